@@ -1,0 +1,40 @@
+"""The language all rooms speak: laws of motion, tables, states, outcomes."""
+
+from scene.laws import BangBang, Fourier, Law
+from scene.load import catalogue, from_data, load, to_data
+from scene.states import (
+    Collision,
+    Horizon,
+    InvalidState,
+    Outcome,
+    Rejected,
+    State,
+    Undecided,
+    Undefined,
+)
+from scene.tables import Cap, Mushroom, Scene, Stem, Wall
+from scene.validity import InvalidScene
+
+__all__ = [
+    "BangBang",
+    "Cap",
+    "Collision",
+    "Fourier",
+    "Horizon",
+    "InvalidScene",
+    "InvalidState",
+    "Law",
+    "Mushroom",
+    "Outcome",
+    "Rejected",
+    "Scene",
+    "State",
+    "Stem",
+    "Undecided",
+    "Undefined",
+    "Wall",
+    "catalogue",
+    "from_data",
+    "load",
+    "to_data",
+]

@@ -1,0 +1,141 @@
+"""Signs of polynomials with rational coefficients, decided exactly (Sturm's theorem).
+
+A polynomial is a list of Fractions, constant term first, without trailing zeros.
+"""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from functools import reduce
+from math import gcd, lcm
+
+Polynomial = list[Fraction]
+
+
+def trimmed(p: Polynomial) -> Polynomial:
+    """Drop leading zeros."""
+    p = list(p)
+    while p and p[-1] == 0:
+        p.pop()
+    return p
+
+
+def add(p: Polynomial, q: Polynomial) -> Polynomial:
+    """Return p + q."""
+    n = max(len(p), len(q))
+    return trimmed([(p[i] if i < len(p) else Fraction(0)) + (q[i] if i < len(q) else 0) for i in range(n)])
+
+
+def multiply(p: Polynomial, q: Polynomial) -> Polynomial:
+    """Return p q."""
+    if not p or not q:
+        return []
+    out = [Fraction(0)] * (len(p) + len(q) - 1)
+    for i, a in enumerate(p):
+        if a:
+            for j, b in enumerate(q):
+                out[i + j] += a * b
+    return trimmed(out)
+
+
+def scale(p: Polynomial, factor: Fraction) -> Polynomial:
+    """Return factor p."""
+    return trimmed([factor * a for a in p])
+
+
+def derivative(p: Polynomial) -> Polynomial:
+    """Return p'."""
+    return [k * a for k, a in enumerate(p)][1:]
+
+
+def at(p: Polynomial, x: Fraction) -> Fraction:
+    """Evaluate p at x, exactly."""
+    return reduce(lambda total, a: total * x + a, reversed(p), Fraction(0))
+
+
+def _primitive(p: Polynomial) -> Polynomial:
+    # A positive multiple with coprime integer coefficients: keeps the chain's numbers small.
+    if not p:
+        return p
+    common = lcm(*(a.denominator for a in p))
+    integers = [int(a * common) for a in p]
+    return [Fraction(a // gcd(*integers)) for a in integers]
+
+
+def divide(p: Polynomial, q: Polynomial) -> tuple[Polynomial, Polynomial]:
+    """Return quotient and remainder of p by q != 0."""
+    rest = list(p)
+    quotient = [Fraction(0)] * max(len(p) - len(q) + 1, 0)
+    for shift in range(len(p) - len(q), -1, -1):
+        factor = rest[shift + len(q) - 1] / q[-1]
+        quotient[shift] = factor
+        for i, b in enumerate(q):
+            rest[shift + i] -= factor * b
+    return trimmed(quotient), trimmed(rest[: len(q) - 1] if len(p) >= len(q) else rest)
+
+
+def squarefree(p: Polynomial) -> Polynomial:
+    """Return p without the multiplicities of its roots (up to a positive factor)."""
+    a, b = _primitive(p), _primitive(derivative(p))
+    while b:
+        a, b = b, _primitive(divide(a, b)[1])
+    quotient = _primitive(divide(p, a)[0])
+    return quotient if (quotient[-1] > 0) == (p[-1] > 0) else scale(quotient, Fraction(-1))
+
+
+class Sturm:
+    """Counts the distinct real roots of a polynomial in intervals."""
+
+    def __init__(self, p: Polynomial) -> None:
+        self.p = p
+        self.root_free_of_squares = squarefree(p)
+        chain = [self.root_free_of_squares, _primitive(derivative(self.root_free_of_squares))]
+        while chain[-1]:
+            chain.append(scale(_primitive(divide(chain[-2], chain[-1])[1]), Fraction(-1)))
+        self.chain = chain[:-1]
+
+    def _variations(self, x: Fraction) -> int:
+        signs = [v > 0 for v in (at(q, x) for q in self.chain) if v != 0]
+        return sum(a != b for a, b in zip(signs, signs[1:], strict=False))
+
+    def n_roots(self, a: Fraction, b: Fraction) -> int:
+        """Count the distinct roots in the open interval (a, b)."""
+        n_half_open = self._variations(a) - self._variations(b)
+        return n_half_open - (at(self.p, b) == 0)
+
+
+def negative_point(p: Polynomial, a: Fraction, b: Fraction) -> Fraction | None:
+    """Return a point of [a, b] at which p < 0, or None when there is none (proof)."""
+    p = trimmed(p)
+    if not p:
+        return None
+    sturm = Sturm(p)
+    todo = [(a, b)]
+    while todo:
+        left, right = todo.pop()
+        ends = at(p, left), at(p, right)
+        if ends[0] < 0:
+            return left
+        if ends[1] < 0:
+            return right
+        n = sturm.n_roots(left, right)
+        middle = (left + right) / 2
+        if at(p, middle) < 0:
+            return middle
+        # No root inside: one sign. One root between two positive ends: it does not change sign.
+        if n == 0 or (n == 1 and ends[0] > 0 and ends[1] > 0):
+            continue
+        todo += [(middle, right), (left, middle)]
+    return None
+
+
+def vanishes(p: Polynomial, a: Fraction, b: Fraction) -> bool:
+    """Tell whether p has a root in the closed interval [a, b]."""
+    p = trimmed(p)
+    return not p or at(p, a) == 0 or at(p, b) == 0 or Sturm(p).n_roots(a, b) > 0
+
+
+def root_bound(p: Polynomial) -> Fraction:
+    """Return a bound on |x| over all roots (Cauchy)."""
+    p = trimmed(p)
+    return 1 + max((abs(a / p[-1]) for a in p[:-1]), default=Fraction(0))

@@ -1,0 +1,82 @@
+"""Scenes from the catalogue, from TOML or JSON files, and from decoded data."""
+
+from __future__ import annotations
+
+import tomllib
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from scene.tables import Scene
+from scene.validity import InvalidScene, check
+
+
+def catalogue() -> list[str]:
+    """Return the names of the scenes that ship with the package, `moving-cap-as-printed` included."""
+    folder = resources.files("scene") / "catalogue"
+    return sorted(entry.name.removesuffix(".toml") for entry in folder.iterdir() if entry.name.endswith(".toml"))
+
+
+def load(source: str | Path) -> Scene:
+    """Load and prove valid a scene.
+
+    Args:
+        source: a catalogue name, or the path of a .toml or .json file in the wire's form.
+
+    Raises:
+        InvalidScene: one line naming the file, the field, the value and the bound.
+    """
+    return from_data(read_data(source), origin=str(source))
+
+
+def read_data(source: str | Path) -> Any:
+    """Read a scene file into plain data, without judging it.
+
+    Raises:
+        InvalidScene: when there is no such scene, or its text is neither TOML nor JSON.
+    """
+    name = str(source)
+    if name in catalogue():
+        return tomllib.loads((resources.files("scene") / "catalogue" / f"{name}.toml").read_text("utf-8"))
+    path = Path(source)
+    if path.suffix not in (".toml", ".json"):
+        raise InvalidScene(f"scene {name!r} is neither a .toml or .json file nor one of: {', '.join(catalogue())}")
+    try:
+        text = path.read_text("utf-8")
+        return tomllib.loads(text) if path.suffix == ".toml" else msgspec.json.decode(text)
+    except OSError as error:
+        raise InvalidScene(f"scene {name!r} cannot be read: {error.strerror}") from None
+    except (ValueError, RecursionError) as error:
+        kind = path.suffix.removeprefix(".").upper()
+        raise InvalidScene(f"scene {name!r} is not valid {kind}: {error}") from None
+
+
+def from_data(data: Any, origin: str = "") -> Scene:
+    """Decode plain data (dicts, lists, numbers) strictly and prove the scene valid.
+
+    Raises:
+        InvalidScene: one line naming the field, the value and the bound.
+    """
+    prefix = f"scene {origin!r}: " if origin else "scene: "
+    try:
+        scene: Scene = msgspec.convert(data, Scene)
+        check(scene)
+    except InvalidScene as error:
+        raise InvalidScene(prefix + str(error)) from None
+    except (msgspec.ValidationError, RecursionError, OverflowError) as error:
+        raise InvalidScene(prefix + str(error).replace("$.", "").replace("$", "scene")) from None
+    return scene
+
+
+def to_data(scene: Scene) -> dict[str, Any]:
+    """Return the wire's form of a scene as plain data."""
+    data: dict[str, Any] = msgspec.to_builtins(scene)
+    return data
+
+
+def json_schema() -> dict[str, Any]:
+    """Return the JSON Schema of a scene file, published as docs/scene.schema.json."""
+    schema = msgspec.json.schema(Scene)
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": "Scene", **schema}

@@ -5,6 +5,7 @@ A polynomial is a list of Fractions, constant term first, without trailing zeros
 
 from __future__ import annotations
 
+import itertools
 from fractions import Fraction
 from functools import reduce
 from math import gcd, lcm
@@ -96,7 +97,7 @@ class Sturm:
 
     def _variations(self, x: Fraction) -> int:
         signs = [v > 0 for v in (at(q, x) for q in self.chain) if v != 0]
-        return sum(a != b for a, b in zip(signs, signs[1:], strict=False))
+        return sum(a != b for a, b in itertools.pairwise(signs))
 
     def n_roots(self, a: Fraction, b: Fraction) -> int:
         """Count the distinct roots in the open interval (a, b)."""

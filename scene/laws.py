@@ -9,6 +9,7 @@ hands that piece out, and `evaluate` works in any of mpmath's number systems (`m
 
 from __future__ import annotations
 
+import itertools
 import math
 from bisect import bisect_right
 from fractions import Fraction
@@ -96,8 +97,11 @@ def _knots_defect(knots: tuple[tuple[float, float], ...]) -> str | None:
         if i and time <= knots[i - 1][0]:
             return f".knots[{i}] time = {time}, must be > {knots[i - 1][0]}"
     if knots[-1][1] != knots[0][1]:
-        return f".knots[{len(knots) - 1}] value = {knots[-1][1]}, must equal the first ({knots[0][1]}): no jumps"
-    if Fraction(knots[-1][0] - knots[0][0]) != Fraction(knots[-1][0]) - Fraction(knots[0][0]):
+        return (
+            f".knots[{len(knots) - 1}] value = {knots[-1][1]}, must equal the first ({knots[0][1]}): no jumps"
+        )
+    span = knots[-1][0] - knots[0][0]
+    if not math.isfinite(span) or Fraction(span) != Fraction(knots[-1][0]) - Fraction(knots[0][0]):
         return f".knots span {knots[0][0]} to {knots[-1][0]}: the period must be a binary64 number"
     return None
 
@@ -122,9 +126,9 @@ def piece_at(law: Law, time: Fraction) -> Piece:
         A float (constant for ever), the Fourier law itself, or the Quadratic up to its end.
     """
     if isinstance(law, BangBang):
-        return _leg_at(law.knots, time)
-    if isinstance(law, Fourier) and is_constant(law):
-        return law.mean
+        return law.knots[0][1] if is_constant(law) else _leg_at(law.knots, time)
+    if isinstance(law, Fourier):
+        return law.mean if is_constant(law) else law
     return law
 
 
@@ -147,7 +151,7 @@ def breakpoints(law: Law) -> list[Fraction]:
     if not isinstance(law, BangBang):
         return []
     times = [Fraction(knot[0]) for knot in law.knots]
-    middles = [(a + b) / 2 for a, b in zip(times, times[1:], strict=False)]
+    middles = [(a + b) / 2 for a, b in itertools.pairwise(times)]
     return sorted(times + middles)
 
 
@@ -200,7 +204,11 @@ def value(ctx: Any, law: Law, t: Any, order: int = 0) -> Any:
     """Evaluate a law at a point (not an interval) of time, in `mp` or `fp`."""
     if isinstance(law, BangBang):
         # A Python float passes through as it is; an mpf becomes the exact rational it stands for.
-        time = Fraction(t) if isinstance(t, (int, float, Fraction)) else Fraction(*t.as_integer_ratio())
+        time = (
+            Fraction(t)
+            if isinstance(t, (int, float, Fraction))
+            else Fraction(*map(int, t.as_integer_ratio()))
+        )
         return evaluate(ctx, piece_at(law, time), t, order)
     return evaluate(ctx, law, t, order)
 

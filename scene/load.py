@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import tomllib
 from importlib import resources
 from pathlib import Path
@@ -16,7 +17,9 @@ from scene.validity import InvalidScene, check
 def catalogue() -> list[str]:
     """Return the names of the scenes that ship with the package, `moving-cap-as-printed` included."""
     folder = resources.files("scene") / "catalogue"
-    return sorted(entry.name.removesuffix(".toml") for entry in folder.iterdir() if entry.name.endswith(".toml"))
+    return sorted(
+        entry.name.removesuffix(".toml") for entry in folder.iterdir() if entry.name.endswith(".toml")
+    )
 
 
 def load(source: str | Path) -> Scene:
@@ -42,10 +45,12 @@ def read_data(source: str | Path) -> Any:
         return tomllib.loads((resources.files("scene") / "catalogue" / f"{name}.toml").read_text("utf-8"))
     path = Path(source)
     if path.suffix not in (".toml", ".json"):
-        raise InvalidScene(f"scene {name!r} is neither a .toml or .json file nor one of: {', '.join(catalogue())}")
+        raise InvalidScene(
+            f"scene {name!r} is neither a .toml or .json file nor one of: {', '.join(catalogue())}"
+        )
     try:
         text = path.read_text("utf-8")
-        return tomllib.loads(text) if path.suffix == ".toml" else msgspec.json.decode(text)
+        return tomllib.loads(text) if path.suffix == ".toml" else json.loads(text)
     except OSError as error:
         raise InvalidScene(f"scene {name!r} cannot be read: {error.strerror}") from None
     except (ValueError, RecursionError) as error:
@@ -66,7 +71,9 @@ def from_data(data: Any, origin: str = "") -> Scene:
     except InvalidScene as error:
         raise InvalidScene(prefix + str(error)) from None
     except (msgspec.ValidationError, RecursionError, OverflowError) as error:
-        raise InvalidScene(prefix + str(error).replace("$.", "").replace("$", "scene")) from None
+        # A key may hold a line break, and the message repeats it.
+        reason = " ".join(str(error).split())
+        raise InvalidScene(prefix + reason.replace("$.", "").replace("$", "scene")) from None
     return scene
 
 

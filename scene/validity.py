@@ -8,12 +8,13 @@ too: nu = 1 at one instant is valid, nu > 1 by one unit in the last place is not
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator
 from fractions import Fraction
 from math import comb, prod
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
-from mpmath import fp
+from mpmath import MPContext
 
 from scene import exact
 from scene.laws import BangBang, Fourier, Law, Quadratic, breakpoints, defect, is_constant, piece_at, value
@@ -77,8 +78,9 @@ def _check_common_period(scene: Scene) -> None:
         (first, a), (second, b) = next(
             ((m, p), (n, q)) for m, p in named.items() for n, q in named.items() if p != q
         )
+        ctx = MPContext()
         raise InvalidScene(
-            f"{first} has period {float(a.value(fp))!r} and {second} has {float(b.value(fp))!r}:"
+            f"{first} has period {ctx.nstr(a.value(ctx), 17)} and {second} has {ctx.nstr(b.value(ctx), 17)}:"
             " all moving laws must share one period exactly (use harmonics for multiples)"
         )
 
@@ -101,7 +103,9 @@ def _polynomials(condition: Condition) -> Iterator[tuple[exact.Polynomial, Fract
         yield from _on_circle(condition)
 
 
-def _on_legs(condition: Condition, legs: list[BangBang]) -> Iterator[tuple[exact.Polynomial, Fraction, Fraction]]:
+def _on_legs(
+    condition: Condition, legs: list[BangBang]
+) -> Iterator[tuple[exact.Polynomial, Fraction, Fraction]]:
     start, span = Fraction(legs[0].knots[0][0]), Fraction(0)
     cuts = {start}
     for law in legs:
@@ -109,12 +113,12 @@ def _on_legs(condition: Condition, legs: list[BangBang]) -> Iterator[tuple[exact
         span = times[-1] - times[0]
         cuts |= {start + (t - start) % span for t in times}
     ordered = [*sorted(cuts), start + span]
-    for a, b in zip(ordered, ordered[1:], strict=False):
+    for a, b in itertools.pairwise(ordered):
         total: exact.Polynomial = []
         for sign, factors in condition.terms:
             term = [Fraction(sign)]
-            for law in factors:
-                term = exact.multiply(term, _leg_polynomial(law, a))
+            for factor in factors:
+                term = exact.multiply(term, _leg_polynomial(factor, a))
             total = exact.add(total, term)
         yield total, Fraction(0), b - a
 
@@ -169,18 +173,19 @@ def _half_angle(law: Law) -> tuple[exact.Polynomial, int]:
 
 
 def _message(scene: Scene, condition: Condition) -> str:
-    # The proof is exact; this only looks for a telling instant to show.
+    # The proof is exact; this only looks for a telling instant to show. In mp no scene overflows.
+    ctx = MPContext()
     shared = period(scene)
-    span = float(shared.value(fp)) if shared else 0.0
+    span = shared.value(ctx) if shared else ctx.mpf(0)
     start = next((law.knots[0][0] for law in laws(scene).values() if isinstance(law, BangBang)), 0.0)
-    times = [start + span * i / 4096 for i in range(4096 if span else 1)]
+    times = [ctx.mpf(start) + span * i / 512 for i in range(512 if span else 1)]
 
-    def excess(t: float) -> float:
-        return sum(sign * prod(value(fp, f, t) for f in factors) for sign, factors in condition.terms)
+    def excess(t: Any) -> Any:
+        return sum(sign * prod(value(ctx, f, t) for f in factors) for sign, factors in condition.terms)
+
+    def shown(number: Any) -> str:
+        return str(ctx.nstr(number, 6))
 
     worst = min(times, key=excess)
-    values = ", ".join(f"{name} = {value(fp, law, worst):.6g}" for name, law in laws(scene).items())
-    margin = excess(worst)
-    return f"{condition.text} fails by {margin:.6g} near t = {worst:.6g}, where {values}"
-
-
+    values = ", ".join(f"{name} = {shown(value(ctx, law, worst))}" for name, law in laws(scene).items())
+    return f"{condition.text} fails by {shown(excess(worst))} near t = {shown(worst)}, where {values}"

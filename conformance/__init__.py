@@ -1,0 +1,1 @@
+"""Holds any stepper to the certified answers and exact properties of moving walls."""

@@ -1,0 +1,79 @@
+"""A scene as the numbers that the compiled kernel reads."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from fast import kernel
+from scene import BangBang, Cap, Fourier, Law, Mushroom, Scene
+from scene.laws import Bounds, bounds, is_constant
+from scene.tables import width_factors
+
+FloatArray = npt.NDArray[np.floating[Any]]
+TABLES = {"Cap": kernel.CAP, "Stem": kernel.STEM, "Mushroom": kernel.MUSHROOM}
+
+
+class Compiled(NamedTuple):
+    """What every kernel entry takes first, in this order."""
+
+    table: int
+    is_relative: bool  # the width row holds nu, and w = nu r
+    laws: FloatArray  # (4, n): radius, width, depth, slope
+    bounds: FloatArray  # (4, 4): lowest, highest, |f'|, |f''| of radius, half-width w, depth, slope
+
+
+def compile_scene(scene: Scene) -> Compiled:
+    """Lay out a valid scene for the kernel."""
+    r: Law = 0.0 if not isinstance(scene, (Cap, Mushroom)) else scene.r
+    h: Law = 0.0
+    slope: Law = 0.0
+    factors: tuple[Law, ...] = (0.0,)
+    if not isinstance(scene, Cap):
+        h, slope, factors = scene.h, scene.slope, width_factors(scene)
+    rows = [_row(law) for law in (r, factors[0], h, slope)]
+    laws = np.zeros((4, max(len(row) for row in rows)))
+    for i, row in enumerate(rows):
+        laws[i, : len(row)] = row
+    limits = np.array([bounds(r), _product_bounds(factors), bounds(h), bounds(slope)])
+    return Compiled(TABLES[type(scene).__name__], len(factors) == 2, laws, limits)
+
+
+def _row(law: Law) -> list[float]:
+    if isinstance(law, Fourier) and not is_constant(law):
+        n = max(len(law.cos), len(law.sin))
+        cos = list(law.cos) + [0.0] * (n - len(law.cos))
+        sin = list(law.sin) + [0.0] * (n - len(law.sin))
+        return [kernel.FOURIER, law.mean, law.omega, float(n), *cos, *sin]
+    if isinstance(law, BangBang) and not is_constant(law):
+        times = [knot[0] for knot in law.knots]
+        values = [knot[1] for knot in law.knots]
+        legs = zip(law.knots, law.knots[1:], strict=False)
+        accelerations = [4.0 * (v1 - v0) / (t1 - t0) / (t1 - t0) for (t0, v0), (t1, v1) in legs]
+        return [
+            kernel.BANG_BANG,
+            0.0,
+            times[-1] - times[0],
+            float(len(times)),
+            *times,
+            *values,
+            *accelerations,
+        ]
+    constant = law if isinstance(law, float) else law.mean if isinstance(law, Fourier) else law.knots[0][1]
+    return [kernel.CONSTANT, constant, 0.0, 0.0]
+
+
+def _product_bounds(factors: tuple[Law, ...]) -> Bounds:
+    if len(factors) == 1:
+        return bounds(factors[0])
+    nu, r = bounds(factors[0]), bounds(factors[1])
+    # Leibniz, rounded outward by a few units in the last place; nu and r are positive.
+    grow = 1.0 + 2.0**-50
+    return Bounds(
+        max(nu.lowest * r.lowest / grow, 0.0),
+        nu.highest * r.highest * grow,
+        (nu.slope * r.highest + nu.highest * r.slope) * grow,
+        (nu.curvature * r.highest + 2 * nu.slope * r.slope + nu.highest * r.curvature) * grow,
+    )

@@ -1,0 +1,165 @@
+"""The fast stepper's face: one step, and a trajectory of steps, on scenes and states."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from fast import kernel
+from fast.compiled import Compiled, FloatArray, compile_scene
+from scene import (
+    Collision,
+    Horizon,
+    InvalidState,
+    Outcome,
+    Rejected,
+    Scene,
+    State,
+    Undecided,
+    Undefined,
+    Wall,
+)
+from scene.states import ON_WALL, check_numbers
+
+WALL_CODES: dict[Wall | None, int] = {
+    None: kernel.NO_WALL,
+    "arc": kernel.ARC,
+    "base": kernel.BASE,
+    "left": kernel.LEFT,
+    "right": kernel.RIGHT,
+    "floor": kernel.FLOOR,
+}
+WALL_NAMES: dict[int, Wall] = {code: name for name, code in WALL_CODES.items() if name}
+REASONS: dict[int, Outcome] = {
+    kernel.SLIDING: Undefined("sliding"),
+    kernel.MOUTH_EDGE: Undefined("mouth-edge"),
+    kernel.TOO_MANY: Undecided(f"no hit within {kernel.MAX_PARABOLAS} sub-intervals"),
+    kernel.TANGENT: Undecided("f and f' vanish together within rounding"),
+    kernel.CORNER: Undecided("two walls are hit together within rounding"),
+    kernel.EDGE: Undecided("the mouth's edge is hit within rounding"),
+    kernel.START: Undecided("the state is on another wall within rounding"),
+    kernel.APPROACHING: Rejected("state.wall: the particle starts on a wall and moves into it"),
+}
+# v^2 and r^2 must neither overflow nor vanish beside each other.
+LARGEST = 2.0**400
+
+
+@lru_cache(maxsize=256)
+def _compiled(scene: Scene) -> Compiled:
+    return compile_scene(scene)
+
+
+def next_collision(scene: Scene, state: State, t_end: float) -> Outcome:
+    """Find the first wall the particle meets after `state.t`, in binary64.
+
+    Args:
+        scene: table and laws of motion.
+        state: position (x, y) [length], velocity (vx, vy) [length/time], wall being left or None.
+        t_end: horizon [time], t_end >= state.t.
+
+    Returns:
+        Collision, Horizon, Undefined, Undecided where rounding leaves it open, or Rejected for
+        a state that is none of this table.
+
+    Source: Gelfreich, Rom-Kedar, Turaev (2014), sec. 3.1.
+    """
+    try:
+        _check(scene, state, t_end)
+    except InvalidState as error:
+        return Rejected(str(error))
+    p = np.array([state.t, 0.0, state.x, state.y, state.vx, state.vy])
+    low_end = t_end - state.t
+    code, dt = kernel.single_step(*_compiled(scene), p, WALL_CODES[state.wall], low_end)
+    if code in WALL_NAMES:
+        return Collision(WALL_NAMES[code], dt, *(float(p[i]) for i in (0, 2, 3, 4, 5)))
+    if code == kernel.HORIZON:
+        return Horizon(t_end, *(float(p[i]) for i in (2, 3, 4, 5)))
+    return _trouble(code, state, WALL_NAMES.get(int(dt)) if code == kernel.OUTSIDE else None)
+
+
+class Trajectory(NamedTuple):
+    """Successive collisions, and why they ended.
+
+    Attributes:
+        walls: (n,) names of the walls hit.
+        steps: (n, 6) dt, t, x, y, vx, vy after each collision.
+        outcome: None when all collisions asked for were found, else what came instead.
+    """
+
+    walls: list[Wall]
+    steps: FloatArray
+    outcome: Outcome | None
+
+
+def trajectory(scene: Scene, state: State, n_collisions: int, t_end: float = np.inf) -> Trajectory:
+    """Follow a particle through `n_collisions` collisions, time carried as a compensated pair.
+
+    Args:
+        scene: table and laws of motion.
+        state: the start, as for `next_collision`.
+        n_collisions: how many collisions to follow, >= 0.
+        t_end: horizon [time]; infinity for none.
+
+    Raises:
+        InvalidState: naming field, value and bound.
+    """
+    _check(scene, state, t_end if np.isfinite(t_end) else state.t)
+    if n_collisions < 0:
+        raise InvalidState(f"n_collisions = {n_collisions}, must be >= 0")
+    steps: FloatArray = np.empty((n_collisions, 6))
+    codes: npt.NDArray[np.int64] = np.empty(n_collisions, dtype=np.int64)
+    p = np.array([state.t, 0.0, state.x, state.y, state.vx, state.vy])
+    n, code = kernel.trajectory(*_compiled(scene), p, WALL_CODES[state.wall], t_end, steps, codes)
+    walls = [WALL_NAMES[int(c)] for c in codes[:n]]
+    outcome: Outcome | None = None
+    if n < n_collisions:
+        is_horizon = code == kernel.HORIZON
+        outcome = Horizon(t_end, *(float(v) for v in p[2:])) if is_horizon else _trouble(code, state, None)
+    return Trajectory(walls, steps[:n], outcome)
+
+
+def _check(scene: Scene, state: State, t_end: float) -> None:
+    check_numbers(scene, state, t_end)
+    for field in ("x", "y", "vx", "vy"):
+        if abs(getattr(state, field)) > LARGEST:
+            raise InvalidState(f"state.{field} = {getattr(state, field)!r}, must be below 2^400 in size")
+    speed = max(abs(state.vx), abs(state.vy))
+    if 0.0 < speed < 1.0 / LARGEST:
+        raise InvalidState(f"speed = {speed!r}, must be 0 or at least 2^-400")
+    if state.wall is not None:
+        gap, size = wall_gap(scene, state)
+        if abs(gap) > ON_WALL * size:
+            raise InvalidState(f"state.wall = {state.wall!r}, but the state is {gap:.3g} away from that wall")
+
+
+def wall_gap(scene: Scene, state: State) -> tuple[float, float]:
+    """Return how far a state is inside the wall it claims to leave, and that wall's distance from 0."""
+    compiled = _compiled(scene)
+    if state.wall == "base":
+        return state.y, float(max(compiled.bounds[0, 1], compiled.bounds[1, 1]))
+    anchors = np.zeros((4, kernel.N_ANCHOR))
+    kernel.set_anchors(compiled.laws, anchors, state.t, 0.0)
+    f, _ = kernel.wall_residual(
+        WALL_CODES[state.wall],
+        state.x,
+        state.y,
+        compiled.laws,
+        anchors,
+        compiled.bounds,
+        compiled.is_relative,
+    )
+    if state.wall == "arc":
+        return float(f / (2 * anchors[0, 0])), float(anchors[0, 0])
+    return float(f), float(compiled.bounds[2, 1] if state.wall == "floor" else compiled.bounds[1, 1])
+
+
+def _trouble(code: int, state: State, wall: Wall | None) -> Outcome:
+    if code == kernel.FAR_TIME:
+        return Rejected(f"state.t = {state.t!r} is more than 2^27 quarter periods from 0: its phase is lost")
+    if code == kernel.OUTSIDE:
+        where = f"beyond wall {wall}" if wall else "outside the table"
+        return Rejected(f"state (x, y) = ({state.x!r}, {state.y!r}) at t = {state.t!r} is {where}")
+    return REASONS[code]

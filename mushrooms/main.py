@@ -1,0 +1,375 @@
+"""The command line. Bad input of any kind is one line on stderr and exit code 2."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated, Any, NoReturn
+
+import typer
+from rich import progress
+from rich.console import Console
+from rich.table import Table
+
+import mushrooms
+import scene as scenes
+from mushrooms import output
+from scene.load import read_data
+from scene.tables import period
+
+PROGRAM = "mushrooms"
+MAX_PARTICLES = 10**8
+MAX_DIGITS = 1000
+UsageError: type[Any] = typer.BadParameter.__bases__[
+    0
+]  # typer 0.26 carries its own click; this names either's
+
+app = typer.Typer(
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+    help="Particles between moving walls: theory, simulation and the audit of Oscillating mushrooms.",
+    epilog="Example: mushrooms audit --out audit-report",
+)
+
+SceneName = Annotated[
+    str, typer.Argument(metavar="SCENE", help="A catalogue name, or a .toml or .json file.")
+]
+AsJson = Annotated[bool, typer.Option("--json", help="Print JSON.")]
+Seed = Annotated[int, typer.Option(help="Seed of the random starts, 0 to 2^64 - 1.")]
+Threads = Annotated[int | None, typer.Option(help="Threads; all cores by default.")]
+Folder = Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder for the results.")]
+
+
+def run(arguments: list[str] | None = None) -> NoReturn:
+    """Run the command line and exit: 0 done, 1 a claim failed, 2 bad input, 130 interrupted."""
+    try:
+        code = typer.main.get_command(app)(arguments, prog_name=PROGRAM, standalone_mode=False)
+        sys.stdout.flush()
+    except (KeyboardInterrupt, typer.Abort):
+        sys.exit(130)
+    except BrokenPipeError:
+        # The reader has gone: nothing to say, and nothing left for the interpreter to flush.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        sys.exit(1)
+    except UsageError as error:
+        _refuse(error.format_message())
+    except (ValueError, OSError) as error:
+        _refuse(str(error))
+    except MemoryError:
+        _refuse("not enough memory for so many particles")
+    sys.exit(code if isinstance(code, int) else 0)
+
+
+def _refuse(message: str) -> NoReturn:
+    print(f"{PROGRAM}: {' '.join(message.split())}", file=sys.stderr)
+    sys.exit(2)
+
+
+def _print_version(is_wanted: bool) -> None:
+    if is_wanted:
+        print(f"{PROGRAM} {mushrooms.__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def main(
+    _version: Annotated[
+        bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version.")
+    ] = False,
+) -> None:
+    """Hold the options that come before any command."""
+
+
+@app.command("scenes", epilog="Example: mushrooms scenes --json")
+def list_scenes(as_json: AsJson = False) -> None:
+    """List the catalogue; the scene that is refused is shown with its reason."""
+    rows = [_catalogue_row(name) for name in scenes.catalogue()]
+    if as_json:
+        print(json.dumps(rows, indent=2, ensure_ascii=False))
+        return
+    table = Table("name", "table", "period", "notes", title="Catalogue")
+    for row in rows:
+        length = (
+            "refused" if row["refused"] else "static" if row["period"] is None else f"{row['period']:.6g}"
+        )
+        notes = f"Refused: {row['refused']}" if row["refused"] else row["notes"]
+        table.add_row(row["name"], row["table"], length, notes)
+    _console().print(table)
+
+
+def _catalogue_row(name: str) -> dict[str, Any]:
+    data = read_data(name)
+    row = {
+        "name": name,
+        "table": data["table"],
+        "period": None,
+        "notes": data.get("notes", ""),
+        "refused": None,
+    }
+    try:
+        shared = period(scenes.load(name))
+    except scenes.InvalidScene as error:
+        return row | {"refused": str(error).partition(": ")[2]}
+    return row | {"period": _float_period(shared)}
+
+
+def _float_period(shared: Any) -> float | None:
+    from mpmath import fp
+
+    return None if shared is None else float(shared.value(fp))
+
+
+@app.command("theory", epilog="Example: mushrooms theory moving-cap --digits 40")
+def predict(
+    scene: SceneName,
+    digits: Annotated[int, typer.Option(help=f"Correct digits, 1 to {MAX_DIGITS}.")] = 15,
+    as_json: AsJson = False,
+) -> None:
+    """Print the paper's predictions for one cycle as decimal strings."""
+    import theory
+
+    _check_range("--digits", digits, 1, MAX_DIGITS)
+    strings = theory.predict(scenes.load(scene), digits).strings(digits)
+    _print_pairs(strings, as_json)
+
+
+@app.command(
+    epilog="Example: mushrooms simulate moving-cap --particles 25000 --energy 1e7 --seed 1 --out run"
+)
+def simulate(
+    scene: SceneName,
+    particles: Annotated[int, typer.Option(help="Number of particles, 1 to 10^8.")],
+    energy: Annotated[float, typer.Option(help="Initial energy v²/2 of every particle, > 0.")],
+    cycles: Annotated[int, typer.Option(help="Cycles of the walls, at least 1.")] = 1,
+    seed: Seed = 0,
+    out: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="Folder for ensemble.npz and summary.json.")
+    ] = None,
+    threads: Threads = None,
+    as_json: AsJson = False,
+) -> None:
+    """Simulate an ensemble; undecided particles are counted, never guessed.
+
+    Prints particles, collisions, lost (not followed to the end), undecided (those of the lost
+    that the stepper could not decide), m1 (mean of log E/E0 per cycle) with its standard error, p_nc
+    (share of cycles without capture), ns_per_collision (and thread) and the SHA-256 of the result.
+    """
+    if not (math.isfinite(energy) and energy > 0):
+        raise ValueError(f"--energy = {energy}, must be finite and > 0")
+    _check_range("--particles", particles, 1, MAX_PARTICLES)
+    _check_range("--cycles", cycles, 1)
+    _check_common(seed, threads)
+    table = scenes.load(scene)
+    with _maybe_folder(out) as folder:
+        import numpy as np
+
+        import fast
+
+        with _progress() as bar:
+            advance = _task(bar, table.name or scene, particles)
+            ensemble = fast.simulate(
+                table,
+                n_particles=particles,
+                energy=energy,
+                n_cycles=cycles,
+                seed=seed,
+                threads=threads,
+                progress=advance,
+            )
+        summary = _summary(table, ensemble, cycles)
+        if folder is not None:
+            fields = {
+                name: value
+                for name, value in ensemble._asdict().items()
+                if name not in ("seconds", "threads")
+            }
+            text = json.dumps(
+                {"scene": scenes.to_data(table), "energy": energy, "cycles": cycles, "seed": seed} | summary
+            )
+            output.write_files(
+                folder,
+                {
+                    "ensemble.npz": lambda file: np.savez(file, **fields),
+                    "summary.json": lambda file: _write_text(file, text + "\n"),
+                },
+            )
+    _print_pairs(summary, as_json)
+
+
+def _summary(table: scenes.Scene, ensemble: Any, n_cycles: int) -> dict[str, Any]:
+    import numpy as np
+
+    followed = ensemble.outcome == 0
+    n = int(followed.sum())
+    gain = np.log(ensemble.energy[followed] / ensemble.energy0) / n_cycles
+    has_island = isinstance(table, scenes.Mushroom)
+    return {
+        "particles": len(ensemble.energy),
+        "collisions": int(ensemble.n_collisions.sum()),
+        "lost": len(ensemble.energy) - n,
+        "undecided": int((ensemble.outcome == 1).sum()),
+        "m1": _finite(gain.mean()) if n else None,
+        "m1_se": _finite(gain.std(ddof=1) / math.sqrt(n)) if n > 1 else None,
+        "p_nc": float(np.isnan(ensemble.t_in[followed]).mean()) if n and has_island else None,
+        "ns_per_collision": _finite(ensemble.ns_per_collision()),
+        "sha256": ensemble.sha256(),
+    }
+
+
+def _finite(value: float) -> float | None:
+    return float(value) if math.isfinite(value) else None
+
+
+@app.command(epilog="Example: mushrooms audit --particles 20000 --out audit-report")
+def audit(
+    out: Folder = Path("audit-report"),
+    particles: Annotated[int, typer.Option(help="Particles per scene, 2000 to 10^8.")] = 10_000,
+    seed: Seed = 0,
+    threads: Threads = None,
+    as_json: AsJson = False,
+) -> None:
+    """Check the paper's claims; writes report.html and report.json.
+
+    Exit code 0 when every claim has its expected verdict, 1 when one has not, 2 on bad input.
+    """
+    import fast
+    from conformance import audit as ledger
+    from mushrooms import report
+
+    _check_range("--particles", particles, ledger.MIN_PARTICLES, MAX_PARTICLES)
+    _check_common(seed, threads)
+    with output.writable_folder(out) as folder:
+        start = time.perf_counter()
+        with _progress() as bar:
+            tasks: dict[str, Callable[[int], None]] = {}
+
+            def advance(name: str, n_done: int) -> None:
+                if name not in tasks:
+                    tasks[name] = _task(bar, name, particles)
+                tasks[name](n_done)
+
+            ensembles = ledger.run_ensembles(
+                fast.simulate, n_particles=particles, seed=seed, threads=threads, progress=advance
+            )
+        samples = {name: ledger.measure(scenes.load(name), ensemble) for name, ensemble in ensembles.items()}
+        findings = ledger.examine(samples)
+        result = report.Audit(particles, seed, time.perf_counter() - start, ensembles, samples, findings)
+        text, page = report.to_json(result), report.to_html(result)
+        output.write_files(
+            folder,
+            {
+                "report.json": lambda file: _write_text(file, text),
+                "report.html": lambda file: _write_text(file, page),
+            },
+        )
+    if as_json:
+        print(text, end="")
+    else:
+        _print_findings(report.to_data(result)["findings"], report.measured_text)
+        n_right = sum(finding.is_as_expected for finding in findings)
+        print(f"{n_right} of {len(findings)} claims have their expected verdict.")
+        print(f"Report: {folder / 'report.html'}")
+    raise typer.Exit(0 if result.is_passed else 1)
+
+
+def _print_findings(findings: list[dict[str, Any]], measured: Callable[[dict[str, Any]], str]) -> None:
+    table = Table("claim", "paper", "theory", "simulation ± standard error", "band", "verdict", title="Audit")
+    for finding in findings:
+        verdict = finding["verdict"]
+        if not finding["as_expected"]:
+            verdict = f"[bold red]{verdict}[/] (expected: {finding['expected']})"
+        table.add_row(
+            f"[bold]{finding['id']}[/]\n{finding['claim']}",
+            finding["paper"] or "–",
+            finding["theory"],
+            measured(finding),
+            "–" if finding["band"] is None else f"{finding['band']:.5f}",
+            verdict,
+            end_section=True,
+        )
+    _console().print(table)
+
+
+@app.command(epilog="Example: mushrooms draw moving-cap --out moving-cap.svg")
+def draw(
+    scene: SceneName,
+    out: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="A .svg, .png or .gif file; SCENE's name with .svg by default."),
+    ] = None,
+) -> None:
+    """Draw the walls through the cycle, with a few chords of one particle; a .gif moves."""
+    table = scenes.load(scene)
+    path = out or Path(f"{Path(scene).stem}.svg")
+    from mushrooms import draw as pictures
+
+    output.check_file(path, pictures.SUFFIXES)
+    output.write_files(
+        path.parent, {path.name: lambda file: pictures.write_picture(table, path.suffix, file)}
+    )
+    print(path)
+
+
+def _check_range(option: str, value: int, low: int, high: int | None = None) -> None:
+    if value < low or (high is not None and value > high):
+        raise ValueError(
+            f"{option} = {value}, must be " + (f">= {low}" if high is None else f"{low} to {high}")
+        )
+
+
+def _check_common(seed: int, threads: int | None) -> None:
+    _check_range("--seed", seed, 0, 2**64 - 1)
+    if threads is not None:
+        _check_range("--threads", threads, 1)
+
+
+@contextmanager
+def _maybe_folder(path: Path | None) -> Iterator[Path | None]:
+    if path is None:
+        yield None
+    else:
+        with output.writable_folder(path) as folder:
+            yield folder
+
+
+def _console() -> Console:
+    # A pipe has no width: lines long enough for the tables.
+    return Console() if sys.stdout.isatty() else Console(width=140)
+
+
+def _progress() -> progress.Progress:
+    console = Console(stderr=True)
+    return progress.Progress(
+        progress.TextColumn("{task.description}"),
+        progress.BarColumn(),
+        progress.MofNCompleteColumn(),
+        progress.TimeRemainingColumn(),
+        console=console,
+        disable=not console.is_terminal,
+        transient=True,
+    )
+
+
+def _task(bar: progress.Progress, name: str, total: int) -> Callable[[int], None]:
+    task = bar.add_task(name, total=total)
+    return lambda n_done: bar.update(task, completed=n_done)
+
+
+def _print_pairs(pairs: dict[str, Any], as_json: bool) -> None:
+    if as_json:
+        print(json.dumps(pairs, indent=2))
+        return
+    width = max(map(len, pairs))
+    for name, value in pairs.items():
+        print(f"{name:<{width}}  {'–' if value is None else value}")
+
+
+def _write_text(file: Any, text: str) -> None:
+    file.write(text.encode("utf-8"))

@@ -1,0 +1,96 @@
+"""Output, refused early or written whole.
+
+A folder is proved writable before work starts; a file appears under its name only when complete.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import BinaryIO
+
+Writer = Callable[[BinaryIO], None]
+
+
+@contextmanager
+def writable_folder(path: Path) -> Iterator[Path]:
+    """Make a folder, prove that files can be written in it, and tidy up if the work fails.
+
+    Args:
+        path: the folder; missing parents are made too.
+
+    Raises:
+        ValueError: one line naming the path and what is wrong with it.
+    """
+    made = []
+    folder = path
+    while not os.path.lexists(folder):
+        made.append(folder)
+        folder = folder.parent
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+        probe = _part(path / "probe")
+        probe.write_bytes(b"")
+        probe.unlink()
+    except (FileExistsError, NotADirectoryError):
+        raise ValueError(f"output {str(path)!r}: {str(folder)!r} is a file, must be a folder") from None
+    except OSError as error:
+        _remove_empty(made)
+        raise ValueError(f"output {str(path)!r} must be a writable folder: {error.strerror}") from None
+    try:
+        yield path
+    except BaseException:
+        _remove_empty(made)
+        raise
+
+
+def check_file(path: Path, suffixes: tuple[str, ...]) -> None:
+    """Prove that a file of one of these kinds can be written at `path`.
+
+    Raises:
+        ValueError: one line naming the path and what is wrong with it.
+    """
+    if path.suffix not in suffixes:
+        raise ValueError(f"output {str(path)!r}: its ending must be one of {', '.join(suffixes)}")
+    if path.is_dir():
+        raise ValueError(f"output {str(path)!r} is a folder, must be a file")
+    try:
+        probe = _part(path)
+        probe.write_bytes(b"")
+        probe.unlink()
+    except OSError as error:
+        raise ValueError(f"output {str(path)!r} cannot be written: {error.strerror}") from None
+
+
+def write_files(folder: Path, writers: Mapping[str, Writer]) -> None:
+    """Write files completely under hidden names, then give all of them their names.
+
+    Args:
+        folder: an existing folder.
+        writers: per file name, what writes its content into an open binary file.
+    """
+    try:
+        for name, writer in writers.items():
+            with _part(folder / name).open("wb") as file:
+                writer(file)
+                file.flush()
+                os.fsync(file.fileno())
+        for name in writers:
+            _part(folder / name).replace(folder / name)
+    finally:
+        for name in writers:
+            _part(folder / name).unlink(missing_ok=True)
+
+
+def _part(path: Path) -> Path:
+    return path.with_name(f".{path.name}.{os.getpid()}.part")
+
+
+def _remove_empty(folders: list[Path]) -> None:
+    for folder in folders:
+        try:
+            folder.rmdir()
+        except OSError:
+            return

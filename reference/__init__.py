@@ -1,0 +1,15 @@
+"""Ground truth: a slow stepper whose every answer is an enclosure, proved to be first."""
+
+from reference.arithmetic import Enclosure
+from reference.stepper import Collision, Horizon, Moment, Outcome, Trajectory, next_collision, trajectory
+
+__all__ = [
+    "Collision",
+    "Enclosure",
+    "Horizon",
+    "Moment",
+    "Outcome",
+    "Trajectory",
+    "next_collision",
+    "trajectory",
+]

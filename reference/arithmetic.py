@@ -1,0 +1,145 @@
+"""Sound interval arithmetic at a private precision, on mpmath's `iv`.
+
+Only operations known to be sound are used: + - * / sqrt, integer squares, and cos and sin in
+one call. mpmath's interval `exp` is not sound and is not here. Comparisons never guess: `sign`
+says 0 when an interval does not decide. Each Arithmetic owns its context, so threads working at
+different precisions do not disturb each other, and mpmath's global precision is never touched.
+"""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from typing import Any, NamedTuple
+
+import mpmath
+from mpmath.ctx_iv import MPIntervalContext
+from mpmath.libmp import libmpf, libmpi
+
+Interval = Any  # mpmath's ivmpf, which has no type stubs
+
+BITS_PER_DIGIT = 3.3219280948873626
+_FLOOR, _CEILING = "f", "c"
+
+
+class Undecidable(Exception):  # noqa: N818 (not an error of the caller: precision is raised)
+    """At this precision the question stays open."""
+
+
+class Enclosure(NamedTuple):
+    """lo <= truth <= hi, both exact mpf."""
+
+    lo: Any
+    hi: Any
+
+    def __float__(self) -> float:
+        """Return the centre, correctly rounded to binary64."""
+        lo, hi = rational(self.lo._mpf_), rational(self.hi._mpf_)
+        return float((lo + hi) / 2)
+
+    def width(self) -> float:
+        """Return hi - lo, rounded."""
+        return float(rational(self.hi._mpf_) - rational(self.lo._mpf_))
+
+    def contains(self, number: float | Fraction) -> bool:
+        """Tell exactly whether a number lies within."""
+        return rational(self.lo._mpf_) <= Fraction(number) <= rational(self.hi._mpf_)
+
+
+def rational(raw: tuple[int, int, int, int]) -> Fraction:
+    """Return the rational that a raw finite mpf stands for."""
+    numerator, denominator = libmpf.to_rational(raw)
+    return Fraction(int(numerator), int(denominator))
+
+
+class Arithmetic:
+    """Interval arithmetic at a fixed precision.
+
+    Args:
+        digits: working decimals.
+    """
+
+    def __init__(self, digits: int) -> None:
+        self.digits = digits
+        self.context = MPIntervalContext()
+        self.context.prec = self.prec = int(digits * BITS_PER_DIGIT) + 8
+        self.zero: Interval = self.context.mpf(0)
+
+    def number(self, value: float | int | Fraction) -> Interval:
+        """Enclose a number: exactly when it is a float or a short integer."""
+        if isinstance(value, Fraction):
+            return self.context.mpf(value.numerator) / self.context.mpf(value.denominator)
+        return self.context.mpf(value)
+
+    def point(self, raw: Any) -> Interval:
+        """Return the thin interval at a raw mpf."""
+        return self.context.make_mpf((raw, raw))
+
+    def lower(self, x: Interval) -> Interval:
+        """Return the lower end as a thin interval."""
+        return self.point(x._mpi_[0])
+
+    def upper(self, x: Interval) -> Interval:
+        """Return the upper end as a thin interval."""
+        return self.point(x._mpi_[1])
+
+    def hull(self, x: Interval, y: Interval) -> Interval:
+        """Return the interval from the lower end of x to the upper end of y."""
+        return self.context.make_mpf((x._mpi_[0], y._mpi_[1]))
+
+    def middle(self, x: Interval) -> Interval:
+        """Return a short dyadic point well inside x (half way when x is very thin)."""
+        a, b = x._mpi_
+        exact = libmpf.mpf_shift(libmpf.mpf_add(a, b), -1)
+        short = libmpf.mpf_pos(exact, 53, "n")
+        inside = libmpf.mpf_lt(a, short) and libmpf.mpf_lt(short, b)
+        return self.point(short if inside else exact)
+
+    def intersection(self, x: Interval, y: Interval) -> Interval:
+        """Return the common part of two intervals that meet."""
+        lo = x._mpi_[0] if libmpf.mpf_gt(x._mpi_[0], y._mpi_[0]) else y._mpi_[0]
+        hi = x._mpi_[1] if libmpf.mpf_lt(x._mpi_[1], y._mpi_[1]) else y._mpi_[1]
+        if libmpf.mpf_gt(lo, hi):
+            raise Undecidable("disjoint enclosures of one number")
+        return self.context.make_mpf((lo, hi))
+
+    def square(self, x: Interval) -> Interval:
+        """Return x^2, never below 0."""
+        return self.context.make_mpf(libmpi.mpi_square(x._mpi_, self.prec))
+
+    def cos_sin(self, x: Interval) -> tuple[Interval, Interval]:
+        """Return cos x and sin x; wide arguments give [-1, 1]."""
+        a, b = x._mpi_
+        if libmpf.mpf_gt(libmpf.mpf_sub(b, a, 30, _FLOOR), libmpf.from_int(3)):
+            whole = self.context.mpf([-1, 1])
+            return whole, whole
+        cos, sin = libmpi.mpi_cos_sin(x._mpi_, self.prec)
+        return self.context.make_mpf(cos), self.context.make_mpf(sin)
+
+    def enclosure(self, x: Interval) -> Enclosure:
+        """Return the ends as exact numbers, free of this context."""
+        lo, hi = x._mpi_
+        return Enclosure(mpmath.mp.make_mpf(lo), mpmath.mp.make_mpf(hi))
+
+
+def sign(x: Interval) -> int:
+    """Return +1 or -1 when all of x has that sign, 0 when that is not so."""
+    lo, hi = x._mpi_
+    if libmpf.mpf_sign(lo) > 0:
+        return 1
+    return -1 if libmpf.mpf_sign(hi) < 0 else 0
+
+
+def is_below(x: Interval, y: Interval) -> bool:
+    """Tell whether every number of x is smaller than every number of y."""
+    return bool(libmpf.mpf_lt(x._mpi_[1], y._mpi_[0]))
+
+
+def is_at_most_zero(x: Interval) -> bool:
+    """Tell whether no number of x is positive."""
+    return bool(libmpf.mpf_sign(x._mpi_[1]) <= 0)
+
+
+def as_rational(x: Interval) -> Fraction | None:
+    """Return the number a thin interval stands for, or None."""
+    lo, hi = x._mpi_
+    return rational(lo) if lo == hi else None

@@ -1,0 +1,63 @@
+"""The Jacobian of a step, by implicit differentiation of the wall equation.
+
+With event point q = (x + vx s, y + vy s, t + s) and D = f'(s), the root's condition gives
+ds = -(f_q . dq at fixed s) / D, and the bounce v' = v - 2 D N / |N|^2 with N = (f_x, f_y) is
+differentiated through the second partials of f. Where the wall being left is met again, the
+equation is f(s) = f(0), and f(0) moves with the state too.
+"""
+
+from __future__ import annotations
+
+from reference.arithmetic import Arithmetic, Enclosure, Interval
+from reference.course import Hit
+from reference.jets import Flight
+
+INPUTS = ("t", "x", "y", "vx", "vy")
+OUTPUTS = ("dt", "x", "y", "vx", "vy")
+Matrix = list[list[Interval]]
+
+
+def step_jacobian(
+    arithmetic: Arithmetic, flight: Flight, hit: Hit, origin: tuple[Interval, Interval, Interval] | None
+) -> Matrix:
+    """Enclose the derivatives of (dt, x, y, vx, vy) after the bounce by (t, x, y, vx, vy) before.
+
+    Args:
+        arithmetic: working precision.
+        flight: the state before.
+        hit: the first collision.
+        origin: f_x, f_y, f_t at the start when the wall hit is the one being left, else None; None
+            there too gives the derivative with the residual held fixed, as a chain of steps needs.
+
+    Returns:
+        5 rows (outputs) of 5 columns (inputs), intervals.
+    """
+    zero, one = arithmetic.zero, arithmetic.number(1)
+    s, d = hit.time, hit.slope
+    f_x, f_y, f_t = hit.motion.gradient(hit.wall, s)
+    f_xx, f_yy, f_yt, f_tt = hit.motion.hessian(hit.wall, s)
+    n2 = arithmetic.square(f_x) + arithmetic.square(f_y)
+    columns = []
+    for i in range(5):
+        e_t, e_x, e_y, e_vx, e_vy = (one if i == j else zero for j in range(5))
+        x, y = e_x + s * e_vx, e_y + s * e_vy
+        change = f_x * x + f_y * y + f_t * e_t
+        if origin is not None:
+            change = change - (origin[0] * e_x + origin[1] * e_y + origin[2] * e_t)
+        ds = -change / d
+        x, y, t = x + flight.vx * ds, y + flight.vy * ds, e_t + ds
+        d_x, d_y, d_t = f_xx * x, f_yy * y + f_yt * t, f_yt * y + f_tt * t
+        dd = d_x * flight.vx + d_y * flight.vy + d_t + f_x * e_vx + f_y * e_vy
+        dn2 = 2 * (f_x * d_x + f_y * d_y)
+        push = 2 * d / n2
+        dpush = 2 * dd / n2 - push * dn2 / n2
+        columns.append([ds, x, y, e_vx - dpush * f_x - push * d_x, e_vy - dpush * f_y - push * d_y])
+    if hit.wall == "base":
+        for column in columns:
+            column[2] = zero
+    return [[columns[i][k] for i in range(5)] for k in range(5)]
+
+
+def enclosures(arithmetic: Arithmetic, matrix: Matrix) -> tuple[tuple[Enclosure, ...], ...]:
+    """Return a matrix free of its working precision."""
+    return tuple(tuple(arithmetic.enclosure(entry) for entry in row) for row in matrix)

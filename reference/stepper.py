@@ -1,0 +1,371 @@
+"""Ground truth: the first collision and trajectories, enclosed and proved at any precision.
+
+`next_collision` doubles the working precision until the answer is proved or a cap is reached;
+then it says `Undecided`. A trajectory restarts at a higher precision until its last state is
+enclosed to the digits asked for.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from fractions import Fraction
+from typing import NamedTuple
+
+import scene as wire
+from reference import rational
+from reference.arithmetic import Arithmetic, Enclosure, Interval, Undecidable, sign
+from reference.course import SIDES, Course, Event, Hit
+from reference.isolation import Leaf
+from reference.jacobian import enclosures, step_jacobian
+from reference.jets import Flight, Motion
+from scene import Cap, InvalidState, Mushroom, Rejected, Scene, State, Stem, Undecided, Undefined, Wall
+from scene.laws import bounds, is_constant, piece_at
+from scene.states import ON_WALL, check_numbers
+from scene.tables import laws
+
+GUARD_DIGITS = 15
+DOUBLINGS = 3
+
+
+class Moment(NamedTuple):
+    """A state, all components enclosed."""
+
+    t: Enclosure
+    x: Enclosure
+    y: Enclosure
+    vx: Enclosure
+    vy: Enclosure
+
+
+Jacobian = tuple[tuple[Enclosure, ...], ...]
+
+
+@dataclass(frozen=True)
+class Collision:
+    """A proved first collision.
+
+    Attributes:
+        wall: the wall met.
+        dt: flight time [time].
+        after: the state just after the bounce.
+        slope: f' at the hit, < 0.
+        digits: working decimals that decided it.
+        proof: for each wall, the sub-intervals of flight time on which f > 0 was proved.
+        jacobian: d(dt, x, y, vx, vy) / d(t, x, y, vx, vy), rows by outputs, when asked for.
+    """
+
+    wall: Wall
+    dt: Enclosure
+    after: Moment
+    slope: Enclosure
+    digits: int
+    proof: dict[str, list[Leaf]] = field(repr=False)
+    jacobian: Jacobian | None = field(repr=False, default=None)
+
+    def rounded(self) -> wire.Collision:
+        """Return the centres, correctly rounded, in the wire's form."""
+        return wire.Collision(self.wall, float(self.dt), *(float(c) for c in self.after))
+
+
+@dataclass(frozen=True)
+class Horizon:
+    """Proved: no collision before t_end; the state there, enclosed."""
+
+    at: Moment
+    digits: int
+    proof: dict[str, list[Leaf]] = field(repr=False)
+
+    def rounded(self) -> wire.Horizon:
+        """Return the centres, correctly rounded, in the wire's form."""
+        return wire.Horizon(*(float(c) for c in self.at))
+
+
+Outcome = Collision | Horizon | Undefined | Undecided | Rejected
+
+
+class _Chain(NamedTuple):
+    """Where a trajectory stands: enclosures, the wall left and its residual."""
+
+    flight: Flight
+    leaving: dict[Wall, Interval]
+
+
+def next_collision(
+    scene: Scene, state: State, t_end: float, *, digits: int = 50, is_differentiated: bool = False
+) -> Outcome:
+    """Find the first wall the particle meets after `state.t`, proved to be first.
+
+    Args:
+        scene: table and laws of motion; numbers are exact binary64.
+        state: position (x, y) [length], velocity (vx, vy) [length/time], wall being left or None.
+        t_end: horizon [time], t_end >= state.t.
+        digits: correct decimals wanted, >= 1; guard digits are added inside.
+        is_differentiated: give the Jacobian of the step too.
+
+    Returns:
+        Collision, its time enclosed to a relative 10**-digits; Horizon; Undefined; Undecided; or
+        Rejected for a state that is none of this table.
+
+    Source: Gelfreich, Rom-Kedar, Turaev (2014), sec. 3.1. Method: isolate, exclude, refine.
+    """
+    working = digits + GUARD_DIGITS
+    open_question = ""
+    for _ in range(DOUBLINGS + 1):
+        try:
+            return _attempt(scene, state, t_end, Arithmetic(working), digits, is_differentiated)
+        except InvalidState as error:
+            return Rejected(str(error))
+        except Undecidable as question:
+            open_question = str(question)
+            working *= 2
+    return Undecided(f"{open_question} ({working // 2} digits)")
+
+
+class Trajectory(NamedTuple):
+    """Successive collisions, what came instead of the last one asked for, and the digits needed."""
+
+    steps: list[Collision]
+    outcome: Outcome | None
+    digits: int
+
+
+def trajectory(
+    scene: Scene, state: State, n_collisions: int, t_end: float | None = None, *, digits: int = 30
+) -> Trajectory:
+    """Follow a particle, every state enclosed, the last one to `digits` decimals.
+
+    Args:
+        scene: table and laws of motion.
+        state: the exact start.
+        n_collisions: how many collisions to follow, >= 0.
+        t_end: horizon [time], None for none.
+        digits: decimals wanted of the last state, relative to the size of its vectors.
+
+    Raises:
+        InvalidState: naming field, value and bound.
+    """
+    working = digits + GUARD_DIGITS + n_collisions // 4
+    while True:
+        try:
+            return _chain(scene, state, n_collisions, t_end, Arithmetic(working), digits)
+        except Undecidable as question:
+            if working > 8 * (digits + GUARD_DIGITS + n_collisions):
+                return Trajectory([], Undecided(f"{question} ({working} digits)"), working)
+            working *= 2
+
+
+def _chain(
+    scene: Scene, state: State, n_collisions: int, t_end: float | None, arithmetic: Arithmetic, digits: int
+) -> Trajectory:
+    check_numbers(scene, state, state.t if t_end is None else t_end)
+    steps: list[Collision] = []
+    outcome = _start(scene, state, arithmetic)
+    if isinstance(outcome, Undefined):
+        return Trajectory(steps, outcome, arithmetic.digits)
+    leaving, flat = outcome
+    chain = _Chain(_flight(arithmetic, state), leaving)
+    in_cap = _is_in_cap(scene, state, leaving)
+    exact: State | None = state
+    while len(steps) < n_collisions:
+        end = _horizon(arithmetic, chain.flight.t, t_end)
+        event = Course(scene, arithmetic, chain.flight, chain.leaving, flat, end, exact).event(in_cap=in_cap)
+        if event.undefined is not None:
+            return Trajectory(steps, event.undefined, arithmetic.digits)
+        if event.hit is None:
+            last = _horizon_outcome(chain.flight, end, event, arithmetic)
+            return Trajectory(steps, last, arithmetic.digits)
+        chain = _bounce(chain, event.hit, arithmetic)
+        steps.append(_collision(event, event.hit, chain.flight, arithmetic))
+        exact, flat = None, frozenset()
+        in_cap = event.hit.wall == "arc" or (event.hit.wall == "base" and not isinstance(scene, Stem))
+    if steps:
+        _require(steps[-1], digits)
+    return Trajectory(steps, None, arithmetic.digits)
+
+
+def _attempt(
+    scene: Scene, state: State, t_end: float, arithmetic: Arithmetic, digits: int, is_differentiated: bool
+) -> Outcome:
+    check_numbers(scene, state, t_end)
+    outcome = _start(scene, state, arithmetic)
+    if isinstance(outcome, Undefined):
+        return outcome
+    leaving, flat = outcome
+    flight = _flight(arithmetic, state)
+    end = _horizon(arithmetic, flight.t, t_end)
+    course = Course(scene, arithmetic, flight, leaving, flat, end, state)
+    event = course.event(in_cap=_is_in_cap(scene, state, leaving))
+    if event.undefined is not None:
+        return event.undefined
+    if event.hit is None:
+        return _horizon_outcome(flight, end, event, arithmetic)
+    after = _bounce(_Chain(flight, leaving), event.hit, arithmetic).flight
+    collision = _collision(event, event.hit, after, arithmetic)
+    _require(collision, digits)
+    if is_differentiated:
+        start = _motion_at(scene, state, arithmetic)
+        wall = event.hit.wall
+        origin = start.gradient(wall, arithmetic.zero) if wall in leaving else None
+        matrix = step_jacobian(arithmetic, flight, event.hit, origin)
+        return replace(collision, jacobian=enclosures(arithmetic, matrix))
+    return collision
+
+
+def _flight(arithmetic: Arithmetic, state: State) -> Flight:
+    return Flight(*(arithmetic.number(v) for v in (state.t, state.x, state.y, state.vx, state.vy)))
+
+
+def _horizon(arithmetic: Arithmetic, t: Interval, t_end: float | None) -> Interval:
+    # Without a horizon: farther than any flight that meets a wall (the escape time cuts it).
+    return arithmetic.number(2.0**1000) if t_end is None else arithmetic.number(t_end) - t
+
+
+def _is_in_cap(scene: Scene, state: State, leaving: dict[Wall, Interval]) -> bool:
+    if not isinstance(scene, Mushroom):
+        return isinstance(scene, Cap)
+    if "arc" in leaving or "base" in leaving:
+        return True
+    is_rising_in_mouth = state.y == 0 and state.vy > 0 and not leaving
+    return state.y > 0 or is_rising_in_mouth
+
+
+def _start(
+    scene: Scene, state: State, arithmetic: Arithmetic
+) -> tuple[dict[Wall, Interval], frozenset[Wall]] | Undefined:
+    """Judge the starting state: which walls it leaves, or why it is none of this table."""
+    motion = _motion_at(scene, state, arithmetic)
+    on = [wall for wall in _walls_near(scene, state) if _is_on(scene, state, wall, motion)]
+    if state.wall is not None and state.wall not in on:
+        on.append(state.wall)
+        _check_residual(scene, state, motion)
+    leaving: dict[Wall, Interval] = {}
+    flat: set[Wall] = set()
+    for wall in on:
+        judged = _departure(scene, state, wall, motion)
+        if isinstance(judged, Undefined):
+            return judged
+        leaving[wall] = motion.wall(wall, arithmetic.zero).f
+        if judged:
+            flat.add(wall)
+    if len(leaving) > 1:
+        return Undefined("corner")
+    return leaving, frozenset(flat)
+
+
+def _motion_at(scene: Scene, state: State, arithmetic: Arithmetic) -> Motion:
+    pieces = {name: piece_at(law, Fraction(state.t)) for name, law in laws(scene).items()}
+    return Motion(arithmetic, _flight(arithmetic, state), pieces, is_stem=isinstance(scene, Stem))
+
+
+def _walls_near(scene: Scene, state: State) -> list[Wall]:
+    """List the walls that bound the part of the table the state is in."""
+    if isinstance(scene, Cap):
+        return ["base", "arc"]
+    if isinstance(scene, Stem):
+        return ["base", *SIDES]
+    if state.y > 0 or state.wall in ("arc", "base"):
+        return ["arc"]
+    return list(SIDES)
+
+
+def _is_on(scene: Scene, state: State, wall: Wall, motion: Motion) -> bool:
+    """Tell whether an unnamed wall passes exactly through the state; refuse a state beyond it."""
+    if wall == state.wall:
+        return False
+    side = sign(motion.wall(wall, motion.arithmetic.zero).f)
+    if isinstance(scene, Mushroom) and state.y == 0 and wall in ("left", "right") and side < 0:
+        # Level with the mouth but beside it: on the base, which belongs to the cap.
+        return _is_on_base(scene, state, motion)
+    if side < 0:
+        raise InvalidState(
+            f"state (x, y) = ({state.x!r}, {state.y!r}) at t = {state.t!r} is beyond wall {wall}"
+        )
+    if side == 0 and not rational.is_zero(scene, state, wall, Fraction(0)):
+        raise Undecidable(f"the state may be on wall {wall}")
+    return side == 0
+
+
+def _is_on_base(scene: Mushroom, state: State, motion: Motion) -> bool:
+    if sign(motion.wall("arc", motion.arithmetic.zero).f) < 0:
+        raise InvalidState(f"state (x, y) = ({state.x!r}, 0) at t = {state.t!r} is beyond wall arc")
+    if state.vy < 0:
+        raise InvalidState(f"state.vy = {state.vy!r}: the particle starts on wall base and moves into it")
+    if state.vy == 0:
+        raise Undecidable("sliding along the base")
+    return False
+
+
+def _departure(scene: Scene, state: State, wall: Wall, motion: Motion) -> Undefined | bool:
+    """Judge f' at the start on a wall: True when it is flat there but lifts, False when it rises."""
+    jet = motion.wall(wall, motion.arithmetic.zero)
+    rise = sign(jet.d1) if jet.d1 is not None else 0
+    if rise > 0:
+        return False
+    if rise < 0:
+        raise InvalidState(f"state.wall = {wall!r}: the particle starts on this wall and moves into it")
+    exact = rational.wall_jet(scene, state, wall, Fraction(0))
+    if exact is None or exact[1] != 0:
+        raise Undecidable("f' at the start has no sign")
+    if exact[2] > 0:
+        return True
+    is_at_rest = all(is_constant(law) for law in laws(scene).values())
+    return Undefined("sliding" if exact[2] < 0 or is_at_rest or wall == "base" else "tangency")
+
+
+def _check_residual(scene: Scene, state: State, motion: Motion) -> None:
+    wall = state.wall
+    assert wall is not None
+    tops = {name: bounds(law).highest for name, law in laws(scene).items()}
+    size = tops.get("h", 0.0) if wall == "floor" else max(tops.get("r", 0.0), tops.get("w", 0.0))
+    gap = float(motion.arithmetic.enclosure(motion.wall(wall, motion.arithmetic.zero).f))
+    if wall == "arc":
+        gap /= 2 * size
+    if abs(gap) > ON_WALL * size:
+        raise InvalidState(f"state.wall = {wall!r}, but the state is {gap:.3g} away from that wall")
+
+
+def _bounce(chain: _Chain, hit: Hit, arithmetic: Arithmetic) -> _Chain:
+    """Reflect: v - 2 f' grad f / |grad f|^2, which is v - 2 (v.n - u) n (sec. 3.1)."""
+    q, s = chain.flight, hit.time
+    x = q.x + q.vx * s
+    y = arithmetic.zero if hit.wall == "base" else q.y + q.vy * s
+    f_x, f_y, _ = hit.motion.gradient(hit.wall, s)
+    factor = 2 * hit.slope / (arithmetic.square(f_x) + arithmetic.square(f_y))
+    after = Flight(q.t + s, x, y, q.vx - factor * f_x, q.vy - factor * f_y)
+    return _Chain(after, {hit.wall: chain.leaving.get(hit.wall, arithmetic.zero)})
+
+
+def _collision(event: Event, hit: Hit, after: Flight, arithmetic: Arithmetic) -> Collision:
+    close = arithmetic.enclosure
+    return Collision(
+        hit.wall,
+        close(hit.time),
+        Moment(*map(close, after)),
+        close(hit.slope),
+        arithmetic.digits,
+        event.proof,
+    )
+
+
+def _horizon_outcome(flight: Flight, end: Interval, event: Event, arithmetic: Arithmetic) -> Horizon:
+    at = Flight(flight.t + end, flight.x + flight.vx * end, flight.y + flight.vy * end, flight.vx, flight.vy)
+    return Horizon(Moment(*map(arithmetic.enclosure, at)), arithmetic.digits, event.proof)
+
+
+def _require(collision: Collision, digits: int) -> None:
+    """Insist on the digits asked for: of dt, and of velocity and place relative to their vectors."""
+    bound = 10.0**-digits
+    after = collision.after
+    sizes = {
+        "dt": abs(float(collision.dt)),
+        "velocity": max(abs(float(after.vx)), abs(float(after.vy))),
+        "place": max(abs(float(after.x)), abs(float(after.y))),
+    }
+    widths = {
+        "dt": collision.dt.width(),
+        "velocity": max(after.vx.width(), after.vy.width()),
+        "place": max(after.x.width(), after.y.width()),
+    }
+    for name, width in widths.items():
+        if width > bound * sizes[name]:
+            raise Undecidable(f"{name} is enclosed too widely")

@@ -1,0 +1,117 @@
+"""fast against reference, step by step, on generated geometries."""
+
+from __future__ import annotations
+
+import os
+from fractions import Fraction
+
+import pytest
+from hypothesis import given, settings
+from msgspec import to_builtins
+from truth import proved_step
+
+import fast
+import reference
+from conformance.agreement import Truth, compare
+from conformance.strategies import scenes_and_states
+from scene import Collision, Horizon, State, Undecided, Undefined, load
+from scene.laws import bounds
+from scene.tables import laws
+
+N_STEPS = int(os.environ.get("MUSHROOMS_STEPS", "2500"))  # 20,000 in a deep run
+# 1e-12 times the condition number is 9,007 backward ulps; the stepper is held to far fewer.
+BOUND = 64.0
+NUDGE = 2.0**-46  # what rounding may move a state by, relative to the table and to the speed
+UNDECIDED_SHARE = 0.04  # the strategies aim at corners and edges on purpose
+
+
+def is_delicate(scene, state, t_end, truth):
+    """Tell whether nudging the state changes the kind of its outcome, the wall, or dt greatly."""
+
+    def summary(outcome):
+        return type(outcome).__name__, getattr(outcome, "wall", None)
+
+    size = max(bounds(law).highest for name, law in laws(scene).items() if name in ("r", "w", "h"))
+    speed = abs(state.vx) + abs(state.vy) + max(bounds(law).slope for law in laws(scene).values())
+    if isinstance(truth.outcome, Undecided | Undefined):
+        return True
+    for field, scale in (("x", size), ("y", size), ("vx", speed), ("vy", speed)):
+        for sign in (-1, 1):
+            nudged = {**to_builtins(state), field: getattr(state, field) + sign * NUDGE * scale}
+            other = reference.next_collision(scene, State(**nudged), t_end, digits=20)
+            if summary(other) != summary(truth.outcome):
+                return True
+            if isinstance(other, reference.Collision):
+                dt = float(other.dt)
+                if abs(dt - truth.outcome.dt) > 1e-3 * max(dt, truth.outcome.dt):
+                    return True
+    return False
+
+
+def test_fast_agrees_with_reference(tally):
+    worst = 0.0
+
+    @settings(max_examples=N_STEPS)
+    @given(scenes_and_states())
+    def step(drawn):
+        nonlocal worst
+        scene, state, t_end = drawn
+        answer = fast.next_collision(scene, state, t_end)
+        truth = proved_step(scene, state, t_end)
+        found = compare(answer, truth, state, BOUND)
+        tally["steps"] += 1
+        tally[type(answer).__name__.lower()] += 1
+        if isinstance(answer, Collision):
+            tally[answer.wall] += 1
+        worst = max(worst, found.ulps)
+        assert found.kind in ("agrees", "undecided"), (found, answer)
+        if found.kind == "undecided":
+            assert is_delicate(scene, state, t_end, truth), answer
+
+    step()
+    tally["worst backward ulps (thousandths)"] = round(1000 * worst)
+    assert tally["steps"] >= N_STEPS
+    assert tally["collision"] >= N_STEPS // 3
+    assert tally["undecided"] <= UNDECIDED_SHARE * N_STEPS
+
+
+SCENE = load("moving-cap")
+STATE = State(0.1, 0.2, 0.3, 10.0, -3.0)
+
+
+@pytest.mark.parametrize(
+    ("spoil", "kind"),
+    [
+        (lambda c: Collision("floor", c.dt, c.t, c.x, c.y, c.vx, c.vy), "wall"),
+        (lambda c: Collision(c.wall, c.dt * (1 + 1e-13), c.t, c.x, c.y, c.vx, c.vy), "numbers"),
+        (lambda c: Collision(c.wall, c.dt, c.t, c.x, c.y, c.vx, -c.vy), "numbers"),
+        (lambda c: Collision(c.wall, c.dt, c.t, c.x, c.y, float("nan"), c.vy), "numbers"),
+        (lambda c: Horizon(c.t, c.x, c.y, c.vx, c.vy), "outcome"),
+        (lambda c: Undecided("shy"), "undecided"),
+        (lambda c: c, "agrees"),
+    ],
+)
+def test_comparison_catches_spoilt_answers(spoil, kind):
+    truth = proved_step(SCENE, STATE, 10.0)
+    assert isinstance(truth.outcome, Collision)
+    assert compare(spoil(truth.outcome), truth, STATE, BOUND).kind == kind
+
+
+def test_horizon_is_compared_too():
+    truth = proved_step(SCENE, STATE, 0.11)
+    assert isinstance(truth.outcome, Horizon)
+    right = truth.outcome
+    assert compare(right, truth, STATE, BOUND).kind == "agrees"
+    wrong = Horizon(right.t, right.x + 1e-9, right.y, right.vx, right.vy)
+    assert compare(wrong, truth, STATE, BOUND).kind == "numbers"
+
+
+def test_exact_answers_where_nothing_may_move():
+    truth = Truth(
+        Collision("floor", 1.0, 1.0, 0.0, -1.0, 0.0, 1.0),
+        [Fraction(n) for n in (1, 0, -1, 0, 1)],
+        [[0.0] * 5] * 5,
+    )
+    assert compare(truth.outcome, truth, State(0.0, 0.0, 0.0, 0.0, -1.0), 4).ulps == 0.0
+    off = Collision("floor", 1.0, 1.0, 5e-324, -1.0, 0.0, 1.0)
+    assert compare(off, truth, State(0.0, 0.0, 0.0, 0.0, -1.0), 4).ulps == float("inf")

@@ -1,0 +1,112 @@
+"""Protocol 1 as `python -m reference` and `python -m fast` serve it."""
+
+from __future__ import annotations
+
+import json
+import struct
+import subprocess
+import sys
+
+import pytest
+
+import fast
+import reference
+from scene import State, catalogue, load, to_data
+
+STATE = {"t": 0.0, "x": 0.1, "y": 0.3, "vx": 10.0, "vy": 7.0, "wall": None}
+SCENE = to_data(load("moving-cap"))
+
+
+def converse(module, *lines):
+    """Send lines, return the decoded answers; the server must end by itself and be silent."""
+    text = "\n".join(line if isinstance(line, str) else json.dumps(line) for line in lines) + "\n"
+    run = subprocess.run(
+        [sys.executable, "-m", module], input=text, capture_output=True, text=True, timeout=120, check=True
+    )
+    assert run.stderr == ""
+    return [json.loads(line) for line in run.stdout.splitlines()]
+
+
+def step(seq, scene=SCENE, **changes):
+    return {"cmd": "step", "seq": seq, "scene": scene, "state": {**STATE, **changes}, "t_end": 100.0}
+
+
+@pytest.fixture(params=["reference", "fast"])
+def module(request):
+    return request.param
+
+
+def test_session(module):
+    numbers = [0.1, 5e-324, -0.0, 1.7976931348623157e308, 2.0**53 + 2, 1 / 3, -1e-310]
+    start, echo, one, two = converse(
+        module,
+        {"cmd": "start", "protocol": 1},
+        {"cmd": "echo", "values": numbers},
+        step(1),
+        step(2, vx=0.0, vy=0.0),
+        {"cmd": "stop"},
+        {"cmd": "echo", "values": []},
+    )
+    assert start["protocol"] == 1
+    assert start["name"] == module
+    assert set(start["tables"]) == {"cap", "stem", "mushroom"}
+    assert [struct.pack("<d", v) for v in echo["values"]] == [struct.pack("<d", v) for v in numbers]
+    assert (one["seq"], one["outcome"], one["wall"]) == (1, "collision", "arc")
+    assert two["seq"] == 2
+    assert two["outcome"] in ("collision", "horizon")
+
+
+def test_answers_are_those_of_the_package(module):
+    """Shortest round-trip printing: what arrives has the same bits."""
+    (answer,) = converse(module, step(7))
+    state = State(**STATE)
+    if module == "fast":
+        expected = fast.next_collision(load("moving-cap"), state, 100.0)
+    else:
+        expected = reference.next_collision(load("moving-cap"), state, 100.0).rounded()
+    assert all(answer[name] == getattr(expected, name) for name in ("wall", "dt", "t", "x", "y", "vx", "vy"))
+
+
+def test_both_agree_to_the_last_digits():
+    (one,), (two,) = converse("reference", step(1)), converse("fast", step(1))
+    assert one["wall"] == two["wall"]
+    assert two["dt"] == pytest.approx(one["dt"], rel=1e-14)
+
+
+@pytest.mark.parametrize(
+    ("line", "words"),
+    [
+        ("not json", "JSON"),
+        ("{}", "cmd"),
+        ('{"cmd":"dance"}', "dance"),
+        ('{"cmd":"step","seq":3}', "scene"),
+        (step(3, x="0.1"), "state.x"),
+        ({**step(3), "extra": 1}, "extra"),
+        (step(3, z=1.0), "z"),
+        (step(3, scene={**SCENE, "table": "cup"}), "cup"),
+        (step(3, scene={**SCENE, "nu": 1.5}), "nu <= 1"),
+        (step(3, scene=3), "int"),
+        (step(3, y=9.0), "beyond wall arc"),
+        (step(3, wall="lid"), "lid"),
+        ("[" * 5000, "object"),
+        ({"cmd": "start", "protocol": 2}, "protocol = 2"),
+        (json.dumps(step(3)).replace("10.0", "NaN"), "JSON"),
+        (json.dumps(step(3)).replace("10.0", "1e999"), "range"),
+    ],
+)
+def test_bad_lines_are_rejected_and_the_session_goes_on(module, line, words):
+    bad, good = converse(module, line, step(4))
+    assert bad["outcome"] == "rejected"
+    assert words in bad["reason"]
+    assert "\n" not in bad["reason"]
+    assert good["seq"] == 4
+    assert good["outcome"] == "collision"
+
+
+def test_every_catalogue_scene_is_served(module):
+    names = [name for name in catalogue() if name != "moving-cap-as-printed"]
+    scenes = [to_data(load(name)) for name in names]
+    starts = [{"y": -0.3} if scene["table"] == "stem" else {} for scene in scenes]
+    answers = converse(module, *(step(i, s, **c) for i, (s, c) in enumerate(zip(scenes, starts, strict=True))))
+    assert [a["seq"] for a in answers] == list(range(len(names)))
+    assert {a["outcome"] for a in answers} == {"collision"}

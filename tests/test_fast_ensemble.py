@@ -1,0 +1,111 @@
+"""Ensembles: the same bits for any number of threads, uniform starts, captured stays."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy import stats
+
+import fast
+from fast.ensemble import cycle_times, initial_states
+from scene import load
+
+
+def test_threads_do_not_change_a_bit():
+    runs = [
+        fast.simulate(load("moving-cap"), n_particles=60, energy=1e3, n_cycles=2, seed=5, threads=threads)
+        for threads in (1, 2)
+    ]
+    assert runs[0].sha256() == runs[1].sha256()
+
+
+def test_more_particles_keep_the_first_ones():
+    few = fast.simulate(load("fixed-cap-clockwise"), n_particles=20, energy=1e4, seed=1)
+    many = fast.simulate(load("fixed-cap-clockwise"), n_particles=90, energy=1e4, seed=1)
+    assert np.array_equal(few.cycle_energies, many.cycle_energies[:20])
+    other = fast.simulate(load("fixed-cap-clockwise"), n_particles=20, energy=1e4, seed=2)
+    assert not np.array_equal(few.energy, other.energy)
+
+
+def test_cycles_continue_one_another():
+    one = fast.simulate(load("moving-cap"), n_particles=30, energy=1e3, n_cycles=1)
+    three = fast.simulate(load("moving-cap"), n_particles=30, energy=1e3, n_cycles=3)
+    assert np.array_equal(one.cycle_energies[:, 0], three.cycle_energies[:, 0])
+
+
+@pytest.mark.parametrize("name", ["moving-cap", "fixed-cap-anticlockwise", "breathing-circle", "fermi-ulam"])
+def test_starts_are_uniform_in_the_table(name):
+    scene = load(name)
+    states = initial_states(scene, 40_000, 0.5, 7, 0.0)
+    x, y, vx, vy = states[:, 2:].T
+    assert np.allclose(vx**2 + vy**2, 1.0)
+    assert stats.kstest(np.arctan2(vy, vx), stats.uniform(-np.pi, 2 * np.pi).cdf).pvalue > 1e-4
+    # Independent: uniform points of the bounding box, kept where the table is.
+    r = {"fermi-ulam": 0.0}.get(name, 1.0)
+    w = {"breathing-circle": 0.0}.get(name, 1.0)
+    h = {"moving-cap": 1.0, "fixed-cap-anticlockwise": 6.0, "breathing-circle": 0.0, "fermi-ulam": 1.0}[name]
+    slope = {"moving-cap": 0.1111, "fixed-cap-anticlockwise": np.tan(np.radians(2.3))}.get(name, 0.0)
+    box = np.random.default_rng(3).uniform((-1, -h), (1, r), size=(200_000, 2))
+    in_cap = (box[:, 1] >= 0) & (np.hypot(*box.T) <= r)
+    in_stem = (box[:, 1] < 0) & (np.abs(box[:, 0]) <= w + slope * box[:, 1])
+    kept = box[in_cap | in_stem]
+    assert stats.ks_2samp(x, kept[:, 0]).pvalue > 1e-4
+    assert stats.ks_2samp(y, kept[:, 1]).pvalue > 1e-4
+
+
+def test_frozen_table_keeps_energy_and_island():
+    """Frozen: energy constant, and the captured share is the island's share of the volume."""
+    run = fast.simulate(load("frozen-mushroom"), n_particles=4000, energy=1e4, seed=2)
+    assert np.allclose(run.energy, 1e4, rtol=1e-12)
+    delta = 2 / np.pi * (np.arccos(0.5) - 0.5 * np.sqrt(0.75))
+    v_cap, v_stem = np.pi**2, 2 * np.pi * (2 * 0.5 - 0.1111)
+    share = delta * v_cap / (v_cap + v_stem)
+    captured = np.mean(~np.isnan(run.t_in[:, 0]))
+    assert captured == pytest.approx(share, abs=4 * np.sqrt(share * (1 - share) / 4000))
+
+
+def test_captured_stays_end_where_nu_returns():
+    """Sec. 3.2: nu(t_out) = nu(t_in) up to O(1/v), here within 8 / v for nine in ten."""
+    gaps = []
+    for energy in (1e4, 1e6):
+        run = fast.simulate(load("moving-cap"), n_particles=300, energy=energy, seed=4)
+        t_in, t_out = run.t_in[:, 0], run.t_out[:, 0]
+        captured = ~np.isnan(t_in)
+        assert captured.sum() > 100
+        assert np.all(t_in[captured] <= np.pi)
+        assert np.all(np.pi <= t_out[captured])
+        gap = np.abs(np.cos(t_in[captured]) - np.cos(t_out[captured]))
+        assert np.quantile(gap, 0.9) < 8 / np.sqrt(2 * energy)
+        gaps.append(np.median(gap))
+    assert gaps[0] / gaps[1] == pytest.approx(10, rel=0.6)
+
+
+def test_least_nu_is_found():
+    _, ends, narrowest = cycle_times(load("moving-cap"), 2)
+    assert ends == pytest.approx([2 * np.pi, 4 * np.pi])
+    assert narrowest == pytest.approx([np.pi, 3 * np.pi], abs=2e-3)
+    assert cycle_times(load("fixed-cap-anticlockwise"), 1)[2] == pytest.approx([0.375], abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"n_particles": 0}, "particles = 0"),
+        ({"energy": -1.0}, "energy = -1.0"),
+        ({"energy": float("nan")}, "energy = nan"),
+        ({"n_cycles": 0}, "cycles = 0"),
+        ({"seed": -1}, "seed = -1"),
+        ({"seed": 2**64}, "seed = 18446744073709551616"),
+        ({"threads": 0}, "threads = 0"),
+    ],
+)
+def test_bad_options_are_refused(options, words):
+    with pytest.raises(ValueError, match=words):
+        fast.simulate(load("moving-cap"), **{"n_particles": 1, "energy": 1.0, **options})
+
+
+def test_progress_reaches_the_end():
+    seen: list[int] = []
+    fast.simulate(load("fermi-ulam"), n_particles=100, energy=10.0, progress=seen.append)
+    assert seen[-1] == 100
+    assert seen == sorted(seen)

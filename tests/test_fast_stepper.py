@@ -1,0 +1,222 @@
+"""The fast step: exact symmetries bit for bit, its building blocks against mpmath, refusals."""
+
+from __future__ import annotations
+
+import math
+import os
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from mpmath import mp, workprec
+
+import fast
+from conformance.strategies import scenes_and_states
+from fast import kernel
+from fast.compiled import compile_scene
+from scene import (
+    BangBang,
+    Cap,
+    Collision,
+    Fourier,
+    Horizon,
+    Mushroom,
+    Rejected,
+    State,
+    Stem,
+    Undecided,
+    Undefined,
+    load,
+)
+from scene.laws import value
+from scene.tables import laws
+
+MIRRORED = {"left": "right", "right": "left"}
+
+
+def scaled_law(law, length, time):
+    if isinstance(law, Fourier):
+        cos, sin = (tuple(length * a for a in part) for part in (law.cos, law.sin))
+        return Fourier(mean=length * law.mean, omega=law.omega / time, cos=cos, sin=sin)
+    if isinstance(law, BangBang):
+        return BangBang(knots=tuple((time * t, length * v) for t, v in law.knots))
+    return length * law
+
+
+def scaled_scene(scene, length, time):
+    sizes = {"slope": 1.0, "nu": 1.0}
+    return type(scene)(**{n: scaled_law(law, sizes.get(n, length), time) for n, law in laws(scene).items()})
+
+
+def mirrored(outcome):
+    if isinstance(outcome, Collision):
+        wall = MIRRORED.get(outcome.wall, outcome.wall)
+        return Collision(wall, outcome.dt, outcome.t, -outcome.x, outcome.y, -outcome.vx, outcome.vy)
+    if isinstance(outcome, Horizon):
+        return Horizon(outcome.t, -outcome.x, outcome.y, -outcome.vx, outcome.vy)
+    return outcome
+
+
+@given(scenes_and_states())
+def test_mirror_is_exact(drawn):
+    scene, s, t_end = drawn
+    other = State(s.t, -s.x, s.y, -s.vx, s.vy, MIRRORED.get(s.wall, s.wall))
+    assert fast.next_collision(scene, other, t_end) == mirrored(fast.next_collision(scene, s, t_end))
+
+
+@given(scenes_and_states(), st.integers(-20, 20), st.integers(-20, 20))
+def test_powers_of_two_scale_exactly(drawn, length_bits, time_bits):
+    scene, s, t_end = drawn
+    length, time = 2.0**length_bits, 2.0**time_bits
+    speed = length / time
+    start = State(s.t * time, s.x * length, s.y * length, s.vx * speed, s.vy * speed, s.wall)
+    got = fast.next_collision(scaled_scene(scene, length, time), start, t_end * time)
+    one = fast.next_collision(scene, s, t_end)
+    if isinstance(one, Collision):
+        one = Collision(
+            one.wall,
+            one.dt * time,
+            one.t * time,
+            one.x * length,
+            one.y * length,
+            one.vx * speed,
+            one.vy * speed,
+        )
+    elif isinstance(one, Horizon):
+        one = Horizon(one.t * time, one.x * length, one.y * length, one.vx * speed, one.vy * speed)
+    assert got == one
+
+
+@given(
+    st.floats(1e-3, 1e3),
+    st.integers(1, 16),
+    st.floats(-1e5, 1e5),
+    st.floats(-1e-12, 1e-12),
+)
+def test_sine_and_cosine(omega, k, t, t_low):
+    s, c, is_reduced = kernel.sine_cosine(omega, float(k), t, t_low)
+    with workprec(200):
+        phase = k * mp.mpf(omega) * (mp.mpf(t) + mp.mpf(t_low))
+        if not is_reduced:
+            assert abs(phase) > 2.0**26
+            return
+        # Relative to the value itself, up to the phase's own rounding near multiples of pi and
+        # the spacing of subnormal numbers.
+        least = abs(phase) * 2.0**-100 + mp.mpf(2) ** -1074
+        assert abs(s - mp.sin(phase)) <= 2.0**-52 * abs(mp.sin(phase)) + least
+        assert abs(c - mp.cos(phase)) <= 2.0**-52 * abs(mp.cos(phase)) + least
+
+
+def test_phase_out_of_reach_is_refused():
+    outcome = fast.next_collision(load("moving-cap"), State(1e15, 0.1, 0.2, 1.0, 1.0), 2e15)
+    assert isinstance(outcome, Rejected)
+    assert "state.t = 1e+15" in outcome.reason
+
+
+@pytest.mark.parametrize("name", ["fixed-cap-clockwise", "moving-cap", "fermi-ulam"])
+@given(t=st.floats(-20, 20), s=st.floats(1e-12, 5))
+def test_increments_of_laws(name, t, s):
+    scene = load(name)
+    compiled = compile_scene(scene)
+    anchors = np.zeros((4, kernel.N_ANCHOR))
+    assert kernel.set_anchors(compiled.laws, anchors, t, 0.0)
+    with workprec(200):
+        law, then = laws(scene)["h"], mp.mpf(t) + mp.mpf(s)
+        change, rate, size, _ = kernel.increment(compiled.laws, anchors, kernel.H, s)
+        exact = value(mp, law, then) - value(mp, law, mp.mpf(t))
+        # Small increments keep their relative accuracy: 16 roundings of the summed terms, and
+        # the rounding of a knot's time by one unit in the last place, at speeds up to 32.
+        assert abs(change - exact) <= 16 * 2.0**-53 * size + 2.0**-52 * 64 * s
+        assert abs(rate - value(mp, law, then, 1)) <= 2.0**-53 * 4096
+        assert abs(anchors[kernel.H, 0] - value(mp, law, mp.mpf(t))) <= 2.0**-50 * 6
+
+
+STATIC = Mushroom(r=1.0, h=1.0, w=0.5)
+
+
+@pytest.mark.parametrize(
+    ("scene", "state", "expected"),
+    [
+        (STATIC, State(0, 0.75, 0.0, 1.0, 0.0, "base"), Undefined("sliding")),
+        (STATIC, State(0, 0.0, 0.0, 1.0, 0.0), Undefined("mouth-edge")),
+        (STATIC, State(0, 0.25, 0.25, 1.0, -1.0), Undecided("the mouth's edge is hit within rounding")),
+        (Cap(r=1.0), State(0, 0.5, 0.5, 0.5, -0.5), Undecided("two walls are hit together within rounding")),
+    ],
+)
+def test_what_it_does_not_guess(scene, state, expected):
+    assert fast.next_collision(scene, state, 100.0) == expected
+
+
+@pytest.mark.parametrize(
+    ("state", "t_end", "words"),
+    [
+        (State(0, 2.0, 0.1, 1.0, 0.0), 1.0, "beyond wall arc"),
+        (State(0, 0.6, -0.1, 1.0, 0.0), 1.0, "beyond wall right"),
+        (State(0, 0.0, -1.1, 1.0, 0.0), 1.0, "beyond wall floor"),
+        (State(0, math.nan, 0.1, 1.0, 0.0), 1.0, "state.x = nan"),
+        (State(0, 0.1, 0.1, 1.0, math.inf), 1.0, "state.vy = inf"),
+        (State(0, 0.1, 0.1, 1.0, 0.0), -1.0, "t_end = -1.0"),
+        (State(0, 0.1, 0.1, 1.0, 0.0), math.inf, "t_end = inf"),
+        (State(0, 0.1, 0.1, 1e200, 0.0), 1.0, "2^400"),
+        (State(0, 0.6, 0.8, 1.0, 0.0, "arc"), 1.0, "moves into it"),
+        (State(0, 0.6, 0.7, -1.0, 0.0, "arc"), 1.0, "away from that wall"),
+    ],
+)
+def test_bad_states_are_rejected(state, t_end, words):
+    outcome = fast.next_collision(STATIC, state, t_end)
+    assert isinstance(outcome, Rejected)
+    assert words in outcome.reason
+    assert "\n" not in outcome.reason
+
+
+def test_wall_of_another_table_is_rejected():
+    outcome = fast.next_collision(Stem(w=1.0, h=1.0), State(0, 0.0, -0.5, 1.0, 0.0, "arc"), 1.0)
+    assert isinstance(outcome, Rejected)
+    assert "state.wall = 'arc'" in outcome.reason
+
+
+def test_trajectory_repeats_the_steps():
+    scene, state = load("moving-cap"), State(0.0, 0.1, 0.3, 20.0, 7.0)
+    path = fast.trajectory(scene, state, 50)
+    assert path.outcome is None
+    for wall, row in zip(path.walls, path.steps, strict=True):
+        step = fast.next_collision(scene, state, state.t + 10)
+        assert isinstance(step, Collision)
+        assert step.wall == wall
+        # The trajectory carries time as a pair; a single step sees it rounded.
+        assert row[1:] == pytest.approx((step.t, step.x, step.y, step.vx, step.vy), rel=1e-11, abs=1e-11)
+        state = State(*map(float, row[1:]), wall)
+
+
+def test_trajectory_ends_at_its_horizon():
+    path = fast.trajectory(load("moving-cap"), State(0.0, 0.1, 0.3, 20.0, 7.0), 1000, t_end=0.5)
+    assert isinstance(path.outcome, Horizon)
+    assert path.outcome.t == 0.5
+    assert 0 < len(path.walls) < 1000
+
+
+def test_same_bits_without_the_compiler():
+    """Kernels are plain Python too: with the compiler off they give the same bits."""
+    program = (
+        "import fast, scene\n"
+        "path = fast.trajectory(scene.load('moving-cap'), scene.State(0.0, 0.1, 0.3, 20.0, 7.0), 40)\n"
+        "print(path.steps.tobytes().hex())\n"
+    )
+    results = []
+    for is_off in ("0", "1"):
+        environment = {**os.environ, "NUMBA_DISABLE_JIT": is_off}
+        run = subprocess.run(
+            [sys.executable, "-c", program], env=environment, capture_output=True, text=True, check=True
+        )
+        results.append(run.stdout)
+    assert results[0] == results[1]
+
+
+@settings(max_examples=50)
+@given(scenes_and_states())
+def test_input_is_untouched_and_answer_repeats(drawn):
+    scene, state, t_end = drawn
+    assert fast.next_collision(scene, state, t_end) == fast.next_collision(scene, state, t_end)

@@ -1,0 +1,168 @@
+"""Laws of motion: values, derivatives, sound bounds, periods, exact pieces (paper, secs. 3 and 4)."""
+
+import math
+from fractions import Fraction
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from mpmath import MPContext, MPIntervalContext, fp
+
+from conformance.strategies import laws
+from scene import BangBang, Fourier
+from scene.laws import Quadratic, bounds, breakpoints, defect, evaluate, exact, is_constant, piece_at, value
+
+LEGS = BangBang(knots=((0.0, 1.0), (0.25, 0.3), (0.5, 0.3), (0.75, 1.0), (1.0, 1.0)))
+times = st.floats(-1e3, 1e3)
+moving = laws().filter(lambda law: not is_constant(law))
+
+
+def context(digits):
+    ctx = MPContext()
+    ctx.dps = digits
+    return ctx
+
+
+def test_a_fourier_law_is_its_sum():
+    law = Fourier(mean=0.5, omega=2.0, cos=(0.25,), sin=(0.125, 0.0625))
+    t = 0.7
+    expected = 0.5 + 0.25 * math.cos(1.4) + 0.125 * math.sin(1.4) + 0.0625 * math.sin(2.8)
+    assert value(fp, law, t) == pytest.approx(expected, rel=1e-15)
+
+
+def test_the_printed_mouth_of_the_moving_cap():
+    # nu = 1 - c sin^2(t/2) with c = 0.8 is 0.6 + 0.4 cos t.
+    law = Fourier(mean=0.6, omega=1.0, cos=(0.4,))
+    for t in (0.0, 1.0, math.pi, 4.0):
+        assert value(fp, law, t) == pytest.approx(1 - 0.8 * math.sin(t / 2) ** 2, rel=1e-14)
+
+
+@pytest.mark.parametrize(("time", "level"), [(0.0, 1.0), (0.25, 0.3), (0.5, 0.3), (0.75, 1.0), (1.0, 1.0)])
+def test_bang_bang_rests_at_its_knots(time, level):
+    ctx = context(40)
+    assert value(ctx, LEGS, time) == ctx.mpf(level)
+    assert value(ctx, LEGS, time, 1) == 0
+
+
+def test_bang_bang_is_half_way_and_fastest_at_mid_leg():
+    ctx = context(40)
+    low, high = ctx.mpf(0.3), ctx.mpf(1.0)
+    assert value(ctx, LEGS, 0.125) == (low + high) / 2
+    assert value(ctx, LEGS, 0.125, 1) == 2 * (low - high) / ctx.mpf(0.25)
+    # Constant acceleration to mid-leg, the opposite after.
+    assert value(ctx, LEGS, 0.0625, 2) == -value(ctx, LEGS, 0.1875, 2)
+    # A quarter of the way in time is an eighth of the way in value.
+    assert value(ctx, LEGS, 0.0625) == high + (low - high) / 8
+
+
+def test_a_knot_belongs_to_the_leg_that_follows():
+    law = BangBang(knots=((0.0, 1.0), (1.0, 2.0), (3.0, 1.0)))
+    assert value(fp, law, 1.0, 2) == -1.0
+    assert value(fp, law, 3.0, 2) == value(fp, law, 0.0, 2) == 4.0
+    # And mid-leg to the half that brakes: a piece never ends where it starts to hold.
+    assert value(fp, law, 0.5, 2) == -4.0
+    assert all(piece_at(law, t).end > t for t in breakpoints(law))
+
+
+@pytest.mark.parametrize("turns", [-(2**40), -3, -1, 1, 7, 2**40])
+def test_bang_bang_repeats_at_negative_and_large_times(turns):
+    for time in (0.0, 0.0625, 0.125, 0.3, 0.5, 0.7421875, 0.875):
+        late = Fraction(time) + turns
+        ctx = context(60)
+        for order in (0, 1, 2):
+            assert value(ctx, LEGS, exact(ctx, late), order) == value(ctx, LEGS, time, order)
+
+
+def test_times_may_be_any_kind_of_number():
+    ctx = context(50)
+    third = ctx.mpf(1) / 3
+    assert value(ctx, LEGS, third) == ctx.mpf(0.3)
+    assert value(ctx, LEGS, ctx.mpf(0.125)) == value(ctx, LEGS, 0.125) == value(ctx, LEGS, Fraction(1, 8))
+
+
+@given(laws(), times)
+def test_values_lie_within_their_bounds(law, t):
+    lowest, highest, slope, curvature = bounds(law)
+    ctx = context(40)
+    assert ctx.mpf(lowest) <= value(ctx, law, t) <= ctx.mpf(highest)
+    assert abs(value(ctx, law, t, 1)) <= ctx.mpf(slope)
+    assert abs(value(ctx, law, t, 2)) <= ctx.mpf(curvature)
+
+
+@given(moving)
+def test_bounds_of_legs_are_reached(law):
+    if isinstance(law, BangBang):
+        ctx = context(40)
+        rates = [abs(value(ctx, law, t, 1)) for t in breakpoints(law)]
+        bends = [abs(value(ctx, law, t, 2)) for t in breakpoints(law)]
+        assert max(rates) >= bounds(law).slope * (1 - 2.0**-40)
+        assert max(bends) >= bounds(law).curvature * (1 - 2.0**-40)
+
+
+@given(laws(), times)
+def test_derivatives_are_limits_of_differences(law, t):
+    ctx = context(60)
+    time, step = ctx.mpf(t), ctx.mpf(2) ** -80
+    for order in (0, 1):
+        # One-sided, for at a knot or mid-leg the law that follows holds.
+        slope = (value(ctx, law, time + step, order) - value(ctx, law, time, order)) / step
+        size = 1 + abs(bounds(law).curvature) * (1 + 64 * getattr(law, "omega", 0.0))
+        assert abs(slope - value(ctx, law, time, order + 1)) <= size * step
+
+
+@given(moving, times)
+def test_a_piece_agrees_with_the_law_until_its_end(law, t):
+    piece = piece_at(law, Fraction(t))
+    if not isinstance(piece, Quadratic):
+        assert piece == law
+        return
+    ctx = context(60)
+    after = piece_at(law, piece.end)
+    assert piece.end > Fraction(t)
+    end = exact(ctx, piece.end)
+    tiny = ctx.mpf(2) ** -150
+    for order in (0, 1):
+        assert abs(evaluate(ctx, piece, end, order) - evaluate(ctx, after, end, order)) < tiny
+    inside = (Fraction(t) + piece.end) / 2
+    assert piece_at(law, inside) == piece
+
+
+@given(laws(), st.floats(-8.0, 8.0), st.floats(0.0, 2.0**-6))
+def test_intervals_enclose_points(law, t, width):
+    iv = MPIntervalContext()
+    iv.prec = 80
+    sharp = context(60)
+    piece = piece_at(law, Fraction(t))
+    stop = min(t + width, float(piece.end)) if isinstance(piece, Quadratic) else t + width
+    for order in (0, 1, 2):
+        enclosure = evaluate(iv, piece, iv.mpf([t, stop]), order)
+        for point in (t, (t + stop) / 2, stop):
+            assert evaluate(sharp, piece, sharp.mpf(point), order) in enclosure
+
+
+@pytest.mark.parametrize(
+    ("law", "message"),
+    [
+        (math.nan, "= nan, must be finite"),
+        (Fourier(mean=math.inf, omega=1.0), ".mean = inf, must be finite"),
+        (Fourier(mean=1.0, omega=0.0), ".omega = 0.0, must be finite and > 0"),
+        (Fourier(mean=1.0, omega=-1.0), ".omega = -1.0, must be finite and > 0"),
+        (Fourier(mean=1.0, omega=math.nan), ".omega = nan, must be finite and > 0"),
+        (Fourier(mean=1.0, omega=1.0, sin=(0.0, math.nan)), ".sin[1] = nan, must be finite"),
+        (Fourier(mean=1.0, omega=1.0, cos=(0.0,) * 17), ".cos has 17 harmonics, at most 16"),
+        (BangBang(knots=()), ".knots has 0 knots, must have 2 to 256"),
+        (BangBang(knots=((0.0, 1.0),) * 257), ".knots has 257 knots, must have 2 to 256"),
+        (BangBang(knots=((0.0, 1.0), (0.0, 1.0))), ".knots[1] time = 0.0, must be > 0.0"),
+        (BangBang(knots=((0.0, 1.0), (1.0, 2.0))), ".knots[1] value = 2.0, must equal the first (1.0)"),
+        (BangBang(knots=((0.0, 1.0), (math.inf, 1.0))), ".knots[1] = [inf, 1.0], must be finite"),
+        (BangBang(knots=((1e-20, 1.0), (1.0, 1.0))), "the period must be a binary64 number"),
+        (BangBang(knots=((-1e308, 1.0), (1e308, 1.0))), "the period must be a binary64 number"),
+    ],
+)
+def test_a_broken_law_is_named(law, message):
+    assert message in defect(law)
+
+
+@given(laws())
+def test_drawn_laws_are_sound(law):
+    assert defect(law) is None

@@ -1,0 +1,228 @@
+"""Loading scenes: round trips, the published schema, and one clear line for whatever is wrong."""
+
+import json
+import math
+import sys
+from pathlib import Path
+
+import jsonschema
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from conformance.strategies import scenes
+from scene import InvalidScene, catalogue, from_data, load, to_data
+from scene.load import json_schema, read_data
+
+SCHEMA = Path(__file__).parent.parent / "docs" / "scene.schema.json"
+CAP = {"table": "cap", "r": 1.0}
+STEM = {"table": "stem", "w": 1.0, "h": 1.0}
+MUSHROOM = {"table": "mushroom", "r": 1.0, "h": 1.0, "nu": 0.5}
+FOURIER = {"kind": "fourier", "mean": 1.0, "omega": 1.0}
+LEGS = {"kind": "bang-bang", "knots": [[0.0, 1.0], [1.0, 1.0]]}
+
+
+def toml(data):
+    """Write data of a scene as TOML; JSON's strings, numbers and arrays are TOML's too."""
+    plain = {key: entry for key, entry in data.items() if not isinstance(entry, dict)}
+    lines = [f"{key} = {json.dumps(entry)}" for key, entry in plain.items()]
+    for key, entry in data.items():
+        if isinstance(entry, dict):
+            lines += [f"[{key}]", *(f"{name} = {json.dumps(item)}" for name, item in entry.items())]
+    return "\n".join(lines)
+
+
+@given(scenes())
+def test_data_round_trips_to_the_bit(scene):
+    data = to_data(scene)
+    assert from_data(data) == scene
+    again = json.loads(json.dumps(data))
+    assert from_data(again) == scene
+    assert json.dumps(to_data(from_data(again))) == json.dumps(data)
+
+
+@given(scenes())
+def test_files_round_trip_to_the_bit(tmp_path_factory, scene):
+    folder = tmp_path_factory.mktemp("scenes")
+    data = to_data(scene)
+    (folder / "a.json").write_text(json.dumps(data), "utf-8")
+    (folder / "a.toml").write_text(toml(data), "utf-8")
+    assert load(folder / "a.json") == load(str(folder / "a.toml")) == scene
+
+
+@pytest.mark.parametrize("name", sorted(set(catalogue()) - {"moving-cap-as-printed"}))
+def test_the_catalogue_round_trips(name):
+    assert from_data(to_data(load(name))) == load(name)
+
+
+def test_whole_numbers_are_numbers():
+    assert from_data({"table": "cap", "r": 1}) == from_data(CAP)
+
+
+BAD_DATA = [
+    (None, "Expected `object`"),
+    ([], "Expected `object`"),
+    (1.0, "Expected `object`"),
+    ({}, "missing required field `table`"),
+    ({"r": 1.0}, "missing required field `table`"),
+    ({"table": "cone", "r": 1.0}, "Invalid value 'cone' - at `table`"),
+    ({"table": 3, "r": 1.0}, "`table`"),
+    ({"table": "cap"}, "missing required field `r`"),
+    ({"table": "stem", "w": 1.0}, "missing required field `h`"),
+    ({"table": "mushroom", "r": 1.0, "h": 1.0}, "exactly one of `w` and `nu`"),
+    ({**MUSHROOM, "w": 0.5}, "exactly one of `w` and `nu`"),
+    ({**CAP, "radius": 1.0}, "unknown field `radius`"),
+    ({**CAP, "w": 1.0}, "unknown field `w`"),
+    ({**CAP, "line\nbreak": 1.0}, "unknown field `line break`"),
+    ({**STEM, "nu": 0.5}, "unknown field `nu`"),
+    ({**CAP, "r": "1.0"}, "at `r`"),
+    ({**CAP, "r": None}, "at `r`"),
+    ({**CAP, "r": True}, "at `r`"),
+    ({**CAP, "r": [1.0]}, "at `r`"),
+    ({**CAP, "name": 3}, "at `name`"),
+    ({**CAP, "r": math.nan}, "r = nan, must be finite"),
+    ({**CAP, "r": -math.inf}, "r = -inf, must be finite"),
+    ({**CAP, "r": 10**400}, "at `r`"),
+    ({**CAP, "r": {}}, "missing required field `kind` - at `r`"),
+    ({**CAP, "r": {"kind": "sawtooth"}}, "Invalid value 'sawtooth' - at `r.kind`"),
+    ({**CAP, "r": {"kind": "fourier", "mean": 1.0}}, "missing required field `omega` - at `r`"),
+    ({**CAP, "r": {**FOURIER, "phase": 0.0}}, "unknown field `phase` - at `r`"),
+    ({**CAP, "r": {**FOURIER, "cos": 0.5}}, "at `r.cos`"),
+    ({**CAP, "r": {**FOURIER, "cos": [0.1, "x"]}}, "at `r.cos[1]`"),
+    ({**CAP, "r": {**FOURIER, "cos": [0.1, math.nan]}}, "r.cos[1] = nan, must be finite"),
+    ({**CAP, "r": {**FOURIER, "omega": 0.0}}, "r.omega = 0.0, must be finite and > 0"),
+    ({**CAP, "r": {**LEGS, "knots": [[0.0, 1.0], [1.0]]}}, "at `r.knots[1]`"),
+    ({**CAP, "r": {**LEGS, "knots": [[0.0, 1.0], [1.0, 2.0]]}}, "r.knots[1] value = 2.0, must equal"),
+    ({**STEM, "slope": 1.0}, "w > h slope fails by"),
+    # Extreme numbers must be refused in words as well, not by an overflow on the way.
+    (
+        {**CAP, "r": {"kind": "fourier", "mean": -1.0, "omega": 1e308, "cos": [0.0] * 15 + [0.1]}},
+        "r > 0 fails",
+    ),
+    ({**CAP, "r": {"kind": "fourier", "mean": -1.0, "omega": 5e-324, "cos": [0.1]}}, "r > 0 fails"),
+    ({**CAP, "r": {**LEGS, "knots": [[0.0, 1.0], [5e-324, -1.0], [1e-323, 1.0]]}}, "r > 0 fails"),
+    ({**CAP, "r": {**LEGS, "knots": [[0.0, 1.0], [1e300, -1.0], [1.5e308, 1.0]]}}, "r > 0 fails"),
+    ({**CAP, "r": {**LEGS, "knots": [[-1e308, 1.0], [1e308, 1.0]]}}, "r.knots span"),
+]
+
+
+def refusal(call, *arguments):
+    with pytest.raises(InvalidScene) as caught:
+        call(*arguments)
+    message = str(caught.value)
+    assert len(message.splitlines()) == 1
+    assert caught.value.__cause__ is None
+    return message
+
+
+@pytest.mark.parametrize(("data", "message"), BAD_DATA)
+def test_bad_data_is_refused_in_one_line_that_names_the_field(data, message):
+    assert message in refusal(from_data, data)
+
+
+BAD_FILES = [
+    ("a.json", b"{", "is not valid JSON"),
+    ("a.json", b"", "is not valid JSON"),
+    ("a.json", b'{"table": "cap", "r": NaN}', "r = nan, must be finite"),
+    ("a.json", b'{"table": "cap", "r": 1e400}', "r = inf, must be finite"),
+    ("a.json", b'{"table": "cap", "r": ' + b"9" * 5000 + b"}", "is not valid JSON"),
+    ("a.json", b"\xff\xfe", "is not valid JSON"),
+    ("a.json", b'{"table": "cap", "r": ' + b"[" * 100_000, "is not valid JSON"),
+    ("a.json", b'{"table": "cap", "radius": 1}', "unknown field `radius`"),
+    ("a.toml", b'table = "cap', "is not valid TOML"),
+    ("a.toml", b'table = "cap"\nr = 1\nr = 2', "is not valid TOML"),
+    ("a.toml", b"", "missing required field `table`"),
+    ("a.toml", b'table = "cap"\nr = nan', "r = nan, must be finite"),
+    ("a.toml", b'table = "cap"\nr = 1e400', "r = inf, must be finite"),
+    ("a.toml", b'table = "cap"\nr = 1979-05-27', "at `r`"),
+    ("a.toml", b'table = "cap"\nr = ' + b"9" * 5000, "is not valid TOML"),
+    ("a.toml", b"\xff\xfe", "is not valid TOML"),
+    ("a.toml", b"r = " + b"[" * 100_000, "is not valid TOML"),
+    ("a.toml", b'table = "cap"\nr = 1\n"line\\nbreak" = 1', "unknown field `line break`"),
+    ("a.yaml", b"table: cap", "is neither a .toml or .json file nor one of: breathing-circle"),
+]
+
+
+@pytest.mark.parametrize(("name", "text", "message"), BAD_FILES)
+def test_bad_files_are_refused_in_one_line_that_names_them(tmp_path, name, text, message):
+    (tmp_path / name).write_bytes(text)
+    found = refusal(load, tmp_path / name)
+    assert message in found
+    assert name in found
+
+
+def test_files_that_cannot_be_read(tmp_path):
+    (tmp_path / "folder.toml").mkdir()
+    assert "cannot be read" in refusal(load, tmp_path / "folder.toml")
+    assert "No such file" in refusal(load, tmp_path / "absent.json")
+    assert "nor one of" in refusal(load, "moving-cup")
+    assert "nor one of" in refusal(load, "")
+    assert "a.toml" in refusal(load, "nul\0a.toml")
+
+
+junk = st.recursive(
+    st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=5),
+    lambda inner: st.lists(inner, max_size=4) | st.dictionaries(st.text(max_size=5), inner, max_size=4),
+    max_leaves=12,
+)
+
+
+@given(st.sampled_from([CAP, STEM, MUSHROOM]), st.sampled_from(["r", "w", "h", "nu", "slope", "table"]), junk)
+def test_junk_is_refused_or_loads_but_never_crashes(data, field, entry):
+    refusal, scene = "one line", None
+    try:
+        scene = from_data({**data, field: entry})
+    except InvalidScene as error:
+        refusal = str(error)
+    assert len(refusal.splitlines()) == 1
+    assert scene is None or from_data(to_data(scene)) == scene
+
+
+def test_a_law_nested_too_deep_is_refused():
+    nested = 1.0
+    for _ in range(2 * sys.getrecursionlimit()):
+        nested = [nested]
+    assert "r" in refusal(from_data, {"table": "cap", "r": {**LEGS, "knots": nested}})
+
+
+def test_the_published_schema_is_up_to_date():
+    # Regenerate with: python -m scene > docs/scene.schema.json
+    assert json.loads(SCHEMA.read_text("utf-8")) == json.loads(json.dumps(json_schema()))
+
+
+@pytest.fixture(scope="module")
+def published():
+    schema = json.loads(SCHEMA.read_text("utf-8"))
+    jsonschema.Draft202012Validator.check_schema(schema)
+    return jsonschema.Draft202012Validator(schema)
+
+
+@pytest.mark.parametrize("name", catalogue())
+def test_the_schema_accepts_the_catalogue(published, name):
+    published.validate(read_data(name))
+
+
+@given(scene=scenes())
+def test_the_schema_accepts_every_scene(published, scene):
+    published.validate(json.loads(json.dumps(to_data(scene))))
+
+
+@pytest.mark.parametrize(
+    "data",
+    [
+        [],
+        {},
+        {"table": "cone", "r": 1.0},
+        {"table": "cap"},
+        {**CAP, "radius": 1.0},
+        {**CAP, "r": "1.0"},
+        {**CAP, "r": None},
+        {**CAP, "r": {**FOURIER, "phase": 0.0}},
+        {**CAP, "r": {**FOURIER, "kind": "sawtooth"}},
+        {**CAP, "r": {**LEGS, "knots": [[0.0, 1.0, 2.0]]}},
+        {"table": "stem", "w": 1.0},
+    ],
+)
+def test_the_schema_refuses_what_the_loader_refuses(published, data):
+    assert not published.is_valid(data)
+    refusal(from_data, data)

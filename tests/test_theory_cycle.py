@@ -1,0 +1,203 @@
+"""Secs. 3.2 and 3.5: where nu falls and rises, capture and release times, refusals."""
+
+from __future__ import annotations
+
+import importlib
+import re
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import pytest
+from mpmath import MPContext
+
+from scene import BangBang, Fourier, Mushroom, from_data, load
+from scene.laws import value
+from theory import Cycle, NotCovered
+from theory.chebyshev import Grid
+from theory.critical import solve_rising, spans
+from theory.motion import Motion
+
+TWO_CAPTURES = {"kind": "fourier", "mean": 0.75, "omega": 1.0, "cos": [0.0, 0.125]}
+
+
+def test_moving_cap_releases_at_two_pi_minus_t() -> None:
+    cycle = Cycle.of(load("moving-cap"), 30)
+    ctx = cycle.ctx
+    assert cycle.start == 0
+    assert (cycle.nu_max, float(cycle.nu_min)) == (1, pytest.approx(0.2))
+    for t in ("0.01", "1.3", "3.1"):
+        assert abs(cycle.release_time(ctx.mpf(t)) - (2 * ctx.pi - ctx.mpf(t))) < ctx.mpf(10) ** -40
+        later = ctx.mpf(t) + 6 * ctx.pi
+        assert abs(cycle.release_time(later) - (8 * ctx.pi - ctx.mpf(t))) < ctx.mpf(10) ** -40
+        nu = ctx.mpf(0.6) + ctx.mpf(0.4) * ctx.cos(ctx.mpf(t))
+        assert abs(cycle.t_in(nu) - ctx.mpf(t)) < ctx.mpf(10) ** -40
+        assert abs(cycle.t_out(nu) - cycle.release_time(ctx.mpf(t))) < ctx.mpf(10) ** -40
+
+
+def test_nothing_is_captured_while_the_mouth_rests_or_widens() -> None:
+    cycle = Cycle.of(load("fixed-cap-clockwise"), 15)
+    assert (float(cycle.start), float(cycle.period)) == (0.25, 1.0)
+    for t in (0.0, 0.125, 0.5, 0.6, 0.8):
+        assert cycle.release_time(t) == t
+    assert cycle.release_time(0.375) == pytest.approx(0.875, abs=1e-40)
+    assert cycle.release_time(1.375) == pytest.approx(1.875, abs=1e-40)
+
+
+def test_bang_bang_times_invert_the_law() -> None:
+    # Second half of the leg 1 -> 0.3: w = 0.3 + 22.4 (t - 0.25)^2.
+    cycle = Cycle.of(load("fixed-cap-anticlockwise"), 20)
+    ctx = cycle.ctx
+    level = ctx.mpf("0.4")
+    low, high = ctx.mpf(0.3), ctx.one
+    t = ctx.mpf("0.25") - ctx.sqrt((level - low) / (2 * (high - low) * 16))
+    assert abs(cycle.t_in(level) - t) < ctx.mpf(10) ** -50
+    assert abs(cycle.t_out(level) - (ctx.mpf("0.75") - t)) < ctx.mpf(10) ** -50
+
+
+def test_degenerate_turns_are_found_with_their_orders() -> None:
+    # nu' ~ -sin t (1 + cos t): quartic minimum. nu' ~ -sin t (1 + cos 2t): cubic inflections.
+    for cos, orders in (([0.25, 0.0625], [4, 2]), ([0.375, 0.0, 0.125], [3, 2, 3, 2])):
+        law = Fourier(mean=0.5, omega=1.0, cos=tuple(cos))
+        ctx = MPContext()
+        found = spans(ctx, Mushroom(r=1.0, h=1.0, nu=law))
+        assert sorted(s.start_order for s in found) == sorted(orders)
+
+
+@pytest.mark.parametrize("shift", [0.0, 1.0, -2.5, 3.0])
+def test_a_shift_in_time_shifts_the_start(shift: float) -> None:
+    # cos(t - shift), so the fall starts at the shift, taken into [0, 2 pi).
+    ctx = MPContext()
+    ctx.dps = 30
+    law = Fourier(mean=0.5, omega=1.0, cos=(float(ctx.cos(shift)) / 4,), sin=(float(ctx.sin(shift)) / 4,))
+    cycle = Cycle.of(Mushroom(r=1.0, h=1.0, nu=law), 15)
+    assert float(cycle.start) == pytest.approx(shift % float(2 * ctx.pi), abs=1e-12)
+    assert 0 <= cycle.start < cycle.period
+
+
+def test_width_over_radius_is_the_same_cycle_as_nu() -> None:
+    # (1/2 + cos t / 4) (1 + sin t / 2), exact in binary64.
+    r = Fourier(mean=1.0, omega=1.0, sin=(0.5,))
+    w = Fourier(mean=0.5, omega=1.0, cos=(0.25,), sin=(0.25, 0.0625))
+    by_w = Cycle.of(Mushroom(r=r, h=1.0, w=w), 20)
+    by_nu = Cycle.of(Mushroom(r=r, h=1.0, nu=Fourier(mean=0.5, omega=1.0, cos=(0.25,))), 20)
+    ctx = by_w.ctx
+    for nu in ("0.3", "0.5", "0.7"):
+        assert abs(by_w.t_in(ctx.mpf(nu)) - by_nu.t_in(ctx.mpf(nu))) < ctx.mpf(10) ** -45
+        assert abs(by_w.t_out(ctx.mpf(nu)) - by_nu.t_out(ctx.mpf(nu))) < ctx.mpf(10) ** -45
+
+
+def test_bang_bang_width_and_radius_turn_between_knots() -> None:
+    # w and r both move in the leg [0, 1]; dense sampling finds the same extremes.
+    w = BangBang(knots=((0.0, 0.5), (1.0, 0.75), (3.0, 0.5)))
+    r = BangBang(knots=((0.0, 1.0), (2.0, 1.5), (3.0, 1.0)))
+    cycle = Cycle.of(Mushroom(r=r, h=1.0, w=w), 15)
+    motion = [s.motion for p in cycle.pieces for s in (p.capture, p.release)]
+    assert motion
+    sampled = [value(cycle.ctx, w, k / 512) / value(cycle.ctx, r, k / 512) for k in range(1536)]
+    assert max(sampled) <= cycle.nu_max < max(sampled) + 1e-4
+    assert min(sampled) - 1e-4 < cycle.nu_min <= min(sampled)
+
+
+@pytest.mark.parametrize(
+    ("scene", "message"),
+    [
+        (load("breathing-circle"), "the theory is of mushrooms: table is cap"),
+        (load("fermi-ulam"), "the theory is of mushrooms: table is stem"),
+        (
+            from_data({"table": "mushroom", "r": 1.0, "h": 1.0, "nu": TWO_CAPTURES}),
+            "one interval of capture per period is covered: this cycle has 2",
+        ),
+    ],
+)
+def test_what_is_not_covered_is_refused_in_one_line(scene: Any, message: str) -> None:
+    with pytest.raises(NotCovered) as caught:
+        Cycle.of(scene, 15)
+    assert str(caught.value) == message
+
+
+def test_bad_arguments_are_named() -> None:
+    with pytest.raises(ValueError, match="digits = 0, must be >= 1"):
+        Cycle.of(load("moving-cap"), 0)
+    with pytest.raises(ValueError, match=r"nu = 0\.1, must be in \[0\.2, 1\]"):
+        Cycle.of(load("moving-cap"), 15).t_in(0.1)
+    with pytest.raises(ValueError, match="nu is constant"):
+        Cycle.of(load("ergodic"), 15).t_out(1.0)
+
+
+def test_chebyshev_grid_integrates_polynomials_exactly() -> None:
+    ctx = MPContext()
+    ctx.dps = 40
+    grid = Grid(ctx, 12)
+    values = [5 * x**4 - 3 * x**2 + 1 for x in grid.points]
+    assert abs(grid.integral(values) - 1) < ctx.mpf(10) ** -38
+    running = grid.running_integral(grid.coefficients(values))
+    for x, integral in zip(grid.points, running, strict=True):
+        assert abs(integral - (x**5 - x**3 + x)) < ctx.mpf(10) ** -38
+    # Eight points back, a polynomial of degree 7 is forecast exactly.
+    assert abs(grid.forecast([x**7 for x in grid.points[:10]]) - grid.points[10] ** 7) < ctx.mpf(10) ** -30
+    assert grid.forecast([]) is None
+
+
+@pytest.mark.parametrize("name", ["moving-cap", "fixed-cap-clockwise"])
+def test_motion_is_the_laws_of_the_scene(name: str) -> None:
+    scene = load(name)
+    assert isinstance(scene, Mushroom)
+    ctx = MPContext()
+    ctx.dps = 40
+    for t in (Fraction(1, 32), Fraction(5, 16), Fraction(15, 8)):
+        motion, at = Motion(ctx, scene, t), ctx.mpf(t.numerator) / t.denominator
+        nu, rate = motion.nu(at)
+        width = scene.nu if scene.nu is not None else scene.w  # r = 1 where w is given
+        assert width is not None
+        assert abs(nu - value(ctx, width, at)) < ctx.mpf(10) ** -38
+        assert abs(rate - value(ctx, width, at, 1)) < ctx.mpf(10) ** -38
+        r, h, slope = (value(ctx, law, at) for law in (scene.r, scene.h, scene.slope))
+        assert abs(motion.volumes(at, nu).v_cap - ctx.pi**2 * r * r) < ctx.mpf(10) ** -37
+        stem = 2 * ctx.pi * (2 * nu * r * h - h * h * slope)
+        assert abs(motion.volumes(at, nu).v_stem - stem) < ctx.mpf(10) ** -36
+
+
+def test_motion_sums_high_harmonics() -> None:
+    law = Fourier(mean=0.5, omega=1.7, cos=(0.1, 0.0, 0.05, 0.0, 0.01), sin=(0.0, 0.02, 0.0, 0.03))
+    ctx = MPContext()
+    ctx.dps = 40
+    motion = Motion(ctx, Mushroom(r=1.0, h=1.0, nu=law), Fraction(0))
+    nu, rate = motion.nu(ctx.mpf("2.3"))
+    assert abs(nu - value(ctx, law, ctx.mpf("2.3"))) < ctx.mpf(10) ** -38
+    assert abs(rate - value(ctx, law, ctx.mpf("2.3"), 1)) < ctx.mpf(10) ** -38
+
+
+def test_a_root_costs_a_handful_of_evaluations() -> None:
+    # At convergence the iterate is itself an end of the bracket: no reason to fall back on bisection.
+    ctx = MPContext()
+    ctx.dps = 50
+    for k in range(1, 60):
+        asked: list[Any] = []
+
+        def rising(x: Any, k: int = k, asked: list[Any] = asked) -> tuple[Any, Any]:
+            asked.append(x)
+            return x**3 + x - ctx.mpf(k) / 30, 3 * x * x + 1
+
+        root = solve_rising(ctx, rising, ctx.zero, ctx.mpf(2))
+        assert abs(rising(root)[0]) < ctx.mpf(10) ** -48
+        assert len(asked) <= 12
+
+
+def test_a_root_is_found_where_newton_alone_runs_away() -> None:
+    ctx = MPContext()
+    ctx.dps = 30
+    root = solve_rising(ctx, lambda x: (ctx.atan(50 * x - 3), 50 / (1 + (50 * x - 3) ** 2)), -10, ctx.mpf(90))
+    assert abs(root - ctx.mpf(3) / 50) < ctx.mpf(10) ** -29
+
+
+def test_the_table_of_equations_names_what_exists() -> None:
+    tests = Path(__file__).parent
+    table = (tests.parent / "theory" / "equations.md").read_text("utf-8")
+    written = "".join(file.read_text("utf-8") for file in tests.glob("test_theory_*.py"))
+    functions, cases = re.findall(r"`(\w+)\.(\w+)`", table), re.findall(r"`(test_\w+)`", table)
+    assert len(functions) > 15
+    for module, function in functions:
+        assert hasattr(importlib.import_module(f"theory.{module}"), function), f"{module}.{function}"
+    for case in cases:
+        assert f"def {case}(" in written, case

@@ -1,0 +1,88 @@
+"""Sec. 2 of the paper: volumes of cap, stem, island and chaotic zone."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from mpmath import MPContext, fp
+
+from scene import load
+from theory import NotCovered, delta, energy, sin_phi_hat, v_cap, v_cha, v_ell, v_stem, volumes_at
+from theory.volumes import delta_slope
+
+
+@pytest.fixture
+def ctx() -> Any:
+    context = MPContext()
+    context.dps = 50
+    return context
+
+
+@pytest.mark.parametrize("nu", ["0", "0.01", "0.3", "0.5", "0.99", "1"])
+def test_delta_is_its_integral_to_40_digits(ctx: Any, nu: str) -> None:
+    r = ctx.mpf("1.7")
+    w = ctx.mpf(nu) * r
+    island = 4 * ctx.pi * ctx.quad(lambda s: ctx.sqrt(abs(r * r - s * s)), [w, (w + r) / 2, r])
+    assert abs(delta(ctx, ctx.mpf(nu)) - island / v_cap(ctx, r)) < ctx.mpf(10) ** -40
+    assert abs(v_ell(ctx, r, ctx.mpf(nu)) - island) < ctx.mpf(10) ** -39
+
+
+def test_delta_slope_is_its_derivative(ctx: Any) -> None:
+    for nu in ("0.1", "0.5", "0.9"):
+        measured = ctx.diff(lambda x: delta(ctx, x), ctx.mpf(nu))
+        assert abs(delta_slope(ctx, ctx.mpf(nu)) - measured) < ctx.mpf(10) ** -20
+
+
+@pytest.mark.parametrize("nu", [0.1, 0.3, 0.65, 0.9])
+def test_delta_is_the_captured_share_of_phase_points(nu: float) -> None:
+    n, r = 400_000, 1.3
+    rng = np.random.Generator(np.random.Philox(20140601))
+    rho, psi, direction = r * np.sqrt(rng.random(n)), np.pi * rng.random(n), 2 * np.pi * rng.random(n)
+    x, y = rho * np.cos(psi), rho * np.sin(psi)
+    captured = np.abs(sin_phi_hat(np, x, y, np.cos(direction), np.sin(direction), r)) > nu
+    expected = delta(fp, nu)
+    sigma = np.sqrt(expected * (1 - expected) / n)
+    assert abs(captured.mean() - expected) < 5 * sigma
+
+
+def test_cap_and_stem_are_two_pi_times_their_areas(ctx: Any) -> None:
+    r, w, h, slope = (ctx.mpf(x) for x in ("1.3", "0.8", "2.1", "0.2"))
+    cap = ctx.quad(lambda y: 2 * ctx.sqrt(abs(r * r - y * y)), [0, r / 2, r])
+    stem = ctx.quad(lambda y: 2 * (w + slope * y), [-h, 0])
+    assert abs(v_cap(ctx, r) - 2 * ctx.pi * cap) < ctx.mpf(10) ** -40
+    assert abs(v_stem(ctx, w, h, slope) - 2 * ctx.pi * stem) < ctx.mpf(10) ** -45
+    whole = v_cap(ctx, r) + v_stem(ctx, w, h, slope)
+    assert abs(v_cha(ctx, r, w, h, slope) + v_ell(ctx, r, w / r) - whole) < ctx.mpf(10) ** -45
+
+
+def test_volumes_of_a_scene_agree_in_floats_and_in_many_digits(ctx: Any) -> None:
+    for name in ("moving-cap", "fixed-cap-clockwise", "frozen-mushroom", "ergodic"):
+        scene = load(name)
+        for t in (0.0, 0.1, 0.375, 2.5, 7.25):
+            many = volumes_at(ctx, scene, ctx.mpf(t))
+            few = volumes_at(fp, scene, t)
+            assert [float(x) for x in many] == pytest.approx(list(few), rel=1e-14, abs=1e-14)
+
+
+def test_moving_cap_volumes_are_the_formulas_of_the_scene(ctx: Any) -> None:
+    t = ctx.mpf("1.1")
+    r, h, nu = 1 + ctx.sin(t) / 2, 1 - ctx.sin(t) / 2, ctx.mpf(0.6) + ctx.mpf(0.4) * ctx.cos(t)
+    found = volumes_at(ctx, load("moving-cap"), t)
+    assert abs(found.nu - nu) < ctx.mpf(10) ** -48
+    assert abs(found.v_cha - v_cha(ctx, r, nu * r, h, ctx.mpf(0.1111))) < ctx.mpf(10) ** -46
+
+
+def test_outside_their_domain_the_formulas_say_so() -> None:
+    with pytest.raises(ValueError, match=r"nu = 1\.5, must be in \[0, 1\]"):
+        delta(fp, 1.5)
+    with pytest.raises(ValueError, match=r"must be in \[0, 1\]"):
+        v_cha(fp, 1.0, 1.25, 1.0, 0.0)
+    with pytest.raises(NotCovered, match="the theory is of mushrooms: table is cap"):
+        volumes_at(fp, load("breathing-circle"), 0.0)
+
+
+def test_energy_is_half_the_square_of_the_speed(ctx: Any) -> None:
+    assert energy(fp, 3.0, 4.0) == 12.5
+    assert energy(ctx, ctx.mpf(3), ctx.mpf(4)) == 12.5

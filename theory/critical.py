@@ -1,0 +1,223 @@
+"""Where nu(t) turns, stalls or rests, by exact algebra.
+
+With w = nu r or nu itself a law, nu' has the sign of N = w' r - w r' (or of the law's own
+derivative). On a bang-bang leg N is a polynomial in time, over a Fourier period one in
+x = tan(omega t / 2), both with rational coefficients: Sturm's theorem isolates every root and
+repeated division gives its multiplicity, so no critical point is missed however close two
+are. Between neighbouring ones nu is strictly monotone or at rest.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from fractions import Fraction
+from math import comb
+from typing import Any, NamedTuple
+
+from scene import exact
+from scene.laws import BangBang, Fourier, Law, Quadratic, breakpoints, is_constant, piece_at
+from scene.laws import exact as number
+from scene.tables import Mushroom, laws, period
+
+# An isolating interval this narrow lets Newton's method take over from bisection.
+NARROW = Fraction(1, 2**24)
+
+
+class Span(NamedTuple):
+    """A time interval on which nu is monotone and every law is analytic.
+
+    Near its ends nu departs from its value there as |t - end|^order.
+    """
+
+    start: Any
+    end: Any
+    start_order: int
+    end_order: int
+    inside: Fraction
+
+
+class Root(NamedTuple):
+    """A real root isolated in [left, right] (equal when it is rational and met exactly)."""
+
+    left: Fraction
+    right: Fraction
+    multiplicity: int
+    simple: exact.Polynomial
+
+
+def spans(ctx: Any, scene: Mushroom) -> list[Span]:
+    """Cut one period into spans, in order of time; an empty list when nu never changes.
+
+    Args:
+        ctx: number system of the times [time].
+        scene: a valid mushroom.
+
+    Source: eq:dnu.
+    """
+    moving = [law for law in laws(scene).values() if not is_constant(law)]
+    width = scene.nu if scene.nu is not None else scene.w
+    radius = scene.r if scene.nu is None else 1.0
+    assert width is not None
+    if is_constant(width) and is_constant(radius):
+        return []
+    if isinstance(moving[0], BangBang):
+        return list(_bang_bang_spans(ctx, moving, width, radius))
+    return _fourier_spans(ctx, scene, width, radius)
+
+
+def _bang_bang_spans(ctx: Any, moving: list[Law], width: Law, radius: Law) -> Iterator[Span]:
+    cuts: set[Fraction] = set()
+    for law in moving:
+        times = breakpoints(law)
+        start = min(cuts, default=times[0])
+        length = times[-1] - times[0]
+        cuts |= {start + (t - start) % length for t in times}
+    ordered = sorted(cuts)
+    for a, b in zip(ordered, [*ordered[1:], ordered[0] + length], strict=True):
+        w, r = _leg(width, a), _leg(radius, a)
+        slope = exact.add(
+            exact.multiply(exact.derivative(w), r),
+            exact.scale(exact.multiply(w, exact.derivative(r)), Fraction(-1)),
+        )
+        times, orders = [number(ctx, a)], [1 + _multiplicity_at(slope, Fraction(0))]
+        for root in _roots(slope, Fraction(0), b - a):
+            times.append(number(ctx, a) + _refined(ctx, root))
+            orders.append(1 + root.multiplicity)
+        times.append(number(ctx, b))
+        orders.append(1 + _multiplicity_at(slope, b - a))
+        for i in range(len(times) - 1):
+            yield Span(times[i], times[i + 1], orders[i], orders[i + 1], (a + b) / 2)
+
+
+def _leg(law: Law, start: Fraction) -> exact.Polynomial:
+    # In the variable t - start.
+    piece = piece_at(law, start)
+    if isinstance(piece, Quadratic):
+        d = start - piece.origin
+        return exact.trimmed(
+            [piece.c0 + d * (piece.c1 + d * piece.c2), piece.c1 + 2 * piece.c2 * d, piece.c2]
+        )
+    assert isinstance(piece, float)
+    return exact.trimmed([Fraction(piece)])
+
+
+def _fourier_spans(ctx: Any, scene: Mushroom, width: Law, radius: Law) -> list[Span]:
+    w, dw, n_w = _half_angle(width)
+    r, dr, n_r = _half_angle(radius)
+    slope = exact.add(exact.multiply(dw, r), exact.scale(exact.multiply(w, dr), Fraction(-1)))
+    if not slope:
+        return []
+    shared = period(scene)
+    assert shared is not None
+    length = shared.value(ctx)
+    found = [(ctx.zero + length / 2, 2 * (n_w + n_r) - (len(slope) - 1))]  # x = infinity
+    bound = exact.root_bound(slope)
+    for root in _roots(slope, -bound, bound):
+        time = length * ctx.atan(_refined(ctx, root)) / ctx.pi
+        found.append((time if time >= 0 else time + length, root.multiplicity))
+    found = sorted((t, m) for t, m in found if m > 0)
+    later = [*found[1:], (found[0][0] + length, found[0][1])]
+    return [Span(a, b, 1 + m, 1 + n, Fraction(0)) for (a, m), (b, n) in zip(found, later, strict=True)]
+
+
+def _half_angle(law: Law) -> tuple[exact.Polynomial, exact.Polynomial, int]:
+    # Numerators of the law and of its derivative in omega t over (1 + x^2)^n, and n.
+    if not isinstance(law, Fourier):
+        constant = law.knots[0][1] if isinstance(law, BangBang) else law
+        return [Fraction(constant)], [], 0
+    harmonics = law.harmonics()
+    n = max((k for k, _, _ in harmonics), default=0)
+    position = exact.scale(_one_plus_square(n), Fraction(law.mean))
+    rate: exact.Polynomial = []
+    for k, c, s in harmonics:
+        # cos(k a) + i sin(k a) = (1 + i x)^(2k) / (1 + x^2)^k with x = tan(a / 2).
+        parts = [[Fraction(comb(2 * k, j) * unit[j % 4]) for j in range(2 * k + 1)] for unit in _UNITS]
+        cos, sin = (exact.multiply(exact.trimmed(part), _one_plus_square(n - k)) for part in parts)
+        cosine, sine = Fraction(c), Fraction(s)
+        position = exact.add(position, exact.add(exact.scale(cos, cosine), exact.scale(sin, sine)))
+        rate = exact.add(rate, exact.add(exact.scale(cos, k * sine), exact.scale(sin, -k * cosine)))
+    return position, rate, n
+
+
+_UNITS = ((1, 0, -1, 0), (0, 1, 0, -1))  # real and imaginary parts of i^j
+
+
+def _one_plus_square(n: int) -> exact.Polynomial:
+    return [Fraction(comb(n, j // 2)) if j % 2 == 0 else Fraction(0) for j in range(2 * n + 1)]
+
+
+def _multiplicity_at(p: exact.Polynomial, x: Fraction) -> int:
+    n = 0
+    while p and exact.at(p, x) == 0:
+        p, n = exact.divide(p, [-x, Fraction(1)])[0], n + 1
+    return n
+
+
+def _roots(p: exact.Polynomial, a: Fraction, b: Fraction) -> list[Root]:
+    """Isolate the distinct roots in the open interval (a, b), in order."""
+    if len(p) < 2:
+        return []
+    layers = [p]  # a root of multiplicity m belongs to the first m of them
+    while len(layers[-1]) > 1:
+        layers.append(exact.divide(layers[-1], exact.squarefree(layers[-1]))[0])
+    sturms = [exact.Sturm(layer) for layer in layers[:-1]]
+    simple = sturms[0].root_free_of_squares
+    found, todo = [], [(a, b)]
+    while todo:
+        left, right = todo.pop()
+        n = sturms[0].n_roots(left, right)
+        if n == 0:
+            continue
+        isolated = n == 1 and right - left <= NARROW and exact.at(p, left) != 0 and exact.at(p, right) != 0
+        if isolated:
+            found.append(Root(left, right, sum(s.n_roots(left, right) for s in sturms), simple))
+            continue
+        middle = (left + right) / 2
+        if exact.at(p, middle) == 0:
+            found.append(Root(middle, middle, _multiplicity_at(p, middle), simple))
+        todo += [(left, middle), (middle, right)]
+    return sorted(found)
+
+
+def _refined(ctx: Any, root: Root) -> Any:
+    if root.left == root.right:
+        return number(ctx, root.left)
+    low, high = number(ctx, root.left), number(ctx, root.right)
+    coefficients = [number(ctx, a) for a in reversed(root.simple)]
+    sign = 1 if exact.at(root.simple, root.right) > 0 else -1
+
+    def rising(x: Any) -> tuple[Any, Any]:
+        value = slope = ctx.zero
+        for c in coefficients:
+            value, slope = value * x + c, slope * x + value
+        return sign * value, sign * slope
+
+    return solve_rising(ctx, rising, low, high)
+
+
+def solve_rising(ctx: Any, f: Any, low: Any, high: Any, guess: Any = None) -> Any:
+    """Find the root of a rising function by Newton's method, kept in its bracket by bisection.
+
+    Args:
+        ctx: number system.
+        f: function returning (value, slope), negative at low, positive at high.
+        low: lower end of the bracket.
+        high: upper end.
+        guess: first trial; the middle by default.
+    """
+    close = ctx.ldexp(high - low, -6 * int(ctx.prec) // 10)  # the step after one this small is below rounding
+    x = (low + high) / 2 if guess is None or not low < guess < high else guess
+    for trial in range(20 + 4 * int(ctx.prec)):
+        value, slope = f(x)
+        if value == 0:
+            break
+        low, high = (x, high) if value < 0 else (low, x)
+        newton = x - value / slope if slope > 0 else high + 1
+        # The ends belong to the bracket: at convergence x is one of them. Bisecting now and then
+        # bounds the work whatever the function.
+        is_trusted = low <= newton <= high and (trial < 20 or trial % 2 == 0)
+        step = (newton if is_trusted else (low + high) / 2) - x
+        x += step
+        if (is_trusted and abs(step) <= close) or high - low <= ctx.eps * abs(x):
+            break
+    return x

@@ -1,0 +1,58 @@
+"""Adiabatic invariants of the cap and the rates at which energy drifts in each zone (sec. 3).
+
+The particle has mass 1. Every formula takes the number system first, or needs none.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from theory.volumes import v_cap
+
+
+def energy(ctx: Any, vx: Any, vy: Any) -> Any:
+    """Return H = (vx^2 + vy^2) / 2 [length^2 / time^2]. Source: sec. 2."""
+    return ctx.mpf(vx * vx + vy * vy) / 2
+
+
+def sin_phi_hat(ctx: Any, x: Any, y: Any, vx: Any, vy: Any, r: Any) -> Any:
+    """Return sin of the angle phi_hat, the cap's adiabatic invariant.
+
+    Args:
+        ctx: number system.
+        x: position across [length].
+        y: height over the base [length].
+        vx: velocity across; vx and vy must not both be 0.
+        vy: velocity upward.
+        r: radius of the cap [length].
+
+    Returns:
+        -(x vy - y vx) / (|v| r); in the cap the particle is captured when its modulus exceeds nu.
+
+    Source: Eq:sinphi.
+    """
+    return (y * vx - x * vy) / (ctx.hypot(vx, vy) * r)
+
+
+def cap_invariant(ctx: Any, vx: Any, vy: Any, r: Any) -> Any:
+    """Return E V_cap, constant while the particle stays in the cap. Source: sec. 3.1."""
+    return energy(ctx, vx, vy) * v_cap(ctx, r)
+
+
+def log_energy_rate_chaotic(v_cha: Any, v_cap: Any, v_cha_rate: Any, delta_rate: Any) -> Any:
+    """Return d log E / dt in the chaotic zone, with the flux through the mouth.
+
+    Args:
+        v_cha: volume of the chaotic zone [length^2].
+        v_cap: volume of the cap [length^2].
+        v_cha_rate: d V_cha / dt.
+        delta_rate: d delta / dt, positive while particles are captured.
+
+    Source: Eq:dE.
+    """
+    return -(v_cha_rate + v_cap * delta_rate) / v_cha
+
+
+def log_energy_rate_island(v_cap: Any, v_cap_rate: Any) -> Any:
+    """Return d log E / dt in the island, -V_cap' / V_cap. Source: Eq:dEe."""
+    return -v_cap_rate / v_cap

@@ -1,0 +1,84 @@
+"""A mushroom's parameters as fast analytic functions of time, with their rates.
+
+The same functions as `scene.laws.evaluate` gives, with the constants converted once and one
+sine and cosine for all laws and harmonics: inverting nu(t) thousands of times needs that.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from fractions import Fraction
+from typing import Any
+
+from scene.laws import Fourier, Piece, Quadratic, exact, piece_at
+from scene.tables import Mushroom, laws
+from theory.volumes import Volumes, volumes_of
+
+# From t and (cos, sin) of omega t to the law's value and rate.
+Parameter = Callable[[Any, Any], tuple[Any, Any]]
+
+
+class Motion:
+    """The table in motion, valid on the span of time on which its laws keep their pieces."""
+
+    def __init__(self, ctx: Any, scene: Mushroom, time: Fraction) -> None:
+        self.ctx = ctx
+        pieces = {name: piece_at(law, time) for name, law in laws(scene).items()}
+        waves = [piece for piece in pieces.values() if isinstance(piece, Fourier)]
+        self._omega = ctx.mpf(waves[0].omega) if waves else None  # laws that move share one period
+        self._parameters = {name: _parameter(ctx, piece) for name, piece in pieces.items()}
+
+    def _at(self, t: Any, *names: str) -> list[tuple[Any, Any]]:
+        turn = self.ctx.cos_sin(self._omega * t) if self._omega is not None else None
+        return [self._parameters[name](t, turn) for name in names]
+
+    def nu(self, t: Any) -> tuple[Any, Any]:
+        """Return the mouth w / r at time t, and its rate. Source: Eq:nu, eq:dnu."""
+        if "nu" in self._parameters:
+            return self._at(t, "nu")[0]
+        (w, w_rate), (r, r_rate) = self._at(t, "w", "r")
+        return w / r, (w_rate * r - w * r_rate) / (r * r)
+
+    def volumes(self, t: Any, nu: Any) -> Volumes:
+        """Return the volumes at time t, where the mouth is known to be nu."""
+        (r, _), (h, _), (slope, _) = self._at(t, "r", "h", "slope")
+        return volumes_of(self.ctx, r, nu, h, slope)
+
+
+def _parameter(ctx: Any, piece: Piece) -> Parameter:
+    if isinstance(piece, Quadratic):
+        return _parabola(ctx, piece)
+    if isinstance(piece, Fourier):
+        return _wave(ctx, piece)
+    constant = ctx.mpf(piece), ctx.zero
+    return lambda t, turn: constant
+
+
+def _parabola(ctx: Any, piece: Quadratic) -> Parameter:
+    origin, c0, c1, c2 = (exact(ctx, number) for number in piece[:4])
+
+    def parabola(t: Any, turn: Any) -> tuple[Any, Any]:
+        x = t - origin
+        return c0 + x * (c1 + x * c2), c1 + 2 * x * c2
+
+    return parabola
+
+
+def _wave(ctx: Any, law: Fourier) -> Parameter:
+    mean, omega = ctx.mpf(law.mean), ctx.mpf(law.omega)
+    amplitudes = {k: (ctx.mpf(c), ctx.mpf(s)) for k, c, s in law.harmonics()}
+    last = max(amplitudes)
+
+    def wave(t: Any, turn: Any) -> tuple[Any, Any]:
+        value, rate = mean, ctx.zero
+        cos, sin = turn
+        for k in range(1, last + 1):
+            if k > 1:
+                cos, sin = cos * turn[0] - sin * turn[1], sin * turn[0] + cos * turn[1]
+            if k in amplitudes:
+                c, s = amplitudes[k]
+                value += c * cos + s * sin
+                rate += k * (s * cos - c * sin)
+        return value, omega * rate
+
+    return wave

@@ -1,0 +1,114 @@
+"""Phase-space volumes of the frozen mushroom at H = 1/2 (sec. 2).
+
+A volume is 2 pi times an area, weighted by the share of directions; at energy E it is
+sqrt(2 E) times larger. Every formula takes the number system first: `mpmath.fp` for floats,
+an `MPContext` for many digits. Intervals are not handled.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+from scene.laws import Law, value
+from scene.tables import Mushroom, Scene
+
+
+class NotCovered(ValueError):  # noqa: N818 (the name users meet in messages)
+    """A scene the theory says nothing about: one line that tells why."""
+
+
+class Volumes(NamedTuple):
+    """Volumes of cap, stem, island and chaotic zone [length^2], and the mouth's nu = w / r."""
+
+    v_cap: Any
+    v_stem: Any
+    v_ell: Any
+    v_cha: Any
+    nu: Any
+
+
+def v_cap(ctx: Any, r: Any) -> Any:
+    """Return pi^2 r^2, the volume over the half disk of radius r [length]. Source: Eq:Vcap."""
+    return ctx.pi**2 * r * r
+
+
+def v_stem(ctx: Any, w: Any, h: Any, slope: Any) -> Any:
+    """Return 2 pi (2 w h - h^2 slope), the volume over the stem. Source: Eq:Vcap."""
+    return 2 * ctx.pi * (2 * w * h - h * h * slope)
+
+
+def delta(ctx: Any, nu: Any) -> Any:
+    """Return the island's share of the cap, (2 / pi) (acos nu - nu sqrt(1 - nu^2)).
+
+    Raises:
+        ValueError: nu is outside [0, 1].
+
+    Source: the equation after volisl.
+    """
+    _check_nu(nu)
+    return 2 * (ctx.acos(nu) - nu * ctx.sqrt((1 - nu) * (1 + nu))) / ctx.pi
+
+
+def delta_slope(ctx: Any, nu: Any) -> Any:
+    """Return d delta / d nu = -(4 / pi) sqrt(1 - nu^2).
+
+    Raises:
+        ValueError: nu is outside [0, 1].
+    """
+    _check_nu(nu)
+    return -4 * ctx.sqrt((1 - nu) * (1 + nu)) / ctx.pi
+
+
+def _check_nu(nu: Any) -> None:
+    if not 0 <= nu <= 1:
+        raise ValueError(f"nu = {nu}, must be in [0, 1]")
+
+
+def v_ell(ctx: Any, r: Any, nu: Any) -> Any:
+    """Return delta(nu) V_cap, the island's volume. Source: volisl."""
+    return delta(ctx, nu) * v_cap(ctx, r)
+
+
+def v_cha(ctx: Any, r: Any, w: Any, h: Any, slope: Any) -> Any:
+    """Return V_cap + V_stem - V_ell, the chaotic zone's volume. Source: vchs."""
+    return v_cap(ctx, r) + v_stem(ctx, w, h, slope) - v_ell(ctx, r, w / r)
+
+
+def volumes_at(ctx: Any, scene: Scene, t: Any) -> Volumes:
+    """Return the volumes of a mushroom frozen at time t.
+
+    Args:
+        ctx: number system.
+        scene: a valid mushroom.
+        t: time, a number of ctx.
+
+    Raises:
+        NotCovered: the table is no mushroom.
+    """
+    mushroom = as_mushroom(scene)
+
+    def at(law: Law) -> Any:
+        return value(ctx, law, t)
+
+    r, h, slope = at(mushroom.r), at(mushroom.h), at(mushroom.slope)
+    nu = at(mushroom.w) / r if mushroom.w is not None else at(mushroom.nu or 0.0)
+    nu = min(nu, ctx.mpf(1))  # a valid scene has nu <= 1: what exceeds it is rounding
+    return volumes_of(ctx, r, nu, h, slope)
+
+
+def volumes_of(ctx: Any, r: Any, nu: Any, h: Any, slope: Any) -> Volumes:
+    """Return all volumes from the table's parameters, the mouth given by nu = w / r."""
+    cap, stem = v_cap(ctx, r), v_stem(ctx, nu * r, h, slope)
+    island = delta(ctx, nu) * cap
+    return Volumes(cap, stem, island, cap + stem - island, nu)
+
+
+def as_mushroom(scene: Scene) -> Mushroom:
+    """Return the scene when it is a mushroom.
+
+    Raises:
+        NotCovered: it is a cap or a stem.
+    """
+    if isinstance(scene, Mushroom):
+        return scene
+    raise NotCovered(f"the theory is of mushrooms: table is {scene.__struct_config__.tag}")

@@ -8,6 +8,7 @@ different precisions do not disturb each other, and mpmath's global precision is
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from fractions import Fraction
 from typing import Any, NamedTuple
 
@@ -85,6 +86,14 @@ class Arithmetic:
     def hull(self, x: Interval, y: Interval) -> Interval:
         """Return the interval from the lower end of x to the upper end of y."""
         return self.context.make_mpf((x._mpi_[0], y._mpi_[1]))
+
+    def union(self, intervals: Sequence[Interval]) -> Interval:
+        """Return the smallest interval that holds all of these."""
+        lo, hi = intervals[0]._mpi_
+        for x in intervals[1:]:
+            a, b = x._mpi_
+            lo, hi = (a if libmpf.mpf_lt(a, lo) else lo), (b if libmpf.mpf_gt(b, hi) else hi)
+        return self.context.make_mpf((lo, hi))
 
     def middle(self, x: Interval) -> Interval:
         """Return a short dyadic point well inside x (half way when x is very thin)."""

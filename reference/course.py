@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from fractions import Fraction
 from functools import partial
+from itertools import zip_longest
 from typing import NamedTuple
 
 from reference import rational
@@ -24,6 +25,7 @@ from scene.tables import laws, period
 
 SIDES: tuple[Wall, ...] = ("left", "right", "floor")
 MAX_SKIPS = 80
+BEYOND = 2.0**-10
 
 
 class Span(NamedTuple):
@@ -35,12 +37,15 @@ class Span(NamedTuple):
 
 
 class Hit(NamedTuple):
-    """A wall met: when (enclosed), with f' there, and where its laws are to be evaluated."""
+    """A wall met: when (enclosed), with f' there, and the law pieces that may hold then.
+
+    There are two motions where the time's enclosure holds a knot: the truth is in their hull.
+    """
 
     wall: Wall
     time: Interval
     slope: Interval
-    motion: Motion
+    motions: tuple[Motion, ...]
 
 
 class Event(NamedTuple):
@@ -125,24 +130,26 @@ class Course:
         return crossing is not None and crossing < horizon
 
     def _beyond_crossing(self, crossing: Interval, *, in_cap: bool) -> Hit | Undefined | None:
-        span = self._span_at(crossing)
         if isinstance(self.scene, Cap):
-            return self._base_hit(crossing, span)
+            return self._base_hit(crossing)
         x = self.flight.x + self.flight.vx * crossing
-        w = span.motion.width(self.flight.t + crossing).f
-        is_open = [sign(w - x), sign(w + x)]
+        is_open = [0, 0]
+        for i, motion in enumerate(self._motions_at(crossing)):
+            w = motion.width(self.flight.t + crossing).f
+            signs = [sign(w - x), sign(w + x)]
+            is_open = signs if i == 0 or signs == is_open else [0, 0]
         if 0 in is_open:
             if self._is_tie(("left", "right"), None):
                 return Undefined("mouth-edge" if isinstance(self.scene, Mushroom) else "corner")
             raise Undecidable("the mouth's edge is met, as far as this precision shows")
         if isinstance(self.scene, Stem) or (in_cap and -1 in is_open):
-            return self._base_hit(crossing, span)
+            return self._base_hit(crossing)
         walls: tuple[Wall, ...] = SIDES if in_cap else ("arc",)
         return self._first_hit(walls, self.arithmetic.lower(crossing), self.end)
 
-    def _base_hit(self, crossing: Interval, span: Span) -> Hit:
+    def _base_hit(self, crossing: Interval) -> Hit:
         slope = -self.flight.vy if isinstance(self.scene, Stem) else self.flight.vy
-        return Hit("base", crossing, slope, span.motion)
+        return Hit("base", crossing, slope, self._motions_at(crossing))
 
     def _first_hit(self, walls: tuple[Wall, ...], start: Interval, limit: Interval) -> Hit | Undefined | None:
         hits: list[Hit] = []
@@ -158,12 +165,19 @@ class Course:
         for other in hits[:-1]:
             if not is_below(best.time, other.time):
                 return self._tied(walls, best.time)
-        if limit is self.end:
-            if not is_below(best.time, limit):
-                raise Undecidable("horizon and collision fall together")
-        elif not is_below(best.time, limit):
+        if is_below(best.time, limit):
+            return best
+        if limit is not self.end:
             return self._tied((*walls, "base"), best.time)
-        return best
+        if self._is_hit_at_horizon(best.wall):
+            return None
+        raise Undecidable("horizon and collision fall together")
+
+    def _is_hit_at_horizon(self, wall: Wall) -> bool:
+        horizon = exact_point(self.end._mpi_[0]) if self.end.delta == 0 else None
+        if self.exact is None or horizon is None:
+            return False
+        return rational.is_zero(self.scene, self.exact, wall, horizon)
 
     def _tied(self, walls: tuple[Wall, ...], time: Interval) -> Undefined:
         if self._is_tie(walls, time):
@@ -195,18 +209,41 @@ class Course:
         residual = self.leaving.get(wall)
         if residual is None and self._is_long(start, stop):
             start = self._skip(wall, start, stop, leaves)
-        for span in self._spans(start, stop):
-            isolator = Isolator(
-                self.arithmetic, partial(span.motion.wall, wall), residual, is_flat=wall in self.flat
-            )
+        spans = list(self._spans(start, stop))
+        for span, following in zip_longest(spans, spans[1:]):
+            isolator = self._isolator(wall, span.motion)
             is_at_start = residual is not None and sign(span.start) == 0
             if not is_at_start and sign(isolator.value(span.start)) <= 0:
                 raise Undecidable(f"f of {wall} has no sign where a stretch of the flight begins")
-            root: Root | None = isolator.first_root(span.start, span.end)
+            # A little beyond the end, where f goes on smoothly, so that a root at the end is isolated.
+            end = self.arithmetic.upper(span.end + (span.end - span.start) * BEYOND)
+            root = isolator.first_root(span.start, end)
             leaves.extend(isolator.leaves)
-            if root is not None:
-                return Hit(wall, root.time, root.slope, span.motion)
+            if root is None or is_below(span.end, root.time):
+                continue
+            if following is None or is_below(root.time, self.arithmetic.lower(following.start)):
+                return Hit(wall, root.time, root.slope, (span.motion,))
+            return self._hit_at_knot(wall, root, span, following)
         return None
+
+    def _isolator(self, wall: Wall, motion: Motion) -> Isolator:
+        residual = self.leaving.get(wall)
+        return Isolator(self.arithmetic, partial(motion.wall, wall), residual, is_flat=wall in self.flat)
+
+    def _hit_at_knot(self, wall: Wall, root: Root, span: Span, following: Span) -> Hit:
+        # The truth is a root of the piece before the knot or of the one after: take the hull of both.
+        before = self.arithmetic.lower(root.time - (root.time - span.start) * BEYOND)
+        isolator = self._isolator(wall, following.motion)
+        after = self.arithmetic.upper(following.start + (following.start - before))
+        if sign(isolator.value(before)) <= 0:
+            raise Undecidable("the pieces on both sides of a knot disagree")
+        other = isolator.first_root(before, after)
+        if other is None:
+            raise Undecidable("the pieces on both sides of a knot disagree")
+        times, slopes = (root.time, other.time), (root.slope, other.slope)
+        return Hit(
+            wall, self.arithmetic.union(times), self.arithmetic.union(slopes), (span.motion, following.motion)
+        )
 
     def _is_long(self, start: Interval, stop: Interval) -> bool:
         shared = period(self.scene)
@@ -230,9 +267,9 @@ class Course:
                 end = self.arithmetic.middle(self.arithmetic.hull(start, end))
         return start
 
-    def _span_at(self, time: Interval) -> Span:
-        # At a knot both pieces give the same value and slope; the later one holds from there on.
-        return list(self._spans(self.arithmetic.lower(time), self.arithmetic.upper(time)))[-1]
+    def _motions_at(self, time: Interval) -> tuple[Motion, ...]:
+        spans = self._spans(self.arithmetic.lower(time), self.arithmetic.upper(time))
+        return tuple(span.motion for span in spans)
 
     def _spans(self, start: Interval, stop: Interval) -> Iterator[Span]:
         """Cut [start, stop] where a law leaves an analytic piece; at least one span."""

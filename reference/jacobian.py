@@ -34,8 +34,9 @@ def step_jacobian(
     """
     zero, one = arithmetic.zero, arithmetic.number(1)
     s, d = hit.time, hit.slope
-    f_x, f_y, f_t = hit.motion.gradient(hit.wall, s)
-    f_xx, f_yy, f_yt, f_tt = hit.motion.hessian(hit.wall, s)
+    motion = hit.motions[-1]  # at a knot the second derivatives jump: those just after it
+    f_x, f_y, f_t = motion.gradient(hit.wall, s)
+    f_xx, f_yy, f_yt, f_tt = motion.hessian(hit.wall, s)
     n2 = arithmetic.square(f_x) + arithmetic.square(f_y)
     columns = []
     for i in range(5):

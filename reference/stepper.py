@@ -329,10 +329,14 @@ def _bounce(chain: _Chain, hit: Hit, arithmetic: Arithmetic) -> _Chain:
     q, s = chain.flight, hit.time
     x = q.x + q.vx * s
     y = arithmetic.zero if hit.wall == "base" else q.y + q.vy * s
-    f_x, f_y, _ = hit.motion.gradient(hit.wall, s)
-    factor = 2 * hit.slope / (arithmetic.square(f_x) + arithmetic.square(f_y))
-    after = Flight(q.t + s, x, y, q.vx - factor * f_x, q.vy - factor * f_y)
-    return _Chain(after, {hit.wall: chain.leaving.get(hit.wall, arithmetic.zero)})
+    velocities = []
+    for motion in hit.motions:
+        f_x, f_y, _ = motion.gradient(hit.wall, s)
+        factor = 2 * hit.slope / (arithmetic.square(f_x) + arithmetic.square(f_y))
+        velocities.append((q.vx - factor * f_x, q.vy - factor * f_y))
+    vx, vy = (arithmetic.union(component) for component in zip(*velocities, strict=True))
+    residual = chain.leaving.get(hit.wall, arithmetic.zero)
+    return _Chain(Flight(q.t + s, x, y, vx, vy), {hit.wall: residual})
 
 
 def _collision(event: Event, hit: Hit, after: Flight, arithmetic: Arithmetic) -> Collision:

@@ -107,6 +107,8 @@ def test_every_catalogue_scene_is_served(module):
     names = [name for name in catalogue() if name != "moving-cap-as-printed"]
     scenes = [to_data(load(name)) for name in names]
     starts = [{"y": -0.3} if scene["table"] == "stem" else {} for scene in scenes]
-    answers = converse(module, *(step(i, s, **c) for i, (s, c) in enumerate(zip(scenes, starts, strict=True))))
+    answers = converse(
+        module, *(step(i, s, **c) for i, (s, c) in enumerate(zip(scenes, starts, strict=True)))
+    )
     assert [a["seq"] for a in answers] == list(range(len(names)))
     assert {a["outcome"] for a in answers} == {"collision"}

@@ -75,6 +75,18 @@ def test_a_shift_in_time_shifts_the_start(shift: float) -> None:
     assert 0 <= cycle.start < cycle.period
 
 
+@pytest.mark.parametrize(("cos", "sin"), [(3, 4), (-3, 4), (5, 12), (-12, 5), (8, -15), (20, 21)])
+def test_a_mouth_that_opens_fully_at_no_round_time(cos: int, sin: int) -> None:
+    # Pythagorean amplitudes: nu touches 1 exactly, at a time where rounding may carry it above.
+    swing = {5: 8, 13: 64, 17: 64, 29: 64}[round((cos**2 + sin**2) ** 0.5)] * 4
+    mean = 1 - round((cos**2 + sin**2) ** 0.5) / swing
+    law = Fourier(mean=mean, omega=1.0, cos=(cos / swing,), sin=(sin / swing,))
+    for digits in (10, 11, 12, 13):
+        cycle = Cycle.of(Mushroom(r=1.0, h=1.0, nu=law), digits)
+        assert cycle.nu_max == 1
+        assert cycle.t_out(cycle.nu_max) - cycle.t_in(cycle.nu_max) == cycle.period
+
+
 def test_width_over_radius_is_the_same_cycle_as_nu() -> None:
     # (1/2 + cos t / 4) (1 + sin t / 2), exact in binary64.
     r = Fourier(mean=1.0, omega=1.0, sin=(0.5,))
@@ -172,15 +184,15 @@ def test_a_root_costs_a_handful_of_evaluations() -> None:
     # At convergence the iterate is itself an end of the bracket: no reason to fall back on bisection.
     ctx = MPContext()
     ctx.dps = 50
-    for k in range(1, 60):
+    for k in range(-59, 60):
         asked: list[Any] = []
 
         def rising(x: Any, k: int = k, asked: list[Any] = asked) -> tuple[Any, Any]:
             asked.append(x)
-            return x**3 + x - ctx.mpf(k) / 30, 3 * x * x + 1
+            return -ctx.cos(x) - ctx.mpf(k) / 60, ctx.sin(x)
 
-        root = solve_rising(ctx, rising, ctx.zero, ctx.mpf(2))
-        assert abs(rising(root)[0]) < ctx.mpf(10) ** -48
+        root = solve_rising(ctx, rising, ctx.zero, +ctx.pi)
+        assert abs(root - ctx.acos(ctx.mpf(-k) / 60)) < ctx.mpf(10) ** -47
         assert len(asked) <= 12
 
 

@@ -1,0 +1,326 @@
+"""The reference: closed forms, proofs that hold together, and honest non-answers."""
+
+from __future__ import annotations
+
+import itertools
+import math
+import threading
+from fractions import Fraction
+
+import mpmath
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from truth import centre
+
+import reference
+from conformance.strategies import scenes_and_states
+from reference.arithmetic import Arithmetic, rational, sign
+from reference.isolation import Isolator
+from reference.jets import Flight, Jet, Motion
+from scene import (
+    BangBang,
+    Cap,
+    Fourier,
+    Horizon,
+    Mushroom,
+    Rejected,
+    State,
+    Stem,
+    Undecided,
+    Undefined,
+    load,
+)
+from scene.laws import piece_at, value
+from scene.tables import laws
+
+CIRCLE = Cap(r=1.0)
+BOX = Stem(w=1.0, h=1.0)
+STATIC = Mushroom(r=1.0, h=1.0, w=0.5)
+# A floor that comes up at constant acceleration 16 from depth 2, for half a time unit.
+LIFT = Stem(w=1.0, h=BangBang(knots=((0.0, 2.0), (0.5, 1.0), (1.0, 2.0))))
+
+
+def hit(scene, state, t_end=100.0, digits=40):
+    outcome = reference.next_collision(scene, state, t_end, digits=digits)
+    assert isinstance(outcome, reference.Collision), outcome
+    return outcome
+
+
+@pytest.mark.parametrize("digits", [10, 40, 90])
+def test_chord_of_the_unit_circle(digits):
+    """S = -q.v + sqrt((q.v)^2 + 1 - q^2) at unit speed scaled to 2."""
+    state = State(0.0, 0.25, 0.5, 2.0, 1.0)
+    found = hit(CIRCLE, state, digits=digits)
+    with mpmath.workdps(digits + 20):
+        q_v, v2, q2 = mpmath.mpf(1), mpmath.mpf(5), mpmath.mpf("0.3125")
+        s = (-q_v + mpmath.sqrt(q_v**2 + v2 * (1 - q2))) / v2
+        assert found.wall == "arc"
+        assert found.dt.lo <= s <= found.dt.hi
+        assert found.dt.hi - found.dt.lo <= mpmath.mpf(10) ** -digits * s
+        x, y = mpmath.mpf("0.25") + 2 * s, mpmath.mpf("0.5") + s
+        push = 2 * (2 * x + y)
+        assert found.after.vx.lo <= 2 - push * x <= found.after.vx.hi
+        assert found.after.vy.lo <= 1 - push * y <= found.after.vy.hi
+
+
+def test_floor_with_constant_acceleration_is_a_quadratic():
+    """H = 2 - 8 t^2 on the first quarter: y + vy s + h = 0 with y = -1.75, vy = 0 at s = sqrt(1/32)."""
+    found = hit(LIFT, State(0.0, 0.0, -1.75, 0.0, 0.0))
+    with mpmath.workdps(60):
+        s = mpmath.sqrt(mpmath.mpf(1) / 32)
+        assert found.wall == "floor"
+        assert found.dt.lo <= s <= found.dt.hi
+        assert found.after.vy.lo <= 2 * 16 * s <= found.after.vy.hi  # v' = 2 u, u = 16 s
+
+
+def test_root_beyond_a_knot():
+    """On the second quarter h = 1 + 8 (t - 1/2)^2: the floor is met there when started higher."""
+    found = hit(LIFT, State(0.0, 0.0, -1.125, 0.0, 0.0))
+    with mpmath.workdps(60):
+        s = mpmath.mpf("0.5") - mpmath.sqrt(mpmath.mpf("0.125") / 8)
+        assert found.dt.lo <= s <= found.dt.hi
+
+
+def test_particle_at_rest_is_swept_or_not():
+    assert hit(LIFT, State(0.0, 0.5, -1.5, 0.0, 0.0)).wall == "floor"
+    outcome = reference.next_collision(LIFT, State(0.0, 0.5, -0.5, 0.0, 0.0), 50.0)
+    assert isinstance(outcome, reference.Horizon)
+    assert outcome.rounded() == Horizon(50.0, 0.5, -0.5, 0.0, 0.0)
+
+
+def test_the_wall_overtakes_a_particle_flying_away_from_it():
+    """Gate on f', never on v: vy > 0, yet the floor is faster."""
+    found = hit(LIFT, State(0.0, 0.0, -1.9, 0.0, 0.5))
+    assert found.wall == "floor"
+    assert float(found.after.vy) > 0.5
+
+
+@given(st.fractions(Fraction(1, 10**12), Fraction(1, 10)))
+def test_recollision_at_vanishing_times_is_found(gap):
+    """Leaving the floor with f' = e under f'' = -16 meets it again at s = 2 e / 16 exactly."""
+    rise = float(gap)
+    found = hit(LIFT, State(0.0, 0.0, -2.0, 0.0, -0.0 + rise, "floor"), digits=20)
+    assert found.wall == "floor"
+    assert found.dt.contains(Fraction(rise) / 8)
+
+
+@pytest.mark.parametrize(
+    ("scene", "state", "reason"),
+    [
+        (CIRCLE, State(0, 0.5, 0.5, 0.5, -0.5), "corner"),
+        (BOX, State(0, 0.5, -0.5, 0.5, -0.5), "corner"),
+        (BOX, State(0, 0.5, -0.5, 0.5, 0.5), "corner"),
+        (STATIC, State(0, 0.25, 0.25, 1.0, -1.0), "mouth-edge"),
+        (STATIC, State(0, 0.25, -0.25, 1.0, 1.0), "mouth-edge"),
+        (STATIC, State(0, 0.0, 0.0, 1.0, 0.0), "mouth-edge"),
+        (STATIC, State(0, 0.75, 0.0, 1.0, 0.0, "base"), "sliding"),
+        (BOX, State(0, 1.0, -0.5, 0.0, 1.0, "right"), "sliding"),
+        (LIFT, State(0, 0.0, -2.0, 0.0, 0.0, "floor"), "sliding"),
+    ],
+)
+def test_undefined_is_proved_by_rational_arithmetic(scene, state, reason):
+    assert reference.next_collision(scene, state, 100.0) == Undefined(reason)
+
+
+@pytest.mark.parametrize(("ulps", "wall"), [(1, "base"), (-1, "right")])
+def test_one_ulp_beside_the_mouths_edge(ulps, wall):
+    x = 0.25 + ulps * 2.0**-54
+    found = hit(STATIC, State(0, x, 0.25, 1.0, -1.0))
+    assert found.wall == wall
+
+
+def test_a_tie_at_an_irrational_time_stays_undecided():
+    """Two moving walls that meet the particle together: no proof either way, and no guess."""
+    law = Fourier(mean=1.0, omega=1.0, sin=(0.25,))
+    outcome = reference.next_collision(Stem(w=law, h=law), State(0, 0.5, -0.5, 1.0, -1.0), 9.0, digits=10)
+    assert isinstance(outcome, Undecided)
+    assert "digits" in outcome.reason
+
+
+@pytest.mark.parametrize(
+    ("scene", "state", "t_end", "words"),
+    [
+        (STATIC, State(0, 2.0, 0.1, 1.0, 0.0), 1.0, "beyond wall arc"),
+        (STATIC, State(0, 0.6, -0.1, 1.0, 0.0), 1.0, "beyond wall right"),
+        (STATIC, State(0, 0.6, 0.8, 1.0, 0.0, "arc"), 1.0, "moves into it"),
+        (STATIC, State(0, 0.6, 0.0, 1.0, -1.0), 1.0, "moves into it"),
+        (STATIC, State(0, 0.6, 0.7, -1.0, 0.0, "arc"), 1.0, "away from that wall"),
+        (STATIC, State(0, math.nan, 0.1, 1.0, 0.0), 1.0, "state.x = nan"),
+        (BOX, State(0, 0.0, -0.5, 1.0, 0.0, "arc"), 1.0, "state.wall = 'arc'"),
+        (BOX, State(5.0, 0.0, -0.5, 1.0, 0.0), 1.0, "t_end = 1.0"),
+        (BOX, State(0, 1.0, -0.5, 1.0, 0.0), 1.0, "moves into it"),
+    ],
+)
+def test_bad_states_are_rejected(scene, state, t_end, words):
+    outcome = reference.next_collision(scene, state, t_end)
+    assert isinstance(outcome, Rejected)
+    assert words in outcome.reason
+
+
+@settings(max_examples=60)
+@given(scenes_and_states())
+def test_precisions_nest(drawn):
+    """30 and 60 digits enclose the same truth, the proof's sub-intervals leave no gap."""
+    scene, state, t_end = drawn
+    one = reference.next_collision(scene, state, t_end, digits=15)
+    two = reference.next_collision(scene, state, t_end, digits=60)
+    assert type(one) is type(two)
+    if isinstance(one, reference.Collision):
+        assert one.wall == two.wall
+        for a, b in zip((one.dt, *one.after), (two.dt, *two.after), strict=True):
+            assert max(a.lo, b.lo) <= min(a.hi, b.hi)
+        for leaves in two.proof.values():
+            for left, right in itertools.pairwise(leaves):
+                assert right.start.a <= left.end.b
+
+
+@settings(max_examples=40)
+@given(scenes_and_states())
+def test_dense_sampling_finds_no_earlier_hit(drawn):
+    """The falsifier: up to the collision, the path is inside at 200 instants, in plain mpmath."""
+    scene, state, t_end = drawn
+    outcome = reference.next_collision(scene, state, t_end, digits=20)
+    if not isinstance(outcome, reference.Collision | reference.Horizon):
+        return
+    dt = float(outcome.dt) if isinstance(outcome, reference.Collision) else t_end - state.t
+    ctx = mpmath.MPContext()
+    ctx.dps = 40
+    for i in range(1, 200):
+        s = ctx.mpf(dt) * i / 200
+        x, y = state.x + s * state.vx, state.y + s * state.vy
+        now = {name: value(ctx, law, ctx.mpf(state.t) + s) for name, law in laws(scene).items()}
+        if y > 0:
+            assert x * x + y * y < now["r"] ** 2 * (1 + ctx.mpf(10) ** -12)
+        else:
+            w = now["w"] if "w" in now else now["nu"] * now["r"] if "nu" in now else ctx.inf
+            tolerance = ctx.mpf(10) ** -12 * (abs(x) + 1)
+            if not isinstance(scene, Cap):
+                assert abs(x) < w + now["slope"] * y + tolerance
+                assert -y < now["h"] * (1 + ctx.mpf(10) ** -12)
+
+
+def test_trajectory_encloses_its_last_state():
+    path = reference.trajectory(load("moving-cap"), State(0.0, 0.1, 0.3, 10.0, 7.0), 60, digits=30)
+    finer = reference.trajectory(load("moving-cap"), State(0.0, 0.1, 0.3, 10.0, 7.0), 60, digits=50)
+    assert len(path.steps) == 60
+    assert path.digits < finer.digits
+    assert [s.wall for s in path.steps] == [s.wall for s in finer.steps]
+    last, truth = path.steps[-1].after, finer.steps[-1].after
+    for a, b in zip(last, truth, strict=True):
+        assert a.lo <= b.lo <= b.hi <= a.hi
+        assert a.width() < 1e-28
+
+
+def test_trajectory_ends_at_its_horizon_and_at_corners():
+    path = reference.trajectory(load("moving-cap"), State(0.0, 0.1, 0.3, 10.0, 7.0), 99, t_end=0.5)
+    assert isinstance(path.outcome, reference.Horizon)
+    path = reference.trajectory(CIRCLE, State(0, 0.5, 0.5, 0.5, -0.5), 3)
+    assert path.outcome == Undefined("corner")
+
+
+def test_jacobian_against_differences():
+    scene, state = load("moving-cap"), State(0.3, 0.1, -0.2, 10.0, -27.0)
+    found = reference.next_collision(scene, state, 9.0, digits=40, is_differentiated=True)
+    assert isinstance(found, reference.Collision)
+    h = 2.0**-30
+    for column, field in enumerate(("t", "x", "y", "vx", "vy")):
+        ends = []
+        for sign_of in (1, -1):
+            moved = {name: getattr(state, name) for name in ("t", "x", "y", "vx", "vy")}
+            moved[field] += sign_of * h * 8
+            ends.append(hit(scene, State(**moved), 9.0))
+        for row, (plus, minus) in enumerate(zip(*((e.dt, *e.after[1:]) for e in ends), strict=True)):
+            difference = float((centre(plus) - centre(minus)) / Fraction(16 * h))
+            assert found.jacobian is not None
+            assert float(found.jacobian[row][column]) == pytest.approx(difference, rel=1e-6, abs=1e-6)
+
+
+def test_threads_at_different_digits_do_not_disturb_each_other():
+    state = State(0.0, 0.1, 0.3, 10.0, 7.0)
+    alone = {d: hit(load("moving-cap"), state, digits=d).dt for d in (10, 80)}
+    found: dict[int, list[object]] = {10: [], 80: []}
+
+    def work(digits):
+        for _ in range(6):
+            found[digits].append(hit(load("moving-cap"), state, digits=digits).dt)
+
+    before = mpmath.mp.prec, mpmath.iv.prec
+    threads = [threading.Thread(target=work, args=(d,)) for d in found]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert all(dt == alone[d] for d, results in found.items() for dt in results)
+    assert (mpmath.mp.prec, mpmath.iv.prec) == before
+
+
+class TestIsolation:
+    """The isolator on functions whose roots are known."""
+
+    def first(self, jet, end=4.0, start=0.0):
+        arithmetic = Arithmetic(30)
+        isolator = Isolator(arithmetic, jet, None)
+        return isolator.first_root(arithmetic.number(start), arithmetic.number(end)), isolator
+
+    def test_the_first_of_many_roots(self):
+        """F = cos(20 s) + 1/2 first falls through 0 at 20 s = 2 pi / 3."""
+        arithmetic = Arithmetic(30)
+
+        def wave(s):
+            cos, sin = arithmetic.cos_sin(20 * s)
+            return Jet(cos + arithmetic.number(0.5), -20 * sin, -400 * cos)
+
+        root, isolator = self.first(wave)
+        assert root is not None
+        ten = rational(root.time._mpi_[0]), rational(root.time._mpi_[1])
+        assert float(ten[0]) == pytest.approx(2 * math.pi / 60, rel=1e-15)
+        assert ten[0] < ten[1]
+        assert isolator.leaves[0].start._mpi_ == arithmetic.zero._mpi_
+
+    @pytest.mark.parametrize("least", [1e-3, 1e-9, 1e-15])
+    def test_a_near_miss_is_no_hit(self, least):
+        """F = (s - 1)^2 + least has no root, however close."""
+        arithmetic = Arithmetic(30)
+
+        def parabola(s):
+            d = s - 1
+            return Jet(arithmetic.square(d) + arithmetic.number(least), 2 * d, arithmetic.number(2))
+
+        assert self.first(parabola)[0] is None
+
+    def test_a_double_root_is_not_decided(self):
+        arithmetic = Arithmetic(30)
+        third = arithmetic.number(Fraction(1, 3))
+
+        def parabola(s):
+            return Jet(arithmetic.square(s - third), 2 * (s - third), arithmetic.number(2))
+
+        with pytest.raises(reference.arithmetic.Undecidable):
+            self.first(parabola)
+
+
+@settings(max_examples=100)
+@given(scenes_and_states(), st.floats(0, 1), st.floats(0, 1))
+def test_wall_functions_enclose_plain_values(drawn, a, b):
+    """f, f', f'' over an interval contain the value and differences at points of it."""
+    scene, state, t_end = drawn
+    arithmetic = Arithmetic(40)
+    pieces = {name: piece_at(law, Fraction(state.t)) for name, law in laws(scene).items()}
+    flight = Flight(*(arithmetic.number(v) for v in (state.t, state.x, state.y, state.vx, state.vy)))
+    motion = Motion(arithmetic, flight, pieces, is_stem=isinstance(scene, Stem))
+    span = min(t_end - state.t, 2.0**-10)
+    lo, hi = sorted((a * span, b * span))
+    whole = arithmetic.context.mpf([lo, hi])
+    for wall in scene.walls:
+        jet = motion.wall(wall, whole)
+        inner = motion.wall(wall, arithmetic.number(lo + (hi - lo) / 3))
+        for outer, point in zip(jet, inner, strict=True):
+            assert (outer is None) == (point is None)
+            if outer is not None:
+                assert outer.a <= point.b
+                assert point.a <= outer.b
+        if hi > lo and jet.d1 is not None:
+            # Mean value: f(hi) - f(lo) lies in f'(I) (hi - lo).
+            ends = motion.wall(wall, arithmetic.number(hi)).f - motion.wall(wall, arithmetic.number(lo)).f
+            assert sign(ends - jet.d1 * (arithmetic.number(hi) - arithmetic.number(lo))) == 0

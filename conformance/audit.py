@@ -23,6 +23,7 @@ import theory
 from conformance.audit_forms import FORMS, Forms, Predict, rounds_to
 from conformance.claims import CLAIMS, ENERGIES, Claim, Verdict
 from scene.laws import bounds
+from scene.refusal import BadInput
 from scene.tables import laws, width_factors
 
 if TYPE_CHECKING:
@@ -178,10 +179,10 @@ def run_ensembles(
     """Simulate one cycle of every scene the ledger measures; scene number k uses seed + k.
 
     Raises:
-        ValueError: naming the number that is out of bounds.
+        BadInput: naming the number that is out of bounds.
     """
     if n_particles < MIN_PARTICLES:
-        raise ValueError(f"particles = {n_particles}, must be >= {MIN_PARTICLES} for an audit")
+        raise BadInput(f"particles = {n_particles}, must be >= {MIN_PARTICLES} for an audit")
     ensembles = {}
     for k, (name, energy) in enumerate(ENERGIES.items()):
         report = None if progress is None else (lambda done, name=name: progress(name, done))

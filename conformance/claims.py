@@ -40,7 +40,7 @@ class Claim(NamedTuple):
 
 # Initial energy by scene. The fixed cap's walls are fast (speeds to 32): at 1e6 the finite-energy
 # effects would be as large as m1 itself.
-ENERGIES = {"fixed-cap-anticlockwise": 1e7, "fixed-cap-clockwise": 1e7, "moving-cap": 1e6}
+ENERGIES = {"fixed-cap-anticlockwise": 1e8, "fixed-cap-clockwise": 1e8, "moving-cap": 1e6}
 SIMULATED = tuple(ENERGIES)
 
 TOLERANCES: dict[Quantity, str] = {

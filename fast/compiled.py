@@ -21,7 +21,7 @@ class Compiled(NamedTuple):
 
     table: int
     is_relative: bool  # the width row holds nu, and w = nu r
-    laws: FloatArray  # (4, n): radius, width, depth, slope
+    laws: FloatArray  # (5, n): radius, width, depth, slope; then omega and harmonics of all Fourier laws
     bounds: FloatArray  # (4, 4): lowest, highest, |f'|, |f''| of radius, half-width w, depth, slope
 
 
@@ -34,7 +34,9 @@ def compile_scene(scene: Scene) -> Compiled:
     if not isinstance(scene, Cap):
         h, slope, factors = scene.h, scene.slope, width_factors(scene)
     rows = [_row(law) for law in (r, factors[0], h, slope)]
-    laws = np.zeros((4, max(len(row) for row in rows)))
+    waves = [row for row in rows if row[0] == kernel.FOURIER]
+    rows.append([waves[0][2], max(row[3] for row in waves)] if waves else [0.0, 0.0])
+    laws = np.zeros((len(rows), max(len(row) for row in rows)))
     for i, row in enumerate(rows):
         laws[i, : len(row)] = row
     limits = np.array([bounds(r), _product_bounds(factors), bounds(h), bounds(slope)])

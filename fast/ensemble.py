@@ -21,6 +21,7 @@ from fast import kernel
 from fast.compiled import FloatArray, compile_scene
 from scene import Cap, Mushroom, Scene, Stem
 from scene.laws import BangBang, value
+from scene.refusal import BadInput
 from scene.tables import laws, period, width_factors
 
 FOLLOWED, UNDECIDED, UNDEFINED = 0, 1, 2
@@ -94,7 +95,7 @@ def simulate(
         progress: called with the number of particles done so far, after every chunk.
 
     Raises:
-        ValueError: naming field, value and bound.
+        BadInput: naming field, value and bound.
 
     Source: secs. 4.1, 4.2 (initial conditions); capture as in sec. 3.2.
     """
@@ -153,16 +154,16 @@ def _warm_up(compiled: tuple[object, ...]) -> None:
 
 def _check(n_particles: int, energy: float, n_cycles: int, seed: int, threads: int | None) -> int:
     if not 1 <= n_particles <= MAX_PARTICLES:
-        raise ValueError(f"particles = {n_particles}, must be 1 to {MAX_PARTICLES}")
+        raise BadInput(f"particles = {n_particles}, must be 1 to {MAX_PARTICLES}")
     if not 0 < energy <= LARGEST_ENERGY:
-        raise ValueError(f"energy = {energy}, must be > 0 and at most 2^800")
+        raise BadInput(f"energy = {energy}, must be > 0 and at most 2^800")
     if n_cycles < 1:
-        raise ValueError(f"cycles = {n_cycles}, must be >= 1")
+        raise BadInput(f"cycles = {n_cycles}, must be >= 1")
     if not 0 <= seed < 2**64:
-        raise ValueError(f"seed = {seed}, must be >= 0 and < 2^64")
+        raise BadInput(f"seed = {seed}, must be >= 0 and < 2^64")
     available = int(numba.config.NUMBA_NUM_THREADS)
     if threads is not None and not 1 <= threads <= available:
-        raise ValueError(f"threads = {threads}, must be 1 to {available}, the cores of this machine")
+        raise BadInput(f"threads = {threads}, must be 1 to {available}, the cores of this machine")
     return available if threads is None else threads
 
 

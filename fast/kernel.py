@@ -26,7 +26,12 @@ CAP, STEM, MUSHROOM = 0, 1, 2
 R, W, H, M = 0, 1, 2, 3  # rows of the law table: radius, width (w or nu), depth, slope
 CONSTANT, FOURIER, BANG_BANG = 0.0, 1.0, 2.0
 MAX_HARMONICS = 16
-N_ANCHOR = 4 + 2 * MAX_HARMONICS  # value, derivative, half-leg, time in it, sines, cosines
+# The laws' rows anchored at the last event: value, derivative, half-leg (Fourier: size of the
+# derivative's terms), time in the half-leg. All Fourier laws of a scene share their omega, so two
+# more rows hold the harmonics' sines and cosines at the event, and their turn since, at one s.
+PHASE, TURN = 4, 5
+N_ANCHOR = 4 + 2 * MAX_HARMONICS
+ANCHORS_SHAPE = (6, N_ANCHOR)
 
 # A wall function is a sum of a few products of rounded numbers: eight units in the last place
 # of the sum of their sizes bound its error.
@@ -117,21 +122,46 @@ def short_sine_cosine(r, tail):
 
 
 @njit(cache=True)
+def set_phases(laws, anchors, t_hi, t_lo):
+    """Store the sines and cosines of all harmonics at t; False when t is out of reach."""
+    anchors[TURN, 0] = -1.0
+    for k in range(1, int(laws[PHASE, 1]) + 1):
+        s, c, is_reduced = sine_cosine(laws[PHASE, 0], float(k), t_hi, t_lo)
+        if not is_reduced:
+            return False
+        anchors[PHASE, 3 + k] = s
+        anchors[PHASE, 3 + MAX_HARMONICS + k] = c
+    return True
+
+
+@njit(cache=True)
+def set_turn(laws, anchors, s):
+    """Store cos(d) - 1 and sin(d) for the phases d = k omega s, small together with s."""
+    anchors[TURN, 0] = s
+    for k in range(1, int(laws[PHASE, 1]) + 1):
+        half = 0.5 * k * laws[PHASE, 0] * s
+        if half < 0.75:
+            half_s, half_c = short_sine_cosine(half, 0.0)
+        else:
+            half_s, half_c, _ = sine_cosine(laws[PHASE, 0], 0.5 * k, s, 0.0)
+        anchors[TURN, 3 + k] = -2.0 * half_s * half_s
+        anchors[TURN, 3 + MAX_HARMONICS + k] = 2.0 * half_s * half_c
+
+
+@njit(cache=True)
 def set_anchor(laws, anchors, row, t_hi, t_lo):
     """Store what a law needs to give its increments since t; False when t is out of reach."""
-    anchors[row, 1] = 0.0
     anchors[row, 0] = laws[row, 1]
+    anchors[row, 1] = 0.0
+    anchors[row, 2] = 0.0
     n = int(laws[row, 3])
     if laws[row, 0] == FOURIER:
         for k in range(1, n + 1):
-            s, c, is_reduced = sine_cosine(laws[row, 2], float(k), t_hi, t_lo)
-            if not is_reduced:
-                return False
-            anchors[row, 3 + k] = s
-            anchors[row, 3 + MAX_HARMONICS + k] = c
+            s, c = anchors[PHASE, 3 + k], anchors[PHASE, 3 + MAX_HARMONICS + k]
             a, b = laws[row, 3 + k], laws[row, 3 + n + k]
             anchors[row, 0] += a * c + b * s
             anchors[row, 1] += k * laws[row, 2] * (b * c - a * s)
+            anchors[row, 2] += k * laws[row, 2] * (abs(a) + abs(b))
     elif laws[row, 0] == BANG_BANG:
         period = laws[row, 2]
         first = laws[row, 4]
@@ -170,29 +200,24 @@ def set_anchor(laws, anchors, row, t_hi, t_lo):
 def increment(laws, anchors, row, s):
     """Return f(t + s) - f(t), f'(t + s), and the summed sizes of the terms of both."""
     if laws[row, 0] == FOURIER:
+        if s == 0.0:
+            return 0.0, anchors[row, 1], 0.0, anchors[row, 2]
+        if s != anchors[TURN, 0]:
+            set_turn(laws, anchors, s)
         change = 0.0
         rate = 0.0
         size = 0.0
-        rate_size = 0.0
         n = int(laws[row, 3])
         for k in range(1, n + 1):
-            half = 0.5 * k * laws[row, 2] * s
-            if half < 0.75:
-                half_s, half_c = short_sine_cosine(half, 0.0)
-            else:
-                half_s, half_c, _ = sine_cosine(laws[row, 2], 0.5 * k, s, 0.0)
-            # cos(d) - 1 and sin(d) for the phase d = k omega s, small together with s
-            down = -2.0 * half_s * half_s
-            across = 2.0 * half_s * half_c
-            sine, cosine = anchors[row, 3 + k], anchors[row, 3 + MAX_HARMONICS + k]
+            down, across = anchors[TURN, 3 + k], anchors[TURN, 3 + MAX_HARMONICS + k]
+            sine, cosine = anchors[PHASE, 3 + k], anchors[PHASE, 3 + MAX_HARMONICS + k]
             d_cosine = cosine * down - sine * across
             d_sine = sine * down + cosine * across
             a, b = laws[row, 3 + k], laws[row, 3 + n + k]
             change += a * d_cosine + b * d_sine
             rate += k * laws[row, 2] * (b * (cosine + d_cosine) - a * (sine + d_sine))
             size += (abs(a) + abs(b)) * (abs(down) + abs(across))
-            rate_size += k * laws[row, 2] * (abs(a) + abs(b))
-        return change, rate, size, rate_size
+        return change, rate, size, anchors[row, 2]
     if laws[row, 0] == BANG_BANG:
         return legs_increment(laws, anchors, row, s)
     return 0.0, 0.0, 0.0, 0.0
@@ -234,7 +259,7 @@ def legs_increment(laws, anchors, row, s):
 @njit(cache=True)
 def set_anchors(laws, anchors, t_hi, t_lo):
     """Anchor all four laws at t."""
-    is_reached = True
+    is_reached = set_phases(laws, anchors, t_hi, t_lo)
     for i in range(4):
         is_reached = set_anchor(laws, anchors, i, t_hi, t_lo) and is_reached
     return is_reached
@@ -411,6 +436,11 @@ def first_root(wall, start, limit, x, y, vx, vy, is_leaving, laws, anchors, boun
         else:
             return NO_WALL, limit, 0.0, 0.0
         moved = s + h
+        if slope < -slope_error and down * h * h <= 2.0**-54 * moved * -slope:
+            # So little curvature that the parabola's root is the function's to the last bit.
+            if moved >= limit:
+                return NO_WALL, limit, 0.0, 0.0
+            return wall, moved, slope, error / -slope
         if moved <= s:
             return TANGENT, s, slope, 0.0
         if n_steps >= PATIENCE:
@@ -631,7 +661,7 @@ def step(table, is_relative, laws, bounds, anchors, p, wall, limit):
 @njit(cache=True)
 def single_step(table, is_relative, laws, bounds, p, wall, limit):
     """Judge one state and advance it; the entry for callers with no anchors. Returns (code, dt)."""
-    anchors = np.zeros((4, N_ANCHOR))
+    anchors = np.zeros(ANCHORS_SHAPE)
     if not set_anchors(laws, anchors, p[0], p[1]):
         return FAR_TIME, 0.0
     beyond = is_outside(table, is_relative, wall, p[2], p[3], laws, anchors, bounds)
@@ -646,7 +676,7 @@ def trajectory(table, is_relative, laws, bounds, p, wall, t_end, out, walls):
 
     Returns the number of collisions and the last code (of a wall when `out` is full).
     """
-    anchors = np.zeros((4, N_ANCHOR))
+    anchors = np.zeros(ANCHORS_SHAPE)
     if not set_anchors(laws, anchors, p[0], p[1]):
         return 0, FAR_TIME
     if is_outside(table, is_relative, wall, p[2], p[3], laws, anchors, bounds) != NO_WALL:
@@ -673,7 +703,7 @@ def follow(table, is_relative, laws, bounds, p, ends, narrowest, energies, t_in,
 
     Returns the final code (HORIZON when all went well) and the number of collisions.
     """
-    anchors = np.zeros((4, N_ANCHOR))
+    anchors = np.zeros(ANCHORS_SHAPE)
     if not set_anchors(laws, anchors, p[0], p[1]):
         return FAR_TIME, 0
     n_collisions = 0

@@ -74,7 +74,7 @@ def next_collision(scene: Scene, state: State, t_end: float) -> Outcome:
     low_end = t_end - state.t
     code, dt = kernel.single_step(*_compiled(scene), p, WALL_CODES[state.wall], low_end)
     if code in WALL_NAMES:
-        return Collision(WALL_NAMES[code], dt, *(float(p[i]) for i in (0, 2, 3, 4, 5)))
+        return Collision(WALL_NAMES[code], float(dt), *(float(p[i]) for i in (0, 2, 3, 4, 5)))
     if code == kernel.HORIZON:
         return Horizon(t_end, *(float(p[i]) for i in (2, 3, 4, 5)))
     return _trouble(code, state, WALL_NAMES.get(int(dt)) if code == kernel.OUTSIDE else None)
@@ -140,7 +140,7 @@ def wall_gap(scene: Scene, state: State) -> tuple[float, float]:
     compiled = _compiled(scene)
     if state.wall == "base":
         return state.y, float(max(compiled.bounds[0, 1], compiled.bounds[1, 1]))
-    anchors = np.zeros((4, kernel.N_ANCHOR))
+    anchors = np.zeros(kernel.ANCHORS_SHAPE)
     kernel.set_anchors(compiled.laws, anchors, state.t, 0.0)
     f, _ = kernel.wall_residual(
         WALL_CODES[state.wall],

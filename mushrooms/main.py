@@ -21,6 +21,7 @@ import mushrooms
 import scene as scenes
 from mushrooms import output
 from scene.load import read_data
+from scene.refusal import BadInput
 from scene.tables import period
 
 PROGRAM = "mushrooms"
@@ -60,7 +61,7 @@ def run(arguments: list[str] | None = None) -> NoReturn:
         sys.exit(1)
     except UsageError as error:
         _refuse(error.format_message())
-    except (ValueError, OSError) as error:
+    except (BadInput, OSError) as error:
         _refuse(str(error))
     except MemoryError:
         _refuse("not enough memory for so many particles")
@@ -162,7 +163,7 @@ def simulate(
     (share of cycles without capture), ns_per_collision (and thread) and the SHA-256 of the result.
     """
     if not (math.isfinite(energy) and energy > 0):
-        raise ValueError(f"--energy = {energy}, must be finite and > 0")
+        raise BadInput(f"--energy = {energy}, must be finite and > 0")
     _check_range("--particles", particles, 1, MAX_PARTICLES)
     _check_range("--cycles", cycles, 1)
     _check_common(seed, threads)
@@ -230,7 +231,7 @@ def _finite(value: float) -> float | None:
 @app.command(epilog="Example: mushrooms audit --particles 20000 --out audit-report")
 def audit(
     out: Folder = Path("audit-report"),
-    particles: Annotated[int, typer.Option(help="Particles per scene, 2000 to 10^8.")] = 10_000,
+    particles: Annotated[int, typer.Option(help="Particles per scene, 2000 to 10^8.")] = 4_000,
     seed: Seed = 0,
     threads: Threads = None,
     as_json: AsJson = False,
@@ -319,7 +320,7 @@ def draw(
 
 def _check_range(option: str, value: int, low: int, high: int | None = None) -> None:
     if value < low or (high is not None and value > high):
-        raise ValueError(
+        raise BadInput(
             f"{option} = {value}, must be " + (f">= {low}" if high is None else f"{low} to {high}")
         )
 

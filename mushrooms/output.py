@@ -11,6 +11,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import BinaryIO
 
+from scene.refusal import BadInput
+
 Writer = Callable[[BinaryIO], None]
 
 
@@ -22,7 +24,7 @@ def writable_folder(path: Path) -> Iterator[Path]:
         path: the folder; missing parents are made too.
 
     Raises:
-        ValueError: one line naming the path and what is wrong with it.
+        BadInput: one line naming the path and what is wrong with it.
     """
     made = []
     folder = path
@@ -35,10 +37,10 @@ def writable_folder(path: Path) -> Iterator[Path]:
         probe.write_bytes(b"")
         probe.unlink()
     except (FileExistsError, NotADirectoryError):
-        raise ValueError(f"output {str(path)!r}: {str(folder)!r} is a file, must be a folder") from None
+        raise BadInput(f"output {str(path)!r}: {str(folder)!r} is a file, must be a folder") from None
     except OSError as error:
         _remove_empty(made)
-        raise ValueError(f"output {str(path)!r} must be a writable folder: {error.strerror}") from None
+        raise BadInput(f"output {str(path)!r} must be a writable folder: {error.strerror}") from None
     try:
         yield path
     except BaseException:
@@ -50,18 +52,18 @@ def check_file(path: Path, suffixes: tuple[str, ...]) -> None:
     """Prove that a file of one of these kinds can be written at `path`.
 
     Raises:
-        ValueError: one line naming the path and what is wrong with it.
+        BadInput: one line naming the path and what is wrong with it.
     """
     if path.suffix not in suffixes:
-        raise ValueError(f"output {str(path)!r}: its ending must be one of {', '.join(suffixes)}")
+        raise BadInput(f"output {str(path)!r}: its ending must be one of {', '.join(suffixes)}")
     if path.is_dir():
-        raise ValueError(f"output {str(path)!r} is a folder, must be a file")
+        raise BadInput(f"output {str(path)!r} is a folder, must be a file")
     try:
         probe = _part(path)
         probe.write_bytes(b"")
         probe.unlink()
     except OSError as error:
-        raise ValueError(f"output {str(path)!r} cannot be written: {error.strerror}") from None
+        raise BadInput(f"output {str(path)!r} cannot be written: {error.strerror}") from None
 
 
 def write_files(folder: Path, writers: Mapping[str, Writer]) -> None:

@@ -2,6 +2,7 @@
 
 from scene.laws import BangBang, Fourier, Law
 from scene.load import catalogue, from_data, load, to_data
+from scene.refusal import BadInput
 from scene.states import (
     Collision,
     Horizon,
@@ -16,6 +17,7 @@ from scene.tables import Cap, Mushroom, Scene, Stem, Wall
 from scene.validity import InvalidScene
 
 __all__ = [
+    "BadInput",
     "BangBang",
     "Cap",
     "Collision",

@@ -7,10 +7,11 @@ from typing import Literal
 
 import msgspec
 
+from scene.refusal import BadInput
 from scene.tables import Scene, Wall
 
 
-class InvalidState(ValueError):  # noqa: N818 (the name users meet in messages)
+class InvalidState(BadInput):
     """A state that means nothing in its scene: one line naming field, value and bound."""
 
 

@@ -18,10 +18,11 @@ from mpmath import MPContext
 
 from scene import exact
 from scene.laws import BangBang, Fourier, Law, Quadratic, breakpoints, defect, is_constant, piece_at, value
+from scene.refusal import BadInput
 from scene.tables import Cap, Mushroom, Scene, laws, period, periods
 
 
-class InvalidScene(ValueError):  # noqa: N818 (the name users meet in messages)
+class InvalidScene(BadInput):
     """A scene that means nothing: one line naming parameter, time, value and bound."""
 
 

@@ -121,7 +121,7 @@ def test_phase_out_of_reach_is_refused():
 def test_increments_of_laws(name, t, s):
     scene = load(name)
     compiled = compile_scene(scene)
-    anchors = np.zeros((4, kernel.N_ANCHOR))
+    anchors = np.zeros(kernel.ANCHORS_SHAPE)
     assert kernel.set_anchors(compiled.laws, anchors, t, 0.0)
     with workprec(200):
         law, then = laws(scene)["h"], mp.mpf(t) + mp.mpf(s)

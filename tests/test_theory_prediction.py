@@ -317,3 +317,13 @@ def test_threads_at_different_digits_do_not_disturb_each_other() -> None:
         together = [job.result() for job in jobs]
     assert together == alone + alone
     assert mpmath.mp.prec == before
+
+
+def test_knots_may_start_anywhere_in_the_period() -> None:
+    # The clockwise cycle, its laws' first knots 1/4 and 1/2 of a period later, or whole periods away.
+    scene = load("fixed-cap-clockwise")
+    assert isinstance(scene, Mushroom)
+    w = BangBang(knots=((0.25, 1.0), (0.5, 0.3), (0.75, 0.3), (1.0, 1.0), (1.25, 1.0)))
+    h = BangBang(knots=((3.5, 2.0), (3.75, 6.0), (4.0, 6.0), (4.25, 2.0), (4.5, 2.0)))
+    turned = Mushroom(r=scene.r, w=w, h=h, slope=scene.slope)
+    assert predict(turned, digits=20).strings(20) == predict(scene, digits=20).strings(20)

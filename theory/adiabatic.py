@@ -17,6 +17,7 @@ from dataclasses import dataclass
 from math import comb
 from typing import Any, NamedTuple
 
+from scene.refusal import BadInput
 from theory.chebyshev import Grid
 from theory.cycle import Cycle, Piece
 from theory.volumes import delta, delta_slope
@@ -24,7 +25,7 @@ from theory.volumes import delta, delta_slope
 MAX_HALVINGS = 24  # a panel of 2^-24 of its piece: nearer singularities are given up
 
 
-class NotConverged(ArithmeticError):  # noqa: N818 (the name users meet in messages)
+class NotConverged(BadInput):
     """The digits asked were not reached within the limits on work."""
 
 

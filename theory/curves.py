@@ -15,6 +15,7 @@ from mpmath import fp
 from numpy.polynomial import chebyshev
 from numpy.typing import ArrayLike, NDArray
 
+from scene.refusal import BadInput
 from scene.tables import Scene
 from theory.adiabatic import captures
 from theory.cycle import Cycle
@@ -56,13 +57,13 @@ def capture_curve(scene: Scene, n: int = 400) -> CaptureCurve:
         Arrays of length n; of length 0 when nothing is captured.
 
     Raises:
-        ValueError: n < 2.
+        BadInput: n < 2.
         NotCovered, NotConverged: as `theory.predict`.
 
     Source: Eq:ps, Eq:g, Eq:lnE/E0.
     """
     if n < 2:
-        raise ValueError(f"n = {n}, must be >= 2")
+        raise BadInput(f"n = {n}, must be >= 2")
     panels = _panels(scene)
     place = np.linspace(0.0, len(panels), n)
     index = np.minimum(place.astype(int), len(panels) - 1)
@@ -109,7 +110,7 @@ def energy_density(scene: Scene, edges: ArrayLike) -> Floats:
         Masses, one per bin. Over all s they sum to 1 - p_nc; the uncaptured, at log_e_nc, are apart.
 
     Raises:
-        ValueError: edges do not rise.
+        BadInput: edges do not rise.
         NotCovered, NotConverged: as `theory.predict`.
 
     Source: Eq:lnE/E0 with Eq:ps.
@@ -128,7 +129,7 @@ def capture_time_mass(scene: Scene, edges: ArrayLike) -> Floats:
         Masses, one per bin.
 
     Raises:
-        ValueError: edges do not rise.
+        BadInput: edges do not rise.
         NotCovered, NotConverged: as `theory.predict`.
 
     Source: Eq:ps.
@@ -221,7 +222,7 @@ def _panels(scene: Scene) -> list[_FloatPanel]:
 def _masses(scene: Scene, edges: ArrayLike, what: str) -> Floats:
     bounds = np.asarray(edges, dtype=np.float64)
     if bounds.ndim != 1 or bounds.size < 2 or not np.all(np.diff(bounds) > 0):
-        raise ValueError("edges must be at least two rising numbers")
+        raise BadInput("edges must be at least two rising numbers")
     below = np.zeros_like(bounds)
     for panel in _panels(scene):
         fine = panel.at(_X)

@@ -19,6 +19,7 @@ from typing import Any, NamedTuple
 
 from mpmath import MPContext
 
+from scene.refusal import BadInput
 from scene.tables import Mushroom, Scene, period
 from theory.critical import Span, solve_rising, spans
 from theory.motion import Motion
@@ -124,14 +125,14 @@ class Cycle:
             digits: correct digits wanted, >= 1.
 
         Raises:
-            ValueError: digits < 1.
+            BadInput: digits < 1.
             NotCovered: not a mushroom, or several intervals of capture per period.
 
         Source: sec. 3.5, Eq:nu.
         """
         mushroom = as_mushroom(scene)
         if digits < 1:
-            raise ValueError(f"digits = {digits}, must be >= 1")
+            raise BadInput(f"digits = {digits}, must be >= 1")
         ctx = MPContext()
         ctx.dps = digits + GUARD
         shared = period(mushroom)
@@ -148,7 +149,7 @@ class Cycle:
         """Return the time in [start, start + period) at which nu falls through the given value.
 
         Raises:
-            ValueError: no particle is captured at that nu.
+            BadInput: no particle is captured at that nu.
         """
         return self._piece(nu).capture.time(nu)
 
@@ -156,7 +157,7 @@ class Cycle:
         """Return the time at which nu next rises to the given value.
 
         Raises:
-            ValueError: no particle is captured at that nu.
+            BadInput: no particle is captured at that nu.
         """
         return self._piece(nu).release.time(nu)
 
@@ -180,8 +181,8 @@ class Cycle:
             if piece.nu_lower <= nu <= piece.nu_upper:
                 return piece
         if not self.pieces:
-            raise ValueError(f"nu = {nu}: nothing is captured, nu is constant")
-        raise ValueError(f"nu = {nu}, must be in [{float(self.nu_min):.6g}, {float(self.nu_max):.6g}]")
+            raise BadInput(f"nu = {nu}: nothing is captured, nu is constant")
+        raise BadInput(f"nu = {nu}, must be in [{float(self.nu_min):.6g}, {float(self.nu_max):.6g}]")
 
 
 def _branches(ctx: Any, scene: Mushroom) -> tuple[list[Stretch], list[Stretch]]:

@@ -56,7 +56,7 @@ def predict(scene: Scene, digits: int = 15) -> Prediction:
         The prediction. What is smaller than 10^-(digits + 30) is given as zero.
 
     Raises:
-        ValueError: digits < 1.
+        BadInput: digits < 1.
         NotCovered: not a mushroom, or several intervals of capture.
         NotConverged: the digits were not reached.
 

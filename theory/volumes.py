@@ -10,10 +10,11 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 from scene.laws import Law, value
+from scene.refusal import BadInput
 from scene.tables import Mushroom, Scene
 
 
-class NotCovered(ValueError):  # noqa: N818 (the name users meet in messages)
+class NotCovered(BadInput):
     """A scene the theory says nothing about: one line that tells why."""
 
 
@@ -41,7 +42,7 @@ def delta(ctx: Any, nu: Any) -> Any:
     """Return the island's share of the cap, (2 / pi) (acos nu - nu sqrt(1 - nu^2)).
 
     Raises:
-        ValueError: nu is outside [0, 1].
+        BadInput: nu is outside [0, 1].
 
     Source: the equation after volisl.
     """
@@ -53,7 +54,7 @@ def delta_slope(ctx: Any, nu: Any) -> Any:
     """Return d delta / d nu = -(4 / pi) sqrt(1 - nu^2).
 
     Raises:
-        ValueError: nu is outside [0, 1].
+        BadInput: nu is outside [0, 1].
     """
     _check_nu(nu)
     return -4 * ctx.sqrt((1 - nu) * (1 + nu)) / ctx.pi
@@ -61,7 +62,7 @@ def delta_slope(ctx: Any, nu: Any) -> Any:
 
 def _check_nu(nu: Any) -> None:
     if not 0 <= nu <= 1:
-        raise ValueError(f"nu = {nu}, must be in [0, 1]")
+        raise BadInput(f"nu = {nu}, must be in [0, 1]")
 
 
 def v_ell(ctx: Any, r: Any, nu: Any) -> Any:

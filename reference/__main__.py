@@ -2,16 +2,27 @@
 
 import sys
 
-from reference.stepper import Collision, Horizon, next_collision
+from reference import stepper
 from scene import Outcome, Scene, State
 from scene.wire import serve
 
 
-def rounded_step(scene: Scene, state: State, t_end: float) -> Outcome:
-    """Return the proved outcome, its numbers rounded to binary64."""
-    outcome = next_collision(scene, state, t_end)
-    return outcome.rounded() if isinstance(outcome, Collision | Horizon) else outcome
+def rounded(outcome: stepper.Outcome) -> Outcome:
+    """Return a proved outcome with its numbers rounded to binary64."""
+    return outcome.rounded() if isinstance(outcome, stepper.Collision | stepper.Horizon) else outcome
+
+
+def step(scene: Scene, state: State, t_end: float) -> Outcome:
+    """Return the proved outcome of one step, rounded."""
+    return rounded(stepper.next_collision(scene, state, t_end))
+
+
+def follow(scene: Scene, state: State, n_collisions: int, t_end: float) -> list[Outcome]:
+    """Return the proved collisions of a trajectory, and last what came instead of one, rounded."""
+    path = stepper.trajectory(scene, state, n_collisions, t_end)
+    found = [*path.steps, *([path.outcome] if path.outcome is not None else [])]
+    return [rounded(outcome) for outcome in found]
 
 
 if __name__ == "__main__":
-    serve("reference", rounded_step, sys.stdin.buffer, sys.stdout.buffer)
+    serve("reference", step, follow, sys.stdin.buffer, sys.stdout.buffer)

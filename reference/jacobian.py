@@ -8,6 +8,8 @@ equation is f(s) = f(0), and f(0) moves with the state too.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 from reference.arithmetic import Arithmetic, Enclosure, Interval
 from reference.course import Hit
 from reference.jets import Flight
@@ -57,6 +59,31 @@ def step_jacobian(
         for column in columns:
             column[2] = zero
     return [[columns[i][k] for i in range(5)] for k in range(5)]
+
+
+def chained(later: Matrix, earlier: Matrix) -> Matrix:
+    """Return d(state after) / d(state before all): the product, with t' = t + dt in row t.
+
+    Args:
+        later: Jacobian of the last step, residual held fixed.
+        earlier: d(t, x, y, vx, vy) at its start / d(initial state).
+    """
+    rows = [[sum_of(a * b[j] for a, b in zip(row, earlier, strict=True)) for j in range(5)] for row in later]
+    rows[0] = [a + b for a, b in zip(rows[0], earlier[0], strict=True)]
+    return rows
+
+
+def sum_of(terms: Iterator[Interval]) -> Interval:
+    """Add intervals (the built-in sum would begin with a plain 0)."""
+    total = next(terms)
+    for term in terms:
+        total = total + term
+    return total
+
+
+def identity(arithmetic: Arithmetic) -> Matrix:
+    """Return the unit matrix."""
+    return [[arithmetic.number(int(i == j)) for j in range(5)] for i in range(5)]
 
 
 def enclosures(arithmetic: Arithmetic, matrix: Matrix) -> tuple[tuple[Enclosure, ...], ...]:

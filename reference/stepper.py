@@ -16,7 +16,7 @@ from reference import rational
 from reference.arithmetic import Arithmetic, Enclosure, Interval, Undecidable, sign
 from reference.course import SIDES, Course, Event, Hit
 from reference.isolation import Leaf
-from reference.jacobian import enclosures, step_jacobian
+from reference.jacobian import chained, enclosures, identity, step_jacobian
 from reference.jets import Flight, Motion
 from scene import Cap, InvalidState, Mushroom, Rejected, Scene, State, Stem, Undecided, Undefined, Wall
 from scene.laws import bounds, is_constant, piece_at
@@ -122,15 +122,29 @@ def next_collision(
 
 
 class Trajectory(NamedTuple):
-    """Successive collisions, what came instead of the last one asked for, and the digits needed."""
+    """Successive collisions and what came instead of the last one asked for.
+
+    Attributes:
+        steps: the collisions, each enclosed.
+        outcome: None, or horizon, undefined or undecided instead of a further collision.
+        digits: the working decimals that were needed.
+        jacobian: d(t, x, y, vx, vy) after the last collision / d(initial state), when asked for.
+    """
 
     steps: list[Collision]
     outcome: Outcome | None
     digits: int
+    jacobian: Jacobian | None = None
 
 
 def trajectory(
-    scene: Scene, state: State, n_collisions: int, t_end: float | None = None, *, digits: int = 30
+    scene: Scene,
+    state: State,
+    n_collisions: int,
+    t_end: float | None = None,
+    *,
+    digits: int = 30,
+    is_differentiated: bool = False,
 ) -> Trajectory:
     """Follow a particle, every state enclosed, the last one to `digits` decimals.
 
@@ -140,6 +154,7 @@ def trajectory(
         n_collisions: how many collisions to follow, >= 0.
         t_end: horizon [time], None for none.
         digits: decimals wanted of the last state, relative to the size of its vectors.
+        is_differentiated: chain the steps' Jacobians too.
 
     Raises:
         InvalidState: naming field, value and bound.
@@ -147,7 +162,7 @@ def trajectory(
     working = digits + GUARD_DIGITS + n_collisions // 4
     while True:
         try:
-            return _chain(scene, state, n_collisions, t_end, Arithmetic(working), digits)
+            return _chain(scene, state, n_collisions, t_end, Arithmetic(working), digits, is_differentiated)
         except Undecidable as question:
             if working > 8 * (digits + GUARD_DIGITS + n_collisions):
                 return Trajectory([], Undecided(f"{question} ({working} digits)"), working)
@@ -155,7 +170,13 @@ def trajectory(
 
 
 def _chain(
-    scene: Scene, state: State, n_collisions: int, t_end: float | None, arithmetic: Arithmetic, digits: int
+    scene: Scene,
+    state: State,
+    n_collisions: int,
+    t_end: float | None,
+    arithmetic: Arithmetic,
+    digits: int,
+    is_differentiated: bool,
 ) -> Trajectory:
     check_numbers(scene, state, state.t if t_end is None else t_end)
     steps: list[Collision] = []
@@ -166,6 +187,7 @@ def _chain(
     chain = _Chain(_flight(arithmetic, state), leaving)
     in_cap = _is_in_cap(scene, state, leaving)
     exact: State | None = state
+    matrix = identity(arithmetic) if is_differentiated else None
     while len(steps) < n_collisions:
         end = _horizon(arithmetic, chain.flight.t, t_end)
         event = Course(scene, arithmetic, chain.flight, chain.leaving, flat, end, exact).event(in_cap=in_cap)
@@ -174,13 +196,19 @@ def _chain(
         if event.hit is None:
             last = _horizon_outcome(chain.flight, end, event, arithmetic)
             return Trajectory(steps, last, arithmetic.digits)
+        if matrix is not None:
+            origin = None
+            if not steps and event.hit.wall in leaving:
+                origin = _motion_at(scene, state, arithmetic).gradient(event.hit.wall, arithmetic.zero)
+            matrix = chained(step_jacobian(arithmetic, chain.flight, event.hit, origin), matrix)
         chain = _bounce(chain, event.hit, arithmetic)
         steps.append(_collision(event, event.hit, chain.flight, arithmetic))
         exact, flat = None, frozenset()
         in_cap = event.hit.wall == "arc" or (event.hit.wall == "base" and not isinstance(scene, Stem))
     if steps:
         _require(steps[-1], digits)
-    return Trajectory(steps, None, arithmetic.digits)
+    jacobian = None if matrix is None else enclosures(arithmetic, matrix)
+    return Trajectory(steps, None, arithmetic.digits, jacobian)
 
 
 def _attempt(

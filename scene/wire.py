@@ -1,7 +1,7 @@
 """Protocol 1, the side of an implementation: one JSON object a line on stdin and stdout.
 
-`serve` answers `start`, `echo`, `step` and `stop` for a stepper given as a Python function. It
-holds no numerics: a line that cannot be understood is answered by `rejected` with the reason,
+`serve` answers `start`, `echo`, `step`, `trajectory` and `stop` for a stepper given as two Python
+functions. It holds no numerics: a line that cannot be understood is answered by `rejected` with the reason,
 naming the field, and the next line is read.
 """
 
@@ -14,12 +14,14 @@ from typing import Any, BinaryIO
 import msgspec
 
 from scene.load import from_data
+from scene.refusal import BadInput
 from scene.states import Outcome, Rejected, State
 from scene.tables import Scene
-from scene.validity import InvalidScene
 
 PROTOCOL = 1
+MAX_COLLISIONS = 1_000_000
 Stepper = Callable[[Scene, State, float], Outcome]
+Follower = Callable[[Scene, State, int, float], list[Outcome]]
 
 
 class Start(msgspec.Struct, frozen=True, tag_field="cmd", tag="start", forbid_unknown_fields=True):
@@ -43,20 +45,31 @@ class Step(msgspec.Struct, frozen=True, tag_field="cmd", tag="step", forbid_unkn
     t_end: float
 
 
+class Trajectory(msgspec.Struct, frozen=True, tag_field="cmd", tag="trajectory", forbid_unknown_fields=True):
+    """Asks for successive collisions."""
+
+    seq: int
+    scene: Any
+    state: State
+    collisions: int
+    t_end: float
+
+
 class Stop(msgspec.Struct, frozen=True, tag_field="cmd", tag="stop", forbid_unknown_fields=True):
     """Ends the session."""
 
 
-Command = Start | Echo | Step | Stop
+Command = Start | Echo | Step | Trajectory | Stop
 _decoder = msgspec.json.Decoder(Command)
 
 
-def serve(name: str, stepper: Stepper, lines: BinaryIO, out: BinaryIO) -> None:
+def serve(name: str, stepper: Stepper, follower: Follower, lines: BinaryIO, out: BinaryIO) -> None:
     """Answer protocol lines until `stop` or the end of input.
 
     Args:
         name: of the implementation.
         stepper: (scene, state, t_end) -> outcome in the wire's form.
+        follower: (scene, state, collisions, t_end) -> collisions, and last what came instead of one.
         lines: requests, one JSON object a line.
         out: answers, one line each, flushed.
     """
@@ -76,18 +89,25 @@ def serve(name: str, stepper: Stepper, lines: BinaryIO, out: BinaryIO) -> None:
         elif isinstance(command, Start):
             _reply(out, _introduction(name, command))
         else:
-            _reply(out, {"seq": command.seq, **_plain(_answer(command, stepper, scenes))})
+            _reply(out, {"seq": command.seq, **_answer(command, stepper, follower, scenes)})
 
 
-def _answer(command: Step, stepper: Stepper, scenes: dict[bytes, Scene]) -> Outcome:
+def _answer(
+    command: Step | Trajectory, stepper: Stepper, follower: Follower, scenes: dict[bytes, Scene]
+) -> dict[str, Any]:
     key = msgspec.json.encode(command.scene)
     try:
         if key not in scenes:
             scenes.clear()  # successive steps mostly share their scene: keep that one
             scenes[key] = from_data(command.scene)
-    except InvalidScene as error:
-        return Rejected(str(error))
-    return stepper(scenes[key], command.state, command.t_end)
+        if isinstance(command, Step):
+            return _plain(stepper(scenes[key], command.state, command.t_end))
+        if not 0 <= command.collisions <= MAX_COLLISIONS:
+            raise BadInput(f"collisions = {command.collisions}, must be 0 to {MAX_COLLISIONS}")
+        steps = follower(scenes[key], command.state, command.collisions, command.t_end)
+        return {"steps": [_plain(outcome) for outcome in steps]}
+    except BadInput as error:
+        return _plain(Rejected(str(error)))
 
 
 def _introduction(name: str, command: Start) -> dict[str, Any]:
@@ -98,7 +118,7 @@ def _introduction(name: str, command: Start) -> dict[str, Any]:
         "name": name,
         "version": version("oscillating-mushrooms"),
         "language": "Python",
-        "profiles": ["step"],
+        "profiles": ["step", "trajectory"],
         "tables": ["cap", "stem", "mushroom"],
         "laws": ["constant", "fourier", "bang-bang"],
     }

@@ -67,6 +67,22 @@ def test_answers_are_those_of_the_package(module):
     assert all(answer[name] == getattr(expected, name) for name in ("wall", "dt", "t", "x", "y", "vx", "vy"))
 
 
+def test_trajectories_are_chained(module):
+    line = {"cmd": "trajectory", "seq": 5, "scene": SCENE, "state": STATE, "collisions": 6, "t_end": 100.0}
+    six, short, bad = converse(module, line, {**line, "t_end": 0.5}, {**line, "collisions": -1})
+    assert six["seq"] == 5
+    assert [s["outcome"] for s in six["steps"]] == ["collision"] * 6
+    state = State(**STATE)
+    for s in six["steps"]:
+        one = fast.next_collision(load("moving-cap"), state, 100.0)
+        assert (s["wall"], s["dt"]) == (one.wall, pytest.approx(one.dt, rel=1e-9))
+        state = State(s["t"], s["x"], s["y"], s["vx"], s["vy"], s["wall"])
+    assert short["steps"][-1]["outcome"] == "horizon"
+    assert short["steps"][-1]["t"] == 0.5
+    assert bad["outcome"] == "rejected"
+    assert "collisions = -1" in bad["reason"]
+
+
 def test_both_agree_to_the_last_digits():
     (one,), (two,) = converse("reference", step(1)), converse("fast", step(1))
     assert one["wall"] == two["wall"]

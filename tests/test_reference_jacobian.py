@@ -1,0 +1,136 @@
+"""Jacobians of steps and trajectories: differences, the symplectic form, backward ulps."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+import pytest
+from hypothesis import given, settings
+from truth import centre, proved_step
+
+import fast
+import reference
+from conformance.agreement import Truth, compare
+from conformance.strategies import scenes_and_states
+from scene import Collision, State, load
+
+INPUTS = ("t", "x", "y", "vx", "vy")
+
+
+def presymplectic(vx, vy):
+    """Return dx ^ dvx + dy ^ dvy - dt ^ d(v^2/2) as a matrix over (t, x, y, vx, vy)."""
+    form = [[Fraction(0)] * 5 for _ in range(5)]
+    for i, j, weight in ((1, 3, Fraction(1)), (2, 4, Fraction(1)), (0, 3, -vx), (0, 4, -vy)):
+        form[i][j] += weight
+        form[j][i] -= weight
+    return form
+
+
+def transported(jacobian, form):
+    """Return J^T form J."""
+    return [
+        [
+            sum(jacobian[k][i] * form[k][m] * jacobian[m][j] for k in range(5) for m in range(5))
+            for j in range(5)
+        ]
+        for i in range(5)
+    ]
+
+
+def is_kept(jacobian, before, after, tolerance):
+    """Tell whether the map with this Jacobian keeps the form, to a share of its terms."""
+    form = transported(jacobian, presymplectic(*after))
+    size = max(1, *(abs(d) for row in jacobian for d in row)) ** 2 * (1 + max(map(abs, after)))
+    return all(
+        abs(a - b) <= tolerance * size
+        for row, expected in zip(form, presymplectic(*before), strict=True)
+        for a, b in zip(row, expected, strict=True)
+    )
+
+
+def state_jacobian(outcome):
+    """Return d(t, x, y, vx, vy) after / before as exact centres: row dt becomes row t."""
+    rows = [[centre(d) for d in row] for row in outcome.jacobian]
+    rows[0][0] += 1
+    return rows
+
+
+@settings(max_examples=120)
+@given(scenes_and_states())
+def test_step_keeps_the_symplectic_form(drawn):
+    """In free flight starts (no residual) the step is symplectic in (x, y, vx, vy, t, E)."""
+    scene, s, t_end = drawn
+    free = State(s.t, s.x, s.y, s.vx, s.vy)
+    outcome = reference.next_collision(scene, free, t_end, digits=40, is_differentiated=True)
+    if not isinstance(outcome, reference.Collision):
+        return
+    before = Fraction(s.vx), Fraction(s.vy)
+    after = centre(outcome.after.vx), centre(outcome.after.vy)
+    assert is_kept(state_jacobian(outcome), before, after, Fraction(1, 10**25))
+
+
+@pytest.mark.parametrize("scale", [Fraction(1001, 1000), Fraction(-1)])
+@pytest.mark.parametrize("row", [0, 3, 4])
+def test_a_spoilt_jacobian_does_not(row, scale):
+    outcome = reference.next_collision(
+        load("moving-cap"), State(0.3, 0.1, 0.2, 3.0, 4.0), 9.0, digits=40, is_differentiated=True
+    )
+    rows = state_jacobian(outcome)
+    rows[row] = [scale * d for d in rows[row]]
+    after = centre(outcome.after.vx), centre(outcome.after.vy)
+    assert not is_kept(rows, (Fraction(3), Fraction(4)), after, Fraction(1, 10**25))
+
+
+def test_trajectory_keeps_the_symplectic_form():
+    start = State(0.3, 0.1, 0.2, 3.0, 4.0)
+    path = reference.trajectory(load("moving-cap"), start, 12, digits=40, is_differentiated=True)
+    assert path.jacobian is not None
+    rows = [[centre(d) for d in row] for row in path.jacobian]
+    last = path.steps[-1].after
+    assert is_kept(rows, (Fraction(3), Fraction(4)), (centre(last.vx), centre(last.vy)), Fraction(1, 10**20))
+
+
+def test_trajectory_jacobian_against_differences():
+    scene, start = load("moving-cap"), State(0.3, 0.1, 0.2, 3.0, 4.0)
+    path = reference.trajectory(scene, start, 5, digits=40, is_differentiated=True)
+    h = 2.0**-36
+    for column, field in enumerate(INPUTS):
+        ends = []
+        for sign in (1, -1):
+            moved = {name: getattr(start, name) for name in INPUTS}
+            moved[field] += sign * h
+            ends.append(reference.trajectory(scene, State(**moved), 5, digits=40).steps[-1].after)
+        for row in range(5):
+            difference = float((centre(ends[0][row]) - centre(ends[1][row])) / Fraction(2 * h))
+            assert float(path.jacobian[row][column]) == pytest.approx(difference, rel=1e-6, abs=1e-5)
+
+
+@pytest.mark.parametrize("name", ["moving-cap", "fixed-cap-clockwise", "breathing-circle", "fermi-ulam"])
+def test_fast_trajectories_within_their_chained_bound(name, tally):
+    """50 collisions in floats stay within what rounding each of the steps can do, chained."""
+    scene = load(name)
+    y = -0.3 if name == "fermi-ulam" else 0.2
+    start = State(0.3, 0.1, y, 30.0, 41.0)
+    for n in (5, 20, 50):
+        truth = reference.trajectory(scene, start, n, digits=30, is_differentiated=True)
+        path = fast.trajectory(scene, start, n)
+        assert path.walls == [step.wall for step in truth.steps]
+        t, x, y_end, vx, vy = map(float, path.steps[-1, 1:])
+        after = truth.steps[-1].after
+        answer = Collision(path.walls[-1], t, t, x, y_end, vx, vy)
+        jacobian = [[float(d) for d in row] for row in truth.jacobian]
+        expected = Truth(answer, [centre(c) for c in after], jacobian)
+        found = compare(answer, expected, start, bound=16.0)
+        tally[f"{n} collisions, thousandths of backward ulps"] = round(1000 * found.ulps)
+        assert found.kind == "agrees", found
+
+
+def test_condition_number_of_a_grazing_hit():
+    """A graze with v_n / v = e has derivatives of order 1/e: the measure stays fair."""
+    scene = load("frozen-mushroom")
+    state = State(0.0, 0.0, 1.0 - 2.0**-30, 1.0, 0.0)
+    truth = proved_step(scene, state, 10.0)
+    assert isinstance(truth.outcome, Collision)
+    largest = max(abs(d) for row in truth.jacobian for d in row)
+    assert 1e3 < largest < 1e6
+    assert compare(fast.next_collision(scene, state, 10.0), truth, state, 16.0).kind == "agrees"

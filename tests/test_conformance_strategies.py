@@ -120,7 +120,7 @@ def test_clocks_have_periods_of_order_one(clock):
     assert 0.5 <= clock.rate <= 8.0
 
 
-N_SESSIONS, N_EACH = 10, 60
+N_SESSIONS, N_EACH = 30, 30
 N_DRAWN = N_SESSIONS * N_EACH
 
 

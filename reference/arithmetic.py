@@ -75,6 +75,10 @@ class Arithmetic:
         """Return the thin interval at a raw mpf."""
         return self.context.make_mpf((raw, raw))
 
+    def power_of_two(self, exponent: int) -> Interval:
+        """Return 2^exponent, exactly."""
+        return self.point(libmpf.from_man_exp(1, exponent))
+
     def lower(self, x: Interval) -> Interval:
         """Return the lower end as a thin interval."""
         return self.point(x._mpi_[0])

@@ -106,6 +106,14 @@ class Course:
             return Event(None, found, self.proof)
         return Event(found, None, self.proof)
 
+    def hit_after(self, wall: Wall, start: Interval) -> Interval | None:
+        """Find when the straight flight would meet a wall after `start`, were nothing in its way."""
+        if wall == "base":
+            crossing = self._crossing(in_cap=not isinstance(self.scene, Stem))
+            return crossing if crossing is not None and is_below(start, crossing) else None
+        hit = self._hit(wall, start, self.end)
+        return None if hit is None else hit.time
+
     def _runs_along_mouth(self) -> bool:
         is_level = self.exact is not None and self.exact.y == 0 and self.exact.vy == 0
         return isinstance(self.scene, Mushroom) and is_level and not self.leaving

@@ -139,7 +139,7 @@ class Isolator:
 
     def _accepted(self, time: Interval, a: Interval) -> Root:
         # Strict signs at both ends of a somewhat wider interval, and the stretch before it.
-        least = self.arithmetic.upper(time) * self.arithmetic.context.ldexp(1, 8 - self.arithmetic.prec)
+        least = self.arithmetic.upper(time) * self.arithmetic.power_of_two(8 - self.arithmetic.prec)
         margin = self.arithmetic.upper(time.delta + least)
         while True:
             wider = self.arithmetic.hull(

@@ -18,6 +18,7 @@ from reference.course import SIDES, Course, Event, Hit
 from reference.isolation import Leaf
 from reference.jacobian import chained, enclosures, identity, step_jacobian
 from reference.jets import Flight, Motion
+from reference.margins import Margins, measure
 from scene import Cap, InvalidState, Mushroom, Rejected, Scene, State, Stem, Undecided, Undefined, Wall
 from scene.laws import bounds, is_constant, piece_at
 from scene.states import ON_WALL, check_numbers
@@ -52,6 +53,7 @@ class Collision:
         digits: working decimals that decided it.
         proof: for each wall, the sub-intervals of flight time on which f > 0 was proved.
         jacobian: d(dt, x, y, vx, vy) / d(t, x, y, vx, vy), rows by outputs, when asked for.
+        margins: how far this answer is from another one, when asked for.
     """
 
     wall: Wall
@@ -61,6 +63,7 @@ class Collision:
     digits: int
     proof: dict[str, list[Leaf]] = field(repr=False)
     jacobian: Jacobian | None = field(repr=False, default=None)
+    margins: Margins | None = field(repr=False, default=None)
 
     def rounded(self) -> wire.Collision:
         """Return the centres, correctly rounded, in the wire's form."""
@@ -91,7 +94,13 @@ class _Chain(NamedTuple):
 
 
 def next_collision(
-    scene: Scene, state: State, t_end: float, *, digits: int = 50, is_differentiated: bool = False
+    scene: Scene,
+    state: State,
+    t_end: float,
+    *,
+    digits: int = 50,
+    is_differentiated: bool = False,
+    is_measured: bool = False,
 ) -> Outcome:
     """Find the first wall the particle meets after `state.t`, proved to be first.
 
@@ -101,6 +110,7 @@ def next_collision(
         t_end: horizon [time], t_end >= state.t.
         digits: correct decimals wanted, >= 1; guard digits are added inside.
         is_differentiated: give the Jacobian of the step too.
+        is_measured: give the margins of the collision too.
 
     Returns:
         Collision, its time enclosed to a relative 10**-digits; Horizon; Undefined; Undecided; or
@@ -110,9 +120,10 @@ def next_collision(
     """
     working = digits + GUARD_DIGITS
     open_question = ""
+    extras = is_differentiated, is_measured
     for _ in range(DOUBLINGS + 1):
         try:
-            return _attempt(scene, state, t_end, Arithmetic(working), digits, is_differentiated)
+            return _attempt(scene, state, t_end, Arithmetic(working), digits, *extras)
         except InvalidState as error:
             return Rejected(str(error))
         except Undecidable as question:
@@ -212,7 +223,13 @@ def _chain(
 
 
 def _attempt(
-    scene: Scene, state: State, t_end: float, arithmetic: Arithmetic, digits: int, is_differentiated: bool
+    scene: Scene,
+    state: State,
+    t_end: float,
+    arithmetic: Arithmetic,
+    digits: int,
+    is_differentiated: bool,
+    is_measured: bool,
 ) -> Outcome:
     check_numbers(scene, state, t_end)
     outcome = _start(scene, state, arithmetic)
@@ -235,7 +252,9 @@ def _attempt(
         wall = event.hit.wall
         origin = start.gradient(wall, arithmetic.zero) if wall in leaving else None
         matrix = step_jacobian(arithmetic, flight, event.hit, origin)
-        return replace(collision, jacobian=enclosures(arithmetic, matrix))
+        collision = replace(collision, jacobian=enclosures(arithmetic, matrix))
+    if is_measured:
+        collision = replace(collision, margins=measure(arithmetic, course, event.hit))
     return collision
 
 

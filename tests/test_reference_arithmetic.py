@@ -1,0 +1,144 @@
+"""Only sound interval operations: each encloses, and no other may be used."""
+
+from __future__ import annotations
+
+import ast
+import operator
+from fractions import Fraction
+from pathlib import Path
+
+import mpmath
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import reference
+from reference.arithmetic import Arithmetic, Enclosure, rational, sign
+
+FOLDER = Path(reference.__file__).parent
+# What may be asked of an interval context, and what may be imported from mpmath.
+SOUND = {"mpf", "make_mpf", "sqrt", "prec"}
+IMPORTED = {"mpmath", "mpmath.ctx_iv", "mpmath.libmp"}
+
+numbers = st.floats(-1e6, 1e6, allow_subnormal=False)
+
+
+def misuses(source: str) -> list[str]:
+    """List the uses of mpmath in a module that are not known to be sound."""
+    found = []
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.Attribute):
+            owner = ast.unparse(node.value)
+            if (owner.endswith("context") and node.attr not in SOUND) or (
+                owner == "mpmath" and node.attr not in {"mp"}
+            ):
+                found.append(ast.unparse(node))
+            if owner == "mpmath.mp" and node.attr != "make_mpf":
+                found.append(ast.unparse(node))
+            if owner == "libmpi" and node.attr not in {"mpi_square", "mpi_cos_sin"}:
+                found.append(ast.unparse(node))
+        if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("mpmath"):
+            found += [] if node.module in IMPORTED else [str(node.module)]
+        if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Pow) and "BEYOND" not in ast.unparse(node):
+            left = node.left
+            if not isinstance(left, ast.Constant):
+                found.append(ast.unparse(node))
+    return found
+
+
+@pytest.mark.parametrize("path", sorted(FOLDER.glob("*.py")), ids=lambda path: path.name)
+def test_modules_use_sound_operations_only(path):
+    assert misuses(path.read_text("utf-8")) == []
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "y = self.context.exp(x)",
+        "y = arithmetic.context.log(x)",
+        "y = mpmath.iv.exp(x)",
+        "mpmath.mp.prec = 100",
+        "y = libmpi.mpi_exp(x, 53)",
+        "from mpmath.functions import zeta",
+        "y = x**2",
+    ],
+)
+def test_an_unsound_one_would_be_seen(line):
+    assert misuses(line) != []
+
+
+def test_the_exponential_of_mpmath_is_not_trusted():
+    """Why `exp` is banned is checked by sampling nothing: it is simply absent."""
+    assert not hasattr(Arithmetic, "exp")
+
+
+def exact(interval):
+    return tuple(rational(end) for end in interval._mpi_)
+
+
+@pytest.mark.parametrize("operation", [operator.add, operator.sub, operator.mul, operator.truediv])
+@given(a=numbers, b=numbers, width=st.floats(0, 10))
+def test_rational_operations_enclose(operation, a, b, width):
+    """At 8 bits or so, the result of exact operands lies within."""
+    arithmetic = Arithmetic(1)
+    x = arithmetic.context.mpf([a, a + width])
+    y = arithmetic.number(b)
+    if operation is operator.truediv and sign(y) == 0:
+        return
+    low, high = exact(operation(x, y))
+    for point in (Fraction(a), Fraction(a + width), (Fraction(a) + Fraction(a + width)) / 2):
+        assert low <= operation(point, Fraction(b)) <= high
+
+
+@given(numbers, st.floats(0, 10))
+def test_squares_and_roots_enclose(a, width):
+    arithmetic = Arithmetic(1)
+    x = arithmetic.context.mpf([a, a + width])
+    low, high = exact(arithmetic.square(x))
+    assert low >= 0
+    for point in (Fraction(a), Fraction(a + width), Fraction(a) + Fraction(width) / 3):
+        if Fraction(a) <= point <= Fraction(a + width):
+            assert low <= point * point <= high
+    if a >= 0:
+        low, high = exact(arithmetic.context.sqrt(x))
+        assert low * low <= Fraction(a)
+        assert Fraction(a + width) <= high * high
+
+
+@given(st.floats(-1e4, 1e4), st.floats(0, 8), st.floats(0, 1))
+def test_cosine_and_sine_enclose(a, width, share):
+    """Any point of the argument, in 60 digits, lies within the image at 8 bits or so."""
+    arithmetic = Arithmetic(1)
+    cos, sin = arithmetic.cos_sin(arithmetic.context.mpf([a, a + width]))
+    ctx = mpmath.MPContext()
+    ctx.dps = 60
+    point = ctx.mpf(a) + ctx.mpf(width) * ctx.mpf(share)
+    if point <= ctx.mpf(a + width):
+        assert cos.a <= ctx.cos(point) <= cos.b
+        assert sin.a <= ctx.sin(point) <= sin.b
+
+
+@pytest.mark.parametrize("k", range(-9, 10))
+def test_extrema_within_are_seen(k):
+    """Around each multiple of pi/2 the image holds the extreme value 1 or -1."""
+    arithmetic = Arithmetic(30)
+    quarter = arithmetic.number(k) * arithmetic.context.pi / 2 if k else arithmetic.zero
+    around = quarter + arithmetic.context.mpf([-1e-20, 1e-20])
+    cos, sin = arithmetic.cos_sin(around)
+    image = cos if k % 2 == 0 else sin
+    extreme = 1 if k % 4 in (0, 1) else -1
+    assert image.a <= extreme <= image.b
+
+
+def test_an_undecided_sign_is_zero():
+    arithmetic = Arithmetic(10)
+    assert sign(arithmetic.context.mpf([-1, 1])) == 0
+    assert sign(arithmetic.context.mpf([0, 1])) == 0
+    assert sign(arithmetic.context.mpf([1, 2])) == 1
+    assert sign(arithmetic.context.mpf([-2, -1])) == -1
+
+
+@given(numbers, st.floats(0, 1e-3))
+def test_centres_round_correctly(a, width):
+    lo, hi = mpmath.mp.make_mpf(mpmath.mpf(a)._mpf_), mpmath.mp.make_mpf(mpmath.mpf(a + width)._mpf_)
+    assert float(Enclosure(lo, hi)) == float((Fraction(a) + Fraction(a + width)) / 2)

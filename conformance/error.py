@@ -12,6 +12,7 @@ from fractions import Fraction
 from math import inf
 
 U = Fraction(1, 2**53)
+LEAST = Fraction(1, 2**1075)  # half the spacing of subnormal numbers: nothing rounds better
 
 
 def backward_ulps(
@@ -45,4 +46,4 @@ def _ulps(computed: float, exact: Fraction, moved: Fraction) -> float:
     allowance = (moved + abs(exact)) * U
     if allowance == 0:
         return 0.0 if error == 0 else inf
-    return float(error / allowance)
+    return float(error / max(allowance, LEAST))

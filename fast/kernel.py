@@ -193,6 +193,7 @@ def set_anchor(laws, anchors, row, t_hi, t_lo):
             anchors[row, 0] = before + 0.5 * a * u * u
             anchors[row, 1] = a * u
         anchors[row, 3] = u
+        anchors[row, 4] = tau
     return True
 
 
@@ -248,7 +249,9 @@ def legs_increment(laws, anchors, row, s):
         change += step * (rate + 0.5 * a * step)
         size += step * (abs(rate) + 0.5 * abs(a) * step)
         if left <= room:
-            return change, rate + a * step, size, abs(a) * half_leg
+            # The time within the half-leg is known to rounding of the time within the period.
+            rate += a * step
+            return change, rate, size, abs(rate) + abs(a) * min(half_leg, anchors[row, 4] + s)
         rate = 0.0 if j % 2 else a * half_leg
         left -= room
         u = 0.0
@@ -477,8 +480,9 @@ def earliest_side_or_floor(wall, start, limit, x, y, vx, vy, laws, anchors, boun
         if found != candidate:
             return found, root, 0.0
         if code != NO_WALL and abs(root - s) <= 8.0 * (error + root_error) + SAFETY * s:
-            return CORNER, root, 0.0
-        if code == NO_WALL or root < s:
+            # A tie, unless a wall still to be tried is met before it.
+            code, s, error = CORNER, min(root, s), max(error, root_error)
+        elif code == NO_WALL or root < s:
             code, s, error = candidate, root, root_error
     return code, s, error
 
@@ -621,7 +625,7 @@ def is_outside(table, is_relative, wall, x, y, laws, anchors, bounds):
     in_cap = table == CAP or (table == MUSHROOM and (y > 0.0 or wall in (BASE, ARC)))
     if (table == CAP and y < 0.0 and wall != BASE) or (table == STEM and y > 0.0 and wall != BASE):
         return BASE
-    if in_cap and y < 0.0 and wall == ARC:
+    if table == MUSHROOM and ((wall == ARC and y < 0.0) or (wall >= LEFT and y > 0.0)):
         return BASE
     for candidate in (ARC, LEFT, RIGHT, FLOOR):
         # On y = 0 both the arc and, below it, the sides bound the table; the mouth is checked in flight.

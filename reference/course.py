@@ -26,6 +26,7 @@ from scene.tables import laws, period
 SIDES: tuple[Wall, ...] = ("left", "right", "floor")
 MAX_SKIPS = 80
 BEYOND = 2.0**-10
+MAX_SPANS = 20_000  # a flight at 1e-3 of the walls' speed crosses some thousand
 
 
 class Span(NamedTuple):
@@ -285,7 +286,7 @@ class Course:
         if sign(start) == 0:
             moment, high = (exact_point(end) for end in self.flight.t._mpi_)
         is_first = sign(start) == 0
-        while True:
+        for _ in range(MAX_SPANS):
             pieces: Pieces = {name: piece_at(law, moment) for name, law in laws(self.scene).items()}
             ends = [piece.end for piece in pieces.values() if isinstance(piece, Quadratic)]
             motion = Motion(self.arithmetic, self.flight, pieces, is_stem=isinstance(self.scene, Stem))
@@ -300,6 +301,7 @@ class Course:
                 yield Span(start, self.arithmetic.upper(cut), motion)
                 start = self.arithmetic.lower(cut)
             moment, is_first = knot, False
+        raise Undecidable(f"more than {MAX_SPANS} knots lie within the flight")
 
     def _escape_time(self) -> Interval | None:
         # Twice the time to cross the largest extent the table ever has, along either axis.

@@ -8,21 +8,18 @@ enclosed to the digits asked for.
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from fractions import Fraction
 from typing import NamedTuple
 
 import scene as wire
-from reference import rational
-from reference.arithmetic import Arithmetic, Enclosure, Interval, Undecidable, sign
-from reference.course import SIDES, Course, Event, Hit
+from reference.arithmetic import Arithmetic, Enclosure, Interval, Undecidable
+from reference.course import Course, Event, Hit
 from reference.isolation import Leaf
 from reference.jacobian import chained, enclosures, identity, step_jacobian
-from reference.jets import Flight, Motion
+from reference.jets import Flight
 from reference.margins import Margins, measure
-from scene import Cap, InvalidState, Mushroom, Rejected, Scene, State, Stem, Undecided, Undefined, Wall
-from scene.laws import bounds, is_constant, piece_at
-from scene.states import ON_WALL, check_numbers
-from scene.tables import laws
+from reference.start import flight_from, is_in_cap, judge_start, motion_at
+from scene import InvalidState, Rejected, Scene, State, Stem, Undecided, Undefined, Wall
+from scene.states import check_numbers
 
 GUARD_DIGITS = 15
 DOUBLINGS = 3
@@ -191,12 +188,12 @@ def _chain(
 ) -> Trajectory:
     check_numbers(scene, state, state.t if t_end is None else t_end)
     steps: list[Collision] = []
-    outcome = _start(scene, state, arithmetic)
+    outcome = judge_start(scene, state, arithmetic)
     if isinstance(outcome, Undefined):
         return Trajectory(steps, outcome, arithmetic.digits)
     leaving, flat = outcome
-    chain = _Chain(_flight(arithmetic, state), leaving)
-    in_cap = _is_in_cap(scene, state, leaving)
+    chain = _Chain(flight_from(arithmetic, state), leaving)
+    in_cap = is_in_cap(scene, state, leaving)
     exact: State | None = state
     matrix = identity(arithmetic) if is_differentiated else None
     while len(steps) < n_collisions:
@@ -210,7 +207,7 @@ def _chain(
         if matrix is not None:
             origin = None
             if not steps and event.hit.wall in leaving:
-                origin = _motion_at(scene, state, arithmetic).gradient(event.hit.wall, arithmetic.zero)
+                origin = motion_at(scene, state, arithmetic).gradient(event.hit.wall, arithmetic.zero)
             matrix = chained(step_jacobian(arithmetic, chain.flight, event.hit, origin), matrix)
         chain = _bounce(chain, event.hit, arithmetic)
         steps.append(_collision(event, event.hit, chain.flight, arithmetic))
@@ -232,14 +229,14 @@ def _attempt(
     is_measured: bool,
 ) -> Outcome:
     check_numbers(scene, state, t_end)
-    outcome = _start(scene, state, arithmetic)
+    outcome = judge_start(scene, state, arithmetic)
     if isinstance(outcome, Undefined):
         return outcome
     leaving, flat = outcome
-    flight = _flight(arithmetic, state)
+    flight = flight_from(arithmetic, state)
     end = _horizon(arithmetic, flight.t, t_end)
     course = Course(scene, arithmetic, flight, leaving, flat, end, state)
-    event = course.event(in_cap=_is_in_cap(scene, state, leaving))
+    event = course.event(in_cap=is_in_cap(scene, state, leaving))
     if event.undefined is not None:
         return event.undefined
     if event.hit is None:
@@ -248,7 +245,7 @@ def _attempt(
     collision = _collision(event, event.hit, after, arithmetic)
     _require(collision, digits)
     if is_differentiated:
-        start = _motion_at(scene, state, arithmetic)
+        start = motion_at(scene, state, arithmetic)
         wall = event.hit.wall
         origin = start.gradient(wall, arithmetic.zero) if wall in leaving else None
         matrix = step_jacobian(arithmetic, flight, event.hit, origin)
@@ -258,117 +255,9 @@ def _attempt(
     return collision
 
 
-def _flight(arithmetic: Arithmetic, state: State) -> Flight:
-    return Flight(*(arithmetic.number(v) for v in (state.t, state.x, state.y, state.vx, state.vy)))
-
-
 def _horizon(arithmetic: Arithmetic, t: Interval, t_end: float | None) -> Interval:
     # Without a horizon: farther than any flight that meets a wall (the escape time cuts it).
     return arithmetic.number(2.0**1000) if t_end is None else arithmetic.number(t_end) - t
-
-
-def _is_in_cap(scene: Scene, state: State, leaving: dict[Wall, Interval]) -> bool:
-    if not isinstance(scene, Mushroom):
-        return isinstance(scene, Cap)
-    if "arc" in leaving or "base" in leaving:
-        return True
-    is_rising_in_mouth = state.y == 0 and state.vy > 0 and not leaving
-    return state.y > 0 or is_rising_in_mouth
-
-
-def _start(
-    scene: Scene, state: State, arithmetic: Arithmetic
-) -> tuple[dict[Wall, Interval], frozenset[Wall]] | Undefined:
-    """Judge the starting state: which walls it leaves, or why it is none of this table."""
-    motion = _motion_at(scene, state, arithmetic)
-    on = [wall for wall in _walls_near(scene, state) if _is_on(scene, state, wall, motion)]
-    if state.wall is not None and state.wall not in on:
-        on.append(state.wall)
-        _check_residual(scene, state, motion)
-    leaving: dict[Wall, Interval] = {}
-    flat: set[Wall] = set()
-    for wall in on:
-        judged = _departure(scene, state, wall, motion)
-        if isinstance(judged, Undefined):
-            return judged
-        leaving[wall] = motion.wall(wall, arithmetic.zero).f
-        if judged:
-            flat.add(wall)
-    if len(leaving) > 1:
-        return Undefined("corner")
-    return leaving, frozenset(flat)
-
-
-def _motion_at(scene: Scene, state: State, arithmetic: Arithmetic) -> Motion:
-    pieces = {name: piece_at(law, Fraction(state.t)) for name, law in laws(scene).items()}
-    return Motion(arithmetic, _flight(arithmetic, state), pieces, is_stem=isinstance(scene, Stem))
-
-
-def _walls_near(scene: Scene, state: State) -> list[Wall]:
-    """List the walls that bound the part of the table the state is in."""
-    if isinstance(scene, Cap):
-        return ["base", "arc"]
-    if isinstance(scene, Stem):
-        return ["base", *SIDES]
-    if state.y > 0 or state.wall in ("arc", "base"):
-        return ["arc"]
-    return list(SIDES)
-
-
-def _is_on(scene: Scene, state: State, wall: Wall, motion: Motion) -> bool:
-    """Tell whether an unnamed wall passes exactly through the state; refuse a state beyond it."""
-    if wall == state.wall:
-        return False
-    side = sign(motion.wall(wall, motion.arithmetic.zero).f)
-    if isinstance(scene, Mushroom) and state.y == 0 and wall in ("left", "right") and side < 0:
-        # Level with the mouth but beside it: on the base, which belongs to the cap.
-        return _is_on_base(scene, state, motion)
-    if side < 0:
-        raise InvalidState(
-            f"state (x, y) = ({state.x!r}, {state.y!r}) at t = {state.t!r} is beyond wall {wall}"
-        )
-    if side == 0 and not rational.is_zero(scene, state, wall, Fraction(0)):
-        raise Undecidable(f"the state may be on wall {wall}")
-    return side == 0
-
-
-def _is_on_base(scene: Mushroom, state: State, motion: Motion) -> bool:
-    if sign(motion.wall("arc", motion.arithmetic.zero).f) < 0:
-        raise InvalidState(f"state (x, y) = ({state.x!r}, 0) at t = {state.t!r} is beyond wall arc")
-    if state.vy < 0:
-        raise InvalidState(f"state.vy = {state.vy!r}: the particle starts on wall base and moves into it")
-    if state.vy == 0:
-        raise Undecidable("sliding along the base")
-    return False
-
-
-def _departure(scene: Scene, state: State, wall: Wall, motion: Motion) -> Undefined | bool:
-    """Judge f' at the start on a wall: True when it is flat there but lifts, False when it rises."""
-    jet = motion.wall(wall, motion.arithmetic.zero)
-    rise = sign(jet.d1) if jet.d1 is not None else 0
-    if rise > 0:
-        return False
-    if rise < 0:
-        raise InvalidState(f"state.wall = {wall!r}: the particle starts on this wall and moves into it")
-    exact = rational.wall_jet(scene, state, wall, Fraction(0))
-    if exact is None or exact[1] != 0:
-        raise Undecidable("f' at the start has no sign")
-    if exact[2] > 0:
-        return True
-    is_at_rest = all(is_constant(law) for law in laws(scene).values())
-    return Undefined("sliding" if exact[2] < 0 or is_at_rest or wall == "base" else "tangency")
-
-
-def _check_residual(scene: Scene, state: State, motion: Motion) -> None:
-    wall = state.wall
-    assert wall is not None
-    tops = {name: bounds(law).highest for name, law in laws(scene).items()}
-    size = tops.get("h", 0.0) if wall == "floor" else max(tops.get("r", 0.0), tops.get("w", 0.0))
-    gap = float(motion.arithmetic.enclosure(motion.wall(wall, motion.arithmetic.zero).f))
-    if wall == "arc":
-        gap /= 2 * size
-    if abs(gap) > ON_WALL * size:
-        raise InvalidState(f"state.wall = {wall!r}, but the state is {gap:.3g} away from that wall")
 
 
 def _bounce(chain: _Chain, hit: Hit, arithmetic: Arithmetic) -> _Chain:

@@ -115,3 +115,8 @@ def test_exact_answers_where_nothing_may_move():
     assert compare(truth.outcome, truth, State(0.0, 0.0, 0.0, 0.0, -1.0), 4).ulps == 0.0
     off = Collision("floor", 1.0, 1.0, 5e-324, -1.0, 0.0, 1.0)
     assert compare(off, truth, State(0.0, 0.0, 0.0, 0.0, -1.0), 4).ulps == float("inf")
+    numbers = [Fraction(n) for n in (1, 0, -1, 0, 1)]
+    numbers[1] = Fraction(5e-324)
+    tiny = Truth(off, numbers, [[0.0] * 5] * 5)
+    rounded = Collision("floor", 1.0, 1.0, 1e-323, -1.0, 0.0, 1.0)
+    assert compare(rounded, tiny, State(0.0, 0.0, 0.0, 0.0, -1.0), 4).ulps == 2.0

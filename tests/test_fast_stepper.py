@@ -163,6 +163,8 @@ def test_what_it_does_not_guess(scene, state, expected):
         (State(0, 0.1, 0.1, 1e200, 0.0), 1.0, "2^400"),
         (State(0, 0.6, 0.8, 1.0, 0.0, "arc"), 1.0, "moves into it"),
         (State(0, 0.6, 0.7, -1.0, 0.0, "arc"), 1.0, "away from that wall"),
+        (State(0, 1.0, -1e-17, -1.0, -0.1, "arc"), 9.0, "beyond wall base"),
+        (State(0, 0.5, 1e-17, -1.0, -0.1, "right"), 9.0, "beyond wall base"),
     ],
 )
 def test_bad_states_are_rejected(state, t_end, words):

@@ -1,0 +1,372 @@
+"""Faulty references: each of these mutants must fail a battery that the reference itself passes.
+
+The battery knows its answers from closed forms, from symmetries, and from the law of reflection
+in plain mpmath; nothing in it compares the reference with its own earlier results.
+"""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from functools import partial
+
+import mpmath
+import pytest
+
+import reference
+from reference import jets, stepper
+from reference.course import SIDES, Course
+from reference.isolation import Isolator
+from reference.jets import Jet, Motion
+from scene import BangBang, Cap, Fourier, Mushroom, State, Stem, Undefined
+from scene.laws import value
+from scene.tables import laws
+
+CIRCLE = Cap(r=1.0)
+BOX = Stem(w=1.0, h=1.0)
+STATIC = Mushroom(r=1.0, h=1.0, w=0.5)
+LIFT = Stem(w=1.0, h=BangBang(knots=((0.0, 2.0), (0.5, 1.0), (1.0, 2.0))))
+BREATHING = Cap(r=Fourier(mean=1.0, omega=1.0, sin=(0.25,)))
+CLOSING = Mushroom(r=1.0, h=1.0, w=BangBang(knots=((0.0, 0.5), (1.0, 0.25), (2.0, 0.5))))
+TILTING = Mushroom(
+    r=Fourier(mean=1.0, omega=1.0, sin=(0.125,)),
+    nu=Fourier(mean=0.5, omega=1.0, cos=(0.125,)),
+    h=Fourier(mean=1.0, omega=1.0, sin=(-0.25,)),
+    slope=Fourier(mean=0.0625, omega=1.0, sin=(0.0625,)),
+)
+DIGITS = 20
+
+
+def hit(scene, state, wall, t_end=100.0, **options):
+    found = reference.next_collision(scene, state, t_end, digits=DIGITS, **options)
+    assert isinstance(found, reference.Collision)
+    assert found.wall == wall
+    return found
+
+
+def holds(enclosure, number):
+    return enclosure.lo - mpmath.mpf(10) ** -40 <= number <= enclosure.hi + mpmath.mpf(10) ** -40
+
+
+def chord():
+    found = hit(CIRCLE, State(0.0, 0.25, 0.5, 2.0, 1.0), "arc")
+    assert holds(found.dt, (-1 + mpmath.sqrt(1 + 5 * (1 - mpmath.mpf("0.3125")))) / 5)
+    speed2 = mpmath.mpf(float(found.after.vx)) ** 2 + mpmath.mpf(float(found.after.vy)) ** 2
+    assert abs(speed2 - 5) < mpmath.mpf(2) ** -48
+
+
+def leaving_a_chord():
+    state = State(0.0, 0.6, 0.8, -1.0, 0.5, "arc")
+    x, y, vx, vy = (Fraction(n) for n in (state.x, state.y, state.vx, state.vy))
+    found = hit(CIRCLE, state, "arc")
+    assert found.dt.contains(-2 * (x * vx + y * vy) / (vx * vx + vy * vy))
+
+
+def lift():
+    found = hit(LIFT, State(0.0, 0.0, -1.75, 0.0, 0.0), "floor")
+    s = mpmath.sqrt(mpmath.mpf(1) / 32)
+    assert holds(found.dt, s)
+    assert holds(found.after.vy, 32 * s)
+
+
+def lift_beyond_a_knot():
+    found = hit(LIFT, State(0.0, 0.0, -1.0625, 0.0, 0.0), "floor")
+    assert holds(found.dt, mpmath.mpf("0.5") - mpmath.sqrt(mpmath.mpf(1) / 128))
+
+
+def first_of_two():
+    """A slow particle would be met again by the floor's second rise."""
+    found = hit(LIFT, State(0.0, 0.0, -1.25, 0.0, -0.125), "floor")
+    assert float(found.dt) < 0.5
+
+
+def recollision():
+    assert hit(LIFT, State(0.0, 0.0, -2.0, 0.0, 2.0**-30, "floor"), "floor").dt.contains(2.0**-33)
+
+
+def box():
+    """Right at 1/4 before floor at 1/2, and the other way round; mirrored, left."""
+    assert hit(BOX, State(0.0, 0.75, -0.5, 1.0, -1.0), "right").dt.contains(0.25)
+    assert hit(BOX, State(0.0, -0.75, -0.5, -1.0, -1.0), "left").dt.contains(0.25)
+    assert hit(BOX, State(0.0, 0.25, -0.75, 1.0, -1.0), "floor").dt.contains(0.25)
+    assert hit(BOX, State(0.0, 0.25, -0.25, 1.0, 1.0), "base").dt.contains(0.25)
+
+
+def horizon():
+    found = reference.next_collision(BOX, State(0.0, 0.0, -0.5, 1.0, 0.0), 0.5, digits=DIGITS)
+    assert isinstance(found, reference.Horizon)
+    assert found.at.x.contains(0.5)
+
+
+def mouth():
+    assert hit(STATIC, State(0.0, 0.25, 0.5, 0.0, -1.0), "floor").dt.contains(1.5)
+    assert hit(STATIC, State(0.0, 0.75, 0.5, 0.0, -1.0), "base").dt.contains(0.5)
+    edge = reference.next_collision(STATIC, State(0.0, 0.25, 0.25, 1.0, -1.0), 9.0, digits=DIGITS)
+    assert edge == Undefined("mouth-edge")
+
+
+def closing_mouth():
+    assert hit(CLOSING, State(0.0, 0.4375, 0.5, 0.0, -1.0), "base").dt.contains(0.5)
+    hit(CLOSING, State(1.0, 0.3125, 0.5, 0.0, -1.0), "floor")
+
+
+def starts():
+    """One flight to each wall of a mushroom in which everything moves."""
+    return [
+        ("arc", State(0.5, 0.1, 0.3, 2.0, 3.0)),
+        ("base", State(0.5, 0.9, 0.2, 0.25, -2.0)),
+        ("right", State(0.5, 0.1, -0.3, 3.0, 0.5)),
+        ("left", State(0.5, 0.1, -0.3, -3.0, -0.5)),
+        ("floor", State(0.5, 0.1, -0.3, 0.25, -3.0)),
+    ]
+
+
+def wall_function(scene, wall):
+    def law(name, t):
+        return value(mpmath.mp, laws(scene)[name], t)
+
+    def width(y, t):
+        return law("nu", t) * law("r", t) + law("slope", t) * y
+
+    return {
+        "arc": lambda x, y, t: law("r", t) - mpmath.sqrt(x * x + y * y),
+        "base": lambda x, y, t: y,
+        "right": lambda x, y, t: width(y, t) - x,
+        "left": lambda x, y, t: width(y, t) + x,
+        "floor": lambda x, y, t: y + law("h", t),
+    }[wall]
+
+
+def law_of_reflection():
+    """V' = v - 2 (v.n - u) n, with n and u from numerical derivatives of the wall's equation."""
+    with mpmath.workdps(50):
+        for wall, q in starts():
+            found = hit(TILTING, q, wall)
+            f = wall_function(TILTING, wall)
+            s = (found.dt.lo + found.dt.hi) / 2
+            x, y, t = q.x + q.vx * s, q.y + q.vy * s, q.t + s
+            assert abs(f(x, y, t)) < mpmath.mpf(10) ** -DIGITS
+            for i in range(1, 50):
+                assert f(q.x + q.vx * s * i / 50, q.y + q.vy * s * i / 50, q.t + s * i / 50) > 0
+            f_x, f_y, f_t = (mpmath.diff(f, (x, y, t), n) for n in ((1, 0, 0), (0, 1, 0), (0, 0, 1)))
+            push = 2 * (f_x * q.vx + f_y * q.vy + f_t) / (f_x**2 + f_y**2)
+            assert abs((found.after.vx.lo) - (q.vx - push * f_x)) < mpmath.mpf(10) ** -15
+            assert abs((found.after.vy.lo) - (q.vy - push * f_y)) < mpmath.mpf(10) ** -15
+
+
+def differentiated():
+    """The Jacobian's column by t is what moving the start in time by +-2^-20 shows."""
+    q = State(0.5, 0.1, 0.3, 2.0, 3.0)
+    found = hit(BREATHING, q, "arc", is_differentiated=True)
+    ends = [
+        hit(BREATHING, State(q.t + step, q.x, q.y, q.vx, q.vy), "arc") for step in (2.0**-20, -(2.0**-20))
+    ]
+    columns = zip(*((e.dt, *e.after[1:]) for e in ends), strict=True)
+    for row, (plus, minus) in zip(found.jacobian, columns, strict=True):
+        assert float(row[0]) == pytest.approx(float(plus.lo - minus.lo) * 2.0**19, abs=1e-8)
+
+
+def mirror():
+    for wall, q in starts():
+        found = hit(TILTING, q, wall)
+        other = {"left": "right", "right": "left"}.get(wall, wall)
+        image = hit(TILTING, State(q.t, -q.x, q.y, -q.vx, q.vy), other)
+        assert (found.dt, found.after.vy) == (image.dt, image.after.vy)
+        assert float(found.after.vx) == -float(image.after.vx)
+
+
+def nested_precisions():
+    for wall, q in starts():
+        found, finer = (reference.next_collision(TILTING, q, 9.0, digits=d) for d in (10, 40))
+        assert isinstance(found, reference.Collision)
+        assert isinstance(finer, reference.Collision)
+        assert found.wall == finer.wall == wall
+        assert found.dt.lo <= finer.dt.hi
+        assert finer.dt.lo <= found.dt.hi
+
+
+def reversed_film():
+    """With laws and velocity reversed, three bounces of a breathing circle are retraced."""
+    film = Cap(r=Fourier(mean=1.0, omega=1.0, sin=(-0.25,)))
+    q = State(0.0, 0.25, 0.5, 2.0, 1.0)
+    there = reference.trajectory(BREATHING, q, 9, 2.0, digits=DIGITS).outcome
+    assert isinstance(there, reference.Horizon)
+    end = there.rounded()
+    back = reference.trajectory(
+        film, State(-2.0, end.x, end.y, -end.vx, -end.vy), 9, 0.0, digits=DIGITS
+    ).outcome
+    assert isinstance(back, reference.Horizon)
+    home = back.rounded()
+    assert (home.x, home.y, -home.vx, -home.vy) == pytest.approx((q.x, q.y, q.vx, q.vy), abs=1e-12)
+
+
+BATTERY = (
+    chord,
+    leaving_a_chord,
+    lift,
+    lift_beyond_a_knot,
+    first_of_two,
+    recollision,
+    box,
+    horizon,
+    mouth,
+    closing_mouth,
+    law_of_reflection,
+    differentiated,
+    mirror,
+    nested_precisions,
+    reversed_film,
+)
+
+first_root = Isolator.first_root
+first_hit = Course._first_hit
+beyond_crossing = Course._beyond_crossing
+spans = Course._spans
+isolator_init = Isolator.__init__
+wall_of = Motion.wall
+gradient = Motion.gradient
+law_of = Motion.law
+width_of = Motion.width
+bounce = stepper._bounce
+
+
+def skip_the_first_root(self, start, end):
+    root = first_root(self, start, end)
+    if root is None:
+        return None
+    for i in range(1, 65):  # from where f > 0 again
+        later = self.arithmetic.middle(root.time + (end - root.time) * self.arithmetic.number(i) / 65)
+        if self.value(later) > 0:
+            return first_root(self, later, end)
+    return None
+
+
+def exclude_nothing(self, walls, start, limit):
+    """The first wall in the list that is hit at all, others not asked."""
+    for wall in walls:
+        found = first_hit(self, (wall,), start, limit)
+        if found is not None:
+            return found
+    return None
+
+
+def exclude_all_but_the_floor(self, walls, start, limit):
+    return first_hit(self, tuple(wall for wall in walls if wall != "floor") or walls, start, limit)
+
+
+def cut_no_knot(self, start, stop):
+    yield next(spans(self, start, stop))._replace(end=stop)
+
+
+def keep_the_residual(self, arithmetic, jet, residual, *, is_flat=False):
+    isolator_init(self, arithmetic, jet, None, is_flat=is_flat)
+
+
+def width_at_departure(self, crossing, *, in_cap):
+    wanted = self.flight.t + crossing
+    motions = self._motions_at
+
+    def wide(motion, at):
+        return width_of(motion, motion.flight.t if at == wanted else at)
+
+    def early(time):
+        if time is not crossing:
+            return motions(time)
+        moved = motions(self.arithmetic.zero)
+        for motion in moved:
+            motion.width = partial(wide, motion)
+        return moved
+
+    self._motions_at = early
+    return beyond_crossing(self, crossing, in_cap=in_cap)
+
+
+def open_always(self, crossing, *, in_cap):
+    if not isinstance(self.scene, Mushroom):
+        return beyond_crossing(self, crossing, in_cap=in_cap)
+    walls = SIDES if in_cap else ("arc",)
+    return self._first_hit(walls, self.arithmetic.lower(crossing), self.end)
+
+
+def with_the_wall_reversed(chain, hit, arithmetic):
+    f_t = hit.motions[-1].gradient(hit.wall, hit.time)[2]
+    return bounce(chain, hit._replace(slope=hit.slope - 2 * f_t), arithmetic)
+
+
+def swapped_sides(self, wall, s):
+    return wall_of(self, {"left": "right", "right": "left"}.get(wall, wall), s)
+
+
+def level_normal(self, wall, s):
+    f_x, f_y, f_t = gradient(self, wall, s)
+    return f_x, self.arithmetic.zero if wall in ("left", "right") else f_y, f_t
+
+
+def still_slope(self, name, time):
+    jet = law_of(self, name, time)
+    return Jet(jet.f, None, None) if name == "slope" else jet
+
+
+def width_with_still_nu(self, time):
+    if "nu" not in self.pieces:
+        return width_of(self, time)
+    nu, r = self.law("nu", time), self.law("r", time)
+    return Jet(nu.f * r.f, None if r.d1 is None else nu.f * r.d1, None)
+
+
+def square_without_second_derivative(arithmetic, p):
+    if p.d1 is None:
+        return Jet(arithmetic.square(p.f), None, None)
+    return Jet(arithmetic.square(p.f), 2 * (p.f * p.d1), 2 * arithmetic.square(p.d1))
+
+
+def hessian_without_time(self, wall, s):
+    zero = self.arithmetic.zero
+    two = self.arithmetic.number(-2)
+    return (two, two, zero, zero) if wall == "arc" else (zero, zero, zero, zero)
+
+
+MUTANTS = {
+    "first root skipped": (Isolator, "first_root", skip_the_first_root),
+    "first wall in the list wins": (Course, "_first_hit", exclude_nothing),
+    "floor never asked": (Course, "_first_hit", exclude_all_but_the_floor),
+    "knot not cut": (Course, "_spans", cut_no_knot),
+    "mouth's width at departure": (Course, "_beyond_crossing", width_at_departure),
+    "mouth always open": (Course, "_beyond_crossing", open_always),
+    "base always closed": (
+        Course,
+        "_beyond_crossing",
+        lambda self, crossing, *, in_cap: self._base_hit(crossing),
+    ),
+    "residual kept": (Isolator, "__init__", keep_the_residual),
+    "wall velocity reversed in the bounce": (stepper, "_bounce", with_the_wall_reversed),
+    "half the kick": (
+        stepper,
+        "_bounce",
+        lambda chain, hit, arithmetic: bounce(chain, hit._replace(slope=hit.slope / 2), arithmetic),
+    ),
+    "left and right swapped": (Motion, "wall", swapped_sides),
+    "normal of a slanted side level": (Motion, "gradient", level_normal),
+    "slope's derivative dropped": (Motion, "law", still_slope),
+    "product rule of nu r dropped": (Motion, "width", width_with_still_nu),
+    "r r'' dropped": (jets, "square", square_without_second_derivative),
+    "second derivatives by time dropped": (Motion, "hessian", hessian_without_time),
+    "horizon overrun": (stepper, "_horizon", lambda arithmetic, t, t_end: arithmetic.number(t_end + 9) - t),
+}
+
+
+@pytest.mark.parametrize("check", BATTERY)
+def test_the_reference_passes(check):
+    check()
+
+
+@pytest.mark.parametrize("name", MUTANTS)
+def test_a_mutant_is_killed(name, monkeypatch):
+    """Killed by an answer that is wrong, or missing, not by a crash."""
+    monkeypatch.setattr(*MUTANTS[name])
+
+    def battery():
+        for check in BATTERY:
+            check()
+
+    with pytest.raises(AssertionError):
+        battery()

@@ -39,6 +39,26 @@ def backward_ulps(
     return found
 
 
+def condition_number(
+    out: Sequence[float], jacobian: Sequence[Sequence[float]], inputs: Sequence[float]
+) -> float:
+    """Return the largest relative change of an output per relative change of the inputs.
+
+    Args:
+        out: (dt, x, y, vx, vy), the exact answer rounded.
+        jacobian: (5, 5) derivatives of the outputs (rows) by the inputs (columns).
+        inputs: (t, x, y, vx, vy) that the step started from.
+
+    Returns:
+        max over outputs of (sum |d out / d in| |in|) / |out|, place and velocity taken as vectors'
+        largest components; inf when such a vector vanishes though it can move.
+    """
+    moved = [sum(abs(d * value) for d, value in zip(row, inputs, strict=True)) for row in jacobian]
+    sizes = [abs(value) for value in out]
+    parts = [(moved[0], sizes[0]), (max(moved[1:3]), max(sizes[1:3])), (max(moved[3:]), max(sizes[3:]))]
+    return max((change / size if size else (inf if change else 0.0)) for change, size in parts)
+
+
 def _ulps(computed: float, exact: Fraction, moved: Fraction) -> float:
     if computed != computed or computed in (inf, -inf):
         return inf

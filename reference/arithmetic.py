@@ -8,6 +8,7 @@ different precisions do not disturb each other, and mpmath's global precision is
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Sequence
 from fractions import Fraction
 from typing import Any, NamedTuple
@@ -19,7 +20,10 @@ from mpmath.libmp import libmpf, libmpi
 Interval = Any  # mpmath's ivmpf, which has no type stubs
 
 BITS_PER_DIGIT = 3.3219280948873626
-_FLOOR, _CEILING = "f", "c"
+_FLOOR = "f"
+# mpmath keeps pi and the precision it was computed to in two variables that all contexts share:
+# a thread that reads one before and the other after a change would get a wrong pi.
+_CONSTANTS = threading.Lock()
 
 
 class Undecidable(Exception):  # noqa: N818 (not an error of the caller: precision is raised)
@@ -125,7 +129,8 @@ class Arithmetic:
         if libmpf.mpf_gt(libmpf.mpf_sub(b, a, 30, _FLOOR), libmpf.from_int(3)):
             whole = self.context.mpf([-1, 1])
             return whole, whole
-        cos, sin = libmpi.mpi_cos_sin(x._mpi_, self.prec)
+        with _CONSTANTS:
+            cos, sin = libmpi.mpi_cos_sin(x._mpi_, self.prec)
         return self.context.make_mpf(cos), self.context.make_mpf(sin)
 
     def enclosure(self, x: Interval) -> Enclosure:

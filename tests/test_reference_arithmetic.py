@@ -130,6 +130,20 @@ def test_extrema_within_are_seen(k):
     assert image.a <= extreme <= image.b
 
 
+def test_threads_take_turns_at_mpmaths_shared_pi(monkeypatch):
+    module = reference.arithmetic
+    seen = []
+
+    def watched(x, prec):
+        seen.append(module._CONSTANTS.locked())
+        return (x, x), (x, x)
+
+    monkeypatch.setattr(module.libmpi, "mpi_cos_sin", watched)
+    arithmetic = Arithmetic(10)
+    arithmetic.cos_sin(arithmetic.number(1))
+    assert seen == [True]
+
+
 def test_an_undecided_sign_is_zero():
     arithmetic = Arithmetic(10)
     assert sign(arithmetic.context.mpf([-1, 1])) == 0

@@ -11,8 +11,9 @@ from truth import centre, proved_step
 import fast
 import reference
 from conformance.agreement import Truth, compare
+from conformance.error import condition_number
 from conformance.strategies import scenes_and_states
-from scene import Collision, State, load
+from scene import Cap, Collision, State, load
 
 INPUTS = ("t", "x", "y", "vx", "vy")
 
@@ -134,3 +135,14 @@ def test_condition_number_of_a_grazing_hit():
     largest = max(abs(d) for row in truth.jacobian for d in row)
     assert 1e3 < largest < 1e6
     assert compare(fast.next_collision(scene, state, 10.0), truth, state, 16.0).kind == "agrees"
+    c, inputs = truth.outcome, (state.t, state.x, state.y, state.vx, state.vy)
+    condition = condition_number((c.dt, c.x, c.y, c.vx, c.vy), truth.jacobian, inputs)
+    assert 1e7 < condition < 1e10  # dt is sqrt(2) 2^-15, its derivative by y 2^15 / sqrt(2)
+
+
+def test_condition_number_of_a_head_on_hit():
+    """Along a radius from the centre: dt = 1/v and v' = -v have condition 1."""
+    state = State(0.0, 0.0, 0.0, 0.0, 2.0)
+    truth = proved_step(Cap(r=1.0), state, 10.0)
+    c = truth.outcome
+    assert condition_number((c.dt, c.x, c.y, c.vx, c.vy), truth.jacobian, (0, 0, 0, 0, 2.0)) == 1.0

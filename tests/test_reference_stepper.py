@@ -11,7 +11,7 @@ import mpmath
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from truth import centre
+from truth import IS_DEEP, centre
 
 import reference
 from conformance.strategies import scenes_and_states
@@ -160,10 +160,10 @@ def test_bad_states_are_rejected(scene, state, t_end, words):
     assert words in outcome.reason
 
 
-@settings(max_examples=60)
+@settings(max_examples=10_000 if IS_DEEP else 60)
 @given(scenes_and_states())
 def test_precisions_nest(drawn):
-    """30 and 60 digits enclose the same truth, the proof's sub-intervals leave no gap."""
+    """15 and 60 digits enclose the same truth, the proof's sub-intervals leave no gap."""
     scene, state, t_end = drawn
     one = reference.next_collision(scene, state, t_end, digits=15)
     two = reference.next_collision(scene, state, t_end, digits=60)
@@ -177,7 +177,7 @@ def test_precisions_nest(drawn):
                 assert right.start.a <= left.end.b
 
 
-@settings(max_examples=40)
+@settings(max_examples=10_000 if IS_DEEP else 40)
 @given(scenes_and_states())
 def test_dense_sampling_finds_no_earlier_hit(drawn):
     """The falsifier: up to the collision, the path is inside at 200 instants, in plain mpmath."""

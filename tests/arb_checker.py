@@ -227,11 +227,20 @@ class _Proof:
         if kind == "falling":
             return flight.has_slope(-1, wall, a, b) and bool(flight.at(wall, b)[0] > 0)
         if kind == "concave":
-            return begins_well and flight.is_concave(wall, a, b) and bool(flight.at(wall, b)[0] > 0)
+            return begins_well and self._bends_down(wall, a, b) and bool(flight.at(wall, b)[0] > 0)
         if kind == "lifting":
             is_flat = is_at_start and bool(flight.at(wall, a)[1] == 0)
             return is_flat and bool(flight.over(wall, a, b)[2] > 0)
         raise Refuted(f"no such kind: {kind}")
+
+    def _bends_down(self, wall: str, a: fmpq, b: fmpq) -> bool:
+        """Prove f'' <= 0 or, where f'' touches 0 and no ball can show its sign, f > 0 itself."""
+        flight = self.flight
+        if flight.is_concave(wall, a, b):
+            return True
+        instants = [a + (b - a) * fmpq(i, 16) for i in range(17)]
+        is_convex_somewhere = any(bool(flight.over(wall, s, s)[2] > 0) for s in instants)
+        return not is_convex_somewhere and flight.is_positive(wall, a, b)
 
     def _base_root(self) -> tuple[fmpq, fmpq]:
         assert self.root is not None

@@ -79,6 +79,11 @@ HONEST = {
         State(0.0, 0.0, -1.0, 0.0, 0.0, "floor"),
         0.75,
     ),
+    "curvature touching zero": (
+        Stem(w=Fourier(mean=0.6, omega=0.5, sin=(0.45,)), h=1.5),
+        State(0.0, -0.59, -0.6, -0.0005, 0.0),
+        200.0,
+    ),
     "slow": (LIFT, State(0.0, 0.0, -0.5, 2.0**-8, 0.0), 500.0),
 }
 

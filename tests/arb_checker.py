@@ -240,7 +240,14 @@ class _Proof:
             return True
         instants = [a + (b - a) * fmpq(i, 16) for i in range(17)]
         is_convex_somewhere = any(bool(flight.over(wall, s, s)[2] > 0) for s in instants)
-        return not is_convex_somewhere and flight.is_positive(wall, a, b)
+        if is_convex_somewhere:
+            return False
+        if a != 0 or wall not in flight.residuals:
+            return flight.is_positive(wall, a, b)
+        # From the wall itself, f = 0 at a: f rises at first, and is positive after that.
+        rests = (a + (b - a) / 2**k for k in range(1, 60))
+        rest = next((s for s in rests if flight.has_slope(1, wall, a, s)), b)
+        return rest < b and flight.is_positive(wall, rest, b)
 
     def _base_root(self) -> tuple[fmpq, fmpq]:
         assert self.root is not None

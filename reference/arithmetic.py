@@ -155,9 +155,3 @@ def is_below(x: Interval, y: Interval) -> bool:
 def is_at_most_zero(x: Interval) -> bool:
     """Tell whether no number of x is positive."""
     return bool(libmpf.mpf_sign(x._mpi_[1]) <= 0)
-
-
-def as_rational(x: Interval) -> Fraction | None:
-    """Return the number a thin interval stands for, or None."""
-    lo, hi = x._mpi_
-    return rational(lo) if lo == hi else None

@@ -14,8 +14,6 @@ from reference.arithmetic import Arithmetic, Enclosure, Interval
 from reference.course import Hit
 from reference.jets import Flight
 
-INPUTS = ("t", "x", "y", "vx", "vy")
-OUTPUTS = ("dt", "x", "y", "vx", "vy")
 Matrix = list[list[Interval]]
 
 

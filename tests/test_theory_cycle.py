@@ -11,14 +11,12 @@ from typing import Any
 import pytest
 from mpmath import MPContext
 
-from scene import BangBang, Fourier, Mushroom, from_data, load
+from scene import BangBang, Fourier, Mushroom, load
 from scene.laws import value
 from theory import Cycle, NotCovered
 from theory.chebyshev import Grid
 from theory.critical import solve_rising, spans
 from theory.motion import Motion
-
-TWO_CAPTURES = {"kind": "fourier", "mean": 0.75, "omega": 1.0, "cos": [0.0, 0.125]}
 
 
 def test_moving_cap_releases_at_two_pi_minus_t() -> None:
@@ -118,10 +116,6 @@ def test_bang_bang_width_and_radius_turn_between_knots() -> None:
     [
         (load("breathing-circle"), "the theory is of mushrooms: table is cap"),
         (load("fermi-ulam"), "the theory is of mushrooms: table is stem"),
-        (
-            from_data({"table": "mushroom", "r": 1.0, "h": 1.0, "nu": TWO_CAPTURES}),
-            "one interval of capture per period is covered: this cycle has 2",
-        ),
     ],
 )
 def test_what_is_not_covered_is_refused_in_one_line(scene: Any, message: str) -> None:

@@ -11,6 +11,19 @@ from theory.curves import (
     largest_gain,
 )
 from theory.cycle import Cycle
+from theory.density import Caustic, capture_rate_at, caustics, cdf_at, density_at
+from theory.distribution import Energies, Sum, energies, energy_cdf, sum_of_cycles
+from theory.finite_energy import (
+    Bias,
+    Limit,
+    PowerFit,
+    Width,
+    bias,
+    extrapolate,
+    fit_power,
+    peak_width,
+    unbiased_mean,
+)
 from theory.invariants import (
     cap_invariant,
     energy,
@@ -18,30 +31,54 @@ from theory.invariants import (
     log_energy_rate_island,
     sin_phi_hat,
 )
-from theory.prediction import Prediction, mean_of, predict
+from theory.prediction import Prediction, cumulants, mean_of, moments, predict, reversed_cycle
+from theory.saddle import Saddle
 from theory.volumes import NotCovered, Volumes, delta, v_cap, v_cha, v_ell, v_stem, volumes_at
 
 __all__ = [
+    "Bias",
     "CaptureCurve",
+    "Caustic",
     "ChaoticZone",
     "Cycle",
+    "Energies",
+    "Limit",
     "NotConverged",
     "NotCovered",
+    "PowerFit",
     "Prediction",
+    "Saddle",
+    "Sum",
     "Volumes",
+    "Width",
+    "bias",
     "cap_invariant",
     "capture_curve",
+    "capture_rate_at",
     "capture_time_mass",
+    "caustics",
+    "cdf_at",
     "chaotic_zone",
+    "cumulants",
     "delta",
+    "density_at",
+    "energies",
     "energy",
+    "energy_cdf",
     "energy_density",
+    "extrapolate",
+    "fit_power",
     "largest_gain",
     "log_energy_rate_chaotic",
     "log_energy_rate_island",
     "mean_of",
+    "moments",
+    "peak_width",
     "predict",
+    "reversed_cycle",
     "sin_phi_hat",
+    "sum_of_cycles",
+    "unbiased_mean",
     "v_cap",
     "v_cha",
     "v_ell",

@@ -5,6 +5,9 @@ With a = V_cap / V_cha at capture and b the same at release,
     B(nu) = integral of b |d delta| from nu to nu_max,    g = b / a          (Eq:g),
     s(nu) = log E1 / E0 = -log g + B - A                                     (Eq:lnE/E0),
     s_nc  = B - A at nu_min, for the particles never captured                (Eq:lnEnc/E0).
+With several captures A and B run along the path from the top of the tree of valleys; a particle
+not captured on a valley's own pieces passes through its children one after another, a Markov chain whose
+gains are independent and add up (theory/equations.md derives it).
 On every piece nu = nu_upper - (nu_upper - nu_lower) I(u), where I is the polynomial that
 leaves 0 as u^p and reaches 1 as (1 - u)^q: with the piece's orders p, q all this is analytic in
 u on [0, 1]. Intervals of u are halved until Chebyshev interpolation resolves them.
@@ -12,14 +15,17 @@ u on [0, 1]. Intervals of u are halved until Chebyshev interpolation resolves th
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import cached_property, reduce
 from math import comb
 from typing import Any, NamedTuple
 
 from scene.refusal import BadInput
 from theory.chebyshev import Grid
-from theory.cycle import Cycle, Piece
+from theory.cycle import Cycle
+from theory.measure import Atoms, convolve, product, shifted
+from theory.valleys import Piece, Valley
 from theory.volumes import delta, delta_slope
 
 MAX_HALVINGS = 24  # a panel of 2^-24 of its piece: nearer singularities are given up
@@ -45,45 +51,151 @@ class Panel(NamedTuple):
 
     @property
     def s(self) -> list[Any]:
-        """Log E1 / E0 of a particle captured here. Source: Eq:lnE/E0."""
+        """What the valleys on the path give to log E1 / E0 of a particle captured here. Source: Eq:lnE/E0."""
         return [b - a - log_g for a, b, log_g in zip(self.A, self.B, self.log_g, strict=True)]
+
+
+class Window(NamedTuple):
+    """A valley resolved: its own panels, its children; A and B where it begins and where the children do."""
+
+    panels: tuple[Panel, ...]
+    children: tuple[Window, ...]
+    A_top: Any
+    B_top: Any
+    A_end: Any
+    B_end: Any
+
+    @property
+    def absorbed(self) -> Any:
+        """-log of the probability of passing the whole valley uncaptured (Eq:ps)."""
+        return self.A_end - self.A_top + sum(child.absorbed for child in self.children)
+
+    @property
+    def s_nc(self) -> Any:
+        """Gain in log E of passing it uncaptured (Eq:lnEnc/E0)."""
+        own = (self.B_end - self.B_top) - (self.A_end - self.A_top)
+        return own + sum(child.s_nc for child in self.children)
+
+
+class Placed(NamedTuple):
+    """A panel within its cycle.
+
+    s_before, s_after: gains of the valleys, off the panel's own path, passed uncaptured before and after it.
+    absorbed: -log of the probability of passing them uncaptured.
+    s_below: gain of passing uncaptured what lies below the panel's valley's first value.
+    """
+
+    panel: Panel
+    s_before: Any
+    s_after: Any
+    absorbed: Any
+    s_below: Any
+
+    @property
+    def s(self) -> list[Any]:
+        """Log E1 / E0 of a particle captured here and nowhere else. Source: Eq:lnE/E0."""
+        return [s + self.s_before + self.s_after for s in self.panel.s]
 
 
 @dataclass(frozen=True)
 class Captures:
-    """A cycle's captured particles, panel by panel from nu_max to nu_min."""
+    """A cycle's captured particles: panels from nu_max to nu_min within each valley."""
 
     cycle: Cycle
     grid: Grid
-    panels: tuple[Panel, ...]
+    target: int
+    root: Window
 
     @property
     def s_not_captured(self) -> Any:
         """Log E1 / E0 of the particles never captured. Source: Eq:lnEnc/E0."""
-        return self.panels[-1].B[-1] - self.panels[-1].A[-1] if self.panels else self.cycle.ctx.zero
+        return self.root.s_nc
 
     @property
     def p_not_captured(self) -> Any:
         """Probability of staying in the chaotic zone. Source: Eq:ps at nu_min."""
-        return self.cycle.ctx.exp(-self.panels[-1].A[-1]) if self.panels else self.cycle.ctx.one
+        return self.cycle.ctx.exp(-self.root.absorbed)
+
+    @property
+    def is_single(self) -> bool:
+        """Tell whether a particle is captured at most once per cycle."""
+        return not self.root.children
+
+    @cached_property
+    def placed(self) -> tuple[Placed, ...]:
+        """All panels, a valley's own before its children's."""
+        zero = self.cycle.ctx.zero
+        return tuple(_placed(self.root, zero, zero, zero))
+
+    @cached_property
+    def atoms(self) -> Atoms:
+        """The distribution of s as weighted points, exact for what the grid resolves."""
+        return self._atoms(self.root)
 
     def mean(self, f: Callable[[Any], Any]) -> Any:
         """Return the mean of f(log E1 / E0) over all particles, the uncaptured ones included."""
-        captured = self._integral(lambda panel: [f(s) for s in panel.s])
-        return captured + self.p_not_captured * f(self.s_not_captured)
+        return self.cycle.ctx.fsum(w * f(s) for w, s in self.atoms)
 
     def growth(self) -> Any:
-        """Return m1, the integral of g - 1 - log g over the captured particles. Source: Eq:Erate."""
-        ctx = self.cycle.ctx
-        return self._integral(lambda panel: [ctx.expm1(log_g) - log_g for log_g in panel.log_g])
-
-    def _integral(self, f: Callable[[Panel], list[Any]]) -> Any:
-        # d p_ell = exp(-A) dA (Eq:dps/ps).
+        """Return m1, the integral of g - 1 - log g over all captures. Source: Eq:Erate."""
         ctx, total = self.cycle.ctx, self.cycle.ctx.zero
-        for panel in self.panels:
+        for panel in (placed.panel for placed in self.placed):
             density = [rate * ctx.exp(-a) for rate, a in zip(panel.rate, panel.A, strict=True)]
-            total += self.grid.integral([y * p for y, p in zip(f(panel), density, strict=True)])
+            gain = [ctx.expm1(log_g) - log_g for log_g in panel.log_g]
+            total += self.grid.integral([y * p for y, p in zip(gain, density, strict=True)])
         return total
+
+    def taylor(self, q: Any, order: int) -> list[Any]:
+        """Return the coefficients, up to `order`, of mean exp((q + x) s) in powers of x."""
+        return self._taylor(self.root, self.cycle.ctx.mpf(q), order)
+
+    def captured(self, window: Window) -> Atoms:
+        """Return the particles captured on a valley's own panels, from its top: d p_ell = exp(-A) dA."""
+        ctx, gain = self.cycle.ctx, window.B_top - window.A_top
+        return [
+            (weight * rate * ctx.exp(window.A_top - a), s - gain)
+            for panel in window.panels
+            for weight, rate, a, s in zip(self.grid.weights, panel.rate, panel.A, panel.s, strict=True)
+        ]
+
+    def _atoms(self, window: Window) -> Atoms:
+        ctx = self.cycle.ctx
+        below: Atoms = [(ctx.one, ctx.zero)]
+        if window.children:
+            grid = Grid(ctx, 2 * (6 + self.target // 3))
+            below = reduce(lambda x, y: convolve(grid, x, y), map(self._atoms, window.children))
+        spent = window.A_end - window.A_top
+        passed = shifted(below, ctx.exp(-spent), (window.B_end - window.B_top) - spent)
+        return self.captured(window) + passed
+
+    def _taylor(self, window: Window, q: Any, order: int) -> list[Any]:
+        ctx, spent = self.cycle.ctx, window.A_end - window.A_top
+        passed = _exponential(ctx, ctx.exp(-spent), (window.B_end - window.B_top) - spent, q, order)
+        for child in window.children:
+            passed = product(passed, self._taylor(child, q, order))
+        terms = [_exponential(ctx, w, s, q, order) for w, s in self.captured(window)]
+        return [ctx.fsum(column) for column in zip(passed, *terms, strict=True)]
+
+
+def _exponential(ctx: Any, weight: Any, s: Any, q: Any, order: int) -> list[Any]:
+    """Return the coefficients of weight exp((q + x) s) in powers of x."""
+    terms = [weight * ctx.exp(q * s)]
+    for k in range(1, order + 1):
+        terms.append(terms[-1] * s / k)
+    return terms
+
+
+def _placed(window: Window, before: Any, after: Any, absorbed: Any) -> Iterator[Placed]:
+    for panel in window.panels:
+        yield Placed(panel, before, after, absorbed, window.s_nc + window.B_top - window.A_top)
+    for i, child in enumerate(window.children):
+        early, late = window.children[:i], window.children[i + 1 :]
+        yield from _placed(
+            child,
+            before + sum(other.s_nc for other in early),
+            after + sum(other.s_nc for other in late),
+            absorbed + sum(other.absorbed for other in early + late),
+        )
 
 
 def captures(cycle: Cycle, target: int) -> Captures:
@@ -97,26 +209,38 @@ def captures(cycle: Cycle, target: int) -> Captures:
         NotConverged: panels as small as 2^-MAX_HALVINGS of a piece do not resolve it.
     """
     grid = Grid(cycle.ctx, 2 * (12 + target))
-    tolerance = cycle.ctx.mpf(10) ** -target
+    start = cycle.ctx.zero, cycle.ctx.zero
+    return Captures(cycle, grid, target, _window(cycle, grid, cycle.valley, start, target))
+
+
+def _window(cycle: Cycle, grid: Grid, valley: Valley, start: tuple[Any, Any], target: int) -> Window:
+    A, B = start
     panels: list[Panel] = []
-    A = B = cycle.ctx.zero
-    for piece in cycle.pieces:
-        todo = [(0, 0)]  # part i of the piece's 2^halvings equal parts in u
-        while todo:
-            i, halvings = todo.pop()
-            panel = _panel(cycle, grid, piece, (i, halvings), (A, B), tolerance)
-            if panel is not None:
-                panels.append(panel)
-                A, B = panel.A[-1], panel.B[-1]
-            elif halvings < MAX_HALVINGS:
-                todo += [(2 * i + 1, halvings + 1), (2 * i, halvings + 1)]
-            else:
-                nu, _ = _descent(cycle.ctx, piece, cycle.ctx.ldexp(i, -halvings))
-                raise NotConverged(
-                    f"the cycle is not resolved to {target} digits near nu = {float(nu):.6g}"
-                    f" by panels of 2^-{MAX_HALVINGS} of a piece"
-                )
-    return Captures(cycle, grid, tuple(panels))
+    for piece in valley.pieces:
+        panels += _resolved(cycle, grid, piece, (A, B), target)
+        A, B = panels[-1].A[-1], panels[-1].B[-1]
+    children = tuple(_window(cycle, grid, child, (A, B), target) for child in valley.children)
+    return Window(tuple(panels), children, *start, A, B)
+
+
+def _resolved(cycle: Cycle, grid: Grid, piece: Piece, start: tuple[Any, Any], target: int) -> list[Panel]:
+    panels: list[Panel] = []
+    todo = [(0, 0)]  # part i of the piece's 2^halvings equal parts in u
+    while todo:
+        i, halvings = todo.pop()
+        panel = _panel(cycle, grid, piece, (i, halvings), start, cycle.ctx.mpf(10) ** -target)
+        if panel is not None:
+            panels.append(panel)
+            start = panel.A[-1], panel.B[-1]
+        elif halvings < MAX_HALVINGS:
+            todo += [(2 * i + 1, halvings + 1), (2 * i, halvings + 1)]
+        else:
+            nu, _ = _descent(cycle.ctx, piece, cycle.ctx.ldexp(i, -halvings))
+            raise NotConverged(
+                f"the cycle is not resolved to {target} digits near nu = {float(nu):.6g}"
+                f" by panels of 2^-{MAX_HALVINGS} of a piece"
+            )
+    return panels
 
 
 def _panel(

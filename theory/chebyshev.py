@@ -56,6 +56,16 @@ class Grid:
         """Return the integral over [0, 1] of the function with these values at the points."""
         return self.ctx.fdot(self.weights, values)
 
+    def quadrature(self, moments: list[Any]) -> list[Any]:
+        """Return the weights at the points of a measure with these means of T_k(2 x - 1), k = 0 ... n."""
+        signed = [-m if k % 2 else m for k, m in enumerate(moments)]
+        signed[0] /= 2
+        signed[self.n] /= 2
+        weights = [self.ctx.fdot(signed, row) * 2 / self.n for row in self._cosines]
+        weights[0] /= 2
+        weights[self.n] /= 2
+        return weights
+
     def forecast(self, values: list[Any]) -> Any:
         """Extrapolate a function known at the first points to the next one; None when none is known."""
         weights = self._forecasts[len(values)]

@@ -1,30 +1,27 @@
 """Curves and histogram masses of the theory in binary64, to be laid over simulations.
 
 They come from the Chebyshev panels of a 15-digit solution, so a curve is right to about 1e-14
-at any sampling. Masses per bin are differences of p_cha along a fine curve, taken where s
-or t_in crosses the bins' edges: caustics of the implicit density (where s turns) integrate
-without care. Times run from the cycle's start, where nu begins to fall, not from t = 0.
+at any sampling, and masses per bin are differences of exact distribution functions: caustics of
+the implicit density (where s turns) need no care. Times run from the cycle's start, where nu
+begins to fall, not from t = 0.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
 from mpmath import fp
-from numpy.polynomial import chebyshev
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from scene.refusal import BadInput
 from scene.tables import Scene
-from theory.adiabatic import captures
+from theory.branches import DIGITS, Branch, Floats, X, tree, turns
+from theory.constants import guarded
 from theory.cycle import Cycle
+from theory.distribution import energies
 from theory.volumes import volumes_at
-
-Floats = NDArray[np.float64]
-
-DIGITS = 15
-FINE = 2048  # intervals of a panel's fine curve: masses are right to about its inverse square, 2e-7
 
 
 class CaptureCurve(NamedTuple):
@@ -35,7 +32,7 @@ class CaptureCurve(NamedTuple):
     t_out: release time [time].
     p_cha: probability of being still in the chaotic zone at t_in (Eq:ps).
     log_g: log of the compression factor (Eq:g).
-    s: log E1 / E0 after the cycle (Eq:lnE/E0).
+    s: log E1 / E0 after the cycle, of a particle captured there and at no other time (Eq:lnE/E0).
     """
 
     nu: Floats
@@ -64,17 +61,23 @@ def capture_curve(scene: Scene, n: int = 400) -> CaptureCurve:
     """
     if n < 2:
         raise BadInput(f"n = {n}, must be >= 2")
-    panels = _panels(scene)
-    place = np.linspace(0.0, len(panels), n)
-    index = np.minimum(place.astype(int), len(panels) - 1)
-    parts = [panel.at(place[index == i] - i) for i, panel in enumerate(panels)]
+    branches = sorted(tree(scene).all_branches(), key=lambda branch: float(branch.ends[1, 0]))
+    place = np.linspace(0.0, len(branches), n)
+    index = np.minimum(place.astype(int), len(branches) - 1)
+    parts = [_curve(branch, place[index == i] - i) for i, branch in enumerate(branches)]
     if not parts:
         return CaptureCurve(*(np.empty(0) for _ in CaptureCurve._fields))
     return CaptureCurve(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))
 
 
+def _curve(branch: Branch, x: Floats) -> CaptureCurve:
+    nu, t_in, t_out, A, B, log_g = branch.evaluate(x)
+    s = B - A - log_g + (branch.s_before + branch.s_after)
+    return CaptureCurve(nu, t_in, t_out, np.exp(-A), log_g, s)
+
+
 def largest_gain(scene: Scene) -> tuple[float, float] | None:
-    """Return (t_in, s) of the captured particles that gain most; None when nothing is captured.
+    """Return (t_in, s) of the particles captured once that gain most; None when nothing is captured.
 
     Args:
         scene: as for `theory.predict`.
@@ -82,20 +85,11 @@ def largest_gain(scene: Scene) -> tuple[float, float] | None:
     Source: Fig:protocol, right, and the right mode of Fig:E1/E0.
     """
     best: tuple[float, float] | None = None
-    for panel in _panels(scene):
-        fine = panel.at(_X)
-        k = int(np.argmax(fine.s))
-        x = _X[k]
-        if 0 < k < FINE:
-            # Newton steps on s' = 0 from a fine sample reach rounding.
-            first, second = chebyshev.chebder(panel.s), chebyshev.chebder(panel.s, 2)
-            for _ in range(3):
-                bend = chebyshev.chebval(2 * x - 1, second)
-                step = chebyshev.chebval(2 * x - 1, first) / (2 * bend) if bend < 0 else 0.0
-                x = min(max(x - step, _X[k - 1]), _X[k + 1])
-        at_best = panel.at(np.array([x]))
-        if best is None or at_best.s[0] > best[1]:
-            best = float(at_best.t_in[0]), float(at_best.s[0])
+    for branch in tree(scene).all_branches():
+        curve = _curve(branch, turns(branch.s, branch.scale))
+        k = int(np.argmax(curve.s))
+        if best is None or curve.s[k] > best[1]:
+            best = float(curve.t_in[k]), float(curve.s[k])
     return best
 
 
@@ -115,11 +109,14 @@ def energy_density(scene: Scene, edges: ArrayLike) -> Floats:
 
     Source: Eq:lnE/E0 with Eq:ps.
     """
-    return _masses(scene, edges, "s")
+    found = energies(scene)
+    return _increments(edges, found.captured_below)
 
 
 def capture_time_mass(scene: Scene, edges: ArrayLike) -> Floats:
-    """Return the probability of being captured within each bin of time.
+    """Return the mean number of captures per particle within each bin of time.
+
+    In a cycle with one interval of capture it is the probability of being captured then.
 
     Args:
         scene: as for `theory.predict`.
@@ -134,7 +131,12 @@ def capture_time_mass(scene: Scene, edges: ArrayLike) -> Floats:
 
     Source: Eq:ps.
     """
-    return _masses(scene, edges, "t_in")
+    branches = tuple(tree(scene).all_branches())
+
+    def captured_before(times: Floats) -> Floats:
+        return sum((branch.below(branch.t_in, times) for branch in branches), np.zeros_like(times))
+
+    return _increments(edges, captured_before)
 
 
 class ChaoticZone(NamedTuple):
@@ -148,6 +150,7 @@ class ChaoticZone(NamedTuple):
     p_cha: Floats
 
 
+@guarded
 def chaotic_zone(scene: Scene, times: ArrayLike) -> ChaoticZone:
     """Follow the chaotic zone's energy and population through the cycle, right to about 2e-7.
 
@@ -170,67 +173,22 @@ def chaotic_zone(scene: Scene, times: ArrayLike) -> ChaoticZone:
         t = t - n_before * float(cycle.period)
     volume = np.array([volumes_at(fp, scene, float(x)).v_cha for x in t])
     log_energy = -np.log(volume / volumes_at(fp, scene, start).v_cha)
-    if not cycle.pieces:
+    root = tree(scene)
+    branches = tuple(root.all_branches())
+    if not branches:
         return ChaoticZone(log_energy, np.ones_like(t))
-    nodes = [panel.evaluate(_X) for panel in _panels(scene)]
-    _, t_in, t_out, A, B, _ = (np.concatenate(rows) for rows in zip(*nodes, strict=True))
-    is_falling = t < t_in[-1]
-    capture = np.interp(t, t_in, A)
-    release = np.interp(t, t_out[::-1], (B[-1] - B)[::-1])
-    still = np.interp(t, t_out[::-1], A[::-1])
-    log_energy += n_before * (B[-1] - A[-1]) + np.where(is_falling, 0.0, release) - capture
-    return ChaoticZone(log_energy, np.exp(-np.where(is_falling, capture, still)))
+    known = []  # time, gain in the chaotic zone's log E but for its volume, A
+    for branch in branches:
+        _, t_in, t_out, A, B, _ = branch.evaluate(X)
+        known += [(t_in, branch.s_before - A, A), (t_out, branch.s_before + branch.s_below - B, A)]
+    rows: Floats = np.concatenate([np.array(row) for row in known], axis=1)
+    knots, gain, spent = rows[:, np.argsort(rows[0], kind="stable")]
+    log_energy += n_before * root.s_nc + np.interp(t, knots, gain)
+    return ChaoticZone(log_energy, np.exp(-np.interp(t, knots, spent)))
 
 
-class _FloatPanel(NamedTuple):
-    """Chebyshev coefficients over x in [0, 1] of nu, t_in, t_out, A, B and log g, and their end values."""
-
-    coefficients: Floats
-    ends: Floats
-
-    @property
-    def s(self) -> Floats:
-        A, B, log_g = self.coefficients[3:]
-        s: Floats = B - A - log_g
-        return s
-
-    def evaluate(self, x: Floats) -> Floats:
-        values: Floats = np.asarray(chebyshev.chebval(2 * x - 1, self.coefficients.T), dtype=np.float64)
-        for end in (0, 1):
-            values[:, x == end] = self.ends[:, [end]]
-        return values
-
-    def at(self, x: Floats) -> CaptureCurve:
-        nu, t_in, t_out, A, B, log_g = self.evaluate(x)
-        return CaptureCurve(nu, t_in, t_out, np.exp(-A), log_g, B - A - log_g)
-
-
-_X = np.linspace(0.0, 1.0, FINE + 1)
-
-
-def _panels(scene: Scene) -> list[_FloatPanel]:
-    found = captures(Cycle.of(scene, DIGITS), DIGITS + 4)
-    panels = []
-    for p in found.panels:
-        functions = (p.nu, p.t_in, p.t_out, p.A, p.B, p.log_g)
-        coefficients = [[float(c) for c in found.grid.coefficients(values)] for values in functions]
-        ends = [[float(values[0]), float(values[-1])] for values in functions]
-        panels.append(_FloatPanel(np.array(coefficients), np.array(ends)))
-    return panels
-
-
-def _masses(scene: Scene, edges: ArrayLike, what: str) -> Floats:
+def _increments(edges: ArrayLike, below: Callable[[Floats], Floats]) -> Floats:
     bounds = np.asarray(edges, dtype=np.float64)
     if bounds.ndim != 1 or bounds.size < 2 or not np.all(np.diff(bounds) > 0):
         raise BadInput("edges must be at least two rising numbers")
-    below = np.zeros_like(bounds)
-    for panel in _panels(scene):
-        fine = panel.at(_X)
-        variable: Floats = getattr(fine, what)
-        mass = fine.p_cha[:-1] - fine.p_cha[1:]
-        low = np.minimum(variable[:-1], variable[1:])
-        width = np.abs(np.diff(variable))
-        for i, edge in enumerate(bounds):
-            covered = np.divide(edge - low, width, out=(edge > low) * 1.0, where=width > 0)
-            below[i] += mass @ np.clip(covered, 0.0, 1.0)
-    return np.diff(below)
+    return np.diff(below(bounds))

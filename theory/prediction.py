@@ -1,8 +1,8 @@
 """What the adiabatic theory predicts for one cycle: the figures of secs. 3.5 and 4.
 
 Everything is computed at two or more resolutions; an answer is given when two in a row
-agree to two digits more than asked, and is then the finer of the two. Cycles with several
-intervals of capture are refused by `Cycle`.
+agree to two digits more than asked, and is then the finer of the two. Any cycle is covered, with
+several captures of one particle in it.
 """
 
 from __future__ import annotations
@@ -10,9 +10,16 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
-from scene.tables import Scene
+import msgspec
+
+from scene.laws import BangBang, Fourier, Law
+from scene.refusal import BadInput
+from scene.tables import Mushroom, Scene, laws
 from theory.adiabatic import Captures, NotConverged, captures
+from theory.constants import guarded
 from theory.cycle import GUARD, Cycle
+from theory.measure import logarithm
+from theory.volumes import as_mushroom
 
 
 class Prediction(NamedTuple):
@@ -33,6 +40,7 @@ class Prediction(NamedTuple):
     mean_exp_minus: Any
     mean_exp_plus: Any
 
+    @guarded
     def strings(self, digits: int) -> dict[str, str]:
         """Return each number in decimals, rounded to `digits` significant digits; zero is "0.0"."""
         return {
@@ -40,16 +48,18 @@ class Prediction(NamedTuple):
             for name, x in zip(self._fields, self, strict=True)
         }
 
+    @guarded
     def sd_of_mean(self, n_cycles: int) -> Any:
         """Return the standard deviation of (1/n) log E_n / E0, whose mean is m1, for independent cycles."""
         return self.sd / self.sd.context.sqrt(n_cycles)
 
 
+@guarded
 def predict(scene: Scene, digits: int = 15) -> Prediction:
     """Predict one cycle.
 
     Args:
-        scene: a valid mushroom with at most one interval of capture per period.
+        scene: a valid mushroom.
         digits: correct significant digits wanted, >= 1.
 
     Returns:
@@ -57,14 +67,15 @@ def predict(scene: Scene, digits: int = 15) -> Prediction:
 
     Raises:
         BadInput: digits < 1.
-        NotCovered: not a mushroom, or several intervals of capture.
+        NotCovered: not a mushroom.
         NotConverged: the digits were not reached.
 
     Source: Eq:ps, Eq:Erate, Eq:lnE/E0, Eq:lnEnc/E0.
     """
-    return Prediction(*_converged(scene, digits, _figures))
+    return Prediction(*converged(scene, digits, _figures))
 
 
+@guarded
 def mean_of(scene: Scene, f: Callable[[Any], Any], digits: int = 15) -> Any:
     """Return the mean of f(s), s = log E1 / E0, over one cycle.
 
@@ -76,7 +87,74 @@ def mean_of(scene: Scene, f: Callable[[Any], Any], digits: int = 15) -> Any:
     Raises:
         As `predict`.
     """
-    return _converged(scene, digits, lambda found: (found.mean(f),))[0]
+    return converged(scene, digits, lambda found: (found.mean(f),))[0]
+
+
+@guarded
+def moments(scene: Scene, order: int, digits: int = 15) -> tuple[Any, ...]:
+    """Return the means of s^k, s = log E1 / E0, for k = 0 ... order.
+
+    Args:
+        scene: as for `predict`.
+        order: highest power, >= 0.
+        digits: correct significant digits wanted.
+
+    Raises:
+        BadInput: order < 0.
+        Otherwise as `predict`.
+    """
+    if order < 0:
+        raise BadInput(f"order = {order}, must be >= 0")
+
+    def figures(found: Captures) -> tuple[Any, ...]:
+        ctx = found.cycle.ctx
+        return tuple(c * ctx.factorial(k) for k, c in enumerate(found.taylor(0, order)))
+
+    return converged(scene, digits, figures)
+
+
+@guarded
+def cumulants(scene: Scene, order: int, digits: int = 15, q: float = 0.0) -> tuple[Any, ...]:
+    """Return K(q) = log mean exp(q s) and its derivatives up to `order`.
+
+    At q = 0 they are the cumulants of s: 0, m1, sd^2, ... Over n independent cycles they add up. The
+    digits are those of mean exp(q s) and its derivatives: K(0) and K(-1) are 0 within 10^-digits.
+
+    Args:
+        scene: as for `predict`.
+        order: highest derivative, >= 0.
+        digits: correct significant digits wanted.
+        q: a binary64 number.
+
+    Raises:
+        BadInput: order < 0.
+        Otherwise as `predict`.
+    """
+    if order < 0:
+        raise BadInput(f"order = {order}, must be >= 0")
+
+    p = list(converged(scene, digits, lambda found: tuple(found.taylor(q, order))))
+    ctx = p[0].context
+    return tuple(c * ctx.factorial(k) for k, c in enumerate(logarithm(ctx, p)))
+
+
+def reversed_cycle(scene: Scene) -> Mushroom:
+    """Return the mushroom that runs the same loop backwards in time.
+
+    Raises:
+        NotCovered: not a mushroom.
+    """
+    mushroom = as_mushroom(scene)
+    backward = {name: _reversed(law) for name, law in laws(mushroom).items()}
+    return msgspec.structs.replace(mushroom, **backward)
+
+
+def _reversed(law: Law) -> Law:
+    if isinstance(law, Fourier):
+        return msgspec.structs.replace(law, sin=tuple(-s for s in law.sin))
+    if isinstance(law, BangBang):
+        return BangBang(knots=tuple((-t, v) for t, v in reversed(law.knots)))
+    return law
 
 
 def _figures(found: Captures) -> tuple[Any, ...]:
@@ -92,14 +170,25 @@ def _figures(found: Captures) -> tuple[Any, ...]:
     )
 
 
-def _converged(scene: Scene, digits: int, figures: Callable[[Captures], tuple[Any, ...]]) -> tuple[Any, ...]:
+def converged(scene: Scene, digits: int, figures: Callable[[Captures], tuple[Any, ...]]) -> tuple[Any, ...]:
+    """Return figures of a cycle once two resolutions in a row agree on them to the digits asked.
+
+    Raises:
+        NotConverged: they do not, as far as the resolution may rise.
+    """
     cycle = Cycle.of(scene, digits)
     ctx = cycle.ctx
     noise, agreement = ctx.mpf(10) ** -(digits + GUARD - 10), ctx.mpf(10) ** -(digits + 2)
-    previous: tuple[Any, ...] = ()
+    previous: tuple[Any, ...] | None = None
     for target in range(digits + 4, digits + GUARD - 8, 12):
         current = tuple(ctx.zero if abs(x) < noise else x for x in figures(captures(cycle, target)))
-        if previous and all(abs(x - y) <= agreement * abs(x) for x, y in zip(current, previous, strict=True)):
+        if previous is not None and _agree(current, previous, agreement):
             return current
         previous = current
     raise NotConverged(f"two resolutions in a row do not agree to {digits} digits")
+
+
+def _agree(current: tuple[Any, ...], previous: tuple[Any, ...], agreement: Any) -> bool:
+    if len(current) != len(previous):
+        return False
+    return all(abs(x - y) <= agreement * abs(x) for x, y in zip(current, previous, strict=True))

@@ -1,0 +1,104 @@
+"""What finite energy adds: widths, biases, fits over energy (theory/equations.md)."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from scene import Fourier, Mushroom, load
+from theory import cumulants, predict
+from theory.finite_energy import bias, extrapolate, fit_power, peak_width, unbiased_mean
+
+
+def diffused(n: int, energy: float, seed: int) -> tuple[np.ndarray, float]:
+    """Draw s of a chaotic cycle from dE = D'(E) dt + sqrt(2 D) dW, D = E^(3/2) / 4: it keeps the measure dE.
+
+    Returns s and its width for a small time, (2 D / E^2)^(1/2).
+    """
+    rng = np.random.Generator(np.random.Philox(seed))
+    e, n_steps = np.full(n, energy), 200
+    for _ in range(n_steps):
+        e = e + 0.375 * np.sqrt(e) / n_steps + np.sqrt(e**1.5 / 2 / n_steps) * rng.standard_normal(n)
+    return np.log(e / energy), float(energy**-0.25 / math.sqrt(2))
+
+
+def test_a_diffusion_that_keeps_phase_volume_drifts_by_a_quarter_of_its_variance() -> None:
+    s, sigma = diffused(40_000, 1e4, 3)
+    found = peak_width(s)
+    assert found.sigma == pytest.approx(sigma, abs=4 * found.error + 2e-4)
+    error = sigma / math.sqrt(s.size)
+    drift = bias(load("ergodic"), found.sigma)
+    assert drift.mean_s == (drift.log_e_nc, drift.log_e_nc) == (found.sigma**2 / 4,) * 2
+    assert abs(s.mean() - drift.log_e_nc) < 4 * error
+    assert abs(np.exp(-s / 2).mean() - 1) < 4 * error / 2
+    # A half, or none, would be seen; and exp(-s) has a bias where exp(-s / 2) has none.
+    assert abs(s.mean() - found.sigma**2 / 2) > 3 * error
+    assert abs(s.mean()) > 3 * error
+
+
+def test_the_share_of_diffusion_is_bounded_by_who_is_in_the_chaotic_zone() -> None:
+    found, p_nc = bias(load("moving-cap"), 0.2), float(predict(load("moving-cap"), 6).p_nc)
+    assert found.log_e_nc == pytest.approx(0.01)
+    assert found.mean_s == pytest.approx((0.01 * p_nc, 0.01))
+    assert found.unknown == pytest.approx(0.04)
+    twice = Mushroom(
+        r=Fourier(mean=1.0, omega=1.0, sin=(0.5,)), h=1.0, nu=Fourier(mean=0.5, omega=1.0, cos=(0.125, 0.25))
+    )
+    low, high = bias(twice, 0.2).mean_s
+    assert 0.01 * float(predict(twice, 4).p_nc) < low < high
+    assert high >= 0.01
+
+
+def test_the_unbiased_mean_is_the_generating_function_at_minus_a_half() -> None:
+    k = cumulants(load("moving-cap"), 0, 8, q=-0.5)[0]
+    found = float(unbiased_mean(load("moving-cap"), 8))
+    assert found == pytest.approx(math.exp(float(k)), rel=1e-8)
+    assert found < 1
+    assert unbiased_mean(load("ergodic")) == 1
+
+
+def test_a_power_law_and_a_limit_are_recovered_within_their_errors() -> None:
+    rng = np.random.Generator(np.random.Philox(11))
+    energies = np.logspace(4, 9, 6)
+    pulls = []
+    for _ in range(400):
+        errors = 0.01 * energies**-0.25
+        law = fit_power(energies, 1.9 * energies**-0.25 + errors * rng.standard_normal(6), errors)
+        end = extrapolate(
+            energies, 0.12 + 0.8 * energies**-0.5 + 1e-4 * rng.standard_normal(6), np.full(6, 1e-4)
+        )
+        pulls.append(
+            [
+                (law.exponent + 0.25) / law.exponent_error,
+                (law.coefficient - 1.9) / law.coefficient_error,
+                (end.limit - 0.12) / end.limit_error,
+                (end.slope - 0.8) / end.slope_error,
+            ]
+        )
+        assert law.chi_square == pytest.approx(float(law.residuals @ law.residuals))
+    assert np.all(np.abs(np.mean(pulls, axis=0)) < 4 / 20)
+    np.testing.assert_allclose(np.std(pulls, axis=0), 1, atol=0.15)
+
+
+def test_a_wrong_exponent_shows_in_the_residuals() -> None:
+    energies = np.logspace(4, 9, 6)
+    law = fit_power(energies, 1.9 * energies**0.25, 0.01 * energies**0.25)  # as sec. 4.1 prints it
+    assert abs(law.exponent + 0.25) > 10 * law.exponent_error
+    assert extrapolate(energies, 0.1 + energies**-0.25, np.full(6, 1e-4)).chi_square > 1000
+
+
+def test_bad_data_is_named() -> None:
+    with pytest.raises(ValueError, match="at least 4 finite energies"):
+        peak_width([0.0, 1.0, float("nan"), 2.0])
+    with pytest.raises(ValueError, match=r"sigma_w = -1\.0, must be finite and >= 0"):
+        bias(load("ergodic"), -1.0)
+    with pytest.raises(ValueError, match="two different x"):
+        fit_power([1.0, 1.0], [1.0, 2.0], [1.0, 1.0])
+    with pytest.raises(ValueError, match="a power law needs y > 0"):
+        fit_power([1.0, 2.0], [1.0, -2.0], [1.0, 1.0])
+    with pytest.raises(ValueError, match="errors must be positive"):
+        extrapolate([1.0, 2.0], [1.0, 2.0], [1.0, 0.0])
+    with pytest.raises(ValueError, match=r"exponent = 0\.5, must be < 0"):
+        extrapolate([1.0, 2.0], [1.0, 2.0], [1.0, 1.0], 0.5)

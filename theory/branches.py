@@ -1,0 +1,201 @@
+"""The panels of a solution in binary64: functions of place along each panel, inverted in whole arrays.
+
+A panel's functions are Chebyshev series in x on [0, 1] from a 15-digit solution, right to about 1e-14. Where
+s(x) turns, found among FINE samples, the panel is cut into monotone stretches; each level is then met by
+bisection, so probabilities below a level are exact to rounding, caustics included (a level within d of a
+caustic costs sqrt(d), the conditioning of the question). Two turns within a FINE-th of a panel are
+not told apart; s varies by about FINE^-3 between them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+from numpy.polynomial import chebyshev
+from numpy.typing import NDArray
+
+from scene.tables import Scene
+from theory.adiabatic import Captures, Window, captures
+from theory.constants import guarded
+from theory.cycle import Cycle
+
+Floats = NDArray[np.float64]
+
+DIGITS = 15
+FINE = 2048  # samples of a panel; interpolation between them is right to the inverse square, 2e-7
+X = np.linspace(0.0, 1.0, FINE + 1)
+BISECTIONS = 52
+
+
+class Branch(NamedTuple):
+    """One panel.
+
+    coefficients: Chebyshev series in 2 x - 1 of nu, t_in, t_out, A, B, log g, shape (6, n).
+    ends: their values at x = 0 and 1, shape (6, 2).
+    s_before, s_after, absorbed, s_below: as in `theory.adiabatic.Placed`.
+    """
+
+    coefficients: Floats
+    ends: Floats
+    s_before: float
+    s_after: float
+    absorbed: float
+    s_below: float
+
+    @property
+    def s(self) -> Floats:
+        """Series of log E1 / E0 of a particle captured here and nowhere else (Eq:lnE/E0)."""
+        A, B, log_g = self.coefficients[3:]
+        s: Floats = np.asarray(B - A - log_g)
+        s[0] += self.s_before + self.s_after
+        return s
+
+    @property
+    def t_in(self) -> Floats:
+        """Series of the capture time."""
+        t_in: Floats = self.coefficients[1]
+        return t_in
+
+    @property
+    def scale(self) -> float:
+        """Size of the numbers s is the difference of."""
+        return float(np.abs(self.coefficients[3:]).max())
+
+    def evaluate(self, x: Floats) -> Floats:
+        """Return nu, t_in, t_out, A, B, log g at x in [0, 1], exact at the ends; shape (6, len(x))."""
+        values: Floats = np.asarray(chebyshev.chebval(2 * x - 1, self.coefficients.T), dtype=np.float64)
+        for end in (0, 1):
+            values[:, x == end] = self.ends[:, [end]]
+        return values
+
+    def chaotic(self, x: Floats) -> Floats:
+        """Return the probability of being in the chaotic zone at x (Eq:ps)."""
+        p: Floats = np.exp(-self.evaluate(x)[3])
+        return p
+
+    def below(self, series: Floats, levels: Floats) -> Floats:
+        """Return the probability of being captured here with the series' value <= each level."""
+        total = np.zeros_like(levels)
+        bounds = turns(series, self.scale)
+        p = self.chaotic(bounds)
+        values = at(series, bounds)
+        for i in range(len(bounds) - 1):
+            is_rising = values[i + 1] > values[i]
+            u = crossing(series, bounds[i], bounds[i + 1], levels)
+            # A level met at no inner point has its bound: p there is what the ends have, to the bit.
+            here = np.where(u == bounds[i], p[i], np.where(u == bounds[i + 1], p[i + 1], self.chaotic(u)))
+            total += p[i] - here if is_rising else here - p[i + 1]
+        return total
+
+
+def at(series: Floats, x: Floats) -> Floats:
+    """Evaluate a Chebyshev series in 2 x - 1."""
+    return np.asarray(chebyshev.chebval(2 * x - 1, series), dtype=np.float64)
+
+
+def turns(series: Floats, scale: float = 0.0) -> Floats:
+    """Return 0, the places in (0, 1) at which the series turns, and 1.
+
+    Args:
+        series: Chebyshev coefficients.
+        scale: size of the numbers the series was computed from, whose rounding is no turn.
+    """
+    values = at(series, X)
+    noise = 64 * np.finfo(float).eps * max(scale, np.max(np.abs(series)))
+    slopes = np.where(np.abs(np.diff(values)) > noise, np.sign(np.diff(values)), 0)
+    told = np.flatnonzero(slopes)
+    rate = chebyshev.chebder(series)
+    found = [0.0]
+    for i, j in pairwise(told):
+        if slopes[i] != slopes[j]:
+            place = crossing(-slopes[i] * rate, X[i], X[j + 1], np.zeros(1))
+            found.append(float(place[0]))
+    return np.array([*found, 1.0])
+
+
+def crossing(series: Floats, start: float, stop: float, levels: Floats) -> Floats:
+    """Return where a series, monotone from start to stop, meets each level; the nearer end when nowhere."""
+    first, last = at(series, np.array([start, stop]))
+    sign = 1.0 if last > first else -1.0
+    u = np.where(sign * (levels - first) <= 0, start, stop)
+    inner = (sign * (levels - first) > 0) & (sign * (last - levels) > 0)
+    low, high = np.full(inner.sum(), start), np.full(inner.sum(), stop)
+    for _ in range(BISECTIONS):
+        middle = (low + high) / 2
+        is_below = sign * (at(series, middle) - levels[inner]) < 0
+        low, high = np.where(is_below, middle, low), np.where(is_below, high, middle)
+    u[inner] = (low + high) / 2
+    return u
+
+
+class Node(NamedTuple):
+    """A valley as numbers: its captured particles as weighted points, and what passing it uncaptured does.
+
+    weights, s: captured on the valley's own panels, from its top.
+    branches: the same particles as functions of place.
+    p_top: probability of being in the chaotic zone at its top.
+    passed, gain: probability of not being captured on its own panels, and the gain in log E of that.
+    """
+
+    weights: Floats
+    s: Floats
+    branches: tuple[Branch, ...]
+    children: tuple[Node, ...]
+    p_top: float
+    passed: float
+    gain: float
+
+    def all_branches(self) -> Iterator[Branch]:
+        """Yield all panels, a valley's own before its children's."""
+        yield from self.branches
+        for child in self.children:
+            yield from child.all_branches()
+
+    @property
+    def p_nc(self) -> float:
+        """Probability of passing the whole valley uncaptured (Eq:ps)."""
+        return self.passed * float(np.prod([child.p_nc for child in self.children]))
+
+    @property
+    def s_nc(self) -> float:
+        """Gain in log E of passing it uncaptured (Eq:lnEnc/E0)."""
+        return self.gain + sum(child.s_nc for child in self.children)
+
+
+@guarded
+def tree(scene: Scene) -> Node:
+    """Solve a cycle to 15 digits and bring it to binary64.
+
+    Raises:
+        NotCovered, NotConverged: as `theory.predict`.
+    """
+    found = captures(Cycle.of(scene, DIGITS), DIGITS + 4)
+    return _node(found, found.root, iter([_branch(found, k) for k in range(len(found.placed))]))
+
+
+def _branch(found: Captures, k: int) -> Branch:
+    placed = found.placed[k]
+    p = placed.panel
+    functions = (p.nu, p.t_in, p.t_out, p.A, p.B, p.log_g)
+    coefficients = [[float(c) for c in found.grid.coefficients(values)] for values in functions]
+    ends = [[float(values[0]), float(values[-1])] for values in functions]
+    return Branch(np.array(coefficients), np.array(ends), *(float(x) for x in placed[1:]))
+
+
+def _node(found: Captures, window: Window, branches: Iterator[Branch]) -> Node:
+    own = tuple(next(branches) for _ in window.panels)
+    points = [(float(w), float(s)) for w, s in found.captured(window)]
+    weights, s = np.array(points).T if points else (np.empty(0), np.empty(0))
+    spent, ctx = window.A_end - window.A_top, found.cycle.ctx
+    return Node(
+        weights,
+        s,
+        own,
+        tuple(_node(found, child, branches) for child in window.children),
+        float(ctx.exp(-window.A_top)),
+        float(ctx.exp(-spent)),
+        float(window.B_end - window.B_top - spent),
+    )

@@ -1,0 +1,259 @@
+"""Densities of s = log E1 / E0 and of capture time at any precision, the caustics included.
+
+A particle captured at place x of a panel has s(x), so the density at a value is the sum of
+|d p_cha / ds| over the places that reach it. Where ds / dt_in = 0 the density is infinite as
+strength / sqrt(|s - s_c|) on one side: a caustic. Distribution functions stay finite. Roots are found in
+the Chebyshev panels by Newton's method, between turning points seen in `theory.branches`. Densities of s in
+cycles with several captures of one particle are convolutions and are refused here: `theory.distribution`
+has their distribution function in binary64.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from itertools import pairwise
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from scene.tables import Scene
+from theory.adiabatic import Captures, Placed
+from theory.branches import turns
+from theory.constants import guarded
+from theory.critical import solve_rising
+from theory.prediction import converged
+from theory.volumes import NotCovered, delta_slope
+
+
+class Caustic(NamedTuple):
+    """A turning point of s(t_in), where the density of s is infinite.
+
+    t_in: capture time [time].
+    s: log E1 / E0 there.
+    strength: the density is strength / sqrt(|s' - s|) near it, on the side where the other energies are.
+    is_largest: s is a local maximum.
+    """
+
+    t_in: Any
+    s: Any
+    strength: Any
+    is_largest: bool
+
+
+class Series:
+    """A Chebyshev series over [0, 1] in one number system."""
+
+    def __init__(self, ctx: Any, coefficients: list[Any]) -> None:
+        self.ctx, self.coefficients = ctx, coefficients
+
+    def __call__(self, x: Any) -> Any:
+        """Return the value at x (Clenshaw)."""
+        y, later, now = 2 * x - 1, self.ctx.zero, self.ctx.zero
+        for c in reversed(self.coefficients[1:]):
+            later, now = now, 2 * y * now - later + c
+        return y * now - later + self.coefficients[0]
+
+    def rate(self) -> Series:
+        """Return the derivative."""
+        c = self.coefficients
+        found = [self.ctx.zero] * (len(c) + 1)
+        for k in range(len(c) - 1, 0, -1):
+            found[k - 1] = found[k + 1] + 4 * k * c[k]  # 2 k, and 2 for the length of [0, 1]
+        found[0] /= 2
+        return Series(self.ctx, found[: max(len(c) - 1, 1)])
+
+
+class _Panel:
+    """One panel's s, A and times as series."""
+
+    def __init__(self, found: Captures, placed: Placed) -> None:
+        self.ctx = found.cycle.ctx
+
+        def series(values: list[Any]) -> Series:
+            return Series(self.ctx, found.grid.coefficients(values))
+
+        self.s, self.A, self.t_in = series(placed.s), series(placed.panel.A), series(placed.panel.t_in)
+        self.ends = (placed.s[0], placed.s[-1])
+        self.A_rate, self.s_rate = series(placed.panel.rate), self.s.rate()
+        self.s_bend = self.s_rate.rate()
+
+    def turns(self) -> list[Any]:
+        """Return 0, the turning points of s, and 1."""
+        rough = turns(np.array([float(c) for c in self.s.coefficients]))
+        found = [self.ctx.zero]
+        for place in rough[1:-1]:
+            near = self.ctx.mpf(float(place))
+            sign = 1 if self.s_bend(near) > 0 else -1
+
+            def rising(x: Any, sign: int = sign) -> tuple[Any, Any]:
+                return sign * self.s_rate(x), sign * self.s_bend(x)
+
+            reach = self.ctx.mpf(2) ** -12
+            found.append(solve_rising(self.ctx, rising, max(near - reach, 0), min(near + reach, 1), near))
+        return [*found, self.ctx.one]
+
+    def stretches(self) -> Iterator[tuple[Any, Any, Any, Any]]:
+        """Yield monotone stretches: start, stop and s at each."""
+        places = self.turns()
+        values = [self.ends[0], *(self.s(x) for x in places[1:-1]), self.ends[1]]
+        for (a, s_a), (b, s_b) in pairwise(zip(places, values, strict=True)):
+            yield a, b, s_a, s_b
+
+    def root(self, a: Any, b: Any, is_rising: bool, s: Any) -> Any:
+        sign = 1 if is_rising else -1
+
+        def rising(x: Any) -> tuple[Any, Any]:
+            return sign * (self.s(x) - s), sign * self.s_rate(x)
+
+        return solve_rising(self.ctx, rising, a, b)
+
+    def flow(self, x: Any) -> Any:
+        """Return the probability captured per unit of x."""
+        return self.ctx.exp(-self.A(x)) * self.A_rate(x)
+
+
+def _panels(found: Captures) -> list[_Panel]:
+    if not found.is_single:
+        raise NotCovered("densities are of cycles in which a particle is captured at most once")
+    ctx = found.cycle.ctx
+    size = max((abs(s) for placed in found.placed for s in placed.s), default=ctx.one)
+    if size < ctx.mpf(10) ** -found.target:
+        raise NotCovered("densities are of cycles in which energies change")
+    return [_Panel(found, placed) for placed in found.placed]
+
+
+@guarded
+def density_at(scene: Scene, s: Sequence[Any], digits: int = 15) -> tuple[Any, ...]:
+    """Return the density of log E1 / E0 of the captured particles at each s; the rest is an atom.
+
+    Args:
+        scene: a valid mushroom in which a particle is captured at most once per cycle.
+        s: floats, mpf or decimal strings.
+        digits: correct significant digits wanted.
+
+    Raises:
+        NotCovered: not a mushroom, or several captures of one particle.
+        NotConverged: the digits were not reached, as within rounding of a caustic.
+
+    Source: Eq:lnE/E0 with Eq:ps.
+    """
+
+    def figures(found: Captures) -> tuple[Any, ...]:
+        stretches = [(panel, row) for panel in _panels(found) for row in panel.stretches()]
+
+        def density(level: Any) -> Any:
+            total = found.cycle.ctx.zero
+            for panel, (a, b, s_a, s_b) in stretches:
+                if min(s_a, s_b) < level < max(s_a, s_b):
+                    x = panel.root(a, b, bool(s_a < s_b), level)
+                    total += panel.flow(x) / abs(panel.s_rate(x))
+            return total
+
+        return tuple(density(found.cycle.ctx.mpf(level)) for level in s)
+
+    return converged(scene, digits, figures)
+
+
+@guarded
+def cdf_at(scene: Scene, s: Sequence[Any], digits: int = 15) -> tuple[Any, ...]:
+    """Return the probability of log E1 / E0 <= each s, the uncaptured included.
+
+    Args:
+        scene: as for `density_at`.
+        s: floats, mpf or decimal strings.
+        digits: correct significant digits wanted.
+
+    Raises:
+        As `density_at`.
+
+    Source: Eq:lnE/E0 with Eq:ps.
+    """
+
+    def figures(found: Captures) -> tuple[Any, ...]:
+        ctx = found.cycle.ctx
+        stretches = [(panel, row) for panel in _panels(found) for row in panel.stretches()]
+
+        def probability(level: Any) -> Any:
+            total = found.p_not_captured if found.s_not_captured <= level else ctx.zero
+            for panel, (a, b, s_a, s_b) in stretches:
+                if level < min(s_a, s_b):
+                    continue
+                start, stop = a, b
+                if level < max(s_a, s_b):
+                    x = panel.root(a, b, bool(s_a < s_b), level)
+                    start, stop = (a, x) if s_a < s_b else (x, b)
+                total += ctx.exp(-panel.A(start)) - ctx.exp(-panel.A(stop))
+            return total
+
+        return tuple(probability(ctx.mpf(level)) for level in s)
+
+    return converged(scene, digits, figures)
+
+
+@guarded
+def caustics(scene: Scene, digits: int = 15) -> list[Caustic]:
+    """Return the caustics of the density of s in order of capture time.
+
+    Args:
+        scene: as for `density_at`.
+        digits: correct significant digits wanted.
+
+    Raises:
+        As `density_at`.
+    """
+
+    def figures(found: Captures) -> tuple[Any, ...]:
+        rows = []
+        for panel in _panels(found):
+            for x in panel.turns()[1:-1]:
+                bend = panel.s_bend(x)
+                strength = panel.flow(x) * found.cycle.ctx.sqrt(2 / abs(bend))
+                rows += [panel.t_in(x), panel.s(x), strength, found.cycle.ctx.sign(bend)]
+        return tuple(rows)
+
+    flat = converged(scene, digits, figures)
+    rows = [flat[i : i + 4] for i in range(0, len(flat), 4)]
+    return [Caustic(t_in, s, strength, bool(bend < 0)) for t_in, s, strength, bend in rows]
+
+
+@guarded
+def capture_rate_at(scene: Scene, t: Sequence[Any], digits: int = 15) -> tuple[Any, ...]:
+    """Return the density of capture times at each t [1/time], 0 where nothing is captured; any cycle.
+
+    Args:
+        scene: a valid mushroom.
+        t: times, floats, mpf or decimal strings, taken into the cycle.
+        digits: correct significant digits wanted.
+
+    Raises:
+        NotCovered: not a mushroom.
+        NotConverged: the digits were not reached.
+
+    Source: Eq:dps/ps.
+    """
+
+    def figures(found: Captures) -> tuple[Any, ...]:
+        return tuple(_rate(found, found.cycle.ctx.mpf(time)) for time in t)
+
+    return converged(scene, digits, figures)
+
+
+def _rate(found: Captures, time: Any) -> Any:
+    cycle, ctx = found.cycle, found.cycle.ctx
+    if cycle.period is not None:
+        time -= ctx.floor((time - cycle.start) / cycle.period) * cycle.period
+    for piece in cycle.pieces:
+        if piece.capture.upper <= time <= piece.capture.lower:
+            nu, rate = piece.capture.motion.nu(time)
+            now = piece.capture.motion.volumes(time, nu)
+            return ctx.exp(-_spent(found, time)) * now.v_cap / now.v_cha * delta_slope(ctx, nu) * rate
+    return ctx.zero
+
+
+def _spent(found: Captures, time: Any) -> Any:
+    """Return A at a time of capture."""
+    ctx = found.cycle.ctx
+    panel = next(p.panel for p in found.placed if p.panel.t_in[0] <= time <= p.panel.t_in[-1])
+    t_in, A = (Series(ctx, found.grid.coefficients(v)) for v in (panel.t_in, panel.A))
+    rate = t_in.rate()
+    return A(solve_rising(ctx, lambda x: (t_in(x) - time, rate(x)), ctx.zero, ctx.one))

@@ -1,0 +1,213 @@
+"""What finite energy adds to the adiabatic theory: widths, biases, and fits over energy.
+
+At finite speed v the chaotic zone's log E diffuses: some v T collisions, each off by u / v, give the
+peak of the uncaptured a variance sigma_w^2 ~ 1 / v, so a width ~ E0^(-1/4). Phase volume is preserved
+(the density of states of a plane billiard does not depend on E), and that alone ties a drift of
+log E to it, a quarter of the variance. theory/equations.md derives what follows from this and says
+where the argument is heuristic. Nothing here knows sigma_w: it is measured.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from scene.refusal import BadInput
+from scene.tables import Scene
+from theory.branches import Floats, Node
+from theory.distribution import Energies, energies
+from theory.prediction import mean_of
+
+
+class Width(NamedTuple):
+    """Standard deviation of a peak and its standard error, from the sample's own fourth moment."""
+
+    sigma: float
+    error: float
+
+
+class Bias(NamedTuple):
+    """What sigma_w adds to the theory of one cycle.
+
+    mean_s: least and largest bias of the mean of s through diffusion, of order sigma_w^2.
+    log_e_nc: bias of the mean of s over the uncaptured through diffusion, sigma_w^2 / 4.
+    unknown: the order, 1 / v, of what volumes do not tell (delayed capture, correlation of capture
+        with gain, skewness between mean and median): sigma_w^2 times a number of order 1. It is the
+        whole bias of p_nc, which energy does not enter.
+    """
+
+    mean_s: tuple[float, float]
+    log_e_nc: float
+    unknown: float
+
+
+class PowerFit(NamedTuple):
+    """y = coefficient x^exponent, fitted to log y.
+
+    exponent, exponent_error: with the standard errors of the data.
+    coefficient, coefficient_error: value at x = 1 and the error of its logarithm times it.
+    residuals: (log y - fit) in standard errors, in the order of the data.
+    chi_square: their sum of squares, for len(y) - 2 degrees of freedom.
+    """
+
+    exponent: float
+    exponent_error: float
+    coefficient: float
+    coefficient_error: float
+    residuals: Floats
+    chi_square: float
+
+
+class Limit(NamedTuple):
+    """y = limit + slope x^exponent.
+
+    limit, limit_error: the value as x -> infinity (exponent < 0).
+    slope, slope_error: of the finite-energy term.
+    residuals: (y - fit) in standard errors.
+    chi_square: their sum of squares, for len(y) - 2 degrees of freedom.
+    """
+
+    limit: float
+    limit_error: float
+    slope: float
+    slope_error: float
+    residuals: Floats
+    chi_square: float
+
+
+def peak_width(s: ArrayLike) -> Width:
+    """Return sigma_w of the uncaptured peak.
+
+    Args:
+        s: log E1 / E0 of the particles never captured, at least 4.
+
+    Raises:
+        BadInput: too few particles, or one that is not finite.
+    """
+    values = np.asarray(s, dtype=np.float64).ravel()
+    if values.size < 4 or not np.all(np.isfinite(values)):
+        raise BadInput("a width needs at least 4 finite energies")
+    centred = values - values.mean()
+    variance = float(np.mean(centred**2))
+    spread = float(np.mean(centred**4)) - variance**2
+    sigma = float(np.sqrt(variance * values.size / (values.size - 1)))
+    error = np.sqrt(max(spread, 0.0) / values.size) / (2 * sigma) if sigma else 0.0
+    return Width(sigma, float(error))
+
+
+def bias(found: Energies | Scene, sigma_w: float) -> Bias:
+    """Return what a measured width of the uncaptured peak adds to the theory of one cycle.
+
+    Args:
+        found: from `theory.energies`, or a scene to solve.
+        sigma_w: width at the initial energy in question, >= 0, see `peak_width`.
+
+    Raises:
+        BadInput: sigma_w is negative or not finite.
+        NotCovered, NotConverged: as `theory.predict`.
+
+    Source: none in the paper, which has the width alone (sec. 4.1); see theory/equations.md.
+    """
+    if not (np.isfinite(sigma_w) and sigma_w >= 0):
+        raise BadInput(f"sigma_w = {sigma_w}, must be finite and >= 0")
+    drift = sigma_w**2 / 4
+    lowest, highest, _ = _diffusing(energies(found).root)
+    return Bias((lowest * drift, highest * drift), drift, sigma_w**2)
+
+
+def _diffusing(node: Node) -> tuple[float, float, float]:
+    """Bound the ensemble's share of diffusion while nu is in a valley; give it also at the valley's end.
+
+    The share at a time is the mean over particles of [in the chaotic zone] (E / E_nc)^(-1/2), E_nc
+    the energy of the uncaptured, for diffusion goes as E^(-1/2). It is 1 at the valley's top, falls with
+    p_cha and rises as particles return, so its extremes are where nu turns.
+    """
+    now, lowest, highest = node.passed, node.passed, 1.0
+    for child in node.children:
+        low, high, end = _diffusing(child)
+        lowest, highest = min(lowest, now * low), max(highest, now * high)
+        now *= end
+    returned = float(node.weights @ np.exp(-(node.s - node.s_nc) / 2))
+    return lowest, max(highest, now + returned), now + returned
+
+
+def unbiased_mean(scene: Scene, digits: int = 15) -> Any:
+    """Return the mean of exp(-s / 2), which finite energy leaves unbiased to the order E0^(-1/2).
+
+    Args:
+        scene: a valid mushroom.
+        digits: correct significant digits wanted.
+
+    Returns:
+        An mpf below 1, or 1 when energies do not change.
+
+    Raises:
+        NotCovered, NotConverged: as `theory.predict`.
+    """
+    return mean_of(scene, lambda s: s.context.exp(-s / 2), digits)
+
+
+def fit_power(x: ArrayLike, y: ArrayLike, errors: ArrayLike) -> PowerFit:
+    """Fit a power law; for the width against the energy the theory's exponent is -1/4.
+
+    Args:
+        x: shape (n,), positive, n >= 2 with two different.
+        y: shape (n,), positive.
+        errors: standard errors of y, positive.
+
+    Raises:
+        BadInput: the shapes differ or a number is out of bounds.
+    """
+    x_, y_, errors_ = _data(x, y, errors)
+    if not np.all(y_ > 0):
+        raise BadInput("a power law needs y > 0")
+    (level, slope), (level_error, slope_error), residuals = _line(np.log(x_), np.log(y_), errors_ / y_)
+    coefficient = float(np.exp(level))
+    return PowerFit(
+        slope, slope_error, coefficient, coefficient * level_error, residuals, float(residuals @ residuals)
+    )
+
+
+def extrapolate(x: ArrayLike, y: ArrayLike, errors: ArrayLike, exponent: float = -0.5) -> Limit:
+    """Extrapolate a measured quantity to infinite energy.
+
+    Args:
+        x: energies, shape (n,), positive, n >= 2 with two different.
+        y: the quantity (mean of s, share not captured, ...), shape (n,).
+        errors: standard errors of y, positive.
+        exponent: of the finite-energy term: -1/2 for everything of order sigma_w^2.
+
+    Raises:
+        BadInput: the shapes differ, a number is out of bounds or exponent is not < 0.
+    """
+    x_, y_, errors_ = _data(x, y, errors)
+    if not exponent < 0:
+        raise BadInput(f"exponent = {exponent}, must be < 0")
+    (limit, slope), (limit_error, slope_error), residuals = _line(x_**exponent, y_, errors_)
+    return Limit(limit, limit_error, slope, slope_error, residuals, float(residuals @ residuals))
+
+
+def _data(x: ArrayLike, y: ArrayLike, errors: ArrayLike) -> tuple[Floats, Floats, Floats]:
+    columns = tuple(np.asarray(column, dtype=np.float64) for column in (x, y, errors))
+    x_, y_, errors_ = columns
+    if x_.ndim != 1 or not x_.shape == y_.shape == errors_.shape or np.unique(x_).size < 2:
+        raise BadInput("x, y and errors must be of one length, with at least two different x")
+    if not (
+        all(np.all(np.isfinite(column)) for column in columns) and np.all(x_ > 0) and np.all(errors_ > 0)
+    ):
+        raise BadInput("x and errors must be positive, and all numbers finite")
+    return x_, y_, errors_
+
+
+def _line(x: Floats, y: Floats, errors: Floats) -> tuple[tuple[float, float], tuple[float, float], Floats]:
+    """Fit y = level + slope x by least squares; return both, their standard errors and the residuals."""
+    weights = errors**-2
+    centre = weights @ x / weights.sum()
+    spread = weights @ (x - centre) ** 2
+    slope = float(weights @ ((x - centre) * y) / spread)
+    mean = weights @ y / weights.sum()
+    level = float(mean - slope * centre)
+    level_error = float(np.sqrt(1 / weights.sum() + centre**2 / spread))
+    return (level, slope), (level_error, float(spread**-0.5)), (y - level - slope * x) / errors

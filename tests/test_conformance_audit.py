@@ -51,13 +51,17 @@ def draw_ensemble(scene, *, n_particles, energy, seed, threads=None, progress=No
     final = energy * np.exp(s)
     if progress:
         progress(n_particles)
-    zeros = np.zeros(n_particles)
-    return fast.Ensemble(
-        energy0=energy, energy=final, cycle_energies=final[:, None],
-        t=zeros, x=zeros, y=zeros, vx=zeros, vy=zeros,
-        n_collisions=np.full(n_particles, 100), outcome=np.zeros(n_particles, np.int8),
-        t_in=t_in[:, None], t_out=t_out[:, None], seconds=1.0, threads=1,
-    )  # fmt: skip
+    fields = {
+        "energy0": energy, "energy": final, "cycle_energies": final[:, None],
+        **dict.fromkeys(("t", "x", "y", "vx", "vy"), np.zeros(n_particles)),
+        "n_collisions": np.full(n_particles, 100), "outcome": np.zeros(n_particles, np.int8),
+        "t_in": t_in[:, None], "t_out": t_out[:, None],
+        "wall_counts": np.full((n_particles, 5), 20), "n_careful": np.zeros(n_particles, np.int64),
+        "phase_energies": np.empty((n_particles, 1, 0)),
+        "phase_captured": np.empty((n_particles, 1, 0), bool),
+        "seconds": 1.0, "threads": 1,
+    }  # fmt: skip
+    return fast.Ensemble(**{name: fields[name] for name in fast.Ensemble._fields})
 
 
 @pytest.fixture(scope="module")

@@ -1,6 +1,7 @@
 """`python -m reference`: serve the reference stepper through protocol 1."""
 
 import sys
+import time
 
 from reference import stepper
 from scene import Outcome, Scene, State
@@ -24,5 +25,15 @@ def follow(scene: Scene, state: State, n_collisions: int, t_end: float) -> list[
     return [rounded(outcome) for outcome in found]
 
 
+def clock(scene: Scene, state: State, n_collisions: int, repeat: int) -> tuple[list[int], Outcome]:
+    """Return the nanoseconds that a proved trajectory took, `repeat` times over, and its last outcome."""
+    ns = []
+    for _ in range(repeat):
+        begin = time.perf_counter_ns()
+        path = stepper.trajectory(scene, state, n_collisions)
+        ns.append(time.perf_counter_ns() - begin)
+    return ns, rounded(path.outcome if path.outcome is not None else path.steps[-1])
+
+
 if __name__ == "__main__":
-    serve("reference", step, follow, sys.stdin.buffer, sys.stdout.buffer)
+    serve("reference", step, follow, sys.stdin.buffer, sys.stdout.buffer, timer=clock)

@@ -1,69 +1,47 @@
 """Protocol 1, the side of an implementation: one JSON object a line on stdin and stdout.
 
-`serve` answers `start`, `echo`, `step`, `trajectory` and `stop` for a stepper given as two Python
-functions. It holds no numerics: a line that cannot be understood is answered by `rejected` with the reason,
-naming the field, and the next line is read.
+`serve` answers every request for a stepper given as Python functions. It holds no numerics: a line
+that cannot be understood is answered by `rejected` with the reason, naming the field, and the next
+line is read.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from importlib.metadata import version
 from typing import Any, BinaryIO
 
 import msgspec
 
 from scene.load import from_data
+from scene.messages import MAX_SEQ, PROTOCOL, Command, Echo, Flow, Start, Step, Stop, Time, Trajectory
 from scene.refusal import BadInput
 from scene.states import Outcome, Rejected, State
 from scene.tables import Scene
 
-PROTOCOL = 1
 MAX_COLLISIONS = 1_000_000
+MAX_REPEAT = 1_000
+MAX_STATES = 1_000_000
 Stepper = Callable[[Scene, State, float], Outcome]
 Follower = Callable[[Scene, State, int, float], list[Outcome]]
-
-
-class Start(msgspec.Struct, frozen=True, tag_field="cmd", tag="start", forbid_unknown_fields=True):
-    """Opens a session."""
-
-    protocol: int
-
-
-class Echo(msgspec.Struct, frozen=True, tag_field="cmd", tag="echo", forbid_unknown_fields=True):
-    """Asks for the same numbers back, bit for bit."""
-
-    values: tuple[float, ...]
-
-
-class Step(msgspec.Struct, frozen=True, tag_field="cmd", tag="step", forbid_unknown_fields=True):
-    """Asks for one collision."""
-
-    seq: int
-    scene: Any
-    state: State
-    t_end: float
-
-
-class Trajectory(msgspec.Struct, frozen=True, tag_field="cmd", tag="trajectory", forbid_unknown_fields=True):
-    """Asks for successive collisions."""
-
-    seq: int
-    scene: Any
-    state: State
-    collisions: int
-    t_end: float
-
-
-class Stop(msgspec.Struct, frozen=True, tag_field="cmd", tag="stop", forbid_unknown_fields=True):
-    """Ends the session."""
-
-
-Command = Start | Echo | Step | Trajectory | Stop
+Captured = tuple[float, float] | None
+Flowing = Callable[[Scene, Sequence[State], float], Sequence[tuple[Outcome, Captured]]]
+Timer = Callable[[Scene, State, int, int], tuple[Sequence[int], Outcome]]
+# What a line may do to the decoder: bad JSON, bad fields, bad UTF-8, too deep a nesting.
+UNREADABLE = (msgspec.DecodeError, UnicodeDecodeError, RecursionError)
 _decoder = msgspec.json.Decoder(Command)
 
 
-def serve(name: str, stepper: Stepper, follower: Follower, lines: BinaryIO, out: BinaryIO) -> None:
+def serve(
+    name: str,
+    stepper: Stepper,
+    follower: Follower,
+    lines: BinaryIO,
+    out: BinaryIO,
+    *,
+    flow: Flowing | None = None,
+    timer: Timer | None = None,
+) -> None:
     """Answer protocol lines until `stop` or the end of input.
 
     Args:
@@ -72,64 +50,108 @@ def serve(name: str, stepper: Stepper, follower: Follower, lines: BinaryIO, out:
         follower: (scene, state, collisions, t_end) -> collisions, and last what came instead of one.
         lines: requests, one JSON object a line.
         out: answers, one line each, flushed.
+        flow: (scene, states, t_end) -> for each state its outcome at t_end and (t_in, t_out) of its
+            first captured stay, or None; the profile is offered only when this is given.
+        timer: (scene, state, collisions, repeat) -> nanoseconds of each repeat, and the last outcome;
+            likewise.
     """
-    scenes: dict[bytes, Scene] = {}
-    for line in lines:
-        if not line.strip():
-            continue
+    _Server(name, stepper, follower, flow, timer).run(lines, out)
+
+
+class _Server:
+    def __init__(
+        self, name: str, stepper: Stepper, follower: Follower, flow: Flowing | None, timer: Timer | None
+    ) -> None:
+        self.name, self.stepper, self.follower = name, stepper, follower
+        self.flow, self.timer = flow, timer
+        # Successive requests mostly share their scene: keep that one.
+        self.kept: tuple[bytes, Scene] | None = None
+
+    def run(self, lines: BinaryIO, out: BinaryIO) -> None:
+        for line in lines:
+            if not line.strip():
+                continue
+            try:
+                command = _decoder.decode(line)
+            except UNREADABLE as error:
+                _reply(out, {"seq": _sequence_number(line), **_plain(_refusal(error))})
+                continue
+            if isinstance(command, Stop):
+                return
+            if isinstance(command, Echo):
+                _reply(out, {"values": command.values})
+            elif isinstance(command, Start):
+                _reply(out, self.introduce(command))
+            else:
+                _reply(out, {"seq": command.seq, **self.answer(command)})
+
+    def introduce(self, command: Start) -> dict[str, Any]:
+        if command.protocol != PROTOCOL:
+            return _plain(Rejected(f"protocol = {command.protocol}, must be {PROTOCOL}"))
+        offered = {"step": True, "trajectory": True, "flow": self.flow, "time": self.timer}
+        return {
+            "protocol": PROTOCOL,
+            "name": self.name,
+            "version": version("oscillating-mushrooms"),
+            "language": "Python",
+            "profiles": [profile for profile, function in offered.items() if function is not None],
+            "tables": ["cap", "stem", "mushroom"],
+            "laws": ["constant", "fourier", "bang-bang"],
+        }
+
+    def answer(self, command: Step | Trajectory | Flow | Time) -> dict[str, Any]:
         try:
-            command = _decoder.decode(line)
-        except (msgspec.DecodeError, RecursionError) as error:
-            _reply(out, {"seq": _sequence_number(line), **_plain(Rejected(str(error)))})
-            continue
-        if isinstance(command, Stop):
-            return
-        if isinstance(command, Echo):
-            _reply(out, {"values": command.values})
-        elif isinstance(command, Start):
-            _reply(out, _introduction(name, command))
-        else:
-            _reply(out, {"seq": command.seq, **_answer(command, stepper, follower, scenes)})
+            scene = self.read_scene(bytes(command.scene))
+            if isinstance(command, Step):
+                return _plain(self.stepper(scene, command.state, command.t_end))
+            if isinstance(command, Flow):
+                return self.answer_flow(scene, command)
+            _check_range("collisions", command.collisions, int(isinstance(command, Time)), MAX_COLLISIONS)
+            if isinstance(command, Time):
+                return self.answer_time(scene, command)
+            steps = self.follower(scene, command.state, command.collisions, command.t_end)
+            return {"steps": [_plain(outcome) for outcome in steps]}
+        except BadInput as error:
+            return _plain(Rejected(str(error)))
+        except UNREADABLE as error:
+            return _plain(_refusal(error))
+
+    def answer_flow(self, scene: Scene, command: Flow) -> dict[str, Any]:
+        if self.flow is None:
+            raise BadInput("flow is not among this implementation's profiles")
+        _check_range("number of states", len(command.states), 0, MAX_STATES)
+        arrivals = self.flow(scene, command.states, command.t_end)
+        return {"states": [{**_plain(outcome), "captured": captured} for outcome, captured in arrivals]}
+
+    def answer_time(self, scene: Scene, command: Time) -> dict[str, Any]:
+        if self.timer is None:
+            raise BadInput("time is not among this implementation's profiles")
+        _check_range("repeat", command.repeat, 1, MAX_REPEAT)
+        ns, last = self.timer(scene, command.state, command.collisions, command.repeat)
+        return {"ns": list(ns), "steps": [_plain(last)]}
+
+    def read_scene(self, raw: bytes) -> Scene:
+        if self.kept is None or self.kept[0] != raw:
+            self.kept = raw, from_data(msgspec.json.decode(raw))
+        return self.kept[1]
 
 
-def _answer(
-    command: Step | Trajectory, stepper: Stepper, follower: Follower, scenes: dict[bytes, Scene]
-) -> dict[str, Any]:
-    key = msgspec.json.encode(command.scene)
-    try:
-        if key not in scenes:
-            scenes.clear()  # successive steps mostly share their scene: keep that one
-            scenes[key] = from_data(command.scene)
-        if isinstance(command, Step):
-            return _plain(stepper(scenes[key], command.state, command.t_end))
-        if not 0 <= command.collisions <= MAX_COLLISIONS:
-            raise BadInput(f"collisions = {command.collisions}, must be 0 to {MAX_COLLISIONS}")
-        steps = follower(scenes[key], command.state, command.collisions, command.t_end)
-        return {"steps": [_plain(outcome) for outcome in steps]}
-    except BadInput as error:
-        return _plain(Rejected(str(error)))
+def _check_range(field: str, value: int, low: int, high: int) -> None:
+    if not low <= value <= high:
+        raise BadInput(f"{field} = {value}, must be {low} to {high}")
 
 
-def _introduction(name: str, command: Start) -> dict[str, Any]:
-    if command.protocol != PROTOCOL:
-        return _plain(Rejected(f"protocol = {command.protocol}, must be {PROTOCOL}"))
-    return {
-        "protocol": PROTOCOL,
-        "name": name,
-        "version": version("oscillating-mushrooms"),
-        "language": "Python",
-        "profiles": ["step", "trajectory"],
-        "tables": ["cap", "stem", "mushroom"],
-        "laws": ["constant", "fourier", "bang-bang"],
-    }
+def _refusal(error: Exception) -> Rejected:
+    # A key may hold a line break, and the message repeats it.
+    return Rejected(" ".join(str(error).split()))
 
 
-def _sequence_number(line: bytes) -> Any:
+def _sequence_number(line: bytes) -> int | None:
     try:
         seq = msgspec.json.decode(line).get("seq")
-    except (msgspec.DecodeError, RecursionError, AttributeError):
+    except (*UNREADABLE, AttributeError):
         return None
-    return seq if isinstance(seq, int) else None
+    return seq if type(seq) is int and 0 <= seq <= MAX_SEQ else None
 
 
 def _plain(outcome: Outcome) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""Flights, laws and walls (sec. 2 of the paper) in Arb, written anew for `arb_checker`.
+"""Flights, laws and walls (sec. 2 of the paper) in Arb, written anew for `generate_proof`.
 
 Times, places and knots are exact rationals (fmpq), whatever is not rational is a ball (arb); both
 compare with 0 only when that is certain.
@@ -14,7 +14,7 @@ from flint import arb, fmpq
 from scene import BangBang, Cap, Fourier, Law, Scene, Stem
 from scene.tables import width_factors
 
-MAX_SPLITS = 400
+MAX_SPLITS = 2000  # a near miss by 1e-300 takes half as many halvings as it has bits
 Number = Any  # fmpq or arb
 Jet = tuple[Number, Number, Number]  # f, f', f'' by flight time
 

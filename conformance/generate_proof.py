@@ -3,21 +3,22 @@
 From scene and state alone it follows which walls can be met, and when: the arc in the cap, the
 sides and the floor in the stem, the base or the mouth where the flight crosses y = 0. The
 certificate only says where to cut and which sign to look for; each sign is proved here, with the
-laws and walls of `arb_flight`.
+laws and walls of `generate_flight`.
 Not checked: whether a state lies close enough to the wall it names.
 """
 
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any, NamedTuple
 
 import flint
-from arb_flight import Flight, Number, ball, exact
 from flint import arb, fmpq
 
+from conformance.generate_flight import Flight, Number, ball, exact
 from scene import BadInput, Cap, Mushroom, from_data
 
 SIDES = ("left", "right", "floor")
@@ -65,10 +66,12 @@ def check(certificate: dict[str, Any]) -> None:
 
 
 def _bits(data: Any) -> Iterator[int]:
-    """List the lengths of all mantissas."""
+    """List the lengths of all mantissas, and how far binary64 numbers reach from 1."""
     if isinstance(data, dict | list):
         for entry in data.values() if isinstance(data, dict) else data:
             yield from _bits(entry)
+    elif isinstance(data, float):
+        yield 53 + abs(math.frexp(data)[1])
     elif isinstance(data, str) and "*2^" in data:
         yield int(data.split("*")[0]).bit_length()
 

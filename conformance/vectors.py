@@ -1,0 +1,244 @@
+"""Vectors: questions with certified answers, and the corpus that they are kept in.
+
+A vector asks for one step or one trajectory; its answers are enclosures that the reference proved and a
+second arithmetic proved again. The corpus is one file of JSON lines for each group, beside a manifest with
+its version and every file's SHA-256; `load` refuses a corpus that does not match its manifest. Answers
+never leave the harness: `request` builds the line that an implementation is sent.
+
+Levels say how delicate a question is, by the condition number (the largest relative change of an answer per
+relative change of the inputs) and by what nudging the inputs does:
+    core      condition <= 1e6, and the walls met stay the same when every input moves by 2^-30 of its size.
+              An answer that passes (backward error 1e-9, see `conformance.grading`) is then right to three
+              digits, and a stepper that loses twice the digits that it must (1e6^2 u = 1e-4 at worst, in the
+              answer; 1e6 u = 1e-10 backward) still passes: what an honest simple stepper can do.
+    extended  condition <= 1e12, walls stable under 2^-44: within binary64's reach, but only for a stepper
+              that is backward stable. Bad input that must be refused is here too.
+    stress    beyond, and where the answer is degenerate: ties of two walls, tangencies, sliding.
+
+The corpus's version is MAJOR.MINOR. A vector once published never changes its question; ids are never
+reused. New vectors take the next number of their group and raise MINOR. A vector found wrong or unfair is
+retired: its id goes to the manifest's `retired`, its line goes away, and MAJOR is raised, as it is when
+enclosures or levels of published vectors change. Results are comparable within one MAJOR.
+
+`python -m conformance.vectors > docs/vector.schema.json` prints the schema of a line.
+Not handled: questions that JSON or `scene.State` cannot hold (nan, fields missing or too many).
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from importlib import resources
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import msgspec
+
+from scene import BadInput, State, Wall
+
+Level = Literal["core", "extended", "stress"]
+LEVELS: tuple[Level, ...] = ("core", "extended", "stress")
+NUMBERS = ("dt", "x", "y", "vx", "vy")
+MANIFEST = "manifest.json"
+Decimal = Annotated[str, msgspec.Meta(pattern=r"^-?[0-9]{1,40}(\.[0-9]{1,40})?(E[+-]?[0-9]{1,4})?$")]
+Enclosure = tuple[Decimal, Decimal]
+Hash = Annotated[str, msgspec.Meta(pattern="^[0-9a-f]{64}$")]
+
+
+class BadCorpus(BadInput):
+    """A corpus that is not what its manifest says: one line naming file, field, value and bound."""
+
+
+class Certified(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
+    """The proved state just after a collision, or at the horizon.
+
+    Attributes:
+        dt: flight time since the collision before [time], enclosed: lower and upper end, both decimal.
+        x: place [length], likewise.
+        y: likewise.
+        vx: velocity [length/time], likewise.
+        vy: likewise.
+        allowance: for dt, x, y, vx, vy: sum over inputs of |d out / d in| |in|. In a trajectory the
+            sum goes over the inputs of every step so far, with the Jacobians chained: what rounding
+            each state that the stepper holds can do.
+        wall: the wall met; None at the horizon.
+    """
+
+    dt: Enclosure
+    x: Enclosure
+    y: Enclosure
+    vx: Enclosure
+    vy: Enclosure
+    allowance: tuple[float, float, float, float, float]
+    wall: Wall | None = None
+
+
+class Expectation(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
+    """One answer that is right.
+
+    Attributes:
+        outcome: of the step; of a trajectory: how it ends, "collision" when all asked for are found.
+        steps: the collisions, and the horizon when it ends there; empty for undefined and rejected steps.
+        reason: of an undefined outcome.
+    """
+
+    outcome: Literal["collision", "horizon", "undefined", "undecided", "rejected"]
+    steps: tuple[Certified, ...] = ()
+    reason: str = ""
+
+
+class Vector(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
+    """A question and its certified answers.
+
+    Attributes:
+        id: "<group>/<number>", never reused.
+        group: what it belongs to: a table, a hard case, a generated family.
+        level: core, extended or stress.
+        kind: step or trajectory.
+        rule: what it tests, in words.
+        source: place in the paper, or hard case number.
+        scene: the wire's form.
+        state: the start.
+        t_end: horizon [time].
+        expect: the right answers; any of them passes. The first is what the reference proved.
+        collisions: how many a trajectory is asked for.
+        condition: condition number, the largest over a trajectory; 0 where nothing is met, and
+            1e300 stands for infinity.
+    """
+
+    id: Annotated[str, msgspec.Meta(pattern="^[a-z0-9-]+/[0-9]+$")]
+    group: str
+    level: Level
+    kind: Literal["step", "trajectory"]
+    rule: str
+    source: str
+    scene: dict[str, Any]
+    state: State
+    t_end: float
+    expect: Annotated[tuple[Expectation, ...], msgspec.Meta(min_length=1)]
+    collisions: Annotated[int, msgspec.Meta(ge=1)] = 1
+    condition: float = 0.0
+
+
+class File(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A file of the corpus: its SHA-256 and how many vectors it holds."""
+
+    sha256: Hash
+    vectors: int
+
+
+class Manifest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """What the corpus holds.
+
+    Attributes:
+        corpus: version, "MAJOR.MINOR".
+        digest: SHA-256 over the files' names and hashes in order, and the retired ids.
+        files: by name.
+        retired: ids that once were, never to be used again.
+    """
+
+    corpus: Annotated[str, msgspec.Meta(pattern=r"^[0-9]+\.[0-9]+$")]
+    digest: Hash
+    files: dict[str, File]
+    retired: tuple[str, ...] = ()
+
+
+def load(level: str = "core", path: Path | None = None) -> list[Vector]:
+    """Load the vectors up to a level: extended includes core, stress includes all.
+
+    Args:
+        level: core, extended or stress.
+        path: the corpus's folder; None for the one that ships with the package.
+
+    Raises:
+        BadCorpus: when the level is none, or files and manifest do not fit together.
+    """
+    if level not in LEVELS:
+        raise BadCorpus(f"level = {level!r}, must be one of {', '.join(LEVELS)}")
+    wanted = LEVELS[: LEVELS.index(level) + 1]
+    found: list[Vector] = []
+    seen: set[str] = set()
+    for name, entry in manifest(path).files.items():
+        for vector in _read_lines(name, entry, path):
+            if vector.id in seen:
+                raise BadCorpus(f"corpus {name}: id {vector.id} appears twice, must be unique")
+            seen.add(vector.id)
+            if vector.level in wanted:
+                found.append(vector)
+    return found
+
+
+def manifest(path: Path | None = None) -> Manifest:
+    """Read a corpus's manifest and check its digest.
+
+    Raises:
+        BadCorpus: when it cannot be read, or is not sound.
+    """
+    try:
+        found = msgspec.json.decode(_read(MANIFEST, path), type=Manifest)
+    except msgspec.DecodeError as error:
+        raise BadCorpus(f"corpus {MANIFEST}: {error}") from None
+    if found.digest != digest(found.files, found.retired):
+        raise BadCorpus(f"corpus {MANIFEST}: digest = {found.digest}, must fit its files and retired ids")
+    return found
+
+
+def digest(files: dict[str, File], retired: tuple[str, ...]) -> str:
+    """Return the SHA-256 that names a corpus: over its files' names and hashes, and its retired ids."""
+    lines = [f"{name} {file.sha256}" for name, file in sorted(files.items())]
+    return hashlib.sha256("\n".join([*lines, *sorted(retired)]).encode()).hexdigest()
+
+
+def encode(vectors: list[Vector]) -> bytes:
+    """Return the lines of a corpus file."""
+    return b"".join(msgspec.json.encode(vector) + b"\n" for vector in vectors)
+
+
+def request(vector: Vector, seq: int) -> dict[str, Any]:
+    """Return the protocol line that asks a vector's question. It tells nothing of the answer.
+
+    Args:
+        vector: the question.
+        seq: number of the request.
+    """
+    state = {name: getattr(vector.state, name) for name in vector.state.__struct_fields__}
+    asked = {"cmd": vector.kind, "seq": seq, "scene": vector.scene, "state": state}
+    if vector.kind == "trajectory":
+        asked["collisions"] = vector.collisions
+    return {**asked, "t_end": vector.t_end}
+
+
+def json_schema() -> dict[str, Any]:
+    """Return the JSON Schema of one line of the corpus, published as docs/vector.schema.json."""
+    schema = msgspec.json.schema(Vector)
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": "Vector", **schema}
+
+
+def _read(name: str, path: Path | None) -> bytes:
+    folder = resources.files("conformance") / "corpus" if path is None else path
+    try:
+        return (folder / name).read_bytes()
+    except OSError as error:
+        raise BadCorpus(f"corpus {name} cannot be read: {error.strerror}") from None
+
+
+def _read_lines(name: str, entry: File, path: Path | None) -> list[Vector]:
+    data = _read(name, path)
+    found = hashlib.sha256(data).hexdigest()
+    if found != entry.sha256:
+        raise BadCorpus(f"corpus {name}: sha256 = {found}, must be {entry.sha256}")
+    vectors = []
+    for number, line in enumerate(data.splitlines(), 1):
+        try:
+            vectors.append(_decoder.decode(line))
+        except msgspec.DecodeError as error:
+            raise BadCorpus(f"corpus {name}:{number}: {error}") from None
+    if len(vectors) != entry.vectors:
+        raise BadCorpus(f"corpus {name}: {len(vectors)} vectors, must be {entry.vectors}")
+    return vectors
+
+
+_decoder = msgspec.json.Decoder(Vector)
+
+if __name__ == "__main__":
+    print(json.dumps(json_schema(), indent=2, ensure_ascii=False))

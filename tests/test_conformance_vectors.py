@@ -1,0 +1,355 @@
+"""The corpus: what it holds, that it is certified, and that no spoilt line and no false claim gets in."""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+import json
+from collections import Counter
+from fractions import Fraction
+from pathlib import Path
+
+import jsonschema
+import msgspec
+import pytest
+
+import reference
+from conformance import generate
+from conformance.generate_certify import Question, Unfit, certify
+from conformance.generate_chain import recheck
+from conformance.generate_draws import Draw, wire_form
+from conformance.generate_families import CATALOGUE, families
+from conformance.generate_proof import Refuted
+from conformance.vectors import MANIFEST, NUMBERS, BadCorpus, json_schema, load, manifest, request
+from scene import BadInput, State, catalogue, from_data
+from scene import load as load_scene
+from scene.messages import Command
+
+ROOT = Path(__file__).parent.parent
+SCHEMA = ROOT / "docs" / "vector.schema.json"
+CORPUS = ROOT / "conformance" / "corpus"
+N_STEPS, N_TRAJECTORIES = 36, 4  # made again, bit for bit
+MOST_BYTES = 15e6
+
+
+@pytest.fixture(scope="module")
+def corpus():
+    return load("stress")
+
+
+def test_what_the_corpus_holds(corpus, tally):
+    tally.update(f"{vector.level} {vector.kind}" for vector in corpus)
+    kinds = Counter(vector.kind for vector in corpus)
+    assert kinds["step"] >= 1500
+    assert kinds["trajectory"] >= 150
+    assert len({vector.id for vector in corpus}) == len(corpus)
+    assert all(vector.id.startswith(f"{vector.group}/") for vector in corpus)
+    groups = {vector.group for vector in corpus}
+    assert {f"hard-case-{number:02}" for number in range(1, 49)} <= groups
+    assert set(CATALOGUE) == set(catalogue()) - {"moving-cap-as-printed"} <= groups
+    assert {f"static-{table}" for table in ("cap", "stem", "mushroom")} <= groups
+    outcomes = Counter(vector.expect[0].outcome for vector in corpus)
+    assert min(outcomes[kind] for kind in ("collision", "horizon", "undefined", "rejected")) >= 12
+    walls = Counter(step.wall for vector in corpus for step in vector.expect[0].steps)
+    assert min(walls[wall] for wall in ("arc", "base", "left", "right", "floor")) >= 100
+    assert sum(path.stat().st_size for path in CORPUS.iterdir()) < MOST_BYTES
+
+
+def test_levels_are_cumulative(corpus):
+    core, extended = load(), load("extended")
+    assert {v.level for v in core} == {"core"}
+    assert {v.level for v in extended} == {"core", "extended"}
+    assert len(core) < len(extended) < len(corpus)
+    assert all(v.condition <= 1e6 for v in core)
+    assert all(v.condition <= 1e12 or v.expect[1:] for v in extended)
+    assert len(core) >= 1000
+
+
+def test_requests_are_of_the_protocol_and_tell_no_answer(corpus):
+    decoder = msgspec.json.Decoder(Command)
+    for seq, vector in enumerate(corpus):
+        asked = request(vector, seq)
+        decoder.decode(msgspec.json.encode(asked))
+        assert set(asked) <= {"cmd", "seq", "scene", "state", "t_end", "collisions"}
+        assert json.loads(json.dumps(asked)) == asked
+
+
+def test_the_published_schema_is_up_to_date():
+    # Regenerate with: python -m conformance.vectors > docs/vector.schema.json
+    assert json.loads(SCHEMA.read_text("utf-8")) == json.loads(json.dumps(json_schema()))
+
+
+@pytest.fixture(scope="module")
+def validator():
+    schema = json.loads(SCHEMA.read_text("utf-8"))
+    jsonschema.Draft202012Validator.check_schema(schema)
+    return jsonschema.Draft202012Validator(schema)
+
+
+def lines():
+    return [line for path in sorted(CORPUS.glob("*.jsonl")) for line in path.read_bytes().splitlines()]
+
+
+def test_lines_fit_the_schema(validator):
+    for line in lines()[::20]:
+        validator.validate(json.loads(line))
+
+
+def spoilt_lines():
+    line = json.loads((CORPUS / "moving-cap.jsonl").read_bytes().splitlines()[0])
+
+    def spoil(change):
+        spoilt = json.loads(json.dumps(line))
+        change(spoilt)
+        return spoilt
+
+    def step(data):
+        return data["expect"][0]["steps"][0]
+
+    return {
+        "level": spoil(lambda d: d.update(level="easy")),
+        "colour": spoil(lambda d: d.update(colour="red")),
+        "t_end": spoil(lambda d: d.pop("t_end")),
+        "id": spoil(lambda d: d.update(id="moving cap 1")),
+        "wall": spoil(lambda d: step(d).update(wall="roof")),
+        "dt": spoil(lambda d: step(d).update(dt=["0.1"])),
+        "x": spoil(lambda d: step(d).update(x=["0.1", "nan"])),
+        "vy": spoil(lambda d: step(d).update(vy=["1E+99999", "1E+99999"])),
+        "allowance": spoil(lambda d: step(d).update(allowance=[1, 2, 3, 4])),
+        "expect": spoil(lambda d: d.update(expect=[])),
+        "collisions": spoil(lambda d: d.update(collisions=0)),
+    }
+
+
+@pytest.mark.parametrize("name", spoilt_lines())
+def test_a_spoilt_line_is_refused(name, validator, tmp_path):
+    """By the schema; and by `load`, even where the manifest has been made to fit."""
+    spoilt = spoilt_lines()[name]
+    assert not validator.is_valid(spoilt)
+    (tmp_path / "spoilt.jsonl").write_text(json.dumps(spoilt) + "\n")
+    write_manifest(tmp_path, {"spoilt.jsonl": 1})
+    with pytest.raises(BadCorpus, match=r"spoilt.jsonl:1: .*"):
+        load("core", tmp_path)
+
+
+def write_manifest(folder, names, **changes):
+    files = {
+        name: {"sha256": hashlib.sha256((folder / name).read_bytes()).hexdigest(), "vectors": n}
+        for name, n in names.items()
+    }
+    text = "\n".join(f"{name} {file['sha256']}" for name, file in sorted(files.items()))
+    data = {"corpus": "1.0", "digest": hashlib.sha256(text.encode()).hexdigest(), "files": files, **changes}
+    (folder / MANIFEST).write_text(json.dumps(data))
+
+
+@pytest.fixture
+def small(tmp_path):
+    """A corpus of two files."""
+    for name in ("moving-cap.jsonl", "untilted.jsonl"):
+        (tmp_path / name).write_bytes(b"".join((CORPUS / name).read_bytes().splitlines(keepends=True)[:3]))
+    write_manifest(tmp_path, {"moving-cap.jsonl": 3, "untilted.jsonl": 3})
+    return tmp_path
+
+
+def changed_number(folder):
+    path = folder / "untilted.jsonl"
+    path.write_bytes(path.read_bytes().replace(b"0", b"1", 1))
+
+
+def missing_file(folder):
+    (folder / "untilted.jsonl").unlink()
+
+
+def no_manifest(folder):
+    (folder / MANIFEST).unlink()
+
+
+def broken_manifest(folder):
+    (folder / MANIFEST).write_text("{")
+
+
+def wrong_digest(folder):
+    write_manifest(folder, {"moving-cap.jsonl": 3}, digest="0" * 64)
+
+
+def hidden_retirement(folder):
+    write_manifest(folder, {"moving-cap.jsonl": 3}, retired=["untilted/1"])
+
+
+def wrong_count(folder):
+    write_manifest(folder, {"moving-cap.jsonl": 2})
+
+
+def twice(folder):
+    (folder / "again.jsonl").write_bytes((folder / "moving-cap.jsonl").read_bytes())
+    write_manifest(folder, {"moving-cap.jsonl": 3, "again.jsonl": 3})
+
+
+SPOILT = [
+    (changed_number, r"untilted.jsonl: sha256 = .*, must be"),
+    (missing_file, r"untilted.jsonl cannot be read"),
+    (no_manifest, r"manifest.json cannot be read"),
+    (broken_manifest, r"manifest.json: "),
+    (wrong_digest, r"digest = 0+, must fit"),
+    (hidden_retirement, r"digest = .*, must fit"),
+    (wrong_count, r"moving-cap.jsonl: 3 vectors, must be 2"),
+    (twice, r"id moving-cap/1 appears twice"),
+]
+
+
+@pytest.mark.parametrize(("spoil", "words"), SPOILT, ids=lambda value: getattr(value, "__name__", ""))
+def test_a_spoilt_corpus_is_refused(small, spoil, words):
+    assert len(load("stress", small)) == 6
+    spoil(small)
+    with pytest.raises(BadCorpus, match=words):
+        load("stress", small)
+
+
+def test_an_unknown_level_is_refused():
+    with pytest.raises(BadCorpus, match="level = 'hard', must be one of core, extended, stress"):
+        load("hard")
+
+
+def sample():
+    """Ids spread over the corpus."""
+    found = load("stress")
+    steps = [v.id for v in found if v.kind == "step"]
+    paths = [v.id for v in found if v.kind == "trajectory" and len(v.expect[0].steps) <= 12]
+    return steps[:: len(steps) // N_STEPS][:N_STEPS] + paths[:: len(paths) // N_TRAJECTORIES][:N_TRAJECTORIES]
+
+
+def test_a_sample_is_made_again_bit_for_bit():
+    there = {json.loads(line)["id"]: line for line in lines()}
+    ids = sample()
+    assert len(ids) == N_STEPS + N_TRAJECTORIES
+    for name in ids:
+        group, number = name.split("/")
+        assert msgspec.json.encode(generate.make(group, int(number))) == there[name], name
+
+
+def test_every_number_of_a_group_is_there_or_retired(corpus):
+    there = {vector.id for vector in corpus} | set(manifest().retired)
+    wanted = {f"{g}/{n}" for g, makers in generate.groups().items() for n in range(1, len(makers) + 1)}
+    assert there == wanted
+    assert set(generate.RETIRED) == set(manifest().retired)
+    assert manifest().corpus == generate.VERSION
+
+
+def test_draws_are_the_same_for_ever():
+    """Pinned: a change here would silently change every drawn vector."""
+    draw = Draw("moving-cap/1/0")
+    assert [draw.part(), draw.short(0.25, 0.5), draw.power(-3, 3), *draw.direction()] == PINNED
+
+
+PINNED = [0.8332185815384037, 0.2536, 8.0, -0.09524087325725812, 0.9954542561369631]
+
+
+@pytest.mark.parametrize(("group", "number"), [("moving-cap", 0), ("moving-cap", 10**6), ("no-such", 1)])
+def test_no_vector_of_that_name(group, number):
+    with pytest.raises(BadInput, match=f"{group}/{number}"):
+        generate.make(group, number)
+
+
+def test_groups_of_families_are_distinct():
+    names = [family.group for family in families()]
+    assert len(set(names)) == len(names)
+
+
+def test_the_command_writes_a_corpus_and_finds_what_differs(small, tmp_path, monkeypatch, capsys):
+    makers = {name: generate.groups()[name] for name in ("hard-case-06", "hard-case-45")}
+    monkeypatch.setattr(generate, "groups", lambda: makers)
+    folder = tmp_path / "made"
+    assert generate.main(["--out", str(folder), "--most", "1"]) == 0
+    assert [path.name for path in folder.iterdir() if path.name.startswith(".")] == []
+    assert len(load("stress", folder)) == 2
+    assert generate.main(["--out", str(folder), "--most", "1", "--check"]) == 0
+    assert generate.main(["--out", str(small), "--most", "1", "--check"]) == 1
+    assert "hard-case-06/1: differs" in capsys.readouterr().out
+    assert generate.main(["--out", str(tmp_path / "none"), "--most", "1", "--check"]) == 2
+    assert "manifest.json cannot be read" in capsys.readouterr().err
+    with pytest.raises(SystemExit, match="2"):
+        generate.main(["--most", "0"])
+
+
+@pytest.fixture(scope="module")
+def path(corpus):
+    """A trajectory in the moving cap that meets several walls."""
+    found = [v for v in corpus if v.group == "moving-cap-trajectory"]
+    return next(v for v in found if 5 <= len(v.expect[0].steps) <= 24)
+
+
+def test_written_trajectories_hold_in_the_second_arithmetic(corpus):
+    paths = [v for v in corpus if v.kind == "trajectory" and v.expect[0].steps]
+    for vector in paths[::25]:
+        recheck(from_data(vector.scene), vector.state, vector.t_end, vector.expect[0].steps)
+
+
+@pytest.mark.parametrize("name", NUMBERS)
+@pytest.mark.parametrize("index", [0, -1])
+def test_a_shifted_enclosure_is_refuted(path, index, name):
+    steps = list(path.expect[0].steps)
+    ends = [Fraction(end) for end in getattr(steps[index], name)]
+    shifted = tuple(f"{float(end):.15g}" for end in (ends[0] + abs(ends[0]) / 10**9, ends[1] + abs(ends[1])))
+    steps[index] = msgspec.structs.replace(steps[index], **{name: shifted})
+    with pytest.raises(Refuted):
+        recheck(from_data(path.scene), path.state, path.t_end, steps)
+
+
+def test_another_wall_is_refuted(path):
+    steps = list(path.expect[0].steps)
+    wall = "arc" if steps[0].wall == "floor" else "floor"
+    steps[0] = msgspec.structs.replace(steps[0], wall=wall)
+    with pytest.raises(Refuted, match="step 1"):
+        recheck(from_data(path.scene), path.state, path.t_end, steps)
+
+
+def test_a_false_certificate_makes_no_vector(monkeypatch):
+    """The reference made to lie about where a particle is: the second arithmetic refuses."""
+    honest = reference.next_collision
+
+    def lying(*arguments, **options):
+        found = honest(*arguments, **options)
+        x = reference.Enclosure(found.after.x.lo + 1, found.after.x.hi + 1)
+        return dataclasses.replace(found, after=found.after._replace(x=x))
+
+    monkeypatch.setattr(reference, "next_collision", lying)
+    question = Question(
+        "lie", "", "", wire_form(load_scene("moving-cap")), State(0.3, 0.1, 0.2, 3.0, 4.0), 9.0
+    )
+    with pytest.raises(Refuted, match="x afterwards"):
+        certify(question, 1)
+
+
+def test_what_has_no_answer_makes_no_vector():
+    lift = {
+        "table": "stem",
+        "w": 1.0,
+        "h": {"kind": "bang-bang", "knots": [[0.0, 2.0], [0.5, 1.0], [1.0, 2.0]]},
+    }
+    touching = State(0.0, 0.0, -1.0, 0.0, 0.0)
+    with pytest.raises(Unfit):
+        certify(Question("touch", "", "", lift, touching, 0.75), 1)
+
+
+def test_allowances_bound_what_a_nudge_does(path):
+    """A relative nudge e of every input moves each number by at most e times its allowance, nearly."""
+    scene, s = from_data(path.scene), path.state
+    e = 2.0**-45
+    nudged = State(s.t * (1 + e), s.x * (1 - e), s.y * (1 + e), s.vx * (1 + e), s.vy * (1 - e), s.wall)
+    n = len([step for step in path.expect[0].steps if step.wall])
+    moved = reference.trajectory(scene, nudged, n, digits=30)
+    for step, found in zip(path.expect[0].steps, moved.steps, strict=False):
+        for name, allowed in zip(NUMBERS, step.allowance, strict=True):
+            got = found.dt if name == "dt" else getattr(found.after, name)
+            difference = abs(float(Fraction(getattr(step, name)[0]) - Fraction(float(got))))
+            assert difference <= 1.01 * e * allowed + 2.0**-52 * abs(float(got))
+
+
+def test_the_first_step_of_a_trajectory_is_that_of_a_step(path):
+    question = Question("alone", "", "", path.scene, path.state, path.t_end)
+    (alone,) = certify(question, 1).expect[0].steps
+    first = path.expect[0].steps[0]
+    assert (first.wall, first.allowance) == (alone.wall, alone.allowance)
+    for name in NUMBERS:
+        (low, high), (inner_low, inner_high) = getattr(first, name), getattr(alone, name)
+        assert Fraction(low) <= Fraction(inner_low) <= Fraction(inner_high) <= Fraction(high)

@@ -1,0 +1,307 @@
+"""Grading: each verdict is reached, right answers pass, shifted and swapped ones fail."""
+
+from __future__ import annotations
+
+import json
+import math
+from fractions import Fraction
+
+import msgspec
+import pytest
+
+import fast
+import reference
+from conformance.grading import BOUND, Grade, grade, precision_class
+from conformance.vectors import NUMBERS, Certified, Expectation, Vector, load
+from fast.__main__ import follow as fast_follow
+from reference.__main__ import follow as reference_follow
+from reference.__main__ import rounded
+from scene import BadInput, Rejected, State, from_data
+
+THIN = {"dt": ("0.75", "0.75"), "x": ("1", "1"), "y": ("-0.5", "-0.5"), "vx": ("-1", "-1"), "vy": ("0", "0")}
+BOX = {"table": "stem", "w": 1.0, "h": 1.0}
+RIGHT = Certified(**THIN, allowance=(1.25, 1.0, 0.5, 1.0, 0.0), wall="right")
+LEFT = Certified(
+    **{**THIN, "dt": ("2", "2"), "x": ("-1", "-1"), "vx": ("1", "1")},
+    allowance=(2.0, 1.0, 0.5, 1.0, 0.0),
+    wall="left",
+)
+AT_END = Certified(
+    **{**THIN, "dt": ("0.5", "0.5"), "x": ("0.75", "0.75"), "vx": ("1", "1")},
+    allowance=(0.0, 1.0, 0.5, 1.0, 0.0),
+)
+HIT = {
+    "outcome": "collision",
+    "wall": "right",
+    "dt": 0.75,
+    "t": 0.75,
+    "x": 1.0,
+    "y": -0.5,
+    "vx": -1.0,
+    "vy": 0.0,
+}
+NEXT = {**HIT, "wall": "left", "dt": 2.0, "t": 2.75, "x": -1.0, "vx": 1.0}
+END = {"outcome": "horizon", "t": 0.5, "x": 0.75, "y": -0.5, "vx": 1.0, "vy": 0.0}
+SHIFT = 4e-9  # beyond the bound, whatever the enclosure's width
+WALLS = ("arc", "base", "left", "right", "floor")
+
+
+def vector(*expect, kind="step", t_end=9.0, collisions=1):
+    return Vector(
+        id="test/1",
+        group="test",
+        level="core",
+        kind=kind,
+        rule="a level flight in a box",
+        source="hard case 17",
+        scene=BOX,
+        state=State(0.0, 0.25, -0.5, 1.0, 0.0),
+        t_end=t_end,
+        expect=expect,
+        collisions=collisions,
+    )
+
+
+STEP = vector(Expectation("collision", (RIGHT,)))
+HORIZON = vector(Expectation("horizon", (AT_END,)), t_end=0.5)
+TIE = vector(Expectation("undefined", reason="corner"), Expectation("undecided"))
+REFUSAL = vector(Expectation("rejected"))
+EITHER = vector(Expectation("collision", (RIGHT,)), Expectation("rejected"))
+PATH = vector(Expectation("collision", (RIGHT, LEFT)), kind="trajectory", collisions=2)
+UNDECIDED = {"outcome": "undecided", "reason": "within rounding"}
+REJECTED = {"outcome": "rejected", "reason": "state.x"}
+CORNER = {"outcome": "undefined", "reason": "corner"}
+
+VERDICTS = [
+    (STEP, HIT, "pass", ""),
+    (STEP, {**HIT, "seq": 7, "comment": "more than was asked"}, "pass", ""),
+    (STEP, {**HIT, "x": 1, "vy": -0.0}, "pass", ""),
+    (STEP, {**HIT, "wall": "left"}, "fail", "left, must be right"),
+    (STEP, END, "fail", "horizon, must be right"),
+    (STEP, {**HIT, "vx": 1.0}, "fail", "vx is off by"),
+    (STEP, {**HIT, "vy": 1e-8}, "fail", "vy is off by"),
+    (STEP, {**HIT, "t": 0.0}, "fail", "t is off by"),
+    (STEP, {**HIT, "dt": 0.75 + 1e-8}, "fail", "dt is off by"),
+    (STEP, REJECTED, "fail", "state.x"),
+    (STEP, CORNER, "fail", "undefined, must be right"),
+    (STEP, UNDECIDED, "declined", "within rounding"),
+    (STEP, {"seq": 1, "error": "segmentation\nfault"}, "error", "segmentation fault"),
+    (HORIZON, END, "pass", ""),
+    (HORIZON, HIT, "fail", "right, must be horizon"),
+    (HORIZON, {**END, "t": 0.25}, "fail", "t is off by"),
+    (TIE, CORNER, "pass", ""),
+    (TIE, UNDECIDED, "pass", ""),
+    (TIE, HIT, "fail", "must be undefined corner"),
+    (REFUSAL, REJECTED, "pass", ""),
+    (REFUSAL, HIT, "fail", "collision, must be rejected"),
+    (REFUSAL, UNDECIDED, "declined", ""),
+    (EITHER, HIT, "pass", ""),
+    (EITHER, REJECTED, "pass", ""),
+    (EITHER, {**HIT, "vx": 1.0}, "fail", ""),
+    (PATH, {"steps": [HIT, NEXT]}, "pass", ""),
+    (PATH, {"steps": [HIT]}, "fail", "step 2: missing, 1 of 2"),
+    (PATH, {"steps": []}, "fail", "step 1: missing"),
+    (PATH, {"steps": [HIT, NEXT, HIT]}, "fail", "1 steps too many"),
+    (PATH, {"steps": [NEXT, HIT]}, "fail", "step 1: left, must be right"),
+    (PATH, {"steps": [HIT, {**NEXT, "t": 2.0}]}, "fail", "step 2: t is off by"),
+    (PATH, {"steps": [HIT, UNDECIDED]}, "declined", "step 2: undecided"),
+    (PATH, {"steps": [{**HIT, "vx": 1.0}, UNDECIDED]}, "fail", "step 1: vx"),
+    (PATH, UNDECIDED, "declined", ""),
+    (PATH, REJECTED, "fail", ""),
+]
+
+
+@pytest.mark.parametrize(("asked", "answer", "verdict", "words"), VERDICTS)
+def test_verdicts(asked, answer, verdict, words):
+    found = grade(asked, answer)
+    assert found.verdict == verdict, found
+    assert words in found.why
+    assert "\n" not in found.why
+
+
+MISSHAPEN = [
+    (STEP, [HIT]),
+    (STEP, None),
+    (STEP, {}),
+    (STEP, {"outcome": "hit"}),
+    (STEP, {name: HIT[name] for name in HIT if name != "dt"}),
+    (STEP, {**HIT, "wall": "roof"}),
+    (STEP, {**HIT, "wall": None}),
+    (STEP, {**HIT, "x": "1.0"}),
+    (STEP, {**HIT, "x": True}),
+    (STEP, {**HIT, "x": None}),
+    (STEP, {**HIT, "x": 10**400}),
+    (STEP, {**HIT, "x": math.nan}),
+    (STEP, {**HIT, "vy": math.inf}),
+    (STEP, {"outcome": "undefined", "reason": "bad luck"}),
+    (STEP, {"outcome": "undecided"}),
+    (STEP, {"steps": [HIT]}),
+    (PATH, HIT),
+    (PATH, {"steps": {"0": HIT}}),
+    (PATH, {"steps": "none"}),
+    (PATH, {"steps": [HIT, 3]}),
+    (PATH, {"steps": [END, HIT]}),
+]
+
+
+@pytest.mark.parametrize(("asked", "answer"), MISSHAPEN)
+def test_missing_or_ill_typed_fields_are_of_wrong_format(asked, answer):
+    found = grade(asked, answer)
+    assert found.verdict == "wrong-format"
+    assert math.isnan(found.ulps)
+    assert found.why
+    assert "\n" not in found.why
+
+
+def test_indeterminate_when_the_enclosure_is_too_wide():
+    wide = msgspec.structs.replace(RIGHT, x=("0.99999999", "1.00000001"))
+    asked = vector(Expectation("collision", (wide,)))
+    assert grade(asked, HIT).verdict == "indeterminate"
+    assert grade(asked, {**HIT, "x": 1.1}).verdict == "fail"
+
+
+def test_backward_ulps_of_a_known_error():
+    """An error of 2^-50 in dt against (1.25 + 0.75 + 2^-50) 2^-53 is 4 backward ulps, a little less."""
+    found = grade(STEP, {**HIT, "dt": 0.75 + 2.0**-50})
+    assert found.verdict == "pass"
+    assert found.ulps == pytest.approx(4, rel=1e-14)
+    assert found.relative == pytest.approx(2.0**-51, rel=1e-14)
+
+
+def test_an_inexact_zero_passes_as_physics_and_shows_in_ulps():
+    found = grade(STEP, {**HIT, "vy": 1e-17})
+    assert found.verdict == "pass"
+    assert found.ulps == 2.0**53
+    assert grade(STEP, HIT).ulps == 0
+
+
+@pytest.mark.parametrize(
+    ("ulps", "reached"),
+    [
+        ([], "A"),
+        ([0.0, 4.0, math.nan], "A"),
+        ([4.1], "B"),
+        ([1.0, 1e4], "B"),
+        ([1.0001e4], "C"),
+        ([1.0, math.inf], "C"),
+    ],
+)
+def test_precision_class(ulps, reached):
+    assert precision_class(ulps) == reached
+
+
+@pytest.fixture(scope="module")
+def corpus() -> list[Vector]:
+    return load("stress")
+
+
+def centre(certified, name):
+    return sum(map(Fraction, getattr(certified, name))) / 2
+
+
+def exact_answer(asked: Vector):
+    """The answer in the middle of the enclosures, rounded."""
+    expected = asked.expect[0]
+    outcomes, t = [], Fraction(asked.state.t)
+    for step in expected.steps:
+        t += centre(step, "dt")
+        numbers = {name: float(centre(step, name)) for name in NUMBERS}
+        if step.wall is None:
+            numbers.pop("dt")
+            outcomes.append({"outcome": "horizon", "t": asked.t_end, **numbers})
+        else:
+            outcomes.append({"outcome": "collision", "wall": step.wall, "t": float(t), **numbers})
+    if expected.outcome not in ("collision", "horizon"):
+        outcomes.append({"outcome": expected.outcome, "reason": expected.reason or "so it is"})
+    return outcomes[0] if asked.kind == "step" else {"steps": outcomes}
+
+
+def test_exact_answers_pass_within_an_ulp(corpus):
+    grades = [grade(asked, exact_answer(asked)) for asked in corpus]
+    assert {found.verdict for found in grades} == {"pass"}
+    assert max(found.ulps for found in grades if not math.isnan(found.ulps)) <= 1.0
+
+
+def shifted(asked: Vector, index: int, name: str, by: float):
+    """The exact answer with one number of one step moved by so much backward error."""
+    answer = json.loads(json.dumps(exact_answer(asked)))
+    step = answer["steps"][index] if asked.kind == "trajectory" else answer
+    certified = asked.expect[0].steps[index]
+    pair = {"x": "xy", "y": "xy", "vx": ("vx", "vy"), "vy": ("vx", "vy")}.get(name, (name,))
+    allowed = dict(zip(NUMBERS, certified.allowance, strict=True))
+    if name == "t":
+        flights = asked.expect[0].steps[: index + 1]
+        size = 2 * abs(asked.state.t) + sum(s.allowance[0] + float(centre(s, "dt")) for s in flights)
+    else:
+        size = max(allowed[n] + abs(step[n]) for n in pair)
+    step[name] += by * size
+    return answer if size else None
+
+
+def test_shifted_answers_fail_and_slightly_shifted_ones_pass(corpus):
+    n_shifted = 0
+    for i, asked in enumerate(corpus[::2]):
+        steps = asked.expect[0].steps
+        if not steps or "hard-case-4" in asked.group:
+            continue  # extreme numbers: a shift would overflow or vanish
+        index = i % len(steps)
+        names = ["t", *NUMBERS] if steps[index].wall else ["t", *NUMBERS[1:]]
+        name = names[i % len(names)]
+        answer = shifted(asked, index, name, SHIFT)
+        if answer is None:
+            continue  # an exact zero
+        found = grade(asked, answer)
+        assert found.verdict == "fail", (asked.id, index, name, found)
+        assert found.why.split(" is off")[0].split(": ")[-1] == name
+        assert grade(asked, shifted(asked, index, name, float(BOUND) / 4)).verdict == "pass", asked.id
+        n_shifted += 1
+    assert n_shifted > 0.4 * len(corpus)
+
+
+def test_swapped_walls_fail(corpus):
+    for asked in corpus[::3]:
+        answer = json.loads(json.dumps(exact_answer(asked)))
+        steps = answer["steps"] if asked.kind == "trajectory" else [answer]
+        for step in steps[-1:]:
+            if step["outcome"] == "collision":
+                step["wall"] = next(wall for wall in WALLS if wall != step["wall"])
+                assert grade(asked, answer).verdict == "fail", asked.id
+
+
+def answered(asked: Vector, next_collision, follow):
+    """What a stepper of ours answers on the wire."""
+    try:
+        scene = from_data(asked.scene)
+        if asked.kind == "step":
+            return msgspec.to_builtins(next_collision(scene, asked.state, asked.t_end))
+        steps = follow(scene, asked.state, asked.collisions, asked.t_end)
+    except BadInput as error:
+        return msgspec.to_builtins(Rejected(str(error)))
+    return {"steps": [msgspec.to_builtins(step) for step in steps]}
+
+
+def proved(scene, state, t_end):
+    return rounded(reference.next_collision(scene, state, t_end))
+
+
+def graded(sample, *stepper) -> dict[str, Grade]:
+    return {asked.id: grade(asked, answered(asked, *stepper)) for asked in sample}
+
+
+def test_the_reference_passes(corpus):
+    sample = [asked for asked in corpus if asked.kind == "step"][::40]
+    sample += [asked for asked in corpus if asked.kind == "trajectory"][::30]
+    grades = graded(sample, proved, reference_follow)
+    assert [name for name, found in grades.items() if found.verdict != "pass"] == []
+    assert precision_class([found.ulps for found in grades.values()]) == "A"
+
+
+def test_the_fast_stepper_passes_or_declines_what_is_degenerate(corpus, tally):
+    sample = corpus[::4]
+    grades = graded(sample, fast.next_collision, fast_follow)
+    level = {asked.id: asked.level for asked in sample}
+    tally.update(f"{level[name]} {found.verdict}" for name, found in grades.items())
+    off = {name: found for name, found in grades.items() if found.verdict not in ("pass", "declined")}
+    assert off == {}
+    assert {level[name] for name, found in grades.items() if found.verdict == "declined"} <= {"stress"}
+    assert precision_class([found.ulps for name, found in grades.items() if level[name] == "core"]) == "A"

@@ -1,0 +1,134 @@
+"""The plain stepper against the reference, and as a process that speaks protocol 1."""
+
+from __future__ import annotations
+
+import json
+import math
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from hypothesis import given, settings
+from truth import proved_step
+
+from conformance import plain
+from conformance.agreement import compare
+from conformance.plain_laws import Legs, Wave
+from conformance.strategies import scenes_and_states
+from scene import BangBang, Cap, Collision, Fourier, Horizon, Mushroom, Rejected, State, Stem, Undecided, load
+
+N_STEPS = 60  # the corpus asks many more
+BOUND = 1024.0  # backward ulps; the worst of 2,500 steps was 218, at a slow particle before a fast wall
+UNDECIDED_SHARE = 0.08
+
+
+def test_plain_agrees_with_reference(tally):
+    @settings(max_examples=N_STEPS)
+    @given(scenes_and_states())
+    def step(drawn):
+        scene, state, t_end = drawn
+        answer = plain.next_collision(scene, state, t_end)
+        found = compare(answer, proved_step(scene, state, t_end), state, BOUND)
+        tally["steps"] += 1
+        tally[found.kind] += 1
+        assert found.kind in ("agrees", "undecided"), (found, answer)
+
+    step()
+    assert tally["steps"] >= N_STEPS
+    assert tally["undecided"] <= UNDECIDED_SHARE * tally["steps"]
+
+
+def test_bound_excludes_a_false_answer():
+    scene, state = load("moving-cap"), State(0.1, 0.2, 0.3, 10.0, -3.0)
+    answer = plain.next_collision(scene, state, 10.0)
+    assert isinstance(answer, Collision)
+    wrong = Collision(
+        answer.wall, answer.dt * (1 + 1e-12), answer.t, answer.x, answer.y, answer.vx, answer.vy
+    )
+    assert compare(wrong, proved_step(scene, state, 10.0), state, BOUND).kind == "numbers"
+
+
+def test_a_rise_keeps_its_digits_however_short_the_time():
+    """A difference of two values would lose them all: 1e-12 * rate beside a value of order 1."""
+    law = Fourier(mean=1.0, omega=2.0, cos=(0.25, 0.125), sin=(0.5,))
+    t, s = 0.75, 1e-12
+    rate = sum(k * 2 * (b * math.cos(2 * k * t) - a * math.sin(2 * k * t)) for k, a, b in law.harmonics())
+    assert Wave(law, t).at(s).rise == pytest.approx(rate * s, rel=1e-11)
+    legs = Legs(BangBang(knots=((0.0, 2.0), (0.5, 1.0), (1.0, 2.0))), 0.25)  # mid-leg, at rate -4
+    assert legs.at(s).rise == pytest.approx(-4 * s, rel=1e-11)
+
+
+@pytest.mark.parametrize("t", [-1.375, 0.0, 0.125, 0.3125, 0.5, 7.0625])
+@pytest.mark.parametrize("s", [0.0, 0.1, 0.25, 0.6, 1.0, 3.7])
+def test_legs_close_after_any_period(t, s):
+    """2 - 8 t^2, 1 + 8 (t - 1/2)^2, 2 - 8 (t - 1)^2 in turn, period 1."""
+    legs = Legs(BangBang(knots=((0.0, 2.0), (0.5, 1.0), (1.0, 2.0))), t)
+
+    def height(time):
+        u = time % 1.0
+        return 1 + 8 * (u - 0.5) ** 2 if 0.25 <= u < 0.75 else 2 - 8 * min(u, 1 - u) ** 2
+
+    assert legs.at(s).now == pytest.approx(height(t + s), abs=1e-13)
+
+
+LIFT = Stem(w=1.0, h=BangBang(knots=((0.0, 2.0), (0.5, 1.0), (1.0, 2.0))))
+STATIC = Mushroom(r=1.0, h=1.0, w=0.5)
+
+
+@pytest.mark.parametrize(
+    ("scene", "state", "kind"),
+    [
+        (Cap(r=1.0), State(0.0, 0.5, 0.5, 0.5, -0.5), Undecided),  # a corner
+        (STATIC, State(0.0, 0.25, 0.25, 1.0, -1.0), Undecided),  # the mouth's edge
+        (LIFT, State(0.0, 0.0, -1.0, 0.0, 0.0), Undecided),  # a touch
+        (LIFT, State(0.0, 0.0, -2.0, 0.0, 0.0, "floor"), Undecided),  # sliding
+        (Cap(r=1.0), State(0.0, 0.9, 0.9, 1.0, 0.0), Rejected),
+        (Cap(r=1.0), State(0.0, 0.6, 0.8, 1.0, 0.0, "arc"), Rejected),
+        (Cap(r=1.0), State(0.0, math.nan, 0.8, 1.0, 0.0), Rejected),
+        (Cap(r=1.0), State(0.0, 0.0, 0.5, 1e200, 0.0), Rejected),
+        (Cap(r=1.0), State(0.0, 0.1, 0.5, 0.0, 0.0), Horizon),  # at rest
+    ],
+)
+def test_what_it_does_not_answer_it_says(scene, state, kind):
+    assert isinstance(plain.next_collision(scene, state, 1.9), kind)
+
+
+def test_trajectory_ends_at_the_horizon():
+    box = Stem(w=1.0, h=1.0)
+    steps = plain.trajectory(box, State(0.0, 0.0, -0.5, 1.0, 0.0), 10, 5.5)
+    assert [getattr(step, "wall", "horizon") for step in steps] == ["right", "left", "right", "horizon"]
+    assert steps[-1] == Horizon(5.5, 0.5, -0.5, -1.0, 0.0)
+
+
+def test_flow_tells_the_captured_stay():
+    """In a static cap a chord that misses the mouth misses it for ever; one through it never does."""
+    gallery, ray = State(0.0, 0.0, 0.9, 1.0, 0.0), State(0.0, 0.0, 0.5, 0.0, -1.0)
+    (_, stay), (_, none) = plain.flow(STATIC, [gallery, ray], 4.0)
+    assert stay == (pytest.approx(math.sqrt(1 - 0.81)), 4.0)
+    assert none is None
+
+
+def test_it_speaks_protocol_1():
+    state = {"t": 0.0, "x": 0.0, "y": 0.5, "vx": 0.0, "vy": 1.0}
+    cap = {"table": "cap", "r": 1.0}
+    lines = [
+        {"cmd": "start", "protocol": 1},
+        {"cmd": "step", "seq": 1, "scene": cap, "state": state, "t_end": 9.0},
+        {"cmd": "flow", "seq": 2, "scene": cap, "states": [state], "t_end": 0.25},
+        {"cmd": "stop"},
+    ]
+    done = subprocess.run(
+        [sys.executable, "-m", "conformance.plain"],
+        input="".join(json.dumps(line) + "\n" for line in lines),
+        capture_output=True,
+        check=True,
+        text=True,
+        timeout=60,
+        cwd=Path(__file__).parent.parent,
+    )
+    start, step, flow = map(json.loads, done.stdout.splitlines())
+    assert start["name"] == "plain"
+    assert "flow" in start["profiles"]
+    assert (step["wall"], step["dt"], step["vy"]) == ("arc", 0.5, -1.0)
+    assert flow["states"][0]["y"] == 0.75

@@ -1,0 +1,268 @@
+"""Statistical profiles: what an ensemble of an implementation's `flow` must show; seeded, rare false alarms.
+
+Every test compares the mean of independent numbers in [0, B] with its exact or predicted value, by the
+empirical Bernstein inequality (Maurer and Pontil 2009, theorem 4): for any distribution, but with
+probability d, the mean of n is off to either side by at most
+    sqrt(2 V log(4 / d) / n) + 7 B log(4 / d) / (3 (n - 1)),        V the sample variance.
+`alarm`, 1e-6 for a whole run, is split over its tests. Particles that the implementation lost may have any
+value in [0, B]: their share of B is added to the margin.
+
+Work identity. A flow keeps phase-space volume, so whatever the walls do
+    mean exp(-W / kT) = A(t) / A(0)     for canonical starts at kT, W = E1 - E0, A the area of the table.
+exp(-W / kT) has a heavy tail where energy falls by half or more. So starts are drawn at the higher
+temperature kT / ratio and weighed: X = exp((ratio E0 - E1) / kT) / ratio has the same mean, and
+0 <= X <= 1 / ratio when every particle keeps `ratio` of its energy. By default that is the product of
+(shortest / longest)^2 over the table's lengths, which bounds adiabatic losses, for kT far above the energy
+of the walls' own speed. X is cut at 1 / ratio, so that a greater loss can only lower the mean, by its excess.
+
+One cycle. For uniform starts of one energy far above the walls', theory predicts the share p_nc never
+captured and the mean m1 of log E1 / E0 in the adiabatic limit; `bias` is granted for the distance from it.
+Captured is read from the state at the instant of least nu: in the cap, on a chord that does not reach the
+mouth. log E1 / E0 is cut to the range it has in theory, widened by `bias`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from math import log, pi, prod, sqrt
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+from mpmath import fp
+
+from scene import BadInput, Cap, Horizon, Mushroom, Outcome, Scene, State, Stem
+from scene.laws import bounds, value
+from scene.tables import laws, period, width_factors
+
+Captured = tuple[float, float] | None
+Flow = Callable[[Scene, Sequence[State], float], Sequence[tuple[Outcome, Captured]]]
+Floats = npt.NDArray[np.float64]
+ALARM = 1e-6
+
+
+class Finding(NamedTuple):
+    """One test: the mean measured, what it must be, how far it may be off."""
+
+    name: str
+    measured: float
+    expected: float
+    margin: float
+    n: int
+    lost: int
+
+    @property
+    def is_met(self) -> bool:
+        """Tell whether the mean is within its margin."""
+        return bool(abs(self.measured - self.expected) <= self.margin)
+
+    def __str__(self) -> str:
+        """Say it in one line."""
+        return (
+            f"{self.name}: {self.measured:.5f}, must be {self.expected:.5f} within {self.margin:.5f}"
+            f" ({self.n} particles, {self.lost} lost)"
+        )
+
+
+def work_identity(
+    flow: Flow,
+    scene: Scene,
+    *,
+    n_particles: int,
+    kT: float,
+    times: Sequence[float] = (0.25, 0.5, 0.75),
+    ratio: float | None = None,
+    seed: int = 0,
+    alarm: float = ALARM,
+) -> list[Finding]:
+    """Test mean exp(-W / kT) = A(t) / A(0) at several times.
+
+    Args:
+        flow: (scene, states, t_end) -> outcome and captured stay of each state.
+        scene: a valid scene that moves.
+        n_particles: drawn for every time anew, >= 2.
+        kT: temperature as an energy [length^2 / time^2], far above that of the walls' own speed.
+        times: of observation, as parts of the period.
+        ratio: least E1 / E0 that occurs, 0 < ratio <= 1; None takes it from the scene's laws.
+        seed: of the Philox streams.
+        alarm: chance of a false alarm in all tests together.
+
+    Returns:
+        A finding for each time.
+
+    Raises:
+        BadInput: the scene stands still, or an argument is outside its bounds.
+    """
+    shared = period(scene)
+    if shared is None:
+        raise BadInput("scene: nothing moves, must have a law that does")
+    ratio = least_ratio(scene) if ratio is None else ratio
+    _check_range("ratio", ratio, 0.0, 1.0)
+    _check_range("alarm", alarm, 0.0, 1.0)
+    _check_range("kT", kT, 0.0, 2.0**800)
+    span, found = float(shared.value(fp)), []
+    for i, part in enumerate(times):
+        states = canonical_states(scene, n_particles, kT / ratio, _generator(seed, i))
+        arrived = flow(scene, states, part * span)
+        pairs = [(_energy(s), _energy(o)) for s, (o, _) in zip(states, arrived, strict=True) if _is_kept(o)]
+        e0, e1 = np.array(pairs).reshape(-1, 2).T
+        x = np.minimum(np.exp((ratio * e0 - e1) / kT), 1.0) / ratio
+        expected = area(scene, part * span) / area(scene, 0.0)
+        found.append(
+            _finding(
+                f"mean exp(-W/kT) at {part:g} T", x, expected, 1 / ratio, n_particles, alarm / len(times)
+            )
+        )
+    return found
+
+
+def one_cycle(
+    flow: Flow,
+    scene: Mushroom,
+    *,
+    p_nc: float,
+    m1: float,
+    largest: float,
+    n_particles: int,
+    energy: float,
+    bias: float,
+    seed: int = 0,
+    alarm: float = ALARM,
+) -> list[Finding]:
+    """Test the share never captured and the mean of log E1 / E0 over one cycle against theory.
+
+    Args:
+        flow: as for `work_identity`.
+        scene: a mushroom, nu greatest at t = 0.
+        p_nc: share never captured, from `theory.predict`.
+        m1: mean of log E1 / E0, likewise.
+        largest: bound on |log E1 / E0| in theory.
+        n_particles: >= 2.
+        energy: of every start [length^2 / time^2], far above that of the walls' own speed.
+        bias: granted to both means for the distance from the adiabatic limit.
+        seed: of the Philox streams.
+        alarm: chance of a false alarm in both tests together.
+
+    Raises:
+        BadInput: the scene stands still, or an argument is outside its bounds.
+    """
+    shared = period(scene)
+    if shared is None:
+        raise BadInput("scene: nothing moves, must have a law that does")
+    _check_range("alarm", alarm, 0.0, 1.0)
+    span = float(shared.value(fp))
+    narrowest = span * least_nu(scene, span)
+    states = microcanonical_states(scene, n_particles, energy, _generator(seed, 0))
+    arrived = [o for o, _ in flow(scene, states, narrowest) if isinstance(o, Horizon)]
+    free = np.array([not _is_captured(scene, o) for o in arrived], dtype=float)
+    ended = [o for o, _ in flow(scene, states, span) if isinstance(o, Horizon)]
+    widest = largest + bias
+    s = np.clip([log(_energy(o) / energy) for o in ended], -widest, widest) + widest
+    tests = (("p_nc", free, p_nc, 1.0), ("m1", s, m1 + widest, 2 * widest))
+    found = [_finding(name, x, mean, b, n_particles, alarm / 2) for name, x, mean, b in tests]
+    found = [finding._replace(margin=finding.margin + bias) for finding in found]
+    return [found[0], found[1]._replace(measured=found[1].measured - widest, expected=m1)]
+
+
+def check_work_identity(flow: Flow, scene: Scene, *, n_particles: int, kT: float, seed: int = 0) -> None:
+    """Raise AssertionError, in one line, where `work_identity` is not met."""
+    for finding in work_identity(flow, scene, n_particles=n_particles, kT=kT, seed=seed):
+        if not finding.is_met:
+            raise AssertionError(f"work identity: {finding}")
+
+
+def margin(x: Floats, bound: float, alarm: float) -> float:
+    """Return how far the mean of independent x in [0, bound] may be off, but with chance `alarm`."""
+    n, logarithm = len(x), log(4 / alarm)
+    return sqrt(2 * float(np.var(x, ddof=1)) * logarithm / n) + 7 * bound * logarithm / (3 * (n - 1))
+
+
+def area(scene: Scene, t: float) -> float:
+    """Return the area of the table at a time [length^2]."""
+    cap, stem = _areas(scene, t)
+    return cap + stem
+
+
+def least_ratio(scene: Scene) -> float:
+    """Return the product of (least / greatest)^2 over the lengths of the table."""
+    found = [bounds(law) for name, law in laws(scene).items() if name in ("r", "w", "h")]
+    return prod((law.lowest / law.highest) ** 2 for law in found)
+
+
+def least_nu(scene: Mushroom, span: float) -> float:
+    """Return the instant of least nu as a part of the period, the middle of a plateau."""
+    parts = np.arange(4096) / 4096
+    nu = np.array([_half_width(scene, span * p) / float(value(fp, scene.r, span * p)) for p in parts])
+    low = parts[nu <= nu.min() * (1 + 2.0**-40)]
+    return float(low[0] + low[-1]) / 2
+
+
+def canonical_states(scene: Scene, n: int, kT: float, random: np.random.Generator) -> list[State]:
+    """Draw starts at t = 0 uniform in area, velocities Gaussian of variance kT each way."""
+    v = sqrt(kT) * random.standard_normal((n, 2))
+    return _states(scene, v, random)
+
+
+def microcanonical_states(scene: Scene, n: int, energy: float, random: np.random.Generator) -> list[State]:
+    """Draw starts at t = 0 uniform in area and direction, all of one energy."""
+    angle = 2 * pi * random.random(n)
+    return _states(scene, sqrt(2 * energy) * np.column_stack([np.cos(angle), np.sin(angle)]), random)
+
+
+def _states(scene: Scene, v: Floats, random: np.random.Generator) -> list[State]:
+    cap, stem = _areas(scene, 0.0)
+    now = {name: float(value(fp, law, 0.0)) for name, law in laws(scene).items()}
+    r, h, slope = now.get("r", 0.0), now.get("h", 0.0), now.get("slope", 0.0)
+    w = 0.0 if isinstance(scene, Cap) else _half_width(scene, 0.0)
+    found = []
+    for (vx, vy), pick, a, b in zip(v, *random.random((3, len(v))), strict=True):
+        if pick * (cap + stem) < cap:
+            x, y = r * sqrt(a) * np.cos(pi * b), r * sqrt(a) * np.sin(pi * b)
+        else:  # at depth d the stem is w - slope d wide: invert 2 w d - slope d^2 = a stem
+            d = a * stem / (w + sqrt(max(w * w - slope * a * stem, 0.0)))
+            x, y = (w - slope * min(d, h)) * (2 * b - 1), -d
+        found.append(State(0.0, float(x), float(y), float(vx), float(vy)))
+    return found
+
+
+def _areas(scene: Scene, t: float) -> tuple[float, float]:
+    now = {name: float(value(fp, law, t)) for name, law in laws(scene).items()}
+    cap = 0.0 if isinstance(scene, Stem) else pi * now["r"] ** 2 / 2
+    if isinstance(scene, Cap):
+        return cap, 0.0
+    return cap, 2 * _half_width(scene, t) * now["h"] - now["slope"] * now["h"] ** 2
+
+
+def _half_width(scene: Stem | Mushroom, t: float) -> float:
+    return prod(float(value(fp, law, t)) for law in width_factors(scene))
+
+
+def _is_captured(scene: Mushroom, at: Horizon) -> bool:
+    spin = abs(at.x * at.vy - at.y * at.vx)
+    return at.y > 0 and spin > _half_width(scene, at.t) * sqrt(2 * _energy(at))
+
+
+def _energy(at: State | Outcome) -> float:
+    assert isinstance(at, State | Horizon)
+    return (at.vx**2 + at.vy**2) / 2
+
+
+def _is_kept(outcome: Outcome) -> bool:
+    return isinstance(outcome, Horizon)
+
+
+def _generator(seed: int, stream: int) -> np.random.Generator:
+    return np.random.Generator(np.random.Philox(key=seed, counter=[0, 0, 0, stream]))
+
+
+def _finding(name: str, x: Floats, expected: float, bound: float, n: int, alarm: float) -> Finding:
+    if len(x) < 2:
+        return Finding(name, float("nan"), expected, 0.0, n, n - len(x))
+    lost = n - len(x)
+    allowed = margin(x, bound, alarm) + bound * lost / n
+    return Finding(name, float(x.mean()), expected, allowed, n, lost)
+
+
+def _check_range(field: str, number: float, low: float, high: float) -> None:
+    if not low < number <= high:
+        raise BadInput(f"{field} = {number!r}, must be above {low:g} and at most {high:g}")

@@ -1,0 +1,390 @@
+"""Exact properties of the billiard, to hold any Python stepper to, with no certified answer at hand.
+
+A check takes a stepper, a question and raises AssertionError, in one line, when the answer breaks the
+property. It returns True when it compared numbers and False when it had nothing to say: the outcome
+is undecided or undefined, the property is not about this table, or the question is so delicate that nudging
+it changes the wall. In a Hypothesis test:
+
+    @given(conformance.strategies.scenes_and_states())
+    def test_mirror(drawn):
+        conformance.properties.check_mirror(my_stepper, *drawn)
+
+Mirror and power-of-two scaling hold bit for bit in any stepper whose arithmetic is binary64 and which has no
+absolute tolerance and treats both sides alike; `is_exact=False` asks for them within rounding. All others
+hold within rounding: `bound` is the backward error granted (1e-9 by default, as in the physics verdict),
+and what it does to the answer is measured on the stepper itself (`conformance.sensitivity`). The work
+identity, a property of whole ensembles, is `conformance.profiles.check_work_identity`.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Sequence
+from fractions import Fraction
+from functools import partial
+from math import hypot
+
+import msgspec
+from mpmath import MPContext
+
+from conformance import sensitivity, transforms
+from conformance.sensitivity import Stepper, measured, numbers
+from scene import Collision, Horizon, Outcome, Rejected, Scene, State, Undecided, to_data
+from scene.laws import is_constant
+from scene.tables import laws, period
+
+BOUND = 1e-9
+SLACK = 4.0  # first-order errors of two answers, each estimated by differences
+NAMES = ("dt", "t", "x", "y", "vx", "vy")
+STEP = 2.0**-16  # relative, of the differences of `check_symplectic`
+LEAST, MOST = 2.0**-400, 2.0**400  # numbers whose squares neither vanish nor overflow
+
+
+def check_mirror(
+    stepper: Stepper, scene: Scene, state: State, t_end: float, *, is_exact: bool = True, bound: float = BOUND
+) -> bool:
+    """Hold x -> -x to give the mirror image of the answer.
+
+    Args:
+        stepper: (scene, state, t_end) -> outcome.
+        scene: a valid scene.
+        state: of a particle.
+        t_end: horizon [time].
+        is_exact: bit for bit, else within rounding.
+        bound: backward error granted when not exact.
+
+    Returns:
+        Whether there was something to compare.
+
+    Raises:
+        AssertionError: one line: what differs, and the question.
+    """
+    answer = stepper(scene, state, t_end)
+    image = stepper(scene, transforms.mirrored(state), t_end)
+    expected = _changed(answer, (1, 1, -1, 1, -1, 1), transforms.mirrored_wall)
+    return _compare("mirror in x", stepper, scene, state, t_end, image, expected, is_exact, bound)
+
+
+def check_scaling(
+    stepper: Stepper,
+    scene: Scene,
+    state: State,
+    t_end: float,
+    *,
+    length: int = 0,
+    time: int = 0,
+    is_exact: bool = True,
+    bound: float = BOUND,
+) -> bool:
+    """Hold lengths times 2^length and times times 2^time to scale the answer alike.
+
+    Bit for bit as long as all numbers, before and after, lie between 2^-400 and 2^400 in size or are 0;
+    elsewhere nothing is compared. Arguments and results otherwise as in `check_mirror`.
+    """
+    unit, size, speed = 2.0**time, 2.0**length, 2.0 ** (length - time)
+    answer = stepper(scene, state, t_end)
+    inputs = [t_end, state.t, state.x, state.y, state.vx, state.vy, *(numbers(answer, state) or ())]
+    if any(part and not LEAST < abs(part) * f < MOST for part in inputs for f in (1.0, unit, size, speed)):
+        return False
+    image = stepper(
+        transforms.scaled(scene, length, time), transforms.scaled_state(state, length, time), unit * t_end
+    )
+    unscaled = _changed(image, (1 / unit, 1 / unit, 1 / size, 1 / size, 1 / speed, 1 / speed))
+    return _compare("scaling", stepper, scene, state, t_end, unscaled, answer, is_exact, bound)
+
+
+def check_static_limit(
+    stepper: Stepper, scene: Scene, state: State, t_end: float, *, is_exact: bool = True, bound: float = BOUND
+) -> bool:
+    """Hold laws of amplitude zero to equal constants, in the scene frozen at the time of the state.
+
+    Bit for bit where a law's value is its mean plus a sum of zeros. See `check_mirror`.
+    """
+    still = transforms.frozen(scene, state.t)
+    answer = stepper(still, state, t_end)
+    idle = stepper(transforms.idle(still), state, t_end)
+    return _compare("static limit", stepper, still, state, t_end, idle, answer, is_exact, bound)
+
+
+def check_period_shift(
+    stepper: Stepper,
+    scene: Scene,
+    state: State,
+    t_end: float,
+    *,
+    is_exact: bool = False,
+    bound: float = BOUND,
+) -> bool:
+    """Hold one whole period later to change nothing but t.
+
+    The shifted times are rounded: by how much is known, and enters as an error of t. `is_exact` asks for
+    equal bits where nothing is rounded at all. See `check_mirror`.
+    """
+    shared, answer = period(scene), stepper(scene, state, t_end)
+    if shared is None or not isinstance(answer, Collision | Horizon):
+        return False
+    ctx = MPContext()
+    ctx.dps = 50
+    shift = shared.value(ctx)
+    later, span = float(state.t + shift), t_end - state.t
+    late = State(later, state.x, state.y, state.vx, state.vy, state.wall)
+    # A collision must not be lost to the rounding of t_end.
+    end = later + (2 * span if isinstance(answer, Collision) else span)
+    image = stepper(scene, late, end)
+    rounding = float(abs(ctx.mpf(later) - state.t - shift))
+    if isinstance(answer, Horizon):
+        rounding += float(abs(ctx.mpf(end) - t_end - shift))
+    if isinstance(image, Collision | Horizon):
+        image = msgspec.structs.replace(image, t=answer.t)
+    is_exact = is_exact and rounding == 0.0
+    incoming = (rounding + bound * abs(later), 0.0, 0.0, 0.0, 0.0)
+    return _compare("period shift", stepper, scene, state, t_end, image, answer, is_exact, bound, incoming)
+
+
+def check_split_flight(
+    stepper: Stepper, scene: Scene, state: State, t_end: float, *, bound: float = BOUND
+) -> bool:
+    """Hold a flight that is stopped halfway and taken up again to meet the same wall. See `check_mirror`."""
+    whole = measured(stepper, scene, state, t_end, bound)
+    if whole is None or not isinstance(whole.outcome, Collision):
+        return False
+    middle = state.t + whole.outcome.dt / 2
+    half = measured(stepper, scene, state, middle, bound)
+    if half is None or middle == state.t:
+        return False
+    if not isinstance(half.outcome, Horizon):
+        _fail("split flight", f"{half.outcome} before half of the flight", scene, state, t_end)
+    rest = measured(stepper, scene, half.state(), t_end, bound, half.errors[1:])
+    if rest is None:
+        return False
+    if not isinstance(rest.outcome, Collision) or rest.outcome.wall != whole.outcome.wall:
+        _fail("split flight", f"then {rest.outcome}, at once {whole.outcome}", scene, state, t_end)
+    taken = float(Fraction(middle) - Fraction(state.t)) + rest.numbers[0]
+    allowed = [a + b for a, b in zip(whole.errors, rest.errors, strict=True)]
+    _near("split flight", (taken, *rest.numbers[1:]), whole.numbers, allowed, scene, state, t_end)
+    return True
+
+
+def check_reversal(
+    stepper: Stepper, scene: Scene, state: State, t_end: float, *, bound: float = BOUND
+) -> bool:
+    """Hold the path across one bounce to be retraced when velocity and laws are reversed.
+
+    From the state over its collision, which it must be able to go on from, to half of the next flight,
+    then back to half of the first. The errors granted are carried along through every step. See
+    `check_mirror`.
+    """
+    there = measured(stepper, scene, state, t_end, bound)
+    if there is None or not isinstance(there.outcome, Collision):
+        return False
+    if isinstance(refusal := stepper(scene, there.state(), max(t_end, there.outcome.t)), Rejected):
+        _fail("time reversal", f"{there.outcome} leads nowhere: {refusal.reason}", scene, state, t_end)
+    way = _across_bounce(stepper, scene, state, t_end)
+    if way is None:
+        return False
+    begin, hit, end = way
+    film = transforms.backwards(scene)
+    onward = measured(stepper, scene, there.state(), end, bound, there.errors[1:])
+    if onward is None or not isinstance(onward.outcome, Horizon):
+        return False
+    _, t, x, y, vx, vy = onward.numbers
+    back = measured(stepper, film, State(-t, x, y, -vx, -vy), -begin.t, bound, onward.errors[1:])
+    if back is None:
+        return False
+    if not isinstance(back.outcome, Collision) or back.outcome.wall != hit.wall:
+        _fail("time reversal", f"{hit.wall} there, {back.outcome} on the way back", scene, state, t_end)
+    home = measured(stepper, film, back.state(), -begin.t, bound, back.errors[1:])
+    if home is None or not isinstance(home.outcome, Horizon):
+        return False
+    _, _, x, y, vx, vy = home.numbers
+    expected = (0.0, 0.0, begin.x, begin.y, begin.vx, begin.vy)
+    _near("time reversal", (0.0, 0.0, x, y, -vx, -vy), expected, home.errors, scene, state, t_end)
+    return True
+
+
+def check_angular_momentum(
+    stepper: Stepper, scene: Scene, state: State, t_end: float, *, bound: float = BOUND
+) -> bool:
+    """Hold x vy - y vx through flight and arc, which only pushes towards the centre.
+
+    Where the base is met it changes sign, at rest as it is. Other walls are not compared.
+    """
+    step = measured(stepper, scene, state, t_end, bound)
+    if step is None or not isinstance(step.outcome, Collision) or step.outcome.wall not in ("arc", "base"):
+        return False
+    _, _, x, y, vx, vy = step.numbers
+    _, _, dx, dy, dvx, dvy = step.errors
+    before, after = state.x * state.vy - state.y * state.vx, x * vy - y * vx
+    if step.outcome.wall == "base":
+        after = -after
+    allowed = abs(vy) * dx + abs(vx) * dy + abs(x) * dvy + abs(y) * dvx
+    allowed += bound * hypot(state.x, state.y) * hypot(state.vx, state.vy)
+    if not abs(after - before) <= SLACK * allowed:
+        text = f"x vy - y vx = {before!r} before and {after!r} after {step.outcome.wall}"
+        _fail("angular momentum", text, scene, state, t_end)
+    return True
+
+
+def check_energy(stepper: Stepper, scene: Scene, state: State, t_end: float, *, bound: float = BOUND) -> bool:
+    """Hold the speed to stay in a static table, whatever is met."""
+    answer = stepper(scene, state, t_end)
+    found = numbers(answer, state)
+    if found is None or not all(is_constant(law) for law in laws(scene).values()):
+        return False
+    before, after = hypot(state.vx, state.vy), hypot(*found[4:])
+    if not abs(after - before) <= SLACK * bound * before:
+        _fail("energy", f"speed {before!r} becomes {after!r} in a static table", scene, state, t_end)
+    return True
+
+
+def check_symplectic(
+    stepper: Stepper, scene: Scene, state: State, t_end: float, *, bound: float = BOUND
+) -> bool:
+    """Hold the map (x, y, vx, vy) -> (x, y, vx, vy) across one bounce to be symplectic.
+
+    Its matrix M is taken by central differences of two widths, extrapolated; their difference bounds what
+    is left. M^T J M = J must hold within that, and within `bound` over the width.
+    """
+    way = _across_bounce(stepper, scene, state, t_end)
+    if way is None:
+        return False
+    begin, hit, end = way
+    scale = sensitivity.scales(scene, state)
+    units = (scale.length, scale.length, scale.speed, scale.speed)
+    coarse, fine = (_flow_matrix(stepper, scene, begin, hit, end, units, width) for width in (STEP, STEP / 2))
+    if coarse is None or fine is None:
+        return False
+    M = [[(4 * b - a) / 3 for a, b in zip(*rows, strict=True)] for rows in zip(coarse, fine, strict=True)]
+    entries = [abs(m) for row in M for m in row]
+    gap = max(abs(a - b) for rows in zip(coarse, fine, strict=True) for a, b in zip(*rows, strict=True))
+    # The time of the hit is rounded like t, whatever the stepper.
+    noise = bound + 2.0**-50 * max(abs(begin.t), abs(end)) / scale.time
+    allowed = 16 * max(entries) * gap + SLACK * max(entries) ** 2 * noise / STEP
+    for i in range(4):
+        for j in range(i):
+            form = sum(M[k][i] * M[k + 2][j] - M[k + 2][i] * M[k][j] for k in (0, 1))
+            wanted = {(2, 0): -1.0, (3, 1): -1.0}.get((i, j), 0.0)
+            if not abs(form - wanted) <= allowed:
+                text = f"(M^T J M)[{i}][{j}] = {form:.9g}, must be {wanted:g} within {allowed:.3g}"
+                _fail("symplectic", text, scene, state, t_end)
+    return True
+
+
+PROPERTIES: dict[str, Callable[..., bool]] = {
+    "mirror": check_mirror,
+    "scaling-of-lengths": partial(check_scaling, length=-40),
+    "scaling-of-times": partial(check_scaling, time=-40),
+    "static-limit": check_static_limit,
+    "period-shift": check_period_shift,
+    "split-flight": check_split_flight,
+    "reversal": check_reversal,
+    "angular-momentum": check_angular_momentum,
+    "energy": check_energy,
+    "symplectic": check_symplectic,
+}
+
+
+def _across_bounce(
+    stepper: Stepper, scene: Scene, state: State, t_end: float
+) -> tuple[State, Collision, float] | None:
+    """Return the state halfway to the collision, the collision, and the time halfway to the next event."""
+    hit = stepper(scene, state, t_end)
+    if not isinstance(hit, Collision) or not hit.t < t_end:
+        return None
+    following = stepper(scene, hit.state(), t_end)
+    if not isinstance(following, Collision | Horizon):
+        return None
+    end, half = (hit.t + following.t) / 2, hit.dt / 2
+    begin = State(state.t + half, state.x + state.vx * half, state.y + state.vy * half, state.vx, state.vy)
+    return (begin, hit, end) if state.t < begin.t < hit.t < end else None
+
+
+def _flow_matrix(
+    stepper: Stepper,
+    scene: Scene,
+    begin: State,
+    hit: Collision,
+    end: float,
+    units: Sequence[float],
+    width: float,
+) -> list[list[float]] | None:
+    """Differentiate the state at `end` by that at `begin`, in the given units; rows by outputs."""
+    columns = []
+    for field, unit in zip(("x", "y", "vx", "vy"), units, strict=True):
+        ends = []
+        for sign in (-1, 1):
+            parts = {name: getattr(begin, name) for name in begin.__struct_fields__}
+            first = stepper(scene, State(**parts | {field: parts[field] + sign * width * unit}), end)
+            if not isinstance(first, Collision) or first.wall != hit.wall:
+                return None
+            last = stepper(scene, first.state(), end)
+            if not isinstance(last, Horizon):
+                return None
+            ends.append((last.x, last.y, last.vx, last.vy))
+        columns.append([(b - a) / (2 * width * u) for a, b, u in zip(*ends, units, strict=True)])
+    return [list(row) for row in zip(*columns, strict=True)]
+
+
+def _changed(
+    outcome: Outcome, factors: Sequence[float], wall: Callable[..., object] = lambda name: name
+) -> Outcome:
+    """Return an outcome with dt, t, x, y, vx, vy times factors and another wall."""
+    if isinstance(outcome, Collision):
+        parts = (getattr(outcome, name) * f for name, f in zip(NAMES, factors, strict=True))
+        return Collision(wall(outcome.wall), *parts)  # type: ignore[arg-type]
+    if isinstance(outcome, Horizon):
+        return Horizon(*(getattr(outcome, name) * f for name, f in zip(NAMES[1:], factors[1:], strict=True)))
+    return outcome
+
+
+def _compare(
+    name: str,
+    stepper: Stepper,
+    scene: Scene,
+    state: State,
+    t_end: float,
+    answer: Outcome,
+    expected: Outcome,
+    is_exact: bool,
+    bound: float,
+    incoming: Sequence[float] = (0.0,) * 5,
+) -> bool:
+    """Compare two outcomes that must be the same, bit for bit or within rounding."""
+    if isinstance(answer, Undecided) or isinstance(expected, Undecided):
+        return False
+    is_same_kind = type(answer) is type(expected)
+    is_same = is_same_kind and getattr(answer, "wall", None) == getattr(expected, "wall", None)
+    allowed: Sequence[float] = (0.0,) * 6
+    if not is_exact:
+        step = measured(stepper, scene, state, t_end, bound, incoming)
+        if step is None:
+            return False
+        allowed = [2 * error for error in step.errors]
+    if not is_same:
+        _fail(name, f"{answer}, must be {expected}", scene, state, t_end)
+    found, wanted = numbers(answer, state), numbers(expected, state)
+    if found is None or wanted is None:
+        return False
+    _near(name, found, wanted, allowed, scene, state, t_end)
+    return True
+
+
+def _near(
+    name: str,
+    found: Sequence[float],
+    wanted: Sequence[float],
+    allowed: Sequence[float],
+    scene: Scene,
+    state: State,
+    t_end: float,
+) -> None:
+    for part, a, b, error in zip(NAMES, found, wanted, allowed, strict=True):
+        if not abs(a - b) <= SLACK * error:
+            within = f" within {SLACK * error:.3g}" if error else ""
+            _fail(name, f"{part} = {a!r}, must be {b!r}{within}", scene, state, t_end)
+
+
+def _fail(name: str, text: str, scene: Scene, state: State, t_end: float) -> None:
+    fields = {field: getattr(state, field) for field in state.__struct_fields__}
+    line = {"cmd": "step", "seq": 1, "scene": to_data(scene), "state": fields, "t_end": t_end}
+    raise AssertionError(f"{name}: {text}; {json.dumps(line)}")

@@ -20,6 +20,7 @@ from rich.table import Table
 import mushrooms
 import scene as scenes
 from mushrooms import output
+from mushrooms.check import check
 from scene.load import read_data
 from scene.refusal import BadInput
 from scene.tables import period
@@ -316,6 +317,9 @@ def draw(
         path.parent, {path.name: lambda file: pictures.write_picture(table, path.suffix, file)}
     )
     print(path)
+
+
+app.command(epilog="Example: mushrooms check --html report.html -- ./my_stepper")(check)
 
 
 def _check_range(option: str, value: int, low: int, high: int | None = None) -> None:

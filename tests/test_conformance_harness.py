@@ -1,0 +1,103 @@
+"""The example harnesses, built and graded at level core wherever their language is present."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from conformance import suite, vectors
+from scene.load import read_data
+
+FOLDER = Path(suite.__file__).parent / "harness"
+LANGUAGES = ("python", "c", "javascript")
+# One vector in so many, to save time; `mushrooms check` grades them with all.
+EVERY = {"python": 16, "c": 3, "javascript": 6}
+
+
+@pytest.fixture(scope="session")
+def commands(tmp_path_factory) -> dict[str, list[str] | str]:
+    """Return each harness's command, or why it cannot run here."""
+    node, compiler = shutil.which("node"), shutil.which("gcc") or shutil.which("cc")
+    found: dict[str, list[str] | str] = {"python": [sys.executable, str(FOLDER / "python" / "stepper.py")]}
+    found["javascript"] = (
+        [node, str(FOLDER / "javascript" / "stepper.js")] if node else "node is not installed"
+    )
+    found["c"] = "no C compiler is installed"
+    if compiler:
+        program = tmp_path_factory.mktemp("c") / "stepper"
+        source = str(FOLDER / "c" / "stepper.c")
+        flags = ["-O3", "-Wall", "-Wextra", "-Werror", "-std=gnu11"]
+        probe = subprocess.run(
+            [compiler, "-E", "-xc", "-"],
+            input="#include <jansson.h>",
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        if probe.returncode:
+            found["c"] = "jansson.h is not installed (Debian: libjansson-dev)"
+        else:
+            line = [compiler, *flags, "-o", str(program), source, "-ljansson", "-lm"]
+            subprocess.run(line, check=True, capture_output=True)
+            found["c"] = [str(program)]
+    return found
+
+
+@pytest.mark.parametrize("language", LANGUAGES)
+def test_an_example_passes_at_level_core(language, commands, monkeypatch, tally):
+    command = commands[language]
+    if isinstance(command, str):
+        tally[f"{language} not run: {command}"] += 1
+        pytest.skip(command)
+    chosen = vectors.load("core")[:: EVERY[language]]
+    monkeypatch.setattr(suite, "choose", lambda *_: chosen)
+    monkeypatch.setattr(suite.suite_properties, "N_QUESTIONS", 4)
+    run = suite.check(command)
+    assert run.objections() == []
+    assert run.exit_code() == 0
+    assert set(run.counts()) <= {"pass", "declined"}
+    assert run.counts()["declined"] <= 3
+    assert run.precision() in ("A", "B")
+    assert run.n_restarts == 0
+    assert run.stderr == ""
+    assert run.speed is not None
+    assert run.speed.best_ns > 0
+    tally[f"{language}: vectors"] += len(chosen)
+
+
+BAD = [
+    ({"scene": {"table": "cap", "r": -1.0}}, "rejected"),
+    ({"scene": {"table": "cap", "r": 1.0, "w": 1.0}}, "rejected"),
+    ({"scene": {"table": "cup", "r": 1.0}}, "rejected"),
+    ({"scene": {"table": "cap"}}, "rejected"),
+    ({"scene": read_data("moving-cap-as-printed")}, "rejected"),
+    ({"state": {"t": 0.0, "x": 5.0, "y": 0.5, "vx": 1.0, "vy": 0.0, "wall": None}}, "rejected"),
+    ({"state": {"t": 0.0, "x": 0.0, "y": 0.5, "vx": 1.0, "vy": 0.0, "wall": "lid"}}, "rejected"),
+    ({"state": {"t": 0.0, "x": 0.0, "y": 0.5, "vx": 1.0, "vy": 0.0, "wall": "arc"}}, "rejected"),
+    ({"t_end": -1.0}, "rejected"),
+    ({"state": {"t": 0.0, "x": 0.0, "y": 0.5, "vx": 1e200, "vy": 0.0, "wall": None}}, "undecided"),
+]
+GOOD = {"cmd": "step", "seq": 5, "scene": {"table": "cap", "r": 1.0}, "t_end": 9.0}
+GOOD["state"] = {"t": 0.0, "x": 0.0, "y": 0.5, "vx": 1.0, "vy": 0.0, "wall": None}
+
+
+@pytest.mark.parametrize("language", LANGUAGES)
+def test_an_example_refuses_bad_input_and_lives_on(language, commands):
+    command = commands[language]
+    if isinstance(command, str):
+        pytest.skip(command)
+    lines = ["nonsense", "[]", "5", '{"cmd":"dance","seq":1}']
+    lines += [json.dumps({**GOOD, **changes}) for changes, _ in BAD] + [json.dumps(GOOD), '{"cmd":"stop"}']
+    run = subprocess.run(
+        command, input="\n".join(lines) + "\n", capture_output=True, text=True, timeout=60, check=True
+    )
+    assert run.stderr == ""
+    answers = [json.loads(line) for line in run.stdout.splitlines()]
+    assert [a["outcome"] for a in answers[:4]] == ["rejected"] * 4
+    assert [a["outcome"] for a in answers[4:-1]] == [outcome for _, outcome in BAD]
+    assert (answers[-1]["seq"], answers[-1]["outcome"], answers[-1]["wall"]) == (5, "collision", "arc")

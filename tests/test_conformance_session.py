@@ -1,0 +1,270 @@
+"""The runner against implementations that break the protocol: the exact verdict, no hang, nothing left."""
+
+from __future__ import annotations
+
+import secrets
+import sys
+from pathlib import Path
+
+import pytest
+from saboteurs import HONEST, SABOTEURS
+
+from conformance import suite
+from conformance.process import CommandNotFound, Trouble
+from conformance.session import Limits, Session, check_echo, probe_values, read_answer
+from conformance.vectors import Certified, Expectation, Vector
+from scene import State
+
+SCRIPT = Path(__file__).parent / "saboteurs.py"
+N = 3
+PATIENT = Limits(timeout=30.0, restarts=N + 2)
+HASTY = Limits(timeout=1.5, restarts=0)
+CASES = ["protocol/start", "protocol/echo", "protocol/rejects", *(f"made-up/{i}" for i in range(N))]
+CASES.append("protocol/stop")
+
+
+def made_up(number: int) -> Vector:
+    """A head-on hit of a unit circle, whose answer every citizen knows by heart."""
+    numbers = {"dt": "1", "x": "0.6", "y": "0.8", "vx": "-0.6", "vy": "-0.8"}
+    ends = {name: (value, value) for name, value in numbers.items()}
+    right = Certified(**ends, allowance=(1.0,) * 5, wall="arc")
+    return Vector(
+        id=f"made-up/{number}",
+        group="made-up",
+        level="core",
+        kind="step",
+        rule="a stand-in",
+        source="none",
+        scene={"table": "cap", "r": 1.0},
+        state=State(0.0, 0.0, 0.0, 0.6, 0.8),
+        t_end=9.0,
+        expect=(Expectation("collision", (right,)),),
+    )
+
+
+@pytest.fixture
+def verdicts(monkeypatch):
+    """Return what runs the suite on a saboteur and gives its results by case; nothing may be left running."""
+    token = f"SABOTAGE={secrets.token_hex(8)}"
+    monkeypatch.setenv(*token.split("="))
+    monkeypatch.setattr(suite.suite_properties, "N_QUESTIONS", 0)
+    monkeypatch.setattr(suite, "choose", lambda *_: [made_up(i) for i in range(N)])
+
+    def run(name: str, limits: Limits) -> suite.Run:
+        command = [sys.executable, "-I", "-S", str(SCRIPT), name]
+        found = suite.check(command, limits=limits)
+        assert [result.id for result in found.results] in (
+            CASES,
+            CASES[:2] + CASES[3:-1],
+            CASES[:1] + CASES[3:-1],
+        )
+        assert alive(token) == []
+        return found
+
+    return run
+
+
+def alive(token: str) -> list[int]:
+    """List the processes whose environment holds the token."""
+    found = []
+    for entry in Path("/proc").glob("[0-9]*"):
+        try:
+            if token.encode() in (entry / "environ").read_bytes():
+                found.append(int(entry.name))
+        except OSError:
+            continue
+    return found
+
+
+@pytest.mark.parametrize("name", HONEST)
+def test_honest_ones_pass_whatever_their_manners(verdicts, name):
+    run = verdicts(name, PATIENT)
+    assert run.counts() == {"pass": len(CASES)}, run.results
+    assert run.exit_code() == 0
+    assert len(run.stderr) < 100_000
+    assert ("bytes left out" in run.stderr) == (name == "noise")
+
+
+# What each saboteur gets for every question, and a word of the reason.
+AT_EVERY_STEP = {
+    "huge-line": ("wrong-format", "longer than"),
+    "endless-line": ("wrong-format", "longer than"),
+    "wrong-seq": ("wrong-format", "answered seq"),
+    "no-seq": ("wrong-format", "answered seq None"),
+    "duplicate": ("wrong-format", "more than one line"),
+    "split-line": ("wrong-format", "line"),
+    "junk": ("wrong-format", "debug: stepping"),
+    "blank-line": ("wrong-format", "''"),
+    "not-utf8": ("wrong-format", "utf-8"),
+    "deep-nesting": ("wrong-format", "[[["),
+    "nan": ("wrong-format", "JSON"),
+    "infinity": ("wrong-format", "out of range"),
+    "number-as-text": ("wrong-format", "`float`"),
+    "missing-field": ("wrong-format", "`vy`"),
+    "unknown-wall": ("wrong-format", "lid"),
+    "reason-of-its-own": ("wrong-format", "reason"),
+    "own-error": ("error", "out of memory"),
+    "exit-silently": ("crashed", "exited with status 0 before it answered"),
+    "close-stdout": ("crashed", "closed its standard output"),
+    "fork-and-die": ("crashed", "exited with status 3"),
+    "daemon": ("crashed", "exited with status 3"),
+}
+
+
+@pytest.mark.parametrize("name", AT_EVERY_STEP)
+def test_a_fault_in_every_answer(verdicts, name):
+    run = verdicts(name, PATIENT)
+    verdict, word = AT_EVERY_STEP[name]
+    asked = [result for result in run.results if result.group == "made-up"]
+    assert [result.verdict for result in asked] == [verdict] * N, asked
+    assert all(word in result.why for result in asked), asked
+    assert all("\n" not in result.why for result in asked)
+    assert run.counts()["pass"] <= 4
+    assert run.exit_code() == 1
+    # An error of its own is no reason to restart; all else is.
+    assert run.n_restarts == (0 if verdict == "error" else N - 1)
+
+
+# What each that breaks the introduction or the probe gets, for the whole session.
+AT_THE_DOOR = {
+    "early-answers": ("start", "more than one line"),
+    "banner": ("start", ""),
+    "other-protocol": ("start", "protocol 2"),
+    "fifteen-digits": ("echo", "values["),
+    "no-minus-zero": ("echo", "values[1] = -0.0 came back as 0.0"),
+    "flush-subnormals": ("echo", "5e-324 came back as 0.0"),
+    "misread-exponents": ("echo", "1e+22 came back as 1e+21"),
+    "fewer-numbers": ("echo", "numbers came back"),
+}
+
+
+@pytest.mark.parametrize("name", AT_THE_DOOR)
+def test_a_session_that_never_begins(verdicts, name):
+    run = verdicts(name, PATIENT)
+    where, word = AT_THE_DOOR[name]
+    by_id = {result.id: result for result in run.results}
+    assert by_id[f"protocol/{where}"].verdict == "wrong-format"
+    assert word in by_id[f"protocol/{where}"].why
+    assert run.counts()["pass"] == (1 if where == "echo" else 0)
+    assert run.counts()["wrong-format"] == N + 1
+    assert f"not asked: {where} failed" in by_id["made-up/0"].why
+    assert run.exit_code() == 1
+
+
+# Those that keep silent; their limit is short, and there is no second process.
+SILENT = {
+    "hang": "no answer within 1.5 s",
+    "late-answer": "no answer within 1.5 s",
+    "ignore-sigterm": "no answer within 1.5 s",
+    "half-a-line": 'after \'{"seq":',
+    "flood-stderr": "no answer within 1.5 s",
+}
+
+
+@pytest.mark.parametrize("name", SILENT)
+def test_silence_ends_at_the_limit(verdicts, name):
+    run = verdicts(name, HASTY)
+    first, *others = [result for result in run.results if result.group == "made-up"]
+    assert first.verdict == "timed-out"
+    assert SILENT[name] in first.why
+    assert first.seconds < HASTY.timeout + 5
+    assert {result.verdict for result in others} == {"error"}
+    assert all("restarted 0 times" in result.why for result in others)
+    assert run.counts()["pass"] == 3
+    assert run.exit_code() == 1
+
+
+def test_silence_at_the_start_is_the_verdict_of_all(verdicts):
+    run = verdicts("hang-at-start", HASTY)
+    assert run.counts() == {"timed-out": N + 1}
+    assert run.exit_code() == 1
+
+
+# Single faults: the case and its verdict; all other cases pass.
+ONCE = {
+    "crash-on-invalid": ("protocol/rejects", "crashed", "status 1"),
+    "guess-on-invalid": ("protocol/rejects", "fail", "without vy"),
+    "crash-at-second": ("made-up/1", "crashed", "SIGSEGV"),
+    "ignore-stop": ("protocol/stop", "timed-out", "after `stop`"),
+    "leave-a-child": ("protocol/stop", "fail", "child"),
+    "talk-after-stop": ("protocol/stop", "wrong-format", "goodbye"),
+}
+
+
+@pytest.mark.parametrize("name", ONCE)
+def test_a_single_fault_is_found_and_nothing_else_suffers(verdicts, name):
+    case, verdict, word = ONCE[name]
+    run = verdicts(name, PATIENT)
+    by_id = {result.id: result for result in run.results}
+    assert by_id[case].verdict == verdict
+    assert word in by_id[case].why
+    assert run.counts()["pass"] == len(CASES) - 1
+    assert run.exit_code() == 1
+    assert "Traceback" in run.stderr or name != "crash-on-invalid"
+
+
+def test_an_answer_to_the_question_before(verdicts):
+    run = verdicts("stale-answer", PATIENT)
+    asked = [result.verdict for result in run.results if result.group == "made-up"]
+    assert asked == ["pass", "wrong-format", "pass"]
+
+
+def test_every_saboteur_is_met():
+    met = {*HONEST, *AT_EVERY_STEP, *AT_THE_DOOR, *SILENT, *ONCE, "hang-at-start", "stale-answer"}
+    assert met == set(SABOTEURS)
+
+
+def test_a_command_that_does_not_exist():
+    with pytest.raises(CommandNotFound, match="no-such-stepper"), Session(["./no-such-stepper"]) as session:
+        session.start()
+
+
+def test_leaving_a_session_kills_what_it_started(monkeypatch):
+    monkeypatch.setenv("SABOTAGE", token := secrets.token_hex(8))
+    with Session([sys.executable, "-I", "-S", str(SCRIPT), "honest"]) as session:
+        session.start()
+        assert alive(token)
+    assert alive(token) == []
+
+
+def test_the_probe_sends_every_kind_of_number():
+    values = probe_values()
+    assert {repr(v) for v in values} >= {
+        "-0.0",
+        "5e-324",
+        "0.1",
+        "1.7976931348623157e+308",
+        "0.3333333333333333",
+    }
+    assert len({repr(v) for v in values}) == len(values)
+    assert max(len(repr(v).strip("-0.").partition("e")[0].replace(".", "")) for v in values) == 17
+
+
+def test_an_echo_is_compared_bit_for_bit():
+    check_echo([0.1, -0.0], b'{"values": [0.1, -0.0]}')
+    with pytest.raises(Trouble, match=r"values\[0\] = 0.1 came back as 0.10000000000000002"):
+        check_echo([0.1, -0.0], b'{"values": [0.10000000000000002, -0.0]}')
+
+
+@pytest.mark.parametrize(
+    ("line", "cmd", "word"),
+    [
+        (b'{"seq":1,"steps":[{"outcome":"collision"}]}', "trajectory", "wall"),
+        (b'{"seq":1,"ns":[-1],"steps":[]}', "time", "ns"),
+        (b'{"seq":1,"states":[{"outcome":"horizon"}]}', "flow", "states"),
+        (b'{"seq":true,"outcome":"undecided","reason":""}', "step", "seq True"),
+        (b'{"seq":null,"outcome":"rejected","reason":"what?"}', "step", "what?"),
+        (b'{"seq":1,"error":5}', "step", "error"),
+    ],
+)
+def test_misshapen_answers_are_named(line, cmd, word):
+    with pytest.raises(Trouble, match="wrong-format") as caught:
+        read_answer(line, cmd, 1)
+    assert word in caught.value.why
+
+
+def test_right_answers_are_read():
+    assert read_answer(b'{"seq":1,"error":"no"}', "step", 1) == {"error": "no"}
+    assert read_answer(b'{"seq":1,"steps":[]}', "trajectory", 1) == {"steps": ()}
+    refusal = {"outcome": "rejected", "reason": "r"}
+    assert read_answer(b'{"seq":1,"outcome":"rejected","reason":"r"}', "trajectory", 1) == refusal

@@ -1,0 +1,232 @@
+"""The suite's accounting: verdicts, exit codes, known failures, reports; its further parts can fail."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+from types import SimpleNamespace
+from xml.etree import ElementTree
+
+import jsonschema
+import msgspec
+import pytest
+from test_conformance_session import SCRIPT, made_up
+
+from conformance import reports, suite, suite_properties, vectors
+from conformance.process import Trouble
+from conformance.session import Limits
+from conformance.suite import Result, Run
+from scene import Collision, Horizon
+from scene.messages import Introduction
+from scene.refusal import BadInput
+
+ROOT = Path(__file__).parent.parent
+INTRODUCTION = Introduction(1, "made-up", "1", "C", ("step", "flow"), ("cap", "mushroom"), ("constant",))
+
+
+def made(*verdicts: str, known: tuple[int, ...] = (), **more) -> Run:
+    results = [
+        Result(
+            f"made-up/{i}",
+            "made-up" if i % 2 else "protocol",
+            verdict,
+            "because & <why>",
+            0.5,
+            "core",
+            ulps=2.0 if verdict == "pass" else None,
+            relative=1e-16 if verdict == "pass" else None,
+            answer={"x": 1.0},
+            is_known=i in known,
+        )
+        for i, verdict in enumerate(verdicts)
+    ]
+    fields = {
+        "command": ["./made-up"],
+        "level": "core",
+        "corpus": "1.0",
+        "digest": "0" * 64,
+        "limits": Limits(),
+        "introduction": INTRODUCTION,
+        "results": results,
+        "speed": None,
+        "n_restarts": 0,
+        "stderr": "",
+        "seconds": 1.5,
+    }
+    return Run(**fields | more)
+
+
+@pytest.mark.parametrize(
+    ("verdicts", "known", "code"),
+    [
+        (["pass", "pass"], (), 0),
+        (["pass", "fail"], (), 1),
+        (["pass", "crashed"], (), 1),
+        (["pass", "timed-out"], (), 1),
+        (["pass", "wrong-format"], (), 1),
+        (["pass", "error"], (), 1),
+        (["pass", "unsupported"], (), 0),
+        (["pass", "indeterminate"], (), 2),
+        (["pass", "indeterminate", "fail"], (), 1),
+        (["unsupported", "unsupported"], (), 1),
+        (["declined", "declined"], (), 1),
+        ([*["pass"] * 19, "declined"], (), 0),
+        ([*["pass"] * 18, "declined"], (), 1),
+        (["pass", "fail"], (1,), 0),
+        (["pass", "crashed"], (1,), 0),
+        (["pass", "pass"], (1,), 1),
+        ([], (), 1),
+    ],
+)
+def test_exit_codes(verdicts, known, code):
+    assert made(*verdicts, known=known).exit_code() == code
+
+
+def test_objections_say_what_is_wrong():
+    run = made("pass", "fail", "pass", known=(2,))
+    assert run.objections() == [
+        "made-up/1: fail: because & <why>",
+        "made-up/2: passes, though it is listed as a known failure",
+    ]
+    assert "no vector passed" in made("unsupported").objections()[0]
+    assert "declined 2 of 3" in made("pass", "declined", "declined").objections()[0]
+
+
+@pytest.mark.parametrize(
+    ("text", "word"),
+    [("breathing-circle/1\nno-such/1", ":2: no-such/1"), ("grazing/1\ngrazing/1 # again", "twice")],
+)
+def test_a_known_failures_file_is_checked(tmp_path, text, word):
+    path = tmp_path / "known.txt"
+    path.write_text(text)
+    with pytest.raises(BadInput, match=word):
+        suite.read_known(path)
+
+
+def test_known_failures_are_read(tmp_path):
+    path = tmp_path / "known.txt"
+    path.write_text("# ours\n\nbreathing-circle/1   # issue 7\nproperty/mirror\n")
+    assert suite.read_known(path) == {"breathing-circle/1", "property/mirror"}
+    with pytest.raises(BadInput, match="cannot be read"):
+        suite.read_known(tmp_path / "absent.txt")
+
+
+def test_known_failures_are_marked_in_a_run(monkeypatch):
+    monkeypatch.setattr(suite, "choose", lambda *_: [made_up(0), made_up(1)])
+    monkeypatch.setattr(suite_properties, "N_QUESTIONS", 0)
+    command = [sys.executable, "-I", "-S", str(SCRIPT), "crash-at-second"]
+    assert suite.check(command).exit_code() == 1
+    fixed = frozenset({"made-up/0", "made-up/1", "protocol/stop"})
+    run = suite.check(command, known=fixed)
+    assert run.objections() == ["made-up/0: passes, though it is listed as a known failure"]
+
+
+def test_what_is_not_offered_is_not_asked():
+    vector = made_up(0)
+    assert suite.missing(INTRODUCTION, vector) == ""
+    moving = msgspec.structs.replace(vector, scene={"table": "stem", "w": 1.0, "h": {"kind": "fourier"}})
+    assert suite.missing(INTRODUCTION, moving) == "table stem, law fourier"
+    assert (
+        suite.missing(INTRODUCTION, msgspec.structs.replace(vector, kind="trajectory"))
+        == "profile trajectory"
+    )
+    result = suite.ask_vector(SimpleNamespace(introduction=INTRODUCTION), moving)
+    assert (result.verdict, result.why) == ("unsupported", "table stem, law fourier")
+
+
+def test_levels_and_groups_are_chosen():
+    assert {v.group for v in suite.choose("core", ["moving-cap"])} == {"moving-cap"}
+    for bad in (("core", ["no-such"]), ("hard", [])):
+        with pytest.raises(BadInput, match="must be one of"):
+            suite.choose(*bad)
+
+
+def test_the_json_report_follows_its_published_schema():
+    schema = json.loads((ROOT / "docs" / "check.schema.json").read_text("utf-8"))
+    assert schema == reports.json_schema()
+    run = made("pass", "fail", "declined", "crashed", known=(1,))
+    data = json.loads(reports.to_json(run))
+    jsonschema.validate(data, schema)
+    assert data["total"]["cases"] == 4
+    assert data["total"]["counts"] == {
+        v: int(v in ("pass", "fail", "declined", "crashed")) for v in suite.VERDICTS
+    }
+    assert data["exit_code"] == 1
+    assert [r.get("answer") for r in data["results"]] == [None, {"x": 1.0}, {"x": 1.0}, {"x": 1.0}]
+    with pytest.raises(jsonschema.ValidationError):
+        jsonschema.validate({**data, "results": [{}]}, schema)
+
+
+def test_junit_counts_what_happened():
+    run = made("pass", "fail", "declined", "crashed", "fail", "pass", known=(4, 5), stderr="\x1b[31mdown\x00")
+    root = ElementTree.fromstring(reports.to_junit(run))
+    names = ("tests", "failures", "errors", "skipped")
+    assert [root.get(name) for name in names] == ["6", "2", "1", "2"]
+    assert sum(int(s.get("tests")) for s in root) == 6
+    cases = {case.get("name"): [child.tag for child in case] for case in root.iter("testcase")}
+    tags = [[], ["failure"], ["skipped"], ["error"], ["skipped"], ["failure"]]
+    assert cases == {f"made-up/{i}": tag for i, tag in enumerate(tags)}
+    assert root.find(".//system-err").text == "\ufffd[31mdown\ufffd"
+    assert root.find(".//failure").get("message") == "fail: because & <why>"
+
+
+class Stub:
+    """A session whose answers are Python functions."""
+
+    def __init__(self, step=None, ask=None):
+        self.introduction, self.step, self.ask = INTRODUCTION, step, ask
+
+
+def core_steps() -> list[vectors.Vector]:
+    return [v for v in vectors.load("core") if v.group in ("moving-cap", "breathing-circle")]
+
+
+def test_properties_can_fail():
+    """A stepper that knows one answer breaks nearly all of them; one that declines is not accepted either."""
+    wrong = Stub(step=lambda _scene, state, _t_end: Collision("arc", 1.0, state.t + 1.0, 0.6, 0.8, 1.0, 2.0))
+    verdicts = {name: verdict for name, verdict, _, _ in suite_properties.ask_properties(wrong, core_steps())}
+    assert verdicts["mirror"] == verdicts["angular-momentum"] == "fail"
+    assert list(verdicts.values()).count("fail") >= 3
+
+    def crash(*_):
+        raise Trouble("crashed", "exited")
+
+    found = list(suite_properties.ask_properties(Stub(step=crash), core_steps()))
+    assert {verdict for _, verdict, _, _ in found} == {"crashed"}
+
+
+def test_profiles_can_fail(monkeypatch):
+    """Particles that come to rest in the stem's mouth: no work is done on them, none is captured."""
+    monkeypatch.setattr(suite_properties, "N_PARTICLES", (400,))
+
+    def sit(request):
+        stays = [
+            {
+                **msgspec.to_builtins(Horizon(request["t_end"], 0.0, -0.1, s["vx"], s["vy"])),
+                "captured": None,
+            }
+            for s in request["states"]
+        ]
+        return {"states": stays}
+
+    found = {name: verdict for name, verdict, _, _ in suite_properties.ask_profiles(Stub(ask=sit))}
+    assert found == {"work-identity": "fail", "one-cycle": "fail"}
+
+    def lose(request):
+        return {"states": sit(request)["states"][1:]}
+
+    found = {name: verdict for name, verdict, _, _ in suite_properties.ask_profiles(Stub(ask=lose))}
+    assert found == {"work-identity": "wrong-format", "one-cycle": "wrong-format"}
+
+
+def test_speed_is_not_measured_where_nothing_is_hit():
+    introduction = msgspec.structs.replace(INTRODUCTION, profiles=("step", "time"))
+    last = msgspec.to_builtins(Horizon(*[0.0] * 5))
+    session = SimpleNamespace(introduction=introduction, ask=lambda _: {"ns": [1], "steps": [last]})
+    assert suite.measure_speed(session) is None
+    hit = msgspec.to_builtins(Collision("arc", *[0.0] * 6))
+    session.ask = lambda request: {"ns": [100 * request["collisions"]] * request["repeat"], "steps": [hit]}
+    speed = suite.measure_speed(session)
+    assert (speed.best_ns, speed.median_ns) == (100.0, 100.0)
+    assert suite.measure_speed(Stub()) is None

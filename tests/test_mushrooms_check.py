@@ -1,0 +1,165 @@
+"""`mushrooms check`: exit codes, report files, bad options in one line, a page that stands alone."""
+
+from __future__ import annotations
+
+import base64
+import json
+import re
+import subprocess
+import sys
+from pathlib import Path
+from xml.etree import ElementTree
+
+import msgspec
+import pytest
+from saboteurs import SABOTEURS
+
+from conformance import pytest_suite, suite, suite_properties, vectors
+from conformance.session import Session
+from mushrooms.main import run
+
+HERE = Path(__file__).parent
+PYTHON = [sys.executable, str(Path(suite.__file__).parent / "harness" / "python" / "stepper.py")]
+SABOTEUR = [sys.executable, "-I", "-S", str(HERE / "saboteurs.py")]
+
+
+@pytest.fixture(autouse=True)
+def _few(monkeypatch):
+    """A handful of vectors of every kind, and few properties."""
+    found = [v for v in vectors.load("core") if v.group in ("moving-cap", "stem-trajectory", "near-corner")][
+        ::6
+    ]
+    assert {vector.kind for vector in found} == {"step", "trajectory"}
+    monkeypatch.setattr(suite, "choose", lambda *_: found)
+    monkeypatch.setattr(suite_properties, "N_QUESTIONS", 2)
+    monkeypatch.setattr(suite, "TIMED_LEAST", 100_000)
+
+
+@pytest.fixture
+def call(capsys):
+    def run_command(*arguments):
+        with pytest.raises(SystemExit) as stop:
+            run(["check", *map(str, arguments)])
+        captured = capsys.readouterr()
+        return stop.value.code, captured.out, captured.err
+
+    return run_command
+
+
+def test_a_good_stepper_is_accepted_and_reported(call, tmp_path):
+    files = [tmp_path / name for name in ("r.json", "r.xml", "r.html")]
+    options = ["--json", files[0], "--junit", files[1], "--html", files[2]]
+    code, out, err = call(*options, "--", *PYTHON)
+    assert (code, err) == (0, "")
+    assert "accepted" in out
+    assert "ns per collision" in out
+    assert sorted(tmp_path.iterdir()) == sorted(files)
+    data = json.loads(files[0].read_text())
+    n = data["total"]["cases"]
+    assert f"{data['total']['counts']['pass']} of {n} cases pass" in out
+    assert data["implementation"]["name"] == "example-python"
+    assert int(ElementTree.fromstring(files[1].read_bytes()).get("tests")) == n
+    page = files[2].read_text("utf-8")
+    assert "example-python" in page
+    assert "Worst cases" in page
+    assert "Speed against error" in page
+    assert_stands_alone(page, n_figures=page.count("<figure>"))
+
+
+def assert_stands_alone(page: str, n_figures: int) -> None:
+    assert "<script" not in page
+    assert not re.search(r'(src|href)="(?!data:|#)', page)
+    images = re.findall(r'src="data:image/svg\+xml;base64,([^"]+)"', page)
+    assert len(images) == n_figures >= 3
+    assert all(b"<svg" in base64.b64decode(image) for image in images)
+
+
+def test_a_bad_stepper_is_not(call, tmp_path):
+    """An honest citizen of the protocol that knows no physics: it fails by verdict, never by crash."""
+    page = tmp_path / "r.html"
+    code, out, _ = call("--html", page, "--json", tmp_path / "r.json", "--", *SABOTEUR, "honest")
+    assert code == 1
+    assert "not accepted" in out
+    assert "fail" in out
+    text = page.read_text("utf-8")
+    assert "Cases that failed" in text
+    assert "What stands against it" in text
+    counts = json.loads((tmp_path / "r.json").read_text())["total"]["counts"]
+    assert counts["fail"] > 5
+    assert counts["unsupported"] >= 1  # it offers no trajectory
+    assert counts["crashed"] == counts["wrong-format"] == counts["timed-out"] == 0
+
+
+@pytest.mark.parametrize("name", ["exit-silently", "other-protocol", "fifteen-digits"])
+def test_reports_of_broken_sessions_are_written_too(call, tmp_path, name):
+    assert name in SABOTEURS
+    options = ["--json", tmp_path / "r.json", "--junit", tmp_path / "r.xml", "--html", tmp_path / "r.html"]
+    code, out, _ = call("--restarts", 1, *options, "--", *SABOTEUR, name)
+    assert code == 1
+    assert "not accepted" in out
+    assert len(list(tmp_path.iterdir())) == 3
+
+
+def test_markup_in_what_it_says_is_text(call, tmp_path):
+    """What an implementation writes ends up in the page escaped."""
+    script = tmp_path / "evil.py"
+    script.write_text(
+        "import sys\nfor line in sys.stdin:\n"
+        "    print('<script>alert(1)</script>[red]', file=sys.stderr, flush=True)\n"
+        "    print('<script>alert(2)</script>', flush=True)\n"
+    )
+    code, out, _ = call("--html", tmp_path / "r.html", "--", sys.executable, script)
+    assert code == 1
+    assert "<script>" in out
+    assert "<script" not in (tmp_path / "r.html").read_text("utf-8")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "word"),
+    [
+        (["--", "./no-such-stepper"], "no-such-stepper"),
+        (["--timeout", "0", "--", *PYTHON], "--timeout = 0.0"),
+        (["--timeout", "nan", "--", *PYTHON], "--timeout = nan"),
+        (["--restarts", "-1", "--", *PYTHON], "--restarts = -1"),
+        (["--json", "report.txt", "--", *PYTHON], ".json"),
+        (["--html", "no/such/folder/r.html", "--", *PYTHON], "cannot be written"),
+        (["--known-failures", "absent.txt", "--", *PYTHON], "absent.txt"),
+        ([], "COMMAND"),
+    ],
+)
+def test_bad_options_are_one_line(call, monkeypatch, tmp_path, arguments, word):
+    monkeypatch.chdir(tmp_path)
+    code, out, err = call(*arguments)
+    assert (code, out) == (2, "")
+    assert err.startswith("mushrooms: ")
+    assert err.count("\n") == 1
+    assert word in err
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_group_that_does_not_exist_is_refused():
+    line = [sys.executable, "-m", "mushrooms", "check", "--groups", "moving-cap,no-such", "--", *PYTHON]
+    refused = subprocess.run(line, capture_output=True, text=True, check=False)
+    assert refused.returncode == 2
+    assert "must be one of" in refused.stderr
+    assert refused.stderr.count("\n") == 1
+
+
+def test_one_test_per_vector_for_pytest(tmp_path):
+    plugin = ["-p", "conformance.pytest_plugin", "--pyargs", "conformance.pytest_suite"]
+    options = ["-q", "-k", "near-corner", "-p", "no:cacheprovider", "--rootdir", str(tmp_path)]
+    line = [sys.executable, "-m", "pytest", *plugin, *options, "--mushrooms-command", " ".join(PYTHON)]
+    done = subprocess.run(line, capture_output=True, text=True, check=False, cwd=tmp_path)
+    assert done.returncode == 0, done.stdout
+    assert f"{len([v for v in vectors.load() if v.group == 'near-corner'])} passed" in done.stdout
+
+
+def test_the_pytest_case_fails_and_skips_with_the_verdict():
+    vector = next(vector for vector in vectors.load() if vector.kind == "step")
+    with Session([*SABOTEUR, "missing-field"]) as session:
+        session.start()
+        with pytest.raises(pytest.fail.Exception, match="wrong-format: "):
+            pytest_suite.test_vector(session, vector)
+        session.introduction = msgspec.structs.replace(session.introduction, tables=())
+        with pytest.raises(pytest.skip.Exception, match="unsupported: table"):
+            pytest_suite.test_vector(session, vector)

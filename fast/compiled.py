@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
+from fractions import Fraction
 from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from fast import kernel
+from fast import codes
 from scene import BangBang, Cap, Fourier, Law, Mushroom, Scene
 from scene.laws import Bounds, bounds, is_constant
 from scene.tables import width_factors
 
 FloatArray = npt.NDArray[np.floating[Any]]
-TABLES = {"Cap": kernel.CAP, "Stem": kernel.STEM, "Mushroom": kernel.MUSHROOM}
+TABLES = {"Cap": codes.CAP, "Stem": codes.STEM, "Mushroom": codes.MUSHROOM}
 
 
 class Compiled(NamedTuple):
@@ -26,7 +27,7 @@ class Compiled(NamedTuple):
 
 
 def compile_scene(scene: Scene) -> Compiled:
-    """Lay out a valid scene for the kernel."""
+    """Lay out a valid scene for the codes."""
     r: Law = 0.0 if not isinstance(scene, (Cap, Mushroom)) else scene.r
     h: Law = 0.0
     slope: Law = 0.0
@@ -34,7 +35,7 @@ def compile_scene(scene: Scene) -> Compiled:
     if not isinstance(scene, Cap):
         h, slope, factors = scene.h, scene.slope, width_factors(scene)
     rows = [_row(law) for law in (r, factors[0], h, slope)]
-    waves = [row for row in rows if row[0] == kernel.FOURIER]
+    waves = [row for row in rows if row[0] == codes.FOURIER]
     rows.append([waves[0][2], max(row[3] for row in waves)] if waves else [0.0, 0.0])
     laws = np.zeros((len(rows), max(len(row) for row in rows)))
     for i, row in enumerate(rows):
@@ -48,23 +49,31 @@ def _row(law: Law) -> list[float]:
         n = max(len(law.cos), len(law.sin))
         cos = list(law.cos) + [0.0] * (n - len(law.cos))
         sin = list(law.sin) + [0.0] * (n - len(law.sin))
-        return [kernel.FOURIER, law.mean, law.omega, float(n), *cos, *sin]
+        return [codes.FOURIER, law.mean, law.omega, float(n), *cos, *sin]
     if isinstance(law, BangBang) and not is_constant(law):
         times = [knot[0] for knot in law.knots]
         values = [knot[1] for knot in law.knots]
         legs = zip(law.knots, law.knots[1:], strict=False)
-        accelerations = [4.0 * (v1 - v0) / (t1 - t0) / (t1 - t0) for (t0, v0), (t1, v1) in legs]
+        accelerations = [
+            4 * (Fraction(v1) - Fraction(v0)) / (Fraction(t1) - Fraction(t0)) ** 2
+            for (t0, v0), (t1, v1) in legs
+        ]
+        accelerations.append(Fraction(0))  # one for every knot keeps the columns simple
+        highs = [float(a) for a in accelerations]
+        period = Fraction(times[-1]) - Fraction(times[0])
         return [
-            kernel.BANG_BANG,
+            codes.BANG_BANG,
             0.0,
-            times[-1] - times[0],
+            float(period),
             float(len(times)),
+            float(period - Fraction(float(period))),
             *times,
             *values,
-            *accelerations,
+            *highs,
+            *(float(a - Fraction(high)) for a, high in zip(accelerations, highs, strict=True)),
         ]
     constant = law if isinstance(law, float) else law.mean if isinstance(law, Fourier) else law.knots[0][1]
-    return [kernel.CONSTANT, constant, 0.0, 0.0]
+    return [codes.CONSTANT, constant, 0.0, 0.0]
 
 
 def _product_bounds(factors: tuple[Law, ...]) -> Bounds:

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from fast import kernel
+from fast import careful, codes, entries, motion, walls
 from fast.compiled import Compiled, FloatArray, compile_scene
 from scene import (
     Collision,
@@ -25,23 +25,23 @@ from scene import (
 from scene.states import ON_WALL, check_numbers
 
 WALL_CODES: dict[Wall | None, int] = {
-    None: kernel.NO_WALL,
-    "arc": kernel.ARC,
-    "base": kernel.BASE,
-    "left": kernel.LEFT,
-    "right": kernel.RIGHT,
-    "floor": kernel.FLOOR,
+    None: codes.NO_WALL,
+    "arc": codes.ARC,
+    "base": codes.BASE,
+    "left": codes.LEFT,
+    "right": codes.RIGHT,
+    "floor": codes.FLOOR,
 }
 WALL_NAMES: dict[int, Wall] = {code: name for name, code in WALL_CODES.items() if name}
 REASONS: dict[int, Outcome] = {
-    kernel.SLIDING: Undefined("sliding"),
-    kernel.MOUTH_EDGE: Undefined("mouth-edge"),
-    kernel.TOO_MANY: Undecided(f"no hit within {kernel.MAX_PARABOLAS} sub-intervals"),
-    kernel.TANGENT: Undecided("f and f' vanish together within rounding"),
-    kernel.CORNER: Undecided("two walls are hit together within rounding"),
-    kernel.EDGE: Undecided("the mouth's edge is hit within rounding"),
-    kernel.START: Undecided("the state is on another wall within rounding"),
-    kernel.APPROACHING: Rejected("state.wall: the particle starts on a wall and moves into it"),
+    codes.SLIDING: Undefined("sliding"),
+    codes.MOUTH_EDGE: Undefined("mouth-edge"),
+    codes.TOO_MANY: Undecided(f"no hit within {careful.MAX_PARABOLAS} sub-intervals"),
+    codes.TANGENT: Undecided("f and f' vanish together within rounding"),
+    codes.CORNER: Undecided("two walls are hit together within rounding"),
+    codes.EDGE: Undecided("the mouth's edge is hit within rounding"),
+    codes.START: Undecided("the state is on another wall within rounding"),
+    codes.APPROACHING: Rejected("state.wall: the particle starts on a wall and moves into it"),
 }
 # v^2 and r^2 must neither overflow nor vanish beside each other.
 LARGEST = 2.0**400
@@ -72,12 +72,12 @@ def next_collision(scene: Scene, state: State, t_end: float) -> Outcome:
         return Rejected(str(error))
     p = np.array([state.t, 0.0, state.x, state.y, state.vx, state.vy])
     low_end = t_end - state.t
-    code, dt = kernel.single_step(*_compiled(scene), p, WALL_CODES[state.wall], low_end)
+    code, dt = entries.single_step(*_compiled(scene), p, WALL_CODES[state.wall], low_end)
     if code in WALL_NAMES:
         return Collision(WALL_NAMES[code], float(dt), *(float(p[i]) for i in (0, 2, 3, 4, 5)))
-    if code == kernel.HORIZON:
+    if code == codes.HORIZON:
         return Horizon(t_end, *(float(p[i]) for i in (2, 3, 4, 5)))
-    return _trouble(code, state, WALL_NAMES.get(int(dt)) if code == kernel.OUTSIDE else None)
+    return _trouble(code, state, WALL_NAMES.get(int(dt)) if code == codes.OUTSIDE else None)
 
 
 class Trajectory(NamedTuple):
@@ -110,13 +110,13 @@ def trajectory(scene: Scene, state: State, n_collisions: int, t_end: float = np.
     if n_collisions < 0:
         raise InvalidState(f"n_collisions = {n_collisions}, must be >= 0")
     steps: FloatArray = np.empty((n_collisions, 6))
-    codes: npt.NDArray[np.int64] = np.empty(n_collisions, dtype=np.int64)
+    met: npt.NDArray[np.int64] = np.empty(n_collisions, dtype=np.int64)
     p = np.array([state.t, 0.0, state.x, state.y, state.vx, state.vy])
-    n, code = kernel.trajectory(*_compiled(scene), p, WALL_CODES[state.wall], t_end, steps, codes)
-    walls = [WALL_NAMES[int(c)] for c in codes[:n]]
+    n, code = entries.trajectory(*_compiled(scene), p, WALL_CODES[state.wall], t_end, steps, met)
+    walls = [WALL_NAMES[int(c)] for c in met[:n]]
     outcome: Outcome | None = None
     if n < n_collisions:
-        is_horizon = code == kernel.HORIZON
+        is_horizon = code == codes.HORIZON
         outcome = Horizon(t_end, *(float(v) for v in p[2:])) if is_horizon else _trouble(code, state, None)
     return Trajectory(walls, steps[:n], outcome)
 
@@ -140,9 +140,9 @@ def wall_gap(scene: Scene, state: State) -> tuple[float, float]:
     compiled = _compiled(scene)
     if state.wall == "base":
         return state.y, float(max(compiled.bounds[0, 1], compiled.bounds[1, 1]))
-    anchors = np.zeros(kernel.ANCHORS_SHAPE)
-    kernel.set_anchors(compiled.laws, anchors, state.t, 0.0)
-    f, _ = kernel.wall_residual(
+    anchors = np.zeros(motion.ANCHORS_SHAPE)
+    motion.set_anchors(compiled.laws, anchors, state.t, 0.0)
+    f, _ = walls.wall_residual(
         WALL_CODES[state.wall],
         state.x,
         state.y,
@@ -157,9 +157,9 @@ def wall_gap(scene: Scene, state: State) -> tuple[float, float]:
 
 
 def _trouble(code: int, state: State, wall: Wall | None) -> Outcome:
-    if code == kernel.FAR_TIME:
+    if code == codes.FAR_TIME:
         return Rejected(f"state.t = {state.t!r} is more than 2^27 quarter periods from 0: its phase is lost")
-    if code == kernel.OUTSIDE:
+    if code == codes.OUTSIDE:
         where = f"beyond wall {wall}" if wall else "outside the table"
         return Rejected(f"state (x, y) = ({state.x!r}, {state.y!r}) at t = {state.t!r} is {where}")
     return REASONS[code]

@@ -7,7 +7,7 @@ import pytest
 from scipy import stats
 
 import fast
-from fast.ensemble import cycle_times, initial_states
+from fast.starts import cycle_stops, initial_states
 from scene import load
 
 
@@ -36,7 +36,7 @@ def test_cycles_continue_one_another():
 @pytest.mark.parametrize("name", ["moving-cap", "fixed-cap-anticlockwise", "breathing-circle", "fermi-ulam"])
 def test_starts_are_uniform_in_the_table(name):
     scene = load(name)
-    states = initial_states(scene, 40_000, 0.5, 7, 0.0)
+    states = initial_states(scene, 40_000, 0.5, 7)
     x, y, vx, vy = states[:, 2:].T
     assert np.allclose(vx**2 + vy**2, 1.0)
     assert stats.kstest(np.arctan2(vy, vx), stats.uniform(-np.pi, 2 * np.pi).cdf).pvalue > 1e-4
@@ -81,10 +81,11 @@ def test_captured_stays_end_where_nu_returns():
 
 
 def test_least_nu_is_found():
-    _, ends, narrowest = cycle_times(load("moving-cap"), 2)
-    assert ends == pytest.approx([2 * np.pi, 4 * np.pi])
-    assert narrowest == pytest.approx([np.pi, 3 * np.pi], abs=2e-3)
-    assert cycle_times(load("fixed-cap-anticlockwise"), 1)[2] == pytest.approx([0.375], abs=1e-3)
+    stops = cycle_stops(load("moving-cap"), 2, (0.25,))
+    assert stops.times == pytest.approx([np.pi / 2, 2 * np.pi, 5 * np.pi / 2, 4 * np.pi])
+    assert stops.cycles.tolist() == [-1, 0, -1, 1]
+    assert stops.narrowest == pytest.approx([np.pi, 3 * np.pi], abs=2e-3)
+    assert cycle_stops(load("fixed-cap-anticlockwise"), 1, ()).narrowest == pytest.approx([0.375], abs=1e-3)
 
 
 @pytest.mark.parametrize(
@@ -97,6 +98,8 @@ def test_least_nu_is_found():
         ({"seed": -1}, "seed = -1"),
         ({"seed": 2**64}, "seed = 18446744073709551616"),
         ({"threads": 0}, "threads = 0"),
+        ({"phases": (0.5, 0.5)}, "phases = "),
+        ({"phases": (0.0,)}, "phases = "),
     ],
 )
 def test_bad_options_are_refused(options, words):

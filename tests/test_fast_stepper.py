@@ -3,9 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
-import subprocess
-import sys
 
 import numpy as np
 import pytest
@@ -15,7 +12,7 @@ from mpmath import mp, workprec
 
 import fast
 from conformance.strategies import scenes_and_states
-from fast import kernel
+from fast import arithmetic, codes, motion
 from fast.compiled import compile_scene
 from scene import (
     BangBang,
@@ -97,7 +94,7 @@ def test_powers_of_two_scale_exactly(drawn, length_bits, time_bits):
     st.floats(-1e-12, 1e-12),
 )
 def test_sine_and_cosine(omega, k, t, t_low):
-    s, c, is_reduced = kernel.sine_cosine(omega, float(k), t, t_low)
+    s, s_low, c, c_low, is_reduced = arithmetic.sine_cosine(omega, float(k), t, t_low)
     with workprec(200):
         phase = k * mp.mpf(omega) * (mp.mpf(t) + mp.mpf(t_low))
         if not is_reduced:
@@ -108,6 +105,9 @@ def test_sine_and_cosine(omega, k, t, t_low):
         least = abs(phase) * 2.0**-100 + (k + 1) * mp.mpf(2) ** -1074
         assert abs(s - mp.sin(phase)) <= 2.0**-52 * abs(mp.sin(phase)) + least
         assert abs(c - mp.cos(phase)) <= 2.0**-52 * abs(mp.cos(phase)) + least
+        # With their low parts a few more bits, absolutely.
+        assert abs(s + mp.mpf(s_low) - mp.sin(phase)) <= 2.0**-55 + abs(phase) * 2.0**-100
+        assert abs(c + mp.mpf(c_low) - mp.cos(phase)) <= 2.0**-55 + abs(phase) * 2.0**-100
 
 
 def test_phase_out_of_reach_is_refused():
@@ -121,17 +121,17 @@ def test_phase_out_of_reach_is_refused():
 def test_increments_of_laws(name, t, s):
     scene = load(name)
     compiled = compile_scene(scene)
-    anchors = np.zeros(kernel.ANCHORS_SHAPE)
-    assert kernel.set_anchors(compiled.laws, anchors, t, 0.0)
+    anchors = np.zeros(motion.ANCHORS_SHAPE)
+    assert motion.set_anchors(compiled.laws, anchors, t, 0.0)
     with workprec(200):
         law, then = laws(scene)["h"], mp.mpf(t) + mp.mpf(s)
-        change, rate, size, _ = kernel.increment(compiled.laws, anchors, kernel.H, s)
+        change, rate, size, _ = motion.increment(compiled.laws, anchors, codes.H, s)
         exact = value(mp, law, then) - value(mp, law, mp.mpf(t))
         # Small increments keep their relative accuracy: 16 roundings of the summed terms, and
         # the rounding of a knot's time by one unit in the last place, at speeds up to 32.
         assert abs(change - exact) <= 16 * 2.0**-53 * size + 2.0**-52 * 64 * s
         assert abs(rate - value(mp, law, then, 1)) <= 2.0**-53 * 4096
-        assert abs(anchors[kernel.H, 0] - value(mp, law, mp.mpf(t))) <= 2.0**-50 * 6
+        assert abs(anchors[codes.H, 0] - value(mp, law, mp.mpf(t))) <= 2.0**-50 * 6
 
 
 STATIC = Mushroom(r=1.0, h=1.0, w=0.5)
@@ -198,23 +198,6 @@ def test_trajectory_ends_at_its_horizon():
     assert isinstance(path.outcome, Horizon)
     assert path.outcome.t == 0.5
     assert 0 < len(path.walls) < 1000
-
-
-def test_same_bits_without_the_compiler():
-    """Kernels are plain Python too: with the compiler off they give the same bits."""
-    program = (
-        "import fast, scene\n"
-        "path = fast.trajectory(scene.load('moving-cap'), scene.State(0.0, 0.1, 0.3, 20.0, 7.0), 40)\n"
-        "print(path.steps.tobytes().hex())\n"
-    )
-    results = []
-    for is_off in ("0", "1"):
-        environment = {**os.environ, "NUMBA_DISABLE_JIT": is_off}
-        run = subprocess.run(
-            [sys.executable, "-c", program], env=environment, capture_output=True, text=True, check=True
-        )
-        results.append(run.stdout)
-    assert results[0] == results[1]
 
 
 @settings(max_examples=50)

@@ -1,0 +1,126 @@
+"""Exact sums and products of two floats, and sine and cosine, in compiled code.
+
+No fastmath and no libm: only + - * / sqrt floor and the fused multiply-add, each rounded once as
+IEEE 754 says, so all results are the same bits on every machine. The compiler never fuses by
+itself; `fma` is written where one rounding is wanted. Phases beyond 2^27 quarter turns are refused.
+"""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+from llvmlite import ir
+from numba import config, njit, types
+from numba.extending import intrinsic
+
+SAFETY = 8.0 * 2.0**-53  # eight units in the last place of the summed sizes of a sum's terms
+MAX_QUADRANT = 2.0**27
+# pi/2 in parts of 26 bits, so that a multiple below 2^27 of each is exact.
+PIO2_1 = float.fromhex("0x1.921fb50000000p+0")
+PIO2_2 = float.fromhex("0x1.110b460000000p-26")
+PIO2_3 = float.fromhex("0x1.1a62630000000p-54")
+PIO2_4 = float.fromhex("0x1.8a2e030000000p-81")
+TWO_OVER_PI = 0.6366197723675814
+
+
+@intrinsic
+def _compiled_fma(_context: Any, a: Any, b: Any, c: Any) -> Any:
+    def generate(_: Any, builder: ir.IRBuilder, __: Any, arguments: Any) -> Any:
+        return builder.fma(*arguments)
+
+    return types.float64(types.float64, types.float64, types.float64), generate
+
+
+def _exact_fma(a: float, b: float, c: float) -> float:
+    rough = a * b + c
+    if rough == 0.0 or not np.isfinite(rough):
+        return rough
+    return float(Fraction(float(a)) * Fraction(float(b)) + Fraction(float(c)))
+
+
+# a b + c, rounded once. Without the compiler the kernels are plain Python, which tests compare.
+fma = _exact_fma if config.DISABLE_JIT else _compiled_fma
+
+
+@njit(error_model="numpy")
+def two_sum(a, b):
+    """Return a + b as a rounded sum and its exact error."""
+    s = a + b
+    z = s - a
+    return s, (a - (s - z)) + (b - z)
+
+
+@njit(error_model="numpy")
+def two_product(a, b):
+    """Return a b as a rounded product and its exact error."""
+    p = a * b
+    return p, fma(a, b, -p)
+
+
+@njit(error_model="numpy")
+def reduced(omega, k, t_hi, t_lo):
+    """Return k omega (t_hi + t_lo) as quarter turns n and a rest r + tail, |r| <= pi/4."""
+    p, e = two_product(omega, t_hi)
+    e += omega * t_lo
+    q, f = two_product(k, p)
+    f += k * e
+    n = np.floor(q * TWO_OVER_PI + 0.5)
+    r = q - n * PIO2_1
+    r, e1 = two_sum(r, -n * PIO2_2)
+    r, e2 = two_sum(r, -n * PIO2_3)
+    r, tail = two_sum(r, (e1 + e2) - n * PIO2_4 + f)
+    return n, r, tail
+
+
+@njit(error_model="numpy")
+def beyond_first_order(r):
+    """Return sin r - r and cos r - 1 for |r| <= pi/4, by their Taylor series to r^17."""
+    z = r * r
+    s = fma(1.0 / 355687428096000.0, z, -1.0 / 1307674368000.0)
+    s = fma(s, z, 1.0 / 6227020800.0)
+    s = fma(s, z, -1.0 / 39916800.0)
+    s = fma(s, z, 1.0 / 362880.0)
+    s = fma(s, z, -1.0 / 5040.0)
+    s = fma(s, z, 1.0 / 120.0)
+    s = fma(s, z, -1.0 / 6.0)
+    c = fma(1.0 / 20922789888000.0, z, -1.0 / 87178291200.0)
+    c = fma(c, z, 1.0 / 479001600.0)
+    c = fma(c, z, -1.0 / 3628800.0)
+    c = fma(c, z, 1.0 / 40320.0)
+    c = fma(c, z, -1.0 / 720.0)
+    c = fma(c, z, 1.0 / 24.0)
+    return r * z * s, fma(z * z, c, -0.5 * z)
+
+
+@njit(error_model="numpy")
+def short_sine_cosine(r, tail):
+    """Return sin and cos of r + tail for |r| <= pi/4, each as a sum of two floats."""
+    more, less = beyond_first_order(r)
+    s, s_low = two_sum(r, fma(less, tail, more) + tail)
+    # The rounding of r^2 is the largest error in cos r - 1: put it back.
+    _, z_low = two_product(r, r)
+    c, c_low = two_sum(1.0, less)
+    return s, s_low, c, c_low - (0.5 * z_low + s * tail)
+
+
+@njit(error_model="numpy")
+def turned(n, sine, cosine):
+    """Return sin and cos of an angle n quarter turns further."""
+    half = np.floor(0.5 * n)
+    is_odd = n - 2.0 * half > 0.5
+    sign = 1.0 - 2.0 * (half - 2.0 * np.floor(0.5 * half))
+    s = sign * (cosine if is_odd else sine)
+    c = sign * (-sine if is_odd else cosine)
+    return s, c
+
+
+@njit(error_model="numpy")
+def sine_cosine(omega, k, t_hi, t_lo):
+    """Return sin and cos of k omega (t_hi + t_lo), each as two floats, and whether it is in reach."""
+    n, r, tail = reduced(omega, k, t_hi, t_lo)
+    sine, sine_low, cosine, cosine_low = short_sine_cosine(r, tail)
+    s, c = turned(n, sine, cosine)
+    s_low, c_low = turned(n, sine_low, cosine_low)
+    return s, s_low, c, c_low, abs(n) < MAX_QUADRANT

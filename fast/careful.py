@@ -1,0 +1,373 @@
+"""The careful scalar step: the first collision by construction, or `undecided`, never a guess.
+
+Idea. Time runs from the last event, so nothing is lost when t is large; each law gives its
+increment since that event without cancellation, and on the wall being left the root at zero is
+removed. For a wall function f (> 0 inside) with f'' >= -K, the parabola f + f' h - K h^2 / 2
+bounds f from below, so up to the parabola's root there is no hit: stepping from root to root
+can never skip a collision, and converges quadratically to the first. Every value of f carries
+a bound on its rounding error; where that bound leaves a question open the answer is `undecided`.
+
+Once the wall is known, the time is polished: the laws are anchored at the hit and the remainder
+of f there gives the time's low part, so that what follows (place, wall speed, velocity) is as
+accurate as its last rounding, however long the flight was.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from fast.arithmetic import SAFETY, fma, two_product, two_sum
+from fast.codes import (
+    APPROACHING,
+    ARC,
+    BASE,
+    CAP,
+    CORNER,
+    EDGE,
+    FAR_TIME,
+    FLOOR,
+    HORIZON,
+    LEFT,
+    MOUTH_EDGE,
+    MUSHROOM,
+    NO_WALL,
+    OUTSIDE,
+    RIGHT,
+    SLIDING,
+    START,
+    STEM,
+    TANGENT,
+    TOO_MANY,
+    H,
+    M,
+    R,
+    W,
+)  # fmt: skip  # isort: skip
+from fast.motion import LOW, set_anchors
+from fast.walls import (
+    curvature_bounds,
+    is_outside,
+    reach_time,
+    side_of_mouth,
+    slope_bound,
+    wall_function,
+    wall_residual,
+    wall_slope,
+)  # fmt: skip  # isort: skip
+
+MAX_PARABOLAS = 1_000_000
+PATIENCE = 6  # parabolas tried before asking whether the wall is out of the particle's reach
+
+
+@njit(error_model="numpy")
+def first_root(wall, start, limit, x, y, vx, vy, is_leaving, laws, anchors, bounds, is_relative):
+    """Find the first s in (start, limit) with f = 0, f' < 0.
+
+    Returns (code, s, f', error of s): code is the wall for a hit, NO_WALL for none before
+    the limit, else a reason for `undecided`.
+    """
+    residual = 0.0
+    residual_error = 0.0
+    if not is_leaving:
+        residual, residual_error = wall_residual(wall, x, y, laws, anchors, bounds, is_relative)
+    down, up = curvature_bounds(wall, vx, vy, bounds)
+    s = start
+    for n_steps in range(MAX_PARABOLAS):
+        if s >= limit:
+            return NO_WALL, limit, 0.0, 0.0
+        f, slope, error, slope_error = wall_function(
+            wall, s, x, y, vx, vy, residual, laws, anchors, is_relative
+        )
+        error += residual_error
+        if s == 0.0 and is_leaving:
+            if slope < -slope_error:
+                return APPROACHING, s, slope, 0.0
+            if slope <= slope_error:
+                # With slope and curvature exactly 0 (static wall, path along it) there is never a hit.
+                if slope == 0.0 and slope_error == 0.0 and down == 0.0:
+                    return NO_WALL, limit, 0.0, 0.0
+                return TANGENT, s, slope, 0.0
+            f = 0.0
+        elif f <= error:
+            if s == start:
+                return (OUTSIDE if f < -error else START), s, slope, 0.0
+            # A simple root from above. Were f convex enough to turn back within its error: undecided.
+            if slope >= -slope_error or (up > 0.0 and slope * slope <= 4.0 * up * error):
+                return TANGENT, s, slope, 0.0
+            root = s - f / slope
+            if root >= limit:
+                return NO_WALL, limit, 0.0, 0.0
+            return wall, root, slope, error / -slope
+        d = np.sqrt(slope * slope + 2.0 * down * f)
+        if slope < 0.0:
+            h = 2.0 * f / (d - slope)
+        elif down > 0.0:
+            h = (slope + d) / down
+        else:
+            return NO_WALL, limit, 0.0, 0.0
+        moved = s + h
+        if slope < -slope_error and down * h * h <= 2.0**-54 * moved * -slope:
+            # So little curvature that the parabola's root is the function's to the last bit.
+            if moved >= limit:
+                return NO_WALL, limit, 0.0, 0.0
+            return wall, moved, slope, error / -slope
+        if moved <= s:
+            return TANGENT, s, slope, 0.0
+        if n_steps >= PATIENCE:
+            reach = reach_time(wall, x + vx * s, y + vy * s, vx, vy, bounds)
+            moved = max(moved, s + reach)
+        s = moved
+    return TOO_MANY, s, 0.0, 0.0
+
+
+@njit(error_model="numpy")
+def earliest_side_or_floor(wall, start, limit, x, y, vx, vy, laws, anchors, bounds, is_relative):
+    """Find the first hit of left, right and floor; (code, s, error of s)."""
+    code, s, error = NO_WALL, limit, 0.0
+    for candidate in (LEFT, RIGHT, FLOOR):
+        # Look a little beyond the best so far, so that ties are seen from both sides.
+        beyond = min(limit, s + 8.0 * error + SAFETY * s)
+        found, root, _, root_error = first_root(
+            candidate, start, beyond, x, y, vx, vy, wall == candidate, laws, anchors, bounds, is_relative
+        )
+        if found == NO_WALL:
+            continue
+        if found != candidate:
+            return found, root, 0.0
+        if code != NO_WALL and abs(root - s) <= 8.0 * (error + root_error) + SAFETY * s:
+            # A tie, unless a wall still to be tried is met before it.
+            code, s, error = CORNER, min(root, s), max(error, root_error)
+        elif code == NO_WALL or root < s:
+            code, s, error = candidate, root, root_error
+    return code, s, error
+
+
+@njit(error_model="numpy")
+def cap_flight(start, limit, wall, x, y, vx, vy, laws, anchors, bounds, is_relative, has_base):
+    """Follow the flight in the cap from `start` to the arc; (code, s)."""
+    code, s, _, error = first_root(
+        ARC, start, limit, x, y, vx, vy, wall == ARC, laws, anchors, bounds, is_relative
+    )
+    if code == ARC and has_base and vy < 0.0:
+        # The corner of arc and base: the height there must be above its rounding error.
+        height = y + vy * s
+        if height <= SAFETY * (abs(y) + abs(vy) * s) + abs(vy) * error:
+            return CORNER, s
+    return code, s
+
+
+@njit(error_model="numpy")
+def along_mouth(limit, x, vx, laws, anchors, bounds, is_relative):
+    """Follow a path along y = 0 inside the mouth: it may only end at the mouth's edge."""
+    code, s, _ = earliest_side_or_floor(
+        NO_WALL, 0.0, limit, x, 0.0, vx, 0.0, laws, anchors, bounds, is_relative
+    )
+    if code in (LEFT, RIGHT):
+        return MOUTH_EDGE, s
+    return (HORIZON if code == NO_WALL else code), s
+
+
+@njit(error_model="numpy")
+def is_side_near(wall, s, x, y, vx, vy, laws, anchors, bounds, is_relative):
+    """Tell whether a side is met within rounding of the time s."""
+    for side in (LEFT, RIGHT):
+        residual = residual_error = 0.0
+        if wall != side:
+            residual, residual_error = wall_residual(side, x, y, laws, anchors, bounds, is_relative)
+        f, slope, error, slope_error = wall_function(
+            side, s, x, y, vx, vy, residual, laws, anchors, is_relative
+        )
+        if f <= error + residual_error + SAFETY * s * (abs(slope) + slope_error):
+            return True
+    return False
+
+
+@njit(error_model="numpy")
+def first_event(table, is_relative, wall, x, y, vx, vy, limit, laws, anchors, bounds):
+    """Find the next collision or say why not; (code, s). The anchors hold the laws at the state."""
+    in_cap = table == CAP or (
+        table == MUSHROOM and (y > 0.0 or wall in (BASE, ARC) or (y == 0.0 and wall == NO_WALL and vy > 0.0))
+    )
+    crossing = np.inf
+    if wall != BASE and ((in_cap and vy < 0.0) or (not in_cap and vy > 0.0 and y < 0.0)):
+        crossing = -y / vy
+    if wall == BASE or (y == 0.0 and wall == NO_WALL and table != MUSHROOM):
+        inward = vy if in_cap else -vy
+        if inward <= 0.0:
+            return (SLIDING if inward == 0.0 else APPROACHING), 0.0
+    if y == 0.0 and wall == NO_WALL and table == MUSHROOM and vy <= 0.0:
+        side = side_of_mouth(0.0, x, y, vx, vy, laws, anchors, is_relative)
+        if side == 0:
+            return EDGE, 0.0
+        if side < 0:
+            return (SLIDING if vy == 0.0 else APPROACHING), 0.0
+        if vy == 0.0:
+            return along_mouth(limit, x, vx, laws, anchors, bounds, is_relative)
+    if in_cap:
+        code, s = cap_flight(
+            0.0,
+            min(crossing, limit),
+            wall,
+            x,
+            y,
+            vx,
+            vy,
+            laws,
+            anchors,
+            bounds,
+            is_relative,
+            crossing < np.inf,
+        )
+        if code != NO_WALL or crossing >= limit:
+            return (HORIZON if code == NO_WALL else code), s
+        residual = residual_error = 0.0
+        if wall != ARC:
+            residual, residual_error = wall_residual(ARC, x, y, laws, anchors, bounds, is_relative)
+        gap, _, gap_error, _ = wall_function(
+            ARC, crossing, x, y, vx, vy, residual, laws, anchors, is_relative
+        )
+        if gap <= gap_error + residual_error:
+            return CORNER, crossing
+        if table == CAP:
+            return BASE, crossing
+        side = side_of_mouth(crossing, x, y, vx, vy, laws, anchors, is_relative)
+        if side <= 0:
+            return (BASE if side < 0 else EDGE), crossing
+        code, s, _ = earliest_side_or_floor(
+            NO_WALL, crossing, limit, x, y, vx, vy, laws, anchors, bounds, is_relative
+        )
+        return (HORIZON if code == NO_WALL else code), s
+    code, s, error = earliest_side_or_floor(
+        wall, 0.0, min(crossing, limit), x, y, vx, vy, laws, anchors, bounds, is_relative
+    )
+    if code != NO_WALL:
+        # A side met at the height of the mouth is its edge.
+        depth = y + vy * s
+        if (
+            crossing < np.inf
+            and code <= FLOOR
+            and -depth <= SAFETY * (abs(y) + abs(vy) * s) + abs(vy) * error
+        ):
+            return EDGE, s
+        return code, s
+    if crossing >= limit:
+        return HORIZON, s
+    if table == STEM:
+        return (
+            CORNER if is_side_near(wall, crossing, x, y, vx, vy, laws, anchors, bounds, is_relative) else BASE
+        ), crossing
+    if side_of_mouth(crossing, x, y, vx, vy, laws, anchors, is_relative) <= 0:
+        return EDGE, crossing
+    code, s = cap_flight(
+        crossing, limit, NO_WALL, x, y, vx, vy, laws, anchors, bounds, is_relative, np.bool_(False)
+    )
+    return (HORIZON if code == NO_WALL else code), s
+
+
+@njit(error_model="numpy")
+def remainder(wall, s, residual, x, y, vx, vy, laws, anchors, bounds, is_relative):
+    """Return what must be added to the time s of a hit, and the rounded place there with its low part.
+
+    The anchors hold the laws at the hit, which is where f = residual.
+    """
+    p, x_low = two_product(vx, s)
+    x_s, e = two_sum(x, p)
+    x_low += e
+    p, y_low = two_product(vy, s)
+    y_s, e = two_sum(y, p)
+    y_low += e
+    if wall == BASE:
+        return -(y_s + y_low) / vy, x_s, x_low, y_s, y_low
+    f, _ = wall_residual(wall, x_s, y_s, laws, anchors, bounds, is_relative)
+    f -= residual
+    if wall == ARC:
+        f -= 2.0 * (x_s * x_low + y_s * y_low)
+    elif wall == FLOOR:
+        f += y_low
+    else:
+        f += anchors[M, 0] * y_low - (x_low if wall == RIGHT else -x_low)
+    return f / -wall_slope(wall, x_s, y_s, vx, vy, anchors, is_relative), x_s, x_low, y_s, y_low
+
+
+@njit(error_model="numpy")
+def bounce(wall, x, y, vx, vy, anchors, is_relative):
+    """Return the velocity after a hit at (x, y): v - 2 f' grad f / |grad f|^2 = v - 2 (v.n - u) n."""
+    if wall == BASE:
+        return vx, -vy
+    if wall == ARC:
+        push = wall_slope(ARC, x, y, vx, vy, anchors, is_relative) / (x * x + y * y)
+        return vx + push * x, vy + push * y
+    if wall == FLOOR:
+        return vx, -vy - 2.0 * anchors[H, 1]
+    m = anchors[M, 0]
+    sign = 1.0 if wall == RIGHT else -1.0
+    rate = anchors[W, 1]
+    if is_relative:
+        rate = rate * anchors[R, 0] + anchors[W, 0] * anchors[R, 1]
+    rate += anchors[M, 1] * y
+    out = sign * vx
+    # The reflection as a matrix: at slopes near +-1 the diagonal is small and must not cancel.
+    tilt, n2 = ((m - 1.0) + anchors[M, LOW]) * (m + 1.0), 1.0 + m * m
+    return (
+        sign * ((tilt * out + 2.0 * (m * vy + rate)) / n2),
+        (2.0 * m * (out - rate) - tilt * vy) / n2,
+    )
+
+
+@njit(error_model="numpy")
+def move(wall, s, is_again, p, laws, bounds, anchors, is_relative):
+    """Move the state to the hit at time s and bounce, in place; returns the time, or -1 if it is lost.
+
+    `is_again`: the wall met is the one left, whose residual at the start stays in its function.
+    """
+    x, y, vx, vy = p[2], p[3], p[4], p[5]
+    residual = residual_error = 0.0
+    if is_again:
+        residual, residual_error = wall_residual(wall, x, y, laws, anchors, bounds, is_relative)
+    t, low = two_sum(p[0], s)
+    if not set_anchors(laws, anchors, t, low + p[1]):
+        return -1.0
+    s_low, x_s, x_low, y_s, y_low = remainder(
+        wall, s, residual, x, y, vx, vy, laws, anchors, bounds, is_relative
+    )
+    if is_again and residual_error > SAFETY * s * slope_bound(wall, x, y, vx, vy, bounds):
+        # A short hop along the wall: its increments gave s better than two residuals can.
+        s_low = 0.0
+    x_s += x_low + vx * s_low
+    y_s = 0.0 if wall == BASE else y_s + (y_low + vy * s_low)
+    p[0], p[1] = two_sum(t, low + p[1] + s_low)
+    set_anchors(laws, anchors, p[0], p[1])
+    p[2], p[3] = x_s, y_s
+    p[4], p[5] = bounce(wall, x_s, y_s, vx, vy, anchors, is_relative)
+    return s + s_low
+
+
+@njit(error_model="numpy")
+def step(table, is_relative, laws, bounds, anchors, p, wall, limit):
+    """Advance the state p = [t, t's low part, x, y, vx, vy] by one collision, in place.
+
+    Returns (code, dt): a wall's code, HORIZON (p is moved to the limit) or why there is none
+    (p stays). The anchors must hold the laws at p's time, and do so again after a collision.
+    """
+    code, s = first_event(table, is_relative, wall, p[2], p[3], p[4], p[5], limit, laws, anchors, bounds)
+    if code > HORIZON:
+        return code, s
+    if code == HORIZON:
+        p[2], p[3] = fma(p[4], limit, p[2]), fma(p[5], limit, p[3])
+        t, low = two_sum(p[0], limit)
+        p[0], p[1] = two_sum(t, low + p[1])
+        return code, limit
+    dt = move(code, s, code == wall, p, laws, bounds, anchors, is_relative)
+    return (code, dt) if dt >= 0.0 else (FAR_TIME, s)
+
+
+@njit(error_model="numpy")
+def first_step(table, is_relative, laws, bounds, anchors, p, wall, limit):
+    """Judge a state and advance it, for callers whose anchors are not set."""
+    if not set_anchors(laws, anchors, p[0], p[1]):
+        return FAR_TIME, 0.0
+    beyond = is_outside(table, is_relative, wall, p[2], p[3], laws, anchors, bounds)
+    if beyond != NO_WALL:
+        return OUTSIDE, float(beyond)
+    return step(table, is_relative, laws, bounds, anchors, p, wall, limit)

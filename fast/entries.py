@@ -1,0 +1,82 @@
+"""The compiled functions that Python calls, kept in numba's disk cache.
+
+numba's cache looks only at the file of the function it keeps, not at those of the functions
+compiled into it. Hence each entry closes over a digest of all of this folder's sources: a change
+anywhere makes it compile anew.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from pathlib import Path
+
+import numpy as np
+from numba import njit
+
+from fast.careful import first_step, step
+from fast.codes import HORIZON
+from fast.follow import follow
+from fast.motion import ANCHORS_SHAPE
+
+
+def digest_of_sources(folder: Path) -> str:
+    """Return a digest of the Python files in a folder."""
+    digest = hashlib.sha256()
+    for path in sorted(folder.glob("*.py")):
+        digest.update(path.read_bytes())
+    return digest.hexdigest()
+
+
+SOURCES = digest_of_sources(Path(__file__).parent)
+
+
+def _single_step(sources):
+    @njit(cache=True, error_model="numpy")
+    def single_step(table, is_relative, laws, bounds, p, wall, limit):
+        """Judge one state and advance it in place. Returns (code, dt)."""
+        sources  # noqa: B018
+        return first_step(table, is_relative, laws, bounds, np.zeros(ANCHORS_SHAPE), p, wall, limit)
+
+    return single_step
+
+
+def _trajectory(sources):
+    @njit(cache=True, error_model="numpy")
+    def trajectory(table, is_relative, laws, bounds, p, wall, t_end, out, walls):
+        """Fill out[i] = [dt, t, x, y, vx, vy] and walls[i] until full, t_end or trouble.
+
+        Returns the number of collisions and the last code (of a wall when `out` is full).
+        """
+        sources  # noqa: B018
+        anchors = np.zeros(ANCHORS_SHAPE)
+        code = wall
+        for i in range(out.shape[0]):
+            limit = (t_end - p[0]) - p[1]
+            if i == 0:
+                code, s = first_step(table, is_relative, laws, bounds, anchors, p, code, limit)
+            else:
+                code, s = step(table, is_relative, laws, bounds, anchors, p, code, limit)
+            if code >= HORIZON:
+                return i, code
+            walls[i] = code
+            out[i, 0] = s
+            out[i, 1] = p[0]
+            out[i, 2:] = p[2:]
+        return out.shape[0], code
+
+    return trajectory
+
+
+def _follow(sources):
+    @njit(cache=True, nogil=True, error_model="numpy")
+    def follow_particles(scene, stops, out, ends):
+        """Follow particles to the last stop: see fast.follow. Threads may call it side by side."""
+        sources  # noqa: B018
+        follow(scene, stops, out, ends)
+
+    return follow_particles
+
+
+single_step = _single_step(SOURCES)
+trajectory = _trajectory(SOURCES)
+follow_particles = _follow(SOURCES)

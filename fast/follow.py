@@ -1,0 +1,392 @@
+"""Following particles to given times: lanes where they are shown right, the careful step elsewhere.
+
+A worker holds LANES particles in two pools: `general` for any collision, and `disk` for captured
+particles, whose base bounces are counted and not stepped; a cap has the disk alone. Every particle's
+numbers depend on that particle only, so threads, chunks and lane positions do not change a bit.
+
+Particles are looked at where their flight passes a *stop*: an instant at which the energy is wanted
+or a cycle ends. A captured stay is recorded for a cycle when it spans that cycle's instant of least
+nu, which keeps out the many brief crossings of the edge |sin phi| = nu.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from fast.arithmetic import MAX_QUADRANT, SAFETY, TWO_OVER_PI, fma
+from fast.careful import first_step
+from fast.codes import (
+    ARC,
+    BANG_BANG,
+    CAP,
+    FOURIER,
+    HORIZON,
+    MUSHROOM,
+    N_WALLS,
+    NO_WALL,
+    PHASES,
+    STEM,
+    H,
+    M,
+    R,
+    W,
+)  # fmt: skip  # isort: skip
+from fast.lanes import (
+    CALM,
+    CLOSED,
+    COARSE,
+    DONE,
+    END,
+    H0,
+    H_REF,
+    HIT,
+    LANES,
+    N_ARC,
+    N_BASE,
+    N_REF,
+    N_ROWS,
+    NARROW,
+    NEVER,
+    NEXT_H0,
+    NEXT_R0,
+    NEXT_T,
+    NEXT_T_LOW,
+    NEXT_VX,
+    NEXT_VY,
+    NEXT_W0,
+    NEXT_X,
+    NEXT_Y,
+    OK,
+    ON_ARC,
+    R0,
+    R_REF,
+    REF,
+    REF_LOW,
+    RIGHT_ONE,
+    SPIN,
+    STAY_IN,
+    STAY_OUT,
+    STOP,
+    T_LOW,
+    VX,
+    VY,
+    W0,
+    WALL,
+    S,
+    T,
+    X,
+    Y,
+    aim,
+    arrive,
+    bounce,
+    chord,
+    fly,
+    law,
+    rebound,
+    turns,
+)  # fmt: skip  # isort: skip
+from fast.motion import ANCHORS_SHAPE, KNOTS, set_anchors
+
+GENERAL, DISK = np.arange(2)
+STAYS, MOVES, ENDS = 0, 1, 2
+POOL_SIZE = N_ROWS * LANES
+SERVES = 0.125  # omega times how long a reference serves for starting a flight
+REFERENCES = (R_REF, N_REF, H_REF)
+
+
+@njit(error_model="numpy")
+def has_lanes(table, laws, last):
+    """Tell whether the lanes know these laws, up to the time `last`."""
+    if laws[M, 0] != 0.0:
+        return False
+    for row in (R, W, H):
+        if laws[row, 0] == FOURIER and laws[row, 3] != 1.0:
+            return False
+        if laws[row, 0] == BANG_BANG and not abs(last) < MAX_QUADRANT * laws[row, 2]:
+            return False
+    return abs(last) * laws[PHASES, 0] * TWO_OVER_PI < 0.5 * MAX_QUADRANT
+
+
+@njit(error_model="numpy")
+def set_reference(a, i, laws, anchors, is_relative):
+    """Make the time of a lane's next state the reference of its laws, and give it their values there."""
+    t, end = a[NEXT_T + i], NEVER
+    a[REF + i], a[REF_LOW + i] = t, a[NEXT_T_LOW + i]
+    for k, row in enumerate((R, W, H)):
+        f, rate, bend = anchors[row, 0], anchors[row, 1], 0.0
+        if laws[row, 0] == FOURIER:
+            bend = -laws[row, 2] * laws[row, 2] * (f - laws[row, 1])
+            end = min(end, t + SERVES / laws[row, 2])
+        elif laws[row, 0] == BANG_BANG:
+            leg, is_second = int(anchors[row, 2]) // 2, int(anchors[row, 2]) % 2
+            bend = laws[row, KNOTS + 2 * int(laws[row, 3]) + leg]
+            bend = -bend if is_second else bend
+            half_leg = 0.5 * (laws[row, KNOTS + leg + 1] - laws[row, KNOTS + leg])
+            end = min(end, t + (half_leg - anchors[row, 3]))
+        place = REFERENCES[k] + i
+        a[place], a[place + LANES], a[place + 2 * LANES] = f, rate, bend
+    a[END + i] = end
+    set_laws(a, i, NEXT_R0, NEXT_W0, NEXT_H0, 0.0, laws[PHASES, 0], is_relative)
+
+
+@njit(error_model="numpy")
+def set_laws(a, i, r_row, w_row, h_row, since, omega, is_relative):
+    """Write a lane's laws at a time after its reference."""
+    g1, g2, g0 = turns(omega, since)
+    r, r1, r2 = law(a[R_REF + i], a[R_REF + LANES + i], a[R_REF + 2 * LANES + i], omega, g1, g2, g0)
+    w, w1, w2 = law(a[N_REF + i], a[N_REF + LANES + i], a[N_REF + 2 * LANES + i], omega, g1, g2, g0)
+    h, h1, h2 = law(a[H_REF + i], a[H_REF + LANES + i], a[H_REF + 2 * LANES + i], omega, g1, g2, g0)
+    if is_relative:
+        w, w1, w2 = w * r, fma(w1, r, w * r1), fma(w2, r, fma(w, r2, 2.0 * w1 * r1))
+    a[r_row + i], a[r_row + LANES + i], a[r_row + 2 * LANES + i] = r, r1, r2
+    a[w_row + i], a[w_row + LANES + i], a[w_row + 2 * LANES + i] = w, w1, w2
+    a[h_row + i], a[h_row + LANES + i], a[h_row + 2 * LANES + i] = h, h1, h2
+
+
+@njit(error_model="numpy")
+def load(a, i, p, wall, stop, narrow):
+    """Put a particle into a lane; its laws are unknown there, so its first step will be careful."""
+    for row in range(N_ROWS):
+        a[row * LANES + i] = 0.0
+    a[T + i], a[T_LOW + i] = p[0], p[1]
+    a[X + i], a[Y + i], a[VX + i], a[VY + i] = p[2], p[3], p[4], p[5]
+    a[WALL + i] = wall
+    a[STOP + i], a[NARROW + i] = stop, narrow
+    a[STAY_IN + i] = a[STAY_OUT + i] = a[CLOSED + i] = NEVER
+    a[END + i] = -NEVER
+
+
+@njit(error_model="numpy")
+def change_lane(a, i, b, j):
+    """Copy lane i of one pool to lane j of another."""
+    for row in range(N_ROWS):
+        b[row * LANES + j] = a[row * LANES + i]
+
+
+@njit(error_model="numpy")
+def fold(a, i, omega, is_relative):
+    """Bring an unfolded particle back to y >= 0, with the laws that the disk has no use for."""
+    if a[Y + i] < 0.0:
+        a[Y + i] = -a[Y + i]
+        a[VY + i] = -a[VY + i]
+    a[SPIN + i] = 0.0
+    a[WALL + i] = ON_ARC
+    since = (a[T + i] - a[REF + i]) + (a[T_LOW + i] - a[REF_LOW + i])
+    set_laws(a, i, R0, W0, H0, since, omega, is_relative)
+
+
+@njit(error_model="numpy")
+def note_stops(a, i, j, at, last, stops, out):
+    """Record what is asked for at the stops up to the time `last`; returns the next stop's number."""
+    times, is_cycle_end, narrowest = stops
+    energies, is_captured, t_in, t_out = out
+    while at < times.shape[0] and times[at] <= last:
+        energies[j, at] = 0.5 * (a[VX + i] * a[VX + i] + a[VY + i] * a[VY + i])
+        begin, end = a[STAY_IN + i], a[STAY_OUT + i]
+        is_captured[j, at] = begin < NEVER and end == NEVER
+        cycle = is_cycle_end[at]
+        at += 1
+        if cycle >= 0:
+            if begin < NEVER and begin <= narrowest[cycle] <= end:
+                t_in[j, cycle] = begin
+                t_out[j, cycle] = min(end, times[at - 1])
+            a[NARROW + i] = narrowest[min(cycle + 1, narrowest.shape[0] - 1)]
+    a[STOP + i] = times[at] if at < times.shape[0] else NEVER
+    return at
+
+
+@njit(error_model="numpy")
+def note_stay(a, i, j, at, stops, out):
+    """Record a captured stay that is over."""
+    _, is_cycle_end, _ = stops
+    while is_cycle_end[at] < 0:  # the last stop ends a cycle
+        at += 1
+    cycle = is_cycle_end[at]
+    out[2][j, cycle] = a[STAY_IN + i]
+    out[3][j, cycle] = a[CLOSED + i]
+    a[STAY_IN + i] = a[STAY_OUT + i] = a[CLOSED + i] = NEVER
+
+
+@njit(error_model="numpy")
+def take_careful_step(scene, a, i, anchors, p, end):
+    """Find a lane's next collision carefully; returns its code. The lane then needs no bounce."""
+    table, is_relative, laws, bounds = scene
+    p[0], p[1] = a[T + i], a[T_LOW + i]
+    p[2], p[3], p[4], p[5] = a[X + i], a[Y + i], a[VX + i], a[VY + i]
+    limit = (end - p[0]) - p[1]
+    code, s = first_step(table, is_relative, laws, bounds, anchors, p, int(a[WALL + i]), limit)
+    a[NEXT_T + i], a[NEXT_T_LOW + i] = p[0], p[1]
+    a[NEXT_X + i], a[NEXT_Y + i], a[NEXT_VX + i], a[NEXT_VY + i] = p[2], p[3], p[4], p[5]
+    a[HIT + i] = code
+    a[DONE + i] = 1.0
+    a[S + i] = s
+    if code < HORIZON:
+        set_reference(a, i, laws, anchors, is_relative)
+    return code
+
+
+@njit(error_model="numpy")
+def finish(a, i, j, code, end, states, codes, counts):
+    """Write down a particle's end: at the last stop for HORIZON, else where trouble met it."""
+    x, y, vx, vy = a[X + i], a[Y + i], a[VX + i], a[VY + i]
+    states[j, 0], states[j, 1] = a[T + i], a[T_LOW + i]
+    if code == HORIZON:
+        dt = (end - a[T + i]) - a[T_LOW + i]
+        states[j, 0], states[j, 1] = end, 0.0
+        x, y_end = fma(vx, dt, x), fma(vy, dt, y)
+        if a[SPIN + i] != 0.0:
+            # Unfolded: the base may lie between.
+            if y * y_end < 0.0:
+                a[N_BASE + i] += 1.0
+            if y_end < 0.0:
+                y_end, vy = -y_end, -vy
+        y = y_end
+    states[j, 2], states[j, 3], states[j, 4], states[j, 5] = x, y, vx, vy
+    codes[j] = code
+    for wall in range(N_WALLS):
+        counts[j, wall] = int(a[N_ARC + wall * LANES + i])
+
+
+@njit(error_model="numpy")
+def step_to_arc(scene, a, i, anchors, p, j, whom, stops, out, n_careful):
+    """Take careful steps in a cap until one ends on the arc; returns the last code."""
+    if a[Y + i] < 0.0:
+        a[Y + i], a[VY + i] = -a[Y + i], -a[VY + i]
+    if a[SPIN + i] != 0.0:
+        a[WALL + i] = ON_ARC
+    a[SPIN + i] = 0.0
+    while True:
+        code = take_careful_step(scene, a, i, anchors, p, stops[0][-1])
+        n_careful[j] += 1
+        if code >= HORIZON:
+            return code
+        whom[1, i] = note_stops(a, i, j, whom[1, i], a[NEXT_T + i], stops, out)
+        if code == ARC:
+            a[N_ARC + i] += 1.0
+            a[SPIN + i] = a[NEXT_X + i] * a[NEXT_VY + i] - a[NEXT_Y + i] * a[NEXT_VX + i]
+            return code
+        a[N_BASE + i] += 1.0
+        arrive(a, i)
+        a[VX + i], a[VY + i] = a[NEXT_VX + i], a[NEXT_VY + i]
+
+
+@njit(error_model="numpy")
+def correct_more(pool, scene, a, i, spare, k_w, bend):
+    """Correct a coarse step until it is right, a few times, in a pool of its own."""
+    table, is_relative, laws, _ = scene
+    if a[OK + i] != COARSE:
+        return
+    change_lane(a, i, spare, np.int64(0))
+    for _ in range(3):
+        if pool == DISK:
+            chord(spare, np.int64(1), np.bool_(True), table == CAP, is_relative, laws[PHASES, 0], bend, k_w)
+        else:
+            fly(spare, np.int64(1), table == STEM, is_relative, laws[PHASES, 0], laws[M, 1], k_w)
+        if spare[OK] != COARSE:
+            break
+    change_lane(spare, np.int64(0), a, i)
+
+
+@njit(error_model="numpy")
+def attend(pool, scene, is_laned, a, i, spare, whom, anchors, p, stops, out, ends, k_w, bend):
+    """Do for a lane what its tick could not; returns whether it stays, moves to the other pool or ends."""
+    states, codes, counts, n_careful = ends
+    table, is_relative, laws, _ = scene
+    omega, end, j = laws[PHASES, 0], stops[0][-1], whom[0, i]
+    if a[CLOSED + i] < NEVER:
+        note_stay(a, i, j, whom[1, i], stops, out)
+    if pool == GENERAL and a[SPIN + i] != 0.0 and is_laned:
+        return MOVES
+    is_known = is_laned and a[END + i] > -NEVER
+    if is_known:
+        correct_more(pool, scene, a, i, spare, k_w, bend)
+    is_past = a[NEXT_T + i] >= a[END + i]
+    if is_known and a[OK + i] == RIGHT_ONE and not (is_past and omega == 0.0):
+        if is_past:
+            set_anchors(laws, anchors, a[NEXT_T + i], a[NEXT_T_LOW + i])
+            set_reference(a, i, laws, anchors, is_relative)
+        code = int(a[HIT + i])
+    elif pool == DISK and table == MUSHROOM:
+        fold(a, i, omega, is_relative)
+        return MOVES
+    elif pool == DISK:
+        code = step_to_arc(scene, a, i, anchors, p, j, whom, stops, out, n_careful)
+    else:
+        code = take_careful_step(scene, a, i, anchors, p, end)
+        n_careful[j] += 1
+    if code < HORIZON:
+        whom[1, i] = note_stops(a, i, j, whom[1, i], a[NEXT_T + i], stops, out)
+        if whom[1, i] < stops[0].shape[0]:
+            return STAYS
+        code = HORIZON
+    elif code == HORIZON:
+        note_stops(a, i, j, whom[1, i], end, stops, out)
+    finish(a, i, j, code, end, states, codes, counts)
+    return ENDS
+
+
+@njit(error_model="numpy")
+def scan(pool, scene, is_laned, pools, whoms, n, anchors, p, stops, out, ends, k_w, bend):
+    """Attend to every lane of a pool that needs it; the last lane fills the place of one that leaves."""
+    a, whom = pools[pool], whoms[pool]
+    i = np.int64(0)
+    while i < n[pool]:
+        if a[CALM + i] > 0.0 and is_laned:
+            i += 1
+            continue
+        fate = attend(pool, scene, is_laned, a, i, pools[2], whom, anchors, p, stops, out, ends, k_w, bend)
+        if fate == STAYS:
+            i += 1
+            continue
+        if fate == MOVES:
+            other = 1 - pool
+            change_lane(a, i, pools[other], n[other])
+            whoms[other, :, n[other]] = whom[:, i]
+            n[other] += 1
+        n[pool] -= 1
+        change_lane(a, n[pool], a, i)
+        whom[:, i] = whom[:, n[pool]]
+
+
+@njit(error_model="numpy")
+def follow(scene, stops, out, ends):
+    """Follow particles to the last stop.
+
+    Args:
+        scene: table, is_relative, laws, bounds.
+        stops: times (S,), the cycle that each ends or -1, instants of least nu (K,).
+        out: energies (N, S), is_captured (N, S), t_in (N, K), t_out (N, K), filled in.
+        ends: states (N, 6): t, its low part, x, y, vx, vy, overwritten; codes (N,), counts (N, 5),
+            careful steps (N,), filled in.
+    """
+    states = ends[0]
+    first, last = 0, states.shape[0]
+    table, is_relative, laws, bounds = scene
+    is_laned = has_lanes(table, laws, stops[0][-1])
+    home = DISK if table == CAP else GENERAL
+    pools = np.zeros((3, POOL_SIZE))  # general, disk, and one to correct single lanes in
+    whoms = np.zeros((2, 2, LANES), dtype=np.int64)
+    n = np.zeros(2, dtype=np.int64)
+    anchors, p = np.zeros(ANCHORS_SHAPE), np.zeros(6)
+    omega, m, is_stem = laws[PHASES, 0], laws[M, 1], table == STEM
+    k_w = max(bounds[W, 3], bounds[H, 3])
+    bend = (1.0 + SAFETY) * (bounds[R, 1] * bounds[R, 3] + bounds[R, 2] * bounds[R, 2])
+    general, disk = pools[GENERAL], pools[DISK]
+    while True:
+        while n[0] + n[1] < LANES and first < last:
+            load(pools[home], n[home], states[first], NO_WALL, stops[0][0], stops[2][0])
+            whoms[home, 0, n[home]], whoms[home, 1, n[home]] = first, 0
+            n[home] += 1
+            first += 1
+        if n[0] + n[1] == 0:
+            break
+        if n[GENERAL] > 0:
+            aim(general, n[GENERAL], is_stem, m, bend, k_w)
+            fly(general, n[GENERAL], is_stem, is_relative, omega, m, k_w)
+            scan(GENERAL, scene, is_laned, pools, whoms, n, anchors, p, stops, out, ends, k_w, bend)
+            bounce(general, n[GENERAL], m, table == MUSHROOM)
+        if n[DISK] > 0:
+            chord(disk, n[DISK], np.bool_(False), table == CAP, is_relative, omega, bend, k_w)
+            scan(DISK, scene, is_laned, pools, whoms, n, anchors, p, stops, out, ends, k_w, bend)
+            rebound(disk, n[DISK])

@@ -1,0 +1,265 @@
+"""A scene's laws in compiled code: anchored at the last event, then their increments since.
+
+Idea. A law gives f(t + s) - f(t) without cancellation, so a wall met again soon after it was
+left is found to full precision whatever t is; the anchors themselves come from the time as a pair
+(t_hi, t_lo), so no digit of the phase is lost in long runs.
+
+Each row of `anchors` holds: value, derivative, half-leg (Fourier: size of the derivative's terms),
+time from the half-leg's begin, time in the period, the value's low part, whole periods gone by.
+All Fourier laws of a scene share their omega, so two more rows hold the harmonics' sines and
+cosines at the event, and their turn since, at one s.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from fast.arithmetic import (
+    MAX_QUADRANT,
+    beyond_first_order,
+    sine_cosine,
+    two_product,
+    two_sum,
+)
+from fast.codes import BANG_BANG, FOURIER, MAX_HARMONICS, PHASES, H, M, R, W
+
+PHASE, TURN = 4, 5
+# Columns of these two rows, to which the number of the harmonic, from 1, is added.
+SINE, COSINE = 3, 3 + MAX_HARMONICS
+SINE_LOW, COSINE_LOW = 3 + 2 * MAX_HARMONICS, 3 + 3 * MAX_HARMONICS
+ANCHORS_SHAPE = (6, 4 + 4 * MAX_HARMONICS)
+# Columns of a bang-bang law's row: kind, 0, period, number of knots, period's low part, then
+# the knots' times, values, the legs' accelerations and the low parts of these (n of each kept).
+KNOTS = 5
+LOW, N_PERIODS = 5, 6  # columns of `anchors`
+
+
+@njit(error_model="numpy")
+def set_phases(laws, anchors, t_hi, t_lo):
+    """Store the sines and cosines of all harmonics at t; False when t is out of reach."""
+    anchors[TURN, 0] = -1.0
+    for k in range(1, int(laws[PHASES, 1]) + 1):
+        s, s_low, c, c_low, is_reduced = sine_cosine(laws[PHASES, 0], float(k), t_hi, t_lo)
+        if not is_reduced:
+            return False
+        anchors[PHASE, SINE + k] = s
+        anchors[PHASE, COSINE + k] = c
+        anchors[PHASE, SINE_LOW + k] = s_low
+        anchors[PHASE, COSINE_LOW + k] = c_low
+    return True
+
+
+@njit(error_model="numpy")
+def set_turn(laws, anchors, s):
+    """Store cos(d) - 1 and sin(d) or, while all d are small, sin(d) - d, for the phases d = k omega s."""
+    n = int(laws[PHASES, 1])
+    is_short = 0.5 * n * laws[PHASES, 0] * s < 0.75
+    anchors[TURN, 0] = s
+    anchors[TURN, 1] = 1.0 if is_short else 0.0
+    for k in range(1, n + 1):
+        half = 0.5 * k * laws[PHASES, 0] * s
+        if is_short:
+            more, less = beyond_first_order(half)
+            sine = half + more
+            anchors[TURN, SINE + k] = 2.0 * (more + sine * less)
+        else:
+            sine, _, cosine, _, _ = sine_cosine(laws[PHASES, 0], 0.5 * k, s, 0.0)
+            anchors[TURN, SINE + k] = 2.0 * sine * cosine
+        anchors[TURN, COSINE + k] = -2.0 * sine * sine
+
+
+@njit(error_model="numpy")
+def set_anchors(laws, anchors, t_hi, t_lo):
+    """Anchor all four laws at t; False when t is out of reach."""
+    if not set_phases(laws, anchors, t_hi, t_lo):
+        return False
+    for row in (R, W, H, M):
+        if laws[row, 0] == FOURIER:
+            set_waves(laws, anchors, row)
+        elif laws[row, 0] == BANG_BANG:
+            if not set_leg(laws, anchors, row, t_hi, t_lo):
+                return False
+        else:
+            anchors[row, 0] = laws[row, 1]
+            anchors[row, 1] = 0.0
+            anchors[row, 2] = 0.0
+            anchors[row, LOW] = 0.0
+    return True
+
+
+@njit(error_model="numpy")
+def add_product(total, low, a, b, b_low):
+    """Return total + low + a (b + b_low), as a sum of two floats."""
+    p, e = two_product(a, b)
+    total, f = two_sum(total, p)
+    return total, low + (e + f + a * b_low)
+
+
+@njit(error_model="numpy")
+def set_waves(laws, anchors, row):
+    """Anchor a Fourier law from the phases stored; its terms may cancel, hence sums of two floats."""
+    n = int(laws[row, 3])
+    f, f_low = laws[row, 1], 0.0
+    rate, rate_low = 0.0, 0.0
+    size = 0.0
+    for k in range(1, n + 1):
+        s, s_low = anchors[PHASE, SINE + k], anchors[PHASE, SINE_LOW + k]
+        c, c_low = anchors[PHASE, COSINE + k], anchors[PHASE, COSINE_LOW + k]
+        a, b = laws[row, 3 + k], laws[row, 3 + n + k]
+        f, f_low = add_product(f, f_low, a, c, c_low)
+        f, f_low = add_product(f, f_low, b, s, s_low)
+        rate, rate_low = add_product(rate, rate_low, b, k * c, k * c_low)
+        rate, rate_low = add_product(rate, rate_low, -a, k * s, k * s_low)
+        size += k * (abs(a) + abs(b))
+    anchors[row, 0], anchors[row, LOW] = two_sum(f, f_low)
+    anchors[row, 1] = laws[row, 2] * (rate + rate_low)
+    anchors[row, 2] = laws[row, 2] * size
+
+
+@njit(error_model="numpy")
+def time_since(knot, n_periods, period, period_low, t_hi, t_lo):
+    """Return t - (knot + n_periods period) as a sum of two floats."""
+    d, e = two_sum(t_hi, -knot)
+    p, q = two_product(n_periods, period)
+    difference, f = two_sum(d, -p)
+    return two_sum(difference, f + ((e - q) + (t_lo - n_periods * period_low)))
+
+
+@njit(error_model="numpy")
+def on_parabola(value, a, a_low, u, u_low):
+    """Return value + a u^2 / 2 as a sum of two floats, and a u."""
+    p, p_low = two_product(u, u)
+    q, q_low = two_product(0.5 * a, p)
+    f, f_low = two_sum(value, q)
+    return f, f_low + (q_low + (0.5 * a * (p_low + 2.0 * u * u_low) + 0.5 * a_low * p)), a * (u + u_low)
+
+
+@njit(error_model="numpy")
+def set_leg(laws, anchors, row, t_hi, t_lo):
+    """Anchor a bang-bang law: its nearer knot gives value and derivative without cancellation."""
+    n = int(laws[row, 3])
+    period, period_low = laws[row, 2], laws[row, 4]
+    first = laws[row, KNOTS]
+    n_periods = np.floor((t_hi - first) / period)
+    if not abs(n_periods) < MAX_QUADRANT:
+        return False
+    tau, _ = time_since(first, n_periods, period, period_low, t_hi, t_lo)
+    if tau < 0.0:
+        n_periods -= 1.0
+    elif tau >= period + period_low:
+        n_periods += 1.0
+    tau, _ = time_since(first, n_periods, period, period_low, t_hi, t_lo)
+    i = 0
+    while i < n - 2:
+        since_next, _ = time_since(laws[row, KNOTS + i + 1], n_periods, period, period_low, t_hi, t_lo)
+        if since_next < 0.0:
+            break
+        i += 1
+    before, after = laws[row, KNOTS + i], laws[row, KNOTS + i + 1]
+    half_leg = 0.5 * (after - before)
+    a, a_low = laws[row, KNOTS + 2 * n + i], laws[row, KNOTS + 3 * n + i]
+    u, u_low = time_since(before, n_periods, period, period_low, t_hi, t_lo)
+    if u < half_leg:
+        f, f_low, rate = on_parabola(laws[row, KNOTS + n + i], a, a_low, u, u_low)
+        anchors[row, 2] = 2.0 * i
+        anchors[row, 3] = max(u, 0.0)
+    else:
+        u, u_low = time_since(after, n_periods, period, period_low, t_hi, t_lo)
+        f, f_low, rate = on_parabola(laws[row, KNOTS + n + i + 1], -a, -a_low, u, u_low)
+        anchors[row, 2] = 2.0 * i + 1.0
+        anchors[row, 3] = max(half_leg + u, 0.0)
+    anchors[row, 0], anchors[row, LOW] = two_sum(f, f_low)
+    anchors[row, 1] = rate
+    anchors[row, 4] = tau
+    anchors[row, N_PERIODS] = n_periods
+    return True
+
+
+@njit(error_model="numpy")
+def increment(laws, anchors, row, s):
+    """Return f(t + s) - f(t), f'(t + s), and the summed sizes of the terms of both."""
+    if laws[row, 0] == FOURIER:
+        if s == 0.0:
+            return 0.0, anchors[row, 1], 0.0, anchors[row, 2]
+        if s != anchors[TURN, 0]:
+            set_turn(laws, anchors, s)
+        return waves_increment(laws, anchors, row, s)
+    if laws[row, 0] == BANG_BANG:
+        return legs_increment(laws, anchors, row, s)
+    return 0.0, 0.0, 0.0, 0.0
+
+
+@njit(error_model="numpy")
+def waves_increment(laws, anchors, row, s):
+    """Return `increment` of a Fourier law for the turn stored."""
+    n = int(laws[row, 3])
+    is_short = anchors[TURN, 1] > 0.0
+    # What goes with s at first order is f' s, and f' is known better than its terms' sum.
+    change = anchors[row, 1] * s if is_short else 0.0
+    size = abs(change)
+    d_rate = 0.0
+    for k in range(1, n + 1):
+        down, across = anchors[TURN, COSINE + k], anchors[TURN, SINE + k]
+        sine, cosine = anchors[PHASE, SINE + k], anchors[PHASE, COSINE + k]
+        a, b = laws[row, 3 + k], laws[row, 3 + n + k]
+        change += (a * cosine + b * sine) * down + (b * cosine - a * sine) * across
+        size += (abs(a) + abs(b)) * (abs(down) + abs(across))
+        if is_short:
+            across += k * laws[PHASES, 0] * s
+        d_rate += k * ((b * cosine - a * sine) * down - (a * cosine + b * sine) * across)
+    return change, anchors[row, 1] + laws[row, 2] * d_rate, size, anchors[row, 2]
+
+
+@njit(error_model="numpy")
+def legs_increment(laws, anchors, row, s):
+    """Return `increment` of a bang-bang law by walking its half-legs, each a parabola."""
+    n = int(laws[row, 3])
+    n_half_legs = 2 * (n - 1)
+    j = int(anchors[row, 2])
+    u = anchors[row, 3]
+    rate = anchors[row, 1]
+    change = 0.0
+    size = 0.0
+    left = s
+    if s >= laws[row, 2]:
+        n_periods = np.floor(s / laws[row, 2])
+        p, e = two_product(n_periods, laws[row, 2])
+        left = max((s - p) - (e + n_periods * laws[row, 4]), 0.0)
+    for _ in range(n_half_legs + 2):
+        i = j // 2
+        half_leg = 0.5 * (laws[row, KNOTS + i + 1] - laws[row, KNOTS + i])
+        a = laws[row, KNOTS + 2 * n + i]
+        if j % 2:
+            a = -a
+        room = max(half_leg - u, 0.0)
+        step = min(left, room)
+        change += step * (rate + 0.5 * a * step)
+        size += step * (abs(rate) + 0.5 * abs(a) * step)
+        if left <= room:
+            # The time within the half-leg is known to rounding of the time within the period.
+            rate += a * step
+            return change, rate, size, abs(rate) + abs(a) * min(half_leg, anchors[row, 4] + s)
+        rate = 0.0 if j % 2 else a * half_leg
+        left -= room
+        u = 0.0
+        j = (j + 1) % n_half_legs
+    return change, rate, size, abs(rate)
+
+
+@njit(error_model="numpy")
+def width(laws, anchors, is_relative, s):
+    """Return w(t), w(t + s) - w(t), w'(t + s) and the sizes of both, for w = nu r or w itself."""
+    d_w, rate, size, rate_size = increment(laws, anchors, W, s)
+    w = anchors[W, 0]
+    if not is_relative:
+        return w, d_w, rate, size, rate_size
+    d_r, r_rate, r_size, r_rate_size = increment(laws, anchors, R, s)
+    r = anchors[R, 0]
+    return (
+        w * r,
+        d_w * (r + d_r) + w * d_r,
+        rate * (r + d_r) + (w + d_w) * r_rate,
+        size * (abs(r) + r_size) + w * r_size,
+        rate_size * (abs(r) + r_size) + (w + size) * r_rate_size,
+    )

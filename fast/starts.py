@@ -1,0 +1,118 @@
+"""Where an ensemble starts and where it is looked at: initial states, cycles and their instants.
+
+Particle i draws its start from block i of a counter-based random stream (Philox) keyed by the
+seed: it is the same particle whatever the number of particles, threads or chunks.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+from mpmath import fp
+
+from fast.compiled import FloatArray
+from scene import Cap, Mushroom, Scene, Stem
+from scene.laws import BangBang, value
+from scene.tables import laws, period, width_factors
+
+
+def initial_states(scene: Scene, n_particles: int, energy: float, seed: int) -> FloatArray:
+    """Draw states uniform in area and direction when the cycle begins, all of one energy.
+
+    Returns:
+        (N, 6) array: t, its low part 0, x, y, vx, vy.
+    """
+    # One Philox block gives four numbers, and four is what a particle needs.
+    raw = np.random.Philox(key=seed).random_raw(4 * n_particles).reshape(n_particles, 4)
+    u = (raw >> np.uint64(11)) * 2.0**-53
+    start = start_time(scene)
+    x, y = _uniform_in_area(scene, start, u[:, 0], u[:, 1], u[:, 2])
+    speed, angle = math.sqrt(2.0 * energy), 2.0 * np.pi * u[:, 3]
+    out: FloatArray = np.column_stack(
+        [
+            np.full(n_particles, start),
+            np.zeros(n_particles),
+            x,
+            y,
+            speed * np.cos(angle),
+            speed * np.sin(angle),
+        ]
+    )
+    return out
+
+
+def _uniform_in_area(
+    scene: Scene, t: float, pick: FloatArray, a: FloatArray, b: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    now = {name: float(value(fp, law, t)) for name, law in laws(scene).items()}
+    r, h, slope = now.get("r", 0.0), now.get("h", 0.0), now.get("slope", 0.0)
+    cap_area = 0.5 * math.pi * r * r
+    if isinstance(scene, Cap):
+        w = stem_area = 0.0
+    else:
+        w = math.prod(float(value(fp, law, t)) for law in width_factors(scene))
+        stem_area = 2.0 * w * h - slope * h * h
+    rho, psi = r * np.sqrt(a), np.pi * b
+    # Depth d below the mouth has density (w - slope d): invert 2 w d - slope d^2 = a stem_area.
+    depth = a * stem_area / (w + np.sqrt(np.maximum(w * w - slope * a * stem_area, 0.0)) + 1e-300)
+    side = (w - slope * depth) * (2.0 * b - 1.0)
+    in_cap = pick * (cap_area + stem_area) < cap_area
+    return np.where(in_cap, rho * np.cos(psi), side), np.where(in_cap, rho * np.sin(psi), -depth)
+
+
+class Stops(NamedTuple):
+    """Instants at which particles are looked at, in order.
+
+    Attributes:
+        times: (S,) the instants; the last one ends the run.
+        cycles: (S,) number of the cycle that an instant ends, -1 for others.
+        narrowest: (K,) instant of least nu of each cycle (middle of a plateau), infinity without a mouth.
+    """
+
+    times: FloatArray
+    cycles: npt.NDArray[np.int64]
+    narrowest: FloatArray
+
+
+def start_time(scene: Scene) -> float:
+    """Return when the cycle begins: at the first knot of a bang-bang law, else at 0."""
+    return next((law.knots[0][0] for law in laws(scene).values() if isinstance(law, BangBang)), 0.0)
+
+
+def cycle_length(scene: Scene) -> float:
+    """Return the period of the laws, 1 for a static scene."""
+    shared = period(scene)
+    return float(shared.value(fp)) if shared else 1.0
+
+
+def cycle_stops(scene: Scene, n_cycles: int, phases: Sequence[float]) -> Stops:
+    """Return the stops of whole cycles: at each of `phases` (fractions of a cycle, rising) and the end."""
+    start, span = start_time(scene), cycle_length(scene)
+    count = np.arange(n_cycles)
+    parts = np.array([*phases, 1.0])
+    times = start + span * (count[:, None] + parts[None, :])
+    cycles = np.full(times.shape, -1)
+    cycles[:, -1] = count
+    return Stops(times.ravel(), cycles.ravel(), start + span * (count + narrowest_phase(scene)))
+
+
+def narrowest_phase(scene: Scene) -> float:
+    """Return the fraction of the cycle at which nu is least (middle of a plateau); infinity with no mouth."""
+    if isinstance(scene, Stem | Cap):
+        return math.inf
+    start, span = start_time(scene), cycle_length(scene)
+    grid = np.arange(4096) / 4096.0
+    nu = np.array([_mouth_ratio(scene, start + span * g) for g in grid])
+    low = grid[nu <= nu.min() * (1.0 + 2.0**-40)]
+    return float(0.5 * (low[0] + low[-1]))
+
+
+def _mouth_ratio(scene: Mushroom, t: float) -> float:
+    if scene.nu is not None:
+        return float(value(fp, scene.nu, t))
+    assert scene.w is not None
+    return float(value(fp, scene.w, t) / value(fp, scene.r, t))

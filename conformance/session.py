@@ -186,6 +186,24 @@ class Session:
         self._end = trouble
 
 
+def missing(introduction: Introduction, profile: str, scene: Mapping[str, Any] | None) -> str:
+    """Say what a question needs that an implementation does not list; empty when it lists all.
+
+    Args:
+        introduction: what it said of itself.
+        profile: step, trajectory, flow or time.
+        scene: of the question, in the wire's form; None for one that must be refused, so that no
+            table and no law is needed.
+    """
+    needs = [("profile", profile, introduction.profiles)]
+    if scene is not None:
+        parts = {name: part for name, part in scene.items() if name not in ("table", "name", "notes")}
+        kinds = {law["kind"] if isinstance(law, Mapping) else "constant" for law in parts.values()}
+        needs.append(("table", str(scene["table"]), introduction.tables))
+        needs += [("law", kind, introduction.laws) for kind in sorted(kinds)]
+    return ", ".join(f"{what} {name}" for what, name, offered in needs if name not in offered)
+
+
 def read_introduction(line: bytes) -> Introduction:
     """Decode the answer to `start`.
 

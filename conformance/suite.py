@@ -20,7 +20,7 @@ import msgspec
 
 from conformance import grading, suite_properties, vectors
 from conformance.process import Trouble
-from conformance.session import Limits, Session
+from conformance.session import Limits, Session, missing
 from conformance.vectors import Vector
 from scene import BadInput, load, to_data
 from scene.messages import Introduction
@@ -250,7 +250,8 @@ def _converse(
 def ask_vector(session: Session, vector: Vector) -> Result:
     """Put one vector to an open session and grade the answer."""
     assert session.introduction is not None
-    if lacking := missing(session.introduction, vector):
+    is_refused = vector.expect[0].outcome == "rejected"
+    if lacking := missing(session.introduction, vector.kind, None if is_refused else vector.scene):
         return _result(vector, Trouble("unsupported", lacking))
     begin = time.monotonic()
     try:
@@ -271,28 +272,14 @@ def ask_vector(session: Session, vector: Vector) -> Result:
     )
 
 
-def missing(introduction: Introduction, vector: Vector) -> str:
-    """Say what a vector needs that the implementation does not list; empty when it lists all."""
-    laws = {
-        law["kind"] if isinstance(law, dict) else "constant"
-        for name, law in vector.scene.items()
-        if name not in ("table", "name", "notes")
-    }
-    needs: list[tuple[str, str, tuple[str, ...]]] = [
-        ("profile", vector.kind, introduction.profiles),
-        ("table", str(vector.scene.get("table")), introduction.tables),
-        *(("law", str(law), introduction.laws) for law in sorted(laws)),
-    ]
-    return ", ".join(f"{what} {name}" for what, name, offered in needs if name not in offered)
-
-
 def measure_speed(session: Session) -> Speed | None:
     """Time a trajectory on the moving cap, longer until the clock can read it; None where not offered."""
     assert session.introduction is not None
-    if "time" not in session.introduction.profiles:
+    scene = to_data(load(TIMED_SCENE))
+    if missing(session.introduction, "time", scene):
         return None
     n_collisions, ns = 10, [0]
-    request = {"cmd": "time", "scene": to_data(load(TIMED_SCENE)), "state": TIMED_STATE}
+    request = {"cmd": "time", "scene": scene, "state": TIMED_STATE}
     try:
         while min(ns) < TIMED_LEAST and n_collisions < 100_000:
             n_collisions *= 10 if min(ns) * 10 < TIMED_LEAST else 2

@@ -13,11 +13,12 @@ import msgspec
 import pytest
 from test_conformance_session import SCRIPT, made_up
 
-from conformance import reports, suite, suite_properties, vectors
+from conformance import kill_matrix, plain, reports, suite, suite_properties, vectors
+from conformance.mutants import MUTANTS
 from conformance.process import Trouble
-from conformance.session import Limits
+from conformance.session import Limits, missing
 from conformance.suite import Result, Run
-from scene import Collision, Horizon
+from scene import Collision, Horizon, State, from_data
 from scene.messages import Introduction
 from scene.refusal import BadInput
 
@@ -124,13 +125,11 @@ def test_known_failures_are_marked_in_a_run(monkeypatch):
 
 def test_what_is_not_offered_is_not_asked():
     vector = made_up(0)
-    assert suite.missing(INTRODUCTION, vector) == ""
+    assert missing(INTRODUCTION, "step", vector.scene) == ""
     moving = msgspec.structs.replace(vector, scene={"table": "stem", "w": 1.0, "h": {"kind": "fourier"}})
-    assert suite.missing(INTRODUCTION, moving) == "table stem, law fourier"
-    assert (
-        suite.missing(INTRODUCTION, msgspec.structs.replace(vector, kind="trajectory"))
-        == "profile trajectory"
-    )
+    assert missing(INTRODUCTION, "step", moving.scene) == "table stem, law fourier"
+    assert missing(INTRODUCTION, "trajectory", vector.scene) == "profile trajectory"
+    assert missing(INTRODUCTION, "step", None) == ""  # what must be refused needs no table
     result = suite.ask_vector(SimpleNamespace(introduction=INTRODUCTION), moving)
     assert (result.verdict, result.why) == ("unsupported", "table stem, law fourier")
 
@@ -175,7 +174,17 @@ class Stub:
     """A session whose answers are Python functions."""
 
     def __init__(self, step=None, ask=None):
-        self.introduction, self.step, self.ask = INTRODUCTION, step, ask
+        laws = ("constant", "fourier", "bang-bang")
+        self.introduction = msgspec.structs.replace(INTRODUCTION, laws=laws)
+        self.step, self.ask = step, ask
+
+
+def test_what_must_be_refused_is_asked_of_all():
+    vector = next(v for v in vectors.load("stress") if v.scene.get("table") == "ellipse")
+    asked = []
+    session = Stub(ask=lambda request: asked.append(request) or {"outcome": "rejected", "reason": "ellipse"})
+    assert suite.ask_vector(session, vector).verdict == "pass"
+    assert asked[0]["scene"] == vector.scene
 
 
 def core_steps() -> list[vectors.Vector]:
@@ -194,6 +203,56 @@ def test_properties_can_fail():
 
     found = list(suite_properties.ask_properties(Stub(step=crash), core_steps()))
     assert {verdict for _, verdict, _, _ in found} == {"crashed"}
+
+
+def test_what_a_property_needs_is_asked_for_first():
+    without = Stub(step=plain.next_collision)
+    without.introduction = msgspec.structs.replace(INTRODUCTION, laws=("constant",))
+    still = [v for v in vectors.load("core") if v.group == "static-cap"]
+    found = {name: verdict for name, verdict, _, _ in suite_properties.ask_properties(without, still)}
+    assert found.pop("static-limit") == "unsupported"
+    assert found.pop("period-shift") == "declined"
+    assert set(found.values()) == {"pass"}
+    assert list(suite_properties.ask_properties(without, core_steps())) == []
+    assert list(suite_properties.ask_profiles(without)) == []
+
+
+def flows(name: str) -> Stub:
+    """A session with a mutant of the plain stepper, or with itself."""
+    mutant = MUTANTS.get(name, kill_matrix.PLAIN)
+
+    def ask(request):
+        states = [State(**state) for state in request["states"]]
+        arrived = mutant.flow(from_data(request["scene"]), states, request["t_end"])
+        return {"states": [{**msgspec.to_builtins(o), "captured": stay} for o, stay in arrived]}
+
+    return Stub(ask=ask)
+
+
+@pytest.mark.parametrize(
+    ("name", "verdict"),
+    [
+        ("none", "pass"),
+        ("wall-velocity-once", "fail"),
+        ("wall-velocity-dropped", "fail"),
+        ("energy-kept", "fail"),
+        ("phase-restarts-at-each-step", "declined"),  # loses nearly all its particles
+    ],
+)
+def test_the_work_identity_tells_a_mutant_from_an_honest_stepper(monkeypatch, name, verdict):
+    monkeypatch.setattr(suite_properties, "N_PARTICLES", (1000,))
+    monkeypatch.setattr(suite_properties, "_one_cycle", lambda *_: [])
+    monkeypatch.setattr(suite_properties, "_affordable", lambda *_: 1000)
+    work, _ = suite_properties.ask_profiles(flows(name))
+    assert work[:2] == ("work-identity", verdict)
+
+
+@pytest.mark.parametrize(("name", "verdict"), [("none", "pass"), ("hole-static", "fail")])
+def test_one_cycle_tells_a_mutant_from_an_honest_stepper(monkeypatch, name, verdict):
+    monkeypatch.setattr(suite_properties, "N_PARTICLES", (200,))
+    monkeypatch.setattr(suite_properties.profiles, "work_identity", lambda *_, **__: [])
+    _, cycle = suite_properties.ask_profiles(flows(name))
+    assert cycle[:2] == ("one-cycle", verdict)
 
 
 def test_profiles_can_fail(monkeypatch):
@@ -221,7 +280,9 @@ def test_profiles_can_fail(monkeypatch):
 
 
 def test_speed_is_not_measured_where_nothing_is_hit():
-    introduction = msgspec.structs.replace(INTRODUCTION, profiles=("step", "time"))
+    introduction = msgspec.structs.replace(
+        INTRODUCTION, profiles=("step", "time"), laws=("fourier", "constant")
+    )
     last = msgspec.to_builtins(Horizon(*[0.0] * 5))
     session = SimpleNamespace(introduction=introduction, ask=lambda _: {"ns": [1], "steps": [last]})
     assert suite.measure_speed(session) is None

@@ -43,7 +43,7 @@ from scene.wire import serve
 ROUNDING = 2.0**-48  # f and f' are sums of a few terms, each rounded to some 2^-52 of its size
 LARGEST = 2.0**400  # squares of greater numbers overflow
 MAX_PARTS = 20_000  # intervals looked at for one wall
-MAX_COLLISIONS = 1_000_000  # of one particle in a flow
+MAX_COLLISIONS = 20_000  # of one particle in a flow: some seconds
 SIDES: tuple[Wall, ...] = ("left", "right", "floor")
 
 

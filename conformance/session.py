@@ -282,4 +282,4 @@ def _encode(request: Mapping[str, Any]) -> bytes:
 
 
 def _reason(error: Exception) -> str:
-    return " ".join(str(error).split()).replace("$.", "")
+    return " ".join(str(error).split()).replace("$.", "")[:200]

@@ -70,8 +70,8 @@ def from_data(data: Any, origin: str = "") -> Scene:
         check(scene)
     except InvalidScene as error:
         raise InvalidScene(prefix + str(error)) from None
-    except (msgspec.ValidationError, RecursionError, OverflowError) as error:
-        # A key may hold a line break, and the message repeats it.
+    except (msgspec.ValidationError, UnicodeEncodeError, RecursionError, OverflowError) as error:
+        # A key may hold a line break, and the message repeats it; JSON may spell a lone surrogate.
         reason = " ".join(str(error).split())
         raise InvalidScene(prefix + reason.replace("$.", "").replace("$", "scene")) from None
     return scene

@@ -87,7 +87,7 @@ class _Server:
 
     def introduce(self, command: Start) -> dict[str, Any]:
         if command.protocol != PROTOCOL:
-            return _plain(Rejected(f"protocol = {command.protocol}, must be {PROTOCOL}"))
+            return {"seq": None, **_plain(Rejected(f"protocol = {command.protocol}, must be {PROTOCOL}"))}
         offered = {"step": True, "trajectory": True, "flow": self.flow, "time": self.timer}
         return {
             "protocol": PROTOCOL,

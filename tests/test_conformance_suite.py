@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
+from decimal import Decimal
 from pathlib import Path
 from types import SimpleNamespace
 from xml.etree import ElementTree
@@ -185,6 +186,33 @@ def test_what_must_be_refused_is_asked_of_all():
     session = Stub(ask=lambda request: asked.append(request) or {"outcome": "rejected", "reason": "ellipse"})
     assert suite.ask_vector(session, vector).verdict == "pass"
     assert asked[0]["scene"] == vector.scene
+
+
+def moved(vector: vectors.Vector, by: float) -> vectors.Vector:
+    """The vector with its first certified place moved by so much of the allowed scale, enclosures and all."""
+    expected = vector.expect[0]
+    first = expected.steps[0]
+    size = by * max(first.allowance[1] + abs(float(first.x[0])), first.allowance[2] + abs(float(first.y[0])))
+    ends = tuple(str(Decimal(end) + Decimal(size)) for end in first.x)
+    shifted = msgspec.structs.replace(first, x=ends)
+    return msgspec.structs.replace(
+        vector, expect=(msgspec.structs.replace(expected, steps=(shifted, *expected.steps[1:])),)
+    )
+
+
+def test_shifted_answers_make_the_reference_fail(monkeypatch):
+    """The corpus is judged by, not with, the reference: shift what is certified, and it fails everywhere."""
+    known = [v for v in vectors.load("core") if v.expect[0].steps and v.group != "hard-case-14"][::100]
+    monkeypatch.setattr(suite_properties, "N_QUESTIONS", 0)
+    monkeypatch.setattr(suite, "measure_speed", lambda _: None)
+    for by, verdict in ((4e-9, "fail"), (1e-10, "pass")):
+        shifted = [moved(vector, by) for vector in known]
+        monkeypatch.setattr(suite, "choose", lambda *_, chosen=shifted: chosen)
+        run = suite.check([sys.executable, "-m", "reference"])
+        graded = {r.id: r.verdict for r in run.results if r.level}
+        assert len(graded) > 12
+        assert set(graded.values()) == {verdict}, graded
+        assert run.exit_code() == (1 if verdict == "fail" else 0)
 
 
 def core_steps() -> list[vectors.Vector]:

@@ -127,6 +127,7 @@ BAD_FILES = [
     ("a.json", b'{"table": "cap", "r": 1e400}', "r = inf, must be finite"),
     ("a.json", b'{"table": "cap", "r": ' + b"9" * 5000 + b"}", "is not valid JSON"),
     ("a.json", b"\xff\xfe", "is not valid JSON"),
+    ("a.json", b'{"table": "cap", "r": "\\ud800"}', "surrogates not allowed"),
     ("a.json", b'{"table": "cap", "r": ' + b"[" * 100_000, "is not valid JSON"),
     ("a.json", b'{"table": "cap", "radius": 1}', "unknown field `radius`"),
     ("a.toml", b'table = "cap', "is not valid TOML"),

@@ -1,0 +1,122 @@
+"""The documents hold: the tutorial's commands do what it says, the protocol's examples fit the schema."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import subprocess
+import sys
+from collections import Counter
+from pathlib import Path
+
+import jsonschema
+import pytest
+
+from conformance import vectors
+from scene.messages import json_schema
+
+ROOT = Path(__file__).parent.parent
+DOCS = ROOT / "docs"
+FENCE = re.compile(r"^```(\w+)(?: (\S+))?\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+# Changes that the tutorial asks its reader to make, by the number of the console block that they precede.
+EDITS = {2: ("box.py", "2 * rate", "1 * rate"), 3: ("box.py", "1 * rate", "2 * rate")}
+
+
+def blocks(document: str, language: str) -> list[tuple[str, str]]:
+    """List the fenced blocks of a language: the name after it, and the text."""
+    found = FENCE.findall((DOCS / document).read_text("utf-8"))
+    return [(name, text) for kind, name, text in found if kind == language]
+
+
+def matches(shown: str, output: str) -> bool:
+    """Tell whether the output has the shown lines in this order; `...` stands for anything."""
+    pattern = re.escape(shown.strip()).replace(r"\.\.\.", ".*?")
+    return re.search(pattern, output, re.DOTALL) is not None
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory) -> Path:
+    """The reader's folder, with the files of the tutorial."""
+    path = tmp_path_factory.mktemp("tutorial")
+    for name, text in blocks("tutorial.md", "python"):
+        if name:
+            (path / name).write_text(text)
+    (path / "known.txt").write_text("static-stem/1\n")
+    return path
+
+
+@pytest.mark.parametrize("number", range(len(blocks("tutorial.md", "console"))))
+def test_the_tutorial_does_what_it_says(folder, number):
+    _, text = blocks("tutorial.md", "console")[number]
+    command, _, shown = text.removeprefix("$ ").partition("\n")
+    if number in EDITS:
+        name, before, after = EDITS[number]
+        file = folder / name
+        assert file.read_text().count(before) == 1
+        file.write_text(file.read_text().replace(before, after))
+    programs = Path(sys.executable).parent
+    environment = {**os.environ, "PATH": f"{programs}{os.pathsep}{os.environ['PATH']}", "COLUMNS": "140"}
+    done = subprocess.run(
+        command, shell=True, cwd=folder, env=environment, capture_output=True, text=True, check=False
+    )
+    assert matches(shown, done.stdout), done.stdout[-3000:] + done.stderr
+    assert done.returncode == (1 if "not accepted" in shown or "though it is listed" in shown else 0)
+
+
+def test_another_output_would_be_seen():
+    assert matches("4 of 24 cases pass, ... s: not accepted", "4 of 24 cases pass, 1.0 s: not accepted")
+    assert not matches("4 of 24 cases pass, ... s: not accepted", "5 of 24 cases pass, 1.0 s: not accepted")
+    assert not matches("a\n...\nb", "b\na\n")
+
+
+def test_the_figures_of_the_corpus_are_right():
+    text = " ".join((DOCS / "corpus.md").read_text("utf-8").split())
+    corpus = vectors.load("stress")
+    kinds = Counter(vector.kind for vector in corpus)
+    levels = Counter(vector.level for vector in corpus)
+    assert (
+        f"Corpus {vectors.manifest().corpus} holds {kinds['step']:,} steps and {kinds['trajectory']}" in text
+    )
+    shown = "{core:,} of them at level core, {extended} at extended, {stress} at stress".format(**levels)
+    assert shown in text
+
+
+def test_the_examples_of_the_protocol_fit_its_schema():
+    """Every line of a block: > is a request, < an answer; together they show every kind of message."""
+    published = json.loads((DOCS / "protocol.schema.json").read_text("utf-8"))
+    assert published == json.loads(json.dumps(json_schema()))
+    kinds = {
+        mark: jsonschema.Draft202012Validator({"$ref": f"#/$defs/{name}", "$defs": published["$defs"]})
+        for mark, name in ((">", "Request"), ("<", "Answer"))
+    }
+    shown = set()
+    for _, text in blocks("protocol.md", "json"):
+        for line in text.splitlines():
+            mark, message = line[0], json.loads(line[1:])
+            kinds[mark].validate(message)
+            shown |= {message.get("cmd"), message.get("outcome"), *message}
+    assert shown >= {"start", "echo", "step", "trajectory", "flow", "time", "stop"}
+    assert shown >= {"collision", "horizon", "undefined", "undecided", "rejected", "error"}
+    assert shown >= {"values", "profiles", "steps", "states", "ns"}
+
+
+def test_the_examples_of_the_protocol_are_what_plain_answers():
+    """To the bit: nothing in them takes a sine."""
+    lines = [line for _, text in blocks("protocol.md", "json") for line in text.splitlines()]
+    asked = [line[1:] for line in lines if line[0] == ">"]
+    expected = [json.loads(line[1:]) for line in lines if line[0] == "<"][: len(asked) - 1]
+    asked.sort(key=lambda line: '"stop"' in line)  # the page shows it before the questions
+    done = subprocess.run(
+        [sys.executable, "-m", "conformance.plain"],
+        input="\n".join(asked),
+        capture_output=True,
+        text=True,
+        check=True,
+        cwd=ROOT,
+    )
+    answered = [json.loads(line) for line in done.stdout.splitlines()]
+    assert answered[0].keys() == expected[0].keys()
+    assert answered[-1]["outcome"] == "rejected"  # plain offers no time
+    assert answered[1:-1] == expected[1:-1]
+    assert len(answered) == len(asked) - 1

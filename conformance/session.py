@@ -254,7 +254,8 @@ def read_answer(line: bytes, cmd: str, seq: int) -> dict[str, Any]:
         envelope = _envelopes.decode(line)
         if type(envelope.seq) is not int or envelope.seq != seq:
             said = f": {str(envelope.reason)[:200]}" if envelope.reason else ""
-            raise Trouble("wrong-format", f"answered seq {envelope.seq!r} to seq {seq}{said}")
+            given = repr(envelope.seq)[:40]
+            raise Trouble("wrong-format", f"answered seq {given} to seq {seq}{said}")
         own = _failures if envelope.error is not None else _answers[cmd]
         decoder = _outcomes if envelope.outcome is not None else own
         data: dict[str, Any] = msgspec.to_builtins(decoder.decode(line))

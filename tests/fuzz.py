@@ -55,6 +55,11 @@ FACTORS = (-1.0, 0.0, 0.5, 1 - 2.0**-53, 1 + 1e-12, 1.1, 2.0, 1e3, 1e-9)
 # A valid request for so many collisions is work, not an attack: counts are small or refused.
 COUNTS = (-1, 0, 1, 2, 1.5, "3", None, 10**7, 2**70, True)
 STATE = {"t": 0.0, "x": 0.1, "y": 0.3, "vx": 10.0, "vy": 7.0, "wall": None}
+CIRCLE = {"table": "cap", "r": 1.0}
+WARM_UP = [
+    {"cmd": "step", "seq": 1, "scene": CIRCLE, "state": STATE, "t_end": 9.0},
+    {"cmd": "trajectory", "seq": 1, "scene": CIRCLE, "state": STATE, "t_end": 9.0, "collisions": 2},
+]
 
 
 def scenes() -> list[dict[str, Any]]:

@@ -1,18 +1,46 @@
 """`python -m fast`: serve the fast stepper through protocol 1."""
 
+import math
 import sys
+import time
+from collections.abc import Sequence
 
-from fast.stepper import next_collision, trajectory
+import fast
+from fast.flow import refuse
 from scene import Collision, Outcome, Scene, State
 from scene.wire import serve
 
 
-def follow(scene: Scene, state: State, n_collisions: int, t_end: float) -> list[Outcome]:
+def follow(scene: Scene, state: State, n_collisions: int, t_end: float = math.inf) -> list[Outcome]:
     """Return the collisions of a trajectory, and last what came instead of one."""
-    path = trajectory(scene, state, n_collisions, t_end)
+    path = fast.trajectory(scene, state, n_collisions, t_end)
     steps = [Collision(wall, *map(float, row)) for wall, row in zip(path.walls, path.steps, strict=True)]
     return [*steps, path.outcome] if path.outcome is not None else list(steps)
 
 
+def carry(
+    scene: Scene, states: Sequence[State], t_end: float
+) -> list[tuple[Outcome, tuple[float, float] | None]]:
+    """Return each particle's outcome at t_end and its first captured stay; a bad start is refused alone."""
+    refusals = [refuse(scene, state, t_end) for state in states]
+    starts = [state for state, refusal in zip(states, refusals, strict=True) if refusal is None]
+    run = fast.flow(scene, starts, t_end)
+    times = zip(run.t_in.tolist(), run.t_out.tolist(), strict=True)
+    stays = [None if math.isnan(begin) else (begin, end) for begin, end in times]
+    arrivals = iter(zip(run.outcomes, stays, strict=True))
+    return [next(arrivals) if refusal is None else (refusal, None) for refusal in refusals]
+
+
+def clock(scene: Scene, state: State, n_collisions: int, repeat: int) -> tuple[list[int], Outcome]:
+    """Return the nanoseconds that a trajectory took, `repeat` times over, and its last outcome."""
+    fast.trajectory(scene, state, 1)  # compiles, or loads from the disk cache
+    ns = []
+    for _ in range(repeat):
+        begin = time.perf_counter_ns()
+        fast.trajectory(scene, state, n_collisions)
+        ns.append(time.perf_counter_ns() - begin)
+    return ns, follow(scene, state, n_collisions)[-1]
+
+
 if __name__ == "__main__":
-    serve("fast", next_collision, follow, sys.stdin.buffer, sys.stdout.buffer)
+    serve("fast", fast.next_collision, follow, sys.stdin.buffer, sys.stdout.buffer, flow=carry, timer=clock)

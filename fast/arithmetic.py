@@ -22,6 +22,8 @@ PIO2_1 = float.fromhex("0x1.921fb50000000p+0")
 PIO2_2 = float.fromhex("0x1.110b460000000p-26")
 PIO2_3 = float.fromhex("0x1.1a62630000000p-54")
 PIO2_4 = float.fromhex("0x1.8a2e030000000p-81")
+# What the rounded fractions lack.
+ONE_6TH_LOW, ONE_24TH_LOW, ONE_120TH_LOW = (float(Fraction(1, n) - Fraction(1.0 / n)) for n in (6, 24, 120))
 TWO_OVER_PI = 0.6366197723675814
 
 
@@ -35,9 +37,10 @@ def _compiled_fma(_context: Any, a: Any, b: Any, c: Any) -> Any:
 
 def _exact_fma(a: float, b: float, c: float) -> float:
     rough = a * b + c
-    if rough == 0.0 or not np.isfinite(rough):
+    if not np.isfinite(rough):
         return rough
-    return float(Fraction(float(a)) * Fraction(float(b)) + Fraction(float(c)))
+    exact = Fraction(float(a)) * Fraction(float(b)) + Fraction(float(c))
+    return float(exact) if exact else rough  # a zero with its sign
 
 
 # a b + c, rounded once. Without the compiler the kernels are plain Python, which tests compare.
@@ -57,6 +60,13 @@ def two_product(a, b):
     """Return a b as a rounded product and its exact error."""
     p = a * b
     return p, fma(a, b, -p)
+
+
+@njit(error_model="numpy")
+def dot(a, b, c, d):
+    """Return a b + c d, right to a unit in the last place or so even where the two cancel."""
+    p = c * d
+    return fma(a, b, p) + fma(c, d, -p)
 
 
 @njit(error_model="numpy")
@@ -95,14 +105,43 @@ def beyond_first_order(r):
 
 
 @njit(error_model="numpy")
+def multiplied(a, a_low, b, b_low):
+    """Return (a + a_low) (b + b_low) as a sum of two floats."""
+    p, e = two_product(a, b)
+    return two_sum(p, e + (a * b_low + a_low * b))
+
+
+@njit(error_model="numpy")
 def short_sine_cosine(r, tail):
-    """Return sin and cos of r + tail for |r| <= pi/4, each as a sum of two floats."""
-    more, less = beyond_first_order(r)
-    s, s_low = two_sum(r, fma(less, tail, more) + tail)
-    # The rounding of r^2 is the largest error in cos r - 1: put it back.
-    _, z_low = two_product(r, r)
-    c, c_low = two_sum(1.0, less)
-    return s, s_low, c, c_low - (0.5 * z_low + s * tail)
+    """Return sin and cos of r + tail for |r| <= pi/4, each as a sum of two floats, right to 2^-64.
+
+    The Taylor series to r^19, whose first terms are sums of two floats.
+    """
+    z, z_low = two_product(r, r)
+    p = fma(-1.0 / 121645100408832000.0, z, 1.0 / 355687428096000.0)
+    p = fma(p, z, -1.0 / 1307674368000.0)
+    p = fma(p, z, 1.0 / 6227020800.0)
+    p = fma(p, z, -1.0 / 39916800.0)
+    p = fma(p, z, 1.0 / 362880.0)
+    p = fma(p, z, -1.0 / 5040.0)
+    p, p_low = two_sum(1.0 / 120.0, p * z)
+    p, p_low = multiplied(p, p_low + ONE_120TH_LOW, z, z_low)
+    p, e = two_sum(-1.0 / 6.0, p)
+    p, p_low = multiplied(p, p_low + (e - ONE_6TH_LOW), z, z_low)
+    p, p_low = multiplied(p, p_low, r, 0.0)
+    s, s_low = two_sum(r, p)
+    q = fma(-1.0 / 6402373705728000.0, z, 1.0 / 20922789888000.0)
+    q = fma(q, z, -1.0 / 87178291200.0)
+    q = fma(q, z, 1.0 / 479001600.0)
+    q = fma(q, z, -1.0 / 3628800.0)
+    q = fma(q, z, 1.0 / 40320.0)
+    q = fma(q, z, -1.0 / 720.0)
+    q, q_low = two_sum(1.0 / 24.0, q * z)
+    q, q_low = multiplied(q, q_low + ONE_24TH_LOW, z, z_low)
+    q, e = two_sum(-0.5, q)
+    q, q_low = multiplied(q, q_low + e, z, z_low)
+    c, c_low = two_sum(1.0, q)
+    return s, s_low + fma(c, tail, p_low), c, c_low + fma(-s, tail, q_low)
 
 
 @njit(error_model="numpy")

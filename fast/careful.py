@@ -17,46 +17,21 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from fast.arithmetic import SAFETY, fma, two_product, two_sum
-from fast.codes import (
-    APPROACHING,
-    ARC,
-    BASE,
-    CAP,
-    CORNER,
-    EDGE,
-    FAR_TIME,
-    FLOOR,
-    HORIZON,
-    LEFT,
-    MOUTH_EDGE,
-    MUSHROOM,
-    NO_WALL,
-    OUTSIDE,
-    RIGHT,
-    SLIDING,
-    START,
-    STEM,
-    TANGENT,
-    TOO_MANY,
-    H,
-    M,
-    R,
-    W,
-)  # fmt: skip  # isort: skip
+from fast.arithmetic import SAFETY, dot, fma, two_product, two_sum
+
+from fast.codes import (  # isort: skip
+    APPROACHING, ARC, AT_END, BASE, CAP, CORNER, EDGE, FAR_TIME, FLOOR, H, HORIZON, LEFT, M, MOUTH_EDGE,
+    MUSHROOM, NO_WALL, OUTSIDE, R, RIGHT, SLIDING, START, STEM, TANGENT, TOO_MANY, W,
+)  # fmt: skip
 from fast.motion import LOW, set_anchors
-from fast.walls import (
-    curvature_bounds,
-    is_outside,
-    reach_time,
-    side_of_mouth,
-    slope_bound,
-    wall_function,
-    wall_residual,
-    wall_slope,
-)  # fmt: skip  # isort: skip
+
+from fast.walls import (  # isort: skip
+    curvature_bounds, is_outside, reach_time, side_of_mouth, wall_function, wall_residual, wall_slope,
+)  # fmt: skip
 
 MAX_PARABOLAS = 1_000_000
+POLISHED = 2.0**-9  # error of a residual, its low parts included, in those of a plain sum
+NEAR = 2.0**-30  # how much beyond the limit hits are looked for, relatively
 PATIENCE = 6  # parabolas tried before asking whether the wall is out of the particle's reach
 
 
@@ -169,18 +144,22 @@ def along_mouth(limit, x, vx, laws, anchors, bounds, is_relative):
 
 
 @njit(error_model="numpy")
-def is_side_near(wall, s, x, y, vx, vy, laws, anchors, bounds, is_relative):
-    """Tell whether a side is met within rounding of the time s."""
-    for side in (LEFT, RIGHT):
+def side_of_wall(candidate, wall, s, x, y, vx, vy, laws, anchors, bounds, is_relative):
+    """Return +1 when a wall is not yet met at time s, -1 when it is passed, 0 where rounding hides it."""
+    if candidate == BASE:
+        f = y + vy * s if vy < 0.0 else -(y + vy * s)
+        error = SAFETY * (abs(y) + abs(vy) * s)
+    else:
         residual = residual_error = 0.0
-        if wall != side:
-            residual, residual_error = wall_residual(side, x, y, laws, anchors, bounds, is_relative)
+        if wall != candidate:
+            residual, residual_error = wall_residual(candidate, x, y, laws, anchors, bounds, is_relative)
         f, slope, error, slope_error = wall_function(
-            side, s, x, y, vx, vy, residual, laws, anchors, is_relative
+            candidate, s, x, y, vx, vy, residual, laws, anchors, is_relative
         )
-        if f <= error + residual_error + SAFETY * s * (abs(slope) + slope_error):
-            return True
-    return False
+        error += residual_error + SAFETY * s * (abs(slope) + slope_error)
+    if abs(f) <= error:
+        return 0
+    return 1 if f > 0.0 else -1
 
 
 @njit(error_model="numpy")
@@ -253,12 +232,11 @@ def first_event(table, is_relative, wall, x, y, vx, vy, limit, laws, anchors, bo
         return code, s
     if crossing >= limit:
         return HORIZON, s
+    for side in (LEFT, RIGHT):
+        if side_of_wall(side, wall, crossing, x, y, vx, vy, laws, anchors, bounds, is_relative) <= 0:
+            return (CORNER if table == STEM else EDGE), crossing
     if table == STEM:
-        return (
-            CORNER if is_side_near(wall, crossing, x, y, vx, vy, laws, anchors, bounds, is_relative) else BASE
-        ), crossing
-    if side_of_mouth(crossing, x, y, vx, vy, laws, anchors, is_relative) <= 0:
-        return EDGE, crossing
+        return BASE, crossing
     code, s = cap_flight(
         crossing, limit, NO_WALL, x, y, vx, vy, laws, anchors, bounds, is_relative, np.bool_(False)
     )
@@ -296,8 +274,8 @@ def bounce(wall, x, y, vx, vy, anchors, is_relative):
     if wall == BASE:
         return vx, -vy
     if wall == ARC:
-        push = wall_slope(ARC, x, y, vx, vy, anchors, is_relative) / (x * x + y * y)
-        return vx + push * x, vy + push * y
+        push = wall_slope(ARC, x, y, vx, vy, anchors, is_relative) / dot(x, x, y, y)
+        return fma(push, x, vx), fma(push, y, vy)
     if wall == FLOOR:
         return vx, -vy - 2.0 * anchors[H, 1]
     m = anchors[M, 0]
@@ -322,17 +300,18 @@ def move(wall, s, is_again, p, laws, bounds, anchors, is_relative):
     `is_again`: the wall met is the one left, whose residual at the start stays in its function.
     """
     x, y, vx, vy = p[2], p[3], p[4], p[5]
-    residual = residual_error = 0.0
+    residual = residual_error = error = 0.0
     if is_again:
         residual, residual_error = wall_residual(wall, x, y, laws, anchors, bounds, is_relative)
+        _, _, error, _ = wall_function(wall, s, x, y, vx, vy, 0.0, laws, anchors, is_relative)
     t, low = two_sum(p[0], s)
     if not set_anchors(laws, anchors, t, low + p[1]):
         return -1.0
     s_low, x_s, x_low, y_s, y_low = remainder(
         wall, s, residual, x, y, vx, vy, laws, anchors, bounds, is_relative
     )
-    if is_again and residual_error > SAFETY * s * slope_bound(wall, x, y, vx, vy, bounds):
-        # A short hop along the wall: its increments gave s better than two residuals can.
+    if is_again and error < POLISHED * residual_error:
+        # A short hop along the wall: its increments gave s better than the laws' low parts can.
         s_low = 0.0
     x_s += x_low + vx * s_low
     y_s = 0.0 if wall == BASE else y_s + (y_low + vy * s_low)
@@ -350,7 +329,15 @@ def step(table, is_relative, laws, bounds, anchors, p, wall, limit):
     Returns (code, dt): a wall's code, HORIZON (p is moved to the limit) or why there is none
     (p stays). The anchors must hold the laws at p's time, and do so again after a collision.
     """
-    code, s = first_event(table, is_relative, wall, p[2], p[3], p[4], p[5], limit, laws, anchors, bounds)
+    x, y, vx, vy = p[2], p[3], p[4], p[5]
+    # Look a little beyond the limit, so that a hit just there is seen from both sides.
+    code, s = first_event(table, is_relative, wall, x, y, vx, vy, limit * (1.0 + NEAR), laws, anchors, bounds)
+    if code > HORIZON and s > limit:
+        code, s = first_event(table, is_relative, wall, x, y, vx, vy, limit, laws, anchors, bounds)
+    elif code < HORIZON and s > limit * (1.0 - NEAR):
+        side = side_of_wall(code, wall, limit, x, y, vx, vy, laws, anchors, bounds, is_relative)
+        if side >= 0:
+            code = HORIZON if side > 0 else AT_END
     if code > HORIZON:
         return code, s
     if code == HORIZON:

@@ -8,7 +8,7 @@ import numpy as np
 NO_WALL, ARC, BASE, LEFT, RIGHT, FLOOR = np.arange(-1, 5)
 N_WALLS = 5
 HORIZON, SLIDING, MOUTH_EDGE = np.array([10, 20, 21])
-FAR_TIME, TOO_MANY, TANGENT, CORNER, EDGE, START = np.arange(31, 37)
+FAR_TIME, TOO_MANY, TANGENT, CORNER, EDGE, START, AT_END = np.arange(31, 38)
 APPROACHING, OUTSIDE = np.array([40, 41])
 CAP, STEM, MUSHROOM = np.arange(3)
 # Rows of the law table: radius, width (w or nu), depth, slope; then omega and the number of

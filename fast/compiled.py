@@ -14,7 +14,7 @@ from scene.laws import Bounds, bounds, is_constant
 from scene.tables import width_factors
 
 FloatArray = npt.NDArray[np.floating[Any]]
-TABLES = {"Cap": codes.CAP, "Stem": codes.STEM, "Mushroom": codes.MUSHROOM}
+TABLES = {"Cap": int(codes.CAP), "Stem": int(codes.STEM), "Mushroom": int(codes.MUSHROOM)}
 
 
 class Compiled(NamedTuple):

@@ -41,7 +41,7 @@ class Followed(NamedTuple):
         careful: (N,) collisions found by the careful step.
         energies: (N, S) energy at each stop.
         is_captured: (N, S) whether the last arc hit had |sin phi| > nu.
-        t_in, t_out: (N, K) captured stay that spans the instant of least nu; nan for none.
+        t_in, t_out: (N, K) the captured stay that is kept; nan for none.
         seconds: wall time of the kernel.
     """
 
@@ -138,7 +138,8 @@ def simulate(
     threads = _check(n_particles, energy, n_cycles, seed, phases, threads)
     stops = cycle_stops(scene, n_cycles, phases)
     start = initial_states(scene, n_particles, energy, seed)
-    done = follow(compile_scene(scene), start, stops, threads, progress)
+    free = np.full(n_particles, codes.NO_WALL)
+    done = follow(compile_scene(scene), start, free, stops, threads, progress)
     every = (n_particles, n_cycles, len(phases) + 1)
     energies, captured = done.energies.reshape(every), done.is_captured.reshape(every)
     t, _, x, y, vx, vy = (np.ascontiguousarray(column) for column in done.states.T)
@@ -173,11 +174,15 @@ def outcomes(ends: IntArray) -> npt.NDArray[np.int8]:
 def follow(
     compiled: Compiled,
     states: FloatArray,
+    walls: IntArray,
     stops: Stops,
     threads: int,
     progress: Callable[[int], None] | None = None,
 ) -> Followed:
-    """Follow particles to the last stop; `states` (N, 6) is overwritten by the last states."""
+    """Follow particles to the last stop; `states` (N, 6) is overwritten by the last states.
+
+    `walls` (N,): codes of the walls that they leave.
+    """
     n, n_stops, n_cycles = len(states), len(stops.times), len(stops.narrowest)
     out = (
         np.full((n, n_stops), np.nan),
@@ -196,7 +201,8 @@ def follow(
 
     def work(first: int) -> None:
         part = slice(first, first + size)
-        entries.follow_particles(scene, when, tuple(a[part] for a in out), tuple(a[part] for a in ends))
+        their_out, their_ends = (tuple(a[part] for a in arrays) for arrays in (out, ends))
+        entries.follow_particles(scene, walls[part], when, their_out, their_ends)
 
     work(n)  # none at all: compiles, or loads from the disk cache, so that `seconds` holds work alone
     begin = time.perf_counter()
@@ -223,6 +229,11 @@ def _check(
     edges = [0.0, *phases, 1.0]
     if any(not a < b for a, b in pairwise(edges)):
         raise BadInput(f"phases = {list(phases)}, must rise and lie in (0, 1)")
+    return check_threads(threads)
+
+
+def check_threads(threads: int | None) -> int:
+    """Return how many threads to use: as many as asked for, by default one for each core."""
     available = os.cpu_count() or 1
     if threads is not None and not 1 <= threads <= available:
         raise BadInput(f"threads = {threads}, must be 1 to {available}, the cores of this machine")

@@ -8,11 +8,13 @@ anywhere makes it compile anew.
 from __future__ import annotations
 
 import hashlib
+import math
 from pathlib import Path
 
 import numpy as np
 from numba import njit
 
+from fast.arithmetic import sine_cosine
 from fast.careful import first_step, step
 from fast.codes import HORIZON
 from fast.follow import follow
@@ -27,6 +29,7 @@ def digest_of_sources(folder: Path) -> str:
     return digest.hexdigest()
 
 
+QUARTER_TURN, QUARTER_TURN_LOW = math.pi / 2, 6.123233995736766e-17  # pi/2 as two floats
 SOURCES = digest_of_sources(Path(__file__).parent)
 
 
@@ -69,14 +72,27 @@ def _trajectory(sources):
 
 def _follow(sources):
     @njit(cache=True, nogil=True, error_model="numpy")
-    def follow_particles(scene, stops, out, ends):
+    def follow_particles(scene, walls, stops, out, ends):
         """Follow particles to the last stop: see fast.follow. Threads may call it side by side."""
         sources  # noqa: B018
-        follow(scene, stops, out, ends)
+        follow(scene, walls, stops, out, ends)
 
     return follow_particles
+
+
+def _directions(sources):
+    @njit(cache=True, error_model="numpy")
+    def directions(turns, out):
+        """Fill out (n, 2) with cosine and sine of whole turns; no libm, hence the same everywhere."""
+        sources  # noqa: B018
+        for i in range(turns.shape[0]):
+            s, _, c, _, _ = sine_cosine(4.0 * turns[i], 1.0, QUARTER_TURN, QUARTER_TURN_LOW)
+            out[i, 0], out[i, 1] = c, s
+
+    return directions
 
 
 single_step = _single_step(SOURCES)
 trajectory = _trajectory(SOURCES)
 follow_particles = _follow(SOURCES)
+directions = _directions(SOURCES)

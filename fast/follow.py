@@ -16,77 +16,17 @@ from numba import njit
 
 from fast.arithmetic import MAX_QUADRANT, SAFETY, TWO_OVER_PI, fma
 from fast.careful import first_step
-from fast.codes import (
-    ARC,
-    BANG_BANG,
-    CAP,
-    FOURIER,
-    HORIZON,
-    MUSHROOM,
-    N_WALLS,
-    NO_WALL,
-    PHASES,
-    STEM,
-    H,
-    M,
-    R,
-    W,
-)  # fmt: skip  # isort: skip
-from fast.lanes import (
-    CALM,
-    CLOSED,
-    COARSE,
-    DONE,
-    END,
-    H0,
-    H_REF,
-    HIT,
-    LANES,
-    N_ARC,
-    N_BASE,
-    N_REF,
-    N_ROWS,
-    NARROW,
-    NEVER,
-    NEXT_H0,
-    NEXT_R0,
-    NEXT_T,
-    NEXT_T_LOW,
-    NEXT_VX,
-    NEXT_VY,
-    NEXT_W0,
-    NEXT_X,
-    NEXT_Y,
-    OK,
-    ON_ARC,
-    R0,
-    R_REF,
-    REF,
-    REF_LOW,
-    RIGHT_ONE,
-    SPIN,
-    STAY_IN,
-    STAY_OUT,
-    STOP,
-    T_LOW,
-    VX,
-    VY,
-    W0,
-    WALL,
-    S,
-    T,
-    X,
-    Y,
-    aim,
-    arrive,
-    bounce,
-    chord,
-    fly,
-    law,
-    rebound,
-    turns,
-)  # fmt: skip  # isort: skip
-from fast.motion import ANCHORS_SHAPE, KNOTS, set_anchors
+
+from fast.codes import (  # isort: skip
+    ARC, BANG_BANG, CAP, FOURIER, H, HORIZON, M, MUSHROOM, N_WALLS, PHASES, R, STEM, W,
+)  # fmt: skip
+from fast.lanes import (  # isort: skip
+    CALM, CLOSED, COARSE, DONE, END, H0, HIT, H_REF, LANES, NEVER, NEXT_H0, NEXT_R0, NEXT_T, NEXT_T_LOW,
+    NEXT_VX, NEXT_VY, NEXT_W0, NEXT_X, NEXT_Y, N_ARC, N_BASE, N_REF, N_ROWS, OK, ON_ARC, R0, REF, REF_LOW,
+    RIGHT_ONE, R_REF, S, SINCE, SPIN, STAY_IN, STAY_OUT, STOP, T, T_LOW, UNTIL, VX, VY, W0, WALL, X, Y,
+    aim, arrive, bounce, chord, fly, law, rebound, turns,
+)  # fmt: skip
+from fast.motion import ANCHORS_SHAPE, KNOTS, LOW, set_anchors
 
 GENERAL, DISK = np.arange(2)
 STAYS, MOVES, ENDS = 0, 1, 2
@@ -125,18 +65,25 @@ def set_reference(a, i, laws, anchors, is_relative):
             half_leg = 0.5 * (laws[row, KNOTS + leg + 1] - laws[row, KNOTS + leg])
             end = min(end, t + (half_leg - anchors[row, 3]))
         place = REFERENCES[k] + i
-        a[place], a[place + LANES], a[place + 2 * LANES] = f, rate, bend
+        a[place], a[place + LANES] = f, anchors[row, LOW]
+        a[place + 2 * LANES], a[place + 3 * LANES] = rate, bend
     a[END + i] = end
     set_laws(a, i, NEXT_R0, NEXT_W0, NEXT_H0, 0.0, laws[PHASES, 0], is_relative)
+
+
+@njit(error_model="numpy")
+def law_of(a, i, omega, g1, g2, g0):
+    """Return a law and its derivatives from the rows of its reference, which begin at i."""
+    return law(a[i], a[i + LANES], a[i + 2 * LANES], a[i + 3 * LANES], omega, g1, g2, g0)
 
 
 @njit(error_model="numpy")
 def set_laws(a, i, r_row, w_row, h_row, since, omega, is_relative):
     """Write a lane's laws at a time after its reference."""
     g1, g2, g0 = turns(omega, since)
-    r, r1, r2 = law(a[R_REF + i], a[R_REF + LANES + i], a[R_REF + 2 * LANES + i], omega, g1, g2, g0)
-    w, w1, w2 = law(a[N_REF + i], a[N_REF + LANES + i], a[N_REF + 2 * LANES + i], omega, g1, g2, g0)
-    h, h1, h2 = law(a[H_REF + i], a[H_REF + LANES + i], a[H_REF + 2 * LANES + i], omega, g1, g2, g0)
+    r, r1, r2 = law_of(a, R_REF + i, omega, g1, g2, g0)
+    w, w1, w2 = law_of(a, N_REF + i, omega, g1, g2, g0)
+    h, h1, h2 = law_of(a, H_REF + i, omega, g1, g2, g0)
     if is_relative:
         w, w1, w2 = w * r, fma(w1, r, w * r1), fma(w2, r, fma(w, r2, 2.0 * w1 * r1))
     a[r_row + i], a[r_row + LANES + i], a[r_row + 2 * LANES + i] = r, r1, r2
@@ -145,14 +92,14 @@ def set_laws(a, i, r_row, w_row, h_row, since, omega, is_relative):
 
 
 @njit(error_model="numpy")
-def load(a, i, p, wall, stop, narrow):
+def load(a, i, p, wall, stop, narrowest):
     """Put a particle into a lane; its laws are unknown there, so its first step will be careful."""
     for row in range(N_ROWS):
         a[row * LANES + i] = 0.0
     a[T + i], a[T_LOW + i] = p[0], p[1]
     a[X + i], a[Y + i], a[VX + i], a[VY + i] = p[2], p[3], p[4], p[5]
     a[WALL + i] = wall
-    a[STOP + i], a[NARROW + i] = stop, narrow
+    a[STOP + i], a[SINCE + i], a[UNTIL + i] = stop, narrowest[0], narrowest[1]
     a[STAY_IN + i] = a[STAY_OUT + i] = a[CLOSED + i] = NEVER
     a[END + i] = -NEVER
 
@@ -177,6 +124,13 @@ def fold(a, i, omega, is_relative):
 
 
 @njit(error_model="numpy")
+def keep_stay(t_in, t_out, j, cycle, begin, end):
+    """Keep a captured stay, unless there is an earlier one."""
+    if np.isnan(t_in[j, cycle]):
+        t_in[j, cycle], t_out[j, cycle] = begin, end
+
+
+@njit(error_model="numpy")
 def note_stops(a, i, j, at, last, stops, out):
     """Record what is asked for at the stops up to the time `last`; returns the next stop's number."""
     times, is_cycle_end, narrowest = stops
@@ -188,10 +142,10 @@ def note_stops(a, i, j, at, last, stops, out):
         cycle = is_cycle_end[at]
         at += 1
         if cycle >= 0:
-            if begin < NEVER and begin <= narrowest[cycle] <= end:
-                t_in[j, cycle] = begin
-                t_out[j, cycle] = min(end, times[at - 1])
-            a[NARROW + i] = narrowest[min(cycle + 1, narrowest.shape[0] - 1)]
+            if begin < NEVER and begin <= narrowest[cycle, 1] and narrowest[cycle, 0] <= end:
+                keep_stay(t_in, t_out, j, cycle, begin, min(end, times[at - 1]))
+            following = narrowest[min(cycle + 1, narrowest.shape[0] - 1)]
+            a[SINCE + i], a[UNTIL + i] = following[0], following[1]
     a[STOP + i] = times[at] if at < times.shape[0] else NEVER
     return at
 
@@ -203,9 +157,9 @@ def note_stay(a, i, j, at, stops, out):
     while is_cycle_end[at] < 0:  # the last stop ends a cycle
         at += 1
     cycle = is_cycle_end[at]
-    out[2][j, cycle] = a[STAY_IN + i]
-    out[3][j, cycle] = a[CLOSED + i]
+    keep_stay(out[2], out[3], j, cycle, a[STAY_IN + i], a[CLOSED + i])
     a[STAY_IN + i] = a[STAY_OUT + i] = a[CLOSED + i] = NEVER
+    a[UNTIL + i] = -NEVER  # one is enough
 
 
 @njit(error_model="numpy")
@@ -350,12 +304,13 @@ def scan(pool, scene, is_laned, pools, whoms, n, anchors, p, stops, out, ends, k
 
 
 @njit(error_model="numpy")
-def follow(scene, stops, out, ends):
+def follow(scene, walls, stops, out, ends):
     """Follow particles to the last stop.
 
     Args:
         scene: table, is_relative, laws, bounds.
-        stops: times (S,), the cycle that each ends or -1, instants of least nu (K,).
+        walls: codes of the walls that the particles leave (N,).
+        stops: see fast.starts.Stops.
         out: energies (N, S), is_captured (N, S), t_in (N, K), t_out (N, K), filled in.
         ends: states (N, 6): t, its low part, x, y, vx, vy, overwritten; codes (N,), counts (N, 5),
             careful steps (N,), filled in.
@@ -375,7 +330,7 @@ def follow(scene, stops, out, ends):
     general, disk = pools[GENERAL], pools[DISK]
     while True:
         while n[0] + n[1] < LANES and first < last:
-            load(pools[home], n[home], states[first], NO_WALL, stops[0][0], stops[2][0])
+            load(pools[home], n[home], states[first], walls[first], stops[0][0], stops[2][0])
             whoms[home, 0, n[home]], whoms[home, 1, n[home]] = first, 0
             n[home] += 1
             first += 1

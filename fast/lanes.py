@@ -28,7 +28,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from fast.arithmetic import SAFETY, fma, two_sum
+from fast.arithmetic import SAFETY, dot, fma, two_sum
 from fast.codes import ARC, BASE, FLOOR, LEFT, RIGHT
 
 LANES = 64  # all rows of a pool stay in the first-level cache
@@ -40,15 +40,17 @@ NEVER = np.inf
     T, T_LOW, X, Y, VX, VY, WALL,  # state at the last collision
     R0, R1, R2, W0, W1, W2, H0, H1, H2,  # radius, half-width, depth there, with two derivatives
     REF, REF_LOW, END,  # the laws' reference time, and until when it serves
-    R_REF, R_REF1, R_REF2, N_REF, N_REF1, N_REF2, H_REF, H_REF1, H_REF2,  # radius, w or nu, depth at it
+    R_REF, R_REF_LOW, R_REF1, R_REF2,  # radius there, its low part, two derivatives
+    N_REF, N_REF_LOW, N_REF1, N_REF2,  # w or nu
+    H_REF, H_REF_LOW, H_REF1, H_REF2,  # depth
     S, HIT, SURE, OK, CALM,  # the step: time, wall, mouth; whether it is right; whether nothing else is to do
     NEXT_T, NEXT_T_LOW, NEXT_X, NEXT_Y, NEXT_VX, NEXT_VY, DONE,  # state after it; DONE: has bounced
     NEXT_R0, NEXT_R1, NEXT_R2, NEXT_W0, NEXT_W1, NEXT_W2, NEXT_H0, NEXT_H1, NEXT_H2,
-    STOP, NARROW,  # next time to look at the particle; the cycle's instant of least nu
+    STOP, SINCE, UNTIL,  # next time to look at the particle; which captured stay is kept
     STAY_IN, STAY_OUT, CLOSED, SPIN,  # the captured stay, its end once it is over, angular momentum
     N_ARC, N_BASE, N_LEFT, N_RIGHT, N_FLOOR,  # collisions so far
-) = LANES * np.arange(60)  # fmt: skip
-N_ROWS = 60
+) = LANES * np.arange(64)  # fmt: skip
+N_ROWS = 64
 # Codes of walls as they stand in a row, and of OK.
 ON_ARC, ON_BASE, ON_LEFT, ON_RIGHT, ON_FLOOR = map(float, (ARC, BASE, LEFT, RIGHT, FLOOR))
 WRONG, COARSE, RIGHT_ONE = 0.0, 1.0, 2.0
@@ -73,9 +75,9 @@ def turns(omega, s):
 
 
 @njit(error_model="numpy")
-def law(f, f1, f2, omega, g1, g2, g0):
+def law(f, low, f1, f2, omega, g1, g2, g0):
     """Return a law and its two derivatives, from its values at the reference time."""
-    return f + fma(f1, g1, f2 * g2), fma(f1, g0, f2 * g1), fma(f2, g0, -(omega * omega * f1) * g1)
+    return f + (low + fma(f1, g1, f2 * g2)), fma(f1, g0, f2 * g1), fma(f2, g0, -(omega * omega * f1) * g1)
 
 
 @njit(error_model="numpy")
@@ -159,15 +161,17 @@ def fly(a, n, is_stem, is_relative, omega, m, k_w):
         r0, r1_0, r2_0, hit, s = a[R0 + i], a[R1 + i], a[R2 + i], a[HIT + i], a[S + i]
         since = ((a[T + i] - a[REF + i]) + (a[T_LOW + i] - a[REF_LOW + i])) + s
         g1, g2, g0 = turns(omega, since)
-        r, r1, r2 = law(a[R_REF + i], a[R_REF1 + i], a[R_REF2 + i], omega, g1, g2, g0)
-        w, w1, w2 = law(a[N_REF + i], a[N_REF1 + i], a[N_REF2 + i], omega, g1, g2, g0)
-        h, h1, h2 = law(a[H_REF + i], a[H_REF1 + i], a[H_REF2 + i], omega, g1, g2, g0)
+        r, r1, r2 = law(a[R_REF + i], a[R_REF_LOW + i], a[R_REF1 + i], a[R_REF2 + i], omega, g1, g2, g0)
+        w, w1, w2 = law(a[N_REF + i], a[N_REF_LOW + i], a[N_REF1 + i], a[N_REF2 + i], omega, g1, g2, g0)
+        h, h1, h2 = law(a[H_REF + i], a[H_REF_LOW + i], a[H_REF1 + i], a[H_REF2 + i], omega, g1, g2, g0)
         w2 = fma(w2, r, fma(w, r2, 2.0 * w1 * r1)) if is_relative else w2
         w1 = fma(w1, r, w * r1) if is_relative else w1
-        w = w * r if is_relative else w
+        nu = w
+        w = nu * r if is_relative else nu
+        w_low = fma(nu, r, -w) if is_relative else 0.0
         x_s, y_s = fma(vx, s, x), fma(vy, s, y)
         sign = 1.0 if hit == ON_RIGHT else -1.0
-        f = fma(m, y_s, w) - sign * x_s
+        f = (w - sign * x_s) + fma(m, y_s, w_low)
         slope = fma(m, vy, w1) - sign * vx
         bend_s = w2
         f = y_s + h if hit == ON_FLOOR else f
@@ -248,8 +252,7 @@ def bounce(a, n, m, is_mushroom):
     for i in range(n):
         x, y, vx, vy, hit = a[NEXT_X + i], a[NEXT_Y + i], a[VX + i], a[VY + i], a[HIT + i]
         w = a[NEXT_W0 + i]
-        q = fma(x, vx, y * vy)
-        push = 2.0 * fma(a[NEXT_R0 + i], a[NEXT_R1 + i], -q) / fma(x, x, y * y)
+        push = 2.0 * fma(a[NEXT_R0 + i], a[NEXT_R1 + i], -dot(x, vx, y, vy)) / dot(x, x, y, y)
         sign = 1.0 if hit == ON_RIGHT else -1.0
         out, rate = sign * vx, a[NEXT_W1 + i]
         vx_s = sign * fma(tilt, out, inverse * fma(m, vy, rate))
@@ -266,23 +269,23 @@ def bounce(a, n, m, is_mushroom):
         beyond = spin * spin - w * w * fma(vx, vx, vy * vy)
         beyond = beyond if hit == ON_ARC else 0.0
         beyond = beyond if is_mushroom else 0.0  # > 0: captured
-        t, begin, end, narrow = a[NEXT_T + i], a[STAY_IN + i], a[STAY_OUT + i], a[NARROW + i]
+        t, begin, end = a[NEXT_T + i], a[STAY_IN + i], a[STAY_OUT + i]
         # At the arc: the stay begins, goes on, or (once, until captured again) ends.
         first_end = min(end, t) if begin < NEVER else end
         end = first_end if hit == ON_ARC else end
         end = NEVER if beyond > 0.0 else end
         begin = min(begin, t) if beyond > 0.0 else begin
-        # Below the mouth: it is over, and kept if it spans the instant of least nu.
+        # Below the mouth: it is over, and kept if it spans an instant in question.
         last = min(end, t)
-        kept = last if begin <= narrow else NEVER
-        kept = kept if narrow <= last else NEVER
+        kept = last if begin <= a[UNTIL + i] else NEVER
+        kept = kept if a[SINCE + i] <= last else NEVER
         kept = kept if begin < NEVER else NEVER
         kept = kept if hit >= ON_LEFT else NEVER
         a[CLOSED + i] = kept
         left = NEVER if kept == NEVER else begin
         a[STAY_IN + i] = left if hit >= ON_LEFT else begin
         a[STAY_OUT + i] = NEVER if hit >= ON_LEFT else end
-        spin = x * vy_s - y * vx_s
+        spin = dot(x, vy_s, -y, vx_s)
         clearly = CLEARLY_CAPTURED * CLEARLY_CAPTURED * w * w * fma(vx_s, vx_s, vy_s * vy_s)
         spin = spin if spin * spin > clearly else 0.0
         a[SPIN + i] = spin if beyond > 0.0 else 0.0
@@ -313,8 +316,8 @@ def chord(a, n, is_again, is_cap, is_relative, omega, bend, k_w):
         s = a[S + i] if is_again else s
         since = ((a[T + i] - a[REF + i]) + (a[T_LOW + i] - a[REF_LOW + i])) + s
         g1, g2, g0 = turns(omega, since)
-        r, r1, r2 = law(a[R_REF + i], a[R_REF1 + i], a[R_REF2 + i], omega, g1, g2, g0)
-        w, w1, _ = law(a[N_REF + i], a[N_REF1 + i], a[N_REF2 + i], omega, g1, g2, g0)
+        r, r1, r2 = law(a[R_REF + i], a[R_REF_LOW + i], a[R_REF1 + i], a[R_REF2 + i], omega, g1, g2, g0)
+        w, w1, _ = law(a[N_REF + i], a[N_REF_LOW + i], a[N_REF1 + i], a[N_REF2 + i], omega, g1, g2, g0)
         w1 = fma(w1, r, w * r1) if is_relative else w1
         w = w * r if is_relative else w
         g1, g2, _ = turns(omega, s)
@@ -353,11 +356,11 @@ def rebound(a, n):
     """Bounce off the arc with the angular momentum of the whole stay, constant to the bit; count."""
     for i in range(n):
         x, y, vx, vy, spin = a[NEXT_X + i], a[NEXT_Y + i], a[VX + i], a[VY + i], a[SPIN + i]
-        outward = 2.0 * (a[NEXT_R0 + i] * a[NEXT_R1 + i]) - fma(x, vx, y * vy)
-        inverse = 1.0 / fma(x, x, y * y)
+        outward = fma(2.0 * a[NEXT_R0 + i], a[NEXT_R1 + i], -dot(x, vx, y, vy))
+        inverse = 1.0 / dot(x, x, y, y)
         is_done = a[DONE + i]
-        vx_s = fma(outward, x, -spin * y) * inverse
-        vy_s = fma(outward, y, spin * x) * inverse
+        vx_s = dot(outward, x, -spin, y) * inverse
+        vy_s = dot(outward, y, spin, x) * inverse
         a[VX + i] = a[NEXT_VX + i] if is_done > 0.0 else vx_s
         a[VY + i] = a[NEXT_VY + i] if is_done > 0.0 else vy_s
         # A chord that crosses y = 0 hits the base; what careful did was counted there.

@@ -109,8 +109,10 @@ def set_waves(laws, anchors, row):
         a, b = laws[row, 3 + k], laws[row, 3 + n + k]
         f, f_low = add_product(f, f_low, a, c, c_low)
         f, f_low = add_product(f, f_low, b, s, s_low)
-        rate, rate_low = add_product(rate, rate_low, b, k * c, k * c_low)
-        rate, rate_low = add_product(rate, rate_low, -a, k * s, k * s_low)
+        kc, kc_low = two_product(k, c)
+        ks, ks_low = two_product(k, s)
+        rate, rate_low = add_product(rate, rate_low, b, kc, kc_low + k * c_low)
+        rate, rate_low = add_product(rate, rate_low, -a, ks, ks_low + k * s_low)
         size += k * (abs(a) + abs(b))
     anchors[row, 0], anchors[row, LOW] = two_sum(f, f_low)
     anchors[row, 1] = laws[row, 2] * (rate + rate_low)

@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 from mpmath import fp
 
+from fast import entries
 from fast.compiled import FloatArray
 from scene import Cap, Mushroom, Scene, Stem
 from scene.laws import BangBang, value
@@ -31,15 +32,15 @@ def initial_states(scene: Scene, n_particles: int, energy: float, seed: int) -> 
     u = (raw >> np.uint64(11)) * 2.0**-53
     start = start_time(scene)
     x, y = _uniform_in_area(scene, start, u[:, 0], u[:, 1], u[:, 2])
-    speed, angle = math.sqrt(2.0 * energy), 2.0 * np.pi * u[:, 3]
+    speed, along = math.sqrt(2.0 * energy), _directions(u[:, 3])
     out: FloatArray = np.column_stack(
         [
             np.full(n_particles, start),
             np.zeros(n_particles),
             x,
             y,
-            speed * np.cos(angle),
-            speed * np.sin(angle),
+            speed * along[:, 0],
+            speed * along[:, 1],
         ]
     )
     return out
@@ -56,12 +57,19 @@ def _uniform_in_area(
     else:
         w = math.prod(float(value(fp, law, t)) for law in width_factors(scene))
         stem_area = 2.0 * w * h - slope * h * h
-    rho, psi = r * np.sqrt(a), np.pi * b
+    rho, along = r * np.sqrt(a), _directions(0.5 * b)
     # Depth d below the mouth has density (w - slope d): invert 2 w d - slope d^2 = a stem_area.
     depth = a * stem_area / (w + np.sqrt(np.maximum(w * w - slope * a * stem_area, 0.0)) + 1e-300)
     side = (w - slope * depth) * (2.0 * b - 1.0)
     in_cap = pick * (cap_area + stem_area) < cap_area
-    return np.where(in_cap, rho * np.cos(psi), side), np.where(in_cap, rho * np.sin(psi), -depth)
+    return np.where(in_cap, rho * along[:, 0], side), np.where(in_cap, rho * along[:, 1], -depth)
+
+
+def _directions(turns: FloatArray) -> FloatArray:
+    """Return (n, 2) unit vectors at whole turns from the x axis."""
+    out = np.empty((len(turns), 2))
+    entries.directions(np.ascontiguousarray(turns), out)
+    return out
 
 
 class Stops(NamedTuple):
@@ -70,7 +78,8 @@ class Stops(NamedTuple):
     Attributes:
         times: (S,) the instants; the last one ends the run.
         cycles: (S,) number of the cycle that an instant ends, -1 for others.
-        narrowest: (K,) instant of least nu of each cycle (middle of a plateau), infinity without a mouth.
+        narrowest: (K, 2) a captured stay is kept for a cycle when it spans an instant between these two:
+            both the instant of least nu (middle of a plateau), infinity without a mouth.
     """
 
     times: FloatArray
@@ -97,7 +106,13 @@ def cycle_stops(scene: Scene, n_cycles: int, phases: Sequence[float]) -> Stops:
     times = start + span * (count[:, None] + parts[None, :])
     cycles = np.full(times.shape, -1)
     cycles[:, -1] = count
-    return Stops(times.ravel(), cycles.ravel(), start + span * (count + narrowest_phase(scene)))
+    narrowest = start + span * (count + narrowest_phase(scene))
+    return Stops(times.ravel(), cycles.ravel(), np.column_stack([narrowest, narrowest]))
+
+
+def only_stop(t_end: float) -> Stops:
+    """Return one stop, that keeps the first captured stay of any length."""
+    return Stops(np.array([t_end]), np.array([0]), np.array([[-math.inf, math.inf]]))
 
 
 def narrowest_phase(scene: Scene) -> float:

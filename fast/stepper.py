@@ -24,24 +24,24 @@ from scene import (
 )
 from scene.states import ON_WALL, check_numbers
 
-WALL_CODES: dict[Wall | None, int] = {
-    None: codes.NO_WALL,
-    "arc": codes.ARC,
-    "base": codes.BASE,
-    "left": codes.LEFT,
-    "right": codes.RIGHT,
-    "floor": codes.FLOOR,
+WALL_NAMES: dict[int, Wall] = {
+    int(codes.ARC): "arc",
+    int(codes.BASE): "base",
+    int(codes.LEFT): "left",
+    int(codes.RIGHT): "right",
+    int(codes.FLOOR): "floor",
 }
-WALL_NAMES: dict[int, Wall] = {code: name for name, code in WALL_CODES.items() if name}
+WALL_CODES: dict[Wall | None, int] = {None: int(codes.NO_WALL)} | {n: c for c, n in WALL_NAMES.items()}
 REASONS: dict[int, Outcome] = {
-    codes.SLIDING: Undefined("sliding"),
-    codes.MOUTH_EDGE: Undefined("mouth-edge"),
-    codes.TOO_MANY: Undecided(f"no hit within {careful.MAX_PARABOLAS} sub-intervals"),
-    codes.TANGENT: Undecided("f and f' vanish together within rounding"),
-    codes.CORNER: Undecided("two walls are hit together within rounding"),
-    codes.EDGE: Undecided("the mouth's edge is hit within rounding"),
-    codes.START: Undecided("the state is on another wall within rounding"),
-    codes.APPROACHING: Rejected("state.wall: the particle starts on a wall and moves into it"),
+    int(codes.SLIDING): Undefined("sliding"),
+    int(codes.MOUTH_EDGE): Undefined("mouth-edge"),
+    int(codes.TOO_MANY): Undecided(f"no hit within {careful.MAX_PARABOLAS} sub-intervals"),
+    int(codes.TANGENT): Undecided("f and f' vanish together within rounding"),
+    int(codes.CORNER): Undecided("two walls are hit together within rounding"),
+    int(codes.EDGE): Undecided("the mouth's edge is hit within rounding"),
+    int(codes.AT_END): Undecided("a wall is hit at the horizon within rounding"),
+    int(codes.START): Undecided("the state is on another wall within rounding"),
+    int(codes.APPROACHING): Rejected("state.wall: the particle starts on a wall and moves into it"),
 }
 # v^2 and r^2 must neither overflow nor vanish beside each other.
 LARGEST = 2.0**400
@@ -77,7 +77,7 @@ def next_collision(scene: Scene, state: State, t_end: float) -> Outcome:
         return Collision(WALL_NAMES[code], float(dt), *(float(p[i]) for i in (0, 2, 3, 4, 5)))
     if code == codes.HORIZON:
         return Horizon(t_end, *(float(p[i]) for i in (2, 3, 4, 5)))
-    return _trouble(code, state, WALL_NAMES.get(int(dt)) if code == codes.OUTSIDE else None)
+    return trouble(code, state, WALL_NAMES.get(int(dt)) if code == codes.OUTSIDE else None)
 
 
 class Trajectory(NamedTuple):
@@ -117,7 +117,7 @@ def trajectory(scene: Scene, state: State, n_collisions: int, t_end: float = np.
     outcome: Outcome | None = None
     if n < n_collisions:
         is_horizon = code == codes.HORIZON
-        outcome = Horizon(t_end, *(float(v) for v in p[2:])) if is_horizon else _trouble(code, state, None)
+        outcome = Horizon(t_end, *(float(v) for v in p[2:])) if is_horizon else trouble(code, state)
     return Trajectory(walls, steps[:n], outcome)
 
 
@@ -156,7 +156,8 @@ def wall_gap(scene: Scene, state: State) -> tuple[float, float]:
     return float(f), float(compiled.bounds[2, 1] if state.wall == "floor" else compiled.bounds[1, 1])
 
 
-def _trouble(code: int, state: State, wall: Wall | None) -> Outcome:
+def trouble(code: int, state: State, wall: Wall | None = None) -> Outcome:
+    """Return the outcome that a code stands for, other than a wall's and HORIZON; `wall`: the one crossed."""
     if code == codes.FAR_TIME:
         return Rejected(f"state.t = {state.t!r} is more than 2^27 quarter periods from 0: its phase is lost")
     if code == codes.OUTSIDE:

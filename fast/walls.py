@@ -9,9 +9,9 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from fast.arithmetic import SAFETY, two_product, two_sum
+from fast.arithmetic import SAFETY, dot, fma, multiplied, two_product, two_sum
 from fast.codes import ARC, BASE, CAP, FLOOR, LEFT, MUSHROOM, NO_WALL, RIGHT, STEM, H, M, R, W
-from fast.motion import increment, width
+from fast.motion import LOW, increment, width
 
 
 @njit(error_model="numpy")
@@ -50,21 +50,30 @@ def wall_function(wall, s, x, y, vx, vy, residual, laws, anchors, is_relative):
 
 @njit(error_model="numpy")
 def wall_residual(wall, x, y, laws, anchors, bounds, is_relative):
-    """Return f(0) and its rounding error."""
+    """Return f(0), right to its last bits, and what its error would be were it summed plainly.
+
+    The second judges states, which come rounded.
+    """
     if wall == ARC:
-        r = anchors[R, 0]
+        r, r_low = anchors[R, 0], anchors[R, LOW]
         r2, r2_low = two_product(r, r)
         x2, x2_low = two_product(x, x)
         y2, y2_low = two_product(y, y)
         a, a_low = two_sum(r2, -x2)
         b, b_low = two_sum(a, -y2)
-        return b + (b_low + a_low + (r2_low - x2_low - y2_low)), SAFETY * bounds[R, 1] * bounds[R, 1]
+        low = b_low + a_low + (r2_low - x2_low - y2_low) + 2.0 * r * r_low
+        return b + low, SAFETY * bounds[R, 1] * bounds[R, 1]
     if wall == FLOOR:
-        return y + anchors[H, 0], SAFETY * bounds[H, 1]
-    w, _, _, _, _ = width(laws, anchors, is_relative, 0.0)
-    tilt = anchors[M, 0] * y
+        f, f_low = two_sum(y, anchors[H, 0])
+        return f + (f_low + anchors[H, LOW]), SAFETY * bounds[H, 1]
+    w, w_low = anchors[W, 0], anchors[W, LOW]
+    if is_relative:
+        w, w_low = multiplied(w, w_low, anchors[R, 0], anchors[R, LOW])
+    tilt, tilt_low = multiplied(anchors[M, 0], anchors[M, LOW], y, 0.0)
+    f, f_low = two_sum(w, -x if wall == RIGHT else x)
+    f, e = two_sum(f, tilt)
     error = SAFETY * (bounds[W, 1] + max(abs(bounds[M, 0]), abs(bounds[M, 1])) * abs(y) + abs(x))
-    return (w + tilt) - (x if wall == RIGHT else -x), error
+    return f + (f_low + e + w_low + tilt_low), error
 
 
 @njit(error_model="numpy")
@@ -73,7 +82,7 @@ def wall_slope(wall, x, y, vx, vy, anchors, is_relative):
     if wall == BASE:
         return vy
     if wall == ARC:
-        return 2.0 * (anchors[R, 0] * anchors[R, 1] - (x * vx + y * vy))
+        return 2.0 * fma(anchors[R, 0], anchors[R, 1], -dot(x, vx, y, vy))
     if wall == FLOOR:
         return vy + anchors[H, 1]
     w_rate = anchors[W, 1]
@@ -96,16 +105,6 @@ def curvature_bounds(wall, vx, vy, bounds):
         return bounds[H, 3], bounds[H, 3]
     k = bounds[W, 3] + bounds[M, 3] * bounds[H, 1] + 2.0 * bounds[M, 2] * abs(vy)
     return k * (1.0 + SAFETY), k * (1.0 + SAFETY)
-
-
-@njit(error_model="numpy")
-def slope_bound(wall, x, y, vx, vy, bounds):
-    """Return how large |f'| may be, near enough, from the laws' bounds."""
-    if wall == ARC:
-        return 2.0 * (bounds[R, 1] * bounds[R, 2] + abs(x * vx) + abs(y * vy))
-    if wall == FLOOR:
-        return bounds[H, 2] + abs(vy)
-    return bounds[W, 2] + bounds[M, 2] * abs(y) + bounds[M, 1] * abs(vy) + abs(vx)
 
 
 @njit(error_model="numpy")

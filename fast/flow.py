@@ -1,0 +1,68 @@
+"""Flow: where given particles are at a given time, through the same kernel as ensembles."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from fast import codes
+from fast.compiled import FloatArray, compile_scene
+from fast.ensemble import IntArray, check_threads, follow
+from fast.starts import only_stop
+from fast.stepper import WALL_CODES, next_collision, trouble
+from scene import Horizon, InvalidState, Outcome, Rejected, Scene, State
+
+
+class Flow(NamedTuple):
+    """Where N particles are at t_end.
+
+    Attributes:
+        outcomes: (N,) Horizon with the state at t_end; Undefined or Undecided for a particle lost before.
+        t_in, t_out: (N,) the first captured stay in the cap [time], cut at t_end; nan for none.
+        wall_counts: (N, 5) collisions with arc, base, left, right, floor.
+        n_careful: (N,) collisions that the lanes left to the careful step.
+    """
+
+    outcomes: list[Outcome]
+    t_in: FloatArray
+    t_out: FloatArray
+    wall_counts: IntArray
+    n_careful: IntArray
+
+
+def flow(scene: Scene, states: Sequence[State], t_end: float, threads: int | None = None) -> Flow:
+    """Carry particles to t_end.
+
+    Args:
+        scene: table and laws of motion.
+        states: the starts, each as for `next_collision`, with t <= t_end.
+        t_end: when to stop [time], finite.
+        threads: how many to use, by default one for each core; they change no bit.
+
+    Raises:
+        InvalidState: a start is none of this table: naming the particle; nothing is followed.
+        BadInput: `threads` is out of bounds.
+
+    Source: a stay is captured while |sin phi| > nu at the arc, sec. 3.2.
+    """
+    threads = check_threads(threads)
+    for i, state in enumerate(states):
+        refusal = refuse(scene, state, t_end)
+        if refusal is not None:
+            raise InvalidState(f"particle {i}: {refusal.reason}")
+    starts = np.array([[s.t, 0.0, s.x, s.y, s.vx, s.vy] for s in states]).reshape(-1, 6)
+    walls = np.array([WALL_CODES[s.wall] for s in states], dtype=np.int64)
+    done = follow(compile_scene(scene), starts, walls, only_stop(t_end), threads)
+    outcomes = [
+        Horizon(t_end, *place) if code == codes.HORIZON else trouble(int(code), state)
+        for state, code, place in zip(states, done.codes, done.states[:, 2:].tolist(), strict=True)
+    ]
+    return Flow(outcomes, done.t_in[:, 0], done.t_out[:, 0], done.counts, done.careful)
+
+
+def refuse(scene: Scene, state: State, t_end: float) -> Rejected | None:
+    """Return why a particle cannot start so, or None."""
+    outcome = next_collision(scene, state, t_end)
+    return outcome if isinstance(outcome, Rejected) else None

@@ -1,0 +1,133 @@
+"""Bits: the same for any threads, chunks, lane position and cache; symmetries exact on whole trajectories."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from test_fast_stepper import MIRRORED, scaled_scene
+
+import fast
+from conformance.strategies import scenes_and_states
+from fast import ensemble, entries
+from scene import State, load
+
+# Of `small_ensemble`. It changes when the arithmetic does, and then only on purpose.
+PINNED = "890e7f6085041943f264024d392509261634a47d480300024e215ad0b3704d0e"
+
+
+def small_ensemble(threads: int | None = None) -> fast.Ensemble:
+    return fast.simulate(
+        load("moving-cap"),
+        n_particles=70,
+        energy=1e3,
+        n_cycles=2,
+        seed=5,
+        phases=(0.25, 0.6),
+        threads=threads,
+    )
+
+
+def test_the_pinned_ensemble():
+    assert small_ensemble().sha256() == PINNED
+
+
+@pytest.mark.parametrize("size", [1, 7, 64])
+def test_chunks_do_not_change_a_bit(size, monkeypatch):
+    """Chunks put particles side by side in other lanes, too."""
+    monkeypatch.setattr(ensemble, "SHARE", size)
+    assert small_ensemble(threads=1).sha256() == small_ensemble(threads=2).sha256() == PINNED
+
+
+def test_lane_positions_do_not_change_a_bit():
+    """A flow's particles, backwards: each lands in another lane, beside others."""
+    scene, random = load("fixed-cap-clockwise"), np.random.default_rng(2)
+    numbers = zip(
+        *random.uniform((-0.3, 0.01, -300, -300), (0.3, 0.4, 300, 300), size=(150, 4)).T, strict=True
+    )
+    states = [State(0.0, *map(float, row)) for row in numbers]
+    one = fast.flow(scene, states, 1.0, threads=1)
+    other = fast.flow(scene, states[::-1], 1.0, threads=1)
+    assert one.outcomes == other.outcomes[::-1]
+    assert np.array_equal(one.t_in, other.t_in[::-1], equal_nan=True)
+    assert one.n_careful.sum() < 0.1 * one.wall_counts.sum()
+
+
+PROGRAM = """
+import fast, scene
+path = fast.trajectory(scene.load("moving-cap"), scene.State(0.0, 0.1, 0.3, 20.0, 7.0), 40)
+print(path.steps.tobytes().hex())
+for name in ("moving-cap", "breathing-circle"):
+    run = fast.simulate(scene.load(name), n_particles=5, energy=200.0, seed=1, threads=1)
+    print(run.n_careful.sum() < 0.2 * run.n_collisions.sum(), run.sha256())
+"""
+
+
+def test_same_bits_without_the_compiler():
+    """Kernels are plain Python too: scalar, uncompiled, they give the bits of the packed machine code."""
+    results = []
+    for is_off in ("0", "1"):
+        environment = {**os.environ, "NUMBA_DISABLE_JIT": is_off}
+        command = [sys.executable, "-W", "ignore", "-c", PROGRAM]
+        run = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
+        results.append(run.stdout)
+    assert results[0] == results[1]
+    assert results[0].count("True") == 2
+
+
+def test_a_change_in_any_source_makes_the_kernels_anew(tmp_path):
+    """Numba's cache looks at one file only; the digest that entries close over looks at all."""
+    folder = Path(entries.__file__).parent
+    copy = shutil.copytree(folder, tmp_path / "fast", ignore=shutil.ignore_patterns("__pycache__"))
+    assert entries.digest_of_sources(copy) == entries.SOURCES
+    (copy / "walls.py").write_text((copy / "walls.py").read_text("utf-8") + "\n", "utf-8")
+    assert entries.digest_of_sources(copy) != entries.SOURCES
+    for entry in (entries.single_step, entries.trajectory, entries.follow_particles):
+        assert entries.SOURCES in [cell.cell_contents for cell in entry.py_func.__closure__]
+
+
+@settings(max_examples=60)
+@given(scenes_and_states())
+def test_a_mirrored_trajectory_is_the_mirror_of_the_trajectory(drawn):
+    scene, s, _ = drawn
+    one = fast.trajectory(scene, s, 30)
+    other = fast.trajectory(scene, State(s.t, -s.x, s.y, -s.vx, s.vy, MIRRORED.get(s.wall, s.wall)), 30)
+    assert other.walls == [MIRRORED.get(wall, wall) for wall in one.walls]
+    assert np.array_equal(other.steps, one.steps * [1, 1, -1, 1, -1, 1])
+
+
+@settings(max_examples=60)
+@given(scenes_and_states(), st.integers(-20, 20), st.integers(-20, 20))
+def test_a_scaled_trajectory_is_the_scaled_one(drawn, length_bits, time_bits):
+    scene, s, _ = drawn
+    length, time = 2.0**length_bits, 2.0**time_bits
+    speed = length / time
+    start = State(s.t * time, s.x * length, s.y * length, s.vx * speed, s.vy * speed, s.wall)
+    one, other = fast.trajectory(scene, s, 30), fast.trajectory(scaled_scene(scene, length, time), start, 30)
+    assert other.walls == one.walls
+    assert np.array_equal(other.steps, one.steps * [time, time, length, length, speed, speed])
+
+
+@pytest.mark.parametrize("name", ["moving-cap", "fixed-cap-clockwise", "breathing-circle"])
+def test_lanes_mirror_and_scale_exactly(name):
+    scene, random = load(name), np.random.default_rng(4)
+    rows = random.uniform((-0.3, 0.01, -300, -300), (0.3, 0.4, 300, 300), size=(64, 4)).tolist()
+    one = fast.flow(scene, [State(0.0, *row) for row in rows], 1.5)
+    mirrored = fast.flow(scene, [State(0.0, -x, y, -vx, vy) for x, y, vx, vy in rows], 1.5)
+    half = fast.flow(
+        scaled_scene(scene, 0.5, 4.0),
+        [State(0.0, x / 2, y / 2, vx / 8, vy / 8) for x, y, vx, vy in rows],
+        6.0,
+    )
+    for a, b, c in zip(one.outcomes, mirrored.outcomes, half.outcomes, strict=True):
+        assert (b.x, b.y, b.vx, b.vy) == (-a.x, a.y, -a.vx, a.vy)
+        assert (c.x, c.y, c.vx, c.vy) == (a.x / 2, a.y / 2, a.vx / 8, a.vy / 8)
+    assert np.array_equal(mirrored.t_in, one.t_in, equal_nan=True)
+    assert np.array_equal(half.t_in, 4 * one.t_in, equal_nan=True)

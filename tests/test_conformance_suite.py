@@ -268,16 +268,16 @@ def flows(name: str) -> Stub:
     ],
 )
 def test_the_work_identity_tells_a_mutant_from_an_honest_stepper(monkeypatch, name, verdict):
-    monkeypatch.setattr(suite_properties, "N_PARTICLES", (1000,))
+    size = suite_properties.Size(100, 1000.0, 0.08)
+    monkeypatch.setattr(suite_properties, "_affordable", lambda *_: size)
     monkeypatch.setattr(suite_properties, "_one_cycle", lambda *_: [])
-    monkeypatch.setattr(suite_properties, "_affordable", lambda *_: 1000)
     work, _ = suite_properties.ask_profiles(flows(name))
     assert work[:2] == ("work-identity", verdict)
 
 
 @pytest.mark.parametrize(("name", "verdict"), [("none", "pass"), ("hole-static", "fail")])
 def test_one_cycle_tells_a_mutant_from_an_honest_stepper(monkeypatch, name, verdict):
-    monkeypatch.setattr(suite_properties, "N_PARTICLES", (200,))
+    monkeypatch.setattr(suite_properties, "_affordable", lambda *_: suite_properties.SIZES[-1])
     monkeypatch.setattr(suite_properties.profiles, "work_identity", lambda *_, **__: [])
     _, cycle = suite_properties.ask_profiles(flows(name))
     assert cycle[:2] == ("one-cycle", verdict)
@@ -285,7 +285,7 @@ def test_one_cycle_tells_a_mutant_from_an_honest_stepper(monkeypatch, name, verd
 
 def test_profiles_can_fail(monkeypatch):
     """Particles that come to rest in the stem's mouth: no work is done on them, none is captured."""
-    monkeypatch.setattr(suite_properties, "N_PARTICLES", (400,))
+    monkeypatch.setattr(suite_properties, "SIZES", (suite_properties.Size(400, 200.0, 0.18),))
 
     def sit(request):
         stays = [

@@ -269,13 +269,15 @@ def remainder(wall, s, residual, x, y, vx, vy, laws, anchors, bounds, is_relativ
 
 
 @njit(error_model="numpy")
-def bounce(wall, x, y, vx, vy, anchors, is_relative):
+def bounce(wall, x, x_low, y, y_low, vx, vy, anchors, is_relative):
     """Return the velocity after a hit at (x, y): v - 2 f' grad f / |grad f|^2 = v - 2 (v.n - u) n."""
     if wall == BASE:
         return vx, -vy
     if wall == ARC:
-        push = wall_slope(ARC, x, y, vx, vy, anchors, is_relative) / dot(x, x, y, y)
-        return fma(push, x, vx), fma(push, y, vy)
+        # The place's rounding would turn the normal: its low part is worth its lines.
+        slope = wall_slope(ARC, x, y, vx, vy, anchors, is_relative) - 2.0 * (x_low * vx + y_low * vy)
+        push = slope / (dot(x, x, y, y) + 2.0 * (x_low * x + y_low * y))
+        return vx + fma(push, x, push * x_low), vy + fma(push, y, push * y_low)
     if wall == FLOOR:
         return vx, -vy - 2.0 * anchors[H, 1]
     m = anchors[M, 0]
@@ -313,12 +315,12 @@ def move(wall, s, is_again, p, laws, bounds, anchors, is_relative):
     if is_again and error < POLISHED * residual_error:
         # A short hop along the wall: its increments gave s better than the laws' low parts can.
         s_low = 0.0
-    x_s += x_low + vx * s_low
-    y_s = 0.0 if wall == BASE else y_s + (y_low + vy * s_low)
+    x_s, x_low = two_sum(x_s, x_low + vx * s_low)
+    y_s, y_low = (0.0, 0.0) if wall == BASE else two_sum(y_s, y_low + vy * s_low)
     p[0], p[1] = two_sum(t, low + p[1] + s_low)
     set_anchors(laws, anchors, p[0], p[1])
     p[2], p[3] = x_s, y_s
-    p[4], p[5] = bounce(wall, x_s, y_s, vx, vy, anchors, is_relative)
+    p[4], p[5] = bounce(wall, x_s, x_low, y_s, y_low, vx, vy, anchors, is_relative)
     return s + s_low
 
 

@@ -8,7 +8,7 @@ from scipy import stats
 
 import fast
 from fast.starts import cycle_stops, initial_states
-from scene import load
+from scene import State, load
 
 
 def test_threads_do_not_change_a_bit():
@@ -112,3 +112,22 @@ def test_progress_reaches_the_end():
     fast.simulate(load("fermi-ulam"), n_particles=100, energy=10.0, progress=seen.append)
     assert seen[-1] == 100
     assert seen == sorted(seen)
+
+
+def test_energies_at_phases_are_the_flow_s():
+    """At a phase of the cycle an ensemble's particle has the energy that the same start has in a flow."""
+    scene, phases = load("moving-cap"), (0.2, 0.5, 0.9)
+    run = fast.simulate(scene, n_particles=40, energy=50.0, seed=3, phases=phases)
+    starts = [State(t, *place) for t, _, *place in initial_states(scene, 40, 50.0, 3).tolist()]
+    assert run.phase_energies.shape == (40, 1, 3)
+    for k, phase in enumerate(phases):
+        there = fast.flow(scene, starts, 2 * np.pi * phase)
+        energies = [(o.vx**2 + o.vy**2) / 2 for o in there.outcomes]
+        assert run.phase_energies[:, 0, k].tolist() == energies
+    assert np.array_equal(run.wall_counts.sum(axis=1), run.n_collisions)
+    # Between its capture and its release a particle is captured at each phase looked at.
+    t_in, t_out = run.t_in[:, 0], run.t_out[:, 0]
+    inside = (t_in < np.pi) & (np.pi < t_out)
+    assert inside.any()
+    assert run.phase_captured[inside, 0, 1].all()
+    assert not run.phase_captured[~inside, 0, 1].any()

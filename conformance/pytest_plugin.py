@@ -16,7 +16,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     group = parser.getgroup("mushrooms")
     group.addoption("--mushrooms-command", metavar="COMMAND", help="A stepper that speaks protocol 1.")
     group.addoption("--mushrooms-level", default="core", choices=vectors.LEVELS, help="Hardest level asked.")
-    group.addoption("--mushrooms-timeout", default=60.0, type=float, help="Seconds for one answer.")
+    group.addoption("--mushrooms-timeout", default=120.0, type=float, help="Seconds for one answer.")
 
 
 def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:

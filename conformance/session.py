@@ -36,7 +36,7 @@ class Limits(msgspec.Struct, frozen=True):
         restarts: fresh processes after the first.
     """
 
-    timeout: float = 60.0
+    timeout: float = 120.0
     restarts: int = 10
 
 

@@ -27,7 +27,7 @@ COLOURS = {"pass": "green", "declined": "yellow", "unsupported": "yellow"}
 def check(
     command: Annotated[list[str], typer.Argument(metavar="-- COMMAND...", help="Speaks protocol 1.")],
     level: Annotated[str, typer.Option(help="core, extended or stress.")] = "core",
-    timeout: Annotated[float, typer.Option(help="Seconds for one answer, compilation included.")] = 60.0,
+    timeout: Annotated[float, typer.Option(help="Seconds for one answer, compilation included.")] = 120.0,
     restarts: Annotated[int, typer.Option(help="Fresh processes after the first, 0 to 1000.")] = 10,
     groups: Annotated[str, typer.Option(help="Groups of vectors, with commas; all by default.")] = "",
     known_failures: Annotated[

@@ -42,6 +42,7 @@ def to_html(run: Run) -> bytes:
         report=report,
         version=__version__,
         seen=seen,
+        further=[r for r in run.results if r.group in ("property", "profile")],
         others=others[:MAX_LISTED],
         n_unlisted=max(0, len(others) - MAX_LISTED),
         cases=[_case(result, by_id[result.id]) for result in _worst(run) if result.id in by_id],

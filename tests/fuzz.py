@@ -59,6 +59,7 @@ CIRCLE = {"table": "cap", "r": 1.0}
 WARM_UP = [
     {"cmd": "step", "seq": 1, "scene": CIRCLE, "state": STATE, "t_end": 9.0},
     {"cmd": "trajectory", "seq": 1, "scene": CIRCLE, "state": STATE, "t_end": 9.0, "collisions": 2},
+    {"cmd": "flow", "seq": 1, "scene": CIRCLE, "states": [STATE], "t_end": 0.1},
 ]
 
 

@@ -30,12 +30,20 @@ from scene.messages import json_schema
 from scene.wire import serve
 
 N_LINES = int(os.environ.get("MUSHROOMS_LINES", "300"))
-LIMIT = 60.0  # seconds for one line: the time limit of `mushrooms check`
+LIMIT = 120.0  # seconds for one line: the time limit of `mushrooms check`
 SERVERS = {
     "reference": lambda feed, out: serve(
         "r", reference_server.step, reference_server.follow, feed, out, timer=reference_server.clock
     ),
-    "fast": lambda feed, out: serve("f", fast.next_collision, fast_server.follow, feed, out),
+    "fast": lambda feed, out: serve(
+        "f",
+        fast.next_collision,
+        fast_server.follow,
+        feed,
+        out,
+        flow=fast_server.carry,
+        timer=fast_server.clock,
+    ),
     "plain": lambda feed, out: serve("p", plain.next_collision, plain.trajectory, feed, out, flow=plain.flow),
 }
 ANSWER = jsonschema.Draft202012Validator({"$ref": "#/$defs/Answer", "$defs": json_schema()["$defs"]})

@@ -63,6 +63,7 @@ def test_a_good_stepper_is_accepted_and_reported(call, tmp_path):
     assert "example-python" in page
     assert "Worst cases" in page
     assert "Speed against error" in page
+    assert "property/mirror" in page
     assert_stands_alone(page, n_figures=page.count("<figure>"))
 
 

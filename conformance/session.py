@@ -253,7 +253,7 @@ def read_answer(line: bytes, cmd: str, seq: int) -> dict[str, Any]:
     try:
         envelope = _envelopes.decode(line)
         if type(envelope.seq) is not int or envelope.seq != seq:
-            said = f": {str(envelope.reason)[:200]}" if envelope.reason else ""
+            said = f": {' '.join(str(envelope.reason).split())[:200]}" if envelope.reason else ""
             given = repr(envelope.seq)[:40]
             raise Trouble("wrong-format", f"answered seq {given} to seq {seq}{said}")
         own = _failures if envelope.error is not None else _answers[cmd]

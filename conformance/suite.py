@@ -18,7 +18,7 @@ from typing import Any
 
 import msgspec
 
-from conformance import grading, suite_properties, vectors
+from conformance import grading, properties, suite_properties, vectors
 from conformance.process import Trouble
 from conformance.session import Limits, Session, missing
 from conformance.vectors import Vector
@@ -34,6 +34,11 @@ TIMED_SCENE, TIMED_STATE = (
     {"t": 0.0, "x": 0.1, "y": 0.2, "vx": 300.0, "vy": 400.0, "wall": None},
 )
 TIMED_REPEATS, TIMED_LEAST = 5, 20_000_000  # timings; nanoseconds that each must last to be read from a clock
+OTHER_CASES = (
+    *(f"protocol/{name}" for name in ("start", "echo", "rejects", "stop")),
+    *(f"property/{name}" for name in properties.PROPERTIES),
+    *(f"profile/{name}" for name in ("work-identity", "one-cycle")),
+)
 Progress = Callable[[int, int], None]
 
 
@@ -198,21 +203,20 @@ def read_known(path: Path) -> frozenset[str]:
     """Read a known-failures file: one id a line, # begins a comment.
 
     Raises:
-        BadInput: naming the line whose id the corpus does not have, or that comes twice.
+        BadInput: naming the line whose id the suite does not have, or that comes twice.
     """
     try:
         lines = path.read_text("utf-8").splitlines()
     except (OSError, UnicodeDecodeError) as error:
         raise BadInput(f"known failures {str(path)!r} cannot be read: {error}") from None
-    ids = {vector.id for vector in vectors.load("stress")}
+    ids = {vector.id for vector in vectors.load("stress")} | set(OTHER_CASES)
     found: set[str] = set()
     for number, line in enumerate(lines, 1):
         name = line.partition("#")[0].strip()
         if not name:
             continue
-        is_vector = name.partition("/")[0] not in ("protocol", "property", "profile")
-        if name in found or (is_vector and name not in ids):
-            problem = "comes twice" if name in found else "is no vector of this corpus"
+        if name in found or name not in ids:
+            problem = "comes twice" if name in found else "is no case of this suite"
             raise BadInput(f"known failures {str(path)!r}:{number}: {name} {problem}")
         found.add(name)
     return frozenset(found)

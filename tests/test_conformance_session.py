@@ -254,6 +254,7 @@ def test_an_echo_is_compared_bit_for_bit():
         (b'{"seq":1,"states":[{"outcome":"horizon"}]}', "flow", "states"),
         (b'{"seq":true,"outcome":"undecided","reason":""}', "step", "seq True"),
         (b'{"seq":null,"outcome":"rejected","reason":"what?"}', "step", "what?"),
+        (b'{"seq":null,"outcome":"rejected","reason":"two\\nlines"}', "step", "two lines"),
         (b'{"seq":1,"error":5}', "step", "error"),
     ],
 )

@@ -97,7 +97,11 @@ def test_objections_say_what_is_wrong():
 
 @pytest.mark.parametrize(
     ("text", "word"),
-    [("breathing-circle/1\nno-such/1", ":2: no-such/1"), ("grazing/1\ngrazing/1 # again", "twice")],
+    [
+        ("breathing-circle/1\nno-such/1", ":2: no-such/1"),
+        ("property/no-such", "no case"),
+        ("grazing/1\ngrazing/1 # again", "twice"),
+    ],
 )
 def test_a_known_failures_file_is_checked(tmp_path, text, word):
     path = tmp_path / "known.txt"
@@ -213,6 +217,17 @@ def test_shifted_answers_make_the_reference_fail(monkeypatch):
         assert len(graded) > 12
         assert set(graded.values()) == {verdict}, graded
         assert run.exit_code() == (1 if verdict == "fail" else 0)
+
+
+def test_the_cases_beside_the_vectors_are_all_listed(monkeypatch):
+    """What a run of an implementation that offers everything contains, and no more."""
+    tiny = suite_properties.Size(20, 50.0, 0.5)
+    for name, value in (("SIZES", (tiny,)), ("BATCH", 20), ("LIGHTER", 1), ("N_QUESTIONS", 2)):
+        monkeypatch.setattr(suite_properties, name, value)
+    run = suite.check([sys.executable, "-m", "conformance.plain"], groups=["static-cap"])
+    others = {result.id for result in run.results if not result.level}
+    assert others == set(suite.OTHER_CASES)
+    assert run.exit_code() == 0
 
 
 def core_steps() -> list[vectors.Vector]:

@@ -13,7 +13,7 @@ from pathlib import Path
 import jsonschema
 import pytest
 
-from conformance import vectors
+from conformance import plain, vectors
 from scene.messages import json_schema
 
 ROOT = Path(__file__).parent.parent
@@ -62,6 +62,13 @@ def test_the_tutorial_does_what_it_says(folder, number):
     )
     assert matches(shown, done.stdout), done.stdout[-3000:] + done.stderr
     assert done.returncode == (1 if "not accepted" in shown or "though it is listed" in shown else 0)
+
+
+def test_the_tutorial_holds_a_python_stepper_to_a_property():
+    (snippet,) = (text for file, text in blocks("tutorial.md", "python") if not file)
+    given = {"my_stepper": plain.next_collision}
+    exec(snippet, given)
+    given["test_mirror"]()
 
 
 def test_another_output_would_be_seen():

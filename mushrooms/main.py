@@ -6,7 +6,6 @@ import json
 import math
 import os
 import sys
-import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -20,6 +19,7 @@ from rich.table import Table
 import mushrooms
 import scene as scenes
 from mushrooms import output
+from mushrooms.audit import audit
 from mushrooms.check import check
 from scene.load import read_data
 from scene.refusal import BadInput
@@ -229,76 +229,6 @@ def _finite(value: float) -> float | None:
     return float(value) if math.isfinite(value) else None
 
 
-@app.command(epilog="Example: mushrooms audit --particles 20000 --out audit-report")
-def audit(
-    out: Folder = Path("audit-report"),
-    particles: Annotated[int, typer.Option(help="Particles per scene, 2000 to 10^8.")] = 4_000,
-    seed: Seed = 0,
-    threads: Threads = None,
-    as_json: AsJson = False,
-) -> None:
-    """Check the paper's claims; writes report.html and report.json.
-
-    Exit code 0 when every claim has its expected verdict, 1 when one has not, 2 on bad input.
-    """
-    import fast
-    from conformance import audit as ledger
-    from mushrooms import report
-
-    _check_range("--particles", particles, ledger.MIN_PARTICLES, MAX_PARTICLES)
-    _check_common(seed, threads)
-    with output.writable_folder(out) as folder:
-        start = time.perf_counter()
-        with _progress() as bar:
-            tasks: dict[str, Callable[[int], None]] = {}
-
-            def advance(name: str, n_done: int) -> None:
-                if name not in tasks:
-                    tasks[name] = _task(bar, name, particles)
-                tasks[name](n_done)
-
-            ensembles = ledger.run_ensembles(
-                fast.simulate, n_particles=particles, seed=seed, threads=threads, progress=advance
-            )
-        samples = {name: ledger.measure(scenes.load(name), ensemble) for name, ensemble in ensembles.items()}
-        findings = ledger.examine(samples)
-        result = report.Audit(particles, seed, time.perf_counter() - start, ensembles, samples, findings)
-        text, page = report.to_json(result), report.to_html(result)
-        output.write_files(
-            folder,
-            {
-                "report.json": lambda file: _write_text(file, text),
-                "report.html": lambda file: _write_text(file, page),
-            },
-        )
-    if as_json:
-        print(text, end="")
-    else:
-        _print_findings(report.to_data(result)["findings"], report.measured_text)
-        n_right = sum(finding.is_as_expected for finding in findings)
-        print(f"{n_right} of {len(findings)} claims have their expected verdict.")
-        print(f"Report: {folder / 'report.html'}")
-    raise typer.Exit(0 if result.is_passed else 1)
-
-
-def _print_findings(findings: list[dict[str, Any]], measured: Callable[[dict[str, Any]], str]) -> None:
-    table = Table("claim", "paper", "theory", "simulation ± standard error", "band", "verdict", title="Audit")
-    for finding in findings:
-        verdict = finding["verdict"]
-        if not finding["as_expected"]:
-            verdict = f"[bold red]{verdict}[/] (expected: {finding['expected']})"
-        table.add_row(
-            f"[bold]{finding['id']}[/]\n{finding['claim']}",
-            finding["paper"] or "–",
-            finding["theory"],
-            measured(finding),
-            "–" if finding["band"] is None else f"{finding['band']:.5f}",
-            verdict,
-            end_section=True,
-        )
-    _console().print(table)
-
-
 @app.command(epilog="Example: mushrooms draw moving-cap --out moving-cap.svg")
 def draw(
     scene: SceneName,
@@ -319,6 +249,7 @@ def draw(
     print(path)
 
 
+app.command(epilog="Example: mushrooms audit --only X2,L4 --out audit-report")(audit)
 app.command(epilog="Example: mushrooms check --html report.html -- ./my_stepper")(check)
 
 

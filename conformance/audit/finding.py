@@ -1,0 +1,105 @@
+"""What an entry of the ledger is, what it finds, and the verdict that follows from its checks.
+
+A check compares one number, or decides one statement. Its form is `claim` for what the paper says,
+`printed` for a form that is expected to fail, `corrected` for the form that must then hold.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+
+if TYPE_CHECKING:
+    from conformance.audit.evidence import Evidence
+
+Verdict = Literal[
+    "confirmed", "misprint", "not reproducible as stated", "inferred", "refuted", "indeterminate"
+]
+Form = Literal["claim", "printed", "corrected"]
+
+
+class Check(NamedTuple):
+    """One comparison.
+
+    Attributes:
+        what: what is compared, in words.
+        holds: True, False, or None when the data are too coarse to tell.
+        expected: the value or bound it is held against, as text.
+        value: what was found, None when `note` says it in words.
+        error: one standard error, None where nothing is random.
+        band: how far off finite energy may put it, by the theory.
+        form: see the module.
+        n_tests: how many chances to be wrong by accident it took, 0 where nothing is random.
+        note: what else is worth knowing.
+    """
+
+    what: str
+    holds: bool | None
+    expected: str
+    value: float | None = None
+    error: float | None = None
+    band: float | None = None
+    form: Form = "claim"
+    n_tests: int = 0
+    note: str = ""
+
+
+class Entry(NamedTuple):
+    """One statement of the paper, or about it, and how it is checked.
+
+    Attributes:
+        id: of the ledger.
+        where: place in the paper.
+        statement: what the paper says; for a misprint, printed and corrected form.
+        method: how it is checked.
+        tolerance: what is accepted, with its reason.
+        expected: the verdict that stands when every check of a claim and of a corrected form holds, and
+            one of the printed form fails.
+        examine: makes the checks.
+        runs: names of the simulations it needs.
+    """
+
+    id: str
+    where: str
+    statement: str
+    method: str
+    tolerance: str
+    expected: Verdict
+    examine: Callable[[Evidence], list[Check]]
+    runs: tuple[str, ...] = ()
+
+
+class Finding(NamedTuple):
+    """What came of an entry; `seconds` is the time its checks took, simulations apart."""
+
+    id: str
+    verdict: Verdict
+    checks: list[Check]
+    seconds: float
+
+
+def verdict_of(entry: Entry, checks: list[Check]) -> Verdict:
+    """Return the verdict that the checks make.
+
+    A printed form stands when all its checks hold; then a misprint is "confirmed" after all. Any other
+    failure refutes the entry; a check that cannot tell leaves it open.
+    """
+    printed = [check.holds for check in checks if check.form == "printed"]
+    others = [check.holds for check in checks if check.form != "printed"]
+    if not others or False in others:
+        return "refuted"
+    if None in others:
+        return "indeterminate"
+    if not printed or False in printed:
+        return entry.expected
+    return "indeterminate" if None in printed else "confirmed"
+
+
+def to_data(finding: Finding) -> dict[str, Any]:
+    """Return a finding as plain data."""
+    return {**finding._asdict(), "checks": [check._asdict() for check in finding.checks]}
+
+
+def from_data(data: dict[str, Any]) -> Finding:
+    """Return the finding that plain data hold."""
+    return Finding(**{**data, "checks": [Check(**check) for check in data["checks"]]})

@@ -1,0 +1,109 @@
+"""The simulations that the audit rests on: which scene, at which energy, how many particles.
+
+A run is made of blocks of particles; each block has a seed of its own, derived from the audit's seed,
+the run's name and the block's number. So a quick audit is the first blocks of a full one, and a run that
+was broken off goes on with the next block.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from typing import Literal, NamedTuple
+
+import scene as scenes
+from scene.refusal import BadInput
+from scene.tables import Mushroom, Scene
+
+Size = Literal["quick", "full"]
+EIGHTHS = tuple(k / 8 for k in range(1, 8))
+SIXTEENTHS = tuple(k / 16 for k in range(1, 16))
+
+
+class Run(NamedTuple):
+    """One simulation.
+
+    Attributes:
+        scene: a catalogue name or a name in SCENES.
+        energy: initial energy of every particle.
+        quick, full: number of particles by the audit's size, 0 for none; whole blocks.
+        block: particles per block.
+        n_cycles: cycles followed.
+        phases: fractions of each cycle at which energies are kept.
+    """
+
+    scene: str
+    energy: float
+    quick: int
+    full: int
+    block: int
+    n_cycles: int = 1
+    phases: tuple[float, ...] = ()
+
+    @property
+    def name(self) -> str:
+        """Return `scene@energy`, with the number of cycles where there are several."""
+        many = f"x{self.n_cycles}" if self.n_cycles > 1 else ""
+        return f"{self.scene}@{self.energy:.0e}{many}".replace("e+0", "e").replace("e+", "e")
+
+    def n_particles(self, size: Size) -> int:
+        """Return how many particles an audit of this size follows."""
+        return self.quick if size == "quick" else self.full
+
+
+# Scenes that are no part of the catalogue: one parameter moves, the rest stand still (X7).
+SCENES: dict[str, Scene] = {
+    "only-mouth": Mushroom(
+        r=1.0, h=1.0, nu=scenes.Fourier(0.6, 1.0, (0.4,)), slope=0.1111, name="only-mouth"
+    ),
+}
+
+_ALL = (
+    # Sec. 4.1 at its size and energy.
+    Run("fixed-cap-anticlockwise", 1e9, 10_000, 100_000, 2_500, phases=EIGHTHS),
+    Run("fixed-cap-clockwise", 1e9, 10_000, 100_000, 2_500, phases=EIGHTHS),
+    # Sec. 4.2 at its energies; the ladder of energies carries the laws and the limits.
+    Run("moving-cap", 1e3, 20_000, 100_000, 20_000),
+    Run("moving-cap", 1e4, 20_000, 100_000, 20_000, phases=SIXTEENTHS),
+    Run("moving-cap", 1e5, 20_000, 100_000, 10_000, phases=SIXTEENTHS),
+    Run("moving-cap", 1e6, 20_000, 100_000, 5_000, phases=SIXTEENTHS),
+    Run("moving-cap", 1e7, 10_000, 100_000, 5_000, phases=SIXTEENTHS),
+    Run("moving-cap", 1e8, 1_000, 5_000, 1_000, phases=SIXTEENTHS),
+    Run("moving-cap", 1e9, 0, 2_000, 500),
+    Run("moving-cap", 1e10, 0, 1_000, 200),
+    Run("moving-cap", 1e11, 0, 500, 50),
+    Run("moving-cap-reversed", 1e6, 10_000, 50_000, 5_000),
+    Run("moving-cap-trivial", 1e6, 10_000, 50_000, 5_000),
+    Run("only-mouth", 1e6, 5_000, 25_000, 5_000),
+    Run("untilted", 1e6, 10_000, 25_000, 5_000),
+    Run("ergodic", 1e4, 10_000, 25_000, 5_000, phases=EIGHTHS),
+    Run("ergodic", 1e5, 10_000, 25_000, 5_000, phases=EIGHTHS),
+    Run("ergodic", 1e6, 10_000, 25_000, 5_000, phases=EIGHTHS),
+    Run("ergodic", 1e7, 10_000, 25_000, 5_000, phases=EIGHTHS),
+    Run("frozen-mushroom", 1e8, 2_000, 10_000, 1_000),
+    # Many cycles cost most: energies, and with them collisions, grow exponentially.
+    Run("moving-cap", 1e5, 500, 500, 250, n_cycles=30),
+    Run("moving-cap", 1e7, 0, 10_000, 500, n_cycles=10),
+    Run("moving-cap", 1e7, 0, 500, 50, n_cycles=30),
+)
+RUNS: dict[str, Run] = {run.name: run for run in _ALL}
+
+
+def scene_of(run: Run) -> Scene:
+    """Return the run's scene."""
+    return SCENES[run.scene] if run.scene in SCENES else scenes.load(run.scene)
+
+
+def block_seed(seed: int, run: Run, number: int) -> int:
+    """Return the seed of a block, 64 bits."""
+    text = f"{seed} {run.name} {number}"
+    return int.from_bytes(hashlib.sha256(text.encode()).digest()[:8], "big")
+
+
+def check_seed(seed: int) -> None:
+    """Refuse a seed out of bounds.
+
+    Raises:
+        BadInput: naming the bound.
+    """
+    if not 0 <= seed < 2**64:
+        raise BadInput(f"seed = {seed}, must be 0 to 2^64 - 1")

@@ -1,0 +1,218 @@
+"""Samples: what a run's particles did, followed in blocks that outlive an interruption.
+
+Every block is saved as soon as it is followed. A saved block is used again only if it was made from the
+same scene, energy, seed and number of particles.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import zipfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+import scene as scenes
+from conformance.audit.runs import Run, Size, block_seed, scene_of
+
+if TYPE_CHECKING:
+    from fast import Ensemble
+
+FloatArray = npt.NDArray[np.float64]
+BoolArray = npt.NDArray[np.bool_]
+Simulate = Callable[..., "Ensemble"]
+Progress = Callable[[str, int, int], None]  # run, particles done, particles in all
+Arrays = dict[str, npt.NDArray[Any]]
+
+MAX_LOST = 1e-3  # a larger unfollowed share could hide a bias as large as the errors themselves
+
+
+class Sample(NamedTuple):
+    """The n particles of a run that were followed to the end, over K cycles, at P phases.
+
+    Attributes:
+        run: what was asked for.
+        s: (n, K) log E / E0 at the end of each cycle.
+        t_in, t_out: (n, K) captured stay around each cycle's least nu; nan for none.
+        phase_s: (n, K, P) log E / E0 at the phases.
+        phase_captured: (n, K, P) whether in the island there.
+        stem_hits: (n,) collisions with left, right and floor.
+        n_particles: particles started.
+        n_undecided, n_undefined: of those not followed.
+        n_collisions, n_careful: in all.
+        seconds: kernel time x threads [s].
+        sha256: of all blocks' results.
+    """
+
+    run: Run
+    s: FloatArray
+    t_in: FloatArray
+    t_out: FloatArray
+    phase_s: FloatArray
+    phase_captured: BoolArray
+    stem_hits: npt.NDArray[np.int64]
+    n_particles: int
+    n_undecided: int
+    n_undefined: int
+    n_collisions: int
+    n_careful: int
+    seconds: float
+    sha256: str
+
+    @property
+    def n(self) -> int:
+        """Return how many were followed to the end."""
+        return len(self.s)
+
+    @property
+    def is_whole(self) -> bool:
+        """Tell whether the unfollowed share is too small to matter."""
+        return self.n > (1 - MAX_LOST) * self.n_particles
+
+    @property
+    def gain(self) -> FloatArray:
+        """Return log E1 / E0 of the first cycle."""
+        return self.s[:, 0]
+
+    @property
+    def captured(self) -> BoolArray:
+        """Return who was captured in the first cycle."""
+        found: BoolArray = ~np.isnan(self.t_in[:, 0])
+        return found
+
+    @property
+    def speed(self) -> float:
+        """Return the initial speed."""
+        return float(np.sqrt(2 * self.run.energy))
+
+
+def draw(
+    simulate: Simulate,
+    run: Run,
+    *,
+    size: Size,
+    seed: int,
+    threads: int | None = None,
+    folder: Path | None = None,
+    resume: bool = False,
+    progress: Progress | None = None,
+) -> Sample:
+    """Follow a run's particles, or take up what was saved of them.
+
+    Args:
+        simulate: `fast.simulate`, or another with its signature.
+        run: what to simulate.
+        size: quick or full.
+        seed: the audit's.
+        threads: for the stepper; all by default.
+        folder: where blocks are saved; None to keep none.
+        resume: whether blocks saved earlier may be used.
+        progress: told of every block.
+    """
+    total = run.n_particles(size)
+    blocks = []
+    for number, first in enumerate(range(0, total, run.block)):
+        n = min(run.block, total - first)
+        path = folder / f"{run.name}-{number:03}.npz" if folder else None
+        key = _key(run, n, block_seed(seed, run, number))
+        block = _load(path, key) if path and resume else None
+        if block is None:
+            block = _follow(simulate, run, n, block_seed(seed, run, number), threads)
+            if path:
+                _save(path, key, block)
+        blocks.append(block)
+        if progress:
+            progress(run.name, first + n, total)
+    return gathered(run, blocks)
+
+
+def _key(run: Run, n: int, seed: int) -> str:
+    scene = scenes.to_data(scene_of(run))
+    return json.dumps([scene, run.energy, n, run.n_cycles, run.phases, seed])
+
+
+def _follow(simulate: Simulate, run: Run, n: int, seed: int, threads: int | None) -> Arrays:
+    ensemble = simulate(
+        scene_of(run),
+        n_particles=n,
+        energy=run.energy,
+        n_cycles=run.n_cycles,
+        seed=seed,
+        threads=threads,
+        phases=run.phases,
+    )
+    return reduced(ensemble)
+
+
+def reduced(ensemble: Ensemble) -> Arrays:
+    """Return what the audit keeps of an ensemble, particles not followed left out."""
+    energies = ensemble.cycle_energies
+    followed = (ensemble.outcome == 0) & np.all(np.isfinite(energies) & (energies > 0), axis=1)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        s, phase_s = np.log(energies / ensemble.energy0), np.log(ensemble.phase_energies / ensemble.energy0)
+    counts = [
+        len(followed),
+        np.sum(ensemble.outcome == 1),
+        np.sum(ensemble.outcome == 2),
+        np.sum(ensemble.n_collisions),
+        np.sum(ensemble.n_careful),
+    ]
+    return {
+        "s": s[followed],
+        "t_in": ensemble.t_in[followed],
+        "t_out": ensemble.t_out[followed],
+        "phase_s": phase_s[followed],
+        "phase_captured": ensemble.phase_captured[followed],
+        "stem_hits": ensemble.wall_counts[followed, 2:].sum(axis=1),
+        "counts": np.array(counts, dtype=np.int64),
+        "seconds": np.array(ensemble.seconds * ensemble.threads),
+        "sha256": np.array(ensemble.sha256()),
+    }
+
+
+def gathered(run: Run, blocks: list[Arrays]) -> Sample:
+    """Join blocks into a sample."""
+
+    def joined(name: str) -> Any:
+        return np.concatenate([block[name] for block in blocks])
+
+    counts = sum((block["counts"] for block in blocks), np.zeros(5, np.int64))
+    digest = hashlib.sha256("".join(str(block["sha256"]) for block in blocks).encode()).hexdigest()
+    return Sample(
+        run,
+        joined("s"),
+        joined("t_in"),
+        joined("t_out"),
+        joined("phase_s"),
+        joined("phase_captured"),
+        joined("stem_hits"),
+        n_particles=int(counts[0]),
+        n_undecided=int(counts[1]),
+        n_undefined=int(counts[2]),
+        n_collisions=int(counts[3]),
+        n_careful=int(counts[4]),
+        seconds=sum(float(block["seconds"]) for block in blocks),
+        sha256=digest,
+    )
+
+
+def _save(path: Path, key: str, block: Arrays) -> None:
+    part = path.with_suffix(".part")
+    with part.open("wb") as file:
+        np.savez_compressed(file, key=np.array(key), **block)  # type: ignore[arg-type]
+    part.replace(path)
+
+
+def _load(path: Path, key: str) -> Arrays | None:
+    """Return a saved block; None when there is none, it is broken or was made from something else."""
+    try:
+        with path.open("rb") as file, np.load(file, allow_pickle=False) as saved:
+            if str(saved["key"]) != key:
+                return None
+            return {name: saved[name] for name in saved.files if name != "key"}
+    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
+        return None

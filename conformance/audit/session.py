@@ -1,0 +1,192 @@
+"""One audit: simulate what the entries need, examine each, keep what is finished.
+
+Entries that need no simulation are examined in another process meanwhile. In the results' folder every
+block of particles and every finding is saved when it is done; with `resume` those made with the same
+settings are not made again.
+"""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Future, ProcessPoolExecutor
+from contextlib import contextmanager
+from functools import cache
+from multiprocessing import get_context
+from pathlib import Path
+from typing import NamedTuple
+
+import theory
+from conformance.audit import ledger
+from conformance.audit.evidence import Evidence, Predict, Steppers
+from conformance.audit.finding import Entry, Finding, from_data, to_data, verdict_of
+from conformance.audit.runs import RUNS, Size, check_seed
+from conformance.audit.samples import Progress, Sample, draw
+
+
+class Settings(NamedTuple):
+    """What an audit is asked for.
+
+    Attributes:
+        size: quick or full.
+        seed: of all random numbers.
+        threads: for the stepper; None for all cores.
+        folder: for blocks and findings; None to keep none.
+        resume: whether what the folder holds may be used.
+        apart: whether entries without simulations are examined in another process.
+    """
+
+    size: Size = "quick"
+    seed: int = 0
+    threads: int | None = None
+    folder: Path | None = None
+    resume: bool = False
+    apart: bool = False
+
+
+class Result(NamedTuple):
+    """What an audit found.
+
+    Attributes:
+        settings: as asked.
+        entries: examined, in the ledger's order.
+        findings: one per entry.
+        samples: by run.
+        seconds: wall time [s].
+    """
+
+    settings: Settings
+    entries: tuple[Entry, ...]
+    findings: list[Finding]
+    samples: dict[str, Sample]
+    seconds: float
+
+    @property
+    def is_passed(self) -> bool:
+        """Tell whether every entry has its expected verdict."""
+        pairs = zip(self.entries, self.findings, strict=True)
+        return all(finding.verdict == entry.expected for entry, finding in pairs)
+
+    @property
+    def n_tests(self) -> int:
+        """Return how many comparisons with random data were made."""
+        return sum(check.n_tests for finding in self.findings for check in finding.checks)
+
+
+def conduct(
+    steppers: Steppers,
+    settings: Settings,
+    *,
+    entries: Sequence[Entry] | None = None,
+    predict: Predict = theory.predict,
+    progress: Progress | None = None,
+    examined: Callable[[Finding], None] | None = None,
+) -> Result:
+    """Conduct an audit.
+
+    Args:
+        steppers: what to simulate with.
+        settings: size, seed, threads, folder.
+        entries: of the ledger, all by default.
+        predict: theory, or a wrong one that must be found out.
+        progress: told of every block of particles.
+        examined: told of every finding.
+
+    Raises:
+        BadInput: a setting out of bounds.
+    """
+    entries = ledger.entries() if entries is None else entries
+    check_seed(settings.seed)
+    begin = time.perf_counter()
+    folder = settings.folder
+    if folder:
+        folder.mkdir(parents=True, exist_ok=True)
+    found = {e.id: f for e in entries if (f := _load(e, settings)) is not None}
+    predict = cache(predict)
+    samples: dict[str, Sample] = {}
+    with _elsewhere(settings, [e for e in entries if not e.runs and e.id not in found]) as pending:
+        for name in dict.fromkeys(run for entry in entries for run in entry.runs):
+            if RUNS[name].n_particles(settings.size):
+                samples[name] = draw(
+                    steppers.simulate,
+                    RUNS[name],
+                    size=settings.size,
+                    seed=settings.seed,
+                    threads=settings.threads,
+                    folder=folder,
+                    resume=settings.resume,
+                    progress=progress,
+                )
+        for entry in entries:
+            if entry.id in found:
+                pass
+            elif entry.id in pending:
+                found[entry.id] = pending[entry.id].result()
+            else:
+                found[entry.id] = examine(entry, samples, steppers, settings, predict)
+            _save(found[entry.id], settings)
+            if examined:
+                examined(found[entry.id])
+    ordered = [found[entry.id] for entry in entries]
+    return Result(settings, tuple(entries), ordered, samples, time.perf_counter() - begin)
+
+
+def examine(
+    entry: Entry, samples: dict[str, Sample], steppers: Steppers, settings: Settings, predict: Predict
+) -> Finding:
+    """Make an entry's checks; with particles lost it cannot be better than open."""
+    begin = time.perf_counter()
+    evidence = Evidence(
+        samples, steppers, size=settings.size, seed=settings.seed, threads=settings.threads, predict=predict
+    )
+    checks = entry.examine(evidence)
+    verdict = verdict_of(entry, checks)
+    if verdict != "refuted" and not all(samples[run].is_whole for run in entry.runs if run in samples):
+        verdict = "indeterminate"
+    return Finding(entry.id, verdict, checks, time.perf_counter() - begin)
+
+
+def _examine_apart(entry_id: str, settings: Settings) -> Finding:
+    import fast
+
+    entry = ledger.select(entry_id)[0]
+    return examine(entry, {}, Steppers(fast.simulate, fast.trajectory), settings, cache(theory.predict))
+
+
+@contextmanager
+def _elsewhere(settings: Settings, entries: list[Entry]) -> Iterator[dict[str, Future[Finding]]]:
+    if not (settings.apart and entries):
+        yield {}
+        return
+    pool = ProcessPoolExecutor(1, mp_context=get_context("spawn"))
+    try:
+        yield {entry.id: pool.submit(_examine_apart, entry.id, settings) for entry in entries}
+    finally:
+        pool.shutdown(cancel_futures=True)
+
+
+def _key(entry: Entry, settings: Settings) -> str:
+    runs = [(run, RUNS[run].n_particles(settings.size), RUNS[run].block) for run in entry.runs]
+    return json.dumps(
+        [entry.id, entry.statement, entry.method, entry.tolerance, settings.size, settings.seed, runs]
+    )
+
+
+def _load(entry: Entry, settings: Settings) -> Finding | None:
+    if not (settings.folder and settings.resume):
+        return None
+    try:
+        data = json.loads((settings.folder / f"{entry.id}.json").read_text("utf-8"))
+        return from_data(data["finding"]) if data["key"] == _key(entry, settings) else None
+    except (OSError, ValueError, KeyError, TypeError):
+        return None
+
+
+def _save(finding: Finding, settings: Settings) -> None:
+    if settings.folder:
+        entry = ledger.select(finding.id)[0]
+        path = settings.folder / f"{finding.id}.json"
+        part = path.with_suffix(".part")
+        part.write_text(json.dumps({"key": _key(entry, settings), "finding": to_data(finding)}), "utf-8")
+        part.replace(path)

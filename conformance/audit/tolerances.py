@@ -1,0 +1,189 @@
+"""Acceptance: how far a measured number may be from what is claimed, and how often chance breaks that.
+
+An audit makes fewer than MAX_TESTS comparisons with random data. Each is allowed to fail a true claim
+with probability LEVEL; so a whole audit raises a false alarm with probability below FAMILY_LEVEL
+(Bonferroni's bound: no independence is assumed). Errors are taken as normal, which means over thousands of
+particles are; shares of particles are judged by the same rule with at least a few dozen on either side.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import mpmath
+import numpy as np
+import numpy.typing as npt
+from scipy.stats import kstwo, norm
+
+from conformance.audit.finding import Check, Form
+
+FloatArray = npt.NDArray[np.float64]
+BoolArray = npt.NDArray[np.bool_]
+Cdf = Callable[[FloatArray], FloatArray]
+
+FAMILY_LEVEL = 1e-3
+MAX_TESTS = 250
+LEVEL = FAMILY_LEVEL / MAX_TESTS
+N_SIGMA = float(norm.isf(LEVEL / 2))  # 4.61
+
+
+class Mean(NamedTuple):
+    """A measured value with its standard error."""
+
+    value: float
+    error: float
+
+
+def mean(values: npt.ArrayLike) -> Mean:
+    """Return the mean and its standard error; nan for fewer than two values."""
+    x = np.asarray(values, dtype=np.float64)
+    if x.size < 2:
+        return Mean(np.nan, np.nan)
+    return Mean(float(x.mean()), float(x.std(ddof=1) / np.sqrt(x.size)))
+
+
+def share(flags: npt.ArrayLike) -> Mean:
+    """Return the share of true flags and its standard error, which is never 0 (Agresti and Coull 1998)."""
+    x = np.asarray(flags, dtype=bool)
+    if not x.size:
+        return Mean(np.nan, np.nan)
+    p = (x.sum() + 2) / (x.size + 4)
+    return Mean(float(x.mean()), float(np.sqrt(p * (1 - p) / (x.size + 4))))
+
+
+def spread(values: npt.ArrayLike) -> Mean:
+    """Return the standard deviation and its standard error, from the fourth moment."""
+    x = np.asarray(values, dtype=np.float64)
+    if x.size < 4:
+        return Mean(np.nan, np.nan)
+    centred = x - x.mean()
+    variance = float(np.mean(centred**2))
+    fourth = float(np.mean(centred**4)) - variance**2
+    return Mean(float(x.std(ddof=1)), float(np.sqrt(max(fourth, 0.0) / x.size / max(4 * variance, 1e-300))))
+
+
+def close(
+    what: str,
+    found: tuple[float, float],
+    expected: Any,
+    *,
+    band: float = 0.0,
+    scale: float = np.inf,
+    form: Form = "claim",
+    note: str = "",
+) -> Check:
+    """Compare a measured value with an expected one.
+
+    Args:
+        what: what is compared.
+        found: value and standard error.
+        expected: an mpf or a float.
+        band: how far off finite energy may put it.
+        scale: size that must be resolved: with a wider reach the check tells nothing.
+        form: of the check.
+        note: what else is worth knowing.
+    """
+    value, error = found
+    reach = N_SIGMA * error + band
+    holds = bool(abs(value - float(expected)) <= reach)  # never with nan
+    is_coarse = holds and reach >= scale
+    return Check(
+        what,
+        None if is_coarse else holds,
+        mpmath.nstr(mpmath.mpf(expected), 10),
+        value,
+        error,
+        band,
+        form,
+        1,
+        note,
+    )
+
+
+def above(
+    what: str,
+    found: tuple[float, float],
+    bound: float,
+    *,
+    band: float = 0.0,
+    form: Form = "claim",
+    note: str = "",
+) -> Check:
+    """Check that a measured value exceeds a bound beyond error and band; within them it is undecided."""
+    value, error = found
+    reach = N_SIGMA * error + band
+    holds = None if abs(value - bound) <= reach else bool(value > bound)
+    return Check(what, holds, f"> {bound:.6g}", value, error, band, form, 1, note)
+
+
+def exact(
+    what: str, value: Any, expected: Any, size: float, *, form: Form = "claim", note: str = ""
+) -> Check:
+    """Compare two computed numbers within `size`, the rounding of the computation."""
+    holds = bool(abs(value - expected) <= size)
+    return Check(what, holds, mpmath.nstr(mpmath.mpf(expected), 12), float(value), None, size, form, 0, note)
+
+
+def stated(what: str, holds: bool, found: str, expected: str, *, form: Form = "claim") -> Check:
+    """Record a statement decided without chance."""
+    return Check(what, bool(holds), expected, form=form, note=found)
+
+
+def largest_gap(values: FloatArray, cdf: Cdf) -> float:
+    """Return Kolmogorov's distance of a sample from a distribution function."""
+    x = np.sort(values)
+    n = len(x)
+    below = cdf(x)
+    rank = np.arange(n + 1) / n
+    return float(max(np.max(rank[1:] - below), np.max(below - rank[:-1])))
+
+
+def critical_gap(n: int) -> float:
+    """Return the distance that n values of the right distribution exceed with probability LEVEL."""
+    return float(kstwo.isf(LEVEL, n))
+
+
+def fits(
+    what: str,
+    values: FloatArray,
+    cdfs: list[Cdf],
+    *,
+    band: float = 0.0,
+    scale: float = 0.5,
+    form: Form = "claim",
+    note: str = "",
+) -> Check:
+    """Test a whole distribution by Kolmogorov's distance (one sample, two sides).
+
+    With several distribution functions the nearest counts: finite energy leaves a width open, and a
+    true law among them is rejected no oftener than alone.
+
+    Args:
+        what: what is tested.
+        values: the sample.
+        cdfs: the laws admitted.
+        band: distance that finite energy may add.
+        scale: distance that must be seen: with a wider reach the check tells nothing.
+        form: of the check.
+        note: what else is worth knowing.
+    """
+    n = len(values)
+    if n < 2:
+        return Check(what, None, "a sample", form=form, n_tests=1, note="no particles")
+    gaps = [largest_gap(values, cdf) for cdf in cdfs]
+    gap, reach = min(gaps), critical_gap(n) + band
+    holds = None if reach >= scale else bool(gap <= reach)
+    p = float(kstwo.sf(max(gap - band, 0.0), n))
+    more = f"; {note}" if note else ""
+    return Check(
+        what,
+        holds,
+        f"<= {reach:.4g}",
+        gap,
+        None,
+        band,
+        form,
+        1,
+        f"Kolmogorov's distance, n = {n}, p = {p:.2g}{more}",
+    )

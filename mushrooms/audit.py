@@ -1,0 +1,96 @@
+"""`mushrooms audit`: conducts the audit with the fast stepper and writes its report."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Annotated, BinaryIO
+
+import typer
+from rich import progress
+from rich.console import Console
+
+from mushrooms import output
+from scene.refusal import BadInput
+
+
+def audit(
+    out: Annotated[Path, typer.Option(metavar="DIR", help="Folder for the report.")] = Path("audit-report"),
+    full: Annotated[
+        bool, typer.Option("--full", help="The paper's sizes; half an hour on two cores.")
+    ] = False,
+    only: Annotated[str, typer.Option(metavar="IDS", help="Claims to check, with commas: X2,L4.")] = "",
+    seed: Annotated[int, typer.Option(help="Seed of the random starts, 0 to 2^64 - 1.")] = 0,
+    threads: Annotated[int | None, typer.Option(help="Threads; all cores by default.")] = None,
+    resume: Annotated[bool, typer.Option("--resume", help="Go on with what DIR/parts holds.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
+) -> None:
+    """Check the paper's claims; writes report.html, report.json and report.txt.
+
+    Finished parts are kept in DIR/parts, for --resume after an interruption or with other --only.
+    Exit code 0 when every claim has its expected verdict, 1 when one has not, 2 on bad input.
+    """
+    import fast
+    from conformance.audit import ledger
+    from conformance.audit.evidence import Steppers
+    from conformance.audit.runs import check_seed
+    from conformance.audit.session import Settings, conduct
+    from mushrooms import report
+
+    entries = ledger.select(only)
+    check_seed(seed)
+    if threads is not None and threads < 1:
+        raise BadInput(f"--threads = {threads}, must be >= 1")
+    with output.writable_folder(out) as folder:
+        settings = Settings("full" if full else "quick", seed, threads, folder / "parts", resume, apart=True)
+        with _progress() as bar:
+            result = conduct(
+                Steppers(fast.simulate, fast.trajectory), settings, entries=entries, progress=_advance(bar)
+            )
+        data = report.to_data(result)
+        texts = {
+            "report.json": report.to_json(data),
+            "report.html": report.to_html(data, result.samples),
+            "report.txt": report.to_text(data),
+        }
+        output.write_files(folder, {name: _writer(text) for name, text in texts.items()})
+    if as_json:
+        print(texts["report.json"], end="")
+    else:
+        print(texts["report.txt"], end="")
+        print(f"Report: {folder / 'report.html'}")
+    raise typer.Exit(0 if result.is_passed else 1)
+
+
+def _writer(text: str) -> output.Writer:
+    def write(file: BinaryIO) -> None:
+        file.write(text.encode("utf-8"))
+
+    return write
+
+
+def _progress() -> progress.Progress:
+    console = Console(stderr=True)
+    return progress.Progress(
+        progress.TextColumn("{task.description}"),
+        progress.BarColumn(),
+        progress.MofNCompleteColumn(),
+        progress.TimeRemainingColumn(),
+        console=console,
+        disable=not console.is_terminal,
+        transient=True,
+    )
+
+
+def _advance(bar: progress.Progress) -> Callable[[str, int, int], None]:
+    tasks: dict[str, progress.TaskID] = {}
+
+    def advance(run: str, n_done: int, n_total: int) -> None:
+        if run not in tasks:
+            tasks[run] = bar.add_task(run, total=n_total)
+        bar.update(tasks[run], completed=n_done)
+        if n_done == n_total and bar.disable:
+            print(f"{run}: {n_done:,} particles", file=sys.stderr)
+
+    return advance

@@ -1,0 +1,201 @@
+"""`mushrooms audit`: a report that is complete, stands alone, and goes on where it was broken off."""
+
+from __future__ import annotations
+
+import base64
+import json
+import re
+from html.parser import HTMLParser
+from pathlib import Path
+from types import SimpleNamespace
+
+import adiabatic_particles
+import jsonschema
+import pytest
+
+import fast
+from conformance.audit import ledger, session
+from conformance.audit.evidence import Steppers
+from conformance.audit.finding import Check, Finding
+from conformance.audit.session import Result, Settings
+from mushrooms import report
+from mushrooms.main import run
+
+SCHEMA = Path(__file__).parent.parent / "docs" / "report.schema.json"
+CHEAP = "M3,M10,X5,N6"
+
+
+@pytest.fixture
+def call(capsys, monkeypatch):
+    monkeypatch.setattr(fast, "simulate", adiabatic_particles.simulate)
+
+    def run_command(*arguments):
+        with pytest.raises(SystemExit) as stop:
+            run(["audit", *(str(argument) for argument in arguments)])
+        captured = capsys.readouterr()
+        return SimpleNamespace(code=stop.value.code, out=captured.out, err=captured.err)
+
+    return run_command
+
+
+@pytest.fixture(scope="module")
+def everything():
+    """A result that has every entry of the ledger, and the samples of all figures."""
+    entries = ledger.entries()
+    samples = {}
+    for name, each in session.RUNS.items():
+        if each.quick:
+            small = each._replace(quick=min(each.quick, 2000), block=2000)
+            samples[name] = session.draw(adiabatic_particles.simulate, small, size="quick", seed=1)
+    checks = [
+        Check("as it is", True, "0.5", 0.51, 0.01, 0.002, "claim", 1, "a note"),
+        Check("as printed", False, "> 0", form="printed", note="fails"),
+        Check("unclear", None, "<= 0.1", 0.2, None, 0.01, "corrected", 1, "n = 5 <b>&"),
+        Check("not a number", False, "1", float("nan"), float("nan"), 0.0, "claim", 1),
+    ]
+    findings = [Finding(entry.id, entry.expected, checks, 0.1) for entry in entries]
+    return Result(Settings(), entries, findings, samples, 12.3)
+
+
+def test_every_id_is_in_the_report_with_verdict_values_and_errors(everything):
+    data = report.to_data(everything)
+    wanted = [f"M{k}" for k in range(1, 14)] + [f"X{k}" for k in range(1, 9)] + [f"L{k}" for k in range(1, 8)]
+    ids = [finding["id"] for finding in data["findings"]]
+    assert set(wanted) <= set(ids)
+    assert len(ids) == len(set(ids))
+    for finding in data["findings"]:
+        assert finding["verdict"]
+        assert finding["checks"][0]["value"] == 0.51
+        assert finding["checks"][0]["error"] == 0.01
+        assert all(finding[field] for field in ("where", "statement", "method", "tolerance", "expected"))
+
+
+def test_the_report_meets_its_published_schema(everything):
+    schema = json.loads(SCHEMA.read_text("utf-8"))
+    assert schema == report.schema(), "python -m mushrooms.report > docs/report.schema.json"
+    data = json.loads(report.to_json(report.to_data(everything)))
+    jsonschema.validate(data, schema)
+    del data["findings"][0]["verdict"]
+    with pytest.raises(jsonschema.ValidationError, match="verdict"):
+        jsonschema.validate(data, schema)
+
+
+class Links(HTMLParser):
+    def __init__(self):
+        super().__init__()
+        self.sources, self.tags = [], []
+
+    def handle_starttag(self, tag, attributes):
+        self.tags.append(tag)
+        self.sources += [value for name, value in attributes if name in ("src", "href", "srcset", "data")]
+
+
+def test_the_page_loads_nothing_from_elsewhere_and_shows_every_figure(everything):
+    page = report.to_html(report.to_data(everything), everything.samples)
+    links = Links()
+    links.feed(page)
+    pictures = [source for source in links.sources if not source.startswith("#")]
+    assert len(pictures) == len(report.pictures.ALL)
+    assert not {"script", "link", "iframe", "object"} & set(links.tags)
+    assert "http" not in page.replace("data:image/svg+xml", "")
+    assert "n = 5 &lt;b&gt;&amp;" in page
+    for source in pictures:
+        assert source.startswith("data:image/svg+xml;base64,")
+        picture = base64.b64decode(source.partition(",")[2]).decode("utf-8")
+        targets = re.findall(r'href="([^"]*)"', picture)
+        assert all(target.startswith(("#", "data:")) for target in targets)
+    for entry in everything.entries:
+        assert f'id="{entry.id}"' in page
+
+
+def test_the_summary_tells_what_is_not_as_expected(everything):
+    findings = [*everything.findings[:-1], everything.findings[-1]._replace(verdict="refuted")]
+    text = report.to_text(report.to_data(everything._replace(findings=findings)))
+    assert "! N6  refuted" in text
+    assert "expected: confirmed" in text
+    assert "corrected: unclear" in text
+    assert f"{len(findings) - 1} of {len(findings)} claims" in text
+
+
+def test_a_few_claims_are_checked_and_reported(call, tmp_path):
+    done = call("--only", CHEAP, "--out", tmp_path / "a", "--json")
+    assert done.code == 0
+    data = json.loads(done.out)
+    assert [finding["id"] for finding in data["findings"]] == CHEAP.split(",")
+    assert {entry["name"] for entry in data["runs"]} == {"ergodic@1e6", "ergodic@1e7"}
+    names = sorted(entry.name for entry in (tmp_path / "a").iterdir())
+    assert names == ["parts", "report.html", "report.json", "report.txt"]
+    assert (tmp_path / "a" / "report.json").read_text("utf-8") == done.out
+
+
+def test_a_failed_claim_exits_with_1(call, tmp_path, monkeypatch):
+    def warmed(scene, **options):
+        done = adiabatic_particles.simulate(scene, **options)
+        return done._replace(cycle_energies=done.cycle_energies * 1.01)
+
+    monkeypatch.setattr(fast, "simulate", warmed)
+    done = call("--only", "X5", "--out", tmp_path)
+    assert done.code == 1
+    assert "! X5  refuted" in done.out
+    assert "(expected: confirmed)" in (tmp_path / "report.html").read_text("utf-8")
+
+
+def test_a_broken_off_audit_goes_on(call, tmp_path, monkeypatch):
+    blocks = []
+
+    def counted(scene, **options):
+        blocks.append(options["seed"])
+        if len(blocks) == 3:
+            raise KeyboardInterrupt
+        return adiabatic_particles.simulate(scene, **options)
+
+    monkeypatch.setattr(fast, "simulate", counted)
+    assert call("--only", "X5", "--out", tmp_path).code == 130
+    assert call("--only", "X5", "--out", tmp_path, "--resume").code == 0
+    assert len(blocks) == len(set(blocks)) + 1 == 5
+    fresh = json.loads((tmp_path / "report.json").read_text("utf-8"))
+    assert call("--only", "X5", "--out", tmp_path, "--resume").code == 0
+    assert len(blocks) == 5
+    again = json.loads((tmp_path / "report.json").read_text("utf-8"))
+    assert again["runs"] == fresh["runs"]
+    assert again["findings"] == fresh["findings"]
+
+
+def test_other_settings_or_broken_files_are_not_taken_up(call, tmp_path, monkeypatch):
+    blocks = []
+
+    def counted(scene, **options):
+        blocks.append(options["seed"])
+        return adiabatic_particles.simulate(scene, **options)
+
+    monkeypatch.setattr(fast, "simulate", counted)
+    call("--only", "X5", "--out", tmp_path)
+    call("--only", "X5", "--out", tmp_path, "--resume", "--seed", 1)
+    assert len(set(blocks)) == len(blocks) == 8
+    for path in (tmp_path / "parts").iterdir():
+        path.write_bytes(path.read_bytes()[:100])
+    assert call("--only", "X5", "--out", tmp_path, "--resume", "--seed", 1).code == 0
+    assert len(blocks) == 12
+
+
+def test_without_resume_everything_is_made_again(call, tmp_path, monkeypatch):
+    blocks = []
+
+    def counted(scene, **options):
+        blocks.append(options["seed"])
+        return adiabatic_particles.simulate(scene, **options)
+
+    monkeypatch.setattr(fast, "simulate", counted)
+    call("--only", "X5", "--out", tmp_path)
+    call("--only", "X5", "--out", tmp_path)
+    assert len(blocks) == 8
+    assert blocks[:4] == blocks[4:]
+
+
+def test_entries_without_simulations_may_be_examined_apart(tmp_path):
+    result = session.conduct(
+        Steppers(adiabatic_particles.simulate, fast.trajectory),
+        Settings(folder=tmp_path, apart=True),
+        entries=ledger.select("M3,M10"),
+    )
+    assert result.is_passed

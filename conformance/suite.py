@@ -8,6 +8,7 @@ session is the verdict of every case not reached; what the implementation does n
 
 from __future__ import annotations
 
+import itertools
 import math
 import time
 from collections import Counter
@@ -34,8 +35,9 @@ TIMED_SCENE, TIMED_STATE = (
     {"t": 0.0, "x": 0.1, "y": 0.2, "vx": 300.0, "vy": 400.0, "wall": None},
 )
 TIMED_REPEATS, TIMED_LEAST = 5, 20_000_000  # timings; nanoseconds that each must last to be read from a clock
+PROTOCOL_CASES = ("start", "echo", "rejects", "stop")
 OTHER_CASES = (
-    *(f"protocol/{name}" for name in ("start", "echo", "rejects", "stop")),
+    *(f"protocol/{name}" for name in PROTOCOL_CASES),
     *(f"property/{name}" for name in properties.PROPERTIES),
     *(f"profile/{name}" for name in ("work-identity", "one-cycle")),
 )
@@ -158,7 +160,7 @@ def check(
         groups: of vectors; all when empty.
         limits: time and restarts.
         known: ids of the cases that are known to fail.
-        progress: called with the number of vectors done and their total.
+        progress: called with the number of cases done and their total, as far as it is known.
 
     Raises:
         BadInput: for a command that cannot be started, an unknown level or group, a broken corpus.
@@ -236,11 +238,12 @@ def _converse(
             return [*results, *(_result(vector, unreached) for vector in chosen)], None
         results.append(Result(f"protocol/{name}", "protocol", "pass", seconds=time.monotonic() - begin))
     results.append(_ask_nonsense(session))
-    for n_done, vector in enumerate(chosen):
-        progress(n_done, len(chosen))
-        results.append(ask_vector(session, vector))
-    progress(len(chosen), len(chosen))
-    results += _ask_further(session, chosen)
+    total = len(results) + len(chosen) + len(OTHER_CASES) - len(PROTOCOL_CASES)
+    for result in itertools.chain(
+        (ask_vector(session, vector) for vector in chosen), _ask_further(session, chosen)
+    ):
+        results.append(result)
+        progress(len(results), total)
     speed = measure_speed(session)
     begin = time.monotonic()
     try:

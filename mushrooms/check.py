@@ -114,6 +114,9 @@ def show(run: Run) -> None:
         console.print(
             f"Speed on {run.speed.scene}: {best}, best of {run.speed.repeats} x {run.speed.collisions}."
         )
+    for result in run.results:
+        if result.group == "profile" and result.verdict == "pass":
+            console.print(f"{result.id}: {result.why}.")
     objections = run.objections()
     for line in objections[:MAX_SHOWN]:
         console.print(f"[red]{escape(line)}[/]")
@@ -155,5 +158,5 @@ def _progress(console: Console) -> progress.Progress:
 
 
 def _advance(bar: progress.Progress) -> Callable[[int, int], None]:
-    task = bar.add_task("vectors", total=None)
+    task = bar.add_task("cases", total=None)
     return lambda n_done, n_total: bar.update(task, completed=n_done, total=n_total)

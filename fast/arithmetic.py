@@ -63,6 +63,30 @@ def two_product(a, b):
 
 
 @njit(error_model="numpy")
+def multiplied(a, a_low, b, b_low):
+    """Return (a + a_low) (b + b_low) as a sum of two floats."""
+    p, e = two_product(a, b)
+    return two_sum(p, e + (a * b_low + a_low * b))
+
+
+@njit(error_model="numpy")
+def products(a, a_low, b, b_low, c, c_low, d, d_low):
+    """Return (a + a_low) (b + b_low) + (c + c_low) (d + d_low) as a sum of two floats."""
+    p, e = two_product(a, b)
+    q, f = two_product(c, d)
+    s, low = two_sum(p, q)
+    return s, low + (e + f + (fma(a, b_low, a_low * b) + fma(c, d_low, c_low * d)))
+
+
+@njit(error_model="numpy")
+def quotient(a, a_low, b, b_low):
+    """Return (a + a_low) / (b + b_low) as a sum of two floats."""
+    inverse = 1.0 / b
+    q = a * inverse
+    return q, (fma(-q, b, a) + (a_low - q * b_low)) * inverse
+
+
+@njit(error_model="numpy")
 def dot(a, b, c, d):
     """Return a b + c d, right to a unit in the last place or so even where the two cancel."""
     p = c * d
@@ -102,13 +126,6 @@ def beyond_first_order(r):
     c = fma(c, z, -1.0 / 720.0)
     c = fma(c, z, 1.0 / 24.0)
     return r * z * s, fma(z * z, c, -0.5 * z)
-
-
-@njit(error_model="numpy")
-def multiplied(a, a_low, b, b_low):
-    """Return (a + a_low) (b + b_low) as a sum of two floats."""
-    p, e = two_product(a, b)
-    return two_sum(p, e + (a * b_low + a_low * b))
 
 
 @njit(error_model="numpy")

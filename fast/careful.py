@@ -17,7 +17,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from fast.arithmetic import SAFETY, dot, fma, two_product, two_sum
+from fast.arithmetic import SAFETY, fma, two_product, two_sum
 
 from fast.codes import (  # isort: skip
     APPROACHING, ARC, AT_END, BASE, CAP, CORNER, EDGE, FAR_TIME, FLOOR, H, HORIZON, LEFT, M, MOUTH_EDGE,
@@ -26,7 +26,8 @@ from fast.codes import (  # isort: skip
 from fast.motion import LOW, set_anchors
 
 from fast.walls import (  # isort: skip
-    curvature_bounds, is_outside, reach_time, side_of_mouth, wall_function, wall_residual, wall_slope,
+    curvature_bounds, is_outside, off_the_arc, reach_time, side_of_mouth, wall_function, wall_residual,
+    wall_slope,
 )  # fmt: skip
 
 MAX_PARABOLAS = 1_000_000
@@ -274,10 +275,7 @@ def bounce(wall, x, x_low, y, y_low, vx, vy, anchors, is_relative):
     if wall == BASE:
         return vx, -vy
     if wall == ARC:
-        # The place's rounding would turn the normal: its low part is worth its lines.
-        slope = wall_slope(ARC, x, y, vx, vy, anchors, is_relative) - 2.0 * (x_low * vx + y_low * vy)
-        push = slope / (dot(x, x, y, y) + 2.0 * (x_low * x + y_low * y))
-        return vx + fma(push, x, push * x_low), vy + fma(push, y, push * y_low)
+        return off_the_arc(x, x_low, y, y_low, vx, vy, anchors[R, 0], anchors[R, 1])
     if wall == FLOOR:
         return vx, -vy - 2.0 * anchors[H, 1]
     m = anchors[M, 0]

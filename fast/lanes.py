@@ -28,8 +28,9 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from fast.arithmetic import SAFETY, dot, fma, two_sum
+from fast.arithmetic import SAFETY, dot, fma, two_product, two_sum
 from fast.codes import ARC, BASE, FLOOR, LEFT, RIGHT
+from fast.walls import off_the_arc, off_the_arc_spinning
 
 LANES = 64  # all rows of a pool stay in the first-level cache
 LONGEST_TURN = 0.25  # omega u up to which the series are used
@@ -44,13 +45,13 @@ NEVER = np.inf
     N_REF, N_REF_LOW, N_REF1, N_REF2,  # w or nu
     H_REF, H_REF_LOW, H_REF1, H_REF2,  # depth
     S, HIT, SURE, OK, CALM,  # the step: time, wall, mouth; whether it is right; whether nothing else is to do
-    NEXT_T, NEXT_T_LOW, NEXT_X, NEXT_Y, NEXT_VX, NEXT_VY, DONE,  # state after it; DONE: has bounced
+    NEXT_T, NEXT_T_LOW, NEXT_X, NEXT_X_LOW, NEXT_Y, NEXT_Y_LOW, NEXT_VX, NEXT_VY, DONE,  # state after it
     NEXT_R0, NEXT_R1, NEXT_R2, NEXT_W0, NEXT_W1, NEXT_W2, NEXT_H0, NEXT_H1, NEXT_H2,
     STOP, SINCE, UNTIL,  # next time to look at the particle; which captured stay is kept
     STAY_IN, STAY_OUT, CLOSED, SPIN,  # the captured stay, its end once it is over, angular momentum
     N_ARC, N_BASE, N_LEFT, N_RIGHT, N_FLOOR,  # collisions so far
-) = LANES * np.arange(64)  # fmt: skip
-N_ROWS = 64
+) = LANES * np.arange(66)  # fmt: skip
+N_ROWS = 66
 # Codes of walls as they stand in a row, and of OK.
 ON_ARC, ON_BASE, ON_LEFT, ON_RIGHT, ON_FLOOR = map(float, (ARC, BASE, LEFT, RIGHT, FLOOR))
 WRONG, COARSE, RIGHT_ONE = 0.0, 1.0, 2.0
@@ -72,6 +73,21 @@ def turns(omega, s):
     b = fma(b, u, -1.0 / 24.0)
     b = fma(b, u, 0.5)
     return fma(s * u, a, s), s * s * b, fma(-u, b, 1.0)
+
+
+@njit(error_model="numpy")
+def moved(x, v, s):
+    """Return x + v s as a sum of two floats."""
+    p, e = two_product(v, s)
+    x_s, low = two_sum(x, p)
+    return x_s, low + e
+
+
+@njit(error_model="numpy")
+def short_sum(a, b):
+    """Return a + b for |b| far below |a|, or a = 0, as a rounded sum and its error."""
+    s = a + b
+    return s, b - (s - a)
 
 
 @njit(error_model="numpy")
@@ -169,12 +185,13 @@ def fly(a, n, is_stem, is_relative, omega, m, k_w):
         nu = w
         w = nu * r if is_relative else nu
         w_low = fma(nu, r, -w) if is_relative else 0.0
-        x_s, y_s = fma(vx, s, x), fma(vy, s, y)
+        x_s, x_low = moved(x, vx, s)
+        y_s, y_low = moved(y, vy, s)
         sign = 1.0 if hit == ON_RIGHT else -1.0
-        f = (w - sign * x_s) + fma(m, y_s, w_low)
+        f = (w - sign * x_s) + (fma(m, y_s, w_low) + fma(m, y_low, -sign * x_low))
         slope = fma(m, vy, w1) - sign * vx
         bend_s = w2
-        f = y_s + h if hit == ON_FLOOR else f
+        f = (y_s + h) + y_low if hit == ON_FLOOR else f
         slope = vy + h1 if hit == ON_FLOOR else slope
         bend_s = h2 if hit == ON_FLOOR else bend_s
         # The arc: its increments if it was left, else what is there.
@@ -183,11 +200,12 @@ def fly(a, n, is_stem, is_relative, omega, m, k_w):
         q = fma(x, vx, y * vy)
         v2 = fma(vx, vx, vy * vy)
         hop = dr * (2.0 * r0 + dr) - s * fma(s, v2, 2.0 * q)
-        f_arc = hop if wall == ON_ARC else fma(-x_s, x_s, (r - y_s) * (r + y_s))
+        f_arc = fma(-x_s, x_s, (r - y_s) * (r + y_s)) - 2.0 * fma(x_s, x_low, y_s * y_low)
+        f_arc = hop if wall == ON_ARC else f_arc
         f = f_arc if hit == ON_ARC else f
         slope = 2.0 * fma(r, r1, -fma(s, v2, q)) if hit == ON_ARC else slope
         bend_s = 2.0 * (fma(r1, r1, r * r2) - v2) if hit == ON_ARC else bend_s
-        f = y_s if hit == ON_BASE else f
+        f = y_s + y_low if hit == ON_BASE else f
         slope = vy if hit == ON_BASE else slope
         bend_s = 0.0 if hit == ON_BASE else bend_s
         inverse = 1.0 / slope
@@ -224,8 +242,10 @@ def fly(a, n, is_stem, is_relative, omega, m, k_w):
         a[OK + i] = result
         a[NEXT_T + i] = t
         a[NEXT_T_LOW + i] = low
-        a[NEXT_X + i] = fma(vx, delta, x_s)
-        a[NEXT_Y + i] = 0.0 if hit == ON_BASE else fma(vy, delta, y_s)
+        a[NEXT_X + i], a[NEXT_X_LOW + i] = short_sum(x_s, fma(vx, delta, x_low))
+        y_s, y_low = short_sum(y_s, fma(vy, delta, y_low))
+        a[NEXT_Y + i] = 0.0 if hit == ON_BASE else y_s
+        a[NEXT_Y_LOW + i] = y_low
         a[NEXT_R0 + i], a[NEXT_R1 + i], a[NEXT_R2 + i] = fma(r1, delta, r), fma(r2, delta, r1), r2
         a[NEXT_W0 + i], a[NEXT_W1 + i], a[NEXT_W2 + i] = fma(w1, delta, w), fma(w2, delta, w1), w2
         a[NEXT_H0 + i], a[NEXT_H1 + i], a[NEXT_H2 + i] = fma(h1, delta, h), fma(h2, delta, h1), h2
@@ -252,7 +272,9 @@ def bounce(a, n, m, is_mushroom):
     for i in range(n):
         x, y, vx, vy, hit = a[NEXT_X + i], a[NEXT_Y + i], a[VX + i], a[VY + i], a[HIT + i]
         w = a[NEXT_W0 + i]
-        push = 2.0 * fma(a[NEXT_R0 + i], a[NEXT_R1 + i], -dot(x, vx, y, vy)) / dot(x, x, y, y)
+        off_x, off_y = off_the_arc(
+            x, a[NEXT_X_LOW + i], y, a[NEXT_Y_LOW + i], vx, vy, a[NEXT_R0 + i], a[NEXT_R1 + i]
+        )
         sign = 1.0 if hit == ON_RIGHT else -1.0
         out, rate = sign * vx, a[NEXT_W1 + i]
         vx_s = sign * fma(tilt, out, inverse * fma(m, vy, rate))
@@ -261,8 +283,8 @@ def bounce(a, n, m, is_mushroom):
         vy_s = -vy - 2.0 * a[NEXT_H1 + i] if hit == ON_FLOOR else vy_s
         vx_s = vx if hit == ON_BASE else vx_s
         vy_s = -vy if hit == ON_BASE else vy_s
-        vx_s = fma(push, x, vx) if hit == ON_ARC else vx_s
-        vy_s = fma(push, y, vy) if hit == ON_ARC else vy_s
+        vx_s = off_x if hit == ON_ARC else vx_s
+        vy_s = off_y if hit == ON_ARC else vy_s
         vx_s = a[NEXT_VX + i] if a[DONE + i] > 0.0 else vx_s
         vy_s = a[NEXT_VY + i] if a[DONE + i] > 0.0 else vy_s
         spin = x * vy - y * vx
@@ -328,7 +350,8 @@ def chord(a, n, is_again, is_cap, is_relative, omega, bend, k_w):
         inverse = 1.0 / slope
         delta = -f * inverse
         error = 2.0**58 * abs((fma(r1, r1, r * r2) - v2) * inverse) * delta * delta
-        x_s, y_s = fma(vx, s, x), fma(vy, s, y)
+        x_s, x_low = moved(x, vx, s)
+        y_s, y_low = moved(y, vy, s)
         # The widest that the mouth can be during the flight, from both ends.
         reach = max(a[W0 + i], w) + k_w * s * s
         clear = spin * spin - (1.0 + 4.0 * SAFETY) * reach * reach * v2
@@ -344,8 +367,8 @@ def chord(a, n, is_again, is_cap, is_relative, omega, bend, k_w):
         a[OK + i] = result
         a[NEXT_T + i] = t
         a[NEXT_T_LOW + i] = low
-        a[NEXT_X + i] = fma(vx, delta, x_s)
-        a[NEXT_Y + i] = fma(vy, delta, y_s)
+        a[NEXT_X + i], a[NEXT_X_LOW + i] = short_sum(x_s, fma(vx, delta, x_low))
+        a[NEXT_Y + i], a[NEXT_Y_LOW + i] = short_sum(y_s, fma(vy, delta, y_low))
         a[NEXT_R0 + i], a[NEXT_R1 + i], a[NEXT_R2 + i] = fma(r1, delta, r), fma(r2, delta, r1), r2
         a[NEXT_W0 + i], a[NEXT_W1 + i] = fma(w1, delta, w), w1
         a[CALM + i] = result - COARSE if t < min(a[STOP + i], a[END + i]) else 0.0
@@ -356,11 +379,9 @@ def rebound(a, n):
     """Bounce off the arc with the angular momentum of the whole stay, constant to the bit; count."""
     for i in range(n):
         x, y, vx, vy, spin = a[NEXT_X + i], a[NEXT_Y + i], a[VX + i], a[VY + i], a[SPIN + i]
-        outward = fma(2.0 * a[NEXT_R0 + i], a[NEXT_R1 + i], -dot(x, vx, y, vy))
-        inverse = 1.0 / dot(x, x, y, y)
+        low_x, low_y, r, rate = a[NEXT_X_LOW + i], a[NEXT_Y_LOW + i], a[NEXT_R0 + i], a[NEXT_R1 + i]
+        vx_s, vy_s = off_the_arc_spinning(x, low_x, y, low_y, vx, vy, r, rate, spin)
         is_done = a[DONE + i]
-        vx_s = dot(outward, x, -spin, y) * inverse
-        vy_s = dot(outward, y, spin, x) * inverse
         a[VX + i] = a[NEXT_VX + i] if is_done > 0.0 else vx_s
         a[VY + i] = a[NEXT_VY + i] if is_done > 0.0 else vy_s
         # A chord that crosses y = 0 hits the base; what careful did was counted there.

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from fast.arithmetic import SAFETY, dot, fma, multiplied, two_product, two_sum
+from fast.arithmetic import SAFETY, dot, fma, multiplied, products, quotient, two_product, two_sum
 from fast.codes import ARC, BASE, CAP, FLOOR, LEFT, MUSHROOM, NO_WALL, RIGHT, STEM, H, M, R, W
 from fast.motion import LOW, increment, width
 
@@ -89,6 +89,36 @@ def wall_slope(wall, x, y, vx, vy, anchors, is_relative):
     if is_relative:
         w_rate = w_rate * anchors[R, 0] + anchors[W, 0] * anchors[R, 1]
     return w_rate + anchors[M, 1] * y + (anchors[M, 0] * vy - (vx if wall == RIGHT else -vx))
+
+
+@njit(error_model="numpy")
+def off_the_arc(x, x_low, y, y_low, vx, vy, r, rate):
+    """Return the velocity after a hit on the arc: v - 2 f' grad f / |grad f|^2 = v - 2 (v.n - r') n.
+
+    The place's low part matters: its rounding would turn the normal.
+    """
+    q, q_low = products(x, x_low, vx, 0.0, y, y_low, vy, 0.0)
+    rho2, rho2_low = products(x, x_low, x, x_low, y, y_low, y, y_low)
+    p, p_low = two_product(r, rate)
+    n, n_low = two_sum(p, -q)
+    push, low = quotient(2.0 * n, 2.0 * (n_low + (p_low - q_low)), rho2, rho2_low)
+    x_push, y_push = fma(push, x_low, low * x), fma(push, y_low, low * y)
+    return fma(push, x, vx) + x_push, fma(push, y, vy) + y_push
+
+
+@njit(error_model="numpy")
+def off_the_arc_spinning(x, x_low, y, y_low, vx, vy, r, rate, spin):
+    """Return the same for a particle whose angular momentum is known to be `spin`."""
+    q, q_low = products(x, x_low, vx, 0.0, y, y_low, vy, 0.0)
+    rho2, rho2_low = products(x, x_low, x, x_low, y, y_low, y, y_low)
+    p, p_low = two_product(2.0 * r, rate)
+    out, low = two_sum(p, -q)
+    low += p_low - q_low
+    a, a_low = products(out, low, x, x_low, -spin, 0.0, y, y_low)
+    b, b_low = products(out, low, y, y_low, spin, 0.0, x, x_low)
+    vx_s, vx_low = quotient(a, a_low, rho2, rho2_low)
+    vy_s, vy_low = quotient(b, b_low, rho2, rho2_low)
+    return vx_s + vx_low, vy_s + vy_low
 
 
 @njit(error_model="numpy")

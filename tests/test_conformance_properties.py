@@ -17,7 +17,7 @@ from scene import BangBang, Cap, Collision, Fourier, Mushroom, State, Stem, load
 from scene.laws import is_constant
 from scene.tables import laws, period
 
-N_QUESTIONS = 80
+N_QUESTIONS = 40
 
 
 def proved(scene, state, t_end):

@@ -69,7 +69,7 @@ def multiplied(a, a_low, b, b_low):
     return two_sum(p, e + (a * b_low + a_low * b))
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", forceinline=True)
 def products(a, a_low, b, b_low, c, c_low, d, d_low):
     """Return (a + a_low) (b + b_low) + (c + c_low) (d + d_low) as a sum of two floats."""
     p, e = two_product(a, b)
@@ -78,7 +78,7 @@ def products(a, a_low, b, b_low, c, c_low, d, d_low):
     return s, low + (e + f + (fma(a, b_low, a_low * b) + fma(c, d_low, c_low * d)))
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", forceinline=True)
 def quotient(a, a_low, b, b_low):
     """Return (a + a_low) / (b + b_low) as a sum of two floats."""
     inverse = 1.0 / b

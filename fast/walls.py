@@ -91,7 +91,7 @@ def wall_slope(wall, x, y, vx, vy, anchors, is_relative):
     return w_rate + anchors[M, 1] * y + (anchors[M, 0] * vy - (vx if wall == RIGHT else -vx))
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", forceinline=True)  # a call in a loop over lanes would not be packed
 def off_the_arc(x, x_low, y, y_low, vx, vy, r, rate):
     """Return the velocity after a hit on the arc: v - 2 f' grad f / |grad f|^2 = v - 2 (v.n - r') n.
 
@@ -106,7 +106,7 @@ def off_the_arc(x, x_low, y, y_low, vx, vy, r, rate):
     return fma(push, x, vx) + x_push, fma(push, y, vy) + y_push
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", forceinline=True)  # a call in a loop over lanes would not be packed
 def off_the_arc_spinning(x, x_low, y, y_low, vx, vy, r, rate, spin):
     """Return the same for a particle whose angular momentum is known to be `spin`."""
     q, q_low = products(x, x_low, vx, 0.0, y, y_low, vy, 0.0)

@@ -17,19 +17,19 @@ settings.register_profile("quick", derandomize=True, deadline=None, print_blob=T
 settings.register_profile("deep", max_examples=10_000, deadline=None, print_blob=True)
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "quick"))
 
-TALLIES = pytest.StashKey[list[str]]()
-
 
 @pytest.fixture
 def tally(request: pytest.FixtureRequest) -> Iterator[Counter[str]]:
     """Count what a test looked at; the counts are printed in the terminal summary."""
     counts: Counter[str] = Counter()
     yield counts
-    lines = request.config.stash.setdefault(TALLIES, [])
-    lines.append(f"{request.node.name}: " + ", ".join(f"{name} {n}" for name, n in counts.items()))
+    line = f"{request.node.name}: " + ", ".join(f"{name} {n}" for name, n in counts.items())
+    request.node.user_properties.append(("tally", line))  # with the report it travels from any worker
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
     """Print the tallies."""
-    for line in terminalreporter.config.stash.get(TALLIES, []):
-        terminalreporter.write_line(line)
+    for report in terminalreporter.stats.get("", []):
+        for name, line in report.user_properties if report.when == "teardown" else ():
+            if name == "tally":
+                terminalreporter.write_line(line)

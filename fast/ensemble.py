@@ -207,9 +207,13 @@ def follow(
     work(n)  # none at all: compiles, or loads from the disk cache, so that `seconds` holds work alone
     begin = time.perf_counter()
     with ThreadPoolExecutor(threads) as pool:
-        for first, _ in zip(range(0, n, size), pool.map(work, range(0, n, size)), strict=True):
-            if progress:
-                progress(min(first + size, n))
+        try:
+            for first, _ in zip(range(0, n, size), pool.map(work, range(0, n, size)), strict=True):
+                if progress:
+                    progress(min(first + size, n))
+        except BaseException:  # an interrupt does not wait for chunks that have not begun
+            pool.shutdown(wait=False, cancel_futures=True)
+            raise
     seconds = time.perf_counter() - begin
     energies, is_captured, t_in, t_out = out
     return Followed(*ends, energies, is_captured, t_in, t_out, seconds)

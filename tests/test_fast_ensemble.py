@@ -131,3 +131,16 @@ def test_energies_at_phases_are_the_flow_s():
     assert inside.any()
     assert run.phase_captured[inside, 0, 1].all()
     assert not run.phase_captured[~inside, 0, 1].any()
+
+
+def test_an_interrupt_drops_the_chunks_not_begun():
+    """What `progress` raises, as an interrupt would, ends the run after the chunks under way."""
+    seen: list[int] = []
+
+    def stop(n_done: int) -> None:
+        seen.append(n_done)
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        fast.simulate(load("fermi-ulam"), n_particles=200_000, energy=100.0, threads=1, progress=stop)
+    assert seen == [256]

@@ -26,7 +26,6 @@ from scene.tables import Mushroom, period
 N_BINS = 80
 N_LOOP = 240
 N_PHASES = 6
-CAPTURED_BLUR = 0.5  # of sigma_w, the middle of what the audit admits
 
 
 def loops() -> Figure:
@@ -101,15 +100,9 @@ def _energies(axes: Axes, sample: Sample) -> None:
     edges = np.linspace(low - sigma, high + sigma, N_BINS + 1)
     counts = np.histogram(sample.gain, edges)[0] / (sample.n * np.diff(edges))
     axes.stairs(counts, edges, fill=True, color=SKY, label="simulation")
-    curve = theory.capture_curve(scene_of(sample.run), 400)
-    ends = float(curve.s.min()), float(curve.s.max())
-    places, below = broadened.blurred(
-        energies_of(sample.run.name).captured_below, *ends, CAPTURED_BLUR * sigma
-    )
-    middle = (places[1:] + places[:-1]) / 2
-    captured = (1 - p_nc) * np.diff(below) / np.diff(places)
     x = np.linspace(edges[0], edges[-1], 1500)
-    total = np.interp(x, middle, captured, 0, 0) + p_nc * norm.pdf(x, centre + sigma**2 / 4, sigma)
+    below = broadened.captured(sample)[0]
+    total = (1 - p_nc) * np.gradient(below(x), x) + p_nc * norm.pdf(x, centre + sigma**2 / 4, sigma)
     axes.plot(x, total, color=BLACK, linewidth=1.3, label=f"theory, blurred by {sigma:.4f}")
     sharp = np.diff(energies_of(sample.run.name).captured_below(x)) / np.diff(x)
     axes.plot((x[1:] + x[:-1]) / 2, sharp, color=ORANGE, linewidth=1.2, label="theory, captured, sharp")

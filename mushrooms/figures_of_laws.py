@@ -11,8 +11,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 import theory
+from conformance.audit.broadened import zone_energy
 from conformance.audit.finite_energy import fitted_width, width
-from conformance.audit.laws import nu_gap, zone_energy, zone_share
+from conformance.audit.laws import nu_gap, zone_share
 from conformance.audit.runs import scene_of
 from conformance.audit.samples import Sample
 from conformance.audit.tolerances import Mean, mean, share

@@ -74,8 +74,8 @@ ALL = (
     Picture(
         "X1",
         "Energies after one cycle, fixed cap. In theory (orange) the never captured share one energy,"
-        " dashed; black: the same theory with the finite-energy blur, sigma_w for the never captured "
-        "and half of it for the captured.",
+        " dashed; black: the same theory with the finite-energy blur: what the never captured gather "
+        "through the cycle, and of it, for the captured, what they gather outside the cap.",
         lambda s: cycles.energies(_there(s, ACW, CW)),
         (ACW, CW),
     ),

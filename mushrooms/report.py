@@ -96,6 +96,8 @@ class ReportData(TypedDict):
     passed: bool
     seed: int
     wall_time_s: float
+    resumed: bool
+    kernel_time_s: float
     machine: dict[str, str | int]
     false_alarms: dict[str, float | int]
     findings: list[FindingData]
@@ -129,6 +131,8 @@ def to_data(result: Result) -> ReportData:
         "passed": result.is_passed,
         "seed": result.settings.seed,
         "wall_time_s": round(result.seconds, 3),
+        "resumed": result.settings.resume,
+        "kernel_time_s": round(sum(sample.seconds for sample in result.samples.values()), 3),
         "machine": machine(),
         "false_alarms": {
             "allowed": FAMILY_LEVEL,

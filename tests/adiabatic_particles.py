@@ -1,7 +1,8 @@
 """A stand-in for the fast stepper: ensembles drawn from theory itself, with the finite-energy terms it names.
 
-The uncaptured peak has a width ~ E0^(-1/4) and drifts by a quarter of its variance; the captured have
-half that width; nu at release exceeds nu at capture by O(1/v). Cycles are independent.
+The uncaptured peak has a width ~ E0^(-1/4) and drifts by a quarter of its variance, gathered evenly
+through the cycle; the captured gather theirs outside the cap. nu at release exceeds nu at capture by O(1/v).
+Cycles are independent.
 """
 
 from __future__ import annotations
@@ -16,7 +17,6 @@ import theory
 from scene.tables import period
 
 WIDTHS = {"fixed-cap-anticlockwise": 15.4, "fixed-cap-clockwise": 15.4, "ergodic": 1.9, "untilted": 11.0}
-CAPTURED = 0.5
 
 
 @cache
@@ -73,7 +73,9 @@ def one_cycle(scene, energy, sigma, phases, rng):
             np.interp(places, np.arange(len(curve.s)), column)
             for column in (curve.t_in, curve.t_out, curve.s)
         )
-        blur = CAPTURED * sigma[captured]
+        span = float(period(scene).value(fp))
+        after = (1 - t_out[captured] / span) * np.exp(-(gain - s_nc) / 2)
+        blur = sigma[captured] * np.sqrt(t_in[captured] / span + after)
         s[captured] = gain + blur**2 / 4 + blur * noise[captured]
         if not scene.name.startswith("fixed"):
             late = np.cos(t_in[captured]) + rng.random(captured.sum()) / speed

@@ -11,7 +11,7 @@ import pytest
 
 import fast
 import theory
-from conformance.audit import experiments, ledger
+from conformance.audit import experiments, laws, ledger
 from conformance.audit.evidence import Evidence, Steppers
 from conformance.audit.finding import verdict_of
 from conformance.audit.runs import RUNS, scene_of
@@ -134,7 +134,7 @@ def test_a_faulty_stepper_does_not_get_the_expected_verdict(name):
     assert finding.verdict != entry.expected, finding.checks
 
 
-@pytest.mark.parametrize("name", ["M1", "M2", "M4", "X1", "X2", "X8", "N1", "N2", "N4"])
+@pytest.mark.parametrize("name", ["M1", "M2", "M4", "X1", "X8", "N1", "N4"])
 def test_a_wrong_theory_does_not_get_the_expected_verdict(name):
     def wrong(scene, digits):
         right = CACHED(scene, digits)
@@ -195,7 +195,7 @@ def test_lost_particles_leave_a_claim_open(code):
         return lose
 
     for share, verdict in ((0.0005, "confirmed"), (0.002, "indeterminate")):
-        result = audited("X2", changed(moving_cap=lossy(share)))
+        result = audited("X5", changed(ergodic=lossy(share)))
         assert result.findings[0].verdict == verdict
         assert all(sample.n < sample.n_particles for sample in result.samples.values())
 
@@ -218,7 +218,9 @@ def test_a_leaking_circle_is_refuted():
     assert verdict_of(entry, checks) == "refuted"
 
 
-def test_work_that_is_not_conserved_is_refuted():
+def test_work_that_is_not_conserved_is_refuted(monkeypatch):
+    monkeypatch.setitem(laws.N_ENERGIES, "quick", 60)
+
     def cooled(scene, **options):
         done = fast.simulate(scene, **options)
         return done._replace(energy=done.energy * 0.7, phase_energies=done.phase_energies * 0.7)

@@ -12,6 +12,7 @@ import numpy as np
 from mpmath import fp
 
 import theory
+from conformance.audit.broadened import phase_times, zone_energy
 from conformance.audit.evidence import Evidence
 from conformance.audit.experiments import MEAN_RETURNS, mouth_speed, return_time
 from conformance.audit.finding import Check
@@ -244,22 +245,6 @@ def nu_gap(sample: Sample) -> FloatArray:
     return gap
 
 
-def zone_energy(sample: Sample) -> tuple[list[float], list[Mean], list[float]]:
-    """Return times of the phases, mean log E/E0 of those not captured so far, and their spreads."""
-    times, means, spreads = _times(sample), [], []
-    for k, time in enumerate(times):
-        with np.errstate(invalid="ignore"):
-            free = ~sample.captured | (time < sample.t_in[:, 0])
-        means.append(mean(sample.phase_s[free, 0, k]))
-        spreads.append(spread(sample.phase_s[free, 0, k]).value)
-    return times, means, spreads
-
-
-def _times(sample: Sample) -> list[float]:
-    span = 1.0 if sample.run.scene.startswith("fixed") else 2 * math.pi
-    return [span * phase for phase in sample.run.phases]
-
-
 def energy_through_the_cycle(evidence: Evidence) -> list[Check]:
     """L5: mean log E in the chaotic zone against eq. (dE)."""
     found = []
@@ -298,7 +283,7 @@ def population_through_the_cycle(evidence: Evidence) -> list[Check]:
     found = []
     for run, every in (("moving-cap@1e7", 2), (ACW, 1)):
         sample = evidence.sample(run)
-        times = np.array(_times(sample))
+        times = np.array(phase_times(sample))
         scene, delay = scene_of(sample.run), MEAN_RETURNS * return_time(sample)
         late, now, early = (theory.chaotic_zone(scene, times + d).p_cha for d in (-delay, 0.0, delay))
         measured = zone_share(sample, times)

@@ -160,7 +160,7 @@ def ergodic_mean(evidence: Evidence) -> list[Check]:
 
 def finite_bias(evidence: Evidence) -> list[Check]:
     """M9: the mean of s is biased at finite energy; the mean of exp(-s/2) is not."""
-    samples = evidence.samples(*LADDER[:6])
+    samples = evidence.samples(*LADDER)
     theirs = float(evidence.predict("moving-cap").m1)
     low = samples[0]
     found = [close(f"{low.run.name}: mean of s is m1, no bias", mean(low.gain), theirs, form="printed")]

@@ -11,10 +11,15 @@ import numpy.typing as npt
 from fast import codes
 from scene import BangBang, Cap, Fourier, Law, Mushroom, Scene
 from scene.laws import Bounds, bounds, is_constant
+from scene.refusal import BadInput
 from scene.tables import width_factors
 
 FloatArray = npt.NDArray[np.floating[Any]]
 TABLES = {"Cap": int(codes.CAP), "Stem": int(codes.STEM), "Mushroom": int(codes.MUSHROOM)}
+
+
+# Squares of what is larger overflow.
+LARGEST = 2.0**400
 
 
 class Compiled(NamedTuple):
@@ -27,7 +32,23 @@ class Compiled(NamedTuple):
 
 
 def compile_scene(scene: Scene) -> Compiled:
-    """Lay out a valid scene for the codes."""
+    """Lay out a valid scene for the kernel.
+
+    Raises:
+        BadInput: a length, speed or acceleration of a wall is 2^400 or more: squares would overflow.
+    """
+    try:
+        compiled = _laid_out(scene)
+    except OverflowError:
+        raise BadInput("scene: a wall's acceleration overflows, must be below 2^400") from None
+    for name, row in zip(("r", "w", "h", "slope"), compiled.bounds, strict=True):
+        for what, size in zip(("least value", "greatest value", "speed", "acceleration"), row, strict=True):
+            if not abs(size) < LARGEST:
+                raise BadInput(f"scene.{name}: {what} {size:.3g}, must be below 2^400 in size")
+    return compiled
+
+
+def _laid_out(scene: Scene) -> Compiled:
     r: Law = 0.0 if not isinstance(scene, (Cap, Mushroom)) else scene.r
     h: Law = 0.0
     slope: Law = 0.0

@@ -20,12 +20,13 @@ import numpy.typing as npt
 
 from fast import codes, entries
 from fast.compiled import Compiled, FloatArray, compile_scene
-from fast.starts import Stops, cycle_stops, initial_states
+from fast.starts import Stops, cycle_length, cycle_stops, initial_states, least_collisions
 from scene import Scene
 from scene.refusal import BadInput
 
 FOLLOWED, UNDECIDED, UNDEFINED, REJECTED = 0, 1, 2, 3
 MAX_PARTICLES = 10**8
+MAX_COLLISIONS = 10**9  # of one particle, a minute of work
 LARGEST_ENERGY = 2.0**800
 SHARE = 256  # particles a worker takes at a time: several times what it holds at once
 IntArray = npt.NDArray[np.int64]
@@ -136,10 +137,16 @@ def simulate(
     Source: secs. 4.1, 4.2 (initial conditions); capture as in sec. 3.2.
     """
     threads = _check(n_particles, energy, n_cycles, seed, phases, threads)
+    compiled = compile_scene(scene)
     stops = cycle_stops(scene, n_cycles, phases)
+    ahead = least_collisions(scene, math.sqrt(2.0 * energy), n_cycles * cycle_length(scene))
+    if ahead > MAX_COLLISIONS:
+        raise BadInput(
+            f"energy = {energy}: over {ahead:.0e} collisions of each particle, must be at most 1e9"
+        )
     start = initial_states(scene, n_particles, energy, seed)
     free = np.full(n_particles, codes.NO_WALL)
-    done = follow(compile_scene(scene), start, free, stops, threads, progress)
+    done = follow(compiled, start, free, stops, threads, progress)
     every = (n_particles, n_cycles, len(phases) + 1)
     energies, captured = done.energies.reshape(every), done.is_captured.reshape(every)
     t, _, x, y, vx, vy = (np.ascontiguousarray(column) for column in done.states.T)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -10,9 +11,11 @@ import numpy as np
 from fast import codes
 from fast.compiled import FloatArray, compile_scene
 from fast.ensemble import IntArray, check_threads, follow
-from fast.starts import only_stop
+from fast.starts import least_collisions, only_stop
 from fast.stepper import WALL_CODES, next_collision, trouble
 from scene import Horizon, InvalidState, Outcome, Rejected, Scene, State
+
+MAX_COLLISIONS = 10**7  # of one particle, some seconds of work
 
 
 class Flow(NamedTuple):
@@ -42,8 +45,9 @@ def flow(scene: Scene, states: Sequence[State], t_end: float, threads: int | Non
         threads: how many to use, by default one for each core; they change no bit.
 
     Raises:
-        InvalidState: a start is none of this table: naming the particle; nothing is followed.
-        BadInput: `threads` is out of bounds.
+        InvalidState: a start is none of this table, or t_end over 10^7 collisions away: naming the
+            particle; nothing is followed.
+        BadInput: `threads` is out of bounds, or the laws are.
 
     Source: a stay is captured while |sin phi| > nu at the arc, sec. 3.2.
     """
@@ -63,6 +67,11 @@ def flow(scene: Scene, states: Sequence[State], t_end: float, threads: int | Non
 
 
 def refuse(scene: Scene, state: State, t_end: float) -> Rejected | None:
-    """Return why a particle cannot start so, or None."""
+    """Return why a particle cannot start so, or be followed so far; else None."""
     outcome = next_collision(scene, state, t_end)
-    return outcome if isinstance(outcome, Rejected) else None
+    if isinstance(outcome, Rejected):
+        return outcome
+    ahead = least_collisions(scene, math.hypot(state.vx, state.vy), t_end - state.t)
+    if ahead > MAX_COLLISIONS:
+        return Rejected(f"t_end = {t_end!r} is over {ahead:.0e} collisions away, must be at most 1e7")
+    return None

@@ -17,7 +17,7 @@ from mpmath import fp
 from fast import entries
 from fast.compiled import FloatArray
 from scene import Cap, Mushroom, Scene, Stem
-from scene.laws import BangBang, value
+from scene.laws import BangBang, bounds, value
 from scene.tables import laws, period, width_factors
 
 
@@ -113,6 +113,14 @@ def cycle_stops(scene: Scene, n_cycles: int, phases: Sequence[float]) -> Stops:
 def only_stop(t_end: float) -> Stops:
     """Return one stop, that keeps the first captured stay of any length."""
     return Stops(np.array([t_end]), np.array([0]), np.array([[-math.inf, math.inf]]))
+
+
+def least_collisions(scene: Scene, speed: float, span: float) -> float:
+    """Return how many flights of the table's full length fit into a path at this speed [collisions]."""
+    found = {name: bounds(law).highest for name, law in laws(scene).items() if name != "slope"}
+    r, h = found.get("r", 0.0), found.get("h", 0.0)
+    w = found.get("w", found.get("nu", 0.0) * r)
+    return speed * span / (2.0 * max(r, w) + r + h)
 
 
 def narrowest_phase(scene: Scene) -> float:

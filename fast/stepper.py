@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fast import careful, codes, entries, motion, walls
-from fast.compiled import Compiled, FloatArray, compile_scene
+from fast.compiled import LARGEST, Compiled, FloatArray, compile_scene
 from scene import (
     Collision,
     Horizon,
@@ -22,6 +22,7 @@ from scene import (
     Undefined,
     Wall,
 )
+from scene.refusal import BadInput
 from scene.states import ON_WALL, check_numbers
 
 WALL_NAMES: dict[int, Wall] = {
@@ -43,8 +44,6 @@ REASONS: dict[int, Outcome] = {
     int(codes.START): Undecided("the state is on another wall within rounding"),
     int(codes.APPROACHING): Rejected("state.wall: the particle starts on a wall and moves into it"),
 }
-# v^2 and r^2 must neither overflow nor vanish beside each other.
-LARGEST = 2.0**400
 
 
 @lru_cache(maxsize=256)
@@ -68,7 +67,7 @@ def next_collision(scene: Scene, state: State, t_end: float) -> Outcome:
     """
     try:
         _check(scene, state, t_end)
-    except InvalidState as error:
+    except BadInput as error:
         return Rejected(str(error))
     p = np.array([state.t, 0.0, state.x, state.y, state.vx, state.vy])
     low_end = t_end - state.t
@@ -104,7 +103,7 @@ def trajectory(scene: Scene, state: State, n_collisions: int, t_end: float = np.
         t_end: horizon [time]; infinity for none.
 
     Raises:
-        InvalidState: naming field, value and bound.
+        BadInput: naming field, value and bound.
     """
     _check(scene, state, t_end if np.isfinite(t_end) else state.t)
     if n_collisions < 0:
@@ -122,6 +121,7 @@ def trajectory(scene: Scene, state: State, n_collisions: int, t_end: float = np.
 
 
 def _check(scene: Scene, state: State, t_end: float) -> None:
+    _compiled(scene)
     check_numbers(scene, state, t_end)
     for field in ("x", "y", "vx", "vy"):
         if abs(getattr(state, field)) > LARGEST:

@@ -47,7 +47,7 @@ LAWS = (
     {"kind": "fourier", "mean": 1.0, "omega": 1e9, "sin": [1e-3] * 40},
     {"kind": "bang-bang", "knots": []},
     {"kind": "bang-bang", "knots": [[0.0, 1.0], [0.0, 1.0]]},
-    {"kind": "bang-bang", "knots": [[0.0, 1.0], [1e-9, 0.5], [1.0, 1.0]]},
+    {"kind": "bang-bang", "knots": [[0.0, 1.0], [1e-300, 0.5], [1.0, 1.0]]},
     {"kind": "spline", "knots": [[0.0, 1.0]]},
 )
 BYTES = (b"\x00", b"\xff", b"{", b"}", b"[", b'"', b"\\", b"e999", b"NaN", b"\xef\xbb\xbf", b",", b"-", b"\r")

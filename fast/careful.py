@@ -23,7 +23,7 @@ from fast.codes import (  # isort: skip
     APPROACHING, ARC, AT_END, BASE, CAP, CORNER, EDGE, FAR_TIME, FLOOR, H, HORIZON, LEFT, M, MOUTH_EDGE,
     MUSHROOM, NO_WALL, OUTSIDE, R, RIGHT, SLIDING, START, STEM, TANGENT, TOO_MANY, W,
 )  # fmt: skip
-from fast.motion import LOW, set_anchors
+from fast.motion import LACK, LOW, PHASE, set_anchors
 
 from fast.walls import (  # isort: skip
     curvature_bounds, is_outside, off_the_arc, reach_time, side_of_mouth, wall_function, wall_residual,
@@ -31,7 +31,7 @@ from fast.walls import (  # isort: skip
 )  # fmt: skip
 
 MAX_PARABOLAS = 1_000_000
-POLISHED = 2.0**-9  # error of a residual, its low parts included, in those of a plain sum
+MAX_POLISHES = 4
 NEAR = 2.0**-30  # how much beyond the limit hits are looked for, relatively
 PATIENCE = 6  # parabolas tried before asking whether the wall is out of the particle's reach
 
@@ -301,18 +301,30 @@ def move(wall, s, is_again, p, laws, bounds, anchors, is_relative):
     """
     x, y, vx, vy = p[2], p[3], p[4], p[5]
     residual = residual_error = error = 0.0
+    lack = anchors[PHASE, LACK]
     if is_again:
         residual, residual_error = wall_residual(wall, x, y, laws, anchors, bounds, is_relative)
         _, _, error, _ = wall_function(wall, s, x, y, vx, vy, 0.0, laws, anchors, is_relative)
-    t, low = two_sum(p[0], s)
-    if not set_anchors(laws, anchors, t, low + p[1]):
-        return -1.0
-    s_low, x_s, x_low, y_s, y_low = remainder(
-        wall, s, residual, x, y, vx, vy, laws, anchors, bounds, is_relative
-    )
-    if is_again and error < POLISHED * residual_error:
-        # A short hop along the wall: its increments gave s better than the laws' low parts can.
-        s_low = 0.0
+    bend, _ = curvature_bounds(wall, vx, vy, bounds)
+    for _ in range(MAX_POLISHES):
+        t, low = two_sum(p[0], s)
+        if not set_anchors(laws, anchors, t, low + p[1]):
+            return -1.0
+        s_low, x_s, x_low, y_s, y_low = remainder(
+            wall, s, residual, x, y, vx, vy, laws, anchors, bounds, is_relative
+        )
+        lack = max(lack, anchors[PHASE, LACK])
+        if is_again and error < lack / SAFETY * residual_error:
+            # A short hop along the wall: its increments gave s better than the laws' low parts can.
+            s_low = 0.0
+        slope = wall_slope(wall, x_s, y_s, vx, vy, anchors, is_relative)
+        # What Newton leaves, bend s_low^2 / (2 slope), must be nothing to the time and to the wall's speed.
+        change = bend * abs(s_low)
+        if wall == BASE or (
+            change <= 2.0**-27 * abs(slope) and change * abs(s_low) <= 2.0**-54 * s * abs(slope)
+        ):
+            break
+        s += s_low
     x_s, x_low = two_sum(x_s, x_low + vx * s_low)
     y_s, y_low = (0.0, 0.0) if wall == BASE else two_sum(y_s, y_low + vy * s_low)
     p[0], p[1] = two_sum(t, low + p[1] + s_low)

@@ -25,6 +25,7 @@ from fast.arithmetic import (
 from fast.codes import BANG_BANG, FOURIER, MAX_HARMONICS, PHASES, H, M, R, W
 
 PHASE, TURN = 4, 5
+LACK = 0  # column of PHASE: error of sines and cosines, low parts included
 # Columns of these two rows, to which the number of the harmonic, from 1, is added.
 SINE, COSINE = 3, 3 + MAX_HARMONICS
 SINE_LOW, COSINE_LOW = 3 + 2 * MAX_HARMONICS, 3 + 3 * MAX_HARMONICS
@@ -39,6 +40,7 @@ LOW, N_PERIODS = 5, 6  # columns of `anchors`
 def set_phases(laws, anchors, t_hi, t_lo):
     """Store the sines and cosines of all harmonics at t; False when t is out of reach."""
     anchors[TURN, 0] = -1.0
+    worst = 0.0
     for k in range(1, int(laws[PHASES, 1]) + 1):
         s, s_low, c, c_low, is_reduced = sine_cosine(laws[PHASES, 0], float(k), t_hi, t_lo)
         if not is_reduced:
@@ -47,6 +49,10 @@ def set_phases(laws, anchors, t_hi, t_lo):
         anchors[PHASE, COSINE + k] = c
         anchors[PHASE, SINE_LOW + k] = s_low
         anchors[PHASE, COSINE_LOW + k] = c_low
+        nearest = min(abs(s), abs(c))
+        worst = max(worst, nearest)
+    # What the low parts lack: the sixth power of the angle from the nearest quarter turn.
+    anchors[PHASE, LACK] = 2.0**-59 * worst**6 + 2.0**-98
     return True
 
 

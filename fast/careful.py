@@ -27,13 +27,27 @@ from fast.motion import LACK, LOW, PHASE, set_anchors
 
 from fast.walls import (  # isort: skip
     curvature_bounds, is_outside, off_the_arc, reach_time, side_of_mouth, wall_function, wall_residual,
-    wall_slope,
+    wall_rest, wall_slope,
 )  # fmt: skip
 
 MAX_PARABOLAS = 1_000_000
 MAX_POLISHES = 4
 NEAR = 2.0**-30  # how much beyond the limit hits are looked for, relatively
 PATIENCE = 6  # parabolas tried before asking whether the wall is out of the particle's reach
+
+
+@njit(error_model="numpy")
+def still_reach(wall, f, slope, still, vx, vy):
+    """Return a time, at most `still`, before which a wall that stands still so long is not met from f > 0."""
+    down = 2.0 * (vx * vx + vy * vy) if wall == ARC else 0.0
+    d = np.sqrt(slope * slope + 2.0 * down * f)
+    if slope < 0.0:
+        h = 2.0 * f / (d - slope)
+    elif down > 0.0:
+        h = (slope + d) / down
+    else:
+        h = still
+    return min(h * (1.0 - 2.0**-20), still)
 
 
 @njit(error_model="numpy")
@@ -93,6 +107,9 @@ def first_root(wall, start, limit, x, y, vx, vy, is_leaving, laws, anchors, boun
         if n_steps >= PATIENCE:
             reach = reach_time(wall, x + vx * s, y + vy * s, vx, vy, bounds)
             moved = max(moved, s + reach)
+            still = wall_rest(wall, s, laws, anchors, is_relative)
+            if s + still > moved:
+                moved = max(moved, s + still_reach(wall, f, slope, still, vx, vy))
         s = moved
     return TOO_MANY, s, 0.0, 0.0
 

@@ -17,6 +17,7 @@ from numba import njit
 
 from fast.arithmetic import (
     MAX_QUADRANT,
+    SAFETY,
     beyond_first_order,
     sine_cosine,
     two_product,
@@ -271,3 +272,21 @@ def width(laws, anchors, is_relative, s):
         size * (abs(r) + r_size) + w * r_size,
         rate_size * (abs(r) + r_size) + (w + size) * r_rate_size,
     )
+
+
+@njit(error_model="numpy")
+def rest(laws, anchors, row, s):
+    """Return for how long after the time s a law stands still; 0 when it moves, or is not known to rest."""
+    if laws[row, 0] == FOURIER:
+        return 0.0
+    if laws[row, 0] != BANG_BANG:
+        return np.inf
+    n = int(laws[row, 3])
+    doubt = SAFETY * (anchors[row, 4] + s + laws[row, 2])
+    tau = anchors[row, 4] + s
+    tau -= laws[row, 2] * np.floor(tau / laws[row, 2])
+    for i in range(n - 1):
+        begin, end = laws[row, KNOTS + i] - laws[row, KNOTS], laws[row, KNOTS + i + 1] - laws[row, KNOTS]
+        if begin + doubt <= tau <= end - doubt and laws[row, KNOTS + 2 * n + i] == 0.0:
+            return end - doubt - tau
+    return 0.0

@@ -11,7 +11,7 @@ from numba import njit
 
 from fast.arithmetic import SAFETY, dot, fma, multiplied, products, quotient, two_product, two_sum
 from fast.codes import ARC, BASE, CAP, FLOOR, LEFT, MUSHROOM, NO_WALL, RIGHT, STEM, H, M, R, W
-from fast.motion import LOW, increment, width
+from fast.motion import LOW, increment, rest, width
 
 
 @njit(error_model="numpy")
@@ -62,17 +62,17 @@ def wall_residual(wall, x, y, laws, anchors, bounds, is_relative):
         a, a_low = two_sum(r2, -x2)
         b, b_low = two_sum(a, -y2)
         low = b_low + a_low + (r2_low - x2_low - y2_low) + 2.0 * r * r_low
-        return b + low, SAFETY * bounds[R, 1] * bounds[R, 1]
+        return b + low, SAFETY * r2
     if wall == FLOOR:
         f, f_low = two_sum(y, anchors[H, 0])
-        return f + (f_low + anchors[H, LOW]), SAFETY * bounds[H, 1]
+        return f + (f_low + anchors[H, LOW]), SAFETY * anchors[H, 0]
     w, w_low = anchors[W, 0], anchors[W, LOW]
     if is_relative:
         w, w_low = multiplied(w, w_low, anchors[R, 0], anchors[R, LOW])
     tilt, tilt_low = multiplied(anchors[M, 0], anchors[M, LOW], y, 0.0)
     f, f_low = two_sum(w, -x if wall == RIGHT else x)
     f, e = two_sum(f, tilt)
-    error = SAFETY * (bounds[W, 1] + max(abs(bounds[M, 0]), abs(bounds[M, 1])) * abs(y) + abs(x))
+    error = SAFETY * (w + abs(tilt) + abs(x))
     return f + (f_low + e + w_low + tilt_low), error
 
 
@@ -135,6 +135,17 @@ def curvature_bounds(wall, vx, vy, bounds):
         return bounds[H, 3], bounds[H, 3]
     k = bounds[W, 3] + bounds[M, 3] * bounds[H, 1] + 2.0 * bounds[M, 2] * abs(vy)
     return k * (1.0 + SAFETY), k * (1.0 + SAFETY)
+
+
+@njit(error_model="numpy")
+def wall_rest(wall, s, laws, anchors, is_relative):
+    """Return for how long after the time s a wall stands still."""
+    if wall == ARC:
+        return rest(laws, anchors, R, s)
+    if wall == FLOOR:
+        return rest(laws, anchors, H, s)
+    still = min(rest(laws, anchors, W, s), rest(laws, anchors, M, s))
+    return min(still, rest(laws, anchors, R, s)) if is_relative else still
 
 
 @njit(error_model="numpy")

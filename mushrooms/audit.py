@@ -9,9 +9,9 @@ from typing import Annotated, BinaryIO
 
 import typer
 from rich import progress
-from rich.console import Console
 
 from mushrooms import output
+from mushrooms.terminal import progress_bar
 from scene.refusal import BadInput
 
 
@@ -44,7 +44,7 @@ def audit(
         raise BadInput(f"--threads = {threads}, must be >= 1")
     with output.writable_folder(out) as folder:
         settings = Settings("full" if full else "quick", seed, threads, folder / "parts", resume, apart=True)
-        with _progress() as bar:
+        with progress_bar() as bar:
             result = conduct(
                 Steppers(fast.simulate, fast.trajectory), settings, entries=entries, progress=_advance(bar)
             )
@@ -68,19 +68,6 @@ def _writer(text: str) -> output.Writer:
         file.write(text.encode("utf-8"))
 
     return write
-
-
-def _progress() -> progress.Progress:
-    console = Console(stderr=True)
-    return progress.Progress(
-        progress.TextColumn("{task.description}"),
-        progress.BarColumn(),
-        progress.MofNCompleteColumn(),
-        progress.TimeRemainingColumn(),
-        console=console,
-        disable=not console.is_terminal,
-        transient=True,
-    )
 
 
 def _advance(bar: progress.Progress) -> Callable[[str, int, int], None]:

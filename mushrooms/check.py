@@ -15,6 +15,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from mushrooms import output
+from mushrooms.terminal import progress_bar
 from scene.refusal import BadInput
 
 if TYPE_CHECKING:
@@ -54,8 +55,7 @@ def check(
     for path, suffix in files.items():
         output.check_file(path, (suffix,))
     known = suite.read_known(known_failures) if known_failures else frozenset()
-    console = Console(stderr=True)
-    with _progress(console) as bar:
+    with progress_bar() as bar:
         run = suite.check(
             command,
             level=level,
@@ -142,18 +142,6 @@ def _verdict(run: Run, total: Any) -> str:
     words = {0: "[bold green]accepted[/]", 1: "[bold red]not accepted[/]"}
     return f"{passed}{more}, {run.seconds:.1f} s: " + words.get(
         run.exit_code(), "[bold red]undecided: the corpus could not tell, which is its own fault[/]"
-    )
-
-
-def _progress(console: Console) -> progress.Progress:
-    return progress.Progress(
-        progress.TextColumn("{task.description}"),
-        progress.BarColumn(),
-        progress.MofNCompleteColumn(),
-        progress.TimeRemainingColumn(),
-        console=console,
-        disable=not console.is_terminal,
-        transient=True,
     )
 
 

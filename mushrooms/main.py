@@ -21,6 +21,7 @@ import scene as scenes
 from mushrooms import output
 from mushrooms.audit import audit
 from mushrooms.check import check
+from mushrooms.terminal import progress_bar
 from scene.load import read_data
 from scene.refusal import BadInput
 from scene.tables import period
@@ -174,7 +175,7 @@ def simulate(
 
         import fast
 
-        with _progress() as bar:
+        with progress_bar() as bar:
             advance = _task(bar, table.name or scene, particles)
             ensemble = fast.simulate(
                 table,
@@ -278,19 +279,6 @@ def _maybe_folder(path: Path | None) -> Iterator[Path | None]:
 def _console() -> Console:
     # A pipe has no width: lines long enough for the tables.
     return Console() if sys.stdout.isatty() else Console(width=140)
-
-
-def _progress() -> progress.Progress:
-    console = Console(stderr=True)
-    return progress.Progress(
-        progress.TextColumn("{task.description}"),
-        progress.BarColumn(),
-        progress.MofNCompleteColumn(),
-        progress.TimeRemainingColumn(),
-        console=console,
-        disable=not console.is_terminal,
-        transient=True,
-    )
 
 
 def _task(bar: progress.Progress, name: str, total: int) -> Callable[[int], None]:

@@ -16,7 +16,7 @@ LEAST = Fraction(1, 2**1075)  # half the spacing of subnormal numbers: nothing r
 
 
 def backward_ulps(
-    out: Sequence[float],
+    out: Sequence[float | Fraction],
     truth: Sequence[Fraction],
     jacobian: Sequence[Sequence[float]],
     inputs: Sequence[float],
@@ -24,7 +24,7 @@ def backward_ulps(
     """Measure each component of an answer.
 
     Args:
-        out: (dt, x, y, vx, vy) as computed.
+        out: (dt, x, y, vx, vy) as computed, to any number of digits.
         truth: the same, exact or far more precise than binary64.
         jacobian: (5, 5) derivatives of the outputs (rows) by the inputs (columns).
         inputs: (t, x, y, vx, vy) that the step started from.
@@ -59,7 +59,7 @@ def condition_number(
     return max((change / size if size else (inf if change else 0.0)) for change, size in parts)
 
 
-def _ulps(computed: float, exact: Fraction, moved: Fraction) -> float:
+def _ulps(computed: float | Fraction, exact: Fraction, moved: Fraction) -> float:
     if computed != computed or computed in (inf, -inf):
         return inf
     error = abs(Fraction(computed) - exact)

@@ -18,6 +18,7 @@ from hypothesis import currently_in_test_context, note
 from hypothesis import strategies as st
 from mpmath import MPContext
 
+from conformance.transforms import scaled_law
 from scene import BangBang, Cap, Fourier, Law, Mushroom, Scene, State, Stem, Wall, to_data
 from scene.laws import bounds, breakpoints, value
 from scene.tables import laws as laws_of
@@ -197,18 +198,9 @@ def rescale(scene: Scene, length: int, time: int) -> Scene:
     """
     sizes = {"nu": 1.0, "slope": 1.0}
     moved = {
-        name: _rescale(law, sizes.get(name, 2.0**length), 2.0**time) for name, law in laws_of(scene).items()
+        name: scaled_law(law, sizes.get(name, 2.0**length), 2.0**time) for name, law in laws_of(scene).items()
     }
     return type(scene)(**moved, name=scene.name, notes=scene.notes)
-
-
-def _rescale(law: Law, size: float, time: float) -> Law:
-    if isinstance(law, BangBang):
-        return BangBang(knots=tuple((time * t, size * v) for t, v in law.knots))
-    if isinstance(law, Fourier):
-        cos, sin = (tuple(size * c for c in amplitudes) for amplitudes in (law.cos, law.sin))
-        return Fourier(mean=size * law.mean, omega=law.omega / time, cos=cos, sin=sin)
-    return size * law
 
 
 class _Moment:

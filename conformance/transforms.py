@@ -34,17 +34,20 @@ def scaled_state(state: State, length: int, time: int) -> State:
 
 def scaled(scene: Scene, length: int, time: int) -> Scene:
     """Return the scene with lengths times 2^length and times times 2^time; `nu` and `slope` stay."""
+    unit = 2.0**time
+    return _with_laws(
+        scene, lambda name, law: scaled_law(law, 1.0 if name in ("nu", "slope") else 2.0**length, unit)
+    )
 
-    def moved(name: str, law: Law) -> Law:
-        size, unit = (1.0 if name in ("nu", "slope") else 2.0**length), 2.0**time
-        if isinstance(law, BangBang):
-            return BangBang(knots=tuple((unit * t, size * v) for t, v in law.knots))
-        if isinstance(law, Fourier):
-            cos, sin = (tuple(size * a for a in amplitudes) for amplitudes in (law.cos, law.sin))
-            return Fourier(mean=size * law.mean, omega=law.omega / unit, cos=cos, sin=sin)
-        return size * law
 
-    return _with_laws(scene, moved)
+def scaled_law(law: Law, size: float, time: float) -> Law:
+    """Return the law with its values times `size` and its times times `time`; exact for powers of two."""
+    if isinstance(law, BangBang):
+        return BangBang(knots=tuple((time * t, size * v) for t, v in law.knots))
+    if isinstance(law, Fourier):
+        cos, sin = (tuple(size * a for a in amplitudes) for amplitudes in (law.cos, law.sin))
+        return Fourier(mean=size * law.mean, omega=law.omega / time, cos=cos, sin=sin)
+    return size * law
 
 
 def backwards(scene: Scene) -> Scene:

@@ -26,8 +26,8 @@ from fast.codes import (  # isort: skip
 from fast.motion import LACK, LOW, PHASE, set_anchors
 
 from fast.walls import (  # isort: skip
-    curvature_bounds, is_outside, off_the_arc, reach_time, side_of_mouth, wall_function, wall_residual,
-    wall_rest, wall_slope,
+    curvature_bounds, is_outside, law_size, off_the_arc, reach_time, side_of_mouth, wall_function,
+    wall_residual, wall_rest, wall_slope,
 )  # fmt: skip
 
 MAX_PARABOLAS = 1_000_000
@@ -37,17 +37,19 @@ PATIENCE = 6  # parabolas tried before asking whether the wall is out of the par
 
 
 @njit(error_model="numpy")
+def parabola_root(f, slope, down):
+    """Return the root h > 0 of f + slope h - down h^2 / 2, for f >= 0 and down >= 0; infinity for none."""
+    d = np.sqrt(slope * slope + 2.0 * down * f)
+    if slope < 0.0:
+        return 2.0 * f / (d - slope)
+    return (slope + d) / down if down > 0.0 else np.inf
+
+
+@njit(error_model="numpy")
 def still_reach(wall, f, slope, still, vx, vy):
     """Return a time, at most `still`, before which a wall that stands still so long is not met from f > 0."""
     down = 2.0 * (vx * vx + vy * vy) if wall == ARC else 0.0
-    d = np.sqrt(slope * slope + 2.0 * down * f)
-    if slope < 0.0:
-        h = 2.0 * f / (d - slope)
-    elif down > 0.0:
-        h = (slope + d) / down
-    else:
-        h = still
-    return min(h * (1.0 - 2.0**-20), still)
+    return min(parabola_root(f, slope, down) * (1.0 - 2.0**-20), still)
 
 
 @njit(error_model="numpy")
@@ -57,10 +59,11 @@ def first_root(wall, start, limit, x, y, vx, vy, is_leaving, laws, anchors, boun
     Returns (code, s, f', error of s): code is the wall for a hit, NO_WALL for none before
     the limit, else a reason for `undecided`.
     """
-    residual = 0.0
-    residual_error = 0.0
+    residual = residual_error = 0.0
+    doubt = 0.0  # of the place: a start within it of the wall may be beyond
     if not is_leaving:
-        residual, residual_error = wall_residual(wall, x, y, laws, anchors, bounds, is_relative)
+        residual, doubt = wall_residual(wall, x, y, laws, anchors, bounds, is_relative)
+        residual_error = anchors[PHASE, LACK] * law_size(wall, y, bounds)
     down, up = curvature_bounds(wall, vx, vy, bounds)
     s = start
     for n_steps in range(MAX_PARABOLAS):
@@ -79,9 +82,9 @@ def first_root(wall, start, limit, x, y, vx, vy, is_leaving, laws, anchors, boun
                     return NO_WALL, limit, 0.0, 0.0
                 return TANGENT, s, slope, 0.0
             f = 0.0
+        elif s == start and f <= error + doubt:
+            return (OUTSIDE if f < -(error + doubt) else START), s, slope, 0.0
         elif f <= error:
-            if s == start:
-                return (OUTSIDE if f < -error else START), s, slope, 0.0
             # A simple root from above. Were f convex enough to turn back within its error: undecided.
             if slope >= -slope_error or (up > 0.0 and slope * slope <= 4.0 * up * error):
                 return TANGENT, s, slope, 0.0
@@ -89,12 +92,8 @@ def first_root(wall, start, limit, x, y, vx, vy, is_leaving, laws, anchors, boun
             if root >= limit:
                 return NO_WALL, limit, 0.0, 0.0
             return wall, root, slope, error / -slope
-        d = np.sqrt(slope * slope + 2.0 * down * f)
-        if slope < 0.0:
-            h = 2.0 * f / (d - slope)
-        elif down > 0.0:
-            h = (slope + d) / down
-        else:
+        h = parabola_root(f, slope, down)
+        if h == np.inf:
             return NO_WALL, limit, 0.0, 0.0
         moved = s + h
         if slope < -slope_error and down * h * h <= 2.0**-54 * moved * -slope:

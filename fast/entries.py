@@ -43,6 +43,21 @@ def _single_step(sources):
     return single_step
 
 
+def _each_step(sources):
+    @njit(cache=True, error_model="numpy")
+    def each_step(table, is_relative, laws, bounds, starts, walls, out, met, n_times):
+        """Fill out[i] = [dt, t, x, y, vx, vy] and met[i] with a step from each start, n_times over."""
+        sources  # noqa: B018
+        anchors, p = np.zeros(ANCHORS_SHAPE), np.empty(6)
+        for _ in range(n_times):
+            for i in range(starts.shape[0]):
+                p[:] = starts[i]
+                met[i], out[i, 0] = first_step(table, is_relative, laws, bounds, anchors, p, walls[i], np.inf)
+                out[i, 1], out[i, 2:] = p[0], p[2:]
+
+    return each_step
+
+
 def _trajectory(sources):
     @njit(cache=True, error_model="numpy")
     def trajectory(table, is_relative, laws, bounds, p, wall, t_end, out, walls):
@@ -93,6 +108,7 @@ def _directions(sources):
 
 
 single_step = _single_step(SOURCES)
+each_step = _each_step(SOURCES)
 trajectory = _trajectory(SOURCES)
 follow_particles = _follow(SOURCES)
 directions = _directions(SOURCES)

@@ -56,6 +56,11 @@ def flow(scene: Scene, states: Sequence[State], t_end: float, threads: int | Non
         refusal = refuse(scene, state, t_end)
         if refusal is not None:
             raise InvalidState(f"particle {i}: {refusal.reason}")
+    return carry_judged(scene, states, t_end, threads)
+
+
+def carry_judged(scene: Scene, states: Sequence[State], t_end: float, threads: int) -> Flow:
+    """Carry particles to t_end whose starts have been judged by `refuse`."""
     starts = np.array([[s.t, 0.0, s.x, s.y, s.vx, s.vy] for s in states]).reshape(-1, 6)
     walls = np.array([WALL_CODES[s.wall] for s in states], dtype=np.int64)
     done = follow(compile_scene(scene), starts, walls, only_stop(t_end), threads)

@@ -5,7 +5,7 @@ left is found to full precision whatever t is; the anchors themselves come from 
 (t_hi, t_lo), so no digit of the phase is lost in long runs.
 
 Each row of `anchors` holds: value, derivative, half-leg (Fourier: size of the derivative's terms),
-time from the half-leg's begin, time in the period, the value's low part, whole periods gone by.
+time from the half-leg's begin, time in the period, the value's low part.
 All Fourier laws of a scene share their omega, so two more rows hold the harmonics' sines and
 cosines at the event, and their turn since, at one s.
 """
@@ -34,7 +34,7 @@ ANCHORS_SHAPE = (6, 4 + 4 * MAX_HARMONICS)
 # Columns of a bang-bang law's row: kind, 0, period, number of knots, period's low part, then
 # the knots' times, values, the legs' accelerations and the low parts of these (n of each kept).
 KNOTS = 5
-LOW, N_PERIODS = 5, 6  # columns of `anchors`
+LOW = 5  # column of `anchors`
 
 
 @njit(error_model="numpy")
@@ -181,7 +181,6 @@ def set_leg(laws, anchors, row, t_hi, t_lo):
     anchors[row, 0], anchors[row, LOW] = two_sum(f, f_low)
     anchors[row, 1] = rate
     anchors[row, 4] = tau
-    anchors[row, N_PERIODS] = n_periods
     return True
 
 

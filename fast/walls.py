@@ -138,6 +138,20 @@ def curvature_bounds(wall, vx, vy, bounds):
 
 
 @njit(error_model="numpy")
+def law_size(wall, y, bounds):
+    """Bound the summed sizes of all terms of the laws in a wall function.
+
+    A positive law's amplitudes add up to at most 2 sqrt(MAX_HARMONICS) = 8 times its highest value, by
+    Parseval; two such laws are multiplied at most.
+    """
+    if wall == ARC:
+        return 64.0 * bounds[R, 1] * bounds[R, 1]
+    if wall == FLOOR:
+        return 64.0 * bounds[H, 1]
+    return 64.0 * (bounds[W, 1] + max(abs(bounds[M, 0]), abs(bounds[M, 1])) * abs(y))
+
+
+@njit(error_model="numpy")
 def wall_rest(wall, s, laws, anchors, is_relative):
     """Return for how long after the time s a wall stands still."""
     if wall == ARC:

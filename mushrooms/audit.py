@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated, BinaryIO
+from typing import Annotated
 
 import typer
 from rich import progress
@@ -54,20 +54,13 @@ def audit(
             "report.html": report.to_html(data, result.samples),
             "report.txt": report.to_text(data),
         }
-        output.write_files(folder, {name: _writer(text) for name, text in texts.items()})
+        output.write_files(folder, {name: output.whole(text.encode()) for name, text in texts.items()})
     if as_json:
         print(texts["report.json"], end="")
     else:
         print(texts["report.txt"], end="")
         print(f"Report: {folder / 'report.html'}")
     raise typer.Exit(0 if result.is_passed else 1)
-
-
-def _writer(text: str) -> output.Writer:
-    def write(file: BinaryIO) -> None:
-        file.write(text.encode("utf-8"))
-
-    return write
 
 
 def _advance(bar: progress.Progress) -> Callable[[str, int, int], None]:

@@ -6,7 +6,7 @@ import math
 import shlex
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, BinaryIO
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from rich import progress
@@ -65,16 +65,9 @@ def check(
             progress=_advance(bar),
         )
     for path, suffix in files.items():
-        output.write_files(path.parent, {path.name: _writer(_content(run, suffix))})
+        output.write_files(path.parent, {path.name: output.whole(_content(run, suffix))})
     show(run)
     raise typer.Exit(run.exit_code())
-
-
-def _writer(content: bytes) -> output.Writer:
-    def write(file: BinaryIO) -> None:
-        file.write(content)
-
-    return write
 
 
 def _content(run: Run, suffix: str) -> bytes:

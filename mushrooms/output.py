@@ -96,3 +96,12 @@ def _remove_empty(folders: list[Path]) -> None:
             folder.rmdir()
         except OSError:
             return
+
+
+def whole(content: bytes) -> Writer:
+    """Return the writer of a content that is ready."""
+
+    def write(file: BinaryIO) -> None:
+        file.write(content)
+
+    return write

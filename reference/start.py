@@ -36,6 +36,8 @@ def judge_start(
     _check_part(scene, state)
     motion = motion_at(scene, state, arithmetic)
     on = [wall for wall in _walls_near(scene, state) if _is_on(scene, state, wall, motion)]
+    if state.vy == 0 and _is_beside_mouth(scene, state, motion):
+        return Undefined("sliding")  # along the base
     if state.wall is not None and state.wall not in on:
         on.append(state.wall)
         _check_residual(scene, state, motion)
@@ -102,9 +104,14 @@ def _is_on_base(scene: Mushroom, state: State, motion: Motion) -> bool:
         raise InvalidState(f"state (x, y) = ({state.x!r}, 0) at t = {state.t!r} is beyond wall arc")
     if state.vy < 0:
         raise InvalidState(f"state.vy = {state.vy!r}: the particle starts on wall base and moves into it")
-    if state.vy == 0:
-        raise Undecidable("sliding along the base")
     return False
+
+
+def _is_beside_mouth(scene: Scene, state: State, motion: Motion) -> bool:
+    """Tell whether a state that names no wall lies on y = 0 beyond the mouth's edge."""
+    if not isinstance(scene, Mushroom) or state.wall is not None or state.y != 0:
+        return False
+    return any(sign(motion.wall(wall, motion.arithmetic.zero).f) < 0 for wall in ("left", "right"))
 
 
 def _departure(scene: Scene, state: State, wall: Wall, motion: Motion) -> Undefined | bool:

@@ -152,6 +152,7 @@ def trajectory(
     t_end: float | None = None,
     *,
     digits: int = 30,
+    working: int | None = None,
     is_differentiated: bool = False,
 ) -> Trajectory:
     """Follow a particle, every state enclosed, the last one to `digits` decimals.
@@ -162,11 +163,15 @@ def trajectory(
         n_collisions: how many collisions to follow, >= 0.
         t_end: horizon [time], None for none.
         digits: decimals wanted of the last state, relative to the size of its vectors.
+        working: decimals to work with, and no more: the path ends, undecided, where they no longer tell
+            what comes next, whatever `digits` says. By default they are doubled until they serve.
         is_differentiated: chain the steps' Jacobians too.
 
     Raises:
         InvalidState: naming field, value and bound.
     """
+    if working is not None:
+        return _chain(scene, state, n_collisions, t_end, Arithmetic(working), None, is_differentiated)
     working = digits + GUARD_DIGITS + n_collisions // 4
     while True:
         try:
@@ -183,9 +188,10 @@ def _chain(
     n_collisions: int,
     t_end: float | None,
     arithmetic: Arithmetic,
-    digits: int,
+    digits: int | None,
     is_differentiated: bool,
 ) -> Trajectory:
+    """Follow with fixed precision; `digits` None: as far as it reaches, else Undecidable is raised."""
     check_numbers(scene, state, state.t if t_end is None else t_end)
     steps: list[Collision] = []
     outcome = judge_start(scene, state, arithmetic)
@@ -198,7 +204,14 @@ def _chain(
     matrix = identity(arithmetic) if is_differentiated else None
     while len(steps) < n_collisions:
         end = _horizon(arithmetic, chain.flight.t, t_end)
-        event = Course(scene, arithmetic, chain.flight, chain.leaving, flat, end, exact).event(in_cap=in_cap)
+        try:
+            event = Course(scene, arithmetic, chain.flight, chain.leaving, flat, end, exact).event(
+                in_cap=in_cap
+            )
+        except Undecidable as question:
+            if digits is not None:
+                raise
+            return Trajectory(steps, Undecided(f"{question} ({arithmetic.digits} digits)"), arithmetic.digits)
         if event.undefined is not None:
             return Trajectory(steps, event.undefined, arithmetic.digits)
         if event.hit is None:
@@ -213,7 +226,7 @@ def _chain(
         steps.append(_collision(event, event.hit, chain.flight, arithmetic))
         exact, flat = None, frozenset()
         in_cap = event.hit.wall == "arc" or (event.hit.wall == "base" and not isinstance(scene, Stem))
-    if steps:
+    if steps and digits is not None:
         _require(steps[-1], digits)
     jacobian = None if matrix is None else enclosures(arithmetic, matrix)
     return Trajectory(steps, None, arithmetic.digits, jacobian)

@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 import fast
-from fast import codes, entries, follow, lanes, motion
-from fast.compiled import compile_scene
+from fast import codes, entries, follow, lanes
+from fast.batch import LaneRound
 from fast.starts import initial_states
 from fast.stepper import WALL_CODES
 from scene import State, load
@@ -47,61 +47,8 @@ def test_the_compiler_packs_divisions_and_square_roots(loop):
         assert re.search(r"vsqrtpd\s+.*%ymm", assembly)
 
 
-class Driver:
-    """One pool of lanes, filled with given states, beside the careful step."""
-
-    def __init__(self, scene):
-        self.compiled = compile_scene(scene)
-        self.table, self.is_relative, self.laws, self.bounds = self.compiled
-        bounds = self.bounds
-        self.bend = (1.0 + 2.0**-40) * (bounds[0, 1] * bounds[0, 3] + bounds[0, 2] ** 2)
-        self.k_w = max(bounds[1, 3], bounds[2, 3])
-        self.omega = self.laws[codes.PHASES, 0]
-        self.anchors = np.zeros(motion.ANCHORS_SHAPE)
-        self.pool = np.zeros(lanes.N_ROWS * lanes.LANES)
-
-    def fill(self, i, p, wall, age):
-        """Put a state into lane i, its laws known from a time `age` before it."""
-        a, never = self.pool, np.array([np.inf, np.inf])
-        follow.load(a, i, p, wall, np.inf, never)
-        a[lanes.NEXT_T + i], a[lanes.NEXT_T_LOW + i] = p[0] - age, p[1]
-        motion.set_anchors(self.laws, self.anchors, p[0] - age, p[1])
-        follow.set_reference(a, i, self.laws, self.anchors, self.is_relative)
-        if a[lanes.END + i] <= p[0]:
-            self.fill(i, p, wall, 0.0)
-            return
-        since = (a[lanes.T + i] - a[lanes.REF + i]) + (a[lanes.T_LOW + i] - a[lanes.REF_LOW + i])
-        rows = (lanes.R0, lanes.W0, lanes.H0)
-        follow.set_laws(a, i, *rows, since, self.omega, self.is_relative)
-        spin = p[2] * p[5] - p[3] * p[4]
-        a[lanes.SPIN + i] = spin
-
-    def fly(self, n):
-        """Take a step in n lanes: which are right, walls, and rows of dt, x, y, vx, vy."""
-        a, n, m = self.pool, np.int64(n), self.laws[codes.M, 1]
-        is_stem = self.table == codes.STEM
-        lanes.aim(a, n, is_stem, m, self.bend, self.k_w)
-        lanes.fly(a, n, is_stem, self.is_relative, self.omega, m, self.k_w)
-        right = self.row(lanes.OK, n) == lanes.RIGHT_ONE
-        # A hit beyond the reference's reach is not taken as it stands.
-        right &= self.row(lanes.NEXT_T, n) < self.row(lanes.END, n)
-        hits, dt = self.row(lanes.HIT, n).copy(), self.row(lanes.S, n).copy()
-        lanes.bounce(a, n, m, self.table == codes.MUSHROOM)
-        return right, hits, np.column_stack([dt, *(self.row(r, n) for r in PLACE)])
-
-    def skip(self, n):
-        """Take captured chords in n lanes, likewise; every hit is on the arc."""
-        a, n = self.pool, np.int64(n)
-        is_cap = self.table == codes.CAP
-        lanes.chord(a, n, OFF, is_cap, self.is_relative, self.omega, self.bend, self.k_w)
-        right = self.row(lanes.OK, n) == lanes.RIGHT_ONE
-        right &= self.row(lanes.NEXT_T, n) < self.row(lanes.END, n)
-        dt = self.row(lanes.S, n).copy()
-        lanes.rebound(a, n)
-        return right, np.zeros(n), np.column_stack([dt, *(self.row(r, n) for r in PLACE)])
-
-    def row(self, start, n):
-        return self.pool[start : start + n]
+class Driver(LaneRound):
+    """A round of the lanes beside the careful step."""
 
     def careful(self, p, wall):
         """Return the careful step's wall and dt, x, y, vx, vy."""
@@ -125,23 +72,20 @@ class Driver:
         return np.column_stack(columns)
 
 
-PLACE = (lanes.X, lanes.Y, lanes.VX, lanes.VY)
-
-
-def compare(driver, states, walls, random, tally, is_disk=False):
+def compare(driver, states, walls, random, tally):
     """Step `states` (n, 6) in lanes and carefully; returns the worst backward ulps between them."""
     n, worst = len(states), 0.0
     for i, (p, wall) in enumerate(zip(states, walls, strict=True)):
         serves = follow.SERVES / driver.omega if driver.omega else 0.0
-        driver.fill(np.int64(i), p, wall, random.random() * serves)
-    right, hits, found = driver.skip(n) if is_disk else driver.fly(n)
+        driver.fill(i, p, wall, random.random() * serves)
+    right, hits, found = driver.skip(n) if driver.is_disk else driver.fly(n)
     for p, wall, is_right, hit, numbers in zip(states, walls, right, hits, found, strict=True):
         tally["steps"] += 1
         if not is_right:
             continue
         tally["by lanes"] += 1
         code, truth = driver.careful(p, wall)
-        if is_disk and code == codes.BASE:  # the disk is unfolded: compare after the base
+        if driver.is_disk and code == codes.BASE:  # the disk is unfolded: compare after the base
             continue
         assert code == hit, (p, wall)
         speed = float(np.hypot(p[4], p[5]))
@@ -164,19 +108,18 @@ SCENES = ("moving-cap", "fixed-cap-clockwise", "breathing-circle", "frozen-mushr
 def test_lanes_take_the_careful_steps(name, tally):
     scene, random = load(name), np.random.default_rng(5)
     driver = Driver(scene)
-    is_disk = driver.table == codes.CAP
     states, walls, worst, n_paths = [], [], 0.0, 0
     while tally["steps"] < N_STEPS // len(SCENES):
         (row,) = initial_states(scene, n_paths + 1, 1e6, 3)[n_paths:]
         n_paths += 1
         path = fast.trajectory(scene, State(row[0], *map(float, row[2:])), 200)
         for wall, (_, t, *place) in zip(path.walls, path.steps.tolist(), strict=True):
-            if is_disk and wall == "base":
+            if driver.is_disk and wall == "base":
                 continue
             states.append(np.array([t, 0.0, *place]))
             walls.append(WALL_CODES[wall])
             if len(states) == lanes.LANES:
-                worst = max(worst, compare(driver, states, walls, random, tally, is_disk))
+                worst = max(worst, compare(driver, states, walls, random, tally))
                 states.clear()
                 walls.clear()
     tally["worst backward ulps (thousandths)"] = round(1000 * worst)

@@ -140,6 +140,19 @@ def test_a_failed_claim_exits_with_1(call, tmp_path, monkeypatch):
     assert "(expected: confirmed)" in (tmp_path / "report.html").read_text("utf-8")
 
 
+@pytest.fixture
+def blocks(monkeypatch):
+    """Return the list to which each simulated block adds its seed."""
+    seeds = []
+
+    def counted(scene, **options):
+        seeds.append(options["seed"])
+        return adiabatic_particles.simulate(scene, **options)
+
+    monkeypatch.setattr(fast, "simulate", counted)
+    return seeds
+
+
 def test_a_broken_off_audit_goes_on(call, tmp_path, monkeypatch):
     blocks = []
 
@@ -161,14 +174,7 @@ def test_a_broken_off_audit_goes_on(call, tmp_path, monkeypatch):
     assert again["findings"] == fresh["findings"]
 
 
-def test_other_settings_or_broken_files_are_not_taken_up(call, tmp_path, monkeypatch):
-    blocks = []
-
-    def counted(scene, **options):
-        blocks.append(options["seed"])
-        return adiabatic_particles.simulate(scene, **options)
-
-    monkeypatch.setattr(fast, "simulate", counted)
+def test_other_settings_or_broken_files_are_not_taken_up(call, tmp_path, blocks):
     call("--only", "X5", "--out", tmp_path)
     call("--only", "X5", "--out", tmp_path, "--resume", "--seed", 1)
     assert len(set(blocks)) == len(blocks) == 8
@@ -178,14 +184,7 @@ def test_other_settings_or_broken_files_are_not_taken_up(call, tmp_path, monkeyp
     assert len(blocks) == 12
 
 
-def test_without_resume_everything_is_made_again(call, tmp_path, monkeypatch):
-    blocks = []
-
-    def counted(scene, **options):
-        blocks.append(options["seed"])
-        return adiabatic_particles.simulate(scene, **options)
-
-    monkeypatch.setattr(fast, "simulate", counted)
+def test_without_resume_everything_is_made_again(call, tmp_path, blocks):
     call("--only", "X5", "--out", tmp_path)
     call("--only", "X5", "--out", tmp_path)
     assert len(blocks) == 8

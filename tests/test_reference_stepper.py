@@ -115,6 +115,7 @@ def test_recollision_at_vanishing_times_is_found(gap):
         (STATIC, State(0, 0.25, -0.25, 1.0, 1.0), "mouth-edge"),
         (STATIC, State(0, 0.0, 0.0, 1.0, 0.0), "mouth-edge"),
         (STATIC, State(0, 0.75, 0.0, 1.0, 0.0, "base"), "sliding"),
+        (STATIC, State(0, 0.75, 0.0, 1.0, 0.0), "sliding"),
         (BOX, State(0, 1.0, -0.5, 0.0, 1.0, "right"), "sliding"),
         (LIFT, State(0, 0.0, -2.0, 0.0, 0.0, "floor"), "sliding"),
     ],

@@ -44,7 +44,7 @@ def is_delicate(scene: Scene, state: State, t_end: float) -> bool:
         for nudge in (-NUDGE * scale, 0.0, NUDGE * scale):
             nudged = {**to_builtins(state), field: getattr(state, field) + nudge}
             outcome = reference.next_collision(scene, State(**nudged), t_end, digits=20)
-            if isinstance(outcome, scenes.Undecided | scenes.Undefined):
+            if isinstance(outcome, scenes.Undecided):
                 continue
             seen.add((type(outcome).__name__, getattr(outcome, "wall", None)))
             times += [float(outcome.dt)] if isinstance(outcome, reference.Collision) else []

@@ -53,7 +53,7 @@ def period(evidence: Evidence) -> list[Check]:
     lowest, highest = 0.0, np.inf
     for name in (ACW, CW):
         sample, (_, bar, n, per_bar) = evidence.sample(name), PRINTED[name]
-        sd, error = spread(sample.gain)
+        sd, error = _spread_beside(sample, n)
         adiabatic = float(evidence.theory_of(sample).sd)
         extra = sd**2 - adiabatic**2  # ~ 1 / (v T)
         bars = [(float(bar) + side * half_unit(bar)) * np.sqrt(n) / per_bar for side in (-1, 1)]
@@ -80,7 +80,7 @@ def error_bars(evidence: Evidence) -> list[Check]:
     found: list[Check] = []
     for name, (m1, bar, n, per_bar) in PRINTED.items():
         sample = evidence.sample(name)
-        sd, error = spread(sample.gain)
+        sd, error = _spread_beside(sample, n)
         for count in (1, 3):
             measured = (count * sd / np.sqrt(n), count * error / np.sqrt(n))
             form: Form = "corrected" if count == per_bar else "printed"
@@ -99,6 +99,12 @@ def error_bars(evidence: Evidence) -> list[Check]:
             )
         )
     return found
+
+
+def _spread_beside(sample: Sample, n: int) -> Mean:
+    """Return our standard deviation with the error of its difference from one measured on n particles."""
+    sd, error = spread(sample.gain)
+    return Mean(sd, error * float(np.sqrt(1 + len(sample.gain) / n)))
 
 
 def width_exponent(evidence: Evidence) -> list[Check]:

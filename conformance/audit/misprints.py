@@ -22,7 +22,6 @@ from scene.tables import Mushroom, period
 
 ZERO = 1e-12  # float64 sums of a few hundred terms of order 10
 N_LOOP = 256  # the trapezoid rule converges geometrically on smooth periodic loops
-PRINTED_DIGITS = "a printed number must be what theory rounds to at as many decimals; nothing is random"
 
 
 def rounds(what: str, printed: str, value: Any, form: Form) -> Check:

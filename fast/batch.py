@@ -1,0 +1,142 @@
+"""One step of each of many given states: by the careful step, and by one round of the lanes.
+
+Ensembles and flows mix both; here each is alone, so that its answers can be compared and its time measured.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from fast import codes, entries, follow, lanes, motion
+from fast.compiled import FloatArray, compile_scene
+from fast.stepper import WALL_CODES, WALL_NAMES, trouble
+from scene import Collision, Outcome, Scene, State
+
+PLACE = (lanes.X, lanes.Y, lanes.VX, lanes.VY)
+OFF = np.bool_(False)
+
+
+def careful_steps(scene: Scene, states: Sequence[State], n_times: int = 1) -> tuple[list[Outcome], float]:
+    """Take a careful step from each of N states, in compiled code throughout.
+
+    Args:
+        scene: table and laws of motion.
+        states: starts that `next_collision` takes.
+        n_times: how often to take all N steps.
+
+    Returns:
+        The outcomes, and the seconds that n_times N steps took.
+    """
+    starts = np.array([[s.t, 0.0, s.x, s.y, s.vx, s.vy] for s in states]).reshape(-1, 6)
+    walls = np.array([WALL_CODES[s.wall] for s in states], dtype=np.int64)
+    out, met = np.empty_like(starts), np.empty_like(walls)
+    compiled = compile_scene(scene)
+    entries.each_step(*compiled, starts[:0], walls[:0], out, met, 0)  # compiles, or loads from the cache
+    begin = time.perf_counter()
+    entries.each_step(*compiled, starts, walls, out, met, n_times)
+    seconds = time.perf_counter() - begin
+    outcomes: list[Outcome] = []
+    for state, code, row in zip(states, met.tolist(), out.tolist(), strict=True):
+        if code in WALL_NAMES:
+            outcomes.append(Collision(WALL_NAMES[code], *row))
+        else:
+            outcomes.append(trouble(code, state))
+    return outcomes, seconds
+
+
+class LaneRound:
+    """One pool of lanes, filled with given states.
+
+    Attributes:
+        compiled: the scene's numbers.
+        is_disk: whether the scene is a cap, whose particles move unfolded: only the arc is met.
+    """
+
+    def __init__(self, scene: Scene) -> None:
+        self.compiled = compile_scene(scene)
+        self.table, self.is_relative, self.laws, self.bounds = self.compiled
+        self.is_disk = bool(self.table == codes.CAP)
+        bounds = self.bounds
+        self.bend = (1.0 + 2.0**-40) * (bounds[0, 1] * bounds[0, 3] + bounds[0, 2] ** 2)
+        self.k_w = max(bounds[1, 3], bounds[2, 3])
+        self.omega = self.laws[codes.PHASES, 0]
+        self.anchors = np.zeros(motion.ANCHORS_SHAPE)
+        self.pool = np.zeros(lanes.N_ROWS * lanes.LANES)
+
+    def fill(self, lane: int, p: FloatArray, wall: int, age: float = 0.0) -> None:
+        """Put a state [t, its low part, x, y, vx, vy] into a lane, its laws known from `age` before it."""
+        a, never = self.pool, np.array([np.inf, np.inf])
+        i = np.int64(lane)
+        follow.load(a, i, p, wall, np.inf, never)
+        a[lanes.NEXT_T + i], a[lanes.NEXT_T_LOW + i] = p[0] - age, p[1]
+        motion.set_anchors(self.laws, self.anchors, p[0] - age, p[1])
+        follow.set_reference(a, i, self.laws, self.anchors, self.is_relative)
+        if a[lanes.END + i] <= p[0]:
+            self.fill(lane, p, wall)
+            return
+        since = (a[lanes.T + i] - a[lanes.REF + i]) + (a[lanes.T_LOW + i] - a[lanes.REF_LOW + i])
+        rows = (lanes.R0, lanes.W0, lanes.H0)
+        follow.set_laws(a, i, *rows, since, self.omega, self.is_relative)
+        spin = p[2] * p[5] - p[3] * p[4]
+        a[lanes.SPIN + i] = spin
+
+    def fly(self, n: int) -> tuple[npt.NDArray[np.bool_], FloatArray, FloatArray]:
+        """Take a step in n lanes: which are shown right, walls met, and rows of dt, x, y, vx, vy."""
+        a, count, m = self.pool, np.int64(n), self.laws[codes.M, 1]
+        is_stem = self.table == codes.STEM
+        lanes.aim(a, count, is_stem, m, self.bend, self.k_w)
+        lanes.fly(a, count, is_stem, self.is_relative, self.omega, m, self.k_w)
+        right = self.row(lanes.OK, n) == lanes.RIGHT_ONE
+        # A hit beyond the reference's reach is not taken as it stands.
+        right &= self.row(lanes.NEXT_T, n) < self.row(lanes.END, n)
+        hits, dt = self.row(lanes.HIT, n).copy(), self.row(lanes.S, n).copy()
+        lanes.bounce(a, count, m, self.table == codes.MUSHROOM)
+        return right, hits, np.column_stack([dt, *(self.row(r, n) for r in PLACE)])
+
+    def skip(self, n: int) -> tuple[npt.NDArray[np.bool_], FloatArray, FloatArray]:
+        """Take captured chords in n lanes, likewise; every hit is on the arc."""
+        a, count = self.pool, np.int64(n)
+        lanes.chord(a, count, OFF, self.is_disk, self.is_relative, self.omega, self.bend, self.k_w)
+        right = self.row(lanes.OK, n) == lanes.RIGHT_ONE
+        right &= self.row(lanes.NEXT_T, n) < self.row(lanes.END, n)
+        dt = self.row(lanes.S, n).copy()
+        lanes.rebound(a, count)
+        return right, np.zeros(n), np.column_stack([dt, *(self.row(r, n) for r in PLACE)])
+
+    def row(self, start: np.integer[Any], n: int) -> FloatArray:
+        """Return n lanes of a row of the pool."""
+        return self.pool[start : start + n]
+
+
+def lane_steps(scene: Scene, states: Sequence[State]) -> list[Outcome | None]:
+    """Take a step from each of N states by one round of the lanes.
+
+    Args:
+        scene: a table whose laws the lanes know.
+        states: starts that `next_collision` takes.
+
+    Returns:
+        Collisions; None where the lanes leave the step to the careful one, and for a start on the base
+        of a cap or a flight to it: there the lanes go unfolded.
+    """
+    pool = LaneRound(scene)
+    found: list[Outcome | None] = []
+    for first in range(0, len(states), lanes.LANES):
+        part = states[first : first + lanes.LANES]
+        for i, s in enumerate(part):
+            pool.fill(i, np.array([s.t, 0.0, s.x, s.y, s.vx, s.vy]), WALL_CODES[s.wall])
+        rows = (pool.skip if pool.is_disk else pool.fly)(len(part))
+        for state, is_right, hit, (dt, x, y, vx, vy) in zip(
+            part, *(row.tolist() for row in rows), strict=True
+        ):
+            is_folded = pool.is_disk and (y < 0.0 or state.wall == "base")
+            is_taken = is_right and not is_folded
+            found.append(
+                Collision(WALL_NAMES[int(hit)], dt, state.t + dt, x, y, vx, vy) if is_taken else None
+            )
+    return found

@@ -20,6 +20,7 @@ import mushrooms
 import scene as scenes
 from mushrooms import output
 from mushrooms.audit import audit
+from mushrooms.bench import bench
 from mushrooms.check import check
 from mushrooms.terminal import progress_bar
 from scene.load import read_data
@@ -251,6 +252,7 @@ def draw(
 
 
 app.command(epilog="Example: mushrooms audit --only X2,L4 --out audit-report")(audit)
+app.command(epilog="Example: mushrooms bench --quick --out bench-report")(bench)
 app.command(epilog="Example: mushrooms check --html report.html -- ./my_stepper")(check)
 
 

@@ -1,0 +1,52 @@
+"""Two benchmarks side by side: ratios of times with confidence, and whether something got slower.
+
+Times are first divided by the core's speed in their own run (`clock_ns`), so that a slower machine is not
+a slower stepper. The ratio of medians has a bootstrap interval over the laps. SLOWER is the bound: only an
+interval wholly above it says that the code, not its neighbours, got slower.
+"""
+
+from __future__ import annotations
+
+import statistics
+from typing import NamedTuple
+
+import numpy as np
+
+from conformance.bench.record import Record
+
+SLOWER = 1.5
+LEVEL = 0.99
+N_RESAMPLES = 2000
+
+
+class Ratio(NamedTuple):
+    """New over old time of a contender on a workload, with its interval."""
+
+    workload: str
+    contender: str
+    ratio: float
+    low: float
+    high: float
+
+    @property
+    def is_slower(self) -> bool:
+        """Tell whether it got slower beyond doubt and beyond the bound."""
+        return self.low > SLOWER
+
+
+def compare(old: Record, new: Record) -> list[Ratio]:
+    """Compare all points that both records have."""
+    before = {(p.workload, p.contender): p for p in old.points}
+    clocks = statistics.median(new.clock_ns) / statistics.median(old.clock_ns)
+    random = np.random.default_rng(0)
+    found = []
+    for point in new.points:
+        key = point.workload, point.contender
+        if key in before:
+            a, b = np.array(point.ns) / clocks, np.array(before[key].ns)
+            ratio = float(np.median(a) / np.median(b))
+            drawn = np.median(random.choice(a, (N_RESAMPLES, len(a))), axis=1)
+            drawn = drawn / np.median(random.choice(b, (N_RESAMPLES, len(b))), axis=1)
+            low, high = np.quantile(drawn, [(1 - LEVEL) / 2, (1 + LEVEL) / 2])
+            found.append(Ratio(*key, ratio, float(low), float(high)))
+    return found

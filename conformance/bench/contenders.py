@@ -1,0 +1,143 @@
+"""The contenders: steppers that step a workload's states and say how long that took."""
+
+from __future__ import annotations
+
+import statistics
+import time
+from collections.abc import Callable, Sequence
+from contextlib import ExitStack
+from fractions import Fraction
+from typing import Any, Literal, NamedTuple
+
+import msgspec
+
+from conformance import plain, vectors
+from conformance.bench.time_stepping import TOLERANCES, next_collision_by
+from conformance.bench.workloads import Workload
+from conformance.process import Trouble
+from conformance.session import Limits, Session, missing
+from conformance.vectors import Vector
+from scene import Outcome, Scene, State, to_data
+
+Family = Literal["proof", "compiled", "interpreted", "time-stepping", "command"]
+Ask = Callable[[Vector], dict[str, Any]]  # raises Trouble
+MAX_REPEAT = 1000  # of a `time` request
+
+
+class Exact(NamedTuple):
+    """A collision to more digits than binary64 holds.
+
+    Attributes:
+        wall: the wall met.
+        numbers: dt, x, y, vx, vy.
+    """
+
+    wall: str
+    numbers: tuple[Fraction, ...]
+
+
+Answer = Outcome | Exact | None  # None: a step that this contender leaves to another
+
+
+class Lap(NamedTuple):
+    """One run over a workload.
+
+    Attributes:
+        ns: nanoseconds per step (or per collision, where the contender follows the states on).
+        answers: one for each question.
+        lasted: nanoseconds in all.
+    """
+
+    ns: float
+    answers: list[Answer]
+    lasted: float
+
+
+class Contender(NamedTuple):
+    """A stepper.
+
+    Attributes:
+        name: as in the plot.
+        family: what kind of thing it is.
+        run: (workload, n_times) -> a lap in which every step is taken n_times; raises Trouble.
+        serves: the workloads it can run; empty for all.
+    """
+
+    name: str
+    family: Family
+    run: Callable[[Workload, int], Lap]
+    serves: tuple[str, ...] = ()
+
+
+def by_call(name: str, family: Family, step: Callable[[Scene, State, float], Answer]) -> Contender:
+    """Return a Python function of one step as a contender; the call is part of its time."""
+
+    def run(workload: Workload, n_times: int) -> Lap:
+        answers: list[Answer] = []
+        begin = time.perf_counter_ns()
+        for _ in range(n_times):
+            answers = [step(workload.scene, q.state, q.t_end) for q in workload.questions]
+        ns = time.perf_counter_ns() - begin
+        return Lap(ns / (n_times * len(workload.questions)), answers, ns)
+
+    return Contender(name, family, run)
+
+
+def plain_python() -> Contender:
+    """Return the plain stepper."""
+    return by_call("plain Python", "interpreted", plain.next_collision)
+
+
+def time_steppers() -> list[Contender]:
+    """Return scipy's solve_ivp with events, at several tolerances."""
+    return [
+        by_call(f"solve_ivp, rtol {rtol:.0e}", "time-stepping", next_collision_by(rtol))
+        for rtol in TOLERANCES
+    ]
+
+
+def by_command(
+    name: str, command: Sequence[str], stack: ExitStack, limits: Limits | None = None
+) -> tuple[Contender, Ask]:
+    """Return a command that speaks protocol 1 as a contender that times itself, and how it answers a vector.
+
+    Args:
+        name: as in the plot.
+        command: program and arguments.
+        stack: closes the session at the end.
+        limits: of the session.
+
+    Raises:
+        CommandNotFound: there is no such program.
+        Trouble: it does not introduce itself.
+    """
+    session = stack.enter_context(Session(command, limits))
+    session.start()
+
+    def run(workload: Workload, n_times: int) -> Lap:
+        assert session.introduction is not None
+        scene = to_data(workload.scene)
+        if lacking := missing(session.introduction, "time", scene):
+            raise Trouble("unsupported", lacking)
+        answers: list[Answer] = []
+        laps = []
+        for question in workload.questions:
+            request: dict[str, Any] = {"cmd": "time", "scene": scene, "collisions": 1}
+            request |= {"state": msgspec.to_builtins(question.state), "repeat": min(n_times, MAX_REPEAT)}
+            found = session.ask(request)
+            if "steps" not in found:
+                raise Trouble("fail", f"{name} answers a time request by {found}"[:200])
+            laps.append(statistics.median(found["ns"]))
+            outcome: Outcome = msgspec.convert(found["steps"][-1], Outcome)
+            answers.append(outcome)
+        ns = statistics.fmean(laps)
+        return Lap(ns, answers, ns * n_times * len(laps))
+
+    def ask(vector: Vector) -> dict[str, Any]:
+        assert session.introduction is not None
+        is_refused = vector.expect[0].outcome == "rejected"
+        if lacking := missing(session.introduction, vector.kind, None if is_refused else vector.scene):
+            raise Trouble("unsupported", lacking)
+        return session.ask(vectors.request(vector, 0))
+
+    return Contender(name, "command", run), ask

@@ -1,0 +1,147 @@
+"""Error growth: how far along a trajectory each stepper can be trusted.
+
+Two trajectories of a chaotic table part exponentially; a stepper's rounding errors grow at the same rate,
+decimals lost per collision, whatever its precision. The chained Jacobians of the proved steps give that rate
+(the Lyapunov slope) and what one backward ulp at each step can grow to (the predicted bound).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from fractions import Fraction
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from conformance.bench.record import Growth
+from conformance.bench.workloads import RULES, Prover, draw_workload
+from conformance.generate_draws import Moment
+from scene import Collision, Scene, State
+
+FloatArray = npt.NDArray[np.float64]
+WORKLOAD, ENERGY = "moving-cap-1e4", 1e4
+U = 2.0**-53
+FAR = 1e9  # horizon of a step that a trajectory takes
+
+
+class Place(NamedTuple):
+    """Where a trajectory stands after a collision; `width`: relative, of what encloses it."""
+
+    wall: str
+    x: Fraction | float
+    y: Fraction | float
+    vx: Fraction | float
+    vy: Fraction | float
+    width: float = 0.0
+
+
+Follower = Callable[[Scene, State, int], list[Place]]
+
+
+def grow(
+    followers: dict[str, Follower],
+    prove: Prover,
+    prove_path: Follower,
+    seed: int,
+    n_paths: int,
+    n_collisions: int,
+    tick: Callable[[str], None],
+) -> Growth:
+    """Follow trajectories with every follower and with proof.
+
+    Args:
+        followers: by name; a path may end early, which counts as having no digit left.
+        prove: one step, with its Jacobian.
+        prove_path: a trajectory, right to many digits at its end.
+        seed: of the draws.
+        n_paths: how many trajectories.
+        n_collisions: of each.
+        tick: called after each path.
+    """
+    rule = next(rule for rule in RULES if rule.name == WORKLOAD)
+    workload = draw_workload(rule, seed, n_paths, prove)
+    errors: dict[str, list[FloatArray]] = {name: [] for name in followers}
+    bounds, growths = [], []
+    for question in workload.questions:
+        truth = prove_path(workload.scene, question.state, n_collisions)
+        size, speed = _sizes(workload.scene, question.state)
+        for name, follow in followers.items():
+            errors[name].append(_errors(follow(workload.scene, question.state, n_collisions), truth, size))
+        bound, growth = _chained(workload.scene, question.state, n_collisions, prove, size, speed)
+        bounds.append(bound)
+        growths.append(growth)
+        tick("")
+    return Growth(
+        scene=rule.scene,
+        energy=ENERGY,
+        paths=n_paths,
+        collisions=n_collisions,
+        followers={name: _rounded(np.median(found, axis=0)) for name, found in errors.items()},
+        lasts={name: float(np.median([_last(path) for path in found])) for name, found in errors.items()},
+        bound=_rounded(np.median(bounds, axis=0)),
+        rate=round(_slope(np.median(np.log10(growths), axis=0)), 4),
+    )
+
+
+def _sizes(scene: Scene, state: State) -> tuple[float, float]:
+    return Moment(scene, state.t).r, math.hypot(state.vx, state.vy)
+
+
+def _errors(path: Sequence[Place], truth: Sequence[Place], size: float) -> FloatArray:
+    """Return errors relative to table and speed, at most 1: no digit left."""
+    found = np.ones(len(truth))
+    for i, (place, exact) in enumerate(zip(path, truth, strict=False)):
+        if place.wall != exact.wall:
+            break
+        speed = math.hypot(float(exact.vx), float(exact.vy))
+        off = [abs(Fraction(a) - Fraction(b)) for a, b in zip(place[1:5], exact[1:5], strict=True)]
+        error = max(float(max(off[:2])) / size, float(max(off[2:])) / speed, place.width)
+        found[i] = min(error, 1.0)
+    return found
+
+
+def _last(errors: FloatArray) -> int:
+    """Return how many collisions there are before the first whose error exceeds a tenth."""
+    beyond = np.flatnonzero(errors > 0.1)
+    return int(beyond[0]) if len(beyond) else len(errors)
+
+
+def _chained(
+    scene: Scene, state: State, n_collisions: int, prove: Prover, size: float, speed: float
+) -> tuple[FloatArray, FloatArray]:
+    """Return the predicted bound and the norm of the chained Jacobians after each collision.
+
+    The steps' Jacobians are taken along a path of proved steps, each from the rounded end of the one before.
+    """
+    scales = np.array([size / speed, size, size, speed, speed])
+    product = np.eye(5)
+    shares: list[FloatArray] = []  # what each earlier step's rounding has become
+    bounds, growths = [], []
+    for _ in range(n_collisions):
+        truth = prove(scene, state, state.t + FAR, 20)
+        assert isinstance(truth.outcome, Collision)
+        assert truth.jacobian is not None
+        step = np.array(truth.jacobian)
+        inputs = np.array([state.t, state.x, state.y, state.vx, state.vy])
+        state = truth.outcome.state()
+        outputs = np.array([truth.outcome.dt, state.x, state.y, state.vx, state.vy])
+        rounding = U * (np.abs(step) @ np.abs(inputs) + np.abs(outputs))
+        step[0, 0] += 1.0  # from the flight time to the time
+        shares = [step @ share for share in shares]
+        shares.append(np.diag(rounding))
+        product = step @ product
+        total = sum((np.abs(share).sum(axis=1) for share in shares), np.zeros(5))
+        bounds.append(float(np.max((total / scales)[1:])))
+        growths.append(float(np.linalg.norm(product * scales[None, :] / scales[:, None], 2)))
+    return np.minimum(bounds, 1.0), np.array(growths)
+
+
+def _slope(logs: FloatArray) -> float:
+    """Return the slope of logarithms against the number of collisions."""
+    return float(np.polyfit(np.arange(1, len(logs) + 1), logs, 1)[0])
+
+
+def _rounded(numbers: FloatArray) -> tuple[float, ...]:
+    return tuple(float(f"{number:.3g}") for number in numbers)

@@ -1,0 +1,102 @@
+"""The table of hard cases: for each, what every stepper makes of the corpus's vectors."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Callable, Mapping
+from itertools import groupby
+from typing import Any
+
+import msgspec
+
+from conformance import vectors
+from conformance.bench.contenders import Ask
+from conformance.bench.record import Case
+from conformance.grading import Grade, Verdict, grade
+from conformance.process import Trouble
+from conformance.vectors import Vector
+from scene import BadInput, Outcome, Rejected, Scene, State, from_data
+
+GROUP = "hard-case-"
+WORDS = {"pass": "right", "declined": "undecided", "fail": "wrong"}
+Step = Callable[[Scene, State, float], Outcome]
+Follow = Callable[[Scene, State, int, float], list[Outcome]]
+
+
+def asked(step: Step, follow: Follow) -> Ask:
+    """Return how a stepper of functions answers a vector, in the wire's form."""
+
+    def ask(vector: Vector) -> dict[str, Any]:
+        try:
+            scene = from_data(vector.scene)
+            if vector.kind == "step":
+                return dict(msgspec.to_builtins(step(scene, vector.state, vector.t_end)))
+            found = follow(scene, vector.state, vector.collisions, vector.t_end)
+            return {"steps": msgspec.to_builtins(found)}
+        except BadInput as error:
+            return dict(msgspec.to_builtins(Rejected(str(error))))
+
+    return ask
+
+
+def tabulate(steppers: Mapping[str, Ask], tick: Callable[[str], None]) -> tuple[Case, ...]:
+    """Grade all hard cases.
+
+    Args:
+        steppers: by name, how each answers a vector.
+        tick: called after each case.
+    """
+    hard = sorted((v for v in vectors.load("stress") if v.group.startswith(GROUP)), key=lambda v: v.group)
+    cases = []
+    for group, members in groupby(hard, key=lambda v: v.group):
+        cases.append(_case(group, list(members), steppers))
+        tick("")
+    return tuple(cases)
+
+
+def _case(group: str, members: list[Vector], steppers: Mapping[str, Ask]) -> Case:
+    verdicts: dict[str, dict[str, int]] = {}
+    ulps: dict[str, float | None] = {}
+    for name, ask in steppers.items():
+        grades = [_graded(vector, ask) for vector in members]
+        verdicts[name] = dict(Counter(WORDS.get(g.verdict, g.verdict) for g in grades))
+        measured = [g.ulps for g in grades if g.verdict == "pass" and not math.isnan(g.ulps)]
+        worst = max(measured, default=math.inf)
+        ulps[name] = float(f"{worst:.2g}") if math.isfinite(worst) else None
+    return Case(group.removeprefix(GROUP), members[0].rule, len(members), verdicts, ulps)
+
+
+def _graded(vector: Vector, ask: Ask) -> Grade:
+    try:
+        return grade(vector, ask(vector))
+    except Trouble as trouble:
+        verdict: Verdict = trouble.verdict  # type: ignore[assignment]  # a Trouble names one of them
+        return Grade(verdict, math.nan, math.nan, trouble.why)
+
+
+def to_markdown(cases: tuple[Case, ...]) -> str:
+    """Return docs/hard-cases.md."""
+    names = list(cases[0].verdicts)
+    lines = [
+        "# Hard cases, by stepper",
+        "",
+        "Each row is a case of the corpus (`hard-case-NN/*`); a cell says how many of its vectors were",
+        "answered right, left undecided or answered wrong, and the worst backward ulps of the right ones.",
+        "Where the mathematics gives no answer, `undefined` and `undecided` are both right.",
+        "`mushrooms bench` makes this table.",
+        "",
+        "| case | what | " + " | ".join(names) + " |",
+        "|---|---|" + "---|" * len(names),
+    ]
+    for case in cases:
+        cells = [cell(case.verdicts[name], case.ulps[name]) for name in names]
+        rule = case.rule.replace("|", "\\|")
+        lines.append(f"| {case.case} | {rule} | " + " | ".join(cells) + " |")
+    return "\n".join(lines) + "\n"
+
+
+def cell(verdicts: Mapping[str, int], ulps: float | None) -> str:
+    """Return what a stepper made of a case: "5 right, 1 undecided (2.1)"."""
+    words = ", ".join(f"{n} {word}" for word, n in sorted(verdicts.items()))
+    return words if ulps is None else f"{words} ({ulps:.2g})"

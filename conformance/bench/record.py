@@ -1,0 +1,202 @@
+"""What a benchmark keeps: bench.json, from which every plotted point can be read and re-made."""
+
+from __future__ import annotations
+
+import os
+import platform
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any, Literal
+
+import msgspec
+
+from scene.refusal import BadInput
+
+FORMAT = 1
+Size = Literal["quick", "full"]
+PACKAGES = ("oscillating-mushrooms", "numpy", "scipy", "numba", "llvmlite", "mpmath", "gmpy2")
+
+
+class Machine(msgspec.Struct, frozen=True):
+    """Where it ran; `compiled` holds the command that built each compiled example."""
+
+    processor: str
+    cores: int
+    system: str
+    python: str
+    versions: dict[str, str]
+    compiled: dict[str, str] = {}
+
+
+class Drawn(msgspec.Struct, frozen=True):
+    """A workload: its scene (of the catalogue) and number of questions; `seed` and sizes re-make it."""
+
+    name: str
+    what: str
+    scene: str
+    questions: int
+
+
+class Point(msgspec.Struct, frozen=True):
+    """A contender on a workload.
+
+    Attributes:
+        workload, contender, family: names.
+        n_times: how often a timed lap took all steps.
+        ns: nanoseconds per step of each lap.
+        right, wrong, undecided, left: numbers of answers: the right wall; another wall or outcome; left
+            open; left to another stepper.
+        ulps: backward ulps of each right answer; null where only an exact number is right, and it is not.
+        relative: its largest relative error.
+    """
+
+    workload: str
+    contender: str
+    family: str
+    n_times: int
+    ns: tuple[float, ...]
+    right: int
+    wrong: int
+    undecided: int
+    left: int
+    ulps: tuple[float | None, ...]
+    relative: tuple[float, ...]
+
+
+class Growth(msgspec.Struct, frozen=True):
+    """Errors along trajectories, relative to table and speed, after 1, 2, ... collisions.
+
+    Attributes:
+        scene, energy, paths, collisions: what was followed.
+        followers: by name the median error over the paths.
+        lasts: by name the median number of collisions until no digit is left.
+        bound: median of what one backward ulp at each step can grow to, by the chained Jacobians.
+        rate: decimals lost per collision, the Lyapunov slope of the chained Jacobians.
+    """
+
+    scene: str
+    energy: float
+    paths: int
+    collisions: int
+    followers: dict[str, tuple[float, ...]]
+    lasts: dict[str, float]
+    bound: tuple[float, ...]
+    rate: float
+
+
+class Series(msgspec.Struct, frozen=True):
+    """Cost against one size.
+
+    Attributes:
+        what: particles, cycles, energy or threads.
+        sizes: its values.
+        seconds: median kernel time of each.
+        collisions: followed by each.
+        exponent, error: of the fit seconds ~ size^exponent over the larger half, and its standard error.
+    """
+
+    what: str
+    sizes: tuple[float, ...]
+    seconds: tuple[float, ...]
+    collisions: tuple[float, ...]
+    exponent: float
+    error: float
+
+
+class Work(msgspec.Struct, frozen=True):
+    """What an ensemble costs; `compile_s` by entry with an empty cache, empty when not measured."""
+
+    scene: str
+    series: tuple[Series, ...]
+    bytes_per_particle: float
+    compile_s: dict[str, float]
+
+
+class Case(msgspec.Struct, frozen=True):
+    """A hard case by stepper: number of vectors by verdict, worst backward ulps (null: none, or infinite)."""
+
+    case: str
+    rule: str
+    vectors: int
+    verdicts: dict[str, dict[str, int]]
+    ulps: dict[str, float | None]
+
+
+class Record(msgspec.Struct, frozen=True):
+    """A whole benchmark.
+
+    Attributes:
+        format: of this file.
+        size, seed, questions, repeats: the settings.
+        digits: of the proved answers.
+        machine: where it ran.
+        clock_ns: time of one dependent addition in each round of laps: the speed of the machine's core.
+        workloads, points: what was asked and found.
+        not_run: contenders left out, with the reason.
+        growth, work, hard_cases: the further measurements.
+        seconds: wall time of all.
+    """
+
+    format: int
+    size: Size
+    seed: int
+    questions: int
+    repeats: int
+    digits: int
+    machine: Machine
+    clock_ns: tuple[float, ...]
+    workloads: tuple[Drawn, ...]
+    points: tuple[Point, ...]
+    not_run: dict[str, str]
+    growth: Growth
+    work: Work
+    hard_cases: tuple[Case, ...]
+    seconds: float
+
+
+def this_machine(compiled: dict[str, str]) -> Machine:
+    """Describe the machine and the packages."""
+    return Machine(
+        processor=_processor(),
+        cores=os.cpu_count() or 1,
+        system=f"{platform.system()} {platform.machine()}",
+        python=platform.python_version(),
+        versions={name: version(name) for name in PACKAGES},
+        compiled=compiled,
+    )
+
+
+def _processor() -> str:
+    try:
+        lines = Path("/proc/cpuinfo").read_text("utf-8").splitlines()
+    except OSError:
+        return platform.processor()
+    names = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
+    return names[0] if names else platform.processor()
+
+
+def encode(record: Record) -> bytes:
+    """Return bench.json's bytes."""
+    return msgspec.json.format(msgspec.json.encode(record), indent=1) + b"\n"
+
+
+def read(path: Path) -> Record:
+    """Read a bench.json.
+
+    Raises:
+        BadInput: naming the file and what is wrong with it.
+    """
+    try:
+        record = msgspec.json.decode(path.read_bytes(), type=Record)
+    except OSError as error:
+        raise BadInput(f"{path}: {error.strerror}") from None
+    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
+        raise BadInput(f"{path} is no bench.json: {error}") from None
+    if record.format != FORMAT:
+        raise BadInput(f"{path}: format = {record.format}, must be {FORMAT}")
+    return record
+
+
+def json_schema() -> dict[str, Any]:
+    """Return the JSON Schema of bench.json."""
+    return msgspec.json.schema(Record)

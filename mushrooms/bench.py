@@ -1,0 +1,195 @@
+"""`mushrooms bench`: speed against error on the same runs, error growth, cost against work, hard cases."""
+
+from __future__ import annotations
+
+import os
+import statistics
+import tempfile
+import time
+from contextlib import ExitStack
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+from rich.console import Console
+from rich.table import Table
+
+from mushrooms import output
+from mushrooms.terminal import progress_bar
+from scene.refusal import BadInput
+
+if TYPE_CHECKING:
+    from conformance.bench.comparison import Ratio
+    from conformance.bench.contenders import Ask, Contender
+    from conformance.bench.measure import Settings
+    from conformance.bench.record import Record, Size
+
+MAX_SEED = 2**64 - 1
+C_FLAGS = ("-O3", "-march=native")
+# By size: questions of a workload, laps, trajectories and their length, repeats of an ensemble.
+QUESTIONS = {"quick": 12, "full": 64}
+REPEATS = {"quick": 5, "full": 11}
+PATHS = {"quick": (3, 40), "full": (9, 80)}
+ENSEMBLE_REPEATS = {"quick": 1, "full": 3}
+
+
+def bench(
+    command: Annotated[
+        list[str] | None,
+        typer.Argument(metavar="[-- COMMAND...]", help="One more stepper; speaks protocol 1."),
+    ] = None,
+    out: Annotated[Path, typer.Option(metavar="DIR", help="Folder for the results.")] = Path("bench-report"),
+    quick: Annotated[bool, typer.Option("--quick", help="Fewer questions and laps: three minutes.")] = False,
+    seed: Annotated[int, typer.Option(help="Seed of the questions, 0 to 2^64 - 1.")] = 0,
+    compare: Annotated[
+        Path | None, typer.Option(metavar="OLD.json", help="An earlier bench.json to compare with.")
+    ] = None,
+) -> None:
+    """Measure speed against error; writes bench.json, bench.svg, bench.html and hard-cases.md.
+
+    Exit code 0, or 1 when --compare shows a stepper slower beyond doubt, or 2 on bad input.
+    """
+    from conformance.bench import comparison, hard_cases, record
+    from mushrooms import bench_report, figures_of_speed
+
+    if not 0 <= seed <= MAX_SEED:
+        raise BadInput(f"--seed = {seed}, must be 0 to 2^64 - 1")
+    old = record.read(compare) if compare is not None else None
+    with output.writable_folder(out) as folder:
+        found = _measured("quick" if quick else "full", seed, command or [])
+        files = {
+            "bench.json": record.encode(found),
+            "bench.svg": figures_of_speed.speed(found),
+            "bench.html": bench_report.to_html(found),
+            "hard-cases.md": hard_cases.to_markdown(found.hard_cases).encode(),
+        }
+        output.write_files(folder, {name: output.whole(content) for name, content in files.items()})
+    console = Console(width=140)
+    console.print(_table(found))
+    for name, why in found.not_run.items():
+        console.print(f"not run: {name}: {why}", markup=False)
+    print(f"{found.seconds:.0f} s. Report: {folder / 'bench.html'}")
+    if old is not None:
+        ratios = comparison.compare(old, found)
+        console.print(_ratios(ratios))
+        slower = [r for r in ratios if r.is_slower]
+        print(f"{len(slower)} of {len(ratios)} slower than {comparison.SLOWER} times {compare}")
+        raise typer.Exit(1 if slower else 0)
+
+
+def _measured(size: Size, seed: int, command: list[str]) -> Record:
+    """Run everything."""
+    from conformance.bench import growth, hard_cases, measure, record, work, workloads
+    from mushrooms import bench_contenders as ours
+
+    begin = time.monotonic()
+    n_questions, repeats = QUESTIONS[size], REPEATS[size]
+    with ExitStack() as stack:
+        bar = stack.enter_context(progress_bar())
+        task = bar.add_task("speed against error", total=len(workloads.RULES) * (repeats + 1))
+
+        def tick(what: str) -> None:
+            bar.update(task, advance=0 if what else 1, description=what or None)
+
+        contenders, askers, built, not_run = _contenders(stack, command)
+        points, clock = [], list[float]()
+        for rule in workloads.RULES:
+            tick(f"questions: {rule.name}")
+            workload = workloads.draw_workload(rule, seed, n_questions, ours.prove)
+            found, troubles = measure.measure(workload, contenders, _settings(size), tick, clock)
+            points += found
+            not_run |= {f"{name} on {rule.name}": why for name, why in troubles.items()}
+            tick("")
+        n_paths, length = PATHS[size]
+        bar.reset(task, total=n_paths, description="error growth")
+        grown = growth.grow(ours.our_followers(), ours.prove, ours.prove_path, seed, n_paths, length, tick)
+        bar.reset(task, total=48, description="hard cases")
+        cases = hard_cases.tabulate(askers, tick)
+        bar.reset(task, total=None)
+        series, memory = work.measure_work(
+            ours.run_ensemble, size, os.cpu_count() or 1, ENSEMBLE_REPEATS[size], tick
+        )
+        tick("compile times")
+        compiled = ours.compile_times() if size == "full" else {}
+    return record.Record(
+        format=record.FORMAT,
+        size=size,
+        seed=seed,
+        questions=n_questions,
+        repeats=repeats,
+        digits=workloads.DIGITS,
+        machine=record.this_machine(built),
+        clock_ns=tuple(clock),
+        workloads=tuple(record.Drawn(r.name, r.what, r.scene, n_questions) for r in workloads.RULES),
+        points=tuple(points),
+        not_run=not_run,
+        growth=grown,
+        work=record.Work(work.SCENE, series, memory, compiled),
+        hard_cases=cases,
+        seconds=round(time.monotonic() - begin, 1),
+    )
+
+
+def _settings(size: str) -> Settings:
+    from conformance.bench.measure import Settings
+
+    return Settings(REPEATS[size], 3e6, 4e8) if size == "quick" else Settings(REPEATS[size], 2e7, 4e9)
+
+
+def _contenders(
+    stack: ExitStack, command: list[str]
+) -> tuple[list[Contender], dict[str, Ask], dict[str, str], dict[str, str]]:
+    """Return contenders, how each answers a vector, what was compiled, and what cannot run."""
+    from conformance.bench import contenders as those
+    from conformance.examples import find_examples
+    from conformance.process import Trouble
+    from mushrooms import bench_contenders as ours
+
+    contenders = [*ours.our_contenders(), those.plain_python(), *those.time_steppers()]
+    askers = ours.our_askers()
+    built, not_run = {}, {}
+    examples = find_examples(Path(stack.enter_context(tempfile.TemporaryDirectory())), C_FLAGS)
+    for language, example in examples.items():
+        if not example.command:
+            not_run[f"example in {language}"] = example.why_not
+            continue
+        contender, ask = those.by_command(f"example in {language}", example.command, stack)
+        contenders.append(contender)
+        askers[contender.name] = ask
+        if example.built:
+            built[contender.name] = example.built
+    if command:
+        try:
+            contender, ask = those.by_command(" ".join(command), command, stack)
+        except Trouble as trouble:
+            raise BadInput(f"command {command[0]!r} {trouble.verdict}: {trouble.why}") from None
+        contenders.append(contender)
+        askers[contender.name] = ask
+    return contenders, askers, built, not_run
+
+
+def _table(found: Record) -> Table:
+    from mushrooms.bench_report import middle_and_worst
+
+    table = Table(title="Speed against error", title_justify="left")
+    for name, side in (("workload", "left"), ("stepper", "left"), ("ns/collision", "right")):
+        table.add_column(name, justify=side)  # type: ignore[arg-type]
+    for name in ("median ulps", "worst ulps", "wrong", "undecided", "left"):
+        table.add_column(name, justify="right")
+    for p in found.points:
+        middle, worst = middle_and_worst(p.ulps, ".2g")
+        counts = [str(n) if n else "" for n in (p.wrong, p.undecided, p.left)]
+        table.add_row(p.workload, p.contender, f"{statistics.median(p.ns):,.0f}", middle, worst, *counts)
+    return table
+
+
+def _ratios(ratios: list[Ratio]) -> Table:
+    table = Table(title="New time over old, 99 % interval", title_justify="left")
+    for name in ("workload", "stepper"):
+        table.add_column(name)
+    table.add_column("ratio", justify="right")
+    table.add_column("interval", justify="right")
+    for r in ratios:
+        mark = " slower" if r.is_slower else ""
+        table.add_row(r.workload, r.contender, f"{r.ratio:.2f}", f"{r.low:.2f} to {r.high:.2f}{mark}")
+    return table

@@ -1,0 +1,186 @@
+"""Our steppers as the benchmark's contenders, and the proofs that all are measured against."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import subprocess
+import sys
+import tempfile
+import tracemalloc
+from fractions import Fraction
+
+import numpy as np
+
+import fast
+import reference
+from conformance import plain
+from conformance.agreement import Truth
+from conformance.bench.contenders import Ask, Contender, Exact, Lap, by_call
+from conformance.bench.growth import FAR, Follower, Place
+from conformance.bench.hard_cases import asked
+from conformance.bench.work import SCENE, Cost, Load
+from conformance.bench.workloads import WINDOW, Workload
+from conformance.generate_draws import Moment
+from fast import __main__ as fast_protocol
+from fast import ensemble
+from fast.batch import careful_steps, lane_steps
+from fast.compiled import compile_scene
+from fast.starts import only_stop
+from fast.stepper import WALL_CODES
+from reference import __main__ as proof
+from reference.arithmetic import Enclosure, rational
+from scene import Collision, Outcome, Scene, State, load
+
+DIGITS = (15, 30, 50, 100, 200)
+PATH_DIGITS = (30, 60)  # working decimals of the proofs whose growth is followed
+LANES_SERVE = ("breathing-disk", "fixed-cap", "moving-cap-1e4", "moving-cap-1e7", "moving-cap-1e12")
+COMPILED = {
+    "step": "fast.next_collision(s, p, 1.0)",
+    "trajectory": "fast.trajectory(s, p, 1)",
+    "ensemble": "fast.simulate(s, n_particles=1, energy=10.0)",
+}
+
+
+def prove(scene: Scene, state: State, t_end: float, digits: int) -> Truth:
+    """Answer a step by proof, with its Jacobian."""
+    outcome = reference.next_collision(scene, state, t_end, digits=digits, is_differentiated=True)
+    if not isinstance(outcome, reference.Collision):
+        return Truth(outcome.rounded() if isinstance(outcome, reference.Horizon) else outcome)
+    assert outcome.jacobian is not None
+    numbers = [_centre(outcome.dt), *map(_centre, outcome.after[1:])]
+    return Truth(outcome.rounded(), numbers, [[float(d) for d in row] for row in outcome.jacobian])
+
+
+def prove_path(scene: Scene, state: State, n_collisions: int) -> list[Place]:
+    """Follow a path by proof, right to twenty digits at its end."""
+    return _places(reference.trajectory(scene, state, n_collisions, digits=20))
+
+
+def our_contenders() -> list[Contender]:
+    """Return our steppers: the reference at several precisions, and the fast one's three ways."""
+    return [
+        *(_proof(digits) for digits in DIGITS),
+        by_call("fast, a call", "compiled", fast.next_collision),
+        Contender("fast, careful", "compiled", _careful),
+        Contender("fast, lanes", "compiled", _lanes, LANES_SERVE),
+    ]
+
+
+def our_askers() -> dict[str, Ask]:
+    """Return how each of our steppers answers a vector."""
+    return {
+        "proof": asked(proof.step, proof.follow),
+        "fast": asked(fast.next_collision, fast_protocol.follow),
+        "plain Python": asked(plain.next_collision, plain.trajectory),
+    }
+
+
+def our_followers() -> dict[str, Follower]:
+    """Return followers of trajectories: binary64, with compensated time, and proofs of fixed precision."""
+    found: dict[str, Follower] = {"binary64 (plain Python)": _plain_path, "compensated (fast)": _fast_path}
+    return found | {f"proof, {digits} decimals": _proof_path(digits) for digits in PATH_DIGITS}
+
+
+def _centre(enclosure: Enclosure) -> Fraction:
+    return (rational(enclosure.lo._mpf_) + rational(enclosure.hi._mpf_)) / 2
+
+
+def _proof(digits: int) -> Contender:
+    def step(scene: Scene, state: State, t_end: float) -> Outcome | Exact:
+        found = reference.next_collision(scene, state, t_end, digits=digits)
+        if isinstance(found, reference.Collision):
+            # The upper ends: their error is what the enclosure admits.
+            ends = [rational(e.hi._mpf_) for e in (found.dt, *found.after[1:])]
+            return Exact(found.wall, tuple(ends))
+        return found.rounded() if isinstance(found, reference.Horizon) else found
+
+    return by_call(f"proof, {digits} digits", "proof", step)
+
+
+def _careful(workload: Workload, n_times: int) -> Lap:
+    answers, seconds = careful_steps(workload.scene, [q.state for q in workload.questions], n_times)
+    return Lap(seconds / (n_times * len(answers)) * 1e9, list(answers), seconds * 1e9)
+
+
+def _lanes(workload: Workload, n_times: int) -> Lap:
+    """Time the engine on flights that go on from the questions; grade one round of its lanes on these."""
+    states = [q.state for q in workload.questions]
+    rows = np.array([[s.t, 0.0, s.x, s.y, s.vx, s.vy] for s in states])
+    walls = np.array([WALL_CODES[s.wall] for s in states], dtype=np.int64)
+    last = max(states, key=lambda s: s.t)
+    span = WINDOW * Moment(workload.scene, last.t).size / math.hypot(last.vx, last.vy)
+    copies = -(-128 // len(states))  # enough to fill both pools
+    seconds, n_collisions = 0.0, 0
+    for _ in range(n_times):
+        starts, their_walls = np.tile(rows, (copies, 1)), np.tile(walls, copies)
+        done = ensemble.follow(
+            compile_scene(workload.scene), starts, their_walls, only_stop(last.t + span), 1
+        )
+        seconds += done.seconds
+        n_collisions += int(done.counts.sum())
+    return Lap(seconds / n_collisions * 1e9, list(lane_steps(workload.scene, states)), seconds * 1e9)
+
+
+def _plain_path(scene: Scene, state: State, n_collisions: int) -> list[Place]:
+    found = plain.trajectory(scene, state, n_collisions, state.t + FAR)
+    return [Place(c.wall, c.x, c.y, c.vx, c.vy) for c in found if isinstance(c, Collision)]
+
+
+def _fast_path(scene: Scene, state: State, n_collisions: int) -> list[Place]:
+    path = fast.trajectory(scene, state, n_collisions)
+    return [Place(wall, *row[2:]) for wall, row in zip(path.walls, path.steps.tolist(), strict=True)]
+
+
+def _proof_path(digits: int) -> Follower:
+    def follow(scene: Scene, state: State, n_collisions: int) -> list[Place]:
+        return _places(reference.trajectory(scene, state, n_collisions, working=digits))
+
+    return follow
+
+
+def _places(path: reference.Trajectory) -> list[Place]:
+    found = []
+    for step in path.steps:
+        ends = [_centre(c) for c in step.after[1:]]
+        size, speed = (math.hypot(*map(float, pair)) for pair in (ends[:2], ends[2:]))
+        widths = [c.width() for c in step.after[1:]]
+        x, y, vx, vy = ends
+        width = max(max(widths[:2]) / size, max(widths[2:]) / speed)
+        found.append(Place(step.wall, x, y, vx, vy, width))
+    return found
+
+
+def run_ensemble(load_of: Load) -> Cost:
+    """Run an ensemble and say what it took."""
+    tracemalloc.start()
+    try:
+        done = fast.simulate(
+            load(SCENE),
+            n_particles=load_of.particles,
+            energy=load_of.energy,
+            n_cycles=load_of.cycles,
+            threads=load_of.threads,
+        )
+        _, peak = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    return Cost(done.seconds, int(done.n_collisions.sum()), peak)
+
+
+def compile_times() -> dict[str, float]:
+    """Return the seconds that each entry takes to compile in a new process with an empty cache."""
+    lines = ["import json, time, fast, scene", "s = scene.load('moving-cap')"]
+    lines += ["p = scene.State(0.0, 0.1, 0.2, 3.0, 4.0)", "found = {}"]
+    for name, call in COMPILED.items():
+        lines += ["begin = time.perf_counter()", call, f"found[{name!r}] = time.perf_counter() - begin"]
+    lines.append("print(json.dumps(found))")
+    with tempfile.TemporaryDirectory() as folder:
+        done = subprocess.run(
+            [sys.executable, "-c", "\n".join(lines)],
+            env={**os.environ, "NUMBA_CACHE_DIR": folder},
+            capture_output=True,
+            check=True,
+        )
+    return {name: round(seconds, 1) for name, seconds in json.loads(done.stdout).items()}

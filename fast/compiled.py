@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from fractions import Fraction
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -31,6 +32,7 @@ class Compiled(NamedTuple):
     bounds: FloatArray  # (4, 4): lowest, highest, |f'|, |f''| of radius, half-width w, depth, slope
 
 
+@lru_cache(maxsize=256)
 def compile_scene(scene: Scene) -> Compiled:
     """Lay out a valid scene for the kernel.
 

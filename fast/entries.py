@@ -19,6 +19,7 @@ from fast.careful import first_step, step
 from fast.codes import HORIZON
 from fast.follow import follow
 from fast.motion import ANCHORS_SHAPE
+from fast.refine import fine_path
 
 
 def digest_of_sources(folder: Path) -> str:
@@ -85,6 +86,16 @@ def _trajectory(sources):
     return trajectory
 
 
+def _fine(sources):
+    @njit(cache=True, error_model="numpy")
+    def fine(table, is_relative, laws, bounds, start, wall, limit, out, met):
+        """Follow a path in pairs of floats: see fast.refine."""
+        sources  # noqa: B018
+        return fine_path(table, is_relative, laws, bounds, start, wall, limit, out, met)
+
+    return fine
+
+
 def _follow(sources):
     @njit(cache=True, nogil=True, error_model="numpy")
     def follow_particles(scene, walls, stops, out, ends):
@@ -110,5 +121,6 @@ def _directions(sources):
 single_step = _single_step(SOURCES)
 each_step = _each_step(SOURCES)
 trajectory = _trajectory(SOURCES)
+fine = _fine(SOURCES)
 follow_particles = _follow(SOURCES)
 directions = _directions(SOURCES)

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from fast import careful, codes, entries, motion, walls
-from fast.compiled import LARGEST, Compiled, FloatArray, compile_scene
+from fast.compiled import LARGEST, FloatArray, compile_scene
 from scene import (
     Collision,
     Horizon,
@@ -46,11 +45,6 @@ REASONS: dict[int, Outcome] = {
 }
 
 
-@lru_cache(maxsize=256)
-def _compiled(scene: Scene) -> Compiled:
-    return compile_scene(scene)
-
-
 def next_collision(scene: Scene, state: State, t_end: float) -> Outcome:
     """Find the first wall the particle meets after `state.t`, in binary64.
 
@@ -66,12 +60,12 @@ def next_collision(scene: Scene, state: State, t_end: float) -> Outcome:
     Source: Gelfreich, Rom-Kedar, Turaev (2014), sec. 3.1.
     """
     try:
-        _check(scene, state, t_end)
+        check_state(scene, state, t_end)
     except BadInput as error:
         return Rejected(str(error))
     p = np.array([state.t, 0.0, state.x, state.y, state.vx, state.vy])
     low_end = t_end - state.t
-    code, dt = entries.single_step(*_compiled(scene), p, WALL_CODES[state.wall], low_end)
+    code, dt = entries.single_step(*compile_scene(scene), p, WALL_CODES[state.wall], low_end)
     if code in WALL_NAMES:
         return Collision(WALL_NAMES[code], float(dt), *(float(p[i]) for i in (0, 2, 3, 4, 5)))
     if code == codes.HORIZON:
@@ -105,13 +99,13 @@ def trajectory(scene: Scene, state: State, n_collisions: int, t_end: float = np.
     Raises:
         BadInput: naming field, value and bound.
     """
-    _check(scene, state, t_end if np.isfinite(t_end) else state.t)
+    check_state(scene, state, t_end if np.isfinite(t_end) else state.t)
     if n_collisions < 0:
         raise InvalidState(f"n_collisions = {n_collisions}, must be >= 0")
     steps: FloatArray = np.empty((n_collisions, 6))
     met: npt.NDArray[np.int64] = np.empty(n_collisions, dtype=np.int64)
     p = np.array([state.t, 0.0, state.x, state.y, state.vx, state.vy])
-    n, code = entries.trajectory(*_compiled(scene), p, WALL_CODES[state.wall], t_end, steps, met)
+    n, code = entries.trajectory(*compile_scene(scene), p, WALL_CODES[state.wall], t_end, steps, met)
     walls = [WALL_NAMES[int(c)] for c in met[:n]]
     outcome: Outcome | None = None
     if n < n_collisions:
@@ -120,8 +114,9 @@ def trajectory(scene: Scene, state: State, n_collisions: int, t_end: float = np.
     return Trajectory(walls, steps[:n], outcome)
 
 
-def _check(scene: Scene, state: State, t_end: float) -> None:
-    _compiled(scene)
+def check_state(scene: Scene, state: State, t_end: float) -> None:
+    """Refuse a scene or a state that this stepper cannot hold, naming field, value and bound."""
+    compile_scene(scene)
     check_numbers(scene, state, t_end)
     for field in ("x", "y", "vx", "vy"):
         if abs(getattr(state, field)) > LARGEST:
@@ -137,7 +132,7 @@ def _check(scene: Scene, state: State, t_end: float) -> None:
 
 def wall_gap(scene: Scene, state: State) -> tuple[float, float]:
     """Return how far a state is inside the wall it claims to leave, and that wall's distance from 0."""
-    compiled = _compiled(scene)
+    compiled = compile_scene(scene)
     if state.wall == "base":
         return state.y, float(max(compiled.bounds[0, 1], compiled.bounds[1, 1]))
     anchors = np.zeros(motion.ANCHORS_SHAPE)

@@ -59,11 +59,12 @@ def prove_path(scene: Scene, state: State, n_collisions: int) -> list[Place]:
 
 
 def our_contenders() -> list[Contender]:
-    """Return our steppers: the reference at several precisions, and the fast one's three ways."""
+    """Return our steppers: the reference at several precisions, and the fast one's four ways."""
     return [
         *(_proof(digits) for digits in DIGITS),
         by_call("fast, a call", "compiled", fast.next_collision),
         Contender("fast, careful", "compiled", _careful),
+        by_call("fast, pairs", "compiled", _fine),
         Contender("fast, lanes", "compiled", _lanes, LANES_SERVE),
     ]
 
@@ -80,6 +81,7 @@ def our_askers() -> dict[str, Ask]:
 def our_followers() -> dict[str, Follower]:
     """Return followers of trajectories: binary64, with compensated time, and proofs of fixed precision."""
     found: dict[str, Follower] = {"binary64 (plain Python)": _plain_path, "compensated (fast)": _fast_path}
+    found["double-double (fast)"] = _fine_path
     return found | {f"proof, {digits} decimals": _proof_path(digits) for digits in PATH_DIGITS}
 
 
@@ -102,6 +104,14 @@ def _proof(digits: int) -> Contender:
 def _careful(workload: Workload, n_times: int) -> Lap:
     answers, seconds = careful_steps(workload.scene, [q.state for q in workload.questions], n_times)
     return Lap(seconds / (n_times * len(answers)) * 1e9, list(answers), seconds * 1e9)
+
+
+def _fine(scene: Scene, state: State, _: float) -> Outcome | Exact:
+    path = fast.fine_trajectory(scene, state, 1)
+    if path.outcome is not None:
+        return path.outcome
+    dt, _t, *place = path.numbers(0)
+    return Exact(path.walls[0], (dt, *place))
 
 
 def _lanes(workload: Workload, n_times: int) -> Lap:
@@ -131,6 +141,15 @@ def _plain_path(scene: Scene, state: State, n_collisions: int) -> list[Place]:
 def _fast_path(scene: Scene, state: State, n_collisions: int) -> list[Place]:
     path = fast.trajectory(scene, state, n_collisions)
     return [Place(wall, *row[2:]) for wall, row in zip(path.walls, path.steps.tolist(), strict=True)]
+
+
+def _fine_path(scene: Scene, state: State, n_collisions: int) -> list[Place]:
+    path = fast.fine_trajectory(scene, state, n_collisions)
+    found = []
+    for i, wall in enumerate(path.walls):
+        _, _, x, y, vx, vy = path.numbers(i)
+        found.append(Place(wall, x, y, vx, vy))
+    return found
 
 
 def _proof_path(digits: int) -> Follower:

@@ -189,7 +189,7 @@ def growth(found: Growth) -> bytes:
     """Draw errors along trajectories with the Lyapunov slope and the predicted bound."""
     figure, axes = plots.new_figure(7.2, 4.4)
     count = np.arange(1, found.collisions + 1)
-    colours = (plots.GREEN, plots.BLUE, plots.ORANGE, "#E69F00")
+    colours = (plots.GREEN, plots.BLUE, "#56B4E9", plots.ORANGE, "#E69F00")
     for (name, errors), colour in zip(found.followers.items(), colours, strict=False):
         shown = np.where(np.array(errors) > 0, errors, np.nan)
         axes.plot(count, shown, color=colour, marker=".", markersize=4, linewidth=1, label=name)

@@ -1,0 +1,60 @@
+"""The fine stepper's face: paths to about 31 decimals, states carried as pairs of floats."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from fast import codes, entries
+from fast.compiled import FloatArray, compile_scene
+from fast.stepper import WALL_CODES, WALL_NAMES, check_state, trouble
+from scene import Horizon, InvalidState, Outcome, Scene, State, Wall
+
+
+class FineTrajectory(NamedTuple):
+    """Successive collisions in pairs, and why they ended.
+
+    Attributes:
+        walls: (n,) names of the walls hit.
+        steps: (n, 6, 2) dt, t, x, y, vx, vy after each collision, as sums high + low.
+        outcome: None when all collisions asked for were found, else what came instead.
+    """
+
+    walls: list[Wall]
+    steps: FloatArray
+    outcome: Outcome | None
+
+    def numbers(self, i: int) -> list[Fraction]:
+        """Return dt, t, x, y, vx, vy of a collision, exactly as they are held."""
+        return [Fraction(high) + Fraction(low) for high, low in self.steps[i].tolist()]
+
+
+def fine_trajectory(scene: Scene, state: State, n_collisions: int) -> FineTrajectory:
+    """Follow a particle through `n_collisions` collisions, each right to about 31 decimals.
+
+    Args:
+        scene: table and laws of motion.
+        state: the start, as for `next_collision`.
+        n_collisions: how many collisions to follow, >= 0.
+
+    Raises:
+        BadInput: naming field, value and bound.
+
+    Source: Gelfreich, Rom-Kedar, Turaev (2014), sec. 3.1; which wall is met is the careful step's answer.
+    """
+    check_state(scene, state, state.t)
+    if n_collisions < 0:
+        raise InvalidState(f"n_collisions = {n_collisions}, must be >= 0")
+    steps: FloatArray = np.empty((n_collisions, 6, 2))
+    met: npt.NDArray[np.int64] = np.empty(n_collisions, dtype=np.int64)
+    start = np.array([state.t, state.x, state.y, state.vx, state.vy])
+    n, code = entries.fine(*compile_scene(scene), start, WALL_CODES[state.wall], np.inf, steps, met)
+    outcome: Outcome | None = None
+    if n < n_collisions:
+        last = steps[n - 1, 2:, 0] if n else start[1:]
+        is_free = code == codes.HORIZON
+        outcome = Horizon(np.inf, *map(float, last)) if is_free else trouble(code, state)
+    return FineTrajectory([WALL_NAMES[int(c)] for c in met[:n]], steps[:n], outcome)

@@ -1,0 +1,133 @@
+"""The fine step against the reference: about 31 decimals, on generated steps and along paths."""
+
+from __future__ import annotations
+
+import os
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from truth import centre, proved_step
+
+import fast
+import reference
+from conformance.error import backward_ulps
+from conformance.strategies import scenes_and_states
+from fast import double_double as dd
+from scene import Collision, InvalidState, Rejected, State, Undecided, load
+
+N_STEPS = int(os.environ.get("MUSHROOMS_STEPS", "400"))
+UNIT = 2.0**51  # backward units of 2^-104 in a backward ulp
+SHARP = 16.0  # units that nearly all answers keep
+WORST = 2.0**24  # of short hops, where a wall's speed is rounding: see fast.refine
+START = State(0.1, 0.2, 0.3, 140.0, 30.0)
+
+
+def exact(a: tuple[float, float]) -> Fraction:
+    return Fraction(float(a[0])) + Fraction(float(a[1]))
+
+
+@pytest.mark.parametrize("seed", range(40))
+@pytest.mark.parametrize("operation", ["add", "sub", "mul", "div"])
+def test_pairs_are_right_to_31_decimals(operation, seed):
+    random = np.random.default_rng(seed)
+    highs, lows = random.normal(size=2), random.normal(size=2) * 2.0**-54
+    if seed % 2:
+        highs[1] = -highs[0] * (1.0 + 2.0 ** -random.integers(1, 52))  # they cancel
+    a, b = (dd.two_sum(*ends) for ends in zip(highs, lows * highs, strict=True))
+    truth = {"add": exact(a) + exact(b), "sub": exact(a) - exact(b)}
+    truth |= {"mul": exact(a) * exact(b), "div": exact(a) / exact(b)}
+    error = abs(exact(getattr(dd, operation)(a, b)) - truth[operation])
+    assert error <= abs(truth[operation]) * Fraction(2) ** -101
+
+
+@pytest.mark.parametrize("angle", [0.0, 1e-20, 0.7, -0.7, 0.8, 1.6, 3.2, -4.7, 1234.5, 2.0**26])
+def test_sine_and_cosine_to_32_decimals(angle):
+    from mpmath import mp
+
+    with mp.workdps(60):
+        truth = mp.sin(mp.mpf(angle)), mp.cos(mp.mpf(angle))
+        *found, is_in_reach = dd.sine_cosine((angle, 0.0))
+        assert is_in_reach
+        for a, b in zip(found, truth, strict=True):
+            assert abs(mp.mpf(float(a[0])) + mp.mpf(float(a[1])) - b) <= mp.mpf(2) ** -103 * max(
+                abs(b), 2**-20
+            )
+
+
+def test_generated_steps_are_right_to_31_decimals(tally):
+    units = []
+
+    @settings(max_examples=N_STEPS)
+    @given(scenes_and_states())
+    def step(drawn):
+        scene, state, t_end = drawn
+        truth = proved_step(scene, state, t_end, digits=60)
+        if not isinstance(truth.outcome, Collision):
+            return
+        path = fast.fine_trajectory(scene, state, 1)
+        tally["steps"] += 1
+        if not path.walls:
+            # Never more shy than the careful step, whose answer it refines.
+            assert isinstance(path.outcome, Undecided)
+            assert isinstance(fast.next_collision(scene, state, t_end), Undecided)
+            tally["undecided"] += 1
+            return
+        assert path.walls == [truth.outcome.wall]
+        dt, _, *place = path.numbers(0)
+        assert truth.jacobian is not None
+        inputs = (state.t, state.x, state.y, state.vx, state.vy)
+        worst = max(backward_ulps([dt, *place], truth.numbers, truth.jacobian, inputs)) * UNIT
+        assert worst <= WORST
+        units.append(worst)
+
+    step()
+    tally["worst units of 2^-104"] = round(max(units))
+    tally["above the sharp bound"] = sum(u > SHARP for u in units)
+    assert tally["above the sharp bound"] <= 0.01 * len(units)
+    assert len(units) > N_STEPS // 3
+
+
+def test_the_bound_tells_pairs_from_binary64():
+    truth, found = (
+        proved_step(load("moving-cap"), START, 10.0, 60),
+        fast.fine_trajectory(load("moving-cap"), START, 1),
+    )
+    inputs = (START.t, START.x, START.y, START.vx, START.vy)
+    highs = [Fraction(found.steps[0, k, 0]) for k in (0, 2, 3, 4, 5)]
+    assert truth.jacobian is not None
+    assert max(backward_ulps(highs, truth.numbers, truth.jacobian, inputs)) * UNIT > WORST
+
+
+@pytest.mark.parametrize("name", ["moving-cap", "fixed-cap-clockwise", "ergodic", "breathing-circle"])
+def test_a_path_keeps_its_digits_longer_than_binary64(name):
+    scene, n = load(name), 30
+    fine, rough = fast.fine_trajectory(scene, START, n), fast.trajectory(scene, START, n)
+    truth = reference.trajectory(scene, START, n, digits=40)
+    assert fine.walls == [step.wall for step in truth.steps]
+    last = [centre(c) for c in truth.steps[-1].after]
+    error = max(
+        abs(a - b) / max(map(abs, last[1:3]))
+        for a, b in zip(fine.numbers(n - 1)[2:4], last[1:3], strict=True)
+    )
+    same = max(abs(Fraction(a) - b) for a, b in zip(rough.steps[-1, 2:4].tolist(), last[1:3], strict=True))
+    assert error <= 1e-18
+    assert same > 1e6 * error * max(map(abs, last[1:3]))
+
+
+def test_the_first_collision_is_the_careful_one_to_its_last_bits():
+    scene = load("moving-cap")
+    (row,), found = fast.fine_trajectory(scene, START, 1).steps, fast.next_collision(scene, START, 1e3)
+    assert isinstance(found, Collision)
+    numbers = [found.dt, found.t, found.x, found.y, found.vx, found.vy]
+    assert row[:, 0].tolist() == pytest.approx(numbers, rel=1e-15)
+
+
+def test_bad_starts_are_refused():
+    scene = load("moving-cap")
+    with pytest.raises(InvalidState, match="n_collisions = -1"):
+        fast.fine_trajectory(scene, START, -1)
+    outside = fast.fine_trajectory(scene, State(0.0, 9.0, 0.5, 1.0, 0.0), 1)
+    assert isinstance(outside.outcome, Rejected)
+    assert not outside.walls

@@ -3,57 +3,37 @@
 from __future__ import annotations
 
 import json
-import shutil
 import subprocess
-import sys
-from pathlib import Path
 
 import pytest
 
 from conformance import suite, vectors
+from conformance.examples import Example, find_examples
 from scene.load import read_data
 
-FOLDER = Path(suite.__file__).parent / "harness"
-LANGUAGES = ("python", "c", "javascript")
+LANGUAGES = ("Python", "C", "JavaScript")
 # One vector in so many, to save time; `mushrooms check` grades them with all.
-EVERY = {"python": 16, "c": 3, "javascript": 6}
+EVERY = {"Python": 16, "C": 3, "JavaScript": 6}
+STRICT = ("-O3", "-Wall", "-Wextra", "-Werror")
 
 
 @pytest.fixture(scope="session")
-def commands(tmp_path_factory) -> dict[str, list[str] | str]:
-    """Return each harness's command, or why it cannot run here."""
-    node, compiler = shutil.which("node"), shutil.which("gcc") or shutil.which("cc")
-    found: dict[str, list[str] | str] = {"python": [sys.executable, str(FOLDER / "python" / "stepper.py")]}
-    found["javascript"] = (
-        [node, str(FOLDER / "javascript" / "stepper.js")] if node else "node is not installed"
-    )
-    found["c"] = "no C compiler is installed"
-    if compiler:
-        program = tmp_path_factory.mktemp("c") / "stepper"
-        source = str(FOLDER / "c" / "stepper.c")
-        flags = ["-O3", "-Wall", "-Wextra", "-Werror", "-std=gnu11"]
-        probe = subprocess.run(
-            [compiler, "-E", "-xc", "-"],
-            input="#include <jansson.h>",
-            capture_output=True,
-            text=True,
-            check=False,
-        )
-        if probe.returncode:
-            found["c"] = "jansson.h is not installed (Debian: libjansson-dev)"
-        else:
-            line = [compiler, *flags, "-o", str(program), source, "-ljansson", "-lm"]
-            subprocess.run(line, check=True, capture_output=True)
-            found["c"] = [str(program)]
-    return found
+def commands(tmp_path_factory) -> dict[str, Example]:
+    """Return each example's command, or why it cannot run here."""
+    return find_examples(tmp_path_factory.mktemp("c"), STRICT)
+
+
+def runnable(example: Example) -> list[str]:
+    # A source that does not compile is a failure; a compiler that is absent is not.
+    assert not example.why_not.startswith("it does not compile"), example.why_not
+    if example.why_not:
+        pytest.skip(example.why_not)
+    return list(example.command)
 
 
 @pytest.mark.parametrize("language", LANGUAGES)
 def test_an_example_passes_at_level_core(language, commands, monkeypatch, tally):
-    command = commands[language]
-    if isinstance(command, str):
-        tally[f"{language} not run: {command}"] += 1
-        pytest.skip(command)
+    command = runnable(commands[language])
     chosen = vectors.load("core")[:: EVERY[language]]
     monkeypatch.setattr(suite, "choose", lambda *_: chosen)
     monkeypatch.setattr(suite.suite_properties, "N_QUESTIONS", 4)
@@ -88,9 +68,7 @@ GOOD["state"] = {"t": 0.0, "x": 0.0, "y": 0.5, "vx": 1.0, "vy": 0.0, "wall": Non
 
 @pytest.mark.parametrize("language", LANGUAGES)
 def test_an_example_refuses_bad_input_and_lives_on(language, commands):
-    command = commands[language]
-    if isinstance(command, str):
-        pytest.skip(command)
+    command = runnable(commands[language])
     lines = ["nonsense", "[]", "5", '{"cmd":"dance","seq":1}']
     lines += [json.dumps({**GOOD, **changes}) for changes, _ in BAD] + [json.dumps(GOOD), '{"cmd":"stop"}']
     run = subprocess.run(

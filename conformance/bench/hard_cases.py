@@ -76,7 +76,7 @@ def _graded(vector: Vector, ask: Ask) -> Grade:
 
 
 def to_markdown(cases: tuple[Case, ...]) -> str:
-    """Return docs/hard-cases.md."""
+    """Return the table as Markdown, kept in docs/bench/."""
     names = list(cases[0].verdicts)
     lines = [
         "# Hard cases, by stepper",

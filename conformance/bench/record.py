@@ -1,7 +1,11 @@
-"""What a benchmark keeps: bench.json, from which every plotted point can be read and re-made."""
+"""What a benchmark keeps: bench.json, from which every plotted point can be read and re-made.
+
+`python -m conformance.bench.record > docs/bench.schema.json` prints its schema.
+"""
 
 from __future__ import annotations
 
+import json
 import os
 import platform
 from importlib.metadata import version
@@ -198,5 +202,9 @@ def read(path: Path) -> Record:
 
 
 def json_schema() -> dict[str, Any]:
-    """Return the JSON Schema of bench.json."""
-    return msgspec.json.schema(Record)
+    """Return the JSON Schema of bench.json, published as docs/bench.schema.json."""
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **msgspec.json.schema(Record)}
+
+
+if __name__ == "__main__":
+    print(json.dumps(json_schema(), indent=2))

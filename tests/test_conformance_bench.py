@@ -1,0 +1,279 @@
+"""The benchmark measures what it says: workloads, grades, growth, fits, comparisons, hard cases."""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+import sys
+from contextlib import ExitStack
+from fractions import Fraction
+from pathlib import Path
+
+import jsonschema
+import msgspec
+import pytest
+from truth import proved_step
+
+import fast
+from conformance import plain
+from conformance.bench import comparison, contenders, growth, hard_cases, measure, record, work, workloads
+from conformance.bench.contenders import Contender, Lap, by_call
+from conformance.bench.time_stepping import next_collision_by
+from conformance.process import Trouble
+from mushrooms import bench_contenders as ours
+from scene import BadInput, Collision, Horizon, State, Undecided, load
+
+DOCS = Path(__file__).parent.parent / "docs"
+BRIEF = measure.Settings(repeats=3, least_ns=1.0, most_ns=1e9)
+
+
+@pytest.fixture(scope="module")
+def drawn() -> dict[str, workloads.Workload]:
+    return {rule.name: workloads.draw_workload(rule, 7, 3, ours.prove) for rule in workloads.RULES}
+
+
+def measured(workload, *these):
+    points, troubles = measure.measure(workload, these, BRIEF, lambda _: None, [])
+    assert not troubles
+    return points
+
+
+@pytest.mark.parametrize("name", workloads.NAMES)
+def test_answers_of_a_workload_are_proved_collisions(drawn, name):
+    for question in drawn[name].questions:
+        again = proved_step(drawn[name].scene, question.state, question.t_end, 50)
+        assert isinstance(again.outcome, Collision)
+        assert question.truth.outcome == again.outcome
+        assert abs(question.truth.numbers[0] - again.numbers[0]) <= again.numbers[0] * Fraction(1, 10**50)
+
+
+def test_a_seed_draws_the_same_questions(drawn):
+    rule = workloads.RULES[0]
+    again = workloads.draw_workload(rule, 7, 2, ours.prove)
+    other = workloads.draw_workload(rule, 8, 2, ours.prove)
+    assert [q.state for q in again.questions] == [q.state for q in drawn[rule.name].questions[:2]]
+    assert [q.state for q in other.questions] != [q.state for q in again.questions]
+
+
+def test_workloads_are_what_their_names_say(drawn):
+    def speeds(name: str) -> list[float]:
+        return [math.hypot(q.state.vx, q.state.vy) for q in drawn[name].questions]
+
+    for name, energy in (("moving-cap-1e4", 1e4), ("moving-cap-1e7", 1e7), ("moving-cap-1e12", 1e12)):
+        # One collision changes the speed by twice the walls' at most.
+        assert speeds(name) == pytest.approx([math.sqrt(2 * energy)] * 3, abs=10.0)
+    assert max(speeds("slow")) < 10.0
+    for q in drawn["grazing"].questions:
+        s = q.state
+        assert s.wall == "arc"
+        assert abs(s.x * s.vx + s.y * s.vy) < 0.1 * math.hypot(s.x, s.y) * math.hypot(s.vx, s.vy)
+
+
+def test_speed_and_error_come_from_the_same_laps(drawn):
+    workload = drawn["moving-cap-1e7"]
+    (proof, careful, lanes) = measured(
+        workload,
+        *(c for c in ours.our_contenders() if c.name in ("proof, 30 digits", "fast, careful", "fast, lanes")),
+    )
+    assert (proof.right, careful.right, lanes.right + lanes.left) == (3, 3, 3)
+    assert max(proof.relative) < 1e-30
+    assert all(u is not None and u <= 4.0 for u in careful.ulps + lanes.ulps)
+    assert len(proof.ns) == len(careful.ns) == 3
+    assert min(proof.ns) > min(careful.ns)
+    assert careful.n_times >= 1
+
+
+@pytest.mark.parametrize(
+    ("spoil", "counts"),
+    [
+        (lambda c: Collision("floor", c.dt, c.t, c.x, c.y, c.vx, c.vy), (0, 3, 0)),
+        (lambda c: Horizon(c.t, c.x, c.y, c.vx, c.vy), (0, 3, 0)),
+        (lambda c: Collision(c.wall, math.nan, c.t, c.x, c.y, c.vx, c.vy), (0, 3, 0)),
+        (lambda _: Undecided("shy"), (0, 0, 3)),
+        (lambda c: c, (3, 0, 0)),
+    ],
+)
+def test_a_spoilt_contender_is_seen(drawn, spoil, counts):
+    workload = drawn["breathing-disk"]
+    spoilt = by_call("spoilt", "compiled", lambda *question: spoil(fast.next_collision(*question)))
+    (point,) = measured(workload, spoilt)
+    assert (point.right, point.wrong, point.undecided) == counts
+
+
+def test_a_small_error_is_measured(drawn):
+    def off(*question):
+        c = fast.next_collision(*question)
+        return Collision(c.wall, c.dt * (1 + 1e-9), c.t, c.x, c.y, c.vx, c.vy)
+
+    (point,) = measured(drawn["moving-cap-1e4"], by_call("off", "compiled", off))
+    assert point.relative == pytest.approx([1e-9] * 3, rel=1e-3)
+    assert all(u is not None and u > 1e4 for u in point.ulps)
+
+
+def test_time_stepping_is_right_where_it_is_easy_and_wrong_where_it_skips(drawn):
+    easy = measured(drawn["moving-cap-1e4"], by_call("s", "time-stepping", next_collision_by(1e-9)))[0]
+    assert easy.right == 3
+    assert max(easy.relative) < 1e-8
+    # A leaf of the arc: both ends of the integrator's step are inside.
+    scene, state = load("breathing-circle"), State(0.0, 0.0, 0.5, 0.6, 0.8)
+    assert isinstance(next_collision_by(1e-6)(scene, state, 10.0), Collision)
+    hop = drawn["grazing"].questions
+    met = [next_collision_by(1e-6)(drawn["grazing"].scene, q.state, q.t_end) for q in hop]
+    errors = [
+        1.0 if m.wall != q.truth.outcome.wall else abs(m.dt / q.truth.outcome.dt - 1)
+        for m, q in zip(met, hop, strict=True)
+    ]
+    assert max(errors) > 0.5
+
+
+def test_commands_time_themselves_and_their_troubles_are_told(drawn):
+    with ExitStack() as stack:
+        able, _ = contenders.by_command("fast", [sys.executable, "-m", "fast"], stack)
+        unable, _ = contenders.by_command("plain", [sys.executable, "-m", "conformance.plain"], stack)
+        points, troubles = measure.measure(drawn["breathing-disk"], [able, unable], BRIEF, lambda _: None, [])
+    assert [p.contender for p in points] == ["fast"]
+    assert points[0].right == 3
+    assert min(points[0].ns) > 0
+    assert troubles["plain"].startswith("unsupported")
+
+
+def test_a_contender_that_breaks_off_is_left_out(drawn):
+    calls = 0
+
+    def run(workload, n_times):
+        nonlocal calls
+        calls += 1
+        if calls > 3:
+            raise Trouble("crashed", "gone")
+        return Lap(1.0, [Undecided("")] * 3, 1e9)
+
+    points, troubles = measure.measure(
+        drawn["slow"], [Contender("brief", "command", run)], BRIEF, lambda _: None, []
+    )
+    assert not points
+    assert troubles == {"brief": "crashed: gone"}
+
+
+def test_errors_grow_as_the_jacobians_say():
+    followers = ours.our_followers()
+    grown = growth.grow(followers, ours.prove, ours.prove_path, 3, 2, 24, lambda _: None)
+    assert 0.05 < grown.rate < 1.0
+    rough, fine = grown.followers["compensated (fast)"], grown.followers["double-double (fast)"]
+    assert rough[-1] > 100 * rough[0]
+    # Two precisions, one slope: the gap stays what it was.
+    gaps = [math.log10(a / b) for a, b in zip(rough, fine, strict=True)]
+    assert min(gaps) > 12
+    assert all(error <= 30 * bound for error, bound in zip(rough, grown.bound, strict=True))
+    assert grown.lasts["proof, 30 decimals"] <= grown.lasts["proof, 60 decimals"]
+
+
+def test_a_wrong_wall_leaves_no_digit():
+    def astray(scene, state, n):
+        path = ours.prove_path(scene, state, n)
+        return [*path[:3], path[3]._replace(wall="nowhere"), *path[4:]]
+
+    grown = growth.grow({"astray": astray}, ours.prove, ours.prove_path, 3, 1, 6, lambda _: None)
+    assert grown.lasts == {"astray": 3.0}
+    assert grown.followers["astray"][3:] == (1.0, 1.0, 1.0)
+
+
+@pytest.mark.parametrize("power", [0.5, 1.0, 2.0])
+def test_exponents_are_fitted(power):
+    sizes = [1.0, 10.0, 100.0, 1000.0, 10_000.0]
+    exponent, error = work.fit(sizes, [3.0 + size**power for size in sizes])
+    assert exponent == pytest.approx(power, abs=0.02)
+    assert error < 0.05
+    assert work.fit([1.0, 2.0], [4.0, 2.0]) == (-1.0, 0.0)
+
+
+def test_an_ensemble_of_twice_the_particles_has_twice_the_collisions():
+    few, many = (ours.run_ensemble(work.Load(particles=n, energy=1e3)) for n in (50, 100))
+    assert many.collisions == pytest.approx(2 * few.collisions, rel=0.2)
+    assert many.peak_bytes > few.peak_bytes > 0
+
+
+def a_point(ns: list[float], contender: str = "fast") -> record.Point:
+    return record.Point("slow", contender, "compiled", 1, tuple(ns), 1, 0, 0, 0, (0.5,), (1e-16,))
+
+
+def a_record(*points: record.Point, clock: float = 1.0) -> record.Record:
+    grown = record.Growth("moving-cap", 1e4, 1, 1, {"a": (1e-16,)}, {"a": 1.0}, (1e-16,), 0.2)
+    costs = record.Work(
+        "moving-cap", (record.Series("particles", (1.0, 2.0), (1.0, 2.0), (1.0, 2.0), 1.0, 0.0),), 1.0, {}
+    )
+    cases = (record.Case("01", "a graze", 1, {"fast": {"right": 1}}, {"fast": 0.5}),)
+    drawn = (record.Drawn("slow", "slow", "moving-cap", 1),)
+    machine = record.this_machine({})
+    return record.Record(
+        1, "quick", 0, 1, 3, 230, machine, (clock,) * 3, drawn, points, {}, grown, costs, cases, 1.0
+    )
+
+
+def test_a_slow_down_is_seen_and_noise_is_not():
+    old = a_record(a_point([100.0, 101.0, 102.0, 103.0, 99.0]))
+    noisy = a_record(a_point([100.0, 160.0, 104.0, 98.0, 130.0]))
+    slow = a_record(a_point([200.0, 210.0, 190.0, 205.0, 195.0]))
+    machine = a_record(a_point([200.0, 210.0, 190.0, 205.0, 195.0]), clock=2.0)
+    for new, is_slower in ((old, False), (noisy, False), (slow, True), (machine, False)):
+        (ratio,) = comparison.compare(old, new)
+        assert ratio.is_slower is is_slower
+        assert ratio.low <= ratio.ratio <= ratio.high
+    assert comparison.compare(old, a_record(a_point([1.0], "another"))) == []
+
+
+def test_a_record_meets_its_published_schema():
+    schema = json.loads((DOCS / "bench.schema.json").read_text("utf-8"))
+    assert schema == record.json_schema()
+    validator = jsonschema.Draft202012Validator(schema)
+    data = json.loads((DOCS / "bench" / "bench.json").read_text("utf-8"))
+    validator.validate(data)
+    del data["seed"]
+    assert not validator.is_valid(data)
+
+
+def test_a_record_returns_whole(tmp_path):
+    found = a_record(msgspec.structs.replace(a_point([1.0]), ulps=(None, 2.0)))
+    path = tmp_path / "bench.json"
+    path.write_bytes(record.encode(found))
+    assert record.read(path) == found
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [(b"{}", "missing required field"), (b"nonsense", "malformed"), (b"\xff", "bench.json")],
+)
+def test_a_file_that_is_no_record_is_refused(tmp_path, content, words):
+    path = tmp_path / "bench.json"
+    path.write_bytes(content)
+    with pytest.raises(BadInput, match=words):
+        record.read(path)
+    with pytest.raises(BadInput, match="No such file"):
+        record.read(tmp_path / "none.json")
+
+
+def test_the_table_of_hard_cases_is_right_for_our_steppers():
+    """docs/bench/hard-cases.md, regenerated: verdict by verdict."""
+    cases = hard_cases.tabulate(ours.our_askers(), lambda _: None)
+    assert len(cases) == 48
+    text = (DOCS / "bench" / "hard-cases.md").read_text("utf-8")
+    rows = [re.split(r"(?<!\\)\|", line)[1:-1] for line in text.splitlines() if line.startswith("|")]
+    names = [cell.strip() for cell in rows[0]]
+    published = {row[0].strip(): dict(zip(names, map(str.strip, row), strict=True)) for row in rows[2:]}
+    assert len(published) == 48
+    for case in cases:
+        for name, verdicts in case.verdicts.items():
+            assert published[case.case][name] == hard_cases.cell(verdicts, case.ulps[name]), case.case
+            assert set(verdicts) <= {"right", "undecided"}
+    assert all(set(case.verdicts["proof"]) == {"right"} for case in cases)
+
+
+def test_the_table_shows_a_wrong_stepper():
+    def bold(scene, state, t_end):
+        found = plain.next_collision(scene, state, t_end)
+        return Horizon(t_end, 0.0, 0.0, 0.0, 0.0) if isinstance(found, Undecided) else found
+
+    ask = hard_cases.asked(bold, plain.trajectory)
+    cases = hard_cases.tabulate({"bold": ask}, lambda _: None)
+    assert sum(case.verdicts["bold"].get("wrong", 0) for case in cases) > 0
+    assert "wrong" in hard_cases.to_markdown(cases)

@@ -1,0 +1,149 @@
+"""`mushrooms bench`: files, exit codes, bad options in one line; the README's table is the record's."""
+
+from __future__ import annotations
+
+import re
+import statistics
+import sys
+from pathlib import Path
+
+import msgspec
+import pytest
+
+from conformance import vectors
+from conformance.bench import record, work, workloads
+from mushrooms import bench, figures_of_speed
+from mushrooms.bench_report import middle_and_worst
+from mushrooms.main import run
+
+ROOT = Path(__file__).parent.parent
+FILES = ["bench.html", "bench.json", "bench.svg", "hard-cases.md"]
+
+
+@pytest.fixture(autouse=True)
+def _small(monkeypatch):
+    """Two workloads, a few questions, hard cases and particles."""
+    hard = [v for v in vectors.load("stress") if v.group in ("hard-case-01", "hard-case-23")]
+    monkeypatch.setattr(vectors, "load", lambda *_: hard)
+    monkeypatch.setattr(workloads, "RULES", workloads.RULES[:1] + workloads.RULES[2:3])
+    monkeypatch.setattr(bench, "QUESTIONS", {"quick": 2})
+    monkeypatch.setattr(bench, "REPEATS", {"quick": 2})
+    monkeypatch.setattr(bench, "PATHS", {"quick": (1, 4)})
+    monkeypatch.setitem(work.SWEEPS, "quick", {"particles": (50, 100), "energy": (1e2, 1e3)})
+
+
+@pytest.fixture
+def call(capsys):
+    def run_command(*arguments):
+        with pytest.raises(SystemExit) as stop:
+            run(["bench", *map(str, arguments)])
+        captured = capsys.readouterr()
+        return stop.value.code, captured.out, captured.err
+
+    return run_command
+
+
+def test_a_benchmark_is_written_whole_and_compared(call, tmp_path):
+    one = [sys.executable, "-m", "fast"]
+    code, out, err = call("--quick", "--out", tmp_path / "one", "--seed", 5, "--", *one)
+    assert (code, err) == (0, "")
+    assert sorted(p.name for p in (tmp_path / "one").iterdir()) == FILES
+    found = record.read(tmp_path / "one" / "bench.json")
+    assert (found.size, found.seed, found.questions) == ("quick", 5, 2)
+    names = {p.contender for p in found.points}
+    assert {"proof, 200 digits", "fast, lanes", "fast, pairs", "plain Python", " ".join(one)} <= names
+    assert {p.workload for p in found.points} == {"breathing-disk", "moving-cap-1e4"}
+    assert "fast, careful" in out
+    page = (tmp_path / "one" / "bench.html").read_text("utf-8")
+    assert not re.search(r"(src|href)=\"(?!data:)", page)
+    assert page.count("<img") == 3
+    assert (tmp_path / "one" / "bench.svg").read_text("utf-8").count("breathing-disk") >= 1
+    assert "| 01 |" in (tmp_path / "one" / "hard-cases.md").read_text("utf-8")
+
+    # The same seed asks the same questions, so that the errors are the same to the last bit.
+    options = [
+        "--quick",
+        "--out",
+        tmp_path / "two",
+        "--seed",
+        5,
+        "--compare",
+        tmp_path / "one" / "bench.json",
+    ]
+    code, out, err = call(*options)
+    assert code in (0, 1)
+    assert "New time over old" in out
+    again = record.read(tmp_path / "two" / "bench.json")
+    errors = [{(p.workload, p.contender): p.relative for p in r.points} for r in (found, again)]
+    assert all(errors[0][key] == errors[1][key] for key in errors[1])
+
+
+def test_a_slow_down_exits_with_1(call, tmp_path, monkeypatch):
+    kept = record.read(ROOT / "docs" / "bench" / "bench.json")
+    monkeypatch.setattr(bench, "_measured", lambda *_: kept)
+    faster = [msgspec.structs.replace(p, ns=tuple(ns / 3 for ns in p.ns)) for p in kept.points]
+    old = tmp_path / "old.json"
+    old.write_bytes(record.encode(msgspec.structs.replace(kept, points=tuple(faster))))
+    same = tmp_path / "same.json"
+    same.write_bytes(record.encode(kept))
+    assert call("--out", tmp_path / "a", "--compare", same)[0] == 0
+    code, out, _ = call("--out", tmp_path / "b", "--compare", old)
+    assert code == 1
+    assert f"{len(kept.points)} of {len(kept.points)} slower" in out
+
+
+@pytest.mark.parametrize(
+    ("arguments", "word"),
+    [
+        (["--seed", "-1"], "--seed = -1"),
+        (["--compare", "absent.json"], "absent.json"),
+        (["--compare", "bad.json"], "bad.json is no bench.json"),
+        (["--", "./no-such-stepper"], "no-such-stepper"),
+        (["--", sys.executable, "-c", "print(1)"], "python"),
+    ],
+)
+def test_bad_options_are_one_line(call, monkeypatch, tmp_path, arguments, word):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "bad.json").write_text("{}")
+    code, out, err = call("--quick", *arguments)
+    assert (code, out) == (2, "")
+    assert err.startswith("mushrooms: ")
+    assert err.count("\n") == 1
+    assert word in err
+    assert [p.name for p in tmp_path.iterdir()] == ["bad.json"]
+
+
+def test_the_front_holds_only_what_nothing_beats():
+    def point(name, ns, error, wrong=0):
+        return record.Point("slow", name, "compiled", 1, (ns,), 1, wrong, 0, 0, (1.0,), (error,))
+
+    points = [
+        point("a", 10.0, 1e-15),
+        point("b", 20.0, 1e-14),
+        point("c", 30.0, 1e-30),
+        point("d", 1.0, 1e-40, 1),
+    ]
+    assert figures_of_speed.pareto(points) == [(pytest.approx(15.0), 10.0), (pytest.approx(30.0), 30.0)]
+
+
+def readme_rows(kept: record.Record) -> list[str]:
+    """The README's table: every stepper on moving-cap-1e7."""
+    rows = []
+    for p in kept.points:
+        if p.workload == "moving-cap-1e7":
+            worst = middle_and_worst(p.ulps, ".2g")[1]
+            relative = middle_and_worst(p.relative, ".0e")[1]
+            rows.append(f"| {p.contender} | {statistics.median(p.ns):,.0f} | {worst} | {relative} |")
+    return rows
+
+
+def test_the_readme_shows_what_the_record_holds():
+    kept = record.read(ROOT / "docs" / "bench" / "bench.json")
+    text = (ROOT / "README.md").read_text("utf-8")
+    assert kept.size == "full"
+    rows = readme_rows(kept)
+    assert len(rows) > 12
+    for row in rows:
+        assert row in text
+    for name, n in kept.growth.lasts.items():
+        assert f"{name}: {'over ' if n >= kept.growth.collisions else ''}{n:.0f}" in text

@@ -15,7 +15,7 @@ import numpy.typing as npt
 from fast import codes, entries, follow, lanes, motion
 from fast.compiled import FloatArray, compile_scene
 from fast.stepper import WALL_CODES, WALL_NAMES, trouble
-from scene import Collision, Outcome, Scene, State
+from scene import Collision, Horizon, Outcome, Scene, State
 
 PLACE = (lanes.X, lanes.Y, lanes.VX, lanes.VY)
 OFF = np.bool_(False)
@@ -44,6 +44,8 @@ def careful_steps(scene: Scene, states: Sequence[State], n_times: int = 1) -> tu
     for state, code, row in zip(states, met.tolist(), out.tolist(), strict=True):
         if code in WALL_NAMES:
             outcomes.append(Collision(WALL_NAMES[code], *row))
+        elif code == codes.HORIZON:  # it moves for ever
+            outcomes.append(Horizon(np.inf, state.x, state.y, state.vx, state.vy))
         else:
             outcomes.append(trouble(code, state))
     return outcomes, seconds

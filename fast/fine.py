@@ -1,4 +1,4 @@
-"""The fine stepper's face: paths to about 31 decimals, states carried as pairs of floats."""
+"""The fine stepper's face: steps to about 31 decimals, states carried as pairs of floats."""
 
 from __future__ import annotations
 
@@ -33,7 +33,9 @@ class FineTrajectory(NamedTuple):
 
 
 def fine_trajectory(scene: Scene, state: State, n_collisions: int) -> FineTrajectory:
-    """Follow a particle through `n_collisions` collisions, each right to about 31 decimals.
+    """Follow a particle, each step right to about 31 decimals of the state that it starts from.
+
+    Along the path errors grow as the dynamics makes them.
 
     Args:
         scene: table and laws of motion.
@@ -50,11 +52,11 @@ def fine_trajectory(scene: Scene, state: State, n_collisions: int) -> FineTrajec
         raise InvalidState(f"n_collisions = {n_collisions}, must be >= 0")
     steps: FloatArray = np.empty((n_collisions, 6, 2))
     met: npt.NDArray[np.int64] = np.empty(n_collisions, dtype=np.int64)
-    start = np.array([state.t, state.x, state.y, state.vx, state.vy])
+    start = np.array([[number, 0.0] for number in (state.t, state.x, state.y, state.vx, state.vy)])
     n, code = entries.fine(*compile_scene(scene), start, WALL_CODES[state.wall], np.inf, steps, met)
     outcome: Outcome | None = None
     if n < n_collisions:
-        last = steps[n - 1, 2:, 0] if n else start[1:]
+        last = steps[n - 1, 2:, 0] if n else start[1:, 0]
         is_free = code == codes.HORIZON
         outcome = Horizon(np.inf, *map(float, last)) if is_free else trouble(code, state)
     return FineTrajectory([WALL_NAMES[int(c)] for c in met[:n]], steps[:n], outcome)

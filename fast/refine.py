@@ -1,7 +1,7 @@
 """The fine step: the careful step's collision to about 31 decimals, in double-double arithmetic.
 
 The careful step, on the state rounded to binary64, says which wall is met first and when, or that it cannot
-tell: its margins of eight units in the last place are far above what that rounding moves. Newton's method in
+tell; where the state has low parts, its residuals are judged no better than that rounding. Newton's method in
 pairs then gives the time, from a wall function made of increments since the last event, so that a hop along
 a wall keeps its digits; place, wall speed and reflection follow in pairs. A path carries its state in pairs.
 
@@ -21,10 +21,11 @@ from fast.codes import (  # isort: skip
     ARC, BANG_BANG, BASE, FAR_TIME, FLOOR, FOURIER, H, HORIZON, M, NO_WALL, OUTSIDE, R, RIGHT, TANGENT, W,
 )  # fmt: skip
 from fast.double_double import add, div, mul, sine_cosine, sub, times
-from fast.motion import ANCHORS_SHAPE, KNOTS, set_anchors
+from fast.motion import ANCHORS_SHAPE, KNOTS, LACK, PHASE, set_anchors
 from fast.walls import is_outside
 
 MAX_CORRECTIONS = 8
+ROUNDED = 2.0**-57  # what rounding a state takes from a residual: 64 times this (fast.walls.law_size)
 SETTLED, LOOSE = 2.0**-102, 2.0**-80  # relative corrections: done; too coarse for an answer
 ZERO = (0.0, 0.0)
 
@@ -228,16 +229,24 @@ def fine_step(table, is_relative, laws, bounds, anchors, p, wall, limit):
 def fine_path(table, is_relative, laws, bounds, start, wall, limit, out, met):
     """Fill out[i] with dt, t, x, y, vx, vy as pairs and met[i] with the wall; returns number and last code.
 
-    `limit` [time] is the horizon of every single step.
+    `start` (5, 2): t, x, y, vx, vy as pairs. `limit` [time] is the horizon of every single step.
     """
     anchors = np.zeros(ANCHORS_SHAPE)
-    p = ((start[0], 0.0), (start[1], 0.0), (start[2], 0.0), (start[3], 0.0), (start[4], 0.0))
+    p = (
+        (start[0, 0], start[0, 1]),
+        (start[1, 0], start[1, 1]),
+        (start[2, 0], start[2, 1]),
+        (start[3, 0], start[3, 1]),
+        (start[4, 0], start[4, 1]),
+    )
     for i in range(out.shape[0]):
         if not set_anchors(laws, anchors, p[0][0], p[0][1]):
             return i, FAR_TIME
+        if p[0][1] != 0.0 or p[1][1] != 0.0 or p[2][1] != 0.0:
+            anchors[PHASE, LACK] = max(anchors[PHASE, LACK], ROUNDED)
         if (
             i == 0
-            and is_outside(table, is_relative, wall, start[1], start[2], laws, anchors, bounds) != NO_WALL
+            and is_outside(table, is_relative, wall, p[1][0], p[2][0], laws, anchors, bounds) != NO_WALL
         ):
             return i, OUTSIDE
         wall, time, p = fine_step(table, is_relative, laws, bounds, anchors, p, wall, limit)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import statistics
+import subprocess
 import tempfile
 import time
 from contextlib import ExitStack
@@ -12,6 +13,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.console import Console
+from rich.markup import escape
 from rich.table import Table
 
 from mushrooms import output
@@ -25,6 +27,7 @@ if TYPE_CHECKING:
     from conformance.bench.record import Record, Size
 
 MAX_SEED = 2**64 - 1
+TIMEOUT, RESTARTS = 30.0, 1  # of a command
 C_FLAGS = ("-O3", "-march=native")
 # By size: questions of a workload, laps, trajectories and their length, repeats of an ensemble.
 QUESTIONS = {"quick": 12, "full": 64}
@@ -47,16 +50,19 @@ def bench(
 ) -> None:
     """Measure speed against error; writes bench.json, bench.svg, bench.html and hard-cases.md.
 
-    Exit code 0, or 1 when --compare shows a stepper slower beyond doubt, or 2 on bad input.
+    Exit code 0, or 1 when --compare shows a stepper slower than laps explain, or 2 on bad input.
     """
     from conformance.bench import comparison, hard_cases, record
     from mushrooms import bench_report, figures_of_speed
 
     if not 0 <= seed <= MAX_SEED:
         raise BadInput(f"--seed = {seed}, must be 0 to 2^64 - 1")
+    size: Size = "quick" if quick else "full"
     old = record.read(compare) if compare is not None else None
+    if old is not None:
+        comparison.check_alike(old, size, seed, QUESTIONS[size])
     with output.writable_folder(out) as folder:
-        found = _measured("quick" if quick else "full", seed, command or [])
+        found = _measured(size, seed, command or [])
         files = {
             "bench.json": record.encode(found),
             "bench.svg": figures_of_speed.speed(found),
@@ -72,6 +78,8 @@ def bench(
     if old is not None:
         ratios = comparison.compare(old, found)
         console.print(_ratios(ratios))
+        for what in comparison.gone(old, found):
+            console.print(f"not measured any more: {what}", markup=False)
         slower = [r for r in ratios if r.is_slower]
         print(f"{len(slower)} of {len(ratios)} slower than {comparison.SLOWER} times {compare}")
         raise typer.Exit(1 if slower else 0)
@@ -89,7 +97,7 @@ def _measured(size: Size, seed: int, command: list[str]) -> Record:
         task = bar.add_task("speed against error", total=len(workloads.RULES) * (repeats + 1))
 
         def tick(what: str) -> None:
-            bar.update(task, advance=0 if what else 1, description=what or None)
+            bar.update(task, advance=0 if what else 1, description=escape(what) or None)
 
         contenders, askers, built, not_run = _contenders(stack, command)
         points, clock = [], list[float]()
@@ -110,7 +118,12 @@ def _measured(size: Size, seed: int, command: list[str]) -> Record:
             ours.run_ensemble, size, os.cpu_count() or 1, ENSEMBLE_REPEATS[size], tick
         )
         tick("compile times")
-        compiled = ours.compile_times() if size == "full" else {}
+        compiled = {}
+        if size == "full":
+            try:
+                compiled = ours.compile_times()
+            except subprocess.CalledProcessError as error:
+                not_run["compile times"] = f"exit code {error.returncode}"
     return record.Record(
         format=record.FORMAT,
         size=size,
@@ -143,8 +156,10 @@ def _contenders(
     from conformance.bench import contenders as those
     from conformance.examples import find_examples
     from conformance.process import Trouble
+    from conformance.session import Limits
     from mushrooms import bench_contenders as ours
 
+    patience = Limits(TIMEOUT, RESTARTS)
     contenders = [*ours.our_contenders(), those.plain_python(), *those.time_steppers()]
     askers = ours.our_askers()
     built, not_run = {}, {}
@@ -153,14 +168,18 @@ def _contenders(
         if not example.command:
             not_run[f"example in {language}"] = example.why_not
             continue
-        contender, ask = those.by_command(f"example in {language}", example.command, stack)
+        try:
+            contender, ask = those.by_command(f"example in {language}", example.command, stack, patience)
+        except (Trouble, BadInput) as trouble:
+            not_run[f"example in {language}"] = str(trouble)
+            continue
         contenders.append(contender)
         askers[contender.name] = ask
         if example.built:
             built[contender.name] = example.built
     if command:
         try:
-            contender, ask = those.by_command(" ".join(command), command, stack)
+            contender, ask = those.by_command(f"command {' '.join(command)}", command, stack, patience)
         except Trouble as trouble:
             raise BadInput(f"command {command[0]!r} {trouble.verdict}: {trouble.why}") from None
         contenders.append(contender)
@@ -179,17 +198,19 @@ def _table(found: Record) -> Table:
     for p in found.points:
         middle, worst = middle_and_worst(p.ulps, ".2g")
         counts = [str(n) if n else "" for n in (p.wrong, p.undecided, p.left)]
-        table.add_row(p.workload, p.contender, f"{statistics.median(p.ns):,.0f}", middle, worst, *counts)
+        table.add_row(
+            p.workload, escape(p.contender), f"{statistics.median(p.ns):,.0f}", middle, worst, *counts
+        )
     return table
 
 
 def _ratios(ratios: list[Ratio]) -> Table:
-    table = Table(title="New time over old, 99 % interval", title_justify="left")
+    table = Table(title="New time over old, 99 % bootstrap interval over the laps", title_justify="left")
     for name in ("workload", "stepper"):
         table.add_column(name)
     table.add_column("ratio", justify="right")
     table.add_column("interval", justify="right")
     for r in ratios:
         mark = " slower" if r.is_slower else ""
-        table.add_row(r.workload, r.contender, f"{r.ratio:.2f}", f"{r.low:.2f} to {r.high:.2f}{mark}")
+        table.add_row(r.workload, escape(r.contender), f"{r.ratio:.2f}", f"{r.low:.2f} to {r.high:.2f}{mark}")
     return table

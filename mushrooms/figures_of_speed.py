@@ -138,9 +138,9 @@ def _digits_of(p: Point) -> tuple[float, float]:
 def pareto(points: list[Point]) -> list[tuple[float, float]]:
     """Return (worst digits, ns) of the contenders that none beats in both, from the fastest on.
 
-    Only a contender with no wrong answer and one right at least can stand on the front.
+    Only a contender with no wrong answer and most of them right can stand on the front.
     """
-    able = [p for p in points if p.right and not p.wrong]
+    able = [p for p in points if p.right > p.undecided + p.left and not p.wrong]
     pairs = sorted((statistics.median(p.ns), -digits(max(p.relative))) for p in able)
     front: list[tuple[float, float]] = []
     for ns, minus_digits in pairs:
@@ -159,6 +159,7 @@ def short_name(contender: str) -> str:
         ("example in ", ""),
     ):
         contender = contender.replace(long, short)
+    contender = contender.replace("$", r"\$")  # no formula
     return contender if len(contender) < 18 else contender[:17] + "…"
 
 
@@ -194,7 +195,7 @@ def growth(found: Growth) -> bytes:
         shown = np.where(np.array(errors) > 0, errors, np.nan)
         axes.plot(count, shown, color=colour, marker=".", markersize=4, linewidth=1, label=name)
     axes.plot(
-        count, found.bound, color=plots.BLACK, linestyle="--", linewidth=1, label="bound: one ulp a step"
+        count, found.bound, color=plots.BLACK, linestyle="--", linewidth=1, label="one ulp a step, grown"
     )
     middle = found.collisions // 3
     guide = 10.0 ** (found.rate * (count[: 2 * middle] - 1) - 32)
@@ -217,7 +218,9 @@ def work(series: tuple[Series, ...]) -> bytes:
     for panel, one in zip(panels, series, strict=True):
         panel.plot(one.sizes, one.seconds, marker="o", color=plots.BLUE)
         panel.set(xscale="log", yscale="log", xlabel=one.what)
-        panel.set_title(f"exponent {one.exponent:.2f} ± {one.error:.2f}", loc="left")
+        error = "" if one.error is None else f" ± {one.error:.2f}"
+        if one.exponent is not None:
+            panel.set_title(f"exponent {one.exponent:.2f}{error}", loc="left")
         if one.what in ("cycles", "threads"):
             panel.xaxis.set_major_locator(FixedLocator(list(one.sizes)))
             panel.xaxis.set_minor_locator(NullLocator())

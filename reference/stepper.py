@@ -171,6 +171,8 @@ def trajectory(
         InvalidState: naming field, value and bound.
     """
     if working is not None:
+        if working < 1:
+            raise InvalidState(f"working = {working}, must be >= 1")
         return _chain(scene, state, n_collisions, t_end, Arithmetic(working), None, is_differentiated)
     working = digits + GUARD_DIGITS + n_collisions // 4
     while True:
@@ -194,7 +196,10 @@ def _chain(
     """Follow with fixed precision; `digits` None: as far as it reaches, else Undecidable is raised."""
     check_numbers(scene, state, state.t if t_end is None else t_end)
     steps: list[Collision] = []
-    outcome = judge_start(scene, state, arithmetic)
+    try:
+        outcome = judge_start(scene, state, arithmetic)
+    except Undecidable as question:
+        return _broken_off(steps, question, arithmetic, digits)
     if isinstance(outcome, Undefined):
         return Trajectory(steps, outcome, arithmetic.digits)
     leaving, flat = outcome
@@ -209,9 +214,7 @@ def _chain(
                 in_cap=in_cap
             )
         except Undecidable as question:
-            if digits is not None:
-                raise
-            return Trajectory(steps, Undecided(f"{question} ({arithmetic.digits} digits)"), arithmetic.digits)
+            return _broken_off(steps, question, arithmetic, digits)
         if event.undefined is not None:
             return Trajectory(steps, event.undefined, arithmetic.digits)
         if event.hit is None:
@@ -230,6 +233,14 @@ def _chain(
         _require(steps[-1], digits)
     jacobian = None if matrix is None else enclosures(arithmetic, matrix)
     return Trajectory(steps, None, arithmetic.digits, jacobian)
+
+
+def _broken_off(
+    steps: list[Collision], question: Undecidable, arithmetic: Arithmetic, digits: int | None
+) -> Trajectory:
+    if digits is not None:
+        raise question
+    return Trajectory(steps, Undecided(f"{question} ({arithmetic.digits} digits)"), arithmetic.digits)
 
 
 def _attempt(

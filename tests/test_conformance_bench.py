@@ -22,7 +22,7 @@ from conformance.bench.contenders import Contender, Lap, by_call
 from conformance.bench.time_stepping import next_collision_by
 from conformance.process import Trouble
 from mushrooms import bench_contenders as ours
-from scene import BadInput, Collision, Horizon, State, Undecided, load
+from scene import BadInput, Collision, Horizon, Undecided
 
 DOCS = Path(__file__).parent.parent / "docs"
 BRIEF = measure.Settings(repeats=3, least_ns=1.0, most_ns=1e9)
@@ -81,7 +81,6 @@ def test_speed_and_error_come_from_the_same_laps(drawn):
     assert all(u is not None and u <= 4.0 for u in careful.ulps + lanes.ulps)
     assert len(proof.ns) == len(careful.ns) == 3
     assert min(proof.ns) > min(careful.ns)
-    assert careful.n_times >= 1
 
 
 @pytest.mark.parametrize(
@@ -115,9 +114,7 @@ def test_time_stepping_is_right_where_it_is_easy_and_wrong_where_it_skips(drawn)
     easy = measured(drawn["moving-cap-1e4"], by_call("s", "time-stepping", next_collision_by(1e-9)))[0]
     assert easy.right == 3
     assert max(easy.relative) < 1e-8
-    # A leaf of the arc: both ends of the integrator's step are inside.
-    scene, state = load("breathing-circle"), State(0.0, 0.0, 0.5, 0.6, 0.8)
-    assert isinstance(next_collision_by(1e-6)(scene, state, 10.0), Collision)
+    # Hops along the arc: it is left with a rounding error for a gap, and met again within one of its steps.
     hop = drawn["grazing"].questions
     met = [next_collision_by(1e-6)(drawn["grazing"].scene, q.state, q.t_end) for q in hop]
     errors = [
@@ -136,6 +133,45 @@ def test_commands_time_themselves_and_their_troubles_are_told(drawn):
     assert points[0].right == 3
     assert min(points[0].ns) > 0
     assert troubles["plain"].startswith("unsupported")
+
+
+IMPOSTOR = """
+import json, sys
+for line in sys.stdin:
+    asked = json.loads(line)
+    if asked["cmd"] == "start":
+        every = {"profiles": ["step", "time"], "tables": ["cap"], "laws": ["constant", "fourier"]}
+        answer = {"protocol": 1, "name": "impostor", "version": "1", "language": "Python", **every}
+    elif asked["cmd"] == "time":
+        answer = {"seq": asked["seq"], "ns": NS, "steps": STEPS}
+    print(json.dumps(answer), flush=True)
+"""
+
+
+@pytest.mark.parametrize(
+    ("ns", "steps"),
+    [("[]", "[]"), ("[0] * asked['repeat']", "[{'outcome': 'undecided', 'reason': ''}]"), ("[5]", "[]")],
+)
+def test_a_command_that_times_nothing_is_left_out(drawn, tmp_path, ns, steps):
+    (tmp_path / "impostor.py").write_text(IMPOSTOR.replace("NS", ns).replace("STEPS", steps))
+    with ExitStack() as stack:
+        impostor, _ = contenders.by_command("it", [sys.executable, str(tmp_path / "impostor.py")], stack)
+        points, troubles = measure.measure(drawn["breathing-disk"], [impostor], BRIEF, lambda _: None, [])
+    assert not points
+    assert troubles["it"].startswith("fail: a time request is answered")
+
+
+def test_a_contender_that_changes_its_answers_is_left_out(drawn):
+    answers = iter(range(100))
+
+    def fickle(workload, n_times):
+        return Lap(1.0, [Undecided(str(next(answers)))] * 3, 1e9)
+
+    points, troubles = measure.measure(
+        drawn["slow"], [Contender("fickle", "command", fickle)], BRIEF, lambda _: None, []
+    )
+    assert not points
+    assert troubles == {"fickle": "fail: its answers differ from lap to lap"}
 
 
 def test_a_contender_that_breaks_off_is_left_out(drawn):
@@ -164,7 +200,7 @@ def test_errors_grow_as_the_jacobians_say():
     # Two precisions, one slope: the gap stays what it was.
     gaps = [math.log10(a / b) for a, b in zip(rough, fine, strict=True)]
     assert min(gaps) > 12
-    assert all(error <= 30 * bound for error, bound in zip(rough, grown.bound, strict=True))
+    assert all(error <= 4 * bound for error, bound in zip(rough, grown.bound, strict=True))
     assert grown.lasts["proof, 30 decimals"] <= grown.lasts["proof, 60 decimals"]
 
 
@@ -184,7 +220,8 @@ def test_exponents_are_fitted(power):
     exponent, error = work.fit(sizes, [3.0 + size**power for size in sizes])
     assert exponent == pytest.approx(power, abs=0.02)
     assert error < 0.05
-    assert work.fit([1.0, 2.0], [4.0, 2.0]) == (-1.0, 0.0)
+    assert work.fit([1.0, 2.0], [4.0, 2.0]) == (-1.0, None)
+    assert work.fit([1.0], [4.0]) == (None, None)
 
 
 def test_an_ensemble_of_twice_the_particles_has_twice_the_collisions():
@@ -222,6 +259,20 @@ def test_a_slow_down_is_seen_and_noise_is_not():
     assert comparison.compare(old, a_record(a_point([1.0], "another"))) == []
 
 
+@pytest.mark.parametrize(("field", "value"), [("size", "full"), ("seed", 1), ("questions", 2)])
+def test_only_like_is_compared_with_like(field, value):
+    old = msgspec.structs.replace(a_record(a_point([1.0])), **{field: value})
+    with pytest.raises(BadInput, match=f"{field} = {value} there"):
+        comparison.check_alike(old, "quick", 0, 1)
+    comparison.check_alike(a_record(a_point([1.0])), "quick", 0, 1)
+
+
+def test_what_is_gone_is_told():
+    old, new = a_record(a_point([1.0]), a_point([1.0], "another")), a_record(a_point([1.0]))
+    assert comparison.gone(old, new) == ["another on slow"]
+    assert comparison.gone(new, old) == []
+
+
 def test_a_record_meets_its_published_schema():
     schema = json.loads((DOCS / "bench.schema.json").read_text("utf-8"))
     assert schema == record.json_schema()
@@ -241,7 +292,15 @@ def test_a_record_returns_whole(tmp_path):
 
 @pytest.mark.parametrize(
     ("content", "words"),
-    [(b"{}", "missing required field"), (b"nonsense", "malformed"), (b"\xff", "bench.json")],
+    [
+        (b"{}", "missing required field"),
+        (b"nonsense", "malformed"),
+        (b"\xff", "bench.json"),
+        (record.encode(a_record(a_point([0.0]))), "ns"),
+        (record.encode(a_record(a_point([]))), "ns"),
+        (record.encode(msgspec.structs.replace(a_record(), clock_ns=())), "clock_ns"),
+        (record.encode(msgspec.structs.replace(a_record(), format=2)), "format = 2, must be 1"),
+    ],
 )
 def test_a_file_that_is_no_record_is_refused(tmp_path, content, words):
     path = tmp_path / "bench.json"
@@ -263,7 +322,13 @@ def test_the_table_of_hard_cases_is_right_for_our_steppers():
     assert len(published) == 48
     for case in cases:
         for name, verdicts in case.verdicts.items():
-            assert published[case.case][name] == hard_cases.cell(verdicts, case.ulps[name]), case.case
+            cell = hard_cases.cell(verdicts, case.ulps[name])
+            # The last bits of plain Python are its platform's libm's.
+            shown, here = (
+                c.partition(" (")[0] if name == "plain Python" else c
+                for c in (published[case.case][name], cell)
+            )
+            assert shown == here, case.case
             assert set(verdicts) <= {"right", "undecided"}
     assert all(set(case.verdicts["proof"]) == {"right"} for case in cases)
 

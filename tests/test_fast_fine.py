@@ -14,8 +14,11 @@ import fast
 import reference
 from conformance.error import backward_ulps
 from conformance.strategies import scenes_and_states
+from fast import codes, entries
 from fast import double_double as dd
-from scene import Collision, InvalidState, Rejected, State, Undecided, load
+from fast.compiled import compile_scene
+from fast.stepper import WALL_CODES
+from scene import Collision, InvalidState, Rejected, State, Stem, Undecided, load
 
 N_STEPS = int(os.environ.get("MUSHROOMS_STEPS", "400"))
 UNIT = 2.0**51  # backward units of 2^-104 in a backward ulp
@@ -122,6 +125,15 @@ def test_the_first_collision_is_the_careful_one_to_its_last_bits():
     assert isinstance(found, Collision)
     numbers = [found.dt, found.t, found.x, found.y, found.vx, found.vy]
     assert row[:, 0].tolist() == pytest.approx(numbers, rel=1e-15)
+
+
+def test_rounding_a_state_of_pairs_is_not_taken_for_a_gap():
+    """A side and the floor met together but for 3e-7 of 1e-10, and the low parts hold which is first."""
+    scene, d = Stem(w=1.0, h=1.0), round(1e-10 * 2**53) * 2.0**-53
+    start = np.array([[0.0, 0.0], [1.0 - d, 0.0], [d - 1.0, -5e-17], [1.0, 0.0], [2e-7 - 1.0, 0.0]])
+    steps, met = np.empty((1, 6, 2)), np.empty(1, dtype=np.int64)
+    n, code = entries.fine(*compile_scene(scene), start, WALL_CODES[None], np.inf, steps, met)
+    assert (n, code) == (0, codes.CORNER)
 
 
 def test_bad_starts_are_refused():

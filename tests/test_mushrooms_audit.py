@@ -5,9 +5,9 @@ from __future__ import annotations
 import base64
 import json
 import re
+from functools import partial
 from html.parser import HTMLParser
 from pathlib import Path
-from types import SimpleNamespace
 
 import adiabatic_particles
 import jsonschema
@@ -19,23 +19,15 @@ from conformance.audit.evidence import Steppers
 from conformance.audit.finding import Check, Finding
 from conformance.audit.session import Result, Settings
 from mushrooms import report
-from mushrooms.main import run
 
 SCHEMA = Path(__file__).parent.parent / "docs" / "report.schema.json"
 CHEAP = "M3,M10,X5,N6"
 
 
 @pytest.fixture
-def call(capsys, monkeypatch):
+def call(command_line, monkeypatch):
     monkeypatch.setattr(fast, "simulate", adiabatic_particles.simulate)
-
-    def run_command(*arguments):
-        with pytest.raises(SystemExit) as stop:
-            run(["audit", *(str(argument) for argument in arguments)])
-        captured = capsys.readouterr()
-        return SimpleNamespace(code=stop.value.code, out=captured.out, err=captured.err)
-
-    return run_command
+    return partial(command_line, "audit")
 
 
 @pytest.fixture(scope="module")

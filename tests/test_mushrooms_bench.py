@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import statistics
 import sys
+from functools import partial
 from pathlib import Path
 
 import msgspec
@@ -14,7 +15,6 @@ from conformance import vectors
 from conformance.bench import record, work, workloads
 from mushrooms import bench, figures_of_speed
 from mushrooms.bench_report import middle_and_worst
-from mushrooms.main import run
 
 ROOT = Path(__file__).parent.parent
 FILES = ["bench.html", "bench.json", "bench.svg", "hard-cases.md"]
@@ -26,21 +26,15 @@ def _small(monkeypatch):
     hard = [v for v in vectors.load("stress") if v.group in ("hard-case-01", "hard-case-23")]
     monkeypatch.setattr(vectors, "load", lambda *_: hard)
     monkeypatch.setattr(workloads, "RULES", workloads.RULES[:1] + workloads.RULES[2:3])
-    monkeypatch.setattr(bench, "QUESTIONS", {"quick": 2})
+    monkeypatch.setattr(bench, "QUESTIONS", {"quick": 2, "full": 64})
     monkeypatch.setattr(bench, "REPEATS", {"quick": 2})
     monkeypatch.setattr(bench, "PATHS", {"quick": (1, 4)})
     monkeypatch.setitem(work.SWEEPS, "quick", {"particles": (50, 100), "energy": (1e2, 1e3)})
 
 
 @pytest.fixture
-def call(capsys):
-    def run_command(*arguments):
-        with pytest.raises(SystemExit) as stop:
-            run(["bench", *map(str, arguments)])
-        captured = capsys.readouterr()
-        return stop.value.code, captured.out, captured.err
-
-    return run_command
+def call(command_line):
+    return partial(command_line, "bench")
 
 
 def test_a_benchmark_is_written_whole_and_compared(call, tmp_path):
@@ -51,7 +45,13 @@ def test_a_benchmark_is_written_whole_and_compared(call, tmp_path):
     found = record.read(tmp_path / "one" / "bench.json")
     assert (found.size, found.seed, found.questions) == ("quick", 5, 2)
     names = {p.contender for p in found.points}
-    assert {"proof, 200 digits", "fast, lanes", "fast, pairs", "plain Python", " ".join(one)} <= names
+    assert {
+        "proof, 200 digits",
+        "fast, lanes",
+        "fast, pairs",
+        "plain Python",
+        f"command {' '.join(one)}",
+    } <= names
     assert {p.workload for p in found.points} == {"breathing-disk", "moving-cap-1e4"}
     assert "fast, careful" in out
     page = (tmp_path / "one" / "bench.html").read_text("utf-8")
@@ -71,8 +71,9 @@ def test_a_benchmark_is_written_whole_and_compared(call, tmp_path):
         tmp_path / "one" / "bench.json",
     ]
     code, out, err = call(*options)
-    assert code in (0, 1)
     assert "New time over old" in out
+    assert "not measured any more: command" in out
+    assert code == (0 if re.search(r"^0 of \d+ slower", out, re.MULTILINE) else 1)
     again = record.read(tmp_path / "two" / "bench.json")
     errors = [{(p.workload, p.contender): p.relative for p in r.points} for r in (found, again)]
     assert all(errors[0][key] == errors[1][key] for key in errors[1])
@@ -80,16 +81,21 @@ def test_a_benchmark_is_written_whole_and_compared(call, tmp_path):
 
 def test_a_slow_down_exits_with_1(call, tmp_path, monkeypatch):
     kept = record.read(ROOT / "docs" / "bench" / "bench.json")
+    points = tuple(msgspec.structs.replace(p, ns=(100.0, 101.0, 102.0)) for p in kept.points)
+    kept = msgspec.structs.replace(kept, points=points, questions=bench.QUESTIONS["quick"], size="quick")
     monkeypatch.setattr(bench, "_measured", lambda *_: kept)
-    faster = [msgspec.structs.replace(p, ns=tuple(ns / 3 for ns in p.ns)) for p in kept.points]
-    old = tmp_path / "old.json"
-    old.write_bytes(record.encode(msgspec.structs.replace(kept, points=tuple(faster))))
-    same = tmp_path / "same.json"
-    same.write_bytes(record.encode(kept))
-    assert call("--out", tmp_path / "a", "--compare", same)[0] == 0
-    code, out, _ = call("--out", tmp_path / "b", "--compare", old)
+    files = {}
+    for name, factor in (("same", 1.0), ("faster", 0.5)):
+        old = tuple(msgspec.structs.replace(p, ns=tuple(factor * ns for ns in p.ns)) for p in points)
+        files[name] = tmp_path / f"{name}.json"
+        files[name].write_bytes(record.encode(msgspec.structs.replace(kept, points=old)))
+    assert call("--quick", "--out", tmp_path / "a", "--compare", files["same"])[0] == 0
+    code, out, _ = call("--quick", "--out", tmp_path / "b", "--compare", files["faster"])
     assert code == 1
-    assert f"{len(kept.points)} of {len(kept.points)} slower" in out
+    assert f"{len(points)} of {len(points)} slower" in out
+    code, out, err = call("--out", tmp_path / "c", "--compare", files["same"])
+    assert (code, out) == (2, "")
+    assert "size = quick there and full here" in err
 
 
 @pytest.mark.parametrize(

@@ -7,6 +7,7 @@ import json
 import re
 import subprocess
 import sys
+from functools import partial
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -16,7 +17,6 @@ from saboteurs import SABOTEURS
 
 from conformance import pytest_suite, suite, suite_properties, vectors
 from conformance.session import Session
-from mushrooms.main import run
 
 HERE = Path(__file__).parent
 PYTHON = [sys.executable, str(Path(suite.__file__).parent / "harness" / "python" / "stepper.py")]
@@ -36,14 +36,8 @@ def _few(monkeypatch):
 
 
 @pytest.fixture
-def call(capsys):
-    def run_command(*arguments):
-        with pytest.raises(SystemExit) as stop:
-            run(["check", *map(str, arguments)])
-        captured = capsys.readouterr()
-        return stop.value.code, captured.out, captured.err
-
-    return run_command
+def call(command_line):
+    return partial(command_line, "check")
 
 
 def test_a_good_stepper_is_accepted_and_reported(call, tmp_path):

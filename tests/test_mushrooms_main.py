@@ -14,7 +14,6 @@ import pytest
 
 import fast
 import scene as scenes
-from mushrooms.main import run
 
 MOVING_CAP = """\
 table = "mushroom"
@@ -36,14 +35,8 @@ BROKEN_SCENES = {
 
 
 @pytest.fixture
-def call(capsys):
-    def run_command(*arguments):
-        with pytest.raises(SystemExit) as stop:
-            run([str(argument) for argument in arguments])
-        captured = capsys.readouterr()
-        return stop.value.code, captured.out, captured.err
-
-    return run_command
+def call(command_line):
+    return command_line
 
 
 def assert_refused(result, *words):

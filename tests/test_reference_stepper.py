@@ -23,6 +23,7 @@ from scene import (
     Cap,
     Fourier,
     Horizon,
+    InvalidState,
     Mushroom,
     Rejected,
     State,
@@ -122,6 +123,21 @@ def test_recollision_at_vanishing_times_is_found(gap):
 )
 def test_undefined_is_proved_by_rational_arithmetic(scene, state, reason):
     assert reference.next_collision(scene, state, 100.0) == Undefined(reason)
+
+
+def test_a_path_of_fixed_precision_ends_where_it_no_longer_tells():
+    scene, start = load("moving-cap"), State(0.1, 0.2, 0.3, 140.0, 30.0)
+    few, more = (reference.trajectory(scene, start, 60, working=digits) for digits in (20, 40))
+    assert 5 < len(few.steps) < len(more.steps) <= 60
+    assert isinstance(few.outcome, Undecided)
+    assert few.digits == 20
+    assert few.steps[-1].after.x.width() > 1e6 * few.steps[0].after.x.width()
+    close = 1.0 + 0.5 * math.sin(0.3) - 1e-8  # to the arc
+    assert isinstance(
+        reference.trajectory(scene, State(0.3, 0.0, close, 1.0, -0.5), 1, working=3).outcome, Undecided
+    )
+    with pytest.raises(InvalidState, match="working = 0"):
+        reference.trajectory(scene, start, 1, working=0)
 
 
 @pytest.mark.parametrize(("ulps", "wall"), [(1, "base"), (-1, "right")])

@@ -1,8 +1,8 @@
 """Two benchmarks side by side: ratios of times with confidence, and whether something got slower.
 
 Times are first divided by the core's speed in their own run (`clock_ns`), so that a slower machine is not
-a slower stepper. The ratio of medians has a bootstrap interval over the laps. SLOWER is the bound: only an
-interval wholly above it says that the code, not its neighbours, got slower.
+a slower stepper. The ratio of medians has a bootstrap interval over the laps of both runs, which knows
+nothing of what differs between runs: hence the bound SLOWER, above which the whole interval must lie.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from conformance.bench.record import Record
+from scene.refusal import BadInput
 
 SLOWER = 1.5
 LEVEL = 0.99
@@ -30,8 +31,28 @@ class Ratio(NamedTuple):
 
     @property
     def is_slower(self) -> bool:
-        """Tell whether it got slower beyond doubt and beyond the bound."""
+        """Tell whether the whole interval is above the bound."""
         return self.low > SLOWER
+
+
+def check_alike(old: Record, size: str, seed: int, questions: int) -> None:
+    """Refuse an old record whose questions were others.
+
+    Raises:
+        BadInput: naming the setting that differs.
+    """
+    now = {"size": size, "seed": seed, "questions": questions}
+    for name, value in now.items():
+        if getattr(old, name) != value:
+            raise BadInput(
+                f"--compare: {name} = {getattr(old, name)} there and {value} here, must be the same"
+            )
+
+
+def gone(old: Record, new: Record) -> list[str]:
+    """List the points of the old record that the new one lacks."""
+    now = {(p.workload, p.contender) for p in new.points}
+    return [f"{p.contender} on {p.workload}" for p in old.points if (p.workload, p.contender) not in now]
 
 
 def compare(old: Record, new: Record) -> list[Ratio]:

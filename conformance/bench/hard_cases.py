@@ -86,7 +86,7 @@ def to_markdown(cases: tuple[Case, ...]) -> str:
         "Where the mathematics gives no answer, `undefined` and `undecided` are both right.",
         "`mushrooms bench` makes this table.",
         "",
-        "| case | what | " + " | ".join(names) + " |",
+        "| case | what | " + " | ".join(name.replace("|", "\\|") for name in names) + " |",
         "|---|---|" + "---|" * len(names),
     ]
     for case in cases:

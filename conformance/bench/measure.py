@@ -1,4 +1,7 @@
-"""Speed and error from the same laps: contenders take turns on a workload, and every lap is graded.
+"""Speed and error from the same laps: contenders take turns on a workload, and their answers are graded.
+
+A contender whose answers differ between laps is left out. (The lanes are timed on whole flights, and graded
+on one round from the same states: see `mushrooms.bench_contenders`.)
 
 Warm-up first (compilation, caches), which also says how often a lap must take the steps to be long enough
 for the clock. Then all contenders run one lap each, again and again, so that a disturbance of the machine
@@ -22,7 +25,7 @@ from conformance.error import backward_ulps
 from conformance.process import Trouble
 from scene import Collision, Undecided
 
-MAX_TIMES = 100_000
+MAX_TIMES = 1000  # as many as a `time` request of the protocol may ask for
 
 
 class Settings(NamedTuple):
@@ -80,6 +83,7 @@ def measure(
             if number < n_laps and contender.name not in troubles:
                 try:
                     laps[contender.name].append(contender.run(workload, n_times))
+                    _check_constant(laps[contender.name])
                 except Trouble as trouble:
                     troubles[contender.name] = f"{trouble.verdict}: {trouble.why}"
         clock.append(_short(clock_ns()))
@@ -103,6 +107,11 @@ def _warm_up(contender: Contender, workload: Workload, settings: Settings) -> tu
         lasted = contender.run(workload, n_times).lasted
     n_laps = min(settings.repeats, max(MIN_REPEATS, int(settings.most_ns / (lasted + 1))))
     return contender, n_times, n_laps
+
+
+def _check_constant(laps: Sequence[Lap]) -> None:
+    if repr(laps[-1].answers) != repr(laps[0].answers):
+        raise Trouble("fail", "its answers differ from lap to lap")
 
 
 def clock_ns() -> float:

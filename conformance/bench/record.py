@@ -10,13 +10,15 @@ import os
 import platform
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 import msgspec
 
 from scene.refusal import BadInput
 
 FORMAT = 1
+Time = Annotated[float, msgspec.Meta(gt=0)]
+Times = Annotated[tuple[Time, ...], msgspec.Meta(min_length=1)]
 Size = Literal["quick", "full"]
 PACKAGES = ("oscillating-mushrooms", "numpy", "scipy", "numba", "llvmlite", "mpmath", "gmpy2")
 
@@ -58,7 +60,7 @@ class Point(msgspec.Struct, frozen=True):
     contender: str
     family: str
     n_times: int
-    ns: tuple[float, ...]
+    ns: Times
     right: int
     wrong: int
     undecided: int
@@ -96,15 +98,16 @@ class Series(msgspec.Struct, frozen=True):
         sizes: its values.
         seconds: median kernel time of each.
         collisions: followed by each.
-        exponent, error: of the fit seconds ~ size^exponent over the larger half, and its standard error.
+        exponent, error: of the fit seconds ~ size^exponent over the larger half, and its standard error; null
+            where there are too few sizes.
     """
 
     what: str
     sizes: tuple[float, ...]
     seconds: tuple[float, ...]
     collisions: tuple[float, ...]
-    exponent: float
-    error: float
+    exponent: float | None
+    error: float | None
 
 
 class Work(msgspec.Struct, frozen=True):
@@ -148,7 +151,7 @@ class Record(msgspec.Struct, frozen=True):
     repeats: int
     digits: int
     machine: Machine
-    clock_ns: tuple[float, ...]
+    clock_ns: Times
     workloads: tuple[Drawn, ...]
     points: tuple[Point, ...]
     not_run: dict[str, str]

@@ -82,17 +82,22 @@ def measure_work(
     return tuple(series), round(memory, 1)
 
 
-def fit(sizes: Sequence[float], seconds: Sequence[float]) -> tuple[float, float]:
-    """Fit seconds ~ size^exponent over the larger half; returns exponent and standard error (0 for two)."""
-    half = min(len(sizes) // 2, len(sizes) - 2)
+def fit(sizes: Sequence[float], seconds: Sequence[float]) -> tuple[float | None, float | None]:
+    """Fit seconds ~ size^exponent over the larger half, three sizes at least.
+
+    Returns:
+        The exponent and its standard error: None for a single size, and no error for two.
+    """
     if len(sizes) < 2:
-        return 0.0, 0.0
+        return None, None
+    half = max(0, min(len(sizes) // 2, len(sizes) - 3))
     x, y = np.log(sizes[half:]), np.log(seconds[half:])
     slope, intercept = np.polyfit(x, y, 1)
+    if len(x) == 2:
+        return round(float(slope), 3), None
     rest = float(np.sum((y - slope * x - intercept) ** 2))
     spread = float(np.sum((x - x.mean()) ** 2))
-    error = (rest / (len(x) - 2) / spread) ** 0.5 if len(x) > 2 else 0.0
-    return round(float(slope), 3), round(error, 3)
+    return round(float(slope), 3), round((rest / (len(x) - 2) / spread) ** 0.5, 3)
 
 
 def _short(number: float) -> float:

@@ -44,6 +44,7 @@ def speed(record: Record) -> bytes:
     """Draw time per collision against correct digits, one panel per workload."""
     n_rows = (len(record.workloads) + 1) // 2
     figure, axes = plots.new_figure(10.5, 3.1 * n_rows, n_rows, 2)
+    axes = np.atleast_2d(axes)
     panels = axes.ravel()
     for panel in panels[len(record.workloads) :]:
         panel.set_visible(False)
@@ -214,7 +215,8 @@ def growth(found: Growth) -> bytes:
 @rc_context(plots.STYLE)
 def work(series: tuple[Series, ...]) -> bytes:
     """Draw kernel time against particles, cycles, energy and threads."""
-    figure, panels = plots.new_figure(10.5, 2.9, 1, len(series))
+    figure, axes = plots.new_figure(10.5, 2.9, 1, len(series))
+    panels = np.atleast_1d(axes)
     for panel, one in zip(panels, series, strict=True):
         panel.plot(one.sizes, one.seconds, marker="o", color=plots.BLUE)
         panel.set(xscale="log", yscale="log", xlabel=one.what)

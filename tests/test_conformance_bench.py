@@ -217,7 +217,7 @@ def test_a_wrong_wall_leaves_no_digit():
 @pytest.mark.parametrize("power", [0.5, 1.0, 2.0])
 def test_exponents_are_fitted(power):
     sizes = [1.0, 10.0, 100.0, 1000.0, 10_000.0]
-    exponent, error = work.fit(sizes, [3.0 + size**power for size in sizes])
+    exponent, error = work.fit(sizes, [0.1 + size**power for size in sizes])
     assert exponent == pytest.approx(power, abs=0.02)
     assert error < 0.05
     assert work.fit([1.0, 2.0], [4.0, 2.0]) == (-1.0, None)
@@ -225,8 +225,9 @@ def test_exponents_are_fitted(power):
 
 
 def test_an_ensemble_of_twice_the_particles_has_twice_the_collisions():
-    few, many = (ours.run_ensemble(work.Load(particles=n, energy=1e3)) for n in (50, 100))
-    assert many.collisions == pytest.approx(2 * few.collisions, rel=0.2)
+    ours.run_ensemble(work.Load(particles=1))  # compiles
+    few, many = (ours.run_ensemble(work.Load(particles=n, energy=1e2)) for n in (1000, 2000))
+    assert many.collisions == pytest.approx(2 * few.collisions, rel=0.1)
     assert many.peak_bytes > few.peak_bytes > 0
 
 

@@ -17,7 +17,7 @@ import fast
 import reference
 from conformance import plain
 from conformance.agreement import Truth
-from conformance.bench.contenders import Ask, Contender, Exact, Lap, by_call
+from conformance.bench.contenders import Answer, Ask, Contender, Exact, Lap, by_call
 from conformance.bench.growth import FAR, Follower, Place
 from conformance.bench.hard_cases import asked
 from conformance.bench.work import SCENE, Cost, Load
@@ -25,7 +25,7 @@ from conformance.bench.workloads import WINDOW, Workload
 from conformance.generate_draws import Moment
 from fast import __main__ as fast_protocol
 from fast import ensemble
-from fast.batch import careful_steps, lane_steps
+from fast.batch import careful_steps, fine_steps, lane_steps
 from fast.compiled import compile_scene
 from fast.starts import only_stop
 from fast.stepper import WALL_CODES
@@ -64,7 +64,7 @@ def our_contenders() -> list[Contender]:
         *(_proof(digits) for digits in DIGITS),
         by_call("fast, a call", "compiled", fast.next_collision),
         Contender("fast, careful", "compiled", _careful),
-        by_call("fast, pairs", "compiled", _fine),
+        Contender("fast, pairs", "compiled", _fine),
         Contender("fast, lanes", "compiled", _lanes, LANES_SERVE),
     ]
 
@@ -106,12 +106,16 @@ def _careful(workload: Workload, n_times: int) -> Lap:
     return Lap(seconds / (n_times * len(answers)) * 1e9, list(answers), seconds * 1e9)
 
 
-def _fine(scene: Scene, state: State, _: float) -> Outcome | Exact:
-    path = fast.fine_trajectory(scene, state, 1)
-    if path.outcome is not None:
-        return path.outcome
-    dt, _t, *place = path.numbers(0)
-    return Exact(path.walls[0], (dt, *place))
+def _fine(workload: Workload, n_times: int) -> Lap:
+    paths, seconds = fine_steps(workload.scene, [q.state for q in workload.questions], n_times)
+    answers: list[Answer] = []
+    for path in paths:
+        if path.outcome is None:
+            dt, _, *place = path.numbers(0)
+            answers.append(Exact(path.walls[0], (dt, *place)))
+        else:
+            answers.append(path.outcome)
+    return Lap(seconds / (n_times * len(answers)) * 1e9, answers, seconds * 1e9)
 
 
 def _lanes(workload: Workload, n_times: int) -> Lap:

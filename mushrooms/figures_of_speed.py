@@ -97,7 +97,8 @@ def _mark(axes: Any, p: Point) -> None:
 
 def _label(axes: Any, points: list[Point]) -> None:
     """Name the points: the proofs by their digits, the time-stepping ones at once."""
-    style = {"fontsize": 7, "annotation_clip": True}
+    paper = {"facecolor": "white", "edgecolor": "none", "pad": 0.4, "alpha": 0.75}
+    style = {"fontsize": 7, "annotation_clip": True, "bbox": paper}
     slow = [p for p in points if p.family == "time-stepping"]
     if slow:
         ns = statistics.median(statistics.median(p.ns) for p in slow)

@@ -16,7 +16,7 @@ from mpmath import fp
 
 from conformance.agreement import Truth
 from conformance.generate_draws import Draw, Moment, state, walls_speed
-from scene import Collision, Scene, State, load
+from scene import Cap, Collision, Scene, State, load
 from scene.tables import period
 
 DIGITS = 230  # of the proved answers: beyond any contender's
@@ -142,11 +142,12 @@ def _question(rule: Rule, scene: Scene, key: str, prove: Prover) -> Question:
                 continue
             t_end += first.outcome.t - start.t
             start = first.outcome.state()
-        if scene.walls == ("arc", "base") and start.wall == "base":
-            continue  # lanes unfold the disk: all begin on the arc
         truth = prove(scene, start, t_end, DIGITS)
-        if isinstance(truth.outcome, Collision):
-            return Question(start, t_end, truth)
+        if not isinstance(truth.outcome, Collision):
+            continue
+        if isinstance(scene, Cap) and "base" in (start.wall, truth.outcome.wall):
+            continue  # lanes unfold the disk: from arc to arc
+        return Question(start, t_end, truth)
     raise RuntimeError(f"{key}: no collision in {MAX_DRAWS} draws")
 
 

@@ -1,7 +1,7 @@
 """One step of each of many given states: careful, fine, or by one round of the lanes.
 
-Ensembles and flows mix careful step and lanes; here each is alone, so that its answers can be compared and its
-time measured.
+Ensembles and flows mix careful step and lanes; here each is alone, so that its answers can be compared and
+its time measured.
 """
 
 from __future__ import annotations

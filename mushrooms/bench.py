@@ -169,7 +169,9 @@ def _contenders(
             not_run[f"example in {language}"] = example.why_not
             continue
         try:
-            contender, ask = those.by_command(f"example in {language}", example.command, stack, patience)
+            contender, ask = those.by_command(
+                f"example in {language}", "example", example.command, stack, patience
+            )
         except (Trouble, BadInput) as trouble:
             not_run[f"example in {language}"] = str(trouble)
             continue
@@ -179,7 +181,9 @@ def _contenders(
             built[contender.name] = example.built
     if command:
         try:
-            contender, ask = those.by_command(f"command {' '.join(command)}", command, stack, patience)
+            contender, ask = those.by_command(
+                f"command {' '.join(command)}", "command", command, stack, patience
+            )
         except Trouble as trouble:
             raise BadInput(f"command {command[0]!r} {trouble.verdict}: {trouble.why}") from None
         contenders.append(contender)

@@ -19,14 +19,16 @@ COLOURS = {
     "compiled": plots.BLUE,
     "interpreted": plots.GREEN,
     "time-stepping": plots.GREY,
-    "command": "#CC79A7",
+    "example": "#CC79A7",
+    "command": "#7A3E9D",
 }
 WORDS = {
     "proof": "proof (reference)",
     "compiled": "fast",
     "interpreted": "plain Python",
     "time-stepping": "scipy solve_ivp with events",
-    "command": "commands: examples in C, JavaScript, Python",
+    "example": "examples in C, JavaScript, Python",
+    "command": "command",
 }
 RED = "#C00000"
 MOST_DIGITS, LEAST_DIGITS = 300.0, 0.5
@@ -159,6 +161,7 @@ def short_name(contender: str) -> str:
         ("fast, ", ""),
         ("solve_ivp, rtol ", "rtol "),
         ("example in ", ""),
+        ("command ", ""),
     ):
         contender = contender.replace(long, short)
     contender = contender.replace("$", r"\$")  # no formula

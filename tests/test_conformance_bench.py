@@ -126,8 +126,10 @@ def test_time_stepping_is_right_where_it_is_easy_and_wrong_where_it_skips(drawn)
 
 def test_commands_time_themselves_and_their_troubles_are_told(drawn):
     with ExitStack() as stack:
-        able, _ = contenders.by_command("fast", [sys.executable, "-m", "fast"], stack)
-        unable, _ = contenders.by_command("plain", [sys.executable, "-m", "conformance.plain"], stack)
+        able, _ = contenders.by_command("fast", "command", [sys.executable, "-m", "fast"], stack)
+        unable, _ = contenders.by_command(
+            "plain", "command", [sys.executable, "-m", "conformance.plain"], stack
+        )
         points, troubles = measure.measure(drawn["breathing-disk"], [able, unable], BRIEF, lambda _: None, [])
     assert [p.contender for p in points] == ["fast"]
     assert points[0].right == 3
@@ -155,7 +157,9 @@ for line in sys.stdin:
 def test_a_command_that_times_nothing_is_left_out(drawn, tmp_path, ns, steps):
     (tmp_path / "impostor.py").write_text(IMPOSTOR.replace("NS", ns).replace("STEPS", steps))
     with ExitStack() as stack:
-        impostor, _ = contenders.by_command("it", [sys.executable, str(tmp_path / "impostor.py")], stack)
+        impostor, _ = contenders.by_command(
+            "it", "command", [sys.executable, str(tmp_path / "impostor.py")], stack
+        )
         points, troubles = measure.measure(drawn["breathing-disk"], [impostor], BRIEF, lambda _: None, [])
     assert not points
     assert troubles["it"].startswith("fail: a time request is answered")
@@ -258,6 +262,10 @@ def test_a_slow_down_is_seen_and_noise_is_not():
         assert ratio.is_slower is is_slower
         assert ratio.low <= ratio.ratio <= ratio.high
     assert comparison.compare(old, a_record(a_point([1.0], "another"))) == []
+    example = a_record(msgspec.structs.replace(a_point([900.0] * 3), family="example"))
+    (ratio,) = comparison.compare(old, example)
+    assert ratio.low > comparison.SLOWER
+    assert not ratio.is_slower
 
 
 @pytest.mark.parametrize(("field", "value"), [("size", "full"), ("seed", 1), ("questions", 2)])

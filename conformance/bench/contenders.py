@@ -19,7 +19,7 @@ from conformance.session import Limits, Session, missing
 from conformance.vectors import Vector
 from scene import Outcome, Scene, State, to_data
 
-Family = Literal["proof", "compiled", "interpreted", "time-stepping", "command"]
+Family = Literal["proof", "compiled", "interpreted", "time-stepping", "example", "command"]
 Ask = Callable[[Vector], dict[str, Any]]  # raises Trouble
 
 
@@ -96,12 +96,13 @@ def time_steppers() -> list[Contender]:
 
 
 def by_command(
-    name: str, command: Sequence[str], stack: ExitStack, limits: Limits | None = None
+    name: str, family: Family, command: Sequence[str], stack: ExitStack, limits: Limits | None = None
 ) -> tuple[Contender, Ask]:
     """Return a command that speaks protocol 1 as a contender that times itself, and how it answers a vector.
 
     Args:
         name: as in the plot.
+        family: "example" or "command".
         command: program and arguments.
         stack: closes the session at the end.
         limits: of the session.
@@ -139,4 +140,4 @@ def by_command(
             raise Trouble("unsupported", lacking)
         return session.ask(vectors.request(vector, 0))
 
-    return Contender(name, "command", run), ask
+    return Contender(name, family, run), ask

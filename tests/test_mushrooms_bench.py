@@ -140,7 +140,10 @@ def readme_rows(kept: record.Record) -> list[str]:
         if p.workload == "moving-cap-1e7":
             worst = middle_and_worst(p.ulps, ".2g")[1]
             relative = middle_and_worst(p.relative, ".0e")[1]
-            rows.append(f"| {p.contender} | {statistics.median(p.ns):,.0f} | {worst} | {relative} |")
+            wrong = f"{p.wrong} of {kept.questions}"
+            rows.append(
+                f"| {p.contender} | {statistics.median(p.ns):,.0f} | {worst} | {relative} | {wrong} |"
+            )
     return rows
 
 

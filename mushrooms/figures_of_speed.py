@@ -99,8 +99,7 @@ def _mark(axes: Any, p: Point) -> None:
 
 def _label(axes: Any, points: list[Point]) -> None:
     """Name the points: the proofs by their digits, the time-stepping ones at once."""
-    paper = {"facecolor": "white", "edgecolor": "none", "pad": 0.4, "alpha": 0.75}
-    style = {"fontsize": 7, "annotation_clip": True, "bbox": paper}
+    style = {"fontsize": 7, "annotation_clip": True}
     slow = [p for p in points if p.family == "time-stepping"]
     if slow:
         ns = statistics.median(statistics.median(p.ns) for p in slow)
@@ -112,24 +111,19 @@ def _label(axes: Any, points: list[Point]) -> None:
             f"solve_ivp{wrong}", place if side == "right" else (0.6, 2.5 * ns), ha=side, va="bottom",
             color=COLOURS["time-stepping"], **style,
         )  # fmt: skip
-    heights: list[float] = []
+    heights: dict[str, float] = {}  # of the last label on each side
     for p in sorted(points, key=lambda p: statistics.median(p.ns)):
-        middle, ns = _digits_of(p)[0], statistics.median(p.ns)
+        middle, worst = _digits_of(p)
+        ns, colour = statistics.median(p.ns), COLOURS[p.family]
         if p.family == "proof":
-            place = (middle, ns * 1.6)
-            axes.annotate(short_name(p.contender), place, ha="center", color=COLOURS[p.family], **style)
+            axes.annotate(short_name(p.contender), (middle, ns * 1.6), ha="center", color=colour, **style)
         elif p.family != "time-stepping":
-            height = math.log10(ns)
-            if heights:
-                height = max(height, heights[-1] + 0.33)
-            heights.append(height)
-            axes.annotate(
-                short_name(p.contender),
-                (middle * 1.15, 10**height),
-                va="center",
-                color=COLOURS[p.family],
-                **style,
-            )
+            # Ours at the right, others' at the left, each above the one before.
+            side = "right" if p.family in ("example", "command") else "left"
+            height = max(math.log10(ns), heights.get(side, -math.inf) + 0.33)
+            heights[side] = height
+            place = (worst / 1.15 if side == "right" else middle * 1.15, 10**height)
+            axes.annotate(short_name(p.contender), place, ha=side, va="center", color=colour, **style)
 
 
 def _digits_of(p: Point) -> tuple[float, float]:

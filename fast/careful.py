@@ -126,8 +126,9 @@ def earliest_side_or_floor(wall, start, limit, x, y, vx, vy, laws, anchors, boun
         if found == NO_WALL:
             continue
         if found != candidate:
-            return found, root, 0.0
-        if code != NO_WALL and abs(root - s) <= 8.0 * (error + root_error) + SAFETY * s:
+            # Undecided from there on, unless a wall still to be tried is met before it.
+            code, s, error = found, min(root, s), 0.0
+        elif code != NO_WALL and abs(root - s) <= 8.0 * (error + root_error) + SAFETY * s:
             # A tie, unless a wall still to be tried is met before it.
             code, s, error = CORNER, min(root, s), max(error, root_error)
         elif code == NO_WALL or root < s:

@@ -9,8 +9,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from mpmath import mp, workprec
+from truth import proved_step
 
 import fast
+from conformance.agreement import compare
 from conformance.strategies import scenes_and_states
 from fast import arithmetic, codes, motion
 from fast.compiled import compile_scene
@@ -214,3 +216,44 @@ def test_rising_from_beside_the_mouths_edge_needs_no_decision():
         outcome = fast.next_collision(scene, State(0.0, x, 0.0, -0.005, 6e-19), 125.0)
         assert isinstance(outcome, Horizon)
         assert fast.next_collision(scene, State(0.0, x, 0.0, -0.005, 6e-19), 999.0).wall == "arc"
+
+
+def test_a_graze_of_a_side_does_not_hide_the_floor_met_before():
+    """Nearly level with a side that comes close much later; the floor is met first, whatever the horizon."""
+
+    def wave(mean, *sin):
+        return Fourier(mean=mean, omega=4.65574312210083, sin=sin)
+
+    scene = Mushroom(
+        r=wave(0.875, 0.11862087249745074), h=wave(2.098803758621216, 1.8488037586195343),
+        w=wave(0.2600053250788279, 0.052338038691819494),
+    )  # fmt: skip
+    start = State(1.3409481355317923, 0.0, 0.0, -2.1066059217309278e-16, -1.1467828510215512)
+    near, far = (fast.next_collision(scene, start, t_end) for t_end in (5.0, 1e6))
+    assert isinstance(near, Collision)
+    assert near.wall == "floor"
+    assert near == far
+
+
+@pytest.mark.parametrize(
+    ("r", "state"),
+    [
+        (
+            BangBang(knots=((1.875, 2.0), (2.011962890625, 0.25), (5.0562744140625, 0.25), (5.0625, 2.0))),
+            State(9.562506079673767, 1.5308084989341915e-17, 0.25, -19218.24325704075, 0.0, "arc"),
+        ),
+        (
+            Fourier(
+                mean=0.7535362243652344,
+                omega=2.4063210487365723,
+                cos=(-0.2517681121823882, 0.05943409717650916),
+            ),
+            State(0.0, 3.436372446831787e-17, 0.5612022093593554, -325.5383901035782, 0.0, "arc"),
+        ),
+    ],
+)
+def test_the_shortest_hop_along_the_arc_keeps_its_digits(r, state):
+    """2 x / v, up to the wall's own bend: 10^-21 of a unit of time."""
+    scene = Cap(r=r)
+    found, truth = fast.next_collision(scene, state, state.t + 1.0), proved_step(scene, state, state.t + 1.0)
+    assert compare(found, truth, state, 4.0).kind == "agrees"

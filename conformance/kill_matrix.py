@@ -14,7 +14,6 @@ import os
 import sys
 from collections import Counter
 from collections.abc import Callable, Sequence
-from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -23,8 +22,8 @@ import msgspec
 from conformance.grading import grade
 from conformance.mutants import MUTANTS, Mutant
 from conformance.plain import Flight
-from conformance.vectors import LEVELS, Vector, load, manifest
-from scene import BadInput, Rejected, Scene, from_data
+from conformance.vectors import LEVELS, Vector, answer, load, manifest
+from scene import BadInput
 
 DOCS = Path(__file__).parent.parent / "docs"
 N_WITNESSES = 3
@@ -32,27 +31,10 @@ PLAIN = Mutant("plain", "none", Flight)
 _graded: dict[tuple[str, bytes], str] = {}
 
 
-@lru_cache(maxsize=4096)
-def _scene(encoded: str) -> Scene:
-    return from_data(json.loads(encoded))
-
-
-def answer(mutant: Mutant, vector: Vector) -> dict[str, Any]:
-    """Return a mutant's answer to a vector in the wire's form."""
-    try:
-        scene = _scene(json.dumps(vector.scene))
-    except BadInput as error:
-        return dict(msgspec.to_builtins(Rejected(str(error))))
-    if vector.kind == "step":
-        return dict(msgspec.to_builtins(mutant.step(scene, vector.state, vector.t_end)))
-    steps = mutant.trajectory(scene, vector.state, vector.collisions, vector.t_end)
-    return {"steps": msgspec.to_builtins(steps)}
-
-
 def verdict(mutant: Mutant, vector: Vector) -> str:
     """Grade a mutant's answer; an exception is `crashed`."""
     try:
-        found = answer(mutant, vector)
+        found = answer(vector, mutant.step, mutant.trajectory)
     except (ArithmeticError, ValueError):
         return "crashed"
     key = vector.id, msgspec.json.encode(found)  # most answers are the plain stepper's: grade them once

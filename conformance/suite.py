@@ -254,15 +254,24 @@ def _converse(
     return results, speed
 
 
-def ask_vector(session: Session, vector: Vector) -> Result:
-    """Put one vector to an open session and grade the answer."""
+def put(session: Session, vector: Vector) -> dict[str, Any]:
+    """Put one vector to an open session and return its answer.
+
+    Raises:
+        Trouble: as `Session.ask`; unsupported, when the implementation does not list what it needs.
+    """
     assert session.introduction is not None
     is_refused = vector.expect[0].outcome == "rejected"
     if lacking := missing(session.introduction, vector.kind, None if is_refused else vector.scene):
-        return _result(vector, Trouble("unsupported", lacking))
+        raise Trouble("unsupported", lacking)
+    return session.ask(vectors.request(vector, 0))
+
+
+def ask_vector(session: Session, vector: Vector) -> Result:
+    """Put one vector to an open session and grade the answer."""
     begin = time.monotonic()
     try:
-        answer = session.ask(vectors.request(vector, 0))
+        answer = put(session, vector)
     except Trouble as trouble:
         return _result(vector, trouble, time.monotonic() - begin)
     grade = grading.grade(vector, answer)

@@ -28,18 +28,22 @@ from __future__ import annotations
 
 import hashlib
 import json
+from collections.abc import Callable
+from functools import lru_cache
 from importlib import resources
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import msgspec
 
-from scene import BadInput, State, Wall
+from scene import BadInput, Outcome, Rejected, Scene, State, Wall, from_data
 
 Level = Literal["core", "extended", "stress"]
 LEVELS: tuple[Level, ...] = ("core", "extended", "stress")
 NUMBERS = ("dt", "x", "y", "vx", "vy")
 MANIFEST = "manifest.json"
+Step = Callable[[Scene, State, float], Outcome]
+Follow = Callable[[Scene, State, int, float], list[Outcome]]
 Decimal = Annotated[str, msgspec.Meta(pattern=r"^-?[0-9]{1,40}(\.[0-9]{1,40})?(E[+-]?[0-9]{1,4})?$")]
 Enclosure = tuple[Decimal, Decimal]
 Hash = Annotated[str, msgspec.Meta(pattern="^[0-9a-f]{64}$")]
@@ -206,6 +210,28 @@ def request(vector: Vector, seq: int) -> dict[str, Any]:
     if vector.kind == "trajectory":
         asked["collisions"] = vector.collisions
     return {**asked, "t_end": vector.t_end}
+
+
+@lru_cache(maxsize=4096)
+def _scene(encoded: str) -> Scene:
+    return from_data(json.loads(encoded))
+
+
+def answer(vector: Vector, step: Step, follow: Follow) -> dict[str, Any]:
+    """Return how a stepper of functions answers a vector, in the wire's form.
+
+    Args:
+        vector: the question.
+        step: (scene, state, t_end) -> outcome.
+        follow: (scene, state, collisions, t_end) -> collisions, and last what came instead of one.
+    """
+    try:
+        scene = _scene(json.dumps(vector.scene))
+        if vector.kind == "step":
+            return dict(msgspec.to_builtins(step(scene, vector.state, vector.t_end)))
+        return {"steps": msgspec.to_builtins(follow(scene, vector.state, vector.collisions, vector.t_end))}
+    except BadInput as error:
+        return dict(msgspec.to_builtins(Rejected(str(error))))
 
 
 def json_schema() -> dict[str, Any]:

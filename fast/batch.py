@@ -13,10 +13,11 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from fast import codes, entries, follow, lanes, motion
+from fast import codes, ensemble, entries, follow, lanes, motion
 from fast.compiled import FloatArray, compile_scene
-from fast.fine import FineTrajectory, fine_trajectory
-from fast.stepper import WALL_CODES, WALL_NAMES, trouble
+from fast.fine import FineTrajectory, as_trajectory
+from fast.starts import only_stop
+from fast.stepper import WALL_NAMES, as_arrays, trouble
 from scene import Collision, Horizon, Outcome, Scene, State
 
 PLACE = (lanes.X, lanes.Y, lanes.VX, lanes.VY)
@@ -34,8 +35,7 @@ def careful_steps(scene: Scene, states: Sequence[State], n_times: int = 1) -> tu
     Returns:
         The outcomes, and the seconds that n_times N steps took.
     """
-    starts = np.array([[s.t, 0.0, s.x, s.y, s.vx, s.vy] for s in states]).reshape(-1, 6)
-    walls = np.array([WALL_CODES[s.wall] for s in states], dtype=np.int64)
+    starts, walls = as_arrays(states)
     out, met = np.empty_like(starts), np.empty_like(walls)
     compiled = compile_scene(scene)
     entries.each_step(*compiled, starts[:0], walls[:0], out, met, 0)  # compiles, or loads from the cache
@@ -55,18 +55,28 @@ def careful_steps(scene: Scene, states: Sequence[State], n_times: int = 1) -> tu
 
 def fine_steps(scene: Scene, states: Sequence[State], n_times: int = 1) -> tuple[list[FineTrajectory], float]:
     """Take a fine step from each of N states, a call of compiled code for each; as `careful_steps`."""
-    compiled, walls = compile_scene(scene), [WALL_CODES[s.wall] for s in states]
-    starts = np.array([[s.t, s.x, s.y, s.vx, s.vy] for s in states]).reshape(-1, 5)
-    pairs = np.stack([starts, np.zeros_like(starts)], axis=-1)
-    out, met = np.empty((1, 6, 2)), np.empty(1, dtype=np.int64)
+    compiled = compile_scene(scene)
+    rows, walls = as_arrays(states)
+    pairs = np.zeros((len(states), 5, 2))
+    pairs[:, :, 0] = np.delete(rows, 1, axis=1)  # without the time's low part
+    out, met = np.empty((len(states), 1, 6, 2)), np.empty((len(states), 1), dtype=np.int64)
+    questions = list(zip(pairs, walls.tolist(), out, met, strict=True))
+    ends: list[tuple[int, int]] = []
     if states:
-        entries.fine(*compiled, pairs[0], walls[0], np.inf, out, met)  # compiles, or loads from the cache
+        entries.fine(*compiled, pairs[0], questions[0][1], np.inf, out[0], met[0])  # compiles, or loads
     begin = time.perf_counter()
     for _ in range(n_times):
-        for start, wall in zip(pairs, walls, strict=True):
-            entries.fine(*compiled, start, wall, np.inf, out, met)
+        ends = [entries.fine(*compiled, p, wall, np.inf, steps, hit) for p, wall, steps, hit in questions]
     seconds = time.perf_counter() - begin
-    return [fine_trajectory(scene, state, 1) for state in states], seconds
+    paths = zip(states, ends, out, met, strict=True)
+    return [as_trajectory(state, *end, steps, hit) for state, end, steps, hit in paths], seconds
+
+
+def flights(scene: Scene, states: Sequence[State], t_end: float) -> tuple[int, float]:
+    """Follow states to t_end in one thread, as ensembles are: number of collisions, seconds."""
+    starts, walls = as_arrays(states)
+    done = ensemble.follow(compile_scene(scene), starts, walls, only_stop(t_end), 1)
+    return int(done.counts.sum()), done.seconds
 
 
 class LaneRound:
@@ -148,8 +158,8 @@ def lane_steps(scene: Scene, states: Sequence[State]) -> list[Outcome | None]:
     found: list[Outcome | None] = []
     for first in range(0, len(states), lanes.LANES):
         part = states[first : first + lanes.LANES]
-        for i, s in enumerate(part):
-            pool.fill(i, np.array([s.t, 0.0, s.x, s.y, s.vx, s.vy]), WALL_CODES[s.wall])
+        for i, (p, wall) in enumerate(zip(*as_arrays(part), strict=True)):
+            pool.fill(i, p, wall)
         rows = (pool.skip if pool.is_disk else pool.fly)(len(part))
         for state, is_right, hit, (dt, x, y, vx, vy) in zip(
             part, *(row.tolist() for row in rows), strict=True

@@ -54,9 +54,16 @@ def fine_trajectory(scene: Scene, state: State, n_collisions: int) -> FineTrajec
     met: npt.NDArray[np.int64] = np.empty(n_collisions, dtype=np.int64)
     start = np.array([[number, 0.0] for number in (state.t, state.x, state.y, state.vx, state.vy)])
     n, code = entries.fine(*compile_scene(scene), start, WALL_CODES[state.wall], np.inf, steps, met)
+    return as_trajectory(state, n, code, steps, met)
+
+
+def as_trajectory(
+    state: State, n: int, code: int, steps: FloatArray, met: npt.NDArray[np.int64]
+) -> FineTrajectory:
+    """Return what the kernel found: `n` collisions of those asked for, and its last code."""
     outcome: Outcome | None = None
-    if n < n_collisions:
-        last = steps[n - 1, 2:, 0] if n else start[1:, 0]
+    if n < len(steps):
+        last = steps[n - 1, 2:, 0] if n else (state.x, state.y, state.vx, state.vy)
         is_free = code == codes.HORIZON
         outcome = Horizon(np.inf, *map(float, last)) if is_free else trouble(code, state)
     return FineTrajectory([WALL_NAMES[int(c)] for c in met[:n]], steps[:n], outcome)

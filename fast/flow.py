@@ -6,13 +6,11 @@ import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
-import numpy as np
-
 from fast import codes
 from fast.compiled import FloatArray, compile_scene
 from fast.ensemble import IntArray, check_threads, follow
 from fast.starts import least_collisions, only_stop
-from fast.stepper import WALL_CODES, next_collision, trouble
+from fast.stepper import as_arrays, next_collision, trouble
 from scene import Horizon, InvalidState, Outcome, Rejected, Scene, State
 
 MAX_COLLISIONS = 10**7  # of one particle, some seconds of work
@@ -61,8 +59,7 @@ def flow(scene: Scene, states: Sequence[State], t_end: float, threads: int | Non
 
 def carry_judged(scene: Scene, states: Sequence[State], t_end: float, threads: int) -> Flow:
     """Carry particles to t_end whose starts have been judged by `refuse`."""
-    starts = np.array([[s.t, 0.0, s.x, s.y, s.vx, s.vy] for s in states]).reshape(-1, 6)
-    walls = np.array([WALL_CODES[s.wall] for s in states], dtype=np.int64)
+    starts, walls = as_arrays(states)
     done = follow(compile_scene(scene), starts, walls, only_stop(t_end), threads)
     outcomes = [
         Horizon(t_end, *place) if code == codes.HORIZON else trouble(int(code), state)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -128,6 +129,12 @@ def check_state(scene: Scene, state: State, t_end: float) -> None:
         gap, size = wall_gap(scene, state)
         if abs(gap) > ON_WALL * size:
             raise InvalidState(f"state.wall = {state.wall!r}, but the state is {gap:.3g} away from that wall")
+
+
+def as_arrays(states: Sequence[State]) -> tuple[FloatArray, npt.NDArray[np.int64]]:
+    """Return N states as the kernels take them: (N, 6) t, its low part, x, y, vx, vy; (N,) codes of walls."""
+    rows = np.array([[s.t, 0.0, s.x, s.y, s.vx, s.vy] for s in states]).reshape(-1, 6)
+    return rows, np.array([WALL_CODES[s.wall] for s in states], dtype=np.int64)
 
 
 def wall_gap(scene: Scene, state: State) -> tuple[float, float]:

@@ -7,6 +7,7 @@ import statistics
 import subprocess
 import tempfile
 import time
+from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -22,7 +23,7 @@ from scene.refusal import BadInput
 
 if TYPE_CHECKING:
     from conformance.bench.comparison import Ratio
-    from conformance.bench.contenders import Ask, Contender
+    from conformance.bench.contenders import Ask, Contender, Family
     from conformance.bench.measure import Settings
     from conformance.bench.record import Record, Size
 
@@ -163,31 +164,29 @@ def _contenders(
     contenders = [*ours.our_contenders(), those.plain_python(), *those.time_steppers()]
     askers = ours.our_askers()
     built, not_run = {}, {}
+
+    def add(name: str, family: Family, line: Sequence[str]) -> None:
+        contender, askers[name] = those.by_command(name, family, line, stack, patience)
+        contenders.append(contender)
+
     examples = find_examples(Path(stack.enter_context(tempfile.TemporaryDirectory())), C_FLAGS)
     for language, example in examples.items():
+        name = f"example in {language}"
         if not example.command:
-            not_run[f"example in {language}"] = example.why_not
+            not_run[name] = example.why_not
             continue
         try:
-            contender, ask = those.by_command(
-                f"example in {language}", "example", example.command, stack, patience
-            )
+            add(name, "example", example.command)
         except (Trouble, BadInput) as trouble:
-            not_run[f"example in {language}"] = str(trouble)
+            not_run[name] = str(trouble)
             continue
-        contenders.append(contender)
-        askers[contender.name] = ask
         if example.built:
-            built[contender.name] = example.built
+            built[name] = example.built
     if command:
         try:
-            contender, ask = those.by_command(
-                f"command {' '.join(command)}", "command", command, stack, patience
-            )
+            add(f"command {' '.join(command)}", "command", command)
         except Trouble as trouble:
             raise BadInput(f"command {command[0]!r} {trouble.verdict}: {trouble.why}") from None
-        contenders.append(contender)
-        askers[contender.name] = ask
     return contenders, askers, built, not_run
 
 
@@ -195,9 +194,9 @@ def _table(found: Record) -> Table:
     from mushrooms.bench_report import middle_and_worst
 
     table = Table(title="Speed against error", title_justify="left")
-    for name, side in (("workload", "left"), ("stepper", "left"), ("ns/collision", "right")):
-        table.add_column(name, justify=side)  # type: ignore[arg-type]
-    for name in ("median ulps", "worst ulps", "wrong", "undecided", "left"):
+    for name in ("workload", "stepper"):
+        table.add_column(name)
+    for name in ("ns/collision", "median ulps", "worst ulps", "wrong", "undecided", "left"):
         table.add_column(name, justify="right")
     for p in found.points:
         middle, worst = middle_and_worst(p.ulps, ".2g")

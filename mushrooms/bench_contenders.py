@@ -9,28 +9,21 @@ import subprocess
 import sys
 import tempfile
 import tracemalloc
-from fractions import Fraction
-
-import numpy as np
+from functools import partial
 
 import fast
 import reference
-from conformance import plain
+from conformance import plain, vectors
 from conformance.agreement import Truth
 from conformance.bench.contenders import Answer, Ask, Contender, Exact, Lap, by_call
 from conformance.bench.growth import FAR, Follower, Place
-from conformance.bench.hard_cases import asked
 from conformance.bench.work import SCENE, Cost, Load
 from conformance.bench.workloads import WINDOW, Workload
 from conformance.generate_draws import Moment
 from fast import __main__ as fast_protocol
-from fast import ensemble
-from fast.batch import careful_steps, fine_steps, lane_steps
-from fast.compiled import compile_scene
-from fast.starts import only_stop
-from fast.stepper import WALL_CODES
+from fast.batch import careful_steps, fine_steps, flights, lane_steps
 from reference import __main__ as proof
-from reference.arithmetic import Enclosure, rational
+from reference.arithmetic import rational
 from scene import Collision, Outcome, Scene, State, load
 
 DIGITS = (15, 30, 50, 100, 200)
@@ -49,7 +42,7 @@ def prove(scene: Scene, state: State, t_end: float, digits: int) -> Truth:
     if not isinstance(outcome, reference.Collision):
         return Truth(outcome.rounded() if isinstance(outcome, reference.Horizon) else outcome)
     assert outcome.jacobian is not None
-    numbers = [_centre(outcome.dt), *map(_centre, outcome.after[1:])]
+    numbers = [outcome.dt.centre(), *(c.centre() for c in outcome.after[1:])]
     return Truth(outcome.rounded(), numbers, [[float(d) for d in row] for row in outcome.jacobian])
 
 
@@ -72,9 +65,9 @@ def our_contenders() -> list[Contender]:
 def our_askers() -> dict[str, Ask]:
     """Return how each of our steppers answers a vector."""
     return {
-        "proof": asked(proof.step, proof.follow),
-        "fast": asked(fast.next_collision, fast_protocol.follow),
-        "plain Python": asked(plain.next_collision, plain.trajectory),
+        "proof": partial(vectors.answer, step=proof.step, follow=proof.follow),
+        "fast": partial(vectors.answer, step=fast.next_collision, follow=fast_protocol.follow),
+        "plain Python": partial(vectors.answer, step=plain.next_collision, follow=plain.trajectory),
     }
 
 
@@ -83,10 +76,6 @@ def our_followers() -> dict[str, Follower]:
     found: dict[str, Follower] = {"binary64 (plain Python)": _plain_path, "compensated (fast)": _fast_path}
     found["double-double (fast)"] = _fine_path
     return found | {f"proof, {digits} decimals": _proof_path(digits) for digits in PATH_DIGITS}
-
-
-def _centre(enclosure: Enclosure) -> Fraction:
-    return (rational(enclosure.lo._mpf_) + rational(enclosure.hi._mpf_)) / 2
 
 
 def _proof(digits: int) -> Contender:
@@ -121,19 +110,13 @@ def _fine(workload: Workload, n_times: int) -> Lap:
 def _lanes(workload: Workload, n_times: int) -> Lap:
     """Time the engine on flights that go on from the questions; grade one round of its lanes on these."""
     states = [q.state for q in workload.questions]
-    rows = np.array([[s.t, 0.0, s.x, s.y, s.vx, s.vy] for s in states])
-    walls = np.array([WALL_CODES[s.wall] for s in states], dtype=np.int64)
     last = max(states, key=lambda s: s.t)
     span = WINDOW * Moment(workload.scene, last.t).size / math.hypot(last.vx, last.vy)
     copies = -(-128 // len(states))  # enough to fill both pools
     seconds, n_collisions = 0.0, 0
     for _ in range(n_times):
-        starts, their_walls = np.tile(rows, (copies, 1)), np.tile(walls, copies)
-        done = ensemble.follow(
-            compile_scene(workload.scene), starts, their_walls, only_stop(last.t + span), 1
-        )
-        seconds += done.seconds
-        n_collisions += int(done.counts.sum())
+        n, lasted = flights(workload.scene, states * copies, last.t + span)
+        n_collisions, seconds = n_collisions + n, seconds + lasted
     return Lap(seconds / n_collisions * 1e9, list(lane_steps(workload.scene, states)), seconds * 1e9)
 
 
@@ -166,7 +149,7 @@ def _proof_path(digits: int) -> Follower:
 def _places(path: reference.Trajectory) -> list[Place]:
     found = []
     for step in path.steps:
-        ends = [_centre(c) for c in step.after[1:]]
+        ends = [c.centre() for c in step.after[1:]]
         size, speed = (math.hypot(*map(float, pair)) for pair in (ends[:2], ends[2:]))
         widths = [c.width() for c in step.after[1:]]
         x, y, vx, vy = ends

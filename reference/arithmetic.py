@@ -38,8 +38,11 @@ class Enclosure(NamedTuple):
 
     def __float__(self) -> float:
         """Return the centre, correctly rounded to binary64."""
-        lo, hi = rational(self.lo._mpf_), rational(self.hi._mpf_)
-        return float((lo + hi) / 2)
+        return float(self.centre())
+
+    def centre(self) -> Fraction:
+        """Return (lo + hi) / 2, exactly."""
+        return (rational(self.lo._mpf_) + rational(self.hi._mpf_)) / 2
 
     def width(self) -> float:
         """Return hi - lo, rounded."""

@@ -8,6 +8,7 @@ import re
 import sys
 from contextlib import ExitStack
 from fractions import Fraction
+from functools import partial
 from pathlib import Path
 
 import jsonschema
@@ -16,7 +17,7 @@ import pytest
 from truth import proved_step
 
 import fast
-from conformance import plain
+from conformance import plain, vectors
 from conformance.bench import comparison, contenders, growth, hard_cases, measure, record, work, workloads
 from conformance.bench.contenders import Contender, Lap, by_call
 from conformance.bench.time_stepping import next_collision_by
@@ -347,7 +348,7 @@ def test_the_table_shows_a_wrong_stepper():
         found = plain.next_collision(scene, state, t_end)
         return Horizon(t_end, 0.0, 0.0, 0.0, 0.0) if isinstance(found, Undecided) else found
 
-    ask = hard_cases.asked(bold, plain.trajectory)
+    ask = partial(vectors.answer, step=bold, follow=plain.trajectory)
     cases = hard_cases.tabulate({"bold": ask}, lambda _: None)
     assert sum(case.verdicts["bold"].get("wrong", 0) for case in cases) > 0
     assert "wrong" in hard_cases.to_markdown(cases)

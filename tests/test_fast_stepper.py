@@ -14,6 +14,7 @@ from truth import proved_step
 import fast
 from conformance.agreement import compare
 from conformance.strategies import scenes_and_states
+from conformance.transforms import scaled_law
 from fast import arithmetic, codes, motion
 from fast.compiled import compile_scene
 from scene import (
@@ -34,15 +35,6 @@ from scene.laws import value
 from scene.tables import laws
 
 MIRRORED = {"left": "right", "right": "left"}
-
-
-def scaled_law(law, length, time):
-    if isinstance(law, Fourier):
-        cos, sin = (tuple(length * a for a in part) for part in (law.cos, law.sin))
-        return Fourier(mean=length * law.mean, omega=law.omega / time, cos=cos, sin=sin)
-    if isinstance(law, BangBang):
-        return BangBang(knots=tuple((time * t, length * v) for t, v in law.knots))
-    return length * law
 
 
 def scaled_scene(scene, length, time):

@@ -10,7 +10,7 @@ from msgspec import to_builtins
 import reference
 import scene as scenes
 from conformance.agreement import Truth
-from reference.arithmetic import Enclosure, rational
+from reference.arithmetic import Enclosure
 from scene import Scene, State
 from scene.laws import bounds
 from scene.tables import laws
@@ -19,8 +19,7 @@ IS_DEEP = os.environ.get("HYPOTHESIS_PROFILE") == "deep"
 NUDGE = 2.0**-46  # what rounding may move a state by, relative to the table and to the speed
 
 
-def centre(enclosure: Enclosure) -> Fraction:
-    return (rational(enclosure.lo._mpf_) + rational(enclosure.hi._mpf_)) / 2
+centre = Enclosure.centre
 
 
 def proved_step(scene: Scene, state: State, t_end: float, digits: int = 30) -> Truth:

@@ -7,15 +7,17 @@ import time
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from fractions import Fraction
+from functools import partial
 from typing import Any, Literal, NamedTuple
 
 import msgspec
 
-from conformance import plain, vectors
+from conformance import plain
 from conformance.bench.time_stepping import TOLERANCES, next_collision_by
 from conformance.bench.workloads import Workload
 from conformance.process import Trouble
 from conformance.session import Limits, Session, missing
+from conformance.suite import put
 from conformance.vectors import Vector
 from scene import Outcome, Scene, State, to_data
 
@@ -133,11 +135,4 @@ def by_command(
         ns = statistics.fmean(laps)
         return Lap(ns, answers, ns * n_times * len(laps))
 
-    def ask(vector: Vector) -> dict[str, Any]:
-        assert session.introduction is not None
-        is_refused = vector.expect[0].outcome == "rejected"
-        if lacking := missing(session.introduction, vector.kind, None if is_refused else vector.scene):
-            raise Trouble("unsupported", lacking)
-        return session.ask(vectors.request(vector, 0))
-
-    return Contender(name, family, run), ask
+    return Contender(name, family, run), partial(put, session)

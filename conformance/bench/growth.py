@@ -15,14 +15,14 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from conformance.bench.record import Growth
+from conformance.bench.record import Growth, short
 from conformance.bench.workloads import RULES, Prover, draw_workload
+from conformance.error import U
 from conformance.generate_draws import Moment
 from scene import Collision, Scene, State
 
 FloatArray = npt.NDArray[np.float64]
 WORKLOAD, ENERGY = "moving-cap-1e4", 1e4
-U = 2.0**-53
 FAR = 1e9  # horizon of a step that a trajectory takes
 
 
@@ -127,7 +127,7 @@ def _chained(
         inputs = np.array([state.t, state.x, state.y, state.vx, state.vy])
         state = truth.outcome.state()
         outputs = np.array([truth.outcome.dt, state.x, state.y, state.vx, state.vy])
-        rounding = U * (np.abs(step) @ np.abs(inputs) + np.abs(outputs))
+        rounding = float(U) * (np.abs(step) @ np.abs(inputs) + np.abs(outputs))
         step[0, 0] += 1.0  # from the flight time to the time
         shares = [step @ share for share in shares]
         shares.append(np.diag(rounding))
@@ -144,4 +144,4 @@ def _slope(logs: FloatArray) -> float:
 
 
 def _rounded(numbers: FloatArray) -> tuple[float, ...]:
-    return tuple(float(f"{number:.3g}") for number in numbers)
+    return tuple(short(float(number), 3) for number in numbers)

@@ -6,38 +6,16 @@ import math
 from collections import Counter
 from collections.abc import Callable, Mapping
 from itertools import groupby
-from typing import Any
-
-import msgspec
 
 from conformance import vectors
 from conformance.bench.contenders import Ask
-from conformance.bench.record import Case
-from conformance.grading import Grade, Verdict, grade
+from conformance.bench.record import Case, short
+from conformance.grading import grade
 from conformance.process import Trouble
 from conformance.vectors import Vector
-from scene import BadInput, Outcome, Rejected, Scene, State, from_data
 
 GROUP = "hard-case-"
 WORDS = {"pass": "right", "declined": "undecided", "fail": "wrong"}
-Step = Callable[[Scene, State, float], Outcome]
-Follow = Callable[[Scene, State, int, float], list[Outcome]]
-
-
-def asked(step: Step, follow: Follow) -> Ask:
-    """Return how a stepper of functions answers a vector, in the wire's form."""
-
-    def ask(vector: Vector) -> dict[str, Any]:
-        try:
-            scene = from_data(vector.scene)
-            if vector.kind == "step":
-                return dict(msgspec.to_builtins(step(scene, vector.state, vector.t_end)))
-            found = follow(scene, vector.state, vector.collisions, vector.t_end)
-            return {"steps": msgspec.to_builtins(found)}
-        except BadInput as error:
-            return dict(msgspec.to_builtins(Rejected(str(error))))
-
-    return ask
 
 
 def tabulate(steppers: Mapping[str, Ask], tick: Callable[[str], None]) -> tuple[Case, ...]:
@@ -59,20 +37,21 @@ def _case(group: str, members: list[Vector], steppers: Mapping[str, Ask]) -> Cas
     verdicts: dict[str, dict[str, int]] = {}
     ulps: dict[str, float | None] = {}
     for name, ask in steppers.items():
-        grades = [_graded(vector, ask) for vector in members]
-        verdicts[name] = dict(Counter(WORDS.get(g.verdict, g.verdict) for g in grades))
-        measured = [g.ulps for g in grades if g.verdict == "pass" and not math.isnan(g.ulps)]
+        judged = [_judged(vector, ask) for vector in members]
+        verdicts[name] = dict(Counter(WORDS.get(verdict, verdict) for verdict, _ in judged))
+        measured = [u for verdict, u in judged if verdict == "pass" and not math.isnan(u)]
         worst = max(measured, default=math.inf)
-        ulps[name] = float(f"{worst:.2g}") if math.isfinite(worst) else None
+        ulps[name] = short(worst, 2) if math.isfinite(worst) else None
     return Case(group.removeprefix(GROUP), members[0].rule, len(members), verdicts, ulps)
 
 
-def _graded(vector: Vector, ask: Ask) -> Grade:
+def _judged(vector: Vector, ask: Ask) -> tuple[str, float]:
+    """Return verdict and backward ulps, nan when not measured."""
     try:
-        return grade(vector, ask(vector))
+        found = grade(vector, ask(vector))
     except Trouble as trouble:
-        verdict: Verdict = trouble.verdict  # type: ignore[assignment]  # a Trouble names one of them
-        return Grade(verdict, math.nan, math.nan, trouble.why)
+        return trouble.verdict, math.nan
+    return found.verdict, found.ulps
 
 
 def to_markdown(cases: tuple[Case, ...]) -> str:

@@ -18,9 +18,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from conformance.agreement import Truth
 from conformance.bench.contenders import Answer, Contender, Lap
-from conformance.bench.record import Point
-from conformance.bench.workloads import Question, Workload, relative_error
+from conformance.bench.record import Point, short
+from conformance.bench.workloads import Question, Workload
 from conformance.error import backward_ulps
 from conformance.process import Trouble
 from scene import Collision, Undecided
@@ -86,7 +87,7 @@ def measure(
                     _check_constant(laps[contender.name])
                 except Trouble as trouble:
                     troubles[contender.name] = f"{trouble.verdict}: {trouble.why}"
-        clock.append(_short(clock_ns()))
+        clock.append(short(clock_ns()))
         tick("")
     points = [
         _point(workload, contender, n_times, laps[contender.name])
@@ -136,13 +137,13 @@ def _point(workload: Workload, contender: Contender, n_times: int, laps: Sequenc
         contender=contender.name,
         family=contender.family,
         n_times=n_times,
-        ns=tuple(_short(lap.ns) for lap in laps),
+        ns=tuple(short(lap.ns) for lap in laps),
         right=len(right),
         wrong=kinds.count("wrong"),
         undecided=kinds.count("undecided"),
         left=kinds.count("left"),
-        ulps=tuple(_short(g.ulps) if math.isfinite(g.ulps) else None for g in right),
-        relative=tuple(_short(g.relative) for g in right),
+        ulps=tuple(short(g.ulps) if math.isfinite(g.ulps) else None for g in right),
+        relative=tuple(short(g.relative) for g in right),
     )
 
 
@@ -171,5 +172,11 @@ def _numbers(answer: Answer) -> Iterator[Fraction | float]:
         yield from getattr(answer, "numbers", ())
 
 
-def _short(number: float) -> float:
-    return float(f"{number:.4g}")
+def relative_error(numbers: tuple[Fraction | float, ...], truth: Truth) -> float:
+    """Return the largest error of dt, place and velocity, each relative to its largest component."""
+    worst = Fraction(0)
+    for members in ((0,), (1, 2), (3, 4)):
+        size = max(abs(truth.numbers[i]) for i in members)
+        error = max(abs(Fraction(numbers[i]) - truth.numbers[i]) for i in members)
+        worst = max(worst, error / size) if size else worst
+    return float(worst)

@@ -161,6 +161,11 @@ class Record(msgspec.Struct, frozen=True):
     seconds: float
 
 
+def short(number: float, digits: int = 4) -> float:
+    """Return a number as it is kept: to a few decimals."""
+    return float(f"{number:.{digits}g}")
+
+
 def this_machine(compiled: dict[str, str]) -> Machine:
     """Describe the machine and the packages."""
     return Machine(

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from conformance.bench.record import Series
+from conformance.bench.record import Series, short
 
 SCENE = "moving-cap"
 
@@ -75,7 +75,7 @@ def measure_work(
         collisions = [float(row[0].collisions) for row in costs]
         exponent, error = fit(sizes, seconds)
         series.append(
-            Series(what, tuple(sizes), tuple(map(_short, seconds)), tuple(collisions), exponent, error)
+            Series(what, tuple(sizes), tuple(map(short, seconds)), tuple(collisions), exponent, error)
         )
         if what == "particles":
             memory = (costs[-1][0].peak_bytes - costs[0][0].peak_bytes) / (sizes[-1] - sizes[0])
@@ -98,7 +98,3 @@ def fit(sizes: Sequence[float], seconds: Sequence[float]) -> tuple[float | None,
     rest = float(np.sum((y - slope * x - intercept) ** 2))
     spread = float(np.sum((x - x.mean()) ** 2))
     return round(float(slope), 3), round((rest / (len(x) - 2) / spread) ** 0.5, 3)
-
-
-def _short(number: float) -> float:
-    return float(f"{number:.4g}")

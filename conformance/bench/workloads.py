@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from fractions import Fraction
 from typing import NamedTuple
 
 from mpmath import fp
@@ -58,6 +57,7 @@ class Rule(NamedTuple):
         name, what: as in Workload.
         scene: of the catalogue.
         draw: from a stream of numbers, the scene and a time to a state.
+        speed: about that of the particle, for the length of the window.
         is_flown: whether the question begins at the first collision of what was drawn.
     """
 
@@ -149,13 +149,3 @@ def _question(rule: Rule, scene: Scene, key: str, prove: Prover) -> Question:
             continue  # lanes unfold the disk: from arc to arc
         return Question(start, t_end, truth)
     raise RuntimeError(f"{key}: no collision in {MAX_DRAWS} draws")
-
-
-def relative_error(numbers: tuple[Fraction | float, ...], truth: Truth) -> float:
-    """Return the largest error of dt, place and velocity, each relative to its largest component."""
-    worst = Fraction(0)
-    for members in ((0,), (1, 2), (3, 4)):
-        size = max(abs(truth.numbers[i]) for i in members)
-        error = max(abs(Fraction(numbers[i]) - truth.numbers[i]) for i in members)
-        worst = max(worst, error / size) if size else worst
-    return float(worst)

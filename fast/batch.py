@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from fast import codes, ensemble, entries, follow, lanes, motion
+from fast import codes, ensemble, entries, follow, lanes, motion, walls
 from fast.compiled import FloatArray, compile_scene
 from fast.fine import FineTrajectory, as_trajectory
 from fast.starts import only_stop
@@ -115,6 +115,17 @@ class LaneRound:
         spin = p[2] * p[5] - p[3] * p[4]
         a[lanes.SPIN + i] = spin
 
+    def is_met(self, p: FloatArray, wall: int) -> bool:
+        """Tell whether a state lies, but for rounding, on the wall that it leaves, as after a step."""
+        if wall == codes.NO_WALL:
+            return False
+        if wall == codes.BASE:
+            return bool(p[3] == 0.0)
+        anchors = np.zeros(motion.ANCHORS_SHAPE)
+        motion.set_anchors(self.laws, anchors, p[0], p[1])
+        f, error = walls.wall_residual(wall, p[2], p[3], self.laws, anchors, self.bounds, self.is_relative)
+        return bool(abs(f) <= error)
+
     def fly(self, n: int) -> tuple[npt.NDArray[np.bool_], FloatArray, FloatArray]:
         """Take a step in n lanes: which are shown right, walls met, and rows of dt, x, y, vx, vy."""
         a, count, m = self.pool, np.int64(n), self.laws[codes.M, 1]
@@ -151,21 +162,24 @@ def lane_steps(scene: Scene, states: Sequence[State]) -> list[Outcome | None]:
         states: starts that `next_collision` takes.
 
     Returns:
-        Collisions; None where the lanes leave the step to the careful one, and for a start on the base
-        of a cap or a flight to it: there the lanes go unfolded.
+        Collisions; None where the lanes leave the step to the careful one, for a start on the base of a cap
+        or a flight to it (there the lanes go unfolded), and for a start that is on no wall, or on its wall
+        by decree only: lanes know a particle by the wall that it has just met, and where that wall is.
     """
     pool = LaneRound(scene)
     found: list[Outcome | None] = []
     for first in range(0, len(states), lanes.LANES):
         part = states[first : first + lanes.LANES]
+        are_met = []
         for i, (p, wall) in enumerate(zip(*as_arrays(part), strict=True)):
             pool.fill(i, p, wall)
+            are_met.append(pool.is_met(p, wall))
         rows = (pool.skip if pool.is_disk else pool.fly)(len(part))
-        for state, is_right, hit, (dt, x, y, vx, vy) in zip(
-            part, *(row.tolist() for row in rows), strict=True
+        for state, is_met, is_right, hit, (dt, x, y, vx, vy) in zip(
+            part, are_met, *(row.tolist() for row in rows), strict=True
         ):
             is_folded = pool.is_disk and (y < 0.0 or state.wall == "base")
-            is_taken = is_right and not is_folded
+            is_taken = is_right and not is_folded and is_met
             found.append(
                 Collision(WALL_NAMES[int(hit)], dt, state.t + dt, x, y, vx, vy) if is_taken else None
             )

@@ -21,7 +21,7 @@ from fast.arithmetic import SAFETY, fma, two_product, two_sum
 
 from fast.codes import (  # isort: skip
     APPROACHING, ARC, AT_END, BASE, CAP, CORNER, EDGE, FAR_TIME, FLOOR, H, HORIZON, LEFT, M, MOUTH_EDGE,
-    MUSHROOM, NO_WALL, OUTSIDE, R, RIGHT, SLIDING, START, STEM, TANGENT, TOO_MANY, W,
+    MUSHROOM, NO_WALL, ON_CORNER, OUTSIDE, R, RIGHT, SLIDING, START, STEM, TANGENT, TOO_MANY, W,
 )  # fmt: skip
 from fast.motion import LACK, LOW, PHASE, set_anchors
 
@@ -182,7 +182,13 @@ def side_of_wall(candidate, wall, s, x, y, vx, vy, laws, anchors, bounds, is_rel
 
 @njit(error_model="numpy")
 def first_event(table, is_relative, wall, x, y, vx, vy, limit, laws, anchors, bounds):
-    """Find the next collision or say why not; (code, s). The anchors hold the laws at the state."""
+    """Find the next collision or say why not; (code, s). The anchors hold the laws at the state.
+
+    A start on two walls at once, here a named wall and y = 0, is a corner whichever way it moves; a second
+    wall of any other pair is found within rounding of f = 0 by `first_root`, and then left undecided.
+    """
+    if y == 0.0 and wall in (ARC, LEFT, RIGHT):
+        return (MOUTH_EDGE if table == MUSHROOM and wall != ARC else ON_CORNER), 0.0
     in_cap = table == CAP or (
         table == MUSHROOM and (y > 0.0 or wall in (BASE, ARC) or (y == 0.0 and wall == NO_WALL and vy > 0.0))
     )

@@ -7,7 +7,7 @@ import numpy as np
 
 NO_WALL, ARC, BASE, LEFT, RIGHT, FLOOR = np.arange(-1, 5)
 N_WALLS = 5
-HORIZON, SLIDING, MOUTH_EDGE = np.array([10, 20, 21])
+HORIZON, SLIDING, MOUTH_EDGE, ON_CORNER = np.array([10, 20, 21, 22])
 FAR_TIME, TOO_MANY, TANGENT, CORNER, EDGE, START, AT_END = np.arange(31, 38)
 APPROACHING, OUTSIDE = np.array([40, 41])
 CAP, STEM, MUSHROOM = np.arange(3)

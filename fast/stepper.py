@@ -36,6 +36,7 @@ WALL_CODES: dict[Wall | None, int] = {None: int(codes.NO_WALL)} | {n: c for c, n
 REASONS: dict[int, Outcome] = {
     int(codes.SLIDING): Undefined("sliding"),
     int(codes.MOUTH_EDGE): Undefined("mouth-edge"),
+    int(codes.ON_CORNER): Undefined("corner"),
     int(codes.TOO_MANY): Undecided(f"no hit within {careful.MAX_PARABOLAS} sub-intervals"),
     int(codes.TANGENT): Undecided("f and f' vanish together within rounding"),
     int(codes.CORNER): Undecided("two walls are hit together within rounding"),
@@ -138,12 +139,20 @@ def as_arrays(states: Sequence[State]) -> tuple[FloatArray, npt.NDArray[np.int64
 
 
 def wall_gap(scene: Scene, state: State) -> tuple[float, float]:
-    """Return how far a state is inside the wall it claims to leave, and that wall's distance from 0."""
+    """Return how far a state is inside the wall it claims to leave, and that wall's distance from 0, both now.
+
+    Today's distance is the measure, not the largest of all time: a small cap is not allowed a large one's
+    slack. A time whose phase is lost is left to the step, which refuses it.
+    """
     compiled = compile_scene(scene)
-    if state.wall == "base":
-        return state.y, float(max(compiled.bounds[0, 1], compiled.bounds[1, 1]))
     anchors = np.zeros(motion.ANCHORS_SHAPE)
-    motion.set_anchors(compiled.laws, anchors, state.t, 0.0)
+    if not motion.set_anchors(compiled.laws, anchors, state.t, 0.0):
+        return 0.0, 1.0
+    r, w, h = (float(anchors[row, 0]) for row in (codes.R, codes.W, codes.H))
+    if compiled.is_relative:
+        w *= r
+    if state.wall == "base":
+        return state.y, max(r, w)
     f, _ = walls.wall_residual(
         WALL_CODES[state.wall],
         state.x,
@@ -154,8 +163,8 @@ def wall_gap(scene: Scene, state: State) -> tuple[float, float]:
         compiled.is_relative,
     )
     if state.wall == "arc":
-        return float(f / (2 * anchors[0, 0])), float(anchors[0, 0])
-    return float(f), float(compiled.bounds[2, 1] if state.wall == "floor" else compiled.bounds[1, 1])
+        return float(f) / (2.0 * r), r
+    return float(f), h if state.wall == "floor" else w
 
 
 def trouble(code: int, state: State, wall: Wall | None = None) -> Outcome:

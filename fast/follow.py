@@ -26,7 +26,7 @@ from fast.lanes import (  # isort: skip
     RIGHT_ONE, R_REF, S, SINCE, SPIN, STAY_IN, STAY_OUT, STOP, T, T_LOW, UNTIL, VX, VY, W0, WALL, X, Y,
     aim, arrive, bounce, chord, fly, law, rebound, turns,
 )  # fmt: skip
-from fast.motion import ANCHORS_SHAPE, KNOTS, LOW, set_anchors
+from fast.motion import ANCHORS_SHAPE, LOW, ROOM, bend_of_half_leg, set_anchors
 
 GENERAL, DISK = np.arange(2)
 STAYS, MOVES, ENDS = 0, 1, 2
@@ -59,11 +59,9 @@ def set_reference(a, i, laws, anchors, is_relative):
             bend = -laws[row, 2] * laws[row, 2] * (f - laws[row, 1])
             end = min(end, t + SERVES / laws[row, 2])
         elif laws[row, 0] == BANG_BANG:
-            leg, is_second = int(anchors[row, 2]) // 2, int(anchors[row, 2]) % 2
-            bend = laws[row, KNOTS + 2 * int(laws[row, 3]) + leg]
-            bend = -bend if is_second else bend
-            half_leg = 0.5 * (laws[row, KNOTS + leg + 1] - laws[row, KNOTS + leg])
-            end = min(end, t + (half_leg - anchors[row, 3]))
+            bend = bend_of_half_leg(laws, row, int(anchors[row, 2]))
+            # Rounded down: a flight that ends before it ends before the half-leg does.
+            end = min(end, (t + anchors[row, ROOM]) - SAFETY * (abs(t) + anchors[row, ROOM]))
         place = REFERENCES[k] + i
         a[place], a[place + LANES] = f, anchors[row, LOW]
         a[place + 2 * LANES], a[place + 3 * LANES] = rate, bend

@@ -91,12 +91,10 @@ class LaneRound:
         self.compiled = compile_scene(scene)
         self.table, self.is_relative, self.laws, self.bounds = self.compiled
         self.is_disk = bool(self.table == codes.CAP)
-        bounds = self.bounds
-        self.bend = (1.0 + 2.0**-40) * (bounds[0, 1] * bounds[0, 3] + bounds[0, 2] ** 2)
-        self.k_w = max(bounds[1, 3], bounds[2, 3])
+        self.limits = lanes.limits_of(self.bounds)
         self.omega = self.laws[codes.PHASES, 0]
         self.anchors = np.zeros(motion.ANCHORS_SHAPE)
-        self.pool = np.zeros(lanes.N_ROWS * lanes.LANES)
+        self.pool, self.spare = np.zeros((2, lanes.N_ROWS * lanes.LANES))
 
     def fill(self, lane: int, p: FloatArray, wall: int, age: float = 0.0) -> None:
         """Put a state [t, its low part, x, y, vx, vy] into a lane, its laws known from `age` before it."""
@@ -130,8 +128,9 @@ class LaneRound:
         """Take a step in n lanes: which are shown right, walls met, and rows of dt, x, y, vx, vy."""
         a, count, m = self.pool, np.int64(n), self.laws[codes.M, 1]
         is_stem = self.table == codes.STEM
-        lanes.aim(a, count, is_stem, m, self.bend, self.k_w)
-        lanes.fly(a, count, is_stem, self.is_relative, self.omega, m, self.k_w)
+        lanes.aim(a, count, is_stem, m, self.limits)
+        lanes.fly(a, count, is_stem, self.is_relative, self.omega, m, self.limits)
+        self.correct_more(follow.GENERAL, n)
         right = self.row(lanes.OK, n) == lanes.RIGHT_ONE
         # A hit beyond the reference's reach is not taken as it stands.
         right &= self.row(lanes.NEXT_T, n) < self.row(lanes.END, n)
@@ -142,12 +141,18 @@ class LaneRound:
     def skip(self, n: int) -> tuple[npt.NDArray[np.bool_], FloatArray, FloatArray]:
         """Take captured chords in n lanes, likewise; every hit is on the arc."""
         a, count = self.pool, np.int64(n)
-        lanes.chord(a, count, OFF, self.is_disk, self.is_relative, self.omega, self.bend, self.k_w)
+        lanes.chord(a, count, OFF, self.is_disk, self.is_relative, self.omega, self.limits)
+        self.correct_more(follow.DISK, n)
         right = self.row(lanes.OK, n) == lanes.RIGHT_ONE
         right &= self.row(lanes.NEXT_T, n) < self.row(lanes.END, n)
         dt = self.row(lanes.S, n).copy()
         lanes.rebound(a, count)
         return right, np.zeros(n), np.column_stack([dt, *(self.row(r, n) for r in PLACE)])
+
+    def correct_more(self, pool: np.integer[Any], n: int) -> None:
+        """Correct coarse steps again, as `fast.follow` does."""
+        for i in range(n):
+            follow.correct_more(pool, tuple(self.compiled), self.pool, np.int64(i), self.spare, self.limits)
 
     def row(self, start: np.integer[Any], n: int) -> FloatArray:
         """Return n lanes of a row of the pool."""

@@ -24,7 +24,7 @@ from fast.lanes import (  # isort: skip
     CALM, CLOSED, COARSE, DONE, END, H0, HIT, H_REF, LANES, NEVER, NEXT_H0, NEXT_R0, NEXT_T, NEXT_T_LOW,
     NEXT_VX, NEXT_VY, NEXT_W0, NEXT_X, NEXT_Y, N_ARC, N_BASE, N_REF, N_ROWS, OK, ON_ARC, R0, REF, REF_LOW,
     RIGHT_ONE, R_REF, S, SINCE, SPIN, STAY_IN, STAY_OUT, STOP, T, T_LOW, UNTIL, VX, VY, W0, WALL, X, Y,
-    aim, arrive, bounce, chord, fly, law, rebound, turns,
+    aim, arrive, bounce, chord, fly, law, limits_of, rebound, turns,
 )  # fmt: skip
 from fast.motion import ANCHORS_SHAPE, LOW, ROOM, bend_of_half_leg, set_anchors
 
@@ -224,7 +224,7 @@ def step_to_arc(scene, a, i, anchors, p, j, whom, stops, out, n_careful):
 
 
 @njit(error_model="numpy")
-def correct_more(pool, scene, a, i, spare, k_w, bend):
+def correct_more(pool, scene, a, i, spare, limits):
     """Correct a coarse step until it is right, a few times, in a pool of its own."""
     table, is_relative, laws, _ = scene
     if a[OK + i] != COARSE:
@@ -232,16 +232,16 @@ def correct_more(pool, scene, a, i, spare, k_w, bend):
     change_lane(a, i, spare, np.int64(0))
     for _ in range(3):
         if pool == DISK:
-            chord(spare, np.int64(1), np.bool_(True), table == CAP, is_relative, laws[PHASES, 0], bend, k_w)
+            chord(spare, np.int64(1), np.bool_(True), table == CAP, is_relative, laws[PHASES, 0], limits)
         else:
-            fly(spare, np.int64(1), table == STEM, is_relative, laws[PHASES, 0], laws[M, 1], k_w)
+            fly(spare, np.int64(1), table == STEM, is_relative, laws[PHASES, 0], laws[M, 1], limits)
         if spare[OK] != COARSE:
             break
     change_lane(spare, np.int64(0), a, i)
 
 
 @njit(error_model="numpy")
-def attend(pool, scene, is_laned, a, i, spare, whom, anchors, p, stops, out, ends, k_w, bend):
+def attend(pool, scene, is_laned, a, i, spare, whom, anchors, p, stops, out, ends, limits):
     """Do for a lane what its tick could not; returns whether it stays, moves to the other pool or ends."""
     states, codes, counts, n_careful = ends
     table, is_relative, laws, _ = scene
@@ -252,7 +252,7 @@ def attend(pool, scene, is_laned, a, i, spare, whom, anchors, p, stops, out, end
         return MOVES
     is_known = is_laned and a[END + i] > -NEVER
     if is_known:
-        correct_more(pool, scene, a, i, spare, k_w, bend)
+        correct_more(pool, scene, a, i, spare, limits)
     is_past = a[NEXT_T + i] >= a[END + i]
     if is_known and a[OK + i] == RIGHT_ONE and not (is_past and omega == 0.0):
         if is_past:
@@ -279,7 +279,7 @@ def attend(pool, scene, is_laned, a, i, spare, whom, anchors, p, stops, out, end
 
 
 @njit(error_model="numpy")
-def scan(pool, scene, is_laned, pools, whoms, n, anchors, p, stops, out, ends, k_w, bend):
+def scan(pool, scene, is_laned, pools, whoms, n, anchors, p, stops, out, ends, limits):
     """Attend to every lane of a pool that needs it; the last lane fills the place of one that leaves."""
     a, whom = pools[pool], whoms[pool]
     i = np.int64(0)
@@ -287,7 +287,7 @@ def scan(pool, scene, is_laned, pools, whoms, n, anchors, p, stops, out, ends, k
         if a[CALM + i] > 0.0 and is_laned:
             i += 1
             continue
-        fate = attend(pool, scene, is_laned, a, i, pools[2], whom, anchors, p, stops, out, ends, k_w, bend)
+        fate = attend(pool, scene, is_laned, a, i, pools[2], whom, anchors, p, stops, out, ends, limits)
         if fate == STAYS:
             i += 1
             continue
@@ -323,8 +323,7 @@ def follow(scene, walls, stops, out, ends):
     n = np.zeros(2, dtype=np.int64)
     anchors, p = np.zeros(ANCHORS_SHAPE), np.zeros(6)
     omega, m, is_stem = laws[PHASES, 0], laws[M, 1], table == STEM
-    k_w = max(bounds[W, 3], bounds[H, 3])
-    bend = (1.0 + SAFETY) * (bounds[R, 1] * bounds[R, 3] + bounds[R, 2] * bounds[R, 2])
+    limits = limits_of(bounds)
     general, disk = pools[GENERAL], pools[DISK]
     while True:
         while n[0] + n[1] < LANES and first < last:
@@ -335,11 +334,11 @@ def follow(scene, walls, stops, out, ends):
         if n[0] + n[1] == 0:
             break
         if n[GENERAL] > 0:
-            aim(general, n[GENERAL], is_stem, m, bend, k_w)
-            fly(general, n[GENERAL], is_stem, is_relative, omega, m, k_w)
-            scan(GENERAL, scene, is_laned, pools, whoms, n, anchors, p, stops, out, ends, k_w, bend)
+            aim(general, n[GENERAL], is_stem, m, limits)
+            fly(general, n[GENERAL], is_stem, is_relative, omega, m, limits)
+            scan(GENERAL, scene, is_laned, pools, whoms, n, anchors, p, stops, out, ends, limits)
             bounce(general, n[GENERAL], m, table == MUSHROOM)
         if n[DISK] > 0:
-            chord(disk, n[DISK], np.bool_(False), table == CAP, is_relative, omega, bend, k_w)
-            scan(DISK, scene, is_laned, pools, whoms, n, anchors, p, stops, out, ends, k_w, bend)
+            chord(disk, n[DISK], np.bool_(False), table == CAP, is_relative, omega, limits)
+            scan(DISK, scene, is_laned, pools, whoms, n, anchors, p, stops, out, ends, limits)
             rebound(disk, n[DISK])

@@ -25,16 +25,19 @@ cross-multiplication, so a flight costs two divisions and one square root.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numba import njit
 
 from fast.arithmetic import SAFETY, dot, fma, two_product, two_sum
-from fast.codes import ARC, BASE, FLOOR, LEFT, RIGHT
+from fast.codes import ARC, BASE, FLOOR, LEFT, RIGHT, H, R, W
 from fast.walls import off_the_arc, off_the_arc_spinning
 
 LANES = 64  # all rows of a pool stay in the first-level cache
 LONGEST_TURN = 0.25  # omega u up to which the series are used
 NEVER = np.inf
+LEAST_RADIUS = 2.0**-1000
 
 # Rows of a pool, LANES numbers each, in one flat array: constant strides let the loops vectorise.
 (
@@ -56,6 +59,40 @@ N_ROWS = 66
 ON_ARC, ON_BASE, ON_LEFT, ON_RIGHT, ON_FLOOR = map(float, (ARC, BASE, LEFT, RIGHT, FLOOR))
 WRONG, COARSE, RIGHT_ONE = 0.0, 1.0, 2.0
 CLEARLY_CAPTURED = 1.05  # |L| over w v from which a particle moves to the disk's pool
+
+
+class Limits(NamedTuple):
+    """What holds of a scene's laws for all time, for the lanes' checks.
+
+    Attributes:
+        bend: at least |r'^2 + r r''|: half of what the arc's function may curve upwards, speed left out.
+        curvature: at least |w''| and |h''|.
+        rate: at least |r'|, |w'| and |h'|.
+        size: at least r + w + h, which bounds the terms that a law is summed of.
+        least_r, least_h: at most the least radius and depth. Where a bound says no more than that the radius is
+            positive it is LEAST_RADIUS, with which only concave arcs pass.
+    """
+
+    bend: float
+    curvature: float
+    rate: float
+    size: float
+    least_r: float
+    least_h: float
+
+
+@njit(error_model="numpy")
+def limits_of(bounds):
+    """Return the limits of laws from their bounds (rows: lowest, highest, |f'|, |f''|)."""
+    grow = 1.0 + SAFETY
+    return Limits(
+        grow * (bounds[R, 1] * bounds[R, 3] + bounds[R, 2] * bounds[R, 2]),
+        max(bounds[W, 3], bounds[H, 3]),
+        max(bounds[R, 2], max(bounds[W, 2], bounds[H, 2])),
+        grow * (bounds[R, 1] + bounds[W, 1] + bounds[H, 1]),
+        max(bounds[R, 0], LEAST_RADIUS),
+        max(bounds[H, 0], 0.0),
+    )
 
 
 @njit(error_model="numpy")
@@ -97,11 +134,13 @@ def law(f, low, f1, f2, omega, g1, g2, g0):
 
 
 @njit(error_model="numpy")
-def aim(a, n, is_stem, m, bend, k_w):
+def aim(a, n, is_stem, m, limits):
     """Choose each lane's wall and guess the time, walls moving at their speed now.
 
-    SURE is positive only where the mouth is passed, or not, beyond doubt.
+    SURE is positive only where the part of the flight before y = 0 is as chosen: docs/lanes.md, "The crossing".
     """
+    bend, k_w, rate_w, size = limits.bend, limits.curvature, limits.rate, limits.size
+    per_r, least_h = 2.0 / limits.least_r, limits.least_h
     for i in range(n):
         x, y, vx, vy, wall = a[X + i], a[Y + i], a[VX + i], a[VY + i], a[WALL + i]
         r0, r1, r2 = a[R0 + i], a[R1 + i], a[R2 + i]
@@ -110,7 +149,12 @@ def aim(a, n, is_stem, m, bend, k_w):
         depth, rise = abs(y), abs(vy)
         # The crossing of y = 0, all times |vy|: on which side of the mouth's edge.
         gap = fma(w0, rise, w1 * depth) - abs(x * vy - y * vx)
-        doubt = fma(k_w * y, y, SAFETY * rise * ((w0 + abs(x)) * rise + abs(vx) * depth))
+        v2 = fma(vx, vx, vy * vy)
+        excess = bend - v2
+        excess = excess if excess > 0.0 else 0.0  # by how much the arc's function may be convex, halved
+        doubt = (k_w + excess * per_r) * depth * depth
+        doubt = fma(SAFETY * rise, fma(size + abs(x), rise, (abs(vx) + rate_w) * depth), doubt)
+        lift = least_h * rise * rise - k_w * depth * depth
         # Sides and floor: the least f / -f', by cross-multiplication.
         edge, drift = fma(m, y, w0), fma(m, vy, w1)
         f_r = 0.0 if wall == ON_RIGHT else edge - x
@@ -132,7 +176,6 @@ def aim(a, n, is_stem, m, bend, k_w):
         d = d_f if best_f > 0.0 else d
         side = ON_FLOOR if best_f > 0.0 else side
         # The arc, to second order in time.
-        v2 = fma(vx, vx, vy * vy)
         q = fma(x, vx, y * vy)
         c = fma(-x, x, (r0 - y) * (r0 + y))
         c = 0.0 if wall == ON_ARC else c
@@ -160,18 +203,21 @@ def aim(a, n, is_stem, m, bend, k_w):
         bend_s = h2 if hit == ON_FLOOR else w2
         bend_s = bend_s if hit >= ON_LEFT else 0.0
         s = s * fma(0.5 * bend_s * s, inverse, 1.0)
-        crossed = -reaches if is_in_cap > 0.5 else -stays
-        sure = abs(gap) * rise - doubt if is_in_cap > 0.5 else gap * rise - doubt
+        # Comparisons so put that what is no number is never sure.
+        whole = reaches if is_in_cap > 0.5 else stays
+        gap = gap * rise
+        sure = abs(gap) - doubt if is_in_cap > 0.5 else min(gap - doubt, lift)
         sure = 1.0 if is_stem else sure
-        sure = sure if crossed >= 0.0 else 1.0
+        sure = 1.0 if whole > 0.0 else sure
         # The arc's function must be concave.
         concave = v2 - bend if hit == ON_ARC else 1.0
         a[HIT + i], a[S + i], a[SURE + i] = hit, s, min(concave, sure)
 
 
 @njit(error_model="numpy")
-def fly(a, n, is_stem, is_relative, omega, m, k_w):
+def fly(a, n, is_stem, is_relative, omega, m, limits):
     """Correct each lane's time of flight once, and tell whether the step is then right and calm."""
+    bend, k_w, rate_w, size_w = limits.bend, limits.curvature, limits.rate, limits.size
     for i in range(n):
         x, y, vx, vy, wall = a[X + i], a[Y + i], a[VX + i], a[VY + i], a[WALL + i]
         r0, r1_0, r2_0, hit, s = a[R0 + i], a[R1 + i], a[R2 + i], a[HIT + i], a[S + i]
@@ -190,10 +236,8 @@ def fly(a, n, is_stem, is_relative, omega, m, k_w):
         sign = 1.0 if hit == ON_RIGHT else -1.0
         f = (w - sign * x_s) + (fma(m, y_s, w_low) + fma(m, y_low, -sign * x_low))
         slope = fma(m, vy, w1) - sign * vx
-        bend_s = w2
         f = (y_s + h) + y_low if hit == ON_FLOOR else f
         slope = vy + h1 if hit == ON_FLOOR else slope
-        bend_s = h2 if hit == ON_FLOOR else bend_s
         # The arc: its increments if it was left, else what is there.
         g1, g2, _ = turns(omega, s)
         dr = fma(r1_0, g1, r2_0 * g2)
@@ -204,7 +248,7 @@ def fly(a, n, is_stem, is_relative, omega, m, k_w):
         f_arc = hop if wall == ON_ARC else f_arc
         f = f_arc if hit == ON_ARC else f
         slope = 2.0 * fma(r, r1, -fma(s, v2, q)) if hit == ON_ARC else slope
-        bend_s = 2.0 * (fma(r1, r1, r * r2) - v2) if hit == ON_ARC else bend_s
+        bend_s = 2.0 * (bend + v2) if hit == ON_ARC else k_w
         f = y_s + y_low if hit == ON_BASE else f
         slope = vy if hit == ON_BASE else slope
         bend_s = 0.0 if hit == ON_BASE else bend_s
@@ -216,17 +260,22 @@ def fly(a, n, is_stem, is_relative, omega, m, k_w):
         clear_r = edge - x_s if hit != ON_RIGHT else NEVER
         clear_l = edge + x_s if hit != ON_LEFT else NEVER
         clear_f = y_s + h if hit != ON_FLOOR else NEVER
-        far = k_w * s * s + SAFETY * (w + abs(x) + abs(y) + (abs(vx) + abs(vy)) * s)
+        way = (abs(vx) + abs(vy)) * s
+        far = k_w * s * s + SAFETY * (size_w + abs(x) + abs(y) + way)
         clear = min(clear_r, min(clear_l, clear_f)) - far
         quality = min(a[SURE + i], clear if hit >= (ON_ARC if is_stem else ON_LEFT) else 1.0)
         # An arc is met above y = 0, sides and floor below, the base inside the arc, all on the way out.
-        size = SAFETY * (abs(y) + abs(vy) * s)
-        place = y_s - size if hit == ON_ARC else -y_s - size
-        inside = r - abs(x_s) - SAFETY * (abs(x) + abs(vx) * s)
-        inside = inside if r > 0.0 else 1.0
+        place = y_s if hit == ON_ARC else -y_s
+        place -= SAFETY * (abs(y) + abs(vy) * s)
+        excess = bend - v2
+        excess = excess if excess > 0.0 else 0.0
+        inside = r - abs(x_s) - SAFETY * (size_w + abs(x) + abs(vx) * s)
+        inside = fma(inside, limits.least_r, -2.0 * excess * s * s)
+        inside = 1.0 if is_stem else inside
         place = inside if hit == ON_BASE else place
-        first = -slope - k_w * s
-        first = -slope if hit == ON_ARC else first
+        first = -slope - (k_w * s + SAFETY * (abs(vx) + abs(vy) + rate_w))
+        sizes = abs(x * vx) + abs(y * vy) + fma(s, v2, r * rate_w)
+        first = -slope - 2.0 * SAFETY * sizes if hit == ON_ARC else first
         first = 1.0 if hit == ON_BASE else first
         quality = min(min(quality, place), min(first, s))
         quality = min(quality, LONGEST_TURN - omega * since)
@@ -246,7 +295,8 @@ def fly(a, n, is_stem, is_relative, omega, m, k_w):
         y_s, y_low = short_sum(y_s, fma(vy, delta, y_low))
         a[NEXT_Y + i] = 0.0 if hit == ON_BASE else y_s
         a[NEXT_Y_LOW + i] = y_low
-        a[NEXT_R0 + i], a[NEXT_R1 + i], a[NEXT_R2 + i] = fma(r1, delta, r), fma(r2, delta, r1), r2
+        a[NEXT_R0 + i], a[NEXT_R1 + i] = fma(r1, delta, r), fma(r2, delta, r1)
+        a[NEXT_R2 + i] = fma(-omega * omega * r1, delta, r2)
         a[NEXT_W0 + i], a[NEXT_W1 + i], a[NEXT_W2 + i] = fma(w1, delta, w), fma(w2, delta, w1), w2
         a[NEXT_H0 + i], a[NEXT_H1 + i], a[NEXT_H2 + i] = fma(h1, delta, h), fma(h2, delta, h1), h2
 
@@ -323,12 +373,13 @@ def bounce(a, n, m, is_mushroom):
 
 
 @njit(error_model="numpy")
-def chord(a, n, is_again, is_cap, is_relative, omega, bend, k_w):
+def chord(a, n, is_again, is_cap, is_relative, omega, limits):
     """Find the next arc hit of captured particles: the base is unfolded, |L| is constant.
 
     The chord keeps the distance |L| / v from the centre; while that exceeds w the mouth is out of reach.
     `is_again`: correct the times found before once more, in place of a new guess.
     """
+    bend, k_w, rate_w, size = limits.bend, limits.curvature, limits.rate, limits.size
     for i in range(n):
         x, y, vx, vy, spin = a[X + i], a[Y + i], a[VX + i], a[VY + i], a[SPIN + i]
         r0, r1_0, r2_0 = a[R0 + i], a[R1 + i], a[R2 + i]
@@ -349,14 +400,16 @@ def chord(a, n, is_again, is_cap, is_relative, omega, bend, k_w):
         slope = 2.0 * fma(r, r1, -fma(s, v2, q))
         inverse = 1.0 / slope
         delta = -f * inverse
-        error = 2.0**58 * abs((fma(r1, r1, r * r2) - v2) * inverse) * delta * delta
+        error = 2.0**58 * abs((bend + v2) * inverse) * delta * delta
         x_s, x_low = moved(x, vx, s)
         y_s, y_low = moved(y, vy, s)
         # The widest that the mouth can be during the flight, from both ends.
-        reach = max(a[W0 + i], w) + k_w * s * s
+        reach = max(a[W0 + i], w) + fma(k_w * s, s, SAFETY * size)
         clear = spin * spin - (1.0 + 4.0 * SAFETY) * reach * reach * v2
         clear = 1.0 if is_cap else clear
-        quality = min(min(clear, abs(y_s) - SAFETY * (abs(y) + abs(vy) * s)), min(-slope, v2 - bend))
+        sizes = abs(x * vx) + abs(y * vy) + fma(s, v2, r * rate_w)
+        first = -slope - 2.0 * SAFETY * sizes
+        quality = min(min(clear, abs(y_s) - SAFETY * (abs(y) + abs(vy) * s)), min(first, v2 - bend))
         quality = min(min(quality, s), LONGEST_TURN - omega * since)
         t, low = two_sum(a[T + i], s)
         t, low = two_sum(t, low + (a[T_LOW + i] + delta))
@@ -369,7 +422,8 @@ def chord(a, n, is_again, is_cap, is_relative, omega, bend, k_w):
         a[NEXT_T_LOW + i] = low
         a[NEXT_X + i], a[NEXT_X_LOW + i] = short_sum(x_s, fma(vx, delta, x_low))
         a[NEXT_Y + i], a[NEXT_Y_LOW + i] = short_sum(y_s, fma(vy, delta, y_low))
-        a[NEXT_R0 + i], a[NEXT_R1 + i], a[NEXT_R2 + i] = fma(r1, delta, r), fma(r2, delta, r1), r2
+        a[NEXT_R0 + i], a[NEXT_R1 + i] = fma(r1, delta, r), fma(r2, delta, r1)
+        a[NEXT_R2 + i] = fma(-omega * omega * r1, delta, r2)
         a[NEXT_W0 + i], a[NEXT_W1 + i] = fma(w1, delta, w), w1
         a[CALM + i] = result - COARSE if t < min(a[STOP + i], a[END + i]) else 0.0
 

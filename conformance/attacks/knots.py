@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from itertools import pairwise
-from typing import Any
+from typing import NamedTuple
 
 from flint import arb
 
@@ -20,9 +20,26 @@ from conformance.generate_draws import Clock, Draw, law
 from scene import BangBang, Cap, Law, Mushroom, Scene, State, Stem
 
 PERIOD = 16.0
+# Nested, so that every scene is valid: nu r >= 0.012, h slope <= 0.008 < w <= 0.4 < r.
 SIZES = {"r": (0.6, 1.5), "w": (0.01, 0.4), "h": (0.3, 2.0), "slope": (-0.2, 0.004), "nu": (0.02, 0.6)}
 # Of each wall the parameters that move it.
-MOVERS = {"arc": ("r",), "floor": ("h",), "left": ("w", "slope"), "right": ("w", "slope"), "base": ("w",)}
+MOVERS = {"arc": ("r",), "floor": ("h",), "left": ("w", "slope"), "right": ("w", "slope")}
+
+
+class Instant(NamedTuple):
+    """A collision, or a crossing of y = 0, of a path that is known.
+
+    Attributes:
+        time: since the start [time].
+        x: place then [length].
+        n_before: collisions before it.
+        wall: the wall met; "mouth" for a crossing of y = 0, on the base or through the mouth.
+    """
+
+    time: float
+    x: float
+    n_before: int
+    wall: str
 
 
 def _start_time(draw: Draw) -> float:
@@ -59,36 +76,29 @@ def _base(draw: Draw) -> tuple[dict[str, Law], State]:
     return found, State(0.0, *place, vx, vy)
 
 
-def _at_rest(found: dict[str, Law], name: str, draw: Draw) -> float:
-    level = found[name]
-    if not isinstance(level, float):
-        level = draw.short(*SIZES[name])
-    return level
-
-
-def instants(scene: Scene, state: State, n: int) -> list[tuple[Any, int, str]]:
-    """List the times of the first n collisions and of the crossings of y = 0 on the way.
-
-    Returns:
-        (time since the start as a ball [time], number of collisions by then, the wall or "mouth").
-    """
+def instants(scene: Scene, state: State, n: int) -> list[Instant]:
+    """List the first n collisions, and the crossings of y = 0 on the way."""
     passed, found = arb(0), []
-    y, vy = arb(state.y), arb(state.vy)
+    x, y, vx, vy = (arb(number) for number in (state.x, state.y, state.vx, state.vy))
     for number, step in enumerate(second_stepper.trajectory(scene, state, n)):
         if step.kind != "collision" or step.wall is None:
             break
-        dt, _, after, _, speed = step.numbers
-        if (y > 0 and after < 0) or (y < 0 and after > 0):
-            found.append((passed - y / vy, number, "mouth"))
+        dt, *after = step.numbers
+        if step.wall == "base" or (y > 0 and after[1] < 0) or (y < 0 and after[1] > 0):
+            crossing = -y / vy
+            found.append(
+                Instant(float((passed + crossing).mid()), float((x + vx * crossing).mid()), number, "mouth")
+            )
         passed += dt
-        found.append((passed, number + 1, step.wall))
-        y, vy = after, speed
+        if step.wall != "base":
+            found.append(Instant(float(passed.mid()), float(after[0].mid()), number, step.wall))
+        x, y, vx, vy = after
     return found
 
 
 def _leg(draw: Draw, near: float, low: float, high: float, width: float) -> BangBang | None:
     """Return a law at rest at `low` but for a sudden leg to `high`, so wide, next to the time `near`."""
-    begin = near + width * draw.pick((-2.0, -1.0, -0.5, -0.1, 0.0, 0.1, 0.5, 1.0))
+    begin = near + width * draw.pick((-2.0, -1.0, -0.75, -0.5, -0.25, -0.1, 0.0, 0.1, 0.5, 1.0))
     end = max(begin + width, math.nextafter(begin, math.inf))
     times = [0.0, begin, end, end + draw.between(0.05, 2.0), PERIOD]
     if not all(a < b for a, b in pairwise(times)):
@@ -100,26 +110,38 @@ def knot_at_event(draw: Draw) -> Attack:
     """A knot next to the time of the first, second or third collision, or of a crossing of y = 0."""
     while True:
         found, state = _base(draw)
-        name = draw.pick(tuple(found))
-        low, high = _at_rest(found, name, draw), draw.short(*SIZES[name])
-        found[name] = low
-        still = built(Mushroom, found)
-        targets = [
-            (time, number)
-            for time, number, wall in ([] if still is None else instants(still, state, 3))
-            if name in MOVERS.get(wall, ("w",)) or (name == "nu" and wall != "floor")
-        ]
-        if not targets:
+        at, name = _target(draw, found, state)
+        if at is None:
             continue
-        time, number = draw.pick(targets)
-        width = draw.power(-55, -30) * draw.between(1.0, 2.0)
-        leg = _leg(draw, float(time.mid()), low, high, width)
-        moved = None if leg is None else built(Mushroom, found | {name: leg})
-        if moved is None:
+        low, high = found[name], draw.short(*SIZES[name])
+        assert isinstance(low, float)
+        if at.wall == "mouth" and name == "w":  # one of them open at x, the other closed
+            ends = abs(at.x) * draw.between(0.1, 0.95), abs(at.x) * draw.between(1.05, 3.0)
+            least, most = SIZES["w"]
+            low, high = (
+                min(max(end, least), most) for end in (ends if draw.pick((True, False)) else ends[::-1])
+            )
+        width = draw.power(-52, -30) * draw.between(1.0, 2.0)
+        leg = _leg(draw, at.time, low, high, width)
+        if leg is None:
             continue
-        late = State(_start_time(draw), state.x, state.y, state.vx, state.vy)
-        working = _working(draw, late.t, width)
-        return Attack(moved, late, None, number + 1 + draw.pick((0, 1)), working)
+        t = _start_time(draw)
+        late = State(t, state.x, state.y, state.vx, state.vy)
+        moved = Mushroom(**(found | {name: leg}))  # type: ignore[arg-type]
+        return Attack(moved, late, None, at.n_before + draw.pick((1, 1, 2)), _working(draw, t, width))
+
+
+def _target(draw: Draw, found: dict[str, Law], state: State) -> tuple[Instant | None, str]:
+    """Put one law to rest and choose an event or a crossing that it decides."""
+    name = draw.pick(("w", "w", *found)) if "w" in found else draw.pick(tuple(found))
+    if not isinstance(found[name], float):
+        found[name] = draw.short(*SIZES[name])
+    known = instants(Mushroom(**found), state, 3)  # type: ignore[arg-type]
+    movers = MOVERS | {"mouth": (name,) if name in ("w", "nu") else ()}
+    if name == "nu":
+        movers |= {"left": ("nu",), "right": ("nu",)}
+    targets = [at for at in known if name in movers[at.wall]]
+    return (draw.pick(targets) if targets else None), name
 
 
 def hit_at_knot(draw: Draw) -> Attack:
@@ -160,7 +182,12 @@ def knots_anywhere(draw: Draw) -> Attack:
 
     scene = None
     while scene is None:
-        found = {"r": moved(0.6, 1.5), "w": moved(0.05, 0.5), "h": moved(0.3, 2.0), "slope": moved(-0.2, 0.02)}
+        found = {
+            "r": moved(0.6, 1.5),
+            "w": moved(0.05, 0.5),
+            "h": moved(0.3, 2.0),
+            "slope": moved(-0.2, 0.02),
+        }
         scene = built(Mushroom, found)
     vx, vy = draw.direction()
     speed = draw.power(-2, 5)

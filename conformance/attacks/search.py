@@ -21,6 +21,7 @@ from conformance.attacks.case import Attack, Family, line
 from conformance.second_stepper import Answer
 from scene import Collision, Horizon, Outcome, Rejected, Scene, State, Undecided, Undefined
 
+KINDS = ("agreed", "undecided", "refused", "open", "wrong")
 BOUND = 4.0  # backward ulps: the sharpest class of grades
 
 
@@ -76,9 +77,6 @@ class Tally:
             self.wrong.append(f"{verdict.why}: {where}")
 
 
-KINDS = ("agreed", "undecided", "refused", "open", "wrong")
-
-
 def truths(attack: Attack) -> list[Answer]:
     """Return the second stepper's answers."""
     if attack.n_collisions is not None:
@@ -131,7 +129,9 @@ def judged(attack: Attack, steppers: Steppers, tally: Tally) -> Iterable[Verdict
     if steppers.stepper is not None:
         t_end = attack.t_end if attack.t_end is not None else late_enough(attack.state, answers[0])
         if t_end is not None:
-            yield stepped(steppers.stepper(attack.scene, attack.state, t_end), answers[0], attack.state, t_end)
+            yield stepped(
+                steppers.stepper(attack.scene, attack.state, t_end), answers[0], attack.state, t_end
+            )
     if steppers.flow is not None and attack.is_flow and attack.t_end is not None:
         yield flown(steppers.flow(attack.scene, attack.state, attack.t_end), answers)
 
@@ -144,11 +144,15 @@ def proved(claims: Sequence[Claim], answers: Sequence[Answer]) -> Verdict:
         if answer.kind == "undecided":
             return Verdict("open", answer.reason)
         if (claim.kind, claim.wall) != (answer.kind, answer.wall):
-            met = f"{claim.kind} {claim.wall or claim.reason}, not {answer.kind} {answer.wall or answer.reason}"
+            met = (
+                f"{claim.kind} {claim.wall or claim.reason}, not {answer.kind} {answer.wall or answer.reason}"
+            )
             return Verdict("wrong", f"step {number} is proved to be {met}")
         if claim.kind == "undefined" and claim.reason != answer.reason:
             return Verdict("wrong", f"step {number} is undefined: {claim.reason}, not {answer.reason}")
-        for name, ends, ball in zip(("dt", "x", "y", "vx", "vy"), claim.numbers, answer.numbers, strict=False):
+        for name, ends, ball in zip(
+            ("dt", "x", "y", "vx", "vy"), claim.numbers, answer.numbers, strict=False
+        ):
             if not meets(ends, ball):
                 return Verdict("wrong", f"the enclosure of {name} after step {number} misses the truth")
         if claim.kind == "rejected":

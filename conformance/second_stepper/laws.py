@@ -96,9 +96,8 @@ class Waves:
     """A trigonometric polynomial of time; its frequency is omega, or 2 pi / period."""
 
     def __init__(self, law: Fourier) -> None:
-        period = getattr(law, "period", None)
-        self.period = None if period is None else exact(period)
-        self.exact_omega = None if self.period is not None else exact(law.omega)
+        self.period = None if law.period is None else exact(law.period)
+        self.exact_omega = None if law.omega is None else exact(law.omega)
         self.omega = 2 * arb.pi() / arb(self.period) if self.exact_omega is None else arb(self.exact_omega)
         self.mean = exact(law.mean)
         self.harmonics = [(k, exact(a), exact(b)) for k, a, b in law.harmonics()]

@@ -15,6 +15,7 @@ from typing import NamedTuple
 
 import flint
 from flint import arb, fmpq
+from mpmath import fp
 
 from conformance.second_stepper import start
 from conformance.second_stepper.answer import Answer, Open
@@ -23,8 +24,7 @@ from conformance.second_stepper.jacobian import jacobian
 from conformance.second_stepper.laws import Ball, Rational, exact
 from conformance.second_stepper.roots import AtEnd, Root, dyadic, first_root
 from scene import Scene, State, Wall
-from scene.laws import BangBang, Fourier
-from scene.tables import laws
+from scene.tables import period
 
 BITS = 160  # to begin with, beyond those that the numbers' sizes need
 DOUBLINGS = 5
@@ -236,13 +236,10 @@ def _until_decided(attempt: Callable[[int], Answer], bits: int, doublings: int) 
 
 def bits_for(scene: Scene, state: State) -> int:
     """Return a precision that tells apart the times of a step: the phase of a late start costs bits."""
-    period = math.inf
-    for law in laws(scene).values():
-        if isinstance(law, BangBang):
-            period = min(period, law.knots[-1][0] - law.knots[0][0])
-        elif isinstance(law, Fourier):
-            period = min(period, getattr(law, "period", None) or 6 / law.omega)
-    late = math.frexp(abs(state.t))[1] - math.frexp(period)[1] if math.isfinite(period) and state.t else 0
+    shared = period(scene)
+    if shared is None or state.t == 0:
+        return BITS
+    late = math.frexp(abs(state.t))[1] - math.frexp(float(shared.value(fp)))[1]
     return BITS + max(late, 0)
 
 

@@ -1,10 +1,10 @@
 """From a question to a certified vector: the reference proves, a second arithmetic proves again.
 
-Steps: every certificate of the reference, undefined outcomes included, is re-proved in Arb, and the enclosures
-that are written down (24 decimals, rounded outward) hold the re-proved ones. Trajectories: the whole path is
-re-proved, each step from the box that the one before leads to (`conformance.generate_path`); each step from
-the rounded state before it is re-proved to meet the same wall first; and the written enclosures are
-re-proved along the whole path by `conformance.generate_chain`.
+Steps: every certificate of the reference, undefined outcomes included, is re-proved in Arb, and the
+enclosures that are written down (24 decimals, rounded outward) hold the re-proved ones. Trajectories: the
+whole path is re-proved, each step from the box that the one before leads to (`conformance.generate_path`);
+each step from the rounded state before it is re-proved to meet the same wall first; and the written
+enclosures are re-proved along the whole path by `conformance.generate_chain`.
 """
 
 from __future__ import annotations

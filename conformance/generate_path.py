@@ -68,7 +68,7 @@ def _next(scene: Scene, step: Step, root: Begin, claim: dict[str, Any]) -> tuple
     departure = claim["departure"]
     instant = dyadic(departure["instant"])
     near = instant - old.t
-    _, x, y, vx, vy = step.moment(*root)
+    _, _, y, vx, vy = step.moment(*root)
     back: Number = near - s  # from the collision to the instant
     truth = {"x": _carried(old.x, old.vx, vx, near, s), "vx": vx, "vy": vy}
     truth["y"] = y + vy * back if step.wall == "base" else _carried(old.y, old.vy, vy, near, s)

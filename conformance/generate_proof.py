@@ -249,7 +249,7 @@ class Step:
             raise Refuted("the top is crossed beside the stem")
 
     def moment(self, low: fmpq, high: fmpq) -> tuple[Number, ...]:
-        """Return t, x, y and the velocity v - 2 f' grad f / |grad f|^2 after the wall is met at [low, high]."""
+        """Return t, x, y, vx, vy after the wall is met at [low, high]: v - 2 f' grad f / |grad f|^2."""
         f, s = self.flight, ball(low, high)
         x, y = f.x + f.vx * s, f.y + f.vy * s
         if self.wall == "base":

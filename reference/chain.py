@@ -27,7 +27,7 @@ class Bounce(NamedTuple):
 
 
 def reflected(arithmetic: Arithmetic, flight: Flight, hit: Hit) -> tuple[Interval, Interval]:
-    """Return the velocity after a hit: v - 2 f' grad f / |grad f|^2, which is v - 2 (v.n - u) n (sec. 3.1)."""
+    """Return v - 2 f' grad f / |grad f|^2, the velocity after a hit: v - 2 (v.n - u) n (sec. 3.1)."""
     f_x, f_y, _ = hit.motion.gradient(hit.wall, hit.time)
     factor = 2 * hit.slope / (arithmetic.square(f_x) + arithmetic.square(f_y))
     return flight.vx - factor * f_x, flight.vy - factor * f_y
@@ -45,8 +45,8 @@ def bounce(arithmetic: Arithmetic, flight: Flight, leaving: dict[Wall, Interval]
     begin = s - near
     x_near = q.x + q.vx * near + (q.vx - vx) * begin
     y_near = -vy * begin if is_base else q.y + q.vy * near + (q.vy - vy) * begin
-    box = (arithmetic.inflated(component) for component in (x_near, y_near, vx, vy))
-    following = Flight(q.instant + exact_point(near._mpi_[0]), *box, arithmetic.inflated(begin))
+    box = map(arithmetic.inflated, (x_near, y_near, vx, vy, begin))
+    following = Flight._make((q.instant + exact_point(near._mpi_[0]), *box))
     x, y, vx, vy = map(arithmetic.inflated, (x, y, vx, vy))
     return Bounce((t, x, y, vx, vy), following, {hit.wall: leaving.get(hit.wall, arithmetic.zero)})
 
@@ -72,8 +72,8 @@ def collision(
 def departure(arithmetic: Arithmetic, flight: Flight, leaving: dict[Wall, Interval]) -> Departure:
     """Return a flight free of its working precision."""
     close = arithmetic.enclosure
-    numbers = (close(number) for number in flight[1:])
-    return Departure(flight.instant, *numbers, {wall: close(f) for wall, f in leaving.items()})
+    residuals = {wall: close(f) for wall, f in leaving.items()}
+    return Departure._make((flight.instant, *map(close, flight[1:]), residuals))
 
 
 def horizon(

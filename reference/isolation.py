@@ -207,10 +207,10 @@ class Isolator:
         earlier = self.arithmetic.middle(self.arithmetic.hull(a, half_way))
         later = self.arithmetic.middle(self.arithmetic.hull(half_way, b))
         for point in (self._knot(a, b), half_way, earlier, later):
-            if point is not None and is_below(a, point) and is_below(point, b):
-                # While the flight may still begin, on the wall, no sign is asked for: f rises or is refused.
-                if self._may_begin(point) or sign(self.value(point)) != 0:
-                    return point
+            is_inside = point is not None and is_below(a, point) and is_below(point, b)
+            # While the flight may still begin, on the wall, no sign is asked for: f rises or is refused.
+            if is_inside and (self._may_begin(point) or sign(self.value(point)) != 0):
+                return point
         raise Undecidable("f has no sign where the interval is split")
 
     def _knot(self, a: Interval, b: Interval) -> Interval | None:

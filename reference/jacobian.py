@@ -35,7 +35,7 @@ def step_jacobian(
     zero, one = arithmetic.zero, arithmetic.number(1)
     s, d = hit.time - flight.begin, hit.slope
     f_x, f_y, f_t = hit.motion.gradient(hit.wall, hit.time)
-    # At a knot the second derivatives jump: both sides' are enclosed, those just after it where time is exact.
+    # At a knot the second derivatives jump: both sides' are enclosed, or those after it at an exact time.
     f_xx, f_yy, f_yt, f_tt = hit.motion.hessian(hit.wall, hit.time)
     n2 = arithmetic.square(f_x) + arithmetic.square(f_y)
     columns = []

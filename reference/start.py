@@ -36,7 +36,7 @@ class Start(NamedTuple):
 def flight_from(arithmetic: Arithmetic, state: State) -> Flight:
     """Return the flight of a state, exactly."""
     numbers = (arithmetic.number(v) for v in (state.x, state.y, state.vx, state.vy))
-    return Flight(Fraction(state.t), *numbers, arithmetic.zero)
+    return Flight._make((Fraction(state.t), *numbers, arithmetic.zero))
 
 
 def is_in_cap(scene: Scene, state: State, leaving: dict[Wall, Interval]) -> bool:
@@ -95,7 +95,7 @@ def motion_at(scene: Scene, state: State, arithmetic: Arithmetic) -> Motion:
 
 
 def _walls_near(scene: Scene, state: State) -> list[Wall]:
-    """List the walls that bound the part of the table the state is in; in a mushroom the arc ends at the base."""
+    """List the walls that bound the state's part of the table; in a mushroom the arc ends at the base."""
     if isinstance(scene, Cap):
         return ["base", "arc"]
     if isinstance(scene, Stem):

@@ -18,7 +18,7 @@ from reference.jacobian import chained, enclosures, identity, step_jacobian
 from reference.margins import measure
 from reference.motion import Flight
 from reference.start import Start, flight_from, is_in_cap, judge_start, motion_at
-from scene import BadInput, InvalidState, Rejected, Scene, State, Stem, Undecided, Undefined
+from scene import BadInput, InvalidState, Rejected, Scene, State, Stem, Undecided
 from scene.refusal import check_count, check_number, check_scene
 from scene.states import check_numbers
 

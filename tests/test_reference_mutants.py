@@ -7,7 +7,6 @@ in plain mpmath; nothing in it compares the reference with its own earlier resul
 from __future__ import annotations
 
 from fractions import Fraction
-from functools import partial
 
 import mpmath
 import pytest
@@ -215,7 +214,7 @@ LEAP = Mushroom(
 
 
 def knot_within_an_enclosed_time():
-    """The mouth is open when y = 0 is crossed; where its knot lies within the enclosure, no answer is given."""
+    """The mouth is open when y = 0 is crossed; with its knot within the enclosure, nothing is said."""
     q = State(2.0**110, 0.3, 0.5, 0.02, 1.0)
     assert [step.wall for step in reference.trajectory(LEAP, q, 2).steps] == ["arc", "left"]
     for working in (6, 8, 10, 12, 15):
@@ -225,7 +224,7 @@ def knot_within_an_enclosed_time():
 
 
 def floor_within_an_enclosed_time():
-    """After the side, the floor begins to rise a little before or after it would be met: 40 knots are tried."""
+    """After the side, the floor begins to rise a little before or after it would be met."""
     for i in range(40):
         knot = 4096.0 + 1.0 + (i - 20) * 2.0**-24
         low = BangBang(

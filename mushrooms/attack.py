@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, BinaryIO
 
 import typer
 from rich.console import Console
@@ -64,8 +64,7 @@ def attack(
         )
     _print(tallies)
     if json_file is not None:
-        text = json.dumps([_row(tally) for tally in tallies], indent=1) + "\n"
-        output.write_files(json_file.parent, {json_file.name: lambda file: file.write(text.encode("utf-8"))})
+        output.write_files(json_file.parent, {json_file.name: lambda file: _write(tallies, file)})
     return int(any(tally.wrong or tally.slowest > SLOWEST for tally in tallies))
 
 
@@ -78,6 +77,10 @@ def _row(tally: Any) -> dict[str, Any]:
         **numbers,
         "wrong_cases": tally.wrong,
     }
+
+
+def _write(tallies: list[Any], file: BinaryIO) -> None:
+    file.write((json.dumps([_row(tally) for tally in tallies], indent=1) + "\n").encode("utf-8"))
 
 
 def _print(tallies: list[Any]) -> None:

@@ -25,7 +25,7 @@ def steppers(choice: str) -> Steppers:
 
 
 def prove(attack: Attack) -> Sequence[Claim]:
-    """Answer an attack with the reference: every step's outcome and enclosures, a single one's certificate."""
+    """Answer an attack with the reference: outcomes, enclosures, the certificate of a single step."""
     scene, state = attack.scene, attack.state
     if attack.n_collisions is None:
         assert attack.t_end is not None
@@ -58,8 +58,11 @@ def ends(enclosure: Enclosure) -> tuple[Fraction, Fraction]:
 
 
 def flow(scene: Scene, state: State, t_end: float) -> dict[str, int] | None:
-    """Return how often the fast stepper's lanes meet each wall up to t_end; None where they are undecided."""
-    carried = fast.flow(scene, [state], t_end)
+    """Return how often the lanes meet each wall up to t_end; None where a flow is undecided or refused."""
+    try:
+        carried = fast.flow(scene, [state], t_end)
+    except BadInput:
+        return None
     if not isinstance(carried.outcomes[0], Horizon | Undefined):
         return None
     return dict(zip(WALLS, map(int, carried.wall_counts[0]), strict=True))

@@ -8,6 +8,7 @@ shows nothing.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 from conformance.attacks.case import Attack, Family
 from conformance.generate_draws import Draw
@@ -48,6 +49,78 @@ def arc_dips(draw: Draw) -> Attack:
     scene = Mushroom(r=BREATHING, h=draw.pick(DEPTHS), w=w)
     t_end = state.t + before + draw.between(0.0, 0.6)
     return _asked(draw, scene, state, t_end)
+
+
+def _breath(t: float) -> tuple[float, float]:
+    """Return the breathing length and its rate."""
+    return 1.0 + DEPTH * math.cos(t), -DEPTH * math.sin(t)
+
+
+def arc_dips_on_rebound(draw: Draw) -> Attack:
+    """As `arc_dips`, but the flight begins with a hit of the arc, as it does in a batch under way.
+
+    The speed is such that f'' = 2 (r'^2 + r r'' - v^2) is next to 0 at the start and negative later, near
+    the least radius: to second order in time the arc is not met.
+    """
+    while True:
+        t = math.pi + 0.3 * draw.between(-1.0, 0.3)
+        r, rate = _breath(t)
+        bend = rate * rate - r * DEPTH * math.cos(t)
+        least_bend = LEAST * DEPTH
+        v2 = least_bend + (bend - least_bend) * draw.between(0.0, 1.1)
+        angle = math.pi * draw.part()
+        nx, ny = -math.cos(angle), -math.sin(angle)
+        # The normal points inside, against the radius: the arc moves along it by -rate.
+        away = 10.0 ** -draw.between(1.0, 5.0) - rate
+        if v2 <= away * away:
+            continue
+        along = math.sqrt(v2 - away * away) * draw.pick((1.0, -1.0))
+        vx, vy = away * nx - along * ny, away * ny + along * nx
+        if vy < 0 and _arc_dips(t, -r * nx, -r * ny, vx, vy):
+            break
+    back = 2 * (away + rate)
+    before = 10.0 ** -draw.between(2.0, 5.0) * r
+    vx, vy = vx - back * nx, vy - back * ny
+    state = State(t - before, -r * nx - vx * before, -r * ny - vy * before, vx, vy)
+    if not (state.y > 0 and math.hypot(state.x, state.y) < _breath(state.t)[0] * (1 - 1e-9)):
+        return arc_dips_on_rebound(draw)
+    scene = Mushroom(r=BREATHING, h=1.0, w=draw.pick((0.0005, 0.01, 0.05, 0.09)))
+    return _asked(draw, scene, state, t + draw.between(0.1, 0.6))
+
+
+def _arc_dips(t: float, x: float, y: float, vx: float, vy: float) -> bool:
+    return _dips(lambda s: _breath(t + s)[0] - math.hypot(x + vx * s, y + vy * s), -y / vy)
+
+
+def _dips(f: Callable[[float], float], end: float) -> bool:
+    """Tell whether f, 0 at 0, rises, falls below 0 and is above 0 again at the end, on a grid."""
+    values = [f(end * i / 64) for i in range(1, 65)]
+    return values[0] > 0 and min(values) < 0 < values[-1]
+
+
+def rebound_dips(draw: Draw) -> Attack:
+    """The floor or a side hits a particle, is left behind, catches up on its way elsewhere and falls back."""
+    while True:
+        t, lift = draw.between(0.05, 1.55), 10.0 ** -draw.between(0.3, 4.0)
+        length, rate = _breath(t)
+        speed = lift - rate
+        if _length_dips(t, speed):
+            break
+    before = 10.0 ** -draw.between(2.0, 5.0)
+    inward = speed - 2 * lift
+    start = -length - inward * before
+    along = 0.05 * draw.between(-1.0, 1.0)
+    t_end = t + draw.between(0.0, 3.0) + length / speed
+    if draw.pick((True, True, False)):
+        scene = Mushroom(r=draw.pick(RADII), h=BREATHING, w=draw.pick(MOUTHS))
+        return _asked(draw, scene, State(t - before, 0.0, start, along, inward), t_end)
+    scene = Mushroom(r=2.0, h=1.0, w=BREATHING)
+    return _asked(draw, scene, State(t - before, start, -0.5, inward, along), t_end)
+
+
+def _length_dips(t: float, speed: float) -> bool:
+    length = _breath(t)[0]
+    return _dips(lambda s: speed * s + _breath(t + s)[0] - length, length / speed)
 
 
 def floor_from_stem(draw: Draw) -> Attack:
@@ -131,6 +204,12 @@ def _value(law: BangBang, t: float) -> tuple[float, float]:
 
 FAMILIES = (
     Family("arc-dips", arc_dips, "the arc is looked at only where a flight ends, though it came by"),
+    Family(
+        "arc-dips-on-rebound",
+        arc_dips_on_rebound,
+        "lanes look at the arc only where a flight to the base ends",
+    ),
+    Family("rebound-dips", rebound_dips, "lanes forget the wall just left on the way to another"),
     Family("floor-from-stem", floor_from_stem, "the floor is forgotten on a flight from the stem to the arc"),
     Family("side-dips", side_dips, "a side is looked at only where a flight ends, though it came by"),
     Family(

@@ -4,12 +4,12 @@ A family draws questions; `run` puts them to steppers that the caller gives and 
 the second stepper (`conformance.second_stepper`). Needs the test extra (python-flint).
 """
 
-from conformance.attacks import corners, knots, residuals
+from conformance.attacks import corners, dips, knots, residuals, shapes
 from conformance.attacks.case import Attack, Family, line
 from conformance.attacks.search import Claim, Steppers, Tally, Verdict, run
 
 FAMILIES: dict[str, Family] = {
-    family.name: family for module in (knots, residuals, corners) for family in module.FAMILIES
+    family.name: family for module in (knots, residuals, corners, dips, shapes) for family in module.FAMILIES
 }
 
 __all__ = ["FAMILIES", "Attack", "Claim", "Family", "Steppers", "Tally", "Verdict", "line", "run"]

@@ -18,6 +18,7 @@ from flint import arb, fmpq
 from conformance import second_stepper
 from conformance.agreement import Truth, compare
 from conformance.attacks.case import Attack, Family, line
+from conformance.generate_proof import Refuted, check
 from conformance.second_stepper import Answer
 from scene import Collision, Horizon, Outcome, Rejected, Scene, State, Undecided, Undefined
 
@@ -28,13 +29,14 @@ BOUND = 4.0  # backward ulps: the sharpest class of grades
 class Claim(NamedTuple):
     """One step as a proved stepper answers it; the same fields as `second_stepper.Answer`.
 
-    `numbers` are pairs (low, high) that enclose dt, x, y, vx, vy.
+    `numbers` are pairs (low, high) that enclose dt, x, y, vx, vy; a `certificate` is proved again.
     """
 
     kind: str
     wall: str | None = None
     reason: str = ""
     numbers: Sequence[tuple[Fraction, Fraction]] = ()
+    certificate: dict[str, Any] | None = None
 
 
 Prover = Callable[[Attack], Sequence[Claim]]
@@ -155,6 +157,11 @@ def proved(claims: Sequence[Claim], answers: Sequence[Answer]) -> Verdict:
         ):
             if not meets(ends, ball):
                 return Verdict("wrong", f"the enclosure of {name} after step {number} misses the truth")
+        if claim.certificate is not None:
+            try:
+                check(claim.certificate)
+            except Refuted as error:
+                return Verdict("wrong", f"the certificate of step {number} does not hold: {error}")
         if claim.kind == "rejected":
             return Verdict("refused")
     if len(claims) > len(answers):

@@ -64,7 +64,7 @@ def _in_mouth(flight: Flight, state: State) -> Start | Answer:
     """Judge a state on y = 0 that names no wall: in the mouth, at its edge, or on the base beside it."""
     signs = [_sign(flight, wall) for wall in ("left", "right")]
     if 0 in signs:
-        return Answer("undefined", reason="mouth-edge")
+        return Answer("undefined", reason="corner" if _sign(flight, "arc") == 0 else "mouth-edge")
     if -1 not in signs:
         if state.vy == 0:
             return Start(in_cap=False, runs_along_mouth=True)
@@ -102,8 +102,9 @@ def _leaves(flight: Flight, state: State, near: tuple[Wall, ...]) -> Answer | No
             return Answer("rejected", reason=f"the state is not on wall {state.wall}")
         on.append(state.wall)
     if len(on) > 1:
-        is_edge = flight.table.is_mushroom and any(wall in on for wall in ("left", "right"))
-        return Answer("undefined", reason="mouth-edge" if is_edge and "base" in on else "corner")
+        sides = flight.table.is_mushroom and any(wall in on for wall in ("left", "right"))
+        is_edge = sides and "base" in on and "arc" not in on
+        return Answer("undefined", reason="mouth-edge" if is_edge else "corner")
     for wall in on:
         if refused := _departs(flight, state, wall):
             return refused

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from mpmath import fp
+import msgspec
+from mpmath import MPContext, fp
 
 from scene import BangBang, Fourier, Law, Scene, State, Wall
 from scene.laws import value
@@ -46,7 +47,9 @@ def scaled_law(law: Law, size: float, time: float) -> Law:
         return BangBang(knots=tuple((time * t, size * v) for t, v in law.knots))
     if isinstance(law, Fourier):
         cos, sin = (tuple(size * a for a in amplitudes) for amplitudes in (law.cos, law.sin))
-        return Fourier(mean=size * law.mean, omega=law.omega / time, cos=cos, sin=sin)
+        omega = None if law.omega is None else law.omega / time
+        period = None if law.period is None else law.period * time
+        return Fourier(mean=size * law.mean, omega=omega, cos=cos, sin=sin, period=period)
     return size * law
 
 
@@ -57,15 +60,20 @@ def backwards(scene: Scene) -> Scene:
         if isinstance(law, BangBang):
             return BangBang(knots=tuple((-t, v) for t, v in reversed(law.knots)))
         if isinstance(law, Fourier):
-            return Fourier(mean=law.mean, omega=law.omega, cos=law.cos, sin=tuple(-b for b in law.sin))
+            return msgspec.structs.replace(law, sin=tuple(-b for b in law.sin))
         return law
 
     return _with_laws(scene, turned)
 
 
 def frozen(scene: Scene, t: float) -> Scene:
-    """Return the static scene with the parameters that it has at time t, rounded."""
-    return _with_laws(scene, lambda _, law: float(value(fp, law, t)))
+    """Return the static scene with the parameters that it has at time t, rounded.
+
+    They are computed to 50 digits and rounded once, so that parameters which touch (w = r, nu = 1) still do.
+    """
+    ctx = MPContext()
+    ctx.dps = 50
+    return _with_laws(scene, lambda _, law: float(value(ctx, law, t)))
 
 
 def idle(scene: Scene) -> Scene:

@@ -19,6 +19,7 @@ from rich.table import Table
 import mushrooms
 import scene as scenes
 from mushrooms import output
+from mushrooms.attack import attack
 from mushrooms.audit import audit
 from mushrooms.bench import bench
 from mushrooms.check import check
@@ -251,6 +252,7 @@ def draw(
     print(path)
 
 
+app.command(epilog="Example: mushrooms attack --family knot-at-event --cases 20000 --seed 1")(attack)
 app.command(epilog="Example: mushrooms audit --only X2,L4 --out audit-report")(audit)
 app.command(epilog="Example: mushrooms bench --quick --out bench-report")(bench)
 app.command(epilog="Example: mushrooms check --html report.html -- ./my_stepper")(check)

@@ -1,0 +1,71 @@
+"""One attack: a question that family, seed and index name for ever, and its line in the wire's form."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from typing import Any, NamedTuple, TypeVar
+
+from conformance.generate_draws import Draw, wire_form
+from scene import BadInput, Cap, Law, Mushroom, Scene, State, Stem
+
+Made = TypeVar("Made", Cap, Stem, Mushroom)
+
+
+class Attack(NamedTuple):
+    """A question put to a stepper.
+
+    Attributes:
+        scene: table and laws.
+        state: the start.
+        t_end: horizon [time]; None for none, which only trajectories allow.
+        n_collisions: how many collisions to follow; None asks for one step.
+        working: decimals that the proved stepper may work with, on a trajectory; None lets it choose.
+        is_flow: ask for all collisions up to t_end at once too (the fast stepper's lanes).
+    """
+
+    scene: Scene
+    state: State
+    t_end: float | None
+    n_collisions: int | None = None
+    working: int | None = None
+    is_flow: bool = False
+
+
+class Family(NamedTuple):
+    """A kind of attack.
+
+    Attributes:
+        name: of the family.
+        draw: from a stream of numbers to a question.
+        hunts: the mistake it looks for.
+        is_delicate: built so that an honest stepper may often leave it undecided.
+    """
+
+    name: str
+    draw: Callable[[Draw], Attack]
+    hunts: str
+    is_delicate: bool = False
+
+    def attack(self, seed: int, index: int) -> Attack:
+        """Draw the question that this seed and index name."""
+        return self.draw(Draw(f"{self.name}/{seed}/{index}"))
+
+
+def built(table: Callable[..., Made], found: dict[str, Law]) -> Made | None:
+    """Return a table with these laws, or None where it would not be a valid scene."""
+    try:
+        return table(**found)
+    except BadInput:
+        return None
+
+
+def line(family: str, seed: int, index: int, attack: Attack) -> str:
+    """Write an attack as one line of JSON: where it comes from, and the question in the wire's form."""
+    state = {name: getattr(attack.state, name) for name in attack.state.__struct_fields__}
+    data: dict[str, Any] = {"family": family, "seed": seed, "index": index, "scene": wire_form(attack.scene)}
+    data |= {"cmd": "step" if attack.n_collisions is None else "trajectory", "state": state}
+    data |= {"t_end": attack.t_end}
+    if attack.n_collisions is not None:
+        data |= {"collisions": attack.n_collisions, "working": attack.working}
+    return json.dumps(data)

@@ -1,0 +1,79 @@
+"""Derivatives of a step, by pushing each of the five inputs through it.
+
+With the input moved by e, the wall's function at the hit, f(s) - f(0) for the wall being left, moves by df at
+fixed s: the hit then moves by ds = -df / f'. Place, f' and the wall's gradient at the hit follow by the chain
+rule. At a knot f'' jumps: where the hit's time touches several pieces, the balls hold the derivatives of all.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+from flint import arb
+
+from conformance.second_stepper.flight import Flight
+from conformance.second_stepper.laws import Ball, product
+from scene import Wall
+
+
+class Partials(NamedTuple):
+    """Derivatives of f(x, y, t) that are not 0 for every wall."""
+
+    fx: Ball
+    fy: Ball
+    ft: Ball
+    fxx: Ball
+    fyy: Ball
+    fyt: Ball
+    ftt: Ball
+
+
+def partials(flight: Flight, wall: Wall, s: Ball) -> Partials:
+    """Enclose the partial derivatives of a wall's function along the flight."""
+    none, time = arb(0), flight.course.t + s
+    fx, fy = flight.gradient(wall, s)
+    if wall == "base":
+        return Partials(fx, fy, none, none, none, none, none)
+    if wall == "floor":
+        _, rate, bend = flight.table.laws["h"].jet(time)
+        return Partials(fx, fy, rate, none, none, none, bend)
+    if wall == "arc":
+        r = flight.table.laws["r"].jet(time)
+        _, rate, bend = product(r, r)
+        return Partials(fx, fy, rate, arb(-2), arb(-2), none, bend)
+    y = flight.place(s)[1]
+    _, rate, bend = flight.width(time)
+    _, tilting, turning = flight.table.laws["slope"].jet(time)
+    return Partials(fx, fy, rate + tilting * y, none, none, tilting, bend + turning * y)
+
+
+def jacobian(flight: Flight, wall: Wall, s: Ball) -> tuple[tuple[Any, ...], ...]:
+    """Enclose d(dt, x, y, vx, vy) / d(t, x, y, vx, vy) of a step that hits `wall` at s."""
+    p, course = partials(flight, wall, s), flight.course
+    origin = partials(flight, wall, arb(0)) if wall in flight.residuals else None
+    rate = p.ft + p.fx * course.vx + p.fy * course.vy
+    size = p.fx * p.fx + p.fy * p.fy
+    columns = []
+    for i in range(5):
+        dt, dx, dy, dvx, dvy = (arb(1 if i == j else 0) for j in range(5))
+        mx, my = dx + s * dvx, dy + s * dvy
+        df = p.fx * mx + p.fy * my + p.ft * dt
+        if origin is not None:
+            df -= origin.fx * dx + origin.fy * dy + origin.ft * dt
+        ds = -df / rate
+        mx, my, mt = mx + course.vx * ds, my + course.vy * ds, dt + ds
+        dfx, dfy, dft = p.fxx * mx, p.fyy * my + p.fyt * mt, p.fyt * my + p.ftt * mt
+        drate = dft + dfx * course.vx + p.fx * dvx + dfy * course.vy + p.fy * dvy
+        dsize = 2 * (p.fx * dfx + p.fy * dfy)
+        push = 2 * rate / size
+        dpush = 2 * drate / size - push * dsize / size
+        columns.append(
+            (
+                ds,
+                mx,
+                arb(0) if wall == "base" else my,
+                dvx - dpush * p.fx - push * dfx,
+                dvy - dpush * p.fy - push * dfy,
+            )
+        )
+    return tuple(zip(*columns, strict=True))

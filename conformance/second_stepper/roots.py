@@ -1,0 +1,139 @@
+"""The first time a wall's function falls through 0, by bisection with Taylor bounds.
+
+Intervals are taken left first. One is passed when f > 0 on all of it: as it is enclosed, or by the expansion
+about its middle, f(m) + f'(m) d + f'' d^2 / 2 with f'' over the interval (f' is Lipschitz, so this holds
+across knots too). One on which f' < 0 and whose ends have opposite signs holds the root, the only one there.
+Everything else is halved. From the wall being left f(0) = 0, and f(s) >= s (f'(0) + s min f'' / 2).
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from flint import arb, ctx, fmpq
+
+from conformance.second_stepper.answer import Open
+from conformance.second_stepper.flight import Flight
+from conformance.second_stepper.laws import Ball, Rational, hull
+from scene import Wall
+
+UNIT = arb(0, 1)  # the ball [-1, 1]
+
+
+class Root(NamedTuple):
+    """f falls through 0 somewhere in [low, high], for the first time; f' < 0 on all of it."""
+
+    wall: Wall
+    low: Rational
+    high: Rational
+
+    def time(self) -> Ball:
+        """Return the ball around the root."""
+        return hull(self.low, self.high)
+
+
+class AtEnd(NamedTuple):
+    """f > 0 up to [low, end]; there f' < 0, and the sign of f at the end is not known."""
+
+    wall: Wall
+    low: Rational
+
+
+def first_root(flight: Flight, wall: Wall, start: Rational, end: Rational) -> Root | AtEnd | None:
+    """Find the first root of f in [start, end].
+
+    Args:
+        flight: a straight flight.
+        wall: one of the table's.
+        start: flight time >= 0; at 0 the wall may be the one being left.
+        end: flight time >= start.
+
+    Returns:
+        The root's bracket; AtEnd; or None: f > 0 on all of (start, end], and at `start` unless left there.
+
+    Raises:
+        Open: at this precision neither is shown.
+    """
+    is_left = wall in flight.residuals and start == 0
+    if not is_left and not flight.jet(wall, arb(start))[0] > 0:
+        raise Open(f"f of {wall} has no sign where a search begins")
+    todo = [(start, end)] if start < end else []
+    least = (end - start) / fmpq(2) ** (2 * ctx.prec)
+    while todo:
+        a, b = todo.pop()
+        if is_left and a == start:
+            if _lifts(flight, wall, b):
+                continue
+        else:
+            found = _judged(flight, wall, a, b)
+            if found == "positive":
+                continue
+            if found == "root":
+                return _narrowed(flight, Root(wall, a, b))
+            if found == "unknown end":
+                if not todo:
+                    return AtEnd(wall, a)
+                # The root lies at b as far as can be seen: cut the two intervals elsewhere.
+                c = todo.pop()[1]
+                cut = a + (c - a) * fmpq(5, 16)
+                todo += [(cut, c), (a, cut)]
+                if b - a < least:
+                    raise Open(f"f of {wall} has no sign near {float(b.p) / float(b.q)!r}")
+                continue
+        if b - a < least:
+            raise Open(f"f and f' of {wall} vanish together, as far as this precision shows")
+        middle = (a + b) / 2
+        todo += [(middle, b), (a, middle)]
+    return None
+
+
+def _lifts(flight: Flight, wall: Wall, b: Rational) -> bool:
+    """Tell whether f - f(0) > 0 on (0, b], from the wall being left."""
+    slope = flight.jet(wall, arb(0))[1]
+    _, rates, bends = flight.over(wall, fmpq(0), b)
+    if rates > 0 or (wall in flight.flat and bends > 0):
+        return True
+    return bool(slope > 0 and slope + arb(b) * bends / 2 > 0)
+
+
+def _judged(flight: Flight, wall: Wall, a: Rational, b: Rational) -> str:
+    """Judge [a, b], f(a) > 0: positive, root, unknown end, or open."""
+    values, rates, bends = flight.over(wall, a, b)
+    if values > 0:
+        return "positive"
+    middle, reach = (a + b) / 2, arb((b - a) / 2) * UNIT
+    value, rate, _ = flight.jet(wall, arb(middle))
+    square = arb((b - a) ** 2 / 8) * (arb(1, 1) / 2)  # reach^2 / 2, never below 0
+    if value + rate * reach + bends * square > 0:
+        return "positive"
+    if not (rates < 0 or rate + bends * reach < 0):
+        is_rising = rates > 0 or rate + bends * reach > 0
+        return "positive" if is_rising else "open"
+    last = flight.jet(wall, arb(b))[0]
+    return "positive" if last > 0 else "root" if last < 0 else "unknown end"
+
+
+def _narrowed(flight: Flight, root: Root) -> Root:
+    """Narrow a root's bracket as far as the precision goes: by sign at points, by the mean value theorem."""
+    wall, low, high = root
+    for _ in range(2 * ctx.prec):
+        width = high - low
+        middle = (low + high) / 2
+        value = flight.jet(wall, arb(middle))[0]
+        rates = flight.over(wall, low, high)[1]
+        if not rates < 0:
+            # As an enclosure f' may lose its sign; it has one all the same: halve by the sign of f.
+            low, high = (middle, high) if value > 0 else (low, middle) if value < 0 else (low, high)
+        else:
+            found = arb(middle) - value / rates
+            low, high = max(low, dyadic(found.lower())), min(high, dyadic(found.upper()))
+            if low > high:
+                raise Open(f"the root of {wall} is lost")
+        if 4 * (high - low) > 3 * width:
+            break
+    return Root(wall, low, high)
+
+
+def dyadic(point: Ball) -> Rational:
+    """Return an exact ball as a rational."""
+    return point.fmpq()

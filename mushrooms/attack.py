@@ -1,0 +1,97 @@
+"""The attack command: families of nasty questions, every answer compared with a second stepper."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Annotated, Any, BinaryIO
+
+import typer
+from rich.console import Console
+from rich.table import Table
+
+from mushrooms import output
+from mushrooms.terminal import progress_bar
+from scene.refusal import BadInput
+
+CHOICES = ("reference", "fast", "both")
+MAX_CASES = 10**7
+SLOWEST = 10.0  # seconds that one question may take the reference: its work is bounded
+
+
+def attack(
+    family: Annotated[str, typer.Option(help="A family's name, or all.")] = "all",
+    cases: Annotated[int, typer.Option(help=f"Cases of each family, 1 to {MAX_CASES}.")] = 100,
+    seed: Annotated[
+        int, typer.Option(help="With family and index, names a case for ever; 0 to 2^64 - 1.")
+    ] = 0,
+    stepper: Annotated[str, typer.Option(help="What is attacked: reference, fast or both.")] = "both",
+    json_file: Annotated[
+        Path | None, typer.Option("--json", metavar="FILE", help="Write the counts and every wrong case.")
+    ] = None,
+) -> int:
+    """Attack the steppers with seeded questions aimed at their weak points.
+
+    Every answer is compared with a second stepper in another arithmetic (Arb). A wrong one is printed as a
+    line of JSON that names the question. Exit code 0: none is wrong, and none took the reference over 10 s;
+    1: some; 2: bad input. Needs python-flint, of the test extra.
+    """
+    if stepper not in CHOICES:
+        raise BadInput(f"--stepper = {stepper!r}, must be one of {', '.join(CHOICES)}")
+    if not 1 <= cases <= MAX_CASES:
+        raise BadInput(f"--cases = {cases}, must be 1 to {MAX_CASES}")
+    if not 0 <= seed < 2**64:
+        raise BadInput(f"--seed = {seed}, must be 0 to {2**64 - 1}")
+    try:
+        from conformance import attacks
+    except ModuleNotFoundError:
+        raise BadInput("attack needs python-flint: pip install 'oscillating-mushrooms[test]'") from None
+    names = list(attacks.FAMILIES) if family == "all" else [family]
+    if family != "all" and family not in attacks.FAMILIES:
+        raise BadInput(f"--family = {family!r}, must be all or one of {', '.join(attacks.FAMILIES)}")
+    if json_file is not None:
+        output.check_file(json_file, (".json",))
+    from mushrooms.attack_steppers import steppers
+
+    with progress_bar() as bar:
+        task = bar.add_task("attack", total=cases * len(names))
+        tallies = attacks.run(
+            [attacks.FAMILIES[name] for name in names],
+            cases,
+            seed,
+            steppers(stepper),
+            progress=lambda _: bar.advance(task),
+        )
+    _print(tallies)
+    if json_file is not None:
+        output.write_files(json_file.parent, {json_file.name: lambda file: _write(tallies, file)})
+    return int(any(tally.wrong or tally.slowest > SLOWEST for tally in tallies))
+
+
+def _row(tally: Any) -> dict[str, Any]:
+    numbers = {"worst_ulps": tally.worst_ulps, "slowest_s": tally.slowest}
+    return {
+        "family": tally.family,
+        "cases": tally.n_cases,
+        **tally.counts,
+        **numbers,
+        "wrong_cases": tally.wrong,
+    }
+
+
+def _write(tallies: list[Any], file: BinaryIO) -> None:
+    file.write((json.dumps([_row(tally) for tally in tallies], indent=1) + "\n").encode("utf-8"))
+
+
+def _print(tallies: list[Any]) -> None:
+    heads = ("family", "cases", "agreed", "undecided", "refused", "open", "wrong", "worst ulps", "slowest s")
+    table = Table(*heads, title="Attacks: verdicts of all steppers asked")
+    for tally in tallies:
+        counts = [str(count) for count in tally.counts.values()]
+        table.add_row(
+            tally.family, str(tally.n_cases), *counts, f"{tally.worst_ulps:.3g}", f"{tally.slowest:.2f}"
+        )
+    Console(width=140).print(table)
+    for tally in tallies:
+        for case in tally.wrong:
+            print(f"wrong: {case}")

@@ -38,6 +38,7 @@ LANES = 64  # all rows of a pool stay in the first-level cache
 LONGEST_TURN = 0.25  # omega u up to which the series are used
 NEVER = np.inf
 LEAST_RADIUS = 2.0**-1000
+ONE = np.float64(1.0)  # its quotient by 0 is infinite without the compiler too
 
 # Rows of a pool, LANES numbers each, in one flat array: constant strides let the loops vectorise.
 (
@@ -198,7 +199,7 @@ def aim(a, n, is_stem, m, limits):
         d = d_a if hit == ON_ARC else d
         f = depth if hit == ON_BASE else f
         d = rise if hit == ON_BASE else d
-        inverse = 1.0 / d
+        inverse = ONE / d
         s = f * inverse
         bend_s = h2 if hit == ON_FLOOR else w2
         bend_s = bend_s if hit >= ON_LEFT else 0.0
@@ -252,7 +253,7 @@ def fly(a, n, is_stem, is_relative, omega, m, limits):
         f = y_s + y_low if hit == ON_BASE else f
         slope = vy if hit == ON_BASE else slope
         bend_s = 0.0 if hit == ON_BASE else bend_s
-        inverse = 1.0 / slope
+        inverse = ONE / slope
         delta = -f * inverse
         error = 2.0**58 * abs(0.5 * bend_s * inverse) * delta * delta
         # The others are not reached: see the error analysis. The mouth was looked at.
@@ -398,7 +399,7 @@ def chord(a, n, is_again, is_cap, is_relative, omega, limits):
         way = fma(s, v2, 2.0 * q)
         f = dr * (2.0 * r0 + dr) - s * way
         slope = 2.0 * fma(r, r1, -fma(s, v2, q))
-        inverse = 1.0 / slope
+        inverse = ONE / slope
         delta = -f * inverse
         error = 2.0**58 * abs((bend + v2) * inverse) * delta * delta
         x_s, x_low = moved(x, vx, s)

@@ -33,16 +33,16 @@ IntArray = npt.NDArray[np.int64]
 
 
 class Followed(NamedTuple):
-    """What the kernel fills in for N particles, S stops and K cycles.
+    """What the kernel fills in for N particles, K cycles of M narrowings, and C stops that ask for energies.
 
     Attributes:
         states: (N, 6) last t, its low part, x, y, vx, vy.
         codes: (N,) why each particle ended, HORIZON when all went well.
         counts: (N, 5) collisions by wall: arc, base, left, right, floor.
         careful: (N,) collisions found by the careful step.
-        energies: (N, S) energy at each stop.
-        is_captured: (N, S) whether the last arc hit had |sin phi| > nu.
-        t_in, t_out: (N, K) the captured stay that is kept; nan for none.
+        energies: (N, C) energy at each stop that asks for it.
+        is_captured: (N, C) whether the last arc hit before had |sin phi| > nu.
+        t_in, t_out: (N, K, M) the captured stays that are kept; nan for none.
         seconds: wall time of the kernel.
     """
 
@@ -58,7 +58,12 @@ class Followed(NamedTuple):
 
 
 class Ensemble(NamedTuple):
-    """What became of N particles over K cycles, looked at P times in each.
+    """What became of N particles over K cycles, looked at P times in each; the mouth narrows M times a cycle.
+
+    A *captured stay* begins with an arc hit at which |sin phi| > nu and ends with the first arc hit at which that
+    is no longer so, or with the mouth if that comes first; if |sin phi| > nu again before the particle has
+    left through the mouth, it is still the same stay. M is the number of local minima of nu in a cycle
+    (`fast.narrowings`; a plateau is one, a nu that stands still has none), in (start, end] of the cycle.
 
     Attributes:
         energy0: initial energy E = v^2 / 2 of every particle.
@@ -67,8 +72,12 @@ class Ensemble(NamedTuple):
         t, x, y, vx, vy: (N,) the last states.
         n_collisions: (N,) collisions followed.
         outcome: (N,) 0 followed to the end, 1 undecided, 2 undefined, 3 rejected.
-        t_in, t_out: (N, K) begin and end of the captured stay that spans the instant of least
-            nu in each cycle; nan for a particle not captured.
+        t_in, t_out: (N, K, M) begin and end [time] of the captured stay that spans narrowing m of cycle k,
+            t_in <= its instant <= t_out; nan when the particle is not captured at that instant. There is at
+            most one. A stay that spans several narrowings stands in the slot of each, with the same begin
+            and, in one cycle, the same end. t_in is the stay's true begin, in an earlier cycle too; of a
+            particle that starts captured it is the first arc hit. A stay that is not over when the cycle
+            ends has the cycle's end as t_out. Stays that span no narrowing are not kept.
         wall_counts: (N, 5) collisions with arc, base, left, right, floor.
         phase_energies: (N, K, P) energy at the phases asked for.
         phase_captured: (N, K, P) whether the last arc hit before them had |sin phi| > nu.
@@ -95,6 +104,30 @@ class Ensemble(NamedTuple):
     n_careful: IntArray
     seconds: float
     threads: int
+
+    def is_captured(self) -> npt.NDArray[np.bool_]:
+        """Return (N, K): whether a particle has a captured stay in a cycle."""
+        found: npt.NDArray[np.bool_] = ~np.isnan(self.t_in).all(axis=2)
+        return found
+
+    def takes_part(self) -> npt.NDArray[np.bool_]:
+        """Return (N,): who was followed to the end, and was not in the island all the time.
+
+        Where nu is always below 1 some particles are never free: in every slot a stay, and no collision with
+        the stem's walls. No cycle captures or releases them, and the theory leaves them out.
+        """
+        was_in_stem = self.wall_counts[:, 2:].any(axis=1)
+        is_always_in = ~np.isnan(self.t_in).any(axis=(1, 2)) if self.t_in.size else np.zeros(len(self.t), bool)
+        taking: npt.NDArray[np.bool_] = (self.outcome == FOLLOWED) & (was_in_stem | ~is_always_in)
+        return taking
+
+    def p_nc(self) -> FloatArray:
+        """Return (K,): the share, of those who take part, that has no captured stay in each cycle; nan of none.
+
+        Source: Eq:ps, the probability of never being captured.
+        """
+        captured = self.is_captured()[self.takes_part()]
+        return 1.0 - captured.mean(axis=0) if len(captured) else np.full(captured.shape[1], np.nan)
 
     def ns_per_collision(self) -> float:
         """Return kernel wall time x threads / collisions, in nanoseconds."""
@@ -190,12 +223,12 @@ def follow(
 
     `walls` (N,): codes of the walls that they leave.
     """
-    n, n_stops, n_cycles = len(states), len(stops.times), len(stops.narrowest)
+    n, n_columns = len(states), int(stops.columns.max()) + 1
     out = (
-        np.full((n, n_stops), np.nan),
-        np.zeros((n, n_stops), dtype=np.bool_),
-        np.full((n, n_cycles), np.nan),
-        np.full((n, n_cycles), np.nan),
+        np.full((n, n_columns), np.nan),
+        np.zeros((n, n_columns), dtype=np.bool_),
+        np.full((n, *stops.narrowings.shape), np.nan),
+        np.full((n, *stops.narrowings.shape), np.nan),
     )
     ends = (
         states,

@@ -65,7 +65,7 @@ def carry_judged(scene: Scene, states: Sequence[State], t_end: float, threads: i
         Horizon(t_end, *place) if code == codes.HORIZON else trouble(int(code), state)
         for state, code, place in zip(states, done.codes, done.states[:, 2:].tolist(), strict=True)
     ]
-    return Flow(outcomes, done.t_in[:, 0], done.t_out[:, 0], done.counts, done.careful)
+    return Flow(outcomes, done.t_in[:, 0, 0], done.t_out[:, 0, 0], done.counts, done.careful)
 
 
 def refuse(scene: Scene, state: State, t_end: float) -> Rejected | None:

@@ -52,10 +52,11 @@ def law_jet(law: Law, time: Number, within: fmpq) -> Jet:
         return exact(law), fmpq(0), fmpq(0)
     total: Jet = (exact(law.mean), fmpq(0), fmpq(0))
     n = max(len(law.cos), len(law.sin))
+    omega = _frequency(law)
     for k, (a, b) in enumerate(zip(law.cos + (0.0,) * n, law.sin + (0.0,) * n, strict=False), 1):
         if not (a or b):
             continue
-        frequency = k * exact(law.omega)
+        frequency = k * omega
         if isinstance(time, fmpq) and time == 0:
             sin, cos = fmpq(0), fmpq(1)
         else:
@@ -65,6 +66,13 @@ def law_jet(law: Law, time: Number, within: fmpq) -> Jet:
             total, (wave, frequency * (exact(b) * cos - exact(a) * sin), -frequency * frequency * wave)
         )
     return total
+
+
+def _frequency(law: Fourier) -> Number:
+    if law.period is not None:
+        return 2 * arb.pi() / exact(law.period)
+    assert law.omega is not None
+    return exact(law.omega)
 
 
 def _leg(law: BangBang, time: Number, within: fmpq) -> Jet:

@@ -12,9 +12,13 @@ from itertools import pairwise
 from math import cos, fmod, sin
 from typing import ClassVar
 
+from mpmath import fp
+from msgspec.structs import replace
+
 from conformance.plain import Flight
 from conformance.plain_laws import Half, Legs, Motion, Still, Wave, turned
 from scene import BangBang, Fourier, Law, Scene, State
+from scene.laws import frequency
 
 
 def single(x: float) -> float:
@@ -120,7 +124,7 @@ class RateByDifferences(Flight):
 class _SlowHarmonics(Wave):
     def __init__(self, law: Fourier, t: float) -> None:
         super().__init__(law, t)
-        self.omega = law.omega
+        self.omega = frequency(fp, law)
 
     def at(self, s: float) -> Motion:
         rate = sum(self.omega * (b * cos(f * s) - a * sin(f * s)) for f, a, b in self.waves)
@@ -138,7 +142,7 @@ class HarmonicsIgnored(Flight):
 
     def law(self, law: Law) -> Still | Wave | Legs:
         if isinstance(law, Fourier):
-            law = Fourier(mean=law.mean, omega=law.omega, cos=law.cos[:1], sin=law.sin[:1])
+            law = replace(law, cos=law.cos[:1], sin=law.sin[:1])
         return super().law(law)
 
 
@@ -147,7 +151,7 @@ class SineAndCosineSwapped(Flight):
 
     def law(self, law: Law) -> Still | Wave | Legs:
         if isinstance(law, Fourier):
-            law = Fourier(mean=law.mean, omega=law.omega, cos=law.sin, sin=law.cos)
+            law = replace(law, cos=law.sin, sin=law.cos)
         return super().law(law)
 
 
@@ -156,7 +160,7 @@ class PhaseSign(Flight):
 
     def law(self, law: Law) -> Still | Wave | Legs:
         if isinstance(law, Fourier):
-            law = Fourier(mean=law.mean, omega=law.omega, cos=law.cos, sin=tuple(-b for b in law.sin))
+            law = replace(law, sin=tuple(-b for b in law.sin))
         return super().law(law)
 
 
@@ -165,13 +169,13 @@ class OmegaAsFrequency(Flight):
 
     def law(self, law: Law) -> Still | Wave | Legs:
         if isinstance(law, Fourier):
-            law = Fourier(mean=law.mean, omega=6.283185307179586 * law.omega, cos=law.cos, sin=law.sin)
+            law = replace(law, omega=6.283185307179586 * frequency(fp, law), period=None)
         return super().law(law)
 
 
 class _RoundPi(Wave):
     def __init__(self, law: Fourier, t: float) -> None:
-        period = 2 * 3.14159 / law.omega
+        period = 2 * 3.14159 / frequency(fp, law)
         super().__init__(law, fmod(t, period))
 
 
@@ -184,7 +188,8 @@ class PiTooShort(Flight):
 class _NoRestart(Wave):
     def __init__(self, law: Fourier, t: float) -> None:
         super().__init__(law, t)
-        self.waves = [turned(k * law.omega, a, b, 0.0) for k, a, b in law.harmonics()]
+        omega = frequency(fp, law)
+        self.waves = [turned(k * omega, a, b, 0.0) for k, a, b in law.harmonics()]
         self.value = law.mean + sum(a for _, a, _ in self.waves)
 
 

@@ -10,7 +10,10 @@ from itertools import pairwise
 from math import cos, floor, fmod, sin
 from typing import NamedTuple
 
+from mpmath import fp
+
 from scene import BangBang, Fourier
+from scene.laws import frequency
 
 
 class Motion(NamedTuple):
@@ -41,7 +44,8 @@ class Wave:
     """A Fourier law from time t on: its waves a cos(f s) + b sin(f s) turned to begin there."""
 
     def __init__(self, law: Fourier, t: float) -> None:
-        self.waves = [turned(k * law.omega, a, b, t) for k, a, b in law.harmonics()]
+        omega = frequency(fp, law)
+        self.waves = [turned(k * omega, a, b, t) for k, a, b in law.harmonics()]
         self.value = law.mean + sum(a for _, a, _ in self.waves)
 
     def at(self, s: float) -> Motion:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
+import msgspec
 from mpmath import fp
 
 from scene import BangBang, Fourier, Law, Scene, State, Wall
@@ -46,7 +47,9 @@ def scaled_law(law: Law, size: float, time: float) -> Law:
         return BangBang(knots=tuple((time * t, size * v) for t, v in law.knots))
     if isinstance(law, Fourier):
         cos, sin = (tuple(size * a for a in amplitudes) for amplitudes in (law.cos, law.sin))
-        return Fourier(mean=size * law.mean, omega=law.omega / time, cos=cos, sin=sin)
+        omega = None if law.omega is None else law.omega / time
+        period = None if law.period is None else law.period * time
+        return Fourier(mean=size * law.mean, omega=omega, cos=cos, sin=sin, period=period)
     return size * law
 
 
@@ -57,7 +60,7 @@ def backwards(scene: Scene) -> Scene:
         if isinstance(law, BangBang):
             return BangBang(knots=tuple((-t, v) for t, v in reversed(law.knots)))
         if isinstance(law, Fourier):
-            return Fourier(mean=law.mean, omega=law.omega, cos=law.cos, sin=tuple(-b for b in law.sin))
+            return msgspec.structs.replace(law, sin=tuple(-b for b in law.sin))
         return law
 
     return _with_laws(scene, turned)

@@ -16,18 +16,23 @@ from fractions import Fraction
 from typing import Any, NamedTuple
 
 import msgspec
+from mpmath import fp
 
 MAX_HARMONICS = 16  # validity is decided by exact algebra, whose cost grows steeply with the degree
 MAX_KNOTS = 256
 
 
 class Fourier(msgspec.Struct, frozen=True, tag_field="kind", tag="fourier", forbid_unknown_fields=True):
-    """mean + sum_k cos[k-1] cos(k omega t) + sin[k-1] sin(k omega t); period 2 pi / omega."""
+    """mean + sum_k cos[k-1] cos(k omega t) + sin[k-1] sin(k omega t).
+
+    Exactly one of `omega` [1/time] and `period` [time] is given; omega is 2 pi / period exactly.
+    """
 
     mean: float
-    omega: float
+    omega: float | None = None
     cos: tuple[float, ...] = ()
     sin: tuple[float, ...] = ()
+    period: float | None = None
 
     def harmonics(self) -> list[tuple[int, float, float]]:
         """Return (k, cosine amplitude, sine amplitude) for every harmonic present."""
@@ -82,8 +87,11 @@ def defect(law: Law) -> str | None:
                     return f".{field}[{k}] = {amplitude}, must be finite"
         if not math.isfinite(law.mean):
             return f".mean = {law.mean}, must be finite"
-        if not (math.isfinite(law.omega) and law.omega > 0):
-            return f".omega = {law.omega}, must be finite and > 0"
+        if (law.omega is None) == (law.period is None):
+            return " needs exactly one of `omega` and `period`"
+        for field, number in (("omega", law.omega), ("period", law.period)):
+            if number is not None and not (math.isfinite(number) and number > 0):
+                return f".{field} = {number}, must be finite and > 0"
         return None
     return None if math.isfinite(law) else f" = {law}, must be finite"
 
@@ -183,16 +191,23 @@ def evaluate(ctx: Any, piece: Piece, t: Any, order: int = 0) -> Any:
     return ctx.mpf(piece) if order == 0 else ctx.mpf(0)
 
 
+def frequency(ctx: Any, law: Fourier) -> Any:
+    """Return omega [1/time] in a number system; in `iv` an enclosure, since 2 pi / period is irrational."""
+    if law.period is not None:
+        return 2 * ctx.pi / ctx.mpf(law.period)
+    return ctx.mpf(law.omega)
+
+
 def _trigonometric(ctx: Any, law: Fourier, t: Any, order: int) -> Any:
     total = ctx.mpf(law.mean) if order == 0 else ctx.mpf(0)
-    omega = ctx.mpf(law.omega)
+    omega = frequency(ctx, law)
     for k, c, s in law.harmonics():
-        frequency = k * omega
-        cos, sin = ctx.cos(frequency * t), ctx.sin(frequency * t)
+        rate = k * omega
+        cos, sin = ctx.cos(rate * t), ctx.sin(rate * t)
         if order == 1:
-            cos, sin = -frequency * sin, frequency * cos
+            cos, sin = -rate * sin, rate * cos
         elif order == 2:
-            cos, sin = -frequency * frequency * cos, -frequency * frequency * sin
+            cos, sin = -rate * rate * cos, -rate * rate * sin
         if c:
             total += ctx.mpf(c) * cos
         if s:
@@ -223,7 +238,8 @@ def bounds(law: Law) -> Bounds:
             curvature = max(curvature, 4 * abs(v1 - v0) / (t1 - t0) / (t1 - t0))
         return Bounds(min(values), max(values), _up(slope), _up(curvature))
     if isinstance(law, Fourier):
-        terms = [(k * law.omega, math.hypot(c, s)) for k, c, s in law.harmonics()]
+        omega = float(frequency(fp, law))  # within the slack of `_up`
+        terms = [(k * omega, math.hypot(c, s)) for k, c, s in law.harmonics()]
         swing = _up(sum(size for _, size in terms))
         slope = _up(sum(size * f for f, size in terms))
         curvature = _up(sum(size * f * f for f, size in terms))

@@ -78,12 +78,27 @@ def from_data(data: Any, origin: str = "") -> Scene:
 
 
 def to_data(scene: Scene) -> dict[str, Any]:
-    """Return the wire's form of a scene as plain data."""
+    """Return the wire's form of a scene as plain data; of `omega` and `period`, the one that a law gives."""
     data: dict[str, Any] = msgspec.to_builtins(scene)
-    return data
+    return {name: _without_none(field) for name, field in data.items()}
+
+
+def _without_none(field: Any) -> Any:
+    if not isinstance(field, dict):
+        return field
+    return {name: value for name, value in field.items() if value is not None}
 
 
 def json_schema() -> dict[str, Any]:
     """Return the JSON Schema of a scene file, published as docs/scene.schema.json."""
     schema = msgspec.json.schema(Scene)
+    state_omega_or_period(schema["$defs"])
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": "Scene", **schema}
+
+
+def state_omega_or_period(definitions: dict[str, Any]) -> None:
+    """Say in a schema's definitions that a Fourier law gives exactly one of `omega` and `period`."""
+    fourier = definitions["Fourier"]
+    for field in ("omega", "period"):
+        fourier["properties"][field] = {"type": "number"}
+    fourier["oneOf"] = [{"required": ["omega"]}, {"required": ["period"]}]

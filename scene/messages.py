@@ -13,6 +13,7 @@ from typing import Annotated, Any
 
 import msgspec
 
+from scene.load import state_omega_or_period
 from scene.states import Collision, Horizon, Outcome, Rejected, State, Undecided, Undefined
 from scene.tables import Scene
 
@@ -148,6 +149,7 @@ def json_schema() -> dict[str, Any]:
     _, definitions = msgspec.json.schema_components(
         [*requests, *outcomes, *answers, Scene], ref_template="#/$defs/{name}"
     )
+    state_omega_or_period(definitions)
     tables = ("Cap", "Stem", "Mushroom")
     scene = {"anyOf": [_reference(name) for name in tables]}
     for request in (Step, Trajectory, Flow, Time):

@@ -1,5 +1,81 @@
-"""The one error that bad input raises, so that a bug of ours is never mistaken for it."""
+"""Bad input: the one error that it raises, and the checks that public entries share.
+
+A public entry checks what it is given before any arithmetic, so that a wrong type or a nan ends in one
+line that names the field, the value and the bound, never in a traceback from deep inside.
+"""
+
+from __future__ import annotations
+
+import math
+import numbers
+import operator
 
 
 class BadInput(ValueError):  # noqa: N818 (the caller's input is bad, not the program)
     """One line naming the field, its value and the bound it breaks."""
+
+
+def check_scene(scene: object) -> None:
+    """Refuse what is no scene at all.
+
+    Args:
+        scene: whatever a caller gave for a Cap, a Stem or a Mushroom.
+
+    Raises:
+        BadInput: naming what was given; for a name, how to load the scene.
+    """
+    from scene.tables import Cap, Mushroom, Stem  # the tables' own errors are BadInput: they need this file
+
+    if isinstance(scene, Cap | Stem | Mushroom):
+        return
+    hint = f"; a name or a file is loaded by scene.load({shown(scene)})" if isinstance(scene, str) else ""
+    raise BadInput(f"scene = {shown(scene)}, must be a Cap, a Stem or a Mushroom{hint}")
+
+
+def check_count(field: str, value: object, low: int, high: int) -> int:
+    """Return a whole number within bounds.
+
+    Args:
+        field: its name, for the message.
+        value: whatever a caller gave; integers of numpy are taken, a float is not, though it be whole.
+        low: least value allowed.
+        high: greatest value allowed.
+
+    Raises:
+        BadInput: naming field, value and bounds.
+    """
+    if isinstance(value, bool) or not isinstance(value, numbers.Integral):
+        raise BadInput(f"{field} = {shown(value)}, must be a whole number, {low} to {high}")
+    count = operator.index(value)
+    if not low <= count <= high:
+        raise BadInput(f"{field} = {shown(count)}, must be {low} to {high}")
+    return count
+
+
+def check_number(field: str, value: object) -> float:
+    """Return a finite number as a binary64.
+
+    Args:
+        field: its name, for the message.
+        value: whatever a caller gave; integers and numbers of numpy are taken.
+
+    Raises:
+        BadInput: naming field, value and bound.
+    """
+    if isinstance(value, bool) or not isinstance(value, numbers.Real):
+        raise BadInput(f"{field} = {shown(value)}, must be a finite number")
+    try:
+        number = float(value)
+    except OverflowError:
+        raise BadInput(f"{field} = {shown(value)}, must be a finite binary64 number") from None
+    if not math.isfinite(number):
+        raise BadInput(f"{field} = {number}, must be finite")
+    return number
+
+
+def shown(value: object) -> str:
+    """Return a value as a message shows it: on one line, and short."""
+    if isinstance(value, int) and value.bit_length() > 256:  # Python refuses to print the longest
+        return f"an integer of {value.bit_length()} bits"
+    text = " ".join(repr(value).split())
+    return text if len(text) <= 60 else text[:57] + "..."

@@ -61,7 +61,7 @@ PARAMETERS = ("r", "w", "nu", "h", "slope")
 
 
 class Period(NamedTuple):
-    """A common period: 2 pi / omega, kept symbolic, or a rational length."""
+    """A common period: 2 pi / omega, kept symbolic, or an exact rational length [time]."""
 
     omega: float | None
     length: Fraction | None
@@ -94,7 +94,8 @@ def periods(scene: Scene) -> dict[str, Period]:
         if is_constant(law):
             continue
         if isinstance(law, Fourier):
-            found[name] = Period(law.omega, None)
+            length = None if law.period is None else Fraction(law.period)
+            found[name] = Period(law.omega, length)
         elif isinstance(law, BangBang):
             found[name] = Period(None, Fraction(law.knots[-1][0]) - Fraction(law.knots[0][0]))
     return found

@@ -85,7 +85,7 @@ BAD_DATA = [
     ({**CAP, "r": 10**400}, "at `r`"),
     ({**CAP, "r": {}}, "missing required field `kind` - at `r`"),
     ({**CAP, "r": {"kind": "sawtooth"}}, "Invalid value 'sawtooth' - at `r.kind`"),
-    ({**CAP, "r": {"kind": "fourier", "mean": 1.0}}, "missing required field `omega` - at `r`"),
+    ({**CAP, "r": {"kind": "fourier", "mean": 1.0}}, "r needs exactly one of `omega` and `period`"),
     ({**CAP, "r": {**FOURIER, "phase": 0.0}}, "unknown field `phase` - at `r`"),
     ({**CAP, "r": {**FOURIER, "cos": 0.5}}, "at `r.cos`"),
     ({**CAP, "r": {**FOURIER, "cos": [0.1, "x"]}}, "at `r.cos[1]`"),

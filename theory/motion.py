@@ -10,7 +10,7 @@ from collections.abc import Callable
 from fractions import Fraction
 from typing import Any
 
-from scene.laws import Fourier, Piece, Quadratic, exact, piece_at
+from scene.laws import Fourier, Piece, Quadratic, exact, frequency, piece_at
 from scene.tables import Mushroom, laws
 from theory.volumes import Volumes, volumes_of
 
@@ -25,7 +25,7 @@ class Motion:
         self.ctx = ctx
         pieces = {name: piece_at(law, time) for name, law in laws(scene).items()}
         waves = [piece for piece in pieces.values() if isinstance(piece, Fourier)]
-        self._omega = ctx.mpf(waves[0].omega) if waves else None  # laws that move share one period
+        self._omega = frequency(ctx, waves[0]) if waves else None  # laws that move share one period
         self._parameters = {name: _parameter(ctx, piece) for name, piece in pieces.items()}
 
     def _at(self, t: Any, *names: str) -> list[tuple[Any, Any]]:
@@ -65,7 +65,7 @@ def _parabola(ctx: Any, piece: Quadratic) -> Parameter:
 
 
 def _wave(ctx: Any, law: Fourier) -> Parameter:
-    mean, omega = ctx.mpf(law.mean), ctx.mpf(law.omega)
+    mean, omega = ctx.mpf(law.mean), frequency(ctx, law)
     amplitudes = {k: (ctx.mpf(c), ctx.mpf(s)) for k, c, s in law.harmonics()}
     last = max(amplitudes)
 

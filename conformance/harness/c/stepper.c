@@ -355,7 +355,7 @@ static int read_knots(json_t *knots, Law *law) {
 static int read_law(json_t *scene, const char *name, Law *law) {
     json_t *data = json_object_get(scene, name), *cosines, *sines;
     const char *kind = json_string_value(json_object_get(data, "kind"));
-    double omega;
+    double omega, period;
     memset(law, 0, sizeof *law);
     if (!data && strcmp(name, "slope") == 0) return FOUND;
     if (kind && strcmp(kind, "bang-bang") == 0) return read_knots(json_object_get(data, "knots"), law);
@@ -363,8 +363,12 @@ static int read_law(json_t *scene, const char *name, Law *law) {
         int status = read_number(scene, name, &law->mean);
         return law->high = fabs(law->mean), status;
     }
-    if (read_number(data, "mean", &law->mean) || read_number(data, "omega", &omega)) return REJECTED;
-    if (omega <= 0) return refuse("omega", omega, "> 0");
+    const char *given = json_object_get(data, "period") ? "period" : "omega";
+    if (json_object_get(data, "period") && json_object_get(data, "omega")) return refuse("number of omega and period", 2, "1");
+    if (read_number(data, "mean", &law->mean) || read_number(data, given, &period)) return REJECTED;
+    if (period <= 0) return refuse(given, period, "> 0");
+    omega = given[0] == 'o' ? period : 2 * M_PI / period;
+    if (given[0] == 'o') period = 2 * M_PI / omega;
     law->high = fabs(law->mean);
     cosines = json_object_get(data, "cos"), sines = json_object_get(data, "sin");
     for (int k = 1; k <= MAX_WAVES; k++) {
@@ -372,7 +376,7 @@ static int read_law(json_t *scene, const char *name, Law *law) {
                   json_number_value(json_array_get(sines, k - 1))};
         double size = hypot(v.cos, v.sin);
         if (size == 0) continue;
-        law->waves[law->n_waves++] = v, law->period = 2 * M_PI / omega;
+        law->waves[law->n_waves++] = v, law->period = period;
         law->high += size, law->slope += k * omega * size, law->curvature += k * omega * k * omega * size;
     }
     return FOUND;

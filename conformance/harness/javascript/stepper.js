@@ -27,12 +27,12 @@ class Open extends Error {}
 // Laws: at(t); rise(t, s) = [f(t + s) - f(t) without cancellation, f'(t + s)]; and bounds on |f|, |f'|, |f''|.
 
 class Fourier {
-  constructor(mean, omega = 1, cosines = [], sines = []) {
+  constructor(mean, omega = 1, cosines = [], sines = [], period = (2 * Math.PI) / omega) {
     const n = max(cosines.length, sines.length);
     const all = Array.from({ length: n }, (_, i) => [(i + 1) * omega, cosines[i] ?? 0, sines[i] ?? 0]);
     this.mean = mean;
     this.waves = all.filter(([, c, d]) => c !== 0 || d !== 0);
-    this.period = this.waves.length ? (2 * Math.PI) / omega : 0;
+    this.period = this.waves.length ? period : 0;
     this.high = abs(mean) + sum(this.waves.map(([, c, d]) => hypot(c, d)));
     this.slope = sum(this.waves.map(([k, c, d]) => k * hypot(c, d)));
     this.curvature = sum(this.waves.map(([k, c, d]) => k * k * hypot(c, d)));
@@ -128,10 +128,13 @@ function checkFields(data, needed, allowed, name) {
 function readLaw(data, name) {
   if (typeof data !== "object" || data === null) return new Fourier(number(data, name));
   if (data.kind === "fourier") {
-    checkFields(data, ["kind", "mean", "omega"], ["cos", "sin"], name);
-    if (!(number(data.omega, `${name}.omega`) > 0)) throw new Refused(`${name}.omega = ${data.omega}, must be > 0`);
+    const given = "period" in data ? "period" : "omega"; // exactly one of the two
+    checkFields(data, ["kind", "mean", given], ["cos", "sin"], name);
+    const size = number(data[given], `${name}.${given}`);
+    if (!(size > 0)) throw new Refused(`${name}.${given} = ${size}, must be > 0`);
     const [c, d] = [data.cos ?? [], data.sin ?? []].map((part) => part.map((a) => number(a, name)));
-    return new Fourier(number(data.mean, `${name}.mean`), data.omega, c, d);
+    const mean = number(data.mean, `${name}.mean`);
+    return given === "omega" ? new Fourier(mean, size, c, d) : new Fourier(mean, (2 * Math.PI) / size, c, d, size);
   }
   if (data.kind !== "bang-bang") throw new Refused(`${name}.kind = ${data.kind}, must be fourier or bang-bang`);
   checkFields(data, ["kind", "knots"], [], name);

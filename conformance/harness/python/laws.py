@@ -17,12 +17,12 @@ class Refused(Exception):
 class Fourier:
     """mean + sum of c cos(k omega t) + s sin(k omega t); a constant has no waves."""
 
-    def __init__(self, mean, omega=1.0, cos=(), sin=()):
+    def __init__(self, mean, omega=1.0, cos=(), sin=(), period=None):
         n = max(len(cos), len(sin))
         cos, sin = [*cos, *[0.0] * (n - len(cos))], [*sin, *[0.0] * (n - len(sin))]
         self.waves = [(k * omega, c, s) for k, (c, s) in enumerate(zip(cos, sin), 1) if c or s]
         sizes = [(k, math.hypot(c, s)) for k, c, s in self.waves]
-        self.mean, self.period = mean, 2 * math.pi / omega if self.waves else 0.0
+        self.mean, self.period = mean, (period or 2 * math.pi / omega) if self.waves else 0.0
         self.high = abs(mean) + sum(a for _, a in sizes)
         self.slope, self.curvature = sum(k * a for k, a in sizes), sum(k * k * a for k, a in sizes)
 
@@ -105,12 +105,16 @@ def number(data, name):
 def read_law(data, name):
     if not isinstance(data, dict):
         return Fourier(number(data, name))
-    if data.get("kind") == "fourier" and set(data) <= {"kind", "mean", "omega", "cos", "sin"}:
-        omega = number(data.get("omega"), name + ".omega")
-        if omega <= 0:
-            raise Refused(f"{name}.omega = {omega}, must be > 0")
+    if data.get("kind") == "fourier" and set(data) <= {"kind", "mean", "omega", "period", "cos", "sin"}:
+        if ("omega" in data) == ("period" in data):
+            raise Refused(f"{name} needs exactly one of omega and period")
+        given = "period" if "period" in data else "omega"
+        size = number(data[given], f"{name}.{given}")
+        if size <= 0:
+            raise Refused(f"{name}.{given} = {size}, must be > 0")
+        omega, period = (size, None) if given == "omega" else (2 * math.pi / size, size)
         cos, sin = ([number(a, f"{name}.{part}") for a in data.get(part, [])] for part in ("cos", "sin"))
-        return Fourier(number(data.get("mean"), name + ".mean"), omega, cos, sin)
+        return Fourier(number(data.get("mean"), name + ".mean"), omega, cos, sin, period)
     if data.get("kind") == "bang-bang" and set(data) == {"kind", "knots"}:
         knots = [(number(t, name + ".knots"), number(v, name + ".knots")) for t, v in data["knots"]]
         if len(knots) < 2 or knots[0][1] != knots[-1][1]:

@@ -8,11 +8,9 @@ from __future__ import annotations
 
 import hashlib
 import math
-import os
 import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -20,14 +18,22 @@ import numpy.typing as npt
 
 from fast import codes, entries
 from fast.compiled import Compiled, FloatArray, compile_scene
+from fast.given import (
+    MAX_CYCLES,
+    MAX_PARTICLES,
+    check_kept,
+    given_energy,
+    given_phases,
+    given_progress,
+    given_threads,
+)
+from fast.narrowings import narrowings
 from fast.starts import Stops, cycle_length, cycle_stops, initial_states, least_collisions
 from scene import Scene
-from scene.refusal import BadInput
+from scene.refusal import BadInput, check_count, check_scene
 
 FOLLOWED, UNDECIDED, UNDEFINED, REJECTED = 0, 1, 2, 3
-MAX_PARTICLES = 10**8
 MAX_COLLISIONS = 10**9  # of one particle, a minute of work
-LARGEST_ENERGY = 2.0**800
 SHARE = 256  # particles a worker takes at a time: several times what it holds at once
 IntArray = npt.NDArray[np.int64]
 
@@ -58,12 +64,12 @@ class Followed(NamedTuple):
 
 
 class Ensemble(NamedTuple):
-    """What became of N particles over K cycles, looked at P times in each; the mouth narrows M times a cycle.
+    """What became of N particles over K cycles, with P looks at them and M narrowings of the mouth in each.
 
-    A *captured stay* begins with an arc hit at which |sin phi| > nu and ends with the first arc hit at which that
-    is no longer so, or with the mouth if that comes first; if |sin phi| > nu again before the particle has
-    left through the mouth, it is still the same stay. M is the number of local minima of nu in a cycle
-    (`fast.narrowings`; a plateau is one, a nu that stands still has none), in (start, end] of the cycle.
+    A *captured stay* begins with an arc hit at which |sin phi| > nu. It ends with the first arc hit at which
+    that is no longer so, or below the mouth if that comes first; when |sin phi| > nu once more before the
+    particle has been below the mouth, the same stay goes on. M is the number of local minima of nu in a
+    cycle, after its start and up to its end (`fast.narrowings`; a plateau is one, a nu at rest has none).
 
     Attributes:
         energy0: initial energy E = v^2 / 2 of every particle.
@@ -107,7 +113,7 @@ class Ensemble(NamedTuple):
 
     def is_captured(self) -> npt.NDArray[np.bool_]:
         """Return (N, K): whether a particle has a captured stay in a cycle."""
-        found: npt.NDArray[np.bool_] = ~np.isnan(self.t_in).all(axis=2)
+        found: npt.NDArray[np.bool_] = np.isfinite(self.t_in).any(axis=2)
         return found
 
     def takes_part(self) -> npt.NDArray[np.bool_]:
@@ -116,13 +122,14 @@ class Ensemble(NamedTuple):
         Where nu is always below 1 some particles are never free: in every slot a stay, and no collision with
         the stem's walls. No cycle captures or releases them, and the theory leaves them out.
         """
-        was_in_stem = self.wall_counts[:, 2:].any(axis=1)
-        is_always_in = ~np.isnan(self.t_in).any(axis=(1, 2)) if self.t_in.size else np.zeros(len(self.t), bool)
-        taking: npt.NDArray[np.bool_] = (self.outcome == FOLLOWED) & (was_in_stem | ~is_always_in)
-        return taking
+        was_followed: npt.NDArray[np.bool_] = self.outcome == FOLLOWED
+        if self.t_in.shape[2] == 0:
+            return was_followed
+        is_always_in = np.isfinite(self.t_in).all(axis=(1, 2)) & ~self.wall_counts[:, 2:].any(axis=1)
+        return was_followed & ~is_always_in
 
     def p_nc(self) -> FloatArray:
-        """Return (K,): the share, of those who take part, that has no captured stay in each cycle; nan of none.
+        """Return (K,): the share of those who take part without a captured stay in each cycle; nan of no one.
 
         Source: Eq:ps, the probability of never being captured.
         """
@@ -156,9 +163,9 @@ def simulate(
 
     Args:
         scene: table and laws; a static one is followed for one unit of time a cycle.
-        n_particles: 1 to 10^8.
+        n_particles: 1 to 10^8, and n_particles n_cycles (P + 1 + 2 M) <= 10^9, which is what is kept.
         energy: initial energy E = v^2 / 2 of every particle [length^2 / time^2], > 0.
-        n_cycles: cycles to follow, >= 1.
+        n_cycles: cycles to follow, 1 to 10^6.
         seed: 0 <= seed < 2^64.
         threads: how many to use, by default one for each core.
         phases: (P,) fractions of each cycle at which energies are wanted, rising, in (0, 1).
@@ -169,8 +176,14 @@ def simulate(
 
     Source: secs. 4.1, 4.2 (initial conditions); capture as in sec. 3.2.
     """
-    threads = _check(n_particles, energy, n_cycles, seed, phases, threads)
+    check_scene(scene)
+    n_particles = check_count("n_particles", n_particles, 1, MAX_PARTICLES)
+    n_cycles = check_count("n_cycles", n_cycles, 1, MAX_CYCLES)
+    seed = check_count("seed", seed, 0, 2**64 - 1)
+    energy, phases = given_energy(energy), given_phases(phases)
+    threads, progress = given_threads(threads), given_progress(progress)
     compiled = compile_scene(scene)
+    check_kept(n_particles, n_cycles, len(phases), len(narrowings(scene)))
     stops = cycle_stops(scene, n_cycles, phases)
     ahead = least_collisions(scene, math.sqrt(2.0 * energy), n_cycles * cycle_length(scene))
     if ahead > MAX_COLLISIONS:
@@ -257,28 +270,3 @@ def follow(
     seconds = time.perf_counter() - begin
     energies, is_captured, t_in, t_out = out
     return Followed(*ends, energies, is_captured, t_in, t_out, seconds)
-
-
-def _check(
-    n_particles: int, energy: float, n_cycles: int, seed: int, phases: Sequence[float], threads: int | None
-) -> int:
-    if not 1 <= n_particles <= MAX_PARTICLES:
-        raise BadInput(f"particles = {n_particles}, must be 1 to {MAX_PARTICLES}")
-    if not 0 < energy <= LARGEST_ENERGY:
-        raise BadInput(f"energy = {energy}, must be > 0 and at most 2^800")
-    if n_cycles < 1:
-        raise BadInput(f"cycles = {n_cycles}, must be >= 1")
-    if not 0 <= seed < 2**64:
-        raise BadInput(f"seed = {seed}, must be >= 0 and < 2^64")
-    edges = [0.0, *phases, 1.0]
-    if any(not a < b for a, b in pairwise(edges)):
-        raise BadInput(f"phases = {list(phases)}, must rise and lie in (0, 1)")
-    return check_threads(threads)
-
-
-def check_threads(threads: int | None) -> int:
-    """Return how many threads to use: as many as asked for, by default one for each core."""
-    available = os.cpu_count() or 1
-    if threads is not None and not 1 <= threads <= available:
-        raise BadInput(f"threads = {threads}, must be 1 to {available}, the cores of this machine")
-    return available if threads is None else threads

@@ -1,13 +1,14 @@
-"""Where in a cycle the mouth narrows: the local minima of nu = w / r, found by algebra on each analytic piece.
+"""Where in a cycle the mouth narrows: the local minima of nu = w / r, by algebra on each analytic piece.
 
-Idea. The sign of nu' is that of N = w' r - w r'. Time is cut where a law is not analytic, and, where a Fourier law
-moves, into parts of half a wavelength. On half a bang-bang leg N is a quadratic; elsewhere it is interpolated by a
-Chebyshev series that rounding alone limits, and its zeros are eigenvalues, polished by Newton's method. Between
-neighbours among all cuts and zeros nu is monotone, so its values there show every rise and fall: a zero too many (of
-a flat inflection, or by rounding) does no harm, and none that matters is missed.
+Idea. The sign of nu' is that of N = w' r - w r'. Time is cut where a law is not analytic and, where a Fourier
+law moves, into parts of half a wavelength. On half a bang-bang leg N is a quadratic; elsewhere it is
+interpolated by a Chebyshev series that rounding alone limits, and its zeros are eigenvalues, polished by
+Newton's method. Between neighbours among all cuts and zeros nu is monotone, so its values there show every
+rise and fall: a zero too many (of a flat inflection, or by rounding) does no harm, and none that matters is
+missed.
 
-A swing of nu below SWING of its largest value is rounding, and counts as none: the two minima beside so low a peak
-are one, and a nu that never swings more has no narrowing at all. A plateau counts once, by its middle.
+A swing of nu below SWING of its largest value is rounding, and counts as none: the two minima beside so low a
+peak are one, and a nu that never swings more has no narrowing at all. A plateau counts once, by its middle.
 """
 
 from __future__ import annotations
@@ -18,11 +19,11 @@ from functools import lru_cache
 
 import numpy as np
 import numpy.typing as npt
-from mpmath import MPContext
+from mpmath import MPContext, fp
 from numpy.polynomial import chebyshev
 
 from scene import BangBang, Fourier, Law, Mushroom, Scene
-from scene.laws import is_constant
+from scene.laws import is_constant, value
 from scene.tables import laws, period
 
 FloatArray = npt.NDArray[np.float64]
@@ -48,8 +49,8 @@ def narrowings(scene: Scene) -> tuple[float, ...]:
         scene: a valid scene; only a mushroom has a mouth.
 
     Returns:
-        Phases (fractions of the cycle, rising, in (0, 1]) at which nu has a local minimum; one at the instant that ends a
-        cycle and begins the next belongs to the one that it ends. None for a nu that is constant.
+        Phases (fractions of the cycle, rising, in (0, 1]) at which nu has a local minimum; one at the instant
+        that ends a cycle and begins the next belongs to the one that it ends. None for a nu that is constant.
 
     Source: sec. 3.2, capture while nu falls, release when it has risen.
     """
@@ -77,7 +78,7 @@ def _in_cycle(phase: float) -> float:
 
 def _motion(law: Law, start: float) -> Motion:
     if is_constant(law):
-        level = law.mean if isinstance(law, Fourier) else law.knots[0][1] if isinstance(law, BangBang) else law
+        level = float(value(fp, law, start))
         return lambda u: np.stack([np.full_like(u, level), np.zeros_like(u), np.zeros_like(u)])
     if isinstance(law, BangBang):
         return _bang_bang(law, start)
@@ -102,10 +103,10 @@ def _bang_bang(law: BangBang, start: float) -> Motion:
         length = knots[leg + 1] - knots[leg]
         before, after = (u - knots[leg]) / length, (knots[leg + 1] - u) / length
         rise = values[leg + 1] - values[leg]
-        is_first = before < 0.5
-        value = np.where(is_first, values[leg] + 2.0 * rise * before**2, values[leg + 1] - 2.0 * rise * after**2)
-        rate = 4.0 * rise * np.where(is_first, before, after) / length
-        return np.stack([value, rate, np.where(is_first, 4.0, -4.0) * rise / length**2])
+        is_first, bend = before < 0.5, 2.0 * rise
+        level = np.where(is_first, values[leg] + bend * before**2, values[leg + 1] - bend * after**2)
+        slope = 2.0 * bend * np.where(is_first, before, after) / length
+        return np.stack([level, slope, np.where(is_first, 2.0, -2.0) * bend / length**2])
 
     return motion
 
@@ -118,14 +119,17 @@ def _fourier(law: Fourier, start: float) -> Motion:
         turns = k * (base + u[..., None])
         angle, rate = 2.0 * np.pi * (turns - np.round(turns)), 2.0 * np.pi * k
         cos, sin = np.cos(angle), np.sin(angle)
-        value = law.mean + cos @ c + sin @ s
-        return np.stack([value, cos @ (rate * s) - sin @ (rate * c), -(cos @ (rate**2 * c) + sin @ (rate**2 * s))])
+        level = law.mean + cos @ c + sin @ s
+        slope = cos @ (rate * s) - sin @ (rate * c)
+        return np.stack([level, slope, -(cos @ (rate**2 * c) + sin @ (rate**2 * s))])
 
     return motion
 
 
 def _turns_at(law: Fourier, t: float) -> float:
     """Return the phase of a law at a time, as a fraction of its period in [0, 1)."""
+    if law.period is not None:
+        return float(Fraction(t) / Fraction(law.period) % 1)
     if t == 0.0:
         return 0.0
     ctx = MPContext()
@@ -135,9 +139,10 @@ def _turns_at(law: Fourier, t: float) -> float:
 
 
 def _cuts(scene: Mushroom, factors: tuple[Law, Law]) -> FloatArray:
-    """Return phases from 0 to 1 between which N is analytic, and no Fourier factor of it turns more than half."""
+    """Return phases from 0 to 1 between which N is analytic and its waves make half a turn at most."""
     start = start_time(scene)
-    parts = 2 * sum(law.harmonics()[-1][0] for law in factors if isinstance(law, Fourier) and law.harmonics())
+    waves = [law.harmonics() for law in factors if isinstance(law, Fourier) and law.harmonics()]
+    parts = 2 * sum(harmonics[-1][0] for harmonics in waves)
     cuts = [np.linspace(0.0, 1.0, max(parts, 1) + 1)]
     for law in factors:
         if isinstance(law, BangBang) and not is_constant(law):

@@ -82,7 +82,7 @@ class Stops(NamedTuple):
         cycles: (S,) number of the cycle that an instant ends, -1 for others.
         narrowings: (K, M) when the mouth narrows in each cycle: a captured stay is kept in slot m of cycle k
             when it spans that instant.
-        is_first_kept: the first captured stay is kept in slot 0, whatever its length; there are no narrowings.
+        is_first_kept: the first captured stay is kept in slot 0, whatever its length.
     """
 
     times: FloatArray
@@ -124,7 +124,9 @@ def cycle_stops(scene: Scene, n_cycles: int, phases: Sequence[float]) -> Stops:
 
 def only_stop(t_end: float) -> Stops:
     """Return one stop, that keeps the first captured stay of any length."""
-    return Stops(np.array([t_end]), np.array([0]), np.array([0]), np.full((1, 1), math.nan), is_first_kept=True)
+    return Stops(
+        np.array([t_end]), np.array([0]), np.array([0]), np.full((1, 1), math.nan), is_first_kept=True
+    )
 
 
 def least_collisions(scene: Scene, speed: float, span: float) -> float:

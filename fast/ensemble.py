@@ -82,8 +82,9 @@ class Ensemble(NamedTuple):
             t_in <= its instant <= t_out; nan when the particle is not captured at that instant. There is at
             most one. A stay that spans several narrowings stands in the slot of each, with the same begin
             and, in one cycle, the same end. t_in is the stay's true begin, in an earlier cycle too; of a
-            particle that starts captured it is the first arc hit. A stay that is not over when the cycle
-            ends has the cycle's end as t_out. Stays that span no narrowing are not kept.
+            particle that starts captured it is the first arc hit. A cycle is written with what is known
+            when it ends: a stay that is on then has the cycle's end as t_out, and one that goes on only
+            later (see above) its arc hit. Stays that span no narrowing are not kept.
         wall_counts: (N, 5) collisions with arc, base, left, right, floor.
         phase_energies: (N, K, P) energy at the phases asked for.
         phase_captured: (N, K, P) whether the last arc hit before them had |sin phi| > nu.

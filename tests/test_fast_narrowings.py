@@ -66,7 +66,7 @@ def fourier(random, mean, swing, n_harmonics, clock):
 
 
 def bang_bang(random, low, high, span, start):
-    """Draw knots; some values twice in a row (plateaus), most from a few levels (equal minima, equal maxima)."""
+    """Draw knots with values from three levels: plateaus, equal minima and equal maxima are common."""
     n = int(random.integers(2, 9))
     levels = np.round(random.uniform(low, high, size=3), int(random.integers(1, 17)))
     levels = np.clip(levels, low, high)

@@ -114,8 +114,7 @@ class Ensemble(NamedTuple):
 
     def is_captured(self) -> npt.NDArray[np.bool_]:
         """Return (N, K): whether a particle has a captured stay in a cycle."""
-        found: npt.NDArray[np.bool_] = np.isfinite(self.t_in).any(axis=2)
-        return found
+        return np.asarray(np.isfinite(self.t_in).any(axis=2))
 
     def takes_part(self) -> npt.NDArray[np.bool_]:
         """Return (N,): who was followed to the end, and was not in the island all the time.

@@ -38,11 +38,8 @@ def given_state(scene: Scene, state: object) -> State:
     wall = state.wall
     if wall is not None and not (isinstance(wall, str) and wall in scene.walls):
         raise InvalidState(f"state.wall = {shown(wall)}, must be null or one of {', '.join(scene.walls)}")
-    try:
-        found = [check_number(f"state.{field}", getattr(state, field)) for field in NUMBERS]
-    except BadInput as error:
-        raise InvalidState(str(error)) from None
-    return State(*found, wall)
+    t, x, y, vx, vy = (check_number(f"state.{name}", getattr(state, name), InvalidState) for name in NUMBERS)
+    return State(t, x, y, vx, vy, wall)
 
 
 def given_end(t_end: object) -> float:

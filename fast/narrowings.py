@@ -23,8 +23,8 @@ from mpmath import MPContext, fp
 from numpy.polynomial import chebyshev
 
 from scene import BangBang, Fourier, Law, Mushroom, Scene
-from scene.laws import is_constant, value
-from scene.tables import laws, period
+from scene.laws import bounds, is_constant, value
+from scene.tables import laws
 
 FloatArray = npt.NDArray[np.float64]
 # Returns a law, its first and its second derivative by the phase, shape (3, ...), at phases given.
@@ -60,14 +60,15 @@ def narrowings(scene: Scene) -> tuple[float, ...]:
     assert width is not None
     if is_constant(width) and is_constant(radius):
         return ()
-    start, shared = start_time(scene), period(scene)
-    assert shared is not None
+    start = start_time(scene)
     w, r = (_motion(law, start) for law in (width, radius))
-    cuts = _cuts(scene, (width, radius))
+    cuts = _cuts(start, (width, radius))
     is_algebraic = not any(isinstance(law, Fourier) and not is_constant(law) for law in (width, radius))
-    zeros = (_zeros_of_quadratics if is_algebraic else _zeros_of_series)(w, r, cuts)
-    phases = np.unique(np.concatenate([cuts[:-1], zeros[(zeros >= 0.0) & (zeros < 1.0)]]))
-    return tuple(sorted(_in_cycle(phase) for phase in _minima(w, r, phases)))
+    # Legs too short for their squares give nan: their zeros drop out, their ends among the cuts stay.
+    with np.errstate(all="ignore"):
+        zeros = (_zeros_of_quadratics if is_algebraic else _zeros_of_series)(w, r, cuts)
+        phases = np.unique(np.concatenate([cuts[:-1], zeros[(zeros >= 0.0) & (zeros < 1.0)]]))
+        return tuple(sorted(_in_cycle(phase) for phase in _minima(w, r, phases)))
 
 
 def _in_cycle(phase: float) -> float:
@@ -77,6 +78,13 @@ def _in_cycle(phase: float) -> float:
 
 
 def _motion(law: Law, start: float) -> Motion:
+    """Return a law's motion, divided by its highest value: only the ratios of nu matter."""
+    highest = bounds(law).highest
+    motion = _unscaled(law, start)
+    return lambda u: motion(u) / highest
+
+
+def _unscaled(law: Law, start: float) -> Motion:
     if is_constant(law):
         level = float(value(fp, law, start))
         return lambda u: np.stack([np.full_like(u, level), np.zeros_like(u), np.zeros_like(u)])
@@ -100,7 +108,7 @@ def _bang_bang(law: BangBang, start: float) -> Motion:
     def motion(u: FloatArray) -> FloatArray:
         u = knots[0] + (u - knots[0]) % 1.0
         leg = np.clip(np.searchsorted(knots, u, side="right") - 1, 0, len(knots) - 2)
-        length = knots[leg + 1] - knots[leg]
+        length = np.maximum(knots[leg + 1] - knots[leg], 2.0**-1000)
         before, after = (u - knots[leg]) / length, (knots[leg + 1] - u) / length
         rise = values[leg + 1] - values[leg]
         is_first, bend = before < 0.5, 2.0 * rise
@@ -138,9 +146,8 @@ def _turns_at(law: Fourier, t: float) -> float:
     return float(turns - ctx.floor(turns))
 
 
-def _cuts(scene: Mushroom, factors: tuple[Law, Law]) -> FloatArray:
+def _cuts(start: float, factors: tuple[Law, Law]) -> FloatArray:
     """Return phases from 0 to 1 between which N is analytic and its waves make half a turn at most."""
-    start = start_time(scene)
     waves = [law.harmonics() for law in factors if isinstance(law, Fourier) and law.harmonics()]
     parts = 2 * sum(harmonics[-1][0] for harmonics in waves)
     cuts = [np.linspace(0.0, 1.0, max(parts, 1) + 1)]
@@ -162,9 +169,8 @@ def _zeros_of_quadratics(w: Motion, r: Motion, cuts: FloatArray) -> FloatArray:
     at_w, at_r = w(middle), r(middle)
     c, b = _slope(at_w, at_r)  # in z = phase - middle: c + b z + a z^2
     a = 0.5 * (at_w[2] * at_r[1] - at_w[1] * at_r[2])
-    with np.errstate(divide="ignore", invalid="ignore"):
-        q = -0.5 * (b + np.copysign(np.sqrt(np.maximum(b * b - 4.0 * a * c, 0.0)), b))
-        z = np.concatenate([q / a, c / q])
+    q = -0.5 * (b + np.copysign(np.sqrt(np.maximum(b * b - 4.0 * a * c, 0.0)), b))
+    z = np.concatenate([q / a, c / q])
     half, middle = np.concatenate([half, half]), np.concatenate([middle, middle])
     found: FloatArray = (middle + z)[np.abs(z) <= half]  # nan and infinity drop out
     return found
@@ -176,7 +182,7 @@ def _zeros_of_series(w: Motion, r: Motion, cuts: FloatArray) -> FloatArray:
     places = middle[:, None] + half[:, None] * NODES
     series = _slope(w(places), r(places))[0] @ TO_SERIES
     sizes = np.abs(series)
-    may_vanish = sizes[:, 0] <= sizes[:, 1:].sum(axis=1)
+    may_vanish = (sizes[:, 0] <= sizes[:, 1:].sum(axis=1)) & np.isfinite(sizes).all(axis=1)
     found = []
     for k in np.flatnonzero(may_vanish):
         kept = np.flatnonzero(sizes[k] > 2.0**-52 * sizes[k].max())

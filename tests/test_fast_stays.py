@@ -20,7 +20,7 @@ from scene import BangBang, Fourier, Mushroom, State, load
 from scene.laws import value
 from scene.tables import width_factors
 
-TWICE = tuple(enumerate((1.0, 1.0, 0.3, 0.3, 1.0, 1.0, 0.3, 0.3, 1.0)))
+TWICE = tuple(zip(map(float, range(9)), (1.0, 1.0, 0.3, 0.3, 1.0, 1.0, 0.3, 0.3, 1.0), strict=True))
 BREATH = ((0.0, 1.0), (2.0, 1.0), (2.5, 1.25), (6.0, 1.25), (6.5, 1.0), (8.0, 1.0))
 MOUTHS = {
     "equal": Mushroom(
@@ -41,7 +41,7 @@ AT_THE_END = Mushroom(r=1.0, h=1.0, nu=Fourier(mean=0.6, omega=1.0, cos=(-0.3,))
 
 
 def stays_along(scene, start, hits):
-    """List the captured stays (begin, end) of a path by their definition; infinity for one that is not over."""
+    """List the captured stays (begin, end) of a path by their definition; end = infinity if not over."""
     found, begin, end = [], math.inf, math.inf
     vx, vy = start.vx, start.vy
     for wall, (_, t, x, y, *after) in hits:

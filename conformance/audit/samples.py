@@ -84,8 +84,7 @@ class Sample(NamedTuple):
     @property
     def captured(self) -> BoolArray:
         """Return who was captured in the first cycle."""
-        found: BoolArray = np.isfinite(self.t_in[:, 0]).any(axis=1)
-        return found
+        return np.asarray(np.isfinite(self.t_in[:, 0]).any(axis=1))
 
     @property
     def never_captured(self) -> BoolArray:

@@ -331,11 +331,11 @@ def settled(wall, s, x, y, vx, vy, laws, anchors, is_relative):
 
 @njit(error_model="numpy")
 def rest_of_hop(wall, s, f, slope, p, laws, anchors, is_relative):
-    """Return what must be added to the time s of a hit of the wall left, where its increments gave f and f'.
+    """Return what must be added to the time s of a hit of the wall left; its increments gave f and f'.
 
-    The low part matters even though s is right to its last bit: a wall that rests until a knot and is met just
-    after it has a speed as small as the time since then. Newton's method, f between s and there by the
-    trapezoidal rule: exact for a bang-bang law, whose f' is linear.
+    The low part matters even though s is right to its last bit: a wall that rests until a knot and is met
+    just after it has a speed as small as the time since then. Newton's method, f between s and there by
+    the trapezoidal rule: exact for a bang-bang law, whose f' is linear.
     """
     x_s, y_s, vx, vy = p[2] + p[4] * s, p[3] + p[5] * s, p[4], p[5]
     t, low = two_sum(p[0], s)

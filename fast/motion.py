@@ -47,7 +47,7 @@ def set_phases(laws, anchors, t_hi, t_lo):
     anchors[TURN, 0] = -1.0
     worst = 0.0
     for k in range(1, int(laws[PHASES, 1]) + 1):
-        s, s_low, c, c_low, is_reduced = sine_cosine(laws[PHASES, 0], float(k), t_hi, t_lo)
+        s, s_low, c, c_low, is_reduced = sine_cosine(laws[PHASES, 0], float(k), t_hi, t_lo, laws[PHASES, 2])
         if not is_reduced:
             return False
         anchors[PHASE, SINE + k] = s
@@ -75,7 +75,7 @@ def set_turn(laws, anchors, s):
             sine = half + more
             anchors[TURN, SINE + k] = 2.0 * (more + sine * less)
         else:
-            sine, _, cosine, _, _ = sine_cosine(laws[PHASES, 0], 0.5 * k, s, 0.0)
+            sine, _, cosine, _, _ = sine_cosine(laws[PHASES, 0], 0.5 * k, s, 0.0, laws[PHASES, 2])
             anchors[TURN, SINE + k] = 2.0 * sine * cosine
         anchors[TURN, COSINE + k] = -2.0 * sine * sine
 

@@ -28,7 +28,7 @@ OFF = np.bool_(False)
 def test_the_compiler_packs_divisions_and_square_roots(loop):
     """Four lanes to an instruction, where the machine has 256-bit registers."""
     a = np.ones(lanes.N_ROWS * lanes.LANES)
-    n, limits = np.int64(60), lanes.Limits(1.0, 1.0, 1.0, 1.0, 1.0, 1.0)
+    n, limits = np.int64(60), lanes.Limits(*[1.0] * 9, False)
     function = getattr(lanes, loop)
     arguments = {
         "aim": (OFF, 0.1, limits),

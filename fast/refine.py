@@ -14,7 +14,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from fast.arithmetic import two_product, two_sum
+from fast.arithmetic import two_sum
 from fast.careful import first_event
 
 from fast.codes import (  # isort: skip

@@ -3,8 +3,8 @@
 A scene is brought to about one size and one period before any arithmetic, and answers are brought back. Two
 scenes that differ by powers of two of length and time are then one and the same to the kernels, so that their
 answers are the same bits, scaled; and no square overflows or vanishes but that of a state 2^300 times faster
-or slower than its table, which is refused. A static table has no time of its own: there the unit of time makes
-each state's speed what it should be.
+or slower than its table, which is refused. A static table has no time of its own: there the unit of time
+makes each state's speed what it should be.
 
 Every change of units is exact or refused: scaling by a power of two loses bits only where numbers become
 subnormal or infinite. The kernel's sizes are well above 1 (2^96 for a length, 2^32 for a time) so that the

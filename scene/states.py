@@ -47,7 +47,7 @@ class Collision(msgspec.Struct, frozen=True, tag_field="outcome", tag="collision
 
 
 class Horizon(msgspec.Struct, frozen=True, tag_field="outcome", tag="horizon"):
-    """No collision up to and including t_end; the state there."""
+    """No collision before t_end (one at t_end exactly is not before it); the state there, before any bounce."""
 
     t: float
     x: float

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import json
 import os
 import re
@@ -121,3 +122,17 @@ def test_the_examples_of_the_protocol_are_what_plain_answers():
     assert answered[-1]["outcome"] == "rejected"  # plain offers no time
     assert answered[1:-1] == expected[1:-1]
     assert len(answered) == len(asked) - 1
+
+
+def test_the_proof_names_what_exists():
+    """Every place of the argument that the page names is in the code, and every file."""
+    text = (DOCS / "proof.md").read_text("utf-8")
+    places = set(re.findall(r"`(?:reference\.)?([a-z_]+)\.([A-Za-z_.]+)`", text))
+    assert len(places) >= 25
+    for module, place in places:
+        found = importlib.import_module(f"reference.{module}" if module != "reference" else module)
+        for name in place.split("."):
+            found = getattr(found, name)
+    files = re.findall(r"`([a-z]+/[a-z_/]+\.py)`", text)
+    assert len(files) >= 4
+    assert all((ROOT / file).is_file() for file in files)

@@ -44,9 +44,7 @@ def check_system(ctx: object) -> None:
         BadInput: naming what was given.
     """
     if not all(hasattr(ctx, name) for name in ("pi", "sqrt", "hypot")):
-        raise BadInput(
-            f"ctx = {shown(ctx)}, must be a number system: mpmath.fp, an MPContext, or numpy for arrays"
-        )
+        raise BadInput(f"ctx = {shown(ctx)}, must be a number system: mpmath.fp, an MPContext, or numpy")
 
 
 def check_real(**numbers: object) -> None:
@@ -63,7 +61,7 @@ def check_real(**numbers: object) -> None:
             finite_array(field, number)
         elif isinstance(number, bool) or not isinstance(number, Real):
             raise BadInput(f"{field} = {shown(number)}, must be a finite number")
-        elif not number - number == 0:  # infinity and nan of any number system
+        elif number - number != 0:  # infinity and nan of any number system
             raise BadInput(f"{field} = {number}, must be finite")
 
 

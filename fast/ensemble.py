@@ -193,11 +193,15 @@ def simulate(
     start = initial_states(scene, n_particles, energy, seed)
     free = np.full(n_particles, codes.NO_WALL)
     done = follow(compiled, start, free, stops, threads, progress)
-    every = (n_particles, n_cycles, len(phases) + 1)
+    return _ensemble(energy, done, (n_particles, n_cycles, len(phases) + 1), threads)
+
+
+def _ensemble(energy0: float, done: Followed, every: tuple[int, int, int], threads: int) -> Ensemble:
+    """Name what the kernel filled in; `every`: particles, cycles, looks at a particle in a cycle."""
     energies, captured = done.energies.reshape(every), done.is_captured.reshape(every)
     t, _, x, y, vx, vy = (np.ascontiguousarray(column) for column in done.states.T)
     return Ensemble(
-        energy0=energy,
+        energy0=energy0,
         energy=np.ascontiguousarray(energies[:, -1, -1]),
         cycle_energies=np.ascontiguousarray(energies[:, :, -1]),
         t=t,

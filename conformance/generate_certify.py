@@ -1,9 +1,10 @@
 """From a question to a certified vector: the reference proves, a second arithmetic proves again.
 
-Steps: every certificate of the reference is re-proved in Arb, and the enclosures that are written down (24
-decimals, rounded outward) hold the re-proved ones. Trajectories: the walls' order is the reference's; each
-step from the rounded state before it is re-proved to meet the same wall first, and the written enclosures
-are re-proved along the whole path by `conformance.generate_chain`.
+Steps: every certificate of the reference, undefined outcomes included, is re-proved in Arb, and the
+enclosures that are written down (24 decimals, rounded outward) hold the re-proved ones. Trajectories: the
+whole path is re-proved, each step from the box that the one before leads to (`conformance.generate_path`);
+each step from the rounded state before it is re-proved to meet the same wall first; and the written
+enclosures are re-proved along the whole path by `conformance.generate_chain`.
 """
 
 from __future__ import annotations
@@ -19,10 +20,11 @@ import msgspec
 import reference
 from conformance.error import condition_number
 from conformance.generate_chain import recheck
+from conformance.generate_path import check_path
 from conformance.generate_proof import check
 from conformance.vectors import NUMBERS, Certified, Enclosure, Expectation, Level, Vector
 from reference.arithmetic import rational
-from reference.certificate import certificate
+from reference.certificate import certificate, path_certificate
 from scene import BadInput, InvalidState, Rejected, Scene, State, Undecided, Undefined, Wall, from_data
 
 DIGITS = 24  # written; the reference encloses to more
@@ -139,6 +141,7 @@ def _step(scene: Scene, question: Question) -> _Proved:
     if isinstance(outcome, Rejected):
         return _Proved((Expectation("rejected"),))
     if isinstance(outcome, Undefined):
+        check(certificate(scene, state, t_end, outcome))
         # A stepper in binary64 may find the tie within rounding, and say no more than that.
         undefined = Expectation("undefined", reason=outcome.reason)
         return _Proved((undefined, Expectation("undecided")), inf)
@@ -166,6 +169,7 @@ def _trajectory(scene: Scene, question: Question) -> _Proved:
         path = reference.trajectory(scene, question.state, question.collisions, question.t_end)
     except InvalidState as error:
         raise Unfit(str(error)) from None
+    check_path(path_certificate(scene, question.state, question.t_end, path))
     links = _Links(scene, question.state, question.t_end)
     steps: list[Certified] = []
     for found in path.steps:

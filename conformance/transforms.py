@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import Any
 
 import msgspec
-from mpmath import fp
+from mpmath import MPContext, fp
 
 from scene import BangBang, Fourier, Law, Scene, State, Wall
 from scene.laws import value
@@ -67,8 +67,13 @@ def backwards(scene: Scene) -> Scene:
 
 
 def frozen(scene: Scene, t: float) -> Scene:
-    """Return the static scene with the parameters that it has at time t, rounded."""
-    return _with_laws(scene, lambda _, law: float(value(fp, law, t)))
+    """Return the static scene with the parameters that it has at time t, rounded.
+
+    They are computed to 50 digits and rounded once, so that parameters which touch (w = r, nu = 1) still do.
+    """
+    ctx = MPContext()
+    ctx.dps = 50
+    return _with_laws(scene, lambda _, law: float(value(ctx, law, t)))
 
 
 def idle(scene: Scene) -> Scene:

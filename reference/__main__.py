@@ -3,14 +3,14 @@
 import sys
 import time
 
-from reference import stepper
+from reference import answers, stepper
 from scene import Outcome, Scene, State
 from scene.wire import serve
 
 
-def rounded(outcome: stepper.Outcome) -> Outcome:
+def rounded(outcome: answers.Outcome) -> Outcome:
     """Return a proved outcome with its numbers rounded to binary64."""
-    return outcome.rounded() if isinstance(outcome, stepper.Collision | stepper.Horizon) else outcome
+    return outcome.rounded() if isinstance(outcome, answers.Collision | answers.Horizon) else outcome
 
 
 def step(scene: Scene, state: State, t_end: float) -> Outcome:

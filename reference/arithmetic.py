@@ -15,11 +15,13 @@ from typing import Any, NamedTuple
 
 import mpmath
 from mpmath.ctx_iv import MPIntervalContext
-from mpmath.libmp import libmpf, libmpi
+from mpmath.libmp import libelefun, libmpf, libmpi
 
 Interval = Any  # mpmath's ivmpf, which has no type stubs
 
 BITS_PER_DIGIT = 3.3219280948873626
+MAX_WORK = 100_000.0  # of one step
+LONG_NUMBER = 1024  # bits; a number so long costs twice as much as a short one
 _FLOOR = "f"
 # mpmath keeps pi and the precision it was computed to in two variables that all contexts share:
 # a thread that reads one before and the other after a change would get a wrong pi.
@@ -28,6 +30,35 @@ _CONSTANTS = threading.Lock()
 
 class Undecidable(Exception):  # noqa: N818 (not an error of the caller: precision is raised)
     """At this precision the question stays open."""
+
+
+class Exhausted(Undecidable):
+    """The work allowed for one step is used up; more precision would not help."""
+
+
+class Work:
+    """What one step may cost, over all the precisions it tries.
+
+    The unit is one evaluation of a parabola at few digits; long numbers cost in proportion. Counted,
+    not timed, so that an answer never depends on the machine.
+
+    Args:
+        limit: units allowed.
+    """
+
+    def __init__(self, limit: float = MAX_WORK) -> None:
+        self.limit = limit
+        self.spent = 0.0
+
+    def spend(self, units: float) -> None:
+        """Count some work.
+
+        Raises:
+            Exhausted: when it is more than allowed.
+        """
+        self.spent += units
+        if self.spent > self.limit:
+            raise Exhausted(f"more than {self.limit:.0f} evaluations of the laws")
 
 
 class Enclosure(NamedTuple):
@@ -44,9 +75,13 @@ class Enclosure(NamedTuple):
         """Return (lo + hi) / 2, exactly."""
         return (rational(self.lo._mpf_) + rational(self.hi._mpf_)) / 2
 
+    def extent(self) -> Fraction:
+        """Return hi - lo, exactly."""
+        return rational(self.hi._mpf_) - rational(self.lo._mpf_)
+
     def width(self) -> float:
         """Return hi - lo, rounded."""
-        return float(rational(self.hi._mpf_) - rational(self.lo._mpf_))
+        return float(self.extent())
 
     def contains(self, number: float | Fraction) -> bool:
         """Tell exactly whether a number lies within."""
@@ -64,19 +99,38 @@ class Arithmetic:
 
     Args:
         digits: working decimals.
+        work: what is left to spend; None begins anew.
     """
 
-    def __init__(self, digits: int) -> None:
+    def __init__(self, digits: int, work: Work | None = None) -> None:
         self.digits = digits
+        self.work = Work() if work is None else work
         self.context = MPIntervalContext()
         self.context.prec = self.prec = int(digits * BITS_PER_DIGIT) + 8
         self.zero: Interval = self.context.mpf(0)
+
+    def spend(self, units: int) -> None:
+        """Count evaluations of a law at this precision.
+
+        Raises:
+            Exhausted: when the step has cost more than is allowed.
+        """
+        self.work.spend(units * (1 + self.prec / LONG_NUMBER))
 
     def number(self, value: float | int | Fraction) -> Interval:
         """Enclose a number: exactly when it is a float or a short integer."""
         if isinstance(value, Fraction):
             return self.context.mpf(value.numerator) / self.context.mpf(value.denominator)
         return self.context.mpf(value)
+
+    def dyadic(self, value: Fraction) -> Interval:
+        """Return the thin interval at a rational whose denominator is a power of two, exactly."""
+        shift = value.denominator.bit_length() - 1
+        return self.point(libmpf.from_man_exp(value.numerator, -shift))
+
+    def between(self, low: Fraction, high: Fraction) -> Interval:
+        """Return the interval between two such rationals, exactly."""
+        return self.hull(self.dyadic(low), self.dyadic(high))
 
     def point(self, raw: Any) -> Interval:
         """Return the thin interval at a raw mpf."""
@@ -122,6 +176,11 @@ class Arithmetic:
             raise Undecidable("disjoint enclosures of one number")
         return self.context.make_mpf((lo, hi))
 
+    def inflated(self, x: Interval) -> Interval:
+        """Return a slightly wider interval, so that another arithmetic can show that it holds the same."""
+        margin = self.upper(x.delta) * self.power_of_two(-6)
+        return self.hull(self.lower(x - margin), self.upper(x + margin))
+
     def square(self, x: Interval) -> Interval:
         """Return x^2, never below 0."""
         return self.context.make_mpf(libmpi.mpi_square(x._mpi_, self.prec))
@@ -135,6 +194,39 @@ class Arithmetic:
         with _CONSTANTS:
             cos, sin = libmpi.mpi_cos_sin(x._mpi_, self.prec)
         return self.context.make_mpf(cos), self.context.make_mpf(sin)
+
+    def turning(
+        self, omega: float | None, period: float | None, instant: Fraction
+    ) -> tuple[Interval, Interval]:
+        """Enclose the angular frequency, and the phase omega t at an instant, less whole turns.
+
+        Args:
+            omega: angular frequency, or None where the period is given [1/time].
+            period: the period, or None [time].
+            instant: t, exactly [time].
+        """
+        if period is not None:
+            turn = 2 * self._pi(self.prec)
+            part = instant / Fraction(period) % 1
+            return turn / self.number(period), self.number(part) * turn
+        assert omega is not None
+        angle = Fraction(omega) * instant
+        if abs(angle) < 8:
+            return self.number(omega), self.dyadic(angle)
+        pi = self._pi(self.prec + abs(angle.numerator // angle.denominator).bit_length() + 8)
+        half_turns = rational(pi._mpi_[0]), rational(pi._mpi_[1])
+        n = angle // (2 * half_turns[0])  # whole turns: any number of them may be taken off
+        ends = [angle - 2 * n * half_turn for half_turn in half_turns]
+        return self.number(omega), self.between(min(ends), max(ends))
+
+    def is_full_turn(self, omega: Interval, length: Fraction) -> bool:
+        """Tell whether omega times a length of time is surely 2 pi or more: 7 is asked for."""
+        return not libmpf.mpf_lt((omega * self.number(length))._mpi_[0], libmpf.from_int(7))
+
+    def _pi(self, bits: int) -> Interval:
+        with _CONSTANTS:
+            low, high = libelefun.mpf_pi(bits, _FLOOR), libelefun.mpf_pi(bits, "c")
+        return self.context.make_mpf((low, high))
 
     def enclosure(self, x: Interval) -> Enclosure:
         """Return the ends as exact numbers, free of this context."""

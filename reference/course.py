@@ -1,60 +1,73 @@
 """One flight from a state to its first collision, at one working precision.
 
-The straight flight is cut where a law leaves an analytic piece and where it crosses y = 0; on
-each part the walls that can be met there are searched left first (`reference.isolation`). All
-quantities are enclosures, so a trajectory may chain flights; what a precision leaves open is
-raised as `Undecidable`, and equalities are settled by `reference.rational` alone.
+Where the straight flight crosses y = 0 it passes from one part of the table to the other; on each
+part the walls that bound it are searched left first (`reference.isolation`). All quantities are
+enclosures but the instant from which flight times are counted, so a trajectory may chain flights;
+what a precision leaves open is raised as `Undecidable`, and equalities are settled by
+`reference.rational` alone. docs/proof.md says what each answer claims and why it follows.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import partial
-from itertools import zip_longest
 from typing import NamedTuple
 
 from reference import rational
 from reference.arithmetic import Arithmetic, Interval, Undecidable, is_below, sign
 from reference.arithmetic import rational as exact_point
 from reference.isolation import Isolator, Leaf, Root
-from reference.jets import Flight, Motion, Pieces
+from reference.motion import Flight, Motion
 from scene import Cap, Mushroom, Scene, State, Stem, Undefined, Wall
-from scene.laws import Quadratic, bounds, piece_at
-from scene.tables import laws, period
+from scene.laws import bounds
+from scene.tables import laws
 
 SIDES: tuple[Wall, ...] = ("left", "right", "floor")
-MAX_SKIPS = 80
 BEYOND = 2.0**-10
-MAX_SPANS = 20_000  # a flight at 1e-3 of the walls' speed crosses some thousand
-
-
-class Span(NamedTuple):
-    """A stretch of flight time on which every law stays on one piece."""
-
-    start: Interval
-    end: Interval
-    motion: Motion
+FOR_EVER = 2.0**1000
 
 
 class Hit(NamedTuple):
-    """A wall met: when (enclosed), with f' there, and the law pieces that may hold then.
-
-    There are two motions where the time's enclosure holds a knot: the truth is in their hull.
-    """
+    """A wall met: when (enclosed, flight time), with f' there, and the walls' motion."""
 
     wall: Wall
     time: Interval
     slope: Interval
-    motions: tuple[Motion, ...]
+    motion: Motion
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """What proves that a flight ends nowhere.
+
+    Attributes:
+        instant: the flight time at which it ends, exactly; None for one that is enclosed by a root.
+        walls: those that are met together then, or the one at which the start is undefined.
+        roots: for each of them but the base, an interval that holds its first root.
+        excluded: for each wall, the sub-intervals on which f > 0 is proved.
+    """
+
+    instant: Fraction | None
+    walls: tuple[Wall, ...]
+    roots: dict[Wall, Interval] = field(default_factory=dict)
+    excluded: dict[str, list[Leaf]] = field(default_factory=dict)
 
 
 class Event(NamedTuple):
-    """How a flight ends: at a hit, at the horizon (hit None), or nowhere (undefined)."""
+    """How a flight ends: at a hit, at the horizon (hit None), or nowhere (undefined, for a reason)."""
 
     hit: Hit | None
     undefined: Undefined | None
     proof: dict[str, list[Leaf]]
+    evidence: Evidence | None = None
+
+
+class Tie(NamedTuple):
+    """Two walls met together: why that is undefined, and its proof."""
+
+    undefined: Undefined
+    evidence: Evidence
 
 
 class Course:
@@ -66,7 +79,7 @@ class Course:
         flight: enclosures of the state.
         leaving: walls the particle is on, each with its residual f(0).
         flat: walls among them with f'(0) = 0 and f''(0) > 0, both exactly.
-        end: horizon as flight time, enclosed.
+        end: horizon as flight time, exactly; None for none.
         exact: the state as binary64 numbers, when it is one; decides ties.
     """
 
@@ -77,7 +90,7 @@ class Course:
         flight: Flight,
         leaving: dict[Wall, Interval],
         flat: frozenset[Wall],
-        end: Interval,
+        end: Fraction | None,
         exact: State | None,
     ) -> None:
         self.scene = scene
@@ -86,25 +99,25 @@ class Course:
         self.leaving = leaving
         self.flat = flat
         self.end = end
+        self.horizon = arithmetic.number(FOR_EVER) if end is None else arithmetic.dyadic(end)
         self.exact = exact
+        self.motion = Motion(arithmetic, scene, flight)
+        self.start = arithmetic.lower(flight.begin)
         self.proof: dict[str, list[Leaf]] = {}
 
     def event(self, *, in_cap: bool) -> Event:
         """Find how the flight ends."""
         if self._runs_along_mouth():
-            hit = self._first_hit(("left", "right"), self.arithmetic.zero, self.end)
-            if isinstance(hit, Hit):
-                hit = Undefined("mouth-edge")
-            return Event(None, hit, self.proof)
+            return self._along_mouth()
         crossing = self._crossing(in_cap=in_cap)
         is_crossed = crossing is not None and self._is_before_end(crossing)
-        limit = crossing if crossing is not None and is_crossed else self.end
+        limit = crossing if is_crossed else None
         near: tuple[Wall, ...] = ("arc",) if in_cap else SIDES
-        found = self._first_hit(near, self.arithmetic.zero, limit)
-        if found is None and crossing is not None and is_crossed:
-            found = self._beyond_crossing(crossing, in_cap=in_cap)
-        if isinstance(found, Undefined):
-            return Event(None, found, self.proof)
+        found = self._first_hit(near, self.start, limit)
+        if found is None and limit is not None:
+            found = self._beyond_crossing(limit, in_cap=in_cap)
+        if isinstance(found, Tie):
+            return Event(None, found.undefined, self.proof, found.evidence)
         return Event(found, None, self.proof)
 
     def hit_after(self, wall: Wall, start: Interval) -> Interval | None:
@@ -112,12 +125,22 @@ class Course:
         if wall == "base":
             crossing = self._crossing(in_cap=not isinstance(self.scene, Stem))
             return crossing if crossing is not None and is_below(start, crossing) else None
-        hit = self._hit(wall, start, self.end)
+        hit = self._hit(wall, start, self.horizon)
         return None if hit is None else hit.time
 
     def _runs_along_mouth(self) -> bool:
         is_level = self.exact is not None and self.exact.y == 0 and self.exact.vy == 0
         return isinstance(self.scene, Mushroom) and is_level and not self.leaving
+
+    def _along_mouth(self) -> Event:
+        """Follow a path along y = 0 inside the mouth: it can only end at the mouth's edge."""
+        hits = self._hits(("left", "right"), self.start, None)
+        if not hits:
+            return Event(None, None, self.proof)
+        self._require_before_end(hits[-1])
+        roots = {hit.wall: hit.time for hit in hits}
+        walls = tuple(roots)
+        return Event(None, Undefined("mouth-edge"), self.proof, Evidence(None, walls, roots, self.proof))
 
     def _crossing(self, *, in_cap: bool) -> Interval | None:
         if "base" in self.leaving or sign(self.flight.vy) == 0:
@@ -125,206 +148,189 @@ class Course:
                 raise Undecidable("the sign of vy is open")
             return None
         is_towards = sign(self.flight.vy) == (-1 if in_cap else 1)
-        return -self.flight.y / self.flight.vy if is_towards else None
+        if not is_towards:
+            return None
+        crossing = self.arithmetic.inflated(-self.flight.y / self.flight.vy)
+        if not is_below(self.arithmetic.upper(self.flight.begin), crossing):
+            raise Undecidable("y = 0 is crossed within the enclosure of the start")
+        return crossing
 
     def _is_before_end(self, time: Interval) -> bool:
-        if is_below(time, self.end):
+        if is_below(time, self.horizon):
             return True
-        if is_below(self.end, time):
+        if is_below(self.horizon, time):
             return False
-        horizon = exact_point(self.end._mpi_[0]) if self.end.delta == 0 else None
-        if self.exact is None or horizon is None:
+        crossing = None if self.exact is None else rational.crossing_time(self.exact)
+        if crossing is None or self.end is None:
             raise Undecidable("horizon and event fall together")
-        crossing = rational.crossing_time(self.exact)
-        return crossing is not None and crossing < horizon
+        return crossing < self.end
 
-    def _beyond_crossing(self, crossing: Interval, *, in_cap: bool) -> Hit | Undefined | None:
+    def _beyond_crossing(self, crossing: Interval, *, in_cap: bool) -> Hit | Tie | None:
+        """Continue a flight that met nothing before y = 0: to the base, or through the mouth."""
         if isinstance(self.scene, Cap):
             return self._base_hit(crossing)
         x = self.flight.x + self.flight.vx * crossing
-        is_open = [0, 0]
-        for i, motion in enumerate(self._motions_at(crossing)):
-            w = motion.width(self.flight.t + crossing).f
-            signs = [sign(w - x), sign(w + x)]
-            is_open = signs if i == 0 or signs == is_open else [0, 0]
-        if 0 in is_open:
-            if self._is_tie(("left", "right"), None):
-                return Undefined("mouth-edge" if isinstance(self.scene, Mushroom) else "corner")
-            raise Undecidable("the mouth's edge is met, as far as this precision shows")
-        if isinstance(self.scene, Stem) or (in_cap and -1 in is_open):
+        w = self.motion.width(crossing).f
+        gaps: dict[Wall, Interval] = {"left": w + x, "right": w - x}
+        for wall, residual in self.leaving.items():
+            if wall in gaps:
+                gaps[wall] = gaps[wall] - residual
+        signs = [sign(gap) for gap in gaps.values()]
+        if in_cap and -1 in signs:
+            return self._base_hit(crossing)
+        if signs != [1, 1]:
+            return self._at_the_edge()
+        if isinstance(self.scene, Stem):
             return self._base_hit(crossing)
         walls: tuple[Wall, ...] = SIDES if in_cap else ("arc",)
-        return self._first_hit(walls, self.arithmetic.lower(crossing), self.end)
+        found = self._first_hit(walls, self.arithmetic.lower(crossing), None)
+        if isinstance(found, Hit) and not is_below(crossing, found.time):
+            raise Undecidable("a wall is met at the height of the mouth, as far as this precision shows")
+        return found
+
+    def _at_the_edge(self) -> Tie:
+        """Settle a crossing of y = 0 of which it is open whether it is within the sides."""
+        instant = None if self.exact is None else rational.crossing_time(self.exact)
+        if instant is None or self.exact is None:
+            raise Undecidable("the mouth's edge is met, as far as this precision shows")
+        walls: tuple[Wall, ...] = ("left", "right")
+        met = tuple(w for w in walls if rational.is_zero(self.scene, self.exact, w, instant))
+        if not met:
+            raise Undecidable("the mouth's edge is met, as far as this precision shows")
+        reason = Undefined("mouth-edge" if isinstance(self.scene, Mushroom) else "corner")
+        return Tie(reason, Evidence(instant, ("base", *met), {}, self.proof))
 
     def _base_hit(self, crossing: Interval) -> Hit:
         slope = -self.flight.vy if isinstance(self.scene, Stem) else self.flight.vy
-        return Hit("base", crossing, slope, self._motions_at(crossing))
+        return Hit("base", crossing, slope, self.motion)
 
-    def _first_hit(self, walls: tuple[Wall, ...], start: Interval, limit: Interval) -> Hit | Undefined | None:
-        hits: list[Hit] = []
-        until = limit
-        for wall in walls:
-            hit = self._hit(wall, start, until)
-            if hit is not None:
-                hits.append(hit)
-                until = hit.time
+    def _first_hit(
+        self, walls: tuple[Wall, ...], start: Interval, limit: Interval | None
+    ) -> Hit | Tie | None:
+        """Find which of some walls is met first, before y = 0 is crossed (`limit`) or the horizon."""
+        hits = self._hits(walls, start, limit)
         if not hits:
+            farthest = self._escape_time()
+            if limit is None and farthest is not None and is_below(farthest, self.horizon):
+                raise Undecidable("the flight leaves the table and no wall is found")
             return None
         best = hits[-1]
-        for other in hits[:-1]:
-            if not is_below(best.time, other.time):
-                return self._tied(walls, best.time)
-        if is_below(best.time, limit):
+        is_alone = all(is_below(best.time, other.time) for other in hits[:-1])
+        if is_alone and (limit is None or is_below(best.time, limit)):
+            self._require_before_end(best)
             return best
-        if limit is not self.end:
-            return self._tied((*walls, "base"), best.time)
-        if self._is_hit_at_horizon(best.wall):
-            return None
-        raise Undecidable("horizon and collision fall together")
+        return self._tied(hits, limit)
 
-    def _is_hit_at_horizon(self, wall: Wall) -> bool:
-        horizon = exact_point(self.end._mpi_[0]) if self.end.delta == 0 else None
-        if self.exact is None or horizon is None:
+    def _hits(self, walls: tuple[Wall, ...], start: Interval, limit: Interval | None) -> list[Hit]:
+        """Find the walls that may be met first; each later one in the list not after those before it.
+
+        What is met at the horizon exactly is not met before it.
+        """
+        until = self.horizon if limit is None else limit
+        hits = []
+        for wall in walls:
+            hit = self._hit(wall, start, until)
+            if hit is not None and not self._is_at_horizon(hit):
+                hits.append(hit)
+                until = hit.time
+        return hits
+
+    def _is_at_horizon(self, hit: Hit) -> bool:
+        """Tell whether a hit is known to fall on the horizon exactly."""
+        if self.exact is None or self.end is None or is_below(hit.time, self.horizon):
             return False
-        return rational.is_zero(self.scene, self.exact, wall, horizon)
+        return rational.is_zero(self.scene, self.exact, hit.wall, self.end)
 
-    def _tied(self, walls: tuple[Wall, ...], time: Interval) -> Undefined:
-        if self._is_tie(walls, time):
-            is_edge = isinstance(self.scene, Mushroom) and "base" in walls and "arc" not in walls
-            return Undefined("mouth-edge" if is_edge else "corner")
+    def _require_before_end(self, hit: Hit) -> None:
+        if not is_below(hit.time, self.horizon):
+            raise Undecidable("horizon and collision fall together")
+
+    def _tied(self, hits: list[Hit], limit: Interval | None) -> Tie:
+        """Settle which walls are met together, exactly, at a time that is rational.
+
+        Raises:
+            Undecidable: when no rational time shows it.
+        """
+        times = [] if self.exact is None else self._rational_times(self.exact)
+        for instant in times:
+            walls = self._met_at(instant, hits, limit)
+            if len(walls) > 1:
+                is_edge = isinstance(self.scene, Mushroom) and "base" in walls and "arc" not in walls
+                roots = {hit.wall: hit.time for hit in hits if hit.wall in walls}
+                reason = Undefined("mouth-edge" if is_edge else "corner")
+                return Tie(reason, Evidence(instant, walls, roots, self.proof))
         raise Undecidable("two walls are met together, as far as this precision shows")
 
-    def _is_tie(self, walls: tuple[Wall, ...], time: Interval | None) -> bool:
-        """Tell whether two walls vanish together at a rational time, exactly."""
-        if self.exact is None:
-            return False
-        # Only the crossing of y = 0 and the hit of a floor at rest have rational times.
-        for instant, own in (
-            (rational.crossing_time(self.exact), "base"),
-            (rational.floor_time(self.scene, self.exact), "floor"),
-        ):
-            if instant is None or (time is not None and instant not in _Within(time)):
-                continue
-            if any(w != own and rational.is_zero(self.scene, self.exact, w, instant) for w in walls):
-                return True
-        return False
+    def _rational_times(self, state: State) -> list[Fraction]:
+        """List the flight times, before the horizon, at which straight walls that stand still are met."""
+        times = [rational.crossing_time(state)]
+        times += [rational.straight_time(self.scene, state, wall) for wall in SIDES]
+        return [time for time in times if time is not None and (self.end is None or time < self.end)]
 
-    def _hit(self, wall: Wall, start: Interval, limit: Interval) -> Hit | None:
-        leaves = self.proof.setdefault(wall, [])
-        stop = self.arithmetic.upper(limit)
+    def _met_at(self, instant: Fraction, hits: list[Hit], limit: Interval | None) -> tuple[Wall, ...]:
+        """List the walls met exactly then, when all others are met later; else nothing."""
+        assert self.exact is not None
+        met: list[Wall] = []
+        if limit is not None:
+            crossing = rational.crossing_time(self.exact)
+            if crossing is None or crossing < instant:
+                return ()
+            met += ["base"] if crossing == instant else []
+        for hit in hits:
+            low, high = (exact_point(end) for end in hit.time._mpi_)
+            is_met = low <= instant <= high and rational.is_zero(self.scene, self.exact, hit.wall, instant)
+            if is_met:
+                met.append(hit.wall)
+            elif low <= instant:
+                return ()
+        return tuple(met)
+
+    def _hit(self, wall: Wall, start: Interval, until: Interval) -> Hit | None:
+        """Find the first root of one wall's function, if it may come before the end of `until`."""
+        stop = self.arithmetic.upper(until)
         farthest = self._escape_time()
-        if farthest is not None and is_below(farthest, stop):
+        is_cut = farthest is not None and is_below(farthest, stop)
+        if is_cut and farthest is not None:
             stop = farthest
-        residual = self.leaving.get(wall)
-        if residual is None and self._is_long(start, stop):
-            start = self._skip(wall, start, stop, leaves)
-        spans = list(self._spans(start, stop))
-        for span, following in zip_longest(spans, spans[1:]):
-            isolator = self._isolator(wall, span.motion)
-            is_at_start = residual is not None and sign(span.start) == 0
-            if not is_at_start and sign(isolator.value(span.start)) <= 0:
-                raise Undecidable(f"f of {wall} has no sign where a stretch of the flight begins")
-            # A little beyond the end, where f goes on smoothly, so that a root at the end is isolated.
-            end = self.arithmetic.upper(span.end + (span.end - span.start) * BEYOND)
-            root = isolator.first_root(span.start, end)
-            leaves.extend(isolator.leaves)
-            if root is None or is_below(span.end, root.time):
-                continue
-            if following is None or is_below(root.time, self.arithmetic.lower(following.start)):
-                return Hit(wall, root.time, root.slope, (span.motion,))
-            return self._hit_at_knot(wall, root, span, following)
-        return None
+        isolator = self._isolator(wall)
+        if wall not in self.leaving and sign(isolator.value(start)) <= 0:
+            raise Undecidable(f"f of {wall} has no sign where a stretch of the flight begins")
+        # A little beyond the end, where f goes on, so that a root at the end is isolated.
+        end = self.arithmetic.upper(stop + (stop - start) * BEYOND)
+        root: Root | None = None
+        if is_below(start, end):
+            root = isolator.first_root(start, end)
+        self.proof.setdefault(wall, []).extend(isolator.leaves)
+        if root is None or is_below(stop, root.time):
+            return None
+        return Hit(wall, root.time, root.slope, self.motion)
 
-    def _isolator(self, wall: Wall, motion: Motion) -> Isolator:
-        residual = self.leaving.get(wall)
-        return Isolator(self.arithmetic, partial(motion.wall, wall), residual, is_flat=wall in self.flat)
-
-    def _hit_at_knot(self, wall: Wall, root: Root, span: Span, following: Span) -> Hit:
-        # The truth is a root of the piece before the knot or of the one after: take the hull of both.
-        before = self.arithmetic.lower(root.time - (root.time - span.start) * BEYOND)
-        isolator = self._isolator(wall, following.motion)
-        after = self.arithmetic.upper(following.start + (following.start - before))
-        if sign(isolator.value(before)) <= 0:
-            raise Undecidable("the pieces on both sides of a knot disagree")
-        other = isolator.first_root(before, after)
-        if other is None:
-            raise Undecidable("the pieces on both sides of a knot disagree")
-        times, slopes = (root.time, other.time), (root.slope, other.slope)
-        return Hit(
-            wall, self.arithmetic.union(times), self.arithmetic.union(slopes), (span.motion, following.motion)
+    def _isolator(self, wall: Wall) -> Isolator:
+        return Isolator(
+            self.arithmetic,
+            partial(self.motion.wall, wall),
+            self.flight.begin,
+            self.leaving.get(wall),
+            is_flat=wall in self.flat,
+            timeline=self.motion.timeline,
         )
 
-    def _is_long(self, start: Interval, stop: Interval) -> bool:
-        shared = period(self.scene)
-        if shared is None:
-            return False
-        span = self.arithmetic.context.mpf(2) * shared.value(self.arithmetic.context)
-        return is_below(start + span, stop)
-
-    def _skip(self, wall: Wall, start: Interval, stop: Interval, leaves: list[Leaf]) -> Interval:
-        """Pass what the wall never sweeps, all laws anywhere within their bounds; for slow particles."""
-        ranges: Pieces = {name: bounds(law) for name, law in laws(self.scene).items()}
-        motion = Motion(self.arithmetic, self.flight, ranges, is_stem=isinstance(self.scene, Stem))
-        end = stop
-        for _ in range(MAX_SKIPS):
-            if sign(motion.wall(wall, self.arithmetic.hull(start, end)).f) > 0:
-                leaves.append(Leaf(start, end, "swept"))
-                if end._mpi_ == stop._mpi_:
-                    return stop
-                start, end = end, stop
-            else:
-                end = self.arithmetic.middle(self.arithmetic.hull(start, end))
-        return start
-
-    def _motions_at(self, time: Interval) -> tuple[Motion, ...]:
-        spans = self._spans(self.arithmetic.lower(time), self.arithmetic.upper(time))
-        return tuple(span.motion for span in spans)
-
-    def _spans(self, start: Interval, stop: Interval) -> Iterator[Span]:
-        """Cut [start, stop] where a law leaves an analytic piece; at least one span."""
-        moment, high = (exact_point(end) for end in (self.flight.t + start)._mpi_)
-        if sign(start) == 0:
-            moment, high = (exact_point(end) for end in self.flight.t._mpi_)
-        is_first = sign(start) == 0
-        for _ in range(MAX_SPANS):
-            pieces: Pieces = {name: piece_at(law, moment) for name, law in laws(self.scene).items()}
-            ends = [piece.end for piece in pieces.values() if isinstance(piece, Quadratic)]
-            motion = Motion(self.arithmetic, self.flight, pieces, is_stem=isinstance(self.scene, Stem))
-            knot = min(ends, default=None)
-            if knot is not None and is_first and knot <= high:
-                raise Undecidable("a knot lies within the enclosure of the starting time")
-            cut = None if knot is None else self.arithmetic.number(knot) - self.flight.t
-            if knot is None or cut is None or not is_below(cut, stop):
-                yield Span(start, stop, motion)
-                return
-            if is_below(start, cut):
-                yield Span(start, self.arithmetic.upper(cut), motion)
-                start = self.arithmetic.lower(cut)
-            moment, is_first = knot, False
-        raise Undecidable(f"more than {MAX_SPANS} knots lie within the flight")
-
     def _escape_time(self) -> Interval | None:
-        # Twice the time to cross the largest extent the table ever has, along either axis.
+        """Return a time by which the straight flight has left the table, wherever its walls are.
+
+        It is twice the time to cross the largest extent the table ever has, along either axis.
+        """
         tops = {name: bounds(law) for name, law in laws(self.scene).items()}
         radius = tops["r"].highest if "r" in tops else 0.0
         depth = tops["h"].highest if "h" in tops else 0.0
         tilt = max(abs(tops["slope"].lowest), abs(tops["slope"].highest)) if "slope" in tops else 0.0
-        half = max(radius, tops["w"].highest if "w" in tops else 0.0) + tilt * depth
+        number, upper = self.arithmetic.number, self.arithmetic.upper
+        half = number(max(radius, tops["w"].highest if "w" in tops else 0.0)) + number(tilt) * number(depth)
         times = []
-        for speed, extent in ((self.flight.vx, 2 * half), (self.flight.vy, radius + depth)):
+        for speed, extent in ((self.flight.vx, 2 * half), (self.flight.vy, number(radius) + number(depth))):
             if sign(speed) != 0:
                 size = speed if sign(speed) > 0 else -speed
-                times.append(self.arithmetic.upper(2 * self.arithmetic.number(extent) / size))
+                times.append(upper(2 * extent / size))
         if not times:
             return None
         return times[0] if len(times) == 1 or is_below(times[0], times[1]) else times[1]
-
-
-class _Within:
-    """Membership of exact numbers in an interval."""
-
-    def __init__(self, interval: Interval) -> None:
-        self.low, self.high = (exact_point(end) for end in interval._mpi_)
-
-    def __contains__(self, number: Fraction) -> bool:
-        return self.low <= number <= self.high

@@ -8,9 +8,17 @@ f >= 0 at its left end, in one of six ways:
     concave  f'' <= 0 on it and f > 0 at its right end;
     centred  f(m) + f'(I)(I - m) > 0, m inside I;
     lifting  f'' > 0 on it, f = f' = 0 exactly at its left end, the start.
-A stretch that a wall never reaches, its laws anywhere within their bounds, is marked `swept`.
+`swept` is `plain` over so long a time that every law is taken anywhere within its range.
 A root is accepted only on an interval with f' < 0 throughout, f > 0 at its left end and f < 0
 at its right one. What none of this decides is bisected, then refused (`Undecidable`).
+
+f is continuously differentiable, also across the knots of its laws; f'' may jump there, and is
+enclosed with all its one-sided values. Each of the six arguments, interval Newton, and the
+uniqueness of the root ask for no more than that, so an interval may hold knots.
+
+On the wall being left, f stands for f - f(0), and f = 0 where the flight begins. That moment may
+be enclosed only (`begin`): then every sub-interval that does not begin after it must rise, or be
+concave and hold all of it.
 """
 
 from __future__ import annotations
@@ -19,10 +27,12 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 from reference.arithmetic import Arithmetic, Interval, Undecidable, is_at_most_zero, is_below, sign
+from reference.arithmetic import rational as exact_point
 from reference.jets import Jet
+from reference.timeline import Timeline
 
 MAX_LEAVES = 4000
-MAX_DEPTH_PER_DIGIT = 8
+MAX_NEWTON = 200
 
 
 class Leaf(NamedTuple):
@@ -49,17 +59,28 @@ class Isolator:
     Args:
         arithmetic: the working precision.
         jet: f, f', f'' over an interval of flight time.
+        begin: encloses the flight time at which the flight begins.
         residual: f(0) when the particle leaves this wall (the root s = 0 is divided out), else None.
         is_flat: f(0) = f'(0) = 0 exactly, so that only f'' > 0 can prove the start.
+        timeline: knows the laws' knots, at which intervals are best cut; None for a smooth function.
     """
 
     def __init__(
-        self, arithmetic: Arithmetic, jet: Function, residual: Interval | None, *, is_flat: bool = False
+        self,
+        arithmetic: Arithmetic,
+        jet: Function,
+        begin: Interval,
+        residual: Interval | None = None,
+        *,
+        is_flat: bool = False,
+        timeline: Timeline | None = None,
     ) -> None:
         self.arithmetic = arithmetic
         self.jet = jet
+        self.begin = begin
         self.residual = residual
         self.is_flat = is_flat
+        self.timeline = timeline
         self.leaves: list[Leaf] = []
 
     def value(self, s: Interval) -> Interval:
@@ -71,52 +92,132 @@ class Isolator:
         """Find the first root in (start, end], or prove that there is none.
 
         Args:
-            start: thin interval; that f > 0 there, or f = 0 and rising, is the caller's claim.
+            start: thin interval; that f > 0 there, or that the flight begins there on this wall and
+                f = 0, is the caller's claim.
             end: thin interval.
 
         Raises:
             Undecidable: when this precision cannot tell.
         """
-        todo = [(start, end, 0)]
-        max_depth = MAX_DEPTH_PER_DIGIT * self.arithmetic.digits + 64
+        todo = [(start, end)]
         while todo:
-            a, b, depth = todo.pop()
-            if depth > max_depth or len(self.leaves) > MAX_LEAVES:
-                raise Undecidable("f and f' vanish together, as far as this precision shows")
+            a, b = todo.pop()
+            if len(self.leaves) > MAX_LEAVES:
+                raise Undecidable(f"more than {MAX_LEAVES} sub-intervals are needed")
             whole = self.arithmetic.hull(a, b)
-            jet = self.jet(whole)
-            if sign(jet.f if self.residual is None else jet.f - self.residual) > 0:
-                self.leaves.append(Leaf(a, b, "plain"))
+            jet = self._sharpened(a, b, whole)
+            kind = self._kind(a, b, whole, jet)
+            if kind is not None:
+                self.leaves.append(Leaf(a, b, kind))
                 continue
-            slope = self.arithmetic.zero if jet.d1 is None else jet.d1
-            is_concave = jet.d2 is None or is_at_most_zero(jet.d2)
-            if sign(slope) > 0:
-                self.leaves.append(Leaf(a, b, "rising"))
-                continue
-            if self.is_flat and a is start and jet.d2 is not None and sign(jet.d2) > 0:
-                self.leaves.append(Leaf(a, b, "lifting"))
-                continue
-            if sign(slope) < 0 or is_concave:
-                at_end = sign(self.value(b))
-                if at_end > 0:
-                    self.leaves.append(Leaf(a, b, "falling" if sign(slope) < 0 else "concave"))
-                    continue
-                if at_end < 0 and sign(slope) < 0:
-                    return self._refine(a, b)
-            elif self._is_centred_positive(whole, slope):
-                self.leaves.append(Leaf(a, b, "centred"))
-                continue
-            middle = self._split(a, b)
-            todo += [(middle, b, depth + 1), (a, middle, depth + 1)]
+            is_falling = jet.d1 is not None and sign(jet.d1) < 0
+            if is_falling and not self._may_begin(a) and sign(self.value(b)) < 0:
+                return self._refine(a, b)
+            todo += reversed(self._parts(a, b, whole, jet))
         return None
 
+    def _sharpened(self, a: Interval, b: Interval, whole: Interval) -> Jet:
+        """Evaluate f and its derivatives over an interval; f' from its ends where it is monotonic."""
+        jet = self.jet(whole)
+        if jet.d1 is None or jet.d2 is None or sign(jet.d1) != 0 or sign(jet.d2) == 0:
+            return jet
+        first, last = self.jet(a).d1, self.jet(b).d1
+        return jet._replace(d1=self.arithmetic.intersection(jet.d1, self.arithmetic.union([first, last])))
+
+    def _may_begin(self, a: Interval) -> bool:
+        """Tell whether the flight may begin, on this wall, at a or later."""
+        return self.residual is not None and not is_below(self.arithmetic.upper(self.begin), a)
+
+    def _kind(self, a: Interval, b: Interval, whole: Interval, jet: Jet) -> str | None:
+        """Say what proves f > 0 on (a, b]; None when nothing does."""
+        slope = self.arithmetic.zero if jet.d1 is None else jet.d1
+        is_concave = jet.d2 is None or is_at_most_zero(jet.d2)
+        if self._may_begin(a):
+            is_all_within = is_below(self.begin, b) and not is_below(self.arithmetic.lower(self.begin), a)
+            if sign(slope) > 0:
+                return "rising"
+            if self.is_flat and jet.d2 is not None and sign(jet.d2) > 0:
+                return "lifting"
+            return "concave" if is_concave and is_all_within and sign(self.value(b)) > 0 else None
+        if sign(jet.f if self.residual is None else jet.f - self.residual) > 0:
+            return "swept" if self._is_whole(whole) else "plain"
+        if sign(slope) > 0:
+            return "rising"
+        if sign(slope) < 0 or is_concave:
+            if sign(self.value(b)) > 0:
+                return "falling" if sign(slope) < 0 else "concave"
+            return None
+        return "centred" if self._is_centred_positive(whole, slope) else None
+
+    def _is_whole(self, whole: Interval) -> bool:
+        if self.timeline is None:
+            return False
+        low, high = map(exact_point, whole._mpi_)
+        return self.timeline.is_whole(high - low)
+
+    def _parts(self, a: Interval, b: Interval, whole: Interval, jet: Jet) -> list[tuple[Interval, Interval]]:
+        """Cut an interval: around its least value where f is convex, at a knot, or half way."""
+        is_convex = jet.d2 is not None and sign(jet.d2) > 0
+        if is_convex and jet.d1 is not None and sign(jet.d1) == 0 and not self._may_begin(a):
+            bottom = self._bottom(whole)
+            if bottom is not None:
+                return self._around(a, b, bottom)
+        middle = self._split(a, b)
+        return [(a, middle), (middle, b)]
+
+    def _bottom(self, whole: Interval) -> Interval | None:
+        """Enclose where a convex f is least, by interval Newton on f'; None when that is at an end."""
+        where = whole
+        for _ in range(MAX_NEWTON):
+            middle = self.arithmetic.middle(where)
+            rate, bend = self.jet(middle).d1, self.jet(where).d2
+            assert rate is not None
+            assert bend is not None
+            image = middle - rate / bend
+            if is_below(image, where) or is_below(where, image):
+                return None
+            narrower = self.arithmetic.intersection(where, image)
+            if not is_below(2 * narrower.delta, where.delta):
+                return narrower
+            where = narrower
+        return where
+
+    def _around(self, a: Interval, b: Interval, bottom: Interval) -> list[tuple[Interval, Interval]]:
+        """Cut out the bottom: left of it f falls, right of it f rises."""
+        low, high = self.arithmetic.lower(bottom), self.arithmetic.upper(bottom)
+        if not (is_below(a, low) and is_below(high, b)):
+            middle = self._split(a, b)
+            return [(a, middle), (middle, b)]
+        at_bottom = sign(self.value(low))
+        if at_bottom > 0 and not self._is_positive(bottom):
+            at_bottom = 0
+        if at_bottom == 0:
+            raise Undecidable("f and f' vanish together, as far as this precision shows")
+        return [(a, low), (low, high), (high, b)] if is_below(low, high) else [(a, low), (low, b)]
+
+    def _is_positive(self, whole: Interval) -> bool:
+        jet = self.jet(whole)
+        f = jet.f if self.residual is None else jet.f - self.residual
+        assert jet.d1 is not None
+        return sign(f) > 0 or self._is_centred_positive(whole, jet.d1)
+
     def _split(self, a: Interval, b: Interval) -> Interval:
-        # A point where f has a sign, so that no sub-interval ends on a root.
-        for left, right in ((a, b), (a, self.arithmetic.middle(self.arithmetic.hull(a, b)))):
-            middle = self.arithmetic.middle(self.arithmetic.hull(left, right))
-            if is_below(a, middle) and is_below(middle, b) and sign(self.value(middle)) != 0:
-                return middle
+        """Return a point inside where f has a sign, so that no sub-interval ends on a root."""
+        half_way = self.arithmetic.middle(self.arithmetic.hull(a, b))
+        earlier = self.arithmetic.middle(self.arithmetic.hull(a, half_way))
+        later = self.arithmetic.middle(self.arithmetic.hull(half_way, b))
+        for point in (self._knot(a, b), half_way, earlier, later):
+            is_inside = point is not None and is_below(a, point) and is_below(point, b)
+            # While the flight may still begin, on the wall, no sign is asked for: f rises or is refused.
+            if is_inside and (self._may_begin(point) or sign(self.value(point)) != 0):
+                return point
         raise Undecidable("f has no sign where the interval is split")
+
+    def _knot(self, a: Interval, b: Interval) -> Interval | None:
+        if self.timeline is None:
+            return None
+        knot = self.timeline.knot_between(exact_point(a._mpi_[0]), exact_point(b._mpi_[0]))
+        return None if knot is None else self.arithmetic.dyadic(knot)
 
     def _is_centred_positive(self, whole: Interval, slope: Interval) -> bool:
         middle = self.arithmetic.middle(whole)
@@ -139,6 +240,8 @@ class Isolator:
 
     def _accepted(self, time: Interval, a: Interval) -> Root:
         # Strict signs at both ends of a somewhat wider interval, and the stretch before it.
+        if not is_below(self.arithmetic.upper(self.begin), time):
+            raise Undecidable("a wall is met within the enclosure of the start")
         least = self.arithmetic.upper(time) * self.arithmetic.power_of_two(8 - self.arithmetic.prec)
         margin = self.arithmetic.upper(time.delta + least)
         while True:

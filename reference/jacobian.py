@@ -12,7 +12,7 @@ from collections.abc import Iterator
 
 from reference.arithmetic import Arithmetic, Enclosure, Interval
 from reference.course import Hit
-from reference.jets import Flight
+from reference.motion import Flight
 
 Matrix = list[list[Interval]]
 
@@ -33,10 +33,10 @@ def step_jacobian(
         5 rows (outputs) of 5 columns (inputs), intervals.
     """
     zero, one = arithmetic.zero, arithmetic.number(1)
-    s, d = hit.time, hit.slope
-    motion = hit.motions[-1]  # at a knot the second derivatives jump: those just after it
-    f_x, f_y, f_t = motion.gradient(hit.wall, s)
-    f_xx, f_yy, f_yt, f_tt = motion.hessian(hit.wall, s)
+    s, d = hit.time - flight.begin, hit.slope
+    f_x, f_y, f_t = hit.motion.gradient(hit.wall, hit.time)
+    # At a knot the second derivatives jump: both sides' are enclosed, or those after it at an exact time.
+    f_xx, f_yy, f_yt, f_tt = hit.motion.hessian(hit.wall, hit.time)
     n2 = arithmetic.square(f_x) + arithmetic.square(f_y)
     columns = []
     for i in range(5):

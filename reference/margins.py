@@ -43,7 +43,7 @@ def neighbours(course: Course, wall: Wall) -> tuple[Wall, ...]:
 
 def distance(arithmetic: Arithmetic, hit: Hit, wall: Wall) -> Interval:
     """Enclose f / |grad f| of a wall at the hit."""
-    motion = hit.motions[-1]
+    motion = hit.motion
     f_x, f_y, _ = motion.gradient(wall, hit.time)
     length = arithmetic.context.sqrt(arithmetic.square(f_x) + arithmetic.square(f_y))
     return motion.wall(wall, hit.time).f / length

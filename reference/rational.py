@@ -9,8 +9,8 @@ from __future__ import annotations
 
 from fractions import Fraction
 
-from scene import Fourier, Law, Mushroom, Scene, State, Stem, Wall
-from scene.laws import Quadratic, piece_at
+from scene import Cap, Fourier, Law, Mushroom, Scene, State, Stem, Wall
+from scene.laws import Quadratic, is_constant, piece_at
 from scene.tables import laws, width_factors
 
 Jet = tuple[Fraction, Fraction, Fraction]
@@ -23,7 +23,7 @@ def law_jet(law: Law, time: Fraction) -> Jet | None:
         u = time - piece.origin
         return piece.c0 + u * (piece.c1 + u * piece.c2), piece.c1 + 2 * u * piece.c2, 2 * piece.c2
     if isinstance(piece, Fourier):
-        if time != 0:
+        if time != 0 or piece.omega is None:
             return None
         omega = Fraction(piece.omega)
         terms = [(k * omega, Fraction(a), Fraction(b)) for k, a, b in piece.harmonics()]
@@ -88,17 +88,26 @@ def crossing_time(state: State) -> Fraction | None:
     return -Fraction(state.y) / Fraction(state.vy)
 
 
-def floor_time(scene: Scene, state: State) -> Fraction | None:
-    """Return the exact flight time to a floor at rest, when it lies ahead."""
-    if not isinstance(scene, (Stem, Mushroom)) or state.vy >= 0:
+def straight_time(scene: Scene, state: State, wall: Wall) -> Fraction | None:
+    """Return the exact flight time to a straight wall of the stem at rest, when it lies ahead.
+
+    A wall being left that stands still is straight ahead of nothing: None.
+    """
+    if isinstance(scene, Cap) or wall == state.wall:
         return None
-    h = piece_at(scene.h, Fraction(state.t))
-    if isinstance(h, (Quadratic, Fourier)):
+    moving = (scene.h,) if wall == "floor" else (*width_factors(scene), scene.slope)
+    if not all(map(is_constant, moving)):
         return None
-    return -(Fraction(state.y) + Fraction(h)) / Fraction(state.vy)
+    jet = wall_jet(scene, state, wall, Fraction(0))
+    if jet is None or jet[0] <= 0 or jet[1] >= 0:
+        return None
+    return -jet[0] / jet[1]
 
 
 def is_zero(scene: Scene, state: State, wall: Wall, s: Fraction) -> bool:
-    """Tell whether f is known to vanish exactly at flight time s."""
+    """Tell whether f, less its residual f(0) on the wall being left, is known to vanish exactly at s."""
     jet = wall_jet(scene, state, wall, s)
-    return jet is not None and jet[0] == 0
+    if jet is None or wall != state.wall:
+        return jet is not None and jet[0] == 0
+    start = wall_jet(scene, state, wall, Fraction(0))
+    return start is not None and jet[0] == start[0]

@@ -2,21 +2,41 @@
 
 from __future__ import annotations
 
+from decimal import Decimal
 from fractions import Fraction
+from typing import NamedTuple
 
 from reference import rational
 from reference.arithmetic import Arithmetic, Interval, Undecidable, sign
+from reference.arithmetic import rational as exact_point
 from reference.course import SIDES
-from reference.jets import Flight, Motion
+from reference.motion import Flight, Motion
 from scene import Cap, InvalidState, Mushroom, Scene, State, Stem, Undefined, Wall
-from scene.laws import bounds, is_constant, piece_at
+from scene.laws import is_constant
 from scene.states import ON_WALL
 from scene.tables import laws
 
 
+class Start(NamedTuple):
+    """A judged start.
+
+    Attributes:
+        leaving: the wall the particle is on, with its residual f(0); at most one.
+        flat: that wall when f'(0) = 0 and f''(0) > 0, both exactly.
+        undefined: why mathematics gives no answer from here; None when it does.
+        walls: those at which the start is undefined.
+    """
+
+    leaving: dict[Wall, Interval]
+    flat: frozenset[Wall] = frozenset()
+    undefined: Undefined | None = None
+    walls: tuple[Wall, ...] = ()
+
+
 def flight_from(arithmetic: Arithmetic, state: State) -> Flight:
     """Return the flight of a state, exactly."""
-    return Flight(*(arithmetic.number(v) for v in (state.t, state.x, state.y, state.vx, state.vy)))
+    numbers = (arithmetic.number(v) for v in (state.x, state.y, state.vx, state.vy))
+    return Flight._make((Fraction(state.t), *numbers, arithmetic.zero))
 
 
 def is_in_cap(scene: Scene, state: State, leaving: dict[Wall, Interval]) -> bool:
@@ -29,30 +49,34 @@ def is_in_cap(scene: Scene, state: State, leaving: dict[Wall, Interval]) -> bool
     return state.y > 0 or is_rising_in_mouth
 
 
-def judge_start(
-    scene: Scene, state: State, arithmetic: Arithmetic
-) -> tuple[dict[Wall, Interval], frozenset[Wall]] | Undefined:
-    """Judge the starting state: which walls it leaves, or why it is none of this table."""
+def judge_start(scene: Scene, state: State, arithmetic: Arithmetic) -> Start:
+    """Judge the starting state: which walls it leaves, or why it is none of this table.
+
+    Raises:
+        InvalidState: naming field, value and bound.
+        Undecidable: when this precision cannot tell.
+    """
     _check_part(scene, state)
     motion = motion_at(scene, state, arithmetic)
+    if state.wall is not None:
+        _check_residual(scene, state, motion)
     on = [wall for wall in _walls_near(scene, state) if _is_on(scene, state, wall, motion)]
     if state.vy == 0 and _is_beside_mouth(scene, state, motion):
-        return Undefined("sliding")  # along the base
-    if state.wall is not None and state.wall not in on:
+        return Start({}, undefined=Undefined("sliding"), walls=("base",))
+    if state.wall is not None:
         on.append(state.wall)
-        _check_residual(scene, state, motion)
-    leaving: dict[Wall, Interval] = {}
-    flat: set[Wall] = set()
+    # A place on two walls is undefined whichever way the particle moves; a side ends at the mouth's edge.
+    if isinstance(scene, Mushroom) and state.y == 0 and ("left" in on or "right" in on):
+        return Start({}, undefined=Undefined("mouth-edge"), walls=tuple(on))
+    if len(on) > 1:
+        return Start({}, undefined=Undefined("corner"), walls=tuple(on))
     for wall in on:
         judged = _departure(scene, state, wall, motion)
         if isinstance(judged, Undefined):
-            return judged
-        leaving[wall] = motion.wall(wall, arithmetic.zero).f
-        if judged:
-            flat.add(wall)
-    if len(leaving) > 1:
-        return Undefined("corner")
-    return leaving, frozenset(flat)
+            return Start({}, undefined=judged, walls=(wall,))
+        residual = motion.wall(wall, arithmetic.zero).f
+        return Start({wall: residual}, frozenset({wall} if judged else ()))
+    return Start({})
 
 
 def _check_part(scene: Scene, state: State) -> None:
@@ -66,20 +90,19 @@ def _check_part(scene: Scene, state: State) -> None:
 
 
 def motion_at(scene: Scene, state: State, arithmetic: Arithmetic) -> Motion:
-    """Return the walls as they move just after the time of the state."""
-    pieces = {name: piece_at(law, Fraction(state.t)) for name, law in laws(scene).items()}
-    return Motion(arithmetic, flight_from(arithmetic, state), pieces, is_stem=isinstance(scene, Stem))
+    """Return the walls along the flight from a state."""
+    return Motion(arithmetic, scene, flight_from(arithmetic, state))
 
 
 def _walls_near(scene: Scene, state: State) -> list[Wall]:
-    """List the walls that bound the part of the table the state is in."""
+    """List the walls that bound the state's part of the table; in a mushroom the arc ends at the base."""
     if isinstance(scene, Cap):
         return ["base", "arc"]
     if isinstance(scene, Stem):
         return ["base", *SIDES]
-    if state.y > 0 or state.wall in ("arc", "base"):
-        return ["arc"]
-    return list(SIDES)
+    if state.wall == "arc" and state.y == 0:
+        return ["base", "arc"]
+    return ["arc"] if state.y > 0 or state.wall in ("arc", "base") else list(SIDES)
 
 
 def _is_on(scene: Scene, state: State, wall: Wall, motion: Motion) -> bool:
@@ -87,7 +110,8 @@ def _is_on(scene: Scene, state: State, wall: Wall, motion: Motion) -> bool:
     if wall == state.wall:
         return False
     side = sign(motion.wall(wall, motion.arithmetic.zero).f)
-    if isinstance(scene, Mushroom) and state.y == 0 and wall in ("left", "right") and side < 0:
+    is_unnamed_and_level = isinstance(scene, Mushroom) and state.y == 0 and state.wall is None
+    if is_unnamed_and_level and wall in ("left", "right") and side < 0:
         # Level with the mouth but beside it: on the base, which belongs to the cap.
         return _is_on_base(scene, state, motion)
     if side < 0:
@@ -99,7 +123,7 @@ def _is_on(scene: Scene, state: State, wall: Wall, motion: Motion) -> bool:
     return side == 0
 
 
-def _is_on_base(scene: Mushroom, state: State, motion: Motion) -> bool:
+def _is_on_base(scene: Scene, state: State, motion: Motion) -> bool:
     if sign(motion.wall("arc", motion.arithmetic.zero).f) < 0:
         raise InvalidState(f"state (x, y) = ({state.x!r}, 0) at t = {state.t!r} is beyond wall arc")
     if state.vy < 0:
@@ -132,12 +156,25 @@ def _departure(scene: Scene, state: State, wall: Wall, motion: Motion) -> Undefi
 
 
 def _check_residual(scene: Scene, state: State, motion: Motion) -> None:
-    wall = state.wall
+    """Refuse a state too far from the wall it names, as measured by that wall's present distance from 0."""
+    wall, zero = state.wall, motion.arithmetic.zero
     assert wall is not None
-    tops = {name: bounds(law).highest for name, law in laws(scene).items()}
-    size = tops.get("h", 0.0) if wall == "floor" else max(tops.get("r", 0.0), tops.get("w", 0.0))
-    gap = float(motion.arithmetic.enclosure(motion.wall(wall, motion.arithmetic.zero).f))
+    size = _distance_of(scene, wall, motion)
+    gap = motion.wall(wall, zero).f
     if wall == "arc":
-        gap /= 2 * size
-    if abs(gap) > ON_WALL * size:
-        raise InvalidState(f"state.wall = {wall!r}, but the state is {gap:.3g} away from that wall")
+        gap = gap / (2 * size)
+    low, high = (exact_point(end) for end in gap._mpi_)
+    if max(abs(low), abs(high)) > Fraction(ON_WALL) * exact_point(size._mpi_[0]):
+        # Decimal, because the gap may be too large for a float.
+        shown = Decimal(low.numerator) / Decimal(low.denominator)
+        raise InvalidState(f"state.wall = {wall!r}, but the state is {shown:.3g} away from that wall")
+
+
+def _distance_of(scene: Scene, wall: Wall, motion: Motion) -> Interval:
+    """Return r for the arc, w for a side, h for the floor, the larger of r and w for the base, now."""
+    zero = motion.arithmetic.zero
+    if wall == "floor":
+        return motion.law("h", zero).f
+    if wall in ("left", "right") or isinstance(scene, Stem):
+        return motion.width(zero).f
+    return motion.law("r", zero).f

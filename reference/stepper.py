@@ -2,92 +2,30 @@
 
 `next_collision` doubles the working precision until the answer is proved or a cap is reached;
 then it says `Undecided`. A trajectory restarts at a higher precision until its last state is
-enclosed to the digits asked for.
+enclosed to the digits asked for. What is claimed, and why it follows: docs/proof.md.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
-from typing import NamedTuple
+from dataclasses import replace
+from fractions import Fraction
 
-import scene as wire
-from reference.arithmetic import Arithmetic, Enclosure, Interval, Undecidable
-from reference.course import Course, Event, Hit
-from reference.isolation import Leaf
+from reference.answers import Collision, Outcome, Trajectory
+from reference.arithmetic import Arithmetic, Exhausted, Undecidable, Work
+from reference.chain import bounce, collision, horizon
+from reference.course import Course, Event, Evidence
 from reference.jacobian import chained, enclosures, identity, step_jacobian
-from reference.jets import Flight
-from reference.margins import Margins, measure
-from reference.start import flight_from, is_in_cap, judge_start, motion_at
-from scene import InvalidState, Rejected, Scene, State, Stem, Undecided, Undefined, Wall
+from reference.margins import measure
+from reference.motion import Flight
+from reference.start import Start, flight_from, is_in_cap, judge_start, motion_at
+from scene import BadInput, InvalidState, Rejected, Scene, State, Stem, Undecided
+from scene.refusal import check_count, check_number, check_scene
 from scene.states import check_numbers
 
 GUARD_DIGITS = 15
 DOUBLINGS = 3
-
-
-class Moment(NamedTuple):
-    """A state, all components enclosed."""
-
-    t: Enclosure
-    x: Enclosure
-    y: Enclosure
-    vx: Enclosure
-    vy: Enclosure
-
-
-Jacobian = tuple[tuple[Enclosure, ...], ...]
-
-
-@dataclass(frozen=True)
-class Collision:
-    """A proved first collision.
-
-    Attributes:
-        wall: the wall met.
-        dt: flight time [time].
-        after: the state just after the bounce.
-        slope: f' at the hit, < 0.
-        digits: working decimals that decided it.
-        proof: for each wall, the sub-intervals of flight time on which f > 0 was proved.
-        jacobian: d(dt, x, y, vx, vy) / d(t, x, y, vx, vy), rows by outputs, when asked for.
-        margins: how far this answer is from another one, when asked for.
-    """
-
-    wall: Wall
-    dt: Enclosure
-    after: Moment
-    slope: Enclosure
-    digits: int
-    proof: dict[str, list[Leaf]] = field(repr=False)
-    jacobian: Jacobian | None = field(repr=False, default=None)
-    margins: Margins | None = field(repr=False, default=None)
-
-    def rounded(self) -> wire.Collision:
-        """Return the centres, correctly rounded, in the wire's form."""
-        return wire.Collision(self.wall, float(self.dt), *(float(c) for c in self.after))
-
-
-@dataclass(frozen=True)
-class Horizon:
-    """Proved: no collision before t_end; the state there, enclosed."""
-
-    at: Moment
-    digits: int
-    proof: dict[str, list[Leaf]] = field(repr=False)
-
-    def rounded(self) -> wire.Horizon:
-        """Return the centres, correctly rounded, in the wire's form."""
-        return wire.Horizon(*(float(c) for c in self.at))
-
-
-Outcome = Collision | Horizon | Undefined | Undecided | Rejected
-
-
-class _Chain(NamedTuple):
-    """Where a trajectory stands: enclosures, the wall left and its residual."""
-
-    flight: Flight
-    leaving: dict[Wall, Interval]
+MAX_DIGITS = 10_000
+MAX_COLLISIONS = 1_000_000
 
 
 def next_collision(
@@ -104,45 +42,59 @@ def next_collision(
     Args:
         scene: table and laws of motion; numbers are exact binary64.
         state: position (x, y) [length], velocity (vx, vy) [length/time], wall being left or None.
-        t_end: horizon [time], t_end >= state.t.
-        digits: correct decimals wanted, >= 1; guard digits are added inside.
+        t_end: horizon [time], t_end >= state.t; a wall met at t_end exactly is not met before it.
+        digits: correct decimals wanted, 1 to 10,000; guard digits are added inside.
         is_differentiated: give the Jacobian of the step too.
         is_measured: give the margins of the collision too.
 
     Returns:
-        Collision, its time enclosed to a relative 10**-digits; Horizon; Undefined; Undecided; or
-        Rejected for a state that is none of this table.
+        Collision, its time enclosed to a relative 10**-digits; Horizon; Undefined; Undecided, also
+        when the work for one step is used up; or Rejected for a state that is none of this table.
+
+    Raises:
+        BadInput: `scene` or `digits` is none, naming field, value and bound.
 
     Source: Gelfreich, Rom-Kedar, Turaev (2014), sec. 3.1. Method: isolate, exclude, refine.
     """
-    working = digits + GUARD_DIGITS
-    open_question = ""
+    digits = _checked(scene, digits)
     extras = is_differentiated, is_measured
+    return _answer(scene, state, t_end, digits, extras)[0]
+
+
+def _checked(scene: Scene, digits: int) -> int:
+    check_scene(scene)
+    return check_count("digits", digits, 1, MAX_DIGITS)
+
+
+def _answer(
+    scene: Scene, state: State, t_end: float, digits: int, extras: tuple[bool, bool]
+) -> tuple[Outcome, Evidence | None]:
+    """Double the precision until a step is decided; with what proves an undefined one."""
+    working, work = digits + GUARD_DIGITS, Work()
+    open_question = ""
     for _ in range(DOUBLINGS + 1):
         try:
-            return _attempt(scene, state, t_end, Arithmetic(working), digits, *extras)
+            return _attempt(scene, state, t_end, Arithmetic(working, work), digits, extras)
         except InvalidState as error:
-            return Rejected(str(error))
+            return Rejected(str(error)), None
+        except Exhausted as question:
+            return Undecided(f"{question} ({working} digits)"), None
         except Undecidable as question:
             open_question = str(question)
             working *= 2
-    return Undecided(f"{open_question} ({working // 2} digits)")
+    return Undecided(f"{open_question} ({working // 2} digits)"), None
 
 
-class Trajectory(NamedTuple):
-    """Successive collisions and what came instead of the last one asked for.
+def evidence_of(scene: Scene, state: State, t_end: float, digits: int = 50) -> Evidence:
+    """Return what proves that a step is undefined.
 
-    Attributes:
-        steps: the collisions, each enclosed.
-        outcome: None, or horizon, undefined or undecided instead of a further collision.
-        digits: the working decimals that were needed.
-        jacobian: d(t, x, y, vx, vy) after the last collision / d(initial state), when asked for.
+    Raises:
+        BadInput: it is not undefined.
     """
-
-    steps: list[Collision]
-    outcome: Outcome | None
-    digits: int
-    jacobian: Jacobian | None = None
+    outcome, evidence = _answer(scene, state, t_end, _checked(scene, digits), (False, False))
+    if evidence is None:
+        raise BadInput(f"outcome = {outcome!r}, must be undefined")
+    return evidence
 
 
 def trajectory(
@@ -160,87 +112,107 @@ def trajectory(
     Args:
         scene: table and laws of motion.
         state: the exact start.
-        n_collisions: how many collisions to follow, >= 0.
-        t_end: horizon [time], None for none.
-        digits: decimals wanted of the last state, relative to the size of its vectors.
+        n_collisions: how many collisions to follow, 0 to 1,000,000.
+        t_end: horizon [time], None for none: then a particle that is never met ends, a Horizon, at the
+            flight time 2^1000.
+        digits: decimals wanted of the last state, relative to the size of its vectors; 1 to 10,000.
         working: decimals to work with, and no more: the path ends, undecided, where they no longer tell
             what comes next, whatever `digits` says. By default they are doubled until they serve.
         is_differentiated: chain the steps' Jacobians too.
 
     Raises:
-        InvalidState: naming field, value and bound.
+        BadInput: naming field, value and bound.
     """
+    digits = _checked(scene, digits)
+    n_collisions = check_count("n_collisions", n_collisions, 0, MAX_COLLISIONS)
+    if t_end is not None:
+        t_end = check_number("t_end", t_end)
     if working is not None:
-        if working < 1:
-            raise InvalidState(f"working = {working}, must be >= 1")
-        return _chain(scene, state, n_collisions, t_end, Arithmetic(working), None, is_differentiated)
+        working = check_count("working", working, 1, MAX_DIGITS)
+        return _Path(scene, state, t_end, working, None, is_differentiated).follow(n_collisions)
     working = digits + GUARD_DIGITS + n_collisions // 4
     while True:
         try:
-            return _chain(scene, state, n_collisions, t_end, Arithmetic(working), digits, is_differentiated)
+            path = _Path(scene, state, t_end, working, digits, is_differentiated)
+            return path.follow(n_collisions)
         except Undecidable as question:
-            if working > 8 * (digits + GUARD_DIGITS + n_collisions):
+            if isinstance(question, Exhausted) or working > 8 * (digits + GUARD_DIGITS + n_collisions):
                 return Trajectory([], Undecided(f"{question} ({working} digits)"), working)
             working *= 2
 
 
-def _chain(
-    scene: Scene,
-    state: State,
-    n_collisions: int,
-    t_end: float | None,
-    arithmetic: Arithmetic,
-    digits: int | None,
-    is_differentiated: bool,
-) -> Trajectory:
-    """Follow with fixed precision; `digits` None: as far as it reaches, else Undecidable is raised."""
-    check_numbers(scene, state, state.t if t_end is None else t_end)
-    steps: list[Collision] = []
-    try:
-        outcome = judge_start(scene, state, arithmetic)
-    except Undecidable as question:
-        return _broken_off(steps, question, arithmetic, digits)
-    if isinstance(outcome, Undefined):
-        return Trajectory(steps, outcome, arithmetic.digits)
-    leaving, flat = outcome
-    chain = _Chain(flight_from(arithmetic, state), leaving)
-    in_cap = is_in_cap(scene, state, leaving)
-    exact: State | None = state
-    matrix = identity(arithmetic) if is_differentiated else None
-    while len(steps) < n_collisions:
-        end = _horizon(arithmetic, chain.flight.t, t_end)
+class _Path:
+    """A trajectory at one working precision; `digits` None: as far as that reaches."""
+
+    def __init__(
+        self,
+        scene: Scene,
+        state: State,
+        t_end: float | None,
+        working: int,
+        digits: int | None,
+        is_differentiated: bool,
+    ) -> None:
+        check_numbers(scene, state, state.t if t_end is None else t_end)
+        self.scene, self.state, self.digits = scene, state, digits
+        self.t_end = None if t_end is None else Fraction(t_end)
+        self.arithmetic = Arithmetic(working)
+        self.matrix = identity(self.arithmetic) if is_differentiated else None
+        self.steps: list[Collision] = []
+
+    def follow(self, n_collisions: int) -> Trajectory:
+        """Take steps until there are enough, or something else comes instead.
+
+        Raises:
+            Undecidable: the precision does not serve for the digits asked for.
+            InvalidState: the start is none of this table.
+        """
         try:
-            event = Course(scene, arithmetic, chain.flight, chain.leaving, flat, end, exact).event(
-                in_cap=in_cap
-            )
+            outcome = self._steps_until(n_collisions)
         except Undecidable as question:
-            return _broken_off(steps, question, arithmetic, digits)
-        if event.undefined is not None:
-            return Trajectory(steps, event.undefined, arithmetic.digits)
-        if event.hit is None:
-            last = _horizon_outcome(chain.flight, end, event, arithmetic)
-            return Trajectory(steps, last, arithmetic.digits)
-        if matrix is not None:
-            origin = None
-            if not steps and event.hit.wall in leaving:
-                origin = motion_at(scene, state, arithmetic).gradient(event.hit.wall, arithmetic.zero)
-            matrix = chained(step_jacobian(arithmetic, chain.flight, event.hit, origin), matrix)
-        chain = _bounce(chain, event.hit, arithmetic)
-        steps.append(_collision(event, event.hit, chain.flight, arithmetic))
-        exact, flat = None, frozenset()
-        in_cap = event.hit.wall == "arc" or (event.hit.wall == "base" and not isinstance(scene, Stem))
-    if steps and digits is not None:
-        _require(steps[-1], digits)
-    jacobian = None if matrix is None else enclosures(arithmetic, matrix)
-    return Trajectory(steps, None, arithmetic.digits, jacobian)
+            if self.digits is not None:
+                raise
+            outcome = Undecided(f"{question} ({self.arithmetic.digits} digits)")
+        jacobian = None
+        if outcome is None and self.matrix is not None:
+            jacobian = enclosures(self.arithmetic, self.matrix)
+        return Trajectory(self.steps, outcome, self.arithmetic.digits, jacobian)
 
+    def _steps_until(self, n_collisions: int) -> Outcome | None:
+        arithmetic = self.arithmetic
+        start = judge_start(self.scene, self.state, arithmetic)
+        if start.undefined is not None:
+            return start.undefined
+        flight, leaving, flat = flight_from(arithmetic, self.state), start.leaving, start.flat
+        in_cap = is_in_cap(self.scene, self.state, leaving)
+        exact: State | None = self.state
+        while len(self.steps) < n_collisions:
+            arithmetic.work = Work()
+            end = None if self.t_end is None else self.t_end - flight.instant
+            course = Course(self.scene, arithmetic, flight, leaving, flat, end, exact)
+            event = course.event(in_cap=in_cap)
+            if event.undefined is not None:
+                return event.undefined
+            if event.hit is None:
+                return horizon(arithmetic, flight, leaving, end, event)
+            self._chain_jacobian(flight, event, start)
+            after = bounce(arithmetic, flight, leaving, event.hit)
+            self.steps.append(collision(arithmetic, flight, leaving, event, after))
+            flight, leaving, flat, exact = after.flight, after.leaving, frozenset(), None
+            is_base = event.hit.wall == "base"
+            in_cap = event.hit.wall == "arc" or (is_base and not isinstance(self.scene, Stem))
+        if self.steps and self.digits is not None:
+            _require(self.steps[-1], self.digits)
+        return None
 
-def _broken_off(
-    steps: list[Collision], question: Undecidable, arithmetic: Arithmetic, digits: int | None
-) -> Trajectory:
-    if digits is not None:
-        raise question
-    return Trajectory(steps, Undecided(f"{question} ({arithmetic.digits} digits)"), arithmetic.digits)
+    def _chain_jacobian(self, flight: Flight, event: Event, start: Start) -> None:
+        if self.matrix is None or event.hit is None:
+            return
+        origin = None
+        if not self.steps and event.hit.wall in start.leaving:
+            here = motion_at(self.scene, self.state, self.arithmetic)
+            origin = here.gradient(event.hit.wall, self.arithmetic.zero)
+        self.matrix = chained(step_jacobian(self.arithmetic, flight, event.hit, origin), self.matrix)
 
 
 def _attempt(
@@ -249,87 +221,39 @@ def _attempt(
     t_end: float,
     arithmetic: Arithmetic,
     digits: int,
-    is_differentiated: bool,
-    is_measured: bool,
-) -> Outcome:
+    extras: tuple[bool, bool],
+) -> tuple[Outcome, Evidence | None]:
+    """Answer at one precision."""
+    is_differentiated, is_measured = extras
     check_numbers(scene, state, t_end)
-    outcome = judge_start(scene, state, arithmetic)
-    if isinstance(outcome, Undefined):
-        return outcome
-    leaving, flat = outcome
-    flight = flight_from(arithmetic, state)
-    end = _horizon(arithmetic, flight.t, t_end)
-    course = Course(scene, arithmetic, flight, leaving, flat, end, state)
-    event = course.event(in_cap=is_in_cap(scene, state, leaving))
+    start = judge_start(scene, state, arithmetic)
+    if start.undefined is not None:
+        return start.undefined, Evidence(Fraction(0), start.walls)
+    flight, end = flight_from(arithmetic, state), Fraction(t_end) - Fraction(state.t)
+    course = Course(scene, arithmetic, flight, start.leaving, start.flat, end, state)
+    event = course.event(in_cap=is_in_cap(scene, state, start.leaving))
     if event.undefined is not None:
-        return event.undefined
+        return event.undefined, event.evidence
     if event.hit is None:
-        return _horizon_outcome(flight, end, event, arithmetic)
-    after = _bounce(_Chain(flight, leaving), event.hit, arithmetic).flight
-    collision = _collision(event, event.hit, after, arithmetic)
-    _require(collision, digits)
+        return horizon(arithmetic, flight, start.leaving, end, event), None
+    after = bounce(arithmetic, flight, start.leaving, event.hit)
+    found = collision(arithmetic, flight, start.leaving, event, after)
+    _require(found, digits)
     if is_differentiated:
-        start = motion_at(scene, state, arithmetic)
-        wall = event.hit.wall
-        origin = start.gradient(wall, arithmetic.zero) if wall in leaving else None
+        here, wall = motion_at(scene, state, arithmetic), event.hit.wall
+        origin = here.gradient(wall, arithmetic.zero) if wall in start.leaving else None
         matrix = step_jacobian(arithmetic, flight, event.hit, origin)
-        collision = replace(collision, jacobian=enclosures(arithmetic, matrix))
+        found = replace(found, jacobian=enclosures(arithmetic, matrix))
     if is_measured:
-        collision = replace(collision, margins=measure(arithmetic, course, event.hit))
-    return collision
+        found = replace(found, margins=measure(arithmetic, course, event.hit))
+    return found, None
 
 
-def _horizon(arithmetic: Arithmetic, t: Interval, t_end: float | None) -> Interval:
-    # Without a horizon: farther than any flight that meets a wall (the escape time cuts it).
-    return arithmetic.number(2.0**1000) if t_end is None else arithmetic.number(t_end) - t
-
-
-def _bounce(chain: _Chain, hit: Hit, arithmetic: Arithmetic) -> _Chain:
-    """Reflect: v - 2 f' grad f / |grad f|^2, which is v - 2 (v.n - u) n (sec. 3.1)."""
-    q, s = chain.flight, hit.time
-    x = q.x + q.vx * s
-    y = arithmetic.zero if hit.wall == "base" else q.y + q.vy * s
-    velocities = []
-    for motion in hit.motions:
-        f_x, f_y, _ = motion.gradient(hit.wall, s)
-        factor = 2 * hit.slope / (arithmetic.square(f_x) + arithmetic.square(f_y))
-        velocities.append((q.vx - factor * f_x, q.vy - factor * f_y))
-    vx, vy = (arithmetic.union(component) for component in zip(*velocities, strict=True))
-    residual = chain.leaving.get(hit.wall, arithmetic.zero)
-    return _Chain(Flight(q.t + s, x, y, vx, vy), {hit.wall: residual})
-
-
-def _collision(event: Event, hit: Hit, after: Flight, arithmetic: Arithmetic) -> Collision:
-    close = arithmetic.enclosure
-    return Collision(
-        hit.wall,
-        close(hit.time),
-        Moment(*map(close, after)),
-        close(hit.slope),
-        arithmetic.digits,
-        event.proof,
-    )
-
-
-def _horizon_outcome(flight: Flight, end: Interval, event: Event, arithmetic: Arithmetic) -> Horizon:
-    at = Flight(flight.t + end, flight.x + flight.vx * end, flight.y + flight.vy * end, flight.vx, flight.vy)
-    return Horizon(Moment(*map(arithmetic.enclosure, at)), arithmetic.digits, event.proof)
-
-
-def _require(collision: Collision, digits: int) -> None:
+def _require(found: Collision, digits: int) -> None:
     """Insist on the digits asked for: of dt, and of velocity and place relative to their vectors."""
-    bound = 10.0**-digits
-    after = collision.after
-    sizes = {
-        "dt": abs(float(collision.dt)),
-        "velocity": max(abs(float(after.vx)), abs(float(after.vy))),
-        "place": max(abs(float(after.x)), abs(float(after.y))),
-    }
-    widths = {
-        "dt": collision.dt.width(),
-        "velocity": max(after.vx.width(), after.vy.width()),
-        "place": max(after.x.width(), after.y.width()),
-    }
-    for name, width in widths.items():
-        if width > bound * sizes[name]:
+    bound, after = Fraction(1, 10**digits), found.after
+    vectors = {"dt": (found.dt,), "velocity": (after.vx, after.vy), "place": (after.x, after.y)}
+    for name, vector in vectors.items():
+        size = max(abs(number.centre()) for number in vector)
+        if max(number.extent() for number in vector) > bound * size:
             raise Undecidable(f"{name} is enclosed too widely")

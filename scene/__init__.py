@@ -2,7 +2,7 @@
 
 from scene.laws import BangBang, Fourier, Law
 from scene.load import catalogue, from_data, load, to_data
-from scene.refusal import BadInput
+from scene.refusal import BadInput, InvalidScene, check_count, check_number, check_scene
 from scene.states import (
     Collision,
     Horizon,
@@ -14,7 +14,6 @@ from scene.states import (
     Undefined,
 )
 from scene.tables import Cap, Mushroom, Scene, Stem, Wall
-from scene.validity import InvalidScene
 
 __all__ = [
     "BadInput",
@@ -36,6 +35,9 @@ __all__ = [
     "Undefined",
     "Wall",
     "catalogue",
+    "check_count",
+    "check_number",
+    "check_scene",
     "from_data",
     "load",
     "to_data",

@@ -16,10 +16,12 @@ from fractions import Fraction
 from typing import Any, NamedTuple
 
 import msgspec
-from mpmath import fp
+
+from scene.refusal import InvalidScene, check_number, shown
 
 MAX_HARMONICS = 16  # validity is decided by exact algebra, whose cost grows steeply with the degree
 MAX_KNOTS = 256
+LEAST_NORMAL = 2.0**-1022
 
 
 class Fourier(msgspec.Struct, frozen=True, tag_field="kind", tag="fourier", forbid_unknown_fields=True):
@@ -34,6 +36,23 @@ class Fourier(msgspec.Struct, frozen=True, tag_field="kind", tag="fourier", forb
     sin: tuple[float, ...] = ()
     period: float | None = None
 
+    def __post_init__(self) -> None:
+        """Refuse what is no law; numbers of any kind become floats, lists become tuples.
+
+        Raises:
+            InvalidScene: naming the field, the value and the bound.
+        """
+        _keep(self, "mean", finite("fourier.mean", self.mean))
+        for field in ("cos", "sin"):
+            _keep(self, field, _amplitudes(f"fourier.{field}", getattr(self, field)))
+        if (self.omega is None) == (self.period is None):
+            raise InvalidScene("fourier needs exactly one of `omega` and `period`")
+        field = "omega" if self.period is None else "period"
+        size = finite(f"fourier.{field}", getattr(self, field))
+        if size <= 0:
+            raise InvalidScene(f"fourier.{field} = {size}, must be finite and > 0")
+        _keep(self, field, size)
+
     def harmonics(self) -> list[tuple[int, float, float]]:
         """Return (k, cosine amplitude, sine amplitude) for every harmonic present."""
         n = max(len(self.cos), len(self.sin))
@@ -47,8 +66,85 @@ class BangBang(msgspec.Struct, frozen=True, tag_field="kind", tag="bang-bang", f
 
     knots: tuple[tuple[float, float], ...]
 
+    def __post_init__(self) -> None:
+        """Refuse what is no law; numbers of any kind become floats, lists become tuples.
+
+        Raises:
+            InvalidScene: naming the knot, the value and the bound.
+        """
+        knots = self.knots
+        if not isinstance(knots, tuple | list):
+            raise InvalidScene(f"bang-bang.knots = {shown(knots)}, must be a list of pairs [time, value]")
+        if not 2 <= len(knots) <= MAX_KNOTS:
+            raise InvalidScene(f"bang-bang.knots has {len(knots)} knots, must have 2 to {MAX_KNOTS}")
+        _keep(self, "knots", tuple(_knot(i, knot) for i, knot in enumerate(knots)))
+        _check_legs(self.knots)
+
 
 Law = float | Fourier | BangBang
+
+
+def finite(field: str, number: object) -> float:
+    """Return a finite number as a float.
+
+    Raises:
+        InvalidScene: it is none.
+    """
+    if type(number) is float and -math.inf < number < math.inf:
+        return number
+    return check_number(field, number, InvalidScene)
+
+
+def _keep(law: msgspec.Struct, field: str, value: Any) -> None:
+    if getattr(law, field) is not value:
+        msgspec.structs.force_setattr(law, field, value)
+
+
+def _amplitudes(field: str, numbers: object) -> tuple[float, ...]:
+    if not isinstance(numbers, tuple | list):
+        raise InvalidScene(f"{field} = {shown(numbers)}, must be a list of numbers")
+    if len(numbers) > MAX_HARMONICS:
+        raise InvalidScene(f"{field} has {len(numbers)} harmonics, at most {MAX_HARMONICS} are allowed")
+    return tuple(finite(f"{field}[{k}]", number) for k, number in enumerate(numbers))
+
+
+def _knot(i: int, knot: object) -> tuple[float, float]:
+    if not (isinstance(knot, tuple | list) and len(knot) == 2):
+        raise InvalidScene(f"bang-bang.knots[{i}] = {shown(knot)}, must be a pair [time, value]")
+    time, value = knot
+    if type(time) is type(value) is float and abs(time) < math.inf and abs(value) < math.inf:
+        return time, value
+    return (
+        check_number(f"bang-bang.knots[{i}] time", time, InvalidScene),
+        check_number(f"bang-bang.knots[{i}] value", value, InvalidScene),
+    )
+
+
+def _check_legs(knots: tuple[tuple[float, float], ...]) -> None:
+    for i, ((before, _), (after, _)) in enumerate(itertools.pairwise(knots), 1):
+        if after <= before:
+            raise InvalidScene(f"bang-bang.knots[{i}] time = {after}, must be > {before}")
+    (start, first), (end, last) = knots[0], knots[-1]
+    if last != first:
+        raise InvalidScene(
+            f"bang-bang.knots[{len(knots) - 1}] value = {last}, must equal the first ({first}): no jumps"
+        )
+    span = end - start
+    if not math.isfinite(span) or Fraction(span) != Fraction(end) - Fraction(start):
+        raise InvalidScene(f"bang-bang.knots span {start} to {end}: the period must be a binary64 number")
+
+
+class Period(NamedTuple):
+    """A common period: 2 pi / omega, kept symbolic, or an exact rational length [time]."""
+
+    omega: float | None
+    length: Fraction | None
+
+    def value(self, ctx: Any) -> Any:
+        """Return the period [time] in an mpmath number system."""
+        if self.length is not None:
+            return ctx.mpf(self.length.numerator) / ctx.mpf(self.length.denominator)
+        return 2 * ctx.pi / ctx.mpf(self.omega)
 
 
 class Quadratic(NamedTuple):
@@ -73,47 +169,6 @@ class Bounds(NamedTuple):
     curvature: float
 
 
-def defect(law: Law) -> str | None:
-    """Say what breaks a law, naming field, value and bound; None when it is sound."""
-    if isinstance(law, BangBang):
-        return _knots_defect(law.knots)
-    if isinstance(law, Fourier):
-        for field in ("cos", "sin"):
-            amplitudes = getattr(law, field)
-            if len(amplitudes) > MAX_HARMONICS:
-                return f".{field} has {len(amplitudes)} harmonics, at most {MAX_HARMONICS} are allowed"
-            for k, amplitude in enumerate(amplitudes):
-                if not math.isfinite(amplitude):
-                    return f".{field}[{k}] = {amplitude}, must be finite"
-        if not math.isfinite(law.mean):
-            return f".mean = {law.mean}, must be finite"
-        if (law.omega is None) == (law.period is None):
-            return " needs exactly one of `omega` and `period`"
-        for field, number in (("omega", law.omega), ("period", law.period)):
-            if number is not None and not (math.isfinite(number) and number > 0):
-                return f".{field} = {number}, must be finite and > 0"
-        return None
-    return None if math.isfinite(law) else f" = {law}, must be finite"
-
-
-def _knots_defect(knots: tuple[tuple[float, float], ...]) -> str | None:
-    if not 2 <= len(knots) <= MAX_KNOTS:
-        return f".knots has {len(knots)} knots, must have 2 to {MAX_KNOTS}"
-    for i, (time, value) in enumerate(knots):
-        if not (math.isfinite(time) and math.isfinite(value)):
-            return f".knots[{i}] = [{time}, {value}], must be finite"
-        if i and time <= knots[i - 1][0]:
-            return f".knots[{i}] time = {time}, must be > {knots[i - 1][0]}"
-    if knots[-1][1] != knots[0][1]:
-        return (
-            f".knots[{len(knots) - 1}] value = {knots[-1][1]}, must equal the first ({knots[0][1]}): no jumps"
-        )
-    span = knots[-1][0] - knots[0][0]
-    if not math.isfinite(span) or Fraction(span) != Fraction(knots[-1][0]) - Fraction(knots[0][0]):
-        return f".knots span {knots[0][0]} to {knots[-1][0]}: the period must be a binary64 number"
-    return None
-
-
 def is_constant(law: Law) -> bool:
     """Tell whether the law never changes."""
     if isinstance(law, Fourier):
@@ -121,6 +176,16 @@ def is_constant(law: Law) -> bool:
     if isinstance(law, BangBang):
         return all(value == law.knots[0][1] for _, value in law.knots)
     return True
+
+
+def period_of(law: Law) -> Period | None:
+    """Return the period of a law that moves; None when it never changes."""
+    if is_constant(law):
+        return None
+    if isinstance(law, BangBang):
+        return Period(None, Fraction(law.knots[-1][0]) - Fraction(law.knots[0][0]))
+    assert isinstance(law, Fourier)
+    return Period(law.omega, None if law.period is None else Fraction(law.period))
 
 
 def piece_at(law: Law, time: Fraction) -> Piece:
@@ -229,30 +294,61 @@ def value(ctx: Any, law: Law, t: Any, order: int = 0) -> Any:
 
 
 def bounds(law: Law) -> Bounds:
-    """Bound a law and its derivatives for all times; rounded outward, so sound in binary64."""
+    """Bound a law and its derivatives for all times, rounded outward at every scale.
+
+    Sizes are summed as fractions in [1/2, 1) with an exponent apart, so nothing overflows or underflows
+    on the way, and a relative slack covers the roundings. Only the last step, which puts the exponent back,
+    may leave the range: it rounds up, to a subnormal number or to infinity.
+    """
     if isinstance(law, BangBang):
-        values = [knot[1] for knot in law.knots]
-        slope = curvature = 0.0
-        for (t0, v0), (t1, v1) in zip(law.knots, law.knots[1:], strict=False):
-            slope = max(slope, 2 * abs(v1 - v0) / (t1 - t0))
-            curvature = max(curvature, 4 * abs(v1 - v0) / (t1 - t0) / (t1 - t0))
-        return Bounds(min(values), max(values), _up(slope), _up(curvature))
-    if isinstance(law, Fourier):
-        omega = float(frequency(fp, law))  # within the slack of `_up`
-        terms = [(k * omega, math.hypot(c, s)) for k, c, s in law.harmonics()]
-        swing = _up(sum(size for _, size in terms))
-        slope = _up(sum(size * f for f, size in terms))
-        curvature = _up(sum(size * f * f for f, size in terms))
-        if not terms:
-            return Bounds(law.mean, law.mean, 0.0, 0.0)
-        lowest, highest = law.mean - swing, law.mean + swing
-        return Bounds(lowest - _slack(lowest, swing), highest + _slack(highest, swing), slope, curvature)
-    return Bounds(law, law, 0.0, 0.0)
+        values = [value for _, value in law.knots]
+        legs = [(abs(v1 - v0), t1 - t0) for (t0, v0), (t1, v1) in itertools.pairwise(law.knots)]
+        slope = max(_quotient_up(2.0, rise, duration) for rise, duration in legs)
+        curvature = max(_quotient_up(4.0, rise, duration, duration) for rise, duration in legs)
+        return Bounds(min(values), max(values), slope, curvature)
+    if not isinstance(law, Fourier):
+        return Bounds(law, law, 0.0, 0.0)
+    harmonics = law.harmonics()
+    if not harmonics:
+        return Bounds(law.mean, law.mean, 0.0, 0.0)
+    _, unit = math.frexp(max(max(abs(c), abs(s)) for _, c, s in harmonics))
+    omega, rate = _split_frequency(law)
+    terms = [(k * omega, math.hypot(math.ldexp(c, -unit), math.ldexp(s, -unit))) for k, c, s in harmonics]
+    swing = _up(sum(size for _, size in terms), unit)
+    slope = _up(sum(size * f for f, size in terms), unit + rate)
+    curvature = _up(sum(size * f * f for f, size in terms), unit + 2 * rate)
+    # The sum of two floats errs by half a unit of its last place, and not at all where it is subnormal.
+    lowest, highest = law.mean - swing, law.mean + swing
+    return Bounds(lowest - _slack(lowest, swing), highest + _slack(highest, swing), slope, curvature)
 
 
-def _up(size: float) -> float:
-    # A few dozen roundings at most went into it, each of relative size 2^-53.
-    return size * (1 + 2.0**-45)
+def _split_frequency(law: Fourier) -> tuple[float, int]:
+    # omega = fraction 2^exponent to within a few roundings.
+    if law.period is not None:
+        fraction, exponent = math.frexp(law.period)
+        return 2 * math.pi / fraction, -exponent
+    assert law.omega is not None
+    return math.frexp(law.omega)
+
+
+def _quotient_up(factor: float, number: float, *divisors: float) -> float:
+    if math.isinf(number):  # a leg from one end of the range of floats to the other
+        return number
+    quotient, exponent = math.frexp(number)
+    for divisor in divisors:
+        fraction, shift = math.frexp(divisor)
+        quotient, exponent = quotient / fraction, exponent - shift
+    return _up(factor * quotient, exponent)
+
+
+def _up(size: float, exponent: int) -> float:
+    # A few dozen roundings at most went into the size, each of relative size 2^-53.
+    size *= 1 + 2.0**-45
+    try:
+        number = math.ldexp(size, exponent)
+    except OverflowError:
+        return math.inf
+    return number if number >= LEAST_NORMAL or size == 0 else math.nextafter(number, math.inf)
 
 
 def _slack(level: float, swing: float) -> float:

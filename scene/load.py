@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import tomllib
 from importlib import resources
 from pathlib import Path
@@ -10,8 +11,9 @@ from typing import Any
 
 import msgspec
 
-from scene.tables import Scene
-from scene.validity import InvalidScene, check
+from scene.laws import BangBang, Fourier
+from scene.refusal import InvalidScene, shown
+from scene.tables import PARAMETERS, Cap, Mushroom, Scene, Stem
 
 
 def catalogue() -> list[str]:
@@ -61,20 +63,49 @@ def read_data(source: str | Path) -> Any:
 def from_data(data: Any, origin: str = "") -> Scene:
     """Decode plain data (dicts, lists, numbers) strictly and prove the scene valid.
 
+    A `$schema` beside the parameters, by which editors find the published schema, is ignored.
+
     Raises:
         InvalidScene: one line naming the field, the value and the bound.
     """
     prefix = f"scene {origin!r}: " if origin else "scene: "
+    if isinstance(data, dict):
+        data = {name: field for name, field in data.items() if name != "$schema"}
     try:
         scene: Scene = msgspec.convert(data, Scene)
-        check(scene)
-    except InvalidScene as error:
-        raise InvalidScene(prefix + str(error)) from None
     except (msgspec.ValidationError, UnicodeEncodeError, RecursionError, OverflowError) as error:
-        # A key may hold a line break, and the message repeats it; JSON may spell a lone surrogate.
-        reason = " ".join(str(error).split())
-        raise InvalidScene(prefix + reason.replace("$.", "").replace("$", "scene")) from None
+        raise InvalidScene(prefix + _in_words(error, data)) from None
     return scene
+
+
+def _in_words(error: Exception, data: Any) -> str:
+    """Return one line that names the field first, then its value, then what is wrong with it."""
+    # A key may hold a line break, and the message repeats it; JSON may spell a lone surrogate.
+    text, _, path = " ".join(str(error).split()).partition(" - at `$")
+    names = re.findall(r"[^.\[\]]+", path.rstrip("`"))
+    place = path.rstrip("`").removeprefix(".")
+    cause = error.__cause__
+    if isinstance(cause, InvalidScene):
+        # A law does not know of what it is the law: it names its kind.
+        return re.sub(r"^(fourier|bang-bang)(?=[. ])", place, str(cause)) if place else str(cause)
+    if place in ("table", *(f"{name}.kind" for name in PARAMETERS)):
+        return f"{place} = {shown(_at(data, names))}, must be one of {_tags(place.removeprefix('table'))}"
+    if "required field `table`" in text or "required field `kind`" in text:
+        return f"{place or 'scene'} has no `{'kind' if place else 'table'}`, must be one of {_tags(place)}"
+    if "`float | object" in text:
+        text = "must be a number or a law"
+    return f"{place} = {shown(_at(data, names))}: {text}" if place else text
+
+
+def _tags(place: str) -> str:
+    valid = (Fourier, BangBang) if place else (Cap, Stem, Mushroom)
+    return ", ".join(str(kind.__struct_config__.tag) for kind in valid)
+
+
+def _at(data: Any, names: list[str]) -> Any:
+    for name in names:
+        data = data[int(name) if isinstance(data, list | tuple) else name]
+    return data
 
 
 def to_data(scene: Scene) -> dict[str, Any]:
@@ -93,6 +124,8 @@ def json_schema() -> dict[str, Any]:
     """Return the JSON Schema of a scene file, published as docs/scene.schema.json."""
     schema = msgspec.json.schema(Scene)
     state_omega_or_period(schema["$defs"])
+    for table in ("Cap", "Stem", "Mushroom"):
+        schema["$defs"][table]["properties"]["$schema"] = {"type": "string"}
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": "Scene", **schema}
 
 

@@ -15,6 +15,10 @@ class BadInput(ValueError):  # noqa: N818 (the caller's input is bad, not the pr
     """One line naming the field, its value and the bound it breaks."""
 
 
+class InvalidScene(BadInput):
+    """A scene that means nothing: one line naming parameter, time, value and bound."""
+
+
 def check_scene(scene: object) -> None:
     """Refuse what is no scene at all.
 
@@ -24,9 +28,10 @@ def check_scene(scene: object) -> None:
     Raises:
         BadInput: naming what was given; for a name, how to load the scene.
     """
-    from scene.tables import Cap, Mushroom, Stem  # the tables' own errors are BadInput: they need this file
+    from scene.tables import Cap, Mushroom, Stem  # not above: the tables need the errors of this file
 
-    if isinstance(scene, Cap | Stem | Mushroom):
+    # A scene is proved valid where it is made; a subclass could leave that out.
+    if type(scene) in (Cap, Stem, Mushroom):
         return
     hint = f"; a name or a file is loaded by scene.load({shown(scene)})" if isinstance(scene, str) else ""
     raise BadInput(f"scene = {shown(scene)}, must be a Cap, a Stem or a Mushroom{hint}")
@@ -52,24 +57,25 @@ def check_count(field: str, value: object, low: int, high: int) -> int:
     return count
 
 
-def check_number(field: str, value: object) -> float:
+def check_number(field: str, value: object, refusal: type[BadInput] = BadInput) -> float:
     """Return a finite number as a binary64.
 
     Args:
         field: its name, for the message.
         value: whatever a caller gave; integers and numbers of numpy are taken.
+        refusal: the error to raise.
 
     Raises:
-        BadInput: naming field, value and bound.
+        BadInput: or the error asked for, naming field, value and bound.
     """
     if isinstance(value, bool) or not isinstance(value, numbers.Real):
-        raise BadInput(f"{field} = {shown(value)}, must be a finite number")
+        raise refusal(f"{field} = {shown(value)}, must be a finite number")
     try:
         number = float(value)
     except OverflowError:
-        raise BadInput(f"{field} = {shown(value)}, must be a finite binary64 number") from None
+        raise refusal(f"{field} = {shown(value)}, must be a finite binary64 number") from None
     if not math.isfinite(number):
-        raise BadInput(f"{field} = {number}, must be finite")
+        raise refusal(f"{field} = {number}, must be finite")
     return number
 
 
@@ -77,5 +83,7 @@ def shown(value: object) -> str:
     """Return a value as a message shows it: on one line, and short."""
     if isinstance(value, int) and value.bit_length() > 256:  # Python refuses to print the longest
         return f"an integer of {value.bit_length()} bits"
+    if not (value is None or isinstance(value, numbers.Number | str)):  # long, or nested too deep to print
+        return f"an object of type {type(value).__name__}"
     text = " ".join(repr(value).split())
     return text if len(text) <= 60 else text[:57] + "..."

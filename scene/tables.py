@@ -1,26 +1,59 @@
 """Tables: cap, stem and mushroom, and the walls that each of them has.
 
-A scene is a table with its laws of motion. Only what a table needs is part of it:
+A scene is a table with its laws of motion, proved valid where it is made: by a constructor, by decoding,
+by replacing a field, by unpickling. (`msgspec.structs.force_setattr` and a subclass that replaces
+`__post_init__` go around it; nobody does so by accident.) Only what a table needs is part of it:
     Cap:      x^2 + y^2 <= r(t)^2, y >= 0, the base closed;
     Stem:     |x| <= w(t) + slope(t) y, -h(t) <= y <= 0, the top closed;
     Mushroom: both, joined through the mouth y = 0, |x| < w(t).
 The mouth is given by `w` (half-width, a length) or by `nu` (w = nu r).
+
+A scene is valid when r, h, w > 0, w <= r and w > h slope at all times, and when all its laws that move share
+one period exactly: the proof covers one period, and the theory is of cycles. The period of a bang-bang law
+is a rational number, that of a Fourier law with `omega` is 2 pi / omega and irrational, so these two never
+share one; a Fourier law that gives `period` has just that period, and can. A law that moves several times
+faster is written as higher harmonics (the k-th number of `cos` and `sin` belongs to k omega) or as
+repeated knots.
 """
 
 from __future__ import annotations
 
-from fractions import Fraction
-from typing import Any, ClassVar, Literal, NamedTuple
+from functools import lru_cache
+from numbers import Real
+from typing import ClassVar, Literal
 
 import msgspec
 
-from scene.laws import BangBang, Fourier, Law, is_constant
+from scene.laws import BangBang, Fourier, Law, Period, finite, period_of
+from scene.refusal import InvalidScene, shown
+from scene.validity import Condition, prove
 
 Wall = Literal["arc", "base", "left", "right", "floor"]
+PARAMETERS = ("r", "w", "nu", "h", "slope")
 
 
 class _Table(msgspec.Struct, frozen=True, tag_field="table", forbid_unknown_fields=True, omit_defaults=True):
-    pass
+    optional: ClassVar[tuple[str, ...]] = ()  # parameters that may be None
+
+    def __post_init__(self) -> None:
+        """Refuse an invalid scene; numbers of any kind become floats.
+
+        Raises:
+            InvalidScene: one line naming the parameter, the value or the time, and the bound.
+        """
+        for field in self.__struct_fields__:
+            given = getattr(self, field)
+            if type(given) is float or field not in PARAMETERS:
+                continue
+            if isinstance(given, Fourier | BangBang) or (given is None and field in self.optional):
+                continue
+            if isinstance(given, bool) or not isinstance(given, Real):
+                raise InvalidScene(f"{field} = {shown(given)}, must be a number, a Fourier or a BangBang law")
+            msgspec.structs.force_setattr(self, field, finite(field, given))
+        for field in ("name", "notes"):
+            if not isinstance(getattr(self, field), str):
+                raise InvalidScene(f"{field} = {shown(getattr(self, field))}, must be text")
+        _prove(type(self), tuple(getattr(self, name, None) for name in PARAMETERS))
 
 
 class Cap(_Table, frozen=True, tag="cap", kw_only=True):
@@ -47,6 +80,7 @@ class Mushroom(_Table, frozen=True, tag="mushroom", kw_only=True):
     """Cap and stem joined through the mouth y = 0, |x| < w (sec. 2)."""
 
     walls: ClassVar[tuple[Wall, ...]] = ("arc", "base", "left", "right", "floor")
+    optional: ClassVar[tuple[str, ...]] = ("w", "nu")
     r: Law
     h: Law
     w: Law | None = None
@@ -57,20 +91,6 @@ class Mushroom(_Table, frozen=True, tag="mushroom", kw_only=True):
 
 
 Scene = Cap | Stem | Mushroom
-PARAMETERS = ("r", "w", "nu", "h", "slope")
-
-
-class Period(NamedTuple):
-    """A common period: 2 pi / omega, kept symbolic, or an exact rational length [time]."""
-
-    omega: float | None
-    length: Fraction | None
-
-    def value(self, ctx: Any) -> Any:
-        """Return the period [time] in an mpmath number system."""
-        if self.length is not None:
-            return ctx.mpf(self.length.numerator) / ctx.mpf(self.length.denominator)
-        return 2 * ctx.pi / ctx.mpf(self.omega)
 
 
 def laws(scene: Scene) -> dict[str, Law]:
@@ -87,20 +107,32 @@ def width_factors(scene: Stem | Mushroom) -> tuple[Law, ...]:
     return (scene.w,)
 
 
-def periods(scene: Scene) -> dict[str, Period]:
-    """Return the period of each law that moves."""
-    found: dict[str, Period] = {}
-    for name, law in laws(scene).items():
-        if is_constant(law):
-            continue
-        if isinstance(law, Fourier):
-            length = None if law.period is None else Fraction(law.period)
-            found[name] = Period(law.omega, length)
-        elif isinstance(law, BangBang):
-            found[name] = Period(None, Fraction(law.knots[-1][0]) - Fraction(law.knots[0][0]))
-    return found
-
-
 def period(scene: Scene) -> Period | None:
-    """Return the period that all moving laws of a valid scene share; None for a static table."""
-    return next(iter(periods(scene).values()), None)
+    """Return the period that all moving laws of a scene share; None for a static table."""
+    return next((found for law in laws(scene).values() if (found := period_of(law)) is not None), None)
+
+
+@lru_cache(maxsize=4096)
+def _prove(table: type[_Table], given: tuple[Law | None, ...]) -> None:
+    # Cached by value: -0.0 and 0.0 count as equal, and validity is a matter of real numbers. A refusal is
+    # not kept, so its message shows the numbers at hand.
+    found = {name: law for name, law in zip(PARAMETERS, given, strict=True) if law is not None}
+    for name, law in found.items():
+        if isinstance(law, float):
+            finite(name, law)
+    if table is Mushroom and (("w" in found) == ("nu" in found)):
+        raise InvalidScene("a mushroom needs exactly one of `w` and `nu`")
+    prove(found, _conditions(found))
+
+
+def _conditions(found: dict[str, Law]) -> list[Condition]:
+    """List what must hold at all times for a table with these laws (sec. 2, here with a strict apex)."""
+    listed = [Condition(f"{name} > 0", ((1, (law,)),)) for name, law in found.items() if name != "slope"]
+    if "h" not in found:
+        return listed
+    width: tuple[Law, ...] = (found["nu"], found["r"]) if "nu" in found else (found["w"],)
+    if "nu" in found:
+        listed.append(Condition("nu <= 1", ((1, (1.0,)), (-1, (found["nu"],))), is_strict=False))
+    elif "r" in found:
+        listed.append(Condition("w <= r", ((1, (found["r"],)), (-1, width)), is_strict=False))
+    return [*listed, Condition("w > h slope", ((1, width), (-1, (found["h"], found["slope"]))))]

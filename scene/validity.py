@@ -1,29 +1,40 @@
-"""Validity of a scene over its whole period, by exact algebra rather than sampling.
+"""Validity of a scene over its whole period, by proof rather than sampling.
 
 Each condition is the sign of a sum of products of laws. For trigonometric laws the
 substitution x = tan(omega t / 2) makes it a rational polynomial over the real line, for
 bang-bang laws it is one on each leg; `scene.exact` decides its sign. Touching is decided
-too: nu = 1 at one instant is valid, nu > 1 by one unit in the last place is not.
+too: nu = 1 at one instant is valid, nu > 1 by one unit in the last place is not. A condition in which
+laws of both kinds move is decided by `scene.mixed`, where the two sides must keep apart: what only
+touches, or might, is refused.
 """
 
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from fractions import Fraction
 from math import comb, prod
 from typing import Any, NamedTuple
 
 from mpmath import MPContext
 
-from scene import exact
-from scene.laws import BangBang, Fourier, Law, Quadratic, breakpoints, defect, is_constant, piece_at, value
-from scene.refusal import BadInput
-from scene.tables import Cap, Mushroom, Scene, laws, period, periods
+from scene import exact, mixed
+from scene.laws import (
+    BangBang,
+    Fourier,
+    Law,
+    Period,
+    Quadratic,
+    breakpoints,
+    is_constant,
+    period_of,
+    piece_at,
+    value,
+)
+from scene.laws import exact as number
+from scene.refusal import InvalidScene
 
-
-class InvalidScene(BadInput):
-    """A scene that means nothing: one line naming parameter, time, value and bound."""
+Laws = Mapping[str, Law]
 
 
 class Condition(NamedTuple):
@@ -34,87 +45,89 @@ class Condition(NamedTuple):
     is_strict: bool = True
 
 
-def check(scene: Scene) -> None:
-    """Prove that a scene is valid at all times.
+def prove(laws: Laws, conditions: Sequence[Condition]) -> None:
+    """Prove that laws share one period and that conditions hold at all times.
 
     Args:
-        scene: table and laws.
+        laws: by parameter name; each a sound law.
+        conditions: those that say that single laws are positive come first.
 
     Raises:
         InvalidScene: naming the parameter, the time and the values that break it.
-
-    Source: sec. 2 of the paper (w <= r, w >= h tan(theta)), here with a strict apex.
     """
-    if isinstance(scene, Mushroom) and (scene.w is None) == (scene.nu is None):
-        raise InvalidScene("a mushroom needs exactly one of `w` and `nu`")
-    for name, law in laws(scene).items():
-        if problem := defect(law):
-            raise InvalidScene(name + problem)
-    _check_common_period(scene)
-    for condition in conditions(scene):
-        if not _holds(scene, condition):
-            raise InvalidScene(_message(scene, condition))
+    check_common_period(laws)
+    positive: set[Law] = set()
+    for condition in conditions:
+        kept = [(sign, factors) for sign, factors in condition.terms if 0.0 not in factors]
+        if [sign for sign, _ in kept] == [1] and positive.issuperset(kept[0][1]):
+            continue  # a product of laws known to be positive
+        _check(laws, condition)
+        if len(condition.terms) == len(condition.terms[0][1]) == 1 and condition.is_strict:
+            positive.add(condition.terms[0][1][0])
 
 
-def conditions(scene: Scene) -> list[Condition]:
-    """List what must hold at all times for this table."""
-    found = [Condition(f"{n} > 0", ((1, (law,)),)) for n, law in laws(scene).items() if n != "slope"]
-    if isinstance(scene, Cap):
-        return found
-    width: tuple[Law, ...]
-    if isinstance(scene, Mushroom) and scene.nu is not None:
-        found.append(Condition("nu <= 1", ((1, (1.0,)), (-1, (scene.nu,))), is_strict=False))
-        width = (scene.nu, scene.r)
-    else:
-        assert scene.w is not None
-        width = (scene.w,)
-        if isinstance(scene, Mushroom):
-            found.append(Condition("w <= r", ((1, (scene.r,)), (-1, width)), is_strict=False))
-    return [*found, Condition("w > h slope", ((1, width), (-1, (scene.h, scene.slope))))]
+def check_common_period(laws: Laws) -> None:
+    """Refuse laws that move with different periods.
+
+    Raises:
+        InvalidScene: naming two of them, their periods and what to do.
+    """
+    moving = {name: shared for name, law in laws.items() if (shared := period_of(law)) is not None}
+    for (first, a), (second, b) in itertools.combinations(moving.items(), 2):
+        if a != b:
+            ctx = MPContext()
+            one, other = (ctx.nstr(shared.value(ctx), 17) for shared in (a, b))
+            raise InvalidScene(
+                f"{first} has period {one} and {second} has {other}:"
+                f" all laws that move must share one period exactly; {_remedy(laws, first, second, a, b)}"
+            )
 
 
-def _check_common_period(scene: Scene) -> None:
-    named = periods(scene)
-    if len(set(named.values())) > 1:
-        (first, a), (second, b) = next(
-            ((m, p), (n, q)) for m, p in named.items() for n, q in named.items() if p != q
+def _remedy(laws: Laws, first: str, second: str, a: Period, b: Period) -> str:
+    if (a.length is None) != (b.length is None):
+        by_omega, length = (first, b.length) if a.length is None else (second, a.length)
+        assert length is not None
+        return (
+            f"{by_omega} gives omega, so its period is irrational: give it period = {float(length)} instead"
         )
-        ctx = MPContext()
-        raise InvalidScene(
-            f"{first} has period {ctx.nstr(a.value(ctx), 17)} and {second} has {ctx.nstr(b.value(ctx), 17)}:"
-            " all moving laws must share one period exactly (use harmonics for multiples)"
-        )
+    if isinstance(laws[first], BangBang) and isinstance(laws[second], BangBang):
+        return "repeat the knots of the shorter, or let it rest until the longer ends"
+    return "give both the longer one, and put faster waves further back in cos and sin (or repeat the knots)"
 
 
-def _holds(scene: Scene, condition: Condition) -> bool:
-    for p, a, b in _polynomials(condition):
-        if exact.negative_point(p, a, b) is not None:
-            return False
-        if condition.is_strict and exact.vanishes(p, a, b):
-            return False
-    return True
-
-
-def _polynomials(condition: Condition) -> Iterator[tuple[exact.Polynomial, Fraction, Fraction]]:
+def _check(laws: Laws, condition: Condition) -> None:
     used = [law for _, factors in condition.terms for law in factors if not is_constant(law)]
     legs = [law for law in used if isinstance(law, BangBang)]
-    if legs:
-        yield from _on_legs(condition, legs)
-    else:
-        yield from _on_circle(condition)
+    if 0 < len(legs) < len(used):
+        verdict = mixed.sign_on_legs(condition.terms, condition.is_strict, _intervals(legs))
+        if verdict.holds is None:
+            raise InvalidScene(
+                f"{condition.text} cannot be shown near t = {float(verdict.time):.6g}: where Fourier and"
+                " bang-bang laws meet in one condition its sides must keep apart: here they touch, or nearly"
+            )
+        if not verdict.holds:
+            raise InvalidScene(_message(laws, condition, verdict.time))
+        return
+    for p, a, b in _on_legs(condition, legs) if legs else _on_circle(condition):
+        if exact.negative_point(p, a, b) is not None or (condition.is_strict and exact.vanishes(p, a, b)):
+            raise InvalidScene(_message(laws, condition))
 
 
-def _on_legs(
-    condition: Condition, legs: list[BangBang]
-) -> Iterator[tuple[exact.Polynomial, Fraction, Fraction]]:
+def _intervals(legs: Sequence[BangBang]) -> list[tuple[Fraction, Fraction]]:
+    """Cut one period at every time at which one of these laws is not analytic."""
     start, span = Fraction(legs[0].knots[0][0]), Fraction(0)
     cuts = {start}
     for law in legs:
         times = breakpoints(law)
         span = times[-1] - times[0]
         cuts |= {start + (t - start) % span for t in times}
-    ordered = [*sorted(cuts), start + span]
-    for a, b in itertools.pairwise(ordered):
+    return list(itertools.pairwise([*sorted(cuts), start + span]))
+
+
+def _on_legs(
+    condition: Condition, legs: Sequence[BangBang]
+) -> Iterator[tuple[exact.Polynomial, Fraction, Fraction]]:
+    for a, b in _intervals(legs):
         total: exact.Polynomial = []
         for sign, factors in condition.terms:
             term = [Fraction(sign)]
@@ -173,20 +186,22 @@ def _half_angle(law: Law) -> tuple[exact.Polynomial, int]:
     return total, n
 
 
-def _message(scene: Scene, condition: Condition) -> str:
-    # The proof is exact; this only looks for a telling instant to show. In mp no scene overflows.
+def _message(laws: Laws, condition: Condition, known: Fraction | None = None) -> str:
+    # The proof is done; this only looks for a telling instant to show. In mp no scene overflows.
     ctx = MPContext()
-    shared = period(scene)
+    shared = next((found for law in laws.values() if (found := period_of(law)) is not None), None)
     span = shared.value(ctx) if shared else ctx.mpf(0)
-    start = next((law.knots[0][0] for law in laws(scene).values() if isinstance(law, BangBang)), 0.0)
+    start = next((law.knots[0][0] for law in laws.values() if isinstance(law, BangBang)), 0.0)
     times = [ctx.mpf(start) + span * i / 512 for i in range(512 if span else 1)]
+    if known is not None:
+        times.append(number(ctx, known))
 
     def excess(t: Any) -> Any:
         return sum(sign * prod(value(ctx, f, t) for f in factors) for sign, factors in condition.terms)
 
-    def shown(number: Any) -> str:
-        return str(ctx.nstr(number, 6))
+    def shown(x: Any) -> str:
+        return str(ctx.nstr(x, 6))
 
     worst = min(times, key=excess)
-    values = ", ".join(f"{name} = {shown(value(ctx, law, worst))}" for name, law in laws(scene).items())
+    values = ", ".join(f"{name} = {shown(value(ctx, law, worst))}" for name, law in laws.items())
     return f"{condition.text} fails by {shown(excess(worst))} near t = {shown(worst)}, where {values}"

@@ -13,12 +13,11 @@ from hypothesis import strategies as st
 from mpmath import MPContext
 
 from conformance.strategies import clocks, laws, scenes, scenes_and_states, states
-from scene import BangBang, Cap, Fourier, Mushroom, State, Stem, from_data, load
+from scene import BangBang, Cap, Fourier, Mushroom, State, Stem, check_scene, from_data, load
 from scene.laws import bounds, is_constant, value
 from scene.states import ON_WALL, check_numbers
 from scene.tables import laws as laws_of
 from scene.tables import period
-from scene.validity import check
 
 
 class Table:
@@ -67,7 +66,7 @@ def walls_around(scene, table, state):
 
 
 def assert_sound(scene, state, t_end):
-    check(scene)
+    check_scene(scene)
     check_numbers(scene, state, t_end)
     table = Table(scene, state.t)
     walls = table.walls(state)

@@ -123,12 +123,16 @@ def late_start(claim):
     claim["excluded"]["arc"][0][0] = "1*2^-30"
 
 
-def shifted_root(claim):
+def shifted_time(claim):
     claim["dt"] = [moved(end, Fraction(1, 2**60)) for end in claim["dt"]]
 
 
+def shifted_root(claim):
+    claim["dt"] = claim["root"] = [moved(end, Fraction(1, 2**60)) for end in claim["dt"]]
+
+
 def wide_root(claim):
-    claim["dt"][0] = "1*2^-10"
+    claim["root"][0] = "1*2^-10"
     claim["excluded"]["arc"] = [["0*2^0", "1*2^-10", "rising"]]
 
 
@@ -145,7 +149,7 @@ def hidden_root_of_another_wall(claim):
 
 
 def hidden_root_of_the_same_wall(claim):
-    claim["dt"] = [moved(end, 1) for end in claim["dt"]]
+    claim["dt"] = claim["root"] = [moved(end, 1) for end in claim["dt"]]
     claim["excluded"] = {wall: [["0*2^0", "2*2^0", "plain"]] for wall in ("left", "right", "floor")}
 
 
@@ -167,9 +171,9 @@ def wall_said_to_stay_away(claim):
 
 
 def end_past_the_root(claim):
-    end = moved(claim["dt"][1], Fraction(1, 1024))
-    claim["excluded"]["arc"][-1][1] = claim["dt"][0] = end
-    claim["dt"][1] = moved(end, Fraction(1, 1024))
+    end = moved(claim["root"][1], Fraction(1, 1024))
+    claim["excluded"]["arc"][-1][1] = claim["root"][0] = end
+    claim["root"][1] = moved(end, Fraction(1, 1024))
 
 
 def changed_velocity(claim):
@@ -189,7 +193,7 @@ def invalid_law(claim):
 
 
 def horizon_despite_a_hit(claim):
-    claim.update(outcome="horizon", wall=None, dt=None)
+    claim.update(outcome="horizon", wall=None, dt=None, root=None)
 
 
 def later_horizon(claim):
@@ -217,6 +221,7 @@ TAMPERED = [
     (missing_stretch, CIRCLE_HIT, "arc is not excluded from 0"),
     (missing_wall, LIFT_HIT, "left is not excluded from 0"),
     (late_start, CIRCLE_HIT, "arc is not excluded from 0"),
+    (shifted_time, CIRCLE_HIT, "dt is not"),
     (shifted_root, CIRCLE_HIT, "arc is not excluded|change sign"),
     (wide_root, CIRCLE_HIT, "f' is not negative"),
     (wrong_wall, LIFT_HIT, "floor is not excluded|change sign"),

@@ -7,17 +7,19 @@ in plain mpmath; nothing in it compares the reference with its own earlier resul
 from __future__ import annotations
 
 from fractions import Fraction
-from functools import partial
 
 import mpmath
 import pytest
 
 import reference
-from reference import jets, stepper
+from reference import chain, motion, rational, start, timeline
+from reference.arithmetic import Arithmetic
+from reference.arithmetic import rational as exact_point
 from reference.course import SIDES, Course
 from reference.isolation import Isolator
-from reference.jets import Jet, Motion
-from scene import BangBang, Cap, Fourier, Mushroom, State, Stem, Undefined
+from reference.jets import Jet
+from reference.motion import Motion
+from scene import BangBang, Cap, Fourier, Mushroom, State, Stem, Undecided, Undefined
 from scene.laws import value
 from scene.tables import laws
 
@@ -199,7 +201,109 @@ def reversed_film():
     assert (home.x, home.y, -home.vx, -home.vy) == pytest.approx((q.x, q.y, q.vx, q.vy), abs=1e-12)
 
 
+# A floor whose highest place is well below what its amplitudes add up to.
+GRAZING = Stem(w=1.0, h=Fourier(mean=1.25, omega=1.0, cos=(0.125,), sin=(0.0, 0.125)))
+# The width leaps from 0.01 to 0.9 within 2e-16 of the second event, at t = 2^110.
+LEAP = Mushroom(
+    r=1.0,
+    h=1.0,
+    w=BangBang(
+        knots=((0.0, 0.01), (1.6097936544959741, 0.01), (1.6097936544959743, 0.9), (5.6, 0.9), (16.0, 0.01))
+    ),
+)
+
+
+def knot_within_an_enclosed_time():
+    """The mouth is open when y = 0 is crossed; with its knot within the enclosure, nothing is said."""
+    q = State(2.0**110, 0.3, 0.5, 0.02, 1.0)
+    assert [step.wall for step in reference.trajectory(LEAP, q, 2).steps] == ["arc", "left"]
+    for working in (6, 8, 10, 12, 15):
+        path = reference.trajectory(LEAP, q, 2, working=working)
+        assert [step.wall for step in path.steps] in (["arc"], ["arc", "left"])
+        assert len(path.steps) == 2 or isinstance(path.outcome, Undecided)
+
+
+def floor_within_an_enclosed_time():
+    """After the side, the floor begins to rise a little before or after it would be met."""
+    for i in range(40):
+        knot = 4096.0 + 1.0 + (i - 20) * 2.0**-24
+        low = BangBang(
+            knots=((4096.0, 1.0), (knot, 1.0), (knot + 2.0**-20, 0.5), (4104.0, 0.5), (4112.0, 1.0))
+        )
+        q = State(4096.0, 0.5, -0.25, 1.0, -0.75 + 2.0**-30)
+        exact = reference.trajectory(Stem(w=1.0, h=low), q, 2, digits=20).steps
+        assert len(exact) == 2
+        truth = exact[-1]
+        path = reference.trajectory(Stem(w=1.0, h=low), q, 2, working=8)
+        for step in path.steps[1:]:
+            assert step.dt.lo <= truth.dt.hi
+            assert truth.dt.lo <= step.dt.hi
+            assert step.after.vy.lo <= truth.after.vy.hi
+            assert truth.after.vy.lo <= step.after.vy.hi
+
+
+def removed_residual_decides():
+    """Left of a wall by 1.5 2^-300 by rounding: with that removed, the wall is met before the top."""
+    for slope, t_end in (
+        (-(2.0**-300), 3.0),
+        (BangBang(((-0.25, 0.0), (0.75, -(2.0**-300)), (1.75, 0.0))), 1.75),
+    ):
+        tilted = Stem(w=BangBang(((0.0, 1.0), (1.0, 2.0), (2.0, 1.0))), h=4.0, slope=slope)
+        hit(tilted, State(0.25, -1.125, -1.5, 0.0, 1.0, "left"), "left", t_end)
+
+
+def met_at_the_horizon():
+    """A wall met at t_end exactly is not met before it."""
+    found = reference.next_collision(BOX, State(0.0, 0.25, -0.25, 1.0, -0.75), 0.75, digits=DIGITS)
+    assert isinstance(found, reference.Horizon)
+
+
+def on_two_walls():
+    for q, reason in (
+        (State(0.0, 1.0, 0.0, -0.1, -1.0, "arc"), "corner"),
+        (State(0.0, -0.5, 0.0, 1.0, 0.0, "left"), "mouth-edge"),
+        (State(0.0, -0.5, 0.0, 1.0, 0.3, "left"), "mouth-edge"),
+        (State(0.0, 0.5, -1.0, -1.0, 1.0, "right"), "corner"),
+    ):
+        assert reference.next_collision(STATIC, q, 9.0, digits=DIGITS) == Undefined(reason)
+
+
+def hit_on_a_knot():
+    """The arc is met just as a violent leg begins."""
+    violent = Cap(r=BangBang(((0.0, 1.0), (1.0, 1.0), (1.0 + 2.0**-20, 0.5), (2.0, 0.5), (4.0, 1.0))))
+    assert hit(violent, State(0.0, 0.0, 0.5, 0.0, 0.5), "arc").dt.contains(1)
+
+
+def edge_as_the_wall_left_sees_it():
+    """An ulp outside the side that it leaves, and moving away: it passes the mouth."""
+    hit(STATIC, State(0.0, -0.5 - 2.0**-53, -0.25, 2.0**-66, 1.0, "left"), "arc")
+
+
+def bounded_work():
+    """A floor that never quite reaches a resting particle, over 160,000 periods: given up, and soon."""
+    spent = [0]
+    honest = Arithmetic.spend
+
+    def watched(self, units):
+        spent[0] += units
+        assert spent[0] < 110_000
+        honest(self, units)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Arithmetic, "spend", watched)
+        outcome = reference.next_collision(GRAZING, State(0.0, 0.5, -1.01, 0.0, 0.0), 1e6, digits=DIGITS)
+    assert isinstance(outcome, Undecided)
+
+
 BATTERY = (
+    knot_within_an_enclosed_time,
+    floor_within_an_enclosed_time,
+    removed_residual_decides,
+    met_at_the_horizon,
+    on_two_walls,
+    hit_on_a_knot,
+    edge_as_the_wall_left_sees_it,
+    bounded_work,
     chord,
     leaving_a_chord,
     lift,
@@ -220,13 +324,15 @@ BATTERY = (
 first_root = Isolator.first_root
 first_hit = Course._first_hit
 beyond_crossing = Course._beyond_crossing
-spans = Course._spans
 isolator_init = Isolator.__init__
+course_init = Course.__init__
 wall_of = Motion.wall
 gradient = Motion.gradient
 law_of = Motion.law
 width_of = Motion.width
-bounce = stepper._bounce
+reflected = chain.reflected
+wall_jet = rational.wall_jet
+legs_jet = timeline.Legs.jet
 
 
 def skip_the_first_root(self, start, end):
@@ -253,43 +359,69 @@ def exclude_all_but_the_floor(self, walls, start, limit):
     return first_hit(self, tuple(wall for wall in walls if wall != "floor") or walls, start, limit)
 
 
-def cut_no_knot(self, start, stop):
-    yield next(spans(self, start, stop))._replace(end=stop)
+def piece_at_the_lower_end(self, s):
+    """Only the piece of a law that holds where an enclosed time begins."""
+    low = self.instant + exact_point(s._mpi_[0])
+    turn = (low - self.starts[0]) // self.period * self.period
+    i = timeline.bisect_right(self.starts, low - turn) - 1
+    return self._on(i, turn, s)
 
 
-def keep_the_residual(self, arithmetic, jet, residual, *, is_flat=False):
-    isolator_init(self, arithmetic, jet, None, is_flat=is_flat)
+def piece_in_the_middle(self, s):
+    """Of the pieces that an enclosed time may touch, the one in its middle is believed."""
+    if s.delta == 0 or s.delta > 2.0**-10:
+        return legs_jet(self, s)
+    middle = legs_jet(self, self.arithmetic.middle(s))
+    return Jet(middle.f + s.delta * middle.d1, middle.d1 + s.delta * middle.d2, middle.d2)
+
+
+def keep_the_residual(self, arithmetic, jet, begin, residual=None, **options):
+    isolator_init(self, arithmetic, jet, begin, None, **options)
+
+
+def tie_with_the_residual(scene, state, wall, s):
+    jet = wall_jet(scene, state, wall, s)
+    return jet is not None and jet[0] == 0
+
+
+def edge_with_the_residual(self, crossing, *, in_cap):
+    leaving, self.leaving = self.leaving, {}
+    try:
+        return beyond_crossing(self, crossing, in_cap=in_cap)
+    finally:
+        self.leaving = leaving
 
 
 def width_at_departure(self, crossing, *, in_cap):
-    wanted = self.flight.t + crossing
-    motions = self._motions_at
-
-    def wide(motion, at):
-        return width_of(motion, motion.flight.t if at == wanted else at)
-
-    def early(time):
-        if time is not crossing:
-            return motions(time)
-        moved = motions(self.arithmetic.zero)
-        for motion in moved:
-            motion.width = partial(wide, motion)
-        return moved
-
-    self._motions_at = early
+    self.motion.width = lambda s: width_of(self.motion, self.arithmetic.zero if s is crossing else s)
     return beyond_crossing(self, crossing, in_cap=in_cap)
+
+
+def with_a_later_horizon(self, scene, arithmetic, flight, leaving, flat, end, exact):
+    course_init(self, scene, arithmetic, flight, leaving, flat, None if end is None else end + 9, exact)
+
+
+def met_before_the_horizon(self, hit):
+    return False
+
+
+def one_wall_at_most(scene, state):
+    return [state.wall] if state.wall else start_walls(scene, state)
+
+
+start_walls = start._walls_near
 
 
 def open_always(self, crossing, *, in_cap):
     if not isinstance(self.scene, Mushroom):
         return beyond_crossing(self, crossing, in_cap=in_cap)
     walls = SIDES if in_cap else ("arc",)
-    return self._first_hit(walls, self.arithmetic.lower(crossing), self.end)
+    return self._first_hit(walls, self.arithmetic.lower(crossing), None)
 
 
-def with_the_wall_reversed(chain, hit, arithmetic):
-    f_t = hit.motions[-1].gradient(hit.wall, hit.time)[2]
-    return bounce(chain, hit._replace(slope=hit.slope - 2 * f_t), arithmetic)
+def with_the_wall_reversed(arithmetic, flight, hit):
+    f_t = hit.motion.gradient(hit.wall, hit.time)[2]
+    return reflected(arithmetic, flight, hit._replace(slope=hit.slope - 2 * f_t))
 
 
 def swapped_sides(self, wall, s):
@@ -301,15 +433,15 @@ def level_normal(self, wall, s):
     return f_x, self.arithmetic.zero if wall in ("left", "right") else f_y, f_t
 
 
-def still_slope(self, name, time):
-    jet = law_of(self, name, time)
+def still_slope(self, name, s):
+    jet = law_of(self, name, s)
     return Jet(jet.f, None, None) if name == "slope" else jet
 
 
-def width_with_still_nu(self, time):
-    if "nu" not in self.pieces:
-        return width_of(self, time)
-    nu, r = self.law("nu", time), self.law("r", time)
+def width_with_still_nu(self, s):
+    if "nu" not in self.timeline.laws:
+        return width_of(self, s)
+    nu, r = self.law("nu", s), self.law("r", s)
     return Jet(nu.f * r.f, None if r.d1 is None else nu.f * r.d1, None)
 
 
@@ -329,7 +461,13 @@ MUTANTS = {
     "first root skipped": (Isolator, "first_root", skip_the_first_root),
     "first wall in the list wins": (Course, "_first_hit", exclude_nothing),
     "floor never asked": (Course, "_first_hit", exclude_all_but_the_floor),
-    "knot not cut": (Course, "_spans", cut_no_knot),
+    "piece at the lower end of an enclosed time": (timeline.Legs, "jet", piece_at_the_lower_end),
+    "piece in the middle of an enclosed time": (timeline.Legs, "jet", piece_in_the_middle),
+    "ties with the residual": (rational, "is_zero", tie_with_the_residual),
+    "mouth's edge with the residual": (Course, "_beyond_crossing", edge_with_the_residual),
+    "met at the horizon is met": (Course, "_is_at_horizon", met_before_the_horizon),
+    "a start is on one wall at most": (start, "_walls_near", one_wall_at_most),
+    "no limit to the work": (Arithmetic, "spend", lambda self, units: None),
     "mouth's width at departure": (Course, "_beyond_crossing", width_at_departure),
     "mouth always open": (Course, "_beyond_crossing", open_always),
     "base always closed": (
@@ -338,19 +476,19 @@ MUTANTS = {
         lambda self, crossing, *, in_cap: self._base_hit(crossing),
     ),
     "residual kept": (Isolator, "__init__", keep_the_residual),
-    "wall velocity reversed in the bounce": (stepper, "_bounce", with_the_wall_reversed),
+    "wall velocity reversed in the bounce": (chain, "reflected", with_the_wall_reversed),
     "half the kick": (
-        stepper,
-        "_bounce",
-        lambda chain, hit, arithmetic: bounce(chain, hit._replace(slope=hit.slope / 2), arithmetic),
+        chain,
+        "reflected",
+        lambda arithmetic, flight, hit: reflected(arithmetic, flight, hit._replace(slope=hit.slope / 2)),
     ),
     "left and right swapped": (Motion, "wall", swapped_sides),
     "normal of a slanted side level": (Motion, "gradient", level_normal),
     "slope's derivative dropped": (Motion, "law", still_slope),
     "product rule of nu r dropped": (Motion, "width", width_with_still_nu),
-    "r r'' dropped": (jets, "square", square_without_second_derivative),
+    "r r'' dropped": (motion, "square", square_without_second_derivative),
     "second derivatives by time dropped": (Motion, "hessian", hessian_without_time),
-    "horizon overrun": (stepper, "_horizon", lambda arithmetic, t, t_end: arithmetic.number(t_end + 9) - t),
+    "horizon overrun": (Course, "__init__", with_a_later_horizon),
 }
 
 

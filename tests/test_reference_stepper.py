@@ -17,13 +17,15 @@ import reference
 from conformance.strategies import scenes_and_states
 from reference.arithmetic import Arithmetic, rational, sign
 from reference.isolation import Isolator
-from reference.jets import Flight, Jet, Motion
+from reference.jets import Jet
+from reference.motion import Motion
+from reference.start import flight_from
 from scene import (
+    BadInput,
     BangBang,
     Cap,
     Fourier,
     Horizon,
-    InvalidState,
     Mushroom,
     Rejected,
     State,
@@ -32,7 +34,7 @@ from scene import (
     Undefined,
     load,
 )
-from scene.laws import piece_at, value
+from scene.laws import value
 from scene.tables import laws
 
 CIRCLE = Cap(r=1.0)
@@ -136,7 +138,7 @@ def test_a_path_of_fixed_precision_ends_where_it_no_longer_tells():
     assert isinstance(
         reference.trajectory(scene, State(0.3, 0.0, close, 1.0, -0.5), 1, working=3).outcome, Undecided
     )
-    with pytest.raises(InvalidState, match="working = 0"):
+    with pytest.raises(BadInput, match="working = 0"):
         reference.trajectory(scene, start, 1, working=0)
 
 
@@ -281,7 +283,7 @@ class TestIsolation:
 
     def first(self, jet, end=4.0, start=0.0):
         arithmetic = Arithmetic(30)
-        isolator = Isolator(arithmetic, jet, None)
+        isolator = Isolator(arithmetic, jet, arithmetic.zero)
         return isolator.first_root(arithmetic.number(start), arithmetic.number(end)), isolator
 
     def test_the_first_of_many_roots(self):
@@ -327,18 +329,17 @@ def test_wall_functions_enclose_plain_values(drawn, a, b):
     """f, f', f'' over an interval contain the value and differences at points of it."""
     scene, state, t_end = drawn
     arithmetic = Arithmetic(40)
-    pieces = {name: piece_at(law, Fraction(state.t)) for name, law in laws(scene).items()}
-    flight = Flight(*(arithmetic.number(v) for v in (state.t, state.x, state.y, state.vx, state.vy)))
-    motion = Motion(arithmetic, flight, pieces, is_stem=isinstance(scene, Stem))
-    span = min(t_end - state.t, 2.0**-10)
+    motion = Motion(arithmetic, scene, flight_from(arithmetic, state))
+    span = t_end - state.t
     lo, hi = sorted((a * span, b * span))
     whole = arithmetic.context.mpf([lo, hi])
     for wall in scene.walls:
         jet = motion.wall(wall, whole)
         inner = motion.wall(wall, arithmetic.number(lo + (hi - lo) / 3))
         for outer, point in zip(jet, inner, strict=True):
-            assert (outer is None) == (point is None)
-            if outer is not None:
+            if outer is None:
+                assert point is None
+            elif point is not None:
                 assert outer.a <= point.b
                 assert point.a <= outer.b
         if hi > lo and jet.d1 is not None:

@@ -201,12 +201,18 @@ def simulate(
     start = initial_states(scene, n_particles, 0.5 * speed2, seed)
     free = np.full(n_particles, codes.NO_WALL)
     done = follow(fitted.compiled, start, free, stops, threads, progress)
-    every = (n_particles, n_cycles, len(phases) + 1)
+    return _ensemble(energy, done, units, (n_particles, n_cycles, len(phases) + 1), threads)
+
+
+def _ensemble(
+    energy0: float, done: Followed, units: Units, every: tuple[int, int, int], threads: int
+) -> Ensemble:
+    """Name what the kernel filled in; `every`: particles, cycles, looks at a particle in a cycle."""
     energies, captured = units.energies(done.energies).reshape(every), done.is_captured.reshape(every)
     columns = [units.times(done.states[:, 0]), *units.places(done.states[:, 2:]).T]
     t, x, y, vx, vy = (np.ascontiguousarray(column) for column in columns)
     return Ensemble(
-        energy0=energy,
+        energy0=energy0,
         energy=np.ascontiguousarray(energies[:, -1, -1]),
         cycle_energies=np.ascontiguousarray(energies[:, :, -1]),
         t=t,

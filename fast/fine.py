@@ -14,7 +14,7 @@ from fast.given import MAX_STEPS
 from fast.stepper import WALL_CODES, WALL_NAMES, Start, check_state, trouble
 from fast.units import Units
 from scene import Horizon, Outcome, Scene, State, Wall
-from scene.refusal import check_count
+from scene.refusal import check_count, check_scene
 
 
 class FineTrajectory(NamedTuple):
@@ -54,6 +54,7 @@ def fine_trajectory(scene: Scene, state: State, n_collisions: int) -> FineTrajec
 
     Source: Gelfreich, Rom-Kedar, Turaev (2014), sec. 3.1; which wall is met is the careful step's answer.
     """
+    check_scene(scene)
     start = check_state(scene, state)
     n_collisions = check_count("n_collisions", n_collisions, 0, MAX_STEPS)
     steps: FloatArray = np.empty((n_collisions, 6, 2))

@@ -16,7 +16,7 @@ from fast.starts import least_collisions, only_stop
 from fast.stepper import as_arrays, fitted_start, next_collision, trouble
 from fast.units import fit
 from scene import Horizon, InvalidState, Outcome, Rejected, Scene, State
-from scene.refusal import check_number
+from scene.refusal import check_number, check_scene
 
 MAX_COLLISIONS = 10**7  # of one particle, some seconds of work
 
@@ -54,6 +54,7 @@ def flow(scene: Scene, states: Sequence[State], t_end: float, threads: int | Non
 
     Source: a stay is captured while |sin phi| > nu at the arc, sec. 3.2.
     """
+    check_scene(scene)
     threads = given_threads(threads)
     states = given_states(scene, states)
     t_end = check_number("t_end", t_end)

@@ -15,7 +15,7 @@ from itertools import pairwise
 import numpy as np
 
 from scene import InvalidState, Scene, State
-from scene.refusal import BadInput, check_count, check_number, check_scene, shown
+from scene.refusal import BadInput, check_count, check_number, shown
 
 MAX_STEPS = 10**7  # collisions of one trajectory, kept in memory: half a gigabyte
 MAX_PARTICLES = 10**8
@@ -26,18 +26,19 @@ NUMBERS = ("t", "x", "y", "vx", "vy")
 
 
 def given_state(scene: Scene, state: object) -> State:
-    """Return a state whose numbers are floats; the bounds of their sizes are not looked at.
+    """Return a state whose numbers are floats; `scene.states.check_numbers` looks at their sizes.
 
     Raises:
-        BadInput: `scene` is no scene, or `state` no State.
-        InvalidState: a field is no finite number, or `wall` is no wall of the scene.
+        BadInput: `state` is no State.
+        InvalidState: a field is no number, or `wall` is no wall of the scene.
     """
-    check_scene(scene)
     if not isinstance(state, State):
         raise BadInput(f"state = {shown(state)}, must be a State")
     wall = state.wall
     if wall is not None and not (isinstance(wall, str) and wall in scene.walls):
         raise InvalidState(f"state.wall = {shown(wall)}, must be null or one of {', '.join(scene.walls)}")
+    if type(state.t) is type(state.x) is type(state.y) is type(state.vx) is type(state.vy) is float:
+        return state
     t, x, y, vx, vy = (check_number(f"state.{name}", getattr(state, name), InvalidState) for name in NUMBERS)
     return State(t, x, y, vx, vy, wall)
 
@@ -50,7 +51,6 @@ def given_end(t_end: object) -> float:
 
 def given_states(scene: Scene, states: object) -> list[State]:
     """Return states whose numbers are floats; InvalidState names the particle."""
-    check_scene(scene)
     if isinstance(states, str | bytes) or not isinstance(states, Sequence):
         raise BadInput(f"states = {shown(states)}, must be a sequence of State")
     found = []

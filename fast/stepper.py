@@ -69,7 +69,7 @@ def next_collision(scene: Scene, state: State, t_end: float) -> Outcome:
     """
     check_scene(scene)
     try:
-        t_end = check_number("t_end", t_end)
+        t_end = t_end if type(t_end) is float else check_number("t_end", t_end)
         state = given_state(scene, state)
         check_numbers(scene, state, t_end)
         start = fitted_start(scene, state)
@@ -117,6 +117,7 @@ def trajectory(scene: Scene, state: State, n_collisions: int, t_end: float = np.
         BadInput: naming field, value and bound, for anything that is not as above. That a state is outside
             the table, or moves into the wall that it leaves, the first step finds: the outcome is Rejected.
     """
+    check_scene(scene)
     t_end = given_end(t_end)
     start = check_state(scene, state, None if t_end == np.inf else t_end)
     n_collisions = check_count("n_collisions", n_collisions, 0, MAX_STEPS)

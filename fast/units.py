@@ -92,16 +92,13 @@ class Fitted(NamedTuple):
         scene: with its lengths and times divided by the units.
         length: exponent of the unit of length.
         time: exponent of the unit of time; None for a static table, which leaves it to the state.
+        compiled: its numbers for the kernels.
     """
 
     scene: Scene
     length: int
     time: int | None
-
-    @property
-    def compiled(self) -> Compiled:
-        """The scene's numbers for the kernels."""
-        return compile_scene(self.scene)
+    compiled: Compiled
 
     def units(self, state: State) -> Units:
         """Return the units for one state: all that depends on it is a static table's unit of time."""
@@ -133,7 +130,8 @@ def fit(scene: Scene) -> Fitted:
         name: _in_units(law, f"scene.{name}", 0 if name in ("nu", "slope") else length, time or 0)
         for name, law in laws(scene).items()
     }
-    return Fitted(msgspec.structs.replace(scene, **changed), length, time)
+    fitted = msgspec.structs.replace(scene, **changed)
+    return Fitted(fitted, length, time, compile_scene(fitted))
 
 
 def exponent(size: float) -> int:

@@ -51,9 +51,7 @@ def draw_question(random: np.random.Generator) -> Question:
     scene = draw_scene(random)
     (t, _, x, y, vx, vy), wall = draw_start(scene, random)
     faster = 2.0 ** random.integers(-8, 9)
-    state = State(
-        float(t), float(x), float(y), float(faster * vx), float(faster * vy), WALL_NAMES[wall]
-    )
+    state = State(float(t), float(x), float(y), float(faster * vx), float(faster * vy), WALL_NAMES[wall])
     if random.random() < 0.3:
         scene = frozen(scene, state.t)
     if random.random() < 0.3:
@@ -104,9 +102,7 @@ def is_scaled(
     ask: Callable[[Question], Numbers], q: Question, length: int, time: int, tally: Counter[str]
 ) -> bool:
     """Tell whether the scaled question has the scaled answer, or one of the two is refused."""
-    other = Question(
-        scaled(q.scene, length, time), scaled_state(q.state, length, time), 2.0**time * q.t_end
-    )
+    other = Question(scaled(q.scene, length, time), scaled_state(q.state, length, time), 2.0**time * q.t_end)
     try:
         one = ask(q)
     except BadInput:

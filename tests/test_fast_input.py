@@ -134,7 +134,7 @@ def test_every_bad_value_is_refused_by_its_name(name):
 
 
 def test_random_bad_input_is_refused(tally):
-    """Several arguments at once, any bad value in any place, and good ones: refused, or answered without nan."""
+    """Bad and good values of any argument in any place, several at once: refused in one line, or taken."""
     random = np.random.default_rng(8)
     pool = [value for values in BAD.values() for value in values]
     for _ in range(600):

@@ -187,3 +187,20 @@ def test_other_stays_give_another_p_nc(name, mutant, monkeypatch):
     monkeypatch.setattr(starts, "narrowings", lambda scene: WRONG[mutant](narrowings(scene)))
     z, error = z_score(fast.simulate(scene, n_particles=N, energy=ENERGY[name], seed=1), scene)
     assert abs(z) > 4 + BIAS[name] / error
+
+
+def test_captures_come_when_theory_says():
+    """Each stay counted once, by its begin, in both falls of nu; and the mean of exp(-s / 2) is right."""
+    scene, n = MOUTHS["plateaus"], 2000
+    run = fast.simulate(scene, n_particles=n, energy=1e6, seed=1)
+    first, second = run.t_in[:, 0].T
+    begins = np.concatenate([first, second[second != first]])
+    edges = np.array([1.0, 1.35, 1.65, 2.0, 5.0, 5.35, 5.65, 6.0])
+    found = np.histogram(begins, edges)[0] / n
+    expected = np.asarray(theory.capture_time_mass(scene, edges))
+    assert expected.sum() == pytest.approx(0.816, abs=1e-3)
+    # A capture waits for the next arc hit, and a chord lasts 1e-3 of these times.
+    assert np.all(np.abs(found - expected) < 4 * np.sqrt(expected / n) + 5e-3)
+    s = np.log(run.energy / run.energy0)
+    error = np.std(np.exp(-s / 2)) / math.sqrt(n)
+    assert abs(np.mean(np.exp(-s / 2)) - float(theory.unbiased_mean(scene))) < 4 * error

@@ -20,7 +20,7 @@ def moved(draw: Draw, size: float, at: float = 0.0) -> Law:
     """Return a law that is `size` at time `at`, at rest then or moving; sometimes a number."""
     if draw.pick((True, False)):
         return size
-    other = size * draw.pick((0.75, 0.875, 1.25, 1.5))
+    other = size * draw.pick((0.75, 0.875, 1.125, 1.25))
     if draw.pick((True, False)):
         knots = ((at, size), (at + 1.0, other), (at + PERIOD, size))
     else:  # half way down a leg of length 2: the mean of its ends
@@ -29,9 +29,12 @@ def moved(draw: Draw, size: float, at: float = 0.0) -> Law:
 
 
 def _shapes(draw: Draw) -> tuple[Scene, float, float, float, float]:
-    """Draw a scene and what r, w, h and slope are at t = 0, whole periods left out."""
-    r, w = 1.0, draw.pick((0.25, 0.5))
-    h, slope = draw.pick((0.5, 1.0)), draw.pick((0.0, 0.125, -0.25))
+    """Draw a scene and what r, w, h and slope are at t = 0, whole periods left out.
+
+    A length moves by at most a quarter of itself: h slope <= 0.08 < 0.18 <= w <= 0.47 < 0.75 <= r.
+    """
+    r, w = 1.0, draw.pick((0.25, 0.375))
+    h, slope = draw.pick((0.5, 1.0)), draw.pick((0.0, 0.0625, -0.25))
     table = draw.pick(("cap", "stem", "mushroom", "mushroom"))
     if table == "cap":
         return Cap(r=moved(draw, r)), r, w, h, slope
@@ -62,8 +65,8 @@ def corner_start(draw: Draw) -> Attack:
 
 def side_at_mouth(draw: Draw) -> Attack:
     """A start on a side, the arc or the base of a mushroom, at y = 0 or next to it."""
-    w, h = draw.pick((0.25, 0.5)), 1.0
-    slope = draw.pick((0.0, 0.0, 0.125, -0.25))
+    w, h = draw.pick((0.25, 0.375)), 1.0
+    slope = draw.pick((0.0, 0.0, 0.0625, -0.25))
     scene = Mushroom(r=moved(draw, 1.0), w=moved(draw, w), h=moved(draw, h), slope=slope)
     wall: Wall = draw.pick(("left", "right", "left", "right", "arc", "base"))
     side = draw.pick((1.0, -1.0))

@@ -11,6 +11,7 @@ import time
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
+from functools import partial
 from typing import Any, NamedTuple
 
 from flint import arb, fmpq
@@ -124,18 +125,29 @@ def judged(attack: Attack, steppers: Steppers, tally: Tally) -> Iterable[Verdict
     """Put one attack to each stepper and judge what it answers."""
     answers = truths(attack)
     if steppers.prover is not None:
-        begun = time.perf_counter()
-        claims = steppers.prover(attack)
+        prover, begun = steppers.prover, time.perf_counter()
+        verdict = _survived(lambda: proved(prover(attack), answers))
         tally.slowest = max(tally.slowest, time.perf_counter() - begun)
-        yield proved(claims, answers)
+        yield verdict
     if steppers.stepper is not None:
         t_end = attack.t_end if attack.t_end is not None else late_enough(attack.state, answers[0])
         if t_end is not None:
-            yield stepped(
-                steppers.stepper(attack.scene, attack.state, t_end), answers[0], attack.state, t_end
-            )
+            yield _survived(partial(_step_verdict, steppers.stepper, attack, t_end, answers[0]))
     if steppers.flow is not None and attack.is_flow and attack.t_end is not None:
-        yield flown(steppers.flow(attack.scene, attack.state, attack.t_end), answers)
+        flow, end = steppers.flow, attack.t_end
+        yield _survived(lambda: flown(flow(attack.scene, attack.state, end), answers))
+
+
+def _step_verdict(stepper: Stepper, attack: Attack, t_end: float, answer: Answer) -> Verdict:
+    return stepped(stepper(attack.scene, attack.state, t_end), answer, attack.state, t_end)
+
+
+def _survived(judge: Callable[[], Verdict]) -> Verdict:
+    """Return a verdict; whatever a stepper under attack raises is one too, and the search goes on."""
+    try:
+        return judge()
+    except Exception as error:
+        return Verdict("wrong", f"it raises {type(error).__name__}: {error}")
 
 
 def proved(claims: Sequence[Claim], answers: Sequence[Answer]) -> Verdict:

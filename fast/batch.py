@@ -132,8 +132,8 @@ class LaneRound:
         follow.next_flight(a, count, is_stem, self.is_relative, self.omega, m, self.limits)
         self.correct_more(follow.GENERAL, n)
         right = self.row(lanes.OK, n) == lanes.RIGHT_ONE
-        # A hit beyond the reference's reach is not taken as it stands.
-        right &= self.row(lanes.NEXT_T, n) < self.row(lanes.END, n)
+        # A hit beyond a knot is left to the careful step.
+        right &= self.row(lanes.NEXT_T, n) < self.row(lanes.KNOT, n)
         hits, dt = self.row(lanes.HIT, n).copy(), self.row(lanes.S, n).copy()
         lanes.bounce(a, count, m, self.table == codes.MUSHROOM)
         return right, hits, np.column_stack([dt, *(self.row(r, n) for r in PLACE)])
@@ -144,7 +144,7 @@ class LaneRound:
         follow.next_chord(a, count, OFF, self.is_disk, self.is_relative, self.omega, self.limits)
         self.correct_more(follow.DISK, n)
         right = self.row(lanes.OK, n) == lanes.RIGHT_ONE
-        right &= self.row(lanes.NEXT_T, n) < self.row(lanes.END, n)
+        right &= self.row(lanes.NEXT_T, n) < self.row(lanes.KNOT, n)
         dt = self.row(lanes.S, n).copy()
         lanes.rebound(a, count)
         return right, np.zeros(n), np.column_stack([dt, *(self.row(r, n) for r in PLACE)])

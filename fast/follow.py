@@ -23,7 +23,7 @@ from fast.codes import (  # isort: skip
     ARC, BANG_BANG, CAP, FOURIER, H, HORIZON, M, MUSHROOM, N_WALLS, PHASES, R, STEM, W,
 )  # fmt: skip
 from fast.lanes import (  # isort: skip
-    CALM, CLOSED, COARSE, DONE, END, H0, HIT, H_REF, LANES, NEVER, NEXT_H0, NEXT_R0, NEXT_T, NEXT_T_LOW,
+    CALM, CLOSED, COARSE, DONE, END, H0, HIT, H_REF, KNOT, LANES, NEVER, NEXT_H0, NEXT_R0, NEXT_T, NEXT_T_LOW,
     NEXT_VX, NEXT_VY, NEXT_W0, NEXT_X, NEXT_Y, N_ARC, N_BASE, N_REF, N_ROWS, OK, ON_ARC, R0, REF, REF_LOW,
     RIGHT_ONE, R_REF, S, SINCE, SPIN, STAY_IN, STAY_OUT, STOP, T, T_LOW, UNTIL, VX, VY, W0, WALL, X, Y,
     aim, arrive, bounce, chord, chord_mixed, fly, fly_mixed, law, limits_of, rebound, turns,
@@ -53,7 +53,7 @@ def has_lanes(table, laws, last):
 @njit(error_model="numpy")
 def set_reference(a, i, laws, anchors, is_relative):
     """Make the time of a lane's next state the reference of its laws, and give it their values there."""
-    t, end = a[NEXT_T + i], NEVER
+    t, end, knot = a[NEXT_T + i], NEVER, NEVER
     a[REF + i], a[REF_LOW + i] = t, a[NEXT_T_LOW + i]
     for k, row in enumerate((R, W, H)):
         f, rate, bend = anchors[row, 0], anchors[row, 1], 0.0
@@ -63,11 +63,11 @@ def set_reference(a, i, laws, anchors, is_relative):
         elif laws[row, 0] == BANG_BANG:
             bend = bend_of_half_leg(laws, row, int(anchors[row, 2]))
             # Rounded down: a flight that ends before it ends before the half-leg does.
-            end = min(end, (t + anchors[row, ROOM]) - SAFETY * (abs(t) + anchors[row, ROOM]))
+            knot = min(knot, (t + anchors[row, ROOM]) - SAFETY * (abs(t) + anchors[row, ROOM]))
         place = REFERENCES[k] + i
         a[place], a[place + LANES] = f, anchors[row, LOW]
         a[place + 2 * LANES], a[place + 3 * LANES] = rate, bend
-    a[END + i] = end
+    a[END + i], a[KNOT + i] = min(end, knot), knot
     set_laws(a, i, NEXT_R0, NEXT_W0, NEXT_H0, 0.0, laws, is_relative)
 
 
@@ -282,9 +282,8 @@ def attend(pool, scene, is_laned, a, i, spare, whom, anchors, p, stops, out, end
     is_known = is_laned and a[END + i] > -NEVER
     if is_known:
         correct_more(pool, scene, a, i, spare, limits)
-    is_past = a[NEXT_T + i] >= a[END + i]
-    if is_known and a[OK + i] == RIGHT_ONE and not (is_past and (limits.has_knots or laws[PHASES, 0] == 0.0)):
-        if is_past:
+    if is_known and a[OK + i] == RIGHT_ONE and a[NEXT_T + i] < a[KNOT + i]:
+        if a[NEXT_T + i] >= a[END + i]:
             set_anchors(laws, anchors, a[NEXT_T + i], a[NEXT_T_LOW + i])
             set_reference(a, i, laws, anchors, is_relative)
         code = int(a[HIT + i])

@@ -9,18 +9,11 @@ Laws. From a reference time on, a law is f + f' G1(u) + f'' G2(u), with G1 = sin
 and G2 = (1 - cos(omega u)) / omega^2: exact for one harmonic, and with omega = 0 for half a
 bang-bang leg. Laws of several harmonics and moving slopes have no lanes.
 
-Error analysis, eps = 2^-53. The correction is Newton's, with the residual of the wall function at
-the rounded place: the error of the time is that of one evaluation there (a few eps of the table's
-size, over |f'|) plus (1/2) |f''/f'| delta^2, which is demanded to be below 2^-57 s; delta itself
-is kept as the time's low part. For an arc left and met again the residual is f(s) - f(0), from
-increments, so short hops keep their digits. The series leave less than 2^-55 of G1 and G2.
-
-That no wall is met earlier: with |f''| <= K, a wall function that is not negative where its part
-of the flight begins and above K s^2 / 2 at its end is positive between, for f lies above its chord
-minus K sigma (s - sigma) / 2; twice that is asked for, and f + f' s may serve at the mouth. The wall
-that is met is met first if K s < |f'| (sides, floor) or f is concave (arc). SAFETY x sizes stands
-for all rounding: eight units of the sum of the sizes that enter. Quotients are compared by
-cross-multiplication, so a flight costs two divisions and one square root.
+What a lane's step claims, and which inequality in which line carries it, for every kind of flight and every
+wall on it, rounding included: docs/lanes.md. In short: Newton's correction leaves less than 2^-57 of the time;
+a wall that is not met has f > K s^2 at the end, so that f was positive all along; the wall that is met has
+|f'| > K s, or f is concave. Quotients are compared by cross-multiplication, so a flight costs two divisions
+and one square root.
 """
 
 from __future__ import annotations
@@ -44,7 +37,7 @@ ONE = np.float64(1.0)  # its quotient by 0 is infinite without the compiler too
 (
     T, T_LOW, X, Y, VX, VY, WALL,  # state at the last collision
     R0, R1, R2, W0, W1, W2, H0, H1, H2,  # radius, half-width, depth there, with two derivatives
-    REF, REF_LOW, END,  # the laws' reference time, and until when it serves
+    REF, REF_LOW, END, KNOT,  # the laws' reference time, until when it serves, when the next knot comes
     R_REF, R_REF_LOW, R_REF1, R_REF2,  # radius there, its low part, two derivatives
     N_REF, N_REF_LOW, N_REF1, N_REF2,  # w or nu
     H_REF, H_REF_LOW, H_REF1, H_REF2,  # depth
@@ -54,8 +47,8 @@ ONE = np.float64(1.0)  # its quotient by 0 is infinite without the compiler too
     STOP, SINCE, UNTIL,  # next time to look at the particle; a captured stay that spans one between is kept
     STAY_IN, STAY_OUT, CLOSED, SPIN,  # the captured stay, its end once it is over, angular momentum
     N_ARC, N_BASE, N_LEFT, N_RIGHT, N_FLOOR,  # collisions so far
-) = LANES * np.arange(66)  # fmt: skip
-N_ROWS = 66
+) = LANES * np.arange(67)  # fmt: skip
+N_ROWS = 67
 # Codes of walls as they stand in a row, and of OK.
 ON_ARC, ON_BASE, ON_LEFT, ON_RIGHT, ON_FLOOR = map(float, (ARC, BASE, LEFT, RIGHT, FLOOR))
 WRONG, COARSE, RIGHT_ONE = 0.0, 1.0, 2.0

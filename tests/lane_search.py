@@ -14,13 +14,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
+from mpmath import fp
 
 from fast import codes, entries, follow, lanes
 from fast.batch import LaneRound
 from fast.compiled import FloatArray
 from scene import BangBang, Cap, Fourier, Law, Mushroom, Scene, Stem
 from scene.laws import value
-from mpmath import fp as _FP
 from scene.tables import laws, width_factors
 
 CLOSE = 2.0**-24  # relative: a wrong hit is off by much more, a right one's Newton step by much less
@@ -97,20 +97,18 @@ def state_in(pool: LaneRound, i: int) -> tuple[FloatArray, int]:
 
 def draw_scene(random: np.random.Generator) -> Scene:
     """Draw a scene that lanes know, its walls moving deeply."""
-    is_smooth = random.random() < 0.6
-    omega = 10.0 ** random.uniform(-0.5, 0.5)
+    kind, omega = random.random(), float(10.0 ** random.uniform(-0.5, 0.5))
 
     def law(least: float, most: float) -> Law:
         if random.random() < 0.25 or least == most:
             return float(least)
-        if is_smooth:
+        # Smooth laws, laws with knots, or both in one scene.
+        if kind < 0.5 or (kind < 0.7 and random.random() < 0.5):
             turn, swing = random.uniform(0, 2 * np.pi), 0.4999 * (most - least)
-            return Fourier(
-                mean=0.5 * (least + most),
-                omega=float(omega),
-                cos=(float(swing * np.cos(turn)),),
-                sin=(float(swing * np.sin(turn)),),
-            )
+            cos, sin = (float(swing * np.cos(turn)),), (float(swing * np.sin(turn)),)
+            if kind < 0.5:
+                return Fourier(mean=0.5 * (least + most), omega=omega, cos=cos, sin=sin)
+            return Fourier(mean=0.5 * (least + most), period=1.0, cos=cos, sin=sin)
         inner = np.sort(random.uniform(0.05, 0.95, 3))
         ends = [float(v) for v in random.uniform(least, most, 3)]
         if random.random() < 0.5:
@@ -142,8 +140,8 @@ def draw_scene(random: np.random.Generator) -> Scene:
 def draw_start(scene: Scene, random: np.random.Generator) -> tuple[FloatArray, int]:
     """Draw a start on a wall: the state as the kernels take it, and the wall's code."""
     t = float(_a_time(scene, random))
-    now: dict[str, Any] = {name: float(value(_FP, law, t)) for name, law in laws(scene).items()}
-    rate: dict[str, Any] = {name: float(value(_FP, law, t, 1)) for name, law in laws(scene).items()}
+    now: dict[str, Any] = {name: float(value(fp, law, t)) for name, law in laws(scene).items()}
+    rate: dict[str, Any] = {name: float(value(fp, law, t, 1)) for name, law in laws(scene).items()}
     along, away = 10.0 ** random.uniform(-3, 1.5, 2) * random.choice([1.0, 1.0, 0.03])
     along *= random.choice([-1.0, 1.0])
     wall = int(random.choice(_walls_of(scene), p=_SHARES[len(_walls_of(scene))]))
@@ -181,8 +179,8 @@ def _mouth(scene: Scene, t: float) -> tuple[float, float]:
     if isinstance(scene, Cap):
         return 0.0, 0.0
     factors = width_factors(scene)
-    values = [float(value(_FP, law, t)) for law in factors]
-    rates = [float(value(_FP, law, t, 1)) for law in factors]
+    values = [float(value(fp, law, t)) for law in factors]
+    rates = [float(value(fp, law, t, 1)) for law in factors]
     if len(factors) == 1:
         return values[0], rates[0]
     return values[0] * values[1], rates[0] * values[1] + values[0] * rates[1]
@@ -193,7 +191,7 @@ def _a_time(scene: Scene, random: np.random.Generator) -> float:
     r = getattr(scene, "r", None)
     if isinstance(r, Fourier) and random.random() < 0.5:
         least = np.arctan2(-r.sin[0], -r.cos[0]) + random.normal(-0.2, 0.4)
-        return float((least + 2 * np.pi * random.integers(0, 5)) / r.omega)
+        return float((least + 2 * np.pi * random.integers(0, 5)) / (r.omega or 2 * np.pi))
     return float(random.uniform(0, 9))
 
 

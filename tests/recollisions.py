@@ -1,7 +1,7 @@
 """Starts on a wall that is met again just after a knot of its law, or while it turns: tiny relative speeds.
 
 The question is delicate in one way only. The wall has been at rest, or has moved with the particle, until
-nearly the hit; its speed there is a multiple of the time since, so that time must be right relative to itself.
+nearly the hit; its speed there is a multiple of the time since, which must be right relative to itself.
 """
 
 from __future__ import annotations

@@ -129,6 +129,8 @@ def draw_scene(random: np.random.Generator) -> Scene:
     if table < 0.25:
         least_w = 10.0 ** random.uniform(-2, 0)
         return Stem(w=law(least_w, random.uniform(least_w, 1.5)), h=h, slope=slope * least_w / most_h)
+    if random.random() < 0.2:  # a rim so narrow that a flight leaves the arc and is at once in the mouth
+        return Mushroom(r=r, nu=1.0 - float(10.0 ** random.uniform(-4, -1)), h=h)
     if random.random() < 0.5:
         nu = law(share * 10.0 ** random.uniform(-2, 0), share)
         least_nu = 0.009 * share

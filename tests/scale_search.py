@@ -35,29 +35,27 @@ def search(seed: int, n: int, tally: Counter[str]) -> list[tuple[Question, int, 
     """Try n scalings; returns those whose answers are neither scaled to the bit nor refused."""
     random, found = np.random.default_rng(seed), []
     while tally["scalings"] < n:
-        question = draw_question(random)
-        asks = [step, trajectory, trajectory, flow] if tally["scalings"] % 7 == 0 else [step, trajectory]
-        for _ in range(2):
-            length, time = draw_exponents(random)
-            for ask in asks:
-                tally["scalings"] += 1
-                if not is_scaled(ask, question, length, time, tally):
-                    found.append((question, length, time))
+        scene = draw_scene(random)
+        questions = [draw_question(scene, random) for _ in range(6)]
+        for length, time in (draw_exponents(random), draw_exponents(random)):
+            for question in questions:
+                for ask in (step, trajectory, flow) if random.random() < 0.2 else (step, trajectory):
+                    tally["scalings"] += 1
+                    if not is_scaled(ask, question, length, time, tally):
+                        found.append((question, length, time))
     return found
 
 
-def draw_question(random: np.random.Generator) -> Question:
-    """Draw a start on a wall or off it, in a moving or a static scene, with speeds of many sizes."""
-    scene = draw_scene(random)
+def draw_question(scene: Scene, random: np.random.Generator) -> Question:
+    """Draw a start on a wall or off it, in a moving scene or the same one frozen, with speeds of many sizes."""
     (t, _, x, y, vx, vy), wall = draw_start(scene, random)
     faster = 2.0 ** random.integers(-8, 9)
     state = State(float(t), float(x), float(y), float(faster * vx), float(faster * vy), WALL_NAMES[wall])
-    if random.random() < 0.3:
+    if random.random() < 0.2:
         scene = frozen(scene, state.t)
     if random.random() < 0.3:
         step = 2.0**-6 / (abs(state.vx) + abs(state.vy))
-        x, y = state.x + step * state.vx, state.y + step * state.vy
-        state = State(state.t, x, y, state.vx, state.vy)
+        state = State(state.t, state.x + step * state.vx, state.y + step * state.vy, state.vx, state.vy)
     return Question(scene, state, state.t + 2.0 ** int(random.integers(-2, 4)))
 
 

@@ -150,6 +150,15 @@ def draw_start(scene: Scene, random: np.random.Generator) -> tuple[FloatArray, i
     if wall == codes.ARC:
         angle = random.uniform(0.0, np.pi) if random.random() < 0.7 else 10.0 ** random.uniform(-3, 0)
         out = rate["r"] - away
+        bend = float(value(fp, laws(scene)["r"], t, 2))
+        curl = rate["r"] ** 2 + now["r"] * bend
+        if random.random() < 0.5 and curl > 0.0:
+            # The arc's function is just concave here, and will not stay so: it may dip, and come back before
+            # the particle is down at y = 0.
+            speed = np.sqrt(curl * (1.0 + 10.0 ** random.uniform(-3, 0.5)))
+            out = rate["r"] - speed * 10.0 ** random.uniform(-5, -1)
+            along = -np.sqrt(max(speed**2 - out**2, 0.0))
+            angle = random.random()
         e_x, e_y = np.cos(angle), np.sin(angle)
         place = (now["r"] * e_x, now["r"] * e_y, out * e_x - along * e_y, out * e_y + along * e_x)
         return np.array([t, 0.0, *place]), wall
@@ -192,7 +201,7 @@ def _a_time(scene: Scene, random: np.random.Generator) -> float:
     # Half of the starts are a little before the least radius.
     r = getattr(scene, "r", None)
     if isinstance(r, Fourier) and random.random() < 0.5:
-        least = np.arctan2(-r.sin[0], -r.cos[0]) + random.normal(-0.2, 0.4)
+        least = np.arctan2(-r.sin[0], -r.cos[0]) + random.normal() * 10.0 ** random.uniform(-3, 0)
         return float((least + 2 * np.pi * random.integers(0, 5)) / (r.omega or 2 * np.pi))
     return float(random.uniform(0, 9))
 

@@ -47,7 +47,7 @@ def search(seed: int, n: int, tally: Counter[str]) -> list[tuple[Question, int, 
 
 
 def draw_question(scene: Scene, random: np.random.Generator) -> Question:
-    """Draw a start on a wall or off it, in a moving scene or the same one frozen, with speeds of many sizes."""
+    """Draw a start on a wall or off it, in a moving scene or frozen, with speeds of many sizes."""
     (t, _, x, y, vx, vy), wall = draw_start(scene, random)
     faster = 2.0 ** random.integers(-8, 9)
     state = State(float(t), float(x), float(y), float(faster * vx), float(faster * vy), WALL_NAMES[wall])

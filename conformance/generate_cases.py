@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from conformance.generate_certify import Outcome, Question
-from conformance.generate_draws import wire_form
+from conformance.generate_draws import unproved, wire_form
 from conformance.vectors import Level
 from scene import BangBang, Cap, Fourier, Mushroom, Scene, State, Stem
 
@@ -108,13 +108,13 @@ def stem() -> Iterator[Question]:
         yield case(21, rule, triangle, State(0.0, x, -0.5, 0.0, -1.0))
     narrowing = Stem(w=0.5, h=1.0, slope=0.25)
     yield case(21, "sides that would meet below the floor", narrowing, State(0.0, 0.0, -0.5, 0.0, -1.0))
-    apex = wire_form(Stem(w=0.5, h=1.0, slope=0.5))
+    apex = unproved("stem", w=0.5, h=1.0, slope=0.5)
     yield case(21, "a closed stem is refused", apex, State(0.0, 0.0, -0.5, 0.0, -1.0))
     for wide in (1e-3, 1e-9, 1e-15):
         for top in (0.4999, 0.5001):
             knots = ((0.0, 0.1), (0.3 - wide, 0.1), (0.3, top), (0.3 + wide, 0.1), (1.0, 0.1))
             rule = "a spike of the slope: valid below w / h, refused above, by proof over the period"
-            of = wire_form(Stem(w=0.5, h=1.0, slope=BangBang(knots=knots)))
+            of = unproved("stem", w=0.5, h=1.0, slope=BangBang(knots=knots))
             # A stepper that bounds curvature over all times cannot decide past the sharper spikes.
             hard: Level | None = "stress" if wide < 1e-3 and top < 0.5 else None
             yield case(22, rule, of, State(0.5, 0.0, -0.5, 0.25, -1.0), level=hard)

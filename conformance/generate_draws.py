@@ -183,6 +183,16 @@ def wire_form(of: Scene) -> dict[str, Any]:
     return decoded
 
 
+def unproved(table: str, **laws: Any) -> dict[str, Any]:
+    """Return a scene as JSON has it whose laws, or their plain data, may break the rules of scenes."""
+    data = {"table": table, **{name: msgspec.to_builtins(law) for name, law in laws.items()}}
+    for law in data.values():
+        if isinstance(law, dict) and "period" in law:
+            del law["omega" if law["omega"] is None else "period"]
+    decoded: dict[str, Any] = msgspec.json.decode(msgspec.json.encode(data))  # lists for tuples
+    return decoded
+
+
 def walls_speed(scene: Scene) -> float:
     """Return a bound of the walls' speeds; 0 when nothing moves."""
     found = {name: bounds(law) for name, law in laws(scene).items()}

@@ -7,8 +7,8 @@ from typing import Any
 
 from conformance.generate_cases import BOX, CIRCLE, LIFT, STATIC, case, grazing_and_slow, stem
 from conformance.generate_certify import Outcome, Question
-from conformance.generate_draws import wire_form
-from scene import BangBang, Cap, Fourier, Mushroom, Scene, State, Stem, load
+from conformance.generate_draws import unproved, wire_form
+from scene import BangBang, Fourier, Mushroom, Scene, State, load
 from scene.tables import laws
 
 # The mouth: w = 1/2 - t^2 / 2 until t = 1/2, then 1/4 + (t - 1)^2 / 2 until t = 3/2.
@@ -63,7 +63,7 @@ def mouth() -> Iterator[Question]:
     for mean in (0.75, 0.75 + 2.0**-53):
         nu = Fourier(mean=mean, omega=1.0, cos=(0.25,))
         rule = "nu = 1 at an instant is valid, more by one unit in the last place is not"
-        yield case(32, rule, wire_form(Mushroom(r=1.0, h=1.0, nu=nu)), DOWN, 3.0)
+        yield case(32, rule, unproved("mushroom", r=1.0, h=1.0, nu=nu), DOWN, 3.0)
 
 
 def corners() -> Iterator[Question]:
@@ -147,10 +147,14 @@ def refused() -> Iterator[Question]:
     inside = State(0.0, 0.1, 0.2, 1.0, 0.0)
     for least in (0.0, -(2.0**-53)):
         law = Fourier(mean=0.25 + least, omega=1.0, sin=(0.25,))
-        for of in (Cap(r=law), Stem(w=1.0, h=law), Stem(w=law, h=1.0, slope=-0.5)):
-            yield case(33, "min r, h or w <= 0", wire_form(of), inside)
+        for of in (
+            unproved("cap", r=law),
+            unproved("stem", w=1.0, h=law),
+            unproved("stem", w=law, h=1.0, slope=-0.5),
+        ):
+            yield case(33, "min r, h or w <= 0", of, inside)
     for knots in (((0.0, 1.0), (1.0, 2.0)), ((0.0, 1.0), (0.5, 1.0), (0.5, 2.0), (1.0, 1.0))):
-        of_jump = wire_form(Stem(w=1.0, h=BangBang(knots=knots)))
+        of_jump = unproved("stem", w=1.0, h={"kind": "bang-bang", "knots": knots})
         yield case(37, "a jump in a law", of_jump, State(0.0, 0.1, -0.2, 1.0, 0.0))
     for scene, state in (
         (CIRCLE, State(0.0, 0.9, 0.9, 1.0, 0.0)),

@@ -6,8 +6,8 @@ import time
 from collections.abc import Sequence
 
 import fast
-from fast.ensemble import check_threads
 from fast.flow import carry_judged, refuse
+from fast.given import given_threads
 from scene import Collision, Outcome, Scene, State
 from scene.wire import serve
 
@@ -25,7 +25,7 @@ def carry(
     """Return each particle's outcome at t_end and its first captured stay; a bad start is refused alone."""
     refusals = [refuse(scene, state, t_end) for state in states]
     starts = [state for state, refusal in zip(states, refusals, strict=True) if refusal is None]
-    run = carry_judged(scene, starts, t_end, check_threads(None))
+    run = carry_judged(scene, starts, t_end, given_threads(None))
     times = zip(run.t_in.tolist(), run.t_out.tolist(), strict=True)
     stays = [None if math.isnan(begin) else (begin, end) for begin, end in times]
     arrivals = iter(zip(run.outcomes, stays, strict=True))

@@ -100,9 +100,9 @@ class LaneRound:
 
     def fill(self, lane: int, p: FloatArray, wall: int, age: float = 0.0) -> None:
         """Put a state [t, its low part, x, y, vx, vy] into a lane, its laws known from `age` before it."""
-        a, never = self.pool, np.array([np.inf, np.inf])
+        a = self.pool
         i = np.int64(lane)
-        follow.load(a, i, p, wall, np.inf, never)
+        follow.load(a, i, p, wall, np.inf, OFF)
         a[lanes.NEXT_T + i], a[lanes.NEXT_T_LOW + i] = p[0] - age, p[1]
         motion.set_anchors(self.laws, self.anchors, p[0] - age, p[1])
         follow.set_reference(a, i, self.laws, self.anchors, self.is_relative)

@@ -8,11 +8,9 @@ from __future__ import annotations
 
 import hashlib
 import math
-import os
 import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -20,29 +18,37 @@ import numpy.typing as npt
 
 from fast import codes, entries
 from fast.compiled import Compiled, FloatArray, compile_scene
+from fast.given import (
+    MAX_CYCLES,
+    MAX_PARTICLES,
+    check_kept,
+    given_energy,
+    given_phases,
+    given_progress,
+    given_threads,
+)
+from fast.narrowings import narrowings
 from fast.starts import Stops, cycle_length, cycle_stops, initial_states, least_collisions
 from scene import Scene
-from scene.refusal import BadInput
+from scene.refusal import BadInput, check_count, check_scene
 
 FOLLOWED, UNDECIDED, UNDEFINED, REJECTED = 0, 1, 2, 3
-MAX_PARTICLES = 10**8
 MAX_COLLISIONS = 10**9  # of one particle, a minute of work
-LARGEST_ENERGY = 2.0**800
 SHARE = 256  # particles a worker takes at a time: several times what it holds at once
 IntArray = npt.NDArray[np.int64]
 
 
 class Followed(NamedTuple):
-    """What the kernel fills in for N particles, S stops and K cycles.
+    """What the kernel fills in for N particles, K cycles of M narrowings, and C stops that ask for energies.
 
     Attributes:
         states: (N, 6) last t, its low part, x, y, vx, vy.
         codes: (N,) why each particle ended, HORIZON when all went well.
         counts: (N, 5) collisions by wall: arc, base, left, right, floor.
         careful: (N,) collisions found by the careful step.
-        energies: (N, S) energy at each stop.
-        is_captured: (N, S) whether the last arc hit had |sin phi| > nu.
-        t_in, t_out: (N, K) the captured stay that is kept; nan for none.
+        energies: (N, C) energy at each stop that asks for it.
+        is_captured: (N, C) whether the last arc hit before had |sin phi| > nu.
+        t_in, t_out: (N, K, M) the captured stays that are kept; nan for none.
         seconds: wall time of the kernel.
     """
 
@@ -58,7 +64,12 @@ class Followed(NamedTuple):
 
 
 class Ensemble(NamedTuple):
-    """What became of N particles over K cycles, looked at P times in each.
+    """What became of N particles over K cycles, with P looks at them and M narrowings of the mouth in each.
+
+    A *captured stay* begins with an arc hit at which |sin phi| > nu. It ends with the first arc hit at which
+    that is no longer so, or below the mouth if that comes first; when |sin phi| > nu once more before the
+    particle has been below the mouth, the same stay goes on. M is the number of local minima of nu in a
+    cycle, after its start and up to its end (`fast.narrowings`; a plateau is one, a nu at rest has none).
 
     Attributes:
         energy0: initial energy E = v^2 / 2 of every particle.
@@ -67,8 +78,13 @@ class Ensemble(NamedTuple):
         t, x, y, vx, vy: (N,) the last states.
         n_collisions: (N,) collisions followed.
         outcome: (N,) 0 followed to the end, 1 undecided, 2 undefined, 3 rejected.
-        t_in, t_out: (N, K) begin and end of the captured stay that spans the instant of least
-            nu in each cycle; nan for a particle not captured.
+        t_in, t_out: (N, K, M) begin and end [time] of the captured stay that spans narrowing m of cycle k,
+            t_in <= its instant <= t_out; nan when the particle is not captured at that instant. There is at
+            most one. A stay that spans several narrowings stands in the slot of each, with the same begin
+            and, in one cycle, the same end. t_in is the stay's true begin, in an earlier cycle too; of a
+            particle that starts captured it is the first arc hit. A cycle is written with what is known
+            when it ends: a stay that is on then has the cycle's end as t_out, and one that goes on only
+            later (see above) its arc hit. Stays that span no narrowing are not kept.
         wall_counts: (N, 5) collisions with arc, base, left, right, floor.
         phase_energies: (N, K, P) energy at the phases asked for.
         phase_captured: (N, K, P) whether the last arc hit before them had |sin phi| > nu.
@@ -95,6 +111,30 @@ class Ensemble(NamedTuple):
     n_careful: IntArray
     seconds: float
     threads: int
+
+    def is_captured(self) -> npt.NDArray[np.bool_]:
+        """Return (N, K): whether a particle has a captured stay in a cycle."""
+        return np.asarray(np.isfinite(self.t_in).any(axis=2))
+
+    def takes_part(self) -> npt.NDArray[np.bool_]:
+        """Return (N,): who was followed to the end, and was not in the island all the time.
+
+        Where nu is always below 1 some particles are never free: in every slot a stay, and no collision with
+        the stem's walls. No cycle captures or releases them, and the theory leaves them out.
+        """
+        was_followed: npt.NDArray[np.bool_] = self.outcome == FOLLOWED
+        if self.t_in.shape[2] == 0:
+            return was_followed
+        is_always_in = np.isfinite(self.t_in).all(axis=(1, 2)) & ~self.wall_counts[:, 2:].any(axis=1)
+        return was_followed & ~is_always_in
+
+    def p_nc(self) -> FloatArray:
+        """Return (K,): the share of those who take part without a captured stay in each cycle; nan of no one.
+
+        Source: Eq:ps, the probability of never being captured.
+        """
+        captured = self.is_captured()[self.takes_part()]
+        return 1.0 - captured.mean(axis=0) if len(captured) else np.full(captured.shape[1], np.nan)
 
     def ns_per_collision(self) -> float:
         """Return kernel wall time x threads / collisions, in nanoseconds."""
@@ -123,9 +163,9 @@ def simulate(
 
     Args:
         scene: table and laws; a static one is followed for one unit of time a cycle.
-        n_particles: 1 to 10^8.
+        n_particles: 1 to 10^8, and n_particles n_cycles (P + 1 + 2 M) <= 10^9, which is what is kept.
         energy: initial energy E = v^2 / 2 of every particle [length^2 / time^2], > 0.
-        n_cycles: cycles to follow, >= 1.
+        n_cycles: cycles to follow, 1 to 10^6.
         seed: 0 <= seed < 2^64.
         threads: how many to use, by default one for each core.
         phases: (P,) fractions of each cycle at which energies are wanted, rising, in (0, 1).
@@ -136,8 +176,14 @@ def simulate(
 
     Source: secs. 4.1, 4.2 (initial conditions); capture as in sec. 3.2.
     """
-    threads = _check(n_particles, energy, n_cycles, seed, phases, threads)
+    check_scene(scene)
+    n_particles = check_count("n_particles", n_particles, 1, MAX_PARTICLES)
+    n_cycles = check_count("n_cycles", n_cycles, 1, MAX_CYCLES)
+    seed = check_count("seed", seed, 0, 2**64 - 1)
+    energy, phases = given_energy(energy), given_phases(phases)
+    threads, progress = given_threads(threads), given_progress(progress)
     compiled = compile_scene(scene)
+    check_kept(n_particles, n_cycles, len(phases), len(narrowings(scene)))
     stops = cycle_stops(scene, n_cycles, phases)
     ahead = least_collisions(scene, math.sqrt(2.0 * energy), n_cycles * cycle_length(scene))
     if ahead > MAX_COLLISIONS:
@@ -147,11 +193,15 @@ def simulate(
     start = initial_states(scene, n_particles, energy, seed)
     free = np.full(n_particles, codes.NO_WALL)
     done = follow(compiled, start, free, stops, threads, progress)
-    every = (n_particles, n_cycles, len(phases) + 1)
+    return _ensemble(energy, done, (n_particles, n_cycles, len(phases) + 1), threads)
+
+
+def _ensemble(energy0: float, done: Followed, every: tuple[int, int, int], threads: int) -> Ensemble:
+    """Name what the kernel filled in; `every`: particles, cycles, looks at a particle in a cycle."""
     energies, captured = done.energies.reshape(every), done.is_captured.reshape(every)
     t, _, x, y, vx, vy = (np.ascontiguousarray(column) for column in done.states.T)
     return Ensemble(
-        energy0=energy,
+        energy0=energy0,
         energy=np.ascontiguousarray(energies[:, -1, -1]),
         cycle_energies=np.ascontiguousarray(energies[:, :, -1]),
         t=t,
@@ -190,12 +240,12 @@ def follow(
 
     `walls` (N,): codes of the walls that they leave.
     """
-    n, n_stops, n_cycles = len(states), len(stops.times), len(stops.narrowest)
+    n, n_columns = len(states), int(stops.columns.max()) + 1
     out = (
-        np.full((n, n_stops), np.nan),
-        np.zeros((n, n_stops), dtype=np.bool_),
-        np.full((n, n_cycles), np.nan),
-        np.full((n, n_cycles), np.nan),
+        np.full((n, n_columns), np.nan),
+        np.zeros((n, n_columns), dtype=np.bool_),
+        np.full((n, *stops.narrowings.shape), np.nan),
+        np.full((n, *stops.narrowings.shape), np.nan),
     )
     ends = (
         states,
@@ -224,28 +274,3 @@ def follow(
     seconds = time.perf_counter() - begin
     energies, is_captured, t_in, t_out = out
     return Followed(*ends, energies, is_captured, t_in, t_out, seconds)
-
-
-def _check(
-    n_particles: int, energy: float, n_cycles: int, seed: int, phases: Sequence[float], threads: int | None
-) -> int:
-    if not 1 <= n_particles <= MAX_PARTICLES:
-        raise BadInput(f"particles = {n_particles}, must be 1 to {MAX_PARTICLES}")
-    if not 0 < energy <= LARGEST_ENERGY:
-        raise BadInput(f"energy = {energy}, must be > 0 and at most 2^800")
-    if n_cycles < 1:
-        raise BadInput(f"cycles = {n_cycles}, must be >= 1")
-    if not 0 <= seed < 2**64:
-        raise BadInput(f"seed = {seed}, must be >= 0 and < 2^64")
-    edges = [0.0, *phases, 1.0]
-    if any(not a < b for a, b in pairwise(edges)):
-        raise BadInput(f"phases = {list(phases)}, must rise and lie in (0, 1)")
-    return check_threads(threads)
-
-
-def check_threads(threads: int | None) -> int:
-    """Return how many threads to use: as many as asked for, by default one for each core."""
-    available = os.cpu_count() or 1
-    if threads is not None and not 1 <= threads <= available:
-        raise BadInput(f"threads = {threads}, must be 1 to {available}, the cores of this machine")
-    return available if threads is None else threads

@@ -10,8 +10,10 @@ import numpy.typing as npt
 
 from fast import codes, entries
 from fast.compiled import FloatArray, compile_scene
+from fast.given import MAX_STEPS
 from fast.stepper import WALL_CODES, WALL_NAMES, check_state, trouble
-from scene import Horizon, InvalidState, Outcome, Scene, State, Wall
+from scene import Horizon, Outcome, Scene, State, Wall
+from scene.refusal import check_count, check_scene
 
 
 class FineTrajectory(NamedTuple):
@@ -40,16 +42,20 @@ def fine_trajectory(scene: Scene, state: State, n_collisions: int) -> FineTrajec
     Args:
         scene: table and laws of motion.
         state: the start, as for `next_collision`.
-        n_collisions: how many collisions to follow, >= 0.
+        n_collisions: how many collisions to follow, 0 to 10^7.
+
+    Returns:
+        The collisions. Where nothing is met any more (a particle at rest that no wall sweeps) the outcome
+        is a Horizon at t = infinity with the place where it rests.
 
     Raises:
         BadInput: naming field, value and bound.
 
     Source: Gelfreich, Rom-Kedar, Turaev (2014), sec. 3.1; which wall is met is the careful step's answer.
     """
-    check_state(scene, state, state.t)
-    if n_collisions < 0:
-        raise InvalidState(f"n_collisions = {n_collisions}, must be >= 0")
+    check_scene(scene)
+    state = check_state(scene, state)
+    n_collisions = check_count("n_collisions", n_collisions, 0, MAX_STEPS)
     steps: FloatArray = np.empty((n_collisions, 6, 2))
     met: npt.NDArray[np.int64] = np.empty(n_collisions, dtype=np.int64)
     start = np.array([[number, 0.0] for number in (state.t, state.x, state.y, state.vx, state.vy)])

@@ -8,10 +8,12 @@ from typing import NamedTuple
 
 from fast import codes
 from fast.compiled import FloatArray, compile_scene
-from fast.ensemble import IntArray, check_threads, follow
+from fast.ensemble import IntArray, follow
+from fast.given import given_states, given_threads
 from fast.starts import least_collisions, only_stop
 from fast.stepper import as_arrays, next_collision, trouble
 from scene import Horizon, InvalidState, Outcome, Rejected, Scene, State
+from scene.refusal import check_number, check_scene
 
 MAX_COLLISIONS = 10**7  # of one particle, some seconds of work
 
@@ -43,13 +45,16 @@ def flow(scene: Scene, states: Sequence[State], t_end: float, threads: int | Non
         threads: how many to use, by default one for each core; they change no bit.
 
     Raises:
-        InvalidState: a start is none of this table, or t_end over 10^7 collisions away: naming the
-            particle; nothing is followed.
-        BadInput: `threads` is out of bounds, or the laws are.
+        InvalidState: a start is no State, none of this table, or t_end over 10^7 collisions away: naming
+            the particle; nothing is followed.
+        BadInput: naming field, value and bound, for anything else that is not as above.
 
     Source: a stay is captured while |sin phi| > nu at the arc, sec. 3.2.
     """
-    threads = check_threads(threads)
+    check_scene(scene)
+    threads = given_threads(threads)
+    states = given_states(scene, states)
+    t_end = check_number("t_end", t_end)
     for i, state in enumerate(states):
         refusal = refuse(scene, state, t_end)
         if refusal is not None:
@@ -65,7 +70,7 @@ def carry_judged(scene: Scene, states: Sequence[State], t_end: float, threads: i
         Horizon(t_end, *place) if code == codes.HORIZON else trouble(int(code), state)
         for state, code, place in zip(states, done.codes, done.states[:, 2:].tolist(), strict=True)
     ]
-    return Flow(outcomes, done.t_in[:, 0], done.t_out[:, 0], done.counts, done.careful)
+    return Flow(outcomes, done.t_in[:, 0, 0], done.t_out[:, 0, 0], done.counts, done.careful)
 
 
 def refuse(scene: Scene, state: State, t_end: float) -> Rejected | None:

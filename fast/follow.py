@@ -4,9 +4,11 @@ A worker holds LANES particles in two pools: `general` for any collision, and `d
 particles, whose base bounces are counted and not stepped; a cap has the disk alone. Every particle's
 numbers depend on that particle only, so threads, chunks and lane positions do not change a bit.
 
-Particles are looked at where their flight passes a *stop*: an instant at which the energy is wanted
-or a cycle ends. A captured stay is recorded for a cycle when it spans that cycle's instant of least
-nu, which keeps out the many brief crossings of the edge |sin phi| = nu.
+Particles are looked at where their flight passes a *stop*: an instant at which the energy is wanted, a cycle
+ends or the mouth narrows (nu has a local minimum). A captured stay is recorded in the slot of each narrowing
+that it spans, which keeps out the many brief crossings of the edge |sin phi| = nu. A lane cannot hold all
+narrowings, and one is enough: a stay spans some narrowing exactly when it spans the first after its begin.
+SINCE = UNTIL is that one, or the last that has passed while there is none.
 """
 
 from __future__ import annotations
@@ -92,14 +94,16 @@ def set_laws(a, i, r_row, w_row, h_row, since, omega, is_relative):
 
 
 @njit(error_model="numpy")
-def load(a, i, p, wall, stop, narrowest):
+def load(a, i, p, wall, stop, is_first_kept):
     """Put a particle into a lane; its laws are unknown there, so its first step will be careful."""
     for row in range(N_ROWS):
         a[row * LANES + i] = 0.0
     a[T + i], a[T_LOW + i] = p[0], p[1]
     a[X + i], a[Y + i], a[VX + i], a[VY + i] = p[2], p[3], p[4], p[5]
     a[WALL + i] = wall
-    a[STOP + i], a[SINCE + i], a[UNTIL + i] = stop, narrowest[0], narrowest[1]
+    # Any stay serves, or none until the mouth has narrowed.
+    any_serves = -NEVER if is_first_kept else NEVER
+    a[STOP + i], a[SINCE + i], a[UNTIL + i] = stop, any_serves, -any_serves
     a[STAY_IN + i] = a[STAY_OUT + i] = a[CLOSED + i] = NEVER
     a[END + i] = -NEVER
 
@@ -124,28 +128,34 @@ def fold(a, i, omega, is_relative):
 
 
 @njit(error_model="numpy")
-def keep_stay(t_in, t_out, j, cycle, begin, end):
-    """Keep a captured stay, unless there is an earlier one."""
-    if np.isnan(t_in[j, cycle]):
-        t_in[j, cycle], t_out[j, cycle] = begin, end
+def keep_stay(t_in, t_out, j, cycle, stops, begin, end):
+    """Keep a captured stay in the slot of each narrowing of a cycle that it spans, or as the first stay."""
+    narrowings, is_first_kept = stops[3], stops[4]
+    for slot in range(narrowings.shape[1]):
+        if is_first_kept:
+            is_kept = np.isnan(t_in[j, cycle, slot])
+        else:
+            is_kept = begin <= narrowings[cycle, slot] <= end
+        if is_kept:
+            t_in[j, cycle, slot], t_out[j, cycle, slot] = begin, end
 
 
 @njit(error_model="numpy")
 def note_stops(a, i, j, at, last, stops, out):
     """Record what is asked for at the stops up to the time `last`; returns the next stop's number."""
-    times, is_cycle_end, narrowest = stops
+    times, columns, cycles, _, _ = stops
     energies, is_captured, t_in, t_out = out
     while at < times.shape[0] and times[at] <= last:
-        energies[j, at] = 0.5 * (a[VX + i] * a[VX + i] + a[VY + i] * a[VY + i])
         begin, end = a[STAY_IN + i], a[STAY_OUT + i]
-        is_captured[j, at] = begin < NEVER and end == NEVER
-        cycle = is_cycle_end[at]
+        column = columns[at]
+        if column >= 0:
+            energies[j, column] = 0.5 * (a[VX + i] * a[VX + i] + a[VY + i] * a[VY + i])
+            is_captured[j, column] = begin < NEVER and end == NEVER
+        elif begin == NEVER or a[UNTIL + i] < begin:
+            a[SINCE + i] = a[UNTIL + i] = times[at]
+        if cycles[at] >= 0 and begin < NEVER:
+            keep_stay(t_in, t_out, j, cycles[at], stops, begin, min(end, times[at]))
         at += 1
-        if cycle >= 0:
-            if begin < NEVER and begin <= narrowest[cycle, 1] and narrowest[cycle, 0] <= end:
-                keep_stay(t_in, t_out, j, cycle, begin, min(end, times[at - 1]))
-            following = narrowest[min(cycle + 1, narrowest.shape[0] - 1)]
-            a[SINCE + i], a[UNTIL + i] = following[0], following[1]
     a[STOP + i] = times[at] if at < times.shape[0] else NEVER
     return at
 
@@ -153,13 +163,13 @@ def note_stops(a, i, j, at, last, stops, out):
 @njit(error_model="numpy")
 def note_stay(a, i, j, at, stops, out):
     """Record a captured stay that is over."""
-    _, is_cycle_end, _ = stops
-    while is_cycle_end[at] < 0:  # the last stop ends a cycle
+    cycles, is_first_kept = stops[2], stops[4]
+    while cycles[at] < 0:  # the last stop ends a cycle
         at += 1
-    cycle = is_cycle_end[at]
-    keep_stay(out[2], out[3], j, cycle, a[STAY_IN + i], a[CLOSED + i])
+    keep_stay(out[2], out[3], j, cycles[at], stops, a[STAY_IN + i], a[CLOSED + i])
     a[STAY_IN + i] = a[STAY_OUT + i] = a[CLOSED + i] = NEVER
-    a[UNTIL + i] = -NEVER  # one is enough
+    if is_first_kept:
+        a[UNTIL + i] = -NEVER  # no other is wanted
 
 
 @njit(error_model="numpy")
@@ -311,7 +321,8 @@ def follow(scene, walls, stops, out, ends):
         scene: table, is_relative, laws, bounds.
         walls: codes of the walls that the particles leave (N,).
         stops: see fast.starts.Stops.
-        out: energies (N, S), is_captured (N, S), t_in (N, K), t_out (N, K), filled in.
+        out: energies (N, C), is_captured (N, C), by the stops' columns; t_in (N, K, M), t_out (N, K, M);
+            filled in.
         ends: states (N, 6): t, its low part, x, y, vx, vy, overwritten; codes (N,), counts (N, 5),
             careful steps (N,), filled in.
     """
@@ -330,7 +341,7 @@ def follow(scene, walls, stops, out, ends):
     general, disk = pools[GENERAL], pools[DISK]
     while True:
         while n[0] + n[1] < LANES and first < last:
-            load(pools[home], n[home], states[first], walls[first], stops[0][0], stops[2][0])
+            load(pools[home], n[home], states[first], walls[first], stops[0][0], stops[4])
             whoms[home, 0, n[home]], whoms[home, 1, n[home]] = first, 0
             n[home] += 1
             first += 1

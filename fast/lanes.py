@@ -47,7 +47,7 @@ NEVER = np.inf
     S, HIT, SURE, OK, CALM,  # the step: time, wall, mouth; whether it is right; whether nothing else is to do
     NEXT_T, NEXT_T_LOW, NEXT_X, NEXT_X_LOW, NEXT_Y, NEXT_Y_LOW, NEXT_VX, NEXT_VY, DONE,  # state after it
     NEXT_R0, NEXT_R1, NEXT_R2, NEXT_W0, NEXT_W1, NEXT_W2, NEXT_H0, NEXT_H1, NEXT_H2,
-    STOP, SINCE, UNTIL,  # next time to look at the particle; which captured stay is kept
+    STOP, SINCE, UNTIL,  # next time to look at the particle; a captured stay that spans one between is kept
     STAY_IN, STAY_OUT, CLOSED, SPIN,  # the captured stay, its end once it is over, angular momentum
     N_ARC, N_BASE, N_LEFT, N_RIGHT, N_FLOOR,  # collisions so far
 ) = LANES * np.arange(66)  # fmt: skip

@@ -16,8 +16,9 @@ from mpmath import fp
 
 from fast import entries
 from fast.compiled import FloatArray
-from scene import Cap, Mushroom, Scene, Stem
-from scene.laws import BangBang, bounds, value
+from fast.narrowings import narrowings, start_time
+from scene import Cap, Scene
+from scene.laws import bounds, value
 from scene.tables import laws, period, width_factors
 
 
@@ -77,19 +78,18 @@ class Stops(NamedTuple):
 
     Attributes:
         times: (S,) the instants; the last one ends the run.
+        columns: (S,) where the energy at an instant is written, -1 for an instant that does not ask for it.
         cycles: (S,) number of the cycle that an instant ends, -1 for others.
-        narrowest: (K, 2) a captured stay is kept for a cycle when it spans an instant between these two:
-            both the instant of least nu (middle of a plateau), infinity without a mouth.
+        narrowings: (K, M) when the mouth narrows in each cycle: a captured stay is kept in slot m of cycle k
+            when it spans that instant.
+        is_first_kept: the first captured stay is kept in slot 0, whatever its length.
     """
 
     times: FloatArray
+    columns: npt.NDArray[np.int64]
     cycles: npt.NDArray[np.int64]
-    narrowest: FloatArray
-
-
-def start_time(scene: Scene) -> float:
-    """Return when the cycle begins: at the first knot of a bang-bang law, else at 0."""
-    return next((law.knots[0][0] for law in laws(scene).values() if isinstance(law, BangBang)), 0.0)
+    narrowings: FloatArray
+    is_first_kept: bool
 
 
 def cycle_length(scene: Scene) -> float:
@@ -99,20 +99,34 @@ def cycle_length(scene: Scene) -> float:
 
 
 def cycle_stops(scene: Scene, n_cycles: int, phases: Sequence[float]) -> Stops:
-    """Return the stops of whole cycles: at each of `phases` (fractions of a cycle, rising) and the end."""
+    """Return the stops of whole cycles: at each of `phases` (fractions of a cycle, rising) and the end.
+
+    The mouth's narrowings are stops too; one at the end of a cycle comes before that end.
+    """
     start, span = start_time(scene), cycle_length(scene)
     count = np.arange(n_cycles)
-    parts = np.array([*phases, 1.0])
-    times = start + span * (count[:, None] + parts[None, :])
-    cycles = np.full(times.shape, -1)
+    narrow = np.array(narrowings(scene))
+    parts = np.array([*narrow, *phases, 1.0])
+    columns = np.full((n_cycles, len(parts)), -1)
+    columns[:, len(narrow) :] = np.arange(n_cycles * (len(phases) + 1)).reshape(n_cycles, -1)
+    cycles = np.full(columns.shape, -1)
     cycles[:, -1] = count
-    narrowest = start + span * (count + narrowest_phase(scene))
-    return Stops(times.ravel(), cycles.ravel(), np.column_stack([narrowest, narrowest]))
+    order = np.argsort(parts, kind="stable")
+    times = start + span * (count[:, None] + parts[None, :])
+    return Stops(
+        times[:, order].ravel(),
+        columns[:, order].ravel(),
+        cycles[:, order].ravel(),
+        times[:, : len(narrow)],
+        is_first_kept=False,
+    )
 
 
 def only_stop(t_end: float) -> Stops:
     """Return one stop, that keeps the first captured stay of any length."""
-    return Stops(np.array([t_end]), np.array([0]), np.array([[-math.inf, math.inf]]))
+    return Stops(
+        np.array([t_end]), np.array([0]), np.array([0]), np.full((1, 1), math.nan), is_first_kept=True
+    )
 
 
 def least_collisions(scene: Scene, speed: float, span: float) -> float:
@@ -121,21 +135,3 @@ def least_collisions(scene: Scene, speed: float, span: float) -> float:
     r, h = found.get("r", 0.0), found.get("h", 0.0)
     w = found.get("w", found.get("nu", 0.0) * r)
     return speed * span / (2.0 * max(r, w) + r + h)
-
-
-def narrowest_phase(scene: Scene) -> float:
-    """Return the fraction of the cycle at which nu is least (middle of a plateau); infinity with no mouth."""
-    if isinstance(scene, Stem | Cap):
-        return math.inf
-    start, span = start_time(scene), cycle_length(scene)
-    grid = np.arange(4096) / 4096.0
-    nu = np.array([_mouth_ratio(scene, start + span * g) for g in grid])
-    low = grid[nu <= nu.min() * (1.0 + 2.0**-40)]
-    return float(0.5 * (low[0] + low[-1]))
-
-
-def _mouth_ratio(scene: Mushroom, t: float) -> float:
-    if scene.nu is not None:
-        return float(value(fp, scene.nu, t))
-    assert scene.w is not None
-    return float(value(fp, scene.w, t) / value(fp, scene.r, t))

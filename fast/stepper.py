@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from fast import careful, codes, entries, motion, walls
 from fast.compiled import LARGEST, FloatArray, compile_scene
+from fast.given import MAX_STEPS, given_end, given_state
 from scene import (
     Collision,
     Horizon,
@@ -22,7 +23,7 @@ from scene import (
     Undefined,
     Wall,
 )
-from scene.refusal import BadInput
+from scene.refusal import BadInput, check_count, check_number, check_scene
 from scene.states import ON_WALL, check_numbers
 
 WALL_NAMES: dict[int, Wall] = {
@@ -56,12 +57,18 @@ def next_collision(scene: Scene, state: State, t_end: float) -> Outcome:
 
     Returns:
         Collision, Horizon, Undefined, Undecided where rounding leaves it open, or Rejected for
-        a state that is none of this table.
+        a state that is none of this table, for a `state` or `t_end` that is none at all (a wrong type,
+        nan, infinity, t_end < state.t), and for laws too large or too fast for binary64.
+
+    Raises:
+        BadInput: `scene` is no scene; all else that is bad is Rejected.
 
     Source: Gelfreich, Rom-Kedar, Turaev (2014), sec. 3.1.
     """
+    check_scene(scene)
     try:
-        check_state(scene, state, t_end)
+        t_end = t_end if type(t_end) is float else check_number("t_end", t_end)
+        state = check_state(scene, state, t_end)
     except BadInput as error:
         return Rejected(str(error))
     p = np.array([state.t, 0.0, state.x, state.y, state.vx, state.vy])
@@ -94,15 +101,21 @@ def trajectory(scene: Scene, state: State, n_collisions: int, t_end: float = np.
     Args:
         scene: table and laws of motion.
         state: the start, as for `next_collision`.
-        n_collisions: how many collisions to follow, >= 0.
-        t_end: horizon [time]; infinity for none.
+        n_collisions: how many collisions to follow, 0 to 10^7.
+        t_end: horizon [time], >= state.t; infinity for none.
+
+    Returns:
+        The collisions. Where t_end is infinite and nothing is met any more (a particle at rest that no wall
+        sweeps) the outcome is a Horizon at t = infinity with the place where it rests.
 
     Raises:
-        BadInput: naming field, value and bound.
+        BadInput: naming field, value and bound, for anything that is not as above. That a state is outside
+            the table, or moves into the wall that it leaves, the first step finds: the outcome is Rejected.
     """
-    check_state(scene, state, t_end if np.isfinite(t_end) else state.t)
-    if n_collisions < 0:
-        raise InvalidState(f"n_collisions = {n_collisions}, must be >= 0")
+    check_scene(scene)
+    t_end = given_end(t_end)
+    state = check_state(scene, state, None if t_end == np.inf else t_end)
+    n_collisions = check_count("n_collisions", n_collisions, 0, MAX_STEPS)
     steps: FloatArray = np.empty((n_collisions, 6))
     met: npt.NDArray[np.int64] = np.empty(n_collisions, dtype=np.int64)
     p = np.array([state.t, 0.0, state.x, state.y, state.vx, state.vy])
@@ -110,15 +123,20 @@ def trajectory(scene: Scene, state: State, n_collisions: int, t_end: float = np.
     walls = [WALL_NAMES[int(c)] for c in met[:n]]
     outcome: Outcome | None = None
     if n < n_collisions:
+        # Without a horizon only what rests is never met, and it rests where it was: there is no v * infinity.
+        last = (
+            p[2:] if np.isfinite(t_end) else steps[n - 1, 2:] if n else (state.x, state.y, state.vx, state.vy)
+        )
         is_horizon = code == codes.HORIZON
-        outcome = Horizon(t_end, *(float(v) for v in p[2:])) if is_horizon else trouble(code, state)
+        outcome = Horizon(t_end, *(float(v) for v in last)) if is_horizon else trouble(code, state)
     return Trajectory(walls, steps[:n], outcome)
 
 
-def check_state(scene: Scene, state: State, t_end: float) -> None:
-    """Refuse a scene or a state that this stepper cannot hold, naming field, value and bound."""
+def check_state(scene: Scene, state: State, t_end: float | None = None) -> State:
+    """Return a state in floats; refuse what this stepper cannot hold, naming field, value and bound."""
+    state = given_state(scene, state)
     compile_scene(scene)
-    check_numbers(scene, state, t_end)
+    check_numbers(scene, state, state.t if t_end is None else t_end)
     for field in ("x", "y", "vx", "vy"):
         if abs(getattr(state, field)) > LARGEST:
             raise InvalidState(f"state.{field} = {getattr(state, field)!r}, must be below 2^400 in size")
@@ -129,6 +147,7 @@ def check_state(scene: Scene, state: State, t_end: float) -> None:
         gap, size = wall_gap(scene, state)
         if abs(gap) > ON_WALL * size:
             raise InvalidState(f"state.wall = {state.wall!r}, but the state is {gap:.3g} away from that wall")
+    return state
 
 
 def as_arrays(states: Sequence[State]) -> tuple[FloatArray, npt.NDArray[np.int64]]:

@@ -123,7 +123,7 @@ def capture_times(samples: list[Sample]) -> Figure:
         scene = scene_of(sample.run)
         curve = theory.capture_curve(scene, 3)
         edges = np.linspace(curve.t_in[0], curve.t_in[-1], 51)
-        counts = np.histogram(sample.t_in[:, 0], edges)[0] / sample.n / np.diff(edges)
+        counts = np.histogram(sample.first_stay[0], edges)[0] / sample.n / np.diff(edges)
         mass = np.asarray(theory.capture_time_mass(scene, edges)) / np.diff(edges)
         panel.stairs(counts, edges, fill=True, color=SKY, label="simulation")
         panel.stairs(mass, edges, color=ORANGE, linewidth=1.5, label="theory, eq. (ps)", baseline=None)

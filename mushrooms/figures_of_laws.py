@@ -92,7 +92,7 @@ def convergence(samples: list[Sample]) -> Figure:
     prediction = theory.predict(scene, 15)
     rows: tuple[tuple[str, list[Mean], float], ...] = (
         ("mean of log E1/E0", [mean(s.gain) for s in samples], float(prediction.m1)),
-        ("share never captured", [share(~s.captured) for s in samples], float(prediction.p_nc)),
+        ("share never captured", [share(s.never_captured) for s in samples], float(prediction.p_nc)),
         (
             "mean of exp(-s/2)",
             [mean(np.exp(-s.gain / 2)) for s in samples],

@@ -165,6 +165,7 @@ def simulate(
     Prints particles, collisions, lost (not followed to the end), undecided (those of the lost
     that the stepper could not decide), m1 (mean of log E/E0 per cycle) with its standard error, p_nc
     (share of cycles without capture), ns_per_collision (and thread) and the SHA-256 of the result.
+    Particles that no cycle ever frees from the island count neither in m1 nor in p_nc.
     """
     if not (math.isfinite(energy) and energy > 0):
         raise BadInput(f"--energy = {energy}, must be finite and > 0")
@@ -211,18 +212,18 @@ def simulate(
 def _summary(table: scenes.Scene, ensemble: Any, n_cycles: int) -> dict[str, Any]:
     import numpy as np
 
-    followed = ensemble.outcome == 0
-    n = int(followed.sum())
-    gain = np.log(ensemble.energy[followed] / ensemble.energy0) / n_cycles
+    n_followed = int((ensemble.outcome == 0).sum())
+    gain = np.log(ensemble.energy[ensemble.takes_part()] / ensemble.energy0) / n_cycles
+    n = len(gain)
     has_island = isinstance(table, scenes.Mushroom)
     return {
         "particles": len(ensemble.energy),
         "collisions": int(ensemble.n_collisions.sum()),
-        "lost": len(ensemble.energy) - n,
+        "lost": len(ensemble.energy) - n_followed,
         "undecided": int((ensemble.outcome == 1).sum()),
         "m1": _finite(gain.mean()) if n else None,
         "m1_se": _finite(gain.std(ddof=1) / math.sqrt(n)) if n > 1 else None,
-        "p_nc": float(np.isnan(ensemble.t_in[followed]).mean()) if n and has_island else None,
+        "p_nc": float(ensemble.p_nc().mean()) if n and has_island else None,
         "ns_per_collision": _finite(ensemble.ns_per_collision()),
         "sha256": ensemble.sha256(),
     }

@@ -24,7 +24,14 @@ MAX_KNOTS = 256
 LEAST_NORMAL = 2.0**-1022
 
 
-class Fourier(msgspec.Struct, frozen=True, tag_field="kind", tag="fourier", forbid_unknown_fields=True):
+class Fourier(
+    msgspec.Struct,
+    frozen=True,
+    tag_field="kind",
+    tag="fourier",
+    forbid_unknown_fields=True,
+    repr_omit_defaults=True,
+):
     """mean + sum_k cos[k-1] cos(k omega t) + sin[k-1] sin(k omega t).
 
     Exactly one of `omega` [1/time] and `period` [time] is given; omega is 2 pi / period exactly.

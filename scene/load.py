@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import re
 import tomllib
 from importlib import resources
@@ -12,7 +13,7 @@ from typing import Any
 import msgspec
 
 from scene.laws import BangBang, Fourier
-from scene.refusal import InvalidScene, shown
+from scene.refusal import InvalidScene, check_scene, shown
 from scene.tables import PARAMETERS, Cap, Mushroom, Scene, Stem
 
 
@@ -42,6 +43,8 @@ def read_data(source: str | Path) -> Any:
     Raises:
         InvalidScene: when there is no such scene, or its text is neither TOML nor JSON.
     """
+    if not isinstance(source, str | os.PathLike):
+        raise InvalidScene(f"scene = {shown(source)}, must be a name of the catalogue or a path")
     name = str(source)
     if name in catalogue():
         return tomllib.loads((resources.files("scene") / "catalogue" / f"{name}.toml").read_text("utf-8"))
@@ -110,6 +113,7 @@ def _at(data: Any, names: list[str]) -> Any:
 
 def to_data(scene: Scene) -> dict[str, Any]:
     """Return the wire's form of a scene as plain data; of `omega` and `period`, the one that a law gives."""
+    check_scene(scene)
     data: dict[str, Any] = msgspec.to_builtins(scene)
     return {name: _without_none(field) for name, field in data.items()}
 

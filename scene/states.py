@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import math
 from typing import Literal
 
 import msgspec
 
-from scene.refusal import BadInput
+from scene.refusal import BadInput, check_number, check_scene, shown
 from scene.tables import Scene, Wall
 
 
@@ -47,7 +46,7 @@ class Collision(msgspec.Struct, frozen=True, tag_field="outcome", tag="collision
 
 
 class Horizon(msgspec.Struct, frozen=True, tag_field="outcome", tag="horizon"):
-    """No collision up to and including t_end; the state there."""
+    """No collision before t_end (one at t_end exactly is not before it); the state there, before any bounce."""
 
     t: float
     x: float
@@ -83,7 +82,7 @@ ON_WALL = 2.0**-20
 
 
 def check_numbers(scene: Scene, state: State, t_end: float) -> None:
-    """Refuse what is no state at all, before any arithmetic.
+    """Refuse what is no question at all, before any arithmetic.
 
     Args:
         scene: the table.
@@ -91,14 +90,15 @@ def check_numbers(scene: Scene, state: State, t_end: float) -> None:
         t_end: horizon [time].
 
     Raises:
+        BadInput: no scene, naming what was given.
         InvalidState: naming field, value and bound.
     """
+    check_scene(scene)
+    if not isinstance(state, State):
+        raise InvalidState(f"state = {shown(state)}, must be a State")
     for field in ("t", "x", "y", "vx", "vy"):
-        number = getattr(state, field)
-        if not math.isfinite(number):
-            raise InvalidState(f"state.{field} = {number}, must be finite")
-    if not math.isfinite(t_end):
-        raise InvalidState(f"t_end = {t_end}, must be finite")
+        check_number(f"state.{field}", getattr(state, field), InvalidState)
+    check_number("t_end", t_end, InvalidState)
     if t_end < state.t:
         raise InvalidState(f"t_end = {t_end!r}, must be >= state.t = {state.t!r}")
     if state.wall is not None and state.wall not in scene.walls:

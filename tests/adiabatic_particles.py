@@ -52,7 +52,8 @@ def simulate(scene, *, n_particles, energy, n_cycles=1, seed=0, threads=None, ph
         "energy0": energy, "energy": energy * np.exp(total), "cycle_energies": energy * np.exp(s),
         **dict.fromkeys(("t", "x", "y", "vx", "vy"), np.zeros(n_particles)),
         "n_collisions": counts.sum(axis=1), "outcome": np.zeros(n_particles, np.int8),
-        "t_in": t_in, "t_out": t_out, "wall_counts": counts, "n_careful": np.zeros(n_particles, np.int64),
+        "t_in": t_in[..., None], "t_out": t_out[..., None],
+        "wall_counts": counts, "n_careful": np.zeros(n_particles, np.int64),
         "phase_energies": energy * np.exp(phase_s), "phase_captured": inside, "seconds": 1.0, "threads": 1,
     }  # fmt: skip
     if progress:

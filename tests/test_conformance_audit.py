@@ -98,7 +98,7 @@ def heated(e):
 
 
 def narrowed(e):
-    free = np.isnan(e.t_in[:, 0])
+    free = np.isnan(e.t_in[:, 0, 0])
     centre = np.median(e.cycle_energies[free])
     return e._replace(cycle_energies=centre * (e.cycle_energies / centre) ** 0.3)
 

@@ -2,18 +2,24 @@
 
 from __future__ import annotations
 
+import doctest
+import importlib
 import json
 import os
 import re
 import subprocess
 import sys
+import tomllib
 from collections import Counter
 from pathlib import Path
 
 import jsonschema
+import pytest
 
 from conformance import plain, vectors
+from scene import BadInput, load
 from scene.messages import json_schema
+from scene.tables import laws
 
 ROOT = Path(__file__).parent.parent
 DOCS = ROOT / "docs"
@@ -121,3 +127,43 @@ def test_the_examples_of_the_protocol_are_what_plain_answers():
     assert answered[-1]["outcome"] == "rejected"  # plain offers no time
     assert answered[1:-1] == expected[1:-1]
     assert len(answered) == len(asked) - 1
+
+
+def test_the_proof_names_what_exists():
+    """Every place of the argument that the page names is in the code, and every file."""
+    text = (DOCS / "proof.md").read_text("utf-8")
+    places = set(re.findall(r"`(?:reference\.)?([a-z_]+)\.([A-Za-z_.]+)`", text))
+    assert len(places) >= 25
+    for module, place in places:
+        found = importlib.import_module(f"reference.{module}" if module != "reference" else module)
+        for name in place.split("."):
+            found = getattr(found, name)
+    files = re.findall(r"`([a-z]+/[a-z_/]+\.py)`", text)
+    assert len(files) >= 4
+    assert all((ROOT / file).is_file() for file in files)
+
+
+def test_the_scenes_of_the_scene_page_are_what_it_says(tmp_path):
+    """Every file of docs/scenes.md loads, in TOML and in JSON; those with a text block are refused by it."""
+    refusals = dict(blocks("scenes.md", "text"))
+    shown = Counter()
+    for name, text in blocks("scenes.md", "toml"):
+        (tmp_path / name).write_text(text, "utf-8")
+        as_json = tmp_path / f"{name}.json"
+        as_json.write_text(json.dumps({"$schema": "scene.schema.json", **tomllib.loads(text)}), "utf-8")
+        if name in refusals:
+            for path in (tmp_path / name, as_json):
+                with pytest.raises(BadInput, match=re.escape(refusals[name].strip())):
+                    load(path)
+            continue
+        table = load(tmp_path / name)
+        assert load(as_json) == table
+        shown.update([type(table).__name__, *(type(law).__name__ for law in laws(table).values())])
+    assert set(shown) == {"Cap", "Stem", "Mushroom", "float", "Fourier", "BangBang"}
+    assert len(refusals) == 1
+
+
+def test_the_python_of_the_scene_page_does_what_it_says():
+    found = doctest.testfile(str(DOCS / "scenes.md"), module_relative=False, optionflags=doctest.ELLIPSIS)
+    assert found.attempted >= 4
+    assert found.failed == 0

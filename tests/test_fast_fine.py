@@ -18,7 +18,7 @@ from fast import codes, entries
 from fast import double_double as dd
 from fast.compiled import compile_scene
 from fast.stepper import WALL_CODES
-from scene import Collision, InvalidState, Rejected, State, Stem, Undecided, load
+from scene import BadInput, Collision, Rejected, State, Stem, Undecided, load
 
 N_STEPS = int(os.environ.get("MUSHROOMS_STEPS", "400"))
 UNIT = 2.0**51  # backward units of 2^-104 in a backward ulp
@@ -139,7 +139,7 @@ def test_rounding_a_state_of_pairs_is_not_taken_for_a_gap():
 
 def test_bad_starts_are_refused():
     scene = load("moving-cap")
-    with pytest.raises(InvalidState, match="n_collisions = -1"):
+    with pytest.raises(BadInput, match="n_collisions = -1"):
         fast.fine_trajectory(scene, START, -1)
     outside = fast.fine_trajectory(scene, State(0.0, 9.0, 0.5, 1.0, 0.0), 1)
     assert isinstance(outside.outcome, Rejected)

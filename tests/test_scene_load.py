@@ -93,7 +93,7 @@ BAD_DATA = [
     ({**CAP, "r": {**FOURIER, "omega": 0.0}}, "r.omega = 0.0, must be finite and > 0"),
     (
         {**CAP, "r": {**LEGS, "knots": [[0.0, 1.0], [1.0]]}},
-        "r.knots[1] = an object of type list: Expected `array` of length 2",
+        "r.knots[1] = an object of type list: Exp",
     ),
     ({**CAP, "r": {**LEGS, "knots": [[0.0, 1.0], [1.0, 2.0]]}}, "r.knots[1] value = 2.0, must equal"),
     ({**STEM, "slope": 1.0}, "w > h slope fails by"),

@@ -11,13 +11,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from fractions import Fraction
-from math import comb
+from itertools import pairwise
+from math import comb, floor
 from typing import Any, NamedTuple
 
 from scene import exact
 from scene.laws import BangBang, Fourier, Law, Quadratic, breakpoints, is_constant, piece_at
 from scene.laws import exact as number
 from scene.tables import Mushroom, laws, period
+from theory.volumes import NotCovered
 
 # An isolating interval this narrow lets Newton's method take over from bisection.
 NARROW = Fraction(1, 2**24)
@@ -60,19 +62,56 @@ def spans(ctx: Any, scene: Mushroom) -> list[Span]:
     assert width is not None
     if is_constant(width) and is_constant(radius):
         return []
-    if isinstance(moving[0], BangBang):
-        return list(_bang_bang_spans(ctx, moving, width, radius))
-    return _fourier_spans(ctx, scene, width, radius)
+    legs = [law for law in moving if isinstance(law, BangBang)]
+    kinds = {type(law) for law in (width, radius) if not is_constant(law)}
+    if len(kinds) > 1:
+        raise NotCovered(
+            "nu = w / r of a Fourier and a bang-bang law: give the mouth by `nu`, a law of one kind"
+        )
+    if kinds == {BangBang}:
+        return list(_bang_bang_spans(ctx, legs, width, radius))
+    found = _fourier_spans(ctx, scene, width, radius)
+    return _cut(ctx, found, _cuts(legs), scene) if legs else found
 
 
-def _bang_bang_spans(ctx: Any, moving: list[Law], width: Law, radius: Law) -> Iterator[Span]:
+def _cuts(legs: list[BangBang]) -> list[Fraction]:
+    """Return the times in one period at which one of these laws is not analytic."""
     cuts: set[Fraction] = set()
-    for law in moving:
+    for law in legs:
         times = breakpoints(law)
         start = min(cuts, default=times[0])
-        length = times[-1] - times[0]
-        cuts |= {start + (t - start) % length for t in times}
-    ordered = sorted(cuts)
+        cuts |= {start + (t - start) % (times[-1] - times[0]) for t in times}
+    return sorted(cuts)
+
+
+def _cut(ctx: Any, found: list[Span], cuts: list[Fraction], scene: Mushroom) -> list[Span]:
+    """Cut spans of a Fourier mouth where bang-bang laws of radius, depth or slope are not analytic.
+
+    The spans' own ends are known to the context's precision only: a cut nearer to one than that is it.
+    """
+    shared = period(scene)
+    assert shared is not None
+    assert shared.length is not None
+    length = shared.value(ctx)
+    near = ctx.ldexp(length, 16 - ctx.prec)
+    pieces = []
+    for span in found:
+        times = [(span.start, span.start_order)]
+        first, last = (floor(t / length) for t in (span.start, span.end))
+        for turn in range(first - 1, last + 2):
+            for cut in cuts:
+                time = number(ctx, cut % shared.length + turn * shared.length)
+                if span.start + near < time < span.end - near:
+                    times.append((time, 1))
+        times = [*sorted(times), (span.end, span.end_order)]
+        for (a, m), (b, n) in pairwise(times):
+            pieces.append(Span(a, b, m, n, Fraction(*map(int, ((a + b) / 2).as_integer_ratio()))))
+    return pieces
+
+
+def _bang_bang_spans(ctx: Any, moving: list[BangBang], width: Law, radius: Law) -> Iterator[Span]:
+    ordered = _cuts(moving)
+    length = Fraction(moving[0].knots[-1][0]) - Fraction(moving[0].knots[0][0])
     for a, b in zip(ordered, [*ordered[1:], ordered[0] + length], strict=True):
         w, r = _leg(width, a), _leg(radius, a)
         slope = exact.add(

@@ -8,20 +8,22 @@ begins to fall, not from t = 0.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
 from mpmath import fp
 from numpy.typing import ArrayLike
 
-from scene.refusal import BadInput
+from scene.refusal import BadInput, check_count
 from scene.tables import Scene
 from theory.branches import DIGITS, Branch, Floats, X, tree, turns
 from theory.constants import guarded
 from theory.cycle import Cycle
 from theory.distribution import energies
+from theory.entries import finite_array
 from theory.volumes import volumes_at
+
+MAX_POINTS = 10_000_000
 
 
 class CaptureCurve(NamedTuple):
@@ -48,19 +50,18 @@ def capture_curve(scene: Scene, n: int = 400) -> CaptureCurve:
 
     Args:
         scene: as for `theory.predict`.
-        n: number of points, >= 2.
+        n: number of points, 2 to 10 million.
 
     Returns:
         Arrays of length n; of length 0 when nothing is captured.
 
     Raises:
-        BadInput: n < 2.
+        BadInput: n out of bounds.
         NotCovered, NotConverged: as `theory.predict`.
 
     Source: Eq:ps, Eq:g, Eq:lnE/E0.
     """
-    if n < 2:
-        raise BadInput(f"n = {n}, must be >= 2")
+    n = check_count("n", n, 2, MAX_POINTS)
     branches = sorted(tree(scene).all_branches(), key=lambda branch: float(branch.ends[1, 0]))
     place = np.linspace(0.0, len(branches), n)
     index = np.minimum(place.astype(int), len(branches) - 1)
@@ -109,8 +110,8 @@ def energy_density(scene: Scene, edges: ArrayLike) -> Floats:
 
     Source: Eq:lnE/E0 with Eq:ps.
     """
-    found = energies(scene)
-    return _increments(edges, found.captured_below)
+    bounds = _rising(edges)
+    return np.diff(energies(scene).captured_below(bounds))
 
 
 def capture_time_mass(scene: Scene, edges: ArrayLike) -> Floats:
@@ -131,12 +132,13 @@ def capture_time_mass(scene: Scene, edges: ArrayLike) -> Floats:
 
     Source: Eq:ps.
     """
+    bounds = _rising(edges)
     branches = tuple(tree(scene).all_branches())
 
     def captured_before(times: Floats) -> Floats:
         return sum((branch.below(branch.t_in, times) for branch in branches), np.zeros_like(times))
 
-    return _increments(edges, captured_before)
+    return np.diff(captured_before(bounds))
 
 
 class ChaoticZone(NamedTuple):
@@ -164,9 +166,9 @@ def chaotic_zone(scene: Scene, times: ArrayLike) -> ChaoticZone:
 
     Source: Eq:dE integrated, Eq:ps.
     """
+    t = finite_array("times", times, n_dimensions=1)
     cycle = Cycle.of(scene, DIGITS)
     start = float(cycle.start)
-    t = np.asarray(times, dtype=np.float64)
     n_before = np.zeros_like(t)
     if cycle.period is not None:
         n_before = np.floor((t - start) / float(cycle.period))
@@ -187,8 +189,8 @@ def chaotic_zone(scene: Scene, times: ArrayLike) -> ChaoticZone:
     return ChaoticZone(log_energy, np.exp(-np.interp(t, knots, spent)))
 
 
-def _increments(edges: ArrayLike, below: Callable[[Floats], Floats]) -> Floats:
-    bounds = np.asarray(edges, dtype=np.float64)
-    if bounds.ndim != 1 or bounds.size < 2 or not np.all(np.diff(bounds) > 0):
+def _rising(edges: ArrayLike) -> Floats:
+    bounds = finite_array("edges", edges, n_dimensions=1)
+    if bounds.size < 2 or not np.all(np.diff(bounds) > 0):
         raise BadInput("edges must be at least two rising numbers")
-    return np.diff(below(bounds))
+    return bounds

@@ -16,6 +16,7 @@ from mpmath import MPContext
 from scene.refusal import BadInput
 from scene.tables import Scene, period
 from theory.constants import guarded, settle
+from theory.entries import check_digits, check_real
 from theory.motion import Motion
 from theory.valleys import Piece, Valley, stretches, valley
 from theory.volumes import as_mushroom
@@ -54,17 +55,16 @@ class Cycle:
 
         Args:
             scene: a valid mushroom, static ones included.
-            digits: correct digits wanted, >= 1.
+            digits: correct digits wanted, 1 to MAX_DIGITS.
 
         Raises:
-            BadInput: digits < 1.
+            BadInput: no scene, or digits out of bounds.
             NotCovered: not a mushroom.
 
         Source: sec. 3.5, Eq:nu.
         """
         mushroom = as_mushroom(scene)
-        if digits < 1:
-            raise BadInput(f"digits = {digits}, must be >= 1")
+        digits = check_digits(digits)
         ctx = MPContext()
         ctx.dps = digits + GUARD
         settle(ctx)
@@ -107,6 +107,7 @@ class Cycle:
 
         Source: trelease.
         """
+        check_real(t=t)
         t = self.ctx.mpf(t)
         if self.period is None:
             return t
@@ -118,6 +119,7 @@ class Cycle:
         return t
 
     def _piece(self, nu: Any) -> Piece:
+        check_real(nu=nu)
         for piece in self.pieces:  # a valley's own pieces come first: the first that fits is the earliest
             if piece.nu_lower <= nu <= piece.nu_upper:
                 return piece

@@ -21,6 +21,7 @@ from theory.adiabatic import Captures, Placed
 from theory.branches import turns
 from theory.constants import guarded
 from theory.critical import solve_rising
+from theory.entries import real_numbers
 from theory.prediction import converged
 from theory.volumes import NotCovered, delta_slope
 
@@ -149,7 +150,7 @@ def density_at(scene: Scene, s: Sequence[Any], digits: int = 15) -> tuple[Any, .
                     total += panel.flow(x) / abs(panel.s_rate(x))
             return total
 
-        return tuple(density(found.cycle.ctx.mpf(level)) for level in s)
+        return tuple(density(level) for level in real_numbers(found.cycle.ctx, "s", s))
 
     return converged(scene, digits, figures)
 
@@ -185,7 +186,7 @@ def cdf_at(scene: Scene, s: Sequence[Any], digits: int = 15) -> tuple[Any, ...]:
                 total += ctx.exp(-panel.A(start)) - ctx.exp(-panel.A(stop))
             return total
 
-        return tuple(probability(ctx.mpf(level)) for level in s)
+        return tuple(probability(level) for level in real_numbers(ctx, "s", s))
 
     return converged(scene, digits, figures)
 
@@ -233,7 +234,7 @@ def capture_rate_at(scene: Scene, t: Sequence[Any], digits: int = 15) -> tuple[A
     """
 
     def figures(found: Captures) -> tuple[Any, ...]:
-        return tuple(_rate(found, found.cycle.ctx.mpf(time)) for time in t)
+        return tuple(_rate(found, time) for time in real_numbers(found.cycle.ctx, "t", t))
 
     return converged(scene, digits, figures)
 

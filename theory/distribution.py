@@ -16,13 +16,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from scene.refusal import BadInput
+from scene.refusal import BadInput, check_count, check_number, shown
 from scene.tables import Scene
 from theory.branches import Branch, Floats, Node, X, at, tree
+from theory.entries import finite_array
 
 STEP = 2.0**-12  # the lattice's, at best: its square times a density of order 1 is the error
 MAX_POINTS = 2**20
 MAX_CYCLES = 10_000
+LARGEST_EXPONENT = 600.0  # exp of it stays finite, and so do sums
 
 Complexes = NDArray[np.complex128]
 
@@ -36,12 +38,15 @@ class Energies:
     """
 
     def __init__(self, root: Node) -> None:
+        if not isinstance(root, Node):
+            raise BadInput(f"root = {shown(root)}, must be a solved cycle: use theory.energies(scene)")
         self.root = root
         self.p_nc, self.s_nc = root.p_nc, root.s_nc
         self._often = Lattice(root, 1) if root.children else None
 
     def captured_below(self, s: Floats) -> Floats:
         """Return the probability of being captured and ending at or below each s."""
+        s = finite_array("s", s)
         total = np.zeros_like(s)
         for branch in self.root.all_branches():
             total += np.exp(-branch.absorbed) * branch.below(branch.s, s)
@@ -49,6 +54,7 @@ class Energies:
 
     def cdf(self, s: Floats) -> Floats:
         """Return the probability of log E1 / E0 <= s."""
+        s = finite_array("s", s)
         return self.captured_below(s) + np.where(s >= self.s_nc, self.p_nc, 0.0)
 
 
@@ -79,7 +85,7 @@ def energy_cdf(found: Energies | Scene, s: ArrayLike) -> Floats:
 
     Source: Eq:lnE/E0 with Eq:ps.
     """
-    levels = np.asarray(s, dtype=np.float64)
+    levels = finite_array("s", s)
     return energies(found).cdf(levels.ravel()).reshape(levels.shape)
 
 
@@ -157,6 +163,14 @@ class Sum:
     """
 
     def __init__(self, root: Node, n_cycles: int, q: float = 0.0) -> None:
+        if not isinstance(root, Node):
+            raise BadInput(
+                f"root = {shown(root)}, must be a solved cycle: use theory.sum_of_cycles(scene, n)"
+            )
+        n_cycles, q = check_count("n_cycles", n_cycles, 1, MAX_CYCLES), check_number("q", q)
+        reach = n_cycles * max(abs(d) for d in _reach(root, root.s_nc))
+        if abs(q) * reach > LARGEST_EXPONENT:
+            raise BadInput(f"q = {q}, must be within +-{LARGEST_EXPONENT / reach:.6g} for {n_cycles} cycles")
         lattice = Lattice(root, n_cycles, q)
         norm = lattice.transform[0].real
         powers = (lattice.transform / norm) ** n_cycles - (root.p_nc / norm) ** n_cycles
@@ -172,14 +186,14 @@ class Sum:
 
     def cdf(self, s: ArrayLike) -> Floats:
         """Return the probability of log E_n / E0 <= s."""
-        levels = np.asarray(s, dtype=np.float64)
+        levels = finite_array("s", s)
         captured = np.interp(levels, self.places, cumulated(self.masses))
         found: Floats = captured + np.where(levels >= self.s_nc, self.p_nc, 0.0)
         return found
 
     def density(self, s: ArrayLike) -> Floats:
         """Return the density at s of log E_n / E0 of those captured at least once."""
-        found: Floats = np.interp(np.asarray(s, dtype=np.float64), self.places, self.masses / self.step)
+        found: Floats = np.interp(finite_array("s", s), self.places, self.masses / self.step)
         return found
 
 
@@ -202,6 +216,5 @@ def sum_of_cycles(found: Energies | Scene, n_cycles: int, *, q: float = 0.0) -> 
 
     Source: sec. 4.2, Fig:n=10.
     """
-    if not 1 <= n_cycles <= MAX_CYCLES:
-        raise BadInput(f"n_cycles = {n_cycles}, must be in [1, {MAX_CYCLES}]")
+    check_count("n_cycles", n_cycles, 1, MAX_CYCLES)
     return Sum(energies(found).root, n_cycles, q)

@@ -14,10 +14,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from scene.refusal import BadInput
+from scene.refusal import BadInput, check_number
 from scene.tables import Scene
 from theory.branches import Floats, Node
 from theory.distribution import Energies, energies
+from theory.entries import finite_array
 from theory.prediction import mean_of
 
 
@@ -86,9 +87,9 @@ def peak_width(s: ArrayLike) -> Width:
     Raises:
         BadInput: too few particles, or one that is not finite.
     """
-    values = np.asarray(s, dtype=np.float64).ravel()
-    if values.size < 4 or not np.all(np.isfinite(values)):
-        raise BadInput("a width needs at least 4 finite energies")
+    values = finite_array("s", s).ravel()
+    if values.size < 4:
+        raise BadInput(f"s has {values.size} values: a width needs at least 4")
     centred = values - values.mean()
     variance = float(np.mean(centred**2))
     spread = float(np.mean(centred**4)) - variance**2
@@ -110,7 +111,8 @@ def bias(found: Energies | Scene, sigma_w: float) -> Bias:
 
     Source: none in the paper, which has the width alone (sec. 4.1); see theory/equations.md.
     """
-    if not (np.isfinite(sigma_w) and sigma_w >= 0):
+    sigma_w = check_number("sigma_w", sigma_w)
+    if sigma_w < 0:
         raise BadInput(f"sigma_w = {sigma_w}, must be finite and >= 0")
     drift = sigma_w**2 / 4
     lowest, highest, _ = _diffusing(energies(found).root)
@@ -183,6 +185,7 @@ def extrapolate(x: ArrayLike, y: ArrayLike, errors: ArrayLike, exponent: float =
         BadInput: the shapes differ, a number is out of bounds or exponent is not < 0.
     """
     x_, y_, errors_ = _data(x, y, errors)
+    exponent = check_number("exponent", exponent)
     if not exponent < 0:
         raise BadInput(f"exponent = {exponent}, must be < 0")
     (limit, slope), (limit_error, slope_error), residuals = _line(x_**exponent, y_, errors_)
@@ -190,13 +193,10 @@ def extrapolate(x: ArrayLike, y: ArrayLike, errors: ArrayLike, exponent: float =
 
 
 def _data(x: ArrayLike, y: ArrayLike, errors: ArrayLike) -> tuple[Floats, Floats, Floats]:
-    columns = tuple(np.asarray(column, dtype=np.float64) for column in (x, y, errors))
-    x_, y_, errors_ = columns
+    x_, y_, errors_ = (finite_array(*named) for named in (("x", x), ("y", y), ("errors", errors)))
     if x_.ndim != 1 or not x_.shape == y_.shape == errors_.shape or np.unique(x_).size < 2:
         raise BadInput("x, y and errors must be of one length, with at least two different x")
-    if not (
-        all(np.all(np.isfinite(column)) for column in columns) and np.all(x_ > 0) and np.all(errors_ > 0)
-    ):
+    if not (np.all(x_ > 0) and np.all(errors_ > 0)):
         raise BadInput("x and errors must be positive, and all numbers finite")
     return x_, y_, errors_
 

@@ -7,11 +7,17 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+
+from scene.refusal import BadInput, shown
+from theory.entries import check_real, check_system
 from theory.volumes import v_cap
 
 
 def energy(ctx: Any, vx: Any, vy: Any) -> Any:
     """Return H = (vx^2 + vy^2) / 2 [length^2 / time^2]. Source: sec. 2."""
+    check_system(ctx)
+    check_real(vx=vx, vy=vy)
     return ctx.mpf(vx * vx + vy * vy) / 2
 
 
@@ -29,9 +35,18 @@ def sin_phi_hat(ctx: Any, x: Any, y: Any, vx: Any, vy: Any, r: Any) -> Any:
     Returns:
         -(x vy - y vx) / (|v| r); in the cap the particle is captured when its modulus exceeds nu.
 
+    Raises:
+        BadInput: an argument is not finite, r is not > 0, or the particle rests.
+
     Source: Eq:sinphi.
     """
-    return (y * vx - x * vy) / (ctx.hypot(vx, vy) * r)
+    check_system(ctx)
+    check_real(x=x, y=y, vx=vx, vy=vy, r=r)
+    speed = ctx.hypot(vx, vy)
+    if not np.all(speed > 0):
+        raise BadInput("vx = vy = 0: a particle at rest has no direction")
+    _check_positive("r", r)
+    return (y * vx - x * vy) / (speed * r)
 
 
 def cap_invariant(ctx: Any, vx: Any, vy: Any, r: Any) -> Any:
@@ -50,9 +65,18 @@ def log_energy_rate_chaotic(v_cha: Any, v_cap: Any, v_cha_rate: Any, delta_rate:
 
     Source: Eq:dE.
     """
+    check_real(v_cha=v_cha, v_cap=v_cap, v_cha_rate=v_cha_rate, delta_rate=delta_rate)
+    _check_positive("v_cha", v_cha)
     return -(v_cha_rate + v_cap * delta_rate) / v_cha
 
 
 def log_energy_rate_island(v_cap: Any, v_cap_rate: Any) -> Any:
     """Return d log E / dt in the island, -V_cap' / V_cap. Source: Eq:dEe."""
+    check_real(v_cap=v_cap, v_cap_rate=v_cap_rate)
+    _check_positive("v_cap", v_cap)
     return -v_cap_rate / v_cap
+
+
+def _check_positive(field: str, size: Any) -> None:
+    if not np.all(size > 0):
+        raise BadInput(f"{field} = {shown(size)}, must be > 0")

@@ -13,13 +13,16 @@ from typing import Any, NamedTuple
 import msgspec
 
 from scene.laws import BangBang, Fourier, Law
-from scene.refusal import BadInput
+from scene.refusal import BadInput, check_count, check_number, shown
 from scene.tables import Mushroom, Scene, laws
 from theory.adiabatic import Captures, NotConverged, captures
 from theory.constants import guarded
 from theory.cycle import GUARD, Cycle
+from theory.entries import check_digits, check_order
 from theory.measure import logarithm
 from theory.volumes import as_mushroom
+
+MAX_CYCLES = 2**53
 
 
 class Prediction(NamedTuple):
@@ -43,6 +46,7 @@ class Prediction(NamedTuple):
     @guarded
     def strings(self, digits: int) -> dict[str, str]:
         """Return each number in decimals, rounded to `digits` significant digits; zero is "0.0"."""
+        digits = check_digits(digits)
         return {
             name: x.context.nstr(x, digits, strip_zeros=False).removesuffix(".")
             for name, x in zip(self._fields, self, strict=True)
@@ -51,6 +55,7 @@ class Prediction(NamedTuple):
     @guarded
     def sd_of_mean(self, n_cycles: int) -> Any:
         """Return the standard deviation of (1/n) log E_n / E0, whose mean is m1, for independent cycles."""
+        n_cycles = check_count("n_cycles", n_cycles, 1, MAX_CYCLES)
         return self.sd / self.sd.context.sqrt(n_cycles)
 
 
@@ -60,13 +65,13 @@ def predict(scene: Scene, digits: int = 15) -> Prediction:
 
     Args:
         scene: a valid mushroom.
-        digits: correct significant digits wanted, >= 1.
+        digits: correct significant digits wanted, 1 to 1000.
 
     Returns:
         The prediction. What is smaller than 10^-(digits + 30) is given as zero.
 
     Raises:
-        BadInput: digits < 1.
+        BadInput: no scene, or digits out of bounds.
         NotCovered: not a mushroom.
         NotConverged: the digits were not reached.
 
@@ -87,6 +92,8 @@ def mean_of(scene: Scene, f: Callable[[Any], Any], digits: int = 15) -> Any:
     Raises:
         As `predict`.
     """
+    if not callable(f):
+        raise BadInput(f"f = {shown(f)}, must be a function")
     return converged(scene, digits, lambda found: (found.mean(f),))[0]
 
 
@@ -96,15 +103,14 @@ def moments(scene: Scene, order: int, digits: int = 15) -> tuple[Any, ...]:
 
     Args:
         scene: as for `predict`.
-        order: highest power, >= 0.
+        order: highest power, 0 to 64.
         digits: correct significant digits wanted.
 
     Raises:
-        BadInput: order < 0.
+        BadInput: order out of bounds.
         Otherwise as `predict`.
     """
-    if order < 0:
-        raise BadInput(f"order = {order}, must be >= 0")
+    order = check_order(order)
 
     def figures(found: Captures) -> tuple[Any, ...]:
         ctx = found.cycle.ctx
@@ -122,18 +128,16 @@ def cumulants(scene: Scene, order: int, digits: int = 15, q: float = 0.0) -> tup
 
     Args:
         scene: as for `predict`.
-        order: highest derivative, >= 0.
+        order: highest derivative, 0 to 64.
         digits: correct significant digits wanted.
         q: a binary64 number.
 
     Raises:
-        BadInput: order < 0.
+        BadInput: order out of bounds.
         Otherwise as `predict`.
     """
-    if order < 0:
-        raise BadInput(f"order = {order}, must be >= 0")
-
-    p = list(converged(scene, digits, lambda found: tuple(found.taylor(q, order))))
+    order, tilt = check_order(order), check_number("q", q)
+    p = list(converged(scene, digits, lambda found: tuple(found.taylor(tilt, order))))
     ctx = p[0].context
     return tuple(c * ctx.factorial(k) for k, c in enumerate(logarithm(ctx, p)))
 
@@ -176,6 +180,7 @@ def converged(scene: Scene, digits: int, figures: Callable[[Captures], tuple[Any
     Raises:
         NotConverged: they do not, as far as the resolution may rise.
     """
+    digits = check_digits(digits)
     cycle = Cycle.of(scene, digits)
     ctx = cycle.ctx
     noise, agreement = ctx.mpf(10) ** -(digits + GUARD - 10), ctx.mpf(10) ** -(digits + 2)

@@ -16,10 +16,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.stats import norm
 
-from scene.refusal import BadInput
+from scene.refusal import BadInput, check_count
 from scene.tables import Scene
 from theory.branches import Floats, Node
 from theory.distribution import Energies, energies
+from theory.entries import finite_array
+from theory.prediction import MAX_CYCLES
 
 LARGEST_EXPONENT = 300.0  # exp of it and its square stay finite
 BISECTIONS = 80
@@ -51,7 +53,10 @@ class Saddle:
 
     def cumulants(self, q: ArrayLike) -> Floats:
         """Return K, K', ..., K'''' at each q; shape (5, n)."""
-        p = _series(self._root, np.atleast_1d(np.asarray(q, dtype=np.float64)))
+        places = np.atleast_1d(finite_array("q", q))
+        if not np.all(np.abs(places) <= self._largest):
+            raise BadInput(f"q must be within +-{self._largest:.6g}")
+        p = _series(self._root, places)
         found = [np.log(p[0])]
         for k in range(1, 5):
             rest = sum((j * found[j] * p[k - j] for j in range(1, k)), np.zeros_like(p[0]))
@@ -64,7 +69,7 @@ class Saddle:
         Raises:
             BadInput: x is outside (slowest, fastest).
         """
-        wanted = np.atleast_1d(np.asarray(x, dtype=np.float64))
+        wanted = np.atleast_1d(finite_array("x", x))
         if not np.all((self.slowest < wanted) & (wanted < self.fastest)):
             raise BadInput(f"s / n must be in ({self.slowest:.6g}, {self.fastest:.6g})")
         low, high = np.full_like(wanted, -self._largest), np.full_like(wanted, self._largest)
@@ -76,7 +81,8 @@ class Saddle:
 
     def density(self, s: ArrayLike, n_cycles: int) -> Floats:
         """Return the density of log E_n / E0 at s, in the order of s, flat."""
-        x = np.ravel(np.asarray(s, dtype=np.float64)) / n_cycles
+        n_cycles = check_count("n_cycles", n_cycles, 1, MAX_CYCLES)
+        x = finite_array("s", s).ravel() / n_cycles
         q = self.place(x)
         K, _, K2, K3, K4 = self.cumulants(q)
         correction = 1 + (K4 / K2**2 / 8 - 5 * K3**2 / K2**3 / 24) / n_cycles
@@ -92,7 +98,8 @@ class Saddle:
         return self._tail(s, n_cycles, -1.0)
 
     def _tail(self, s: ArrayLike, n_cycles: int, side: float) -> Floats:
-        x = np.ravel(np.asarray(s, dtype=np.float64)) / n_cycles
+        n_cycles = check_count("n_cycles", n_cycles, 1, MAX_CYCLES)
+        x = finite_array("s", s).ravel() / n_cycles
         q = self.place(x)
         K, _, K2, K3, _ = self.cumulants(q)
         w = np.sign(q) * np.sqrt(2 * n_cycles * np.maximum(q * x - K, 0.0))

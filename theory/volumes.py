@@ -10,8 +10,9 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 from scene.laws import Law, value
-from scene.refusal import BadInput
+from scene.refusal import BadInput, check_scene
 from scene.tables import Mushroom, Scene
+from theory.entries import check_real, check_system
 
 
 class NotCovered(BadInput):
@@ -30,11 +31,23 @@ class Volumes(NamedTuple):
 
 def v_cap(ctx: Any, r: Any) -> Any:
     """Return pi^2 r^2, the volume over the half disk of radius r [length]. Source: Eq:Vcap."""
+    check_system(ctx)
+    check_real(r=r)
+    return _v_cap(ctx, r)
+
+
+def _v_cap(ctx: Any, r: Any) -> Any:
     return ctx.pi**2 * r * r
 
 
 def v_stem(ctx: Any, w: Any, h: Any, slope: Any) -> Any:
     """Return 2 pi (2 w h - h^2 slope), the volume over the stem. Source: Eq:Vcap."""
+    check_system(ctx)
+    check_real(w=w, h=h, slope=slope)
+    return _v_stem(ctx, w, h, slope)
+
+
+def _v_stem(ctx: Any, w: Any, h: Any, slope: Any) -> Any:
     return 2 * ctx.pi * (2 * w * h - h * h * slope)
 
 
@@ -46,6 +59,7 @@ def delta(ctx: Any, nu: Any) -> Any:
 
     Source: the equation after volisl.
     """
+    check_system(ctx)
     _check_nu(nu)
     return 2 * (ctx.acos(nu) - nu * ctx.sqrt((1 - nu) * (1 + nu))) / ctx.pi
 
@@ -56,23 +70,28 @@ def delta_slope(ctx: Any, nu: Any) -> Any:
     Raises:
         BadInput: nu is outside [0, 1].
     """
+    check_system(ctx)
     _check_nu(nu)
     return -4 * ctx.sqrt((1 - nu) * (1 + nu)) / ctx.pi
 
 
 def _check_nu(nu: Any) -> None:
+    check_real(nu=nu)
     if not 0 <= nu <= 1:
         raise BadInput(f"nu = {nu}, must be in [0, 1]")
 
 
 def v_ell(ctx: Any, r: Any, nu: Any) -> Any:
     """Return delta(nu) V_cap, the island's volume. Source: volisl."""
-    return delta(ctx, nu) * v_cap(ctx, r)
+    return v_cap(ctx, r) * delta(ctx, nu)
 
 
 def v_cha(ctx: Any, r: Any, w: Any, h: Any, slope: Any) -> Any:
     """Return V_cap + V_stem - V_ell, the chaotic zone's volume. Source: vchs."""
-    return v_cap(ctx, r) + v_stem(ctx, w, h, slope) - v_ell(ctx, r, w / r)
+    cap, stem = v_cap(ctx, r), v_stem(ctx, w, h, slope)
+    if not r > 0:
+        raise BadInput(f"r = {r}, must be > 0")
+    return cap + stem - v_ell(ctx, r, w / r)
 
 
 def volumes_at(ctx: Any, scene: Scene, t: Any) -> Volumes:
@@ -85,8 +104,11 @@ def volumes_at(ctx: Any, scene: Scene, t: Any) -> Volumes:
 
     Raises:
         NotCovered: the table is no mushroom.
+        BadInput: no scene, no number system or no finite time.
     """
     mushroom = as_mushroom(scene)
+    check_system(ctx)
+    check_real(t=t)
 
     def at(law: Law) -> Any:
         return value(ctx, law, t)
@@ -99,7 +121,7 @@ def volumes_at(ctx: Any, scene: Scene, t: Any) -> Volumes:
 
 def volumes_of(ctx: Any, r: Any, nu: Any, h: Any, slope: Any) -> Volumes:
     """Return all volumes from the table's parameters, the mouth given by nu = w / r."""
-    cap, stem = v_cap(ctx, r), v_stem(ctx, nu * r, h, slope)
+    cap, stem = _v_cap(ctx, r), _v_stem(ctx, nu * r, h, slope)
     island = delta(ctx, nu) * cap
     return Volumes(cap, stem, island, cap + stem - island, nu)
 
@@ -109,7 +131,9 @@ def as_mushroom(scene: Scene) -> Mushroom:
 
     Raises:
         NotCovered: it is a cap or a stem.
+        BadInput: it is no scene.
     """
+    check_scene(scene)
     if isinstance(scene, Mushroom):
         return scene
     raise NotCovered(f"the theory is of mushrooms: table is {scene.__struct_config__.tag}")

@@ -77,7 +77,7 @@ def zone_energy(sample: Sample) -> tuple[list[float], list[Mean], list[float]]:
     times, means, spreads = phase_times(sample), [], []
     for k, time in enumerate(times):
         with np.errstate(invalid="ignore"):
-            free = ~sample.captured | (time < sample.t_in[:, 0])
+            free = ~sample.captured | (time < sample.first_stay[0])
         means.append(mean(sample.phase_s[free, 0, k]))
         spreads.append(spread(sample.phase_s[free, 0, k]).value)
     return times, means, spreads

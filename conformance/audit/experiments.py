@@ -64,7 +64,7 @@ def escape(evidence: Evidence, sample: Sample) -> Check:
     band = 2 * mouth_speed(sample) / sample.speed
     return close(
         f"{sample.run.name}: share never captured",
-        share(~sample.captured),
+        share(sample.never_captured),
         evidence.theory_of(sample).p_nc,
         band=band,
         scale=0.1,
@@ -129,7 +129,7 @@ def moving_cap(evidence: Evidence) -> list[Check]:
     found.append(
         close(
             "share never captured at 1e7 against the paper's 38.78 %",
-            (share(~high.captured).value, float(np.hypot(share(~high.captured).error, 0.00308))),
+            (share(high.never_captured).value, float(np.hypot(share(high.never_captured).error, 0.00308))),
             0.3878,
             band=5e-5,
         )
@@ -172,7 +172,7 @@ def capture_times(evidence: Evidence) -> list[Check]:
     found = []
     for run in ("moving-cap@1e7", ACW, CW):
         sample = evidence.sample(run)
-        times = sample.t_in[sample.captured, 0]
+        times = sample.first_stay[0][sample.captured]
         cdf = _capture_cdf(run)
         delay = MEAN_RETURNS * return_time(sample)
         grid = np.linspace(times.min(), times.max(), 2000)

@@ -146,7 +146,8 @@ def cap_change(sample: Sample) -> FloatArray:
 
 def _stays(sample: Sample, first: float, last: float) -> BoolArray:
     with np.errstate(invalid="ignore"):
-        inside: BoolArray = (sample.t_in[:, 0] < 2 * np.pi * first) & (sample.t_out[:, 0] > 2 * np.pi * last)
+        t_in, t_out = sample.first_stay
+        inside: BoolArray = (t_in < 2 * np.pi * first) & (t_out > 2 * np.pi * last)
     return inside
 
 
@@ -240,7 +241,7 @@ def nu_gap(sample: Sample) -> FloatArray:
     """Return nu(t_out) - nu(t_in) of the captured of a moving-cap run."""
     scene = scene_of(sample.run)
     assert isinstance(scene, Mushroom)
-    t_in, t_out = sample.t_in[sample.captured, 0], sample.t_out[sample.captured, 0]
+    t_in, t_out = (t[sample.captured] for t in sample.first_stay)
     gap: FloatArray = 0.4 * (np.cos(t_out) - np.cos(t_in))  # nu = 0.6 + 0.4 cos t
     return gap
 
@@ -272,7 +273,7 @@ def energy_through_the_cycle(evidence: Evidence) -> list[Check]:
 
 def zone_share(sample: Sample, times: FloatArray) -> FloatArray:
     """Return the share of particles in the chaotic zone at each time."""
-    t_in, t_out = (np.sort(t[sample.captured, 0]) for t in (sample.t_in, sample.t_out))
+    t_in, t_out = (np.sort(t[sample.captured]) for t in sample.first_stay)
     caught, freed = (np.searchsorted(t, times, side="right") for t in (t_in, t_out))
     found: FloatArray = 1 - (caught - freed) / sample.n
     return found

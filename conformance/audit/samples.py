@@ -28,6 +28,7 @@ Simulate = Callable[..., "Ensemble"]
 Progress = Callable[[str, int, int], None]  # run, particles done, particles in all
 Arrays = dict[str, npt.NDArray[Any]]
 
+FORM = 2  # of a saved block: raised when its arrays change, so that older ones are followed anew
 MAX_LOST = 1e-3  # a larger unfollowed share could hide a bias as large as the errors themselves
 
 
@@ -37,7 +38,8 @@ class Sample(NamedTuple):
     Attributes:
         run: what was asked for.
         s: (n, K) log E / E0 at the end of each cycle.
-        t_in, t_out: (n, K) captured stay around each cycle's least nu; nan for none.
+        t_in, t_out: (n, K, M) captured stay around each narrowing of the mouth; nan for none.
+        takes_part: (n,) who is not in the island all the time.
         phase_s: (n, K, P) log E / E0 at the phases.
         phase_captured: (n, K, P) whether in the island there.
         stem_hits: (n,) collisions with left, right and floor.
@@ -52,6 +54,7 @@ class Sample(NamedTuple):
     s: FloatArray
     t_in: FloatArray
     t_out: FloatArray
+    takes_part: BoolArray
     phase_s: FloatArray
     phase_captured: BoolArray
     stem_hits: npt.NDArray[np.int64]
@@ -81,8 +84,19 @@ class Sample(NamedTuple):
     @property
     def captured(self) -> BoolArray:
         """Return who was captured in the first cycle."""
-        found: BoolArray = ~np.isnan(self.t_in[:, 0])
-        return found
+        return np.asarray(np.isfinite(self.t_in[:, 0]).any(axis=1))
+
+    @property
+    def never_captured(self) -> BoolArray:
+        """Return, for each who takes part, whether the first cycle passes uncaptured; p_nc is the share."""
+        flags: BoolArray = ~self.captured[self.takes_part]
+        return flags
+
+    @property
+    def first_stay(self) -> tuple[FloatArray, FloatArray]:
+        """Return begin and end (n,) of each one's first captured stay in the first cycle; nan for none."""
+        begin, end = (np.fmin.reduce(t[:, 0], axis=1, initial=np.nan) for t in (self.t_in, self.t_out))
+        return begin, end
 
     @property
     def speed(self) -> float:
@@ -132,7 +146,7 @@ def draw(
 
 def _key(run: Run, n: int, seed: int) -> str:
     scene = scenes.to_data(scene_of(run))
-    return json.dumps([scene, run.energy, n, run.n_cycles, run.phases, seed])
+    return json.dumps([FORM, scene, run.energy, n, run.n_cycles, run.phases, seed])
 
 
 def _follow(simulate: Simulate, run: Run, n: int, seed: int, threads: int | None) -> Arrays:
@@ -165,6 +179,7 @@ def reduced(ensemble: Ensemble) -> Arrays:
         "s": s[followed],
         "t_in": ensemble.t_in[followed],
         "t_out": ensemble.t_out[followed],
+        "takes_part": ensemble.takes_part()[followed],
         "phase_s": phase_s[followed],
         "phase_captured": ensemble.phase_captured[followed],
         "stem_hits": ensemble.wall_counts[followed, 2:].sum(axis=1),
@@ -187,6 +202,7 @@ def gathered(run: Run, blocks: list[Arrays]) -> Sample:
         joined("s"),
         joined("t_in"),
         joined("t_out"),
+        joined("takes_part"),
         joined("phase_s"),
         joined("phase_captured"),
         joined("stem_hits"),

@@ -1,0 +1,233 @@
+"""Where in a cycle the mouth narrows: the local minima of nu = w / r, by algebra on each analytic piece.
+
+Idea. The sign of nu' is that of N = w' r - w r'. Time is cut where a law is not analytic and, where a Fourier
+law moves, into parts of half a wavelength. On half a bang-bang leg N is a quadratic; elsewhere it is
+interpolated by a Chebyshev series that rounding alone limits, and its zeros are eigenvalues, polished by
+Newton's method. Between neighbours among all cuts and zeros nu is monotone, so its values there show every
+rise and fall: a zero too many (of a flat inflection, or by rounding) does no harm, and none that matters is
+missed.
+
+A swing of nu below SWING of its largest value is rounding, and counts as none: the two minima beside so low a
+peak are one, and a nu that never swings more has no narrowing at all. A plateau counts once, by its middle.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from fractions import Fraction
+from functools import lru_cache
+
+import numpy as np
+import numpy.typing as npt
+from mpmath import MPContext, fp
+from numpy.polynomial import chebyshev
+
+from scene import BangBang, Fourier, Law, Mushroom, Scene
+from scene.laws import bounds, is_constant, value
+from scene.tables import laws
+
+FloatArray = npt.NDArray[np.float64]
+# Returns a law, its first and its second derivative by the phase, shape (3, ...), at phases given.
+Motion = Callable[[FloatArray], FloatArray]
+
+SWING = 2.0**-44  # a few hundred roundings, as sums of sixteen harmonics gather them
+DEGREE = 24  # over half a wavelength the series of cos and sin, times a quadratic, is below 2^-53 from there
+NODES = np.cos(np.pi * (np.arange(DEGREE + 1) + 0.5) / (DEGREE + 1))
+TO_SERIES = np.linalg.inv(chebyshev.chebvander(NODES, DEGREE)).T
+
+
+def start_time(scene: Scene) -> float:
+    """Return when the cycle begins [time]: at the first knot of a bang-bang law, else at 0."""
+    return next((law.knots[0][0] for law in laws(scene).values() if isinstance(law, BangBang)), 0.0)
+
+
+@lru_cache(maxsize=256)
+def narrowings(scene: Scene) -> tuple[float, ...]:
+    """Find every narrowing of the mouth in one cycle.
+
+    Args:
+        scene: a valid scene; only a mushroom has a mouth.
+
+    Returns:
+        Phases (fractions of the cycle, rising, in (0, 1]) at which nu has a local minimum; one at the instant
+        that ends a cycle and begins the next belongs to the one that it ends. None for a nu that is constant.
+
+    Source: sec. 3.2, capture while nu falls, release when it has risen.
+    """
+    if not isinstance(scene, Mushroom):
+        return ()
+    width, radius = (scene.nu, 1.0) if scene.nu is not None else (scene.w, scene.r)
+    assert width is not None
+    if is_constant(width) and is_constant(radius):
+        return ()
+    start = start_time(scene)
+    w, r = (_motion(law, start) for law in (width, radius))
+    cuts = _cuts(start, (width, radius))
+    is_algebraic = not any(isinstance(law, Fourier) and not is_constant(law) for law in (width, radius))
+    # Legs too short for their squares give nan: their zeros drop out, their ends among the cuts stay.
+    with np.errstate(all="ignore"):
+        zeros = (_zeros_of_quadratics if is_algebraic else _zeros_of_series)(w, r, cuts)
+        phases = np.unique(np.concatenate([cuts[:-1], zeros[(zeros >= 0.0) & (zeros < 1.0)]]))
+        return tuple(sorted(_in_cycle(phase) for phase in _minima(w, r, phases)))
+
+
+def _in_cycle(phase: float) -> float:
+    """Return a phase in (0, 1]; one within rounding of the cycle's ends is its last instant."""
+    phase %= 1.0
+    return 1.0 if min(phase, 1.0 - phase) < 2.0**-40 else phase
+
+
+def _motion(law: Law, start: float) -> Motion:
+    """Return a law's motion, divided by its highest value: only the ratios of nu matter."""
+    highest = bounds(law).highest
+    motion = _unscaled(law, start)
+    return lambda u: motion(u) / highest
+
+
+def _unscaled(law: Law, start: float) -> Motion:
+    if is_constant(law):
+        level = float(value(fp, law, start))
+        return lambda u: np.stack([np.full_like(u, level), np.zeros_like(u), np.zeros_like(u)])
+    if isinstance(law, BangBang):
+        return _bang_bang(law, start)
+    assert isinstance(law, Fourier)
+    return _fourier(law, start)
+
+
+def _knot_phases(law: BangBang, start: float) -> FloatArray:
+    """Return the knots' phases; the first is in [0, 1), the last one more than the first."""
+    first, last = Fraction(law.knots[0][0]), Fraction(law.knots[-1][0])
+    span = last - first
+    shift = (first - Fraction(start)) / span // 1 * span + Fraction(start)
+    return np.array([float((Fraction(t) - shift) / span) for t, _ in law.knots])
+
+
+def _bang_bang(law: BangBang, start: float) -> Motion:
+    knots, values = _knot_phases(law, start), np.array([v for _, v in law.knots])
+
+    def motion(u: FloatArray) -> FloatArray:
+        u = knots[0] + (u - knots[0]) % 1.0
+        leg = np.clip(np.searchsorted(knots, u, side="right") - 1, 0, len(knots) - 2)
+        length = np.maximum(knots[leg + 1] - knots[leg], 2.0**-1000)
+        before, after = (u - knots[leg]) / length, (knots[leg + 1] - u) / length
+        rise = values[leg + 1] - values[leg]
+        is_first, bend = before < 0.5, 2.0 * rise
+        level = np.where(is_first, values[leg] + bend * before**2, values[leg + 1] - bend * after**2)
+        slope = 2.0 * bend * np.where(is_first, before, after) / length
+        return np.stack([level, slope, np.where(is_first, 2.0, -2.0) * bend / length**2])
+
+    return motion
+
+
+def _fourier(law: Fourier, start: float) -> Motion:
+    k, c, s = (np.array(column) for column in zip(*law.harmonics(), strict=True))
+    base = _turns_at(law, start)
+
+    def motion(u: FloatArray) -> FloatArray:
+        turns = k * (base + u[..., None])
+        angle, rate = 2.0 * np.pi * (turns - np.round(turns)), 2.0 * np.pi * k
+        cos, sin = np.cos(angle), np.sin(angle)
+        level = law.mean + cos @ c + sin @ s
+        slope = cos @ (rate * s) - sin @ (rate * c)
+        return np.stack([level, slope, -(cos @ (rate**2 * c) + sin @ (rate**2 * s))])
+
+    return motion
+
+
+def _turns_at(law: Fourier, t: float) -> float:
+    """Return the phase of a law at a time, as a fraction of its period in [0, 1)."""
+    if law.period is not None:
+        return float(Fraction(t) / Fraction(law.period) % 1)
+    if t == 0.0:
+        return 0.0
+    ctx = MPContext()
+    ctx.prec = 2300  # every binary64 time times every binary64 omega, and 100 bits behind the point
+    turns = ctx.mpf(law.omega) * ctx.mpf(t) / (2 * ctx.pi)
+    return float(turns - ctx.floor(turns))
+
+
+def _cuts(start: float, factors: tuple[Law, Law]) -> FloatArray:
+    """Return phases from 0 to 1 between which N is analytic and its waves make half a turn at most."""
+    waves = [law.harmonics() for law in factors if isinstance(law, Fourier) and law.harmonics()]
+    parts = 2 * sum(harmonics[-1][0] for harmonics in waves)
+    cuts = [np.linspace(0.0, 1.0, max(parts, 1) + 1)]
+    for law in factors:
+        if isinstance(law, BangBang) and not is_constant(law):
+            knots = _knot_phases(law, start)
+            cuts += [knots % 1.0, (0.5 * (knots[1:] + knots[:-1])) % 1.0]
+    return np.unique(np.concatenate(cuts))
+
+
+def _slope(w: FloatArray, r: FloatArray) -> FloatArray:
+    """Return N = w' r - w r' and its derivative, shape (2, ...)."""
+    return np.stack([w[1] * r[0] - w[0] * r[1], w[2] * r[0] - w[0] * r[2]])
+
+
+def _zeros_of_quadratics(w: Motion, r: Motion, cuts: FloatArray) -> FloatArray:
+    """Return N's zeros where both laws are quadratics between neighbouring cuts."""
+    middle, half = 0.5 * (cuts[1:] + cuts[:-1]), 0.5 * np.diff(cuts)
+    at_w, at_r = w(middle), r(middle)
+    c, b = _slope(at_w, at_r)  # in z = phase - middle: c + b z + a z^2
+    a = 0.5 * (at_w[2] * at_r[1] - at_w[1] * at_r[2])
+    q = -0.5 * (b + np.copysign(np.sqrt(np.maximum(b * b - 4.0 * a * c, 0.0)), b))
+    z = np.concatenate([q / a, c / q])
+    half, middle = np.concatenate([half, half]), np.concatenate([middle, middle])
+    found: FloatArray = (middle + z)[np.abs(z) <= half]  # nan and infinity drop out
+    return found
+
+
+def _zeros_of_series(w: Motion, r: Motion, cuts: FloatArray) -> FloatArray:
+    """Return N's zeros where a Fourier law moves, by Chebyshev series between neighbouring cuts."""
+    middle, half = 0.5 * (cuts[1:] + cuts[:-1]), 0.5 * np.diff(cuts)
+    places = middle[:, None] + half[:, None] * NODES
+    series = _slope(w(places), r(places))[0] @ TO_SERIES
+    sizes = np.abs(series)
+    may_vanish = (sizes[:, 0] <= sizes[:, 1:].sum(axis=1)) & np.isfinite(sizes).all(axis=1)
+    found = []
+    for k in np.flatnonzero(may_vanish):
+        kept = np.flatnonzero(sizes[k] > 2.0**-52 * sizes[k].max())
+        if len(kept) and kept[-1] > 0:
+            zeros = chebyshev.chebroots(series[k, : kept[-1] + 1]).real
+            found.append(middle[k] + half[k] * zeros[np.abs(zeros) <= 1.0 + 2.0**-20])
+    if not found:
+        return np.empty(0)
+    phases = np.concatenate(found)
+    for _ in range(3):
+        slope, rate = _slope(w(phases), r(phases))
+        step = np.divide(slope, rate, out=np.zeros_like(slope), where=rate != 0.0)
+        phases = np.where(np.abs(step) < 2.0**-20, phases - step, phases)
+    return phases
+
+
+def _minima(w: Motion, r: Motion, phases: FloatArray) -> list[float]:
+    """Return where nu is least in each of its valleys; it is monotone between neighbours among `phases`."""
+    at_w, at_r = w(phases), r(phases)
+    nu, slope = at_w[0] / at_r[0], np.abs(_slope(at_w, at_r)[0])
+    top = int(np.argmax(nu))
+    small = SWING * nu[top]
+    # Once round from the highest place to itself.
+    order = np.append(np.arange(top, top + len(nu)), top) % len(nu)
+    u = np.append(phases[order[:-1]] + (order[:-1] < top), phases[top] + 1.0)
+    found: list[float] = []
+    is_falling, extreme, begin = True, nu[top], 0
+    for k, level in enumerate(nu[order]):
+        if is_falling:
+            extreme = min(extreme, level)
+            if level > extreme + small:
+                low = [i for i in range(begin, k) if nu[order[i]] <= extreme + small]
+                found.append(_lowest(w, r, u[low], slope[order[low]]))
+                is_falling, extreme = False, level
+        else:
+            extreme = max(extreme, level)
+            if level < extreme - small:
+                is_falling, extreme, begin = True, level, k
+    return found
+
+
+def _lowest(w: Motion, r: Motion, u: FloatArray, slope: FloatArray) -> float:
+    """Return the middle of a plateau, else the place of least slope, of places equal within rounding."""
+    middle = np.array([0.5 * (u[0] + u[-1])])
+    at_w, at_r = w(middle % 1.0), r(middle % 1.0)
+    terms = np.abs(at_w[1] * at_r[0]) + np.abs(at_w[0] * at_r[1])
+    is_plateau = np.abs(_slope(at_w, at_r)[0]) <= SWING * terms
+    return float(middle[0]) if is_plateau else float(u[np.argmin(slope)])

@@ -1,0 +1,202 @@
+"""Bad input of fast's public entries: one line that names field, value and bound, and never anything else."""
+
+from __future__ import annotations
+
+import math
+from fractions import Fraction
+
+import numpy as np
+import pytest
+
+import fast
+from fast.batch import careful_steps
+from scene import BadInput, BangBang, Cap, Horizon, Mushroom, Rejected, State, load
+
+CAP, MUSHROOM = Cap(r=1.0), Mushroom(r=1.0, h=1.0, w=0.5)
+GOOD = {"t": 0.0, "x": 0.1, "y": 0.3, "vx": 1.0, "vy": 0.7}
+START = State(**GOOD)
+# What each entry takes: a function of its arguments by name, and arguments that are good.
+ENTRIES = {
+    "next_collision": (fast.next_collision, {"scene": CAP, "state": START, "t_end": 2.0}),
+    "trajectory": (fast.trajectory, {"scene": CAP, "state": START, "n_collisions": 2, "t_end": 2.0}),
+    "fine_trajectory": (fast.fine_trajectory, {"scene": CAP, "state": START, "n_collisions": 2}),
+    "flow": (fast.flow, {"scene": CAP, "states": [START], "t_end": 2.0, "threads": 1}),
+    "simulate": (
+        fast.simulate,
+        {
+            "scene": CAP,
+            "n_particles": 1,
+            "energy": 1.0,
+            "n_cycles": 1,
+            "seed": 0,
+            "threads": 1,
+            "phases": (0.5,),
+            "progress": None,
+        },
+    ),
+}
+NAN, INFINITY, HUGE = math.nan, math.inf, 10**400
+NO_NUMBER = [None, True, "1", b"1", [], [1.0], {}, 1j, np.array([1.0, 2.0]), NAN, -INFINITY, HUGE, CAP, START]
+NO_COUNT = [*(value for value in NO_NUMBER if value is not None), 2.5, 2.0, Fraction(2), INFINITY, -1]
+BAD = {
+    "scene": [None, "moving-cap", b"cap", 1.0, NAN, [], {"table": "cap", "r": 1.0}, Cap, START, HUGE],
+    "state": [
+        *(value for value in NO_NUMBER if value is not START),
+        (0.0, 0.1, 0.3, 1.0, 0.7),
+        *(State(**{**GOOD, field: value}) for field in GOOD for value in [*NO_NUMBER, INFINITY]),
+        *(State(**GOOD, wall=wall) for wall in ("roof", "left", 0, True, 1.5, [], ["arc"], b"arc", NAN)),
+        State(0.0, 0.1, 0.3, 1.0, 0.7, "arc"),
+    ],
+    "n_collisions": [None, *NO_COUNT, 10**7 + 1, 10**12, HUGE],
+    "t_end": [*NO_NUMBER, -1.0],
+    "states": [
+        None,
+        START,
+        "states",
+        1.0,
+        {},
+        {START},
+        CAP,
+        [None],
+        [START, "a"],
+        [START, (0.0, 0.1, 0.3, 1.0, 0.7)],
+        [State(0.0, "a", 0.3, 1.0, 0.7)],
+        [State(0.0, 9.0, 0.3, 1.0, 0.7)],
+        np.zeros((1, 6)),
+    ],
+    "threads": [*NO_COUNT, 0, 10**6, HUGE],
+    "n_particles": [None, *NO_COUNT, 0, 10**8 + 1, 10**12, HUGE],
+    "energy": [*NO_NUMBER, INFINITY, 0.0, -1.0, 2.0**801, 10**300],
+    "n_cycles": [None, *NO_COUNT, 0, 10**6 + 1, HUGE],
+    "seed": [None, *NO_COUNT, 2**64, HUGE],
+    "phases": [
+        None,
+        True,
+        0.5,
+        "0.5",
+        b"\x00",
+        {0.5},
+        {0.5: 1},
+        (0.5, 0.5),
+        (0.6, 0.5),
+        (0.0,),
+        (1.0,),
+        (NAN,),
+        ("a",),
+        (None,),
+        ((0.5,),),
+        (0.5, INFINITY),
+        np.array([[0.5]]),
+        np.array(["a"]),
+        CAP,
+        (True,),
+    ],
+    "progress": [1, "print", [], START],
+}
+# A flight from START to this horizon takes over 10^7 collisions; a trajectory needs none.
+FAR = {"flow": [("t_end", 1e9), ("t_end", INFINITY)], "next_collision": [("t_end", INFINITY)]}
+CASES = [
+    (name, field, value)
+    for name, (_, good) in ENTRIES.items()
+    for field in good
+    for value in BAD[field]
+    if not (name == "trajectory" and field == "t_end" and value is INFINITY)
+] + [(name, *case) for name, cases in FAR.items() for case in cases]
+
+
+def refusal(name, changes):
+    """Return the line with which an entry refuses; None when it takes what it is given."""
+    entry, good = ENTRIES[name]
+    try:
+        answer = entry(**{**good, **changes})
+    except BadInput as error:
+        return str(error)
+    if isinstance(answer, fast.Trajectory | fast.FineTrajectory):
+        answer = answer.outcome
+    return answer.reason if isinstance(answer, Rejected) else None
+
+
+def test_good_input_is_taken():
+    assert [refusal(name, {}) for name in ENTRIES] == [None] * len(ENTRIES)
+
+
+@pytest.mark.parametrize("name", ENTRIES)
+def test_every_bad_value_is_refused_by_its_name(name):
+    mine = [(field, value) for entry, field, value in CASES if entry == name]
+    assert len(mine) > 50
+    for field, value in mine:
+        line = refusal(name, {field: value})
+        assert line is not None, (field, value)
+        assert "\n" not in line
+        assert len(line) < 300, line
+        named = {"states": ("states", "particle", "state")}.get(field, (field,))
+        assert any(word in line for word in named), (field, value, line)
+
+
+def test_random_bad_input_is_refused(tally):
+    """Bad and good values of any argument in any place, several at once: refused in one line, or taken."""
+    random = np.random.default_rng(8)
+    pool = [value for values in BAD.values() for value in values]
+    for _ in range(600):
+        name = list(ENTRIES)[random.integers(len(ENTRIES))]
+        fields = [field for field in ENTRIES[name][1] if random.random() < 0.5]
+        changes = {}
+        for field in fields:
+            values = BAD[field] if random.random() < 0.5 else pool
+            changes[field] = values[random.integers(len(values))]
+        line = refusal(name, changes)
+        tally["refused" if line else "taken"] += 1
+        assert line is None or "\n" not in line
+    assert tally["refused"] > 400
+
+
+def test_what_an_ensemble_keeps_is_bounded():
+    for changes in (
+        {"n_particles": 10**8, "n_cycles": 100},
+        {"n_cycles": 10**6, "n_particles": 10**6},
+        {"n_particles": 10**8, "phases": tuple(np.linspace(0, 1, 102)[1:-1])},
+    ):
+        assert "to keep, must be at most 1000000000" in refusal("simulate", changes)
+
+
+def test_numbers_of_other_kinds_are_taken():
+    """Integers, fractions and numbers of numpy mean the floats that they round to."""
+    kinds = [
+        State(np.float32(0), Fraction(1, 2), np.float64(0.25), 1, np.int64(2), "base"),
+        State(0, 0.5, 0.25, 1, 2),
+    ]
+    expected = fast.trajectory(CAP, State(0.0, 0.5, 0.25, 1.0, 2.0), 5)
+    found = fast.trajectory(CAP, kinds[1], np.int64(5), Fraction(100))
+    assert np.array_equal(found.steps, expected.steps)
+    assert isinstance(fast.next_collision(CAP, kinds[0], 1), Rejected)
+    runs = [
+        fast.simulate(CAP, n_particles=3, energy=e, phases=p) for e, p in ((1, np.array([0.5])), (1.0, [0.5]))
+    ]
+    assert runs[0].sha256() == runs[1].sha256()
+
+
+RESTING = State(0.0, 0.0, 0.5, 0.0, 0.0)
+SWEPT_ONCE = Cap(r=BangBang(knots=((0.0, 1.0), (1.0, 0.5), (2.0, 1.0))))
+
+
+def test_what_rests_and_is_never_swept_stays_where_it_is():
+    """Without a horizon: at t = infinity in its place, the same for all entries; no nan."""
+    expected = Horizon(math.inf, 0.0, 0.5, 0.0, 0.0)
+    assert fast.trajectory(CAP, RESTING, 3).outcome == expected
+    assert fast.trajectory(CAP, RESTING, 3, math.inf).outcome == expected
+    assert fast.fine_trajectory(CAP, RESTING, 3).outcome == expected
+    assert careful_steps(CAP, [RESTING])[0] == [expected]
+    assert fast.trajectory(CAP, RESTING, 3, 7.0).outcome == Horizon(7.0, 0.0, 0.5, 0.0, 0.0)
+    assert fast.trajectory(CAP, RESTING, 0).outcome is None
+
+
+def test_what_rests_in_a_wall_s_way_is_swept():
+    path = fast.trajectory(SWEPT_ONCE, State(0.0, 0.0, 0.75, 0.0, 0.0), 1)
+    assert path.walls == ["arc"]
+    assert np.isfinite(path.steps).all()
+
+
+def test_catalogue_names_are_answered_with_a_hint():
+    for name in ENTRIES:
+        assert "scene.load('moving-cap')" in refusal(name, {"scene": "moving-cap"})
+    assert refusal("simulate", {"scene": load("moving-cap")}) is None

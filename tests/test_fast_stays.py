@@ -1,0 +1,206 @@
+"""Captured stays in the slots of the narrowings that they span; p_nc where the mouth narrows twice a cycle.
+
+The stays are found once more by their definition, in plain Python, along trajectories.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from mpmath import fp
+
+import fast
+import theory
+from fast import starts
+from fast.narrowings import narrowings, start_time
+from fast.starts import cycle_length, cycle_stops, initial_states
+from scene import BangBang, Fourier, Mushroom, State, load
+from scene.laws import value
+from scene.tables import width_factors
+
+TWICE = tuple(zip(map(float, range(9)), (1.0, 1.0, 0.3, 0.3, 1.0, 1.0, 0.3, 0.3, 1.0), strict=True))
+BREATH = ((0.0, 1.0), (2.0, 1.0), (2.5, 1.25), (6.0, 1.25), (6.5, 1.0), (8.0, 1.0))
+MOUTHS = {
+    "equal": Mushroom(
+        r=Fourier(mean=1.0, omega=1.0, sin=(0.3,)),
+        h=1.0,
+        nu=Fourier(mean=0.6, omega=1.0, cos=(0.0, 0.25)),
+        slope=0.05,
+    ),
+    "unequal": Mushroom(
+        r=Fourier(mean=1.0, omega=1.0, sin=(0.3,)),
+        h=1.0,
+        nu=Fourier(mean=0.6, omega=1.0, cos=(0.12, 0.25)),
+        slope=0.05,
+    ),
+    "plateaus": Mushroom(r=BangBang(knots=BREATH), h=1.0, nu=BangBang(knots=TWICE), slope=0.1),
+}
+AT_THE_END = Mushroom(r=1.0, h=1.0, nu=Fourier(mean=0.6, omega=1.0, cos=(-0.3,)), slope=0.05)
+
+
+def stays_along(scene, start, hits):
+    """List the captured stays (begin, end) of a path by their definition; end = infinity if not over."""
+    found, begin, end = [], math.inf, math.inf
+    vx, vy = start.vx, start.vy
+    for wall, (_, t, x, y, *after) in hits:
+        if wall == "arc":
+            w = math.prod(float(value(fp, law, t)) for law in width_factors(scene))
+            if abs(x * vy - y * vx) > w * math.hypot(vx, vy):
+                begin, end = min(begin, t), math.inf
+            elif begin < math.inf:
+                end = min(end, t)
+        elif wall != "base":
+            if begin < math.inf:
+                found.append((begin, min(end, t)))
+            begin = end = math.inf
+        vx, vy = after
+    return [*found, (begin, end)] if begin < math.inf else found
+
+
+def slots_along(scene, start, path, cycle):
+    """Return (2, M): t_in, t_out of a cycle, from what is known when it ends."""
+    span = cycle_length(scene)
+    begin_of_cycle, end_of_cycle = (start_time(scene) + span * k for k in (cycle, cycle + 1.0))
+    hits = zip(path.walls, path.steps.tolist(), strict=True)
+    stays = stays_along(scene, start, [hit for hit in hits if hit[1][1] < end_of_cycle])
+    slots = np.full((2, len(narrowings(scene))), np.nan)
+    for m, phase in enumerate(narrowings(scene)):
+        for begin, end in stays:
+            if begin <= begin_of_cycle + span * phase <= end:
+                slots[:, m] = begin, min(end, end_of_cycle)
+    return slots
+
+
+CASES = {**MOUTHS, "at the cycle's end": AT_THE_END, "moving-cap": load("moving-cap")}
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_stays_are_those_of_the_definition(name, tally):
+    """In the cycles before chaos parts a particle from its trajectory, which other roundings lead."""
+    scene, n, n_cycles = CASES[name], 100, 3
+    span = cycle_length(scene)
+    energy = 0.5 * (25.0 / span) ** 2
+    run = fast.simulate(scene, n_particles=n, energy=energy, n_cycles=n_cycles, seed=3)
+    assert run.t_in.shape == run.t_out.shape == (n, n_cycles, len(narrowings(scene)))
+    for i, (t, _, *place) in enumerate(initial_states(scene, n, energy, 3).tolist()):
+        start = State(t, *place)
+        for cycle in range(n_cycles):
+            path = fast.trajectory(scene, start, 10_000, start_time(scene) + span * (cycle + 1))
+            its_energy = 0.5 * (path.outcome.vx**2 + path.outcome.vy**2)
+            if its_energy != pytest.approx(run.cycle_energies[i, cycle], rel=1e-6):
+                tally["parted"] += 1
+                break
+            expected = slots_along(scene, start, path, cycle)
+            found = np.stack([run.t_in[i, cycle], run.t_out[i, cycle]])
+            assert found == pytest.approx(expected, rel=1e-6, nan_ok=True), (i, cycle)
+            tally["cycles compared"] += 1
+            tally["slots filled"] += int(np.isfinite(expected[0]).sum())
+    assert tally["cycles compared"] > 60
+    assert tally["slots filled"] > 30
+
+
+def test_a_stay_over_both_narrowings_stands_in_both_slots():
+    """Captured above the peak between them: released after the second. Below it: let out at the peak."""
+    run = fast.simulate(MOUTHS["unequal"], n_particles=400, energy=1e3, seed=1)
+    peak = 0.73  # of nu, at t = pi
+    (first, second), (first_end, second_end) = run.t_in[:, 0].T, run.t_out[:, 0].T
+    both = np.isfinite(first) & (first == second)
+    apart = np.isfinite(first) & np.isfinite(second) & ~both
+    assert min(both.sum(), apart.sum()) > 10
+    assert np.array_equal(first_end[both], second_end[both])
+    assert np.all(first_end[apart] < second[apart])
+    nu = 0.6 + 0.12 * np.cos(first) + 0.25 * np.cos(2 * first)
+    delay = 4 / np.sqrt(2 * 1e3)  # nu is known to O(1/v)
+    assert np.quantile(nu[both], 0.1) > peak - delay
+    assert np.quantile(nu[apart], 0.9) < peak + delay
+
+
+def test_a_narrowing_at_the_cycle_s_end_belongs_to_it():
+    """A stay begun before the end is cut there; in the next cycle it goes on, and counts no more."""
+    span = 2 * np.pi
+    run = fast.simulate(AT_THE_END, n_particles=300, energy=1e3, n_cycles=2, seed=1)
+    for cycle in range(2):
+        captured = run.is_captured()[:, cycle]
+        assert 0.2 < captured.mean() < 0.9
+        assert np.all(run.t_out[captured, cycle, 0] == span * (cycle + 1.0))
+    stays = run.t_in[run.takes_part() & run.is_captured()[:, 1], 1, 0]
+    assert np.mean(stays > span) > 0.99
+
+
+def test_a_narrowing_comes_before_the_end_of_its_cycle():
+    stops = cycle_stops(AT_THE_END, 2, (0.5,))
+    assert stops.columns.tolist() == [0, -1, 1, 2, -1, 3]
+    assert stops.cycles.tolist() == [-1, -1, 0, -1, -1, 1]
+    assert stops.times == pytest.approx(np.array([0.5, 1, 1, 1.5, 2, 2]) * 2 * np.pi)
+
+
+def test_a_mouth_that_stands_still_captures_nobody():
+    run = fast.simulate(load("frozen-mushroom"), n_particles=50, energy=100.0)
+    assert run.t_in.shape == (50, 1, 0)
+    assert run.p_nc().tolist() == [1.0]
+    assert run.takes_part().all()
+
+
+def test_who_is_never_free_takes_no_part():
+    """The island beyond the widest mouth: delta(nu_max) of the cap's share of the volume."""
+    scene = MOUTHS["equal"]
+    run = fast.simulate(scene, n_particles=600, energy=1e3, seed=2)
+    volumes, nu = theory.volumes_at(fp, scene, 0.0), 0.85
+    island = 2 / np.pi * (np.arccos(nu) - nu * np.sqrt(1 - nu**2))
+    share = island * volumes.v_cap / (volumes.v_cap + volumes.v_stem)
+    assert np.mean(~run.takes_part()) == pytest.approx(share, abs=4 * np.sqrt(share / 600))
+    assert np.all(np.ptp(run.t_in[~run.takes_part()], axis=(1, 2)) == 0)
+
+
+def z_score(run, scene):
+    """Return how many standard errors p_nc is from theory, and their size."""
+    expected = float(theory.predict(scene, 6).p_nc)
+    error = math.sqrt(expected * (1 - expected) / run.takes_part().sum())
+    return (float(run.p_nc()[0]) - expected) / error, error
+
+
+N, ENERGY = 1000, {"equal": 1e4, "unequal": 1e4, "plateaus": 1e6}
+# Finite energy moves p_nc by O(1/v): up to 0.012 was seen at 1e4 with 10,000 particles, 0.007 at 1e6.
+BIAS = {"equal": 0.02, "unequal": 0.02, "plateaus": 0.01}
+
+
+@pytest.mark.parametrize("name", MOUTHS)
+def test_p_nc_where_the_mouth_narrows_twice(name):
+    scene = MOUTHS[name]
+    z, error = z_score(fast.simulate(scene, n_particles=N, energy=ENERGY[name], seed=1), scene)
+    assert abs(z) < 4 + BIAS[name] / error
+
+
+WRONG = {
+    "the first narrowing only": lambda found: found[:1],
+    "the last narrowing only": lambda found: found[-1:],
+    "first and last averaged": lambda found: (0.5 * (found[0] + found[-1]),),
+}
+
+
+@pytest.mark.parametrize("mutant", WRONG)
+@pytest.mark.parametrize("name", ["equal", "plateaus"])
+def test_other_stays_give_another_p_nc(name, mutant, monkeypatch):
+    scene = MOUTHS[name]
+    monkeypatch.setattr(starts, "narrowings", lambda scene: WRONG[mutant](narrowings(scene)))
+    z, error = z_score(fast.simulate(scene, n_particles=N, energy=ENERGY[name], seed=1), scene)
+    assert abs(z) > 4 + BIAS[name] / error
+
+
+def test_captures_come_when_theory_says():
+    """Each stay counted once, by its begin, in both falls of nu; and the mean of exp(-s / 2) is right."""
+    scene, n = MOUTHS["plateaus"], 2000
+    run = fast.simulate(scene, n_particles=n, energy=1e6, seed=1)
+    first, second = run.t_in[:, 0].T
+    begins = np.concatenate([first, second[second != first]])
+    edges = np.array([1.0, 1.35, 1.65, 2.0, 5.0, 5.35, 5.65, 6.0])
+    found = np.histogram(begins, edges)[0] / n
+    expected = np.asarray(theory.capture_time_mass(scene, edges))
+    assert expected.sum() == pytest.approx(0.816, abs=1e-3)
+    # A capture waits for the next arc hit, and a chord lasts 1e-3 of these times.
+    assert np.all(np.abs(found - expected) < 4 * np.sqrt(expected / n) + 5e-3)
+    s = np.log(run.energy / run.energy0)
+    error = np.std(np.exp(-s / 2)) / math.sqrt(n)
+    assert abs(np.mean(np.exp(-s / 2)) - float(theory.unbiased_mean(scene))) < 4 * error

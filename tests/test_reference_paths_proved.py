@@ -1,0 +1,275 @@
+"""Certificates of trajectories and undefined outcomes hold in the second arithmetic; forged ones do not."""
+
+from __future__ import annotations
+
+import copy
+import json
+from fractions import Fraction
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from test_reference_certificate import moved
+from truth import IS_DEEP
+
+import reference
+from conformance.generate_path import check_path
+from conformance.generate_proof import Refuted, check
+from conformance.strategies import scenes_and_states
+from reference.certificate import certificate, path_certificate
+from scene import BadInput, BangBang, Cap, Fourier, Mushroom, State, Stem, Undecided, Undefined, load
+
+N_EXAMPLES = 5_000 if IS_DEEP else 60
+
+BOX = Stem(w=1.0, h=1.0)
+STATIC = Mushroom(r=1.0, h=1.0, w=0.5)
+LIFT = Stem(w=1.0, h=BangBang(knots=((0.0, 2.0), (0.5, 1.0), (1.0, 2.0))))
+START = State(-1.0, 0.375, 0.5, 0.0625, 1.0)  # to the arc, then down across y = 0 at x = 0.33 or so
+
+
+def opening(moment):
+    """A mouth that is a quarter wide and opens at a given time within 2^-20, to three quarters."""
+    widths = ((-1.0, 0.25), (moment, 0.25), (moment + 2.0**-20, 0.75), (6.0, 0.75), (7.0, 0.25))
+    return Mushroom(r=1.0, h=1.0, w=BangBang(knots=widths))
+
+
+CROSSING = float(reference.trajectory(Mushroom(r=1.0, h=1.0, w=0.25), START, 2).steps[1].after.t)
+# A shallow hop along a breathing arc that comes back to the same wall: its residual is carried on.
+HOPS = Cap(r=Fourier(mean=1.0, omega=1.0, cos=(0.25,)))
+
+
+def path_claim(scene, state, n, t_end=None, **options):
+    path = reference.trajectory(scene, state, n, t_end, **options)
+    return path, path_certificate(scene, state, t_end, path)
+
+
+def test_every_path_is_proved_again(tally):
+    @settings(max_examples=N_EXAMPLES)
+    @given(scenes_and_states(), st.integers(1, 6), st.sampled_from((None, 10, 25)))
+    def proves(drawn, n, working):
+        scene, state, t_end = drawn
+        try:
+            path, claim = path_claim(scene, state, n, t_end, digits=15, working=working)
+        except BadInput:
+            tally["rejected"] += 1
+            return
+        check_path(claim)
+        tally["paths"] += 1
+        tally["enclosed starts"] += max(len(claim["steps"]) - 1, 0)
+        tally[type(path.outcome).__name__.lower()] += 1
+
+    proves()
+    assert tally["paths"] >= 0.9 * N_EXAMPLES
+    assert tally["enclosed starts"] >= N_EXAMPLES / 4
+
+
+@pytest.mark.parametrize("working", [6, 8, 12, 20, None])
+def test_knots_within_enclosed_times_are_proved_again(working, tally):
+    """The mouth opens just when y = 0 is crossed, give or take what the crossing is enclosed to."""
+    for i in range(-24, 24):
+        moment = CROSSING - 2.0**-21 + i * 2.0**-24
+        path, claim = path_claim(opening(moment), START, 3, digits=15, working=working)
+        check_path(claim)
+        tally["undecided"] += isinstance(path.outcome, Undecided)
+        tally["steps"] += len(path.steps)
+        tally.update(step.wall for step in path.steps[1:2])
+    assert (tally["undecided"] > 0) == (working in (6, 8))
+    assert working == 6 or min(tally["base"], tally["left"]) > 0
+
+
+PATHS = {
+    "moving cap": (load("moving-cap"), State(0.1, 0.2, 0.3, 14.0, 3.0), 5, None),
+    "along the arc": (HOPS, State(4.0, 0.6, 0.58, -1.0, 0.9), 6, None),
+    "to a horizon": (LIFT, State(0.0, 0.25, -0.75, 1.0, -0.5), 9, 3.0),
+    "late": (opening(1.0), State(2.0**40, 0.375, 0.5, 0.0625, 1.0), 3, None),
+}
+
+
+@pytest.mark.parametrize("name", PATHS)
+def test_honest_paths_hold_and_survive_json(name):
+    scene, state, n, t_end = PATHS[name]
+    _, claim = path_claim(scene, state, n, t_end)
+    assert len(claim["steps"]) >= 3
+    assert json.loads(json.dumps(claim)) == claim
+    check_path(claim)
+
+
+def thin_place(claim):
+    claim["steps"][1]["departure"]["x"][1] = claim["steps"][1]["departure"]["x"][0]
+
+
+def shifted_speed(claim):
+    ends = claim["steps"][2]["departure"]["vy"]
+    claim["steps"][2]["departure"]["vy"] = [moved(end, Fraction(1, 2**40)) for end in ends]
+
+
+def later_begin(claim):
+    begin = claim["steps"][1]["departure"]["begin"]
+    begin[0] = begin[1]
+
+
+def another_instant(claim):
+    departure = claim["steps"][1]["departure"]
+    departure["instant"] = moved(departure["instant"], Fraction(1, 2**20))
+
+
+def forgotten_wall(claim):
+    claim["steps"][1]["departure"]["residuals"] = {}
+
+
+def invented_residual(claim):
+    (wall,) = claim["steps"][1]["departure"]["residuals"]
+    claim["steps"][1]["departure"]["residuals"] = {wall: ["1*2^-60", "1*2^-60"]}
+
+
+def left_out_step(claim):
+    del claim["steps"][1]
+
+
+def not_excluded(claim):
+    (wall,) = claim["steps"][1]["departure"]["residuals"]
+    del claim["steps"][1]["excluded"][wall][0]
+
+
+def plain_from_the_wall(claim):
+    (wall,) = claim["steps"][1]["departure"]["residuals"]
+    claim["steps"][1]["excluded"][wall][0][2] = "plain"
+
+
+def elapsed_otherwise(claim):
+    claim["steps"][1]["dt"] = [moved(end, Fraction(1, 2**40)) for end in claim["steps"][1]["dt"]]
+
+
+TAMPERED = [
+    (thin_place, "step 1: the next step's x does not hold"),
+    (shifted_speed, "step 2: the next step's vy does not hold"),
+    (later_begin, "step 1: the next step does not begin"),
+    (another_instant, "step 1: the next step"),
+    (forgotten_wall, "step 1: the next step does not leave"),
+    (invented_residual, "step 1: the residual"),
+    (left_out_step, "step 1: the next step"),
+    (not_excluded, "step 2: .* is not excluded from"),
+    (plain_from_the_wall, "step 2: .* is not excluded, plain"),
+    (elapsed_otherwise, "step 2: dt is not"),
+]
+
+
+@pytest.mark.parametrize(("tamper", "reason"), TAMPERED, ids=lambda value: getattr(value, "__name__", ""))
+def test_a_tampered_path_is_refuted(tamper, reason):
+    scene, state, n, t_end = PATHS["along the arc"]
+    _, claim = path_claim(scene, state, n, t_end)
+    check_path(claim)
+    forged = copy.deepcopy(claim)
+    tamper(forged)
+    with pytest.raises(Refuted, match=reason):
+        check_path(forged)
+
+
+def test_the_piece_that_does_not_hold_is_refuted():
+    """A base hit, claimed where the mouth has opened just before the crossing."""
+    _, closed = path_claim(opening(CROSSING), START, 2)
+    _, opened = path_claim(opening(CROSSING - 2.0**-20), START, 2)
+    assert [claim["steps"][1]["wall"] for claim in (closed, opened)] == ["base", "left"]
+    for claim, other in ((closed, opened), (opened, closed)):
+        forged = copy.deepcopy(claim) | {"scene": other["scene"]}
+        with pytest.raises(Refuted, match="step 2: the mouth is"):
+            check_path(forged)
+
+
+NOWHERE = {
+    "corner": (BOX, State(0.0, 0.5, -0.5, 0.5, -0.5)),
+    "corner above": (BOX, State(0.0, 0.5, -0.5, 0.5, 0.5)),
+    "arc and base": (Cap(r=1.0), State(0.0, 0.5, 0.5, 0.5, -0.5)),
+    "mouth's edge from above": (STATIC, State(0.0, 0.25, 0.25, 1.0, -1.0)),
+    "mouth's edge from below": (STATIC, State(0.0, 0.25, -0.25, 1.0, 1.0)),
+    "along the mouth": (STATIC, State(0.0, 0.0, 0.0, 1.0, 0.0)),
+    "along the base": (STATIC, State(0.0, 0.75, 0.0, 1.0, 0.0, "base")),
+    "along the base, unnamed": (STATIC, State(0.0, 0.75, 0.0, 1.0, 0.0)),
+    "on two walls": (STATIC, State(0.0, 1.0, 0.0, -0.1, -1.0, "arc")),
+    "at the edge": (STATIC, State(0.0, -0.5, 0.0, 1.0, 0.3, "left")),
+    "at the edge, on the base": (STATIC, State(0.0, -0.5, 0.0, 1.0, 0.3, "base")),
+    "along a side": (BOX, State(0.0, 1.0, -0.5, 0.0, 1.0, "right")),
+    "pushed by the floor": (LIFT, State(0.0, 0.0, -2.0, 0.0, 0.0, "floor")),
+}
+
+
+def nowhere(name):
+    scene, state = NOWHERE[name]
+    outcome = reference.next_collision(scene, state, 9.0)
+    assert isinstance(outcome, Undefined)
+    return certificate(scene, state, 9.0, outcome)
+
+
+@pytest.mark.parametrize("name", NOWHERE)
+def test_undefined_outcomes_are_proved_again(name):
+    claim = nowhere(name)
+    assert json.loads(json.dumps(claim)) == claim
+    check(claim)
+
+
+def another_reason(claim):
+    claim["reason"] = "tangency"
+
+
+def one_wall(claim):
+    claim["walls"] = claim["walls"][:1]
+
+
+def nudged_place(claim):
+    claim["state"]["x"] += 2.0**-40
+
+
+def nudged_height(claim):
+    claim["state"]["y"] += 2.0**-40
+
+
+def earlier_horizon(claim):
+    claim["t_end"] = 2.0**-4
+
+
+def residual_taken_out(claim):
+    claim["state"]["wall"] = "right"
+
+
+def no_exclusion(claim):
+    claim["excluded"] = {}
+
+
+@pytest.mark.parametrize(
+    ("name", "tamper"),
+    [(name, another_reason) for name in NOWHERE]
+    + [
+        ("corner", one_wall),
+        ("on two walls", one_wall),
+        ("corner", no_exclusion),
+        ("along the mouth", no_exclusion),
+    ]
+    + [(name, nudged_place) for name in ("corner", "corner above", "arc and base", "mouth's edge from above")]
+    + [(name, nudged_height) for name in ("on two walls", "at the edge", "along the base, unnamed")]
+    + [(name, earlier_horizon) for name in ("corner", "mouth's edge from below", "along the mouth")],
+)
+def test_a_tampered_undefined_outcome_is_refuted(name, tamper):
+    claim = nowhere(name)
+    check(claim)
+    tamper(claim)
+    with pytest.raises(Refuted):
+        check(claim)
+
+
+def test_a_corner_less_a_residual_is_none():
+    """Two functions vanish together at s = 3/2, but one of them is 2^-300 too high: its residual."""
+    scene = Stem(w=BangBang(knots=((0.0, 1.0), (1.0, 2.0), (2.0, 1.0))), h=4.0, slope=-(2.0**-300))
+    state = State(0.25, -1.125, -1.5, 0.0, 1.0, "left")
+    outcome = reference.next_collision(scene, state, 3.0)
+    check(certificate(scene, state, 3.0, outcome))
+    forged = certificate(scene, State(0.25, -1.125, -1.5, 0.0, 1.0, "left"), 3.0, outcome)
+    corner = {
+        "instant": "3/2",
+        "walls": ["base", "left"],
+        "roots": {"left": forged["root"]},
+        "reason": "corner",
+    }
+    with pytest.raises(Refuted, match="left is not shown to be met exactly then"):
+        check(forged | corner | {"outcome": "undefined"})
+    with pytest.raises(BadInput, match="must be undefined"):
+        certificate(scene, state, 3.0, Undefined("corner"))

@@ -55,8 +55,7 @@ class _Undefined:
         """Prove that the state lies on two walls, at the mouth's edge, or slides along one."""
         if not self.walls or not all(map(self._is_on, self.walls)):
             raise Refuted("the state is not shown to lie on these walls")
-        is_level = self.flight.y == 0 or self.flight.wall == "base"
-        is_edge = self._is_mushroom() and is_level and {"left", "right"} & set(self.walls)
+        is_edge = self._is_mushroom() and self.flight.y == 0 and {"left", "right"} & set(self.walls)
         if self.reason in ("corner", "mouth-edge"):
             if len(self.walls) < 2 and not is_edge:
                 raise Refuted("the state lies on one wall only")
@@ -142,9 +141,6 @@ class _Undefined:
         f = self.flight
         if wall == f.wall:
             return True
-        if f.wall == "base" and wall in ("left", "right"):
-            # On the base y is 0 by definition: the side's upper end.
-            return bool(f.width(fmpq(0), fmpq(0))[0] == (f.x if wall == "right" else -f.x))
         if wall == "base" and self._is_mushroom() and f.wall is None:
             # The base is beside the mouth only.
             return bool(f.y == 0) and any(

@@ -323,6 +323,14 @@ def scenes_and_states(draw: st.DrawFn, table: str | None = None) -> tuple[Scene,
     return scene, state, t_end
 
 
+def adversarial(family: str | None = None) -> st.SearchStrategy[Any]:
+    """Draw a `conformance.attacks.Attack` of a family by its name, or of any; needs python-flint."""
+    from conformance.attacks import FAMILIES
+
+    names = st.sampled_from([family] if family else list(FAMILIES))
+    return st.builds(lambda name, index: FAMILIES[name].attack(0, index), names, st.integers(0, 2**32 - 1))
+
+
 @st.composite
 def _times(draw: st.DrawFn, scene: Scene) -> float:
     shared = period(scene)

@@ -65,11 +65,9 @@ def judge_start(scene: Scene, state: State, arithmetic: Arithmetic) -> Start:
         return Start({}, undefined=Undefined("sliding"), walls=("base",))
     if state.wall is not None:
         on.append(state.wall)
-    # A place on two walls is undefined whichever way it moves; sides and base end at the mouth's edge.
+    # A place on two walls is undefined whichever way it moves; a side ends at the mouth's edge.
     if isinstance(scene, Mushroom) and state.y == 0 and ("left" in on or "right" in on):
         return Start({}, undefined=Undefined("mouth-edge"), walls=tuple(on))
-    if state.wall == "base" and (edge := _edge_met(scene, state, motion)) is not None:
-        return Start({}, undefined=Undefined("mouth-edge"), walls=("base", edge))
     if len(on) > 1:
         return Start({}, undefined=Undefined("corner"), walls=tuple(on))
     for wall in on:
@@ -138,19 +136,6 @@ def _is_beside_mouth(scene: Scene, state: State, motion: Motion) -> bool:
     if not isinstance(scene, Mushroom) or state.wall is not None or state.y != 0:
         return False
     return any(sign(motion.wall(wall, motion.arithmetic.zero).f) < 0 for wall in ("left", "right"))
-
-
-def _edge_met(scene: Scene, state: State, motion: Motion) -> Wall | None:
-    """Return the side at whose upper end, exactly, a state on the base lies; None elsewhere."""
-    if not isinstance(scene, Mushroom):
-        return None
-    gap = motion.width(motion.arithmetic.zero).f - motion.arithmetic.number(abs(state.x))
-    if sign(gap) != 0:
-        return None
-    width = rational.width_jet(scene, Fraction(state.t))
-    if width is None or width[0] != abs(Fraction(state.x)):
-        raise Undecidable("the state may be at the mouth's edge")
-    return "right" if state.x > 0 else "left"
 
 
 def _departure(scene: Scene, state: State, wall: Wall, motion: Motion) -> Undefined | bool:

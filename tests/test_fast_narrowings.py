@@ -165,6 +165,24 @@ def test_named_mouths(name):
     assert narrowings(scene) == pytest.approx(expected, rel=1e-12, abs=0)
 
 
+def test_scales_and_short_legs():
+    """At any scale, beside legs of 2^-20 to 2^-60 of the period: as many as the values of the knots say."""
+    random = np.random.default_rng(77)
+    for _ in range(60):
+        length, span = (2.0 ** int(n) for n in random.integers(-300, 300, size=2))
+        n, levels = int(random.integers(2, 7)), random.uniform(0.1, 0.7, 3) * length
+        times = np.sort(random.random(n - 1))
+        times[0] = 2.0 ** -int(random.integers(20, 60)) if random.random() < 0.5 else times[0]
+        times[-1] = 1.0 - 2.0 ** -int(random.integers(20, 53)) if random.random() < 0.3 else times[-1]
+        times = [0.0, *sorted(set(times.tolist()))]
+        values = [float(levels[random.integers(3)]) for _ in times]
+        pairs = [(t * span, v) for t, v in zip(times, values, strict=True)]
+        scene = Mushroom(r=length, h=length, w=knots(*pairs, (span, values[0])))
+        steps = [v for before, v in pairwise([values[-1], *values]) if v != before]
+        neighbours = zip([*steps[-1:], *steps], steps, [*steps[1:], *steps[:1]], strict=False)
+        assert len(narrowings(scene)) == sum(before > v < after for before, v, after in neighbours)
+
+
 def test_narrowings_are_exact_to_rounding():
     """Where nu = 0.5 + a cos t + b cos 2t, |a| < 4 b, it is least at cos t = -a / 4b."""
     random = np.random.default_rng(5)

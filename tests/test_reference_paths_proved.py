@@ -187,7 +187,6 @@ NOWHERE = {
     "along the base, unnamed": (STATIC, State(0.0, 0.75, 0.0, 1.0, 0.0)),
     "on two walls": (STATIC, State(0.0, 1.0, 0.0, -0.1, -1.0, "arc")),
     "at the edge": (STATIC, State(0.0, -0.5, 0.0, 1.0, 0.3, "left")),
-    "at the edge, on the base": (STATIC, State(0.0, -0.5, 0.0, 1.0, 0.3, "base")),
     "along a side": (BOX, State(0.0, 1.0, -0.5, 0.0, 1.0, "right")),
     "pushed by the floor": (LIFT, State(0.0, 0.0, -2.0, 0.0, 0.0, "floor")),
 }

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from typing import Any, NamedTuple, TypeVar
 
 from conformance.generate_draws import Draw, wire_form
-from scene import BadInput, Cap, Law, Mushroom, Scene, State, Stem
+from scene import BadInput, Cap, Mushroom, Scene, State, Stem
 
 Made = TypeVar("Made", Cap, Stem, Mushroom)
 
@@ -52,10 +52,10 @@ class Family(NamedTuple):
         return self.draw(Draw(f"{self.name}/{seed}/{index}"))
 
 
-def built(table: Callable[..., Made], found: dict[str, Law]) -> Made | None:
-    """Return a table with these laws, or None where it would not be a valid scene."""
+def built(make: Callable[[], Made]) -> Made | None:
+    """Return what is made, or None where a law or the scene would not be valid."""
     try:
-        return table(**found)
+        return make()
     except BadInput:
         return None
 

@@ -182,13 +182,12 @@ def knots_anywhere(draw: Draw) -> Attack:
 
     scene = None
     while scene is None:
-        found = {
-            "r": moved(0.6, 1.5),
-            "w": moved(0.05, 0.5),
-            "h": moved(0.3, 2.0),
-            "slope": moved(-0.2, 0.02),
-        }
-        scene = built(Mushroom, found)
+        # The distance from the first knot to the last may round: then it is no period.
+        scene = built(
+            lambda: Mushroom(
+                r=moved(0.6, 1.5), w=moved(0.05, 0.5), h=moved(0.3, 2.0), slope=moved(-0.2, 0.02)
+            )
+        )
     vx, vy = draw.direction()
     speed = draw.power(-2, 5)
     t = draw.pick((first, first + 0.25, first - 3 * period, 100 * draw.part(), -100 * draw.part()))

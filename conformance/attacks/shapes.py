@@ -70,7 +70,8 @@ def narrow_base(draw: Draw) -> Attack:
     r = draw.pick(radii)
     if draw.pick((True, False, False)):
         nu = Fourier(mean=0.75, omega=2.0, cos=(close - 0.75,))
-    made = built(Mushroom, {"r": r, "h": draw.pick((0.5, 2.0)), "nu": nu, "slope": draw.pick((0.0, -0.25))})
+    h, slope = draw.pick((0.5, 2.0)), draw.pick((0.0, -0.25))
+    made = built(lambda: Mushroom(r=r, h=h, nu=nu, slope=slope))
     if made is None:
         return narrow_base(draw)
     if draw.pick((True, False)):
@@ -89,11 +90,14 @@ def _harmonics(draw: Draw, n: int, size: float) -> tuple[float, ...]:
 
 
 def many_harmonics(draw: Draw) -> Attack:
-    """Laws of 4 to 16 harmonics, and a side that leans and turns, at times of either sign."""
+    """Laws of 4 to 16 harmonics, and a side that leans and turns, at times of either sign.
+
+    Many harmonics only where one law decides alone: scenes are proved valid by polynomials of their degrees.
+    """
     omega = draw.pick((0.5, 1.0, 3.0))
 
-    def law(mean: float, swing: float) -> Law:
-        n = draw.pick((4, 8, 16))
+    def law(mean: float, swing: float, harmonics: tuple[int, ...] = (4, 5)) -> Law:
+        n = draw.pick(harmonics)
         return Fourier(
             mean=mean,
             omega=omega,
@@ -104,11 +108,11 @@ def many_harmonics(draw: Draw) -> Attack:
     table = draw.pick(("cap", "stem", "mushroom"))
     made: Scene
     if table == "cap":
-        made = Cap(r=law(1.0, 0.5))
+        made = Cap(r=law(1.0, 0.5, (4, 8, 12, 16)))
     elif table == "stem":
-        made = Stem(w=law(0.6, 0.25), h=law(1.0, 0.4), slope=law(0.0, 0.2))
+        made = Stem(w=law(0.6, 0.25), h=law(1.0, 0.4), slope=law(0.0, 0.2, (1, 2)))
     else:
-        made = Mushroom(r=law(1.2, 0.4), w=law(0.5, 0.2), h=law(1.0, 0.4), slope=law(-0.05, 0.2))
+        made = Mushroom(r=law(1.2, 0.4), w=law(0.5, 0.2), h=law(1.0, 0.4), slope=law(-0.05, 0.2, (1, 2)))
     at = {"speed": draw.power(-4, 6) * draw.between(1.0, 2.0), "t": draw.between(-40.0, 40.0)}
     return Attack(made, *state(draw, made, at))
 

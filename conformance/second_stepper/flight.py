@@ -18,7 +18,7 @@ from scene import Cap, Mushroom, Scene, State, Stem, Wall
 from scene.tables import laws, width_factors
 
 SIDES: tuple[Wall, ...] = ("left", "right", "floor")
-MAX_LOOKS = 40_000  # evaluations of a wall, in one step at one precision: a few seconds
+MAX_LOOKS = 20_000  # evaluations of a wall in one flight, at one precision: a second or two
 
 
 class Table:

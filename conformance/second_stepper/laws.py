@@ -188,12 +188,7 @@ class Legs:
         if turns is None:
             return self.anywhere
         local -= arb(self.period * turns)
-        share = local * self.unit
-        middle, reach = float(share.mid()), float(share.rad()) + PREFILTER
-        low = max(bisect_left(self.starts, middle - reach) - 1, 0)
-        high = bisect_right(self.starts, middle + reach)
-        # A comparison of balls is true only when it is certain, so what may be touched stays.
-        touched = [p for p in self.pieces[low:high] if not (p.start > local or p.end < local)]
+        touched = self.touched(local)
         if not touched:  # beyond the pieces listed: the ball's lower end rounds far below 0
             return self.anywhere
         if len(touched) == 1:
@@ -203,6 +198,15 @@ class Legs:
         for other in jets[1:]:
             value, rate, bend = value.union(other[0]), rate.union(other[1]), bend.union(other[2])
         return value, rate, bend
+
+    def touched(self, local: Ball) -> list[Piece]:
+        """Return the pieces that hold at some time of a ball of local time."""
+        share = local * self.unit
+        middle, reach = float(share.mid()), float(share.rad()) + PREFILTER
+        low = max(bisect_left(self.starts, middle - reach) - 1, 0)
+        high = bisect_right(self.starts, middle + reach)
+        # A comparison of balls is true only when it is certain, so what may be touched stays.
+        return [piece for piece in self.pieces[low:high] if not (piece.start > local or piece.end < local)]
 
     def exact_value(self, time: Rational) -> Rational | None:
         """See `Timed`."""

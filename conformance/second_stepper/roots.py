@@ -104,8 +104,11 @@ def _judged(flight: Flight, wall: Wall, a: Rational, b: Rational) -> str:
     middle, reach = (a + b) / 2, arb((b - a) / 2) * UNIT
     value, rate, _ = flight.jet(wall, arb(middle))
     square = arb((b - a) ** 2 / 8) * (arb(1, 1) / 2)  # reach^2 / 2, never below 0
-    if value + rate * reach + bends * square > 0:
+    spread = rate * reach + bends * square
+    if value + spread > 0:
         return "positive"
+    if value.contains(0) and value.rad() > spread.abs_upper():
+        raise Open(f"f of {wall} is lost in rounding where f' vanishes too")
     if not (rates < 0 or rate + bends * reach < 0):
         is_rising = rates > 0 or rate + bends * reach > 0
         return "positive" if is_rising else "open"

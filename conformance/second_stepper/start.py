@@ -2,7 +2,8 @@
 
 A state that names a wall is on it by definition, if its rounding allows that. Its place may lie exactly on a
 second wall of its part of the table: that is a corner, whichever way it moves (a mushroom's side at y = 0
-meets the mouth's edge). A state that names none leaves a wall that passes exactly through it.
+meets the mouth's edge; the base belongs to the cap, and at its inner end the cap has no other wall). A state
+that names none leaves a wall that passes exactly through it.
 """
 
 from __future__ import annotations
@@ -53,8 +54,6 @@ def _misplaced(table: Table, state: State) -> str:
 
 
 def _near(table: Table, state: State, *, in_cap: bool) -> tuple[Wall, ...]:
-    if table.is_mushroom and state.wall == "base":
-        return ("base", "arc", "left", "right")
     if in_cap:
         return ("arc", "base")
     return ("base", *SIDES)
@@ -72,10 +71,10 @@ def _in_mouth(flight: Flight, state: State) -> Start | Answer:
     side = _sign(flight, "arc")
     if side < 0:
         return Answer("rejected", reason="the state is beyond wall arc")
-    if side == 0:
-        return Answer("undefined", reason="corner")
-    if state.vy <= 0:
-        return Answer("rejected" if state.vy < 0 else "undefined", reason="sliding")
+    if state.vy < 0:
+        return Answer("rejected", reason="the particle starts on wall base and moves into it")
+    if side == 0 or state.vy == 0:
+        return Answer("undefined", reason="corner" if side == 0 else "sliding")
     flight.leave("base")
     return Start(in_cap=True)
 
@@ -91,8 +90,6 @@ def _leaves(flight: Flight, state: State, near: tuple[Wall, ...]) -> Answer | No
                 on.append(wall)
             continue
         side = _sign(flight, wall)
-        if side < 0 and flight.table.is_mushroom and state.wall == "base" and wall in ("left", "right"):
-            continue  # beyond the mouth's edge the base is where it should be
         if side < 0:
             return Answer("rejected", reason=f"the state is beyond wall {wall}")
         if side == 0:

@@ -144,6 +144,40 @@ def test_threads_take_turns_at_mpmaths_shared_pi(monkeypatch):
     assert seen == [True]
 
 
+def test_threads_take_turns_when_pi_itself_is_read(monkeypatch):
+    module = reference.arithmetic
+    honest, seen = module.libelefun.mpf_pi, []
+
+    def watched(bits, rounding):
+        seen.append(module._CONSTANTS.locked())
+        return honest(bits, rounding)
+
+    monkeypatch.setattr(module.libelefun, "mpf_pi", watched)
+    arithmetic = Arithmetic(10)
+    arithmetic.turning(1.0, None, Fraction(100))
+    arithmetic.turning(None, 3.0, Fraction(100))
+    assert len(seen) == 4
+    assert all(seen)
+    source = "".join(path.read_text("utf-8") for path in FOLDER.glob("*.py"))
+    assert "context.pi" not in source
+    assert "ctx.pi" not in source
+
+
+@given(st.floats(-1e300, 1e300), st.floats(0.125, 1e3), st.booleans())
+def test_phases_lose_no_digit(t, number, is_period):
+    """Less whole turns, the phase has the sine of omega t, however large t is."""
+    arithmetic = Arithmetic(30)
+    law = (None, number) if is_period else (number, None)
+    omega, phase = arithmetic.turning(*law, Fraction(t))
+    assert float(arithmetic.enclosure(phase).extent()) < 1e-28
+    ctx = mpmath.MPContext()
+    ctx.prec = 2300
+    exact_omega = 2 * ctx.pi / ctx.mpf(number) if is_period else ctx.mpf(number)
+    assert omega.a <= exact_omega <= omega.b
+    _, sin = arithmetic.cos_sin(phase)
+    assert sin.a <= ctx.sin(exact_omega * ctx.mpf(t)) <= sin.b
+
+
 def test_an_undecided_sign_is_zero():
     arithmetic = Arithmetic(10)
     assert sign(arithmetic.context.mpf([-1, 1])) == 0

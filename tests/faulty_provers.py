@@ -237,3 +237,37 @@ def resting(attack: Attack) -> list[Claim]:
     """Take a particle at rest, or nearly, for never met."""
     is_at_rest = abs(attack.state.vx) + abs(attack.state.vy) < 2.0**-20
     return [Claim("horizon")] if is_at_rest else claims(truths(attack))
+
+
+def still_wall(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A bounce forgets that the wall moves."""
+
+    def still(at: flight.Flight, wall: Any, s: Any) -> Any:
+        nx, ny = at.gradient(wall, s)
+        c = at.course
+        push = 2 * (nx * c.vx + ny * c.vy) / (nx * nx + ny * ny)
+        return s, *at.place(s), c.vx - push * nx, c.vy - push * ny
+
+    monkeypatch.setattr(stepper, "bounced", still)
+
+
+def last_wall(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of several walls the one looked at last is answered."""
+    first = Search._first
+    monkeypatch.setattr(
+        Search,
+        "_first",
+        lambda self, walls, begin, limit: next(
+            filter(None, (first(self, (wall,), begin, limit) for wall in reversed(walls))), None
+        ),
+    )
+
+
+def lazy_taylor(monkeypatch: pytest.MonkeyPatch) -> None:
+    """An interval is passed when f > 0 at its middle."""
+    judged = roots._judged
+
+    def lazy(at: flight.Flight, wall: Any, a: Any, b: Any) -> str:
+        return "positive" if at.jet(wall, arb((a + b) / 2))[0] > 0 else judged(at, wall, a, b)
+
+    monkeypatch.setattr(roots, "_judged", lazy)

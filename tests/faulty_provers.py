@@ -21,6 +21,7 @@ from conformance.attacks.search import as_truth, truths
 from conformance.second_stepper import Answer, flight, laws, next_collision, roots, start, stepper
 from conformance.second_stepper.stepper import Met, Search
 from scene import Collision, Outcome, Scene, State
+from scene.states import ON_WALL
 from scene.tables import period
 
 Patch = Callable[[pytest.MonkeyPatch], None]
@@ -111,6 +112,17 @@ def _whole_value(self: flight.Flight, wall: Any, s: Any) -> Any:
     q = self.state
     x, y = (laws.exact(place) + laws.exact(speed) * s for place, speed in ((q.x, q.vx), (q.y, q.vy)))
     return self._exact_sum(wall, x, y, laws.exact(q.t) + s)
+
+
+def size_of_all_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A state is on the wall it names by the largest size of all time."""
+
+    def is_near(at: flight.Flight, state: State, wall: Any) -> bool:
+        largest = max(law.range()[1].abs_upper() for law in at.table.laws.values())
+        gap = at.jet(wall, arb(0))[0]
+        return bool(abs(gap) < largest * (2 * largest if wall == "arc" else 1) * ON_WALL)
+
+    monkeypatch.setattr(start, "_is_near", is_near)
 
 
 def corner_unseen(monkeypatch: pytest.MonkeyPatch) -> None:

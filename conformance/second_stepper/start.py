@@ -133,10 +133,10 @@ def _is_near(flight: Flight, state: State, wall: Wall) -> bool:
     gap, time = flight.jet(wall, arb(0))[0], arb(exact(state.t))
     if wall == "floor":
         size = flight.table.laws["h"].jet(time)[0]
-    elif "r" in flight.table.laws:
-        size = flight.table.laws["r"].jet(time)[0]
-    else:
+    elif wall in ("left", "right") or flight.table.is_stem:
         size = flight.width(time)[0]
+    else:
+        size = flight.table.laws["r"].jet(time)[0]
     bound = size * arb(ON_WALL) * (2 * size if wall == "arc" else 1)
     if gap < bound and -gap < bound:
         return True

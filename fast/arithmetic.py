@@ -94,10 +94,10 @@ def dot(a, b, c, d):
 
 
 @njit(error_model="numpy")
-def reduced(omega, k, t_hi, t_lo):
-    """Return k omega (t_hi + t_lo) as quarter turns n and a rest r + tail, |r| <= pi/4."""
+def reduced(omega, omega_low, k, t_hi, t_lo):
+    """Return k (omega + omega_low) (t_hi + t_lo) as quarter turns n and a rest r + tail, |r| <= pi/4."""
     p, e = two_product(omega, t_hi)
-    e += omega * t_lo
+    e += omega * t_lo + omega_low * t_hi
     q, f = two_product(k, p)
     f += k * e
     n = np.floor(q * TWO_OVER_PI + 0.5)
@@ -173,9 +173,9 @@ def turned(n, sine, cosine):
 
 
 @njit(error_model="numpy")
-def sine_cosine(omega, k, t_hi, t_lo):
-    """Return sin and cos of k omega (t_hi + t_lo), each as two floats, and whether it is in reach."""
-    n, r, tail = reduced(omega, k, t_hi, t_lo)
+def sine_cosine(omega, k, t_hi, t_lo, omega_low=0.0):
+    """Return sin and cos of k (omega + omega_low) (t_hi + t_lo), each as two floats, and whether in reach."""
+    n, r, tail = reduced(omega, omega_low, k, t_hi, t_lo)
     sine, sine_low, cosine, cosine_low = short_sine_cosine(r, tail)
     s, c = turned(n, sine, cosine)
     s_low, c_low = turned(n, sine_low, cosine_low)

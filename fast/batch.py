@@ -13,11 +13,12 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from fast import codes, ensemble, entries, follow, lanes, motion
+from fast import codes, entries, follow, lanes, motion, walls
 from fast.compiled import FloatArray, compile_scene
-from fast.fine import FineTrajectory, as_trajectory
-from fast.starts import only_stop
-from fast.stepper import WALL_NAMES, as_arrays, trouble
+from fast.fine import FineTrajectory, as_pairs, as_trajectory
+from fast.flow import follow_to
+from fast.stepper import WALL_NAMES, as_arrays, fitted_start, trouble
+from fast.units import fit
 from scene import Collision, Horizon, Outcome, Scene, State
 
 PLACE = (lanes.X, lanes.Y, lanes.VX, lanes.VY)
@@ -35,17 +36,18 @@ def careful_steps(scene: Scene, states: Sequence[State], n_times: int = 1) -> tu
     Returns:
         The outcomes, and the seconds that n_times N steps took.
     """
-    starts, walls = as_arrays(states)
-    out, met = np.empty_like(starts), np.empty_like(walls)
-    compiled = compile_scene(scene)
-    entries.each_step(*compiled, starts[:0], walls[:0], out, met, 0)  # compiles, or loads from the cache
+    starts = [fitted_start(scene, state) for state in states]
+    rows, walls = as_arrays(starts)
+    out, met = np.empty_like(rows), np.empty_like(walls)
+    compiled = fit(scene).compiled
+    entries.each_step(*compiled, rows[:0], walls[:0], out, met, 0)  # compiles, or loads from the cache
     begin = time.perf_counter()
-    entries.each_step(*compiled, starts, walls, out, met, n_times)
+    entries.each_step(*compiled, rows, walls, out, met, n_times)
     seconds = time.perf_counter() - begin
     outcomes: list[Outcome] = []
-    for state, code, row in zip(states, met.tolist(), out.tolist(), strict=True):
+    for state, start, code, row in zip(states, starts, met.tolist(), out, strict=True):
         if code in WALL_NAMES:
-            outcomes.append(Collision(WALL_NAMES[code], *row))
+            outcomes.append(Collision(WALL_NAMES[code], *start.units.steps(row).tolist()))
         elif code == codes.HORIZON:  # it moves for ever
             outcomes.append(Horizon(np.inf, state.x, state.y, state.vx, state.vy))
         else:
@@ -55,10 +57,9 @@ def careful_steps(scene: Scene, states: Sequence[State], n_times: int = 1) -> tu
 
 def fine_steps(scene: Scene, states: Sequence[State], n_times: int = 1) -> tuple[list[FineTrajectory], float]:
     """Take a fine step from each of N states, a call of compiled code for each; as `careful_steps`."""
-    compiled = compile_scene(scene)
-    rows, walls = as_arrays(states)
-    pairs = np.zeros((len(states), 5, 2))
-    pairs[:, :, 0] = np.delete(rows, 1, axis=1)  # without the time's low part
+    starts = [fitted_start(scene, state) for state in states]
+    compiled, pairs = fit(scene).compiled, [as_pairs(start) for start in starts]
+    _, walls = as_arrays(starts)
     out, met = np.empty((len(states), 1, 6, 2)), np.empty((len(states), 1), dtype=np.int64)
     questions = list(zip(pairs, walls.tolist(), out, met, strict=True))
     ends: list[tuple[int, int]] = []
@@ -68,19 +69,18 @@ def fine_steps(scene: Scene, states: Sequence[State], n_times: int = 1) -> tuple
     for _ in range(n_times):
         ends = [entries.fine(*compiled, p, wall, np.inf, steps, hit) for p, wall, steps, hit in questions]
     seconds = time.perf_counter() - begin
-    paths = zip(states, ends, out, met, strict=True)
-    return [as_trajectory(state, *end, steps, hit) for state, end, steps, hit in paths], seconds
+    paths = zip(states, starts, ends, out, met, strict=True)
+    return [as_trajectory(s, start.units, *end, steps, hit) for s, start, end, steps, hit in paths], seconds
 
 
 def flights(scene: Scene, states: Sequence[State], t_end: float) -> tuple[int, float]:
     """Follow states to t_end in one thread, as ensembles are: number of collisions, seconds."""
-    starts, walls = as_arrays(states)
-    done = ensemble.follow(compile_scene(scene), starts, walls, only_stop(t_end), 1)
+    done = follow_to(scene, states, t_end, 1)
     return int(done.counts.sum()), done.seconds
 
 
 class LaneRound:
-    """One pool of lanes, filled with given states.
+    """One pool of lanes, filled with given states; scene and states as they are, in whatever units.
 
     Attributes:
         compiled: the scene's numbers.
@@ -91,12 +91,10 @@ class LaneRound:
         self.compiled = compile_scene(scene)
         self.table, self.is_relative, self.laws, self.bounds = self.compiled
         self.is_disk = bool(self.table == codes.CAP)
-        bounds = self.bounds
-        self.bend = (1.0 + 2.0**-40) * (bounds[0, 1] * bounds[0, 3] + bounds[0, 2] ** 2)
-        self.k_w = max(bounds[1, 3], bounds[2, 3])
+        self.limits = lanes.limits_of(self.laws, self.bounds)
         self.omega = self.laws[codes.PHASES, 0]
         self.anchors = np.zeros(motion.ANCHORS_SHAPE)
-        self.pool = np.zeros(lanes.N_ROWS * lanes.LANES)
+        self.pool, self.spare = np.zeros((2, lanes.N_ROWS * lanes.LANES))
 
     def fill(self, lane: int, p: FloatArray, wall: int, age: float = 0.0) -> None:
         """Put a state [t, its low part, x, y, vx, vy] into a lane, its laws known from `age` before it."""
@@ -111,19 +109,31 @@ class LaneRound:
             return
         since = (a[lanes.T + i] - a[lanes.REF + i]) + (a[lanes.T_LOW + i] - a[lanes.REF_LOW + i])
         rows = (lanes.R0, lanes.W0, lanes.H0)
-        follow.set_laws(a, i, *rows, since, self.omega, self.is_relative)
+        follow.set_laws(a, i, *rows, since, self.laws, self.is_relative)
         spin = p[2] * p[5] - p[3] * p[4]
         a[lanes.SPIN + i] = spin
+
+    def is_met(self, p: FloatArray, wall: int) -> bool:
+        """Tell whether a state lies, but for rounding, on the wall that it leaves, as after a step."""
+        if wall == codes.NO_WALL:
+            return False
+        if wall == codes.BASE:
+            return bool(p[3] == 0.0)
+        anchors = np.zeros(motion.ANCHORS_SHAPE)
+        motion.set_anchors(self.laws, anchors, p[0], p[1])
+        f, error = walls.wall_residual(wall, p[2], p[3], self.laws, anchors, self.bounds, self.is_relative)
+        return bool(abs(f) <= error)
 
     def fly(self, n: int) -> tuple[npt.NDArray[np.bool_], FloatArray, FloatArray]:
         """Take a step in n lanes: which are shown right, walls met, and rows of dt, x, y, vx, vy."""
         a, count, m = self.pool, np.int64(n), self.laws[codes.M, 1]
         is_stem = self.table == codes.STEM
-        lanes.aim(a, count, is_stem, m, self.bend, self.k_w)
-        lanes.fly(a, count, is_stem, self.is_relative, self.omega, m, self.k_w)
+        lanes.aim(a, count, is_stem, m, self.limits)
+        follow.next_flight(a, count, is_stem, self.is_relative, self.omega, m, self.limits)
+        self.correct_more(follow.GENERAL, n)
         right = self.row(lanes.OK, n) == lanes.RIGHT_ONE
-        # A hit beyond the reference's reach is not taken as it stands.
-        right &= self.row(lanes.NEXT_T, n) < self.row(lanes.END, n)
+        # A hit beyond a knot is left to the careful step.
+        right &= self.row(lanes.NEXT_T, n) < self.row(lanes.KNOT, n)
         hits, dt = self.row(lanes.HIT, n).copy(), self.row(lanes.S, n).copy()
         lanes.bounce(a, count, m, self.table == codes.MUSHROOM)
         return right, hits, np.column_stack([dt, *(self.row(r, n) for r in PLACE)])
@@ -131,12 +141,18 @@ class LaneRound:
     def skip(self, n: int) -> tuple[npt.NDArray[np.bool_], FloatArray, FloatArray]:
         """Take captured chords in n lanes, likewise; every hit is on the arc."""
         a, count = self.pool, np.int64(n)
-        lanes.chord(a, count, OFF, self.is_disk, self.is_relative, self.omega, self.bend, self.k_w)
+        follow.next_chord(a, count, OFF, self.is_disk, self.is_relative, self.omega, self.limits)
+        self.correct_more(follow.DISK, n)
         right = self.row(lanes.OK, n) == lanes.RIGHT_ONE
-        right &= self.row(lanes.NEXT_T, n) < self.row(lanes.END, n)
+        right &= self.row(lanes.NEXT_T, n) < self.row(lanes.KNOT, n)
         dt = self.row(lanes.S, n).copy()
         lanes.rebound(a, count)
         return right, np.zeros(n), np.column_stack([dt, *(self.row(r, n) for r in PLACE)])
+
+    def correct_more(self, pool: np.integer[Any], n: int) -> None:
+        """Correct coarse steps again, as `fast.follow` does."""
+        for i in range(n):
+            follow.correct_more(pool, tuple(self.compiled), self.pool, np.int64(i), self.spare, self.limits)
 
     def row(self, start: np.integer[Any], n: int) -> FloatArray:
         """Return n lanes of a row of the pool."""
@@ -151,22 +167,24 @@ def lane_steps(scene: Scene, states: Sequence[State]) -> list[Outcome | None]:
         states: starts that `next_collision` takes.
 
     Returns:
-        Collisions; None where the lanes leave the step to the careful one, and for a start on the base
-        of a cap or a flight to it: there the lanes go unfolded.
+        Collisions; None where the lanes leave the step to the careful one, for a start on the base of a cap
+        or a flight to it (there the lanes go unfolded), and for a start that is on no wall, or on its wall
+        by decree only: lanes know a particle by the wall that it has just met, and where that wall is.
     """
-    pool = LaneRound(scene)
+    pool = LaneRound(fit(scene).scene)
     found: list[Outcome | None] = []
     for first in range(0, len(states), lanes.LANES):
         part = states[first : first + lanes.LANES]
-        for i, (p, wall) in enumerate(zip(*as_arrays(part), strict=True)):
+        starts, are_met = [fitted_start(scene, state) for state in part], []
+        for i, (p, wall) in enumerate(zip(*as_arrays(starts), strict=True)):
             pool.fill(i, p, wall)
+            are_met.append(pool.is_met(p, wall))
         rows = (pool.skip if pool.is_disk else pool.fly)(len(part))
-        for state, is_right, hit, (dt, x, y, vx, vy) in zip(
-            part, *(row.tolist() for row in rows), strict=True
-        ):
-            is_folded = pool.is_disk and (y < 0.0 or state.wall == "base")
-            is_taken = is_right and not is_folded
-            found.append(
-                Collision(WALL_NAMES[int(hit)], dt, state.t + dt, x, y, vx, vy) if is_taken else None
-            )
+        for state, start, is_met, is_right, hit, row in zip(part, starts, are_met, *rows, strict=True):
+            is_folded = pool.is_disk and (row[2] < 0.0 or state.wall == "base")
+            if not is_right or is_folded or not is_met:
+                found.append(None)
+                continue
+            numbers = start.units.steps(np.array([row[0], start.state.t + row[0], *row[1:]]))
+            found.append(Collision(WALL_NAMES[int(hit)], *numbers.tolist()))
     return found

@@ -21,7 +21,7 @@ from fast.arithmetic import SAFETY, fma, two_product, two_sum
 
 from fast.codes import (  # isort: skip
     APPROACHING, ARC, AT_END, BASE, CAP, CORNER, EDGE, FAR_TIME, FLOOR, H, HORIZON, LEFT, M, MOUTH_EDGE,
-    MUSHROOM, NO_WALL, OUTSIDE, R, RIGHT, SLIDING, START, STEM, TANGENT, TOO_MANY, W,
+    MUSHROOM, NO_WALL, ON_CORNER, OUTSIDE, R, RIGHT, SLIDING, START, STEM, TANGENT, TOO_MANY, W,
 )  # fmt: skip
 from fast.motion import LACK, LOW, PHASE, set_anchors
 
@@ -182,7 +182,13 @@ def side_of_wall(candidate, wall, s, x, y, vx, vy, laws, anchors, bounds, is_rel
 
 @njit(error_model="numpy")
 def first_event(table, is_relative, wall, x, y, vx, vy, limit, laws, anchors, bounds):
-    """Find the next collision or say why not; (code, s). The anchors hold the laws at the state."""
+    """Find the next collision or say why not; (code, s). The anchors hold the laws at the state.
+
+    A start on two walls at once, here a named wall and y = 0, is a corner whichever way it moves; a second
+    wall of any other pair is found within rounding of f = 0 by `first_root`, and then left undecided.
+    """
+    if y == 0.0 and wall in (ARC, LEFT, RIGHT):
+        return (MOUTH_EDGE if table == MUSHROOM and wall != ARC else ON_CORNER), 0.0
     in_cap = table == CAP or (
         table == MUSHROOM and (y > 0.0 or wall in (BASE, ARC) or (y == 0.0 and wall == NO_WALL and vy > 0.0))
     )
@@ -311,17 +317,54 @@ def bounce(wall, x, x_low, y, y_low, vx, vy, anchors, is_relative):
 
 
 @njit(error_model="numpy")
+def settled(wall, s, x, y, vx, vy, laws, anchors, is_relative):
+    """Return the time of a hit of the wall left, right to its last bit, with f, f' and f's error there."""
+    f, slope, error, _ = wall_function(wall, s, x, y, vx, vy, 0.0, laws, anchors, is_relative)
+    for _ in range(MAX_POLISHES):
+        change = f / -slope
+        if not abs(change) > 2.0**-52 * s:
+            break
+        s += change
+        f, slope, error, _ = wall_function(wall, s, x, y, vx, vy, 0.0, laws, anchors, is_relative)
+    return s, f, slope, error
+
+
+@njit(error_model="numpy")
+def rest_of_hop(wall, s, f, slope, p, laws, anchors, is_relative):
+    """Return what must be added to the time s of a hit of the wall left; its increments gave f and f'.
+
+    The low part matters even though s is right to its last bit: a wall that rests until a knot and is met
+    just after it has a speed as small as the time since then. Newton's method, f between s and there by
+    the trapezoidal rule: exact for a bang-bang law, whose f' is linear.
+    """
+    x_s, y_s, vx, vy = p[2] + p[4] * s, p[3] + p[5] * s, p[4], p[5]
+    t, low = two_sum(p[0], s)
+    rest = f / -slope
+    for _ in range(MAX_POLISHES):
+        if not set_anchors(laws, anchors, t, low + p[1] + rest):
+            return 0.0
+        now = wall_slope(wall, x_s, y_s, vx, vy, anchors, is_relative)
+        change = (f + 0.5 * rest * (slope + now)) / -now
+        if not abs(change) <= 2.0**-52 * s:
+            return 0.0
+        rest += change
+        if abs(change) <= 2.0**-54 * abs(rest):
+            break
+    return rest
+
+
+@njit(error_model="numpy")
 def move(wall, s, is_again, p, laws, bounds, anchors, is_relative):
     """Move the state to the hit at time s and bounce, in place; returns the time, or -1 if it is lost.
 
     `is_again`: the wall met is the one left, whose residual at the start stays in its function.
     """
     x, y, vx, vy = p[2], p[3], p[4], p[5]
-    residual = residual_error = error = 0.0
+    residual = residual_error = error = f = slope_s = 0.0
     lack = anchors[PHASE, LACK]
     if is_again:
         residual, residual_error = wall_residual(wall, x, y, laws, anchors, bounds, is_relative)
-        _, _, error, _ = wall_function(wall, s, x, y, vx, vy, 0.0, laws, anchors, is_relative)
+        s, f, slope_s, error = settled(wall, s, x, y, vx, vy, laws, anchors, is_relative)
     bend, _ = curvature_bounds(wall, vx, vy, bounds)
     for _ in range(MAX_POLISHES):
         t, low = two_sum(p[0], s)
@@ -332,8 +375,9 @@ def move(wall, s, is_again, p, laws, bounds, anchors, is_relative):
         )
         lack = max(lack, anchors[PHASE, LACK])
         if is_again and error < lack / SAFETY * residual_error:
-            # A short hop along the wall: its increments gave s better than the laws' low parts can.
-            s_low = 0.0
+            # A short hop along the wall: its increments give s better than the laws' low parts can.
+            s_low = rest_of_hop(wall, s, f, slope_s, p, laws, anchors, is_relative)
+            break
         slope = wall_slope(wall, x_s, y_s, vx, vy, anchors, is_relative)
         # What Newton leaves, bend s_low^2 / (2 slope), must be nothing to the time and to the wall's speed.
         change = bend * abs(s_low)

@@ -10,11 +10,13 @@ import numpy as np
 import numpy.typing as npt
 
 from fast import codes
+from fast.double_double import half_pi
 from scene import BangBang, Cap, Fourier, Law, Mushroom, Scene
 from scene.laws import Bounds, bounds, is_constant
 from scene.refusal import BadInput
 from scene.tables import width_factors
 
+HALF_PI = half_pi()
 FloatArray = npt.NDArray[np.floating[Any]]
 TABLES = {"Cap": int(codes.CAP), "Stem": int(codes.STEM), "Mushroom": int(codes.MUSHROOM)}
 
@@ -28,7 +30,7 @@ class Compiled(NamedTuple):
 
     table: int
     is_relative: bool  # the width row holds nu, and w = nu r
-    laws: FloatArray  # (5, n): radius, width, depth, slope; then omega and harmonics of all Fourier laws
+    laws: FloatArray  # (5, n): radius, width, depth, slope; then what all Fourier laws share: see fast.codes
     bounds: FloatArray  # (4, 4): lowest, highest, |f'|, |f''| of radius, half-width w, depth, slope
 
 
@@ -59,7 +61,9 @@ def _laid_out(scene: Scene) -> Compiled:
         h, slope, factors = scene.h, scene.slope, width_factors(scene)
     rows = [_row(law) for law in (r, factors[0], h, slope)]
     waves = [row for row in rows if row[0] == codes.FOURIER]
-    rows.append([waves[0][2], max(row[3] for row in waves)] if waves else [0.0, 0.0])
+    moving = [law for law in (r, *factors, h, slope) if isinstance(law, Fourier) and not is_constant(law)]
+    omega_low = _omega(moving[0])[1] if moving else 0.0
+    rows.append([waves[0][2], max(row[3] for row in waves), omega_low] if waves else [0.0, 0.0, 0.0])
     laws = np.zeros((len(rows), max(len(row) for row in rows)))
     for i, row in enumerate(rows):
         laws[i, : len(row)] = row
@@ -67,12 +71,22 @@ def _laid_out(scene: Scene) -> Compiled:
     return Compiled(TABLES[type(scene).__name__], len(factors) == 2, laws, limits)
 
 
+def _omega(law: Fourier) -> tuple[float, float]:
+    """Return a law's frequency as a sum of two floats: exact if given, else 2 pi / period to 2^-106."""
+    if law.omega is not None:
+        return law.omega, 0.0
+    assert law.period is not None
+    frequency = 4 * HALF_PI / Fraction(law.period)
+    high = float(frequency)
+    return high, float(frequency - Fraction(high))
+
+
 def _row(law: Law) -> list[float]:
     if isinstance(law, Fourier) and not is_constant(law):
         n = max(len(law.cos), len(law.sin))
         cos = list(law.cos) + [0.0] * (n - len(law.cos))
         sin = list(law.sin) + [0.0] * (n - len(law.sin))
-        return [codes.FOURIER, law.mean, law.omega, float(n), *cos, *sin]
+        return [codes.FOURIER, law.mean, _omega(law)[0], float(n), *cos, *sin]
     if isinstance(law, BangBang) and not is_constant(law):
         times = [knot[0] for knot in law.knots]
         values = [knot[1] for knot in law.knots]

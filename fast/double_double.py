@@ -27,13 +27,14 @@ def _parts(number: Fraction, n: int) -> list[float]:
     return found
 
 
-def _half_pi() -> Fraction:
+def half_pi() -> Fraction:
+    """Return pi / 2 to 300 bits."""
     ctx = MPContext()
     ctx.prec = 300
     return Fraction(*map(int, (ctx.pi / 2).as_integer_ratio()))
 
 
-HALF_PI = np.array(_parts(_half_pi(), 4))
+HALF_PI = np.array(_parts(half_pi(), 4))
 # 1 / n! with the series' signs: of sin in odd rows, of cos in even ones.
 TERMS = np.array([_parts(Fraction((-1) ** (n // 2), factorial(n)), 2) for n in range(2 * N_TERMS)])
 

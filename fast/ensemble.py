@@ -17,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fast import codes, entries
-from fast.compiled import Compiled, FloatArray, compile_scene
+from fast.compiled import LARGEST, Compiled, FloatArray
 from fast.given import (
     MAX_CYCLES,
     MAX_PARTICLES,
@@ -29,6 +29,7 @@ from fast.given import (
 )
 from fast.narrowings import narrowings
 from fast.starts import Stops, cycle_length, cycle_stops, initial_states, least_collisions
+from fast.units import Units, fit, inward
 from scene import Scene
 from scene.refusal import BadInput, check_count, check_scene
 
@@ -182,24 +183,34 @@ def simulate(
     seed = check_count("seed", seed, 0, 2**64 - 1)
     energy, phases = given_energy(energy), given_phases(phases)
     threads, progress = given_threads(threads), given_progress(progress)
-    compiled = compile_scene(scene)
+    fitted = fit(scene)
+    # A static table is followed for units of the caller's time.
+    units = Units(fitted.length, fitted.time or 0)
+    scene, speed2 = fitted.scene, 2.0 * inward("energy", energy, 2 * (units.length - units.time))
     check_kept(n_particles, n_cycles, len(phases), len(narrowings(scene)))
     stops = cycle_stops(scene, n_cycles, phases)
-    ahead = least_collisions(scene, math.sqrt(2.0 * energy), n_cycles * cycle_length(scene))
+    ahead = least_collisions(scene, math.sqrt(speed2), n_cycles * cycle_length(scene))
     if ahead > MAX_COLLISIONS:
         raise BadInput(
             f"energy = {energy}: over {ahead:.0e} collisions of each particle, must be at most 1e9"
         )
-    start = initial_states(scene, n_particles, energy, seed)
+    if speed2 < LARGEST**-2:
+        raise BadInput(
+            f"energy = {energy}: the speed must be at least 2^-400 beside the table's size and period"
+        )
+    start = initial_states(scene, n_particles, 0.5 * speed2, seed)
     free = np.full(n_particles, codes.NO_WALL)
-    done = follow(compiled, start, free, stops, threads, progress)
-    return _ensemble(energy, done, (n_particles, n_cycles, len(phases) + 1), threads)
+    done = follow(fitted.compiled, start, free, stops, threads, progress)
+    return _ensemble(energy, done, units, (n_particles, n_cycles, len(phases) + 1), threads)
 
 
-def _ensemble(energy0: float, done: Followed, every: tuple[int, int, int], threads: int) -> Ensemble:
+def _ensemble(
+    energy0: float, done: Followed, units: Units, every: tuple[int, int, int], threads: int
+) -> Ensemble:
     """Name what the kernel filled in; `every`: particles, cycles, looks at a particle in a cycle."""
-    energies, captured = done.energies.reshape(every), done.is_captured.reshape(every)
-    t, _, x, y, vx, vy = (np.ascontiguousarray(column) for column in done.states.T)
+    energies, captured = units.energies(done.energies).reshape(every), done.is_captured.reshape(every)
+    columns = [units.times(done.states[:, 0]), *units.places(done.states[:, 2:]).T]
+    t, x, y, vx, vy = (np.ascontiguousarray(column) for column in columns)
     return Ensemble(
         energy0=energy0,
         energy=np.ascontiguousarray(energies[:, -1, -1]),
@@ -211,8 +222,8 @@ def _ensemble(energy0: float, done: Followed, every: tuple[int, int, int], threa
         vy=vy,
         n_collisions=done.counts.sum(axis=1),
         outcome=outcomes(done.codes),
-        t_in=done.t_in,
-        t_out=done.t_out,
+        t_in=units.times(done.t_in),
+        t_out=units.times(done.t_out),
         wall_counts=done.counts,
         phase_energies=energies[:, :, :-1],
         phase_captured=captured[:, :, :-1],

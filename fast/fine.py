@@ -9,9 +9,10 @@ import numpy as np
 import numpy.typing as npt
 
 from fast import codes, entries
-from fast.compiled import FloatArray, compile_scene
+from fast.compiled import FloatArray
 from fast.given import MAX_STEPS
-from fast.stepper import WALL_CODES, WALL_NAMES, check_state, trouble
+from fast.stepper import WALL_CODES, WALL_NAMES, Start, check_state, trouble
+from fast.units import Units
 from scene import Horizon, Outcome, Scene, State, Wall
 from scene.refusal import check_count, check_scene
 
@@ -54,22 +55,28 @@ def fine_trajectory(scene: Scene, state: State, n_collisions: int) -> FineTrajec
     Source: Gelfreich, Rom-Kedar, Turaev (2014), sec. 3.1; which wall is met is the careful step's answer.
     """
     check_scene(scene)
-    state = check_state(scene, state)
+    start = check_state(scene, state)
     n_collisions = check_count("n_collisions", n_collisions, 0, MAX_STEPS)
     steps: FloatArray = np.empty((n_collisions, 6, 2))
     met: npt.NDArray[np.int64] = np.empty(n_collisions, dtype=np.int64)
-    start = np.array([[number, 0.0] for number in (state.t, state.x, state.y, state.vx, state.vy)])
-    n, code = entries.fine(*compile_scene(scene), start, WALL_CODES[state.wall], np.inf, steps, met)
-    return as_trajectory(state, n, code, steps, met)
+    n, code = entries.fine(*start.compiled, as_pairs(start), WALL_CODES[state.wall], np.inf, steps, met)
+    return as_trajectory(state, start.units, n, code, steps, met)
+
+
+def as_pairs(start: Start) -> FloatArray:
+    """Return a state as the fine kernel takes it: (5, 2), t, x, y, vx, vy and their low parts."""
+    s = start.state
+    return np.array([[number, 0.0] for number in (s.t, s.x, s.y, s.vx, s.vy)])
 
 
 def as_trajectory(
-    state: State, n: int, code: int, steps: FloatArray, met: npt.NDArray[np.int64]
+    state: State, units: Units, n: int, code: int, steps: FloatArray, met: npt.NDArray[np.int64]
 ) -> FineTrajectory:
     """Return what the kernel found: `n` collisions of those asked for, and its last code."""
     outcome: Outcome | None = None
+    found = units.steps(steps[:n])
     if n < len(steps):
-        last = steps[n - 1, 2:, 0] if n else (state.x, state.y, state.vx, state.vy)
+        last = found[n - 1, 2:, 0] if n else (state.x, state.y, state.vx, state.vy)
         is_free = code == codes.HORIZON
         outcome = Horizon(np.inf, *map(float, last)) if is_free else trouble(code, state)
-    return FineTrajectory([WALL_NAMES[int(c)] for c in met[:n]], steps[:n], outcome)
+    return FineTrajectory([WALL_NAMES[int(c)] for c in met[:n]], found, outcome)

@@ -6,12 +6,15 @@ import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
+import numpy as np
+
 from fast import codes
-from fast.compiled import FloatArray, compile_scene
-from fast.ensemble import IntArray, follow
+from fast.compiled import FloatArray
+from fast.ensemble import Followed, IntArray, follow
 from fast.given import given_states, given_threads
 from fast.starts import least_collisions, only_stop
-from fast.stepper import as_arrays, next_collision, trouble
+from fast.stepper import as_arrays, fitted_start, next_collision, trouble
+from fast.units import fit
 from scene import Horizon, InvalidState, Outcome, Rejected, Scene, State
 from scene.refusal import check_number, check_scene
 
@@ -64,8 +67,7 @@ def flow(scene: Scene, states: Sequence[State], t_end: float, threads: int | Non
 
 def carry_judged(scene: Scene, states: Sequence[State], t_end: float, threads: int) -> Flow:
     """Carry particles to t_end whose starts have been judged by `refuse`."""
-    starts, walls = as_arrays(states)
-    done = follow(compile_scene(scene), starts, walls, only_stop(t_end), threads)
+    done = follow_to(scene, states, t_end, threads)
     outcomes = [
         Horizon(t_end, *place) if code == codes.HORIZON else trouble(int(code), state)
         for state, code, place in zip(states, done.codes, done.states[:, 2:].tolist(), strict=True)
@@ -73,12 +75,42 @@ def carry_judged(scene: Scene, states: Sequence[State], t_end: float, threads: i
     return Flow(outcomes, done.t_in[:, 0, 0], done.t_out[:, 0, 0], done.counts, done.careful)
 
 
+def follow_to(scene: Scene, states: Sequence[State], t_end: float, threads: int) -> Followed:
+    """Follow particles to t_end, those whose units agree together; all but energies is filled in.
+
+    Raises:
+        BadInput: scene, a state or an answer does not fit into binary64: see fast.units.
+    """
+    starts = [fitted_start(scene, state) for state in states]
+    compiled, (rows, walls) = fit(scene).compiled, as_arrays(starts)
+    n = len(states)
+    t_in, t_out = np.full((2, n, 1, 1), np.nan)
+    ends, counts, careful = (
+        np.zeros(n, np.int64),
+        np.zeros((n, codes.N_WALLS), np.int64),
+        np.zeros(n, np.int64),
+    )
+    seconds = 0.0
+    for units in sorted({start.units for start in starts}):
+        those = np.array([i for i, start in enumerate(starts) if start.units == units])
+        own = rows[those]
+        done = follow(compiled, own, walls[those], only_stop(units.horizon(t_end)), threads)
+        rows[those, :2], rows[those, 2:] = units.times(own[:, :2]), units.places(own[:, 2:])
+        t_in[those], t_out[those] = units.times(done.t_in), units.times(done.t_out)
+        ends[those], counts[those], careful[those] = done.codes, done.counts, done.careful
+        seconds += done.seconds
+    nothing = np.full((n, 1), np.nan)
+    return Followed(rows, ends, counts, careful, nothing, np.zeros((n, 1), np.bool_), t_in, t_out, seconds)
+
+
 def refuse(scene: Scene, state: State, t_end: float) -> Rejected | None:
     """Return why a particle cannot start so, or be followed so far; else None."""
     outcome = next_collision(scene, state, t_end)
     if isinstance(outcome, Rejected):
         return outcome
-    ahead = least_collisions(scene, math.hypot(state.vx, state.vy), t_end - state.t)
+    fitted, start = fit(scene), fitted_start(scene, state)
+    s = start.state
+    ahead = least_collisions(fitted.scene, math.hypot(s.vx, s.vy), start.units.horizon(t_end) - s.t)
     if ahead > MAX_COLLISIONS:
         return Rejected(f"t_end = {t_end!r} is over {ahead:.0e} collisions away, must be at most 1e7")
     return None

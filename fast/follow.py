@@ -23,12 +23,12 @@ from fast.codes import (  # isort: skip
     ARC, BANG_BANG, CAP, FOURIER, H, HORIZON, M, MUSHROOM, N_WALLS, PHASES, R, STEM, W,
 )  # fmt: skip
 from fast.lanes import (  # isort: skip
-    CALM, CLOSED, COARSE, DONE, END, H0, HIT, H_REF, LANES, NEVER, NEXT_H0, NEXT_R0, NEXT_T, NEXT_T_LOW,
+    CALM, CLOSED, COARSE, DONE, END, H0, HIT, H_REF, KNOT, LANES, NEVER, NEXT_H0, NEXT_R0, NEXT_T, NEXT_T_LOW,
     NEXT_VX, NEXT_VY, NEXT_W0, NEXT_X, NEXT_Y, N_ARC, N_BASE, N_REF, N_ROWS, OK, ON_ARC, R0, REF, REF_LOW,
     RIGHT_ONE, R_REF, S, SINCE, SPIN, STAY_IN, STAY_OUT, STOP, T, T_LOW, UNTIL, VX, VY, W0, WALL, X, Y,
-    aim, arrive, bounce, chord, fly, law, rebound, turns,
+    aim, arrive, bounce, chord, chord_mixed, fly, fly_mixed, law, limits_of, rebound, turns,
 )  # fmt: skip
-from fast.motion import ANCHORS_SHAPE, KNOTS, LOW, set_anchors
+from fast.motion import ANCHORS_SHAPE, LOW, ROOM, bend_of_half_leg, set_anchors
 
 GENERAL, DISK = np.arange(2)
 STAYS, MOVES, ENDS = 0, 1, 2
@@ -53,7 +53,7 @@ def has_lanes(table, laws, last):
 @njit(error_model="numpy")
 def set_reference(a, i, laws, anchors, is_relative):
     """Make the time of a lane's next state the reference of its laws, and give it their values there."""
-    t, end = a[NEXT_T + i], NEVER
+    t, end, knot = a[NEXT_T + i], NEVER, NEVER
     a[REF + i], a[REF_LOW + i] = t, a[NEXT_T_LOW + i]
     for k, row in enumerate((R, W, H)):
         f, rate, bend = anchors[row, 0], anchors[row, 1], 0.0
@@ -61,31 +61,30 @@ def set_reference(a, i, laws, anchors, is_relative):
             bend = -laws[row, 2] * laws[row, 2] * (f - laws[row, 1])
             end = min(end, t + SERVES / laws[row, 2])
         elif laws[row, 0] == BANG_BANG:
-            leg, is_second = int(anchors[row, 2]) // 2, int(anchors[row, 2]) % 2
-            bend = laws[row, KNOTS + 2 * int(laws[row, 3]) + leg]
-            bend = -bend if is_second else bend
-            half_leg = 0.5 * (laws[row, KNOTS + leg + 1] - laws[row, KNOTS + leg])
-            end = min(end, t + (half_leg - anchors[row, 3]))
+            bend = bend_of_half_leg(laws, row, int(anchors[row, 2]))
+            # Rounded down: a flight that ends before it ends before the half-leg does.
+            knot = min(knot, (t + anchors[row, ROOM]) - SAFETY * (abs(t) + anchors[row, ROOM]))
         place = REFERENCES[k] + i
         a[place], a[place + LANES] = f, anchors[row, LOW]
         a[place + 2 * LANES], a[place + 3 * LANES] = rate, bend
-    a[END + i] = end
-    set_laws(a, i, NEXT_R0, NEXT_W0, NEXT_H0, 0.0, laws[PHASES, 0], is_relative)
+    a[END + i], a[KNOT + i] = min(end, knot), knot
+    set_laws(a, i, NEXT_R0, NEXT_W0, NEXT_H0, 0.0, laws, is_relative)
 
 
 @njit(error_model="numpy")
-def law_of(a, i, omega, g1, g2, g0):
+def law_of(a, i, row, laws, since):
     """Return a law and its derivatives from the rows of its reference, which begin at i."""
+    omega = laws[row, 2] if laws[row, 0] == FOURIER else 0.0
+    g1, g2, g0 = turns(omega, since)
     return law(a[i], a[i + LANES], a[i + 2 * LANES], a[i + 3 * LANES], omega, g1, g2, g0)
 
 
 @njit(error_model="numpy")
-def set_laws(a, i, r_row, w_row, h_row, since, omega, is_relative):
+def set_laws(a, i, r_row, w_row, h_row, since, laws, is_relative):
     """Write a lane's laws at a time after its reference."""
-    g1, g2, g0 = turns(omega, since)
-    r, r1, r2 = law_of(a, R_REF + i, omega, g1, g2, g0)
-    w, w1, w2 = law_of(a, N_REF + i, omega, g1, g2, g0)
-    h, h1, h2 = law_of(a, H_REF + i, omega, g1, g2, g0)
+    r, r1, r2 = law_of(a, R_REF + i, R, laws, since)
+    w, w1, w2 = law_of(a, N_REF + i, W, laws, since)
+    h, h1, h2 = law_of(a, H_REF + i, H, laws, since)
     if is_relative:
         w, w1, w2 = w * r, fma(w1, r, w * r1), fma(w2, r, fma(w, r2, 2.0 * w1 * r1))
     a[r_row + i], a[r_row + LANES + i], a[r_row + 2 * LANES + i] = r, r1, r2
@@ -116,7 +115,7 @@ def change_lane(a, i, b, j):
 
 
 @njit(error_model="numpy")
-def fold(a, i, omega, is_relative):
+def fold(a, i, laws, is_relative):
     """Bring an unfolded particle back to y >= 0, with the laws that the disk has no use for."""
     if a[Y + i] < 0.0:
         a[Y + i] = -a[Y + i]
@@ -124,7 +123,7 @@ def fold(a, i, omega, is_relative):
     a[SPIN + i] = 0.0
     a[WALL + i] = ON_ARC
     since = (a[T + i] - a[REF + i]) + (a[T_LOW + i] - a[REF_LOW + i])
-    set_laws(a, i, R0, W0, H0, since, omega, is_relative)
+    set_laws(a, i, R0, W0, H0, since, laws, is_relative)
 
 
 @njit(error_model="numpy")
@@ -236,7 +235,25 @@ def step_to_arc(scene, a, i, anchors, p, j, whom, stops, out, n_careful):
 
 
 @njit(error_model="numpy")
-def correct_more(pool, scene, a, i, spare, k_w, bend):
+def next_flight(a, n, is_stem, is_relative, omega, m, limits):
+    """Call the loop over flights that these laws need."""
+    if limits.has_knots and omega > 0.0:
+        fly_mixed(a, n, is_stem, is_relative, omega, m, limits)
+    else:
+        fly(a, n, is_stem, is_relative, omega, m, limits)
+
+
+@njit(error_model="numpy")
+def next_chord(a, n, is_again, is_cap, is_relative, omega, limits):
+    """Call the loop over chords that these laws need."""
+    if limits.has_knots and omega > 0.0:
+        chord_mixed(a, n, is_again, is_cap, is_relative, omega, limits)
+    else:
+        chord(a, n, is_again, is_cap, is_relative, omega, limits)
+
+
+@njit(error_model="numpy")
+def correct_more(pool, scene, a, i, spare, limits):
     """Correct a coarse step until it is right, a few times, in a pool of its own."""
     table, is_relative, laws, _ = scene
     if a[OK + i] != COARSE:
@@ -244,35 +261,34 @@ def correct_more(pool, scene, a, i, spare, k_w, bend):
     change_lane(a, i, spare, np.int64(0))
     for _ in range(3):
         if pool == DISK:
-            chord(spare, np.int64(1), np.bool_(True), table == CAP, is_relative, laws[PHASES, 0], bend, k_w)
+            next_chord(spare, np.int64(1), np.bool_(True), table == CAP, is_relative, laws[PHASES, 0], limits)
         else:
-            fly(spare, np.int64(1), table == STEM, is_relative, laws[PHASES, 0], laws[M, 1], k_w)
+            next_flight(spare, np.int64(1), table == STEM, is_relative, laws[PHASES, 0], laws[M, 1], limits)
         if spare[OK] != COARSE:
             break
     change_lane(spare, np.int64(0), a, i)
 
 
 @njit(error_model="numpy")
-def attend(pool, scene, is_laned, a, i, spare, whom, anchors, p, stops, out, ends, k_w, bend):
+def attend(pool, scene, is_laned, a, i, spare, whom, anchors, p, stops, out, ends, limits):
     """Do for a lane what its tick could not; returns whether it stays, moves to the other pool or ends."""
     states, codes, counts, n_careful = ends
     table, is_relative, laws, _ = scene
-    omega, end, j = laws[PHASES, 0], stops[0][-1], whom[0, i]
+    end, j = stops[0][-1], whom[0, i]
     if a[CLOSED + i] < NEVER:
         note_stay(a, i, j, whom[1, i], stops, out)
     if pool == GENERAL and a[SPIN + i] != 0.0 and is_laned:
         return MOVES
     is_known = is_laned and a[END + i] > -NEVER
     if is_known:
-        correct_more(pool, scene, a, i, spare, k_w, bend)
-    is_past = a[NEXT_T + i] >= a[END + i]
-    if is_known and a[OK + i] == RIGHT_ONE and not (is_past and omega == 0.0):
-        if is_past:
+        correct_more(pool, scene, a, i, spare, limits)
+    if is_known and a[OK + i] == RIGHT_ONE and a[NEXT_T + i] < a[KNOT + i]:
+        if a[NEXT_T + i] >= a[END + i]:
             set_anchors(laws, anchors, a[NEXT_T + i], a[NEXT_T_LOW + i])
             set_reference(a, i, laws, anchors, is_relative)
         code = int(a[HIT + i])
     elif pool == DISK and table == MUSHROOM:
-        fold(a, i, omega, is_relative)
+        fold(a, i, laws, is_relative)
         return MOVES
     elif pool == DISK:
         code = step_to_arc(scene, a, i, anchors, p, j, whom, stops, out, n_careful)
@@ -291,7 +307,7 @@ def attend(pool, scene, is_laned, a, i, spare, whom, anchors, p, stops, out, end
 
 
 @njit(error_model="numpy")
-def scan(pool, scene, is_laned, pools, whoms, n, anchors, p, stops, out, ends, k_w, bend):
+def scan(pool, scene, is_laned, pools, whoms, n, anchors, p, stops, out, ends, limits):
     """Attend to every lane of a pool that needs it; the last lane fills the place of one that leaves."""
     a, whom = pools[pool], whoms[pool]
     i = np.int64(0)
@@ -299,7 +315,7 @@ def scan(pool, scene, is_laned, pools, whoms, n, anchors, p, stops, out, ends, k
         if a[CALM + i] > 0.0 and is_laned:
             i += 1
             continue
-        fate = attend(pool, scene, is_laned, a, i, pools[2], whom, anchors, p, stops, out, ends, k_w, bend)
+        fate = attend(pool, scene, is_laned, a, i, pools[2], whom, anchors, p, stops, out, ends, limits)
         if fate == STAYS:
             i += 1
             continue
@@ -336,8 +352,7 @@ def follow(scene, walls, stops, out, ends):
     n = np.zeros(2, dtype=np.int64)
     anchors, p = np.zeros(ANCHORS_SHAPE), np.zeros(6)
     omega, m, is_stem = laws[PHASES, 0], laws[M, 1], table == STEM
-    k_w = max(bounds[W, 3], bounds[H, 3])
-    bend = (1.0 + SAFETY) * (bounds[R, 1] * bounds[R, 3] + bounds[R, 2] * bounds[R, 2])
+    limits = limits_of(laws, bounds)
     general, disk = pools[GENERAL], pools[DISK]
     while True:
         while n[0] + n[1] < LANES and first < last:
@@ -348,11 +363,11 @@ def follow(scene, walls, stops, out, ends):
         if n[0] + n[1] == 0:
             break
         if n[GENERAL] > 0:
-            aim(general, n[GENERAL], is_stem, m, bend, k_w)
-            fly(general, n[GENERAL], is_stem, is_relative, omega, m, k_w)
-            scan(GENERAL, scene, is_laned, pools, whoms, n, anchors, p, stops, out, ends, k_w, bend)
+            aim(general, n[GENERAL], is_stem, m, limits)
+            next_flight(general, n[GENERAL], is_stem, is_relative, omega, m, limits)
+            scan(GENERAL, scene, is_laned, pools, whoms, n, anchors, p, stops, out, ends, limits)
             bounce(general, n[GENERAL], m, table == MUSHROOM)
         if n[DISK] > 0:
-            chord(disk, n[DISK], np.bool_(False), table == CAP, is_relative, omega, bend, k_w)
-            scan(DISK, scene, is_laned, pools, whoms, n, anchors, p, stops, out, ends, k_w, bend)
+            next_chord(disk, n[DISK], np.bool_(False), table == CAP, is_relative, omega, limits)
+            scan(DISK, scene, is_laned, pools, whoms, n, anchors, p, stops, out, ends, limits)
             rebound(disk, n[DISK])

@@ -4,8 +4,11 @@ Idea. A law gives f(t + s) - f(t) without cancellation, so a wall met again soon
 left is found to full precision whatever t is; the anchors themselves come from the time as a pair
 (t_hi, t_lo), so no digit of the phase is lost in long runs.
 
-Each row of `anchors` holds: value, derivative, half-leg (Fourier: size of the derivative's terms),
-time from the half-leg's begin, time in the period, the value's low part.
+Each row of `anchors` holds: value, derivative, half-leg (Fourier: size of the derivative's terms), then for
+bang-bang laws the time to the half-leg's end and its low part; last the value's low part.
+Times to knots are sums of two floats throughout: a wall that is met again just after a knot has moved by
+the square of the time since then, and its speed is that time's multiple, so that time must be right relative
+to itself, not to the period that its knots are written in.
 All Fourier laws of a scene share their omega, so two more rows hold the harmonics' sines and
 cosines at the event, and their turn since, at one s.
 """
@@ -31,6 +34,7 @@ LACK = 0  # column of PHASE: error of sines and cosines, low parts included
 SINE, COSINE = 3, 3 + MAX_HARMONICS
 SINE_LOW, COSINE_LOW = 3 + 2 * MAX_HARMONICS, 3 + 3 * MAX_HARMONICS
 ANCHORS_SHAPE = (6, 4 + 4 * MAX_HARMONICS)
+ROOM, ROOM_LOW = 3, 4  # columns of `anchors`
 # Columns of a bang-bang law's row: kind, 0, period, number of knots, period's low part, then
 # the knots' times, values, the legs' accelerations and the low parts of these (n of each kept).
 KNOTS = 5
@@ -43,7 +47,7 @@ def set_phases(laws, anchors, t_hi, t_lo):
     anchors[TURN, 0] = -1.0
     worst = 0.0
     for k in range(1, int(laws[PHASES, 1]) + 1):
-        s, s_low, c, c_low, is_reduced = sine_cosine(laws[PHASES, 0], float(k), t_hi, t_lo)
+        s, s_low, c, c_low, is_reduced = sine_cosine(laws[PHASES, 0], float(k), t_hi, t_lo, laws[PHASES, 2])
         if not is_reduced:
             return False
         anchors[PHASE, SINE + k] = s
@@ -71,7 +75,7 @@ def set_turn(laws, anchors, s):
             sine = half + more
             anchors[TURN, SINE + k] = 2.0 * (more + sine * less)
         else:
-            sine, _, cosine, _, _ = sine_cosine(laws[PHASES, 0], 0.5 * k, s, 0.0)
+            sine, _, cosine, _, _ = sine_cosine(laws[PHASES, 0], 0.5 * k, s, 0.0, laws[PHASES, 2])
             anchors[TURN, SINE + k] = 2.0 * sine * cosine
         anchors[TURN, COSINE + k] = -2.0 * sine * sine
 
@@ -166,22 +170,31 @@ def set_leg(laws, anchors, row, t_hi, t_lo):
             break
         i += 1
     before, after = laws[row, KNOTS + i], laws[row, KNOTS + i + 1]
-    half_leg = 0.5 * (after - before)
+    length, length_low = two_sum(after, -before)
     a, a_low = laws[row, KNOTS + 2 * n + i], laws[row, KNOTS + 3 * n + i]
     u, u_low = time_since(before, n_periods, period, period_low, t_hi, t_lo)
-    if u < half_leg:
+    room, room_low = difference(0.5 * length, 0.5 * length_low, u, u_low)
+    if room > 0.0:
         f, f_low, rate = on_parabola(laws[row, KNOTS + n + i], a, a_low, u, u_low)
         anchors[row, 2] = 2.0 * i
-        anchors[row, 3] = max(u, 0.0)
     else:
         u, u_low = time_since(after, n_periods, period, period_low, t_hi, t_lo)
         f, f_low, rate = on_parabola(laws[row, KNOTS + n + i + 1], -a, -a_low, u, u_low)
         anchors[row, 2] = 2.0 * i + 1.0
-        anchors[row, 3] = max(half_leg + u, 0.0)
+        room, room_low = -u, -u_low
     anchors[row, 0], anchors[row, LOW] = two_sum(f, f_low)
     anchors[row, 1] = rate
-    anchors[row, 4] = tau
+    anchors[row, ROOM], anchors[row, ROOM_LOW] = room, room_low
     return True
+
+
+@njit(error_model="numpy")
+def difference(a, a_low, b, b_low):
+    """Return (a + a_low) - (b + b_low) as a sum of two floats, right relative to itself."""
+    d, e = two_sum(a, -b)
+    low, f = two_sum(a_low, -b_low)
+    d, e = two_sum(d, e + low)
+    return two_sum(d, e + f)
 
 
 @njit(error_model="numpy")
@@ -220,39 +233,61 @@ def waves_increment(laws, anchors, row, s):
 
 
 @njit(error_model="numpy")
+def bend_of_half_leg(laws, row, j):
+    """Return the second derivative of a bang-bang law in its half-leg j."""
+    a = laws[row, KNOTS + 2 * int(laws[row, 3]) + j // 2]
+    return -a if j % 2 else a
+
+
+@njit(error_model="numpy")
+def whole_periods_off(laws, row, s):
+    """Return s less the whole periods in it, as a sum of two floats."""
+    period, period_low = laws[row, 2], laws[row, 4]
+    if s < period:
+        return s, 0.0
+    n_periods = np.floor(s / period)
+    p, e = two_product(n_periods, period)
+    left, left_low = difference(s, 0.0, p, e + n_periods * period_low)
+    return (left, left_low) if left > 0.0 else (0.0, 0.0)
+
+
+@njit(error_model="numpy")
+def leg_after(laws, anchors, row, s):
+    """Walk the half-legs of a bang-bang law for a time s.
+
+    Returns (half-leg, time since the walk entered it, time to its end, derivative at its entry, increase up
+    to there, size of that increase's terms).
+    """
+    n_half_legs = 2 * (int(laws[row, 3]) - 1)
+    j = int(anchors[row, 2])
+    room, room_low = anchors[row, ROOM], anchors[row, ROOM_LOW]
+    rate, change, size, beyond = anchors[row, 1], 0.0, 0.0, 0.0
+    left, left_low = whole_periods_off(laws, row, s)
+    for _ in range(n_half_legs + 1):
+        beyond, beyond_low = difference(left, left_low, room, room_low)
+        if beyond < 0.0:
+            break
+        a = bend_of_half_leg(laws, row, j)
+        change += room * (rate + 0.5 * a * room)
+        size += room * (abs(rate) + 0.5 * abs(a) * room)
+        j = (j + 1) % n_half_legs
+        i = j // 2
+        length, length_low = two_sum(laws[row, KNOTS + i + 1], -laws[row, KNOTS + i])
+        # At a knot the law is at rest; in mid-leg it has what half the leg gave it.
+        rate = 0.5 * bend_of_half_leg(laws, row, j - 1) * length if j % 2 else 0.0
+        left, left_low = beyond, beyond_low
+        room, room_low = 0.5 * length, 0.5 * length_low
+    return j, left, max(-beyond, 0.0), rate, change, size
+
+
+@njit(error_model="numpy")
 def legs_increment(laws, anchors, row, s):
     """Return `increment` of a bang-bang law by walking its half-legs, each a parabola."""
-    n = int(laws[row, 3])
-    n_half_legs = 2 * (n - 1)
-    j = int(anchors[row, 2])
-    u = anchors[row, 3]
-    rate = anchors[row, 1]
-    change = 0.0
-    size = 0.0
-    left = s
-    if s >= laws[row, 2]:
-        n_periods = np.floor(s / laws[row, 2])
-        p, e = two_product(n_periods, laws[row, 2])
-        left = max((s - p) - (e + n_periods * laws[row, 4]), 0.0)
-    for _ in range(n_half_legs + 2):
-        i = j // 2
-        half_leg = 0.5 * (laws[row, KNOTS + i + 1] - laws[row, KNOTS + i])
-        a = laws[row, KNOTS + 2 * n + i]
-        if j % 2:
-            a = -a
-        room = max(half_leg - u, 0.0)
-        step = min(left, room)
-        change += step * (rate + 0.5 * a * step)
-        size += step * (abs(rate) + 0.5 * abs(a) * step)
-        if left <= room:
-            # The time within the half-leg is known to rounding of the time within the period.
-            rate += a * step
-            return change, rate, size, abs(rate) + abs(a) * min(half_leg, anchors[row, 4] + s)
-        rate = 0.0 if j % 2 else a * half_leg
-        left -= room
-        u = 0.0
-        j = (j + 1) % n_half_legs
-    return change, rate, size, abs(rate)
+    j, step, _, rate, change, size = leg_after(laws, anchors, row, s)
+    a = bend_of_half_leg(laws, row, j)
+    change += step * (rate + 0.5 * a * step)
+    size += step * (abs(rate) + 0.5 * abs(a) * step)
+    return change, rate + a * step, size, abs(rate) + abs(a) * step
 
 
 @njit(error_model="numpy")
@@ -280,12 +315,10 @@ def rest(laws, anchors, row, s):
         return 0.0
     if laws[row, 0] != BANG_BANG:
         return np.inf
-    n = int(laws[row, 3])
-    doubt = SAFETY * (anchors[row, 4] + s + laws[row, 2])
-    tau = anchors[row, 4] + s
-    tau -= laws[row, 2] * np.floor(tau / laws[row, 2])
-    for i in range(n - 1):
-        begin, end = laws[row, KNOTS + i] - laws[row, KNOTS], laws[row, KNOTS + i + 1] - laws[row, KNOTS]
-        if begin + doubt <= tau <= end - doubt and laws[row, KNOTS + 2 * n + i] == 0.0:
-            return end - doubt - tau
-    return 0.0
+    j, left, room, _, _, _ = leg_after(laws, anchors, row, s)
+    if bend_of_half_leg(laws, row, j) != 0.0:
+        return 0.0
+    if j % 2 == 0:  # the leg's other half is at rest too
+        i = j // 2
+        room += 0.5 * (laws[row, KNOTS + i + 1] - laws[row, KNOTS + i])
+    return max(room - SAFETY * (room + left), 0.0)

@@ -14,11 +14,12 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from fast.arithmetic import two_product, two_sum
+from fast.arithmetic import two_sum
 from fast.careful import first_event
 
 from fast.codes import (  # isort: skip
-    ARC, BANG_BANG, BASE, FAR_TIME, FLOOR, FOURIER, H, HORIZON, M, NO_WALL, OUTSIDE, R, RIGHT, TANGENT, W,
+    ARC, BANG_BANG, BASE, FAR_TIME, FLOOR, FOURIER, H, HORIZON, M, NO_WALL, OUTSIDE, PHASES, R, RIGHT,
+    TANGENT, W,
 )  # fmt: skip
 from fast.double_double import add, div, mul, sine_cosine, sub, times
 from fast.motion import ANCHORS_SHAPE, KNOTS, LACK, PHASE, set_anchors
@@ -33,7 +34,7 @@ ZERO = (0.0, 0.0)
 @njit(error_model="numpy")
 def phase(laws, row, k, t):
     """Return k omega t."""
-    return mul(two_product(k, laws[row, 2]), t)
+    return mul(times(k, (laws[row, 2], laws[PHASES, 2])), t)
 
 
 @njit(error_model="numpy")
@@ -78,7 +79,7 @@ def law(laws, row, t):
             a, b = laws[row, 3 + k], laws[row, 3 + n + k]
             f = add(f, add(times(a, cosine), times(b, sine)))
             rate = add(rate, times(float(k), sub(times(b, cosine), times(a, sine))))
-        return f, times(laws[row, 2], rate)
+        return f, mul((laws[row, 2], laws[PHASES, 2]), rate)
     if laws[row, 0] == BANG_BANG:
         half_leg, _, u = half_leg_at(laws, row, t)
         a = bend_of(laws, row, half_leg)

@@ -9,8 +9,9 @@ import numpy as np
 import numpy.typing as npt
 
 from fast import careful, codes, entries, motion, walls
-from fast.compiled import LARGEST, FloatArray, compile_scene
+from fast.compiled import Compiled, FloatArray
 from fast.given import MAX_STEPS, given_end, given_state
+from fast.units import Units, fit
 from scene import (
     Collision,
     Horizon,
@@ -37,6 +38,7 @@ WALL_CODES: dict[Wall | None, int] = {None: int(codes.NO_WALL)} | {n: c for c, n
 REASONS: dict[int, Outcome] = {
     int(codes.SLIDING): Undefined("sliding"),
     int(codes.MOUTH_EDGE): Undefined("mouth-edge"),
+    int(codes.ON_CORNER): Undefined("corner"),
     int(codes.TOO_MANY): Undecided(f"no hit within {careful.MAX_PARABOLAS} sub-intervals"),
     int(codes.TANGENT): Undecided("f and f' vanish together within rounding"),
     int(codes.CORNER): Undecided("two walls are hit together within rounding"),
@@ -68,16 +70,19 @@ def next_collision(scene: Scene, state: State, t_end: float) -> Outcome:
     check_scene(scene)
     try:
         t_end = t_end if type(t_end) is float else check_number("t_end", t_end)
-        state = check_state(scene, state, t_end)
+        state = given_state(scene, state)
+        check_numbers(scene, state, t_end)
+        start = fitted_start(scene, state)
+        p = start.row()
+        limit = start.units.horizon(t_end) - start.state.t
+        code, dt = entries.single_step(*start.compiled, p, WALL_CODES[state.wall], limit)
+        if code in WALL_NAMES:
+            numbers = start.units.steps(np.array([dt, *np.delete(p, 1)]))
+            return Collision(WALL_NAMES[code], *numbers.tolist())
+        if code == codes.HORIZON:
+            return Horizon(t_end, *start.units.places(p[2:]).tolist())
     except BadInput as error:
         return Rejected(str(error))
-    p = np.array([state.t, 0.0, state.x, state.y, state.vx, state.vy])
-    low_end = t_end - state.t
-    code, dt = entries.single_step(*compile_scene(scene), p, WALL_CODES[state.wall], low_end)
-    if code in WALL_NAMES:
-        return Collision(WALL_NAMES[code], float(dt), *(float(p[i]) for i in (0, 2, 3, 4, 5)))
-    if code == codes.HORIZON:
-        return Horizon(t_end, *(float(p[i]) for i in (2, 3, 4, 5)))
     return trouble(code, state, WALL_NAMES.get(int(dt)) if code == codes.OUTSIDE else None)
 
 
@@ -114,55 +119,88 @@ def trajectory(scene: Scene, state: State, n_collisions: int, t_end: float = np.
     """
     check_scene(scene)
     t_end = given_end(t_end)
-    state = check_state(scene, state, None if t_end == np.inf else t_end)
+    start = check_state(scene, state, None if t_end == np.inf else t_end)
     n_collisions = check_count("n_collisions", n_collisions, 0, MAX_STEPS)
     steps: FloatArray = np.empty((n_collisions, 6))
     met: npt.NDArray[np.int64] = np.empty(n_collisions, dtype=np.int64)
-    p = np.array([state.t, 0.0, state.x, state.y, state.vx, state.vy])
-    n, code = entries.trajectory(*compile_scene(scene), p, WALL_CODES[state.wall], t_end, steps, met)
+    p, limit = start.row(), start.units.horizon(t_end)
+    n, code = entries.trajectory(*start.compiled, p, WALL_CODES[state.wall], limit, steps, met)
+    steps = start.units.steps(steps[:n])
     walls = [WALL_NAMES[int(c)] for c in met[:n]]
     outcome: Outcome | None = None
     if n < n_collisions:
         # Without a horizon only what rests is never met, and it rests where it was: there is no v * infinity.
-        last = (
-            p[2:] if np.isfinite(t_end) else steps[n - 1, 2:] if n else (state.x, state.y, state.vx, state.vy)
-        )
+        last = steps[n - 1, 2:] if n else np.array([state.x, state.y, state.vx, state.vy])
         is_horizon = code == codes.HORIZON
+        if is_horizon and np.isfinite(t_end):
+            last = start.units.places(p[2:])
         outcome = Horizon(t_end, *(float(v) for v in last)) if is_horizon else trouble(code, state)
-    return Trajectory(walls, steps[:n], outcome)
+    return Trajectory(walls, steps, outcome)
 
 
-def check_state(scene: Scene, state: State, t_end: float | None = None) -> State:
-    """Return a state in floats; refuse what this stepper cannot hold, naming field, value and bound."""
+class Start(NamedTuple):
+    """A state in the kernel's units, with what leads there and back.
+
+    Attributes:
+        state: in the kernel's units.
+        units: those.
+        compiled: the scene's numbers in them.
+    """
+
+    state: State
+    units: Units
+    compiled: Compiled
+
+    def row(self) -> FloatArray:
+        """Return the state as the kernels take it: t, its low part, x, y, vx, vy."""
+        s = self.state
+        return np.array([s.t, 0.0, s.x, s.y, s.vx, s.vy])
+
+
+def check_state(scene: Scene, state: State, t_end: float | None = None) -> Start:
+    """Return a state in the kernel's units; refuse what this stepper cannot hold, naming field and bound."""
     state = given_state(scene, state)
-    compile_scene(scene)
     check_numbers(scene, state, state.t if t_end is None else t_end)
-    for field in ("x", "y", "vx", "vy"):
-        if abs(getattr(state, field)) > LARGEST:
-            raise InvalidState(f"state.{field} = {getattr(state, field)!r}, must be below 2^400 in size")
-    speed = max(abs(state.vx), abs(state.vy))
-    if 0.0 < speed < 1.0 / LARGEST:
-        raise InvalidState(f"speed = {speed!r}, must be 0 or at least 2^-400")
+    return fitted_start(scene, state)
+
+
+def fitted_start(scene: Scene, state: State) -> Start:
+    """Return a state that has been checked, in the kernel's units.
+
+    Raises:
+        BadInput: scene or state do not fit, or the state is not on the wall that it names.
+    """
+    fitted = fit(scene)
+    units = fitted.units(state)
+    inner = units.state(state)
     if state.wall is not None:
-        gap, size = wall_gap(scene, state)
+        gap, size = wall_gap(fitted.compiled, inner)
         if abs(gap) > ON_WALL * size:
-            raise InvalidState(f"state.wall = {state.wall!r}, but the state is {gap:.3g} away from that wall")
-    return state
+            away = f"{gap / size:.3g} of that wall's distance from the origin"
+            raise InvalidState(f"state.wall = {state.wall!r}, but the state is {away} away from that wall")
+    return Start(inner, units, fitted.compiled)
 
 
-def as_arrays(states: Sequence[State]) -> tuple[FloatArray, npt.NDArray[np.int64]]:
+def as_arrays(starts: Sequence[Start]) -> tuple[FloatArray, npt.NDArray[np.int64]]:
     """Return N states as the kernels take them: (N, 6) t, its low part, x, y, vx, vy; (N,) codes of walls."""
-    rows = np.array([[s.t, 0.0, s.x, s.y, s.vx, s.vy] for s in states]).reshape(-1, 6)
-    return rows, np.array([WALL_CODES[s.wall] for s in states], dtype=np.int64)
+    rows = np.array([start.row() for start in starts]).reshape(-1, 6)
+    return rows, np.array([WALL_CODES[start.state.wall] for start in starts], dtype=np.int64)
 
 
-def wall_gap(scene: Scene, state: State) -> tuple[float, float]:
-    """Return how far a state is inside the wall it claims to leave, and that wall's distance from 0."""
-    compiled = compile_scene(scene)
-    if state.wall == "base":
-        return state.y, float(max(compiled.bounds[0, 1], compiled.bounds[1, 1]))
+def wall_gap(compiled: Compiled, state: State) -> tuple[float, float]:
+    """Return how far a state is inside the wall it claims to leave, and that wall's distance from 0, now.
+
+    Today's distance is the measure, not the largest of all time: a small cap is not allowed a large one's
+    slack. A time whose phase is lost is left to the step, which refuses it.
+    """
     anchors = np.zeros(motion.ANCHORS_SHAPE)
-    motion.set_anchors(compiled.laws, anchors, state.t, 0.0)
+    if not motion.set_anchors(compiled.laws, anchors, state.t, 0.0):
+        return 0.0, 1.0
+    r, w, h = (float(anchors[row, 0]) for row in (codes.R, codes.W, codes.H))
+    if compiled.is_relative:
+        w *= r
+    if state.wall == "base":
+        return state.y, max(r, w)
     f, _ = walls.wall_residual(
         WALL_CODES[state.wall],
         state.x,
@@ -173,8 +211,8 @@ def wall_gap(scene: Scene, state: State) -> tuple[float, float]:
         compiled.is_relative,
     )
     if state.wall == "arc":
-        return float(f / (2 * anchors[0, 0])), float(anchors[0, 0])
-    return float(f), float(compiled.bounds[2, 1] if state.wall == "floor" else compiled.bounds[1, 1])
+        return float(f) / (2.0 * r), r
+    return float(f), h if state.wall == "floor" else w
 
 
 def trouble(code: int, state: State, wall: Wall | None = None) -> Outcome:

@@ -46,7 +46,7 @@ class Collision(msgspec.Struct, frozen=True, tag_field="outcome", tag="collision
 
 
 class Horizon(msgspec.Struct, frozen=True, tag_field="outcome", tag="horizon"):
-    """No collision before t_end (one at t_end exactly is not before it); the state there, before any bounce."""
+    """No collision before t_end (one at t_end exactly is not before it); the state there, not bounced."""
 
     t: float
     x: float

@@ -28,13 +28,13 @@ OFF = np.bool_(False)
 def test_the_compiler_packs_divisions_and_square_roots(loop):
     """Four lanes to an instruction, where the machine has 256-bit registers."""
     a = np.ones(lanes.N_ROWS * lanes.LANES)
-    n, numbers = np.int64(60), (1.0, 0.1, 1.0, 1.0)
+    n, limits = np.int64(60), lanes.Limits(*[1.0] * 9, False)
     function = getattr(lanes, loop)
     arguments = {
-        "aim": (OFF, *numbers[:3]),
-        "fly": (OFF, True, *numbers[:3]),
+        "aim": (OFF, 0.1, limits),
+        "fly": (OFF, True, 1.0, 0.1, limits),
         "bounce": (0.1, True),
-        "chord": (OFF, OFF, True, *numbers[:3]),
+        "chord": (OFF, OFF, True, 1.0, limits),
         "rebound": (),
     }
     function(a, n, *arguments[loop])

@@ -1,0 +1,211 @@
+"""Units of length and time, powers of two chosen for a scene, in which the kernels work.
+
+A scene is brought to about one size and one period before any arithmetic, and answers are brought back. Two
+scenes that differ by powers of two of length and time are then one and the same to the kernels, so that their
+answers are the same bits, scaled; and no square overflows or vanishes but that of a state 2^300 times faster
+or slower than its table, which is refused. A static table has no time of its own: there the unit of time
+makes each state's speed what it should be.
+
+Every change of units is exact or refused: scaling by a power of two loses bits only where numbers become
+subnormal or infinite. The kernel's sizes are well above 1 (2^96 for a length, 2^32 for a time) so that the
+least of all floats, beside a table of common size, comes in exactly too.
+"""
+
+from __future__ import annotations
+
+import math
+from functools import lru_cache
+from typing import NamedTuple
+
+import msgspec
+import numpy as np
+
+from fast.compiled import LARGEST, Compiled, FloatArray, compile_scene
+from scene import BangBang, Fourier, InvalidState, Law, Scene, State
+from scene.refusal import BadInput
+from scene.tables import laws, period
+
+LENGTH, TIME = 96, 32  # exponents of a table's size and period in the kernel
+
+
+class Units(NamedTuple):
+    """A kernel's length times 2^length is the scene's, and a kernel's time times 2^time.
+
+    Attributes:
+        length, time: the exponents, for one scene and state.
+    """
+
+    length: int
+    time: int
+
+    def state(self, state: State) -> State:
+        """Return a state in the kernel's units.
+
+        Raises:
+            InvalidState: it is too fast or too slow for its table, or loses bits beside the table's size.
+        """
+        speed = self.length - self.time
+        exponents = {"t": self.time, "x": self.length, "y": self.length, "vx": speed, "vy": speed}
+        inner = {name: inward(f"state.{name}", getattr(state, name), e) for name, e in exponents.items()}
+        for name in ("x", "y", "vx", "vy"):
+            if not abs(inner[name]) <= LARGEST:
+                raise InvalidState(
+                    f"state.{name} = {getattr(state, name)!r}, must be below 2^400 in size beside the table's"
+                    " size and period"
+                )
+        fastest = max(abs(inner["vx"]), abs(inner["vy"]))
+        if 0.0 < fastest < 1.0 / LARGEST:
+            raise InvalidState(
+                f"speed = {max(abs(state.vx), abs(state.vy))!r}, must be 0 or at least 2^-400 beside the"
+                " table's size and period"
+            )
+        return State(**inner, wall=state.wall)
+
+    def horizon(self, t_end: float) -> float:
+        """Return a horizon, which may be infinite, in the kernel's units."""
+        return inward("t_end", t_end, self.time)
+
+    def steps(self, rows: FloatArray) -> FloatArray:
+        """Return rows of [dt, t, x, y, vx, vy], each a number or a pair, in the scene's units."""
+        speed = self.length - self.time
+        exponents = np.array([self.time, self.time, self.length, self.length, speed, speed])
+        return outward(rows, exponents if rows.shape[-1] == 6 else exponents[:, None])
+
+    def places(self, rows: FloatArray) -> FloatArray:
+        """Return rows of [x, y, vx, vy] in the scene's units."""
+        speed = self.length - self.time
+        return outward(rows, np.array([self.length, self.length, speed, speed]))
+
+    def times(self, numbers: FloatArray) -> FloatArray:
+        """Return times in the scene's units."""
+        return outward(numbers, np.array(self.time))
+
+    def energies(self, numbers: FloatArray) -> FloatArray:
+        """Return energies, squares of speeds, in the scene's units."""
+        return outward(numbers, np.array(2 * (self.length - self.time)))
+
+
+class Fitted(NamedTuple):
+    """A scene in the kernel's units.
+
+    Attributes:
+        scene: with its lengths and times divided by the units.
+        length: exponent of the unit of length.
+        time: exponent of the unit of time; None for a static table, which leaves it to the state.
+        compiled: its numbers for the kernels.
+    """
+
+    scene: Scene
+    length: int
+    time: int | None
+    compiled: Compiled
+
+    def units(self, state: State) -> Units:
+        """Return the units for one state: all that depends on it is a static table's unit of time."""
+        return self.units_at(max(abs(state.vx), abs(state.vy)))
+
+    def units_at(self, speed: float) -> Units:
+        """Return the units for a state whose faster component of velocity has this size."""
+        if self.time is not None:
+            return Units(self.length, self.time)
+        own = self.length + LENGTH - exponent(speed) - TIME if speed > 0.0 else 0
+        return Units(self.length, own)
+
+
+@lru_cache(maxsize=256)
+def fit(scene: Scene) -> Fitted:
+    """Bring a scene to the kernel's units.
+
+    Raises:
+        BadInput: a number of the scene loses bits beside the table's size and period, or a wall is too fast.
+    """
+    sizes = [level(law) for name, law in laws(scene).items() if name in ("r", "w", "h")]
+    length = exponent(max(sizes)) - LENGTH
+    shared = period(scene)
+    time = None
+    if shared is not None:
+        own = -exponent(shared.omega) if shared.omega is not None else exponent(_as_float(shared.length))
+        time = own - TIME
+    changed = {
+        name: _in_units(law, f"scene.{name}", 0 if name in ("nu", "slope") else length, time or 0)
+        for name, law in laws(scene).items()
+    }
+    fitted = msgspec.structs.replace(scene, **changed)
+    return Fitted(fitted, length, time, compile_scene(fitted))
+
+
+def exponent(size: float) -> int:
+    """Return e with 2^e <= size < 2^(e + 1), for size > 0."""
+    return math.frexp(size)[1] - 1
+
+
+def level(law: Law) -> float:
+    """Return a number within a factor of a few dozen of a positive law's largest value.
+
+    It is one of the law's own numbers, so that it scales as the law does, to the bit.
+    """
+    if isinstance(law, BangBang):
+        return max(knot[1] for knot in law.knots)
+    return law.mean if isinstance(law, Fourier) else law
+
+
+def inward(field: str, number: float, exponent: int) -> float:
+    """Return a number divided by 2^exponent, exactly.
+
+    Raises:
+        InvalidState: it would lose bits, or be too large.
+    """
+    try:
+        scaled = math.ldexp(number, -exponent)
+    except OverflowError:
+        scaled = math.inf
+    if scaled == number or (abs(scaled) < math.inf and math.ldexp(scaled, exponent) == number):
+        return scaled
+    bound = "at least 2^-900" if abs(scaled) < 1.0 else "below 2^900 in size"
+    raise InvalidState(f"{field} = {number!r}, must be {bound} beside the table's size and period")
+
+
+def outward(numbers: FloatArray, exponents: FloatArray) -> FloatArray:
+    """Return kernel numbers times 2^exponents, exactly; infinities and nans as they are.
+
+    Raises:
+        BadInput: one of them would lose bits, or overflow.
+    """
+    with np.errstate(over="ignore", under="ignore"):
+        scaled = np.ldexp(numbers, exponents)
+        is_kept = (np.ldexp(scaled, -exponents) == numbers) | ~np.isfinite(numbers)
+    if not is_kept.all():
+        raise BadInput("the answer holds a number beyond binary64: every one must be 0 or 2^-1022 to 2^1023")
+    return scaled
+
+
+def _as_float(length: object) -> float:
+    return float(length)  # type: ignore[arg-type]  # a Fraction that a scene has found to be a float
+
+
+def _in_units(law: Law, field: str, length: int, time: int) -> Law:
+    def size(number: float) -> float:
+        return _kept(field, number, length)
+
+    def moment(number: float) -> float:
+        return _kept(field, number, time)
+
+    if isinstance(law, BangBang):
+        return BangBang(knots=tuple((moment(t), size(v)) for t, v in law.knots))
+    if isinstance(law, Fourier):
+        cos, sin = (tuple(size(a) for a in amplitudes) for amplitudes in (law.cos, law.sin))
+        return Fourier(
+            mean=size(law.mean),
+            omega=None if law.omega is None else _kept(field, law.omega, -time),
+            cos=cos,
+            sin=sin,
+            period=None if law.period is None else moment(law.period),
+        )
+    return size(law)
+
+
+def _kept(field: str, number: float, exponent: int) -> float:
+    try:
+        return inward(field, number, exponent)
+    except InvalidState as error:
+        raise BadInput(str(error)) from None

@@ -1,0 +1,40 @@
+"""The fast stepper with one line of its kernels changed, compiled and run in a process of its own."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import fast
+
+HOUSE = Path(fast.__file__).parent.parent
+
+
+def output_of(folder: Path, program: str, file: str = "", old: str = "", new: str = "") -> str:
+    """Run a program on a copy of the fast stepper in which `old` stands no more in `file`.
+
+    Args:
+        folder: an empty folder for the copy.
+        program: Python source.
+        file: a file of fast/; none to run the honest kernels in the same manner.
+        old: its text to replace, found exactly once.
+        new: what to put there.
+
+    Returns:
+        What the program printed.
+    """
+    shutil.copytree(HOUSE / "fast", folder / "fast", ignore=shutil.ignore_patterns("__pycache__"))
+    if file:
+        source = (folder / "fast" / file).read_text("utf-8")
+        assert source.count(old) == 1, (file, old, source.count(old))
+        (folder / "fast" / file).write_text(source.replace(old, new), "utf-8")
+    paths = [str(folder), str(HOUSE), str(HOUSE / "tests")]
+    cache = str(folder / "cache")
+    environment = {**os.environ, "NUMBA_CACHE_DIR": cache, "PYTHONPATH": os.pathsep.join(paths)}
+    command = [sys.executable, "-W", "ignore", "-c", program]
+    done = subprocess.run(command, env=environment, cwd=folder, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    return done.stdout

@@ -1,0 +1,316 @@
+"""A battery that the reference passes and its mutants fail (test_reference_mutants).
+
+The battery knows its answers from closed forms, from symmetries, and from the law of reflection
+in plain mpmath; nothing in it compares the reference with its own earlier results.
+"""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+import mpmath
+import pytest
+
+import reference
+from reference.arithmetic import Arithmetic
+from scene import BangBang, Cap, Fourier, Mushroom, State, Stem, Undecided, Undefined
+from scene.laws import value
+from scene.tables import laws
+
+CIRCLE = Cap(r=1.0)
+BOX = Stem(w=1.0, h=1.0)
+STATIC = Mushroom(r=1.0, h=1.0, w=0.5)
+LIFT = Stem(w=1.0, h=BangBang(knots=((0.0, 2.0), (0.5, 1.0), (1.0, 2.0))))
+BREATHING = Cap(r=Fourier(mean=1.0, omega=1.0, sin=(0.25,)))
+CLOSING = Mushroom(r=1.0, h=1.0, w=BangBang(knots=((0.0, 0.5), (1.0, 0.25), (2.0, 0.5))))
+TILTING = Mushroom(
+    r=Fourier(mean=1.0, omega=1.0, sin=(0.125,)),
+    nu=Fourier(mean=0.5, omega=1.0, cos=(0.125,)),
+    h=Fourier(mean=1.0, omega=1.0, sin=(-0.25,)),
+    slope=Fourier(mean=0.0625, omega=1.0, sin=(0.0625,)),
+)
+DIGITS = 20
+
+
+def hit(scene, state, wall, t_end=100.0, **options):
+    found = reference.next_collision(scene, state, t_end, digits=DIGITS, **options)
+    assert isinstance(found, reference.Collision)
+    assert found.wall == wall
+    return found
+
+
+def holds(enclosure, number):
+    return enclosure.lo - mpmath.mpf(10) ** -40 <= number <= enclosure.hi + mpmath.mpf(10) ** -40
+
+
+def chord():
+    found = hit(CIRCLE, State(0.0, 0.25, 0.5, 2.0, 1.0), "arc")
+    assert holds(found.dt, (-1 + mpmath.sqrt(1 + 5 * (1 - mpmath.mpf("0.3125")))) / 5)
+    speed2 = mpmath.mpf(float(found.after.vx)) ** 2 + mpmath.mpf(float(found.after.vy)) ** 2
+    assert abs(speed2 - 5) < mpmath.mpf(2) ** -48
+
+
+def leaving_a_chord():
+    state = State(0.0, 0.6, 0.8, -1.0, 0.5, "arc")
+    x, y, vx, vy = (Fraction(n) for n in (state.x, state.y, state.vx, state.vy))
+    found = hit(CIRCLE, state, "arc")
+    assert found.dt.contains(-2 * (x * vx + y * vy) / (vx * vx + vy * vy))
+
+
+def lift():
+    found = hit(LIFT, State(0.0, 0.0, -1.75, 0.0, 0.0), "floor")
+    s = mpmath.sqrt(mpmath.mpf(1) / 32)
+    assert holds(found.dt, s)
+    assert holds(found.after.vy, 32 * s)
+
+
+def lift_beyond_a_knot():
+    found = hit(LIFT, State(0.0, 0.0, -1.0625, 0.0, 0.0), "floor")
+    assert holds(found.dt, mpmath.mpf("0.5") - mpmath.sqrt(mpmath.mpf(1) / 128))
+
+
+def first_of_two():
+    """A slow particle would be met again by the floor's second rise."""
+    found = hit(LIFT, State(0.0, 0.0, -1.25, 0.0, -0.125), "floor")
+    assert float(found.dt) < 0.5
+
+
+def recollision():
+    assert hit(LIFT, State(0.0, 0.0, -2.0, 0.0, 2.0**-30, "floor"), "floor").dt.contains(2.0**-33)
+
+
+def box():
+    """Right at 1/4 before floor at 1/2, and the other way round; mirrored, left."""
+    assert hit(BOX, State(0.0, 0.75, -0.5, 1.0, -1.0), "right").dt.contains(0.25)
+    assert hit(BOX, State(0.0, -0.75, -0.5, -1.0, -1.0), "left").dt.contains(0.25)
+    assert hit(BOX, State(0.0, 0.25, -0.75, 1.0, -1.0), "floor").dt.contains(0.25)
+    assert hit(BOX, State(0.0, 0.25, -0.25, 1.0, 1.0), "base").dt.contains(0.25)
+
+
+def horizon():
+    found = reference.next_collision(BOX, State(0.0, 0.0, -0.5, 1.0, 0.0), 0.5, digits=DIGITS)
+    assert isinstance(found, reference.Horizon)
+    assert found.at.x.contains(0.5)
+
+
+def mouth():
+    assert hit(STATIC, State(0.0, 0.25, 0.5, 0.0, -1.0), "floor").dt.contains(1.5)
+    assert hit(STATIC, State(0.0, 0.75, 0.5, 0.0, -1.0), "base").dt.contains(0.5)
+    edge = reference.next_collision(STATIC, State(0.0, 0.25, 0.25, 1.0, -1.0), 9.0, digits=DIGITS)
+    assert edge == Undefined("mouth-edge")
+
+
+def closing_mouth():
+    assert hit(CLOSING, State(0.0, 0.4375, 0.5, 0.0, -1.0), "base").dt.contains(0.5)
+    hit(CLOSING, State(1.0, 0.3125, 0.5, 0.0, -1.0), "floor")
+
+
+def starts():
+    """One flight to each wall of a mushroom in which everything moves."""
+    return [
+        ("arc", State(0.5, 0.1, 0.3, 2.0, 3.0)),
+        ("base", State(0.5, 0.9, 0.2, 0.25, -2.0)),
+        ("right", State(0.5, 0.1, -0.3, 3.0, 0.5)),
+        ("left", State(0.5, 0.1, -0.3, -3.0, -0.5)),
+        ("floor", State(0.5, 0.1, -0.3, 0.25, -3.0)),
+    ]
+
+
+def wall_function(scene, wall):
+    def law(name, t):
+        return value(mpmath.mp, laws(scene)[name], t)
+
+    def width(y, t):
+        return law("nu", t) * law("r", t) + law("slope", t) * y
+
+    return {
+        "arc": lambda x, y, t: law("r", t) - mpmath.sqrt(x * x + y * y),
+        "base": lambda x, y, t: y,
+        "right": lambda x, y, t: width(y, t) - x,
+        "left": lambda x, y, t: width(y, t) + x,
+        "floor": lambda x, y, t: y + law("h", t),
+    }[wall]
+
+
+def law_of_reflection():
+    """V' = v - 2 (v.n - u) n, with n and u from numerical derivatives of the wall's equation."""
+    with mpmath.workdps(50):
+        for wall, q in starts():
+            found = hit(TILTING, q, wall)
+            f = wall_function(TILTING, wall)
+            s = (found.dt.lo + found.dt.hi) / 2
+            x, y, t = q.x + q.vx * s, q.y + q.vy * s, q.t + s
+            assert abs(f(x, y, t)) < mpmath.mpf(10) ** -DIGITS
+            for i in range(1, 50):
+                assert f(q.x + q.vx * s * i / 50, q.y + q.vy * s * i / 50, q.t + s * i / 50) > 0
+            f_x, f_y, f_t = (mpmath.diff(f, (x, y, t), n) for n in ((1, 0, 0), (0, 1, 0), (0, 0, 1)))
+            push = 2 * (f_x * q.vx + f_y * q.vy + f_t) / (f_x**2 + f_y**2)
+            assert abs((found.after.vx.lo) - (q.vx - push * f_x)) < mpmath.mpf(10) ** -15
+            assert abs((found.after.vy.lo) - (q.vy - push * f_y)) < mpmath.mpf(10) ** -15
+
+
+def differentiated():
+    """The Jacobian's column by t is what moving the start in time by +-2^-20 shows."""
+    q = State(0.5, 0.1, 0.3, 2.0, 3.0)
+    found = hit(BREATHING, q, "arc", is_differentiated=True)
+    ends = [
+        hit(BREATHING, State(q.t + step, q.x, q.y, q.vx, q.vy), "arc") for step in (2.0**-20, -(2.0**-20))
+    ]
+    columns = zip(*((e.dt, *e.after[1:]) for e in ends), strict=True)
+    for row, (plus, minus) in zip(found.jacobian, columns, strict=True):
+        assert float(row[0]) == pytest.approx(float(plus.lo - minus.lo) * 2.0**19, abs=1e-8)
+
+
+def mirror():
+    for wall, q in starts():
+        found = hit(TILTING, q, wall)
+        other = {"left": "right", "right": "left"}.get(wall, wall)
+        image = hit(TILTING, State(q.t, -q.x, q.y, -q.vx, q.vy), other)
+        assert (found.dt, found.after.vy) == (image.dt, image.after.vy)
+        assert float(found.after.vx) == -float(image.after.vx)
+
+
+def nested_precisions():
+    for wall, q in starts():
+        found, finer = (reference.next_collision(TILTING, q, 9.0, digits=d) for d in (10, 40))
+        assert isinstance(found, reference.Collision)
+        assert isinstance(finer, reference.Collision)
+        assert found.wall == finer.wall == wall
+        assert found.dt.lo <= finer.dt.hi
+        assert finer.dt.lo <= found.dt.hi
+
+
+def reversed_film():
+    """With laws and velocity reversed, three bounces of a breathing circle are retraced."""
+    film = Cap(r=Fourier(mean=1.0, omega=1.0, sin=(-0.25,)))
+    q = State(0.0, 0.25, 0.5, 2.0, 1.0)
+    there = reference.trajectory(BREATHING, q, 9, 2.0, digits=DIGITS).outcome
+    assert isinstance(there, reference.Horizon)
+    end = there.rounded()
+    back = reference.trajectory(
+        film, State(-2.0, end.x, end.y, -end.vx, -end.vy), 9, 0.0, digits=DIGITS
+    ).outcome
+    assert isinstance(back, reference.Horizon)
+    home = back.rounded()
+    assert (home.x, home.y, -home.vx, -home.vy) == pytest.approx((q.x, q.y, q.vx, q.vy), abs=1e-12)
+
+
+# A floor whose highest place is well below what its amplitudes add up to.
+GRAZING = Stem(w=1.0, h=Fourier(mean=1.25, omega=1.0, cos=(0.125,), sin=(0.0, 0.125)))
+# The width leaps from 0.01 to 0.9 within 2e-16 of the second event, at t = 2^110.
+LEAP = Mushroom(
+    r=1.0,
+    h=1.0,
+    w=BangBang(
+        knots=((0.0, 0.01), (1.6097936544959741, 0.01), (1.6097936544959743, 0.9), (5.6, 0.9), (16.0, 0.01))
+    ),
+)
+
+
+def knot_within_an_enclosed_time():
+    """The mouth is open when y = 0 is crossed; with its knot within the enclosure, nothing is said."""
+    q = State(2.0**110, 0.3, 0.5, 0.02, 1.0)
+    assert [step.wall for step in reference.trajectory(LEAP, q, 2).steps] == ["arc", "left"]
+    for working in (6, 8, 10, 12, 15):
+        path = reference.trajectory(LEAP, q, 2, working=working)
+        assert [step.wall for step in path.steps] in (["arc"], ["arc", "left"])
+        assert len(path.steps) == 2 or isinstance(path.outcome, Undecided)
+
+
+def floor_within_an_enclosed_time():
+    """After the side, the floor begins to rise a little before or after it would be met."""
+    for i in range(40):
+        knot = 4096.0 + 1.0 + (i - 20) * 2.0**-24
+        low = BangBang(
+            knots=((4096.0, 1.0), (knot, 1.0), (knot + 2.0**-20, 0.5), (4104.0, 0.5), (4112.0, 1.0))
+        )
+        q = State(4096.0, 0.5, -0.25, 1.0, -0.75 + 2.0**-30)
+        exact = reference.trajectory(Stem(w=1.0, h=low), q, 2, digits=20).steps
+        assert len(exact) == 2
+        truth = exact[-1]
+        path = reference.trajectory(Stem(w=1.0, h=low), q, 2, working=8)
+        for step in path.steps[1:]:
+            assert step.dt.lo <= truth.dt.hi
+            assert truth.dt.lo <= step.dt.hi
+            assert step.after.vy.lo <= truth.after.vy.hi
+            assert truth.after.vy.lo <= step.after.vy.hi
+
+
+def removed_residual_decides():
+    """Left of a wall by 1.5 2^-300 by rounding: with that removed, the wall is met before the top."""
+    for slope, t_end in (
+        (-(2.0**-300), 3.0),
+        (BangBang(((-0.25, 0.0), (0.75, -(2.0**-300)), (1.75, 0.0))), 1.75),
+    ):
+        tilted = Stem(w=BangBang(((0.0, 1.0), (1.0, 2.0), (2.0, 1.0))), h=4.0, slope=slope)
+        hit(tilted, State(0.25, -1.125, -1.5, 0.0, 1.0, "left"), "left", t_end)
+
+
+def met_at_the_horizon():
+    """A wall met at t_end exactly is not met before it."""
+    found = reference.next_collision(BOX, State(0.0, 0.25, -0.25, 1.0, -0.75), 0.75, digits=DIGITS)
+    assert isinstance(found, reference.Horizon)
+
+
+def on_two_walls():
+    for q, reason in (
+        (State(0.0, 1.0, 0.0, -0.1, -1.0, "arc"), "corner"),
+        (State(0.0, -0.5, 0.0, 1.0, 0.0, "left"), "mouth-edge"),
+        (State(0.0, -0.5, 0.0, 1.0, 0.3, "left"), "mouth-edge"),
+        (State(0.0, 0.5, -1.0, -1.0, 1.0, "right"), "corner"),
+    ):
+        assert reference.next_collision(STATIC, q, 9.0, digits=DIGITS) == Undefined(reason)
+
+
+def hit_on_a_knot():
+    """The arc is met just as a violent leg begins."""
+    violent = Cap(r=BangBang(((0.0, 1.0), (1.0, 1.0), (1.0 + 2.0**-20, 0.5), (2.0, 0.5), (4.0, 1.0))))
+    assert hit(violent, State(0.0, 0.0, 0.5, 0.0, 0.5), "arc").dt.contains(1)
+
+
+def edge_as_the_wall_left_sees_it():
+    """An ulp outside the side that it leaves, and moving away: it passes the mouth."""
+    hit(STATIC, State(0.0, -0.5 - 2.0**-53, -0.25, 2.0**-66, 1.0, "left"), "arc")
+
+
+def bounded_work():
+    """A floor that never quite reaches a resting particle, over 160,000 periods: given up, and soon."""
+    spent = [0]
+    honest = Arithmetic.spend
+
+    def watched(self, units):
+        spent[0] += units
+        assert spent[0] < 110_000
+        honest(self, units)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Arithmetic, "spend", watched)
+        outcome = reference.next_collision(GRAZING, State(0.0, 0.5, -1.01, 0.0, 0.0), 1e6, digits=DIGITS)
+    assert isinstance(outcome, Undecided)
+
+
+BATTERY = (
+    knot_within_an_enclosed_time,
+    floor_within_an_enclosed_time,
+    removed_residual_decides,
+    met_at_the_horizon,
+    on_two_walls,
+    hit_on_a_knot,
+    edge_as_the_wall_left_sees_it,
+    bounded_work,
+    chord,
+    leaving_a_chord,
+    lift,
+    lift_beyond_a_knot,
+    first_of_two,
+    recollision,
+    box,
+    horizon,
+    mouth,
+    closing_mouth,
+    law_of_reflection,
+    differentiated,
+    mirror,
+    nested_precisions,
+    reversed_film,
+)

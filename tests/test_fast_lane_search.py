@@ -1,0 +1,77 @@
+"""No lane answer is wrong: the directed search, its mutants, and lanes asked by themselves.
+
+`MUSHROOMS_LANE_ANSWERS=20000 pytest tests/test_fast_lane_search.py` searches deeper.
+"""
+
+from __future__ import annotations
+
+import os
+
+import numpy as np
+import pytest
+from faulty_kernels import output_of
+from lane_search import draw_scene, draw_start, search
+
+import fast
+from fast.batch import lane_steps
+from fast.stepper import WALL_NAMES
+from scene import Cap, Collision, Fourier, Mushroom, Rejected, State
+
+N_ANSWERS = int(os.environ.get("MUSHROOMS_LANE_ANSWERS", "2500"))
+
+
+def test_no_lane_answer_is_wrong(tally):
+    assert search(11, N_ANSWERS, tally) == []
+
+
+def test_the_arc_that_comes_and_goes_on_the_way_to_the_base():
+    """Near the least radius f of the arc dips below zero and comes back: two hits, not one."""
+    scene = Mushroom(r=Fourier(1.0, 1.0, (0.9,)), h=1.0, w=0.0005)
+    state = State(
+        3.116786370335045, 0.09723691417765834, 0.024502880446325, 0.05208237622567096, -0.29708987593890235
+    )
+    run = fast.flow(scene, [state], 3.377786370335045)
+    assert run.wall_counts.tolist() == [[2, 1, 0, 0, 0]]
+
+
+def test_lanes_alone_take_the_careful_steps_and_no_free_starts(tally):
+    random = np.random.default_rng(8)
+    for _ in range(12):
+        scene = draw_scene(random)
+        starts = [draw_start(scene, random) for _ in range(24)]
+        rows = [(tuple(float(v) for v in np.delete(p, 1)), wall) for p, wall in starts]
+        on_walls = [State(*row, WALL_NAMES[wall]) for row, wall in rows]
+        free = [State(*row) for row, _ in rows]
+        assert set(lane_steps(scene, free)) == {None}
+        for state, found in zip(on_walls, lane_steps(scene, on_walls), strict=True):
+            truth = fast.next_collision(scene, state, state.t + 1e3)
+            if found is None or isinstance(truth, Rejected):
+                continue
+            tally["lane steps"] += 1
+            assert isinstance(truth, Collision)
+            assert (found.wall, found.dt) == (truth.wall, pytest.approx(truth.dt, rel=1e-6))
+    assert tally["lane steps"] > 20
+
+
+def test_a_start_by_decree_is_left_to_the_careful_step():
+    """Within 2^-20 of its wall a state is on it by definition; lanes know walls that they have met."""
+    scene = Cap(r=1.0)
+    exact, near = State(0.0, 0.0, 1.0, 0.5, -1.0, "arc"), State(0.0, 0.0, 1.0 - 2.0**-22, 0.5, -1.0, "arc")
+    taken, left = lane_steps(Mushroom(r=1.0, h=1.0, w=0.5), [exact, near])
+    assert isinstance(taken, Collision)
+    assert left is None
+    assert isinstance(fast.next_collision(scene, near, 9.0), Collision)
+
+
+PROGRAM = """
+from collections import Counter
+from lane_search import search
+print(len(search({seed}, {n}, Counter())))
+"""
+MUTANTS = {}
+
+
+@pytest.mark.parametrize("name", MUTANTS)
+def test_the_search_kills(name, tmp_path):
+    seed, n, old, new = MUTANTS[name]
+    assert int(output_of(tmp_path, PROGRAM.format(seed=seed, n=n), "lanes.py", old, new)) > 0

@@ -1,0 +1,106 @@
+"""A wall met again just after a knot of its law keeps its speed; starts on two walls; on its wall today."""
+
+from __future__ import annotations
+
+import math
+import os
+
+import pytest
+from faulty_kernels import output_of
+from recollisions import recollisions
+from truth import proved_step
+
+import fast
+from conformance.agreement import compare
+from scene import BangBang, Cap, Collision, Fourier, Mushroom, Rejected, State, Stem, Undefined
+
+N_RECOLLISIONS = int(os.environ.get("MUSHROOMS_RECOLLISIONS", "25"))
+STATIC = Mushroom(r=1.0, h=1.0, w=0.5)
+
+
+def again(seed, n, t_ahead=5.0):
+    """Yield the first n recollisions: scene, state and answer."""
+    for scene, state in recollisions(seed, 20 * n):
+        found = fast.next_collision(scene, state, state.t + t_ahead)
+        if isinstance(found, Collision) and found.wall == state.wall:
+            yield scene, state, found
+            n -= 1
+        if n == 0:
+            return
+
+
+def test_recollisions_are_right_to_four_backward_ulps(tally):
+    for scene, state, found in again(1, N_RECOLLISIONS):
+        agreement = compare(found, proved_step(scene, state, state.t + 5.0), state, 4.0)
+        tally["recollisions"] += 1
+        assert agreement.kind == "agrees", (agreement, scene, state)
+
+
+PROGRAM = """
+from test_fast_recollisions import again
+for scene, state, found in again(1, 60):
+    print(found.vx.hex(), found.vy.hex())
+"""
+
+
+@pytest.mark.parametrize(
+    ("file", "old", "new"),
+    [
+        ("careful.py", "        rest += change\n        if abs(change) <=", "        if abs(change) <="),
+        (
+            "careful.py",
+            "s_low = rest_of_hop(wall, s, f, slope_s, p, laws, anchors, is_relative)",
+            "s_low = 0.0",
+        ),
+    ],
+)
+def test_without_the_rest_of_a_hop_speeds_are_wrong(file, old, new, tmp_path):
+    """A mutant: the time of the hit only to its own last bit, or to first order."""
+    honest = [v for _, _, found in again(1, 60) for v in (found.vx, found.vy)]
+    spoilt = [float.fromhex(word) for word in output_of(tmp_path, PROGRAM, file, old, new).split()]
+    off = [abs(a - b) / abs(a or 1.0) for a, b in zip(honest, spoilt, strict=True)]
+    assert max(off) > 1e-9
+
+
+def test_a_floor_met_again_across_a_knot_keeps_its_speed():
+    rest = 1.1677015281036474
+    knots = (
+        (0.0, 2.1896091243577565), (0.18958107597645885, rest), (0.261809659609697, rest),
+        (0.2870035976351556, 0.3360244714926794), (0.5, 2.1896091243577565),
+    )  # fmt: skip
+    scene = Mushroom(r=1.9226618138907277, h=BangBang(knots), nu=0.3133864674412362)
+    state = State(
+        59.7010171193737, 0.008512276997033654, -rest, -0.0874566283705382, 5.536225002296594e-15, "floor"
+    )
+    truth = proved_step(scene, state, 100.0)
+    assert compare(fast.next_collision(scene, state, 100.0), truth, state, 4.0).kind == "agrees"
+
+
+@pytest.mark.parametrize(
+    ("scene", "state", "reason"),
+    [
+        (STATIC, State(0.0, -0.5, 0.0, 1.0, 0.3, "left"), "mouth-edge"),
+        (STATIC, State(0.0, -0.5, 0.0, 1.0, 0.0, "left"), "mouth-edge"),
+        (STATIC, State(0.0, 0.5, 0.0, -1.0, -0.3, "right"), "mouth-edge"),
+        (STATIC, State(0.0, 1.0, 0.0, -0.1, -1.0, "arc"), "corner"),
+        (Cap(r=1.0), State(0.0, 1.0, 0.0, -1.0, 0.1, "arc"), "corner"),
+        (Stem(w=1.0, h=1.0), State(0.0, 1.0, 0.0, -1.0, -0.1, "right"), "corner"),
+    ],
+)
+def test_a_start_on_two_walls_is_a_corner(scene, state, reason):
+    assert fast.next_collision(scene, state, 9.0) == Undefined(reason)
+    assert fast.trajectory(scene, state, 3).outcome == Undefined(reason)
+    assert fast.fine_trajectory(scene, state, 3).outcome == Undefined(reason)
+
+
+def test_on_its_wall_is_judged_by_todays_size():
+    """Where the radius is a thousandth of its largest, so is the slack that a place on the arc has."""
+    breathing = Cap(r=Fourier(1.0, 1.0, (0.999,)))
+    off = fast.next_collision(breathing, State(math.pi, 0.0, 1e-3 + 5e-9, 0.0, -1.0, "arc"), 9.0)
+    assert isinstance(off, Rejected)
+    assert isinstance(
+        fast.next_collision(breathing, State(math.pi, 0.0, 1e-3, 0.0, -1.0, "arc"), 9.0), Collision
+    )
+    far = fast.next_collision(breathing, State(math.pi, 0.0, 1e-4, 0.0, -1.0, "arc"), 9.0)
+    assert isinstance(far, Rejected)
+    assert "away from that wall" in far.reason

@@ -1,0 +1,115 @@
+"""Scaling by powers of two: the same bits or a refusal, whatever the exponents; the extremes of binary64.
+
+`MUSHROOMS_SCALINGS=20000 pytest tests/test_fast_units.py` searches deeper.
+"""
+
+from __future__ import annotations
+
+import os
+
+import numpy as np
+import pytest
+from scale_search import search
+from truth import proved_step
+
+import fast
+from conformance.agreement import compare
+from conformance.transforms import scaled
+from fast import flow, stepper
+from fast.compiled import compile_scene
+from fast.units import Fitted
+from scene import BangBang, Cap, Collision, Fourier, Mushroom, Rejected, State, load
+from scene.refusal import BadInput
+
+N_SCALINGS = int(os.environ.get("MUSHROOMS_SCALINGS", "300"))
+
+
+def test_scaled_questions_have_scaled_answers(tally):
+    assert search(4, N_SCALINGS, tally) == []
+    assert tally["answers"] > 0.6 * N_SCALINGS
+    assert tally["refused"] < 0.02 * N_SCALINGS
+
+
+def test_the_search_sees_a_stepper_that_does_not_scale(monkeypatch, tally):
+    """Kernels in the scene's own units, as they would be without fast.units."""
+
+    def unfitted(scene):
+        return Fitted(scene, 0, 0, compile_scene(scene))
+
+    monkeypatch.setattr(stepper, "fit", unfitted)
+    monkeypatch.setattr(flow, "fit", unfitted)
+    with np.errstate(all="ignore"):
+        assert search(4, 300, tally)
+
+
+def test_a_square_that_would_overflow():
+    length, speed = 2.0**150, 2.0**380
+    start = State(0.0, 0.3 * length, 0.2 * length, -0.9 * speed, 0.2 * speed)
+    found = fast.next_collision(Cap(r=length), start, 100 * length / speed)
+    one = fast.next_collision(Cap(r=1.0), State(0.0, 0.3, 0.2, -0.9, 0.2), 100.0)
+    assert isinstance(found, Collision)
+    assert isinstance(one, Collision)
+    assert (found.x, found.y, found.vx) == (length * one.x, length * one.y, speed * one.vx)
+    assert found.dt == one.dt * length / speed
+
+
+def test_an_ensemble_scales_to_the_bit():
+    scene, length, time = load("moving-cap"), 380, -350
+    energy = 2.0 ** (2 * (length - time) - 1000) * 1e3 * 2.0**300  # of a table that is slower by 2^-350
+    with pytest.raises(BadInput):
+        fast.simulate(scaled(scene, 2 * length, time), n_particles=5, energy=energy)
+    length, time = 190, 150
+    one = fast.simulate(scene, n_particles=5, energy=1e3, seed=2)
+    other = fast.simulate(
+        scaled(scene, length, time), n_particles=5, energy=1e3 * 4.0 ** (length - time), seed=2
+    )
+    speed = length - time
+    for name, exponent in (("x", length), ("t_in", time), ("vy", speed), ("cycle_energies", 2 * speed)):
+        assert np.array_equal(np.ldexp(getattr(one, name), exponent), getattr(other, name), equal_nan=True)
+
+
+@pytest.mark.parametrize(
+    ("scene", "state", "words"),
+    [
+        # A speed that a moving table's own time does not hold.
+        (Cap(r=Fourier(1.0, 1.0, (0.5,))), State(0.0, 0.1, 0.2, 1e200, 0.0), "2^400"),
+        (Cap(r=Fourier(1.0, 1.0, (0.5,))), State(0.0, 0.1, 0.2, 1e-200, 0.0), "2^-400"),
+        # Bits that would be lost beside the table's size, or in the answer.
+        (Cap(r=2.0**200), State(0.0, 5e-324, 1.0, 1.0, 0.0), "state.x = 5e-324"),
+        (Cap(r=2.0**-1030), State(0.0, 0.0, 2.0**-1031, 2.0**-1030, 2.0**-1031), "beyond binary64"),
+    ],
+)
+def test_what_does_not_fit_is_refused(scene, state, words):
+    found = fast.next_collision(scene, state, 1e9)
+    assert isinstance(found, Rejected)
+    assert words in found.reason
+    assert "\n" not in found.reason
+
+
+def test_the_least_of_all_floats_beside_a_common_table():
+    found = fast.next_collision(Cap(r=1.0), State(0.0, 0.0, 0.5, 3.0, 5e-324), 9.0)
+    assert isinstance(found, Collision)
+    assert found.wall == "arc"
+
+
+def test_fourier_laws_given_by_their_period_share_a_scene_with_knots(tally):
+    """2 pi / period as a sum of two floats: exact phases after two thousand periods."""
+    wave = Fourier(0.5, sin=(0.2, 0.1), period=1.0)
+    floor = BangBang(((0.0, 2.0), (0.3, 1.0), (0.5, 1.0), (1.0, 2.0)))
+    scene = Mushroom(r=Fourier(1.5, cos=(0.3,), period=1.0), h=floor, nu=wave)
+    random = np.random.default_rng(3)
+    for _ in range(12):
+        x, y, vx, vy = (float(v) for v in random.uniform((-0.8, 0.01, -5, -5), (0.8, 0.8, 5, 5)))
+        state = State(float(random.uniform(0, 2000)), x, y, vx, vy)
+        truth = proved_step(scene, state, state.t + 10.0)
+        found = compare(fast.next_collision(scene, state, state.t + 10.0), truth, state, 4.0)
+        tally[found.kind] += 1
+        assert found.kind in ("agrees", "undecided")
+    assert tally["agrees"] > 8
+
+
+def test_lanes_take_scenes_of_both_kinds_of_laws():
+    floor = BangBang(((0.0, 2.0), (0.3, 1.0), (0.5, 1.0), (1.0, 2.0)))
+    scene = Mushroom(r=Fourier(1.5, cos=(0.3,), period=1.0), h=floor, nu=Fourier(0.5, sin=(0.2,), period=1.0))
+    run = fast.simulate(scene, n_particles=20, energy=1e5, seed=1)
+    assert run.n_careful.sum() < 0.05 * run.n_collisions.sum()

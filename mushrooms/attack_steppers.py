@@ -9,7 +9,7 @@ import fast
 import reference
 from conformance.attacks import Attack, Claim, Steppers
 from reference.arithmetic import Enclosure, rational
-from reference.certificate import certificate
+from reference.certificate import certificate, path_certificate
 from scene import BadInput, Horizon, Scene, State, Undefined
 
 DIGITS = 25  # of a single step: enough to tell enclosures from wrong answers
@@ -25,13 +25,13 @@ def steppers(choice: str) -> Steppers:
 
 
 def prove(attack: Attack) -> Sequence[Claim]:
-    """Answer an attack with the reference: outcomes, enclosures, the certificate of a single step."""
+    """Answer an attack with the reference: outcomes, enclosures, and the certificate of all of it."""
     scene, state = attack.scene, attack.state
     if attack.n_collisions is None:
         assert attack.t_end is not None
         outcome = reference.next_collision(scene, state, attack.t_end, digits=DIGITS)
         claim = claimed(outcome)
-        if isinstance(outcome, reference.Collision | reference.Horizon):
+        if isinstance(outcome, reference.Collision | reference.Horizon | Undefined):
             claim = claim._replace(certificate=certificate(scene, state, attack.t_end, outcome))
         return [claim]
     try:
@@ -39,7 +39,10 @@ def prove(attack: Attack) -> Sequence[Claim]:
     except BadInput as error:
         return [Claim("rejected", reason=str(error))]
     steps: list[reference.Outcome] = [*path.steps]
-    return [claimed(step) for step in (steps if path.outcome is None else [*steps, path.outcome])]
+    claims = [claimed(step) for step in (steps if path.outcome is None else [*steps, path.outcome])]
+    if attack.t_end is None and isinstance(path.outcome, Undefined):
+        return claims  # without a horizon the proof of an undefined end cannot be written down
+    return [claims[0]._replace(certificate=path_certificate(scene, state, attack.t_end, path)), *claims[1:]]
 
 
 def claimed(outcome: reference.Outcome) -> Claim:

@@ -21,6 +21,7 @@ from conformance.attacks.search import as_truth, truths
 from conformance.second_stepper import Answer, flight, laws, next_collision, roots, start, stepper
 from conformance.second_stepper.stepper import Met, Search
 from scene import Collision, Outcome, Scene, State
+from scene.states import ON_WALL
 from scene.tables import period
 
 Patch = Callable[[pytest.MonkeyPatch], None]
@@ -111,6 +112,17 @@ def _whole_value(self: flight.Flight, wall: Any, s: Any) -> Any:
     q = self.state
     x, y = (laws.exact(place) + laws.exact(speed) * s for place, speed in ((q.x, q.vx), (q.y, q.vy)))
     return self._exact_sum(wall, x, y, laws.exact(q.t) + s)
+
+
+def size_of_all_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A state is on the wall it names by the largest size of all time."""
+
+    def is_near(at: flight.Flight, state: State, wall: Any) -> bool:
+        largest = max(law.range()[1].abs_upper() for law in at.table.laws.values())
+        gap = at.jet(wall, arb(0))[0]
+        return bool(abs(gap) < largest * (2 * largest if wall == "arc" else 1) * ON_WALL)
+
+    monkeypatch.setattr(start, "_is_near", is_near)
 
 
 def corner_unseen(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -237,3 +249,37 @@ def resting(attack: Attack) -> list[Claim]:
     """Take a particle at rest, or nearly, for never met."""
     is_at_rest = abs(attack.state.vx) + abs(attack.state.vy) < 2.0**-20
     return [Claim("horizon")] if is_at_rest else claims(truths(attack))
+
+
+def still_wall(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A bounce forgets that the wall moves."""
+
+    def still(at: flight.Flight, wall: Any, s: Any) -> Any:
+        nx, ny = at.gradient(wall, s)
+        c = at.course
+        push = 2 * (nx * c.vx + ny * c.vy) / (nx * nx + ny * ny)
+        return s, *at.place(s), c.vx - push * nx, c.vy - push * ny
+
+    monkeypatch.setattr(stepper, "bounced", still)
+
+
+def last_wall(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of several walls the one looked at last is answered."""
+    first = Search._first
+    monkeypatch.setattr(
+        Search,
+        "_first",
+        lambda self, walls, begin, limit: next(
+            filter(None, (first(self, (wall,), begin, limit) for wall in reversed(walls))), None
+        ),
+    )
+
+
+def lazy_taylor(monkeypatch: pytest.MonkeyPatch) -> None:
+    """An interval is passed when f > 0 at its middle."""
+    judged = roots._judged
+
+    def lazy(at: flight.Flight, wall: Any, a: Any, b: Any) -> str:
+        return "positive" if at.jet(wall, arb((a + b) / 2))[0] > 0 else judged(at, wall, a, b)
+
+    monkeypatch.setattr(roots, "_judged", lazy)

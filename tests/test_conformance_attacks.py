@@ -29,6 +29,7 @@ KILLS = {
     "flattening-slope": (faults.faulty(faults.residual_forgotten), 30),
     "arc-residual": (faults.faulty(faults.residual_forgotten), 40),
     "floor-residual": (faults.faulty(faults.residual_forgotten), 20),
+    "on-the-wall": (faults.faulty(faults.size_of_all_time), 30),
     "corner-start": (faults.faulty(faults.corner_unseen), 20),
     "side-at-mouth": (faults.faulty(faults.corner_unseen), 20),
     "corner-arrival": (faults.faulty(faults.tie_guessed), 20),

@@ -10,7 +10,7 @@ import math
 
 from conformance.attacks.case import Attack, Family
 from conformance.generate_draws import Draw
-from scene import BangBang, Cap, Law, Mushroom, Scene, State, Stem, Wall
+from scene import BangBang, Cap, Fourier, Law, Mushroom, Scene, State, Stem, Wall
 
 SPEEDS = (-2.0, -1.0, -0.75, -0.1, 0.0, 0.1, 0.25, 1.0, 3.0)
 PERIOD = 4.0
@@ -180,7 +180,27 @@ def near_another_wall(draw: Draw) -> Attack:
     return Attack(scene, State(t, side * x, y, vx, vy, wall), t + 8.0 / speed)
 
 
+def on_the_wall(draw: Draw) -> Attack:
+    """A start on a wall but for rounding, or clearly off it, by the table's size of that moment."""
+    swing = 1.0 - 10.0 ** -draw.between(1.0, 4.0)
+    law = Fourier(mean=1.0, omega=1.0, cos=(swing,))
+    t = math.pi + draw.pick((0.0, 0.001, -0.01, 3.0))
+    size = 1.0 + swing * math.cos(t)
+    gap = size * draw.pick((0.0, 2.0**-30, -(2.0**-24), 2.0**-16, -(2.0**-14), 0.01, 0.5))
+    speed = draw.pick((1.0, 8.0))  # faster than every wall
+    t_end = t + 8.0
+    wall: Wall = draw.pick(("arc", "floor", "left", "right"))
+    if wall == "arc":
+        return Attack(Cap(r=law), State(t, 0.0, size - gap, 0.25, -2 * speed, wall), t_end)
+    if wall == "floor":
+        return Attack(Stem(w=1.0, h=law), State(t, 0.125, gap - size, 0.25, 2 * speed, wall), t_end)
+    side = 1.0 if wall == "right" else -1.0
+    start = State(t, side * (size - gap), -0.5, -2 * side * speed, 0.25, wall)
+    return Attack(Stem(w=law, h=1.0), start, t_end)
+
+
 FAMILIES = (
+    Family("on-the-wall", on_the_wall, "a state is on its wall by the largest size of all time"),
     Family("corner-start", corner_start, "a named wall hides that the place lies on a second one"),
     Family(
         "side-at-mouth", side_at_mouth, "a side wall is met above the stem, or the mouth's edge is passed"

@@ -19,7 +19,9 @@ from flint import arb, fmpq
 from conformance import second_stepper
 from conformance.agreement import Truth, compare
 from conformance.attacks.case import Attack, Family, line
-from conformance.generate_proof import Refuted, check
+from conformance.generate_exclusion import Refuted
+from conformance.generate_path import check_path
+from conformance.generate_proof import check
 from conformance.second_stepper import Answer
 from scene import Collision, Horizon, Outcome, Rejected, Scene, State, Undecided, Undefined
 
@@ -30,7 +32,8 @@ BOUND = 4.0  # backward ulps: the sharpest class of grades
 class Claim(NamedTuple):
     """One step as a proved stepper answers it; the same fields as `second_stepper.Answer`.
 
-    `numbers` are pairs (low, high) that enclose dt, x, y, vx, vy; a `certificate` is proved again.
+    `numbers` are pairs (low, high) that enclose dt, x, y, vx, vy; a `certificate` is proved again. That of a
+    path is given with its first step.
     """
 
     kind: str
@@ -171,9 +174,9 @@ def proved(claims: Sequence[Claim], answers: Sequence[Answer]) -> Verdict:
                 return Verdict("wrong", f"the enclosure of {name} after step {number} misses the truth")
         if claim.certificate is not None:
             try:
-                check(claim.certificate)
+                (check_path if "steps" in claim.certificate else check)(claim.certificate)
             except Refuted as error:
-                return Verdict("wrong", f"the certificate of step {number} does not hold: {error}")
+                return Verdict("wrong", f"the certificate of step {number} on does not hold: {error}")
         if claim.kind == "rejected":
             return Verdict("refused")
     if len(claims) > len(answers):

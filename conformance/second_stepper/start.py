@@ -1,9 +1,8 @@
 """Starting states: which part of the table they are in, which wall they leave, or why they are refused.
 
 A state that names a wall is on it by definition, if its rounding allows that. Its place may lie exactly on a
-second wall of its part of the table: that is a corner, whichever way it moves (a mushroom's side at y = 0
-meets the mouth's edge; the base belongs to the cap, and at its inner end the cap has no other wall). A state
-that names none leaves a wall that passes exactly through it.
+second wall of its part of the table: that is a corner, whichever way it moves; a mushroom's sides and its
+base end at the mouth's edge. A state that names none leaves a wall that passes exactly through it.
 """
 
 from __future__ import annotations
@@ -27,12 +26,17 @@ class Start(NamedTuple):
     runs_along_mouth: bool = False
 
 
-def judge(flight: Flight, scene: Scene, state: State, t_end: float) -> Start | Answer:
-    """Judge a starting state; the wall it leaves has its residual taken out of the flight's walls."""
+def refused(scene: Scene, state: State, t_end: float) -> Answer | None:
+    """Refuse numbers that mean no state at all."""
     try:
         check_numbers(scene, state, t_end)
     except InvalidState as error:
         return Answer("rejected", reason=str(error))
+    return None
+
+
+def judge(flight: Flight, state: State) -> Start | Answer:
+    """Judge a starting state; the wall it leaves has its residual taken out of the flight's walls."""
     if refusal := _misplaced(flight.table, state):
         return Answer("rejected", reason=refusal)
     if flight.table.is_mushroom and state.wall is None and state.y == 0:
@@ -54,6 +58,8 @@ def _misplaced(table: Table, state: State) -> str:
 
 
 def _near(table: Table, state: State, *, in_cap: bool) -> tuple[Wall, ...]:
+    if table.is_mushroom and state.wall == "base":
+        return ("arc", "left", "right")
     if in_cap:
         return ("arc", "base")
     return ("base", *SIDES)
@@ -63,7 +69,7 @@ def _in_mouth(flight: Flight, state: State) -> Start | Answer:
     """Judge a state on y = 0 that names no wall: in the mouth, at its edge, or on the base beside it."""
     signs = [_sign(flight, wall) for wall in ("left", "right")]
     if 0 in signs:
-        return Answer("undefined", reason="corner" if _sign(flight, "arc") == 0 else "mouth-edge")
+        return Answer("undefined", reason="mouth-edge")
     if -1 not in signs:
         if state.vy == 0:
             return Start(in_cap=False, runs_along_mouth=True)
@@ -74,7 +80,7 @@ def _in_mouth(flight: Flight, state: State) -> Start | Answer:
     if state.vy < 0:
         return Answer("rejected", reason="the particle starts on wall base and moves into it")
     if side == 0 or state.vy == 0:
-        return Answer("undefined", reason="corner" if side == 0 else "sliding")
+        return Answer("undefined", reason="sliding" if state.vy == 0 else "corner")
     flight.leave("base")
     return Start(in_cap=True)
 
@@ -90,6 +96,8 @@ def _leaves(flight: Flight, state: State, near: tuple[Wall, ...]) -> Answer | No
                 on.append(wall)
             continue
         side = _sign(flight, wall)
+        if side < 0 and flight.table.is_mushroom and state.wall == "base" and wall != "arc":
+            continue  # beyond the mouth's edge the base is where it should be
         if side < 0:
             return Answer("rejected", reason=f"the state is beyond wall {wall}")
         if side == 0:
@@ -100,7 +108,7 @@ def _leaves(flight: Flight, state: State, near: tuple[Wall, ...]) -> Answer | No
         on.append(state.wall)
     if len(on) > 1:
         sides = flight.table.is_mushroom and any(wall in on for wall in ("left", "right"))
-        is_edge = sides and "base" in on and "arc" not in on
+        is_edge = sides and "base" in on
         return Answer("undefined", reason="mouth-edge" if is_edge else "corner")
     for wall in on:
         if refused := _departs(flight, state, wall):
@@ -125,10 +133,10 @@ def _is_near(flight: Flight, state: State, wall: Wall) -> bool:
     gap, time = flight.jet(wall, arb(0))[0], arb(exact(state.t))
     if wall == "floor":
         size = flight.table.laws["h"].jet(time)[0]
-    elif "r" in flight.table.laws:
-        size = flight.table.laws["r"].jet(time)[0]
-    else:
+    elif wall in ("left", "right") or flight.table.is_stem:
         size = flight.width(time)[0]
+    else:
+        size = flight.table.laws["r"].jet(time)[0]
     bound = size * arb(ON_WALL) * (2 * size if wall == "arc" else 1)
     if gap < bound and -gap < bound:
         return True

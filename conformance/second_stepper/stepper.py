@@ -219,6 +219,8 @@ def next_collision(scene: Scene, state: State, t_end: float, *, doublings: int =
     Returns:
         The answer; `undefined` only where it is shown exactly.
     """
+    if refusal := start.refused(scene, state, t_end):
+        return refusal
     return _until_decided(lambda bits: _step(scene, state, t_end, bits), bits_for(scene, state), doublings)
 
 
@@ -245,7 +247,7 @@ def bits_for(scene: Scene, state: State) -> int:
 
 def _step(scene: Scene, state: State, t_end: float, bits: int) -> Answer:
     flight = Flight(Table(scene), course_of(state), state)
-    begun = start.judge(flight, scene, state, t_end)
+    begun = start.judge(flight, state)
     if isinstance(begun, Answer):
         return begun._replace(bits=bits)
     end = exact(t_end) - exact(state.t)
@@ -309,6 +311,8 @@ def trajectory(
     Returns:
         Answers in order. From the second on, steps start in balls: what is a tie there is undecided.
     """
+    if refusal := start.refused(scene, state, state.t if t_end is None else t_end):
+        return [refusal]
     bits, found = bits_for(scene, state), []
     for _ in range(doublings + 1):
         with precision(bits):
@@ -324,7 +328,7 @@ def _chain(scene: Scene, state: State, n_collisions: int, t_end: float | None, b
     try:
         table = Table(scene)
         flight = Flight(table, course_of(state), state)
-        begun = start.judge(flight, scene, state, state.t if t_end is None else t_end)
+        begun = start.judge(flight, state)
         if isinstance(begun, Answer):
             return [begun._replace(bits=bits)]
         in_cap, along_mouth = begun.in_cap, begun.runs_along_mouth

@@ -1,0 +1,201 @@
+"""The second stepper against closed forms, symmetries and the plain stepper; faults in it do not pass."""
+
+from __future__ import annotations
+
+from math import inf, pi, sqrt
+
+import faulty_provers as faults
+import pytest
+from flint import arb, fmpq
+
+from conformance import plain
+from conformance.agreement import compare
+from conformance.attacks.search import as_truth
+from conformance.generate_draws import Draw, clock, scene, state
+from conformance.second_stepper import next_collision, trajectory
+from conformance.second_stepper.stepper import simplest
+from conformance.transforms import mirrored, mirrored_wall
+from scene import BangBang, Cap, Collision, Fourier, Mushroom, State, Stem, Undecided
+
+STATIC = Mushroom(r=1.0, h=1.0, w=0.5)
+LIFT = Stem(w=1.0, h=BangBang(knots=((0.0, 2.0), (0.5, 1.0), (1.0, 2.0))))
+BREATHING = Cap(r=Fourier(mean=1.0, omega=1.0, sin=(0.25,)))
+N_DRAWS = 150
+
+
+def holds(ball, number):
+    return ball.overlaps(arb(number)) and ball.rad() < 1e-20
+
+
+def chord():
+    hit = next_collision(Cap(r=1.0), State(0.0, 0.25, 0.5, 2.0, 1.0), 9.0)
+    dt = (-1 + (1 + 5 * (arb(1) - arb(fmpq(5, 16)))).sqrt()) / 5
+    assert hit.wall == "arc"
+    assert holds(hit.numbers[0], dt)
+
+
+def chord_from_the_arc():
+    hit = next_collision(Cap(r=1.0), State(0.0, 0.0, 1.0, 1.0, -0.75, "arc"), 9.0)
+    assert hit.wall == "arc"
+    assert holds(hit.numbers[0], arb(fmpq(24, 25)))
+
+
+def bounce_of_a_rising_floor():
+    # h = 2 - 8 t^2 at first: the floor is met by a particle at rest at y = -1.875 when 8 t^2 = 1/8.
+    hit = next_collision(LIFT, State(0.0, 0.0, -1.875, 0.5, 0.0), 9.0)
+    assert hit.wall == "floor"
+    assert holds(hit.numbers[0], arb(fmpq(1, 8)))
+    assert holds(hit.numbers[4], arb(4))  # twice the floor's speed, 16 t
+
+
+def rest_in_a_breathing_circle():
+    # Swept at r = 7/8 on the way in: sin t = -1/2.
+    hit = next_collision(BREATHING, State(0.0, 0.0, 0.875, 0.0, 0.0), 9.0)
+    assert hit.wall == "arc"
+    assert float(hit.numbers[0].mid()) == pytest.approx(7 * pi / 6, rel=1e-15)
+    assert float(hit.numbers[4].mid()) == pytest.approx(-0.25 * sqrt(3), rel=1e-15)
+
+
+def closing_mouth():
+    # w = 1/2 at t = 1, when y = 0 is crossed at x = 5/8: it was open there before.
+    law = BangBang(knots=((0.0, 0.75), (1.0, 0.5), (2.0, 0.75)))
+    hit = next_collision(Mushroom(r=1.0, h=1.0, w=law), State(0.0, 0.625, 0.25, 0.0, -0.25), 9.0)
+    assert (hit.wall, float(hit.numbers[0].mid())) == ("base", 1.0)
+
+
+def undefined_places():
+    corner = State(0.0, 0.0, 0.5, 1.0, -0.5)
+    assert next_collision(STATIC, corner, 9.0).reason == "corner"
+    edge = State(0.0, 0.0, 0.5, 0.5, -0.5)
+    assert next_collision(STATIC, edge, 9.0).reason == "mouth-edge"
+    assert next_collision(STATIC, State(0.0, 1.0, 0.0, -0.1, -1.0, "arc"), 9.0).reason == "corner"
+    assert next_collision(STATIC, State(0.0, -0.5, 0.0, 1.0, 0.3, "left"), 9.0).reason == "mouth-edge"
+    foot = State(0.0, 0.0, -0.5, 0.5, -0.5)
+    assert next_collision(STATIC, foot, 9.0).reason == "corner"
+
+
+def horizons():
+    falling = State(0.0, 0.75, 0.5, 0.0, -0.5)
+    assert next_collision(STATIC, falling, 1.0).kind == "horizon"
+    assert next_collision(STATIC, falling, 1.0 - 2.0**-53).kind == "horizon"
+    assert next_collision(STATIC, falling, 1.0 + 2.0**-52).wall == "base"
+
+
+def tiny_residual():
+    width = BangBang(knots=((0.0, 1.0), (1.0, 2.0), (2.0, 1.0)))
+    start = State(0.25, -1.125, -1.5, 0.0, 1.0, "left")
+    assert next_collision(Stem(w=width, h=4.0, slope=-(2.0**-300)), start, 3.0).wall == "left"
+    assert next_collision(Stem(w=width, h=4.0, slope=2.0**-300), start, 3.0).wall == "base"
+
+
+def knot_within_the_time():
+    leg = (
+        (0.0, 0.01),
+        (1.6097936544959741, 0.01),
+        (1.6097936544959743, 0.9),
+        (5.609793654495975, 0.9),
+        (16.0, 0.01),
+    )
+    late = State(2.0**110, 0.3, 0.5, 0.02, 1.0)
+    path = trajectory(Mushroom(r=1.0, h=1.0, w=BangBang(knots=leg)), late, 2)
+    assert [step.wall for step in path] == ["arc", "left"]
+
+
+def mirror_images():
+    draw = Draw("mirror")
+    for _ in range(20):
+        table = scene(draw, "mushroom", clock(draw))
+        start, t_end = state(draw, table, {})
+        one, other = next_collision(table, start, t_end), next_collision(table, mirrored(start), t_end)
+        assert mirrored_wall(one.wall) == other.wall
+        assert all(a.overlaps(b) for a, b in zip(one.numbers[2::2], other.numbers[2::2], strict=True))
+        assert all(a.overlaps(-b) for a, b in zip(one.numbers[1::2], other.numbers[1::2], strict=True))
+
+
+def agreement_with_plain():
+    n_collisions = 0
+    for index in range(N_DRAWS):
+        draw = Draw(f"plain/{index}")
+        table = scene(draw, draw.pick(("cap", "stem", "mushroom")), clock(draw))
+        start, t_end = state(draw, table, {})
+        answer, rival = next_collision(table, start, t_end), plain.next_collision(table, start, t_end)
+        if isinstance(rival, Undecided) or answer.kind == "undecided":
+            continue
+        found = compare(rival, as_truth(answer, t_end), start, 1e6)
+        assert found.kind == "agrees", (index, found)
+        n_collisions += isinstance(rival, Collision)
+    assert n_collisions > N_DRAWS // 2
+
+
+BATTERY = [
+    chord,
+    chord_from_the_arc,
+    bounce_of_a_rising_floor,
+    rest_in_a_breathing_circle,
+    closing_mouth,
+    undefined_places,
+    horizons,
+    tiny_residual,
+    knot_within_the_time,
+    mirror_images,
+    agreement_with_plain,
+]
+
+
+@pytest.mark.parametrize("check", BATTERY)
+def test_battery(check):
+    check()
+
+
+FAULTS = [
+    faults.residual_forgotten,
+    faults.corner_unseen,
+    faults.tie_guessed,
+    faults.hit_at_end_counts,
+    faults.ends_alone,
+    faults.still_wall,
+    faults.last_wall,
+    faults.lazy_taylor,
+]
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_a_fault_does_not_pass(fault):
+    with faults.patched(fault):
+        assert any(fails(check) for check in BATTERY)
+
+
+def fails(check):
+    try:
+        check()
+    except Exception:  # a fault may show itself in any way
+        return True
+    return False
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "best"),
+    [
+        (fmpq(1, 3), fmpq(1, 2), fmpq(1, 2)),
+        (fmpq(-7, 5), fmpq(-6, 5), fmpq(-4, 3)),
+        (fmpq(2), fmpq(9), fmpq(2)),
+    ],
+)
+def test_simplest(low, high, best):
+    assert simplest(low, high) == best
+
+
+def test_rejections():
+    assert next_collision(STATIC, State(0.0, 2.0, 0.5, 1.0, 0.0), 9.0).kind == "rejected"
+    assert next_collision(STATIC, State(0.0, 0.0, 0.5, inf, 0.0), 9.0).kind == "rejected"
+    assert next_collision(STATIC, State(0.0, 0.0, 0.5, 1.0, 0.0, "floor"), 9.0).kind == "rejected"
+    assert next_collision(STATIC, State(0.0, -0.5, -0.5, -1.0, 0.0, "left"), 9.0).kind == "rejected"
+    assert next_collision(BREATHING, State(3 * pi / 2, 0.0, 1e-4, 0.0, -1.0, "arc"), 9.0).kind == "rejected"
+
+
+def test_a_path_ends_where_it_must():
+    assert [step.kind for step in trajectory(STATIC, State(0.0, 0.0, 0.5, 0.0, -1.0), 9, 1.0)] == ["horizon"]
+    assert trajectory(STATIC, State(0.0, 0.75, 0.5, 0.0, 0.0), 3)[0].kind == "undecided"
+    path = trajectory(STATIC, State(0.0, 0.75, 0.5, 0.0, -0.5), 2)
+    assert [step.wall for step in path] == ["base", "arc"]
+    assert trajectory(STATIC, State(0.0, 0.0, 0.5, inf, 0.0), 2)[0].kind == "rejected"

@@ -10,8 +10,9 @@ Not checked: whether a state lies close enough to the wall it names.
 
 from __future__ import annotations
 
+import itertools
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any, NamedTuple
 
@@ -27,6 +28,7 @@ __all__ = ["Refuted", "Step", "check", "opened", "precision"]
 
 SIDES = ("left", "right", "floor")
 ZERO = (fmpq(0), fmpq(0))
+PARTS = (1, 16, 128)  # into how many a piece is cut, one after the other, until balls are thin enough
 
 
 class Stretch(NamedTuple):
@@ -119,6 +121,7 @@ class Step:
         self.after = {name: interval(ends) for name, ends in claim["after"].items()}
         self.exclusion = Exclusion(flight, begin, claim["excluded"])
         self.is_hit = claim["outcome"] == "collision"
+        self.n_parts = PARTS[0]
         is_whole = all((part is not None) == self.is_hit for part in (self.root, self.dt, self.wall))
         if not is_whole or (end is not None and end < begin[0]) or (end is None and not self.is_hit):
             raise Refuted("not a certificate")
@@ -136,12 +139,17 @@ class Step:
                 self.exclusion.cover(wall, start, until, may_touch=self.root is None and stop == self.end)
         if not self.is_hit:
             f = self.flight
-            self._enclosed((f.t + self.end, f.x + f.vx * self.end, f.y + f.vy * self.end, f.vx, f.vy))
+            at = (f.t + self.end, f.x + f.vx * self.end, f.y + f.vy * self.end, f.vx, f.vy)
+            if (misplaced := self._misplaced(at)) is not None:
+                raise Refuted(f"{misplaced} afterwards is not what was claimed")
             return None
         low, high = self._root_time()
         self._require_dt(low, high)
-        self._enclosed(self.moment(low, high))
-        return low, high
+        for self.n_parts in PARTS:
+            misplaced = self._misplaced(self.moment(low, high))
+            if misplaced is None:
+                return low, high
+        raise Refuted(f"{misplaced} afterwards is not what was claimed")
 
     def _require_dt(self, low: fmpq, high: fmpq) -> None:
         assert self.dt is not None
@@ -220,22 +228,32 @@ class Step:
     def _crossing_time(self) -> tuple[fmpq, fmpq]:
         return rational_ends(-self.flight.y / self.flight.vy)
 
-    def _gaps(self) -> list[tuple[Number, Number]]:
-        """Enclose the distances to the sides at y = 0, for each piece of the laws that may hold then."""
-        f, (low, high) = self.flight, self._crossing_time()
-        cuts = f.cuts(low, high)
-        found = []
-        for a, b in zip(cuts, cuts[1:] or cuts, strict=False):
-            s = ball(a, b)
-            w, x = f.width(s, (a + b) / 2)[0], f.x + f.vx * s
-            left, right = (f.residuals.get(wall, fmpq(0)) for wall in ("left", "right"))
-            found.append((w - x - right, w + x - left))
-        return found
+    def _parts(self, low: fmpq, high: fmpq, n_parts: int) -> list[tuple[fmpq, fmpq]]:
+        """Cut [low, high] at the knots, and each piece evenly: balls of whole pieces may be too wide."""
+        if low == high:
+            return [(low, high)]
+        pieces = itertools.pairwise(self.flight.cuts(low, high))
+        ends = [(a, (b - a) / n_parts) for a, b in pieces]
+        return [(a + i * width, a + (i + 1) * width) for a, width in ends for i in range(n_parts)]
+
+    def _gaps(self, a: fmpq, b: fmpq) -> list[Number]:
+        """Enclose the distances to the sides at y = 0, crossed within [a, b] on one piece of the laws."""
+        f, s = self.flight, ball(a, b)
+        w, x = f.width(s, (a + b) / 2)[0], f.x + f.vx * s
+        left, right = (f.residuals.get(wall, fmpq(0)) for wall in ("left", "right"))
+        return [w - x - right, w + x - left]
+
+    def _at_crossing(self, holds: Callable[[list[Number]], bool]) -> bool:
+        """Tell whether the gaps have a property wherever within its enclosure the crossing is."""
+        low, high = self._crossing_time()
+        return any(
+            all(holds(self._gaps(*part)) for part in self._parts(low, high, n_parts)) for n_parts in PARTS
+        )
 
     def _require_open(self) -> None:
         if not isinstance(self.flight.scene, Mushroom):
             raise Refuted("the base is closed: it is hit")
-        if not all(gap > 0 for gaps in self._gaps() for gap in gaps):
+        if not self._at_crossing(_are_positive):
             raise Refuted("the mouth is not open where y = 0 is crossed")
 
     def _require_closed(self, in_cap: bool) -> None:
@@ -243,9 +261,9 @@ class Step:
         if isinstance(scene, Mushroom):
             if not in_cap:
                 raise Refuted("from the stem no base is met")
-            if not all(any(gap < 0 for gap in gaps) for gaps in self._gaps()):
+            if not self._at_crossing(lambda gaps: any(gap < 0 for gap in gaps)):
                 raise Refuted("the mouth is open where y = 0 is crossed")
-        if isinstance(scene, Stem) and not all(gap > 0 for gaps in self._gaps() for gap in gaps):
+        if isinstance(scene, Stem) and not self._at_crossing(_are_positive):
             raise Refuted("the top is crossed beside the stem")
 
     def moment(self, low: fmpq, high: fmpq) -> tuple[Number, ...]:
@@ -254,9 +272,8 @@ class Step:
         x, y = f.x + f.vx * s, f.y + f.vy * s
         if self.wall == "base":
             return f.t + s, x, fmpq(0), f.vx, -f.vy
-        cuts = f.cuts(low, high)
         # At a knot both pieces' velocities are taken; they differ by no more than the time is enclosed.
-        velocities = [self._reflected(a, b) for a, b in zip(cuts, cuts[1:] or cuts, strict=False)]
+        velocities = [self._reflected(*part) for part in self._parts(low, high, self.n_parts)]
         vx, vy = velocities[0]
         for other_x, other_y in velocities[1:]:
             vx, vy = arb(vx).union(arb(other_x)), arb(vy).union(arb(other_y))
@@ -273,11 +290,17 @@ class Step:
         factor = 2 * f.jet(str(self.wall), s, within)[1] / (gradient[0] ** 2 + gradient[1] ** 2)
         return f.vx - factor * gradient[0], f.vy - factor * gradient[1]
 
-    def _enclosed(self, moment: tuple[Number, ...]) -> None:
+    def _misplaced(self, moment: tuple[Number, ...]) -> str | None:
+        """Return the name of a number that is not shown to lie where it is claimed; None when all do."""
         for name, number in zip(("t", "x", "y", "vx", "vy"), moment, strict=True):
             low, high = self.after[name]
             if not (arb(low) <= number and number <= arb(high)):
-                raise Refuted(f"{name} afterwards is not what was claimed")
+                return name
+        return None
+
+
+def _are_positive(numbers: list[Number]) -> bool:
+    return all(number > 0 for number in numbers)
 
 
 def is_in_cap(f: Flight) -> bool:

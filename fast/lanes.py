@@ -10,7 +10,7 @@ and G2 = (1 - cos(omega u)) / omega^2: exact for one harmonic, and with omega = 
 bang-bang leg. Laws of several harmonics and moving slopes have no lanes.
 
 What a lane's step claims, and which inequality in which line carries it, for every kind of flight and every
-wall on it, rounding included: docs/lanes.md. In short: Newton's correction leaves less than 2^-57 of the time;
+wall on it, rounding included: docs/lanes.md. In short: Newton leaves less than 2^-57 of the time;
 a wall that is not met has f > K s^2 at the end, so that f was positive all along; the wall that is met has
 |f'| > K s, or f is concave. Quotients are compared by cross-multiplication, so a flight costs two divisions
 and one square root.

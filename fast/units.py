@@ -14,6 +14,7 @@ least of all floats, beside a table of common size, comes in exactly too.
 from __future__ import annotations
 
 import math
+import sys
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -62,7 +63,12 @@ class Units(NamedTuple):
         return State(**inner, wall=state.wall)
 
     def horizon(self, t_end: float) -> float:
-        """Return a horizon, which may be infinite, in the kernel's units."""
+        """Return a horizon, which may be infinite, in the kernel's units.
+
+        One beyond all floats becomes the largest of them: whatever moves meets a wall long before.
+        """
+        if t_end < math.inf and math.frexp(t_end)[1] - self.time > sys.float_info.max_exp:
+            return math.copysign(sys.float_info.max, t_end)
         return inward("t_end", t_end, self.time)
 
     def steps(self, rows: FloatArray) -> FloatArray:

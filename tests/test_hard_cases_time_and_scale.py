@@ -110,18 +110,13 @@ def declines(scene, state):
 
 @pytest.mark.parametrize("speed", [1e100, 1e200, 1e300])
 def test_40_squares_that_overflow(speed):
-    """Scaled by the reference; by the fast stepper up to 2^400, beyond that refused, never nan."""
+    """Scaled by both: a static table has no time of its own, so that any speed is a common one there."""
     state = State(0.0, 0.0, 0.5, speed, 0.0)
     proved = reference.next_collision(CIRCLE, state, 1.0)
     assert isinstance(proved, reference.Collision)
     with mpmath.workdps(300):
         assert is_enclosed(mpmath.sqrt(mpmath.mpf(0.75)) / mpmath.mpf(speed), proved.dt)
-    answer = fast.next_collision(CIRCLE, state, 1.0)
-    if speed < 2.0**400:
-        assert collision(CIRCLE, state, 1.0).wall == "arc"
-    else:
-        assert isinstance(answer, Rejected)
-        assert "state.vx" in answer.reason
+    assert collision(CIRCLE, state, 1.0).wall == "arc"
 
 
 @pytest.mark.parametrize(

@@ -206,7 +206,10 @@ class Isolator:
         half_way = self.arithmetic.middle(self.arithmetic.hull(a, b))
         earlier = self.arithmetic.middle(self.arithmetic.hull(a, half_way))
         later = self.arithmetic.middle(self.arithmetic.hull(half_way, b))
-        for point in (self._knot(a, b), half_way, earlier, later):
+        # Should f vanish half way, which is a short number and may lie aside: the wider part is cut first.
+        is_left_wider = is_below(b - half_way, half_way - a)
+        aside = (earlier, later) if is_left_wider else (later, earlier)
+        for point in (self._knot(a, b), half_way, *aside):
             is_inside = point is not None and is_below(a, point) and is_below(point, b)
             # While the flight may still begin, on the wall, no sign is asked for: f rises or is refused.
             if is_inside and (self._may_begin(point) or sign(self.value(point)) != 0):
@@ -225,18 +228,31 @@ class Isolator:
 
     def _refine(self, a: Interval, b: Interval) -> Root:
         # Interval Newton on [a, b]: f' < 0 there, so each image encloses the one root. Where it
-        # does not halve the enclosure, the sign at the middle does.
+        # does not halve the enclosure, the sign at a point inside does.
         time = self.arithmetic.hull(a, b)
         while True:
             middle = self.arithmetic.middle(time)
             f = self.value(middle)
             smaller = self.arithmetic.intersection(time, middle - f / self.jet(time).d1)
             if not is_below(2 * smaller.delta, time.delta):
-                if sign(f) == 0:
+                half = self._cut(time, middle, f)
+                if half is None:
                     return self._accepted(smaller, a)
-                lower, upper = self.arithmetic.lower(time), self.arithmetic.upper(time)
-                smaller = self.arithmetic.hull(*((middle, upper) if sign(f) > 0 else (lower, middle)))
+                smaller = half
             time = smaller
+
+    def _cut(self, time: Interval, middle: Interval, f: Interval) -> Interval | None:
+        """Return the part of an enclosure that holds the root, by the sign of f inside; None without one.
+
+        The root may lie half way, at a knot say, however wide the enclosure is; then not at a quarter.
+        """
+        lower, upper = self.arithmetic.lower(time), self.arithmetic.upper(time)
+        if sign(f) == 0:
+            middle = self.arithmetic.middle(self.arithmetic.hull(lower, middle))
+            f = self.value(middle)
+        if sign(f) == 0:
+            return None
+        return self.arithmetic.hull(*((middle, upper) if sign(f) > 0 else (lower, middle)))
 
     def _accepted(self, time: Interval, a: Interval) -> Root:
         # Strict signs at both ends of a somewhat wider interval, and the stretch before it.

@@ -1,8 +1,8 @@
 """A hit that has been found: its time polished, the state moved there, and the bounce.
 
-The laws are anchored at the hit, where the remainder of f gives the time's low part; on the wall that was left,
-for a short hop, the increments since then give it better. So place, wall speed and velocity are as accurate
-as their last rounding.
+The laws are anchored at the hit, where the remainder of f gives the time's low part; on the wall that was
+left, for a short hop, the increments since then give it better. So place, wall speed and velocity are as
+accurate as their last rounding.
 """
 
 from __future__ import annotations

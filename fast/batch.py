@@ -17,6 +17,7 @@ from fast import codes, entries, follow, lanes, motion, walls
 from fast.compiled import FloatArray, compile_scene
 from fast.fine import FineTrajectory, as_pairs, as_trajectory
 from fast.flow import follow_to
+from fast.limits import limits_of
 from fast.stepper import WALL_NAMES, as_arrays, fitted_start, trouble
 from fast.units import fit
 from scene import Collision, Horizon, Outcome, Scene, State
@@ -91,7 +92,7 @@ class LaneRound:
         self.compiled = compile_scene(scene)
         self.table, self.is_relative, self.laws, self.bounds = self.compiled
         self.is_disk = bool(self.table == codes.CAP)
-        self.limits = lanes.limits_of(self.laws, self.bounds)
+        self.limits = limits_of(self.laws, self.bounds)
         self.omega = self.laws[codes.PHASES, 0]
         self.anchors = np.zeros(motion.ANCHORS_SHAPE)
         self.pool, self.spare = np.zeros((2, lanes.N_ROWS * lanes.LANES))

@@ -26,9 +26,11 @@ from fast.lanes import (  # isort: skip
     CALM, CLOSED, COARSE, DONE, END, H0, HIT, H_REF, KNOT, LANES, NEVER, NEXT_H0, NEXT_R0, NEXT_T, NEXT_T_LOW,
     NEXT_VX, NEXT_VY, NEXT_W0, NEXT_X, NEXT_Y, N_ARC, N_BASE, N_REF, N_ROWS, OK, ON_ARC, R0, REF, REF_LOW,
     RIGHT_ONE, R_REF, S, SINCE, SPIN, STAY_IN, STAY_OUT, STOP, T, T_LOW, UNTIL, VX, VY, W0, WALL, X, Y,
-    aim, arrive, bounce, chord, chord_mixed, fly, fly_mixed, law, limits_of, rebound, turns,
+    aim, arrive, bounce, chord, chord_mixed, fly, fly_mixed, rebound,
 )  # fmt: skip
+from fast.limits import limits_of
 from fast.motion import ANCHORS_SHAPE, LOW, ROOM, bend_of_half_leg, set_anchors
+from fast.short import law, turns
 
 GENERAL, DISK = np.arange(2)
 STAYS, MOVES, ENDS = 0, 1, 2

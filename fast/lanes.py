@@ -18,19 +18,17 @@ and one square root.
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 from numba import njit
 
-from fast.arithmetic import SAFETY, dot, fma, two_product, two_sum
-from fast.codes import ARC, BANG_BANG, BASE, FLOOR, FOURIER, LEFT, RIGHT, H, R, W
+from fast.arithmetic import SAFETY, dot, fma, two_sum
+from fast.codes import ARC, BASE, FLOOR, LEFT, RIGHT
+from fast.short import law, moved, short_sum, turns
 from fast.walls import off_the_arc, off_the_arc_spinning
 
 LANES = 64  # all rows of a pool stay in the first-level cache
 LONGEST_TURN = 0.25  # omega u up to which the series are used
 NEVER = np.inf
-LEAST_RADIUS = 2.0**-1000
 ONE = np.float64(1.0)  # its quotient by 0 is infinite without the compiler too
 
 # Rows of a pool, LANES numbers each, in one flat array: constant strides let the loops vectorise.
@@ -53,89 +51,6 @@ N_ROWS = 67
 ON_ARC, ON_BASE, ON_LEFT, ON_RIGHT, ON_FLOOR = map(float, (ARC, BASE, LEFT, RIGHT, FLOOR))
 WRONG, COARSE, RIGHT_ONE = 0.0, 1.0, 2.0
 CLEARLY_CAPTURED = 1.05  # |L| over w v from which a particle moves to the disk's pool
-
-
-class Limits(NamedTuple):
-    """What holds of a scene's laws for all time, for the lanes' checks.
-
-    Attributes:
-        bend: at least |r'^2 + r r''|: half of what the arc's function may curve upwards, speed left out.
-        curvature: at least |w''| and |h''|.
-        rate: at least |r'|, |w'| and |h'|.
-        size: at least r + w + h, which bounds the terms that a law is summed of.
-        least_r, least_h: at most the least radius and depth. Where a bound says no more than that the
-            radius is positive it is LEAST_RADIUS, with which only concave arcs pass.
-        omega_r, omega_w, omega_h: omega of the radius, the width (w or nu) and the depth; 0 for laws of
-            constant acceleration.
-        has_knots: some law has knots.
-    """
-
-    bend: float
-    curvature: float
-    rate: float
-    size: float
-    least_r: float
-    least_h: float
-    omega_r: float
-    omega_w: float
-    omega_h: float
-    has_knots: bool
-
-
-@njit(error_model="numpy")
-def limits_of(laws, bounds):
-    """Return the limits of laws from the laws and their bounds (rows: lowest, highest, |f'|, |f''|)."""
-    grow = 1.0 + SAFETY
-    return Limits(
-        grow * (bounds[R, 1] * bounds[R, 3] + bounds[R, 2] * bounds[R, 2]),
-        max(bounds[W, 3], bounds[H, 3]),
-        max(bounds[R, 2], max(bounds[W, 2], bounds[H, 2])),
-        grow * (bounds[R, 1] + bounds[W, 1] + bounds[H, 1]),
-        max(bounds[R, 0], LEAST_RADIUS),
-        max(bounds[H, 0], 0.0),
-        laws[R, 2] if laws[R, 0] == FOURIER else 0.0,
-        laws[W, 2] if laws[W, 0] == FOURIER else 0.0,
-        laws[H, 2] if laws[H, 0] == FOURIER else 0.0,
-        laws[R, 0] == BANG_BANG or laws[W, 0] == BANG_BANG or laws[H, 0] == BANG_BANG,
-    )
-
-
-@njit(error_model="numpy")
-def turns(omega, s):
-    """Return G1(s), G2(s) and cos(omega s) for |omega s| <= 1/4; s, s^2 / 2 and 1 for omega = 0."""
-    z = omega * s
-    u = z * z
-    a = fma(u, -1.0 / 39916800.0, 1.0 / 362880.0)
-    a = fma(a, u, -1.0 / 5040.0)
-    a = fma(a, u, 1.0 / 120.0)
-    a = fma(a, u, -1.0 / 6.0)
-    b = fma(u, -1.0 / 479001600.0, 1.0 / 3628800.0)
-    b = fma(b, u, -1.0 / 40320.0)
-    b = fma(b, u, 1.0 / 720.0)
-    b = fma(b, u, -1.0 / 24.0)
-    b = fma(b, u, 0.5)
-    return fma(s * u, a, s), s * s * b, fma(-u, b, 1.0)
-
-
-@njit(error_model="numpy")
-def moved(x, v, s):
-    """Return x + v s as a sum of two floats."""
-    p, e = two_product(v, s)
-    x_s, low = two_sum(x, p)
-    return x_s, low + e
-
-
-@njit(error_model="numpy")
-def short_sum(a, b):
-    """Return a + b for |b| far below |a|, or a = 0, as a rounded sum and its error."""
-    s = a + b
-    return s, b - (s - a)
-
-
-@njit(error_model="numpy")
-def law(f, low, f1, f2, omega, g1, g2, g0):
-    """Return a law and its two derivatives, from its values at the reference time."""
-    return f + (low + fma(f1, g1, f2 * g2)), fma(f1, g0, f2 * g1), fma(f2, g0, -(omega * omega * f1) * g1)
 
 
 @njit(error_model="numpy")

@@ -14,6 +14,7 @@ import pytest
 import fast
 from fast import codes, entries, follow, lanes
 from fast.batch import LaneRound
+from fast.limits import Limits
 from fast.starts import initial_states
 from fast.stepper import WALL_CODES
 from scene import State, load
@@ -28,7 +29,7 @@ OFF = np.bool_(False)
 def test_the_compiler_packs_divisions_and_square_roots(loop):
     """Four lanes to an instruction, where the machine has 256-bit registers."""
     a = np.ones(lanes.N_ROWS * lanes.LANES)
-    n, limits = np.int64(60), lanes.Limits(*[1.0] * 9, False)
+    n, limits = np.int64(60), Limits(*[1.0] * 9, False)
     function = getattr(lanes, loop)
     arguments = {
         "aim": (OFF, 0.1, limits),

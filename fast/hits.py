@@ -18,17 +18,17 @@ MAX_POLISHES = 4
 
 
 @njit(error_model="numpy")
-def remainder(wall, s, residual, x, y, vx, vy, laws, anchors, bounds, is_relative):
-    """Return what must be added to the time s of a hit, and the rounded place there with its low part.
+def remainder(wall, s, rest, residual, x, y, vx, vy, laws, anchors, bounds, is_relative):
+    """Return what must be added to the time s + rest of a hit, and the rounded place there with its low part.
 
     The anchors hold the laws at the hit, which is where f = residual.
     """
     p, x_low = two_product(vx, s)
     x_s, e = two_sum(x, p)
-    x_low += e
+    x_low += e + vx * rest
     p, y_low = two_product(vy, s)
     y_s, e = two_sum(y, p)
-    y_low += e
+    y_low += e + vy * rest
     if wall == BASE:
         return -(y_s + y_low) / vy, x_s, x_low, y_s, y_low
     f, _ = wall_residual(wall, x_s, y_s, laws, anchors, bounds, is_relative)
@@ -108,8 +108,10 @@ def move(wall, s, is_again, p, laws, bounds, anchors, is_relative):
     """Move the state to the hit at time s and bounce, in place; returns the time, or -1 if it is lost.
 
     `is_again`: the wall met is the one left, whose residual at the start stays in its function.
+    The time is polished as a sum of two floats: beside a violent leg, whose whole length may be a few units
+    in the last place of s, Newton's method needs the digits that s alone cannot hold.
     """
-    x, y, vx, vy = p[2], p[3], p[4], p[5]
+    x, y, vx, vy, rest = p[2], p[3], p[4], p[5], 0.0
     residual = residual_error = error = f = slope_s = 0.0
     lack = anchors[PHASE, LACK]
     if is_again:
@@ -118,15 +120,16 @@ def move(wall, s, is_again, p, laws, bounds, anchors, is_relative):
     bend, _ = curvature_bounds(wall, vx, vy, bounds)
     for _ in range(MAX_POLISHES):
         t, low = two_sum(p[0], s)
-        if not set_anchors(laws, anchors, t, low + p[1]):
+        if not set_anchors(laws, anchors, t, low + p[1] + rest):
             return -1.0
         s_low, x_s, x_low, y_s, y_low = remainder(
-            wall, s, residual, x, y, vx, vy, laws, anchors, bounds, is_relative
+            wall, s, rest, residual, x, y, vx, vy, laws, anchors, bounds, is_relative
         )
         lack = max(lack, anchors[PHASE, LACK])
         if is_again and error < lack / SAFETY * residual_error:
             # A short hop along the wall: its increments give s better than the laws' low parts can.
-            s_low = rest_of_hop(wall, s, f, slope_s, p, laws, anchors, is_relative)
+            x_low, y_low = x_low - vx * rest, y_low - vy * rest
+            s_low, rest = rest_of_hop(wall, s, f, slope_s, p, laws, anchors, is_relative), 0.0
             break
         slope = wall_slope(wall, x_s, y_s, vx, vy, anchors, is_relative)
         # What Newton leaves, bend s_low^2 / (2 slope), must be nothing to the time and to the wall's speed.
@@ -135,11 +138,11 @@ def move(wall, s, is_again, p, laws, bounds, anchors, is_relative):
             change <= 2.0**-27 * abs(slope) and change * abs(s_low) <= 2.0**-54 * s * abs(slope)
         ):
             break
-        s += s_low
+        s, rest = two_sum(s, rest + s_low)
     x_s, x_low = two_sum(x_s, x_low + vx * s_low)
     y_s, y_low = (0.0, 0.0) if wall == BASE else two_sum(y_s, y_low + vy * s_low)
-    p[0], p[1] = two_sum(t, low + p[1] + s_low)
+    p[0], p[1] = two_sum(t, low + p[1] + rest + s_low)
     set_anchors(laws, anchors, p[0], p[1])
     p[2], p[3] = x_s, y_s
     p[4], p[5] = bounce(wall, x_s, x_low, y_s, y_low, vx, vy, anchors, is_relative)
-    return s + s_low
+    return s + (rest + s_low)

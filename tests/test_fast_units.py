@@ -10,7 +10,7 @@ from importlib import import_module
 
 import numpy as np
 import pytest
-from scale_search import search
+from scale_search import Question, is_scaled, search, step
 from truth import proved_step
 
 import fast
@@ -40,7 +40,8 @@ def test_the_search_sees_a_stepper_that_does_not_scale(monkeypatch, tally):
     monkeypatch.setattr(stepper, "fit", unfitted)
     monkeypatch.setattr(import_module("fast.flow"), "fit", unfitted)
     with np.errstate(all="ignore"):
-        assert search(4, 300, tally)
+        question = Question(Cap(r=1.0), State(0.0, 0.3, 0.2, -0.9, 0.2), 100.0)
+        assert not is_scaled(step, question, 150, -230, tally)
 
 
 def test_a_square_that_would_overflow():

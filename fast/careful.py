@@ -32,6 +32,7 @@ from fast.walls import (  # isort: skip
 )  # fmt: skip
 
 MAX_PARABOLAS = 1_000_000
+LEAST = 2.0**-1022  # a time in which nothing is met
 NEAR = 2.0**-30  # how much beyond the limit hits are looked for, relatively
 PATIENCE = 6  # parabolas tried before asking whether the wall is out of the particle's reach
 
@@ -77,10 +78,9 @@ def first_root(wall, start, limit, x, y, vx, vy, is_leaving, laws, anchors, boun
             if slope < -slope_error:
                 return APPROACHING, s, slope, 0.0
             if slope <= slope_error:
-                # With slope and curvature exactly 0 (static wall, path along it) there is never a hit.
-                if slope == 0.0 and slope_error == 0.0 and down == 0.0:
-                    return NO_WALL, limit, 0.0, 0.0
-                return TANGENT, s, slope, 0.0
+                # With slope and curvature exactly 0 the path runs along a wall that stands still.
+                is_along = slope == 0.0 and slope_error == 0.0 and down == 0.0
+                return (SLIDING if is_along else TANGENT), s, slope, 0.0
             f = 0.0
         elif s == start and f <= error + doubt:
             return (OUTSIDE if f < -(error + doubt) else START), s, slope, 0.0
@@ -275,9 +275,13 @@ def step(table, is_relative, laws, bounds, anchors, p, wall, limit):
     (p stays). The anchors must hold the laws at p's time, and do so again after a collision.
     """
     x, y, vx, vy = p[2], p[3], p[4], p[5]
-    # Look a little beyond the limit, so that a hit just there is seen from both sides.
-    code, s = first_event(table, is_relative, wall, x, y, vx, vy, limit * (1.0 + NEAR), laws, anchors, bounds)
-    if code > HORIZON and s > limit:
+    # Look a little beyond the limit, so that a hit just there is seen from both sides. With no time left
+    # the start is judged all the same.
+    ahead = limit * (1.0 + NEAR) if limit > 0.0 else LEAST
+    code, s = first_event(table, is_relative, wall, x, y, vx, vy, ahead, laws, anchors, bounds)
+    if limit == 0.0 and code < HORIZON:
+        code = HORIZON
+    if code > HORIZON and s > limit and limit > 0.0:
         code, s = first_event(table, is_relative, wall, x, y, vx, vy, limit, laws, anchors, bounds)
     elif code < HORIZON and s > limit * (1.0 - NEAR):
         side = side_of_wall(code, wall, limit, x, y, vx, vy, laws, anchors, bounds, is_relative)

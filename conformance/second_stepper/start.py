@@ -1,8 +1,9 @@
 """Starting states: which part of the table they are in, which wall they leave, or why they are refused.
 
 A state that names a wall is on it by definition, if its rounding allows that. Its place may lie exactly on a
-second wall of its part of the table: that is a corner, whichever way it moves; a mushroom's sides and its
-base end at the mouth's edge. A state that names none leaves a wall that passes exactly through it.
+second wall of its part of the table: that is a corner, whichever way it moves; a mushroom's sides end at the
+mouth's edge. A state that names the base is in the cap, wherever the mouth's edge is by now. A state that names
+none leaves a wall that passes exactly through it.
 """
 
 from __future__ import annotations
@@ -58,8 +59,6 @@ def _misplaced(table: Table, state: State) -> str:
 
 
 def _near(table: Table, state: State, *, in_cap: bool) -> tuple[Wall, ...]:
-    if table.is_mushroom and state.wall == "base":
-        return ("arc", "left", "right")
     if in_cap:
         return ("arc", "base")
     return ("base", *SIDES)
@@ -96,8 +95,6 @@ def _leaves(flight: Flight, state: State, near: tuple[Wall, ...]) -> Answer | No
                 on.append(wall)
             continue
         side = _sign(flight, wall)
-        if side < 0 and flight.table.is_mushroom and state.wall == "base" and wall != "arc":
-            continue  # beyond the mouth's edge the base is where it should be
         if side < 0:
             return Answer("rejected", reason=f"the state is beyond wall {wall}")
         if side == 0:

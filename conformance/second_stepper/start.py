@@ -2,8 +2,8 @@
 
 A state that names a wall is on it by definition, if its rounding allows that. Its place may lie exactly on a
 second wall of its part of the table: that is a corner, whichever way it moves; a mushroom's sides end at the
-mouth's edge. A state that names the base is in the cap, wherever the mouth's edge is by now. A state that names
-none leaves a wall that passes exactly through it.
+mouth's edge. A state that names the base is in the cap, wherever the mouth's edge is by now. A state that
+names none leaves a wall that passes exactly through it.
 """
 
 from __future__ import annotations

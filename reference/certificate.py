@@ -21,6 +21,7 @@ from reference.course import Evidence
 from reference.isolation import Leaf
 from reference.stepper import evidence_of
 from scene import BadInput, Scene, State, Undefined, to_data
+from scene.refusal import check_scene, shown
 
 VERSION = 2
 
@@ -41,9 +42,13 @@ def certificate(
         what `_claim` or `_undefined` adds.
 
     Raises:
-        BadInput: `outcome` is undefined and not the answer to these.
+        BadInput: `outcome` has no proof, or is undefined and not the answer to these.
     """
     question = _question(scene, state, t_end)
+    if not isinstance(outcome, Collision | Horizon | Undefined):
+        raise BadInput(
+            f"outcome = {shown(outcome)}, must be a proved collision, horizon or undefined outcome"
+        )
     if isinstance(outcome, Undefined):
         return question | _undefined(outcome, evidence_of(scene, state, t_end))
     return question | _claim(outcome)
@@ -56,8 +61,10 @@ def path_certificate(scene: Scene, state: State, t_end: float | None, path: Traj
     which the flight begins, and the `residuals` of the wall being left. Undecided ends claim nothing.
 
     Raises:
-        BadInput: the path ends undefined, and does not follow from these.
+        BadInput: `path` is none, or ends undefined and does not follow from these.
     """
+    if not isinstance(path, Trajectory):
+        raise BadInput(f"path = {shown(path)}, must be a Trajectory of the reference")
     steps = [_claim(step) | {"departure": _departure(step.departure)} for step in path.steps]
     if isinstance(path.outcome, Horizon) and t_end is not None:
         steps.append(_claim(path.outcome) | {"departure": _departure(path.outcome.departure)})
@@ -69,6 +76,9 @@ def path_certificate(scene: Scene, state: State, t_end: float | None, path: Traj
 
 
 def _question(scene: Scene, state: State, t_end: float | None) -> dict[str, Any]:
+    check_scene(scene)
+    if not isinstance(state, State):
+        raise BadInput(f"state = {shown(state)}, must be a State")
     return {
         "certificate": VERSION,
         "scene": json.loads(json.dumps(to_data(scene))),  # lists for tuples

@@ -153,7 +153,7 @@ class _Path:
         digits: int | None,
         is_differentiated: bool,
     ) -> None:
-        check_numbers(scene, state, state.t if t_end is None else t_end)
+        state = _judged(scene, state, getattr(state, "t", 0.0) if t_end is None else t_end)
         self.scene, self.state, self.digits = scene, state, digits
         self.t_end = None if t_end is None else Fraction(t_end)
         self.arithmetic = Arithmetic(working)
@@ -225,11 +225,11 @@ def _attempt(
 ) -> tuple[Outcome, Evidence | None]:
     """Answer at one precision."""
     is_differentiated, is_measured = extras
-    check_numbers(scene, state, t_end)
+    state = _judged(scene, state, t_end)
     start = judge_start(scene, state, arithmetic)
     if start.undefined is not None:
         return start.undefined, Evidence(Fraction(0), start.walls)
-    flight, end = flight_from(arithmetic, state), Fraction(t_end) - Fraction(state.t)
+    flight, end = flight_from(arithmetic, state), Fraction(float(t_end)) - Fraction(state.t)
     course = Course(scene, arithmetic, flight, start.leaving, start.flat, end, state)
     event = course.event(in_cap=is_in_cap(scene, state, start.leaving))
     if event.undefined is not None:
@@ -247,6 +247,17 @@ def _attempt(
     if is_measured:
         found = replace(found, margins=measure(arithmetic, course, event.hit))
     return found, None
+
+
+def _judged(scene: Scene, state: State, t_end: float) -> State:
+    """Return a state whose numbers are all floats.
+
+    Raises:
+        InvalidState: naming field, value and bound.
+    """
+    check_numbers(scene, state, t_end)
+    t, x, y, vx, vy = (float(number) for number in (state.t, state.x, state.y, state.vx, state.vy))
+    return State(t, x, y, vx, vy, state.wall)
 
 
 def _require(found: Collision, digits: int) -> None:

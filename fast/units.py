@@ -130,8 +130,11 @@ def fit(scene: Scene) -> Fitted:
     shared = period(scene)
     time = None
     if shared is not None:
-        own = -exponent(shared.omega) if shared.omega is not None else exponent(_as_float(shared.length))
-        time = own - TIME
+        if shared.omega is not None:
+            time = -exponent(shared.omega) - TIME
+        else:
+            assert shared.length is not None  # a float, as the scene has found
+            time = exponent(float(shared.length)) - TIME
     changed = {
         name: _in_units(law, f"scene.{name}", 0 if name in ("nu", "slope") else length, time or 0)
         for name, law in laws(scene).items()
@@ -183,10 +186,6 @@ def outward(numbers: FloatArray, exponents: FloatArray) -> FloatArray:
     if not is_kept.all():
         raise BadInput("the answer holds a number beyond binary64: every one must be 0 or 2^-1022 to 2^1023")
     return scaled
-
-
-def _as_float(length: object) -> float:
-    return float(length)  # type: ignore[arg-type]  # a Fraction that a scene has found to be a float
 
 
 def _in_units(law: Law, field: str, length: int, time: int) -> Law:

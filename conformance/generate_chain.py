@@ -15,7 +15,8 @@ import flint
 from flint import arb, fmpq
 
 from conformance.generate_flight import Flight, Number, ball
-from conformance.generate_proof import Refuted, precision
+from conformance.generate_proof import Refuted
+from conformance.precision import precision
 from conformance.vectors import Certified
 from scene import Scene, State
 

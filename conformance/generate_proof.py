@@ -22,9 +22,10 @@ from flint import arb, fmpq
 from conformance.generate_exclusion import Exclusion, Refuted, dyadic, interval
 from conformance.generate_flight import Flight, Number, ball, exact
 from conformance.generate_undefined import check_undefined
+from conformance.precision import precision
 from scene import BadInput, Cap, Mushroom, Scene, Stem, from_data
 
-__all__ = ["Refuted", "Step", "check", "opened", "precision"]
+__all__ = ["Refuted", "Step", "check", "opened"]
 
 SIDES = ("left", "right", "floor")
 ZERO = (fmpq(0), fmpq(0))
@@ -37,17 +38,6 @@ class Stretch(NamedTuple):
     walls: tuple[str, ...]
     start: fmpq
     stop: fmpq
-
-
-@contextmanager
-def precision(bits: int) -> Iterator[None]:
-    """Work with balls of this many bits, then restore flint's own."""
-    before = flint.ctx.prec
-    flint.ctx.prec = bits
-    try:
-        yield
-    finally:
-        flint.ctx.prec = before
 
 
 @contextmanager

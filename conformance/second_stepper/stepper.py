@@ -9,14 +9,13 @@ exactly: the crossing, the horizon, or the simplest rational number of the overl
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
-import flint
 from flint import arb, fmpq
 from mpmath import fp
 
+from conformance.precision import precision
 from conformance.second_stepper import start
 from conformance.second_stepper.answer import Answer, Open
 from conformance.second_stepper.flight import SIDES, Course, Flight, Table, course_of
@@ -194,17 +193,6 @@ def simplest(low: Rational, high: Rational) -> Rational:
     if whole == low or whole + 1 <= high:
         return fmpq(whole) if whole == low else fmpq(whole) + 1
     return whole + 1 / simplest(1 / (high - whole), 1 / (low - whole))
-
-
-@contextmanager
-def precision(bits: int) -> Iterator[None]:
-    """Work with balls of this many bits, then restore flint's own."""
-    before = flint.ctx.prec
-    flint.ctx.prec = bits
-    try:
-        yield
-    finally:
-        flint.ctx.prec = before
 
 
 def next_collision(scene: Scene, state: State, t_end: float, *, doublings: int = DOUBLINGS) -> Answer:

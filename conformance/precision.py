@@ -1,4 +1,4 @@
-"""The working precision of Arb, which both uses of the second arithmetic share: proofs again, and a stepper."""
+"""The working precision of Arb, shared by both uses of the second arithmetic: proofs again, and a stepper."""
 
 from __future__ import annotations
 

@@ -199,11 +199,16 @@ def first_event(table, is_relative, wall, x, y, vx, vy, limit, laws, anchors, bo
         inward = vy if in_cap else -vy
         if inward <= 0.0:
             return (SLIDING if inward == 0.0 else APPROACHING), 0.0
-    if y == 0.0 and wall == NO_WALL and table == MUSHROOM:
+    if y == 0.0 and wall == NO_WALL and table == MUSHROOM and vy > 0.0:
+        # In the cap from the mouth or from the base, all the same, but not from the edge between them.
+        gap, _ = wall_residual(RIGHT if x > 0.0 else LEFT, x, y, laws, anchors, bounds, is_relative)
+        if gap == 0.0:
+            return EDGE, 0.0
+    if y == 0.0 and wall == NO_WALL and table == MUSHROOM and vy <= 0.0:
         side = side_of_mouth(0.0, x, y, vx, vy, laws, anchors, is_relative)
         if side == 0:
             return EDGE, 0.0
-        if side < 0 and vy <= 0.0:
+        if side < 0:
             return (SLIDING if vy == 0.0 else APPROACHING), 0.0
         if vy == 0.0:
             return along_mouth(limit, x, vx, laws, anchors, bounds, is_relative)

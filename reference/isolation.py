@@ -183,8 +183,10 @@ class Isolator:
         return where
 
     def _around(self, a: Interval, b: Interval, bottom: Interval) -> list[tuple[Interval, Interval]]:
-        """Cut out the bottom: left of it f falls, right of it f rises."""
-        low, high = self.arithmetic.lower(bottom), self.arithmetic.upper(bottom)
+        """Cut out the bottom, wider than it is known, so that f clearly falls left and rises right of it."""
+        margin = self._margin(bottom)
+        low, high = self.arithmetic.lower(bottom - margin), self.arithmetic.upper(bottom + margin)
+        bottom = self.arithmetic.hull(low, high)
         if not (is_below(a, low) and is_below(high, b)):
             middle = self._split(a, b)
             return [(a, middle), (middle, b)]
@@ -254,19 +256,24 @@ class Isolator:
             return None
         return self.arithmetic.hull(*((middle, upper) if sign(f) > 0 else (lower, middle)))
 
+    def _margin(self, time: Interval) -> Interval:
+        """Return how much wider than its width, and than its rounding, an enclosed time is taken."""
+        least = self.arithmetic.upper(time) * self.arithmetic.power_of_two(8 - self.arithmetic.prec)
+        return self.arithmetic.upper(time.delta + least)
+
     def _accepted(self, time: Interval, a: Interval) -> Root:
         # Strict signs at both ends of a somewhat wider interval, and the stretch before it.
         if not is_below(self.arithmetic.upper(self.begin), time):
             raise Undecidable("a wall is met within the enclosure of the start")
-        least = self.arithmetic.upper(time) * self.arithmetic.power_of_two(8 - self.arithmetic.prec)
-        margin = self.arithmetic.upper(time.delta + least)
+        margin = self._margin(time)
         while True:
             wider = self.arithmetic.hull(
                 self.arithmetic.lower(time - margin), self.arithmetic.upper(time + margin)
             )
             lower, upper = self.arithmetic.lower(wider), self.arithmetic.upper(wider)
             slope = self.jet(wider).d1
-            if not is_below(a, lower) or slope is None or sign(slope) >= 0:
+            is_later = is_below(a, lower) and is_below(self.arithmetic.upper(self.begin), lower)
+            if not is_later or slope is None or sign(slope) >= 0:
                 raise Undecidable("the signs around the root are not strict")
             if sign(self.value(lower)) > 0 > sign(self.value(upper)):
                 self.leaves.append(Leaf(a, lower, "falling"))

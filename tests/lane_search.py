@@ -151,7 +151,8 @@ def search(seed: int, n: int, tally: Counter[str], group: str = ANYWHERE, kernel
         else:
             scene = draw_directed_scene(GROUPS[group], random)
             starts = draw_starts(scene, GROUPS[group], lanes.LANES, random)
-        found += try_starts(Round(scene, kernels), scene, starts, random, tally)
+        is_captured = group != ANYWHERE and GROUPS[group].is_captured
+        found += try_starts(Round(scene, kernels, is_captured=is_captured), scene, starts, random, tally)
     return found
 
 

@@ -136,7 +136,9 @@ def draw_crowd(scene: Scene, group: Group, random: np.random.Generator) -> Array
     if group.is_captured:
         x, y, vx, vy = chords(now, then, s, random)
     elif group.wall == codes.ARC:
-        angle = np.where(random.random(n) < 0.5, random.uniform(0, np.pi, n), 10.0 ** random.uniform(-3, 0.4, n))
+        angle = np.where(
+            random.random(n) < 0.5, random.uniform(0, np.pi, n), 10.0 ** random.uniform(-3, 0.4, n)
+        )
         x, y = now["r"].f * np.cos(angle), now["r"].f * np.sin(angle)
         edge = np.where(random.random(n) < 0.5, then["r"].f, then["w"].f)
         x_s, y_s = sign * edge * inward, np.zeros(n)
@@ -147,7 +149,9 @@ def draw_crowd(scene: Scene, group: Group, random: np.random.Generator) -> Array
     elif group.wall == codes.BASE:
         x, y = sign * (now["w"].f + (now["r"].f - now["w"].f) * inward), np.zeros(n)
         # About as fast as the arc, whose function is then hardly concave, or not.
-        speed = np.sqrt(np.abs(now["r"].rate ** 2 + now["r"].f * now["r"].bend)) * 10.0 ** random.uniform(-1.5, 1.5, n)
+        speed = np.sqrt(np.abs(now["r"].rate ** 2 + now["r"].f * now["r"].bend)) * 10.0 ** random.uniform(
+            -1.5, 1.5, n
+        )
         turn = np.pi * random.random(n)
         vx, vy = speed * np.cos(turn), speed * np.sin(turn)
     elif group.wall == codes.FLOOR:

@@ -1,4 +1,4 @@
-"""The fast stepper with one line of its kernels changed, in a process of its own or as a module of its own."""
+"""The fast stepper with one line of its kernels changed, in a process or a module of its own."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def output_of(folder: Path, program: str, file: str = "", old: str = "", new: st
 
 
 def faulty_lanes(old: str, new: str) -> ModuleType:
-    """Return fast.lanes with `old`, found in it, replaced everywhere; a loop is compiled when it is called."""
+    """Return fast.lanes with `old`, found in it, replaced; a loop is compiled when it is called."""
     path = HOUSE / "fast" / "lanes.py"
     source = path.read_text("utf-8")
     assert old in source, old

@@ -1,14 +1,14 @@
 """Draws of scenes and starts in which a wall comes and goes during one flight, for the search in lane_search.
 
-Each group aims at one kind of flight of docs/lanes.md: one wall moves deeply, the particle leaves the wall named
-with a velocity of the order of the walls', and of thousands of such starts those are kept on whose way some f falls
-below zero and rises above it again within the time that lanes look ahead: there nearly every answer hangs on a
-check. Some starts are kept unseen, so that the lanes have something to answer.
+Each group aims at one kind of flight of docs/lanes.md: one wall moves deeply, the particle leaves the wall
+named with a velocity of the order of the walls', and of thousands of such starts those are kept on whose way
+some f falls below zero and rises above it again within the time that lanes look ahead: there nearly every
+answer hangs on a check. Some starts are kept unseen, so that the lanes have something to answer.
 """
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -17,7 +17,7 @@ from fast import codes
 from scene import BangBang, Cap, Fourier, Law, Mushroom, Scene, Stem
 from scene.tables import laws, width_factors
 
-Array = npt.NDArray[np.float64]
+Array = npt.NDArray[np.floating[Any]]
 Start = tuple[Array, int]
 N_CROWD, N_INSTANTS = 1500, 96
 LOOK_AHEAD = 0.25  # phase, as in lanes.LONGEST_TURN
@@ -42,18 +42,18 @@ class Group(NamedTuple):
 
 
 GROUPS = {
-    "arc to base": Group(codes.ARC, "r", is_mouth_wide=False),
-    "arc to stem": Group(codes.ARC, "r"),
-    "base to arc": Group(codes.BASE, "r"),
-    "arc to moving mouth": Group(codes.ARC, "w"),
-    "side to arc": Group(codes.RIGHT, "w"),
-    "side to moving arc": Group(codes.LEFT, "r"),
-    "floor to arc": Group(codes.FLOOR, "w"),
-    "floor to moving arc": Group(codes.FLOOR, "r"),
-    "side under moving floor": Group(codes.LEFT, "h"),
-    "rising floor": Group(codes.FLOOR, "h"),
-    "captured beside a moving mouth": Group(codes.ARC, "w", is_captured=True),
-    "captured under a moving arc": Group(codes.ARC, "r", is_mouth_wide=False, is_captured=True),
+    "arc to base": Group(int(codes.ARC), "r", is_mouth_wide=False),
+    "arc to stem": Group(int(codes.ARC), "r"),
+    "base to arc": Group(int(codes.BASE), "r"),
+    "arc to moving mouth": Group(int(codes.ARC), "w"),
+    "side to arc": Group(int(codes.RIGHT), "w"),
+    "side to moving arc": Group(int(codes.LEFT), "r"),
+    "floor to arc": Group(int(codes.FLOOR), "w"),
+    "floor to moving arc": Group(int(codes.FLOOR), "r"),
+    "side under moving floor": Group(int(codes.LEFT), "h"),
+    "rising floor": Group(int(codes.FLOOR), "h"),
+    "captured beside a moving mouth": Group(int(codes.ARC), "w", is_captured=True),
+    "captured under a moving arc": Group(int(codes.ARC), "r", is_mouth_wide=False, is_captured=True),
 }
 
 
@@ -169,7 +169,7 @@ def draw_crowd(scene: Scene, group: Group, random: np.random.Generator) -> Array
 def chords(
     now: dict[str, Numbers], then: dict[str, Numbers], s: Array, random: np.random.Generator
 ) -> tuple[Array, Array, Array, Array]:
-    """Return starts on the arc whose chords, about s long, pass the centre at about the mouth's half-width."""
+    """Return starts on the arc whose chords, about s long, pass the mouth's edge closely."""
     n, r = len(s), now["r"].f
     edge = np.where(random.random(n) < 0.5, np.maximum(now["w"].f, then["w"].f), now["w"].f)
     spread = random.choice([-1.0, 1.0], n) * 10.0 ** random.uniform(-5, -0.5, n)
@@ -197,9 +197,10 @@ def slipping(
 ) -> tuple[Array, Array, Array, Array]:
     """Return starts on the arc from which it comes and goes within s, and the particle is at y = 0 then.
 
-    f(u) / u = P(u) - 2 q, where P(u) = (r(u)^2 - r(0)^2) / u - v^2 u and q = x vx + y vy: f is below zero where P is below
-    2 q. The speed is drawn such that P has its value at 0 again somewhere on the way, so that it dips before or after;
-    then 2 q such that f begins and ends above zero, and so does the parabola from which lanes guess the hit.
+    f(u) / u = P(u) - 2 q, where P(u) = (r(u)^2 - r(0)^2) / u - v^2 u and q = x vx + y vy: f is below zero
+    where P is below 2 q. The speed is drawn such that P has its value at 0 again somewhere on the way, so
+    that it dips before or after; then 2 q such that f begins and ends above zero, and so does the parabola
+    from which lanes guess the hit. At the end the particle may be no further out than `widest`.
     """
     n, part = len(t), np.arange(1, 49) / 48.0
     r, u = numbers(law, t), s[:, None] * part
@@ -219,7 +220,7 @@ def slipping(
 
 
 def comes_and_goes(scene: Scene, crowd: Array) -> npt.NDArray[np.bool_]:
-    """Tell for which starts some f goes below zero on the way and comes back, before the base ends the flight."""
+    """Tell for which starts some f goes below zero and comes back, before the base ends the flight."""
     t, x, y, vx, vy, ahead = crowd[:, :, None].transpose(1, 0, 2)
     s = ahead * np.arange(1, N_INSTANTS + 1) / N_INSTANTS
     now = walls_at(scene, t + s)

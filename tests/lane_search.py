@@ -185,9 +185,9 @@ def try_starts(
     """Fill a pool with starts in a scene and take lane steps from them."""
     found = []
     age = follow.SERVES / pool.omega * random.random() if pool.omega and random.random() < 0.5 else 0.0
-    for i, (p, wall) in enumerate(starts):
-        pool.fill(i, p, wall, age)
-    is_live = np.array([is_valid(pool, p, wall) for p, wall in starts])
+    for i, start in enumerate(starts):
+        pool.fill(i, *start, age)
+    is_live = np.array([is_valid(pool, *start) for start in starts])
     for _ in range(N_ROUNDS):
         begun = [state_in(pool, i) for i in range(len(starts))]
         right, hits, numbers = pool.step(len(starts))
@@ -213,7 +213,7 @@ def try_starts(
 def error_of(
     pool: Round, p: FloatArray, wall: int, answer: FloatArray, truth: FloatArray, tally: Counter[str]
 ) -> float | None:
-    """Return a lane answer's backward ulps, 0 where it may only be compared roughly; None for a delicate step."""
+    """Return a lane answer's backward ulps, 0 where only times are compared; None for a delicate step."""
     if pool.is_disk and p[3] * answer[2] < 0.0:
         # Through the base the careful step forgets that the start lay on the arc by definition, and so its
         # rounding counts. A quarter turn, which is exact, brings half of these chords above y = 0.

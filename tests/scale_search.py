@@ -36,7 +36,7 @@ def search(seed: int, n: int, tally: Counter[str]) -> list[tuple[Question, int, 
     random, found = np.random.default_rng(seed), []
     while tally["answers"] < n:
         scene = draw_scene(random)
-        questions = [draw_question(scene, random) for _ in range(40)]
+        questions = [draw_question(scene, random) for _ in range(10)]
         for length, time in (draw_exponents(random), draw_exponents(random)):
             for question in questions:
                 for ask in (step, trajectory, flow) if random.random() < 0.2 else (step, trajectory):

@@ -128,6 +128,8 @@ def draw_crowd(scene: Scene, group: Group, random: np.random.Generator) -> Array
     least = np.pi if is_smooth else scene_knot(scene)
     t = np.where(random.random(n) < 0.5, t, least + ahead * random.uniform(-1.5, 0.5, n))
     s = ahead * 10.0 ** random.uniform(-2, 0, n)
+    if group.is_captured and is_smooth:
+        t = np.where(random.random(n) < 0.5, t, 2.0 * np.pi - 0.5 * s)  # about the greatest of cos t
     now, then = walls_at(scene, t), walls_at(scene, t + s)
     pace = 1.0 / period
     small = 10.0 ** random.uniform(-6, 0, n) * pace
@@ -135,6 +137,13 @@ def draw_crowd(scene: Scene, group: Group, random: np.random.Generator) -> Array
     inward = 1.0 - 10.0 ** random.uniform(-5, 0, n)
     if group.is_captured:
         x, y, vx, vy = chords(now, then, s, random)
+        if random.random() < 0.5:
+            # Straight down, to the mouth, which is as wide there and then but not at one of the ends.
+            widest = walls_at(scene, t + 0.5 * s)["w"].f
+            edge = now["w"].f if random.random() < 0.5 else then["w"].f
+            x = edge + (widest - edge) * random.random(n)
+            y = np.sqrt(np.maximum((now["r"].f - x) * (now["r"].f + x), 0.0))
+            vx, vy = np.zeros(n), -2.0 * y / s
     elif group.wall == codes.ARC:
         angle = np.where(
             random.random(n) < 0.5, random.uniform(0, np.pi, n), 10.0 ** random.uniform(-3, 0.4, n)

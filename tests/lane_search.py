@@ -185,8 +185,8 @@ def try_starts(
     """Fill a pool with starts in a scene and take lane steps from them."""
     found = []
     age = follow.SERVES / pool.omega * random.random() if pool.omega and random.random() < 0.5 else 0.0
-    for i, start in enumerate(starts):
-        pool.fill(i, *start, age)
+    for lane, start in enumerate(starts):
+        pool.fill(lane, *start, age)
     is_live = np.array([is_valid(pool, *start) for start in starts])
     for _ in range(N_ROUNDS):
         begun = [state_in(pool, i) for i in range(len(starts))]

@@ -72,7 +72,7 @@ class Tally:
     n_cases: int = 0
     counts: dict[str, int] = field(default_factory=lambda: dict.fromkeys(KINDS, 0))
     worst_ulps: float = 0.0
-    slowest: float = 0.0  # seconds a step of the proved stepper, its certificate included
+    slowest: float = 0.0  # seconds a step of the proved stepper, its proof repeated
     wrong: list[str] = field(default_factory=list)
 
     def add(self, verdict: Verdict, where: str) -> None:
@@ -130,7 +130,7 @@ def judged(attack: Attack, steppers: Steppers, tally: Tally) -> Iterable[Verdict
     if steppers.prover is not None:
         prover, begun = steppers.prover, time.perf_counter()
         verdict = _survived(lambda: proved(prover(attack), answers))
-        tally.slowest = max(tally.slowest, (time.perf_counter() - begun) / max(len(claims), 1))
+        tally.slowest = max(tally.slowest, (time.perf_counter() - begun) / max(len(answers), 1))
         yield verdict
     if steppers.stepper is not None:
         t_end = attack.t_end if attack.t_end is not None else late_enough(attack.state, answers[0])

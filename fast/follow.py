@@ -309,6 +309,15 @@ def attend(pool, scene, is_laned, a, i, spare, whom, anchors, p, stops, out, end
 
 
 @njit(error_model="numpy")
+def are_calm(a, n):
+    """Tell whether no lane of a pool needs attention: mostly so, and seen in one packed loop."""
+    least = 1.0
+    for i in range(n):
+        least = min(least, a[CALM + i])
+    return least > 0.0
+
+
+@njit(error_model="numpy")
 def scan(pool, scene, is_laned, pools, whoms, n, anchors, p, stops, out, ends, limits):
     """Attend to every lane of a pool that needs it; the last lane fills the place of one that leaves."""
     a, whom = pools[pool], whoms[pool]
@@ -367,9 +376,11 @@ def follow(scene, walls, stops, out, ends):
         if n[GENERAL] > 0:
             aim(general, n[GENERAL], is_stem, m, limits)
             next_flight(general, n[GENERAL], is_stem, is_relative, omega, m, limits)
-            scan(GENERAL, scene, is_laned, pools, whoms, n, anchors, p, stops, out, ends, limits)
+            if not (is_laned and are_calm(general, n[GENERAL])):
+                scan(GENERAL, scene, is_laned, pools, whoms, n, anchors, p, stops, out, ends, limits)
             bounce(general, n[GENERAL], m, table == MUSHROOM)
         if n[DISK] > 0:
             next_chord(disk, n[DISK], np.bool_(False), table == CAP, is_relative, omega, limits)
-            scan(DISK, scene, is_laned, pools, whoms, n, anchors, p, stops, out, ends, limits)
+            if not (is_laned and are_calm(disk, n[DISK])):
+                scan(DISK, scene, is_laned, pools, whoms, n, anchors, p, stops, out, ends, limits)
             rebound(disk, n[DISK])

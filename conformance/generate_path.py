@@ -92,11 +92,10 @@ def _carried(place: Number, speed: Number, later: Number, near: fmpq, s: Number)
 
 
 def _residuals(old: Flight, wall: str, claimed: dict[str, Any]) -> dict[str, Number]:
-    """Return the residual of the wall just met: what was taken out of it before, else nothing."""
+    """Return the residual of the wall just met, as it is known here: what was taken out before, or 0."""
     if set(claimed) != {wall}:
         raise Refuted("the next step does not leave the wall that was met")
-    low, high = interval(claimed[wall])
     truth = old.residuals.get(wall, fmpq(0))
-    if not (arb(low) <= truth and truth <= arb(high)):
+    if not arb(truth).overlaps(ball(*interval(claimed[wall]))):
         raise Refuted("the residual of the wall met is not carried on")
-    return {} if wall == "base" else {wall: low if low == high else ball(low, high)}
+    return {} if wall == "base" else {wall: truth}

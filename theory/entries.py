@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from scene.refusal import BadInput, check_count, shown
 
-MAX_DIGITS = 1000  # minutes of work for the moving cap; time grows with about the third power
+MAX_DIGITS = 1000  # a bound on nonsense, not a promise: for the moving cap so many may take far over ten minutes
 MAX_ORDER = 64  # of moments and cumulants
 
 

@@ -162,7 +162,7 @@ def z_score(run, scene):
 
 
 N, ENERGY = 1000, {"equal": 1e4, "unequal": 1e4, "plateaus": 1e6}
-# Finite energy moves p_nc by O(1/v): 0.007 was seen at 1e6 with 10,000 particles; at 1e4 the bound is a guess.
+# Finite energy moves p_nc by O(1/v): 0.007 was seen at 1e6, N = 10,000; at 1e4 the bound is a guess.
 BIAS = {"equal": 0.02, "unequal": 0.02, "plateaus": 0.01}
 
 

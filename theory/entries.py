@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from scene.refusal import BadInput, check_count, shown
 
-MAX_DIGITS = 1000  # a bound on nonsense, not a promise: for the moving cap so many may take far over ten minutes
+MAX_DIGITS = 1000  # a bound on nonsense, no promise: the moving cap may take far over ten minutes
 MAX_ORDER = 64  # of moments and cumulants
 
 

@@ -12,7 +12,7 @@ it changes the wall. In a Hypothesis test:
 Mirror and power-of-two scaling hold bit for bit in any stepper whose arithmetic is binary64 and which has no
 absolute tolerance and treats both sides alike; `is_exact=False` asks for them within rounding. All others
 hold within rounding: `bound` is the backward error granted (1e-9 by default, as in the physics verdict),
-and what it does to the answer is measured on the stepper itself (`conformance.sensitivity`). The work
+and what it does to the answer is measured on the stepper itself (`conformance.grading.sensitivity`). The work
 identity, a property of whole ensembles, is `conformance.profiles.check_work_identity`.
 """
 
@@ -27,9 +27,9 @@ from math import hypot
 import msgspec
 from mpmath import MPContext
 
-from conformance import sensitivity, transforms
-from conformance.sensitivity import Stepper, measured, numbers
-from scene import Collision, Horizon, Outcome, Rejected, Scene, State, Undecided, to_data
+from conformance.grading import sensitivity
+from conformance.grading.sensitivity import Stepper, measured, numbers
+from scene import Collision, Horizon, Outcome, Rejected, Scene, State, Undecided, to_data, transforms
 from scene.laws import is_constant
 from scene.tables import laws, period
 

@@ -18,11 +18,11 @@ from hypothesis import currently_in_test_context, note
 from hypothesis import strategies as st
 from mpmath import MPContext
 
-from conformance.transforms import scaled_law
 from scene import BangBang, Cap, Fourier, Law, Mushroom, Scene, State, Stem, Wall, to_data
 from scene.laws import bounds, breakpoints, value
 from scene.tables import laws as laws_of
 from scene.tables import period, width_factors
+from scene.transforms import scaled_law
 
 T = TypeVar("T")
 MARGIN = 1 - 2.0**-40  # keeps the rounding of sums of amplitudes inside the range asked for

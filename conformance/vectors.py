@@ -8,7 +8,7 @@ never leave the harness: `request` builds the line that an implementation is sen
 Levels say how delicate a question is, by the condition number (the largest relative change of an answer per
 relative change of the inputs) and by what nudging the inputs does:
     core      condition <= 1e6, and the walls met stay the same when every input moves by 2^-30 of its size.
-              An answer that passes (backward error 1e-9, see `conformance.grading`) is then right to three
+              An answer that passes (backward error 1e-9, see `grading.grade`) is then right to three
               digits, and a stepper that loses twice the digits that it must (1e6^2 u = 1e-4 at worst, in the
               answer; 1e6 u = 1e-10 backward) still passes: what an honest simple stepper can do.
     extended  condition <= 1e12, walls stable under 2^-44: within binary64's reach, but only for a stepper

@@ -3,7 +3,7 @@
 from fast.ensemble import Ensemble, simulate
 from fast.fine import FineTrajectory, fine_trajectory
 from fast.flow import Flow, flow
-from fast.stepper import Trajectory, next_collision, trajectory
+from fast.step import Trajectory, next_collision, trajectory
 
 __all__ = [
     "Ensemble",

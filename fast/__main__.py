@@ -9,7 +9,7 @@ import fast
 from fast.flow import carry_judged, refuse
 from fast.given import given_threads
 from scene import Collision, Outcome, Scene, State
-from scene.wire import serve
+from scene.protocol.wire import serve
 
 
 def follow(scene: Scene, state: State, n_collisions: int, t_end: float = math.inf) -> list[Outcome]:

@@ -13,12 +13,13 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from fast import codes, entries, follow, lanes, motion, walls
 from fast.compiled import FloatArray, compile_scene
 from fast.fine import FineTrajectory, as_pairs, as_trajectory
 from fast.flow import follow_to
-from fast.limits import limits_of
-from fast.stepper import WALL_NAMES, as_arrays, fitted_start, trouble
+from fast.kernel import codes, entries, follow, lanes, walls
+from fast.kernel.laws import ANCHORS_SHAPE, set_anchors
+from fast.kernel.limits import limits_of
+from fast.step import WALL_NAMES, as_arrays, fitted_start, trouble
 from fast.units import fit
 from scene import Collision, Horizon, Outcome, Scene, State
 
@@ -94,7 +95,7 @@ class LaneRound:
         self.is_disk = bool(self.table == codes.CAP)
         self.limits = limits_of(self.laws, self.bounds)
         self.omega = self.laws[codes.PHASES, 0]
-        self.anchors = np.zeros(motion.ANCHORS_SHAPE)
+        self.anchors = np.zeros(ANCHORS_SHAPE)
         self.pool, self.spare = np.zeros((2, lanes.N_ROWS * lanes.LANES))
 
     def fill(self, lane: int, p: FloatArray, wall: int, age: float = 0.0) -> None:
@@ -103,7 +104,7 @@ class LaneRound:
         i = np.int64(lane)
         follow.load(a, i, p, wall, np.inf, OFF)
         a[lanes.NEXT_T + i], a[lanes.NEXT_T_LOW + i] = p[0] - age, p[1]
-        motion.set_anchors(self.laws, self.anchors, p[0] - age, p[1])
+        set_anchors(self.laws, self.anchors, p[0] - age, p[1])
         follow.set_reference(a, i, self.laws, self.anchors, self.is_relative)
         if a[lanes.END + i] <= p[0]:
             self.fill(lane, p, wall)
@@ -120,8 +121,8 @@ class LaneRound:
             return False
         if wall == codes.BASE:
             return bool(p[3] == 0.0)
-        anchors = np.zeros(motion.ANCHORS_SHAPE)
-        motion.set_anchors(self.laws, anchors, p[0], p[1])
+        anchors = np.zeros(ANCHORS_SHAPE)
+        set_anchors(self.laws, anchors, p[0], p[1])
         f, error = walls.wall_residual(wall, p[2], p[3], self.laws, anchors, self.bounds, self.is_relative)
         return bool(abs(f) <= error)
 
@@ -151,7 +152,7 @@ class LaneRound:
         return right, np.zeros(n), np.column_stack([dt, *(self.row(r, n) for r in PLACE)])
 
     def correct_more(self, pool: np.integer[Any], n: int) -> None:
-        """Correct coarse steps again, as `fast.follow` does."""
+        """Correct coarse steps again, as `fast.kernel.follow` does."""
         for i in range(n):
             follow.correct_more(pool, tuple(self.compiled), self.pool, np.int64(i), self.spare, self.limits)
 

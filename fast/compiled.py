@@ -9,8 +9,8 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from fast import codes
-from fast.double_double import half_pi
+from fast.kernel import codes
+from fast.kernel.double_double import half_pi
 from scene import BangBang, Cap, Fourier, Law, Mushroom, Scene
 from scene.laws import Bounds, bounds, is_constant
 from scene.refusal import BadInput
@@ -30,7 +30,7 @@ class Compiled(NamedTuple):
 
     table: int
     is_relative: bool  # the width row holds nu, and w = nu r
-    laws: FloatArray  # (5, n): radius, width, depth, slope; then what all Fourier laws share: see fast.codes
+    laws: FloatArray  # (5, n): radius, width, depth, slope; then what Fourier laws share: see kernel.codes
     bounds: FloatArray  # (4, 4): lowest, highest, |f'|, |f''| of radius, half-width w, depth, slope
 
 

@@ -16,7 +16,6 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from fast import codes, entries
 from fast.compiled import LARGEST, Compiled, FloatArray
 from fast.given import (
     MAX_CYCLES,
@@ -27,6 +26,7 @@ from fast.given import (
     given_progress,
     given_threads,
 )
+from fast.kernel import codes, entries
 from fast.narrowings import narrowings
 from fast.starts import Stops, cycle_length, cycle_stops, initial_states, least_collisions
 from fast.units import Units, fit, inward

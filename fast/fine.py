@@ -8,10 +8,10 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from fast import codes, entries
 from fast.compiled import FloatArray
 from fast.given import MAX_STEPS
-from fast.stepper import WALL_CODES, WALL_NAMES, Start, check_state, trouble
+from fast.kernel import codes, entries
+from fast.step import WALL_CODES, WALL_NAMES, Start, check_state, trouble
 from fast.units import Units
 from scene import Horizon, Outcome, Scene, State, Wall
 from scene.refusal import check_count, check_scene

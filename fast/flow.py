@@ -8,12 +8,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fast import codes
 from fast.compiled import FloatArray
 from fast.ensemble import Followed, IntArray, follow
 from fast.given import given_states, given_threads
+from fast.kernel import codes
 from fast.starts import least_collisions, only_stop
-from fast.stepper import as_arrays, fitted_start, next_collision, trouble
+from fast.step import as_arrays, fitted_start, next_collision, trouble
 from fast.units import fit
 from scene import Horizon, InvalidState, Outcome, Rejected, Scene, State
 from scene.refusal import check_number, check_scene

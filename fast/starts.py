@@ -14,8 +14,8 @@ import numpy as np
 import numpy.typing as npt
 from mpmath import fp
 
-from fast import entries
 from fast.compiled import FloatArray
+from fast.kernel import entries
 from fast.narrowings import narrowings, start_time
 from scene import Cap, Scene
 from scene.laws import bounds, value

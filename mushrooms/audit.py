@@ -26,7 +26,7 @@ def audit(
     resume: Annotated[bool, typer.Option("--resume", help="Go on with what DIR/parts holds.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
-    """Check the paper's claims; writes report.html, report.json and report.txt.
+    """Check the paper's claims; writes audit_page.html, audit_page.json and audit_page.txt.
 
     Finished parts are kept in DIR/parts, for --resume after an interruption or with other --only.
     Exit code 0 when every claim has its expected verdict, 1 when one has not, 2 on bad input.
@@ -36,7 +36,7 @@ def audit(
     from conformance.audit.evidence import Steppers
     from conformance.audit.runs import check_seed
     from conformance.audit.session import Settings, conduct
-    from mushrooms import report
+    from mushrooms.reports import audit_page
 
     entries = ledger.select(only)
     check_seed(seed)
@@ -48,11 +48,11 @@ def audit(
             result = conduct(
                 Steppers(fast.simulate, fast.trajectory), settings, entries=entries, progress=_advance(bar)
             )
-        data = report.to_data(result)
+        data = audit_page.to_data(result)
         texts = {
-            "report.json": report.to_json(data),
-            "report.html": report.to_html(data, result.samples),
-            "report.txt": report.to_text(data),
+            "report.json": audit_page.to_json(data),
+            "report.html": audit_page.to_html(data, result.samples),
+            "report.txt": audit_page.to_text(data),
         }
         output.write_files(folder, {name: output.whole(text.encode()) for name, text in texts.items()})
     if as_json:

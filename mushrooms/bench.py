@@ -54,7 +54,8 @@ def bench(
     Exit code 0, or 1 when --compare shows a stepper slower than laps explain, or 2 on bad input.
     """
     from conformance.bench import comparison, hard_cases, record
-    from mushrooms import bench_report, figures_of_speed
+    from mushrooms.figures import speed as figures_of_speed
+    from mushrooms.reports import bench_page
 
     if not 0 <= seed <= MAX_SEED:
         raise BadInput(f"--seed = {seed}, must be 0 to 2^64 - 1")
@@ -67,7 +68,7 @@ def bench(
         files = {
             "bench.json": record.encode(found),
             "bench.svg": figures_of_speed.speed(found),
-            "bench.html": bench_report.to_html(found),
+            "bench.html": bench_page.to_html(found),
             "hard-cases.md": hard_cases.to_markdown(found.hard_cases).encode(),
         }
         output.write_files(folder, {name: output.whole(content) for name, content in files.items()})
@@ -155,9 +156,9 @@ def _contenders(
 ) -> tuple[list[Contender], dict[str, Ask], dict[str, str], dict[str, str]]:
     """Return contenders, how each answers a vector, what was compiled, and what cannot run."""
     from conformance.bench import contenders as those
-    from conformance.examples import find_examples
-    from conformance.process import Trouble
-    from conformance.session import Limits
+    from conformance.harness.examples import find_examples
+    from conformance.suite.process import Trouble
+    from conformance.suite.session import Limits
     from mushrooms import bench_contenders as ours
 
     patience = Limits(TIMEOUT, RESTARTS)
@@ -191,7 +192,7 @@ def _contenders(
 
 
 def _table(found: Record) -> Table:
-    from mushrooms.bench_report import middle_and_worst
+    from mushrooms.reports.bench_page import middle_and_worst
 
     table = Table(title="Speed against error", title_justify="left")
     for name in ("workload", "stepper"):

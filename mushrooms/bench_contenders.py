@@ -14,12 +14,12 @@ from functools import partial
 import fast
 import reference
 from conformance import plain, vectors
-from conformance.agreement import Truth
 from conformance.bench.contenders import Answer, Ask, Contender, Exact, Lap, by_call
 from conformance.bench.growth import FAR, Follower, Place
 from conformance.bench.work import SCENE, Cost, Load
 from conformance.bench.workloads import WINDOW, Workload
-from conformance.generate_draws import Moment
+from conformance.generator.draws import Moment
+from conformance.grading.agreement import Truth
 from fast import __main__ as fast_protocol
 from fast.batch import careful_steps, fine_steps, flights, lane_steps
 from reference import __main__ as proof

@@ -19,7 +19,7 @@ from mushrooms.terminal import progress_bar
 from scene.refusal import BadInput
 
 if TYPE_CHECKING:
-    from conformance.suite import Run
+    from conformance.suite.run import Run
 
 MAX_SHOWN = 20  # objections on the terminal; all are in the reports
 COLOURS = {"pass": "green", "declined": "yellow", "unsupported": "yellow"}
@@ -43,7 +43,7 @@ def check(
     Exit code 0 when everything passes, 1 when something fails, 2 when the options or the suite are at fault.
     """
     from conformance import suite
-    from conformance.session import Limits
+    from conformance.suite.session import Limits
 
     if not (math.isfinite(timeout) and 0 < timeout <= 86_400):
         raise BadInput(f"--timeout = {timeout}, must be > 0 and at most 86400 seconds")
@@ -71,18 +71,18 @@ def check(
 
 
 def _content(run: Run, suffix: str) -> bytes:
-    from conformance import reports
-    from mushrooms import check_report
+    from conformance.suite import reports
+    from mushrooms.reports import check_page
 
     if suffix == ".json":
         return reports.to_json(run)
-    return reports.to_junit(run) if suffix == ".xml" else check_report.to_html(run)
+    return reports.to_junit(run) if suffix == ".xml" else check_page.to_html(run)
 
 
 def show(run: Run) -> None:
     """Print verdicts by group, with every denominator, and what stands against success."""
-    from conformance import reports
-    from conformance.suite import VERDICTS
+    from conformance.suite import reports
+    from conformance.suite.run import VERDICTS
 
     groups = [*(reports.summarise(run, group) for group in run.groups()), reports.summarise(run)]
     seen = [verdict for verdict in VERDICTS if verdict == "pass" or groups[-1].counts[verdict]]

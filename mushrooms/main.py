@@ -244,7 +244,7 @@ def draw(
     """Draw the walls through the cycle, with a few chords of one particle; a .gif moves."""
     table = scenes.load(scene)
     path = out or Path(f"{Path(scene).stem}.svg")
-    from mushrooms import draw as pictures
+    from mushrooms.figures import table as pictures
 
     output.check_file(path, pictures.SUFFIXES)
     output.write_files(

@@ -2,7 +2,7 @@
 
 from reference.answers import Collision, Horizon, Moment, Outcome, Trajectory
 from reference.arithmetic import Enclosure
-from reference.stepper import next_collision, trajectory
+from reference.step import next_collision, trajectory
 
 __all__ = [
     "Collision",

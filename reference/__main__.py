@@ -3,9 +3,10 @@
 import sys
 import time
 
-from reference import answers, stepper
+from reference import answers
+from reference import step as stepper
 from scene import Outcome, Scene, State
-from scene.wire import serve
+from scene.protocol.wire import serve
 
 
 def rounded(outcome: answers.Outcome) -> Outcome:

@@ -19,7 +19,7 @@ from reference.answers import Collision, Departure, Horizon, Trajectory
 from reference.arithmetic import Enclosure
 from reference.course import Evidence
 from reference.isolation import Leaf
-from reference.stepper import evidence_of
+from reference.step import evidence_of
 from scene import BadInput, Scene, State, Undefined, to_data
 from scene.refusal import check_scene, shown
 

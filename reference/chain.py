@@ -14,7 +14,7 @@ from reference.answers import Collision, Departure, Horizon, Moment
 from reference.arithmetic import Arithmetic, Interval
 from reference.arithmetic import rational as exact_point
 from reference.course import FOR_EVER, Event, Hit
-from reference.motion import Flight
+from reference.walls import Flight
 from scene import Wall
 
 

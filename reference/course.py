@@ -18,7 +18,7 @@ from reference import rational
 from reference.arithmetic import Arithmetic, Interval, Undecidable, is_below, sign
 from reference.arithmetic import rational as exact_point
 from reference.isolation import Isolator, Leaf, Root
-from reference.motion import Flight, Motion
+from reference.walls import Flight, Motion
 from scene import Cap, Mushroom, Scene, State, Stem, Undefined, Wall
 from scene.laws import bounds
 from scene.tables import laws

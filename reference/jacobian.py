@@ -12,7 +12,7 @@ from collections.abc import Iterator
 
 from reference.arithmetic import Arithmetic, Enclosure, Interval
 from reference.course import Hit
-from reference.motion import Flight
+from reference.walls import Flight
 
 Matrix = list[list[Interval]]
 

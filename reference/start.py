@@ -10,7 +10,7 @@ from reference import rational
 from reference.arithmetic import Arithmetic, Interval, Undecidable, sign
 from reference.arithmetic import rational as exact_point
 from reference.course import SIDES
-from reference.motion import Flight, Motion
+from reference.walls import Flight, Motion
 from scene import Cap, InvalidState, Mushroom, Scene, State, Stem, Undefined, Wall
 from scene.laws import is_constant
 from scene.states import ON_WALL

@@ -7,10 +7,10 @@ from fractions import Fraction
 
 import pytest
 from hypothesis import given, settings
-from truth import is_delicate, proved_step
+from support.truth import is_delicate, proved_step
 
 import fast
-from conformance.agreement import Truth, compare
+from conformance.grading.agreement import Truth, compare
 from conformance.strategies import scenes_and_states
 from scene import Collision, Horizon, State, Undecided, load
 

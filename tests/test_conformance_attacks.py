@@ -5,10 +5,10 @@ from __future__ import annotations
 import json
 import os
 
-import faulty_provers as faults
 import pytest
 from flint import arb
 from hypothesis import given, settings
+from support import faulty_provers as faults
 
 from conformance.attacks import FAMILIES, Claim, Steppers, line, run
 from conformance.attacks.search import as_truth, flown, proved, stepped, truths

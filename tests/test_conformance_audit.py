@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from functools import cache
 
-import adiabatic_particles
 import mpmath
 import numpy as np
 import pytest
+from support import adiabatic_particles
 
 import fast
 import theory
-from conformance.audit import experiments, laws, ledger
+from conformance.audit import ledger
+from conformance.audit.claims import experiments, exponents
 from conformance.audit.evidence import Evidence, Steppers
 from conformance.audit.finding import verdict_of
 from conformance.audit.runs import RUNS, scene_of
@@ -219,7 +220,7 @@ def test_a_leaking_circle_is_refuted():
 
 
 def test_work_that_is_not_conserved_is_refuted(monkeypatch):
-    monkeypatch.setitem(laws.N_ENERGIES, "quick", 60)
+    monkeypatch.setitem(exponents.N_ENERGIES, "quick", 60)
 
     def cooled(scene, **options):
         done = fast.simulate(scene, **options)

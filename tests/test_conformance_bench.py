@@ -14,14 +14,14 @@ from pathlib import Path
 import jsonschema
 import msgspec
 import pytest
-from truth import proved_step
+from support.truth import proved_step
 
 import fast
 from conformance import plain, vectors
 from conformance.bench import comparison, contenders, growth, hard_cases, measure, record, work, workloads
 from conformance.bench.contenders import Contender, Lap, by_call
 from conformance.bench.time_stepping import next_collision_by
-from conformance.process import Trouble
+from conformance.suite.process import Trouble
 from mushrooms import bench_contenders as ours
 from scene import BadInput, Collision, Horizon, Undecided
 

@@ -14,20 +14,21 @@ import time
 from collections import Counter
 from contextlib import contextmanager, suppress
 
-import fuzz
 import jsonschema
 import pytest
+from support import fuzz
 from test_conformance_session import made_up
 
 import fast
 import fast.__main__ as fast_server
 import reference.__main__ as reference_server
-from conformance import plain, session
-from conformance.grading import grade
-from conformance.process import Trouble
+from conformance import plain
+from conformance.grading.grade import grade
+from conformance.suite import session
+from conformance.suite.process import Trouble
 from scene import BadInput, load
-from scene.messages import json_schema
-from scene.wire import serve
+from scene.protocol.messages import json_schema
+from scene.protocol.wire import serve
 
 N_LINES = int(os.environ.get("MUSHROOMS_LINES", "300"))
 LIMIT = 120.0  # seconds for one line: the time limit of `mushrooms check`

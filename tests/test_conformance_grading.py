@@ -11,7 +11,7 @@ import pytest
 
 import fast
 import reference
-from conformance.grading import BOUND, Grade, grade, precision_class
+from conformance.grading.grade import BOUND, Grade, grade, precision_class
 from conformance.vectors import NUMBERS, Certified, Expectation, Vector, load
 from fast.__main__ import follow as fast_follow
 from reference.__main__ import follow as reference_follow

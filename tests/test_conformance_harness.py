@@ -7,8 +7,10 @@ import subprocess
 
 import pytest
 
-from conformance import suite, vectors
-from conformance.examples import Example, find_examples
+from conformance import vectors
+from conformance.harness.examples import Example, find_examples
+from conformance.suite import property_checks
+from conformance.suite import run as suite
 from scene.load import read_data
 
 LANGUAGES = ("Python", "C", "JavaScript")
@@ -36,7 +38,7 @@ def test_an_example_passes_at_level_core(language, commands, monkeypatch, tally)
     command = runnable(commands[language])
     chosen = vectors.load("core")[:: EVERY[language]]
     monkeypatch.setattr(suite, "choose", lambda *_: chosen)
-    monkeypatch.setattr(suite.suite_properties, "N_QUESTIONS", 4)
+    monkeypatch.setattr(property_checks, "N_QUESTIONS", 4)
     run = suite.check(command)
     assert run.objections() == []
     assert run.exit_code() == 0

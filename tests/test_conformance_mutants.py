@@ -7,9 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from conformance import kill_matrix
-from conformance.kill_matrix import PLAIN, kills, matrix, table, verdict
-from conformance.mutants import MUTANTS
+from conformance.mutants import MUTANTS, kill_matrix
+from conformance.mutants.kill_matrix import PLAIN, kills, matrix, table, verdict
 from conformance.vectors import load, manifest
 from scene import BadInput
 

@@ -10,11 +10,11 @@ from pathlib import Path
 
 import pytest
 from hypothesis import given, settings
-from truth import proved_step
+from support.truth import proved_step
 
 from conformance import plain
-from conformance.agreement import compare
-from conformance.plain_laws import Legs, Wave
+from conformance.grading.agreement import compare
+from conformance.plain.motion import Legs, Wave
 from conformance.strategies import scenes_and_states
 from scene import BangBang, Cap, Collision, Fourier, Horizon, Mushroom, Rejected, State, Stem, Undecided, load
 

@@ -9,11 +9,11 @@ from hypothesis import given, settings
 
 import fast
 import reference
-from conformance import plain, transforms
+from conformance import plain
 from conformance.mutants import MUTANTS
 from conformance.properties import PROPERTIES, check_mirror, check_period_shift, check_scaling
 from conformance.strategies import scenes_and_states
-from scene import BangBang, Cap, Collision, Fourier, Mushroom, State, Stem, load
+from scene import BangBang, Cap, Collision, Fourier, Mushroom, State, Stem, load, transforms
 from scene.laws import is_constant
 from scene.tables import laws, period
 

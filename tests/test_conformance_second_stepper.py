@@ -4,18 +4,18 @@ from __future__ import annotations
 
 from math import inf, pi, sqrt
 
-import faulty_provers as faults
 import pytest
 from flint import arb, fmpq
+from support import faulty_provers as faults
 
 from conformance import plain
-from conformance.agreement import compare
 from conformance.attacks.search import as_truth
-from conformance.generate_draws import Draw, clock, scene, state
+from conformance.generator.draws import Draw, clock, scene, state
+from conformance.grading.agreement import compare
 from conformance.second_stepper import next_collision, trajectory
-from conformance.second_stepper.stepper import simplest
-from conformance.transforms import mirrored, mirrored_wall
+from conformance.second_stepper.step import simplest
 from scene import BangBang, Cap, Collision, Fourier, Mushroom, State, Stem, Undecided
+from scene.transforms import mirrored, mirrored_wall
 
 STATIC = Mushroom(r=1.0, h=1.0, w=0.5)
 LIFT = Stem(w=1.0, h=BangBang(knots=((0.0, 2.0), (0.5, 1.0), (1.0, 2.0))))

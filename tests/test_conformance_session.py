@@ -7,15 +7,16 @@ import sys
 from pathlib import Path
 
 import pytest
-from saboteurs import HONEST, SABOTEURS
+from support.saboteurs import HONEST, SABOTEURS
 
-from conformance import suite
-from conformance.process import CommandNotFound, Trouble
-from conformance.session import Limits, Session, check_echo, probe_values, read_answer
+from conformance.suite import property_checks
+from conformance.suite import run as suite
+from conformance.suite.process import CommandNotFound, Trouble
+from conformance.suite.session import Limits, Session, check_echo, probe_values, read_answer
 from conformance.vectors import Certified, Expectation, Vector
 from scene import State
 
-SCRIPT = Path(__file__).parent / "saboteurs.py"
+SCRIPT = Path(__file__).parent / "support" / "saboteurs.py"
 N = 3
 PATIENT = Limits(timeout=30.0, restarts=N + 2)
 HASTY = Limits(timeout=1.5, restarts=0)
@@ -47,7 +48,7 @@ def verdicts(monkeypatch):
     """Return what runs the suite on a saboteur and gives its results by case; nothing may be left running."""
     token = f"SABOTAGE={secrets.token_hex(8)}"
     monkeypatch.setenv(*token.split("="))
-    monkeypatch.setattr(suite.suite_properties, "N_QUESTIONS", 0)
+    monkeypatch.setattr(property_checks, "N_QUESTIONS", 0)
     monkeypatch.setattr(suite, "choose", lambda *_: [made_up(i) for i in range(N)])
 
     def run(name: str, limits: Limits) -> suite.Run:

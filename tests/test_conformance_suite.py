@@ -14,13 +14,15 @@ import msgspec
 import pytest
 from test_conformance_session import SCRIPT, made_up
 
-from conformance import kill_matrix, plain, reports, suite, suite_properties, vectors
-from conformance.mutants import MUTANTS
-from conformance.process import Trouble
-from conformance.session import Limits, missing
-from conformance.suite import Result, Run
+from conformance import plain, vectors
+from conformance.mutants import MUTANTS, kill_matrix
+from conformance.suite import property_checks, reports
+from conformance.suite import run as suite
+from conformance.suite.process import Trouble
+from conformance.suite.run import Result, Run
+from conformance.suite.session import Limits, missing
 from scene import Collision, Horizon, State, from_data
-from scene.messages import Introduction
+from scene.protocol.messages import Introduction
 from scene.refusal import BadInput
 
 ROOT = Path(__file__).parent.parent
@@ -120,7 +122,7 @@ def test_known_failures_are_read(tmp_path):
 
 def test_known_failures_are_marked_in_a_run(monkeypatch):
     monkeypatch.setattr(suite, "choose", lambda *_: [made_up(0), made_up(1)])
-    monkeypatch.setattr(suite_properties, "N_QUESTIONS", 0)
+    monkeypatch.setattr(property_checks, "N_QUESTIONS", 0)
     command = [sys.executable, "-I", "-S", str(SCRIPT), "crash-at-second"]
     assert suite.check(command).exit_code() == 1
     fixed = frozenset({"made-up/0", "made-up/1", "protocol/stop"})
@@ -207,7 +209,7 @@ def moved(vector: vectors.Vector, by: float) -> vectors.Vector:
 def test_shifted_answers_make_the_reference_fail(monkeypatch):
     """The corpus is judged by, not with, the reference: shift what is certified, and it fails everywhere."""
     known = [v for v in vectors.load("core") if v.expect[0].steps and v.group != "hard-case-14"][::100]
-    monkeypatch.setattr(suite_properties, "N_QUESTIONS", 0)
+    monkeypatch.setattr(property_checks, "N_QUESTIONS", 0)
     monkeypatch.setattr(suite, "measure_speed", lambda _: None)
     for by, verdict in ((4e-9, "fail"), (1e-10, "pass")):
         shifted = [moved(vector, by) for vector in known]
@@ -221,9 +223,9 @@ def test_shifted_answers_make_the_reference_fail(monkeypatch):
 
 def test_the_cases_beside_the_vectors_are_all_listed(monkeypatch):
     """What a run of an implementation that offers everything contains, and no more."""
-    tiny = suite_properties.Size(20, 50.0, 0.5)
+    tiny = property_checks.Size(20, 50.0, 0.5)
     for name, value in (("SIZES", (tiny,)), ("BATCH", 20), ("LIGHTER", 1), ("N_QUESTIONS", 2)):
-        monkeypatch.setattr(suite_properties, name, value)
+        monkeypatch.setattr(property_checks, name, value)
     run = suite.check([sys.executable, "-m", "conformance.plain"], groups=["static-cap"])
     others = {result.id for result in run.results if not result.level}
     assert others == set(suite.OTHER_CASES)
@@ -237,14 +239,14 @@ def core_steps() -> list[vectors.Vector]:
 def test_properties_can_fail():
     """A stepper that knows one answer breaks nearly all of them; one that declines is not accepted either."""
     wrong = Stub(step=lambda _scene, state, _t_end: Collision("arc", 1.0, state.t + 1.0, 0.6, 0.8, 1.0, 2.0))
-    verdicts = {name: verdict for name, verdict, _, _ in suite_properties.ask_properties(wrong, core_steps())}
+    verdicts = {name: verdict for name, verdict, _, _ in property_checks.ask_properties(wrong, core_steps())}
     assert verdicts["mirror"] == verdicts["angular-momentum"] == "fail"
     assert list(verdicts.values()).count("fail") >= 3
 
     def crash(*_):
         raise Trouble("crashed", "exited")
 
-    found = list(suite_properties.ask_properties(Stub(step=crash), core_steps()))
+    found = list(property_checks.ask_properties(Stub(step=crash), core_steps()))
     assert {verdict for _, verdict, _, _ in found} == {"crashed"}
 
 
@@ -252,12 +254,12 @@ def test_what_a_property_needs_is_asked_for_first():
     without = Stub(step=plain.next_collision)
     without.introduction = msgspec.structs.replace(INTRODUCTION, laws=("constant",))
     still = [v for v in vectors.load("core") if v.group == "static-cap"]
-    found = {name: verdict for name, verdict, _, _ in suite_properties.ask_properties(without, still)}
+    found = {name: verdict for name, verdict, _, _ in property_checks.ask_properties(without, still)}
     assert found.pop("static-limit") == "unsupported"
     assert found.pop("period-shift") == "declined"
     assert set(found.values()) == {"pass"}
-    assert list(suite_properties.ask_properties(without, core_steps())) == []
-    assert list(suite_properties.ask_profiles(without)) == []
+    assert list(property_checks.ask_properties(without, core_steps())) == []
+    assert list(property_checks.ask_profiles(without)) == []
 
 
 def flows(name: str) -> Stub:
@@ -282,10 +284,10 @@ def flows(name: str) -> Stub:
     ],
 )
 def test_the_work_identity_tells_a_mutant_from_an_honest_stepper(monkeypatch, name, verdict):
-    size = suite_properties.Size(100, 1000.0, 0.08)
-    monkeypatch.setattr(suite_properties, "_affordable", lambda *_: size)
-    monkeypatch.setattr(suite_properties, "_one_cycle", lambda *_: [])
-    work, _ = suite_properties.ask_profiles(flows(name))
+    size = property_checks.Size(100, 1000.0, 0.08)
+    monkeypatch.setattr(property_checks, "_affordable", lambda *_: size)
+    monkeypatch.setattr(property_checks, "_one_cycle", lambda *_: [])
+    work, _ = property_checks.ask_profiles(flows(name))
     assert work[:2] == ("work-identity", verdict)
 
 
@@ -293,16 +295,16 @@ def test_the_work_identity_tells_a_mutant_from_an_honest_stepper(monkeypatch, na
     ("name", "energy", "verdict"), [("none", 20.0, "pass"), ("hole-static", 200.0, "fail")]
 )
 def test_one_cycle_tells_a_mutant_from_an_honest_stepper(monkeypatch, name, energy, verdict):
-    size = suite_properties.SIZES[-1]._replace(energy=energy)  # the slower, the sooner done
-    monkeypatch.setattr(suite_properties, "_affordable", lambda *_: size)
-    monkeypatch.setattr(suite_properties.profiles, "work_identity", lambda *_, **__: [])
-    _, cycle = suite_properties.ask_profiles(flows(name))
+    size = property_checks.SIZES[-1]._replace(energy=energy)  # the slower, the sooner done
+    monkeypatch.setattr(property_checks, "_affordable", lambda *_: size)
+    monkeypatch.setattr(property_checks.profiles, "work_identity", lambda *_, **__: [])
+    _, cycle = property_checks.ask_profiles(flows(name))
     assert cycle[:2] == ("one-cycle", verdict)
 
 
 def test_profiles_can_fail(monkeypatch):
     """Particles that come to rest in the stem's mouth: no work is done on them, none is captured."""
-    monkeypatch.setattr(suite_properties, "SIZES", (suite_properties.Size(400, 200.0, 0.18),))
+    monkeypatch.setattr(property_checks, "SIZES", (property_checks.Size(400, 200.0, 0.18),))
 
     def sit(request):
         stays = [
@@ -314,13 +316,13 @@ def test_profiles_can_fail(monkeypatch):
         ]
         return {"states": stays}
 
-    found = {name: verdict for name, verdict, _, _ in suite_properties.ask_profiles(Stub(ask=sit))}
+    found = {name: verdict for name, verdict, _, _ in property_checks.ask_profiles(Stub(ask=sit))}
     assert found == {"work-identity": "fail", "one-cycle": "fail"}
 
     def lose(request):
         return {"states": sit(request)["states"][1:]}
 
-    found = {name: verdict for name, verdict, _, _ in suite_properties.ask_profiles(Stub(ask=lose))}
+    found = {name: verdict for name, verdict, _, _ in property_checks.ask_profiles(Stub(ask=lose))}
     assert found == {"work-identity": "wrong-format", "one-cycle": "wrong-format"}
 
 

@@ -14,16 +14,16 @@ import msgspec
 import pytest
 
 import reference
-from conformance import generate
-from conformance.generate_certify import Question, Unfit, certify
-from conformance.generate_chain import recheck
-from conformance.generate_draws import Draw, wire_form
-from conformance.generate_families import CATALOGUE, families
-from conformance.generate_proof import Refuted
+from conformance.generator import __main__ as generate
+from conformance.generator.certify import Question, Unfit, certify
+from conformance.generator.draws import Draw, wire_form
+from conformance.generator.families import CATALOGUE, families
+from conformance.second_proof.chain import recheck
+from conformance.second_proof.step import Refuted
 from conformance.vectors import MANIFEST, NUMBERS, BadCorpus, json_schema, load, manifest, request
 from scene import BadInput, State, catalogue, from_data
 from scene import load as load_scene
-from scene.messages import Command
+from scene.protocol.messages import Command
 
 ROOT = Path(__file__).parent.parent
 SCHEMA = ROOT / "docs" / "vector.schema.json"

@@ -18,7 +18,7 @@ import pytest
 
 from conformance import plain, vectors
 from scene import BadInput, load
-from scene.messages import json_schema
+from scene.protocol.messages import json_schema
 from scene.tables import laws
 
 ROOT = Path(__file__).parent.parent

@@ -16,7 +16,8 @@ from test_fast_stepper import MIRRORED, scaled_scene
 
 import fast
 from conformance.strategies import scenes_and_states
-from fast import ensemble, entries
+from fast import ensemble
+from fast.kernel import entries
 from scene import State, load
 
 # Of `small_ensemble`. It changes when the arithmetic does, and then only on purpose.
@@ -84,11 +85,13 @@ def test_same_bits_without_the_compiler():
 
 def test_a_change_in_any_source_makes_the_kernels_anew(tmp_path):
     """Numba's cache looks at one file only; the digest that entries close over looks at all."""
-    folder = Path(entries.__file__).parent
+    folder = Path(fast.__file__).parent
     copy = shutil.copytree(folder, tmp_path / "fast", ignore=shutil.ignore_patterns("__pycache__"))
     assert entries.digest_of_sources(copy) == entries.SOURCES
-    (copy / "walls.py").write_text((copy / "walls.py").read_text("utf-8") + "\n", "utf-8")
-    assert entries.digest_of_sources(copy) != entries.SOURCES
+    for path in (copy / "units.py", copy / "kernel" / "walls.py"):
+        path.write_text(path.read_text("utf-8") + "\n", "utf-8")
+        assert entries.digest_of_sources(copy) != entries.SOURCES
+        path.write_text(path.read_text("utf-8")[:-1], "utf-8")
     for entry in (entries.single_step, entries.trajectory, entries.follow_particles):
         assert entries.SOURCES in [cell.cell_contents for cell in entry.py_func.__closure__]
 

@@ -8,22 +8,22 @@ from fractions import Fraction
 import numpy as np
 import pytest
 from hypothesis import given, settings
-from truth import centre, proved_step
+from support.truth import centre, proved_step
 
 import fast
 import reference
-from conformance.error import backward_ulps
+from conformance.grading.error import backward_ulps
 from conformance.strategies import scenes_and_states
-from fast import codes, entries
-from fast import double_double as dd
 from fast.compiled import compile_scene
-from fast.stepper import WALL_CODES
+from fast.kernel import codes, entries
+from fast.kernel import double_double as dd
+from fast.step import WALL_CODES
 from scene import BadInput, Collision, Rejected, State, Stem, Undecided, load
 
 N_STEPS = int(os.environ.get("MUSHROOMS_STEPS", "400"))
 UNIT = 2.0**51  # backward units of 2^-104 in a backward ulp
 SHARP = 4.0  # units that nearly all answers keep
-WORST = 2.0**24  # where a wall's speed is the rest of harmonics that cancel: see fast.refine
+WORST = 2.0**24  # where a wall's speed is the rest of harmonics that cancel: see fast.kernel.refine
 START = State(0.1, 0.2, 0.3, 140.0, 30.0)
 
 

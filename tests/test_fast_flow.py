@@ -12,7 +12,7 @@ import pytest
 import fast
 from fast import __main__ as served
 from scene import BangBang, Cap, Horizon, InvalidState, Rejected, State, Undefined, load
-from scene.wire import serve
+from scene.protocol.wire import serve
 
 SCENE = load("moving-cap")
 STARTS = [State(0.25 * k, 0.1 - 0.01 * k, 0.3, 25.0 + k, -7.0 * k) for k in range(5)]

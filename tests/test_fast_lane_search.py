@@ -9,13 +9,13 @@ import os
 
 import numpy as np
 import pytest
-from faulty_kernels import faulty_lanes
-from lane_draws import GROUPS
-from lane_search import ANYWHERE, draw_scene, draw_start, search
+from support.faulty_kernels import faulty_lanes
+from support.lane_draws import GROUPS
+from support.lane_search import ANYWHERE, draw_scene, draw_start, search
 
 import fast
 from fast.batch import lane_steps
-from fast.stepper import WALL_NAMES
+from fast.step import WALL_NAMES
 from scene import Cap, Collision, Fourier, Mushroom, Rejected, State
 
 N_ANSWERS = int(os.environ.get("MUSHROOMS_LANE_ANSWERS", "300"))  # of each group of draws

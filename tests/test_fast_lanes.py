@@ -12,11 +12,11 @@ import numpy as np
 import pytest
 
 import fast
-from fast import codes, entries, follow, lanes
 from fast.batch import LaneRound
-from fast.limits import Limits
+from fast.kernel import codes, entries, follow, lanes
+from fast.kernel.limits import Limits
 from fast.starts import initial_states
-from fast.stepper import WALL_CODES
+from fast.step import WALL_CODES
 from scene import State, load
 
 N_STEPS = int(os.environ.get("MUSHROOMS_LANE_STEPS", "4000"))
@@ -94,7 +94,7 @@ def compare(driver, states, walls, random, tally):
         if jacobian is None:
             tally["delicate"] += 1
             continue
-        # conformance.error.backward_ulps in floats: a million of them should not take all day.
+        # conformance.grading.error.backward_ulps in floats: a million of them should not take all day.
         moved = np.abs(jacobian) @ np.abs([p[0], *p[2:]]) + np.abs(truth)
         ulps = float(np.max(np.abs(numbers - truth) / (2.0**-53 * moved + 5e-324)))
         assert ulps <= BOUND, (ulps, p.tolist(), wall)

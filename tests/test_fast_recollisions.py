@@ -6,12 +6,12 @@ import math
 import os
 
 import pytest
-from faulty_kernels import output_of
-from recollisions import recollisions
-from truth import proved_step
+from support.faulty_kernels import output_of
+from support.recollisions import recollisions
+from support.truth import proved_step
 
 import fast
-from conformance.agreement import compare
+from conformance.grading.agreement import compare
 from scene import BangBang, Cap, Collision, Fourier, Mushroom, Rejected, State, Stem, Undefined
 
 N_RECOLLISIONS = int(os.environ.get("MUSHROOMS_RECOLLISIONS", "25"))

@@ -9,14 +9,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from mpmath import mp, workprec
-from truth import proved_step
+from support.truth import proved_step
 
 import fast
-from conformance.agreement import compare
+from conformance.grading.agreement import compare
 from conformance.strategies import scenes_and_states
-from conformance.transforms import scaled_law
-from fast import arithmetic, codes, motion
 from fast.compiled import compile_scene
+from fast.kernel import arithmetic, codes
+from fast.kernel.laws import ANCHORS_SHAPE, increment, set_anchors
 from scene import (
     BangBang,
     Cap,
@@ -33,6 +33,7 @@ from scene import (
 )
 from scene.laws import value
 from scene.tables import laws
+from scene.transforms import scaled_law
 
 MIRRORED = {"left": "right", "right": "left"}
 
@@ -115,11 +116,11 @@ def test_phase_out_of_reach_is_refused():
 def test_increments_of_laws(name, t, s):
     scene = load(name)
     compiled = compile_scene(scene)
-    anchors = np.zeros(motion.ANCHORS_SHAPE)
-    assert motion.set_anchors(compiled.laws, anchors, t, 0.0)
+    anchors = np.zeros(ANCHORS_SHAPE)
+    assert set_anchors(compiled.laws, anchors, t, 0.0)
     with workprec(200):
         law, then = laws(scene)["h"], mp.mpf(t) + mp.mpf(s)
-        change, rate, size, _ = motion.increment(compiled.laws, anchors, codes.H, s)
+        change, rate, size, _ = increment(compiled.laws, anchors, codes.H, s)
         exact = value(mp, law, then) - value(mp, law, mp.mpf(t))
         # Small increments keep their relative accuracy: 16 roundings of the summed terms, and
         # the rounding of a knot's time by one unit in the last place, at speeds up to 32.

@@ -10,17 +10,17 @@ from importlib import import_module
 
 import numpy as np
 import pytest
-from scale_search import Question, is_scaled, search, step
-from truth import proved_step
+from support.scale_search import Question, is_scaled, search, step
+from support.truth import proved_step
 
 import fast
-from conformance.agreement import compare
-from conformance.transforms import scaled
-from fast import stepper
+from conformance.grading.agreement import compare
+from fast import step as stepper
 from fast.compiled import compile_scene
 from fast.units import Fitted
 from scene import BangBang, Cap, Collision, Fourier, Mushroom, Rejected, State, load
 from scene.refusal import BadInput
+from scene.transforms import scaled
 
 N_SCALINGS = int(os.environ.get("MUSHROOMS_SCALINGS", "300"))
 

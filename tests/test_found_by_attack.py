@@ -6,12 +6,12 @@ import math
 
 import numpy as np
 import pytest
-from truth import proved_step
+from support.truth import proved_step
 
 import fast
 import reference
 import theory
-from conformance.agreement import compare
+from conformance.grading.agreement import compare
 from fast.batch import lane_steps
 from scene import (
     BadInput,

@@ -12,12 +12,12 @@ from fractions import Fraction
 
 import mpmath
 import pytest
-from hard_cases import CIRCLE, LIFT, collision, in_both, is_enclosed
+from support.hard_cases import CIRCLE, LIFT, collision, in_both, is_enclosed
 
 import fast
 import reference
 from scene import BangBang, Cap, Fourier, State, Stem, Undecided, Undefined
-from scene.wire import MAX_COLLISIONS, serve
+from scene.protocol.wire import MAX_COLLISIONS, serve
 
 
 @pytest.fixture(autouse=True)

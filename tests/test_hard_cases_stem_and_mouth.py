@@ -11,12 +11,12 @@ from fractions import Fraction
 import mpmath
 import numpy as np
 import pytest
-from hard_cases import BOX, CIRCLE, LIFT, STATIC, collision, in_both, is_enclosed
-from truth import proved_step
+from support.hard_cases import BOX, CIRCLE, LIFT, STATIC, collision, in_both, is_enclosed
+from support.truth import proved_step
 
 import fast
 import reference
-from conformance.agreement import compare
+from conformance.grading.agreement import compare
 from scene import (
     BangBang,
     Cap,

@@ -13,7 +13,7 @@ from fractions import Fraction
 import mpmath
 import numpy as np
 import pytest
-from hard_cases import BOX, CIRCLE, LIFT, STATIC, collision, is_enclosed
+from support.hard_cases import BOX, CIRCLE, LIFT, STATIC, collision, is_enclosed
 
 import fast
 import reference
@@ -30,8 +30,8 @@ from scene import (
     from_data,
     load,
 )
+from scene.protocol.wire import serve
 from scene.tables import laws
-from scene.wire import serve
 
 MIRRORED = {"left": "right", "right": "left"}
 

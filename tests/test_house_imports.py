@@ -18,7 +18,7 @@ MAY_IMPORT = {
     "mushrooms": PACKAGES,
 }
 # The audit compares the steppers, the generator certifies vectors: they alone meet them by import.
-MEETS_STEPPERS = ("conformance/audit*.py", "conformance/generate*.py")
+MEETS_STEPPERS = ("conformance/audit/*", "conformance/generator/*")
 LOADERS = {"import_module", "__import__", "run_module", "find_spec"}
 
 
@@ -84,8 +84,8 @@ PLANTED = [
     ("theory/growth.py", "import conformance.claims"),
     ("scene/laws.py", "from reference import step"),
     ("scene/laws.py", "import mushrooms"),
-    ("conformance/grading.py", "import reference"),
-    ("conformance/grading.py", "import mushrooms"),
+    ("conformance/grading/grade.py", "import reference"),
+    ("conformance/grading/grade.py", "import mushrooms"),
     ("conformance/audit.py", "import mushrooms"),
 ]
 
@@ -106,7 +106,7 @@ ALLOWED = [
         "reference/deep/step.py",
         "from ..proof import exclude\nimport importlib\nimportlib.import_module('mpmath')",
     ),
-    ("conformance/audit_growth.py", "import reference, fast, theory, scene"),
+    ("conformance/audit/claims/growth.py", "import reference, fast, theory, scene"),
     ("mushrooms/main.py", "import reference, fast, theory, scene, conformance"),
 ]
 

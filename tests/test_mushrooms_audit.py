@@ -9,16 +9,16 @@ from functools import partial
 from html.parser import HTMLParser
 from pathlib import Path
 
-import adiabatic_particles
 import jsonschema
 import pytest
+from support import adiabatic_particles
 
 import fast
 from conformance.audit import ledger, session
 from conformance.audit.evidence import Steppers
 from conformance.audit.finding import Check, Finding
 from conformance.audit.session import Result, Settings
-from mushrooms import report
+from mushrooms.reports import audit_page
 
 SCHEMA = Path(__file__).parent.parent / "docs" / "report.schema.json"
 CHEAP = "M3,M10,X5,N6"
@@ -50,7 +50,7 @@ def everything():
 
 
 def test_every_id_is_in_the_report_with_verdict_values_and_errors(everything):
-    data = report.to_data(everything)
+    data = audit_page.to_data(everything)
     wanted = [f"M{k}" for k in range(1, 14)] + [f"X{k}" for k in range(1, 9)] + [f"L{k}" for k in range(1, 8)]
     ids = [finding["id"] for finding in data["findings"]]
     assert set(wanted) <= set(ids)
@@ -64,8 +64,8 @@ def test_every_id_is_in_the_report_with_verdict_values_and_errors(everything):
 
 def test_the_report_meets_its_published_schema(everything):
     schema = json.loads(SCHEMA.read_text("utf-8"))
-    assert schema == report.schema(), "python -m mushrooms.report > docs/report.schema.json"
-    data = json.loads(report.to_json(report.to_data(everything)))
+    assert schema == audit_page.schema(), "python -m mushrooms.reports.audit_page > docs/report.schema.json"
+    data = json.loads(audit_page.to_json(audit_page.to_data(everything)))
     jsonschema.validate(data, schema)
     del data["findings"][0]["verdict"]
     with pytest.raises(jsonschema.ValidationError, match="verdict"):
@@ -83,11 +83,11 @@ class Links(HTMLParser):
 
 
 def test_the_page_loads_nothing_from_elsewhere_and_shows_every_figure(everything):
-    page = report.to_html(report.to_data(everything), everything.samples)
+    page = audit_page.to_html(audit_page.to_data(everything), everything.samples)
     links = Links()
     links.feed(page)
     pictures = [source for source in links.sources if not source.startswith("#")]
-    assert len(pictures) == len(report.pictures.ALL)
+    assert len(pictures) == len(audit_page.pictures.ALL)
     assert not {"script", "link", "iframe", "object"} & set(links.tags)
     assert "http" not in page.replace("data:image/svg+xml", "")
     assert "n = 5 &lt;b&gt;&amp;" in page
@@ -102,7 +102,7 @@ def test_the_page_loads_nothing_from_elsewhere_and_shows_every_figure(everything
 
 def test_the_summary_tells_what_is_not_as_expected(everything):
     findings = [*everything.findings[:-1], everything.findings[-1]._replace(verdict="refuted")]
-    text = report.to_text(report.to_data(everything._replace(findings=findings)))
+    text = audit_page.to_text(audit_page.to_data(everything._replace(findings=findings)))
     assert "! N6  refuted" in text
     assert "expected: confirmed" in text
     assert "corrected: unclear" in text

@@ -13,8 +13,9 @@ import pytest
 
 from conformance import vectors
 from conformance.bench import record, work, workloads
-from mushrooms import bench, figures_of_speed
-from mushrooms.bench_report import middle_and_worst
+from mushrooms import bench
+from mushrooms.figures import speed as figures_of_speed
+from mushrooms.reports.bench_page import middle_and_worst
 
 ROOT = Path(__file__).parent.parent
 FILES = ["bench.html", "bench.json", "bench.svg", "hard-cases.md"]

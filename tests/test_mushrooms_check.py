@@ -13,13 +13,16 @@ from xml.etree import ElementTree
 
 import msgspec
 import pytest
-from saboteurs import SABOTEURS
+from support.saboteurs import SABOTEURS
 
-from conformance import pytest_suite, suite, suite_properties, vectors
-from conformance.session import Session
+import conformance
+from conformance import vectors
+from conformance.suite import property_checks, pytest_suite
+from conformance.suite import run as suite
+from conformance.suite.session import Session
 
 HERE = Path(__file__).parent
-PYTHON = [sys.executable, str(Path(suite.__file__).parent / "harness" / "python" / "stepper.py")]
+PYTHON = [sys.executable, str(Path(conformance.__file__).parent / "harness" / "python" / "stepper.py")]
 SABOTEUR = [sys.executable, "-I", "-S", str(HERE / "saboteurs.py")]
 
 
@@ -31,7 +34,7 @@ def _few(monkeypatch):
     ]
     assert {vector.kind for vector in found} == {"step", "trajectory"}
     monkeypatch.setattr(suite, "choose", lambda *_: found)
-    monkeypatch.setattr(suite_properties, "N_QUESTIONS", 2)
+    monkeypatch.setattr(property_checks, "N_QUESTIONS", 2)
     monkeypatch.setattr(suite, "TIMED_LEAST", 100_000)
 
 
@@ -141,7 +144,7 @@ def test_a_group_that_does_not_exist_is_refused():
 
 
 def test_one_test_per_vector_for_pytest(tmp_path):
-    plugin = ["-p", "conformance.pytest_plugin", "--pyargs", "conformance.pytest_suite"]
+    plugin = ["-p", "conformance.suite.pytest_plugin", "--pyargs", "conformance.suite.pytest_suite"]
     options = ["-q", "-k", "near-corner", "-p", "no:cacheprovider", "--rootdir", str(tmp_path)]
     line = [sys.executable, "-m", "pytest", *plugin, *options, "--mushrooms-command", " ".join(PYTHON)]
     done = subprocess.run(line, capture_output=True, text=True, check=False, cwd=tmp_path)

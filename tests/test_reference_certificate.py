@@ -9,10 +9,10 @@ from fractions import Fraction
 import flint
 import pytest
 from hypothesis import given, settings
-from truth import IS_DEEP, is_delicate
+from support.truth import IS_DEEP, is_delicate
 
 import reference
-from conformance.generate_proof import Refuted, check
+from conformance.second_proof.step import Refuted, check
 from conformance.strategies import scenes_and_states
 from reference.certificate import certificate
 from scene import BangBang, Cap, Fourier, Mushroom, State, Stem, Undecided, to_data

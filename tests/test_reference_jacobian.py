@@ -6,12 +6,12 @@ from fractions import Fraction
 
 import pytest
 from hypothesis import given, settings
-from truth import centre, proved_step
+from support.truth import centre, proved_step
 
 import fast
 import reference
-from conformance.agreement import Truth, compare
-from conformance.error import condition_number
+from conformance.grading.agreement import Truth, compare
+from conformance.grading.error import condition_number
 from conformance.strategies import scenes_and_states
 from scene import Cap, Collision, State, load
 

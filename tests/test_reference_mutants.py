@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import pytest
-from reference_battery import BATTERY
+from support.reference_battery import BATTERY
 
-from reference import chain, motion, rational, start, timeline
+from reference import chain, rational, start, timeline, walls
 from reference.arithmetic import Arithmetic
 from reference.arithmetic import rational as exact_point
 from reference.course import SIDES, Course
 from reference.isolation import Isolator
 from reference.jets import Jet
-from reference.motion import Motion
+from reference.walls import Motion
 from scene import Mushroom
 
 first_root = Isolator.first_root
@@ -179,7 +179,7 @@ MUTANTS = {
     "normal of a slanted side level": (Motion, "gradient", level_normal),
     "slope's derivative dropped": (Motion, "law", still_slope),
     "product rule of nu r dropped": (Motion, "width", width_with_still_nu),
-    "r r'' dropped": (motion, "square", square_without_second_derivative),
+    "r r'' dropped": (walls, "square", square_without_second_derivative),
     "second derivatives by time dropped": (Motion, "hessian", hessian_without_time),
     "horizon overrun": (Course, "__init__", with_a_later_horizon),
 }

@@ -9,12 +9,12 @@ from fractions import Fraction
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from support.truth import IS_DEEP
 from test_reference_certificate import moved
-from truth import IS_DEEP
 
 import reference
-from conformance.generate_path import check_path
-from conformance.generate_proof import Refuted, check
+from conformance.second_proof.step import Refuted, check
+from conformance.second_proof.trajectory import check_path
 from conformance.strategies import scenes_and_states
 from reference.certificate import certificate, path_certificate
 from scene import BadInput, BangBang, Cap, Fourier, Mushroom, State, Stem, Undecided, Undefined, load

@@ -11,15 +11,15 @@ import mpmath
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from truth import IS_DEEP, centre
+from support.truth import IS_DEEP, centre
 
 import reference
 from conformance.strategies import scenes_and_states
 from reference.arithmetic import Arithmetic, rational, sign
 from reference.isolation import Isolator
 from reference.jets import Jet
-from reference.motion import Motion
 from reference.start import flight_from
+from reference.walls import Motion
 from scene import (
     BadInput,
     BangBang,

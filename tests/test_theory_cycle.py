@@ -16,7 +16,7 @@ from scene.laws import value
 from theory import Cycle, NotCovered
 from theory.chebyshev import Grid
 from theory.critical import solve_rising, spans
-from theory.motion import Motion
+from theory.parameters import Motion
 
 
 def test_moving_cap_releases_at_two_pi_minus_t() -> None:

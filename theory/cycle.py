@@ -17,7 +17,7 @@ from scene.refusal import BadInput
 from scene.tables import Scene, period
 from theory.constants import guarded, settle
 from theory.entries import check_digits, check_real
-from theory.motion import Motion
+from theory.parameters import Motion
 from theory.valleys import Piece, Valley, stretches, valley
 from theory.volumes import as_mushroom
 

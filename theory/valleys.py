@@ -19,7 +19,7 @@ from typing import Any, NamedTuple
 
 from scene.tables import Mushroom, period
 from theory.critical import Span, solve_rising, spans
-from theory.motion import Motion
+from theory.parameters import Motion
 
 
 class Stretch(NamedTuple):

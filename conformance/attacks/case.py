@@ -6,7 +6,7 @@ import json
 from collections.abc import Callable
 from typing import Any, NamedTuple, TypeVar
 
-from conformance.generate_draws import Draw, wire_form
+from conformance.generator.draws import Draw, wire_form
 from scene import BadInput, Cap, Mushroom, Scene, State, Stem
 
 Made = TypeVar("Made", Cap, Stem, Mushroom)

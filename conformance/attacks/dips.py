@@ -11,7 +11,7 @@ import math
 from collections.abc import Callable
 
 from conformance.attacks.case import Attack, Family
-from conformance.generate_draws import Draw
+from conformance.generator.draws import Draw
 from scene import BangBang, Fourier, Law, Mushroom, State
 
 DEPTH = 0.9  # the moving length is 1 - 0.9 cos(t - turn): least, 0.1, at t = turn

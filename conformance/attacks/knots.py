@@ -16,7 +16,7 @@ from flint import arb
 
 from conformance import second_stepper
 from conformance.attacks.case import Attack, Family, built
-from conformance.generate_draws import Clock, Draw, law
+from conformance.generator.draws import Clock, Draw, law
 from scene import BangBang, Cap, Law, Mushroom, Scene, State, Stem
 
 PERIOD = 16.0

@@ -2,7 +2,7 @@
 
 Steppers are callables that the caller gives. A proved stepper answers with claims, whose enclosures must meet
 the second stepper's; `undecided` is honest. A fast one answers a step in the wire's form, judged as grades
-are (`conformance.agreement`), and a flow with the walls it counted.
+are (`conformance.grading.agreement`), and a flow with the walls it counted.
 """
 
 from __future__ import annotations
@@ -17,11 +17,11 @@ from typing import Any, NamedTuple
 from flint import arb, fmpq
 
 from conformance import second_stepper
-from conformance.agreement import Truth, compare
 from conformance.attacks.case import Attack, Family, line
-from conformance.generate_exclusion import Refuted
-from conformance.generate_path import check_path
-from conformance.generate_proof import check
+from conformance.grading.agreement import Truth, compare
+from conformance.second_proof.exclusion import Refuted
+from conformance.second_proof.step import check
+from conformance.second_proof.trajectory import check_path
 from conformance.second_stepper import Answer
 from scene import Collision, Horizon, Outcome, Rejected, Scene, State, Undecided, Undefined
 

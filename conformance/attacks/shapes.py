@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 
 from conformance.attacks.case import Attack, Family, built
-from conformance.generate_draws import Clock, Draw, clock, scene, state
-from conformance.transforms import scaled, scaled_state
+from conformance.generator.draws import Clock, Draw, clock, scene, state
 from scene import BangBang, Cap, Fourier, Law, Mushroom, Scene, State, Stem
+from scene.transforms import scaled, scaled_state
 
 
 def extreme_scale(draw: Draw) -> Attack:

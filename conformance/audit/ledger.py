@@ -6,7 +6,7 @@ import tomllib
 from functools import cache
 from importlib import resources
 
-from conformance.audit import experiments, finite_energy, further, laws, misprints
+from conformance.audit.claims import experiments, exponents, finite_energy, identities, misprints
 from conformance.audit.finding import Entry
 from conformance.audit.tolerances import N_SIGMA
 from scene.refusal import BadInput
@@ -15,8 +15,8 @@ CHECKS = {
     **misprints.CHECKS,
     **finite_energy.CHECKS,
     **experiments.CHECKS,
-    **laws.CHECKS,
-    **further.CHECKS,
+    **exponents.CHECKS,
+    **identities.CHECKS,
 }
 
 

@@ -15,9 +15,9 @@ import msgspec
 from conformance import plain
 from conformance.bench.time_stepping import TOLERANCES, next_collision_by
 from conformance.bench.workloads import Workload
-from conformance.process import Trouble
-from conformance.session import Limits, Session, missing
-from conformance.suite import put
+from conformance.suite.process import Trouble
+from conformance.suite.run import put
+from conformance.suite.session import Limits, Session, missing
 from conformance.vectors import Vector
 from scene import Outcome, Scene, State, to_data
 

@@ -17,8 +17,8 @@ import numpy.typing as npt
 
 from conformance.bench.record import Growth, short
 from conformance.bench.workloads import RULES, Prover, draw_workload
-from conformance.error import U
-from conformance.generate_draws import Moment
+from conformance.generator.draws import Moment
+from conformance.grading.error import U
 from scene import Collision, Scene, State
 
 FloatArray = npt.NDArray[np.float64]

@@ -10,8 +10,8 @@ from itertools import groupby
 from conformance import vectors
 from conformance.bench.contenders import Ask
 from conformance.bench.record import Case, short
-from conformance.grading import grade
-from conformance.process import Trouble
+from conformance.grading.grade import grade
+from conformance.suite.process import Trouble
 from conformance.vectors import Vector
 
 GROUP = "hard-case-"

@@ -18,12 +18,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from conformance.agreement import Truth
 from conformance.bench.contenders import Answer, Contender, Lap
 from conformance.bench.record import Point, short
 from conformance.bench.workloads import Question, Workload
-from conformance.error import backward_ulps
-from conformance.process import Trouble
+from conformance.grading.agreement import Truth
+from conformance.grading.error import backward_ulps
+from conformance.suite.process import Trouble
 from scene import Collision, Undecided
 
 MAX_TIMES = 1000  # as many as a `time` request of the protocol may ask for

@@ -13,8 +13,8 @@ from typing import NamedTuple
 
 from mpmath import fp
 
-from conformance.agreement import Truth
-from conformance.generate_draws import Draw, Moment, state, walls_speed
+from conformance.generator.draws import Draw, Moment, state, walls_speed
+from conformance.grading.agreement import Truth
 from scene import Cap, Collision, Scene, State, load
 from scene.tables import period
 

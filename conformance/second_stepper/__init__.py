@@ -5,6 +5,6 @@ before a wrong answer passes. It is slow to compile nothing and needs the test e
 """
 
 from conformance.second_stepper.answer import Answer, Kind
-from conformance.second_stepper.stepper import next_collision, trajectory
+from conformance.second_stepper.step import next_collision, trajectory
 
 __all__ = ["Answer", "Kind", "next_collision", "trajectory"]

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 from flint import arb, fmpq
 
 from conformance.second_stepper.answer import Open
-from conformance.second_stepper.laws import Ball, Rational, Timed, exact, hull, product, timed
+from conformance.second_stepper.law_balls import Ball, Rational, Timed, exact, hull, product, timed
 from scene import Cap, Mushroom, Scene, State, Stem, Wall
 from scene.tables import laws, width_factors
 

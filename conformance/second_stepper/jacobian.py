@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 from flint import arb
 
 from conformance.second_stepper.flight import Flight
-from conformance.second_stepper.laws import Ball, product
+from conformance.second_stepper.law_balls import Ball, product
 from scene import Wall
 
 

@@ -14,7 +14,7 @@ from flint import arb, ctx, fmpq
 
 from conformance.second_stepper.answer import Open
 from conformance.second_stepper.flight import Flight
-from conformance.second_stepper.laws import Ball, Rational, hull
+from conformance.second_stepper.law_balls import Ball, Rational, hull
 from scene import Wall
 
 UNIT = arb(0, 1)  # the ball [-1, 1]

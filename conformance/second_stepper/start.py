@@ -15,7 +15,7 @@ from flint import arb, fmpq
 
 from conformance.second_stepper.answer import Answer, Open
 from conformance.second_stepper.flight import SIDES, Flight, Table
-from conformance.second_stepper.laws import ExactJet, Rational, exact, product
+from conformance.second_stepper.law_balls import ExactJet, Rational, exact, product
 from scene import InvalidState, Scene, State, Wall
 from scene.states import ON_WALL, check_numbers
 

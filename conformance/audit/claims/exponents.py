@@ -1,0 +1,354 @@
+"""Laws confirmed by measured exponents and through the cycle: L1 to L7.
+
+Exponents are slopes of least-squares lines through logarithms. What is random carries its standard error;
+single trajectories (L1) carry none, and are judged by how straight the line is.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from mpmath import fp
+
+import theory
+from conformance.audit.claims.broadened import phase_times, zone_energy
+from conformance.audit.claims.experiments import MEAN_RETURNS, mouth_speed, return_time
+from conformance.audit.claims.finite_energy import ACW, ERGODIC, LADDER
+from conformance.audit.evidence import Evidence
+from conformance.audit.finding import Check
+from conformance.audit.runs import RUNS, block_seed, scene_of
+from conformance.audit.samples import Sample
+from conformance.audit.tolerances import (
+    BoolArray,
+    FloatArray,
+    Mean,
+    close,
+    mean,
+    share,
+    spread,
+    stated,
+)
+from scene import Mushroom, Scene, State, load
+from scene.laws import value
+
+SPEEDS = tuple(10.0 ** (k / 2) for k in range(4, 9))  # 100 to 10,000
+STARTS = ((0.3, 0.4, 0.3), (-0.5, 0.2, 1.1), (0.1, 0.6, 2.0), (0.0, 0.3, 2.9))  # x, y, direction
+DURATION = 1.0  # of the 2 pi of a cycle: O(v) hits
+EXPONENT_BAND = 0.03  # the next order in 1/v, at the lowest speed, over the range of the fit
+KT, HOTTER = 50.0, 2.0
+N_POINTS = {"quick": 400_000, "full": 4_000_000}
+N_ENERGIES = {"quick": 400, "full": 2000}
+PER_ENERGY = 20
+
+
+def circle(evidence: Evidence) -> list[Check]:
+    """L1: the breathing circle, hit by hit."""
+    scene = load("breathing-circle")
+    momentum, steps, drifts = 0.0, [], []
+    for speed in SPEEDS:
+        rows = [_hits(evidence, scene, speed, start) for start in STARTS]
+        momentum = max(momentum, *(row[0] for row in rows))
+        steps.append(float(np.mean([row[1] for row in rows])))
+        drifts.append(float(np.mean([row[2] for row in rows])))
+    angle, product = _slope(SPEEDS, steps), _slope(SPEEDS, drifts)
+    return [
+        stated(
+            "angular momentum at arc hits: largest relative change",
+            momentum < 1e-12,
+            f"{momentum:.1e}",
+            "rounding of up to 10,000 hits, < 1e-12",
+        ),
+        stated("phi' - phi per hit: exponent of v", abs(angle + 2) < EXPONENT_BAND, f"{angle:.4f}", "-2"),
+        stated(
+            "drift of v r over a fixed time: exponent of v",
+            abs(product + 1) < EXPONENT_BAND,
+            f"{product:.4f}",
+            "-1",
+        ),
+    ]
+
+
+def _hits(
+    evidence: Evidence, scene: Scene, speed: float, start: tuple[float, float, float]
+) -> tuple[float, float, float]:
+    """Return largest change of L, root mean square of phi' - phi per hit and largest drift of v r."""
+    x, y, turn = start
+    state = State(0.0, x, y, speed * math.cos(turn), speed * math.sin(turn))
+    done = evidence.steppers.trajectory(scene, state, int(4 * speed), DURATION)
+    at_arc = np.array([wall == "arc" for wall in done.walls])
+    _, t, x_, y_, vx, vy = done.steps[at_arc].T
+    momentum = np.abs(x_ * vy - y_ * vx)
+    r = np.array([float(value(fp, scene.r, time)) for time in t])  # type: ignore[union-attr]
+    after = np.hypot(vx, vy)
+    before = np.concatenate([[speed], after[:-1]])  # the base stands still
+    phi = np.arcsin(momentum / (r * before))
+    product = before * r
+    return (
+        float(np.max(np.abs(momentum / momentum[0] - 1))),
+        float(np.sqrt(np.mean(np.diff(phi) ** 2))),
+        float(np.max(np.abs(product / product[0] - 1))),
+    )
+
+
+def _slope(x: tuple[float, ...], y: list[float]) -> float:
+    return float(np.polyfit(np.log(x), np.log(y), 1)[0])
+
+
+def invariants(evidence: Evidence) -> list[Check]:
+    """L2: E V_cap in the cap, E V in the ergodic table."""
+    captured = evidence.samples(*LADDER[1:6])
+    widths = []
+    for sample in captured:
+        change = cap_change(sample)
+        widths.append(spread(change))
+    found = [
+        _exponent(
+            "log(E V_cap) of captured particles, phase 7/16 to 9/16: spread against E0",
+            captured,
+            widths,
+            -0.5,
+        )
+    ]
+    high = captured[-2]
+    found.append(
+        close(
+            f"{high.run.name}: its mean", mean(cap_change(high)), 0.0, band=2 * mouth_speed(high) / high.speed
+        )
+    )
+    free = evidence.samples(*ERGODIC)
+    changes = [sample.phase_s[:, 0, 3] + log_volume(sample, 0.5) for sample in free]
+    found.append(
+        _exponent(
+            "c = 0, log(E V) at half a cycle: spread against E0", free, [spread(c) for c in changes], -0.25
+        )
+    )
+    drift = spread(changes[-1]).value ** 2 / 4
+    found.append(
+        close(
+            f"{free[-1].run.name}: its mean, less the drift",
+            Mean(mean(changes[-1]).value - drift, mean(changes[-1]).error),
+            0.0,
+            band=drift,
+        )
+    )
+    return found
+
+
+def cap_change(sample: Sample) -> FloatArray:
+    """Return the change of log(E V_cap) from phase 7/16 to 9/16 of those in the island at both."""
+    first, last = 6, 8
+    inside = _stays(sample, 7 / 16, 9 / 16)
+    volumes = [theory.volumes_at(fp, scene_of(sample.run), 2 * fp.pi * k / 16).v_cap for k in (7, 9)]
+    change: FloatArray = sample.phase_s[inside, 0, last] - sample.phase_s[inside, 0, first]
+    return change + math.log(volumes[1] / volumes[0])
+
+
+def _stays(sample: Sample, first: float, last: float) -> BoolArray:
+    with np.errstate(invalid="ignore"):
+        t_in, t_out = sample.first_stay
+        inside: BoolArray = (t_in < 2 * np.pi * first) & (t_out > 2 * np.pi * last)
+    return inside
+
+
+def log_volume(sample: Sample, phase: float) -> float:
+    """Return log V(t)/V(0) of the whole table."""
+    now, start = (theory.volumes_at(fp, scene_of(sample.run), 2 * fp.pi * p) for p in (phase, 0.0))
+    return math.log((now.v_cap + now.v_stem) / (start.v_cap + start.v_stem))
+
+
+def _exponent(what: str, samples: list[Sample], values: list[Mean], exponent: float) -> Check:
+    fit = theory.fit_power(
+        [sample.run.energy for sample in samples], [m.value for m in values], [m.error for m in values]
+    )
+    return close(
+        what,
+        (fit.exponent, fit.exponent_error),
+        exponent,
+        band=EXPONENT_BAND,
+        note=f"E0 from {samples[0].run.energy:.0e} to {samples[-1].run.energy:.0e}",
+    )
+
+
+def volumes(evidence: Evidence) -> list[Check]:
+    """L3: volumes as shares of random phase points, and of particles that stay in the frozen cap."""
+    found = []
+    n = N_POINTS[evidence.size]
+    random = np.random.default_rng(block_seed(evidence.seed, RUNS["frozen-mushroom@1e8"], -1))
+    scene = load("moving-cap")
+    for phase in (1 / 8, 3 / 8, 1 / 2):
+        now = theory.volumes_at(fp, scene, 2 * fp.pi * phase)
+        inside, in_cap, in_island = _points(scene, 2 * math.pi * phase, n, random)
+        total = now.v_cap + now.v_stem
+        label = f"moving cap at {phase:g} of its cycle"
+        found += [
+            close(f"{label}: V_cap / V", share(in_cap[inside]), now.v_cap / total),
+            close(f"{label}: V_ell / V_cap", share(in_island[inside & in_cap]), now.v_ell / now.v_cap),
+        ]
+    sample = evidence.sample("frozen-mushroom@1e8")
+    still = theory.volumes_at(fp, load("frozen-mushroom"), 0.0)
+    found.append(
+        close(
+            "frozen mushroom: particles that never meet the stem's walls",
+            share(sample.stem_hits == 0),
+            still.v_ell / (still.v_cap + still.v_stem),
+            band=1e-3,
+            note="band: sticky chaotic orbits that had not yet left the cap",
+        )
+    )
+    return found
+
+
+def _points(
+    scene: Scene, t: float, n: int, random: np.random.Generator
+) -> tuple[BoolArray, BoolArray, BoolArray]:
+    """Draw points in a box around the table; tell which lie in it, in the cap, in the island."""
+    assert isinstance(scene, Mushroom)
+    r, h, slope = (float(value(fp, law, t)) for law in (scene.r, scene.h, scene.slope))
+    w = r * float(value(fp, scene.nu or 0.0, t))
+    x, y, turn = random.uniform(-r, r, n), random.uniform(-h, r, n), random.uniform(0, 2 * np.pi, n)
+    in_cap = (y >= 0) & (x * x + y * y <= r * r)
+    in_stem = (y < 0) & (np.abs(x) <= w + slope * y)
+    momentum = np.abs(x * np.sin(turn) - y * np.cos(turn))
+    return in_cap | in_stem, in_cap, in_cap & (momentum >= w)
+
+
+def release(evidence: Evidence) -> list[Check]:
+    """L4: captured at t_in, released when nu returns."""
+    samples = evidence.samples(*LADDER[1:6])
+    gaps = [nu_gap(sample) for sample in samples]
+    sizes = []
+    for gap in gaps:
+        square = mean(gap**2)
+        root = math.sqrt(square.value)
+        sizes.append(Mean(root, square.error / (2 * root)))
+    found = [_exponent("nu(t_out) - nu(t_in): root mean square against E0", samples, sizes, -0.5)]
+    largest = max(
+        float(np.max(np.abs(gap))) * sample.speed for gap, sample in zip(gaps, samples, strict=True)
+    )
+    found.append(
+        stated(
+            "largest |nu(t_out) - nu(t_in)| v at any energy",
+            largest < 20,
+            f"{largest:.2f}",
+            "bounded: < 20 speeds of the walls",
+        )
+    )
+    return found
+
+
+def nu_gap(sample: Sample) -> FloatArray:
+    """Return nu(t_out) - nu(t_in) of the captured of a moving-cap run."""
+    scene = scene_of(sample.run)
+    assert isinstance(scene, Mushroom)
+    t_in, t_out = (t[sample.captured] for t in sample.first_stay)
+    gap: FloatArray = 0.4 * (np.cos(t_out) - np.cos(t_in))  # nu = 0.6 + 0.4 cos t
+    return gap
+
+
+def energy_through_the_cycle(evidence: Evidence) -> list[Check]:
+    """L5: mean log E in the chaotic zone against eq. (dE)."""
+    found = []
+    for run, every in (("moving-cap@1e7", 2), (ACW, 1)):
+        sample = evidence.sample(run)
+        times, means, spreads = zone_energy(sample)
+        scene, delay = scene_of(sample.run), return_time(sample)
+        late, now, early = (
+            theory.chaotic_zone(scene, np.array(times) + d).log_energy for d in (-delay, 0.0, delay)
+        )
+        start = theory.chaotic_zone(scene, [0.0]).log_energy[0]
+        for k in range(every - 1, len(times), every):
+            drift = spreads[k] ** 2 / 4
+            wait = max(abs(late[k] - now[k]), abs(early[k] - now[k]))
+            found.append(
+                close(
+                    f"{run}: mean log E/E0 at phase {sample.run.phases[k]:g}, less the drift",
+                    (means[k].value - drift, means[k].error),
+                    float(now[k] - start),
+                    band=drift + wait + 2 * mouth_speed(sample) / sample.speed,
+                )
+            )
+    return found
+
+
+def zone_share(sample: Sample, times: FloatArray) -> FloatArray:
+    """Return the share of particles in the chaotic zone at each time."""
+    t_in, t_out = (np.sort(t[sample.captured]) for t in sample.first_stay)
+    caught, freed = (np.searchsorted(t, times, side="right") for t in (t_in, t_out))
+    found: FloatArray = 1 - (caught - freed) / sample.n
+    return found
+
+
+def population_through_the_cycle(evidence: Evidence) -> list[Check]:
+    """L6: p_cha(t) against eq. (ps)."""
+    found = []
+    for run, every in (("moving-cap@1e7", 2), (ACW, 1)):
+        sample = evidence.sample(run)
+        times = np.array(phase_times(sample))
+        scene, delay = scene_of(sample.run), MEAN_RETURNS * return_time(sample)
+        late, now, early = (theory.chaotic_zone(scene, times + d).p_cha for d in (-delay, 0.0, delay))
+        measured = zone_share(sample, times)
+        for k in range(every - 1, len(times), every):
+            error = math.sqrt(max(now[k] * (1 - now[k]), 1 / sample.n) / sample.n)
+            band = max(abs(late[k] - now[k]), abs(early[k] - now[k])) + 2 * mouth_speed(sample) / sample.speed
+            found.append(
+                close(
+                    f"{run}: share in the chaotic zone at phase {sample.run.phases[k]:g}",
+                    (float(measured[k]), error),
+                    float(now[k]),
+                    band=float(band),
+                )
+            )
+    return found
+
+
+def work(evidence: Evidence) -> list[Check]:
+    """L7: mean exp(-W/kT) = A(t)/A(0), exact at any speed of the walls."""
+    phases = (0.25, 0.5, 0.75)
+    scene = load("moving-cap")
+    random = np.random.default_rng(block_seed(evidence.seed, RUNS["moving-cap@1e3"], -1))
+    rows, n_lost = [], 0
+    for k, energy in enumerate(random.exponential(HOTTER * KT, N_ENERGIES[evidence.size])):
+        seed = block_seed(evidence.seed, RUNS["moving-cap@1e3"], -2 - k)
+        done = evidence.steppers.simulate(
+            scene,
+            n_particles=PER_ENERGY,
+            energy=float(energy),
+            seed=seed,
+            threads=evidence.threads,
+            phases=phases,
+        )
+        ends = np.column_stack([done.phase_energies[:, 0], done.energy])[done.outcome == 0]
+        n_lost += PER_ENERGY - len(ends)
+        # Energies are drawn HOTTER times hotter, else rare fast particles carried the mean: weigh them back.
+        rows.append(np.mean(HOTTER * np.exp(energy / (HOTTER * KT) - ends / KT), axis=0))
+    found = []
+    for k, phase in enumerate((*phases, 1.0)):
+        values = np.array(rows)[:, k]
+        ratio = area(scene, phase) / area(scene, 0.0)
+        found.append(
+            close(
+                f"kT = {KT:g}, phase {phase:g}: mean exp(-W/kT)",
+                mean(values),
+                ratio,
+                note=f"{len(rows)} energies of {PER_ENERGY} particles, {n_lost} not followed",
+            )
+        )
+    return found
+
+
+def area(scene: Scene, phase: float) -> float:
+    """Return the table's area at a fraction of a 2 pi cycle [length²]."""
+    now = theory.volumes_at(fp, scene, 2 * fp.pi * phase)
+    return float((now.v_cap + now.v_stem) / (2 * fp.pi))
+
+
+CHECKS = {
+    "L1": circle,
+    "L2": invariants,
+    "L3": volumes,
+    "L4": release,
+    "L5": energy_through_the_cycle,
+    "L6": population_through_the_cycle,
+    "L7": work,
+}

@@ -1,0 +1,1 @@
+"""How the corpus is made: families of questions, hard cases by number, certification by two arithmetics."""

@@ -1,0 +1,62 @@
+"""Mutants: the plain stepper with one physics error each, of the kind that people make.
+
+A mutant is a class of flight that overrides what is wrong. Each is killed by a `fail` on some vector of the
+corpus (`kill_matrix` says which), not by a crash. They prove that the suite can fail; nothing
+else may use them. None is equivalent to the plain stepper: a mutant that changes no answer proves nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from conformance import plain
+from conformance.mutants import of_laws, of_roots, of_walls
+from conformance.plain.step import Captured, Flight
+from scene import Outcome, Scene, State
+
+
+class Mutant(NamedTuple):
+    """A faulty stepper.
+
+    Attributes:
+        name: words joined by hyphens.
+        fault: what it does wrong, in a line.
+        flight: the faulty computation of one flight.
+    """
+
+    name: str
+    fault: str
+    flight: type[Flight]
+
+    def step(self, scene: Scene, state: State, t_end: float) -> Outcome:
+        """Return the mutant's answer to a step."""
+        return plain.next_collision(scene, state, t_end, self.flight)
+
+    def trajectory(self, scene: Scene, state: State, n_collisions: int, t_end: float) -> list[Outcome]:
+        """Return the mutant's answer to a trajectory."""
+        return plain.trajectory(scene, state, n_collisions, t_end, self.flight)
+
+    def flow(self, scene: Scene, states: Sequence[State], t_end: float) -> list[tuple[Outcome, Captured]]:
+        """Return the mutant's answer to a flow."""
+        return plain.flow(scene, states, t_end, self.flight)
+
+
+def _listed() -> dict[str, Mutant]:
+    """Name every class of flight of the three modules: its name in hyphens, its docstring as the fault."""
+    found = {}
+    for module in (of_laws, of_walls, of_roots):
+        for name, flight in vars(module).items():
+            if name.startswith("_"):
+                continue
+            if (
+                isinstance(flight, type)
+                and issubclass(flight, Flight)
+                and flight.__module__ == module.__name__
+            ):
+                hyphened = "".join("-" * c.isupper() + c.lower() for c in name).strip("-")
+                found[hyphened] = Mutant(hyphened, str(flight.__doc__).rstrip("."), flight)
+    return found
+
+
+MUTANTS = _listed()

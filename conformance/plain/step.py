@@ -1,0 +1,393 @@
+"""A plain stepper: binary64, scalar arithmetic, nothing clever, and right.
+
+A particle flies straight until it meets a wall. Every wall is a function f of the flight time s, positive
+inside; |f''| is bounded by what is known of the laws, so on an interval of width d f stays above the lesser
+of its ends less bound * d^2 / 8. That excludes early roots: an interval is passed when the bound proves
+f > 0, solved when f' has one sign and f changes its own, and halved otherwise, left half first. On the wall
+being left f(0) = 0 by definition: f is its rise since, and has no root before 2 f'(0) / bound.
+The third implementation beside `reference` and `fast`, the subject of the tutorial, and what the mutants of
+`conformance.mutants` spoil. Ties within rounding are answered `undecided`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import hypot, inf, prod
+from typing import ClassVar, NamedTuple
+
+from conformance.plain.motion import Legs, Motion, Still, Wave
+from scene import (
+    BangBang,
+    Cap,
+    Collision,
+    Fourier,
+    Horizon,
+    InvalidState,
+    Law,
+    Mushroom,
+    Outcome,
+    Rejected,
+    Scene,
+    State,
+    Stem,
+    Undecided,
+    Undefined,
+    Wall,
+)
+from scene.laws import bounds
+from scene.states import ON_WALL, check_numbers
+from scene.tables import laws, width_factors
+
+ROUNDING = 2.0**-48  # f and f' are sums of a few terms, each rounded to some 2^-52 of its size
+LARGEST = 2.0**400  # squares of greater numbers overflow
+MAX_PARTS = 20_000  # intervals looked at for one wall
+MAX_COLLISIONS = 20_000  # of one particle in a flow: some seconds
+SIDES: tuple[Wall, ...] = ("left", "right", "floor")
+
+
+class Gap(NamedTuple):
+    """A wall's f > 0 inside: f(0), its rise since, and its partial derivatives by t, x, y."""
+
+    start: float
+    rise: float
+    ft: float
+    fx: float
+    fy: float
+
+
+class Open(Exception):  # noqa: N818 (a question left open is no error)
+    """Rounding, or the limit on work, leaves it open."""
+
+
+class Flight:
+    """One straight flight from a state to its outcome; s is the time since departure."""
+
+    kinds: ClassVar = {float: Still, Fourier: Wave, BangBang: Legs}
+
+    def __init__(self, scene: Scene, state: State, t_end: float) -> None:
+        self.scene, self.state, self.t_end = scene, state, t_end
+        self.x, self.y, self.vx, self.vy, self.wall = state.x, state.y, state.vx, state.vy, state.wall
+        if self.wall is None and self.y == 0 and not isinstance(scene, Mushroom):
+            self.wall = "base"
+        self.laws = {name: self.law(law) for name, law in laws(scene).items()}
+        self.bounds = {name: bounds(law) for name, law in laws(scene).items()}
+        self.is_in_cap = self.starts_in_cap()
+        self.end = min(t_end - state.t, self.escape())
+        self.is_horizon = self.end == t_end - state.t
+        self.crossing = self.crossing_time()
+
+    def law(self, law: Law) -> Still | Wave | Legs:
+        """Return a law as seen from departure."""
+        found: Still | Wave | Legs = self.kinds[type(law)](law, self.state.t)
+        return found
+
+    def starts_in_cap(self) -> bool:
+        """Tell whether the flight begins in the cap."""
+        if not isinstance(self.scene, Mushroom):
+            return isinstance(self.scene, Cap)
+        is_rising = self.wall is None and self.y == 0 and self.vy > 0
+        return self.wall in ("arc", "base") or (self.wall is None and self.y > 0) or is_rising
+
+    def outcome(self) -> Outcome:
+        """Find how the flight ends."""
+        if refusal := self.refusal():
+            return refusal
+        if self.wall is None and self.y == 0 and self.vy == 0:
+            hit = self.first_hit(("left", "right"), 0.0, self.end)
+            return Undefined("mouth-edge") if hit else self.horizon()
+        near = self.walls_near(in_cap=self.is_in_cap)
+        hit = self.first_hit(near, 0.0, min(self.crossing, self.end))
+        if hit is None and self.crossing <= self.end:
+            self.require_clear(near, self.crossing)
+            if not self.is_mouth_open(self.crossing):
+                return self.collision("base", self.crossing)
+            near = self.walls_near(in_cap=not self.is_in_cap)
+            self.require_clear(near, self.crossing)
+            hit = self.first_hit(near, self.crossing, self.end)
+        elif self.crossing < inf:
+            near = (*near, "base")  # a tie of hit and crossing is a corner
+        self.require_clear(near, self.end if self.is_horizon else 0.0)
+        if hit is None:
+            return self.horizon()
+        wall, s = hit
+        self.require_clear([other for other in near if other != wall], s)
+        return self.collision(wall, s)
+
+    def walls_near(self, *, in_cap: bool) -> tuple[Wall, ...]:
+        """List the walls of one part of the table; a mushroom's base is met at the crossing."""
+        near: tuple[Wall, ...] = ("arc",) if in_cap else SIDES
+        return near if isinstance(self.scene, Mushroom) else ("base", *near)
+
+    def crossing_time(self) -> float:
+        """Return when y = 0 is crossed between cap and stem; infinity for never."""
+        is_towards = self.y > 0 > self.vy or self.y < 0 < self.vy
+        if not isinstance(self.scene, Mushroom) or self.wall == "base" or not is_towards:
+            return inf
+        return -self.y / self.vy
+
+    def is_mouth_open(self, s: float) -> bool:
+        """Tell whether |x| < w at the time of the crossing."""
+        room = self.width(s).now - abs(self.x + self.vx * s)
+        if abs(room) <= self.noise("right", s):
+            raise Open("the mouth's edge is met within rounding")
+        return room > 0
+
+    def first_hit(self, walls: Sequence[Wall], start: float, end: float) -> tuple[Wall, float] | None:
+        """Return the wall met first in start < s <= end, and when."""
+        roots = ((wall, self.first_root(wall, start, end)) for wall in walls)
+        hits = [(wall, s) for wall, s in roots if s is not None]
+        return min(hits, key=lambda hit: hit[1], default=None)
+
+    def first_root(self, wall: Wall, start: float, end: float) -> float | None:
+        """Return the first s at which f turns negative, proved first by the bound on f''."""
+        bend = self.bend(wall)
+        if wall == self.wall:  # f(s) >= f'(0) s - bend s^2 / 2 > 0 up to twice this time
+            start = max(start, self.f(wall, 0.0)[1] / bend if bend else inf)
+        parts = [(start, end)] if start < end else []
+        for _ in range(MAX_PARTS):
+            if not parts:
+                return None
+            a, b = parts.pop()
+            middle, width = (a + b) / 2, b - a
+            fa, fb = self.f(wall, a)[0], self.f(wall, b)[0]
+            if fa <= 0:
+                raise Open(f"f of {wall} has no sign where it should be positive")
+            noise = 0.0 if wall == self.wall else self.noise(wall, b)
+            if min(fa, fb) > bend * width * width / 8 + noise:
+                continue
+            slope = self.f(wall, middle)[1]
+            if abs(slope) > bend * width / 2:  # f is monotonic
+                if fb > 0:
+                    continue
+                root = self.root_between(wall, a, b)
+                if fb < -noise or self.f(wall, root)[1] ** 2 > 2 * bend * noise:
+                    return root
+                break  # f may come back before it is negative beyond rounding
+            if not a < middle < b:
+                break
+            parts += [(middle, b), (a, middle)]
+        raise Open(
+            f"no hit of {wall} is proved or excluded: f and f' vanish together, or there is too much to do"
+        )
+
+    def root_between(self, wall: Wall, a: float, b: float) -> float:
+        """Return the root of a decreasing f with f(a) > 0 >= f(b): Newton, or half the bracket."""
+        s = b
+        while True:
+            f, slope = self.f(wall, s)
+            a, b = (s, b) if f > 0 else (a, s)
+            newton = s - f / slope if slope < 0 else a
+            following = newton if a < newton <= b else a + (b - a) / 2
+            if abs(following - s) <= 2.0**-52 * s:
+                return following
+            s = following
+
+    def f(self, wall: Wall, s: float) -> tuple[float, float]:
+        """Evaluate a wall's function along the flight, and its rate; it begins at 0 on the wall left."""
+        gap = self.gap(wall, s)
+        value = gap.rise if wall == self.wall else gap.start + gap.rise
+        return value, gap.ft + gap.fx * self.vx + gap.fy * self.vy
+
+    def gap(self, wall: Wall, s: float) -> Gap:
+        """Evaluate a wall's function; each rise is free of cancellation for small s."""
+        if wall == "arc":
+            r, xy, v2 = self.laws["r"].at(s), self.x * self.vx + self.y * self.vy, self.vx**2 + self.vy**2
+            rise = r.rise * (r.value + r.now) - s * (2 * xy + s * v2)
+            x, y = self.place(s)
+            return Gap(r.value**2 - (self.x**2 + self.y**2), rise, 2 * r.now * r.rate, -2 * x, -2 * y)
+        if wall == "floor":
+            h = self.laws["h"].at(s)
+            return Gap(self.y + h.value, self.vy * s + h.rise, h.rate, 0.0, 1.0)
+        if wall == "base":
+            up = -1.0 if isinstance(self.scene, Stem) else 1.0
+            return Gap(up * self.y, up * self.vy * s, 0.0, 0.0, up)
+        side = 1.0 if wall == "left" else -1.0
+        w, slope, y = self.width(s), self.laws["slope"].at(s), self.place(s)[1]
+        rise = w.rise + (slope.value * self.vy * s + slope.rise * y) + side * self.vx * s
+        start = w.value + slope.value * self.y + side * self.x
+        return Gap(start, rise, w.rate + slope.rate * y, side, slope.now)
+
+    def width(self, s: float) -> Motion:
+        """Return the half-width w of the mouth, or nu r."""
+        if "w" in self.laws:
+            return self.laws["w"].at(s)
+        nu, r = self.laws["nu"].at(s), self.laws["r"].at(s)
+        rise, rate = nu.rise * r.value + nu.now * r.rise, nu.rate * r.now + nu.now * r.rate
+        return Motion(nu.value * r.value, rise, rate)
+
+    def place(self, s: float) -> tuple[float, float]:
+        """Return where the particle is."""
+        return self.x + self.vx * s, self.y + self.vy * s
+
+    def bend(self, wall: Wall) -> float:
+        """Bound |f''| of a wall, whatever the laws do."""
+        b = self.bounds
+        if wall == "arc":
+            moving = b["r"].slope ** 2 + b["r"].highest * b["r"].curvature
+            return 2 * (moving + self.vx**2 + self.vy**2)
+        if wall == "floor":
+            return b["h"].curvature
+        if wall == "base":
+            return 0.0
+        deepest = abs(self.y) + abs(self.vy) * self.end
+        tilting = b["slope"].curvature * deepest + 2 * b["slope"].slope * abs(self.vy)
+        if "w" in b:
+            return b["w"].curvature + tilting
+        nu, r = b["nu"], b["r"]
+        return nu.curvature * r.highest + 2 * nu.slope * r.slope + nu.highest * r.curvature + tilting
+
+    def noise(self, wall: Wall, s: float) -> float:
+        """Bound what rounding may change a wall's f by."""
+        late = abs(self.gap(wall, s).ft * self.state.t)
+        x, y = abs(self.x) + abs(self.vx) * s, abs(self.y) + abs(self.vy) * s
+        size = {name: max(-law.lowest, law.highest) for name, law in self.bounds.items()}
+        if wall == "arc":
+            return ROUNDING * (size["r"] ** 2 + x * x + y * y + late)
+        if wall in ("floor", "base"):
+            return ROUNDING * (y + (size["h"] if wall == "floor" else 0.0) + late)
+        w = size["w"] if "w" in size else size["nu"] * size["r"]
+        return ROUNDING * (w + size["slope"] * y + x + late)
+
+    def require_clear(self, walls: Sequence[Wall], s: float) -> None:
+        """Leave open what comes first when a wall not being left passes the particle within rounding."""
+        for wall in walls:
+            if wall != self.wall and abs(self.f(wall, s)[0]) <= self.noise(wall, s):
+                raise Open(f"at s = {s!r} the particle is on wall {wall} within rounding")
+
+    def escape(self) -> float:
+        """Return a time by which no table is large enough to have kept the particle."""
+        top = {name: max(-law.lowest, law.highest) for name, law in self.bounds.items()}
+        r, h = top.get("r", 0.0), top.get("h", 0.0)
+        half = max(r, top.get("w", 0.0)) + top.get("slope", 0.0) * h
+        across, along = abs(self.vx) / (4 * half), abs(self.vy) / (2 * (r + h))
+        return min(1 / max(across, along, 1 / LARGEST), LARGEST)
+
+    def refusal(self) -> Outcome | None:
+        """Judge the state: why no flight begins here, or None."""
+        wall, where = self.wall, f"(x, y) = ({self.x!r}, {self.y!r}) at t = {self.state.t!r}"
+        if isinstance(self.scene, Mushroom) and (
+            (wall == "arc" and self.y < 0) or (wall in SIDES and self.y > 0)
+        ):
+            return Rejected(f"state {where} is not on wall {wall}")
+        if self.y == 0 and wall not in (None, "base"):
+            return Undecided("the state is in a corner within rounding")
+        for near in self.walls_near(in_cap=self.is_in_cap):
+            if near != wall and self.f(near, 0.0)[0] < -self.noise(near, 0.0):
+                return Rejected(f"state {where} is beyond wall {near}")
+        self.require_clear(self.walls_near(in_cap=self.is_in_cap), 0.0)
+        return None if wall is None else self.refusal_of_departure(wall)
+
+    def refusal_of_departure(self, wall: Wall) -> Outcome | None:
+        """Judge f(0) and f'(0) on the wall being left."""
+        gap, slope = self.gap(wall, 0.0), self.f(wall, 0.0)[1]
+        size = {"arc": "r", "floor": "h"}.get(wall, "r" if "r" in self.bounds else "w")
+        extent = self.bounds[size].highest
+        if abs(gap.start) > ON_WALL * extent * (2 * extent if wall == "arc" else 1.0):
+            return Rejected(f"state.wall = {wall!r}, but f there is {gap.start!r}")
+        if wall == "base" and slope == 0:
+            return Undefined("sliding")
+        if abs(slope) <= ROUNDING * (abs(gap.ft) + abs(gap.fx * self.vx) + abs(gap.fy * self.vy)):
+            return Undecided(f"f' of {wall} vanishes at departure within rounding")
+        return Rejected(f"state.wall = {wall!r}: the particle moves into it") if slope < 0 else None
+
+    def collision(self, wall: Wall, s: float) -> Collision:
+        """Return the collision with a wall after the flight time s."""
+        x, y = self.place(s)
+        return Collision(wall, s, self.state.t + s, x, 0.0 if wall == "base" else y, *self.bounce(wall, s))
+
+    def bounce(self, wall: Wall, s: float) -> tuple[float, float]:
+        """Return the velocity after: v - 2 (v.n - u) n."""
+        nx, ny, u = self.normal(wall, s)
+        along = self.vx * nx + self.vy * ny - u
+        return self.vx - 2 * along * nx, self.vy - 2 * along * ny
+
+    def normal(self, wall: Wall, s: float) -> tuple[float, float, float]:
+        """Return a wall's inward unit normal n and its speed u along it."""
+        gap = self.gap(wall, s)
+        size = hypot(gap.fx, gap.fy)
+        return gap.fx / size, gap.fy / size, -gap.ft / size
+
+    def horizon(self) -> Outcome:
+        """Return the state at t_end; nothing was met."""
+        if not self.is_horizon:
+            return Undecided("no wall is met in the time searched")
+        return Horizon(self.t_end, *self.place(self.end), self.vx, self.vy)
+
+
+def next_collision(scene: Scene, state: State, t_end: float, flight: type[Flight] = Flight) -> Outcome:
+    """Find the first wall the particle meets after `state.t`.
+
+    Args:
+        scene: a valid scene.
+        state: position (x, y) [length], velocity (vx, vy) [length/time], wall being left or None.
+        t_end: horizon [time], t_end >= state.t.
+        flight: how one flight is computed; a mutant puts another class here.
+
+    Returns:
+        Collision, Horizon, Undefined, Undecided where rounding leaves it open, or Rejected.
+    """
+    try:
+        check_numbers(scene, state, t_end)
+        for field in ("x", "y", "vx", "vy"):
+            if abs(getattr(state, field)) > LARGEST:
+                return Rejected(f"state.{field} = {getattr(state, field)!r}, must be at most 2^400 in size")
+        return flight(scene, state, t_end).outcome()
+    except InvalidState as error:
+        return Rejected(str(error))
+    except Open as question:
+        return Undecided(str(question))
+    except OverflowError:
+        return Undecided("a number overflows")
+
+
+def trajectory(
+    scene: Scene, state: State, n_collisions: int, t_end: float, flight: type[Flight] = Flight
+) -> list[Outcome]:
+    """Follow a particle: its collisions, and last what came instead of one."""
+    steps: list[Outcome] = []
+    while len(steps) < n_collisions:
+        outcome = next_collision(scene, state, t_end, flight)
+        steps.append(outcome)
+        if not isinstance(outcome, Collision):
+            break
+        state = outcome.state()
+    return steps
+
+
+Captured = tuple[float, float] | None
+
+
+def flow(
+    scene: Scene, states: Sequence[State], t_end: float, flight: type[Flight] = Flight
+) -> list[tuple[Outcome, Captured]]:
+    """Carry particles to t_end: the outcome of each there, and (begin, end) of its first captured stay."""
+    return [carried(scene, state, t_end, flight) for state in states]
+
+
+def carried(scene: Scene, state: State, t_end: float, flight: type[Flight]) -> tuple[Outcome, Captured]:
+    """Carry one particle. A stay in the cap is captured from an arc hit that cannot see the mouth on."""
+    begin, stay = None, None
+    for _ in range(MAX_COLLISIONS):
+        outcome = next_collision(scene, state, t_end, flight)
+        if not isinstance(outcome, Collision):
+            break
+        if isinstance(scene, Mushroom) and outcome.wall != "base":
+            is_captured = outcome.wall == "arc" and misses_mouth(
+                scene, outcome.t, outcome, state.vx, state.vy
+            )
+            if is_captured and begin is None:
+                begin = outcome.t
+            if not is_captured and begin is not None:
+                stay, begin = stay or (begin, outcome.t), None
+        state = outcome.state()
+    else:
+        outcome = Undecided(f"more than {MAX_COLLISIONS} collisions")
+    if begin is not None:
+        stay = stay or (begin, t_end)
+    return outcome, stay
+
+
+def misses_mouth(scene: Mushroom, t: float, at: Collision | State, vx: float, vy: float) -> bool:
+    """Tell whether |sin phi_hat| > nu: the chord through a place keeps further from the centre than w."""
+    w = prod(Flight.kinds[type(law)](law, t).value for law in width_factors(scene))
+    return bool(abs(at.x * vy - at.y * vx) > w * hypot(vx, vy))

@@ -1,0 +1,1 @@
+"""What the reference proves, proved again in Arb from its certificate alone."""

@@ -1,0 +1,27 @@
+"""The suite: every question put to one implementation as a process, the verdicts, and their reports."""
+
+from conformance.suite.run import (
+    BAD,
+    VERDICTS,
+    Result,
+    Run,
+    Speed,
+    ask_vector,
+    check,
+    choose,
+    measure_speed,
+    read_known,
+)
+
+__all__ = [
+    "BAD",
+    "VERDICTS",
+    "Result",
+    "Run",
+    "Speed",
+    "ask_vector",
+    "check",
+    "choose",
+    "measure_speed",
+    "read_known",
+]

@@ -1,0 +1,286 @@
+"""A session of protocol 1 with one implementation: asks, decodes strictly, restarts after trouble.
+
+What is no answer becomes a verdict (`Trouble`): crashed, timed-out, wrong-format; `error` when the
+restarts are used up and nothing was asked. After trouble the process is killed and the next question
+goes to a fresh one, to which `start` is replayed. Sequence numbers are random, so that no answer can be
+given before its question. Whether an answer is right is not judged here.
+"""
+
+from __future__ import annotations
+
+import random
+import struct
+import sys
+from collections.abc import Mapping, Sequence
+from types import TracebackType
+from typing import Any
+
+import msgspec
+
+from conformance.suite.process import Process, Transcript, Trouble, shown
+from scene import Outcome, Scene, State, to_data
+from scene.protocol.messages import PROTOCOL, Echoed, Failed, Flown, Introduction, Steps, Timed
+from scene.refusal import BadInput
+
+MAX_SEQ = 2**31 - 1  # the integers of every language
+STOP_TIMEOUT = 5.0  # seconds to exit after `stop`
+UNREADABLE = (msgspec.DecodeError, UnicodeDecodeError, RecursionError)
+ANSWERS = {"step": Outcome, "trajectory": Steps, "flow": Flown, "time": Timed}
+
+
+class Limits(msgspec.Struct, frozen=True):
+    """What a session puts up with.
+
+    Attributes:
+        timeout: seconds for one answer, start-up and just-in-time compilation included.
+        restarts: fresh processes after the first.
+    """
+
+    timeout: float = 120.0
+    restarts: int = 10
+
+
+class _Envelope(msgspec.Struct):
+    seq: Any = None
+    outcome: Any = None
+    error: Any = None
+    reason: Any = ""
+
+
+_outcomes: msgspec.json.Decoder[Any] = msgspec.json.Decoder(Outcome)
+_envelopes = msgspec.json.Decoder(_Envelope)
+_failures: msgspec.json.Decoder[Any] = msgspec.json.Decoder(Failed)
+_answers: dict[str, msgspec.json.Decoder[Any]] = {
+    cmd: msgspec.json.Decoder(form) for cmd, form in ANSWERS.items()
+}
+
+
+class Session:
+    """A conversation with a command; a context manager that leaves no process behind.
+
+    Attributes:
+        introduction: what the implementation said of itself, once opened.
+        n_restarts: fresh processes that were needed so far.
+        stderr: what it wrote to standard error, bounded.
+    """
+
+    def __init__(self, command: Sequence[str], limits: Limits | None = None) -> None:
+        if not command:
+            raise BadInput("no command to check: give it after `--`")
+        self._command, self._limits = list(command), limits or Limits()
+        self._process: Process | None = None
+        self._end: Trouble | None = None
+        self._draw = random.Random()
+        self.introduction: Introduction | None = None
+        self.n_restarts = 0
+        self.stderr = Transcript()
+
+    def __enter__(self) -> Session:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.kill()
+
+    def start(self) -> Introduction:
+        """Start the process and exchange introductions.
+
+        Raises:
+            CommandNotFound: when there is no such program.
+            Trouble: when it does not introduce itself in protocol 1; the session is then over.
+        """
+        if self._process is not None:
+            raise RuntimeError("this session has started")
+        self._process = Process(self._command, self.stderr)
+        try:
+            line = self._exchange({"cmd": "start", "protocol": PROTOCOL})
+            self.introduction = read_introduction(line)
+        except Trouble as trouble:
+            self._give_up(trouble)
+            raise
+        return self.introduction
+
+    def probe(self) -> None:
+        """Prove that numbers arrive and return with all their bits.
+
+        Raises:
+            Trouble: wrong-format, naming the first number that does not; the session is then over.
+        """
+        values = probe_values()
+        try:
+            line = self._exchange({"cmd": "echo", "values": values})
+            check_echo(values, line)
+        except Trouble as trouble:
+            self._give_up(trouble)
+            raise
+
+    def ask(self, request: Mapping[str, Any]) -> dict[str, Any]:
+        """Put one question and return its answer as plain data.
+
+        Args:
+            request: a step, trajectory, flow or time request; its seq is replaced by a random one.
+
+        Raises:
+            Trouble: crashed, timed-out or wrong-format; error when the session is over.
+        """
+        if self._end is not None:
+            raise self._end
+        if self._process is None:
+            self._restart()
+        seq = self._draw.randint(1, MAX_SEQ)
+        try:
+            return read_answer(self._exchange({**request, "seq": seq}), request["cmd"], seq)
+        except Trouble:
+            self.kill()
+            raise
+
+    def step(self, scene: Scene, state: State, t_end: float) -> Outcome:
+        """Ask for one step: the session as a stepper, for properties.
+
+        Raises:
+            Trouble: as `ask`.
+        """
+        fields = msgspec.to_builtins(state)
+        request = {"cmd": "step", "scene": to_data(scene), "state": fields, "t_end": t_end}
+        outcome: Outcome = msgspec.convert(self.ask(request), Outcome)
+        return outcome
+
+    def stop(self) -> None:
+        """Ask the process to stop and see it end by itself.
+
+        Raises:
+            Trouble: when it does not, goes on talking, or leaves a child; it is killed all the same.
+        """
+        process, self._process = self._process, None
+        if process is None:
+            raise Trouble("error", "not asked: no process was left")
+        try:
+            process.finish(_encode({"cmd": "stop"}), min(STOP_TIMEOUT, self._limits.timeout))
+        finally:
+            process.kill()
+
+    def kill(self) -> None:
+        """End the process at once, if there is one."""
+        process, self._process = self._process, None
+        if process is not None:
+            process.kill()
+
+    def _exchange(self, request: Mapping[str, Any]) -> bytes:
+        assert self._process is not None
+        return self._process.exchange(_encode(request), self._limits.timeout)
+
+    def _restart(self) -> None:
+        if self.n_restarts >= self._limits.restarts:
+            self._give_up(Trouble("error", f"not asked: restarted {self.n_restarts} times already"))
+            raise self._end  # type: ignore[misc]
+        self.n_restarts += 1
+        try:
+            self.start()
+        except (Trouble, BadInput) as trouble:
+            self._give_up(Trouble("error", f"not asked: the restart failed, {trouble}"))
+            raise self._end from None  # type: ignore[misc]
+
+    def _give_up(self, trouble: Trouble) -> None:
+        self.kill()
+        self._end = trouble
+
+
+def missing(introduction: Introduction, profile: str, scene: Mapping[str, Any] | None) -> str:
+    """Say what a question needs that an implementation does not list; empty when it lists all.
+
+    Args:
+        introduction: what it said of itself.
+        profile: step, trajectory, flow or time.
+        scene: of the question, in the wire's form; None for one that must be refused, so that no
+            table and no law is needed.
+    """
+    needs = [("profile", profile, introduction.profiles)]
+    if scene is not None:
+        parts = {name: part for name, part in scene.items() if name not in ("table", "name", "notes")}
+        kinds = {law["kind"] if isinstance(law, Mapping) else "constant" for law in parts.values()}
+        needs.append(("table", str(scene["table"]), introduction.tables))
+        needs += [("law", kind, introduction.laws) for kind in sorted(kinds)]
+    return ", ".join(f"{what} {name}" for what, name, offered in needs if name not in offered)
+
+
+def read_introduction(line: bytes) -> Introduction:
+    """Decode the answer to `start`.
+
+    Raises:
+        Trouble: wrong-format.
+    """
+    try:
+        introduction = msgspec.json.decode(line, type=Introduction)
+    except UNREADABLE as error:
+        raise Trouble("wrong-format", f"start: {_reason(error)} in {shown(line)}") from None
+    if introduction.protocol != PROTOCOL:
+        raise Trouble("wrong-format", f"start: it speaks protocol {introduction.protocol}, not {PROTOCOL}")
+    return introduction
+
+
+def check_echo(values: Sequence[float], line: bytes) -> None:
+    """Compare an echo bit for bit.
+
+    Raises:
+        Trouble: wrong-format, naming the first number that differs.
+    """
+    try:
+        echoed = msgspec.json.decode(line, type=Echoed).values
+    except UNREADABLE as error:
+        raise Trouble("wrong-format", f"echo: {_reason(error)} in {shown(line)}") from None
+    if len(echoed) != len(values):
+        raise Trouble("wrong-format", f"echo: {len(echoed)} numbers came back of {len(values)}")
+    for i, (sent, came) in enumerate(zip(values, echoed, strict=True)):
+        if struct.pack("<d", sent) != struct.pack("<d", came):
+            raise Trouble("wrong-format", f"echo: values[{i}] = {sent!r} came back as {came!r}")
+
+
+def read_answer(line: bytes, cmd: str, seq: int) -> dict[str, Any]:
+    """Decode the answer to one question, strictly.
+
+    Args:
+        line: as received.
+        cmd: step, trajectory, flow or time.
+        seq: that of the question.
+
+    Returns:
+        The answer as plain data, without its seq: an outcome, what the command asks for, or an error.
+
+    Raises:
+        Trouble: wrong-format, naming the field.
+    """
+    try:
+        envelope = _envelopes.decode(line)
+        if type(envelope.seq) is not int or envelope.seq != seq:
+            said = f": {' '.join(str(envelope.reason).split())[:200]}" if envelope.reason else ""
+            given = repr(envelope.seq)[:40]
+            raise Trouble("wrong-format", f"answered seq {given} to seq {seq}{said}")
+        own = _failures if envelope.error is not None else _answers[cmd]
+        decoder = _outcomes if envelope.outcome is not None else own
+        data: dict[str, Any] = msgspec.to_builtins(decoder.decode(line))
+    except UNREADABLE as error:
+        raise Trouble("wrong-format", f"{cmd}: {_reason(error)} in {shown(line)}") from None
+    data.pop("seq", None)
+    return data
+
+
+def probe_values() -> list[float]:
+    """Return the numbers of the transport probe: every kind, and random bits of every exponent."""
+    least, largest = 5e-324, sys.float_info.max
+    tiny = sys.float_info.min
+    special = [0.0, 0.1, 1 / 3, 2 / 3, 1e22, 1e23, 2.0**53 - 1, 2.0**53 + 2, 123456789012345680.0, largest]
+    small = [least, 3 * least, tiny, tiny - least, tiny / 3, 1.0 + 2.0**-52, 1.0 - 2.0**-53]
+    draw = random.Random(53)
+    bits = [(exponent << 52) | draw.getrandbits(52) for exponent in range(0, 2047, 8)]
+    scattered = [struct.unpack("<d", struct.pack("<Q", pattern))[0] for pattern in bits]
+    positive = [*special, *small, *scattered]
+    return [sign * value for value in positive for sign in (1.0, -1.0)]
+
+
+def _encode(request: Mapping[str, Any]) -> bytes:
+    return msgspec.json.encode(request)
+
+
+def _reason(error: Exception) -> str:
+    return " ".join(str(error).split()).replace("$.", "")[:200]

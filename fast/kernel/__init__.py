@@ -1,0 +1,1 @@
+"""What numba compiles: laws, walls, the careful step, the lanes, and the entries that Python calls."""

@@ -1,0 +1,324 @@
+"""A scene's laws in compiled code: anchored at the last event, then their increments since.
+
+Idea. A law gives f(t + s) - f(t) without cancellation, so a wall met again soon after it was
+left is found to full precision whatever t is; the anchors themselves come from the time as a pair
+(t_hi, t_lo), so no digit of the phase is lost in long runs.
+
+Each row of `anchors` holds: value, derivative, half-leg (Fourier: size of the derivative's terms), then for
+bang-bang laws the time to the half-leg's end and its low part; last the value's low part.
+Times to knots are sums of two floats throughout: a wall that is met again just after a knot has moved by
+the square of the time since then, and its speed is that time's multiple, so that time must be right relative
+to itself, not to the period that its knots are written in.
+All Fourier laws of a scene share their omega, so two more rows hold the harmonics' sines and
+cosines at the event, and their turn since, at one s.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from fast.kernel.arithmetic import (
+    MAX_QUADRANT,
+    SAFETY,
+    beyond_first_order,
+    sine_cosine,
+    two_product,
+    two_sum,
+)
+from fast.kernel.codes import BANG_BANG, FOURIER, MAX_HARMONICS, PHASES, H, M, R, W
+
+PHASE, TURN = 4, 5
+LACK = 0  # column of PHASE: error of sines and cosines, low parts included
+# Columns of these two rows, to which the number of the harmonic, from 1, is added.
+SINE, COSINE = 3, 3 + MAX_HARMONICS
+SINE_LOW, COSINE_LOW = 3 + 2 * MAX_HARMONICS, 3 + 3 * MAX_HARMONICS
+ANCHORS_SHAPE = (6, 4 + 4 * MAX_HARMONICS)
+ROOM, ROOM_LOW = 3, 4  # columns of `anchors`
+# Columns of a bang-bang law's row: kind, 0, period, number of knots, period's low part, then
+# the knots' times, values, the legs' accelerations and the low parts of these (n of each kept).
+KNOTS = 5
+LOW = 5  # column of `anchors`
+
+
+@njit(error_model="numpy")
+def set_phases(laws, anchors, t_hi, t_lo):
+    """Store the sines and cosines of all harmonics at t; False when t is out of reach."""
+    anchors[TURN, 0] = -1.0
+    worst = 0.0
+    for k in range(1, int(laws[PHASES, 1]) + 1):
+        s, s_low, c, c_low, is_reduced = sine_cosine(laws[PHASES, 0], float(k), t_hi, t_lo, laws[PHASES, 2])
+        if not is_reduced:
+            return False
+        anchors[PHASE, SINE + k] = s
+        anchors[PHASE, COSINE + k] = c
+        anchors[PHASE, SINE_LOW + k] = s_low
+        anchors[PHASE, COSINE_LOW + k] = c_low
+        nearest = min(abs(s), abs(c))
+        worst = max(worst, nearest)
+    # What the low parts lack: the sixth power of the angle from the nearest quarter turn.
+    anchors[PHASE, LACK] = 2.0**-59 * worst**6 + 2.0**-98
+    return True
+
+
+@njit(error_model="numpy")
+def set_turn(laws, anchors, s):
+    """Store cos(d) - 1 and sin(d) or, while all d are small, sin(d) - d, for the phases d = k omega s."""
+    n = int(laws[PHASES, 1])
+    is_short = 0.5 * n * laws[PHASES, 0] * s < 0.75
+    anchors[TURN, 0] = s
+    anchors[TURN, 1] = 1.0 if is_short else 0.0
+    for k in range(1, n + 1):
+        half = 0.5 * k * laws[PHASES, 0] * s
+        if is_short:
+            more, less = beyond_first_order(half)
+            sine = half + more
+            anchors[TURN, SINE + k] = 2.0 * (more + sine * less)
+        else:
+            sine, _, cosine, _, _ = sine_cosine(laws[PHASES, 0], 0.5 * k, s, 0.0, laws[PHASES, 2])
+            anchors[TURN, SINE + k] = 2.0 * sine * cosine
+        anchors[TURN, COSINE + k] = -2.0 * sine * sine
+
+
+@njit(error_model="numpy")
+def set_anchors(laws, anchors, t_hi, t_lo):
+    """Anchor all four laws at t; False when t is out of reach."""
+    if not set_phases(laws, anchors, t_hi, t_lo):
+        return False
+    for row in (R, W, H, M):
+        if laws[row, 0] == FOURIER:
+            set_waves(laws, anchors, row)
+        elif laws[row, 0] == BANG_BANG:
+            if not set_leg(laws, anchors, row, t_hi, t_lo):
+                return False
+        else:
+            anchors[row, 0] = laws[row, 1]
+            anchors[row, 1] = 0.0
+            anchors[row, 2] = 0.0
+            anchors[row, LOW] = 0.0
+    return True
+
+
+@njit(error_model="numpy")
+def add_product(total, low, a, b, b_low):
+    """Return total + low + a (b + b_low), as a sum of two floats."""
+    p, e = two_product(a, b)
+    total, f = two_sum(total, p)
+    return total, low + (e + f + a * b_low)
+
+
+@njit(error_model="numpy")
+def set_waves(laws, anchors, row):
+    """Anchor a Fourier law from the phases stored; its terms may cancel, hence sums of two floats."""
+    n = int(laws[row, 3])
+    f, f_low = laws[row, 1], 0.0
+    rate, rate_low = 0.0, 0.0
+    size = 0.0
+    for k in range(1, n + 1):
+        s, s_low = anchors[PHASE, SINE + k], anchors[PHASE, SINE_LOW + k]
+        c, c_low = anchors[PHASE, COSINE + k], anchors[PHASE, COSINE_LOW + k]
+        a, b = laws[row, 3 + k], laws[row, 3 + n + k]
+        f, f_low = add_product(f, f_low, a, c, c_low)
+        f, f_low = add_product(f, f_low, b, s, s_low)
+        kc, kc_low = two_product(k, c)
+        ks, ks_low = two_product(k, s)
+        rate, rate_low = add_product(rate, rate_low, b, kc, kc_low + k * c_low)
+        rate, rate_low = add_product(rate, rate_low, -a, ks, ks_low + k * s_low)
+        size += k * (abs(a) + abs(b))
+    anchors[row, 0], anchors[row, LOW] = two_sum(f, f_low)
+    anchors[row, 1] = laws[row, 2] * (rate + rate_low)
+    anchors[row, 2] = laws[row, 2] * size
+
+
+@njit(error_model="numpy")
+def time_since(knot, n_periods, period, period_low, t_hi, t_lo):
+    """Return t - (knot + n_periods period) as a sum of two floats."""
+    d, e = two_sum(t_hi, -knot)
+    p, q = two_product(n_periods, period)
+    difference, f = two_sum(d, -p)
+    return two_sum(difference, f + ((e - q) + (t_lo - n_periods * period_low)))
+
+
+@njit(error_model="numpy")
+def on_parabola(value, a, a_low, u, u_low):
+    """Return value + a u^2 / 2 as a sum of two floats, and a u."""
+    p, p_low = two_product(u, u)
+    q, q_low = two_product(0.5 * a, p)
+    f, f_low = two_sum(value, q)
+    return f, f_low + (q_low + (0.5 * a * (p_low + 2.0 * u * u_low) + 0.5 * a_low * p)), a * (u + u_low)
+
+
+@njit(error_model="numpy")
+def set_leg(laws, anchors, row, t_hi, t_lo):
+    """Anchor a bang-bang law: its nearer knot gives value and derivative without cancellation."""
+    n = int(laws[row, 3])
+    period, period_low = laws[row, 2], laws[row, 4]
+    first = laws[row, KNOTS]
+    n_periods = np.floor((t_hi - first) / period)
+    if not abs(n_periods) < MAX_QUADRANT:
+        return False
+    tau, _ = time_since(first, n_periods, period, period_low, t_hi, t_lo)
+    if tau < 0.0:
+        n_periods -= 1.0
+    elif tau >= period + period_low:
+        n_periods += 1.0
+    tau, _ = time_since(first, n_periods, period, period_low, t_hi, t_lo)
+    i = 0
+    while i < n - 2:
+        since_next, _ = time_since(laws[row, KNOTS + i + 1], n_periods, period, period_low, t_hi, t_lo)
+        if since_next < 0.0:
+            break
+        i += 1
+    before, after = laws[row, KNOTS + i], laws[row, KNOTS + i + 1]
+    length, length_low = two_sum(after, -before)
+    a, a_low = laws[row, KNOTS + 2 * n + i], laws[row, KNOTS + 3 * n + i]
+    u, u_low = time_since(before, n_periods, period, period_low, t_hi, t_lo)
+    room, room_low = difference(0.5 * length, 0.5 * length_low, u, u_low)
+    if room > 0.0:
+        f, f_low, rate = on_parabola(laws[row, KNOTS + n + i], a, a_low, u, u_low)
+        anchors[row, 2] = 2.0 * i
+    else:
+        u, u_low = time_since(after, n_periods, period, period_low, t_hi, t_lo)
+        f, f_low, rate = on_parabola(laws[row, KNOTS + n + i + 1], -a, -a_low, u, u_low)
+        anchors[row, 2] = 2.0 * i + 1.0
+        room, room_low = -u, -u_low
+    anchors[row, 0], anchors[row, LOW] = two_sum(f, f_low)
+    anchors[row, 1] = rate
+    anchors[row, ROOM], anchors[row, ROOM_LOW] = room, room_low
+    return True
+
+
+@njit(error_model="numpy")
+def difference(a, a_low, b, b_low):
+    """Return (a + a_low) - (b + b_low) as a sum of two floats, right relative to itself."""
+    d, e = two_sum(a, -b)
+    low, f = two_sum(a_low, -b_low)
+    d, e = two_sum(d, e + low)
+    return two_sum(d, e + f)
+
+
+@njit(error_model="numpy")
+def increment(laws, anchors, row, s):
+    """Return f(t + s) - f(t), f'(t + s), and the summed sizes of the terms of both."""
+    if laws[row, 0] == FOURIER:
+        if s == 0.0:
+            return 0.0, anchors[row, 1], 0.0, anchors[row, 2]
+        if s != anchors[TURN, 0]:
+            set_turn(laws, anchors, s)
+        return waves_increment(laws, anchors, row, s)
+    if laws[row, 0] == BANG_BANG:
+        return legs_increment(laws, anchors, row, s)
+    return 0.0, 0.0, 0.0, 0.0
+
+
+@njit(error_model="numpy")
+def waves_increment(laws, anchors, row, s):
+    """Return `increment` of a Fourier law for the turn stored."""
+    n = int(laws[row, 3])
+    is_short = anchors[TURN, 1] > 0.0
+    # What goes with s at first order is f' s, and f' is known better than its terms' sum.
+    change = anchors[row, 1] * s if is_short else 0.0
+    size = abs(change)
+    d_rate = 0.0
+    for k in range(1, n + 1):
+        down, across = anchors[TURN, COSINE + k], anchors[TURN, SINE + k]
+        sine, cosine = anchors[PHASE, SINE + k], anchors[PHASE, COSINE + k]
+        a, b = laws[row, 3 + k], laws[row, 3 + n + k]
+        change += (a * cosine + b * sine) * down + (b * cosine - a * sine) * across
+        size += (abs(a) + abs(b)) * (abs(down) + abs(across))
+        if is_short:
+            across += k * laws[PHASES, 0] * s
+        d_rate += k * ((b * cosine - a * sine) * down - (a * cosine + b * sine) * across)
+    return change, anchors[row, 1] + laws[row, 2] * d_rate, size, anchors[row, 2]
+
+
+@njit(error_model="numpy")
+def bend_of_half_leg(laws, row, j):
+    """Return the second derivative of a bang-bang law in its half-leg j."""
+    a = laws[row, KNOTS + 2 * int(laws[row, 3]) + j // 2]
+    return -a if j % 2 else a
+
+
+@njit(error_model="numpy")
+def whole_periods_off(laws, row, s):
+    """Return s less the whole periods in it, as a sum of two floats."""
+    period, period_low = laws[row, 2], laws[row, 4]
+    if s < period:
+        return s, 0.0
+    n_periods = np.floor(s / period)
+    p, e = two_product(n_periods, period)
+    left, left_low = difference(s, 0.0, p, e + n_periods * period_low)
+    return (left, left_low) if left > 0.0 else (0.0, 0.0)
+
+
+@njit(error_model="numpy")
+def leg_after(laws, anchors, row, s):
+    """Walk the half-legs of a bang-bang law for a time s.
+
+    Returns (half-leg, time since the walk entered it, time to its end, derivative at its entry, increase up
+    to there, size of that increase's terms).
+    """
+    n_half_legs = 2 * (int(laws[row, 3]) - 1)
+    j = int(anchors[row, 2])
+    room, room_low = anchors[row, ROOM], anchors[row, ROOM_LOW]
+    rate, change, size, beyond = anchors[row, 1], 0.0, 0.0, 0.0
+    left, left_low = whole_periods_off(laws, row, s)
+    for _ in range(n_half_legs + 1):
+        beyond, beyond_low = difference(left, left_low, room, room_low)
+        if beyond < 0.0:
+            break
+        a = bend_of_half_leg(laws, row, j)
+        change += room * (rate + 0.5 * a * room)
+        size += room * (abs(rate) + 0.5 * abs(a) * room)
+        j = (j + 1) % n_half_legs
+        i = j // 2
+        length, length_low = two_sum(laws[row, KNOTS + i + 1], -laws[row, KNOTS + i])
+        # At a knot the law is at rest; in mid-leg it has what half the leg gave it.
+        rate = 0.5 * bend_of_half_leg(laws, row, j - 1) * length if j % 2 else 0.0
+        left, left_low = beyond, beyond_low
+        room, room_low = 0.5 * length, 0.5 * length_low
+    return j, left, max(-beyond, 0.0), rate, change, size
+
+
+@njit(error_model="numpy")
+def legs_increment(laws, anchors, row, s):
+    """Return `increment` of a bang-bang law by walking its half-legs, each a parabola."""
+    j, step, _, rate, change, size = leg_after(laws, anchors, row, s)
+    a = bend_of_half_leg(laws, row, j)
+    change += step * (rate + 0.5 * a * step)
+    size += step * (abs(rate) + 0.5 * abs(a) * step)
+    return change, rate + a * step, size, abs(rate) + abs(a) * step
+
+
+@njit(error_model="numpy")
+def width(laws, anchors, is_relative, s):
+    """Return w(t), w(t + s) - w(t), w'(t + s) and the sizes of both, for w = nu r or w itself."""
+    d_w, rate, size, rate_size = increment(laws, anchors, W, s)
+    w = anchors[W, 0]
+    if not is_relative:
+        return w, d_w, rate, size, rate_size
+    d_r, r_rate, r_size, r_rate_size = increment(laws, anchors, R, s)
+    r = anchors[R, 0]
+    return (
+        w * r,
+        d_w * (r + d_r) + w * d_r,
+        rate * (r + d_r) + (w + d_w) * r_rate,
+        size * (abs(r) + r_size) + w * r_size,
+        rate_size * (abs(r) + r_size) + (w + size) * r_rate_size,
+    )
+
+
+@njit(error_model="numpy")
+def rest(laws, anchors, row, s):
+    """Return for how long after the time s a law stands still; 0 when it moves, or is not known to rest."""
+    if laws[row, 0] == FOURIER:
+        return 0.0
+    if laws[row, 0] != BANG_BANG:
+        return np.inf
+    j, left, room, _, _, _ = leg_after(laws, anchors, row, s)
+    if bend_of_half_leg(laws, row, j) != 0.0:
+        return 0.0
+    if j % 2 == 0:  # the leg's other half is at rest too
+        i = j // 2
+        room += 0.5 * (laws[row, KNOTS + i + 1] - laws[row, KNOTS + i])
+    return max(room - SAFETY * (room + left), 0.0)

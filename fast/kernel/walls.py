@@ -1,0 +1,231 @@
+"""The walls as functions f > 0 inside: their values along a flight, and bounds that hold for all time.
+
+A wall function is a sum of a few products of rounded numbers, so `SAFETY` times the sum of their
+sizes bounds its error; every value of f comes with such a bound. Source: sec. 2, D_stem and D_cap.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from fast.kernel.arithmetic import SAFETY, dot, fma, multiplied, products, quotient, two_product, two_sum
+from fast.kernel.codes import ARC, BASE, CAP, FLOOR, LEFT, MUSHROOM, NO_WALL, RIGHT, STEM, H, M, R, W
+from fast.kernel.laws import LOW, increment, rest, width
+
+
+@njit(error_model="numpy")
+def wall_function(wall, s, x, y, vx, vy, residual, laws, anchors, is_relative):
+    """Return f(s), f'(s) and the rounding errors of both, for one wall (f > 0 inside).
+
+    `residual` is f(0), or 0 on the wall being left. Source: sec. 2, D_stem and D_cap.
+    """
+    if wall == ARC:
+        d_r, r_rate, r_size, r_rate_size = increment(laws, anchors, R, s)
+        r = anchors[R, 0]
+        q = x * vx + y * vy
+        v2 = vx * vx + vy * vy
+        f = residual + (d_r * (2.0 * r + d_r) - s * (2.0 * q + s * v2))
+        slope = 2.0 * ((r + d_r) * r_rate - (q + s * v2))
+        sizes = abs(x * vx) + abs(y * vy)
+        error = abs(residual) + r_size * (2.0 * r + r_size) + s * (2.0 * sizes + s * v2)
+        slope_error = 2.0 * ((r + abs(d_r)) * r_rate_size + sizes + s * v2)
+        return f, slope, SAFETY * error, SAFETY * slope_error
+    if wall == FLOOR:
+        d_h, h_rate, h_size, h_rate_size = increment(laws, anchors, H, s)
+        f = residual + (vy * s + d_h)
+        error = abs(residual) + abs(vy) * s + h_size
+        return f, vy + h_rate, SAFETY * error, SAFETY * (abs(vy) + h_rate_size)
+    _, d_w, w_rate, w_size, w_rate_size = width(laws, anchors, is_relative, s)
+    d_m, m_rate, m_size, m_rate_size = increment(laws, anchors, M, s)
+    m = anchors[M, 0]
+    outward = vx if wall == RIGHT else -vx
+    y_s = y + vy * s
+    f = residual + (d_w + d_m * y_s + s * (m * vy - outward))
+    slope = w_rate + m_rate * y_s + (m + d_m) * vy - outward
+    error = abs(residual) + w_size + m_size * abs(y_s) + s * (abs(m * vy) + abs(vx))
+    slope_error = w_rate_size + m_rate_size * (abs(y) + abs(vy) * s) + (abs(m) + m_size) * abs(vy) + abs(vx)
+    return f, slope, SAFETY * error, SAFETY * slope_error
+
+
+@njit(error_model="numpy")
+def wall_residual(wall, x, y, laws, anchors, bounds, is_relative):
+    """Return f(0), right to its last bits, and what its error would be were it summed plainly.
+
+    The second judges states, which come rounded.
+    """
+    if wall == ARC:
+        r, r_low = anchors[R, 0], anchors[R, LOW]
+        r2, r2_low = two_product(r, r)
+        x2, x2_low = two_product(x, x)
+        y2, y2_low = two_product(y, y)
+        a, a_low = two_sum(r2, -x2)
+        b, b_low = two_sum(a, -y2)
+        low = b_low + a_low + (r2_low - x2_low - y2_low) + 2.0 * r * r_low
+        return b + low, SAFETY * r2
+    if wall == FLOOR:
+        f, f_low = two_sum(y, anchors[H, 0])
+        return f + (f_low + anchors[H, LOW]), SAFETY * anchors[H, 0]
+    w, w_low = anchors[W, 0], anchors[W, LOW]
+    if is_relative:
+        w, w_low = multiplied(w, w_low, anchors[R, 0], anchors[R, LOW])
+    tilt, tilt_low = multiplied(anchors[M, 0], anchors[M, LOW], y, 0.0)
+    f, f_low = two_sum(w, -x if wall == RIGHT else x)
+    f, e = two_sum(f, tilt)
+    error = SAFETY * (w + abs(tilt) + abs(x))
+    return f + (f_low + e + w_low + tilt_low), error
+
+
+@njit(error_model="numpy")
+def wall_slope(wall, x, y, vx, vy, anchors, is_relative):
+    """Return f' of a wall at the time of the anchors."""
+    if wall == BASE:
+        return vy
+    if wall == ARC:
+        return 2.0 * fma(anchors[R, 0], anchors[R, 1], -dot(x, vx, y, vy))
+    if wall == FLOOR:
+        return vy + anchors[H, 1]
+    w_rate = anchors[W, 1]
+    if is_relative:
+        w_rate = w_rate * anchors[R, 0] + anchors[W, 0] * anchors[R, 1]
+    return w_rate + anchors[M, 1] * y + (anchors[M, 0] * vy - (vx if wall == RIGHT else -vx))
+
+
+@njit(error_model="numpy", forceinline=True)  # a call in a loop over lanes would not be packed
+def off_the_arc(x, x_low, y, y_low, vx, vy, r, rate):
+    """Return the velocity after a hit on the arc: v - 2 f' grad f / |grad f|^2 = v - 2 (v.n - r') n.
+
+    The place's low part matters: its rounding would turn the normal.
+    """
+    q, q_low = products(x, x_low, vx, 0.0, y, y_low, vy, 0.0)
+    rho2, rho2_low = products(x, x_low, x, x_low, y, y_low, y, y_low)
+    p, p_low = two_product(r, rate)
+    n, n_low = two_sum(p, -q)
+    push, low = quotient(2.0 * n, 2.0 * (n_low + (p_low - q_low)), rho2, rho2_low)
+    x_push, y_push = fma(push, x_low, low * x), fma(push, y_low, low * y)
+    return fma(push, x, vx) + x_push, fma(push, y, vy) + y_push
+
+
+@njit(error_model="numpy", forceinline=True)  # a call in a loop over lanes would not be packed
+def off_the_arc_spinning(x, x_low, y, y_low, vx, vy, r, rate, spin):
+    """Return the same for a particle whose angular momentum is known to be `spin`."""
+    q, q_low = products(x, x_low, vx, 0.0, y, y_low, vy, 0.0)
+    rho2, rho2_low = products(x, x_low, x, x_low, y, y_low, y, y_low)
+    p, p_low = two_product(2.0 * r, rate)
+    out, low = two_sum(p, -q)
+    low += p_low - q_low
+    a, a_low = products(out, low, x, x_low, -spin, 0.0, y, y_low)
+    b, b_low = products(out, low, y, y_low, spin, 0.0, x, x_low)
+    vx_s, vx_low = quotient(a, a_low, rho2, rho2_low)
+    vy_s, vy_low = quotient(b, b_low, rho2, rho2_low)
+    return vx_s + vx_low, vy_s + vy_low
+
+
+@njit(error_model="numpy")
+def curvature_bounds(wall, vx, vy, bounds):
+    """Return K >= -inf f'' and L >= sup f'' from the laws' bounds (rows: lo, hi, |f'|, |f''|)."""
+    if wall == ARC:
+        bend = bounds[R, 1] * bounds[R, 3]
+        v2 = vx * vx + vy * vy
+        return (
+            2.0 * (bend + v2) * (1.0 + SAFETY),
+            2.0 * (bend + bounds[R, 2] * bounds[R, 2] - v2) + SAFETY * v2,
+        )
+    if wall == FLOOR:
+        return bounds[H, 3], bounds[H, 3]
+    k = bounds[W, 3] + bounds[M, 3] * bounds[H, 1] + 2.0 * bounds[M, 2] * abs(vy)
+    return k * (1.0 + SAFETY), k * (1.0 + SAFETY)
+
+
+@njit(error_model="numpy")
+def law_size(wall, y, bounds):
+    """Bound the summed sizes of all terms of the laws in a wall function.
+
+    A positive law's amplitudes add up to at most 2 sqrt(MAX_HARMONICS) = 8 times its highest value, by
+    Parseval; two such laws are multiplied at most.
+    """
+    if wall == ARC:
+        return 64.0 * bounds[R, 1] * bounds[R, 1]
+    if wall == FLOOR:
+        return 64.0 * bounds[H, 1]
+    return 64.0 * (bounds[W, 1] + max(abs(bounds[M, 0]), abs(bounds[M, 1])) * abs(y))
+
+
+@njit(error_model="numpy")
+def wall_rest(wall, s, laws, anchors, is_relative):
+    """Return for how long after the time s a wall stands still."""
+    if wall == ARC:
+        return rest(laws, anchors, R, s)
+    if wall == FLOOR:
+        return rest(laws, anchors, H, s)
+    still = min(rest(laws, anchors, W, s), rest(laws, anchors, M, s))
+    return min(still, rest(laws, anchors, R, s)) if is_relative else still
+
+
+@njit(error_model="numpy")
+def reach_time(wall, x, y, vx, vy, bounds):
+    """Return a time before which the particle cannot reach what the wall ever sweeps.
+
+    This lets a slow particle cross the middle of the table in one step.
+    """
+    if wall == ARC:
+        inner = bounds[R, 0]
+        gap = inner * inner - (x * x + y * y)
+        v2 = vx * vx + vy * vy
+        if gap <= SAFETY * inner * inner or v2 == 0.0:
+            return np.inf if gap > SAFETY * inner * inner else 0.0
+        q = x * vx + y * vy
+        root = np.sqrt(q * q + v2 * gap)
+        return (gap / (q + root) if q > 0.0 else (root - q) / v2) * (1.0 - 4.0 * SAFETY)
+    if wall == FLOOR:
+        gap = y + bounds[H, 0]
+        size = abs(y) + bounds[H, 0]
+        speed = -vy
+    else:
+        m_lo, m_hi = bounds[M, 0], bounds[M, 1]
+        outward = vx if wall == RIGHT else -vx
+        position = x if wall == RIGHT else -x
+        if m_lo == m_hi:
+            gap = bounds[W, 0] + m_lo * y - position
+            speed = outward - m_lo * vy
+        else:
+            gap = bounds[W, 0] - max(abs(m_lo), abs(m_hi)) * bounds[H, 1] - position
+            speed = outward
+        size = bounds[W, 0] + max(abs(m_lo), abs(m_hi)) * bounds[H, 1] + abs(x)
+    if gap <= SAFETY * size:
+        return 0.0
+    if speed <= 0.0:
+        return np.inf
+    return gap / speed * (1.0 - 4.0 * SAFETY)
+
+
+@njit(error_model="numpy")
+def side_of_mouth(s, x, y, vx, vy, laws, anchors, is_relative):
+    """Return +1 when the crossing of y = 0 after time s is within |x| < w, -1 beyond, 0 too close."""
+    w, d_w, _, w_size, _ = width(laws, anchors, is_relative, s)
+    x_s = abs(x + vx * s)
+    margin = (w - x_s) + d_w
+    error = SAFETY * (w + w_size + abs(x) + 2.0 * abs(vx) * s)
+    if margin > error:
+        return 1
+    return -1 if margin < -error else 0
+
+
+@njit(error_model="numpy")
+def is_outside(table, is_relative, wall, x, y, laws, anchors, bounds):
+    """Tell whether the state is beyond a wall by more than rounding; returns the wall or NO_WALL."""
+    in_cap = table == CAP or (table == MUSHROOM and (y > 0.0 or wall in (BASE, ARC)))
+    if (table == CAP and y < 0.0 and wall != BASE) or (table == STEM and y > 0.0 and wall != BASE):
+        return BASE
+    if table == MUSHROOM and ((wall == ARC and y < 0.0) or (wall >= LEFT and y > 0.0)):
+        return BASE
+    for candidate in (ARC, LEFT, RIGHT, FLOOR):
+        # On y = 0 both the arc and, below it, the sides bound the table; the mouth is checked in flight.
+        is_bound = (candidate == ARC and table != STEM and y >= 0.0) or (
+            candidate != ARC and table != CAP and (not in_cap) and (y < 0.0 or table == STEM)
+        )
+        if is_bound and candidate != wall:
+            f, error = wall_residual(candidate, x, y, laws, anchors, bounds, is_relative)
+            if f < -error:
+                return candidate
+    return NO_WALL

@@ -1,0 +1,139 @@
+"""Which figure belongs to which entry of the report, and which simulations it shows."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import NamedTuple
+
+from matplotlib import rc_context
+from matplotlib.figure import Figure
+
+from conformance.audit.claims.finite_energy import ACW, CW, ERGODIC, LADDER
+from conformance.audit.samples import Sample
+from mushrooms.figures import cycles as cycles
+from mushrooms.figures import scaling as laws
+from mushrooms.figures.style import STYLE
+
+Samples = Mapping[str, Sample]
+N7, N7X10, N7X30, N5X30 = "moving-cap@1e7", "moving-cap@1e7x10", "moving-cap@1e7x30", "moving-cap@1e5x30"
+
+
+class Picture(NamedTuple):
+    """A figure of the report.
+
+    Attributes:
+        entry: the ledger's id below which it stands.
+        caption: what it shows.
+        draw: makes it from the samples by run.
+        needs: runs it cannot do without.
+    """
+
+    entry: str
+    caption: str
+    draw: Callable[[Samples], Figure]
+    needs: tuple[str, ...] = ()
+
+
+def _sums(samples: Samples) -> Figure:
+    if N7X30 in samples:
+        return cycles.sums([(samples[N7X10], 10), (samples[N7X30], 30)])
+    return cycles.sums([(samples[N5X30], 10), (samples[N5X30], 30)])
+
+
+def _there(samples: Samples, *names: str) -> list[Sample]:
+    return [samples[name] for name in names if name in samples]
+
+
+ALL = (
+    Picture(
+        "M2",
+        "The cycles, with the direction of time; colours mark the phase. Left: the plane of eq. "
+        "(cycle). Middle and right: the plane of sec. 3.5, in which energy grows when the loop bounds"
+        " an area (M12). The moving cap's runs clockwise, as its caption in the paper says.",
+        lambda _: cycles.loops(),
+    ),
+    Picture(
+        "N5",
+        "Theory: what a particle captured at t_in has gained after the cycle.",
+        lambda _: cycles.gain_of_capture(),
+    ),
+    Picture(
+        "M7",
+        "Width of the uncaptured peak against energy, with fitted powers, and the power as printed. "
+        "Error bars are smaller than the marks.",
+        lambda s: laws.widths(_there(s, *LADDER[1:6]), _there(s, *ERGODIC)),
+        (*LADDER[1:6], *ERGODIC),
+    ),
+    Picture(
+        "M9",
+        "How the moving cap's means approach the theory as E0 grows. The mean of exp(-s/2), right, "
+        "has no bias of order E0^(-1/2).",
+        lambda s: laws.convergence(_there(s, *LADDER)),
+        LADDER[:6],
+    ),
+    Picture(
+        "X1",
+        "Energies after one cycle, fixed cap. In theory (orange) the never captured share one energy,"
+        " dashed; black: the same theory with the finite-energy blur: what the never captured gather "
+        "through the cycle, and of it, for the captured, what they gather outside the cap.",
+        lambda s: cycles.energies(_there(s, ACW, CW)),
+        (ACW, CW),
+    ),
+    Picture(
+        "X2",
+        "Energies after one cycle, moving cap; as above. The orange density is infinite at its right "
+        "end, the caustic of N5.",
+        lambda s: cycles.energies(_there(s, "moving-cap@1e6", N7)),
+        ("moving-cap@1e6", N7),
+    ),
+    Picture(
+        "X3",
+        "When particles are captured. The area is the captured share.",
+        lambda s: cycles.capture_times(_there(s, N7, ACW, CW)),
+        (N7, ACW, CW),
+    ),
+    Picture(
+        "X4",
+        "Many cycles: the centre and, on a logarithmic axis, the tails. The exact convolution leaves "
+        "the Gaussian there.",
+        _sums,
+        (N5X30,),
+    ),
+    Picture("X5", "c = 0: one narrow peak.", lambda s: cycles.ergodic(s["ergodic@1e7"]), ("ergodic@1e7",)),
+    Picture(
+        "X6",
+        "Tilted and upright stem: energies of the never captured, each counted from its own theory's "
+        "log E_nc. Parabolic orbits between the upright sides spread them far.",
+        lambda s: cycles.stems(s["moving-cap@1e6"], s["untilted@1e6"]),
+        ("moving-cap@1e6", "untilted@1e6"),
+    ),
+    Picture(
+        "L3",
+        "The frozen mushroom: orbits in the island (blue) and in the chaotic zone (orange).",
+        lambda _: laws.frozen(),
+    ),
+    Picture(
+        "L4",
+        "Release: how far nu at release is from nu at capture, against 1/v (grey: single particles), "
+        "and its distribution in units of 1/v.",
+        lambda s: laws.release(_there(s, *LADDER[1:6])),
+        LADDER[1:6],
+    ),
+    Picture(
+        "L5",
+        "Through the cycle: mean log E of the particles not captured so far, and the share of "
+        "particles in the chaotic zone (L6).",
+        lambda s: laws.zone(_there(s, N7, ACW)),
+        (N7, ACW),
+    ),
+)
+
+
+def drawn(entries: list[str], samples: Samples) -> list[tuple[Picture, Figure]]:
+    """Draw the figures of these entries whose simulations are there."""
+    found = []
+    for picture in ALL:
+        if picture.entry in entries and all(name in samples for name in picture.needs):
+            with rc_context(STYLE):
+                found.append((picture, picture.draw(samples)))
+    return found

@@ -1,0 +1,220 @@
+"""Figures of one cycle and of many: loops, energies, capture times, sums; theory over simulation."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from mpmath import fp
+from scipy.stats import norm
+
+import theory
+from conformance.audit.claims import broadened
+from conformance.audit.claims.finite_energy import width
+from conformance.audit.claims.many_cycles import blur_of_sum
+from conformance.audit.evidence import energies_of
+from conformance.audit.runs import scene_of
+from conformance.audit.samples import Sample
+from conformance.audit.tolerances import mean, spread
+from mushrooms.figures.style import BLACK, BLUE, GREEN, ORANGE, SKY, FloatArray, new_figure, phase_colours
+from scene import Scene, load
+from scene.laws import value
+from scene.tables import Mushroom, period
+
+N_BINS = 80
+N_LOOP = 240
+N_PHASES = 6
+
+
+def loops() -> Figure:
+    """Draw the cycles: in the plane (w, h) of sec. 4.1 and the plane (V_ell/V_cap, V_cap/V) of sec. 3.5."""
+    figure, axes = new_figure(9.6, 3.4, 1, 3)
+    fixed, moving = load("fixed-cap-anticlockwise"), load("moving-cap")
+    assert isinstance(fixed, Mushroom)
+    times = np.linspace(0, 1, N_LOOP + 1)
+    w, h = (np.array([float(value(fp, law, float(t))) for t in times]) for law in (fixed.w or 0.0, fixed.h))
+    _loop(axes[0], w, h)
+    axes[0].set(xlabel="half-width w", ylabel="depth h", title="fixed cap, anticlockwise")
+    for panel, scene, title in (
+        (axes[1], fixed, "fixed cap, anticlockwise"),
+        (axes[2], moving, "moving cap"),
+    ):
+        _loop(panel, *_volume_loop(scene))
+        panel.set(xlabel="V_ell / V_cap", ylabel="V_cap / V", title=title)
+    axes[2].legend(loc="best", title="t / T")
+    return figure
+
+
+def _volume_loop(scene: Scene) -> tuple[FloatArray, FloatArray]:
+    shared = period(scene)
+    assert shared is not None
+    span = float(shared.value(fp))
+    volumes = [theory.volumes_at(fp, scene, span * k / N_LOOP) for k in range(N_LOOP + 1)]
+    x = np.array([v.v_ell / v.v_cap for v in volumes])
+    return x, np.array([v.v_cap / (v.v_cap + v.v_stem) for v in volumes])
+
+
+def _loop(axes: Axes, x: FloatArray, y: FloatArray) -> None:
+    axes.fill(x, y, color=SKY, alpha=0.5, linewidth=0)
+    axes.plot(x, y, color=BLACK, linewidth=1.2)
+    for k, colour in enumerate(phase_colours(N_PHASES)):
+        i = k * N_LOOP // N_PHASES
+        axes.plot(x[i], y[i], "o", color=colour, markersize=6, label=f"{k}/{N_PHASES}")
+        j = i + N_LOOP // (2 * N_PHASES)
+        start, end = (x[j - 2], y[j - 2]), (x[j], y[j])
+        if start != end:
+            axes.annotate("", end, start, arrowprops={"arrowstyle": "-|>", "color": BLACK, "linewidth": 0})
+
+
+def gain_of_capture() -> Figure:
+    """Draw log E1/E0 against the time of capture, theory (the paper's figure beside its loop)."""
+    figure, axes = new_figure(5.2, 3.2)
+    curve = theory.capture_curve(load("moving-cap"), 600)
+    best = theory.largest_gain(load("moving-cap"))
+    assert best is not None
+    axes.plot(curve.t_in, curve.s, color=ORANGE, linewidth=1.8)
+    axes.plot(*best, "o", color=BLACK, label=f"largest: {best[1]:.6f} at t = {best[0]:.5f}")
+    axes.axhline(
+        curve.s[-1], color=BLACK, linestyle=":", linewidth=1, label=f"never captured: {curve.s[-1]:.6f}"
+    )
+    axes.set(xlabel="time of capture, t_in", ylabel="log E1/E0 (theory)")
+    axes.legend()
+    return figure
+
+
+def energies(samples: list[Sample]) -> Figure:
+    """Draw histograms of log E1/E0 with theory over them."""
+    figure, axes = new_figure(9.6, 3.6, 1, len(samples))
+    for panel, sample in zip(np.atleast_1d(axes), samples, strict=True):
+        _energies(panel, sample)
+    np.atleast_1d(axes)[0].legend(loc="best")
+    return figure
+
+
+def _energies(axes: Axes, sample: Sample) -> None:
+    prediction = theory.predict(scene_of(sample.run), 15)
+    sigma, centre, p_nc = width(sample).value, float(prediction.log_e_nc), float(prediction.p_nc)
+    low, high = (float(np.quantile(sample.gain, q)) for q in (0.0005, 0.9995))
+    edges = np.linspace(low - sigma, high + sigma, N_BINS + 1)
+    counts = np.histogram(sample.gain, edges)[0] / (sample.n * np.diff(edges))
+    axes.stairs(counts, edges, fill=True, color=SKY, label="simulation")
+    x = np.linspace(edges[0], edges[-1], 1500)
+    below = broadened.captured(sample)[0]
+    total = (1 - p_nc) * np.gradient(below(x), x) + p_nc * norm.pdf(x, centre + sigma**2 / 4, sigma)
+    axes.plot(x, total, color=BLACK, linewidth=1.3, label=f"theory, blurred by {sigma:.4f}")
+    sharp = np.diff(energies_of(sample.run.name).captured_below(x)) / np.diff(x)
+    axes.plot((x[1:] + x[:-1]) / 2, sharp, color=ORANGE, linewidth=1.2, label="theory, captured, sharp")
+    axes.axvline(centre, color=ORANGE, linestyle="--", linewidth=1.2, label="theory, never captured")
+    axes.set(
+        xlim=(edges[0], edges[-1]),
+        ylim=(0, 1.15 * max(counts.max(), total.max())),
+        xlabel="log E1/E0",
+        ylabel="density",
+        title=f"{sample.run.scene}, E0 = {sample.run.energy:.0e}, {sample.n:,} particles",
+    )
+
+
+def capture_times(samples: list[Sample]) -> Figure:
+    """Draw histograms of capture times with the theory's density over them."""
+    figure, axes = new_figure(9.6, 3.2, 1, len(samples))
+    for panel, sample in zip(np.atleast_1d(axes), samples, strict=True):
+        scene = scene_of(sample.run)
+        curve = theory.capture_curve(scene, 3)
+        edges = np.linspace(curve.t_in[0], curve.t_in[-1], 51)
+        counts = np.histogram(sample.first_stay[0], edges)[0] / sample.n / np.diff(edges)
+        mass = np.asarray(theory.capture_time_mass(scene, edges)) / np.diff(edges)
+        panel.stairs(counts, edges, fill=True, color=SKY, label="simulation")
+        panel.stairs(mass, edges, color=ORANGE, linewidth=1.5, label="theory, eq. (ps)", baseline=None)
+        panel.set(xlabel="time of capture", ylabel="density", title=sample.run.name, ylim=(0, None))
+    np.atleast_1d(axes)[0].legend(loc="upper left", fontsize=7)
+    return figure
+
+
+def sums(cases: list[tuple[Sample, int]]) -> Figure:
+    """Draw log E_n/E0 over n: density, and its tails on a logarithmic axis."""
+    figure, axes = new_figure(9.6, 3.2 * len(cases), len(cases), 2)
+    for row, (sample, n) in zip(np.reshape(axes, (-1, 2)), cases, strict=True):
+        for panel, scale in zip(row, ("linear", "log"), strict=True):
+            _sum(panel, sample, n, scale)
+        row[0].legend(loc="upper left")
+    return figure
+
+
+def _sum(axes: Axes, sample: Sample, n: int, scale: str) -> None:
+    total = sample.s[:, n - 1] / n
+    k = [float(c) for c in theory.cumulants(scene_of(sample.run), 2)]
+    noise, bias, _ = blur_of_sum(sample, n)
+    places, below = broadened.summed(sample.run.name, n, noise, bias)
+    x = (places[1:] + places[:-1]) / 2 / n
+    density = np.diff(below) / np.diff(places) * n
+    sd = float(np.hypot(np.sqrt(k[2] * n), noise)) / n
+    centre = k[1] + bias / n
+    edges = np.linspace(centre - 5 * sd, centre + 5 * sd, 51)
+    counts = np.histogram(total, edges)[0] / (sample.n * np.diff(edges))
+    axes.stairs(counts, edges, fill=True, color=SKY, label="simulation", baseline=1e-9)
+    axes.plot(x, density, color=BLACK, linewidth=1.3, label="convolution of n cycles")
+    axes.plot(x, norm.pdf(x, centre, sd), color=ORANGE, linestyle="--", linewidth=1.2, label="Gaussian")
+    top = float(norm.pdf(0) / sd)
+    axes.set(
+        yscale=scale,
+        xlim=(edges[0], edges[-1]),
+        ylim=(0, 1.4 * top) if scale == "linear" else (top * 1e-5, 2 * top),
+        xlabel=f"(1/{n}) log E_{n}/E0",
+        ylabel="density",
+        title=f"n = {n}, E0 = {sample.run.energy:.0e}, {sample.n:,} particles",
+    )
+
+
+def ergodic(sample: Sample) -> Figure:
+    """Draw the histogram of c = 0."""
+    figure, axes = new_figure(5.2, 3.2)
+    sigma, found = spread(sample.gain).value, mean(sample.gain)
+    edges = np.linspace(-4.5 * sigma, 4.5 * sigma, 61)
+    counts = np.histogram(sample.gain, edges)[0] / (sample.n * np.diff(edges))
+    axes.stairs(counts, edges, fill=True, color=SKY, label=f"simulation, {sample.n:,} particles")
+    x = np.linspace(edges[0], edges[-1], 400)
+    axes.plot(
+        x,
+        norm.pdf(x, sigma**2 / 4, sigma),
+        color=BLACK,
+        linewidth=1.3,
+        label=f"Gaussian, sd {sigma:.4f}, mean sd²/4 = {sigma**2 / 4:.1e}",
+    )
+    axes.set(
+        xlabel="log E1/E0",
+        ylabel="density",
+        ylim=(0, 0.62 / sigma),
+        title=f"c = 0, E0 = {sample.run.energy:.0e}: mean {found.value:.1e} ± {found.error:.1e}",
+    )
+    axes.legend(loc="upper center")
+    return figure
+
+
+def stems(tilted: Sample, upright: Sample) -> Figure:
+    """Draw the uncaptured particles' energies of both stems, each from its own theory's."""
+    figure, axes = new_figure(9.6, 3.4, 1, 2)
+    edges = np.linspace(-0.4, 0.8, 121)
+    styles: tuple[tuple[Sample, dict[str, Any]], ...] = (
+        (tilted, {"color": SKY, "fill": True, "label": "tilted stem"}),
+        (upright, {"color": BLUE, "linewidth": 1.5, "label": "upright stem"}),
+    )
+    for panel, scale in zip(axes, ("linear", "log"), strict=True):
+        for sample, style in styles:
+            kept = sample.gain[~sample.captured] - float(theory.predict(scene_of(sample.run), 15).log_e_nc)
+            counts = np.histogram(kept, edges)[0] / (len(kept) * np.diff(edges))
+            panel.stairs(counts, edges, baseline=1e-3 if scale == "log" else 0, **style)
+        x = np.linspace(-0.4, 0.8, 600)
+        sigma = width(tilted).value
+        panel.plot(
+            x,
+            norm.pdf(x, sigma**2 / 4, sigma),
+            color=GREEN,
+            linewidth=1.2,
+            label="Gaussian, tilted stem's width",
+        )
+        panel.set(xlabel="log E1/E0 of the never captured, from theory's", ylabel="density", yscale=scale)
+    axes[1].set(ylim=(1e-3, 10))
+    axes[0].legend()
+    return figure

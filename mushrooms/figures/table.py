@@ -1,0 +1,167 @@
+"""Pictures of a table: its walls through the cycle, a few chords of one trajectory, an animation."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, BinaryIO
+
+import numpy as np
+from matplotlib import rc_context
+from matplotlib.animation import FuncAnimation, PillowWriter
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from mpmath import fp
+
+from mushrooms.figures import style as plots
+from scene import Cap, Collision, Mushroom, Scene, State, Stem
+from scene.laws import value
+from scene.tables import period, width_factors
+
+SUFFIXES = (".svg", ".png", ".gif")
+N_PHASES = 6
+N_CHORDS = 14
+N_FRAMES = 36
+FRAMES_PER_SECOND = 12
+
+
+def walls(scene: Scene, t: float) -> list[np.ndarray]:
+    """Return the walls at time t as polylines of shape (2, n) [length]; the mouth is left open."""
+    lines = []
+    factors = () if isinstance(scene, Cap) else width_factors(scene)
+    w = float(np.prod([value(fp, law, t) for law in factors])) if factors else 0.0
+    if isinstance(scene, (Cap, Mushroom)):
+        r = float(value(fp, scene.r, t))
+        angle = np.linspace(0, np.pi, 181)
+        lines.append(np.array([np.r_[w, r * np.cos(angle), -w], np.r_[0, r * np.sin(angle), 0]]))
+    if isinstance(scene, (Stem, Mushroom)):
+        h = float(value(fp, scene.h, t))
+        foot = w - h * float(value(fp, scene.slope, t))
+        lines.append(np.array([[-w, -foot, foot, w], [0, -h, -h, 0]]))
+    if isinstance(scene, Stem):
+        lines.append(np.array([[-w, w], [0, 0]]))
+    return lines
+
+
+def phases(scene: Scene, n: int = N_PHASES) -> list[float]:
+    """Return n times [time] evenly over one cycle; a static table has the single time 0."""
+    span = cycle(scene)
+    return [span * k / n for k in range(n)] if span else [0.0]
+
+
+def cycle(scene: Scene) -> float:
+    """Return the period [time], 0 for a static table."""
+    shared = period(scene)
+    return float(shared.value(fp)) if shared else 0.0
+
+
+def chords(scene: Scene, t: float, n: int = N_CHORDS) -> np.ndarray:
+    """Follow one particle for n collisions from time t; returns points of shape (2, m) [length].
+
+    It is so fast that the walls hardly move meanwhile; the line stops early where the step
+    has no answer.
+    """
+    import fast  # compiles for seconds: only when a trajectory is wanted
+
+    points = np.hstack(walls(scene, t))
+    top, bottom = points[1].max(), points[1].min()
+    speed = 1e6 * points[0].max()
+    direction = 0.61  # radians: off every symmetry
+    state = State(
+        t,
+        0.0,
+        float(0.37 * (top or bottom)),
+        float(speed * np.cos(direction)),
+        float(speed * np.sin(direction)),
+    )
+    path = [(state.x, state.y)]
+    for _ in range(n):
+        outcome = fast.next_collision(scene, state, t + 1.0)
+        if not isinstance(outcome, Collision):
+            break
+        state = outcome.state()
+        path.append((state.x, state.y))
+    return np.array(path).T
+
+
+@rc_context(plots.STYLE)
+def new_strip(scene: Scene, width: float, max_height: float) -> Figure:
+    """Return a figure [inches] with the table at each phase of the cycle and a trajectory in it.
+
+    Low tables stand in two rows when the height allows it.
+    """
+    times = phases(scene)
+    left, right, bottom, top = _frame(scene)
+    ratio = (top - bottom) / (right - left)
+
+    def height(n_rows: int) -> float:
+        return n_rows * (0.85 * width * n_rows / len(times) * ratio + 0.6)
+
+    n_rows = 2 if len(times) > 1 and height(2) <= max_height else 1
+    figure, grid = plots.new_figure(width, min(height(n_rows), max_height), n_rows, len(times) // n_rows)
+    for k, (axes, t, colour) in enumerate(
+        zip(np.ravel(grid), times, plots.phase_colours(len(times)), strict=True)
+    ):
+        axes.plot(*chords(scene, t), color=plots.GREY, linewidth=0.6)
+        for line in walls(scene, t):
+            axes.plot(*line, color=colour, linewidth=2, solid_capstyle="butt")
+        _set_frame(axes, scene)
+        axes.set_title(f"t/T = {k}/{len(times)}" if len(times) > 1 else "static")
+        axes.label_outer()
+    return figure
+
+
+def write_picture(scene: Scene, suffix: str, file: BinaryIO) -> None:
+    """Write a picture of the scene.
+
+    Args:
+        scene: any valid table.
+        suffix: ".svg" or ".png": the table at each phase, with chords; ".gif": the walls in motion.
+        file: open for binary writing.
+    """
+    if suffix == ".gif":
+        _write_animation(scene, file)
+    else:
+        figure = new_strip(scene, 7.2, 6.0)
+        figure.suptitle(scene.name)
+        plots.save(figure, file, suffix)
+
+
+@rc_context(plots.STYLE)
+def _write_animation(scene: Scene, file: BinaryIO) -> None:
+    times = phases(scene, N_FRAMES)
+    span = cycle(scene)
+    figure, axes = plots.new_figure(4.8, 4.8)
+    _set_frame(axes, scene)
+    lines = [axes.plot(*line, color=plots.BLUE, linewidth=2)[0] for line in walls(scene, 0.0)]
+    title = axes.set_title("")
+
+    def show(t: float) -> Sequence[Any]:
+        for line, points in zip(lines, walls(scene, t), strict=True):
+            line.set_data(*points)
+        title.set_text(f"{scene.name}   t/T = {t / span:.2f}" if span else f"{scene.name}   static")
+        return lines
+
+    show(times[0])
+    figure.draw_without_rendering()
+    figure.set_layout_engine("none")  # laid out once: nothing may jump between frames, and frames are quick
+    animation = FuncAnimation(figure, show, frames=times)
+    # The writer takes a path only.
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "walls.gif"
+        animation.save(path, writer=PillowWriter(fps=FRAMES_PER_SECOND), dpi=80)
+        file.write(path.read_bytes())
+
+
+def _frame(scene: Scene) -> tuple[float, float, float, float]:
+    # Left, right, bottom, top of one frame that holds the walls of the whole cycle.
+    points = np.hstack([line for t in phases(scene, N_FRAMES) for line in walls(scene, t)])
+    (left, bottom), (right, top) = points.min(axis=1), points.max(axis=1)
+    margin = 0.05 * max(right - left, top - bottom)
+    return left - margin, right + margin, bottom - margin, top + margin
+
+
+def _set_frame(axes: Axes, scene: Scene) -> None:
+    left, right, bottom, top = _frame(scene)
+    axes.set(xlim=(left, right), ylim=(bottom, top), aspect="equal", xlabel="x [length]", ylabel="y [length]")

@@ -1,0 +1,1 @@
+"""The HTML pages of the commands, and the data behind them."""

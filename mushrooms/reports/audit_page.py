@@ -1,0 +1,285 @@
+"""The audit's report: a self-contained HTML page, the same content as JSON, and a text summary.
+
+`ReportData` is report.json's form; docs/report.schema.json is made from it.
+"""
+
+from __future__ import annotations
+
+import base64
+import json
+import os
+import platform
+from importlib import resources
+from typing import Any, TypedDict
+
+import jinja2
+import msgspec
+import numba
+import numpy as np
+
+import scene as scenes
+from conformance.audit.finding import Check, Entry, Finding
+from conformance.audit.runs import scene_of
+from conformance.audit.samples import Sample
+from conformance.audit.session import Result
+from conformance.audit.tolerances import FAMILY_LEVEL, LEVEL, N_SIGMA, mean, spread
+from mushrooms import __version__
+from mushrooms.figures import by_claim
+from mushrooms.figures import style as plots
+
+GROUPS = {
+    "M": "Misprints and gaps",
+    "X": "Experiments",
+    "L": "Laws",
+    "I": "Identities",
+    "N": "Formulas checked one by one",
+}
+PIXELS_PER_INCH = 104  # of a screen: a figure is shown no larger
+
+
+class CheckData(TypedDict):
+    """One comparison; `form` is claim, printed or corrected."""
+
+    what: str
+    holds: bool | None
+    expected: str
+    value: float | None
+    error: float | None
+    band: float | None
+    form: str
+    n_tests: int
+    note: str
+
+
+class FindingData(TypedDict):
+    """One entry of the ledger and what came of it."""
+
+    id: str
+    where: str
+    statement: str
+    method: str
+    tolerance: str
+    verdict: str
+    expected: str
+    as_expected: bool
+    runs: list[str]
+    seconds: float
+    checks: list[CheckData]
+
+
+class RunData(TypedDict):
+    """One simulation; seconds are kernel time x threads."""
+
+    name: str
+    scene: dict[str, Any]
+    energy: float
+    cycles: int
+    particles: int
+    block: int
+    followed: int
+    undecided: int
+    undefined: int
+    collisions: int
+    careful: int
+    captured: float
+    m1: float | None
+    m1_error: float | None
+    sigma_w: float | None
+    seconds: float
+    ns_per_collision: float
+    sha256: str
+
+
+class ReportData(TypedDict):
+    """What report.json holds."""
+
+    version: str
+    size: str
+    passed: bool
+    seed: int
+    wall_time_s: float
+    resumed: bool
+    kernel_time_s: float
+    machine: dict[str, str | int]
+    false_alarms: dict[str, float | int]
+    findings: list[FindingData]
+    runs: list[RunData]
+
+
+def schema() -> dict[str, Any]:
+    """Return the JSON Schema of report.json, published as docs/report.schema.json."""
+    found = msgspec.json.schema(ReportData)
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": "Audit report", **found}
+
+
+def machine() -> dict[str, str | int]:
+    """Return what the numbers were computed on."""
+    return {
+        "platform": platform.platform(),
+        "processor": platform.machine(),
+        "cores": os.cpu_count() or 0,
+        "python": platform.python_version(),
+        "numpy": np.__version__,
+        "numba": numba.__version__,
+    }
+
+
+def to_data(result: Result) -> ReportData:
+    """Return the content of report.json."""
+    pairs = zip(result.entries, result.findings, strict=True)
+    return {
+        "version": __version__,
+        "size": result.settings.size,
+        "passed": result.is_passed,
+        "seed": result.settings.seed,
+        "wall_time_s": round(result.seconds, 3),
+        "resumed": result.settings.resume,
+        "kernel_time_s": round(sum(sample.seconds for sample in result.samples.values()), 3),
+        "machine": machine(),
+        "false_alarms": {
+            "allowed": FAMILY_LEVEL,
+            "bound": result.n_tests * LEVEL,
+            "tests": result.n_tests,
+            "level": LEVEL,
+            "standard_errors": N_SIGMA,
+        },
+        "findings": [_finding(entry, finding) for entry, finding in pairs],
+        "runs": [_run(sample) for sample in result.samples.values()],
+    }
+
+
+def _finding(entry: Entry, finding: Finding) -> FindingData:
+    return {
+        "id": entry.id,
+        "where": entry.where,
+        "statement": entry.statement,
+        "method": entry.method,
+        "tolerance": entry.tolerance,
+        "verdict": finding.verdict,
+        "expected": entry.expected,
+        "as_expected": finding.verdict == entry.expected,
+        "runs": list(entry.runs),
+        "seconds": round(finding.seconds, 3),
+        "checks": [_check(check) for check in finding.checks],
+    }
+
+
+def _check(check: Check) -> CheckData:
+    return {
+        "what": check.what,
+        "holds": check.holds,
+        "expected": check.expected,
+        "value": _number(check.value),
+        "error": _number(check.error),
+        "band": _number(check.band),
+        "form": check.form,
+        "n_tests": check.n_tests,
+        "note": check.note,
+    }
+
+
+def _run(sample: Sample) -> RunData:
+    found = mean(sample.gain)
+    return {
+        "name": sample.run.name,
+        "scene": scenes.to_data(scene_of(sample.run)),
+        "energy": sample.run.energy,
+        "cycles": sample.run.n_cycles,
+        "particles": sample.n_particles,
+        "block": sample.run.block,
+        "followed": sample.n,
+        "undecided": sample.n_undecided,
+        "undefined": sample.n_undefined,
+        "collisions": sample.n_collisions,
+        "careful": sample.n_careful,
+        "captured": float(sample.captured.mean()) if sample.n else 0.0,
+        "m1": _number(found.value),
+        "m1_error": _number(found.error),
+        "sigma_w": _number(spread(sample.gain[~sample.captured]).value),
+        "seconds": round(sample.seconds, 3),
+        "ns_per_collision": sample.seconds / max(sample.n_collisions, 1) * 1e9,
+        "sha256": sample.sha256,
+    }
+
+
+def _number(value: float | None) -> float | None:
+    # JSON knows no nan.
+    return None if value is None or not np.isfinite(value) else float(value)
+
+
+def to_json(data: ReportData) -> str:
+    """Return report.json's text."""
+    return json.dumps(data, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
+
+
+def to_html(data: ReportData, samples: by_claim.Samples) -> str:
+    """Return report.html's text: no scripts, images embedded, nothing loaded from elsewhere."""
+    environment = jinja2.Environment(
+        autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True
+    )
+    environment.filters |= {"figures": figures_text, "count": lambda n: f"{n:,}"}
+    text = (resources.files("mushrooms.reports") / "audit.html.jinja").read_text("utf-8")
+    figures: dict[str, list[dict[str, str]]] = {}
+    for picture, figure in by_claim.drawn([finding["id"] for finding in data["findings"]], samples):
+        wide = f"{figure.get_figwidth() * PIXELS_PER_INCH:.0f}px"
+        image = {"source": _embed(plots.svg(figure)), "caption": picture.caption, "width": wide}
+        figures.setdefault(picture.entry, []).append(image)
+    groups = [
+        (title, [finding for finding in data["findings"] if finding["id"][0] == letter])
+        for letter, title in GROUPS.items()
+    ]
+    tables = {run["name"].partition("@")[0]: run["scene"] for run in data["runs"]}
+    return environment.from_string(text).render(report=data, groups=groups, images=figures, scenes=tables)
+
+
+def figures_text(check: CheckData) -> str:
+    """Return what a check found: value ± standard error, or its note."""
+    if check["value"] is None:
+        return check["note"]
+    if check["error"] is None:
+        return f"{check['value']:.10g}"
+    digits = max(0, 1 - int(np.floor(np.log10(check["error"])))) if check["error"] > 0 else 6
+    if digits > 7:
+        return f"{check['value']:.3g} ± {check['error']:.2g}"
+    return f"{check['value']:.{digits}f} ± {check['error']:.{digits}f}"
+
+
+def _embed(svg: bytes) -> str:
+    return "data:image/svg+xml;base64," + base64.b64encode(svg).decode("ascii")
+
+
+def to_text(data: ReportData) -> str:
+    """Return the summary: one line per entry, then what did not come out as expected."""
+    lines = []
+    for finding in data["findings"]:
+        n_held = sum(check["holds"] is True for check in finding["checks"] if check["form"] != "printed")
+        n = sum(check["form"] != "printed" for check in finding["checks"])
+        mark = " " if finding["as_expected"] else "!"
+        lines.append(f"{mark} {finding['id']:<4}{finding['verdict']:<28}{n_held:>3}/{n:<4}{finding['where']}")
+        if not finding["as_expected"]:
+            lines.append(f"      expected: {finding['expected']}")
+            lines += [f"      {line}" for line in _failed(finding)]
+    n_right = sum(finding["as_expected"] for finding in data["findings"])
+    alarms = data["false_alarms"]
+    lines += [
+        "",
+        f"{n_right} of {len(data['findings'])} claims have their expected verdict."
+        f" {alarms['tests']} comparisons with random data at {alarms['standard_errors']:.2f} standard errors:"
+        f" a false alarm in fewer than {alarms['bound']:.1e} of audits.",
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def _failed(finding: FindingData) -> list[str]:
+    def is_wrong(check: CheckData) -> bool:
+        return (check["holds"] is not True) != (check["form"] == "printed")
+
+    return [
+        f"{check['form']}: {check['what']}: {figures_text(check)}, expected {check['expected']}"
+        for check in finding["checks"]
+        if is_wrong(check)
+    ]
+
+
+if __name__ == "__main__":
+    print(json.dumps(schema(), indent=2))

@@ -1,0 +1,167 @@
+"""The HTML report of a conformance run: one self-contained page, no scripts, figures embedded.
+
+It shows the verdicts by group, the worst cases with the implementation's path drawn over the certified
+one, the errors by precision class, and the implementation's point in the plane of speed and error.
+"""
+
+from __future__ import annotations
+
+import base64
+import math
+from collections.abc import Sequence
+from importlib import resources
+from typing import Any
+
+import jinja2
+import numpy as np
+from matplotlib import rc_context
+
+from conformance import vectors
+from conformance.grading.grade import FAIR, SHARP
+from conformance.suite import reports
+from conformance.suite.run import Result, Run
+from conformance.vectors import Certified, Vector
+from mushrooms import __version__
+from mushrooms.figures import style as plots
+from mushrooms.figures import table as draw
+from scene import BadInput, Scene, from_data
+
+N_FAILED, N_SHARPEST = 8, 4  # cases drawn: those that failed, or else the least precise that passed
+MAX_LISTED = 200
+EXACT = 1e-2  # ulps at which answers with no error at all are drawn
+
+
+def to_html(run: Run) -> bytes:
+    """Return the page."""
+    environment = jinja2.Environment(
+        autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True
+    )
+    text = (resources.files("mushrooms.reports") / "check.html.jinja").read_text("utf-8")
+    report = reports.new_report(run)
+    seen = [verdict for verdict in report.total.counts if verdict == "pass" or report.total.counts[verdict]]
+    others = [r for r in run.results if r.verdict != "pass" or r.is_known]
+    by_id = {vector.id: vector for vector in vectors.load(run.level)}
+    page = environment.from_string(text).render(
+        report=report,
+        version=__version__,
+        seen=seen,
+        further=[r for r in run.results if r.group in ("property", "profile")],
+        others=others[:MAX_LISTED],
+        n_unlisted=max(0, len(others) - MAX_LISTED),
+        cases=[_case(result, by_id[result.id]) for result in _worst(run) if result.id in by_id],
+        errors=_embed(_errors(run)) if run.ulps() else "",
+        speed=_embed(_speed(run)) if run.speed and run.ulps() else "",
+        sharp=SHARP,
+        fair=FAIR,
+    )
+    return page.encode("utf-8")
+
+
+def _worst(run: Run) -> list[Result]:
+    failed = [r for r in run.results if r.verdict in ("fail", "indeterminate") and r.answer is not None]
+    if failed:
+        return failed[:N_FAILED]
+    passed = [r for r in run.results if r.verdict == "pass" and r.relative is not None]
+    return sorted(passed, key=lambda r: math.inf if r.ulps is None else r.ulps, reverse=True)[:N_SHARPEST]
+
+
+def _case(result: Result, vector: Vector) -> dict[str, Any]:
+    try:
+        figure = _embed(_paths(result, vector))
+    except BadInput:  # a vector whose scene must be refused has no table to draw
+        figure = ""
+    return {"result": result, "vector": vector, "figure": figure}
+
+
+@rc_context(plots.STYLE)
+def _paths(result: Result, vector: Vector) -> bytes:
+    """Draw the walls at the start and at the certified end, the certified path and the given one."""
+    scene = from_data(vector.scene)
+    figure, axes = plots.new_figure(4.2, 4.2)
+    start = (vector.state.x, vector.state.y)
+    steps = vector.expect[0].steps
+    certified = [start, *((_middle(step.x), _middle(step.y)) for step in steps)]
+    end = vector.state.t + sum(_middle(step.dt) for step in steps)
+    for line in draw.walls(scene, vector.state.t):
+        axes.plot(*line, color=plots.GREY, linewidth=1, label="walls at the start")
+    for line in draw.walls(scene, end):
+        axes.plot(*line, color=plots.BLACK, linewidth=1, linestyle=":", label="walls at the end")
+    axes.plot(*np.transpose(certified), color=plots.ORANGE, linewidth=4, alpha=0.6, label="certified")
+    answer = result.answer or {}
+    given = [step for step in answer.get("steps", [answer]) if "x" in step]
+    path = [start, *((step["x"], step["y"]) for step in given)]
+    axes.plot(*np.transpose(path), color=plots.BLUE, linewidth=1.5, marker=".", label="given")
+    for step, colour, width in (
+        (_last(steps), plots.ORANGE, 4),
+        (given[-1] if given else None, plots.BLUE, 1.5),
+    ):
+        if step is not None:
+            _draw_velocity(axes, step, scene, colour, width)
+    axes.plot(*start, marker="o", color=plots.BLACK, markersize=4, label="start", linestyle="none")
+    axes.set(aspect="equal", xlabel="x [length]", ylabel="y [length]")
+    handles, labels = axes.get_legend_handles_labels()
+    unique = dict(zip(labels, handles, strict=True))
+    figure.legend(unique.values(), unique.keys(), loc="outside upper center", ncols=3, frameon=False)
+    return plots.svg(figure)
+
+
+def _last(steps: Sequence[Certified]) -> dict[str, float] | None:
+    return {name: _middle(getattr(steps[-1], name)) for name in ("x", "y", "vx", "vy")} if steps else None
+
+
+def _draw_velocity(axes: Any, step: dict[str, float], scene: Scene, colour: str, width: float) -> None:
+    # Where it goes on: its direction, a tenth of the table long.
+    size = 0.1 * float(np.ptp(np.hstack(draw.walls(scene, step.get("t", 0.0))), axis=1).max())
+    speed = math.hypot(step["vx"], step["vy"])
+    if speed > 0:
+        x, y = (step[a] + size * step[v] / speed for a, v in (("x", "vx"), ("y", "vy")))
+        axes.plot(
+            [step["x"], x], [step["y"], y], color=colour, linewidth=width, alpha=0.6, linestyle=(0, (1, 0.6))
+        )
+
+
+@rc_context(plots.STYLE)
+def _errors(run: Run) -> bytes:
+    """Draw the backward ulps of every passing answer, by group, with the bounds of the classes."""
+    groups = [group for group in run.groups() if run.ulps(group)]
+    figure, axes = plots.new_figure(7.2, 0.9 + 0.24 * len(groups))
+    for row, group in enumerate(groups):
+        ulps = np.maximum([u for u in run.ulps(group) if math.isfinite(u)], EXACT)
+        axes.plot(ulps, np.full(len(ulps), row), linestyle="none", marker="o", markersize=3.5, alpha=0.5)
+    _mark_classes(axes, axes.axvline)
+    axes.set(xscale="log", xlabel="backward ulps of the answers that passed", ylim=(len(groups) - 0.5, -0.5))
+    axes.set_yticks(range(len(groups)), groups)
+    for lines in axes.lines[: len(groups)]:
+        lines.set_color(plots.BLUE)
+    return plots.svg(figure)
+
+
+@rc_context(plots.STYLE)
+def _speed(run: Run) -> bytes:
+    """Draw the implementation's point: time per collision against the error of its answers."""
+    assert run.speed is not None
+    ulps = np.maximum([u for u in run.ulps() if math.isfinite(u)], EXACT)
+    middle, worst = float(np.median(ulps)), float(ulps.max())
+    figure, axes = plots.new_figure(4.8, 3.2)
+    axes.plot([run.speed.best_ns] * 2, [middle, worst], color=plots.BLUE, linewidth=1.5)
+    axes.plot(run.speed.best_ns, worst, marker="v", color=plots.BLUE, linestyle="none", label="worst")
+    axes.plot(run.speed.best_ns, middle, marker="o", color=plots.BLUE, linestyle="none", label="median")
+    _mark_classes(axes, axes.axhline)
+    axes.set(xscale="log", yscale="log", xlim=(run.speed.best_ns / 30, run.speed.best_ns * 30))
+    axes.set(xlabel=f"ns per collision on {run.speed.scene}", ylabel="backward ulps")
+    axes.legend(frameon=False)
+    return plots.svg(figure)
+
+
+def _mark_classes(axes: Any, line: Any) -> None:
+    for bound, name in ((SHARP, "A"), (FAIR, "B")):
+        line(bound, color=plots.ORANGE, linewidth=1, linestyle="--", label=f"class {name} ends")
+
+
+def _middle(enclosure: Sequence[str]) -> float:
+    low, high = map(float, enclosure)
+    return low + (high - low) / 2
+
+
+def _embed(svg: bytes) -> str:
+    return "data:image/svg+xml;base64," + base64.b64encode(svg).decode("ascii")

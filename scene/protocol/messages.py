@@ -1,0 +1,175 @@
+"""The messages of protocol 1, both directions, and their published JSON Schema.
+
+Requests are decoded strictly: an unknown field is refused. Answers may carry further fields, which
+are ignored, so that an implementation can say more than it is asked. A scene stays raw here: it is
+decoded and proved valid once, by whoever steps in it.
+`python -m scene.protocol.messages > docs/protocol.schema.json` prints the schema.
+"""
+
+from __future__ import annotations
+
+import json
+from typing import Annotated, Any
+
+import msgspec
+
+from scene.load import state_omega_or_period
+from scene.states import Collision, Horizon, Outcome, Rejected, State, Undecided, Undefined
+from scene.tables import Scene
+
+PROTOCOL = 1
+MAX_SEQ = 2**53  # the integers that every JSON parser keeps
+PROFILES = ("step", "trajectory", "flow", "time")
+Seq = Annotated[int, msgspec.Meta(ge=0, le=MAX_SEQ)]
+
+
+class Start(msgspec.Struct, frozen=True, tag_field="cmd", tag="start", forbid_unknown_fields=True):
+    """Opens a session; answered by Introduction."""
+
+    protocol: int
+
+
+class Echo(msgspec.Struct, frozen=True, tag_field="cmd", tag="echo", forbid_unknown_fields=True):
+    """Asks for the same numbers back, bit for bit; answered by Echoed."""
+
+    values: tuple[float, ...]
+
+
+class Step(msgspec.Struct, frozen=True, tag_field="cmd", tag="step", forbid_unknown_fields=True):
+    """Asks for one collision; answered by an outcome with the same seq."""
+
+    seq: Seq
+    scene: msgspec.Raw
+    state: State
+    t_end: float
+
+
+class Trajectory(msgspec.Struct, frozen=True, tag_field="cmd", tag="trajectory", forbid_unknown_fields=True):
+    """Asks for successive collisions; answered by Steps."""
+
+    seq: Seq
+    scene: msgspec.Raw
+    state: State
+    collisions: int
+    t_end: float
+
+
+class Flow(msgspec.Struct, frozen=True, tag_field="cmd", tag="flow", forbid_unknown_fields=True):
+    """Asks where many particles are at t_end; answered by Flown."""
+
+    seq: Seq
+    scene: msgspec.Raw
+    states: tuple[State, ...]
+    t_end: float
+
+
+class Time(msgspec.Struct, frozen=True, tag_field="cmd", tag="time", forbid_unknown_fields=True):
+    """Asks how long a trajectory of that many collisions takes, `repeat` times over; answered by Timed."""
+
+    seq: Seq
+    scene: msgspec.Raw
+    state: State
+    collisions: int
+    repeat: int
+
+
+class Stop(msgspec.Struct, frozen=True, tag_field="cmd", tag="stop", forbid_unknown_fields=True):
+    """Ends the session; not answered, the process exits."""
+
+
+Command = Start | Echo | Step | Trajectory | Flow | Time | Stop
+
+
+class Introduction(msgspec.Struct, frozen=True):
+    """Who answers, and what it can do; what it does not list it is not asked."""
+
+    protocol: int
+    name: str
+    version: str
+    language: str
+    profiles: tuple[str, ...]
+    tables: tuple[str, ...]
+    laws: tuple[str, ...]
+
+
+class Echoed(msgspec.Struct, frozen=True):
+    """The numbers of an echo."""
+
+    values: tuple[float, ...]
+
+
+class Steps(msgspec.Struct, frozen=True):
+    """The collisions of a trajectory, and last what came instead of a further one."""
+
+    seq: Seq
+    steps: tuple[Outcome, ...]
+
+
+class Arrival(msgspec.Struct, frozen=True, tag_field="outcome", tag="horizon"):
+    """A particle at t_end, and the times [time] of its first stay in the cap, captured; None without one.
+
+    A stay that goes on at t_end ends there.
+    """
+
+    t: float
+    x: float
+    y: float
+    vx: float
+    vy: float
+    captured: tuple[float, float] | None = None
+
+
+class Flown(msgspec.Struct, frozen=True):
+    """Where the particles of a flow are, in their order; what was lost says why."""
+
+    seq: Seq
+    states: tuple[Arrival | Undefined | Undecided | Rejected, ...]
+
+
+class Timed(msgspec.Struct, frozen=True):
+    """Wall-clock nanoseconds of each repeat, and the last outcome of the trajectory."""
+
+    seq: Seq
+    ns: tuple[Annotated[int, msgspec.Meta(ge=0)], ...]
+    steps: tuple[Outcome, ...]
+
+
+class Failed(msgspec.Struct, frozen=True):
+    """The implementation's own word that it failed at this question; counted as an error, not as a crash."""
+
+    seq: Seq
+    error: str
+
+
+def json_schema() -> dict[str, Any]:
+    """Return the JSON Schema of one line of protocol 1, published as docs/protocol.schema.json."""
+    requests = (Start, Echo, Step, Trajectory, Flow, Time, Stop)
+    outcomes = (Collision, Horizon, Undefined, Undecided, Rejected)
+    answers = (Introduction, Echoed, Steps, Flown, Timed, Failed)
+    _, definitions = msgspec.json.schema_components(
+        [*requests, *outcomes, *answers, Scene], ref_template="#/$defs/{name}"
+    )
+    state_omega_or_period(definitions)
+    tables = ("Cap", "Stem", "Mushroom")
+    scene = {"anyOf": [_reference(name) for name in tables]}
+    for request in (Step, Trajectory, Flow, Time):
+        definitions[request.__name__]["properties"]["scene"] = scene
+    # A step is answered by an outcome that carries the seq of the request (null where it had none).
+    seq = {"type": "object", "properties": {"seq": {"type": ["integer", "null"]}}, "required": ["seq"]}
+    definitions["Request"] = {"anyOf": [_reference(kind.__name__) for kind in requests]}
+    stepped = {"allOf": [seq, {"anyOf": [_reference(kind.__name__) for kind in outcomes]}]}
+    definitions["Answer"] = {"anyOf": [stepped, *(_reference(kind.__name__) for kind in answers)]}
+    return {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "title": "Protocol 1",
+        "anyOf": [_reference("Request"), _reference("Answer")],
+        "$defs": definitions,
+    }
+
+
+def _reference(name: str) -> dict[str, str]:
+    return {"$ref": f"#/$defs/{name}"}
+
+
+if __name__ == "__main__":
+    print(json.dumps(json_schema(), indent=2, ensure_ascii=False))

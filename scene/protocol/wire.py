@@ -1,0 +1,175 @@
+"""Protocol 1, the side of an implementation: one JSON object a line on stdin and stdout.
+
+`serve` answers every request for a stepper given as Python functions. It holds no numerics: a line
+that cannot be understood is answered by `rejected` with the reason, naming the field, and the next
+line is read.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from importlib.metadata import version
+from typing import Any, BinaryIO
+
+import msgspec
+
+from scene.load import from_data
+from scene.protocol.messages import (
+    MAX_SEQ,
+    PROTOCOL,
+    Command,
+    Echo,
+    Flow,
+    Start,
+    Step,
+    Stop,
+    Time,
+    Trajectory,
+)
+from scene.refusal import BadInput
+from scene.states import Outcome, Rejected, State
+from scene.tables import Scene
+
+MAX_COLLISIONS = 1_000_000
+MAX_REPEAT = 1_000
+MAX_STATES = 1_000_000
+Stepper = Callable[[Scene, State, float], Outcome]
+Follower = Callable[[Scene, State, int, float], list[Outcome]]
+Captured = tuple[float, float] | None
+Flowing = Callable[[Scene, Sequence[State], float], Sequence[tuple[Outcome, Captured]]]
+Timer = Callable[[Scene, State, int, int], tuple[Sequence[int], Outcome]]
+# What a line may do to the decoder: bad JSON, bad fields, bad UTF-8, too deep a nesting.
+UNREADABLE = (msgspec.DecodeError, UnicodeDecodeError, RecursionError)
+_decoder = msgspec.json.Decoder(Command)
+
+
+def serve(
+    name: str,
+    stepper: Stepper,
+    follower: Follower,
+    lines: BinaryIO,
+    out: BinaryIO,
+    *,
+    flow: Flowing | None = None,
+    timer: Timer | None = None,
+) -> None:
+    """Answer protocol lines until `stop` or the end of input.
+
+    Args:
+        name: of the implementation.
+        stepper: (scene, state, t_end) -> outcome in the wire's form.
+        follower: (scene, state, collisions, t_end) -> collisions, and last what came instead of one.
+        lines: requests, one JSON object a line.
+        out: answers, one line each, flushed.
+        flow: (scene, states, t_end) -> for each state its outcome at t_end and (t_in, t_out) of its
+            first captured stay, or None; the profile is offered only when this is given.
+        timer: (scene, state, collisions, repeat) -> nanoseconds of each repeat, and the last outcome;
+            likewise.
+    """
+    _Server(name, stepper, follower, flow, timer).run(lines, out)
+
+
+class _Server:
+    def __init__(
+        self, name: str, stepper: Stepper, follower: Follower, flow: Flowing | None, timer: Timer | None
+    ) -> None:
+        self.name, self.stepper, self.follower = name, stepper, follower
+        self.flow, self.timer = flow, timer
+        # Successive requests mostly share their scene: keep that one.
+        self.kept: tuple[bytes, Scene] | None = None
+
+    def run(self, lines: BinaryIO, out: BinaryIO) -> None:
+        for line in lines:
+            if not line.strip():
+                continue
+            try:
+                command = _decoder.decode(line)
+            except UNREADABLE as error:
+                _reply(out, {"seq": _sequence_number(line), **_plain(_refusal(error))})
+                continue
+            if isinstance(command, Stop):
+                return
+            if isinstance(command, Echo):
+                _reply(out, {"values": command.values})
+            elif isinstance(command, Start):
+                _reply(out, self.introduce(command))
+            else:
+                _reply(out, {"seq": command.seq, **self.answer(command)})
+
+    def introduce(self, command: Start) -> dict[str, Any]:
+        if command.protocol != PROTOCOL:
+            return {"seq": None, **_plain(Rejected(f"protocol = {command.protocol}, must be {PROTOCOL}"))}
+        offered = {"step": True, "trajectory": True, "flow": self.flow, "time": self.timer}
+        return {
+            "protocol": PROTOCOL,
+            "name": self.name,
+            "version": version("oscillating-mushrooms"),
+            "language": "Python",
+            "profiles": [profile for profile, function in offered.items() if function is not None],
+            "tables": ["cap", "stem", "mushroom"],
+            "laws": ["constant", "fourier", "bang-bang"],
+        }
+
+    def answer(self, command: Step | Trajectory | Flow | Time) -> dict[str, Any]:
+        try:
+            scene = self.read_scene(bytes(command.scene))
+            if isinstance(command, Step):
+                return _plain(self.stepper(scene, command.state, command.t_end))
+            if isinstance(command, Flow):
+                return self.answer_flow(scene, command)
+            _check_range("collisions", command.collisions, int(isinstance(command, Time)), MAX_COLLISIONS)
+            if isinstance(command, Time):
+                return self.answer_time(scene, command)
+            steps = self.follower(scene, command.state, command.collisions, command.t_end)
+            return {"steps": [_plain(outcome) for outcome in steps]}
+        except BadInput as error:
+            return _plain(Rejected(str(error)))
+        except UNREADABLE as error:
+            return _plain(_refusal(error))
+
+    def answer_flow(self, scene: Scene, command: Flow) -> dict[str, Any]:
+        if self.flow is None:
+            raise BadInput("flow is not among this implementation's profiles")
+        _check_range("number of states", len(command.states), 0, MAX_STATES)
+        arrivals = self.flow(scene, command.states, command.t_end)
+        return {"states": [{**_plain(outcome), "captured": captured} for outcome, captured in arrivals]}
+
+    def answer_time(self, scene: Scene, command: Time) -> dict[str, Any]:
+        if self.timer is None:
+            raise BadInput("time is not among this implementation's profiles")
+        _check_range("repeat", command.repeat, 1, MAX_REPEAT)
+        ns, last = self.timer(scene, command.state, command.collisions, command.repeat)
+        return {"ns": list(ns), "steps": [_plain(last)]}
+
+    def read_scene(self, raw: bytes) -> Scene:
+        if self.kept is None or self.kept[0] != raw:
+            self.kept = raw, from_data(msgspec.json.decode(raw))
+        return self.kept[1]
+
+
+def _check_range(field: str, value: int, low: int, high: int) -> None:
+    if not low <= value <= high:
+        raise BadInput(f"{field} = {value}, must be {low} to {high}")
+
+
+def _refusal(error: Exception) -> Rejected:
+    # A key may hold a line break, and the message repeats it.
+    return Rejected(" ".join(str(error).split()))
+
+
+def _sequence_number(line: bytes) -> int | None:
+    try:
+        seq = msgspec.json.decode(line).get("seq")
+    except (*UNREADABLE, AttributeError):
+        return None
+    return seq if type(seq) is int and 0 <= seq <= MAX_SEQ else None
+
+
+def _plain(outcome: Outcome) -> dict[str, Any]:
+    data: dict[str, Any] = msgspec.to_builtins(outcome)
+    return data
+
+
+def _reply(out: BinaryIO, answer: dict[str, Any]) -> None:
+    out.write(msgspec.json.encode(answer) + b"\n")
+    out.flush()

@@ -1,0 +1,1 @@
+"""Stand-ins, faulty implementations and searches that several tests share."""

@@ -1,0 +1,51 @@
+"""The fast stepper with one line of its kernels changed, in a process or a module of its own."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+from types import ModuleType
+
+import fast
+
+HOUSE = Path(fast.__file__).parent.parent
+
+
+def output_of(folder: Path, program: str, file: str = "", old: str = "", new: str = "") -> str:
+    """Run a program on a copy of the fast stepper in which `old` stands no more in `file`.
+
+    Args:
+        folder: an empty folder for the copy.
+        program: Python source.
+        file: a file of fast/kernel/; none to run the honest kernels in the same manner.
+        old: its text to replace, found exactly once.
+        new: what to put there.
+
+    Returns:
+        What the program printed.
+    """
+    shutil.copytree(HOUSE / "fast", folder / "fast", ignore=shutil.ignore_patterns("__pycache__"))
+    if file:
+        source = (folder / "fast" / "kernel" / file).read_text("utf-8")
+        assert source.count(old) == 1, (file, old, source.count(old))
+        (folder / "fast" / "kernel" / file).write_text(source.replace(old, new), "utf-8")
+    paths = [str(folder), str(HOUSE), str(HOUSE / "tests")]
+    cache = str(folder / "cache")
+    environment = {**os.environ, "NUMBA_CACHE_DIR": cache, "PYTHONPATH": os.pathsep.join(paths)}
+    command = [sys.executable, "-W", "ignore", "-c", program]
+    done = subprocess.run(command, env=environment, cwd=folder, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def faulty_lanes(old: str, new: str) -> ModuleType:
+    """Return fast.kernel.lanes with `old`, found in it, replaced; a loop is compiled when it is called."""
+    path = HOUSE / "fast" / "kernel" / "lanes.py"
+    source = path.read_text("utf-8")
+    assert old in source, old
+    module = ModuleType("faulty_lanes")
+    exec(compile(source.replace(old, new), str(path), "exec"), module.__dict__)
+    return module

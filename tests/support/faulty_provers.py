@@ -1,0 +1,287 @@
+"""Faulty proved steppers: the second stepper with one mistake in it, as attacks meet a stepper.
+
+Each makes the mistake that some families of attacks hunt. The mistake is there only while it answers.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from fractions import Fraction
+from math import fmod
+from typing import Any
+
+import msgspec
+import pytest
+from flint import arb, fmpq
+from mpmath import fp
+
+from conformance.attacks import Attack, Claim
+from conformance.attacks.search import as_truth, truths
+from conformance.second_stepper import Answer, flight, law_balls, next_collision, roots, start
+from conformance.second_stepper import step as stepper
+from conformance.second_stepper.step import Met, Search
+from scene import Collision, Outcome, Scene, State
+from scene.states import ON_WALL
+from scene.tables import period
+
+Patch = Callable[[pytest.MonkeyPatch], None]
+
+
+def claims(answers: Sequence[Answer]) -> list[Claim]:
+    """Return answers as claims: the ends of their balls."""
+    return [
+        Claim(answer.kind, answer.wall, answer.reason, [ends(ball) for ball in answer.numbers])
+        for answer in answers
+    ]
+
+
+def ends(ball: Any) -> tuple[Fraction, Fraction]:
+    """Return the ends of a ball, exactly."""
+    low, high = (point.fmpq() for point in (ball.lower(), ball.upper()))
+    return Fraction(int(low.p), int(low.q)), Fraction(int(high.p), int(high.q))
+
+
+@contextmanager
+def patched(patch: Patch) -> Iterator[None]:
+    """Make the mistake, and mend it afterwards."""
+    with pytest.MonkeyPatch.context() as monkeypatch:
+        patch(monkeypatch)
+        yield
+
+
+def faulty(patch: Patch) -> Callable[[Attack], list[Claim]]:
+    """Return the second stepper, with a mistake, as a proved stepper."""
+
+    def prove(attack: Attack) -> list[Claim]:
+        with patched(patch):
+            return claims(truths(attack))
+
+    return prove
+
+
+def one_piece(attack: Attack) -> list[Claim]:
+    """Let the first of all law pieces that an enclosed time touches decide alone, at the digits allowed."""
+    assert attack.n_collisions is not None
+    assert attack.working is not None
+    bits = int(attack.working * 3.33) + 8
+    touched = law_balls.Legs.touched
+
+    def patch(monkeypatch: pytest.MonkeyPatch) -> None:
+        monkeypatch.setattr(law_balls.Legs, "touched", lambda self, local: touched(self, local)[:1])
+        monkeypatch.setattr(stepper, "bits_for", lambda scene, state: bits)
+
+    with patched(patch):
+        path = stepper.trajectory(attack.scene, attack.state, attack.n_collisions, attack.t_end, doublings=0)
+        return claims(path)
+
+
+def knots_unseen(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The piece that holds where an interval begins is taken to hold on all of it."""
+    touched = law_balls.Legs.touched
+    monkeypatch.setattr(law_balls.Legs, "touched", lambda self, local: touched(self, local)[:1])
+
+
+def period_from_zero(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Knots are taken to begin at time 0."""
+    made = law_balls.Legs.__init__
+
+    def init(self: law_balls.Legs, law: Any) -> None:
+        made(self, law)
+        self.first = fmpq(0)
+
+    monkeypatch.setattr(law_balls.Legs, "__init__", init)
+
+
+def residual_forgotten(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Ties are judged by f, not by f - f(0)."""
+    monkeypatch.setattr(flight.Flight, "exact_value", lambda self, wall, s: _whole_value(self, wall, s))
+    jet = flight.Flight.jet
+
+    def unmoved(self: flight.Flight, wall: Any, s: Any) -> Any:
+        found = jet(self, wall, s)
+        # Away from the start the residual is put back: only the wall's neighbourhood knows of it.
+        is_late = wall in self.residuals and s > 2.0**-20
+        return (found[0] + self.residuals[wall], *found[1:]) if is_late else found
+
+    monkeypatch.setattr(flight.Flight, "jet", unmoved)
+
+
+def _whole_value(self: flight.Flight, wall: Any, s: Any) -> Any:
+    if self.state is None:
+        return None
+    q = self.state
+    lines = ((q.x, q.vx), (q.y, q.vy))
+    x, y = (law_balls.exact(place) + law_balls.exact(speed) * s for place, speed in lines)
+    return self._exact_sum(wall, x, y, law_balls.exact(q.t) + s)
+
+
+def size_of_all_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A state is on the wall it names by the largest size of all time."""
+
+    def is_near(at: flight.Flight, state: State, wall: Any) -> bool:
+        largest = max(law.range()[1].abs_upper() for law in at.table.laws.values())
+        gap = at.jet(wall, arb(0))[0]
+        return bool(abs(gap) < largest * (2 * largest if wall == "arc" else 1) * ON_WALL)
+
+    monkeypatch.setattr(start, "_is_near", is_near)
+
+
+def corner_unseen(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A state that names a wall is on no other."""
+    sign = start._sign
+    monkeypatch.setattr(start, "_sign", lambda at, wall: sign(at, wall) or int(at.state.wall is not None))
+    near = start._near
+    monkeypatch.setattr(
+        start,
+        "_near",
+        lambda table, state, in_cap: tuple(
+            w for w in near(table, state, in_cap=in_cap) if w != "base" or state.wall in (None, "base")
+        ),
+    )
+
+
+def tie_guessed(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of two walls met together the first is answered; at the mouth's edge the mouth is shut."""
+    monkeypatch.setattr(Search, "_tied", lambda self, found: Met(found[0].wall, found[0].time()))
+    monkeypatch.setattr(Search, "_is_edge", lambda self, limit: False)
+    monkeypatch.setattr(
+        Search, "_is_mouth_open", lambda self, limit: not self.flight.jet("left", arb(limit))[0] < 0
+    )
+    monkeypatch.setattr(Search, "_at_limit", lambda self, walls, limit: Met(walls[0], arb(limit)))
+
+
+def hit_at_end_counts(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A wall that is met exactly at the horizon is met before it."""
+    monkeypatch.setattr(Search, "_at_limit", lambda self, walls, limit: Met(walls[0], arb(limit)))
+
+
+def blind_start(monkeypatch: pytest.MonkeyPatch) -> None:
+    """No wall is met in the first 1e-3 of a flight."""
+    search = roots.first_root
+
+    def late(at: flight.Flight, wall: Any, a: Any, b: Any) -> Any:
+        begin = b / 1024 if a == 0 else a
+        return search(at, wall, begin, b) if at.jet(wall, arb(begin))[0] > 0 else None
+
+    monkeypatch.setattr(stepper, "first_root", late)
+
+
+def ends_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A wall is met only if f is below 0 at the end of the search."""
+    search = roots.first_root
+
+    def at_end(at: flight.Flight, wall: Any, a: Any, b: Any) -> Any:
+        return None if at.jet(wall, arb(b))[0] > 0 else search(at, wall, a, b)
+
+    monkeypatch.setattr(stepper, "first_root", at_end)
+
+
+def rounded_rates(scene: Scene, state: State, t_end: float) -> Outcome:
+    """Answer a step in binary64, the wall's speed taken at the time of day as it rounds to binary64."""
+    answer = next_collision(scene, state, t_end)
+    outcome = as_truth(answer, t_end).outcome
+    if not isinstance(outcome, Collision):
+        return outcome
+    with stepper.precision(answer.bits):
+        at = flight.Flight(flight.Table(scene), flight.course_of(state), state)
+        vx, vy = stepper.bounced(at, outcome.wall, arb(state.t + outcome.dt) - arb(state.t))[3:]
+    place = outcome.dt, outcome.t, outcome.x, outcome.y
+    return Collision(outcome.wall, *place, float(vx.mid()), float(vy.mid()))
+
+
+def reduced_time(attack: Attack) -> list[Claim]:
+    """Take whole periods, rounded to binary64, off the start."""
+    shared = period(attack.scene)
+    assert shared is not None
+    t = fmod(attack.state.t, float(shared.value(fp)))
+    t_end = None if attack.t_end is None else attack.t_end - (attack.state.t - t)
+    return claims(truths(attack._replace(state=msgspec.structs.replace(attack.state, t=t), t_end=t_end)))
+
+
+def few_harmonics(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Harmonics beyond the third are dropped."""
+    made = law_balls.Waves.__init__
+
+    def init(self: law_balls.Waves, law: Any) -> None:
+        made(self, law)
+        self.terms = self.terms[:3]
+
+    monkeypatch.setattr(law_balls.Waves, "__init__", init)
+
+
+def rounded_omega(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A period is turned into an omega in binary64."""
+    made = law_balls.Waves.__init__
+
+    def init(self: law_balls.Waves, law: Any) -> None:
+        made(self, law)
+        if self.exact_omega is None:
+            omega = arb(float(self.omega.mid()))
+            self.terms = [(k * omega, arb(a), arb(b)) for k, a, b in self.harmonics]
+
+    monkeypatch.setattr(law_balls.Waves, "__init__", init)
+
+
+def narrow_mouth(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The mouth is taken to be narrower by 1e-3 of itself."""
+
+    def is_open(self: Search, limit: Any) -> bool:
+        rim = self.flight.width(self.flight.course.t + arb(limit))[0] / 1000
+        return all(self.flight.jet(wall, arb(limit))[0] > rim for wall in ("left", "right"))
+
+    monkeypatch.setattr(Search, "_is_mouth_open", is_open)
+
+
+def overflowing(attack: Attack) -> list[Claim]:
+    """Take a horizon for proved where (x . v)^2 is no binary64 number."""
+    product = attack.state.x * attack.state.vx + attack.state.y * attack.state.vy
+    is_in_range = 2.0**-1022 <= product * product <= 2.0**1023
+    return claims(truths(attack)) if is_in_range else [Claim("horizon")]
+
+
+def impatient(attack: Attack) -> list[Claim]:
+    """Give a particle up, as never met, after 10 periods."""
+    found = claims(truths(attack))
+    is_late = found[0].kind == "collision" and found[0].numbers[0][0] > 10
+    return [Claim("horizon")] if is_late else found
+
+
+def resting(attack: Attack) -> list[Claim]:
+    """Take a particle at rest, or nearly, for never met."""
+    is_at_rest = abs(attack.state.vx) + abs(attack.state.vy) < 2.0**-20
+    return [Claim("horizon")] if is_at_rest else claims(truths(attack))
+
+
+def still_wall(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A bounce forgets that the wall moves."""
+
+    def still(at: flight.Flight, wall: Any, s: Any) -> Any:
+        nx, ny = at.gradient(wall, s)
+        c = at.course
+        push = 2 * (nx * c.vx + ny * c.vy) / (nx * nx + ny * ny)
+        return s, *at.place(s), c.vx - push * nx, c.vy - push * ny
+
+    monkeypatch.setattr(stepper, "bounced", still)
+
+
+def last_wall(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of several walls the one looked at last is answered."""
+    first = Search._first
+    monkeypatch.setattr(
+        Search,
+        "_first",
+        lambda self, walls, begin, limit: next(
+            filter(None, (first(self, (wall,), begin, limit) for wall in reversed(walls))), None
+        ),
+    )
+
+
+def lazy_taylor(monkeypatch: pytest.MonkeyPatch) -> None:
+    """An interval is passed when f > 0 at its middle."""
+    judged = roots._judged
+
+    def lazy(at: flight.Flight, wall: Any, a: Any, b: Any) -> str:
+        return "positive" if at.jet(wall, arb((a + b) / 2))[0] > 0 else judged(at, wall, a, b)
+
+    monkeypatch.setattr(roots, "_judged", lazy)

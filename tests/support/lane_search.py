@@ -1,0 +1,365 @@
+"""A search for wrong lane answers, aimed at what the checks of docs/lanes.md rule out.
+
+Of two halves. `anywhere` draws scenes whose walls move as far and the particles as slowly as lanes allow:
+near the least radius, mouths from half the cap to a slit, deep floors, plateaus; starts on every wall. The
+groups of `lane_draws` aim at one kind of flight each. Each start goes three lane steps, so that what a step
+leaves to the next is tried too. An answer is wrong that names another wall than the careful step from the
+same state, or differs from it by more than 4 backward ulps. `python tests/support/lane_search.py SEED N`
+searches N lane answers deep in each group.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections import Counter
+from types import ModuleType
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+from mpmath import fp
+
+from fast.batch import LaneRound
+from fast.compiled import FloatArray
+from fast.kernel import codes, entries, follow, lanes
+from scene import BangBang, Cap, Fourier, Law, Mushroom, Scene, Stem
+from scene.laws import value
+from scene.tables import laws, width_factors
+from support.lane_draws import GROUPS, Start, draw_starts
+from support.lane_draws import draw_scene as draw_directed_scene
+
+BOUND = 4.0  # backward ulps
+CLOSE = 2.0**-24  # relative, where no more can be asked: see error_of
+NUDGES = (2.0**-36, 2.0**-46)  # of each number of a state: for the derivatives of a step
+ANYWHERE = "anywhere"
+N_ROUNDS = 3
+
+
+class Wrong(NamedTuple):
+    """A lane answer that the careful step contradicts."""
+
+    scene: Scene
+    state: list[float]
+    wall: int
+    lane: tuple[int, list[float]]
+    careful: tuple[int, list[float]]
+
+
+class Round(LaneRound):
+    """A round of the lanes, of the honest kernels or of faulty ones, beside the careful step.
+
+    Attributes:
+        is_disk: whether particles move unfolded through the base: in a cap, and as captured ones.
+    """
+
+    def __init__(self, scene: Scene, kernels: ModuleType = lanes, *, is_captured: bool = False) -> None:
+        super().__init__(scene)
+        self.kernels = kernels
+        self.is_cap, self.is_disk = self.is_disk, self.is_disk or is_captured
+        self.is_mixed = bool(self.limits.has_knots and self.omega > 0.0)
+
+    def step(self, n: int) -> tuple[npt.NDArray[np.bool_], FloatArray, FloatArray]:
+        """Take a step in n lanes: which are shown right, walls met, and rows of dt, x, y, vx, vy."""
+        a, count = self.pool, np.int64(n)
+        if not self.is_disk:
+            self.kernels.aim(a, count, self.table == codes.STEM, self.laws[codes.M, 1], self.limits)
+        else:
+            # A step is judged from its state alone, not from the angular momentum of the stay so far.
+            x, y, vx, vy = (self.row(r, n) for r in (lanes.X, lanes.Y, lanes.VX, lanes.VY))
+            self.row(lanes.SPIN, n)[:] = x * vy - y * vx
+        self.find(a, count, is_again=False)
+        for i in np.flatnonzero(self.row(lanes.OK, n) == lanes.COARSE):
+            self.correct_lane(np.int64(i))
+        right = (self.row(lanes.OK, n) == lanes.RIGHT_ONE) & (
+            self.row(lanes.NEXT_T, n) < self.row(lanes.KNOT, n)
+        )
+        hits = np.zeros(n) if self.is_disk else self.row(lanes.HIT, n).copy()
+        dt = self.row(lanes.S, n).copy()
+        if self.is_disk:
+            lanes.rebound(a, count)
+        else:
+            lanes.bounce(a, count, self.laws[codes.M, 1], self.table == codes.MUSHROOM)
+        places = (lanes.X, lanes.Y, lanes.VX, lanes.VY)
+        return right, hits, np.column_stack([dt, *(self.row(r, n) for r in places)])
+
+    def find(self, a: FloatArray, count: np.integer[Any], *, is_again: bool) -> None:
+        """Call the loop of the kernels that fast.kernel.follow calls."""
+        k, m, rest = self.kernels, self.laws[codes.M, 1], (self.is_relative, self.omega)
+        if self.is_disk:
+            chord = k.chord_mixed if self.is_mixed else k.chord
+            chord(a, count, np.bool_(is_again), np.bool_(self.is_cap), *rest, self.limits)
+        else:
+            fly = k.fly_mixed if self.is_mixed else k.fly
+            fly(a, count, self.table == codes.STEM, *rest, m, self.limits)
+
+    def correct_lane(self, i: np.integer[Any]) -> None:
+        """Correct a coarse step again, as `follow.correct_more` does."""
+        follow.change_lane(self.pool, i, self.spare, np.int64(0))
+        for _ in range(3):
+            self.find(self.spare, np.int64(1), is_again=True)
+            if self.spare[lanes.OK] != lanes.COARSE:
+                break
+        follow.change_lane(self.spare, np.int64(0), self.pool, i)
+
+    def careful(self, p: FloatArray, wall: int) -> tuple[int, FloatArray]:
+        """Return the careful step's wall and dt, x, y, vx, vy; unfolded, those of the next hit of the arc."""
+        q, total, is_folded = p.copy(), 0.0, False
+        if self.is_disk and q[3] < 0.0:
+            q[3], q[5], is_folded = -q[3], -q[5], True
+        code = codes.NO_WALL
+        for _ in range(2):
+            code, dt = entries.single_step(*self.compiled, q, wall, np.inf)
+            total += dt
+            if not self.is_disk or code != codes.BASE:
+                break
+            wall, is_folded = int(code), not is_folded
+        if is_folded:
+            q[3], q[5] = -q[3], -q[5]
+        return int(code), np.array([total, *q[2:]])
+
+    def ulps(self, p: FloatArray, wall: int, answer: FloatArray, truth: FloatArray) -> float | None:
+        """Return the backward ulps of an answer beside the careful one; None for a delicate step.
+
+        `grading.error.backward_ulps`, with what a step changes by when a number of its start does.
+        """
+        off = np.abs(answer - truth)
+        if bool(np.all(off <= BOUND * 2.0**-53 * np.abs(truth))):
+            return float(np.max(off / (2.0**-53 * np.abs(truth) + 5e-324)))
+        for nudge in NUDGES:
+            moved = self.moved(p, wall, nudge)
+            if moved is not None:
+                return float(np.max(off / (2.0**-53 * (moved + np.abs(truth)) + 5e-324)))
+        return None
+
+    def fine(self, p: FloatArray, wall: int) -> FloatArray:
+        """Return dt, x, y, vx, vy of a step that meets no base first, from pairs of floats, rounded once."""
+        is_folded = bool(self.is_disk and p[3] < 0.0)
+        start = np.array([[p[0], p[1]], *([v, 0.0] for v in p[2:])])
+        steps, met = np.zeros((1, 6, 2)), np.zeros(1, dtype=np.int64)
+        if is_folded:
+            start[[2, 4]] *= -1.0
+        entries.fine(*self.compiled, start, wall, np.inf, steps, met)
+        found = np.delete(steps[0, :, 0], 1)
+        if is_folded:
+            found[[2, 4]] *= -1.0
+        return found
+
+    def moved(self, p: FloatArray, wall: int, nudge: float) -> FloatArray | None:
+        """Return the sum over the start's numbers of |d step / d number| |number|, by differences."""
+        total, code = np.zeros(5), None
+        for k in (0, 2, 3, 4, 5):
+            ends = []
+            for sign in (-1.0, 1.0):
+                q = p.copy()
+                q[k] += sign * nudge * q[k]
+                found, numbers = self.careful(q, wall)
+                if code not in (None, found):
+                    return None
+                code = found
+                ends.append(numbers)
+            total += np.abs(ends[1] - ends[0]) / (2.0 * nudge)
+        return total
+
+
+def search(
+    seed: int, n: int, tally: Counter[str], group: str = ANYWHERE, kernels: ModuleType = lanes
+) -> list[Wrong]:
+    """Search one group of draws until lanes have given n answers; returns the wrong ones."""
+    random, found = np.random.default_rng(seed), []
+    before = tally["lane answers"]
+    while tally["lane answers"] < before + n:
+        if group == ANYWHERE:
+            scene = draw_scene(random)
+            starts = [draw_start(scene, random) for _ in range(lanes.LANES)]
+        else:
+            scene = draw_directed_scene(GROUPS[group], random)
+            starts = draw_starts(scene, GROUPS[group], lanes.LANES, random)
+        is_captured = group != ANYWHERE and GROUPS[group].is_captured
+        found += try_starts(Round(scene, kernels, is_captured=is_captured), scene, starts, random, tally)
+    return found
+
+
+def try_starts(
+    pool: Round, scene: Scene, starts: list[Start], random: np.random.Generator, tally: Counter[str]
+) -> list[Wrong]:
+    """Fill a pool with starts in a scene and take lane steps from them."""
+    found = []
+    age = follow.SERVES / pool.omega * random.random() if pool.omega and random.random() < 0.5 else 0.0
+    for lane, start in enumerate(starts):
+        pool.fill(lane, *start, age)
+    is_live = np.array([is_valid(pool, *start) for start in starts])
+    for _ in range(N_ROUNDS):
+        begun = [state_in(pool, i) for i in range(len(starts))]
+        right, hits, numbers = pool.step(len(starts))
+        tally["steps"] += int(is_live.sum())
+        is_live &= right
+        for i in np.flatnonzero(is_live):
+            p, wall = begun[i]
+            code, truth = pool.careful(p, wall)
+            tally["lane answers"] += 1
+            ulps = error_of(pool, p, wall, numbers[i], truth, tally) if code == hits[i] else np.inf
+            if ulps is None:
+                tally["delicate"] += 1
+            elif not ulps <= BOUND:
+                found.append(
+                    Wrong(
+                        scene, p.tolist(), wall, (int(hits[i]), numbers[i].tolist()), (code, truth.tolist())
+                    )
+                )
+                is_live[i] = False
+    return found
+
+
+def error_of(
+    pool: Round, p: FloatArray, wall: int, answer: FloatArray, truth: FloatArray, tally: Counter[str]
+) -> float | None:
+    """Return a lane answer's backward ulps, 0 where only times are compared; None for a delicate step."""
+    if pool.is_disk and p[3] * answer[2] < 0.0:
+        # Through the base the careful step forgets that the start lay on the arc by definition, and so its
+        # rounding counts. A quarter turn, which is exact, brings half of these chords above y = 0.
+        if p[2] * answer[1] < 0.0:
+            tally["across the base, by the time alone"] += 1
+            return 0.0 if abs(answer[0] - truth[0]) <= CLOSE * truth[0] else np.inf
+        sign = 1.0 if p[2] > 0.0 else -1.0
+        p = np.array([p[0], p[1], -sign * p[3], sign * p[2], -sign * p[5], sign * p[4]])
+        answer = np.array(
+            [answer[0], -sign * answer[2], sign * answer[1], -sign * answer[4], sign * answer[3]]
+        )
+        _, truth = pool.careful(p, wall)
+    ulps = pool.ulps(p, wall, answer, truth)
+    if ulps is not None and BOUND < ulps < np.inf:
+        # The careful step has errors too.
+        tally["judged in pairs of floats"] += 1
+        ulps = pool.ulps(p, wall, answer, pool.fine(p, wall))
+    return ulps
+
+
+def is_valid(pool: Round, p: FloatArray, wall: int) -> bool:
+    """Tell whether the careful step takes a start."""
+    code, _ = entries.single_step(*pool.compiled, p.copy(), wall, np.inf)
+    return bool(code < codes.APPROACHING)
+
+
+def state_in(pool: Round, i: int) -> tuple[FloatArray, int]:
+    """Return the state in a lane, as the kernels take it."""
+    rows = (lanes.T, lanes.T_LOW, lanes.X, lanes.Y, lanes.VX, lanes.VY)
+    return np.array([pool.pool[row + i] for row in rows]), int(pool.pool[lanes.WALL + i])
+
+
+def draw_scene(random: np.random.Generator) -> Scene:
+    """Draw a scene that lanes know, its walls moving deeply."""
+    kind, omega = random.random(), float(10.0 ** random.uniform(-0.5, 0.5))
+
+    def law(least: float, most: float) -> Law:
+        if random.random() < 0.25 or least == most:
+            return float(least)
+        # Smooth laws, laws with knots, or both in one scene.
+        if kind < 0.5 or (kind < 0.7 and random.random() < 0.5):
+            turn, swing = random.uniform(0, 2 * np.pi), 0.4999 * (most - least)
+            cos, sin = (float(swing * np.cos(turn)),), (float(swing * np.sin(turn)),)
+            if kind < 0.5:
+                return Fourier(mean=0.5 * (least + most), omega=omega, cos=cos, sin=sin)
+            return Fourier(mean=0.5 * (least + most), period=1.0, cos=cos, sin=sin)
+        inner = np.sort(random.uniform(0.05, 0.95, 3))
+        ends = [float(v) for v in random.uniform(least, most, 3)]
+        if random.random() < 0.5:
+            ends[1] = ends[0]
+        times = [0.0, *map(float, inner), 1.0]
+        return BangBang(knots=tuple(zip(times, [ends[2], *ends, ends[2]], strict=True)))
+
+    least_r = 10.0 ** random.uniform(-3, 0)
+    r = law(least_r, random.uniform(least_r, 2.0))
+    table = random.random()
+    if table < 0.1:
+        return Cap(r=r)
+    least_h = 10.0 ** random.uniform(-2, 0.5)
+    most_h = random.uniform(least_h, 4.0 + least_h)
+    h = law(least_h, most_h)
+    share = min(10.0 ** random.uniform(-3, 0.3), 0.95)
+    slope = float(random.choice([0.0, random.uniform(-0.4, 0.4)]))
+    if table < 0.25:
+        least_w = 10.0 ** random.uniform(-2, 0)
+        return Stem(w=law(least_w, random.uniform(least_w, 1.5)), h=h, slope=slope * least_w / most_h)
+    if random.random() < 0.2:  # a rim so narrow that a flight leaves the arc and is at once in the mouth
+        return Mushroom(r=r, nu=1.0 - float(10.0 ** random.uniform(-4, -1)), h=h)
+    if random.random() < 0.5:
+        nu = law(share * 10.0 ** random.uniform(-2, 0), share)
+        least_nu = 0.009 * share
+        return Mushroom(r=r, nu=nu, h=h, slope=slope * least_nu * least_r / most_h)
+    w = law(0.05 * share * least_r, share * least_r)
+    return Mushroom(r=r, w=w, h=h, slope=slope * 0.05 * share * least_r / most_h)
+
+
+def draw_start(scene: Scene, random: np.random.Generator) -> tuple[FloatArray, int]:
+    """Draw a start on a wall: the state as the kernels take it, and the wall's code."""
+    t = float(_a_time(scene, random))
+    now: dict[str, Any] = {name: float(value(fp, law, t)) for name, law in laws(scene).items()}
+    rate: dict[str, Any] = {name: float(value(fp, law, t, 1)) for name, law in laws(scene).items()}
+    along, away = 10.0 ** random.uniform(-3, 1.5, 2) * random.choice([1.0, 1.0, 0.03])
+    along *= random.choice([-1.0, 1.0])
+    wall = int(random.choice(_walls_of(scene), p=_SHARES[len(_walls_of(scene))]))
+    if wall == codes.ARC:
+        angle = random.uniform(0.0, np.pi) if random.random() < 0.7 else 10.0 ** random.uniform(-3, 0)
+        out = rate["r"] - away
+        bend = float(value(fp, laws(scene)["r"], t, 2))
+        curl = rate["r"] ** 2 + now["r"] * bend
+        if random.random() < 0.5 and curl > 0.0:
+            # The arc's function is just concave here, and will not stay so: it may dip, and come back before
+            # the particle is down at y = 0.
+            speed = np.sqrt(curl * (1.0 + 10.0 ** random.uniform(-3, 0.5)))
+            out = rate["r"] - speed * 10.0 ** random.uniform(-5, -1)
+            along = -np.sqrt(max(speed**2 - out**2, 0.0))
+            angle = random.random()
+        e_x, e_y = np.cos(angle), np.sin(angle)
+        place = (now["r"] * e_x, now["r"] * e_y, out * e_x - along * e_y, out * e_y + along * e_x)
+        return np.array([t, 0.0, *place]), wall
+    w, w_rate = _mouth(scene, t)
+    if wall == codes.BASE:
+        is_top = isinstance(scene, Stem)
+        x = w * random.uniform(-1, 1) if is_top else w + (now["r"] - w) * random.random()
+        return np.array([t, 0.0, x, 0.0, along, -away if is_top else away]), wall
+    if wall == codes.FLOOR:
+        at = (w - now["slope"] * now["h"]) * random.uniform(-1, 1)
+        return np.array([t, 0.0, at, -now["h"], along, away - rate["h"]]), wall
+    y = -now["h"] * random.random()
+    sign = 1.0 if wall == codes.RIGHT else -1.0
+    out = w_rate + now["slope"] * along - away
+    return np.array([t, 0.0, sign * (w + now["slope"] * y), y, sign * out, along]), wall
+
+
+def _walls_of(scene: Scene) -> npt.NDArray[np.int64]:
+    if isinstance(scene, Cap):
+        return np.array([codes.ARC])
+    below = [codes.BASE, codes.LEFT, codes.RIGHT, codes.FLOOR]
+    return np.array(below if isinstance(scene, Stem) else [codes.ARC, *below])
+
+
+_SHARES = {1: [1.0], 4: [0.25] * 4, 5: [0.6, 0.1, 0.1, 0.1, 0.1]}
+
+
+def _mouth(scene: Scene, t: float) -> tuple[float, float]:
+    if isinstance(scene, Cap):
+        return 0.0, 0.0
+    factors = width_factors(scene)
+    values = [float(value(fp, law, t)) for law in factors]
+    rates = [float(value(fp, law, t, 1)) for law in factors]
+    if len(factors) == 1:
+        return values[0], rates[0]
+    return values[0] * values[1], rates[0] * values[1] + values[0] * rates[1]
+
+
+def _a_time(scene: Scene, random: np.random.Generator) -> float:
+    # Half of the starts are a little before the least radius.
+    r = getattr(scene, "r", None)
+    if isinstance(r, Fourier) and random.random() < 0.5:
+        least = np.arctan2(-r.sin[0], -r.cos[0]) + random.normal() * 10.0 ** random.uniform(-3, 0)
+        return float((least + 2 * np.pi * random.integers(0, 5)) / (r.omega or 2 * np.pi))
+    return float(random.uniform(0, 9))
+
+
+if __name__ == "__main__":
+    for name in (ANYWHERE, *GROUPS):
+        counts: Counter[str] = Counter()
+        for wrong in search(int(sys.argv[1]), int(sys.argv[2]), counts, name):
+            print(wrong)
+        print(name, dict(counts), flush=True)

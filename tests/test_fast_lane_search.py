@@ -12,6 +12,7 @@ import pytest
 from faulty_kernels import faulty_lanes
 from lane_draws import GROUPS
 from lane_search import ANYWHERE, draw_scene, draw_start, search
+from lane_traps import TRAPS
 
 import fast
 from fast.batch import lane_steps
@@ -21,7 +22,7 @@ from scene import Cap, Collision, Fourier, Mushroom, Rejected, State
 N_ANSWERS = int(os.environ.get("MUSHROOMS_LANE_ANSWERS", "300"))  # of each group of draws
 
 
-@pytest.mark.parametrize("group", [ANYWHERE, *GROUPS])
+@pytest.mark.parametrize("group", [ANYWHERE, *GROUPS, *TRAPS])
 def test_no_lane_answer_is_wrong(group, tally):
     assert search(11, N_ANSWERS, tally, group) == []
 
@@ -124,6 +125,24 @@ MUTANTS = {
         400,
         "fma(k_w * s, s, SAFETY * size)",
         "SAFETY * size",
+    ),
+    "the floor before the mouth": (
+        "corner over a rising floor",
+        100,
+        "min(gap - doubt, lift)",
+        "gap - doubt",
+    ),
+    "concavity of the arc under a chord": (
+        "misled chord",
+        100,
+        "min(first, v2 - bend))",
+        "first)",
+    ),
+    "the slope of the side that is met": (
+        "misled side",
+        100,
+        "first = 1.0 if hit == ON_BASE else first",
+        "first = 1.0 if hit != ON_ARC else first",
     ),
 }
 

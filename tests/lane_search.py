@@ -34,7 +34,7 @@ CLOSE = 2.0**-24  # relative, where no more can be asked: see error_of
 NUDGES = (2.0**-36, 2.0**-46)  # of each number of a state: for the derivatives of a step
 ANYWHERE = "anywhere"
 N_ROUNDS = 3
-N_STEPS = 20  # looked at for each answer asked for, at most
+ANSWERS_OF_A_TRAP = 10  # that a draw of starts solved for stands for
 
 
 class Wrong(NamedTuple):
@@ -169,9 +169,10 @@ def search(
     """Search one group of draws until lanes have given n answers; returns the wrong ones."""
     random, found = np.random.default_rng(seed), []
     before = tally["lane answers"]
-    steps = tally["steps"]
-    # Most of the starts that are solved for are left to the careful step: that is looked at too.
-    while tally["lane answers"] < before + n and tally["steps"] < steps + N_STEPS * n:
+    draws = 0
+    # Starts that are solved for are mostly left to the careful step: the draws are then counted.
+    while tally["lane answers"] < before + n and (group not in TRAPS or draws < n // ANSWERS_OF_A_TRAP):
+        draws += 1
         if group == ANYWHERE:
             scene = draw_scene(random)
             starts = [draw_start(scene, random) for _ in range(lanes.LANES)]

@@ -129,9 +129,7 @@ def misled_side(n: int, random: np.random.Generator) -> tuple[Scene, list[Start]
             - 0.5 * other * np.sin(two) * (1.0 + swing * np.cos(one))
         )
 
-    bend = -0.5 * (
-        swing * np.cos(t) + other * np.cos(t + phi) + 2.0 * swing * other * np.cos(2.0 * t + phi)
-    )
+    bend = -0.5 * (swing * np.cos(t) + other * np.cos(t + phi) + 2.0 * swing * other * np.cos(2.0 * t + phi))
     u_1 = REACH * random.uniform(0.2, 0.9, N_CROWD)
 
     def motion(u_2: Array) -> tuple[Array, Array]:

@@ -2,10 +2,10 @@
 
 Of two halves. `anywhere` draws scenes whose walls move as far and the particles as slowly as lanes allow:
 near the least radius, mouths from half the cap to a slit, deep floors, plateaus; starts on every wall. The
-groups of `lane_draws` and `lane_traps` aim at one kind of flight each. Each start goes three lane steps, so that what a step
-leaves to the next is tried too. An answer is wrong that names another wall than the careful step from the
-same state, or differs from it by more than 4 backward ulps. `python tests/lane_search.py SEED N` searches N
-lane answers deep in each group.
+groups of `lane_draws` and `lane_traps` aim at one kind of flight each. Each start goes three lane steps, so
+that what a step leaves to the next is tried too. An answer is wrong that names another wall than the careful
+step from the same state, or differs from it by more than 4 backward ulps. `python tests/lane_search.py SEED N`
+searches N lane answers deep in each group.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Draws of starts solved for: of the search in lane_search, where a random start hardly ever hangs on a check.
+"""Starts that are solved for, for the search in lane_search: random ones hardly ever hang on these checks.
 
 `misled chord` and `misled side` solve for a flight whose f has two or three roots close together, and for
 which Newton's method from the lane's guess lands on the second or third of them. `corner over a rising floor`
@@ -20,7 +20,7 @@ from scene.laws import value
 
 Array = npt.NDArray[np.floating[Any]]
 Start = tuple[Array, int]
-N_CROWD = 20_000
+N_CROWD = 4_000
 REACH = 0.24  # phase, below lanes.LONGEST_TURN
 
 

@@ -4,7 +4,8 @@ Of two halves. `anywhere` draws scenes whose walls move as far and the particles
 near the least radius, mouths from half the cap to a slit, deep floors, plateaus; starts on every wall. The
 groups of `lane_draws` and `lane_traps` aim at one kind of flight each. Each start goes three lane steps, so
 that what a step leaves to the next is tried too. An answer is wrong that names another wall than the careful
-step from the same state, or differs from it by more than 4 backward ulps. `python tests/lane_search.py SEED N`
+step from the same state, or differs from it by more than 4 backward ulps; or another than the floor, from a
+start above it by less than the careful step tells, but rising slower. `python tests/lane_search.py SEED N`
 searches N lane answers deep in each group.
 """
 
@@ -17,12 +18,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from lane_draws import GROUPS, Start, draw_starts
+from lane_draws import GROUPS, Group, Start, draw_starts
 from lane_draws import draw_scene as draw_directed_scene
-from lane_traps import TRAPS
+from lane_traps import TRAPS, Trap
 from mpmath import fp
 
-from fast import codes, entries, follow, lanes
+from fast import codes, entries, follow, lanes, motion, walls
 from fast.batch import LaneRound
 from fast.compiled import FloatArray
 from scene import BangBang, Cap, Fourier, Law, Mushroom, Scene, Stem
@@ -119,6 +120,14 @@ class Round(LaneRound):
             q[3], q[5] = -q[3], -q[5]
         return int(code), np.array([total, *q[2:]])
 
+    def is_floor_met_at_once(self, p: FloatArray) -> bool:
+        """Tell whether a start is above the floor by no more than rounding, in pairs of floats, and falls."""
+        motion.set_anchors(self.laws, self.anchors, p[0], p[1])
+        places = (codes.FLOOR, p[2], p[3])
+        f, error = walls.wall_residual(*places, self.laws, self.anchors, self.bounds, self.is_relative)
+        slope = walls.wall_slope(*places, p[4], p[5], self.anchors, self.is_relative)
+        return bool(0.0 < f <= error and slope < 0.0)
+
     def ulps(self, p: FloatArray, wall: int, answer: FloatArray, truth: FloatArray) -> float | None:
         """Return the backward ulps of an answer beside the careful one; None for a delicate step.
 
@@ -181,7 +190,7 @@ def search(
         else:
             scene = draw_directed_scene(GROUPS[group], random)
             starts = draw_starts(scene, GROUPS[group], lanes.LANES, random)
-        aims = {**GROUPS, **TRAPS}
+        aims: dict[str, Group | Trap] = {**GROUPS, **TRAPS}
         is_captured = group in aims and aims[group].is_captured
         found += try_starts(Round(scene, kernels, is_captured=is_captured), scene, starts, random, tally)
     return found
@@ -204,9 +213,13 @@ def try_starts(
         for i in np.flatnonzero(is_live):
             p, wall = begun[i]
             code, truth = pool.careful(p, wall)
-            if code == codes.START:  # whether it is inside its walls is lost in rounding
+            if code == codes.START:  # the careful step cannot tell whether it is inside its walls
                 tally["starts at a corner"] += 1
                 is_live[i] = False
+                if hits[i] != codes.FLOOR and pool.is_floor_met_at_once(p):
+                    found.append(
+                        Wrong(scene, p.tolist(), wall, (int(hits[i]), numbers[i].tolist()), (code, []))
+                    )
                 continue
             tally["lane answers"] += 1
             ulps = error_of(pool, p, wall, numbers[i], truth, tally) if code == hits[i] else np.inf

@@ -23,6 +23,7 @@ from mpmath import fp
 from fast.batch import LaneRound
 from fast.compiled import FloatArray
 from fast.kernel import codes, entries, follow, lanes, walls
+from fast.kernel.laws import set_anchors
 from scene import BangBang, Cap, Fourier, Law, Mushroom, Scene, Stem
 from scene.laws import value
 from scene.tables import laws, width_factors

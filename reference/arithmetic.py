@@ -36,7 +36,7 @@ class Exhausted(Undecidable):
     """The work allowed for one step is used up; more precision would not help."""
 
 
-class Work:
+class WorkLimit:
     """What one step may cost, over all the precisions it tries.
 
     The unit is one evaluation of a parabola at few digits; long numbers cost in proportion. Counted,
@@ -94,6 +94,12 @@ def rational(raw: tuple[int, int, int, int]) -> Fraction:
     return Fraction(int(numerator), int(denominator))
 
 
+def exact_ends(interval: Interval) -> tuple[Fraction, Fraction]:
+    """Return the ends of a finite interval as rationals."""
+    low, high = interval._mpi_
+    return rational(low), rational(high)
+
+
 class Arithmetic:
     """Interval arithmetic at a fixed precision.
 
@@ -102,9 +108,9 @@ class Arithmetic:
         work: what is left to spend; None begins anew.
     """
 
-    def __init__(self, digits: int, work: Work | None = None) -> None:
+    def __init__(self, digits: int, work: WorkLimit | None = None) -> None:
         self.digits = digits
-        self.work = Work() if work is None else work
+        self.work = WorkLimit() if work is None else work
         self.context = MPIntervalContext()
         self.context.prec = self.prec = int(digits * BITS_PER_DIGIT) + 8
         self.zero: Interval = self.context.mpf(0)

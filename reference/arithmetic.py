@@ -20,8 +20,8 @@ from mpmath.libmp import libelefun, libmpf, libmpi
 Interval = Any  # mpmath's ivmpf, which has no type stubs
 
 BITS_PER_DIGIT = 3.3219280948873626
-MAX_WORK = 100_000.0  # of one step
-LONG_NUMBER = 1024  # bits; a number so long costs twice as much as a short one
+MAX_WORK = 100_000.0  # that one step may take, in the unit of `WorkLimit`
+LONG_NUMBER = 1024  # bits; arithmetic with so long a number takes twice as long as with a short one
 _FLOOR = "f"
 # mpmath keeps pi and the precision it was computed to in two variables that all contexts share:
 # a thread that reads one before and the other after a change would get a wrong pi.
@@ -226,7 +226,7 @@ class Arithmetic:
         return self.number(omega), self.between(min(ends), max(ends))
 
     def is_full_turn(self, omega: Interval, length: Fraction) -> bool:
-        """Tell whether omega times a length of time is surely 2 pi or more: 7 is asked for."""
+        """Tell whether omega times a length of time is 2 pi or more; we require 7, a little to spare."""
         return not libmpf.mpf_lt((omega * self.number(length))._mpi_[0], libmpf.from_int(7))
 
     def _pi(self, bits: int) -> Interval:

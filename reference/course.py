@@ -23,8 +23,8 @@ from scene.laws import bounds
 from scene.tables import laws
 
 SIDES: tuple[Wall, ...] = ("left", "right", "floor")
-BEYOND = 2.0**-10
-FOR_EVER = 2.0**1000
+BEYOND = 2.0**-10  # how far past the end of a search f is still looked at, as a share of its length
+FOR_EVER = 2.0**1000  # the horizon when none is given, as a flight time
 
 
 class Hit(NamedTuple):
@@ -289,7 +289,7 @@ class Course:
         isolator = self._isolator(wall)
         if wall not in self.leaving and sign(isolator.value(start)) <= 0:
             raise Undecidable(f"f of {wall} has no sign where a stretch of the flight begins")
-        # A little beyond the end, where f goes on, so that a root at the end is isolated.
+        # We search a little beyond the end, so that a root exactly there still lies inside the interval.
         end = self.arithmetic.upper(stop + (stop - start) * BEYOND)
         root: IsolatedRoot | None = None
         if is_below(start, end):

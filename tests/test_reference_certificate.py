@@ -40,20 +40,22 @@ def test_every_answer_is_proved_again(tally):
     @given(scenes_and_states())
     def proves(drawn):
         outcome = reference.next_collision(*drawn, digits=30)
-        tally[type(outcome).__name__.lower()] += 1
         if not isinstance(outcome, reference.Collision | reference.Horizon):
+            tally[type(outcome).__name__.lower()] += 1
             if isinstance(outcome, Undecided):
                 assert is_delicate(*drawn), outcome
             return
         claim = certificate(*drawn, outcome)
         check(claim)
         tally["proved"] += 1
+        tally[claim["outcome"]] += 1
         tally[f"at {claim['wall']}"] += 1
         for stretches in claim["excluded"].values():
             tally.update(kind for _, _, kind in stretches)
 
     proves()
-    assert tally["proved"] == tally["collision"] + tally["horizon"] >= 0.9 * N_EXAMPLES
+    assert min(tally["collision"], tally["horizon"]) > 0
+    assert tally["proved"] >= 0.9 * N_EXAMPLES
     assert min(tally[kind] for kind in ("plain", "rising", "falling", "swept")) > 0
 
 

@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from support.tables import BOX, CIRCLE, LIFT, STATIC
-from support.truth import IS_DEEP, centre
+from support.truth import IS_DEEP
 
 import reference
 from conformance.strategies import scenes_and_states
@@ -196,23 +196,6 @@ def test_trajectory_ends_at_its_horizon_and_at_corners():
     assert isinstance(path.outcome, reference.Horizon)
     path = reference.trajectory(CIRCLE, State(0, 0.5, 0.5, 0.5, -0.5), 3)
     assert path.outcome == Undefined("corner")
-
-
-def test_jacobian_against_differences():
-    scene, state = load("moving-cap"), State(0.3, 0.1, -0.2, 10.0, -27.0)
-    found = reference.next_collision(scene, state, 9.0, digits=40, is_differentiated=True)
-    assert isinstance(found, reference.Collision)
-    h = 2.0**-30
-    for column, field in enumerate(("t", "x", "y", "vx", "vy")):
-        ends = []
-        for sign_of in (1, -1):
-            moved = {name: getattr(state, name) for name in ("t", "x", "y", "vx", "vy")}
-            moved[field] += sign_of * h * 8
-            ends.append(hit(scene, State(**moved), 9.0))
-        for row, (plus, minus) in enumerate(zip(*((e.dt, *e.after[1:]) for e in ends), strict=True)):
-            difference = float((centre(plus) - centre(minus)) / Fraction(16 * h))
-            assert found.jacobian is not None
-            assert float(found.jacobian[row][column]) == pytest.approx(difference, rel=1e-6, abs=1e-6)
 
 
 def test_threads_at_different_digits_do_not_disturb_each_other():

@@ -27,7 +27,7 @@ from scene.tables import period
 
 BITS = 160  # to begin with, beyond those that the numbers' sizes need
 DOUBLINGS = 5
-NEAT = 80  # bits of an answer that comparisons may rely on, relative to the size of its vectors
+RELIABLE_BITS = 80  # that comparisons may take from an answer, relative to the size of its vectors
 
 
 class Met(NamedTuple):
@@ -255,7 +255,7 @@ def _answer(flight: SearchedFlight, met: Met, end: Ball | Rational | None, bits:
     numbers = bounced(flight, met.wall, met.time)
     found = Answer("collision", met.wall, numbers=numbers, bits=bits)
     if flight.state is not None:
-        _require_neat(numbers)
+        _require_reliable(numbers)
         found = found._replace(jacobian=jacobian(flight, met.wall, met.time))
     return found
 
@@ -268,11 +268,11 @@ def bounced(flight: SearchedFlight, wall: Wall, s: Ball) -> tuple[Ball, ...]:
     return s, x, arb(0) if wall == "base" else y, *flight.reflected(wall, s)
 
 
-def _require_neat(numbers: tuple[Ball, ...]) -> None:
+def _require_reliable(numbers: tuple[Ball, ...]) -> None:
     dt, x, y, vx, vy = numbers
     for vector in ((dt,), (x, y), (vx, vy)):
         size = max(number.abs_upper() for number in vector)
-        if any(number.rad() * arb(2) ** NEAT > size for number in vector):
+        if any(number.rad() * arb(2) ** RELIABLE_BITS > size for number in vector):
             raise OpenQuestion("the answer is enclosed too widely")
 
 

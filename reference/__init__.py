@@ -1,8 +1,11 @@
 """Ground truth: a slow stepper whose every answer is an enclosure, proved to be first."""
 
-from reference.answers import Collision, Horizon, Moment, Outcome, Trajectory
+from reference.answers import Moment, Outcome, Trajectory
+from reference.answers import ProvedCollision as Collision
+from reference.answers import ProvedHorizon as Horizon
 from reference.arithmetic import Enclosure
-from reference.step import next_collision, trajectory
+from reference.path import trajectory
+from reference.step import next_collision
 
 __all__ = [
     "Collision",

@@ -3,25 +3,24 @@
 import sys
 import time
 
-from reference import answers
-from reference import step as stepper
+import reference
 from scene import Outcome, Scene, State
 from scene.protocol.wire import serve
 
 
-def rounded(outcome: answers.Outcome) -> Outcome:
+def rounded(outcome: reference.Outcome) -> Outcome:
     """Return a proved outcome with its numbers rounded to binary64."""
-    return outcome.rounded() if isinstance(outcome, answers.Collision | answers.Horizon) else outcome
+    return outcome.rounded() if isinstance(outcome, reference.Collision | reference.Horizon) else outcome
 
 
 def step(scene: Scene, state: State, t_end: float) -> Outcome:
     """Return the proved outcome of one step, rounded."""
-    return rounded(stepper.next_collision(scene, state, t_end))
+    return rounded(reference.next_collision(scene, state, t_end))
 
 
 def follow(scene: Scene, state: State, n_collisions: int, t_end: float) -> list[Outcome]:
     """Return the proved collisions of a trajectory, and last what came instead of one, rounded."""
-    path = stepper.trajectory(scene, state, n_collisions, t_end)
+    path = reference.trajectory(scene, state, n_collisions, t_end)
     found = [*path.steps, *([path.outcome] if path.outcome is not None else [])]
     return [rounded(outcome) for outcome in found]
 
@@ -31,7 +30,7 @@ def clock(scene: Scene, state: State, n_collisions: int, repeat: int) -> tuple[l
     ns = []
     for _ in range(repeat):
         begin = time.perf_counter_ns()
-        path = stepper.trajectory(scene, state, n_collisions)
+        path = reference.trajectory(scene, state, n_collisions)
         ns.append(time.perf_counter_ns() - begin)
     return ns, rounded(path.outcome if path.outcome is not None else path.steps[-1])
 

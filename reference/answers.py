@@ -46,7 +46,7 @@ class Departure(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Collision:
+class ProvedCollision:
     """A proved first collision.
 
     Attributes:
@@ -79,7 +79,7 @@ class Collision:
 
 
 @dataclass(frozen=True)
-class Horizon:
+class ProvedHorizon:
     """Proved: no collision before t_end; the state there, enclosed, and the flight for which it is proved."""
 
     at: Moment
@@ -92,7 +92,7 @@ class Horizon:
         return wire.Horizon(*(float(c) for c in self.at))
 
 
-Outcome = Collision | Horizon | Undefined | Undecided | Rejected
+Outcome = ProvedCollision | ProvedHorizon | Undefined | Undecided | Rejected
 
 
 class Trajectory(NamedTuple):
@@ -105,7 +105,7 @@ class Trajectory(NamedTuple):
         jacobian: d(t, x, y, vx, vy) after the last collision / d(initial state), when asked for.
     """
 
-    steps: list[Collision]
+    steps: list[ProvedCollision]
     outcome: Outcome | None
     digits: int
     jacobian: Jacobian | None = None

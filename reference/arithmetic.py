@@ -20,8 +20,8 @@ from mpmath.libmp import libelefun, libmpf, libmpi
 Interval = Any  # mpmath's ivmpf, which has no type stubs
 
 BITS_PER_DIGIT = 3.3219280948873626
-MAX_WORK = 100_000.0  # of one step
-LONG_NUMBER = 1024  # bits; a number so long costs twice as much as a short one
+MAX_WORK = 100_000.0  # that one step may take, in the unit of `WorkLimit`
+LONG_NUMBER = 1024  # bits; arithmetic with so long a number takes twice as long as with a short one
 _FLOOR = "f"
 # mpmath keeps pi and the precision it was computed to in two variables that all contexts share:
 # a thread that reads one before and the other after a change would get a wrong pi.
@@ -36,7 +36,7 @@ class Exhausted(Undecidable):
     """The work allowed for one step is used up; more precision would not help."""
 
 
-class Work:
+class WorkLimit:
     """What one step may cost, over all the precisions it tries.
 
     The unit is one evaluation of a parabola at few digits; long numbers cost in proportion. Counted,
@@ -94,6 +94,12 @@ def rational(raw: tuple[int, int, int, int]) -> Fraction:
     return Fraction(int(numerator), int(denominator))
 
 
+def exact_ends(interval: Interval) -> tuple[Fraction, Fraction]:
+    """Return the ends of a finite interval as rationals."""
+    low, high = interval._mpi_
+    return rational(low), rational(high)
+
+
 class Arithmetic:
     """Interval arithmetic at a fixed precision.
 
@@ -102,9 +108,9 @@ class Arithmetic:
         work: what is left to spend; None begins anew.
     """
 
-    def __init__(self, digits: int, work: Work | None = None) -> None:
+    def __init__(self, digits: int, work: WorkLimit | None = None) -> None:
         self.digits = digits
-        self.work = Work() if work is None else work
+        self.work = WorkLimit() if work is None else work
         self.context = MPIntervalContext()
         self.context.prec = self.prec = int(digits * BITS_PER_DIGIT) + 8
         self.zero: Interval = self.context.mpf(0)
@@ -220,7 +226,7 @@ class Arithmetic:
         return self.number(omega), self.between(min(ends), max(ends))
 
     def is_full_turn(self, omega: Interval, length: Fraction) -> bool:
-        """Tell whether omega times a length of time is surely 2 pi or more: 7 is asked for."""
+        """Tell whether omega times a length of time is 2 pi or more; we require 7, a little to spare."""
         return not libmpf.mpf_lt((omega * self.number(length))._mpi_[0], libmpf.from_int(7))
 
     def _pi(self, bits: int) -> Interval:

@@ -15,11 +15,11 @@ from typing import Any
 
 from mpmath.libmp import libmpf
 
-from reference.answers import Collision, Departure, Horizon, Trajectory
+from reference.answers import Departure, ProvedCollision, ProvedHorizon, Trajectory
 from reference.arithmetic import Enclosure
-from reference.course import Evidence
+from reference.course import UndefinedProof
 from reference.isolation import Leaf
-from reference.step import evidence_of
+from reference.step import proof_of_undefined
 from scene import BadInput, Scene, State, Undefined, to_data
 from scene.refusal import check_scene, shown
 
@@ -27,7 +27,7 @@ VERSION = 2
 
 
 def certificate(
-    scene: Scene, state: State, t_end: float, outcome: Collision | Horizon | Undefined
+    scene: Scene, state: State, t_end: float, outcome: ProvedCollision | ProvedHorizon | Undefined
 ) -> dict[str, Any]:
     """Write down what proves an outcome of `next_collision`.
 
@@ -45,12 +45,12 @@ def certificate(
         BadInput: `outcome` has no proof, or is undefined and not the answer to these.
     """
     question = _question(scene, state, t_end)
-    if not isinstance(outcome, Collision | Horizon | Undefined):
+    if not isinstance(outcome, ProvedCollision | ProvedHorizon | Undefined):
         raise BadInput(
             f"outcome = {shown(outcome)}, must be a proved collision, horizon or undefined outcome"
         )
     if isinstance(outcome, Undefined):
-        return question | _undefined(outcome, evidence_of(scene, state, t_end))
+        return question | _undefined(outcome, proof_of_undefined(scene, state, t_end))
     return question | _claim(outcome)
 
 
@@ -66,12 +66,12 @@ def path_certificate(scene: Scene, state: State, t_end: float | None, path: Traj
     if not isinstance(path, Trajectory):
         raise BadInput(f"path = {shown(path)}, must be a Trajectory of the reference")
     steps = [_claim(step) | {"departure": _departure(step.departure)} for step in path.steps]
-    if isinstance(path.outcome, Horizon) and t_end is not None:
+    if isinstance(path.outcome, ProvedHorizon) and t_end is not None:
         steps.append(_claim(path.outcome) | {"departure": _departure(path.outcome.departure)})
     if isinstance(path.outcome, Undefined):
         if t_end is None:
             raise BadInput("t_end = None, must be a time after the undefined instant")
-        steps.append(_undefined(path.outcome, evidence_of(scene, state, t_end)))
+        steps.append(_undefined(path.outcome, proof_of_undefined(scene, state, t_end)))
     return _question(scene, state, t_end) | {"steps": steps}
 
 
@@ -87,7 +87,7 @@ def _question(scene: Scene, state: State, t_end: float | None) -> dict[str, Any]
     }
 
 
-def _claim(outcome: Collision | Horizon) -> dict[str, Any]:
+def _claim(outcome: ProvedCollision | ProvedHorizon) -> dict[str, Any]:
     """Return the claim of one flight.
 
     `wall`, `dt` (flight time [time]) and `root` (the same from the departure's instant), None at a horizon;
@@ -95,34 +95,34 @@ def _claim(outcome: Collision | Horizon) -> dict[str, Any]:
     each wall its sub-intervals [start, end, kind] of flight time, in order. An enclosure is
     [lower, upper].
     """
-    is_hit = isinstance(outcome, Collision)
-    moment = outcome.after if isinstance(outcome, Collision) else outcome.at
+    hit = outcome if isinstance(outcome, ProvedCollision) else None
+    moment = outcome.after if isinstance(outcome, ProvedCollision) else outcome.at
     return {
-        "outcome": "collision" if is_hit else "horizon",
-        "wall": outcome.wall if isinstance(outcome, Collision) else None,
-        "dt": _ends(outcome.dt) if isinstance(outcome, Collision) else None,
-        "root": _ends(outcome.root) if isinstance(outcome, Collision) else None,
+        "outcome": "collision" if hit else "horizon",
+        "wall": hit.wall if hit else None,
+        "dt": _ends(hit.dt) if hit else None,
+        "root": _ends(hit.root) if hit else None,
         "after": {name: _ends(enclosure) for name, enclosure in moment._asdict().items()},
         "excluded": {wall: _stretches(leaves) for wall, leaves in outcome.proof.items()},
     }
 
 
-def _undefined(outcome: Undefined, evidence: Evidence) -> dict[str, Any]:
+def _undefined(outcome: Undefined, proof: UndefinedProof) -> dict[str, Any]:
     """Return the claim that a flight ends nowhere.
 
     `reason`; `instant`, the flight time at which it ends (0/1: at the start; None: at the root of a wall);
     `walls` met together then; `roots`, an interval around the first root of each that is searched
     for; `excluded` as for a collision.
     """
-    instant = evidence.instant
-    roots = {wall: _interval(time) for wall, time in evidence.roots.items()}
+    instant = proof.instant
+    roots = {wall: _interval(time) for wall, time in proof.roots.items()}
     return {
         "outcome": "undefined",
         "reason": outcome.reason,
         "instant": None if instant is None else f"{instant.numerator}/{instant.denominator}",
-        "walls": list(evidence.walls),
+        "walls": list(proof.walls),
         "roots": roots,
-        "excluded": {wall: _stretches(leaves) for wall, leaves in evidence.excluded.items()},
+        "excluded": {wall: _stretches(leaves) for wall, leaves in proof.excluded.items()},
     }
 
 

@@ -2,7 +2,7 @@
 
 A collision's time is enclosed, so the state after it is carried along the new line of flight to an
 exact instant within that enclosure. There place and velocity are boxes and the time is a number; the
-flight itself begins a little before or after, at an enclosed flight time (`Flight.begin`).
+flight itself begins a little before or after, at an enclosed flight time (`EnclosedFlight.begin`).
 """
 
 from __future__ import annotations
@@ -10,11 +10,10 @@ from __future__ import annotations
 from fractions import Fraction
 from typing import NamedTuple
 
-from reference.answers import Collision, Departure, Horizon, Moment
-from reference.arithmetic import Arithmetic, Interval
-from reference.arithmetic import rational as exact_point
+from reference.answers import Departure, Moment, ProvedCollision, ProvedHorizon
+from reference.arithmetic import Arithmetic, Interval, exact_ends
 from reference.course import FOR_EVER, Event, Hit
-from reference.walls import Flight
+from reference.walls import EnclosedFlight
 from scene import Wall
 
 
@@ -22,42 +21,42 @@ class Bounce(NamedTuple):
     """What follows a hit: the state just after it, and the next flight with the wall it leaves."""
 
     moment: tuple[Interval, Interval, Interval, Interval, Interval]
-    flight: Flight
+    flight: EnclosedFlight
     leaving: dict[Wall, Interval]
 
 
-def reflected(arithmetic: Arithmetic, flight: Flight, hit: Hit) -> tuple[Interval, Interval]:
+def reflected(arithmetic: Arithmetic, flight: EnclosedFlight, hit: Hit) -> tuple[Interval, Interval]:
     """Return v - 2 f' grad f / |grad f|^2, the velocity after a hit: v - 2 (v.n - u) n (sec. 3.1)."""
     f_x, f_y, _ = hit.motion.gradient(hit.wall, hit.time)
     factor = 2 * hit.slope / (arithmetic.square(f_x) + arithmetic.square(f_y))
     return flight.vx - factor * f_x, flight.vy - factor * f_y
 
 
-def bounce(arithmetic: Arithmetic, flight: Flight, leaving: dict[Wall, Interval], hit: Hit) -> Bounce:
+def bounce(arithmetic: Arithmetic, flight: EnclosedFlight, leaving: dict[Wall, Interval], hit: Hit) -> Bounce:
     """Reflect at a hit, and describe the next flight at an exact instant close to it."""
     q, s = flight, hit.time
     vx, vy = reflected(arithmetic, flight, hit)
     is_base = hit.wall == "base"
     x, y = q.x + q.vx * s, arithmetic.zero if is_base else q.y + q.vy * s
-    t = arithmetic.between(*(q.instant + exact_point(end) for end in arithmetic.inflated(s)._mpi_))
+    t = arithmetic.between(*(q.instant + end for end in exact_ends(arithmetic.inflated(s))))
     # The new line of flight, as far before or after the hit as the instant is.
     near = arithmetic.middle(s)
     begin = s - near
     x_near = q.x + q.vx * near + (q.vx - vx) * begin
     y_near = -vy * begin if is_base else q.y + q.vy * near + (q.vy - vy) * begin
     box = map(arithmetic.inflated, (x_near, y_near, vx, vy, begin))
-    following = Flight._make((q.instant + exact_point(near._mpi_[0]), *box))
+    following = EnclosedFlight._make((q.instant + exact_ends(near)[0], *box))
     x, y, vx, vy = map(arithmetic.inflated, (x, y, vx, vy))
     return Bounce((t, x, y, vx, vy), following, {hit.wall: leaving.get(hit.wall, arithmetic.zero)})
 
 
 def collision(
-    arithmetic: Arithmetic, flight: Flight, leaving: dict[Wall, Interval], event: Event, after: Bounce
-) -> Collision:
+    arithmetic: Arithmetic, flight: EnclosedFlight, leaving: dict[Wall, Interval], event: Event, after: Bounce
+) -> ProvedCollision:
     """Return a collision free of its working precision."""
     assert event.hit is not None
     close = arithmetic.enclosure
-    return Collision(
+    return ProvedCollision(
         event.hit.wall,
         close(arithmetic.inflated(event.hit.time - flight.begin)),
         Moment(*map(close, after.moment)),
@@ -69,7 +68,7 @@ def collision(
     )
 
 
-def departure(arithmetic: Arithmetic, flight: Flight, leaving: dict[Wall, Interval]) -> Departure:
+def departure(arithmetic: Arithmetic, flight: EnclosedFlight, leaving: dict[Wall, Interval]) -> Departure:
     """Return a flight free of its working precision."""
     close = arithmetic.enclosure
     residuals = {wall: close(f) for wall, f in leaving.items()}
@@ -78,15 +77,15 @@ def departure(arithmetic: Arithmetic, flight: Flight, leaving: dict[Wall, Interv
 
 def horizon(
     arithmetic: Arithmetic,
-    flight: Flight,
+    flight: EnclosedFlight,
     leaving: dict[Wall, Interval],
     end: Fraction | None,
     event: Event,
-) -> Horizon:
+) -> ProvedHorizon:
     """Return the state at a horizon that no collision comes before."""
     end = Fraction(FOR_EVER) if end is None else end
     s = arithmetic.dyadic(end)
     t = arithmetic.dyadic(flight.instant + end)
     at = (flight.x + flight.vx * s, flight.y + flight.vy * s, flight.vx, flight.vy)
     moment = Moment(*map(arithmetic.enclosure, (t, *map(arithmetic.inflated, at))))
-    return Horizon(moment, arithmetic.digits, departure(arithmetic, flight, leaving), event.proof)
+    return ProvedHorizon(moment, arithmetic.digits, departure(arithmetic, flight, leaving), event.proof)

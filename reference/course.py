@@ -15,17 +15,16 @@ from functools import partial
 from typing import NamedTuple
 
 from reference import rational
-from reference.arithmetic import Arithmetic, Interval, Undecidable, is_below, sign
-from reference.arithmetic import rational as exact_point
-from reference.isolation import Isolator, Leaf, Root
-from reference.walls import Flight, Motion
+from reference.arithmetic import Arithmetic, Interval, Undecidable, exact_ends, is_below, sign
+from reference.isolation import IsolatedRoot, Isolator, Leaf
+from reference.walls import EnclosedFlight, MovingWalls
 from scene import Cap, Mushroom, Scene, State, Stem, Undefined, Wall
 from scene.laws import bounds
 from scene.tables import laws
 
 SIDES: tuple[Wall, ...] = ("left", "right", "floor")
-BEYOND = 2.0**-10
-FOR_EVER = 2.0**1000
+BEYOND = 2.0**-10  # how far past the end of a search f is still looked at, as a share of its length
+FOR_EVER = 2.0**1000  # the horizon when none is given, as a flight time
 
 
 class Hit(NamedTuple):
@@ -34,11 +33,11 @@ class Hit(NamedTuple):
     wall: Wall
     time: Interval
     slope: Interval
-    motion: Motion
+    motion: MovingWalls
 
 
 @dataclass(frozen=True)
-class Evidence:
+class UndefinedProof:
     """What proves that a flight ends nowhere.
 
     Attributes:
@@ -60,20 +59,21 @@ class Event(NamedTuple):
     hit: Hit | None
     undefined: Undefined | None
     proof: dict[str, list[Leaf]]
-    evidence: Evidence | None = None
+    undefined_proof: UndefinedProof | None = None
 
 
 class Tie(NamedTuple):
     """Two walls met together: why that is undefined, and its proof."""
 
     undefined: Undefined
-    evidence: Evidence
+    proof: UndefinedProof
 
 
+@dataclass(eq=False)
 class Course:
     """A flight and all that is asked about it.
 
-    Args:
+    Attributes:
         scene: table and laws.
         arithmetic: working precision.
         flight: enclosures of the state.
@@ -83,26 +83,20 @@ class Course:
         exact: the state as binary64 numbers, when it is one; decides ties.
     """
 
-    def __init__(
-        self,
-        scene: Scene,
-        arithmetic: Arithmetic,
-        flight: Flight,
-        leaving: dict[Wall, Interval],
-        flat: frozenset[Wall],
-        end: Fraction | None,
-        exact: State | None,
-    ) -> None:
-        self.scene = scene
-        self.arithmetic = arithmetic
-        self.flight = flight
-        self.leaving = leaving
-        self.flat = flat
-        self.end = end
-        self.horizon = arithmetic.number(FOR_EVER) if end is None else arithmetic.dyadic(end)
-        self.exact = exact
-        self.motion = Motion(arithmetic, scene, flight)
-        self.start = arithmetic.lower(flight.begin)
+    scene: Scene
+    arithmetic: Arithmetic
+    flight: EnclosedFlight
+    leaving: dict[Wall, Interval]
+    flat: frozenset[Wall]
+    end: Fraction | None
+    exact: State | None
+
+    def __post_init__(self) -> None:
+        """Enclose the horizon and the start; nothing is proved yet."""
+        arithmetic = self.arithmetic
+        self.horizon = arithmetic.number(FOR_EVER) if self.end is None else arithmetic.dyadic(self.end)
+        self.motion = MovingWalls(arithmetic, self.scene, self.flight)
+        self.start = arithmetic.lower(self.flight.begin)
         self.proof: dict[str, list[Leaf]] = {}
 
     def event(self, *, in_cap: bool) -> Event:
@@ -117,7 +111,7 @@ class Course:
         if found is None and limit is not None:
             found = self._beyond_crossing(limit, in_cap=in_cap)
         if isinstance(found, Tie):
-            return Event(None, found.undefined, self.proof, found.evidence)
+            return Event(None, found.undefined, self.proof, found.proof)
         return Event(found, None, self.proof)
 
     def hit_after(self, wall: Wall, start: Interval) -> Interval | None:
@@ -139,8 +133,8 @@ class Course:
             return Event(None, None, self.proof)
         self._require_before_end(hits[-1])
         roots = {hit.wall: hit.time for hit in hits}
-        walls = tuple(roots)
-        return Event(None, Undefined("mouth-edge"), self.proof, Evidence(None, walls, roots, self.proof))
+        proof = UndefinedProof(None, tuple(roots), roots, self.proof)
+        return Event(None, Undefined("mouth-edge"), self.proof, proof)
 
     def _crossing(self, *, in_cap: bool) -> Interval | None:
         if "base" in self.leaving or sign(self.flight.vy) == 0:
@@ -198,7 +192,7 @@ class Course:
         if not met:
             raise Undecidable("the mouth's edge is met, as far as this precision shows")
         reason = Undefined("mouth-edge" if isinstance(self.scene, Mushroom) else "corner")
-        return Tie(reason, Evidence(instant, ("base", *met), {}, self.proof))
+        return Tie(reason, UndefinedProof(instant, ("base", *met), {}, self.proof))
 
     def _base_hit(self, crossing: Interval) -> Hit:
         slope = -self.flight.vy if isinstance(self.scene, Stem) else self.flight.vy
@@ -258,7 +252,7 @@ class Course:
                 is_edge = isinstance(self.scene, Mushroom) and "base" in walls and "arc" not in walls
                 roots = {hit.wall: hit.time for hit in hits if hit.wall in walls}
                 reason = Undefined("mouth-edge" if is_edge else "corner")
-                return Tie(reason, Evidence(instant, walls, roots, self.proof))
+                return Tie(reason, UndefinedProof(instant, walls, roots, self.proof))
         raise Undecidable("two walls are met together, as far as this precision shows")
 
     def _rational_times(self, state: State) -> list[Fraction]:
@@ -277,7 +271,7 @@ class Course:
                 return ()
             met += ["base"] if crossing == instant else []
         for hit in hits:
-            low, high = (exact_point(end) for end in hit.time._mpi_)
+            low, high = exact_ends(hit.time)
             is_met = low <= instant <= high and rational.is_zero(self.scene, self.exact, hit.wall, instant)
             if is_met:
                 met.append(hit.wall)
@@ -295,9 +289,9 @@ class Course:
         isolator = self._isolator(wall)
         if wall not in self.leaving and sign(isolator.value(start)) <= 0:
             raise Undecidable(f"f of {wall} has no sign where a stretch of the flight begins")
-        # A little beyond the end, where f goes on, so that a root at the end is isolated.
+        # We search a little beyond the end, so that a root exactly there still lies inside the interval.
         end = self.arithmetic.upper(stop + (stop - start) * BEYOND)
-        root: Root | None = None
+        root: IsolatedRoot | None = None
         if is_below(start, end):
             root = isolator.first_root(start, end)
         self.proof.setdefault(wall, []).extend(isolator.leaves)

@@ -24,10 +24,18 @@ concave and hold all of it.
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
-from reference.arithmetic import Arithmetic, Interval, Undecidable, is_at_most_zero, is_below, sign
-from reference.arithmetic import rational as exact_point
+from reference.arithmetic import (
+    Arithmetic,
+    Interval,
+    Undecidable,
+    exact_ends,
+    is_at_most_zero,
+    is_below,
+    sign,
+)
 from reference.jets import Jet
 from reference.timeline import Timeline
 
@@ -43,52 +51,41 @@ class Leaf(NamedTuple):
     kind: str
 
 
-class Root(NamedTuple):
+class IsolatedRoot(NamedTuple):
     """The only root on `time`, with f' < 0 throughout it; what lies before is excluded by `leaves`."""
 
     time: Interval
     slope: Interval
 
 
-Function = Callable[[Interval], Jet]
-
-
+@dataclass(eq=False)
 class Isolator:
     """Isolates roots of one wall function, with the residual of the wall being left removed.
 
-    Args:
+    Attributes:
         arithmetic: the working precision.
         jet: f, f', f'' over an interval of flight time.
         begin: encloses the flight time at which the flight begins.
         residual: f(0) when the particle leaves this wall (the root s = 0 is divided out), else None.
         is_flat: f(0) = f'(0) = 0 exactly, so that only f'' > 0 can prove the start.
         timeline: knows the laws' knots, at which intervals are best cut; None for a smooth function.
+        leaves: what has been excluded so far, from the left.
     """
 
-    def __init__(
-        self,
-        arithmetic: Arithmetic,
-        jet: Function,
-        begin: Interval,
-        residual: Interval | None = None,
-        *,
-        is_flat: bool = False,
-        timeline: Timeline | None = None,
-    ) -> None:
-        self.arithmetic = arithmetic
-        self.jet = jet
-        self.begin = begin
-        self.residual = residual
-        self.is_flat = is_flat
-        self.timeline = timeline
-        self.leaves: list[Leaf] = []
+    arithmetic: Arithmetic
+    jet: Callable[[Interval], Jet]
+    begin: Interval
+    residual: Interval | None = None
+    is_flat: bool = field(default=False, kw_only=True)
+    timeline: Timeline | None = field(default=None, kw_only=True)
+    leaves: list[Leaf] = field(default_factory=list, init=False)
 
     def value(self, s: Interval) -> Interval:
         """Enclose f, less its residual, at s."""
         f = self.jet(s).f
         return f if self.residual is None else f - self.residual
 
-    def first_root(self, start: Interval, end: Interval) -> Root | None:
+    def first_root(self, start: Interval, end: Interval) -> IsolatedRoot | None:
         """Find the first root in (start, end], or prove that there is none.
 
         Args:
@@ -152,7 +149,7 @@ class Isolator:
     def _is_whole(self, whole: Interval) -> bool:
         if self.timeline is None:
             return False
-        low, high = map(exact_point, whole._mpi_)
+        low, high = exact_ends(whole)
         return self.timeline.is_whole(high - low)
 
     def _parts(self, a: Interval, b: Interval, whole: Interval, jet: Jet) -> list[tuple[Interval, Interval]]:
@@ -221,14 +218,14 @@ class Isolator:
     def _knot(self, a: Interval, b: Interval) -> Interval | None:
         if self.timeline is None:
             return None
-        knot = self.timeline.knot_between(exact_point(a._mpi_[0]), exact_point(b._mpi_[0]))
+        knot = self.timeline.knot_between(exact_ends(a)[0], exact_ends(b)[0])
         return None if knot is None else self.arithmetic.dyadic(knot)
 
     def _is_centred_positive(self, whole: Interval, slope: Interval) -> bool:
         middle = self.arithmetic.middle(whole)
         return sign(self.value(middle) + slope * (whole - middle)) > 0
 
-    def _refine(self, a: Interval, b: Interval) -> Root:
+    def _refine(self, a: Interval, b: Interval) -> IsolatedRoot:
         # Interval Newton on [a, b]: f' < 0 there, so each image encloses the one root. Where it
         # does not halve the enclosure, the sign at a point inside does.
         time = self.arithmetic.hull(a, b)
@@ -261,7 +258,7 @@ class Isolator:
         least = self.arithmetic.upper(time) * self.arithmetic.power_of_two(8 - self.arithmetic.prec)
         return self.arithmetic.upper(time.delta + least)
 
-    def _accepted(self, time: Interval, a: Interval) -> Root:
+    def _accepted(self, time: Interval, a: Interval) -> IsolatedRoot:
         # Strict signs at both ends of a somewhat wider interval, and the stretch before it.
         if not is_below(self.arithmetic.upper(self.begin), time):
             raise Undecidable("a wall is met within the enclosure of the start")
@@ -277,5 +274,5 @@ class Isolator:
                 raise Undecidable("the signs around the root are not strict")
             if sign(self.value(lower)) > 0 > sign(self.value(upper)):
                 self.leaves.append(Leaf(a, lower, "falling"))
-                return Root(wider, slope)
+                return IsolatedRoot(wider, slope)
             margin = 8 * margin

@@ -12,13 +12,16 @@ from collections.abc import Iterator
 
 from reference.arithmetic import Arithmetic, Enclosure, Interval
 from reference.course import Hit
-from reference.walls import Flight
+from reference.walls import EnclosedFlight
 
 Matrix = list[list[Interval]]
 
 
 def step_jacobian(
-    arithmetic: Arithmetic, flight: Flight, hit: Hit, origin: tuple[Interval, Interval, Interval] | None
+    arithmetic: Arithmetic,
+    flight: EnclosedFlight,
+    hit: Hit,
+    origin: tuple[Interval, Interval, Interval] | None,
 ) -> Matrix:
     """Enclose the derivatives of (dt, x, y, vx, vy) after the bounce by (t, x, y, vx, vy) before.
 

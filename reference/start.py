@@ -7,17 +7,16 @@ from fractions import Fraction
 from typing import NamedTuple
 
 from reference import rational
-from reference.arithmetic import Arithmetic, Interval, Undecidable, sign
-from reference.arithmetic import rational as exact_point
+from reference.arithmetic import Arithmetic, Interval, Undecidable, exact_ends, sign
 from reference.course import SIDES
-from reference.walls import Flight, Motion
+from reference.walls import EnclosedFlight, MovingWalls
 from scene import Cap, InvalidState, Mushroom, Scene, State, Stem, Undefined, Wall
 from scene.laws import is_constant
 from scene.states import ON_WALL
 from scene.tables import laws
 
 
-class Start(NamedTuple):
+class JudgedStart(NamedTuple):
     """A judged start.
 
     Attributes:
@@ -33,10 +32,10 @@ class Start(NamedTuple):
     walls: tuple[Wall, ...] = ()
 
 
-def flight_from(arithmetic: Arithmetic, state: State) -> Flight:
+def flight_from(arithmetic: Arithmetic, state: State) -> EnclosedFlight:
     """Return the flight of a state, exactly."""
     numbers = (arithmetic.number(v) for v in (state.x, state.y, state.vx, state.vy))
-    return Flight._make((Fraction(state.t), *numbers, arithmetic.zero))
+    return EnclosedFlight._make((Fraction(state.t), *numbers, arithmetic.zero))
 
 
 def is_in_cap(scene: Scene, state: State, leaving: dict[Wall, Interval]) -> bool:
@@ -49,7 +48,7 @@ def is_in_cap(scene: Scene, state: State, leaving: dict[Wall, Interval]) -> bool
     return state.y > 0 or is_rising_in_mouth
 
 
-def judge_start(scene: Scene, state: State, arithmetic: Arithmetic) -> Start:
+def judge_start(scene: Scene, state: State, arithmetic: Arithmetic) -> JudgedStart:
     """Judge the starting state: which walls it leaves, or why it is none of this table.
 
     Raises:
@@ -62,21 +61,21 @@ def judge_start(scene: Scene, state: State, arithmetic: Arithmetic) -> Start:
         _check_residual(scene, state, motion)
     on = [wall for wall in _walls_near(scene, state) if _is_on(scene, state, wall, motion)]
     if state.vy == 0 and _is_beside_mouth(scene, state, motion):
-        return Start({}, undefined=Undefined("sliding"), walls=("base",))
+        return JudgedStart({}, undefined=Undefined("sliding"), walls=("base",))
     if state.wall is not None:
         on.append(state.wall)
     # A place on two walls is undefined whichever way it moves; a side ends at the mouth's edge.
     if isinstance(scene, Mushroom) and state.y == 0 and ("left" in on or "right" in on):
-        return Start({}, undefined=Undefined("mouth-edge"), walls=tuple(on))
+        return JudgedStart({}, undefined=Undefined("mouth-edge"), walls=tuple(on))
     if len(on) > 1:
-        return Start({}, undefined=Undefined("corner"), walls=tuple(on))
+        return JudgedStart({}, undefined=Undefined("corner"), walls=tuple(on))
     for wall in on:
         judged = _departure(scene, state, wall, motion)
         if isinstance(judged, Undefined):
-            return Start({}, undefined=judged, walls=(wall,))
+            return JudgedStart({}, undefined=judged, walls=(wall,))
         residual = motion.wall(wall, arithmetic.zero).f
-        return Start({wall: residual}, frozenset({wall} if judged else ()))
-    return Start({})
+        return JudgedStart({wall: residual}, frozenset({wall} if judged else ()))
+    return JudgedStart({})
 
 
 def _check_part(scene: Scene, state: State) -> None:
@@ -89,9 +88,18 @@ def _check_part(scene: Scene, state: State) -> None:
         raise InvalidState(f"state.y = {state.y!r} on wall {state.wall} is above the stem, must be <= 0")
 
 
-def motion_at(scene: Scene, state: State, arithmetic: Arithmetic) -> Motion:
+def motion_at(scene: Scene, state: State, arithmetic: Arithmetic) -> MovingWalls:
     """Return the walls along the flight from a state."""
-    return Motion(arithmetic, scene, flight_from(arithmetic, state))
+    return MovingWalls(arithmetic, scene, flight_from(arithmetic, state))
+
+
+def origin_of(
+    scene: Scene, state: State, start: JudgedStart, wall: Wall, arithmetic: Arithmetic
+) -> tuple[Interval, Interval, Interval] | None:
+    """Return f_x, f_y, f_t at the start of the wall met, when that is the one being left: f(0) moves too."""
+    if wall not in start.leaving:
+        return None
+    return motion_at(scene, state, arithmetic).gradient(wall, arithmetic.zero)
 
 
 def _walls_near(scene: Scene, state: State) -> list[Wall]:
@@ -105,7 +113,7 @@ def _walls_near(scene: Scene, state: State) -> list[Wall]:
     return ["arc"] if state.y > 0 or state.wall in ("arc", "base") else list(SIDES)
 
 
-def _is_on(scene: Scene, state: State, wall: Wall, motion: Motion) -> bool:
+def _is_on(scene: Scene, state: State, wall: Wall, motion: MovingWalls) -> bool:
     """Tell whether an unnamed wall passes exactly through the state; refuse a state beyond it."""
     if wall == state.wall:
         return False
@@ -123,7 +131,7 @@ def _is_on(scene: Scene, state: State, wall: Wall, motion: Motion) -> bool:
     return side == 0
 
 
-def _is_on_base(scene: Scene, state: State, motion: Motion) -> bool:
+def _is_on_base(scene: Scene, state: State, motion: MovingWalls) -> bool:
     if sign(motion.wall("arc", motion.arithmetic.zero).f) < 0:
         raise InvalidState(f"state (x, y) = ({state.x!r}, 0) at t = {state.t!r} is beyond wall arc")
     if state.vy < 0:
@@ -131,14 +139,14 @@ def _is_on_base(scene: Scene, state: State, motion: Motion) -> bool:
     return False
 
 
-def _is_beside_mouth(scene: Scene, state: State, motion: Motion) -> bool:
+def _is_beside_mouth(scene: Scene, state: State, motion: MovingWalls) -> bool:
     """Tell whether a state that names no wall lies on y = 0 beyond the mouth's edge."""
     if not isinstance(scene, Mushroom) or state.wall is not None or state.y != 0:
         return False
     return any(sign(motion.wall(wall, motion.arithmetic.zero).f) < 0 for wall in ("left", "right"))
 
 
-def _departure(scene: Scene, state: State, wall: Wall, motion: Motion) -> Undefined | bool:
+def _departure(scene: Scene, state: State, wall: Wall, motion: MovingWalls) -> Undefined | bool:
     """Judge f' at the start on a wall: True when it is flat there but lifts, False when it rises."""
     jet = motion.wall(wall, motion.arithmetic.zero)
     rise = sign(jet.d1) if jet.d1 is not None else 0
@@ -155,7 +163,7 @@ def _departure(scene: Scene, state: State, wall: Wall, motion: Motion) -> Undefi
     return Undefined("sliding" if exact[2] < 0 or is_at_rest or wall == "base" else "tangency")
 
 
-def _check_residual(scene: Scene, state: State, motion: Motion) -> None:
+def _check_residual(scene: Scene, state: State, motion: MovingWalls) -> None:
     """Refuse a state too far from the wall it names, as measured by that wall's present distance from 0."""
     wall, zero = state.wall, motion.arithmetic.zero
     assert wall is not None
@@ -163,14 +171,14 @@ def _check_residual(scene: Scene, state: State, motion: Motion) -> None:
     gap = motion.wall(wall, zero).f
     if wall == "arc":
         gap = gap / (2 * size)
-    low, high = (exact_point(end) for end in gap._mpi_)
-    if max(abs(low), abs(high)) > Fraction(ON_WALL) * exact_point(size._mpi_[0]):
+    low, high = exact_ends(gap)
+    if max(abs(low), abs(high)) > Fraction(ON_WALL) * exact_ends(size)[0]:
         # Decimal, because the gap may be too large for a float.
         shown = Decimal(low.numerator) / Decimal(low.denominator)
         raise InvalidState(f"state.wall = {wall!r}, but the state is {shown:.3g} away from that wall")
 
 
-def _distance_of(scene: Scene, wall: Wall, motion: Motion) -> Interval:
+def _distance_of(scene: Scene, wall: Wall, motion: MovingWalls) -> Interval:
     """Return r for the arc, w for a side, h for the floor, the larger of r and w for the base, now."""
     zero = motion.arithmetic.zero
     if wall == "floor":

@@ -13,8 +13,7 @@ from fractions import Fraction
 from functools import lru_cache
 from typing import NamedTuple, Protocol
 
-from reference.arithmetic import Arithmetic, Interval
-from reference.arithmetic import rational as exact_point
+from reference.arithmetic import Arithmetic, Interval, exact_ends
 from reference.jets import Jet, united
 from scene import BangBang, Fourier, Law, Scene
 from scene.laws import is_constant
@@ -168,7 +167,7 @@ class Legs:
 
     def jet(self, s: Interval) -> Jet:
         """Unite the parabolas that times within s may lie on."""
-        low, high = (self.instant + exact_point(end) for end in s._mpi_)
+        low, high = (self.instant + end for end in exact_ends(s))
         if high - low >= self.period:
             return self._whole()
         turn = (low - self.starts[0]) // self.period * self.period

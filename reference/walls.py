@@ -16,7 +16,7 @@ from reference.timeline import Timeline
 from scene import Scene, Stem, Wall
 
 
-class Flight(NamedTuple):
+class EnclosedFlight(NamedTuple):
     """A straight flight, described at an exact instant.
 
     Attributes:
@@ -34,10 +34,10 @@ class Flight(NamedTuple):
     begin: Interval
 
 
-class Motion:
+class MovingWalls:
     """Evaluates the walls along a flight."""
 
-    def __init__(self, arithmetic: Arithmetic, scene: Scene, flight: Flight) -> None:
+    def __init__(self, arithmetic: Arithmetic, scene: Scene, flight: EnclosedFlight) -> None:
         self.arithmetic = arithmetic
         self.flight = flight
         self.is_stem = isinstance(scene, Stem)

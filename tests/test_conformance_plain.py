@@ -10,13 +10,14 @@ from pathlib import Path
 
 import pytest
 from hypothesis import given, settings
+from support.tables import BOX, CIRCLE, LIFT, STATIC
 from support.truth import proved_step
 
 from conformance import plain
 from conformance.grading.agreement import compare
-from conformance.plain.motion import Legs, Wave
+from conformance.plain.motion import BangBangMotion, FourierMotion
 from conformance.strategies import scenes_and_states
-from scene import BangBang, Cap, Collision, Fourier, Horizon, Mushroom, Rejected, State, Stem, Undecided, load
+from scene import Collision, Fourier, Horizon, Rejected, State, Undecided, load
 
 N_STEPS = 60  # the corpus asks many more
 BOUND = 1024.0  # backward ulps; the worst of 2,500 steps was 218, at a slow particle before a fast wall
@@ -54,8 +55,8 @@ def test_a_rise_keeps_its_digits_however_short_the_time():
     law = Fourier(mean=1.0, omega=2.0, cos=(0.25, 0.125), sin=(0.5,))
     t, s = 0.75, 1e-12
     rate = sum(k * 2 * (b * math.cos(2 * k * t) - a * math.sin(2 * k * t)) for k, a, b in law.harmonics())
-    assert Wave(law, t).at(s).rise == pytest.approx(rate * s, rel=1e-11)
-    legs = Legs(BangBang(knots=((0.0, 2.0), (0.5, 1.0), (1.0, 2.0))), 0.25)  # mid-leg, at rate -4
+    assert FourierMotion(law, t).at(s).rise == pytest.approx(rate * s, rel=1e-11)
+    legs = BangBangMotion(LIFT.h, 0.25)  # mid-leg, at rate -4
     assert legs.at(s).rise == pytest.approx(-4 * s, rel=1e-11)
 
 
@@ -63,7 +64,7 @@ def test_a_rise_keeps_its_digits_however_short_the_time():
 @pytest.mark.parametrize("s", [0.0, 0.1, 0.25, 0.6, 1.0, 3.7])
 def test_legs_close_after_any_period(t, s):
     """2 - 8 t^2, 1 + 8 (t - 1/2)^2, 2 - 8 (t - 1)^2 in turn, period 1."""
-    legs = Legs(BangBang(knots=((0.0, 2.0), (0.5, 1.0), (1.0, 2.0))), t)
+    legs = BangBangMotion(LIFT.h, t)
 
     def height(time):
         u = time % 1.0
@@ -72,22 +73,18 @@ def test_legs_close_after_any_period(t, s):
     assert legs.at(s).now == pytest.approx(height(t + s), abs=1e-13)
 
 
-LIFT = Stem(w=1.0, h=BangBang(knots=((0.0, 2.0), (0.5, 1.0), (1.0, 2.0))))
-STATIC = Mushroom(r=1.0, h=1.0, w=0.5)
-
-
 @pytest.mark.parametrize(
     ("scene", "state", "kind"),
     [
-        (Cap(r=1.0), State(0.0, 0.5, 0.5, 0.5, -0.5), Undecided),  # a corner
+        (CIRCLE, State(0.0, 0.5, 0.5, 0.5, -0.5), Undecided),  # a corner
         (STATIC, State(0.0, 0.25, 0.25, 1.0, -1.0), Undecided),  # the mouth's edge
         (LIFT, State(0.0, 0.0, -1.0, 0.0, 0.0), Undecided),  # a touch
         (LIFT, State(0.0, 0.0, -2.0, 0.0, 0.0, "floor"), Undecided),  # sliding
-        (Cap(r=1.0), State(0.0, 0.9, 0.9, 1.0, 0.0), Rejected),
-        (Cap(r=1.0), State(0.0, 0.6, 0.8, 1.0, 0.0, "arc"), Rejected),
-        (Cap(r=1.0), State(0.0, math.nan, 0.8, 1.0, 0.0), Rejected),
-        (Cap(r=1.0), State(0.0, 0.0, 0.5, 1e200, 0.0), Rejected),
-        (Cap(r=1.0), State(0.0, 0.1, 0.5, 0.0, 0.0), Horizon),  # at rest
+        (CIRCLE, State(0.0, 0.9, 0.9, 1.0, 0.0), Rejected),
+        (CIRCLE, State(0.0, 0.6, 0.8, 1.0, 0.0, "arc"), Rejected),
+        (CIRCLE, State(0.0, math.nan, 0.8, 1.0, 0.0), Rejected),
+        (CIRCLE, State(0.0, 0.0, 0.5, 1e200, 0.0), Rejected),
+        (CIRCLE, State(0.0, 0.1, 0.5, 0.0, 0.0), Horizon),  # at rest
     ],
 )
 def test_what_it_does_not_answer_it_says(scene, state, kind):
@@ -95,8 +92,7 @@ def test_what_it_does_not_answer_it_says(scene, state, kind):
 
 
 def test_trajectory_ends_at_the_horizon():
-    box = Stem(w=1.0, h=1.0)
-    steps = plain.trajectory(box, State(0.0, 0.0, -0.5, 1.0, 0.0), 10, 5.5)
+    steps = plain.trajectory(BOX, State(0.0, 0.0, -0.5, 1.0, 0.0), 10, 5.5)
     assert [getattr(step, "wall", "horizon") for step in steps] == ["right", "left", "right", "horizon"]
     assert steps[-1] == Horizon(5.5, 0.5, -0.5, -1.0, 0.0)
 

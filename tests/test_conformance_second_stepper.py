@@ -7,6 +7,7 @@ from math import inf, pi, sqrt
 import pytest
 from flint import arb, fmpq
 from support import faulty_provers as faults
+from support.tables import BREATHING, CIRCLE, LEAP, LIFT, STATIC
 
 from conformance import plain
 from conformance.attacks.search import as_truth
@@ -14,12 +15,9 @@ from conformance.generator.draws import Draw, clock, scene, state
 from conformance.grading.agreement import compare
 from conformance.second_stepper import next_collision, trajectory
 from conformance.second_stepper.step import simplest
-from scene import BangBang, Cap, Collision, Fourier, Mushroom, State, Stem, Undecided
+from scene import BangBang, Collision, Mushroom, State, Stem, Undecided
 from scene.transforms import mirrored, mirrored_wall
 
-STATIC = Mushroom(r=1.0, h=1.0, w=0.5)
-LIFT = Stem(w=1.0, h=BangBang(knots=((0.0, 2.0), (0.5, 1.0), (1.0, 2.0))))
-BREATHING = Cap(r=Fourier(mean=1.0, omega=1.0, sin=(0.25,)))
 N_DRAWS = 150
 
 
@@ -28,14 +26,14 @@ def holds(ball, number):
 
 
 def chord():
-    hit = next_collision(Cap(r=1.0), State(0.0, 0.25, 0.5, 2.0, 1.0), 9.0)
+    hit = next_collision(CIRCLE, State(0.0, 0.25, 0.5, 2.0, 1.0), 9.0)
     dt = (-1 + (1 + 5 * (arb(1) - arb(fmpq(5, 16)))).sqrt()) / 5
     assert hit.wall == "arc"
     assert holds(hit.numbers[0], dt)
 
 
 def chord_from_the_arc():
-    hit = next_collision(Cap(r=1.0), State(0.0, 0.0, 1.0, 1.0, -0.75, "arc"), 9.0)
+    hit = next_collision(CIRCLE, State(0.0, 0.0, 1.0, 1.0, -0.75, "arc"), 9.0)
     assert hit.wall == "arc"
     assert holds(hit.numbers[0], arb(fmpq(24, 25)))
 
@@ -89,15 +87,7 @@ def tiny_residual():
 
 
 def knot_within_the_time():
-    leg = (
-        (0.0, 0.01),
-        (1.6097936544959741, 0.01),
-        (1.6097936544959743, 0.9),
-        (5.609793654495975, 0.9),
-        (16.0, 0.01),
-    )
-    late = State(2.0**110, 0.3, 0.5, 0.02, 1.0)
-    path = trajectory(Mushroom(r=1.0, h=1.0, w=BangBang(knots=leg)), late, 2)
+    path = trajectory(LEAP, State(2.0**110, 0.3, 0.5, 0.02, 1.0), 2)
     assert [step.wall for step in path] == ["arc", "left"]
 
 

@@ -5,11 +5,10 @@ from __future__ import annotations
 from fractions import Fraction
 
 import pytest
+from support.tables import BOX, CIRCLE, STATIC
 
 import reference
-from scene import Cap, Mushroom, State, Stem, load
-
-BOX = Stem(w=1.0, h=1.0)
+from scene import State, load
 
 
 def margins(scene, state):
@@ -40,7 +39,7 @@ def test_alone_in_sight():
 @pytest.mark.parametrize("near", [1e-3, 1e-9])
 def test_near_the_corner_of_arc_and_base(near):
     """Falling steeply beside the corner: the base is met, then at once the arc."""
-    found = margins(Cap(r=1.0), State(0, 0.5, 0.5, 0.5, -0.5 - near))
+    found = margins(CIRCLE, State(0, 0.5, 0.5, 0.5, -0.5 - near))
     assert float(found.corner) == pytest.approx(near, rel=0.02)
     assert 0 < float(found.gap) < 5 * near
 
@@ -52,5 +51,5 @@ def test_arc_of_the_moving_cap_before_the_base():
 
 
 def test_sides_of_a_mushroom_ignore_the_arc():
-    found = margins(Mushroom(r=1.0, h=1.0, w=0.5), State(0, 0.0, -0.5, 1.0, 0.0))
+    found = margins(STATIC, State(0, 0.0, -0.5, 1.0, 0.0))
     assert float(found.corner) == 0.5

@@ -6,12 +6,11 @@ import pytest
 from support.reference_battery import BATTERY
 
 from reference import chain, rational, start, timeline, walls
-from reference.arithmetic import Arithmetic
-from reference.arithmetic import rational as exact_point
+from reference.arithmetic import Arithmetic, exact_ends
 from reference.course import SIDES, Course
 from reference.isolation import Isolator
 from reference.jets import Jet
-from reference.walls import Motion
+from reference.walls import MovingWalls
 from scene import Mushroom
 
 first_root = Isolator.first_root
@@ -19,10 +18,10 @@ first_hit = Course._first_hit
 beyond_crossing = Course._beyond_crossing
 isolator_init = Isolator.__init__
 course_init = Course.__init__
-wall_of = Motion.wall
-gradient = Motion.gradient
-law_of = Motion.law
-width_of = Motion.width
+wall_of = MovingWalls.wall
+gradient = MovingWalls.gradient
+law_of = MovingWalls.law
+width_of = MovingWalls.width
 reflected = chain.reflected
 wall_jet = rational.wall_jet
 legs_jet = timeline.Legs.jet
@@ -54,7 +53,7 @@ def exclude_all_but_the_floor(self, walls, start, limit):
 
 def piece_at_the_lower_end(self, s):
     """Only the piece of a law that holds where an enclosed time begins."""
-    low = self.instant + exact_point(s._mpi_[0])
+    low = self.instant + exact_ends(s)[0]
     turn = (low - self.starts[0]) // self.period * self.period
     i = timeline.bisect_right(self.starts, low - turn) - 1
     return self._on(i, turn, s)
@@ -175,12 +174,12 @@ MUTANTS = {
         "reflected",
         lambda arithmetic, flight, hit: reflected(arithmetic, flight, hit._replace(slope=hit.slope / 2)),
     ),
-    "left and right swapped": (Motion, "wall", swapped_sides),
-    "normal of a slanted side level": (Motion, "gradient", level_normal),
-    "slope's derivative dropped": (Motion, "law", still_slope),
-    "product rule of nu r dropped": (Motion, "width", width_with_still_nu),
+    "left and right swapped": (MovingWalls, "wall", swapped_sides),
+    "normal of a slanted side level": (MovingWalls, "gradient", level_normal),
+    "slope's derivative dropped": (MovingWalls, "law", still_slope),
+    "product rule of nu r dropped": (MovingWalls, "width", width_with_still_nu),
     "r r'' dropped": (walls, "square", square_without_second_derivative),
-    "second derivatives by time dropped": (Motion, "hessian", hessian_without_time),
+    "second derivatives by time dropped": (MovingWalls, "hessian", hessian_without_time),
     "horizon overrun": (Course, "__init__", with_a_later_horizon),
 }
 

@@ -11,7 +11,8 @@ import mpmath
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from support.truth import IS_DEEP, centre
+from support.tables import BOX, CIRCLE, LIFT, STATIC
+from support.truth import IS_DEEP
 
 import reference
 from conformance.strategies import scenes_and_states
@@ -19,14 +20,12 @@ from reference.arithmetic import Arithmetic, rational, sign
 from reference.isolation import Isolator
 from reference.jets import Jet
 from reference.start import flight_from
-from reference.walls import Motion
+from reference.walls import MovingWalls
 from scene import (
     BadInput,
-    BangBang,
     Cap,
     Fourier,
     Horizon,
-    Mushroom,
     Rejected,
     State,
     Stem,
@@ -36,12 +35,6 @@ from scene import (
 )
 from scene.laws import value
 from scene.tables import laws
-
-CIRCLE = Cap(r=1.0)
-BOX = Stem(w=1.0, h=1.0)
-STATIC = Mushroom(r=1.0, h=1.0, w=0.5)
-# A floor that comes up at constant acceleration 16 from depth 2, for half a time unit.
-LIFT = Stem(w=1.0, h=BangBang(knots=((0.0, 2.0), (0.5, 1.0), (1.0, 2.0))))
 
 
 def hit(scene, state, t_end=100.0, digits=40):
@@ -67,24 +60,6 @@ def test_chord_of_the_unit_circle(digits):
         assert found.after.vy.lo <= 1 - push * y <= found.after.vy.hi
 
 
-def test_floor_with_constant_acceleration_is_a_quadratic():
-    """H = 2 - 8 t^2 on the first quarter: y + vy s + h = 0 with y = -1.75, vy = 0 at s = sqrt(1/32)."""
-    found = hit(LIFT, State(0.0, 0.0, -1.75, 0.0, 0.0))
-    with mpmath.workdps(60):
-        s = mpmath.sqrt(mpmath.mpf(1) / 32)
-        assert found.wall == "floor"
-        assert found.dt.lo <= s <= found.dt.hi
-        assert found.after.vy.lo <= 2 * 16 * s <= found.after.vy.hi  # v' = 2 u, u = 16 s
-
-
-def test_root_beyond_a_knot():
-    """On the second quarter h = 1 + 8 (t - 1/2)^2: the floor is met there when started higher."""
-    found = hit(LIFT, State(0.0, 0.0, -1.125, 0.0, 0.0))
-    with mpmath.workdps(60):
-        s = mpmath.mpf("0.5") - mpmath.sqrt(mpmath.mpf("0.125") / 8)
-        assert found.dt.lo <= s <= found.dt.hi
-
-
 def test_particle_at_rest_is_swept_or_not():
     assert hit(LIFT, State(0.0, 0.5, -1.5, 0.0, 0.0)).wall == "floor"
     outcome = reference.next_collision(LIFT, State(0.0, 0.5, -0.5, 0.0, 0.0), 50.0)
@@ -106,25 +81,6 @@ def test_recollision_at_vanishing_times_is_found(gap):
     found = hit(LIFT, State(0.0, 0.0, -2.0, 0.0, -0.0 + rise, "floor"), digits=20)
     assert found.wall == "floor"
     assert found.dt.contains(Fraction(rise) / 8)
-
-
-@pytest.mark.parametrize(
-    ("scene", "state", "reason"),
-    [
-        (CIRCLE, State(0, 0.5, 0.5, 0.5, -0.5), "corner"),
-        (BOX, State(0, 0.5, -0.5, 0.5, -0.5), "corner"),
-        (BOX, State(0, 0.5, -0.5, 0.5, 0.5), "corner"),
-        (STATIC, State(0, 0.25, 0.25, 1.0, -1.0), "mouth-edge"),
-        (STATIC, State(0, 0.25, -0.25, 1.0, 1.0), "mouth-edge"),
-        (STATIC, State(0, 0.0, 0.0, 1.0, 0.0), "mouth-edge"),
-        (STATIC, State(0, 0.75, 0.0, 1.0, 0.0, "base"), "sliding"),
-        (STATIC, State(0, 0.75, 0.0, 1.0, 0.0), "sliding"),
-        (BOX, State(0, 1.0, -0.5, 0.0, 1.0, "right"), "sliding"),
-        (LIFT, State(0, 0.0, -2.0, 0.0, 0.0, "floor"), "sliding"),
-    ],
-)
-def test_undefined_is_proved_by_rational_arithmetic(scene, state, reason):
-    assert reference.next_collision(scene, state, 100.0) == Undefined(reason)
 
 
 def test_a_path_of_fixed_precision_ends_where_it_no_longer_tells():
@@ -242,23 +198,6 @@ def test_trajectory_ends_at_its_horizon_and_at_corners():
     assert path.outcome == Undefined("corner")
 
 
-def test_jacobian_against_differences():
-    scene, state = load("moving-cap"), State(0.3, 0.1, -0.2, 10.0, -27.0)
-    found = reference.next_collision(scene, state, 9.0, digits=40, is_differentiated=True)
-    assert isinstance(found, reference.Collision)
-    h = 2.0**-30
-    for column, field in enumerate(("t", "x", "y", "vx", "vy")):
-        ends = []
-        for sign_of in (1, -1):
-            moved = {name: getattr(state, name) for name in ("t", "x", "y", "vx", "vy")}
-            moved[field] += sign_of * h * 8
-            ends.append(hit(scene, State(**moved), 9.0))
-        for row, (plus, minus) in enumerate(zip(*((e.dt, *e.after[1:]) for e in ends), strict=True)):
-            difference = float((centre(plus) - centre(minus)) / Fraction(16 * h))
-            assert found.jacobian is not None
-            assert float(found.jacobian[row][column]) == pytest.approx(difference, rel=1e-6, abs=1e-6)
-
-
 def test_threads_at_different_digits_do_not_disturb_each_other():
     state = State(0.0, 0.1, 0.3, 10.0, 7.0)
     alone = {d: hit(load("moving-cap"), state, digits=d).dt for d in (10, 80)}
@@ -329,7 +268,7 @@ def test_wall_functions_enclose_plain_values(drawn, a, b):
     """f, f', f'' over an interval contain the value and differences at points of it."""
     scene, state, t_end = drawn
     arithmetic = Arithmetic(40)
-    motion = Motion(arithmetic, scene, flight_from(arithmetic, state))
+    motion = MovingWalls(arithmetic, scene, flight_from(arithmetic, state))
     span = t_end - state.t
     lo, hi = sorted((a * span, b * span))
     whole = arithmetic.context.mpf([lo, hi])

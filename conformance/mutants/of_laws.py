@@ -15,7 +15,15 @@ from typing import ClassVar
 from mpmath import fp
 from msgspec.structs import replace
 
-from conformance.plain.motion import Half, Legs, Motion, Still, Wave, turned
+from conformance.plain.motion import (
+    BangBangMotion,
+    ConstantMotion,
+    FourierMotion,
+    Half,
+    LawMotion,
+    LawValue,
+    turned,
+)
 from conformance.plain.step import Flight
 from scene import BangBang, Fourier, Law, Scene, State
 from scene.laws import frequency
@@ -26,7 +34,7 @@ def single(x: float) -> float:
     return float(struct.unpack("f", struct.pack("f", max(-3e38, min(x, 3e38))))[0])
 
 
-class _LinearLegs(Legs):
+class _LinearLegs(BangBangMotion):
     def halves(self, a: float, u: float, b: float, v: float) -> tuple[Half, Half]:
         middle = (a + b) / 2
         return Half(a, middle, a, u, 0.0), Half(middle, b, a, u, 0.0)
@@ -41,14 +49,14 @@ class _LinearLegs(Legs):
         self.value = u + legs[now][1] * (t - a)
         self.legs = [(a + legs[now][0] - t, legs[now][1]), *legs[now + 1 :], *legs[: now + 1]]
 
-    def at(self, s: float) -> Motion:
+    def at(self, s: float) -> LawValue:
         rise, rate, left = 0.0, 0.0, fmod(s, self.period)
         for duration, rate in self.legs:
             step = min(duration, left)
             rise, left = rise + rate * step, left - step
             if left <= 0:
                 break
-        return Motion(self.value, rise, rate)
+        return LawValue(self.value, rise, rate)
 
 
 class LegsAtConstantSpeed(Flight):
@@ -57,7 +65,7 @@ class LegsAtConstantSpeed(Flight):
     kinds: ClassVar = {**Flight.kinds, BangBang: _LinearLegs}
 
 
-class _UnbrokenLegs(Legs):
+class _UnbrokenLegs(BangBangMotion):
     def halves(self, a: float, u: float, b: float, v: float) -> tuple[Half, Half]:
         middle, pull = (a + b) / 2, 4 * (v - u) / (b - a) / (b - a)
         return Half(a, middle, a, u, pull), Half(middle, b, b, v, pull)
@@ -72,14 +80,14 @@ class HalfLegAccelerationSign(Flight):
 class PhaseOffByOneKnot(Flight):
     """Takes each knot's value from the knot after it."""
 
-    def law(self, law: Law) -> Still | Wave | Legs:
+    def law(self, law: Law) -> LawMotion:
         if isinstance(law, BangBang):
             times, values = zip(*law.knots, strict=True)
             law = BangBang(knots=tuple(zip(times, [*values[1:], values[1]], strict=True)))
         return super().law(law)
 
 
-class _UnwrappedLegs(Legs):
+class _UnwrappedLegs(BangBangMotion):
     def __init__(self, law: BangBang, t: float) -> None:
         super().__init__(law, t)
         self.left = max(law.knots[-1][0] - t, 0.0)
@@ -87,7 +95,7 @@ class _UnwrappedLegs(Legs):
             self.value, self.pieces = law.knots[-1][1], [(self.period, 0.0)]
             self.rate = 0.0
 
-    def at(self, s: float) -> Motion:
+    def at(self, s: float) -> LawValue:
         return super().at(min(s, self.left))
 
 
@@ -97,7 +105,7 @@ class PeriodWrapLost(Flight):
     kinds: ClassVar = {**Flight.kinds, BangBang: _UnwrappedLegs}
 
 
-class _HalvedPull(Legs):
+class _HalvedPull(BangBangMotion):
     def halves(self, a: float, u: float, b: float, v: float) -> tuple[Half, Half]:
         one, two = super().halves(a, u, b, v)
         return one._replace(pull=one.pull / 2), two._replace(pull=two.pull / 2)
@@ -109,8 +117,8 @@ class HalfTheAcceleration(Flight):
     kinds: ClassVar = {**Flight.kinds, BangBang: _HalvedPull}
 
 
-class _Coarse(Wave):
-    def at(self, s: float) -> Motion:
+class _Coarse(FourierMotion):
+    def at(self, s: float) -> LawValue:
         now, then = super().at(s), super().at(s + 1e-6)
         return now._replace(rate=(then.rise - now.rise) / 1e-6)
 
@@ -121,12 +129,12 @@ class RateByDifferences(Flight):
     kinds: ClassVar = {**Flight.kinds, Fourier: _Coarse}
 
 
-class _SlowHarmonics(Wave):
+class _SlowHarmonics(FourierMotion):
     def __init__(self, law: Fourier, t: float) -> None:
         super().__init__(law, t)
         self.omega = frequency(fp, law)
 
-    def at(self, s: float) -> Motion:
+    def at(self, s: float) -> LawValue:
         rate = sum(self.omega * (b * cos(f * s) - a * sin(f * s)) for f, a, b in self.waves)
         return super().at(s)._replace(rate=rate)
 
@@ -140,7 +148,7 @@ class RateWithoutHarmonicNumber(Flight):
 class HarmonicsIgnored(Flight):
     """Keeps the first harmonic of a Fourier law only."""
 
-    def law(self, law: Law) -> Still | Wave | Legs:
+    def law(self, law: Law) -> LawMotion:
         if isinstance(law, Fourier):
             law = replace(law, cos=law.cos[:1], sin=law.sin[:1])
         return super().law(law)
@@ -149,7 +157,7 @@ class HarmonicsIgnored(Flight):
 class SineAndCosineSwapped(Flight):
     """Takes the cosine amplitudes for the sine's."""
 
-    def law(self, law: Law) -> Still | Wave | Legs:
+    def law(self, law: Law) -> LawMotion:
         if isinstance(law, Fourier):
             law = replace(law, cos=law.sin, sin=law.cos)
         return super().law(law)
@@ -158,7 +166,7 @@ class SineAndCosineSwapped(Flight):
 class PhaseSign(Flight):
     """Runs the phase of a Fourier law backwards: sines change sign."""
 
-    def law(self, law: Law) -> Still | Wave | Legs:
+    def law(self, law: Law) -> LawMotion:
         if isinstance(law, Fourier):
             law = replace(law, sin=tuple(-b for b in law.sin))
         return super().law(law)
@@ -167,13 +175,13 @@ class PhaseSign(Flight):
 class OmegaAsFrequency(Flight):
     """Takes omega for cycles per unit of time: too fast by 2 pi."""
 
-    def law(self, law: Law) -> Still | Wave | Legs:
+    def law(self, law: Law) -> LawMotion:
         if isinstance(law, Fourier):
             law = replace(law, omega=6.283185307179586 * frequency(fp, law), period=None)
         return super().law(law)
 
 
-class _RoundPi(Wave):
+class _RoundPi(FourierMotion):
     def __init__(self, law: Fourier, t: float) -> None:
         period = 2 * 3.14159 / frequency(fp, law)
         super().__init__(law, fmod(t, period))
@@ -185,7 +193,7 @@ class PiTooShort(Flight):
     kinds: ClassVar = {**Flight.kinds, Fourier: _RoundPi}
 
 
-class _NoRestart(Wave):
+class _NoRestart(FourierMotion):
     def __init__(self, law: Fourier, t: float) -> None:
         super().__init__(law, t)
         omega = frequency(fp, law)
@@ -202,8 +210,8 @@ class PhaseRestartsAtEachStep(Flight):
 class TimeInFloat32(Flight):
     """Keeps the time of departure in binary32."""
 
-    def law(self, law: Law) -> Still | Wave | Legs:
-        found: Still | Wave | Legs = self.kinds[type(law)](law, single(self.state.t))
+    def law(self, law: Law) -> LawMotion:
+        found: LawMotion = self.kinds[type(law)](law, single(self.state.t))
         return found
 
 
@@ -222,4 +230,4 @@ class SlopeConstantThoughALaw(Flight):
         super().__init__(scene, state, t_end)
         if "slope" in self.laws:
             law = getattr(scene, "slope")  # noqa: B009 (a cap has none)
-            self.laws["slope"] = Still(self.kinds[type(law)](law, 0.0).value, 0.0)
+            self.laws["slope"] = ConstantMotion(self.kinds[type(law)](law, 0.0).value, 0.0)

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from math import hypot
 
-from conformance.plain.motion import Legs, Motion, Still, Wave
+from conformance.plain.motion import ConstantMotion, LawMotion, LawValue
 from conformance.plain.step import Flight, Gap, Open
 from scene import Collision, Horizon, Outcome, Scene, State, Wall
 
@@ -116,13 +116,13 @@ class TiltRateDropped(Flight):
         return gap._replace(ft=self.width(s).rate) if wall in ("left", "right") else gap
 
 
-class _Negated(Still):
-    def __init__(self, law: Still | Wave | Legs) -> None:
+class _Negated(ConstantMotion):
+    def __init__(self, law: LawMotion) -> None:
         super().__init__(-law.value, 0.0)
         self.law = law
 
-    def at(self, s: float) -> Motion:
-        return Motion(*(-part for part in self.law.at(s)))
+    def at(self, s: float) -> LawValue:
+        return LawValue(*(-part for part in self.law.at(s)))
 
 
 class SlopeSign(Flight):
@@ -146,7 +146,7 @@ class LeftSideUpright(Flight):
 
 def _freeze(flight: Flight, name: str) -> None:
     if name in flight.laws:
-        flight.laws[name] = Still(flight.laws[name].value, 0.0)
+        flight.laws[name] = ConstantMotion(flight.laws[name].value, 0.0)
 
 
 class ArcStatic(Flight):
@@ -168,7 +168,7 @@ class FloorStatic(Flight):
 class HoleStatic(Flight):
     """Lets the mouth and the sides stand still during a flight."""
 
-    def width(self, s: float) -> Motion:
+    def width(self, s: float) -> LawValue:
         return super().width(0.0)._replace(rate=0.0)
 
 
@@ -185,14 +185,14 @@ class SidesNotMovedByTheHole(Flight):
 class HoleNotScaledByRadius(Flight):
     """Takes nu for the half-width of the mouth."""
 
-    def width(self, s: float) -> Motion:
+    def width(self, s: float) -> LawValue:
         return self.laws["w" if "w" in self.laws else "nu"].at(s)
 
 
 class HoleRateWithoutRadius(Flight):
     """Forgets that nu r grows with r too: its rate is nu' r."""
 
-    def width(self, s: float) -> Motion:
+    def width(self, s: float) -> LawValue:
         motion = super().width(s)
         if "w" in self.laws:
             return motion

@@ -16,7 +16,7 @@ from scene import BangBang, Fourier
 from scene.laws import frequency
 
 
-class Motion(NamedTuple):
+class LawValue(NamedTuple):
     """A law seen from departure: its value then, its rise since, its rate now."""
 
     value: float
@@ -29,18 +29,18 @@ class Motion(NamedTuple):
         return self.value + self.rise
 
 
-class Still:
+class ConstantMotion:
     """A law that is a number."""
 
     def __init__(self, law: float, t: float) -> None:
         self.value = law
 
-    def at(self, s: float) -> Motion:
+    def at(self, s: float) -> LawValue:
         """Return the motion at the time s since departure."""
-        return Motion(self.value, 0.0, 0.0)
+        return LawValue(self.value, 0.0, 0.0)
 
 
-class Wave:
+class FourierMotion:
     """A Fourier law from time t on: its waves a cos(f s) + b sin(f s) turned to begin there."""
 
     def __init__(self, law: Fourier, t: float) -> None:
@@ -48,11 +48,11 @@ class Wave:
         self.waves = [turned(k * omega, a, b, t) for k, a, b in law.harmonics()]
         self.value = law.mean + sum(a for _, a, _ in self.waves)
 
-    def at(self, s: float) -> Motion:
+    def at(self, s: float) -> LawValue:
         """Return the motion at the time s since departure; cos(f s) - 1 is -2 sin(f s / 2)^2."""
         rise = sum(b * sin(f * s) - 2 * a * sin(f * s / 2) ** 2 for f, a, b in self.waves)
         rate = sum(f * (b * cos(f * s) - a * sin(f * s)) for f, a, b in self.waves)
-        return Motion(self.value, rise, rate)
+        return LawValue(self.value, rise, rate)
 
 
 def turned(f: float, a: float, b: float, t: float) -> tuple[float, float, float]:
@@ -71,7 +71,7 @@ class Half(NamedTuple):
     pull: float
 
 
-class Legs:
+class BangBangMotion:
     """A bang-bang law from time t on: one period of pieces of constant acceleration."""
 
     def __init__(self, law: BangBang, t: float) -> None:
@@ -86,7 +86,7 @@ class Legs:
         ends = (half.end - t, half.pull), (t - half.begin, half.pull)
         self.pieces = [ends[0], *((other.end - other.begin, other.pull) for other in others), ends[1]]
 
-    def at(self, s: float) -> Motion:
+    def at(self, s: float) -> LawValue:
         """Return the motion at the time s since departure, carried from piece to piece."""
         rise, rate, left = 0.0, self.rate, fmod(s, self.period)
         for duration, pull in self.pieces:
@@ -96,9 +96,12 @@ class Legs:
             left -= step
             if left <= 0:
                 break
-        return Motion(self.value, rise, rate)
+        return LawValue(self.value, rise, rate)
 
     def halves(self, a: float, u: float, b: float, v: float) -> tuple[Half, Half]:
         """Cut the leg from value u at knot a to value v at knot b in two."""
         middle, pull = (a + b) / 2, 4 * (v - u) / (b - a) / (b - a)
         return Half(a, middle, a, u, pull), Half(middle, b, b, v, -pull)
+
+
+LawMotion = ConstantMotion | FourierMotion | BangBangMotion

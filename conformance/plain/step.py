@@ -15,7 +15,7 @@ from collections.abc import Sequence
 from math import hypot, inf, prod
 from typing import ClassVar, NamedTuple
 
-from conformance.plain.motion import Legs, Motion, Still, Wave
+from conformance.plain.motion import BangBangMotion, ConstantMotion, FourierMotion, LawMotion, LawValue
 from scene import (
     BangBang,
     Cap,
@@ -62,7 +62,7 @@ class Open(Exception):  # noqa: N818 (a question left open is no error)
 class Flight:
     """One straight flight from a state to its outcome; s is the time since departure."""
 
-    kinds: ClassVar = {float: Still, Fourier: Wave, BangBang: Legs}
+    kinds: ClassVar = {float: ConstantMotion, Fourier: FourierMotion, BangBang: BangBangMotion}
 
     def __init__(self, scene: Scene, state: State, t_end: float) -> None:
         self.scene, self.state, self.t_end = scene, state, t_end
@@ -76,9 +76,9 @@ class Flight:
         self.is_horizon = self.end == t_end - state.t
         self.crossing = self.crossing_time()
 
-    def law(self, law: Law) -> Still | Wave | Legs:
+    def law(self, law: Law) -> LawMotion:
         """Return a law as seen from departure."""
-        found: Still | Wave | Legs = self.kinds[type(law)](law, self.state.t)
+        found: LawMotion = self.kinds[type(law)](law, self.state.t)
         return found
 
     def starts_in_cap(self) -> bool:
@@ -207,13 +207,13 @@ class Flight:
         start = w.value + slope.value * self.y + side * self.x
         return Gap(start, rise, w.rate + slope.rate * y, side, slope.now)
 
-    def width(self, s: float) -> Motion:
+    def width(self, s: float) -> LawValue:
         """Return the half-width w of the mouth, or nu r."""
         if "w" in self.laws:
             return self.laws["w"].at(s)
         nu, r = self.laws["nu"].at(s), self.laws["r"].at(s)
         rise, rate = nu.rise * r.value + nu.now * r.rise, nu.rate * r.now + nu.now * r.rate
-        return Motion(nu.value * r.value, rise, rate)
+        return LawValue(nu.value * r.value, rise, rate)
 
     def place(self, s: float) -> tuple[float, float]:
         """Return where the particle is."""

@@ -12,23 +12,13 @@ from typing import Any
 
 from flint import fmpq
 
-from conformance.second_proof.flight import Flight
+from conformance.arb.numbers import bisected, dyadic
+from conformance.second_proof.signs import SignedFlight
+from scene import Wall
 
 
 class Refuted(AssertionError):  # noqa: N818 (a verdict, not an error)
     """The certificate does not prove its answer, for this reason."""
-
-
-def dyadic(text: str) -> fmpq:
-    """Read "m*2^e"."""
-    mantissa, exponent = text.split("*2^")
-    return fmpq(int(mantissa)) * fmpq(2) ** int(exponent)
-
-
-def interval(ends: Any) -> tuple[fmpq, fmpq]:
-    """Read an enclosure [lower, upper]."""
-    low, high = map(dyadic, ends)
-    return low, high
 
 
 class Exclusion:
@@ -40,12 +30,12 @@ class Exclusion:
         excluded: for each wall its sub-intervals [start, end, kind] of flight time.
     """
 
-    def __init__(self, flight: Flight, begin: tuple[fmpq, fmpq], excluded: dict[str, Any]) -> None:
+    def __init__(self, flight: SignedFlight, begin: tuple[fmpq, fmpq], excluded: dict[str, Any]) -> None:
         self.flight = flight
         self.begin = begin
         self.excluded = excluded
 
-    def cover(self, wall: str, start: fmpq, stop: fmpq, *, may_touch: bool = False) -> None:
+    def cover(self, wall: Wall, start: fmpq, stop: fmpq, *, may_touch: bool = False) -> None:
         """Prove f > 0 from the flight's begin, or from `start` if that is later, to `stop`.
 
         Args:
@@ -63,22 +53,21 @@ class Exclusion:
             if dyadic(low) > reached and reached < stop:
                 break
             if a < b:
-                if not is_begun and not self.flight.at(wall, a)[0] > 0:
+                if not is_begun and not self.flight.jet(wall, a)[0] > 0:
                     raise Refuted(f"{wall} is not shown to be ahead at {float(a)!r}")
                 self._leaf(wall, a, b, kind)
                 reached, is_begun = b, True  # every kind proves f > 0 at its right end
         if reached < stop and not (may_touch and self._touches(wall, reached, stop)):
             raise Refuted(f"{wall} is not excluded from {float(reached)!r} on")
 
-    def _touches(self, wall: str, a: fmpq, b: fmpq) -> bool:
-        return bool(self.flight.at(wall, b)[0] == 0) and self.falls(wall, a, b)
+    def _touches(self, wall: Wall, a: fmpq, b: fmpq) -> bool:
+        return bool(self.flight.jet(wall, b)[0] == 0) and self.falls(wall, a, b)
 
-    def falls(self, wall: str, a: fmpq, b: fmpq) -> bool:
+    def falls(self, wall: Wall, a: fmpq, b: fmpq) -> bool:
         """Tell whether f' < 0 on [a, b]."""
-        cuts = self.flight.cuts(a, b)
-        return all(self.flight.has_slope(-1, wall, *piece) for piece in itertools.pairwise(cuts))
+        return self._has_slope(-1, wall, a, b)
 
-    def _leaf(self, wall: str, a: fmpq, b: fmpq, kind: str) -> None:
+    def _leaf(self, wall: Wall, a: fmpq, b: fmpq, kind: str) -> None:
         """Prove f > 0 on (a, b], in the way stated, on each piece of the laws; f >= 0 at a is known."""
         if kind == "swept":
             if not self.flight.is_never_swept(wall, a, b):
@@ -86,7 +75,7 @@ class Exclusion:
             return
         pieces = list(itertools.pairwise(self.flight.cuts(a, b)))
         if kind == "falling":
-            holds = self.falls(wall, a, b) and bool(self.flight.at(wall, b)[0] > 0)
+            holds = self.falls(wall, a, b) and bool(self.flight.jet(wall, b)[0] > 0)
         elif kind == "concave":
             holds = self._is_concave(wall, a, b, pieces)
         else:
@@ -94,17 +83,17 @@ class Exclusion:
         if not holds or (self._may_begin(wall, a) and not self._begins(wall, a, b, kind)):
             raise Refuted(f"{wall} is not excluded, {kind}, on [{float(a)!r}, {float(b)!r}]")
 
-    def _may_begin(self, wall: str, a: fmpq) -> bool:
+    def _may_begin(self, wall: Wall, a: fmpq) -> bool:
         """Tell whether the flight may begin, on this wall, at a or later."""
         return wall in self.flight.residuals and a <= self.begin[1]
 
-    def _begins(self, wall: str, a: fmpq, b: fmpq, kind: str) -> bool:
+    def _begins(self, wall: Wall, a: fmpq, b: fmpq, kind: str) -> bool:
         """Tell whether a sub-interval of this kind proves f > 0 from f = 0, wherever within it that is."""
         if kind == "concave":
             return bool(a <= self.begin[0] and self.begin[1] < b)
         return kind in ("rising", "lifting")
 
-    def _holds(self, wall: str, a: fmpq, b: fmpq, kind: str) -> bool:
+    def _holds(self, wall: Wall, a: fmpq, b: fmpq, kind: str) -> bool:
         """Prove what a kind says on one piece."""
         flight = self.flight
         if kind in ("plain", "centred"):
@@ -113,14 +102,14 @@ class Exclusion:
             return flight.has_slope(1, wall, a, b)
         if kind == "lifting":
             is_flat = self.begin[0] == self.begin[1] and wall in flight.residuals
-            jet = flight.at(wall, self.begin[0])
+            jet = flight.jet(wall, self.begin[0])
             return is_flat and bool(jet[1] == 0) and bool(flight.over(wall, a, b)[2] > 0)
         raise Refuted(f"no such kind: {kind}")
 
-    def _is_concave(self, wall: str, a: fmpq, b: fmpq, pieces: list[tuple[fmpq, fmpq]]) -> bool:
+    def _is_concave(self, wall: Wall, a: fmpq, b: fmpq, pieces: list[tuple[fmpq, fmpq]]) -> bool:
         """Prove that f lies above its chord, or, where f'' touches 0 and no ball shows its sign, f > 0."""
         flight = self.flight
-        if not flight.at(wall, b)[0] > 0:
+        if not flight.jet(wall, b)[0] > 0:
             return False
         if all(flight.is_concave(wall, *piece) for piece in pieces):
             return True
@@ -131,31 +120,19 @@ class Exclusion:
             return all(flight.is_positive(wall, *piece) for piece in pieces)
         # From the wall itself, f = 0 where it begins: f rises at first, and is positive after that.
         rests = (a + (b - a) / 2**k for k in range(1, 60))
-        rest = next((s for s in rests if self._rises(wall, a, s)), b)
+        rest = next((s for s in rests if self._has_slope(1, wall, a, s)), b)
         if not self.begin[1] < rest < b:
             return False
         return all(flight.is_positive(wall, *piece) for piece in itertools.pairwise(flight.cuts(rest, b)))
 
-    def _rises(self, wall: str, a: fmpq, b: fmpq) -> bool:
-        cuts = self.flight.cuts(a, b)
-        return all(self.flight.has_slope(1, wall, *piece) for piece in itertools.pairwise(cuts))
+    def _has_slope(self, sign: int, wall: Wall, a: fmpq, b: fmpq) -> bool:
+        pieces = itertools.pairwise(self.flight.cuts(a, b))
+        return all(self.flight.has_slope(sign, wall, *piece) for piece in pieces)
 
-    def refined_root(self, wall: str, low: fmpq, high: fmpq, n_halvings: int) -> tuple[fmpq, fmpq]:
+    def refined_root(self, wall: Wall, low: fmpq, high: fmpq, n_halvings: int) -> tuple[fmpq, fmpq]:
         """Prove that f falls through 0 within [low, high], once, and enclose it more tightly."""
-        flight = self.flight
-        if not (flight.at(wall, low)[0] > 0 and flight.at(wall, high)[0] < 0):
+        if not (self.flight.jet(wall, low)[0] > 0 and self.flight.jet(wall, high)[0] < 0):
             raise Refuted("f does not change sign from + to - over the root interval")
         if not self.falls(wall, low, high):
             raise Refuted("f' is not negative throughout the root interval")
-        for _ in range(n_halvings):
-            # The root itself may lie half way; then it does not lie at a third.
-            for middle in ((low + high) / 2, (2 * low + high) / 3):
-                f = flight.at(wall, middle)[0]
-                if f > 0:
-                    low = middle
-                elif f < 0:
-                    high = middle
-                else:
-                    continue
-                break
-        return low, high
+        return bisected(lambda s: self.flight.jet(wall, s)[0], low, high, n_halvings)

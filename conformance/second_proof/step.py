@@ -3,39 +3,38 @@
 From scene and state alone it follows which walls can be met, and when: the arc in the cap, the
 sides and the floor in the stem, the base or the mouth where the flight crosses y = 0. The
 certificate only says where to cut and which sign to look for; each sign is proved here, with the
-laws and walls of `flight`. The steps of a trajectory are proved for every state of the box
+laws and walls of `conformance.arb`. The steps of a trajectory are proved for every state of the box
 that they start from (`trajectory`), undefined outcomes by exact zeros (`undefined`).
 Not checked: whether a state lies close enough to the wall it names.
 """
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import reduce
 from typing import Any, NamedTuple
 
 import flint
 from flint import arb, fmpq
 
-from conformance.second_proof.exclusion import Exclusion, Refuted, dyadic, interval
-from conformance.second_proof.flight import Flight, Number, ball, exact
-from conformance.second_proof.precision import precision
+from conformance.arb.flight import SIDES
+from conformance.arb.numbers import ZERO, Number, exact, hull, interval, precision, rational_ends
+from conformance.second_proof.exclusion import Exclusion, Refuted
+from conformance.second_proof.signs import SignedFlight, flight_from
 from conformance.second_proof.undefined import check_undefined
-from scene import BadInput, Cap, Mushroom, Scene, Stem, from_data
+from scene import BadInput, Scene, Wall, from_data
 
-__all__ = ["Refuted", "Step", "check", "opened"]
+__all__ = ["Refuted", "StepProof", "check", "opened"]
 
-SIDES = ("left", "right", "floor")
-ZERO = (fmpq(0), fmpq(0))
 PARTS = (1, 16, 128)  # into how many a piece is cut, one after the other, until balls are thin enough
 
 
-class Stretch(NamedTuple):
+class WallStretch(NamedTuple):
     """Walls to exclude on [start, stop] of flight time."""
 
-    walls: tuple[str, ...]
+    walls: tuple[Wall, ...]
     start: fmpq
     stop: fmpq
 
@@ -65,12 +64,12 @@ def check(certificate: dict[str, Any]) -> None:
         Refuted: saying what does not hold.
     """
     with opened(certificate) as scene:
-        flight = Flight(scene, certificate["state"])
-        end = exact(certificate["t_end"]) - flight.t
+        flight = flight_from(scene, certificate["state"])
+        end = exact(certificate["t_end"]) - flight.line.t
         if certificate["outcome"] == "undefined":
             check_undefined(flight, certificate, end)
             return
-        Step(flight, ZERO, certificate, end).check()
+        StepProof(flight, (ZERO, ZERO), certificate, end).check()
 
 
 def _bits(data: Any) -> Iterator[int]:
@@ -85,7 +84,7 @@ def _bits(data: Any) -> Iterator[int]:
         yield max(mantissa.bit_length(), abs(exponent) if exponent > 0 else 0)
 
 
-class Step:
+class StepProof:
     """What a certificate claims about one flight.
 
     Args:
@@ -98,7 +97,7 @@ class Step:
 
     def __init__(
         self,
-        flight: Flight,
+        flight: SignedFlight,
         begin: tuple[fmpq, fmpq],
         claim: dict[str, Any],
         end: fmpq | None,
@@ -106,7 +105,7 @@ class Step:
         is_exact: bool = True,
     ) -> None:
         self.flight, self.begin, self.end, self.is_exact = flight, begin, end, is_exact
-        self.wall: str | None = claim["wall"]
+        self.wall: Wall | None = claim["wall"]
         self.root, self.dt = (None if claim[key] is None else interval(claim[key]) for key in ("root", "dt"))
         self.after = {name: interval(ends) for name, ends in claim["after"].items()}
         self.exclusion = Exclusion(flight, begin, claim["excluded"])
@@ -128,8 +127,8 @@ class Step:
                 until = self.root[0] if wall == self.wall and self.root is not None else stop
                 self.exclusion.cover(wall, start, until, may_touch=self.root is None and stop == self.end)
         if not self.is_hit:
-            f = self.flight
-            at = (f.t + self.end, f.x + f.vx * self.end, f.y + f.vy * self.end, f.vx, f.vy)
+            line = self.flight.line
+            at = (line.t + self.end, *self.flight.place(self.end), line.vx, line.vy)
             if (misplaced := self._misplaced(at)) is not None:
                 raise Refuted(f"{misplaced} afterwards is not what was claimed")
             return None
@@ -156,12 +155,12 @@ class Step:
             return low, high
         return self.exclusion.refined_root(self.wall, *self.root, flint.ctx.prec // 4)
 
-    def _stretches(self) -> list[Stretch]:
+    def _stretches(self) -> list[WallStretch]:
         """Say which walls can be met where, up to the claimed end of the flight."""
-        f, in_cap, begin = self.flight, is_in_cap(self.flight), self.begin[0]
-        near: tuple[str, ...] = ("arc",) if in_cap else SIDES
-        far: tuple[str, ...] = SIDES if in_cap else ("arc",)
-        if isinstance(f.scene, Mushroom) and f.wall is None and f.y == 0 and f.vy == 0:
+        f, in_cap, begin = self.flight, self.flight.begins_in_cap(), self.begin[0]
+        near: tuple[Wall, ...] = ("arc",) if in_cap else SIDES
+        far: tuple[Wall, ...] = SIDES if in_cap else ("arc",)
+        if f.table.is_mushroom and f.wall is None and f.line.y == f.line.vy == 0:
             near = ("left", "right")
             if self.is_hit:
                 raise Refuted("along the mouth no wall is hit")
@@ -175,16 +174,16 @@ class Step:
             if not is_crossing or (self.end is not None and not self._crossing_time()[1] < self.end):
                 raise Refuted("y = 0 is not crossed before the horizon")
             self._require_closed(in_cap)
-            return [Stretch(near, begin, self._crossing_time()[1])]
+            return [WallStretch(near, begin, self._crossing_time()[1])]
         if not is_crossing or self._ends_before_crossing(end):
             if self.wall is not None and self.wall not in near:
                 raise Refuted(f"{self.wall} cannot be met on this side of y = 0")
-            return [Stretch(near, begin, end)]
+            return [WallStretch(near, begin, end)]
         low, high = self._crossing_time()
         if self.root is not None and (self.wall not in far or not high < self.root[0]):
             raise Refuted(f"{self.wall} cannot be met beyond y = 0, or not that early")
         self._require_open()
-        return [Stretch(near, begin, high), Stretch(far, low, end)]
+        return [WallStretch(near, begin, high), WallStretch(far, low, end)]
 
     def _require_order(self) -> None:
         if self.root is None or self.wall == "base":
@@ -201,14 +200,15 @@ class Step:
     def _is_crossing(self, in_cap: bool) -> bool:
         """Tell whether the flight heads for y = 0, which it then crosses after it begins."""
         f, inward = self.flight, 1 if in_cap else -1
-        if f.wall == "base" or (f.y == 0 and not isinstance(f.scene, Mushroom)):
-            if not inward * f.vy > 0:
+        y, vy = f.line.y, f.line.vy
+        if f.wall == "base" or (y == 0 and not f.table.is_mushroom):
+            if not inward * vy > 0:
                 raise Refuted("the particle does not leave the base")
             return False
-        if self.is_exact and (inward * f.y < 0 or (f.y == 0 and inward * f.vy < 0)):
+        if self.is_exact and (inward * y < 0 or (y == 0 and inward * vy < 0)):
             raise Refuted("the state is beyond y = 0")
-        if not inward * f.vy < 0:
-            if not inward * f.vy >= 0:
+        if not inward * vy < 0:
+            if not inward * vy >= 0:
                 raise Refuted("the sign of vy is open")
             return False
         if self._crossing_time()[0] <= self.begin[1] and not self.is_exact:
@@ -216,22 +216,18 @@ class Step:
         return True
 
     def _crossing_time(self) -> tuple[fmpq, fmpq]:
-        return rational_ends(-self.flight.y / self.flight.vy)
+        return rational_ends(-self.flight.line.y / self.flight.line.vy)
 
     def _parts(self, low: fmpq, high: fmpq, n_parts: int) -> list[tuple[fmpq, fmpq]]:
-        """Cut [low, high] at the knots, and each piece evenly: balls of whole pieces may be too wide."""
-        if low == high:
-            return [(low, high)]
-        pieces = itertools.pairwise(self.flight.cuts(low, high))
-        ends = [(a, (b - a) / n_parts) for a, b in pieces]
-        return [(a + i * width, a + (i + 1) * width) for a, width in ends for i in range(n_parts)]
+        """Cut [low, high] evenly: the ball of the whole may be too wide."""
+        width = (high - low) / n_parts
+        return [(low + i * width, low + (i + 1) * width) for i in range(n_parts if width else 1)]
 
     def _gaps(self, a: fmpq, b: fmpq) -> list[Number]:
-        """Enclose the distances to the sides at y = 0, crossed within [a, b] on one piece of the laws."""
-        f, s = self.flight, ball(a, b)
-        w, x = f.width(s, (a + b) / 2)[0], f.x + f.vx * s
-        left, right = (f.residuals.get(wall, fmpq(0)) for wall in ("left", "right"))
-        return [w - x - right, w + x - left]
+        """Enclose the distances to the sides at y = 0, crossed within [a, b]."""
+        f, s = self.flight, hull(a, b)
+        w, x = f.width(s)[0], f.place(s)[0]
+        return [w - x - f.residuals.get("right", ZERO), w + x - f.residuals.get("left", ZERO)]
 
     def _at_crossing(self, holds: Callable[[list[Number]], bool]) -> bool:
         """Tell whether the gaps have a property wherever within its enclosure the crossing is."""
@@ -241,44 +237,29 @@ class Step:
         )
 
     def _require_open(self) -> None:
-        if not isinstance(self.flight.scene, Mushroom):
+        if not self.flight.table.is_mushroom:
             raise Refuted("the base is closed: it is hit")
         if not self._at_crossing(_are_positive):
             raise Refuted("the mouth is not open where y = 0 is crossed")
 
     def _require_closed(self, in_cap: bool) -> None:
-        scene = self.flight.scene
-        if isinstance(scene, Mushroom):
+        table = self.flight.table
+        if table.is_mushroom:
             if not in_cap:
                 raise Refuted("from the stem no base is met")
             if not self._at_crossing(lambda gaps: any(gap < 0 for gap in gaps)):
                 raise Refuted("the mouth is open where y = 0 is crossed")
-        if isinstance(scene, Stem) and not self._at_crossing(_are_positive):
+        if table.is_stem and not self._at_crossing(_are_positive):
             raise Refuted("the top is crossed beside the stem")
 
     def moment(self, low: fmpq, high: fmpq) -> tuple[Number, ...]:
-        """Return t, x, y, vx, vy after the wall is met at [low, high]: v - 2 f' grad f / |grad f|^2."""
-        f, s = self.flight, ball(low, high)
-        x, y = f.x + f.vx * s, f.y + f.vy * s
-        if self.wall == "base":
-            return f.t + s, x, fmpq(0), f.vx, -f.vy
-        # At a knot both pieces' velocities are taken; they differ by no more than the time is enclosed.
-        velocities = [self._reflected(*part) for part in self._parts(low, high, self.n_parts)]
-        vx, vy = velocities[0]
-        for other_x, other_y in velocities[1:]:
-            vx, vy = arb(vx).union(arb(other_x)), arb(vy).union(arb(other_y))
-        return f.t + s, x, y, vx, vy
-
-    def _reflected(self, a: fmpq, b: fmpq) -> tuple[Number, Number]:
-        f, s, within = self.flight, ball(a, b), (a + b) / 2
-        x, y = f.x + f.vx * s, f.y + f.vy * s
-        gradient: tuple[Number, Number] = (fmpq(0), fmpq(1))
-        if self.wall == "arc":
-            gradient = (-2 * x, -2 * y)
-        elif self.wall != "floor":
-            gradient = (fmpq(1 if self.wall == "left" else -1), f.law("slope", s, within)[0])
-        factor = 2 * f.jet(str(self.wall), s, within)[1] / (gradient[0] ** 2 + gradient[1] ** 2)
-        return f.vx - factor * gradient[0], f.vy - factor * gradient[1]
+        """Return t, x, y, vx, vy after the wall is met at [low, high]."""
+        assert self.wall is not None
+        f, s = self.flight, hull(low, high)
+        x, y = f.place(s)
+        velocities = [f.reflected(self.wall, hull(*part)) for part in self._parts(low, high, self.n_parts)]
+        vx, vy = (reduce(hull, numbers) for numbers in zip(*velocities, strict=True))
+        return f.line.t + s, x, ZERO if self.wall == "base" else y, vx, vy
 
     def _misplaced(self, moment: tuple[Number, ...]) -> str | None:
         """Return the name of a number that is not shown to lie where it is claimed; None when all do."""
@@ -291,21 +272,3 @@ class Step:
 
 def _are_positive(numbers: list[Number]) -> bool:
     return all(number > 0 for number in numbers)
-
-
-def is_in_cap(f: Flight) -> bool:
-    """Tell whether a flight begins in the cap."""
-    if not isinstance(f.scene, Mushroom):
-        return isinstance(f.scene, Cap)
-    return f.wall in ("arc", "base") or (f.wall is None and (f.y > 0 or (f.y == 0 and f.vy > 0)))
-
-
-def rational_ends(number: Number) -> tuple[fmpq, fmpq]:
-    """Return rationals that enclose a number: the number itself when it is one."""
-    if isinstance(number, fmpq):
-        return number, number
-    ends = []
-    for end in (number.lower(), number.upper()):
-        mantissa, exponent = end.man_exp()
-        ends.append(dyadic(f"{int(mantissa)}*2^{int(exponent)}"))
-    return ends[0], ends[1]

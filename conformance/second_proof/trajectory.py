@@ -14,11 +14,13 @@ from typing import Any
 
 from flint import arb, fmpq
 
-from conformance.second_proof.exclusion import Refuted, dyadic, interval
-from conformance.second_proof.flight import Flight, Number, ball, exact
-from conformance.second_proof.step import Step, opened
+from conformance.arb.flight import Line
+from conformance.arb.numbers import ZERO, Number, dyadic, exact, hull, interval
+from conformance.second_proof.exclusion import Refuted
+from conformance.second_proof.signs import SignedFlight, flight_from
+from conformance.second_proof.step import StepProof, opened
 from conformance.second_proof.undefined import check_undefined
-from scene import Scene
+from scene import Wall
 
 BOX = ("x", "y", "vx", "vy")
 Begin = tuple[fmpq, fmpq]
@@ -34,25 +36,25 @@ def check_path(certificate: dict[str, Any]) -> None:
         Refuted: naming the step and what does not hold.
     """
     with opened(certificate) as scene:
-        flight = Flight(scene, certificate["state"])
-        begin: Begin = (fmpq(0), fmpq(0))
+        flight = flight_from(scene, certificate["state"])
+        begin: Begin = (ZERO, ZERO)
         t_end = None if certificate["t_end"] is None else exact(certificate["t_end"])
         for number, claim in enumerate(certificate["steps"], 1):
             try:
-                end = None if t_end is None else t_end - flight.t
+                end = None if t_end is None else t_end - flight.line.t
                 if claim["outcome"] == "undefined":
                     if number > 1 or end is None:
                         raise Refuted("only the first step can be undefined, before a horizon")
                     check_undefined(flight, claim, end)
                     _require_last(certificate, number)
                     return
-                step = Step(flight, begin, claim, end, is_exact=number == 1)
+                step = StepProof(flight, begin, claim, end, is_exact=number == 1)
                 root = step.check()
                 if root is None:
                     _require_last(certificate, number)
                     return
                 if number < len(certificate["steps"]):
-                    flight, begin = _next(scene, step, root, certificate["steps"][number])
+                    flight, begin = _next(step, root, certificate["steps"][number])
             except Refuted as reason:
                 raise Refuted(f"step {number}: {reason}") from None
 
@@ -62,9 +64,10 @@ def _require_last(certificate: dict[str, Any], number: int) -> None:
         raise Refuted("a path goes on where it has ended")
 
 
-def _next(scene: Scene, step: Step, root: Begin, claim: dict[str, Any]) -> tuple[Flight, Begin]:
+def _next(step: StepProof, root: Begin, claim: dict[str, Any]) -> tuple[SignedFlight, Begin]:
     """Return the flight after a collision, shown to hold all that the collision may lead to."""
-    old, s = step.flight, ball(*root)
+    assert step.wall is not None
+    old, s = step.flight.line, hull(*root)
     departure = claim["departure"]
     instant = dyadic(departure["instant"])
     near = instant - old.t
@@ -72,18 +75,17 @@ def _next(scene: Scene, step: Step, root: Begin, claim: dict[str, Any]) -> tuple
     back: Number = near - s  # from the collision to the instant
     truth = {"x": _carried(old.x, old.vx, vx, near, s), "vx": vx, "vy": vy}
     truth["y"] = y + vy * back if step.wall == "base" else _carried(old.y, old.vy, vy, near, s)
-    new = Flight(scene, {"t": 0.0, "x": 0.0, "y": 0.0, "vx": 0.0, "vy": 0.0, "wall": step.wall})
-    new.t = instant
+    box = []
     for name in BOX:
         low, high = interval(departure[name])
         if not (arb(low) <= truth[name] and truth[name] <= arb(high)):
             raise Refuted(f"the next step's {name} does not hold where this one leads")
-        setattr(new, name, low if low == high else ball(low, high))
+        box.append(low if low == high else hull(low, high))
     begin = interval(departure["begin"])
     if not (begin[0] <= root[0] - near and root[1] - near <= begin[1]):
         raise Refuted("the next step does not begin where this one ends")
-    new.residuals = _residuals(old, str(step.wall), departure["residuals"])
-    return new, begin
+    residuals = _residuals(step.flight, step.wall, departure["residuals"])
+    return SignedFlight(step.flight.table, Line(instant, *box), step.wall, residuals), begin
 
 
 def _carried(place: Number, speed: Number, later: Number, near: fmpq, s: Number) -> Number:
@@ -91,11 +93,11 @@ def _carried(place: Number, speed: Number, later: Number, near: fmpq, s: Number)
     return place + speed * near + (speed - later) * (s - near)
 
 
-def _residuals(old: Flight, wall: str, claimed: dict[str, Any]) -> dict[str, Number]:
+def _residuals(old: SignedFlight, wall: Wall, claimed: dict[str, Any]) -> dict[Wall, Number]:
     """Return the residual of the wall just met, as it is known here: what was taken out before, or 0."""
     if set(claimed) != {wall}:
         raise Refuted("the next step does not leave the wall that was met")
-    truth = old.residuals.get(wall, fmpq(0))
-    if not arb(truth).overlaps(ball(*interval(claimed[wall]))):
+    truth = old.residuals.get(wall, ZERO)
+    if not arb(truth).overlaps(hull(*interval(claimed[wall]))):
         raise Refuted("the residual of the wall met is not carried on")
     return {} if wall == "base" else {wall: truth}

@@ -11,16 +11,18 @@ from typing import Any
 
 from flint import fmpq
 
-from conformance.second_proof.exclusion import Exclusion, Refuted, interval
-from conformance.second_proof.flight import Flight
-from scene import Mushroom, Stem
+from conformance.arb.flight import SIDES
+from conformance.arb.numbers import ZERO, interval
+from conformance.second_proof.exclusion import Exclusion, Refuted
+from conformance.second_proof.signs import SignedFlight
+from scene import Wall
 from scene.laws import is_constant
 from scene.tables import laws
 
-ZERO = (fmpq(0), fmpq(0))
+START = (ZERO, ZERO)
 
 
-def check_undefined(flight: Flight, claim: dict[str, Any], end: fmpq) -> None:
+def check_undefined(flight: SignedFlight, claim: dict[str, Any], end: fmpq) -> None:
     """Prove that a step has no answer.
 
     Args:
@@ -43,11 +45,13 @@ def check_undefined(flight: Flight, claim: dict[str, Any], end: fmpq) -> None:
 class _Undefined:
     """What is claimed about a flight that ends nowhere."""
 
-    def __init__(self, flight: Flight, claim: dict[str, Any], end: fmpq) -> None:
+    def __init__(self, flight: SignedFlight, claim: dict[str, Any], end: fmpq) -> None:
         self.flight, self.end = flight, end
         self.reason: str = claim["reason"]
-        self.walls: list[str] = claim["walls"]
-        self.roots = {wall: interval(ends) for wall, ends in claim["roots"].items()}
+        self.walls: list[Wall] = claim["walls"]
+        self.roots: dict[Wall, tuple[fmpq, fmpq]] = {
+            wall: interval(ends) for wall, ends in claim["roots"].items()
+        }
         self.excluded = claim["excluded"]
         self.instant = fmpq(*map(int, (claim["instant"] or "0/1").split("/")))
 
@@ -55,7 +59,8 @@ class _Undefined:
         """Prove that the state lies on two walls, at the mouth's edge, or slides along one."""
         if not self.walls or not all(map(self._is_on, self.walls)):
             raise Refuted("the state is not shown to lie on these walls")
-        is_edge = self._is_mushroom() and self.flight.y == 0 and {"left", "right"} & set(self.walls)
+        flight = self.flight
+        is_edge = flight.table.is_mushroom and flight.line.y == 0 and {"left", "right"} & set(self.walls)
         if self.reason in ("corner", "mouth-edge"):
             if len(self.walls) < 2 and not is_edge:
                 raise Refuted("the state lies on one wall only")
@@ -64,66 +69,65 @@ class _Undefined:
         if len(self.walls) > 1:
             raise Refuted("a particle slides along one wall")
         (wall,) = self.walls
-        _, slope, bend = (
-            (fmpq(0), self.flight.vy, fmpq(0)) if wall == "base" else self.flight.at(wall, fmpq(0))
-        )
+        _, slope, bend = flight.jet(wall, ZERO)
         if not slope == 0:
             raise Refuted("f' does not vanish at the start")
         if bend > 0 or not (bend <= 0):
             raise Refuted("f'' is not shown to let the particle rest on the wall")
-        is_at_rest = all(is_constant(law) for law in laws(self.flight.scene).values())
+        is_at_rest = all(is_constant(law) for law in laws(self.flight.table.scene).values())
         self._require_reason("sliding" if bend < 0 or is_at_rest or wall == "base" else "tangency")
 
     def later(self) -> None:
         """Prove that two walls are met together, for the first time, and no other before."""
-        in_cap = self._begins_in_cap()
-        near = ["arc"] if in_cap else ["left", "right", "floor"]
         f, s = self.flight, self.instant
+        near: tuple[Wall, ...] = ("arc",) if f.begins_in_cap() else SIDES
         if not 0 < s < self.end:
             raise Refuted("the instant does not lie before the horizon")
-        f.leave(tuple(near))
+        f.leave(near)
         if len(set(self.walls)) < 2:
             raise Refuted("one wall alone is met")
-        crossing = -f.y / f.vy if f.vy != 0 and f.wall != "base" else None
+        crossing = -f.line.y / f.line.vy if f.line.vy != 0 and f.wall != "base" else None
         is_crossing = crossing is not None and crossing > 0
         if "base" in self.walls and not (is_crossing and crossing == s):
             raise Refuted("y = 0 is not crossed then")
         if is_crossing and crossing < s:
             raise Refuted("y = 0 is crossed before")
-        exclusion = Exclusion(f, ZERO, self.excluded)
+        exclusion = Exclusion(f, START, self.excluded)
         for wall in set(self.walls) - {"base"}:
-            if not f.at(wall, s)[0] == 0:
+            if not f.jet(wall, s)[0] == 0:
                 raise Refuted(f"{wall} is not shown to be met exactly then")
             if wall in near:
                 self._require_first(exclusion, wall)
             elif not ("base" in self.walls and wall in ("left", "right")):
                 raise Refuted(f"{wall} cannot be met on this side of y = 0")
         for wall in set(near) - set(self.walls):
-            exclusion.cover(wall, fmpq(0), s)
-        is_edge = self._is_mushroom() and "base" in self.walls and "arc" not in self.walls
+            exclusion.cover(wall, ZERO, s)
+        is_edge = self.flight.table.is_mushroom and "base" in self.walls and "arc" not in self.walls
         self._require_reason("mouth-edge" if is_edge else "corner")
 
     def along_mouth(self) -> None:
         """Prove that a path along y = 0 inside the mouth comes to its edge."""
         f = self.flight
-        if not (self._is_mushroom() and f.wall is None and f.y == 0 and f.vy == 0 and self.roots):
+        if not (f.table.is_mushroom and f.wall is None and f.line.y == f.line.vy == 0 and self.roots):
             raise Refuted("not a path along the mouth")
         self._require_reason("mouth-edge")
-        f.leave(("left", "right"))
+        sides: tuple[Wall, ...] = ("left", "right")
+        f.leave(sides)
         if f.residuals:
             raise Refuted("the path begins at the mouth's edge")
-        exclusion = Exclusion(f, ZERO, self.excluded)
+        exclusion = Exclusion(f, START, self.excluded)
         ends = [exclusion.refined_root(wall, *self._lead(exclusion, wall), 0)[1] for wall in self.roots]
         if not min(ends) < self.end:
             raise Refuted("the edge is not met before the horizon")
-        for wall in {"left", "right"} - set(self.roots):
-            exclusion.cover(wall, fmpq(0), min(ends))
+        for wall in sides:
+            if wall not in self.roots:
+                exclusion.cover(wall, ZERO, min(ends))
 
-    def _lead(self, exclusion: Exclusion, wall: str) -> tuple[fmpq, fmpq]:
-        exclusion.cover(wall, fmpq(0), self.roots[wall][0])
+    def _lead(self, exclusion: Exclusion, wall: Wall) -> tuple[fmpq, fmpq]:
+        exclusion.cover(wall, ZERO, self.roots[wall][0])
         return self.roots[wall]
 
-    def _require_first(self, exclusion: Exclusion, wall: str) -> None:
+    def _require_first(self, exclusion: Exclusion, wall: Wall) -> None:
         """Prove that the exact zero is the first root: f > 0 up to an interval on which f falls, once."""
         if wall not in self.roots or not self.roots[wall][0] <= self.instant <= self.roots[wall][1]:
             raise Refuted(f"{wall} has no root claimed around the instant")
@@ -133,23 +137,13 @@ class _Undefined:
         if self.reason != reason:
             raise Refuted(f"the reason is {reason}")
 
-    def _is_mushroom(self) -> bool:
-        return isinstance(self.flight.scene, Mushroom)
-
-    def _is_on(self, wall: str) -> bool:
+    def _is_on(self, wall: Wall) -> bool:
         """Tell whether the state is on a wall: it names it, or lies on it exactly."""
         f = self.flight
         if wall == f.wall:
             return True
-        if wall == "base" and self._is_mushroom() and f.wall is None:
+        is_met = bool(f.jet(wall, ZERO)[0] == 0)
+        if wall == "base" and f.table.is_mushroom and f.wall is None:
             # The base is beside the mouth only.
-            return bool(f.y == 0) and any(
-                gap < 0 for gap in (f.at("left", fmpq(0))[0], f.at("right", fmpq(0))[0])
-            )
-        return bool(f.y == 0 if wall == "base" else f.at(wall, fmpq(0))[0] == 0)
-
-    def _begins_in_cap(self) -> bool:
-        f = self.flight
-        if not self._is_mushroom():
-            return not isinstance(f.scene, Stem)
-        return f.wall in ("arc", "base") or (f.wall is None and (f.y > 0 or (f.y == 0 and f.vy > 0)))
+            return is_met and any(f.jet(side, ZERO)[0] < 0 for side in ("left", "right"))
+        return is_met

@@ -1,7 +1,7 @@
-"""A second stepper in ball arithmetic (Arb, through python-flint), which shares nothing with the reference.
+"""A second stepper in ball arithmetic (`conformance.arb`), which shares nothing with the reference.
 
 It answers the same questions as `reference`, by another argument, so that two mistakes would have to agree
-before a wrong answer passes. It is slow to compile nothing and needs the test extra (python-flint).
+before a wrong answer passes. It takes milliseconds a step and needs the test extra (python-flint).
 """
 
 from conformance.second_stepper.answer import Answer, Kind

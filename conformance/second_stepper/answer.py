@@ -9,7 +9,7 @@ from scene import Wall
 Kind = Literal["collision", "horizon", "undefined", "undecided", "rejected"]
 
 
-class Open(Exception):  # noqa: N818 (a question left open is no error: precision is raised)
+class OpenQuestion(Exception):  # noqa: N818 (a question left open is no error: precision is raised)
     """At this precision, or within this amount of work, the question stays open."""
 
 

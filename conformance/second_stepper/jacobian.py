@@ -11,47 +11,47 @@ from typing import Any, NamedTuple
 
 from flint import arb
 
-from conformance.second_stepper.flight import Flight
-from conformance.second_stepper.law_balls import Ball, product
+from conformance.arb.flight import BallFlight
+from conformance.arb.numbers import Ball, Number, product
 from scene import Wall
 
 
 class Partials(NamedTuple):
     """Derivatives of f(x, y, t) that are not 0 for every wall."""
 
-    fx: Ball
-    fy: Ball
-    ft: Ball
-    fxx: Ball
-    fyy: Ball
-    fyt: Ball
-    ftt: Ball
+    fx: Number
+    fy: Number
+    ft: Number
+    fxx: Number
+    fyy: Number
+    fyt: Number
+    ftt: Number
 
 
-def partials(flight: Flight, wall: Wall, s: Ball) -> Partials:
+def partials(flight: BallFlight, wall: Wall, s: Ball) -> Partials:
     """Enclose the partial derivatives of a wall's function along the flight."""
-    none, time = arb(0), flight.course.t + s
+    none = arb(0)
     fx, fy = flight.gradient(wall, s)
     if wall == "base":
         return Partials(fx, fy, none, none, none, none, none)
     if wall == "floor":
-        _, rate, bend = flight.table.laws["h"].jet(time)
+        _, rate, bend = flight.law("h", s)
         return Partials(fx, fy, rate, none, none, none, bend)
     if wall == "arc":
-        r = flight.table.laws["r"].jet(time)
+        r = flight.law("r", s)
         _, rate, bend = product(r, r)
         return Partials(fx, fy, rate, arb(-2), arb(-2), none, bend)
     y = flight.place(s)[1]
-    _, rate, bend = flight.width(time)
-    _, tilting, turning = flight.table.laws["slope"].jet(time)
+    _, rate, bend = flight.width(s)
+    _, tilting, turning = flight.law("slope", s)
     return Partials(fx, fy, rate + tilting * y, none, none, tilting, bend + turning * y)
 
 
-def jacobian(flight: Flight, wall: Wall, s: Ball) -> tuple[tuple[Any, ...], ...]:
+def jacobian(flight: BallFlight, wall: Wall, s: Ball) -> tuple[tuple[Any, ...], ...]:
     """Enclose d(dt, x, y, vx, vy) / d(t, x, y, vx, vy) of a step that hits `wall` at s."""
-    p, course = partials(flight, wall, s), flight.course
+    p, line = partials(flight, wall, s), flight.balls
     origin = partials(flight, wall, arb(0)) if wall in flight.residuals else None
-    rate = p.ft + p.fx * course.vx + p.fy * course.vy
+    rate = p.ft + p.fx * line.vx + p.fy * line.vy
     size = p.fx * p.fx + p.fy * p.fy
     columns = []
     for i in range(5):
@@ -61,9 +61,9 @@ def jacobian(flight: Flight, wall: Wall, s: Ball) -> tuple[tuple[Any, ...], ...]
         if origin is not None:
             df -= origin.fx * dx + origin.fy * dy + origin.ft * dt
         ds = -df / rate
-        mx, my, mt = mx + course.vx * ds, my + course.vy * ds, dt + ds
+        mx, my, mt = mx + line.vx * ds, my + line.vy * ds, dt + ds
         dfx, dfy, dft = p.fxx * mx, p.fyy * my + p.fyt * mt, p.fyt * my + p.ftt * mt
-        drate = dft + dfx * course.vx + p.fx * dvx + dfy * course.vy + p.fy * dvy
+        drate = dft + dfx * line.vx + p.fx * dvx + dfy * line.vy + p.fy * dvy
         dsize = 2 * (p.fx * dfx + p.fy * dfy)
         push = 2 * rate / size
         dpush = 2 * drate / size - push * dsize / size

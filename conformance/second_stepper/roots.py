@@ -12,15 +12,15 @@ from typing import NamedTuple
 
 from flint import arb, ctx, fmpq
 
-from conformance.second_stepper.answer import Open
-from conformance.second_stepper.flight import Flight
-from conformance.second_stepper.law_balls import Ball, Rational, hull
+from conformance.arb.numbers import Ball, Rational, hull, rational_ends
+from conformance.second_stepper.answer import OpenQuestion
+from conformance.second_stepper.flight import SearchedFlight
 from scene import Wall
 
 UNIT = arb(0, 1)  # the ball [-1, 1]
 
 
-class Root(NamedTuple):
+class RootBracket(NamedTuple):
     """f falls through 0 somewhere in [low, high], for the first time; f' < 0 on all of it."""
 
     wall: Wall
@@ -39,7 +39,9 @@ class AtEnd(NamedTuple):
     low: Rational
 
 
-def first_root(flight: Flight, wall: Wall, start: Rational, end: Rational) -> Root | AtEnd | None:
+def first_root(
+    flight: SearchedFlight, wall: Wall, start: Rational, end: Rational
+) -> RootBracket | AtEnd | None:
     """Find the first root of f in [start, end].
 
     Args:
@@ -52,11 +54,11 @@ def first_root(flight: Flight, wall: Wall, start: Rational, end: Rational) -> Ro
         The root's bracket; AtEnd; or None: f > 0 on all of (start, end], and at `start` unless left there.
 
     Raises:
-        Open: at this precision neither is shown.
+        OpenQuestion: at this precision neither is shown.
     """
     is_left = wall in flight.residuals and start == 0
     if not is_left and not flight.jet(wall, arb(start))[0] > 0:
-        raise Open(f"f of {wall} has no sign where a search begins")
+        raise OpenQuestion(f"f of {wall} has no sign where a search begins")
     todo = [(start, end)] if start < end else []
     least = (end - start) / fmpq(2) ** (2 * ctx.prec)
     while todo:
@@ -69,7 +71,7 @@ def first_root(flight: Flight, wall: Wall, start: Rational, end: Rational) -> Ro
             if found == "positive":
                 continue
             if found == "root":
-                return _narrowed(flight, Root(wall, a, b))
+                return _narrowed(flight, RootBracket(wall, a, b))
             if found == "unknown end":
                 if not todo:
                     return AtEnd(wall, a)
@@ -78,16 +80,16 @@ def first_root(flight: Flight, wall: Wall, start: Rational, end: Rational) -> Ro
                 cut = a + (c - a) * fmpq(5, 16)
                 todo += [(cut, c), (a, cut)]
                 if b - a < least:
-                    raise Open(f"f of {wall} has no sign near {float(b.p) / float(b.q)!r}")
+                    raise OpenQuestion(f"f of {wall} has no sign near {float(b.p) / float(b.q)!r}")
                 continue
         if b - a < least:
-            raise Open(f"f and f' of {wall} vanish together, as far as this precision shows")
+            raise OpenQuestion(f"f and f' of {wall} vanish together, as far as this precision shows")
         middle = (a + b) / 2
         todo += [(middle, b), (a, middle)]
     return None
 
 
-def _lifts(flight: Flight, wall: Wall, b: Rational) -> bool:
+def _lifts(flight: SearchedFlight, wall: Wall, b: Rational) -> bool:
     """Tell whether f - f(0) > 0 on (0, b], from the wall being left."""
     slope = flight.jet(wall, arb(0))[1]
     _, rates, bends = flight.over(wall, fmpq(0), b)
@@ -96,7 +98,7 @@ def _lifts(flight: Flight, wall: Wall, b: Rational) -> bool:
     return bool(slope > 0 and slope + arb(b) * bends / 2 > 0)
 
 
-def _judged(flight: Flight, wall: Wall, a: Rational, b: Rational) -> str:
+def _judged(flight: SearchedFlight, wall: Wall, a: Rational, b: Rational) -> str:
     """Judge [a, b], f(a) > 0: positive, root, unknown end, or open."""
     values, rates, bends = flight.over(wall, a, b)
     if values > 0:
@@ -108,7 +110,7 @@ def _judged(flight: Flight, wall: Wall, a: Rational, b: Rational) -> str:
     if value + spread > 0:
         return "positive"
     if value.contains(0) and value.rad() > spread.abs_upper():
-        raise Open(f"f of {wall} is lost in rounding where f' vanishes too")
+        raise OpenQuestion(f"f of {wall} is lost in rounding where f' vanishes too")
     if not (rates < 0 or rate + bends * reach < 0):
         is_rising = rates > 0 or rate + bends * reach > 0
         return "positive" if is_rising else "open"
@@ -116,7 +118,7 @@ def _judged(flight: Flight, wall: Wall, a: Rational, b: Rational) -> str:
     return "positive" if last > 0 else "root" if last < 0 else "unknown end"
 
 
-def _narrowed(flight: Flight, root: Root) -> Root:
+def _narrowed(flight: SearchedFlight, root: RootBracket) -> RootBracket:
     """Narrow a root's bracket as far as the precision goes: by sign at points, by the mean value theorem."""
     wall, low, high = root
     for _ in range(2 * ctx.prec):
@@ -128,15 +130,10 @@ def _narrowed(flight: Flight, root: Root) -> Root:
             # As an enclosure f' may lose its sign; it has one all the same: halve by the sign of f.
             low, high = (middle, high) if value > 0 else (low, middle) if value < 0 else (low, high)
         else:
-            found = arb(middle) - value / rates
-            low, high = max(low, dyadic(found.lower())), min(high, dyadic(found.upper()))
+            first, last = rational_ends(arb(middle) - value / rates)
+            low, high = max(low, first), min(high, last)
             if low > high:
-                raise Open(f"the root of {wall} is lost")
+                raise OpenQuestion(f"the root of {wall} is lost")
         if 4 * (high - low) > 3 * width:
             break
-    return Root(wall, low, high)
-
-
-def dyadic(point: Ball) -> Rational:
-    """Return an exact ball as a rational."""
-    return point.fmpq()
+    return RootBracket(wall, low, high)

@@ -8,19 +8,21 @@ names none leaves a wall that passes exactly through it.
 
 from __future__ import annotations
 
-from functools import reduce
 from typing import NamedTuple
 
 from flint import arb, fmpq
 
-from conformance.second_stepper.answer import Answer, Open
-from conformance.second_stepper.flight import SIDES, Flight, Table
-from conformance.second_stepper.law_balls import ExactJet, Rational, exact, product
+from conformance.arb.flight import SIDES, Table
+from conformance.arb.numbers import ZERO
+from conformance.second_stepper.answer import Answer, OpenQuestion
+from conformance.second_stepper.flight import SearchedFlight
 from scene import InvalidState, Scene, State, Wall
+from scene.laws import is_constant
 from scene.states import ON_WALL, check_numbers
+from scene.tables import laws
 
 
-class Start(NamedTuple):
+class Beginning(NamedTuple):
     """A flight that may begin: its part of the table, and whether it runs along the mouth."""
 
     in_cap: bool
@@ -36,7 +38,7 @@ def refused(scene: Scene, state: State, t_end: float) -> Answer | None:
     return None
 
 
-def judge(flight: Flight, state: State) -> Start | Answer:
+def judge(flight: SearchedFlight, state: State) -> Beginning | Answer:
     """Judge a starting state; the wall it leaves has its residual taken out of the flight's walls."""
     if refusal := _misplaced(flight.table, state):
         return Answer("rejected", reason=refusal)
@@ -47,7 +49,7 @@ def judge(flight: Flight, state: State) -> Start | Answer:
         in_cap = not flight.table.is_stem
     if refused := _leaves(flight, state, _near(flight.table, state, in_cap=in_cap)):
         return refused
-    return Start(in_cap)
+    return Beginning(in_cap)
 
 
 def _misplaced(table: Table, state: State) -> str:
@@ -64,15 +66,15 @@ def _near(table: Table, state: State, *, in_cap: bool) -> tuple[Wall, ...]:
     return ("base", *SIDES)
 
 
-def _in_mouth(flight: Flight, state: State) -> Start | Answer:
+def _in_mouth(flight: SearchedFlight, state: State) -> Beginning | Answer:
     """Judge a state on y = 0 that names no wall: in the mouth, at its edge, or on the base beside it."""
     signs = [_sign(flight, wall) for wall in ("left", "right")]
     if 0 in signs:
         return Answer("undefined", reason="mouth-edge")
     if -1 not in signs:
         if state.vy == 0:
-            return Start(in_cap=False, runs_along_mouth=True)
-        return Start(in_cap=state.vy > 0)
+            return Beginning(in_cap=False, runs_along_mouth=True)
+        return Beginning(in_cap=state.vy > 0)
     side = _sign(flight, "arc")
     if side < 0:
         return Answer("rejected", reason="the state is beyond wall arc")
@@ -81,10 +83,10 @@ def _in_mouth(flight: Flight, state: State) -> Start | Answer:
     if side == 0 or state.vy == 0:
         return Answer("undefined", reason="sliding" if state.vy == 0 else "corner")
     flight.leave("base")
-    return Start(in_cap=True)
+    return Beginning(in_cap=True)
 
 
-def _leaves(flight: Flight, state: State, near: tuple[Wall, ...]) -> Answer | None:
+def _leaves(flight: SearchedFlight, state: State, near: tuple[Wall, ...]) -> Answer | None:
     on: list[Wall] = []
     for wall in near:
         if wall == state.wall:
@@ -100,7 +102,7 @@ def _leaves(flight: Flight, state: State, near: tuple[Wall, ...]) -> Answer | No
         if side == 0:
             on.append(wall)
     if state.wall is not None:
-        if not _is_near(flight, state, state.wall):
+        if not _is_near(flight, state.wall):
             return Answer("rejected", reason=f"the state is not on wall {state.wall}")
         on.append(state.wall)
     if len(on) > 1:
@@ -108,41 +110,42 @@ def _leaves(flight: Flight, state: State, near: tuple[Wall, ...]) -> Answer | No
         is_edge = sides and "base" in on
         return Answer("undefined", reason="mouth-edge" if is_edge else "corner")
     for wall in on:
-        if refused := _departs(flight, state, wall):
+        if refused := _departs(flight, wall):
             return refused
     return None
 
 
-def _sign(flight: Flight, wall: Wall) -> int:
+def _sign(flight: SearchedFlight, wall: Wall) -> int:
     """Return the sign of f at the start; 0 only where it is exactly 0."""
     value = flight.jet(wall, arb(0))[0]
     if value > 0:
         return 1
     if value < 0:
         return -1
-    if flight.is_zero(wall, fmpq(0)):
+    if flight.is_zero(wall, ZERO):
         return 0
-    raise Open(f"the state may be on wall {wall}")
+    raise OpenQuestion(f"the state may be on wall {wall}")
 
 
-def _is_near(flight: Flight, state: State, wall: Wall) -> bool:
+def _is_near(flight: SearchedFlight, wall: Wall) -> bool:
     """Tell whether a state is on the wall it names but for rounding, by the table's sizes of that moment."""
-    gap, time = flight.jet(wall, arb(0))[0], arb(exact(state.t))
+    now = arb(0)
+    gap = flight.jet(wall, now)[0]
     if wall == "floor":
-        size = flight.table.laws["h"].jet(time)[0]
+        size = flight.law("h", now)[0]
     elif wall in ("left", "right") or flight.table.is_stem:
-        size = flight.width(time)[0]
+        size = flight.width(now)[0]
     else:
-        size = flight.table.laws["r"].jet(time)[0]
+        size = flight.law("r", now)[0]
     bound = size * arb(ON_WALL) * (2 * size if wall == "arc" else 1)
     if gap < bound and -gap < bound:
         return True
     if gap > bound or -gap > bound:
         return False
-    raise Open(f"whether the state is on wall {wall} is open")
+    raise OpenQuestion(f"whether the state is on wall {wall} is open")
 
 
-def _departs(flight: Flight, state: State, wall: Wall) -> Answer | None:
+def _departs(flight: SearchedFlight, wall: Wall) -> Answer | None:
     """Take out f(0) and judge f'(0)."""
     flight.leave(wall)
     rise = flight.jet(wall, arb(0))[1]
@@ -150,40 +153,11 @@ def _departs(flight: Flight, state: State, wall: Wall) -> Answer | None:
         return None
     if rise < 0:
         return Answer("rejected", reason=f"the particle starts on wall {wall} and moves into it")
-    jet = _exact_rates(flight, state, wall)
-    if jet is None or jet[0] != 0:
-        raise Open("f' at the start has no sign")
-    if jet[1] > 0:
+    _, rise, bend = flight.jet(wall, ZERO)  # rationals, where they are known to be
+    if not (isinstance(rise, fmpq) and isinstance(bend, fmpq) and rise == 0):
+        raise OpenQuestion("f' at the start has no sign")
+    if bend > 0:
         flight.flat.add(wall)
         return None
-    is_still = all(law.range()[0].overlaps(law.range()[1]) for law in flight.table.laws.values())
-    return Answer("undefined", reason="sliding" if jet[1] < 0 or is_still or wall == "base" else "tangency")
-
-
-def _exact_rates(flight: Flight, state: State, wall: Wall) -> tuple[fmpq, fmpq] | None:
-    """Return f' and f'' just after the start where they are known to be rational."""
-    table, time = flight.table, exact(state.t)
-    x, y, vx, vy = (exact(getattr(state, name)) for name in ("x", "y", "vx", "vy"))
-    if wall == "base":
-        return (-vy if table.is_stem else vy), fmpq(0)
-    jets = {name: law.exact_jet(time) for name, law in table.laws.items()}
-    if wall == "arc":
-        r = jets["r"]
-        if r is None:
-            return None
-        return 2 * (r[0] * r[1] - x * vx - y * vy), 2 * (r[1] ** 2 + r[0] * r[2] - vx * vx - vy * vy)
-    if wall == "floor":
-        h = jets["h"]
-        return None if h is None else (vy + h[1], h[2])
-    across, slope = jets.get("w") or _exact_product(table, time), jets["slope"]
-    if slope is None or across is None:
-        return None
-    along = vx if wall == "left" else -vx
-    return across[1] + slope[1] * y + slope[0] * vy + along, across[2] + slope[2] * y + 2 * slope[1] * vy
-
-
-def _exact_product(table: Table, time: Rational) -> ExactJet | None:
-    jets = [law.exact_jet(time) for law in table.width]
-    known = [jet for jet in jets if jet is not None]
-    found: ExactJet = reduce(product, known, (fmpq(1), fmpq(0), fmpq(0)))
-    return found if len(known) == len(jets) else None
+    is_still = all(map(is_constant, laws(flight.table.scene).values()))
+    return Answer("undefined", reason="sliding" if bend < 0 or is_still or wall == "base" else "tangency")

@@ -15,19 +15,19 @@ from typing import NamedTuple
 from flint import arb, fmpq
 from mpmath import fp
 
-from conformance.second_proof.precision import precision
+from conformance.arb.flight import SIDES, Line, Table, line_of
+from conformance.arb.numbers import ZERO, Ball, Rational, exact, precision, rational_ends
 from conformance.second_stepper import start
-from conformance.second_stepper.answer import Answer, Open
-from conformance.second_stepper.flight import SIDES, Course, Flight, Table, course_of
+from conformance.second_stepper.answer import Answer, OpenQuestion
+from conformance.second_stepper.flight import SearchedFlight, extent
 from conformance.second_stepper.jacobian import jacobian
-from conformance.second_stepper.law_balls import Ball, Rational, exact
-from conformance.second_stepper.roots import AtEnd, Root, dyadic, first_root
+from conformance.second_stepper.roots import AtEnd, RootBracket, first_root
 from scene import Scene, State, Wall
 from scene.tables import period
 
 BITS = 160  # to begin with, beyond those that the numbers' sizes need
 DOUBLINGS = 5
-NEAT = 80  # bits of an answer that comparisons may rely on, relative to the size of its vectors
+RELIABLE_BITS = 80  # that comparisons may take from an answer, relative to the size of its vectors
 
 
 class Met(NamedTuple):
@@ -47,20 +47,20 @@ class Search:
         end: flight time to the horizon, a rational, a ball, or None for none.
     """
 
-    def __init__(self, flight: Flight, *, in_cap: bool, end: Ball | Rational | None) -> None:
+    def __init__(self, flight: SearchedFlight, *, in_cap: bool, end: Ball | Rational | None) -> None:
         self.flight, self.in_cap = flight, in_cap
         escape = self._escape()
         self.is_horizon = end is not None and (escape is None or not escape < arb(end))
         self.end = end if self.is_horizon else escape
         if self.end is None:
-            raise Open("a particle at rest and no horizon")
+            raise OpenQuestion("a particle at rest and no horizon")
 
     def outcome(self) -> Met:
         """Find how the flight ends."""
         crossing = self._crossing()
         limit = self.end if crossing is None or not self._is_before(crossing, self.end) else crossing
         near: tuple[Wall, ...] = ("arc",) if self.in_cap else SIDES
-        met = self._first(near, fmpq(0), limit)
+        met = self._first(near, ZERO, limit)
         if met is not None:
             return met
         if limit is self.end:
@@ -71,38 +71,38 @@ class Search:
                 return Met(None, reason="mouth-edge")
             return Met("base", time)
         beyond = SIDES if self.in_cap else ("arc",)
-        met = self._first(beyond, dyadic(time.lower()), self.end)
+        met = self._first(beyond, rational_ends(time)[0], self.end)
         if met is None:
             return self._nothing()
         if met.wall is not None and not met.time > time:
-            raise Open("a wall is met where y = 0 is crossed, as far as this precision shows")
+            raise OpenQuestion("a wall is met where y = 0 is crossed, as far as this precision shows")
         return met
 
     def along_mouth(self) -> Met:
         """Follow a particle along y = 0 in the mouth: to the horizon, or the mouth's edge."""
-        met = self._first(("left", "right"), fmpq(0), self.end)
+        met = self._first(("left", "right"), ZERO, self.end)
         return self._nothing() if met is None else Met(None, reason="mouth-edge")
 
     def _nothing(self) -> Met:
         if not self.is_horizon:
-            raise Open("no wall is met where one must be")
+            raise OpenQuestion("no wall is met where one must be")
         return Met(None)
 
     def _crossing(self) -> Ball | Rational | None:
         """Return when y = 0 is met or crossed: a rational for an exact state; None for never."""
-        flight, course = self.flight, self.flight.course
+        flight, line = self.flight, self.flight.balls
         if "base" in flight.residuals:
             return None
         towards = -1 if self.in_cap else 1
-        if towards * course.vy <= 0:
+        if towards * line.vy <= 0:
             return None
-        if not towards * course.vy > 0:
-            raise Open("the sign of vy is open")
+        if not towards * line.vy > 0:
+            raise OpenQuestion("the sign of vy is open")
         if flight.state is not None:
-            return -exact(flight.state.y) / exact(flight.state.vy) if flight.state.y else None
-        if not towards * course.y < 0:
-            raise Open("the side of y = 0 is open")
-        return -course.y / course.vy
+            return -flight.line.y / flight.line.vy if flight.state.y else None
+        if not towards * line.y < 0:
+            raise OpenQuestion("the side of y = 0 is open")
+        return -line.y / line.vy
 
     def _is_before(self, time: Ball | Rational, other: Ball | Rational) -> bool:
         """Tell whether time < other, exactly where both are rational."""
@@ -112,15 +112,15 @@ class Search:
             return True
         if arb(time) > arb(other):
             return False
-        raise Open("the crossing of y = 0 and the horizon fall together")
+        raise OpenQuestion("the crossing of y = 0 and the horizon fall together")
 
     def _escape(self) -> Ball | None:
         """Return a time by which every particle that meets no wall has left the table."""
-        across, up = self.flight.table.extent()
-        course = self.flight.course
+        across, up = extent(self.flight.table)
+        line = self.flight.balls
         times = [
             2 * size / abs(speed)
-            for size, speed in ((4 * across, course.vx), (2 * up, course.vy))
+            for size, speed in ((4 * across, line.vx), (2 * up, line.vy))
             if speed > 0 or speed < 0
         ]
         # A time that both axes allow: the lesser, wherever balls can tell.
@@ -132,7 +132,7 @@ class Search:
             return True
         if any(gap < 0 for gap in gaps) or self._is_edge(limit):
             return False
-        raise Open("the mouth's edge is met, as far as this precision shows")
+        raise OpenQuestion("the mouth's edge is met, as far as this precision shows")
 
     def _is_edge(self, limit: Ball | Rational) -> bool:
         is_exact = isinstance(limit, fmpq)
@@ -140,8 +140,8 @@ class Search:
 
     def _first(self, walls: Sequence[Wall], begin: Rational, limit: Ball | Rational) -> Met | None:
         """Find what is met first of these walls before `limit`; None when f > 0 on all of them up to it."""
-        flight, last = self.flight, dyadic(arb(limit).upper())
-        roots: list[Root] = []  # none of which certainly comes after another
+        flight, last = self.flight, rational_ends(arb(limit))[1]
+        roots: list[RootBracket] = []  # none of which certainly comes after another
         at_limit: list[Wall] = []
         for wall in walls:
             until = min((root.high for root in roots), default=last)
@@ -150,7 +150,7 @@ class Search:
                 found = first_root(flight, wall, begin, last)  # it may fall with the one found: bracket it
             if isinstance(found, AtEnd) or (found is not None and self._is_at(found, limit)):
                 if not self._vanishes_at(wall, limit):
-                    raise Open(f"{wall} is met at the end of the search, as far as this precision shows")
+                    raise OpenQuestion(f"{wall} may be met just at the end of the search, at this precision")
                 at_limit.append(wall)
             elif found is not None and not any(root.high < found.low for root in roots):
                 roots = [found, *(root for root in roots if not found.high < root.low)]
@@ -159,13 +159,13 @@ class Search:
             return self._tied(earlier) if len(earlier) > 1 else Met(earlier[0].wall, earlier[0].time())
         return self._at_limit(at_limit, limit) if at_limit else None
 
-    def _is_at(self, root: Root, limit: Ball | Rational) -> bool:
+    def _is_at(self, root: RootBracket, limit: Ball | Rational) -> bool:
         """Tell whether a root may be the limit itself."""
         if isinstance(limit, fmpq):
             return bool(root.low <= limit <= root.high)
         return not root.time() < arb(limit) and not root.time() > arb(limit)
 
-    def _is_after(self, root: Root, limit: Ball | Rational) -> bool:
+    def _is_after(self, root: RootBracket, limit: Ball | Rational) -> bool:
         return bool(root.low > limit) if isinstance(limit, fmpq) else bool(root.time() > limit)
 
     def _vanishes_at(self, wall: Wall, limit: Ball | Rational) -> bool:
@@ -178,13 +178,13 @@ class Search:
         is_edge = self.flight.table.is_mushroom and any(wall in ("left", "right") for wall in walls)
         return Met(None, reason="mouth-edge" if is_edge else "corner")
 
-    def _tied(self, roots: list[Root]) -> Met:
+    def _tied(self, roots: list[RootBracket]) -> Met:
         low, high = max(root.low for root in roots), min(root.high for root in roots)
         if low <= high:
             instant = simplest(low, high)
             if all(self.flight.is_zero(root.wall, instant) for root in roots):
                 return Met(None, reason="corner")
-        raise Open("two walls are met together, as far as this precision shows")
+        raise OpenQuestion("two walls are met together, as far as this precision shows")
 
 
 def simplest(low: Rational, high: Rational) -> Rational:
@@ -218,7 +218,7 @@ def _until_decided(attempt: Callable[[int], Answer], bits: int, doublings: int) 
         try:
             with precision(bits):
                 return attempt(bits)
-        except Open as found:
+        except OpenQuestion as found:
             question = str(found)
             bits *= 2
     return Answer("undecided", reason=f"{question} ({bits // 2} bits)", bits=bits // 2)
@@ -234,7 +234,7 @@ def bits_for(scene: Scene, state: State) -> int:
 
 
 def _step(scene: Scene, state: State, t_end: float, bits: int) -> Answer:
-    flight = Flight(Table(scene), course_of(state), state)
+    flight = SearchedFlight(Table(scene), line_of(state), state)
     begun = start.judge(flight, state)
     if isinstance(begun, Answer):
         return begun._replace(bits=bits)
@@ -246,42 +246,34 @@ def _step(scene: Scene, state: State, t_end: float, bits: int) -> Answer:
     return _answer(flight, met, end, bits)
 
 
-def _answer(flight: Flight, met: Met, end: Ball | Rational | None, bits: int) -> Answer:
+def _answer(flight: SearchedFlight, met: Met, end: Ball | Rational | None, bits: int) -> Answer:
     if met.reason:
         return Answer("undefined", reason=met.reason, bits=bits)
     if met.wall is None:
         s = arb(end)
-        return Answer("horizon", numbers=(s, *flight.place(s), flight.course.vx, flight.course.vy), bits=bits)
+        return Answer("horizon", numbers=(s, *flight.place(s), flight.balls.vx, flight.balls.vy), bits=bits)
     numbers = bounced(flight, met.wall, met.time)
     found = Answer("collision", met.wall, numbers=numbers, bits=bits)
     if flight.state is not None:
-        _require_neat(numbers)
+        _require_reliable(numbers)
         found = found._replace(jacobian=jacobian(flight, met.wall, met.time))
     return found
 
 
-def bounced(flight: Flight, wall: Wall, s: Ball) -> tuple[Ball, ...]:
-    """Return dt, x, y, vx, vy after the bounce: v - 2 f' grad f / |grad f|^2, which is v - 2 (v.n - u) n."""
-    course = flight.course
+def bounced(flight: SearchedFlight, wall: Wall, s: Ball) -> tuple[Ball, ...]:
+    """Return dt, x, y, vx, vy after the bounce."""
+    if not flight.jet(wall, s)[1] < 0:
+        raise OpenQuestion(f"f' of {wall} has no sign where it is met")
     x, y = flight.place(s)
-    if wall == "base":
-        return s, x, arb(0), course.vx, -course.vy
-    rate = flight.jet(wall, s)[1]
-    if not rate < 0:
-        raise Open(f"f' of {wall} has no sign where it is met")
-    if wall == "floor":
-        return s, x, y, course.vx, course.vy - 2 * rate
-    nx, ny = flight.gradient(wall, s)
-    push = 2 * rate / (nx * nx + ny * ny)
-    return s, x, y, course.vx - push * nx, course.vy - push * ny
+    return s, x, arb(0) if wall == "base" else y, *flight.reflected(wall, s)
 
 
-def _require_neat(numbers: tuple[Ball, ...]) -> None:
+def _require_reliable(numbers: tuple[Ball, ...]) -> None:
     dt, x, y, vx, vy = numbers
     for vector in ((dt,), (x, y), (vx, vy)):
         size = max(number.abs_upper() for number in vector)
-        if any(number.rad() * arb(2) ** NEAT > size for number in vector):
-            raise Open("the answer is enclosed too widely")
+        if any(number.rad() * arb(2) ** RELIABLE_BITS > size for number in vector):
+            raise OpenQuestion("the answer is enclosed too widely")
 
 
 def trajectory(
@@ -315,7 +307,7 @@ def _chain(scene: Scene, state: State, n_collisions: int, t_end: float | None, b
     found: list[Answer] = []
     try:
         table = Table(scene)
-        flight = Flight(table, course_of(state), state)
+        flight = SearchedFlight(table, line_of(state), state)
         begun = start.judge(flight, state)
         if isinstance(begun, Answer):
             return [begun._replace(bits=bits)]
@@ -324,7 +316,7 @@ def _chain(scene: Scene, state: State, n_collisions: int, t_end: float | None, b
             end = None
             if t_end is not None:
                 exact_start = flight.state is not None
-                end = exact(t_end) - exact(state.t) if exact_start else arb(exact(t_end)) - flight.course.t
+                end = exact(t_end) - (flight.line.t if exact_start else flight.balls.t)
             search = Search(flight, in_cap=in_cap, end=end)
             met = search.along_mouth() if along_mouth else search.outcome()
             found.append(_answer(flight, met, end, bits))
@@ -332,14 +324,14 @@ def _chain(scene: Scene, state: State, n_collisions: int, t_end: float | None, b
                 return found
             flight, in_cap = _following(flight, met.wall, found[-1].numbers), met.wall in ("arc", "base")
             in_cap, along_mouth = in_cap and not table.is_stem, False
-    except Open as question:
+    except OpenQuestion as question:
         found.append(Answer("undecided", reason=f"{question} ({bits} bits)", bits=bits))
     return found
 
 
-def _following(flight: Flight, wall: Wall, numbers: tuple[Ball, ...]) -> Flight:
+def _following(flight: SearchedFlight, wall: Wall, numbers: tuple[Ball, ...]) -> SearchedFlight:
     """Return the flight after a bounce: the wall is left with the residual it was met with."""
     dt, *moved = numbers
-    after = Flight(flight.table, Course(flight.course.t + dt, *moved), None)
+    after = SearchedFlight(flight.table, Line(flight.balls.t + dt, *moved), None)
     after.leave(wall, flight.residuals.get(wall, arb(0)))
     return after

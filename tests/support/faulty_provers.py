@@ -16,10 +16,14 @@ import pytest
 from flint import arb, fmpq
 from mpmath import fp
 
+from conformance.arb.flight import BallFlight, Table, line_of
+from conformance.arb.laws import BallBangBang, BallFourier
+from conformance.arb.numbers import precision
 from conformance.attacks import Attack, Claim
 from conformance.attacks.search import as_truth, truths
-from conformance.second_stepper import Answer, flight, law_balls, next_collision, roots, start
+from conformance.second_stepper import Answer, next_collision, roots, start
 from conformance.second_stepper import step as stepper
+from conformance.second_stepper.flight import SearchedFlight
 from conformance.second_stepper.step import Met, Search
 from scene import Collision, Outcome, Scene, State
 from scene.states import ON_WALL
@@ -65,10 +69,9 @@ def one_piece(attack: Attack) -> list[Claim]:
     assert attack.n_collisions is not None
     assert attack.working is not None
     bits = int(attack.working * 3.33) + 8
-    touched = law_balls.Legs.touched
 
     def patch(monkeypatch: pytest.MonkeyPatch) -> None:
-        monkeypatch.setattr(law_balls.Legs, "touched", lambda self, local: touched(self, local)[:1])
+        knots_unseen(monkeypatch)
         monkeypatch.setattr(stepper, "bits_for", lambda scene, state: bits)
 
     with patched(patch):
@@ -78,49 +81,43 @@ def one_piece(attack: Attack) -> list[Claim]:
 
 def knots_unseen(monkeypatch: pytest.MonkeyPatch) -> None:
     """The piece that holds where an interval begins is taken to hold on all of it."""
-    touched = law_balls.Legs.touched
-    monkeypatch.setattr(law_balls.Legs, "touched", lambda self, local: touched(self, local)[:1])
+    touched = BallBangBang.touched
+    monkeypatch.setattr(BallBangBang, "touched", lambda self, local: touched(self, local)[:1])
 
 
 def period_from_zero(monkeypatch: pytest.MonkeyPatch) -> None:
     """Knots are taken to begin at time 0."""
-    made = law_balls.Legs.__init__
+    _spoil(monkeypatch, BallBangBang, lambda law: setattr(law, "first", fmpq(0)))
 
-    def init(self: law_balls.Legs, law: Any) -> None:
+
+def _spoil(monkeypatch: pytest.MonkeyPatch, kind: type, change: Callable[[Any], None]) -> None:
+    """Change every law of a kind as soon as it is made."""
+    made = kind.__init__  # type: ignore[misc]  # of the class, which no subclass replaces
+
+    def init(self: Any, law: Any) -> None:
         made(self, law)
-        self.first = fmpq(0)
+        change(self)
 
-    monkeypatch.setattr(law_balls.Legs, "__init__", init)
+    monkeypatch.setattr(kind, "__init__", init)
 
 
 def residual_forgotten(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Ties are judged by f, not by f - f(0)."""
-    monkeypatch.setattr(flight.Flight, "exact_value", lambda self, wall, s: _whole_value(self, wall, s))
-    jet = flight.Flight.jet
+    """Ties are judged by f, not by f - f(0), and so is all that is far from the start."""
+    jet = SearchedFlight.jet
 
-    def unmoved(self: flight.Flight, wall: Any, s: Any) -> Any:
-        found = jet(self, wall, s)
-        # Away from the start the residual is put back: only the wall's neighbourhood knows of it.
-        is_late = wall in self.residuals and s > 2.0**-20
+    def unmoved(self: SearchedFlight, wall: Any, s: Any, within: Any = None) -> Any:
+        found = jet(self, wall, s, within)
+        is_late = wall in self.residuals and (isinstance(s, fmpq) or s > 2.0**-20)
         return (found[0] + self.residuals[wall], *found[1:]) if is_late else found
 
-    monkeypatch.setattr(flight.Flight, "jet", unmoved)
-
-
-def _whole_value(self: flight.Flight, wall: Any, s: Any) -> Any:
-    if self.state is None:
-        return None
-    q = self.state
-    lines = ((q.x, q.vx), (q.y, q.vy))
-    x, y = (law_balls.exact(place) + law_balls.exact(speed) * s for place, speed in lines)
-    return self._exact_sum(wall, x, y, law_balls.exact(q.t) + s)
+    monkeypatch.setattr(SearchedFlight, "jet", unmoved)
 
 
 def size_of_all_time(monkeypatch: pytest.MonkeyPatch) -> None:
     """A state is on the wall it names by the largest size of all time."""
 
-    def is_near(at: flight.Flight, state: State, wall: Any) -> bool:
-        largest = max(law.range()[1].abs_upper() for law in at.table.laws.values())
+    def is_near(at: SearchedFlight, wall: Any) -> bool:
+        largest = max(arb(law.range()[1]).abs_upper() for law in at.table.laws.values())
         gap = at.jet(wall, arb(0))[0]
         return bool(abs(gap) < largest * (2 * largest if wall == "arc" else 1) * ON_WALL)
 
@@ -160,7 +157,7 @@ def blind_start(monkeypatch: pytest.MonkeyPatch) -> None:
     """No wall is met in the first 1e-3 of a flight."""
     search = roots.first_root
 
-    def late(at: flight.Flight, wall: Any, a: Any, b: Any) -> Any:
+    def late(at: SearchedFlight, wall: Any, a: Any, b: Any) -> Any:
         begin = b / 1024 if a == 0 else a
         return search(at, wall, begin, b) if at.jet(wall, arb(begin))[0] > 0 else None
 
@@ -171,7 +168,7 @@ def ends_alone(monkeypatch: pytest.MonkeyPatch) -> None:
     """A wall is met only if f is below 0 at the end of the search."""
     search = roots.first_root
 
-    def at_end(at: flight.Flight, wall: Any, a: Any, b: Any) -> Any:
+    def at_end(at: SearchedFlight, wall: Any, a: Any, b: Any) -> Any:
         return None if at.jet(wall, arb(b))[0] > 0 else search(at, wall, a, b)
 
     monkeypatch.setattr(stepper, "first_root", at_end)
@@ -183,9 +180,9 @@ def rounded_rates(scene: Scene, state: State, t_end: float) -> Outcome:
     outcome = as_truth(answer, t_end).outcome
     if not isinstance(outcome, Collision):
         return outcome
-    with stepper.precision(answer.bits):
-        at = flight.Flight(flight.Table(scene), flight.course_of(state), state)
-        vx, vy = stepper.bounced(at, outcome.wall, arb(state.t + outcome.dt) - arb(state.t))[3:]
+    with precision(answer.bits):
+        at = BallFlight(Table(scene), line_of(state))
+        vx, vy = at.reflected(outcome.wall, arb(state.t + outcome.dt) - arb(state.t))
     place = outcome.dt, outcome.t, outcome.x, outcome.y
     return Collision(outcome.wall, *place, float(vx.mid()), float(vy.mid()))
 
@@ -201,33 +198,24 @@ def reduced_time(attack: Attack) -> list[Claim]:
 
 def few_harmonics(monkeypatch: pytest.MonkeyPatch) -> None:
     """Harmonics beyond the third are dropped."""
-    made = law_balls.Waves.__init__
-
-    def init(self: law_balls.Waves, law: Any) -> None:
-        made(self, law)
-        self.terms = self.terms[:3]
-
-    monkeypatch.setattr(law_balls.Waves, "__init__", init)
+    _spoil(monkeypatch, BallFourier, lambda law: setattr(law, "terms", law.terms[:3]))
 
 
 def rounded_omega(monkeypatch: pytest.MonkeyPatch) -> None:
     """A period is turned into an omega in binary64."""
-    made = law_balls.Waves.__init__
 
-    def init(self: law_balls.Waves, law: Any) -> None:
-        made(self, law)
-        if self.exact_omega is None:
-            omega = arb(float(self.omega.mid()))
-            self.terms = [(k * omega, arb(a), arb(b)) for k, a, b in self.harmonics]
+    def round_omega(law: BallFourier) -> None:
+        omega = arb(float(arb(law.omega).mid()))
+        law.terms = [(k * omega, arb(a), arb(b)) for k, a, b in law.harmonics]
 
-    monkeypatch.setattr(law_balls.Waves, "__init__", init)
+    _spoil(monkeypatch, BallFourier, round_omega)
 
 
 def narrow_mouth(monkeypatch: pytest.MonkeyPatch) -> None:
     """The mouth is taken to be narrower by 1e-3 of itself."""
 
     def is_open(self: Search, limit: Any) -> bool:
-        rim = self.flight.width(self.flight.course.t + arb(limit))[0] / 1000
+        rim = self.flight.width(arb(limit))[0] / 1000
         return all(self.flight.jet(wall, arb(limit))[0] > rim for wall in ("left", "right"))
 
     monkeypatch.setattr(Search, "_is_mouth_open", is_open)
@@ -256,13 +244,13 @@ def resting(attack: Attack) -> list[Claim]:
 def still_wall(monkeypatch: pytest.MonkeyPatch) -> None:
     """A bounce forgets that the wall moves."""
 
-    def still(at: flight.Flight, wall: Any, s: Any) -> Any:
+    def still(at: BallFlight, wall: Any, s: Any) -> Any:
         nx, ny = at.gradient(wall, s)
-        c = at.course
-        push = 2 * (nx * c.vx + ny * c.vy) / (nx * nx + ny * ny)
-        return s, *at.place(s), c.vx - push * nx, c.vy - push * ny
+        vx, vy = at.balls[3:]
+        push = 2 * (nx * vx + ny * vy) / (nx * nx + ny * ny)
+        return vx - push * nx, vy - push * ny
 
-    monkeypatch.setattr(stepper, "bounced", still)
+    monkeypatch.setattr(SearchedFlight, "reflected", still)
 
 
 def last_wall(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -281,7 +269,7 @@ def lazy_taylor(monkeypatch: pytest.MonkeyPatch) -> None:
     """An interval is passed when f > 0 at its middle."""
     judged = roots._judged
 
-    def lazy(at: flight.Flight, wall: Any, a: Any, b: Any) -> str:
+    def lazy(at: SearchedFlight, wall: Any, a: Any, b: Any) -> str:
         return "positive" if at.jet(wall, arb((a + b) / 2))[0] > 0 else judged(at, wall, a, b)
 
     monkeypatch.setattr(roots, "_judged", lazy)

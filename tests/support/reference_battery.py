@@ -16,12 +16,8 @@ from reference.arithmetic import Arithmetic
 from scene import BangBang, Cap, Fourier, Mushroom, State, Stem, Undecided, Undefined
 from scene.laws import value
 from scene.tables import laws
+from support.tables import BOX, BREATHING, CIRCLE, LEAP, LIFT, STATIC
 
-CIRCLE = Cap(r=1.0)
-BOX = Stem(w=1.0, h=1.0)
-STATIC = Mushroom(r=1.0, h=1.0, w=0.5)
-LIFT = Stem(w=1.0, h=BangBang(knots=((0.0, 2.0), (0.5, 1.0), (1.0, 2.0))))
-BREATHING = Cap(r=Fourier(mean=1.0, omega=1.0, sin=(0.25,)))
 CLOSING = Mushroom(r=1.0, h=1.0, w=BangBang(knots=((0.0, 0.5), (1.0, 0.25), (2.0, 0.5))))
 TILTING = Mushroom(
     r=Fourier(mean=1.0, omega=1.0, sin=(0.125,)),
@@ -197,14 +193,6 @@ def reversed_film():
 
 # A floor whose highest place is well below what its amplitudes add up to.
 GRAZING = Stem(w=1.0, h=Fourier(mean=1.25, omega=1.0, cos=(0.125,), sin=(0.0, 0.125)))
-# The width leaps from 0.01 to 0.9 within 2e-16 of the second event, at t = 2^110.
-LEAP = Mushroom(
-    r=1.0,
-    h=1.0,
-    w=BangBang(
-        knots=((0.0, 0.01), (1.6097936544959741, 0.01), (1.6097936544959743, 0.9), (5.6, 0.9), (16.0, 0.01))
-    ),
-)
 
 
 def knot_within_an_enclosed_time():

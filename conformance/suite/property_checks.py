@@ -27,6 +27,7 @@ from conformance.suite.process import Trouble
 from conformance.suite.session import Session, missing
 from conformance.vectors import Vector
 from scene import Fourier, Horizon, Mushroom, Outcome, Scene, State, from_data, load, to_data
+from scene.geometry import area
 from scene.tables import period
 
 NEEDS_FOURIER = ("static-limit",)  # asks for constants written as laws
@@ -172,7 +173,7 @@ def _one_cycle(session: Session, scene: Mushroom, size: Size) -> list[Finding]:
     prediction = theory.predict(scene, 10)
     span = period(scene)
     assert span is not None
-    areas = [profiles.area(scene, float(span.value(fp)) * k / 64) for k in range(64)]
+    areas = [area(scene, float(span.value(fp)) * k / 64) for k in range(64)]
     return profiles.one_cycle(
         _flow(session),
         scene,

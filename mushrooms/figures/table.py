@@ -15,9 +15,9 @@ from matplotlib.figure import Figure
 from mpmath import fp
 
 from mushrooms.figures import style as plots
-from scene import Cap, Collision, Mushroom, Scene, State, Stem
-from scene.laws import value
-from scene.tables import period, width_factors
+from scene import Collision, Scene, State
+from scene.geometry import table_at
+from scene.tables import period
 
 SUFFIXES = (".svg", ".png", ".gif")
 N_PHASES = 6
@@ -28,20 +28,7 @@ FRAMES_PER_SECOND = 12
 
 def walls(scene: Scene, t: float) -> list[np.ndarray]:
     """Return the walls at time t as polylines of shape (2, n) [length]; the mouth is left open."""
-    lines = []
-    factors = () if isinstance(scene, Cap) else width_factors(scene)
-    w = float(np.prod([value(fp, law, t) for law in factors])) if factors else 0.0
-    if isinstance(scene, (Cap, Mushroom)):
-        r = float(value(fp, scene.r, t))
-        angle = np.linspace(0, np.pi, 181)
-        lines.append(np.array([np.r_[w, r * np.cos(angle), -w], np.r_[0, r * np.sin(angle), 0]]))
-    if isinstance(scene, (Stem, Mushroom)):
-        h = float(value(fp, scene.h, t))
-        foot = w - h * float(value(fp, scene.slope, t))
-        lines.append(np.array([[-w, -foot, foot, w], [0, -h, -h, 0]]))
-    if isinstance(scene, Stem):
-        lines.append(np.array([[-w, w], [0, 0]]))
-    return lines
+    return [np.transpose(line) for line in table_at(fp, scene, t).outline()]
 
 
 def phases(scene: Scene, n: int = N_PHASES) -> list[float]:

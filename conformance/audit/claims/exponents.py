@@ -30,6 +30,7 @@ from conformance.audit.tolerances import (
     stated,
 )
 from scene import Mushroom, Scene, State, load
+from scene.geometry import area, table_at
 from scene.laws import value
 
 SPEEDS = tuple(10.0 ** (k / 2) for k in range(4, 9))  # 100 to 10,000
@@ -204,11 +205,11 @@ def _points(
 ) -> tuple[BoolArray, BoolArray, BoolArray]:
     """Draw points in a box around the table; tell which lie in it, in the cap, in the island."""
     assert isinstance(scene, Mushroom)
-    r, h, slope = (float(value(fp, law, t)) for law in (scene.r, scene.h, scene.slope))
-    w = r * float(value(fp, scene.nu or 0.0, t))
+    table = table_at(fp, scene, t)
+    r, h, w = table.r, table.h, table.w
     x, y, turn = random.uniform(-r, r, n), random.uniform(-h, r, n), random.uniform(0, 2 * np.pi, n)
-    in_cap = (y >= 0) & (x * x + y * y <= r * r)
-    in_stem = (y < 0) & (np.abs(x) <= w + slope * y)
+    in_cap = (y >= 0) & (table.gap("arc", x, y) >= 0)
+    in_stem = (y < 0) & (np.abs(x) <= table.half_width(y))
     momentum = np.abs(x * np.sin(turn) - y * np.cos(turn))
     return in_cap | in_stem, in_cap, in_cap & (momentum >= w)
 
@@ -325,7 +326,7 @@ def work(evidence: Evidence) -> list[Check]:
     found = []
     for k, phase in enumerate((*phases, 1.0)):
         values = np.array(rows)[:, k]
-        ratio = area(scene, phase) / area(scene, 0.0)
+        ratio = area(scene, 2 * math.pi * phase) / area(scene, 0.0)
         found.append(
             close(
                 f"kT = {KT:g}, phase {phase:g}: mean exp(-W/kT)",
@@ -335,12 +336,6 @@ def work(evidence: Evidence) -> list[Check]:
             )
         )
     return found
-
-
-def area(scene: Scene, phase: float) -> float:
-    """Return the table's area at a fraction of a 2 pi cycle [length²]."""
-    now = theory.volumes_at(fp, scene, 2 * fp.pi * phase)
-    return float((now.v_cap + now.v_stem) / (2 * fp.pi))
 
 
 CHECKS = {

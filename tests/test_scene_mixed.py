@@ -13,7 +13,7 @@ from flint import arb, ctx, fmpq
 from scene import BangBang, Fourier, InvalidScene, Mushroom, mixed
 from scene.laws import MAX_HARMONICS, Quadratic, piece_at
 from scene.mixed import BITS, PI, PI_ERROR, Jet, jet, multiply, sign_on_legs, turns
-from scene.validity import _intervals
+from scene.polynomials import leg_intervals
 
 N_SCENES = 300
 
@@ -87,7 +87,7 @@ def test_jets_enclose_products(many_bits):
     draw = random.Random("jets")
     for _ in range(200):
         wave, legs = random_laws(draw)
-        a, b = draw.choice(_intervals([legs]))
+        a, b = draw.choice(leg_intervals([legs]))
         m, h = (a + b) / 2, (b - a) / 2 / draw.choice((1, 4, 1024))
         found = multiply(jet(wave, m), jet(legs, m), h)
         assert abs(exactly(wave, m) * exactly(legs, m) - rational(found.value)) <= rational(found.value_error)
@@ -165,7 +165,7 @@ def test_a_lost_bend_is_caught(monkeypatch):
 def test_the_work_is_bounded(monkeypatch):
     wave, legs = dip(0.0)
     monkeypatch.setattr(mixed, "MAX_BOXES", 20)
-    assert sign_on_legs(((1, (wave,)), (-1, (legs,))), False, _intervals([legs])).holds is None
+    assert sign_on_legs(((1, (wave,)), (-1, (legs,))), False, leg_intervals([legs])).holds is None
 
 
 def test_products_known_to_be_positive_need_no_proof(monkeypatch):

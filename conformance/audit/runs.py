@@ -11,7 +11,6 @@ import hashlib
 from typing import Literal, NamedTuple
 
 import scene as scenes
-from scene.refusal import BadInput
 from scene.tables import Mushroom, Scene
 
 Size = Literal["quick", "full"]
@@ -97,13 +96,3 @@ def block_seed(seed: int, run: Run, number: int) -> int:
     """Return the seed of a block, 64 bits."""
     text = f"{seed} {run.name} {number}"
     return int.from_bytes(hashlib.sha256(text.encode()).digest()[:8], "big")
-
-
-def check_seed(seed: int) -> None:
-    """Refuse a seed out of bounds.
-
-    Raises:
-        BadInput: naming the bound.
-    """
-    if not 0 <= seed < 2**64:
-        raise BadInput(f"seed = {seed}, must be 0 to 2^64 - 1")

@@ -10,14 +10,16 @@ import hashlib
 import json
 import zipfile
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, BinaryIO, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 import scene as scenes
 from conformance.audit.runs import Run, Size, block_seed, scene_of
+from scene.files import write_file
 
 if TYPE_CHECKING:
     from fast import Ensemble
@@ -137,7 +139,8 @@ def draw(
         if block is None:
             block = _follow(simulate, run, n, block_seed(seed, run, number), threads)
             if path:
-                _save(path, key, block)
+                content = {"key": np.array(key), **block}
+                write_file(path, partial(_write_block, content=content))
         blocks.append(block)
         if progress:
             progress(run.name, first + n, total)
@@ -216,11 +219,8 @@ def gathered(run: Run, blocks: list[Arrays]) -> Sample:
     )
 
 
-def _save(path: Path, key: str, block: Arrays) -> None:
-    part = path.with_suffix(".part")
-    with part.open("wb") as file:
-        np.savez_compressed(file, key=np.array(key), **block)  # type: ignore[arg-type]
-    part.replace(path)
+def _write_block(file: BinaryIO, content: Arrays) -> None:
+    np.savez_compressed(file, **content)  # type: ignore[arg-type]  # its other argument is no array
 
 
 def _load(path: Path, key: str) -> Arrays | None:

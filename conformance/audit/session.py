@@ -21,8 +21,10 @@ import theory
 from conformance.audit import ledger
 from conformance.audit.evidence import Evidence, Predict, Steppers
 from conformance.audit.finding import Entry, Finding, from_data, to_data, verdict_of
-from conformance.audit.runs import RUNS, Size, check_seed
+from conformance.audit.runs import RUNS, Size
 from conformance.audit.samples import Progress, Sample, draw
+from scene.files import write_file
+from scene.refusal import check_seed
 
 
 class Settings(NamedTuple):
@@ -186,7 +188,5 @@ def _load(entry: Entry, settings: Settings) -> Finding | None:
 def _save(finding: Finding, settings: Settings) -> None:
     if settings.folder:
         entry = ledger.select(finding.id)[0]
-        path = settings.folder / f"{finding.id}.json"
-        part = path.with_suffix(".part")
-        part.write_text(json.dumps({"key": _key(entry, settings), "finding": to_data(finding)}), "utf-8")
-        part.replace(path)
+        content = json.dumps({"key": _key(entry, settings), "finding": to_data(finding)})
+        write_file(settings.folder / f"{finding.id}.json", content)

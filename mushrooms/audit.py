@@ -34,8 +34,8 @@ def audit(
     """
     import fast
     from conformance.audit import ledger
-    from conformance.audit.evidence import Steppers
-    from conformance.audit.session import Settings, conduct
+    from conformance.audit.evidence import AuditSteppers
+    from conformance.audit.session import AuditSettings, conduct
     from mushrooms.reports import audit_page
 
     entries = ledger.select(only)
@@ -43,10 +43,15 @@ def audit(
     if threads is not None and threads < 1:
         raise BadInput(f"--threads = {threads}, must be >= 1")
     with output.writable_folder(out) as folder:
-        settings = Settings("full" if full else "quick", seed, threads, folder / "parts", resume, apart=True)
+        settings = AuditSettings(
+            "full" if full else "quick", seed, threads, folder / "parts", resume, apart=True
+        )
         with progress_bar() as bar:
             result = conduct(
-                Steppers(fast.simulate, fast.trajectory), settings, entries=entries, progress=_advance(bar)
+                AuditSteppers(fast.simulate, fast.trajectory),
+                settings,
+                entries=entries,
+                progress=_advance(bar),
             )
         data = audit_page.to_data(result)
         texts = {

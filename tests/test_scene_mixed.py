@@ -12,7 +12,7 @@ from flint import arb, ctx, fmpq
 
 from scene import BangBang, Fourier, InvalidScene, Mushroom, mixed
 from scene.laws import MAX_HARMONICS, Quadratic, piece_at
-from scene.mixed import BITS, PI, PI_ERROR, Jet, jet, multiply, sign_on_legs, turns
+from scene.mixed import BITS, PI, PI_ERROR, TaylorBounds, jet, multiply, sign_on_legs, turns
 from scene.polynomials import leg_intervals
 
 N_SCENES = 300
@@ -125,7 +125,7 @@ def test_the_proof_agrees_with_sampling(many_bits, tally):
     assert min(tally["valid"], tally["refused"]) > 50
 
 
-class BendLost(Jet):
+class BendLost(TaylorBounds):
     """A faulty Jet: keeps the tangent and forgets the bound on the second derivative."""
 
     def least(self, h):
@@ -158,7 +158,7 @@ def test_a_lost_bend_is_caught(monkeypatch):
     terms = ((1, (Fourier(1.0, cos=(0.25,), period=1.0),)), (-1, (1.0,)))
     interval = [(Fraction(-2, 5), Fraction(2, 5))]
     assert sign_on_legs(terms, False, interval).holds is False
-    monkeypatch.setattr(mixed.Jet, "least", BendLost.least)
+    monkeypatch.setattr(mixed.TaylorBounds, "least", BendLost.least)
     assert sign_on_legs(terms, False, interval).holds is True
 
 

@@ -19,7 +19,7 @@ DIGITS = 30
 Predict = Callable[[Scene, int], theory.Prediction]
 
 
-class Steppers(NamedTuple):
+class AuditSteppers(NamedTuple):
     """The stepper that the audit simulates with: `fast`, or another with its signatures."""
 
     simulate: Simulate
@@ -32,7 +32,7 @@ def energies_of(name: str) -> Energies:
     return theory.energies(scene_of(RUNS[name]))
 
 
-class Evidence:
+class ClaimEvidence:
     """What an entry looks at.
 
     Args:
@@ -47,7 +47,7 @@ class Evidence:
     def __init__(
         self,
         samples: Mapping[str, Sample],
-        steppers: Steppers,
+        steppers: AuditSteppers,
         *,
         size: Size = "quick",
         seed: int = 0,

@@ -18,7 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 import scene as scenes
-from conformance.audit.runs import Run, Size, block_seed, scene_of
+from conformance.audit.runs import Simulation, Size, block_seed, scene_of
 from scene.files import write_file
 
 if TYPE_CHECKING:
@@ -52,7 +52,7 @@ class Sample(NamedTuple):
         sha256: of all blocks' results.
     """
 
-    run: Run
+    run: Simulation
     s: FloatArray
     t_in: FloatArray
     t_out: FloatArray
@@ -108,7 +108,7 @@ class Sample(NamedTuple):
 
 def draw(
     simulate: Simulate,
-    run: Run,
+    run: Simulation,
     *,
     size: Size,
     seed: int,
@@ -147,12 +147,12 @@ def draw(
     return gathered(run, blocks)
 
 
-def _key(run: Run, n: int, seed: int) -> str:
+def _key(run: Simulation, n: int, seed: int) -> str:
     scene = scenes.to_data(scene_of(run))
     return json.dumps([FORM, scene, run.energy, n, run.n_cycles, run.phases, seed])
 
 
-def _follow(simulate: Simulate, run: Run, n: int, seed: int, threads: int | None) -> Arrays:
+def _follow(simulate: Simulate, run: Simulation, n: int, seed: int, threads: int | None) -> Arrays:
     ensemble = simulate(
         scene_of(run),
         n_particles=n,
@@ -192,7 +192,7 @@ def reduced(ensemble: Ensemble) -> Arrays:
     }
 
 
-def gathered(run: Run, blocks: list[Arrays]) -> Sample:
+def gathered(run: Simulation, blocks: list[Arrays]) -> Sample:
     """Join blocks into a sample."""
 
     def joined(name: str) -> Any:

@@ -21,7 +21,7 @@ import scene as scenes
 from conformance.audit.finding import Check, Entry, Finding
 from conformance.audit.runs import scene_of
 from conformance.audit.samples import Sample
-from conformance.audit.session import Result
+from conformance.audit.session import AuditResult
 from conformance.audit.tolerances import FAMILY_LEVEL, LEVEL, N_SIGMA, mean, spread
 from mushrooms import __version__
 from mushrooms.figures import by_claim
@@ -124,7 +124,7 @@ def machine() -> dict[str, str | int]:
     }
 
 
-def to_data(result: Result) -> ReportData:
+def to_data(result: AuditResult) -> ReportData:
     """Return the content of report.json."""
     pairs = zip(result.entries, result.findings, strict=True)
     return {

@@ -9,7 +9,7 @@ from scipy.stats import ks_2samp
 import theory
 from conformance.audit.claims import broadened, many_cycles
 from conformance.audit.claims.finite_energy import ACW, CW, bias_of_mean, width
-from conformance.audit.evidence import Evidence
+from conformance.audit.evidence import ClaimEvidence
 from conformance.audit.finding import Check
 from conformance.audit.runs import RUNS, scene_of
 from conformance.audit.samples import Sample
@@ -46,7 +46,7 @@ def mouth_speed(sample: Sample) -> float:
     return float(max(bounds(laws(scene)["r"]).slope, mouth))
 
 
-def growth(evidence: Evidence, sample: Sample) -> Check:
+def growth(evidence: ClaimEvidence, sample: Sample) -> Check:
     """Compare the mean of s with m1 and its finite-energy bias."""
     theirs = float(evidence.theory_of(sample).m1)
     bias, band = bias_of_mean(sample)
@@ -59,7 +59,7 @@ def growth(evidence: Evidence, sample: Sample) -> Check:
     )
 
 
-def escape(evidence: Evidence, sample: Sample) -> Check:
+def escape(evidence: ClaimEvidence, sample: Sample) -> Check:
     """Compare the uncaptured share with p_nc."""
     band = 2 * mouth_speed(sample) / sample.speed
     return close(
@@ -71,7 +71,7 @@ def escape(evidence: Evidence, sample: Sample) -> Check:
     )
 
 
-def peak_place(evidence: Evidence, sample: Sample) -> Check:
+def peak_place(evidence: ClaimEvidence, sample: Sample) -> Check:
     """Compare the mean energy of the uncaptured with log E_nc and its drift."""
     kept = sample.gain[~sample.captured]
     drift = width(sample).value ** 2 / 4
@@ -81,7 +81,7 @@ def peak_place(evidence: Evidence, sample: Sample) -> Check:
     return close(what, found, theirs, band=drift, scale=abs(theirs) or np.inf)
 
 
-def peak_shape(evidence: Evidence, sample: Sample) -> Check:
+def peak_shape(evidence: ClaimEvidence, sample: Sample) -> Check:
     """Test the uncaptured peak against the Gaussian of its own mean and width."""
     kept = sample.gain[~sample.captured]
     centre = mean(kept).value - width(sample).value ** 2 / 4
@@ -102,7 +102,7 @@ def captured_energies(sample: Sample) -> Check:
     return fits(f"{sample.run.name}: log E1/E0 of the captured", values, laws_, scale=0.2, note=note)
 
 
-def one_cycle(evidence: Evidence, runs: tuple[str, ...]) -> list[Check]:
+def one_cycle(evidence: ClaimEvidence, runs: tuple[str, ...]) -> list[Check]:
     """Check growth, escape, the peak and both distributions of each run."""
     found = []
     for run in runs:
@@ -117,12 +117,12 @@ def one_cycle(evidence: Evidence, runs: tuple[str, ...]) -> list[Check]:
     return found
 
 
-def fixed_cap(evidence: Evidence) -> list[Check]:
+def fixed_cap(evidence: ClaimEvidence) -> list[Check]:
     """X1: both directions at E0 = 1e9."""
     return one_cycle(evidence, (ACW, CW))
 
 
-def moving_cap(evidence: Evidence) -> list[Check]:
+def moving_cap(evidence: ClaimEvidence) -> list[Check]:
     """X2: the moving cap at 1e6 and 1e7."""
     low, high = (evidence.sample(run) for run in MOVING)
     found = one_cycle(evidence, MOVING)
@@ -167,7 +167,7 @@ def _modes(s: FloatArray) -> tuple[float, float]:
     return float(middle[left][np.argmax(counts[left])]), float(middle[~left][np.argmax(counts[~left])])
 
 
-def capture_times(evidence: Evidence) -> list[Check]:
+def capture_times(evidence: ClaimEvidence) -> list[Check]:
     """X3: when particles are captured."""
     found = []
     for run in ("moving-cap@1e7", ACW, CW):
@@ -198,7 +198,7 @@ def return_time(sample: Sample) -> float:
     return float(now.v_cha / (4 * w * sample.speed))
 
 
-def ergodic(evidence: Evidence) -> list[Check]:
+def ergodic(evidence: ClaimEvidence) -> list[Check]:
     """X5: c = 0."""
     sample = evidence.sample("ergodic@1e7")
     sigma = spread(sample.gain)
@@ -223,13 +223,13 @@ def ergodic(evidence: Evidence) -> list[Check]:
     ]
 
 
-def _ratio(evidence: Evidence) -> tuple[float, float]:
+def _ratio(evidence: ClaimEvidence) -> tuple[float, float]:
     a, b = (spread(evidence.sample(run).gain) for run in ("ergodic@1e7", "ergodic@1e6"))
     ratio = a.value / b.value
     return ratio, ratio * float(np.hypot(a.error / a.value, b.error / b.value))
 
 
-def untilted(evidence: Evidence) -> list[Check]:
+def untilted(evidence: ClaimEvidence) -> list[Check]:
     """X6: with an upright stem the chaotic zone's energies are distributed differently."""
     upright, tilted = evidence.sample("untilted@1e6"), evidence.sample("moving-cap@1e6")
     centred = []
@@ -267,7 +267,7 @@ def untilted(evidence: Evidence) -> list[Check]:
     return found
 
 
-def trivial_loops(evidence: Evidence) -> list[Check]:
+def trivial_loops(evidence: ClaimEvidence) -> list[Check]:
     """X7: loops that enclose nothing."""
     found = []
     for name, table in ONE_PARAMETER.items():
@@ -304,7 +304,7 @@ def _one_parameter() -> dict[str, Mushroom]:
 ONE_PARAMETER = _one_parameter()
 
 
-def both_ways(evidence: Evidence) -> list[Check]:
+def both_ways(evidence: ClaimEvidence) -> list[Check]:
     """X8: reversed cycles."""
     found: list[Check] = []
     for name, other in (

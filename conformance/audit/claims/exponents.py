@@ -15,7 +15,7 @@ import theory
 from conformance.audit.claims.broadened import phase_times, zone_energy
 from conformance.audit.claims.experiments import MEAN_RETURNS, mouth_speed, return_time
 from conformance.audit.claims.finite_energy import ACW, ERGODIC, LADDER
-from conformance.audit.evidence import Evidence
+from conformance.audit.evidence import ClaimEvidence
 from conformance.audit.finding import Check
 from conformance.audit.runs import RUNS, block_seed, scene_of
 from conformance.audit.samples import Sample
@@ -43,7 +43,7 @@ N_ENERGIES = {"quick": 400, "full": 2000}
 PER_ENERGY = 20
 
 
-def circle(evidence: Evidence) -> list[Check]:
+def circle(evidence: ClaimEvidence) -> list[Check]:
     """L1: the breathing circle, hit by hit."""
     scene = load("breathing-circle")
     momentum, steps, drifts = 0.0, [], []
@@ -71,7 +71,7 @@ def circle(evidence: Evidence) -> list[Check]:
 
 
 def _hits(
-    evidence: Evidence, scene: Scene, speed: float, start: tuple[float, float, float]
+    evidence: ClaimEvidence, scene: Scene, speed: float, start: tuple[float, float, float]
 ) -> tuple[float, float, float]:
     """Return largest change of L, root mean square of phi' - phi per hit and largest drift of v r."""
     x, y, turn = start
@@ -96,7 +96,7 @@ def _slope(x: tuple[float, ...], y: list[float]) -> float:
     return float(np.polyfit(np.log(x), np.log(y), 1)[0])
 
 
-def invariants(evidence: Evidence) -> list[Check]:
+def invariants(evidence: ClaimEvidence) -> list[Check]:
     """L2: E V_cap in the cap, E V in the ergodic table."""
     captured = evidence.samples(*LADDER[1:6])
     widths = []
@@ -171,7 +171,7 @@ def _exponent(what: str, samples: list[Sample], values: list[Mean], exponent: fl
     )
 
 
-def volumes(evidence: Evidence) -> list[Check]:
+def volumes(evidence: ClaimEvidence) -> list[Check]:
     """L3: volumes as shares of random phase points, and of particles that stay in the frozen cap."""
     found = []
     n = N_POINTS[evidence.size]
@@ -214,7 +214,7 @@ def _points(
     return in_cap | in_stem, in_cap, in_cap & (momentum >= w)
 
 
-def release(evidence: Evidence) -> list[Check]:
+def release(evidence: ClaimEvidence) -> list[Check]:
     """L4: captured at t_in, released when nu returns."""
     samples = evidence.samples(*LADDER[1:6])
     gaps = [nu_gap(sample) for sample in samples]
@@ -247,7 +247,7 @@ def nu_gap(sample: Sample) -> FloatArray:
     return gap
 
 
-def energy_through_the_cycle(evidence: Evidence) -> list[Check]:
+def energy_through_the_cycle(evidence: ClaimEvidence) -> list[Check]:
     """L5: mean log E in the chaotic zone against eq. (dE)."""
     found = []
     for run, every in (("moving-cap@1e7", 2), (ACW, 1)):
@@ -280,7 +280,7 @@ def zone_share(sample: Sample, times: FloatArray) -> FloatArray:
     return found
 
 
-def population_through_the_cycle(evidence: Evidence) -> list[Check]:
+def population_through_the_cycle(evidence: ClaimEvidence) -> list[Check]:
     """L6: p_cha(t) against eq. (ps)."""
     found = []
     for run, every in (("moving-cap@1e7", 2), (ACW, 1)):
@@ -303,7 +303,7 @@ def population_through_the_cycle(evidence: Evidence) -> list[Check]:
     return found
 
 
-def work(evidence: Evidence) -> list[Check]:
+def work(evidence: ClaimEvidence) -> list[Check]:
     """L7: mean exp(-W/kT) = A(t)/A(0), exact at any speed of the walls."""
     phases = (0.25, 0.5, 0.75)
     scene = load("moving-cap")

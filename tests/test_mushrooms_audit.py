@@ -18,6 +18,7 @@ from conformance.audit import ledger, session
 from conformance.audit.evidence import AuditSteppers
 from conformance.audit.finding import Check, Finding
 from conformance.audit.session import AuditResult, AuditSettings
+from mushrooms.figures import by_claim
 from mushrooms.reports import audit_page
 
 SCHEMA = Path(__file__).parent.parent / "docs" / "report.schema.json"
@@ -87,7 +88,7 @@ def test_the_page_loads_nothing_from_elsewhere_and_shows_every_figure(everything
     links = Links()
     links.feed(page)
     pictures = [source for source in links.sources if not source.startswith("#")]
-    assert len(pictures) == len(audit_page.pictures.ALL)
+    assert len(pictures) == len(by_claim.ALL)
     assert not {"script", "link", "iframe", "object"} & set(links.tags)
     assert "http" not in page.replace("data:image/svg+xml", "")
     assert "n = 5 &lt;b&gt;&amp;" in page

@@ -12,6 +12,7 @@ import msgspec
 import numpy as np
 import pytest
 from hypothesis import given
+from support.refusals import one_line
 
 from conformance.strategies import scenes
 from scene import (
@@ -52,16 +53,6 @@ NO_NUMBERS = [
     10**400,
 ]
 OUT_OF_RANGE = [math.nan, math.inf, -math.inf, np.float64("nan"), np.float32("inf")]
-
-
-def one_line(call, *arguments, **fields):
-    """Return the message with which a call refuses."""
-    with pytest.raises(BadInput) as refusal:
-        call(*arguments, **fields)
-    message = str(refusal.value)
-    assert len(message.splitlines()) == 1
-    assert len(message) < 300
-    return message
 
 
 @pytest.mark.parametrize("bad", NO_NUMBERS + OUT_OF_RANGE + [0.0, -0.0, -1.0, -1])

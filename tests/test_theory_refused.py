@@ -7,9 +7,10 @@ import math
 import mpmath
 import numpy as np
 import pytest
+from support.refusals import one_line
 
 import theory
-from scene import BadInput, BangBang, Cap, Fourier, Mushroom, Stem, load
+from scene import BangBang, Cap, Fourier, Mushroom, Stem, load
 from theory.entries import MAX_DIGITS, MAX_ORDER
 
 SCENE = load("moving-cap")
@@ -28,15 +29,6 @@ NO_ARRAYS = [
     {"a": 1},
     [1j, 0],
 ]
-
-
-def one_line(call, *arguments, **fields):
-    with pytest.raises(BadInput) as refusal:
-        call(*arguments, **fields)
-    message = str(refusal.value)
-    assert len(message.splitlines()) == 1
-    assert len(message) < 300
-    return message
 
 
 OF_A_SCENE = {

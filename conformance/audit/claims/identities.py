@@ -14,7 +14,14 @@ import numpy as np
 import scene as scenes
 import theory
 from conformance.audit.claims.finite_energy import ACW, CW, width
-from conformance.audit.claims.misprints import chaotic_volume, fixed_cap, island_slope, loop_area, rounds
+from conformance.audit.claims.misprints import (
+    chaotic_volume,
+    fixed_cap,
+    island_slope,
+    loop_area,
+    rounds,
+    signed_area,
+)
 from conformance.audit.evidence import DIGITS, ClaimEvidence
 from conformance.audit.finding import Check
 from conformance.audit.tolerances import close, exact, mean, stated
@@ -158,7 +165,7 @@ def orientations(_evidence: ClaimEvidence) -> list[Check]:
         table = scenes.load(name)
         assert isinstance(table, Mushroom)
         w, h = ([v for _, v in law.knots[:-1]] for law in (table.w, table.h))  # type: ignore[union-attr]
-        area = sum(w[k] * h[(k + 1) % 4] - w[(k + 1) % 4] * h[k] for k in range(4)) / 2
+        area = signed_area(w, h)
         found.append(
             stated(f"{name} in the plane (w, h)", area * sign > 0, f"area {area:+.3f}", f"sign {sign:+d}")
         )

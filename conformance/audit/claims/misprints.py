@@ -6,6 +6,7 @@ nothing is recorded.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import mpmath
@@ -86,7 +87,7 @@ def signs(evidence: ClaimEvidence) -> list[Check]:
 def loop_area(name: str) -> float:
     """Return the signed area of a loop in the plane (V_ell/V_cap, V_cap/V), anticlockwise positive."""
     points = _volumes(scenes.load(name))
-    return _area([v.v_ell / v.v_cap for v in points], [v.v_cap / (v.v_cap + v.v_stem) for v in points])
+    return signed_area([v.v_ell / v.v_cap for v in points], [v.v_cap / (v.v_cap + v.v_stem) for v in points])
 
 
 def _volumes(table: scenes.Scene) -> list[theory.Volumes]:
@@ -96,8 +97,8 @@ def _volumes(table: scenes.Scene) -> list[theory.Volumes]:
     return [theory.volumes_at(fp, table, span * k / N_LOOP) for k in range(N_LOOP)]
 
 
-def _area(x: list[float], y: list[float]) -> float:
-    # Of the closed polygon, by the shoelace formula.
+def signed_area(x: Sequence[float], y: Sequence[float]) -> float:
+    """Return the area of a closed polygon, positive when it runs anticlockwise (the shoelace formula)."""
     n = len(x)
     return float(sum(x[k] * y[(k + 1) % n] - x[(k + 1) % n] * y[k] for k in range(n)) / 2)
 
@@ -190,8 +191,8 @@ def loop_plane(evidence: ClaimEvidence) -> list[Check]:
     """M12: area of the loop a = b = 0.5 in the summary's plane and in that of sec. 3.5."""
     points = _volumes(scenes.load("moving-cap-trivial"))
     share = [v.v_ell / v.v_cap for v in points]
-    summary = _area(share, [v.v_cha for v in points])
-    section = _area(share, [v.v_cap / (v.v_cap + v.v_stem) for v in points])
+    summary = signed_area(share, [v.v_cha for v in points])
+    section = signed_area(share, [v.v_cap / (v.v_cap + v.v_stem) for v in points])
     result = evidence.predict("moving-cap-trivial")
     grows = abs(result.m1) > ZERO
     m1 = f"m1 = {mpmath.nstr(result.m1, 3)}, p_nc = {mpmath.nstr(result.p_nc, 6)}"

@@ -34,7 +34,7 @@ from mpmath import fp
 from scene import BadInput, Horizon, Mushroom, Outcome, Scene, State
 from scene.geometry import area, half_width, table_at
 from scene.laws import bounds, value
-from scene.tables import laws, period
+from scene.tables import cycle_length, laws
 
 Captured = tuple[float, float] | None
 Flow = Callable[[Scene, Sequence[State], float], Sequence[tuple[Outcome, Captured]]]
@@ -94,14 +94,14 @@ def work_identity(
     Raises:
         BadInput: the scene stands still, or an argument is outside its bounds.
     """
-    shared = period(scene)
-    if shared is None:
+    span = cycle_length(scene)
+    if not span:
         raise BadInput("scene: nothing moves, must have a law that does")
     ratio = least_ratio(scene) if ratio is None else ratio
     _check_range("ratio", ratio, 0.0, 1.0)
     _check_range("alarm", alarm, 0.0, 1.0)
     _check_range("kT", kT, 0.0, 2.0**800)
-    span, found = float(shared.value(fp)), []
+    found = []
     for i, part in enumerate(times):
         states = canonical_states(scene, n_particles, kT / ratio, _generator(seed, i))
         arrived = flow(scene, states, part * span)
@@ -147,11 +147,10 @@ def one_cycle(
     Raises:
         BadInput: the scene stands still, or an argument is outside its bounds.
     """
-    shared = period(scene)
-    if shared is None:
+    span = cycle_length(scene)
+    if not span:
         raise BadInput("scene: nothing moves, must have a law that does")
     _check_range("alarm", alarm, 0.0, 1.0)
-    span = float(shared.value(fp))
     narrowest = span * least_nu(scene, span)
     states = microcanonical_states(scene, n_particles, energy, _generator(seed, 0))
     arrived = [o for o, _ in flow(scene, states, narrowest) if isinstance(o, Horizon)]

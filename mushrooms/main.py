@@ -27,7 +27,7 @@ from mushrooms.terminal import progress_bar
 from scene.files import write_file, write_files
 from scene.load import read_data
 from scene.refusal import BadInput, check_seed
-from scene.tables import period
+from scene.tables import cycle_length
 
 PROGRAM = "mushrooms"
 MAX_PARTICLES = 10**8
@@ -120,16 +120,10 @@ def _catalogue_row(name: str) -> dict[str, Any]:
         "refused": None,
     }
     try:
-        shared = period(scenes.load(name))
+        length = cycle_length(scenes.load(name))
     except scenes.InvalidScene as error:
         return row | {"refused": str(error).partition(": ")[2]}
-    return row | {"period": _float_period(shared)}
-
-
-def _float_period(shared: Any) -> float | None:
-    from mpmath import fp
-
-    return None if shared is None else float(shared.value(fp))
+    return row | {"period": length or None}
 
 
 @app.command("theory", epilog="Example: mushrooms theory moving-cap --digits 40")

@@ -19,15 +19,7 @@ from typing import Any, NamedTuple
 from mpmath import MPContext
 
 from scene import exact, mixed
-from scene.laws import (
-    BangBang,
-    Law,
-    Period,
-    bounds,
-    is_constant,
-    period_of,
-    value,
-)
+from scene.laws import BangBang, Law, Period, bounds, is_constant, period_of, value
 from scene.laws import exact as number
 from scene.polynomials import half_angle, leg_intervals, leg_polynomial, one_plus_square
 from scene.refusal import InvalidScene

@@ -91,10 +91,7 @@ BAD_DATA = [
     ({**CAP, "r": {**FOURIER, "cos": [0.1, "x"]}}, "r.cos[1] = 'x': Expected `float`"),
     ({**CAP, "r": {**FOURIER, "cos": [0.1, math.nan]}}, "r.cos[1] = nan, must be finite"),
     ({**CAP, "r": {**FOURIER, "omega": 0.0}}, "r.omega = 0.0, must be finite and > 0"),
-    (
-        {**CAP, "r": {**LEGS, "knots": [[0.0, 1.0], [1.0]]}},
-        "r.knots[1] = an object of type list: Exp",
-    ),
+    ({**CAP, "r": {**LEGS, "knots": [[0.0, 1.0], [1.0]]}}, "r.knots[1] = an object of type list: Exp"),
     ({**CAP, "r": {**LEGS, "knots": [[0.0, 1.0], [1.0, 2.0]]}}, "r.knots[1] value = 2.0, must equal"),
     ({**STEM, "slope": 1.0}, "w > h slope fails by"),
     # Extreme numbers must be refused in words as well, not by an overflow on the way.

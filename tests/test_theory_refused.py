@@ -200,11 +200,7 @@ def test_arrays(bad, solved):
     "bad", [None, 1.0, "0.1", [math.nan], ["x"], [None], [[0.0]], [True], ["inf"], [1j]], ids=repr
 )
 def test_levels(bad):
-    for entry, field in (
-        (theory.density_at, "s"),
-        (theory.cdf_at, "s"),
-        (theory.capture_rate_at, "t"),
-    ):
+    for entry, field in ((theory.density_at, "s"), (theory.cdf_at, "s"), (theory.capture_rate_at, "t")):
         assert one_line(entry, SCENE, bad, 4).startswith(field)
 
 

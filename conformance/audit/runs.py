@@ -51,9 +51,7 @@ class Simulation(NamedTuple):
 
 # Scenes that are no part of the catalogue: one parameter moves, the rest stand still (X7).
 SCENES: dict[str, Scene] = {
-    "only-mouth": Mushroom(
-        r=1.0, h=1.0, nu=scenes.Fourier(0.6, 1.0, (0.4,)), slope=0.1111, name="only-mouth"
-    ),
+    "only-mouth": Mushroom(r=1.0, h=1.0, nu=scenes.Fourier(0.6, 1.0, (0.4,)), slope=0.1111, name="only-mouth")
 }
 
 _ALL = (

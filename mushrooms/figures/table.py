@@ -17,7 +17,7 @@ from mpmath import fp
 from mushrooms.figures import style as plots
 from scene import Collision, Scene, State
 from scene.geometry import table_at
-from scene.tables import period
+from scene.tables import cycle_length
 
 SUFFIXES = (".svg", ".png", ".gif")
 N_PHASES = 6
@@ -33,14 +33,8 @@ def walls(scene: Scene, t: float) -> list[np.ndarray]:
 
 def phases(scene: Scene, n: int = N_PHASES) -> list[float]:
     """Return n times [time] evenly over one cycle; a static table has the single time 0."""
-    span = cycle(scene)
+    span = cycle_length(scene)
     return [span * k / n for k in range(n)] if span else [0.0]
-
-
-def cycle(scene: Scene) -> float:
-    """Return the period [time], 0 for a static table."""
-    shared = period(scene)
-    return float(shared.value(fp)) if shared else 0.0
 
 
 def chords(scene: Scene, t: float, n: int = N_CHORDS) -> np.ndarray:
@@ -118,7 +112,7 @@ def write_picture(scene: Scene, suffix: str, file: BinaryIO) -> None:
 @rc_context(plots.STYLE)
 def _write_animation(scene: Scene, file: BinaryIO) -> None:
     times = phases(scene, N_FRAMES)
-    span = cycle(scene)
+    span = cycle_length(scene)
     figure, axes = plots.new_figure(4.8, 4.8)
     _set_frame(axes, scene)
     lines = [axes.plot(*line, color=plots.BLUE, linewidth=2)[0] for line in walls(scene, 0.0)]

@@ -19,16 +19,7 @@ from conformance.audit.evidence import ClaimEvidence
 from conformance.audit.finding import Check
 from conformance.audit.runs import RUNS, block_seed, scene_of
 from conformance.audit.samples import Sample
-from conformance.audit.tolerances import (
-    BoolArray,
-    FloatArray,
-    Mean,
-    close,
-    mean,
-    share,
-    spread,
-    stated,
-)
+from conformance.audit.tolerances import BoolArray, FloatArray, Mean, close, mean, share, spread, stated
 from scene import Mushroom, Scene, State, load
 from scene.geometry import area, table_at
 from scene.laws import value

@@ -116,7 +116,7 @@ def positivity(evidence: ClaimEvidence) -> list[Check]:
             least > 0,
             f"least m1 = {least:.3g}",
             "> 0",
-        ),
+        )
     ]
 
 

@@ -19,7 +19,7 @@ from conformance.audit.evidence import DIGITS, ClaimEvidence
 from conformance.audit.finding import Check, Form
 from conformance.audit.tolerances import exact, stated
 from scene.laws import BangBang
-from scene.tables import Mushroom, period
+from scene.tables import Mushroom, cycle_length
 
 ZERO = 1e-12  # float64 sums of a few hundred terms of order 10
 N_LOOP = 256  # the trapezoid rule converges geometrically on smooth periodic loops
@@ -86,15 +86,17 @@ def signs(evidence: ClaimEvidence) -> list[Check]:
 
 def loop_area(name: str) -> float:
     """Return the signed area of a loop in the plane (V_ell/V_cap, V_cap/V), anticlockwise positive."""
-    points = _volumes(scenes.load(name))
-    return signed_area([v.v_ell / v.v_cap for v in points], [v.v_cap / (v.v_cap + v.v_stem) for v in points])
+    return signed_area(*volume_loop(scenes.load(name), N_LOOP))
 
 
-def _volumes(table: scenes.Scene) -> list[theory.Volumes]:
-    shared = period(table)
-    assert shared is not None
-    span = shared.value(fp)
-    return [theory.volumes_at(fp, table, span * k / N_LOOP) for k in range(N_LOOP)]
+def volume_loop(table: scenes.Scene, n: int) -> tuple[list[float], list[float]]:
+    """Return V_ell/V_cap and V_cap/V at n even times of one cycle, the plane of sec. 3.5."""
+    points = _volumes(table, n)
+    return [v.v_ell / v.v_cap for v in points], [v.v_cap / (v.v_cap + v.v_stem) for v in points]
+
+
+def _volumes(table: scenes.Scene, n: int) -> list[theory.Volumes]:
+    return [theory.volumes_at(fp, table, cycle_length(table) * k / n) for k in range(n)]
 
 
 def signed_area(x: Sequence[float], y: Sequence[float]) -> float:
@@ -189,10 +191,10 @@ def cone(_evidence: ClaimEvidence) -> list[Check]:
 
 def loop_plane(evidence: ClaimEvidence) -> list[Check]:
     """M12: area of the loop a = b = 0.5 in the summary's plane and in that of sec. 3.5."""
-    points = _volumes(scenes.load("moving-cap-trivial"))
-    share = [v.v_ell / v.v_cap for v in points]
-    summary = signed_area(share, [v.v_cha for v in points])
-    section = signed_area(share, [v.v_cap / (v.v_cap + v.v_stem) for v in points])
+    table = scenes.load("moving-cap-trivial")
+    share, part = volume_loop(table, N_LOOP)
+    summary = signed_area(share, [v.v_cha for v in _volumes(table, N_LOOP)])
+    section = signed_area(share, part)
     result = evidence.predict("moving-cap-trivial")
     grows = abs(result.m1) > ZERO
     m1 = f"m1 = {mpmath.nstr(result.m1, 3)}, p_nc = {mpmath.nstr(result.p_nc, 6)}"

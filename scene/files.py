@@ -1,4 +1,4 @@
-"""Files written whole or not at all: a file appears under its name only when it is complete."""
+"""Files written whole or not at all: a file gets its name only when it is complete and on the disk."""
 
 from __future__ import annotations
 

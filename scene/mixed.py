@@ -8,8 +8,9 @@ bound K on its second derivative there,
 
 so an interval on which the right side is positive is done, any other is halved. Everything is a rational
 number: times and legs are, and cos and sin of a rational part of a turn are computed here, in integers, to
-155 bits with a proved error that is carried along. (mpmath would serve too, but its constants are shared by
-all threads.) Near a contact no interval is ever small enough: the search then ends, and says where.
+155 bits, with a proved bound on their error that is carried along. (mpmath could do this as well, but its
+constants are shared by all threads.) Near a contact no interval is ever small enough: the search ends then,
+and reports where.
 """
 
 from __future__ import annotations

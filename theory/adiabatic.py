@@ -56,7 +56,7 @@ class Panel(NamedTuple):
 
 
 class Window(NamedTuple):
-    """A valley resolved: its own panels, its children; A and B where it begins and where the children do."""
+    """A valley resolved: its own panels and its children; A and B at its top and where the children begin."""
 
     panels: tuple[Panel, ...]
     children: tuple[Window, ...]

@@ -78,7 +78,8 @@ def spans(ctx: Any, scene: Mushroom) -> list[Span]:
 def _cut(ctx: Any, found: list[Span], cuts: list[Fraction], scene: Mushroom) -> list[Span]:
     """Cut spans of a Fourier mouth where bang-bang laws of radius, depth or slope are not analytic.
 
-    The spans' own ends are known to the context's precision only: a cut nearer to one than that is it.
+    The ends of the spans are rounded to the context's precision; a cut that lies nearer to an end than that
+    rounding is taken for the end itself.
     """
     shared = period(scene)
     assert shared is not None

@@ -1,8 +1,8 @@
 """What the adiabatic theory predicts for one cycle: the figures of secs. 3.5 and 4.
 
 Everything is computed at two or more resolutions; an answer is given when two in a row
-agree to two digits more than asked, and is then the finer of the two. Any cycle is covered, with
-several captures of one particle in it.
+agree to two digits more than asked, and is then the finer of the two. A cycle in which one particle is
+captured several times is covered too.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What an entry may use: samples of the runs it names, steppers, theory."""
+"""What the check of a claim may look at: samples of the simulations it names, steppers and theory."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def energies_of(name: str) -> Energies:
 
 
 class ClaimEvidence:
-    """What an entry looks at.
+    """What the check of one claim looks at.
 
     Args:
         samples: by run, those that the entry names.

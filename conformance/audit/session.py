@@ -1,8 +1,8 @@
 """One audit: simulate what the entries need, examine each, keep what is finished.
 
-Entries that need no simulation are examined in another process meanwhile. In the results' folder every
-block of particles and every finding is saved when it is done; with `resume` those made with the same
-settings are not made again.
+Entries that need no simulation are examined in another process at the same time. Every block of particles
+and every finding is saved in the results' folder when it is done; `resume` takes up those that were made
+with the same settings.
 """
 
 from __future__ import annotations

@@ -17,13 +17,13 @@ from typing import Any, Literal, NamedTuple, TypeVar
 import msgspec
 from hypothesis import currently_in_test_context, note
 from hypothesis import strategies as st
-from mpmath import MPContext
 
 from scene import BangBang, Cap, Fourier, Law, Mushroom, Scene, State, Stem, Wall, to_data
 from scene.geometry import DIGITS, TableAt, table_at
 from scene.laws import bounds, breakpoints
+from scene.precision import decimals
+from scene.tables import cycle_length
 from scene.tables import laws as laws_of
-from scene.tables import period
 from scene.transforms import scaled
 
 T = TypeVar("T")
@@ -216,8 +216,7 @@ class _Place(NamedTuple):
 
     @classmethod
     def of(cls, scene: Scene, t: float) -> _Place:
-        ctx = MPContext()
-        ctx.dps = DIGITS
+        ctx = decimals(DIGITS)
         exact = table_at(ctx, scene, t)
         return cls(ctx, exact, exact.rounded())
 
@@ -280,9 +279,8 @@ def states(draw: st.DrawFn, scene: Scene) -> tuple[State, float]:
     vx, vy = draw(_headings(place, wall, x, y))
     vx, vy = _leaving(place, wall, x, y, speed * vx, speed * vy)
     flight = place.near.size / speed * draw(st.sampled_from((4.0, 1.0, 0.125, 2.0**-20, 0.0)))
-    shared = period(scene)
-    if shared is not None:
-        flight = min(flight, LONGEST_FLIGHT * float(shared.value(place.ctx)))
+    if length := cycle_length(scene):
+        flight = min(flight, LONGEST_FLIGHT * length)
     state, t_end = State(t, x, y, vx, vy, wall), t + flight
     if currently_in_test_context():
         fields = {name: getattr(state, name) for name in state.__struct_fields__}
@@ -309,8 +307,7 @@ def adversarial(family: str | None = None) -> st.SearchStrategy[Any]:
 
 @st.composite
 def _times(draw: st.DrawFn, scene: Scene) -> float:
-    shared = period(scene)
-    length = 1.0 if shared is None else float(shared.value(MPContext()))
+    length = cycle_length(scene) or 1.0
     knots = [float(t) for law in laws_of(scene).values() for t in breakpoints(law)] or [0.0]
     turns = draw(st.one_of(st.integers(-2, 3), st.sampled_from((0, 0, 1000, -1000))))
     inside = fractions().map(lambda part: length * (turns + part))

@@ -11,9 +11,10 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-from mpmath import MPContext, fp
+from mpmath import fp
 
 from scene.laws import value
+from scene.precision import decimals
 from scene.tables import Cap, Scene, Stem, Wall, laws, width_factors
 
 DIGITS = 50  # to which `rounded` evaluates laws before it rounds them
@@ -165,7 +166,7 @@ def half_width(ctx: Any, scene: Scene, t: Any, order: int = 0) -> Any:
 
 
 def table_at(ctx: Any, scene: Scene, t: Any) -> TableAt:
-    """Evaluate a table at time t in mpmath's `fp` or in an MPContext."""
+    """Evaluate a table at time t in mpmath's `fp` or in numbers of `scene.precision.decimals`."""
     given = laws(scene)
     columns = []
     for order in (0, 1):
@@ -177,9 +178,7 @@ def table_at(ctx: Any, scene: Scene, t: Any) -> TableAt:
 
 def rounded(scene: Scene, t: float) -> TableAt:
     """Evaluate a table to DIGITS digits and round once: the same binary64 numbers on every machine."""
-    ctx = MPContext()
-    ctx.dps = DIGITS
-    return table_at(ctx, scene, t).rounded()
+    return table_at(decimals(DIGITS), scene, t).rounded()
 
 
 def area(scene: Scene, t: float) -> float:

@@ -10,10 +10,11 @@ from collections.abc import Callable
 from typing import Any, TypeVar
 
 import msgspec
-from mpmath import MPContext, fp
+from mpmath import fp
 
 from scene import BangBang, Fourier, Law, Scene, State, Wall
 from scene.laws import value
+from scene.precision import decimals
 from scene.tables import laws
 
 Table = TypeVar("Table", bound=Scene)
@@ -76,9 +77,7 @@ def frozen(scene: Table, t: float) -> Table:
 
     They are computed to 50 digits and rounded once, so that parameters which touch (w = r, nu = 1) still do.
     """
-    ctx = MPContext()
-    ctx.dps = 50
-    return _with_laws(scene, lambda _, law: float(value(ctx, law, t)))
+    return _with_laws(scene, lambda _, law: float(value(decimals(50), law, t)))
 
 
 def idle(scene: Table) -> Table:

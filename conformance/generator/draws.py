@@ -15,12 +15,11 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple, TypeVar
 
 import msgspec
-from mpmath import MPContext
 
 from scene import BangBang, Cap, Fourier, Law, Mushroom, Scene, State, Stem, Wall, to_data
 from scene.geometry import TableAt, rounded
 from scene.laws import bounds, breakpoints
-from scene.tables import laws, period
+from scene.tables import cycle_length, laws
 
 T = TypeVar("T")
 
@@ -156,8 +155,7 @@ def walls_speed(scene: Scene) -> float:
 
 def time(draw: Draw, scene: Scene, turns: int = 3) -> float:
     """Draw a time within some periods; now and then on a knot."""
-    shared = period(scene)
-    length = 1.0 if shared is None else float(shared.value(MPContext()))
+    length = cycle_length(scene) or 1.0
     knots = [float(t) for law in laws(scene).values() for t in breakpoints(law)]
     if knots and draw.pick(range(5)) == 0:
         return length * draw.pick(range(turns)) + draw.pick(knots)

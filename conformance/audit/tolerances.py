@@ -34,6 +34,15 @@ class Mean(NamedTuple):
     value: float
     error: float
 
+    def less(self, amount: float) -> Mean:
+        """Return the value less a known amount."""
+        return Mean(self.value - amount, self.error)
+
+    def over(self, other: Mean) -> Mean:
+        """Return the ratio to an independent value, its error to first order."""
+        ratio = self.value / other.value
+        return Mean(ratio, ratio * float(np.hypot(self.error / self.value, other.error / other.value)))
+
 
 def mean(values: npt.ArrayLike) -> Mean:
     """Return the mean and its standard error; nan for fewer than two values."""

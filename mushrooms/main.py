@@ -32,9 +32,8 @@ from scene.tables import cycle_length
 PROGRAM = "mushrooms"
 MAX_PARTICLES = 10**8
 MAX_DIGITS = 1000
-UsageError: type[Any] = typer.BadParameter.__bases__[
-    0
-]  # typer 0.26 carries its own click; this names either's
+# Typer 0.26 carries a click of its own, older ones import it: this is the error class of the one in use.
+UsageError: type[Any] = typer.BadParameter.__bases__[0]
 
 app = typer.Typer(
     add_completion=False,

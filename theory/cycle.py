@@ -21,8 +21,8 @@ from theory.parameters import MovingMushroom
 from theory.valleys import CapturePiece, Valley, stretches, valley
 from theory.volumes import as_mushroom
 
-# Digits beyond those asked. Loops that binary64 cannot tell from trivial ones have g - 1 ~ 1e-16 and
-# m1 ~ 1e-32: with 40 digits to spare such an m1 is still told from zero.
+# Digits beyond those asked. A loop that binary64 cannot tell from a trivial one has g - 1 ~ 1e-16 and
+# m1 ~ 1e-32; with 40 more digits such an m1 still differs from zero.
 GUARD = 40
 
 

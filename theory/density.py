@@ -2,10 +2,10 @@
 
 A particle captured at place x of a panel has s(x), so the density at a value is the sum of
 |d p_cha / ds| over the places that reach it. Where ds / dt_in = 0 the density is infinite as
-strength / sqrt(|s - s_c|) on one side: a caustic. Distribution functions stay finite. Roots are found in
-the Chebyshev panels by Newton's method, between turning points seen in `theory.branches`. Densities of s in
-cycles with several captures of one particle are convolutions and are refused here: `theory.distribution`
-has their distribution function in binary64.
+strength / sqrt(|s - s_c|) on one side of a caustic s_c. Distribution functions stay finite. Places are found
+in the Chebyshev panels by Newton's method, between the turning points that `theory.branches` finds. Cycles
+in which one particle is captured several times are refused here: their densities are convolutions, and
+`theory.distribution` has their distribution function in binary64.
 """
 
 from __future__ import annotations

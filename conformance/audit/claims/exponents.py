@@ -312,7 +312,7 @@ def work(evidence: ClaimEvidence) -> list[Check]:
         )
         ends = np.column_stack([done.phase_energies[:, 0], done.energy])[done.outcome == 0]
         n_lost += PER_ENERGY - len(ends)
-        # Energies are drawn HOTTER times hotter, else rare fast particles carried the mean: weigh them back.
+        # Energies are drawn at HOTTER times kT and weighted back: a few fast particles would carry the mean.
         rows.append(np.mean(HOTTER * np.exp(energy / (HOTTER * KT) - ends / KT), axis=0))
     found = []
     for k, phase in enumerate((*phases, 1.0)):

@@ -31,9 +31,10 @@ import numpy as np
 import numpy.typing as npt
 from mpmath import fp
 
-from scene import BadInput, Cap, Horizon, Mushroom, Outcome, Scene, State, Stem
+from scene import BadInput, Horizon, Mushroom, Outcome, Scene, State
+from scene.geometry import area, half_width, table_at
 from scene.laws import bounds, value
-from scene.tables import laws, period, width_factors
+from scene.tables import cycle_length, laws
 
 Captured = tuple[float, float] | None
 Flow = Callable[[Scene, Sequence[State], float], Sequence[tuple[Outcome, Captured]]]
@@ -93,14 +94,14 @@ def work_identity(
     Raises:
         BadInput: the scene stands still, or an argument is outside its bounds.
     """
-    shared = period(scene)
-    if shared is None:
+    span = cycle_length(scene)
+    if not span:
         raise BadInput("scene: nothing moves, must have a law that does")
     ratio = least_ratio(scene) if ratio is None else ratio
     _check_range("ratio", ratio, 0.0, 1.0)
     _check_range("alarm", alarm, 0.0, 1.0)
     _check_range("kT", kT, 0.0, 2.0**800)
-    span, found = float(shared.value(fp)), []
+    found = []
     for i, part in enumerate(times):
         states = canonical_states(scene, n_particles, kT / ratio, _generator(seed, i))
         arrived = flow(scene, states, part * span)
@@ -146,11 +147,10 @@ def one_cycle(
     Raises:
         BadInput: the scene stands still, or an argument is outside its bounds.
     """
-    shared = period(scene)
-    if shared is None:
+    span = cycle_length(scene)
+    if not span:
         raise BadInput("scene: nothing moves, must have a law that does")
     _check_range("alarm", alarm, 0.0, 1.0)
-    span = float(shared.value(fp))
     narrowest = span * least_nu(scene, span)
     states = microcanonical_states(scene, n_particles, energy, _generator(seed, 0))
     arrived = [o for o, _ in flow(scene, states, narrowest) if isinstance(o, Horizon)]
@@ -177,12 +177,6 @@ def margin(x: Floats, bound: float, alarm: float) -> float:
     return sqrt(2 * float(np.var(x, ddof=1)) * logarithm / n) + 7 * bound * logarithm / (3 * (n - 1))
 
 
-def area(scene: Scene, t: float) -> float:
-    """Return the area of the table at a time [length^2]."""
-    cap, stem = _areas(scene, t)
-    return cap + stem
-
-
 def least_ratio(scene: Scene) -> float:
     """Return the product of (least / greatest)^2 over the lengths of the table."""
     found = [bounds(law) for name, law in laws(scene).items() if name in ("r", "w", "h")]
@@ -192,7 +186,7 @@ def least_ratio(scene: Scene) -> float:
 def least_nu(scene: Mushroom, span: float) -> float:
     """Return the instant of least nu as a part of the period, the middle of a plateau."""
     parts = np.arange(4096) / 4096
-    nu = np.array([_half_width(scene, span * p) / float(value(fp, scene.r, span * p)) for p in parts])
+    nu = np.array([half_width(fp, scene, span * p) / value(fp, scene.r, span * p) for p in parts])
     low = parts[nu <= nu.min() * (1 + 2.0**-40)]
     return float(low[0] + low[-1]) / 2
 
@@ -210,36 +204,19 @@ def microcanonical_states(scene: Scene, n: int, energy: float, random: np.random
 
 
 def _states(scene: Scene, v: Floats, random: np.random.Generator) -> list[State]:
-    cap, stem = _areas(scene, 0.0)
-    now = {name: float(value(fp, law, 0.0)) for name, law in laws(scene).items()}
-    r, h, slope = now.get("r", 0.0), now.get("h", 0.0), now.get("slope", 0.0)
-    w = 0.0 if isinstance(scene, Cap) else _half_width(scene, 0.0)
-    found = []
-    for (vx, vy), pick, a, b in zip(v, *random.random((3, len(v))), strict=True):
-        if pick * (cap + stem) < cap:
-            x, y = r * sqrt(a) * np.cos(pi * b), r * sqrt(a) * np.sin(pi * b)
-        else:  # at depth d the stem is w - slope d wide: invert 2 w d - slope d^2 = a stem
-            d = a * stem / (w + sqrt(max(w * w - slope * a * stem, 0.0)))
-            x, y = (w - slope * min(d, h)) * (2 * b - 1), -d
-        found.append(State(0.0, float(x), float(y), float(vx), float(vy)))
-    return found
-
-
-def _areas(scene: Scene, t: float) -> tuple[float, float]:
-    now = {name: float(value(fp, law, t)) for name, law in laws(scene).items()}
-    cap = 0.0 if isinstance(scene, Stem) else pi * now["r"] ** 2 / 2
-    if isinstance(scene, Cap):
-        return cap, 0.0
-    return cap, 2 * _half_width(scene, t) * now["h"] - now["slope"] * now["h"] ** 2
-
-
-def _half_width(scene: Stem | Mushroom, t: float) -> float:
-    return prod(float(value(fp, law, t)) for law in width_factors(scene))
+    now = table_at(fp, scene, 0.0)
+    cap, stem = now.cap_area(), now.stem_area()
+    pick, a, b = random.random((3, len(v)))
+    across, depth = now.uniform_in_stem(a, b)
+    is_in_cap = pick * (cap + stem) < cap
+    x = np.where(is_in_cap, now.r * np.sqrt(a) * np.cos(pi * b), across)
+    y = np.where(is_in_cap, now.r * np.sqrt(a) * np.sin(pi * b), -depth)
+    return [State(0.0, *row) for row in np.column_stack([x, y, v]).tolist()]
 
 
 def _is_captured(scene: Mushroom, at: Horizon) -> bool:
     spin = abs(at.x * at.vy - at.y * at.vx)
-    return at.y > 0 and spin > _half_width(scene, at.t) * sqrt(2 * _energy(at))
+    return at.y > 0 and spin > half_width(fp, scene, at.t) * sqrt(2 * _energy(at))
 
 
 def _energy(at: State | Outcome) -> float:

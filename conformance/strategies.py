@@ -14,15 +14,17 @@ import math
 from collections.abc import Sequence
 from typing import Any, Literal, NamedTuple, TypeVar
 
+import msgspec
 from hypothesis import currently_in_test_context, note
 from hypothesis import strategies as st
-from mpmath import MPContext
 
 from scene import BangBang, Cap, Fourier, Law, Mushroom, Scene, State, Stem, Wall, to_data
-from scene.laws import bounds, breakpoints, value
+from scene.geometry import DIGITS, TableAt, table_at
+from scene.laws import bounds, breakpoints
+from scene.precision import decimals
+from scene.tables import cycle_length
 from scene.tables import laws as laws_of
-from scene.tables import period, width_factors
-from scene.transforms import scaled_law
+from scene.transforms import scaled
 
 T = TypeVar("T")
 MARGIN = 1 - 2.0**-40  # keeps the rounding of sums of amplitudes inside the range asked for
@@ -194,90 +196,63 @@ def _slopes(draw: st.DrawFn, narrowest: float, deepest: float, clock: Clock) -> 
 def rescale(scene: Scene, length: int, time: int) -> Scene:
     """Return the scene with lengths times 2^length and times times 2^time, exactly.
 
-    Ratios (`nu`, `slope`) stay. Exact as long as no number becomes subnormal or overflows.
+    Ratios (`nu`, `slope`), name and notes stay. Exact as long as no number becomes subnormal or overflows.
     """
-    sizes = {"nu": 1.0, "slope": 1.0}
-    moved = {
-        name: scaled_law(law, sizes.get(name, 2.0**length), 2.0**time) for name, law in laws_of(scene).items()
-    }
-    return type(scene)(**moved, name=scene.name, notes=scene.notes)
+    return msgspec.structs.replace(scaled(scene, length, time), name=scene.name, notes=scene.notes)
 
 
-class _Moment:
-    # The table at one instant to 50 digits, and the same numbers rounded for placing particles.
+class _Place(NamedTuple):
+    """Where a particle may be at one instant: decided to 50 digits, placed in binary64.
 
-    def __init__(self, scene: Scene, t: float) -> None:
-        ctx = MPContext()
-        ctx.dps = 50
-        self.ctx, self.scene = ctx, scene
-        found = {name: self._motion(law, t) for name, law in laws_of(scene).items()}
-        if not isinstance(scene, Cap):
-            w, w_rate = ctx.mpf(1), ctx.mpf(0)
-            for factor, rate in (self._motion(law, t) for law in width_factors(scene)):
-                w, w_rate = w * factor, w_rate * factor + w * rate
-            found["w"] = (w, w_rate)
-        absent = (ctx.mpf(0), ctx.mpf(0))
-        (self.r, self.r_rate), (self.w, self.w_rate) = found.get("r", absent), found.get("w", absent)
-        (self.h, self.h_rate), (self.slope, self.slope_rate) = (found.get(n, absent) for n in ("h", "slope"))
-        self.size = float(2 * self.r + 2 * self.w + self.h)
+    Attributes:
+        ctx: number system of 50 digits.
+        exact: the table in it.
+        near: the same table rounded.
+    """
 
-    def _motion(self, law: Law, t: float) -> tuple[Any, Any]:
-        return value(self.ctx, law, t), value(self.ctx, law, t, 1)
+    ctx: Any
+    exact: TableAt
+    near: TableAt
 
-    def gap(self, wall: Wall, x: float, y: float, vx: float = 0.0, vy: float = 0.0) -> tuple[Any, Any]:
-        """The wall's function f > 0 inside [length; the arc's: length^2], and its rate along the flight."""
-        X, Y, VX, VY = map(self.ctx.mpf, (x, y, vx, vy))
-        if wall == "arc":
-            return self.r * self.r - X * X - Y * Y, 2 * (self.r * self.r_rate - X * VX - Y * VY)
-        if wall == "floor":
-            return Y + self.h, VY + self.h_rate
-        if wall == "base":
-            return (-Y, -VY) if isinstance(self.scene, Stem) else (Y, VY)
-        edge = self.w + self.slope * Y
-        rate = self.w_rate + self.slope_rate * Y + self.slope * VY
-        return (edge + X, rate + VX) if wall == "left" else (edge - X, rate - VX)
+    @classmethod
+    def of(cls, scene: Scene, t: float) -> _Place:
+        ctx = decimals(DIGITS)
+        exact = table_at(ctx, scene, t)
+        return cls(ctx, exact, exact.rounded())
+
+    def gap(self, wall: Wall, x: float, y: float) -> Any:
+        """Return the wall's function f > 0 inside."""
+        return self.exact.gap(wall, self.ctx.mpf(x), self.ctx.mpf(y))
+
+    def rate(self, wall: Wall, *flight: float) -> Any:
+        """Return the rate of f along the flight x, y, vx, vy."""
+        return self.exact.gap_rate(wall, *map(self.ctx.mpf, flight))
 
     def is_clear(self, x: float, y: float, start: Wall | None) -> bool:
         """Tell whether (x, y) is strictly inside, the wall it starts on left aside."""
-        if isinstance(self.scene, Mushroom):
+        scene = self.exact.scene
+        if isinstance(scene, Mushroom):
             if start == "base" or (start is None and y == 0):
-                is_over_mouth = bool(abs(self.ctx.mpf(x)) < self.w)
-                is_beside = bool(abs(self.ctx.mpf(x)) > self.w) and bool(self.gap("arc", x, 0.0)[0] > 0)
+                is_over_mouth = bool(abs(self.ctx.mpf(x)) < self.exact.w)
+                is_beside = bool(abs(self.ctx.mpf(x)) > self.exact.w) and bool(self.gap("arc", x, 0.0) > 0)
                 return y == 0 and (is_beside if start else is_over_mouth)
             is_in_cap = y > 0 and start in (None, "arc")
             if not is_in_cap and (y >= 0 or start == "arc"):
                 return False
             near: tuple[Wall, ...] = ("arc",) if is_in_cap else ("left", "right", "floor")
         else:
-            near = self.scene.walls
-        return all(self.gap(wall, x, y)[0] > 0 for wall in near if wall != start)
+            near = scene.walls
+        return all(self.gap(wall, x, y) > 0 for wall in near if wall != start)
 
     def point(self, site: str, a: float, b: float) -> tuple[float, float]:
         """Place two fractions of a region, or one of a wall; (1/2, 1/2) is its middle."""
-        r, w, h, slope = map(float, (self.r, self.w, self.h, self.slope))
-        side = 2 * b - 1
+        at = self.near
         if site in ("cap", "arc"):
-            rho = r if site == "arc" else r * b
+            rho = at.r if site == "arc" else at.r * b
             return rho * math.cos(math.pi * a), rho * math.sin(math.pi * a)
-        if site == "mouth" or (site == "base" and isinstance(self.scene, Stem)):
-            return w * side, 0.0
-        if site == "base":
-            return math.copysign(w + (r - w) * b, a - 0.5), 0.0
-        if site == "floor":
-            return side * float(self.w - self.slope * self.h), -h
-        half_width = w - slope * h * a
-        return half_width * {"left": -1.0, "right": 1.0}.get(site, side), -h * a
-
-    def normal(self, wall: Wall, x: float, y: float) -> tuple[float, float]:
-        """The wall's unit normal that points inside."""
-        if wall == "arc":
-            distance = math.hypot(x, y)
-            return -x / distance, -y / distance
-        if wall in ("base", "floor"):
-            return 0.0, -1.0 if wall == "base" and isinstance(self.scene, Stem) else 1.0
-        slope = float(self.slope)
-        length = math.hypot(1.0, slope)
-        return (1.0 if wall == "left" else -1.0) / length, slope / length
+        if site == "base" and not isinstance(at.scene, Stem):
+            return math.copysign(at.w + (at.r - at.w) * b, a - 0.5), 0.0
+        return at.stem_point(site, 2 * b - 1, a)
 
 
 @st.composite
@@ -296,17 +271,16 @@ def states(draw: st.DrawFn, scene: Scene) -> tuple[State, float]:
         lie on it up to the rounding of x and y, and their gap to it grows.
     """
     t = draw(_times(scene))
-    moment = _Moment(scene, t)
+    place = _Place.of(scene, t)
     wall: Wall | None = draw(_one_of([*(None for _ in scene.walls), *scene.walls]))
-    wall, x, y = draw(_places(moment, wall))
-    walls_speed = _walls_speed(scene) or moment.size
+    wall, x, y = draw(_places(place, wall))
+    walls_speed = _walls_speed(scene) or place.near.size
     speed = walls_speed * 10 ** draw(_between(-3.0, 6.0))
-    vx, vy = draw(_headings(moment, wall, x, y))
-    vx, vy = _leaving(moment, wall, x, y, speed * vx, speed * vy)
-    flight = moment.size / speed * draw(st.sampled_from((4.0, 1.0, 0.125, 2.0**-20, 0.0)))
-    shared = period(scene)
-    if shared is not None:
-        flight = min(flight, LONGEST_FLIGHT * float(shared.value(moment.ctx)))
+    vx, vy = draw(_headings(place, wall, x, y))
+    vx, vy = _leaving(place, wall, x, y, speed * vx, speed * vy)
+    flight = place.near.size / speed * draw(st.sampled_from((4.0, 1.0, 0.125, 2.0**-20, 0.0)))
+    if length := cycle_length(scene):
+        flight = min(flight, LONGEST_FLIGHT * length)
     state, t_end = State(t, x, y, vx, vy, wall), t + flight
     if currently_in_test_context():
         fields = {name: getattr(state, name) for name in state.__struct_fields__}
@@ -333,8 +307,7 @@ def adversarial(family: str | None = None) -> st.SearchStrategy[Any]:
 
 @st.composite
 def _times(draw: st.DrawFn, scene: Scene) -> float:
-    shared = period(scene)
-    length = 1.0 if shared is None else float(shared.value(MPContext()))
+    length = cycle_length(scene) or 1.0
     knots = [float(t) for law in laws_of(scene).values() for t in breakpoints(law)] or [0.0]
     turns = draw(st.one_of(st.integers(-2, 3), st.sampled_from((0, 0, 1000, -1000))))
     inside = fractions().map(lambda part: length * (turns + part))
@@ -350,25 +323,25 @@ def _walls_speed(scene: Scene) -> float:
 
 
 @st.composite
-def _places(draw: st.DrawFn, moment: _Moment, wall: Wall | None) -> tuple[Wall | None, float, float]:
+def _places(draw: st.DrawFn, place: _Place, wall: Wall | None) -> tuple[Wall | None, float, float]:
     regions = {Cap: ("cap",), Stem: ("stem",), Mushroom: ("mouth", "cap", "stem", "cap", "stem")}
-    site: str = wall or draw(_one_of(regions[type(moment.scene)]))
+    site: str = wall or draw(_one_of(regions[type(place.near.scene)]))
     a, b = draw(fractions()), draw(fractions())
     if site == "cap" and draw(st.integers(0, 5)) == 5:
         # Low over the base, near the mouth's edge (in a cap: near the centre).
         a = min(a, 1 - a)
-        b = min(float(moment.w / moment.r) * (0.5 + b), 1 - 2.0**-30)
+        b = min(place.near.w / place.near.r * (0.5 + b), 1 - 2.0**-30)
     # Towards the middle in ever larger parts: what is near a wall stays as near as it may.
     for part in (0.0, *(2.0**-k for k in range(52, -1, -4))):
-        x, y = moment.point(site, a + part * (0.5 - a), b + part * (0.5 - b))
-        if moment.is_clear(x, y, wall):
+        x, y = place.point(site, a + part * (0.5 - a), b + part * (0.5 - b))
+        if place.is_clear(x, y, wall):
             return wall, x, y
     # Only the base of a mushroom may be too short to hold a point: the mouth is as wide as the cap.
-    return draw(_places(moment, "arc"))
+    return draw(_places(place, "arc"))
 
 
 @st.composite
-def _headings(draw: st.DrawFn, moment: _Moment, wall: Wall | None, x: float, y: float) -> tuple[float, float]:
+def _headings(draw: st.DrawFn, place: _Place, wall: Wall | None, x: float, y: float) -> tuple[float, float]:
     # A unit vector: any direction; along an axis; to or around the centre; grazing the wall it leaves.
     turn = 2 * math.pi * draw(fractions())
     any_way = (math.cos(turn), math.sin(turn))
@@ -377,24 +350,24 @@ def _headings(draw: st.DrawFn, moment: _Moment, wall: Wall | None, x: float, y: 
     radial = [(-x / distance, -y / distance), (-y / distance, x / distance)] if x or y else axes[:2]
     if wall is None:
         return draw(st.one_of(st.just(any_way), st.just(any_way), st.sampled_from(axes + radial)))
-    nx, ny = moment.normal(wall, x, y)
+    nx, ny = place.near.normal(wall, x, y)
     lift, sense = 2.0 ** -draw(st.integers(2, 50)), draw(st.sampled_from((1.0, -1.0)))
     grazing = (lift * nx - sense * ny, lift * ny + sense * nx)
     return draw(st.sampled_from((any_way, any_way, grazing, grazing, (nx, ny), *axes)))
 
 
-def _leaving(moment: _Moment, wall: Wall | None, x: float, y: float, *v: float) -> tuple[float, float]:
+def _leaving(place: _Place, wall: Wall | None, x: float, y: float, *v: float) -> tuple[float, float]:
     # A particle that approaches its wall is first reflected; one that then still grazes it
     # within rounding leaves along the normal, outrunning the wall.
     vx, vy = v
-    if wall is None or moment.gap(wall, x, y, vx, vy)[1] > 0:
+    if wall is None or place.rate(wall, x, y, vx, vy) > 0:
         return vx, vy
-    nx, ny = moment.normal(wall, x, y)
-    drift = moment.gap(wall, x, y)[1]
-    along = float(moment.gap(wall, x, y, nx, ny)[1] - drift)
-    approach = float(moment.gap(wall, x, y, vx, vy)[1]) / along
+    nx, ny = place.near.normal(wall, x, y)
+    drift = place.rate(wall, x, y, 0.0, 0.0)
+    along = float(place.rate(wall, x, y, nx, ny) - drift)
+    approach = float(place.rate(wall, x, y, vx, vy)) / along
     away = vx - 2 * approach * nx, vy - 2 * approach * ny
-    if moment.gap(wall, x, y, *away)[1] > 0:
+    if place.rate(wall, x, y, *away) > 0:
         return away
     push = abs(float(drift)) / along + math.hypot(vx, vy)
     return push * nx, push * ny

@@ -17,9 +17,10 @@ from mpmath import fp
 from fast.compiled import FloatArray
 from fast.kernel import entries
 from fast.narrowings import narrowings, start_time
-from scene import Cap, Scene
-from scene.laws import bounds, value
-from scene.tables import laws, period, width_factors
+from scene import Scene
+from scene.geometry import table_at
+from scene.laws import bounds
+from scene.tables import laws, period
 
 
 def initial_states(scene: Scene, n_particles: int, energy: float, seed: int) -> FloatArray:
@@ -50,18 +51,10 @@ def initial_states(scene: Scene, n_particles: int, energy: float, seed: int) -> 
 def _uniform_in_area(
     scene: Scene, t: float, pick: FloatArray, a: FloatArray, b: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    now = {name: float(value(fp, law, t)) for name, law in laws(scene).items()}
-    r, h, slope = now.get("r", 0.0), now.get("h", 0.0), now.get("slope", 0.0)
-    cap_area = 0.5 * math.pi * r * r
-    if isinstance(scene, Cap):
-        w = stem_area = 0.0
-    else:
-        w = math.prod(float(value(fp, law, t)) for law in width_factors(scene))
-        stem_area = 2.0 * w * h - slope * h * h
-    rho, along = r * np.sqrt(a), _directions(0.5 * b)
-    # Depth d below the mouth has density (w - slope d): invert 2 w d - slope d^2 = a stem_area.
-    depth = a * stem_area / (w + np.sqrt(np.maximum(w * w - slope * a * stem_area, 0.0)) + 1e-300)
-    side = (w - slope * depth) * (2.0 * b - 1.0)
+    now = table_at(fp, scene, t)
+    cap_area, stem_area = now.cap_area(), now.stem_area()
+    rho, along = now.r * np.sqrt(a), _directions(0.5 * b)
+    side, depth = now.uniform_in_stem(a, b)
     in_cap = pick * (cap_area + stem_area) < cap_area
     return np.where(in_cap, rho * along[:, 0], side), np.where(in_cap, rho * along[:, 1], -depth)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Annotated, Any, BinaryIO
+from typing import Annotated, Any
 
 import typer
 from rich.console import Console
@@ -12,6 +12,7 @@ from rich.table import Table
 
 from mushrooms import output
 from mushrooms.terminal import progress_bar
+from scene.files import write_file
 from scene.refusal import BadInput
 
 CHOICES = ("reference", "fast", "both")
@@ -64,7 +65,7 @@ def attack(
         )
     _print(tallies)
     if json_file is not None:
-        output.write_files(json_file.parent, {json_file.name: lambda file: _write(tallies, file)})
+        write_file(json_file, json.dumps([_row(tally) for tally in tallies], indent=1) + "\n")
     return int(any(tally.wrong or tally.slowest > SLOWEST for tally in tallies))
 
 
@@ -77,10 +78,6 @@ def _row(tally: Any) -> dict[str, Any]:
         **numbers,
         "wrong_cases": tally.wrong,
     }
-
-
-def _write(tallies: list[Any], file: BinaryIO) -> None:
-    file.write((json.dumps([_row(tally) for tally in tallies], indent=1) + "\n").encode("utf-8"))
 
 
 def _print(tallies: list[Any]) -> None:

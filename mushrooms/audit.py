@@ -12,7 +12,8 @@ from rich import progress
 
 from mushrooms import output
 from mushrooms.terminal import progress_bar
-from scene.refusal import BadInput
+from scene.files import write_files
+from scene.refusal import BadInput, check_seed
 
 
 def audit(
@@ -26,27 +27,31 @@ def audit(
     resume: Annotated[bool, typer.Option("--resume", help="Go on with what DIR/parts holds.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
-    """Check the paper's claims; writes audit_page.html, audit_page.json and audit_page.txt.
+    """Check the paper's claims; writes report.html, report.json and report.txt.
 
     Finished parts are kept in DIR/parts, for --resume after an interruption or with other --only.
     Exit code 0 when every claim has its expected verdict, 1 when one has not, 2 on bad input.
     """
     import fast
     from conformance.audit import ledger
-    from conformance.audit.evidence import Steppers
-    from conformance.audit.runs import check_seed
-    from conformance.audit.session import Settings, conduct
+    from conformance.audit.evidence import AuditSteppers
+    from conformance.audit.session import AuditSettings, conduct
     from mushrooms.reports import audit_page
 
     entries = ledger.select(only)
-    check_seed(seed)
+    check_seed(seed, "--seed")
     if threads is not None and threads < 1:
         raise BadInput(f"--threads = {threads}, must be >= 1")
     with output.writable_folder(out) as folder:
-        settings = Settings("full" if full else "quick", seed, threads, folder / "parts", resume, apart=True)
+        settings = AuditSettings(
+            "full" if full else "quick", seed, threads, folder / "parts", resume, apart=True
+        )
         with progress_bar() as bar:
             result = conduct(
-                Steppers(fast.simulate, fast.trajectory), settings, entries=entries, progress=_advance(bar)
+                AuditSteppers(fast.simulate, fast.trajectory),
+                settings,
+                entries=entries,
+                progress=_advance(bar),
             )
         data = audit_page.to_data(result)
         texts = {
@@ -54,7 +59,7 @@ def audit(
             "report.html": audit_page.to_html(data, result.samples),
             "report.txt": audit_page.to_text(data),
         }
-        output.write_files(folder, {name: output.whole(text.encode()) for name, text in texts.items()})
+        write_files(folder, texts)
     if as_json:
         print(texts["report.json"], end="")
     else:

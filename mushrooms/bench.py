@@ -19,6 +19,7 @@ from rich.table import Table
 
 from mushrooms import output
 from mushrooms.terminal import progress_bar
+from scene.files import Writer, write_files
 from scene.refusal import BadInput
 
 if TYPE_CHECKING:
@@ -65,13 +66,13 @@ def bench(
         comparison.check_alike(old, size, seed, QUESTIONS[size])
     with output.writable_folder(out) as folder:
         found = _measured(size, seed, command or [])
-        files = {
+        files: dict[str, bytes | str | Writer] = {
             "bench.json": record.encode(found),
             "bench.svg": figures_of_speed.speed(found),
             "bench.html": bench_page.to_html(found),
             "hard-cases.md": hard_cases.to_markdown(found.hard_cases).encode(),
         }
-        output.write_files(folder, {name: output.whole(content) for name, content in files.items()})
+        write_files(folder, files)
     console = Console(width=140)
     console.print(_table(found))
     for name, why in found.not_run.items():

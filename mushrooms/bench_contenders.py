@@ -18,13 +18,13 @@ from conformance.bench.contenders import Answer, Ask, Contender, Exact, Lap, by_
 from conformance.bench.growth import FAR, Follower, Place
 from conformance.bench.work import SCENE, Cost, Load
 from conformance.bench.workloads import WINDOW, Workload
-from conformance.generator.draws import Moment
 from conformance.grading.agreement import Truth
 from fast import __main__ as fast_protocol
 from fast.batch import careful_steps, fine_steps, flights, lane_steps
 from reference import __main__ as proof
 from reference.arithmetic import rational
 from scene import Collision, Outcome, Scene, State, load
+from scene.geometry import rounded
 
 DIGITS = (15, 30, 50, 100, 200)
 PATH_DIGITS = (30, 60)  # working decimals of the proofs whose growth is followed
@@ -111,7 +111,7 @@ def _lanes(workload: Workload, n_times: int) -> Lap:
     """Time the engine on flights that go on from the questions; grade one round of its lanes on these."""
     states = [q.state for q in workload.questions]
     last = max(states, key=lambda s: s.t)
-    span = WINDOW * Moment(workload.scene, last.t).size / math.hypot(last.vx, last.vy)
+    span = WINDOW * rounded(workload.scene, last.t).size / math.hypot(last.vx, last.vy)
     copies = -(-128 // len(states))  # enough to fill both pools
     seconds, n_collisions = 0.0, 0
     for _ in range(n_times):

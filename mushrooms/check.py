@@ -16,6 +16,7 @@ from rich.table import Table
 
 from mushrooms import output
 from mushrooms.terminal import progress_bar
+from scene.files import write_file
 from scene.refusal import BadInput
 
 if TYPE_CHECKING:
@@ -65,7 +66,7 @@ def check(
             progress=_advance(bar),
         )
     for path, suffix in files.items():
-        output.write_files(path.parent, {path.name: output.whole(_content(run, suffix))})
+        write_file(path, _content(run, suffix))
     show(run)
     raise typer.Exit(run.exit_code())
 

@@ -24,16 +24,16 @@ from mushrooms.audit import audit
 from mushrooms.bench import bench
 from mushrooms.check import check
 from mushrooms.terminal import progress_bar
+from scene.files import write_file, write_files
 from scene.load import read_data
-from scene.refusal import BadInput
-from scene.tables import period
+from scene.refusal import BadInput, check_seed
+from scene.tables import cycle_length
 
 PROGRAM = "mushrooms"
 MAX_PARTICLES = 10**8
 MAX_DIGITS = 1000
-UsageError: type[Any] = typer.BadParameter.__bases__[
-    0
-]  # typer 0.26 carries its own click; this names either's
+# Typer 0.26 carries a click of its own, older ones import it: this is the error class of the one in use.
+UsageError: type[Any] = typer.BadParameter.__bases__[0]
 
 app = typer.Typer(
     add_completion=False,
@@ -119,16 +119,10 @@ def _catalogue_row(name: str) -> dict[str, Any]:
         "refused": None,
     }
     try:
-        shared = period(scenes.load(name))
+        length = cycle_length(scenes.load(name))
     except scenes.InvalidScene as error:
         return row | {"refused": str(error).partition(": ")[2]}
-    return row | {"period": _float_period(shared)}
-
-
-def _float_period(shared: Any) -> float | None:
-    from mpmath import fp
-
-    return None if shared is None else float(shared.value(fp))
+    return row | {"period": length or None}
 
 
 @app.command("theory", epilog="Example: mushrooms theory moving-cap --digits 40")
@@ -199,12 +193,8 @@ def simulate(
             text = json.dumps(
                 {"scene": scenes.to_data(table), "energy": energy, "cycles": cycles, "seed": seed} | summary
             )
-            output.write_files(
-                folder,
-                {
-                    "ensemble.npz": lambda file: np.savez(file, **fields),
-                    "summary.json": lambda file: _write_text(file, text + "\n"),
-                },
+            write_files(
+                folder, {"ensemble.npz": lambda file: np.savez(file, **fields), "summary.json": text + "\n"}
             )
     _print_pairs(summary, as_json)
 
@@ -247,9 +237,7 @@ def draw(
     from mushrooms.figures import table as pictures
 
     output.check_file(path, pictures.SUFFIXES)
-    output.write_files(
-        path.parent, {path.name: lambda file: pictures.write_picture(table, path.suffix, file)}
-    )
+    write_file(path, lambda file: pictures.write_picture(table, path.suffix, file))
     print(path)
 
 
@@ -267,7 +255,7 @@ def _check_range(option: str, value: int, low: int, high: int | None = None) -> 
 
 
 def _check_common(seed: int, threads: int | None) -> None:
-    _check_range("--seed", seed, 0, 2**64 - 1)
+    check_seed(seed, "--seed")
     if threads is not None:
         _check_range("--threads", threads, 1)
 
@@ -298,7 +286,3 @@ def _print_pairs(pairs: dict[str, Any], as_json: bool) -> None:
     width = max(map(len, pairs))
     for name, value in pairs.items():
         print(f"{name:<{width}}  {'–' if value is None else value}")
-
-
-def _write_text(file: Any, text: str) -> None:
-    file.write(text.encode("utf-8"))

@@ -1,19 +1,14 @@
-"""Output, refused early or written whole.
-
-A folder is proved writable before work starts; a file appears under its name only when complete.
-"""
+"""Output refused early: a folder or a file is proved writable before work starts."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import BinaryIO
 
+from scene.files import part
 from scene.refusal import BadInput
-
-Writer = Callable[[BinaryIO], None]
 
 
 @contextmanager
@@ -33,7 +28,7 @@ def writable_folder(path: Path) -> Iterator[Path]:
         folder = folder.parent
     try:
         path.mkdir(parents=True, exist_ok=True)
-        probe = _part(path / "probe")
+        probe = part(path / "probe")
         probe.write_bytes(b"")
         probe.unlink()
     except (FileExistsError, NotADirectoryError):
@@ -59,35 +54,11 @@ def check_file(path: Path, suffixes: tuple[str, ...]) -> None:
     if path.is_dir():
         raise BadInput(f"output {str(path)!r} is a folder, must be a file")
     try:
-        probe = _part(path)
+        probe = part(path)
         probe.write_bytes(b"")
         probe.unlink()
     except OSError as error:
         raise BadInput(f"output {str(path)!r} cannot be written: {error.strerror}") from None
-
-
-def write_files(folder: Path, writers: Mapping[str, Writer]) -> None:
-    """Write files completely under hidden names, then give all of them their names.
-
-    Args:
-        folder: an existing folder.
-        writers: per file name, what writes its content into an open binary file.
-    """
-    try:
-        for name, writer in writers.items():
-            with _part(folder / name).open("wb") as file:
-                writer(file)
-                file.flush()
-                os.fsync(file.fileno())
-        for name in writers:
-            _part(folder / name).replace(folder / name)
-    finally:
-        for name in writers:
-            _part(folder / name).unlink(missing_ok=True)
-
-
-def _part(path: Path) -> Path:
-    return path.with_name(f".{path.name}.{os.getpid()}.part")
 
 
 def _remove_empty(folders: list[Path]) -> None:
@@ -96,12 +67,3 @@ def _remove_empty(folders: list[Path]) -> None:
             folder.rmdir()
         except OSError:
             return
-
-
-def whole(content: bytes) -> Writer:
-    """Return the writer of a content that is ready."""
-
-    def write(file: BinaryIO) -> None:
-        file.write(content)
-
-    return write

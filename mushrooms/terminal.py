@@ -1,4 +1,4 @@
-"""What the commands show on a terminal while they work."""
+"""The progress bar that commands show on a terminal while they work."""
 
 from __future__ import annotations
 

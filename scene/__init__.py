@@ -3,16 +3,7 @@
 from scene.laws import BangBang, Fourier, Law
 from scene.load import catalogue, from_data, load, to_data
 from scene.refusal import BadInput, InvalidScene, check_count, check_number, check_scene
-from scene.states import (
-    Collision,
-    Horizon,
-    InvalidState,
-    Outcome,
-    Rejected,
-    State,
-    Undecided,
-    Undefined,
-)
+from scene.states import Collision, Horizon, InvalidState, Outcome, Rejected, State, Undecided, Undefined
 from scene.tables import Cap, Mushroom, Scene, Stem, Wall
 
 __all__ = [

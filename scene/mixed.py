@@ -8,8 +8,9 @@ bound K on its second derivative there,
 
 so an interval on which the right side is positive is done, any other is halved. Everything is a rational
 number: times and legs are, and cos and sin of a rational part of a turn are computed here, in integers, to
-155 bits with a proved error that is carried along. (mpmath would serve too, but its constants are shared by
-all threads.) Near a contact no interval is ever small enough: the search then ends, and says where.
+155 bits, with a proved bound on their error that is carried along. (mpmath could do this as well, but its
+constants are shared by all threads.) Near a contact no interval is ever small enough: the search ends then,
+and reports where.
 """
 
 from __future__ import annotations
@@ -35,7 +36,7 @@ _HALF_PI = int(PI * 2 ** (BITS - 1))
 _ONE = 1 << BITS
 
 
-class Jet(NamedTuple):
+class TaylorBounds(NamedTuple):
     """A function about a time m: value and rate there, how wrong each may be, and a bound on |f''| near m."""
 
     value: Fraction
@@ -54,17 +55,17 @@ class Jet(NamedTuple):
         return self.value - self.value_error - h * (abs(self.rate) + self.rate_error + h * self.bend / 2)
 
 
-def add(f: Jet, g: Jet) -> Jet:
+def add(f: TaylorBounds, g: TaylorBounds) -> TaylorBounds:
     """Return f + g."""
-    return Jet(*(a + b for a, b in zip(f, g, strict=True)))
+    return TaylorBounds(*(a + b for a, b in zip(f, g, strict=True)))
 
 
-def multiply(f: Jet, g: Jet, h: Fraction) -> Jet:
+def multiply(f: TaylorBounds, g: TaylorBounds, h: Fraction) -> TaylorBounds:
     """Return f g within h of m, by the product rule."""
     f_size, f_rate = f.sizes(h)
     g_size, g_rate = g.sizes(h)
     f_whole, g_whole = abs(f.value) + f.value_error, abs(g.value) + g.value_error
-    return Jet(
+    return TaylorBounds(
         f.value * g.value,
         f.rate * g.value + f.value * g.rate,
         f_whole * g.value_error + f.value_error * abs(g.value),
@@ -95,16 +96,16 @@ def turns(part: Fraction, n: int) -> list[tuple[int, int]]:
     return found
 
 
-def jet(law: Law, m: Fraction) -> Jet:
+def jet(law: Law, m: Fraction) -> TaylorBounds:
     """Return a law about m, good as far as the analytic piece that holds at m."""
     piece, zero = piece_at(law, m), Fraction(0)
     if isinstance(piece, Quadratic):
         d = m - piece.origin
         value, rate = piece.c0 + d * (piece.c1 + d * piece.c2), piece.c1 + 2 * piece.c2 * d
-        return Jet(value, rate, zero, zero, abs(2 * piece.c2))
+        return TaylorBounds(value, rate, zero, zero, abs(2 * piece.c2))
     if isinstance(piece, Fourier):
         return _wave(piece, m)
-    return Jet(Fraction(piece), zero, zero, zero, zero)
+    return TaylorBounds(Fraction(piece), zero, zero, zero, zero)
 
 
 class _Wave(NamedTuple):
@@ -134,7 +135,7 @@ def _prepared(law: Fourier) -> _Wave:
     )
 
 
-def _wave(law: Fourier, m: Fraction) -> Jet:
+def _wave(law: Fourier, m: Fraction) -> TaylorBounds:
     assert law.period is not None  # a law that gives omega shares no period with a bang-bang law
     wave, period = _prepared(law), Fraction(law.period)
     found = turns(m / period % 1, wave.harmonics[-1][0])
@@ -145,7 +146,7 @@ def _wave(law: Fourier, m: Fraction) -> Jet:
         slope += k * (b * cos - a * sin)
     omega, omega_error = 2 * PI / period, 2 * PI_ERROR / period
     highest = omega + omega_error
-    return Jet(
+    return TaylorBounds(
         Fraction(value, wave.scale * _ONE),
         omega * Fraction(slope, wave.scale * _ONE),
         wave.swing * TURN_ERROR,
@@ -154,7 +155,7 @@ def _wave(law: Fourier, m: Fraction) -> Jet:
     )
 
 
-class Verdict(NamedTuple):
+class SignVerdict(NamedTuple):
     """Whether a condition holds at all times; None when that stays open, near the time named."""
 
     holds: bool | None
@@ -163,7 +164,7 @@ class Verdict(NamedTuple):
 
 def sign_on_legs(
     terms: Sequence[tuple[int, tuple[Law, ...]]], is_strict: bool, legs: Iterable[tuple[Fraction, Fraction]]
-) -> Verdict:
+) -> SignVerdict:
     """Decide whether the sum of sign * product(laws) is > 0 (strict) or >= 0 at all times.
 
     Args:
@@ -177,21 +178,21 @@ def sign_on_legs(
     todo = [((a + b) / 2, (b - a) / 2, 0) for a, b in legs]
     for _ in range(MAX_BOXES):
         if not todo:
-            return Verdict(True, Fraction(0))
+            return SignVerdict(True, Fraction(0))
         m, h, n_halvings = todo.pop()
         total = reduce(add, (_product(sign, laws, m, h) for sign, laws in terms))
         highest, least = total.value + total.value_error, total.least(h)
         if highest < 0 or (is_strict and highest == 0):
-            return Verdict(False, m)
+            return SignVerdict(False, m)
         if least > 0 or (least == 0 and not is_strict):
             continue
         if n_halvings == MAX_HALVINGS:
-            return Verdict(None, m)
+            return SignVerdict(None, m)
         todo += [(m - h / 2, h / 2, n_halvings + 1), (m + h / 2, h / 2, n_halvings + 1)]
-    return Verdict(None, todo[-1][0]) if todo else Verdict(True, Fraction(0))
+    return SignVerdict(None, todo[-1][0]) if todo else SignVerdict(True, Fraction(0))
 
 
-def _product(sign: int, laws: tuple[Law, ...], m: Fraction, h: Fraction) -> Jet:
+def _product(sign: int, laws: tuple[Law, ...], m: Fraction, h: Fraction) -> TaylorBounds:
     zero = Fraction(0)
-    one = Jet(Fraction(sign), zero, zero, zero, zero)
+    one = TaylorBounds(Fraction(sign), zero, zero, zero, zero)
     return reduce(lambda f, law: multiply(f, jet(law, m), h), laws, one)

@@ -23,6 +23,7 @@ from numbers import Real
 from typing import ClassVar, Literal
 
 import msgspec
+from mpmath import fp
 
 from scene.laws import BangBang, Fourier, Law, Period, finite, period_of
 from scene.refusal import InvalidScene, shown
@@ -110,6 +111,12 @@ def width_factors(scene: Stem | Mushroom) -> tuple[Law, ...]:
 def period(scene: Scene) -> Period | None:
     """Return the period that all moving laws of a scene share; None for a static table."""
     return next((found for law in laws(scene).values() if (found := period_of(law)) is not None), None)
+
+
+def cycle_length(scene: Scene) -> float:
+    """Return the period [time] in binary64, 0 for a static table."""
+    shared = period(scene)
+    return float(shared.value(fp)) if shared else 0.0
 
 
 @lru_cache(maxsize=4096)

@@ -1,17 +1,23 @@
-"""Transformations of scenes and states under which the physics is known to stay the same."""
+"""Transformations of scenes and states under which the physics is known to stay the same.
+
+A transformed scene is a new one: it keeps neither name nor notes, and is proved valid like any other. Mirror
+images and powers of two are exact as long as no number overflows or becomes subnormal.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, TypeVar
 
 import msgspec
-from mpmath import MPContext, fp
+from mpmath import fp
 
 from scene import BangBang, Fourier, Law, Scene, State, Wall
 from scene.laws import value
+from scene.precision import decimals
 from scene.tables import laws
 
+Table = TypeVar("Table", bound=Scene)
 _ACROSS: dict[Wall, Wall] = {"left": "right", "right": "left"}
 
 
@@ -26,14 +32,14 @@ def mirrored(state: State) -> State:
 
 
 def scaled_state(state: State, length: int, time: int) -> State:
-    """Return the state with lengths times 2^length and times times 2^time."""
+    """Return the state with lengths times 2^length and times times 2^time, velocities accordingly."""
     size, speed = 2.0**length, 2.0 ** (length - time)
     return State(
         2.0**time * state.t, size * state.x, size * state.y, speed * state.vx, speed * state.vy, state.wall
     )
 
 
-def scaled(scene: Scene, length: int, time: int) -> Scene:
+def scaled(scene: Table, length: int, time: int) -> Table:
     """Return the scene with lengths times 2^length and times times 2^time; `nu` and `slope` stay."""
     unit = 2.0**time
     return _with_laws(
@@ -53,7 +59,7 @@ def scaled_law(law: Law, size: float, time: float) -> Law:
     return size * law
 
 
-def backwards(scene: Scene) -> Scene:
+def backwards(scene: Table) -> Table:
     """Return the scene whose laws run backwards: f(-t) for f(t)."""
 
     def turned(_: str, law: Law) -> Law:
@@ -66,23 +72,21 @@ def backwards(scene: Scene) -> Scene:
     return _with_laws(scene, turned)
 
 
-def frozen(scene: Scene, t: float) -> Scene:
+def frozen(scene: Table, t: float) -> Table:
     """Return the static scene with the parameters that it has at time t, rounded.
 
     They are computed to 50 digits and rounded once, so that parameters which touch (w = r, nu = 1) still do.
     """
-    ctx = MPContext()
-    ctx.dps = 50
-    return _with_laws(scene, lambda _, law: float(value(ctx, law, t)))
+    return _with_laws(scene, lambda _, law: float(value(decimals(50), law, t)))
 
 
-def idle(scene: Scene) -> Scene:
+def idle(scene: Table) -> Table:
     """Return a static scene with every number written as a Fourier law of amplitude zero."""
     return _with_laws(
         scene, lambda _, law: Fourier(mean=float(value(fp, law, 0.0)), omega=1.0, cos=(0.0,), sin=(0.0,))
     )
 
 
-def _with_laws(scene: Scene, change: Callable[[str, Law], Law]) -> Scene:
+def _with_laws(scene: Table, change: Callable[[str, Law], Law]) -> Table:
     changed: dict[str, Any] = {name: change(name, law) for name, law in laws(scene).items()}
     return type(scene)(**changed)

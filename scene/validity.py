@@ -13,26 +13,14 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterator, Mapping, Sequence
 from fractions import Fraction
-from math import comb, isfinite, prod
+from math import isfinite, prod
 from typing import Any, NamedTuple
 
-from mpmath import MPContext
-
 from scene import exact, mixed
-from scene.laws import (
-    BangBang,
-    Fourier,
-    Law,
-    Period,
-    Quadratic,
-    bounds,
-    breakpoints,
-    is_constant,
-    period_of,
-    piece_at,
-    value,
-)
+from scene.laws import BangBang, Law, Period, bounds, is_constant, period_of, value
 from scene.laws import exact as number
+from scene.polynomials import half_angle, leg_intervals, leg_polynomial, one_plus_square
+from scene.precision import decimals
 from scene.refusal import InvalidScene
 
 Laws = Mapping[str, Law]
@@ -76,7 +64,7 @@ def check_common_period(laws: Laws) -> None:
     moving = {name: shared for name, law in laws.items() if (shared := period_of(law)) is not None}
     for (first, a), (second, b) in itertools.combinations(moving.items(), 2):
         if a != b:
-            ctx = MPContext()
+            ctx = decimals()
             one, other = (ctx.nstr(shared.value(ctx), 17) for shared in (a, b))
             raise InvalidScene(
                 f"{first} has period {one} and {second} has {other}:"
@@ -116,7 +104,7 @@ def _check(laws: Laws, condition: Condition) -> None:
     used = [law for _, factors in condition.terms for law in factors if not is_constant(law)]
     legs = [law for law in used if isinstance(law, BangBang)]
     if 0 < len(legs) < len(used):
-        verdict = mixed.sign_on_legs(condition.terms, condition.is_strict, _intervals(legs))
+        verdict = mixed.sign_on_legs(condition.terms, condition.is_strict, leg_intervals(legs))
         if verdict.holds is None:
             raise InvalidScene(
                 f"{condition.text} cannot be shown near t = {float(verdict.time):.6g}: where Fourier and"
@@ -130,48 +118,26 @@ def _check(laws: Laws, condition: Condition) -> None:
             raise InvalidScene(_message(laws, condition))
 
 
-def _intervals(legs: Sequence[BangBang]) -> list[tuple[Fraction, Fraction]]:
-    """Cut one period at every time at which one of these laws is not analytic."""
-    start, span = Fraction(legs[0].knots[0][0]), Fraction(0)
-    cuts = {start}
-    for law in legs:
-        times = breakpoints(law)
-        span = times[-1] - times[0]
-        cuts |= {start + (t - start) % span for t in times}
-    return list(itertools.pairwise([*sorted(cuts), start + span]))
-
-
 def _on_legs(
     condition: Condition, legs: Sequence[BangBang]
 ) -> Iterator[tuple[exact.Polynomial, Fraction, Fraction]]:
-    for a, b in _intervals(legs):
+    for a, b in leg_intervals(legs):
         total: exact.Polynomial = []
         for sign, factors in condition.terms:
             term = [Fraction(sign)]
             for factor in factors:
-                term = exact.multiply(term, _leg_polynomial(factor, a))
+                term = exact.multiply(term, leg_polynomial(factor, a))
             total = exact.add(total, term)
         yield total, Fraction(0), b - a
 
 
-def _leg_polynomial(law: Law, a: Fraction) -> exact.Polynomial:
-    # In the variable t - a.
-    piece = piece_at(law, a)
-    if isinstance(piece, Quadratic):
-        d = a - piece.origin
-        c0, c1, c2 = piece.c0, piece.c1, piece.c2
-        return exact.trimmed([c0 + d * (c1 + d * c2), c1 + 2 * c2 * d, c2])
-    assert isinstance(piece, float)
-    return exact.trimmed([Fraction(piece)])
-
-
 def _on_circle(condition: Condition) -> Iterator[tuple[exact.Polynomial, Fraction, Fraction]]:
     # Each law is N(x) / (1 + x^2)^n with n its highest harmonic.
-    terms = [(sign, [_half_angle(law) for law in factors]) for sign, factors in condition.terms]
+    terms = [(sign, [half_angle(law) for law in factors]) for sign, factors in condition.terms]
     n = max(sum(degree for _, degree in factors) for _, factors in terms)
     total: exact.Polynomial = []
     for sign, factors in terms:
-        term = exact.scale(_one_plus_square(n - sum(d for _, d in factors)), Fraction(sign))
+        term = exact.scale(one_plus_square(n - sum(d for _, d in factors)), Fraction(sign))
         for numerator, _ in factors:
             term = exact.multiply(term, numerator)
         total = exact.add(total, term)
@@ -183,29 +149,9 @@ def _on_circle(condition: Condition) -> Iterator[tuple[exact.Polynomial, Fractio
         yield total, -bound, bound
 
 
-def _one_plus_square(n: int) -> exact.Polynomial:
-    return [Fraction(comb(n, k // 2)) if k % 2 == 0 else Fraction(0) for k in range(2 * n + 1)]
-
-
-def _half_angle(law: Law) -> tuple[exact.Polynomial, int]:
-    if not isinstance(law, Fourier):
-        mean = law if isinstance(law, float) else law.knots[0][1]
-        return exact.trimmed([Fraction(mean)]), 0
-    harmonics = law.harmonics()
-    n = max((k for k, _, _ in harmonics), default=0)
-    total = exact.scale(_one_plus_square(n), Fraction(law.mean))
-    for k, c, s in harmonics:
-        # cos(k a) + i sin(k a) = (1 + i x)^(2k) / (1 + x^2)^k with x = tan(a / 2).
-        real = [Fraction(comb(2 * k, j) * (1, 0, -1, 0)[j % 4]) for j in range(2 * k + 1)]
-        imaginary = [Fraction(comb(2 * k, j) * (0, 1, 0, -1)[j % 4]) for j in range(2 * k + 1)]
-        wave = exact.add(exact.scale(real, Fraction(c)), exact.scale(imaginary, Fraction(s)))
-        total = exact.add(total, exact.multiply(wave, _one_plus_square(n - k)))
-    return total, n
-
-
 def _message(laws: Laws, condition: Condition, known: Fraction | None = None) -> str:
     # The proof is done; this only looks for a telling instant to show. In mp no scene overflows.
-    ctx = MPContext()
+    ctx = decimals()
     shared = next((found for law in laws.values() if (found := period_of(law)) is not None), None)
     span = shared.value(ctx) if shared else ctx.mpf(0)
     start = next((law.knots[0][0] for law in laws.values() if isinstance(law, BangBang)), 0.0)

@@ -13,21 +13,23 @@ import fast
 import theory
 from conformance.audit import ledger
 from conformance.audit.claims import experiments, exponents
-from conformance.audit.evidence import Evidence, Steppers
+from conformance.audit.evidence import AuditSteppers, ClaimEvidence
 from conformance.audit.finding import verdict_of
 from conformance.audit.runs import RUNS, scene_of
 from conformance.audit.samples import draw
-from conformance.audit.session import Settings, conduct
+from conformance.audit.session import AuditSettings, conduct
 from conformance.audit.tolerances import MAX_TESTS, N_SIGMA
 
 REAL = ("L1", "L7")  # follow single particles or slow ones: not the stand-in's matter
 CACHED = cache(theory.predict)
-STAND_IN = Steppers(adiabatic_particles.simulate, fast.trajectory)
+STAND_IN = AuditSteppers(adiabatic_particles.simulate, fast.trajectory)
 
 
 def audited(only="", simulate=adiabatic_particles.simulate, predict=CACHED):
     entries = [entry for entry in ledger.select(only) if only or entry.id not in REAL]
-    return conduct(Steppers(simulate, fast.trajectory), Settings(), entries=entries, predict=predict)
+    return conduct(
+        AuditSteppers(simulate, fast.trajectory), AuditSettings(), entries=entries, predict=predict
+    )
 
 
 @pytest.fixture(scope="module")
@@ -170,18 +172,20 @@ def fixed_caps():
 def test_planted_wrong_claims_are_refuted_at_the_papers_size(fixed_caps, name, sign):
     sample = fixed_caps[name]
     right = CACHED(scene_of(sample.run), 30)
-    known = experiments.growth(Evidence(fixed_caps, STAND_IN, size="full", predict=CACHED), sample)
+    known = experiments.growth(ClaimEvidence(fixed_caps, STAND_IN, size="full", predict=CACHED), sample)
     assert known.holds
     far = known.value + sign * (5 * known.error + known.band)
     near = known.value + sign * (4 * known.error + known.band)
     for m1, verdict in ((far, False), (near, True)):
         planted = right._replace(m1=mpmath.mpf(m1))
-        evidence = Evidence(fixed_caps, STAND_IN, size="full", predict=lambda *_, planted=planted: planted)
+        evidence = ClaimEvidence(
+            fixed_caps, STAND_IN, size="full", predict=lambda *_, planted=planted: planted
+        )
         assert experiments.growth(evidence, sample).holds is verdict
     planted = right._replace(p_nc=right.p_nc + sign * mpmath.mpf("0.01"))
-    evidence = Evidence(fixed_caps, STAND_IN, size="full", predict=lambda *_: planted)
+    evidence = ClaimEvidence(fixed_caps, STAND_IN, size="full", predict=lambda *_: planted)
     assert experiments.escape(evidence, sample).holds is False
-    honest = Evidence(fixed_caps, STAND_IN, size="full", predict=CACHED)
+    honest = ClaimEvidence(fixed_caps, STAND_IN, size="full", predict=CACHED)
     assert experiments.escape(honest, sample).holds is True
 
 
@@ -203,7 +207,7 @@ def test_lost_particles_leave_a_claim_open(code):
 
 def test_the_fast_stepper_keeps_the_laws_of_single_particles():
     entries = ledger.select("L1,L7")
-    result = conduct(Steppers(fast.simulate, fast.trajectory), Settings(threads=1), entries=entries)
+    result = conduct(AuditSteppers(fast.simulate, fast.trajectory), AuditSettings(threads=1), entries=entries)
     assert [finding.verdict for finding in result.findings] == ["confirmed", "confirmed"]
 
 
@@ -215,7 +219,7 @@ def test_a_leaking_circle_is_refuted():
         return done._replace(steps=steps)
 
     (entry,) = ledger.select("L1")
-    checks = entry.examine(Evidence({}, Steppers(fast.simulate, leaking), predict=CACHED))
+    checks = entry.examine(ClaimEvidence({}, AuditSteppers(fast.simulate, leaking), predict=CACHED))
     assert verdict_of(entry, checks) == "refuted"
 
 
@@ -227,6 +231,8 @@ def test_work_that_is_not_conserved_is_refuted(monkeypatch):
         return done._replace(energy=done.energy * 0.7, phase_energies=done.phase_energies * 0.7)
 
     (entry,) = ledger.select("L7")
-    checks = entry.examine(Evidence({}, Steppers(cooled, fast.trajectory), predict=CACHED, threads=1))
+    checks = entry.examine(
+        ClaimEvidence({}, AuditSteppers(cooled, fast.trajectory), predict=CACHED, threads=1)
+    )
     assert verdict_of(entry, checks) == "refuted"
     assert N_SIGMA > 4

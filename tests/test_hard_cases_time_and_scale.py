@@ -24,7 +24,6 @@ from scene import (
     Horizon,
     InvalidScene,
     InvalidState,
-    Mushroom,
     Rejected,
     State,
     from_data,
@@ -32,6 +31,7 @@ from scene import (
 )
 from scene.protocol.wire import serve
 from scene.tables import laws
+from scene.transforms import backwards
 
 MIRRORED = {"left": "right", "right": "left"}
 
@@ -274,20 +274,12 @@ def test_46_broken_scenes(data, words):
         from_data(data)
 
 
-def backwards(law):
-    if isinstance(law, Fourier):
-        return Fourier(mean=law.mean, omega=law.omega, cos=law.cos, sin=tuple(-a for a in law.sin))
-    if isinstance(law, BangBang):
-        return BangBang(knots=tuple((-t, v) for t, v in reversed(law.knots)))
-    return law
-
-
 @pytest.mark.parametrize("name", ["moving-cap", "fixed-cap-clockwise"])
 @pytest.mark.parametrize("stepper", [reference, fast])
 def test_47_reversed_film(stepper, name):
     """Velocity and laws reversed, the path is retraced; a hundredfold per bounce is its sensitivity."""
     scene = load(name)
-    film = Mushroom(**{n: backwards(law) for n, law in laws(scene).items()})
+    film = backwards(scene)
     start, t_end = State(0.125, 0.1, 0.3, 10.0, 7.0), 0.625
     there = stepper.trajectory(scene, start, 99, t_end)
     end = there.outcome if stepper is fast else there.outcome.rounded()

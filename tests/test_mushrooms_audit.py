@@ -15,9 +15,10 @@ from support import adiabatic_particles
 
 import fast
 from conformance.audit import ledger, session
-from conformance.audit.evidence import Steppers
+from conformance.audit.evidence import AuditSteppers
 from conformance.audit.finding import Check, Finding
-from conformance.audit.session import Result, Settings
+from conformance.audit.session import AuditResult, AuditSettings
+from mushrooms.figures import by_claim
 from mushrooms.reports import audit_page
 
 SCHEMA = Path(__file__).parent.parent / "docs" / "report.schema.json"
@@ -46,7 +47,7 @@ def everything():
         Check("not a number", False, "1", float("nan"), float("nan"), 0.0, "claim", 1),
     ]
     findings = [Finding(entry.id, entry.expected, checks, 0.1) for entry in entries]
-    return Result(Settings(), entries, findings, samples, 12.3)
+    return AuditResult(AuditSettings(), entries, findings, samples, 12.3)
 
 
 def test_every_id_is_in_the_report_with_verdict_values_and_errors(everything):
@@ -87,7 +88,7 @@ def test_the_page_loads_nothing_from_elsewhere_and_shows_every_figure(everything
     links = Links()
     links.feed(page)
     pictures = [source for source in links.sources if not source.startswith("#")]
-    assert len(pictures) == len(audit_page.pictures.ALL)
+    assert len(pictures) == len(by_claim.ALL)
     assert not {"script", "link", "iframe", "object"} & set(links.tags)
     assert "http" not in page.replace("data:image/svg+xml", "")
     assert "n = 5 &lt;b&gt;&amp;" in page
@@ -185,8 +186,8 @@ def test_without_resume_everything_is_made_again(call, tmp_path, blocks):
 
 def test_entries_without_simulations_may_be_examined_apart(tmp_path):
     result = session.conduct(
-        Steppers(adiabatic_particles.simulate, fast.trajectory),
-        Settings(folder=tmp_path, apart=True),
+        AuditSteppers(adiabatic_particles.simulate, fast.trajectory),
+        AuditSettings(folder=tmp_path, apart=True),
         entries=ledger.select("M3,M10"),
     )
     assert result.is_passed

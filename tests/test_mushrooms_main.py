@@ -14,6 +14,7 @@ import pytest
 
 import fast
 import scene as scenes
+from scene.files import write_files
 
 MOVING_CAP = """\
 table = "mushroom"
@@ -77,7 +78,7 @@ def test_a_broken_scene_is_refused(call, tmp_path, command, kind):
         (["theory", "moving-cap", "--digits", "many"], ["--digits"]),
         (["simulate", "moving-cap", "--energy", "1"], ["--particles"]),
         (["audit", "--only", "X2,X99"], ["X99", "M1", "L7"]),
-        (["audit", "--seed", "-1"], ["seed = -1", "2^64"]),
+        (["audit", "--seed", "-1"], ["--seed = -1", "0 to 18446744073709551615"]),
         (["audit", "--threads", "0"], ["--threads = 0"]),
         (["draw", "moving-cap", "--out", "picture.pdf"], ["picture.pdf", ".svg"]),
         (["draw", "moving-cap", "--out", "nowhere/picture.svg"], ["nowhere/picture.svg", "No such"]),
@@ -147,15 +148,13 @@ def test_a_broken_off_simulation_leaves_nothing(call, tmp_path, monkeypatch, err
 
 
 def test_a_failed_write_leaves_older_results_alone(tmp_path):
-    from mushrooms import output
-
     (tmp_path / "a.json").write_text("old")
 
     def fail(_file):
         raise OSError("disk full")
 
     with pytest.raises(OSError, match="disk full"):
-        output.write_files(tmp_path, {"a.json": lambda file: file.write(b"new"), "b.json": fail})
+        write_files(tmp_path, {"a.json": lambda file: file.write(b"new"), "b.json": fail})
     assert [entry.name for entry in tmp_path.iterdir()] == ["a.json"]
     assert (tmp_path / "a.json").read_text() == "old"
 

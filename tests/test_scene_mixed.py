@@ -12,8 +12,8 @@ from flint import arb, ctx, fmpq
 
 from scene import BangBang, Fourier, InvalidScene, Mushroom, mixed
 from scene.laws import MAX_HARMONICS, Quadratic, piece_at
-from scene.mixed import BITS, PI, PI_ERROR, Jet, jet, multiply, sign_on_legs, turns
-from scene.validity import _intervals
+from scene.mixed import BITS, PI, PI_ERROR, TaylorBounds, jet, multiply, sign_on_legs, turns
+from scene.polynomials import leg_intervals
 
 N_SCENES = 300
 
@@ -87,7 +87,7 @@ def test_jets_enclose_products(many_bits):
     draw = random.Random("jets")
     for _ in range(200):
         wave, legs = random_laws(draw)
-        a, b = draw.choice(_intervals([legs]))
+        a, b = draw.choice(leg_intervals([legs]))
         m, h = (a + b) / 2, (b - a) / 2 / draw.choice((1, 4, 1024))
         found = multiply(jet(wave, m), jet(legs, m), h)
         assert abs(exactly(wave, m) * exactly(legs, m) - rational(found.value)) <= rational(found.value_error)
@@ -125,7 +125,7 @@ def test_the_proof_agrees_with_sampling(many_bits, tally):
     assert min(tally["valid"], tally["refused"]) > 50
 
 
-class BendLost(Jet):
+class BendLost(TaylorBounds):
     """A faulty Jet: keeps the tangent and forgets the bound on the second derivative."""
 
     def least(self, h):
@@ -158,14 +158,14 @@ def test_a_lost_bend_is_caught(monkeypatch):
     terms = ((1, (Fourier(1.0, cos=(0.25,), period=1.0),)), (-1, (1.0,)))
     interval = [(Fraction(-2, 5), Fraction(2, 5))]
     assert sign_on_legs(terms, False, interval).holds is False
-    monkeypatch.setattr(mixed.Jet, "least", BendLost.least)
+    monkeypatch.setattr(mixed.TaylorBounds, "least", BendLost.least)
     assert sign_on_legs(terms, False, interval).holds is True
 
 
 def test_the_work_is_bounded(monkeypatch):
     wave, legs = dip(0.0)
     monkeypatch.setattr(mixed, "MAX_BOXES", 20)
-    assert sign_on_legs(((1, (wave,)), (-1, (legs,))), False, _intervals([legs])).holds is None
+    assert sign_on_legs(((1, (wave,)), (-1, (legs,))), False, leg_intervals([legs])).holds is None
 
 
 def test_products_known_to_be_positive_need_no_proof(monkeypatch):

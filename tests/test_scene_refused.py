@@ -12,6 +12,7 @@ import msgspec
 import numpy as np
 import pytest
 from hypothesis import given
+from support.refusals import one_line
 
 from conformance.strategies import scenes
 from scene import (
@@ -54,16 +55,6 @@ NO_NUMBERS = [
 OUT_OF_RANGE = [math.nan, math.inf, -math.inf, np.float64("nan"), np.float32("inf")]
 
 
-def one_line(call, *arguments, **fields):
-    """Return the message with which a call refuses."""
-    with pytest.raises(BadInput) as refusal:
-        call(*arguments, **fields)
-    message = str(refusal.value)
-    assert len(message.splitlines()) == 1
-    assert len(message) < 300
-    return message
-
-
 @pytest.mark.parametrize("bad", NO_NUMBERS + OUT_OF_RANGE + [0.0, -0.0, -1.0, -1])
 def test_a_length_that_is_none_is_refused_by_name(bad):
     assert one_line(Cap, r=bad).startswith("r ")
@@ -87,6 +78,10 @@ def test_a_name_is_text(bad):
     ("make", "words"),
     [
         (lambda: Mushroom(r=1.0, h=1.0, nu=2.0), "nu <= 1 fails by -1"),
+        (
+            lambda: Mushroom(r=1.0, h=1.0, nu=math.nextafter(1.0, 2.0)),
+            "nu <= 1 fails by -2.22045e-16 near t = 0.0, where r = 1.0, nu = 1.0",
+        ),
         (lambda: Mushroom(r=1.0, h=1.0, nu=Fourier(0.75, 1.0, (0.2500001,))), "nu <= 1 fails by -1"),
         (lambda: Mushroom(r=1.0, h=1.0, w=BangBang(((0, 0.5), (1, 1.5), (2, 0.5)))), "w <= r fails by -0.5"),
         (lambda: Mushroom(r=1.0, h=1.0), "exactly one of `w` and `nu`"),
@@ -171,7 +166,6 @@ def test_a_scene_survives_every_way_of_copying(scene):
     ways = (copy.copy, copy.deepcopy, lambda s: pickle.loads(pickle.dumps(s)), msgspec.structs.replace)
     for way in ways:
         assert way(scene) == scene
-    assert from_data(to_data(scene)) == scene
     check_scene(scene)
 
 

@@ -214,21 +214,6 @@ def test_the_moving_cap_as_printed_is_refused():
     assert float(min(gaps)) == pytest.approx(0.0511, abs=5e-5)
 
 
-@pytest.mark.parametrize(
-    ("laws", "message"),
-    [
-        ({"w": 0.5}, "exactly one of `w` and `nu`"),
-        ({"nu": None}, "exactly one of `w` and `nu`"),
-        ({"slope": math.nan}, "slope = nan, must be finite"),
-        ({"nu": UP}, "nu <= 1 fails by -2.22045e-16 near t = 0.0, where r = 1.0, nu = 1.0"),
-    ],
-)
-def test_the_message_names_what_is_wrong(laws, message):
-    with pytest.raises(InvalidScene) as refusal:
-        mushroom(**laws)
-    assert message in str(refusal.value)
-
-
 BY_OMEGA, BY_PERIOD = wave(1.0, 0.1), Fourier(mean=1.0, period=1.0, cos=(0.1,))
 
 

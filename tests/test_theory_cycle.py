@@ -16,7 +16,7 @@ from scene.laws import value
 from theory import Cycle, NotCovered
 from theory.chebyshev import Grid
 from theory.critical import solve_rising, spans
-from theory.parameters import Motion
+from theory.parameters import MovingMushroom
 
 
 def test_moving_cap_releases_at_two_pi_minus_t() -> None:
@@ -154,7 +154,7 @@ def test_motion_is_the_laws_of_the_scene(name: str) -> None:
     ctx = MPContext()
     ctx.dps = 40
     for t in (Fraction(1, 32), Fraction(5, 16), Fraction(15, 8)):
-        motion, at = Motion(ctx, scene, t), ctx.mpf(t.numerator) / t.denominator
+        motion, at = MovingMushroom(ctx, scene, t), ctx.mpf(t.numerator) / t.denominator
         nu, rate = motion.nu(at)
         width = scene.nu if scene.nu is not None else scene.w  # r = 1 where w is given
         assert width is not None
@@ -170,7 +170,7 @@ def test_motion_sums_high_harmonics() -> None:
     law = Fourier(mean=0.5, omega=1.7, cos=(0.1, 0.0, 0.05, 0.0, 0.01), sin=(0.0, 0.02, 0.0, 0.03))
     ctx = MPContext()
     ctx.dps = 40
-    motion = Motion(ctx, Mushroom(r=1.0, h=1.0, nu=law), Fraction(0))
+    motion = MovingMushroom(ctx, Mushroom(r=1.0, h=1.0, nu=law), Fraction(0))
     nu, rate = motion.nu(ctx.mpf("2.3"))
     assert abs(nu - value(ctx, law, ctx.mpf("2.3"))) < ctx.mpf(10) ** -38
     assert abs(rate - value(ctx, law, ctx.mpf("2.3"), 1)) < ctx.mpf(10) ** -38

@@ -17,7 +17,6 @@ from theory import (
     log_energy_rate_island,
     predict,
     sin_phi_hat,
-    v_cap,
     volumes_at,
 )
 from theory.volumes import delta_slope
@@ -65,10 +64,6 @@ def test_the_rates_integrate_to_the_energies_of_the_cycle() -> None:
         free = ctx.quad(chaotic, [0, t_in], maxdegree=4) + ctx.quad(chaotic, [t_out, 2 * ctx.pi], maxdegree=4)
         held = ctx.quad(island, [t_in, t_out], maxdegree=5)
         assert float(free + held) == pytest.approx(captured.s[k], abs=1e-8)
-
-
-def test_energy_is_constant_in_a_cap_that_stands_still() -> None:
-    assert log_energy_rate_island(v_cap(fp, 1.0), 0.0) == 0.0
 
 
 def test_formulas_take_arrays_with_numpy_as_number_system() -> None:

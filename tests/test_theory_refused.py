@@ -7,9 +7,10 @@ import math
 import mpmath
 import numpy as np
 import pytest
+from support.refusals import one_line
 
 import theory
-from scene import BadInput, BangBang, Cap, Fourier, Mushroom, Stem, load
+from scene import BangBang, Cap, Fourier, Mushroom, Stem, load
 from theory.entries import MAX_DIGITS, MAX_ORDER
 
 SCENE = load("moving-cap")
@@ -28,15 +29,6 @@ NO_ARRAYS = [
     {"a": 1},
     [1j, 0],
 ]
-
-
-def one_line(call, *arguments, **fields):
-    with pytest.raises(BadInput) as refusal:
-        call(*arguments, **fields)
-    message = str(refusal.value)
-    assert len(message.splitlines()) == 1
-    assert len(message) < 300
-    return message
 
 
 OF_A_SCENE = {
@@ -208,11 +200,7 @@ def test_arrays(bad, solved):
     "bad", [None, 1.0, "0.1", [math.nan], ["x"], [None], [[0.0]], [True], ["inf"], [1j]], ids=repr
 )
 def test_levels(bad):
-    for entry, field in (
-        (theory.density_at, "s"),
-        (theory.cdf_at, "s"),
-        (theory.capture_rate_at, "t"),
-    ):
+    for entry, field in ((theory.density_at, "s"), (theory.cdf_at, "s"), (theory.capture_rate_at, "t")):
         assert one_line(entry, SCENE, bad, 4).startswith(field)
 
 

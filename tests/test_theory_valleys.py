@@ -10,7 +10,7 @@ from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from scene import BangBang, Fourier, InvalidScene, Mushroom, from_data
+from scene import BangBang, Fourier, InvalidScene, Mushroom
 from theory import (
     Cycle,
     Energies,
@@ -230,20 +230,16 @@ amplitude = st.integers(-16, 16).map(lambda k: k / 64)
 def test_growth_is_never_negative_with_recapture(amplitudes: list[float], tangent: int) -> None:
     r_cos, r_sin, h_cos, h_sin, first, third = amplitudes
 
-    def fourier(mean: float, cos: list[float], sin: list[float]) -> dict[str, Any]:
-        return {"kind": "fourier", "mean": mean, "omega": 1.0, "cos": cos, "sin": sin}
-
-    scene = {
-        "table": "mushroom",
-        "r": fourier(1.0, [r_cos], [r_sin]),
-        "h": fourier(1.0, [h_cos], [h_sin]),
-        "nu": fourier(0.5, [first / 2, 0.1875, third / 2], []),
-        "slope": tangent / 64,
-    }
     try:
-        found = captures(Cycle.of(from_data(scene), 4), 10)
+        scene = Mushroom(
+            r=Fourier(1.0, 1.0, (r_cos,), (r_sin,)),
+            h=Fourier(1.0, 1.0, (h_cos,), (h_sin,)),
+            nu=Fourier(0.5, 1.0, (first / 2, 0.1875, third / 2)),
+            slope=tangent / 64,
+        )
     except InvalidScene:
         assume(False)
+    found = captures(Cycle.of(scene, 4), 10)
     assert found.growth() >= 0
     assert 0 < found.p_not_captured < 1
     assert abs(found.taylor(-1, 0)[0] - 1) < 1e-8

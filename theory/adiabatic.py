@@ -25,7 +25,7 @@ from scene.refusal import BadInput
 from theory.chebyshev import Grid
 from theory.cycle import Cycle
 from theory.measure import Atoms, convolve, product, shifted
-from theory.valleys import Piece, Valley
+from theory.valleys import CapturePiece, Valley
 from theory.volumes import delta, delta_slope
 
 MAX_HALVINGS = 24  # a panel of 2^-24 of its piece: nearer singularities are given up
@@ -56,7 +56,7 @@ class Panel(NamedTuple):
 
 
 class Window(NamedTuple):
-    """A valley resolved: its own panels, its children; A and B where it begins and where the children do."""
+    """A valley resolved: its own panels and its children; A and B at its top and where the children begin."""
 
     panels: tuple[Panel, ...]
     children: tuple[Window, ...]
@@ -223,7 +223,9 @@ def _window(cycle: Cycle, grid: Grid, valley: Valley, start: tuple[Any, Any], ta
     return Window(tuple(panels), children, *start, A, B)
 
 
-def _resolved(cycle: Cycle, grid: Grid, piece: Piece, start: tuple[Any, Any], target: int) -> list[Panel]:
+def _resolved(
+    cycle: Cycle, grid: Grid, piece: CapturePiece, start: tuple[Any, Any], target: int
+) -> list[Panel]:
     panels: list[Panel] = []
     todo = [(0, 0)]  # part i of the piece's 2^halvings equal parts in u
     while todo:
@@ -244,7 +246,12 @@ def _resolved(cycle: Cycle, grid: Grid, piece: Piece, start: tuple[Any, Any], ta
 
 
 def _panel(
-    cycle: Cycle, grid: Grid, piece: Piece, part: tuple[int, int], start: tuple[Any, Any], tolerance: Any
+    cycle: Cycle,
+    grid: Grid,
+    piece: CapturePiece,
+    part: tuple[int, int],
+    start: tuple[Any, Any],
+    tolerance: Any,
 ) -> Panel | None:
     """Sample a part of a piece and integrate from `start` = (A, B); None when it is not resolved."""
     ctx, width = cycle.ctx, cycle.ctx.ldexp(1, -part[1])
@@ -275,7 +282,7 @@ def _panel(
     return Panel(levels, t_in, t_out, dA, log_g, A, B)
 
 
-def _descent(ctx: Any, piece: Piece, u: Any) -> tuple[Any, Any]:
+def _descent(ctx: Any, piece: CapturePiece, u: Any) -> tuple[Any, Any]:
     """Return nu and d nu / du at u in [0, 1], nu falling along I(u).
 
     I is the regularised incomplete beta function with integer parameters p, q >= 1.

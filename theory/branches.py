@@ -1,10 +1,10 @@
 """The panels of a solution in binary64: functions of place along each panel, inverted in whole arrays.
 
 A panel's functions are Chebyshev series in x on [0, 1] from a 15-digit solution, right to about 1e-14. Where
-s(x) turns, found among FINE samples, the panel is cut into monotone stretches; each level is then met by
-bisection, so probabilities below a level are exact to rounding, caustics included (a level within d of a
-caustic costs sqrt(d), the conditioning of the question). Two turns within a FINE-th of a panel are
-not told apart; s varies by about FINE^-3 between them.
+s(x) turns, the panel is cut into monotone stretches; the turns are searched among FINE samples. The place at
+which s reaches a level is then found by bisection, so the probability below a level is exact to rounding.
+Near a caustic an error e in the level becomes sqrt(e) in the probability; no method avoids this. Two turns
+nearer to each other than 1 / FINE of a panel are not told apart; s varies by about FINE^-3 between them.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from theory.cycle import Cycle
 Floats = NDArray[np.float64]
 
 DIGITS = 15
-FINE = 2048  # samples of a panel; interpolation between them is right to the inverse square, 2e-7
+FINE = 2048  # samples of a panel; linear interpolation between them errs by FINE^-2, 2e-7
 X = np.linspace(0.0, 1.0, FINE + 1)
 BISECTIONS = 52
 
@@ -61,7 +61,7 @@ class Branch(NamedTuple):
 
     @property
     def scale(self) -> float:
-        """Size of the numbers s is the difference of."""
+        """Size of A, B and log g, whose difference is s."""
         return float(np.abs(self.coefficients[3:]).max())
 
     def evaluate(self, x: Floats) -> Floats:
@@ -85,7 +85,7 @@ class Branch(NamedTuple):
         for i in range(len(bounds) - 1):
             is_rising = values[i + 1] > values[i]
             u = crossing(series, bounds[i], bounds[i + 1], levels)
-            # A level met at no inner point has its bound: p there is what the ends have, to the bit.
+            # A level that is met at no inner point has an end for its place; p at the ends is known already.
             here = np.where(u == bounds[i], p[i], np.where(u == bounds[i + 1], p[i + 1], self.chaotic(u)))
             total += p[i] - here if is_rising else here - p[i + 1]
         return total

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from typing import Any
 
-REACH = 8  # points a forecast looks back on: it saves half of Newton's steps, more save no further ones
+REACH = 8  # points that a forecast extrapolates from; more of them would save no further Newton steps
 
 
 class Grid:

@@ -34,6 +34,6 @@ def guarded(function: Callable[P, R]) -> Callable[P, R]:
 
 
 def settle(ctx: Any) -> None:
-    """Compute the constants to more than a context's working precision asks for, so that they then rest."""
+    """Compute the constants to more digits than a context will ask for: nothing refines them later."""
     for constant in (libelefun.pi_fixed, libelefun.ln2_fixed, libelefun.ln10_fixed):
         constant(4 * ctx.prec)  # cos and exp work with up to about three times the precision

@@ -12,12 +12,13 @@ from __future__ import annotations
 from collections.abc import Iterator
 from fractions import Fraction
 from itertools import pairwise
-from math import comb, floor
+from math import floor
 from typing import Any, NamedTuple
 
 from scene import exact
-from scene.laws import BangBang, Fourier, Law, Quadratic, breakpoints, is_constant, piece_at
+from scene.laws import BangBang, Law, is_constant
 from scene.laws import exact as number
+from scene.polynomials import half_angle, leg_intervals, leg_polynomial
 from scene.tables import Mushroom, laws, period
 from theory.volumes import NotCovered
 
@@ -38,7 +39,7 @@ class Span(NamedTuple):
     inside: Fraction
 
 
-class Root(NamedTuple):
+class IsolatedRoot(NamedTuple):
     """A real root isolated in [left, right] (equal when it is rational and met exactly)."""
 
     left: Fraction
@@ -71,23 +72,14 @@ def spans(ctx: Any, scene: Mushroom) -> list[Span]:
     if kinds == {BangBang}:
         return list(_bang_bang_spans(ctx, legs, width, radius))
     found = _fourier_spans(ctx, scene, width, radius)
-    return _cut(ctx, found, _cuts(legs), scene) if legs else found
-
-
-def _cuts(legs: list[BangBang]) -> list[Fraction]:
-    """Return the times in one period at which one of these laws is not analytic."""
-    cuts: set[Fraction] = set()
-    for law in legs:
-        times = breakpoints(law)
-        start = min(cuts, default=times[0])
-        cuts |= {start + (t - start) % (times[-1] - times[0]) for t in times}
-    return sorted(cuts)
+    return _cut(ctx, found, [a for a, _ in leg_intervals(legs)], scene) if legs else found
 
 
 def _cut(ctx: Any, found: list[Span], cuts: list[Fraction], scene: Mushroom) -> list[Span]:
     """Cut spans of a Fourier mouth where bang-bang laws of radius, depth or slope are not analytic.
 
-    The spans' own ends are known to the context's precision only: a cut nearer to one than that is it.
+    The ends of the spans are rounded to the context's precision; a cut that lies nearer to an end than that
+    rounding is taken for the end itself.
     """
     shared = period(scene)
     assert shared is not None
@@ -110,10 +102,8 @@ def _cut(ctx: Any, found: list[Span], cuts: list[Fraction], scene: Mushroom) -> 
 
 
 def _bang_bang_spans(ctx: Any, moving: list[BangBang], width: Law, radius: Law) -> Iterator[Span]:
-    ordered = _cuts(moving)
-    length = Fraction(moving[0].knots[-1][0]) - Fraction(moving[0].knots[0][0])
-    for a, b in zip(ordered, [*ordered[1:], ordered[0] + length], strict=True):
-        w, r = _leg(width, a), _leg(radius, a)
+    for a, b in leg_intervals(moving):
+        w, r = leg_polynomial(width, a), leg_polynomial(radius, a)
         slope = exact.add(
             exact.multiply(exact.derivative(w), r),
             exact.scale(exact.multiply(w, exact.derivative(r)), Fraction(-1)),
@@ -128,21 +118,9 @@ def _bang_bang_spans(ctx: Any, moving: list[BangBang], width: Law, radius: Law) 
             yield Span(times[i], times[i + 1], orders[i], orders[i + 1], (a + b) / 2)
 
 
-def _leg(law: Law, start: Fraction) -> exact.Polynomial:
-    # In the variable t - start.
-    piece = piece_at(law, start)
-    if isinstance(piece, Quadratic):
-        d = start - piece.origin
-        return exact.trimmed(
-            [piece.c0 + d * (piece.c1 + d * piece.c2), piece.c1 + 2 * piece.c2 * d, piece.c2]
-        )
-    assert isinstance(piece, float)
-    return exact.trimmed([Fraction(piece)])
-
-
 def _fourier_spans(ctx: Any, scene: Mushroom, width: Law, radius: Law) -> list[Span]:
-    w, dw, n_w = _half_angle(width)
-    r, dr, n_r = _half_angle(radius)
+    (w, n_w), (r, n_r) = half_angle(width), half_angle(radius)
+    (dw, _), (dr, _) = half_angle(width, 1), half_angle(radius, 1)
     slope = exact.add(exact.multiply(dw, r), exact.scale(exact.multiply(w, dr), Fraction(-1)))
     if not slope:
         return []
@@ -159,32 +137,6 @@ def _fourier_spans(ctx: Any, scene: Mushroom, width: Law, radius: Law) -> list[S
     return [Span(a, b, 1 + m, 1 + n, Fraction(0)) for (a, m), (b, n) in zip(found, later, strict=True)]
 
 
-def _half_angle(law: Law) -> tuple[exact.Polynomial, exact.Polynomial, int]:
-    # Numerators of the law and of its derivative in omega t over (1 + x^2)^n, and n.
-    if not isinstance(law, Fourier):
-        constant = law.knots[0][1] if isinstance(law, BangBang) else law
-        return [Fraction(constant)], [], 0
-    harmonics = law.harmonics()
-    n = max((k for k, _, _ in harmonics), default=0)
-    position = exact.scale(_one_plus_square(n), Fraction(law.mean))
-    rate: exact.Polynomial = []
-    for k, c, s in harmonics:
-        # cos(k a) + i sin(k a) = (1 + i x)^(2k) / (1 + x^2)^k with x = tan(a / 2).
-        parts = [[Fraction(comb(2 * k, j) * unit[j % 4]) for j in range(2 * k + 1)] for unit in _UNITS]
-        cos, sin = (exact.multiply(exact.trimmed(part), _one_plus_square(n - k)) for part in parts)
-        cosine, sine = Fraction(c), Fraction(s)
-        position = exact.add(position, exact.add(exact.scale(cos, cosine), exact.scale(sin, sine)))
-        rate = exact.add(rate, exact.add(exact.scale(cos, k * sine), exact.scale(sin, -k * cosine)))
-    return position, rate, n
-
-
-_UNITS = ((1, 0, -1, 0), (0, 1, 0, -1))  # real and imaginary parts of i^j
-
-
-def _one_plus_square(n: int) -> exact.Polynomial:
-    return [Fraction(comb(n, j // 2)) if j % 2 == 0 else Fraction(0) for j in range(2 * n + 1)]
-
-
 def _multiplicity_at(p: exact.Polynomial, x: Fraction) -> int:
     n = 0
     while p and exact.at(p, x) == 0:
@@ -192,7 +144,7 @@ def _multiplicity_at(p: exact.Polynomial, x: Fraction) -> int:
     return n
 
 
-def _roots(p: exact.Polynomial, a: Fraction, b: Fraction) -> list[Root]:
+def _roots(p: exact.Polynomial, a: Fraction, b: Fraction) -> list[IsolatedRoot]:
     """Isolate the distinct roots in the open interval (a, b), in order."""
     if len(p) < 2:
         return []
@@ -209,16 +161,16 @@ def _roots(p: exact.Polynomial, a: Fraction, b: Fraction) -> list[Root]:
             continue
         isolated = n == 1 and right - left <= NARROW and exact.at(p, left) != 0 and exact.at(p, right) != 0
         if isolated:
-            found.append(Root(left, right, sum(s.n_roots(left, right) for s in sturms), simple))
+            found.append(IsolatedRoot(left, right, sum(s.n_roots(left, right) for s in sturms), simple))
             continue
         middle = (left + right) / 2
         if exact.at(p, middle) == 0:
-            found.append(Root(middle, middle, _multiplicity_at(p, middle), simple))
+            found.append(IsolatedRoot(middle, middle, _multiplicity_at(p, middle), simple))
         todo += [(left, middle), (middle, right)]
     return sorted(found)
 
 
-def _refined(ctx: Any, root: Root) -> Any:
+def _refined(ctx: Any, root: IsolatedRoot) -> Any:
     if root.left == root.right:
         return number(ctx, root.left)
     low, high = number(ctx, root.left), number(ctx, root.right)

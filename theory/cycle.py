@@ -17,12 +17,12 @@ from scene.refusal import BadInput
 from scene.tables import Scene, period
 from theory.constants import guarded, settle
 from theory.entries import check_digits, check_real
-from theory.parameters import Motion
-from theory.valleys import Piece, Valley, stretches, valley
+from theory.parameters import MovingMushroom
+from theory.valleys import CapturePiece, Valley, stretches, valley
 from theory.volumes import as_mushroom
 
-# Digits beyond those asked. Loops that binary64 cannot tell from trivial ones have g - 1 ~ 1e-16 and
-# m1 ~ 1e-32: with 40 digits to spare such an m1 is still told from zero.
+# Digits beyond those asked. A loop that binary64 cannot tell from a trivial one has g - 1 ~ 1e-16 and
+# m1 ~ 1e-32; with 40 more digits such an m1 still differs from zero.
 GUARD = 40
 
 
@@ -72,14 +72,14 @@ class Cycle:
         length = shared.value(ctx) if shared else None
         run = stretches(ctx, mushroom)
         if not run:
-            nu, _ = Motion(ctx, mushroom, Fraction(0)).nu(ctx.zero)
+            nu, _ = MovingMushroom(ctx, mushroom, Fraction(0)).nu(ctx.zero)
             return cls(ctx, digits, ctx.zero, length, nu, nu, Valley((), ()))
         found = valley(ctx, run)
         levels = [nu for piece in found.all_pieces() for nu in (piece.nu_upper, piece.nu_lower)]
         return cls(ctx, digits, run[0].upper, length, max(levels), min(levels), found)
 
     @property
-    def pieces(self) -> tuple[Piece, ...]:
+    def pieces(self) -> tuple[CapturePiece, ...]:
         """All pieces of the tree of valleys."""
         return tuple(self.valley.all_pieces())
 
@@ -118,7 +118,7 @@ class Cycle:
                 return piece.release.time(nu) + shift
         return t
 
-    def _piece(self, nu: Any) -> Piece:
+    def _piece(self, nu: Any) -> CapturePiece:
         check_real(nu=nu)
         for piece in self.pieces:  # a valley's own pieces come first: the first that fits is the earliest
             if piece.nu_lower <= nu <= piece.nu_upper:

@@ -2,10 +2,10 @@
 
 A particle captured at place x of a panel has s(x), so the density at a value is the sum of
 |d p_cha / ds| over the places that reach it. Where ds / dt_in = 0 the density is infinite as
-strength / sqrt(|s - s_c|) on one side: a caustic. Distribution functions stay finite. Roots are found in
-the Chebyshev panels by Newton's method, between turning points seen in `theory.branches`. Densities of s in
-cycles with several captures of one particle are convolutions and are refused here: `theory.distribution`
-has their distribution function in binary64.
+strength / sqrt(|s - s_c|) on one side of a caustic s_c. Distribution functions stay finite. Places are found
+in the Chebyshev panels by Newton's method, between the turning points that `theory.branches` finds. Cycles
+in which one particle is captured several times are refused here: their densities are convolutions, and
+`theory.distribution` has their distribution function in binary64.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ class Caustic(NamedTuple):
     is_largest: bool
 
 
-class Series:
+class ChebyshevSeries:
     """A Chebyshev series over [0, 1] in one number system."""
 
     def __init__(self, ctx: Any, coefficients: list[Any]) -> None:
@@ -54,14 +54,14 @@ class Series:
             later, now = now, 2 * y * now - later + c
         return y * now - later + self.coefficients[0]
 
-    def rate(self) -> Series:
+    def rate(self) -> ChebyshevSeries:
         """Return the derivative."""
         c = self.coefficients
         found = [self.ctx.zero] * (len(c) + 1)
         for k in range(len(c) - 1, 0, -1):
             found[k - 1] = found[k + 1] + 4 * k * c[k]  # 2 k, and 2 for the length of [0, 1]
         found[0] /= 2
-        return Series(self.ctx, found[: max(len(c) - 1, 1)])
+        return ChebyshevSeries(self.ctx, found[: max(len(c) - 1, 1)])
 
 
 class _Panel:
@@ -70,8 +70,8 @@ class _Panel:
     def __init__(self, found: Captures, placed: Placed) -> None:
         self.ctx = found.cycle.ctx
 
-        def series(values: list[Any]) -> Series:
-            return Series(self.ctx, found.grid.coefficients(values))
+        def series(values: list[Any]) -> ChebyshevSeries:
+            return ChebyshevSeries(self.ctx, found.grid.coefficients(values))
 
         self.s, self.A, self.t_in = series(placed.s), series(placed.panel.A), series(placed.panel.t_in)
         self.ends = (placed.s[0], placed.s[-1])
@@ -255,6 +255,6 @@ def _spent(found: Captures, time: Any) -> Any:
     """Return A at a time of capture."""
     ctx = found.cycle.ctx
     panel = next(p.panel for p in found.placed if p.panel.t_in[0] <= time <= p.panel.t_in[-1])
-    t_in, A = (Series(ctx, found.grid.coefficients(v)) for v in (panel.t_in, panel.A))
+    t_in, A = (ChebyshevSeries(ctx, found.grid.coefficients(v)) for v in (panel.t_in, panel.A))
     rate = t_in.rate()
     return A(solve_rising(ctx, lambda x: (t_in(x) - time, rate(x)), ctx.zero, ctx.one))

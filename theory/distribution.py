@@ -3,9 +3,10 @@
 One cycle: an atom at s_nc; particles captured once, whose implicit density (Eq:lnE/E0 with Eq:ps) is
 integrated exactly; those captured more often, a convolution on a lattice (right to about 1e-6).
 Many cycles, taken as independent (sec. 4.2, Fig:n=10): powers of the Fourier transform of the
-lattice distribution. The lattice counts from the uncaptured energy, so the atom lies on it
-exactly; a particle between two points is shared so that mass and mean are kept. Far tails are lost in
-rounding unless the distribution is tilted by exp(q s) first; `theory.saddle` reaches them too.
+lattice distribution. The lattice's origin is the uncaptured energy, so the atom is one of its points. The
+mass of a particle between two points is shared among them so that mass and mean are kept. Far tails are
+smaller than the rounding of the transform unless the distribution is first tilted by exp(q s);
+`theory.saddle` reaches them without a transform.
 """
 
 from __future__ import annotations

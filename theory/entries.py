@@ -1,7 +1,7 @@
-"""What the theory's public entries refuse, before any arithmetic: one `BadInput` line each.
+"""Checks of what callers give to the theory's public entries, made before any arithmetic.
 
-Scenes, whole numbers and binary64 numbers have their checks in `scene.refusal`. Here are those for digits,
-number systems, numbers of any precision and arrays.
+Each raises `BadInput` with one line. Scenes, whole numbers and binary64 numbers are checked by
+`scene.refusal`; here are the checks of digits, number systems, numbers of any precision and arrays.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from scene.refusal import BadInput, check_count, shown
 
-MAX_DIGITS = 1000  # a bound on nonsense, no promise: the moving cap may take far over ten minutes
+MAX_DIGITS = 1000  # excludes nonsense; so many digits of the moving cap may take far over ten minutes
 MAX_ORDER = 64  # of moments and cumulants
 
 

@@ -1,8 +1,9 @@
 """Distributions as weighted points: sums of independent variables and truncated power series.
 
-A smooth function's mean over a sum of independent variables needs all pairs of points. The pairs are
-replaced by the weights, not all positive, of a Chebyshev grid over their range that has the same means of
-all polynomials up to the grid's degree: means of analytic functions converge geometrically.
+The mean of a function over a sum of two independent variables needs all pairs of their points. To keep the
+number of points small the pairs are replaced by weights on a Chebyshev grid over their range. The weights
+give all polynomials up to the grid's degree the same mean, so means of analytic functions converge
+geometrically; some of the weights may be negative.
 """
 
 from __future__ import annotations

@@ -18,7 +18,7 @@ from theory.volumes import Volumes, volumes_of
 Parameter = Callable[[Any, Any], tuple[Any, Any]]
 
 
-class Motion:
+class MovingMushroom:
     """The table in motion, valid on the span of time on which its laws keep their pieces."""
 
     def __init__(self, ctx: Any, scene: Mushroom, time: Fraction) -> None:

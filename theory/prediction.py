@@ -1,8 +1,8 @@
 """What the adiabatic theory predicts for one cycle: the figures of secs. 3.5 and 4.
 
 Everything is computed at two or more resolutions; an answer is given when two in a row
-agree to two digits more than asked, and is then the finer of the two. Any cycle is covered, with
-several captures of one particle in it.
+agree to two digits more than asked, and is then the finer of the two. A cycle in which one particle is
+captured several times is covered too.
 """
 
 from __future__ import annotations
@@ -12,9 +12,9 @@ from typing import Any, NamedTuple
 
 import msgspec
 
-from scene.laws import BangBang, Fourier, Law
 from scene.refusal import BadInput, check_count, check_number, shown
-from scene.tables import Mushroom, Scene, laws
+from scene.tables import Mushroom, Scene
+from scene.transforms import backwards
 from theory.adiabatic import Captures, NotConverged, captures
 from theory.constants import guarded
 from theory.cycle import GUARD, Cycle
@@ -149,16 +149,7 @@ def reversed_cycle(scene: Scene) -> Mushroom:
         NotCovered: not a mushroom.
     """
     mushroom = as_mushroom(scene)
-    backward = {name: _reversed(law) for name, law in laws(mushroom).items()}
-    return msgspec.structs.replace(mushroom, **backward)
-
-
-def _reversed(law: Law) -> Law:
-    if isinstance(law, Fourier):
-        return msgspec.structs.replace(law, sin=tuple(-s for s in law.sin))
-    if isinstance(law, BangBang):
-        return BangBang(knots=tuple((-t, v) for t, v in reversed(law.knots)))
-    return law
+    return msgspec.structs.replace(backwards(mushroom), name=mushroom.name, notes=mushroom.notes)
 
 
 def _figures(found: Captures) -> tuple[Any, ...]:

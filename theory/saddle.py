@@ -3,9 +3,9 @@
 With K(q) = log mean exp(q s), the density of log E_n / E0 at n x is
     exp(n (K(q) - q x)) / sqrt(2 pi n K''(q)) (1 + (k4 / 8 - 5 k3^2 / 24) / n),  K'(q) = x,
 with k3, k4 the standardised derivatives (Daniels 1954), and the tail follows Lugannani and Rice (1980).
-Relative errors are O(n^-2) for the density and O(n^-1) or better for the tail where the sum has a
-smooth density. The atom of particles never captured, p_nc^n, is smeared out: where it is not small the
-formulas are wrong near n s_nc.
+Where the sum has a smooth density, relative errors are O(n^-2) for the density and O(n^-1) or better for the
+tail. The formulas spread the atom of particles never captured, p_nc^n, over its neighbourhood: where it is
+not small they are wrong near n s_nc.
 """
 
 from __future__ import annotations

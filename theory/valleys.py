@@ -19,13 +19,13 @@ from typing import Any, NamedTuple
 
 from scene.tables import Mushroom, period
 from theory.critical import Span, solve_rising, spans
-from theory.parameters import Motion
+from theory.parameters import MovingMushroom
 
 
-class Stretch(NamedTuple):
+class MonotoneStretch(NamedTuple):
     """A part of a branch on which nu is strictly monotone: from `upper` at nu_upper to `lower`."""
 
-    motion: Motion
+    motion: MovingMushroom
     upper: Any
     lower: Any
     nu_upper: Any
@@ -48,7 +48,7 @@ class Stretch(NamedTuple):
         low, high = sorted((self.lower, self.upper))
         return solve_rising(self.motion.ctx, rising, low, high, guess)
 
-    def between(self, nu_upper: Any, nu_lower: Any, tolerance: Any) -> Stretch:
+    def between(self, nu_upper: Any, nu_lower: Any, tolerance: Any) -> MonotoneStretch:
         """Return the part between two values; a value within tolerance of an end is that end."""
         cut = self._replace(nu_upper=nu_upper, nu_lower=nu_lower)
         if self.nu_upper - nu_upper > tolerance:
@@ -58,11 +58,11 @@ class Stretch(NamedTuple):
         return cut
 
 
-class Piece(NamedTuple):
+class CapturePiece(NamedTuple):
     """Capture and release stretches over the same values of nu, from nu_upper down to nu_lower."""
 
-    capture: Stretch
-    release: Stretch
+    capture: MonotoneStretch
+    release: MonotoneStretch
 
     @property
     def nu_upper(self) -> Any:
@@ -89,17 +89,17 @@ class Piece(NamedTuple):
 class Valley(NamedTuple):
     """Pieces from the top down to the level of the children, which follow one another in time."""
 
-    pieces: tuple[Piece, ...]
+    pieces: tuple[CapturePiece, ...]
     children: tuple[Valley, ...]
 
-    def all_pieces(self) -> Iterator[Piece]:
+    def all_pieces(self) -> Iterator[CapturePiece]:
         """Yield the pieces of the whole tree, a valley's own before its children's."""
         yield from self.pieces
         for child in self.children:
             yield from child.all_pieces()
 
 
-def stretches(ctx: Any, scene: Mushroom) -> list[Stretch]:
+def stretches(ctx: Any, scene: Mushroom) -> list[MonotoneStretch]:
     """Return one period's stretches in order of time, from a highest maximum of nu; [] if nu is constant."""
     found = [(span, s) for span in spans(ctx, scene) if (s := _stretch(ctx, scene, span)) is not None]
     tops = [i for i, (_, s) in enumerate(found) if is_fall(s) and not is_fall(found[i - 1][1])]
@@ -111,7 +111,7 @@ def stretches(ctx: Any, scene: Mushroom) -> list[Stretch]:
     return [s for _, s in found[first:]] + [s for s in later if s is not None]
 
 
-def valley(ctx: Any, run: list[Stretch]) -> Valley:
+def valley(ctx: Any, run: list[MonotoneStretch]) -> Valley:
     """Nest stretches, in order of time, that start falling from a level and end rising to it."""
     small = tolerance(ctx)
     peaks = [i for i in range(1, len(run)) if is_fall(run[i]) and not is_fall(run[i - 1])]
@@ -121,7 +121,7 @@ def valley(ctx: Any, run: list[Stretch]) -> Valley:
     if not peaks:
         return Valley(_pieces(ctx, fall, rise[::-1]), ())
     level = max(run[i].nu_upper for i in peaks)
-    pieces: tuple[Piece, ...] = ()
+    pieces: tuple[CapturePiece, ...] = ()
     if run[0].nu_upper - level > small:
         pieces = _pieces(ctx, _above(fall, level, small), _above(rise, level, small)[::-1])
     parts = [0, *(i for i in peaks if level - run[i].nu_upper <= small), len(run)]
@@ -129,7 +129,7 @@ def valley(ctx: Any, run: list[Stretch]) -> Valley:
     return Valley(pieces, tuple(valley(ctx, _below(group, level, small)) for group in groups))
 
 
-def is_fall(s: Stretch) -> bool:
+def is_fall(s: MonotoneStretch) -> bool:
     """Tell whether nu falls with time."""
     return bool(s.upper < s.lower)
 
@@ -139,12 +139,12 @@ def tolerance(ctx: Any) -> Any:
     return ctx.mpf(10) ** (10 - ctx.dps)
 
 
-def _above(branch: list[Stretch], level: Any, small: Any) -> list[Stretch]:
+def _above(branch: list[MonotoneStretch], level: Any, small: Any) -> list[MonotoneStretch]:
     cut = [s for s in branch if s.nu_upper - level > small]
     return [s.between(s.nu_upper, max(s.nu_lower, level), small) for s in cut]
 
 
-def _below(branch: list[Stretch], level: Any, small: Any) -> list[Stretch]:
+def _below(branch: list[MonotoneStretch], level: Any, small: Any) -> list[MonotoneStretch]:
     cut = [s for s in branch if level - s.nu_lower > small]
     return [s.between(min(s.nu_upper, level), s.nu_lower, small) for s in cut]
 
@@ -158,9 +158,9 @@ def _next_period(ctx: Any, scene: Mushroom, span: Span) -> Span:
     )
 
 
-def _stretch(ctx: Any, scene: Mushroom, span: Span) -> Stretch | None:
+def _stretch(ctx: Any, scene: Mushroom, span: Span) -> MonotoneStretch | None:
     """Return the stretch of a span; None on a plateau."""
-    motion = Motion(ctx, scene, span.inside)
+    motion = MovingMushroom(ctx, scene, span.inside)
     ends = [
         (motion.nu(span.start)[0], span.start, span.start_order),
         (motion.nu(span.end)[0], span.end, span.end_order),
@@ -168,10 +168,12 @@ def _stretch(ctx: Any, scene: Mushroom, span: Span) -> Stretch | None:
     (nu_lower, lower, lower_order), (nu_upper, upper, upper_order) = sorted(ends)
     if nu_upper - nu_lower <= tolerance(ctx):
         return None
-    return Stretch(motion, upper, lower, nu_upper, nu_lower, upper_order, lower_order)
+    return MonotoneStretch(motion, upper, lower, nu_upper, nu_lower, upper_order, lower_order)
 
 
-def _pieces(ctx: Any, capture: list[Stretch], release: list[Stretch]) -> tuple[Piece, ...]:
+def _pieces(
+    ctx: Any, capture: list[MonotoneStretch], release: list[MonotoneStretch]
+) -> tuple[CapturePiece, ...]:
     small = tolerance(ctx)
     values = sorted({nu for s in capture + release for nu in (s.nu_upper, s.nu_lower)}, reverse=True)
     cuts = [values[0]]
@@ -181,9 +183,9 @@ def _pieces(ctx: Any, capture: list[Stretch], release: list[Stretch]) -> tuple[P
     if abs(1 - cuts[0]) <= small:
         cuts[0] = ctx.one
 
-    def over(branch: list[Stretch], nu_upper: Any, nu_lower: Any) -> Stretch:
+    def over(branch: list[MonotoneStretch], nu_upper: Any, nu_lower: Any) -> MonotoneStretch:
         middle = (nu_upper + nu_lower) / 2
         whole = next(s for s in branch if s.nu_lower < middle < s.nu_upper)
         return whole.between(nu_upper, nu_lower, small)
 
-    return tuple(Piece(over(capture, a, b), over(release, a, b)) for a, b in pairwise(cuts))
+    return tuple(CapturePiece(over(capture, a, b), over(release, a, b)) for a, b in pairwise(cuts))

@@ -1,6 +1,5 @@
 """The audit: claims of the paper as data, checked against theory and simulation, a verdict on each.
 
-`ledger.toml` is the ledger, `ledger` reads it; `misprints`, `finite_energy`, `experiments`, `many_cycles`,
-`laws` and `further` hold the checks; `runs` says what is simulated, `samples` does it; `session` conducts
-an audit.
+`ledger.toml` holds the claims and `ledger` reads it; `claims/` checks them, a file for each group; `runs`
+says what is simulated and `samples` simulates it; `session` conducts an audit.
 """

@@ -1,4 +1,4 @@
-"""What an entry may use: samples of the runs it names, steppers, theory."""
+"""What the check of a claim may look at: samples of the simulations it names, steppers and theory."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ DIGITS = 30
 Predict = Callable[[Scene, int], theory.Prediction]
 
 
-class Steppers(NamedTuple):
+class AuditSteppers(NamedTuple):
     """The stepper that the audit simulates with: `fast`, or another with its signatures."""
 
     simulate: Simulate
@@ -32,8 +32,8 @@ def energies_of(name: str) -> Energies:
     return theory.energies(scene_of(RUNS[name]))
 
 
-class Evidence:
-    """What an entry looks at.
+class ClaimEvidence:
+    """What the check of one claim looks at.
 
     Args:
         samples: by run, those that the entry names.
@@ -47,7 +47,7 @@ class Evidence:
     def __init__(
         self,
         samples: Mapping[str, Sample],
-        steppers: Steppers,
+        steppers: AuditSteppers,
         *,
         size: Size = "quick",
         seed: int = 0,

@@ -10,7 +10,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 if TYPE_CHECKING:
-    from conformance.audit.evidence import Evidence
+    from conformance.audit.evidence import ClaimEvidence
 
 Verdict = Literal[
     "confirmed", "misprint", "not reproducible as stated", "inferred", "refuted", "indeterminate"
@@ -65,7 +65,7 @@ class Entry(NamedTuple):
     method: str
     tolerance: str
     expected: Verdict
-    examine: Callable[[Evidence], list[Check]]
+    examine: Callable[[ClaimEvidence], list[Check]]
     runs: tuple[str, ...] = ()
 
 

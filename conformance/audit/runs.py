@@ -11,7 +11,6 @@ import hashlib
 from typing import Literal, NamedTuple
 
 import scene as scenes
-from scene.refusal import BadInput
 from scene.tables import Mushroom, Scene
 
 Size = Literal["quick", "full"]
@@ -19,7 +18,7 @@ EIGHTHS = tuple(k / 8 for k in range(1, 8))
 SIXTEENTHS = tuple(k / 16 for k in range(1, 16))
 
 
-class Run(NamedTuple):
+class Simulation(NamedTuple):
     """One simulation.
 
     Attributes:
@@ -52,58 +51,46 @@ class Run(NamedTuple):
 
 # Scenes that are no part of the catalogue: one parameter moves, the rest stand still (X7).
 SCENES: dict[str, Scene] = {
-    "only-mouth": Mushroom(
-        r=1.0, h=1.0, nu=scenes.Fourier(0.6, 1.0, (0.4,)), slope=0.1111, name="only-mouth"
-    ),
+    "only-mouth": Mushroom(r=1.0, h=1.0, nu=scenes.Fourier(0.6, 1.0, (0.4,)), slope=0.1111, name="only-mouth")
 }
 
 _ALL = (
     # Sec. 4.1 at its size and energy.
-    Run("fixed-cap-anticlockwise", 1e9, 10_000, 100_000, 2_500, phases=EIGHTHS),
-    Run("fixed-cap-clockwise", 1e9, 10_000, 100_000, 2_500, phases=EIGHTHS),
+    Simulation("fixed-cap-anticlockwise", 1e9, 10_000, 100_000, 2_500, phases=EIGHTHS),
+    Simulation("fixed-cap-clockwise", 1e9, 10_000, 100_000, 2_500, phases=EIGHTHS),
     # Sec. 4.2 at its energies; the ladder of energies carries the laws and the limits.
-    Run("moving-cap", 1e3, 20_000, 100_000, 20_000),
-    Run("moving-cap", 1e4, 20_000, 100_000, 20_000, phases=SIXTEENTHS),
-    Run("moving-cap", 1e5, 20_000, 100_000, 10_000, phases=SIXTEENTHS),
-    Run("moving-cap", 1e6, 20_000, 100_000, 5_000, phases=SIXTEENTHS),
-    Run("moving-cap", 1e7, 10_000, 100_000, 5_000, phases=SIXTEENTHS),
-    Run("moving-cap", 1e8, 1_000, 5_000, 1_000, phases=SIXTEENTHS),
-    Run("moving-cap", 1e9, 0, 2_000, 500),
-    Run("moving-cap", 1e10, 0, 1_000, 200),
-    Run("moving-cap", 1e11, 0, 500, 50),
-    Run("moving-cap-reversed", 1e6, 10_000, 50_000, 5_000),
-    Run("moving-cap-trivial", 1e6, 10_000, 50_000, 5_000),
-    Run("only-mouth", 1e6, 5_000, 25_000, 5_000),
-    Run("untilted", 1e6, 10_000, 25_000, 5_000),
-    Run("ergodic", 1e4, 10_000, 25_000, 5_000, phases=EIGHTHS),
-    Run("ergodic", 1e5, 10_000, 25_000, 5_000, phases=EIGHTHS),
-    Run("ergodic", 1e6, 10_000, 25_000, 5_000, phases=EIGHTHS),
-    Run("ergodic", 1e7, 10_000, 25_000, 5_000, phases=EIGHTHS),
-    Run("frozen-mushroom", 1e8, 2_000, 10_000, 1_000),
+    Simulation("moving-cap", 1e3, 20_000, 100_000, 20_000),
+    Simulation("moving-cap", 1e4, 20_000, 100_000, 20_000, phases=SIXTEENTHS),
+    Simulation("moving-cap", 1e5, 20_000, 100_000, 10_000, phases=SIXTEENTHS),
+    Simulation("moving-cap", 1e6, 20_000, 100_000, 5_000, phases=SIXTEENTHS),
+    Simulation("moving-cap", 1e7, 10_000, 100_000, 5_000, phases=SIXTEENTHS),
+    Simulation("moving-cap", 1e8, 1_000, 5_000, 1_000, phases=SIXTEENTHS),
+    Simulation("moving-cap", 1e9, 0, 2_000, 500),
+    Simulation("moving-cap", 1e10, 0, 1_000, 200),
+    Simulation("moving-cap", 1e11, 0, 500, 50),
+    Simulation("moving-cap-reversed", 1e6, 10_000, 50_000, 5_000),
+    Simulation("moving-cap-trivial", 1e6, 10_000, 50_000, 5_000),
+    Simulation("only-mouth", 1e6, 5_000, 25_000, 5_000),
+    Simulation("untilted", 1e6, 10_000, 25_000, 5_000),
+    Simulation("ergodic", 1e4, 10_000, 25_000, 5_000, phases=EIGHTHS),
+    Simulation("ergodic", 1e5, 10_000, 25_000, 5_000, phases=EIGHTHS),
+    Simulation("ergodic", 1e6, 10_000, 25_000, 5_000, phases=EIGHTHS),
+    Simulation("ergodic", 1e7, 10_000, 25_000, 5_000, phases=EIGHTHS),
+    Simulation("frozen-mushroom", 1e8, 2_000, 10_000, 1_000),
     # Many cycles cost most: energies, and with them collisions, grow exponentially.
-    Run("moving-cap", 1e5, 500, 500, 250, n_cycles=30),
-    Run("moving-cap", 1e7, 0, 10_000, 500, n_cycles=10),
-    Run("moving-cap", 1e7, 0, 500, 50, n_cycles=30),
+    Simulation("moving-cap", 1e5, 500, 500, 250, n_cycles=30),
+    Simulation("moving-cap", 1e7, 0, 10_000, 500, n_cycles=10),
+    Simulation("moving-cap", 1e7, 0, 500, 50, n_cycles=30),
 )
-RUNS: dict[str, Run] = {run.name: run for run in _ALL}
+RUNS: dict[str, Simulation] = {run.name: run for run in _ALL}
 
 
-def scene_of(run: Run) -> Scene:
+def scene_of(run: Simulation) -> Scene:
     """Return the run's scene."""
     return SCENES[run.scene] if run.scene in SCENES else scenes.load(run.scene)
 
 
-def block_seed(seed: int, run: Run, number: int) -> int:
+def block_seed(seed: int, run: Simulation, number: int) -> int:
     """Return the seed of a block, 64 bits."""
     text = f"{seed} {run.name} {number}"
     return int.from_bytes(hashlib.sha256(text.encode()).digest()[:8], "big")
-
-
-def check_seed(seed: int) -> None:
-    """Refuse a seed out of bounds.
-
-    Raises:
-        BadInput: naming the bound.
-    """
-    if not 0 <= seed < 2**64:
-        raise BadInput(f"seed = {seed}, must be 0 to 2^64 - 1")

@@ -10,14 +10,16 @@ import hashlib
 import json
 import zipfile
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, BinaryIO, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 import scene as scenes
-from conformance.audit.runs import Run, Size, block_seed, scene_of
+from conformance.audit.runs import Simulation, Size, block_seed, scene_of
+from scene.files import write_file
 
 if TYPE_CHECKING:
     from fast import Ensemble
@@ -50,7 +52,7 @@ class Sample(NamedTuple):
         sha256: of all blocks' results.
     """
 
-    run: Run
+    run: Simulation
     s: FloatArray
     t_in: FloatArray
     t_out: FloatArray
@@ -106,7 +108,7 @@ class Sample(NamedTuple):
 
 def draw(
     simulate: Simulate,
-    run: Run,
+    run: Simulation,
     *,
     size: Size,
     seed: int,
@@ -137,19 +139,20 @@ def draw(
         if block is None:
             block = _follow(simulate, run, n, block_seed(seed, run, number), threads)
             if path:
-                _save(path, key, block)
+                content = {"key": np.array(key), **block}
+                write_file(path, partial(_write_block, content=content))
         blocks.append(block)
         if progress:
             progress(run.name, first + n, total)
     return gathered(run, blocks)
 
 
-def _key(run: Run, n: int, seed: int) -> str:
+def _key(run: Simulation, n: int, seed: int) -> str:
     scene = scenes.to_data(scene_of(run))
     return json.dumps([FORM, scene, run.energy, n, run.n_cycles, run.phases, seed])
 
 
-def _follow(simulate: Simulate, run: Run, n: int, seed: int, threads: int | None) -> Arrays:
+def _follow(simulate: Simulate, run: Simulation, n: int, seed: int, threads: int | None) -> Arrays:
     ensemble = simulate(
         scene_of(run),
         n_particles=n,
@@ -189,7 +192,7 @@ def reduced(ensemble: Ensemble) -> Arrays:
     }
 
 
-def gathered(run: Run, blocks: list[Arrays]) -> Sample:
+def gathered(run: Simulation, blocks: list[Arrays]) -> Sample:
     """Join blocks into a sample."""
 
     def joined(name: str) -> Any:
@@ -216,11 +219,8 @@ def gathered(run: Run, blocks: list[Arrays]) -> Sample:
     )
 
 
-def _save(path: Path, key: str, block: Arrays) -> None:
-    part = path.with_suffix(".part")
-    with part.open("wb") as file:
-        np.savez_compressed(file, key=np.array(key), **block)  # type: ignore[arg-type]
-    part.replace(path)
+def _write_block(file: BinaryIO, content: Arrays) -> None:
+    np.savez_compressed(file, **content)  # type: ignore[arg-type]  # its other argument is no array
 
 
 def _load(path: Path, key: str) -> Arrays | None:

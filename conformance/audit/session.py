@@ -1,8 +1,8 @@
 """One audit: simulate what the entries need, examine each, keep what is finished.
 
-Entries that need no simulation are examined in another process meanwhile. In the results' folder every
-block of particles and every finding is saved when it is done; with `resume` those made with the same
-settings are not made again.
+Entries that need no simulation are examined in another process at the same time. Every block of particles
+and every finding is saved in the results' folder when it is done; `resume` takes up those that were made
+with the same settings.
 """
 
 from __future__ import annotations
@@ -19,13 +19,15 @@ from typing import NamedTuple
 
 import theory
 from conformance.audit import ledger
-from conformance.audit.evidence import Evidence, Predict, Steppers
+from conformance.audit.evidence import AuditSteppers, ClaimEvidence, Predict
 from conformance.audit.finding import Entry, Finding, from_data, to_data, verdict_of
-from conformance.audit.runs import RUNS, Size, check_seed
+from conformance.audit.runs import RUNS, Size
 from conformance.audit.samples import Progress, Sample, draw
+from scene.files import write_file
+from scene.refusal import check_seed
 
 
-class Settings(NamedTuple):
+class AuditSettings(NamedTuple):
     """What an audit is asked for.
 
     Attributes:
@@ -45,7 +47,7 @@ class Settings(NamedTuple):
     apart: bool = False
 
 
-class Result(NamedTuple):
+class AuditResult(NamedTuple):
     """What an audit found.
 
     Attributes:
@@ -56,7 +58,7 @@ class Result(NamedTuple):
         seconds: wall time [s].
     """
 
-    settings: Settings
+    settings: AuditSettings
     entries: tuple[Entry, ...]
     findings: list[Finding]
     samples: dict[str, Sample]
@@ -75,14 +77,14 @@ class Result(NamedTuple):
 
 
 def conduct(
-    steppers: Steppers,
-    settings: Settings,
+    steppers: AuditSteppers,
+    settings: AuditSettings,
     *,
     entries: Sequence[Entry] | None = None,
     predict: Predict = theory.predict,
     progress: Progress | None = None,
     examined: Callable[[Finding], None] | None = None,
-) -> Result:
+) -> AuditResult:
     """Conduct an audit.
 
     Args:
@@ -129,15 +131,19 @@ def conduct(
             if examined:
                 examined(found[entry.id])
     ordered = [found[entry.id] for entry in entries]
-    return Result(settings, tuple(entries), ordered, samples, time.perf_counter() - begin)
+    return AuditResult(settings, tuple(entries), ordered, samples, time.perf_counter() - begin)
 
 
 def examine(
-    entry: Entry, samples: dict[str, Sample], steppers: Steppers, settings: Settings, predict: Predict
+    entry: Entry,
+    samples: dict[str, Sample],
+    steppers: AuditSteppers,
+    settings: AuditSettings,
+    predict: Predict,
 ) -> Finding:
     """Make an entry's checks; with particles lost it cannot be better than open."""
     begin = time.perf_counter()
-    evidence = Evidence(
+    evidence = ClaimEvidence(
         samples, steppers, size=settings.size, seed=settings.seed, threads=settings.threads, predict=predict
     )
     checks = entry.examine(evidence)
@@ -147,15 +153,15 @@ def examine(
     return Finding(entry.id, verdict, checks, time.perf_counter() - begin)
 
 
-def _examine_apart(entry_id: str, settings: Settings) -> Finding:
+def _examine_apart(entry_id: str, settings: AuditSettings) -> Finding:
     import fast
 
     entry = ledger.select(entry_id)[0]
-    return examine(entry, {}, Steppers(fast.simulate, fast.trajectory), settings, cache(theory.predict))
+    return examine(entry, {}, AuditSteppers(fast.simulate, fast.trajectory), settings, cache(theory.predict))
 
 
 @contextmanager
-def _elsewhere(settings: Settings, entries: list[Entry]) -> Iterator[dict[str, Future[Finding]]]:
+def _elsewhere(settings: AuditSettings, entries: list[Entry]) -> Iterator[dict[str, Future[Finding]]]:
     if not (settings.apart and entries):
         yield {}
         return
@@ -166,14 +172,14 @@ def _elsewhere(settings: Settings, entries: list[Entry]) -> Iterator[dict[str, F
         pool.shutdown(cancel_futures=True)
 
 
-def _key(entry: Entry, settings: Settings) -> str:
+def _key(entry: Entry, settings: AuditSettings) -> str:
     runs = [(run, RUNS[run].n_particles(settings.size), RUNS[run].block) for run in entry.runs]
     return json.dumps(
         [entry.id, entry.statement, entry.method, entry.tolerance, settings.size, settings.seed, runs]
     )
 
 
-def _load(entry: Entry, settings: Settings) -> Finding | None:
+def _load(entry: Entry, settings: AuditSettings) -> Finding | None:
     if not (settings.folder and settings.resume):
         return None
     try:
@@ -183,10 +189,8 @@ def _load(entry: Entry, settings: Settings) -> Finding | None:
         return None
 
 
-def _save(finding: Finding, settings: Settings) -> None:
+def _save(finding: Finding, settings: AuditSettings) -> None:
     if settings.folder:
         entry = ledger.select(finding.id)[0]
-        path = settings.folder / f"{finding.id}.json"
-        part = path.with_suffix(".part")
-        part.write_text(json.dumps({"key": _key(entry, settings), "finding": to_data(finding)}), "utf-8")
-        part.replace(path)
+        content = json.dumps({"key": _key(entry, settings), "finding": to_data(finding)})
+        write_file(settings.folder / f"{finding.id}.json", content)

@@ -2,8 +2,8 @@
 
 An audit makes fewer than MAX_TESTS comparisons with random data. Each is allowed to fail a true claim
 with probability LEVEL; so a whole audit raises a false alarm with probability below FAMILY_LEVEL
-(Bonferroni's bound: no independence is assumed). Errors are taken as normal, which means over thousands of
-particles are; shares of particles are judged by the same rule with at least a few dozen on either side.
+(Bonferroni's bound: no independence is assumed). Errors are taken to be normal: means over thousands of
+particles are, and so are shares when a few dozen particles or more lie on either side.
 """
 
 from __future__ import annotations
@@ -33,6 +33,15 @@ class Mean(NamedTuple):
 
     value: float
     error: float
+
+    def less(self, amount: float) -> Mean:
+        """Return the value less a known amount."""
+        return Mean(self.value - amount, self.error)
+
+    def over(self, other: Mean) -> Mean:
+        """Return the ratio to an independent value, its error to first order."""
+        ratio = self.value / other.value
+        return Mean(ratio, ratio * float(np.hypot(self.error / self.value, other.error / other.value)))
 
 
 def mean(values: npt.ArrayLike) -> Mean:

@@ -17,9 +17,9 @@ import numpy.typing as npt
 
 from conformance.bench.record import Growth, short
 from conformance.bench.workloads import RULES, Prover, draw_workload
-from conformance.generator.draws import Moment
 from conformance.grading.error import U
 from scene import Collision, Scene, State
+from scene.geometry import rounded
 
 FloatArray = npt.NDArray[np.float64]
 WORKLOAD, ENERGY = "moving-cap-1e4", 1e4
@@ -86,7 +86,7 @@ def grow(
 
 
 def _sizes(scene: Scene, state: State) -> tuple[float, float]:
-    return Moment(scene, state.t).r, math.hypot(state.vx, state.vy)
+    return rounded(scene, state.t).r, math.hypot(state.vx, state.vy)
 
 
 def _errors(path: Sequence[Place], truth: Sequence[Place], size: float) -> FloatArray:

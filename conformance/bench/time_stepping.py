@@ -16,8 +16,9 @@ from mpmath import fp
 from scipy.integrate import solve_ivp
 
 from scene import Cap, Collision, Horizon, Mushroom, Outcome, Scene, State, Stem, Undecided, Wall
+from scene.geometry import half_width, table_at
 from scene.laws import value
-from scene.tables import laws, width_factors
+from scene.tables import laws
 
 TOLERANCES = (1e-3, 1e-6, 1e-9, 1e-12)
 FloatArray = npt.NDArray[np.float64]
@@ -41,7 +42,7 @@ def next_collision_by(rtol: float) -> Callable[[Scene, State, float], Outcome]:
                 return Undecided(str(found.message))
             wall = next(name for name, times in zip(gaps, found.t_events, strict=True) if len(times))
             t, q = float(found.t[-1]), found.y[:, -1]
-            is_open = isinstance(scene, Mushroom) and abs(q[0]) < _half_width(scene, t)
+            is_open = isinstance(scene, Mushroom) and abs(q[0]) < half_width(fp, scene, t)
             if wall == "mouth" or (wall == "base" and is_open):
                 part = "stem" if part == "cap" else "cap"
                 q[1] = 0.0
@@ -83,39 +84,22 @@ def _gaps(scene: Scene, part: str) -> dict[Any, Gap]:
     slope = law["slope"]
     top = "mouth" if isinstance(scene, Mushroom) else "base"
     return {
-        "left": lambda t, q: _half_width(scene, t) + slope(t) * q[1] + q[0],
-        "right": lambda t, q: _half_width(scene, t) + slope(t) * q[1] - q[0],
+        "left": lambda t, q: half_width(fp, scene, t) + slope(t) * q[1] + q[0],
+        "right": lambda t, q: half_width(fp, scene, t) + slope(t) * q[1] - q[0],
         "floor": lambda t, q: float(q[1]) + law["h"](t),
         top: lambda _, q: -float(q[1]),
     }
 
 
-def _law(scene: Scene, name: str, order: int = 0) -> Callable[[float], float]:
+def _law(scene: Scene, name: str) -> Callable[[float], float]:
     of = laws(scene)[name]
-    return lambda t: float(value(fp, of, t, order))
-
-
-def _half_width(scene: Scene, t: float, order: int = 0) -> float:
-    """Return w or, for order 1, w'."""
-    assert not isinstance(scene, Cap)
-    w, rate = 1.0, 0.0
-    for factor in width_factors(scene):
-        f, df = float(value(fp, factor, t)), float(value(fp, factor, t, 1))
-        w, rate = w * f, rate * f + w * df
-    return rate if order else w
+    return lambda t: float(value(fp, of, t))
 
 
 def _bounce(scene: Scene, wall: Wall, t: float, q: FloatArray) -> tuple[float, float]:
-    """Reflect: v - 2 f' grad f / |grad f|^2."""
+    """Reflect: v - 2 (v.n - u) n, with u = -receding the wall's velocity along its inward normal n."""
     x, y, vx, vy = map(float, q)
-    if wall == "arc":
-        f_x, f_y, f_t = -2 * x, -2 * y, 2 * _law(scene, "r")(t) * _law(scene, "r", 1)(t)
-    elif wall == "floor":
-        f_x, f_y, f_t = 0.0, 1.0, _law(scene, "h", 1)(t)
-    elif wall == "base":
-        f_x, f_y, f_t = 0.0, 1.0, 0.0
-    else:
-        f_x, f_y = (1.0 if wall == "left" else -1.0), _law(scene, "slope")(t)
-        f_t = _half_width(scene, t, 1) + _law(scene, "slope", 1)(t) * y
-    factor = 2 * (f_t + vx * f_x + vy * f_y) / (f_x**2 + f_y**2)
-    return vx - factor * f_x, vy - factor * f_y
+    table = table_at(fp, scene, t)
+    n_x, n_y = table.normal(wall, x, y)
+    push = 2 * (vx * n_x + vy * n_y + table.receding(wall, y))
+    return vx - push * n_x, vy - push * n_y

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import argparse
 import hashlib
-import os
 import sys
 from collections import Counter, defaultdict
 from collections.abc import Callable, Mapping, Sequence
@@ -21,6 +20,7 @@ import msgspec
 
 from conformance.vectors import MANIFEST, File, Manifest, Vector, digest, encode, load
 from scene import BadInput
+from scene.files import write_file
 
 try:
     from conformance.generator.certify import Unfit, certify
@@ -82,20 +82,14 @@ def write(folder: Path, files: Mapping[str, list[Vector]]) -> Manifest:
     entries = {}
     for name, vectors in sorted(files.items()):
         data = encode(vectors)
-        _replace(folder / name, data)
+        write_file(folder / name, data)
         entries[name] = File(hashlib.sha256(data).hexdigest(), len(vectors))
     manifest = Manifest(VERSION, digest(entries, RETIRED), entries, RETIRED)
-    _replace(folder / MANIFEST, msgspec.json.format(msgspec.json.encode(manifest)) + b"\n")
+    write_file(folder / MANIFEST, msgspec.json.format(msgspec.json.encode(manifest)) + b"\n")
     for stale in sorted(folder.glob("*.jsonl")):
         if stale.name not in entries:
             stale.unlink()
     return manifest
-
-
-def _replace(path: Path, data: bytes) -> None:
-    neighbour = path.with_name(f".{path.name}.{os.getpid()}")
-    neighbour.write_bytes(data)
-    os.replace(neighbour, path)
 
 
 def _file_name(group: str) -> str:

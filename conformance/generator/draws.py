@@ -15,11 +15,11 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple, TypeVar
 
 import msgspec
-from mpmath import MPContext
 
 from scene import BangBang, Cap, Fourier, Law, Mushroom, Scene, State, Stem, Wall, to_data
-from scene.laws import bounds, breakpoints, value
-from scene.tables import laws, period, width_factors
+from scene.geometry import TableAt, rounded
+from scene.laws import bounds, breakpoints
+from scene.tables import cycle_length, laws
 
 T = TypeVar("T")
 
@@ -117,63 +117,16 @@ def _slope(draw: Draw, narrowest: float, deepest: float, shared: Clock) -> Law:
     return draw.short(-0.8, -0.01) if kind == "negative" else 0.0
 
 
-class Moment:
-    """The table at one instant: each length and its rate, to 50 digits and then rounded."""
-
-    def __init__(self, scene: Scene, t: float) -> None:
-        ctx = MPContext()
-        ctx.dps = 50
-        self.scene = scene
-        found = {name: (value(ctx, law, t), value(ctx, law, t, 1)) for name, law in laws(scene).items()}
-        if not isinstance(scene, Cap):
-            w, rate = ctx.mpf(1), ctx.mpf(0)
-            for factor in width_factors(scene):
-                f, df = value(ctx, factor, t), value(ctx, factor, t, 1)
-                w, rate = w * f, rate * f + w * df
-            found["w"] = (w, rate)
-        numbers = {name: tuple(map(float, pair)) for name, pair in found.items()}
-        self.r, self.r_rate = numbers.get("r", (0.0, 0.0))
-        self.w, self.w_rate = numbers.get("w", (0.0, 0.0))
-        self.h, self.h_rate = numbers.get("h", (0.0, 0.0))
-        self.slope, self.slope_rate = numbers.get("slope", (0.0, 0.0))
-        self.size = 2 * self.r + 2 * self.w + self.h
-
-    def place(self, draw: Draw, site: str) -> tuple[float, float]:
-        """Draw a place in the cap, the stem or the mouth, or on a wall."""
-        if site in ("cap", "arc"):
-            c, s = draw.direction()
-            rho = self.r if site == "arc" else self.r * math.sqrt(draw.part())
-            return rho * c, rho * abs(s)
-        side = draw.between(-1.0, 1.0)
-        if site == "mouth" or (site == "base" and isinstance(self.scene, Stem)):
-            return self.w * side, 0.0
-        if site == "base":
-            return draw.pick((1.0, -1.0)) * draw.between(self.w, self.r), 0.0
-        if site == "floor":
-            return side * (self.w - self.slope * self.h), -self.h
-        y = -self.h * draw.part()
-        half_width = self.w + self.slope * y
-        return half_width * {"left": -1.0, "right": 1.0}.get(site, side), y
-
-    def normal(self, wall: Wall, x: float, y: float) -> tuple[float, float, float]:
-        """Return a wall's inward unit normal at a point, and the speed at which it recedes there."""
-        if wall == "arc":
-            distance = math.sqrt(x * x + y * y)
-            return -x / distance, -y / distance, self.r_rate
-        if wall == "base":
-            return 0.0, (-1.0 if isinstance(self.scene, Stem) else 1.0), 0.0
-        if wall == "floor":
-            return 0.0, 1.0, self.h_rate
-        length = math.sqrt(1 + self.slope * self.slope)
-        receding = (self.w_rate + self.slope_rate * y) / length
-        return (1.0 if wall == "left" else -1.0) / length, self.slope / length, receding
-
-    def corners(self, site: str) -> list[tuple[float, float]]:
-        """List where two walls of the cap or of the stem meet, and the mouth's edges."""
-        half = [(self.w - self.slope * self.h, -self.h)] if site == "stem" else [(self.r, 0.0)]
-        if not isinstance(self.scene, Cap):
-            half.append((self.w, 0.0))
-        return [(side * x, y) for x, y in half for side in (1.0, -1.0)]
+def place(draw: Draw, at: TableAt, site: str) -> tuple[float, float]:
+    """Draw a place in the cap, the stem or the mouth, or on a wall."""
+    if site in ("cap", "arc"):
+        c, s = draw.direction()
+        rho = at.r if site == "arc" else at.r * math.sqrt(draw.part())
+        return rho * c, rho * abs(s)
+    side = draw.between(-1.0, 1.0)
+    if site == "base" and not isinstance(at.scene, Stem):
+        return draw.pick((1.0, -1.0)) * draw.between(at.w, at.r), 0.0
+    return at.stem_point(site, side, 0.0 if site in ("mouth", "base", "floor") else draw.part())
 
 
 def wire_form(of: Scene) -> dict[str, Any]:
@@ -202,8 +155,7 @@ def walls_speed(scene: Scene) -> float:
 
 def time(draw: Draw, scene: Scene, turns: int = 3) -> float:
     """Draw a time within some periods; now and then on a knot."""
-    shared = period(scene)
-    length = 1.0 if shared is None else float(shared.value(MPContext()))
+    length = cycle_length(scene) or 1.0
     knots = [float(t) for law in laws(scene).values() for t in breakpoints(law)]
     if knots and draw.pick(range(5)) == 0:
         return length * draw.pick(range(turns)) + draw.pick(knots)
@@ -211,7 +163,7 @@ def time(draw: Draw, scene: Scene, turns: int = 3) -> float:
 
 
 def sites(scene: Scene) -> list[str]:
-    """List where a particle may start: regions by the names that `Moment.place` knows, and walls."""
+    """List where a particle may start: regions by the names that `place` knows, and walls."""
     regions = {Cap: ["cap"], Stem: ["stem"], Mushroom: ["cap", "stem", "mouth"]}[type(scene)]
     return [*regions, *regions, *scene.walls]
 
@@ -227,18 +179,18 @@ def state(draw: Draw, scene: Scene, at: dict[str, Any]) -> tuple[State, float]:
             to the wall), `patience` (flight time allowed, in crossings of the table).
     """
     t = at["t"] if "t" in at else time(draw, scene)
-    moment = Moment(scene, t)
+    table = rounded(scene, t)
     site = at["site"] if "site" in at else draw.pick(sites(scene))
-    x, y = moment.place(draw, site)
+    x, y = place(draw, table, site)
     factor = at["speed"] if "speed" in at else draw.power(-2, 12) * draw.between(1.0, 2.0)
-    speed = factor * (walls_speed(scene) or moment.size)
+    speed = factor * (walls_speed(scene) or table.size)
     vx, vy = (speed * c for c in draw.direction())
     wall: Wall | None = next((name for name in scene.walls if name == site), None)
     if wall is not None:
-        nx, ny, receding = moment.normal(wall, x, y)
+        nx, ny = table.normal(wall, x, y)
         lift = at.get("lift") or draw.part()
         along = draw.pick((1.0, -1.0)) * speed
-        away = lift * speed - receding
+        away = lift * speed - table.receding(wall, y)
         vx, vy = away * nx - along * ny, away * ny + along * nx
-    t_end = t + at.get("patience", 64.0) * moment.size / speed
+    t_end = t + at.get("patience", 64.0) * table.size / speed
     return State(t, x, y, vx, vy, wall), t_end

@@ -12,8 +12,9 @@ from typing import NamedTuple
 import msgspec
 
 from conformance.generator.certify import Question
-from conformance.generator.draws import Clock, Draw, Moment, clock, scene, state, time, wire_form
+from conformance.generator.draws import Clock, Draw, clock, place, scene, state, time, wire_form
 from scene import Scene, State, from_data, load, to_data
+from scene.geometry import rounded
 
 Ask = Callable[[Draw], Question]
 MOVING = ("moving-cap", "moving-cap-reversed", "moving-cap-trivial", "ergodic", "untilted")
@@ -156,7 +157,7 @@ def _skipping(draw: Draw) -> Question:
 def _grazing(draw: Draw) -> Question:
     of = scene(draw, draw.pick(("cap", "mushroom")), clock(draw))
     t = time(draw, of)
-    r, (c, s) = Moment(of, t).r, draw.direction()
+    r, (c, s) = rounded(of, t).r, draw.direction()
     rho = r * (1 - draw.power(-50, -6))
     speed, turn = draw.power(0, 10), draw.pick((1.0, -1.0))
     start = State(t, rho * c, rho * abs(s), -turn * speed * abs(s), turn * speed * c)
@@ -167,11 +168,11 @@ def _grazing(draw: Draw) -> Question:
 def _near_corner(draw: Draw) -> Question:
     of = scene(draw, draw.pick(("cap", "stem", "mushroom")), clock(draw))
     t = time(draw, of)
-    now, speed = Moment(of, t), draw.power(0, 8)
+    now, speed = rounded(of, t), draw.power(0, 8)
     site = draw.pick(_regions(of))
-    x, y = now.place(draw, site)
+    x, y = place(draw, now, site)
     flight = now.size / speed * draw.between(0.25, 1.0)
-    there = Moment(of, t + flight)
+    there = rounded(of, t + flight)
     corner = draw.pick(there.corners(site))
     off = there.size * draw.power(-50, -8)
     c, s = draw.direction()
@@ -191,10 +192,10 @@ def _through_mouth(draw: Draw) -> Question:
     else:
         of = scene(draw, "mushroom", clock(draw))
     t = time(draw, of)
-    now, speed = Moment(of, t), draw.power(0, 7)
-    x, y = now.place(draw, draw.pick(("cap", "stem")))
+    now, speed = rounded(of, t), draw.power(0, 7)
+    x, y = place(draw, now, draw.pick(("cap", "stem")))
     flight = now.size / speed * draw.between(0.25, 1.0)
-    aim = draw.between(-1.2, 1.2) * Moment(of, t + flight).w
+    aim = draw.between(-1.2, 1.2) * rounded(of, t + flight).w
     start = State(t, x, y, (aim - x) / flight, -y / flight)
     rule = "the width of the mouth when it is reached decides"
     return _question("through-mouth", rule, "sec. 2; hard cases 24, 26", of, (start, t + 8 * flight))
@@ -247,7 +248,7 @@ def _scales(draw: Draw) -> Question:
 def _outside(draw: Draw) -> Question:
     of = scene(draw, draw.pick(("cap", "stem", "mushroom")), clock(draw))
     start, t_end = state(draw, of, {"site": draw.pick(_regions(of))})
-    far = draw.pick((1.5, 4.0, 1e6)) * Moment(of, start.t).size
+    far = draw.pick((1.5, 4.0, 1e6)) * rounded(of, start.t).size
     c, s = draw.direction()
     out = msgspec.structs.replace(start, x=start.x + far * c, y=start.y + far * s)
     return _question("refused-state", "a state outside the table", "hard case 45", of, (out, t_end))

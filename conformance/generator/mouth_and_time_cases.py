@@ -18,6 +18,7 @@ from conformance.generator.grazing_and_stem_cases import (
 )
 from scene import BangBang, Fourier, Mushroom, Scene, State, load
 from scene.tables import laws
+from scene.transforms import backwards
 
 # The mouth: w = 1/2 - t^2 / 2 until t = 1/2, then 1/4 + (t - 1)^2 / 2 until t = 3/2.
 CLOSING = Mushroom(r=1.0, h=1.0, w=BangBang(knots=((0.0, 0.5), (1.0, 0.25), (2.0, 0.5))))
@@ -141,7 +142,10 @@ def symmetries() -> Iterator[Question]:
         yield case(43, "signs of zero do not matter", STATIC, start, 9.0)
     for name in ("moving-cap", "fixed-cap-clockwise"):
         of = load(name)
-        films: tuple[tuple[Scene | dict[str, Any], float], ...] = ((of, 0.125), (_backwards(of), -0.625))
+        films: tuple[tuple[Scene | dict[str, Any], float], ...] = (
+            (of, 0.125),
+            (wire_form(backwards(of)), -0.625),
+        )
         for scene, t in films:
             start = State(t, 0.1, 0.3, 10.0, 7.0)
             yield case(47, "a film run forwards, and its laws run backwards", scene, start, t + 0.5, 99)
@@ -196,14 +200,3 @@ def _still(of: Scene) -> dict[str, Any]:
     flat = {"kind": "fourier", "omega": 1.0, "sin": [0.0, 0.0], "cos": [0.0]}
     found = {name: {**flat, "mean": law} for name, law in laws(of).items()}
     return {**wire_form(of), **found}
-
-
-def _backwards(of: Scene) -> dict[str, Any]:
-    """Return the scene as it is when time runs the other way."""
-    found: dict[str, Any] = wire_form(of)
-    for name, law in laws(of).items():
-        if isinstance(law, Fourier):
-            found[name]["sin"] = [-a for a in law.sin]
-        elif isinstance(law, BangBang):
-            found[name]["knots"] = [[-t, v] for t, v in reversed(law.knots)]
-    return found

@@ -10,7 +10,6 @@ Not handled: trajectories and steps are graded alike; what a mutant does in `flo
 from __future__ import annotations
 
 import json
-import os
 import sys
 from collections import Counter
 from collections.abc import Callable, Sequence
@@ -24,6 +23,7 @@ from conformance.mutants import MUTANTS, Mutant
 from conformance.plain.step import Flight
 from conformance.vectors import LEVELS, Vector, answer, load, manifest
 from scene import BadInput
+from scene.files import write_file
 
 DOCS = Path(__file__).parent.parent.parent / "docs"
 N_WITNESSES = 3
@@ -114,13 +114,6 @@ def table(found: dict[str, Any]) -> str:
     return "\n".join(lines) + "\n"
 
 
-def write(path: Path, text: str) -> None:
-    """Write a file whole or not at all."""
-    neighbour = path.with_name(path.name + ".part")
-    neighbour.write_text(text, "utf-8")
-    os.replace(neighbour, path)
-
-
 def run(docs: Path = DOCS, progress: Callable[[str], None] = print) -> int:
     """Compute and write the matrix.
 
@@ -141,8 +134,8 @@ def run(docs: Path = DOCS, progress: Callable[[str], None] = print) -> int:
         **matrix(vectors, found),
     }
     docs.mkdir(parents=True, exist_ok=True)
-    write(docs / "kill-matrix.json", json.dumps(published, indent=1) + "\n")
-    write(docs / "kill-matrix.md", table(published))
+    write_file(docs / "kill-matrix.json", json.dumps(published, indent=1) + "\n")
+    write_file(docs / "kill-matrix.md", table(published))
     progress(
         f"survivors: {', '.join(published['survivors']) or 'none'}; plain fails: {', '.join(wrong) or 'none'}"
     )

@@ -18,7 +18,6 @@ from typing import NamedTuple
 
 import msgspec
 import numpy as np
-from mpmath import fp
 
 import theory
 from conformance import profiles, properties
@@ -27,7 +26,8 @@ from conformance.suite.process import Trouble
 from conformance.suite.session import Session, missing
 from conformance.vectors import Vector
 from scene import Fourier, Horizon, Mushroom, Outcome, Scene, State, from_data, load, to_data
-from scene.tables import period
+from scene.geometry import area
+from scene.tables import cycle_length
 
 NEEDS_FOURIER = ("static-limit",)  # asks for constants written as laws
 N_QUESTIONS = 24  # per property, spread evenly over the steps of level core
@@ -153,14 +153,12 @@ def _judged(findings: Sequence[Finding]) -> str:
 
 
 def _affordable(session: Session, scene: Mushroom) -> Size:
-    span = period(scene)
-    assert span is not None
     states = profiles.microcanonical_states(scene, BATCH, SIZES[0].energy, np.random.default_rng(0))
     begin = 0.0
     try:
         for _ in range(2):  # the first may compile
             begin = time.monotonic()
-            _flow(session)(scene, states, float(span.value(fp)) / 16)
+            _flow(session)(scene, states, cycle_length(scene) / 16)
     except Trouble:
         return SIZES[-1]  # the profiles themselves will meet it again and say so
     # All profiles together follow every particle for some three cycles.
@@ -170,9 +168,7 @@ def _affordable(session: Session, scene: Mushroom) -> Size:
 
 def _one_cycle(session: Session, scene: Mushroom, size: Size) -> list[Finding]:
     prediction = theory.predict(scene, 10)
-    span = period(scene)
-    assert span is not None
-    areas = [profiles.area(scene, float(span.value(fp)) * k / 64) for k in range(64)]
+    areas = [area(scene, cycle_length(scene) * k / 64) for k in range(64)]
     return profiles.one_cycle(
         _flow(session),
         scene,

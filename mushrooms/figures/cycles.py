@@ -14,6 +14,7 @@ import theory
 from conformance.audit.claims import broadened
 from conformance.audit.claims.finite_energy import width
 from conformance.audit.claims.many_cycles import blur_of_sum
+from conformance.audit.claims.misprints import volume_loop
 from conformance.audit.evidence import energies_of
 from conformance.audit.runs import scene_of
 from conformance.audit.samples import Sample
@@ -21,7 +22,7 @@ from conformance.audit.tolerances import mean, spread
 from mushrooms.figures.style import BLACK, BLUE, GREEN, ORANGE, SKY, FloatArray, new_figure, phase_colours
 from scene import Scene, load
 from scene.laws import value
-from scene.tables import Mushroom, period
+from scene.tables import Mushroom
 
 N_BINS = 80
 N_LOOP = 240
@@ -48,12 +49,8 @@ def loops() -> Figure:
 
 
 def _volume_loop(scene: Scene) -> tuple[FloatArray, FloatArray]:
-    shared = period(scene)
-    assert shared is not None
-    span = float(shared.value(fp))
-    volumes = [theory.volumes_at(fp, scene, span * k / N_LOOP) for k in range(N_LOOP + 1)]
-    x = np.array([v.v_ell / v.v_cap for v in volumes])
-    return x, np.array([v.v_cap / (v.v_cap + v.v_stem) for v in volumes])
+    x, y = volume_loop(scene, N_LOOP)
+    return np.array([*x, x[0]]), np.array([*y, y[0]])
 
 
 def _loop(axes: Axes, x: FloatArray, y: FloatArray) -> None:

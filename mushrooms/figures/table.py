@@ -15,9 +15,9 @@ from matplotlib.figure import Figure
 from mpmath import fp
 
 from mushrooms.figures import style as plots
-from scene import Cap, Collision, Mushroom, Scene, State, Stem
-from scene.laws import value
-from scene.tables import period, width_factors
+from scene import Collision, Scene, State
+from scene.geometry import table_at
+from scene.tables import cycle_length
 
 SUFFIXES = (".svg", ".png", ".gif")
 N_PHASES = 6
@@ -28,32 +28,13 @@ FRAMES_PER_SECOND = 12
 
 def walls(scene: Scene, t: float) -> list[np.ndarray]:
     """Return the walls at time t as polylines of shape (2, n) [length]; the mouth is left open."""
-    lines = []
-    factors = () if isinstance(scene, Cap) else width_factors(scene)
-    w = float(np.prod([value(fp, law, t) for law in factors])) if factors else 0.0
-    if isinstance(scene, (Cap, Mushroom)):
-        r = float(value(fp, scene.r, t))
-        angle = np.linspace(0, np.pi, 181)
-        lines.append(np.array([np.r_[w, r * np.cos(angle), -w], np.r_[0, r * np.sin(angle), 0]]))
-    if isinstance(scene, (Stem, Mushroom)):
-        h = float(value(fp, scene.h, t))
-        foot = w - h * float(value(fp, scene.slope, t))
-        lines.append(np.array([[-w, -foot, foot, w], [0, -h, -h, 0]]))
-    if isinstance(scene, Stem):
-        lines.append(np.array([[-w, w], [0, 0]]))
-    return lines
+    return [np.transpose(line) for line in table_at(fp, scene, t).outline()]
 
 
 def phases(scene: Scene, n: int = N_PHASES) -> list[float]:
     """Return n times [time] evenly over one cycle; a static table has the single time 0."""
-    span = cycle(scene)
+    span = cycle_length(scene)
     return [span * k / n for k in range(n)] if span else [0.0]
-
-
-def cycle(scene: Scene) -> float:
-    """Return the period [time], 0 for a static table."""
-    shared = period(scene)
-    return float(shared.value(fp)) if shared else 0.0
 
 
 def chords(scene: Scene, t: float, n: int = N_CHORDS) -> np.ndarray:
@@ -131,7 +112,7 @@ def write_picture(scene: Scene, suffix: str, file: BinaryIO) -> None:
 @rc_context(plots.STYLE)
 def _write_animation(scene: Scene, file: BinaryIO) -> None:
     times = phases(scene, N_FRAMES)
-    span = cycle(scene)
+    span = cycle_length(scene)
     figure, axes = plots.new_figure(4.8, 4.8)
     _set_frame(axes, scene)
     lines = [axes.plot(*line, color=plots.BLUE, linewidth=2)[0] for line in walls(scene, 0.0)]

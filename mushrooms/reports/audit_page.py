@@ -5,14 +5,11 @@
 
 from __future__ import annotations
 
-import base64
 import json
 import os
 import platform
-from importlib import resources
 from typing import Any, TypedDict
 
-import jinja2
 import msgspec
 import numba
 import numpy as np
@@ -21,11 +18,12 @@ import scene as scenes
 from conformance.audit.finding import Check, Entry, Finding
 from conformance.audit.runs import scene_of
 from conformance.audit.samples import Sample
-from conformance.audit.session import Result
+from conformance.audit.session import AuditResult
 from conformance.audit.tolerances import FAMILY_LEVEL, LEVEL, N_SIGMA, mean, spread
 from mushrooms import __version__
 from mushrooms.figures import by_claim
 from mushrooms.figures import style as plots
+from mushrooms.reports.page import embed, render
 
 GROUPS = {
     "M": "Misprints and gaps",
@@ -124,7 +122,7 @@ def machine() -> dict[str, str | int]:
     }
 
 
-def to_data(result: Result) -> ReportData:
+def to_data(result: AuditResult) -> ReportData:
     """Return the content of report.json."""
     pairs = zip(result.entries, result.findings, strict=True)
     return {
@@ -214,22 +212,24 @@ def to_json(data: ReportData) -> str:
 
 def to_html(data: ReportData, samples: by_claim.Samples) -> str:
     """Return report.html's text: no scripts, images embedded, nothing loaded from elsewhere."""
-    environment = jinja2.Environment(
-        autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True
-    )
-    environment.filters |= {"figures": figures_text, "count": lambda n: f"{n:,}"}
-    text = (resources.files("mushrooms.reports") / "audit.html.jinja").read_text("utf-8")
     figures: dict[str, list[dict[str, str]]] = {}
     for picture, figure in by_claim.drawn([finding["id"] for finding in data["findings"]], samples):
         wide = f"{figure.get_figwidth() * PIXELS_PER_INCH:.0f}px"
-        image = {"source": _embed(plots.svg(figure)), "caption": picture.caption, "width": wide}
+        image = {"source": embed(plots.svg(figure)), "caption": picture.caption, "width": wide}
         figures.setdefault(picture.entry, []).append(image)
     groups = [
         (title, [finding for finding in data["findings"] if finding["id"][0] == letter])
         for letter, title in GROUPS.items()
     ]
     tables = {run["name"].partition("@")[0]: run["scene"] for run in data["runs"]}
-    return environment.from_string(text).render(report=data, groups=groups, images=figures, scenes=tables)
+    return render(
+        "audit.html.jinja",
+        report=data,
+        groups=groups,
+        images=figures,
+        scenes=tables,
+        figures_text=figures_text,
+    )
 
 
 def figures_text(check: CheckData) -> str:
@@ -242,10 +242,6 @@ def figures_text(check: CheckData) -> str:
     if digits > 7:
         return f"{check['value']:.3g} ± {check['error']:.2g}"
     return f"{check['value']:.{digits}f} ± {check['error']:.{digits}f}"
-
-
-def _embed(svg: bytes) -> str:
-    return "data:image/svg+xml;base64," + base64.b64encode(svg).decode("ascii")
 
 
 def to_text(data: ReportData) -> str:

@@ -2,33 +2,25 @@
 
 from __future__ import annotations
 
-import base64
 import math
 import statistics
 from collections.abc import Sequence
-from importlib import resources
 from typing import Any
-
-import jinja2
 
 from conformance.bench.hard_cases import cell
 from conformance.bench.record import Point, Record
-from mushrooms import __version__
 from mushrooms.figures import speed as figures_of_speed
+from mushrooms.reports.page import embed, render
 
 
 def to_html(record: Record) -> bytes:
     """Return the page."""
-    environment = jinja2.Environment(
-        autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True
-    )
-    text = (resources.files("mushrooms.reports") / "bench.html.jinja").read_text("utf-8")
-    page = environment.from_string(text).render(
+    page = render(
+        "bench.html.jinja",
         record=record,
-        version=__version__,
-        speed=_embed(figures_of_speed.speed(record)),
-        growth=_embed(figures_of_speed.growth(record.growth)),
-        work=_embed(figures_of_speed.work(record.work.series)),
+        speed=embed(figures_of_speed.speed(record)),
+        growth=embed(figures_of_speed.growth(record.growth)),
+        work=embed(figures_of_speed.work(record.work.series)),
         rows=[_row(p) for p in record.points],
         steppers=list(record.hard_cases[0].verdicts),
         cell=cell,
@@ -54,7 +46,3 @@ def middle_and_worst(errors: Sequence[float | None], form: str) -> tuple[str, st
         return "–", "–"
     numbers = [math.inf if e is None else e for e in errors]
     return f"{statistics.median(numbers):{form}}", f"{max(numbers):{form}}"
-
-
-def _embed(svg: bytes) -> str:
-    return "data:image/svg+xml;base64," + base64.b64encode(svg).decode("ascii")

@@ -6,13 +6,10 @@ one, the errors by precision class, and the implementation's point in the plane 
 
 from __future__ import annotations
 
-import base64
 import math
 from collections.abc import Sequence
-from importlib import resources
 from typing import Any
 
-import jinja2
 import numpy as np
 from matplotlib import rc_context
 
@@ -21,9 +18,9 @@ from conformance.grading.grade import FAIR, SHARP
 from conformance.suite import reports
 from conformance.suite.run import Result, Run
 from conformance.vectors import Certified, Vector
-from mushrooms import __version__
 from mushrooms.figures import style as plots
 from mushrooms.figures import table as draw
+from mushrooms.reports.page import embed, render
 from scene import BadInput, Scene, from_data
 
 N_FAILED, N_SHARPEST = 8, 4  # cases drawn: those that failed, or else the least precise that passed
@@ -33,24 +30,20 @@ EXACT = 1e-2  # ulps at which answers with no error at all are drawn
 
 def to_html(run: Run) -> bytes:
     """Return the page."""
-    environment = jinja2.Environment(
-        autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True
-    )
-    text = (resources.files("mushrooms.reports") / "check.html.jinja").read_text("utf-8")
     report = reports.new_report(run)
     seen = [verdict for verdict in report.total.counts if verdict == "pass" or report.total.counts[verdict]]
     others = [r for r in run.results if r.verdict != "pass" or r.is_known]
     by_id = {vector.id: vector for vector in vectors.load(run.level)}
-    page = environment.from_string(text).render(
+    page = render(
+        "check.html.jinja",
         report=report,
-        version=__version__,
         seen=seen,
         further=[r for r in run.results if r.group in ("property", "profile")],
         others=others[:MAX_LISTED],
         n_unlisted=max(0, len(others) - MAX_LISTED),
         cases=[_case(result, by_id[result.id]) for result in _worst(run) if result.id in by_id],
-        errors=_embed(_errors(run)) if run.ulps() else "",
-        speed=_embed(_speed(run)) if run.speed and run.ulps() else "",
+        errors=embed(_errors(run)) if run.ulps() else "",
+        speed=embed(_speed(run)) if run.speed and run.ulps() else "",
         sharp=SHARP,
         fair=FAIR,
     )
@@ -67,7 +60,7 @@ def _worst(run: Run) -> list[Result]:
 
 def _case(result: Result, vector: Vector) -> dict[str, Any]:
     try:
-        figure = _embed(_paths(result, vector))
+        figure = embed(_paths(result, vector))
     except BadInput:  # a vector whose scene must be refused has no table to draw
         figure = ""
     return {"result": result, "vector": vector, "figure": figure}
@@ -161,7 +154,3 @@ def _mark_classes(axes: Any, line: Any) -> None:
 def _middle(enclosure: Sequence[str]) -> float:
     low, high = map(float, enclosure)
     return low + (high - low) / 2
-
-
-def _embed(svg: bytes) -> str:
-    return "data:image/svg+xml;base64," + base64.b64encode(svg).decode("ascii")

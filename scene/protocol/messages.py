@@ -2,7 +2,8 @@
 
 Requests are decoded strictly: an unknown field is refused. Answers may carry further fields, which
 are ignored, so that an implementation can say more than it is asked. A scene stays raw here: it is
-decoded and proved valid once, by whoever steps in it.
+decoded and proved valid once, by whoever steps in it. On the wire and in the schema a request has its
+class's name without the suffix.
 `python -m scene.protocol.messages > docs/protocol.schema.json` prints the schema.
 """
 
@@ -23,19 +24,19 @@ PROFILES = ("step", "trajectory", "flow", "time")
 Seq = Annotated[int, msgspec.Meta(ge=0, le=MAX_SEQ)]
 
 
-class Start(msgspec.Struct, frozen=True, tag_field="cmd", tag="start", forbid_unknown_fields=True):
+class StartRequest(msgspec.Struct, frozen=True, tag_field="cmd", tag="start", forbid_unknown_fields=True):
     """Opens a session; answered by Introduction."""
 
     protocol: int
 
 
-class Echo(msgspec.Struct, frozen=True, tag_field="cmd", tag="echo", forbid_unknown_fields=True):
+class EchoRequest(msgspec.Struct, frozen=True, tag_field="cmd", tag="echo", forbid_unknown_fields=True):
     """Asks for the same numbers back, bit for bit; answered by Echoed."""
 
     values: tuple[float, ...]
 
 
-class Step(msgspec.Struct, frozen=True, tag_field="cmd", tag="step", forbid_unknown_fields=True):
+class StepRequest(msgspec.Struct, frozen=True, tag_field="cmd", tag="step", forbid_unknown_fields=True):
     """Asks for one collision; answered by an outcome with the same seq."""
 
     seq: Seq
@@ -44,7 +45,9 @@ class Step(msgspec.Struct, frozen=True, tag_field="cmd", tag="step", forbid_unkn
     t_end: float
 
 
-class Trajectory(msgspec.Struct, frozen=True, tag_field="cmd", tag="trajectory", forbid_unknown_fields=True):
+class TrajectoryRequest(
+    msgspec.Struct, frozen=True, tag_field="cmd", tag="trajectory", forbid_unknown_fields=True
+):
     """Asks for successive collisions; answered by Steps."""
 
     seq: Seq
@@ -54,7 +57,7 @@ class Trajectory(msgspec.Struct, frozen=True, tag_field="cmd", tag="trajectory",
     t_end: float
 
 
-class Flow(msgspec.Struct, frozen=True, tag_field="cmd", tag="flow", forbid_unknown_fields=True):
+class FlowRequest(msgspec.Struct, frozen=True, tag_field="cmd", tag="flow", forbid_unknown_fields=True):
     """Asks where many particles are at t_end; answered by Flown."""
 
     seq: Seq
@@ -63,7 +66,7 @@ class Flow(msgspec.Struct, frozen=True, tag_field="cmd", tag="flow", forbid_unkn
     t_end: float
 
 
-class Time(msgspec.Struct, frozen=True, tag_field="cmd", tag="time", forbid_unknown_fields=True):
+class TimeRequest(msgspec.Struct, frozen=True, tag_field="cmd", tag="time", forbid_unknown_fields=True):
     """Asks how long a trajectory of that many collisions takes, `repeat` times over; answered by Timed."""
 
     seq: Seq
@@ -73,11 +76,13 @@ class Time(msgspec.Struct, frozen=True, tag_field="cmd", tag="time", forbid_unkn
     repeat: int
 
 
-class Stop(msgspec.Struct, frozen=True, tag_field="cmd", tag="stop", forbid_unknown_fields=True):
+class StopRequest(msgspec.Struct, frozen=True, tag_field="cmd", tag="stop", forbid_unknown_fields=True):
     """Ends the session; not answered, the process exits."""
 
 
-Command = Start | Echo | Step | Trajectory | Flow | Time | Stop
+Command = (
+    StartRequest | EchoRequest | StepRequest | TrajectoryRequest | FlowRequest | TimeRequest | StopRequest
+)
 
 
 class Introduction(msgspec.Struct, frozen=True):
@@ -143,20 +148,30 @@ class Failed(msgspec.Struct, frozen=True):
 
 def json_schema() -> dict[str, Any]:
     """Return the JSON Schema of one line of protocol 1, published as docs/protocol.schema.json."""
-    requests = (Start, Echo, Step, Trajectory, Flow, Time, Stop)
+    requests = (
+        StartRequest,
+        EchoRequest,
+        StepRequest,
+        TrajectoryRequest,
+        FlowRequest,
+        TimeRequest,
+        StopRequest,
+    )
     outcomes = (Collision, Horizon, Undefined, Undecided, Rejected)
     answers = (Introduction, Echoed, Steps, Flown, Timed, Failed)
     _, definitions = msgspec.json.schema_components(
         [*requests, *outcomes, *answers, Scene], ref_template="#/$defs/{name}"
     )
     state_omega_or_period(definitions)
+    published = {name: name.removesuffix("Request") for name in definitions}
+    definitions = {published[name]: {**kind, "title": published[name]} for name, kind in definitions.items()}
     tables = ("Cap", "Stem", "Mushroom")
     scene = {"anyOf": [_reference(name) for name in tables]}
-    for request in (Step, Trajectory, Flow, Time):
-        definitions[request.__name__]["properties"]["scene"] = scene
+    for request in (StepRequest, TrajectoryRequest, FlowRequest, TimeRequest):
+        definitions[published[request.__name__]]["properties"]["scene"] = scene
     # A step is answered by an outcome that carries the seq of the request (null where it had none).
     seq = {"type": "object", "properties": {"seq": {"type": ["integer", "null"]}}, "required": ["seq"]}
-    definitions["Request"] = {"anyOf": [_reference(kind.__name__) for kind in requests]}
+    definitions["Request"] = {"anyOf": [_reference(published[kind.__name__]) for kind in requests]}
     stepped = {"allOf": [seq, {"anyOf": [_reference(kind.__name__) for kind in outcomes]}]}
     definitions["Answer"] = {"anyOf": [stepped, *(_reference(kind.__name__) for kind in answers)]}
     return {

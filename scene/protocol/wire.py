@@ -18,13 +18,13 @@ from scene.protocol.messages import (
     MAX_SEQ,
     PROTOCOL,
     Command,
-    Echo,
-    Flow,
-    Start,
-    Step,
-    Stop,
-    Time,
-    Trajectory,
+    EchoRequest,
+    FlowRequest,
+    StartRequest,
+    StepRequest,
+    StopRequest,
+    TimeRequest,
+    TrajectoryRequest,
 )
 from scene.refusal import BadInput
 from scene.states import Outcome, Rejected, State
@@ -87,16 +87,16 @@ class _Server:
             except UNREADABLE as error:
                 _reply(out, {"seq": _sequence_number(line), **_plain(_refusal(error))})
                 continue
-            if isinstance(command, Stop):
+            if isinstance(command, StopRequest):
                 return
-            if isinstance(command, Echo):
+            if isinstance(command, EchoRequest):
                 _reply(out, {"values": command.values})
-            elif isinstance(command, Start):
+            elif isinstance(command, StartRequest):
                 _reply(out, self.introduce(command))
             else:
                 _reply(out, {"seq": command.seq, **self.answer(command)})
 
-    def introduce(self, command: Start) -> dict[str, Any]:
+    def introduce(self, command: StartRequest) -> dict[str, Any]:
         if command.protocol != PROTOCOL:
             return {"seq": None, **_plain(Rejected(f"protocol = {command.protocol}, must be {PROTOCOL}"))}
         offered = {"step": True, "trajectory": True, "flow": self.flow, "time": self.timer}
@@ -110,15 +110,17 @@ class _Server:
             "laws": ["constant", "fourier", "bang-bang"],
         }
 
-    def answer(self, command: Step | Trajectory | Flow | Time) -> dict[str, Any]:
+    def answer(self, command: StepRequest | TrajectoryRequest | FlowRequest | TimeRequest) -> dict[str, Any]:
         try:
             scene = self.read_scene(bytes(command.scene))
-            if isinstance(command, Step):
+            if isinstance(command, StepRequest):
                 return _plain(self.stepper(scene, command.state, command.t_end))
-            if isinstance(command, Flow):
+            if isinstance(command, FlowRequest):
                 return self.answer_flow(scene, command)
-            _check_range("collisions", command.collisions, int(isinstance(command, Time)), MAX_COLLISIONS)
-            if isinstance(command, Time):
+            _check_range(
+                "collisions", command.collisions, int(isinstance(command, TimeRequest)), MAX_COLLISIONS
+            )
+            if isinstance(command, TimeRequest):
                 return self.answer_time(scene, command)
             steps = self.follower(scene, command.state, command.collisions, command.t_end)
             return {"steps": [_plain(outcome) for outcome in steps]}
@@ -127,14 +129,14 @@ class _Server:
         except UNREADABLE as error:
             return _plain(_refusal(error))
 
-    def answer_flow(self, scene: Scene, command: Flow) -> dict[str, Any]:
+    def answer_flow(self, scene: Scene, command: FlowRequest) -> dict[str, Any]:
         if self.flow is None:
             raise BadInput("flow is not among this implementation's profiles")
         _check_range("number of states", len(command.states), 0, MAX_STATES)
         arrivals = self.flow(scene, command.states, command.t_end)
         return {"states": [{**_plain(outcome), "captured": captured} for outcome, captured in arrivals]}
 
-    def answer_time(self, scene: Scene, command: Time) -> dict[str, Any]:
+    def answer_time(self, scene: Scene, command: TimeRequest) -> dict[str, Any]:
         if self.timer is None:
             raise BadInput("time is not among this implementation's profiles")
         _check_range("repeat", command.repeat, 1, MAX_REPEAT)

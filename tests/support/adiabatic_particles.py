@@ -14,7 +14,7 @@ from mpmath import fp
 
 import fast
 import theory
-from scene.tables import period
+from scene.tables import cycle_length
 
 WIDTHS = {"fixed-cap-anticlockwise": 15.4, "fixed-cap-clockwise": 15.4, "ergodic": 1.9, "untilted": 11.0}
 
@@ -23,8 +23,7 @@ WIDTHS = {"fixed-cap-anticlockwise": 15.4, "fixed-cap-clockwise": 15.4, "ergodic
 def curves(scene):
     prediction = theory.predict(scene, 15)
     zone = None
-    if period(scene):
-        span = float(period(scene).value(fp))
+    if span := cycle_length(scene):
         grid = np.linspace(0, span, 2001)
         cap = np.log([theory.volumes_at(fp, scene, float(t)).v_cap for t in grid])
         zone = grid, theory.chaotic_zone(scene, grid).log_energy, cap
@@ -74,7 +73,7 @@ def one_cycle(scene, energy, sigma, phases, rng):
             np.interp(places, np.arange(len(curve.s)), column)
             for column in (curve.t_in, curve.t_out, curve.s)
         )
-        span = float(period(scene).value(fp))
+        span = cycle_length(scene)
         after = (1 - t_out[captured] / span) * np.exp(-(gain - s_nc) / 2)
         blur = sigma[captured] * np.sqrt(t_in[captured] / span + after)
         s[captured] = gain + blur**2 / 4 + blur * noise[captured]

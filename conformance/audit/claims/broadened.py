@@ -13,7 +13,6 @@ mean is left open by SHIFTS times sigma_w², of the order 1/v of the delay, and 
 from __future__ import annotations
 
 import numpy as np
-from mpmath import fp
 from scipy.signal import fftconvolve
 from scipy.stats import norm
 
@@ -21,7 +20,7 @@ from conformance.audit.evidence import energies_of
 from conformance.audit.runs import scene_of
 from conformance.audit.samples import Sample
 from conformance.audit.tolerances import Cdf, FloatArray, Mean, mean, spread
-from scene.tables import period
+from scene.tables import cycle_length
 from theory import CaptureCurve, capture_curve, sum_of_cycles
 
 N_BINS = 4000
@@ -85,9 +84,7 @@ def zone_energy(sample: Sample) -> tuple[list[float], list[Mean], list[float]]:
 
 def phase_times(sample: Sample) -> list[float]:
     """Return the times of the sample's phases."""
-    shared = period(scene_of(sample.run))
-    assert shared is not None
-    span = float(shared.value(fp))
+    span = cycle_length(scene_of(sample.run))
     return [span * phase for phase in sample.run.phases]
 
 

@@ -15,21 +15,13 @@ import theory
 from conformance.audit.claims.broadened import phase_times, zone_energy
 from conformance.audit.claims.experiments import MEAN_RETURNS, mouth_speed, return_time
 from conformance.audit.claims.finite_energy import ACW, ERGODIC, LADDER
-from conformance.audit.evidence import Evidence
+from conformance.audit.evidence import ClaimEvidence
 from conformance.audit.finding import Check
 from conformance.audit.runs import RUNS, block_seed, scene_of
 from conformance.audit.samples import Sample
-from conformance.audit.tolerances import (
-    BoolArray,
-    FloatArray,
-    Mean,
-    close,
-    mean,
-    share,
-    spread,
-    stated,
-)
+from conformance.audit.tolerances import BoolArray, FloatArray, Mean, close, mean, share, spread, stated
 from scene import Mushroom, Scene, State, load
+from scene.geometry import area, table_at
 from scene.laws import value
 
 SPEEDS = tuple(10.0 ** (k / 2) for k in range(4, 9))  # 100 to 10,000
@@ -42,7 +34,7 @@ N_ENERGIES = {"quick": 400, "full": 2000}
 PER_ENERGY = 20
 
 
-def circle(evidence: Evidence) -> list[Check]:
+def circle(evidence: ClaimEvidence) -> list[Check]:
     """L1: the breathing circle, hit by hit."""
     scene = load("breathing-circle")
     momentum, steps, drifts = 0.0, [], []
@@ -70,7 +62,7 @@ def circle(evidence: Evidence) -> list[Check]:
 
 
 def _hits(
-    evidence: Evidence, scene: Scene, speed: float, start: tuple[float, float, float]
+    evidence: ClaimEvidence, scene: Scene, speed: float, start: tuple[float, float, float]
 ) -> tuple[float, float, float]:
     """Return largest change of L, root mean square of phi' - phi per hit and largest drift of v r."""
     x, y, turn = start
@@ -95,7 +87,7 @@ def _slope(x: tuple[float, ...], y: list[float]) -> float:
     return float(np.polyfit(np.log(x), np.log(y), 1)[0])
 
 
-def invariants(evidence: Evidence) -> list[Check]:
+def invariants(evidence: ClaimEvidence) -> list[Check]:
     """L2: E V_cap in the cap, E V in the ergodic table."""
     captured = evidence.samples(*LADDER[1:6])
     widths = []
@@ -170,7 +162,7 @@ def _exponent(what: str, samples: list[Sample], values: list[Mean], exponent: fl
     )
 
 
-def volumes(evidence: Evidence) -> list[Check]:
+def volumes(evidence: ClaimEvidence) -> list[Check]:
     """L3: volumes as shares of random phase points, and of particles that stay in the frozen cap."""
     found = []
     n = N_POINTS[evidence.size]
@@ -204,16 +196,16 @@ def _points(
 ) -> tuple[BoolArray, BoolArray, BoolArray]:
     """Draw points in a box around the table; tell which lie in it, in the cap, in the island."""
     assert isinstance(scene, Mushroom)
-    r, h, slope = (float(value(fp, law, t)) for law in (scene.r, scene.h, scene.slope))
-    w = r * float(value(fp, scene.nu or 0.0, t))
+    table = table_at(fp, scene, t)
+    r, h, w = table.r, table.h, table.w
     x, y, turn = random.uniform(-r, r, n), random.uniform(-h, r, n), random.uniform(0, 2 * np.pi, n)
-    in_cap = (y >= 0) & (x * x + y * y <= r * r)
-    in_stem = (y < 0) & (np.abs(x) <= w + slope * y)
+    in_cap = (y >= 0) & (table.gap("arc", x, y) >= 0)
+    in_stem = (y < 0) & (np.abs(x) <= table.half_width(y))
     momentum = np.abs(x * np.sin(turn) - y * np.cos(turn))
     return in_cap | in_stem, in_cap, in_cap & (momentum >= w)
 
 
-def release(evidence: Evidence) -> list[Check]:
+def release(evidence: ClaimEvidence) -> list[Check]:
     """L4: captured at t_in, released when nu returns."""
     samples = evidence.samples(*LADDER[1:6])
     gaps = [nu_gap(sample) for sample in samples]
@@ -246,7 +238,7 @@ def nu_gap(sample: Sample) -> FloatArray:
     return gap
 
 
-def energy_through_the_cycle(evidence: Evidence) -> list[Check]:
+def energy_through_the_cycle(evidence: ClaimEvidence) -> list[Check]:
     """L5: mean log E in the chaotic zone against eq. (dE)."""
     found = []
     for run, every in (("moving-cap@1e7", 2), (ACW, 1)):
@@ -279,7 +271,7 @@ def zone_share(sample: Sample, times: FloatArray) -> FloatArray:
     return found
 
 
-def population_through_the_cycle(evidence: Evidence) -> list[Check]:
+def population_through_the_cycle(evidence: ClaimEvidence) -> list[Check]:
     """L6: p_cha(t) against eq. (ps)."""
     found = []
     for run, every in (("moving-cap@1e7", 2), (ACW, 1)):
@@ -302,7 +294,7 @@ def population_through_the_cycle(evidence: Evidence) -> list[Check]:
     return found
 
 
-def work(evidence: Evidence) -> list[Check]:
+def work(evidence: ClaimEvidence) -> list[Check]:
     """L7: mean exp(-W/kT) = A(t)/A(0), exact at any speed of the walls."""
     phases = (0.25, 0.5, 0.75)
     scene = load("moving-cap")
@@ -320,12 +312,12 @@ def work(evidence: Evidence) -> list[Check]:
         )
         ends = np.column_stack([done.phase_energies[:, 0], done.energy])[done.outcome == 0]
         n_lost += PER_ENERGY - len(ends)
-        # Energies are drawn HOTTER times hotter, else rare fast particles carried the mean: weigh them back.
+        # Energies are drawn at HOTTER times kT and weighted back: a few fast particles would carry the mean.
         rows.append(np.mean(HOTTER * np.exp(energy / (HOTTER * KT) - ends / KT), axis=0))
     found = []
     for k, phase in enumerate((*phases, 1.0)):
         values = np.array(rows)[:, k]
-        ratio = area(scene, phase) / area(scene, 0.0)
+        ratio = area(scene, 2 * math.pi * phase) / area(scene, 0.0)
         found.append(
             close(
                 f"kT = {KT:g}, phase {phase:g}: mean exp(-W/kT)",
@@ -335,12 +327,6 @@ def work(evidence: Evidence) -> list[Check]:
             )
         )
     return found
-
-
-def area(scene: Scene, phase: float) -> float:
-    """Return the table's area at a fraction of a 2 pi cycle [length²]."""
-    now = theory.volumes_at(fp, scene, 2 * fp.pi * phase)
-    return float((now.v_cap + now.v_stem) / (2 * fp.pi))
 
 
 CHECKS = {

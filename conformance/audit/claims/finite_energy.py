@@ -11,7 +11,7 @@ from scipy.stats import norm
 
 import theory
 from conformance.audit.claims.printed import half_unit
-from conformance.audit.evidence import Evidence, energies_of
+from conformance.audit.evidence import ClaimEvidence, energies_of
 from conformance.audit.finding import Check, Form
 from conformance.audit.samples import Sample
 from conformance.audit.tolerances import N_SIGMA, Mean, above, close, mean, spread, stated
@@ -47,7 +47,7 @@ def width(sample: Sample) -> Mean:
     return spread(sample.gain[~sample.captured])
 
 
-def period(evidence: Evidence) -> list[Check]:
+def period(evidence: ClaimEvidence) -> list[Check]:
     """M5: for which period of sec. 4.1 the printed error bars come out, given our widths at T = 1."""
     found: list[Check] = []
     lowest, highest = 0.0, np.inf
@@ -75,7 +75,7 @@ def period(evidence: Evidence) -> list[Check]:
     return [*found, stated("T = 1 gives the printed error bars", lowest <= 1 <= highest, text, "contains 1")]
 
 
-def error_bars(evidence: Evidence) -> list[Check]:
+def error_bars(evidence: ClaimEvidence) -> list[Check]:
     """M6: how many sigma_N the printed error bars are, and whether the printed means agree with ours."""
     found: list[Check] = []
     for name, (m1, bar, n, per_bar) in PRINTED.items():
@@ -107,7 +107,7 @@ def _spread_beside(sample: Sample, n: int) -> Mean:
     return Mean(sd, error * float(np.sqrt(1 + len(sample.gain) / n)))
 
 
-def width_exponent(evidence: Evidence) -> list[Check]:
+def width_exponent(evidence: ClaimEvidence) -> list[Check]:
     """M7: the exponent of the peak's width."""
     found: list[Check] = []
     for label, runs in (("moving cap", LADDER[1:6]), ("c = 0", ERGODIC)):
@@ -130,7 +130,7 @@ def fitted_width(samples: list[Sample]) -> tuple[theory.PowerFit, list[float]]:
     return theory.fit_power(energies, [w.value for w in widths], [w.error for w in widths]), energies
 
 
-def ergodic_mean(evidence: Evidence) -> list[Check]:
+def ergodic_mean(evidence: ClaimEvidence) -> list[Check]:
     """M8: |m1*| < 3e-5 for c = 0."""
     sample = evidence.sample("ergodic@1e7")
     sd, found = spread(sample.gain), mean(sample.gain)
@@ -164,7 +164,7 @@ def ergodic_mean(evidence: Evidence) -> list[Check]:
     ]
 
 
-def finite_bias(evidence: Evidence) -> list[Check]:
+def finite_bias(evidence: ClaimEvidence) -> list[Check]:
     """M9: the mean of s is biased at finite energy; the mean of exp(-s/2) is not."""
     samples = evidence.samples(*LADDER)
     theirs = float(evidence.predict("moving-cap").m1)
@@ -197,7 +197,7 @@ def finite_bias(evidence: Evidence) -> list[Check]:
     return found
 
 
-def heating(evidence: Evidence) -> list[Check]:
+def heating(evidence: ClaimEvidence) -> list[Check]:
     """M11: where the energy comes from in the clockwise cycle, with a cap at rest."""
     sample = evidence.sample(CW)
     # Captured at phases 4/8 and 6/8, between which the mouth stays at w0 and the stem grows.

@@ -14,8 +14,15 @@ import numpy as np
 import scene as scenes
 import theory
 from conformance.audit.claims.finite_energy import ACW, CW, width
-from conformance.audit.claims.misprints import chaotic_volume, fixed_cap, island_slope, loop_area, rounds
-from conformance.audit.evidence import DIGITS, Evidence
+from conformance.audit.claims.misprints import (
+    chaotic_volume,
+    fixed_cap,
+    island_slope,
+    loop_area,
+    rounds,
+    signed_area,
+)
+from conformance.audit.evidence import DIGITS, ClaimEvidence
 from conformance.audit.finding import Check
 from conformance.audit.tolerances import close, exact, mean, stated
 from scene.tables import Mushroom
@@ -25,7 +32,7 @@ N_LOOPS = 6
 SIMULATED = (ACW, CW, "moving-cap@1e6", "moving-cap@1e7", "moving-cap-reversed@1e6", "untilted@1e6")
 
 
-def mean_exp_minus(evidence: Evidence) -> list[Check]:
+def mean_exp_minus(evidence: ClaimEvidence) -> list[Check]:
     """I1: the mean of E0/E1 is 1."""
     found = [
         exact(f"{name}: theory", evidence.predict(name).mean_exp_minus, 1, 10.0 ** (2 - DIGITS))
@@ -38,7 +45,7 @@ def mean_exp_minus(evidence: Evidence) -> list[Check]:
     return found
 
 
-def equivalent_forms(evidence: Evidence) -> list[Check]:
+def equivalent_forms(evidence: ClaimEvidence) -> list[Check]:
     """N1: eq. (Erate) is the mean of eq. (lnE/E0) over eq. (ps)."""
     found = []
     for name in NAMES:
@@ -47,7 +54,7 @@ def equivalent_forms(evidence: Evidence) -> list[Check]:
     return found
 
 
-def formulas_in_w(evidence: Evidence) -> list[Check]:
+def formulas_in_w(evidence: ClaimEvidence) -> list[Check]:
     """N2: sec. 4.1's integrals over w, by a quadrature of their own."""
     found: list[Check] = []
     printed = {
@@ -85,7 +92,7 @@ def _over_w(w0: Any, w1: Any, h_in: Any, h_out: Any, slope: Any) -> tuple[Any, A
     return total, mpmath.quad(lambda w: rate(w) - rate(w, h_out), [w0, w1])
 
 
-def positivity(evidence: Evidence) -> list[Check]:
+def positivity(evidence: ClaimEvidence) -> list[Check]:
     """N3: m1 >= 0 for any cycle, several captures included."""
     random = np.random.default_rng(evidence.seed)
     least, n_nested = np.inf, 0
@@ -109,11 +116,11 @@ def positivity(evidence: Evidence) -> list[Check]:
             least > 0,
             f"least m1 = {least:.3g}",
             "> 0",
-        ),
+        )
     ]
 
 
-def reversal(evidence: Evidence) -> list[Check]:
+def reversal(evidence: ClaimEvidence) -> list[Check]:
     """N4: reversed cycles weigh the forward ones by exp(-s)."""
     found = []
     size = 1e-20
@@ -134,7 +141,7 @@ def reversal(evidence: Evidence) -> list[Check]:
     return found
 
 
-def right_mode(_evidence: Evidence) -> list[Check]:
+def right_mode(_evidence: ClaimEvidence) -> list[Check]:
     """N5: the largest gain, where the density of s has its caustic."""
     gain = theory.largest_gain(scenes.load("moving-cap"))
     caustic = theory.caustics(scenes.load("moving-cap"))
@@ -151,14 +158,14 @@ def right_mode(_evidence: Evidence) -> list[Check]:
     ]
 
 
-def orientations(_evidence: Evidence) -> list[Check]:
+def orientations(_evidence: ClaimEvidence) -> list[Check]:
     """N6: the sense of sec. 4.1's loops in the plane (w, h), as eq. (cycle) and its reverse say."""
     found = []
     for name, sign in (("fixed-cap-anticlockwise", 1), ("fixed-cap-clockwise", -1)):
         table = scenes.load(name)
         assert isinstance(table, Mushroom)
         w, h = ([v for _, v in law.knots[:-1]] for law in (table.w, table.h))  # type: ignore[union-attr]
-        area = sum(w[k] * h[(k + 1) % 4] - w[(k + 1) % 4] * h[k] for k in range(4)) / 2
+        area = signed_area(w, h)
         found.append(
             stated(f"{name} in the plane (w, h)", area * sign > 0, f"area {area:+.3f}", f"sign {sign:+d}")
         )

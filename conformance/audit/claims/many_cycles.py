@@ -8,14 +8,14 @@ from scipy.stats import norm
 import theory
 from conformance.audit.claims import broadened
 from conformance.audit.claims.finite_energy import bias_of_mean, width
-from conformance.audit.evidence import Evidence
+from conformance.audit.evidence import ClaimEvidence
 from conformance.audit.finding import Check
 from conformance.audit.runs import RUNS, scene_of
 from conformance.audit.samples import Sample
 from conformance.audit.tolerances import FloatArray, Mean, close, fits, mean, share, spread, stated
 
 
-def sums(evidence: Evidence) -> list[Check]:
+def sums(evidence: ClaimEvidence) -> list[Check]:
     """X4: after n cycles the centre is Gaussian, the tails are not."""
     runs = ("moving-cap@1e7x10", "moving-cap@1e7x30") if evidence.size == "full" else ("moving-cap@1e5x30",)
     found: list[Check] = []
@@ -27,7 +27,7 @@ def sums(evidence: Evidence) -> list[Check]:
     return found
 
 
-def _sum_of(evidence: Evidence, sample: Sample, n: int, cumulants: list[float]) -> list[Check]:
+def _sum_of(evidence: ClaimEvidence, sample: Sample, n: int, cumulants: list[float]) -> list[Check]:
     label = f"{sample.run.name}, n = {n}"
     total = sample.s[:, n - 1]
     m1, sd = cumulants[1], cumulants[2] ** 0.5

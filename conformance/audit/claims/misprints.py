@@ -6,6 +6,7 @@ nothing is recorded.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import mpmath
@@ -14,11 +15,11 @@ from mpmath import fp
 import scene as scenes
 import theory
 from conformance.audit.claims.printed import rounds_to
-from conformance.audit.evidence import DIGITS, Evidence
+from conformance.audit.evidence import DIGITS, ClaimEvidence
 from conformance.audit.finding import Check, Form
 from conformance.audit.tolerances import exact, stated
 from scene.laws import BangBang
-from scene.tables import Mushroom, period
+from scene.tables import Mushroom, cycle_length
 
 ZERO = 1e-12  # float64 sums of a few hundred terms of order 10
 N_LOOP = 256  # the trapezoid rule converges geometrically on smooth periodic loops
@@ -29,7 +30,7 @@ def rounds(what: str, printed: str, value: Any, form: Form) -> Check:
     return Check(what, rounds_to(printed, value), printed, float(value), form=form)
 
 
-def half_angle(evidence: Evidence) -> list[Check]:
+def half_angle(evidence: ClaimEvidence) -> list[Check]:
     """M1: the mouth as printed, sin²(t), and with the half angle."""
     try:
         scenes.load("moving-cap-as-printed")
@@ -57,7 +58,7 @@ def half_angle(evidence: Evidence) -> list[Check]:
     ]
 
 
-def signs(evidence: Evidence) -> list[Check]:
+def signs(evidence: ClaimEvidence) -> list[Check]:
     """M2: the text's signs of a and b, and the captions'."""
     printed = {"m1": "0.122768", "p_nc": "0.38474", "log_e_nc": "-0.422465"}
     cases: tuple[tuple[str, str, Form], ...] = (
@@ -85,24 +86,26 @@ def signs(evidence: Evidence) -> list[Check]:
 
 def loop_area(name: str) -> float:
     """Return the signed area of a loop in the plane (V_ell/V_cap, V_cap/V), anticlockwise positive."""
-    points = _volumes(scenes.load(name))
-    return _area([v.v_ell / v.v_cap for v in points], [v.v_cap / (v.v_cap + v.v_stem) for v in points])
+    return signed_area(*volume_loop(scenes.load(name), N_LOOP))
 
 
-def _volumes(table: scenes.Scene) -> list[theory.Volumes]:
-    shared = period(table)
-    assert shared is not None
-    span = shared.value(fp)
-    return [theory.volumes_at(fp, table, span * k / N_LOOP) for k in range(N_LOOP)]
+def volume_loop(table: scenes.Scene, n: int) -> tuple[list[float], list[float]]:
+    """Return V_ell/V_cap and V_cap/V at n even times of one cycle, the plane of sec. 3.5."""
+    points = _volumes(table, n)
+    return [v.v_ell / v.v_cap for v in points], [v.v_cap / (v.v_cap + v.v_stem) for v in points]
 
 
-def _area(x: list[float], y: list[float]) -> float:
-    # Of the closed polygon, by the shoelace formula.
+def _volumes(table: scenes.Scene, n: int) -> list[theory.Volumes]:
+    return [theory.volumes_at(fp, table, cycle_length(table) * k / n) for k in range(n)]
+
+
+def signed_area(x: Sequence[float], y: Sequence[float]) -> float:
+    """Return the area of a closed polygon, positive when it runs anticlockwise (the shoelace formula)."""
     n = len(x)
     return float(sum(x[k] * y[(k + 1) % n] - x[(k + 1) % n] * y[k] for k in range(n)) / 2)
 
 
-def radius_squared(_evidence: Evidence) -> list[Check]:
+def radius_squared(_evidence: ClaimEvidence) -> list[Check]:
     """M3: the half disk x² + y² <= r, and x² + y² <= r², against V_cap = pi² r² = 2 pi times its area."""
     found: list[Check] = []
     for r in (0.5, 1.5):
@@ -114,7 +117,7 @@ def radius_squared(_evidence: Evidence) -> list[Check]:
     return found
 
 
-def exponent_sign(evidence: Evidence) -> list[Check]:
+def exponent_sign(evidence: ClaimEvidence) -> list[Check]:
     """M4: exp(-∫ dV_ell/V_cha) and exp(+∫ dV_ell/V_cha) over the mouth's closing, sec. 4.1."""
     found = []
     for name, paper in (("fixed-cap-anticlockwise", "0.843472"), ("fixed-cap-clockwise", "0.717894")):
@@ -170,7 +173,7 @@ def chaotic_volume(w: Any, h: Any, slope: Any) -> Any:
     return pi * pi + 2 * pi * (2 * w * h - h * h * slope) - v_ell
 
 
-def cone(_evidence: Evidence) -> list[Check]:
+def cone(_evidence: ClaimEvidence) -> list[Check]:
     """M10: where the cone |x| <= w + y tan theta must still be open: y = h as printed, or y = -h."""
     w, h, slope = mpmath.mpf("0.5"), mpmath.mpf(1), mpmath.mpf("0.5")  # w = h tan: the stem just closes
     volume = theory.v_stem(mpmath.mp, w, h, slope)
@@ -186,12 +189,12 @@ def cone(_evidence: Evidence) -> list[Check]:
     return found
 
 
-def loop_plane(evidence: Evidence) -> list[Check]:
+def loop_plane(evidence: ClaimEvidence) -> list[Check]:
     """M12: area of the loop a = b = 0.5 in the summary's plane and in that of sec. 3.5."""
-    points = _volumes(scenes.load("moving-cap-trivial"))
-    share = [v.v_ell / v.v_cap for v in points]
-    summary = _area(share, [v.v_cha for v in points])
-    section = _area(share, [v.v_cap / (v.v_cap + v.v_stem) for v in points])
+    table = scenes.load("moving-cap-trivial")
+    share, part = volume_loop(table, N_LOOP)
+    summary = signed_area(share, [v.v_cha for v in _volumes(table, N_LOOP)])
+    section = signed_area(share, part)
     result = evidence.predict("moving-cap-trivial")
     grows = abs(result.m1) > ZERO
     m1 = f"m1 = {mpmath.nstr(result.m1, 3)}, p_nc = {mpmath.nstr(result.p_nc, 6)}"
@@ -213,7 +216,7 @@ def loop_plane(evidence: Evidence) -> list[Check]:
     ]
 
 
-def measures(evidence: Evidence) -> list[Check]:
+def measures(evidence: ClaimEvidence) -> list[Check]:
     """M13: whose share p_cha is, and which volume the set H = E has."""
     table = Mushroom(r=1.0, h=scenes.Fourier(1.0, 1.0, (), (0.5,)), nu=scenes.Fourier(0.5, 1.0, (0.4,)))
     start = theory.volumes_at(fp, table, 0.0)  # nu = 0.9 at most: an island remains

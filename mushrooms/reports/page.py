@@ -1,0 +1,36 @@
+"""What the HTML reports share: one base template, one style, figures embedded, numbers written one way.
+
+A page is one file: no scripts, and nothing is loaded from elsewhere.
+"""
+
+from __future__ import annotations
+
+import base64
+from typing import Any
+
+import jinja2
+
+from mushrooms import __version__
+
+
+def render(template: str, **fields: Any) -> str:
+    """Return the page that a template of this folder makes of these fields; `version` is ours."""
+    environment = jinja2.Environment(
+        loader=jinja2.PackageLoader("mushrooms", "reports"),
+        autoescape=True,
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.filters["number"] = number
+    return environment.get_template(template).render(version=__version__, **fields)
+
+
+def number(value: float | None, form: str) -> str:
+    """Return a number in a format of Python's, such as ".2e" or ","; a dash when there is none."""
+    return "–" if value is None else format(value, form)
+
+
+def embed(svg: bytes) -> str:
+    """Return a figure as the source of an image within the page."""
+    return "data:image/svg+xml;base64," + base64.b64encode(svg).decode("ascii")

@@ -25,12 +25,12 @@ from functools import partial
 from math import hypot
 
 import msgspec
-from mpmath import MPContext
 
 from conformance.grading import sensitivity
 from conformance.grading.sensitivity import Stepper, measured, numbers
 from scene import Collision, Horizon, Outcome, Rejected, Scene, State, Undecided, to_data, transforms
 from scene.laws import is_constant
+from scene.precision import decimals
 from scene.tables import laws, period
 
 BOUND = 1e-9
@@ -123,8 +123,7 @@ def check_period_shift(
     shared, answer = period(scene), stepper(scene, state, t_end)
     if shared is None or not isinstance(answer, Collision | Horizon):
         return False
-    ctx = MPContext()
-    ctx.dps = 50
+    ctx = decimals(50)
     shift = shared.value(ctx)
     later, span = float(state.t + shift), t_end - state.t
     late = State(later, state.x, state.y, state.vx, state.vy, state.wall)

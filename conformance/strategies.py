@@ -16,10 +16,10 @@ from typing import Any, Literal, NamedTuple, TypeVar
 
 from hypothesis import currently_in_test_context, note
 from hypothesis import strategies as st
-from mpmath import MPContext
 
 from scene import BangBang, Cap, Fourier, Law, Mushroom, Scene, State, Stem, Wall, to_data
 from scene.laws import bounds, breakpoints, value
+from scene.precision import decimals
 from scene.tables import laws as laws_of
 from scene.tables import period, width_factors
 from scene.transforms import scaled_law
@@ -207,9 +207,8 @@ class _Moment:
     # The table at one instant to 50 digits, and the same numbers rounded for placing particles.
 
     def __init__(self, scene: Scene, t: float) -> None:
-        ctx = MPContext()
-        ctx.dps = 50
-        self.ctx, self.scene = ctx, scene
+        self.ctx, self.scene = decimals(50), scene
+        ctx = self.ctx
         found = {name: self._motion(law, t) for name, law in laws_of(scene).items()}
         if not isinstance(scene, Cap):
             w, w_rate = ctx.mpf(1), ctx.mpf(0)
@@ -334,7 +333,7 @@ def adversarial(family: str | None = None) -> st.SearchStrategy[Any]:
 @st.composite
 def _times(draw: st.DrawFn, scene: Scene) -> float:
     shared = period(scene)
-    length = 1.0 if shared is None else float(shared.value(MPContext()))
+    length = 1.0 if shared is None else float(shared.value(decimals()))
     knots = [float(t) for law in laws_of(scene).values() for t in breakpoints(law)] or [0.0]
     turns = draw(st.one_of(st.integers(-2, 3), st.sampled_from((0, 0, 1000, -1000))))
     inside = fractions().map(lambda part: length * (turns + part))

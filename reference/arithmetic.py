@@ -14,8 +14,9 @@ from fractions import Fraction
 from typing import Any, NamedTuple
 
 import mpmath
-from mpmath.ctx_iv import MPIntervalContext
 from mpmath.libmp import libelefun, libmpf, libmpi
+
+from scene.precision import intervals
 
 Interval = Any  # mpmath's ivmpf, which has no type stubs
 
@@ -105,8 +106,8 @@ class Arithmetic:
     def __init__(self, digits: int, work: Work | None = None) -> None:
         self.digits = digits
         self.work = Work() if work is None else work
-        self.context = MPIntervalContext()
-        self.context.prec = self.prec = int(digits * BITS_PER_DIGIT) + 8
+        self.prec = int(digits * BITS_PER_DIGIT) + 8
+        self.context = intervals(self.prec)
         self.zero: Interval = self.context.mpf(0)
 
     def spend(self, units: int) -> None:

@@ -6,10 +6,11 @@ from collections.abc import Callable
 from typing import Any
 
 import msgspec
-from mpmath import MPContext, fp
+from mpmath import fp
 
 from scene import BangBang, Fourier, Law, Scene, State, Wall
 from scene.laws import value
+from scene.precision import decimals
 from scene.tables import laws
 
 _ACROSS: dict[Wall, Wall] = {"left": "right", "right": "left"}
@@ -71,9 +72,7 @@ def frozen(scene: Scene, t: float) -> Scene:
 
     They are computed to 50 digits and rounded once, so that parameters which touch (w = r, nu = 1) still do.
     """
-    ctx = MPContext()
-    ctx.dps = 50
-    return _with_laws(scene, lambda _, law: float(value(ctx, law, t)))
+    return _with_laws(scene, lambda _, law: float(value(decimals(50), law, t)))
 
 
 def idle(scene: Scene) -> Scene:

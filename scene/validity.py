@@ -16,8 +16,6 @@ from fractions import Fraction
 from math import comb, isfinite, prod
 from typing import Any, NamedTuple
 
-from mpmath import MPContext
-
 from scene import exact, mixed
 from scene.laws import (
     BangBang,
@@ -33,6 +31,7 @@ from scene.laws import (
     value,
 )
 from scene.laws import exact as number
+from scene.precision import decimals
 from scene.refusal import InvalidScene
 
 Laws = Mapping[str, Law]
@@ -76,7 +75,7 @@ def check_common_period(laws: Laws) -> None:
     moving = {name: shared for name, law in laws.items() if (shared := period_of(law)) is not None}
     for (first, a), (second, b) in itertools.combinations(moving.items(), 2):
         if a != b:
-            ctx = MPContext()
+            ctx = decimals()
             one, other = (ctx.nstr(shared.value(ctx), 17) for shared in (a, b))
             raise InvalidScene(
                 f"{first} has period {one} and {second} has {other}:"
@@ -205,7 +204,7 @@ def _half_angle(law: Law) -> tuple[exact.Polynomial, int]:
 
 def _message(laws: Laws, condition: Condition, known: Fraction | None = None) -> str:
     # The proof is done; this only looks for a telling instant to show. In mp no scene overflows.
-    ctx = MPContext()
+    ctx = decimals()
     shared = next((found for law in laws.values() if (found := period_of(law)) is not None), None)
     span = shared.value(ctx) if shared else ctx.mpf(0)
     start = next((law.knots[0][0] for law in laws.values() if isinstance(law, BangBang)), 0.0)

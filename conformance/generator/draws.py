@@ -15,10 +15,10 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple, TypeVar
 
 import msgspec
-from mpmath import MPContext
 
 from scene import BangBang, Cap, Fourier, Law, Mushroom, Scene, State, Stem, Wall, to_data
 from scene.laws import bounds, breakpoints, value
+from scene.precision import decimals
 from scene.tables import laws, period, width_factors
 
 T = TypeVar("T")
@@ -121,8 +121,7 @@ class Moment:
     """The table at one instant: each length and its rate, to 50 digits and then rounded."""
 
     def __init__(self, scene: Scene, t: float) -> None:
-        ctx = MPContext()
-        ctx.dps = 50
+        ctx = decimals(50)
         self.scene = scene
         found = {name: (value(ctx, law, t), value(ctx, law, t, 1)) for name, law in laws(scene).items()}
         if not isinstance(scene, Cap):
@@ -203,7 +202,7 @@ def walls_speed(scene: Scene) -> float:
 def time(draw: Draw, scene: Scene, turns: int = 3) -> float:
     """Draw a time within some periods; now and then on a knot."""
     shared = period(scene)
-    length = 1.0 if shared is None else float(shared.value(MPContext()))
+    length = 1.0 if shared is None else float(shared.value(decimals()))
     knots = [float(t) for law in laws(scene).values() for t in breakpoints(law)]
     if knots and draw.pick(range(5)) == 0:
         return length * draw.pick(range(turns)) + draw.pick(knots)

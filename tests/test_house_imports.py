@@ -9,9 +9,9 @@ import pytest
 ROOT = Path(__file__).parent.parent
 PACKAGES = {"scene", "reference", "fast", "theory", "conformance", "mushrooms"}
 STEPPERS = {"reference", "fast"}
-# What the files of a folder may import of ours, besides their own package; the deepest folder that is named here
-# decides. The audit compares the steppers and the generator certifies vectors: of `conformance` they alone meet
-# steppers by import. The rest is given commands, or functions.
+# What the files of a folder may import of ours, besides their own package; the deepest folder named here
+# decides. The audit compares the steppers, and the generator certifies vectors: of `conformance` they alone
+# meet steppers by import. The rest is given commands, or functions.
 MAY_IMPORT = {
     "scene": set(),
     "reference": {"scene"},

@@ -10,8 +10,7 @@ import numpy.typing as npt
 
 from fast.compiled import Compiled, FloatArray
 from fast.given import MAX_STEPS, given_end, given_state
-from fast.kernel import careful, codes, entries, walls
-from fast.kernel.laws import ANCHORS_SHAPE, set_anchors
+from fast.kernel import careful, codes, entries
 from fast.units import Units, fit
 from scene import (
     Collision,
@@ -194,23 +193,14 @@ def wall_gap(compiled: Compiled, state: State) -> tuple[float, float]:
     Today's distance is the measure, not the largest of all time: a small cap is not allowed a large one's
     slack. A time whose phase is lost is left to the step, which refuses it.
     """
-    anchors = np.zeros(ANCHORS_SHAPE)
-    if not set_anchors(compiled.laws, anchors, state.t, 0.0):
+    p = np.array([state.t, 0.0, state.x, state.y, state.vx, state.vy])
+    is_known, r, w, h, f = entries.wall_gap(*compiled, p, WALL_CODES[state.wall])
+    if not is_known:
         return 0.0, 1.0
-    r, w, h = (float(anchors[row, 0]) for row in (codes.R, codes.W, codes.H))
     if compiled.is_relative:
         w *= r
     if state.wall == "base":
         return state.y, max(r, w)
-    f, _ = walls.wall_residual(
-        WALL_CODES[state.wall],
-        state.x,
-        state.y,
-        compiled.laws,
-        anchors,
-        compiled.bounds,
-        compiled.is_relative,
-    )
     if state.wall == "arc":
         return float(f) / (2.0 * r), r
     return float(f), h if state.wall == "floor" else w

@@ -2,23 +2,73 @@
 
 A failing example of `conformance.strategies` carries a note: the step as the wire's JSON line.
 What long comparisons counted is printed after the tests: nothing is skipped silently.
+Workers take whole files, the long ones first, and do not compile what another worker is compiling.
 """
 
 from __future__ import annotations
 
+import fcntl
 import os
 from collections import Counter
 from collections.abc import Callable, Iterator
-from typing import NamedTuple
+from pathlib import Path
+from typing import Any, NamedTuple
 
 import pytest
 from hypothesis import settings
+from numba.core.dispatcher import Dispatcher
 
+from fast.kernel import entries
 from mushrooms.main import run
 
 settings.register_profile("quick", derandomize=True, deadline=None, print_blob=True)
 settings.register_profile("deep", max_examples=10_000, deadline=None, print_blob=True)
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "quick"))
+
+# Files that take longest, in the order in which they begin, so that no worker is left alone with one at the
+# end. While one worker compiles for test_fast_bits.py, the next has nothing to compile.
+LONGEST = [
+    "test_fast_bits.py",
+    "test_conformance_audit.py",
+    "test_conformance_bench.py",
+    "test_conformance_agreement.py",
+    "test_fast_lane_search.py",
+    "test_reference_mutants.py",
+    "test_fast_fine.py",
+    "test_conformance_suite.py",
+    "test_docs.py",
+    "test_conformance_attacks.py",
+    "test_mushrooms_audit.py",
+    "test_mushrooms_bench.py",
+    "test_conformance_strategies.py",
+    "test_scene_mixed.py",
+]
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Put the files that take longest first; the order within a file stays."""
+    places = {name: place for place, name in enumerate(LONGEST)}
+    items.sort(key=lambda item: places.get(item.path.name, len(places)))
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _compiled_once() -> None:
+    """Let one worker compile an entry of the kernel while the others wait, and then load what it has kept."""
+
+    def one_at_a_time(name: str, entry: Dispatcher) -> Callable[[Any], Any]:
+        compile_or_load, lock = entry.compile, Path(entry.stats.cache_path) / f"{name}.lock"
+
+        def compile_alone(signature: Any) -> Any:
+            lock.parent.mkdir(parents=True, exist_ok=True)
+            with lock.open("w") as held:
+                fcntl.flock(held, fcntl.LOCK_EX)
+                return compile_or_load(signature)
+
+        return compile_alone
+
+    for name, entry in vars(entries).items():
+        if isinstance(entry, Dispatcher) and entry.stats.cache_path:
+            entry.compile = one_at_a_time(name, entry)
 
 
 @pytest.fixture

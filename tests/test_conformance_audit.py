@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from functools import cache
-
 import mpmath
 import numpy as np
 import pytest
@@ -21,7 +19,7 @@ from conformance.audit.session import AuditSettings, conduct
 from conformance.audit.tolerances import MAX_TESTS, N_SIGMA
 
 REAL = ("L1", "L7")  # follow single particles or slow ones: not the stand-in's matter
-CACHED = cache(theory.predict)
+CACHED = adiabatic_particles.predict
 STAND_IN = AuditSteppers(adiabatic_particles.simulate, fast.trajectory)
 
 

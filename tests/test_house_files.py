@@ -1,4 +1,4 @@
-"""Habits of the house that a newcomer would otherwise have to be told: paths, sizes, docstrings."""
+"""Habits of the house that a newcomer would otherwise have to be told: paths, sizes, names, docstrings."""
 
 import ast
 import re
@@ -10,9 +10,18 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parent.parent
-MAX_LINES = 400
-# Files that may be longer, and why.
+PACKAGES = ("scene", "reference", "fast", "theory", "conformance", "mushrooms")
+MAX_LINES = 400  # of a file
+MAX_FUNCTION = 60  # lines of a function, its decorators and docstring included
+# Files, and functions by `file: name`, that may be longer, and why.
 LONGER: dict[str, str] = {}
+# Examples for other people's steppers, each complete in itself: their classes may have our names.
+EXAMPLES = "conformance/harness/"
+# Classes of one name that mean one thing in two packages, and why the name stays.
+ALIKE = {
+    "Collision": "an outcome: `scene`'s has rounded numbers as on the wire, `reference`'s has enclosures",
+    "Horizon": "likewise",
+}
 # Joined here so that this file does not contain what it forbids.
 PLACES = ["/" + "work", ".." + "/shared", "/" + "home/ada", "/" + "Users/ada", "C:" + r"\Users\ada"]
 FOREIGN = re.compile(
@@ -63,12 +72,63 @@ def test_every_module_opens_with_a_docstring():
     assert bare == []
 
 
-def test_files_stay_short():
-    lengths = {
-        path.relative_to(ROOT).as_posix(): len(path.read_bytes().splitlines()) for path in python_files()
-    }
-    long = {name: n for name, n in lengths.items() if n > MAX_LINES and name not in LONGER}
-    assert long == {}
+def python_sources() -> dict[str, str]:
+    """Return the text of every Python file of the project by its path."""
+    return {path.relative_to(ROOT).as_posix(): path.read_text("utf-8") for path in python_files()}
+
+
+def long_files(sources: dict[str, str]) -> list[str]:
+    """List the files that are too long."""
+    return [path for path, text in sources.items() if len(text.splitlines()) > MAX_LINES]
+
+
+def long_functions(sources: dict[str, str]) -> list[str]:
+    """List the functions that are too long, as `file: name`; one inside another counts as part of it too."""
+    return [
+        f"{path}: {node.name}"
+        for path, text in sources.items()
+        for node in ast.walk(ast.parse(text))
+        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef)
+        and (node.end_lineno or 0) - min(d.lineno for d in [node, *node.decorator_list]) >= MAX_FUNCTION
+    ]
+
+
+def repeated_classes(sources: dict[str, str]) -> dict[str, list[str]]:
+    """Return the names that several classes of the packages have, with the files they are in."""
+    places: dict[str, list[str]] = {}
+    for path, text in sources.items():
+        if path.startswith(PACKAGES) and not path.startswith(EXAMPLES):
+            for node in ast.walk(ast.parse(text)):
+                if isinstance(node, ast.ClassDef):
+                    places.setdefault(node.name, []).append(path)
+    return {name: paths for name, paths in places.items() if len(paths) > 1}
+
+
+def test_files_and_functions_stay_short():
+    sources = python_sources()
+    assert len(sources) > 100
+    long = {*long_files(sources), *long_functions(sources)}
+    assert long - set(LONGER) == set()
+    assert set(LONGER) - long == set(), "no longer needed"
+
+
+def test_one_name_means_one_class():
+    repeated = set(repeated_classes(python_sources()))
+    assert repeated - set(ALIKE) == set()
+    assert set(ALIKE) - repeated == set(), "no longer needed"
+
+
+def test_planted_lengths_and_names_are_seen():
+    body = "    pass\n"
+    assert long_files({"fast/a.py": body * 401, "fast/b.py": body * 400}) == ["fast/a.py"]
+    long = "@decorated\n" + "def f():\n" + body * 59
+    right = "class A:\n    async def g(self):\n" + "        pass\n" * 59
+    assert long_functions({"fast/a.py": long, "tests/b.py": right}) == ["fast/a.py: f"]
+    assert long_functions({"tests/b.py": right + "        pass\n"}) == ["tests/b.py: g"]
+    ours = {"fast/a.py": "class Run: pass", "scene/b.py": "def f():\n    class Run: pass"}
+    assert repeated_classes(ours) == {"Run": ["fast/a.py", "scene/b.py"]}
+    theirs = {"tests/c.py": "class Run: pass", EXAMPLES + "python/d.py": "class Run: pass"}
+    assert repeated_classes({"fast/a.py": "class Run: pass", **theirs}) == {}
 
 
 def test_every_dependency_says_why_it_is_there():

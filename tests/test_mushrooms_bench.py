@@ -1,4 +1,4 @@
-"""`mushrooms bench`: files, exit codes, bad options in one line; the README's table is the record's."""
+"""`mushrooms bench`: files, exit codes, bad options in one line; the page on speed shows the record."""
 
 from __future__ import annotations
 
@@ -134,8 +134,8 @@ def test_the_front_holds_only_what_nothing_beats():
     assert figures_of_speed.pareto(points) == [(pytest.approx(15.0), 10.0), (pytest.approx(30.0), 30.0)]
 
 
-def readme_rows(kept: record.Record) -> list[str]:
-    """The README's table: every stepper on moving-cap-1e7."""
+def shown_rows(kept: record.Record) -> list[str]:
+    """The table of the page on speed: every stepper on moving-cap-1e7."""
     rows = []
     for p in kept.points:
         if p.workload == "moving-cap-1e7":
@@ -148,11 +148,11 @@ def readme_rows(kept: record.Record) -> list[str]:
     return rows
 
 
-def test_the_readme_shows_what_the_record_holds():
+def test_the_page_on_speed_shows_what_the_record_holds():
     kept = record.read(ROOT / "docs" / "bench" / "bench.json")
-    text = (ROOT / "README.md").read_text("utf-8")
+    text = (ROOT / "docs" / "speed.md").read_text("utf-8")
     assert kept.size == "full"
-    rows = readme_rows(kept)
+    rows = shown_rows(kept)
     assert len(rows) > 12
     for row in rows:
         assert row in text

@@ -27,17 +27,25 @@ class Grid:
         half = [ctx.cos(ctx.pi * m / n) for m in range(n // 2)] + [ctx.zero]
         quarter_turns = half + [-c for c in reversed(half[:-1])]  # cos(pi m / n), m = 0 ... n
         full_turn = quarter_turns + quarter_turns[-2:0:-1]
-        self._cosines = [[full_turn[j * k % (2 * n)] for j in range(n + 1)] for k in range(n + 1)]
+        self._cosines = [[full_turn[j * k % (2 * n)] for j in range(n // 2 + 1)] for k in range(n + 1)]
         self.points = [(1 - c) / 2 for c in quarter_turns]
         self.weights = self._clenshaw_curtis()
         self._forecasts = [self._extrapolation(j) for j in range(n + 1)]
+
+    def _cosine_sums(self, values: list[Any]) -> list[Any]:
+        """Return the sums over j of values[j] cos(pi j k / n), k = 0 ... n."""
+        # cos(pi (n - j) k / n) = (-1)^k cos(pi j k / n): the second half of the products is that of the first.
+        middle = self.n // 2
+        pairs = list(zip(values[:middle], values[:middle:-1], strict=True))
+        even, odd = [a + b for a, b in pairs] + [values[middle]], [a - b for a, b in pairs]
+        return [self.ctx.fdot(odd if k % 2 else even, row) for k, row in enumerate(self._cosines)]
 
     def coefficients(self, values: list[Any]) -> list[Any]:
         """Return the interpolant's coefficients c_k, f = sum c_k T_k(2 x - 1)."""
         n, halved = self.n, list(values)
         halved[0] /= 2
         halved[n] /= 2
-        found = [self.ctx.fdot(halved, row) * 2 / n for row in self._cosines]
+        found = [total * 2 / n for total in self._cosine_sums(halved)]
         found[0] /= 2
         found[n] /= 2
         return [-c if k % 2 else c for k, c in enumerate(found)]
@@ -50,7 +58,7 @@ class Grid:
         terms = [self.ctx.zero] + [(c[k - 1] - c[k + 1]) / (4 * k) for k in range(1, n + 1)]
         signed = [-term if k % 2 else term for k, term in enumerate(terms)]
         at_zero = self.ctx.fsum(signed)
-        return [self.ctx.fdot(signed, row) - at_zero for row in self._cosines]
+        return [total - at_zero for total in self._cosine_sums(signed)]
 
     def integral(self, values: list[Any]) -> Any:
         """Return the integral over [0, 1] of the function with these values at the points."""
@@ -61,7 +69,7 @@ class Grid:
         signed = [-m if k % 2 else m for k, m in enumerate(moments)]
         signed[0] /= 2
         signed[self.n] /= 2
-        weights = [self.ctx.fdot(signed, row) * 2 / self.n for row in self._cosines]
+        weights = [total * 2 / self.n for total in self._cosine_sums(signed)]
         weights[0] /= 2
         weights[self.n] /= 2
         return weights
@@ -81,7 +89,7 @@ class Grid:
         even = [ctx.mpf(1) / (1 - k * k) if k % 2 == 0 else ctx.zero for k in range(n + 1)]
         even[0] /= 2
         even[n] /= 2
-        weights = [2 * ctx.fdot(even, row) / n for row in self._cosines]
+        weights = [2 * total / n for total in self._cosine_sums(even)]
         weights[0] /= 2
         weights[n] /= 2
         return weights

@@ -16,10 +16,11 @@ from numba import njit
 
 from fast.kernel.arithmetic import sine_cosine
 from fast.kernel.careful import first_step, step
-from fast.kernel.codes import HORIZON
+from fast.kernel.codes import BASE, HORIZON, H, R, W
 from fast.kernel.follow import follow
-from fast.kernel.laws import ANCHORS_SHAPE
+from fast.kernel.laws import ANCHORS_SHAPE, set_anchors
 from fast.kernel.refine import fine_path
+from fast.kernel.walls import wall_residual
 
 
 def digest_of_sources(folder: Path) -> str:
@@ -106,6 +107,23 @@ def _follow(sources):
     return follow_particles
 
 
+def _wall_gap(sources):
+    @njit(cache=True, error_model="numpy")
+    def wall_gap(table, is_relative, laws, bounds, p, wall):
+        """Tell whether a time's phase is known, and return r, w, h and the residual of a wall then.
+
+        w is nu where `is_relative`. The residual of the base is y.
+        """
+        sources  # noqa: B018
+        anchors = np.zeros(ANCHORS_SHAPE)
+        is_known, f = set_anchors(laws, anchors, p[0], p[1]), p[3]
+        if is_known and wall != BASE:
+            f, _ = wall_residual(wall, p[2], p[3], laws, anchors, bounds, is_relative)
+        return is_known, anchors[R, 0], anchors[W, 0], anchors[H, 0], f
+
+    return wall_gap
+
+
 def _directions(sources):
     @njit(cache=True, error_model="numpy")
     def directions(turns, out):
@@ -123,4 +141,5 @@ each_step = _each_step(SOURCES)
 trajectory = _trajectory(SOURCES)
 fine = _fine(SOURCES)
 follow_particles = _follow(SOURCES)
+wall_gap = _wall_gap(SOURCES)
 directions = _directions(SOURCES)

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 from reference.answers import Departure, Moment, ProvedCollision, ProvedHorizon
 from reference.arithmetic import Arithmetic, Interval, exact_ends
-from reference.course import FOR_EVER, Event, Hit
+from reference.course import FOR_EVER, Course, Hit
 from reference.walls import EnclosedFlight
 from scene import Wall
 
@@ -32,10 +32,10 @@ def reflected(arithmetic: Arithmetic, flight: EnclosedFlight, hit: Hit) -> tuple
     return flight.vx - factor * f_x, flight.vy - factor * f_y
 
 
-def bounce(arithmetic: Arithmetic, flight: EnclosedFlight, leaving: dict[Wall, Interval], hit: Hit) -> Bounce:
+def bounce(course: Course, hit: Hit) -> Bounce:
     """Reflect at a hit, and describe the next flight at an exact instant close to it."""
-    q, s = flight, hit.time
-    vx, vy = reflected(arithmetic, flight, hit)
+    arithmetic, q, s = course.arithmetic, course.flight, hit.time
+    vx, vy = reflected(arithmetic, q, hit)
     is_base = hit.wall == "base"
     x, y = q.x + q.vx * s, arithmetic.zero if is_base else q.y + q.vy * s
     t = arithmetic.between(*(q.instant + end for end in exact_ends(arithmetic.inflated(s))))
@@ -47,45 +47,38 @@ def bounce(arithmetic: Arithmetic, flight: EnclosedFlight, leaving: dict[Wall, I
     box = map(arithmetic.inflated, (x_near, y_near, vx, vy, begin))
     following = EnclosedFlight._make((q.instant + exact_ends(near)[0], *box))
     x, y, vx, vy = map(arithmetic.inflated, (x, y, vx, vy))
-    return Bounce((t, x, y, vx, vy), following, {hit.wall: leaving.get(hit.wall, arithmetic.zero)})
+    return Bounce((t, x, y, vx, vy), following, {hit.wall: course.leaving.get(hit.wall, arithmetic.zero)})
 
 
-def collision(
-    arithmetic: Arithmetic, flight: EnclosedFlight, leaving: dict[Wall, Interval], event: Event, after: Bounce
-) -> ProvedCollision:
+def collision(course: Course, hit: Hit, after: Bounce) -> ProvedCollision:
     """Return a collision free of its working precision."""
-    assert event.hit is not None
+    arithmetic = course.arithmetic
     close = arithmetic.enclosure
     return ProvedCollision(
-        event.hit.wall,
-        close(arithmetic.inflated(event.hit.time - flight.begin)),
+        hit.wall,
+        close(arithmetic.inflated(hit.time - course.flight.begin)),
         Moment(*map(close, after.moment)),
-        close(event.hit.slope),
+        close(hit.slope),
         arithmetic.digits,
-        departure(arithmetic, flight, leaving),
-        close(event.hit.time),
-        event.proof,
+        departure(course),
+        close(hit.time),
+        course.proof,
     )
 
 
-def departure(arithmetic: Arithmetic, flight: EnclosedFlight, leaving: dict[Wall, Interval]) -> Departure:
+def departure(course: Course) -> Departure:
     """Return a flight free of its working precision."""
-    close = arithmetic.enclosure
-    residuals = {wall: close(f) for wall, f in leaving.items()}
+    close, flight = course.arithmetic.enclosure, course.flight
+    residuals = {wall: close(f) for wall, f in course.leaving.items()}
     return Departure._make((flight.instant, *map(close, flight[1:]), residuals))
 
 
-def horizon(
-    arithmetic: Arithmetic,
-    flight: EnclosedFlight,
-    leaving: dict[Wall, Interval],
-    end: Fraction | None,
-    event: Event,
-) -> ProvedHorizon:
+def horizon(course: Course) -> ProvedHorizon:
     """Return the state at a horizon that no collision comes before."""
-    end = Fraction(FOR_EVER) if end is None else end
+    arithmetic, flight = course.arithmetic, course.flight
+    end = Fraction(FOR_EVER) if course.end is None else course.end
     s = arithmetic.dyadic(end)
     t = arithmetic.dyadic(flight.instant + end)
     at = (flight.x + flight.vx * s, flight.y + flight.vy * s, flight.vx, flight.vy)
     moment = Moment(*map(arithmetic.enclosure, (t, *map(arithmetic.inflated, at))))
-    return ProvedHorizon(moment, arithmetic.digits, departure(arithmetic, flight, leaving), event.proof)
+    return ProvedHorizon(moment, arithmetic.digits, departure(course), course.proof)

@@ -57,8 +57,7 @@ class Event(NamedTuple):
     """How a flight ends: at a hit, at the horizon (hit None), or nowhere (undefined, for a reason)."""
 
     hit: Hit | None
-    undefined: Undefined | None
-    proof: dict[str, list[Leaf]]
+    undefined: Undefined | None = None
     undefined_proof: UndefinedProof | None = None
 
 
@@ -111,8 +110,8 @@ class Course:
         if found is None and limit is not None:
             found = self._beyond_crossing(limit, in_cap=in_cap)
         if isinstance(found, Tie):
-            return Event(None, found.undefined, self.proof, found.proof)
-        return Event(found, None, self.proof)
+            return Event(None, found.undefined, found.proof)
+        return Event(found)
 
     def hit_after(self, wall: Wall, start: Interval) -> Interval | None:
         """Find when the straight flight would meet a wall after `start`, were nothing in its way."""
@@ -130,11 +129,11 @@ class Course:
         """Follow a path along y = 0 inside the mouth: it can only end at the mouth's edge."""
         hits = self._hits(("left", "right"), self.start, None)
         if not hits:
-            return Event(None, None, self.proof)
+            return Event(None)
         self._require_before_end(hits[-1])
         roots = {hit.wall: hit.time for hit in hits}
         proof = UndefinedProof(None, tuple(roots), roots, self.proof)
-        return Event(None, Undefined("mouth-edge"), self.proof, proof)
+        return Event(None, Undefined("mouth-edge"), proof)
 
     def _crossing(self, *, in_cap: bool) -> Interval | None:
         if "base" in self.leaving or sign(self.flight.vy) == 0:

@@ -118,10 +118,10 @@ class _EnclosedPath:
             if event.undefined is not None:
                 return event.undefined
             if event.hit is None:
-                return horizon(arithmetic, flight, leaving, end, event)
+                return horizon(course)
             self._chain_jacobian(flight, event, start)
-            after = bounce(arithmetic, flight, leaving, event.hit)
-            self.steps.append(collision(arithmetic, flight, leaving, event, after))
+            after = bounce(course, event.hit)
+            self.steps.append(collision(course, event.hit, after))
             flight, leaving, flat, exact = after.flight, after.leaving, frozenset(), None
             is_base = event.hit.wall == "base"
             in_cap = event.hit.wall == "arc" or (is_base and not isinstance(self.scene, Stem))

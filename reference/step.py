@@ -144,9 +144,8 @@ def _attempt(question: _Question, arithmetic: Arithmetic) -> tuple[Outcome, Unde
     if event.undefined is not None:
         return event.undefined, event.undefined_proof
     if event.hit is None:
-        return horizon(arithmetic, flight, start.leaving, end, event), None
-    after = bounce(arithmetic, flight, start.leaving, event.hit)
-    found = collision(arithmetic, flight, start.leaving, event, after)
+        return horizon(course), None
+    found = collision(course, event.hit, bounce(course, event.hit))
     require_digits(found, question.digits)
     if question.is_differentiated:
         origin = origin_of(scene, state, start, event.hit.wall, arithmetic)

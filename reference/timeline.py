@@ -63,15 +63,11 @@ class Timeline:
 
 def law_in_time(arithmetic: Arithmetic, law: Law, instant: Fraction) -> LawInTime:
     """Return a law as a function of the time since an instant."""
-    if is_constant(law):
-        constant = (
-            law.mean if isinstance(law, Fourier) else law.knots[0][1] if isinstance(law, BangBang) else law
-        )
-        return Constant(arithmetic, constant)
+    if isinstance(law, Fourier):
+        return Constant(arithmetic, law.mean) if is_constant(law) else Waves(arithmetic, law, instant)
     if isinstance(law, BangBang):
-        return Legs(arithmetic, law, instant)
-    assert isinstance(law, Fourier)
-    return Waves(arithmetic, law, instant)
+        return Constant(arithmetic, law.knots[0][1]) if is_constant(law) else Legs(arithmetic, law, instant)
+    return Constant(arithmetic, law)
 
 
 class Constant:

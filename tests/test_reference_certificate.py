@@ -8,6 +8,7 @@ from fractions import Fraction
 import flint
 import pytest
 from hypothesis import given, settings
+from support import faulty_provers as faults
 from support.forgery import both, drop, moved, put, shift
 from support.tables import BOX, LIFT
 from support.truth import IS_DEEP, is_delicate
@@ -196,3 +197,32 @@ def test_a_forged_certificate_is_refuted(name):
     with pytest.raises(Refuted, match=reason):
         check(claim)
     assert flint.ctx.prec == before
+
+
+# A fault in the laws that the second proof shares with the second stepper, and what it shows on.
+UNSOUND = [
+    (
+        faults.period_from_zero,
+        (
+            Stem(w=1.0, h=BangBang(knots=((0.25, 2.0), (0.75, 1.0), (1.25, 2.0)))),
+            State(0.25, 0.0, -1.875, 0.0, 0.0),
+            50.0,
+        ),
+    ),
+    (
+        faults.few_harmonics,
+        (Cap(r=Fourier(mean=1.0, omega=1.0, sin=(0.0625,) * 4)), State(0.0, 0.0, 0.5, 1.0, 0.5), 50.0),
+    ),
+    (
+        faults.rounded_omega,
+        (Cap(r=Fourier(mean=1.0, period=3.0, sin=(0.25,))), State(1.0, 0.0, 0.5, 1.0, 0.5), 50.0),
+    ),
+]
+
+
+@pytest.mark.parametrize(("fault", "step"), UNSOUND)
+def test_a_fault_in_the_second_laws_is_seen(fault, step):
+    claim = proved(*step)
+    check(claim)
+    with faults.patched(fault), pytest.raises(Refuted):
+        check(claim)

@@ -9,7 +9,7 @@ exactly: the crossing, the horizon, or the simplest rational number of the overl
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple
 
 from flint import arb, fmpq
@@ -207,21 +207,7 @@ def next_collision(scene: Scene, state: State, t_end: float, *, doublings: int =
     Returns:
         The answer; `undefined` only where it is shown exactly.
     """
-    if refusal := start.refused(scene, state, t_end):
-        return refusal
-    return _until_decided(lambda bits: _step(scene, state, t_end, bits), bits_for(scene, state), doublings)
-
-
-def _until_decided(attempt: Callable[[int], Answer], bits: int, doublings: int) -> Answer:
-    question = ""
-    for _ in range(doublings + 1):
-        try:
-            with precision(bits):
-                return attempt(bits)
-        except OpenQuestion as found:
-            question = str(found)
-            bits *= 2
-    return Answer("undecided", reason=f"{question} ({bits // 2} bits)", bits=bits // 2)
+    return trajectory(scene, state, 1, t_end, doublings=doublings)[0]
 
 
 def bits_for(scene: Scene, state: State) -> int:
@@ -231,19 +217,6 @@ def bits_for(scene: Scene, state: State) -> int:
         return BITS
     late = math.frexp(abs(state.t))[1] - math.frexp(float(shared.value(fp)))[1]
     return BITS + max(late, 0)
-
-
-def _step(scene: Scene, state: State, t_end: float, bits: int) -> Answer:
-    flight = SearchedFlight(Table(scene), line_of(state), state)
-    begun = start.judge(flight, state)
-    if isinstance(begun, Answer):
-        return begun._replace(bits=bits)
-    end = exact(t_end) - exact(state.t)
-    if end == 0:
-        return _answer(flight, Met(None), end, bits)
-    search = Search(flight, in_cap=begun.in_cap, end=end)
-    met = search.along_mouth() if begun.runs_along_mouth else search.outcome()
-    return _answer(flight, met, end, bits)
 
 
 def _answer(flight: SearchedFlight, met: Met, end: Ball | Rational | None, bits: int) -> Answer:
@@ -313,12 +286,12 @@ def _chain(scene: Scene, state: State, n_collisions: int, t_end: float | None, b
             return [begun._replace(bits=bits)]
         in_cap, along_mouth = begun.in_cap, begun.runs_along_mouth
         while len(found) < n_collisions:
-            end = None
-            if t_end is not None:
-                exact_start = flight.state is not None
-                end = exact(t_end) - (flight.line.t if exact_start else flight.balls.t)
-            search = Search(flight, in_cap=in_cap, end=end)
-            met = search.along_mouth() if along_mouth else search.outcome()
+            end = None if t_end is None else exact(t_end) - flight.line.t
+            if end == 0:
+                met = Met(None)
+            else:
+                search = Search(flight, in_cap=in_cap, end=end)
+                met = search.along_mouth() if along_mouth else search.outcome()
             found.append(_answer(flight, met, end, bits))
             if met.wall is None:
                 return found

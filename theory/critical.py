@@ -39,7 +39,7 @@ class Span(NamedTuple):
     inside: Fraction
 
 
-class IsolatedRoot(NamedTuple):
+class CriticalRoot(NamedTuple):
     """A real root isolated in [left, right] (equal when it is rational and met exactly)."""
 
     left: Fraction
@@ -144,7 +144,7 @@ def _multiplicity_at(p: exact.Polynomial, x: Fraction) -> int:
     return n
 
 
-def _roots(p: exact.Polynomial, a: Fraction, b: Fraction) -> list[IsolatedRoot]:
+def _roots(p: exact.Polynomial, a: Fraction, b: Fraction) -> list[CriticalRoot]:
     """Isolate the distinct roots in the open interval (a, b), in order."""
     if len(p) < 2:
         return []
@@ -161,16 +161,16 @@ def _roots(p: exact.Polynomial, a: Fraction, b: Fraction) -> list[IsolatedRoot]:
             continue
         isolated = n == 1 and right - left <= NARROW and exact.at(p, left) != 0 and exact.at(p, right) != 0
         if isolated:
-            found.append(IsolatedRoot(left, right, sum(s.n_roots(left, right) for s in sturms), simple))
+            found.append(CriticalRoot(left, right, sum(s.n_roots(left, right) for s in sturms), simple))
             continue
         middle = (left + right) / 2
         if exact.at(p, middle) == 0:
-            found.append(IsolatedRoot(middle, middle, _multiplicity_at(p, middle), simple))
+            found.append(CriticalRoot(middle, middle, _multiplicity_at(p, middle), simple))
         todo += [(left, middle), (middle, right)]
     return sorted(found)
 
 
-def _refined(ctx: Any, root: IsolatedRoot) -> Any:
+def _refined(ctx: Any, root: CriticalRoot) -> Any:
     if root.left == root.right:
         return number(ctx, root.left)
     low, high = number(ctx, root.left), number(ctx, root.right)

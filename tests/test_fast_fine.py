@@ -20,7 +20,7 @@ from fast.kernel import double_double as dd
 from fast.step import WALL_CODES
 from scene import BadInput, Collision, Rejected, State, Stem, Undecided, load
 
-N_STEPS = int(os.environ.get("MUSHROOMS_STEPS", "400"))
+N_STEPS = int(os.environ.get("MUSHROOMS_STEPS", "250"))
 UNIT = 2.0**51  # backward units of 2^-104 in a backward ulp
 SHARP = 4.0  # units that nearly all answers keep
 WORST = 2.0**24  # where a wall's speed is the rest of harmonics that cancel: see fast.kernel.refine

@@ -10,6 +10,7 @@ nearer to each other than 1 / FINE of a panel are not told apart; s varies by ab
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import lru_cache
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -17,6 +18,7 @@ import numpy as np
 from numpy.polynomial import chebyshev
 from numpy.typing import NDArray
 
+from scene.refusal import check_scene
 from scene.tables import Scene
 from theory.adiabatic import Captures, Window, captures
 from theory.constants import guarded
@@ -172,6 +174,13 @@ def tree(scene: Scene) -> Node:
     Raises:
         NotCovered, NotConverged: as `theory.predict`.
     """
+    check_scene(scene)
+    return _solved(scene)
+
+
+@lru_cache(maxsize=32)
+def _solved(scene: Scene) -> Node:
+    # Every curve and histogram of a scene asks for its tree again. Its arrays are shared, hence read only.
     found = captures(Cycle.of(scene, DIGITS), DIGITS + 4)
     return _node(found, found.root, iter([_branch(found, k) for k in range(len(found.placed))]))
 
@@ -182,13 +191,19 @@ def _branch(found: Captures, k: int) -> Branch:
     functions = (p.nu, p.t_in, p.t_out, p.A, p.B, p.log_g)
     coefficients = [[float(c) for c in found.grid.coefficients(values)] for values in functions]
     ends = [[float(values[0]), float(values[-1])] for values in functions]
-    return Branch(np.array(coefficients), np.array(ends), *(float(x) for x in placed[1:]))
+    return Branch(_kept(coefficients), _kept(ends), *(float(x) for x in placed[1:]))
+
+
+def _kept(numbers: list[list[float]]) -> Floats:
+    array = np.array(numbers)
+    array.setflags(write=False)
+    return array
 
 
 def _node(found: Captures, window: Window, branches: Iterator[Branch]) -> Node:
     own = tuple(next(branches) for _ in window.panels)
-    points = [(float(w), float(s)) for w, s in found.captured(window)]
-    weights, s = np.array(points).T if points else (np.empty(0), np.empty(0))
+    points = [[float(w), float(s)] for w, s in found.captured(window)]
+    weights, s = _kept(points).T if points else (np.empty(0), np.empty(0))
     spent, ctx = window.A_end - window.A_top, found.cycle.ctx
     return Node(
         weights,

@@ -34,7 +34,7 @@ class Grid:
 
     def _cosine_sums(self, values: list[Any]) -> list[Any]:
         """Return the sums over j of values[j] cos(pi j k / n), k = 0 ... n."""
-        # cos(pi (n - j) k / n) = (-1)^k cos(pi j k / n): the second half of the products is the first's.
+        # cos(pi (n - j) k / n) = (-1)^k cos(pi j k / n): the second half of the sums repeats the first.
         middle = self.n // 2
         pairs = list(zip(values[:middle], values[:middle:-1], strict=True))
         even, odd = [a + b for a, b in pairs] + [values[middle]], [a - b for a, b in pairs]

@@ -26,9 +26,11 @@ Not handled: questions that JSON or `scene.State` cannot hold (nan, fields missi
 
 from __future__ import annotations
 
+import decimal
 import hashlib
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
+from fractions import Fraction
 from functools import lru_cache
 from importlib import resources
 from pathlib import Path
@@ -46,6 +48,8 @@ Step = Callable[[Scene, State, float], Outcome]
 Follow = Callable[[Scene, State, int, float], list[Outcome]]
 Decimal = Annotated[str, msgspec.Meta(pattern=r"^-?[0-9]{1,40}(\.[0-9]{1,40})?(E[+-]?[0-9]{1,4})?$")]
 Enclosure = tuple[Decimal, Decimal]
+Ends = tuple[Fraction, Fraction]  # low and high of an enclosure, exactly
+DIGITS = 24  # decimals that an enclosure in the corpus is written with
 Hash = Annotated[str, msgspec.Meta(pattern="^[0-9a-f]{64}$")]
 
 
@@ -76,9 +80,19 @@ class Certified(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_de
     allowance: tuple[float, float, float, float, float]
     wall: Wall | None = None
 
+    def ends(self, name: str) -> Ends:
+        """Return both ends of one of the enclosures, exactly."""
+        low, high = getattr(self, name)
+        return Fraction(low), Fraction(high)
+
+    def centre(self, name: str) -> Fraction:
+        """Return the middle of one of the enclosures, exactly."""
+        low, high = self.ends(name)
+        return (low + high) / 2
+
 
 class Expectation(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
-    """One answer that is right.
+    """A certified answer: one answer that is right.
 
     Attributes:
         outcome: of the step; of a trajectory: how it ends, "collision" when all asked for are found.
@@ -145,6 +159,48 @@ class Manifest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     digest: Hash
     files: dict[str, File]
     retired: tuple[str, ...] = ()
+
+
+def certified(
+    ends: Mapping[str, Ends],
+    allowance: Sequence[float],
+    wall: Wall | None,
+    *,
+    digits: int = DIGITS,
+    is_wide: bool = False,
+) -> Certified:
+    """Write down a proved state: its enclosures in decimals, rounded outward.
+
+    Args:
+        ends: low and high of dt, x, y, vx, vy.
+        allowance: of these, in this order; four digits of it are kept.
+        wall: the wall met; None at the horizon.
+        digits: decimals to write.
+        is_wide: go one unit of the last decimal further, so that an enclosure in balls fits in.
+    """
+    numbers = {name: _written(ends[name], digits, is_wide) for name in NUMBERS}
+    dt, x, y, vx, vy = map(four_digits, allowance)
+    return Certified(**numbers, allowance=(dt, x, y, vx, vy), wall=wall)
+
+
+def four_digits(number: float) -> float:
+    """Return a number to the four digits that allowances and condition numbers are kept with."""
+    return float(f"{number:.3e}")
+
+
+def _written(ends: Ends, digits: int, is_wide: bool) -> Enclosure:
+    low, high = (
+        decimal.Context(prec=digits, rounding=rounding, Emin=-9999, Emax=9999)
+        for rounding in (decimal.ROUND_FLOOR, decimal.ROUND_CEILING)
+    )
+    lowest, highest = (
+        context.divide(decimal.Decimal(end.numerator), decimal.Decimal(end.denominator))
+        for context, end in zip((low, high), ends, strict=True)
+    )
+    if is_wide:
+        lowest = lowest and lowest.next_minus(low)
+        highest = highest and highest.next_plus(high)
+    return str(lowest.normalize(low)), str(highest.normalize(high))
 
 
 def load(level: str = "core", path: Path | None = None) -> list[Vector]:

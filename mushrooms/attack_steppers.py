@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from fractions import Fraction
+
+from mpmath import isfinite
 
 import fast
 import reference
 from conformance.attacks import Attack, Claim, Steppers
-from reference.arithmetic import Enclosure, rational
+from conformance.generator.prover import coasted, ends
+from conformance.grading.agreement import Answer, Enclosed
+from conformance.vectors import Ends
 from reference.certificate import certificate, path_certificate
-from scene import BadInput, Horizon, Scene, State, Undefined
+from scene import BadInput, Horizon, Rejected, Scene, State, Undecided, Undefined
 
 DIGITS = 25  # of a single step: enough to tell enclosures from wrong answers
 WALLS = ("arc", "base", "left", "right", "floor")
@@ -24,40 +27,41 @@ def steppers(choice: str) -> Steppers:
     return Steppers(proved)
 
 
-def prove(attack: Attack) -> Sequence[Claim]:
+def prove(attack: Attack) -> Claim:
     """Answer an attack with the reference: outcomes, enclosures, and the certificate of all of it."""
     scene, state = attack.scene, attack.state
     if attack.n_collisions is None:
         assert attack.t_end is not None
         outcome = reference.next_collision(scene, state, attack.t_end, digits=DIGITS)
-        claim = claimed(outcome)
-        if isinstance(outcome, reference.Collision | reference.Horizon | Undefined):
-            claim = claim._replace(certificate=certificate(scene, state, attack.t_end, outcome))
-        return [claim]
+        answers = [claimed(outcome, (Fraction(state.t), Fraction(state.t)))]
+        if isinstance(outcome, Undecided | Rejected):
+            return Claim(answers)
+        return Claim(answers, certificate(scene, state, attack.t_end, outcome))
     try:
         path = reference.trajectory(scene, state, attack.n_collisions, attack.t_end, working=attack.working)
     except BadInput as error:
-        return [Claim("rejected", reason=str(error))]
-    steps: list[reference.Outcome] = [*path.steps]
-    claims = [claimed(step) for step in (steps if path.outcome is None else [*steps, path.outcome])]
+        return Claim([Rejected(str(error))])
+    since = Fraction(state.t), Fraction(state.t)
+    answers = []
+    for step in path.steps:
+        answers.append(claimed(step, since))
+        since = ends(step.after.t)
+    if path.outcome is not None:
+        answers.append(claimed(path.outcome, since))
     if attack.t_end is None and isinstance(path.outcome, Undefined):
-        return claims  # without a horizon the proof of an undefined end cannot be written down
-    return [claims[0]._replace(certificate=path_certificate(scene, state, attack.t_end, path)), *claims[1:]]
+        return Claim(answers)  # without a horizon the proof of an undefined end cannot be written down
+    return Claim(answers, path_certificate(scene, state, attack.t_end, path))
 
 
-def claimed(outcome: reference.Outcome) -> Claim:
-    """Return one of the reference's outcomes as a claim."""
+def claimed(outcome: reference.Outcome, since: Ends) -> Answer:
+    """Return one of the reference's outcomes, reached from time `since`: collisions and horizons enclosed."""
     if isinstance(outcome, reference.Collision):
-        numbers = [ends(outcome.dt), *(ends(number) for number in outcome.after[1:])]
-        return Claim("collision", outcome.wall, numbers=numbers)
+        return Enclosed(outcome.wall, [ends(number) for number in (outcome.dt, *outcome.after[1:])])
     if isinstance(outcome, reference.Horizon):
-        return Claim("horizon")
-    return Claim(type(outcome).__name__.lower(), reason=outcome.reason)
-
-
-def ends(enclosure: Enclosure) -> tuple[Fraction, Fraction]:
-    """Return the ends of an enclosure, exactly."""
-    return rational(enclosure.lo._mpf_), rational(enclosure.hi._mpf_)
+        if not isfinite(outcome.at.t.hi):  # a particle at rest, followed without a horizon
+            return outcome.rounded()
+        return Enclosed(None, list(coasted(outcome, since).values()))
+    return outcome
 
 
 def flow(scene: Scene, state: State, t_end: float) -> dict[str, int] | None:

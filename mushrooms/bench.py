@@ -25,7 +25,7 @@ from scene.refusal import BadInput
 if TYPE_CHECKING:
     from conformance.bench.comparison import Ratio
     from conformance.bench.contenders import Ask, Contender, Family
-    from conformance.bench.measure import Settings
+    from conformance.bench.measure import Effort
     from conformance.bench.record import Record, Size
 
 MAX_SEED = 2**64 - 1
@@ -91,6 +91,7 @@ def bench(
 def _measured(size: Size, seed: int, command: list[str]) -> Record:
     """Run everything."""
     from conformance.bench import growth, hard_cases, measure, record, work, workloads
+    from conformance.generator.prover import proved_step
     from mushrooms import bench_contenders as ours
 
     begin = time.monotonic()
@@ -106,14 +107,16 @@ def _measured(size: Size, seed: int, command: list[str]) -> Record:
         points, clock = [], list[float]()
         for rule in workloads.RULES:
             tick(f"questions: {rule.name}")
-            workload = workloads.draw_workload(rule, seed, n_questions, ours.prove)
-            found, troubles = measure.measure(workload, contenders, _settings(size), tick, clock)
+            workload = workloads.draw_workload(rule, seed, n_questions, proved_step)
+            found, troubles = measure.measure(workload, contenders, _effort(size), tick, clock)
             points += found
             not_run |= {f"{name} on {rule.name}": why for name, why in troubles.items()}
             tick("")
         n_paths, length = PATHS[size]
         bar.reset(task, total=n_paths, description="error growth")
-        grown = growth.grow(ours.our_followers(), ours.prove, ours.prove_path, seed, n_paths, length, tick)
+        grown = growth.grow(
+            ours.our_followers(), proved_step, ours.linearise, ours.prove_path, seed, n_paths, length, tick
+        )
         bar.reset(task, total=48, description="hard cases")
         cases = hard_cases.tabulate(askers, tick)
         bar.reset(task, total=None)
@@ -146,10 +149,10 @@ def _measured(size: Size, seed: int, command: list[str]) -> Record:
     )
 
 
-def _settings(size: str) -> Settings:
-    from conformance.bench.measure import Settings
+def _effort(size: str) -> Effort:
+    from conformance.bench.measure import Effort
 
-    return Settings(REPEATS[size], 3e6, 4e8) if size == "quick" else Settings(REPEATS[size], 2e7, 4e9)
+    return Effort(REPEATS[size], 3e6, 4e8) if size == "quick" else Effort(REPEATS[size], 2e7, 4e9)
 
 
 def _contenders(

@@ -14,16 +14,17 @@ from functools import partial
 import fast
 import reference
 from conformance import plain, vectors
-from conformance.bench.contenders import Answer, Ask, Contender, Exact, Lap, by_call
+from conformance.bench.contenders import Ask, Contender, Given, Lap, by_call
 from conformance.bench.growth import FAR, Follower, Place
 from conformance.bench.work import SCENE, Cost, Load
 from conformance.bench.workloads import WINDOW, Workload
-from conformance.grading.agreement import Truth
+from conformance.generator import prover
+from conformance.grading.agreement import Answer, Enclosed, exact
+from conformance.grading.error import Matrix
 from fast import __main__ as fast_protocol
 from fast.batch import careful_steps, fine_steps, flights, lane_steps
 from reference import __main__ as proof
-from reference.arithmetic import rational
-from scene import Collision, Outcome, Scene, State, load
+from scene import Collision, Scene, State, load
 from scene.geometry import rounded
 
 DIGITS = (15, 30, 50, 100, 200)
@@ -36,14 +37,11 @@ COMPILED = {
 }
 
 
-def prove(scene: Scene, state: State, t_end: float, digits: int) -> Truth:
-    """Answer a step by proof, with its Jacobian."""
-    outcome = reference.next_collision(scene, state, t_end, digits=digits, is_differentiated=True)
-    if not isinstance(outcome, reference.Collision):
-        return Truth(outcome.rounded() if isinstance(outcome, reference.Horizon) else outcome)
-    assert outcome.jacobian is not None
-    numbers = [outcome.dt.centre(), *(c.centre() for c in outcome.after[1:])]
-    return Truth(outcome.rounded(), numbers, [[float(d) for d in row] for row in outcome.jacobian])
+def linearise(scene: Scene, state: State, t_end: float) -> tuple[Collision, Matrix]:
+    """Return a proved collision, and its Jacobian."""
+    outcome = prover.ask(scene, state, t_end)
+    assert isinstance(outcome, reference.Collision)
+    return outcome.rounded(), prover.flight_of(outcome, state, t_end).jacobian
 
 
 def prove_path(scene: Scene, state: State, n_collisions: int) -> list[Place]:
@@ -79,12 +77,10 @@ def our_followers() -> dict[str, Follower]:
 
 
 def _proof(digits: int) -> Contender:
-    def step(scene: Scene, state: State, t_end: float) -> Outcome | Exact:
+    def step(scene: Scene, state: State, t_end: float) -> Answer:
         found = reference.next_collision(scene, state, t_end, digits=digits)
         if isinstance(found, reference.Collision):
-            # The upper ends: their error is what the enclosure admits.
-            ends = [rational(e.hi._mpf_) for e in (found.dt, *found.after[1:])]
-            return Exact(found.wall, tuple(ends))
+            return Enclosed(found.wall, list(prover.collided(found).values()))
         return found.rounded() if isinstance(found, reference.Horizon) else found
 
     return by_call(f"proof, {digits} digits", "proof", step)
@@ -97,11 +93,11 @@ def _careful(workload: Workload, n_times: int) -> Lap:
 
 def _fine(workload: Workload, n_times: int) -> Lap:
     paths, seconds = fine_steps(workload.scene, [q.state for q in workload.questions], n_times)
-    answers: list[Answer] = []
+    answers: list[Given] = []
     for path in paths:
         if path.outcome is None:
             dt, _, *place = path.numbers(0)
-            answers.append(Exact(path.walls[0], (dt, *place)))
+            answers.append(exact(path.walls[0], (dt, *place)))
         else:
             answers.append(path.outcome)
     return Lap(seconds / (n_times * len(answers)) * 1e9, answers, seconds * 1e9)

@@ -10,12 +10,13 @@ from flint import arb
 from hypothesis import given, settings
 from support import faulty_provers as faults
 
-from conformance.attacks import FAMILIES, Claim, Steppers, line, run
-from conformance.attacks.search import as_truth, flown, proved, stepped, truths
+from conformance.attacks import FAMILIES, Attack, Claim, Steppers, line, run
+from conformance.attacks.search import as_certified, flown, proved, stepped, truths
+from conformance.grading.agreement import middle
 from conformance.second_stepper import Answer, next_collision
 from conformance.strategies import adversarial
-from mushrooms.attack_steppers import steppers
-from scene import Collision, Horizon, State, Undecided, load
+from mushrooms.attack_steppers import prove, steppers
+from scene import Collision, Horizon, Rejected, State, Undecided, Undefined, load
 
 N_ATTACKS = int(os.environ.get("MUSHROOMS_ATTACKS", "6"))
 SEED = 2014
@@ -110,29 +111,50 @@ ANSWER = next_collision(SCENE, STATE, 10.0)
     ],
 )
 def test_a_step_is_judged(spoil, kind):
-    right = as_truth(ANSWER, 10.0).outcome
-    assert stepped(spoil(right), ANSWER, STATE, 10.0).kind == kind
+    (right,) = middle(as_certified([ANSWER], STATE), STATE)
+    assert stepped(spoil(right), ANSWER, STATE).kind == kind
+
+
+def off(enclosed):
+    """The claim that everything happens a little later and elsewhere."""
+    return enclosed._replace(
+        ends=[(high + (high - low) + abs(high) / 10**30,) * 2 for low, high in enclosed.ends]
+    )
 
 
 @pytest.mark.parametrize(
-    ("claim", "kind"),
+    ("spoil", "kind"),
     [
-        (Claim("collision", "arc"), "agreed"),
-        (Claim("undecided", reason="shy"), "undecided"),
-        (Claim("collision", "base"), "wrong"),
-        (Claim("horizon"), "wrong"),
-        (Claim("collision", "arc", numbers=[(1, 2)] * 5), "wrong"),
+        (lambda enclosed: enclosed, "agreed"),
+        (lambda _: Undecided("shy"), "undecided"),
+        (lambda _: Rejected("no"), "wrong"),
+        (lambda enclosed: enclosed._replace(wall="base"), "wrong"),
+        (lambda enclosed: enclosed._replace(wall=None), "wrong"),
+        (off, "wrong"),
     ],
 )
-def test_a_claim_is_judged(claim, kind):
+def test_a_claim_is_judged(spoil, kind):
     assert ANSWER.wall == "arc"
-    assert proved([claim], [ANSWER]).kind == kind
+    (right,) = faults.claim([ANSWER]).answers
+    assert proved(Claim([spoil(right)]), [ANSWER], STATE).kind == kind
+
+
+def test_a_claim_of_another_reason_or_a_false_certificate_is_wrong():
+    edge = Answer("undefined", reason="mouth-edge")
+    assert proved(Claim([Undefined("corner")]), [edge], STATE).kind == "wrong"
+    assert proved(Claim([Undefined("mouth-edge")]), [edge], STATE).kind == "agreed"
+    scene, state = load("frozen-mushroom"), State(0.0, 0.1, 0.2, 0.3, 0.4)
+    true = prove(Attack(scene, state, 9.0))
+    answers = truths(Attack(scene, state, 9.0))
+    assert proved(true, answers, state).kind == "agreed"
+    false = true._replace(certificate={**true.certificate, "wall": "floor"})
+    assert proved(false, answers, state).kind == "wrong"
 
 
 def test_a_claim_beyond_the_path_is_wrong():
-    claim = faults.claims([ANSWER])[0]
-    assert proved([claim, claim], [ANSWER]).kind == "wrong"
-    assert proved([claim], [Answer("undecided")]).kind == "open"
+    (right,) = faults.claim([ANSWER]).answers
+    assert proved(Claim([right, right]), [ANSWER], STATE).kind == "wrong"
+    assert proved(Claim([right]), [Answer("undecided")], STATE).kind == "open"
 
 
 def test_a_flow_is_judged():
@@ -164,7 +186,7 @@ def test_the_command_prints_wrong_cases(command_line, tmp_path, monkeypatch):
     monkeypatch.setattr("mushrooms.attack_steppers.prove", faults.impatient)
     found = command_line("attack", "--family", "long-wait", "--cases", 2, "--stepper", "reference")
     assert found.code == 1
-    assert "wrong: step 1 is proved to be horizon" in found.out
+    assert "wrong: proved, but horizon, must be" in found.out
     assert '"family": "long-wait", "seed": 0' in found.out
 
 

@@ -4,19 +4,19 @@ from __future__ import annotations
 
 import json
 import math
-from fractions import Fraction
 
 import msgspec
 import pytest
 
 import fast
 import reference
-from conformance.grading.grade import BOUND, Grade, grade, precision_class
-from conformance.vectors import NUMBERS, Certified, Expectation, Vector, load
+from conformance.grading.agreement import BOUND, middle
+from conformance.grading.grade import Grade, grade, precision_class
+from conformance.vectors import NUMBERS, Certified, Expectation, Vector, answer, load
 from fast.__main__ import follow as fast_follow
 from reference.__main__ import follow as reference_follow
 from reference.__main__ import rounded
-from scene import BadInput, Rejected, State, from_data
+from scene import State
 
 THIN = {"dt": ("0.75", "0.75"), "x": ("1", "1"), "y": ("-0.5", "-0.5"), "vx": ("-1", "-1"), "vy": ("0", "0")}
 BOX = {"table": "stem", "w": 1.0, "h": 1.0}
@@ -195,25 +195,10 @@ def corpus() -> list[Vector]:
     return load("stress")
 
 
-def centre(certified, name):
-    return sum(map(Fraction, getattr(certified, name))) / 2
-
-
 def exact_answer(asked: Vector):
-    """The answer in the middle of the enclosures, rounded."""
-    expected = asked.expect[0]
-    outcomes, t = [], Fraction(asked.state.t)
-    for step in expected.steps:
-        t += centre(step, "dt")
-        numbers = {name: float(centre(step, name)) for name in NUMBERS}
-        if step.wall is None:
-            numbers.pop("dt")
-            outcomes.append({"outcome": "horizon", "t": asked.t_end, **numbers})
-        else:
-            outcomes.append({"outcome": "collision", "wall": step.wall, "t": float(t), **numbers})
-    if expected.outcome not in ("collision", "horizon"):
-        outcomes.append({"outcome": expected.outcome, "reason": expected.reason or "so it is"})
-    return outcomes[0] if asked.kind == "step" else {"steps": outcomes}
+    """The answer in the middle of the enclosures, rounded, as it comes over the wire."""
+    steps = [msgspec.to_builtins(step) for step in middle(asked.expect[0], asked.state)]
+    return steps[0] if asked.kind == "step" else {"steps": steps}
 
 
 def test_exact_answers_pass_within_an_ulp(corpus):
@@ -231,7 +216,7 @@ def shifted(asked: Vector, index: int, name: str, by: float):
     allowed = dict(zip(NUMBERS, certified.allowance, strict=True))
     if name == "t":
         flights = asked.expect[0].steps[: index + 1]
-        size = 2 * abs(asked.state.t) + sum(s.allowance[0] + float(centre(s, "dt")) for s in flights)
+        size = 2 * abs(asked.state.t) + sum(s.allowance[0] + float(s.centre("dt")) for s in flights)
     else:
         size = max(allowed[n] + abs(step[n]) for n in pair)
     step[name] += by * size
@@ -268,24 +253,12 @@ def test_swapped_walls_fail(corpus):
                 assert grade(asked, answer).verdict == "fail", asked.id
 
 
-def answered(asked: Vector, next_collision, follow):
-    """What a stepper of ours answers on the wire."""
-    try:
-        scene = from_data(asked.scene)
-        if asked.kind == "step":
-            return msgspec.to_builtins(next_collision(scene, asked.state, asked.t_end))
-        steps = follow(scene, asked.state, asked.collisions, asked.t_end)
-    except BadInput as error:
-        return msgspec.to_builtins(Rejected(str(error)))
-    return {"steps": [msgspec.to_builtins(step) for step in steps]}
-
-
 def proved(scene, state, t_end):
     return rounded(reference.next_collision(scene, state, t_end))
 
 
 def graded(sample, *stepper) -> dict[str, Grade]:
-    return {asked.id: grade(asked, answered(asked, *stepper)) for asked in sample}
+    return {asked.id: grade(asked, answer(asked, *stepper)) for asked in sample}
 
 
 def test_the_reference_passes(corpus):

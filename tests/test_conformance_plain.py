@@ -33,7 +33,7 @@ def test_plain_agrees_with_reference(tally):
         found = compare(answer, proved_step(scene, state, t_end), state, BOUND)
         tally["steps"] += 1
         tally[found.kind] += 1
-        assert found.kind in ("agrees", "undecided"), (found, answer)
+        assert found.kind in ("agrees", "undecided", "indeterminate"), (found, answer)
 
     step()
     assert tally["steps"] >= N_STEPS

@@ -10,7 +10,7 @@ from support import faulty_provers as faults
 from support.tables import BREATHING, CIRCLE, LEAP, LIFT, STATIC
 
 from conformance import plain
-from conformance.attacks.search import as_truth
+from conformance.attacks.search import as_certified
 from conformance.generator.draws import Draw, clock, scene, state
 from conformance.grading.agreement import compare
 from conformance.second_stepper import next_collision, trajectory
@@ -111,7 +111,7 @@ def agreement_with_plain():
         answer, rival = next_collision(table, start, t_end), plain.next_collision(table, start, t_end)
         if isinstance(rival, Undecided) or answer.kind == "undecided":
             continue
-        found = compare(rival, as_truth(answer, t_end), start, 1e6)
+        found = compare(rival, as_certified([answer], start), start, 1e6)
         assert found.kind == "agrees", (index, found)
         n_collisions += isinstance(rival, Collision)
     assert n_collisions > N_DRAWS // 2

@@ -10,10 +10,12 @@ from support.truth import centre, proved_step
 
 import fast
 import reference
-from conformance.grading.agreement import Truth, compare
-from conformance.grading.error import condition_number
+from conformance.generator.prover import ask, ends, flight_of
+from conformance.grading.agreement import compare, exact
+from conformance.grading.error import condition_number, inputs_of, moved
 from conformance.strategies import scenes_and_states
-from scene import Cap, Collision, State, load
+from conformance.vectors import NUMBERS, Expectation, certified
+from scene import Cap, State, load
 
 INPUTS = ("t", "x", "y", "vx", "vy")
 FROM_THE_CAP = State(0.3, 0.1, 0.2, 3.0, 4.0)
@@ -119,9 +121,11 @@ def test_fast_trajectories_within_their_chained_bound(name, tally):
         assert path.walls == [step.wall for step in truth.steps]
         t, x, y_end, vx, vy = map(float, path.steps[-1, 1:])
         after = truth.steps[-1].after
-        answer = Collision(path.walls[-1], t, t, x, y_end, vx, vy)
-        jacobian = [[float(d) for d in row] for row in truth.jacobian]
-        expected = Truth(answer, [centre(c) for c in after], jacobian)
+        # The bound is on the time itself: it stands where a step has its flight time.
+        numbers = dict(zip(NUMBERS, map(ends, after), strict=True))
+        allowance = [moved([float(d) for d in row], inputs_of(start)) for row in truth.jacobian]
+        expected = Expectation("collision", (certified(numbers, allowance, path.walls[-1]),))
+        answer = exact(path.walls[-1], list(map(Fraction, (t, x, y_end, vx, vy))))
         found = compare(answer, expected, start, bound=16.0)
         tally[f"{n} collisions, thousandths of backward ulps"] = round(1000 * found.ulps)
         assert found.kind == "agrees", found
@@ -131,19 +135,17 @@ def test_condition_number_of_a_grazing_hit():
     """A graze with v_n / v = e has derivatives of order 1/e: the measure stays fair."""
     scene = load("frozen-mushroom")
     state = State(0.0, 0.0, 1.0 - 2.0**-30, 1.0, 0.0)
-    truth = proved_step(scene, state, 10.0)
-    assert isinstance(truth.outcome, Collision)
-    largest = max(abs(d) for row in truth.jacobian for d in row)
+    flight = flight_of(ask(scene, state, 10.0), state, 10.0)
+    largest = max(abs(d) for row in flight.jacobian for d in row)
     assert 1e3 < largest < 1e6
+    truth = proved_step(scene, state, 10.0)
     assert compare(fast.next_collision(scene, state, 10.0), truth, state, 16.0).kind == "agrees"
-    c, inputs = truth.outcome, (state.t, state.x, state.y, state.vx, state.vy)
-    condition = condition_number((c.dt, c.x, c.y, c.vx, c.vy), truth.jacobian, inputs)
+    condition = condition_number(flight.centre(), flight.jacobian, inputs_of(state))
     assert 1e7 < condition < 1e10  # dt is sqrt(2) 2^-15, its derivative by y 2^15 / sqrt(2)
 
 
 def test_condition_number_of_a_head_on_hit():
     """Along a radius from the centre: dt = 1/v and v' = -v have condition 1."""
     state = State(0.0, 0.0, 0.0, 0.0, 2.0)
-    truth = proved_step(Cap(r=1.0), state, 10.0)
-    c = truth.outcome
-    assert condition_number((c.dt, c.x, c.y, c.vx, c.vy), truth.jacobian, (0, 0, 0, 0, 2.0)) == 1.0
+    flight = flight_of(ask(Cap(r=1.0), state, 10.0), state, 10.0)
+    assert condition_number(flight.centre(), flight.jacobian, inputs_of(state)) == 1.0

@@ -1,8 +1,8 @@
 """Run families of attacks against steppers, every answer compared with the second stepper's.
 
-Steppers are callables that the caller gives. A proved stepper answers with claims, whose enclosures must meet
-the second stepper's; `undecided` is honest. A fast one answers a step in the wire's form, judged as grades
-are (`conformance.grading.agreement`), and a flow with the walls it counted.
+Steppers are callables that the caller gives. A proved stepper answers with a claim, whose enclosures must
+meet the second stepper's; `undecided` is honest. A fast one answers a step in the wire's form, and a flow
+with the walls it counted. All but these counts are compared by `conformance.grading.agreement`.
 """
 
 from __future__ import annotations
@@ -14,36 +14,34 @@ from fractions import Fraction
 from functools import partial
 from typing import Any, NamedTuple
 
-from flint import arb, fmpq
-
 from conformance import second_stepper
 from conformance.attacks.case import Attack, Family, line
-from conformance.grading.agreement import Truth, compare
+from conformance.grading.agreement import Answer, compare
+from conformance.grading.error import free_flight, inputs_of, moved
 from conformance.second_proof.exclusion import Refuted
 from conformance.second_proof.step import check
 from conformance.second_proof.trajectory import check_path
-from conformance.second_stepper import Answer
-from scene import Collision, Horizon, Outcome, Rejected, Scene, State, Undecided, Undefined
+from conformance.vectors import NUMBERS, Certified, Ends, Expectation, certified
+from scene import Outcome, Rejected, Scene, State, Undecided, Undefined
 
 KINDS = ("agreed", "undecided", "refused", "open", "wrong")
 BOUND = 4.0  # backward ulps: the sharpest class of grades
+DIGITS = 400  # decimals that balls are written with: beyond their own precision
 
 
 class Claim(NamedTuple):
-    """One step as a proved stepper answers it; the same fields as `second_stepper.Answer`.
+    """What a proved stepper answers.
 
-    `numbers` are pairs (low, high) that enclose dt, x, y, vx, vy; a `certificate` is proved again. That of a
-    path is given with its first step.
+    Attributes:
+        answers: one a step, collisions and horizons enclosed.
+        certificate: of all of it, to be proved again; None where there is none.
     """
 
-    kind: str
-    wall: str | None = None
-    reason: str = ""
-    numbers: Sequence[tuple[Fraction, Fraction]] = ()
+    answers: list[Answer]
     certificate: dict[str, Any] | None = None
 
 
-Prover = Callable[[Attack], Sequence[Claim]]
+Prover = Callable[[Attack], Claim]
 Stepper = Callable[[Scene, State, float], Outcome]
 Flow = Callable[[Scene, State, float], "dict[str, int] | None"]  # None: undecided
 
@@ -83,7 +81,7 @@ class Tally:
             self.wrong.append(f"{verdict.why}: {where}")
 
 
-def truths(attack: Attack) -> list[Answer]:
+def truths(attack: Attack) -> list[second_stepper.Answer]:
     """Return the second stepper's answers."""
     if attack.n_collisions is not None:
         return second_stepper.trajectory(attack.scene, attack.state, attack.n_collisions, attack.t_end)
@@ -129,7 +127,7 @@ def judged(attack: Attack, steppers: Steppers, tally: Tally) -> Iterable[Verdict
     answers = truths(attack)
     if steppers.prover is not None:
         prover, begun = steppers.prover, time.perf_counter()
-        verdict = _survived(lambda: proved(prover(attack), answers))
+        verdict = _survived(lambda: proved(prover(attack), answers, attack.state))
         tally.slowest = max(tally.slowest, (time.perf_counter() - begun) / max(len(answers), 1))
         yield verdict
     if steppers.stepper is not None:
@@ -141,8 +139,8 @@ def judged(attack: Attack, steppers: Steppers, tally: Tally) -> Iterable[Verdict
         yield _survived(lambda: flown(flow(attack.scene, attack.state, end), answers))
 
 
-def _step_verdict(stepper: Stepper, attack: Attack, t_end: float, answer: Answer) -> Verdict:
-    return stepped(stepper(attack.scene, attack.state, t_end), answer, attack.state, t_end)
+def _step_verdict(stepper: Stepper, attack: Attack, t_end: float, answer: second_stepper.Answer) -> Verdict:
+    return stepped(stepper(attack.scene, attack.state, t_end), answer, attack.state)
 
 
 def _survived(judge: Callable[[], Verdict]) -> Verdict:
@@ -153,92 +151,83 @@ def _survived(judge: Callable[[], Verdict]) -> Verdict:
         return Verdict("wrong", f"it raises {type(error).__name__}: {error}")
 
 
-def proved(claims: Sequence[Claim], answers: Sequence[Answer]) -> Verdict:
+def proved(claim: Claim, truth: Sequence[second_stepper.Answer], state: State) -> Verdict:
     """Compare a proved stepper's path with the second stepper's, up to where either is undecided."""
-    for number, (claim, answer) in enumerate(zip(claims, answers, strict=False), 1):
-        if claim.kind == "undecided":
-            return Verdict("undecided")
-        if answer.kind == "undecided":
-            return Verdict("open", answer.reason)
-        if (claim.kind, claim.wall) != (answer.kind, answer.wall):
-            met = (
-                f"{claim.kind} {claim.wall or claim.reason}, not {answer.kind} {answer.wall or answer.reason}"
-            )
-            return Verdict("wrong", f"step {number} is proved to be {met}")
-        if claim.kind == "undefined" and claim.reason != answer.reason:
-            return Verdict("wrong", f"step {number} is undefined: {claim.reason}, not {answer.reason}")
-        for name, ends, ball in zip(
-            ("dt", "x", "y", "vx", "vy"), claim.numbers, answer.numbers, strict=False
-        ):
-            if not meets(ends, ball):
-                return Verdict("wrong", f"the enclosure of {name} after step {number} misses the truth")
-        if claim.certificate is not None:
-            try:
-                (check_path if "steps" in claim.certificate else check)(claim.certificate)
-            except Refuted as error:
-                return Verdict("wrong", f"the certificate of step {number} on does not hold: {error}")
-        if claim.kind == "rejected":
-            return Verdict("refused")
-    if len(claims) > len(answers):
-        return Verdict("wrong", f"{len(claims)} steps are proved of a path that ends after {len(answers)}")
-    return Verdict("agreed")
+    is_open = truth[-1].kind == "undecided"
+    given = claim.answers[: len(truth) - 1] if is_open else claim.answers
+    expected = as_certified(truth[: len(given)] if is_open else truth, state)
+    # Two enclosures of one number meet: they are less than 0 backward ulps apart.
+    found = compare(given, expected, state, bound=0.0)
+    if found.kind == "undecided" or any(isinstance(a, Undecided) for a in claim.answers[: len(truth)]):
+        return Verdict("undecided")
+    if found.kind not in ("agrees", "indeterminate"):
+        return Verdict("wrong", f"proved, but {found.why}")
+    end = given[-1] if given else None
+    if isinstance(end, Undefined) and end.reason != expected.reason:
+        return Verdict("wrong", f"proved to be undefined: {end.reason}, not {expected.reason}")
+    if claim.certificate is not None:
+        try:
+            (check_path if "steps" in claim.certificate else check)(claim.certificate)
+        except Refuted as error:
+            return Verdict("wrong", f"the certificate does not hold: {error}")
+    if is_open:
+        return Verdict("open", truth[-1].reason)
+    return Verdict("refused" if isinstance(end, Rejected) else "agreed")
 
 
-def meets(ends: tuple[Fraction, Fraction], ball: Any) -> bool:
-    """Tell whether a ball holds a number of [low, high]; a ball exceeds its number by rounding only."""
-    low, high = (arb(fmpq(end.numerator, end.denominator)) for end in ends)
-    return bool(ball.overlaps(low.union(high)))
-
-
-def late_enough(state: State, answer: Answer) -> float | None:
+def late_enough(state: State, answer: second_stepper.Answer) -> float | None:
     """Return a horizon well after the first collision, for a path asked for without one."""
     if answer.kind != "collision":
         return None
     return state.t + 2 * float(answer.numbers[0].mid()) + abs(state.t) * 2.0**-50
 
 
-def stepped(outcome: Outcome, answer: Answer, state: State, t_end: float) -> Verdict:
+def stepped(outcome: Outcome, truth: second_stepper.Answer, state: State) -> Verdict:
     """Judge one step in binary64: the same outcome within some backward ulps, or an honest undecided."""
     if isinstance(outcome, Undecided):
         return Verdict("undecided")
-    if answer.kind == "undecided":
-        return Verdict("open", answer.reason)
+    if truth.kind == "undecided":
+        return Verdict("open", truth.reason)
     if isinstance(outcome, Rejected):
         return Verdict("refused")
-    if isinstance(outcome, Undefined) and answer.kind == "undefined":
-        return Verdict("agreed")
-    truth = as_truth(answer, t_end)
-    found = compare(outcome, truth, state, BOUND)
+    found = compare(outcome, as_certified([truth], state), state, BOUND)
     if found.kind == "agrees":
         return Verdict("agreed", ulps=found.ulps)
-    met = f"{type(outcome).__name__.lower()} {getattr(outcome, 'wall', '')}"
-    why = {
-        "numbers": f"numbers are off by {found.ulps:.3g} backward ulps",
-        "wall": f"{met}, not {answer.wall}",
-    }.get(found.kind, f"{met}, not {answer.kind} {answer.wall or answer.reason}")
-    return Verdict("wrong", why, found.ulps)
+    return Verdict("open" if found.kind == "indeterminate" else "wrong", found.why, found.ulps)
 
 
-def as_truth(answer: Answer, t_end: float) -> Truth:
-    """Return an answer as comparisons take it."""
-    if answer.kind not in ("collision", "horizon"):
-        plain = Rejected(answer.reason) if answer.kind == "rejected" else Undefined("corner")
-        return Truth(plain)
-    numbers = [_fraction(ball) for ball in answer.numbers]
-    dt, x, y, vx, vy = map(float, numbers)
-    if answer.kind == "horizon":
-        return Truth(Horizon(t_end, x, y, vx, vy), numbers)
-    assert answer.wall is not None
-    rows = [[float(entry.abs_upper()) for entry in row] for row in answer.jacobian]
-    return Truth(Collision(answer.wall, dt, 0.0, x, y, vx, vy), numbers, rows)
+def as_certified(truth: Sequence[second_stepper.Answer], state: State) -> Expectation:
+    """Return the second stepper's path, or step, as a certified answer.
+
+    The allowances are those of the first step, and 0 for later ones: the second stepper does not know them.
+    """
+    steps = [
+        _certified(answer, state if number == 0 else None)
+        for number, answer in enumerate(truth)
+        if answer.kind in ("collision", "horizon")
+    ]
+    return Expectation(
+        truth[-1].kind if truth else "collision", tuple(steps), truth[-1].reason if truth else ""
+    )
 
 
-def _fraction(ball: Any) -> Fraction:
-    middle = ball.mid().fmpq()
-    return Fraction(int(middle.p), int(middle.q))
+def _certified(answer: second_stepper.Answer, state: State | None) -> Certified:
+    numbers = dict(zip(NUMBERS, map(ball_ends, answer.numbers), strict=True))
+    allowance = [0.0] * len(NUMBERS)
+    if state is not None:
+        rows = [[float(entry.abs_upper()) for entry in row] for row in answer.jacobian]
+        rows = rows or free_flight(state, float(answer.numbers[0].mid()))
+        allowance = [moved(row, inputs_of(state)) for row in rows]
+    return certified(numbers, allowance, answer.wall, digits=DIGITS)
 
 
-def flown(counts: dict[str, int] | None, answers: Sequence[Answer]) -> Verdict:
+def ball_ends(ball: Any) -> Ends:
+    """Return the ends of a ball, exactly."""
+    low, high = (end.fmpq() for end in (ball.lower(), ball.upper()))
+    return Fraction(int(low.p), int(low.q)), Fraction(int(high.p), int(high.q))
+
+
+def flown(counts: dict[str, int] | None, answers: Sequence[second_stepper.Answer]) -> Verdict:
     """Compare the walls that a flow counted with those of the path."""
     if counts is None:
         return Verdict("undecided")

@@ -6,7 +6,6 @@ import statistics
 import time
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
-from fractions import Fraction
 from functools import partial
 from typing import Any, Literal, NamedTuple
 
@@ -15,6 +14,7 @@ import msgspec
 from conformance import plain
 from conformance.bench.time_stepping import TOLERANCES, next_collision_by
 from conformance.bench.workloads import Workload
+from conformance.grading.agreement import Answer
 from conformance.suite.process import Trouble
 from conformance.suite.run import put
 from conformance.suite.session import Limits, Session, missing
@@ -25,19 +25,7 @@ Family = Literal["proof", "compiled", "interpreted", "time-stepping", "example",
 Ask = Callable[[Vector], dict[str, Any]]  # raises Trouble
 
 
-class Exact(NamedTuple):
-    """A collision to more digits than binary64 holds.
-
-    Attributes:
-        wall: the wall met.
-        numbers: dt, x, y, vx, vy.
-    """
-
-    wall: str
-    numbers: tuple[Fraction, ...]
-
-
-Answer = Outcome | Exact | None  # None: a step that this contender leaves to another
+Given = Answer | None  # None: a step that this contender leaves to another
 
 
 class Lap(NamedTuple):
@@ -50,7 +38,7 @@ class Lap(NamedTuple):
     """
 
     ns: float
-    answers: list[Answer]
+    answers: list[Given]
     lasted: float
 
 
@@ -70,11 +58,11 @@ class Contender(NamedTuple):
     serves: tuple[str, ...] = ()
 
 
-def by_call(name: str, family: Family, step: Callable[[Scene, State, float], Answer]) -> Contender:
+def by_call(name: str, family: Family, step: Callable[[Scene, State, float], Given]) -> Contender:
     """Return a Python function of one step as a contender; the call is part of its time."""
 
     def run(workload: Workload, n_times: int) -> Lap:
-        answers: list[Answer] = []
+        answers: list[Given] = []
         begin = time.perf_counter_ns()
         for _ in range(n_times):
             answers = [step(workload.scene, q.state, q.t_end) for q in workload.questions]
@@ -121,7 +109,7 @@ def by_command(
         scene = to_data(workload.scene)
         if lacking := missing(session.introduction, "time", scene):
             raise Trouble("unsupported", lacking)
-        answers: list[Answer] = []
+        answers: list[Given] = []
         laps = []
         for question in workload.questions:
             request: dict[str, Any] = {"cmd": "time", "scene": scene, "collisions": 1}

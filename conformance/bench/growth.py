@@ -17,7 +17,7 @@ import numpy.typing as npt
 
 from conformance.bench.record import Growth, short
 from conformance.bench.workloads import RULES, Prover, draw_workload
-from conformance.grading.error import U
+from conformance.grading.error import Matrix, U, inputs_of
 from scene import Collision, Scene, State
 from scene.geometry import rounded
 
@@ -38,11 +38,13 @@ class Place(NamedTuple):
 
 
 Follower = Callable[[Scene, State, int], list[Place]]
+Linearised = Callable[[Scene, State, float], tuple[Collision, Matrix]]  # a proved step and its Jacobian
 
 
 def grow(
     followers: dict[str, Follower],
     prove: Prover,
+    linearise: Linearised,
     prove_path: Follower,
     seed: int,
     n_paths: int,
@@ -53,7 +55,8 @@ def grow(
 
     Args:
         followers: by name; a path may end early, which counts as having no digit left.
-        prove: one step, with its Jacobian.
+        prove: one step, for the draws.
+        linearise: one step, with its Jacobian.
         prove_path: a trajectory, right to many digits at its end.
         seed: of the draws.
         n_paths: how many trajectories.
@@ -69,7 +72,7 @@ def grow(
         size, speed = _sizes(workload.scene, question.state)
         for name, follow in followers.items():
             errors[name].append(_errors(follow(workload.scene, question.state, n_collisions), truth, size))
-        bound, growth = _chained(workload.scene, question.state, n_collisions, prove, size, speed)
+        bound, growth = _chained(workload.scene, question.state, n_collisions, linearise, size, speed)
         bounds.append(bound)
         growths.append(growth)
         tick("")
@@ -109,7 +112,7 @@ def _last(errors: FloatArray) -> int:
 
 
 def _chained(
-    scene: Scene, state: State, n_collisions: int, prove: Prover, size: float, speed: float
+    scene: Scene, state: State, n_collisions: int, linearise: Linearised, size: float, speed: float
 ) -> tuple[FloatArray, FloatArray]:
     """Return the predicted bound and the norm of the chained Jacobians after each collision.
 
@@ -120,13 +123,9 @@ def _chained(
     shares: list[FloatArray] = []  # what each earlier step's rounding has become
     bounds, growths = [], []
     for _ in range(n_collisions):
-        truth = prove(scene, state, state.t + FAR, 20)
-        assert isinstance(truth.outcome, Collision)
-        assert truth.jacobian is not None
-        step = np.array(truth.jacobian)
-        inputs = np.array([state.t, state.x, state.y, state.vx, state.vy])
-        state = truth.outcome.state()
-        outputs = np.array([truth.outcome.dt, state.x, state.y, state.vx, state.vy])
+        met, jacobian = linearise(scene, state, state.t + FAR)
+        step, inputs, state = np.array(jacobian), np.array(inputs_of(state)), met.state()
+        outputs = np.array([met.dt, *inputs_of(state)[1:]])
         rounding = float(U) * (np.abs(step) @ np.abs(inputs) + np.abs(outputs))
         step[0, 0] += 1.0  # from the flight time to the time
         shares = [step @ share for share in shares]

@@ -12,24 +12,24 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from fractions import Fraction
 from typing import NamedTuple
 
 import numpy as np
 
-from conformance.bench.contenders import Answer, Contender, Lap
+from conformance.bench.contenders import Contender, Given, Lap
 from conformance.bench.record import Point, short
-from conformance.bench.workloads import Question, Workload
-from conformance.grading.agreement import Truth
-from conformance.grading.error import backward_ulps
+from conformance.bench.workloads import ProvedStep, Workload
+from conformance.grading.agreement import Answer, Enclosed, compare, exact
 from conformance.suite.process import Trouble
-from scene import Collision, Undecided
+from conformance.vectors import NUMBERS, Certified
+from scene import Collision
 
 MAX_TIMES = 1000  # as many as a `time` request of the protocol may ask for
 
 
-class Settings(NamedTuple):
+class Effort(NamedTuple):
     """How long to measure.
 
     Attributes:
@@ -50,7 +50,7 @@ ONES = np.ones(100_000)
 def measure(
     workload: Workload,
     contenders: Sequence[Contender],
-    settings: Settings,
+    effort: Effort,
     tick: Callable[[str], None],
     clock: list[float],
 ) -> tuple[list[Point], dict[str, str]]:
@@ -59,7 +59,7 @@ def measure(
     Args:
         workload: with proved answers.
         contenders: those that serve it are run.
-        settings: how long.
+        effort: how long.
         tick: called with a contender's name before its warm-up, and after every round with "".
         clock: the time of a dependent addition [ns] is appended in every round.
 
@@ -74,12 +74,12 @@ def measure(
             continue
         tick(contender.name)
         try:
-            running.append(_warm_up(contender, workload, settings))
+            running.append(_warm_up(contender, workload, effort))
         except Trouble as trouble:
             troubles[contender.name] = f"{trouble.verdict}: {trouble.why}"
             continue
         laps[contender.name] = []
-    for number in range(settings.repeats):
+    for number in range(effort.repeats):
         for contender, n_times, n_laps in running:
             if number < n_laps and contender.name not in troubles:
                 try:
@@ -97,16 +97,14 @@ def measure(
     return points, troubles
 
 
-def _warm_up(contender: Contender, workload: Workload, settings: Settings) -> tuple[Contender, int, int]:
+def _warm_up(contender: Contender, workload: Workload, effort: Effort) -> tuple[Contender, int, int]:
     """Return how many times a lap is to take the steps, and how many laps there is time for."""
     n_times = 1
     lasted = contender.run(workload, 1).lasted
-    while lasted < settings.least_ns and n_times < MAX_TIMES:
-        n_times = min(
-            MAX_TIMES, max(2 * n_times, math.ceil(1.2 * n_times * settings.least_ns / (lasted + 1)))
-        )
+    while lasted < effort.least_ns and n_times < MAX_TIMES:
+        n_times = min(MAX_TIMES, max(2 * n_times, math.ceil(1.2 * n_times * effort.least_ns / (lasted + 1))))
         lasted = contender.run(workload, n_times).lasted
-    n_laps = min(settings.repeats, max(MIN_REPEATS, int(settings.most_ns / (lasted + 1))))
+    n_laps = min(effort.repeats, max(MIN_REPEATS, int(effort.most_ns / (lasted + 1))))
     return contender, n_times, n_laps
 
 
@@ -147,36 +145,33 @@ def _point(workload: Workload, contender: Contender, n_times: int, laps: Sequenc
     )
 
 
-def _grade(answer: Answer, question: Question) -> _Graded:
-    truth = question.truth
-    assert isinstance(truth.outcome, Collision)
-    if answer is None:
+def _grade(given: Given, question: ProvedStep) -> _Graded:
+    if given is None:
         return _Graded("left")
-    if isinstance(answer, Undecided):
+    answer = _enclosed(given)
+    found = compare(answer, question.truth, question.state)
+    if found.kind == "undecided":
         return _Graded("undecided")
-    wall = getattr(answer, "wall", None)
-    numbers = tuple(_numbers(answer))
-    if wall != truth.outcome.wall or not numbers or not all(map(math.isfinite, numbers)):
+    if math.isnan(found.ulps) or not isinstance(answer, Enclosed):
         return _Graded("wrong")
-    assert truth.jacobian is not None
-    s = question.state
-    exact = [Fraction(n) for n in numbers]
-    ulps = max(backward_ulps(exact, truth.numbers, truth.jacobian, (s.t, s.x, s.y, s.vx, s.vy)))
-    return _Graded("right", ulps, relative_error(numbers, truth))
+    return _Graded("right", found.ulps, relative_error(answer, question.truth.steps[0]))
 
 
-def _numbers(answer: Answer) -> Iterator[Fraction | float]:
-    if isinstance(answer, Collision):
-        yield from (answer.dt, answer.x, answer.y, answer.vx, answer.vy)
-    else:
-        yield from getattr(answer, "numbers", ())
+def _enclosed(answer: Answer) -> Answer:
+    """Return a collision by the numbers that all contenders have, which leaves out the rounded time t."""
+    if not isinstance(answer, Collision):
+        return answer
+    numbers = [getattr(answer, name) for name in NUMBERS]
+    return exact(answer.wall, list(map(Fraction, numbers))) if all(map(math.isfinite, numbers)) else answer
 
 
-def relative_error(numbers: tuple[Fraction | float, ...], truth: Truth) -> float:
+def relative_error(answer: Enclosed, truth: Certified) -> float:
     """Return the largest error of dt, place and velocity, each relative to its largest component."""
+    given = dict(zip(NUMBERS, answer.ends, strict=True))
     worst = Fraction(0)
-    for members in ((0,), (1, 2), (3, 4)):
-        size = max(abs(truth.numbers[i]) for i in members)
-        error = max(abs(Fraction(numbers[i]) - truth.numbers[i]) for i in members)
+    for vector in (("dt",), ("x", "y"), ("vx", "vy")):
+        centres = {name: truth.centre(name) for name in vector}
+        size = max(map(abs, centres.values()))
+        error = max(abs(end - centres[name]) for name in vector for end in given[name])
         worst = max(worst, error / size) if size else worst
     return float(worst)

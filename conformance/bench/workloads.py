@@ -14,7 +14,8 @@ from typing import NamedTuple
 from mpmath import fp
 
 from conformance.generator.draws import Draw, place, state, walls_speed
-from conformance.grading.agreement import Truth
+from conformance.grading.agreement import middle
+from conformance.vectors import Expectation
 from scene import Cap, Collision, Scene, State, load
 from scene.geometry import rounded
 from scene.tables import period
@@ -23,16 +24,17 @@ DIGITS = 230  # of the proved answers: beyond any contender's
 WINDOW = 1000.0  # flights
 PHASE = 0.3  # of the cycle, where the window begins
 MAX_DRAWS = 100
-Prover = Callable[[Scene, State, float, int], Truth]  # (scene, state, t_end, digits) -> a proved step
+# (scene, state, t_end, digits) -> certified answer of a step; None where the proof is undecided.
+Prover = Callable[[Scene, State, float, int], Expectation | None]
 Drawn = tuple[State, float]  # with its horizon
 
 
-class Question(NamedTuple):
-    """A step and its proved answer, a collision."""
+class ProvedStep(NamedTuple):
+    """The question of one step, and its certified answer, a collision."""
 
     state: State
     t_end: float
-    truth: Truth
+    truth: Expectation
 
 
 class Workload(NamedTuple):
@@ -48,7 +50,7 @@ class Workload(NamedTuple):
     name: str
     what: str
     scene: Scene
-    questions: list[Question]
+    questions: list[ProvedStep]
 
 
 class Rule(NamedTuple):
@@ -122,14 +124,14 @@ def draw_workload(rule: Rule, seed: int, n_questions: int, prove: Prover) -> Wor
         rule: one of RULES.
         seed: of all draws.
         n_questions: how many, >= 1.
-        prove: answers one step by proof, with its Jacobian.
+        prove: answers one step by proof.
     """
     scene = load(rule.scene)
     questions = [_question(rule, scene, f"bench {seed} {rule.name} {i}", prove) for i in range(n_questions)]
     return Workload(rule.name, rule.what, scene, questions)
 
 
-def _question(rule: Rule, scene: Scene, key: str, prove: Prover) -> Question:
+def _question(rule: Rule, scene: Scene, key: str, prove: Prover) -> ProvedStep:
     shared = period(scene)
     span = 1.0 if shared is None else float(shared.value(fp))
     for attempt in range(MAX_DRAWS):
@@ -139,14 +141,15 @@ def _question(rule: Rule, scene: Scene, key: str, prove: Prover) -> Question:
         start, t_end = rule.draw(stream, scene, t)
         if rule.is_flown:
             first = prove(scene, start, t_end, 20)
-            if not isinstance(first.outcome, Collision):
+            met = middle(first, start)[0] if first else None
+            if not isinstance(met, Collision):
                 continue
-            t_end += first.outcome.t - start.t
-            start = first.outcome.state()
+            t_end += met.t - start.t
+            start = met.state()
         truth = prove(scene, start, t_end, DIGITS)
-        if not isinstance(truth.outcome, Collision):
+        if truth is None or truth.outcome != "collision":
             continue
-        if isinstance(scene, Cap) and "base" in (start.wall, truth.outcome.wall):
+        if isinstance(scene, Cap) and "base" in (start.wall, truth.steps[0].wall):
             continue  # lanes unfold the disk: from arc to arc
-        return Question(start, t_end, truth)
+        return ProvedStep(start, t_end, truth)
     raise RuntimeError(f"{key}: no collision in {MAX_DRAWS} draws")

@@ -9,50 +9,29 @@ first; and the written enclosures are re-proved along the whole path by `second_
 
 from __future__ import annotations
 
-import decimal
 from collections.abc import Sequence
-from fractions import Fraction
 from math import fsum, inf, isfinite
 from typing import Any, Literal, NamedTuple
 
 import msgspec
 
 import reference
-from conformance.grading.error import condition_number
+from conformance.generator.prover import ask, coasted, collided, ends, expectation, flight_of
+from conformance.grading.error import Matrix, condition_number, free_flight, inputs_of, moved
 from conformance.second_proof.chain import recheck
 from conformance.second_proof.step import check
 from conformance.second_proof.trajectory import check_path
-from conformance.vectors import NUMBERS, Certified, Enclosure, Expectation, Level, Vector
-from reference.arithmetic import rational
+from conformance.vectors import NUMBERS, Certified, Expectation, Level, Vector, certified, four_digits
 from reference.certificate import certificate, path_certificate
-from scene import BadInput, InvalidState, Rejected, Scene, State, Undecided, Undefined, Wall, from_data
+from scene import BadInput, InvalidState, Rejected, Scene, State, Undecided, Undefined, from_data
 
-DIGITS = 24  # written; the reference encloses to more
 NUDGES: tuple[tuple[Level, float], ...] = (("core", 2.0**-30), ("extended", 2.0**-44))
 CONDITIONS = {"core": 1e6, "extended": 1e12}
 LONGEST = 1e8  # condition number up to which a trajectory is followed
 INFINITE = 1e300
 # Pairs, so that one of each pair lies on either side of a tie; a trajectory takes the first pair.
 SIGNS = ((1, 1, -1, 1, -1), (-1, -1, 1, -1, 1), (1, 1, 1, 1, 1), (-1, -1, -1, -1, -1))
-Matrix = list[list[float]]
 Outcome = Literal["collision", "horizon", "undefined", "undecided", "rejected"]
-
-
-class _Thin(NamedTuple):
-    """An enclosure by rationals."""
-
-    lo: Fraction
-    hi: Fraction
-
-    def __float__(self) -> float:
-        return float((self.lo + self.hi) / 2)
-
-
-Enclosed = reference.Enclosure | _Thin
-
-
-def _rational(end: Any) -> Fraction:
-    return end if isinstance(end, Fraction) else rational(end._mpf_)
 
 
 class Question(NamedTuple):
@@ -128,38 +107,26 @@ def certify(question: Question, number: int) -> Vector:
         t_end=question.t_end,
         expect=expect,
         collisions=proved.collisions,
-        condition=_short(min(proved.condition, INFINITE)),
+        condition=four_digits(min(proved.condition, INFINITE)),
     )
     return msgspec.structs.replace(vector, level=question.level or _level(scene, vector))
 
 
 def _step(scene: Scene, question: Question) -> _Proved:
     state, t_end = question.state, question.t_end
-    outcome = reference.next_collision(scene, state, t_end, digits=30, is_differentiated=True)
-    if isinstance(outcome, Undecided):
+    outcome = ask(scene, state, t_end)
+    answer = expectation(outcome, state, t_end)
+    if answer is None:
         return _Proved(())
-    if isinstance(outcome, Rejected):
-        return _Proved((Expectation("rejected"),))
+    if isinstance(outcome, Rejected | Undecided):
+        return _Proved((answer,))
+    check(certificate(scene, state, t_end, outcome))
     if isinstance(outcome, Undefined):
-        check(certificate(scene, state, t_end, outcome))
         # A stepper in binary64 may find the tie within rounding, and say no more than that.
-        undefined = Expectation("undefined", reason=outcome.reason)
-        return _Proved((undefined, Expectation("undecided")), inf)
-    claim = certificate(scene, state, t_end, outcome)
-    check(claim)
-    enclosures: dict[str, Enclosed]
-    if isinstance(outcome, reference.Horizon):
-        flight = Fraction(t_end) - Fraction(state.t)
-        enclosures, wall = {**outcome.at._asdict(), "dt": _Thin(flight, flight)}, None
-        jacobian = _free_flight(state, float(flight))
-    else:
-        assert outcome.jacobian is not None
-        enclosures, wall = {**outcome.after._asdict(), "dt": outcome.dt}, outcome.wall
-        jacobian = [[float(d) for d in row] for row in outcome.jacobian]
-    moved = [_moved(row, _inputs(state)) for row in jacobian]
-    certified = _certified(enclosures, moved, wall)
-    condition = _condition([float(enclosures[name]) for name in NUMBERS], moved)
-    return _Proved((Expectation("collision" if wall else "horizon", (certified,)),), condition)
+        return _Proved((answer, Expectation("undecided")), inf)
+    flight = flight_of(outcome, state, t_end)
+    allowance = _finite(flight.allowance(state))
+    return _Proved((answer,), _condition(flight.centre(), allowance))
 
 
 def _trajectory(scene: Scene, question: Question) -> _Proved:
@@ -173,11 +140,11 @@ def _trajectory(scene: Scene, question: Question) -> _Proved:
     links = _Links(scene, question.state, question.t_end)
     steps: list[Certified] = []
     for found in path.steps:
-        moved = links.add(found)
+        allowance = links.add(found)
         if links.condition > question.longest:
             break
         links.largest = max(links.largest, links.condition)
-        steps.append(_certified({**found.after._asdict(), "dt": found.dt}, moved, found.wall, is_wide=True))
+        steps.append(certified(collided(found), _finite(allowance), found.wall, is_wide=True))
     if not steps:
         raise Unfit("no collision is met, or the first is too delicate")
     expect = [Expectation("collision", tuple(steps))]
@@ -210,92 +177,46 @@ class _Links:
 
     def add(self, found: reference.Collision) -> list[float]:
         """Add a step: prove it again from the rounded state, and return what all rounding may do to it."""
-        proved = reference.next_collision(
-            self.scene, self.state, self.t_end, digits=30, is_differentiated=True
-        )
+        proved = ask(self.scene, self.state, self.t_end)
         if not isinstance(proved, reference.Collision) or proved.wall != found.wall:
             raise Unfit("a rounded state takes another path")
         check(certificate(self.scene, self.state, self.t_end, proved))
-        assert proved.jacobian is not None
-        jacobian = [[float(d) for d in row] for row in proved.jacobian]
         centre = [float(found.dt), *(float(c) for c in found.after[1:])]
-        moved = self._chain(jacobian, centre)
+        allowance = self._chain(flight_of(proved, self.state, self.t_end).jacobian, centre)
         self.state = found.rounded().state()
-        return moved
+        return allowance
 
-    def coast(self, at: reference.Horizon, since: Enclosed) -> Certified:
+    def coast(self, horizon: reference.Horizon, since: reference.Enclosure) -> Certified:
         """Return the horizon after the last collision, at time `since`."""
-        end = at.at.t
-        dt = _Thin(_rational(end.lo) - _rational(since.hi), _rational(end.hi) - _rational(since.lo))
-        centre = [float(dt), *(float(c) for c in at.at[1:])]
-        moved = self._chain(_free_flight(self.state, centre[0]), centre)
-        return _certified({**at.at._asdict(), "dt": dt}, moved, None, is_wide=True)
+        numbers = coasted(horizon, ends(since))
+        centre = [float(sum(numbers[name]) / 2) for name in NUMBERS]
+        allowance = self._chain(free_flight(self.state, centre[0]), centre)
+        return certified(numbers, _finite(allowance), None, is_wide=True)
 
     def _chain(self, jacobian: Matrix, centre: list[float]) -> list[float]:
-        self.held.append(([[float(i == j) for j in range(5)] for i in range(5)], _inputs(self.state)))
-        moved = [0.0] * 5
+        self.held.append(([[float(i == j) for j in range(5)] for i in range(5)], inputs_of(self.state)))
+        allowance = [0.0] * 5
         for k, (earlier, inputs) in enumerate(self.held):
             rows = [
                 [fsum(a * b[j] for a, b in zip(row, earlier, strict=True)) for j in range(5)]
                 for row in jacobian
             ]
-            moved = [m + _moved(row, inputs) for m, row in zip(moved, rows, strict=True)]
+            allowance = [a + moved(row, inputs) for a, row in zip(allowance, rows, strict=True)]
             rows[0] = [a + b for a, b in zip(rows[0], earlier[0], strict=True)]
             self.held[k] = (rows, inputs)
-        self.condition = _condition(centre, moved)
-        return moved
+        self.condition = _condition(centre, allowance)
+        return allowance
 
 
-def _moved(row: Sequence[float], inputs: Sequence[float]) -> float:
-    return fsum(abs(d * v) for d, v in zip(row, inputs, strict=True))
-
-
-def _condition(centre: Sequence[float], moved: Sequence[float]) -> float:
+def _condition(centre: Sequence[float], allowance: Sequence[float]) -> float:
     # The inputs' part in each output is summed already.
-    return condition_number(centre, [[m] for m in moved], [1.0])
+    return condition_number(centre, [[part] for part in allowance], [1.0])
 
 
-def _inputs(state: State) -> list[float]:
-    return [state.t, state.x, state.y, state.vx, state.vy]
-
-
-def _free_flight(state: State, dt: float) -> Matrix:
-    return [
-        [-1.0, 0.0, 0.0, 0.0, 0.0],
-        [-state.vx, 1.0, 0.0, dt, 0.0],
-        [-state.vy, 0.0, 1.0, 0.0, dt],
-        [0.0, 0.0, 0.0, 1.0, 0.0],
-        [0.0, 0.0, 0.0, 0.0, 1.0],
-    ]
-
-
-def _certified(
-    enclosures: dict[str, Enclosed], moved: Sequence[float], wall: Wall | None, *, is_wide: bool = False
-) -> Certified:
-    numbers = {name: _written(enclosures[name], is_wide=is_wide) for name in NUMBERS}
-    if not all(map(isfinite, moved)):
+def _finite(allowance: Sequence[float]) -> Sequence[float]:
+    if not all(map(isfinite, allowance)):
         raise Unfit("an allowance overflows")
-    dt, x, y, vx, vy = map(_short, moved)
-    return Certified(**numbers, allowance=(dt, x, y, vx, vy), wall=wall)
-
-
-def _written(enclosure: Enclosed, *, is_wide: bool) -> Enclosure:
-    """Write both ends with 24 decimals, rounded outward; wide: one unit further, so that balls fit in."""
-    ends = []
-    for end, rounding in ((enclosure.lo, decimal.ROUND_FLOOR), (enclosure.hi, decimal.ROUND_CEILING)):
-        number = _rational(end)
-        context = decimal.Context(prec=DIGITS, rounding=rounding, Emin=-9999, Emax=9999)
-        written = context.divide(decimal.Decimal(number.numerator), decimal.Decimal(number.denominator))
-        if is_wide and written:
-            is_lower = rounding == decimal.ROUND_FLOOR
-            written = written.next_minus(context) if is_lower else written.next_plus(context)
-        ends.append(str(written.normalize(context)))
-    return ends[0], ends[1]
-
-
-def _short(number: float) -> float:
-    # An allowance and a condition number are measures: four digits will do.
-    return float(f"{number:.3e}")
+    return allowance
 
 
 def _level(scene: Scene | None, vector: Vector) -> Level:
@@ -318,7 +239,7 @@ def _level(scene: Scene | None, vector: Vector) -> Level:
 def _nudged(state: State, t_end: float, signs: Sequence[int], nudge: float) -> State:
     place, speed = max(abs(state.x), abs(state.y)), max(abs(state.vx), abs(state.vy))
     sizes = (abs(state.t), place, place, speed, speed)
-    values = [v + nudge * sign * size for v, sign, size in zip(_inputs(state), signs, sizes, strict=True)]
+    values = [v + nudge * sign * size for v, sign, size in zip(inputs_of(state), signs, sizes, strict=True)]
     t, x, y, vx, vy = values
     return State(min(t, t_end), x, y, vx, vy, state.wall)
 

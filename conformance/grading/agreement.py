@@ -1,80 +1,234 @@
-"""Does a stepper's answer agree with a proved one? The comparison behind grades and tests.
+"""Does an answer agree with a certified one? One comparison, for grades, benchmark, attacks and tests.
 
-An agreement is the same outcome, the same wall, and numbers within a bound of backward ulps
-(`conformance.grading.error`). `undecided` is never wrong, only counted; it is the caller's to bound.
+An agreement is the same outcome, the same walls in the same order, and numbers that are right as physics:
+a backward error of at most 1e-9, |out - truth| / (allowance + |out|). Place and velocity are each taken as a
+vector (its largest allowance and component), so that a stepper which computes normals from angles is not
+refused for 1e-17 where the exact zero is right. A caller may also bound the backward ulps of every single
+component (`grading.error`). In a trajectory all steps are held to the same bounds, with chained allowances.
+
+Both the truth and the answer may be enclosures. Numbers count as right, or as wrong, only where they are so
+for all numbers of the enclosures; else the comparison is `indeterminate`. An answer `undecided` is never
+wrong; callers count it. Reasons of outcomes without numbers are not compared.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from fractions import Fraction
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
-from conformance.grading.error import backward_ulps
-from scene import Collision, Horizon, Outcome, State
+import msgspec
+
+from conformance.grading.error import LEAST, U, backward_ulps
+from conformance.vectors import NUMBERS, Certified, Ends, Expectation
+from scene import Collision, Horizon, Outcome, Rejected, State, Undecided, Undefined, Wall
+
+BOUND = Fraction(1, 10**9)  # physics: far above rounding, far below any error of principle
+# dt, t, place, velocity: what is judged as one vector.
+VECTORS = (("dt",), ("t",), ("x", "y"), ("vx", "vy"))
+Kind = Literal["agrees", "numbers", "indeterminate", "wall", "outcome", "length", "undecided"]
 
 
-class Truth(NamedTuple):
-    """A proved answer.
+class Enclosed(NamedTuple):
+    """A collision or horizon whose numbers are given more closely than binary64 holds them.
 
     Attributes:
-        outcome: in the wire's form, numbers rounded.
-        numbers: dt, x, y, vx, vy to many more digits (dt to the horizon where nothing is hit).
-        jacobian: derivatives of the numbers by t, x, y, vx, vy; None where nothing is hit.
+        wall: the wall met; None at the horizon.
+        ends: low and high of dt, x, y, vx, vy; equal where a number is exact.
     """
 
-    outcome: Outcome
-    numbers: Sequence[Fraction] = ()
-    jacobian: Sequence[Sequence[float]] | None = None
+    wall: Wall | None
+    ends: Sequence[Ends]
+
+
+Answer = Outcome | Enclosed
+
+
+def exact(wall: Wall | None, numbers: Sequence[Fraction]) -> Enclosed:
+    """Return a collision, or the horizon, by exact numbers dt, x, y, vx, vy."""
+    return Enclosed(wall, [(number, number) for number in numbers])
 
 
 class Agreement(NamedTuple):
-    """How an answer compares: `kind` is agrees, undecided, outcome, wall or numbers; its error."""
+    """How an answer compares.
 
-    kind: str
-    ulps: float
+    Attributes:
+        kind: `agrees`, or what differs first: the `outcome`, the `wall`, the `numbers`, the `length` of a
+            trajectory; `undecided` where the answer is; `indeterminate` where the truth cannot tell.
+        ulps: worst backward ulps of a component, nan when not measured.
+        relative: worst backward error, likewise.
+        why: one line.
+    """
+
+    kind: Kind
+    ulps: float = math.nan
+    relative: float = math.nan
+    why: str = ""
 
 
-# Position and velocity in free flight, by t, x, y, vx, vy, for the flight time dt.
-def _free_flight(dt: float, state: State) -> list[list[float]]:
-    return [
-        [0.0] * 5,
-        [-state.vx, 1.0, 0.0, dt, 0.0],
-        [-state.vy, 0.0, 1.0, 0.0, dt],
-        [0.0, 0.0, 0.0, 1.0, 0.0],
-        [0.0, 0.0, 0.0, 0.0, 1.0],
-    ]
+class _Measured(NamedTuple):
+    """Bounds of an error over the enclosures; `where` names the worst component."""
+
+    least: Fraction | float
+    most: Fraction | float
+    least_ulps: Fraction | float
+    most_ulps: Fraction | float
+    where: str
 
 
-def compare(answer: Outcome, truth: Truth, state: State, bound: float) -> Agreement:
-    """Compare one step with the truth.
+def compare(
+    answer: Answer | list[Answer], expected: Expectation | None, state: State, bound: float | None = None
+) -> Agreement:
+    """Compare an answer with the truth.
 
     Args:
-        answer: of the stepper under test.
-        truth: proved.
-        state: the start of the step.
-        bound: backward ulps allowed.
+        answer: of a step; of a trajectory a list of its steps, with what came instead of a further one.
+        expected: certified; None where the proof itself is undecided.
+        state: the start.
+        bound: backward ulps allowed in every component; None where physics is all that is asked.
 
     Returns:
-        What differs first, with the worst backward ulps of the numbers where they were compared.
+        What differs first, with the worst errors of the numbers where they were compared.
     """
-    if answer == truth.outcome and not isinstance(answer, Collision | Horizon):
-        return Agreement("agrees", 0.0)
-    kinds = {type(answer).__name__, type(truth.outcome).__name__}
-    if "Undecided" in kinds:
-        return Agreement("undecided", 0.0)
-    if len(kinds) > 1:
-        return Agreement("outcome", 0.0)
-    if isinstance(answer, Collision) and isinstance(truth.outcome, Collision):
-        if answer.wall != truth.outcome.wall:
-            return Agreement("wall", 0.0)
-        dt = answer.dt
-    elif isinstance(answer, Horizon):
-        dt = float(truth.numbers[0])
-    else:
-        return Agreement("agrees", 0.0)  # undefined or rejected, for reasons in other words
-    computed = (dt, answer.x, answer.y, answer.vx, answer.vy)
-    jacobian = truth.jacobian or _free_flight(dt, state)
-    inputs = (state.t, state.x, state.y, state.vx, state.vy)
-    worst = max(backward_ulps(computed, truth.numbers, jacobian, inputs))
-    return Agreement("agrees" if worst <= bound else "numbers", worst)
+    answers = answer if isinstance(answer, list) else [answer]
+    if expected is None:
+        is_undecided = any(isinstance(step, Undecided) for step in answers)
+        return Agreement("undecided" if is_undecided else "indeterminate", why="the proof is undecided")
+    measured: list[_Measured] = []
+    clock = _Clock(state)
+    for i, certified in enumerate(expected.steps):
+        place = f"step {i + 1}: " if isinstance(answer, list) else ""
+        if i >= len(answers):
+            return Agreement("length", why=f"{place}missing, {i} of {len(expected.steps)} were given")
+        if differing := _difference(answers[i], certified.wall):
+            return differing._replace(why=(place + differing.why)[:200])
+        measured.append(_measure(answers[i], certified, clock.advance(certified), place))
+        if measured[-1].least > BOUND:
+            return _judge_numbers(measured, bound)
+    return _judge_end(expected, answers[len(expected.steps) :]) or _judge_numbers(measured, bound)
+
+
+def middle(expected: Expectation, state: State) -> list[Outcome]:
+    """Return the certified answer in the middle of its enclosures, rounded to binary64: one outcome a step.
+
+    Args:
+        expected: the certified answer.
+        state: the start.
+    """
+    found: list[Outcome] = []
+    t = Fraction(state.t)
+    for step in expected.steps:
+        dt, *numbers = (step.centre(name) for name in NUMBERS)
+        t += dt
+        place = float(t), *map(float, numbers)
+        found.append(Collision(step.wall, float(dt), *place) if step.wall else Horizon(*place))
+    if expected.outcome not in ("collision", "horizon"):
+        data = {"outcome": expected.outcome, "reason": expected.reason or "as certified"}
+        found.append(msgspec.convert(data, Outcome))
+    return found
+
+
+def _difference(answer: Answer, wall: Wall | None) -> Agreement | None:
+    """Return how an answer differs in outcome or wall; None when it does not."""
+    if isinstance(answer, Undecided):
+        return Agreement("undecided", why=f"undecided: {answer.reason}")
+    if isinstance(answer, Rejected | Undefined):
+        why = f"{_name(answer)}, must be {wall or 'horizon'}: {answer.reason}"
+        return Agreement("outcome", why=why)
+    met = None if isinstance(answer, Horizon) else answer.wall
+    if met == wall:
+        return None
+    why = f"{met or 'horizon'}, must be {wall or 'horizon'}"
+    return Agreement("wall" if met and wall else "outcome", why=why)
+
+
+def _judge_end(expected: Expectation, rest: Sequence[Answer]) -> Agreement | None:
+    """Judge what follows the certified steps; None when it is right."""
+    if expected.outcome in ("collision", "horizon"):
+        return Agreement("length", why=f"{len(rest)} steps too many") if rest else None
+    if not rest:
+        return Agreement("length", why=f"must end as {expected.outcome}")
+    kind = _name(rest[0])
+    if kind == expected.outcome:
+        return None
+    why = f"{kind}, must be {expected.outcome} {expected.reason}".rstrip()
+    return Agreement("undecided" if kind == "undecided" else "outcome", why=why)
+
+
+def _name(answer: Answer) -> str:
+    if isinstance(answer, Enclosed):
+        return "collision" if answer.wall else "horizon"
+    return type(answer).__name__.lower()
+
+
+def _judge_numbers(measured: Sequence[_Measured], bound: float | None) -> Agreement:
+    """Judge the numbers of an answer whose outcomes and walls are right."""
+    if not measured:
+        return Agreement("agrees", why="the right outcome")
+    worst = max(measured, key=lambda found: found.most)
+    ulps = _rounded(max(found.most_ulps for found in measured))
+    found = Agreement("agrees", ulps, _rounded(worst.most), f"{ulps:.3g} backward ulps")
+    if measured[-1].least > BOUND:
+        return found._replace(kind="numbers", why=f"{worst.where} is off by {found.relative:.3g} (backward)")
+    if bound is not None and any(step.least_ulps > bound for step in measured):
+        return found._replace(kind="numbers", why=f"numbers are off by {ulps:.3g} backward ulps")
+    if worst.most > BOUND or (bound is not None and ulps > bound):
+        return found._replace(kind="indeterminate", why=f"{worst.where} is enclosed too widely")
+    return found
+
+
+class _Clock:
+    """Time along an answer: the enclosure of t, and what it may be off by."""
+
+    def __init__(self, state: State) -> None:
+        self.low = self.high = Fraction(state.t)
+        self.allowance = abs(self.low)
+
+    def advance(self, certified: Certified) -> tuple[Ends, Fraction]:
+        """Add a flight, and return the enclosure and the allowance of the time after it."""
+        low, high = certified.ends("dt")
+        self.low, self.high = self.low + low, self.high + high
+        self.allowance += Fraction(certified.allowance[0])
+        return (self.low, self.high), self.allowance
+
+
+def _measure(answer: Answer, certified: Certified, time: tuple[Ends, Fraction], place: str) -> _Measured:
+    """Measure dt (but of a horizon), t (but of an enclosed answer), place and velocity."""
+    numbers = _given(answer)
+    if not all(math.isfinite(end) for ends in numbers.values() for end in ends if isinstance(end, float)):
+        return _Measured(math.inf, math.inf, math.inf, math.inf, f"{place}a number that is not finite")
+    given = {name: (Fraction(low), Fraction(high)) for name, (low, high) in numbers.items()}
+    truth = {name: certified.ends(name) for name in NUMBERS} | {"t": time[0]}
+    allowances = dict(zip(NUMBERS, map(Fraction, certified.allowance), strict=True)) | {"t": time[1]}
+    sizes = {name: allowances[name] + max(map(abs, ends)) for name, ends in given.items()}
+    found = _Measured(Fraction(0), Fraction(-1), Fraction(0), Fraction(0), "")
+    for vector in VECTORS:
+        scale = max([LEAST / U, *(sizes[name] for name in vector if name in given)])
+        for name in (name for name in vector if name in given):
+            (low, high), (certified_low, certified_high) = given[name], truth[name]
+            most = max(abs(high - certified_low), abs(certified_high - low))
+            least = max(certified_low - high, low - certified_high, Fraction(0))
+            found = _Measured(
+                max(found.least, least / scale),
+                max(found.most, most / scale),
+                max(found.least_ulps, backward_ulps(least, sizes[name])),
+                max(found.most_ulps, backward_ulps(most, sizes[name])),
+                place + name if most / scale > found.most else found.where,
+            )
+    return found
+
+
+def _given(answer: Answer) -> dict[str, tuple[Fraction | float, Fraction | float]]:
+    """Return the ends of the numbers that an answer has, by name."""
+    if isinstance(answer, Enclosed):
+        return dict(zip(NUMBERS, answer.ends, strict=True))
+    numbers = {name: getattr(answer, name, None) for name in ("t", *NUMBERS)}
+    return {name: (number, number) for name, number in numbers.items() if number is not None}
+
+
+def _rounded(number: Fraction | float) -> float:
+    try:
+        return float(number)
+    except OverflowError:
+        return math.inf

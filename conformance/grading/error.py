@@ -1,42 +1,59 @@
 """The one measure of a stepper's error: backward ulps.
 
-|out - truth| / (sum over inputs |d out / d in| |in| u + |out| u), u = 2^-53: how many units in
-the last place the inputs and the output would have to move to explain the answer. It is as
-fair to a grazing hit, where every stepper must lose digits, as to a head-on one.
+    |out - truth| / (sum over inputs |d out / d in| |in| u + |out| u),    u = 2^-53
+
+counts how many units in the last place the inputs and the output would have to move to explain the answer.
+It is as fair to a grazing hit, where every stepper must lose digits, as to a head-on one. The sum over the
+inputs is the `allowance` that a certified answer carries (`conformance.vectors.Certified`).
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from fractions import Fraction
-from math import inf
+from math import fsum, inf
+
+from scene import State
 
 U = Fraction(1, 2**53)
 LEAST = Fraction(1, 2**1075)  # half the spacing of subnormal numbers: nothing rounds better
+Matrix = list[list[float]]
 
 
-def backward_ulps(
-    out: Sequence[float | Fraction],
-    truth: Sequence[Fraction],
-    jacobian: Sequence[Sequence[float]],
-    inputs: Sequence[float],
-) -> list[float]:
-    """Measure each component of an answer.
+def backward_ulps(error: Fraction, size: Fraction) -> Fraction | float:
+    """Return an error in backward ulps.
 
     Args:
-        out: (dt, x, y, vx, vy) as computed, to any number of digits.
-        truth: the same, exact or far more precise than binary64.
-        jacobian: (5, 5) derivatives of the outputs (rows) by the inputs (columns).
-        inputs: (t, x, y, vx, vy) that the step started from.
+        error: |out - truth|.
+        size: the allowance plus |out|.
 
     Returns:
-        Backward ulps per component: 0 for an exact answer, inf where only an exact one is right.
+        error / (size u): 0 for an exact answer, inf where only an exact one is right.
     """
-    found = []
-    for computed, exact, row in zip(out, truth, jacobian, strict=True):
-        moved = [abs(Fraction(d) * Fraction(value)) for d, value in zip(row, inputs, strict=True)]
-        found.append(_ulps(computed, exact, sum(moved, Fraction(0))))
-    return found
+    if not size:
+        return inf if error else Fraction(0)
+    return error / max(size * U, LEAST)
+
+
+def inputs_of(state: State) -> list[float]:
+    """Return the five numbers that a step starts from: t, x, y, vx, vy."""
+    return [state.t, state.x, state.y, state.vx, state.vy]
+
+
+def moved(row: Sequence[float], inputs: Sequence[float]) -> float:
+    """Return the sum over inputs of |d out / d in| |in|, for the derivatives of one output."""
+    return fsum(abs(d * value) for d, value in zip(row, inputs, strict=True))
+
+
+def free_flight(state: State, dt: float) -> Matrix:
+    """Return the (5, 5) Jacobian of a flight up to a fixed time: dt, x, y, vx, vy by t, x, y, vx, vy."""
+    return [
+        [-1.0, 0.0, 0.0, 0.0, 0.0],
+        [-state.vx, 1.0, 0.0, dt, 0.0],
+        [-state.vy, 0.0, 1.0, 0.0, dt],
+        [0.0, 0.0, 0.0, 1.0, 0.0],
+        [0.0, 0.0, 0.0, 0.0, 1.0],
+    ]
 
 
 def condition_number(
@@ -57,13 +74,3 @@ def condition_number(
     sizes = [abs(value) for value in out]
     parts = [(moved[0], sizes[0]), (max(moved[1:3]), max(sizes[1:3])), (max(moved[3:]), max(sizes[3:]))]
     return max((change / size if size else (inf if change else 0.0)) for change, size in parts)
-
-
-def _ulps(computed: float | Fraction, exact: Fraction, moved: Fraction) -> float:
-    if computed != computed or computed in (inf, -inf):
-        return inf
-    error = abs(Fraction(computed) - exact)
-    allowance = (moved + abs(exact)) * U
-    if allowance == 0:
-        return 0.0 if error == 0 else inf
-    return float(error / max(allowance, LEAST))

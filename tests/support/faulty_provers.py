@@ -20,7 +20,8 @@ from conformance.arb.flight import BallFlight, Table, line_of
 from conformance.arb.laws import BallBangBang, BallFourier
 from conformance.arb.numbers import precision
 from conformance.attacks import Attack, Claim
-from conformance.attacks.search import as_truth, truths
+from conformance.attacks.search import as_certified, ball_ends, truths
+from conformance.grading.agreement import Enclosed, exact, middle
 from conformance.second_stepper import Answer, next_collision, roots, start
 from conformance.second_stepper import step as stepper
 from conformance.second_stepper.flight import SearchedFlight
@@ -32,18 +33,24 @@ from scene.tables import period
 Patch = Callable[[pytest.MonkeyPatch], None]
 
 
-def claims(answers: Sequence[Answer]) -> list[Claim]:
-    """Return answers as claims: the ends of their balls."""
-    return [
-        Claim(answer.kind, answer.wall, answer.reason, [ends(ball) for ball in answer.numbers])
+def claim(answers: Sequence[Answer]) -> Claim:
+    """Return answers as a claim: collisions and horizons by the ends of their balls."""
+    given = [
+        Enclosed(answer.wall, [ball_ends(ball) for ball in answer.numbers])
+        if answer.numbers
+        else msgspec.convert({"outcome": answer.kind, "reason": answer.reason}, Outcome)
         for answer in answers
     ]
+    return Claim(given)
 
 
-def ends(ball: Any) -> tuple[Fraction, Fraction]:
-    """Return the ends of a ball, exactly."""
-    low, high = (point.fmpq() for point in (ball.lower(), ball.upper()))
-    return Fraction(int(low.p), int(low.q)), Fraction(int(high.p), int(high.q))
+def never_met(attack: Attack) -> Claim:
+    """Claim that nothing is met before the horizon."""
+    s = attack.state
+    assert attack.t_end is not None
+    dt, x, y, vx, vy = (Fraction(n) for n in (attack.t_end, s.x, s.y, s.vx, s.vy))
+    dt -= Fraction(s.t)
+    return Claim([exact(None, (dt, x + vx * dt, y + vy * dt, vx, vy))])
 
 
 @contextmanager
@@ -54,17 +61,17 @@ def patched(patch: Patch) -> Iterator[None]:
         yield
 
 
-def faulty(patch: Patch) -> Callable[[Attack], list[Claim]]:
+def faulty(patch: Patch) -> Callable[[Attack], Claim]:
     """Return the second stepper, with a mistake, as a proved stepper."""
 
-    def prove(attack: Attack) -> list[Claim]:
+    def prove(attack: Attack) -> Claim:
         with patched(patch):
-            return claims(truths(attack))
+            return claim(truths(attack))
 
     return prove
 
 
-def one_piece(attack: Attack) -> list[Claim]:
+def one_piece(attack: Attack) -> Claim:
     """Let the first of all law pieces that an enclosed time touches decide alone, at the digits allowed."""
     assert attack.n_collisions is not None
     assert attack.working is not None
@@ -76,7 +83,7 @@ def one_piece(attack: Attack) -> list[Claim]:
 
     with patched(patch):
         path = stepper.trajectory(attack.scene, attack.state, attack.n_collisions, attack.t_end, doublings=0)
-        return claims(path)
+        return claim(path)
 
 
 def knots_unseen(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -177,7 +184,7 @@ def ends_alone(monkeypatch: pytest.MonkeyPatch) -> None:
 def rounded_rates(scene: Scene, state: State, t_end: float) -> Outcome:
     """Answer a step in binary64, the wall's speed taken at the time of day as it rounds to binary64."""
     answer = next_collision(scene, state, t_end)
-    outcome = as_truth(answer, t_end).outcome
+    (outcome,) = middle(as_certified([answer], state), state)
     if not isinstance(outcome, Collision):
         return outcome
     with precision(answer.bits):
@@ -187,13 +194,13 @@ def rounded_rates(scene: Scene, state: State, t_end: float) -> Outcome:
     return Collision(outcome.wall, *place, float(vx.mid()), float(vy.mid()))
 
 
-def reduced_time(attack: Attack) -> list[Claim]:
+def reduced_time(attack: Attack) -> Claim:
     """Take whole periods, rounded to binary64, off the start."""
     shared = period(attack.scene)
     assert shared is not None
     t = fmod(attack.state.t, float(shared.value(fp)))
     t_end = None if attack.t_end is None else attack.t_end - (attack.state.t - t)
-    return claims(truths(attack._replace(state=msgspec.structs.replace(attack.state, t=t), t_end=t_end)))
+    return claim(truths(attack._replace(state=msgspec.structs.replace(attack.state, t=t), t_end=t_end)))
 
 
 def few_harmonics(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -221,24 +228,24 @@ def narrow_mouth(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(Search, "_is_mouth_open", is_open)
 
 
-def overflowing(attack: Attack) -> list[Claim]:
+def overflowing(attack: Attack) -> Claim:
     """Take a horizon for proved where (x . v)^2 is no binary64 number."""
     product = attack.state.x * attack.state.vx + attack.state.y * attack.state.vy
     is_in_range = 2.0**-1022 <= product * product <= 2.0**1023
-    return claims(truths(attack)) if is_in_range else [Claim("horizon")]
+    return claim(truths(attack)) if is_in_range else never_met(attack)
 
 
-def impatient(attack: Attack) -> list[Claim]:
+def impatient(attack: Attack) -> Claim:
     """Give a particle up, as never met, after 10 periods."""
-    found = claims(truths(attack))
-    is_late = found[0].kind == "collision" and found[0].numbers[0][0] > 10
-    return [Claim("horizon")] if is_late else found
+    found = truths(attack)
+    is_late = found[0].kind == "collision" and found[0].numbers[0] > 10
+    return never_met(attack) if is_late else claim(found)
 
 
-def resting(attack: Attack) -> list[Claim]:
+def resting(attack: Attack) -> Claim:
     """Take a particle at rest, or nearly, for never met."""
     is_at_rest = abs(attack.state.vx) + abs(attack.state.vy) < 2.0**-20
-    return [Claim("horizon")] if is_at_rest else claims(truths(attack))
+    return never_met(attack) if is_at_rest else claim(truths(attack))
 
 
 def still_wall(monkeypatch: pytest.MonkeyPatch) -> None:

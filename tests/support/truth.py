@@ -1,37 +1,24 @@
-"""The reference's answers in the form that comparisons take, and how delicate a question is."""
+"""Certified answers, from the one prover, and how delicate a question is."""
 
 from __future__ import annotations
 
 import os
-from fractions import Fraction
 
 from msgspec import to_builtins
 
 import reference
 import scene as scenes
-from conformance.grading.agreement import Truth
+from conformance.generator.prover import proved_step
 from reference.arithmetic import Enclosure
 from scene import Scene, State
 from scene.laws import bounds
 from scene.tables import laws
 
+__all__ = ["IS_DEEP", "centre", "is_delicate", "proved_step"]
+
 IS_DEEP = os.environ.get("HYPOTHESIS_PROFILE") == "deep"
 NUDGE = 2.0**-46  # what rounding may move a state by, relative to the table and to the speed
-
-
 centre = Enclosure.centre
-
-
-def proved_step(scene: Scene, state: State, t_end: float, digits: int = 30) -> Truth:
-    outcome = reference.next_collision(scene, state, t_end, digits=digits, is_differentiated=True)
-    if isinstance(outcome, reference.Collision):
-        numbers = [centre(outcome.dt), *(centre(c) for c in outcome.after[1:])]
-        assert outcome.jacobian is not None
-        return Truth(outcome.rounded(), numbers, [[float(d) for d in row] for row in outcome.jacobian])
-    if isinstance(outcome, reference.Horizon):
-        dt = Fraction(t_end) - Fraction(state.t)
-        return Truth(outcome.rounded(), [dt, *(centre(c) for c in outcome.at[1:])])
-    return Truth(outcome)
 
 
 def is_delicate(scene: Scene, state: State, t_end: float) -> bool:

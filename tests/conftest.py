@@ -30,18 +30,23 @@ settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "quick"))
 LONGEST = [
     "test_fast_bits.py",
     "test_conformance_audit.py",
+    "test_fast_lane_search.py",
     "test_conformance_bench.py",
     "test_conformance_agreement.py",
-    "test_fast_lane_search.py",
-    "test_reference_mutants.py",
-    "test_fast_fine.py",
-    "test_conformance_suite.py",
-    "test_docs.py",
     "test_conformance_attacks.py",
+    "test_theory_prediction.py",
     "test_mushrooms_audit.py",
+    "test_conformance_suite.py",
+    "test_reference_mutants.py",
+    "test_docs.py",
+    "test_fast_fine.py",
     "test_mushrooms_bench.py",
+    "test_theory_distribution.py",
     "test_conformance_strategies.py",
+    "test_reference_exact.py",
+    "test_conformance_properties.py",
     "test_scene_mixed.py",
+    "test_scene_validity.py",
 ]
 
 

@@ -136,12 +136,12 @@ def aim(a, n, is_stem, m, limits):
 
 def _fly(is_mixed):
     @njit(error_model="numpy")
-    def fly(a, n, is_stem, is_relative, omega, m, limits):
+    def fly(a, n, is_stem, is_relative, omega, m, limits, omegas):
         """Correct each lane's time of flight once, and tell whether the step is then right and calm."""
         bend, k_w, rate_w, size_w = limits.bend, limits.curvature, limits.rate, limits.size
-        omega_r = limits.omega_r if is_mixed else omega
-        omega_w = limits.omega_w if is_mixed else omega
-        omega_h = limits.omega_h if is_mixed else omega
+        omega_r = omegas.radius if is_mixed else omega
+        omega_w = omegas.width if is_mixed else omega
+        omega_h = omegas.depth if is_mixed else omega
         for i in range(n):
             x, y, vx, vy, wall = a[X + i], a[Y + i], a[VX + i], a[VY + i], a[WALL + i]
             r0, r1_0, r2_0, hit, s = a[R0 + i], a[R1 + i], a[R2 + i], a[HIT + i], a[S + i]
@@ -304,15 +304,15 @@ def bounce(a, n, m, is_mushroom):
 
 def _chord(is_mixed):
     @njit(error_model="numpy")
-    def chord(a, n, is_again, is_cap, is_relative, omega, limits):
+    def chord(a, n, is_again, is_cap, is_relative, omega, limits, omegas):
         """Find the next arc hit of captured particles: the base is unfolded, |L| is constant.
 
         The chord keeps the distance |L| / v from the centre; while that exceeds w the mouth is out of reach.
         `is_again`: correct the times found before once more, in place of a new guess.
         """
         bend, k_w, rate_w, size = limits.bend, limits.curvature, limits.rate, limits.size
-        omega_r = limits.omega_r if is_mixed else omega
-        omega_w = limits.omega_w if is_mixed else omega
+        omega_r = omegas.radius if is_mixed else omega
+        omega_w = omegas.width if is_mixed else omega
         for i in range(n):
             x, y, vx, vy, spin = a[X + i], a[Y + i], a[VX + i], a[VY + i], a[SPIN + i]
             r0, r1_0, r2_0 = a[R0 + i], a[R1 + i], a[R2 + i]

@@ -11,17 +11,20 @@ import numpy as np
 import pytest
 from support.faulty_kernels import faulty_lanes
 from support.lane_draws import GROUPS
-from support.lane_search import ANYWHERE, draw_scene, draw_start, search
+from support.lane_search import ANYWHERE, Round, draw_scene, draw_start, search
+from support.lane_ties import TIES, wrong_walls
+from support.lane_traps import TRAPS
 
 import fast
 from fast.batch import lane_steps
+from fast.kernel import lanes
 from fast.step import WALL_NAMES
 from scene import Cap, Collision, Fourier, Mushroom, Rejected, State
 
 N_ANSWERS = int(os.environ.get("MUSHROOMS_LANE_ANSWERS", "300"))  # of each group of draws
 
 
-@pytest.mark.parametrize("group", [ANYWHERE, *GROUPS])
+@pytest.mark.parametrize("group", [ANYWHERE, *GROUPS, *TRAPS])
 def test_no_lane_answer_is_wrong(group, tally):
     assert search(11, N_ANSWERS, tally, group) == []
 
@@ -125,6 +128,24 @@ MUTANTS = {
         "fma(k_w * s, s, SAFETY * size)",
         "SAFETY * size",
     ),
+    "the floor before the mouth": (
+        "corner over a rising floor",
+        100,
+        "min(gap - doubt, lift)",
+        "gap - doubt",
+    ),
+    "concavity of the arc under a chord": (
+        "misled chord",
+        100,
+        "min(first, v2 - bend))",
+        "first)",
+    ),
+    "the slope of the side that is met": (
+        "misled side",
+        100,
+        "first = 1.0 if hit == ON_BASE else first",
+        "first = 1.0 if hit != ON_ARC else first",
+    ),
 }
 
 
@@ -134,3 +155,49 @@ def test_the_search_kills(name, tally):
     wrong = search(1, n, tally, group, faulty_lanes(old, new))
     tally["wrong"] = len(wrong)
     assert wrong
+
+
+def count_wrong_walls(draw, kernels, tally):
+    random = np.random.default_rng(3)
+    for _ in range(40):
+        scene, starts = TIES[draw](lanes.LANES, random)
+        answered, wrong = wrong_walls(Round(scene, kernels), scene, starts)
+        tally["answered"] += answered
+        tally["wrong"] += wrong
+    return tally["wrong"]
+
+
+# Terms of rounding, and the draw of ties that misses each.
+ROUNDING = {
+    "the mouth's edge": (
+        "at the mouth's edge",
+        "doubt = fma(SAFETY * rise, fma(size + abs(x), rise, (abs(vx) + rate_w) * depth), doubt)",
+        "doubt = doubt + 0.0",
+    ),
+    "the height at the end": (
+        "at the end of the arc",
+        "place -= SAFETY * (abs(y) + abs(vy) * s)",
+        "place -= 0.0",
+    ),
+    "the base inside the arc": (
+        "at the end of the arc",
+        "inside = r - abs(x_s) - SAFETY * (size_w + abs(x) + abs(vx) * s)",
+        "inside = r - abs(x_s)",
+    ),
+    "walls that are not met": (
+        "at the floor's corner",
+        "far = k_w * s * s + SAFETY * (size_w + abs(x) + abs(y) + way)",
+        "far = k_w * s * s",
+    ),
+}
+
+
+@pytest.mark.parametrize("draw", TIES)
+def test_no_tie_within_rounding_is_answered_wrongly(draw, tally):
+    assert count_wrong_walls(draw, lanes, tally) == 0
+
+
+@pytest.mark.parametrize("name", ROUNDING)
+def test_the_ties_kill(name, tally):
+    draw, old, new = ROUNDING[name]
+    assert count_wrong_walls(draw, faulty_lanes(old, new), tally) > 0

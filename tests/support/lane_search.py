@@ -2,9 +2,10 @@
 
 Of two halves. `anywhere` draws scenes whose walls move as far and the particles as slowly as lanes allow:
 near the least radius, mouths from half the cap to a slit, deep floors, plateaus; starts on every wall. The
-groups of `lane_draws` aim at one kind of flight each. Each start goes three lane steps, so that what a step
-leaves to the next is tried too. An answer is wrong that names another wall than the careful step from the
-same state, or differs from it by more than 4 backward ulps. `python tests/support/lane_search.py SEED N`
+groups of `lane_draws` and `lane_traps` aim at one kind of flight each. Each start goes three lane steps, so
+that what a step leaves to the next is tried too. An answer is wrong that names another wall than the careful
+step from the same state, or differs from it by more than 4 backward ulps; or another than the floor, from a
+start above it by less than the careful step tells, but rising slower. `python lane_search.py SEED N`
 searches N lane answers deep in each group.
 """
 
@@ -21,18 +22,21 @@ from mpmath import fp
 
 from fast.batch import LaneRound
 from fast.compiled import FloatArray
-from fast.kernel import codes, entries, follow, lanes
+from fast.kernel import codes, entries, follow, lanes, walls
+from fast.kernel.laws import set_anchors
 from scene import BangBang, Cap, Fourier, Law, Mushroom, Scene, Stem
 from scene.laws import value
 from scene.tables import laws, width_factors
-from support.lane_draws import GROUPS, Start, draw_starts
+from support.lane_draws import GROUPS, Group, Start, draw_starts
 from support.lane_draws import draw_scene as draw_directed_scene
+from support.lane_traps import TRAPS, Trap
 
 BOUND = 4.0  # backward ulps
 CLOSE = 2.0**-24  # relative, where no more can be asked: see error_of
 NUDGES = (2.0**-36, 2.0**-46)  # of each number of a state: for the derivatives of a step
 ANYWHERE = "anywhere"
 N_ROUNDS = 3
+ANSWERS_OF_A_TRAP = 10  # that a draw of starts solved for stands for
 
 
 class Wrong(NamedTuple):
@@ -117,6 +121,14 @@ class Round(LaneRound):
             q[3], q[5] = -q[3], -q[5]
         return int(code), np.array([total, *q[2:]])
 
+    def is_floor_met_at_once(self, p: FloatArray) -> bool:
+        """Tell whether a start is above the floor by no more than rounding, in pairs of floats, and falls."""
+        set_anchors(self.laws, self.anchors, p[0], p[1])
+        places = (codes.FLOOR, p[2], p[3])
+        f, error = walls.wall_residual(*places, self.laws, self.anchors, self.bounds, self.is_relative)
+        slope = walls.wall_slope(*places, p[4], p[5], self.anchors, self.is_relative)
+        return bool(0.0 < f <= error and slope < 0.0)
+
     def ulps(self, p: FloatArray, wall: int, answer: FloatArray, truth: FloatArray) -> float | None:
         """Return the backward ulps of an answer beside the careful one; None for a delicate step.
 
@@ -167,14 +179,20 @@ def search(
     """Search one group of draws until lanes have given n answers; returns the wrong ones."""
     random, found = np.random.default_rng(seed), []
     before = tally["lane answers"]
-    while tally["lane answers"] < before + n:
+    draws = 0
+    # Starts that are solved for are mostly left to the careful step: the draws are then counted.
+    while tally["lane answers"] < before + n and (group not in TRAPS or draws < n // ANSWERS_OF_A_TRAP):
+        draws += 1
         if group == ANYWHERE:
             scene = draw_scene(random)
             starts = [draw_start(scene, random) for _ in range(lanes.LANES)]
+        elif group in TRAPS:
+            scene, starts = TRAPS[group].draw(lanes.LANES, random)
         else:
             scene = draw_directed_scene(GROUPS[group], random)
             starts = draw_starts(scene, GROUPS[group], lanes.LANES, random)
-        is_captured = group != ANYWHERE and GROUPS[group].is_captured
+        aims: dict[str, Group | Trap] = {**GROUPS, **TRAPS}
+        is_captured = group in aims and aims[group].is_captured
         found += try_starts(Round(scene, kernels, is_captured=is_captured), scene, starts, random, tally)
     return found
 
@@ -187,7 +205,7 @@ def try_starts(
     age = follow.SERVES / pool.omega * random.random() if pool.omega and random.random() < 0.5 else 0.0
     for lane, start in enumerate(starts):
         pool.fill(lane, *start, age)
-    is_live = np.array([is_valid(pool, *start) for start in starts])
+    is_live = np.array([is_valid(pool, *start) for start in starts], dtype=bool)
     for _ in range(N_ROUNDS):
         begun = [state_in(pool, i) for i in range(len(starts))]
         right, hits, numbers = pool.step(len(starts))
@@ -196,6 +214,14 @@ def try_starts(
         for i in np.flatnonzero(is_live):
             p, wall = begun[i]
             code, truth = pool.careful(p, wall)
+            if code == codes.START:  # the careful step cannot tell whether it is inside its walls
+                tally["starts at a corner"] += 1
+                is_live[i] = False
+                if hits[i] != codes.FLOOR and pool.is_floor_met_at_once(p):
+                    found.append(
+                        Wrong(scene, p.tolist(), wall, (int(hits[i]), numbers[i].tolist()), (code, []))
+                    )
+                continue
             tally["lane answers"] += 1
             ulps = error_of(pool, p, wall, numbers[i], truth, tally) if code == hits[i] else np.inf
             if ulps is None:
@@ -358,7 +384,7 @@ def _a_time(scene: Scene, random: np.random.Generator) -> float:
 
 
 if __name__ == "__main__":
-    for name in (ANYWHERE, *GROUPS):
+    for name in (ANYWHERE, *GROUPS, *TRAPS):
         counts: Counter[str] = Counter()
         for wrong in search(int(sys.argv[1]), int(sys.argv[2]), counts, name):
             print(wrong)

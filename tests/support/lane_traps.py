@@ -1,0 +1,163 @@
+"""Starts that are solved for, for the search in lane_search: random ones hardly ever hang on these checks.
+
+`misled chord` and `misled side` solve for a flight whose f has two or three roots close together, and for
+which Newton's method from the lane's guess lands on the second or third of them. `corner over a rising floor`
+starts on a side so near the floor that its f is computed as 0.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+from mpmath import fp
+
+from fast.kernel import codes
+from scene import Fourier, Mushroom, Scene
+from scene.laws import value
+
+Array = npt.NDArray[np.floating[Any]]
+Start = tuple[Array, int]
+N_CROWD = 4_000
+REACH = 0.24  # phase, below lanes.LONGEST_TURN
+
+
+class Trap(NamedTuple):
+    """How to draw a scene and starts, and whether particles move unfolded through the base."""
+
+    draw: Callable[[int, np.random.Generator], tuple[Scene, list[Start]]]
+    is_captured: bool = False
+
+
+def corner_over_a_rising_floor(n: int, random: np.random.Generator) -> tuple[Scene, list[Start]]:
+    """Draw starts on the left side that the floor, slowing down, overtakes at once but for rounding.
+
+    Without its f at the start, only f at y = 0 and the bound on its curvature tell that it is met.
+    """
+    least, least_after = float(10.0 ** random.uniform(-4, -2)), float(random.uniform(0.1, 0.3))
+    depth = Fourier(1.0 + least, 1.0, (-1.0,))
+    scene = Mushroom(r=float(1.0 + 10.0 ** random.uniform(-3, -1)), w=1.0, h=depth)
+    starts = []
+    for t in random.uniform(-0.1, 0.0, n) - least_after:
+        h, rate = float(value(fp, depth, float(t))), float(value(fp, depth, float(t), 1))
+        rise = -rate * random.uniform(0.7, 1.0)
+        along = random.uniform(1.3, 1.9) * rise / h  # to cross the mouth at a third to 0.9 of its half-width
+        starts.append((np.array([t, 0.0, -1.0, -h, along, rise]), int(codes.LEFT)))
+    return scene, starts
+
+
+def zero_between(off: Callable[[Array], Array], low: Array, high: Array) -> Array:
+    """Return zeros of many functions by bisection, nan where the ends have one sign or off jumps."""
+    below = off(low)
+    ok = below * off(high) < 0.0
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        at = off(middle)
+        is_left = below * at <= 0.0
+        low, high = np.where(is_left, low, middle), np.where(is_left, middle, high)
+        below = np.where(is_left, below, at)
+    middle = 0.5 * (low + high)
+    return np.where(ok & (np.abs(off(middle)) < 1e-7), middle, np.nan)
+
+
+def misled_chord(n: int, random: np.random.Generator) -> tuple[Scene, list[Start]]:
+    """Draw captured particles slower than the arc's bend, near its least radius, of about four amplitudes.
+
+    There p - r, p the distance from the centre, may bend upwards, downwards and upwards again: the arc is
+    met, left and met once more. The speed and direction are such that f has roots at u_1 and u_3; u_3 is
+    solved for such that Newton's second correction ends there.
+    """
+    mean = 4.0 + float(10.0 ** random.uniform(-3, 0))
+    t = -random.uniform(0.02, 0.09, N_CROWD)
+    u_1, n_steps = REACH * random.uniform(0.3, 0.8, N_CROWD), int(random.integers(1, 3))
+    r, rate, bend = mean - np.cos(t), np.sin(t), np.cos(t)
+
+    def grown(u: Array) -> Array:  # (r(t + u)^2 - r(t)^2) / u
+        d = np.cos(t) - np.cos(t + u)
+        return np.asarray(d * (2.0 * r + d) / u)
+
+    def motion(u_3: Array) -> tuple[Array, Array]:
+        v2 = (grown(u_3) - grown(u_1)) / (u_3 - u_1)
+        return v2, 0.5 * (grown(u_1) - v2 * u_1)
+
+    def missed(u_3: Array) -> Array:
+        v2, q = motion(u_3)
+        s = 2.0 * (r * rate - q) / (v2 - rate**2 - r * bend)
+        for _ in range(n_steps):
+            slope = 2.0 * ((mean - np.cos(t + s)) * np.sin(t + s) - (s * v2 + q))
+            s = s - s * (grown(s) - s * v2 - 2.0 * q) / slope
+        return np.asarray(s - u_3)
+
+    with np.errstate(all="ignore"):
+        first = u_1 * (1.0 + 10.0 ** random.uniform(-2.5, -0.2, N_CROWD))
+        u_3 = zero_between(missed, first, first * random.uniform(1.0, 1.3, N_CROWD))
+        v2, q = motion(u_3)
+        out = q / r
+        slope = 2.0 * ((mean - np.cos(t + u_3)) * np.sin(t + u_3) - (u_3 * v2 + q))
+        chosen = np.flatnonzero((v2 > out**2) & (out < rate) & (slope < 0.0) & (u_3 < 0.25))[:n]
+    scene = Mushroom(r=Fourier(mean, 1.0, (-1.0,)), w=0.01, h=1.0)
+    starts = []
+    for i, turn in zip(chosen, random.uniform(0.3, 2.0, len(chosen)), strict=True):
+        e_x, e_y, along = np.cos(turn), np.sin(turn), np.sqrt(v2[i] - out[i] ** 2)
+        place = (r[i] * e_x, r[i] * e_y, out[i] * e_x - along * e_y, out[i] * e_y + along * e_x)
+        starts.append((np.array([t[i], 0.0, *place]), int(codes.ARC)))
+    return scene, starts
+
+
+def misled_side(n: int, random: np.random.Generator) -> tuple[Scene, list[Start]]:
+    """Draw flights from the floor along the right side, whose w = nu r is of the fourth order at its least.
+
+    f = w - x then has the shape of any quartic. Its first roots are u_1 and u_2; u_2 is solved for such that
+    Newton's method ends there.
+    """
+    swing = float(random.uniform(0.2, 0.9))
+    other = min(0.98, swing * (1.0 + random.normal() * float(10.0 ** random.uniform(-3, -1.5))))
+    phi = 2.0 * np.arccos(swing)
+    r = Fourier(1.0, 1.0, (swing,))
+    nu = Fourier(0.5, 1.0, (float(0.5 * other * np.cos(phi)),), (float(-0.5 * other * np.sin(phi)),))
+    t, n_steps = np.pi - 0.5 * phi + random.uniform(-0.2, 0.1, N_CROWD), int(random.integers(1, 4))
+
+    def w(u: Array | float) -> Array:
+        return np.asarray(0.5 * (1.0 + swing * np.cos(t + u)) * (1.0 + other * np.cos(t + u + phi)))
+
+    def rate(u: Array | float) -> Array:
+        one, two = t + u, t + u + phi
+        return np.asarray(
+            -0.5 * swing * np.sin(one) * (1.0 + other * np.cos(two))
+            - 0.5 * other * np.sin(two) * (1.0 + swing * np.cos(one))
+        )
+
+    bend = -0.5 * (swing * np.cos(t) + other * np.cos(t + phi) + 2.0 * swing * other * np.cos(2.0 * t + phi))
+    u_1 = REACH * random.uniform(0.2, 0.9, N_CROWD)
+
+    def motion(u_2: Array) -> tuple[Array, Array]:
+        v = (w(u_2) - w(u_1)) / (u_2 - u_1)
+        return v, w(u_1) - v * u_1
+
+    def missed(u_2: Array) -> Array:
+        v, x = motion(u_2)
+        s = (w(0.0) - x) / (v - rate(0.0))
+        s = s * (1.0 + 0.5 * bend * s / (v - rate(0.0)))
+        for _ in range(n_steps):
+            s = s - (w(s) - x - v * s) / (rate(s) - v)
+        return np.asarray(s - u_2)
+
+    with np.errstate(all="ignore"):
+        first = u_1 * (1.0 + 10.0 ** random.uniform(-3, -0.1, N_CROWD))
+        u_2 = zero_between(missed, first, first * random.uniform(1.0, 1.3, N_CROWD))
+        v, x = motion(u_2)
+        is_good = (x < w(0.0)) & (v > rate(0.0)) & (rate(u_1) < v) & (u_2 < REACH)
+    scene = Mushroom(r=r, nu=nu, h=1.0)
+    starts = [
+        (np.array([t[i], 0.0, x[i], -1.0, v[i], 0.5]), int(codes.FLOOR)) for i in np.flatnonzero(is_good)[:n]
+    ]
+    return scene, starts
+
+
+TRAPS = {
+    "corner over a rising floor": Trap(corner_over_a_rising_floor),
+    "misled chord": Trap(misled_chord, is_captured=True),
+    "misled side": Trap(misled_side),
+}

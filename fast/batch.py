@@ -16,15 +16,15 @@ import numpy.typing as npt
 from fast.compiled import compile_scene
 from fast.fine import FineTrajectory, as_pairs, as_trajectory, fill_path
 from fast.flow import follow_to
-from fast.kernel import codes, follow, lanes, walls
+from fast.kernel import bounces, codes, follow, pools, walls
 from fast.kernel.laws import set_anchors
 from fast.kernel.limits import limits_of, own_omegas
-from fast.kernel.records import ANCHORS_SHAPE, LEVEL, SLOPE, FloatArray, Particle
+from fast.kernel.records import ANCHORS_SHAPE, LEVEL, OMEGA, SHARED, SLOPE, FloatArray, Particle
 from fast.step import WALL_NAMES, as_arrays, fitted_start, followed_paths, trouble
 from fast.units import fit
 from scene import Collision, Horizon, Outcome, Scene, State
 
-PLACE = (lanes.X, lanes.Y, lanes.VX, lanes.VY)
+PLACE = (pools.X, pools.Y, pools.VX, pools.VY)
 OFF = np.bool_(False)
 
 
@@ -81,6 +81,12 @@ def flights(scene: Scene, states: Sequence[State], t_end: float) -> tuple[int, f
     return int(done.counts.sum()), seconds
 
 
+def as_particle(p: FloatArray, wall: int) -> Particle:
+    """Return a state [t, its low part, x, y, vx, vy], in whatever units, as the kernels take it."""
+    t, t_low, x, y, vx, vy = p.tolist()
+    return Particle(t, t_low, x, y, vx, vy, int(wall))
+
+
 class LaneRound:
     """One pool of lanes, filled with given states; scene and states as they are, in whatever units.
 
@@ -93,27 +99,28 @@ class LaneRound:
         self.compiled = compile_scene(scene)
         self.is_disk = bool(self.compiled.table == codes.CAP)
         self.limits, self.omegas = limits_of(self.compiled), own_omegas(self.compiled)
+        self.omega = float(self.compiled.laws[SHARED, OMEGA])
         self.anchors = np.zeros(ANCHORS_SHAPE)
-        self.pool, self.spare = np.zeros((2, lanes.N_ROWS * lanes.LANES))
+        self.pool, self.spare = np.zeros((2, pools.N_ROWS * pools.LANES))
 
     def fill(self, lane: int, p: FloatArray, wall: int, age: float = 0.0) -> None:
         """Put a state [t, its low part, x, y, vx, vy] into a lane, its laws known from `age` before it."""
         a, i = self.pool, np.int64(lane)
-        particle = Particle(*map(float, p), int(wall))
-        follow.load(a, i, particle, np.inf, OFF)
-        a[lanes.NEXT_T + i], a[lanes.NEXT_T_LOW + i] = particle.t - age, particle.t_low
+        particle = as_particle(p, wall)
+        pools.load(a, i, particle, np.inf, OFF)
+        a[pools.NEXT_T + i], a[pools.NEXT_T_LOW + i] = particle.t - age, particle.t_low
         set_anchors(self.compiled.laws, self.anchors, particle.t - age, particle.t_low)
-        follow.set_reference(a, i, self.compiled, self.anchors)
-        if a[lanes.END + i] <= particle.t:
+        pools.set_reference(a, i, self.compiled, self.anchors)
+        if a[pools.END + i] <= particle.t:
             self.fill(lane, p, wall)
             return
-        since = (a[lanes.T + i] - a[lanes.REF + i]) + (a[lanes.T_LOW + i] - a[lanes.REF_LOW + i])
-        follow.set_laws(a, i, lanes.R0, lanes.W0, lanes.H0, since, self.compiled)
-        a[lanes.SPIN + i] = particle.x * particle.vy - particle.y * particle.vx
+        since = (a[pools.T + i] - a[pools.REF + i]) + (a[pools.T_LOW + i] - a[pools.REF_LOW + i])
+        pools.set_laws(a, i, pools.R0, pools.W0, pools.H0, since, self.compiled)
+        a[pools.SPIN + i] = particle.x * particle.vy - particle.y * particle.vx
 
     def is_met(self, p: FloatArray, wall: int) -> bool:
         """Tell whether a state lies, but for rounding, on the wall that it leaves, as after a step."""
-        particle = Particle(*map(float, p), int(wall))
+        particle = as_particle(p, wall)
         if wall == codes.NO_WALL:
             return False
         if wall == codes.BASE:
@@ -127,13 +134,13 @@ class LaneRound:
         """Take a step in n lanes: which are shown right, walls met, and rows of dt, x, y, vx, vy."""
         right, hits, dt = self.find(follow.GENERAL, n)
         slope, is_mushroom = self.compiled.laws[SLOPE, LEVEL], self.compiled.table == codes.MUSHROOM
-        lanes.bounce(self.pool, np.int64(n), slope, is_mushroom)
+        bounces.bounce(self.pool, np.int64(n), slope, is_mushroom)
         return right, hits, np.column_stack([dt, *(self.row(r, n) for r in PLACE)])
 
     def skip(self, n: int) -> tuple[npt.NDArray[np.bool_], FloatArray, FloatArray]:
         """Take captured chords in n lanes, likewise; every hit is on the arc."""
         right, _, dt = self.find(follow.DISK, n)
-        lanes.rebound(self.pool, np.int64(n))
+        bounces.rebound(self.pool, np.int64(n))
         return right, np.zeros(n), np.column_stack([dt, *(self.row(r, n) for r in PLACE)])
 
     def find(self, pool: np.integer[Any], n: int) -> tuple[npt.NDArray[np.bool_], FloatArray, FloatArray]:
@@ -141,10 +148,19 @@ class LaneRound:
         rest = (self.compiled, self.limits, self.omegas)
         follow.advance(pool, self.pool, np.int64(n), OFF, *rest)
         follow.correct(pool, self.pool, np.int64(n), self.spare, *rest)
-        right = self.row(lanes.OK, n) == lanes.RIGHT_ONE
+        return self.answers(n)
+
+    def answers(self, n: int) -> tuple[npt.NDArray[np.bool_], FloatArray, FloatArray]:
+        """Return which of n lanes are shown right, the walls that they meet, and when."""
+        right = self.row(pools.OK, n) == pools.CERTAIN
         # A hit beyond a knot is left to the careful step.
-        right &= self.row(lanes.NEXT_T, n) < self.row(lanes.KNOT, n)
-        return right, self.row(lanes.HIT, n).copy(), self.row(lanes.S, n).copy()
+        right &= self.row(pools.NEXT_T, n) < self.row(pools.KNOT, n)
+        return right, self.row(pools.HIT, n).copy(), self.row(pools.S, n).copy()
+
+    def careful_step(self, p: FloatArray, wall: int) -> tuple[int, float, FloatArray]:
+        """Return the careful step's wall, its time, and the state after, from a state and its wall."""
+        paths = followed_paths(self.compiled, p[None], np.array([wall]), 1, np.inf)
+        return int(paths.codes[0]), float(paths.steps[0, 0, 0]), paths.ends[0]
 
     def row(self, start: np.integer[Any], n: int) -> FloatArray:
         """Return n lanes of a row of the pool."""
@@ -165,8 +181,8 @@ def lane_steps(scene: Scene, states: Sequence[State]) -> list[Outcome | None]:
     """
     pool = LaneRound(fit(scene).scene)
     found: list[Outcome | None] = []
-    for first in range(0, len(states), lanes.LANES):
-        part = states[first : first + lanes.LANES]
+    for first in range(0, len(states), pools.LANES):
+        part = states[first : first + pools.LANES]
         starts, are_met = [fitted_start(scene, state) for state in part], []
         for i, (p, wall) in enumerate(zip(*as_arrays(starts), strict=True)):
             pool.fill(i, p, wall)

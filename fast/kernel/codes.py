@@ -9,6 +9,6 @@ NO_WALL, ARC, BASE, LEFT, RIGHT, FLOOR = np.arange(-1, 5)
 N_WALLS = 5
 HORIZON, SLIDING, MOUTH_EDGE, ON_CORNER = np.array([10, 20, 21, 22])
 FAR_TIME, TOO_MANY, TANGENT, CORNER, EDGE, START, AT_END = np.arange(31, 38)
-# A state that is refused: it moves into the wall it leaves, or lies beyond a wall (BEYOND plus that wall's code).
+# A refused state moves into the wall that it leaves, or lies beyond a wall: BEYOND plus that wall's code.
 APPROACHING, BEYOND = np.array([40, 41])
 CAP, STEM, MUSHROOM = np.arange(3)

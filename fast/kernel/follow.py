@@ -18,30 +18,28 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from fast.kernel.arithmetic import SAFETY, fma
+from fast.kernel.arithmetic import fma
 from fast.kernel.careful import first_step
 from fast.kernel.codes import ARC, CAP, HORIZON, MUSHROOM, N_WALLS, STEM
 
-from fast.kernel.lanes import (  # isort: skip
-    CALM, CLOSED, COARSE, DONE, END, H0, HIT, H_REF, KNOT, LANES, NEVER, NEXT_H0, NEXT_R0, NEXT_T, NEXT_T_LOW,
-    NEXT_VX, NEXT_VY, NEXT_W0, NEXT_X, NEXT_Y, N_ARC, N_BASE, N_REF, N_ROWS, OK, ON_ARC, R0, REF, REF_LOW,
-    RIGHT_ONE, R_REF, S, SINCE, SPIN, STAY_IN, STAY_OUT, STOP, T, T_LOW, UNTIL, VX, VY, W0, WALL, X, Y,
-    aim, arrive, bounce, chord, chord_mixed, fly, fly_mixed, rebound,
+from fast.kernel.pools import (  # isort: skip
+    CERTAIN, CLOSED, COARSE, DONE, END, HIT, KNOT, LANES, NEVER, NEXT_T, NEXT_T_LOW, NEXT_VX, NEXT_VY,
+    NEXT_X, NEXT_Y, N_ARC, N_BASE, OK, ROUTINE, S, SINCE, SPIN, STAY_IN, STAY_OUT, STOP, T, T_LOW, UNTIL,
+    VX, VY, WALL, X, Y, change_lane, fold, load, refold, set_reference, POOL_SIZE,
 )  # fmt: skip
-from fast.kernel.laws import bend_of_half_leg, set_anchors
+from fast.kernel.bounces import arrive, bounce, rebound
+from fast.kernel.lanes import aim, chord, fly
+from fast.kernel.laws import set_anchors
 from fast.kernel.limits import Limits, has_lanes, limits_of
 
 from fast.kernel.records import (  # isort: skip
-    ANCHORS_SHAPE, BANG_BANG, DEPTH, FOURIER, HALF_LEG, KIND, LEVEL, OMEGA, RADIUS, RATE, ROOM, SHARED, SLOPE, VALUE,
-    VALUE_LOW, WIDTH, Compiled, FloatArray, Followed, IntArray, Particle, Stops, particle_at, write_state,
+    ANCHORS_SHAPE, Compiled, FloatArray, Followed, IntArray, LEVEL, OMEGA, Particle, SHARED, SLOPE, Stops,
+    particle_at, write_state,
 )  # fmt: skip
-from fast.kernel.short import law, turns
 
 GENERAL, DISK, SPARE = np.arange(3)  # pools; SPARE is one to correct single lanes in
 PARTICLE, NEXT_STOP = np.arange(2)  # rows of a roster: each lane's particle and the number of its next stop
 STAYS, MOVES, ENDS = 0, 1, 2
-POOL_SIZE = N_ROWS * LANES
-SERVES = 0.125  # omega times how long a reference serves for starting a flight
 MAX_CORRECTIONS = 3
 ON, OFF = np.bool_(True), np.bool_(False)
 
@@ -84,81 +82,6 @@ def new_worker(scene: Compiled, stops: Stops, followed: Followed) -> Worker:
         stops,
         followed,
     )
-
-
-@njit(error_model="numpy")
-def set_reference(a, i, scene, anchors):
-    """Make the time of a lane's next state the reference of its laws, and give it their values there."""
-    laws, t, end, knot = scene.laws, a[NEXT_T + i], NEVER, NEVER
-    a[REF + i], a[REF_LOW + i] = t, a[NEXT_T_LOW + i]
-    for row, place in ((RADIUS, R_REF + i), (WIDTH, N_REF + i), (DEPTH, H_REF + i)):
-        f, rate, bend = anchors[row, VALUE], anchors[row, RATE], 0.0
-        if laws[row, KIND] == FOURIER:
-            bend = -laws[row, OMEGA] * laws[row, OMEGA] * (f - laws[row, LEVEL])
-            end = min(end, t + SERVES / laws[row, OMEGA])
-        elif laws[row, KIND] == BANG_BANG:
-            bend = bend_of_half_leg(laws, row, int(anchors[row, HALF_LEG]))
-            # Rounded down: a flight that ends before it ends before the half-leg does.
-            knot = min(knot, (t + anchors[row, ROOM]) - SAFETY * (abs(t) + anchors[row, ROOM]))
-        a[place], a[place + LANES] = f, anchors[row, VALUE_LOW]
-        a[place + 2 * LANES], a[place + 3 * LANES] = rate, bend
-    a[END + i], a[KNOT + i] = min(end, knot), knot
-    set_laws(a, i, NEXT_R0, NEXT_W0, NEXT_H0, 0.0, scene)
-
-
-@njit(error_model="numpy")
-def law_of(a, i, row, laws, since):
-    """Return a law and its derivatives from the rows of its reference, which begin at i."""
-    omega = laws[row, OMEGA] if laws[row, KIND] == FOURIER else 0.0
-    g1, g2, g0 = turns(omega, since)
-    return law(a[i], a[i + LANES], a[i + 2 * LANES], a[i + 3 * LANES], omega, g1, g2, g0)
-
-
-@njit(error_model="numpy")
-def set_laws(a, i, r_row, w_row, h_row, since, scene):
-    """Write a lane's laws at a time after its reference."""
-    r, r1, r2 = law_of(a, R_REF + i, RADIUS, scene.laws, since)
-    w, w1, w2 = law_of(a, N_REF + i, WIDTH, scene.laws, since)
-    h, h1, h2 = law_of(a, H_REF + i, DEPTH, scene.laws, since)
-    if scene.is_relative:
-        w, w1, w2 = w * r, fma(w1, r, w * r1), fma(w2, r, fma(w, r2, 2.0 * w1 * r1))
-    a[r_row + i], a[r_row + LANES + i], a[r_row + 2 * LANES + i] = r, r1, r2
-    a[w_row + i], a[w_row + LANES + i], a[w_row + 2 * LANES + i] = w, w1, w2
-    a[h_row + i], a[h_row + LANES + i], a[h_row + 2 * LANES + i] = h, h1, h2
-
-
-@njit(error_model="numpy")
-def load(a, i, particle, stop, is_first_kept):
-    """Put a particle into a lane; its laws are unknown there, so its first step will be careful."""
-    for row in range(N_ROWS):
-        a[row * LANES + i] = 0.0
-    a[T + i], a[T_LOW + i] = particle.t, particle.t_low
-    a[X + i], a[Y + i], a[VX + i], a[VY + i] = particle.x, particle.y, particle.vx, particle.vy
-    a[WALL + i] = particle.wall
-    # Any stay serves, or none until the mouth has narrowed.
-    any_serves = -NEVER if is_first_kept else NEVER
-    a[STOP + i], a[SINCE + i], a[UNTIL + i] = stop, any_serves, -any_serves
-    a[STAY_IN + i] = a[STAY_OUT + i] = a[CLOSED + i] = NEVER
-    a[END + i] = -NEVER
-
-
-@njit(error_model="numpy")
-def change_lane(a, i, b, j):
-    """Copy lane i of one pool to lane j of another."""
-    for row in range(N_ROWS):
-        b[row * LANES + j] = a[row * LANES + i]
-
-
-@njit(error_model="numpy")
-def fold(a, i, scene):
-    """Bring an unfolded particle back to y >= 0, with the laws that the disk has no use for."""
-    if a[Y + i] < 0.0:
-        a[Y + i] = -a[Y + i]
-        a[VY + i] = -a[VY + i]
-    a[SPIN + i] = 0.0
-    a[WALL + i] = ON_ARC
-    since = (a[T + i] - a[REF + i]) + (a[T_LOW + i] - a[REF_LOW + i])
-    set_laws(a, i, R0, W0, H0, since, scene)
 
 
 @njit(error_model="numpy")
@@ -227,16 +150,6 @@ def finish(a, i, j, code, end, followed):
         followed.counts[j, wall] = int(a[N_ARC + wall * LANES + i])
 
 
-@njit(error_model="numpy")
-def refold(a, i):
-    """Bring an unfolded particle of a cap back to y >= 0, on the arc if it was unfolded at all."""
-    if a[Y + i] < 0.0:
-        a[Y + i], a[VY + i] = -a[Y + i], -a[VY + i]
-    if a[SPIN + i] != 0.0:
-        a[WALL + i] = ON_ARC
-    a[SPIN + i] = 0.0
-
-
 @njit(error_model="numpy", inline="always")
 def step_carefully(pool, a, i, roster, worker):
     """Find a lane's next collision carefully, in the disk the next one with the arc; returns the last code.
@@ -278,7 +191,8 @@ def advance(pool, a, n, is_again, scene, limits, omegas):
         a: the pool's rows.
         n: how many lanes are in use.
         is_again: correct the times found before once more, in place of a new guess.
-        scene, limits: the scene, and what holds of it for all time.
+        scene: the scene's numbers.
+        limits: what holds of its laws for all time.
         omegas: None where all laws share their frequency; numba then leaves out the slower loops.
     """
     table, is_relative, omega, m = (
@@ -288,17 +202,11 @@ def advance(pool, a, n, is_again, scene, limits, omegas):
         scene.laws[SLOPE, LEVEL],
     )
     if pool == DISK:
-        if omegas is None:
-            chord(a, n, is_again, table == CAP, is_relative, omega, limits, omegas)
-        else:
-            chord_mixed(a, n, is_again, table == CAP, is_relative, omega, limits, omegas)
+        chord(a, n, is_again, table == CAP, is_relative, omega, limits, omegas)
         return
     if not is_again:
         aim(a, n, table == STEM, m, limits)
-    if omegas is None:
-        fly(a, n, table == STEM, is_relative, omega, m, limits, omegas)
-    else:
-        fly_mixed(a, n, table == STEM, is_relative, omega, m, limits, omegas)
+    fly(a, n, table == STEM, is_relative, omega, m, limits, omegas)
 
 
 @njit(error_model="numpy")
@@ -325,7 +233,7 @@ def attend(pool, a, i, roster, worker):
     if pool == GENERAL and a[SPIN + i] != 0.0 and worker.is_laned:
         return MOVES
     is_known = worker.is_laned and a[END + i] > -NEVER
-    if is_known and a[OK + i] == RIGHT_ONE and a[NEXT_T + i] < a[KNOT + i]:
+    if is_known and a[OK + i] == CERTAIN and a[NEXT_T + i] < a[KNOT + i]:
         if a[NEXT_T + i] >= a[END + i]:
             set_anchors(scene.laws, worker.anchors, a[NEXT_T + i], a[NEXT_T_LOW + i])
             set_reference(a, i, scene, worker.anchors)
@@ -347,11 +255,11 @@ def attend(pool, a, i, roster, worker):
 
 
 @njit(error_model="numpy")
-def are_calm(a, n):
+def are_routine(a, n):
     """Tell whether no lane of a pool needs attention: mostly so, and seen in one packed loop."""
     least = 1.0
     for i in range(n):
-        least = min(least, a[CALM + i])
+        least = min(least, a[ROUTINE + i])
     return least > 0.0
 
 
@@ -370,7 +278,7 @@ def scan(pool, worker):
     i = np.int64(0)
     while i < n_held[pool]:
         fate = STAYS
-        if not (a[CALM + i] > 0.0 and worker.is_laned):
+        if not (a[ROUTINE + i] > 0.0 and worker.is_laned):
             fate = attend(pool, a, i, roster, worker)
         if fate == STAYS:
             i += 1
@@ -412,7 +320,7 @@ def follow(worker, walls, omegas):
             if n_held[pool] == 0:
                 continue
             advance(pool, a, n_held[pool], OFF, scene, worker.limits, omegas)
-            if not (worker.is_laned and are_calm(a, n_held[pool])):
+            if not (worker.is_laned and are_routine(a, n_held[pool])):
                 if worker.is_laned:
                     correct(pool, a, n_held[pool], pools[SPARE], scene, worker.limits, omegas)
                 scan(pool, worker)

@@ -118,8 +118,8 @@ def move(wall, s, particle, scene, anchors):
     again keeps its residual at the start in its function.
 
     Returns:
-        (code, time, particle): the wall and the particle leaving it. Else the particle as it was, with FAR_TIME,
-        or with TANGENT where f' is so slight that the polished time is none.
+        (code, time, particle): the wall and the particle leaving it. Else the particle as it was, with
+        FAR_TIME, or with TANGENT where f' is so slight that the polished time lies before the start.
     """
     vx, vy, is_again, rest = particle.vx, particle.vy, wall == particle.wall, 0.0
     residual = residual_error = error = f = slope_s = 0.0

@@ -7,8 +7,8 @@ from typing import NamedTuple
 from fast.kernel.arithmetic import MAX_QUADRANT, SAFETY, TWO_OVER_PI
 
 from fast.kernel.records import (  # isort: skip
-    BANG_BANG, BEND, CONSTANT, DEPTH, FASTEST, FOURIER, HIGHEST, KIND, LOWEST, N_HARMONICS, OMEGA, PERIOD, RADIUS, SHARED, SLOPE,
-    WIDTH, Compiled,
+    BANG_BANG, BEND, CONSTANT, DEPTH, FASTEST, FOURIER, HIGHEST, KIND, LOWEST, N_HARMONICS, OMEGA, PERIOD,
+    RADIUS, SHARED, SLOPE, WIDTH, Compiled,
 )  # fmt: skip
 
 LEAST_RADIUS = 2.0**-1000

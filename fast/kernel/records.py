@@ -1,7 +1,7 @@
 """What kernels are given and hand back, and the names of the columns of their tables of numbers.
 
-numba reads a named tuple as cheaply as loose arguments. The numbers of all laws are rows of one array, because a
-row is chosen while a kernel runs; its columns are named here and nowhere else.
+numba reads a named tuple as cheaply as loose arguments. The numbers of all laws are rows of one array,
+because a row is chosen while a kernel runs; its columns are named here and nowhere else.
 """
 
 from __future__ import annotations
@@ -18,36 +18,38 @@ FloatArray = npt.NDArray[np.floating[Any]]
 IntArray = npt.NDArray[np.int64]
 BoolArray = npt.NDArray[np.bool_]
 
-# Rows of `laws`, `bounds` and `anchors`. WIDTH is the half-width w of the stem, or nu where a scene gives that;
+# Rows of `laws`, `bounds` and `anchors`. WIDTH is the half-width w of the stem, or nu where a scene gives it.
 # SHARED, a row of `laws` alone, holds OMEGA, N_HARMONICS and OMEGA_LOW of all Fourier laws of a scene.
 RADIUS, WIDTH, DEPTH, SLOPE, SHARED = np.arange(5)
 
-# Columns of `laws`. KIND is one of CONSTANT, FOURIER and BANG_BANG.
+# Columns of `laws`. KIND is one of CONSTANT, FOURIER and BANG_BANG; LEVEL is a constant law's value, or a
+# Fourier law's mean.
 CONSTANT, FOURIER, BANG_BANG = 0.0, 1.0, 2.0
 MAX_HARMONICS = 16
-KIND, LEVEL = np.arange(2)  # LEVEL: a constant law's value, a Fourier law's mean
-# A Fourier law: its frequency is OMEGA + OMEGA_LOW; harmonic k from 1 to n has its cosine's amplitude in column
-# AMPLITUDES + k and its sine's in AMPLITUDES + n + k.
+KIND, LEVEL = np.arange(2)
+# A Fourier law has the frequency OMEGA + OMEGA_LOW. Harmonic k, from 1 to n, has the amplitude of its cosine
+# in column AMPLITUDES + k, and that of its sine in AMPLITUDES + n + k.
 OMEGA, N_HARMONICS, OMEGA_LOW, AMPLITUDES = np.array([2, 3, 4, 3])
-# A bang-bang law of n knots: its period is PERIOD + PERIOD_LOW; from column KNOTS on stand the n times of its knots,
-# their n values, the accelerations of its legs and the low parts of these (n columns of each).
+# A bang-bang law has the period PERIOD + PERIOD_LOW. From column KNOTS on stand, n columns of each: the times
+# of its n knots, their values, the accelerations of its legs, and the low parts of these.
 PERIOD, N_KNOTS, PERIOD_LOW, KNOTS = np.array([2, 3, 4, 5])
 
-# Columns of `bounds`: the least and greatest value of a law (here WIDTH is w in every scene), and the greatest size
-# of its first and second derivative.
+# Columns of `bounds`: the least and greatest value of a law, and the greatest size of its first and second
+# derivative. Here WIDTH is w in every scene.
 LOWEST, HIGHEST, FASTEST, BEND = np.arange(4)
 
-# Columns of `anchors`, the laws at the last event: value, derivative, and the value's low part. TERMS is for a
-# Fourier law the summed sizes of its derivative's terms. A bang-bang law has the number of its half-leg, and the
-# time to that half-leg's end as a sum of two floats.
+# Columns of `anchors`, the laws at the last event: value, derivative, and the value's low part. A Fourier law
+# has in TERMS the summed sizes of its derivative's terms. A bang-bang law has the number of its half-leg, and
+# the time to that half-leg's end as a sum of two floats.
 VALUE, RATE, TERMS, ROOM, ROOM_LOW, VALUE_LOW = np.arange(6)
 HALF_LEG = TERMS
-# Two more rows of `anchors`: PHASE holds the sines and cosines of all harmonics at the last event, each as a sum of
-# two floats in the column plus the harmonic's number, and a bound on their error. TURN holds what a later time,
-# TURN_TIME, adds to the phases: sin and cos - 1 of the turn, or sin less the turn itself where IS_SHORT.
-PHASE, TURN = 4, 5
+# Two more rows of `anchors`. PHASE holds the sines and cosines of all harmonics at the last event, each as a
+# sum of two floats, in the columns below plus the number of the harmonic; and a bound on their error. TURN
+# holds what a later time TURN_TIME adds: sin and cos - 1 of the turn since, or sin less the turn where
+# IS_SHORT.
+PHASE, TURN = np.array([4, 5])
 PHASE_ERROR = 0
-TURN_TIME, IS_SHORT = 0, 1
+TURN_TIME, IS_SHORT = np.arange(2)
 SINE, COSINE = 3, 3 + MAX_HARMONICS
 SINE_LOW, COSINE_LOW = 3 + 2 * MAX_HARMONICS, 3 + 3 * MAX_HARMONICS
 ANCHORS_SHAPE = (6, 4 + 4 * MAX_HARMONICS)

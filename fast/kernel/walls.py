@@ -124,7 +124,7 @@ def off_the_arc(x, x_low, y, y_low, vx, vy, r, rate):
 
 @njit(error_model="numpy", forceinline=True)  # a call in a loop over lanes would not be packed
 def off_the_arc_spinning(x, x_low, y, y_low, vx, vy, r, rate, spin):
-    """Return the velocity after a hit on the arc of a particle whose angular momentum is known to be `spin`."""
+    """Return the velocity after a hit on the arc where the angular momentum is known to be `spin`."""
     q, q_low = products(x, x_low, vx, 0.0, y, y_low, vy, 0.0)
     rho2, rho2_low = products(x, x_low, x, x_low, y, y_low, y, y_low)
     p, p_low = two_product(2.0 * r, rate)

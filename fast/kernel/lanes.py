@@ -24,12 +24,12 @@ from numba import njit
 from fast.kernel.arithmetic import SAFETY, fma, two_sum
 
 from fast.kernel.pools import (  # isort: skip
-    CERTAIN, CLOSED, COARSE, END, H0, H1, H2, HIT, H_REF, LANES, NEVER, NEXT_H0, NEXT_H1, NEXT_H2, NEXT_R0,
+    CERTAIN, CLOSED, COARSE, END, H0, H1, H2, HIT, H_REF, NEVER, NEXT_H0, NEXT_H1, NEXT_H2, NEXT_R0,
     NEXT_R1, NEXT_R2, NEXT_T, NEXT_T_LOW, NEXT_W0, NEXT_W1, NEXT_W2, NEXT_X, NEXT_X_LOW, NEXT_Y, NEXT_Y_LOW,
     OK, ON_ARC, ON_BASE, ON_FLOOR, ON_LEFT, ON_RIGHT, R0, R1, R2, REF, REFUSED, REF_LOW, ROUTINE, R_REF, S,
-    SPIN, STOP, SURE, T, T_LOW, VX, VY, W0, W1, W2, WALL, W_REF, X, Y,
+    SPIN, STOP, SURE, T, T_LOW, VX, VY, W0, W1, W2, WALL, W_REF, X, Y, law_after,
 )  # fmt: skip
-from fast.kernel.short import law, moved, short_sum, turns
+from fast.kernel.short import moved, short_sum, turns
 
 LONGEST_TURN = 0.25  # omega u up to which the series are used
 ONE = np.float64(1.0)  # its quotient by 0 is infinite without the compiler too
@@ -133,12 +133,6 @@ def aim(a, n, is_stem, m, limits):
         # The arc's function must be concave.
         concave = fma(vx, vx, vy * vy) - bend if hit == ON_ARC else 1.0
         a[HIT + i], a[S + i], a[SURE + i] = hit, s, min(concave, sure)
-
-
-@njit(error_model="numpy", inline="always")
-def law_after(a, place, omega, g1, g2, g0):
-    """Return a law and its derivatives from the rows of its reference, which begin at `place`."""
-    return law(a[place], a[place + LANES], a[place + 2 * LANES], a[place + 3 * LANES], omega, g1, g2, g0)
 
 
 @njit(error_model="numpy", inline="always")

@@ -63,12 +63,18 @@ def set_reference(a, i, scene, anchors):
     set_laws(a, i, NEXT_R0, NEXT_W0, NEXT_H0, 0.0, scene)
 
 
+@njit(error_model="numpy", inline="always")
+def law_after(a, place, omega, g1, g2, g0):
+    """Return a law and its derivatives from the rows of its reference, which begin at `place`."""
+    return law(a[place], a[place + LANES], a[place + 2 * LANES], a[place + 3 * LANES], omega, g1, g2, g0)
+
+
 @njit(error_model="numpy")
-def law_of(a, i, row, laws, since):
-    """Return a law and its derivatives from the rows of its reference, which begin at i."""
+def law_of(a, place, row, laws, since):
+    """Return a law and its derivatives at a time after its reference."""
     omega = laws[row, OMEGA] if laws[row, KIND] == FOURIER else 0.0
     g1, g2, g0 = turns(omega, since)
-    return law(a[i], a[i + LANES], a[i + 2 * LANES], a[i + 3 * LANES], omega, g1, g2, g0)
+    return law_after(a, place, omega, g1, g2, g0)
 
 
 @njit(error_model="numpy")

@@ -3,13 +3,14 @@
 from fast.ensemble import Ensemble, simulate
 from fast.fine import FineTrajectory, fine_trajectory
 from fast.flow import Flow, flow
-from fast.step import Trajectory, next_collision, trajectory
+from fast.step import next_collision
+from fast.trajectory import Collisions, trajectory
 
 __all__ = [
+    "Collisions",
     "Ensemble",
     "FineTrajectory",
     "Flow",
-    "Trajectory",
     "fine_trajectory",
     "flow",
     "next_collision",

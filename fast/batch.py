@@ -13,17 +13,18 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from fast.compiled import FloatArray, compile_scene
-from fast.fine import FineTrajectory, as_pairs, as_trajectory
+from fast.compiled import compile_scene
+from fast.fine import FineTrajectory, as_pairs, as_trajectory, fill_path
 from fast.flow import follow_to
-from fast.kernel import codes, entries, follow, lanes, walls
-from fast.kernel.laws import ANCHORS_SHAPE, set_anchors
-from fast.kernel.limits import limits_of
-from fast.step import WALL_NAMES, as_arrays, fitted_start, trouble
+from fast.kernel import bounces, codes, follow, pools, walls
+from fast.kernel.laws import set_anchors
+from fast.kernel.limits import limits_of, own_omegas
+from fast.kernel.records import ANCHORS_SHAPE, LEVEL, OMEGA, SHARED, SLOPE, FloatArray, Particle
+from fast.step import WALL_NAMES, as_arrays, fitted_start, followed_paths, trouble
 from fast.units import fit
 from scene import Collision, Horizon, Outcome, Scene, State
 
-PLACE = (lanes.X, lanes.Y, lanes.VX, lanes.VY)
+PLACE = (pools.X, pools.Y, pools.VX, pools.VY)
 OFF = np.bool_(False)
 
 
@@ -40,14 +41,13 @@ def careful_steps(scene: Scene, states: Sequence[State], n_times: int = 1) -> tu
     """
     starts = [fitted_start(scene, state) for state in states]
     rows, walls = as_arrays(starts)
-    out, met = np.empty_like(rows), np.empty_like(walls)
     compiled = fit(scene).compiled
-    entries.each_step(*compiled, rows[:0], walls[:0], out, met, 0)  # compiles, or loads from the cache
+    followed_paths(compiled, rows[:0], walls[:0], 1, np.inf)  # compiles, or loads from the cache
     begin = time.perf_counter()
-    entries.each_step(*compiled, rows, walls, out, met, n_times)
+    paths = followed_paths(compiled, rows, walls, 1, np.inf, n_times)
     seconds = time.perf_counter() - begin
     outcomes: list[Outcome] = []
-    for state, start, code, row in zip(states, starts, met.tolist(), out, strict=True):
+    for state, start, code, row in zip(states, starts, paths.codes.tolist(), paths.steps[:, 0], strict=True):
         if code in WALL_NAMES:
             outcomes.append(Collision(WALL_NAMES[code], *start.units.steps(row).tolist()))
         elif code == codes.HORIZON:  # it moves for ever
@@ -66,10 +66,10 @@ def fine_steps(scene: Scene, states: Sequence[State], n_times: int = 1) -> tuple
     questions = list(zip(pairs, walls.tolist(), out, met, strict=True))
     ends: list[tuple[int, int]] = []
     if states:
-        entries.fine(*compiled, pairs[0], questions[0][1], np.inf, out[0], met[0])  # compiles, or loads
+        fill_path(compiled, *questions[0])  # compiles, or loads
     begin = time.perf_counter()
     for _ in range(n_times):
-        ends = [entries.fine(*compiled, p, wall, np.inf, steps, hit) for p, wall, steps, hit in questions]
+        ends = [fill_path(compiled, *question) for question in questions]
     seconds = time.perf_counter() - begin
     paths = zip(states, starts, ends, out, met, strict=True)
     return [as_trajectory(s, start.units, *end, steps, hit) for s, start, end, steps, hit in paths], seconds
@@ -77,8 +77,14 @@ def fine_steps(scene: Scene, states: Sequence[State], n_times: int = 1) -> tuple
 
 def flights(scene: Scene, states: Sequence[State], t_end: float) -> tuple[int, float]:
     """Follow states to t_end in one thread, as ensembles are: number of collisions, seconds."""
-    done = follow_to(scene, states, t_end, 1)
-    return int(done.counts.sum()), done.seconds
+    done, seconds = follow_to(scene, states, t_end, 1)
+    return int(done.counts.sum()), seconds
+
+
+def as_particle(p: FloatArray, wall: int) -> Particle:
+    """Return a state [t, its low part, x, y, vx, vy], in whatever units, as the kernels take it."""
+    t, t_low, x, y, vx, vy = p.tolist()
+    return Particle(t, t_low, x, y, vx, vy, int(wall))
 
 
 class LaneRound:
@@ -91,70 +97,70 @@ class LaneRound:
 
     def __init__(self, scene: Scene) -> None:
         self.compiled = compile_scene(scene)
-        self.table, self.is_relative, self.laws, self.bounds = self.compiled
-        self.is_disk = bool(self.table == codes.CAP)
-        self.limits = limits_of(self.laws, self.bounds)
-        self.omega = self.laws[codes.PHASES, 0]
+        self.is_disk = bool(self.compiled.table == codes.CAP)
+        self.limits, self.omegas = limits_of(self.compiled), own_omegas(self.compiled)
+        self.omega = float(self.compiled.laws[SHARED, OMEGA])
         self.anchors = np.zeros(ANCHORS_SHAPE)
-        self.pool, self.spare = np.zeros((2, lanes.N_ROWS * lanes.LANES))
+        self.pool, self.spare = np.zeros((2, pools.N_ROWS * pools.LANES))
 
     def fill(self, lane: int, p: FloatArray, wall: int, age: float = 0.0) -> None:
         """Put a state [t, its low part, x, y, vx, vy] into a lane, its laws known from `age` before it."""
-        a = self.pool
-        i = np.int64(lane)
-        follow.load(a, i, p, wall, np.inf, OFF)
-        a[lanes.NEXT_T + i], a[lanes.NEXT_T_LOW + i] = p[0] - age, p[1]
-        set_anchors(self.laws, self.anchors, p[0] - age, p[1])
-        follow.set_reference(a, i, self.laws, self.anchors, self.is_relative)
-        if a[lanes.END + i] <= p[0]:
+        a, i = self.pool, np.int64(lane)
+        particle = as_particle(p, wall)
+        pools.load(a, i, particle, np.inf, OFF)
+        a[pools.NEXT_T + i], a[pools.NEXT_T_LOW + i] = particle.t - age, particle.t_low
+        set_anchors(self.compiled.laws, self.anchors, particle.t - age, particle.t_low)
+        pools.set_reference(a, i, self.compiled, self.anchors)
+        if a[pools.END + i] <= particle.t:
             self.fill(lane, p, wall)
             return
-        since = (a[lanes.T + i] - a[lanes.REF + i]) + (a[lanes.T_LOW + i] - a[lanes.REF_LOW + i])
-        rows = (lanes.R0, lanes.W0, lanes.H0)
-        follow.set_laws(a, i, *rows, since, self.laws, self.is_relative)
-        spin = p[2] * p[5] - p[3] * p[4]
-        a[lanes.SPIN + i] = spin
+        since = (a[pools.T + i] - a[pools.REF + i]) + (a[pools.T_LOW + i] - a[pools.REF_LOW + i])
+        pools.set_laws(a, i, pools.R0, pools.W0, pools.H0, since, self.compiled)
+        a[pools.SPIN + i] = particle.x * particle.vy - particle.y * particle.vx
 
     def is_met(self, p: FloatArray, wall: int) -> bool:
         """Tell whether a state lies, but for rounding, on the wall that it leaves, as after a step."""
+        particle = as_particle(p, wall)
         if wall == codes.NO_WALL:
             return False
         if wall == codes.BASE:
-            return bool(p[3] == 0.0)
+            return bool(particle.y == 0.0)
         anchors = np.zeros(ANCHORS_SHAPE)
-        set_anchors(self.laws, anchors, p[0], p[1])
-        f, error = walls.wall_residual(wall, p[2], p[3], self.laws, anchors, self.bounds, self.is_relative)
+        set_anchors(self.compiled.laws, anchors, particle.t, particle.t_low)
+        f, error = walls.wall_residual(wall, particle.x, particle.y, self.compiled, anchors)
         return bool(abs(f) <= error)
 
     def fly(self, n: int) -> tuple[npt.NDArray[np.bool_], FloatArray, FloatArray]:
         """Take a step in n lanes: which are shown right, walls met, and rows of dt, x, y, vx, vy."""
-        a, count, m = self.pool, np.int64(n), self.laws[codes.M, 1]
-        is_stem = self.table == codes.STEM
-        lanes.aim(a, count, is_stem, m, self.limits)
-        follow.next_flight(a, count, is_stem, self.is_relative, self.omega, m, self.limits)
-        self.correct_more(follow.GENERAL, n)
-        right = self.row(lanes.OK, n) == lanes.RIGHT_ONE
-        # A hit beyond a knot is left to the careful step.
-        right &= self.row(lanes.NEXT_T, n) < self.row(lanes.KNOT, n)
-        hits, dt = self.row(lanes.HIT, n).copy(), self.row(lanes.S, n).copy()
-        lanes.bounce(a, count, m, self.table == codes.MUSHROOM)
+        right, hits, dt = self.find(follow.GENERAL, n)
+        slope, is_mushroom = self.compiled.laws[SLOPE, LEVEL], self.compiled.table == codes.MUSHROOM
+        bounces.bounce(self.pool, np.int64(n), slope, is_mushroom)
         return right, hits, np.column_stack([dt, *(self.row(r, n) for r in PLACE)])
 
     def skip(self, n: int) -> tuple[npt.NDArray[np.bool_], FloatArray, FloatArray]:
         """Take captured chords in n lanes, likewise; every hit is on the arc."""
-        a, count = self.pool, np.int64(n)
-        follow.next_chord(a, count, OFF, self.is_disk, self.is_relative, self.omega, self.limits)
-        self.correct_more(follow.DISK, n)
-        right = self.row(lanes.OK, n) == lanes.RIGHT_ONE
-        right &= self.row(lanes.NEXT_T, n) < self.row(lanes.KNOT, n)
-        dt = self.row(lanes.S, n).copy()
-        lanes.rebound(a, count)
+        right, _, dt = self.find(follow.DISK, n)
+        bounces.rebound(self.pool, np.int64(n))
         return right, np.zeros(n), np.column_stack([dt, *(self.row(r, n) for r in PLACE)])
 
-    def correct_more(self, pool: np.integer[Any], n: int) -> None:
-        """Correct coarse steps again, as `fast.kernel.follow` does."""
-        for i in range(n):
-            follow.correct_more(pool, tuple(self.compiled), self.pool, np.int64(i), self.spare, self.limits)
+    def find(self, pool: np.integer[Any], n: int) -> tuple[npt.NDArray[np.bool_], FloatArray, FloatArray]:
+        """Find the next collision of n lanes: which are shown right, walls met, and times."""
+        rest = (self.compiled, self.limits, self.omegas)
+        follow.advance(pool, self.pool, np.int64(n), OFF, *rest)
+        follow.correct(pool, self.pool, np.int64(n), self.spare, *rest)
+        return self.answers(n)
+
+    def answers(self, n: int) -> tuple[npt.NDArray[np.bool_], FloatArray, FloatArray]:
+        """Return which of n lanes are shown right, the walls that they meet, and when."""
+        right = self.row(pools.OK, n) == pools.CERTAIN
+        # A hit beyond a knot is left to the careful step.
+        right &= self.row(pools.NEXT_T, n) < self.row(pools.KNOT, n)
+        return right, self.row(pools.HIT, n).copy(), self.row(pools.S, n).copy()
+
+    def careful_step(self, p: FloatArray, wall: int) -> tuple[int, float, FloatArray]:
+        """Return the careful step's wall, its time, and the state after, from a state and its wall."""
+        paths = followed_paths(self.compiled, p[None], np.array([wall]), 1, np.inf)
+        return int(paths.codes[0]), float(paths.steps[0, 0, 0]), paths.ends[0]
 
     def row(self, start: np.integer[Any], n: int) -> FloatArray:
         """Return n lanes of a row of the pool."""
@@ -175,8 +181,8 @@ def lane_steps(scene: Scene, states: Sequence[State]) -> list[Outcome | None]:
     """
     pool = LaneRound(fit(scene).scene)
     found: list[Outcome | None] = []
-    for first in range(0, len(states), lanes.LANES):
-        part = states[first : first + lanes.LANES]
+    for first in range(0, len(states), pools.LANES):
+        part = states[first : first + pools.LANES]
         starts, are_met = [fitted_start(scene, state) for state in part], []
         for i, (p, wall) in enumerate(zip(*as_arrays(starts), strict=True)):
             pool.fill(i, p, wall)

@@ -4,34 +4,26 @@ from __future__ import annotations
 
 from fractions import Fraction
 from functools import lru_cache
-from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from fast.kernel import codes
 from fast.kernel.double_double import half_pi
+
+from fast.kernel.records import (  # isort: skip
+    BANG_BANG, CONSTANT, FOURIER, KIND, N_HARMONICS, OMEGA, OMEGA_LOW, SHARED, Compiled,
+)  # fmt: skip
 from scene import BangBang, Cap, Fourier, Law, Mushroom, Scene
 from scene.laws import Bounds, bounds, is_constant
 from scene.refusal import BadInput
 from scene.tables import width_factors
 
 HALF_PI = half_pi()
-FloatArray = npt.NDArray[np.floating[Any]]
 TABLES = {"Cap": int(codes.CAP), "Stem": int(codes.STEM), "Mushroom": int(codes.MUSHROOM)}
 
 
 # Squares of what is larger overflow.
 LARGEST = 2.0**400
-
-
-class Compiled(NamedTuple):
-    """What every kernel entry takes first, in this order."""
-
-    table: int
-    is_relative: bool  # the width row holds nu, and w = nu r
-    laws: FloatArray  # (5, n): radius, width, depth, slope; then what Fourier laws share: see kernel.codes
-    bounds: FloatArray  # (4, 4): lowest, highest, |f'|, |f''| of radius, half-width w, depth, slope
 
 
 @lru_cache(maxsize=256)
@@ -60,13 +52,15 @@ def _laid_out(scene: Scene) -> Compiled:
     if not isinstance(scene, Cap):
         h, slope, factors = scene.h, scene.slope, width_factors(scene)
     rows = [_row(law) for law in (r, factors[0], h, slope)]
-    waves = [row for row in rows if row[0] == codes.FOURIER]
+    waves = [row for row in rows if row[KIND] == FOURIER]
     moving = [law for law in (r, *factors, h, slope) if isinstance(law, Fourier) and not is_constant(law)]
     omega_low = _omega(moving[0])[1] if moving else 0.0
-    rows.append([waves[0][2], max(row[3] for row in waves), omega_low] if waves else [0.0, 0.0, 0.0])
-    laws = np.zeros((len(rows), max(len(row) for row in rows)))
+    laws = np.zeros((len(rows) + 1, max(OMEGA_LOW + 1, *(len(row) for row in rows))))
     for i, row in enumerate(rows):
         laws[i, : len(row)] = row
+    for row in waves:
+        laws[SHARED, OMEGA], laws[SHARED, OMEGA_LOW] = row[OMEGA], omega_low
+        laws[SHARED, N_HARMONICS] = max(laws[SHARED, N_HARMONICS], row[N_HARMONICS])
     limits = np.array([bounds(r), _product_bounds(factors), bounds(h), bounds(slope)])
     return Compiled(TABLES[type(scene).__name__], len(factors) == 2, laws, limits)
 
@@ -86,7 +80,7 @@ def _row(law: Law) -> list[float]:
         n = max(len(law.cos), len(law.sin))
         cos = list(law.cos) + [0.0] * (n - len(law.cos))
         sin = list(law.sin) + [0.0] * (n - len(law.sin))
-        return [codes.FOURIER, law.mean, _omega(law)[0], float(n), *cos, *sin]
+        return [FOURIER, law.mean, _omega(law)[0], float(n), *cos, *sin]
     if isinstance(law, BangBang) and not is_constant(law):
         times = [knot[0] for knot in law.knots]
         values = [knot[1] for knot in law.knots]
@@ -99,7 +93,7 @@ def _row(law: Law) -> list[float]:
         highs = [float(a) for a in accelerations]
         period = Fraction(times[-1]) - Fraction(times[0])
         return [
-            codes.BANG_BANG,
+            BANG_BANG,
             0.0,
             float(period),
             float(len(times)),
@@ -110,7 +104,7 @@ def _row(law: Law) -> list[float]:
             *(float(a - Fraction(high)) for a, high in zip(accelerations, highs, strict=True)),
         ]
     constant = law if isinstance(law, float) else law.mean if isinstance(law, Fourier) else law.knots[0][1]
-    return [codes.CONSTANT, constant, 0.0, 0.0]
+    return [CONSTANT, constant, 0.0, 0.0]
 
 
 def _product_bounds(factors: tuple[Law, ...]) -> Bounds:

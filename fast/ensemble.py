@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from fast.compiled import LARGEST, Compiled, FloatArray
+from fast.compiled import LARGEST
 from fast.given import (
     MAX_CYCLES,
     MAX_PARTICLES,
@@ -27,8 +27,11 @@ from fast.given import (
     given_threads,
 )
 from fast.kernel import codes, entries
+from fast.kernel.follow import new_worker
+from fast.kernel.limits import own_omegas
+from fast.kernel.records import Compiled, FloatArray, Followed, IntArray, Stops, unfilled_ends
 from fast.narrowings import narrowings
-from fast.starts import Stops, cycle_length, cycle_stops, initial_states, least_collisions
+from fast.starts import cycle_length, cycle_stops, initial_states, least_collisions
 from fast.units import Units, fit, inward
 from scene import Scene
 from scene.refusal import BadInput, check_count, check_scene
@@ -36,32 +39,6 @@ from scene.refusal import BadInput, check_count, check_scene
 FOLLOWED, UNDECIDED, UNDEFINED, REJECTED = 0, 1, 2, 3
 MAX_COLLISIONS = 10**9  # of one particle, a minute of work
 SHARE = 256  # particles a worker takes at a time: several times what it holds at once
-IntArray = npt.NDArray[np.int64]
-
-
-class Followed(NamedTuple):
-    """What the kernel fills in for N particles, K cycles of M narrowings, and C stops that ask for energies.
-
-    Attributes:
-        states: (N, 6) last t, its low part, x, y, vx, vy.
-        codes: (N,) why each particle ended, HORIZON when all went well.
-        counts: (N, 5) collisions by wall: arc, base, left, right, floor.
-        careful: (N,) collisions found by the careful step.
-        energies: (N, C) energy at each stop that asks for it.
-        is_captured: (N, C) whether the last arc hit before had |sin phi| > nu.
-        t_in, t_out: (N, K, M) the captured stays that are kept; nan for none.
-        seconds: wall time of the kernel.
-    """
-
-    states: FloatArray
-    codes: IntArray
-    counts: IntArray
-    careful: IntArray
-    energies: FloatArray
-    is_captured: npt.NDArray[np.bool_]
-    t_in: FloatArray
-    t_out: FloatArray
-    seconds: float
 
 
 class Ensemble(NamedTuple):
@@ -200,12 +177,17 @@ def simulate(
         )
     start = initial_states(scene, n_particles, 0.5 * speed2, seed)
     free = np.full(n_particles, codes.NO_WALL)
-    done = follow(fitted.compiled, start, free, stops, threads, progress)
-    return _ensemble(energy, done, units, (n_particles, n_cycles, len(phases) + 1), threads)
+    done, seconds = follow(fitted.compiled, start, free, stops, threads, progress)
+    return _ensemble(energy, done, seconds, units, (n_particles, n_cycles, len(phases) + 1), threads)
 
 
 def _ensemble(
-    energy0: float, done: Followed, units: Units, every: tuple[int, int, int], threads: int
+    energy0: float,
+    done: Followed,
+    seconds: float,
+    units: Units,
+    every: tuple[int, int, int],
+    threads: int,
 ) -> Ensemble:
     """Name what the kernel filled in; `every`: particles, cycles, looks at a particle in a cycle."""
     energies, captured = units.energies(done.energies).reshape(every), done.is_captured.reshape(every)
@@ -228,7 +210,7 @@ def _ensemble(
         phase_energies=energies[:, :, :-1],
         phase_captured=captured[:, :, :-1],
         n_careful=done.careful,
-        seconds=done.seconds,
+        seconds=seconds,
         threads=threads,
     )
 
@@ -246,31 +228,19 @@ def follow(
     stops: Stops,
     threads: int,
     progress: Callable[[int], None] | None = None,
-) -> Followed:
+) -> tuple[Followed, float]:
     """Follow particles to the last stop; `states` (N, 6) is overwritten by the last states.
 
-    `walls` (N,): codes of the walls that they leave.
+    `walls` (N,): codes of the walls that they leave. Returns what became of them, and the seconds that took.
     """
-    n, n_columns = len(states), int(stops.columns.max()) + 1
-    out = (
-        np.full((n, n_columns), np.nan),
-        np.zeros((n, n_columns), dtype=np.bool_),
-        np.full((n, *stops.narrowings.shape), np.nan),
-        np.full((n, *stops.narrowings.shape), np.nan),
-    )
-    ends = (
-        states,
-        np.zeros(n, dtype=np.int64),
-        np.zeros((n, codes.N_WALLS), dtype=np.int64),
-        np.zeros(n, dtype=np.int64),
-    )
-    scene, when = tuple(compiled), tuple(stops)
+    n = len(states)
+    followed = unfilled_ends(states, int(stops.columns.max()) + 1, stops.narrowings.shape)
+    omegas = own_omegas(compiled)
     size = min(SHARE, math.ceil(max(n, 1) / threads))
 
     def work(first: int) -> None:
         part = slice(first, first + size)
-        their_out, their_ends = (tuple(a[part] for a in arrays) for arrays in (out, ends))
-        entries.follow_particles(scene, walls[part], when, their_out, their_ends)
+        entries.follow_particles(new_worker(compiled, stops, followed.part(part)), walls[part], omegas)
 
     work(n)  # none at all: compiles, or loads from the disk cache, so that `seconds` holds work alone
     begin = time.perf_counter()
@@ -282,6 +252,4 @@ def follow(
         except BaseException:  # an interrupt does not wait for chunks that have not begun
             pool.shutdown(wait=False, cancel_futures=True)
             raise
-    seconds = time.perf_counter() - begin
-    energies, is_captured, t_in, t_out = out
-    return Followed(*ends, energies, is_captured, t_in, t_out, seconds)
+    return followed, time.perf_counter() - begin

@@ -6,11 +6,10 @@ from fractions import Fraction
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
-from fast.compiled import FloatArray
 from fast.given import MAX_STEPS
 from fast.kernel import codes, entries
+from fast.kernel.records import ANCHORS_SHAPE, Compiled, FloatArray, IntArray
 from fast.step import WALL_CODES, WALL_NAMES, Start, check_state, trouble
 from fast.units import Units
 from scene import Horizon, Outcome, Scene, State, Wall
@@ -58,9 +57,17 @@ def fine_trajectory(scene: Scene, state: State, n_collisions: int) -> FineTrajec
     start = check_state(scene, state)
     n_collisions = check_count("n_collisions", n_collisions, 0, MAX_STEPS)
     steps: FloatArray = np.empty((n_collisions, 6, 2))
-    met: npt.NDArray[np.int64] = np.empty(n_collisions, dtype=np.int64)
-    n, code = entries.fine(*start.compiled, as_pairs(start), WALL_CODES[state.wall], np.inf, steps, met)
+    met: IntArray = np.empty(n_collisions, dtype=np.int64)
+    n, code = fill_path(start.compiled, as_pairs(start), WALL_CODES[state.wall], steps, met)
     return as_trajectory(state, start.units, n, code, steps, met)
+
+
+def fill_path(
+    compiled: Compiled, start: FloatArray, wall: int, steps: FloatArray, met: IntArray
+) -> tuple[int, int]:
+    """Fill `steps` and `met` from a start in pairs; returns the number of collisions and the last code."""
+    found: tuple[int, int] = entries.fine(compiled, np.zeros(ANCHORS_SHAPE), start, wall, np.inf, steps, met)
+    return found
 
 
 def as_pairs(start: Start) -> FloatArray:
@@ -70,7 +77,7 @@ def as_pairs(start: Start) -> FloatArray:
 
 
 def as_trajectory(
-    state: State, units: Units, n: int, code: int, steps: FloatArray, met: npt.NDArray[np.int64]
+    state: State, units: Units, n: int, code: int, steps: FloatArray, met: IntArray
 ) -> FineTrajectory:
     """Return what the kernel found: `n` collisions of those asked for, and its last code."""
     outcome: Outcome | None = None

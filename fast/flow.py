@@ -8,10 +8,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fast.compiled import FloatArray
-from fast.ensemble import Followed, IntArray, follow
+from fast.ensemble import follow
 from fast.given import given_states, given_threads
 from fast.kernel import codes
+from fast.kernel.records import FloatArray, Followed, IntArray, unfilled_ends
 from fast.starts import least_collisions, only_stop
 from fast.step import as_arrays, fitted_start, next_collision, trouble
 from fast.units import fit
@@ -67,40 +67,38 @@ def flow(scene: Scene, states: Sequence[State], t_end: float, threads: int | Non
 
 def carry_judged(scene: Scene, states: Sequence[State], t_end: float, threads: int) -> Flow:
     """Carry particles to t_end whose starts have been judged by `refuse`."""
-    done = follow_to(scene, states, t_end, threads)
+    done, _ = follow_to(scene, states, t_end, threads)
     outcomes = [
-        Horizon(t_end, *place) if code == codes.HORIZON else trouble(int(code), state)
-        for state, code, place in zip(states, done.codes, done.states[:, 2:].tolist(), strict=True)
+        Horizon(t_end, *place) if code == codes.HORIZON else trouble(code, state)
+        for state, code, place in zip(states, done.codes.tolist(), done.states[:, 2:].tolist(), strict=True)
     ]
     return Flow(outcomes, done.t_in[:, 0, 0], done.t_out[:, 0, 0], done.counts, done.careful)
 
 
-def follow_to(scene: Scene, states: Sequence[State], t_end: float, threads: int) -> Followed:
-    """Follow particles to t_end, those whose units agree together; all but energies is filled in.
+def follow_to(scene: Scene, states: Sequence[State], t_end: float, threads: int) -> tuple[Followed, float]:
+    """Follow particles to t_end, those whose units agree together; energies are left in the kernel's units.
+
+    Returns:
+        What became of them, and the seconds that took.
 
     Raises:
         BadInput: scene, a state or an answer does not fit into binary64: see fast.units.
     """
     starts = [fitted_start(scene, state) for state in states]
     compiled, (rows, walls) = fit(scene).compiled, as_arrays(starts)
-    n = len(states)
-    t_in, t_out = np.full((2, n, 1, 1), np.nan)
-    ends, counts, careful = (
-        np.zeros(n, np.int64),
-        np.zeros((n, codes.N_WALLS), np.int64),
-        np.zeros(n, np.int64),
-    )
-    seconds = 0.0
+    followed, seconds = unfilled_ends(rows, 1, (1, 1)), 0.0
     for units in sorted({start.units for start in starts}):
         those = np.array([i for i, start in enumerate(starts) if start.units == units])
-        own = rows[those]
-        done = follow(compiled, own, walls[those], only_stop(units.horizon(t_end)), threads)
-        rows[those, :2], rows[those, 2:] = units.times(own[:, :2]), units.places(own[:, 2:])
-        t_in[those], t_out[those] = units.times(done.t_in), units.times(done.t_out)
-        ends[those], counts[those], careful[those] = done.codes, done.counts, done.careful
-        seconds += done.seconds
-    nothing = np.full((n, 1), np.nan)
-    return Followed(rows, ends, counts, careful, nothing, np.zeros((n, 1), np.bool_), t_in, t_out, seconds)
+        stop = only_stop(units.horizon(t_end))
+        done, their_seconds = follow(compiled, rows[those], walls[those], stop, threads)
+        times, places = units.times(done.states[:, :2]), units.places(done.states[:, 2:])
+        done = done._replace(
+            states=np.hstack([times, places]), t_in=units.times(done.t_in), t_out=units.times(done.t_out)
+        )
+        for whole, own in zip(followed, done, strict=True):
+            whole[those] = own
+        seconds += their_seconds
+    return followed, seconds
 
 
 def refuse(scene: Scene, state: State, t_end: float) -> Rejected | None:

@@ -8,14 +8,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 from mpmath import fp
 
-from fast.compiled import FloatArray
 from fast.kernel import entries
+from fast.kernel.records import FloatArray, Stops
 from fast.narrowings import narrowings, start_time
 from scene import Scene
 from scene.geometry import table_at
@@ -64,25 +62,6 @@ def _directions(turns: FloatArray) -> FloatArray:
     out = np.empty((len(turns), 2))
     entries.directions(np.ascontiguousarray(turns), out)
     return out
-
-
-class Stops(NamedTuple):
-    """Instants at which particles are looked at, in order.
-
-    Attributes:
-        times: (S,) the instants; the last one ends the run.
-        columns: (S,) where the energy at an instant is written, -1 for an instant that does not ask for it.
-        cycles: (S,) number of the cycle that an instant ends, -1 for others.
-        narrowings: (K, M) when the mouth narrows in each cycle: a captured stay is kept in slot m of cycle k
-            when it spans that instant.
-        is_first_kept: the first captured stay is kept in slot 0, whatever its length.
-    """
-
-    times: FloatArray
-    columns: npt.NDArray[np.int64]
-    cycles: npt.NDArray[np.int64]
-    narrowings: FloatArray
-    is_first_kept: bool
 
 
 def cycle_length(scene: Scene) -> float:

@@ -1,4 +1,4 @@
-"""The fast stepper's face: one step, and a trajectory of steps, on scenes and states."""
+"""The fast stepper's face: one step, and how states and outcomes look to the kernels."""
 
 from __future__ import annotations
 
@@ -6,11 +6,18 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
-from fast.compiled import Compiled, FloatArray
-from fast.given import MAX_STEPS, given_end, given_state
+from fast.given import given_state
 from fast.kernel import careful, codes, entries
+from fast.kernel.records import (
+    ANCHORS_SHAPE,
+    Compiled,
+    FloatArray,
+    IntArray,
+    Particle,
+    Paths,
+    unfilled_paths,
+)
 from fast.units import Units, fit
 from scene import (
     Collision,
@@ -24,7 +31,7 @@ from scene import (
     Undefined,
     Wall,
 )
-from scene.refusal import BadInput, check_count, check_number, check_scene
+from scene.refusal import BadInput, check_number, check_scene
 from scene.states import ON_WALL, check_numbers
 
 WALL_NAMES: dict[int, Wall] = {
@@ -73,69 +80,33 @@ def next_collision(scene: Scene, state: State, t_end: float) -> Outcome:
         state = given_state(scene, state)
         check_numbers(scene, state, t_end)
         start = fitted_start(scene, state)
-        p = start.row()
-        limit = start.units.horizon(t_end) - start.state.t
-        code, dt = entries.single_step(*start.compiled, p, WALL_CODES[state.wall], limit)
+        paths = followed_paths(start.compiled, *as_arrays([start]), 1, start.units.horizon(t_end))
+        code = paths.codes.item()
         if code in WALL_NAMES:
-            numbers = start.units.steps(np.array([dt, *np.delete(p, 1)]))
-            return Collision(WALL_NAMES[code], *numbers.tolist())
+            return Collision(WALL_NAMES[code], *start.units.steps(paths.steps[0, 0]).tolist())
         if code == codes.HORIZON:
-            return Horizon(t_end, *start.units.places(p[2:]).tolist())
+            return Horizon(t_end, *start.units.places(paths.ends[0, 2:]).tolist())
     except BadInput as error:
         return Rejected(str(error))
-    return trouble(code, state, WALL_NAMES.get(int(dt)) if code == codes.OUTSIDE else None)
+    return trouble(code, state)
 
 
-class Trajectory(NamedTuple):
-    """Successive collisions, and why they ended.
-
-    Attributes:
-        walls: (n,) names of the walls hit.
-        steps: (n, 6) dt, t, x, y, vx, vy after each collision.
-        outcome: None when all collisions asked for were found, else what came instead.
-    """
-
-    walls: list[Wall]
-    steps: FloatArray
-    outcome: Outcome | None
-
-
-def trajectory(scene: Scene, state: State, n_collisions: int, t_end: float = np.inf) -> Trajectory:
-    """Follow a particle through `n_collisions` collisions, time carried as a compensated pair.
+def followed_paths(
+    compiled: Compiled, states: FloatArray, walls: IntArray, n_collisions: int, t_end: float, n_times: int = 1
+) -> Paths:
+    """Follow each of N states by careful steps, all in the kernel's units.
 
     Args:
-        scene: table and laws of motion.
-        state: the start, as for `next_collision`.
-        n_collisions: how many collisions to follow, 0 to 10^7.
-        t_end: horizon [time], >= state.t; infinity for none.
-
-    Returns:
-        The collisions. Where t_end is infinite and nothing is met any more (a particle at rest that no wall
-        sweeps) the outcome is a Horizon at t = infinity with the place where it rests.
-
-    Raises:
-        BadInput: naming field, value and bound, for anything that is not as above. That a state is outside
-            the table, or moves into the wall that it leaves, the first step finds: the outcome is Rejected.
+        compiled: the scene's numbers.
+        states: (N, 6) t, its low part, x, y, vx, vy.
+        walls: (N,) codes of the walls that they leave.
+        n_collisions: how many collisions to follow.
+        t_end: horizon [time]; infinity for none.
+        n_times: how often to do all this, where its time is measured.
     """
-    check_scene(scene)
-    t_end = given_end(t_end)
-    start = check_state(scene, state, None if t_end == np.inf else t_end)
-    n_collisions = check_count("n_collisions", n_collisions, 0, MAX_STEPS)
-    steps: FloatArray = np.empty((n_collisions, 6))
-    met: npt.NDArray[np.int64] = np.empty(n_collisions, dtype=np.int64)
-    p, limit = start.row(), start.units.horizon(t_end)
-    n, code = entries.trajectory(*start.compiled, p, WALL_CODES[state.wall], limit, steps, met)
-    steps = start.units.steps(steps[:n])
-    walls = [WALL_NAMES[int(c)] for c in met[:n]]
-    outcome: Outcome | None = None
-    if n < n_collisions:
-        # Without a horizon only what rests is never met, and it rests where it was: there is no v * infinity.
-        last = steps[n - 1, 2:] if n else np.array([state.x, state.y, state.vx, state.vy])
-        is_horizon = code == codes.HORIZON
-        if is_horizon and np.isfinite(t_end):
-            last = start.units.places(p[2:])
-        outcome = Horizon(t_end, *(float(v) for v in last)) if is_horizon else trouble(code, state)
-    return Trajectory(walls, steps, outcome)
+    paths = unfilled_paths(len(states), n_collisions)
+    entries.careful(compiled, np.zeros(ANCHORS_SHAPE), states, walls, t_end, n_times, paths)
+    return paths
 
 
 class Start(NamedTuple):
@@ -181,7 +152,7 @@ def fitted_start(scene: Scene, state: State) -> Start:
     return Start(inner, units, fitted.compiled)
 
 
-def as_arrays(starts: Sequence[Start]) -> tuple[FloatArray, npt.NDArray[np.int64]]:
+def as_arrays(starts: Sequence[Start]) -> tuple[FloatArray, IntArray]:
     """Return N states as the kernels take them: (N, 6) t, its low part, x, y, vx, vy; (N,) codes of walls."""
     rows = np.array([start.row() for start in starts]).reshape(-1, 6)
     return rows, np.array([WALL_CODES[start.state.wall] for start in starts], dtype=np.int64)
@@ -193,8 +164,8 @@ def wall_gap(compiled: Compiled, state: State) -> tuple[float, float]:
     Today's distance is the measure, not the largest of all time: a small cap is not allowed a large one's
     slack. A time whose phase is lost is left to the step, which refuses it.
     """
-    p = np.array([state.t, 0.0, state.x, state.y, state.vx, state.vy])
-    is_known, r, w, h, f = entries.wall_gap(*compiled, p, WALL_CODES[state.wall])
+    particle = Particle(state.t, 0.0, state.x, state.y, state.vx, state.vy, WALL_CODES[state.wall])
+    is_known, r, w, h, f = entries.wall_gap(compiled, particle)
     if not is_known:
         return 0.0, 1.0
     if compiled.is_relative:
@@ -206,11 +177,11 @@ def wall_gap(compiled: Compiled, state: State) -> tuple[float, float]:
     return float(f), h if state.wall == "floor" else w
 
 
-def trouble(code: int, state: State, wall: Wall | None = None) -> Outcome:
-    """Return the outcome that a code stands for, other than a wall's and HORIZON; `wall`: the one crossed."""
+def trouble(code: int, state: State) -> Outcome:
+    """Return the outcome that a code stands for, other than a wall's and HORIZON."""
     if code == codes.FAR_TIME:
         return Rejected(f"state.t = {state.t!r} is more than 2^27 quarter periods from 0: its phase is lost")
-    if code == codes.OUTSIDE:
-        where = f"beyond wall {wall}" if wall else "outside the table"
-        return Rejected(f"state (x, y) = ({state.x!r}, {state.y!r}) at t = {state.t!r} is {where}")
+    if code >= codes.BEYOND:
+        wall = WALL_NAMES[int(code - codes.BEYOND)]
+        return Rejected(f"state (x, y) = ({state.x!r}, {state.y!r}) at t = {state.t!r} is beyond wall {wall}")
     return REASONS[code]

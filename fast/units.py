@@ -21,7 +21,8 @@ from typing import NamedTuple
 import msgspec
 import numpy as np
 
-from fast.compiled import LARGEST, Compiled, FloatArray, compile_scene
+from fast.compiled import LARGEST, compile_scene
+from fast.kernel.records import Compiled, FloatArray
 from scene import BangBang, Fourier, InvalidState, Law, Scene, State
 from scene.refusal import BadInput
 from scene.tables import laws, period

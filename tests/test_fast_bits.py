@@ -92,7 +92,7 @@ def test_a_change_in_any_source_makes_the_kernels_anew(tmp_path):
         path.write_text(path.read_text("utf-8") + "\n", "utf-8")
         assert entries.digest_of_sources(copy) != entries.SOURCES
         path.write_text(path.read_text("utf-8")[:-1], "utf-8")
-    for entry in (entries.single_step, entries.trajectory, entries.follow_particles):
+    for entry in (entries.careful, entries.fine, entries.follow_particles):
         assert entries.SOURCES in [cell.cell_contents for cell in entry.py_func.__closure__]
 
 

@@ -16,7 +16,8 @@ from conformance.grading.agreement import compare
 from conformance.grading.agreement import exact as enclosed
 from conformance.strategies import scenes_and_states
 from fast.compiled import compile_scene
-from fast.kernel import codes, entries
+from fast.fine import fill_path
+from fast.kernel import codes
 from fast.kernel import double_double as dd
 from fast.step import WALL_CODES
 from scene import BadInput, Collision, Rejected, State, Stem, Undecided, load
@@ -130,7 +131,7 @@ def test_rounding_a_state_of_pairs_is_not_taken_for_a_gap():
     scene, d = Stem(w=1.0, h=1.0), round(1e-10 * 2**53) * 2.0**-53
     start = np.array([[0.0, 0.0], [1.0 - d, 0.0], [d - 1.0, -5e-17], [1.0, 0.0], [2e-7 - 1.0, 0.0]])
     steps, met = np.empty((1, 6, 2)), np.empty(1, dtype=np.int64)
-    n, code = entries.fine(*compile_scene(scene), start, WALL_CODES[None], np.inf, steps, met)
+    n, code = fill_path(compile_scene(scene), start, WALL_CODES[None], steps, met)
     assert (n, code) == (0, codes.CORNER)
 
 

@@ -111,7 +111,7 @@ def refusal(name, changes):
         answer = entry(**{**good, **changes})
     except BadInput as error:
         return str(error)
-    if isinstance(answer, fast.Trajectory | fast.FineTrajectory):
+    if isinstance(answer, fast.Collisions | fast.FineTrajectory):
         answer = answer.outcome
     return answer.reason if isinstance(answer, Rejected) else None
 

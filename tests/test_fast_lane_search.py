@@ -17,7 +17,7 @@ from support.lane_traps import TRAPS
 
 import fast
 from fast.batch import lane_steps
-from fast.kernel import lanes
+from fast.kernel import lanes, pools
 from fast.step import WALL_NAMES
 from scene import Cap, Collision, Fourier, Mushroom, Rejected, State
 
@@ -73,22 +73,22 @@ MUTANTS = {
     "the arc's chord on a flight to the base": (
         "arc to base",
         800,
-        "place = inside if hit == ON_BASE else place",
-        "place = 1.0 if hit == ON_BASE else place",
+        "return inside if hit == ON_BASE else place",
+        "return 1.0 if hit == ON_BASE else place",
     ),
     "the mouth's own curvature": ("side to arc", 300, "doubt = (k_w + excess", "doubt = (excess"),
     "the sides before the mouth": ("side to arc", 300, "min(gap - doubt, lift)", "lift"),
     "concavity of the arc": (
         "base to arc",
         4000,
-        "concave = v2 - bend if hit == ON_ARC else 1.0",
+        "concave = fma(vx, vx, vy * vy) - bend if hit == ON_ARC else 1.0",
         "concave = 1.0",
     ),
     "walls that are not met": (
         "side to arc",
         300,
-        "clear = min(clear_r, min(clear_l, clear_f)) - far",
-        "clear = 1.0",
+        "return min(clear_r, min(clear_l, clear_f)) - far",
+        "return 1.0",
     ),
     "the curvature of walls that are not met": ("side to arc", 1500, "far = k_w * s * s + ", "far = "),
     "the part of the table that a wall is in": (
@@ -97,7 +97,7 @@ MUTANTS = {
         "place -= SAFETY * (abs(y) + abs(vy) * s)",
         "place = 1.0",
     ),
-    "what Newton's step leaves": ("arc to stem", 500, "RIGHT_ONE if error < s else COARSE", "RIGHT_ONE"),
+    "what Newton's step leaves": ("arc to stem", 500, "CERTAIN if error < s else COARSE", "CERTAIN"),
     "the arc's acceleration a moment later": (
         "arc to stem",
         1500,
@@ -143,8 +143,8 @@ MUTANTS = {
     "the slope of the side that is met": (
         "misled side",
         100,
-        "first = 1.0 if hit == ON_BASE else first",
-        "first = 1.0 if hit != ON_ARC else first",
+        "return 1.0 if hit == ON_BASE else first",
+        "return 1.0 if hit != ON_ARC else first",
     ),
 }
 
@@ -160,7 +160,7 @@ def test_the_search_kills(name, tally):
 def count_wrong_walls(draw, kernels, tally):
     random = np.random.default_rng(3)
     for _ in range(40):
-        scene, starts = TIES[draw](lanes.LANES, random)
+        scene, starts = TIES[draw](pools.LANES, random)
         answered, wrong = wrong_walls(Round(scene, kernels), scene, starts)
         tally["answered"] += answered
         tally["wrong"] += wrong

@@ -13,7 +13,7 @@ import pytest
 
 import fast
 from fast.batch import LaneRound
-from fast.kernel import codes, entries, follow, lanes
+from fast.kernel import bounces, codes, lanes, pools
 from fast.kernel.limits import Limits
 from fast.starts import initial_states
 from fast.step import WALL_CODES
@@ -28,14 +28,14 @@ OFF = np.bool_(False)
 @pytest.mark.parametrize("loop", ["aim", "fly", "bounce", "chord", "rebound"])
 def test_the_compiler_packs_divisions_and_square_roots(loop):
     """Four lanes to an instruction, where the machine has 256-bit registers."""
-    a = np.ones(lanes.N_ROWS * lanes.LANES)
-    n, limits = np.int64(60), Limits(*[1.0] * 9, False)
-    function = getattr(lanes, loop)
+    a = np.ones(pools.N_ROWS * pools.LANES)
+    n, limits = np.int64(60), Limits(*[1.0] * 6)
+    function = getattr(bounces if loop in ("bounce", "rebound") else lanes, loop)
     arguments = {
         "aim": (OFF, 0.1, limits),
-        "fly": (OFF, True, 1.0, 0.1, limits),
+        "fly": (OFF, True, 1.0, 0.1, limits, None),
         "bounce": (0.1, True),
-        "chord": (OFF, OFF, True, 1.0, limits),
+        "chord": (OFF, OFF, True, 1.0, limits, None),
         "rebound": (),
     }
     function(a, n, *arguments[loop])
@@ -53,9 +53,8 @@ class Driver(LaneRound):
 
     def careful(self, p, wall):
         """Return the careful step's wall and dt, x, y, vx, vy."""
-        q = p.copy()
-        code, dt = entries.single_step(*self.compiled, q, wall, np.inf)
-        return code, np.array([dt, *q[2:]])
+        code, dt, end = self.careful_step(p, wall)
+        return code, np.array([dt, *end[2:]])
 
     def jacobian(self, p, wall, code, length, speed):
         """Return the careful step's derivatives by central differences; None for a delicate step."""
@@ -77,7 +76,7 @@ def compare(driver, states, walls, random, tally):
     """Step `states` (n, 6) in lanes and carefully; returns the worst backward ulps between them."""
     n, worst = len(states), 0.0
     for i, (p, wall) in enumerate(zip(states, walls, strict=True)):
-        serves = follow.SERVES / driver.omega if driver.omega else 0.0
+        serves = pools.SERVES / driver.omega if driver.omega else 0.0
         driver.fill(i, p, wall, random.random() * serves)
     right, hits, found = driver.skip(n) if driver.is_disk else driver.fly(n)
     for p, wall, is_right, hit, numbers in zip(states, walls, right, hits, found, strict=True):
@@ -119,7 +118,7 @@ def test_lanes_take_the_careful_steps(name, tally):
                 continue
             states.append(np.array([t, 0.0, *place]))
             walls.append(WALL_CODES[wall])
-            if len(states) == lanes.LANES:
+            if len(states) == pools.LANES:
                 worst = max(worst, compare(driver, states, walls, random, tally))
                 states.clear()
                 walls.clear()

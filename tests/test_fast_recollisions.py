@@ -45,7 +45,7 @@ for scene, state, found in again(1, 60):
 
 def test_without_the_rest_of_a_hop_speeds_are_wrong(tmp_path):
     """A mutant: the time of the hit to its own last bit only."""
-    old = "s_low, rest = rest_of_hop(wall, s, f, slope_s, p, laws, anchors, is_relative), 0.0"
+    old = "s_low, rest = rest_of_hop(s, f, slope_s, particle, scene, anchors), 0.0"
     new = "s_low, rest = 0.0, 0.0"
     honest = [v for _, _, found in again(1, 60) for v in (found.vx, found.vy)]
     spoilt = [float.fromhex(word) for word in output_of(tmp_path, PROGRAM, "hits.py", old, new).split()]

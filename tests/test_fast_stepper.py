@@ -15,8 +15,9 @@ import fast
 from conformance.grading.agreement import compare
 from conformance.strategies import scenes_and_states
 from fast.compiled import compile_scene
-from fast.kernel import arithmetic, codes
-from fast.kernel.laws import ANCHORS_SHAPE, increment, set_anchors
+from fast.kernel import arithmetic
+from fast.kernel.laws import increment, set_anchors
+from fast.kernel.records import ANCHORS_SHAPE, DEPTH, VALUE
 from scene import (
     BangBang,
     Cap,
@@ -89,7 +90,7 @@ def test_powers_of_two_scale_exactly(drawn, length_bits, time_bits):
     st.floats(-1e-12, 1e-12),
 )
 def test_sine_and_cosine(omega, k, t, t_low):
-    s, s_low, c, c_low, is_reduced = arithmetic.sine_cosine(omega, float(k), t, t_low)
+    s, s_low, c, c_low, is_reduced = arithmetic.sine_cosine(omega, 0.0, float(k), t, t_low)
     with workprec(200):
         phase = k * mp.mpf(omega) * (mp.mpf(t) + mp.mpf(t_low))
         if not is_reduced:
@@ -120,13 +121,13 @@ def test_increments_of_laws(name, t, s):
     assert set_anchors(compiled.laws, anchors, t, 0.0)
     with workprec(200):
         law, then = laws(scene)["h"], mp.mpf(t) + mp.mpf(s)
-        change, rate, size, _ = increment(compiled.laws, anchors, codes.H, s)
+        change, rate, size, _ = increment(compiled.laws, anchors, DEPTH, s)
         exact = value(mp, law, then) - value(mp, law, mp.mpf(t))
         # Small increments keep their relative accuracy: 16 roundings of the summed terms, and
         # the rounding of a knot's time by one unit in the last place, at speeds up to 32.
         assert abs(change - exact) <= 16 * 2.0**-53 * size + 2.0**-52 * 64 * s
         assert abs(rate - value(mp, law, then, 1)) <= 2.0**-53 * 4096
-        assert abs(anchors[codes.H, 0] - value(mp, law, mp.mpf(t))) <= 2.0**-50 * 6
+        assert abs(anchors[DEPTH, VALUE] - value(mp, law, mp.mpf(t))) <= 2.0**-50 * 6
 
 
 STATIC = Mushroom(r=1.0, h=1.0, w=0.5)

@@ -13,7 +13,7 @@ from scene import Scene, load
 from theory.distribution import Energies
 
 if TYPE_CHECKING:
-    from fast import Trajectory
+    from fast import Collisions
 
 DIGITS = 30
 Predict = Callable[[Scene, int], theory.Prediction]
@@ -23,7 +23,7 @@ class AuditSteppers(NamedTuple):
     """The stepper that the audit simulates with: `fast`, or another with its signatures."""
 
     simulate: Simulate
-    trajectory: Callable[..., Trajectory]
+    trajectory: Callable[..., Collisions]
 
 
 @cache

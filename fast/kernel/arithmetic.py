@@ -173,7 +173,7 @@ def turned(n, sine, cosine):
 
 
 @njit(error_model="numpy")
-def sine_cosine(omega, k, t_hi, t_lo, omega_low=0.0):
+def sine_cosine(omega, omega_low, k, t_hi, t_lo):
     """Return sin and cos of k (omega + omega_low) (t_hi + t_lo), each as two floats, and whether in reach."""
     n, r, tail = reduced(omega, omega_low, k, t_hi, t_lo)
     sine, sine_low, cosine, cosine_low = short_sine_cosine(r, tail)

@@ -20,21 +20,23 @@ from numba import njit
 from fast.kernel.arithmetic import SAFETY, fma, two_sum
 
 from fast.kernel.codes import (  # isort: skip
-    APPROACHING, ARC, AT_END, BASE, CAP, CORNER, EDGE, FAR_TIME, FLOOR, HORIZON, LEFT, MOUTH_EDGE,
-    MUSHROOM, NO_WALL, ON_CORNER, OUTSIDE, RIGHT, SLIDING, START, STEM, TANGENT, TOO_MANY,
+    APPROACHING, ARC, AT_END, BASE, BEYOND, CAP, CORNER, EDGE, FAR_TIME, FLOOR, HORIZON, LEFT, MOUTH_EDGE,
+    MUSHROOM, NO_WALL, ON_CORNER, RIGHT, SLIDING, START, STEM, TANGENT, TOO_MANY,
 )  # fmt: skip
 from fast.kernel.hits import move
-from fast.kernel.laws import LACK, PHASE, set_anchors
+from fast.kernel.laws import set_anchors
+from fast.kernel.records import PHASE, PHASE_ERROR, Particle, released
 
 from fast.kernel.walls import (  # isort: skip
-    curvature_bounds, is_outside, law_size, reach_time, side_of_mouth, wall_function,
+    crossed_wall, curvature_bounds, law_size, reach_time, side_of_mouth, wall_function,
     wall_residual, wall_rest,
 )  # fmt: skip
 
 MAX_PARABOLAS = 1_000_000
 LEAST = 2.0**-1022  # a time in which nothing is met
 NEAR = 2.0**-30  # how much beyond the limit hits are looked for, relatively
-PATIENCE = 6  # parabolas tried before asking whether the wall is out of the particle's reach
+# How many parabolas are tried before asking whether the wall is out of the particle's reach.
+PARABOLAS_BEFORE_REACH = 6
 
 
 @njit(error_model="numpy")
@@ -54,25 +56,36 @@ def still_reach(wall, f, slope, still, vx, vy):
 
 
 @njit(error_model="numpy")
-def first_root(wall, start, limit, x, y, vx, vy, is_leaving, laws, anchors, bounds, is_relative):
+def reached_at_least(wall, s, f, slope, moved, particle, scene, anchors):
+    """Return a time, at least `moved`, before which a wall is not met, from what holds of it for long."""
+    vx, vy = particle.vx, particle.vy
+    reach = reach_time(wall, particle.x + vx * s, particle.y + vy * s, vx, vy, scene.bounds)
+    moved = max(moved, s + reach)
+    still = wall_rest(wall, s, scene, anchors)
+    if s + still > moved:
+        moved = max(moved, s + still_reach(wall, f, slope, still, vx, vy))
+    return moved
+
+
+@njit(error_model="numpy")
+def first_root(wall, start, limit, particle, scene, anchors):
     """Find the first s in (start, limit) with f = 0, f' < 0.
 
     Returns (code, s, f', error of s): code is the wall for a hit, NO_WALL for none before
     the limit, else a reason for `undecided`.
     """
+    is_leaving = wall == particle.wall
     residual = residual_error = 0.0
     doubt = 0.0  # of the place: a start within it of the wall may be beyond
     if not is_leaving:
-        residual, doubt = wall_residual(wall, x, y, laws, anchors, bounds, is_relative)
-        residual_error = anchors[PHASE, LACK] * law_size(wall, y, bounds)
-    down, up = curvature_bounds(wall, vx, vy, bounds)
+        residual, doubt = wall_residual(wall, particle.x, particle.y, scene, anchors)
+        residual_error = anchors[PHASE, PHASE_ERROR] * law_size(wall, particle.y, scene.bounds)
+    down, up = curvature_bounds(wall, particle.vx, particle.vy, scene.bounds)
     s = start
     for n_steps in range(MAX_PARABOLAS):
         if s >= limit:
             return NO_WALL, limit, 0.0, 0.0
-        f, slope, error, slope_error = wall_function(
-            wall, s, x, y, vx, vy, residual, laws, anchors, is_relative
-        )
+        f, slope, error, slope_error = wall_function(wall, s, particle, residual, scene, anchors)
         error += residual_error
         if s == 0.0 and is_leaving:
             if slope < -slope_error:
@@ -83,7 +96,7 @@ def first_root(wall, start, limit, x, y, vx, vy, is_leaving, laws, anchors, boun
                 return (SLIDING if is_along else TANGENT), s, slope, 0.0
             f = 0.0
         elif s == start and f <= error + doubt:
-            return (OUTSIDE if f < -(error + doubt) else START), s, slope, 0.0
+            return (BEYOND + wall if f < -(error + doubt) else START), s, slope, 0.0
         elif f <= error:
             # A simple root from above. Were f convex enough to turn back within its error: undecided.
             if slope >= -slope_error or (up > 0.0 and slope * slope <= 4.0 * up * error):
@@ -103,26 +116,20 @@ def first_root(wall, start, limit, x, y, vx, vy, is_leaving, laws, anchors, boun
             return wall, moved, slope, error / -slope
         if moved <= s:
             return TANGENT, s, slope, 0.0
-        if n_steps >= PATIENCE:
-            reach = reach_time(wall, x + vx * s, y + vy * s, vx, vy, bounds)
-            moved = max(moved, s + reach)
-            still = wall_rest(wall, s, laws, anchors, is_relative)
-            if s + still > moved:
-                moved = max(moved, s + still_reach(wall, f, slope, still, vx, vy))
+        if n_steps >= PARABOLAS_BEFORE_REACH:
+            moved = reached_at_least(wall, s, f, slope, moved, particle, scene, anchors)
         s = moved
     return TOO_MANY, s, 0.0, 0.0
 
 
 @njit(error_model="numpy")
-def earliest_side_or_floor(wall, start, limit, x, y, vx, vy, laws, anchors, bounds, is_relative):
+def earliest_side_or_floor(start, limit, particle, scene, anchors):
     """Find the first hit of left, right and floor; (code, s, error of s)."""
     code, s, error = NO_WALL, limit, 0.0
     for candidate in (LEFT, RIGHT, FLOOR):
         # Look a little beyond the best so far, so that ties are seen from both sides.
         beyond = min(limit, s + 8.0 * error + SAFETY * s)
-        found, root, _, root_error = first_root(
-            candidate, start, beyond, x, y, vx, vy, wall == candidate, laws, anchors, bounds, is_relative
-        )
+        found, root, _, root_error = first_root(candidate, start, beyond, particle, scene, anchors)
         if found == NO_WALL:
             continue
         if found != candidate:
@@ -137,178 +144,174 @@ def earliest_side_or_floor(wall, start, limit, x, y, vx, vy, laws, anchors, boun
 
 
 @njit(error_model="numpy")
-def cap_flight(start, limit, wall, x, y, vx, vy, laws, anchors, bounds, is_relative, has_base):
+def cap_flight(start, limit, has_base, particle, scene, anchors):
     """Follow the flight in the cap from `start` to the arc; (code, s)."""
-    code, s, _, error = first_root(
-        ARC, start, limit, x, y, vx, vy, wall == ARC, laws, anchors, bounds, is_relative
-    )
-    if code == ARC and has_base and vy < 0.0:
+    code, s, _, error = first_root(ARC, start, limit, particle, scene, anchors)
+    if code == ARC and has_base and particle.vy < 0.0:
         # The corner of arc and base: the height there must be above its rounding error.
+        y, vy = particle.y, particle.vy
         height = y + vy * s
         if height <= SAFETY * (abs(y) + abs(vy) * s) + abs(vy) * error:
             return CORNER, s
     return code, s
 
 
-@njit(error_model="numpy")
-def along_mouth(limit, x, vx, laws, anchors, bounds, is_relative):
+@njit(error_model="numpy", inline="always")
+def along_mouth(limit, particle, scene, anchors):
     """Follow a path along y = 0 inside the mouth: it may only end at the mouth's edge."""
-    code, s, _ = earliest_side_or_floor(
-        NO_WALL, 0.0, limit, x, 0.0, vx, 0.0, laws, anchors, bounds, is_relative
-    )
-    if code in (LEFT, RIGHT):
-        return MOUTH_EDGE, s
-    return (HORIZON if code == NO_WALL else code), s
+    level = Particle(particle.t, particle.t_low, particle.x, 0.0, particle.vx, 0.0, NO_WALL)
+    code, s, _ = earliest_side_or_floor(0.0, limit, level, scene, anchors)
+    return (MOUTH_EDGE if code in (LEFT, RIGHT) else code), s
 
 
 @njit(error_model="numpy")
-def side_of_wall(candidate, wall, s, x, y, vx, vy, laws, anchors, bounds, is_relative):
+def side_of_wall(candidate, s, particle, scene, anchors):
     """Return +1 when a wall is not yet met at time s, -1 when it is passed, 0 where rounding hides it."""
+    y, vy = particle.y, particle.vy
     if candidate == BASE:
         f = y + vy * s if vy < 0.0 else -(y + vy * s)
         error = SAFETY * (abs(y) + abs(vy) * s)
     else:
         residual = residual_error = 0.0
-        if wall != candidate:
-            residual, residual_error = wall_residual(candidate, x, y, laws, anchors, bounds, is_relative)
-        f, slope, error, slope_error = wall_function(
-            candidate, s, x, y, vx, vy, residual, laws, anchors, is_relative
-        )
+        if particle.wall != candidate:
+            residual, residual_error = wall_residual(candidate, particle.x, y, scene, anchors)
+        f, slope, error, slope_error = wall_function(candidate, s, particle, residual, scene, anchors)
         error += residual_error + SAFETY * s * (abs(slope) + slope_error)
     if abs(f) <= error:
         return 0
     return 1 if f > 0.0 else -1
 
 
-@njit(error_model="numpy")
-def first_event(table, is_relative, wall, x, y, vx, vy, limit, laws, anchors, bounds):
-    """Find the next collision or say why not; (code, s). The anchors hold the laws at the state.
+@njit(error_model="numpy", inline="always")
+def trouble_at_start(is_in_cap, particle, scene, anchors):
+    """Return why no flight begins on y = 0, NO_WALL where one does.
 
     A start on two walls at once, here a named wall and y = 0, is a corner whichever way it moves; a second
     wall of any other pair is found within rounding of f = 0 by `first_root`, and then left undecided.
     """
+    x, y, vx, vy, wall = particle.x, particle.y, particle.vx, particle.vy, particle.wall
+    is_mushroom = scene.table == MUSHROOM
     if y == 0.0 and wall in (ARC, LEFT, RIGHT):
-        return (MOUTH_EDGE if table == MUSHROOM and wall != ARC else ON_CORNER), 0.0
-    in_cap = table == CAP or (
-        table == MUSHROOM and (y > 0.0 or wall in (BASE, ARC) or (y == 0.0 and wall == NO_WALL and vy > 0.0))
-    )
-    crossing = np.inf
-    if wall != BASE and ((in_cap and vy < 0.0) or (not in_cap and vy > 0.0 and y < 0.0)):
-        crossing = -y / vy
-    if wall == BASE or (y == 0.0 and wall == NO_WALL and table != MUSHROOM):
-        inward = vy if in_cap else -vy
+        return MOUTH_EDGE if is_mushroom and wall != ARC else ON_CORNER
+    if wall == BASE or (y == 0.0 and wall == NO_WALL and not is_mushroom):
+        inward = vy if is_in_cap else -vy
         if inward <= 0.0:
-            return (SLIDING if inward == 0.0 else APPROACHING), 0.0
-    if y == 0.0 and wall == NO_WALL and table == MUSHROOM and vy > 0.0:
+            return SLIDING if inward == 0.0 else APPROACHING
+    elif y == 0.0 and wall == NO_WALL and vy > 0.0:
         # In the cap from the mouth or from the base, all the same, but not from the edge between them.
-        gap, _ = wall_residual(RIGHT if x > 0.0 else LEFT, x, y, laws, anchors, bounds, is_relative)
+        gap, _ = wall_residual(RIGHT if x > 0.0 else LEFT, x, y, scene, anchors)
         if gap == 0.0:
-            return EDGE, 0.0
-    if y == 0.0 and wall == NO_WALL and table == MUSHROOM and vy <= 0.0:
-        side = side_of_mouth(0.0, x, y, vx, vy, laws, anchors, is_relative)
+            return EDGE
+    elif y == 0.0 and wall == NO_WALL:
+        side = side_of_mouth(0.0, x, vx, scene, anchors)
         if side == 0:
-            return EDGE, 0.0
+            return EDGE
         if side < 0:
-            return (SLIDING if vy == 0.0 else APPROACHING), 0.0
-        if vy == 0.0:
-            return along_mouth(limit, x, vx, laws, anchors, bounds, is_relative)
-    if in_cap:
-        code, s = cap_flight(
-            0.0,
-            min(crossing, limit),
-            wall,
-            x,
-            y,
-            vx,
-            vy,
-            laws,
-            anchors,
-            bounds,
-            is_relative,
-            crossing < np.inf,
-        )
-        if code != NO_WALL or crossing >= limit:
-            return (HORIZON if code == NO_WALL else code), s
-        residual = residual_error = 0.0
-        if wall != ARC:
-            residual, residual_error = wall_residual(ARC, x, y, laws, anchors, bounds, is_relative)
-        gap, _, gap_error, _ = wall_function(
-            ARC, crossing, x, y, vx, vy, residual, laws, anchors, is_relative
-        )
-        if gap <= gap_error + residual_error:
-            return CORNER, crossing
-        if table == CAP:
-            return BASE, crossing
-        side = side_of_mouth(crossing, x, y, vx, vy, laws, anchors, is_relative)
-        if side <= 0:
-            return (BASE if side < 0 else EDGE), crossing
-        code, s, _ = earliest_side_or_floor(
-            NO_WALL, crossing, limit, x, y, vx, vy, laws, anchors, bounds, is_relative
-        )
-        return (HORIZON if code == NO_WALL else code), s
-    code, s, error = earliest_side_or_floor(
-        wall, 0.0, min(crossing, limit), x, y, vx, vy, laws, anchors, bounds, is_relative
-    )
+            return SLIDING if vy == 0.0 else APPROACHING
+    return NO_WALL
+
+
+@njit(error_model="numpy", inline="always")
+def event_from_cap(crossing, limit, particle, scene, anchors):
+    """Find the next collision of a flight that begins in the cap and crosses y = 0 at a time; (code, s)."""
+    code, s = cap_flight(0.0, min(crossing, limit), crossing < np.inf, particle, scene, anchors)
+    if code != NO_WALL or crossing >= limit:
+        return code, s
+    residual = residual_error = 0.0
+    if particle.wall != ARC:
+        residual, residual_error = wall_residual(ARC, particle.x, particle.y, scene, anchors)
+    gap, _, gap_error, _ = wall_function(ARC, crossing, particle, residual, scene, anchors)
+    if gap <= gap_error + residual_error:
+        return CORNER, crossing
+    if scene.table == CAP:
+        return BASE, crossing
+    side = side_of_mouth(crossing, particle.x, particle.vx, scene, anchors)
+    if side <= 0:
+        return (BASE if side < 0 else EDGE), crossing
+    code, s, _ = earliest_side_or_floor(crossing, limit, released(particle), scene, anchors)
+    return code, s
+
+
+@njit(error_model="numpy", inline="always")
+def event_from_stem(crossing, limit, particle, scene, anchors):
+    """Find the next collision of a flight that begins in the stem and crosses y = 0 at a time; (code, s)."""
+    y, vy = particle.y, particle.vy
+    code, s, error = earliest_side_or_floor(0.0, min(crossing, limit), particle, scene, anchors)
     if code != NO_WALL:
         # A side met at the height of the mouth is its edge.
-        depth = y + vy * s
-        if (
-            crossing < np.inf
-            and code <= FLOOR
-            and -depth <= SAFETY * (abs(y) + abs(vy) * s) + abs(vy) * error
-        ):
-            return EDGE, s
-        return code, s
+        depth = -(y + vy * s)
+        is_at_mouth = depth <= SAFETY * (abs(y) + abs(vy) * s) + abs(vy) * error
+        return (EDGE if crossing < np.inf and code <= FLOOR and is_at_mouth else code), s
     if crossing >= limit:
-        return HORIZON, s
+        return NO_WALL, s
     for side in (LEFT, RIGHT):
-        if side_of_wall(side, wall, crossing, x, y, vx, vy, laws, anchors, bounds, is_relative) <= 0:
-            return (CORNER if table == STEM else EDGE), crossing
-    if table == STEM:
+        if side_of_wall(side, crossing, particle, scene, anchors) <= 0:
+            return (CORNER if scene.table == STEM else EDGE), crossing
+    if scene.table == STEM:
         return BASE, crossing
-    code, s = cap_flight(
-        crossing, limit, NO_WALL, x, y, vx, vy, laws, anchors, bounds, is_relative, np.bool_(False)
+    return cap_flight(crossing, limit, np.bool_(False), released(particle), scene, anchors)
+
+
+@njit(error_model="numpy")
+def first_event(particle, limit, scene, anchors):
+    """Find the next collision or say why not; (code, s). The anchors hold the laws at the particle's time."""
+    table, y, vy, wall = scene.table, particle.y, particle.vy, particle.wall
+    is_in_cap = table == CAP or (
+        table == MUSHROOM and (y > 0.0 or wall in (BASE, ARC) or (y == 0.0 and wall == NO_WALL and vy > 0.0))
     )
+    code = trouble_at_start(is_in_cap, particle, scene, anchors)
+    if code != NO_WALL:
+        return code, 0.0
+    crossing = np.inf
+    if wall != BASE and ((is_in_cap and vy < 0.0) or (not is_in_cap and vy > 0.0 and y < 0.0)):
+        crossing = -y / vy
+    if table == MUSHROOM and wall == NO_WALL and y == 0.0 and vy == 0.0:
+        code, s = along_mouth(limit, particle, scene, anchors)
+    elif is_in_cap:
+        code, s = event_from_cap(crossing, limit, particle, scene, anchors)
+    else:
+        code, s = event_from_stem(crossing, limit, particle, scene, anchors)
     return (HORIZON if code == NO_WALL else code), s
 
 
 @njit(error_model="numpy")
-def step(table, is_relative, laws, bounds, anchors, p, wall, limit):
-    """Advance the state p = [t, t's low part, x, y, vx, vy] by one collision, in place.
+def step(particle, limit, scene, anchors):
+    """Find the next collision of a particle within a time, and what it is then.
 
-    Returns (code, dt): a wall's code, HORIZON (p is moved to the limit) or why there is none
-    (p stays). The anchors must hold the laws at p's time, and do so again after a collision.
+    The anchors must hold the laws at the particle's time, and do so again after a collision.
+
+    Returns:
+        (code, dt, particle): a wall's code and the particle that leaves it, HORIZON and the particle at the
+        limit, or why there is neither and the particle as it was.
     """
-    x, y, vx, vy = p[2], p[3], p[4], p[5]
     # Look a little beyond the limit, so that a hit just there is seen from both sides. With no time left
     # the start is judged all the same.
     ahead = limit * (1.0 + NEAR) if limit > 0.0 else LEAST
-    code, s = first_event(table, is_relative, wall, x, y, vx, vy, ahead, laws, anchors, bounds)
+    code, s = first_event(particle, ahead, scene, anchors)
     if limit == 0.0 and code < HORIZON:
         code = HORIZON
     if code > HORIZON and s > limit and limit > 0.0:
-        code, s = first_event(table, is_relative, wall, x, y, vx, vy, limit, laws, anchors, bounds)
+        code, s = first_event(particle, limit, scene, anchors)
     elif code < HORIZON and s > limit * (1.0 - NEAR):
-        side = side_of_wall(code, wall, limit, x, y, vx, vy, laws, anchors, bounds, is_relative)
+        side = side_of_wall(code, limit, particle, scene, anchors)
         if side >= 0:
             code = HORIZON if side > 0 else AT_END
     if code > HORIZON:
-        return code, s
-    if code == HORIZON:
-        p[2], p[3] = fma(p[4], limit, p[2]), fma(p[5], limit, p[3])
-        t, low = two_sum(p[0], limit)
-        p[0], p[1] = two_sum(t, low + p[1])
-        return code, limit
-    dt = move(code, s, code == wall, p, laws, bounds, anchors, is_relative)
-    return (code, dt) if dt >= 0.0 else (FAR_TIME, s)
+        return code, s, particle
+    if code < HORIZON:
+        return move(code, s, particle, scene, anchors)
+    x, y = fma(particle.vx, limit, particle.x), fma(particle.vy, limit, particle.y)
+    t, low = two_sum(particle.t, limit)
+    t, low = two_sum(t, low + particle.t_low)
+    return code, limit, Particle(t, low, x, y, particle.vx, particle.vy, particle.wall)
 
 
-@njit(error_model="numpy")
-def first_step(table, is_relative, laws, bounds, anchors, p, wall, limit):
-    """Judge a state and advance it, for callers whose anchors are not set."""
-    if not set_anchors(laws, anchors, p[0], p[1]):
-        return FAR_TIME, 0.0
-    beyond = is_outside(table, is_relative, wall, p[2], p[3], laws, anchors, bounds)
-    if beyond != NO_WALL:
-        return OUTSIDE, float(beyond)
-    return step(table, is_relative, laws, bounds, anchors, p, wall, limit)
+@njit(error_model="numpy", inline="always")
+def first_step(particle, limit, scene, anchors):
+    """Judge a particle and take its step, for callers whose anchors are not set."""
+    if not set_anchors(scene.laws, anchors, particle.t, particle.t_low):
+        return FAR_TIME, 0.0, particle
+    crossed = crossed_wall(particle, scene, anchors)
+    if crossed != NO_WALL:
+        return BEYOND + crossed, 0.0, particle
+    return step(particle, limit, scene, anchors)

@@ -9,10 +9,6 @@ NO_WALL, ARC, BASE, LEFT, RIGHT, FLOOR = np.arange(-1, 5)
 N_WALLS = 5
 HORIZON, SLIDING, MOUTH_EDGE, ON_CORNER = np.array([10, 20, 21, 22])
 FAR_TIME, TOO_MANY, TANGENT, CORNER, EDGE, START, AT_END = np.arange(31, 38)
-APPROACHING, OUTSIDE = np.array([40, 41])
+# A refused state moves into the wall that it leaves, or lies beyond a wall: BEYOND plus that wall's code.
+APPROACHING, BEYOND = np.array([40, 41])
 CAP, STEM, MUSHROOM = np.arange(3)
-# Rows of the law table: radius, width (w or nu), depth, slope; then omega, the number of harmonics and
-# omega's low part, of all Fourier laws of a scene.
-R, W, H, M, PHASES = np.arange(5)
-CONSTANT, FOURIER, BANG_BANG = 0.0, 1.0, 2.0
-MAX_HARMONICS = 16

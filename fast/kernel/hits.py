@@ -10,56 +10,60 @@ from __future__ import annotations
 from numba import njit
 
 from fast.kernel.arithmetic import SAFETY, two_product, two_sum
-from fast.kernel.codes import ARC, BASE, FLOOR, RIGHT, H, M, R, W
-from fast.kernel.laws import LACK, LOW, PHASE, set_anchors
-from fast.kernel.walls import curvature_bounds, off_the_arc, wall_function, wall_residual, wall_slope
+from fast.kernel.codes import ARC, BASE, FAR_TIME, FLOOR, RIGHT, TANGENT
+from fast.kernel.laws import set_anchors
+
+from fast.kernel.records import (  # isort: skip
+    DEPTH, PHASE, PHASE_ERROR, RADIUS, RATE, SLOPE, VALUE, VALUE_LOW, Particle,
+)  # fmt: skip
+from fast.kernel.walls import (  # isort: skip
+    curvature_bounds, off_the_arc, wall_function, wall_residual, wall_slope, width_rate,
+)  # fmt: skip
 
 MAX_POLISHES = 4
 
 
 @njit(error_model="numpy")
-def remainder(wall, s, rest, residual, x, y, vx, vy, laws, anchors, bounds, is_relative):
+def remainder(wall, s, rest, residual, particle, scene, anchors):
     """Return what must be added to the time s + rest of a hit, and the rounded place there with its low part.
 
     The anchors hold the laws at the hit, which is where f = residual.
     """
+    vx, vy = particle.vx, particle.vy
     p, x_low = two_product(vx, s)
-    x_s, e = two_sum(x, p)
+    x_s, e = two_sum(particle.x, p)
     x_low += e + vx * rest
     p, y_low = two_product(vy, s)
-    y_s, e = two_sum(y, p)
+    y_s, e = two_sum(particle.y, p)
     y_low += e + vy * rest
     if wall == BASE:
         return -(y_s + y_low) / vy, x_s, x_low, y_s, y_low
-    f, _ = wall_residual(wall, x_s, y_s, laws, anchors, bounds, is_relative)
+    f, _ = wall_residual(wall, x_s, y_s, scene, anchors)
     f -= residual
     if wall == ARC:
         f -= 2.0 * (x_s * x_low + y_s * y_low)
     elif wall == FLOOR:
         f += y_low
     else:
-        f += anchors[M, 0] * y_low - (x_low if wall == RIGHT else -x_low)
-    return f / -wall_slope(wall, x_s, y_s, vx, vy, anchors, is_relative), x_s, x_low, y_s, y_low
+        f += anchors[SLOPE, VALUE] * y_low - (x_low if wall == RIGHT else -x_low)
+    return f / -wall_slope(wall, x_s, y_s, vx, vy, scene, anchors), x_s, x_low, y_s, y_low
 
 
 @njit(error_model="numpy")
-def bounce(wall, x, x_low, y, y_low, vx, vy, anchors, is_relative):
+def bounce(wall, x, x_low, y, y_low, vx, vy, scene, anchors):
     """Return the velocity after a hit at (x, y): v - 2 f' grad f / |grad f|^2 = v - 2 (v.n - u) n."""
     if wall == BASE:
         return vx, -vy
     if wall == ARC:
-        return off_the_arc(x, x_low, y, y_low, vx, vy, anchors[R, 0], anchors[R, 1])
+        return off_the_arc(x, x_low, y, y_low, vx, vy, anchors[RADIUS, VALUE], anchors[RADIUS, RATE])
     if wall == FLOOR:
-        return vx, -vy - 2.0 * anchors[H, 1]
-    m = anchors[M, 0]
+        return vx, -vy - 2.0 * anchors[DEPTH, RATE]
+    m = anchors[SLOPE, VALUE]
     sign = 1.0 if wall == RIGHT else -1.0
-    rate = anchors[W, 1]
-    if is_relative:
-        rate = rate * anchors[R, 0] + anchors[W, 0] * anchors[R, 1]
-    rate += anchors[M, 1] * y
+    rate = width_rate(scene, anchors) + anchors[SLOPE, RATE] * y
     out = sign * vx
     # The reflection as a matrix: at slopes near +-1 the diagonal is small and must not cancel.
-    tilt, n2 = ((m - 1.0) + anchors[M, LOW]) * (m + 1.0), 1.0 + m * m
+    tilt, n2 = ((m - 1.0) + anchors[SLOPE, VALUE_LOW]) * (m + 1.0), 1.0 + m * m
     return (
         sign * ((tilt * out + 2.0 * (m * vy + rate)) / n2),
         (2.0 * m * (out - rate) - tilt * vy) / n2,
@@ -67,33 +71,35 @@ def bounce(wall, x, x_low, y, y_low, vx, vy, anchors, is_relative):
 
 
 @njit(error_model="numpy")
-def settled(wall, s, x, y, vx, vy, laws, anchors, is_relative):
+def settled(s, particle, scene, anchors):
     """Return the time of a hit of the wall left, right to its last bit, with f, f' and f's error there."""
-    f, slope, error, _ = wall_function(wall, s, x, y, vx, vy, 0.0, laws, anchors, is_relative)
+    wall = particle.wall
+    f, slope, error, _ = wall_function(wall, s, particle, 0.0, scene, anchors)
     for _ in range(MAX_POLISHES):
         change = f / -slope
         if not abs(change) > 2.0**-52 * s:
             break
         s += change
-        f, slope, error, _ = wall_function(wall, s, x, y, vx, vy, 0.0, laws, anchors, is_relative)
+        f, slope, error, _ = wall_function(wall, s, particle, 0.0, scene, anchors)
     return s, f, slope, error
 
 
 @njit(error_model="numpy")
-def rest_of_hop(wall, s, f, slope, p, laws, anchors, is_relative):
+def rest_of_hop(s, f, slope, particle, scene, anchors):
     """Return what must be added to the time s of a hit of the wall left; its increments gave f and f'.
 
     The low part matters even though s is right to its last bit: a wall that rests until a knot and is met
     just after it has a speed as small as the time since then. Newton's method, f between s and there by
     the trapezoidal rule: exact for a bang-bang law, whose f' is linear.
     """
-    x_s, y_s, vx, vy = p[2] + p[4] * s, p[3] + p[5] * s, p[4], p[5]
-    t, low = two_sum(p[0], s)
+    vx, vy = particle.vx, particle.vy
+    x_s, y_s = particle.x + vx * s, particle.y + vy * s
+    t, low = two_sum(particle.t, s)
     rest = f / -slope
     for _ in range(MAX_POLISHES):
-        if not set_anchors(laws, anchors, t, low + p[1] + rest):
+        if not set_anchors(scene.laws, anchors, t, low + particle.t_low + rest):
             return 0.0
-        now = wall_slope(wall, x_s, y_s, vx, vy, anchors, is_relative)
+        now = wall_slope(particle.wall, x_s, y_s, vx, vy, scene, anchors)
         change = (f + 0.5 * rest * (slope + now)) / -now
         if not abs(change) <= 2.0**-52 * s:
             return 0.0
@@ -104,45 +110,48 @@ def rest_of_hop(wall, s, f, slope, p, laws, anchors, is_relative):
 
 
 @njit(error_model="numpy")
-def move(wall, s, is_again, p, laws, bounds, anchors, is_relative):
-    """Move the state to the hit at time s and bounce, in place; returns the time, or -1 if it is lost.
+def move(wall, s, particle, scene, anchors):
+    """Move a particle to its hit of a wall at time s, and bounce it.
 
-    `is_again`: the wall met is the one left, whose residual at the start stays in its function.
     The time is polished as a sum of two floats: beside a violent leg, whose whole length may be a few units
-    in the last place of s, Newton's method needs the digits that s alone cannot hold.
+    in the last place of s, Newton's method needs the digits that s alone cannot hold. A wall that is met
+    again keeps its residual at the start in its function.
+
+    Returns:
+        (code, time, particle): the wall and the particle leaving it. Else the particle as it was, with
+        FAR_TIME, or with TANGENT where f' is so slight that the polished time lies before the start.
     """
-    x, y, vx, vy, rest = p[2], p[3], p[4], p[5], 0.0
+    vx, vy, is_again, rest = particle.vx, particle.vy, wall == particle.wall, 0.0
     residual = residual_error = error = f = slope_s = 0.0
-    lack = anchors[PHASE, LACK]
+    laws, phase_error = scene.laws, anchors[PHASE, PHASE_ERROR]
     if is_again:
-        residual, residual_error = wall_residual(wall, x, y, laws, anchors, bounds, is_relative)
-        s, f, slope_s, error = settled(wall, s, x, y, vx, vy, laws, anchors, is_relative)
-    bend, _ = curvature_bounds(wall, vx, vy, bounds)
+        residual, residual_error = wall_residual(wall, particle.x, particle.y, scene, anchors)
+        s, f, slope_s, error = settled(s, particle, scene, anchors)
+    bend, _ = curvature_bounds(wall, vx, vy, scene.bounds)
     for _ in range(MAX_POLISHES):
-        t, low = two_sum(p[0], s)
-        if not set_anchors(laws, anchors, t, low + p[1] + rest):
-            return -1.0
-        s_low, x_s, x_low, y_s, y_low = remainder(
-            wall, s, rest, residual, x, y, vx, vy, laws, anchors, bounds, is_relative
-        )
-        lack = max(lack, anchors[PHASE, LACK])
-        if is_again and error < lack / SAFETY * residual_error:
+        t, low = two_sum(particle.t, s)
+        if not set_anchors(laws, anchors, t, low + particle.t_low + rest):
+            return FAR_TIME, s, particle
+        s_low, x_s, x_low, y_s, y_low = remainder(wall, s, rest, residual, particle, scene, anchors)
+        phase_error = max(phase_error, anchors[PHASE, PHASE_ERROR])
+        if is_again and error < phase_error / SAFETY * residual_error:
             # A short hop along the wall: its increments give s better than the laws' low parts can.
             x_low, y_low = x_low - vx * rest, y_low - vy * rest
-            s_low, rest = rest_of_hop(wall, s, f, slope_s, p, laws, anchors, is_relative), 0.0
+            s_low, rest = rest_of_hop(s, f, slope_s, particle, scene, anchors), 0.0
             break
-        slope = wall_slope(wall, x_s, y_s, vx, vy, anchors, is_relative)
+        slope = wall_slope(wall, x_s, y_s, vx, vy, scene, anchors)
         # What Newton leaves, bend s_low^2 / (2 slope), must be nothing to the time and to the wall's speed.
         change = bend * abs(s_low)
-        if wall == BASE or (
-            change <= 2.0**-27 * abs(slope) and change * abs(s_low) <= 2.0**-54 * s * abs(slope)
-        ):
+        is_slight = change <= 2.0**-27 * abs(slope) and change * abs(s_low) <= 2.0**-54 * s * abs(slope)
+        if wall == BASE or is_slight:
             break
         s, rest = two_sum(s, rest + s_low)
+    time = s + (rest + s_low)
+    if not time >= 0.0:
+        return TANGENT, s, particle
     x_s, x_low = two_sum(x_s, x_low + vx * s_low)
     y_s, y_low = (0.0, 0.0) if wall == BASE else two_sum(y_s, y_low + vy * s_low)
-    p[0], p[1] = two_sum(t, low + p[1] + rest + s_low)
-    set_anchors(laws, anchors, p[0], p[1])
-    p[2], p[3] = x_s, y_s
-    p[4], p[5] = bounce(wall, x_s, x_low, y_s, y_low, vx, vy, anchors, is_relative)
-    return s + (rest + s_low)
+    t, t_low = two_sum(t, low + particle.t_low + rest + s_low)
+    set_anchors(laws, anchors, t, t_low)
+    vx, vy = bounce(wall, x_s, x_low, y_s, y_low, vx, vy, scene, anchors)
+    return wall, time, Particle(t, t_low, x_s, y_s, vx, vy, wall)

@@ -21,36 +21,73 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from fast.kernel.arithmetic import SAFETY, dot, fma, two_sum
-from fast.kernel.codes import ARC, BASE, FLOOR, LEFT, RIGHT
-from fast.kernel.short import law, moved, short_sum, turns
-from fast.kernel.walls import off_the_arc, off_the_arc_spinning
+from fast.kernel.arithmetic import SAFETY, fma, two_sum
 
-LANES = 64  # all rows of a pool stay in the first-level cache
+from fast.kernel.pools import (  # isort: skip
+    CERTAIN, CLOSED, COARSE, END, H0, H1, H2, HIT, H_REF, NEVER, NEXT_H0, NEXT_H1, NEXT_H2, NEXT_R0,
+    NEXT_R1, NEXT_R2, NEXT_T, NEXT_T_LOW, NEXT_W0, NEXT_W1, NEXT_W2, NEXT_X, NEXT_X_LOW, NEXT_Y, NEXT_Y_LOW,
+    OK, ON_ARC, ON_BASE, ON_FLOOR, ON_LEFT, ON_RIGHT, R0, R1, R2, REF, REFUSED, REF_LOW, ROUTINE, R_REF, S,
+    SPIN, STOP, SURE, T, T_LOW, VX, VY, W0, W1, W2, WALL, W_REF, X, Y, law_after,
+)  # fmt: skip
+from fast.kernel.short import moved, short_sum, turns
+
 LONGEST_TURN = 0.25  # omega u up to which the series are used
-NEVER = np.inf
 ONE = np.float64(1.0)  # its quotient by 0 is infinite without the compiler too
 
-# Rows of a pool, LANES numbers each, in one flat array: constant strides let the loops vectorise.
-(
-    T, T_LOW, X, Y, VX, VY, WALL,  # state at the last collision
-    R0, R1, R2, W0, W1, W2, H0, H1, H2,  # radius, half-width, depth there, with two derivatives
-    REF, REF_LOW, END, KNOT,  # the laws' reference time, until when it serves, when the next knot comes
-    R_REF, R_REF_LOW, R_REF1, R_REF2,  # radius there, its low part, two derivatives
-    N_REF, N_REF_LOW, N_REF1, N_REF2,  # w or nu
-    H_REF, H_REF_LOW, H_REF1, H_REF2,  # depth
-    S, HIT, SURE, OK, CALM,  # the step: time, wall, mouth; whether it is right; whether nothing else is to do
-    NEXT_T, NEXT_T_LOW, NEXT_X, NEXT_X_LOW, NEXT_Y, NEXT_Y_LOW, NEXT_VX, NEXT_VY, DONE,  # state after it
-    NEXT_R0, NEXT_R1, NEXT_R2, NEXT_W0, NEXT_W1, NEXT_W2, NEXT_H0, NEXT_H1, NEXT_H2,
-    STOP, SINCE, UNTIL,  # next time to look at the particle; a captured stay that spans one between is kept
-    STAY_IN, STAY_OUT, CLOSED, SPIN,  # the captured stay, its end once it is over, angular momentum
-    N_ARC, N_BASE, N_LEFT, N_RIGHT, N_FLOOR,  # collisions so far
-) = LANES * np.arange(67)  # fmt: skip
-N_ROWS = 67
-# Codes of walls as they stand in a row, and of OK.
-ON_ARC, ON_BASE, ON_LEFT, ON_RIGHT, ON_FLOOR = map(float, (ARC, BASE, LEFT, RIGHT, FLOOR))
-WRONG, COARSE, RIGHT_ONE = 0.0, 1.0, 2.0
-CLEARLY_CAPTURED = 1.05  # |L| over w v from which a particle moves to the disk's pool
+
+@njit(error_model="numpy", inline="always")
+def mouth_crossing(x, y, vx, vy, w0, w1, per_r, limits):
+    """Return `gap`, `doubt` and `lift` of docs/lanes.md: on which side of the mouth's edge y = 0 is crossed.
+
+    The gap comes times |vy|, the other two times |vy|^2.
+    """
+    bend, k_w, rate_w, size = limits.bend, limits.curvature, limits.rate, limits.size
+    depth, rise = abs(y), abs(vy)
+    gap = fma(w0, rise, w1 * depth) - abs(x * vy - y * vx)
+    excess = bend - fma(vx, vx, vy * vy)
+    excess = excess if excess > 0.0 else 0.0  # by how much the arc's function may be convex, halved
+    doubt = (k_w + excess * per_r) * depth * depth
+    doubt = fma(SAFETY * rise, fma(size + abs(x), rise, (abs(vx) + rate_w) * depth), doubt)
+    lift = limits.least_h * rise * rise - k_w * depth * depth
+    return gap, doubt, lift
+
+
+@njit(error_model="numpy", inline="always")
+def nearest_below(wall, f_r, d_r, f_l, d_l, f_f, d_f):
+    """Return the least quotient f / d of right, left and floor, by cross-multiplication, and its wall.
+
+    f is the wall's function, 0 on the wall being left, and d how fast it falls.
+    """
+    f_r = 0.0 if wall == ON_RIGHT else f_r
+    f_l = 0.0 if wall == ON_LEFT else f_l
+    f_f = 0.0 if wall == ON_FLOOR else f_f
+    f = f_r if f_r > 0.0 else 1.0
+    d = d_r if f_r > 0.0 else 0.0
+    d = d if d > 0.0 else 0.0
+    side = ON_RIGHT
+    best_l = d_l * f - f_l * d
+    best_l = best_l if f_l > 0.0 else 0.0
+    f = f_l if best_l > 0.0 else f
+    d = d_l if best_l > 0.0 else d
+    side = ON_LEFT if best_l > 0.0 else side
+    best_f = d_f * f - f_f * d
+    best_f = best_f if f_f > 0.0 else 0.0
+    f = f_f if best_f > 0.0 else f
+    d = d_f if best_f > 0.0 else d
+    side = ON_FLOOR if best_f > 0.0 else side
+    return f, d, side
+
+
+@njit(error_model="numpy", inline="always")
+def arc_quotient(x, y, vx, vy, wall, r0, r1, r2):
+    """Return the time to the arc, to second order in it, as a quotient f / d."""
+    q, v2 = fma(x, vx, y * vy), fma(vx, vx, vy * vy)
+    c = fma(-x, x, (r0 - y) * (r0 + y))
+    c = 0.0 if wall == ON_ARC else c
+    a2 = v2 - fma(r1, r1, r0 * r2)
+    b = fma(-r0, r1, q)
+    root = np.sqrt(fma(b, b, a2 * c))
+    return c if b > 0.0 else root - b, b + root if b > 0.0 else a2
 
 
 @njit(error_model="numpy")
@@ -59,51 +96,15 @@ def aim(a, n, is_stem, m, limits):
 
     SURE is positive only where the part of the flight before y = 0 is as chosen: docs/lanes.md.
     """
-    bend, k_w, rate_w, size = limits.bend, limits.curvature, limits.rate, limits.size
-    per_r, least_h = 2.0 / limits.least_r, limits.least_h
+    bend, per_r = limits.bend, 2.0 / limits.least_r
     for i in range(n):
         x, y, vx, vy, wall = a[X + i], a[Y + i], a[VX + i], a[VY + i], a[WALL + i]
-        r0, r1, r2 = a[R0 + i], a[R1 + i], a[R2 + i]
-        w0, w1, w2 = a[W0 + i], a[W1 + i], a[W2 + i]
-        h0, h1, h2 = a[H0 + i], a[H1 + i], a[H2 + i]
+        w0, w1, h1 = a[W0 + i], a[W1 + i], a[H1 + i]
         depth, rise = abs(y), abs(vy)
-        # The crossing of y = 0, all times |vy|: on which side of the mouth's edge.
-        gap = fma(w0, rise, w1 * depth) - abs(x * vy - y * vx)
-        v2 = fma(vx, vx, vy * vy)
-        excess = bend - v2
-        excess = excess if excess > 0.0 else 0.0  # by how much the arc's function may be convex, halved
-        doubt = (k_w + excess * per_r) * depth * depth
-        doubt = fma(SAFETY * rise, fma(size + abs(x), rise, (abs(vx) + rate_w) * depth), doubt)
-        lift = least_h * rise * rise - k_w * depth * depth
-        # Sides and floor: the least f / -f', by cross-multiplication.
+        gap, doubt, lift = mouth_crossing(x, y, vx, vy, w0, w1, per_r, limits)
         edge, drift = fma(m, y, w0), fma(m, vy, w1)
-        f_r = 0.0 if wall == ON_RIGHT else edge - x
-        f_l = 0.0 if wall == ON_LEFT else edge + x
-        f_f = 0.0 if wall == ON_FLOOR else y + h0
-        d_r, d_l, d_f = vx - drift, -vx - drift, -vy - h1
-        f = f_r if f_r > 0.0 else 1.0
-        d = d_r if f_r > 0.0 else 0.0
-        d = d if d > 0.0 else 0.0
-        side = ON_RIGHT
-        best_l = d_l * f - f_l * d
-        best_l = best_l if f_l > 0.0 else 0.0
-        f = f_l if best_l > 0.0 else f
-        d = d_l if best_l > 0.0 else d
-        side = ON_LEFT if best_l > 0.0 else side
-        best_f = d_f * f - f_f * d
-        best_f = best_f if f_f > 0.0 else 0.0
-        f = f_f if best_f > 0.0 else f
-        d = d_f if best_f > 0.0 else d
-        side = ON_FLOOR if best_f > 0.0 else side
-        # The arc, to second order in time.
-        q = fma(x, vx, y * vy)
-        c = fma(-x, x, (r0 - y) * (r0 + y))
-        c = 0.0 if wall == ON_ARC else c
-        a2 = v2 - fma(r1, r1, r0 * r2)
-        b = fma(-r0, r1, q)
-        root = np.sqrt(fma(b, b, a2 * c))
-        f_a = c if b > 0.0 else root - b
-        d_a = b + root if b > 0.0 else a2
+        f, d, side = nearest_below(wall, edge - x, vx - drift, edge + x, -vx - drift, y + a[H0 + i], -vy - h1)
+        f_a, d_a = arc_quotient(x, y, vx, vy, wall, a[R0 + i], a[R1 + i], a[R2 + i])
         # Which of them, by the part of the table the flight is in and whether it crosses y = 0 before.
         reaches = fma(y, d_a, vy * f_a) if vy < 0.0 else 1.0  # cap: > 0 where the arc comes first
         stays = depth * d - f * vy if vy > 0.0 else 1.0  # stem: > 0 where a side comes first
@@ -120,7 +121,7 @@ def aim(a, n, is_stem, m, limits):
         d = rise if hit == ON_BASE else d
         inverse = ONE / d
         s = f * inverse
-        bend_s = h2 if hit == ON_FLOOR else w2
+        bend_s = a[H2 + i] if hit == ON_FLOOR else a[W2 + i]
         bend_s = bend_s if hit >= ON_LEFT else 0.0
         s = s * fma(0.5 * bend_s * s, inverse, 1.0)
         # Comparisons so put that what is no number is never sure.
@@ -130,262 +131,199 @@ def aim(a, n, is_stem, m, limits):
         sure = 1.0 if is_stem else sure
         sure = 1.0 if whole > 0.0 else sure
         # The arc's function must be concave.
-        concave = v2 - bend if hit == ON_ARC else 1.0
+        concave = fma(vx, vx, vy * vy) - bend if hit == ON_ARC else 1.0
         a[HIT + i], a[S + i], a[SURE + i] = hit, s, min(concave, sure)
 
 
-def _fly(is_mixed):
-    @njit(error_model="numpy")
-    def fly(a, n, is_stem, is_relative, omega, m, limits):
-        """Correct each lane's time of flight once, and tell whether the step is then right and calm."""
-        bend, k_w, rate_w, size_w = limits.bend, limits.curvature, limits.rate, limits.size
-        omega_r = limits.omega_r if is_mixed else omega
-        omega_w = limits.omega_w if is_mixed else omega
-        omega_h = limits.omega_h if is_mixed else omega
-        for i in range(n):
-            x, y, vx, vy, wall = a[X + i], a[Y + i], a[VX + i], a[VY + i], a[WALL + i]
-            r0, r1_0, r2_0, hit, s = a[R0 + i], a[R1 + i], a[R2 + i], a[HIT + i], a[S + i]
-            since = ((a[T + i] - a[REF + i]) + (a[T_LOW + i] - a[REF_LOW + i])) + s
-            g1, g2, g0 = turns(omega_r, since)
-            r, r1, r2 = law(a[R_REF + i], a[R_REF_LOW + i], a[R_REF1 + i], a[R_REF2 + i], omega_r, g1, g2, g0)
-            if is_mixed:
-                g1, g2, g0 = turns(omega_w, since)
-            w, w1, w2 = law(a[N_REF + i], a[N_REF_LOW + i], a[N_REF1 + i], a[N_REF2 + i], omega_w, g1, g2, g0)
-            if is_mixed:
-                g1, g2, g0 = turns(omega_h, since)
-            h, h1, h2 = law(a[H_REF + i], a[H_REF_LOW + i], a[H_REF1 + i], a[H_REF2 + i], omega_h, g1, g2, g0)
-            w2 = fma(w2, r, fma(w, r2, 2.0 * w1 * r1)) if is_relative else w2
-            w1 = fma(w1, r, w * r1) if is_relative else w1
-            nu = w
-            w = nu * r if is_relative else nu
-            w_low = fma(nu, r, -w) if is_relative else 0.0
-            x_s, x_low = moved(x, vx, s)
-            y_s, y_low = moved(y, vy, s)
-            sign = 1.0 if hit == ON_RIGHT else -1.0
-            f = (w - sign * x_s) + (fma(m, y_s, w_low) + fma(m, y_low, -sign * x_low))
-            slope = fma(m, vy, w1) - sign * vx
-            f = (y_s + h) + y_low if hit == ON_FLOOR else f
-            slope = vy + h1 if hit == ON_FLOOR else slope
-            # The arc: its increments if it was left, else what is there.
-            g1, g2, _ = turns(omega_r, s)
-            dr = fma(r1_0, g1, r2_0 * g2)
-            q = fma(x, vx, y * vy)
-            v2 = fma(vx, vx, vy * vy)
-            hop = dr * (2.0 * r0 + dr) - s * fma(s, v2, 2.0 * q)
-            f_arc = fma(-x_s, x_s, (r - y_s) * (r + y_s)) - 2.0 * fma(x_s, x_low, y_s * y_low)
-            f_arc = hop if wall == ON_ARC else f_arc
-            f = f_arc if hit == ON_ARC else f
-            slope = 2.0 * fma(r, r1, -fma(s, v2, q)) if hit == ON_ARC else slope
-            bend_s = 2.0 * (bend + v2) if hit == ON_ARC else k_w
-            f = y_s + y_low if hit == ON_BASE else f
-            slope = vy if hit == ON_BASE else slope
-            bend_s = 0.0 if hit == ON_BASE else bend_s
-            inverse = ONE / slope
-            delta = -f * inverse
-            error = 2.0**58 * abs(0.5 * bend_s * inverse) * delta * delta
-            # The others are not reached: see the error analysis. The mouth was looked at.
-            edge = fma(m, y_s, w)
-            clear_r = edge - x_s if hit != ON_RIGHT else NEVER
-            clear_l = edge + x_s if hit != ON_LEFT else NEVER
-            clear_f = y_s + h if hit != ON_FLOOR else NEVER
-            way = (abs(vx) + abs(vy)) * s
-            far = k_w * s * s + SAFETY * (size_w + abs(x) + abs(y) + way)
-            clear = min(clear_r, min(clear_l, clear_f)) - far
-            quality = min(a[SURE + i], clear if hit >= (ON_ARC if is_stem else ON_LEFT) else 1.0)
-            # An arc is met above y = 0, sides and floor below, the base inside the arc, all on the way out.
-            place = y_s if hit == ON_ARC else -y_s
-            place -= SAFETY * (abs(y) + abs(vy) * s)
-            excess = bend - v2
-            excess = excess if excess > 0.0 else 0.0
-            inside = r - abs(x_s) - SAFETY * (size_w + abs(x) + abs(vx) * s)
-            inside = fma(inside, limits.least_r, -2.0 * excess * s * s)
-            inside = 1.0 if is_stem else inside
-            place = inside if hit == ON_BASE else place
-            first = -slope - (k_w * s + SAFETY * (abs(vx) + abs(vy) + rate_w))
-            sizes = abs(x * vx) + abs(y * vy) + fma(s, v2, r * rate_w)
-            first = -slope - 2.0 * SAFETY * sizes if hit == ON_ARC else first
-            first = 1.0 if hit == ON_BASE else first
-            quality = min(min(quality, place), min(first, s))
-            quality = min(quality, LONGEST_TURN - omega * since)
-            t, low = two_sum(a[T + i], s)
-            t, low = two_sum(t, low + (a[T_LOW + i] + delta))
-            result = RIGHT_ONE if error < s else COARSE
-            result = result if quality > 0.0 else WRONG
-            result = result if s < NEVER else WRONG
-            calm = result - COARSE if t < min(a[STOP + i], a[END + i]) else 0.0
-            calm = calm if a[CLOSED + i] == NEVER else 0.0
-            a[CALM + i] = calm if a[SPIN + i] == 0.0 else 0.0
-            a[S + i] = s + delta
-            a[OK + i] = result
-            a[NEXT_T + i] = t
-            a[NEXT_T_LOW + i] = low
-            a[NEXT_X + i], a[NEXT_X_LOW + i] = short_sum(x_s, fma(vx, delta, x_low))
-            y_s, y_low = short_sum(y_s, fma(vy, delta, y_low))
-            a[NEXT_Y + i] = 0.0 if hit == ON_BASE else y_s
-            a[NEXT_Y_LOW + i] = y_low
-            a[NEXT_R0 + i], a[NEXT_R1 + i] = fma(r1, delta, r), fma(r2, delta, r1)
-            a[NEXT_R2 + i] = fma(-omega_r * omega_r * r1, delta, r2)
-            a[NEXT_W0 + i], a[NEXT_W1 + i], a[NEXT_W2 + i] = fma(w1, delta, w), fma(w2, delta, w1), w2
-            a[NEXT_H0 + i], a[NEXT_H1 + i], a[NEXT_H2 + i] = fma(h1, delta, h), fma(h2, delta, h1), h2
-
-    return fly
+@njit(error_model="numpy", inline="always")
+def at_side_or_floor(hit, x_s, x_low, y_s, y_low, vx, vy, w, w_low, w1, h, h1, m):
+    """Return f and f' of the side or the floor that is met."""
+    sign = 1.0 if hit == ON_RIGHT else -1.0
+    f = (w - sign * x_s) + (fma(m, y_s, w_low) + fma(m, y_low, -sign * x_low))
+    slope = fma(m, vy, w1) - sign * vx
+    f = (y_s + h) + y_low if hit == ON_FLOOR else f
+    slope = vy + h1 if hit == ON_FLOOR else slope
+    return f, slope
 
 
-@njit(error_model="numpy")
-def arrive(a, i):
-    """Take the laws and the place at the collision as the present ones."""
-    a[T + i], a[T_LOW + i] = a[NEXT_T + i], a[NEXT_T_LOW + i]
-    a[X + i], a[Y + i], a[WALL + i] = a[NEXT_X + i], a[NEXT_Y + i], a[HIT + i]
-    a[R0 + i], a[R1 + i], a[R2 + i] = a[NEXT_R0 + i], a[NEXT_R1 + i], a[NEXT_R2 + i]
-    a[W0 + i], a[W1 + i], a[W2 + i] = a[NEXT_W0 + i], a[NEXT_W1 + i], a[NEXT_W2 + i]
-    a[H0 + i], a[H1 + i], a[H2 + i] = a[NEXT_H0 + i], a[NEXT_H1 + i], a[NEXT_H2 + i]
+@njit(error_model="numpy", inline="always")
+def hop_along_arc(s, q, v2, omega, r0, r1_0, r2_0):
+    """Return f of the arc that was left, by its increments since."""
+    g1, g2, _ = turns(omega, s)
+    dr = fma(r1_0, g1, r2_0 * g2)
+    return dr * (2.0 * r0 + dr) - s * fma(s, v2, 2.0 * q)
 
 
-@njit(error_model="numpy")
-def bounce(a, n, m, is_mushroom):
-    """Bounce off the wall met, v - 2 f' grad f / |grad f|^2; count the hit; watch captured stays.
+@njit(error_model="numpy", inline="always")
+def clearance(hit, s, x, y, vx, vy, x_s, y_s, w, h, m, limits):
+    """Return `clear` of docs/lanes.md: how far inside the walls below that are not met a flight ends."""
+    k_w, size_w = limits.curvature, limits.size
+    edge = fma(m, y_s, w)
+    clear_r = edge - x_s if hit != ON_RIGHT else NEVER
+    clear_l = edge + x_s if hit != ON_LEFT else NEVER
+    clear_f = y_s + h if hit != ON_FLOOR else NEVER
+    way = (abs(vx) + abs(vy)) * s
+    far = k_w * s * s + SAFETY * (size_w + abs(x) + abs(y) + way)
+    return min(clear_r, min(clear_l, clear_f)) - far
 
-    A stay in the cap counts as captured from its first arc hit with |sin phi| > nu (angles before
-    the bounce, eq. sinphi) to the hit at which that ended.
+
+@njit(error_model="numpy", inline="always")
+def place_on_wall(hit, s, x, y, vx, vy, v2, x_s, y_s, r, is_stem, limits):
+    """Return `place` of docs/lanes.md: positive where the wall met is met in its own part of the table.
+
+    The arc is met above y = 0, sides and floor below it, the base inside the arc.
     """
-    tilt, inverse = (m - 1.0) * (m + 1.0) / (1.0 + m * m), 2.0 / (1.0 + m * m)
-    for i in range(n):
-        x, y, vx, vy, hit = a[NEXT_X + i], a[NEXT_Y + i], a[VX + i], a[VY + i], a[HIT + i]
-        w = a[NEXT_W0 + i]
-        off_x, off_y = off_the_arc(
-            x, a[NEXT_X_LOW + i], y, a[NEXT_Y_LOW + i], vx, vy, a[NEXT_R0 + i], a[NEXT_R1 + i]
-        )
-        sign = 1.0 if hit == ON_RIGHT else -1.0
-        out, rate = sign * vx, a[NEXT_W1 + i]
-        vx_s = sign * fma(tilt, out, inverse * fma(m, vy, rate))
-        vy_s = fma(inverse * m, out - rate, -tilt * vy)
-        vx_s = vx if hit == ON_FLOOR else vx_s
-        vy_s = -vy - 2.0 * a[NEXT_H1 + i] if hit == ON_FLOOR else vy_s
-        vx_s = vx if hit == ON_BASE else vx_s
-        vy_s = -vy if hit == ON_BASE else vy_s
-        vx_s = off_x if hit == ON_ARC else vx_s
-        vy_s = off_y if hit == ON_ARC else vy_s
-        vx_s = a[NEXT_VX + i] if a[DONE + i] > 0.0 else vx_s
-        vy_s = a[NEXT_VY + i] if a[DONE + i] > 0.0 else vy_s
-        spin = x * vy - y * vx
-        beyond = spin * spin - w * w * fma(vx, vx, vy * vy)
-        beyond = beyond if hit == ON_ARC else 0.0
-        beyond = beyond if is_mushroom else 0.0  # > 0: captured
-        t, begin, end = a[NEXT_T + i], a[STAY_IN + i], a[STAY_OUT + i]
-        # At the arc: the stay begins, goes on, or (once, until captured again) ends.
-        first_end = min(end, t) if begin < NEVER else end
-        end = first_end if hit == ON_ARC else end
-        end = NEVER if beyond > 0.0 else end
-        begin = min(begin, t) if beyond > 0.0 else begin
-        # Below the mouth: it is over, and kept if it spans an instant in question.
-        last = min(end, t)
-        kept = last if begin <= a[UNTIL + i] else NEVER
-        kept = kept if a[SINCE + i] <= last else NEVER
-        kept = kept if begin < NEVER else NEVER
-        kept = kept if hit >= ON_LEFT else NEVER
-        a[CLOSED + i] = kept
-        left = NEVER if kept == NEVER else begin
-        a[STAY_IN + i] = left if hit >= ON_LEFT else begin
-        a[STAY_OUT + i] = NEVER if hit >= ON_LEFT else end
-        spin = dot(x, vy_s, -y, vx_s)
-        clearly = CLEARLY_CAPTURED * CLEARLY_CAPTURED * w * w * fma(vx_s, vx_s, vy_s * vy_s)
-        spin = spin if spin * spin > clearly else 0.0
-        a[SPIN + i] = spin if beyond > 0.0 else 0.0
-        a[VX + i] = vx_s
-        a[VY + i] = vy_s
-        a[DONE + i] = 0.0
-        a[N_ARC + i] += 1.0 if hit == ON_ARC else 0.0
-        a[N_BASE + i] += 1.0 if hit == ON_BASE else 0.0
-        a[N_LEFT + i] += 1.0 if hit == ON_LEFT else 0.0
-        a[N_RIGHT + i] += 1.0 if hit == ON_RIGHT else 0.0
-        a[N_FLOOR + i] += 1.0 if hit == ON_FLOOR else 0.0
-        arrive(a, i)
+    place = y_s if hit == ON_ARC else -y_s
+    place -= SAFETY * (abs(y) + abs(vy) * s)
+    excess = limits.bend - v2
+    excess = excess if excess > 0.0 else 0.0
+    size_w = limits.size
+    inside = r - abs(x_s) - SAFETY * (size_w + abs(x) + abs(vx) * s)
+    inside = fma(inside, limits.least_r, -2.0 * excess * s * s)
+    inside = 1.0 if is_stem else inside
+    return inside if hit == ON_BASE else place
 
 
-def _chord(is_mixed):
-    @njit(error_model="numpy")
-    def chord(a, n, is_again, is_cap, is_relative, omega, limits):
-        """Find the next arc hit of captured particles: the base is unfolded, |L| is constant.
+@njit(error_model="numpy", inline="always")
+def way_out(hit, s, x, y, vx, vy, v2, r, slope, limits):
+    """Return `first` of docs/lanes.md: positive where the wall is met on the way out."""
+    k_w, rate_w = limits.curvature, limits.rate
+    first = -slope - (k_w * s + SAFETY * (abs(vx) + abs(vy) + rate_w))
+    sizes = abs(x * vx) + abs(y * vy) + fma(s, v2, r * rate_w)
+    first = -slope - 2.0 * SAFETY * sizes if hit == ON_ARC else first
+    return 1.0 if hit == ON_BASE else first
 
-        The chord keeps the distance |L| / v from the centre; while that exceeds w the mouth is out of reach.
-        `is_again`: correct the times found before once more, in place of a new guess.
-        """
-        bend, k_w, rate_w, size = limits.bend, limits.curvature, limits.rate, limits.size
-        omega_r = limits.omega_r if is_mixed else omega
-        omega_w = limits.omega_w if is_mixed else omega
-        for i in range(n):
-            x, y, vx, vy, spin = a[X + i], a[Y + i], a[VX + i], a[VY + i], a[SPIN + i]
-            r0, r1_0, r2_0 = a[R0 + i], a[R1 + i], a[R2 + i]
-            v2 = fma(vx, vx, vy * vy)
-            q = fma(x, vx, y * vy)
-            s = 2.0 * fma(r0, r1_0, -q) / (v2 - fma(r1_0, r1_0, r0 * r2_0))
-            s = a[S + i] if is_again else s
-            since = ((a[T + i] - a[REF + i]) + (a[T_LOW + i] - a[REF_LOW + i])) + s
-            g1, g2, g0 = turns(omega_r, since)
-            r, r1, r2 = law(a[R_REF + i], a[R_REF_LOW + i], a[R_REF1 + i], a[R_REF2 + i], omega_r, g1, g2, g0)
-            if is_mixed:
-                g1, g2, g0 = turns(omega_w, since)
-            w, w1, _ = law(a[N_REF + i], a[N_REF_LOW + i], a[N_REF1 + i], a[N_REF2 + i], omega_w, g1, g2, g0)
-            w1 = fma(w1, r, w * r1) if is_relative else w1
-            w = w * r if is_relative else w
-            g1, g2, _ = turns(omega_r, s)
-            dr = fma(r1_0, g1, r2_0 * g2)
-            way = fma(s, v2, 2.0 * q)
-            f = dr * (2.0 * r0 + dr) - s * way
-            slope = 2.0 * fma(r, r1, -fma(s, v2, q))
-            inverse = ONE / slope
-            delta = -f * inverse
-            error = 2.0**58 * abs((bend + v2) * inverse) * delta * delta
-            x_s, x_low = moved(x, vx, s)
-            y_s, y_low = moved(y, vy, s)
-            # The widest that the mouth can be during the flight, from both ends.
-            reach = max(a[W0 + i], w) + fma(k_w * s, s, SAFETY * size)
-            clear = spin * spin - (1.0 + 4.0 * SAFETY) * reach * reach * v2
-            clear = 1.0 if is_cap else clear
-            sizes = abs(x * vx) + abs(y * vy) + fma(s, v2, r * rate_w)
-            first = -slope - 2.0 * SAFETY * sizes
-            quality = min(min(clear, abs(y_s) - SAFETY * (abs(y) + abs(vy) * s)), min(first, v2 - bend))
-            quality = min(min(quality, s), LONGEST_TURN - omega * since)
-            t, low = two_sum(a[T + i], s)
-            t, low = two_sum(t, low + (a[T_LOW + i] + delta))
-            result = RIGHT_ONE if error < s else COARSE
-            result = result if quality > 0.0 else WRONG
-            result = result if s < NEVER else WRONG
-            a[S + i] = s + delta
-            a[OK + i] = result
-            a[NEXT_T + i] = t
-            a[NEXT_T_LOW + i] = low
-            a[NEXT_X + i], a[NEXT_X_LOW + i] = short_sum(x_s, fma(vx, delta, x_low))
-            a[NEXT_Y + i], a[NEXT_Y_LOW + i] = short_sum(y_s, fma(vy, delta, y_low))
-            a[NEXT_R0 + i], a[NEXT_R1 + i] = fma(r1, delta, r), fma(r2, delta, r1)
-            a[NEXT_R2 + i] = fma(-omega_r * omega_r * r1, delta, r2)
-            a[NEXT_W0 + i], a[NEXT_W1 + i] = fma(w1, delta, w), w1
-            a[CALM + i] = result - COARSE if t < min(a[STOP + i], a[END + i]) else 0.0
 
-    return chord
+@njit(error_model="numpy", inline="always")
+def verdict(quality, s, error):
+    """Return what is known of a step: CERTAIN, COARSE, or REFUSED, which nan comes to as well."""
+    result = CERTAIN if error < s else COARSE
+    result = result if quality > 0.0 else REFUSED
+    return result if s < NEVER else REFUSED
+
+
+@njit(error_model="numpy", inline="always")
+def arrive_at(a, i, s, delta, result, x_s, x_low, y_s, y_low, vx, vy):
+    """Write what became of a step, with time and place of the hit; returns y there, and ROUTINE so far."""
+    t, low = two_sum(a[T + i], s)
+    t, low = two_sum(t, low + (a[T_LOW + i] + delta))
+    a[S + i] = s + delta
+    a[OK + i] = result
+    a[NEXT_T + i] = t
+    a[NEXT_T_LOW + i] = low
+    a[NEXT_X + i], a[NEXT_X_LOW + i] = short_sum(x_s, fma(vx, delta, x_low))
+    y_s, y_low = short_sum(y_s, fma(vy, delta, y_low))
+    a[NEXT_Y_LOW + i] = y_low
+    return y_s, result - COARSE if t < min(a[STOP + i], a[END + i]) else 0.0
+
+
+@njit(error_model="numpy", inline="always")
+def laws_at_hit(a, i, delta, omega_r, r, r1, r2, w, w1):
+    """Write radius and half-width at the hit, which is `delta` after the time that they are given for."""
+    a[NEXT_R0 + i], a[NEXT_R1 + i] = fma(r1, delta, r), fma(r2, delta, r1)
+    a[NEXT_R2 + i] = fma(-omega_r * omega_r * r1, delta, r2)
+    a[NEXT_W0 + i] = fma(w1, delta, w)
 
 
 @njit(error_model="numpy")
-def rebound(a, n):
-    """Bounce off the arc with the angular momentum of the whole stay, constant to the bit; count."""
+def fly(a, n, is_stem, is_relative, omega, m, limits, omegas):
+    """Correct each lane's time of flight once, and tell whether the step is then right and routine."""
+    bend, k_w = limits.bend, limits.curvature
+    omega_r = omega if omegas is None else omegas.radius
+    omega_w = omega if omegas is None else omegas.width
+    omega_h = omega if omegas is None else omegas.depth
     for i in range(n):
-        x, y, vx, vy, spin = a[NEXT_X + i], a[NEXT_Y + i], a[VX + i], a[VY + i], a[SPIN + i]
-        low_x, low_y, r, rate = a[NEXT_X_LOW + i], a[NEXT_Y_LOW + i], a[NEXT_R0 + i], a[NEXT_R1 + i]
-        vx_s, vy_s = off_the_arc_spinning(x, low_x, y, low_y, vx, vy, r, rate, spin)
-        is_done = a[DONE + i]
-        a[VX + i] = a[NEXT_VX + i] if is_done > 0.0 else vx_s
-        a[VY + i] = a[NEXT_VY + i] if is_done > 0.0 else vy_s
-        # A chord that crosses y = 0 hits the base; what careful did was counted there.
-        crossed = 1.0 if a[Y + i] * y < 0.0 else 0.0
-        a[N_ARC + i] += 1.0 - is_done
-        a[N_BASE + i] += 0.0 if is_done > 0.0 else crossed
-        a[DONE + i] = 0.0
-        a[T + i], a[T_LOW + i], a[X + i], a[Y + i] = a[NEXT_T + i], a[NEXT_T_LOW + i], x, y
-        a[R0 + i], a[R1 + i], a[R2 + i] = a[NEXT_R0 + i], a[NEXT_R1 + i], a[NEXT_R2 + i]
-        a[W0 + i], a[W1 + i] = a[NEXT_W0 + i], a[NEXT_W1 + i]
+        x, y, vx, vy, wall = a[X + i], a[Y + i], a[VX + i], a[VY + i], a[WALL + i]
+        hit, s = a[HIT + i], a[S + i]
+        since = ((a[T + i] - a[REF + i]) + (a[T_LOW + i] - a[REF_LOW + i])) + s
+        g1, g2, g0 = turns(omega_r, since)
+        r, r1, r2 = law_after(a, R_REF + i, omega_r, g1, g2, g0)
+        if omegas is not None:
+            g1, g2, g0 = turns(omega_w, since)
+        w, w1, w2 = law_after(a, W_REF + i, omega_w, g1, g2, g0)
+        if omegas is not None:
+            g1, g2, g0 = turns(omega_h, since)
+        h, h1, h2 = law_after(a, H_REF + i, omega_h, g1, g2, g0)
+        w2 = fma(w2, r, fma(w, r2, 2.0 * w1 * r1)) if is_relative else w2
+        w1 = fma(w1, r, w * r1) if is_relative else w1
+        nu = w
+        w = nu * r if is_relative else nu
+        w_low = fma(nu, r, -w) if is_relative else 0.0
+        x_s, x_low = moved(x, vx, s)
+        y_s, y_low = moved(y, vy, s)
+        q, v2 = fma(x, vx, y * vy), fma(vx, vx, vy * vy)
+        f, slope = at_side_or_floor(hit, x_s, x_low, y_s, y_low, vx, vy, w, w_low, w1, h, h1, m)
+        # The arc: its increments if it was left, else what is there.
+        hop = hop_along_arc(s, q, v2, omega_r, a[R0 + i], a[R1 + i], a[R2 + i])
+        f_arc = fma(-x_s, x_s, (r - y_s) * (r + y_s)) - 2.0 * fma(x_s, x_low, y_s * y_low)
+        f_arc = hop if wall == ON_ARC else f_arc
+        f = f_arc if hit == ON_ARC else f
+        slope = 2.0 * fma(r, r1, -fma(s, v2, q)) if hit == ON_ARC else slope
+        bend_s = 2.0 * (bend + v2) if hit == ON_ARC else k_w
+        f = y_s + y_low if hit == ON_BASE else f
+        slope = vy if hit == ON_BASE else slope
+        bend_s = 0.0 if hit == ON_BASE else bend_s
+        inverse = ONE / slope
+        delta = -f * inverse
+        error = 2.0**58 * abs(0.5 * bend_s * inverse) * delta * delta
+        # The others are not reached: see the error analysis. The mouth was looked at.
+        clear = clearance(hit, s, x, y, vx, vy, x_s, y_s, w, h, m, limits)
+        quality = min(a[SURE + i], clear if hit >= (ON_ARC if is_stem else ON_LEFT) else 1.0)
+        place = place_on_wall(hit, s, x, y, vx, vy, v2, x_s, y_s, r, is_stem, limits)
+        first = way_out(hit, s, x, y, vx, vy, v2, r, slope, limits)
+        quality = min(min(quality, place), min(first, s))
+        quality = min(quality, LONGEST_TURN - omega * since)
+        result = verdict(quality, s, error)
+        y_s, routine = arrive_at(a, i, s, delta, result, x_s, x_low, y_s, y_low, vx, vy)
+        a[NEXT_Y + i] = 0.0 if hit == ON_BASE else y_s
+        routine = routine if a[CLOSED + i] == NEVER else 0.0
+        a[ROUTINE + i] = routine if a[SPIN + i] == 0.0 else 0.0
+        laws_at_hit(a, i, delta, omega_r, r, r1, r2, w, w1)
+        a[NEXT_W1 + i], a[NEXT_W2 + i] = fma(w2, delta, w1), w2
+        a[NEXT_H0 + i], a[NEXT_H1 + i], a[NEXT_H2 + i] = fma(h1, delta, h), fma(h2, delta, h1), h2
 
 
-# Where some laws are Fourier's and others have knots each needs its own omega; else all share one, and a
-# constant law any. Two loops, for the choice inside one would cost all scenes.
-fly, fly_mixed = _fly(False), _fly(True)
-chord, chord_mixed = _chord(False), _chord(True)
+@njit(error_model="numpy")
+def chord(a, n, is_again, is_cap, is_relative, omega, limits, omegas):
+    """Find the next arc hit of captured particles: the base is unfolded, |L| is constant.
+
+    The chord keeps the distance |L| / v from the centre; while that exceeds w the mouth is out of reach.
+    `is_again`: correct the times found before once more, in place of a new guess.
+    """
+    bend, k_w, rate_w, size = limits.bend, limits.curvature, limits.rate, limits.size
+    omega_r = omega if omegas is None else omegas.radius
+    omega_w = omega if omegas is None else omegas.width
+    for i in range(n):
+        x, y, vx, vy, spin = a[X + i], a[Y + i], a[VX + i], a[VY + i], a[SPIN + i]
+        r0, r1_0, r2_0 = a[R0 + i], a[R1 + i], a[R2 + i]
+        q, v2 = fma(x, vx, y * vy), fma(vx, vx, vy * vy)
+        s = 2.0 * fma(r0, r1_0, -q) / (v2 - fma(r1_0, r1_0, r0 * r2_0))
+        s = a[S + i] if is_again else s
+        since = ((a[T + i] - a[REF + i]) + (a[T_LOW + i] - a[REF_LOW + i])) + s
+        g1, g2, g0 = turns(omega_r, since)
+        r, r1, r2 = law_after(a, R_REF + i, omega_r, g1, g2, g0)
+        if omegas is not None:
+            g1, g2, g0 = turns(omega_w, since)
+        w, w1, _ = law_after(a, W_REF + i, omega_w, g1, g2, g0)
+        w1 = fma(w1, r, w * r1) if is_relative else w1
+        w = w * r if is_relative else w
+        f = hop_along_arc(s, q, v2, omega_r, r0, r1_0, r2_0)
+        slope = 2.0 * fma(r, r1, -fma(s, v2, q))
+        inverse = ONE / slope
+        delta = -f * inverse
+        error = 2.0**58 * abs((bend + v2) * inverse) * delta * delta
+        x_s, x_low = moved(x, vx, s)
+        y_s, y_low = moved(y, vy, s)
+        # The widest that the mouth can be during the flight, from both ends.
+        reach = max(a[W0 + i], w) + fma(k_w * s, s, SAFETY * size)
+        clear = spin * spin - (1.0 + 4.0 * SAFETY) * reach * reach * v2
+        clear = 1.0 if is_cap else clear
+        sizes = abs(x * vx) + abs(y * vy) + fma(s, v2, r * rate_w)
+        first = -slope - 2.0 * SAFETY * sizes
+        quality = min(min(clear, abs(y_s) - SAFETY * (abs(y) + abs(vy) * s)), min(first, v2 - bend))
+        quality = min(min(quality, s), LONGEST_TURN - omega * since)
+        result = verdict(quality, s, error)
+        y_s, a[ROUTINE + i] = arrive_at(a, i, s, delta, result, x_s, x_low, y_s, y_low, vx, vy)
+        a[NEXT_Y + i] = y_s
+        laws_at_hit(a, i, delta, omega_r, r, r1, r2, w, w1)
+        a[NEXT_W1 + i] = w1

@@ -4,13 +4,11 @@ Idea. A law gives f(t + s) - f(t) without cancellation, so a wall met again soon
 left is found to full precision whatever t is; the anchors themselves come from the time as a pair
 (t_hi, t_lo), so no digit of the phase is lost in long runs.
 
-Each row of `anchors` holds: value, derivative, half-leg (Fourier: size of the derivative's terms), then for
-bang-bang laws the time to the half-leg's end and its low part; last the value's low part.
-Times to knots are sums of two floats throughout: a wall that is met again just after a knot has moved by
-the square of the time since then, and its speed is that time's multiple, so that time must be right relative
-to itself, not to the period that its knots are written in.
-All Fourier laws of a scene share their omega, so two more rows hold the harmonics' sines and
-cosines at the event, and their turn since, at one s.
+The columns of `laws` and `anchors` are those of fast.kernel.records. Times to knots are sums of two floats
+throughout: a wall that is met again just after a knot has moved by the square of the time since then, and
+its speed is that time's multiple, so that time must be right relative to itself, not to the period that its
+knots are written in. All Fourier laws of a scene share their omega, so the sines and cosines of the harmonics
+are found once for all of them, at the event (row PHASE) and for the turn since then, at one s (row TURN).
 """
 
 from __future__ import annotations
@@ -26,28 +24,21 @@ from fast.kernel.arithmetic import (
     two_product,
     two_sum,
 )
-from fast.kernel.codes import BANG_BANG, FOURIER, MAX_HARMONICS, PHASES, H, M, R, W
 
-PHASE, TURN = 4, 5
-LACK = 0  # column of PHASE: error of sines and cosines, low parts included
-# Columns of these two rows, to which the number of the harmonic, from 1, is added.
-SINE, COSINE = 3, 3 + MAX_HARMONICS
-SINE_LOW, COSINE_LOW = 3 + 2 * MAX_HARMONICS, 3 + 3 * MAX_HARMONICS
-ANCHORS_SHAPE = (6, 4 + 4 * MAX_HARMONICS)
-ROOM, ROOM_LOW = 3, 4  # columns of `anchors`
-# Columns of a bang-bang law's row: kind, 0, period, number of knots, period's low part, then
-# the knots' times, values, the legs' accelerations and the low parts of these (n of each kept).
-KNOTS = 5
-LOW = 5  # column of `anchors`
+from fast.kernel.records import (  # isort: skip
+    AMPLITUDES, BANG_BANG, COSINE, COSINE_LOW, DEPTH, FOURIER, HALF_LEG, IS_SHORT, KIND, KNOTS, LEVEL,
+    N_HARMONICS, N_KNOTS, OMEGA, OMEGA_LOW, PERIOD, PERIOD_LOW, PHASE, PHASE_ERROR, RADIUS, RATE, ROOM,
+    ROOM_LOW, SHARED, SINE, SINE_LOW, SLOPE, TERMS, TURN, TURN_TIME, VALUE, VALUE_LOW, WIDTH,
+)  # fmt: skip
 
 
 @njit(error_model="numpy")
 def set_phases(laws, anchors, t_hi, t_lo):
     """Store the sines and cosines of all harmonics at t; False when t is out of reach."""
-    anchors[TURN, 0] = -1.0
-    worst = 0.0
-    for k in range(1, int(laws[PHASES, 1]) + 1):
-        s, s_low, c, c_low, is_reduced = sine_cosine(laws[PHASES, 0], float(k), t_hi, t_lo, laws[PHASES, 2])
+    anchors[TURN, TURN_TIME] = -1.0
+    omega, omega_low, worst = laws[SHARED, OMEGA], laws[SHARED, OMEGA_LOW], 0.0
+    for k in range(1, int(laws[SHARED, N_HARMONICS]) + 1):
+        s, s_low, c, c_low, is_reduced = sine_cosine(omega, omega_low, float(k), t_hi, t_lo)
         if not is_reduced:
             return False
         anchors[PHASE, SINE + k] = s
@@ -57,25 +48,26 @@ def set_phases(laws, anchors, t_hi, t_lo):
         nearest = min(abs(s), abs(c))
         worst = max(worst, nearest)
     # What the low parts lack: the sixth power of the angle from the nearest quarter turn.
-    anchors[PHASE, LACK] = 2.0**-59 * worst**6 + 2.0**-98
+    anchors[PHASE, PHASE_ERROR] = 2.0**-59 * worst**6 + 2.0**-98
     return True
 
 
 @njit(error_model="numpy")
 def set_turn(laws, anchors, s):
     """Store cos(d) - 1 and sin(d) or, while all d are small, sin(d) - d, for the phases d = k omega s."""
-    n = int(laws[PHASES, 1])
-    is_short = 0.5 * n * laws[PHASES, 0] * s < 0.75
-    anchors[TURN, 0] = s
-    anchors[TURN, 1] = 1.0 if is_short else 0.0
+    n = int(laws[SHARED, N_HARMONICS])
+    omega, omega_low = laws[SHARED, OMEGA], laws[SHARED, OMEGA_LOW]
+    is_short = 0.5 * n * omega * s < 0.75
+    anchors[TURN, TURN_TIME] = s
+    anchors[TURN, IS_SHORT] = 1.0 if is_short else 0.0
     for k in range(1, n + 1):
-        half = 0.5 * k * laws[PHASES, 0] * s
+        half = 0.5 * k * omega * s
         if is_short:
             more, less = beyond_first_order(half)
             sine = half + more
             anchors[TURN, SINE + k] = 2.0 * (more + sine * less)
         else:
-            sine, _, cosine, _, _ = sine_cosine(laws[PHASES, 0], 0.5 * k, s, 0.0, laws[PHASES, 2])
+            sine, _, cosine, _, _ = sine_cosine(omega, omega_low, 0.5 * k, s, 0.0)
             anchors[TURN, SINE + k] = 2.0 * sine * cosine
         anchors[TURN, COSINE + k] = -2.0 * sine * sine
 
@@ -85,17 +77,17 @@ def set_anchors(laws, anchors, t_hi, t_lo):
     """Anchor all four laws at t; False when t is out of reach."""
     if not set_phases(laws, anchors, t_hi, t_lo):
         return False
-    for row in (R, W, H, M):
-        if laws[row, 0] == FOURIER:
+    for row in (RADIUS, WIDTH, DEPTH, SLOPE):
+        if laws[row, KIND] == FOURIER:
             set_waves(laws, anchors, row)
-        elif laws[row, 0] == BANG_BANG:
+        elif laws[row, KIND] == BANG_BANG:
             if not set_leg(laws, anchors, row, t_hi, t_lo):
                 return False
         else:
-            anchors[row, 0] = laws[row, 1]
-            anchors[row, 1] = 0.0
-            anchors[row, 2] = 0.0
-            anchors[row, LOW] = 0.0
+            anchors[row, VALUE] = laws[row, LEVEL]
+            anchors[row, RATE] = 0.0
+            anchors[row, TERMS] = 0.0
+            anchors[row, VALUE_LOW] = 0.0
     return True
 
 
@@ -110,24 +102,24 @@ def add_product(total, low, a, b, b_low):
 @njit(error_model="numpy")
 def set_waves(laws, anchors, row):
     """Anchor a Fourier law from the phases stored; its terms may cancel, hence sums of two floats."""
-    n = int(laws[row, 3])
-    f, f_low = laws[row, 1], 0.0
+    n = int(laws[row, N_HARMONICS])
+    f, f_low = laws[row, LEVEL], 0.0
     rate, rate_low = 0.0, 0.0
     size = 0.0
     for k in range(1, n + 1):
         s, s_low = anchors[PHASE, SINE + k], anchors[PHASE, SINE_LOW + k]
         c, c_low = anchors[PHASE, COSINE + k], anchors[PHASE, COSINE_LOW + k]
-        a, b = laws[row, 3 + k], laws[row, 3 + n + k]
+        a, b = laws[row, AMPLITUDES + k], laws[row, AMPLITUDES + n + k]
         f, f_low = add_product(f, f_low, a, c, c_low)
         f, f_low = add_product(f, f_low, b, s, s_low)
-        kc, kc_low = two_product(k, c)
-        ks, ks_low = two_product(k, s)
+        kc, kc_low = two_product(float(k), c)
+        ks, ks_low = two_product(float(k), s)
         rate, rate_low = add_product(rate, rate_low, b, kc, kc_low + k * c_low)
         rate, rate_low = add_product(rate, rate_low, -a, ks, ks_low + k * s_low)
         size += k * (abs(a) + abs(b))
-    anchors[row, 0], anchors[row, LOW] = two_sum(f, f_low)
-    anchors[row, 1] = laws[row, 2] * (rate + rate_low)
-    anchors[row, 2] = laws[row, 2] * size
+    anchors[row, VALUE], anchors[row, VALUE_LOW] = two_sum(f, f_low)
+    anchors[row, RATE] = laws[row, OMEGA] * (rate + rate_low)
+    anchors[row, TERMS] = laws[row, OMEGA] * size
 
 
 @njit(error_model="numpy")
@@ -151,8 +143,8 @@ def on_parabola(value, a, a_low, u, u_low):
 @njit(error_model="numpy")
 def set_leg(laws, anchors, row, t_hi, t_lo):
     """Anchor a bang-bang law: its nearer knot gives value and derivative without cancellation."""
-    n = int(laws[row, 3])
-    period, period_low = laws[row, 2], laws[row, 4]
+    n = int(laws[row, N_KNOTS])
+    period, period_low = laws[row, PERIOD], laws[row, PERIOD_LOW]
     first = laws[row, KNOTS]
     n_periods = np.floor((t_hi - first) / period)
     if not abs(n_periods) < MAX_QUADRANT:
@@ -176,14 +168,14 @@ def set_leg(laws, anchors, row, t_hi, t_lo):
     room, room_low = difference(0.5 * length, 0.5 * length_low, u, u_low)
     if room > 0.0:
         f, f_low, rate = on_parabola(laws[row, KNOTS + n + i], a, a_low, u, u_low)
-        anchors[row, 2] = 2.0 * i
+        anchors[row, HALF_LEG] = 2.0 * i
     else:
         u, u_low = time_since(after, n_periods, period, period_low, t_hi, t_lo)
         f, f_low, rate = on_parabola(laws[row, KNOTS + n + i + 1], -a, -a_low, u, u_low)
-        anchors[row, 2] = 2.0 * i + 1.0
+        anchors[row, HALF_LEG] = 2.0 * i + 1.0
         room, room_low = -u, -u_low
-    anchors[row, 0], anchors[row, LOW] = two_sum(f, f_low)
-    anchors[row, 1] = rate
+    anchors[row, VALUE], anchors[row, VALUE_LOW] = two_sum(f, f_low)
+    anchors[row, RATE] = rate
     anchors[row, ROOM], anchors[row, ROOM_LOW] = room, room_low
     return True
 
@@ -200,13 +192,13 @@ def difference(a, a_low, b, b_low):
 @njit(error_model="numpy")
 def increment(laws, anchors, row, s):
     """Return f(t + s) - f(t), f'(t + s), and the summed sizes of the terms of both."""
-    if laws[row, 0] == FOURIER:
+    if laws[row, KIND] == FOURIER:
         if s == 0.0:
-            return 0.0, anchors[row, 1], 0.0, anchors[row, 2]
-        if s != anchors[TURN, 0]:
+            return 0.0, anchors[row, RATE], 0.0, anchors[row, TERMS]
+        if s != anchors[TURN, TURN_TIME]:
             set_turn(laws, anchors, s)
         return waves_increment(laws, anchors, row, s)
-    if laws[row, 0] == BANG_BANG:
+    if laws[row, KIND] == BANG_BANG:
         return legs_increment(laws, anchors, row, s)
     return 0.0, 0.0, 0.0, 0.0
 
@@ -214,35 +206,35 @@ def increment(laws, anchors, row, s):
 @njit(error_model="numpy")
 def waves_increment(laws, anchors, row, s):
     """Return `increment` of a Fourier law for the turn stored."""
-    n = int(laws[row, 3])
-    is_short = anchors[TURN, 1] > 0.0
+    n = int(laws[row, N_HARMONICS])
+    is_short = anchors[TURN, IS_SHORT] > 0.0
     # What goes with s at first order is f' s, and f' is known better than its terms' sum.
-    change = anchors[row, 1] * s if is_short else 0.0
+    change = anchors[row, RATE] * s if is_short else 0.0
     size = abs(change)
     d_rate = 0.0
     for k in range(1, n + 1):
         down, across = anchors[TURN, COSINE + k], anchors[TURN, SINE + k]
         sine, cosine = anchors[PHASE, SINE + k], anchors[PHASE, COSINE + k]
-        a, b = laws[row, 3 + k], laws[row, 3 + n + k]
+        a, b = laws[row, AMPLITUDES + k], laws[row, AMPLITUDES + n + k]
         change += (a * cosine + b * sine) * down + (b * cosine - a * sine) * across
         size += (abs(a) + abs(b)) * (abs(down) + abs(across))
         if is_short:
-            across += k * laws[PHASES, 0] * s
+            across += k * laws[SHARED, OMEGA] * s
         d_rate += k * ((b * cosine - a * sine) * down - (a * cosine + b * sine) * across)
-    return change, anchors[row, 1] + laws[row, 2] * d_rate, size, anchors[row, 2]
+    return change, anchors[row, RATE] + laws[row, OMEGA] * d_rate, size, anchors[row, TERMS]
 
 
 @njit(error_model="numpy")
 def bend_of_half_leg(laws, row, j):
     """Return the second derivative of a bang-bang law in its half-leg j."""
-    a = laws[row, KNOTS + 2 * int(laws[row, 3]) + j // 2]
+    a = laws[row, KNOTS + 2 * int(laws[row, N_KNOTS]) + j // 2]
     return -a if j % 2 else a
 
 
 @njit(error_model="numpy")
 def whole_periods_off(laws, row, s):
     """Return s less the whole periods in it, as a sum of two floats."""
-    period, period_low = laws[row, 2], laws[row, 4]
+    period, period_low = laws[row, PERIOD], laws[row, PERIOD_LOW]
     if s < period:
         return s, 0.0
     n_periods = np.floor(s / period)
@@ -258,10 +250,10 @@ def leg_after(laws, anchors, row, s):
     Returns (half-leg, time since the walk entered it, time to its end, derivative at its entry, increase up
     to there, size of that increase's terms).
     """
-    n_half_legs = 2 * (int(laws[row, 3]) - 1)
-    j = int(anchors[row, 2])
+    n_half_legs = 2 * (int(laws[row, N_KNOTS]) - 1)
+    j = int(anchors[row, HALF_LEG])
     room, room_low = anchors[row, ROOM], anchors[row, ROOM_LOW]
-    rate, change, size, beyond = anchors[row, 1], 0.0, 0.0, 0.0
+    rate, change, size, beyond = anchors[row, RATE], 0.0, 0.0, 0.0
     left, left_low = whole_periods_off(laws, row, s)
     for _ in range(n_half_legs + 1):
         beyond, beyond_low = difference(left, left_low, room, room_low)
@@ -291,14 +283,14 @@ def legs_increment(laws, anchors, row, s):
 
 
 @njit(error_model="numpy")
-def width(laws, anchors, is_relative, s):
+def width(scene, anchors, s):
     """Return w(t), w(t + s) - w(t), w'(t + s) and the sizes of both, for w = nu r or w itself."""
-    d_w, rate, size, rate_size = increment(laws, anchors, W, s)
-    w = anchors[W, 0]
-    if not is_relative:
+    d_w, rate, size, rate_size = increment(scene.laws, anchors, WIDTH, s)
+    w = anchors[WIDTH, VALUE]
+    if not scene.is_relative:
         return w, d_w, rate, size, rate_size
-    d_r, r_rate, r_size, r_rate_size = increment(laws, anchors, R, s)
-    r = anchors[R, 0]
+    d_r, r_rate, r_size, r_rate_size = increment(scene.laws, anchors, RADIUS, s)
+    r = anchors[RADIUS, VALUE]
     return (
         w * r,
         d_w * (r + d_r) + w * d_r,
@@ -311,9 +303,9 @@ def width(laws, anchors, is_relative, s):
 @njit(error_model="numpy")
 def rest(laws, anchors, row, s):
     """Return for how long after the time s a law stands still; 0 when it moves, or is not known to rest."""
-    if laws[row, 0] == FOURIER:
+    if laws[row, KIND] == FOURIER:
         return 0.0
-    if laws[row, 0] != BANG_BANG:
+    if laws[row, KIND] != BANG_BANG:
         return np.inf
     j, left, room, _, _, _ = leg_after(laws, anchors, row, s)
     if bend_of_half_leg(laws, row, j) != 0.0:

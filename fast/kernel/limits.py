@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from numba import njit
+from fast.kernel.arithmetic import MAX_QUADRANT, SAFETY, TWO_OVER_PI
 
-from fast.kernel.arithmetic import SAFETY
-from fast.kernel.codes import BANG_BANG, FOURIER, H, R, W
+from fast.kernel.records import (  # isort: skip
+    BANG_BANG, BEND, CONSTANT, DEPTH, FASTEST, FOURIER, HIGHEST, KIND, LOWEST, N_HARMONICS, OMEGA, PERIOD,
+    RADIUS, SHARED, SLOPE, WIDTH, Compiled,
+)  # fmt: skip
 
 LEAST_RADIUS = 2.0**-1000
 
@@ -22,9 +24,6 @@ class Limits(NamedTuple):
         size: at least r + w + h, which bounds the terms that a law is summed of.
         least_r, least_h: at most the least radius and depth. Where a bound says no more than that the
             radius is positive it is LEAST_RADIUS, with which only concave arcs pass.
-        omega_r, omega_w, omega_h: omega of the radius, the width (w or nu) and the depth; 0 for laws of
-            constant acceleration.
-        has_knots: some law has knots.
     """
 
     bend: float
@@ -33,25 +32,50 @@ class Limits(NamedTuple):
     size: float
     least_r: float
     least_h: float
-    omega_r: float
-    omega_w: float
-    omega_h: float
-    has_knots: bool
 
 
-@njit(error_model="numpy")
-def limits_of(laws, bounds):
-    """Return the limits of laws from the laws and their bounds (rows: lowest, highest, |f'|, |f''|)."""
+class Omegas(NamedTuple):
+    """The frequency of each law: 0 for one of constant acceleration."""
+
+    radius: float
+    width: float
+    depth: float
+
+
+def limits_of(scene: Compiled) -> Limits:
+    """Return the limits of a scene's laws."""
+    r, w, h = (scene.bounds[row] for row in (RADIUS, WIDTH, DEPTH))
     grow = 1.0 + SAFETY
-    return Limits(
-        grow * (bounds[R, 1] * bounds[R, 3] + bounds[R, 2] * bounds[R, 2]),
-        max(bounds[W, 3], bounds[H, 3]),
-        max(bounds[R, 2], max(bounds[W, 2], bounds[H, 2])),
-        grow * (bounds[R, 1] + bounds[W, 1] + bounds[H, 1]),
-        max(bounds[R, 0], LEAST_RADIUS),
-        max(bounds[H, 0], 0.0),
-        laws[R, 2] if laws[R, 0] == FOURIER else 0.0,
-        laws[W, 2] if laws[W, 0] == FOURIER else 0.0,
-        laws[H, 2] if laws[H, 0] == FOURIER else 0.0,
-        laws[R, 0] == BANG_BANG or laws[W, 0] == BANG_BANG or laws[H, 0] == BANG_BANG,
+    found = (
+        grow * (r[HIGHEST] * r[BEND] + r[FASTEST] * r[FASTEST]),
+        max(w[BEND], h[BEND]),
+        max(r[FASTEST], w[FASTEST], h[FASTEST]),
+        grow * (r[HIGHEST] + w[HIGHEST] + h[HIGHEST]),
+        max(r[LOWEST], LEAST_RADIUS),
+        max(h[LOWEST], 0.0),
     )
+    return Limits(*map(float, found))
+
+
+def own_omegas(scene: Compiled) -> Omegas | None:
+    """Return the frequency of each law where some are Fourier's and others have knots.
+
+    Else None: all laws that oscillate share one frequency, and a constant law may be given any.
+    """
+    rows = scene.laws[[RADIUS, WIDTH, DEPTH]]
+    if not ((rows[:, KIND] == BANG_BANG).any() and scene.laws[SHARED, OMEGA] > 0.0):
+        return None
+    return Omegas(*(float(row[OMEGA]) if row[KIND] == FOURIER else 0.0 for row in rows))
+
+
+def has_lanes(scene: Compiled, last: float) -> bool:
+    """Tell whether the lanes know a scene's laws, up to the time `last`."""
+    laws = scene.laws
+    if laws[SLOPE, KIND] != CONSTANT:
+        return False
+    for row in (RADIUS, WIDTH, DEPTH):
+        if laws[row, KIND] == FOURIER and laws[row, N_HARMONICS] != 1.0:
+            return False
+        if laws[row, KIND] == BANG_BANG and not abs(last) < MAX_QUADRANT * laws[row, PERIOD]:
+            return False
+    return bool(abs(last) * laws[SHARED, OMEGA] * TWO_OVER_PI < 0.5 * MAX_QUADRANT)

@@ -10,19 +10,25 @@ import numpy as np
 from numba import njit
 
 from fast.kernel.arithmetic import SAFETY, dot, fma, multiplied, products, quotient, two_product, two_sum
-from fast.kernel.codes import ARC, BASE, CAP, FLOOR, LEFT, MUSHROOM, NO_WALL, RIGHT, STEM, H, M, R, W
-from fast.kernel.laws import LOW, increment, rest, width
+from fast.kernel.codes import ARC, BASE, CAP, FLOOR, LEFT, MUSHROOM, NO_WALL, RIGHT, STEM
+from fast.kernel.laws import increment, rest, width
+
+from fast.kernel.records import (  # isort: skip
+    BEND, DEPTH, FASTEST, HIGHEST, LOWEST, RADIUS, RATE, SLOPE, VALUE, VALUE_LOW, WIDTH,
+)  # fmt: skip
 
 
 @njit(error_model="numpy")
-def wall_function(wall, s, x, y, vx, vy, residual, laws, anchors, is_relative):
+def wall_function(wall, s, particle, residual, scene, anchors):
     """Return f(s), f'(s) and the rounding errors of both, for one wall (f > 0 inside).
 
     `residual` is f(0), or 0 on the wall being left. Source: sec. 2, D_stem and D_cap.
     """
+    y, vx, vy = particle.y, particle.vx, particle.vy
     if wall == ARC:
-        d_r, r_rate, r_size, r_rate_size = increment(laws, anchors, R, s)
-        r = anchors[R, 0]
+        x = particle.x
+        d_r, r_rate, r_size, r_rate_size = increment(scene.laws, anchors, RADIUS, s)
+        r = anchors[RADIUS, VALUE]
         q = x * vx + y * vy
         v2 = vx * vx + vy * vy
         f = residual + (d_r * (2.0 * r + d_r) - s * (2.0 * q + s * v2))
@@ -32,13 +38,13 @@ def wall_function(wall, s, x, y, vx, vy, residual, laws, anchors, is_relative):
         slope_error = 2.0 * ((r + abs(d_r)) * r_rate_size + sizes + s * v2)
         return f, slope, SAFETY * error, SAFETY * slope_error
     if wall == FLOOR:
-        d_h, h_rate, h_size, h_rate_size = increment(laws, anchors, H, s)
+        d_h, h_rate, h_size, h_rate_size = increment(scene.laws, anchors, DEPTH, s)
         f = residual + (vy * s + d_h)
         error = abs(residual) + abs(vy) * s + h_size
         return f, vy + h_rate, SAFETY * error, SAFETY * (abs(vy) + h_rate_size)
-    _, d_w, w_rate, w_size, w_rate_size = width(laws, anchors, is_relative, s)
-    d_m, m_rate, m_size, m_rate_size = increment(laws, anchors, M, s)
-    m = anchors[M, 0]
+    _, d_w, w_rate, w_size, w_rate_size = width(scene, anchors, s)
+    d_m, m_rate, m_size, m_rate_size = increment(scene.laws, anchors, SLOPE, s)
+    m = anchors[SLOPE, VALUE]
     outward = vx if wall == RIGHT else -vx
     y_s = y + vy * s
     f = residual + (d_w + d_m * y_s + s * (m * vy - outward))
@@ -49,13 +55,13 @@ def wall_function(wall, s, x, y, vx, vy, residual, laws, anchors, is_relative):
 
 
 @njit(error_model="numpy")
-def wall_residual(wall, x, y, laws, anchors, bounds, is_relative):
-    """Return f(0), right to its last bits, and what its error would be were it summed plainly.
+def wall_residual(wall, x, y, scene, anchors):
+    """Return f(0), right to its last bits, and a bound on its error had it been summed plainly.
 
-    The second judges states, which come rounded.
+    The second value is used only to judge given states, whose coordinates are rounded.
     """
     if wall == ARC:
-        r, r_low = anchors[R, 0], anchors[R, LOW]
+        r, r_low = anchors[RADIUS, VALUE], anchors[RADIUS, VALUE_LOW]
         r2, r2_low = two_product(r, r)
         x2, x2_low = two_product(x, x)
         y2, y2_low = two_product(y, y)
@@ -64,12 +70,12 @@ def wall_residual(wall, x, y, laws, anchors, bounds, is_relative):
         low = b_low + a_low + (r2_low - x2_low - y2_low) + 2.0 * r * r_low
         return b + low, SAFETY * r2
     if wall == FLOOR:
-        f, f_low = two_sum(y, anchors[H, 0])
-        return f + (f_low + anchors[H, LOW]), SAFETY * anchors[H, 0]
-    w, w_low = anchors[W, 0], anchors[W, LOW]
-    if is_relative:
-        w, w_low = multiplied(w, w_low, anchors[R, 0], anchors[R, LOW])
-    tilt, tilt_low = multiplied(anchors[M, 0], anchors[M, LOW], y, 0.0)
+        f, f_low = two_sum(y, anchors[DEPTH, VALUE])
+        return f + (f_low + anchors[DEPTH, VALUE_LOW]), SAFETY * anchors[DEPTH, VALUE]
+    w, w_low = anchors[WIDTH, VALUE], anchors[WIDTH, VALUE_LOW]
+    if scene.is_relative:
+        w, w_low = multiplied(w, w_low, anchors[RADIUS, VALUE], anchors[RADIUS, VALUE_LOW])
+    tilt, tilt_low = multiplied(anchors[SLOPE, VALUE], anchors[SLOPE, VALUE_LOW], y, 0.0)
     f, f_low = two_sum(w, -x if wall == RIGHT else x)
     f, e = two_sum(f, tilt)
     error = SAFETY * (w + abs(tilt) + abs(x))
@@ -77,18 +83,28 @@ def wall_residual(wall, x, y, laws, anchors, bounds, is_relative):
 
 
 @njit(error_model="numpy")
-def wall_slope(wall, x, y, vx, vy, anchors, is_relative):
+def width_rate(scene, anchors):
+    """Return w' at the time of the anchors."""
+    rate = anchors[WIDTH, RATE]
+    if not scene.is_relative:
+        return rate
+    return rate * anchors[RADIUS, VALUE] + anchors[WIDTH, VALUE] * anchors[RADIUS, RATE]
+
+
+@njit(error_model="numpy")
+def wall_slope(wall, x, y, vx, vy, scene, anchors):
     """Return f' of a wall at the time of the anchors."""
     if wall == BASE:
         return vy
     if wall == ARC:
-        return 2.0 * fma(anchors[R, 0], anchors[R, 1], -dot(x, vx, y, vy))
+        return 2.0 * fma(anchors[RADIUS, VALUE], anchors[RADIUS, RATE], -dot(x, vx, y, vy))
     if wall == FLOOR:
-        return vy + anchors[H, 1]
-    w_rate = anchors[W, 1]
-    if is_relative:
-        w_rate = w_rate * anchors[R, 0] + anchors[W, 0] * anchors[R, 1]
-    return w_rate + anchors[M, 1] * y + (anchors[M, 0] * vy - (vx if wall == RIGHT else -vx))
+        return vy + anchors[DEPTH, RATE]
+    return (
+        width_rate(scene, anchors)
+        + anchors[SLOPE, RATE] * y
+        + (anchors[SLOPE, VALUE] * vy - (vx if wall == RIGHT else -vx))
+    )
 
 
 @njit(error_model="numpy", forceinline=True)  # a call in a loop over lanes would not be packed
@@ -108,7 +124,7 @@ def off_the_arc(x, x_low, y, y_low, vx, vy, r, rate):
 
 @njit(error_model="numpy", forceinline=True)  # a call in a loop over lanes would not be packed
 def off_the_arc_spinning(x, x_low, y, y_low, vx, vy, r, rate, spin):
-    """Return the same for a particle whose angular momentum is known to be `spin`."""
+    """Return the velocity after a hit on the arc where the angular momentum is known to be `spin`."""
     q, q_low = products(x, x_low, vx, 0.0, y, y_low, vy, 0.0)
     rho2, rho2_low = products(x, x_low, x, x_low, y, y_low, y, y_low)
     p, p_low = two_product(2.0 * r, rate)
@@ -123,17 +139,21 @@ def off_the_arc_spinning(x, x_low, y, y_low, vx, vy, r, rate, spin):
 
 @njit(error_model="numpy")
 def curvature_bounds(wall, vx, vy, bounds):
-    """Return K >= -inf f'' and L >= sup f'' from the laws' bounds (rows: lo, hi, |f'|, |f''|)."""
+    """Return K >= -inf f'' and L >= sup f'' for all time, from the laws' bounds."""
     if wall == ARC:
-        bend = bounds[R, 1] * bounds[R, 3]
+        bend = bounds[RADIUS, HIGHEST] * bounds[RADIUS, BEND]
         v2 = vx * vx + vy * vy
         return (
             2.0 * (bend + v2) * (1.0 + SAFETY),
-            2.0 * (bend + bounds[R, 2] * bounds[R, 2] - v2) + SAFETY * v2,
+            2.0 * (bend + bounds[RADIUS, FASTEST] * bounds[RADIUS, FASTEST] - v2) + SAFETY * v2,
         )
     if wall == FLOOR:
-        return bounds[H, 3], bounds[H, 3]
-    k = bounds[W, 3] + bounds[M, 3] * bounds[H, 1] + 2.0 * bounds[M, 2] * abs(vy)
+        return bounds[DEPTH, BEND], bounds[DEPTH, BEND]
+    k = (
+        bounds[WIDTH, BEND]
+        + bounds[SLOPE, BEND] * bounds[DEPTH, HIGHEST]
+        + 2.0 * bounds[SLOPE, FASTEST] * abs(vy)
+    )
     return k * (1.0 + SAFETY), k * (1.0 + SAFETY)
 
 
@@ -145,21 +165,23 @@ def law_size(wall, y, bounds):
     Parseval; two such laws are multiplied at most.
     """
     if wall == ARC:
-        return 64.0 * bounds[R, 1] * bounds[R, 1]
+        return 64.0 * bounds[RADIUS, HIGHEST] * bounds[RADIUS, HIGHEST]
     if wall == FLOOR:
-        return 64.0 * bounds[H, 1]
-    return 64.0 * (bounds[W, 1] + max(abs(bounds[M, 0]), abs(bounds[M, 1])) * abs(y))
+        return 64.0 * bounds[DEPTH, HIGHEST]
+    return 64.0 * (
+        bounds[WIDTH, HIGHEST] + max(abs(bounds[SLOPE, LOWEST]), abs(bounds[SLOPE, HIGHEST])) * abs(y)
+    )
 
 
 @njit(error_model="numpy")
-def wall_rest(wall, s, laws, anchors, is_relative):
+def wall_rest(wall, s, scene, anchors):
     """Return for how long after the time s a wall stands still."""
     if wall == ARC:
-        return rest(laws, anchors, R, s)
+        return rest(scene.laws, anchors, RADIUS, s)
     if wall == FLOOR:
-        return rest(laws, anchors, H, s)
-    still = min(rest(laws, anchors, W, s), rest(laws, anchors, M, s))
-    return min(still, rest(laws, anchors, R, s)) if is_relative else still
+        return rest(scene.laws, anchors, DEPTH, s)
+    still = min(rest(scene.laws, anchors, WIDTH, s), rest(scene.laws, anchors, SLOPE, s))
+    return min(still, rest(scene.laws, anchors, RADIUS, s)) if scene.is_relative else still
 
 
 @njit(error_model="numpy")
@@ -169,7 +191,7 @@ def reach_time(wall, x, y, vx, vy, bounds):
     This lets a slow particle cross the middle of the table in one step.
     """
     if wall == ARC:
-        inner = bounds[R, 0]
+        inner = bounds[RADIUS, LOWEST]
         gap = inner * inner - (x * x + y * y)
         v2 = vx * vx + vy * vy
         if gap <= SAFETY * inner * inner or v2 == 0.0:
@@ -178,20 +200,20 @@ def reach_time(wall, x, y, vx, vy, bounds):
         root = np.sqrt(q * q + v2 * gap)
         return (gap / (q + root) if q > 0.0 else (root - q) / v2) * (1.0 - 4.0 * SAFETY)
     if wall == FLOOR:
-        gap = y + bounds[H, 0]
-        size = abs(y) + bounds[H, 0]
+        gap = y + bounds[DEPTH, LOWEST]
+        size = abs(y) + bounds[DEPTH, LOWEST]
         speed = -vy
     else:
-        m_lo, m_hi = bounds[M, 0], bounds[M, 1]
+        m_lo, m_hi = bounds[SLOPE, LOWEST], bounds[SLOPE, HIGHEST]
         outward = vx if wall == RIGHT else -vx
         position = x if wall == RIGHT else -x
         if m_lo == m_hi:
-            gap = bounds[W, 0] + m_lo * y - position
+            gap = bounds[WIDTH, LOWEST] + m_lo * y - position
             speed = outward - m_lo * vy
         else:
-            gap = bounds[W, 0] - max(abs(m_lo), abs(m_hi)) * bounds[H, 1] - position
+            gap = bounds[WIDTH, LOWEST] - max(abs(m_lo), abs(m_hi)) * bounds[DEPTH, HIGHEST] - position
             speed = outward
-        size = bounds[W, 0] + max(abs(m_lo), abs(m_hi)) * bounds[H, 1] + abs(x)
+        size = bounds[WIDTH, LOWEST] + max(abs(m_lo), abs(m_hi)) * bounds[DEPTH, HIGHEST] + abs(x)
     if gap <= SAFETY * size:
         return 0.0
     if speed <= 0.0:
@@ -200,9 +222,9 @@ def reach_time(wall, x, y, vx, vy, bounds):
 
 
 @njit(error_model="numpy")
-def side_of_mouth(s, x, y, vx, vy, laws, anchors, is_relative):
+def side_of_mouth(s, x, vx, scene, anchors):
     """Return +1 when the crossing of y = 0 after time s is within |x| < w, -1 beyond, 0 too close."""
-    w, d_w, _, w_size, _ = width(laws, anchors, is_relative, s)
+    w, d_w, _, w_size, _ = width(scene, anchors, s)
     x_s = abs(x + vx * s)
     margin = (w - x_s) + d_w
     error = SAFETY * (w + w_size + abs(x) + 2.0 * abs(vx) * s)
@@ -212,8 +234,9 @@ def side_of_mouth(s, x, y, vx, vy, laws, anchors, is_relative):
 
 
 @njit(error_model="numpy")
-def is_outside(table, is_relative, wall, x, y, laws, anchors, bounds):
-    """Tell whether the state is beyond a wall by more than rounding; returns the wall or NO_WALL."""
+def crossed_wall(particle, scene, anchors):
+    """Return a wall that the particle is beyond by more than rounding, NO_WALL for none."""
+    table, y, wall = scene.table, particle.y, particle.wall
     in_cap = table == CAP or (table == MUSHROOM and (y > 0.0 or wall in (BASE, ARC)))
     if (table == CAP and y < 0.0 and wall != BASE) or (table == STEM and y > 0.0 and wall != BASE):
         return BASE
@@ -225,7 +248,7 @@ def is_outside(table, is_relative, wall, x, y, laws, anchors, bounds):
             candidate != ARC and table != CAP and (not in_cap) and (y < 0.0 or table == STEM)
         )
         if is_bound and candidate != wall:
-            f, error = wall_residual(candidate, x, y, laws, anchors, bounds, is_relative)
+            f, error = wall_residual(candidate, particle.x, y, scene, anchors)
             if f < -error:
                 return candidate
     return NO_WALL

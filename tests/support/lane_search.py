@@ -21,9 +21,10 @@ import numpy.typing as npt
 from mpmath import fp
 
 from fast.batch import LaneRound
-from fast.compiled import FloatArray
-from fast.kernel import codes, entries, follow, lanes, walls
+from fast.fine import fill_path
+from fast.kernel import codes, follow, lanes, pools, walls
 from fast.kernel.laws import set_anchors
+from fast.kernel.records import LEVEL, SLOPE, FloatArray
 from scene import BangBang, Cap, Fourier, Law, Mushroom, Scene, Stem
 from scene.laws import value
 from scene.tables import laws, width_factors
@@ -60,50 +61,44 @@ class Round(LaneRound):
         super().__init__(scene)
         self.kernels = kernels
         self.is_cap, self.is_disk = self.is_disk, self.is_disk or is_captured
-        self.is_mixed = bool(self.limits.has_knots and self.omega > 0.0)
 
     def step(self, n: int) -> tuple[npt.NDArray[np.bool_], FloatArray, FloatArray]:
         """Take a step in n lanes: which are shown right, walls met, and rows of dt, x, y, vx, vy."""
-        a, count = self.pool, np.int64(n)
         if not self.is_disk:
-            self.kernels.aim(a, count, self.table == codes.STEM, self.laws[codes.M, 1], self.limits)
-        else:
-            # A step is judged from its state alone, not from the angular momentum of the stay so far.
-            x, y, vx, vy = (self.row(r, n) for r in (lanes.X, lanes.Y, lanes.VX, lanes.VY))
-            self.row(lanes.SPIN, n)[:] = x * vy - y * vx
-        self.find(a, count, is_again=False)
-        for i in np.flatnonzero(self.row(lanes.OK, n) == lanes.COARSE):
-            self.correct_lane(np.int64(i))
-        right = (self.row(lanes.OK, n) == lanes.RIGHT_ONE) & (
-            self.row(lanes.NEXT_T, n) < self.row(lanes.KNOT, n)
-        )
-        hits = np.zeros(n) if self.is_disk else self.row(lanes.HIT, n).copy()
-        dt = self.row(lanes.S, n).copy()
-        if self.is_disk:
-            lanes.rebound(a, count)
-        else:
-            lanes.bounce(a, count, self.laws[codes.M, 1], self.table == codes.MUSHROOM)
-        places = (lanes.X, lanes.Y, lanes.VX, lanes.VY)
-        return right, hits, np.column_stack([dt, *(self.row(r, n) for r in places)])
+            return self.fly(n)
+        # A step is judged from its state alone, not from the angular momentum of the stay so far.
+        x, y, vx, vy = (self.row(r, n) for r in (pools.X, pools.Y, pools.VX, pools.VY))
+        self.row(pools.SPIN, n)[:] = x * vy - y * vx
+        return self.skip(n)
 
-    def find(self, a: FloatArray, count: np.integer[Any], *, is_again: bool) -> None:
-        """Call the loop of the kernels that fast.kernel.follow calls."""
-        k, m, rest = self.kernels, self.laws[codes.M, 1], (self.is_relative, self.omega)
+    def find(self, pool: np.integer[Any], n: int) -> tuple[npt.NDArray[np.bool_], FloatArray, FloatArray]:
+        """Find the next collision of n lanes by these kernels, as the honest ones do."""
+        self.advance(self.pool, np.int64(n), is_again=False)
+        for i in np.flatnonzero(self.row(pools.OK, n) == pools.COARSE):
+            self.correct_lane(np.int64(i))
+        return self.answers(n)
+
+    def advance(self, a: FloatArray, count: np.integer[Any], *, is_again: bool) -> None:
+        """Call the loops of the kernels that `follow.advance` calls."""
+        scene, is_stem = self.compiled, self.compiled.table == codes.STEM
+        m = scene.laws[SLOPE, LEVEL]
+        rest, k = (self.limits, self.omegas), self.kernels
         if self.is_disk:
-            chord = k.chord_mixed if self.is_mixed else k.chord
-            chord(a, count, np.bool_(is_again), np.bool_(self.is_cap), *rest, self.limits)
-        else:
-            fly = k.fly_mixed if self.is_mixed else k.fly
-            fly(a, count, self.table == codes.STEM, *rest, m, self.limits)
+            flags = np.bool_(is_again), np.bool_(self.is_cap), scene.is_relative
+            k.chord(a, count, *flags, self.omega, *rest)
+            return
+        if not is_again:
+            k.aim(a, count, is_stem, m, self.limits)
+        k.fly(a, count, is_stem, scene.is_relative, self.omega, m, *rest)
 
     def correct_lane(self, i: np.integer[Any]) -> None:
-        """Correct a coarse step again, as `follow.correct_more` does."""
-        follow.change_lane(self.pool, i, self.spare, np.int64(0))
-        for _ in range(3):
-            self.find(self.spare, np.int64(1), is_again=True)
-            if self.spare[lanes.OK] != lanes.COARSE:
+        """Correct a coarse step again, as `follow.correct` does."""
+        pools.change_lane(self.pool, i, self.spare, np.int64(0))
+        for _ in range(follow.MAX_CORRECTIONS):
+            self.advance(self.spare, np.int64(1), is_again=True)
+            if self.spare[pools.OK] != pools.COARSE:
                 break
-        follow.change_lane(self.spare, np.int64(0), self.pool, i)
+        pools.change_lane(self.spare, np.int64(0), self.pool, i)
 
     def careful(self, p: FloatArray, wall: int) -> tuple[int, FloatArray]:
         """Return the careful step's wall and dt, x, y, vx, vy; unfolded, those of the next hit of the arc."""
@@ -112,7 +107,7 @@ class Round(LaneRound):
             q[3], q[5], is_folded = -q[3], -q[5], True
         code = codes.NO_WALL
         for _ in range(2):
-            code, dt = entries.single_step(*self.compiled, q, wall, np.inf)
+            code, dt, q = self.careful_step(q, wall)
             total += dt
             if not self.is_disk or code != codes.BASE:
                 break
@@ -123,10 +118,9 @@ class Round(LaneRound):
 
     def is_floor_met_at_once(self, p: FloatArray) -> bool:
         """Tell whether a start is above the floor by no more than rounding, in pairs of floats, and falls."""
-        set_anchors(self.laws, self.anchors, p[0], p[1])
-        places = (codes.FLOOR, p[2], p[3])
-        f, error = walls.wall_residual(*places, self.laws, self.anchors, self.bounds, self.is_relative)
-        slope = walls.wall_slope(*places, p[4], p[5], self.anchors, self.is_relative)
+        set_anchors(self.compiled.laws, self.anchors, p[0], p[1])
+        f, error = walls.wall_residual(codes.FLOOR, p[2], p[3], self.compiled, self.anchors)
+        slope = walls.wall_slope(codes.FLOOR, *p[2:], self.compiled, self.anchors)
         return bool(0.0 < f <= error and slope < 0.0)
 
     def ulps(self, p: FloatArray, wall: int, answer: FloatArray, truth: FloatArray) -> float | None:
@@ -150,7 +144,7 @@ class Round(LaneRound):
         steps, met = np.zeros((1, 6, 2)), np.zeros(1, dtype=np.int64)
         if is_folded:
             start[[2, 4]] *= -1.0
-        entries.fine(*self.compiled, start, wall, np.inf, steps, met)
+        fill_path(self.compiled, start, wall, steps, met)
         found = np.delete(steps[0, :, 0], 1)
         if is_folded:
             found[[2, 4]] *= -1.0
@@ -185,12 +179,12 @@ def search(
         draws += 1
         if group == ANYWHERE:
             scene = draw_scene(random)
-            starts = [draw_start(scene, random) for _ in range(lanes.LANES)]
+            starts = [draw_start(scene, random) for _ in range(pools.LANES)]
         elif group in TRAPS:
-            scene, starts = TRAPS[group].draw(lanes.LANES, random)
+            scene, starts = TRAPS[group].draw(pools.LANES, random)
         else:
             scene = draw_directed_scene(GROUPS[group], random)
-            starts = draw_starts(scene, GROUPS[group], lanes.LANES, random)
+            starts = draw_starts(scene, GROUPS[group], pools.LANES, random)
         aims: dict[str, Group | Trap] = {**GROUPS, **TRAPS}
         is_captured = group in aims and aims[group].is_captured
         found += try_starts(Round(scene, kernels, is_captured=is_captured), scene, starts, random, tally)
@@ -202,7 +196,7 @@ def try_starts(
 ) -> list[Wrong]:
     """Fill a pool with starts in a scene and take lane steps from them."""
     found = []
-    age = follow.SERVES / pool.omega * random.random() if pool.omega and random.random() < 0.5 else 0.0
+    age = pools.SERVES / pool.omega * random.random() if pool.omega and random.random() < 0.5 else 0.0
     for lane, start in enumerate(starts):
         pool.fill(lane, *start, age)
     is_live = np.array([is_valid(pool, *start) for start in starts], dtype=bool)
@@ -262,14 +256,14 @@ def error_of(
 
 def is_valid(pool: Round, p: FloatArray, wall: int) -> bool:
     """Tell whether the careful step takes a start."""
-    code, _ = entries.single_step(*pool.compiled, p.copy(), wall, np.inf)
+    code, _, _ = pool.careful_step(p, wall)
     return bool(code < codes.APPROACHING)
 
 
 def state_in(pool: Round, i: int) -> tuple[FloatArray, int]:
     """Return the state in a lane, as the kernels take it."""
-    rows = (lanes.T, lanes.T_LOW, lanes.X, lanes.Y, lanes.VX, lanes.VY)
-    return np.array([pool.pool[row + i] for row in rows]), int(pool.pool[lanes.WALL + i])
+    rows = (pools.T, pools.T_LOW, pools.X, pools.Y, pools.VX, pools.VY)
+    return np.array([pool.pool[row + i] for row in rows]), int(pool.pool[pools.WALL + i])
 
 
 def draw_scene(random: np.random.Generator) -> Scene:

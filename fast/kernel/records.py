@@ -1,0 +1,216 @@
+"""What kernels are given and hand back, and the names of the columns of their tables of numbers.
+
+numba reads a named tuple as cheaply as loose arguments. The numbers of all laws are rows of one array,
+because a row is chosen while a kernel runs; its columns are named here and nowhere else.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+from numba import njit
+
+from fast.kernel.codes import N_WALLS, NO_WALL
+
+FloatArray = npt.NDArray[np.floating[Any]]
+IntArray = npt.NDArray[np.int64]
+BoolArray = npt.NDArray[np.bool_]
+
+# Rows of `laws`, `bounds` and `anchors`. WIDTH is the half-width w of the stem, or nu where a scene gives it.
+# SHARED, a row of `laws` alone, holds OMEGA, N_HARMONICS and OMEGA_LOW of all Fourier laws of a scene.
+RADIUS, WIDTH, DEPTH, SLOPE, SHARED = np.arange(5)
+
+# Columns of `laws`. KIND is one of CONSTANT, FOURIER and BANG_BANG; LEVEL is a constant law's value, or a
+# Fourier law's mean.
+CONSTANT, FOURIER, BANG_BANG = 0.0, 1.0, 2.0
+MAX_HARMONICS = 16
+KIND, LEVEL = np.arange(2)
+# A Fourier law has the frequency OMEGA + OMEGA_LOW. Harmonic k, from 1 to n, has the amplitude of its cosine
+# in column AMPLITUDES + k, and that of its sine in AMPLITUDES + n + k.
+OMEGA, N_HARMONICS, OMEGA_LOW, AMPLITUDES = np.array([2, 3, 4, 3])
+# A bang-bang law has the period PERIOD + PERIOD_LOW. From column KNOTS on stand, n columns of each: the times
+# of its n knots, their values, the accelerations of its legs, and the low parts of these.
+PERIOD, N_KNOTS, PERIOD_LOW, KNOTS = np.array([2, 3, 4, 5])
+
+# Columns of `bounds`: the least and greatest value of a law, and the greatest size of its first and second
+# derivative. Here WIDTH is w in every scene.
+LOWEST, HIGHEST, FASTEST, BEND = np.arange(4)
+
+# Columns of `anchors`, the laws at the last event: value, derivative, and the value's low part. A Fourier law
+# has in TERMS the summed sizes of its derivative's terms. A bang-bang law has the number of its half-leg, and
+# the time to that half-leg's end as a sum of two floats.
+VALUE, RATE, TERMS, ROOM, ROOM_LOW, VALUE_LOW = np.arange(6)
+HALF_LEG = TERMS
+# Two more rows of `anchors`. PHASE holds the sines and cosines of all harmonics at the last event, each as a
+# sum of two floats, in the columns below plus the number of the harmonic; and a bound on their error. TURN
+# holds what a later time TURN_TIME adds: sin and cos - 1 of the turn since, or sin less the turn where
+# IS_SHORT.
+PHASE, TURN = np.array([4, 5])
+PHASE_ERROR = 0
+TURN_TIME, IS_SHORT = np.arange(2)
+SINE, COSINE = 3, 3 + MAX_HARMONICS
+SINE_LOW, COSINE_LOW = 3 + 2 * MAX_HARMONICS, 3 + 3 * MAX_HARMONICS
+ANCHORS_SHAPE = (6, 4 + 4 * MAX_HARMONICS)
+
+
+class Compiled(NamedTuple):
+    """A scene as the numbers that the kernels read.
+
+    Attributes:
+        table: CAP, STEM or MUSHROOM.
+        is_relative: the width is given as nu, and w = nu r.
+        laws: (5, n) a row for each law of motion, and one for what Fourier laws share.
+        bounds: (4, 4) what holds of each law for all time.
+    """
+
+    table: int
+    is_relative: bool
+    laws: FloatArray
+    bounds: FloatArray
+
+
+class Particle(NamedTuple):
+    """A particle at one instant.
+
+    Attributes:
+        t, t_low: time, as a sum of two floats.
+        x, y, vx, vy: place and velocity.
+        wall: code of the wall that it is leaving, NO_WALL for none.
+    """
+
+    t: float
+    t_low: float
+    x: float
+    y: float
+    vx: float
+    vy: float
+    wall: int | np.integer[Any]
+
+
+class Paths(NamedTuple):
+    """What the careful kernel fills in: paths of at most K collisions from each of N starts.
+
+    Attributes:
+        steps: (N, K, 6) dt, t, x, y, vx, vy after each collision.
+        walls: (N, K) codes of the walls hit.
+        counts: (N,) how many collisions there are.
+        codes: (N,) the last wall's code where there are K, else what came instead.
+        ends: (N, 6) the last state, as in an array of states; for HORIZON the one there.
+    """
+
+    steps: FloatArray
+    walls: IntArray
+    counts: IntArray
+    codes: IntArray
+    ends: FloatArray
+
+
+def unfilled_paths(n_starts: int, n_collisions: int) -> Paths:
+    """Return what is to be filled in for paths from some starts."""
+    return Paths(
+        np.empty((n_starts, n_collisions, 6)),
+        np.empty((n_starts, n_collisions), np.int64),
+        np.zeros(n_starts, np.int64),
+        np.zeros(n_starts, np.int64),
+        np.empty((n_starts, 6)),
+    )
+
+
+class Stops(NamedTuple):
+    """Instants at which particles are looked at, in order.
+
+    Attributes:
+        times: (S,) the instants; the last one ends the run.
+        columns: (S,) where the energy at an instant is written, -1 for an instant that does not ask for it.
+        cycles: (S,) number of the cycle that an instant ends, -1 for others.
+        narrowings: (K, M) when the mouth narrows in each cycle: a captured stay is kept in slot m of cycle k
+            when it spans that instant.
+        is_first_kept: the first captured stay is kept in slot 0, whatever its length.
+    """
+
+    times: FloatArray
+    columns: IntArray
+    cycles: IntArray
+    narrowings: FloatArray
+    is_first_kept: bool
+
+
+class Followed(NamedTuple):
+    """What the kernel fills in for N particles, K cycles of M narrowings, and C stops that ask for energies.
+
+    Attributes:
+        states: (N, 6) last t, its low part, x, y, vx, vy.
+        codes: (N,) why each particle ended, HORIZON when all went well.
+        counts: (N, 5) collisions by wall: arc, base, left, right, floor.
+        careful: (N,) collisions found by the careful step.
+        energies: (N, C) energy at each stop that asks for it.
+        is_captured: (N, C) whether the last arc hit before had |sin phi| > nu.
+        t_in, t_out: (N, K, M) the captured stays that are kept; nan for none.
+    """
+
+    states: FloatArray
+    codes: IntArray
+    counts: IntArray
+    careful: IntArray
+    energies: FloatArray
+    is_captured: BoolArray
+    t_in: FloatArray
+    t_out: FloatArray
+
+    def part(self, those: slice) -> Followed:
+        """Return views of some of the particles."""
+        return Followed(
+            self.states[those],
+            self.codes[those],
+            self.counts[those],
+            self.careful[those],
+            self.energies[those],
+            self.is_captured[those],
+            self.t_in[those],
+            self.t_out[those],
+        )
+
+
+def unfilled_ends(states: FloatArray, n_columns: int, slots: tuple[int, int]) -> Followed:
+    """Return what is to be filled in for particles that start from `states`, which are overwritten."""
+    n = len(states)
+    return Followed(
+        states,
+        np.zeros(n, np.int64),
+        np.zeros((n, N_WALLS), np.int64),
+        np.zeros(n, np.int64),
+        np.full((n, n_columns), np.nan),
+        np.zeros((n, n_columns), np.bool_),
+        np.full((n, *slots), np.nan),
+        np.full((n, *slots), np.nan),
+    )
+
+
+@njit(error_model="numpy")
+def particle_at(states, i, wall):
+    """Return the particle whose state is a row of `states`."""
+    return Particle(states[i, 0], states[i, 1], states[i, 2], states[i, 3], states[i, 4], states[i, 5], wall)
+
+
+@njit(error_model="numpy")
+def write_state(states, i, particle):
+    """Write a particle's state into a row of `states`."""
+    states[i, 0], states[i, 1] = particle.t, particle.t_low
+    states[i, 2], states[i, 3] = particle.x, particle.y
+    states[i, 4], states[i, 5] = particle.vx, particle.vy
+
+
+@njit(error_model="numpy")
+def write_step(steps, i, k, dt, particle):
+    """Write collision k of path i: dt, t, x, y, vx, vy."""
+    steps[i, k, 0], steps[i, k, 1] = dt, particle.t
+    steps[i, k, 2], steps[i, k, 3] = particle.x, particle.y
+    steps[i, k, 4], steps[i, k, 5] = particle.vx, particle.vy
+
+
+@njit(error_model="numpy")
+def released(particle):
+    """Return the particle as one that is on no wall."""
+    return Particle(particle.t, particle.t_low, particle.x, particle.y, particle.vx, particle.vy, NO_WALL)

@@ -1,0 +1,64 @@
+"""A trajectory: the successive collisions of one particle, its time carried as a sum of two floats."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from fast.given import MAX_STEPS, given_end
+from fast.kernel import codes
+from fast.kernel.records import FloatArray
+from fast.step import WALL_NAMES, as_arrays, check_state, followed_paths, trouble
+from scene import Horizon, Outcome, Scene, State, Wall
+from scene.refusal import check_count, check_scene
+
+
+class Collisions(NamedTuple):
+    """Successive collisions, and why they ended.
+
+    Attributes:
+        walls: (n,) names of the walls hit.
+        steps: (n, 6) dt, t, x, y, vx, vy after each collision.
+        outcome: None when all collisions asked for were found, else what came instead.
+    """
+
+    walls: list[Wall]
+    steps: FloatArray
+    outcome: Outcome | None
+
+
+def trajectory(scene: Scene, state: State, n_collisions: int, t_end: float = np.inf) -> Collisions:
+    """Follow a particle through `n_collisions` collisions, time carried as a compensated pair.
+
+    Args:
+        scene: table and laws of motion.
+        state: the start, as for `next_collision`.
+        n_collisions: how many collisions to follow, 0 to 10^7.
+        t_end: horizon [time], >= state.t; infinity for none.
+
+    Returns:
+        The collisions. Where t_end is infinite and nothing is met any more (a particle at rest that no wall
+        sweeps) the outcome is a Horizon at t = infinity with the place where it rests.
+
+    Raises:
+        BadInput: naming field, value and bound, for anything that is not as above. That a state is outside
+            the table, or moves into the wall that it leaves, the first step finds: the outcome is Rejected.
+    """
+    check_scene(scene)
+    t_end = given_end(t_end)
+    start = check_state(scene, state, None if t_end == np.inf else t_end)
+    n_collisions = check_count("n_collisions", n_collisions, 0, MAX_STEPS)
+    paths = followed_paths(start.compiled, *as_arrays([start]), n_collisions, start.units.horizon(t_end))
+    n, code = paths.counts.item(), paths.codes.item()
+    steps = start.units.steps(paths.steps[0, :n])
+    walls = [WALL_NAMES[c] for c in paths.walls[0, :n].tolist()]
+    outcome: Outcome | None = None
+    if n < n_collisions:
+        # Without a horizon only what rests is never met, and it rests where it was: there is no v * infinity.
+        last = steps[n - 1, 2:] if n else np.array([state.x, state.y, state.vx, state.vy])
+        is_horizon = code == codes.HORIZON
+        if is_horizon and np.isfinite(t_end):
+            last = start.units.places(paths.ends[0, 2:])
+        outcome = Horizon(t_end, *(float(v) for v in last)) if is_horizon else trouble(code, state)
+    return Collisions(walls, steps, outcome)

@@ -19,7 +19,7 @@ from conformance.bench.growth import FAR, Follower, Place
 from conformance.bench.work import SCENE, Cost, Load
 from conformance.bench.workloads import WINDOW, Workload
 from conformance.generator import prover
-from conformance.generator.draws import Moment
+from conformance.generator.draws import TableAt
 from conformance.grading.agreement import Answer, Enclosed, exact
 from conformance.grading.error import Matrix
 from fast import __main__ as fast_protocol
@@ -107,7 +107,7 @@ def _lanes(workload: Workload, n_times: int) -> Lap:
     """Time the engine on flights that go on from the questions; grade one round of its lanes on these."""
     states = [q.state for q in workload.questions]
     last = max(states, key=lambda s: s.t)
-    span = WINDOW * Moment(workload.scene, last.t).size / math.hypot(last.vx, last.vy)
+    span = WINDOW * TableAt(workload.scene, last.t).size / math.hypot(last.vx, last.vy)
     copies = -(-128 // len(states))  # enough to fill both pools
     seconds, n_collisions = 0.0, 0
     for _ in range(n_times):

@@ -10,6 +10,8 @@ import math
 import numbers
 import operator
 
+MAX_SEED = 2**64 - 1
+
 
 class BadInput(ValueError):  # noqa: N818 (the caller's input is bad, not the program)
     """One line naming the field, its value and the bound it breaks."""
@@ -55,6 +57,15 @@ def check_count(field: str, value: object, low: int, high: int) -> int:
     if not low <= count <= high:
         raise BadInput(f"{field} = {shown(count)}, must be {low} to {high}")
     return count
+
+
+def check_seed(value: object, field: str = "seed") -> int:
+    """Return a seed of random numbers, 0 to MAX_SEED.
+
+    Raises:
+        BadInput: naming field, value and bounds.
+    """
+    return check_count(field, value, 0, MAX_SEED)
 
 
 def check_number(field: str, value: object, refusal: type[BadInput] = BadInput) -> float:

@@ -17,7 +17,7 @@ import numpy.typing as npt
 
 from conformance.bench.record import Growth, short
 from conformance.bench.workloads import RULES, Prover, draw_workload
-from conformance.generator.draws import Moment
+from conformance.generator.draws import TableAt
 from conformance.grading.error import Matrix, U, inputs_of
 from scene import Collision, Scene, State
 
@@ -89,7 +89,7 @@ def grow(
 
 
 def _sizes(scene: Scene, state: State) -> tuple[float, float]:
-    return Moment(scene, state.t).r, math.hypot(state.vx, state.vy)
+    return TableAt(scene, state.t).r, math.hypot(state.vx, state.vy)
 
 
 def _errors(path: Sequence[Place], truth: Sequence[Place], size: float) -> FloatArray:

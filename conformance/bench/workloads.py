@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 from mpmath import fp
 
-from conformance.generator.draws import Draw, Moment, state, walls_speed
+from conformance.generator.draws import Draw, TableAt, state, walls_speed
 from conformance.grading.agreement import middle
 from conformance.vectors import Expectation
 from scene import Cap, Collision, Scene, State, load
@@ -93,10 +93,10 @@ def _grazing(stream: Draw, scene: Scene, t: float) -> Drawn:
 
 
 def _near_corner(stream: Draw, scene: Scene, t: float) -> Drawn:
-    now, speed = Moment(scene, t), 2.0**10
+    now, speed = TableAt(scene, t), 2.0**10
     x, y = now.place(stream, "cap")
     flight = now.size / speed * stream.between(0.25, 1.0)
-    there = Moment(scene, t + flight)
+    there = TableAt(scene, t + flight)
     corner_x, corner_y = stream.pick(there.corners("cap"))
     off, (c, s) = there.size * stream.power(-40, -8), stream.direction()
     start = State(t, x, y, (corner_x + off * c - x) / flight, (corner_y + off * s - y) / flight)
@@ -135,7 +135,7 @@ def _question(rule: Rule, scene: Scene, key: str, prove: Prover) -> ProvedStep:
     span = 1.0 if shared is None else float(shared.value(fp))
     for attempt in range(MAX_DRAWS):
         stream = Draw(f"{key} {attempt}")
-        size = Moment(scene, 0.0).size
+        size = TableAt(scene, 0.0).size
         t = span * PHASE + stream.part() * min(span, WINDOW * size / rule.speed)
         start, t_end = rule.draw(stream, scene, t)
         if rule.is_flown:

@@ -60,20 +60,20 @@ class Draw:
         return c * self.pick((1.0, -1.0)), s * self.pick((1.0, -1.0))
 
 
-class Clock(NamedTuple):
+class SharedPeriod(NamedTuple):
     """What the moving laws of a scene share: kind, and omega or the period."""
 
     kind: str
     rate: float
 
 
-def clock(draw: Draw, kinds: Sequence[str] = ("fourier", "bang-bang", "constant")) -> Clock:
+def clock(draw: Draw, kinds: Sequence[str] = ("fourier", "bang-bang", "constant")) -> SharedPeriod:
     """Draw what the laws of a scene share."""
     kind = draw.pick(kinds)
-    return Clock(kind, draw.short(0.5, 6.0) if kind == "fourier" else draw.pick((0.5, 1.0, 1.5, 4.0)))
+    return SharedPeriod(kind, draw.short(0.5, 6.0) if kind == "fourier" else draw.pick((0.5, 1.0, 1.5, 4.0)))
 
 
-def law(draw: Draw, low: float, high: float, shared: Clock) -> Law:
+def law(draw: Draw, low: float, high: float, shared: SharedPeriod) -> Law:
     """Draw a law that stays within [low, high]; now and then one that stands still."""
     if shared.kind == "constant" or draw.pick(range(6)) == 0:
         return draw.short(low, high)
@@ -90,7 +90,7 @@ def law(draw: Draw, low: float, high: float, shared: Clock) -> Law:
     return Fourier(mean=mean, omega=shared.rate, cos=tuple(amplitudes[:n_cos]), sin=tuple(amplitudes[n_cos:]))
 
 
-def scene(draw: Draw, table: str, shared: Clock) -> Scene:
+def scene(draw: Draw, table: str, shared: SharedPeriod) -> Scene:
     """Draw a valid scene of a table: "cap", "stem" or "mushroom"."""
     if table == "cap":
         return Cap(r=law(draw, 0.25, 2.0, shared))
@@ -107,7 +107,7 @@ def scene(draw: Draw, table: str, shared: Clock) -> Scene:
     return Mushroom(r=r, w=w, h=h, slope=_slope(draw, bounds(w).lowest, bounds(h).highest, shared))
 
 
-def _slope(draw: Draw, narrowest: float, deepest: float, shared: Clock) -> Law:
+def _slope(draw: Draw, narrowest: float, deepest: float, shared: SharedPeriod) -> Law:
     steepest = 0.9 * narrowest / deepest
     kind = draw.pick(("positive", "zero", "negative", "moving"))
     if kind == "moving" and steepest > 0.01:
@@ -117,7 +117,7 @@ def _slope(draw: Draw, narrowest: float, deepest: float, shared: Clock) -> Law:
     return draw.short(-0.8, -0.01) if kind == "negative" else 0.0
 
 
-class Moment:
+class TableAt:
     """The table at one instant: each length and its rate, to 50 digits and then rounded."""
 
     def __init__(self, scene: Scene, t: float) -> None:
@@ -211,7 +211,7 @@ def time(draw: Draw, scene: Scene, turns: int = 3) -> float:
 
 
 def sites(scene: Scene) -> list[str]:
-    """List where a particle may start: regions by the names that `Moment.place` knows, and walls."""
+    """List where a particle may start: regions by the names that `TableAt.place` knows, and walls."""
     regions = {Cap: ["cap"], Stem: ["stem"], Mushroom: ["cap", "stem", "mouth"]}[type(scene)]
     return [*regions, *regions, *scene.walls]
 
@@ -227,7 +227,7 @@ def state(draw: Draw, scene: Scene, at: dict[str, Any]) -> tuple[State, float]:
             to the wall), `patience` (flight time allowed, in crossings of the table).
     """
     t = at["t"] if "t" in at else time(draw, scene)
-    moment = Moment(scene, t)
+    moment = TableAt(scene, t)
     site = at["site"] if "site" in at else draw.pick(sites(scene))
     x, y = moment.place(draw, site)
     factor = at["speed"] if "speed" in at else draw.power(-2, 12) * draw.between(1.0, 2.0)

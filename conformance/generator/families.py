@@ -12,7 +12,7 @@ from typing import NamedTuple
 import msgspec
 
 from conformance.generator.certify import Question
-from conformance.generator.draws import Clock, Draw, Moment, clock, scene, state, time, wire_form
+from conformance.generator.draws import Draw, SharedPeriod, TableAt, clock, scene, state, time, wire_form
 from scene import Scene, State, from_data, load, to_data
 
 Ask = Callable[[Draw], Question]
@@ -32,7 +32,7 @@ CATALOGUE = {
 }
 
 
-class Family(NamedTuple):
+class VectorFamily(NamedTuple):
     """A group's drawn vectors.
 
     Attributes:
@@ -48,34 +48,34 @@ class Family(NamedTuple):
     wanted: str | None = None
 
 
-def families() -> list[Family]:
+def families() -> list[VectorFamily]:
     """List all families, in the corpus's order."""
     found = []
     for name, source in CATALOGUE.items():
-        found.append(Family(name, 50, partial(_catalogue_step, name, source)))
+        found.append(VectorFamily(name, 50, partial(_catalogue_step, name, source)))
         n_paths = 16 if name in ("moving-cap", *FIXED) else 11
-        found.append(Family(f"{name}-trajectory", n_paths, partial(_catalogue_path, name, source)))
+        found.append(VectorFamily(f"{name}-trajectory", n_paths, partial(_catalogue_path, name, source)))
     for table in ("cap", "stem", "mushroom"):
         found += [
-            Family(f"static-{table}", 20, partial(_generated_step, table, "static", ("constant",))),
-            Family(f"generated-{table}", 90, partial(_generated_step, table, "generated", ())),
-            Family(f"generated-{table}-trajectory", 10, partial(_generated_path, table)),
+            VectorFamily(f"static-{table}", 20, partial(_generated_step, table, "static", ("constant",))),
+            VectorFamily(f"generated-{table}", 90, partial(_generated_step, table, "generated", ())),
+            VectorFamily(f"generated-{table}-trajectory", 10, partial(_generated_path, table)),
         ]
     return [
         *found,
-        Family("whispering-gallery", 10, _gallery),
-        Family("stem-trajectory", 10, _stem_path),
-        Family("slow-particle", 60, _slow),
-        Family("fast-wall", 40, _fast_wall),
-        Family("skipping", 60, _skipping),
-        Family("grazing", 60, _grazing),
-        Family("near-corner", 90, _near_corner),
-        Family("through-mouth", 60, _through_mouth),
-        Family("knot-in-flight", 60, _knots),
-        Family("late-start", 50, _late),
-        Family("horizon", 50, _horizon, "horizon"),
-        Family("scales", 50, _scales),
-        Family("refused-state", 30, _outside, "rejected"),
+        VectorFamily("whispering-gallery", 10, _gallery),
+        VectorFamily("stem-trajectory", 10, _stem_path),
+        VectorFamily("slow-particle", 60, _slow),
+        VectorFamily("fast-wall", 40, _fast_wall),
+        VectorFamily("skipping", 60, _skipping),
+        VectorFamily("grazing", 60, _grazing),
+        VectorFamily("near-corner", 90, _near_corner),
+        VectorFamily("through-mouth", 60, _through_mouth),
+        VectorFamily("knot-in-flight", 60, _knots),
+        VectorFamily("late-start", 50, _late),
+        VectorFamily("horizon", 50, _horizon, "horizon"),
+        VectorFamily("scales", 50, _scales),
+        VectorFamily("refused-state", 30, _outside, "rejected"),
     ]
 
 
@@ -156,7 +156,7 @@ def _skipping(draw: Draw) -> Question:
 def _grazing(draw: Draw) -> Question:
     of = scene(draw, draw.pick(("cap", "mushroom")), clock(draw))
     t = time(draw, of)
-    r, (c, s) = Moment(of, t).r, draw.direction()
+    r, (c, s) = TableAt(of, t).r, draw.direction()
     rho = r * (1 - draw.power(-50, -6))
     speed, turn = draw.power(0, 10), draw.pick((1.0, -1.0))
     start = State(t, rho * c, rho * abs(s), -turn * speed * abs(s), turn * speed * c)
@@ -167,11 +167,11 @@ def _grazing(draw: Draw) -> Question:
 def _near_corner(draw: Draw) -> Question:
     of = scene(draw, draw.pick(("cap", "stem", "mushroom")), clock(draw))
     t = time(draw, of)
-    now, speed = Moment(of, t), draw.power(0, 8)
+    now, speed = TableAt(of, t), draw.power(0, 8)
     site = draw.pick(_regions(of))
     x, y = now.place(draw, site)
     flight = now.size / speed * draw.between(0.25, 1.0)
-    there = Moment(of, t + flight)
+    there = TableAt(of, t + flight)
     corner = draw.pick(there.corners(site))
     off = there.size * draw.power(-50, -8)
     c, s = draw.direction()
@@ -191,10 +191,10 @@ def _through_mouth(draw: Draw) -> Question:
     else:
         of = scene(draw, "mushroom", clock(draw))
     t = time(draw, of)
-    now, speed = Moment(of, t), draw.power(0, 7)
+    now, speed = TableAt(of, t), draw.power(0, 7)
     x, y = now.place(draw, draw.pick(("cap", "stem")))
     flight = now.size / speed * draw.between(0.25, 1.0)
-    aim = draw.between(-1.2, 1.2) * Moment(of, t + flight).w
+    aim = draw.between(-1.2, 1.2) * TableAt(of, t + flight).w
     start = State(t, x, y, (aim - x) / flight, -y / flight)
     rule = "the width of the mouth when it is reached decides"
     return _question("through-mouth", rule, "sec. 2; hard cases 24, 26", of, (start, t + 8 * flight))
@@ -204,7 +204,7 @@ def _knots(draw: Draw) -> Question:
     if draw.pick((False, True)):
         _, of = _named(draw, FIXED)
     else:
-        of = scene(draw, draw.pick(("stem", "mushroom")), Clock("bang-bang", draw.pick((0.5, 1.0))))
+        of = scene(draw, draw.pick(("stem", "mushroom")), SharedPeriod("bang-bang", draw.pick((0.5, 1.0))))
     start, t_end = state(draw, of, {"speed": draw.power(-4, 1), "patience": 8.0})
     rule = "a law changes its piece during the flight"
     return _question("knot-in-flight", rule, "sec. 4.1; hard case 36", of, (start, min(t_end, start.t + 16)))
@@ -212,7 +212,7 @@ def _knots(draw: Draw) -> Question:
 
 def _late(draw: Draw) -> Question:
     if draw.pick((False, True)):
-        of, most = scene(draw, draw.pick(("cap", "stem", "mushroom")), Clock("constant", 1.0)), 44
+        of, most = scene(draw, draw.pick(("cap", "stem", "mushroom")), SharedPeriod("constant", 1.0)), 44
     else:
         of, most = load(draw.pick((*MOVING, *FIXED, "breathing-circle", "fermi-ulam"))), 20
     t = draw.power(8, most) * draw.between(1.0, 2.0)
@@ -231,7 +231,7 @@ def _horizon(draw: Draw) -> Question:
 
 def _scales(draw: Draw) -> Question:
     table = draw.pick(("cap", "stem", "mushroom"))
-    of = scene(draw, table, Clock("constant", 1.0))
+    of = scene(draw, table, SharedPeriod("constant", 1.0))
     start, t_end = state(draw, of, {"t": 0.0})
     k = draw.pick(range(-60, 61))
     laws = to_data(of)
@@ -247,7 +247,7 @@ def _scales(draw: Draw) -> Question:
 def _outside(draw: Draw) -> Question:
     of = scene(draw, draw.pick(("cap", "stem", "mushroom")), clock(draw))
     start, t_end = state(draw, of, {"site": draw.pick(_regions(of))})
-    far = draw.pick((1.5, 4.0, 1e6)) * Moment(of, start.t).size
+    far = draw.pick((1.5, 4.0, 1e6)) * TableAt(of, start.t).size
     c, s = draw.direction()
     out = msgspec.structs.replace(start, x=start.x + far * c, y=start.y + far * s)
     return _question("refused-state", "a state outside the table", "hard case 45", of, (out, t_end))

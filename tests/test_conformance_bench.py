@@ -42,7 +42,7 @@ def measured(workload, *these):
 @pytest.mark.parametrize("name", workloads.NAMES)
 def test_answers_of_a_workload_are_proved_collisions(drawn, name):
     for question in drawn[name].questions:
-        again = proved_step(drawn[name].scene, question.state, question.t_end, 50)
+        again = proved_step(drawn[name].scene, question.state, question.t_end, 60)
         assert again.outcome == question.truth.outcome == "collision"
         (step,), (once_more,) = question.truth.steps, again.steps
         assert step.wall == once_more.wall

@@ -42,7 +42,7 @@ Floats = npt.NDArray[np.float64]
 ALARM = 1e-6
 
 
-class Finding(NamedTuple):
+class Statistic(NamedTuple):
     """One test: the mean measured, what it must be, how far it may be off."""
 
     name: str
@@ -75,7 +75,7 @@ def work_identity(
     ratio: float | None = None,
     seed: int = 0,
     alarm: float = ALARM,
-) -> list[Finding]:
+) -> list[Statistic]:
     """Test mean exp(-W / kT) = A(t) / A(0) at several times.
 
     Args:
@@ -110,7 +110,7 @@ def work_identity(
         x = np.minimum(np.exp((ratio * e0 - e1) / kT), 1.0) / ratio
         expected = area(scene, part * span) / area(scene, 0.0)
         found.append(
-            _finding(
+            _statistic(
                 f"mean exp(-W/kT) at {part:g} T", x, expected, 1 / ratio, n_particles, alarm / len(times)
             )
         )
@@ -129,7 +129,7 @@ def one_cycle(
     bias: float,
     seed: int = 0,
     alarm: float = ALARM,
-) -> list[Finding]:
+) -> list[Statistic]:
     """Test the share never captured and the mean of log E1 / E0 over one cycle against theory.
 
     Args:
@@ -159,7 +159,7 @@ def one_cycle(
     widest = largest + bias
     s = np.clip([log(_energy(o) / energy) for o in ended], -widest, widest) + widest
     tests = (("p_nc", free, p_nc, 1.0), ("m1", s, m1 + widest, 2 * widest))
-    found = [_finding(name, x, mean, b, n_particles, alarm / 2) for name, x, mean, b in tests]
+    found = [_statistic(name, x, mean, b, n_particles, alarm / 2) for name, x, mean, b in tests]
     found = [finding._replace(margin=finding.margin + bias) for finding in found]
     return [found[0], found[1]._replace(measured=found[1].measured - widest, expected=m1)]
 
@@ -232,12 +232,12 @@ def _generator(seed: int, stream: int) -> np.random.Generator:
     return np.random.Generator(np.random.Philox(key=seed, counter=[0, 0, 0, stream]))
 
 
-def _finding(name: str, x: Floats, expected: float, bound: float, n: int, alarm: float) -> Finding:
+def _statistic(name: str, x: Floats, expected: float, bound: float, n: int, alarm: float) -> Statistic:
     if len(x) < 2:
-        return Finding(name, float("nan"), expected, 0.0, n, n - len(x))
+        return Statistic(name, float("nan"), expected, 0.0, n, n - len(x))
     lost = n - len(x)
     allowed = margin(x, bound, alarm) + bound * lost / n
-    return Finding(name, float(x.mean()), expected, allowed, n, lost)
+    return Statistic(name, float(x.mean()), expected, allowed, n, lost)
 
 
 def _check_range(field: str, number: float, low: float, high: float) -> None:

@@ -92,7 +92,7 @@ class Certified(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_de
 
 
 class Expectation(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
-    """A certified answer: one answer that is right.
+    """One answer that is right.
 
     Attributes:
         outcome: of the step; of a trajectory: how it ends, "collision" when all asked for are found.

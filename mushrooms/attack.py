@@ -13,7 +13,7 @@ from rich.table import Table
 from mushrooms import output
 from mushrooms.terminal import progress_bar
 from scene.files import write_file
-from scene.refusal import BadInput
+from scene.refusal import BadInput, check_count, check_seed
 
 CHOICES = ("reference", "fast", "both")
 MAX_CASES = 10**7
@@ -39,10 +39,8 @@ def attack(
     """
     if stepper not in CHOICES:
         raise BadInput(f"--stepper = {stepper!r}, must be one of {', '.join(CHOICES)}")
-    if not 1 <= cases <= MAX_CASES:
-        raise BadInput(f"--cases = {cases}, must be 1 to {MAX_CASES}")
-    if not 0 <= seed < 2**64:
-        raise BadInput(f"--seed = {seed}, must be 0 to {2**64 - 1}")
+    check_count("--cases", cases, 1, MAX_CASES)
+    check_seed(seed, "--seed")
     try:
         from conformance import attacks
     except ModuleNotFoundError:

@@ -8,7 +8,7 @@ from mpmath import isfinite
 
 import fast
 import reference
-from conformance.attacks import Attack, Claim, Steppers
+from conformance.attacks import Attack, Claim, UnderAttack
 from conformance.generator.prover import coasted, ends
 from conformance.grading.agreement import Answer, Enclosed
 from conformance.vectors import Ends
@@ -19,12 +19,12 @@ DIGITS = 25  # of a single step: enough to tell enclosures from wrong answers
 WALLS = ("arc", "base", "left", "right", "floor")
 
 
-def steppers(choice: str) -> Steppers:
+def steppers(choice: str) -> UnderAttack:
     """Return what "reference", "fast" or "both" puts under attack."""
     proved = prove if choice in ("reference", "both") else None
     if choice in ("fast", "both"):
-        return Steppers(proved, fast.next_collision, flow)
-    return Steppers(proved)
+        return UnderAttack(proved, fast.next_collision, flow)
+    return UnderAttack(proved)
 
 
 def prove(attack: Attack) -> Claim:

@@ -20,7 +20,7 @@ from rich.table import Table
 from mushrooms import output
 from mushrooms.terminal import progress_bar
 from scene.files import Writer, write_files
-from scene.refusal import BadInput
+from scene.refusal import BadInput, check_seed
 
 if TYPE_CHECKING:
     from conformance.bench.comparison import Ratio
@@ -28,7 +28,6 @@ if TYPE_CHECKING:
     from conformance.bench.measure import Effort
     from conformance.bench.record import Record, Size
 
-MAX_SEED = 2**64 - 1
 TIMEOUT, RESTARTS = 30.0, 1  # of a command
 C_FLAGS = ("-O3", "-march=native")
 # By size: questions of a workload, laps, trajectories and their length, repeats of an ensemble.
@@ -58,8 +57,7 @@ def bench(
     from mushrooms.figures import speed as figures_of_speed
     from mushrooms.reports import bench_page
 
-    if not 0 <= seed <= MAX_SEED:
-        raise BadInput(f"--seed = {seed}, must be 0 to 2^64 - 1")
+    check_seed(seed, "--seed")
     size: Size = "quick" if quick else "full"
     old = record.read(compare) if compare is not None else None
     if old is not None:
@@ -143,7 +141,7 @@ def _measured(size: Size, seed: int, command: list[str]) -> Record:
         points=tuple(points),
         not_run=not_run,
         growth=grown,
-        work=record.Work(work.SCENE, series, memory, compiled),
+        work=record.EnsembleWork(work.SCENE, series, memory, compiled),
         hard_cases=cases,
         seconds=round(time.monotonic() - begin, 1),
     )

@@ -10,7 +10,7 @@ from flint import arb
 from hypothesis import given, settings
 from support import faulty_provers as faults
 
-from conformance.attacks import FAMILIES, Attack, Claim, Steppers, line, run
+from conformance.attacks import FAMILIES, Attack, Claim, UnderAttack, line, run
 from conformance.attacks.search import as_certified, flown, proved, stepped, truths
 from conformance.grading.agreement import middle
 from conformance.second_stepper import Answer, next_collision
@@ -41,7 +41,7 @@ KILLS = {
     "rebound-dips": (faults.faulty(faults.ends_alone), 20),
     "floor-from-stem": (faults.faulty(faults.ends_alone), 20),
     "side-dips": (faults.faulty(faults.ends_alone), 20),
-    "met-again-across-knot": (Steppers(stepper=faults.rounded_rates), 60),
+    "met-again-across-knot": (UnderAttack(stepper=faults.rounded_rates), 60),
     "extreme-scale": (faults.overflowing, 40),
     "late-phase": (faults.reduced_time, 20),
     "long-wait": (faults.impatient, 10),
@@ -70,7 +70,7 @@ def test_our_steppers_survive(name, tally):
 @pytest.mark.parametrize("name", KILLS)
 def test_a_family_finds_its_fault(name):
     fault, n_cases = KILLS[name]
-    faulty = fault if isinstance(fault, Steppers) else Steppers(fault)
+    faulty = fault if isinstance(fault, UnderAttack) else UnderAttack(fault)
     (found,) = run([FAMILIES[name]], n_cases, SEED, faulty)
     assert found.wrong
 
@@ -168,7 +168,7 @@ def test_a_stepper_that_raises_is_a_finding():
     def raising(attack):
         raise OverflowError("too large")
 
-    (found,) = run([FAMILIES["long-wait"]], 1, SEED, Steppers(raising))
+    (found,) = run([FAMILIES["long-wait"]], 1, SEED, UnderAttack(raising))
     assert "OverflowError" in found.wrong[0]
 
 

@@ -42,7 +42,7 @@ def measured(workload, *these):
 @pytest.mark.parametrize("name", workloads.NAMES)
 def test_answers_of_a_workload_are_proved_collisions(drawn, name):
     for question in drawn[name].questions:
-        again = proved_step(drawn[name].scene, question.state, question.t_end, 50)
+        again = proved_step(drawn[name].scene, question.state, question.t_end, 60)
         assert again.outcome == question.truth.outcome == "collision"
         (step,), (once_more,) = question.truth.steps, again.steps
         assert step.wall == once_more.wall
@@ -244,8 +244,8 @@ def a_point(ns: list[float], contender: str = "fast") -> record.Point:
 
 def a_record(*points: record.Point, clock: float = 1.0) -> record.Record:
     grown = record.Growth("moving-cap", 1e4, 1, 1, {"a": (1e-16,)}, {"a": 1.0}, (1e-16,), 0.2)
-    costs = record.Work(
-        "moving-cap", (record.Series("particles", (1.0, 2.0), (1.0, 2.0), (1.0, 2.0), 1.0, 0.0),), 1.0, {}
+    costs = record.EnsembleWork(
+        "moving-cap", (record.CostSeries("particles", (1.0, 2.0), (1.0, 2.0), (1.0, 2.0), 1.0, 0.0),), 1.0, {}
     )
     cases = (record.Case("01", "a graze", 1, {"fast": {"right": 1}}, {"fast": 0.5}),)
     drawn = (record.Drawn("slow", "slow", "moving-cap", 1),)

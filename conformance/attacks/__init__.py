@@ -6,10 +6,10 @@ the second stepper (`conformance.second_stepper`). Needs the test extra (python-
 
 from conformance.attacks import corners, dips, knots, residuals, shapes
 from conformance.attacks.case import Attack, Family, line
-from conformance.attacks.search import Claim, Steppers, Tally, Verdict, run
+from conformance.attacks.search import Claim, Judgement, Tally, UnderAttack, run
 
 FAMILIES: dict[str, Family] = {
     family.name: family for module in (knots, residuals, corners, dips, shapes) for family in module.FAMILIES
 }
 
-__all__ = ["FAMILIES", "Attack", "Claim", "Family", "Steppers", "Tally", "Verdict", "line", "run"]
+__all__ = ["FAMILIES", "Attack", "Claim", "Family", "Judgement", "Tally", "UnderAttack", "line", "run"]

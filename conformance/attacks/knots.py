@@ -16,7 +16,7 @@ from flint import arb
 
 from conformance import second_stepper
 from conformance.attacks.case import Attack, Family, built
-from conformance.generator.draws import Clock, Draw, law
+from conformance.generator.draws import Draw, SharedPeriod, law
 from scene import BangBang, Cap, Law, Mushroom, Scene, State, Stem
 
 PERIOD = 16.0
@@ -61,7 +61,7 @@ def _working(draw: Draw, t: float, width: float) -> int:
 
 def _base(draw: Draw) -> tuple[dict[str, Law], State]:
     """Draw a mushroom's parameters, some of them moving, and a particle in it at t = 0."""
-    clock = Clock("bang-bang", PERIOD)
+    clock = SharedPeriod("bang-bang", PERIOD)
     names = ("r", draw.pick(("w", "w", "nu")), "h", "slope")
     found = {
         name: law(draw, *SIZES[name], clock) if draw.pick((True, False, False)) else draw.short(*SIZES[name])

@@ -46,7 +46,7 @@ Stepper = Callable[[Scene, State, float], Outcome]
 Flow = Callable[[Scene, State, float], "dict[str, int] | None"]  # None: undecided
 
 
-class Verdict(NamedTuple):
+class Judgement(NamedTuple):
     """How one answer compares: agreed, undecided, refused, open (the second stepper's), or wrong."""
 
     kind: str
@@ -54,7 +54,7 @@ class Verdict(NamedTuple):
     ulps: float = 0.0
 
 
-class Steppers(NamedTuple):
+class UnderAttack(NamedTuple):
     """What is under attack; None leaves one out."""
 
     prover: Prover | None = None
@@ -73,7 +73,7 @@ class Tally:
     slowest: float = 0.0  # seconds a step of the proved stepper, its proof repeated
     wrong: list[str] = field(default_factory=list)
 
-    def add(self, verdict: Verdict, where: str) -> None:
+    def add(self, verdict: Judgement, where: str) -> None:
         """Count a verdict."""
         self.counts[verdict.kind] += 1
         self.worst_ulps = max(self.worst_ulps, verdict.ulps)
@@ -93,7 +93,7 @@ def run(
     families: Iterable[Family],
     n_cases: int,
     seed: int,
-    steppers: Steppers,
+    steppers: UnderAttack,
     progress: Callable[[Tally], None] = lambda tally: None,
 ) -> list[Tally]:
     """Attack steppers with some cases of each family.
@@ -122,7 +122,7 @@ def run(
     return tallies
 
 
-def judged(attack: Attack, steppers: Steppers, tally: Tally) -> Iterable[Verdict]:
+def judged(attack: Attack, steppers: UnderAttack, tally: Tally) -> Iterable[Judgement]:
     """Put one attack to each stepper and judge what it answers."""
     answers = truths(attack)
     if steppers.prover is not None:
@@ -139,19 +139,19 @@ def judged(attack: Attack, steppers: Steppers, tally: Tally) -> Iterable[Verdict
         yield _survived(lambda: flown(flow(attack.scene, attack.state, end), answers))
 
 
-def _step_verdict(stepper: Stepper, attack: Attack, t_end: float, answer: second_stepper.Answer) -> Verdict:
+def _step_verdict(stepper: Stepper, attack: Attack, t_end: float, answer: second_stepper.Answer) -> Judgement:
     return stepped(stepper(attack.scene, attack.state, t_end), answer, attack.state)
 
 
-def _survived(judge: Callable[[], Verdict]) -> Verdict:
+def _survived(judge: Callable[[], Judgement]) -> Judgement:
     """Return a verdict; whatever a stepper under attack raises is one too, and the search goes on."""
     try:
         return judge()
     except Exception as error:
-        return Verdict("wrong", f"it raises {type(error).__name__}: {error}")
+        return Judgement("wrong", f"it raises {type(error).__name__}: {error}")
 
 
-def proved(claim: Claim, truth: Sequence[second_stepper.Answer], state: State) -> Verdict:
+def proved(claim: Claim, truth: Sequence[second_stepper.Answer], state: State) -> Judgement:
     """Compare a proved stepper's path with the second stepper's, up to where either is undecided."""
     is_open = truth[-1].kind == "undecided"
     given = claim.answers[: len(truth) - 1] if is_open else claim.answers
@@ -159,20 +159,20 @@ def proved(claim: Claim, truth: Sequence[second_stepper.Answer], state: State) -
     # Two enclosures of one number meet: they are less than 0 backward ulps apart.
     found = compare(given, expected, state, bound=0.0)
     if found.kind == "undecided" or any(isinstance(a, Undecided) for a in claim.answers[: len(truth)]):
-        return Verdict("undecided")
+        return Judgement("undecided")
     if found.kind not in ("agrees", "indeterminate"):
-        return Verdict("wrong", f"proved, but {found.why}")
+        return Judgement("wrong", f"proved, but {found.why}")
     end = given[-1] if given else None
     if isinstance(end, Undefined) and end.reason != expected.reason:
-        return Verdict("wrong", f"proved to be undefined: {end.reason}, not {expected.reason}")
+        return Judgement("wrong", f"proved to be undefined: {end.reason}, not {expected.reason}")
     if claim.certificate is not None:
         try:
             (check_path if "steps" in claim.certificate else check)(claim.certificate)
         except Refuted as error:
-            return Verdict("wrong", f"the certificate does not hold: {error}")
+            return Judgement("wrong", f"the certificate does not hold: {error}")
     if is_open:
-        return Verdict("open", truth[-1].reason)
-    return Verdict("refused" if isinstance(end, Rejected) else "agreed")
+        return Judgement("open", truth[-1].reason)
+    return Judgement("refused" if isinstance(end, Rejected) else "agreed")
 
 
 def late_enough(state: State, answer: second_stepper.Answer) -> float | None:
@@ -182,18 +182,18 @@ def late_enough(state: State, answer: second_stepper.Answer) -> float | None:
     return state.t + 2 * float(answer.numbers[0].mid()) + abs(state.t) * 2.0**-50
 
 
-def stepped(outcome: Outcome, truth: second_stepper.Answer, state: State) -> Verdict:
+def stepped(outcome: Outcome, truth: second_stepper.Answer, state: State) -> Judgement:
     """Judge one step in binary64: the same outcome within some backward ulps, or an honest undecided."""
     if isinstance(outcome, Undecided):
-        return Verdict("undecided")
+        return Judgement("undecided")
     if truth.kind == "undecided":
-        return Verdict("open", truth.reason)
+        return Judgement("open", truth.reason)
     if isinstance(outcome, Rejected):
-        return Verdict("refused")
+        return Judgement("refused")
     found = compare(outcome, as_certified([truth], state), state, BOUND)
     if found.kind == "agrees":
-        return Verdict("agreed", ulps=found.ulps)
-    return Verdict("open" if found.kind == "indeterminate" else "wrong", found.why, found.ulps)
+        return Judgement("agreed", ulps=found.ulps)
+    return Judgement("open" if found.kind == "indeterminate" else "wrong", found.why, found.ulps)
 
 
 def as_certified(truth: Sequence[second_stepper.Answer], state: State) -> Expectation:
@@ -227,14 +227,16 @@ def ball_ends(ball: Any) -> Ends:
     return Fraction(int(low.p), int(low.q)), Fraction(int(high.p), int(high.q))
 
 
-def flown(counts: dict[str, int] | None, answers: Sequence[second_stepper.Answer]) -> Verdict:
+def flown(counts: dict[str, int] | None, answers: Sequence[second_stepper.Answer]) -> Judgement:
     """Compare the walls that a flow counted with those of the path."""
     if counts is None:
-        return Verdict("undecided")
+        return Judgement("undecided")
     if answers[-1].kind != "horizon":
-        return Verdict("open", answers[-1].reason)
+        return Judgement("open", answers[-1].reason)
     truth: dict[str, int] = {}
     for answer in answers[:-1]:
         truth[str(answer.wall)] = truth.get(str(answer.wall), 0) + 1
     counted = {wall: n for wall, n in counts.items() if n}
-    return Verdict("agreed") if counted == truth else Verdict("wrong", f"a flow met {counted}, not {truth}")
+    return (
+        Judgement("agreed") if counted == truth else Judgement("wrong", f"a flow met {counted}, not {truth}")
+    )

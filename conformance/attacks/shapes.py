@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from conformance.attacks.case import Attack, Family, built
-from conformance.generator.draws import Clock, Draw, clock, scene, state
+from conformance.generator.draws import Draw, SharedPeriod, clock, scene, state
 from scene import BangBang, Cap, Fourier, Law, Mushroom, Scene, State, Stem
 from scene.transforms import scaled, scaled_state
 
@@ -51,7 +51,7 @@ def long_wait(draw: Draw) -> Attack:
 
 def rest_and_sweep(draw: Draw) -> Attack:
     """A particle at rest, or nearly: swept up by a wall, or left alone up to the horizon."""
-    shared = Clock("fourier", 1.0) if draw.pick((True, False)) else Clock("bang-bang", 1.5)
+    shared = SharedPeriod("fourier", 1.0) if draw.pick((True, False)) else SharedPeriod("bang-bang", 1.5)
     plain = scene(draw, draw.pick(("cap", "stem", "mushroom")), shared)
     start, _ = state(draw, plain, {})
     size = draw.pick((0.0, 0.0, draw.power(-300, -10), draw.power(-40, -2)))

@@ -90,7 +90,7 @@ class Growth(msgspec.Struct, frozen=True):
     rate: float
 
 
-class Series(msgspec.Struct, frozen=True):
+class CostSeries(msgspec.Struct, frozen=True):
     """Cost against one size.
 
     Attributes:
@@ -110,11 +110,11 @@ class Series(msgspec.Struct, frozen=True):
     error: float | None
 
 
-class Work(msgspec.Struct, frozen=True):
+class EnsembleWork(msgspec.Struct, frozen=True):
     """What an ensemble costs; `compile_s` by entry with an empty cache, empty when not measured."""
 
     scene: str
-    series: tuple[Series, ...]
+    series: tuple[CostSeries, ...]
     bytes_per_particle: float
     compile_s: dict[str, float]
 
@@ -156,7 +156,7 @@ class Record(msgspec.Struct, frozen=True):
     points: tuple[Point, ...]
     not_run: dict[str, str]
     growth: Growth
-    work: Work
+    work: EnsembleWork
     hard_cases: tuple[Case, ...]
     seconds: float
 

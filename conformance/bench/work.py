@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from conformance.bench.record import Series, short
+from conformance.bench.record import CostSeries, short
 
 SCENE = "moving-cap"
 
@@ -50,7 +50,7 @@ FEW = {"particles": Load(), "cycles": Load(particles=300), "energy": Load(partic
 
 def measure_work(
     ensemble: Ensemble, size: str, cores: int, repeats: int, tick: Callable[[str], None]
-) -> tuple[tuple[Series, ...], float]:
+) -> tuple[tuple[CostSeries, ...], float]:
     """Time ensembles of many sizes.
 
     Args:
@@ -75,7 +75,7 @@ def measure_work(
         collisions = [float(row[0].collisions) for row in costs]
         exponent, error = fit(sizes, seconds)
         series.append(
-            Series(what, tuple(sizes), tuple(map(short, seconds)), tuple(collisions), exponent, error)
+            CostSeries(what, tuple(sizes), tuple(map(short, seconds)), tuple(collisions), exponent, error)
         )
         if what == "particles":
             memory = (costs[-1][0].peak_bytes - costs[0][0].peak_bytes) / (sizes[-1] - sizes[0])

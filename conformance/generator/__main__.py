@@ -25,7 +25,7 @@ from scene.files import write_file
 try:
     from conformance.generator.certify import Unfit, certify
     from conformance.generator.draws import Draw
-    from conformance.generator.families import Family, families
+    from conformance.generator.families import VectorFamily, families
     from conformance.generator.mouth_and_time_cases import cases
 except ModuleNotFoundError as error:
     if error.name != "flint":
@@ -50,7 +50,7 @@ def groups() -> dict[str, list[Maker]]:
     return found
 
 
-def drawn(family: Family, number: int) -> Vector:
+def drawn(family: VectorFamily, number: int) -> Vector:
     """Return a family's vector of that number: its first draw that has a certified answer."""
     for attempt in range(ATTEMPTS):
         question = family.ask(Draw(f"{family.group}/{number}/{attempt}"))

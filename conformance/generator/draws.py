@@ -60,20 +60,20 @@ class Draw:
         return c * self.pick((1.0, -1.0)), s * self.pick((1.0, -1.0))
 
 
-class Clock(NamedTuple):
+class SharedPeriod(NamedTuple):
     """What the moving laws of a scene share: kind, and omega or the period."""
 
     kind: str
     rate: float
 
 
-def clock(draw: Draw, kinds: Sequence[str] = ("fourier", "bang-bang", "constant")) -> Clock:
+def clock(draw: Draw, kinds: Sequence[str] = ("fourier", "bang-bang", "constant")) -> SharedPeriod:
     """Draw what the laws of a scene share."""
     kind = draw.pick(kinds)
-    return Clock(kind, draw.short(0.5, 6.0) if kind == "fourier" else draw.pick((0.5, 1.0, 1.5, 4.0)))
+    return SharedPeriod(kind, draw.short(0.5, 6.0) if kind == "fourier" else draw.pick((0.5, 1.0, 1.5, 4.0)))
 
 
-def law(draw: Draw, low: float, high: float, shared: Clock) -> Law:
+def law(draw: Draw, low: float, high: float, shared: SharedPeriod) -> Law:
     """Draw a law that stays within [low, high]; now and then one that stands still."""
     if shared.kind == "constant" or draw.pick(range(6)) == 0:
         return draw.short(low, high)
@@ -90,7 +90,7 @@ def law(draw: Draw, low: float, high: float, shared: Clock) -> Law:
     return Fourier(mean=mean, omega=shared.rate, cos=tuple(amplitudes[:n_cos]), sin=tuple(amplitudes[n_cos:]))
 
 
-def scene(draw: Draw, table: str, shared: Clock) -> Scene:
+def scene(draw: Draw, table: str, shared: SharedPeriod) -> Scene:
     """Draw a valid scene of a table: "cap", "stem" or "mushroom"."""
     if table == "cap":
         return Cap(r=law(draw, 0.25, 2.0, shared))
@@ -107,7 +107,7 @@ def scene(draw: Draw, table: str, shared: Clock) -> Scene:
     return Mushroom(r=r, w=w, h=h, slope=_slope(draw, bounds(w).lowest, bounds(h).highest, shared))
 
 
-def _slope(draw: Draw, narrowest: float, deepest: float, shared: Clock) -> Law:
+def _slope(draw: Draw, narrowest: float, deepest: float, shared: SharedPeriod) -> Law:
     steepest = 0.9 * narrowest / deepest
     kind = draw.pick(("positive", "zero", "negative", "moving"))
     if kind == "moving" and steepest > 0.01:

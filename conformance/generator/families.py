@@ -12,7 +12,7 @@ from typing import NamedTuple
 import msgspec
 
 from conformance.generator.certify import Question
-from conformance.generator.draws import Clock, Draw, clock, place, scene, state, time, wire_form
+from conformance.generator.draws import Draw, SharedPeriod, clock, place, scene, state, time, wire_form
 from scene import Scene, State, from_data, load, to_data
 from scene.geometry import rounded
 
@@ -33,7 +33,7 @@ CATALOGUE = {
 }
 
 
-class Family(NamedTuple):
+class VectorFamily(NamedTuple):
     """A group's drawn vectors.
 
     Attributes:
@@ -49,34 +49,34 @@ class Family(NamedTuple):
     wanted: str | None = None
 
 
-def families() -> list[Family]:
+def families() -> list[VectorFamily]:
     """List all families, in the corpus's order."""
     found = []
     for name, source in CATALOGUE.items():
-        found.append(Family(name, 50, partial(_catalogue_step, name, source)))
+        found.append(VectorFamily(name, 50, partial(_catalogue_step, name, source)))
         n_paths = 16 if name in ("moving-cap", *FIXED) else 11
-        found.append(Family(f"{name}-trajectory", n_paths, partial(_catalogue_path, name, source)))
+        found.append(VectorFamily(f"{name}-trajectory", n_paths, partial(_catalogue_path, name, source)))
     for table in ("cap", "stem", "mushroom"):
         found += [
-            Family(f"static-{table}", 20, partial(_generated_step, table, "static", ("constant",))),
-            Family(f"generated-{table}", 90, partial(_generated_step, table, "generated", ())),
-            Family(f"generated-{table}-trajectory", 10, partial(_generated_path, table)),
+            VectorFamily(f"static-{table}", 20, partial(_generated_step, table, "static", ("constant",))),
+            VectorFamily(f"generated-{table}", 90, partial(_generated_step, table, "generated", ())),
+            VectorFamily(f"generated-{table}-trajectory", 10, partial(_generated_path, table)),
         ]
     return [
         *found,
-        Family("whispering-gallery", 10, _gallery),
-        Family("stem-trajectory", 10, _stem_path),
-        Family("slow-particle", 60, _slow),
-        Family("fast-wall", 40, _fast_wall),
-        Family("skipping", 60, _skipping),
-        Family("grazing", 60, _grazing),
-        Family("near-corner", 90, _near_corner),
-        Family("through-mouth", 60, _through_mouth),
-        Family("knot-in-flight", 60, _knots),
-        Family("late-start", 50, _late),
-        Family("horizon", 50, _horizon, "horizon"),
-        Family("scales", 50, _scales),
-        Family("refused-state", 30, _outside, "rejected"),
+        VectorFamily("whispering-gallery", 10, _gallery),
+        VectorFamily("stem-trajectory", 10, _stem_path),
+        VectorFamily("slow-particle", 60, _slow),
+        VectorFamily("fast-wall", 40, _fast_wall),
+        VectorFamily("skipping", 60, _skipping),
+        VectorFamily("grazing", 60, _grazing),
+        VectorFamily("near-corner", 90, _near_corner),
+        VectorFamily("through-mouth", 60, _through_mouth),
+        VectorFamily("knot-in-flight", 60, _knots),
+        VectorFamily("late-start", 50, _late),
+        VectorFamily("horizon", 50, _horizon, "horizon"),
+        VectorFamily("scales", 50, _scales),
+        VectorFamily("refused-state", 30, _outside, "rejected"),
     ]
 
 
@@ -205,7 +205,7 @@ def _knots(draw: Draw) -> Question:
     if draw.pick((False, True)):
         _, of = _named(draw, FIXED)
     else:
-        of = scene(draw, draw.pick(("stem", "mushroom")), Clock("bang-bang", draw.pick((0.5, 1.0))))
+        of = scene(draw, draw.pick(("stem", "mushroom")), SharedPeriod("bang-bang", draw.pick((0.5, 1.0))))
     start, t_end = state(draw, of, {"speed": draw.power(-4, 1), "patience": 8.0})
     rule = "a law changes its piece during the flight"
     return _question("knot-in-flight", rule, "sec. 4.1; hard case 36", of, (start, min(t_end, start.t + 16)))
@@ -213,7 +213,7 @@ def _knots(draw: Draw) -> Question:
 
 def _late(draw: Draw) -> Question:
     if draw.pick((False, True)):
-        of, most = scene(draw, draw.pick(("cap", "stem", "mushroom")), Clock("constant", 1.0)), 44
+        of, most = scene(draw, draw.pick(("cap", "stem", "mushroom")), SharedPeriod("constant", 1.0)), 44
     else:
         of, most = load(draw.pick((*MOVING, *FIXED, "breathing-circle", "fermi-ulam"))), 20
     t = draw.power(8, most) * draw.between(1.0, 2.0)
@@ -232,7 +232,7 @@ def _horizon(draw: Draw) -> Question:
 
 def _scales(draw: Draw) -> Question:
     table = draw.pick(("cap", "stem", "mushroom"))
-    of = scene(draw, table, Clock("constant", 1.0))
+    of = scene(draw, table, SharedPeriod("constant", 1.0))
     start, t_end = state(draw, of, {"t": 0.0})
     k = draw.pick(range(-60, 61))
     laws = to_data(of)

@@ -22,7 +22,7 @@ NUDGE = 2.0**-26  # relative: the differences of central differences then keep h
 INPUTS = ("t", "x", "y", "vx", "vy")
 
 
-class Step(NamedTuple):
+class MeasuredStep(NamedTuple):
     """An answer and what rounding may move it by: dt, t, x, y, vx, vy each."""
 
     outcome: Collision | Horizon
@@ -68,7 +68,7 @@ def measured(
     t_end: float,
     bound: float,
     incoming: Sequence[float] = (0.0,) * 5,
-) -> Step | None:
+) -> MeasuredStep | None:
     """Take a step and measure what rounding may do to it.
 
     Args:
@@ -96,7 +96,7 @@ def measured(
         if slopes is None:
             return None
         errors = [e + abs(d) * (error + bound * extent) for e, d in zip(errors, slopes, strict=True)]
-    return Step(outcome, found, tuple(errors))
+    return MeasuredStep(outcome, found, tuple(errors))
 
 
 def vector_sizes(found: Numbers) -> Numbers:

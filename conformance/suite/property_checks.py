@@ -21,7 +21,7 @@ import numpy as np
 
 import theory
 from conformance import profiles, properties
-from conformance.profiles import Captured, Finding
+from conformance.profiles import Captured, Statistic
 from conformance.suite.process import Trouble
 from conformance.suite.session import Session, missing
 from conformance.vectors import Vector
@@ -124,7 +124,7 @@ def ask_profiles(session: Session) -> Iterator[Verdict]:
     if missing(session.introduction, "flow", to_data(scene)):
         return
     size = _affordable(session, scene)
-    tests: dict[str, Callable[[], list[Finding]]] = {
+    tests: dict[str, Callable[[], list[Statistic]]] = {
         "work-identity": lambda: profiles.work_identity(
             _flow(session),
             SHRINKING,
@@ -146,7 +146,7 @@ def ask_profiles(session: Session) -> Iterator[Verdict]:
         yield name, _judged(findings), "; ".join(map(str, findings)), time.monotonic() - begin
 
 
-def _judged(findings: Sequence[Finding]) -> str:
+def _judged(findings: Sequence[Statistic]) -> str:
     if not all(finding.is_met for finding in findings):
         return "fail"
     return "declined" if any(finding.lost > MAX_LOST * finding.n for finding in findings) else "pass"
@@ -166,7 +166,7 @@ def _affordable(session: Session, scene: Mushroom) -> Size:
     return next((size for size in SIZES if size.n_particles * seconds < BUDGET), SIZES[-1])
 
 
-def _one_cycle(session: Session, scene: Mushroom, size: Size) -> list[Finding]:
+def _one_cycle(session: Session, scene: Mushroom, size: Size) -> list[Statistic]:
     prediction = theory.predict(scene, 10)
     areas = [area(scene, cycle_length(scene) * k / 64) for k in range(64)]
     return profiles.one_cycle(

@@ -11,7 +11,7 @@ from matplotlib import rc_context
 from matplotlib.lines import Line2D
 from matplotlib.ticker import FixedLocator, NullLocator
 
-from conformance.bench.record import Growth, Point, Record, Series
+from conformance.bench.record import CostSeries, Growth, Point, Record
 from mushrooms.figures import style as plots
 
 COLOURS = {
@@ -211,7 +211,7 @@ def growth(found: Growth) -> bytes:
 
 
 @rc_context(plots.STYLE)
-def work(series: tuple[Series, ...]) -> bytes:
+def work(series: tuple[CostSeries, ...]) -> bytes:
     """Draw kernel time against particles, cycles, energy and threads."""
     figure, axes = plots.new_figure(10.5, 2.9, 1, len(series))
     panels = np.atleast_1d(axes)

@@ -23,7 +23,7 @@ from conformance.suite.session import Session
 
 HERE = Path(__file__).parent
 PYTHON = [sys.executable, str(Path(conformance.__file__).parent / "harness" / "python" / "stepper.py")]
-SABOTEUR = [sys.executable, "-I", "-S", str(HERE / "saboteurs.py")]
+SABOTEUR = [sys.executable, "-I", "-S", str(HERE / "support" / "saboteurs.py")]
 
 
 @pytest.fixture(autouse=True)

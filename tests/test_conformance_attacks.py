@@ -186,7 +186,7 @@ def test_the_command_prints_wrong_cases(command_line, tmp_path, monkeypatch):
     monkeypatch.setattr("mushrooms.attack_steppers.prove", faults.impatient)
     found = command_line("attack", "--family", "long-wait", "--cases", 2, "--stepper", "reference")
     assert found.code == 1
-    assert "wrong: proved, but horizon, must be" in found.out
+    assert "wrong: proved, but step 1: horizon, must be" in found.out
     assert '"family": "long-wait", "seed": 0' in found.out
 
 

@@ -12,8 +12,10 @@ from typing import Any
 
 import numpy as np
 from llvmlite import ir
-from numba import config, njit, types
+from numba import config, types
 from numba.extending import intrinsic
+
+from fast.kernel.compiling import kernel, packed, part
 
 SAFETY = 8.0 * 2.0**-53  # eight units in the last place of the summed sizes of a sum's terms
 MAX_QUADRANT = 2.0**27
@@ -47,7 +49,7 @@ def _exact_fma(a: float, b: float, c: float) -> float:
 fma = _exact_fma if config.DISABLE_JIT else _compiled_fma
 
 
-@njit(error_model="numpy")
+@kernel
 def two_sum(a, b):
     """Return a + b as a rounded sum and its exact error."""
     s = a + b
@@ -55,21 +57,21 @@ def two_sum(a, b):
     return s, (a - (s - z)) + (b - z)
 
 
-@njit(error_model="numpy")
+@kernel
 def two_product(a, b):
     """Return a b as a rounded product and its exact error."""
     p = a * b
     return p, fma(a, b, -p)
 
 
-@njit(error_model="numpy")
+@kernel
 def multiplied(a, a_low, b, b_low):
     """Return (a + a_low) (b + b_low) as a sum of two floats."""
     p, e = two_product(a, b)
     return two_sum(p, e + (a * b_low + a_low * b))
 
 
-@njit(error_model="numpy", forceinline=True)
+@packed
 def products(a, a_low, b, b_low, c, c_low, d, d_low):
     """Return (a + a_low) (b + b_low) + (c + c_low) (d + d_low) as a sum of two floats."""
     p, e = two_product(a, b)
@@ -78,7 +80,7 @@ def products(a, a_low, b, b_low, c, c_low, d, d_low):
     return s, low + (e + f + (fma(a, b_low, a_low * b) + fma(c, d_low, c_low * d)))
 
 
-@njit(error_model="numpy", forceinline=True)
+@packed
 def quotient(a, a_low, b, b_low):
     """Return (a + a_low) / (b + b_low) as a sum of two floats."""
     inverse = 1.0 / b
@@ -86,14 +88,14 @@ def quotient(a, a_low, b, b_low):
     return q, (fma(-q, b, a) + (a_low - q * b_low)) * inverse
 
 
-@njit(error_model="numpy")
+@kernel
 def dot(a, b, c, d):
     """Return a b + c d, right to a unit in the last place or so even where the two cancel."""
     p = c * d
     return fma(a, b, p) + fma(c, d, -p)
 
 
-@njit(error_model="numpy")
+@kernel
 def reduced(omega, omega_low, k, t_hi, t_lo):
     """Return k (omega + omega_low) (t_hi + t_lo) as quarter turns n and a rest r + tail, |r| <= pi/4."""
     p, e = two_product(omega, t_hi)
@@ -108,7 +110,7 @@ def reduced(omega, omega_low, k, t_hi, t_lo):
     return n, r, tail
 
 
-@njit(error_model="numpy")
+@kernel
 def beyond_first_order(r):
     """Return sin r - r and cos r - 1 for |r| <= pi/4, by their Taylor series to r^17."""
     z = r * r
@@ -128,7 +130,7 @@ def beyond_first_order(r):
     return r * z * s, fma(z * z, c, -0.5 * z)
 
 
-@njit(error_model="numpy")
+@part
 def short_sine_cosine(r, tail):
     """Return sin and cos of r + tail for |r| <= pi/4, each as a sum of two floats, right to 2^-64.
 
@@ -161,7 +163,7 @@ def short_sine_cosine(r, tail):
     return s, s_low + fma(c, tail, p_low), c, c_low + fma(-s, tail, q_low)
 
 
-@njit(error_model="numpy")
+@kernel
 def turned(n, sine, cosine):
     """Return sin and cos of an angle n quarter turns further."""
     half = np.floor(0.5 * n)
@@ -172,7 +174,7 @@ def turned(n, sine, cosine):
     return s, c
 
 
-@njit(error_model="numpy")
+@kernel
 def sine_cosine(omega, omega_low, k, t_hi, t_lo):
     """Return sin and cos of k (omega + omega_low) (t_hi + t_lo), each as two floats, and whether in reach."""
     n, r, tail = reduced(omega, omega_low, k, t_hi, t_lo)

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from numba import njit
-
 from fast.kernel.arithmetic import dot, fma
+from fast.kernel.compiling import kernel
 
 from fast.kernel.pools import (  # isort: skip
     CLOSED, DONE, H0, H1, H2, HIT, NEVER, NEXT_H0, NEXT_H1, NEXT_H2, NEXT_R0, NEXT_R1, NEXT_R2, NEXT_T,
@@ -17,7 +16,7 @@ from fast.kernel.walls import off_the_arc, off_the_arc_spinning
 CLEARLY_CAPTURED = 1.05  # |L| over w v from which a particle moves to the disk's pool
 
 
-@njit(error_model="numpy")
+@kernel
 def arrive(a, i):
     """Take the laws and the place at the collision as the present ones."""
     a[T + i], a[T_LOW + i] = a[NEXT_T + i], a[NEXT_T_LOW + i]
@@ -27,7 +26,7 @@ def arrive(a, i):
     a[H0 + i], a[H1 + i], a[H2 + i] = a[NEXT_H0 + i], a[NEXT_H1 + i], a[NEXT_H2 + i]
 
 
-@njit(error_model="numpy")
+@kernel
 def bounce(a, n, m, is_mushroom):
     """Bounce off the wall met, v - 2 f' grad f / |grad f|^2; count the hit; watch captured stays.
 
@@ -88,7 +87,7 @@ def bounce(a, n, m, is_mushroom):
         arrive(a, i)
 
 
-@njit(error_model="numpy")
+@kernel
 def rebound(a, n):
     """Bounce off the arc with the angular momentum of the whole stay, constant to the bit; count."""
     for i in range(n):

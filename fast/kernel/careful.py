@@ -15,9 +15,9 @@ accurate as its last rounding, however long the flight was.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from fast.kernel.arithmetic import SAFETY, fma, two_sum
+from fast.kernel.compiling import kernel, part
 
 from fast.kernel.codes import (  # isort: skip
     APPROACHING, ARC, AT_END, BASE, BEYOND, CAP, CORNER, EDGE, FAR_TIME, FLOOR, HORIZON, LEFT, MOUTH_EDGE,
@@ -39,7 +39,7 @@ NEAR = 2.0**-30  # how much beyond the limit hits are looked for, relatively
 PARABOLAS_BEFORE_REACH = 6
 
 
-@njit(error_model="numpy")
+@kernel
 def parabola_root(f, slope, down):
     """Return the root h > 0 of f + slope h - down h^2 / 2, for f >= 0 and down >= 0; infinity for none."""
     d = np.sqrt(slope * slope + 2.0 * down * f)
@@ -48,14 +48,14 @@ def parabola_root(f, slope, down):
     return (slope + d) / down if down > 0.0 else np.inf
 
 
-@njit(error_model="numpy")
+@part
 def still_reach(wall, f, slope, still, vx, vy):
     """Return a time, at most `still`, before which a wall that stands still so long is not met from f > 0."""
     down = 2.0 * (vx * vx + vy * vy) if wall == ARC else 0.0
     return min(parabola_root(f, slope, down) * (1.0 - 2.0**-20), still)
 
 
-@njit(error_model="numpy")
+@part
 def reached_at_least(wall, s, f, slope, moved, particle, scene, anchors):
     """Return a time, at least `moved`, before which a wall is not met, from what holds of it for long."""
     vx, vy = particle.vx, particle.vy
@@ -67,7 +67,7 @@ def reached_at_least(wall, s, f, slope, moved, particle, scene, anchors):
     return moved
 
 
-@njit(error_model="numpy")
+@kernel
 def first_root(wall, start, limit, particle, scene, anchors):
     """Find the first s in (start, limit) with f = 0, f' < 0.
 
@@ -122,7 +122,7 @@ def first_root(wall, start, limit, particle, scene, anchors):
     return TOO_MANY, s, 0.0, 0.0
 
 
-@njit(error_model="numpy")
+@kernel
 def earliest_side_or_floor(start, limit, particle, scene, anchors):
     """Find the first hit of left, right and floor; (code, s, error of s)."""
     code, s, error = NO_WALL, limit, 0.0
@@ -143,7 +143,7 @@ def earliest_side_or_floor(start, limit, particle, scene, anchors):
     return code, s, error
 
 
-@njit(error_model="numpy")
+@kernel
 def cap_flight(start, limit, has_base, particle, scene, anchors):
     """Follow the flight in the cap from `start` to the arc; (code, s)."""
     code, s, _, error = first_root(ARC, start, limit, particle, scene, anchors)
@@ -156,7 +156,7 @@ def cap_flight(start, limit, has_base, particle, scene, anchors):
     return code, s
 
 
-@njit(error_model="numpy", inline="always")
+@part
 def along_mouth(limit, particle, scene, anchors):
     """Follow a path along y = 0 inside the mouth: it may only end at the mouth's edge."""
     level = Particle(particle.t, particle.t_low, particle.x, 0.0, particle.vx, 0.0, NO_WALL)
@@ -164,7 +164,7 @@ def along_mouth(limit, particle, scene, anchors):
     return (MOUTH_EDGE if code in (LEFT, RIGHT) else code), s
 
 
-@njit(error_model="numpy")
+@kernel
 def side_of_wall(candidate, s, particle, scene, anchors):
     """Return +1 when a wall is not yet met at time s, -1 when it is passed, 0 where rounding hides it."""
     y, vy = particle.y, particle.vy
@@ -182,7 +182,7 @@ def side_of_wall(candidate, s, particle, scene, anchors):
     return 1 if f > 0.0 else -1
 
 
-@njit(error_model="numpy", inline="always")
+@part
 def trouble_at_start(is_in_cap, particle, scene, anchors):
     """Return why no flight begins on y = 0, NO_WALL where one does.
 
@@ -211,7 +211,7 @@ def trouble_at_start(is_in_cap, particle, scene, anchors):
     return NO_WALL
 
 
-@njit(error_model="numpy", inline="always")
+@part
 def event_from_cap(crossing, limit, particle, scene, anchors):
     """Find the next collision of a flight that begins in the cap and crosses y = 0 at a time; (code, s)."""
     code, s = cap_flight(0.0, min(crossing, limit), crossing < np.inf, particle, scene, anchors)
@@ -232,7 +232,7 @@ def event_from_cap(crossing, limit, particle, scene, anchors):
     return code, s
 
 
-@njit(error_model="numpy", inline="always")
+@part
 def event_from_stem(crossing, limit, particle, scene, anchors):
     """Find the next collision of a flight that begins in the stem and crosses y = 0 at a time; (code, s)."""
     y, vy = particle.y, particle.vy
@@ -252,7 +252,7 @@ def event_from_stem(crossing, limit, particle, scene, anchors):
     return cap_flight(crossing, limit, np.bool_(False), released(particle), scene, anchors)
 
 
-@njit(error_model="numpy")
+@kernel
 def first_event(particle, limit, scene, anchors):
     """Find the next collision or say why not; (code, s). The anchors hold the laws at the particle's time."""
     table, y, vy, wall = scene.table, particle.y, particle.vy, particle.wall
@@ -274,7 +274,7 @@ def first_event(particle, limit, scene, anchors):
     return (HORIZON if code == NO_WALL else code), s
 
 
-@njit(error_model="numpy")
+@kernel
 def step(particle, limit, scene, anchors):
     """Find the next collision of a particle within a time, and what it is then.
 
@@ -306,7 +306,7 @@ def step(particle, limit, scene, anchors):
     return code, limit, Particle(t, low, x, y, particle.vx, particle.vy, particle.wall)
 
 
-@njit(error_model="numpy", inline="always")
+@part
 def first_step(particle, limit, scene, anchors):
     """Judge a particle and take its step, for callers whose anchors are not set."""
     if not set_anchors(scene.laws, anchors, particle.t, particle.t_low):

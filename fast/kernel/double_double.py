@@ -11,9 +11,9 @@ from math import factorial
 
 import numpy as np
 from mpmath import MPContext
-from numba import njit
 
 from fast.kernel.arithmetic import MAX_QUADRANT, TWO_OVER_PI, multiplied, two_product, two_sum
+from fast.kernel.compiling import kernel
 
 N_TERMS = 15  # of a series for an angle up to pi/4: to 2^-106
 
@@ -39,7 +39,7 @@ HALF_PI = np.array(_parts(half_pi(), 4))
 TERMS = np.array([_parts(Fraction((-1) ** (n // 2), factorial(n)), 2) for n in range(2 * N_TERMS)])
 
 
-@njit(error_model="numpy")
+@kernel
 def add(a, b):
     """Return a + b; right relative to the sum even where a and b cancel."""
     s, e = two_sum(a[0], b[0])
@@ -48,25 +48,25 @@ def add(a, b):
     return two_sum(s, e + f)
 
 
-@njit(error_model="numpy")
+@kernel
 def sub(a, b):
     """Return a - b."""
     return add(a, (-b[0], -b[1]))
 
 
-@njit(error_model="numpy")
+@kernel
 def mul(a, b):
     """Return a b."""
     return multiplied(a[0], a[1], b[0], b[1])
 
 
-@njit(error_model="numpy")
+@kernel
 def times(factor, a):
     """Return a float times a pair."""
     return multiplied(factor, 0.0, a[0], a[1])
 
 
-@njit(error_model="numpy")
+@kernel
 def div(a, b):
     """Return a / b."""
     q = a[0] / b[0]
@@ -76,7 +76,7 @@ def div(a, b):
     return add(two_sum(q, q2), (rest[0] / b[0], 0.0))
 
 
-@njit(error_model="numpy")
+@kernel
 def series(r, z, first):
     """Return the sine's (first = 1) or the cosine's (first = 0) series at r, z = r r."""
     total = (TERMS[2 * N_TERMS - 2 + first, 0], TERMS[2 * N_TERMS - 2 + first, 1])
@@ -86,7 +86,7 @@ def series(r, z, first):
     return mul(total, r) if first else total
 
 
-@njit(error_model="numpy")
+@kernel
 def sine_cosine(angle):
     """Return sine and cosine of a pair, and whether it is in reach (2^27 quarter turns)."""
     n = np.floor(angle[0] * TWO_OVER_PI + 0.5)

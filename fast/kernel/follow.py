@@ -16,11 +16,11 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from fast.kernel.arithmetic import fma
 from fast.kernel.careful import first_step
 from fast.kernel.codes import ARC, CAP, HORIZON, MUSHROOM, N_WALLS, STEM
+from fast.kernel.compiling import kernel, part
 
 from fast.kernel.pools import (  # isort: skip
     CERTAIN, CLOSED, COARSE, DONE, END, HIT, KNOT, LANES, NEVER, NEXT_T, NEXT_T_LOW, NEXT_VX, NEXT_VY,
@@ -84,7 +84,7 @@ def new_worker(scene: Compiled, stops: Stops, followed: Followed) -> Worker:
     )
 
 
-@njit(error_model="numpy")
+@part
 def keep_stay(j, cycle, begin, end, stops, followed):
     """Keep a captured stay in the slot of each narrowing of a cycle that it spans, or as the first stay."""
     t_in, t_out = followed.t_in, followed.t_out
@@ -97,7 +97,7 @@ def keep_stay(j, cycle, begin, end, stops, followed):
             t_in[j, cycle, slot], t_out[j, cycle, slot] = begin, end
 
 
-@njit(error_model="numpy")
+@kernel
 def note_stops(a, i, roster, last, stops, followed):
     """Record for a lane's particle what is asked for at the stops up to the time `last`."""
     j, at = roster[PARTICLE, i], roster[NEXT_STOP, i]
@@ -117,7 +117,7 @@ def note_stops(a, i, roster, last, stops, followed):
     a[STOP + i] = times[at] if at < times.shape[0] else NEVER
 
 
-@njit(error_model="numpy")
+@part
 def note_stay(a, i, roster, stops, followed):
     """Record a captured stay that is over."""
     at = roster[NEXT_STOP, i]
@@ -129,7 +129,7 @@ def note_stay(a, i, roster, stops, followed):
         a[UNTIL + i] = -NEVER  # no other is wanted
 
 
-@njit(error_model="numpy")
+@part
 def finish(a, i, j, code, end, followed):
     """Write down a particle's end: at the last stop for HORIZON, else where trouble met it."""
     t, t_low, x, y, vx, vy = a[T + i], a[T_LOW + i], a[X + i], a[Y + i], a[VX + i], a[VY + i]
@@ -150,7 +150,7 @@ def finish(a, i, j, code, end, followed):
         followed.counts[j, wall] = int(a[N_ARC + wall * LANES + i])
 
 
-@njit(error_model="numpy", inline="always")
+@part
 def step_carefully(pool, a, i, roster, worker):
     """Find a lane's next collision carefully, in the disk the next one with the arc; returns the last code.
 
@@ -182,7 +182,7 @@ def step_carefully(pool, a, i, roster, worker):
     return code
 
 
-@njit(error_model="numpy")
+@kernel
 def advance(pool, a, n, is_again, scene, limits, omegas):
     """Find the next collision of the n lanes of a pool.
 
@@ -209,7 +209,7 @@ def advance(pool, a, n, is_again, scene, limits, omegas):
     fly(a, n, table == STEM, is_relative, omega, m, limits, omegas)
 
 
-@njit(error_model="numpy")
+@part
 def correct(pool, a, n, spare, scene, limits, omegas):
     """Correct coarse steps until they are right, a few times, each in a pool of its own."""
     for i in range(n):
@@ -223,7 +223,7 @@ def correct(pool, a, n, spare, scene, limits, omegas):
         change_lane(spare, np.int64(0), a, i)
 
 
-@njit(error_model="numpy")
+@kernel
 def attend(pool, a, i, roster, worker):
     """Do for a lane what `advance` could not; returns whether it stays, moves to the other pool or ends."""
     scene, stops, followed = worker.scene, worker.stops, worker.followed
@@ -254,7 +254,7 @@ def attend(pool, a, i, roster, worker):
     return ENDS
 
 
-@njit(error_model="numpy")
+@part
 def are_routine(a, n):
     """Tell whether no lane of a pool needs attention: mostly so, and seen in one packed loop."""
     least = 1.0
@@ -263,7 +263,7 @@ def are_routine(a, n):
     return least > 0.0
 
 
-@njit(error_model="numpy")
+@part
 def change_place(worker, pool, i, other, j):
     """Copy a lane and its entry in the roster to another place."""
     change_lane(worker.pools[pool], i, worker.pools[other], j)
@@ -271,7 +271,7 @@ def change_place(worker, pool, i, other, j):
     worker.rosters[other, NEXT_STOP, j] = worker.rosters[pool, NEXT_STOP, i]
 
 
-@njit(error_model="numpy", inline="always")
+@part
 def scan(pool, worker):
     """Attend to every lane of a pool that needs it; the last lane fills the place of one that leaves."""
     a, roster, n_held = worker.pools[pool], worker.rosters[pool], worker.n_held
@@ -291,7 +291,7 @@ def scan(pool, worker):
         change_place(worker, pool, n_held[pool], pool, i)
 
 
-@njit(error_model="numpy", inline="always")
+@part
 def follow(worker, walls, omegas):
     """Follow particles to the last stop.
 

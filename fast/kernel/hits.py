@@ -7,10 +7,9 @@ accurate as their last rounding.
 
 from __future__ import annotations
 
-from numba import njit
-
 from fast.kernel.arithmetic import SAFETY, two_product, two_sum
 from fast.kernel.codes import ARC, BASE, FAR_TIME, FLOOR, RIGHT, TANGENT
+from fast.kernel.compiling import kernel, part
 from fast.kernel.laws import set_anchors
 
 from fast.kernel.records import (  # isort: skip
@@ -23,7 +22,7 @@ from fast.kernel.walls import (  # isort: skip
 MAX_POLISHES = 4
 
 
-@njit(error_model="numpy")
+@part
 def remainder(wall, s, rest, residual, particle, scene, anchors):
     """Return what must be added to the time s + rest of a hit, and the rounded place there with its low part.
 
@@ -49,7 +48,7 @@ def remainder(wall, s, rest, residual, particle, scene, anchors):
     return f / -wall_slope(wall, x_s, y_s, vx, vy, scene, anchors), x_s, x_low, y_s, y_low
 
 
-@njit(error_model="numpy")
+@kernel
 def bounce(wall, x, x_low, y, y_low, vx, vy, scene, anchors):
     """Return the velocity after a hit at (x, y): v - 2 f' grad f / |grad f|^2 = v - 2 (v.n - u) n."""
     if wall == BASE:
@@ -70,7 +69,7 @@ def bounce(wall, x, x_low, y, y_low, vx, vy, scene, anchors):
     )
 
 
-@njit(error_model="numpy")
+@part
 def settled(s, particle, scene, anchors):
     """Return the time of a hit of the wall left, right to its last bit, with f, f' and f's error there."""
     wall = particle.wall
@@ -84,7 +83,7 @@ def settled(s, particle, scene, anchors):
     return s, f, slope, error
 
 
-@njit(error_model="numpy")
+@part
 def rest_of_hop(s, f, slope, particle, scene, anchors):
     """Return what must be added to the time s of a hit of the wall left; its increments gave f and f'.
 
@@ -109,7 +108,7 @@ def rest_of_hop(s, f, slope, particle, scene, anchors):
     return rest
 
 
-@njit(error_model="numpy")
+@kernel
 def move(wall, s, particle, scene, anchors):
     """Move a particle to its hit of a wall at time s, and bounce it.
 

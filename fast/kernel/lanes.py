@@ -19,9 +19,9 @@ and one square root.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from fast.kernel.arithmetic import SAFETY, fma, two_sum
+from fast.kernel.compiling import kernel, packed, part
 
 from fast.kernel.pools import (  # isort: skip
     CERTAIN, CLOSED, COARSE, END, H0, H1, H2, HIT, H_REF, NEVER, NEXT_H0, NEXT_H1, NEXT_H2, NEXT_R0,
@@ -35,7 +35,7 @@ LONGEST_TURN = 0.25  # omega u up to which the series are used
 ONE = np.float64(1.0)  # its quotient by 0 is infinite without the compiler too
 
 
-@njit(error_model="numpy", inline="always")
+@part
 def mouth_crossing(x, y, vx, vy, w0, w1, per_r, limits):
     """Return `gap`, `doubt` and `lift` of docs/lanes.md: on which side of the mouth's edge y = 0 is crossed.
 
@@ -52,7 +52,7 @@ def mouth_crossing(x, y, vx, vy, w0, w1, per_r, limits):
     return gap, doubt, lift
 
 
-@njit(error_model="numpy", inline="always")
+@part
 def nearest_below(wall, f_r, d_r, f_l, d_l, f_f, d_f):
     """Return the least quotient f / d of right, left and floor, by cross-multiplication, and its wall.
 
@@ -78,7 +78,7 @@ def nearest_below(wall, f_r, d_r, f_l, d_l, f_f, d_f):
     return f, d, side
 
 
-@njit(error_model="numpy", inline="always")
+@part
 def arc_quotient(x, y, vx, vy, wall, r0, r1, r2):
     """Return the time to the arc, to second order in it, as a quotient f / d."""
     q, v2 = fma(x, vx, y * vy), fma(vx, vx, vy * vy)
@@ -90,7 +90,7 @@ def arc_quotient(x, y, vx, vy, wall, r0, r1, r2):
     return c if b > 0.0 else root - b, b + root if b > 0.0 else a2
 
 
-@njit(error_model="numpy")
+@kernel
 def aim(a, n, is_stem, m, limits):
     """Choose each lane's wall and guess the time, walls moving at their speed now.
 
@@ -99,7 +99,7 @@ def aim(a, n, is_stem, m, limits):
     bend, per_r = limits.bend, 2.0 / limits.least_r
     for i in range(n):
         x, y, vx, vy, wall = a[X + i], a[Y + i], a[VX + i], a[VY + i], a[WALL + i]
-        w0, w1, h1 = a[W0 + i], a[W1 + i], a[H1 + i]
+        w0, w1, w2, h1, h2 = a[W0 + i], a[W1 + i], a[W2 + i], a[H1 + i], a[H2 + i]
         depth, rise = abs(y), abs(vy)
         gap, doubt, lift = mouth_crossing(x, y, vx, vy, w0, w1, per_r, limits)
         edge, drift = fma(m, y, w0), fma(m, vy, w1)
@@ -121,7 +121,7 @@ def aim(a, n, is_stem, m, limits):
         d = rise if hit == ON_BASE else d
         inverse = ONE / d
         s = f * inverse
-        bend_s = a[H2 + i] if hit == ON_FLOOR else a[W2 + i]
+        bend_s = h2 if hit == ON_FLOOR else w2
         bend_s = bend_s if hit >= ON_LEFT else 0.0
         s = s * fma(0.5 * bend_s * s, inverse, 1.0)
         # Comparisons so put that what is no number is never sure.
@@ -135,7 +135,7 @@ def aim(a, n, is_stem, m, limits):
         a[HIT + i], a[S + i], a[SURE + i] = hit, s, min(concave, sure)
 
 
-@njit(error_model="numpy", inline="always")
+@part
 def at_side_or_floor(hit, x_s, x_low, y_s, y_low, vx, vy, w, w_low, w1, h, h1, m):
     """Return f and f' of the side or the floor that is met."""
     sign = 1.0 if hit == ON_RIGHT else -1.0
@@ -146,7 +146,7 @@ def at_side_or_floor(hit, x_s, x_low, y_s, y_low, vx, vy, w, w_low, w1, h, h1, m
     return f, slope
 
 
-@njit(error_model="numpy", inline="always")
+@part
 def hop_along_arc(s, q, v2, omega, r0, r1_0, r2_0):
     """Return f of the arc that was left, by its increments since."""
     g1, g2, _ = turns(omega, s)
@@ -154,7 +154,7 @@ def hop_along_arc(s, q, v2, omega, r0, r1_0, r2_0):
     return dr * (2.0 * r0 + dr) - s * fma(s, v2, 2.0 * q)
 
 
-@njit(error_model="numpy", inline="always")
+@part
 def clearance(hit, s, x, y, vx, vy, x_s, y_s, w, h, m, limits):
     """Return `clear` of docs/lanes.md: how far inside the walls below that are not met a flight ends."""
     k_w, size_w = limits.curvature, limits.size
@@ -167,7 +167,7 @@ def clearance(hit, s, x, y, vx, vy, x_s, y_s, w, h, m, limits):
     return min(clear_r, min(clear_l, clear_f)) - far
 
 
-@njit(error_model="numpy", inline="always")
+@part
 def place_on_wall(hit, s, x, y, vx, vy, v2, x_s, y_s, r, is_stem, limits):
     """Return `place` of docs/lanes.md: positive where the wall met is met in its own part of the table.
 
@@ -184,7 +184,7 @@ def place_on_wall(hit, s, x, y, vx, vy, v2, x_s, y_s, r, is_stem, limits):
     return inside if hit == ON_BASE else place
 
 
-@njit(error_model="numpy", inline="always")
+@part
 def way_out(hit, s, x, y, vx, vy, v2, r, slope, limits):
     """Return `first` of docs/lanes.md: positive where the wall is met on the way out."""
     k_w, rate_w = limits.curvature, limits.rate
@@ -194,7 +194,7 @@ def way_out(hit, s, x, y, vx, vy, v2, r, slope, limits):
     return 1.0 if hit == ON_BASE else first
 
 
-@njit(error_model="numpy", inline="always")
+@part
 def verdict(quality, s, error):
     """Return what is known of a step: CERTAIN, COARSE, or REFUSED, which nan comes to as well."""
     result = CERTAIN if error < s else COARSE
@@ -202,7 +202,7 @@ def verdict(quality, s, error):
     return result if s < NEVER else REFUSED
 
 
-@njit(error_model="numpy", inline="always")
+@packed
 def arrive_at(a, i, s, delta, result, x_s, x_low, y_s, y_low, vx, vy):
     """Write what became of a step, with time and place of the hit; returns y there, and ROUTINE so far."""
     t, low = two_sum(a[T + i], s)
@@ -217,7 +217,7 @@ def arrive_at(a, i, s, delta, result, x_s, x_low, y_s, y_low, vx, vy):
     return y_s, result - COARSE if t < min(a[STOP + i], a[END + i]) else 0.0
 
 
-@njit(error_model="numpy", inline="always")
+@packed
 def laws_at_hit(a, i, delta, omega_r, r, r1, r2, w, w1):
     """Write radius and half-width at the hit, which is `delta` after the time that they are given for."""
     a[NEXT_R0 + i], a[NEXT_R1 + i] = fma(r1, delta, r), fma(r2, delta, r1)
@@ -225,7 +225,7 @@ def laws_at_hit(a, i, delta, omega_r, r, r1, r2, w, w1):
     a[NEXT_W0 + i] = fma(w1, delta, w)
 
 
-@njit(error_model="numpy")
+@kernel
 def fly(a, n, is_stem, is_relative, omega, m, limits, omegas):
     """Correct each lane's time of flight once, and tell whether the step is then right and routine."""
     bend, k_w = limits.bend, limits.curvature
@@ -283,7 +283,7 @@ def fly(a, n, is_stem, is_relative, omega, m, limits, omegas):
         a[NEXT_H0 + i], a[NEXT_H1 + i], a[NEXT_H2 + i] = fma(h1, delta, h), fma(h2, delta, h1), h2
 
 
-@njit(error_model="numpy")
+@kernel
 def chord(a, n, is_again, is_cap, is_relative, omega, limits, omegas):
     """Find the next arc hit of captured particles: the base is unfolded, |L| is constant.
 

@@ -14,7 +14,6 @@ are found once for all of them, at the event (row PHASE) and for the turn since 
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from fast.kernel.arithmetic import (
     MAX_QUADRANT,
@@ -24,6 +23,7 @@ from fast.kernel.arithmetic import (
     two_product,
     two_sum,
 )
+from fast.kernel.compiling import kernel, part
 
 from fast.kernel.records import (  # isort: skip
     AMPLITUDES, BANG_BANG, COSINE, COSINE_LOW, DEPTH, FOURIER, HALF_LEG, IS_SHORT, KIND, KNOTS, LEVEL,
@@ -32,7 +32,7 @@ from fast.kernel.records import (  # isort: skip
 )  # fmt: skip
 
 
-@njit(error_model="numpy")
+@part
 def set_phases(laws, anchors, t_hi, t_lo):
     """Store the sines and cosines of all harmonics at t; False when t is out of reach."""
     anchors[TURN, TURN_TIME] = -1.0
@@ -52,7 +52,7 @@ def set_phases(laws, anchors, t_hi, t_lo):
     return True
 
 
-@njit(error_model="numpy")
+@part
 def set_turn(laws, anchors, s):
     """Store cos(d) - 1 and sin(d) or, while all d are small, sin(d) - d, for the phases d = k omega s."""
     n = int(laws[SHARED, N_HARMONICS])
@@ -72,7 +72,7 @@ def set_turn(laws, anchors, s):
         anchors[TURN, COSINE + k] = -2.0 * sine * sine
 
 
-@njit(error_model="numpy")
+@kernel
 def set_anchors(laws, anchors, t_hi, t_lo):
     """Anchor all four laws at t; False when t is out of reach."""
     if not set_phases(laws, anchors, t_hi, t_lo):
@@ -91,7 +91,7 @@ def set_anchors(laws, anchors, t_hi, t_lo):
     return True
 
 
-@njit(error_model="numpy")
+@kernel
 def add_product(total, low, a, b, b_low):
     """Return total + low + a (b + b_low), as a sum of two floats."""
     p, e = two_product(a, b)
@@ -99,7 +99,7 @@ def add_product(total, low, a, b, b_low):
     return total, low + (e + f + a * b_low)
 
 
-@njit(error_model="numpy")
+@part
 def set_waves(laws, anchors, row):
     """Anchor a Fourier law from the phases stored; its terms may cancel, hence sums of two floats."""
     n = int(laws[row, N_HARMONICS])
@@ -122,7 +122,7 @@ def set_waves(laws, anchors, row):
     anchors[row, TERMS] = laws[row, OMEGA] * size
 
 
-@njit(error_model="numpy")
+@kernel
 def time_since(knot, n_periods, period, period_low, t_hi, t_lo):
     """Return t - (knot + n_periods period) as a sum of two floats."""
     d, e = two_sum(t_hi, -knot)
@@ -131,7 +131,7 @@ def time_since(knot, n_periods, period, period_low, t_hi, t_lo):
     return two_sum(difference, f + ((e - q) + (t_lo - n_periods * period_low)))
 
 
-@njit(error_model="numpy")
+@kernel
 def on_parabola(value, a, a_low, u, u_low):
     """Return value + a u^2 / 2 as a sum of two floats, and a u."""
     p, p_low = two_product(u, u)
@@ -140,7 +140,7 @@ def on_parabola(value, a, a_low, u, u_low):
     return f, f_low + (q_low + (0.5 * a * (p_low + 2.0 * u * u_low) + 0.5 * a_low * p)), a * (u + u_low)
 
 
-@njit(error_model="numpy")
+@part
 def set_leg(laws, anchors, row, t_hi, t_lo):
     """Anchor a bang-bang law: its nearer knot gives value and derivative without cancellation."""
     n = int(laws[row, N_KNOTS])
@@ -180,7 +180,7 @@ def set_leg(laws, anchors, row, t_hi, t_lo):
     return True
 
 
-@njit(error_model="numpy")
+@kernel
 def difference(a, a_low, b, b_low):
     """Return (a + a_low) - (b + b_low) as a sum of two floats, right relative to itself."""
     d, e = two_sum(a, -b)
@@ -189,7 +189,7 @@ def difference(a, a_low, b, b_low):
     return two_sum(d, e + f)
 
 
-@njit(error_model="numpy")
+@kernel
 def increment(laws, anchors, row, s):
     """Return f(t + s) - f(t), f'(t + s), and the summed sizes of the terms of both."""
     if laws[row, KIND] == FOURIER:
@@ -203,7 +203,7 @@ def increment(laws, anchors, row, s):
     return 0.0, 0.0, 0.0, 0.0
 
 
-@njit(error_model="numpy")
+@part
 def waves_increment(laws, anchors, row, s):
     """Return `increment` of a Fourier law for the turn stored."""
     n = int(laws[row, N_HARMONICS])
@@ -224,14 +224,14 @@ def waves_increment(laws, anchors, row, s):
     return change, anchors[row, RATE] + laws[row, OMEGA] * d_rate, size, anchors[row, TERMS]
 
 
-@njit(error_model="numpy")
+@kernel
 def bend_of_half_leg(laws, row, j):
     """Return the second derivative of a bang-bang law in its half-leg j."""
     a = laws[row, KNOTS + 2 * int(laws[row, N_KNOTS]) + j // 2]
     return -a if j % 2 else a
 
 
-@njit(error_model="numpy")
+@part
 def whole_periods_off(laws, row, s):
     """Return s less the whole periods in it, as a sum of two floats."""
     period, period_low = laws[row, PERIOD], laws[row, PERIOD_LOW]
@@ -243,7 +243,7 @@ def whole_periods_off(laws, row, s):
     return (left, left_low) if left > 0.0 else (0.0, 0.0)
 
 
-@njit(error_model="numpy")
+@kernel
 def leg_after(laws, anchors, row, s):
     """Walk the half-legs of a bang-bang law for a time s.
 
@@ -272,7 +272,7 @@ def leg_after(laws, anchors, row, s):
     return j, left, max(-beyond, 0.0), rate, change, size
 
 
-@njit(error_model="numpy")
+@part
 def legs_increment(laws, anchors, row, s):
     """Return `increment` of a bang-bang law by walking its half-legs, each a parabola."""
     j, step, _, rate, change, size = leg_after(laws, anchors, row, s)
@@ -282,7 +282,7 @@ def legs_increment(laws, anchors, row, s):
     return change, rate + a * step, size, abs(rate) + abs(a) * step
 
 
-@njit(error_model="numpy")
+@kernel
 def width(scene, anchors, s):
     """Return w(t), w(t + s) - w(t), w'(t + s) and the sizes of both, for w = nu r or w itself."""
     d_w, rate, size, rate_size = increment(scene.laws, anchors, WIDTH, s)
@@ -300,7 +300,7 @@ def width(scene, anchors, s):
     )
 
 
-@njit(error_model="numpy")
+@kernel
 def rest(laws, anchors, row, s):
     """Return for how long after the time s a law stands still; 0 when it moves, or is not known to rest."""
     if laws[row, KIND] == FOURIER:

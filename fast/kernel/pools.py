@@ -6,10 +6,10 @@ A law in a lane is known from its value and two derivatives at a reference time;
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from fast.kernel.arithmetic import SAFETY, fma
 from fast.kernel.codes import ARC, BASE, FLOOR, LEFT, RIGHT
+from fast.kernel.compiling import kernel, packed, part
 from fast.kernel.laws import bend_of_half_leg
 
 from fast.kernel.records import (  # isort: skip
@@ -43,7 +43,7 @@ POOL_SIZE = N_ROWS * LANES
 SERVES = 0.125  # omega times how long a reference serves for starting a flight
 
 
-@njit(error_model="numpy")
+@kernel
 def set_reference(a, i, scene, anchors):
     """Make the time of a lane's next state the reference of its laws, and give it their values there."""
     laws, t, end, knot = scene.laws, a[NEXT_T + i], NEVER, NEVER
@@ -63,13 +63,13 @@ def set_reference(a, i, scene, anchors):
     set_laws(a, i, NEXT_R0, NEXT_W0, NEXT_H0, 0.0, scene)
 
 
-@njit(error_model="numpy", inline="always")
+@packed
 def law_after(a, place, omega, g1, g2, g0):
     """Return a law and its derivatives from the rows of its reference, which begin at `place`."""
     return law(a[place], a[place + LANES], a[place + 2 * LANES], a[place + 3 * LANES], omega, g1, g2, g0)
 
 
-@njit(error_model="numpy")
+@kernel
 def law_of(a, place, row, laws, since):
     """Return a law and its derivatives at a time after its reference."""
     omega = laws[row, OMEGA] if laws[row, KIND] == FOURIER else 0.0
@@ -77,7 +77,7 @@ def law_of(a, place, row, laws, since):
     return law_after(a, place, omega, g1, g2, g0)
 
 
-@njit(error_model="numpy")
+@kernel
 def set_laws(a, i, r_row, w_row, h_row, since, scene):
     """Write a lane's laws at a time after its reference."""
     r, r1, r2 = law_of(a, R_REF + i, RADIUS, scene.laws, since)
@@ -90,7 +90,7 @@ def set_laws(a, i, r_row, w_row, h_row, since, scene):
     a[h_row + i], a[h_row + LANES + i], a[h_row + 2 * LANES + i] = h, h1, h2
 
 
-@njit(error_model="numpy")
+@part
 def load(a, i, particle, stop, is_first_kept):
     """Put a particle into a lane; its laws are unknown there, so its first step will be careful."""
     for row in range(N_ROWS):
@@ -105,14 +105,14 @@ def load(a, i, particle, stop, is_first_kept):
     a[END + i] = -NEVER
 
 
-@njit(error_model="numpy")
+@kernel
 def change_lane(a, i, b, j):
     """Copy lane i of one pool to lane j of another."""
     for row in range(N_ROWS):
         b[row * LANES + j] = a[row * LANES + i]
 
 
-@njit(error_model="numpy")
+@part
 def fold(a, i, scene):
     """Bring an unfolded particle back to y >= 0, with the laws that the disk has no use for."""
     if a[Y + i] < 0.0:
@@ -124,7 +124,7 @@ def fold(a, i, scene):
     set_laws(a, i, R0, W0, H0, since, scene)
 
 
-@njit(error_model="numpy")
+@part
 def refold(a, i):
     """Bring an unfolded particle of a cap back to y >= 0, on the arc if it was unfolded at all."""
     if a[Y + i] < 0.0:

@@ -10,9 +10,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from numba import njit
 
 from fast.kernel.codes import N_WALLS, NO_WALL
+from fast.kernel.compiling import kernel
 
 FloatArray = npt.NDArray[np.floating[Any]]
 IntArray = npt.NDArray[np.int64]
@@ -188,13 +188,13 @@ def unfilled_ends(states: FloatArray, n_columns: int, slots: tuple[int, int]) ->
     )
 
 
-@njit(error_model="numpy")
+@kernel
 def particle_at(states, i, wall):
     """Return the particle whose state is a row of `states`."""
     return Particle(states[i, 0], states[i, 1], states[i, 2], states[i, 3], states[i, 4], states[i, 5], wall)
 
 
-@njit(error_model="numpy")
+@kernel
 def write_state(states, i, particle):
     """Write a particle's state into a row of `states`."""
     states[i, 0], states[i, 1] = particle.t, particle.t_low
@@ -202,7 +202,7 @@ def write_state(states, i, particle):
     states[i, 4], states[i, 5] = particle.vx, particle.vy
 
 
-@njit(error_model="numpy")
+@kernel
 def write_step(steps, i, k, dt, particle):
     """Write collision k of path i: dt, t, x, y, vx, vy."""
     steps[i, k, 0], steps[i, k, 1] = dt, particle.t
@@ -210,7 +210,7 @@ def write_step(steps, i, k, dt, particle):
     steps[i, k, 4], steps[i, k, 5] = particle.vx, particle.vy
 
 
-@njit(error_model="numpy")
+@kernel
 def released(particle):
     """Return the particle as one that is on no wall."""
     return Particle(particle.t, particle.t_low, particle.x, particle.y, particle.vx, particle.vy, NO_WALL)

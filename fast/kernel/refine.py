@@ -14,11 +14,11 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from fast.kernel.arithmetic import two_sum
 from fast.kernel.careful import first_event
 from fast.kernel.codes import ARC, BASE, BEYOND, FAR_TIME, FLOOR, HORIZON, NO_WALL, RIGHT, TANGENT
+from fast.kernel.compiling import kernel, part
 from fast.kernel.double_double import add, div, mul, sine_cosine, sub, times
 from fast.kernel.laws import set_anchors
 
@@ -44,19 +44,19 @@ class FineState(NamedTuple):
     vy: tuple[float, float]
 
 
-@njit(error_model="numpy")
+@kernel
 def frequency(laws, row):
     """Return a Fourier law's omega."""
     return laws[row, OMEGA], laws[SHARED, OMEGA_LOW]
 
 
-@njit(error_model="numpy")
+@kernel
 def phase(laws, row, k, t):
     """Return k omega t."""
     return mul(times(k, frequency(laws, row)), t)
 
 
-@njit(error_model="numpy")
+@kernel
 def half_leg_at(laws, row, t):
     """Return where in a bang-bang law a time lies: half-leg, periods gone by, time from the nearer knot."""
     n = int(laws[row, N_KNOTS])
@@ -79,7 +79,7 @@ def half_leg_at(laws, row, t):
     return 2 * i + 1, n_periods, sub(u, length)
 
 
-@njit(error_model="numpy")
+@kernel
 def bend_of(laws, row, half_leg):
     """Return the second derivative in a half-leg."""
     n, i = int(laws[row, N_KNOTS]), half_leg // 2
@@ -87,7 +87,7 @@ def bend_of(laws, row, half_leg):
     return sign * laws[row, KNOTS + 2 * n + i], sign * laws[row, KNOTS + 3 * n + i]
 
 
-@njit(error_model="numpy")
+@kernel
 def law(laws, row, t):
     """Return a law's value and derivative."""
     if laws[row, KIND] == FOURIER:
@@ -107,7 +107,7 @@ def law(laws, row, t):
     return (laws[row, LEVEL], 0.0), ZERO
 
 
-@njit(error_model="numpy")
+@kernel
 def increment(laws, row, t, s):
     """Return a law's f(t + s) - f(t), without cancellation."""
     if laws[row, KIND] == FOURIER:
@@ -128,7 +128,7 @@ def increment(laws, row, t, s):
     return ZERO
 
 
-@njit(error_model="numpy")
+@kernel
 def half_width(scene, t):
     """Return w and w'."""
     w, rate = law(scene.laws, WIDTH, t)
@@ -138,7 +138,7 @@ def half_width(scene, t):
     return mul(w, r), add(mul(rate, r), mul(w, r_rate))
 
 
-@njit(error_model="numpy")
+@kernel
 def increase(wall, s, state, scene):
     """Return f(s) - f(0) of a wall along the flight from the state p."""
     t, x, y, vx, vy = state
@@ -162,7 +162,7 @@ def increase(wall, s, state, scene):
     return add(add(d_w, tilt), mul(s, sub(mul(m, vy), outward)))
 
 
-@njit(error_model="numpy")
+@kernel
 def residual(wall, state, scene):
     """Return f(0) of a wall."""
     t, x, y, _, _ = state
@@ -176,7 +176,7 @@ def residual(wall, state, scene):
     return sub(add(half_width(scene, t)[0], mul(m, y)), across)
 
 
-@njit(error_model="numpy")
+@kernel
 def gradient(wall, state, scene):
     """Return f_x, f_y and f' of a wall at a state on it."""
     t, x, y, vx, vy = state
@@ -194,14 +194,14 @@ def gradient(wall, state, scene):
     return (side, 0.0), m, add(rate, add(mul(m, vy), times(side, vx)))
 
 
-@njit(error_model="numpy")
+@kernel
 def moved(state, s):
     """Return the state after a free flight."""
     t, x, y, vx, vy = state
     return FineState(add(t, s), add(x, mul(vx, s)), add(y, mul(vy, s)), vx, vy)
 
 
-@njit(error_model="numpy")
+@kernel
 def corrected(wall, s, is_again, state, scene):
     """Return the time of a hit, from a time right to binary64, and whether Newton's method settled."""
     if wall == BASE:
@@ -218,7 +218,7 @@ def corrected(wall, s, is_again, state, scene):
     return time, abs(change) <= LOOSE * time[0]
 
 
-@njit(error_model="numpy")
+@kernel
 def reflected(wall, state, scene):
     """Return the velocity after a hit: v - 2 f' grad f / |grad f|^2."""
     f_x, f_y, slope = gradient(wall, state, scene)
@@ -226,13 +226,13 @@ def reflected(wall, state, scene):
     return sub(state.vx, mul(factor, f_x)), sub(state.vy, mul(factor, f_y))
 
 
-@njit(error_model="numpy")
+@kernel
 def rounded(state, wall):
     """Return a fine state as the careful step takes it."""
     return Particle(state.t[0], state.t[1], state.x[0], state.y[0], state.vx[0], state.vy[0], wall)
 
 
-@njit(error_model="numpy")
+@kernel
 def fine_step(wall, state, limit, scene, anchors):
     """Return (code, flight time, state after) from a state on `wall`; the anchors hold the laws at it."""
     code, s = first_event(rounded(state, wall), limit, scene, anchors)
@@ -248,7 +248,7 @@ def fine_step(wall, state, limit, scene, anchors):
     return code, time, FineState(t, x, y, vx, vy)
 
 
-@njit(error_model="numpy", inline="always")
+@part
 def fine_path(scene, anchors, start, wall, limit, out, met):
     """Fill out[i] with dt, t, x, y, vx, vy as pairs and met[i] with the wall; returns number and last code.
 

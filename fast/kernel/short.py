@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from numba import njit
-
 from fast.kernel.arithmetic import fma, two_product, two_sum
+from fast.kernel.compiling import kernel
 
 
-@njit(error_model="numpy")
+@kernel
 def turns(omega, s):
     """Return G1(s), G2(s) and cos(omega s) for |omega s| <= 1/4; s, s^2 / 2 and 1 for omega = 0."""
     z = omega * s
@@ -24,7 +23,7 @@ def turns(omega, s):
     return fma(s * u, a, s), s * s * b, fma(-u, b, 1.0)
 
 
-@njit(error_model="numpy")
+@kernel
 def moved(x, v, s):
     """Return x + v s as a sum of two floats."""
     p, e = two_product(v, s)
@@ -32,14 +31,14 @@ def moved(x, v, s):
     return x_s, low + e
 
 
-@njit(error_model="numpy")
+@kernel
 def short_sum(a, b):
     """Return a + b for |b| far below |a|, or a = 0, as a rounded sum and its error."""
     s = a + b
     return s, b - (s - a)
 
 
-@njit(error_model="numpy")
+@kernel
 def law(f, low, f1, f2, omega, g1, g2, g0):
     """Return a law and its two derivatives, from its values at the reference time."""
     return f + (low + fma(f1, g1, f2 * g2)), fma(f1, g0, f2 * g1), fma(f2, g0, -(omega * omega * f1) * g1)

@@ -7,10 +7,10 @@ sizes bounds its error; every value of f comes with such a bound. Source: sec. 2
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from fast.kernel.arithmetic import SAFETY, dot, fma, multiplied, products, quotient, two_product, two_sum
 from fast.kernel.codes import ARC, BASE, CAP, FLOOR, LEFT, MUSHROOM, NO_WALL, RIGHT, STEM
+from fast.kernel.compiling import kernel, packed, part
 from fast.kernel.laws import increment, rest, width
 
 from fast.kernel.records import (  # isort: skip
@@ -18,7 +18,7 @@ from fast.kernel.records import (  # isort: skip
 )  # fmt: skip
 
 
-@njit(error_model="numpy")
+@kernel
 def wall_function(wall, s, particle, residual, scene, anchors):
     """Return f(s), f'(s) and the rounding errors of both, for one wall (f > 0 inside).
 
@@ -54,7 +54,7 @@ def wall_function(wall, s, particle, residual, scene, anchors):
     return f, slope, SAFETY * error, SAFETY * slope_error
 
 
-@njit(error_model="numpy")
+@kernel
 def wall_residual(wall, x, y, scene, anchors):
     """Return f(0), right to its last bits, and a bound on its error had it been summed plainly.
 
@@ -82,7 +82,7 @@ def wall_residual(wall, x, y, scene, anchors):
     return f + (f_low + e + w_low + tilt_low), error
 
 
-@njit(error_model="numpy")
+@kernel
 def width_rate(scene, anchors):
     """Return w' at the time of the anchors."""
     rate = anchors[WIDTH, RATE]
@@ -91,7 +91,7 @@ def width_rate(scene, anchors):
     return rate * anchors[RADIUS, VALUE] + anchors[WIDTH, VALUE] * anchors[RADIUS, RATE]
 
 
-@njit(error_model="numpy")
+@kernel
 def wall_slope(wall, x, y, vx, vy, scene, anchors):
     """Return f' of a wall at the time of the anchors."""
     if wall == BASE:
@@ -107,7 +107,7 @@ def wall_slope(wall, x, y, vx, vy, scene, anchors):
     )
 
 
-@njit(error_model="numpy", forceinline=True)  # a call in a loop over lanes would not be packed
+@packed
 def off_the_arc(x, x_low, y, y_low, vx, vy, r, rate):
     """Return the velocity after a hit on the arc: v - 2 f' grad f / |grad f|^2 = v - 2 (v.n - r') n.
 
@@ -122,7 +122,7 @@ def off_the_arc(x, x_low, y, y_low, vx, vy, r, rate):
     return fma(push, x, vx) + x_push, fma(push, y, vy) + y_push
 
 
-@njit(error_model="numpy", forceinline=True)  # a call in a loop over lanes would not be packed
+@packed
 def off_the_arc_spinning(x, x_low, y, y_low, vx, vy, r, rate, spin):
     """Return the velocity after a hit on the arc where the angular momentum is known to be `spin`."""
     q, q_low = products(x, x_low, vx, 0.0, y, y_low, vy, 0.0)
@@ -137,7 +137,7 @@ def off_the_arc_spinning(x, x_low, y, y_low, vx, vy, r, rate, spin):
     return vx_s + vx_low, vy_s + vy_low
 
 
-@njit(error_model="numpy")
+@kernel
 def curvature_bounds(wall, vx, vy, bounds):
     """Return K >= -inf f'' and L >= sup f'' for all time, from the laws' bounds."""
     if wall == ARC:
@@ -157,7 +157,7 @@ def curvature_bounds(wall, vx, vy, bounds):
     return k * (1.0 + SAFETY), k * (1.0 + SAFETY)
 
 
-@njit(error_model="numpy")
+@part
 def law_size(wall, y, bounds):
     """Bound the summed sizes of all terms of the laws in a wall function.
 
@@ -173,7 +173,7 @@ def law_size(wall, y, bounds):
     )
 
 
-@njit(error_model="numpy")
+@kernel
 def wall_rest(wall, s, scene, anchors):
     """Return for how long after the time s a wall stands still."""
     if wall == ARC:
@@ -184,7 +184,7 @@ def wall_rest(wall, s, scene, anchors):
     return min(still, rest(scene.laws, anchors, RADIUS, s)) if scene.is_relative else still
 
 
-@njit(error_model="numpy")
+@part
 def reach_time(wall, x, y, vx, vy, bounds):
     """Return a time before which the particle cannot reach what the wall ever sweeps.
 
@@ -221,7 +221,7 @@ def reach_time(wall, x, y, vx, vy, bounds):
     return gap / speed * (1.0 - 4.0 * SAFETY)
 
 
-@njit(error_model="numpy")
+@kernel
 def side_of_mouth(s, x, vx, scene, anchors):
     """Return +1 when the crossing of y = 0 after time s is within |x| < w, -1 beyond, 0 too close."""
     w, d_w, _, w_size, _ = width(scene, anchors, s)
@@ -233,7 +233,7 @@ def side_of_mouth(s, x, vx, scene, anchors):
     return -1 if margin < -error else 0
 
 
-@njit(error_model="numpy")
+@kernel
 def crossed_wall(particle, scene, anchors):
     """Return a wall that the particle is beyond by more than rounding, NO_WALL for none."""
     table, y, wall = scene.table, particle.y, particle.wall

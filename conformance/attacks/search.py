@@ -70,7 +70,7 @@ class Tally:
     n_cases: int = 0
     counts: dict[str, int] = field(default_factory=lambda: dict.fromkeys(KINDS, 0))
     worst_ulps: float = 0.0
-    slowest: float = 0.0  # seconds a step of the proved stepper, its proof repeated
+    slowest: float = 0.0  # processor seconds a step of the proved stepper, its proof repeated
     wrong: list[str] = field(default_factory=list)
 
     def add(self, verdict: Judgement, where: str) -> None:
@@ -126,9 +126,9 @@ def judged(attack: Attack, steppers: UnderAttack, tally: Tally) -> Iterable[Judg
     """Put one attack to each stepper and judge what it answers."""
     answers = truths(attack)
     if steppers.prover is not None:
-        prover, begun = steppers.prover, time.perf_counter()
+        prover, begun = steppers.prover, time.process_time()
         verdict = _survived(lambda: proved(prover(attack), answers, attack.state))
-        tally.slowest = max(tally.slowest, (time.perf_counter() - begun) / max(len(answers), 1))
+        tally.slowest = max(tally.slowest, (time.process_time() - begun) / max(len(answers), 1))
         yield verdict
     if steppers.stepper is not None:
         t_end = attack.t_end if attack.t_end is not None else late_enough(attack.state, answers[0])

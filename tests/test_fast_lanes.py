@@ -14,7 +14,7 @@ import pytest
 import fast
 from fast.batch import LaneRound
 from fast.kernel import bounces, codes, lanes, pools
-from fast.kernel.limits import Limits
+from fast.kernel.limits import LawLimits
 from fast.starts import initial_states
 from fast.step import WALL_CODES
 from scene import State, load
@@ -29,7 +29,7 @@ OFF = np.bool_(False)
 def test_the_compiler_packs_divisions_and_square_roots(loop):
     """Four lanes to an instruction, where the machine has 256-bit registers."""
     a = np.ones(pools.N_ROWS * pools.LANES)
-    n, limits = np.int64(60), Limits(*[1.0] * 6)
+    n, limits = np.int64(60), LawLimits(*[1.0] * 6)
     function = getattr(bounces if loop in ("bounce", "rebound") else lanes, loop)
     arguments = {
         "aim": (OFF, 0.1, limits),

@@ -30,7 +30,7 @@ from fast.kernel.pools import (  # isort: skip
 from fast.kernel.bounces import arrive, bounce, rebound
 from fast.kernel.lanes import aim, chord, fly
 from fast.kernel.laws import set_anchors
-from fast.kernel.limits import Limits, has_lanes, limits_of
+from fast.kernel.limits import LawLimits, has_lanes, limits_of
 
 from fast.kernel.records import (  # isort: skip
     ANCHORS_SHAPE, Compiled, FloatArray, Followed, IntArray, LEVEL, OMEGA, Particle, SHARED, SLOPE, Stops,
@@ -59,7 +59,7 @@ class Worker(NamedTuple):
     """
 
     scene: Compiled
-    limits: Limits
+    limits: LawLimits
     anchors: FloatArray
     is_laned: bool
     pools: FloatArray

@@ -14,7 +14,7 @@ from fast.kernel.records import (  # isort: skip
 LEAST_RADIUS = 2.0**-1000
 
 
-class Limits(NamedTuple):
+class LawLimits(NamedTuple):
     """What holds of a scene's laws for all time, for the lanes' checks.
 
     Attributes:
@@ -42,7 +42,7 @@ class Omegas(NamedTuple):
     depth: float
 
 
-def limits_of(scene: Compiled) -> Limits:
+def limits_of(scene: Compiled) -> LawLimits:
     """Return the limits of a scene's laws."""
     r, w, h = (scene.bounds[row] for row in (RADIUS, WIDTH, DEPTH))
     grow = 1.0 + SAFETY
@@ -54,7 +54,7 @@ def limits_of(scene: Compiled) -> Limits:
         max(r[LOWEST], LEAST_RADIUS),
         max(h[LOWEST], 0.0),
     )
-    return Limits(*map(float, found))
+    return LawLimits(*map(float, found))
 
 
 def own_omegas(scene: Compiled) -> Omegas | None:

@@ -111,19 +111,6 @@ def test_bang_bang_width_and_radius_turn_between_knots() -> None:
     assert min(sampled) - 1e-4 < cycle.nu_min <= min(sampled)
 
 
-@pytest.mark.parametrize(
-    ("scene", "message"),
-    [
-        (load("breathing-circle"), "the theory is of mushrooms: table is cap"),
-        (load("fermi-ulam"), "the theory is of mushrooms: table is stem"),
-    ],
-)
-def test_what_is_not_covered_is_refused_in_one_line(scene: Any, message: str) -> None:
-    with pytest.raises(NotCovered) as caught:
-        Cycle.of(scene, 15)
-    assert str(caught.value) == message
-
-
 def test_bad_arguments_are_named() -> None:
     with pytest.raises(ValueError, match="digits = 0, must be 1 to 1000"):
         Cycle.of(load("moving-cap"), 0)

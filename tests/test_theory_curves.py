@@ -140,8 +140,3 @@ def test_a_trivial_loop_keeps_all_its_mass_at_zero() -> None:
 def test_edges_must_rise(edges: list[float]) -> None:
     with pytest.raises(ValueError, match="edges must be at least two rising numbers"):
         capture_time_mass(load("moving-cap"), edges)
-
-
-def test_a_curve_needs_two_points() -> None:
-    with pytest.raises(ValueError, match="n = 1, must be 2 to 10000000"):
-        capture_curve(load("moving-cap"), 1)

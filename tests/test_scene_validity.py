@@ -183,22 +183,6 @@ def test_the_catalogue_is_valid(name):
         assert least_margin(laws_of(scene)) > -1e-25
 
 
-def test_the_catalogue_is_complete():
-    assert catalogue() == [
-        "breathing-circle",
-        "ergodic",
-        "fermi-ulam",
-        "fixed-cap-anticlockwise",
-        "fixed-cap-clockwise",
-        "frozen-mushroom",
-        "moving-cap",
-        "moving-cap-as-printed",
-        "moving-cap-reversed",
-        "moving-cap-trivial",
-        "untilted",
-    ]
-
-
 def test_the_moving_cap_as_printed_is_refused():
     # Ledger M1: min (w - h tan theta) = -0.0667 with the printed t, +0.0511 with t/2.
     with pytest.raises(InvalidScene, match=r"w > h slope fails by -0\.066\d* near t = .*, where r = "):

@@ -7,7 +7,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from mpmath import MPContext
 
-from conformance.strategies import Clock, laws, rescale, scenes
+from conformance.strategies import Clock, laws, scenes
 from scene import BangBang, Cap, Fourier, InvalidScene, Mushroom, Stem, catalogue, from_data, load, to_data
 from scene.laws import bounds, breakpoints, exact, is_constant, period_of, value
 from scene.tables import laws as laws_of
@@ -167,11 +167,6 @@ def test_a_planted_defect_is_refused_by_name(scene, name, bad):
     data[name] = bad
     with pytest.raises(InvalidScene, match=f"^scene: {name} > 0 fails by "):
         from_data(data)
-
-
-@given(scenes(), st.integers(-30, 30), st.integers(-30, 30))
-def test_scaling_by_powers_of_two_keeps_validity(scene, length, time):
-    assert rescale(rescale(scene, length, time), -length, -time) == scene
 
 
 @pytest.mark.parametrize("name", sorted(set(catalogue()) - {"moving-cap-as-printed"}))

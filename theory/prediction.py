@@ -178,13 +178,9 @@ def converged(scene: Scene, digits: int, figures: Callable[[Captures], tuple[Any
     previous: tuple[Any, ...] | None = None
     for target in range(digits + 4, digits + GUARD - 8, 12):
         current = tuple(ctx.zero if abs(x) < noise else x for x in figures(captures(cycle, target)))
-        if previous is not None and _agree(current, previous, agreement):
-            return current
+        if previous is not None and len(current) == len(previous):
+            changes = (abs(x - y) <= agreement * abs(x) for x, y in zip(current, previous, strict=True))
+            if all(changes):
+                return current
         previous = current
     raise NotConverged(f"two resolutions in a row do not agree to {digits} digits")
-
-
-def _agree(current: tuple[Any, ...], previous: tuple[Any, ...], agreement: Any) -> bool:
-    if len(current) != len(previous):
-        return False
-    return all(abs(x - y) <= agreement * abs(x) for x, y in zip(current, previous, strict=True))

@@ -25,6 +25,7 @@ from reference.start import flight_from
 from reference.walls import MovingWalls
 from scene import (
     BadInput,
+    Cap,
     Fourier,
     Rejected,
     State,
@@ -33,6 +34,8 @@ from scene import (
     Undefined,
     load,
 )
+from scene.laws import value
+from scene.tables import laws
 
 
 def hit(scene, state, t_end=100.0, digits=40):
@@ -111,6 +114,33 @@ def test_precisions_nest(drawn):
         for leaves in two.proof.values():
             for left, right in itertools.pairwise(leaves):
                 assert right.start.a <= left.end.b
+
+
+@settings(max_examples=10_000 if IS_DEEP else 40)
+@given(scenes_and_states())
+def test_dense_sampling_finds_no_earlier_hit(drawn):
+    """The falsifier: up to the collision, the path is inside at 200 instants, in plain mpmath."""
+    scene, state, t_end = drawn
+    outcome = reference.next_collision(scene, state, t_end, digits=20)
+    if not isinstance(outcome, reference.Collision | reference.Horizon):
+        return
+    dt = float(outcome.dt) if isinstance(outcome, reference.Collision) else t_end - state.t
+    if dt == 0:
+        return
+    ctx = mpmath.MPContext()
+    ctx.dps = 40
+    for i in range(1, 200):
+        s = ctx.mpf(dt) * i / 200
+        x, y = state.x + s * state.vx, state.y + s * state.vy
+        now = {name: value(ctx, law, ctx.mpf(state.t) + s) for name, law in laws(scene).items()}
+        if y > 0:
+            assert x * x + y * y < now["r"] ** 2 * (1 + ctx.mpf(10) ** -12)
+        else:
+            w = now["w"] if "w" in now else now["nu"] * now["r"] if "nu" in now else ctx.inf
+            tolerance = ctx.mpf(10) ** -12 * (abs(x) + 1)
+            if not isinstance(scene, Cap):
+                assert abs(x) < w + now["slope"] * y + tolerance
+                assert -y < now["h"] * (1 + ctx.mpf(10) ** -12)
 
 
 def test_trajectory_encloses_its_last_state():

@@ -12,13 +12,13 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from test_fast_stepper import MIRRORED, scaled_scene
 
 import fast
 from conformance.strategies import scenes_and_states
 from fast import ensemble
 from fast.kernel import entries
 from scene import State, load
+from scene.transforms import mirrored, mirrored_wall, scaled, scaled_state
 
 # Of `small_ensemble`. It changes when the arithmetic does, and then only on purpose.
 PINNED = "95c80293d83c6d8183bf29793ed99ada6565654795664fc25915abcc1795ad9c"
@@ -101,36 +101,32 @@ def test_a_change_in_any_source_makes_the_kernels_anew(tmp_path):
 def test_a_mirrored_trajectory_is_the_mirror_of_the_trajectory(drawn):
     scene, s, _ = drawn
     one = fast.trajectory(scene, s, 30)
-    other = fast.trajectory(scene, State(s.t, -s.x, s.y, -s.vx, s.vy, MIRRORED.get(s.wall, s.wall)), 30)
-    assert other.walls == [MIRRORED.get(wall, wall) for wall in one.walls]
+    other = fast.trajectory(scene, mirrored(s), 30)
+    assert other.walls == [mirrored_wall(wall) for wall in one.walls]
     assert np.array_equal(other.steps, one.steps * [1, 1, -1, 1, -1, 1])
 
 
 @settings(max_examples=60)
 @given(scenes_and_states(), st.integers(-20, 20), st.integers(-20, 20))
-def test_a_scaled_trajectory_is_the_scaled_one(drawn, length_bits, time_bits):
+def test_a_scaled_trajectory_is_the_scaled_one(drawn, length, time):
     scene, s, _ = drawn
-    length, time = 2.0**length_bits, 2.0**time_bits
-    speed = length / time
-    start = State(s.t * time, s.x * length, s.y * length, s.vx * speed, s.vy * speed, s.wall)
-    one, other = fast.trajectory(scene, s, 30), fast.trajectory(scaled_scene(scene, length, time), start, 30)
+    one = fast.trajectory(scene, s, 30)
+    other = fast.trajectory(scaled(scene, length, time), scaled_state(s, length, time), 30)
+    speed = length - time
     assert other.walls == one.walls
-    assert np.array_equal(other.steps, one.steps * [time, time, length, length, speed, speed])
+    assert np.array_equal(other.steps, np.ldexp(one.steps, [time, time, length, length, speed, speed]))
 
 
 @pytest.mark.parametrize("name", ["moving-cap", "fixed-cap-clockwise", "breathing-circle"])
 def test_lanes_mirror_and_scale_exactly(name):
     scene, random = load(name), np.random.default_rng(4)
     rows = random.uniform((-0.3, 0.01, -300, -300), (0.3, 0.4, 300, 300), size=(64, 4)).tolist()
-    one = fast.flow(scene, [State(0.0, *row) for row in rows], 1.5)
-    mirrored = fast.flow(scene, [State(0.0, -x, y, -vx, vy) for x, y, vx, vy in rows], 1.5)
-    half = fast.flow(
-        scaled_scene(scene, 0.5, 4.0),
-        [State(0.0, x / 2, y / 2, vx / 8, vy / 8) for x, y, vx, vy in rows],
-        6.0,
-    )
-    for a, b, c in zip(one.outcomes, mirrored.outcomes, half.outcomes, strict=True):
+    states = [State(0.0, *row) for row in rows]
+    one = fast.flow(scene, states, 1.5)
+    image = fast.flow(scene, [mirrored(state) for state in states], 1.5)
+    half = fast.flow(scaled(scene, -1, 2), [scaled_state(state, -1, 2) for state in states], 6.0)
+    for a, b, c in zip(one.outcomes, image.outcomes, half.outcomes, strict=True):
         assert (b.x, b.y, b.vx, b.vy) == (-a.x, a.y, -a.vx, a.vy)
         assert (c.x, c.y, c.vx, c.vy) == (a.x / 2, a.y / 2, a.vx / 8, a.vy / 8)
-    assert np.array_equal(mirrored.t_in, one.t_in, equal_nan=True)
+    assert np.array_equal(image.t_in, one.t_in, equal_nan=True)
     assert np.array_equal(half.t_in, 4 * one.t_in, equal_nan=True)

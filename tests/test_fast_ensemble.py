@@ -11,14 +11,6 @@ from fast.starts import cycle_stops, initial_states
 from scene import State, load
 
 
-def test_threads_do_not_change_a_bit():
-    runs = [
-        fast.simulate(load("moving-cap"), n_particles=60, energy=1e3, n_cycles=2, seed=5, threads=threads)
-        for threads in (1, 2)
-    ]
-    assert runs[0].sha256() == runs[1].sha256()
-
-
 def test_more_particles_keep_the_first_ones():
     few = fast.simulate(load("fixed-cap-clockwise"), n_particles=20, energy=1e4, seed=1)
     many = fast.simulate(load("fixed-cap-clockwise"), n_particles=90, energy=1e4, seed=1)
@@ -87,25 +79,6 @@ def test_least_nu_is_found():
     assert stops.cycles.tolist() == [-1, -1, 0, -1, -1, 1]
     assert stops.narrowings == pytest.approx(np.array([[np.pi], [3 * np.pi]]), rel=1e-15)
     assert cycle_stops(load("fixed-cap-anticlockwise"), 1, ()).narrowings.tolist() == [[0.375]]
-
-
-@pytest.mark.parametrize(
-    ("options", "words"),
-    [
-        ({"n_particles": 0}, "particles = 0"),
-        ({"energy": -1.0}, "energy = -1.0"),
-        ({"energy": float("nan")}, "energy = nan"),
-        ({"n_cycles": 0}, "cycles = 0"),
-        ({"seed": -1}, "seed = -1"),
-        ({"seed": 2**64}, "seed = 18446744073709551616"),
-        ({"threads": 0}, "threads = 0"),
-        ({"phases": (0.5, 0.5)}, "phases = "),
-        ({"phases": (0.0,)}, "phases = "),
-    ],
-)
-def test_bad_options_are_refused(options, words):
-    with pytest.raises(ValueError, match=words):
-        fast.simulate(load("moving-cap"), **{"n_particles": 1, "energy": 1.0, **options})
 
 
 def test_progress_reaches_the_end():

@@ -61,8 +61,6 @@ def test_a_bad_start_is_refused_by_its_number():
         fast.flow(SCENE, [STARTS[0], State(0.0, 3.0, 0.1, 1.0, 0.0)], 2.0)
     with pytest.raises(InvalidState, match=r"particle 0: t_end = -1\.0"):
         fast.flow(SCENE, STARTS[:1], -1.0)
-    with pytest.raises(ValueError, match="threads = 0"):
-        fast.flow(SCENE, STARTS, 2.0, threads=0)
 
 
 def test_a_flight_too_long_to_follow_is_refused():

@@ -41,13 +41,6 @@ def test_a_fourier_law_is_its_sum():
     assert value(fp, law, t) == pytest.approx(expected, rel=1e-15)
 
 
-def test_the_printed_mouth_of_the_moving_cap():
-    # nu = 1 - c sin^2(t/2) with c = 0.8 is 0.6 + 0.4 cos t.
-    law = Fourier(mean=0.6, omega=1.0, cos=(0.4,))
-    for t in (0.0, 1.0, math.pi, 4.0):
-        assert value(fp, law, t) == pytest.approx(1 - 0.8 * math.sin(t / 2) ** 2, rel=1e-14)
-
-
 @pytest.mark.parametrize(("time", "level"), [(0.0, 1.0), (0.25, 0.3), (0.5, 0.3), (0.75, 1.0), (1.0, 1.0)])
 def test_bang_bang_rests_at_its_knots(time, level):
     ctx = context(40)

@@ -80,15 +80,11 @@ BAD_DATA = [
     ({**CAP, "r": 10**400}, "r = an integer of 1329 bits"),
     ({**CAP, "r": {}}, "r has no `kind`, must be one of fourier, bang-bang"),
     ({**CAP, "r": {"kind": "sawtooth"}}, "r.kind = 'sawtooth', must be one of fourier, bang-bang"),
-    ({**CAP, "r": {"kind": "fourier", "mean": 1.0}}, "r needs exactly one of `omega` and `period`"),
     ({**CAP, "r": {**FOURIER, "phase": 0.0}}, "unknown field `phase`"),
     ({**CAP, "r": {**FOURIER, "cos": 0.5}}, "r.cos = 0.5: Expected `array`"),
     ({**CAP, "r": {**FOURIER, "cos": [0.1, "x"]}}, "r.cos[1] = 'x': Expected `float`"),
     ({**CAP, "r": {**FOURIER, "cos": [0.1, math.nan]}}, "r.cos[1] = nan, must be finite"),
-    ({**CAP, "r": {**FOURIER, "omega": 0.0}}, "r.omega = 0.0, must be finite and > 0"),
     ({**CAP, "r": {**LEGS, "knots": [[0.0, 1.0], [1.0]]}}, "r.knots[1] = an object of type list: Exp"),
-    ({**CAP, "r": {**LEGS, "knots": [[0.0, 1.0], [1.0, 2.0]]}}, "r.knots[1] value = 2.0, must equal"),
-    ({**STEM, "slope": 1.0}, "w > h slope fails by"),
     # Extreme numbers must be refused in words as well, not by an overflow on the way.
     (
         {**CAP, "r": {"kind": "fourier", "mean": -1.0, "omega": 1e308, "cos": [0.0] * 15 + [0.1]}},
@@ -97,7 +93,6 @@ BAD_DATA = [
     ({**CAP, "r": {"kind": "fourier", "mean": -1.0, "omega": 5e-324, "cos": [0.1]}}, "r > 0 fails"),
     ({**CAP, "r": {**LEGS, "knots": [[0.0, 1.0], [5e-324, -1.0], [1e-323, 1.0]]}}, "r > 0 fails"),
     ({**CAP, "r": {**LEGS, "knots": [[0.0, 1.0], [1e300, -1.0], [1.5e308, 1.0]]}}, "r > 0 fails"),
-    ({**CAP, "r": {**LEGS, "knots": [[-1e308, 1.0], [1e308, 1.0]]}}, "r.knots span"),
 ]
 
 

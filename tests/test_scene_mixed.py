@@ -10,8 +10,9 @@ from fractions import Fraction
 import pytest
 from flint import arb, ctx, fmpq
 
+from conformance.arb.laws import ball_law
 from scene import BangBang, Fourier, InvalidScene, Mushroom, mixed
-from scene.laws import MAX_HARMONICS, Quadratic, piece_at
+from scene.laws import MAX_HARMONICS
 from scene.mixed import BITS, PI, PI_ERROR, TaylorBounds, jet, multiply, sign_on_legs, turns
 from scene.polynomials import leg_intervals
 
@@ -31,17 +32,7 @@ def rational(x: Fraction) -> fmpq:
 
 def exactly(law, t: Fraction) -> arb:
     """Evaluate a law in Arb."""
-    if isinstance(law, Fourier):
-        total = arb(rational(Fraction(law.mean)))
-        for k, c, s in law.harmonics():
-            part = arb(2 * k * rational(t / Fraction(law.period)))
-            total += arb(rational(Fraction(c))) * part.cos_pi() + arb(rational(Fraction(s))) * part.sin_pi()
-        return total
-    piece = piece_at(law, t)
-    if isinstance(piece, Quadratic):
-        x = t - piece.origin
-        return arb(rational(piece.c0 + x * (piece.c1 + x * piece.c2)))
-    return arb(rational(Fraction(piece)))
+    return arb(ball_law(law).jet(rational(t))[0])
 
 
 def random_laws(draw: random.Random):

@@ -77,17 +77,11 @@ def test_a_name_is_text(bad):
 @pytest.mark.parametrize(
     ("make", "words"),
     [
-        (lambda: Mushroom(r=1.0, h=1.0, nu=2.0), "nu <= 1 fails by -1"),
         (
             lambda: Mushroom(r=1.0, h=1.0, nu=math.nextafter(1.0, 2.0)),
             "nu <= 1 fails by -2.22045e-16 near t = 0.0, where r = 1.0, nu = 1.0",
         ),
-        (lambda: Mushroom(r=1.0, h=1.0, nu=Fourier(0.75, 1.0, (0.2500001,))), "nu <= 1 fails by -1"),
         (lambda: Mushroom(r=1.0, h=1.0, w=BangBang(((0, 0.5), (1, 1.5), (2, 0.5)))), "w <= r fails by -0.5"),
-        (lambda: Mushroom(r=1.0, h=1.0), "exactly one of `w` and `nu`"),
-        (lambda: Mushroom(r=1.0, h=1.0, w=0.5, nu=0.5), "exactly one of `w` and `nu`"),
-        (lambda: Stem(w=0.5, h=1.0, slope=0.5), "w > h slope fails"),
-        (lambda: Mushroom(r=Fourier(1.0, 1.0, (0.5,)), h=Fourier(1.0, 2.0, (0.5,)), nu=0.5), "one period"),
     ],
 )
 def test_scenes_that_cannot_exist(make, words):
@@ -203,11 +197,6 @@ def test_check_count():
     assert type(check_count("n", np.int64(9), 1, 9)) is int
     assert one_line(check_count, "n", 10, 1, 9) == "n = 10, must be 1 to 9"
     assert one_line(check_count, "n", 10**5000, 1, 9) == "n = an integer of 16610 bits, must be 1 to 9"
-
-
-@pytest.mark.parametrize("bad", NO_NUMBERS + OUT_OF_RANGE)
-def test_check_number_refuses(bad):
-    assert one_line(check_number, "x", bad).startswith("x = ")
 
 
 def test_check_number():

@@ -7,7 +7,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from mpmath import MPContext
 
-from conformance.strategies import Clock, laws, rescale, scenes
+from conformance.strategies import Clock, laws, scenes
 from scene import BangBang, Cap, Fourier, InvalidScene, Mushroom, Stem, catalogue, from_data, load, to_data
 from scene.laws import bounds, breakpoints, exact, is_constant, period_of, value
 from scene.tables import laws as laws_of
@@ -141,23 +141,18 @@ def most_missed(given):
     return bends * float(shared.value(MPContext()) / N_SAMPLES) ** 2 / 8
 
 
-verdicts = {True: 0, False: 0}
+def test_the_proof_agrees_with_dense_sampling(tally):
+    @given(careless_mushrooms())
+    def agrees(found):
+        least, proved = least_margin(found), is_valid(Mushroom, **found)
+        tally["valid" if proved else "refused"] += 1
+        if proved:
+            assert least > -1e-25  # 30 digits: a contact may round to just below 0
+        else:
+            assert least <= most_missed(found)
 
-
-@given(careless_mushrooms())
-def test_the_proof_agrees_with_dense_sampling(found):
-    least, proved = least_margin(found), is_valid(Mushroom, **found)
-    verdicts[proved] += 1
-    if proved:
-        assert least > -1e-25  # 30 digits: a contact may round to just below 0
-    else:
-        assert least <= most_missed(found)
-
-
-def test_both_verdicts_were_reached():
-    if sum(verdicts.values()) == 0:
-        pytest.skip("counts the verdicts of the test above, which was not selected")
-    assert min(verdicts.values()) >= 10
+    agrees()
+    assert min(tally["valid"], tally["refused"]) >= 10
 
 
 @given(scenes(), st.sampled_from(["r", "w", "nu", "h"]), st.floats(-2.0, -0.0))
@@ -169,11 +164,6 @@ def test_a_planted_defect_is_refused_by_name(scene, name, bad):
         from_data(data)
 
 
-@given(scenes(), st.integers(-30, 30), st.integers(-30, 30))
-def test_scaling_by_powers_of_two_keeps_validity(scene, length, time):
-    assert rescale(rescale(scene, length, time), -length, -time) == scene
-
-
 @pytest.mark.parametrize("name", sorted(set(catalogue()) - {"moving-cap-as-printed"}))
 def test_the_catalogue_is_valid(name):
     scene = load(name)
@@ -181,22 +171,6 @@ def test_the_catalogue_is_valid(name):
     assert scene.notes
     if isinstance(scene, Mushroom):
         assert least_margin(laws_of(scene)) > -1e-25
-
-
-def test_the_catalogue_is_complete():
-    assert catalogue() == [
-        "breathing-circle",
-        "ergodic",
-        "fermi-ulam",
-        "fixed-cap-anticlockwise",
-        "fixed-cap-clockwise",
-        "frozen-mushroom",
-        "moving-cap",
-        "moving-cap-as-printed",
-        "moving-cap-reversed",
-        "moving-cap-trivial",
-        "untilted",
-    ]
 
 
 def test_the_moving_cap_as_printed_is_refused():

@@ -37,20 +37,6 @@ def test_no_thread_computes_while_another_does() -> None:
     assert (found["mean"], tuple(found["other"])) == (0, (1, 0, 0, 0, 1, 1))
 
 
-def test_the_race_that_the_lock_prevents_is_real() -> None:
-    # A memo read while another caller refines it: the precision is the old one, the digits are the new ones.
-    @libelefun.constant_memo
-    def three(prec: int) -> int:
-        return 3 << prec
-
-    memo = three.__closure__[0].cell_contents
-    assert three(100) >> 100 == 3
-    old = memo.memo_prec
-    three(1000)
-    memo.memo_prec = old  # as a reader sees it that looked before the refinement
-    assert three(100) >> 100 != 3
-
-
 @pytest.mark.parametrize(
     "name",
     [

@@ -90,8 +90,6 @@ def test_a_wrong_exponent_shows_in_the_residuals() -> None:
 
 
 def test_bad_data_is_named() -> None:
-    with pytest.raises(ValueError, match="s holds nan, must be finite"):
-        peak_width([0.0, 1.0, float("nan"), 2.0])
     with pytest.raises(ValueError, match="s has 3 values: a width needs at least 4"):
         peak_width([0.0, 1.0, 2.0])
     with pytest.raises(ValueError, match=r"sigma_w = -1\.0, must be finite and >= 0"):

@@ -8,12 +8,10 @@ from typing import Any
 
 import mpmath
 import pytest
-from hypothesis import HealthCheck, assume, given, settings
-from hypothesis import strategies as st
 from mpmath import MPContext
 
-from scene import BangBang, Fourier, InvalidScene, Mushroom, Scene, load
-from theory import NotConverged, NotCovered, Prediction, mean_of, predict, v_cap, v_cha, volumes_at
+from scene import BangBang, Fourier, Mushroom, Scene, load
+from theory import NotConverged, Prediction, predict, v_cap, v_cha, volumes_at
 from theory.volumes import delta_slope
 
 MAIN = ("fixed-cap-anticlockwise", "fixed-cap-clockwise", "moving-cap", "moving-cap-reversed")
@@ -153,21 +151,6 @@ def test_mean_exp_minus_s_is_one_to_40_digits(name: str) -> None:
     assert abs(predict(load(name), digits=40).mean_exp_minus - 1) < mpmath.mpf(10) ** -40
 
 
-@pytest.mark.parametrize(
-    ("forward", "backward"),
-    [("moving-cap", "moving-cap-reversed"), ("fixed-cap-anticlockwise", "fixed-cap-clockwise")],
-)
-def test_a_reversed_cycle_is_the_forward_one_weighted_by_exp_minus_s(forward: str, backward: str) -> None:
-    # p'(-s) = p(s) exp(-s): every mean of the reversed cycle from the forward one.
-    ahead, back = predict(load(forward), digits=20), predict(load(backward), digits=20)
-    ctx, small = ahead.m1.context, mpmath.mpf(10) ** -19
-    assert abs(back.log_e_nc + ahead.log_e_nc) < small
-    assert abs(back.p_nc - ahead.p_nc * ctx.exp(-ahead.log_e_nc)) < small
-    assert abs(back.m1 + mean_of(load(forward), lambda s: s * ctx.exp(-s), digits=20)) < small
-    square = mean_of(load(forward), lambda s: s * s * ctx.exp(-s), digits=20)
-    assert abs(back.sd**2 + back.m1**2 - square) < small
-
-
 def test_a_loop_that_encloses_nothing_gains_nothing_though_v_cha_varies() -> None:
     found = predict(load("moving-cap-trivial"), digits=25)
     assert (found.m1, found.log_e_nc, found.sd) == (0, 0, 0)
@@ -180,12 +163,6 @@ def test_a_loop_that_encloses_nothing_gains_nothing_though_v_cha_varies() -> Non
 @pytest.mark.parametrize("name", ["ergodic", "frozen-mushroom"])
 def test_without_capture_nothing_happens(name: str) -> None:
     assert tuple(predict(load(name))) == (1, 0, 0, 0, 1, 1)
-
-
-def test_untilted_stem_is_a_mushroom_like_any_other() -> None:
-    found = predict(load("untilted"))
-    assert found.m1 > 0
-    assert abs(found.mean_exp_minus - 1) < 1e-15
 
 
 def test_a_loop_too_thin_for_binary64_still_has_its_growth_rate() -> None:
@@ -249,31 +226,6 @@ def test_degenerate_turns_converge_like_plain_ones(cos: tuple[float, ...]) -> No
     expected = quadrature(ctx, ratio, lambda t: ratio(2 * ctx.pi - t), slope, [0, ctx.pi / 2, ctx.pi])
     for name, x in expected.items():
         assert abs(getattr(found, name) - x) < 1e-13, name
-
-
-amplitude = st.integers(-24, 24).map(lambda k: k / 64)
-
-
-@settings(
-    max_examples=6, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.filter_too_much]
-)
-@given(st.lists(amplitude, min_size=4, max_size=4), st.integers(-4, 4), st.integers(0, 12))
-def test_growth_is_never_negative(amplitudes: list[float], second: int, tangent: int) -> None:
-    r_cos, r_sin, h_cos, h_sin = amplitudes
-
-    try:
-        scene = Mushroom(
-            r=Fourier(1.0, 1.0, (r_cos,), (r_sin,)),
-            h=Fourier(1.0, 1.0, (h_cos,), (h_sin,)),
-            nu=Fourier(0.5, 1.0, (0.3125, second / 64)),
-            slope=tangent / 64,
-        )
-        found = predict(scene, digits=6)
-    except (InvalidScene, NotCovered):
-        assume(False)
-    assert found.m1 >= 0
-    assert 0 < found.p_nc < 1
-    assert abs(found.mean_exp_minus - 1) < 1e-6
 
 
 def test_digits_out_of_reach_are_refused_not_guessed() -> None:

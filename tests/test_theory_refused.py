@@ -116,10 +116,11 @@ def test_counts(bad, solved):
             assert one_line(entry, 0.0, bad).startswith("n_cycles = ")
 
 
-def test_orders_end_at_their_bound():
-    assert (
-        one_line(theory.moments, SCENE, MAX_ORDER + 1) == f"order = {MAX_ORDER + 1}, must be 0 to {MAX_ORDER}"
-    )
+def test_counts_end_at_their_bounds():
+    for bad in (-1, MAX_ORDER + 1):
+        assert one_line(theory.moments, SCENE, bad) == f"order = {bad}, must be 0 to {MAX_ORDER}"
+    assert one_line(theory.capture_curve, SCENE, 1) == "n = 1, must be 2 to 10000000"
+    assert one_line(theory.sum_of_cycles, SCENE, 0) == "n_cycles = 0, must be 1 to 10000"
 
 
 @pytest.mark.parametrize("bad", NO_NUMBERS, ids=repr)

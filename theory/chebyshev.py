@@ -42,12 +42,7 @@ class Grid:
 
     def coefficients(self, values: list[Any]) -> list[Any]:
         """Return the interpolant's coefficients c_k, f = sum c_k T_k(2 x - 1)."""
-        n, halved = self.n, list(values)
-        halved[0] /= 2
-        halved[n] /= 2
-        found = [total * 2 / n for total in self._cosine_sums(halved)]
-        found[0] /= 2
-        found[n] /= 2
+        found = self._interpolated(values)
         return [-c if k % 2 else c for k, c in enumerate(found)]
 
     def running_integral(self, coefficients: list[Any]) -> list[Any]:
@@ -66,13 +61,12 @@ class Grid:
 
     def quadrature(self, moments: list[Any]) -> list[Any]:
         """Return the weights at the points of a measure with these means of T_k(2 x - 1), k = 0 ... n."""
-        signed = [-m if k % 2 else m for k, m in enumerate(moments)]
-        signed[0] /= 2
-        signed[self.n] /= 2
-        weights = [total * 2 / self.n for total in self._cosine_sums(signed)]
-        weights[0] /= 2
-        weights[self.n] /= 2
-        return weights
+        return self._interpolated([-m if k % 2 else m for k, m in enumerate(moments)])
+
+    def _interpolated(self, values: list[Any]) -> list[Any]:
+        """Return 2 / n times the cosine sums, the first and the last value and sum counted half."""
+        total = self._cosine_sums(_with_halved_ends(values))
+        return _with_halved_ends([2 * x / self.n for x in total])
 
     def forecast(self, values: list[Any]) -> Any:
         """Extrapolate a function known at the first points to the next one; None when none is known."""
@@ -87,9 +81,8 @@ class Grid:
     def _clenshaw_curtis(self) -> list[Any]:
         n, ctx = self.n, self.ctx
         even = [ctx.mpf(1) / (1 - k * k) if k % 2 == 0 else ctx.zero for k in range(n + 1)]
-        even[0] /= 2
-        even[n] /= 2
-        weights = [2 * total / n for total in self._cosine_sums(even)]
-        weights[0] /= 2
-        weights[n] /= 2
-        return weights
+        return self._interpolated(even)
+
+
+def _with_halved_ends(values: list[Any]) -> list[Any]:
+    return [values[0] / 2, *values[1:-1], values[-1] / 2]

@@ -133,12 +133,8 @@ def capture_time_mass(scene: Scene, edges: ArrayLike) -> Floats:
     Source: Eq:ps.
     """
     bounds = _rising(edges)
-    branches = tuple(tree(scene).all_branches())
-
-    def captured_before(times: Floats) -> Floats:
-        return sum((branch.below(branch.t_in, times) for branch in branches), np.zeros_like(times))
-
-    return np.diff(captured_before(bounds))
+    captured = (branch.below(branch.t_in, bounds) for branch in tree(scene).all_branches())
+    return np.diff(sum(captured, np.zeros_like(bounds)))
 
 
 class ChaoticZone(NamedTuple):

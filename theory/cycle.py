@@ -13,10 +13,10 @@ from typing import Any
 
 from mpmath import MPContext
 
-from scene.refusal import BadInput
+from scene.refusal import BadInput, check_count
 from scene.tables import Scene, period
 from theory.constants import guarded, settle
-from theory.entries import check_digits, check_real
+from theory.entries import MAX_DIGITS, check_real
 from theory.parameters import MovingMushroom
 from theory.valleys import CapturePiece, Valley, stretches, valley
 from theory.volumes import as_mushroom
@@ -64,7 +64,7 @@ class Cycle:
         Source: sec. 3.5, Eq:nu.
         """
         mushroom = as_mushroom(scene)
-        digits = check_digits(digits)
+        digits = check_count("digits", digits, 1, MAX_DIGITS)
         ctx = MPContext()
         ctx.dps = digits + GUARD
         settle(ctx)

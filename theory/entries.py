@@ -1,7 +1,7 @@
 """Checks of what callers give to the theory's public entries, made before any arithmetic.
 
 Each raises `BadInput` with one line. Scenes, whole numbers and binary64 numbers are checked by
-`scene.refusal`; here are the checks of digits, number systems, numbers of any precision and arrays.
+`scene.refusal`; here are the checks of number systems, numbers of any precision and arrays, and bounds.
 """
 
 from __future__ import annotations
@@ -13,28 +13,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from scene.refusal import BadInput, check_count, shown
+from scene.refusal import BadInput, shown
 
 MAX_DIGITS = 1000  # excludes nonsense; so many digits of the moving cap may take far over ten minutes
 MAX_ORDER = 64  # of moments and cumulants
-
-
-def check_digits(digits: object) -> int:
-    """Return a number of digits within bounds.
-
-    Raises:
-        BadInput: it is no whole number, or not from 1 to MAX_DIGITS.
-    """
-    return check_count("digits", digits, 1, MAX_DIGITS)
-
-
-def check_order(order: object) -> int:
-    """Return an order of derivatives within bounds.
-
-    Raises:
-        BadInput: it is no whole number, or not from 0 to MAX_ORDER.
-    """
-    return check_count("order", order, 0, MAX_ORDER)
 
 
 def check_system(ctx: object) -> None:

@@ -18,7 +18,7 @@ from scene.transforms import backwards
 from theory.adiabatic import Captures, NotConverged, captures
 from theory.constants import guarded
 from theory.cycle import GUARD, Cycle
-from theory.entries import check_digits, check_order
+from theory.entries import MAX_DIGITS, MAX_ORDER
 from theory.measure import logarithm
 from theory.volumes import as_mushroom
 
@@ -46,7 +46,7 @@ class Prediction(NamedTuple):
     @guarded
     def strings(self, digits: int) -> dict[str, str]:
         """Return each number in decimals, rounded to `digits` significant digits; zero is "0.0"."""
-        digits = check_digits(digits)
+        digits = check_count("digits", digits, 1, MAX_DIGITS)
         return {
             name: x.context.nstr(x, digits, strip_zeros=False).removesuffix(".")
             for name, x in zip(self._fields, self, strict=True)
@@ -110,7 +110,7 @@ def moments(scene: Scene, order: int, digits: int = 15) -> tuple[Any, ...]:
         BadInput: order out of bounds.
         Otherwise as `predict`.
     """
-    order = check_order(order)
+    order = check_count("order", order, 0, MAX_ORDER)
 
     def figures(found: Captures) -> tuple[Any, ...]:
         ctx = found.cycle.ctx
@@ -136,7 +136,7 @@ def cumulants(scene: Scene, order: int, digits: int = 15, q: float = 0.0) -> tup
         BadInput: order out of bounds.
         Otherwise as `predict`.
     """
-    order, tilt = check_order(order), check_number("q", q)
+    order, tilt = check_count("order", order, 0, MAX_ORDER), check_number("q", q)
     p = list(converged(scene, digits, lambda found: tuple(found.taylor(tilt, order))))
     ctx = p[0].context
     return tuple(c * ctx.factorial(k) for k, c in enumerate(logarithm(ctx, p)))
@@ -171,20 +171,16 @@ def converged(scene: Scene, digits: int, figures: Callable[[Captures], tuple[Any
     Raises:
         NotConverged: they do not, as far as the resolution may rise.
     """
-    digits = check_digits(digits)
+    digits = check_count("digits", digits, 1, MAX_DIGITS)
     cycle = Cycle.of(scene, digits)
     ctx = cycle.ctx
     noise, agreement = ctx.mpf(10) ** -(digits + GUARD - 10), ctx.mpf(10) ** -(digits + 2)
     previous: tuple[Any, ...] | None = None
     for target in range(digits + 4, digits + GUARD - 8, 12):
         current = tuple(ctx.zero if abs(x) < noise else x for x in figures(captures(cycle, target)))
-        if previous is not None and _agree(current, previous, agreement):
-            return current
+        if previous is not None and len(current) == len(previous):
+            changes = (abs(x - y) <= agreement * abs(x) for x, y in zip(current, previous, strict=True))
+            if all(changes):
+                return current
         previous = current
     raise NotConverged(f"two resolutions in a row do not agree to {digits} digits")
-
-
-def _agree(current: tuple[Any, ...], previous: tuple[Any, ...], agreement: Any) -> bool:
-    if len(current) != len(previous):
-        return False
-    return all(abs(x - y) <= agreement * abs(x) for x, y in zip(current, previous, strict=True))

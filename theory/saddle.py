@@ -21,6 +21,7 @@ from scene.tables import Scene
 from theory.branches import Floats, Node
 from theory.distribution import Energies, energies
 from theory.entries import finite_array
+from theory.measure import logarithm, product
 from theory.prediction import MAX_CYCLES
 
 LARGEST_EXPONENT = 300.0  # exp of it and its square stay finite
@@ -56,11 +57,7 @@ class Saddle:
         places = np.atleast_1d(finite_array("q", q))
         if not np.all(np.abs(places) <= self._largest):
             raise BadInput(f"q must be within +-{self._largest:.6g}")
-        p = _series(self._root, places)
-        found = [np.log(p[0])]
-        for k in range(1, 5):
-            rest = sum((j * found[j] * p[k - j] for j in range(1, k)), np.zeros_like(p[0]))
-            found.append((p[k] - rest / k) / p[0])
+        found = logarithm(np, list(_series(self._root, places)))
         return np.array([factorial(k) * c for k, c in enumerate(found)])
 
     def place(self, x: ArrayLike) -> Floats:
@@ -119,8 +116,7 @@ def _series(node: Node, q: Floats) -> Floats:
     captured: Floats = (powers * node.weights) @ np.exp(np.outer(node.s, q))
     passed = node.passed * np.exp(node.gain * q) * (node.gain**orders / factorials)[:, None]
     for child in node.children:
-        other = _series(child, q)
-        passed = np.array([sum(passed[i] * other[k - i] for i in range(k + 1)) for k in orders])
+        passed = np.array(product(list(passed), list(_series(child, q))))
     total: Floats = captured + passed
     return total
 

@@ -33,10 +33,6 @@ def v_cap(ctx: Any, r: Any) -> Any:
     """Return pi^2 r^2, the volume over the half disk of radius r [length]. Source: Eq:Vcap."""
     check_system(ctx)
     check_real(r=r)
-    return _v_cap(ctx, r)
-
-
-def _v_cap(ctx: Any, r: Any) -> Any:
     return ctx.pi**2 * r * r
 
 
@@ -44,10 +40,6 @@ def v_stem(ctx: Any, w: Any, h: Any, slope: Any) -> Any:
     """Return 2 pi (2 w h - h^2 slope), the volume over the stem. Source: Eq:Vcap."""
     check_system(ctx)
     check_real(w=w, h=h, slope=slope)
-    return _v_stem(ctx, w, h, slope)
-
-
-def _v_stem(ctx: Any, w: Any, h: Any, slope: Any) -> Any:
     return 2 * ctx.pi * (2 * w * h - h * h * slope)
 
 
@@ -121,7 +113,7 @@ def volumes_at(ctx: Any, scene: Scene, t: Any) -> Volumes:
 
 def volumes_of(ctx: Any, r: Any, nu: Any, h: Any, slope: Any) -> Volumes:
     """Return all volumes from the table's parameters, the mouth given by nu = w / r."""
-    cap, stem = _v_cap(ctx, r), _v_stem(ctx, nu * r, h, slope)
+    cap, stem = v_cap(ctx, r), v_stem(ctx, nu * r, h, slope)
     island = delta(ctx, nu) * cap
     return Volumes(cap, stem, island, cap + stem - island, nu)
 

@@ -1,8 +1,9 @@
 """Mutants: the plain stepper with one physics error each, of the kind that people make.
 
-A mutant is a class of flight that overrides what is wrong. Each is killed by a `fail` on some vector of the
-corpus (`kill_matrix` says which), not by a crash. They prove that the suite can fail; nothing
-else may use them. None is equivalent to the plain stepper: a mutant that changes no answer proves nothing.
+A mutant is a class of flight, or of the motion of a law, that overrides what is wrong. Each is killed by a
+`fail` on some vector of the corpus (`kill_matrix` says which), not by a crash. They prove that the suite can
+fail; nothing else may use them. None is equivalent to the plain stepper: a mutant that changes no answer
+proves nothing.
 """
 
 from __future__ import annotations
@@ -43,20 +44,26 @@ class Mutant(NamedTuple):
 
 
 def _listed() -> dict[str, Mutant]:
-    """Name every class of flight of the three modules: its name in hyphens, its docstring as the fault."""
+    """Name every mutant of the three modules: its class's name in hyphens, its docstring as the fault."""
     found = {}
     for module in (of_laws, of_walls, of_roots):
-        for name, flight in vars(module).items():
-            if name.startswith("_"):
+        for name, kind in vars(module).items():
+            if name.startswith("_") or not isinstance(kind, type) or kind.__module__ != module.__name__:
                 continue
-            if (
-                isinstance(flight, type)
-                and issubclass(flight, Flight)
-                and flight.__module__ == module.__name__
-            ):
-                hyphened = "".join("-" * c.isupper() + c.lower() for c in name).strip("-")
-                found[hyphened] = Mutant(hyphened, str(flight.__doc__).rstrip("."), flight)
+            hyphened = "".join("-" * c.isupper() + c.lower() for c in name).strip("-")
+            found[hyphened] = Mutant(hyphened, str(kind.__doc__).rstrip("."), _flight(kind))
     return found
+
+
+def _flight(kind: type) -> type[Flight]:
+    """Return a class of flight as it is, and for a class of motion the plain flight that uses it."""
+    if issubclass(kind, Flight):
+        return kind
+    spoilt = {
+        law: kind if issubclass(kind, plain_motion) else plain_motion
+        for law, plain_motion in Flight.kinds.items()
+    }
+    return type(kind.__name__, (Flight,), {"kinds": spoilt})
 
 
 MUTANTS = _listed()

@@ -1,6 +1,7 @@
 """Mutants that follow a law of motion wrongly: phase, harmonics, legs, periods, precision of time.
 
-Part of `conformance.mutants`, which lists them; a docstring is the fault.
+Part of `conformance.mutants`, which lists them; a docstring is the fault. A class of motion stands for the
+flight that is plain but for its laws of that kind.
 """
 
 # ruff: noqa: D102 (a class says what its one method does wrong)
@@ -10,7 +11,6 @@ from __future__ import annotations
 import struct
 from itertools import pairwise
 from math import cos, fmod, sin
-from typing import ClassVar
 
 from mpmath import fp
 from msgspec.structs import replace
@@ -34,10 +34,8 @@ def single(x: float) -> float:
     return float(struct.unpack("f", struct.pack("f", max(-3e38, min(x, 3e38))))[0])
 
 
-class _LinearLegs(BangBangMotion):
-    def halves(self, a: float, u: float, b: float, v: float) -> tuple[Half, Half]:
-        middle = (a + b) / 2
-        return Half(a, middle, a, u, 0.0), Half(middle, b, a, u, 0.0)
+class LegsAtConstantSpeed(BangBangMotion):
+    """Joins the knots of a bang-bang law by straight lines."""
 
     def __init__(self, law: BangBang, t: float) -> None:
         super().__init__(law, t)
@@ -59,35 +57,25 @@ class _LinearLegs(BangBangMotion):
         return LawValue(self.value, rise, rate)
 
 
-class LegsAtConstantSpeed(Flight):
-    """Joins the knots of a bang-bang law by straight lines."""
+class HalfLegAccelerationSign(BangBangMotion):
+    """Accelerates through the second half of a leg instead of braking."""
 
-    kinds: ClassVar = {**Flight.kinds, BangBang: _LinearLegs}
-
-
-class _UnbrokenLegs(BangBangMotion):
     def halves(self, a: float, u: float, b: float, v: float) -> tuple[Half, Half]:
         middle, pull = (a + b) / 2, 4 * (v - u) / (b - a) / (b - a)
         return Half(a, middle, a, u, pull), Half(middle, b, b, v, pull)
 
 
-class HalfLegAccelerationSign(Flight):
-    """Accelerates through the second half of a leg instead of braking."""
-
-    kinds: ClassVar = {**Flight.kinds, BangBang: _UnbrokenLegs}
-
-
-class PhaseOffByOneKnot(Flight):
+class PhaseOffByOneKnot(BangBangMotion):
     """Takes each knot's value from the knot after it."""
 
-    def law(self, law: Law) -> LawMotion:
-        if isinstance(law, BangBang):
-            times, values = zip(*law.knots, strict=True)
-            law = BangBang(knots=tuple(zip(times, [*values[1:], values[1]], strict=True)))
-        return super().law(law)
+    def __init__(self, law: BangBang, t: float) -> None:
+        times, values = zip(*law.knots, strict=True)
+        super().__init__(BangBang(knots=tuple(zip(times, [*values[1:], values[1]], strict=True))), t)
 
 
-class _UnwrappedLegs(BangBangMotion):
+class PeriodWrapLost(BangBangMotion):
+    """Lets a bang-bang law stand still outside its first period."""
+
     def __init__(self, law: BangBang, t: float) -> None:
         super().__init__(law, t)
         self.left = max(law.knots[-1][0] - t, 0.0)
@@ -99,37 +87,25 @@ class _UnwrappedLegs(BangBangMotion):
         return super().at(min(s, self.left))
 
 
-class PeriodWrapLost(Flight):
-    """Lets a bang-bang law stand still outside its first period."""
+class HalfTheAcceleration(BangBangMotion):
+    """Forgets that half a leg is covered in half its time: accelerates by 2 d / T^2, not 4 d / T^2."""
 
-    kinds: ClassVar = {**Flight.kinds, BangBang: _UnwrappedLegs}
-
-
-class _HalvedPull(BangBangMotion):
     def halves(self, a: float, u: float, b: float, v: float) -> tuple[Half, Half]:
         one, two = super().halves(a, u, b, v)
         return one._replace(pull=one.pull / 2), two._replace(pull=two.pull / 2)
 
 
-class HalfTheAcceleration(Flight):
-    """Forgets that half a leg is covered in half its time: accelerates by 2 d / T^2, not 4 d / T^2."""
+class RateByDifferences(FourierMotion):
+    """Takes the rate of a Fourier law from a difference over a fixed time of 1e-6."""
 
-    kinds: ClassVar = {**Flight.kinds, BangBang: _HalvedPull}
-
-
-class _Coarse(FourierMotion):
     def at(self, s: float) -> LawValue:
         now, then = super().at(s), super().at(s + 1e-6)
         return now._replace(rate=(then.rise - now.rise) / 1e-6)
 
 
-class RateByDifferences(Flight):
-    """Takes the rate of a Fourier law from a difference over a fixed time of 1e-6."""
+class RateWithoutHarmonicNumber(FourierMotion):
+    """Differentiates cos(k omega t) to -omega sin(k omega t)."""
 
-    kinds: ClassVar = {**Flight.kinds, Fourier: _Coarse}
-
-
-class _SlowHarmonics(FourierMotion):
     def __init__(self, law: Fourier, t: float) -> None:
         super().__init__(law, t)
         self.omega = frequency(fp, law)
@@ -139,72 +115,50 @@ class _SlowHarmonics(FourierMotion):
         return super().at(s)._replace(rate=rate)
 
 
-class RateWithoutHarmonicNumber(Flight):
-    """Differentiates cos(k omega t) to -omega sin(k omega t)."""
-
-    kinds: ClassVar = {**Flight.kinds, Fourier: _SlowHarmonics}
-
-
-class HarmonicsIgnored(Flight):
+class HarmonicsIgnored(FourierMotion):
     """Keeps the first harmonic of a Fourier law only."""
 
-    def law(self, law: Law) -> LawMotion:
-        if isinstance(law, Fourier):
-            law = replace(law, cos=law.cos[:1], sin=law.sin[:1])
-        return super().law(law)
+    def __init__(self, law: Fourier, t: float) -> None:
+        super().__init__(replace(law, cos=law.cos[:1], sin=law.sin[:1]), t)
 
 
-class SineAndCosineSwapped(Flight):
+class SineAndCosineSwapped(FourierMotion):
     """Takes the cosine amplitudes for the sine's."""
 
-    def law(self, law: Law) -> LawMotion:
-        if isinstance(law, Fourier):
-            law = replace(law, cos=law.sin, sin=law.cos)
-        return super().law(law)
+    def __init__(self, law: Fourier, t: float) -> None:
+        super().__init__(replace(law, cos=law.sin, sin=law.cos), t)
 
 
-class PhaseSign(Flight):
+class PhaseSign(FourierMotion):
     """Runs the phase of a Fourier law backwards: sines change sign."""
 
-    def law(self, law: Law) -> LawMotion:
-        if isinstance(law, Fourier):
-            law = replace(law, sin=tuple(-b for b in law.sin))
-        return super().law(law)
+    def __init__(self, law: Fourier, t: float) -> None:
+        super().__init__(replace(law, sin=tuple(-b for b in law.sin)), t)
 
 
-class OmegaAsFrequency(Flight):
+class OmegaAsFrequency(FourierMotion):
     """Takes omega for cycles per unit of time: too fast by 2 pi."""
 
-    def law(self, law: Law) -> LawMotion:
-        if isinstance(law, Fourier):
-            law = replace(law, omega=6.283185307179586 * frequency(fp, law), period=None)
-        return super().law(law)
+    def __init__(self, law: Fourier, t: float) -> None:
+        super().__init__(replace(law, omega=6.283185307179586 * frequency(fp, law), period=None), t)
 
 
-class _RoundPi(FourierMotion):
+class PiTooShort(FourierMotion):
+    """Reduces the phase of a Fourier law by 2 x 3.14159."""
+
     def __init__(self, law: Fourier, t: float) -> None:
         period = 2 * 3.14159 / frequency(fp, law)
         super().__init__(law, fmod(t, period))
 
 
-class PiTooShort(Flight):
-    """Reduces the phase of a Fourier law by 2 x 3.14159."""
+class PhaseRestartsAtEachStep(FourierMotion):
+    """Follows a Fourier law from t = 0 whatever the time of departure."""
 
-    kinds: ClassVar = {**Flight.kinds, Fourier: _RoundPi}
-
-
-class _NoRestart(FourierMotion):
     def __init__(self, law: Fourier, t: float) -> None:
         super().__init__(law, t)
         omega = frequency(fp, law)
         self.waves = [turned(k * omega, a, b, 0.0) for k, a, b in law.harmonics()]
         self.value = law.mean + sum(a for _, a, _ in self.waves)
-
-
-class PhaseRestartsAtEachStep(Flight):
-    """Follows a Fourier law from t = 0 whatever the time of departure."""
-
-    kinds: ClassVar = {**Flight.kinds, Fourier: _NoRestart}
 
 
 class TimeInFloat32(Flight):

@@ -10,6 +10,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from math import hypot
 
+from msgspec.structs import replace
+
 from conformance.plain.motion import ConstantMotion, LawMotion, LawValue
 from conformance.plain.step import Flight, Gap, Open
 from scene import Collision, Horizon, Outcome, Scene, State, Wall
@@ -281,8 +283,7 @@ class PlaceNotMoved(Flight):
     """Gives the place of departure for that of the hit."""
 
     def collision(self, wall: Wall, s: float) -> Collision:
-        hit = super().collision(wall, s)
-        return Collision(wall, hit.dt, hit.t, self.x, self.y, hit.vx, hit.vy)
+        return replace(super().collision(wall, s), x=self.x, y=self.y)
 
 
 class TimeForFlightTime(Flight):
@@ -290,7 +291,7 @@ class TimeForFlightTime(Flight):
 
     def collision(self, wall: Wall, s: float) -> Collision:
         hit = super().collision(wall, s)
-        return Collision(wall, hit.t, hit.t, hit.x, hit.y, hit.vx, hit.vy)
+        return replace(hit, dt=hit.t)
 
 
 class ClockRestarts(Flight):
@@ -298,7 +299,7 @@ class ClockRestarts(Flight):
 
     def collision(self, wall: Wall, s: float) -> Collision:
         hit = super().collision(wall, s)
-        return Collision(wall, hit.dt, hit.dt, hit.x, hit.y, hit.vx, hit.vy)
+        return replace(hit, t=hit.dt)
 
 
 class HorizonNotReached(Flight):

@@ -1,12 +1,10 @@
 """A battery that the reference passes and its mutants fail (test_reference_mutants).
 
-The battery knows its answers from closed forms, from symmetries, and from the law of reflection
-in plain mpmath; nothing in it compares the reference with its own earlier results.
+The battery knows its answers from closed forms and from the law of reflection in plain mpmath; nothing
+in it compares the reference with its own earlier results. Further answers: test_hard_cases_steps.
 """
 
 from __future__ import annotations
-
-from fractions import Fraction
 
 import mpmath
 import pytest
@@ -18,7 +16,6 @@ from scene.laws import value
 from scene.tables import laws
 from support.tables import BOX, BREATHING, CIRCLE, LEAP, LIFT, STATIC
 
-CLOSING = Mushroom(r=1.0, h=1.0, w=BangBang(knots=((0.0, 0.5), (1.0, 0.25), (2.0, 0.5))))
 TILTING = Mushroom(
     r=Fourier(mean=1.0, omega=1.0, sin=(0.125,)),
     nu=Fourier(mean=0.5, omega=1.0, cos=(0.125,)),
@@ -28,8 +25,8 @@ TILTING = Mushroom(
 DIGITS = 20
 
 
-def hit(scene, state, wall, t_end=100.0, **options):
-    found = reference.next_collision(scene, state, t_end, digits=DIGITS, **options)
+def hit(scene, state, wall, t_end=100.0, digits=DIGITS, **options):
+    found = reference.next_collision(scene, state, t_end, digits=digits, **options)
     assert isinstance(found, reference.Collision)
     assert found.wall == wall
     return found
@@ -46,13 +43,6 @@ def chord():
     assert abs(speed2 - 5) < mpmath.mpf(2) ** -48
 
 
-def leaving_a_chord():
-    state = State(0.0, 0.6, 0.8, -1.0, 0.5, "arc")
-    x, y, vx, vy = (Fraction(n) for n in (state.x, state.y, state.vx, state.vy))
-    found = hit(CIRCLE, state, "arc")
-    assert found.dt.contains(-2 * (x * vx + y * vy) / (vx * vx + vy * vy))
-
-
 def lift():
     found = hit(LIFT, State(0.0, 0.0, -1.75, 0.0, 0.0), "floor")
     s = mpmath.sqrt(mpmath.mpf(1) / 32)
@@ -60,19 +50,10 @@ def lift():
     assert holds(found.after.vy, 32 * s)
 
 
-def lift_beyond_a_knot():
-    found = hit(LIFT, State(0.0, 0.0, -1.0625, 0.0, 0.0), "floor")
-    assert holds(found.dt, mpmath.mpf("0.5") - mpmath.sqrt(mpmath.mpf(1) / 128))
-
-
 def first_of_two():
     """A slow particle would be met again by the floor's second rise."""
     found = hit(LIFT, State(0.0, 0.0, -1.25, 0.0, -0.125), "floor")
     assert float(found.dt) < 0.5
-
-
-def recollision():
-    assert hit(LIFT, State(0.0, 0.0, -2.0, 0.0, 2.0**-30, "floor"), "floor").dt.contains(2.0**-33)
 
 
 def box():
@@ -94,11 +75,6 @@ def mouth():
     assert hit(STATIC, State(0.0, 0.75, 0.5, 0.0, -1.0), "base").dt.contains(0.5)
     edge = reference.next_collision(STATIC, State(0.0, 0.25, 0.25, 1.0, -1.0), 9.0, digits=DIGITS)
     assert edge == Undefined("mouth-edge")
-
-
-def closing_mouth():
-    assert hit(CLOSING, State(0.0, 0.4375, 0.5, 0.0, -1.0), "base").dt.contains(0.5)
-    hit(CLOSING, State(1.0, 0.3125, 0.5, 0.0, -1.0), "floor")
 
 
 def starts():
@@ -157,40 +133,6 @@ def differentiated():
         assert float(row[0]) == pytest.approx(float(plus.lo - minus.lo) * 2.0**19, abs=1e-8)
 
 
-def mirror():
-    for wall, q in starts():
-        found = hit(TILTING, q, wall)
-        other = {"left": "right", "right": "left"}.get(wall, wall)
-        image = hit(TILTING, State(q.t, -q.x, q.y, -q.vx, q.vy), other)
-        assert (found.dt, found.after.vy) == (image.dt, image.after.vy)
-        assert float(found.after.vx) == -float(image.after.vx)
-
-
-def nested_precisions():
-    for wall, q in starts():
-        found, finer = (reference.next_collision(TILTING, q, 9.0, digits=d) for d in (10, 40))
-        assert isinstance(found, reference.Collision)
-        assert isinstance(finer, reference.Collision)
-        assert found.wall == finer.wall == wall
-        assert found.dt.lo <= finer.dt.hi
-        assert finer.dt.lo <= found.dt.hi
-
-
-def reversed_film():
-    """With laws and velocity reversed, three bounces of a breathing circle are retraced."""
-    film = Cap(r=Fourier(mean=1.0, omega=1.0, sin=(-0.25,)))
-    q = State(0.0, 0.25, 0.5, 2.0, 1.0)
-    there = reference.trajectory(BREATHING, q, 9, 2.0, digits=DIGITS).outcome
-    assert isinstance(there, reference.Horizon)
-    end = there.rounded()
-    back = reference.trajectory(
-        film, State(-2.0, end.x, end.y, -end.vx, -end.vy), 9, 0.0, digits=DIGITS
-    ).outcome
-    assert isinstance(back, reference.Horizon)
-    home = back.rounded()
-    assert (home.x, home.y, -home.vx, -home.vy) == pytest.approx((q.x, q.y, q.vx, q.vy), abs=1e-12)
-
-
 # A floor whose highest place is well below what its amplitudes add up to.
 GRAZING = Stem(w=1.0, h=Fourier(mean=1.25, omega=1.0, cos=(0.125,), sin=(0.0, 0.125)))
 
@@ -199,10 +141,10 @@ def knot_within_an_enclosed_time():
     """The mouth is open when y = 0 is crossed; with its knot within the enclosure, nothing is said."""
     q = State(2.0**110, 0.3, 0.5, 0.02, 1.0)
     assert [step.wall for step in reference.trajectory(LEAP, q, 2).steps] == ["arc", "left"]
-    for working in (6, 8, 10, 12, 15):
+    for working in (6, 8, 10, 12, 15, 30, 60, 200):
         path = reference.trajectory(LEAP, q, 2, working=working)
         assert [step.wall for step in path.steps] in (["arc"], ["arc", "left"])
-        assert len(path.steps) == 2 or isinstance(path.outcome, Undecided)
+        assert len(path.steps) == 2 or (working <= 15 and isinstance(path.outcome, Undecided))
 
 
 def floor_within_an_enclosed_time():
@@ -231,7 +173,9 @@ def removed_residual_decides():
         (BangBang(((-0.25, 0.0), (0.75, -(2.0**-300)), (1.75, 0.0))), 1.75),
     ):
         tilted = Stem(w=BangBang(((0.0, 1.0), (1.0, 2.0), (2.0, 1.0))), h=4.0, slope=slope)
-        hit(tilted, State(0.25, -1.125, -1.5, 0.0, 1.0, "left"), "left", t_end)
+        start = State(0.25, -1.125, -1.5, 0.0, 1.0, "left")
+        for digits in (DIGITS, 50, 200):
+            hit(tilted, start, "left", t_end, digits)
 
 
 def met_at_the_horizon():
@@ -248,6 +192,8 @@ def on_two_walls():
         (State(0.0, 0.5, -1.0, -1.0, 1.0, "right"), "corner"),
     ):
         assert reference.next_collision(STATIC, q, 9.0, digits=DIGITS) == Undefined(reason)
+    beside = State(0.0, 1.0, 0.0, -1.0, 0.1, "arc")
+    assert reference.next_collision(CIRCLE, beside, 9.0, digits=DIGITS) == Undefined("corner")
 
 
 def hit_on_a_knot():
@@ -286,20 +232,13 @@ BATTERY = (
     hit_on_a_knot,
     edge_as_the_wall_left_sees_it,
     chord,
-    leaving_a_chord,
     lift,
-    lift_beyond_a_knot,
     first_of_two,
-    recollision,
     box,
     horizon,
     mouth,
-    closing_mouth,
     law_of_reflection,
     differentiated,
-    mirror,
-    nested_precisions,
-    reversed_film,
     floor_within_an_enclosed_time,
     bounded_work,
 )

@@ -1,4 +1,4 @@
-"""Bad input of fast's public entries: one line that names field, value and bound, and never anything else."""
+"""Bad input of the steppers' public entries: one line that names field, value and bound, and nothing else."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import fast
+import reference
 from fast.batch import careful_steps
 from scene import BadInput, BangBang, Cap, Horizon, Mushroom, Rejected, State, load
 
@@ -33,6 +34,16 @@ ENTRIES = {
             "phases": (0.5,),
             "progress": None,
         },
+    ),
+}
+PROVED = {
+    "reference.next_collision": (
+        reference.next_collision,
+        {"scene": CAP, "state": START, "t_end": 2.0, "digits": 20},
+    ),
+    "reference.trajectory": (
+        reference.trajectory,
+        {"scene": CAP, "state": START, "n_collisions": 2, "t_end": 2.0, "digits": 20, "working": 20},
     ),
 }
 NAN, INFINITY, HUGE = math.nan, math.inf, 10**400
@@ -92,35 +103,42 @@ BAD = {
         (True,),
     ],
     "progress": [1, "print", [], START],
+    "digits": [None, *NO_COUNT, 0, 10**4 + 1, HUGE],
+    "working": [*NO_COUNT, 0, 10**4 + 1, HUGE],
 }
 # A flight from START to this horizon takes over 10^7 collisions; a trajectory needs none.
-FAR = {"flow": [("t_end", 1e9), ("t_end", INFINITY)], "next_collision": [("t_end", INFINITY)]}
+FAR = {
+    "flow": [("t_end", 1e9), ("t_end", INFINITY)],
+    "next_collision": [("t_end", INFINITY)],
+    "reference.next_collision": [("t_end", INFINITY)],
+    "reference.trajectory": [("t_end", INFINITY)],
+}
 CASES = [
     (name, field, value)
-    for name, (_, good) in ENTRIES.items()
+    for name, (_, good) in {**ENTRIES, **PROVED}.items()
     for field in good
     for value in BAD[field]
-    if not (name == "trajectory" and field == "t_end" and value is INFINITY)
+    if not (name == "reference.trajectory" and field == "t_end" and value is None)
 ] + [(name, *case) for name, cases in FAR.items() for case in cases]
 
 
 def refusal(name, changes):
     """Return the line with which an entry refuses; None when it takes what it is given."""
-    entry, good = ENTRIES[name]
+    entry, good = {**ENTRIES, **PROVED}[name]
     try:
         answer = entry(**{**good, **changes})
     except BadInput as error:
         return str(error)
-    if isinstance(answer, fast.Collisions | fast.FineTrajectory):
+    if isinstance(answer, fast.Collisions | fast.FineTrajectory | reference.Trajectory):
         answer = answer.outcome
     return answer.reason if isinstance(answer, Rejected) else None
 
 
 def test_good_input_is_taken():
-    assert [refusal(name, {}) for name in ENTRIES] == [None] * len(ENTRIES)
+    assert {refusal(name, {}) for name in [*ENTRIES, *PROVED]} == {None}
 
 
-@pytest.mark.parametrize("name", ENTRIES)
+@pytest.mark.parametrize("name", [*ENTRIES, *PROVED])
 def test_every_bad_value_is_refused_by_its_name(name):
     mine = [(field, value) for entry, field, value in CASES if entry == name]
     assert len(mine) > 50

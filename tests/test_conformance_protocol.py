@@ -91,6 +91,7 @@ def test_trajectories_are_chained(module):
         ('{"cmd":"dance"}', "dance"),
         ('{"cmd":"step","seq":3}', "scene"),
         (step(3, x="0.1"), "state.x"),
+        ({**step(3), "state": {name: STATE[name] for name in STATE if name != "vy"}}, "vy"),
         ({**step(3), "extra": 1}, "extra"),
         (step(3, z=1.0), "z"),
         (step(3, scene={**SCENE, "table": "cup"}), "cup"),

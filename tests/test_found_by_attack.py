@@ -27,7 +27,6 @@ from scene import (
     Stem,
     Undecided,
     Undefined,
-    from_data,
 )
 
 CIRCLE = Cap(r=1.0)
@@ -204,20 +203,9 @@ class TestFast:
 class TestScenes:
     """Scenes that cannot exist cannot be made."""
 
-    @pytest.mark.parametrize(
-        "make",
-        [
-            lambda: Cap(r=-1.0),
-            lambda: Mushroom(r=1.0, h=1.0, nu=2.0),
-            lambda: Mushroom(r=1.0, h=1.0, nu=Fourier(0.9, 1.0, (0.2,))),
-            lambda: Stem(w=Fourier(1.0, 1.0, (0.1,)), h=Fourier(1.0, math.sqrt(2.0), (0.1,))),
-            lambda: Cap(r=math.nan),
-            lambda: Cap(r="1"),
-        ],
-    )
-    def test_invalid_ones_are_refused_where_they_are_made(self, make):
-        with pytest.raises(InvalidScene):
-            make()
+    def test_laws_without_a_common_period(self):
+        with pytest.raises(InvalidScene, match="period"):
+            Stem(w=Fourier(1.0, 1.0, (0.1,)), h=Fourier(1.0, math.sqrt(2.0), (0.1,)))
 
     def test_laws_of_both_kinds_share_a_scene(self):
         scene = Mushroom(
@@ -230,10 +218,3 @@ class TestScenes:
         assert compare(fast.next_collision(scene, state, 9.0), truth, state, 4.0).kind == "agrees"
         run = fast.simulate(scene, n_particles=20, energy=100.0, seed=1)
         assert np.all(run.outcome == 0)
-
-    def test_a_schema_is_no_unknown_field(self):
-        assert from_data({"$schema": "scene.schema.json", "table": "cap", "r": 1.0}) == CIRCLE
-
-    def test_a_wrong_kind_names_the_valid_ones(self):
-        with pytest.raises(InvalidScene, match=r"fourier.*bang-bang|bang-bang.*fourier"):
-            from_data({"table": "cap", "r": {"kind": "spline", "knots": []}})

@@ -105,7 +105,11 @@ def work_identity(
     for i, part in enumerate(times):
         states = canonical_states(scene, n_particles, kT / ratio, _generator(seed, i))
         arrived = flow(scene, states, part * span)
-        pairs = [(_energy(s), _energy(o)) for s, (o, _) in zip(states, arrived, strict=True) if _is_kept(o)]
+        pairs = [
+            (_energy(s), _energy(o))
+            for s, (o, _) in zip(states, arrived, strict=True)
+            if isinstance(o, Horizon)
+        ]
         e0, e1 = np.array(pairs).reshape(-1, 2).T
         x = np.minimum(np.exp((ratio * e0 - e1) / kT), 1.0) / ratio
         expected = area(scene, part * span) / area(scene, 0.0)
@@ -222,10 +226,6 @@ def _is_captured(scene: Mushroom, at: Horizon) -> bool:
 def _energy(at: State | Outcome) -> float:
     assert isinstance(at, State | Horizon)
     return (at.vx**2 + at.vy**2) / 2
-
-
-def _is_kept(outcome: Outcome) -> bool:
-    return isinstance(outcome, Horizon)
 
 
 def _generator(seed: int, stream: int) -> np.random.Generator:

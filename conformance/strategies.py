@@ -18,6 +18,7 @@ import msgspec
 from hypothesis import currently_in_test_context, note
 from hypothesis import strategies as st
 
+from conformance.generator.draws import walls_speed
 from scene import BangBang, Cap, Fourier, Law, Mushroom, Scene, State, Stem, Wall, to_data
 from scene.geometry import DIGITS, TableAt, table_at
 from scene.laws import bounds, breakpoints
@@ -274,8 +275,7 @@ def states(draw: st.DrawFn, scene: Scene) -> tuple[State, float]:
     place = _Place.of(scene, t)
     wall: Wall | None = draw(_one_of([*(None for _ in scene.walls), *scene.walls]))
     wall, x, y = draw(_places(place, wall))
-    walls_speed = _walls_speed(scene) or place.near.size
-    speed = walls_speed * 10 ** draw(_between(-3.0, 6.0))
+    speed = (walls_speed(scene) or place.near.size) * 10 ** draw(_between(-3.0, 6.0))
     vx, vy = draw(_headings(place, wall, x, y))
     vx, vy = _leaving(place, wall, x, y, speed * vx, speed * vy)
     flight = place.near.size / speed * draw(st.sampled_from((4.0, 1.0, 0.125, 2.0**-20, 0.0)))
@@ -313,13 +313,6 @@ def _times(draw: st.DrawFn, scene: Scene) -> float:
     inside = fractions().map(lambda part: length * (turns + part))
     at_knot = st.sampled_from(knots).map(lambda knot: length * turns + knot)
     return draw(st.one_of(st.just(0.0), inside, inside, inside, at_knot))
-
-
-def _walls_speed(scene: Scene) -> float:
-    # nu moves the mouth at the scale of r, slope the sides at the scale of h.
-    found = {name: bounds(law) for name, law in laws_of(scene).items()}
-    reach = {name: found[length].highest for name, length in (("nu", "r"), ("slope", "h")) if name in found}
-    return max(law.slope * reach.get(name, 1.0) for name, law in found.items())
 
 
 @st.composite

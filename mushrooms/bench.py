@@ -193,14 +193,18 @@ def _contenders(
     return contenders, askers, built, not_run
 
 
+def _new_table(title: str, *numbers: str) -> Table:
+    table = Table("workload", "stepper", title=title, title_justify="left")
+    for name in numbers:
+        table.add_column(name, justify="right")
+    return table
+
+
 def _table(found: Record) -> Table:
     from mushrooms.reports.bench_page import middle_and_worst
 
-    table = Table(title="Speed against error", title_justify="left")
-    for name in ("workload", "stepper"):
-        table.add_column(name)
-    for name in ("ns/collision", "median ulps", "worst ulps", "wrong", "undecided", "left"):
-        table.add_column(name, justify="right")
+    numbers = ("ns/collision", "median ulps", "worst ulps", "wrong", "undecided", "left")
+    table = _new_table("Speed against error", *numbers)
     for p in found.points:
         middle, worst = middle_and_worst(p.ulps, ".2g")
         counts = [str(n) if n else "" for n in (p.wrong, p.undecided, p.left)]
@@ -211,11 +215,7 @@ def _table(found: Record) -> Table:
 
 
 def _ratios(ratios: list[Ratio]) -> Table:
-    table = Table(title="New time over old, 99 % bootstrap interval over the laps", title_justify="left")
-    for name in ("workload", "stepper"):
-        table.add_column(name)
-    table.add_column("ratio", justify="right")
-    table.add_column("interval", justify="right")
+    table = _new_table("New time over old, 99 % bootstrap interval over the laps", "ratio", "interval")
     for r in ratios:
         mark = " slower" if r.is_slower else ""
         table.add_row(r.workload, escape(r.contender), f"{r.ratio:.2f}", f"{r.low:.2f} to {r.high:.2f}{mark}")

@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import math
 import shlex
-from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-from rich import progress
 from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
@@ -57,13 +55,14 @@ def check(
         output.check_file(path, (suffix,))
     known = suite.read_known(known_failures) if known_failures else frozenset()
     with progress_bar() as bar:
+        task = bar.add_task("cases", total=None)
         run = suite.check(
             command,
             level=level,
             groups=[name.strip() for name in groups.split(",") if name.strip()],
             limits=Limits(timeout, restarts),
             known=known,
-            progress=_advance(bar),
+            progress=lambda n_done, n_total: bar.update(task, completed=n_done, total=n_total),
         )
     for path, suffix in files.items():
         write_file(path, _content(run, suffix))
@@ -92,15 +91,11 @@ def show(run: Run) -> None:
         column.justify = "right"
     for group in groups:
         cells = [_cell(verdict, group.counts[verdict]) for verdict in seen]
-        worst = (
-            "–"
-            if group.precision == "–"
-            else "inf"
-            if group.worst_ulps is None
-            else f"{group.worst_ulps:.3g}"
-        )
+        worst = "inf" if group.worst_ulps is None else f"{group.worst_ulps:.3g}"
         table.add_section() if group is groups[-1] else None
-        table.add_row(group.group, str(group.cases), *cells, worst, group.precision)
+        table.add_row(
+            group.group, str(group.cases), *cells, "–" if group.precision == "–" else worst, group.precision
+        )
     console = Console(width=None if Console().is_terminal else 140, soft_wrap=True, highlight=False)
     console.print(table)
     if run.speed:
@@ -137,8 +132,3 @@ def _verdict(run: Run, total: Any) -> str:
     return f"{passed}{more}, {run.seconds:.1f} s: " + words.get(
         run.exit_code(), "[bold red]undecided: the corpus could not tell, which is its own fault[/]"
     )
-
-
-def _advance(bar: progress.Progress) -> Callable[[int, int], None]:
-    task = bar.add_task("cases", total=None)
-    return lambda n_done, n_total: bar.update(task, completed=n_done, total=n_total)

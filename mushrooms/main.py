@@ -6,13 +6,11 @@ import json
 import math
 import os
 import sys
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Annotated, Any, NoReturn
 
 import typer
-from rich import progress
 from rich.console import Console
 from rich.table import Table
 
@@ -49,7 +47,6 @@ SceneName = Annotated[
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON.")]
 Seed = Annotated[int, typer.Option(help="Seed of the random starts, 0 to 2^64 - 1.")]
 Threads = Annotated[int | None, typer.Option(help="Threads; all cores by default.")]
-Folder = Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder for the results.")]
 
 
 def run(arguments: list[str] | None = None) -> NoReturn:
@@ -165,15 +162,17 @@ def simulate(
         raise BadInput(f"--energy = {energy}, must be finite and > 0")
     _check_range("--particles", particles, 1, MAX_PARTICLES)
     _check_range("--cycles", cycles, 1)
-    _check_common(seed, threads)
+    check_seed(seed, "--seed")
+    if threads is not None:
+        _check_range("--threads", threads, 1)
     table = scenes.load(scene)
-    with _maybe_folder(out) as folder:
+    with output.writable_folder(out) if out else nullcontext() as folder:
         import numpy as np
 
         import fast
 
         with progress_bar() as bar:
-            advance = _task(bar, table.name or scene, particles)
+            task = bar.add_task(table.name or scene, total=particles)
             ensemble = fast.simulate(
                 table,
                 n_particles=particles,
@@ -181,15 +180,11 @@ def simulate(
                 n_cycles=cycles,
                 seed=seed,
                 threads=threads,
-                progress=advance,
+                progress=lambda n_done: bar.update(task, completed=n_done),
             )
         summary = _summary(table, ensemble, cycles)
         if folder is not None:
-            fields = {
-                name: value
-                for name, value in ensemble._asdict().items()
-                if name not in ("seconds", "threads")
-            }
+            fields = {k: v for k, v in ensemble._asdict().items() if k not in ("seconds", "threads")}
             text = json.dumps(
                 {"scene": scenes.to_data(table), "energy": energy, "cycles": cycles, "seed": seed} | summary
             )
@@ -254,29 +249,9 @@ def _check_range(option: str, value: int, low: int, high: int | None = None) -> 
         )
 
 
-def _check_common(seed: int, threads: int | None) -> None:
-    check_seed(seed, "--seed")
-    if threads is not None:
-        _check_range("--threads", threads, 1)
-
-
-@contextmanager
-def _maybe_folder(path: Path | None) -> Iterator[Path | None]:
-    if path is None:
-        yield None
-    else:
-        with output.writable_folder(path) as folder:
-            yield folder
-
-
 def _console() -> Console:
     # A pipe has no width: lines long enough for the tables.
     return Console() if sys.stdout.isatty() else Console(width=140)
-
-
-def _task(bar: progress.Progress, name: str, total: int) -> Callable[[int], None]:
-    task = bar.add_task(name, total=total)
-    return lambda n_done: bar.update(task, completed=n_done)
 
 
 def _print_pairs(pairs: dict[str, Any], as_json: bool) -> None:

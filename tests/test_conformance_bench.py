@@ -33,8 +33,12 @@ def drawn() -> dict[str, workloads.Workload]:
     return {rule.name: workloads.draw_workload(rule, 7, 3, proved_step) for rule in workloads.RULES}
 
 
+def tried(workload, *these):
+    return measure.measure(workload, these, BRIEF, lambda _: None, [])
+
+
 def measured(workload, *these):
-    points, troubles = measure.measure(workload, these, BRIEF, lambda _: None, [])
+    points, troubles = tried(workload, *these)
     assert not troubles
     return points
 
@@ -131,7 +135,7 @@ def test_commands_time_themselves_and_their_troubles_are_told(drawn):
         unable, _ = contenders.by_command(
             "plain", "command", [sys.executable, "-m", "conformance.plain"], stack
         )
-        points, troubles = measure.measure(drawn["breathing-disk"], [able, unable], BRIEF, lambda _: None, [])
+        points, troubles = tried(drawn["breathing-disk"], able, unable)
     assert [p.contender for p in points] == ["fast"]
     assert points[0].right == 3
     assert min(points[0].ns) > 0
@@ -161,7 +165,7 @@ def test_a_command_that_times_nothing_is_left_out(drawn, tmp_path, ns, steps):
         impostor, _ = contenders.by_command(
             "it", "command", [sys.executable, str(tmp_path / "impostor.py")], stack
         )
-        points, troubles = measure.measure(drawn["breathing-disk"], [impostor], BRIEF, lambda _: None, [])
+        points, troubles = tried(drawn["breathing-disk"], impostor)
     assert not points
     assert troubles["it"].startswith("fail: a time request is answered")
 
@@ -172,26 +176,20 @@ def test_a_contender_that_changes_its_answers_is_left_out(drawn):
     def fickle(workload, n_times):
         return Lap(1.0, [Undecided(str(next(answers)))] * 3, 1e9)
 
-    points, troubles = measure.measure(
-        drawn["slow"], [Contender("fickle", "command", fickle)], BRIEF, lambda _: None, []
-    )
+    points, troubles = tried(drawn["slow"], Contender("fickle", "command", fickle))
     assert not points
     assert troubles == {"fickle": "fail: its answers differ from lap to lap"}
 
 
 def test_a_contender_that_breaks_off_is_left_out(drawn):
-    calls = 0
+    calls = iter(range(100))
 
     def run(workload, n_times):
-        nonlocal calls
-        calls += 1
-        if calls > 3:
+        if next(calls) > 2:
             raise Trouble("crashed", "gone")
         return Lap(1.0, [Undecided("")] * 3, 1e9)
 
-    points, troubles = measure.measure(
-        drawn["slow"], [Contender("brief", "command", run)], BRIEF, lambda _: None, []
-    )
+    points, troubles = tried(drawn["slow"], Contender("brief", "command", run))
     assert not points
     assert troubles == {"brief": "crashed: gone"}
 

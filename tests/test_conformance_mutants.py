@@ -10,7 +10,6 @@ import pytest
 from conformance.mutants import MUTANTS, kill_matrix
 from conformance.mutants.kill_matrix import PLAIN, kills, matrix, table, verdict
 from conformance.vectors import load, manifest
-from scene import BadInput
 
 DOCS = Path(__file__).parent.parent / "docs"
 PUBLISHED = json.loads((DOCS / "kill-matrix.json").read_text("utf-8"))
@@ -108,8 +107,3 @@ def test_a_survivor_makes_the_command_fail(monkeypatch, tmp_path, vectors):
     monkeypatch.setattr(kill_matrix, "load", lambda level: list(vectors.values())[:3])
     monkeypatch.setattr(kill_matrix, "MUTANTS", {name: MUTANTS[name]._replace(flight=PLAIN.flight)})
     assert kill_matrix.run(tmp_path, lambda line: None) == 1
-
-
-def test_an_unreadable_corpus_is_bad_input(tmp_path):
-    with pytest.raises(BadInput, match="cannot be read"):
-        load("stress", tmp_path)

@@ -12,7 +12,7 @@ from hypothesis import Phase, given, seed, settings
 from hypothesis import strategies as st
 from mpmath import MPContext
 
-from conformance.strategies import clocks, laws, scenes, scenes_and_states, states
+from conformance.strategies import clocks, laws, scenes_and_states, states
 from scene import BangBang, Cap, Fourier, Mushroom, State, Stem, check_scene, from_data, load
 from scene.laws import bounds, is_constant, value
 from scene.states import ON_WALL, check_numbers
@@ -107,11 +107,6 @@ def test_laws_stay_in_their_range(low, width, data):
     slack = 2.0**-45 * (abs(low) + width)
     assert bounds(law).lowest >= low - slack
     assert bounds(law).highest <= low + width + slack
-
-
-@given(scenes("cap"))
-def test_a_table_may_be_asked_for(scene):
-    assert isinstance(scene, Cap)
 
 
 @given(clocks())

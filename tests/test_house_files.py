@@ -17,11 +17,6 @@ MAX_FUNCTION = 60  # lines of a function, its decorators and docstring included
 LONGER: dict[str, str] = {}
 # Examples for other people's steppers, each complete in itself: their classes may have our names.
 EXAMPLES = "conformance/harness/"
-# Classes of one name that mean one thing in two packages, and why the name stays.
-ALIKE = {
-    "Collision": "an outcome: `scene`'s has rounded numbers as on the wire, `reference`'s has enclosures",
-    "Horizon": "likewise",
-}
 # Joined here so that this file does not contain what it forbids.
 PLACES = ["/" + "work", ".." + "/shared", "/" + "home/ada", "/" + "Users/ada", "C:" + r"\Users\ada"]
 FOREIGN = re.compile(
@@ -113,9 +108,7 @@ def test_files_and_functions_stay_short():
 
 
 def test_one_name_means_one_class():
-    repeated = set(repeated_classes(python_sources()))
-    assert repeated - set(ALIKE) == set()
-    assert set(ALIKE) - repeated == set(), "no longer needed"
+    assert repeated_classes(python_sources()) == {}
 
 
 def test_planted_lengths_and_names_are_seen():

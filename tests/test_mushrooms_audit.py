@@ -134,28 +134,22 @@ def test_a_failed_claim_exits_with_1(call, tmp_path, monkeypatch):
 
 
 @pytest.fixture
-def blocks(monkeypatch):
-    """Return the list to which each simulated block adds its seed."""
-    seeds = []
+def blocks(monkeypatch, request):
+    """Return the list to which each simulated block adds its seed; a parameter says which one breaks off."""
+    seeds, last = [], getattr(request, "param", None)
 
     def counted(scene, **options):
         seeds.append(options["seed"])
+        if len(seeds) == last:
+            raise KeyboardInterrupt
         return adiabatic_particles.simulate(scene, **options)
 
     monkeypatch.setattr(fast, "simulate", counted)
     return seeds
 
 
-def test_a_broken_off_audit_goes_on(call, tmp_path, monkeypatch):
-    blocks = []
-
-    def counted(scene, **options):
-        blocks.append(options["seed"])
-        if len(blocks) == 3:
-            raise KeyboardInterrupt
-        return adiabatic_particles.simulate(scene, **options)
-
-    monkeypatch.setattr(fast, "simulate", counted)
+@pytest.mark.parametrize("blocks", [3], indirect=True)
+def test_a_broken_off_audit_goes_on(call, tmp_path, blocks):
     assert call("--only", "X5", "--out", tmp_path).code == 130
     assert call("--only", "X5", "--out", tmp_path, "--resume").code == 0
     assert len(blocks) == len(set(blocks)) + 1 == 5

@@ -10,12 +10,13 @@ import math
 
 from conformance.attacks.case import Attack, Family
 from conformance.generator.draws import Draw
-from scene import BangBang, Cap, Law, Mushroom, Scene, State, Stem, Wall
+from scene import BangBang, Cap, Mushroom, Scene, State, Stem, Wall
 
 
-def _rise_and_fall(draw: Draw, low: float, high: float) -> BangBang:
-    """Return a law that rises for a time 1 and falls for a time 1: the same at t and at 2 - t."""
-    return BangBang(knots=((0.0, low), (1.0, high), (2.0, low)))
+def _rise_and_fall(low: float, high: float, t: float) -> tuple[BangBang, float]:
+    """Return a law that rises for a time 1 and falls for a time 1, and its value at t and at 2 - t."""
+    share = 2 * t * t if t <= 0.5 else 1 - 2 * (1 - t) * (1 - t)
+    return BangBang(knots=((0.0, low), (1.0, high), (2.0, low))), low + (high - low) * share
 
 
 def _tilt(draw: Draw) -> float:
@@ -27,9 +28,7 @@ def tiny_slope(draw: Draw) -> Attack:
     """Leave a side that leans by next to nothing, and come back to it at y = 0 or at the horizon."""
     t = draw.pick((0.25, 0.5, 0.125, 0.75))
     low, high = draw.pick(((1.0, 2.0), (0.5, 0.75), (1.0, 1.125)))
-    width = _rise_and_fall(draw, low, high)
-    share = 2 * t * t if t <= 0.5 else 1 - 2 * (1 - t) * (1 - t)
-    half = low + (high - low) * share
+    width, half = _rise_and_fall(low, high, t)
     speed = draw.pick((1.0, 0.5, 0.25))
     y = -speed * (2 - 2 * t) if draw.pick((True, True, False)) else -1.0
     turn = 2.0 * draw.pick((0, 0, 1, -5, 512))
@@ -58,22 +57,20 @@ def flattening_slope(draw: Draw) -> Attack:
             )
         )
     )
-    width = _rise_and_fall(draw, 1.0, 2.0)
+    width, half = _rise_and_fall(1.0, 2.0, t)
     side = draw.pick((-1.0, 1.0))
     wall: Wall = "left" if side < 0 else "right"
     speed = draw.pick((0.0, 0.5, 1.0, -0.25))
     y = draw.pick((-1.5, -1.0, -2.0))
     t_end = draw.pick((1.75, 1.75, 3.0, math.nextafter(1.75, 9.0), math.nextafter(1.75, 0.0)))
-    return Attack(Stem(w=width, h=4.0, slope=slope), State(t, side * 1.125, y, 0.0, speed, wall), t_end)
+    return Attack(Stem(w=width, h=4.0, slope=slope), State(t, side * half, y, 0.0, speed, wall), t_end)
 
 
 def arc_residual(draw: Draw) -> Attack:
     """Wait just beside the arc's top while it rises and falls; back at the start's radius it is met."""
     t = draw.pick((0.25, 0.5, 0.125, 0.75))
     low, high = draw.pick(((1.0, 2.0), (0.5, 0.75)))
-    share = 2 * t * t if t <= 0.5 else 1 - 2 * (1 - t) * (1 - t)
-    radius = low + (high - low) * share
-    arc: Law = _rise_and_fall(draw, low, high)
+    arc, radius = _rise_and_fall(low, high, t)
     off = draw.pick((0.0, draw.power(-200, -20), -draw.power(-200, -20)))
     up = draw.pick((radius, math.nextafter(radius, 0.0), math.nextafter(radius, 9.0)))
     t_end = draw.pick((2 - t, 2 - t, 3.0, math.nextafter(2 - t, 9.0), math.nextafter(2 - t, 0.0)))
@@ -83,10 +80,7 @@ def arc_residual(draw: Draw) -> Attack:
 def floor_residual(draw: Draw) -> Attack:
     """Leave the floor from a rounding beside it; it comes back with a side, or at the horizon."""
     t = draw.pick((0.25, 0.5, 0.75))
-    low, high = 1.0, 1.5
-    share = 2 * t * t if t <= 0.5 else 1 - 2 * (1 - t) * (1 - t)
-    depth = low + (high - low) * share
-    floor = _rise_and_fall(draw, low, high)
+    floor, depth = _rise_and_fall(1.0, 1.5, t)
     off = draw.pick((0.0, 2.0**-52, -(2.0**-52), 2.0**-40, -(2.0**-40)))
     vx = draw.pick((0.0, 0.5 / (2 - 2 * t), 0.25))
     t_end = draw.pick((2 - t, 3.0, 3.0, math.nextafter(2 - t, 9.0), math.nextafter(2 - t, 0.0)))

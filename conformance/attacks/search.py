@@ -133,14 +133,11 @@ def judged(attack: Attack, steppers: UnderAttack, tally: Tally) -> Iterable[Judg
     if steppers.stepper is not None:
         t_end = attack.t_end if attack.t_end is not None else late_enough(attack.state, answers[0])
         if t_end is not None:
-            yield _survived(partial(_step_verdict, steppers.stepper, attack, t_end, answers[0]))
+            outcome = partial(steppers.stepper, attack.scene, attack.state, t_end)
+            yield _survived(lambda: stepped(outcome(), answers[0], attack.state))
     if steppers.flow is not None and attack.is_flow and attack.t_end is not None:
         flow, end = steppers.flow, attack.t_end
         yield _survived(lambda: flown(flow(attack.scene, attack.state, end), answers))
-
-
-def _step_verdict(stepper: Stepper, attack: Attack, t_end: float, answer: second_stepper.Answer) -> Judgement:
-    return stepped(stepper(attack.scene, attack.state, t_end), answer, attack.state)
 
 
 def _survived(judge: Callable[[], Judgement]) -> Judgement:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import json
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor
 from contextlib import contextmanager
 from functools import cache
@@ -83,7 +83,6 @@ def conduct(
     entries: Sequence[Entry] | None = None,
     predict: Predict = theory.predict,
     progress: Progress | None = None,
-    examined: Callable[[Finding], None] | None = None,
 ) -> AuditResult:
     """Conduct an audit.
 
@@ -93,7 +92,6 @@ def conduct(
         entries: of the ledger, all by default.
         predict: theory, or a wrong one that must be found out.
         progress: told of every block of particles.
-        examined: told of every finding.
 
     Raises:
         BadInput: a setting out of bounds.
@@ -121,15 +119,11 @@ def conduct(
                     progress=progress,
                 )
         for entry in entries:
-            if entry.id in found:
-                pass
-            elif entry.id in pending:
+            if entry.id in pending:
                 found[entry.id] = pending[entry.id].result()
-            else:
+            elif entry.id not in found:
                 found[entry.id] = examine(entry, samples, steppers, settings, predict)
             _save(found[entry.id], settings)
-            if examined:
-                examined(found[entry.id])
     ordered = [found[entry.id] for entry in entries]
     return AuditResult(settings, tuple(entries), ordered, samples, time.perf_counter() - begin)
 

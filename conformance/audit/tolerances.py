@@ -115,23 +115,18 @@ def above(
     found: tuple[float, float],
     bound: float,
     *,
-    band: float = 0.0,
     form: Form = "claim",
-    note: str = "",
 ) -> Check:
-    """Check that a measured value exceeds a bound beyond error and band; within them it is undecided."""
+    """Check that a measured value exceeds a bound beyond its error; within it, it is undecided."""
     value, error = found
-    reach = N_SIGMA * error + band
-    holds = None if abs(value - bound) <= reach else bool(value > bound)
-    return Check(what, holds, f"> {bound:.6g}", value, error, band, form, 1, note)
+    holds = None if abs(value - bound) <= N_SIGMA * error else bool(value > bound)
+    return Check(what, holds, f"> {bound:.6g}", value, error, 0.0, form, 1)
 
 
-def exact(
-    what: str, value: Any, expected: Any, size: float, *, form: Form = "claim", note: str = ""
-) -> Check:
+def exact(what: str, value: Any, expected: Any, size: float, *, form: Form = "claim") -> Check:
     """Compare two computed numbers within `size`, the rounding of the computation."""
     holds = bool(abs(value - expected) <= size)
-    return Check(what, holds, mpmath.nstr(mpmath.mpf(expected), 12), float(value), None, size, form, 0, note)
+    return Check(what, holds, mpmath.nstr(mpmath.mpf(expected), 12), float(value), None, size, form)
 
 
 def stated(what: str, holds: bool, found: str, expected: str, *, form: Form = "claim") -> Check:
@@ -160,7 +155,6 @@ def fits(
     *,
     band: float = 0.0,
     scale: float = 0.5,
-    form: Form = "claim",
     note: str = "",
 ) -> Check:
     """Test a whole distribution by Kolmogorov's distance (one sample, two sides).
@@ -174,25 +168,15 @@ def fits(
         cdfs: the laws admitted.
         band: distance that finite energy may add.
         scale: distance that must be seen: with a wider reach the check tells nothing.
-        form: of the check.
         note: what else is worth knowing.
     """
     n = len(values)
     if n < 2:
-        return Check(what, None, "a sample", form=form, n_tests=1, note="no particles")
+        return Check(what, None, "a sample", n_tests=1, note="no particles")
     gaps = [largest_gap(values, cdf) for cdf in cdfs]
     gap, reach = min(gaps), critical_gap(n) + band
     holds = None if reach >= scale else bool(gap <= reach)
     p = float(kstwo.sf(max(gap - band, 0.0), n))
     more = f"; {note}" if note else ""
-    return Check(
-        what,
-        holds,
-        f"<= {reach:.4g}",
-        gap,
-        None,
-        band,
-        form,
-        1,
-        f"Kolmogorov's distance, n = {n}, p = {p:.2g}{more}",
-    )
+    text = f"Kolmogorov's distance, n = {n}, p = {p:.2g}{more}"
+    return Check(what, holds, f"<= {reach:.4g}", gap, band=band, n_tests=1, note=text)

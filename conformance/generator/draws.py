@@ -147,7 +147,10 @@ def unproved(table: str, **laws: Any) -> dict[str, Any]:
 
 
 def walls_speed(scene: Scene) -> float:
-    """Return a bound of the walls' speeds; 0 when nothing moves."""
+    """Return a bound of the walls' speeds; 0 when nothing moves.
+
+    nu moves the mouth at the scale of r, slope the sides at the scale of h.
+    """
     found = {name: bounds(law) for name, law in laws(scene).items()}
     reach = {name: found[of].highest for name, of in (("nu", "r"), ("slope", "h")) if name in found}
     return max(law.slope * reach.get(name, 1.0) for name, law in found.items())

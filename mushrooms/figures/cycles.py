@@ -20,7 +20,7 @@ from conformance.audit.runs import scene_of
 from conformance.audit.samples import Sample
 from conformance.audit.tolerances import mean, spread
 from mushrooms.figures.style import BLACK, BLUE, GREEN, ORANGE, SKY, FloatArray, new_figure, phase_colours
-from scene import Scene, load
+from scene import load
 from scene.laws import value
 from scene.tables import Mushroom
 
@@ -42,15 +42,10 @@ def loops() -> Figure:
         (axes[1], fixed, "fixed cap, anticlockwise"),
         (axes[2], moving, "moving cap"),
     ):
-        _loop(panel, *_volume_loop(scene))
+        _loop(panel, *(np.array([*values, values[0]]) for values in volume_loop(scene, N_LOOP)))
         panel.set(xlabel="V_ell / V_cap", ylabel="V_cap / V", title=title)
     axes[2].legend(loc="best", title="t / T")
     return figure
-
-
-def _volume_loop(scene: Scene) -> tuple[FloatArray, FloatArray]:
-    x, y = volume_loop(scene, N_LOOP)
-    return np.array([*x, x[0]]), np.array([*y, y[0]])
 
 
 def _loop(axes: Axes, x: FloatArray, y: FloatArray) -> None:

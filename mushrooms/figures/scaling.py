@@ -34,29 +34,27 @@ def zone(samples: list[Sample]) -> Figure:
         curve, start = theory.chaotic_zone(scene_of(sample.run), fine), 0.0
         start = curve.log_energy[0]
         left.plot(fine / span, curve.log_energy - start, color=ORANGE, label="theory, eq. (dE)")
-        _points(left, sample.run.phases, means, "simulation")
+        _points(left, sample.run.phases, means)
         left.set(xlabel="t / T", ylabel="mean log E/E0, not captured so far", title=sample.run.name)
         right.plot(fine / span, curve.p_cha, color=ORANGE, label="theory, eq. (ps)")
         shares = zone_share(sample, np.array(times))
         errors = [Mean(float(p), math.sqrt(max(p * (1 - p), 1e-6) / sample.n)) for p in shares]
-        _points(right, sample.run.phases, errors, "simulation")
+        _points(right, sample.run.phases, errors)
         right.set(xlabel="t / T", ylabel="share in the chaotic zone", title=sample.run.name, ylim=(0, 1.05))
         left.legend(loc="lower center")
         right.legend(loc="lower left")
     return figure
 
 
-def _points(axes: Axes, x: tuple[float, ...] | list[float], values: list[Mean], label: str) -> None:
-    axes.errorbar(
-        x,
-        [v.value for v in values],
-        [v.error for v in values],
-        fmt="o",
-        color=BLUE,
-        markersize=4,
-        capsize=2,
-        label=f"{label}, ± 1 standard error",
-    )
+def _points(axes: Axes, x: tuple[float, ...] | list[float], values: list[Mean], **style: Any) -> None:
+    found, errors = zip(*values, strict=True)
+    usual: dict[str, Any] = {
+        "fmt": "o",
+        "color": BLUE,
+        "markersize": 4,
+        "label": "simulation, ± 1 standard error",
+    }
+    axes.errorbar(x, found, errors, capsize=2, **usual | style)
 
 
 def widths(moving: list[Sample], ergodic: list[Sample]) -> Figure:
@@ -64,17 +62,9 @@ def widths(moving: list[Sample], ergodic: list[Sample]) -> Figure:
     figure, axes = new_figure(5.4, 3.8)
     for samples, colour, marker, label in ((moving, BLUE, "o", "moving cap"), (ergodic, GREEN, "s", "c = 0")):
         fit, energies = fitted_width(samples)
+        text = f"{label}: exponent {fit.exponent:.4f} ± {fit.exponent_error:.4f}"
         values = [width(sample) for sample in samples]
-        axes.errorbar(
-            energies,
-            [v.value for v in values],
-            [v.error for v in values],
-            fmt=marker,
-            color=colour,
-            markersize=5,
-            capsize=2,
-            label=f"{label}: exponent {fit.exponent:.4f} ± {fit.exponent_error:.4f}",
-        )
+        _points(axes, energies, values, fmt=marker, color=colour, markersize=5, label=text)
         axes.plot(energies, fit.coefficient * np.array(energies) ** fit.exponent, color=colour, linewidth=1)
     x = np.array([moving[0].run.energy, moving[-1].run.energy])
     printed = width(moving[0]).value * (x / x[0]) ** 0.25
@@ -100,7 +90,7 @@ def convergence(samples: list[Sample]) -> Figure:
         ),
     )
     for panel, (label, values, truth) in zip(axes, rows, strict=True):
-        _points(panel, energies, values, "simulation")
+        _points(panel, energies, values)
         panel.axhline(truth, color=ORANGE, label="theory, infinite E0")
         panel.set(xscale="log", xlabel="E0", title=label)
     fit = theory.extrapolate(energies, [v.value for v in rows[0][1]], [v.error for v in rows[0][1]])

@@ -99,6 +99,65 @@ def saboteur(name: str, method: str) -> Callable[[Callable[..., None]], Callable
 SABOTEURS: dict[str, type[Citizen]] = {"honest": Citizen}
 # Odd manners that are no faults: these must pass.
 HONEST = ("honest", "dribble", "noise", "more-fields", "answer-and-exit")
+# What is answered to a step in place of the honest answer.
+ANSWERS: dict[str, Callable[[Request], Request]] = {
+    "more-fields": lambda hit: {**hit, "iterations": 7, "note": "\u221e"},
+    "huge-line": lambda hit: {"seq": hit["seq"], "filler": "x" * (2**24 + 2**20)},
+    "wrong-seq": lambda hit: {**hit, "seq": hit["seq"] + 1},
+    "no-seq": lambda _: HIT,
+    "nan": lambda hit: {**hit, "vx": float("nan")},
+    "number-as-text": lambda hit: {**hit, "dt": "1.0"},
+    "missing-field": lambda hit: {name: value for name, value in hit.items() if name != "vy"},
+    "unknown-wall": lambda hit: {**hit, "wall": "lid"},
+    "reason-of-its-own": lambda hit: {"seq": hit["seq"], "outcome": "undefined", "reason": "too hard"},
+    "own-error": lambda hit: {"seq": hit["seq"], "error": "out of memory"},
+}
+# What is written in place of the honest line.
+LINES: dict[str, Callable[[str], str]] = {
+    "duplicate": lambda line: line + line,
+    "split-line": lambda line: line[:20] + "\n" + line[20:],
+    "junk": lambda line: "debug: stepping\n" + line,
+    "blank-line": lambda _: "\n",
+    "deep-nesting": lambda _: "[" * 100_000 + "]" * 100_000 + "\n",
+    "infinity": lambda line: line.replace("-0.6", "1e999"),
+}
+# What becomes of the numbers to be echoed.
+ECHOES: dict[str, Callable[[float], float]] = {
+    "no-minus-zero": lambda value: value or 0.0,
+    "flush-subnormals": lambda value: value if abs(value) >= sys.float_info.min else 0.0 * value,
+    "misread-exponents": lambda value: float(repr(value).replace("e+22", "e+21")),
+}
+
+
+def answering(change: Callable[[Request], Request]) -> Callable[..., None]:
+    """Return a step that says a changed answer."""
+    return lambda _, request: say(change({"seq": request["seq"], **HIT}))
+
+
+def writing(change: Callable[[str], str]) -> Callable[..., None]:
+    """Return a step that writes something else for its line."""
+    return lambda _, request: write(change(json.dumps({"seq": request["seq"], **HIT}) + "\n"))
+
+
+def echoing(change: Callable[[float], float]) -> Callable[..., None]:
+    """Return an echo of changed numbers."""
+    return lambda _, values: say({"values": [change(value) for value in values]})
+
+
+def sleep(*_: Any) -> None:
+    """Do nothing for longer than anyone waits."""
+    time.sleep(SLEEP)
+
+
+for _name, _answer in ANSWERS.items():
+    saboteur(_name, "step")(answering(_answer))
+for _name, _line in LINES.items():
+    saboteur(_name, "step")(writing(_line))
+for _name, _number in ECHOES.items():
+    saboteur(_name, "echo")(echoing(_number))
+saboteur("fewer-numbers", "echo")(lambda _, values: say({"values": values[:-1]}))
+for _name, _method in (("hang", "step"), ("hang-at-start", "start"), ("ignore-stop", "end")):
+    saboteur(_name, _method)(sleep)
 
 
 @saboteur("dribble", "step")
@@ -115,19 +174,9 @@ def write_much_to_standard_error(_: Citizen, request: Request) -> None:
     say({"seq": request["seq"], **HIT})
 
 
-@saboteur("more-fields", "step")
-def answer_more_than_asked(_: Citizen, request: Request) -> None:
-    say({"seq": request["seq"], **HIT, "iterations": 7, "note": "\u221e"})
-
-
 @saboteur("answer-and-exit", "end")
 def exit_before_the_input_ends(_: Citizen) -> None:
     os._exit(0)
-
-
-@saboteur("hang", "step")
-def hang(_: Citizen, request: Request) -> None:
-    time.sleep(SLEEP)
 
 
 @saboteur("late-answer", "step")
@@ -136,20 +185,10 @@ def answer_late(_: Citizen, request: Request) -> None:
     say({"seq": request["seq"], **HIT})
 
 
-@saboteur("hang-at-start", "start")
-def hang_at_start(_: Citizen) -> None:
-    time.sleep(SLEEP)
-
-
 @saboteur("ignore-sigterm", "step")
 def ignore_termination(_: Citizen, request: Request) -> None:
     for name in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP):
         signal.signal(name, signal.SIG_IGN)
-    time.sleep(SLEEP)
-
-
-@saboteur("ignore-stop", "end")
-def ignore_stop(_: Citizen) -> None:
     time.sleep(SLEEP)
 
 
@@ -165,20 +204,10 @@ def write_without_end(_: Citizen, request: Request) -> None:
         write("9" * 2**20)
 
 
-@saboteur("huge-line", "step")
-def write_a_huge_line(_: Citizen, request: Request) -> None:
-    say({"seq": request["seq"], "filler": "x" * (2**24 + 2**20)})
-
-
 @saboteur("flood-stderr", "step")
 def flood_standard_error(_: Citizen, request: Request) -> None:
     while True:
         os.write(2, b"help! " * 10_000)
-
-
-@saboteur("wrong-seq", "step")
-def answer_another_question(_: Citizen, request: Request) -> None:
-    say({"seq": request["seq"] + 1, **HIT})
 
 
 @saboteur("stale-answer", "step")
@@ -187,33 +216,10 @@ def answer_the_question_before(self: Any, request: Request) -> None:
     say({"seq": before, **HIT})
 
 
-@saboteur("no-seq", "step")
-def answer_without_seq(_: Citizen, request: Request) -> None:
-    say(HIT)
-
-
-@saboteur("duplicate", "step")
-def answer_twice(_: Citizen, request: Request) -> None:
-    line = json.dumps({"seq": request["seq"], **HIT}) + "\n"
-    write(line + line)
-
-
 @saboteur("early-answers", "start")
 def answer_before_being_asked(_: Citizen) -> None:
     lines = [INTRODUCTION, *({"seq": seq, **HIT} for seq in range(10))]
     write("".join(json.dumps(line) + "\n" for line in lines))
-
-
-@saboteur("split-line", "step")
-def split_a_line(_: Citizen, request: Request) -> None:
-    line = json.dumps({"seq": request["seq"], **HIT})
-    write(line[:20] + "\n" + line[20:] + "\n")
-
-
-@saboteur("junk", "step")
-def write_junk_first(_: Citizen, request: Request) -> None:
-    write("debug: stepping\n")
-    say({"seq": request["seq"], **HIT})
 
 
 @saboteur("banner", "start")
@@ -222,55 +228,10 @@ def write_a_banner_first(_: Citizen) -> None:
     say(INTRODUCTION)
 
 
-@saboteur("blank-line", "step")
-def write_a_blank_line(_: Citizen, request: Request) -> None:
-    write("\n")
-
-
 @saboteur("not-utf8", "step")
 def write_bytes(_: Citizen, request: Request) -> None:
     sys.stdout.buffer.write(b'{"seq": %d, "outcome": "\xff\xfe"}\n' % request["seq"])
     sys.stdout.flush()
-
-
-@saboteur("deep-nesting", "step")
-def nest_deeply(_: Citizen, request: Request) -> None:
-    write("[" * 100_000 + "]" * 100_000 + "\n")
-
-
-@saboteur("nan", "step")
-def answer_nan(_: Citizen, request: Request) -> None:
-    say({"seq": request["seq"], **HIT, "vx": float("nan")})
-
-
-@saboteur("infinity", "step")
-def answer_beyond_binary64(_: Citizen, request: Request) -> None:
-    write(json.dumps({"seq": request["seq"], **HIT}).replace("-0.6", "1e999") + "\n")
-
-
-@saboteur("number-as-text", "step")
-def quote_a_number(_: Citizen, request: Request) -> None:
-    say({"seq": request["seq"], **HIT, "dt": "1.0"})
-
-
-@saboteur("missing-field", "step")
-def leave_out_a_field(_: Citizen, request: Request) -> None:
-    say({"seq": request["seq"], **{name: value for name, value in HIT.items() if name != "vy"}})
-
-
-@saboteur("unknown-wall", "step")
-def name_an_unknown_wall(_: Citizen, request: Request) -> None:
-    say({"seq": request["seq"], **HIT, "wall": "lid"})
-
-
-@saboteur("reason-of-its-own", "step")
-def invent_a_reason(_: Citizen, request: Request) -> None:
-    say({"seq": request["seq"], "outcome": "undefined", "reason": "too hard"})
-
-
-@saboteur("own-error", "step")
-def report_an_error(_: Citizen, request: Request) -> None:
-    say({"seq": request["seq"], "error": "out of memory"})
 
 
 @saboteur("other-protocol", "start")
@@ -281,26 +242,6 @@ def speak_another_protocol(_: Citizen) -> None:
 @saboteur("fifteen-digits", "echo")
 def print_fifteen_digits(_: Citizen, values: list[float]) -> None:
     write('{"values": [' + ", ".join(f"{value:.15g}" for value in values) + "]}\n")
-
-
-@saboteur("no-minus-zero", "echo")
-def lose_the_sign_of_zero(_: Citizen, values: list[float]) -> None:
-    say({"values": [value or 0.0 for value in values]})
-
-
-@saboteur("flush-subnormals", "echo")
-def flush_subnormals(_: Citizen, values: list[float]) -> None:
-    say({"values": [value if abs(value) >= sys.float_info.min else 0.0 * value for value in values]})
-
-
-@saboteur("misread-exponents", "echo")
-def misread_exponents(_: Citizen, values: list[float]) -> None:
-    say({"values": [float(repr(value).replace("e+22", "e+21")) for value in values]})
-
-
-@saboteur("fewer-numbers", "echo")
-def lose_a_number(_: Citizen, values: list[float]) -> None:
-    say({"values": values[:-1]})
 
 
 @saboteur("crash-on-invalid", "reject")

@@ -21,7 +21,7 @@ from scene.precision import intervals
 Interval = Any  # mpmath's ivmpf, which has no type stubs
 
 BITS_PER_DIGIT = 3.3219280948873626
-# What one step may take, in the unit of `WorkLimit`: two and a half times the most that a vector of the corpus
+# What one step may take, in the unit of `WorkLimit`: two and a half times what any vector of the corpus
 # needs (4,700, hard case 9), and some seconds at 0.1 to 0.6 ms a unit.
 MAX_WORK = 12_000.0
 LONG_NUMBER = 1024  # bits; arithmetic with so long a number takes twice as long as with a short one

@@ -19,7 +19,7 @@ from conformance.plain.motion import BangBangMotion, FourierMotion
 from conformance.strategies import scenes_and_states
 from scene import Fourier, Horizon, Rejected, State, Undecided
 
-N_STEPS = 60  # the corpus asks many more
+N_STEPS = 150  # the corpus asks many more
 BOUND = 1024.0  # backward ulps; the worst of 2,500 steps was 218, at a slow particle before a fast wall
 UNDECIDED_SHARE = 0.08
 

@@ -6,6 +6,7 @@ import math
 import random
 import time
 from fractions import Fraction
+from functools import lru_cache
 
 import pytest
 from flint import arb, ctx, fmpq
@@ -30,9 +31,12 @@ def rational(x: Fraction) -> fmpq:
     return fmpq(x.numerator, x.denominator)
 
 
+of_balls = lru_cache(maxsize=4)(ball_law)  # a law is evaluated at many times in turn
+
+
 def exactly(law, t: Fraction) -> arb:
     """Evaluate a law in Arb."""
-    return arb(ball_law(law).jet(rational(t))[0])
+    return arb(of_balls(law).jet(rational(t))[0])
 
 
 def random_laws(draw: random.Random):

@@ -16,7 +16,7 @@ from support.lane_ties import TIES, wrong_walls
 from support.lane_traps import TRAPS
 
 import fast
-from fast.batch import lane_steps
+from fast.batch import LaneRound, lane_steps
 from fast.kernel import lanes, pools
 from fast.step import WALL_NAMES
 from scene import Cap, Collision, Fourier, Mushroom, Rejected, State
@@ -56,6 +56,25 @@ def test_lanes_alone_take_the_careful_steps_and_no_free_starts(tally):
             assert isinstance(truth, Collision)
             assert (found.wall, found.dt) == (truth.wall, pytest.approx(truth.dt, rel=1e-6))
     assert tally["lane steps"] > 20
+
+
+def test_lanes_that_took_free_starts_would_be_wrong(monkeypatch, tally):
+    """A mutant of `lane_steps`: starts within the stem, on no wall, are taken to be in the cap."""
+    scene, random = Mushroom(r=1.0, h=1.0, w=0.5), np.random.default_rng(8)
+    free = [
+        State(
+            0.0, *map(float, (random.uniform(-0.4, 0.4), random.uniform(-0.9, -0.1), *random.normal(size=2)))
+        )
+        for _ in range(60)
+    ]
+    assert set(lane_steps(scene, free)) == {None}
+    monkeypatch.setattr(LaneRound, "is_met", lambda *_: True)
+    for state, found in zip(free, lane_steps(scene, free), strict=True):
+        truth = fast.next_collision(scene, state, 1e3)
+        assert isinstance(truth, Collision)
+        tally["taken"] += found is not None
+        tally["wrong walls"] += found is not None and found.wall != truth.wall
+    assert tally["wrong walls"] > 0
 
 
 def test_a_start_by_decree_is_left_to_the_careful_step():

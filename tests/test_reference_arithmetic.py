@@ -153,6 +153,16 @@ def test_threads_take_turns_when_pi_itself_is_read(monkeypatch):
     arithmetic.turning(None, 3.0, Fraction(100))
     assert len(seen) == 4
     assert all(seen)
+
+    class Unlocked:
+        """A lock that holds nobody back: a reference that reads pi outside it would be seen."""
+
+        __enter__ = __exit__ = locked = staticmethod(lambda *_: False)
+
+    monkeypatch.setattr(module, "_CONSTANTS", Unlocked())
+    arithmetic.turning(1.0, None, Fraction(100))
+    assert not any(seen[4:])
+    assert seen[4:]
     source = "".join(path.read_text("utf-8") for path in FOLDER.glob("*.py"))
     assert "context.pi" not in source
     assert "ctx.pi" not in source

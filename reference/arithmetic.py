@@ -21,9 +21,9 @@ from scene.precision import intervals
 Interval = Any  # mpmath's ivmpf, which has no type stubs
 
 BITS_PER_DIGIT = 3.3219280948873626
-# What one step may take, in the unit of `WorkLimit`: two and a half times what any vector of the corpus
-# needs (4,700, hard case 9), and some seconds at 0.1 to 0.6 ms a unit.
-MAX_WORK = 12_000.0
+# What one step may take, in the unit of `WorkLimit`. Measured: 4,700 for the most that a vector of the corpus
+# needs at 50 digits, some 15,000 for a plain step at 10,000 digits; 0.1 to 0.35 ms a unit on one idle core.
+MAX_WORK = 20_000.0
 LONG_NUMBER = 1024  # bits; arithmetic with so long a number takes twice as long as with a short one
 _FLOOR = "f"
 # mpmath keeps pi and the precision it was computed to in two variables that all contexts share:

@@ -28,6 +28,7 @@ from scene import (
     Undecided,
     Undefined,
     from_data,
+    load,
 )
 
 CIRCLE = Cap(r=1.0)
@@ -69,6 +70,12 @@ class TestProof:
     def test_digits_are_what_was_asked_for(self, digits):
         found = reference.next_collision(CIRCLE, State(0.0, 0.1, 0.2, 0.3, 0.4), 9.0, digits=digits)
         assert found.dt.extent() * 10**digits <= abs(found.dt.centre())
+
+    def test_the_bound_on_work_leaves_room_for_ten_thousand_digits(self):
+        found = reference.next_collision(
+            load("moving-cap"), State(0.0, 0.1, 0.2, 0.3, -0.4), 50.0, digits=10_000
+        )
+        assert isinstance(found, reference.Collision)
 
     @pytest.mark.parametrize("digits", [-30, 0, 10**6, 2.5, "50", True, None])
     def test_absurd_digits_are_refused(self, digits):

@@ -3,7 +3,7 @@
 Idea. Particles sit side by side in lanes. `fly` gives every lane its next collision: it picks the
 wall and a first guess of the time, corrects it once, and checks; `bounce` reflects. `chord` and
 `rebound` do the same for captured particles, unfolded through the base. A lane whose step is not
-shown right by the checks is left to the careful step (fast.kernel.follow): a lane is fast, never wrong.
+shown right by the checks is left to the careful step (fast.kernel.follow).
 
 Laws. From a reference time on, a law is f + f' G1(u) + f'' G2(u), with G1 = sin(omega u) / omega
 and G2 = (1 - cos(omega u)) / omega^2: exact for one harmonic, and with omega = 0 for half a

@@ -214,7 +214,7 @@ def bounded_work():
 
     def watched(self, units):
         spent[0] += units
-        assert spent[0] < 13_000
+        assert spent[0] < 21_000
         honest(self, units)
 
     with pytest.MonkeyPatch.context() as patch:

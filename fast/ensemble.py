@@ -28,9 +28,9 @@ from fast.given import (
 )
 from fast.kernel import codes, entries
 from fast.kernel.follow import new_worker
-from fast.kernel.limits import own_omegas
-from fast.kernel.records import Compiled, FloatArray, Followed, IntArray, Stops, unfilled_ends
+from fast.kernel.records import FloatArray, Followed, IntArray, Stops, unfilled_ends
 from fast.narrowings import narrowings
+from fast.pieces import LawsInLanes, laws_in_lanes
 from fast.starts import cycle_length, cycle_stops, initial_states, least_collisions
 from fast.units import Units, fit, inward
 from scene import Scene
@@ -177,7 +177,7 @@ def simulate(
         )
     start = initial_states(scene, n_particles, 0.5 * speed2, seed)
     free = np.full(n_particles, codes.NO_WALL)
-    done, seconds = follow(fitted.compiled, start, free, stops, threads, progress)
+    done, seconds = follow(laws_in_lanes(scene), start, free, stops, threads, progress)
     return _ensemble(energy, done, seconds, units, (n_particles, n_cycles, len(phases) + 1), threads)
 
 
@@ -222,25 +222,34 @@ def outcomes(ends: IntArray) -> npt.NDArray[np.int8]:
 
 
 def follow(
-    compiled: Compiled,
+    in_lanes: LawsInLanes,
     states: FloatArray,
     walls: IntArray,
     stops: Stops,
     threads: int,
     progress: Callable[[int], None] | None = None,
 ) -> tuple[Followed, float]:
-    """Follow particles to the last stop; `states` (N, 6) is overwritten by the last states.
+    """Follow particles to the last stop.
 
-    `walls` (N,): codes of the walls that they leave. Returns what became of them, and the seconds that took.
+    Args:
+        in_lanes: the scene as the lanes know it.
+        states: (N, 6) as kernels take them; overwritten by the last states.
+        walls: (N,) codes of the walls that they leave.
+        stops: when particles are looked at.
+        threads: how many to use.
+        progress: called with the number of particles done so far, again and again.
+
+    Returns:
+        What became of them, and the seconds that took.
     """
     n = len(states)
     followed = unfilled_ends(states, int(stops.columns.max()) + 1, stops.narrowings.shape)
-    omegas = own_omegas(compiled)
     size = min(SHARE, math.ceil(max(n, 1) / threads))
 
     def work(first: int) -> None:
         part = slice(first, first + size)
-        entries.follow_particles(new_worker(compiled, stops, followed.part(part)), walls[part], omegas)
+        worker = new_worker(in_lanes, stops, followed.part(part))
+        entries.follow_particles(worker, walls[part], in_lanes.slope)
 
     work(n)  # none at all: compiles, or loads from the disk cache, so that `seconds` holds work alone
     begin = time.perf_counter()

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from fast.kernel.arithmetic import dot, fma
-from fast.kernel.compiling import kernel
+from fast.kernel.compiling import kernel, widest_registers
 
 from fast.kernel.pools import (  # isort: skip
-    CLOSED, DONE, H0, H1, H2, HIT, NEVER, NEXT_H0, NEXT_H1, NEXT_H2, NEXT_R0, NEXT_R1, NEXT_R2, NEXT_T,
-    NEXT_T_LOW, NEXT_VX, NEXT_VY, NEXT_W0, NEXT_W1, NEXT_W2, NEXT_X, NEXT_X_LOW, NEXT_Y, NEXT_Y_LOW, N_ARC,
+    CLOSED, DONE, H0, H1, H2, HIT, M0, M1, M2, NEVER, NEXT_H0, NEXT_H1, NEXT_H2, NEXT_M0, NEXT_M1,
+    NEXT_M2, NEXT_R0, NEXT_R1, NEXT_R2, NEXT_T, NEXT_T_LOW, NEXT_VX, NEXT_VY, NEXT_W0, NEXT_W1, NEXT_W2, NEXT_X, NEXT_X_LOW, NEXT_Y, NEXT_Y_LOW, N_ARC,
     N_BASE, N_FLOOR, N_LEFT, N_RIGHT, ON_ARC, ON_BASE, ON_FLOOR, ON_LEFT, ON_RIGHT, R0, R1, R2, SINCE, SPIN,
     STAY_IN, STAY_OUT, T, T_LOW, UNTIL, VX, VY, W0, W1, W2, WALL, X, Y,
 )  # fmt: skip
@@ -17,24 +17,29 @@ CLEARLY_CAPTURED = 1.05  # |L| over w v from which a particle moves to the disk'
 
 
 @kernel
-def arrive(a, i):
+def arrive(a, i, slope):
     """Take the laws and the place at the collision as the present ones."""
     a[T + i], a[T_LOW + i] = a[NEXT_T + i], a[NEXT_T_LOW + i]
     a[X + i], a[Y + i], a[WALL + i] = a[NEXT_X + i], a[NEXT_Y + i], a[HIT + i]
     a[R0 + i], a[R1 + i], a[R2 + i] = a[NEXT_R0 + i], a[NEXT_R1 + i], a[NEXT_R2 + i]
     a[W0 + i], a[W1 + i], a[W2 + i] = a[NEXT_W0 + i], a[NEXT_W1 + i], a[NEXT_W2 + i]
     a[H0 + i], a[H1 + i], a[H2 + i] = a[NEXT_H0 + i], a[NEXT_H1 + i], a[NEXT_H2 + i]
+    if slope is None:
+        a[M0 + i], a[M1 + i], a[M2 + i] = a[NEXT_M0 + i], a[NEXT_M1 + i], a[NEXT_M2 + i]
 
 
 @kernel
-def bounce(a, n, m, is_mushroom):
+def bounce(a, n, slope, is_mushroom):
     """Bounce off the wall met, v - 2 f' grad f / |grad f|^2; count the hit; watch captured stays.
 
     A stay in the cap counts as captured from its first arc hit with |sin phi| > nu (angles before
     the bounce, eq. sinphi) to the hit at which that ended.
     """
-    tilt, inverse = (m - 1.0) * (m + 1.0) / (1.0 + m * m), 2.0 / (1.0 + m * m)
+    widest_registers()
     for i in range(n):
+        m = a[NEXT_M0 + i] if slope is None else slope
+        inverse = 2.0 / fma(m, m, 1.0)
+        tilt = 0.5 * inverse * (m - 1.0) * (m + 1.0)
         x, y, vx, vy, hit = a[NEXT_X + i], a[NEXT_Y + i], a[VX + i], a[VY + i], a[HIT + i]
         w = a[NEXT_W0 + i]
         off_x, off_y = off_the_arc(
@@ -42,6 +47,7 @@ def bounce(a, n, m, is_mushroom):
         )
         sign = 1.0 if hit == ON_RIGHT else -1.0
         out, rate = sign * vx, a[NEXT_W1 + i]
+        rate = fma(a[NEXT_M1 + i], y, rate) if slope is None else rate
         vx_s = sign * fma(tilt, out, inverse * fma(m, vy, rate))
         vy_s = fma(inverse * m, out - rate, -tilt * vy)
         vx_s = vx if hit == ON_FLOOR else vx_s
@@ -84,12 +90,13 @@ def bounce(a, n, m, is_mushroom):
         a[N_LEFT + i] += 1.0 if hit == ON_LEFT else 0.0
         a[N_RIGHT + i] += 1.0 if hit == ON_RIGHT else 0.0
         a[N_FLOOR + i] += 1.0 if hit == ON_FLOOR else 0.0
-        arrive(a, i)
+        arrive(a, i, slope)
 
 
 @kernel
 def rebound(a, n):
     """Bounce off the arc with the angular momentum of the whole stay, constant to the bit; count."""
+    widest_registers()
     for i in range(n):
         x, y, vx, vy, spin = a[NEXT_X + i], a[NEXT_Y + i], a[VX + i], a[VY + i], a[SPIN + i]
         low_x, low_y, r, rate = a[NEXT_X_LOW + i], a[NEXT_Y_LOW + i], a[NEXT_R0 + i], a[NEXT_R1 + i]

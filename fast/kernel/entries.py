@@ -17,8 +17,9 @@ from numba import njit
 from fast.kernel.arithmetic import sine_cosine
 from fast.kernel.careful import first_step, step
 from fast.kernel.codes import BASE, HORIZON
-from fast.kernel.follow import follow
+from fast.kernel.follow import follow, without_counts
 from fast.kernel.laws import set_anchors
+from fast.kernel.pieces import fill_coefficients
 from fast.kernel.records import (
     ANCHORS_SHAPE,
     DEPTH,
@@ -82,12 +83,22 @@ def _fine(sources):
 
 def _follow(sources):
     @njit(cache=True, nogil=True, error_model="numpy")
-    def follow_particles(worker, walls, omegas):
+    def follow_particles(worker, walls, slope):
         """Follow particles to the last stop: see fast.kernel.follow. Threads may call it side by side."""
         sources  # noqa: B018
-        follow(worker, walls, omegas)
+        follow(without_counts(worker), walls, slope)
 
     return follow_particles
+
+
+def _fill_pieces(sources):
+    @njit(cache=True, error_model="numpy")
+    def fill_pieces(laws, references, coefficients):
+        """Write the polynomials of all laws about reference times: see fast.kernel.pieces."""
+        sources  # noqa: B018
+        fill_coefficients(laws, references, coefficients)
+
+    return fill_pieces
 
 
 def _wall_gap(sources):
@@ -122,5 +133,6 @@ def _directions(sources):
 careful = _careful(SOURCES)
 fine = _fine(SOURCES)
 follow_particles = _follow(SOURCES)
+fill_pieces = _fill_pieces(SOURCES)
 wall_gap = _wall_gap(SOURCES)
 directions = _directions(SOURCES)

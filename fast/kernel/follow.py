@@ -20,25 +20,26 @@ import numpy as np
 from fast.kernel.arithmetic import fma
 from fast.kernel.careful import first_step
 from fast.kernel.codes import ARC, CAP, HORIZON, MUSHROOM, N_WALLS, STEM
-from fast.kernel.compiling import kernel, part
+from fast.kernel.compiling import kernel, part, unowned
 
 from fast.kernel.pools import (  # isort: skip
-    CERTAIN, CLOSED, COARSE, DONE, END, HIT, KNOT, LANES, NEVER, NEXT_T, NEXT_T_LOW, NEXT_VX, NEXT_VY,
-    NEXT_X, NEXT_Y, N_ARC, N_BASE, OK, ROUTINE, S, SINCE, SPIN, STAY_IN, STAY_OUT, STOP, T, T_LOW, UNTIL,
-    VX, VY, WALL, X, Y, change_lane, fold, load, refold, set_reference, POOL_SIZE,
+    CERTAIN, CLOSED, COARSE, DONE, END, FAR, HIT, LANES, LAWS, N_COEFFICIENTS, NEVER, NEXT_R0, NEXT_T, NEXT_T_LOW, NEXT_VX,
+    NEXT_VY, NEXT_X, NEXT_Y, N_ARC, N_BASE, OK, REF, REF_LOW, ROUTINE, S, SINCE, SPIN, STAY_IN, STAY_OUT,
+    STOP, T, T_LOW, UNTIL, VX, VY, WALL, X, Y, change_lane, copy_rows, fold, load, POOL_SIZE, refold, set_laws,
+    set_reference, whole_registers,
 )  # fmt: skip
 from fast.kernel.bounces import arrive, bounce, rebound
 from fast.kernel.lanes import aim, chord, fly
-from fast.kernel.laws import set_anchors
-from fast.kernel.limits import LawLimits, has_lanes, limits_of
+from fast.kernel.limits import LawLimits, limits_of
 
 from fast.kernel.records import (  # isort: skip
-    ANCHORS_SHAPE, Compiled, FloatArray, Followed, IntArray, LEVEL, OMEGA, Particle, SHARED, SLOPE, Stops,
+    ANCHORS_SHAPE, Compiled, FloatArray, Followed, IntArray, LawsInLanes, Particle, Pieces, Stops,
     particle_at, write_state,
 )  # fmt: skip
 
 GENERAL, DISK, SPARE = np.arange(3)  # pools; SPARE is one to correct single lanes in
-PARTICLE, NEXT_STOP = np.arange(2)  # rows of a roster: each lane's particle and the number of its next stop
+# Rows of a roster: each lane's particle, the number of its next stop, and places for `correct`.
+PARTICLE, NEXT_STOP, SPARE_PLACES = np.arange(3)
 STAYS, MOVES, ENDS = 0, 1, 2
 MAX_CORRECTIONS = 3
 ON, OFF = np.bool_(True), np.bool_(False)
@@ -49,10 +50,12 @@ class Worker(NamedTuple):
 
     Attributes:
         scene, limits: the scene, and what holds of it for all time.
+        pieces: its laws as the lanes know them.
+        degree: see fast.kernel.pieces.law_at.
         anchors: room for its laws at one time.
-        is_laned: the lanes know its laws.
+        is_laned: the lanes may be used.
         pools: (3, POOL_SIZE) general, disk and spare pool.
-        rosters: (2, 2, LANES) rosters of the first two pools.
+        rosters: (2, 3, LANES) rosters of the first two pools.
         n_held: (2,) number of lanes in use in each.
         stops: when particles are looked at.
         followed: what is filled in.
@@ -60,6 +63,8 @@ class Worker(NamedTuple):
 
     scene: Compiled
     limits: LawLimits
+    pieces: Pieces
+    degree: tuple[int, ...]
     anchors: FloatArray
     is_laned: bool
     pools: FloatArray
@@ -69,18 +74,63 @@ class Worker(NamedTuple):
     followed: Followed
 
 
-def new_worker(scene: Compiled, stops: Stops, followed: Followed) -> Worker:
+def new_worker(in_lanes: LawsInLanes, stops: Stops, followed: Followed) -> Worker:
     """Return a worker that holds no particle yet."""
     return Worker(
-        scene,
-        limits_of(scene),
+        in_lanes.compiled,
+        limits_of(in_lanes.compiled),
+        in_lanes.pieces,
+        in_lanes.degree,
         np.zeros(ANCHORS_SHAPE),
-        has_lanes(scene, stops.times[-1]),
+        bool(abs(stops.times[-1]) < in_lanes.until),
         np.zeros((3, POOL_SIZE)),
-        np.zeros((2, 2, LANES), np.int64),
+        np.zeros((2, 3, LANES), np.int64),
         np.zeros(2, np.int64),
         stops,
         followed,
+    )
+
+
+@kernel
+def without_counts(worker):
+    """Return a worker whose arrays count no references: see fast.kernel.compiling.unowned."""
+    scene, pieces, stops, followed = worker.scene, worker.pieces, worker.stops, worker.followed
+    return Worker(
+        Compiled(scene.table, scene.is_relative, unowned(scene.laws), unowned(scene.bounds)),
+        worker.limits,
+        Pieces(
+            pieces.origin,
+            pieces.period,
+            pieces.period_low,
+            unowned(pieces.begins),
+            unowned(pieces.references),
+            unowned(pieces.limits),
+            unowned(pieces.serves),
+            unowned(pieces.coefficients),
+        ),
+        worker.degree,
+        unowned(worker.anchors),
+        worker.is_laned,
+        unowned(worker.pools),
+        unowned(worker.rosters),
+        unowned(worker.n_held),
+        Stops(
+            unowned(stops.times),
+            unowned(stops.columns),
+            unowned(stops.cycles),
+            unowned(stops.narrowings),
+            stops.is_first_kept,
+        ),
+        Followed(
+            unowned(followed.states),
+            unowned(followed.codes),
+            unowned(followed.counts),
+            unowned(followed.careful),
+            unowned(followed.energies),
+            unowned(followed.is_captured),
+            unowned(followed.t_in),
+            unowned(followed.t_out),
+        ),
     )
 
 
@@ -151,7 +201,7 @@ def finish(a, i, j, code, end, followed):
 
 
 @part
-def step_carefully(pool, a, i, roster, worker):
+def step_carefully(pool, a, i, roster, worker, slope):
     """Find a lane's next collision carefully, in the disk the next one with the arc; returns the last code.
 
     The lane then needs no bounce.
@@ -167,8 +217,10 @@ def step_carefully(pool, a, i, roster, worker):
         a[NEXT_T + i], a[NEXT_T_LOW + i] = p.t, p.t_low
         a[NEXT_X + i], a[NEXT_Y + i], a[NEXT_VX + i], a[NEXT_VY + i] = p.x, p.y, p.vx, p.vy
         a[HIT + i], a[DONE + i], a[S + i] = code, 1.0, s
-        if code < HORIZON:
-            set_reference(a, i, scene, anchors)
+        if code < HORIZON and worker.is_laned:
+            set_reference(a, i, p.t, p.t_low, scene, worker.pieces, worker.degree)
+            u = (p.t - a[REF + i]) + (p.t_low - a[REF_LOW + i])
+            set_laws(a, i, NEXT_R0, u, scene, worker.degree)
         if pool == GENERAL or code >= HORIZON:
             break
         note_stops(a, i, roster, p.t, stops, followed)
@@ -177,54 +229,69 @@ def step_carefully(pool, a, i, roster, worker):
             a[SPIN + i] = p.x * p.vy - p.y * p.vx
             break
         a[N_BASE + i] += 1.0
-        arrive(a, i)
+        arrive(a, i, slope)
         a[VX + i], a[VY + i] = p.vx, p.vy
     return code
 
 
 @kernel
-def advance(pool, a, n, is_again, scene, limits, omegas):
-    """Find the next collision of the n lanes of a pool.
+def advance(pool, a, n, is_again, scene, slope, degree, limits):
+    """Find the next collision of the first n lanes of a pool.
 
     Args:
         pool: GENERAL, or DISK for lanes that move unfolded from arc to arc.
         a: the pool's rows.
-        n: how many lanes are in use.
+        n: how many lanes, whole registers of them.
         is_again: correct the times found before once more, in place of a new guess.
         scene: the scene's numbers.
-        limits: what holds of its laws for all time.
-        omegas: None where all laws share their frequency; numba then leaves out the slower loops.
+        slope: of the sides, None where it moves; numba then compiles the loops with its rows.
+        degree: see fast.kernel.pieces.law_at.
+        limits: what holds of the scene's laws for all time.
     """
-    table, is_relative, omega, m = (
-        scene.table,
-        scene.is_relative,
-        scene.laws[SHARED, OMEGA],
-        scene.laws[SLOPE, LEVEL],
-    )
+    table, is_relative = scene.table, scene.is_relative
     if pool == DISK:
-        chord(a, n, is_again, table == CAP, is_relative, omega, limits, omegas)
+        chord(a, n, is_again, table == CAP, is_relative, degree, limits)
         return
     if not is_again:
-        aim(a, n, table == STEM, m, limits)
-    fly(a, n, table == STEM, is_relative, omega, m, limits, omegas)
+        aim(a, n, table == STEM, slope, limits)
+    fly(a, n, table == STEM, is_relative, slope, degree, limits)
 
 
 @part
-def correct(pool, a, n, spare, scene, limits, omegas):
-    """Correct coarse steps until they are right, a few times, each in a pool of its own."""
+def gather(a, n, spare, places, worker, slope):
+    """Copy the lanes that want another correction to a spare pool; returns how many, and notes their places.
+
+    One that flies beyond what its piece of the laws holds for is given the piece at its flight's end.
+    """
+    n_open = np.int64(0)
     for i in range(n):
-        if a[OK + i] != COARSE or a[END + i] == -NEVER:
+        if not (a[OK + i] == COARSE or a[OK + i] == FAR) or a[END + i] == -NEVER:
             continue
-        change_lane(a, i, spare, np.int64(0))
-        for _ in range(MAX_CORRECTIONS):
-            advance(pool, spare, np.int64(1), ON, scene, limits, omegas)
-            if spare[OK] != COARSE:
-                break
-        change_lane(spare, np.int64(0), a, i)
+        if a[OK + i] == FAR:
+            set_reference(a, i, a[T + i] + a[S + i], a[T_LOW + i], worker.scene, worker.pieces, worker.degree)
+        copy_rows(a, i, spare, n_open, 0, OK)
+        copy_rows(a, i, spare, n_open, LAWS, LAWS + (4 if slope is None else 3) * N_COEFFICIENTS * LANES)
+        places[n_open] = i
+        n_open += 1
+    return n_open
+
+
+@part
+def correct(pool, a, n, worker, slope):
+    """Correct times of flight that are not yet right a few times more, all lanes that want it side by side."""
+    spare, places = worker.pools[SPARE], worker.rosters[pool, SPARE_PLACES]
+    for _ in range(MAX_CORRECTIONS):
+        n_open = gather(a, n, spare, places, worker, slope)
+        if n_open == 0:
+            break
+        m = whole_registers(n_open)
+        advance(pool, spare, m, ON, worker.scene, slope, worker.degree, worker.limits)
+        for k in range(n_open):
+            copy_rows(spare, k, a, places[k], S, NEXT_VX)
 
 
 @kernel
-def attend(pool, a, i, roster, worker):
+def attend(pool, a, i, roster, worker, slope):
     """Do for a lane what `advance` could not; returns whether it stays, moves to the other pool or ends."""
     scene, stops, followed = worker.scene, worker.stops, worker.followed
     end = stops.times[-1]
@@ -233,16 +300,15 @@ def attend(pool, a, i, roster, worker):
     if pool == GENERAL and a[SPIN + i] != 0.0 and worker.is_laned:
         return MOVES
     is_known = worker.is_laned and a[END + i] > -NEVER
-    if is_known and a[OK + i] == CERTAIN and a[NEXT_T + i] < a[KNOT + i]:
+    if is_known and a[OK + i] == CERTAIN:
         if a[NEXT_T + i] >= a[END + i]:
-            set_anchors(scene.laws, worker.anchors, a[NEXT_T + i], a[NEXT_T_LOW + i])
-            set_reference(a, i, scene, worker.anchors)
+            set_reference(a, i, a[NEXT_T + i], a[NEXT_T_LOW + i], scene, worker.pieces, worker.degree)
         code = int(a[HIT + i])
     elif pool == DISK and scene.table == MUSHROOM:
-        fold(a, i, scene)
+        fold(a, i, scene, worker.pieces, worker.degree)
         return MOVES
     else:
-        code = step_carefully(pool, a, i, roster, worker)
+        code = step_carefully(pool, a, i, roster, worker, slope)
     if code < HORIZON:
         note_stops(a, i, roster, a[NEXT_T + i], stops, followed)
         if roster[NEXT_STOP, i] < stops.times.shape[0]:
@@ -272,14 +338,14 @@ def change_place(worker, pool, i, other, j):
 
 
 @part
-def scan(pool, worker):
+def scan(pool, worker, slope):
     """Attend to every lane of a pool that needs it; the last lane fills the place of one that leaves."""
     a, roster, n_held = worker.pools[pool], worker.rosters[pool], worker.n_held
     i = np.int64(0)
     while i < n_held[pool]:
         fate = STAYS
         if not (a[ROUTINE + i] > 0.0 and worker.is_laned):
-            fate = attend(pool, a, i, roster, worker)
+            fate = attend(pool, a, i, roster, worker, slope)
         if fate == STAYS:
             i += 1
             continue
@@ -292,13 +358,13 @@ def scan(pool, worker):
 
 
 @part
-def follow(worker, walls, omegas):
+def follow(worker, walls, slope):
     """Follow particles to the last stop.
 
     Args:
         worker: it holds no particle yet; its `followed.states` are the particles' starts.
         walls: codes of the walls that the particles leave (N,).
-        omegas: see fast.kernel.limits.own_omegas.
+        slope: see `advance`.
     """
     scene, stops, pools, n_held = worker.scene, worker.stops, worker.pools, worker.n_held
     states = worker.followed.states
@@ -319,12 +385,13 @@ def follow(worker, walls, omegas):
             a = pools[pool]
             if n_held[pool] == 0:
                 continue
-            advance(pool, a, n_held[pool], OFF, scene, worker.limits, omegas)
+            n = whole_registers(n_held[pool])
+            advance(pool, a, n, OFF, scene, slope, worker.degree, worker.limits)
             if not (worker.is_laned and are_routine(a, n_held[pool])):
                 if worker.is_laned:
-                    correct(pool, a, n_held[pool], pools[SPARE], scene, worker.limits, omegas)
-                scan(pool, worker)
+                    correct(pool, a, n_held[pool], worker, slope)
+                scan(pool, worker, slope)
             if pool == GENERAL:
-                bounce(a, n_held[pool], scene.laws[SLOPE, LEVEL], scene.table == MUSHROOM)
+                bounce(a, n, slope, scene.table == MUSHROOM)
             else:
-                rebound(a, n_held[pool])
+                rebound(a, n)

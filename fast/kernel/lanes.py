@@ -5,9 +5,8 @@ wall and a first guess of the time, corrects it once, and checks; `bounce` refle
 `rebound` do the same for captured particles, unfolded through the base. A lane whose step is not
 shown right by the checks is left to the careful step (fast.kernel.follow).
 
-Laws. From a reference time on, a law is f + f' G1(u) + f'' G2(u), with G1 = sin(omega u) / omega
-and G2 = (1 - cos(omega u)) / omega^2: exact for one harmonic, and with omega = 0 for half a
-bang-bang leg. Laws of several harmonics and moving slopes have no lanes.
+Laws. Every law is a short polynomial about the lane's reference time, whatever its kind: fast.kernel.pieces.
+A slope that stands still is passed as `slope`; where that is None the slope moves, and its rows are read.
 
 What a lane's step claims, and which inequality in which line carries it, for every kind of flight and every
 wall on it, rounding included: docs/lanes.md. In short: Newton leaves less than 2^-57 of the time;
@@ -21,34 +20,41 @@ from __future__ import annotations
 import numpy as np
 
 from fast.kernel.arithmetic import SAFETY, fma, two_sum
-from fast.kernel.compiling import kernel, packed, part
+from fast.kernel.compiling import kernel, packed, part, widest_registers
 
 from fast.kernel.pools import (  # isort: skip
-    CERTAIN, CLOSED, COARSE, END, H0, H1, H2, HIT, H_REF, NEVER, NEXT_H0, NEXT_H1, NEXT_H2, NEXT_R0,
-    NEXT_R1, NEXT_R2, NEXT_T, NEXT_T_LOW, NEXT_W0, NEXT_W1, NEXT_W2, NEXT_X, NEXT_X_LOW, NEXT_Y, NEXT_Y_LOW,
-    OK, ON_ARC, ON_BASE, ON_FLOOR, ON_LEFT, ON_RIGHT, R0, R1, R2, REF, REFUSED, REF_LOW, ROUTINE, R_REF, S,
-    SPIN, STOP, SURE, T, T_LOW, VX, VY, W0, W1, W2, WALL, W_REF, X, Y, law_after,
+    BACK, CERTAIN, CLOSED, COARSE, DEPTH_LAW, END, FAR, H0, H1, H2, HIT, LANES, LIMIT, M0, M1, M2, NEVER, NEXT_H0,
+    NEXT_H1, NEXT_H2, NEXT_M0, NEXT_M1, NEXT_M2, NEXT_R0, NEXT_R1, NEXT_R2, NEXT_T, NEXT_T_LOW, NEXT_W0,
+    NEXT_W1, NEXT_W2, NEXT_X, NEXT_X_LOW, NEXT_Y, NEXT_Y_LOW, OK, ON_ARC, ON_BASE, ON_FLOOR, ON_LEFT,
+    ON_RIGHT, R0, R1, R2, RADIUS_LAW, REF, REFUSED, REF_LOW, ROUTINE, S, SLOPE_LAW, SPIN, STOP, SURE, T, T_LOW, VX, VY, W0, W1, W2,
+    WALL, X, Y, law_of, width_of,
 )  # fmt: skip
-from fast.kernel.short import moved, short_sum, turns
+from fast.kernel.pieces import law_at
+from fast.kernel.short import moved, short_sum
 
-LONGEST_TURN = 0.25  # omega u up to which the series are used
 ONE = np.float64(1.0)  # its quotient by 0 is infinite without the compiler too
 
 
 @part
-def mouth_crossing(x, y, vx, vy, w0, w1, per_r, limits):
+def side_curvature(vy, slope, limits):
+    """Return a bound on |f''| of a side, w'' + m'' y + 2 m' vy, for a flight of the stem."""
+    return fma(limits.turning, abs(vy), limits.curvature) if slope is None else limits.curvature
+
+
+@part
+def mouth_crossing(x, y, vx, vy, w0, w1, k_side, per_r, limits):
     """Return `gap`, `doubt` and `lift` of docs/lanes.md: on which side of the mouth's edge y = 0 is crossed.
 
     The gap comes times |vy|, the other two times |vy|^2.
     """
-    bend, k_w, rate_w, size = limits.bend, limits.curvature, limits.rate, limits.size
+    bend, rate_w, size = limits.bend, limits.rate, limits.size
     depth, rise = abs(y), abs(vy)
     gap = fma(w0, rise, w1 * depth) - abs(x * vy - y * vx)
     excess = bend - fma(vx, vx, vy * vy)
     excess = excess if excess > 0.0 else 0.0  # by how much the arc's function may be convex, halved
-    doubt = (k_w + excess * per_r) * depth * depth
+    doubt = (k_side + excess * per_r) * depth * depth
     doubt = fma(SAFETY * rise, fma(size + abs(x), rise, (abs(vx) + rate_w) * depth), doubt)
-    lift = limits.least_h * rise * rise - k_w * depth * depth
+    lift = limits.least_h * rise * rise - limits.curvature * depth * depth
     return gap, doubt, lift
 
 
@@ -91,18 +97,21 @@ def arc_quotient(x, y, vx, vy, wall, r0, r1, r2):
 
 
 @kernel
-def aim(a, n, is_stem, m, limits):
+def aim(a, n, is_stem, slope, limits):
     """Choose each lane's wall and guess the time, walls moving at their speed now.
 
     SURE is positive only where the part of the flight before y = 0 is as chosen: docs/lanes.md.
     """
+    widest_registers()
     bend, per_r = limits.bend, 2.0 / limits.least_r
     for i in range(n):
         x, y, vx, vy, wall = a[X + i], a[Y + i], a[VX + i], a[VY + i], a[WALL + i]
         w0, w1, w2, h1, h2 = a[W0 + i], a[W1 + i], a[W2 + i], a[H1 + i], a[H2 + i]
         depth, rise = abs(y), abs(vy)
-        gap, doubt, lift = mouth_crossing(x, y, vx, vy, w0, w1, per_r, limits)
-        edge, drift = fma(m, y, w0), fma(m, vy, w1)
+        k_side = side_curvature(vy, slope, limits)
+        gap, doubt, lift = mouth_crossing(x, y, vx, vy, w0, w1, k_side, per_r, limits)
+        m, m1, m2 = (a[M0 + i], a[M1 + i], a[M2 + i]) if slope is None else (slope, 0.0, 0.0)
+        edge, drift = fma(m, y, w0), fma(m, vy, fma(m1, y, w1))
         f, d, side = nearest_below(wall, edge - x, vx - drift, edge + x, -vx - drift, y + a[H0 + i], -vy - h1)
         f_a, d_a = arc_quotient(x, y, vx, vy, wall, a[R0 + i], a[R1 + i], a[R2 + i])
         # Which of them, by the part of the table the flight is in and whether it crosses y = 0 before.
@@ -121,7 +130,7 @@ def aim(a, n, is_stem, m, limits):
         d = rise if hit == ON_BASE else d
         inverse = ONE / d
         s = f * inverse
-        bend_s = h2 if hit == ON_FLOOR else w2
+        bend_s = h2 if hit == ON_FLOOR else fma(m2, y, fma(2.0 * m1, vy, w2))
         bend_s = bend_s if hit >= ON_LEFT else 0.0
         s = s * fma(0.5 * bend_s * s, inverse, 1.0)
         # Comparisons so put that what is no number is never sure.
@@ -136,34 +145,31 @@ def aim(a, n, is_stem, m, limits):
 
 
 @part
-def at_side_or_floor(hit, x_s, x_low, y_s, y_low, vx, vy, w, w_low, w1, h, h1, m):
+def at_side_or_floor(hit, x_s, x_low, y_s, y_low, vx, vy, w, w_low, w1, h, h1, m, m1):
     """Return f and f' of the side or the floor that is met."""
     sign = 1.0 if hit == ON_RIGHT else -1.0
     f = (w - sign * x_s) + (fma(m, y_s, w_low) + fma(m, y_low, -sign * x_low))
-    slope = fma(m, vy, w1) - sign * vx
+    slope = fma(m, vy, fma(m1, y_s, w1)) - sign * vx
     f = (y_s + h) + y_low if hit == ON_FLOOR else f
     slope = vy + h1 if hit == ON_FLOOR else slope
     return f, slope
 
 
 @part
-def hop_along_arc(s, q, v2, omega, r0, r1_0, r2_0):
-    """Return f of the arc that was left, by its increments since."""
-    g1, g2, _ = turns(omega, s)
-    dr = fma(r1_0, g1, r2_0 * g2)
+def hop_along_arc(s, q, v2, r0, dr):
+    """Return f of the arc that was left, by its increments since, of which `dr` is the radius's."""
     return dr * (2.0 * r0 + dr) - s * fma(s, v2, 2.0 * q)
 
 
 @part
-def clearance(hit, s, x, y, vx, vy, x_s, y_s, w, h, m, limits):
+def clearance(hit, s, x, y, vx, vy, x_s, y_s, w, h, m, k_side, limits):
     """Return `clear` of docs/lanes.md: how far inside the walls below that are not met a flight ends."""
-    k_w, size_w = limits.curvature, limits.size
     edge = fma(m, y_s, w)
     clear_r = edge - x_s if hit != ON_RIGHT else NEVER
     clear_l = edge + x_s if hit != ON_LEFT else NEVER
     clear_f = y_s + h if hit != ON_FLOOR else NEVER
     way = (abs(vx) + abs(vy)) * s
-    far = k_w * s * s + SAFETY * (size_w + abs(x) + abs(y) + way)
+    far = k_side * s * s + SAFETY * (limits.size + abs(x) + abs(y) + way)
     return min(clear_r, min(clear_l, clear_f)) - far
 
 
@@ -185,21 +191,22 @@ def place_on_wall(hit, s, x, y, vx, vy, v2, x_s, y_s, r, is_stem, limits):
 
 
 @part
-def way_out(hit, s, x, y, vx, vy, v2, r, slope, limits):
+def way_out(hit, s, x, y, vx, vy, v2, r, slope, k_side, limits):
     """Return `first` of docs/lanes.md: positive where the wall is met on the way out."""
-    k_w, rate_w = limits.curvature, limits.rate
-    first = -slope - (k_w * s + SAFETY * (abs(vx) + abs(vy) + rate_w))
+    rate_w = limits.rate
+    first = -slope - (k_side * s + SAFETY * (abs(vx) + limits.lean * abs(vy) + rate_w))
     sizes = abs(x * vx) + abs(y * vy) + fma(s, v2, r * rate_w)
     first = -slope - 2.0 * SAFETY * sizes if hit == ON_ARC else first
     return 1.0 if hit == ON_BASE else first
 
 
 @part
-def verdict(quality, s, error):
-    """Return what is known of a step: CERTAIN, COARSE, or REFUSED, which nan comes to as well."""
+def verdict(quality, ahead, s, error):
+    """Return what is known of a step: CERTAIN, COARSE, REFUSED, which nan comes to as well, or FAR."""
     result = CERTAIN if error < s else COARSE
     result = result if quality > 0.0 else REFUSED
-    return result if s < NEVER else REFUSED
+    result = result if s < NEVER else REFUSED
+    return FAR if ahead <= 0.0 else result
 
 
 @packed
@@ -207,7 +214,7 @@ def arrive_at(a, i, s, delta, result, x_s, x_low, y_s, y_low, vx, vy):
     """Write what became of a step, with time and place of the hit; returns y there, and ROUTINE so far."""
     t, low = two_sum(a[T + i], s)
     t, low = two_sum(t, low + (a[T_LOW + i] + delta))
-    a[S + i] = s + delta
+    a[S + i] = s if result == FAR else s + delta
     a[OK + i] = result
     a[NEXT_T + i] = t
     a[NEXT_T_LOW + i] = low
@@ -218,96 +225,85 @@ def arrive_at(a, i, s, delta, result, x_s, x_low, y_s, y_low, vx, vy):
 
 
 @packed
-def laws_at_hit(a, i, delta, omega_r, r, r1, r2, w, w1):
+def laws_at_hit(a, i, delta, r, r1, r2, w, w1):
     """Write radius and half-width at the hit, which is `delta` after the time that they are given for."""
-    a[NEXT_R0 + i], a[NEXT_R1 + i] = fma(r1, delta, r), fma(r2, delta, r1)
-    a[NEXT_R2 + i] = fma(-omega_r * omega_r * r1, delta, r2)
+    a[NEXT_R0 + i], a[NEXT_R1 + i], a[NEXT_R2 + i] = fma(r1, delta, r), fma(r2, delta, r1), r2
     a[NEXT_W0 + i] = fma(w1, delta, w)
 
 
 @kernel
-def fly(a, n, is_stem, is_relative, omega, m, limits, omegas):
+def fly(a, n, is_stem, is_relative, slope, degree, limits):
     """Correct each lane's time of flight once, and tell whether the step is then right and routine."""
-    bend, k_w = limits.bend, limits.curvature
-    omega_r = omega if omegas is None else omegas.radius
-    omega_w = omega if omegas is None else omegas.width
-    omega_h = omega if omegas is None else omegas.depth
+    widest_registers()
+    bend = limits.bend
     for i in range(n):
         x, y, vx, vy, wall = a[X + i], a[Y + i], a[VX + i], a[VY + i], a[WALL + i]
         hit, s = a[HIT + i], a[S + i]
-        since = ((a[T + i] - a[REF + i]) + (a[T_LOW + i] - a[REF_LOW + i])) + s
-        g1, g2, g0 = turns(omega_r, since)
-        r, r1, r2 = law_after(a, R_REF + i, omega_r, g1, g2, g0)
-        if omegas is not None:
-            g1, g2, g0 = turns(omega_w, since)
-        w, w1, w2 = law_after(a, W_REF + i, omega_w, g1, g2, g0)
-        if omegas is not None:
-            g1, g2, g0 = turns(omega_h, since)
-        h, h1, h2 = law_after(a, H_REF + i, omega_h, g1, g2, g0)
-        w2 = fma(w2, r, fma(w, r2, 2.0 * w1 * r1)) if is_relative else w2
-        w1 = fma(w1, r, w * r1) if is_relative else w1
-        nu = w
-        w = nu * r if is_relative else nu
-        w_low = fma(nu, r, -w) if is_relative else 0.0
+        before = (a[T + i] - a[REF + i]) + (a[T_LOW + i] - a[REF_LOW + i])
+        since = before + s
+        r, r1, r2, mean = law_at(a, RADIUS_LAW + i, LANES, since, before, degree)
+        w, w1, w2, w_low = width_of(a, i, since, r, r1, r2, is_relative, degree)
+        h, h1, h2 = law_of(a, DEPTH_LAW + i, since, degree)
+        m, m1, m2 = law_of(a, SLOPE_LAW + i, since, degree) if slope is None else (slope, 0.0, 0.0)
+        k_side = side_curvature(vy, slope, limits)
         x_s, x_low = moved(x, vx, s)
         y_s, y_low = moved(y, vy, s)
         q, v2 = fma(x, vx, y * vy), fma(vx, vx, vy * vy)
-        f, slope = at_side_or_floor(hit, x_s, x_low, y_s, y_low, vx, vy, w, w_low, w1, h, h1, m)
+        f, rate = at_side_or_floor(hit, x_s, x_low, y_s, y_low, vx, vy, w, w_low, w1, h, h1, m, m1)
         # The arc: its increments if it was left, else what is there.
-        hop = hop_along_arc(s, q, v2, omega_r, a[R0 + i], a[R1 + i], a[R2 + i])
+        hop = hop_along_arc(s, q, v2, a[R0 + i], s * mean)
         f_arc = fma(-x_s, x_s, (r - y_s) * (r + y_s)) - 2.0 * fma(x_s, x_low, y_s * y_low)
         f_arc = hop if wall == ON_ARC else f_arc
         f = f_arc if hit == ON_ARC else f
-        slope = 2.0 * fma(r, r1, -fma(s, v2, q)) if hit == ON_ARC else slope
-        bend_s = 2.0 * (bend + v2) if hit == ON_ARC else k_w
+        rate = 2.0 * fma(r, r1, -fma(s, v2, q)) if hit == ON_ARC else rate
+        bend_s = 2.0 * (bend + v2) if hit == ON_ARC else k_side
         f = y_s + y_low if hit == ON_BASE else f
-        slope = vy if hit == ON_BASE else slope
+        rate = vy if hit == ON_BASE else rate
         bend_s = 0.0 if hit == ON_BASE else bend_s
-        inverse = ONE / slope
+        inverse = ONE / rate
         delta = -f * inverse
         error = 2.0**58 * abs(0.5 * bend_s * inverse) * delta * delta
         # The others are not reached: see the error analysis. The mouth was looked at.
-        clear = clearance(hit, s, x, y, vx, vy, x_s, y_s, w, h, m, limits)
+        clear = clearance(hit, s, x, y, vx, vy, x_s, y_s, w, h, m, k_side, limits)
         quality = min(a[SURE + i], clear if hit >= (ON_ARC if is_stem else ON_LEFT) else 1.0)
         place = place_on_wall(hit, s, x, y, vx, vy, v2, x_s, y_s, r, is_stem, limits)
-        first = way_out(hit, s, x, y, vx, vy, v2, r, slope, limits)
+        first = way_out(hit, s, x, y, vx, vy, v2, r, rate, k_side, limits)
         quality = min(min(quality, place), min(first, s))
-        quality = min(quality, LONGEST_TURN - omega * since)
-        result = verdict(quality, s, error)
+        # A hop needs the radius at both of its ends.
+        known = before - a[BACK + i] if hit == ON_ARC else 1.0
+        quality = min(quality, known if wall == ON_ARC else 1.0)
+        result = verdict(quality, a[LIMIT + i] - (since + delta), s, error)
         y_s, routine = arrive_at(a, i, s, delta, result, x_s, x_low, y_s, y_low, vx, vy)
         a[NEXT_Y + i] = 0.0 if hit == ON_BASE else y_s
         routine = routine if a[CLOSED + i] == NEVER else 0.0
         a[ROUTINE + i] = routine if a[SPIN + i] == 0.0 else 0.0
-        laws_at_hit(a, i, delta, omega_r, r, r1, r2, w, w1)
+        laws_at_hit(a, i, delta, r, r1, r2, w, w1)
         a[NEXT_W1 + i], a[NEXT_W2 + i] = fma(w2, delta, w1), w2
         a[NEXT_H0 + i], a[NEXT_H1 + i], a[NEXT_H2 + i] = fma(h1, delta, h), fma(h2, delta, h1), h2
+        if slope is None:
+            a[NEXT_M0 + i], a[NEXT_M1 + i], a[NEXT_M2 + i] = fma(m1, delta, m), fma(m2, delta, m1), m2
 
 
 @kernel
-def chord(a, n, is_again, is_cap, is_relative, omega, limits, omegas):
+def chord(a, n, is_again, is_cap, is_relative, degree, limits):
     """Find the next arc hit of captured particles: the base is unfolded, |L| is constant.
 
     The chord keeps the distance |L| / v from the centre; while that exceeds w the mouth is out of reach.
     `is_again`: correct the times found before once more, in place of a new guess.
     """
+    widest_registers()
     bend, k_w, rate_w, size = limits.bend, limits.curvature, limits.rate, limits.size
-    omega_r = omega if omegas is None else omegas.radius
-    omega_w = omega if omegas is None else omegas.width
     for i in range(n):
         x, y, vx, vy, spin = a[X + i], a[Y + i], a[VX + i], a[VY + i], a[SPIN + i]
         r0, r1_0, r2_0 = a[R0 + i], a[R1 + i], a[R2 + i]
         q, v2 = fma(x, vx, y * vy), fma(vx, vx, vy * vy)
         s = 2.0 * fma(r0, r1_0, -q) / (v2 - fma(r1_0, r1_0, r0 * r2_0))
         s = a[S + i] if is_again else s
-        since = ((a[T + i] - a[REF + i]) + (a[T_LOW + i] - a[REF_LOW + i])) + s
-        g1, g2, g0 = turns(omega_r, since)
-        r, r1, r2 = law_after(a, R_REF + i, omega_r, g1, g2, g0)
-        if omegas is not None:
-            g1, g2, g0 = turns(omega_w, since)
-        w, w1, _ = law_after(a, W_REF + i, omega_w, g1, g2, g0)
-        w1 = fma(w1, r, w * r1) if is_relative else w1
-        w = w * r if is_relative else w
-        f = hop_along_arc(s, q, v2, omega_r, r0, r1_0, r2_0)
+        before = (a[T + i] - a[REF + i]) + (a[T_LOW + i] - a[REF_LOW + i])
+        since = before + s
+        r, r1, r2, mean = law_at(a, RADIUS_LAW + i, LANES, since, before, degree)
+        w, w1, _, _ = width_of(a, i, since, r, r1, r2, is_relative, degree)
+        f = hop_along_arc(s, q, v2, r0, s * mean)
         slope = 2.0 * fma(r, r1, -fma(s, v2, q))
         inverse = ONE / slope
         delta = -f * inverse
@@ -321,9 +317,9 @@ def chord(a, n, is_again, is_cap, is_relative, omega, limits, omegas):
         sizes = abs(x * vx) + abs(y * vy) + fma(s, v2, r * rate_w)
         first = -slope - 2.0 * SAFETY * sizes
         quality = min(min(clear, abs(y_s) - SAFETY * (abs(y) + abs(vy) * s)), min(first, v2 - bend))
-        quality = min(min(quality, s), LONGEST_TURN - omega * since)
-        result = verdict(quality, s, error)
+        quality = min(min(quality, s), before - a[BACK + i])
+        result = verdict(quality, a[LIMIT + i] - (since + delta), s, error)
         y_s, a[ROUTINE + i] = arrive_at(a, i, s, delta, result, x_s, x_low, y_s, y_low, vx, vy)
         a[NEXT_Y + i] = y_s
-        laws_at_hit(a, i, delta, omega_r, r, r1, r2, w, w1)
+        laws_at_hit(a, i, delta, r, r1, r2, w, w1)
         a[NEXT_W1 + i] = w1

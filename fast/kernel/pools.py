@@ -1,21 +1,17 @@
 """Pools of particles side by side: what a lane holds, and how particles are put into lanes.
 
-A law in a lane is known from its value and two derivatives at a reference time; see fast.kernel.lanes.
+A lane knows its laws as polynomials about a reference time: see fast.kernel.pieces.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from fast.kernel.arithmetic import SAFETY, fma
+from fast.kernel.arithmetic import fma
 from fast.kernel.codes import ARC, BASE, FLOOR, LEFT, RIGHT
 from fast.kernel.compiling import kernel, packed, part
-from fast.kernel.laws import bend_of_half_leg
-
-from fast.kernel.records import (  # isort: skip
-    BANG_BANG, DEPTH, FOURIER, HALF_LEG, KIND, LEVEL, OMEGA, RADIUS, RATE, ROOM, VALUE, VALUE_LOW, WIDTH,
-)  # fmt: skip
-from fast.kernel.short import law, turns
+from fast.kernel.pieces import bend_about, law_at, piece_at
+from fast.kernel.records import CONSTANT, KIND, RADIUS
 
 LANES = 64  # all rows of a pool stay in the first-level cache
 NEVER = np.inf
@@ -23,71 +19,79 @@ NEVER = np.inf
 # Rows of a pool, LANES numbers each, in one flat array: constant strides let the loops vectorise.
 (
     T, T_LOW, X, Y, VX, VY, WALL,  # state at the last collision
-    R0, R1, R2, W0, W1, W2, H0, H1, H2,  # radius, half-width, depth there, with two derivatives
-    REF, REF_LOW, END, KNOT,  # the laws' reference time, until when it serves, when the next knot comes
-    R_REF, R_REF_LOW, R_REF1, R_REF2,  # radius there, its low part, two derivatives
-    W_REF, W_REF_LOW, W_REF1, W_REF2,  # w or nu
-    H_REF, H_REF_LOW, H_REF1, H_REF2,  # depth
-    S, HIT, SURE, OK, ROUTINE,  # the step: time, wall, mouth; is it right, and is nothing else to do
-    NEXT_T, NEXT_T_LOW, NEXT_X, NEXT_X_LOW, NEXT_Y, NEXT_Y_LOW, NEXT_VX, NEXT_VY, DONE,  # state after it
-    NEXT_R0, NEXT_R1, NEXT_R2, NEXT_W0, NEXT_W1, NEXT_W2, NEXT_H0, NEXT_H1, NEXT_H2,
-    STOP, SINCE, UNTIL,  # next time to look at the particle; a captured stay that spans one between is kept
-    STAY_IN, STAY_OUT, CLOSED, SPIN,  # the captured stay, its end once it is over, angular momentum
+    R0, R1, R2, W0, W1, W2, H0, H1, H2, M0, M1, M2,  # radius, half-width, depth, slope there, two derivatives
+    REF, REF_LOW, END, LIMIT, BACK,  # the laws' reference time, until when it serves; how far they hold
+    STOP, CLOSED, SPIN,  # next time to look at the particle; end of a captured stay; angular momentum in one
+    HIT, SURE, S,  # the step: wall, mouth, time
+    OK, ROUTINE,  # is it right, and is nothing else to do
+    NEXT_T, NEXT_T_LOW, NEXT_X, NEXT_X_LOW, NEXT_Y, NEXT_Y_LOW,  # state after it
+    NEXT_R0, NEXT_R1, NEXT_R2, NEXT_W0, NEXT_W1, NEXT_W2, NEXT_H0, NEXT_H1, NEXT_H2, NEXT_M0, NEXT_M1, NEXT_M2,
+    NEXT_VX, NEXT_VY, DONE,  # velocity after it where a careful step has found it
+    SINCE, UNTIL, STAY_IN, STAY_OUT,  # a captured stay that spans an instant between is kept; begin and end
     N_ARC, N_BASE, N_LEFT, N_RIGHT, N_FLOOR,  # collisions so far
-) = LANES * np.arange(67)  # fmt: skip
-N_ROWS = 67
-# Codes of walls as they stand in a row, and of OK.
+    LAWS,  # from here on the laws' coefficients: see Pieces.coefficients
+) = LANES * np.arange(63)  # fmt: skip
+N_COEFFICIENTS = 16  # of each law, as many as the highest degree asks for
+N_ROWS = 62 + 4 * N_COEFFICIENTS
+RADIUS_LAW, WIDTH_LAW, DEPTH_LAW, SLOPE_LAW = LAWS + LANES * N_COEFFICIENTS * np.arange(4)
+# Codes of walls as they stand in a row, and of OK: out of the laws' reach, not shown right, to be corrected,
+# right.
 ON_ARC, ON_BASE, ON_LEFT, ON_RIGHT, ON_FLOOR = map(float, (ARC, BASE, LEFT, RIGHT, FLOOR))
-REFUSED, COARSE, CERTAIN = 0.0, 1.0, 2.0
+FAR, REFUSED, COARSE, CERTAIN = -1.0, 0.0, 1.0, 2.0
 POOL_SIZE = N_ROWS * LANES
-SERVES = 0.125  # omega times how long a reference serves for starting a flight
+REGISTER = 8  # lanes of the widest registers
+
+
+@part
+def whole_registers(n):
+    """Return the number of lanes rounded up to whole registers: what they hold too many is not looked at."""
+    return (n + REGISTER - 1) // REGISTER * REGISTER
 
 
 @kernel
-def set_reference(a, i, scene, anchors):
-    """Make the time of a lane's next state the reference of its laws, and give it their values there."""
-    laws, t, end, knot = scene.laws, a[NEXT_T + i], NEVER, NEVER
-    a[REF + i], a[REF_LOW + i] = t, a[NEXT_T_LOW + i]
-    for row, place in ((RADIUS, R_REF + i), (WIDTH, W_REF + i), (DEPTH, H_REF + i)):
-        f, rate, bend = anchors[row, VALUE], anchors[row, RATE], 0.0
-        if laws[row, KIND] == FOURIER:
-            bend = -laws[row, OMEGA] * laws[row, OMEGA] * (f - laws[row, LEVEL])
-            end = min(end, t + SERVES / laws[row, OMEGA])
-        elif laws[row, KIND] == BANG_BANG:
-            bend = bend_of_half_leg(laws, row, int(anchors[row, HALF_LEG]))
-            # Rounded down: a flight that ends before it ends before the half-leg does.
-            knot = min(knot, (t + anchors[row, ROOM]) - SAFETY * (abs(t) + anchors[row, ROOM]))
-        a[place], a[place + LANES] = f, anchors[row, VALUE_LOW]
-        a[place + 2 * LANES], a[place + 3 * LANES] = rate, bend
-    a[END + i], a[KNOT + i] = min(end, knot), knot
-    set_laws(a, i, NEXT_R0, NEXT_W0, NEXT_H0, 0.0, scene)
+def set_reference(a, i, t, t_low, scene, pieces, degree):
+    """Give a lane the piece of the laws that serves at a time."""
+    piece, reference, low = piece_at(pieces, t, t_low)
+    a[REF + i], a[REF_LOW + i] = reference, low
+    a[END + i] = reference + pieces.serves[piece]
+    a[BACK + i], a[LIMIT + i] = -pieces.limits[piece, 0], pieces.limits[piece, 1]
+    if scene.laws[RADIUS, KIND] == CONSTANT:
+        a[BACK + i] = -NEVER
+    for row in range(4):
+        for j in range(len(degree) + 2):
+            a[LAWS + (row * N_COEFFICIENTS + j) * LANES + i] = pieces.coefficients[piece, row, j]
 
 
 @packed
-def law_after(a, place, omega, g1, g2, g0):
-    """Return a law and its derivatives from the rows of its reference, which begin at `place`."""
-    return law(a[place], a[place + LANES], a[place + 2 * LANES], a[place + 3 * LANES], omega, g1, g2, g0)
+def law_of(a, place, u, degree):
+    """Return a law of a lane and its derivative, and about its second, at a time since its reference.
+
+    Its coefficients begin at `place`.
+    """
+    f, rate, _, _ = law_at(a, place, LANES, u, u, degree)
+    return f, rate, bend_about(a, place, LANES, u, degree)
+
+
+@packed
+def width_of(a, i, u, r, r1, r2, is_relative, degree):
+    """Return the half-width of a lane and two derivatives, and the value's low part; see `law_of`."""
+    w, w1, w2 = law_of(a, WIDTH_LAW + i, u, degree)
+    w2 = fma(w2, r, fma(w, r2, 2.0 * w1 * r1)) if is_relative else w2
+    w1 = fma(w1, r, w * r1) if is_relative else w1
+    nu = w
+    w = nu * r if is_relative else nu
+    return w, w1, w2, fma(nu, r, -w) if is_relative else 0.0
 
 
 @kernel
-def law_of(a, place, row, laws, since):
-    """Return a law and its derivatives at a time after its reference."""
-    omega = laws[row, OMEGA] if laws[row, KIND] == FOURIER else 0.0
-    g1, g2, g0 = turns(omega, since)
-    return law_after(a, place, omega, g1, g2, g0)
-
-
-@kernel
-def set_laws(a, i, r_row, w_row, h_row, since, scene):
-    """Write a lane's laws at a time after its reference."""
-    r, r1, r2 = law_of(a, R_REF + i, RADIUS, scene.laws, since)
-    w, w1, w2 = law_of(a, W_REF + i, WIDTH, scene.laws, since)
-    h, h1, h2 = law_of(a, H_REF + i, DEPTH, scene.laws, since)
-    if scene.is_relative:
-        w, w1, w2 = w * r, fma(w1, r, w * r1), fma(w2, r, fma(w, r2, 2.0 * w1 * r1))
-    a[r_row + i], a[r_row + LANES + i], a[r_row + 2 * LANES + i] = r, r1, r2
-    a[w_row + i], a[w_row + LANES + i], a[w_row + 2 * LANES + i] = w, w1, w2
-    a[h_row + i], a[h_row + LANES + i], a[h_row + 2 * LANES + i] = h, h1, h2
+def set_laws(a, i, place, u, scene, degree):
+    """Write a lane's laws at a time since its reference, in the twelve rows from `place` on."""
+    r, r1, r2 = law_of(a, RADIUS_LAW + i, u, degree)
+    w, w1, w2, _ = width_of(a, i, u, r, r1, r2, scene.is_relative, degree)
+    h, h1, h2 = law_of(a, DEPTH_LAW + i, u, degree)
+    m, m1, m2 = law_of(a, SLOPE_LAW + i, u, degree)
+    for j, number in enumerate((r, r1, r2, w, w1, w2, h, h1, h2, m, m1, m2)):
+        a[place + j * LANES + i] = number
 
 
 @part
@@ -106,22 +110,28 @@ def load(a, i, particle, stop, is_first_kept):
 
 
 @kernel
-def change_lane(a, i, b, j):
-    """Copy lane i of one pool to lane j of another."""
-    for row in range(N_ROWS):
-        b[row * LANES + j] = a[row * LANES + i]
+def copy_rows(a, i, b, j, first, last):
+    """Copy what lane i of one pool holds to lane j of another, from one row up to another."""
+    for row in range(first, last, LANES):
+        b[row + j] = a[row + i]
 
 
 @part
-def fold(a, i, scene):
+def change_lane(a, i, b, j):
+    """Copy lane i of one pool to lane j of another."""
+    copy_rows(a, i, b, j, 0, POOL_SIZE)
+
+
+@part
+def fold(a, i, scene, pieces, degree):
     """Bring an unfolded particle back to y >= 0, with the laws that the disk has no use for."""
     if a[Y + i] < 0.0:
         a[Y + i] = -a[Y + i]
         a[VY + i] = -a[VY + i]
     a[SPIN + i] = 0.0
     a[WALL + i] = ON_ARC
-    since = (a[T + i] - a[REF + i]) + (a[T_LOW + i] - a[REF_LOW + i])
-    set_laws(a, i, R0, W0, H0, since, scene)
+    set_reference(a, i, a[T + i], a[T_LOW + i], scene, pieces, degree)
+    set_laws(a, i, R0, (a[T + i] - a[REF + i]) + (a[T_LOW + i] - a[REF_LOW + i]), scene, degree)
 
 
 @part

@@ -71,6 +71,51 @@ class Compiled(NamedTuple):
     bounds: FloatArray
 
 
+class Pieces(NamedTuple):
+    """A scene's laws over one period, as P pieces: polynomials of degree D about reference times.
+
+    The polynomials of a piece hold from the time at which it begins to serve until `limits` after its
+    reference time: `fast.pieces` proves how well. A scene without a period has one piece, for all time.
+
+    Attributes:
+        origin, period, period_low: when the first piece begins, and the period as a sum of two floats;
+            infinite for none.
+        begins: (P,) times since the origin at which pieces begin to serve, rising from 0.
+        references: (P, 2) reference times in the first period, as sums of two floats.
+        limits: (P, 2) how long before and after it the polynomials hold.
+        serves: (P,) until when after its reference time a piece is the best one.
+        coefficients: (P, 4, D + 2) for r, w or nu, h, slope: the value at the reference time, its low part,
+            and the coefficients of the powers 1 to D of the time since.
+    """
+
+    origin: float
+    period: float
+    period_low: float
+    begins: FloatArray
+    references: FloatArray
+    limits: FloatArray
+    serves: FloatArray
+    coefficients: FloatArray
+
+
+class LawsInLanes(NamedTuple):
+    """A scene as the lanes know it.
+
+    Attributes:
+        compiled: the scene's numbers.
+        pieces: its laws as polynomials.
+        degree: as many zeros as their degree: numba compiles the loops anew for each degree, and unrolls them.
+        slope: of the sides; None where it moves.
+        until: up to when the lanes may be used [time]; later, or before minus that, phases are lost.
+    """
+
+    compiled: Compiled
+    pieces: Pieces
+    degree: tuple[int, ...]
+    slope: float | None
+    until: float
+
+
 class Particle(NamedTuple):
     """A particle at one instant.
 

@@ -1,0 +1,195 @@
+"""A scene's laws cut into pieces, on each of which a short polynomial is as good as the law itself.
+
+Idea. On a half-leg between knots a bang-bang law is a parabola, exactly. A Fourier law differs from its Taylor
+polynomial of degree D, for times up to V before and after the reference time, by at most
+M(D + 1) V^(D + 1) / (D + 1)!, and its derivative by M(D + 1) V^D / D!, where M(j) = sum (k w)^j (|a_k| + |b_k|)
+bounds the law's derivative of order j. V is so short that the first is below 2^-54 of the law's least value, and
+the second below 2^-54 of M(1). A constant is its own polynomial.
+
+The period is cut at every knot and in the middle of every leg, and then into pieces of length V: a piece serves
+flights that begin in its first half, and holds for all of it, so that flights up to V end in it. Where a law
+changes by more than half of itself in a piece (a radius that comes down to 1/1000 of its mean), the piece is
+halved again: else the rounding of the terms would be far more than that of their sum.
+"""
+
+from __future__ import annotations
+
+import math
+from fractions import Fraction
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+
+from fast.compiled import HALF_PI, compile_scene
+from fast.kernel import entries
+from fast.kernel.arithmetic import MAX_QUADRANT
+
+from fast.kernel.records import (  # isort: skip
+    AMPLITUDES, BANG_BANG, CONSTANT, DEPTH, FOURIER, HIGHEST, KIND, KNOTS, LOWEST, N_HARMONICS, N_KNOTS, OMEGA,
+    OMEGA_LOW, LEVEL, PERIOD, PERIOD_LOW, RADIUS, SHARED, SLOPE, WIDTH, Compiled, FloatArray, LawsInLanes,
+    Pieces,
+)  # fmt: skip
+from scene import Cap, Scene
+
+# Of parabolas; of laws whose period takes few pieces so; of all others.
+DEGREES = (2, 10, 14)
+FEW = 64
+MAX_PIECES = 2**15
+REMAINDER = 2.0**-54
+FIXED = Cap(r=1.0)
+
+
+class Cut(NamedTuple):
+    """A piece to be: it begins to serve at `begin`, and holds for a length; both since the origin."""
+
+    begin: Fraction
+    serves: Fraction
+    holds: Fraction
+
+
+@lru_cache(maxsize=64)
+def laws_in_lanes(scene: Scene) -> LawsInLanes:
+    """Return a scene, which is in the kernel's units, as the lanes know it."""
+    compiled = compile_scene(scene)
+    degree = degree_for(compiled)
+    pieces = pieces_of(compiled, degree)
+    until = -1.0 if pieces is None else 0.125 * MAX_QUADRANT * pieces.period
+    if pieces is None:
+        pieces = pieces_of(compile_scene(FIXED), degree)
+        assert pieces is not None
+    moves = compiled.laws[SLOPE, KIND] != CONSTANT
+    slope = None if moves else float(compiled.laws[SLOPE, LEVEL])
+    return LawsInLanes(compiled, pieces, (0,) * degree, slope, until)
+
+
+def degree_for(compiled: Compiled) -> int:
+    """Return the degree of the polynomials: no higher than it takes, for every power costs time."""
+    if not (compiled.laws[:SHARED, KIND] == FOURIER).any():
+        return DEGREES[0]
+    period, _ = period_of(compiled.laws)
+    assert period is not None
+    return DEGREES[1] if FEW * reach(compiled, DEGREES[1]) > period else DEGREES[2]
+
+
+def reach(compiled: Compiled, degree: int) -> float:
+    """Return V: how far from its reference time a polynomial holds [time]; infinite without a Fourier law."""
+    found = math.inf
+    for row in (RADIUS, WIDTH, DEPTH, SLOPE):
+        law = compiled.laws[row]
+        if law[KIND] != FOURIER:
+            continue
+        n = int(law[N_HARMONICS])
+        k = np.arange(1, n + 1)
+        # In units of 1 / w, so that no power overflows.
+        sizes = np.abs(law[AMPLITUDES + k]) + np.abs(law[AMPLITUDES + n + k])
+        first, beyond = float(sizes @ k), float(sizes @ k.astype(float) ** (degree + 1))
+        least = first if row == SLOPE else min(first, (degree + 1) * float(least_of(compiled, row)))
+        found = min(
+            found,
+            (REMAINDER * first * math.factorial(degree) / beyond) ** (1.0 / degree) / law[OMEGA],
+            (REMAINDER * least * math.factorial(degree) / beyond) ** (1.0 / (degree + 1)) / law[OMEGA],
+        )
+    return found
+
+
+def least_of(compiled: Compiled, row: int | np.integer) -> float:
+    """Return the least value of a law as it is given: of nu where the scene has nu."""
+    bounds = compiled.bounds
+    if row == WIDTH and compiled.is_relative:
+        return float(bounds[WIDTH, LOWEST] / bounds[RADIUS, HIGHEST])
+    return float(bounds[row, LOWEST])
+
+
+def pieces_of(compiled: Compiled, degree: int) -> Pieces | None:
+    """Return a scene's laws as polynomials of a degree, or None where that would take too many."""
+    laws = compiled.laws
+    period, origin = period_of(laws)
+    if period is None:
+        return _filled(compiled, None, Fraction(0), [Cut(Fraction(0), Fraction(0), Fraction(0))], degree)
+    longest = reach(compiled, degree)
+    knots = sorted(_knots(laws, period, origin))
+    edges = [Fraction(0), *knots, period]
+    cuts: list[Cut] = []
+    for a, b in zip(edges, edges[1:], strict=False):
+        n = 1 if longest == math.inf else math.ceil((b - a) / Fraction(longest))
+        if len(cuts) + n > MAX_PIECES:
+            return None
+        length = (b - a) / n
+        for i in range(n):
+            begin = a + i * length
+            cuts.append(Cut(begin, length, min(2 * length, b - begin) if knots else 2 * length))
+    return _refined(compiled, period, origin, cuts, degree)
+
+
+def _refined(
+    compiled: Compiled, period: Fraction, origin: Fraction, cuts: list[Cut], degree: int
+) -> Pieces | None:
+    """Halve pieces in which a law changes by more than half of itself."""
+    while len(cuts) <= MAX_PIECES:
+        pieces = _filled(compiled, period, origin, cuts, degree)
+        size = np.maximum(pieces.limits[:, 0], pieces.limits[:, 1])
+        powers = size[:, None] ** np.arange(1, degree + 1)
+        rows = [row for row in (RADIUS, WIDTH, DEPTH) if compiled.laws[row, KIND] != CONSTANT]
+        own = pieces.coefficients[:, rows]
+        change = (np.abs(own[:, :, 2:]) * powers[:, None, :]).sum(axis=2)
+        is_wide = (change > 0.5 * own[:, :, 0]).any(axis=1)
+        if not is_wide.any():
+            return pieces
+        cuts = [
+            part
+            for cut, wide in zip(cuts, is_wide, strict=True)
+            for part in (_halves(cut) if wide else [cut])
+        ]
+    return None
+
+
+def _halves(cut: Cut) -> list[Cut]:
+    half = cut.serves / 2
+    ends = cut.begin + cut.holds
+    return [Cut(begin, half, min(2 * half, ends - begin)) for begin in (cut.begin, cut.begin + half)]
+
+
+def _filled(
+    compiled: Compiled, period: Fraction | None, origin: Fraction, cuts: list[Cut], degree: int
+) -> Pieces:
+    middles = [origin + cut.begin + cut.holds / 2 for cut in cuts]
+    references = np.array([_pair(middle) for middle in middles])
+    coefficients = np.empty((len(cuts), 4, degree + 2))
+    entries.fill_pieces(compiled.laws, references, coefficients)
+    begins = np.array([float(cut.begin) for cut in cuts])
+    half = np.array([float(cut.holds / 2) for cut in cuts])
+    serves = np.array([float(cut.serves - cut.holds / 2) for cut in cuts])
+    if period is None:
+        half, serves = np.array([math.inf]), np.array([math.inf])
+    high, low = _pair(period) if period is not None else (math.inf, 0.0)
+    return Pieces(
+        float(origin), high, low, begins, references, np.column_stack([half, half]), serves, coefficients
+    )
+
+
+def _pair(number: Fraction) -> tuple[float, float]:
+    high = float(number)
+    return high, float(number - Fraction(high))
+
+
+def period_of(laws: FloatArray) -> tuple[Fraction | None, Fraction]:
+    """Return the period that all moving laws share, None for none, and when it begins."""
+    for row in laws[:SHARED]:
+        if row[KIND] == BANG_BANG:
+            return Fraction(row[PERIOD]) + Fraction(row[PERIOD_LOW]), Fraction(row[KNOTS])
+    omega = Fraction(laws[SHARED, OMEGA]) + Fraction(laws[SHARED, OMEGA_LOW])
+    if not omega:
+        return None, Fraction(0)
+    return 4 * HALF_PI / omega, Fraction(0)
+
+
+def _knots(laws: FloatArray, period: Fraction, origin: Fraction) -> set[Fraction]:
+    """Return the times since the origin, inside the period, of all knots and of the middles of legs."""
+    found = set()
+    for row in laws[:SHARED]:
+        if row[KIND] == BANG_BANG:
+            times = [Fraction(t) - origin for t in row[KNOTS : KNOTS + int(row[N_KNOTS])]]
+            middles = [(a + b) / 2 for a, b in zip(times, times[1:], strict=False)]
+            found |= {t % period for t in (*times, *middles)} - {Fraction(0)}
+    return found

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import secrets
-import sys
 from pathlib import Path
 
 import pytest
-from support.saboteurs import HONEST, SABOTEURS
+from support.saboteurs import HONEST, SABOTEURS, command
 
 from conformance.suite import property_checks
 from conformance.suite import run as suite
@@ -16,7 +15,6 @@ from conformance.suite.session import Limits, Session, check_echo, probe_values,
 from conformance.vectors import Certified, Expectation, Vector
 from scene import State
 
-SCRIPT = Path(__file__).parent / "support" / "saboteurs.py"
 N = 3
 PATIENT = Limits(timeout=30.0, restarts=N + 2)
 HASTY = Limits(timeout=1.5, restarts=0)
@@ -52,8 +50,7 @@ def verdicts(monkeypatch):
     monkeypatch.setattr(suite, "choose", lambda *_: [made_up(i) for i in range(N)])
 
     def run(name: str, limits: Limits) -> suite.Run:
-        command = [sys.executable, "-I", "-S", str(SCRIPT), name]
-        found = suite.check(command, limits=limits)
+        found = suite.check(command(name), limits=limits)
         assert [result.id for result in found.results] in (
             CASES,
             CASES[:2] + CASES[3:-1],
@@ -222,7 +219,7 @@ def test_a_command_that_does_not_exist():
 
 def test_leaving_a_session_kills_what_it_started(monkeypatch):
     monkeypatch.setenv("SABOTAGE", token := secrets.token_hex(8))
-    with Session([sys.executable, "-I", "-S", str(SCRIPT), "honest"]) as session:
+    with Session(command("honest")) as session:
         session.start()
         assert alive(token)
     assert alive(token) == []

@@ -12,7 +12,8 @@ from xml.etree import ElementTree
 import jsonschema
 import msgspec
 import pytest
-from test_conformance_session import SCRIPT, made_up
+from support.saboteurs import command
+from test_conformance_session import made_up
 
 from conformance import plain, vectors
 from conformance.mutants import MUTANTS, kill_matrix
@@ -123,10 +124,9 @@ def test_known_failures_are_read(tmp_path):
 def test_known_failures_are_marked_in_a_run(monkeypatch):
     monkeypatch.setattr(suite, "choose", lambda *_: [made_up(0), made_up(1)])
     monkeypatch.setattr(property_checks, "N_QUESTIONS", 0)
-    command = [sys.executable, "-I", "-S", str(SCRIPT), "crash-at-second"]
-    assert suite.check(command).exit_code() == 1
+    assert suite.check(command("crash-at-second")).exit_code() == 1
     fixed = frozenset({"made-up/0", "made-up/1", "protocol/stop"})
-    run = suite.check(command, known=fixed)
+    run = suite.check(command("crash-at-second"), known=fixed)
     assert run.objections() == ["made-up/0: passes, though it is listed as a known failure"]
 
 

@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from mpmath import mp, workprec
+from support.tables import CIRCLE, STATIC
 from support.truth import proved_step
 
 import fast
@@ -22,7 +23,6 @@ from scene import (
     Fourier,
     Horizon,
     Mushroom,
-    Rejected,
     State,
     Undecided,
     Undefined,
@@ -55,12 +55,6 @@ def test_sine_and_cosine(omega, k, t, t_low):
         assert abs(c + mp.mpf(c_low) - mp.cos(phase)) <= 2.0**-55 + abs(phase) * 2.0**-100
 
 
-def test_phase_out_of_reach_is_refused():
-    outcome = fast.next_collision(load("moving-cap"), State(1e15, 0.1, 0.2, 1.0, 1.0), 2e15)
-    assert isinstance(outcome, Rejected)
-    assert "state.t = 1000000000000000.0" in outcome.reason
-
-
 @pytest.mark.parametrize("name", ["fixed-cap-clockwise", "moving-cap", "fermi-ulam"])
 @given(t=st.floats(-20, 20), s=st.floats(1e-12, 5))
 def test_increments_of_laws(name, t, s):
@@ -79,16 +73,13 @@ def test_increments_of_laws(name, t, s):
         assert abs(anchors[DEPTH, VALUE] - value(mp, law, mp.mpf(t))) <= 2.0**-50 * 6
 
 
-STATIC = Mushroom(r=1.0, h=1.0, w=0.5)
-
-
 @pytest.mark.parametrize(
     ("scene", "state", "expected"),
     [
         (STATIC, State(0, 0.75, 0.0, 1.0, 0.0, "base"), Undefined("sliding")),
         (STATIC, State(0, 0.0, 0.0, 1.0, 0.0), Undefined("mouth-edge")),
         (STATIC, State(0, 0.25, 0.25, 1.0, -1.0), Undecided("the mouth's edge is hit within rounding")),
-        (Cap(r=1.0), State(0, 0.5, 0.5, 0.5, -0.5), Undecided("two walls are hit together within rounding")),
+        (CIRCLE, State(0, 0.5, 0.5, 0.5, -0.5), Undecided("two walls are hit together within rounding")),
     ],
 )
 def test_what_it_does_not_guess(scene, state, expected):

@@ -18,7 +18,7 @@ from support.truth import proved_step
 import fast
 import reference
 from conformance.grading.agreement import compare
-from scene import Collision, InvalidScene, Rejected, State, Stem, Undecided, Undefined, from_data
+from scene import Collision, InvalidScene, Rejected, State, Undecided, Undefined, from_data
 
 mpf = mpmath.mpf
 # Degenerate within rounding: the fast stepper may be undecided.
@@ -258,11 +258,6 @@ def test_a_touch_in_flight_is_no_event_or_undecided():
     for stepper in (reference, fast):
         outcome = stepper.next_collision(lift, s, 0.75)
         assert isinstance(outcome, Undecided) or type(outcome).__name__ == "Horizon"
-
-
-def test_a_floor_of_half_width_zero_is_refused_in_python_too():
-    with pytest.raises(InvalidScene, match="w > h slope"):
-        Stem(w=0.5, h=1.0, slope=0.5)
 
 
 def test_the_step_after_a_narrow_mouth():

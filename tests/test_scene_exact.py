@@ -113,13 +113,6 @@ def test_negative_point_between_ends_that_are_roots(case, data):
     assert (negative_point(p, a, b) is not None) == any(at(p, probe) < 0 for probe in probes)
 
 
-def test_a_negative_stretch_that_starts_at_a_root_is_found():
-    # x (x - 1) on [0, 3]: zero at the left end, positive at the middle and at the right end.
-    point = negative_point([Fraction(0), Fraction(-1), Fraction(1)], Fraction(0), Fraction(3))
-    assert point is not None
-    assert 0 < point < 1
-
-
 @given(st.lists(quadratics, min_size=1, max_size=3), intervals)
 def test_double_irrational_roots_are_no_change_of_sign(factors, ends):
     a, b = ends

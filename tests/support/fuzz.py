@@ -10,6 +10,7 @@ from typing import Any
 
 from scene import catalogue
 from scene.load import read_data
+from support.saboteurs import HIT, INTRODUCTION
 
 NUMBERS = (
     0.0,
@@ -87,36 +88,18 @@ def requests(draw: random.Random) -> dict[str, Any]:
 
 def answers(draw: random.Random) -> dict[str, Any]:
     """Return a valid answer of protocol 1 to seq 1."""
-    hit = {
-        "outcome": "collision",
-        "wall": "arc",
-        "dt": 1.0,
-        "t": 1.0,
-        "x": 0.6,
-        "y": 0.8,
-        "vx": -0.6,
-        "vy": -0.8,
-    }
     arrival = {"outcome": "horizon", "t": 1.0, "x": 0.0, "y": 0.0, "vx": 1.0, "vy": 1.0}
     return draw.choice(
         [
-            {"seq": 1, **hit},
+            {"seq": 1, **HIT},
             {"seq": 1, **arrival},
             {"seq": 1, "outcome": "undefined", "reason": "corner"},
-            {"seq": 1, "steps": [dict(hit), dict(arrival)]},
+            {"seq": 1, "steps": [dict(HIT), dict(arrival)]},
             {"seq": 1, "states": [{**arrival, "captured": [0.1, 0.2]}]},
-            {"seq": 1, "ns": [100], "steps": [dict(hit)]},
+            {"seq": 1, "ns": [100], "steps": [dict(HIT)]},
             {"seq": 1, "error": "no"},
             {"values": [0.1, -0.0]},
-            {
-                "protocol": 1,
-                "name": "n",
-                "version": "1",
-                "language": "C",
-                "profiles": ["step"],
-                "tables": ["cap"],
-                "laws": ["constant"],
-            },
+            INTRODUCTION,
         ]
     )
 

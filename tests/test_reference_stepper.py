@@ -18,7 +18,7 @@ from support.truth import IS_DEEP
 import fast
 import reference
 from conformance.strategies import scenes_and_states
-from reference.arithmetic import Arithmetic, rational, sign
+from reference.arithmetic import Arithmetic, sign
 from reference.isolation import Isolator
 from reference.jets import Jet
 from reference.start import flight_from
@@ -147,21 +147,6 @@ class TestIsolation:
         arithmetic = Arithmetic(30)
         isolator = Isolator(arithmetic, jet, arithmetic.zero)
         return isolator.first_root(arithmetic.number(start), arithmetic.number(end)), isolator
-
-    def test_the_first_of_many_roots(self):
-        """F = cos(20 s) + 1/2 first falls through 0 at 20 s = 2 pi / 3."""
-        arithmetic = Arithmetic(30)
-
-        def wave(s):
-            cos, sin = arithmetic.cos_sin(20 * s)
-            return Jet(cos + arithmetic.number(0.5), -20 * sin, -400 * cos)
-
-        root, isolator = self.first(wave)
-        assert root is not None
-        ten = rational(root.time._mpi_[0]), rational(root.time._mpi_[1])
-        assert float(ten[0]) == pytest.approx(2 * math.pi / 60, rel=1e-15)
-        assert ten[0] < ten[1]
-        assert isolator.leaves[0].start._mpi_ == arithmetic.zero._mpi_
 
     @pytest.mark.parametrize("least", [1e-3, 1e-9, 1e-15])
     def test_a_near_miss_is_no_hit(self, least):

@@ -167,4 +167,20 @@ def lines(seed: int, n: int, kind: Any) -> Iterator[bytes]:
         yield garble(draw, line) if 0.55 < part < 0.75 else line
 
 
+def as_toml(line: bytes) -> bytes:
+    """Write a line of JSON as TOML; what is garbled stays as it is."""
+    try:
+        data = json.loads(line)
+        lines = [f"{json.dumps(key)} = {_inline(value)}" for key, value in data.items()]
+    except (ValueError, AttributeError, RecursionError):
+        return line
+    return "\n".join(lines).encode("utf-8", "surrogatepass")
+
+
+def _inline(value: Any) -> str:
+    if isinstance(value, dict):
+        return "{" + ", ".join(f"{json.dumps(key)} = {_inline(part)}" for key, part in value.items()) + "}"
+    return "[" + ", ".join(map(_inline, value)) + "]" if isinstance(value, list) else json.dumps(value)
+
+
 scenes_known = scenes()

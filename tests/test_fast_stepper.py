@@ -11,7 +11,9 @@ from support.tables import CIRCLE, STATIC
 from support.truth import proved_step
 
 import fast
+import reference
 from conformance.grading.agreement import compare
+from fast.batch import lane_steps
 from fast.compiled import compile_scene
 from fast.kernel import arithmetic
 from fast.kernel.laws import increment, set_anchors
@@ -152,3 +154,21 @@ def test_the_shortest_hop_along_the_arc_keeps_its_digits(r, state):
     scene = Cap(r=r)
     found, truth = fast.next_collision(scene, state, state.t + 1.0), proved_step(scene, state, state.t + 1.0)
     assert compare(found, truth, state, 4.0).kind == "agrees"
+
+
+def test_an_arc_that_dips_below_zero_and_comes_back_on_the_way_to_the_base():
+    scene = Mushroom(r=Fourier(1.0, 1.0, (0.9,)), h=1.0, w=0.0005)
+    place = 0.09723691417765834, 0.024502880446325
+    state = State(3.116786370335045, *place, 0.05208237622567096, -0.29708987593890235)
+    t_end = 3.377786370335045
+    truth = reference.trajectory(scene, state, 9, t_end)
+    walls = [step.wall for step in truth.steps]
+    assert walls == fast.trajectory(scene, state, 9, t_end).walls == ["arc", "arc", "base"]
+    assert fast.flow(scene, [state], t_end).wall_counts.tolist() == [[2, 1, 0, 0, 0]]
+
+
+@pytest.mark.parametrize("state", [State(0.0, 0.1, -0.3, 1.0, 2.0), State(0.0, 0.1, 0.3, 1.0, -2.0)])
+def test_lanes_with_a_start_that_names_no_wall(state):
+    (found,) = lane_steps(STATIC, [state])
+    truth = fast.next_collision(STATIC, state, 9.0)
+    assert found is None or found.wall == truth.wall

@@ -140,6 +140,22 @@ def test_threads_at_different_digits_do_not_disturb_each_other():
     assert (mpmath.mp.prec, mpmath.iv.prec) == before
 
 
+@pytest.mark.parametrize("digits", [1, 308, 309, 400, 1000])
+def test_digits_are_what_was_asked_for(digits):
+    found = reference.next_collision(CIRCLE, State(0.0, 0.1, 0.2, 0.3, 0.4), 9.0, digits=digits)
+    assert found.dt.extent() * 10**digits <= abs(found.dt.centre())
+
+
+def test_the_bound_on_work_leaves_room_for_ten_thousand_digits():
+    found = reference.next_collision(load("moving-cap"), State(0.0, 0.1, 0.2, 0.3, -0.4), 50.0, digits=10_000)
+    assert isinstance(found, reference.Collision)
+
+
+def test_a_table_whose_square_overflows():
+    state = State(0.0, 0.6e200, 0.8e200, -1.0, -1.0, "arc")
+    assert reference.next_collision(Cap(r=1e200), state, 1e300).wall == "base"
+
+
 class TestIsolation:
     """The isolator on functions whose roots are known."""
 

@@ -11,6 +11,7 @@ from decimal import Decimal
 
 import numpy as np
 import pytest
+from support.refusals import assert_refused
 
 import fast
 import scene as scenes
@@ -38,17 +39,6 @@ BROKEN_SCENES = {
 @pytest.fixture
 def call(command_line):
     return command_line
-
-
-def assert_refused(result, *words):
-    code, out, err = result
-    assert code == 2
-    assert out == ""
-    assert err.startswith("mushrooms: ")
-    assert err.endswith("\n")
-    assert err.count("\n") == 1
-    for word in words:
-        assert word in err
 
 
 @pytest.mark.parametrize("command", ["theory", "simulate", "draw"])

@@ -24,3 +24,14 @@ def one_line(call, *arguments, **fields):
     assert len(message.splitlines()) == 1
     assert len(message) < 300
     return message
+
+
+def assert_refused(result, *words):
+    """Hold that a command ended with code 2 and one line on standard error, with these words in it."""
+    code, out, err = result
+    assert (code, out) == (2, "")
+    assert err.startswith("mushrooms: ")
+    assert err.endswith("\n")
+    assert err.count("\n") == 1
+    for word in words:
+        assert word in err

@@ -60,7 +60,7 @@ BAD = {
     ],
     "threads": [*NO_COUNT, 0, 10**6, HUGE],
     "n_particles": [None, *NO_COUNT, 0, 10**8 + 1, 10**12, HUGE],
-    "energy": [*NO_NUMBER, INFINITY, 0.0, -1.0, 2.0**801, 10**300],
+    "energy": [*NO_NUMBER, INFINITY, 0.0, -1.0, 1e30, 2.0**801, 10**300],
     "n_cycles": [None, *NO_COUNT, 0, 10**6 + 1, HUGE],
     "seed": [None, *NO_COUNT, 2**64, HUGE],
     "phases": [

@@ -28,21 +28,8 @@ NUMBERS = (
     2**70,
     6.283185307179586,
 )
-OTHERS = (
-    None,
-    True,
-    "",
-    "1.0",
-    "nan",
-    "\u0000\ud800",
-    "arc",
-    "lid",
-    [],
-    {},
-    [[]],
-    [0.5, "x"],
-    {"kind": "fourier"},
-)
+WORDS = ("", "1.0", "nan", "\u0000\ud800", "arc", "lid")
+OTHERS = (None, True, *WORDS, [], {}, [[]], [0.5, "x"], {"kind": "fourier"})
 LAWS = (
     {"kind": "fourier", "mean": 1.0, "omega": 0.0, "cos": [0.1]},
     {"kind": "fourier", "mean": 1.0, "omega": 1e9, "sin": [1e-3] * 40},

@@ -36,16 +36,19 @@ class Family(NamedTuple):
     """A kind of attack.
 
     Attributes:
-        name: of the family.
-        draw: from a stream of numbers to a question.
+        draw: from a stream of numbers to a question. Its name is the family's, and names cases for ever.
         hunts: the mistake it looks for.
         is_delicate: built so that an honest stepper may often leave it undecided.
     """
 
-    name: str
     draw: Callable[[Draw], Attack]
     hunts: str
     is_delicate: bool = False
+
+    @property
+    def name(self) -> str:
+        """Return the function's name, its words joined by hyphens."""
+        return self.draw.__name__.replace("_", "-")
 
     def attack(self, seed: int, index: int) -> Attack:
         """Draw the question that this seed and index name."""

@@ -15,7 +15,7 @@ from typing import Annotated, Any, get_args
 import msgspec
 
 from scene.load import state_omega_or_period
-from scene.states import Collision, Horizon, Outcome, Rejected, State, Undecided, Undefined
+from scene.states import Outcome, Rejected, State, Undecided, Undefined
 from scene.tables import Scene
 
 PROTOCOL = 1

@@ -6,6 +6,8 @@ import json
 from collections.abc import Callable
 from typing import Any, NamedTuple, TypeVar
 
+import msgspec
+
 from conformance.generator.draws import Draw, wire_form
 from scene import BadInput, Cap, Mushroom, Scene, State, Stem
 
@@ -65,10 +67,9 @@ def built(make: Callable[[], Made]) -> Made | None:
 
 def line(family: str, seed: int, index: int, attack: Attack) -> str:
     """Write an attack as one line of JSON: where it comes from, and the question in the wire's form."""
-    state = {name: getattr(attack.state, name) for name in attack.state.__struct_fields__}
     data: dict[str, Any] = {"family": family, "seed": seed, "index": index, "scene": wire_form(attack.scene)}
-    data |= {"cmd": "step" if attack.n_collisions is None else "trajectory", "state": state}
-    data |= {"t_end": attack.t_end}
+    data |= {"cmd": "step" if attack.n_collisions is None else "trajectory"}
+    data |= {"state": msgspec.structs.asdict(attack.state), "t_end": attack.t_end}
     if attack.n_collisions is not None:
         data |= {"collisions": attack.n_collisions, "working": attack.working}
     return json.dumps(data)

@@ -51,25 +51,15 @@ def growth(evidence: ClaimEvidence, sample: Sample) -> Check:
     """Compare the mean of s with m1 and its finite-energy bias."""
     theirs = float(evidence.theory_of(sample).m1)
     bias, band = bias_of_mean(sample)
-    return close(
-        f"{sample.run.name}: mean of log E1/E0, less its bias {bias:.5f}",
-        mean(sample.gain).less(bias),
-        theirs,
-        band=band,
-        scale=abs(theirs) or np.inf,
-    )
+    what = f"{sample.run.name}: mean of log E1/E0, less its bias {bias:.5f}"
+    return close(what, mean(sample.gain).less(bias), theirs, band=band, scale=abs(theirs) or np.inf)
 
 
 def escape(evidence: ClaimEvidence, sample: Sample) -> Check:
     """Compare the uncaptured share with p_nc."""
     band = 2 * mouth_speed(sample) / sample.speed
-    return close(
-        f"{sample.run.name}: share never captured",
-        share(sample.never_captured),
-        evidence.theory_of(sample).p_nc,
-        band=band,
-        scale=0.1,
-    )
+    what = f"{sample.run.name}: share never captured"
+    return close(what, share(sample.never_captured), evidence.theory_of(sample).p_nc, band=band, scale=0.1)
 
 
 def peak_place(evidence: ClaimEvidence, sample: Sample) -> Check:
@@ -85,13 +75,8 @@ def peak_shape(evidence: ClaimEvidence, sample: Sample) -> Check:
     """Test the uncaptured peak against the Gaussian of its own mean and width."""
     kept = sample.gain[~sample.captured]
     centre = mean(kept).value - width(sample).value ** 2 / 4
-    return fits(
-        f"{sample.run.name}: the never captured are Gaussian",
-        kept,
-        [broadened.peak(centre, width(sample).value)],
-        band=PEAK_BAND,
-        scale=0.2,
-    )
+    what = f"{sample.run.name}: the never captured are Gaussian"
+    return fits(what, kept, [broadened.peak(centre, width(sample).value)], band=PEAK_BAND, scale=0.2)
 
 
 def captured_energies(sample: Sample) -> Check:
@@ -131,12 +116,8 @@ def moving_cap(evidence: ClaimEvidence) -> Iterator[Check]:
     modes = [_modes(sample.gain) for sample in (low, high)]
     for sample, (left, right) in zip((low, high), modes, strict=True):
         sigma = width(sample).value
-        yield stated(
-            f"{sample.run.name}: two modes, the left one at the uncaptured",
-            abs(left + 0.422465) < sigma / 2,
-            f"mode at {left:+.3f}",
-            "-0.422",
-        )
+        what = f"{sample.run.name}: two modes, the left one at the uncaptured"
+        yield stated(what, abs(left + 0.422465) < sigma / 2, f"mode at {left:+.3f}", "-0.422")
         yield stated(
             f"{sample.run.name}: the right one at the largest log E1/E0",
             abs(right - 0.846126) < 1.5 * sigma,
@@ -227,12 +208,8 @@ def trivial_loops(evidence: ClaimEvidence) -> Iterator[Check]:
     """X7: loops that enclose nothing."""
     for name, table in ONE_PARAMETER.items():
         result = evidence.predict(table)
-        yield stated(
-            f"only {name} moves: theory",
-            result.m1 == 0 and result.log_e_nc == 0,
-            f"m1 = {float(result.m1):.1g}",
-            "m1 = 0",
-        )
+        what = f"only {name} moves: theory"
+        yield stated(what, result.m1 == 0 and result.log_e_nc == 0, f"m1 = {float(result.m1):.1g}", "m1 = 0")
     for run in ("only-mouth@1e6", "moving-cap-trivial@1e6"):
         sample = evidence.sample(run)
         bias, band = bias_of_mean(sample)
@@ -261,11 +238,9 @@ def both_ways(evidence: ClaimEvidence) -> Iterator[Check]:
         ("moving-cap", "moving-cap-reversed"),
     ):
         a, b = evidence.predict(name), evidence.predict(other)
+        what = f"{name}: theory's log E_nc flips"
         yield stated(
-            f"{name}: theory's log E_nc flips",
-            abs(a.log_e_nc + b.log_e_nc) < 1e-20,
-            f"sum {float(a.log_e_nc + b.log_e_nc):.1g}",
-            "0",
+            what, abs(a.log_e_nc + b.log_e_nc) < 1e-20, f"sum {float(a.log_e_nc + b.log_e_nc):.1g}", "0"
         )
     for first, second in ((ACW, CW), ("moving-cap@1e6", "moving-cap-reversed@1e6")):
         pair = [evidence.sample(first), evidence.sample(second)]

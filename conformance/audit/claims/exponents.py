@@ -45,19 +45,11 @@ def circle(evidence: ClaimEvidence) -> Iterator[Check]:
         steps.append(float(np.mean([row[1] for row in rows])))
         drifts.append(float(np.mean([row[2] for row in rows])))
     angle, product = _slope(SPEEDS, steps), _slope(SPEEDS, drifts)
-    yield stated(
-        "angular momentum at arc hits: largest relative change",
-        momentum < 1e-12,
-        f"{momentum:.1e}",
-        "rounding of up to 10,000 hits, < 1e-12",
-    )
+    what = "angular momentum at arc hits: largest relative change"
+    yield stated(what, momentum < 1e-12, f"{momentum:.1e}", "rounding of up to 10,000 hits, < 1e-12")
     yield stated("phi' - phi per hit: exponent of v", abs(angle + 2) < EXPONENT_BAND, f"{angle:.4f}", "-2")
-    yield stated(
-        "drift of v r over a fixed time: exponent of v",
-        abs(product + 1) < EXPONENT_BAND,
-        f"{product:.4f}",
-        "-1",
-    )
+    what = "drift of v r over a fixed time: exponent of v"
+    yield stated(what, abs(product + 1) < EXPONENT_BAND, f"{product:.4f}", "-1")
 
 
 def _hits(
@@ -193,12 +185,8 @@ def release(evidence: ClaimEvidence) -> Iterator[Check]:
     largest = max(
         float(np.max(np.abs(gap))) * sample.speed for gap, sample in zip(gaps, samples, strict=True)
     )
-    yield stated(
-        "largest |nu(t_out) - nu(t_in)| v at any energy",
-        largest < 20,
-        f"{largest:.2f}",
-        "bounded: < 20 speeds of the walls",
-    )
+    what = "largest |nu(t_out) - nu(t_in)| v at any energy"
+    yield stated(what, largest < 20, f"{largest:.2f}", "bounded: < 20 speeds of the walls")
 
 
 def nu_gap(sample: Sample) -> FloatArray:
@@ -250,12 +238,8 @@ def population_through_the_cycle(evidence: ClaimEvidence) -> Iterator[Check]:
         for k in range(every - 1, len(times), every):
             error = math.sqrt(max(now[k] * (1 - now[k]), 1 / sample.n) / sample.n)
             band = max(abs(late[k] - now[k]), abs(early[k] - now[k])) + 2 * mouth_speed(sample) / sample.speed
-            yield close(
-                f"{run}: share in the chaotic zone at phase {sample.run.phases[k]:g}",
-                (float(measured[k]), error),
-                float(now[k]),
-                band=float(band),
-            )
+            what = f"{run}: share in the chaotic zone at phase {sample.run.phases[k]:g}"
+            yield close(what, (float(measured[k]), error), float(now[k]), band=float(band))
 
 
 def work(evidence: ClaimEvidence) -> Iterator[Check]:

@@ -128,20 +128,10 @@ def ergodic_mean(evidence: ClaimEvidence) -> Iterator[Check]:
     chance = sd.value / np.sqrt(25_000)
     drift = sd.value**2 / 4
     luck = float(norm.cdf(3e-5, drift, chance) - norm.cdf(-3e-5, drift, chance))
-    yield stated(
-        "the standard deviation is below 3e-5",
-        sd.value < 3e-5,
-        f"sd = {sd.value:.4f}",
-        "< 3e-5",
-        form="printed",
-    )
-    yield stated(
-        "25,000 particles tell |m1*| < 3e-5",
-        chance < 3e-5,
-        f"their standard error is {chance:.1e}",
-        "< 3e-5",
-        form="printed",
-    )
+    what = "the standard deviation is below 3e-5"
+    yield stated(what, sd.value < 3e-5, f"sd = {sd.value:.4f}", "< 3e-5", form="printed")
+    what = "25,000 particles tell |m1*| < 3e-5"
+    yield stated(what, chance < 3e-5, f"their standard error is {chance:.1e}", "< 3e-5", form="printed")
     yield close(
         "mean of s is sd²/4, the drift that preserving phase volume demands",
         found,
@@ -172,13 +162,8 @@ def finite_bias(evidence: ClaimEvidence) -> Iterator[Check]:
     half = float(theory.unbiased_mean(load("moving-cap")))
     for sample in samples:
         band = sample.run.energy**-1.0 * 2  # of order 1/E0
-        yield close(
-            f"{sample.run.name}: mean of exp(-s/2)",
-            mean(np.exp(-sample.gain / 2)),
-            half,
-            band=band,
-            form="corrected",
-        )
+        what = f"{sample.run.name}: mean of exp(-s/2)"
+        yield close(what, mean(np.exp(-sample.gain / 2)), half, band=band, form="corrected")
 
 
 def heating(evidence: ClaimEvidence) -> Iterator[Check]:
@@ -198,19 +183,10 @@ def heating(evidence: ClaimEvidence) -> Iterator[Check]:
         "> 0",
         form="printed",
     )
-    yield stated(
-        "energy is constant in the cap",
-        still.sum() > 0 and largest < 1e-9,
-        f"{largest:.1e}",
-        "0",
-        form="corrected",
-    )
-    yield above(
-        "the free lose energy meanwhile, log E falls by",
-        (-mean(free).value, mean(free).error),
-        0.0,
-        form="corrected",
-    )
+    what = "energy is constant in the cap"
+    yield stated(what, still.sum() > 0 and largest < 1e-9, f"{largest:.1e}", "0", form="corrected")
+    what = "the free lose energy meanwhile, log E falls by"
+    yield above(what, (-mean(free).value, mean(free).error), 0.0, form="corrected")
     yield above("so the captured come out ahead: their mean of s", gain, 0.0, form="corrected")
 
 

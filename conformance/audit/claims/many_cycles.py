@@ -41,12 +41,8 @@ def _sum_of(evidence: ClaimEvidence, sample: Sample, n: int, cumulants: list[flo
     z = (total - mean(total).value) / spread(total).value
     gap = float(np.max(np.abs(below - _gaussian(places, centre, scale))))
     yield close(f"{label}: mean of log E_n/E0 over n, less its bias", per_cycle, m1, band=band / n, scale=m1)
-    yield close(
-        f"{label}: standard deviation over n",
-        (spread(total).value / n, spread(total).error / n),
-        scale / n,
-        band=0.03 * scale / n,
-    )
+    what = f"{label}: standard deviation over n"
+    yield close(what, (spread(total).value / n, spread(total).error / n), scale / n, band=0.03 * scale / n)
     yield fits(
         f"{label}: log E_n/E0 against the convolution of n cycles",
         total,
@@ -56,12 +52,8 @@ def _sum_of(evidence: ClaimEvidence, sample: Sample, n: int, cumulants: list[flo
         note=f"the Gaussian is off by {gap:.3f} of itself",
     )
     yield close(f"{label}: share within one standard deviation", share(inner), expected, band=0.01)
-    yield close(
-        f"{label}: skewness, 0 for a Gaussian",
-        (float(np.mean(z**3)), float(np.sqrt(6 / len(z)))),
-        skewness,
-        band=0.1,
-    )
+    what = f"{label}: skewness, 0 for a Gaussian"
+    yield close(what, (float(np.mean(z**3)), float(np.sqrt(6 / len(z)))), skewness, band=0.1)
     yield stated(f"{label}: the tails are no Gaussian's, by theory", *_tails(places, below, centre, scale))
 
 

@@ -71,13 +71,8 @@ def signs(evidence: ClaimEvidence) -> Iterator[Check]:
     )
     for scene, label, form in cases:
         turn = loop_area(scene)
-        yield stated(
-            f"{label}: the loop runs clockwise, as the caption of the cycle's figure says",
-            turn < 0,
-            f"signed area {turn:+.4f}",
-            "area < 0",
-            form=form,
-        )
+        what = f"{label}: the loop runs clockwise, as the caption of the cycle's figure says"
+        yield stated(what, turn < 0, f"signed area {turn:+.4f}", "area < 0", form=form)
 
 
 def loop_area(name: str) -> float:
@@ -205,34 +200,16 @@ def measures(evidence: ClaimEvidence) -> Iterator[Check]:
     energy, area = 2.0, 1.0
     printed = 2 * fp.pi * fp.sqrt(2 * energy) * area
     rate = 2 * fp.pi * ((energy + 1) - (energy - 1)) * area / 2  # of the volume below H = E: a disk times A
+    what = "n_cha/n_0 and n_cha/n_cha(t0) agree for any loop (nu from 0.1 to 0.9)"
+    yield exact(what, p_nc * free, p_nc, ZERO, form="printed")
+    what = "they agree when nu reaches 1, as in every loop of the paper"
     yield exact(
-        "n_cha/n_0 and n_cha/n_cha(t0) agree for any loop (nu from 0.1 to 0.9)",
-        p_nc * free,
-        p_nc,
-        ZERO,
-        form="printed",
+        what, theory.volumes_at(fp, scenes.load("moving-cap"), 0.0).v_ell, 0.0, ZERO, form="corrected"
     )
-    yield exact(
-        "they agree when nu reaches 1, as in every loop of the paper",
-        theory.volumes_at(fp, scenes.load("moving-cap"), 0.0).v_ell,
-        0.0,
-        ZERO,
-        form="corrected",
-    )
-    yield exact(
-        "volume of H = E, E = 2, A = 1, as Liouville's measure: 2 pi sqrt(2E) A",
-        printed,
-        rate,
-        ZERO,
-        form="printed",
-    )
-    yield exact(
-        "2 pi A for every E: as V(D0) is defined, and all the paper's ratios need",
-        2 * fp.pi * area,
-        rate,
-        ZERO,
-        form="corrected",
-    )
+    what = "volume of H = E, E = 2, A = 1, as Liouville's measure: 2 pi sqrt(2E) A"
+    yield exact(what, printed, rate, ZERO, form="printed")
+    what = "2 pi A for every E: as V(D0) is defined, and all the paper's ratios need"
+    yield exact(what, 2 * fp.pi * area, rate, ZERO, form="corrected")
 
 
 CHECKS = {

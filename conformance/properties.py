@@ -312,8 +312,8 @@ def _flow_matrix(
     for field, unit in zip(("x", "y", "vx", "vy"), units, strict=True):
         ends = []
         for sign in (-1, 1):
-            parts = {name: getattr(begin, name) for name in begin.__struct_fields__}
-            first = stepper(scene, State(**parts | {field: parts[field] + sign * width * unit}), end)
+            moved = getattr(begin, field) + sign * width * unit
+            first = stepper(scene, msgspec.structs.replace(begin, **{field: moved}), end)
             if not isinstance(first, Collision) or first.wall != hit.wall:
                 return None
             last = stepper(scene, first.state(), end)
@@ -384,6 +384,6 @@ def _near(
 
 
 def _fail(name: str, text: str, scene: Scene, state: State, t_end: float) -> None:
-    fields = {field: getattr(state, field) for field in state.__struct_fields__}
-    line = {"cmd": "step", "seq": 1, "scene": to_data(scene), "state": fields, "t_end": t_end}
+    asked = {"scene": to_data(scene), "state": msgspec.structs.asdict(state), "t_end": t_end}
+    line = {"cmd": "step", "seq": 1, **asked}
     raise AssertionError(f"{name}: {text}; {json.dumps(line)}")

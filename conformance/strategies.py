@@ -122,14 +122,8 @@ def _fourier(draw: st.DrawFn, low: float, high: float, omega: float) -> Fourier:
 def _bang_bang(draw: st.DrawFn, low: float, high: float, clock: Clock) -> BangBang:
     # Inner knots on a grid of 1/4096 of the period; or off every grid, to 1/3 of a step.
     n_legs = draw(st.integers(2, 6))
-    places = draw(
-        st.lists(
-            st.integers(1, 4095).map(lambda n: _scatter(n, 12)),
-            min_size=n_legs - 1,
-            max_size=n_legs - 1,
-            unique=True,
-        )
-    )
+    inner = st.integers(1, 4095).map(lambda n: _scatter(n, 12))
+    places = draw(st.lists(inner, min_size=n_legs - 1, max_size=n_legs - 1, unique=True))
     shift = draw(st.sampled_from((0.0, 1 / 3)))
     times = [clock.start + clock.rate * ((place + shift) / 4096) for place in sorted(places)]
     levels = st.one_of(_between(low, high), st.sampled_from((low, high)))
@@ -283,9 +277,8 @@ def states(draw: st.DrawFn, scene: Scene) -> tuple[State, float]:
         flight = min(flight, LONGEST_FLIGHT * length)
     state, t_end = State(t, x, y, vx, vy, wall), t + flight
     if currently_in_test_context():
-        fields = {name: getattr(state, name) for name in state.__struct_fields__}
-        wire = {"cmd": "step", "seq": 1, "scene": to_data(scene), "state": fields, "t_end": t_end}
-        note(json.dumps(wire))
+        asked = {"scene": to_data(scene), "state": msgspec.structs.asdict(state), "t_end": t_end}
+        note(json.dumps({"cmd": "step", "seq": 1, **asked}))
     return state, t_end
 
 

@@ -261,7 +261,7 @@ def request(vector: Vector, seq: int) -> dict[str, Any]:
         vector: the question.
         seq: number of the request.
     """
-    state = {name: getattr(vector.state, name) for name in vector.state.__struct_fields__}
+    state = msgspec.structs.asdict(vector.state)
     asked = {"cmd": vector.kind, "seq": seq, "scene": vector.scene, "state": state}
     if vector.kind == "trajectory":
         asked["collisions"] = vector.collisions

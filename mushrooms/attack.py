@@ -68,14 +68,9 @@ def attack(
 
 
 def _row(tally: Any) -> dict[str, Any]:
-    numbers = {"worst_ulps": tally.worst_ulps, "slowest_s": tally.slowest}
-    return {
-        "family": tally.family,
-        "cases": tally.n_cases,
-        **tally.counts,
-        **numbers,
-        "wrong_cases": tally.wrong,
-    }
+    row = {"family": tally.family, "cases": tally.n_cases, **tally.counts}
+    row |= {"worst_ulps": tally.worst_ulps, "slowest_s": tally.slowest, "wrong_cases": tally.wrong}
+    return row
 
 
 def _print(tallies: list[Any]) -> None:

@@ -108,13 +108,8 @@ def list_scenes(as_json: AsJson = False) -> None:
 
 def _catalogue_row(name: str) -> dict[str, Any]:
     data = read_data(name)
-    row = {
-        "name": name,
-        "table": data["table"],
-        "period": None,
-        "notes": data.get("notes", ""),
-        "refused": None,
-    }
+    row = {"name": name, "table": data["table"], "period": None, "notes": data.get("notes", "")}
+    row |= {"refused": None}
     try:
         length = cycle_length(scenes.load(name))
     except scenes.InvalidScene as error:

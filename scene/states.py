@@ -101,5 +101,8 @@ def check_numbers(scene: Scene, state: State, t_end: float) -> None:
     check_number("t_end", t_end, InvalidState)
     if t_end < state.t:
         raise InvalidState(f"t_end = {t_end!r}, must be >= state.t = {state.t!r}")
-    if state.wall is not None and state.wall not in scene.walls:
-        raise InvalidState(f"state.wall = {state.wall!r}, must be null or one of {', '.join(scene.walls)}")
+    # Of an array, `in` alone would ask for its truth.
+    if state.wall is not None and not (isinstance(state.wall, str) and state.wall in scene.walls):
+        raise InvalidState(
+            f"state.wall = {shown(state.wall)}, must be null or one of {', '.join(scene.walls)}"
+        )

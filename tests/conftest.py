@@ -43,7 +43,6 @@ LONGEST = [
     "test_mushrooms_bench.py",
     "test_theory_distribution.py",
     "test_conformance_strategies.py",
-    "test_reference_exact.py",
     "test_conformance_properties.py",
     "test_scene_mixed.py",
     "test_scene_validity.py",

@@ -218,7 +218,7 @@ def test_a_leaking_circle_is_refuted():
 
     (entry,) = ledger.select("L1")
     checks = entry.examine(ClaimEvidence({}, AuditSteppers(fast.simulate, leaking), predict=CACHED))
-    assert verdict_of(entry, checks) == "refuted"
+    assert verdict_of(entry, list(checks)) == "refuted"
 
 
 def test_work_that_is_not_conserved_is_refuted(monkeypatch):
@@ -232,5 +232,5 @@ def test_work_that_is_not_conserved_is_refuted(monkeypatch):
     checks = entry.examine(
         ClaimEvidence({}, AuditSteppers(cooled, fast.trajectory), predict=CACHED, threads=1)
     )
-    assert verdict_of(entry, checks) == "refuted"
+    assert verdict_of(entry, list(checks)) == "refuted"
     assert N_SIGMA > 4

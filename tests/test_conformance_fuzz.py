@@ -112,7 +112,7 @@ def test_the_runner_reads_every_line_or_says_wrong_format(tally):
 def test_a_scene_file_is_read_or_refused_in_one_line(suffix, tmp_path, tally):
     path = tmp_path / f"scene{suffix}"
     for line in fuzz.lines(3, N_LINES, lambda draw: draw.choice(fuzz.scenes_known)):
-        path.write_bytes(line if suffix == ".json" else as_toml(line))
+        path.write_bytes(line if suffix == ".json" else fuzz.as_toml(line))
         with limit(line):
             refusal = refused(path)
         assert "\n" not in refusal, line
@@ -128,22 +128,6 @@ def refused(path) -> str:
     return ""
 
 
-def as_toml(line: bytes) -> bytes:
-    """Write a line of JSON as TOML; what is garbled stays as it is."""
-    try:
-        data = json.loads(line)
-        lines = [f"{json.dumps(key)} = {inline(value)}" for key, value in data.items()]
-    except (ValueError, AttributeError, RecursionError):
-        return line
-    return "\n".join(lines).encode("utf-8", "surrogatepass")
-
-
-def inline(value) -> str:
-    if isinstance(value, dict):
-        return "{" + ", ".join(f"{json.dumps(key)} = {inline(part)}" for key, part in value.items()) + "}"
-    return "[" + ", ".join(map(inline, value)) + "]" if isinstance(value, list) else json.dumps(value)
-
-
 def test_a_traceback_or_a_hang_would_be_seen(monkeypatch):
     def crash(*_):
         raise KeyError("vy")
@@ -154,7 +138,3 @@ def test_a_traceback_or_a_hang_would_be_seen(monkeypatch):
     monkeypatch.setattr("test_conformance_fuzz.LIMIT", 0.05)
     with pytest.raises(TimeoutError, match="a line"), limit(b"a line"):
         time.sleep(5.0)
-
-
-def test_lines_are_the_same_every_time():
-    assert list(fuzz.lines(1, 50, fuzz.requests)) == list(fuzz.lines(1, 50, fuzz.requests))

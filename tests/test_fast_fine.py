@@ -20,7 +20,7 @@ from fast.fine import fill_path
 from fast.kernel import codes
 from fast.kernel import double_double as dd
 from fast.step import WALL_CODES
-from scene import BadInput, Collision, Rejected, State, Stem, Undecided, load
+from scene import Collision, State, Stem, Undecided, load
 
 N_STEPS = int(os.environ.get("MUSHROOMS_STEPS", "250"))
 UNIT = 2.0**51  # backward units of 2^-104 in a backward ulp
@@ -133,12 +133,3 @@ def test_rounding_a_state_of_pairs_is_not_taken_for_a_gap():
     steps, met = np.empty((1, 6, 2)), np.empty(1, dtype=np.int64)
     n, code = fill_path(compile_scene(scene), start, WALL_CODES[None], steps, met)
     assert (n, code) == (0, codes.CORNER)
-
-
-def test_bad_starts_are_refused():
-    scene = load("moving-cap")
-    with pytest.raises(BadInput, match="n_collisions = -1"):
-        fast.fine_trajectory(scene, START, -1)
-    outside = fast.fine_trajectory(scene, State(0.0, 9.0, 0.5, 1.0, 0.0), 1)
-    assert isinstance(outside.outcome, Rejected)
-    assert not outside.walls

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import io
 import json
-import math
 from fractions import Fraction
 
 import mpmath
@@ -21,12 +20,8 @@ import reference
 from scene import (
     Collision,
     Horizon,
-    InvalidScene,
-    InvalidState,
-    Rejected,
     State,
     Undecided,
-    from_data,
 )
 from scene.protocol.wire import MAX_COLLISIONS, serve
 from scene.transforms import mirrored_wall
@@ -191,24 +186,6 @@ def test_44_speed_in_a_static_circle():
     v2 = path.steps[:, 4] ** 2 + path.steps[:, 5] ** 2
     drift = np.abs(v2 / (0.7**2 + 0.3**2) - 1.0)
     assert np.all(drift <= 8 * 2.0**-53 * np.arange(2, 10_002))
-
-
-@pytest.mark.parametrize("number", [math.nan, math.inf, -math.inf])
-@pytest.mark.parametrize("field", ["t", "x", "y", "vx", "vy"])
-def test_46_no_numbers(field, number):
-    circle = scene_of("01/1")
-    state = State(**{"t": 0.0, "x": 0.1, "y": 0.2, "vx": 1.0, "vy": 0.0, field: number})
-    for stepper in (reference, fast):
-        outcome = stepper.next_collision(circle, state, 10.0)
-        assert isinstance(outcome, Rejected)
-        assert f"state.{field}" in outcome.reason
-        with pytest.raises(InvalidState, match=f"state.{field}"):
-            stepper.trajectory(circle, state, 1)
-
-
-def test_46_an_infinite_omega():
-    with pytest.raises(InvalidScene, match=r"r\.omega = inf"):
-        from_data({"table": "cap", "r": {"kind": "fourier", "mean": 1.0, "omega": math.inf}})
 
 
 @pytest.mark.parametrize(("forwards", "backwards"), [("47/1", "47/2"), ("47/3", "47/4")])

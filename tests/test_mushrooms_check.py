@@ -13,7 +13,8 @@ from xml.etree import ElementTree
 
 import msgspec
 import pytest
-from support.saboteurs import SABOTEURS
+from support.refusals import assert_refused
+from support.saboteurs import command
 
 import conformance
 from conformance import vectors
@@ -21,9 +22,7 @@ from conformance.suite import property_checks, pytest_suite
 from conformance.suite import run as suite
 from conformance.suite.session import Session
 
-HERE = Path(__file__).parent
 PYTHON = [sys.executable, str(Path(conformance.__file__).parent / "harness" / "python" / "stepper.py")]
-SABOTEUR = [sys.executable, "-I", "-S", str(HERE / "support" / "saboteurs.py")]
 
 
 @pytest.fixture(autouse=True)
@@ -35,6 +34,8 @@ def _few(monkeypatch):
     assert {vector.kind for vector in found} == {"step", "trajectory"}
     monkeypatch.setattr(suite, "choose", lambda *_: found)
     monkeypatch.setattr(property_checks, "N_QUESTIONS", 2)
+    monkeypatch.setattr(property_checks, "SIZES", (property_checks.Size(20, 50.0, 0.5),))
+    monkeypatch.setattr(property_checks, "BATCH", 20)
     monkeypatch.setattr(suite, "TIMED_LEAST", 100_000)
 
 
@@ -75,7 +76,7 @@ def assert_stands_alone(page: str, n_figures: int) -> None:
 def test_a_bad_stepper_is_not(call, tmp_path):
     """An honest citizen of the protocol that knows no physics: it fails by verdict, never by crash."""
     page = tmp_path / "r.html"
-    code, out, _ = call("--html", page, "--json", tmp_path / "r.json", "--", *SABOTEUR, "honest")
+    code, out, _ = call("--html", page, "--json", tmp_path / "r.json", "--", *command("honest"))
     assert code == 1
     assert "not accepted" in out
     assert "fail" in out
@@ -90,9 +91,8 @@ def test_a_bad_stepper_is_not(call, tmp_path):
 
 @pytest.mark.parametrize("name", ["exit-silently", "other-protocol", "fifteen-digits"])
 def test_reports_of_broken_sessions_are_written_too(call, tmp_path, name):
-    assert name in SABOTEURS
     options = ["--json", tmp_path / "r.json", "--junit", tmp_path / "r.xml", "--html", tmp_path / "r.html"]
-    code, out, _ = call("--restarts", 1, *options, "--", *SABOTEUR, name)
+    code, out, _ = call("--restarts", 1, *options, "--", *command(name))
     assert code == 1
     assert "not accepted" in out
     assert len(list(tmp_path.iterdir())) == 3
@@ -127,11 +127,7 @@ def test_markup_in_what_it_says_is_text(call, tmp_path):
 )
 def test_bad_options_are_one_line(call, monkeypatch, tmp_path, arguments, word):
     monkeypatch.chdir(tmp_path)
-    code, out, err = call(*arguments)
-    assert (code, out) == (2, "")
-    assert err.startswith("mushrooms: ")
-    assert err.count("\n") == 1
-    assert word in err
+    assert_refused(call(*arguments), word)
     assert list(tmp_path.iterdir()) == []
 
 
@@ -154,7 +150,7 @@ def test_one_test_per_vector_for_pytest(tmp_path):
 
 def test_the_pytest_case_fails_and_skips_with_the_verdict():
     vector = next(vector for vector in vectors.load() if vector.kind == "step")
-    with Session([*SABOTEUR, "missing-field"]) as session:
+    with Session(command("missing-field")) as session:
         session.start()
         with pytest.raises(pytest.fail.Exception, match="wrong-format: "):
             pytest_suite.test_vector(session, vector)

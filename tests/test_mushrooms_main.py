@@ -11,6 +11,7 @@ from decimal import Decimal
 
 import numpy as np
 import pytest
+from support.refusals import assert_refused
 
 import fast
 import scene as scenes
@@ -40,17 +41,6 @@ def call(command_line):
     return command_line
 
 
-def assert_refused(result, *words):
-    code, out, err = result
-    assert code == 2
-    assert out == ""
-    assert err.startswith("mushrooms: ")
-    assert err.endswith("\n")
-    assert err.count("\n") == 1
-    for word in words:
-        assert word in err
-
-
 @pytest.mark.parametrize("command", ["theory", "simulate", "draw"])
 @pytest.mark.parametrize("kind", BROKEN_SCENES)
 def test_a_broken_scene_is_refused(call, tmp_path, command, kind):
@@ -63,9 +53,26 @@ def test_a_broken_scene_is_refused(call, tmp_path, command, kind):
     assert [entry.name for entry in tmp_path.iterdir()] == ["scene.toml"]
 
 
+# Of `simulate`, and what the refusal says beside them.
+BAD_NUMBERS = [
+    ("--particles", "0", "1 to 100000000"),
+    ("--particles", "100000001", "1 to 100000000"),
+    ("--energy", "-1", "> 0"),
+    ("--energy", "0", "> 0"),
+    ("--energy", "nan", "finite"),
+    ("--energy", "inf", "finite"),
+    ("--cycles", "0", ">= 1"),
+    ("--seed", "-1", "0 to 18446744073709551615"),
+    ("--seed", "18446744073709551616", "0 to 18446744073709551615"),
+    ("--threads", "0", ">= 1"),
+]
+SIMULATE = ["simulate", "moving-cap", "--particles", "5", "--energy", "100", "--out", "out"]
+
+
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
+        *(([*SIMULATE, option, value], [option, value, bound]) for option, value, bound in BAD_NUMBERS),
         ([], ["command"]),
         (["bogus"], ["bogus"]),
         (["theory"], ["SCENE"]),
@@ -91,46 +98,26 @@ def test_bad_arguments_are_refused(call, tmp_path, monkeypatch, arguments, words
 
 
 @pytest.mark.parametrize(
-    ("option", "value", "bound"),
+    ("arguments", "out", "word"),
     [
-        ("--particles", "0", "1 to 100000000"),
-        ("--particles", "100000001", "1 to 100000000"),
-        ("--energy", "-1", "> 0"),
-        ("--energy", "0", "> 0"),
-        ("--energy", "nan", "finite"),
-        ("--energy", "inf", "finite"),
-        ("--cycles", "0", ">= 1"),
-        ("--seed", "-1", "0 to 18446744073709551615"),
-        ("--seed", "18446744073709551616", "0 to 18446744073709551615"),
-        ("--threads", "0", ">= 1"),
+        *(
+            (arguments, out, "folder")
+            for arguments in (SIMULATE[:-2], ["audit"])
+            for out in ("file.txt", "file.txt/sub")
+        ),
+        (["draw", "moving-cap"], "file.txt/a.svg", "a.svg"),
     ],
 )
-def test_bad_numbers_are_refused_with_value_and_bound(call, tmp_path, option, value, bound):
-    options = {"--particles": "5", "--energy": "100", "--out": str(tmp_path / "out")} | {option: value}
-    result = call("simulate", "moving-cap", *(part for pair in options.items() for part in pair))
-    assert_refused(result, option, value, bound)
-    assert list(tmp_path.iterdir()) == []
-
-
-@pytest.mark.parametrize("command", ["simulate", "audit"])
-@pytest.mark.parametrize("below", [True, False])
-def test_output_on_a_file_is_refused_before_any_work(call, tmp_path, monkeypatch, command, below):
+def test_output_on_a_file_is_refused_before_any_work(call, tmp_path, monkeypatch, arguments, out, word):
     def never(*_args, **_options):
         raise AssertionError("simulated although the output cannot be written")
 
     monkeypatch.setattr(fast, "simulate", never)
     blocker = tmp_path / "file.txt"
     blocker.write_text("kept")
-    more = ["moving-cap", "--particles", 5, "--energy", 100] if command == "simulate" else []
-    assert_refused(call(command, *more, "--out", blocker / "sub" if below else blocker), "file.txt", "folder")
+    assert_refused(call(*arguments, "--out", tmp_path / out), "file.txt", word)
     assert blocker.read_text() == "kept"
     assert list(tmp_path.iterdir()) == [blocker]
-
-
-def test_a_picture_below_a_file_is_refused(call, tmp_path):
-    (tmp_path / "file.txt").write_text("kept")
-    assert_refused(call("draw", "moving-cap", "--out", tmp_path / "file.txt" / "a.svg"), "a.svg")
-    assert [entry.name for entry in tmp_path.iterdir()] == ["file.txt"]
 
 
 @pytest.mark.parametrize(

@@ -126,32 +126,20 @@ def test_extrema_within_are_seen(k):
 
 
 def test_threads_take_turns_at_mpmaths_shared_pi(monkeypatch):
-    module = reference.arithmetic
-    seen = []
+    """Whatever computes or reads it does so with the lock held."""
+    module, seen = reference.arithmetic, []
 
-    def watched(x, prec):
-        seen.append(module._CONSTANTS.locked())
-        return (x, x), (x, x)
+    def watched(honest):
+        return lambda *given: seen.append(module._CONSTANTS.locked()) or honest(*given)
 
-    monkeypatch.setattr(module.libmpi, "mpi_cos_sin", watched)
+    monkeypatch.setattr(module.libmpi, "mpi_cos_sin", watched(module.libmpi.mpi_cos_sin))
+    monkeypatch.setattr(module.libelefun, "mpf_pi", watched(module.libelefun.mpf_pi))
     arithmetic = Arithmetic(10)
     arithmetic.cos_sin(arithmetic.number(1))
-    assert seen == [True]
-
-
-def test_threads_take_turns_when_pi_itself_is_read(monkeypatch):
-    module = reference.arithmetic
-    honest, seen = module.libelefun.mpf_pi, []
-
-    def watched(bits, rounding):
-        seen.append(module._CONSTANTS.locked())
-        return honest(bits, rounding)
-
-    monkeypatch.setattr(module.libelefun, "mpf_pi", watched)
-    arithmetic = Arithmetic(10)
+    assert len(seen) == 1
     arithmetic.turning(1.0, None, Fraction(100))
     arithmetic.turning(None, 3.0, Fraction(100))
-    assert len(seen) == 4
+    assert len(seen) == 5
     assert all(seen)
 
     class Unlocked:
@@ -161,8 +149,8 @@ def test_threads_take_turns_when_pi_itself_is_read(monkeypatch):
 
     monkeypatch.setattr(module, "_CONSTANTS", Unlocked())
     arithmetic.turning(1.0, None, Fraction(100))
-    assert not any(seen[4:])
-    assert seen[4:]
+    assert not any(seen[5:])
+    assert seen[5:]
     source = "".join(path.read_text("utf-8") for path in FOLDER.glob("*.py"))
     assert "context.pi" not in source
     assert "ctx.pi" not in source

@@ -8,8 +8,9 @@ import json
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from support.answers_by_hand import UNDEFINED
 from support.forgery import drop, put, shift
-from support.tables import BOX, CIRCLE, LIFT, STATIC
+from support.tables import LIFT
 from support.truth import IS_DEEP
 
 import reference
@@ -145,30 +146,14 @@ def test_the_piece_that_does_not_hold_is_refuted():
             check_path(forged)
 
 
-NOWHERE = {
-    "corner": (BOX, State(0.0, 0.5, -0.5, 0.5, -0.5), "corner"),
-    "corner above": (BOX, State(0.0, 0.5, -0.5, 0.5, 0.5), "corner"),
-    "arc and base": (CIRCLE, State(0.0, 0.5, 0.5, 0.5, -0.5), "corner"),
-    "mouth's edge from above": (STATIC, State(0.0, 0.25, 0.25, 1.0, -1.0), "mouth-edge"),
-    "mouth's edge from below": (STATIC, State(0.0, 0.25, -0.25, 1.0, 1.0), "mouth-edge"),
-    "along the mouth": (STATIC, State(0.0, 0.0, 0.0, 1.0, 0.0), "mouth-edge"),
-    "along the base": (STATIC, State(0.0, 0.75, 0.0, 1.0, 0.0, "base"), "sliding"),
-    "along the base, unnamed": (STATIC, State(0.0, 0.75, 0.0, 1.0, 0.0), "sliding"),
-    "on two walls": (STATIC, State(0.0, 1.0, 0.0, -0.1, -1.0, "arc"), "corner"),
-    "at the edge": (STATIC, State(0.0, -0.5, 0.0, 1.0, 0.3, "left"), "mouth-edge"),
-    "along a side": (BOX, State(0.0, 1.0, -0.5, 0.0, 1.0, "right"), "sliding"),
-    "pushed by the floor": (LIFT, State(0.0, 0.0, -2.0, 0.0, 0.0, "floor"), "sliding"),
-}
-
-
 def nowhere(name):
-    scene, state, reason = NOWHERE[name]
-    outcome = reference.next_collision(scene, state, 9.0)
+    scene, state, t_end, reason, _ = UNDEFINED[name]
+    outcome = reference.next_collision(scene, state, t_end)
     assert outcome == Undefined(reason)
-    return certificate(scene, state, 9.0, outcome)
+    return certificate(scene, state, t_end, outcome)
 
 
-@pytest.mark.parametrize("name", NOWHERE)
+@pytest.mark.parametrize("name", UNDEFINED)
 def test_undefined_outcomes_are_proved_again(name):
     claim = nowhere(name)
     assert json.loads(json.dumps(claim)) == claim
@@ -176,7 +161,7 @@ def test_undefined_outcomes_are_proved_again(name):
 
 
 FORGED_NOWHERE = [
-    *((name, put("reason", "tangency")) for name in NOWHERE),
+    *((name, put("reason", "tangency")) for name in UNDEFINED),
     *((name, drop("walls", 1)) for name in ("corner", "on two walls")),
     *((name, put("excluded", {})) for name in ("corner", "along the mouth")),
     *(

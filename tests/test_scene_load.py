@@ -9,6 +9,7 @@ import jsonschema
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from support.fuzz import as_toml
 
 from conformance.strategies import scenes
 from scene import InvalidScene, catalogue, from_data, load, to_data
@@ -20,16 +21,6 @@ STEM = {"table": "stem", "w": 1.0, "h": 1.0}
 MUSHROOM = {"table": "mushroom", "r": 1.0, "h": 1.0, "nu": 0.5}
 FOURIER = {"kind": "fourier", "mean": 1.0, "omega": 1.0}
 LEGS = {"kind": "bang-bang", "knots": [[0.0, 1.0], [1.0, 1.0]]}
-
-
-def toml(data):
-    """Write data of a scene as TOML; JSON's strings, numbers and arrays are TOML's too."""
-    plain = {key: entry for key, entry in data.items() if not isinstance(entry, dict)}
-    lines = [f"{key} = {json.dumps(entry)}" for key, entry in plain.items()]
-    for key, entry in data.items():
-        if isinstance(entry, dict):
-            lines += [f"[{key}]", *(f"{name} = {json.dumps(item)}" for name, item in entry.items())]
-    return "\n".join(lines)
 
 
 @given(scenes())
@@ -45,8 +36,8 @@ def test_data_round_trips_to_the_bit(scene):
 def test_files_round_trip_to_the_bit(tmp_path_factory, scene):
     folder = tmp_path_factory.mktemp("scenes")
     data = to_data(scene)
-    (folder / "a.json").write_text(json.dumps(data), "utf-8")
-    (folder / "a.toml").write_text(toml(data), "utf-8")
+    (folder / "a.json").write_bytes(line := json.dumps(data).encode())
+    (folder / "a.toml").write_bytes(as_toml(line))
     assert load(folder / "a.json") == load(str(folder / "a.toml")) == scene
 
 
@@ -54,7 +45,8 @@ def test_whole_numbers_are_numbers():
     assert from_data({"table": "cap", "r": 1}) == from_data(CAP)
 
 
-BAD_DATA = [
+# What the published schema refuses, too.
+ILL_FORMED = [
     (None, "Expected `object`"),
     ([], "Expected `object`"),
     (1.0, "Expected `object`"),
@@ -64,8 +56,6 @@ BAD_DATA = [
     ({"table": 3, "r": 1.0}, "table = 3, must be one of cap, stem, mushroom"),
     ({"table": "cap"}, "missing required field `r`"),
     ({"table": "stem", "w": 1.0}, "missing required field `h`"),
-    ({"table": "mushroom", "r": 1.0, "h": 1.0}, "exactly one of `w` and `nu`"),
-    ({**MUSHROOM, "w": 0.5}, "exactly one of `w` and `nu`"),
     ({**CAP, "radius": 1.0}, "unknown field `radius`"),
     ({**CAP, "w": 1.0}, "unknown field `w`"),
     ({**CAP, "line\nbreak": 1.0}, "unknown field `line break`"),
@@ -75,16 +65,22 @@ BAD_DATA = [
     ({**CAP, "r": True}, "r = True: must be a number or a law"),
     ({**CAP, "r": [1.0]}, "r = an object of type list: must be a number or a law"),
     ({**CAP, "name": 3}, "name = 3: Expected `str`"),
-    ({**CAP, "r": math.nan}, "r = nan, must be finite"),
-    ({**CAP, "r": -math.inf}, "r = -inf, must be finite"),
-    ({**CAP, "r": 10**400}, "r = an integer of 1329 bits"),
     ({**CAP, "r": {}}, "r has no `kind`, must be one of fourier, bang-bang"),
     ({**CAP, "r": {"kind": "sawtooth"}}, "r.kind = 'sawtooth', must be one of fourier, bang-bang"),
     ({**CAP, "r": {**FOURIER, "phase": 0.0}}, "unknown field `phase`"),
     ({**CAP, "r": {**FOURIER, "cos": 0.5}}, "r.cos = 0.5: Expected `array`"),
     ({**CAP, "r": {**FOURIER, "cos": [0.1, "x"]}}, "r.cos[1] = 'x': Expected `float`"),
-    ({**CAP, "r": {**FOURIER, "cos": [0.1, math.nan]}}, "r.cos[1] = nan, must be finite"),
     ({**CAP, "r": {**LEGS, "knots": [[0.0, 1.0], [1.0]]}}, "r.knots[1] = an object of type list: Exp"),
+    ({**CAP, "r": {**LEGS, "knots": [[0.0, 1.0, 2.0]]}}, "r.knots[0] = an object of type list: Exp"),
+]
+# What no schema says.
+IMPOSSIBLE = [
+    ({"table": "mushroom", "r": 1.0, "h": 1.0}, "exactly one of `w` and `nu`"),
+    ({**MUSHROOM, "w": 0.5}, "exactly one of `w` and `nu`"),
+    ({**CAP, "r": math.nan}, "r = nan, must be finite"),
+    ({**CAP, "r": -math.inf}, "r = -inf, must be finite"),
+    ({**CAP, "r": 10**400}, "r = an integer of 1329 bits"),
+    ({**CAP, "r": {**FOURIER, "cos": [0.1, math.nan]}}, "r.cos[1] = nan, must be finite"),
     # Extreme numbers must be refused in words as well, not by an overflow on the way.
     (
         {**CAP, "r": {"kind": "fourier", "mean": -1.0, "omega": 1e308, "cos": [0.0] * 15 + [0.1]}},
@@ -105,7 +101,7 @@ def refusal(call, *arguments):
     return message
 
 
-@pytest.mark.parametrize(("data", "message"), BAD_DATA)
+@pytest.mark.parametrize(("data", "message"), ILL_FORMED + IMPOSSIBLE)
 def test_bad_data_is_refused_in_one_line_that_names_the_field(data, message):
     assert message in refusal(from_data, data)
 
@@ -198,22 +194,6 @@ def test_the_schema_accepts_every_scene(published, scene):
     published.validate(json.loads(json.dumps(to_data(scene))))
 
 
-@pytest.mark.parametrize(
-    "data",
-    [
-        [],
-        {},
-        {"table": "cone", "r": 1.0},
-        {"table": "cap"},
-        {**CAP, "radius": 1.0},
-        {**CAP, "r": "1.0"},
-        {**CAP, "r": None},
-        {**CAP, "r": {**FOURIER, "phase": 0.0}},
-        {**CAP, "r": {**FOURIER, "kind": "sawtooth"}},
-        {**CAP, "r": {**LEGS, "knots": [[0.0, 1.0, 2.0]]}},
-        {"table": "stem", "w": 1.0},
-    ],
-)
-def test_the_schema_refuses_what_the_loader_refuses(published, data):
+@pytest.mark.parametrize(("data", "_"), ILL_FORMED)
+def test_the_schema_refuses_what_the_loader_refuses(published, data, _):
     assert not published.is_valid(data)
-    refusal(from_data, data)

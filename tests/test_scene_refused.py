@@ -12,7 +12,8 @@ import msgspec
 import numpy as np
 import pytest
 from hypothesis import given
-from support.refusals import one_line
+from support.refusals import NO_NUMBERS, NOT_FINITE, one_line
+from support.tables import CIRCLE
 
 from conformance.strategies import scenes
 from scene import (
@@ -21,7 +22,6 @@ from scene import (
     Cap,
     Fourier,
     InvalidScene,
-    InvalidState,
     Mushroom,
     Scene,
     State,
@@ -38,40 +38,52 @@ from scene.states import check_numbers
 from scene.tables import PARAMETERS
 
 VALID = sorted(set(catalogue()) - {"moving-cap-as-printed"})
-NO_NUMBERS = [
-    "1",
-    b"1",
-    None,
-    True,
-    np.True_,
-    [1.0],
-    (1.0,),
-    {"kind": "fourier"},
-    1j,
-    object(),
-    Fourier,
-    10**400,
+NO_VALUES = [None, *NO_NUMBERS, *NOT_FINITE]
+NO_LENGTHS = [*NO_VALUES, 0.0, -0.0, -1.0, -1]
+NO_SCENES = [None, 1.0, "moving-cap", Cap, *(bad for bad in NO_NUMBERS if not isinstance(bad, Cap))]
+NO_COUNTS = [*NO_VALUES, 2.0, 2.5, 10]
+NO_FILES = [None, 3, 1.5, b"moving-cap", ["moving-cap"], CIRCLE, "", "a\nb", "nul\0.toml"]
+NO_TEXTS = [None, 3, b"x", ["x"]]
+START = State(0.0, 0.1, 0.2, 1.0, 0.0)
+
+
+def started(**changes):
+    """Check a step of which the start is changed."""
+    check_numbers(CIRCLE, msgspec.structs.replace(START, **changes), 9.0)
+
+
+# What is refused, how the line begins, and a call with it.
+REFUSED = [
+    (NO_LENGTHS, "r ", lambda bad: Cap(r=bad)),
+    (NO_LENGTHS, "w ", lambda bad: Stem(w=bad, h=1.0)),
+    (NO_LENGTHS, "h ", lambda bad: Stem(w=1.0, h=bad)),
+    (NO_LENGTHS, "nu ", lambda bad: Mushroom(r=1.0, h=1.0, nu=2.0 if bad is None else bad)),
+    (NO_VALUES, "slope ", lambda bad: Stem(w=1.0, h=1.0, slope=bad)),
+    (NO_TEXTS, "name ", lambda bad: Cap(r=1.0, name=bad)),
+    (NO_TEXTS, "notes ", lambda bad: Cap(r=1.0, notes=bad)),
+    (NO_SCENES, "scene = ", check_scene),
+    (NO_SCENES, "scene = ", to_data),
+    (NO_FILES, "scene ", load),
+    (NO_COUNTS, "n = ", lambda bad: check_count("n", bad, 1, 9)),
+    (NO_SCENES, "scene = ", lambda bad: check_numbers(bad, START, 9.0)),
+    ([None, *NO_FILES], "state = ", lambda bad: check_numbers(CIRCLE, bad, 9.0)),
+    (NO_VALUES, "t_end = ", lambda bad: check_numbers(CIRCLE, START, bad)),
+    (NO_VALUES, "state.t = ", lambda bad: started(t=bad)),
+    (NO_VALUES, "state.x = ", lambda bad: started(x=bad)),
+    (NO_VALUES, "state.y = ", lambda bad: started(y=bad)),
+    (NO_VALUES, "state.vx = ", lambda bad: started(vx=bad)),
+    (NO_VALUES, "state.vy = ", lambda bad: started(vy=bad)),
+    ([3, *NO_NUMBERS], "state.wall = ", lambda bad: started(wall=bad)),
 ]
-OUT_OF_RANGE = [math.nan, math.inf, -math.inf, np.float64("nan"), np.float32("inf")]
 
 
-@pytest.mark.parametrize("bad", NO_NUMBERS + OUT_OF_RANGE + [0.0, -0.0, -1.0, -1])
-def test_a_length_that_is_none_is_refused_by_name(bad):
-    assert one_line(Cap, r=bad).startswith("r ")
-    assert one_line(Stem, w=bad, h=1.0).startswith("w ")
-    assert one_line(Stem, w=1.0, h=bad).startswith("h ")
-    assert one_line(Mushroom, r=1.0, h=1.0, nu=2.0 if bad is None else bad).startswith("nu ")
-
-
-@pytest.mark.parametrize("bad", NO_NUMBERS + OUT_OF_RANGE)
-def test_a_slope_that_is_none_is_refused_by_name(bad):
-    assert one_line(Stem, w=1.0, h=1.0, slope=bad).startswith("slope ")
-
-
-@pytest.mark.parametrize("bad", [None, 3, b"x", ["x"]])
-def test_a_name_is_text(bad):
-    assert one_line(Cap, r=1.0, name=bad).startswith("name ")
-    assert one_line(Cap, r=1.0, notes=bad).startswith("notes ")
+@pytest.mark.parametrize(("bads", "begin", "call"), REFUSED)
+def test_bad_input_is_refused_by_name(bads, begin, call):
+    for bad in bads:
+        line = one_line(call, bad)
+        assert line.startswith(begin), bad
+        assert ("scene.load(" in line) == (begin == "scene = " and isinstance(bad, str)), bad
+        assert ("1 to 9" in line) == (begin == "n = "), bad
 
 
 @pytest.mark.parametrize(
@@ -88,7 +100,6 @@ def test_scenes_that_cannot_exist(make, words):
     assert words in one_line(make)
 
 
-CIRCLE = Cap(r=1.0)
 WAYS = {
     "constructor": lambda field, bad: Cap(**{"r": 1.0, field: bad}),
     "structs.replace": lambda field, bad: msgspec.structs.replace(CIRCLE, **{field: bad}),
@@ -177,21 +188,6 @@ def test_zeros_of_either_sign_are_one_number():
         assert math.copysign(1.0, Stem(w=1.0, h=1.0, slope=slope).slope) == math.copysign(1.0, slope)
 
 
-@pytest.mark.parametrize("bad", [*NO_NUMBERS, 1.0, "moving-cap", CIRCLE.r, Cap])
-def test_check_scene(bad):
-    message = one_line(check_scene, bad)
-    assert message.startswith("scene = ")
-    assert ("scene.load(" in message) == isinstance(bad, str)
-
-
-@pytest.mark.parametrize(
-    "bad", [b for b in NO_NUMBERS if b is not NO_NUMBERS[-1]] + OUT_OF_RANGE + [2.0, 2.5]
-)
-def test_check_count_refuses(bad):
-    assert one_line(check_count, "n", bad, 1, 9).startswith("n = ")
-    assert "1 to 9" in one_line(check_count, "n", bad, 1, 9)
-
-
 def test_check_count():
     assert check_count("n", np.int64(9), 1, 9) == 9
     assert type(check_count("n", np.int64(9), 1, 9)) is int
@@ -203,37 +199,6 @@ def test_check_number():
     for number in (1, 1.0, np.float32(1), np.float64(1), np.int8(1)):
         assert check_number("x", number) == 1.0
         assert type(check_number("x", number)) is float
-
-
-START = State(0.0, 0.1, 0.2, 1.0, 0.0)
-
-
-@pytest.mark.parametrize("bad", NO_NUMBERS + OUT_OF_RANGE)
-@pytest.mark.parametrize("field", ["t", "x", "y", "vx", "vy"])
-def test_a_state_of_other_things_is_refused_by_field(field, bad):
-    state = msgspec.structs.replace(START, **{field: bad})
-    assert one_line(check_numbers, CIRCLE, state, 9.0).startswith(f"state.{field} = ")
-
-
-@pytest.mark.parametrize("bad", NO_NUMBERS + OUT_OF_RANGE)
-def test_other_arguments_of_a_step(bad):
-    assert one_line(check_numbers, CIRCLE, START, bad).startswith("t_end = ")
-    assert one_line(check_numbers, CIRCLE, bad, 9.0).startswith("state = ")
-    assert one_line(check_numbers, bad, START, 9.0).startswith("scene = ")
-    with pytest.raises(InvalidState):
-        check_numbers(CIRCLE, msgspec.structs.replace(START, wall=bad if bad is not None else 3), 9.0)
-
-
-@pytest.mark.parametrize(
-    "bad", [None, 3, 1.5, b"moving-cap", ["moving-cap"], CIRCLE, "", "a\nb", "nul\0.toml"]
-)
-def test_load_refuses(bad):
-    assert one_line(load, bad).startswith("scene ")
-
-
-@pytest.mark.parametrize("bad", [None, 3, "moving-cap", CIRCLE.r])
-def test_to_data_refuses(bad):
-    assert one_line(to_data, bad).startswith("scene = ")
 
 
 def test_a_schema_beside_the_parameters_is_ignored(tmp_path):

@@ -10,8 +10,9 @@ names an instant `within` the one piece that it means.
 from __future__ import annotations
 
 from bisect import bisect_left, bisect_right
+from collections.abc import Iterable
 from itertools import pairwise
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 from flint import arb, fmpq
 
@@ -24,7 +25,7 @@ PREFILTER = 2.0**-30
 QUARTERS = (fmpq(1), ZERO, fmpq(-1), ZERO)  # cos of 0, 1, 2 and 3 quarters of a turn
 
 
-class BallLaw(Protocol):
+class BallLaw:
     """A law that can be asked at balls of time and at exact times."""
 
     def jet(self, time: Number, within: Rational | None = None) -> Jet:
@@ -35,12 +36,15 @@ class BallLaw(Protocol):
                 the three is a rational where it is known to be one.
             within: an instant of the only piece to consider; None for every piece touched.
         """
+        raise NotImplementedError
 
     def range(self) -> tuple[Number, Number]:
         """Return bounds of the value at all times."""
+        raise NotImplementedError
 
     def knots(self, start: Rational, end: Rational) -> list[Rational]:
         """List the times strictly between at which the law changes its piece."""
+        return []
 
 
 def ball_law(law: Law) -> BallLaw:
@@ -52,7 +56,7 @@ def ball_law(law: Law) -> BallLaw:
     return BallConstant(law)
 
 
-class BallConstant:
+class BallConstant(BallLaw):
     """A law that never changes."""
 
     def __init__(self, number: float) -> None:
@@ -67,12 +71,8 @@ class BallConstant:
         """See `BallLaw`."""
         return self.exact[0], self.exact[0]
 
-    def knots(self, start: Rational, end: Rational) -> list[Rational]:
-        """See `BallLaw`."""
-        return []
 
-
-class BallFourier:
+class BallFourier(BallLaw):
     """A trigonometric polynomial of time; its frequency is omega, or 2 pi / period."""
 
     def __init__(self, law: Fourier) -> None:
@@ -88,24 +88,13 @@ class BallFourier:
             turn = ZERO if time == 0 else None if self.period is None else time / self.period
             if turn is not None and (4 * turn).q == 1:
                 return self._at_quarter(int((4 * turn).p))
-        value, rate, bend = arb(self.mean), arb(0), arb(0)
-        for frequency, a, b in self.terms:
-            sin, cos = (frequency * time).sin_cos()
-            wave = a * cos + b * sin
-            value += wave
-            rate += frequency * (b * cos - a * sin)
-            bend -= frequency * frequency * wave
-        return value, rate, bend
+        waves = ((frequency, a, b, *(frequency * time).sin_cos()) for frequency, a, b in self.terms)
+        return _added((arb(self.mean), arb(0), arb(0)), waves)
 
     def _at_quarter(self, quarter: int) -> Jet:
-        value, rate, bend = self.mean, ZERO, ZERO
-        for k, a, b in self.harmonics:
-            frequency, cos, sin = k * self.omega, QUARTERS[k * quarter % 4], QUARTERS[(k * quarter - 1) % 4]
-            wave = a * cos + b * sin
-            value += wave
-            rate += frequency * (b * cos - a * sin)
-            bend -= frequency * frequency * wave
-        return value, rate, bend
+        turned = ((k, a, b, k * quarter) for k, a, b in self.harmonics)
+        waves = ((k * self.omega, a, b, QUARTERS[(n - 1) % 4], QUARTERS[n % 4]) for k, a, b, n in turned)
+        return _added((self.mean, ZERO, ZERO), waves)
 
     def range(self) -> tuple[Number, Number]:
         """See `BallLaw`."""
@@ -114,9 +103,15 @@ class BallFourier:
             swing += (a * a + b * b).sqrt()
         return self.mean - swing, self.mean + swing
 
-    def knots(self, start: Rational, end: Rational) -> list[Rational]:
-        """See `BallLaw`."""
-        return []
+
+def _added(to: Jet, waves: Iterable[tuple[Number, ...]]) -> Jet:
+    """Add waves and their derivatives; each is frequency, cosine and sine amplitude, sine and cosine."""
+    value, rate, bend = to
+    for frequency, a, b, sin, cos in waves:
+        wave = a * cos + b * sin
+        value, rate = value + wave, rate + frequency * (b * cos - a * sin)
+        bend -= frequency * frequency * wave
+    return value, rate, bend
 
 
 class Parabola(NamedTuple):
@@ -135,7 +130,7 @@ class Parabola(NamedTuple):
         return self.value + rate * u / 2, rate, self.pull
 
 
-class BallBangBang:
+class BallBangBang(BallLaw):
     """A bang-bang law. Local time is the time since the first knot, whole periods taken off."""
 
     def __init__(self, law: BangBang) -> None:

@@ -6,6 +6,8 @@ import json
 from collections.abc import Callable
 from typing import Any, NamedTuple, TypeVar
 
+import msgspec
+
 from conformance.generator.draws import Draw, wire_form
 from scene import BadInput, Cap, Mushroom, Scene, State, Stem
 
@@ -36,16 +38,19 @@ class Family(NamedTuple):
     """A kind of attack.
 
     Attributes:
-        name: of the family.
-        draw: from a stream of numbers to a question.
+        draw: from a stream of numbers to a question. Its name is the family's, and names cases for ever.
         hunts: the mistake it looks for.
         is_delicate: built so that an honest stepper may often leave it undecided.
     """
 
-    name: str
     draw: Callable[[Draw], Attack]
     hunts: str
     is_delicate: bool = False
+
+    @property
+    def name(self) -> str:
+        """Return the function's name, its words joined by hyphens."""
+        return self.draw.__name__.replace("_", "-")
 
     def attack(self, seed: int, index: int) -> Attack:
         """Draw the question that this seed and index name."""
@@ -62,10 +67,9 @@ def built(make: Callable[[], Made]) -> Made | None:
 
 def line(family: str, seed: int, index: int, attack: Attack) -> str:
     """Write an attack as one line of JSON: where it comes from, and the question in the wire's form."""
-    state = {name: getattr(attack.state, name) for name in attack.state.__struct_fields__}
     data: dict[str, Any] = {"family": family, "seed": seed, "index": index, "scene": wire_form(attack.scene)}
-    data |= {"cmd": "step" if attack.n_collisions is None else "trajectory", "state": state}
-    data |= {"t_end": attack.t_end}
+    data |= {"cmd": "step" if attack.n_collisions is None else "trajectory"}
+    data |= {"state": msgspec.structs.asdict(attack.state), "t_end": attack.t_end}
     if attack.n_collisions is not None:
         data |= {"collisions": attack.n_collisions, "working": attack.working}
     return json.dumps(data)

@@ -200,19 +200,10 @@ def on_the_wall(draw: Draw) -> Attack:
 
 
 FAMILIES = (
-    Family("on-the-wall", on_the_wall, "a state is on its wall by the largest size of all time"),
-    Family("corner-start", corner_start, "a named wall hides that the place lies on a second one"),
-    Family(
-        "side-at-mouth", side_at_mouth, "a side wall is met above the stem, or the mouth's edge is passed"
-    ),
-    Family(
-        "corner-arrival", corner_arrival, "an edge missed by 1e-8 to 1e-15, or not at all", is_delicate=True
-    ),
-    Family(
-        "hit-at-end",
-        hit_at_end,
-        "a hit exactly at the horizon is called before it, or after",
-        is_delicate=True,
-    ),
-    Family("near-another-wall", near_another_wall, "the second of two walls within a whisker is skipped"),
+    Family(on_the_wall, "a state is on its wall by the largest size of all time"),
+    Family(corner_start, "a named wall hides that the place lies on a second one"),
+    Family(side_at_mouth, "a side wall is met above the stem, or the mouth's edge is passed"),
+    Family(corner_arrival, "an edge missed by 1e-8 to 1e-15, or not at all", is_delicate=True),
+    Family(hit_at_end, "a hit exactly at the horizon is called before it, or after", is_delicate=True),
+    Family(near_another_wall, "the second of two walls within a whisker is skipped"),
 )

@@ -203,16 +203,10 @@ def _value(law: BangBang, t: float) -> tuple[float, float]:
 
 
 FAMILIES = (
-    Family("arc-dips", arc_dips, "the arc is looked at only where a flight ends, though it came by"),
-    Family(
-        "arc-dips-on-rebound",
-        arc_dips_on_rebound,
-        "lanes look at the arc only where a flight to the base ends",
-    ),
-    Family("rebound-dips", rebound_dips, "lanes forget the wall just left on the way to another"),
-    Family("floor-from-stem", floor_from_stem, "the floor is forgotten on a flight from the stem to the arc"),
-    Family("side-dips", side_dips, "a side is looked at only where a flight ends, though it came by"),
-    Family(
-        "met-again-across-knot", met_again_across_knot, "the time within a leg is rounded to the period's ulp"
-    ),
+    Family(arc_dips, "the arc is looked at only where a flight ends, though it came by"),
+    Family(arc_dips_on_rebound, "lanes look at the arc only where a flight to the base ends"),
+    Family(rebound_dips, "lanes forget the wall just left on the way to another"),
+    Family(floor_from_stem, "the floor is forgotten on a flight from the stem to the arc"),
+    Family(side_dips, "a side is looked at only where a flight ends, though it came by"),
+    Family(met_again_across_knot, "the time within a leg is rounded to the period's ulp"),
 )

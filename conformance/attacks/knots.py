@@ -202,11 +202,10 @@ def knots_anywhere(draw: Draw) -> Attack:
 
 FAMILIES = (
     Family(
-        "knot-at-event",
         knot_at_event,
         "one piece of a law decides, though the enclosed time of an event or a crossing touches several",
         is_delicate=True,
     ),
-    Family("hit-at-knot", hit_at_knot, "a hit exactly at a knot, or a unit beside it, before a violent leg"),
-    Family("knots-anywhere", knots_anywhere, "knots are taken to begin at 0 or at a whole period"),
+    Family(hit_at_knot, "a hit exactly at a knot, or a unit beside it, before a violent leg"),
+    Family(knots_anywhere, "knots are taken to begin at 0 or at a whole period"),
 )

@@ -90,21 +90,9 @@ def floor_residual(draw: Draw) -> Attack:
 
 FAMILIES = (
     Family(
-        "tiny-slope",
-        tiny_slope,
-        "f is asked for where f - f(0) decides, at the crossing or the horizon",
-        is_delicate=True,
+        tiny_slope, "f is asked for where f - f(0) decides, at the crossing or the horizon", is_delicate=True
     ),
-    Family(
-        "flattening-slope", flattening_slope, "f(0) = 5e-91 is forgotten at the horizon", is_delicate=True
-    ),
-    Family(
-        "arc-residual", arc_residual, "the arc's f(0) is forgotten where it is met again", is_delicate=True
-    ),
-    Family(
-        "floor-residual",
-        floor_residual,
-        "the floor's f(0) is forgotten at a corner or the horizon",
-        is_delicate=True,
-    ),
+    Family(flattening_slope, "f(0) = 5e-91 is forgotten at the horizon", is_delicate=True),
+    Family(arc_residual, "the arc's f(0) is forgotten where it is met again", is_delicate=True),
+    Family(floor_residual, "the floor's f(0) is forgotten at a corner or the horizon", is_delicate=True),
 )

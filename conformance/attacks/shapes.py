@@ -145,11 +145,11 @@ def mixed_laws(draw: Draw) -> Attack:
 
 
 FAMILIES = (
-    Family("extreme-scale", extreme_scale, "squares overflow or vanish, though every number is in range"),
-    Family("late-phase", late_phase, "the phase of a late or negative start loses digits"),
-    Family("long-wait", long_wait, "a hit after many periods of waiting is given up or skipped"),
-    Family("rest-and-sweep", rest_and_sweep, "a particle at rest is never hit, or divided by its speed"),
-    Family("narrow-base", narrow_base, "a base of 1e-9 of the cap is lost in rounding"),
-    Family("many-harmonics", many_harmonics, "bounds hold for a few harmonics, straight sides, t > 0"),
-    Family("mixed-laws", mixed_laws, "a scene of both kinds of law is taken for one kind"),
+    Family(extreme_scale, "squares overflow or vanish, though every number is in range"),
+    Family(late_phase, "the phase of a late or negative start loses digits"),
+    Family(long_wait, "a hit after many periods of waiting is given up or skipped"),
+    Family(rest_and_sweep, "a particle at rest is never hit, or divided by its speed"),
+    Family(narrow_base, "a base of 1e-9 of the cap is lost in rounding"),
+    Family(many_harmonics, "bounds hold for a few harmonics, straight sides, t > 0"),
+    Family(mixed_laws, "a scene of both kinds of law is taken for one kind"),
 )

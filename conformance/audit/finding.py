@@ -6,7 +6,7 @@ A check compares one number, or decides one statement. Its form is `claim` for w
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 if TYPE_CHECKING:
@@ -65,7 +65,7 @@ class Entry(NamedTuple):
     method: str
     tolerance: str
     expected: Verdict
-    examine: Callable[[ClaimEvidence], list[Check]]
+    examine: Callable[[ClaimEvidence], Iterable[Check]]
     runs: tuple[str, ...] = ()
 
 

@@ -31,6 +31,8 @@ Progress = Callable[[str, int, int], None]  # run, particles done, particles in 
 Arrays = dict[str, npt.NDArray[Any]]
 
 FORM = 2  # of a saved block: raised when its arrays change, so that older ones are followed anew
+ARRAYS = ("s", "t_in", "t_out", "takes_part", "phase_s", "phase_captured", "stem_hits")
+COUNTS = ("n_particles", "n_undecided", "n_undefined", "n_collisions", "n_careful")
 MAX_LOST = 1e-3  # a larger unfollowed share could hide a bias as large as the errors themselves
 
 
@@ -194,29 +196,11 @@ def reduced(ensemble: Ensemble) -> Arrays:
 
 def gathered(run: Simulation, blocks: list[Arrays]) -> Sample:
     """Join blocks into a sample."""
-
-    def joined(name: str) -> Any:
-        return np.concatenate([block[name] for block in blocks])
-
-    counts = sum((block["counts"] for block in blocks), np.zeros(5, np.int64))
+    arrays: dict[str, Any] = {name: np.concatenate([block[name] for block in blocks]) for name in ARRAYS}
+    counts = sum((block["counts"] for block in blocks), np.zeros(len(COUNTS), np.int64)).tolist()
     digest = hashlib.sha256("".join(str(block["sha256"]) for block in blocks).encode()).hexdigest()
-    return Sample(
-        run,
-        joined("s"),
-        joined("t_in"),
-        joined("t_out"),
-        joined("takes_part"),
-        joined("phase_s"),
-        joined("phase_captured"),
-        joined("stem_hits"),
-        n_particles=int(counts[0]),
-        n_undecided=int(counts[1]),
-        n_undefined=int(counts[2]),
-        n_collisions=int(counts[3]),
-        n_careful=int(counts[4]),
-        seconds=sum(float(block["seconds"]) for block in blocks),
-        sha256=digest,
-    )
+    seconds = sum(float(block["seconds"]) for block in blocks)
+    return Sample(run, **arrays, **dict(zip(COUNTS, counts, strict=True)), seconds=seconds, sha256=digest)
 
 
 def _write_block(file: BinaryIO, content: Arrays) -> None:

@@ -140,7 +140,7 @@ def examine(
     evidence = ClaimEvidence(
         samples, steppers, size=settings.size, seed=settings.seed, threads=settings.threads, predict=predict
     )
-    checks = entry.examine(evidence)
+    checks = list(entry.examine(evidence))
     verdict = verdict_of(entry, checks)
     if verdict != "refuted" and not all(samples[run].is_whole for run in entry.runs if run in samples):
         verdict = "indeterminate"

@@ -131,9 +131,7 @@ def place(draw: Draw, at: TableAt, site: str) -> tuple[float, float]:
 
 def wire_form(of: Scene) -> dict[str, Any]:
     """Return a scene as JSON has it, without its name and notes."""
-    data = {key: law for key, law in to_data(of).items() if key not in ("name", "notes")}
-    decoded: dict[str, Any] = msgspec.json.decode(msgspec.json.encode(data))  # lists for tuples
-    return decoded
+    return _through_json({key: law for key, law in to_data(of).items() if key not in ("name", "notes")})
 
 
 def unproved(table: str, **laws: Any) -> dict[str, Any]:
@@ -142,6 +140,10 @@ def unproved(table: str, **laws: Any) -> dict[str, Any]:
     for law in data.values():
         if isinstance(law, dict) and "period" in law:
             del law["omega" if law["omega"] is None else "period"]
+    return _through_json(data)
+
+
+def _through_json(data: dict[str, Any]) -> dict[str, Any]:
     decoded: dict[str, Any] = msgspec.json.decode(msgspec.json.encode(data))  # lists for tuples
     return decoded
 

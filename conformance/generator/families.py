@@ -80,11 +80,6 @@ def families() -> list[VectorFamily]:
     ]
 
 
-def _named(draw: Draw, names: tuple[str, ...]) -> tuple[str, Scene]:
-    name = draw.pick(names)
-    return name, load(name)
-
-
 def _question(
     group: str, rule: str, source: str, of: Scene, start: tuple[State, float], n: int | None = None
 ) -> Question:
@@ -119,7 +114,7 @@ def _generated_path(table: str, draw: Draw) -> Question:
 
 
 def _gallery(draw: Draw) -> Question:
-    _, of = _named(draw, ("breathing-circle", "moving-cap", "frozen-mushroom"))
+    of = load(draw.pick(("breathing-circle", "moving-cap", "frozen-mushroom")))
     at = {"site": "arc", "speed": draw.power(3, 6), "lift": draw.power(-6, -2), "patience": 400.0}
     rule = "a whispering gallery: angular momentum is kept while r moves"
     return _question("whispering-gallery", rule, "sec. 3.1; hard cases 2, 3", of, state(draw, of, at), 30)
@@ -140,7 +135,7 @@ def _slow(draw: Draw) -> Question:
 
 
 def _fast_wall(draw: Draw) -> Question:
-    _, of = _named(draw, (*MOVING, *FIXED, "breathing-circle", "fermi-ulam"))
+    of = load(draw.pick((*MOVING, *FIXED, "breathing-circle", "fermi-ulam")))
     start, t_end = state(draw, of, {"speed": draw.power(-10, 0), "patience": 2.0})
     rule = "a wall that overtakes or recedes: gate on f', not on v"
     return _question("fast-wall", rule, "hard cases 8, 11", of, (start, min(t_end, start.t + 16)))
@@ -188,7 +183,7 @@ def _regions(of: Scene) -> tuple[str, ...]:
 
 def _through_mouth(draw: Draw) -> Question:
     if draw.pick((False, True)):
-        _, of = _named(draw, (*MOVING, *FIXED))
+        of = load(draw.pick((*MOVING, *FIXED)))
     else:
         of = scene(draw, "mushroom", clock(draw))
     t = time(draw, of)
@@ -203,7 +198,7 @@ def _through_mouth(draw: Draw) -> Question:
 
 def _knots(draw: Draw) -> Question:
     if draw.pick((False, True)):
-        _, of = _named(draw, FIXED)
+        of = load(draw.pick(FIXED))
     else:
         of = scene(draw, draw.pick(("stem", "mushroom")), SharedPeriod("bang-bang", draw.pick((0.5, 1.0))))
     start, t_end = state(draw, of, {"speed": draw.power(-4, 1), "patience": 8.0})
@@ -231,8 +226,7 @@ def _horizon(draw: Draw) -> Question:
 
 
 def _scales(draw: Draw) -> Question:
-    table = draw.pick(("cap", "stem", "mushroom"))
-    of = scene(draw, table, SharedPeriod("constant", 1.0))
+    of = scene(draw, draw.pick(("cap", "stem", "mushroom")), SharedPeriod("constant", 1.0))
     start, t_end = state(draw, of, {"t": 0.0})
     k = draw.pick(range(-60, 61))
     laws = to_data(of)

@@ -12,6 +12,8 @@ from collections.abc import Callable, Sequence
 from math import hypot
 from typing import NamedTuple
 
+from msgspec.structs import replace
+
 from scene import Collision, Horizon, Outcome, Scene, State
 from scene.laws import bounds
 from scene.tables import laws
@@ -112,8 +114,7 @@ def derivative(
     at = [getattr(state, field) - nudge, getattr(state, field) + nudge]
     ends = []
     for value in at:
-        parts = {name: getattr(state, name) for name in state.__struct_fields__} | {field: value}
-        nudged = State(**parts)
+        nudged = replace(state, **{field: value})
         if nudged.t > t_end:
             return None
         answer = stepper(scene, nudged, t_end)

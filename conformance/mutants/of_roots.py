@@ -81,26 +81,27 @@ class RootInAbsoluteTime(Flight):
         return None if root is None else (self.state.t + root) - self.state.t
 
 
+def _halved(flight: Flight, wall: Wall, a: float, b: float, width: float = 0.0, gap: float = -1.0) -> float:
+    """Halve the bracket of a root until it is no wider than `width`, or |f| no larger than `gap`."""
+    middle = (a + b) / 2
+    while b - a > width and a < middle < b and abs(f := flight.f(wall, middle)[0]) > gap:
+        a, b = (middle, b) if f > 0 else (a, middle)
+        middle = (a + b) / 2
+    return middle
+
+
 class RootToSixDigits(Flight):
     """Stops halving the bracket at a width of 1e-6."""
 
     def root_between(self, wall: Wall, a: float, b: float) -> float:
-        middle = (a + b) / 2
-        while b - a > 1e-6 and a < middle < b:
-            a, b = (middle, b) if self.f(wall, middle)[0] > 0 else (a, middle)
-            middle = (a + b) / 2
-        return middle
+        return _halved(self, wall, a, b, width=1e-6)
 
 
 class RootWhereGapIsSmall(Flight):
     """Accepts as a hit where f is below 1e-7."""
 
     def root_between(self, wall: Wall, a: float, b: float) -> float:
-        middle = (a + b) / 2
-        while a < middle < b and abs(f := self.f(wall, middle)[0]) > 1e-7:
-            a, b = (middle, b) if f > 0 else (a, middle)
-            middle = (a + b) / 2
-        return middle
+        return _halved(self, wall, a, b, gap=1e-7)
 
 
 class OneNewtonStep(Flight):

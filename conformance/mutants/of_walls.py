@@ -146,25 +146,21 @@ class LeftSideUpright(Flight):
         return Gap(w.value + self.x, w.rise + self.vx * s, w.rate, 1.0, 0.0)
 
 
-def _freeze(flight: Flight, name: str) -> None:
-    if name in flight.laws:
-        flight.laws[name] = ConstantMotion(flight.laws[name].value, 0.0)
-
-
 class ArcStatic(Flight):
     """Lets the arc stand still during a flight."""
 
+    still = "r"
+
     def __init__(self, scene: Scene, state: State, t_end: float) -> None:
         super().__init__(scene, state, t_end)
-        _freeze(self, "r")
+        if self.still in self.laws:
+            self.laws[self.still] = ConstantMotion(self.laws[self.still].value, 0.0)
 
 
-class FloorStatic(Flight):
+class FloorStatic(ArcStatic):
     """Lets the floor stand still during a flight."""
 
-    def __init__(self, scene: Scene, state: State, t_end: float) -> None:
-        super().__init__(scene, state, t_end)
-        _freeze(self, "h")
+    still = "h"
 
 
 class HoleStatic(Flight):

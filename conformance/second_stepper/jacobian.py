@@ -67,13 +67,6 @@ def jacobian(flight: BallFlight, wall: Wall, s: Ball) -> tuple[tuple[Any, ...], 
         dsize = 2 * (p.fx * dfx + p.fy * dfy)
         push = 2 * rate / size
         dpush = 2 * drate / size - push * dsize / size
-        columns.append(
-            (
-                ds,
-                mx,
-                arb(0) if wall == "base" else my,
-                dvx - dpush * p.fx - push * dfx,
-                dvy - dpush * p.fy - push * dfy,
-            )
-        )
+        dvx, dvy = dvx - dpush * p.fx - push * dfx, dvy - dpush * p.fy - push * dfy
+        columns.append((ds, mx, arb(0) if wall == "base" else my, dvx, dvy))
     return tuple(zip(*columns, strict=True))

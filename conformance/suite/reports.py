@@ -17,6 +17,7 @@ import msgspec
 from conformance.suite.run import VERDICTS, Result, Run, Speed
 from scene.protocol.messages import Introduction
 
+TAGS = {"failures": "failure", "errors": "error", "skipped": "skipped"}  # of JUnit, by what counts them
 # What XML 1.0 cannot hold, even escaped.
 _UNPRINTABLE = re.compile("[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 
@@ -77,23 +78,18 @@ def summarise(run: Run, group: str | None = None) -> Group:
 def new_report(run: Run) -> Report:
     """Return the report of a run; answers are kept where they did not pass."""
     kept = [r if r.verdict != "pass" else msgspec.structs.replace(r, answer=None) for r in run.results]
+    same = ("command", "level", "corpus", "digest", "seconds", "speed", "stderr")
     return Report(
         report=1,
-        command=run.command,
+        **{name: getattr(run, name) for name in same},
         implementation=run.introduction,
-        level=run.level,
-        corpus=run.corpus,
-        digest=run.digest,
         timeout_s=run.limits.timeout,
         restarts_allowed=run.limits.restarts,
         restarts=run.n_restarts,
-        seconds=run.seconds,
         exit_code=run.exit_code(),
         objections=run.objections(),
         total=summarise(run),
         groups=[summarise(run, group) for group in run.groups()],
-        speed=run.speed,
-        stderr=run.stderr,
         results=kept,
     )
 
@@ -113,17 +109,12 @@ def to_junit(run: Run) -> bytes:
     """Return the JUnit XML report: a suite for each group, a case for each vector."""
     name = run.introduction.name if run.introduction else run.command[0]
     root = ElementTree.Element("testsuites", name=_printable(f"mushrooms check {name}"))
-    totals = {"tests": 0, "failures": 0, "errors": 0, "skipped": 0}
+    totals = dict.fromkeys(("tests", *TAGS), 0)
     for group in run.groups():
         results = [result for result in run.results if result.group == group]
         suite = ElementTree.SubElement(root, "testsuite", name=group)
         tags = [_add_case(suite, result) for result in results]
-        counted = {
-            "tests": len(tags),
-            "failures": tags.count("failure"),
-            "errors": tags.count("error"),
-            "skipped": tags.count("skipped"),
-        }
+        counted = {"tests": len(tags), **{name: tags.count(tag) for name, tag in TAGS.items()}}
         totals = {key: totals[key] + counted[key] for key in totals}
         seconds = sum(result.seconds for result in results)
         suite.attrib |= {key: str(value) for key, value in counted.items()} | {"time": f"{seconds:.3f}"}

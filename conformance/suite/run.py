@@ -13,6 +13,7 @@ import math
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 from pathlib import Path
 from statistics import median
 from typing import Any
@@ -231,15 +232,11 @@ def _converse(
 ) -> tuple[list[Result], Speed | None]:
     results: list[Result] = []
     for name, act in (("start", session.start), ("echo", session.probe)):
-        begin = time.monotonic()
-        try:
-            act()
-        except Trouble as trouble:
-            results.append(_troubled(f"protocol/{name}", "protocol", trouble, begin))
-            unreached = Trouble(trouble.verdict, f"not asked: {name} failed")
+        results.append(_tried(name, act))
+        if results[-1].verdict != "pass":
+            unreached = Trouble(results[-1].verdict, f"not asked: {name} failed")
             return [*results, *(_result(vector, unreached) for vector in chosen)], None
-        results.append(Result(f"protocol/{name}", "protocol", "pass", seconds=time.monotonic() - begin))
-    results.append(_ask_nonsense(session))
+    results.append(_tried("rejects", partial(_ask_nonsense, session)))
     total = len(results) + len(chosen) + len(OTHER_CASES) - len(PROTOCOL_CASES)
     for result in itertools.chain(
         (ask_vector(session, vector) for vector in chosen), _ask_further(session, chosen)
@@ -247,13 +244,17 @@ def _converse(
         results.append(result)
         progress(len(results), total)
     speed = measure_speed(session)
-    begin = time.monotonic()
+    return [*results, _tried("stop", session.stop)], speed
+
+
+def _tried(name: str, act: Callable[[], object]) -> Result:
+    """Return a case of the protocol: what it raises is its verdict."""
+    begin, verdict, why = time.monotonic(), "pass", ""
     try:
-        session.stop()
-        results.append(Result("protocol/stop", "protocol", "pass", seconds=time.monotonic() - begin))
+        act()
     except Trouble as trouble:
-        results.append(_troubled("protocol/stop", "protocol", trouble, begin))
-    return results, speed
+        verdict, why = trouble.verdict, trouble.why
+    return Result(f"protocol/{name}", "protocol", verdict, why, time.monotonic() - begin)
 
 
 def put(session: Session, vector: Vector) -> dict[str, Any]:
@@ -310,20 +311,12 @@ def measure_speed(session: Session) -> Speed | None:
     return Speed(TIMED_SCENE, n_collisions, len(ns), min(ns) / n_collisions, median(ns) / n_collisions)
 
 
-def _ask_nonsense(session: Session) -> Result:
+def _ask_nonsense(session: Session) -> None:
     """A state without `vy` must be rejected, not guessed, and the process must live on."""
-    begin = time.monotonic()
     state = {name: value for name, value in TIMED_STATE.items() if name != "vy"}
-    try:
-        answer = session.ask(
-            {"cmd": "step", "scene": {"table": "cap", "r": 1.0}, "state": state, "t_end": 1.0}
-        )
-    except Trouble as trouble:
-        return _troubled("protocol/rejects", "protocol", trouble, begin)
-    is_rejected = answer.get("outcome") == "rejected"
-    why = "" if is_rejected else f"a state without vy was answered {answer}"[:200]
-    seconds = time.monotonic() - begin
-    return Result("protocol/rejects", "protocol", "pass" if is_rejected else "fail", why, seconds)
+    answer = session.ask({"cmd": "step", "scene": {"table": "cap", "r": 1.0}, "state": state, "t_end": 1.0})
+    if answer.get("outcome") != "rejected":
+        raise Trouble("fail", f"a state without vy was answered {answer}"[:200])
 
 
 def _ask_further(session: Session, chosen: Sequence[Vector]) -> Iterator[Result]:
@@ -335,7 +328,3 @@ def _ask_further(session: Session, chosen: Sequence[Vector]) -> Iterator[Result]
 
 def _result(vector: Vector, trouble: Trouble, seconds: float = 0.0) -> Result:
     return Result(vector.id, vector.group, trouble.verdict, trouble.why, seconds, vector.level)
-
-
-def _troubled(name: str, group: str, trouble: Trouble, begin: float) -> Result:
-    return Result(name, group, trouble.verdict, trouble.why, time.monotonic() - begin)

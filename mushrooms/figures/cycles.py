@@ -60,6 +60,14 @@ def _loop(axes: Axes, x: FloatArray, y: FloatArray) -> None:
             axes.annotate("", end, start, arrowprops={"arrowstyle": "-|>", "color": BLACK, "linewidth": 0})
 
 
+def _bars(axes: Axes, values: FloatArray, edges: FloatArray, n: int, **style: Any) -> FloatArray:
+    """Draw a histogram of n particles' values as a density, and return its heights."""
+    heights: FloatArray = np.histogram(values, edges)[0] / (n * np.diff(edges))
+    usual: dict[str, Any] = {"fill": True, "color": SKY, "label": "simulation"}
+    axes.stairs(heights, edges, **usual | style)
+    return heights
+
+
 def gain_of_capture() -> Figure:
     """Draw log E1/E0 against the time of capture, theory (the paper's figure beside its loop)."""
     figure, axes = new_figure(5.2, 3.2)
@@ -90,8 +98,7 @@ def _energies(axes: Axes, sample: Sample) -> None:
     sigma, centre, p_nc = width(sample).value, float(prediction.log_e_nc), float(prediction.p_nc)
     low, high = (float(np.quantile(sample.gain, q)) for q in (0.0005, 0.9995))
     edges = np.linspace(low - sigma, high + sigma, N_BINS + 1)
-    counts = np.histogram(sample.gain, edges)[0] / (sample.n * np.diff(edges))
-    axes.stairs(counts, edges, fill=True, color=SKY, label="simulation")
+    heights = _bars(axes, sample.gain, edges, sample.n)
     x = np.linspace(edges[0], edges[-1], 1500)
     below = broadened.captured(sample)[0]
     total = (1 - p_nc) * np.gradient(below(x), x) + p_nc * norm.pdf(x, centre + sigma**2 / 4, sigma)
@@ -101,7 +108,7 @@ def _energies(axes: Axes, sample: Sample) -> None:
     axes.axvline(centre, color=ORANGE, linestyle="--", linewidth=1.2, label="theory, never captured")
     axes.set(
         xlim=(edges[0], edges[-1]),
-        ylim=(0, 1.15 * max(counts.max(), total.max())),
+        ylim=(0, 1.15 * max(heights.max(), total.max())),
         xlabel="log E1/E0",
         ylabel="density",
         title=f"{sample.run.scene}, E0 = {sample.run.energy:.0e}, {sample.n:,} particles",
@@ -115,9 +122,8 @@ def capture_times(samples: list[Sample]) -> Figure:
         scene = scene_of(sample.run)
         curve = theory.capture_curve(scene, 3)
         edges = np.linspace(curve.t_in[0], curve.t_in[-1], 51)
-        counts = np.histogram(sample.first_stay[0], edges)[0] / sample.n / np.diff(edges)
         mass = np.asarray(theory.capture_time_mass(scene, edges)) / np.diff(edges)
-        panel.stairs(counts, edges, fill=True, color=SKY, label="simulation")
+        _bars(panel, sample.first_stay[0], edges, sample.n)
         panel.stairs(mass, edges, color=ORANGE, linewidth=1.5, label="theory, eq. (ps)", baseline=None)
         panel.set(xlabel="time of capture", ylabel="density", title=sample.run.name, ylim=(0, None))
     np.atleast_1d(axes)[0].legend(loc="upper left", fontsize=7)
@@ -144,8 +150,7 @@ def _sum(axes: Axes, sample: Sample, n: int, scale: str) -> None:
     sd = float(np.hypot(np.sqrt(k[2] * n), noise)) / n
     centre = k[1] + bias / n
     edges = np.linspace(centre - 5 * sd, centre + 5 * sd, 51)
-    counts = np.histogram(total, edges)[0] / (sample.n * np.diff(edges))
-    axes.stairs(counts, edges, fill=True, color=SKY, label="simulation", baseline=1e-9)
+    _bars(axes, total, edges, sample.n, baseline=1e-9)
     axes.plot(x, density, color=BLACK, linewidth=1.3, label="convolution of n cycles")
     axes.plot(x, norm.pdf(x, centre, sd), color=ORANGE, linestyle="--", linewidth=1.2, label="Gaussian")
     top = float(norm.pdf(0) / sd)
@@ -164,16 +169,10 @@ def ergodic(sample: Sample) -> Figure:
     figure, axes = new_figure(5.2, 3.2)
     sigma, found = spread(sample.gain).value, mean(sample.gain)
     edges = np.linspace(-4.5 * sigma, 4.5 * sigma, 61)
-    counts = np.histogram(sample.gain, edges)[0] / (sample.n * np.diff(edges))
-    axes.stairs(counts, edges, fill=True, color=SKY, label=f"simulation, {sample.n:,} particles")
+    _bars(axes, sample.gain, edges, sample.n, label=f"simulation, {sample.n:,} particles")
     x = np.linspace(edges[0], edges[-1], 400)
-    axes.plot(
-        x,
-        norm.pdf(x, sigma**2 / 4, sigma),
-        color=BLACK,
-        linewidth=1.3,
-        label=f"Gaussian, sd {sigma:.4f}, mean sd²/4 = {sigma**2 / 4:.1e}",
-    )
+    label = f"Gaussian, sd {sigma:.4f}, mean sd²/4 = {sigma**2 / 4:.1e}"
+    axes.plot(x, norm.pdf(x, sigma**2 / 4, sigma), color=BLACK, linewidth=1.3, label=label)
     axes.set(
         xlabel="log E1/E0",
         ylabel="density",
@@ -189,23 +188,16 @@ def stems(tilted: Sample, upright: Sample) -> Figure:
     figure, axes = new_figure(9.6, 3.4, 1, 2)
     edges = np.linspace(-0.4, 0.8, 121)
     styles: tuple[tuple[Sample, dict[str, Any]], ...] = (
-        (tilted, {"color": SKY, "fill": True, "label": "tilted stem"}),
-        (upright, {"color": BLUE, "linewidth": 1.5, "label": "upright stem"}),
+        (tilted, {"label": "tilted stem"}),
+        (upright, {"color": BLUE, "fill": False, "linewidth": 1.5, "label": "upright stem"}),
     )
     for panel, scale in zip(axes, ("linear", "log"), strict=True):
         for sample, style in styles:
             kept = sample.gain[~sample.captured] - float(theory.predict(scene_of(sample.run), 15).log_e_nc)
-            counts = np.histogram(kept, edges)[0] / (len(kept) * np.diff(edges))
-            panel.stairs(counts, edges, baseline=1e-3 if scale == "log" else 0, **style)
-        x = np.linspace(-0.4, 0.8, 600)
-        sigma = width(tilted).value
-        panel.plot(
-            x,
-            norm.pdf(x, sigma**2 / 4, sigma),
-            color=GREEN,
-            linewidth=1.2,
-            label="Gaussian, tilted stem's width",
-        )
+            _bars(panel, kept, edges, len(kept), baseline=1e-3 if scale == "log" else 0, **style)
+        x, sigma = np.linspace(-0.4, 0.8, 600), width(tilted).value
+        gaussian = norm.pdf(x, sigma**2 / 4, sigma)
+        panel.plot(x, gaussian, color=GREEN, linewidth=1.2, label="Gaussian, tilted stem's width")
         panel.set(xlabel="log E1/E0 of the never captured, from theory's", ylabel="density", yscale=scale)
     axes[1].set(ylim=(1e-3, 10))
     axes[0].legend()

@@ -31,9 +31,8 @@ def zone(samples: list[Sample]) -> Figure:
         times, means, _ = zone_energy(sample)
         span = times[0] / sample.run.phases[0]
         fine = np.linspace(0, span, 400)
-        curve, start = theory.chaotic_zone(scene_of(sample.run), fine), 0.0
-        start = curve.log_energy[0]
-        left.plot(fine / span, curve.log_energy - start, color=ORANGE, label="theory, eq. (dE)")
+        curve = theory.chaotic_zone(scene_of(sample.run), fine)
+        left.plot(fine / span, curve.log_energy - curve.log_energy[0], color=ORANGE, label="theory, eq. (dE)")
         _points(left, sample.run.phases, means)
         left.set(xlabel="t / T", ylabel="mean log E/E0, not captured so far", title=sample.run.name)
         right.plot(fine / span, curve.p_cha, color=ORANGE, label="theory, eq. (ps)")
@@ -48,13 +47,8 @@ def zone(samples: list[Sample]) -> Figure:
 
 def _points(axes: Axes, x: tuple[float, ...] | list[float], values: list[Mean], **style: Any) -> None:
     found, errors = zip(*values, strict=True)
-    usual: dict[str, Any] = {
-        "fmt": "o",
-        "color": BLUE,
-        "markersize": 4,
-        "label": "simulation, ± 1 standard error",
-    }
-    axes.errorbar(x, found, errors, capsize=2, **usual | style)
+    usual: dict[str, Any] = {"fmt": "o", "markersize": 4, "label": "simulation, ± 1 standard error"}
+    axes.errorbar(x, found, errors, capsize=2, **usual | {"color": BLUE} | style)
 
 
 def widths(moving: list[Sample], ergodic: list[Sample]) -> Figure:
@@ -79,15 +73,11 @@ def convergence(samples: list[Sample]) -> Figure:
     figure, axes = new_figure(9.6, 3.2, 1, 3)
     energies = [sample.run.energy for sample in samples]
     scene = load("moving-cap")
-    prediction = theory.predict(scene, 15)
+    prediction, unbiased = theory.predict(scene, 15), theory.unbiased_mean(scene)
     rows: tuple[tuple[str, list[Mean], float], ...] = (
         ("mean of log E1/E0", [mean(s.gain) for s in samples], float(prediction.m1)),
         ("share never captured", [share(s.never_captured) for s in samples], float(prediction.p_nc)),
-        (
-            "mean of exp(-s/2)",
-            [mean(np.exp(-s.gain / 2)) for s in samples],
-            float(theory.unbiased_mean(scene)),
-        ),
+        ("mean of exp(-s/2)", [mean(np.exp(-s.gain / 2)) for s in samples], float(unbiased)),
     )
     for panel, (label, values, truth) in zip(axes, rows, strict=True):
         _points(panel, energies, values)
@@ -95,13 +85,8 @@ def convergence(samples: list[Sample]) -> Figure:
         panel.set(xscale="log", xlabel="E0", title=label)
     fit = theory.extrapolate(energies, [v.value for v in rows[0][1]], [v.error for v in rows[0][1]])
     x = np.geomspace(energies[0], energies[-1], 200)
-    axes[0].plot(
-        x,
-        fit.limit + fit.slope * x**-0.5,
-        color=BLACK,
-        linewidth=1,
-        label=f"{fit.limit:.4f} + {fit.slope:.2f} E0^(-1/2)",
-    )
+    label = f"{fit.limit:.4f} + {fit.slope:.2f} E0^(-1/2)"
+    axes[0].plot(x, fit.limit + fit.slope * x**-0.5, color=BLACK, linewidth=1, label=label)
     axes[0].legend(fontsize=8)
     return figure
 
@@ -111,25 +96,15 @@ def release(samples: list[Sample]) -> Figure:
     figure, axes = new_figure(9.6, 3.4, 1, 2)
     for sample in samples:
         gap = nu_gap(sample)
-        axes[0].plot(
-            np.full(min(len(gap), 400), 1 / sample.speed),
-            np.abs(gap[:400]),
-            ".",
-            color=GREY,
-            markersize=1.5,
-            rasterized=True,
-        )
+        shown = np.abs(gap[:400])
+        place = np.full(len(shown), 1 / sample.speed)
+        axes[0].plot(place, shown, ".", color=GREY, markersize=1.5, rasterized=True)
     x = np.array([1 / sample.speed for sample in samples])
     rms = np.array([math.sqrt(np.mean(nu_gap(sample) ** 2)) for sample in samples])
     axes[0].plot(x, rms, "o", color=BLUE, label="root mean square")
     axes[0].plot(x, rms[0] * x / x[0], color=ORANGE, label="slope 1")
-    axes[0].set(
-        xscale="log",
-        yscale="log",
-        xlabel="1/v",
-        ylabel="|nu(t_out) - nu(t_in)|",
-        ylim=(rms.min() / 100, rms.max() * 100),
-    )
+    axes[0].set(xscale="log", yscale="log", ylim=(rms.min() / 100, rms.max() * 100))
+    axes[0].set(xlabel="1/v", ylabel="|nu(t_out) - nu(t_in)|")
     axes[0].legend()
     sample = samples[-1]
     gap = nu_gap(sample) * sample.speed

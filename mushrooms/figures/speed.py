@@ -76,14 +76,8 @@ def _panel(axes: Any, points: list[Point], floor: int) -> None:
     if front:
         digits_of, times = zip(*front, strict=True)
         # To be right to so many digits, so much time is needed.
-        axes.step(
-            [LEAST_DIGITS, *digits_of],
-            [times[0], *times],
-            where="pre",
-            color=plots.BLACK,
-            linewidth=0.8,
-            zorder=0,
-        )
+        x, y = [LEAST_DIGITS, *digits_of], [times[0], *times]
+        axes.step(x, y, where="pre", color=plots.BLACK, linewidth=0.8, zorder=0)
 
 
 def _mark(axes: Any, p: Point) -> None:
@@ -149,15 +143,8 @@ def pareto(points: list[Point]) -> list[tuple[float, float]]:
 
 def short_name(contender: str) -> str:
     """Return a contender's label."""
-    for long, short in (
-        ("proof, ", ""),
-        (" digits", ""),
-        ("fast, ", ""),
-        ("solve_ivp, rtol ", "rtol "),
-        ("example in ", ""),
-        ("command ", ""),
-    ):
-        contender = contender.replace(long, short)
+    for part in ("proof, ", " digits", "fast, ", "solve_ivp, ", "example in ", "command "):
+        contender = contender.replace(part, "")
     contender = contender.replace("$", r"\$")  # no formula
     return contender if len(contender) < 18 else contender[:17] + "…"
 
@@ -165,22 +152,15 @@ def short_name(contender: str) -> str:
 def _legend(record: Record) -> list[Line2D]:
     families = [f for f in COLOURS if any(p.family == f for p in record.points)]
     handles = [Line2D([], [], color=COLOURS[f], marker="o", markersize=4.5, label=WORDS[f]) for f in families]
+    none: dict[str, Any] = {"linestyle": "none"}
+    thin: dict[str, Any] = {"color": plots.BLACK, "linewidth": 0.8}
     return [
         *handles,
-        Line2D([], [], marker="o", markersize=4.5, label="median", linestyle="none", color=plots.BLACK),
-        Line2D([], [], marker="<", markersize=4.5, label="worst", linestyle="none", color=plots.BLACK),
-        Line2D([], [], marker="x", color=RED, linestyle="none", label="some walls wrong"),
-        Line2D(
-            [], [], color=plots.BLACK, linewidth=0.8, label="front: least time for so many digits, at worst"
-        ),
-        Line2D(
-            [],
-            [],
-            color=plots.BLACK,
-            linewidth=0.8,
-            linestyle=":",
-            label="binary64; shaded: beyond the proofs",
-        ),
+        Line2D([], [], marker="o", markersize=4.5, label="median", color=plots.BLACK, **none),
+        Line2D([], [], marker="<", markersize=4.5, label="worst", color=plots.BLACK, **none),
+        Line2D([], [], marker="x", color=RED, label="some walls wrong", **none),
+        Line2D([], [], label="front: least time for so many digits, at worst", **thin),
+        Line2D([], [], label="binary64; shaded: beyond the proofs", linestyle=":", **thin),
     ]
 
 
@@ -193,18 +173,11 @@ def growth(found: Growth) -> bytes:
     for (name, errors), colour in zip(found.followers.items(), colours, strict=False):
         shown = np.where(np.array(errors) > 0, errors, np.nan)
         axes.plot(count, shown, color=colour, marker=".", markersize=4, linewidth=1, label=name)
-    axes.plot(
-        count, found.bound, color=plots.BLACK, linestyle="--", linewidth=1, label="one ulp a step, grown"
-    )
-    middle = found.collisions // 3
-    guide = 10.0 ** (found.rate * (count[: 2 * middle] - 1) - 32)
-    axes.plot(
-        count[: 2 * middle],
-        guide,
-        color=plots.GREY,
-        linestyle=":",
-        label=f"Lyapunov slope: {found.rate:.2f} decimals a collision",
-    )
+    label = "one ulp a step, grown"
+    axes.plot(count, found.bound, color=plots.BLACK, linestyle="--", linewidth=1, label=label)
+    early = count[: 2 * (found.collisions // 3)]
+    label = f"Lyapunov slope: {found.rate:.2f} decimals a collision"
+    axes.plot(early, 10.0 ** (found.rate * (early - 1) - 32), color=plots.GREY, linestyle=":", label=label)
     axes.set(yscale="log", xlabel="collisions", ylabel="error, relative to table and speed", ylim=(1e-60, 10))
     axes.legend(loc="lower right")
     return plots.svg(figure)

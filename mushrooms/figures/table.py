@@ -49,13 +49,8 @@ def chords(scene: Scene, t: float, n: int = N_CHORDS) -> np.ndarray:
     top, bottom = points[1].max(), points[1].min()
     speed = 1e6 * points[0].max()
     direction = 0.61  # radians: off every symmetry
-    state = State(
-        t,
-        0.0,
-        float(0.37 * (top or bottom)),
-        float(speed * np.cos(direction)),
-        float(speed * np.sin(direction)),
-    )
+    vx, vy = float(speed * np.cos(direction)), float(speed * np.sin(direction))
+    state = State(t, 0.0, float(0.37 * (top or bottom)), vx, vy)
     path = [(state.x, state.y)]
     for _ in range(n):
         outcome = fast.next_collision(scene, state, t + 1.0)

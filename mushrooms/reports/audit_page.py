@@ -8,7 +8,7 @@ from __future__ import annotations
 import json
 import os
 import platform
-from typing import Any, TypedDict
+from typing import Any, TypedDict, cast
 
 import msgspec
 import numba
@@ -163,17 +163,8 @@ def _finding(entry: Entry, finding: Finding) -> FindingData:
 
 
 def _check(check: Check) -> CheckData:
-    return {
-        "what": check.what,
-        "holds": check.holds,
-        "expected": check.expected,
-        "value": _number(check.value),
-        "error": _number(check.error),
-        "band": _number(check.band),
-        "form": check.form,
-        "n_tests": check.n_tests,
-        "note": check.note,
-    }
+    numbers = {name: _number(getattr(check, name)) for name in ("value", "error", "band")}
+    return cast(CheckData, check._asdict() | numbers)
 
 
 def _run(sample: Sample) -> RunData:

@@ -10,12 +10,12 @@ class's name without the suffix.
 from __future__ import annotations
 
 import json
-from typing import Annotated, Any
+from typing import Annotated, Any, get_args
 
 import msgspec
 
 from scene.load import state_omega_or_period
-from scene.states import Collision, Horizon, Outcome, Rejected, State, Undecided, Undefined
+from scene.states import Outcome, Rejected, State, Undecided, Undefined
 from scene.tables import Scene
 
 PROTOCOL = 1
@@ -148,16 +148,7 @@ class Failed(msgspec.Struct, frozen=True):
 
 def json_schema() -> dict[str, Any]:
     """Return the JSON Schema of one line of protocol 1, published as docs/protocol.schema.json."""
-    requests = (
-        StartRequest,
-        EchoRequest,
-        StepRequest,
-        TrajectoryRequest,
-        FlowRequest,
-        TimeRequest,
-        StopRequest,
-    )
-    outcomes = (Collision, Horizon, Undefined, Undecided, Rejected)
+    requests, outcomes = get_args(Command), get_args(Outcome)
     answers = (Introduction, Echoed, Steps, Flown, Timed, Failed)
     _, definitions = msgspec.json.schema_components(
         [*requests, *outcomes, *answers, Scene], ref_template="#/$defs/{name}"

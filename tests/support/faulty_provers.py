@@ -53,6 +53,15 @@ def never_met(attack: Attack) -> Claim:
     return Claim([exact(None, (dt, x + vx * dt, y + vy * dt, vx, vy))])
 
 
+def replacing(owner: object, name: str) -> Callable[[Callable[..., Any]], Patch]:
+    """Turn a function into the mistake of using it for an honest one."""
+    return lambda function: lambda monkeypatch: monkeypatch.setattr(owner, name, function)
+
+
+touched, jet = BallBangBang.touched, SearchedFlight.jet
+first, first_root, judged = Search._first, roots.first_root, roots._judged
+
+
 @contextmanager
 def patched(patch: Patch) -> Iterator[None]:
     """Make the mistake, and mend it afterwards."""
@@ -86,10 +95,10 @@ def one_piece(attack: Attack) -> Claim:
         return claim(path)
 
 
-def knots_unseen(monkeypatch: pytest.MonkeyPatch) -> None:
+@replacing(BallBangBang, "touched")
+def knots_unseen(self: BallBangBang, local: Any) -> Any:
     """The piece that holds where an interval begins is taken to hold on all of it."""
-    touched = BallBangBang.touched
-    monkeypatch.setattr(BallBangBang, "touched", lambda self, local: touched(self, local)[:1])
+    return touched(self, local)[:1]
 
 
 def period_from_zero(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -108,27 +117,20 @@ def _spoil(monkeypatch: pytest.MonkeyPatch, kind: type, change: Callable[[Any], 
     monkeypatch.setattr(kind, "__init__", init)
 
 
-def residual_forgotten(monkeypatch: pytest.MonkeyPatch) -> None:
+@replacing(SearchedFlight, "jet")
+def residual_forgotten(self: SearchedFlight, wall: Any, s: Any, within: Any = None) -> Any:
     """Ties are judged by f, not by f - f(0), and so is all that is far from the start."""
-    jet = SearchedFlight.jet
-
-    def unmoved(self: SearchedFlight, wall: Any, s: Any, within: Any = None) -> Any:
-        found = jet(self, wall, s, within)
-        is_late = wall in self.residuals and (isinstance(s, fmpq) or s > 2.0**-20)
-        return (found[0] + self.residuals[wall], *found[1:]) if is_late else found
-
-    monkeypatch.setattr(SearchedFlight, "jet", unmoved)
+    found = jet(self, wall, s, within)
+    is_late = wall in self.residuals and (isinstance(s, fmpq) or s > 2.0**-20)
+    return (found[0] + self.residuals[wall], *found[1:]) if is_late else found
 
 
-def size_of_all_time(monkeypatch: pytest.MonkeyPatch) -> None:
+@replacing(start, "_is_near")
+def size_of_all_time(at: SearchedFlight, wall: Any) -> bool:
     """A state is on the wall it names by the largest size of all time."""
-
-    def is_near(at: SearchedFlight, wall: Any) -> bool:
-        largest = max(arb(law.range()[1]).abs_upper() for law in at.table.laws.values())
-        gap = at.jet(wall, arb(0))[0]
-        return bool(abs(gap) < largest * (2 * largest if wall == "arc" else 1) * ON_WALL)
-
-    monkeypatch.setattr(start, "_is_near", is_near)
+    largest = max(arb(law.range()[1]).abs_upper() for law in at.table.laws.values())
+    gap = at.jet(wall, arb(0))[0]
+    return bool(abs(gap) < largest * (2 * largest if wall == "arc" else 1) * ON_WALL)
 
 
 def corner_unseen(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -145,6 +147,12 @@ def corner_unseen(monkeypatch: pytest.MonkeyPatch) -> None:
     )
 
 
+@replacing(Search, "_at_limit")
+def hit_at_end_counts(self: Search, walls: Any, limit: Any) -> Met:
+    """A wall that is met exactly at the horizon is met before it."""
+    return Met(walls[0], arb(limit))
+
+
 def tie_guessed(monkeypatch: pytest.MonkeyPatch) -> None:
     """Of two walls met together the first is answered; at the mouth's edge the mouth is shut."""
     monkeypatch.setattr(Search, "_tied", lambda self, found: Met(found[0].wall, found[0].time()))
@@ -152,33 +160,20 @@ def tie_guessed(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(
         Search, "_is_mouth_open", lambda self, limit: not self.flight.jet("left", arb(limit))[0] < 0
     )
-    monkeypatch.setattr(Search, "_at_limit", lambda self, walls, limit: Met(walls[0], arb(limit)))
+    hit_at_end_counts(monkeypatch)
 
 
-def hit_at_end_counts(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A wall that is met exactly at the horizon is met before it."""
-    monkeypatch.setattr(Search, "_at_limit", lambda self, walls, limit: Met(walls[0], arb(limit)))
-
-
-def blind_start(monkeypatch: pytest.MonkeyPatch) -> None:
+@replacing(stepper, "first_root")
+def blind_start(at: SearchedFlight, wall: Any, a: Any, b: Any) -> Any:
     """No wall is met in the first 1e-3 of a flight."""
-    search = roots.first_root
-
-    def late(at: SearchedFlight, wall: Any, a: Any, b: Any) -> Any:
-        begin = b / 1024 if a == 0 else a
-        return search(at, wall, begin, b) if at.jet(wall, arb(begin))[0] > 0 else None
-
-    monkeypatch.setattr(stepper, "first_root", late)
+    begin = b / 1024 if a == 0 else a
+    return first_root(at, wall, begin, b) if at.jet(wall, arb(begin))[0] > 0 else None
 
 
-def ends_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+@replacing(stepper, "first_root")
+def ends_alone(at: SearchedFlight, wall: Any, a: Any, b: Any) -> Any:
     """A wall is met only if f is below 0 at the end of the search."""
-    search = roots.first_root
-
-    def at_end(at: SearchedFlight, wall: Any, a: Any, b: Any) -> Any:
-        return None if at.jet(wall, arb(b))[0] > 0 else search(at, wall, a, b)
-
-    monkeypatch.setattr(stepper, "first_root", at_end)
+    return None if at.jet(wall, arb(b))[0] > 0 else first_root(at, wall, a, b)
 
 
 def rounded_rates(scene: Scene, state: State, t_end: float) -> Outcome:
@@ -218,14 +213,11 @@ def rounded_omega(monkeypatch: pytest.MonkeyPatch) -> None:
     _spoil(monkeypatch, BallFourier, round_omega)
 
 
-def narrow_mouth(monkeypatch: pytest.MonkeyPatch) -> None:
+@replacing(Search, "_is_mouth_open")
+def narrow_mouth(self: Search, limit: Any) -> bool:
     """The mouth is taken to be narrower by 1e-3 of itself."""
-
-    def is_open(self: Search, limit: Any) -> bool:
-        rim = self.flight.width(arb(limit))[0] / 1000
-        return all(self.flight.jet(wall, arb(limit))[0] > rim for wall in ("left", "right"))
-
-    monkeypatch.setattr(Search, "_is_mouth_open", is_open)
+    rim = self.flight.width(arb(limit))[0] / 1000
+    return all(self.flight.jet(wall, arb(limit))[0] > rim for wall in ("left", "right"))
 
 
 def overflowing(attack: Attack) -> Claim:
@@ -248,35 +240,23 @@ def resting(attack: Attack) -> Claim:
     return never_met(attack) if is_at_rest else claim(truths(attack))
 
 
-def still_wall(monkeypatch: pytest.MonkeyPatch) -> None:
+@replacing(SearchedFlight, "reflected")
+def still_wall(at: BallFlight, wall: Any, s: Any) -> Any:
     """A bounce forgets that the wall moves."""
-
-    def still(at: BallFlight, wall: Any, s: Any) -> Any:
-        nx, ny = at.gradient(wall, s)
-        vx, vy = at.balls[3:]
-        push = 2 * (nx * vx + ny * vy) / (nx * nx + ny * ny)
-        return vx - push * nx, vy - push * ny
-
-    monkeypatch.setattr(SearchedFlight, "reflected", still)
+    nx, ny = at.gradient(wall, s)
+    vx, vy = at.balls[3:]
+    push = 2 * (nx * vx + ny * vy) / (nx * nx + ny * ny)
+    return vx - push * nx, vy - push * ny
 
 
-def last_wall(monkeypatch: pytest.MonkeyPatch) -> None:
+@replacing(Search, "_first")
+def last_wall(self: Search, walls: Any, begin: Any, limit: Any) -> Any:
     """Of several walls the one looked at last is answered."""
-    first = Search._first
-    monkeypatch.setattr(
-        Search,
-        "_first",
-        lambda self, walls, begin, limit: next(
-            filter(None, (first(self, (wall,), begin, limit) for wall in reversed(walls))), None
-        ),
-    )
+    hits = (first(self, (wall,), begin, limit) for wall in reversed(walls))
+    return next(filter(None, hits), None)
 
 
-def lazy_taylor(monkeypatch: pytest.MonkeyPatch) -> None:
+@replacing(roots, "_judged")
+def lazy_taylor(at: SearchedFlight, wall: Any, a: Any, b: Any) -> str:
     """An interval is passed when f > 0 at its middle."""
-    judged = roots._judged
-
-    def lazy(at: SearchedFlight, wall: Any, a: Any, b: Any) -> str:
-        return "positive" if at.jet(wall, arb((a + b) / 2))[0] > 0 else judged(at, wall, a, b)
-
-    monkeypatch.setattr(roots, "_judged", lazy)
+    return "positive" if at.jet(wall, arb((a + b) / 2))[0] > 0 else judged(at, wall, a, b)

@@ -10,6 +10,7 @@ from typing import Any
 
 from scene import catalogue
 from scene.load import read_data
+from support.saboteurs import HIT, INTRODUCTION
 
 NUMBERS = (
     0.0,
@@ -27,21 +28,8 @@ NUMBERS = (
     2**70,
     6.283185307179586,
 )
-OTHERS = (
-    None,
-    True,
-    "",
-    "1.0",
-    "nan",
-    "\u0000\ud800",
-    "arc",
-    "lid",
-    [],
-    {},
-    [[]],
-    [0.5, "x"],
-    {"kind": "fourier"},
-)
+WORDS = ("", "1.0", "nan", "\u0000\ud800", "arc", "lid")
+OTHERS = (None, True, *WORDS, [], {}, [[]], [0.5, "x"], {"kind": "fourier"})
 LAWS = (
     {"kind": "fourier", "mean": 1.0, "omega": 0.0, "cos": [0.1]},
     {"kind": "fourier", "mean": 1.0, "omega": 1e9, "sin": [1e-3] * 40},
@@ -87,36 +75,18 @@ def requests(draw: random.Random) -> dict[str, Any]:
 
 def answers(draw: random.Random) -> dict[str, Any]:
     """Return a valid answer of protocol 1 to seq 1."""
-    hit = {
-        "outcome": "collision",
-        "wall": "arc",
-        "dt": 1.0,
-        "t": 1.0,
-        "x": 0.6,
-        "y": 0.8,
-        "vx": -0.6,
-        "vy": -0.8,
-    }
     arrival = {"outcome": "horizon", "t": 1.0, "x": 0.0, "y": 0.0, "vx": 1.0, "vy": 1.0}
     return draw.choice(
         [
-            {"seq": 1, **hit},
+            {"seq": 1, **HIT},
             {"seq": 1, **arrival},
             {"seq": 1, "outcome": "undefined", "reason": "corner"},
-            {"seq": 1, "steps": [dict(hit), dict(arrival)]},
+            {"seq": 1, "steps": [dict(HIT), dict(arrival)]},
             {"seq": 1, "states": [{**arrival, "captured": [0.1, 0.2]}]},
-            {"seq": 1, "ns": [100], "steps": [dict(hit)]},
+            {"seq": 1, "ns": [100], "steps": [dict(HIT)]},
             {"seq": 1, "error": "no"},
             {"values": [0.1, -0.0]},
-            {
-                "protocol": 1,
-                "name": "n",
-                "version": "1",
-                "language": "C",
-                "profiles": ["step"],
-                "tables": ["cap"],
-                "laws": ["constant"],
-            },
+            INTRODUCTION,
         ]
     )
 
@@ -182,6 +152,22 @@ def lines(seed: int, n: int, kind: Any) -> Iterator[bytes]:
             data = spoil(draw, data)
         line = json.dumps(data).encode()
         yield garble(draw, line) if 0.55 < part < 0.75 else line
+
+
+def as_toml(line: bytes) -> bytes:
+    """Write a line of JSON as TOML; what is garbled stays as it is."""
+    try:
+        data = json.loads(line)
+        lines = [f"{json.dumps(key)} = {_inline(value)}" for key, value in data.items()]
+    except (ValueError, AttributeError, RecursionError):
+        return line
+    return "\n".join(lines).encode("utf-8", "surrogatepass")
+
+
+def _inline(value: Any) -> str:
+    if isinstance(value, dict):
+        return "{" + ", ".join(f"{json.dumps(key)} = {_inline(part)}" for key, part in value.items()) + "}"
+    return "[" + ", ".join(map(_inline, value)) + "]" if isinstance(value, list) else json.dumps(value)
 
 
 scenes_known = scenes()

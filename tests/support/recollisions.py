@@ -12,8 +12,9 @@ import numpy as np
 from mpmath import fp
 
 from scene import BangBang, Law, Mushroom, Scene, State, Stem, Wall
+from scene.geometry import half_width
 from scene.laws import value
-from scene.tables import laws, width_factors
+from scene.tables import laws
 
 WALLS: tuple[Wall, ...] = ("arc", "left", "right", "floor")
 
@@ -77,12 +78,7 @@ def _on_wall(random: np.random.Generator, scene: Scene, wall: Wall, t: float, sl
     x = float(random.uniform(-0.3, 0.3))
     if wall == "floor":
         return State(t, x, -now["h"], along, away - rates["h"], wall)
-    assert not hasattr(scene, "r") or isinstance(scene, Mushroom)
-    factors = width_factors(scene)  # type: ignore[arg-type]  # a cap has no sides
-    ws = [float(value(fp, f, t)) for f in factors]
-    dw = [float(value(fp, f, t, 1)) for f in factors]
-    w = float(np.prod(ws))
-    rate = dw[0] if len(ws) == 1 else dw[0] * ws[1] + ws[0] * dw[1]
+    w, rate = (float(half_width(fp, scene, t, order)) for order in (0, 1))
     y = -float(random.uniform(0.1, 0.9)) * now["h"]
     sign = 1.0 if wall == "right" else -1.0
     return State(t, sign * (w + slope * y), y, sign * (rate + slope * along - away), along, wall)

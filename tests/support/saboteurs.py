@@ -1,7 +1,7 @@
 """Implementations that break the protocol, each in one way; `python saboteurs.py NAME` is one of them.
 
-Each is an honest citizen (it answers every step alike, as physics is not asked of it here) whose one fault
-is a function below. None may hang the runner, outlive it, or pass.
+Each is an honest citizen (it answers every step alike, as physics is not asked of it here) but in one place,
+where it does what the table of faults says. None may hang the runner, outlive it, or pass.
 """
 
 from __future__ import annotations
@@ -26,58 +26,46 @@ INTRODUCTION = {
 }
 HIT = {"outcome": "collision", "wall": "arc", "dt": 1.0, "t": 1.0, "x": 0.6, "y": 0.8, "vx": -0.6, "vy": -0.8}
 SLEEP = 600.0
-Request = dict[str, Any]
+Answer = dict[str, Any]
+Act = Callable[[Answer], object]  # what is done with the honest answer, in place of saying it
+asked: list[int] = []  # the seq of every step so far
 
 
-class Citizen:
-    """The honest part: what it says when nothing is sabotaged."""
-
-    n_steps = 0
-
-    def run(self) -> None:
-        """Answer requests until `stop`."""
-        for line in sys.stdin:
-            request = json.loads(line)
-            if request["cmd"] == "stop":
-                self.end()
-                return
-            self.reply(request)
-
-    def reply(self, request: Request) -> None:
-        """Answer one request."""
-        if request["cmd"] == "start":
-            self.start()
-        elif request["cmd"] == "echo":
-            self.echo(request["values"])
-        elif "vy" not in request["state"]:
-            self.reject(request)
-        else:
-            self.n_steps += 1
-            self.step(request)
-
-    def start(self) -> None:
-        """Introduce itself."""
-        say(INTRODUCTION)
-
-    def echo(self, values: list[float]) -> None:
-        """Return the numbers."""
-        say({"values": values})
-
-    def reject(self, request: Request) -> None:
-        """Refuse a state without vy."""
-        say({"seq": request["seq"], "outcome": "rejected", "reason": "state.vy is missing"})
-
-    def step(self, request: Request) -> None:
-        """Answer a step."""
-        say({"seq": request["seq"], **HIT})
-
-    def end(self) -> None:
-        """Leave."""
+def command(name: str) -> list[str]:
+    """Return the command of a saboteur."""
+    return [sys.executable, "-I", "-S", __file__, name]
 
 
-def say(data: Any) -> None:
+def run(name: str) -> None:
+    """Answer requests until `stop`."""
+    place, fault = SABOTEURS[name]
+    for line in sys.stdin:
+        request = json.loads(line)
+        where = request["cmd"]
+        if where == "step":
+            where = "step" if "vy" in request["state"] else "reject"
+        if where == "step":
+            asked.append(request["seq"])
+        (fault if where == place else say)(honest_answer(where, request))
+        if where == "stop":
+            return
+
+
+def honest_answer(where: str, request: dict[str, Any]) -> Answer:
+    """Return what an honest citizen says: nothing, to `stop`."""
+    if where == "start":
+        return INTRODUCTION
+    if where == "echo":
+        return {"values": request["values"]}
+    if where == "reject":
+        return {"seq": request["seq"], "outcome": "rejected", "reason": "state.vy is missing"}
+    return {"seq": request["seq"], **HIT} if where == "step" else {}
+
+
+def say(answer: Answer) -> None:
     """Write one line of JSON."""
-    write(json.dumps(data) + "\n")
+    if answer:
+        write(json.dumps(answer) + "\n")
 
 
 def write(text: str) -> None:
@@ -86,220 +74,162 @@ def write(text: str) -> None:
     sys.stdout.flush()
 
 
-def saboteur(name: str, method: str) -> Callable[[Callable[..., None]], Callable[..., None]]:
-    """Register a function as the one method in which a saboteur differs."""
-
-    def register(function: Callable[..., None]) -> Callable[..., None]:
-        SABOTEURS[name] = type(name, (Citizen,), {method: function})
-        return function
-
-    return register
+def says(change: Callable[[Answer], Answer]) -> Act:
+    """Say a changed answer."""
+    return lambda answer: say(change(answer))
 
 
-SABOTEURS: dict[str, type[Citizen]] = {"honest": Citizen}
-# Odd manners that are no faults: these must pass.
-HONEST = ("honest", "dribble", "noise", "more-fields", "answer-and-exit")
-# What is answered to a step in place of the honest answer.
-ANSWERS: dict[str, Callable[[Request], Request]] = {
-    "more-fields": lambda hit: {**hit, "iterations": 7, "note": "\u221e"},
-    "huge-line": lambda hit: {"seq": hit["seq"], "filler": "x" * (2**24 + 2**20)},
-    "wrong-seq": lambda hit: {**hit, "seq": hit["seq"] + 1},
-    "no-seq": lambda _: HIT,
-    "nan": lambda hit: {**hit, "vx": float("nan")},
-    "number-as-text": lambda hit: {**hit, "dt": "1.0"},
-    "missing-field": lambda hit: {name: value for name, value in hit.items() if name != "vy"},
-    "unknown-wall": lambda hit: {**hit, "wall": "lid"},
-    "reason-of-its-own": lambda hit: {"seq": hit["seq"], "outcome": "undefined", "reason": "too hard"},
-    "own-error": lambda hit: {"seq": hit["seq"], "error": "out of memory"},
-}
-# What is written in place of the honest line.
-LINES: dict[str, Callable[[str], str]] = {
-    "duplicate": lambda line: line + line,
-    "split-line": lambda line: line[:20] + "\n" + line[20:],
-    "junk": lambda line: "debug: stepping\n" + line,
-    "blank-line": lambda _: "\n",
-    "deep-nesting": lambda _: "[" * 100_000 + "]" * 100_000 + "\n",
-    "infinity": lambda line: line.replace("-0.6", "1e999"),
-}
-# What becomes of the numbers to be echoed.
-ECHOES: dict[str, Callable[[float], float]] = {
-    "no-minus-zero": lambda value: value or 0.0,
-    "flush-subnormals": lambda value: value if abs(value) >= sys.float_info.min else 0.0 * value,
-    "misread-exponents": lambda value: float(repr(value).replace("e+22", "e+21")),
-}
+def writes(change: Callable[[str], str]) -> Act:
+    """Write something else for the line."""
+    return lambda answer: write(change(json.dumps(answer) + "\n"))
 
 
-def answering(change: Callable[[Request], Request]) -> Callable[..., None]:
-    """Return a step that says a changed answer."""
-    return lambda _, request: say(change({"seq": request["seq"], **HIT}))
+def echoes(change: Callable[[float], float]) -> Act:
+    """Echo changed numbers."""
+    return says(lambda answer: {"values": [change(value) for value in answer["values"]]})
 
 
-def writing(change: Callable[[str], str]) -> Callable[..., None]:
-    """Return a step that writes something else for its line."""
-    return lambda _, request: write(change(json.dumps({"seq": request["seq"], **HIT}) + "\n"))
+def then(*acts: Act) -> Act:
+    """Do several things, one after the other."""
+    return lambda answer: [act(answer) for act in acts]
 
 
-def echoing(change: Callable[[float], float]) -> Callable[..., None]:
-    """Return an echo of changed numbers."""
-    return lambda _, values: say({"values": [change(value) for value in values]})
+def forever(act: Act) -> Act:
+    """Do one thing without end."""
+
+    def repeat(answer: Answer) -> None:
+        while True:
+            act(answer)
+
+    return repeat
 
 
-def sleep(*_: Any) -> None:
-    """Do nothing for longer than anyone waits."""
-    time.sleep(SLEEP)
+def leave(status: int) -> Act:
+    """Exit at once."""
+    return lambda _: os._exit(status)
 
 
-for _name, _answer in ANSWERS.items():
-    saboteur(_name, "step")(answering(_answer))
-for _name, _line in LINES.items():
-    saboteur(_name, "step")(writing(_line))
-for _name, _number in ECHOES.items():
-    saboteur(_name, "echo")(echoing(_number))
-saboteur("fewer-numbers", "echo")(lambda _, values: say({"values": values[:-1]}))
-for _name, _method in (("hang", "step"), ("hang-at-start", "start"), ("ignore-stop", "end")):
-    saboteur(_name, _method)(sleep)
+def wait(seconds: float) -> Act:
+    """Do nothing for so long."""
+    return lambda _: time.sleep(seconds)
 
 
-@saboteur("dribble", "step")
-def write_in_pieces(_: Citizen, request: Request) -> None:
-    line = json.dumps({"seq": request["seq"], **HIT}) + "\n"
+def child(*, is_detached: bool) -> Act:
+    """Start a child that holds this process's pipes."""
+    program = [sys.executable, "-c", f"import time; time.sleep({SLEEP})"]
+    return lambda _: subprocess.Popen(program, start_new_session=is_detached)
+
+
+def cry(what: bytes) -> Act:
+    """Write to standard error."""
+    return lambda _: os.write(2, what)
+
+
+def ignore_termination(_: Answer) -> None:
+    """Ignore the signals that ask a process to end."""
+    for name in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP):
+        signal.signal(name, signal.SIG_IGN)
+
+
+def write_in_pieces(answer: Answer) -> None:
+    """Write the line in pieces, slowly."""
+    line = json.dumps(answer) + "\n"
     for start in range(0, len(line), 50):
         write(line[start : start + 50])
         time.sleep(0.02)
 
 
-@saboteur("noise", "step")
-def write_much_to_standard_error(_: Citizen, request: Request) -> None:
-    os.write(2, b"stepping " * 50_000)
-    say({"seq": request["seq"], **HIT})
-
-
-@saboteur("answer-and-exit", "end")
-def exit_before_the_input_ends(_: Citizen) -> None:
-    os._exit(0)
-
-
-@saboteur("late-answer", "step")
-def answer_late(_: Citizen, request: Request) -> None:
-    time.sleep(3.0)
-    say({"seq": request["seq"], **HIT})
-
-
-@saboteur("ignore-sigterm", "step")
-def ignore_termination(_: Citizen, request: Request) -> None:
-    for name in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP):
-        signal.signal(name, signal.SIG_IGN)
-    time.sleep(SLEEP)
-
-
-@saboteur("half-a-line", "step")
-def stop_within_a_line(_: Citizen, request: Request) -> None:
-    write(json.dumps({"seq": request["seq"], **HIT})[:40])
-    time.sleep(SLEEP)
-
-
-@saboteur("endless-line", "step")
-def write_without_end(_: Citizen, request: Request) -> None:
-    while True:
-        write("9" * 2**20)
-
-
-@saboteur("flood-stderr", "step")
-def flood_standard_error(_: Citizen, request: Request) -> None:
-    while True:
-        os.write(2, b"help! " * 10_000)
-
-
-@saboteur("stale-answer", "step")
-def answer_the_question_before(self: Any, request: Request) -> None:
-    before, self.seq = getattr(self, "seq", request["seq"]), request["seq"]
-    say({"seq": before, **HIT})
-
-
-@saboteur("early-answers", "start")
-def answer_before_being_asked(_: Citizen) -> None:
-    lines = [INTRODUCTION, *({"seq": seq, **HIT} for seq in range(10))]
-    write("".join(json.dumps(line) + "\n" for line in lines))
-
-
-@saboteur("banner", "start")
-def write_a_banner_first(_: Citizen) -> None:
-    write("Welcome to the stepper!\n")
-    say(INTRODUCTION)
-
-
-@saboteur("not-utf8", "step")
-def write_bytes(_: Citizen, request: Request) -> None:
-    sys.stdout.buffer.write(b'{"seq": %d, "outcome": "\xff\xfe"}\n' % request["seq"])
+def write_bytes(answer: Answer) -> None:
+    """Write what is no UTF-8."""
+    sys.stdout.buffer.write(b'{"seq": %d, "outcome": "\xff\xfe"}\n' % answer["seq"])
     sys.stdout.flush()
 
 
-@saboteur("other-protocol", "start")
-def speak_another_protocol(_: Citizen) -> None:
-    say({**INTRODUCTION, "protocol": 2})
+def print_fifteen_digits(answer: Answer) -> None:
+    """Echo numbers to fifteen digits."""
+    write('{"values": [' + ", ".join(f"{value:.15g}" for value in answer["values"]) + "]}\n")
 
 
-@saboteur("fifteen-digits", "echo")
-def print_fifteen_digits(_: Citizen, values: list[float]) -> None:
-    write('{"values": [' + ", ".join(f"{value:.15g}" for value in values) + "]}\n")
-
-
-@saboteur("crash-on-invalid", "reject")
-def crash_on_invalid(_: Citizen, request: Request) -> None:
+def crash(_: Answer) -> None:
+    """End with a traceback."""
     raise KeyError("vy")
 
 
-@saboteur("guess-on-invalid", "reject")
-def guess_what_is_missing(_: Citizen, request: Request) -> None:
-    say({"seq": request["seq"], **HIT})
-
-
-@saboteur("crash-at-second", "step")
-def crash_at_the_second(self: Citizen, request: Request) -> None:
-    if self.n_steps == 2:
+def crash_at_the_second(answer: Answer) -> None:
+    """Be killed at the second step."""
+    if len(asked) == 2:
         os.kill(os.getpid(), signal.SIGSEGV)
-    say({"seq": request["seq"], **HIT})
+    say(answer)
 
 
-@saboteur("exit-silently", "step")
-def exit_silently(_: Citizen, request: Request) -> None:
-    os._exit(0)
+def answer_before_being_asked(answer: Answer) -> None:
+    """Introduce itself and answer ten steps at once."""
+    write("".join(json.dumps(line) + "\n" for line in [answer, *({"seq": seq, **HIT} for seq in range(10))]))
 
 
-@saboteur("close-stdout", "step")
-def close_standard_output(_: Citizen, request: Request) -> None:
-    os.close(1)
-    time.sleep(SLEEP)
-
-
-@saboteur("fork-and-die", "step")
-def die_and_leave_a_child(_: Citizen, request: Request) -> None:
-    spawn(is_detached=False)
-    os._exit(3)
-
-
-@saboteur("daemon", "step")
-def die_and_leave_a_daemon(_: Citizen, request: Request) -> None:
-    spawn(is_detached=True)
-    os._exit(3)
-
-
-@saboteur("leave-a-child", "end")
-def leave_a_child_at_stop(_: Citizen) -> None:
-    spawn(is_detached=True)
-
-
-@saboteur("talk-after-stop", "end")
-def talk_after_stop(_: Citizen) -> None:
-    write("goodbye\n")
-
-
-def spawn(is_detached: bool) -> None:
-    """Start a child that holds this process's pipes."""
-    subprocess.Popen(
-        [sys.executable, "-c", f"import time; time.sleep({SLEEP})"], start_new_session=is_detached
-    )
+sleep = wait(SLEEP)  # longer than anyone waits
+# Odd manners that are no faults: these must pass.
+HONEST = ("honest", "dribble", "noise", "more-fields", "answer-and-exit")
+# Where each differs from an honest citizen (in what it makes of `start`, `echo`, a step, a step without vy,
+# or `stop`), and what it does there.
+SABOTEURS: dict[str, tuple[str, Act]] = {
+    "honest": ("step", say),
+    "dribble": ("step", write_in_pieces),
+    "noise": ("step", then(cry(b"stepping " * 50_000), say)),
+    "more-fields": ("step", says(lambda hit: {**hit, "iterations": 7, "note": "\u221e"})),
+    "answer-and-exit": ("stop", leave(0)),
+    # Something else is said.
+    "huge-line": ("step", says(lambda hit: {"seq": hit["seq"], "filler": "x" * (2**24 + 2**20)})),
+    "wrong-seq": ("step", says(lambda hit: {**hit, "seq": hit["seq"] + 1})),
+    "no-seq": ("step", says(lambda _: HIT)),
+    "stale-answer": ("step", says(lambda hit: {**hit, "seq": asked[-2:][0]})),
+    "nan": ("step", says(lambda hit: {**hit, "vx": float("nan")})),
+    "number-as-text": ("step", says(lambda hit: {**hit, "dt": "1.0"})),
+    "missing-field": ("step", says(lambda hit: {name: hit[name] for name in hit if name != "vy"})),
+    "unknown-wall": ("step", says(lambda hit: {**hit, "wall": "lid"})),
+    "reason-of-its-own": (
+        "step",
+        says(lambda hit: {"seq": hit["seq"], "outcome": "undefined", "reason": "too hard"}),
+    ),
+    "own-error": ("step", says(lambda hit: {"seq": hit["seq"], "error": "out of memory"})),
+    "other-protocol": ("start", says(lambda introduction: {**introduction, "protocol": 2})),
+    "early-answers": ("start", answer_before_being_asked),
+    "guess-on-invalid": ("reject", says(lambda refusal: {"seq": refusal["seq"], **HIT})),
+    "talk-after-stop": ("stop", lambda _: write("goodbye\n")),
+    # The line is spoilt.
+    "duplicate": ("step", writes(lambda line: line + line)),
+    "split-line": ("step", writes(lambda line: line[:20] + "\n" + line[20:])),
+    "junk": ("step", writes(lambda line: "debug: stepping\n" + line)),
+    "blank-line": ("step", writes(lambda _: "\n")),
+    "deep-nesting": ("step", writes(lambda _: "[" * 100_000 + "]" * 100_000 + "\n")),
+    "infinity": ("step", writes(lambda line: line.replace("-0.6", "1e999"))),
+    "endless-line": ("step", forever(writes(lambda _: "9" * 2**20))),
+    "half-a-line": ("step", then(writes(lambda line: line[:40]), sleep)),
+    "not-utf8": ("step", write_bytes),
+    "banner": ("start", writes(lambda line: "Welcome to the stepper!\n" + line)),
+    # Numbers are misread or misprinted.
+    "no-minus-zero": ("echo", echoes(lambda value: value or 0.0)),
+    "flush-subnormals": ("echo", echoes(lambda v: v if abs(v) >= sys.float_info.min else 0.0 * v)),
+    "misread-exponents": ("echo", echoes(lambda value: float(repr(value).replace("e+22", "e+21")))),
+    "fifteen-digits": ("echo", print_fifteen_digits),
+    "fewer-numbers": ("echo", says(lambda answer: {"values": answer["values"][:-1]})),
+    # Nothing is said, or too late, or nothing but noise.
+    "hang": ("step", sleep),
+    "hang-at-start": ("start", sleep),
+    "ignore-stop": ("stop", sleep),
+    "late-answer": ("step", then(wait(3.0), say)),
+    "ignore-sigterm": ("step", then(ignore_termination, sleep)),
+    "flood-stderr": ("step", forever(cry(b"help! " * 10_000))),
+    # The process ends, or its children stay.
+    "crash-on-invalid": ("reject", crash),
+    "crash-at-second": ("step", crash_at_the_second),
+    "exit-silently": ("step", leave(0)),
+    "close-stdout": ("step", then(lambda _: os.close(1), sleep)),
+    "fork-and-die": ("step", then(child(is_detached=False), leave(3))),
+    "daemon": ("step", then(child(is_detached=True), leave(3))),
+    "leave-a-child": ("stop", child(is_detached=True)),
+}
 
 
 if __name__ == "__main__":
-    SABOTEURS[sys.argv[1]]().run()
+    run(sys.argv[1])

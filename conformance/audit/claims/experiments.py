@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 from mpmath import fp
 from scipy.stats import ks_2samp
@@ -49,25 +51,15 @@ def growth(evidence: ClaimEvidence, sample: Sample) -> Check:
     """Compare the mean of s with m1 and its finite-energy bias."""
     theirs = float(evidence.theory_of(sample).m1)
     bias, band = bias_of_mean(sample)
-    return close(
-        f"{sample.run.name}: mean of log E1/E0, less its bias {bias:.5f}",
-        mean(sample.gain).less(bias),
-        theirs,
-        band=band,
-        scale=abs(theirs) or np.inf,
-    )
+    what = f"{sample.run.name}: mean of log E1/E0, less its bias {bias:.5f}"
+    return close(what, mean(sample.gain).less(bias), theirs, band=band, scale=abs(theirs) or np.inf)
 
 
 def escape(evidence: ClaimEvidence, sample: Sample) -> Check:
     """Compare the uncaptured share with p_nc."""
     band = 2 * mouth_speed(sample) / sample.speed
-    return close(
-        f"{sample.run.name}: share never captured",
-        share(sample.never_captured),
-        evidence.theory_of(sample).p_nc,
-        band=band,
-        scale=0.1,
-    )
+    what = f"{sample.run.name}: share never captured"
+    return close(what, share(sample.never_captured), evidence.theory_of(sample).p_nc, band=band, scale=0.1)
 
 
 def peak_place(evidence: ClaimEvidence, sample: Sample) -> Check:
@@ -83,13 +75,8 @@ def peak_shape(evidence: ClaimEvidence, sample: Sample) -> Check:
     """Test the uncaptured peak against the Gaussian of its own mean and width."""
     kept = sample.gain[~sample.captured]
     centre = mean(kept).value - width(sample).value ** 2 / 4
-    return fits(
-        f"{sample.run.name}: the never captured are Gaussian",
-        kept,
-        [broadened.peak(centre, width(sample).value)],
-        band=PEAK_BAND,
-        scale=0.2,
-    )
+    what = f"{sample.run.name}: the never captured are Gaussian"
+    return fits(what, kept, [broadened.peak(centre, width(sample).value)], band=PEAK_BAND, scale=0.2)
 
 
 def captured_energies(sample: Sample) -> Check:
@@ -100,58 +87,45 @@ def captured_energies(sample: Sample) -> Check:
     return fits(f"{sample.run.name}: log E1/E0 of the captured", values, laws_, scale=0.2, note=note)
 
 
-def one_cycle(evidence: ClaimEvidence, runs: tuple[str, ...]) -> list[Check]:
+def one_cycle(evidence: ClaimEvidence, runs: tuple[str, ...]) -> Iterator[Check]:
     """Check growth, escape, the peak and both distributions of each run."""
-    found = []
     for run in runs:
         sample = evidence.sample(run)
-        found += [
-            growth(evidence, sample),
-            escape(evidence, sample),
-            peak_place(evidence, sample),
-            peak_shape(evidence, sample),
-            captured_energies(sample),
-        ]
-    return found
+        yield growth(evidence, sample)
+        yield escape(evidence, sample)
+        yield peak_place(evidence, sample)
+        yield peak_shape(evidence, sample)
+        yield captured_energies(sample)
 
 
-def fixed_cap(evidence: ClaimEvidence) -> list[Check]:
+def fixed_cap(evidence: ClaimEvidence) -> Iterator[Check]:
     """X1: both directions at E0 = 1e9."""
-    return one_cycle(evidence, (ACW, CW))
+    yield from one_cycle(evidence, (ACW, CW))
 
 
-def moving_cap(evidence: ClaimEvidence) -> list[Check]:
+def moving_cap(evidence: ClaimEvidence) -> Iterator[Check]:
     """X2: the moving cap at 1e6 and 1e7."""
     low, high = (evidence.sample(run) for run in MOVING)
-    found = one_cycle(evidence, MOVING)
-    found.append(
-        close(
-            "share never captured at 1e7 against the paper's 38.78 %",
-            (share(high.never_captured).value, float(np.hypot(share(high.never_captured).error, 0.00308))),
-            0.3878,
-            band=5e-5,
-        )
+    yield from one_cycle(evidence, MOVING)
+    yield close(
+        "share never captured at 1e7 against the paper's 38.78 %",
+        (share(high.never_captured).value, float(np.hypot(share(high.never_captured).error, 0.00308))),
+        0.3878,
+        band=5e-5,
     )
     modes = [_modes(sample.gain) for sample in (low, high)]
     for sample, (left, right) in zip((low, high), modes, strict=True):
         sigma = width(sample).value
-        found += [
-            stated(
-                f"{sample.run.name}: two modes, the left one at the uncaptured",
-                abs(left + 0.422465) < sigma / 2,
-                f"mode at {left:+.3f}",
-                "-0.422",
-            ),
-            stated(
-                f"{sample.run.name}: the right one at the largest log E1/E0",
-                abs(right - 0.846126) < 1.5 * sigma,
-                f"mode at {right:+.3f}",
-                "0.846, less half the blur or so",
-            ),
-        ]
+        what = f"{sample.run.name}: two modes, the left one at the uncaptured"
+        yield stated(what, abs(left + 0.422465) < sigma / 2, f"mode at {left:+.3f}", "-0.422")
+        yield stated(
+            f"{sample.run.name}: the right one at the largest log E1/E0",
+            abs(right - 0.846126) < 1.5 * sigma,
+            f"mode at {right:+.3f}",
+            "0.846, less half the blur or so",
+        )
     ratio, error = width(high).over(width(low))
-    found.append(above("agreement is better at 1e7: the peak is narrower by", (1 - ratio, error), 0.0))
-    return found
+    yield above("agreement is better at 1e7: the peak is narrower by", (1 - ratio, error), 0.0)
 
 
 def _modes(s: FloatArray) -> tuple[float, float]:
@@ -162,9 +136,8 @@ def _modes(s: FloatArray) -> tuple[float, float]:
     return float(middle[left][np.argmax(counts[left])]), float(middle[~left][np.argmax(counts[~left])])
 
 
-def capture_times(evidence: ClaimEvidence) -> list[Check]:
+def capture_times(evidence: ClaimEvidence) -> Iterator[Check]:
     """X3: when particles are captured."""
-    found = []
     for run in ("moving-cap@1e7", ACW, CW):
         sample = evidence.sample(run)
         times = sample.first_stay[0][sample.captured]
@@ -172,8 +145,7 @@ def capture_times(evidence: ClaimEvidence) -> list[Check]:
         delay = MEAN_RETURNS * return_time(sample)
         grid = np.linspace(times.min(), times.max(), 2000)
         band = float(np.max(np.abs(cdf(grid + delay) - cdf(grid - delay)))) / 2
-        found.append(fits(f"{run}: times of capture", times, [cdf], band=band, scale=0.2))
-    return found
+        yield fits(f"{run}: times of capture", times, [cdf], band=band, scale=0.2)
 
 
 def _capture_cdf(run: str) -> Cdf:
@@ -193,36 +165,24 @@ def return_time(sample: Sample) -> float:
     return float(now.v_cha / (4 * w * sample.speed))
 
 
-def ergodic(evidence: ClaimEvidence) -> list[Check]:
+def ergodic(evidence: ClaimEvidence) -> Iterator[Check]:
     """X5: c = 0."""
     sample = evidence.sample("ergodic@1e7")
     sigma, earlier = spread(sample.gain), spread(evidence.sample("ergodic@1e6").gain)
     drift = sigma.value**2 / 4
-    return [
-        close(
-            "mean of log E1/E0, less the drift sd²/4",
-            mean(sample.gain).less(drift),
-            0.0,
-            band=drift,
-        ),
-        fits(
-            "one Gaussian peak",
-            sample.gain,
-            [broadened.peak(0.0, sigma.value)],
-            band=2 * PEAK_BAND,
-            scale=0.2,
-        ),
-        close("mean of E0/E1", mean(np.exp(-sample.gain)), 1.0, band=drift),
-        stated("nobody is captured", not sample.captured.any(), f"{sample.captured.sum()} captured", "0"),
-        close("its width shrinks as E0^(-1/4) from 1e6: ratio", sigma.over(earlier), 10**-0.25, band=0.02),
-    ]
+    yield close("mean of log E1/E0, less the drift sd²/4", mean(sample.gain).less(drift), 0.0, band=drift)
+    yield fits(
+        "one Gaussian peak", sample.gain, [broadened.peak(0.0, sigma.value)], band=2 * PEAK_BAND, scale=0.2
+    )
+    yield close("mean of E0/E1", mean(np.exp(-sample.gain)), 1.0, band=drift)
+    yield stated("nobody is captured", not sample.captured.any(), f"{sample.captured.sum()} captured", "0")
+    yield close("its width shrinks as E0^(-1/4) from 1e6: ratio", sigma.over(earlier), 10**-0.25, band=0.02)
 
 
-def untilted(evidence: ClaimEvidence) -> list[Check]:
+def untilted(evidence: ClaimEvidence) -> Iterator[Check]:
     """X6: with an upright stem the chaotic zone's energies are distributed differently."""
     upright, tilted = evidence.sample("untilted@1e6"), evidence.sample("moving-cap@1e6")
     centred = []
-    found = []
     for sample in (tilted, upright):
         kept = sample.gain[~sample.captured]
         centred.append(kept - float(evidence.theory_of(sample).log_e_nc))
@@ -231,44 +191,31 @@ def untilted(evidence: ClaimEvidence) -> list[Check]:
     gap = float(np.max(np.abs(np.searchsorted(a, grid) / len(a) - np.searchsorted(b, grid) / len(b))))
     p = float(ks_2samp(a, b).pvalue)
     size = len(a) * len(b) // (len(a) + len(b))
-    found.append(
-        Check(
-            "uncaptured energies, each from its own theory's: two samples differ",
-            True if p < LEVEL else None,
-            f"> {critical_gap(size):.3g}",
-            gap,
-            n_tests=1,
-            note=f"Kolmogorov's distance, p = {p:.1g}",
-        )
+    yield Check(
+        "uncaptured energies, each from its own theory's: two samples differ",
+        True if p < LEVEL else None,
+        f"> {critical_gap(size):.3g}",
+        gap,
+        n_tests=1,
+        note=f"Kolmogorov's distance, p = {p:.1g}",
     )
     ratio = width(upright).over(width(tilted))
-    found.append(above("upright: the uncaptured peak is wider, ratio of widths", ratio, 1.0))
-    found.append(peak_place(evidence, tilted))
-    return found
+    yield above("upright: the uncaptured peak is wider, ratio of widths", ratio, 1.0)
+    yield peak_place(evidence, tilted)
 
 
-def trivial_loops(evidence: ClaimEvidence) -> list[Check]:
+def trivial_loops(evidence: ClaimEvidence) -> Iterator[Check]:
     """X7: loops that enclose nothing."""
-    found = []
     for name, table in ONE_PARAMETER.items():
         result = evidence.predict(table)
-        found.append(
-            stated(
-                f"only {name} moves: theory",
-                result.m1 == 0 and result.log_e_nc == 0,
-                f"m1 = {float(result.m1):.1g}",
-                "m1 = 0",
-            )
-        )
+        what = f"only {name} moves: theory"
+        yield stated(what, result.m1 == 0 and result.log_e_nc == 0, f"m1 = {float(result.m1):.1g}", "m1 = 0")
     for run in ("only-mouth@1e6", "moving-cap-trivial@1e6"):
         sample = evidence.sample(run)
         bias, band = bias_of_mean(sample)
         values = mean(sample.gain).less(bias)
-        found += [
-            close(f"{run}: mean of log E1/E0, less its bias {bias:.5f}", values, 0.0, band=band, scale=0.04),
-            escape(evidence, sample),
-        ]
-    return found
+        yield close(f"{run}: mean of log E1/E0, less its bias {bias:.5f}", values, 0.0, band=band, scale=0.04)
+        yield escape(evidence, sample)
 
 
 def _one_parameter() -> dict[str, Mushroom]:
@@ -284,48 +231,36 @@ def _one_parameter() -> dict[str, Mushroom]:
 ONE_PARAMETER = _one_parameter()
 
 
-def both_ways(evidence: ClaimEvidence) -> list[Check]:
+def both_ways(evidence: ClaimEvidence) -> Iterator[Check]:
     """X8: reversed cycles."""
-    found: list[Check] = []
     for name, other in (
         ("fixed-cap-anticlockwise", "fixed-cap-clockwise"),
         ("moving-cap", "moving-cap-reversed"),
     ):
         a, b = evidence.predict(name), evidence.predict(other)
-        found.append(
-            stated(
-                f"{name}: theory's log E_nc flips",
-                abs(a.log_e_nc + b.log_e_nc) < 1e-20,
-                f"sum {float(a.log_e_nc + b.log_e_nc):.1g}",
-                "0",
-            )
+        what = f"{name}: theory's log E_nc flips"
+        yield stated(
+            what, abs(a.log_e_nc + b.log_e_nc) < 1e-20, f"sum {float(a.log_e_nc + b.log_e_nc):.1g}", "0"
         )
     for first, second in ((ACW, CW), ("moving-cap@1e6", "moving-cap-reversed@1e6")):
         pair = [evidence.sample(first), evidence.sample(second)]
         kept = [mean(sample.gain[~sample.captured]) for sample in pair]
         drifts = sum(width(sample).value ** 2 / 4 for sample in pair)
-        found.append(
-            close(
-                f"{first} and its reverse: sum of the peaks, less their drifts",
-                (kept[0].value + kept[1].value - drifts, float(np.hypot(kept[0].error, kept[1].error))),
-                0.0,
-                band=drifts,
-                scale=0.15,
-            )
+        yield close(
+            f"{first} and its reverse: sum of the peaks, less their drifts",
+            (kept[0].value + kept[1].value - drifts, float(np.hypot(kept[0].error, kept[1].error))),
+            0.0,
+            band=drifts,
+            scale=0.15,
         )
         for sample in pair:
             bias, _ = bias_of_mean(sample)
-            found += [
-                above(
-                    f"{sample.run.name}: mean of log E1/E0 grows, beyond its bias", mean(sample.gain), bias
-                ),
-                above(f"{sample.run.name}: mean of E1/E0 grows", mean(np.exp(sample.gain)), 1.0),
-            ]
-    found += [
-        growth(evidence, evidence.sample("moving-cap-reversed@1e6")),
-        escape(evidence, evidence.sample("moving-cap-reversed@1e6")),
-    ]
-    return found
+            yield above(
+                f"{sample.run.name}: mean of log E1/E0 grows, beyond its bias", mean(sample.gain), bias
+            )
+            yield above(f"{sample.run.name}: mean of E1/E0 grows", mean(np.exp(sample.gain)), 1.0)
+    yield growth(evidence, evidence.sample("moving-cap-reversed@1e6"))
+    yield escape(evidence, evidence.sample("moving-cap-reversed@1e6"))
 
 
 CHECKS = {

@@ -7,6 +7,7 @@ single trajectories (L1) carry none, and are judged by how straight the line is.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 
 import numpy as np
 from mpmath import fp
@@ -34,7 +35,7 @@ N_ENERGIES = {"quick": 400, "full": 2000}
 PER_ENERGY = 20
 
 
-def circle(evidence: ClaimEvidence) -> list[Check]:
+def circle(evidence: ClaimEvidence) -> Iterator[Check]:
     """L1: the breathing circle, hit by hit."""
     scene = load("breathing-circle")
     momentum, steps, drifts = 0.0, [], []
@@ -44,21 +45,11 @@ def circle(evidence: ClaimEvidence) -> list[Check]:
         steps.append(float(np.mean([row[1] for row in rows])))
         drifts.append(float(np.mean([row[2] for row in rows])))
     angle, product = _slope(SPEEDS, steps), _slope(SPEEDS, drifts)
-    return [
-        stated(
-            "angular momentum at arc hits: largest relative change",
-            momentum < 1e-12,
-            f"{momentum:.1e}",
-            "rounding of up to 10,000 hits, < 1e-12",
-        ),
-        stated("phi' - phi per hit: exponent of v", abs(angle + 2) < EXPONENT_BAND, f"{angle:.4f}", "-2"),
-        stated(
-            "drift of v r over a fixed time: exponent of v",
-            abs(product + 1) < EXPONENT_BAND,
-            f"{product:.4f}",
-            "-1",
-        ),
-    ]
+    what = "angular momentum at arc hits: largest relative change"
+    yield stated(what, momentum < 1e-12, f"{momentum:.1e}", "rounding of up to 10,000 hits, < 1e-12")
+    yield stated("phi' - phi per hit: exponent of v", abs(angle + 2) < EXPONENT_BAND, f"{angle:.4f}", "-2")
+    what = "drift of v r over a fixed time: exponent of v"
+    yield stated(what, abs(product + 1) < EXPONENT_BAND, f"{product:.4f}", "-1")
 
 
 def _hits(
@@ -87,44 +78,26 @@ def _slope(x: tuple[float, ...], y: list[float]) -> float:
     return float(np.polyfit(np.log(x), np.log(y), 1)[0])
 
 
-def invariants(evidence: ClaimEvidence) -> list[Check]:
+def invariants(evidence: ClaimEvidence) -> Iterator[Check]:
     """L2: E V_cap in the cap, E V in the ergodic table."""
     captured = evidence.samples(*LADDER[1:6])
-    widths = []
-    for sample in captured:
-        change = cap_change(sample)
-        widths.append(spread(change))
-    found = [
-        _exponent(
-            "log(E V_cap) of captured particles, phase 7/16 to 9/16: spread against E0",
-            captured,
-            widths,
-            -0.5,
-        )
-    ]
+    widths = [spread(cap_change(sample)) for sample in captured]
+    yield _exponent(
+        "log(E V_cap) of captured particles, phase 7/16 to 9/16: spread against E0", captured, widths, -0.5
+    )
     high = captured[-2]
-    found.append(
-        close(
-            f"{high.run.name}: its mean", mean(cap_change(high)), 0.0, band=2 * mouth_speed(high) / high.speed
-        )
+    yield close(
+        f"{high.run.name}: its mean", mean(cap_change(high)), 0.0, band=2 * mouth_speed(high) / high.speed
     )
     free = evidence.samples(*ERGODIC)
     changes = [sample.phase_s[:, 0, 3] + log_volume(sample, 0.5) for sample in free]
-    found.append(
-        _exponent(
-            "c = 0, log(E V) at half a cycle: spread against E0", free, [spread(c) for c in changes], -0.25
-        )
+    yield _exponent(
+        "c = 0, log(E V) at half a cycle: spread against E0", free, [spread(c) for c in changes], -0.25
     )
     drift = spread(changes[-1]).value ** 2 / 4
-    found.append(
-        close(
-            f"{free[-1].run.name}: its mean, less the drift",
-            Mean(mean(changes[-1]).value - drift, mean(changes[-1]).error),
-            0.0,
-            band=drift,
-        )
+    yield close(
+        f"{free[-1].run.name}: its mean, less the drift", mean(changes[-1]).less(drift), 0.0, band=drift
     )
-    return found
 
 
 def cap_change(sample: Sample) -> FloatArray:
@@ -162,9 +135,8 @@ def _exponent(what: str, samples: list[Sample], values: list[Mean], exponent: fl
     )
 
 
-def volumes(evidence: ClaimEvidence) -> list[Check]:
+def volumes(evidence: ClaimEvidence) -> Iterator[Check]:
     """L3: volumes as shares of random phase points, and of particles that stay in the frozen cap."""
-    found = []
     n = N_POINTS[evidence.size]
     random = np.random.default_rng(block_seed(evidence.seed, RUNS["frozen-mushroom@1e8"], -1))
     scene = load("moving-cap")
@@ -173,22 +145,17 @@ def volumes(evidence: ClaimEvidence) -> list[Check]:
         inside, in_cap, in_island = _points(scene, 2 * math.pi * phase, n, random)
         total = now.v_cap + now.v_stem
         label = f"moving cap at {phase:g} of its cycle"
-        found += [
-            close(f"{label}: V_cap / V", share(in_cap[inside]), now.v_cap / total),
-            close(f"{label}: V_ell / V_cap", share(in_island[inside & in_cap]), now.v_ell / now.v_cap),
-        ]
+        yield close(f"{label}: V_cap / V", share(in_cap[inside]), now.v_cap / total)
+        yield close(f"{label}: V_ell / V_cap", share(in_island[inside & in_cap]), now.v_ell / now.v_cap)
     sample = evidence.sample("frozen-mushroom@1e8")
     still = theory.volumes_at(fp, load("frozen-mushroom"), 0.0)
-    found.append(
-        close(
-            "frozen mushroom: particles that never meet the stem's walls",
-            share(sample.stem_hits == 0),
-            still.v_ell / (still.v_cap + still.v_stem),
-            band=1e-3,
-            note="band: sticky chaotic orbits that had not yet left the cap",
-        )
+    yield close(
+        "frozen mushroom: particles that never meet the stem's walls",
+        share(sample.stem_hits == 0),
+        still.v_ell / (still.v_cap + still.v_stem),
+        band=1e-3,
+        note="band: sticky chaotic orbits that had not yet left the cap",
     )
-    return found
 
 
 def _points(
@@ -205,7 +172,7 @@ def _points(
     return in_cap | in_stem, in_cap, in_cap & (momentum >= w)
 
 
-def release(evidence: ClaimEvidence) -> list[Check]:
+def release(evidence: ClaimEvidence) -> Iterator[Check]:
     """L4: captured at t_in, released when nu returns."""
     samples = evidence.samples(*LADDER[1:6])
     gaps = [nu_gap(sample) for sample in samples]
@@ -214,19 +181,12 @@ def release(evidence: ClaimEvidence) -> list[Check]:
         square = mean(gap**2)
         root = math.sqrt(square.value)
         sizes.append(Mean(root, square.error / (2 * root)))
-    found = [_exponent("nu(t_out) - nu(t_in): root mean square against E0", samples, sizes, -0.5)]
+    yield _exponent("nu(t_out) - nu(t_in): root mean square against E0", samples, sizes, -0.5)
     largest = max(
         float(np.max(np.abs(gap))) * sample.speed for gap, sample in zip(gaps, samples, strict=True)
     )
-    found.append(
-        stated(
-            "largest |nu(t_out) - nu(t_in)| v at any energy",
-            largest < 20,
-            f"{largest:.2f}",
-            "bounded: < 20 speeds of the walls",
-        )
-    )
-    return found
+    what = "largest |nu(t_out) - nu(t_in)| v at any energy"
+    yield stated(what, largest < 20, f"{largest:.2f}", "bounded: < 20 speeds of the walls")
 
 
 def nu_gap(sample: Sample) -> FloatArray:
@@ -238,9 +198,8 @@ def nu_gap(sample: Sample) -> FloatArray:
     return gap
 
 
-def energy_through_the_cycle(evidence: ClaimEvidence) -> list[Check]:
+def energy_through_the_cycle(evidence: ClaimEvidence) -> Iterator[Check]:
     """L5: mean log E in the chaotic zone against eq. (dE)."""
-    found = []
     for run, every in (("moving-cap@1e7", 2), (ACW, 1)):
         sample = evidence.sample(run)
         times, means, spreads = zone_energy(sample)
@@ -252,15 +211,12 @@ def energy_through_the_cycle(evidence: ClaimEvidence) -> list[Check]:
         for k in range(every - 1, len(times), every):
             drift = spreads[k] ** 2 / 4
             wait = max(abs(late[k] - now[k]), abs(early[k] - now[k]))
-            found.append(
-                close(
-                    f"{run}: mean log E/E0 at phase {sample.run.phases[k]:g}, less the drift",
-                    (means[k].value - drift, means[k].error),
-                    float(now[k] - start),
-                    band=drift + wait + 2 * mouth_speed(sample) / sample.speed,
-                )
+            yield close(
+                f"{run}: mean log E/E0 at phase {sample.run.phases[k]:g}, less the drift",
+                (means[k].value - drift, means[k].error),
+                float(now[k] - start),
+                band=drift + wait + 2 * mouth_speed(sample) / sample.speed,
             )
-    return found
 
 
 def zone_share(sample: Sample, times: FloatArray) -> FloatArray:
@@ -271,9 +227,8 @@ def zone_share(sample: Sample, times: FloatArray) -> FloatArray:
     return found
 
 
-def population_through_the_cycle(evidence: ClaimEvidence) -> list[Check]:
+def population_through_the_cycle(evidence: ClaimEvidence) -> Iterator[Check]:
     """L6: p_cha(t) against eq. (ps)."""
-    found = []
     for run, every in (("moving-cap@1e7", 2), (ACW, 1)):
         sample = evidence.sample(run)
         times = np.array(phase_times(sample))
@@ -283,18 +238,11 @@ def population_through_the_cycle(evidence: ClaimEvidence) -> list[Check]:
         for k in range(every - 1, len(times), every):
             error = math.sqrt(max(now[k] * (1 - now[k]), 1 / sample.n) / sample.n)
             band = max(abs(late[k] - now[k]), abs(early[k] - now[k])) + 2 * mouth_speed(sample) / sample.speed
-            found.append(
-                close(
-                    f"{run}: share in the chaotic zone at phase {sample.run.phases[k]:g}",
-                    (float(measured[k]), error),
-                    float(now[k]),
-                    band=float(band),
-                )
-            )
-    return found
+            what = f"{run}: share in the chaotic zone at phase {sample.run.phases[k]:g}"
+            yield close(what, (float(measured[k]), error), float(now[k]), band=float(band))
 
 
-def work(evidence: ClaimEvidence) -> list[Check]:
+def work(evidence: ClaimEvidence) -> Iterator[Check]:
     """L7: mean exp(-W/kT) = A(t)/A(0), exact at any speed of the walls."""
     phases = (0.25, 0.5, 0.75)
     scene = load("moving-cap")
@@ -314,19 +262,15 @@ def work(evidence: ClaimEvidence) -> list[Check]:
         n_lost += PER_ENERGY - len(ends)
         # Energies are drawn at HOTTER times kT and weighted back: a few fast particles would carry the mean.
         rows.append(np.mean(HOTTER * np.exp(energy / (HOTTER * KT) - ends / KT), axis=0))
-    found = []
     for k, phase in enumerate((*phases, 1.0)):
         values = np.array(rows)[:, k]
         ratio = area(scene, 2 * math.pi * phase) / area(scene, 0.0)
-        found.append(
-            close(
-                f"kT = {KT:g}, phase {phase:g}: mean exp(-W/kT)",
-                mean(values),
-                ratio,
-                note=f"{len(rows)} energies of {PER_ENERGY} particles, {n_lost} not followed",
-            )
+        yield close(
+            f"kT = {KT:g}, phase {phase:g}: mean exp(-W/kT)",
+            mean(values),
+            ratio,
+            note=f"{len(rows)} energies of {PER_ENERGY} particles, {n_lost} not followed",
         )
-    return found
 
 
 CHECKS = {

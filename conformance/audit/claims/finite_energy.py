@@ -6,6 +6,8 @@ theory/equations.md, "Finite energy".
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 from scipy.stats import norm
 
@@ -47,9 +49,8 @@ def width(sample: Sample) -> Mean:
     return spread(sample.gain[~sample.captured])
 
 
-def period(evidence: ClaimEvidence) -> list[Check]:
+def period(evidence: ClaimEvidence) -> Iterator[Check]:
     """M5: for which period of sec. 4.1 the printed error bars come out, given our widths at T = 1."""
-    found: list[Check] = []
     lowest, highest = 0.0, np.inf
     for name in (ACW, CW):
         sample, (_, bar, n, per_bar) = evidence.sample(name), PRINTED[name]
@@ -62,22 +63,19 @@ def period(evidence: ClaimEvidence) -> list[Check]:
         lowest = max(lowest, (extra - slack) / most)
         highest = min(highest, (extra + slack) / least)
         p_nc, wide = float(evidence.theory_of(sample).p_nc), width(sample).value ** 2
-        found.append(
-            close(
-                f"{name}: variance of s beyond the adiabatic one, at T = 1",
-                (extra, 2 * sd * error),
-                wide * (1 + p_nc) / 2,
-                band=wide * (1 - p_nc) / 2,
-                note="expected: sigma_w² of the never captured, anything from 0 to that of the captured",
-            )
+        yield close(
+            f"{name}: variance of s beyond the adiabatic one, at T = 1",
+            (extra, 2 * sd * error),
+            wide * (1 + p_nc) / 2,
+            band=wide * (1 - p_nc) / 2,
+            note="expected: sigma_w² of the never captured, anything from 0 to that of the captured",
         )
     text = f"the printed bars fit {lowest:.2f} <= T <= {highest:.2f}"
-    return [*found, stated("T = 1 gives the printed error bars", lowest <= 1 <= highest, text, "contains 1")]
+    yield stated("T = 1 gives the printed error bars", lowest <= 1 <= highest, text, "contains 1")
 
 
-def error_bars(evidence: ClaimEvidence) -> list[Check]:
+def error_bars(evidence: ClaimEvidence) -> Iterator[Check]:
     """M6: how many sigma_N the printed error bars are, and whether the printed means agree with ours."""
-    found: list[Check] = []
     for name, (m1, bar, n, per_bar) in PRINTED.items():
         sample = evidence.sample(name)
         sd, error = _spread_beside(sample, n)
@@ -85,20 +83,17 @@ def error_bars(evidence: ClaimEvidence) -> list[Check]:
             measured = (count * sd / np.sqrt(n), count * error / np.sqrt(n))
             form: Form = "corrected" if count == per_bar else "printed"
             if form == "corrected" or per_bar == 3:
-                found.append(close(f"{name}: {count} sigma_N", measured, bar, band=half_unit(bar), form=form))
+                yield close(f"{name}: {count} sigma_N", measured, bar, band=half_unit(bar), form=form)
         ours = mean(sample.gain)
         both = float(np.hypot(ours.error, float(bar) / per_bar))
-        found.append(
-            close(
-                f"{name}: the paper's m1* against ours",
-                (ours.value, both),
-                m1,
-                band=half_unit(m1),
-                form="corrected",
-                note=f"{(ours.value - float(m1)) / both:+.2f} standard errors of the difference",
-            )
+        yield close(
+            f"{name}: the paper's m1* against ours",
+            (ours.value, both),
+            m1,
+            band=half_unit(m1),
+            form="corrected",
+            note=f"{(ours.value - float(m1)) / both:+.2f} standard errors of the difference",
         )
-    return found
 
 
 def _spread_beside(sample: Sample, n: int) -> Mean:
@@ -107,20 +102,16 @@ def _spread_beside(sample: Sample, n: int) -> Mean:
     return Mean(sd, error * float(np.sqrt(1 + len(sample.gain) / n)))
 
 
-def width_exponent(evidence: ClaimEvidence) -> list[Check]:
+def width_exponent(evidence: ClaimEvidence) -> Iterator[Check]:
     """M7: the exponent of the peak's width."""
-    found: list[Check] = []
     for label, runs in (("moving cap", LADDER[1:6]), ("c = 0", ERGODIC)):
         fit, energies = fitted_width(evidence.samples(*runs))
         text = f"E0 {energies[0]:.0e} to {energies[-1]:.0e}: {fit.coefficient:.3g} E0^{fit.exponent:.3f}"
         measured = (fit.exponent, fit.exponent_error)
-        found.append(
-            close(f"{label}: exponent +1/4", measured, 0.25, band=EXPONENT_BAND, form="printed", note=text)
+        yield close(f"{label}: exponent +1/4", measured, 0.25, band=EXPONENT_BAND, form="printed", note=text)
+        yield close(
+            f"{label}: exponent -1/4", measured, -0.25, band=EXPONENT_BAND, form="corrected", note=text
         )
-        found.append(
-            close(f"{label}: exponent -1/4", measured, -0.25, band=EXPONENT_BAND, form="corrected", note=text)
-        )
-    return found
 
 
 def fitted_width(samples: list[Sample]) -> tuple[theory.PowerFit, list[float]]:
@@ -130,46 +121,34 @@ def fitted_width(samples: list[Sample]) -> tuple[theory.PowerFit, list[float]]:
     return theory.fit_power(energies, [w.value for w in widths], [w.error for w in widths]), energies
 
 
-def ergodic_mean(evidence: ClaimEvidence) -> list[Check]:
+def ergodic_mean(evidence: ClaimEvidence) -> Iterator[Check]:
     """M8: |m1*| < 3e-5 for c = 0."""
     sample = evidence.sample("ergodic@1e7")
     sd, found = spread(sample.gain), mean(sample.gain)
     chance = sd.value / np.sqrt(25_000)
     drift = sd.value**2 / 4
     luck = float(norm.cdf(3e-5, drift, chance) - norm.cdf(-3e-5, drift, chance))
-    return [
-        stated(
-            "the standard deviation is below 3e-5",
-            sd.value < 3e-5,
-            f"sd = {sd.value:.4f}",
-            "< 3e-5",
-            form="printed",
-        ),
-        stated(
-            "25,000 particles tell |m1*| < 3e-5",
-            chance < 3e-5,
-            f"their standard error is {chance:.1e}",
-            "< 3e-5",
-            form="printed",
-        ),
-        close(
-            "mean of s is sd²/4, the drift that preserving phase volume demands",
-            found,
-            drift,
-            band=drift / 2,
-            form="corrected",
-            note=f"|m1*| < 3e-5 with 25,000 particles has probability {luck:.2f}",
-        ),
-        close("sd E0^(1/4)", (sd.value * 1e7**0.25, sd.error * 1e7**0.25), 1.9, band=0.05, form="corrected"),
-    ]
+    what = "the standard deviation is below 3e-5"
+    yield stated(what, sd.value < 3e-5, f"sd = {sd.value:.4f}", "< 3e-5", form="printed")
+    what = "25,000 particles tell |m1*| < 3e-5"
+    yield stated(what, chance < 3e-5, f"their standard error is {chance:.1e}", "< 3e-5", form="printed")
+    yield close(
+        "mean of s is sd²/4, the drift that preserving phase volume demands",
+        found,
+        drift,
+        band=drift / 2,
+        form="corrected",
+        note=f"|m1*| < 3e-5 with 25,000 particles has probability {luck:.2f}",
+    )
+    yield close("sd E0^(1/4)", (sd.value * 1e7**0.25, sd.error * 1e7**0.25), 1.9, band=0.05, form="corrected")
 
 
-def finite_bias(evidence: ClaimEvidence) -> list[Check]:
+def finite_bias(evidence: ClaimEvidence) -> Iterator[Check]:
     """M9: the mean of s is biased at finite energy; the mean of exp(-s/2) is not."""
     samples = evidence.samples(*LADDER)
     theirs = float(evidence.predict("moving-cap").m1)
     low = samples[0]
-    found = [close(f"{low.run.name}: mean of s is m1, no bias", mean(low.gain), theirs, form="printed")]
+    yield close(f"{low.run.name}: mean of s is m1, no bias", mean(low.gain), theirs, form="printed")
     values = [mean(sample.gain) for sample in samples]
     fit = theory.extrapolate(
         [sample.run.energy for sample in samples], [m.value for m in values], [m.error for m in values]
@@ -177,27 +156,17 @@ def finite_bias(evidence: ClaimEvidence) -> list[Check]:
     limit = (fit.limit, fit.limit_error)
     text = f"m1* = m1 + {fit.slope:.2f} E0^(-1/2), chi² = {fit.chi_square:.1f} for {len(samples) - 2}"
     curvature = abs(fit.slope) / low.run.energy  # the next order, 1/E0, with a coefficient of the same size
-    found.append(
-        close(
-            "limit of the mean of s as E0 grows", limit, theirs, band=curvature, form="corrected", note=text
-        )
+    yield close(
+        "limit of the mean of s as E0 grows", limit, theirs, band=curvature, form="corrected", note=text
     )
     half = float(theory.unbiased_mean(load("moving-cap")))
     for sample in samples:
         band = sample.run.energy**-1.0 * 2  # of order 1/E0
-        found.append(
-            close(
-                f"{sample.run.name}: mean of exp(-s/2)",
-                mean(np.exp(-sample.gain / 2)),
-                half,
-                band=band,
-                form="corrected",
-            )
-        )
-    return found
+        what = f"{sample.run.name}: mean of exp(-s/2)"
+        yield close(what, mean(np.exp(-sample.gain / 2)), half, band=band, form="corrected")
 
 
-def heating(evidence: ClaimEvidence) -> list[Check]:
+def heating(evidence: ClaimEvidence) -> Iterator[Check]:
     """M11: where the energy comes from in the clockwise cycle, with a cap at rest."""
     sample = evidence.sample(CW)
     # Captured at phases 4/8 and 6/8, between which the mouth stays at w0 and the stem grows.
@@ -206,30 +175,19 @@ def heating(evidence: ClaimEvidence) -> list[Check]:
     free = sample.phase_s[~sample.captured, 0, 5] - sample.phase_s[~sample.captured, 0, 3]
     largest = float(np.max(np.abs(change), initial=0.0))
     gain = mean(sample.gain[sample.captured])
-    return [
-        stated(
-            "energy grows in the cap",
-            largest > 1e-9,
-            f"largest |change of log E| of {still.sum():,} captured"
-            f" particles while the stem grows: {largest:.1e}",
-            "> 0",
-            form="printed",
-        ),
-        stated(
-            "energy is constant in the cap",
-            still.sum() > 0 and largest < 1e-9,
-            f"{largest:.1e}",
-            "0",
-            form="corrected",
-        ),
-        above(
-            "the free lose energy meanwhile, log E falls by",
-            (-mean(free).value, mean(free).error),
-            0.0,
-            form="corrected",
-        ),
-        above("so the captured come out ahead: their mean of s", gain, 0.0, form="corrected"),
-    ]
+    yield stated(
+        "energy grows in the cap",
+        largest > 1e-9,
+        f"largest |change of log E| of {still.sum():,} captured"
+        f" particles while the stem grows: {largest:.1e}",
+        "> 0",
+        form="printed",
+    )
+    what = "energy is constant in the cap"
+    yield stated(what, still.sum() > 0 and largest < 1e-9, f"{largest:.1e}", "0", form="corrected")
+    what = "the free lose energy meanwhile, log E falls by"
+    yield above(what, (-mean(free).value, mean(free).error), 0.0, form="corrected")
+    yield above("so the captured come out ahead: their mean of s", gain, 0.0, form="corrected")
 
 
 CHECKS = {

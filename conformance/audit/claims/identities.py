@@ -6,6 +6,7 @@ single formulas of the paper.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
 import mpmath
@@ -32,31 +33,27 @@ N_LOOPS = 6
 SIMULATED = (ACW, CW, "moving-cap@1e6", "moving-cap@1e7", "moving-cap-reversed@1e6", "untilted@1e6")
 
 
-def mean_exp_minus(evidence: ClaimEvidence) -> list[Check]:
+def mean_exp_minus(evidence: ClaimEvidence) -> Iterator[Check]:
     """I1: the mean of E0/E1 is 1."""
-    found = [
+    yield from (
         exact(f"{name}: theory", evidence.predict(name).mean_exp_minus, 1, 10.0 ** (2 - DIGITS))
         for name in NAMES
-    ]
+    )
     for run in SIMULATED[:-1]:
         sample = evidence.sample(run)
         sigma = width(sample).value
-        found.append(close(f"{run}: simulation", mean(np.exp(-sample.gain)), 1.0, band=sigma**2 / 2))
-    return found
+        yield close(f"{run}: simulation", mean(np.exp(-sample.gain)), 1.0, band=sigma**2 / 2)
 
 
-def equivalent_forms(evidence: ClaimEvidence) -> list[Check]:
+def equivalent_forms(evidence: ClaimEvidence) -> Iterator[Check]:
     """N1: eq. (Erate) is the mean of eq. (lnE/E0) over eq. (ps)."""
-    found = []
     for name in NAMES:
         direct = theory.mean_of(scenes.load(name), lambda s: s, 20)
-        found.append(exact(f"{name}: mean of eq. (lnE/E0)", direct, evidence.predict(name).m1, 1e-18))
-    return found
+        yield exact(f"{name}: mean of eq. (lnE/E0)", direct, evidence.predict(name).m1, 1e-18)
 
 
-def formulas_in_w(evidence: ClaimEvidence) -> list[Check]:
+def formulas_in_w(evidence: ClaimEvidence) -> Iterator[Check]:
     """N2: sec. 4.1's integrals over w, by a quadrature of their own."""
-    found: list[Check] = []
     printed = {
         "fixed-cap-anticlockwise": ("0.044926", "0.161205"),
         "fixed-cap-clockwise": ("0.05252", "-0.161205"),
@@ -68,13 +65,10 @@ def formulas_in_w(evidence: ClaimEvidence) -> list[Check]:
         with mpmath.workdps(20):
             total, peak = _over_w(w0, w1, h_in, h_out, mpmath.mpf(table.slope))
         theirs = evidence.predict(name)
-        found += [
-            exact(f"{name}: growth rate, integral over w", total, theirs.m1, 1e-10),
-            rounds(f"{name}: printed growth rate", m1, total, "claim"),
-            exact(f"{name}: eq. (Enoncapt)", peak, theirs.log_e_nc, 1e-15),
-            rounds(f"{name}: printed log E_nc/E0", log_e_nc, peak, "claim"),
-        ]
-    return found
+        yield exact(f"{name}: growth rate, integral over w", total, theirs.m1, 1e-10)
+        yield rounds(f"{name}: printed growth rate", m1, total, "claim")
+        yield exact(f"{name}: eq. (Enoncapt)", peak, theirs.log_e_nc, 1e-15)
+        yield rounds(f"{name}: printed log E_nc/E0", log_e_nc, peak, "claim")
 
 
 def _over_w(w0: Any, w1: Any, h_in: Any, h_out: Any, slope: Any) -> tuple[Any, Any]:
@@ -92,7 +86,7 @@ def _over_w(w0: Any, w1: Any, h_in: Any, h_out: Any, slope: Any) -> tuple[Any, A
     return total, mpmath.quad(lambda w: rate(w) - rate(w, h_out), [w0, w1])
 
 
-def positivity(evidence: ClaimEvidence) -> list[Check]:
+def positivity(evidence: ClaimEvidence) -> Iterator[Check]:
     """N3: m1 >= 0 for any cycle, several captures included."""
     random = np.random.default_rng(evidence.seed)
     least, n_nested = np.inf, 0
@@ -110,74 +104,48 @@ def positivity(evidence: ClaimEvidence) -> list[Check]:
         scenes.from_data(scenes.to_data(table))
         n_nested += bool(theory.Cycle.of(table, 15).valley.children)
         least = min(least, float(theory.predict(table, 12).m1))
-    return [
-        stated(
-            f"m1 > 0 in {N_LOOPS} random loops, {n_nested} of them with several captures",
-            least > 0,
-            f"least m1 = {least:.3g}",
-            "> 0",
-        )
-    ]
+    what = f"m1 > 0 in {N_LOOPS} random loops, {n_nested} of them with several captures"
+    yield stated(what, least > 0, f"least m1 = {least:.3g}", "> 0")
 
 
-def reversal(evidence: ClaimEvidence) -> list[Check]:
+def reversal(evidence: ClaimEvidence) -> Iterator[Check]:
     """N4: reversed cycles weigh the forward ones by exp(-s)."""
-    found = []
     size = 1e-20
     for name in ("moving-cap", "fixed-cap-anticlockwise"):
         forward = evidence.predict(name)
         backward = evidence.predict(theory.reversed_cycle(scenes.load(name)))
         weighted = -theory.mean_of(scenes.load(name), lambda s: s * s.context.exp(-s), 22)
-        found += [
-            exact(f"{name}: log E_nc flips", backward.log_e_nc, -forward.log_e_nc, size),
-            exact(
-                f"{name}: p_nc of the reverse is p_nc exp(-s_nc)",
-                backward.p_nc,
-                forward.p_nc * mpmath.exp(-forward.log_e_nc),
-                1e-14,
-            ),
-            exact(f"{name}: m1 of the reverse is -mean of s exp(-s)", backward.m1, weighted, size),
-        ]
-    return found
+        yield exact(f"{name}: log E_nc flips", backward.log_e_nc, -forward.log_e_nc, size)
+        what = f"{name}: p_nc of the reverse is p_nc exp(-s_nc)"
+        yield exact(what, backward.p_nc, forward.p_nc * mpmath.exp(-forward.log_e_nc), 1e-14)
+        yield exact(f"{name}: m1 of the reverse is -mean of s exp(-s)", backward.m1, weighted, size)
 
 
-def right_mode(_evidence: ClaimEvidence) -> list[Check]:
+def right_mode(_evidence: ClaimEvidence) -> Iterator[Check]:
     """N5: the largest gain, where the density of s has its caustic."""
     gain = theory.largest_gain(scenes.load("moving-cap"))
     caustic = theory.caustics(scenes.load("moving-cap"))
     assert gain is not None
-    return [
-        exact("largest log E1/E0", gain[1], 0.846126, 5e-7),
-        exact("its capture time", gain[0], 1.24757, 5e-6),
-        stated(
-            "one caustic, there",
-            len(caustic) == 1 and abs(float(caustic[0].s) - gain[1]) < 1e-12,
-            f"s = {float(caustic[0].s):.9f}" if caustic else "none",
-            "s of the largest gain",
-        ),
-    ]
+    yield exact("largest log E1/E0", gain[1], 0.846126, 5e-7)
+    yield exact("its capture time", gain[0], 1.24757, 5e-6)
+    yield stated(
+        "one caustic, there",
+        len(caustic) == 1 and abs(float(caustic[0].s) - gain[1]) < 1e-12,
+        f"s = {float(caustic[0].s):.9f}" if caustic else "none",
+        "s of the largest gain",
+    )
 
 
-def orientations(_evidence: ClaimEvidence) -> list[Check]:
+def orientations(_evidence: ClaimEvidence) -> Iterator[Check]:
     """N6: the sense of sec. 4.1's loops in the plane (w, h), as eq. (cycle) and its reverse say."""
-    found = []
     for name, sign in (("fixed-cap-anticlockwise", 1), ("fixed-cap-clockwise", -1)):
         table = scenes.load(name)
         assert isinstance(table, Mushroom)
         w, h = ([v for _, v in law.knots[:-1]] for law in (table.w, table.h))  # type: ignore[union-attr]
         area = signed_area(w, h)
-        found.append(
-            stated(f"{name} in the plane (w, h)", area * sign > 0, f"area {area:+.3f}", f"sign {sign:+d}")
-        )
-    found.append(
-        stated(
-            "moving-cap in the plane (V_ell/V_cap, V_cap/V): clockwise",
-            loop_area("moving-cap") < 0,
-            f"area {loop_area('moving-cap'):+.4f}",
-            "area < 0",
-        )
-    )
-    return found
+        yield stated(f"{name} in the plane (w, h)", area * sign > 0, f"area {area:+.3f}", f"sign {sign:+d}")
+    what = "moving-cap in the plane (V_ell/V_cap, V_cap/V): clockwise"
+    yield stated(what, loop_area("moving-cap") < 0, f"area {loop_area('moving-cap'):+.4f}", "area < 0")
 
 
 CHECKS = {

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 from scipy.stats import norm
 
@@ -15,19 +17,17 @@ from conformance.audit.samples import Sample
 from conformance.audit.tolerances import FloatArray, Mean, close, fits, mean, share, spread, stated
 
 
-def sums(evidence: ClaimEvidence) -> list[Check]:
+def sums(evidence: ClaimEvidence) -> Iterator[Check]:
     """X4: after n cycles the centre is Gaussian, the tails are not."""
     runs = ("moving-cap@1e7x10", "moving-cap@1e7x30") if evidence.size == "full" else ("moving-cap@1e5x30",)
-    found: list[Check] = []
     cumulants = [float(k) for k in theory.cumulants(scene_of(RUNS[runs[0]]), 3)]
     for run in runs:
         sample = evidence.sample(run)
         for n in sorted({10, sample.run.n_cycles}):
-            found += _sum_of(evidence, sample, n, cumulants)
-    return found
+            yield from _sum_of(evidence, sample, n, cumulants)
 
 
-def _sum_of(evidence: ClaimEvidence, sample: Sample, n: int, cumulants: list[float]) -> list[Check]:
+def _sum_of(evidence: ClaimEvidence, sample: Sample, n: int, cumulants: list[float]) -> Iterator[Check]:
     label = f"{sample.run.name}, n = {n}"
     total = sample.s[:, n - 1]
     m1, sd = cumulants[1], cumulants[2] ** 0.5
@@ -40,31 +40,21 @@ def _sum_of(evidence: ClaimEvidence, sample: Sample, n: int, cumulants: list[flo
     skewness = cumulants[3] * n / scale**3
     z = (total - mean(total).value) / spread(total).value
     gap = float(np.max(np.abs(below - _gaussian(places, centre, scale))))
-    return [
-        close(f"{label}: mean of log E_n/E0 over n, less its bias", per_cycle, m1, band=band / n, scale=m1),
-        close(
-            f"{label}: standard deviation over n",
-            (spread(total).value / n, spread(total).error / n),
-            scale / n,
-            band=0.03 * scale / n,
-        ),
-        fits(
-            f"{label}: log E_n/E0 against the convolution of n cycles",
-            total,
-            [lambda s: np.asarray(np.interp(s, places, below))],
-            band=band / scale * 0.4,
-            scale=0.3,
-            note=f"the Gaussian is off by {gap:.3f} of itself",
-        ),
-        close(f"{label}: share within one standard deviation", share(inner), expected, band=0.01),
-        close(
-            f"{label}: skewness, 0 for a Gaussian",
-            (float(np.mean(z**3)), float(np.sqrt(6 / len(z)))),
-            skewness,
-            band=0.1,
-        ),
-        stated(f"{label}: the tails are no Gaussian's, by theory", *_tails(places, below, centre, scale)),
-    ]
+    yield close(f"{label}: mean of log E_n/E0 over n, less its bias", per_cycle, m1, band=band / n, scale=m1)
+    what = f"{label}: standard deviation over n"
+    yield close(what, (spread(total).value / n, spread(total).error / n), scale / n, band=0.03 * scale / n)
+    yield fits(
+        f"{label}: log E_n/E0 against the convolution of n cycles",
+        total,
+        [lambda s: np.asarray(np.interp(s, places, below))],
+        band=band / scale * 0.4,
+        scale=0.3,
+        note=f"the Gaussian is off by {gap:.3f} of itself",
+    )
+    yield close(f"{label}: share within one standard deviation", share(inner), expected, band=0.01)
+    what = f"{label}: skewness, 0 for a Gaussian"
+    yield close(what, (float(np.mean(z**3)), float(np.sqrt(6 / len(z)))), skewness, band=0.1)
+    yield stated(f"{label}: the tails are no Gaussian's, by theory", *_tails(places, below, centre, scale))
 
 
 def blur_of_sum(sample: Sample, n: int) -> tuple[float, float, float]:

@@ -6,7 +6,7 @@ nothing is recorded.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import mpmath
@@ -21,6 +21,7 @@ from conformance.audit.tolerances import exact, stated
 from scene.laws import BangBang
 from scene.tables import Mushroom, cycle_length
 
+FORMS: tuple[Form, Form] = ("printed", "corrected")
 ZERO = 1e-12  # float64 sums of a few hundred terms of order 10
 N_LOOP = 256  # the trapezoid rule converges geometrically on smooth periodic loops
 
@@ -30,7 +31,7 @@ def rounds(what: str, printed: str, value: Any, form: Form) -> Check:
     return Check(what, rounds_to(printed, value), printed, float(value), form=form)
 
 
-def half_angle(evidence: ClaimEvidence) -> list[Check]:
+def half_angle(evidence: ClaimEvidence) -> Iterator[Check]:
     """M1: the mouth as printed, sin²(t), and with the half angle."""
     try:
         scenes.load("moving-cap-as-printed")
@@ -43,45 +44,35 @@ def half_angle(evidence: ClaimEvidence) -> list[Check]:
         nu=scenes.Fourier(0.6, 1.0, (0.0, 0.4)),
     )
     as_printed, corrected = evidence.predict(upright), evidence.predict("moving-cap")
-    return [
-        stated("sin²(t): the table is valid through the cycle", is_valid, message, "valid", form="printed"),
-        stated(
-            "sin²(t), slope 0: energy grows",
-            bool(as_printed.m1 > ZERO),
-            f"m1 = {mpmath.nstr(as_printed.m1, 3)}: t and pi - t see the same r, h",
-            "m1 > 0",
-            form="printed",
-        ),
-        stated("sin²(t/2): the table is valid", True, "valid, by exact algebra", "valid", form="corrected"),
-        rounds("sin²(t/2): m1", "0.122768", corrected.m1, "corrected"),
-        rounds("sin²(t/2): p_nc", "0.38474", corrected.p_nc, "corrected"),
-    ]
+    yield stated("sin²(t): the table is valid through the cycle", is_valid, message, "valid", form="printed")
+    yield stated(
+        "sin²(t), slope 0: energy grows",
+        bool(as_printed.m1 > ZERO),
+        f"m1 = {mpmath.nstr(as_printed.m1, 3)}: t and pi - t see the same r, h",
+        "m1 > 0",
+        form="printed",
+    )
+    yield stated("sin²(t/2): the table is valid", True, "valid, by exact algebra", "valid", form="corrected")
+    yield rounds("sin²(t/2): m1", "0.122768", corrected.m1, "corrected")
+    yield rounds("sin²(t/2): p_nc", "0.38474", corrected.p_nc, "corrected")
 
 
-def signs(evidence: ClaimEvidence) -> list[Check]:
+def signs(evidence: ClaimEvidence) -> Iterator[Check]:
     """M2: the text's signs of a and b, and the captions'."""
     printed = {"m1": "0.122768", "p_nc": "0.38474", "log_e_nc": "-0.422465"}
     cases: tuple[tuple[str, str, Form], ...] = (
         ("moving-cap-reversed", "text, a = -0.5, b = 0.5", "printed"),
         ("moving-cap", "captions, a = 0.5, b = -0.5", "corrected"),
     )
-    found = [
+    yield from (
         rounds(f"{label}: {name}", value, getattr(evidence.predict(scene), name), form)
         for scene, label, form in cases
         for name, value in printed.items()
-    ]
+    )
     for scene, label, form in cases:
         turn = loop_area(scene)
-        found.append(
-            stated(
-                f"{label}: the loop runs clockwise, as the caption of the cycle's figure says",
-                turn < 0,
-                f"signed area {turn:+.4f}",
-                "area < 0",
-                form=form,
-            )
-        )
-    return found
+        what = f"{label}: the loop runs clockwise, as the caption of the cycle's figure says"
+        yield stated(what, turn < 0, f"signed area {turn:+.4f}", "area < 0", form=form)
 
 
 def loop_area(name: str) -> float:
@@ -105,40 +96,30 @@ def signed_area(x: Sequence[float], y: Sequence[float]) -> float:
     return float(sum(x[k] * y[(k + 1) % n] - x[(k + 1) % n] * y[k] for k in range(n)) / 2)
 
 
-def radius_squared(_evidence: ClaimEvidence) -> list[Check]:
+def radius_squared(_evidence: ClaimEvidence) -> Iterator[Check]:
     """M3: the half disk x² + y² <= r, and x² + y² <= r², against V_cap = pi² r² = 2 pi times its area."""
-    found: list[Check] = []
     for r in (0.5, 1.5):
-        for power, form in ((1, "printed"), (2, "corrected")):
+        for power, form in zip((1, 2), FORMS, strict=True):
             edge = mpmath.sqrt(mpmath.mpf(r) ** power)
             area = mpmath.quad(lambda x, edge=edge: mpmath.sqrt(edge**2 - x**2), [-edge, 0, edge])
             what = f"x² + y² <= r{'²' if power == 2 else ''}, r = {r}: 2 pi area"
-            found.append(exact(what, 2 * mpmath.pi * area, theory.v_cap(mpmath.mp, r), ZERO, form=form))  # type: ignore[arg-type]
-    return found
+            yield exact(what, 2 * mpmath.pi * area, theory.v_cap(mpmath.mp, r), ZERO, form=form)
 
 
-def exponent_sign(evidence: ClaimEvidence) -> list[Check]:
+def exponent_sign(evidence: ClaimEvidence) -> Iterator[Check]:
     """M4: exp(-∫ dV_ell/V_cha) and exp(+∫ dV_ell/V_cha) over the mouth's closing, sec. 4.1."""
-    found = []
     for name, paper in (("fixed-cap-anticlockwise", "0.843472"), ("fixed-cap-clockwise", "0.717894")):
         table = scenes.load(name)
         with mpmath.workdps(DIGITS):
             integral = _capture_integral(table)
             minus, plus = mpmath.exp(-integral), mpmath.exp(integral)
         theirs = evidence.predict(table).p_nc
-        found += [
-            stated(
-                f"exp(-∫), {name}: a probability",
-                bool(minus <= 1),
-                mpmath.nstr(minus, 8),
-                "<= 1",
-                form="printed",
-            ),
-            rounds(f"exp(-∫), {name}: p_nc", paper, minus, "printed"),
-            rounds(f"exp(+∫), {name}: p_nc", paper, plus, "corrected"),
-            exact(f"exp(+∫), {name}: eq. (ps)", plus, theirs, 10.0 ** (5 - DIGITS), form="corrected"),
-        ]
-    return found
+        yield stated(
+            f"exp(-∫), {name}: a probability", bool(minus <= 1), mpmath.nstr(minus, 8), "<= 1", form="printed"
+        )
+        yield rounds(f"exp(-∫), {name}: p_nc", paper, minus, "printed")
+        yield rounds(f"exp(+∫), {name}: p_nc", paper, plus, "corrected")
+        yield exact(f"exp(+∫), {name}: eq. (ps)", plus, theirs, 10.0 ** (5 - DIGITS), form="corrected")
 
 
 def _capture_integral(table: scenes.Scene) -> Any:
@@ -173,23 +154,19 @@ def chaotic_volume(w: Any, h: Any, slope: Any) -> Any:
     return pi * pi + 2 * pi * (2 * w * h - h * h * slope) - v_ell
 
 
-def cone(_evidence: ClaimEvidence) -> list[Check]:
+def cone(_evidence: ClaimEvidence) -> Iterator[Check]:
     """M10: where the cone |x| <= w + y tan theta must still be open: y = h as printed, or y = -h."""
     w, h, slope = mpmath.mpf("0.5"), mpmath.mpf(1), mpmath.mpf("0.5")  # w = h tan: the stem just closes
     volume = theory.v_stem(mpmath.mp, w, h, slope)
-    found: list[Check] = []
-    for end, form in ((h, "printed"), (-h, "corrected")):
+    for end, form in zip((h, -h), FORMS, strict=True):
         width = w + end * slope
         area = mpmath.quad(lambda y: 2 * (w + y * slope), sorted([0, end]))
         label = "y = h" if end > 0 else "y = -h"
-        found += [
-            exact(f"{label}: w = h tan is where the cone closes", width, 0, ZERO, form=form),  # type: ignore[arg-type]
-            exact(f"{label}: 2 pi area is V_stem", 2 * mpmath.pi * area, volume, ZERO, form=form),  # type: ignore[arg-type]
-        ]
-    return found
+        yield exact(f"{label}: w = h tan is where the cone closes", width, 0, ZERO, form=form)
+        yield exact(f"{label}: 2 pi area is V_stem", 2 * mpmath.pi * area, volume, ZERO, form=form)
 
 
-def loop_plane(evidence: ClaimEvidence) -> list[Check]:
+def loop_plane(evidence: ClaimEvidence) -> Iterator[Check]:
     """M12: area of the loop a = b = 0.5 in the summary's plane and in that of sec. 3.5."""
     table = scenes.load("moving-cap-trivial")
     share, part = volume_loop(table, N_LOOP)
@@ -198,25 +175,23 @@ def loop_plane(evidence: ClaimEvidence) -> list[Check]:
     result = evidence.predict("moving-cap-trivial")
     grows = abs(result.m1) > ZERO
     m1 = f"m1 = {mpmath.nstr(result.m1, 3)}, p_nc = {mpmath.nstr(result.p_nc, 6)}"
-    return [
-        stated(
-            "plane (V_cha, flux): an area means growth",
-            (abs(summary) > ZERO) == grows,
-            f"area {summary:.4g}, yet {m1}",
-            "area and growth, or neither",
-            form="printed",
-        ),
-        stated(
-            "plane (V_ell/V_cap, V_cap/V): an area means growth",
-            (abs(section) > ZERO) == grows,
-            f"area {section:.1g}, {m1}",
-            "area and growth, or neither",
-            form="corrected",
-        ),
-    ]
+    yield stated(
+        "plane (V_cha, flux): an area means growth",
+        (abs(summary) > ZERO) == grows,
+        f"area {summary:.4g}, yet {m1}",
+        "area and growth, or neither",
+        form="printed",
+    )
+    yield stated(
+        "plane (V_ell/V_cap, V_cap/V): an area means growth",
+        (abs(section) > ZERO) == grows,
+        f"area {section:.1g}, {m1}",
+        "area and growth, or neither",
+        form="corrected",
+    )
 
 
-def measures(evidence: ClaimEvidence) -> list[Check]:
+def measures(evidence: ClaimEvidence) -> Iterator[Check]:
     """M13: whose share p_cha is, and which volume the set H = E has."""
     table = Mushroom(r=1.0, h=scenes.Fourier(1.0, 1.0, (), (0.5,)), nu=scenes.Fourier(0.5, 1.0, (0.4,)))
     start = theory.volumes_at(fp, table, 0.0)  # nu = 0.9 at most: an island remains
@@ -225,36 +200,16 @@ def measures(evidence: ClaimEvidence) -> list[Check]:
     energy, area = 2.0, 1.0
     printed = 2 * fp.pi * fp.sqrt(2 * energy) * area
     rate = 2 * fp.pi * ((energy + 1) - (energy - 1)) * area / 2  # of the volume below H = E: a disk times A
-    return [
-        exact(
-            "n_cha/n_0 and n_cha/n_cha(t0) agree for any loop (nu from 0.1 to 0.9)",
-            p_nc * free,
-            p_nc,
-            ZERO,
-            form="printed",
-        ),
-        exact(
-            "they agree when nu reaches 1, as in every loop of the paper",
-            theory.volumes_at(fp, scenes.load("moving-cap"), 0.0).v_ell,
-            0.0,
-            ZERO,
-            form="corrected",
-        ),
-        exact(
-            "volume of H = E, E = 2, A = 1, as Liouville's measure: 2 pi sqrt(2E) A",
-            printed,
-            rate,
-            ZERO,
-            form="printed",
-        ),
-        exact(
-            "2 pi A for every E: as V(D0) is defined, and all the paper's ratios need",
-            2 * fp.pi * area,
-            rate,
-            ZERO,
-            form="corrected",
-        ),
-    ]
+    what = "n_cha/n_0 and n_cha/n_cha(t0) agree for any loop (nu from 0.1 to 0.9)"
+    yield exact(what, p_nc * free, p_nc, ZERO, form="printed")
+    what = "they agree when nu reaches 1, as in every loop of the paper"
+    yield exact(
+        what, theory.volumes_at(fp, scenes.load("moving-cap"), 0.0).v_ell, 0.0, ZERO, form="corrected"
+    )
+    what = "volume of H = E, E = 2, A = 1, as Liouville's measure: 2 pi sqrt(2E) A"
+    yield exact(what, printed, rate, ZERO, form="printed")
+    what = "2 pi A for every E: as V(D0) is defined, and all the paper's ratios need"
+    yield exact(what, 2 * fp.pi * area, rate, ZERO, form="corrected")
 
 
 CHECKS = {

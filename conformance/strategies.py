@@ -12,6 +12,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Sequence
+from functools import cache
 from typing import Any, Literal, NamedTuple, TypeVar
 
 import msgspec
@@ -44,6 +45,7 @@ class Clock(NamedTuple):
     start: float = 0.0
 
 
+@cache
 def fractions() -> st.SearchStrategy[float]:
     """Draw from the open interval (0, 1): uniform, or within 2^-k of an end, k up to 52."""
     uniform = st.integers(1, 2**20 - 1).map(lambda n: _scatter(n, 20) / 2**20)
@@ -51,6 +53,7 @@ def fractions() -> st.SearchStrategy[float]:
     return st.one_of(st.just(0.5), uniform, uniform, uniform, near_0, near_0.map(lambda e: 1 - e))
 
 
+@cache
 def clocks() -> st.SearchStrategy[Clock]:
     """Draw what the laws of a scene share: static, Fourier or bang-bang, periods of order 1 to 10."""
     sixteenths = st.integers(8, 64).map(lambda n: n / 16)
@@ -67,14 +70,21 @@ def _scatter(n: int, bits: int) -> int:
     return (n * 648055) & ((1 << bits) - 1)
 
 
+# Made once: Hypothesis validates every strategy anew that is made while it draws.
+_SHARES = st.integers(0, 2**20).map(lambda n: 1.0 if n == 2**20 else _scatter(n, 20) / 2**20)
+_PLACES = st.integers(0, 2**20 - 1)
+_KNOTS = st.integers(1, 4095).map(lambda n: _scatter(n, 12))
+_N_WAVES = st.sampled_from([(i, j) for i in range(5) for j in range(5) if i + j])
+_TURNS = st.one_of(st.integers(-2, 3), st.sampled_from((0, 0, 1000, -1000)))
+
+
 def _between(low: float, high: float) -> st.SearchStrategy[float]:
     # Even on a grid of 2^-20 of the range, the ends included.
-    part = st.integers(0, 2**20).map(lambda n: 1.0 if n == 2**20 else _scatter(n, 20) / 2**20)
-    return part.map(lambda share: min(low + (high - low) * share, high))
+    return _SHARES.map(lambda share: min(low + (high - low) * share, high))
 
 
 def _one_of(options: Sequence[T]) -> st.SearchStrategy[T]:
-    return st.integers(0, 2**20 - 1).map(lambda n: options[_scatter(n, 20) * len(options) >> 20])
+    return _PLACES.map(lambda n: options[_scatter(n, 20) * len(options) >> 20])
 
 
 @st.composite
@@ -107,7 +117,7 @@ def laws(draw: st.DrawFn, low: float = 0.5, high: float = 2.0, clock: Clock | No
 def _fourier(draw: st.DrawFn, low: float, high: float, omega: float) -> Fourier:
     mean = draw(_between(0.75 * low + 0.25 * high, 0.25 * low + 0.75 * high))
     swing = min(high - mean, mean - low)
-    n_cos, n_sin = draw(st.sampled_from([(i, j) for i in range(5) for j in range(5) if i + j]))
+    n_cos, n_sin = draw(_N_WAVES)
     if (n_cos, n_sin) == (1, 0):
         # One cosine that reaches the nearer bound, exactly where mean and bound are dyadic.
         return Fourier(mean=mean, omega=omega, cos=(swing if mean + swing <= high else swing * MARGIN,))
@@ -122,8 +132,7 @@ def _fourier(draw: st.DrawFn, low: float, high: float, omega: float) -> Fourier:
 def _bang_bang(draw: st.DrawFn, low: float, high: float, clock: Clock) -> BangBang:
     # Inner knots on a grid of 1/4096 of the period; or off every grid, to 1/3 of a step.
     n_legs = draw(st.integers(2, 6))
-    inner = st.integers(1, 4095).map(lambda n: _scatter(n, 12))
-    places = draw(st.lists(inner, min_size=n_legs - 1, max_size=n_legs - 1, unique=True))
+    places = draw(st.lists(_KNOTS, min_size=n_legs - 1, max_size=n_legs - 1, unique=True))
     shift = draw(st.sampled_from((0.0, 1 / 3)))
     times = [clock.start + clock.rate * ((place + shift) / 4096) for place in sorted(places)]
     levels = st.one_of(_between(low, high), st.sampled_from((low, high)))
@@ -302,7 +311,7 @@ def adversarial(family: str | None = None) -> st.SearchStrategy[Any]:
 def _times(draw: st.DrawFn, scene: Scene) -> float:
     length = cycle_length(scene) or 1.0
     knots = [float(t) for law in laws_of(scene).values() for t in breakpoints(law)] or [0.0]
-    turns = draw(st.one_of(st.integers(-2, 3), st.sampled_from((0, 0, 1000, -1000))))
+    turns = draw(_TURNS)
     inside = fractions().map(lambda part: length * (turns + part))
     at_knot = st.sampled_from(knots).map(lambda knot: length * turns + knot)
     return draw(st.one_of(st.just(0.0), inside, inside, inside, at_knot))

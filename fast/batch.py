@@ -12,20 +12,72 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+from numba import njit
 
 from fast.compiled import compile_scene
 from fast.fine import FineTrajectory, as_pairs, as_trajectory, fill_path
 from fast.flow import follow_to
-from fast.kernel import bounces, codes, follow, pools, walls
+from fast.kernel import codes, pools
+from fast.kernel.bounces import bounce, rebound
+from fast.kernel.entries import SOURCES
+from fast.kernel.follow import DISK, GENERAL, OFF, advance, correct
 from fast.kernel.laws import set_anchors
 from fast.kernel.limits import limits_of, own_omegas
 from fast.kernel.records import ANCHORS_SHAPE, LEVEL, OMEGA, SHARED, SLOPE, FloatArray, Particle
+from fast.kernel.walls import wall_residual
 from fast.step import WALL_NAMES, as_arrays, fitted_start, followed_paths, trouble
 from fast.units import fit
 from scene import Collision, Horizon, Outcome, Scene, State
 
 PLACE = (pools.X, pools.Y, pools.VX, pools.VY)
-OFF = np.bool_(False)
+
+
+def _entries(sources):
+    """Return the compiled functions of a round of lanes, kept on disk as those of fast.kernel.entries are."""
+
+    @njit(cache=True, error_model="numpy")
+    def fill_lane(a, i, particle, age, scene, anchors):
+        """Put a particle into a lane, its laws known from `age` before its time, if they still serve then."""
+        sources  # noqa: B018
+        for early in (age, 0.0):
+            pools.load(a, i, particle, np.inf, OFF)
+            t = particle.t - early
+            a[pools.NEXT_T + i], a[pools.NEXT_T_LOW + i] = t, particle.t_low
+            set_anchors(scene.laws, anchors, t, particle.t_low)
+            pools.set_reference(a, i, scene, anchors)
+            if a[pools.END + i] > particle.t:
+                break
+        since = (a[pools.T + i] - a[pools.REF + i]) + (a[pools.T_LOW + i] - a[pools.REF_LOW + i])
+        pools.set_laws(a, i, pools.R0, pools.W0, pools.H0, since, scene)
+        a[pools.SPIN + i] = particle.x * particle.vy - particle.y * particle.vx
+
+    @njit(cache=True, error_model="numpy")
+    def find_hits(pool, a, n, spare, scene, limits, omegas):
+        """Find the next collision of n lanes, and correct what is coarse."""
+        sources  # noqa: B018
+        advance(pool, a, n, OFF, scene, limits, omegas)
+        correct(pool, a, n, spare, scene, limits, omegas)
+
+    @njit(cache=True, error_model="numpy")
+    def bounce_lanes(pool, a, n, slope, is_mushroom):
+        """Bounce n lanes off the walls that they have met."""
+        sources  # noqa: B018
+        if pool == DISK:
+            rebound(a, n)
+        else:
+            bounce(a, n, slope, is_mushroom)
+
+    @njit(cache=True, error_model="numpy")
+    def residual(particle, scene, anchors):
+        """Return the function of a particle's wall where the particle is, and a bound on its rounding."""
+        sources  # noqa: B018
+        set_anchors(scene.laws, anchors, particle.t, particle.t_low)
+        return wall_residual(particle.wall, particle.x, particle.y, scene, anchors)
+
+    return fill_lane, find_hits, bounce_lanes, residual
+
+
+fill_lane, find_hits, bounce_lanes, residual = _entries(SOURCES)
 
 
 def careful_steps(scene: Scene, states: Sequence[State], n_times: int = 1) -> tuple[list[Outcome], float]:
@@ -105,18 +157,7 @@ class LaneRound:
 
     def fill(self, lane: int, p: FloatArray, wall: int, age: float = 0.0) -> None:
         """Put a state [t, its low part, x, y, vx, vy] into a lane, its laws known from `age` before it."""
-        a, i = self.pool, np.int64(lane)
-        particle = as_particle(p, wall)
-        pools.load(a, i, particle, np.inf, OFF)
-        a[pools.NEXT_T + i], a[pools.NEXT_T_LOW + i] = particle.t - age, particle.t_low
-        set_anchors(self.compiled.laws, self.anchors, particle.t - age, particle.t_low)
-        pools.set_reference(a, i, self.compiled, self.anchors)
-        if a[pools.END + i] <= particle.t:
-            self.fill(lane, p, wall)
-            return
-        since = (a[pools.T + i] - a[pools.REF + i]) + (a[pools.T_LOW + i] - a[pools.REF_LOW + i])
-        pools.set_laws(a, i, pools.R0, pools.W0, pools.H0, since, self.compiled)
-        a[pools.SPIN + i] = particle.x * particle.vy - particle.y * particle.vx
+        fill_lane(self.pool, np.int64(lane), as_particle(p, wall), float(age), self.compiled, self.anchors)
 
     def is_met(self, p: FloatArray, wall: int) -> bool:
         """Tell whether a state lies, but for rounding, on the wall that it leaves, as after a step."""
@@ -125,29 +166,28 @@ class LaneRound:
             return False
         if wall == codes.BASE:
             return bool(particle.y == 0.0)
-        anchors = np.zeros(ANCHORS_SHAPE)
-        set_anchors(self.compiled.laws, anchors, particle.t, particle.t_low)
-        f, error = walls.wall_residual(wall, particle.x, particle.y, self.compiled, anchors)
+        f, error = residual(particle, self.compiled, self.anchors)
         return bool(abs(f) <= error)
 
     def fly(self, n: int) -> tuple[npt.NDArray[np.bool_], FloatArray, FloatArray]:
         """Take a step in n lanes: which are shown right, walls met, and rows of dt, x, y, vx, vy."""
-        right, hits, dt = self.find(follow.GENERAL, n)
-        slope, is_mushroom = self.compiled.laws[SLOPE, LEVEL], self.compiled.table == codes.MUSHROOM
-        bounces.bounce(self.pool, np.int64(n), slope, is_mushroom)
-        return right, hits, np.column_stack([dt, *(self.row(r, n) for r in PLACE)])
+        right, hits, dt = self.find(GENERAL, n)
+        return right, hits, self.bounced(GENERAL, n, dt)
 
     def skip(self, n: int) -> tuple[npt.NDArray[np.bool_], FloatArray, FloatArray]:
         """Take captured chords in n lanes, likewise; every hit is on the arc."""
-        right, _, dt = self.find(follow.DISK, n)
-        bounces.rebound(self.pool, np.int64(n))
-        return right, np.zeros(n), np.column_stack([dt, *(self.row(r, n) for r in PLACE)])
+        right, _, dt = self.find(DISK, n)
+        return right, np.zeros(n), self.bounced(DISK, n, dt)
+
+    def bounced(self, pool: np.integer[Any], n: int, dt: FloatArray) -> FloatArray:
+        """Bounce n lanes off the walls that they have met; returns rows of dt, x, y, vx, vy."""
+        slope, is_mushroom = self.compiled.laws[SLOPE, LEVEL], self.compiled.table == codes.MUSHROOM
+        bounce_lanes(pool, self.pool, np.int64(n), slope, is_mushroom)
+        return np.column_stack([dt, *(self.row(r, n) for r in PLACE)])
 
     def find(self, pool: np.integer[Any], n: int) -> tuple[npt.NDArray[np.bool_], FloatArray, FloatArray]:
         """Find the next collision of n lanes: which are shown right, walls met, and times."""
-        rest = (self.compiled, self.limits, self.omegas)
-        follow.advance(pool, self.pool, np.int64(n), OFF, *rest)
-        follow.correct(pool, self.pool, np.int64(n), self.spare, *rest)
+        find_hits(pool, self.pool, np.int64(n), self.spare, self.compiled, self.limits, self.omegas)
         return self.answers(n)
 
     def answers(self, n: int) -> tuple[npt.NDArray[np.bool_], FloatArray, FloatArray]:

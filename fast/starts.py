@@ -89,7 +89,7 @@ def cycle_stops(scene: Scene, n_cycles: int, phases: Sequence[float]) -> Stops:
         times[:, order].ravel(),
         columns[:, order].ravel(),
         cycles[:, order].ravel(),
-        times[:, : len(narrow)],
+        np.ascontiguousarray(times[:, : len(narrow)]),  # a slice would have `follow` compiled once more
         is_first_kept=False,
     )
 

@@ -64,10 +64,11 @@ def bench(
         comparison.check_alike(old, size, seed, QUESTIONS[size])
     with output.writable_folder(out) as folder:
         found = _measured(size, seed, command or [])
+        picture = figures_of_speed.speed(found)
         files: dict[str, bytes | str | Writer] = {
             "bench.json": record.encode(found),
-            "bench.svg": figures_of_speed.speed(found),
-            "bench.html": bench_page.to_html(found),
+            "bench.svg": picture,
+            "bench.html": bench_page.to_html(found, picture),
             "hard-cases.md": hard_cases.to_markdown(found.hard_cases).encode(),
         }
         write_files(folder, files)

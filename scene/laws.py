@@ -13,6 +13,7 @@ import itertools
 import math
 from bisect import bisect_right
 from fractions import Fraction
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import msgspec
@@ -212,18 +213,29 @@ def piece_at(law: Law, time: Fraction) -> Piece:
     return law
 
 
+@lru_cache(maxsize=64)
+def _exact_times(knots: tuple[tuple[float, float], ...]) -> list[Fraction]:
+    return [Fraction(t) for t, _ in knots]
+
+
 def _leg_at(knots: tuple[tuple[float, float], ...], time: Fraction) -> Quadratic:
-    times = [Fraction(knot[0]) for knot in knots]
+    times = _exact_times(knots)
     period = times[-1] - times[0]
-    shift = (time - times[0]) // period * period
-    i = bisect_right(times, time - shift) - 1
+    n_periods = (time - times[0]) // period
+    early, late = _halves(knots, bisect_right(times, time - n_periods * period) - 1, n_periods)
+    return early if time < early.end else late
+
+
+@lru_cache(maxsize=256)
+def _halves(knots: tuple[tuple[float, float], ...], i: int, n_periods: int) -> tuple[Quadratic, Quadratic]:
+    times = _exact_times(knots)
+    shift = n_periods * (times[-1] - times[0])
     start, stop = times[i] + shift, times[i + 1] + shift
     before, after = Fraction(knots[i][1]), Fraction(knots[i + 1][1])
     half_acceleration = 2 * (after - before) / (stop - start) ** 2
     middle = (start + stop) / 2
-    if time < middle:
-        return Quadratic(start, before, Fraction(0), half_acceleration, middle)
-    return Quadratic(stop, after, Fraction(0), -half_acceleration, stop)
+    early = Quadratic(start, before, Fraction(0), half_acceleration, middle)
+    return early, Quadratic(stop, after, Fraction(0), -half_acceleration, stop)
 
 
 def breakpoints(law: Law) -> list[Fraction]:

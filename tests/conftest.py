@@ -18,6 +18,7 @@ import pytest
 from hypothesis import settings
 from numba.core.dispatcher import Dispatcher
 
+from fast import batch
 from fast.kernel import entries
 from mushrooms.main import run
 
@@ -70,7 +71,7 @@ def _compiled_once() -> None:
 
         return compile_alone
 
-    for name, entry in vars(entries).items():
+    for name, entry in (vars(entries) | vars(batch)).items():
         if isinstance(entry, Dispatcher) and entry.stats.cache_path:
             entry.compile = one_at_a_time(name, entry)
 

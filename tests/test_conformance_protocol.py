@@ -83,32 +83,39 @@ def test_trajectories_are_chained(module):
     assert "collisions = -1" in bad["reason"]
 
 
-@pytest.mark.parametrize(
-    ("line", "words"),
-    [
-        ("not json", "JSON"),
-        ("{}", "cmd"),
-        ('{"cmd":"dance"}', "dance"),
-        ('{"cmd":"step","seq":3}', "scene"),
-        (step(3, x="0.1"), "state.x"),
-        ({**step(3), "state": {name: STATE[name] for name in STATE if name != "vy"}}, "vy"),
-        ({**step(3), "extra": 1}, "extra"),
-        (step(3, z=1.0), "z"),
-        (step(3, scene={**SCENE, "table": "cup"}), "cup"),
-        (step(3, scene={**SCENE, "nu": 1.5}), "nu <= 1"),
-        (step(3, scene=3), "int"),
-        (step(3, y=9.0), "beyond wall arc"),
-        (step(3, wall="lid"), "lid"),
-        ("[" * 5000, "object"),
-        ({"cmd": "start", "protocol": 2}, "protocol = 2"),
-        (json.dumps(step(3)).replace("10.0", "NaN"), "JSON"),
-        (json.dumps(step(3)).replace("10.0", "1e999"), "range"),
-    ],
-)
-def test_bad_lines_are_rejected_and_the_session_goes_on(module, line, words):
-    bad, good = converse(module, line, step(4))
+BAD = [
+    ("not json", "JSON"),
+    ("{}", "cmd"),
+    ('{"cmd":"dance"}', "dance"),
+    ('{"cmd":"step","seq":3}', "scene"),
+    (step(3, x="0.1"), "state.x"),
+    ({**step(3), "state": {name: STATE[name] for name in STATE if name != "vy"}}, "vy"),
+    ({**step(3), "extra": 1}, "extra"),
+    (step(3, z=1.0), "z"),
+    (step(3, scene={**SCENE, "table": "cup"}), "cup"),
+    (step(3, scene={**SCENE, "nu": 1.5}), "nu <= 1"),
+    (step(3, scene=3), "int"),
+    (step(3, y=9.0), "beyond wall arc"),
+    (step(3, wall="lid"), "lid"),
+    ("[" * 5000, "object"),
+    ({"cmd": "start", "protocol": 2}, "protocol = 2"),
+    (json.dumps(step(3)).replace("10.0", "NaN"), "JSON"),
+    (json.dumps(step(3)).replace("10.0", "1e999"), "range"),
+]
+
+
+@pytest.fixture(scope="module", params=["reference", "fast"])
+def replies(request):
+    """The answers of one session to all bad lines, each followed by a good one."""
+    found = converse(request.param, *(line for bad, _ in BAD for line in (bad, step(4))))
+    return list(zip(found[::2], found[1::2], strict=True))
+
+
+@pytest.mark.parametrize("i", range(len(BAD)), ids=[words for _, words in BAD])
+def test_bad_lines_are_rejected_and_the_session_goes_on(replies, i):
+    bad, good = replies[i]
     assert bad["outcome"] == "rejected"
-    assert words in bad["reason"]
+    assert BAD[i][1] in bad["reason"]
     assert "\n" not in bad["reason"]
     assert good["seq"] == 4
     assert good["outcome"] == "collision"

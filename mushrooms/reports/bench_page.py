@@ -13,12 +13,12 @@ from mushrooms.figures import speed as figures_of_speed
 from mushrooms.reports.page import embed, render
 
 
-def to_html(record: Record) -> bytes:
-    """Return the page."""
+def to_html(record: Record, speed: bytes) -> bytes:
+    """Return the page; `speed` is its first picture, as SVG."""
     page = render(
         "bench.html.jinja",
         record=record,
-        speed=embed(figures_of_speed.speed(record)),
+        speed=embed(speed),
         growth=embed(figures_of_speed.growth(record.growth)),
         work=embed(figures_of_speed.work(record.work.series)),
         rows=[_row(p) for p in record.points],

@@ -20,11 +20,10 @@ import numpy as np
 import numpy.typing as npt
 from mpmath import fp
 
-from fast.batch import LaneRound
+from fast.batch import LaneRound, as_particle, residual
 from fast.fine import fill_path
-from fast.kernel import codes, follow, lanes, pools, walls
-from fast.kernel.laws import set_anchors
-from fast.kernel.records import LEVEL, SLOPE, FloatArray
+from fast.kernel import codes, follow, lanes, pools
+from fast.kernel.records import DEPTH, LEVEL, RATE, SLOPE, FloatArray
 from scene import BangBang, Cap, Fourier, Law, Mushroom, Scene, Stem
 from scene.laws import value
 from scene.tables import laws, width_factors
@@ -72,33 +71,38 @@ class Round(LaneRound):
         return self.skip(n)
 
     def find(self, pool: np.integer[Any], n: int) -> tuple[npt.NDArray[np.bool_], FloatArray, FloatArray]:
-        """Find the next collision of n lanes by these kernels, as the honest ones do."""
-        self.advance(self.pool, np.int64(n), is_again=False)
-        for i in np.flatnonzero(self.row(pools.OK, n) == pools.COARSE):
-            self.correct_lane(np.int64(i))
+        """Find the next collision of n lanes; faulty kernels run uncompiled, on a list."""
+        if self.kernels is lanes:
+            return super().find(pool, n)
+        a, spare = self.pool.tolist(), self.spare.tolist()
+        with np.errstate(all="ignore"):
+            self.advance(a, n, is_again=False)
+            for i in range(n):
+                if a[pools.OK + i] == pools.COARSE:
+                    self.correct_lane(a, i, spare)
+        self.pool[:] = a
         return self.answers(n)
 
-    def advance(self, a: FloatArray, count: np.integer[Any], *, is_again: bool) -> None:
+    def advance(self, a: list[float], count: int, *, is_again: bool) -> None:
         """Call the loops of the kernels that `follow.advance` calls."""
         scene, is_stem = self.compiled, self.compiled.table == codes.STEM
-        m = scene.laws[SLOPE, LEVEL]
+        m = float(scene.laws[SLOPE, LEVEL])
         rest, k = (self.limits, self.omegas), self.kernels
         if self.is_disk:
-            flags = np.bool_(is_again), np.bool_(self.is_cap), scene.is_relative
-            k.chord(a, count, *flags, self.omega, *rest)
+            k.chord(a, count, is_again, self.is_cap, scene.is_relative, self.omega, *rest)
             return
         if not is_again:
             k.aim(a, count, is_stem, m, self.limits)
         k.fly(a, count, is_stem, scene.is_relative, self.omega, m, *rest)
 
-    def correct_lane(self, i: np.integer[Any]) -> None:
+    def correct_lane(self, a: list[float], i: int, spare: list[float]) -> None:
         """Correct a coarse step again, as `follow.correct` does."""
-        pools.change_lane(self.pool, i, self.spare, np.int64(0))
+        pools.change_lane.py_func(a, i, spare, 0)
         for _ in range(follow.MAX_CORRECTIONS):
-            self.advance(self.spare, np.int64(1), is_again=True)
-            if self.spare[pools.OK] != pools.COARSE:
+            self.advance(spare, 1, is_again=True)
+            if spare[pools.OK] != pools.COARSE:
                 break
-        pools.change_lane(self.spare, np.int64(0), self.pool, i)
+        pools.change_lane.py_func(spare, 0, a, i)
 
     def careful(self, p: FloatArray, wall: int) -> tuple[int, FloatArray]:
         """Return the careful step's wall and dt, x, y, vx, vy; unfolded, those of the next hit of the arc."""
@@ -118,10 +122,8 @@ class Round(LaneRound):
 
     def is_floor_met_at_once(self, p: FloatArray) -> bool:
         """Tell whether a start is above the floor by no more than rounding, in pairs of floats, and falls."""
-        set_anchors(self.compiled.laws, self.anchors, p[0], p[1])
-        f, error = walls.wall_residual(codes.FLOOR, p[2], p[3], self.compiled, self.anchors)
-        slope = walls.wall_slope(codes.FLOOR, *p[2:], self.compiled, self.anchors)
-        return bool(0.0 < f <= error and slope < 0.0)
+        f, error = residual(as_particle(p, int(codes.FLOOR)), self.compiled, self.anchors)
+        return bool(0.0 < f <= error and p[5] + self.anchors[DEPTH, RATE] < 0.0)
 
     def ulps(self, p: FloatArray, wall: int, answer: FloatArray, truth: FloatArray) -> float | None:
         """Return the backward ulps of an answer beside the careful one; None for a delicate step.
@@ -170,12 +172,17 @@ class Round(LaneRound):
 def search(
     seed: int, n: int, tally: Counter[str], group: str = ANYWHERE, kernels: ModuleType = lanes
 ) -> list[Wrong]:
-    """Search one group of draws until lanes have given n answers; returns the wrong ones."""
+    """Search one group of draws until lanes have given n answers; returns the wrong ones.
+
+    The search of faulty kernels ends with the first draw in which they are found out.
+    """
     random, found = np.random.default_rng(seed), []
     before = tally["lane answers"]
     draws = 0
     # Starts that are solved for are mostly left to the careful step: the draws are then counted.
     while tally["lane answers"] < before + n and (group not in TRAPS or draws < n // ANSWERS_OF_A_TRAP):
+        if found and kernels is not lanes:
+            break
         draws += 1
         if group == ANYWHERE:
             scene = draw_scene(random)

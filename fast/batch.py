@@ -20,11 +20,13 @@ from fast.flow import follow_to
 from fast.kernel import codes, pools
 from fast.kernel.bounces import bounce, rebound
 from fast.kernel.entries import SOURCES
-from fast.kernel.follow import DISK, GENERAL, OFF, advance, correct
+from fast.kernel.follow import DISK, GENERAL, OFF, advance, correct, new_worker
 from fast.kernel.laws import set_anchors
-from fast.kernel.limits import limits_of, own_omegas
-from fast.kernel.records import ANCHORS_SHAPE, LEVEL, OMEGA, SHARED, SLOPE, FloatArray, Particle
+from fast.kernel.pools import whole_registers
+from fast.kernel.records import ANCHORS_SHAPE, FloatArray, Particle, unfilled_ends
 from fast.kernel.walls import wall_residual
+from fast.pieces import laws_in_lanes
+from fast.starts import only_stop
 from fast.step import WALL_NAMES, as_arrays, fitted_start, followed_paths, trouble
 from fast.units import fit
 from scene import Collision, Horizon, Outcome, Scene, State
@@ -36,27 +38,24 @@ def _entries(sources):
     """Return the compiled functions of a round of lanes, kept on disk as those of fast.kernel.entries are."""
 
     @njit(cache=True, error_model="numpy")
-    def fill_lane(a, i, particle, age, scene, anchors):
+    def fill_lane(a, i, particle, age, scene, pieces, degree):
         """Put a particle into a lane, its laws known from `age` before its time, if they still serve then."""
         sources  # noqa: B018
         for early in (age, 0.0):
             pools.load(a, i, particle, np.inf, OFF)
-            t = particle.t - early
-            a[pools.NEXT_T + i], a[pools.NEXT_T_LOW + i] = t, particle.t_low
-            set_anchors(scene.laws, anchors, t, particle.t_low)
-            pools.set_reference(a, i, scene, anchors)
+            pools.set_reference(a, i, particle.t - early, particle.t_low, scene, pieces, degree)
             if a[pools.END + i] > particle.t:
                 break
         since = (a[pools.T + i] - a[pools.REF + i]) + (a[pools.T_LOW + i] - a[pools.REF_LOW + i])
-        pools.set_laws(a, i, pools.R0, pools.W0, pools.H0, since, scene)
+        pools.set_laws(a, i, pools.R0, since, scene, degree)
         a[pools.SPIN + i] = particle.x * particle.vy - particle.y * particle.vx
 
     @njit(cache=True, error_model="numpy")
-    def find_hits(pool, a, n, spare, scene, limits, omegas):
+    def find_hits(pool, a, n, worker, slope):
         """Find the next collision of n lanes, and correct what is coarse."""
         sources  # noqa: B018
-        advance(pool, a, n, OFF, scene, limits, omegas)
-        correct(pool, a, n, spare, scene, limits, omegas)
+        advance(pool, a, whole_registers(n), OFF, worker.scene, slope, worker.degree, worker.limits)
+        correct(pool, a, n, worker, slope)
 
     @njit(cache=True, error_model="numpy")
     def bounce_lanes(pool, a, n, slope, is_mushroom):
@@ -145,19 +144,22 @@ class LaneRound:
     Attributes:
         compiled: the scene's numbers.
         is_disk: whether the scene is a cap, whose particles move unfolded: only the arc is met.
+        serves: the longest time that a piece of its laws serves.
     """
 
     def __init__(self, scene: Scene) -> None:
         self.compiled = compile_scene(scene)
         self.is_disk = bool(self.compiled.table == codes.CAP)
-        self.limits, self.omegas = limits_of(self.compiled), own_omegas(self.compiled)
-        self.omega = float(self.compiled.laws[SHARED, OMEGA])
+        self.in_lanes = laws_in_lanes(scene)
+        self.worker = new_worker(self.in_lanes, only_stop(np.inf), unfilled_ends(np.empty((0, 6)), 1, (1, 1)))
+        self.serves = float(np.diff(self.in_lanes.pieces.begins, append=self.in_lanes.pieces.period).max())
         self.anchors = np.zeros(ANCHORS_SHAPE)
-        self.pool, self.spare = np.zeros((2, pools.N_ROWS * pools.LANES))
+        self.pool = np.zeros(pools.POOL_SIZE)
 
     def fill(self, lane: int, p: FloatArray, wall: int, age: float = 0.0) -> None:
         """Put a state [t, its low part, x, y, vx, vy] into a lane, its laws known from `age` before it."""
-        fill_lane(self.pool, np.int64(lane), as_particle(p, wall), float(age), self.compiled, self.anchors)
+        known = self.compiled, self.in_lanes.pieces, self.in_lanes.degree
+        fill_lane(self.pool, np.int64(lane), as_particle(p, wall), float(age), *known)
 
     def is_met(self, p: FloatArray, wall: int) -> bool:
         """Tell whether a state lies, but for rounding, on the wall that it leaves, as after a step."""
@@ -181,20 +183,18 @@ class LaneRound:
 
     def bounced(self, pool: np.integer[Any], n: int, dt: FloatArray) -> FloatArray:
         """Bounce n lanes off the walls that they have met; returns rows of dt, x, y, vx, vy."""
-        slope, is_mushroom = self.compiled.laws[SLOPE, LEVEL], self.compiled.table == codes.MUSHROOM
-        bounce_lanes(pool, self.pool, np.int64(n), slope, is_mushroom)
+        is_mushroom = self.compiled.table == codes.MUSHROOM
+        bounce_lanes(pool, self.pool, np.int64(n), self.in_lanes.slope, is_mushroom)
         return np.column_stack([dt, *(self.row(r, n) for r in PLACE)])
 
     def find(self, pool: np.integer[Any], n: int) -> tuple[npt.NDArray[np.bool_], FloatArray, FloatArray]:
         """Find the next collision of n lanes: which are shown right, walls met, and times."""
-        find_hits(pool, self.pool, np.int64(n), self.spare, self.compiled, self.limits, self.omegas)
+        find_hits(pool, self.pool, np.int64(n), self.worker, self.in_lanes.slope)
         return self.answers(n)
 
     def answers(self, n: int) -> tuple[npt.NDArray[np.bool_], FloatArray, FloatArray]:
         """Return which of n lanes are shown right, the walls that they meet, and when."""
         right = self.row(pools.OK, n) == pools.CERTAIN
-        # A hit beyond a knot is left to the careful step.
-        right &= self.row(pools.NEXT_T, n) < self.row(pools.KNOT, n)
         return right, self.row(pools.HIT, n).copy(), self.row(pools.S, n).copy()
 
     def careful_step(self, p: FloatArray, wall: int) -> tuple[int, float, FloatArray]:

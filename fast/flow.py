@@ -12,6 +12,7 @@ from fast.ensemble import follow
 from fast.given import given_states, given_threads
 from fast.kernel import codes
 from fast.kernel.records import FloatArray, Followed, IntArray, unfilled_ends
+from fast.pieces import laws_in_lanes
 from fast.starts import least_collisions, only_stop
 from fast.step import as_arrays, fitted_start, next_collision, trouble
 from fast.units import fit
@@ -85,12 +86,12 @@ def follow_to(scene: Scene, states: Sequence[State], t_end: float, threads: int)
         BadInput: scene, a state or an answer does not fit into binary64: see fast.units.
     """
     starts = [fitted_start(scene, state) for state in states]
-    compiled, (rows, walls) = fit(scene).compiled, as_arrays(starts)
+    in_lanes, (rows, walls) = laws_in_lanes(fit(scene).scene), as_arrays(starts)
     followed, seconds = unfilled_ends(rows, 1, (1, 1)), 0.0
     for units in sorted({start.units for start in starts}):
         those = np.array([i for i, start in enumerate(starts) if start.units == units])
         stop = only_stop(units.horizon(t_end))
-        done, their_seconds = follow(compiled, rows[those], walls[those], stop, threads)
+        done, their_seconds = follow(in_lanes, rows[those], walls[those], stop, threads)
         times, places = units.times(done.states[:, :2]), units.places(done.states[:, 2:])
         done = done._replace(
             states=np.hstack([times, places]), t_in=units.times(done.t_in), t_out=units.times(done.t_out)

@@ -96,11 +96,11 @@ MUTANTS = {
         "return inside if hit == ON_BASE else place",
         "return 1.0 if hit == ON_BASE else place",
     ),
-    "the mouth's own curvature": ("side to arc", 300, "doubt = (k_w + excess", "doubt = (excess"),
+    "the mouth's own curvature": ("side to arc", 300, "doubt = (k_side + excess", "doubt = (excess"),
     "the sides before the mouth": ("side to arc", 300, "min(gap - doubt, lift)", "lift"),
     "concavity of the arc": (
-        "base to arc",
-        4000,
+        "arc to stem",
+        1500,
         "concave = fma(vx, vx, vy * vy) - bend if hit == ON_ARC else 1.0",
         "concave = 1.0",
     ),
@@ -110,7 +110,7 @@ MUTANTS = {
         "return min(clear_r, min(clear_l, clear_f)) - far",
         "return 1.0",
     ),
-    "the curvature of walls that are not met": ("side to arc", 1500, "far = k_w * s * s + ", "far = "),
+    "the curvature of walls that are not met": ("side to arc", 1500, "far = k_side * s * s + ", "far = "),
     "the part of the table that a wall is in": (
         "arc to stem",
         500,
@@ -118,17 +118,17 @@ MUTANTS = {
         "place = 1.0",
     ),
     "what Newton's step leaves": ("arc to stem", 500, "CERTAIN if error < s else COARSE", "CERTAIN"),
-    "the arc's acceleration a moment later": (
-        "arc to stem",
-        1500,
-        "a[NEXT_R2 + i] = fma(-omega_r * omega_r * r1, delta, r2)",
-        "a[NEXT_R2 + i] = r2",
-    ),
-    "how long the series serve": (
+    "how long the polynomials hold": (
         "floor to moving arc",
         500,
-        "quality = min(quality, LONGEST_TURN - omega * since)",
-        "quality = quality",
+        "return FAR if ahead <= 0.0 else result",
+        "return result",
+    ),
+    "how long the radius was known before": (
+        "base to arc",
+        500,
+        "known = before - a[BACK + i] if hit == ON_ARC else 1.0",
+        "known = 1.0",
     ),
     "the mouth under a chord": (
         "captured beside a moving mouth",
@@ -223,8 +223,8 @@ ROUNDING = {
     ),
     "walls that are not met": (
         "at the floor's corner",
-        "far = k_w * s * s + SAFETY * (size_w + abs(x) + abs(y) + way)",
-        "far = k_w * s * s",
+        "far = k_side * s * s + SAFETY * (limits.size + abs(x) + abs(y) + way)",
+        "far = k_side * s * s",
     ),
 }
 

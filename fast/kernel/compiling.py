@@ -14,7 +14,7 @@ from numba.extending import intrinsic
 
 # A function of its own. No fastmath, so that results are the same bits on every machine; quotients by zero
 # are infinite or nan, as in numpy. Wrappers for callers in C, which there are none of, are left out.
-kernel = njit(error_model="numpy", no_cfunc_wrapper=True, no_cpython_wrapper=True)
+kernel = njit(error_model="numpy", no_cfunc_wrapper=True)
 # A function whose text is put into its callers before types are inferred. In a loop over lanes it may not be
 # given an array: numba counts one more reference to it there, and the loop is not packed.
 part = njit(error_model="numpy", no_cfunc_wrapper=True, inline="always")

@@ -210,11 +210,11 @@ def verdict(quality, ahead, s, error):
 
 
 @packed
-def arrive_at(a, i, s, delta, result, x_s, x_low, y_s, y_low, vx, vy):
+def arrive_at(a, i, s, delta, within, result, x_s, x_low, y_s, y_low, vx, vy):
     """Write what became of a step, with time and place of the hit; returns y there, and ROUTINE so far."""
     t, low = two_sum(a[T + i], s)
     t, low = two_sum(t, low + (a[T_LOW + i] + delta))
-    a[S + i] = s if result == FAR else s + delta
+    a[S + i] = s + delta if within > 0.0 else s  # from laws out of their reach nothing is learnt
     a[OK + i] = result
     a[NEXT_T + i] = t
     a[NEXT_T_LOW + i] = low
@@ -272,8 +272,9 @@ def fly(a, n, is_stem, is_relative, slope, degree, limits):
         # A hop needs the radius at both of its ends.
         known = before - a[BACK + i] if hit == ON_ARC else 1.0
         quality = min(quality, known if wall == ON_ARC else 1.0)
-        result = verdict(quality, a[LIMIT + i] - (since + delta), s, error)
-        y_s, routine = arrive_at(a, i, s, delta, result, x_s, x_low, y_s, y_low, vx, vy)
+        within = a[LIMIT + i] - abs(since)
+        result = verdict(quality, min(within, a[LIMIT + i] - abs(since + delta)), s, error)
+        y_s, routine = arrive_at(a, i, s, delta, within, result, x_s, x_low, y_s, y_low, vx, vy)
         a[NEXT_Y + i] = 0.0 if hit == ON_BASE else y_s
         routine = routine if a[CLOSED + i] == NEVER else 0.0
         a[ROUTINE + i] = routine if a[SPIN + i] == 0.0 else 0.0
@@ -318,8 +319,9 @@ def chord(a, n, is_again, is_cap, is_relative, degree, limits):
         first = -slope - 2.0 * SAFETY * sizes
         quality = min(min(clear, abs(y_s) - SAFETY * (abs(y) + abs(vy) * s)), min(first, v2 - bend))
         quality = min(min(quality, s), before - a[BACK + i])
-        result = verdict(quality, a[LIMIT + i] - (since + delta), s, error)
-        y_s, a[ROUTINE + i] = arrive_at(a, i, s, delta, result, x_s, x_low, y_s, y_low, vx, vy)
+        within = a[LIMIT + i] - abs(since)
+        result = verdict(quality, min(within, a[LIMIT + i] - abs(since + delta)), s, error)
+        y_s, a[ROUTINE + i] = arrive_at(a, i, s, delta, within, result, x_s, x_low, y_s, y_low, vx, vy)
         a[NEXT_Y + i] = y_s
         laws_at_hit(a, i, delta, r, r1, r2, w, w1)
         a[NEXT_W1 + i] = w1

@@ -64,13 +64,6 @@ def law_at(a, place, stride, u, u_before, degree):
     return value, fma(rate, u, rise), 2.0 * fma(half_bend, u, rate), mean
 
 
-@packed
-def bend_about(a, place, stride, u, degree):
-    """Return a law's second derivative to first order in the time since the reference: for first guesses."""
-    bend = 2.0 * a[place + 3 * stride]
-    return fma(6.0 * u, a[place + 4 * stride], bend) if len(degree) > 2 else bend
-
-
 @kernel
 def piece_at(pieces, t, t_low):
     """Return the number of the piece that serves at a time, and its reference time as a sum of two floats."""

@@ -10,7 +10,7 @@ import numpy as np
 from fast.kernel.arithmetic import fma
 from fast.kernel.codes import ARC, BASE, FLOOR, LEFT, RIGHT
 from fast.kernel.compiling import kernel, packed, part
-from fast.kernel.pieces import bend_about, law_at, piece_at
+from fast.kernel.pieces import law_at, piece_at
 from fast.kernel.records import CONSTANT, KIND, RADIUS
 
 LANES = 64  # all rows of a pool stay in the first-level cache
@@ -64,12 +64,9 @@ def set_reference(a, i, t, t_low, scene, pieces, degree):
 
 @packed
 def law_of(a, place, u, degree):
-    """Return a law of a lane and its derivative, and about its second, at a time since its reference.
-
-    Its coefficients begin at `place`.
-    """
-    f, rate, _, _ = law_at(a, place, LANES, u, u, degree)
-    return f, rate, bend_about(a, place, LANES, u, degree)
+    """Return a law of a lane, which begins at `place`, and two derivatives at a time since its reference."""
+    f, rate, bend, _ = law_at(a, place, LANES, u, u, degree)
+    return f, rate, bend
 
 
 @packed

@@ -7,14 +7,14 @@ import shutil
 import subprocess
 import sys
 from pathlib import Path
-from types import ModuleType
+from types import FunctionType, ModuleType
 
 import numpy as np
 from numba import njit
 from numba.core.dispatcher import Dispatcher
 
 import fast
-from fast.kernel import pools
+from fast.kernel import pieces, pools
 from fast.kernel.arithmetic import fma
 
 HOUSE = Path(fast.__file__).parent.parent
@@ -58,12 +58,16 @@ def faulty_lanes(old: str, new: str) -> ModuleType:
     assert old in source, old
     module = ModuleType("faulty_lanes")
     exec(compile(source.replace(old, new), str(path), "exec"), module.__dict__)
+    for name, found in (vars(pieces) | vars(pools)).items():
+        vars(module).setdefault(name, found)
+    names = module.__name__, pools.__name__, pieces.__name__
     for name, found in list(vars(module).items()):
-        if isinstance(found, Dispatcher) and found.py_func.__module__ in (module.__name__, pools.__name__):
-            setattr(module, name, found.py_func)
+        if isinstance(found, Dispatcher) and found.py_func.__module__ in names:
+            # What it calls is looked up among the faulty ones.
+            setattr(module, name, FunctionType(found.py_func.__code__, vars(module)))
         elif isinstance(found, np.integer):
             setattr(module, name, int(found))
-    vars(module)["fma"] = compiled_fma
+    vars(module).update(fma=compiled_fma, widest_registers=lambda: None)
     return module
 
 

@@ -23,7 +23,7 @@ from mpmath import fp
 from fast.batch import LaneRound, as_particle, residual
 from fast.fine import fill_path
 from fast.kernel import codes, follow, lanes, pools
-from fast.kernel.records import DEPTH, LEVEL, RATE, SLOPE, FloatArray
+from fast.kernel.records import DEPTH, RATE, FloatArray
 from scene import BangBang, Cap, Fourier, Law, Mushroom, Scene, Stem
 from scene.laws import value
 from scene.tables import laws, width_factors
@@ -74,35 +74,37 @@ class Round(LaneRound):
         """Find the next collision of n lanes; faulty kernels run uncompiled, on a list."""
         if self.kernels is lanes:
             return super().find(pool, n)
-        a, spare = self.pool.tolist(), self.spare.tolist()
+        a = self.pool.tolist()
         with np.errstate(all="ignore"):
             self.advance(a, n, is_again=False)
             for i in range(n):
-                if a[pools.OK + i] == pools.COARSE:
-                    self.correct_lane(a, i, spare)
+                self.correct_lane(a, i)
         self.pool[:] = a
         return self.answers(n)
 
     def advance(self, a: list[float], count: int, *, is_again: bool) -> None:
         """Call the loops of the kernels that `follow.advance` calls."""
         scene, is_stem = self.compiled, self.compiled.table == codes.STEM
-        m = float(scene.laws[SLOPE, LEVEL])
-        rest, k = (self.limits, self.omegas), self.kernels
+        slope, degree, limits, k = self.in_lanes.slope, self.in_lanes.degree, self.worker.limits, self.kernels
         if self.is_disk:
-            k.chord(a, count, is_again, self.is_cap, scene.is_relative, self.omega, *rest)
+            k.chord(a, count, is_again, self.is_cap, scene.is_relative, degree, limits)
             return
         if not is_again:
-            k.aim(a, count, is_stem, m, self.limits)
-        k.fly(a, count, is_stem, scene.is_relative, self.omega, m, *rest)
+            k.aim(a, count, is_stem, slope, limits)
+        k.fly(a, count, is_stem, scene.is_relative, slope, degree, limits)
 
-    def correct_lane(self, a: list[float], i: int, spare: list[float]) -> None:
-        """Correct a coarse step again, as `follow.correct` does."""
-        pools.change_lane.py_func(a, i, spare, 0)
+    def correct_lane(self, a: list[float], i: int) -> None:
+        """Correct a step that is not yet right again, as `follow.correct` does."""
+        k, known = self.kernels, (self.compiled, self.in_lanes.pieces, self.in_lanes.degree)
         for _ in range(follow.MAX_CORRECTIONS):
-            self.advance(spare, 1, is_again=True)
-            if spare[pools.OK] != pools.COARSE:
+            if a[pools.OK + i] not in (pools.COARSE, pools.FAR):
                 break
-        pools.change_lane.py_func(spare, 0, a, i)
+            if a[pools.OK + i] == pools.FAR:
+                k.set_reference(a, i, a[pools.T + i] + a[pools.S + i], a[pools.T_LOW + i], *known)
+            spare = [0.0] * pools.POOL_SIZE
+            k.copy_rows(a, i, spare, 0, 0, pools.POOL_SIZE)
+            self.advance(spare, 1, is_again=True)
+            k.copy_rows(spare, 0, a, i, pools.S, pools.NEXT_VX)
 
     def careful(self, p: FloatArray, wall: int) -> tuple[int, FloatArray]:
         """Return the careful step's wall and dt, x, y, vx, vy; unfolded, those of the next hit of the arc."""
@@ -203,7 +205,7 @@ def try_starts(
 ) -> list[Wrong]:
     """Fill a pool with starts in a scene and take lane steps from them."""
     found = []
-    age = pools.SERVES / pool.omega * random.random() if pool.omega and random.random() < 0.5 else 0.0
+    age = pool.serves * random.random() if pool.serves < np.inf and random.random() < 0.5 else 0.0
     for lane, start in enumerate(starts):
         pool.fill(lane, *start, age)
     is_live = np.array([is_valid(pool, *start) for start in starts], dtype=bool)
@@ -282,8 +284,10 @@ def draw_scene(random: np.random.Generator) -> Scene:
             return float(least)
         # Smooth laws, laws with knots, or both in one scene.
         if kind < 0.5 or (kind < 0.7 and random.random() < 0.5):
-            turn, swing = random.uniform(0, 2 * np.pi), 0.4999 * (most - least)
-            cos, sin = (float(swing * np.cos(turn)),), (float(swing * np.sin(turn)),)
+            n, swing = int(random.choice([1, 1, 2, 5, 16])), 0.4999 * (most - least)
+            turns, sizes = random.uniform(0, 2 * np.pi, n), random.random(n) / np.arange(1, n + 1) ** 2
+            sizes *= swing / sizes.sum()
+            cos, sin = (tuple(map(float, sizes * wave(turns))) for wave in (np.cos, np.sin))
             if kind < 0.5:
                 return Fourier(mean=0.5 * (least + most), omega=omega, cos=cos, sin=sin)
             return Fourier(mean=0.5 * (least + most), period=1.0, cos=cos, sin=sin)
@@ -303,18 +307,23 @@ def draw_scene(random: np.random.Generator) -> Scene:
     most_h = random.uniform(least_h, 4.0 + least_h)
     h = law(least_h, most_h)
     share = min(10.0 ** random.uniform(-3, 0.3), 0.95)
-    slope = float(random.choice([0.0, random.uniform(-0.4, 0.4)]))
+    lean = float(random.choice([0.0, random.uniform(-0.4, 0.4)]))
+
+    def slope(size: float) -> Law:
+        # It moves in half of the scenes, about any of its values.
+        return law(*sorted((lean * size, -0.4 * size))) if random.random() < 0.5 else lean * size
+
     if table < 0.25:
         least_w = 10.0 ** random.uniform(-2, 0)
-        return Stem(w=law(least_w, random.uniform(least_w, 1.5)), h=h, slope=slope * least_w / most_h)
+        return Stem(w=law(least_w, random.uniform(least_w, 1.5)), h=h, slope=slope(least_w / most_h))
     if random.random() < 0.2:  # a rim so narrow that a flight leaves the arc and is at once in the mouth
         return Mushroom(r=r, nu=1.0 - float(10.0 ** random.uniform(-4, -1)), h=h)
     if random.random() < 0.5:
         nu = law(share * 10.0 ** random.uniform(-2, 0), share)
         least_nu = 0.009 * share
-        return Mushroom(r=r, nu=nu, h=h, slope=slope * least_nu * least_r / most_h)
+        return Mushroom(r=r, nu=nu, h=h, slope=slope(least_nu * least_r / most_h))
     w = law(0.05 * share * least_r, share * least_r)
-    return Mushroom(r=r, w=w, h=h, slope=slope * 0.05 * share * least_r / most_h)
+    return Mushroom(r=r, w=w, h=h, slope=slope(0.05 * share * least_r / most_h))
 
 
 def draw_start(scene: Scene, random: np.random.Generator) -> tuple[FloatArray, int]:
@@ -350,7 +359,7 @@ def draw_start(scene: Scene, random: np.random.Generator) -> tuple[FloatArray, i
         return np.array([t, 0.0, at, -now["h"], along, away - rate["h"]]), wall
     y = -now["h"] * random.random()
     sign = 1.0 if wall == codes.RIGHT else -1.0
-    out = w_rate + now["slope"] * along - away
+    out = w_rate + rate["slope"] * y + now["slope"] * along - away
     return np.array([t, 0.0, sign * (w + now["slope"] * y), y, sign * out, along]), wall
 
 

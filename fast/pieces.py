@@ -54,13 +54,13 @@ def laws_in_lanes(scene: Scene) -> LawsInLanes:
     compiled = compile_scene(scene)
     degree = degree_for(compiled)
     pieces = pieces_of(compiled, degree)
-    until = -1.0 if pieces is None else 0.125 * MAX_QUADRANT * pieces.period
     if pieces is None:
-        pieces = pieces_of(compile_scene(FIXED), degree)
-        assert pieces is not None
+        none = pieces_of(compile_scene(FIXED), degree)
+        assert none is not None
+        pieces = none._replace(until=-1.0)
     moves = compiled.laws[SLOPE, KIND] != CONSTANT
     slope = None if moves else float(compiled.laws[SLOPE, LEVEL])
-    return LawsInLanes(compiled, pieces, (0,) * degree, slope, until)
+    return LawsInLanes(compiled, pieces, (0,) * degree, slope)
 
 
 def degree_for(compiled: Compiled) -> int:
@@ -163,9 +163,9 @@ def _filled(
     if period is None:
         half, serves = np.array([math.inf]), np.array([math.inf])
     high, low = _pair(period) if period is not None else (math.inf, 0.0)
-    return Pieces(
-        float(origin), high, low, begins, references, np.column_stack([half, half]), serves, coefficients
-    )
+    limits = np.column_stack([half, half])
+    until = 0.125 * MAX_QUADRANT * high
+    return Pieces(float(origin), high, low, begins, references, limits, serves, coefficients, until)
 
 
 def _pair(number: Fraction) -> tuple[float, float]:

@@ -7,9 +7,13 @@ from typing import NamedTuple
 import numpy as np
 
 from fast.given import MAX_STEPS, given_end
-from fast.kernel import codes
-from fast.kernel.records import FloatArray
-from fast.step import WALL_NAMES, as_arrays, check_state, followed_paths, trouble
+from fast.kernel import codes, entries
+from fast.kernel.follow import new_worker
+from fast.kernel.records import FloatArray, unfilled_ends, unfilled_paths
+from fast.pieces import laws_in_lanes
+from fast.starts import only_stop
+from fast.step import WALL_NAMES, as_arrays, check_state, trouble
+from fast.units import fit
 from scene import Horizon, Outcome, Scene, State, Wall
 from scene.refusal import check_count, check_scene
 
@@ -49,7 +53,11 @@ def trajectory(scene: Scene, state: State, n_collisions: int, t_end: float = np.
     t_end = given_end(t_end)
     start = check_state(scene, state, None if t_end == np.inf else t_end)
     n_collisions = check_count("n_collisions", n_collisions, 0, MAX_STEPS)
-    paths = followed_paths(start.compiled, *as_arrays([start]), n_collisions, start.units.horizon(t_end))
+    rows, walls = as_arrays([start])
+    paths = unfilled_paths(1, n_collisions)
+    in_lanes = laws_in_lanes(fit(scene).scene)
+    worker = new_worker(in_lanes, only_stop(start.units.horizon(t_end)), unfilled_ends(rows, 1, (1, 1)))
+    entries.follow_paths(worker, walls, in_lanes.slope, paths)
     n, code = paths.counts.item(), paths.codes.item()
     steps = start.units.steps(paths.steps[0, :n])
     walls = [WALL_NAMES[c] for c in paths.walls[0, :n].tolist()]

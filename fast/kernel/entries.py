@@ -19,6 +19,7 @@ from fast.kernel.careful import first_step, step
 from fast.kernel.codes import BASE, HORIZON
 from fast.kernel.follow import follow, without_counts
 from fast.kernel.laws import set_anchors
+from fast.kernel.path import follow_one
 from fast.kernel.pieces import fill_coefficients
 from fast.kernel.records import (
     ANCHORS_SHAPE,
@@ -91,6 +92,16 @@ def _follow(sources):
     return follow_particles
 
 
+def _follow_one(sources):
+    @njit(cache=True, nogil=True, error_model="numpy")
+    def follow_paths(worker, walls, slope, paths):
+        """Follow particles one by one, collision by collision: see fast.kernel.path."""
+        sources  # noqa: B018
+        follow_one(without_counts(worker), walls, slope, paths)
+
+    return follow_paths
+
+
 def _fill_pieces(sources):
     @njit(cache=True, error_model="numpy")
     def fill_pieces(laws, references, coefficients):
@@ -133,6 +144,7 @@ def _directions(sources):
 careful = _careful(SOURCES)
 fine = _fine(SOURCES)
 follow_particles = _follow(SOURCES)
+follow_paths = _follow_one(SOURCES)
 fill_pieces = _fill_pieces(SOURCES)
 wall_gap = _wall_gap(SOURCES)
 directions = _directions(SOURCES)

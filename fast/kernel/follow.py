@@ -23,9 +23,9 @@ from fast.kernel.codes import ARC, CAP, HORIZON, MUSHROOM, N_WALLS, STEM
 from fast.kernel.compiling import kernel, part, unowned
 
 from fast.kernel.pools import (  # isort: skip
-    CERTAIN, CLOSED, COARSE, DONE, END, FAR, HIT, LANES, LAWS, N_COEFFICIENTS, NEVER, NEXT_R0, NEXT_T, NEXT_T_LOW, NEXT_VX,
+    CERTAIN, CLOSED, COARSE, DONE, END, FAR, HIT, LANES, LAWS, N_COEFFICIENTS, NEVER, NEXT_R0, NEXT_W0, NEXT_T, NEXT_T_LOW, NEXT_VX,
     NEXT_VY, NEXT_X, NEXT_Y, N_ARC, N_BASE, OK, REF, REF_LOW, ROUTINE, S, SINCE, SPIN, STAY_IN, STAY_OUT,
-    STOP, T, T_LOW, UNTIL, VX, VY, WALL, X, Y, change_lane, copy_rows, fold, load, POOL_SIZE, refold, set_laws,
+    STOP, STRIDE, T, T_LOW, UNTIL, VX, VY, WALL, X, Y, change_lane, copy_rows, fold, load, POOL_SIZE, refold, set_laws,
     set_reference, whole_registers,
 )  # fmt: skip
 from fast.kernel.bounces import arrive, bounce, rebound
@@ -33,7 +33,8 @@ from fast.kernel.lanes import aim, chord, fly
 from fast.kernel.limits import LawLimits, limits_of
 
 from fast.kernel.records import (  # isort: skip
-    ANCHORS_SHAPE, Compiled, FloatArray, Followed, IntArray, LawsInLanes, Particle, Pieces, Stops,
+    ANCHORS_SHAPE, Compiled, FloatArray, Followed, IntArray, LawsInLanes, Particle, Pieces, RADIUS, Stops,
+    VALUE, WIDTH,
     particle_at, write_state,
 )  # fmt: skip
 
@@ -74,6 +75,12 @@ class Worker(NamedTuple):
     followed: Followed
 
 
+def is_known_throughout(in_lanes: LawsInLanes, last: float) -> bool:
+    """Tell whether lanes know the laws up to a time; where there is no end `set_reference` looks each time."""
+    until = in_lanes.pieces.until
+    return until > 0.0 and (abs(last) < until or last == np.inf)
+
+
 def new_worker(in_lanes: LawsInLanes, stops: Stops, followed: Followed) -> Worker:
     """Return a worker that holds no particle yet."""
     return Worker(
@@ -82,7 +89,7 @@ def new_worker(in_lanes: LawsInLanes, stops: Stops, followed: Followed) -> Worke
         in_lanes.pieces,
         in_lanes.degree,
         np.zeros(ANCHORS_SHAPE),
-        bool(abs(stops.times[-1]) < in_lanes.until),
+        is_known_throughout(in_lanes, float(stops.times[-1])),
         np.zeros((3, POOL_SIZE)),
         np.zeros((2, 3, LANES), np.int64),
         np.zeros(2, np.int64),
@@ -107,6 +114,7 @@ def without_counts(worker):
             unowned(pieces.limits),
             unowned(pieces.serves),
             unowned(pieces.coefficients),
+            pieces.until,
         ),
         worker.degree,
         unowned(worker.anchors),
@@ -197,7 +205,7 @@ def finish(a, i, j, code, end, followed):
     write_state(followed.states, j, Particle(t, t_low, x, y, vx, vy, int(a[WALL + i])))
     followed.codes[j] = code
     for wall in range(N_WALLS):
-        followed.counts[j, wall] = int(a[N_ARC + wall * LANES + i])
+        followed.counts[j, wall] = int(a[N_ARC + wall * STRIDE + i])
 
 
 @part
@@ -217,10 +225,12 @@ def step_carefully(pool, a, i, roster, worker, slope):
         a[NEXT_T + i], a[NEXT_T_LOW + i] = p.t, p.t_low
         a[NEXT_X + i], a[NEXT_Y + i], a[NEXT_VX + i], a[NEXT_VY + i] = p.x, p.y, p.vx, p.vy
         a[HIT + i], a[DONE + i], a[S + i] = code, 1.0, s
-        if code < HORIZON and worker.is_laned:
+        if code < HORIZON:
             set_reference(a, i, p.t, p.t_low, scene, worker.pieces, worker.degree)
             u = (p.t - a[REF + i]) + (p.t_low - a[REF_LOW + i])
             set_laws(a, i, NEXT_R0, u, scene, worker.degree)
+            w = anchors[WIDTH, VALUE]  # known where the lanes know nothing
+            a[NEXT_W0 + i] = w * anchors[RADIUS, VALUE] if scene.is_relative else w
         if pool == GENERAL or code >= HORIZON:
             break
         note_stops(a, i, roster, p.t, stops, followed)
@@ -270,7 +280,7 @@ def gather(a, n, spare, places, worker, slope):
         if a[OK + i] == FAR:
             set_reference(a, i, a[T + i] + a[S + i], a[T_LOW + i], worker.scene, worker.pieces, worker.degree)
         copy_rows(a, i, spare, n_open, 0, OK)
-        copy_rows(a, i, spare, n_open, LAWS, LAWS + (4 if slope is None else 3) * N_COEFFICIENTS * LANES)
+        copy_rows(a, i, spare, n_open, LAWS, LAWS + (4 if slope is None else 3) * N_COEFFICIENTS * STRIDE)
         places[n_open] = i
         n_open += 1
     return n_open

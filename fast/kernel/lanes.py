@@ -23,10 +23,10 @@ from fast.kernel.arithmetic import SAFETY, fma, two_sum
 from fast.kernel.compiling import kernel, packed, part, widest_registers
 
 from fast.kernel.pools import (  # isort: skip
-    BACK, CERTAIN, CLOSED, COARSE, DEPTH_LAW, END, FAR, H0, H1, H2, HIT, LANES, LIMIT, M0, M1, M2, NEVER, NEXT_H0,
+    BACK, CERTAIN, CLOSED, COARSE, DEPTH_LAW, END, FAR, H0, H1, H2, HIT, LIMIT, M0, M1, M2, NEVER, NEXT_H0,
     NEXT_H1, NEXT_H2, NEXT_M0, NEXT_M1, NEXT_M2, NEXT_R0, NEXT_R1, NEXT_R2, NEXT_T, NEXT_T_LOW, NEXT_W0,
     NEXT_W1, NEXT_W2, NEXT_X, NEXT_X_LOW, NEXT_Y, NEXT_Y_LOW, OK, ON_ARC, ON_BASE, ON_FLOOR, ON_LEFT,
-    ON_RIGHT, R0, R1, R2, RADIUS_LAW, REF, REFUSED, REF_LOW, ROUTINE, S, SLOPE_LAW, SPIN, STOP, SURE, T, T_LOW, VX, VY, W0, W1, W2,
+    ON_RIGHT, R0, R1, R2, RADIUS_LAW, REF, REFUSED, REF_LOW, ROUTINE, S, SLOPE_LAW, SPIN, STOP, STRIDE, SURE, T, T_LOW, VX, VY, W0, W1, W2,
     WALL, X, Y, law_of, width_of,
 )  # fmt: skip
 from fast.kernel.pieces import law_at
@@ -241,7 +241,7 @@ def fly(a, n, is_stem, is_relative, slope, degree, limits):
         hit, s = a[HIT + i], a[S + i]
         before = (a[T + i] - a[REF + i]) + (a[T_LOW + i] - a[REF_LOW + i])
         since = before + s
-        r, r1, r2, mean = law_at(a, RADIUS_LAW + i, LANES, since, before, degree)
+        r, r1, r2, mean = law_at(a, RADIUS_LAW + i, STRIDE, since, before, degree)
         w, w1, w2, w_low = width_of(a, i, since, r, r1, r2, is_relative, degree)
         h, h1, h2 = law_of(a, DEPTH_LAW + i, since, degree)
         m, m1, m2 = law_of(a, SLOPE_LAW + i, since, degree) if slope is None else (slope, 0.0, 0.0)
@@ -302,7 +302,7 @@ def chord(a, n, is_again, is_cap, is_relative, degree, limits):
         s = a[S + i] if is_again else s
         before = (a[T + i] - a[REF + i]) + (a[T_LOW + i] - a[REF_LOW + i])
         since = before + s
-        r, r1, r2, mean = law_at(a, RADIUS_LAW + i, LANES, since, before, degree)
+        r, r1, r2, mean = law_at(a, RADIUS_LAW + i, STRIDE, since, before, degree)
         w, w1, _, _ = width_of(a, i, since, r, r1, r2, is_relative, degree)
         f = hop_along_arc(s, q, v2, r0, s * mean)
         slope = 2.0 * fma(r, r1, -fma(s, v2, q))

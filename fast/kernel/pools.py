@@ -14,9 +14,12 @@ from fast.kernel.pieces import law_at, piece_at
 from fast.kernel.records import CONSTANT, KIND, RADIUS
 
 LANES = 64  # all rows of a pool stay in the first-level cache
+# How far rows are apart. Were it a divisor of 4096 bytes, rows would meet in few sets of the cache, and a load
+# would wait for stores to rows whose addresses end alike.
+STRIDE = 72
 NEVER = np.inf
 
-# Rows of a pool, LANES numbers each, in one flat array: constant strides let the loops vectorise.
+# Rows of a pool, in one flat array: constant strides let the loops vectorise.
 (
     T, T_LOW, X, Y, VX, VY, WALL,  # state at the last collision
     R0, R1, R2, W0, W1, W2, H0, H1, H2, M0, M1, M2,  # radius, half-width, depth, slope there, two derivatives
@@ -30,15 +33,15 @@ NEVER = np.inf
     SINCE, UNTIL, STAY_IN, STAY_OUT,  # a captured stay that spans an instant between is kept; begin and end
     N_ARC, N_BASE, N_LEFT, N_RIGHT, N_FLOOR,  # collisions so far
     LAWS,  # from here on the laws' coefficients: see Pieces.coefficients
-) = LANES * np.arange(63)  # fmt: skip
+) = STRIDE * np.arange(63)  # fmt: skip
 N_COEFFICIENTS = 16  # of each law, as many as the highest degree asks for
 N_ROWS = 62 + 4 * N_COEFFICIENTS
-RADIUS_LAW, WIDTH_LAW, DEPTH_LAW, SLOPE_LAW = LAWS + LANES * N_COEFFICIENTS * np.arange(4)
+RADIUS_LAW, WIDTH_LAW, DEPTH_LAW, SLOPE_LAW = LAWS + STRIDE * N_COEFFICIENTS * np.arange(4)
 # Codes of walls as they stand in a row, and of OK: out of the laws' reach, not shown right, to be corrected,
 # right.
 ON_ARC, ON_BASE, ON_LEFT, ON_RIGHT, ON_FLOOR = map(float, (ARC, BASE, LEFT, RIGHT, FLOOR))
 FAR, REFUSED, COARSE, CERTAIN = -1.0, 0.0, 1.0, 2.0
-POOL_SIZE = N_ROWS * LANES
+POOL_SIZE = N_ROWS * STRIDE
 REGISTER = 8  # lanes of the widest registers
 
 
@@ -50,7 +53,10 @@ def whole_registers(n):
 
 @kernel
 def set_reference(a, i, t, t_low, scene, pieces, degree):
-    """Give a lane the piece of the laws that serves at a time."""
+    """Give a lane the piece of the laws that serves at a time; END is minus infinity where none does."""
+    if not abs(t) < pieces.until:
+        a[END + i] = -NEVER
+        return
     piece, reference, low = piece_at(pieces, t, t_low)
     a[REF + i], a[REF_LOW + i] = reference, low
     a[END + i] = reference + pieces.serves[piece]
@@ -59,13 +65,13 @@ def set_reference(a, i, t, t_low, scene, pieces, degree):
         a[BACK + i] = -NEVER
     for row in range(4):
         for j in range(len(degree) + 2):
-            a[LAWS + (row * N_COEFFICIENTS + j) * LANES + i] = pieces.coefficients[piece, row, j]
+            a[LAWS + (row * N_COEFFICIENTS + j) * STRIDE + i] = pieces.coefficients[piece, row, j]
 
 
 @packed
 def law_of(a, place, u, degree):
     """Return a law of a lane, which begins at `place`, and two derivatives at a time since its reference."""
-    f, rate, bend, _ = law_at(a, place, LANES, u, u, degree)
+    f, rate, bend, _ = law_at(a, place, STRIDE, u, u, degree)
     return f, rate, bend
 
 
@@ -88,14 +94,14 @@ def set_laws(a, i, place, u, scene, degree):
     h, h1, h2 = law_of(a, DEPTH_LAW + i, u, degree)
     m, m1, m2 = law_of(a, SLOPE_LAW + i, u, degree)
     for j, number in enumerate((r, r1, r2, w, w1, w2, h, h1, h2, m, m1, m2)):
-        a[place + j * LANES + i] = number
+        a[place + j * STRIDE + i] = number
 
 
 @part
 def load(a, i, particle, stop, is_first_kept):
     """Put a particle into a lane; its laws are unknown there, so its first step will be careful."""
     for row in range(N_ROWS):
-        a[row * LANES + i] = 0.0
+        a[row * STRIDE + i] = 0.0
     a[T + i], a[T_LOW + i] = particle.t, particle.t_low
     a[X + i], a[Y + i], a[VX + i], a[VY + i] = particle.x, particle.y, particle.vx, particle.vy
     a[WALL + i] = particle.wall
@@ -109,7 +115,7 @@ def load(a, i, particle, stop, is_first_kept):
 @kernel
 def copy_rows(a, i, b, j, first, last):
     """Copy what lane i of one pool holds to lane j of another, from one row up to another."""
-    for row in range(first, last, LANES):
+    for row in range(first, last, STRIDE):
         b[row + j] = a[row + i]
 
 

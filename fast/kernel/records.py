@@ -86,6 +86,7 @@ class Pieces(NamedTuple):
         serves: (P,) until when after its reference time a piece is the best one.
         coefficients: (P, 4, D + 2) for r, w or nu, h, slope: the value at the reference time, its low part,
             and the coefficients of the powers 1 to D of the time since.
+        until: up to when they may be used [time]; later, or before minus that, phases are lost.
     """
 
     origin: float
@@ -96,6 +97,7 @@ class Pieces(NamedTuple):
     limits: FloatArray
     serves: FloatArray
     coefficients: FloatArray
+    until: float
 
 
 class LawsInLanes(NamedTuple):
@@ -106,14 +108,12 @@ class LawsInLanes(NamedTuple):
         pieces: its laws as polynomials.
         degree: as many zeros as their degree: numba compiles the loops anew for each degree, and unrolls them.
         slope: of the sides; None where it moves.
-        until: up to when the lanes may be used [time]; later, or before minus that, phases are lost.
     """
 
     compiled: Compiled
     pieces: Pieces
     degree: tuple[int, ...]
     slope: float | None
-    until: float
 
 
 class Particle(NamedTuple):

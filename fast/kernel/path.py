@@ -1,0 +1,59 @@
+"""Following one particle collision by collision: the lanes' loops with one lane in use, else the careful step."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fast.kernel.bounces import bounce
+from fast.kernel.careful import NEAR
+from fast.kernel.codes import HORIZON, MUSHROOM
+from fast.kernel.compiling import part
+from fast.kernel.follow import GENERAL, OFF, advance, correct, step_carefully
+
+from fast.kernel.pools import (  # isort: skip
+    CERTAIN, END, HIT, NEVER, NEXT_T, NEXT_T_LOW, NEXT_VX, NEXT_VY, NEXT_X, NEXT_Y, OK, REGISTER, S, T, T_LOW,
+    VX, VY, WALL, X, Y, load, set_reference,
+)  # fmt: skip
+from fast.kernel.records import Particle, particle_at, write_state, write_step
+
+
+@part
+def next_hit(a, roster, worker, slope):
+    """Find the next collision of the particle in the first lane; returns its wall's code, or what comes instead.
+
+    The lanes' answer is taken unless the end may come before: there the careful step looks from both sides.
+    """
+    i, limit = np.int64(0), (worker.stops.times[-1] - a[T]) - a[T_LOW]
+    if worker.is_laned and a[END + i] > -NEVER:
+        advance(GENERAL, a, REGISTER, OFF, worker.scene, slope, worker.degree, worker.limits)
+        if a[OK + i] != CERTAIN:
+            correct(GENERAL, a, 1, worker, slope)
+        if a[OK + i] == CERTAIN and a[S + i] < limit * (1.0 - 4.0 * NEAR):
+            if a[NEXT_T + i] >= a[END + i]:
+                t, t_low = a[NEXT_T + i], a[NEXT_T_LOW + i]
+                set_reference(a, i, t, t_low, worker.scene, worker.pieces, worker.degree)
+            return int(a[HIT + i])
+    return step_carefully(GENERAL, a, i, roster, worker, slope)
+
+
+@part
+def follow_one(worker, walls, slope, paths):
+    """Follow each particle of a worker by itself through as many collisions as there is room for in `paths`."""
+    states, a, roster = worker.followed.states, worker.pools[GENERAL], worker.rosters[GENERAL]
+    for j in range(states.shape[0]):
+        load(a, 0, particle_at(states, j, walls[j]), NEVER, OFF)
+        roster[0, 0] = j
+        code, n = walls[j], 0
+        while n < paths.walls.shape[1]:
+            code = next_hit(a, roster, worker, slope)
+            if code >= HORIZON:
+                a[T], a[T_LOW], a[X], a[Y] = a[NEXT_T], a[NEXT_T_LOW], a[NEXT_X], a[NEXT_Y]
+                a[VX], a[VY] = a[NEXT_VX], a[NEXT_VY]
+                break
+            bounce(a, REGISTER, slope, worker.scene.table == MUSHROOM)
+            paths.walls[j, n] = code
+            particle = Particle(a[T], a[T_LOW], a[X], a[Y], a[VX], a[VY], code)
+            write_step(paths.steps, j, n, a[S], particle)
+            n += 1
+        paths.codes[j], paths.counts[j] = code, n
+        write_state(paths.ends, j, Particle(a[T], a[T_LOW], a[X], a[Y], a[VX], a[VY], int(a[WALL])))

@@ -1,0 +1,127 @@
+"""The polynomials that lanes take for laws, against the laws themselves to 60 digits."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from mpmath import MPContext
+
+from conformance.strategies import scenes
+from fast import pieces
+from fast.compiled import compile_scene
+from fast.kernel.pieces import law_at, piece_at
+from fast.pieces import DEGREES, laws_in_lanes
+from fast.units import fit
+from scene import BangBang, Cap, Fourier, Mushroom, Stem
+from scene.laws import bounds, value
+from scene.tables import width_factors
+
+ROUNDING = 8 * 2.0**-53
+CTX = MPContext()
+CTX.dps = 60
+
+
+def as_rows(scene):
+    """Return a scene's laws by the row of their coefficients."""
+    found = {} if isinstance(scene, Stem) else {0: scene.r}
+    if not isinstance(scene, Cap):
+        found |= {1: width_factors(scene)[0], 2: scene.h, 3: scene.slope}
+    return found
+
+
+def worst_errors(scene, random, n):
+    """Return how far polynomials are from laws: value over its least value, rate over its terms, mean rate."""
+    in_lanes, worst = laws_in_lanes(scene), np.zeros(3)
+    p, degree = in_lanes.pieces, in_lanes.degree
+    span = 7 * p.period if p.period < np.inf else 10.0
+    for t in random.uniform(-span, span, n):
+        piece, reference, low = piece_at(p, t, 0.0)
+        near, far = np.sort(random.choice([-1.0, 1.0, *random.uniform(-1, 1, 2)], 2)) * p.limits[piece, 0]
+        if p.period == np.inf:
+            near, far = -1.0, 1.0
+        for row, law in as_rows(scene).items():
+            f, rate, _, mean = law_at(p.coefficients[piece, row], 0, 1, far, near, degree)
+            at = [CTX.mpf(reference) + CTX.mpf(low) + CTX.mpf(u) for u in (near, far)]
+            true = [value(CTX, law, u) for u in at]
+            rates = terms_of_rate(law)
+            size = max(abs(v) for v in true) + (row == 3)
+            errors = [abs(f - true[1]) / size, abs(rate - value(CTX, law, at[1], 1)) / rates, 0.0]
+            if near != far:
+                errors[2] = abs(mean - (true[1] - true[0]) / (at[1] - at[0])) / rates
+            worst = np.maximum(worst, [float(e) for e in errors])
+    return worst
+
+
+def terms_of_rate(law):
+    """Return the summed sizes of the terms of a law's rate, 1 for a constant."""
+    if isinstance(law, Fourier):
+        omega = law.omega or 2 * np.pi / law.period
+        sizes = [k * (abs(c) + abs(s)) for k, c, s in law.harmonics()]
+        return omega * sum(sizes) or 1.0
+    return bounds(law).slope or 1.0
+
+
+@given(scenes(), st.integers(0, 2**32 - 1))
+@settings(max_examples=60)
+def test_polynomials_are_the_laws_within_rounding(scene, seed):
+    scene = fit(scene).scene
+    assert (worst_errors(scene, np.random.default_rng(seed), 4) <= ROUNDING).all()
+
+
+DEEP = [
+    Mushroom(r=Fourier(1.0, 1.0, (0.9985,)), nu=0.5, h=1.0),
+    Mushroom(r=1.0, w=0.1, h=1.0, slope=Fourier(0.0, 3.0, tuple(0.05 / k**2 for k in range(1, 17)))),
+    Cap(r=Fourier(mean=1.0, period=1.0, cos=(0.1, 0.0, 0.02), sin=(0.0, 0.05))),
+    Stem(
+        w=BangBang(((0.3125, 1.0), (0.55, 0.2), (1.3125, 1.0))),
+        h=Fourier(mean=2.0, period=1.0, sin=tuple(1.0 / k**3 for k in range(1, 17))),
+    ),
+    Stem(w=BangBang(((-0.6875, 1.0), (-0.6874, 0.9), (0.3125, 1.0))), h=1.0),
+]
+
+
+@pytest.mark.parametrize("scene", DEEP)
+def test_deep_quick_and_mixed_laws_too(scene):
+    assert (worst_errors(scene, np.random.default_rng(1), 100) <= ROUNDING).all()
+
+
+@pytest.mark.parametrize("scene", DEEP[:4])
+def test_pieces_that_hold_for_too_long_are_seen(scene, monkeypatch):
+    reach = pieces.reach
+    monkeypatch.setattr(pieces, "reach", lambda compiled, degree: 1.6 * reach(compiled, degree))
+    laws_in_lanes.cache_clear()
+    try:
+        assert not (worst_errors(scene, np.random.default_rng(1), 100) <= ROUNDING).all()
+    finally:
+        laws_in_lanes.cache_clear()
+
+
+def test_every_flight_that_begins_in_a_piece_has_room_there():
+    """What a piece serves is at most what it holds; pieces follow each other round the period."""
+    for scene in DEEP:
+        p = laws_in_lanes(scene).pieces
+        ends = np.append(p.begins[1:], p.period)
+        middle = p.references[:, 0] + p.references[:, 1] - p.origin
+        assert p.begins[0] == 0.0
+        assert (np.diff(p.begins) > 0.0).all()
+        assert np.allclose(middle - p.limits[:, 0], p.begins, rtol=0, atol=1e-15 * p.period)
+        assert (middle + p.limits[:, 1] >= ends - 1e-15 * p.period).all()
+        assert np.allclose(p.serves, ends - middle, rtol=0, atol=1e-15 * p.period)
+
+
+def test_degrees_are_no_higher_than_it_takes():
+    assert len(laws_in_lanes(DEEP[4]).degree) == DEGREES[0]
+    assert len(laws_in_lanes(Cap(r=Fourier(1.0, 1.0, (0.1,)))).degree) == DEGREES[1]
+    assert len(laws_in_lanes(DEEP[1]).degree) == DEGREES[2]
+
+
+def test_laws_that_take_too_many_pieces_are_left_to_careful_steps(monkeypatch):
+    monkeypatch.setattr(pieces, "MAX_PIECES", 8)
+    assert pieces.pieces_of(compile_scene(DEEP[0]), DEGREES[1]) is None
+    laws_in_lanes.cache_clear()
+    try:
+        assert laws_in_lanes(DEEP[0]).pieces.until < 0.0
+    finally:
+        laws_in_lanes.cache_clear()

@@ -23,7 +23,7 @@ import numpy as np
 
 from fast.compiled import compile_scene
 from fast.kernel.records import Compiled, FloatArray
-from fast.kernel.single import LARGEST
+from fast.kernel.single import LARGEST, packed
 from scene import BangBang, Fourier, InvalidState, Law, Scene, State
 from scene.refusal import BadInput
 from scene.tables import laws, period
@@ -104,12 +104,14 @@ class Fitted(NamedTuple):
         length: exponent of the unit of length.
         time: exponent of the unit of time; None for a static table, which leaves it to the state.
         compiled: its numbers for the kernels.
+        packed: the same in one array.
     """
 
     scene: Scene
     length: int
     time: int | None
     compiled: Compiled
+    packed: FloatArray
 
     def units(self, state: State) -> Units:
         """Return the units for one state: all that depends on it is a static table's unit of time."""
@@ -146,7 +148,8 @@ def fit(scene: Scene) -> Fitted:
         for name, law in laws(scene).items()
     }
     fitted = msgspec.structs.replace(scene, **changed)
-    return Fitted(fitted, length, time, compile_scene(fitted))
+    compiled = compile_scene(fitted)
+    return Fitted(fitted, length, time, compiled, packed(compiled))
 
 
 def exponent(size: float) -> int:

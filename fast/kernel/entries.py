@@ -19,7 +19,7 @@ from fast.kernel.careful import first_step, step
 from fast.kernel.codes import HORIZON
 from fast.kernel.follow import follow
 from fast.kernel.laws import set_anchors
-from fast.kernel.records import ANCHORS_SHAPE, Compiled, particle_at, write_state, write_step
+from fast.kernel.records import ANCHORS_SHAPE, particle_at, write_state, write_step
 from fast.kernel.refine import fine_path
 from fast.kernel.single import single_step, wall_gap
 
@@ -83,11 +83,10 @@ def _follow(sources):
 
 def _single(sources):
     @njit(cache=True, error_model="numpy")
-    def single(table, is_relative, laws, bounds, length, time, t, x, y, vx, vy, wall, t_end):
-        """Take one step: see fast.kernel.single. numba reads loose arguments faster than a named tuple."""
+    def single(numbers, length, time, t, x, y, vx, vy, wall, t_end):
+        """Take one step: see fast.kernel.single."""
         sources  # noqa: B018
-        scene = Compiled(table, is_relative, laws, bounds)
-        return single_step(scene, length, time, t, x, y, vx, vy, wall, t_end)
+        return single_step(numbers, length, time, t, x, y, vx, vy, wall, t_end)
 
     return single
 

@@ -1,8 +1,8 @@
-"""One careful step of one particle, from numbers to numbers: what a single question costs is mostly around it.
+"""One careful step of one particle, from numbers to numbers: most of what one question costs is around it.
 
-Units are changed here and not in Python, no array is handed over but the scene's own two, and the answer is
-a tuple: nothing is kept between calls, so that threads may ask side by side. What is refused here is refused
-by the checks in Python too, which say why.
+Units are changed here and not in Python, the scene is one array and the answer a tuple. Nothing is kept
+between calls, so that threads may ask side by side. What is refused here is refused by the checks in Python
+too, which say why.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ def packed(scene):
 
 @kernel
 def unpacked(numbers):
-    """Return the Compiled that `packed` was given. Whoever owns the array holds it as long as this is used."""
+    """Return the Compiled that `packed` was given; whoever owns the array must hold it meanwhile."""
     numbers = borrowed(numbers)
     bounds, laws = numbers[2:18].reshape((4, 4)), numbers[18:]
     return Compiled(
@@ -141,7 +141,7 @@ def answer(length, time, code, dt, particle):
 
 @part
 def single_step(numbers, length, time, t, x, y, vx, vy, wall, t_end):
-    """Take a careful step in a packed scene, of a particle in the scene's units, which are 2^length and 2^time of the kernel's.
+    """Take a careful step in a packed scene, whose units are 2^length and 2^time of the kernel's.
 
     Returns:
         (code, dt, t, x, y, vx, vy): a wall's code and the collision there, HORIZON and the place then, or why

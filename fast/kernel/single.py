@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numba import config
 from numba.core import cgutils
 from numba.extending import intrinsic
 
@@ -28,8 +29,19 @@ LARGEST = 2.0**400
 LARGEST_FLOAT = float(np.finfo(np.float64).max)
 
 
+def _plain_ldexp(number, exponent):
+    try:
+        return math.ldexp(number, exponent)
+    except OverflowError:
+        return math.copysign(math.inf, number)
+
+
+def _itself(array):
+    return array
+
+
 @intrinsic
-def borrowed(typing_context, array):
+def _uncounted(typing_context, array):
     """Return an array as one whose references are not counted; whoever owns it must outlive that.
 
     numba counts atomically, wherever an array is handed on: a quarter of the time of a careful step.
@@ -42,6 +54,11 @@ def borrowed(typing_context, array):
         return found._getvalue()
 
     return array(array), without_owner
+
+
+# Without the compiler nothing is counted so, and Python's own ldexp raises where C has infinity.
+borrowed = _itself if config.DISABLE_JIT else _uncounted
+ldexp = _plain_ldexp if config.DISABLE_JIT else math.ldexp
 
 
 def packed(scene):
@@ -62,8 +79,8 @@ def unpacked(numbers):
 @kernel
 def scaled(number, exponent):
     """Return a number times 2^exponent, and whether that is finite and exact."""
-    found = math.ldexp(number, exponent)
-    return found, abs(found) < np.inf and math.ldexp(found, -exponent) == number
+    found = ldexp(number, exponent)
+    return found, abs(found) < np.inf and ldexp(found, -exponent) == number
 
 
 @kernel

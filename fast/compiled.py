@@ -7,7 +7,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from fast.kernel import codes
+from fast.kernel import codes, single
 from fast.kernel.double_double import half_pi
 
 from fast.kernel.records import (  # isort: skip
@@ -20,10 +20,7 @@ from scene.tables import width_factors
 
 HALF_PI = half_pi()
 TABLES = {"Cap": int(codes.CAP), "Stem": int(codes.STEM), "Mushroom": int(codes.MUSHROOM)}
-
-
-# Squares of what is larger overflow.
-LARGEST = 2.0**400
+LARGEST = single.LARGEST
 
 
 @lru_cache(maxsize=256)

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from fast.given import given_state
-from fast.kernel import careful, codes, entries
+from fast.kernel import careful, codes, entries, single
 from fast.kernel.records import (
     ANCHORS_SHAPE,
     Compiled,
@@ -18,15 +18,18 @@ from fast.kernel.records import (
     Paths,
     unfilled_paths,
 )
-from fast.units import Units, fit
+from fast.units import ANSWER_LOST, Units, fit
 from scene import (
+    Cap,
     Collision,
     Horizon,
     InvalidState,
+    Mushroom,
     Outcome,
     Rejected,
     Scene,
     State,
+    Stem,
     Undecided,
     Undefined,
     Wall,
@@ -34,6 +37,7 @@ from scene import (
 from scene.refusal import BadInput, check_number, check_scene
 from scene.states import ON_WALL, check_numbers
 
+TABLES = (Cap, Stem, Mushroom)
 WALL_NAMES: dict[int, Wall] = {
     int(codes.ARC): "arc",
     int(codes.BASE): "base",
@@ -52,6 +56,7 @@ REASONS: dict[int, Outcome] = {
     int(codes.EDGE): Undecided("the mouth's edge is hit within rounding"),
     int(codes.AT_END): Undecided("a wall is hit at the horizon within rounding"),
     int(codes.START): Undecided("the state is on another wall within rounding"),
+    int(single.ANSWER_LOST): Rejected(ANSWER_LOST),
     int(codes.APPROACHING): Rejected("state.wall: the particle starts on a wall and moves into it"),
 }
 
@@ -74,18 +79,35 @@ def next_collision(scene: Scene, state: State, t_end: float) -> Outcome:
 
     Source: Gelfreich, Rom-Kedar, Turaev (2014), sec. 3.1.
     """
-    check_scene(scene)
+    if type(scene) not in TABLES:  # the common case is not worth a call
+        check_scene(scene)
     try:
         t_end = t_end if type(t_end) is float else check_number("t_end", t_end)
         state = given_state(scene, state)
-        check_numbers(scene, state, t_end)
-        start = fitted_start(scene, state)
-        paths = followed_paths(start.compiled, *as_arrays([start]), 1, start.units.horizon(t_end))
-        code = paths.codes.item()
+        try:
+            fitted = fit(scene)
+        except BadInput:
+            check_numbers(scene, state, t_end)  # what is wrong with the question comes first
+            raise
+        code, dt, t, x, y, vx, vy = entries.single(
+            fitted.packed,
+            fitted.length,
+            fitted.time_at(max(abs(state.vx), abs(state.vy))) if fitted.time is None else fitted.time,
+            state.t,
+            state.x,
+            state.y,
+            state.vx,
+            state.vy,
+            WALL_CODES[state.wall],
+            t_end,
+        )
         if code in WALL_NAMES:
-            return Collision(WALL_NAMES[code], *start.units.steps(paths.steps[0, 0]).tolist())
+            return Collision(WALL_NAMES[code], dt, t, x, y, vx, vy)
         if code == codes.HORIZON:
-            return Horizon(t_end, *start.units.places(paths.ends[0, 2:]).tolist())
+            return Horizon(t_end, x, y, vx, vy)
+        if code == single.REFUSED:  # by the checks that follow, made in compiled code: they say why
+            check_numbers(scene, state, t_end)
+            fitted_start(scene, state).units.horizon(t_end)
     except BadInput as error:
         return Rejected(str(error))
     return trouble(code, state)
@@ -145,7 +167,8 @@ def fitted_start(scene: Scene, state: State) -> Start:
     units = fitted.units(state)
     inner = units.state(state)
     if state.wall is not None:
-        gap, size = wall_gap(fitted.compiled, inner)
+        particle = Particle(inner.t, 0.0, inner.x, inner.y, inner.vx, inner.vy, WALL_CODES[state.wall])
+        gap, size = entries.gap(fitted.compiled, particle)
         if abs(gap) > ON_WALL * size:
             away = f"{gap / size:.3g} of that wall's distance from the origin"
             raise InvalidState(f"state.wall = {state.wall!r}, but the state is {away} away from that wall")
@@ -158,30 +181,11 @@ def as_arrays(starts: Sequence[Start]) -> tuple[FloatArray, IntArray]:
     return rows, np.array([WALL_CODES[start.state.wall] for start in starts], dtype=np.int64)
 
 
-def wall_gap(compiled: Compiled, state: State) -> tuple[float, float]:
-    """Return how far a state is inside the wall it claims to leave, and that wall's distance from 0, now.
-
-    Today's distance is the measure, not the largest of all time: a small cap is not allowed a large one's
-    slack. A time whose phase is lost is left to the step, which refuses it.
-    """
-    particle = Particle(state.t, 0.0, state.x, state.y, state.vx, state.vy, WALL_CODES[state.wall])
-    is_known, r, w, h, f = entries.wall_gap(compiled, particle)
-    if not is_known:
-        return 0.0, 1.0
-    if compiled.is_relative:
-        w *= r
-    if state.wall == "base":
-        return state.y, max(r, w)
-    if state.wall == "arc":
-        return float(f) / (2.0 * r), r
-    return float(f), h if state.wall == "floor" else w
-
-
 def trouble(code: int, state: State) -> Outcome:
     """Return the outcome that a code stands for, other than a wall's and HORIZON."""
+    if code in REASONS:
+        return REASONS[code]
     if code == codes.FAR_TIME:
         return Rejected(f"state.t = {state.t!r} is more than 2^27 quarter periods from 0: its phase is lost")
-    if code >= codes.BEYOND:
-        wall = WALL_NAMES[int(code - codes.BEYOND)]
-        return Rejected(f"state (x, y) = ({state.x!r}, {state.y!r}) at t = {state.t!r} is beyond wall {wall}")
-    return REASONS[code]
+    wall = WALL_NAMES[int(code - codes.BEYOND)]
+    return Rejected(f"state (x, y) = ({state.x!r}, {state.y!r}) at t = {state.t!r} is beyond wall {wall}")

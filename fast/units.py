@@ -21,13 +21,15 @@ from typing import NamedTuple
 import msgspec
 import numpy as np
 
-from fast.compiled import LARGEST, compile_scene
+from fast.compiled import compile_scene
 from fast.kernel.records import Compiled, FloatArray
+from fast.kernel.single import LARGEST, packed
 from scene import BangBang, Fourier, InvalidState, Law, Scene, State
 from scene.refusal import BadInput
 from scene.tables import laws, period
 
 LENGTH, TIME = 96, 32  # exponents of a table's size and period in the kernel
+ANSWER_LOST = "the answer holds a number beyond binary64: every one must be 0 or 2^-1022 to 2^1023"
 
 
 class Units(NamedTuple):
@@ -68,7 +70,9 @@ class Units(NamedTuple):
 
         One beyond all floats becomes the largest of them: whatever moves meets a wall long before.
         """
-        if t_end < math.inf and math.frexp(t_end)[1] - self.time > sys.float_info.max_exp:
+        try:
+            math.ldexp(t_end, -self.time)
+        except OverflowError:
             return math.copysign(sys.float_info.max, t_end)
         return inward("t_end", t_end, self.time)
 
@@ -100,12 +104,14 @@ class Fitted(NamedTuple):
         length: exponent of the unit of length.
         time: exponent of the unit of time; None for a static table, which leaves it to the state.
         compiled: its numbers for the kernels.
+        packed: the same in one array.
     """
 
     scene: Scene
     length: int
     time: int | None
     compiled: Compiled
+    packed: FloatArray
 
     def units(self, state: State) -> Units:
         """Return the units for one state: all that depends on it is a static table's unit of time."""
@@ -113,10 +119,11 @@ class Fitted(NamedTuple):
 
     def units_at(self, speed: float) -> Units:
         """Return the units for a state whose faster component of velocity has this size."""
-        if self.time is not None:
-            return Units(self.length, self.time)
-        own = self.length + LENGTH - exponent(speed) - TIME if speed > 0.0 else 0
-        return Units(self.length, own)
+        return Units(self.length, self.time_at(speed) if self.time is None else self.time)
+
+    def time_at(self, speed: float) -> int:
+        """Return the exponent of a static table's unit of time for such a state."""
+        return self.length + LENGTH - TIME - exponent(speed) if speed > 0.0 else 0
 
 
 @lru_cache(maxsize=256)
@@ -141,7 +148,8 @@ def fit(scene: Scene) -> Fitted:
         for name, law in laws(scene).items()
     }
     fitted = msgspec.structs.replace(scene, **changed)
-    return Fitted(fitted, length, time, compile_scene(fitted))
+    compiled = compile_scene(fitted)
+    return Fitted(fitted, length, time, compiled, packed(compiled))
 
 
 def exponent(size: float) -> int:
@@ -185,7 +193,7 @@ def outward(numbers: FloatArray, exponents: FloatArray) -> FloatArray:
         scaled = np.ldexp(numbers, exponents)
         is_kept = (np.ldexp(scaled, -exponents) == numbers) | ~np.isfinite(numbers)
     if not is_kept.all():
-        raise BadInput("the answer holds a number beyond binary64: every one must be 0 or 2^-1022 to 2^1023")
+        raise BadInput(ANSWER_LOST)
     return scaled
 
 

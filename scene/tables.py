@@ -33,7 +33,14 @@ Wall = Literal["arc", "base", "left", "right", "floor"]
 PARAMETERS = ("r", "w", "nu", "h", "slope")
 
 
-class _Table(msgspec.Struct, frozen=True, tag_field="table", forbid_unknown_fields=True, omit_defaults=True):
+class _Table(
+    msgspec.Struct,
+    frozen=True,
+    cache_hash=True,  # steppers look up what they made of a scene at every step
+    tag_field="table",
+    forbid_unknown_fields=True,
+    omit_defaults=True,
+):
     optional: ClassVar[tuple[str, ...]] = ()  # parameters that may be None
 
     def __post_init__(self) -> None:

@@ -65,6 +65,8 @@ PROGRAM = """
 import fast, scene
 path = fast.trajectory(scene.load("moving-cap"), scene.State(0.0, 0.1, 0.3, 20.0, 7.0), 40)
 print(path.steps.tobytes().hex())
+for size in (1.0, 2.0**-500):
+    print(fast.next_collision(scene.Cap(r=size), scene.State(0.0, 0.0, 0.5 * size, 2.0**520, 0.0), 1e9))
 for name in ("moving-cap", "breathing-circle"):
     run = fast.simulate(scene.load(name), n_particles=5, energy=200.0, seed=1, threads=1)
     print(run.n_careful.sum() < 0.2 * run.n_collisions.sum(), run.sha256())
@@ -92,7 +94,7 @@ def test_a_change_in_any_source_makes_the_kernels_anew(tmp_path):
         path.write_text(path.read_text("utf-8") + "\n", "utf-8")
         assert entries.digest_of_sources(copy) != entries.SOURCES
         path.write_text(path.read_text("utf-8")[:-1], "utf-8")
-    for entry in (entries.careful, entries.fine, entries.follow_particles):
+    for entry in (entries.careful, entries.single, entries.fine, entries.follow_particles):
         assert entries.SOURCES in [cell.cell_contents for cell in entry.py_func.__closure__]
 
 

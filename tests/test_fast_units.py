@@ -18,6 +18,7 @@ import fast
 from conformance.grading.agreement import compare
 from fast import step as stepper
 from fast.compiled import compile_scene
+from fast.kernel.single import packed
 from fast.units import Fitted
 from scene import BangBang, Cap, Collision, Fourier, Mushroom, Rejected, State, load
 from scene.refusal import BadInput
@@ -37,7 +38,8 @@ def test_the_search_sees_a_stepper_that_does_not_scale(monkeypatch, tally):
     """Kernels in the scene's own units, as they would be without fast.units."""
 
     def unfitted(scene):
-        return Fitted(scene, 0, 0, compile_scene(scene))
+        compiled = compile_scene(scene)
+        return Fitted(scene, 0, 0, compiled, packed(compiled))
 
     monkeypatch.setattr(stepper, "fit", unfitted)
     monkeypatch.setattr(import_module("fast.flow"), "fit", unfitted)

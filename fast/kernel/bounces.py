@@ -7,8 +7,8 @@ from fast.kernel.compiling import kernel, widest_registers
 
 from fast.kernel.pools import (  # isort: skip
     CLOSED, DONE, H0, H1, H2, HIT, M0, M1, M2, NEVER, NEXT_H0, NEXT_H1, NEXT_H2, NEXT_M0, NEXT_M1,
-    NEXT_M2, NEXT_R0, NEXT_R1, NEXT_R2, NEXT_T, NEXT_T_LOW, NEXT_VX, NEXT_VY, NEXT_W0, NEXT_W1, NEXT_W2, NEXT_X, NEXT_X_LOW, NEXT_Y, NEXT_Y_LOW, N_ARC,
-    N_BASE, N_FLOOR, N_LEFT, N_RIGHT, ON_ARC, ON_BASE, ON_FLOOR, ON_LEFT, ON_RIGHT, R0, R1, R2, SINCE, SPIN,
+    NEXT_M2, NEXT_R0, NEXT_R1, NEXT_R2, NEXT_R3, NEXT_T, NEXT_T_LOW, NEXT_VX, NEXT_VY, NEXT_W0, NEXT_W1, NEXT_W2, NEXT_X, NEXT_X_LOW, NEXT_Y, NEXT_Y_LOW, N_ARC,
+    N_BASE, N_FLOOR, N_LEFT, N_RIGHT, ON_ARC, ON_BASE, ON_FLOOR, ON_LEFT, ON_RIGHT, R0, R1, R2, R3, SINCE, SPIN,
     STAY_IN, STAY_OUT, T, T_LOW, UNTIL, VX, VY, W0, W1, W2, WALL, X, Y,
 )  # fmt: skip
 from fast.kernel.walls import off_the_arc, off_the_arc_spinning
@@ -22,6 +22,7 @@ def arrive(a, i, slope):
     a[T + i], a[T_LOW + i] = a[NEXT_T + i], a[NEXT_T_LOW + i]
     a[X + i], a[Y + i], a[WALL + i] = a[NEXT_X + i], a[NEXT_Y + i], a[HIT + i]
     a[R0 + i], a[R1 + i], a[R2 + i] = a[NEXT_R0 + i], a[NEXT_R1 + i], a[NEXT_R2 + i]
+    a[R3 + i] = a[NEXT_R3 + i]
     a[W0 + i], a[W1 + i], a[W2 + i] = a[NEXT_W0 + i], a[NEXT_W1 + i], a[NEXT_W2 + i]
     a[H0 + i], a[H1 + i], a[H2 + i] = a[NEXT_H0 + i], a[NEXT_H1 + i], a[NEXT_H2 + i]
     if slope is None:
@@ -111,4 +112,5 @@ def rebound(a, n):
         a[DONE + i] = 0.0
         a[T + i], a[T_LOW + i], a[X + i], a[Y + i] = a[NEXT_T + i], a[NEXT_T_LOW + i], x, y
         a[R0 + i], a[R1 + i], a[R2 + i] = a[NEXT_R0 + i], a[NEXT_R1 + i], a[NEXT_R2 + i]
+        a[R3 + i] = a[NEXT_R3 + i]
         a[W0 + i], a[W1 + i] = a[NEXT_W0 + i], a[NEXT_W1 + i]

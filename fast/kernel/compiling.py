@@ -42,7 +42,7 @@ widest_registers = _no_registers if config.DISABLE_JIT else _compiled_widest_reg
 
 
 @intrinsic
-def _compiled_unowned(_context: Any, array: Any) -> Any:
+def _compiled_borrowed(_context: Any, array: Any) -> Any:
     def generate(context: Any, builder: ir.IRBuilder, signature: Any, arguments: Any) -> Any:
         view = context.make_array(array)(context, builder, arguments[0])
         view.meminfo = ir.Constant(view.meminfo.type, None)
@@ -58,4 +58,4 @@ def _itself(array: Any) -> Any:
 
 # A view of an array that keeps no count of its references: one that is taken from a tuple is counted, and each
 # count is an atomic operation. Only for what a caller holds while the view is used.
-unowned = _itself if config.DISABLE_JIT else _compiled_unowned
+borrowed = _itself if config.DISABLE_JIT else _compiled_borrowed

@@ -16,23 +16,14 @@ from numba import njit
 
 from fast.kernel.arithmetic import sine_cosine
 from fast.kernel.careful import first_step, step
-from fast.kernel.codes import BASE, HORIZON
+from fast.kernel.codes import HORIZON
 from fast.kernel.follow import follow, without_counts
 from fast.kernel.laws import set_anchors
 from fast.kernel.path import follow_one
 from fast.kernel.pieces import fill_coefficients
-from fast.kernel.records import (
-    ANCHORS_SHAPE,
-    DEPTH,
-    RADIUS,
-    VALUE,
-    WIDTH,
-    particle_at,
-    write_state,
-    write_step,
-)
+from fast.kernel.records import ANCHORS_SHAPE, particle_at, write_state, write_step
 from fast.kernel.refine import fine_path
-from fast.kernel.walls import wall_residual
+from fast.kernel.single import single_step, wall_gap
 
 
 def digest_of_sources(folder: Path) -> str:
@@ -112,21 +103,30 @@ def _fill_pieces(sources):
     return fill_pieces
 
 
-def _wall_gap(sources):
+def _single(sources):
     @njit(cache=True, error_model="numpy")
-    def wall_gap(scene, particle):
-        """Tell whether a time's phase is known; return r, w, h and the residual of the particle's wall then.
+    def single(numbers, length, time, t, x, y, vx, vy, wall, t_end):
+        """Take one step: see fast.kernel.single."""
+        sources  # noqa: B018
+        return single_step(numbers, length, time, t, x, y, vx, vy, wall, t_end)
 
-        w is nu where the scene gives that. The residual of the base is y.
+    return single
+
+
+def _gap(sources):
+    @njit(cache=True, error_model="numpy")
+    def gap(scene, particle):
+        """Return a particle's distance from its wall and that wall's size; 0 and 1 where a phase is lost.
+
+        Such a time is left to the step, which refuses it.
         """
         sources  # noqa: B018
         anchors = np.zeros(ANCHORS_SHAPE)
-        is_known, f = set_anchors(scene.laws, anchors, particle.t, particle.t_low), particle.y
-        if is_known and particle.wall != BASE:
-            f, _ = wall_residual(particle.wall, particle.x, particle.y, scene, anchors)
-        return is_known, anchors[RADIUS, VALUE], anchors[WIDTH, VALUE], anchors[DEPTH, VALUE], f
+        if not set_anchors(scene.laws, anchors, particle.t, particle.t_low):
+            return 0.0, 1.0
+        return wall_gap(particle, scene, anchors)
 
-    return wall_gap
+    return gap
 
 
 def _directions(sources):
@@ -146,5 +146,6 @@ fine = _fine(SOURCES)
 follow_particles = _follow(SOURCES)
 follow_paths = _follow_one(SOURCES)
 fill_pieces = _fill_pieces(SOURCES)
-wall_gap = _wall_gap(SOURCES)
+single = _single(SOURCES)
+gap = _gap(SOURCES)
 directions = _directions(SOURCES)

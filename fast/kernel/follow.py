@@ -20,7 +20,7 @@ import numpy as np
 from fast.kernel.arithmetic import fma
 from fast.kernel.careful import first_step
 from fast.kernel.codes import ARC, CAP, HORIZON, MUSHROOM, N_WALLS, STEM
-from fast.kernel.compiling import kernel, part, unowned
+from fast.kernel.compiling import kernel, part, borrowed
 
 from fast.kernel.pools import (  # isort: skip
     CERTAIN, CLOSED, COARSE, DONE, END, FAR, HIT, LANES, LAWS, N_COEFFICIENTS, NEVER, NEXT_R0, NEXT_W0, NEXT_T, NEXT_T_LOW, NEXT_VX,
@@ -100,44 +100,44 @@ def new_worker(in_lanes: LawsInLanes, stops: Stops, followed: Followed) -> Worke
 
 @kernel
 def without_counts(worker):
-    """Return a worker whose arrays count no references: see fast.kernel.compiling.unowned."""
+    """Return a worker whose arrays count no references: see fast.kernel.compiling.borrowed."""
     scene, pieces, stops, followed = worker.scene, worker.pieces, worker.stops, worker.followed
     return Worker(
-        Compiled(scene.table, scene.is_relative, unowned(scene.laws), unowned(scene.bounds)),
+        Compiled(scene.table, scene.is_relative, borrowed(scene.laws), borrowed(scene.bounds)),
         worker.limits,
         Pieces(
             pieces.origin,
             pieces.period,
             pieces.period_low,
-            unowned(pieces.begins),
-            unowned(pieces.references),
-            unowned(pieces.limits),
-            unowned(pieces.serves),
-            unowned(pieces.coefficients),
+            borrowed(pieces.begins),
+            borrowed(pieces.references),
+            borrowed(pieces.limits),
+            borrowed(pieces.serves),
+            borrowed(pieces.coefficients),
             pieces.until,
         ),
         worker.degree,
-        unowned(worker.anchors),
+        borrowed(worker.anchors),
         worker.is_laned,
-        unowned(worker.pools),
-        unowned(worker.rosters),
-        unowned(worker.n_held),
+        borrowed(worker.pools),
+        borrowed(worker.rosters),
+        borrowed(worker.n_held),
         Stops(
-            unowned(stops.times),
-            unowned(stops.columns),
-            unowned(stops.cycles),
-            unowned(stops.narrowings),
+            borrowed(stops.times),
+            borrowed(stops.columns),
+            borrowed(stops.cycles),
+            borrowed(stops.narrowings),
             stops.is_first_kept,
         ),
         Followed(
-            unowned(followed.states),
-            unowned(followed.codes),
-            unowned(followed.counts),
-            unowned(followed.careful),
-            unowned(followed.energies),
-            unowned(followed.is_captured),
-            unowned(followed.t_in),
-            unowned(followed.t_out),
+            borrowed(followed.states),
+            borrowed(followed.codes),
+            borrowed(followed.counts),
+            borrowed(followed.careful),
+            borrowed(followed.energies),
+            borrowed(followed.is_captured),
+            borrowed(followed.t_in),
+            borrowed(followed.t_out),
         ),
     )
 

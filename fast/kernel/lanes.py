@@ -24,12 +24,12 @@ from fast.kernel.compiling import kernel, packed, part, widest_registers
 
 from fast.kernel.pools import (  # isort: skip
     BACK, CERTAIN, CLOSED, COARSE, DEPTH_LAW, END, FAR, H0, H1, H2, HIT, LIMIT, M0, M1, M2, NEVER, NEXT_H0,
-    NEXT_H1, NEXT_H2, NEXT_M0, NEXT_M1, NEXT_M2, NEXT_R0, NEXT_R1, NEXT_R2, NEXT_T, NEXT_T_LOW, NEXT_W0,
+    NEXT_H1, NEXT_H2, NEXT_M0, NEXT_M1, NEXT_M2, NEXT_R0, NEXT_R1, NEXT_R2, NEXT_R3, NEXT_T, NEXT_T_LOW, NEXT_W0,
     NEXT_W1, NEXT_W2, NEXT_X, NEXT_X_LOW, NEXT_Y, NEXT_Y_LOW, OK, ON_ARC, ON_BASE, ON_FLOOR, ON_LEFT,
-    ON_RIGHT, R0, R1, R2, RADIUS_LAW, REF, REFUSED, REF_LOW, ROUTINE, S, SLOPE_LAW, SPIN, STOP, STRIDE, SURE, T, T_LOW, VX, VY, W0, W1, W2,
+    ON_RIGHT, R0, R1, R2, R3, RADIUS_LAW, REF, REFUSED, REF_LOW, ROUTINE, S, SLOPE_LAW, SPIN, STOP, STRIDE, SURE, T, T_LOW, VX, VY, W0, W1, W2,
     WALL, X, Y, law_of, width_of,
 )  # fmt: skip
-from fast.kernel.pieces import law_at
+from fast.kernel.pieces import law_at, third_derivative
 from fast.kernel.short import moved, short_sum
 
 ONE = np.float64(1.0)  # its quotient by 0 is infinite without the compiler too
@@ -86,14 +86,20 @@ def nearest_below(wall, f_r, d_r, f_l, d_l, f_f, d_f):
 
 @part
 def arc_quotient(x, y, vx, vy, wall, r0, r1, r2):
-    """Return the time to the arc, to second order in it, as a quotient f / d."""
+    """Return the time to the arc, to second order in it, as a quotient f / d; and how fast f falls there, halved."""
     q, v2 = fma(x, vx, y * vy), fma(vx, vx, vy * vy)
     c = fma(-x, x, (r0 - y) * (r0 + y))
     c = 0.0 if wall == ON_ARC else c
     a2 = v2 - fma(r1, r1, r0 * r2)
     b = fma(-r0, r1, q)
     root = np.sqrt(fma(b, b, a2 * c))
-    return c if b > 0.0 else root - b, b + root if b > 0.0 else a2
+    return c if b > 0.0 else root - b, b + root if b > 0.0 else a2, root
+
+
+@part
+def cube_of_arc(r0, r1, r2, r3):
+    """Return the coefficient of the third power of the time in r^2."""
+    return fma(r1, r2, r0 * r3 * (1.0 / 3.0))
 
 
 @kernel
@@ -113,7 +119,8 @@ def aim(a, n, is_stem, slope, limits):
         m, m1, m2 = (a[M0 + i], a[M1 + i], a[M2 + i]) if slope is None else (slope, 0.0, 0.0)
         edge, drift = fma(m, y, w0), fma(m, vy, fma(m1, y, w1))
         f, d, side = nearest_below(wall, edge - x, vx - drift, edge + x, -vx - drift, y + a[H0 + i], -vy - h1)
-        f_a, d_a = arc_quotient(x, y, vx, vy, wall, a[R0 + i], a[R1 + i], a[R2 + i])
+        r0, r1, r2 = a[R0 + i], a[R1 + i], a[R2 + i]
+        f_a, d_a, root = arc_quotient(x, y, vx, vy, wall, r0, r1, r2)
         # Which of them, by the part of the table the flight is in and whether it crosses y = 0 before.
         reaches = fma(y, d_a, vy * f_a) if vy < 0.0 else 1.0  # cap: > 0 where the arc comes first
         stays = depth * d - f * vy if vy > 0.0 else 1.0  # stem: > 0 where a side comes first
@@ -128,11 +135,15 @@ def aim(a, n, is_stem, slope, limits):
         d = d_a if hit == ON_ARC else d
         f = depth if hit == ON_BASE else f
         d = rise if hit == ON_BASE else d
-        inverse = ONE / d
-        s = f * inverse
-        bend_s = h2 if hit == ON_FLOOR else fma(m2, y, fma(2.0 * m1, vy, w2))
-        bend_s = bend_s if hit >= ON_LEFT else 0.0
-        s = s * fma(0.5 * bend_s * s, inverse, 1.0)
+        # One division for 1 / d and 1 / root.
+        root = root if hit == ON_ARC else 1.0
+        inverse = ONE / (d * root)
+        s = f * (root * inverse)
+        # What is beyond the straight line, or beyond second order at the arc.
+        beyond = h2 if hit == ON_FLOOR else fma(m2, y, fma(2.0 * m1, vy, w2))
+        beyond = beyond if hit >= ON_LEFT else 0.0
+        beyond = beyond * s if hit != ON_ARC else cube_of_arc(r0, r1, r2, a[R3 + i]) * s * s * d
+        s = s * fma(0.5 * beyond, inverse, 1.0)
         # Comparisons so put that what is no number is never sure.
         whole = reaches if is_in_cap > 0.5 else stays
         gap = gap * rise
@@ -279,6 +290,7 @@ def fly(a, n, is_stem, is_relative, slope, degree, limits):
         routine = routine if a[CLOSED + i] == NEVER else 0.0
         a[ROUTINE + i] = routine if a[SPIN + i] == 0.0 else 0.0
         laws_at_hit(a, i, delta, r, r1, r2, w, w1)
+        a[NEXT_R3 + i] = third_derivative(a, RADIUS_LAW + i, STRIDE, since, degree)
         a[NEXT_W1 + i], a[NEXT_W2 + i] = fma(w2, delta, w1), w2
         a[NEXT_H0 + i], a[NEXT_H1 + i], a[NEXT_H2 + i] = fma(h1, delta, h), fma(h2, delta, h1), h2
         if slope is None:
@@ -298,7 +310,9 @@ def chord(a, n, is_again, is_cap, is_relative, degree, limits):
         x, y, vx, vy, spin = a[X + i], a[Y + i], a[VX + i], a[VY + i], a[SPIN + i]
         r0, r1_0, r2_0 = a[R0 + i], a[R1 + i], a[R2 + i]
         q, v2 = fma(x, vx, y * vy), fma(vx, vx, vy * vy)
-        s = 2.0 * fma(r0, r1_0, -q) / (v2 - fma(r1_0, r1_0, r0 * r2_0))
+        inverse = ONE / (v2 - fma(r1_0, r1_0, r0 * r2_0))
+        s = 2.0 * fma(r0, r1_0, -q) * inverse
+        s = s * fma(cube_of_arc(r0, r1_0, r2_0, a[R3 + i]) * s, inverse, 1.0)
         s = a[S + i] if is_again else s
         before = (a[T + i] - a[REF + i]) + (a[T_LOW + i] - a[REF_LOW + i])
         since = before + s
@@ -324,4 +338,5 @@ def chord(a, n, is_again, is_cap, is_relative, degree, limits):
         y_s, a[ROUTINE + i] = arrive_at(a, i, s, delta, within, result, x_s, x_low, y_s, y_low, vx, vy)
         a[NEXT_Y + i] = y_s
         laws_at_hit(a, i, delta, r, r1, r2, w, w1)
+        a[NEXT_R3 + i] = third_derivative(a, RADIUS_LAW + i, STRIDE, since, degree)
         a[NEXT_W1 + i] = w1

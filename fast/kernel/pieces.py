@@ -64,6 +64,15 @@ def law_at(a, place, stride, u, u_before, degree):
     return value, fma(rate, u, rise), 2.0 * fma(half_bend, u, rate), mean
 
 
+@packed
+def third_derivative(a, place, stride, u, degree):
+    """Return about the third derivative of a law, from three of its coefficients: for first guesses."""
+    if len(degree) == 2:
+        return 0.0
+    f3, f4, f5 = a[place + 4 * stride], a[place + 5 * stride], a[place + 6 * stride]
+    return 6.0 * fma(u, fma(10.0 * u, f5, 4.0 * f4), f3)
+
+
 @kernel
 def piece_at(pieces, t, t_low):
     """Return the number of the piece that serves at a time, and its reference time as a sum of two floats."""

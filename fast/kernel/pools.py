@@ -10,7 +10,7 @@ import numpy as np
 from fast.kernel.arithmetic import fma
 from fast.kernel.codes import ARC, BASE, FLOOR, LEFT, RIGHT
 from fast.kernel.compiling import kernel, packed, part
-from fast.kernel.pieces import law_at, piece_at
+from fast.kernel.pieces import law_at, piece_at, third_derivative
 from fast.kernel.records import CONSTANT, KIND, RADIUS
 
 LANES = 64  # all rows of a pool stay in the first-level cache
@@ -22,20 +22,20 @@ NEVER = np.inf
 # Rows of a pool, in one flat array: constant strides let the loops vectorise.
 (
     T, T_LOW, X, Y, VX, VY, WALL,  # state at the last collision
-    R0, R1, R2, W0, W1, W2, H0, H1, H2, M0, M1, M2,  # radius, half-width, depth, slope there, two derivatives
+    R0, R1, R2, R3, W0, W1, W2, H0, H1, H2, M0, M1, M2,  # radius, half-width, depth, slope there, two derivatives
     REF, REF_LOW, END, LIMIT, BACK,  # the laws' reference time, until when it serves; how far they hold
     STOP, CLOSED, SPIN,  # next time to look at the particle; end of a captured stay; angular momentum in one
     HIT, SURE, S,  # the step: wall, mouth, time
     OK, ROUTINE,  # is it right, and is nothing else to do
     NEXT_T, NEXT_T_LOW, NEXT_X, NEXT_X_LOW, NEXT_Y, NEXT_Y_LOW,  # state after it
-    NEXT_R0, NEXT_R1, NEXT_R2, NEXT_W0, NEXT_W1, NEXT_W2, NEXT_H0, NEXT_H1, NEXT_H2, NEXT_M0, NEXT_M1, NEXT_M2,
+    NEXT_R0, NEXT_R1, NEXT_R2, NEXT_R3, NEXT_W0, NEXT_W1, NEXT_W2, NEXT_H0, NEXT_H1, NEXT_H2, NEXT_M0, NEXT_M1, NEXT_M2,
     NEXT_VX, NEXT_VY, DONE,  # velocity after it where a careful step has found it
     SINCE, UNTIL, STAY_IN, STAY_OUT,  # a captured stay that spans an instant between is kept; begin and end
     N_ARC, N_BASE, N_LEFT, N_RIGHT, N_FLOOR,  # collisions so far
     LAWS,  # from here on the laws' coefficients: see Pieces.coefficients
-) = STRIDE * np.arange(63)  # fmt: skip
+) = STRIDE * np.arange(65)  # fmt: skip
 N_COEFFICIENTS = 16  # of each law, as many as the highest degree asks for
-N_ROWS = 62 + 4 * N_COEFFICIENTS
+N_ROWS = 64 + 4 * N_COEFFICIENTS
 RADIUS_LAW, WIDTH_LAW, DEPTH_LAW, SLOPE_LAW = LAWS + STRIDE * N_COEFFICIENTS * np.arange(4)
 # Codes of walls as they stand in a row, and of OK: out of the laws' reach, not shown right, to be corrected,
 # right.
@@ -88,12 +88,13 @@ def width_of(a, i, u, r, r1, r2, is_relative, degree):
 
 @kernel
 def set_laws(a, i, place, u, scene, degree):
-    """Write a lane's laws at a time since its reference, in the twelve rows from `place` on."""
+    """Write a lane's laws at a time since its reference, in the thirteen rows from `place` on."""
     r, r1, r2 = law_of(a, RADIUS_LAW + i, u, degree)
     w, w1, w2, _ = width_of(a, i, u, r, r1, r2, scene.is_relative, degree)
     h, h1, h2 = law_of(a, DEPTH_LAW + i, u, degree)
     m, m1, m2 = law_of(a, SLOPE_LAW + i, u, degree)
-    for j, number in enumerate((r, r1, r2, w, w1, w2, h, h1, h2, m, m1, m2)):
+    r3 = third_derivative(a, RADIUS_LAW + i, STRIDE, u, degree)
+    for j, number in enumerate((r, r1, r2, r3, w, w1, w2, h, h1, h2, m, m1, m2)):
         a[place + j * STRIDE + i] = number
 
 

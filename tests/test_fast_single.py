@@ -1,0 +1,136 @@
+"""One question of the fast stepper: one call of compiled code, the same answer as by separate checks."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+
+import msgspec
+import numpy as np
+import pytest
+
+import fast
+from fast import step as stepper
+from fast.kernel import codes
+from fast.kernel.single import REFUSED
+from scene import BadInput, Cap, Collision, Fourier, Horizon, Mushroom, Outcome, Rejected, Scene, State, load
+from scene.states import check_numbers
+
+NAMES = ("moving-cap", "fixed-cap-clockwise", "fermi-ulam", "frozen-mushroom", "ergodic")
+SCENES = (
+    *map(load, NAMES),
+    Cap(r=1.0),
+    Cap(r=2.0**-500),
+    Cap(r=2.0**1000),
+    Cap(r=Fourier(1.0, 2.0**1000, (0.5,))),
+    Cap(r=Fourier(2.0**900, 2.0**300, (2.0**898, 2.0**-170))),  # loses bits in any unit
+    Mushroom(r=1.0, h=1.0, w=0.5),
+)
+ODD = (math.nan, math.inf, -math.inf, 0.0, -0.0, 5e-324, 1e308, 1e-308, 2.0**400, 2.0**-500, 1e15, 1 / 3)
+FIELDS = ("t", "x", "y", "vx", "vy")
+Question = tuple[Scene, State, float]
+
+
+def by_separate_checks(scene: Scene, state: State, t_end: float) -> Outcome:
+    """Answer as `next_collision`, with checks and units in Python and the careful step of trajectories."""
+    try:
+        check_numbers(scene, state, t_end)
+        start = stepper.fitted_start(scene, state)
+        rows, walls = stepper.as_arrays([start])
+        paths = stepper.followed_paths(start.compiled, rows, walls, 1, start.units.horizon(t_end))
+        code = paths.codes.item()
+        if code in stepper.WALL_NAMES:
+            return Collision(stepper.WALL_NAMES[code], *start.units.steps(paths.steps[0, 0]).tolist())
+        if code == codes.HORIZON:
+            return Horizon(t_end, *start.units.places(paths.ends[0, 2:]).tolist())
+    except BadInput as error:
+        return Rejected(str(error))
+    return stepper.trouble(code, state)
+
+
+def questions(seed: int, n: int) -> Iterator[Question]:
+    """Draw states and horizons: steps of a path, off the wall by a little, odd numbers in some fields."""
+    random = np.random.default_rng(seed)
+    for _ in range(n):
+        scene = SCENES[random.integers(len(SCENES))]
+        size = scene.r if isinstance(getattr(scene, "r", None), float) else 1.0
+        speed = size * 10.0 ** float(random.uniform(-3, 5))
+        x, y, vx, vy = (float(v) for v in random.uniform(-1.0, 1.0, 4))
+        state = State(float(random.uniform(-9, 9)), 0.3 * x * size, 0.9 * y * size, vx * speed, vy * speed)
+        t_end = state.t + float(random.choice([0.0, 1e-3, 1.0, 100.0]))
+        found = fast.next_collision(scene, state, t_end)
+        if isinstance(found, Collision):
+            state = found.state()
+            off = 1.0 + float(random.choice([0.0, 1e-7, 1e-5]))
+            yield scene, msgspec.structs.replace(state, x=state.x * off, y=state.y * off), t_end
+        for _ in range(random.integers(3)):
+            field, value = FIELDS[random.integers(5)], float(ODD[random.integers(len(ODD))])
+            state = msgspec.structs.replace(state, **{field: value})
+        yield scene, state, t_end if random.random() < 0.7 else float(ODD[random.integers(len(ODD))])
+
+
+def differing(seed: int, n: int) -> list[Question]:
+    """Return the questions that are answered otherwise than by separate checks; nan counts as itself."""
+    return [q for q in questions(seed, n) if repr(fast.next_collision(*q)) != repr(by_separate_checks(*q))]
+
+
+def test_one_call_answers_as_separate_checks_do(tally):
+    assert differing(1, 1500) == []
+    for question in questions(1, 1500):
+        tally[type(fast.next_collision(*question)).__name__] += 1
+    assert tally["Collision"] > 300
+    assert tally["Rejected"] > 500
+    assert tally["Horizon"] > 50
+
+
+def test_a_kernel_that_overlooks_the_wall_is_found(monkeypatch):
+    """It takes for free what is not on the wall that it names."""
+    single = stepper.entries.single
+
+    def lenient(*question):
+        found = single(*question)
+        return single(*question[:-2], int(codes.NO_WALL), question[-1]) if found[0] == REFUSED else found
+
+    monkeypatch.setattr(stepper.entries, "single", lenient)
+    assert differing(1, 300)
+
+
+def test_a_horizon_of_zero_is_no_late_one(monkeypatch):
+    """Where the unit of time is below 2^-1024 no power of two takes 0 anywhere."""
+    quick = Cap(r=Fourier(1.0, 2.0**1000, (0.5,))), State(0.0, 0.0, 0.25, 2.0**1000, 0.0)
+    small = Cap(r=2.0**-500), State(0.0, 0.0, 2.0**-501, 2.0**520, 0.0)
+    for scene, state in (quick, small):
+        expected = Horizon(0.0, state.x, state.y, state.vx, state.vy)
+        assert fast.next_collision(scene, state, 0.0) == expected
+        assert fast.trajectory(scene, state, 1, 0.0).outcome == expected
+    latest = np.finfo(np.float64).max
+    monkeypatch.setattr(stepper.Units, "horizon", lambda units, t_end: t_end or latest)
+    assert by_separate_checks(*small, 0.0) != fast.next_collision(*small, 0.0)
+
+
+def test_scenes_that_come_and_go_are_not_mistaken(monkeypatch):
+    """Scenes made for one question each often get the address of the one before."""
+    state, radii = State(0.0, 0.0, 0.5, 1.0, 0.0), [1.0 + i / 64 for i in range(600)]
+
+    def met():
+        return [fast.next_collision(Cap(r=r), state, 99.0).x for r in radii]
+
+    expected = [pytest.approx(math.sqrt(r * r - 0.25), rel=1e-15, abs=0.0) for r in radii]
+    assert met() == expected
+    fit, kept = stepper.fit, {}
+
+    def by_address(scene):
+        return kept[id(scene)] if id(scene) in kept else kept.setdefault(id(scene), fit(scene))
+
+    monkeypatch.setattr(stepper, "fit", by_address)
+    fit.cache_clear()  # it holds scenes, and so their addresses
+    assert met()[300:] != expected[300:]
+
+
+def test_threads_may_ask_side_by_side():
+    asked = list(questions(2, 300))
+    expected = [repr(fast.next_collision(*question)) for question in asked]
+    with ThreadPoolExecutor(4) as threads:
+        for found in threads.map(lambda _: [repr(fast.next_collision(*q)) for q in asked], range(8)):
+            assert found == expected

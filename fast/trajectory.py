@@ -18,6 +18,9 @@ from scene import Horizon, Outcome, Scene, State, Wall
 from scene.refusal import check_count, check_scene
 
 
+NAMES = np.array([WALL_NAMES[code] for code in range(len(WALL_NAMES))], dtype=object)
+
+
 class Collisions(NamedTuple):
     """Successive collisions, and why they ended.
 
@@ -60,7 +63,7 @@ def trajectory(scene: Scene, state: State, n_collisions: int, t_end: float = np.
     entries.follow_paths(worker, walls, in_lanes.slope, paths)
     n, code = paths.counts.item(), paths.codes.item()
     steps = start.units.steps(paths.steps[0, :n])
-    walls = [WALL_NAMES[c] for c in paths.walls[0, :n].tolist()]
+    walls = NAMES[paths.walls[0, :n]].tolist()
     outcome: Outcome | None = None
     if n < n_collisions:
         # Without a horizon only what rests is never met, and it rests where it was: there is no v * infinity.

@@ -190,8 +190,13 @@ def outward(numbers: FloatArray, exponents: FloatArray) -> FloatArray:
         BadInput: one of them would lose bits, or overflow.
     """
     with np.errstate(over="ignore", under="ignore"):
-        scaled = np.ldexp(numbers, exponents)
-        is_kept = (np.ldexp(scaled, -exponents) == numbers) | ~np.isfinite(numbers)
+        if np.abs(exponents).max() <= 1000:  # a product is exact too, and many times quicker
+            factors = np.ldexp(1.0, exponents)
+            scaled = numbers * factors
+            is_kept = (scaled / factors == numbers) | ~np.isfinite(numbers)
+        else:
+            scaled = np.ldexp(numbers, exponents)
+            is_kept = (np.ldexp(scaled, -exponents) == numbers) | ~np.isfinite(numbers)
     if not is_kept.all():
         raise BadInput(ANSWER_LOST)
     return scaled

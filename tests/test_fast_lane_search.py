@@ -119,8 +119,8 @@ MUTANTS = {
     ),
     "what Newton's step leaves": ("arc to stem", 500, "CERTAIN if error < s else COARSE", "CERTAIN"),
     "how long the polynomials hold": (
-        "floor to moving arc",
-        500,
+        "arc to base",
+        1000,
         "return FAR if ahead <= 0.0 else result",
         "return result",
     ),

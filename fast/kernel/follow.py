@@ -20,7 +20,7 @@ import numpy as np
 from fast.kernel.arithmetic import fma
 from fast.kernel.careful import first_step
 from fast.kernel.codes import ARC, CAP, HORIZON, MUSHROOM, N_WALLS, STEM
-from fast.kernel.compiling import kernel, part, borrowed
+from fast.kernel.compiling import borrowed, kernel, part
 
 from fast.kernel.pools import (  # isort: skip
     CERTAIN, CLOSED, COARSE, DONE, END, FAR, HIT, LANES, LAWS, N_COEFFICIENTS, NEVER, NEXT_R0, NEXT_W0, NEXT_T, NEXT_T_LOW, NEXT_VX,

@@ -11,7 +11,7 @@ from matplotlib import rc_context
 from matplotlib.lines import Line2D
 from matplotlib.ticker import FixedLocator, NullLocator
 
-from conformance.bench.record import CostSeries, Growth, Point, Record
+from conformance.bench.record import CostSeries, Growth, Point, Record, quartiles
 from mushrooms.figures import style as plots
 
 COLOURS = {
@@ -19,6 +19,8 @@ COLOURS = {
     "compiled": plots.BLUE,
     "interpreted": plots.GREEN,
     "time-stepping": plots.GREY,
+    "fixed-step": "#8C6D1F",
+    "lean": plots.BLACK,
     "example": "#CC79A7",
     "command": "#7A3E9D",
 }
@@ -27,10 +29,13 @@ WORDS = {
     "compiled": "fast",
     "interpreted": "plain Python",
     "time-stepping": "scipy solve_ivp with events",
+    "fixed-step": "C by fixed time steps, parts of a flight",
+    "lean": "Newton without checks, in C and numba",
     "example": "examples in C, JavaScript, Python",
     "command": "command",
 }
 RED = "#C00000"
+LEFT_SIDE = ("example", "command")  # families whose labels stand left of their points
 MOST_DIGITS, LEAST_DIGITS = 300.0, 0.5
 BINARY64 = 53 * math.log10(2)
 TICKS = (1, 2, 4, 8, 16, 32, 64, 128, 256)
@@ -81,13 +86,14 @@ def _panel(axes: Any, points: list[Point], floor: int) -> None:
 
 
 def _mark(axes: Any, p: Point) -> None:
-    colour, ns = COLOURS[p.family], statistics.median(p.ns)
+    colour, (first, ns, third) = COLOURS[p.family], quartiles(p.ns)
     middle, worst = _digits_of(p)
     if p.right:
+        axes.errorbar(middle, ns, [[ns - first], [third - ns]], color=colour, capsize=2, linewidth=0.8)
         axes.plot([worst, middle], [ns, ns], color=colour, linewidth=1.2)
         axes.plot(middle, ns, marker="o", markersize=4.5, color=colour, linestyle="none")
         axes.plot(worst, ns, marker="<", markersize=4.5, color=colour, linestyle="none")
-    if p.wrong:
+    if p.wrong or p.astray:
         axes.plot(LEAST_DIGITS, ns, marker="x", markersize=6, color=RED, linestyle="none")
 
 
@@ -112,12 +118,14 @@ def _label(axes: Any, points: list[Point]) -> None:
         if p.family == "proof":
             axes.annotate(short_name(p.contender), (middle, ns * 1.6), ha="center", color=colour, **style)
         elif p.family != "time-stepping":
-            # Ours at the right, others' at the left, each above the one before.
-            side = "right" if p.family in ("example", "command") else "left"
-            height = max(math.log10(ns), heights.get(side, -math.inf) + 0.33)
-            heights[side] = height
+            # Those at the same digits share a column; each label stands above the one before.
+            side = "right" if p.family in LEFT_SIDE else "left"
+            column = "fixed-step" if p.family == "fixed-step" else side
+            height = max(math.log10(ns), heights.get(column, -math.inf) + 0.36)
+            heights[column] = height
             place = (worst / 1.15 if side == "right" else middle * 1.15, 10**height)
-            axes.annotate(short_name(p.contender), place, ha=side, va="center", color=colour, **style)
+            name = short_name(p.contender) + (f", {p.astray / p.further:.2%} wrong" if p.astray else "")
+            axes.annotate(name, place, ha=side, va="center", color=colour, **style)
 
 
 def _digits_of(p: Point) -> tuple[float, float]:
@@ -132,7 +140,7 @@ def pareto(points: list[Point]) -> list[tuple[float, float]]:
 
     Only a contender with no wrong answer and most of them right can stand on the front.
     """
-    able = [p for p in points if p.right > p.undecided + p.left and not p.wrong]
+    able = [p for p in points if p.right > p.undecided + p.left and not p.wrong and not p.astray]
     pairs = sorted((statistics.median(p.ns), -digits(max(p.relative))) for p in able)
     front: list[tuple[float, float]] = []
     for ns, minus_digits in pairs:
@@ -143,7 +151,7 @@ def pareto(points: list[Point]) -> list[tuple[float, float]]:
 
 def short_name(contender: str) -> str:
     """Return a contender's label."""
-    for part in ("proof, ", " digits", "fast, ", "solve_ivp, ", "example in ", "command "):
+    for part in ("proof, ", " digits", "fast, ", "solve_ivp, ", "example in ", "command ", "time steps of "):
         contender = contender.replace(part, "")
     contender = contender.replace("$", r"\$")  # no formula
     return contender if len(contender) < 18 else contender[:17] + "…"

@@ -222,8 +222,9 @@ def _table(found: Record) -> Table:
     for p in found.points:
         middle, worst = middle_and_worst(p.ulps, ".2g")
         counts = [str(n) if n else "" for n in (p.wrong, p.undecided, p.left)]
-        first, ns, third = (f"{q:,.0f}" for q in quartiles(p.ns))
-        row = [escape(p.contender), ns, f"{first} to {third}", middle, worst, *counts, astray(p)]
+        first, ns, third = quartiles(p.ns)
+        spread = f"-{1 - first / ns:.1%} +{third / ns - 1:.1%}"
+        row = [escape(p.contender), f"{ns:,.0f}", spread, middle, worst, *counts, astray(p)]
         table.add_row(p.workload, *row)
     return table
 

@@ -146,8 +146,8 @@ def in_c(library: Path) -> list[Contender]:
     """Return the contenders that the compiled C file holds."""
     found = [_contender("lean C", "lean", CEngine(library, 0))]
     for parts in PARTS:
-        name = f"time steps of flight/{parts}"
-        found.append(_contender(name, "fixed-step", CEngine(library, parts), 10 * WINDOW / parts))
+        engine = CEngine(library, parts)
+        found.append(_contender(f"steps, flight/{parts}", "fixed-step", engine, 10 * WINDOW / parts))
     return found
 
 

@@ -149,7 +149,7 @@ def _point(workload: Workload, contender: Contender, n_times: int, laps: Sequenc
 
 
 def _count_walls(workload: Workload, contender: Contender) -> tuple[int, int]:
-    """Return how many of the workload's further steps the contender answers, and how many with a wrong wall."""
+    """Return how many of the further steps the contender answers, and how many with a wrong wall."""
     if contender.steps is None or not workload.further:
         return 0, 0
     given = contender.steps(workload.scene, [step.state for step in workload.further])

@@ -9,9 +9,7 @@ import math
 
 from numba import njit
 
-from conformance.bench.codes import (
-    ARC, BANG_BANG, BASE, CAP, CONSTANT, FACTOR, FLOOR, H, LEFT, MUSHROOM, NONE, R, RIGHT, SLOPE, WIDTH,
-)  # fmt: skip
+from conformance.bench import codes
 
 MOST_NEWTON = 30
 
@@ -34,9 +32,9 @@ def _bang_bang(law, t):
 
 @njit(cache=True)
 def _at(law, t):
-    if law[0] == CONSTANT:
+    if law[0] == codes.CONSTANT:
         return law[2], 0.0
-    if law[0] == BANG_BANG:
+    if law[0] == codes.BANG_BANG:
         return _bang_bang(law, t)
     value, rate = law[2], 0.0
     for k in range(1, int(law[1]) + 1):
@@ -49,22 +47,22 @@ def _at(law, t):
 
 @njit(cache=True)
 def _mouth(laws, t):
-    width, width_rate = _at(laws[WIDTH], t)
-    factor, factor_rate = _at(laws[FACTOR], t)
+    width, width_rate = _at(laws[codes.WIDTH], t)
+    factor, factor_rate = _at(laws[codes.FACTOR], t)
     return width * factor, width_rate * factor + width * factor_rate
 
 
 @njit(cache=True)
 def _gap(laws, wall, t, x, y, vx, vy):
-    if wall == ARC:
-        r, v = _at(laws[R], t)
+    if wall == codes.ARC:
+        r, v = _at(laws[codes.R], t)
         return r * r - x * x - y * y, 2 * r * v - 2 * (x * vx + y * vy), -2 * x, -2 * y
-    if wall == FLOOR:
-        h, v = _at(laws[H], t)
+    if wall == codes.FLOOR:
+        h, v = _at(laws[codes.H], t)
         return y + h, vy + v, 0.0, 1.0
     w, v = _mouth(laws, t)
-    lean, lean_rate = _at(laws[SLOPE], t)
-    side = 1.0 if wall == LEFT else -1.0
+    lean, lean_rate = _at(laws[codes.SLOPE], t)
+    side = 1.0 if wall == codes.LEFT else -1.0
     return w + lean * y + side * x, v + lean_rate * y + lean * vy + side * vx, side, lean
 
 
@@ -81,16 +79,16 @@ def _newton(laws, wall, t, x, y, vx, vy, s):
 
 @njit(cache=True)
 def _arc_time(laws, t, x, y, vx, vy):
-    r, v = _at(laws[R], t)
+    r, v = _at(laws[codes.R], t)
     square, along = vx * vx + vy * vy - v * v, x * vx + y * vy - r * v
     root = math.sqrt(max(along * along + square * (r * r - x * x - y * y), 0.0))
-    return _newton(laws, ARC, t, x, y, vx, vy, (root - along) / square)
+    return _newton(laws, codes.ARC, t, x, y, vx, vy, (root - along) / square)
 
 
 @njit(cache=True)
 def _stem_time(laws, last, t, x, y, vx, vy):
-    first, soonest = NONE, math.inf
-    for wall in (FLOOR, LEFT, RIGHT):
+    first, soonest = codes.NONE, math.inf
+    for wall in (codes.FLOOR, codes.LEFT, codes.RIGHT):
         inside, rate, _, _ = _gap(laws, wall, t, x, y, vx, vy)
         if wall != last and rate < 0:
             s = _newton(laws, wall, t, x, y, vx, vy, -inside / rate)
@@ -101,28 +99,28 @@ def _stem_time(laws, last, t, x, y, vx, vy):
 
 @njit(cache=True)
 def _next_hit(laws, table, t, x, y, vx, vy, last):
-    is_in_cap = table == CAP
-    if table == MUSHROOM:
-        is_in_cap = last in (ARC, BASE) or (last == NONE and (y > 0 or (y == 0 and vy > 0)))
+    is_in_cap = table == codes.CAP
+    if table == codes.MUSHROOM:
+        is_in_cap = last in (codes.ARC, codes.BASE) or (last == codes.NONE and (y > 0 or (y == 0 and vy > 0)))
     dt = 0.0
     while True:
         if vy < 0 if is_in_cap else vy > 0:
             s = -y / vy
             there = abs(x + s * vx)
-            is_open = table != CAP and there < _mouth(laws, t + s)[0]
-            if is_open or (is_in_cap and there < _at(laws[R], t + s)[0]):
+            is_open = table != codes.CAP and there < _mouth(laws, t + s)[0]
+            if is_open or (is_in_cap and there < _at(laws[codes.R], t + s)[0]):
                 dt, t, x, y = dt + s, t + s, x + s * vx, 0.0
-                if table == MUSHROOM and is_open:
+                if table == codes.MUSHROOM and is_open:
                     is_in_cap = not is_in_cap
                     continue
-                return dt, t, x, y, vx, -vy, float(BASE)
-        first, s = ARC, 0.0
+                return dt, t, x, y, vx, -vy, float(codes.BASE)
+        first, s = codes.ARC, 0.0
         if is_in_cap:
             s = _arc_time(laws, t, x, y, vx, vy)
         else:
             first, s = _stem_time(laws, last, t, x, y, vx, vy)
         if s == math.inf:
-            return math.inf, t, x, y, vx, vy, float(NONE)
+            return math.inf, t, x, y, vx, vy, float(codes.NONE)
         dt, t, x, y = dt + s, t + s, x + s * vx, y + s * vy
         _, rate, gx, gy = _gap(laws, first, t, x, y, vx, vy)
         push = 2 * rate / (gx * gx + gy * gy)
@@ -131,7 +129,7 @@ def _next_hit(laws, table, t, x, y, vx, vy, last):
 
 @njit(cache=True)
 def next_hits(laws, table, states, hits):
-    """Fill `hits` with the next collision of each state; NONE and an infinite time where there is none."""
+    """Fill `hits` with the next collision of each state; no wall and infinite time where there is none."""
     for i in range(len(states)):
         t, x, y, vx, vy, last = states[i]
         for j, number in enumerate(_next_hit(laws, table, t, x, y, vx, vy, float(last))):
@@ -149,7 +147,7 @@ def follow(laws, table, states, t_end, most, n_times):
                 if t >= t_end:
                     break
                 _, t, x, y, vx, vy, last = _next_hit(laws, table, t, x, y, vx, vy, last)
-                if last == NONE:
+                if last == codes.NONE:
                     break
                 n_hits += 1
     return n_hits

@@ -70,7 +70,8 @@ class Workload(NamedTuple):
     def end(self, flights: float = WINDOW) -> float:
         """Return the time that lies so many flights after the last question."""
         last = max((q.state for q in self.questions), key=lambda state: state.t)
-        return last.t + flights * rounded(self.scene, last.t).size / math.hypot(last.vx, last.vy)
+        flight = float(rounded(self.scene, last.t).size) / math.hypot(last.vx, last.vy)
+        return last.t + flights * flight
 
 
 class Rule(NamedTuple):

@@ -1,4 +1,4 @@
-"""The benchmark's baselines: right where most would be, caught where they are not, timed on what they follow."""
+"""The benchmark's baselines: right where most would be, caught where not, timed on what they follow."""
 
 from __future__ import annotations
 

@@ -108,7 +108,7 @@ def test_a_spoilt_contender_is_seen(drawn, spoil, counts):
 def test_walls_of_further_steps_are_compared(drawn):
     steps = [workloads.FurtherStep(q.state, "arc") for q in drawn["breathing-disk"].questions]
     workload = drawn["breathing-disk"]._replace(further=steps)
-    met = fast.next_collision(workload.scene, steps[0].state, math.inf)
+    met = fast.next_collision(workload.scene, steps[0].state, workload.questions[0].t_end)
 
     def answers(scene, states):
         return [met, msgspec.structs.replace(met, wall="base"), None]

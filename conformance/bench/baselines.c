@@ -222,7 +222,7 @@ static Hit next_hit(const Method *method, State q)
 
 /* Time step by time step ------------------------------------------------------------------------------- */
 
-/* Put q back on a wall along its normal: to first order, which is exact for all but the arc. */
+/* Put q back on a wall along its normal. */
 static void put_back(const Laws *laws, int wall, State *q, double inside, double gx, double gy)
 {
     double rate;

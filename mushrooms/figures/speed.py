@@ -89,7 +89,7 @@ def _mark(axes: Any, p: Point) -> None:
     colour, (first, ns, third) = COLOURS[p.family], quartiles(p.ns)
     middle, worst = _digits_of(p)
     if p.right:
-        axes.errorbar(middle, ns, [[ns - first], [third - ns]], color=colour, capsize=2, linewidth=0.8)
+        axes.plot([middle, middle], [first, third], color=colour, marker="_", markersize=5, linewidth=0.8)
         axes.plot([worst, middle], [ns, ns], color=colour, linewidth=1.2)
         axes.plot(middle, ns, marker="o", markersize=4.5, color=colour, linestyle="none")
         axes.plot(worst, ns, marker="<", markersize=4.5, color=colour, linestyle="none")

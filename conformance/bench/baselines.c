@@ -170,19 +170,18 @@ static double arc_time(const Laws *laws, const State *q)
  * that does not approach, or has just been left, is not met. */
 static double stem_time(const Laws *laws, const State *q, int *first)
 {
-    double v, lean_rate, soonest = INFINITY, h = at(&laws->h, q->t, &v);
-    double inside[] = {q->y + h, 0, 0}, rate[] = {q->vy + v, 0, 0};
-    int walls[] = {FLOOR, LEFT, RIGHT};
-    double w = mouth(laws, q->t, &v), lean = at(&laws->slope, q->t, &lean_rate);
-    w += lean * q->y, v += lean_rate * q->y + lean * q->vy;
-    inside[1] = w + q->x, rate[1] = v + q->vx;
-    inside[2] = w - q->x, rate[2] = v - q->vx;
+    double h_rate, w_rate, lean_rate, soonest = INFINITY;
+    double h = at(&laws->h, q->t, &h_rate), w = mouth(laws, q->t, &w_rate);
+    double lean = at(&laws->slope, q->t, &lean_rate);
+    w += lean * q->y, w_rate += lean_rate * q->y + lean * q->vy;
+    double inside[] = {w + q->x, w - q->x, q->y + h};
+    double rate[] = {w_rate + q->vx, w_rate - q->vx, q->vy + h_rate};
     for (int i = 0; i < 3; i++) {
-        if (walls[i] == (int)q->wall || rate[i] >= 0)
+        if (LEFT + i == (int)q->wall || rate[i] >= 0)
             continue;
-        double s = newton(laws, walls[i], q, -inside[i] / rate[i]);
+        double s = newton(laws, LEFT + i, q, -inside[i] / rate[i]);
         if (s < soonest)
-            soonest = s, *first = walls[i];
+            soonest = s, *first = LEFT + i;
     }
     return soonest;
 }
@@ -222,19 +221,6 @@ static Hit next_hit(const Method *method, State q)
 
 /* Time step by time step ------------------------------------------------------------------------------- */
 
-/* Put q back on a wall along its normal. */
-static void put_back(const Laws *laws, int wall, State *q, double inside, double gx, double gy)
-{
-    double rate;
-    if (wall == ARC) {
-        double scale = at(&laws->r, q->t, &rate) / hypot(q->x, q->y);
-        q->x *= scale, q->y *= scale;
-    } else {
-        double push = inside / (gx * gx + gy * gy);
-        q->x -= push * gx, q->y -= push * gy;
-    }
-}
-
 /* Move by dt. Returns the wall that was met, of several the first in the order of the names, or NONE. */
 static int time_step(const Method *method, State *q, int *in_cap, double dt)
 {
@@ -251,8 +237,9 @@ static int time_step(const Method *method, State *q, int *in_cap, double dt)
     }
     for (int wall = *in_cap ? ARC : LEFT; wall <= (*in_cap ? ARC : FLOOR); wall++) {
         inside = gap(laws, wall, q, &rate, &gx, &gy);
-        if (inside < 0 && rate < 0) {
-            put_back(laws, wall, q, inside, gx, gy);
+        if (inside < 0 && rate < 0) { /* put it back along the normal: onto the arc to first order */
+            double push = inside / (gx * gx + gy * gy);
+            q->x -= push * gx, q->y -= push * gy;
             bounce(laws, wall, q);
             return wall;
         }

@@ -126,12 +126,7 @@ def _measured(size: Size, seed: int, command: list[str]) -> Record:
             ours.run_ensemble, size, os.cpu_count() or 1, ENSEMBLE_REPEATS[size], tick
         )
         tick("compile times")
-        compiled = {}
-        if size == "full":
-            try:
-                compiled = ours.compile_times()
-            except subprocess.CalledProcessError as error:
-                not_run["compile times"] = f"exit code {error.returncode}"
+        compiled = _compile_times(not_run) if size == "full" else {}
     return record.Record(
         format=record.FORMAT,
         size=size,
@@ -151,6 +146,16 @@ def _measured(size: Size, seed: int, command: list[str]) -> Record:
         hard_cases=cases,
         seconds=round(time.monotonic() - begin, 1),
     )
+
+
+def _compile_times(not_run: dict[str, str]) -> dict[str, float]:
+    from mushrooms import bench_contenders as ours
+
+    try:
+        return ours.compile_times()
+    except subprocess.CalledProcessError as error:
+        not_run["compile times"] = f"exit code {error.returncode}"
+        return {}
 
 
 def _effort(size: str) -> Effort:

@@ -30,8 +30,8 @@ def library(tmp_path_factory):
 @pytest.fixture(params=["numba", "C"])
 def engine(request):
     if request.param == "C":
-        return baselines.CEngine(request.getfixturevalue("library"), 0)
-    return baselines.NumbaEngine()
+        return baselines.c_engine(request.getfixturevalue("library"))
+    return baselines.numba_engine()
 
 
 def drawn(name: str, n_further: int, n_questions: int = 2) -> workloads.Workload:

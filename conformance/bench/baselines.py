@@ -14,10 +14,10 @@ import ctypes
 import shutil
 import subprocess
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from itertools import zip_longest
 from pathlib import Path
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -49,14 +49,17 @@ class Questions(NamedTuple):
     states: FloatArray
 
 
-class Engine(Protocol):
-    """A compiled baseline."""
+class Engine(NamedTuple):
+    """A compiled baseline.
 
-    def hits(self, q: Questions) -> FloatArray:
-        """Return dt, t, x, y, vx, vy, wall of each state's next collision, (N, 7)."""
+    Attributes:
+        hits: returns dt, t, x, y, vx, vy, wall of each state's next collision, (N, 7).
+        follow: (questions, t_end, most, n_times) -> collisions and seconds of following each state, so many
+            times, to t_end or for `most` collisions.
+    """
 
-    def follow(self, q: Questions, t_end: float, most: int, n_times: int) -> tuple[int, float]:
-        """Follow each state to t_end or for `most` collisions, n_times; return collisions and seconds."""
+    hits: Callable[[Questions], FloatArray]
+    follow: Callable[[Questions, float, int, int], tuple[int, float]]
 
 
 class _Method(ctypes.Structure):
@@ -70,52 +73,50 @@ class _Method(ctypes.Structure):
     )
 
 
-class CEngine:
-    """The compiled `baselines.c`, event-driven (parts = 0) or by so many time steps to a flight."""
+def c_engine(library: Path, parts: int = 0) -> Engine:
+    """Return the compiled C file, event-driven (0 parts) or by so many time steps to a flight.
 
-    def __init__(self, library: Path, parts: int) -> None:
-        self._library, self._parts = ctypes.CDLL(str(library)), parts
-        count, place = ctypes.c_long, ctypes.c_void_p
-        self._library.next_hits.argtypes = (place, count, place, place)
-        self._library.follow.argtypes = (place, count, place, ctypes.c_double, count, count, place)
-        self._library.follow.restype = ctypes.c_double
+    The seconds are those of the C code's own clock.
+    """
+    compiled = ctypes.CDLL(str(library))
+    count, place = ctypes.c_long, ctypes.c_void_p
+    compiled.next_hits.argtypes = (place, count, place, place)
+    compiled.follow.argtypes = (place, count, place, ctypes.c_double, count, count, place)
+    compiled.follow.restype = ctypes.c_double
 
-    def _asked(self, q: Questions) -> tuple[Any, int, int]:
-        method = _Method(q.laws.ctypes.data, q.table, self._parts, q.length)
+    def asked(q: Questions) -> tuple[Any, int, int]:
+        method = _Method(q.laws.ctypes.data, q.table, parts, q.length)
         return ctypes.byref(method), len(q.states), q.states.ctypes.data
 
-    def hits(self, q: Questions) -> FloatArray:
-        """Return the next collisions, as Engine does."""
-        hits = np.empty((len(q.states), 7))
-        self._library.next_hits(*self._asked(q), hits.ctypes.data)
-        return hits
+    def hits(q: Questions) -> FloatArray:
+        found = np.empty((len(q.states), 7))
+        compiled.next_hits(*asked(q), found.ctypes.data)
+        return found
 
-    def follow(self, q: Questions, t_end: float, most: int, n_times: int) -> tuple[int, float]:
-        """Follow states, as Engine does; the seconds are by the C code's own clock."""
+    def follow(q: Questions, t_end: float, most: int, n_times: int) -> tuple[int, float]:
         n_hits = ctypes.c_long()
-        seconds = self._library.follow(*self._asked(q), t_end, most, n_times, ctypes.byref(n_hits))
+        seconds = compiled.follow(*asked(q), t_end, most, n_times, ctypes.byref(n_hits))
         return n_hits.value, seconds
 
+    return Engine(hits, follow)
 
-class NumbaEngine:
-    """The event-driven stepper in scalar numba."""
 
-    def hits(self, q: Questions) -> FloatArray:
-        """Return the next collisions, as Engine does."""
-        from conformance.bench import numba_stepper  # numba takes half a second to load
+def numba_engine() -> Engine:
+    """Return the event-driven stepper in numba; the seconds contain the call, not the compilation."""
+    from conformance.bench import numba_stepper  # numba takes half a second to load
 
-        hits = np.empty((len(q.states), 7))
-        numba_stepper.next_hits(q.laws, q.table, q.states, hits)
-        return hits
+    def hits(q: Questions) -> FloatArray:
+        found = np.empty((len(q.states), 7))
+        numba_stepper.next_hits(q.laws, q.table, q.states, found)
+        return found
 
-    def follow(self, q: Questions, t_end: float, most: int, n_times: int) -> tuple[int, float]:
-        """Follow states, as Engine does; the call is part of the time, the compilation is not."""
-        from conformance.bench import numba_stepper
-
+    def follow(q: Questions, t_end: float, most: int, n_times: int) -> tuple[int, float]:
         numba_stepper.follow(q.laws, q.table, q.states[:0], t_end, most, n_times)
         begin = time.perf_counter()
         n_hits = numba_stepper.follow(q.laws, q.table, q.states, t_end, most, n_times)
         return n_hits, time.perf_counter() - begin
+
+    return Engine(hits, follow)
 
 
 def build(folder: Path, flags: Sequence[str]) -> tuple[Path, str]:
@@ -144,16 +145,16 @@ def build(folder: Path, flags: Sequence[str]) -> tuple[Path, str]:
 
 def in_c(library: Path) -> list[Contender]:
     """Return the contenders that the compiled C file holds."""
-    found = [_contender("lean C", "lean", CEngine(library, 0))]
+    found = [_contender("lean C", "lean", c_engine(library))]
     for parts in PARTS:
-        engine = CEngine(library, parts)
+        engine = c_engine(library, parts)
         found.append(_contender(f"steps, flight/{parts}", "fixed-step", engine, 10 * WINDOW / parts))
     return found
 
 
 def in_numba() -> Contender:
     """Return the scalar stepper in numba."""
-    return _contender("lean numba", "lean", NumbaEngine())
+    return _contender("lean numba", "lean", numba_engine())
 
 
 def _contender(name: str, family: Family, engine: Engine, flights: float = WINDOW) -> Contender:

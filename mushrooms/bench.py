@@ -182,7 +182,9 @@ def _contenders(
     folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
     try:
         library, built["lean C"] = baselines.build(folder, C_FLAGS)
-        contenders += baselines.in_c(library)
+        in_c = baselines.in_c(library)
+        contenders += in_c
+        askers |= {c.name: baselines.asker(c) for c in (in_c[0], in_c[-1])}
     except Trouble as trouble:
         not_run["lean C, time steps"] = trouble.why
 

@@ -15,6 +15,7 @@ import shutil
 import subprocess
 import time
 from collections.abc import Callable, Sequence
+from functools import partial
 from itertools import zip_longest
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -23,11 +24,12 @@ import numpy as np
 import numpy.typing as npt
 from mpmath import fp
 
+from conformance import vectors
 from conformance.bench import codes
-from conformance.bench.contenders import Contender, Family, Given, Lap
+from conformance.bench.contenders import Ask, Contender, Family, Given, Lap
 from conformance.bench.workloads import SINGLE_STEPS, WINDOW, Workload
 from conformance.suite.process import Trouble
-from scene import BangBang, Cap, Collision, Fourier, Horizon, Law, Scene, State, Stem, Wall
+from scene import BangBang, Cap, Collision, Fourier, Horizon, Law, Outcome, Scene, State, Stem, Wall
 from scene.geometry import rounded
 from scene.laws import frequency
 from scene.tables import laws, width_factors
@@ -155,6 +157,30 @@ def in_c(library: Path) -> list[Contender]:
 def in_numba() -> Contender:
     """Return the scalar stepper in numba."""
     return _contender("lean numba", "lean", numba_engine())
+
+
+def asker(contender: Contender) -> Ask:
+    """Return how a baseline answers a vector, for the hard cases; states are taken as they are."""
+    assert contender.steps is not None
+    steps = contender.steps
+
+    def step(scene: Scene, state: State, t_end: float) -> Outcome:
+        (met,) = steps(scene, [state])
+        if isinstance(met, Collision) and met.t < t_end:
+            return met
+        left = t_end - state.t
+        return Horizon(t_end, state.x + left * state.vx, state.y + left * state.vy, state.vx, state.vy)
+
+    def follow(scene: Scene, state: State, n_collisions: int, t_end: float) -> list[Outcome]:
+        found: list[Outcome] = []
+        while len(found) < n_collisions:
+            found.append(met := step(scene, state, t_end))
+            if not isinstance(met, Collision):
+                break
+            state = met.state()
+        return found
+
+    return partial(vectors.answer, step=step, follow=follow)
 
 
 def _contender(name: str, family: Family, engine: Engine, flights: float = WINDOW) -> Contender:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import statistics
 import subprocess
 import tempfile
 import time
@@ -30,8 +29,10 @@ if TYPE_CHECKING:
 
 TIMEOUT, RESTARTS = 30.0, 1  # of a command
 C_FLAGS = ("-O3", "-march=native")
-# By size: questions of a workload, laps, trajectories and their length, repeats of an ensemble.
+# By size: questions of a workload, steps with walls only, laps, trajectories and their length, repeats of an
+# ensemble.
 QUESTIONS = {"quick": 12, "full": 64}
+FURTHER = {"quick": 200, "full": 2000}
 REPEATS = {"quick": 5, "full": 11}
 PATHS = {"quick": (3, 40), "full": (9, 80)}
 ENSEMBLE_REPEATS = {"quick": 1, "full": 3}
@@ -43,7 +44,7 @@ def bench(
         typer.Argument(metavar="[-- COMMAND...]", help="One more stepper; speaks protocol 1."),
     ] = None,
     out: Annotated[Path, typer.Option(metavar="DIR", help="Folder for the results.")] = Path("bench-report"),
-    quick: Annotated[bool, typer.Option("--quick", help="Fewer questions and laps: three minutes.")] = False,
+    quick: Annotated[bool, typer.Option("--quick", help="Fewer questions and laps: five minutes.")] = False,
     seed: Annotated[int, typer.Option(help="Seed of the questions, 0 to 2^64 - 1.")] = 0,
     compare: Annotated[
         Path | None, typer.Option(metavar="OLD.json", help="An earlier bench.json to compare with.")
@@ -89,12 +90,13 @@ def bench(
 
 def _measured(size: Size, seed: int, command: list[str]) -> Record:
     """Run everything."""
+    import fast
     from conformance.bench import growth, hard_cases, measure, record, work, workloads
     from conformance.generator.prover import proved_step
     from mushrooms import bench_contenders as ours
 
     begin = time.monotonic()
-    n_questions, repeats = QUESTIONS[size], REPEATS[size]
+    n_questions, n_further, repeats = QUESTIONS[size], FURTHER[size], REPEATS[size]
     with ExitStack() as stack:
         bar = stack.enter_context(progress_bar())
         task = bar.add_task("speed against error", total=len(workloads.RULES) * (repeats + 1))
@@ -106,7 +108,9 @@ def _measured(size: Size, seed: int, command: list[str]) -> Record:
         points, clock = [], list[float]()
         for rule in workloads.RULES:
             tick(f"questions: {rule.name}")
-            workload = workloads.draw_workload(rule, seed, n_questions, proved_step)
+            workload = workloads.draw_workload(
+                rule, seed, n_questions, proved_step, n_further, fast.next_collision
+            )
             found, troubles = measure.measure(workload, contenders, _effort(size), tick, clock)
             points += found
             not_run |= {f"{name} on {rule.name}": why for name, why in troubles.items()}
@@ -123,12 +127,7 @@ def _measured(size: Size, seed: int, command: list[str]) -> Record:
             ours.run_ensemble, size, os.cpu_count() or 1, ENSEMBLE_REPEATS[size], tick
         )
         tick("compile times")
-        compiled = {}
-        if size == "full":
-            try:
-                compiled = ours.compile_times()
-            except subprocess.CalledProcessError as error:
-                not_run["compile times"] = f"exit code {error.returncode}"
+        compiled = _compile_times(not_run) if size == "full" else {}
     return record.Record(
         format=record.FORMAT,
         size=size,
@@ -138,7 +137,9 @@ def _measured(size: Size, seed: int, command: list[str]) -> Record:
         digits=workloads.DIGITS,
         machine=record.this_machine(built),
         clock_ns=tuple(clock),
-        workloads=tuple(record.Drawn(r.name, r.what, r.scene, n_questions) for r in workloads.RULES),
+        workloads=tuple(
+            record.Drawn(r.name, r.what, r.scene, n_questions, n_further) for r in workloads.RULES
+        ),
         points=tuple(points),
         not_run=not_run,
         growth=grown,
@@ -146,6 +147,16 @@ def _measured(size: Size, seed: int, command: list[str]) -> Record:
         hard_cases=cases,
         seconds=round(time.monotonic() - begin, 1),
     )
+
+
+def _compile_times(not_run: dict[str, str]) -> dict[str, float]:
+    from mushrooms import bench_contenders as ours
+
+    try:
+        return ours.compile_times()
+    except subprocess.CalledProcessError as error:
+        not_run["compile times"] = f"exit code {error.returncode}"
+        return {}
 
 
 def _effort(size: str) -> Effort:
@@ -158,6 +169,7 @@ def _contenders(
     stack: ExitStack, command: list[str]
 ) -> tuple[list[Contender], dict[str, Ask], dict[str, str], dict[str, str]]:
     """Return contenders, how each answers a vector, what was compiled, and what cannot run."""
+    from conformance.bench import baselines
     from conformance.bench import contenders as those
     from conformance.harness.examples import find_examples
     from conformance.suite.process import Trouble
@@ -165,15 +177,23 @@ def _contenders(
     from mushrooms import bench_contenders as ours
 
     patience = Limits(TIMEOUT, RESTARTS)
-    contenders = [*ours.our_contenders(), those.plain_python(), *those.time_steppers()]
+    contenders = [*ours.our_contenders(), baselines.in_numba(), those.plain_python(), *those.time_steppers()]
     askers = ours.our_askers()
     built, not_run = {}, {}
+    folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
+    try:
+        library, built["lean C"] = baselines.build(folder, C_FLAGS)
+        in_c = baselines.in_c(library)
+        contenders += in_c
+        askers |= {c.name: baselines.asker(c) for c in (in_c[0], in_c[-1])}
+    except Trouble as trouble:
+        not_run["lean C, time steps"] = trouble.why
 
     def add(name: str, family: Family, line: Sequence[str]) -> None:
         contender, askers[name] = those.by_command(name, family, line, stack, patience)
         contenders.append(contender)
 
-    examples = find_examples(Path(stack.enter_context(tempfile.TemporaryDirectory())), C_FLAGS)
+    examples = find_examples(folder, C_FLAGS)
     for language, example in examples.items():
         name = f"example in {language}"
         if not example.command:
@@ -202,16 +222,18 @@ def _new_table(title: str, *numbers: str) -> Table:
 
 
 def _table(found: Record) -> Table:
-    from mushrooms.reports.bench_page import middle_and_worst
+    from conformance.bench.record import quartiles
+    from mushrooms.reports.bench_page import astray, middle_and_worst
 
-    numbers = ("ns/collision", "median ulps", "worst ulps", "wrong", "undecided", "left")
-    table = _new_table("Speed against error", *numbers)
+    numbers = ("ns/collision", "quartiles", "median ulps", "worst ulps", "wrong", "undecided", "left")
+    table = _new_table("Speed against error", *numbers, "wrong of further")
     for p in found.points:
         middle, worst = middle_and_worst(p.ulps, ".2g")
         counts = [str(n) if n else "" for n in (p.wrong, p.undecided, p.left)]
-        table.add_row(
-            p.workload, escape(p.contender), f"{statistics.median(p.ns):,.0f}", middle, worst, *counts
-        )
+        first, ns, third = quartiles(p.ns)
+        spread = f"-{1 - first / ns:.1%} +{third / ns - 1:.1%}"
+        row = [escape(p.contender), f"{ns:,.0f}", spread, middle, worst, *counts, astray(p)]
+        table.add_row(p.workload, *row)
     return table
 
 

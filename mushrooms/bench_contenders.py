@@ -8,6 +8,7 @@ import os
 import subprocess
 import sys
 import tempfile
+import time
 import tracemalloc
 from functools import partial
 
@@ -25,11 +26,13 @@ from fast import __main__ as fast_protocol
 from fast.batch import careful_steps, fine_steps, flights, lane_steps
 from reference import __main__ as proof
 from scene import Collision, Scene, State, load
-from scene.geometry import rounded
 
 DIGITS = (15, 30, 50, 100, 200)
 PATH_DIGITS = (30, 60)  # working decimals of the proofs whose growth is followed
-LANES_SERVE = ("breathing-disk", "fixed-cap", "moving-cap-1e4", "moving-cap-1e7", "moving-cap-1e12")
+LANES_SERVE = (
+    "breathing-disk", "fixed-cap", "moving-cap-1e4", "moving-cap-1e7", "moving-cap-1e12", "two-harmonics",
+    "sixteen-harmonics", "moving-slope", "bang-bang", "one-path",
+)  # fmt: skip
 COMPILED = {
     "step": "fast.next_collision(s, p, 1.0)",
     "trajectory": "fast.trajectory(s, p, 1)",
@@ -50,13 +53,14 @@ def prove_path(scene: Scene, state: State, n_collisions: int) -> list[Place]:
 
 
 def our_contenders() -> list[Contender]:
-    """Return our steppers: the reference at several precisions, and the fast one's four ways."""
+    """Return our steppers: the reference at several precisions, and the fast one's five ways."""
     return [
         *(_proof(digits) for digits in DIGITS),
         by_call("fast, a call", "compiled", fast.next_collision),
         Contender("fast, careful", "compiled", _careful),
         Contender("fast, pairs", "compiled", _fine),
-        Contender("fast, lanes", "compiled", _lanes, LANES_SERVE),
+        Contender("fast, lanes", "compiled", _lanes, LANES_SERVE, lane_steps),
+        Contender("fast, trajectory", "compiled", _trajectory, ("one-path",)),
     ]
 
 
@@ -106,14 +110,26 @@ def _fine(workload: Workload, n_times: int) -> Lap:
 def _lanes(workload: Workload, n_times: int) -> Lap:
     """Time the engine on flights that go on from the questions; grade one round of its lanes on these."""
     states = [q.state for q in workload.questions]
-    last = max(states, key=lambda s: s.t)
-    span = WINDOW * rounded(workload.scene, last.t).size / math.hypot(last.vx, last.vy)
     copies = -(-128 // len(states))  # enough to fill both pools
+    followed = states[:1] if workload.length else states * copies
+    t_end = workload.end(workload.length or WINDOW)
     seconds, n_collisions = 0.0, 0
     for _ in range(n_times):
-        n, lasted = flights(workload.scene, states * copies, last.t + span)
+        n, lasted = flights(workload.scene, followed, t_end)
         n_collisions, seconds = n_collisions + n, seconds + lasted
     return Lap(seconds / n_collisions * 1e9, list(lane_steps(workload.scene, states)), seconds * 1e9)
+
+
+def _trajectory(workload: Workload, n_times: int) -> Lap:
+    """Time a path from the first question, the call and its arrays included; grade a step from each."""
+    states = [q.state for q in workload.questions]
+    paths = [fast.trajectory(workload.scene, state, 1) for state in states]
+    begin = time.perf_counter_ns()
+    for _ in range(n_times):
+        fast.trajectory(workload.scene, states[0], workload.length)
+    ns = time.perf_counter_ns() - begin
+    answers: list[Given] = [Collision(path.walls[0], *path.steps[0].tolist()) for path in paths]
+    return Lap(ns / (n_times * workload.length), answers, ns)
 
 
 def _plain_path(scene: Scene, state: State, n_collisions: int) -> list[Place]:

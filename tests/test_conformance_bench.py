@@ -105,6 +105,20 @@ def test_a_spoilt_contender_is_seen(drawn, spoil, counts):
     assert (point.right, point.wrong, point.undecided) == counts
 
 
+def test_walls_of_further_steps_are_compared(drawn):
+    steps = [workloads.FurtherStep(q.state, "arc") for q in drawn["breathing-disk"].questions]
+    workload = drawn["breathing-disk"]._replace(further=steps)
+    met = fast.next_collision(workload.scene, steps[0].state, workload.questions[0].t_end)
+
+    def answers(scene, states):
+        return [met, msgspec.structs.replace(met, wall="base"), None]
+
+    stepper = by_call("fast", "compiled", fast.next_collision)
+    (point, other) = measured(workload, stepper._replace(steps=answers), stepper)
+    assert (point.further, point.astray) == (2, 1)
+    assert (other.further, other.astray) == (0, 0)
+
+
 def test_a_small_error_is_measured(drawn):
     def off(*question):
         c = fast.next_collision(*question)
@@ -237,7 +251,7 @@ def test_an_ensemble_of_twice_the_particles_has_twice_the_collisions():
 
 
 def a_point(ns: list[float], contender: str = "fast") -> record.Point:
-    return record.Point("slow", contender, "compiled", 1, tuple(ns), 1, 0, 0, 0, (0.5,), (1e-16,))
+    return record.Point("slow", contender, "compiled", 1, tuple(ns), 1, 0, 0, 0, 0, 0, (0.5,), (1e-16,))
 
 
 def a_record(*points: record.Point, clock: float = 1.0) -> record.Record:
@@ -246,10 +260,10 @@ def a_record(*points: record.Point, clock: float = 1.0) -> record.Record:
         "moving-cap", (record.CostSeries("particles", (1.0, 2.0), (1.0, 2.0), (1.0, 2.0), 1.0, 0.0),), 1.0, {}
     )
     cases = (record.Case("01", "a graze", 1, {"fast": {"right": 1}}, {"fast": 0.5}),)
-    drawn = (record.Drawn("slow", "slow", "moving-cap", 1),)
+    drawn = (record.Drawn("slow", "slow", "moving-cap", 1, 0),)
     machine = record.this_machine({})
     return record.Record(
-        1, "quick", 0, 1, 3, 230, machine, (clock,) * 3, drawn, points, {}, grown, costs, cases, 1.0
+        2, "quick", 0, 1, 3, 230, machine, (clock,) * 3, drawn, points, {}, grown, costs, cases, 1.0
     )
 
 
@@ -263,10 +277,11 @@ def test_a_slow_down_is_seen_and_noise_is_not():
         assert ratio.is_slower is is_slower
         assert ratio.low <= ratio.ratio <= ratio.high
     assert comparison.compare(old, a_record(a_point([1.0], "another"))) == []
-    example = a_record(msgspec.structs.replace(a_point([900.0] * 3), family="example"))
-    (ratio,) = comparison.compare(old, example)
-    assert ratio.low > comparison.SLOWER
-    assert not ratio.is_slower
+    for family in ("example", "lean", "fixed-step"):
+        other = a_record(msgspec.structs.replace(a_point([900.0] * 3), family=family))
+        (ratio,) = comparison.compare(old, other)
+        assert ratio.low > comparison.SLOWER
+        assert not ratio.is_slower
 
 
 @pytest.mark.parametrize(("field", "value"), [("size", "full"), ("seed", 1), ("questions", 2)])
@@ -309,7 +324,7 @@ def test_a_record_returns_whole(tmp_path):
         (record.encode(a_record(a_point([0.0]))), "ns"),
         (record.encode(a_record(a_point([]))), "ns"),
         (record.encode(msgspec.structs.replace(a_record(), clock_ns=())), "clock_ns"),
-        (record.encode(msgspec.structs.replace(a_record(), format=2)), "format = 2, must be 1"),
+        (record.encode(msgspec.structs.replace(a_record(), format=1)), "format = 1, must be 2"),
     ],
 )
 def test_a_file_that_is_no_record_is_refused(tmp_path, content, words):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import shutil
 import statistics
 import sys
 from functools import partial
@@ -12,10 +13,10 @@ import msgspec
 import pytest
 
 from conformance import vectors
-from conformance.bench import record, work, workloads
+from conformance.bench import comparison, record, work, workloads
 from mushrooms import bench
 from mushrooms.figures import speed as figures_of_speed
-from mushrooms.reports.bench_page import middle_and_worst
+from mushrooms.reports.bench_page import astray, middle_and_worst
 
 ROOT = Path(__file__).parent.parent
 FILES = ["bench.html", "bench.json", "bench.svg", "hard-cases.md"]
@@ -28,6 +29,7 @@ def _small(monkeypatch):
     monkeypatch.setattr(vectors, "load", lambda *_: hard)
     monkeypatch.setattr(workloads, "RULES", workloads.RULES[:1] + workloads.RULES[2:3])
     monkeypatch.setattr(bench, "QUESTIONS", {"quick": 2, "full": 64})
+    monkeypatch.setattr(bench, "FURTHER", {"quick": 40, "full": 2000})
     monkeypatch.setattr(bench, "REPEATS", {"quick": 2})
     monkeypatch.setattr(bench, "PATHS", {"quick": (1, 4)})
     monkeypatch.setitem(work.SWEEPS, "quick", {"particles": (50, 100), "energy": (1e2, 1e3)})
@@ -51,8 +53,15 @@ def test_a_benchmark_is_written_whole_and_compared(call, tmp_path):
         "fast, lanes",
         "fast, pairs",
         "plain Python",
+        "lean numba",
         f"command {' '.join(one)}",
     } <= names
+    if shutil.which("cc"):
+        assert names >= {"lean C", "steps, flight/10", "steps, flight/100", "steps, flight/1000"}
+        assert "baselines.c" in found.machine.compiled["lean C"]
+    else:
+        assert found.not_run["lean C, time steps"] == "no C compiler is installed"
+    assert {p.further for p in found.points if p.contender in ("fast, lanes", "lean numba")} == {40}
     assert {p.workload for p in found.points} == {"breathing-disk", "moving-cap-1e4"}
     assert "fast, careful" in out
     page = (tmp_path / "one" / "bench.html").read_text("utf-8")
@@ -93,7 +102,7 @@ def test_a_slow_down_exits_with_1(call, tmp_path, monkeypatch):
     assert call("--quick", "--out", tmp_path / "a", "--compare", files["same"])[0] == 0
     code, out, _ = call("--quick", "--out", tmp_path / "b", "--compare", files["faster"])
     assert code == 1
-    n_judged = sum(p.family != "example" for p in points)
+    n_judged = sum(p.family not in comparison.NOT_JUDGED for p in points)
     assert f"{n_judged} of {len(points)} slower" in out
     code, out, err = call("--out", tmp_path / "c", "--compare", files["same"])
     assert (code, out) == (2, "")
@@ -122,14 +131,15 @@ def test_bad_options_are_one_line(call, monkeypatch, tmp_path, arguments, word):
 
 
 def test_the_front_holds_only_what_nothing_beats():
-    def point(name, ns, error, wrong=0):
-        return record.Point("slow", name, "compiled", 1, (ns,), 1, wrong, 0, 0, (1.0,), (error,))
+    def point(name, ns, error, wrong=0, astray=0):
+        return record.Point("slow", name, "compiled", 1, (ns,), 1, wrong, 0, 0, 9, astray, (1.0,), (error,))
 
     points = [
         point("a", 10.0, 1e-15),
         point("b", 20.0, 1e-14),
         point("c", 30.0, 1e-30),
         point("d", 1.0, 1e-40, 1),
+        point("e", 2.0, 1e-40, 0, 1),
     ]
     assert figures_of_speed.pareto(points) == [(pytest.approx(15.0), 10.0), (pytest.approx(30.0), 30.0)]
 
@@ -142,9 +152,8 @@ def shown_rows(kept: record.Record) -> list[str]:
             worst = middle_and_worst(p.ulps, ".2g")[1]
             relative = middle_and_worst(p.relative, ".0e")[1]
             wrong = f"{p.wrong} of {kept.questions}"
-            rows.append(
-                f"| {p.contender} | {statistics.median(p.ns):,.0f} | {worst} | {relative} | {wrong} |"
-            )
+            row = (p.contender, f"{statistics.median(p.ns):,.0f}", worst, relative, wrong, astray(p))
+            rows.append(f"| {' | '.join(row)} |")
     return rows
 
 

@@ -4,7 +4,8 @@ Times are first divided by the core's speed in their own run (`clock_ns`), so th
 a slower stepper. The ratio of medians has a bootstrap interval over the laps of both runs, which knows
 nothing of what differs between runs: hence the bound SLOWER, above which the whole interval must lie. Two
 quick runs of one commit on a shared machine had ratios from 0.7 to 1.6 and no interval above the bound, but
-for an example that its interpreter compiles as it runs (8.6): examples are shown, and not judged.
+for an example that its interpreter compiles as it runs (8.6): examples and baselines are shown, not
+judged.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ from scene.refusal import BadInput
 SLOWER = 1.5
 LEVEL = 0.99
 N_RESAMPLES = 2000
+NOT_JUDGED = ("example", "lean", "fixed-step")  # no stepper of ours
 
 
 class Ratio(NamedTuple):
@@ -72,5 +74,5 @@ def compare(old: Record, new: Record) -> list[Ratio]:
             drawn = np.median(random.choice(a, (N_RESAMPLES, len(a))), axis=1)
             drawn = drawn / np.median(random.choice(b, (N_RESAMPLES, len(b))), axis=1)
             low, high = np.quantile(drawn, [(1 - LEVEL) / 2, (1 + LEVEL) / 2])
-            found.append(Ratio(*key, ratio, float(low), float(high), point.family != "example"))
+            found.append(Ratio(*key, ratio, float(low), float(high), point.family not in NOT_JUDGED))
     return found

@@ -13,7 +13,7 @@ import msgspec
 
 from conformance import plain
 from conformance.bench.time_stepping import TOLERANCES, next_collision_by
-from conformance.bench.workloads import Workload
+from conformance.bench.workloads import SINGLE_STEPS, Workload
 from conformance.grading.agreement import Answer
 from conformance.suite.process import Trouble
 from conformance.suite.run import put
@@ -21,7 +21,9 @@ from conformance.suite.session import Limits, Session, missing
 from conformance.vectors import Vector
 from scene import Outcome, Scene, State, to_data
 
-Family = Literal["proof", "compiled", "interpreted", "time-stepping", "example", "command"]
+Family = Literal[
+    "proof", "compiled", "interpreted", "time-stepping", "fixed-step", "lean", "example", "command"
+]
 Ask = Callable[[Vector], dict[str, Any]]  # raises Trouble
 
 
@@ -49,13 +51,15 @@ class Contender(NamedTuple):
         name: as in the plot.
         family: what kind of thing it is.
         run: (workload, n_times) -> a lap in which every step is taken n_times; raises Trouble.
-        serves: the workloads it can run; empty for all.
+        serves: the workloads it can run.
+        steps: one step from each of many states, quickly; None where there is no such thing.
     """
 
     name: str
     family: Family
     run: Callable[[Workload, int], Lap]
-    serves: tuple[str, ...] = ()
+    serves: tuple[str, ...] = SINGLE_STEPS
+    steps: Callable[[Scene, Sequence[State]], Sequence[Given]] | None = None
 
 
 def by_call(name: str, family: Family, step: Callable[[Scene, State, float], Given]) -> Contender:

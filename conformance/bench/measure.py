@@ -24,7 +24,7 @@ from conformance.bench.workloads import ProvedStep, Workload
 from conformance.grading.agreement import Answer, Enclosed, compare, exact
 from conformance.suite.process import Trouble
 from conformance.vectors import NUMBERS, Certified
-from scene import Collision
+from scene import Collision, Undecided
 
 MAX_TIMES = 1000  # as many as a `time` request of the protocol may ask for
 
@@ -70,7 +70,7 @@ def measure(
     laps: dict[str, list[Lap]] = {}
     troubles: dict[str, str] = {}
     for contender in contenders:
-        if contender.serves and workload.name not in contender.serves:
+        if workload.name not in contender.serves:
             continue
         tick(contender.name)
         try:
@@ -130,6 +130,7 @@ def _point(workload: Workload, contender: Contender, n_times: int, laps: Sequenc
     graded = [_grade(answer, q) for answer, q in zip(laps[-1].answers, workload.questions, strict=True)]
     kinds = [g.kind for g in graded]
     right = [g for g in graded if g.kind == "right"]
+    further, astray = _count_walls(workload, contender)
     return Point(
         workload=workload.name,
         contender=contender.name,
@@ -140,9 +141,21 @@ def _point(workload: Workload, contender: Contender, n_times: int, laps: Sequenc
         wrong=kinds.count("wrong"),
         undecided=kinds.count("undecided"),
         left=kinds.count("left"),
+        further=further,
+        astray=astray,
         ulps=tuple(short(g.ulps) if math.isfinite(g.ulps) else None for g in right),
         relative=tuple(short(g.relative) for g in right),
     )
+
+
+def _count_walls(workload: Workload, contender: Contender) -> tuple[int, int]:
+    """Return how many of the further steps the contender answers, and how many with a wrong wall."""
+    if contender.steps is None or not workload.further:
+        return 0, 0
+    given = contender.steps(workload.scene, [step.state for step in workload.further])
+    pairs = [(a, step.wall) for a, step in zip(given, workload.further, strict=True)]
+    answered = [(a, wall) for a, wall in pairs if not isinstance(a, Undecided | None)]
+    return len(answered), sum(getattr(a, "wall", None) != wall for a, wall in answered)
 
 
 def _grade(given: Given, question: ProvedStep) -> _Graded:

@@ -8,15 +8,17 @@ from __future__ import annotations
 import json
 import os
 import platform
+from collections.abc import Sequence
 from importlib.metadata import version
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import msgspec
+import numpy as np
 
 from scene.refusal import BadInput
 
-FORMAT = 1
+FORMAT = 2
 Time = Annotated[float, msgspec.Meta(gt=0)]
 Times = Annotated[tuple[Time, ...], msgspec.Meta(min_length=1)]
 Size = Literal["quick", "full"]
@@ -35,12 +37,13 @@ class Machine(msgspec.Struct, frozen=True):
 
 
 class Drawn(msgspec.Struct, frozen=True):
-    """A workload: its scene (of the catalogue) and number of questions; `seed` and sizes re-make it."""
+    """A workload: its scene, numbers of questions and of further steps; `seed` and sizes re-make it."""
 
     name: str
     what: str
     scene: str
     questions: int
+    further: int
 
 
 class Point(msgspec.Struct, frozen=True):
@@ -52,6 +55,8 @@ class Point(msgspec.Struct, frozen=True):
         ns: nanoseconds per step of each lap.
         right, wrong, undecided, left: numbers of answers: the right wall; another wall or outcome; left
             open; left to another stepper.
+        further, astray: how many of the workload's further steps it answered, and how many of them with
+            another wall than the trusted stepper; 0, 0 where it was not asked.
         ulps: backward ulps of each right answer; null where only an exact number is right, and it is not.
         relative: its largest relative error.
     """
@@ -65,6 +70,8 @@ class Point(msgspec.Struct, frozen=True):
     wrong: int
     undecided: int
     left: int
+    further: int
+    astray: int
     ulps: tuple[float | None, ...]
     relative: tuple[float, ...]
 
@@ -159,6 +166,12 @@ class Record(msgspec.Struct, frozen=True):
     work: EnsembleWork
     hard_cases: tuple[Case, ...]
     seconds: float
+
+
+def quartiles(ns: Sequence[float]) -> tuple[float, float, float]:
+    """Return the first quartile, the median and the third quartile of a point's laps."""
+    first, middle, third = np.quantile(ns, (0.25, 0.5, 0.75)).tolist()
+    return first, middle, third
 
 
 def short(number: float, digits: int = 4) -> float:

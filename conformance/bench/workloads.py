@@ -3,12 +3,15 @@
 A question is a state as a trajectory meets it: drawn in the table, flown to its first collision, rounded.
 The states of a workload lie within WINDOW flights of each other, so that an engine which follows them on
 does comparable work at every energy. Every answer is a collision; other draws are drawn again.
+
+Proofs are slow, and a few dozen questions show no rare mistake. So each workload draws many further steps by
+the same rule, whose walls a stepper that the caller trusts has named.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from typing import NamedTuple
 
 from mpmath import fp
@@ -16,7 +19,7 @@ from mpmath import fp
 from conformance.generator.draws import Draw, place, state, walls_speed
 from conformance.grading.agreement import middle
 from conformance.vectors import Expectation
-from scene import Cap, Collision, Scene, State, load
+from scene import BangBang, Cap, Collision, Fourier, Mushroom, Outcome, Scene, State, Wall, load
 from scene.geometry import rounded
 from scene.tables import period
 
@@ -26,6 +29,7 @@ PHASE = 0.3  # of the cycle, where the window begins
 MAX_DRAWS = 100
 # (scene, state, t_end, digits) -> certified answer of a step; None where the proof is undecided.
 Prover = Callable[[Scene, State, float, int], Expectation | None]
+Stepper = Callable[[Scene, State, float], Outcome]
 Drawn = tuple[State, float]  # with its horizon
 
 
@@ -37,6 +41,13 @@ class ProvedStep(NamedTuple):
     truth: Expectation
 
 
+class FurtherStep(NamedTuple):
+    """The question of one more step, and the wall that the trusted stepper meets."""
+
+    state: State
+    wall: Wall
+
+
 class Workload(NamedTuple):
     """Questions of one kind.
 
@@ -45,12 +56,22 @@ class Workload(NamedTuple):
         what: in a line.
         scene: of all questions.
         questions: one step each.
+        length: the time is that of one particle's path of so many collisions; 0: of all the questions.
+        further: steps of the same kind, on which only walls are compared.
     """
 
     name: str
     what: str
     scene: Scene
     questions: list[ProvedStep]
+    length: int = 0
+    further: Sequence[FurtherStep] = ()
+
+    def end(self, flights: float = WINDOW) -> float:
+        """Return the time that lies so many flights after the last question."""
+        last = max((q.state for q in self.questions), key=lambda state: state.t)
+        flight = float(rounded(self.scene, last.t).size) / math.hypot(last.vx, last.vy)
+        return last.t + flights * flight
 
 
 class Rule(NamedTuple):
@@ -58,10 +79,11 @@ class Rule(NamedTuple):
 
     Attributes:
         name, what: as in Workload.
-        scene: of the catalogue.
+        scene: of the catalogue, or of SCENES.
         draw: from a stream of numbers, the scene and a time to a state.
         speed: about that of the particle, for the length of the window.
         is_flown: whether the question begins at the first collision of what was drawn.
+        length: as in Workload.
     """
 
     name: str
@@ -70,6 +92,7 @@ class Rule(NamedTuple):
     draw: Callable[[Draw, Scene, float], Drawn]
     speed: float
     is_flown: bool = True
+    length: int = 0
 
 
 def _flight(energy: float) -> tuple[Callable[[Draw, Scene, float], Drawn], float]:
@@ -104,20 +127,62 @@ def _near_corner(stream: Draw, scene: Scene, t: float) -> Drawn:
     return start, t + 4.0 * flight
 
 
+SIXTEEN = tuple(round(0.4 / k**2, 4) for k in range(1, 17))
+SCENES: dict[str, Scene] = {
+    "moving cap, two harmonics": Mushroom(
+        r=Fourier(1.0, 1.0, sin=(0.4, 0.1)),
+        h=Fourier(1.0, 1.0, cos=(0.0, 0.1), sin=(-0.4,)),
+        nu=Fourier(0.6, 1.0, cos=(0.3,), sin=(0.0, 0.08)),
+        slope=0.1111,
+    ),
+    "moving cap, sixteen harmonics": Mushroom(
+        r=Fourier(1.0, 1.0, sin=SIXTEEN),
+        h=Fourier(1.0, 1.0, sin=tuple(-size for size in SIXTEEN)),
+        nu=0.5,
+        slope=0.1111,
+    ),
+    "moving cap, moving slope": Mushroom(
+        r=Fourier(1.0, 1.0, sin=(0.5,)),
+        h=Fourier(1.0, 1.0, sin=(-0.5,)),
+        nu=Fourier(0.6, 1.0, cos=(0.4,)),
+        slope=Fourier(0.06, 1.0, cos=(0.04,)),
+    ),
+    "moving cap, bang-bang": Mushroom(
+        r=BangBang(((0.0, 1.0), (1.5, 1.5), (4.5, 0.5), (6.0, 1.0))),
+        h=BangBang(((0.0, 1.0), (1.5, 0.5), (4.5, 1.5), (6.0, 1.0))),
+        nu=BangBang(((0.0, 1.0), (3.0, 0.3), (6.0, 1.0))),
+        slope=0.1111,
+    ),
+}
+
+
+def scene_of(rule: Rule) -> Scene:
+    """Return a rule's scene."""
+    return SCENES[rule.scene] if rule.scene in SCENES else load(rule.scene)
+
+
 RULES: tuple[Rule, ...] = (
     Rule("breathing-disk", "the cap alone, energy 1e6", "breathing-circle", *_flight(1e6)),
-    Rule("fixed-cap", "sec. 4.1, energy 1e9", "fixed-cap-anticlockwise", *_flight(1e9)),
+    Rule("fixed-cap", "sec. 4.1, bang-bang, energy 1e9", "fixed-cap-anticlockwise", *_flight(1e9)),
     Rule("moving-cap-1e4", "sec. 4.2, energy 1e4", "moving-cap", *_flight(1e4)),
     Rule("moving-cap-1e7", "sec. 4.2, energy 1e7", "moving-cap", *_flight(1e7)),
     Rule("moving-cap-1e12", "sec. 4.2, energy 1e12", "moving-cap", *_flight(1e12)),
     Rule("slow", "a quarter to twice the walls' speed", "moving-cap", _slow, 1.0),
     Rule("grazing", "the arc left at 2^-26 to 2^-4 of a radian", "moving-cap", _grazing, 2.0**10, False),
     Rule("near-corner", "2^-40 to 2^-8 from a corner", "moving-cap", _near_corner, 2.0**10, False),
+    Rule("two-harmonics", "r, h and nu, energy 1e7", "moving cap, two harmonics", *_flight(1e7)),
+    Rule("sixteen-harmonics", "r and h, energy 1e7", "moving cap, sixteen harmonics", *_flight(1e7)),
+    Rule("moving-slope", "energy 1e7", "moving cap, moving slope", *_flight(1e7)),
+    Rule("bang-bang", "r, h and nu, energy 1e7", "moving cap, bang-bang", *_flight(1e7)),
+    Rule("one-path", "one particle, 1e5 collisions", "moving-cap", *_flight(1e7), length=100_000),
 )
 NAMES = tuple(rule.name for rule in RULES)
+SINGLE_STEPS = tuple(rule.name for rule in RULES if not rule.length)
 
 
-def draw_workload(rule: Rule, seed: int, n_questions: int, prove: Prover) -> Workload:
+def draw_workload(
+    rule: Rule, seed: int, n_questions: int, prove: Prover, n_further: int = 0, trust: Stepper | None = None
+) -> Workload:
     """Draw a workload and have it answered.
 
     Args:
@@ -125,20 +190,47 @@ def draw_workload(rule: Rule, seed: int, n_questions: int, prove: Prover) -> Wor
         seed: of all draws.
         n_questions: how many, >= 1.
         prove: answers one step by proof.
+        n_further: how many further steps.
+        trust: names their walls.
     """
-    scene = load(rule.scene)
+    scene, further = scene_of(rule), list[FurtherStep]()
     questions = [_question(rule, scene, f"bench {seed} {rule.name} {i}", prove) for i in range(n_questions)]
-    return Workload(rule.name, rule.what, scene, questions)
+    if trust is not None:
+        key = f"bench {seed} {rule.name} further"
+        further = [_further_step(rule, scene, f"{key} {i}", trust) for i in range(n_further)]
+    return Workload(rule.name, rule.what, scene, questions, rule.length, further)
+
+
+def _starts(rule: Rule, scene: Scene, key: str) -> Iterator[Drawn]:
+    """Draw starts until one is taken."""
+    shared = period(scene)
+    span = 1.0 if shared is None else float(shared.value(fp))
+    size = rounded(scene, 0.0).size
+    for attempt in range(MAX_DRAWS):
+        stream = Draw(f"{key} {attempt}")
+        t = span * PHASE + stream.part() * min(span, WINDOW * size / rule.speed)
+        yield rule.draw(stream, scene, t)
+    raise RuntimeError(f"{key}: no collision in {MAX_DRAWS} draws")
+
+
+def _is_folded(scene: Scene, *walls: Wall | None) -> bool:
+    """Tell whether a step of the cap meets its base: the lanes unfold the disk, from arc to arc."""
+    return isinstance(scene, Cap) and "base" in walls
+
+
+def _further_step(rule: Rule, scene: Scene, key: str, trust: Stepper) -> FurtherStep:
+    for start, t_end in _starts(rule, scene, key):
+        met = trust(scene, start, t_end)
+        if rule.is_flown and isinstance(met, Collision):
+            start = met.state()
+            met = trust(scene, start, t_end)
+        if isinstance(met, Collision) and not _is_folded(scene, start.wall, met.wall):
+            return FurtherStep(start, met.wall)
+    raise AssertionError
 
 
 def _question(rule: Rule, scene: Scene, key: str, prove: Prover) -> ProvedStep:
-    shared = period(scene)
-    span = 1.0 if shared is None else float(shared.value(fp))
-    for attempt in range(MAX_DRAWS):
-        stream = Draw(f"{key} {attempt}")
-        size = rounded(scene, 0.0).size
-        t = span * PHASE + stream.part() * min(span, WINDOW * size / rule.speed)
-        start, t_end = rule.draw(stream, scene, t)
+    for start, t_end in _starts(rule, scene, key):
         if rule.is_flown:
             first = prove(scene, start, t_end, 20)
             met = middle(first, start)[0] if first else None
@@ -149,7 +241,6 @@ def _question(rule: Rule, scene: Scene, key: str, prove: Prover) -> ProvedStep:
         truth = prove(scene, start, t_end, DIGITS)
         if truth is None or truth.outcome != "collision":
             continue
-        if isinstance(scene, Cap) and "base" in (start.wall, truth.steps[0].wall):
-            continue  # lanes unfold the disk: from arc to arc
-        return ProvedStep(start, t_end, truth)
-    raise RuntimeError(f"{key}: no collision in {MAX_DRAWS} draws")
+        if not _is_folded(scene, start.wall, truth.steps[0].wall):
+            return ProvedStep(start, t_end, truth)
+    raise AssertionError

@@ -11,7 +11,7 @@ from matplotlib import rc_context
 from matplotlib.lines import Line2D
 from matplotlib.ticker import FixedLocator, NullLocator
 
-from conformance.bench.record import CostSeries, Growth, Point, Record
+from conformance.bench.record import CostSeries, Growth, Point, Record, quartiles
 from mushrooms.figures import style as plots
 
 COLOURS = {
@@ -19,6 +19,8 @@ COLOURS = {
     "compiled": plots.BLUE,
     "interpreted": plots.GREEN,
     "time-stepping": plots.GREY,
+    "fixed-step": "#8C6D1F",
+    "lean": plots.BLACK,
     "example": "#CC79A7",
     "command": "#7A3E9D",
 }
@@ -27,10 +29,13 @@ WORDS = {
     "compiled": "fast",
     "interpreted": "plain Python",
     "time-stepping": "scipy solve_ivp with events",
+    "fixed-step": "time steps of 1/10 to 1/1000 flight, in C",
+    "lean": "Newton without checks, in C and numba",
     "example": "examples in C, JavaScript, Python",
     "command": "command",
 }
 RED = "#C00000"
+CHARACTER, LINE = 0.035, 0.4  # sizes of labels, in decades of the axes
 MOST_DIGITS, LEAST_DIGITS = 300.0, 0.5
 BINARY64 = 53 * math.log10(2)
 TICKS = (1, 2, 4, 8, 16, 32, 64, 128, 256)
@@ -45,7 +50,7 @@ def digits(error: float) -> float:
 def speed(record: Record) -> bytes:
     """Draw time per collision against correct digits, one panel per workload."""
     n_rows = (len(record.workloads) + 1) // 2
-    figure, axes = plots.new_figure(10.5, 3.1 * n_rows, n_rows, 2)
+    figure, axes = plots.new_figure(10.5, 2.8 * n_rows, n_rows, 2)
     axes = np.atleast_2d(axes)
     panels = axes.ravel()
     for panel in panels[len(record.workloads) :]:
@@ -81,13 +86,14 @@ def _panel(axes: Any, points: list[Point], floor: int) -> None:
 
 
 def _mark(axes: Any, p: Point) -> None:
-    colour, ns = COLOURS[p.family], statistics.median(p.ns)
+    colour, (first, ns, third) = COLOURS[p.family], quartiles(p.ns)
     middle, worst = _digits_of(p)
     if p.right:
+        axes.plot([middle, middle], [first, third], color=colour, marker="_", markersize=5, linewidth=0.8)
         axes.plot([worst, middle], [ns, ns], color=colour, linewidth=1.2)
         axes.plot(middle, ns, marker="o", markersize=4.5, color=colour, linestyle="none")
         axes.plot(worst, ns, marker="<", markersize=4.5, color=colour, linestyle="none")
-    if p.wrong:
+    if p.wrong or p.astray:
         axes.plot(LEAST_DIGITS, ns, marker="x", markersize=6, color=RED, linestyle="none")
 
 
@@ -105,19 +111,26 @@ def _label(axes: Any, points: list[Point]) -> None:
             f"solve_ivp{wrong}", place if side == "right" else (0.6, 2.5 * ns), ha=side, va="bottom",
             color=COLOURS["time-stepping"], **style,
         )  # fmt: skip
-    heights: dict[str, float] = {}  # of the last label on each side
+    taken: list[tuple[float, float, float]] = []  # from and to which digits, and how high, in decades
     for p in sorted(points, key=lambda p: statistics.median(p.ns)):
         middle, worst = _digits_of(p)
         ns, colour = statistics.median(p.ns), COLOURS[p.family]
         if p.family == "proof":
             axes.annotate(short_name(p.contender), (middle, ns * 1.6), ha="center", color=colour, **style)
         elif p.family != "time-stepping":
-            # Ours at the right, others' at the left, each above the one before.
-            side = "right" if p.family in ("example", "command") else "left"
-            height = max(math.log10(ns), heights.get(side, -math.inf) + 0.33)
-            heights[side] = height
-            place = (worst / 1.15 if side == "right" else middle * 1.15, 10**height)
-            axes.annotate(short_name(p.contender), place, ha=side, va="center", color=colour, **style)
+            name = short_name(p.contender)
+            if p.astray:
+                name += f": {100 * p.astray / p.further:.2g} % wrong"
+            is_left = p.family in ("example", "command") or (p.family == "lean" and middle < BINARY64 / 2)
+            x, width = math.log10(worst / 1.15 if is_left else middle * 1.15), CHARACTER * len(name)
+            low, high = (x - width, x) if is_left else (x, x + width)
+            height = math.log10(ns)
+            for other_low, other_high, other_height in sorted(taken, key=lambda place: place[2]):
+                if low < other_high and other_low < high and abs(height - other_height) < LINE:
+                    height = max(height, other_height + LINE)
+            taken.append((low, high, height))
+            side = "right" if is_left else "left"
+            axes.annotate(name, (10**x, 10**height), ha=side, va="center", color=colour, **style)
 
 
 def _digits_of(p: Point) -> tuple[float, float]:
@@ -132,7 +145,7 @@ def pareto(points: list[Point]) -> list[tuple[float, float]]:
 
     Only a contender with no wrong answer and most of them right can stand on the front.
     """
-    able = [p for p in points if p.right > p.undecided + p.left and not p.wrong]
+    able = [p for p in points if p.right > p.undecided + p.left and not p.wrong and not p.astray]
     pairs = sorted((statistics.median(p.ns), -digits(max(p.relative))) for p in able)
     front: list[tuple[float, float]] = []
     for ns, minus_digits in pairs:
@@ -143,8 +156,8 @@ def pareto(points: list[Point]) -> list[tuple[float, float]]:
 
 def short_name(contender: str) -> str:
     """Return a contender's label."""
-    for part in ("proof, ", " digits", "fast, ", "solve_ivp, ", "example in ", "command "):
-        contender = contender.replace(part, "")
+    for part in ("proof, ", " digits", "fast, ", "solve_ivp, ", "example in ", "command ", "steps, flight"):
+        contender = contender.replace(part, "1" if part == "steps, flight" else "")
     contender = contender.replace("$", r"\$")  # no formula
     return contender if len(contender) < 18 else contender[:17] + "…"
 

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from conformance.bench.hard_cases import cell
-from conformance.bench.record import Point, Record
+from conformance.bench.record import Point, Record, quartiles
 from mushrooms.figures import speed as figures_of_speed
 from mushrooms.reports.page import embed, render
 
@@ -30,14 +30,20 @@ def to_html(record: Record, speed: bytes) -> bytes:
 
 
 def _row(p: Point) -> dict[str, Any]:
-    ns = statistics.median(p.ns)
+    first, ns, third = (f"{q:,.0f}" if q >= 100 else f"{q:.1f}" for q in quartiles(p.ns))
     return {
         "point": p,
-        "ns": f"{ns:,.0f}" if ns >= 100 else f"{ns:.1f}",
-        "spread": f"{max(p.ns) / min(p.ns) - 1:.0%}",
+        "ns": ns,
+        "quartiles": f"{first} to {third}",
+        "astray": astray(p),
         "ulps": middle_and_worst(p.ulps, ".2g"),
         "relative": middle_and_worst(p.relative, ".1e"),
     }
+
+
+def astray(p: Point) -> str:
+    """Return how many further steps met a wrong wall, as text: "12 of 2,000 (0.6 %)"."""
+    return f"{p.astray:,} of {p.further:,} ({100 * p.astray / p.further:.2g} %)" if p.further else "–"
 
 
 def middle_and_worst(errors: Sequence[float | None], form: str) -> tuple[str, str]:

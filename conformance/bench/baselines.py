@@ -1,0 +1,232 @@
+"""Baselines: what most people would write, as contenders.
+
+Event-driven, with Newton's method for each wall and no checks: in C and in scalar numba. By fixed time steps,
+in C: move by dt, and where the new place is outside put it back on the wall and reflect. All answer many
+questions in one call and are timed as the lanes are, on flights that go on from a workload's questions.
+
+Every law is a row of LAW_LENGTH numbers: kind, n, mean, omega, then pairs: amplitudes (cos, sin) of
+k = 1, 2, ... n, or n knots (time, value). A state is t, x, y, vx, vy, the wall being left.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import shutil
+import subprocess
+import time
+from collections.abc import Callable, Sequence
+from functools import partial
+from itertools import zip_longest
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+from mpmath import fp
+
+from conformance import vectors
+from conformance.bench import codes
+from conformance.bench.contenders import Ask, Contender, Family, Given, Lap
+from conformance.bench.workloads import SINGLE_STEPS, WINDOW, Workload
+from conformance.suite.process import Trouble
+from scene import BangBang, Cap, Collision, Fourier, Horizon, Law, Outcome, Scene, State, Stem, Wall
+from scene.geometry import rounded
+from scene.laws import frequency
+from scene.tables import laws, width_factors
+
+FloatArray = npt.NDArray[np.float64]
+SOURCE = Path(__file__).parent / "baselines.c"
+PARTS = (10, 100, 1000)  # time steps in a flight
+WALLS: tuple[Wall, ...] = ("arc", "base", "left", "right", "floor")
+LAW_LENGTH, PAIRS = 516, 4
+MOST = 10 * int(WINDOW)  # collisions of a particle: one that hops along the arc would never end
+
+
+class Questions(NamedTuple):
+    """States of a scene as arrays: `laws` (5, LAW_LENGTH), `states` (N, 6); `length` of a flight."""
+
+    table: int
+    laws: FloatArray
+    length: float
+    states: FloatArray
+
+
+class Engine(NamedTuple):
+    """A compiled baseline.
+
+    Attributes:
+        hits: returns dt, t, x, y, vx, vy, wall of each state's next collision, (N, 7).
+        follow: (questions, t_end, most, n_times) -> collisions and seconds of following each state, so many
+            times, to t_end or for `most` collisions.
+    """
+
+    hits: Callable[[Questions], FloatArray]
+    follow: Callable[[Questions, float, int, int], tuple[int, float]]
+
+
+class _Method(ctypes.Structure):
+    """How the C file is to step; fields as there."""
+
+    _fields_ = (
+        ("laws", ctypes.c_void_p),
+        ("table", ctypes.c_int),
+        ("parts", ctypes.c_int),
+        ("length", ctypes.c_double),
+    )
+
+
+def c_engine(library: Path, parts: int = 0) -> Engine:
+    """Return the compiled C file, event-driven (0 parts) or by so many time steps to a flight.
+
+    The seconds are those of the C code's own clock.
+    """
+    compiled = ctypes.CDLL(str(library))
+    count, place = ctypes.c_long, ctypes.c_void_p
+    compiled.next_hits.argtypes = (place, count, place, place)
+    compiled.follow.argtypes = (place, count, place, ctypes.c_double, count, count, place)
+    compiled.follow.restype = ctypes.c_double
+
+    def asked(q: Questions) -> tuple[Any, int, int]:
+        method = _Method(q.laws.ctypes.data, q.table, parts, q.length)
+        return ctypes.byref(method), len(q.states), q.states.ctypes.data
+
+    def hits(q: Questions) -> FloatArray:
+        found = np.empty((len(q.states), 7))
+        compiled.next_hits(*asked(q), found.ctypes.data)
+        return found
+
+    def follow(q: Questions, t_end: float, most: int, n_times: int) -> tuple[int, float]:
+        n_hits = ctypes.c_long()
+        seconds = compiled.follow(*asked(q), t_end, most, n_times, ctypes.byref(n_hits))
+        return n_hits.value, seconds
+
+    return Engine(hits, follow)
+
+
+def numba_engine() -> Engine:
+    """Return the event-driven stepper in numba; the seconds contain the call, not the compilation."""
+    from conformance.bench import numba_stepper  # numba takes half a second to load
+
+    def hits(q: Questions) -> FloatArray:
+        found = np.empty((len(q.states), 7))
+        numba_stepper.next_hits(q.laws, q.table, q.states, found)
+        return found
+
+    def follow(q: Questions, t_end: float, most: int, n_times: int) -> tuple[int, float]:
+        numba_stepper.follow(q.laws, q.table, q.states[:0], t_end, most, n_times)
+        begin = time.perf_counter()
+        n_hits = numba_stepper.follow(q.laws, q.table, q.states, t_end, most, n_times)
+        return n_hits, time.perf_counter() - begin
+
+    return Engine(hits, follow)
+
+
+def build(folder: Path, flags: Sequence[str]) -> tuple[Path, str]:
+    """Compile the C file.
+
+    Args:
+        folder: where the library goes.
+        flags: for the C compiler.
+
+    Returns:
+        The library, and the line that compiled it, paths left out.
+
+    Raises:
+        Trouble: there is no compiler, or it fails.
+    """
+    compiler = shutil.which("cc") or shutil.which("gcc")
+    if not compiler:
+        raise Trouble("unsupported", "no C compiler is installed")
+    options, library = [*flags, "-std=gnu11", "-shared", "-fPIC"], folder / "baselines.so"
+    line = [compiler, *options, "-o", str(library), str(SOURCE), "-lm"]
+    done = subprocess.run(line, capture_output=True, text=True, check=False)
+    if done.returncode:
+        raise Trouble("error", f"it does not compile: {' '.join(done.stderr.split())[:200]}")
+    return library, " ".join([Path(compiler).name, *options, SOURCE.name, "-lm"])
+
+
+def in_c(library: Path) -> list[Contender]:
+    """Return the contenders that the compiled C file holds."""
+    found = [_contender("lean C", "lean", c_engine(library))]
+    for parts in PARTS:
+        engine = c_engine(library, parts)
+        found.append(_contender(f"steps, flight/{parts}", "fixed-step", engine, 10 * WINDOW / parts))
+    return found
+
+
+def in_numba() -> Contender:
+    """Return the scalar stepper in numba."""
+    return _contender("lean numba", "lean", numba_engine())
+
+
+def asker(contender: Contender) -> Ask:
+    """Return how a baseline answers a vector, for the hard cases; states are taken as they are."""
+    assert contender.steps is not None
+    steps = contender.steps
+
+    def step(scene: Scene, state: State, t_end: float) -> Outcome:
+        (met,) = steps(scene, [state])
+        if isinstance(met, Collision) and met.t < t_end:
+            return met
+        left = t_end - state.t
+        return Horizon(t_end, state.x + left * state.vx, state.y + left * state.vy, state.vx, state.vy)
+
+    def follow(scene: Scene, state: State, n_collisions: int, t_end: float) -> list[Outcome]:
+        found: list[Outcome] = []
+        while len(found) < n_collisions:
+            found.append(met := step(scene, state, t_end))
+            if not isinstance(met, Collision):
+                break
+            state = met.state()
+        return found
+
+    return partial(vectors.answer, step=step, follow=follow)
+
+
+def _contender(name: str, family: Family, engine: Engine, flights: float = WINDOW) -> Contender:
+    def steps(scene: Scene, states: Sequence[State]) -> list[Given]:
+        return [_outcome(row) for row in engine.hits(questions(scene, states)).tolist()]
+
+    def run(workload: Workload, n_times: int) -> Lap:
+        states = [q.state for q in workload.questions]
+        followed, t_end, most = states, workload.end(flights), MOST
+        if workload.length:
+            followed, t_end, most = states[:1], np.inf, workload.length
+        n_hits, seconds = engine.follow(questions(workload.scene, followed), t_end, most, n_times)
+        if not n_hits:
+            raise Trouble("fail", "it meets no wall")
+        return Lap(seconds / n_hits * 1e9, steps(workload.scene, states), seconds * 1e9)
+
+    serves = SINGLE_STEPS if family == "fixed-step" else (*SINGLE_STEPS, "one-path")
+    return Contender(name, family, run, serves, steps)
+
+
+def _outcome(row: list[float]) -> Given:
+    *numbers, wall = row
+    return Horizon(*numbers[1:]) if wall == codes.NONE else Collision(WALLS[int(wall)], *numbers)
+
+
+def questions(scene: Scene, states: Sequence[State]) -> Questions:
+    """Return a scene and states as the engines take them."""
+    given = laws(scene)
+    width = (0.0,) if isinstance(scene, Cap) else width_factors(scene)
+    rows = [given.get("r", 0.0), width[0], width[1] if len(width) > 1 else 1.0]
+    rows += [given.get("h", 0.0), given.get("slope", 0.0)]
+    table = codes.CAP if isinstance(scene, Cap) else codes.STEM if isinstance(scene, Stem) else codes.MUSHROOM
+    starts = [(s.t, s.x, s.y, s.vx, s.vy, WALLS.index(s.wall) if s.wall else codes.NONE) for s in states]
+    length = float(rounded(scene, states[0].t).size)
+    return Questions(table, np.array([_row(law) for law in rows]), length, np.array(starts, dtype=float))
+
+
+def _row(law: Law) -> FloatArray:
+    row, pairs = np.zeros(LAW_LENGTH), list[tuple[float, float]]()
+    if isinstance(law, BangBang):
+        row[0], pairs = codes.BANG_BANG, list(law.knots)
+    elif isinstance(law, Fourier):
+        row[0], row[2], row[3] = codes.FOURIER, law.mean, float(frequency(fp, law))
+        pairs = list(zip_longest(law.cos, law.sin, fillvalue=0.0))
+    else:
+        row[0], row[2] = codes.CONSTANT, law
+    row[1] = len(pairs)
+    row[PAIRS : PAIRS + 2 * len(pairs)] = np.ravel(pairs)
+    return row

@@ -1,0 +1,156 @@
+"""The benchmark's baselines: right where most would be, caught where not, timed on what they follow."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+
+import numpy as np
+import pytest
+from support.truth import proved_step
+
+import fast
+from conformance.bench import baselines, hard_cases, measure, workloads
+from conformance.bench.codes import FACTOR, SLOPE, WIDTH, H, R
+from conformance.generator import draws
+from conformance.suite.process import Trouble
+from scene import Collision, Horizon, Mushroom, State, load
+
+BRIEF = measure.Effort(repeats=3, least_ns=1.0, most_ns=1e9)
+
+
+@pytest.fixture(scope="module")
+def library(tmp_path_factory):
+    try:
+        return baselines.build(tmp_path_factory.mktemp("baselines"), ["-O1"])[0]
+    except Trouble as trouble:
+        pytest.skip(trouble.why)
+
+
+@pytest.fixture(params=["numba", "C"])
+def engine(request):
+    if request.param == "C":
+        return baselines.c_engine(request.getfixturevalue("library"))
+    return baselines.numba_engine()
+
+
+def drawn(name: str, n_further: int, n_questions: int = 2) -> workloads.Workload:
+    rule = next(rule for rule in workloads.RULES if rule.name == name)
+    return workloads.draw_workload(rule, 3, n_questions, proved_step, n_further, fast.next_collision)
+
+
+def points(workload, contenders):
+    found, troubles = measure.measure(workload, contenders, BRIEF, lambda _: None, [])
+    assert not troubles
+    return {point.contender: point for point in found}
+
+
+def fast_steps(table: str, n: int):
+    """Yield a scene, a state and the careful step's collision, of particles faster than the walls."""
+    for i in range(n):
+        stream = draws.Draw(f"baselines {table} {i}")
+        scene = draws.scene(stream, table, draws.clock(stream))
+        state, t_end = draws.state(stream, scene, {"speed": 2.0**12, "lift": 0.2 + 0.6 * stream.part()})
+        try:
+            met = fast.next_collision(scene, state, t_end)
+        except ValueError:  # the draw may lie outside
+            continue
+        if isinstance(met, Collision):
+            yield scene, state, met
+
+
+@pytest.mark.parametrize("table", ["cap", "stem", "mushroom"])
+def test_the_lean_steppers_know_every_table_and_law(engine, table):
+    counts: Counter[str] = Counter()
+    for scene, state, met in fast_steps(table, 150):
+        dt, t, x, y, vx, vy, wall = engine.hits(baselines.questions(scene, [state]))[0].tolist()
+        counts["asked"] += 1
+        counts["wrong"] += baselines.WALLS[int(wall)] != met.wall
+        if baselines.WALLS[int(wall)] == met.wall:
+            size, speed = math.hypot(met.x, met.y), math.hypot(met.vx, met.vy)
+            assert dt == pytest.approx(met.dt, rel=1e-9)
+            assert t == pytest.approx(met.t, rel=1e-12)
+            assert math.dist((x, y), (met.x, met.y)) <= 1e-9 * size
+            assert math.dist((vx, vy), (met.vx, met.vy)) <= 1e-9 * speed
+    assert counts["asked"] > 100
+    assert counts["wrong"] <= 1
+
+
+@pytest.mark.parametrize("row", [R, WIDTH, FACTOR, H, SLOPE])
+def test_a_law_that_is_misread_is_seen(engine, row):
+    scene = load("moving-cap")
+    assert isinstance(scene, Mushroom)
+    state = [State(0.5, 0.1, 0.3, 300.0, 500.0), State(0.5, 0.1, -0.3, 300.0, -500.0)]
+    state.append(State(0.5, 0.1, -0.3, 900.0, -100.0))
+    asked = baselines.questions(scene, [*state, State(0.5, 0.0, 0.4, 1000.0, -600.0)])
+    before = engine.hits(asked)
+    asked.laws[row, 2] *= 0.9
+    assert not np.array_equal(engine.hits(asked), before)
+
+
+@pytest.mark.parametrize("name", ["moving-cap-1e7", "two-harmonics", "moving-slope", "bang-bang"])
+def test_the_lean_ones_are_right_and_time_steps_are_not(library, name):
+    found = points(drawn(name, 300), [*baselines.in_c(library), baselines.in_numba()])
+    for lean in (found["lean C"], found["lean numba"]):
+        assert (lean.right, lean.wrong, lean.further, lean.astray) == (2, 0, 300, 0)
+        assert max(lean.relative) < 1e-13
+    steps = [found[f"steps, flight/{parts}"] for parts in baselines.PARTS]
+    assert steps[0].astray > 10
+    assert steps[0].astray > steps[1].astray >= steps[2].astray
+    assert all(point.further == 300 and min(point.ns) > 0 for point in steps)
+    assert min(min(point.relative, default=1.0) for point in steps) > 1e-6
+
+
+def test_no_checks_cost_walls_where_walls_are_fast_and_corners_near(library):
+    slow = points(drawn("slow", 300, 1), [*baselines.in_c(library), baselines.in_numba()])
+    assert slow["lean C"].astray > 3
+    assert slow["lean numba"].astray > 3
+    corner = points(drawn("near-corner", 100, 1), baselines.in_c(library))
+    assert corner["steps, flight/1000"].astray > 10
+
+
+def test_hard_cases_are_hard_without_checks(library):
+    askers = {c.name: baselines.asker(c) for c in baselines.in_c(library)[::3]}
+    cases = hard_cases.tabulate(askers, lambda _: None)
+    for name, least in (("lean C", 20), ("steps, flight/1000", 60)):
+        counts = sum((Counter(case.verdicts[name]) for case in cases), Counter())
+        assert set(counts) == {"right", "wrong"}
+        assert counts["right"] > 20
+        assert counts["wrong"] > least
+
+
+def test_one_path_is_followed_for_its_length(engine):
+    workload = drawn("moving-cap-1e4", 0)
+    asked = baselines.questions(workload.scene, [workload.questions[0].state])
+    assert engine.follow(asked, math.inf, 50, 3)[0] == 150
+    n_hits, seconds = engine.follow(asked, workload.end(100.0), 10_000, 1)
+    assert 50 < n_hits < 5000  # it may hop along the arc
+    assert 0 < seconds < 1
+
+
+def test_the_end_of_a_window_is_counted_in_flights():
+    workload = drawn("moving-cap-1e4", 0)
+    last = max(q.state.t for q in workload.questions)
+    assert workload.end(0.0) == last
+    assert 10 * (workload.end(100.0) - last) == pytest.approx(workload.end() - last)
+
+
+def test_a_particle_that_meets_nothing_is_told(engine):
+    rows = engine.hits(baselines.questions(load("fermi-ulam"), [State(0.0, 0.0, -0.5, 0.0, 0.0)]))
+    assert rows[0, 6] == 5
+    assert isinstance(baselines.in_numba().steps(load("fermi-ulam"), [State(0, 0, -0.5, 0, 0)])[0], Horizon)
+
+
+def test_further_steps_come_from_the_seed():
+    again = [drawn("grazing", 5).further for _ in range(2)]
+    assert again[0] == again[1]
+    assert len({step.state for step in again[0]}) == 5
+
+
+def test_without_a_compiler_the_reason_is_told(monkeypatch, tmp_path):
+    monkeypatch.setattr(baselines, "SOURCE", tmp_path / "absent.c")
+    with pytest.raises(Trouble, match="it does not compile" if baselines.shutil.which("cc") else "no C"):
+        baselines.build(tmp_path, [])
+    monkeypatch.setattr(baselines.shutil, "which", lambda _: None)
+    with pytest.raises(Trouble, match="no C compiler is installed"):
+        baselines.build(tmp_path, [])

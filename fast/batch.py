@@ -20,11 +20,12 @@ from fast.flow import follow_to
 from fast.kernel import codes, pools
 from fast.kernel.bounces import bounce, rebound
 from fast.kernel.entries import SOURCES
-from fast.kernel.follow import DISK, GENERAL, OFF, advance, correct, new_worker
+from fast.kernel.flights import OFF, advance, correct
 from fast.kernel.laws import set_anchors
 from fast.kernel.pools import whole_registers
 from fast.kernel.records import ANCHORS_SHAPE, FloatArray, Particle, unfilled_ends
 from fast.kernel.walls import wall_residual
+from fast.kernel.worker import DISK, GENERAL, new_worker
 from fast.pieces import laws_in_lanes
 from fast.starts import only_stop
 from fast.step import WALL_NAMES, as_arrays, fitted_start, followed_paths, trouble

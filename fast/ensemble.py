@@ -27,10 +27,10 @@ from fast.given import (
     given_threads,
 )
 from fast.kernel import codes, entries
-from fast.kernel.follow import new_worker
-from fast.kernel.records import FloatArray, Followed, IntArray, Stops, unfilled_ends
+from fast.kernel.records import FloatArray, Followed, IntArray, LawsInLanes, Stops, unfilled_ends
+from fast.kernel.worker import new_worker
 from fast.narrowings import narrowings
-from fast.pieces import LawsInLanes, laws_in_lanes
+from fast.pieces import laws_in_lanes
 from fast.starts import cycle_length, cycle_stops, initial_states, least_collisions
 from fast.units import Units, fit, inward
 from scene import Scene

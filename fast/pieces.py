@@ -1,15 +1,15 @@
 """A scene's laws cut into pieces, on each of which a short polynomial is as good as the law itself.
 
-Idea. On a half-leg between knots a bang-bang law is a parabola, exactly. A Fourier law differs from its Taylor
-polynomial of degree D, for times up to V before and after the reference time, by at most
-M(D + 1) V^(D + 1) / (D + 1)!, and its derivative by M(D + 1) V^D / D!, where M(j) = sum (k w)^j (|a_k| + |b_k|)
-bounds the law's derivative of order j. V is so short that the first is below 2^-54 of the law's least value, and
-the second below 2^-54 of M(1). A constant is its own polynomial.
+Idea. On a half-leg between knots a bang-bang law is a parabola, exactly. A Fourier law differs from its
+Taylor polynomial of degree D, for times up to V before and after the reference time, by at most
+M(D + 1) V^(D + 1) / (D + 1)!, and its derivative by M(D + 1) V^D / D!, where M(j) = sum (k w)^j (|a_k| +
+|b_k|) bounds the law's derivative of order j. V is so short that the first is below 2^-54 of the law's least
+value, and the second below 2^-54 of M(1). A constant is its own polynomial.
 
-The period is cut at every knot and in the middle of every leg, and then into pieces of length V: a piece serves
-flights that begin in its first half, and holds for all of it, so that flights up to V end in it. Where a law
-changes by more than half of itself in a piece (a radius that comes down to 1/1000 of its mean), the piece is
-halved again: else the rounding of the terms would be far more than that of their sum.
+The period is cut at every knot and in the middle of every leg, and then into pieces of length V: a piece
+serves flights that begin in its first half, and holds for all of it, so that flights up to V end in it. Where
+a law changes by more than half of itself in a piece (a radius that comes down to 1/1000 of its mean), the
+piece is halved again: else the rounding of the terms would be far more than that of their sum.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ from __future__ import annotations
 import math
 from fractions import Fraction
 from functools import lru_cache
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -26,9 +27,9 @@ from fast.kernel import entries
 from fast.kernel.arithmetic import MAX_QUADRANT
 
 from fast.kernel.records import (  # isort: skip
-    AMPLITUDES, BANG_BANG, CONSTANT, DEPTH, FOURIER, HIGHEST, KIND, KNOTS, LOWEST, N_HARMONICS, N_KNOTS, OMEGA,
-    OMEGA_LOW, LEVEL, PERIOD, PERIOD_LOW, RADIUS, SHARED, SLOPE, WIDTH, Compiled, FloatArray, LawsInLanes,
-    Pieces,
+    AMPLITUDES, BANG_BANG, CONSTANT, DEPTH, FOURIER, HIGHEST, KIND, KNOTS, LEVEL, LOWEST, N_HARMONICS,
+    N_KNOTS, OMEGA, OMEGA_LOW, PERIOD, PERIOD_LOW, RADIUS, SHARED, SLOPE, WIDTH, Compiled, FloatArray,
+    LawsInLanes, Pieces,
 )  # fmt: skip
 from scene import Cap, Scene
 
@@ -111,7 +112,7 @@ def pieces_of(compiled: Compiled, degree: int) -> Pieces | None:
     knots = sorted(_knots(laws, period, origin))
     edges = [Fraction(0), *knots, period]
     cuts: list[Cut] = []
-    for a, b in zip(edges, edges[1:], strict=False):
+    for a, b in pairwise(edges):
         n = 1 if longest == math.inf else math.ceil((b - a) / Fraction(longest))
         if len(cuts) + n > MAX_PIECES:
             return None
@@ -190,6 +191,6 @@ def _knots(laws: FloatArray, period: Fraction, origin: Fraction) -> set[Fraction
     for row in laws[:SHARED]:
         if row[KIND] == BANG_BANG:
             times = [Fraction(t) - origin for t in row[KNOTS : KNOTS + int(row[N_KNOTS])]]
-            middles = [(a + b) / 2 for a, b in zip(times, times[1:], strict=False)]
+            middles = [(a + b) / 2 for a, b in pairwise(times)]
             found |= {t % period for t in (*times, *middles)} - {Fraction(0)}
     return found

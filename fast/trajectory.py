@@ -8,15 +8,14 @@ import numpy as np
 
 from fast.given import MAX_STEPS, given_end
 from fast.kernel import codes, entries
-from fast.kernel.follow import new_worker
 from fast.kernel.records import FloatArray, unfilled_ends, unfilled_paths
+from fast.kernel.worker import new_worker
 from fast.pieces import laws_in_lanes
 from fast.starts import only_stop
 from fast.step import WALL_NAMES, as_arrays, check_state, trouble
 from fast.units import fit
 from scene import Horizon, Outcome, Scene, State, Wall
 from scene.refusal import check_count, check_scene
-
 
 NAMES = np.array([WALL_NAMES[code] for code in range(len(WALL_NAMES))], dtype=object)
 

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from fast.kernel.arithmetic import dot, fma
-from fast.kernel.compiling import kernel, widest_registers
+from fast.kernel.compiling import kernel, packed, widest_registers
 
 from fast.kernel.pools import (  # isort: skip
     CLOSED, DONE, H0, H1, H2, HIT, M0, M1, M2, NEVER, NEXT_H0, NEXT_H1, NEXT_H2, NEXT_M0, NEXT_M1,
-    NEXT_M2, NEXT_R0, NEXT_R1, NEXT_R2, NEXT_R3, NEXT_T, NEXT_T_LOW, NEXT_VX, NEXT_VY, NEXT_W0, NEXT_W1, NEXT_W2, NEXT_X, NEXT_X_LOW, NEXT_Y, NEXT_Y_LOW, N_ARC,
-    N_BASE, N_FLOOR, N_LEFT, N_RIGHT, ON_ARC, ON_BASE, ON_FLOOR, ON_LEFT, ON_RIGHT, R0, R1, R2, R3, SINCE, SPIN,
-    STAY_IN, STAY_OUT, T, T_LOW, UNTIL, VX, VY, W0, W1, W2, WALL, X, Y,
+    NEXT_M2, NEXT_R0, NEXT_R1, NEXT_R2, NEXT_R3, NEXT_T, NEXT_T_LOW, NEXT_VX, NEXT_VY, NEXT_W0, NEXT_W1,
+    NEXT_W2, NEXT_X, NEXT_X_LOW, NEXT_Y, NEXT_Y_LOW, N_ARC, N_BASE, N_FLOOR, N_LEFT, N_RIGHT, ON_ARC,
+    ON_BASE, ON_FLOOR, ON_LEFT, ON_RIGHT, R0, R1, R2, R3, SINCE, SPIN, STAY_IN, STAY_OUT, T, T_LOW, UNTIL,
+    VX, VY, W0, W1, W2, WALL, X, Y,
 )  # fmt: skip
 from fast.kernel.walls import off_the_arc, off_the_arc_spinning
 
@@ -29,6 +30,14 @@ def arrive(a, i, slope):
         a[M0 + i], a[M1 + i], a[M2 + i] = a[NEXT_M0 + i], a[NEXT_M1 + i], a[NEXT_M2 + i]
 
 
+@packed
+def off_the_side(sign, vx, vy, m, rate):
+    """Return the velocity after a hit on a side of slope m that moves out at a rate; sign is 1 on the right."""
+    inverse = 2.0 / fma(m, m, 1.0)
+    tilt, out = 0.5 * inverse * (m - 1.0) * (m + 1.0), sign * vx
+    return sign * fma(tilt, out, inverse * fma(m, vy, rate)), fma(inverse * m, out - rate, -tilt * vy)
+
+
 @kernel
 def bounce(a, n, slope, is_mushroom):
     """Bounce off the wall met, v - 2 f' grad f / |grad f|^2; count the hit; watch captured stays.
@@ -39,18 +48,13 @@ def bounce(a, n, slope, is_mushroom):
     widest_registers()
     for i in range(n):
         m = a[NEXT_M0 + i] if slope is None else slope
-        inverse = 2.0 / fma(m, m, 1.0)
-        tilt = 0.5 * inverse * (m - 1.0) * (m + 1.0)
         x, y, vx, vy, hit = a[NEXT_X + i], a[NEXT_Y + i], a[VX + i], a[VY + i], a[HIT + i]
         w = a[NEXT_W0 + i]
         off_x, off_y = off_the_arc(
             x, a[NEXT_X_LOW + i], y, a[NEXT_Y_LOW + i], vx, vy, a[NEXT_R0 + i], a[NEXT_R1 + i]
         )
-        sign = 1.0 if hit == ON_RIGHT else -1.0
-        out, rate = sign * vx, a[NEXT_W1 + i]
-        rate = fma(a[NEXT_M1 + i], y, rate) if slope is None else rate
-        vx_s = sign * fma(tilt, out, inverse * fma(m, vy, rate))
-        vy_s = fma(inverse * m, out - rate, -tilt * vy)
+        rate = fma(a[NEXT_M1 + i], y, a[NEXT_W1 + i]) if slope is None else a[NEXT_W1 + i]
+        vx_s, vy_s = off_the_side(1.0 if hit == ON_RIGHT else -1.0, vx, vy, m, rate)
         vx_s = vx if hit == ON_FLOOR else vx_s
         vy_s = -vy - 2.0 * a[NEXT_H1 + i] if hit == ON_FLOOR else vy_s
         vx_s = vx if hit == ON_BASE else vx_s

@@ -56,6 +56,6 @@ def _itself(array: Any) -> Any:
     return array
 
 
-# A view of an array that keeps no count of its references: one that is taken from a tuple is counted, and each
-# count is an atomic operation. Only for what a caller holds while the view is used.
+# A view of an array that keeps no count of its references: one that is taken from a tuple is counted, and
+# each count is an atomic operation. Only for what a caller holds while the view is used.
 borrowed = _itself if config.DISABLE_JIT else _compiled_borrowed

@@ -17,13 +17,14 @@ from numba import njit
 from fast.kernel.arithmetic import sine_cosine
 from fast.kernel.careful import first_step, step
 from fast.kernel.codes import HORIZON
-from fast.kernel.follow import follow, without_counts
+from fast.kernel.follow import follow
 from fast.kernel.laws import set_anchors
 from fast.kernel.path import follow_one
 from fast.kernel.pieces import fill_coefficients
 from fast.kernel.records import ANCHORS_SHAPE, particle_at, write_state, write_step
 from fast.kernel.refine import fine_path
 from fast.kernel.single import single_step, wall_gap
+from fast.kernel.worker import without_counts
 
 
 def digest_of_sources(folder: Path) -> str:

@@ -13,133 +13,25 @@ SINCE = UNTIL is that one, or the last that has passed while there is none.
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
 from fast.kernel.arithmetic import fma
+from fast.kernel.bounces import arrive, bounce, rebound
 from fast.kernel.careful import first_step
-from fast.kernel.codes import ARC, CAP, HORIZON, MUSHROOM, N_WALLS, STEM
-from fast.kernel.compiling import borrowed, kernel, part
+from fast.kernel.codes import ARC, CAP, HORIZON, MUSHROOM, N_WALLS
+from fast.kernel.compiling import kernel, part
+from fast.kernel.flights import OFF, advance, correct
 
 from fast.kernel.pools import (  # isort: skip
-    CERTAIN, CLOSED, COARSE, DONE, END, FAR, HIT, LANES, LAWS, N_COEFFICIENTS, NEVER, NEXT_R0, NEXT_W0, NEXT_T, NEXT_T_LOW, NEXT_VX,
-    NEXT_VY, NEXT_X, NEXT_Y, N_ARC, N_BASE, OK, REF, REF_LOW, ROUTINE, S, SINCE, SPIN, STAY_IN, STAY_OUT,
-    STOP, STRIDE, T, T_LOW, UNTIL, VX, VY, WALL, X, Y, change_lane, copy_rows, fold, load, POOL_SIZE, refold, set_laws,
-    set_reference, whole_registers,
+    CERTAIN, CLOSED, DONE, END, HIT, LANES, NEVER, NEXT_R0, NEXT_T, NEXT_T_LOW, NEXT_VX, NEXT_VY, NEXT_W0,
+    NEXT_X, NEXT_Y, N_ARC, N_BASE, OK, REF, REF_LOW, ROUTINE, S, SINCE, SPIN, STAY_IN, STAY_OUT, STOP, STRIDE,
+    T, T_LOW, UNTIL, VX, VY, WALL, X, Y, change_lane, fold, load, refold, set_laws, set_reference,
+    whole_registers,
 )  # fmt: skip
-from fast.kernel.bounces import arrive, bounce, rebound
-from fast.kernel.lanes import aim, chord, fly
-from fast.kernel.limits import LawLimits, limits_of
+from fast.kernel.records import RADIUS, VALUE, WIDTH, Particle, particle_at, write_state
+from fast.kernel.worker import DISK, GENERAL, NEXT_STOP, PARTICLE
 
-from fast.kernel.records import (  # isort: skip
-    ANCHORS_SHAPE, Compiled, FloatArray, Followed, IntArray, LawsInLanes, Particle, Pieces, RADIUS, Stops,
-    VALUE, WIDTH,
-    particle_at, write_state,
-)  # fmt: skip
-
-GENERAL, DISK, SPARE = np.arange(3)  # pools; SPARE is one to correct single lanes in
-# Rows of a roster: each lane's particle, the number of its next stop, and places for `correct`.
-PARTICLE, NEXT_STOP, SPARE_PLACES = np.arange(3)
 STAYS, MOVES, ENDS = 0, 1, 2
-MAX_CORRECTIONS = 3
-ON, OFF = np.bool_(True), np.bool_(False)
-
-
-class Worker(NamedTuple):
-    """What one thread needs to follow some particles.
-
-    Attributes:
-        scene, limits: the scene, and what holds of it for all time.
-        pieces: its laws as the lanes know them.
-        degree: see fast.kernel.pieces.law_at.
-        anchors: room for its laws at one time.
-        is_laned: the lanes may be used.
-        pools: (3, POOL_SIZE) general, disk and spare pool.
-        rosters: (2, 3, LANES) rosters of the first two pools.
-        n_held: (2,) number of lanes in use in each.
-        stops: when particles are looked at.
-        followed: what is filled in.
-    """
-
-    scene: Compiled
-    limits: LawLimits
-    pieces: Pieces
-    degree: tuple[int, ...]
-    anchors: FloatArray
-    is_laned: bool
-    pools: FloatArray
-    rosters: IntArray
-    n_held: IntArray
-    stops: Stops
-    followed: Followed
-
-
-def is_known_throughout(in_lanes: LawsInLanes, last: float) -> bool:
-    """Tell whether lanes know the laws up to a time; where there is no end `set_reference` looks each time."""
-    until = in_lanes.pieces.until
-    return until > 0.0 and (abs(last) < until or last == np.inf)
-
-
-def new_worker(in_lanes: LawsInLanes, stops: Stops, followed: Followed) -> Worker:
-    """Return a worker that holds no particle yet."""
-    return Worker(
-        in_lanes.compiled,
-        limits_of(in_lanes.compiled),
-        in_lanes.pieces,
-        in_lanes.degree,
-        np.zeros(ANCHORS_SHAPE),
-        is_known_throughout(in_lanes, float(stops.times[-1])),
-        np.zeros((3, POOL_SIZE)),
-        np.zeros((2, 3, LANES), np.int64),
-        np.zeros(2, np.int64),
-        stops,
-        followed,
-    )
-
-
-@kernel
-def without_counts(worker):
-    """Return a worker whose arrays count no references: see fast.kernel.compiling.borrowed."""
-    scene, pieces, stops, followed = worker.scene, worker.pieces, worker.stops, worker.followed
-    return Worker(
-        Compiled(scene.table, scene.is_relative, borrowed(scene.laws), borrowed(scene.bounds)),
-        worker.limits,
-        Pieces(
-            pieces.origin,
-            pieces.period,
-            pieces.period_low,
-            borrowed(pieces.begins),
-            borrowed(pieces.references),
-            borrowed(pieces.limits),
-            borrowed(pieces.serves),
-            borrowed(pieces.coefficients),
-            pieces.until,
-        ),
-        worker.degree,
-        borrowed(worker.anchors),
-        worker.is_laned,
-        borrowed(worker.pools),
-        borrowed(worker.rosters),
-        borrowed(worker.n_held),
-        Stops(
-            borrowed(stops.times),
-            borrowed(stops.columns),
-            borrowed(stops.cycles),
-            borrowed(stops.narrowings),
-            stops.is_first_kept,
-        ),
-        Followed(
-            borrowed(followed.states),
-            borrowed(followed.codes),
-            borrowed(followed.counts),
-            borrowed(followed.careful),
-            borrowed(followed.energies),
-            borrowed(followed.is_captured),
-            borrowed(followed.t_in),
-            borrowed(followed.t_out),
-        ),
-    )
 
 
 @part
@@ -242,62 +134,6 @@ def step_carefully(pool, a, i, roster, worker, slope):
         arrive(a, i, slope)
         a[VX + i], a[VY + i] = p.vx, p.vy
     return code
-
-
-@kernel
-def advance(pool, a, n, is_again, scene, slope, degree, limits):
-    """Find the next collision of the first n lanes of a pool.
-
-    Args:
-        pool: GENERAL, or DISK for lanes that move unfolded from arc to arc.
-        a: the pool's rows.
-        n: how many lanes, whole registers of them.
-        is_again: correct the times found before once more, in place of a new guess.
-        scene: the scene's numbers.
-        slope: of the sides, None where it moves; numba then compiles the loops with its rows.
-        degree: see fast.kernel.pieces.law_at.
-        limits: what holds of the scene's laws for all time.
-    """
-    table, is_relative = scene.table, scene.is_relative
-    if pool == DISK:
-        chord(a, n, is_again, table == CAP, is_relative, degree, limits)
-        return
-    if not is_again:
-        aim(a, n, table == STEM, slope, limits)
-    fly(a, n, table == STEM, is_relative, slope, degree, limits)
-
-
-@part
-def gather(a, n, spare, places, worker, slope):
-    """Copy the lanes that want another correction to a spare pool; returns how many, and notes their places.
-
-    One that flies beyond what its piece of the laws holds for is given the piece at its flight's end.
-    """
-    n_open = np.int64(0)
-    for i in range(n):
-        if not (a[OK + i] == COARSE or a[OK + i] == FAR) or a[END + i] == -NEVER:
-            continue
-        if a[OK + i] == FAR:
-            set_reference(a, i, a[T + i] + a[S + i], a[T_LOW + i], worker.scene, worker.pieces, worker.degree)
-        copy_rows(a, i, spare, n_open, 0, OK)
-        copy_rows(a, i, spare, n_open, LAWS, LAWS + (4 if slope is None else 3) * N_COEFFICIENTS * STRIDE)
-        places[n_open] = i
-        n_open += 1
-    return n_open
-
-
-@part
-def correct(pool, a, n, worker, slope):
-    """Correct times of flight that are not yet right a few times more, all lanes that want it side by side."""
-    spare, places = worker.pools[SPARE], worker.rosters[pool, SPARE_PLACES]
-    for _ in range(MAX_CORRECTIONS):
-        n_open = gather(a, n, spare, places, worker, slope)
-        if n_open == 0:
-            break
-        m = whole_registers(n_open)
-        advance(pool, spare, m, ON, worker.scene, slope, worker.degree, worker.limits)
-        for k in range(n_open):
-            copy_rows(spare, k, a, places[k], S, NEXT_VX)
 
 
 @kernel

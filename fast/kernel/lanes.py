@@ -23,11 +23,11 @@ from fast.kernel.arithmetic import SAFETY, fma, two_sum
 from fast.kernel.compiling import kernel, packed, part, widest_registers
 
 from fast.kernel.pools import (  # isort: skip
-    BACK, CERTAIN, CLOSED, COARSE, DEPTH_LAW, END, FAR, H0, H1, H2, HIT, LIMIT, M0, M1, M2, NEVER, NEXT_H0,
-    NEXT_H1, NEXT_H2, NEXT_M0, NEXT_M1, NEXT_M2, NEXT_R0, NEXT_R1, NEXT_R2, NEXT_R3, NEXT_T, NEXT_T_LOW, NEXT_W0,
-    NEXT_W1, NEXT_W2, NEXT_X, NEXT_X_LOW, NEXT_Y, NEXT_Y_LOW, OK, ON_ARC, ON_BASE, ON_FLOOR, ON_LEFT,
-    ON_RIGHT, R0, R1, R2, R3, RADIUS_LAW, REF, REFUSED, REF_LOW, ROUTINE, S, SLOPE_LAW, SPIN, STOP, STRIDE, SURE, T, T_LOW, VX, VY, W0, W1, W2,
-    WALL, X, Y, law_of, width_of,
+    BACK, CERTAIN, CLOSED, COARSE, DEPTH_LAW, END, FAR, H0, H1, H2, HIT, LIMIT, M0, M1, M2, NEVER,
+    NEXT_H0, NEXT_H1, NEXT_H2, NEXT_M0, NEXT_M1, NEXT_M2, NEXT_R0, NEXT_R1, NEXT_R2, NEXT_R3, NEXT_T,
+    NEXT_T_LOW, NEXT_W0, NEXT_W1, NEXT_W2, NEXT_X, NEXT_X_LOW, NEXT_Y, NEXT_Y_LOW, OK, ON_ARC, ON_BASE,
+    ON_FLOOR, ON_LEFT, ON_RIGHT, R0, R1, R2, R3, RADIUS_LAW, REF, REFUSED, REF_LOW, ROUTINE, S, SLOPE_LAW,
+    SPIN, STOP, STRIDE, SURE, T, T_LOW, VX, VY, W0, W1, W2, WALL, X, Y, law_of, width_of,
 )  # fmt: skip
 from fast.kernel.pieces import law_at, third_derivative
 from fast.kernel.short import moved, short_sum
@@ -86,7 +86,10 @@ def nearest_below(wall, f_r, d_r, f_l, d_l, f_f, d_f):
 
 @part
 def arc_quotient(x, y, vx, vy, wall, r0, r1, r2):
-    """Return the time to the arc, to second order in it, as a quotient f / d; and how fast f falls there, halved."""
+    """Return the time to the arc, to second order in it, as a quotient f / d.
+
+    And half of how fast f falls there.
+    """
     q, v2 = fma(x, vx, y * vy), fma(vx, vx, vy * vy)
     c = fma(-x, x, (r0 - y) * (r0 + y))
     c = 0.0 if wall == ON_ARC else c

@@ -1,4 +1,4 @@
-"""Following one particle collision by collision: the lanes' loops with one lane in use, else the careful step."""
+"""Following one particle from collision to collision, by the lanes' loops with one lane in use."""
 
 from __future__ import annotations
 
@@ -8,18 +8,20 @@ from fast.kernel.bounces import bounce
 from fast.kernel.careful import NEAR
 from fast.kernel.codes import HORIZON, MUSHROOM
 from fast.kernel.compiling import part
-from fast.kernel.follow import GENERAL, OFF, advance, correct, step_carefully
+from fast.kernel.flights import OFF, advance, correct
+from fast.kernel.follow import step_carefully
 
 from fast.kernel.pools import (  # isort: skip
-    CERTAIN, END, HIT, NEVER, NEXT_T, NEXT_T_LOW, NEXT_VX, NEXT_VY, NEXT_X, NEXT_Y, OK, REGISTER, S, T, T_LOW,
-    VX, VY, WALL, X, Y, load, set_reference,
+    CERTAIN, END, HIT, NEVER, NEXT_T, NEXT_T_LOW, NEXT_VX, NEXT_VY, NEXT_X, NEXT_Y, OK, REGISTER, S, T,
+    T_LOW, VX, VY, WALL, X, Y, load, set_reference,
 )  # fmt: skip
 from fast.kernel.records import Particle, particle_at, write_state, write_step
+from fast.kernel.worker import GENERAL, PARTICLE
 
 
 @part
 def next_hit(a, roster, worker, slope):
-    """Find the next collision of the particle in the first lane; returns its wall's code, or what comes instead.
+    """Find the next collision of the particle in the first lane; returns its wall, or what comes instead.
 
     The lanes' answer is taken unless the end may come before: there the careful step looks from both sides.
     """
@@ -38,11 +40,11 @@ def next_hit(a, roster, worker, slope):
 
 @part
 def follow_one(worker, walls, slope, paths):
-    """Follow each particle of a worker by itself through as many collisions as there is room for in `paths`."""
+    """Follow each particle of a worker by itself, through as many collisions as `paths` has room for."""
     states, a, roster = worker.followed.states, worker.pools[GENERAL], worker.rosters[GENERAL]
     for j in range(states.shape[0]):
         load(a, 0, particle_at(states, j, walls[j]), NEVER, OFF)
-        roster[0, 0] = j
+        roster[PARTICLE, 0] = j
         code, n = walls[j], 0
         while n < paths.walls.shape[1]:
             code = next_hit(a, roster, worker, slope)

@@ -1,7 +1,7 @@
 """A scene's laws as short polynomials about reference times: what the lanes know of them.
 
-One form for every law: a constant, a Fourier sum, a half-leg between knots, in any mixture. What the pieces are
-and why their polynomials may be trusted is said where they are cut, in fast.pieces.
+One form for every law: a constant, a Fourier sum, a half-leg between knots, in any mixture. What the pieces
+are and why their polynomials may be trusted is said where they are cut, in fast.pieces.
 """
 
 from __future__ import annotations
@@ -13,8 +13,8 @@ from fast.kernel.compiling import kernel, packed
 from fast.kernel.laws import bend_of_half_leg, set_anchors, time_since
 
 from fast.kernel.records import (  # isort: skip
-    AMPLITUDES, ANCHORS_SHAPE, BANG_BANG, COSINE, DEPTH, FOURIER, HALF_LEG, KIND, N_HARMONICS, OMEGA, PHASE,
-    RADIUS, RATE, SINE, SLOPE, VALUE, VALUE_LOW, WIDTH,
+    AMPLITUDES, ANCHORS_SHAPE, BANG_BANG, COSINE, DEPTH, FOURIER, HALF_LEG, KIND, N_HARMONICS, OMEGA,
+    PHASE, RADIUS, RATE, SINE, SLOPE, VALUE, VALUE_LOW, WIDTH,
 )  # fmt: skip
 
 

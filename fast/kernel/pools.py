@@ -14,21 +14,22 @@ from fast.kernel.pieces import law_at, piece_at, third_derivative
 from fast.kernel.records import CONSTANT, KIND, RADIUS
 
 LANES = 64  # all rows of a pool stay in the first-level cache
-# How far rows are apart. Were it a divisor of 4096 bytes, rows would meet in few sets of the cache, and a load
-# would wait for stores to rows whose addresses end alike.
+# How far rows are apart. Were it a divisor of 4096 bytes, rows would meet in few sets of the cache, and a
+# load would wait for stores to rows whose addresses end alike.
 STRIDE = 72
 NEVER = np.inf
 
 # Rows of a pool, in one flat array: constant strides let the loops vectorise.
 (
     T, T_LOW, X, Y, VX, VY, WALL,  # state at the last collision
-    R0, R1, R2, R3, W0, W1, W2, H0, H1, H2, M0, M1, M2,  # radius, half-width, depth, slope there, two derivatives
+    R0, R1, R2, R3, W0, W1, W2, H0, H1, H2, M0, M1, M2,  # radius, half-width, depth, slope; derivatives
     REF, REF_LOW, END, LIMIT, BACK,  # the laws' reference time, until when it serves; how far they hold
     STOP, CLOSED, SPIN,  # next time to look at the particle; end of a captured stay; angular momentum in one
     HIT, SURE, S,  # the step: wall, mouth, time
     OK, ROUTINE,  # is it right, and is nothing else to do
     NEXT_T, NEXT_T_LOW, NEXT_X, NEXT_X_LOW, NEXT_Y, NEXT_Y_LOW,  # state after it
-    NEXT_R0, NEXT_R1, NEXT_R2, NEXT_R3, NEXT_W0, NEXT_W1, NEXT_W2, NEXT_H0, NEXT_H1, NEXT_H2, NEXT_M0, NEXT_M1, NEXT_M2,
+    NEXT_R0, NEXT_R1, NEXT_R2, NEXT_R3, NEXT_W0, NEXT_W1, NEXT_W2, NEXT_H0, NEXT_H1, NEXT_H2,  # laws there
+    NEXT_M0, NEXT_M1, NEXT_M2,
     NEXT_VX, NEXT_VY, DONE,  # velocity after it where a careful step has found it
     SINCE, UNTIL, STAY_IN, STAY_OUT,  # a captured stay that spans an instant between is kept; begin and end
     N_ARC, N_BASE, N_LEFT, N_RIGHT, N_FLOOR,  # collisions so far

@@ -106,7 +106,7 @@ class LawsInLanes(NamedTuple):
     Attributes:
         compiled: the scene's numbers.
         pieces: its laws as polynomials.
-        degree: as many zeros as their degree: numba compiles the loops anew for each degree, and unrolls them.
+        degree: as many zeros as their degree: numba compiles the loops anew for each, and unrolls them.
         slope: of the sides; None where it moves.
     """
 

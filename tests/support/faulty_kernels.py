@@ -47,17 +47,19 @@ def output_of(folder: Path, program: str, file: str = "", old: str = "", new: st
     return done.stdout
 
 
-def faulty_lanes(old: str, new: str) -> ModuleType:
-    """Return fast.kernel.lanes with `old`, found in it, replaced, for pools that are lists of numbers.
+def faulty_lanes(*changes: str) -> ModuleType:
+    """Return fast.kernel.lanes with texts found in it replaced (old, new, old, new, ...), for pools that are lists of numbers.
 
     The loops run as plain Python, which takes less time than to compile them and gives the same bits; what
     they call that takes no pool is compiled, once for all faults.
     """
     path = HOUSE / "fast" / "kernel" / "lanes.py"
     source = path.read_text("utf-8")
-    assert old in source, old
+    for old, new in zip(changes[::2], changes[1::2], strict=True):
+        assert old in source, old
+        source = source.replace(old, new)
     module = ModuleType("faulty_lanes")
-    exec(compile(source.replace(old, new), str(path), "exec"), module.__dict__)
+    exec(compile(source, str(path), "exec"), module.__dict__)
     for name, found in (vars(pieces) | vars(pools)).items():
         vars(module).setdefault(name, found)
     names = module.__name__, pools.__name__, pieces.__name__

@@ -22,7 +22,7 @@ from mpmath import fp
 
 from fast.batch import LaneRound, as_particle, residual
 from fast.fine import fill_path
-from fast.kernel import codes, follow, lanes, pools
+from fast.kernel import codes, flights, lanes, pools
 from fast.kernel.records import DEPTH, RATE, FloatArray
 from scene import BangBang, Cap, Fourier, Law, Mushroom, Scene, Stem
 from scene.laws import value
@@ -83,7 +83,7 @@ class Round(LaneRound):
         return self.answers(n)
 
     def advance(self, a: list[float], count: int, *, is_again: bool) -> None:
-        """Call the loops of the kernels that `follow.advance` calls."""
+        """Call the loops of the kernels that `flights.advance` calls."""
         scene, is_stem = self.compiled, self.compiled.table == codes.STEM
         slope, degree, limits, k = self.in_lanes.slope, self.in_lanes.degree, self.worker.limits, self.kernels
         if self.is_disk:
@@ -94,9 +94,9 @@ class Round(LaneRound):
         k.fly(a, count, is_stem, scene.is_relative, slope, degree, limits)
 
     def correct_lane(self, a: list[float], i: int) -> None:
-        """Correct a step that is not yet right again, as `follow.correct` does."""
+        """Correct a step that is not yet right again, as `flights.correct` does."""
         k, known = self.kernels, (self.compiled, self.in_lanes.pieces, self.in_lanes.degree)
-        for _ in range(follow.MAX_CORRECTIONS):
+        for _ in range(flights.MAX_CORRECTIONS):
             if a[pools.OK + i] not in (pools.COARSE, pools.FAR):
                 break
             if a[pools.OK + i] == pools.FAR:

@@ -1,0 +1,115 @@
+"""What a thread holds while it follows particles: the scene, its pools, and what it fills in."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from fast.kernel.compiling import borrowed, kernel
+from fast.kernel.limits import LawLimits, limits_of
+from fast.kernel.pools import LANES, POOL_SIZE
+
+from fast.kernel.records import (  # isort: skip
+    ANCHORS_SHAPE, Compiled, FloatArray, Followed, IntArray, LawsInLanes, Pieces, Stops,
+)  # fmt: skip
+
+GENERAL, DISK, SPARE = np.arange(3)  # pools; SPARE is one to correct single lanes in
+# Rows of a roster: each lane's particle, the number of its next stop, and places for `correct`.
+PARTICLE, NEXT_STOP, SPARE_PLACES = np.arange(3)
+
+
+class Worker(NamedTuple):
+    """What one thread needs to follow some particles.
+
+    Attributes:
+        scene, limits: the scene, and what holds of it for all time.
+        pieces: its laws as the lanes know them.
+        degree: see fast.kernel.pieces.law_at.
+        anchors: room for its laws at one time.
+        is_laned: the lanes may be used.
+        pools: (3, POOL_SIZE) general, disk and spare pool.
+        rosters: (2, 3, LANES) rosters of the first two pools.
+        n_held: (2,) number of lanes in use in each.
+        stops: when particles are looked at.
+        followed: what is filled in.
+    """
+
+    scene: Compiled
+    limits: LawLimits
+    pieces: Pieces
+    degree: tuple[int, ...]
+    anchors: FloatArray
+    is_laned: bool
+    pools: FloatArray
+    rosters: IntArray
+    n_held: IntArray
+    stops: Stops
+    followed: Followed
+
+
+def is_known_throughout(in_lanes: LawsInLanes, last: float) -> bool:
+    """Tell whether lanes know the laws up to a time; with no end, `set_reference` looks each time."""
+    until = in_lanes.pieces.until
+    return until > 0.0 and (abs(last) < until or last == np.inf)
+
+
+def new_worker(in_lanes: LawsInLanes, stops: Stops, followed: Followed) -> Worker:
+    """Return a worker that holds no particle yet."""
+    return Worker(
+        in_lanes.compiled,
+        limits_of(in_lanes.compiled),
+        in_lanes.pieces,
+        in_lanes.degree,
+        np.zeros(ANCHORS_SHAPE),
+        is_known_throughout(in_lanes, float(stops.times[-1])),
+        np.zeros((3, POOL_SIZE)),
+        np.zeros((2, 3, LANES), np.int64),
+        np.zeros(2, np.int64),
+        stops,
+        followed,
+    )
+
+
+@kernel
+def without_counts(worker):
+    """Return a worker whose arrays count no references: see fast.kernel.compiling.borrowed."""
+    scene, pieces, stops, followed = worker.scene, worker.pieces, worker.stops, worker.followed
+    return Worker(
+        Compiled(scene.table, scene.is_relative, borrowed(scene.laws), borrowed(scene.bounds)),
+        worker.limits,
+        Pieces(
+            pieces.origin,
+            pieces.period,
+            pieces.period_low,
+            borrowed(pieces.begins),
+            borrowed(pieces.references),
+            borrowed(pieces.limits),
+            borrowed(pieces.serves),
+            borrowed(pieces.coefficients),
+            pieces.until,
+        ),
+        worker.degree,
+        borrowed(worker.anchors),
+        worker.is_laned,
+        borrowed(worker.pools),
+        borrowed(worker.rosters),
+        borrowed(worker.n_held),
+        Stops(
+            borrowed(stops.times),
+            borrowed(stops.columns),
+            borrowed(stops.cycles),
+            borrowed(stops.narrowings),
+            stops.is_first_kept,
+        ),
+        Followed(
+            borrowed(followed.states),
+            borrowed(followed.codes),
+            borrowed(followed.counts),
+            borrowed(followed.careful),
+            borrowed(followed.energies),
+            borrowed(followed.is_captured),
+            borrowed(followed.t_in),
+            borrowed(followed.t_out),
+        ),
+    )

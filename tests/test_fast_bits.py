@@ -21,7 +21,7 @@ from scene import State, load
 from scene.transforms import mirrored, mirrored_wall, scaled, scaled_state
 
 # Of `small_ensemble`. It changes when the arithmetic does, and then only on purpose.
-PINNED = "95c80293d83c6d8183bf29793ed99ada6565654795664fc25915abcc1795ad9c"
+PINNED = "62d0b19d4c83954582634d55a9a494ed46694a45a1b6823320cd62b9b0dd4e9f"
 
 
 def small_ensemble(threads: int | None = None) -> fast.Ensemble:

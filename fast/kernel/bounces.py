@@ -32,7 +32,7 @@ def arrive(a, i, slope):
 
 @packed
 def off_the_side(sign, vx, vy, m, rate):
-    """Return the velocity after a hit on a side of slope m that moves out at a rate; sign is 1 on the right."""
+    """Return the velocity after a hit on a side of slope m moving out at a rate; sign is 1 on the right."""
     inverse = 2.0 / fma(m, m, 1.0)
     tilt, out = 0.5 * inverse * (m - 1.0) * (m + 1.0), sign * vx
     return sign * fma(tilt, out, inverse * fma(m, vy, rate)), fma(inverse * m, out - rate, -tilt * vy)

@@ -48,7 +48,7 @@ def output_of(folder: Path, program: str, file: str = "", old: str = "", new: st
 
 
 def faulty_lanes(*changes: str) -> ModuleType:
-    """Return fast.kernel.lanes with texts found in it replaced (old, new, old, new, ...), for pools that are lists of numbers.
+    """Return fast.kernel.lanes with texts in it replaced (old, new, old, new, ...); pools are lists there.
 
     The loops run as plain Python, which takes less time than to compile them and gives the same bits; what
     they call that takes no pool is compiled, once for all faults.

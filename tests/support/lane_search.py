@@ -310,7 +310,6 @@ def draw_scene(random: np.random.Generator) -> Scene:
     lean = float(random.choice([0.0, random.uniform(-0.4, 0.4)]))
 
     def slope(size: float) -> Law:
-        # It moves in half of the scenes, about any of its values.
         return law(*sorted((lean * size, -0.4 * size))) if random.random() < 0.5 else lean * size
 
     if table < 0.25:
@@ -385,7 +384,7 @@ def _mouth(scene: Scene, t: float) -> tuple[float, float]:
 
 
 def _a_time(scene: Scene, random: np.random.Generator) -> float:
-    # Half of the starts are a little before the least radius.
+    """Draw a time, half of them a little before the least radius."""
     r = getattr(scene, "r", None)
     if isinstance(r, Fourier) and random.random() < 0.5:
         least = np.arctan2(-r.sin[0], -r.cos[0]) + random.normal() * 10.0 ** random.uniform(-3, 0)

@@ -27,7 +27,15 @@ from fast.given import (
     given_threads,
 )
 from fast.kernel import codes, entries
-from fast.kernel.records import FloatArray, Followed, IntArray, LawsInLanes, Stops, unfilled_ends
+from fast.kernel.records import (
+    FloatArray,
+    Followed,
+    IntArray,
+    LawsInLanes,
+    Stops,
+    unfilled_ends,
+    unfilled_paths,
+)
 from fast.kernel.worker import new_worker
 from fast.narrowings import narrowings
 from fast.pieces import laws_in_lanes
@@ -38,6 +46,7 @@ from scene.refusal import BadInput, check_count, check_scene
 
 FOLLOWED, UNDECIDED, UNDEFINED, REJECTED = 0, 1, 2, 3
 MAX_COLLISIONS = 10**9  # of one particle, a minute of work
+NO_PATHS = unfilled_paths(0, 0)
 SHARE = 256  # particles a worker takes at a time: several times what it holds at once
 
 
@@ -249,7 +258,7 @@ def follow(
     def work(first: int) -> None:
         part = slice(first, first + size)
         worker = new_worker(in_lanes, stops, followed.part(part))
-        entries.follow_particles(worker, walls[part], in_lanes.slope)
+        entries.follow_particles(worker, walls[part], in_lanes.slope, NO_PATHS)
 
     work(n)  # none at all: compiles, or loads from the disk cache, so that `seconds` holds work alone
     begin = time.perf_counter()

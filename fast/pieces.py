@@ -33,9 +33,7 @@ from fast.kernel.records import (  # isort: skip
 )  # fmt: skip
 from scene import Cap, Scene
 
-# Of parabolas; of laws whose period takes few pieces so; of all others.
-DEGREES = (2, 10, 14)
-FEW = 64
+PARABOLA, SERIES = 2, 12  # degrees; with one of the latter a harmonic takes 27 pieces
 MAX_PIECES = 2**15
 REMAINDER = 2.0**-54
 FIXED = Cap(r=1.0)
@@ -53,7 +51,7 @@ class Cut(NamedTuple):
 def laws_in_lanes(scene: Scene) -> LawsInLanes:
     """Return a scene, which is in the kernel's units, as the lanes know it."""
     compiled = compile_scene(scene)
-    degree = degree_for(compiled)
+    degree = SERIES if (compiled.laws[:SHARED, KIND] == FOURIER).any() else PARABOLA
     pieces = pieces_of(compiled, degree)
     if pieces is None:
         none = pieces_of(compile_scene(FIXED), degree)
@@ -62,15 +60,6 @@ def laws_in_lanes(scene: Scene) -> LawsInLanes:
     moves = compiled.laws[SLOPE, KIND] != CONSTANT
     slope = None if moves else float(compiled.laws[SLOPE, LEVEL])
     return LawsInLanes(compiled, pieces, (0,) * degree, slope)
-
-
-def degree_for(compiled: Compiled) -> int:
-    """Return the degree of the polynomials: no higher than it takes, for every power costs time."""
-    if not (compiled.laws[:SHARED, KIND] == FOURIER).any():
-        return DEGREES[0]
-    period, _ = period_of(compiled.laws)
-    assert period is not None
-    return DEGREES[1] if FEW * reach(compiled, DEGREES[1]) > period else DEGREES[2]
 
 
 def reach(compiled: Compiled, degree: int) -> float:

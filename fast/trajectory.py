@@ -59,7 +59,8 @@ def trajectory(scene: Scene, state: State, n_collisions: int, t_end: float = np.
     paths = unfilled_paths(1, n_collisions)
     in_lanes = laws_in_lanes(fit(scene).scene)
     worker = new_worker(in_lanes, only_stop(start.units.horizon(t_end)), unfilled_ends(rows, 1, (1, 1)))
-    entries.follow_paths(worker, walls, in_lanes.slope, paths)
+    if n_collisions:
+        entries.follow_particles(worker, walls, in_lanes.slope, paths)
     n, code = paths.counts.item(), paths.codes.item()
     steps = start.units.steps(paths.steps[0, :n])
     walls = NAMES[paths.walls[0, :n]].tolist()

@@ -17,7 +17,7 @@ from support.lane_search import Round, try_starts
 import fast
 from fast.kernel import bounces, lanes, pools
 from fast.kernel.limits import LawLimits
-from fast.pieces import DEGREES
+from fast.pieces import PARABOLA, SERIES
 from fast.starts import initial_states
 from fast.step import WALL_CODES
 from scene import Cap, State, load
@@ -27,7 +27,7 @@ OFF = np.bool_(False)
 
 
 @pytest.mark.parametrize("slope", [0.1, None])
-@pytest.mark.parametrize("degree", DEGREES)
+@pytest.mark.parametrize("degree", [PARABOLA, SERIES])
 @pytest.mark.parametrize("loop", ["aim", "fly", "bounce", "chord", "rebound"])
 def test_the_compiler_packs_divisions_and_square_roots(loop, degree, slope):
     """Eight lanes to an instruction, where the machine has 512-bit registers, or four of 256."""

@@ -12,7 +12,7 @@ from conformance.strategies import scenes
 from fast import pieces
 from fast.compiled import compile_scene
 from fast.kernel.pieces import law_at, piece_at
-from fast.pieces import DEGREES, laws_in_lanes
+from fast.pieces import PARABOLA, SERIES, laws_in_lanes
 from fast.units import fit
 from scene import BangBang, Cap, Fourier, Mushroom, Stem
 from scene.laws import bounds, value
@@ -112,14 +112,13 @@ def test_every_flight_that_begins_in_a_piece_has_room_there():
 
 
 def test_degrees_are_no_higher_than_it_takes():
-    assert len(laws_in_lanes(DEEP[4]).degree) == DEGREES[0]
-    assert len(laws_in_lanes(Cap(r=Fourier(1.0, 1.0, (0.1,)))).degree) == DEGREES[1]
-    assert len(laws_in_lanes(DEEP[1]).degree) == DEGREES[2]
+    assert [len(laws_in_lanes(scene).degree) for scene in DEEP] == [SERIES] * 4 + [PARABOLA]
+    assert len(laws_in_lanes(Cap(r=Fourier(1.0, 1.0, (0.1,)))).pieces.begins) == 27
 
 
 def test_laws_that_take_too_many_pieces_are_left_to_careful_steps(monkeypatch):
     monkeypatch.setattr(pieces, "MAX_PIECES", 8)
-    assert pieces.pieces_of(compile_scene(DEEP[0]), DEGREES[1]) is None
+    assert pieces.pieces_of(compile_scene(DEEP[0]), SERIES) is None
     laws_in_lanes.cache_clear()
     try:
         assert laws_in_lanes(DEEP[0]).pieces.until < 0.0

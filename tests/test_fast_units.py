@@ -110,6 +110,6 @@ def test_fourier_laws_given_by_their_period_share_a_scene_with_knots(tally):
 
 
 def test_lanes_take_scenes_of_both_kinds_of_laws():
-    scene = replace(MIXED, nu=Fourier(0.5, sin=(0.2,), period=1.0))  # lanes know one harmonic
+    scene = replace(MIXED, nu=Fourier(0.5, sin=(0.2,), period=1.0))
     run = fast.simulate(scene, n_particles=20, energy=1e5, seed=1)
     assert run.n_careful.sum() < 0.05 * run.n_collisions.sum()

@@ -76,22 +76,19 @@ def _fine(sources):
 
 def _follow(sources):
     @njit(cache=True, nogil=True, error_model="numpy")
-    def follow_particles(worker, walls, slope):
-        """Follow particles to the last stop: see fast.kernel.follow. Threads may call it side by side."""
+    def follow_particles(worker, walls, slope, paths):
+        """Follow particles to the last stop, or where `paths` has room from collision to collision.
+
+        See fast.kernel.follow and fast.kernel.path; one entry, for half a minute is compiled once for both.
+        Threads may call it side by side.
+        """
         sources  # noqa: B018
-        follow(without_counts(worker), walls, slope)
+        if paths.walls.shape[1] > 0:
+            follow_one(without_counts(worker), walls, slope, paths)
+        else:
+            follow(without_counts(worker), walls, slope)
 
     return follow_particles
-
-
-def _follow_one(sources):
-    @njit(cache=True, nogil=True, error_model="numpy")
-    def follow_paths(worker, walls, slope, paths):
-        """Follow particles one by one, collision by collision: see fast.kernel.path."""
-        sources  # noqa: B018
-        follow_one(without_counts(worker), walls, slope, paths)
-
-    return follow_paths
 
 
 def _fill_pieces(sources):
@@ -145,7 +142,6 @@ def _directions(sources):
 careful = _careful(SOURCES)
 fine = _fine(SOURCES)
 follow_particles = _follow(SOURCES)
-follow_paths = _follow_one(SOURCES)
 fill_pieces = _fill_pieces(SOURCES)
 single = _single(SOURCES)
 gap = _gap(SOURCES)

@@ -38,19 +38,16 @@ def law_at(a, place, stride, u, u_before, degree):
         stride: how far they are apart.
         u: time since the reference.
         u_before: another one.
-        degree: a tuple as long as the degree, one of fast.pieces.DEGREES. The compiler knows its length, and
-            keeps those steps that there are; a loop inside a loop over lanes would not be packed.
+        degree: a tuple as long as the degree, fast.pieces.PARABOLA or SERIES. The compiler knows its length
+            and keeps those steps that there are; a loop inside a loop over lanes would not be packed.
     """
     n = len(degree)
     rate = a[place + (n + 1) * stride]
     rise = fma(rate, u, a[place + n * stride])
     p = (0.0, rate, fma(rate, u_before, rise), rise)
-    if n > 10:
-        p = one_power(*p, u, u_before, a[place + (n - 1) * stride])
-        p = one_power(*p, u, u_before, a[place + (n - 2) * stride])
-        p = one_power(*p, u, u_before, a[place + (n - 3) * stride])
-        p = one_power(*p, u, u_before, a[place + (n - 4) * stride])
-    if n > 2:
+    if n == 12:
+        p = one_power(*p, u, u_before, a[place + 11 * stride])
+        p = one_power(*p, u, u_before, a[place + 10 * stride])
         p = one_power(*p, u, u_before, a[place + 9 * stride])
         p = one_power(*p, u, u_before, a[place + 8 * stride])
         p = one_power(*p, u, u_before, a[place + 7 * stride])

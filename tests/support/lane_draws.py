@@ -20,7 +20,7 @@ from scene.tables import laws, width_factors
 Array = npt.NDArray[np.floating[Any]]
 Start = tuple[Array, int]
 N_CROWD, N_INSTANTS = 1500, 96
-LOOK_AHEAD = 0.25  # phase, as in lanes.LONGEST_TURN
+LOOK_AHEAD = 0.25  # phase
 
 
 class Numbers(NamedTuple):

@@ -21,7 +21,7 @@ from scene.laws import value
 Array = npt.NDArray[np.floating[Any]]
 Start = tuple[Array, int]
 N_CROWD = 4_000
-REACH = 0.24  # phase, below lanes.LONGEST_TURN
+REACH = 0.24  # phase
 
 
 class Trap(NamedTuple):

@@ -147,7 +147,8 @@ def simulate(
         seed: 0 <= seed < 2^64.
         threads: how many to use, by default one for each core.
         phases: (P,) fractions of each cycle at which energies are wanted, rising, in (0, 1).
-        progress: called with the number of particles done so far, again and again.
+        progress: called with the number of particles done so far, again and again: first with 0, when all
+            is checked and compiled.
 
     Raises:
         BadInput: naming field, value and bound.
@@ -243,6 +244,8 @@ def follow(
         entries.follow_particles(new_worker(compiled, stops, followed.part(part)), walls[part], omegas)
 
     work(n)  # none at all: compiles, or loads from the disk cache, so that `seconds` holds work alone
+    if progress:
+        progress(0)
     begin = time.perf_counter()
     with ThreadPoolExecutor(threads) as pool:
         try:

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 from mpmath import fp
 
 from fast.batch import flights
+from fast.ensemble import SHARE
 from fast.narrowings import start_time
 from fast.starts import cycle_length, initial_states
 from scene import Cap, Mushroom, Scene, State, Stem
@@ -19,7 +20,6 @@ SLOWEST = 1e-5  # seconds that a collision may take: a run that is short at this
 PILOTS = (10**4, 10**5, 10**6)  # collisions; each is flown if the one before was too short to be timed
 PILOT_SHARE = 0.02  # of a run's collisions that a second or third pilot may take
 TIMED = 0.1  # seconds that a pilot must last to be believed: short ones are mostly beginnings and ends
-AT_ONCE = 256  # particles that a worker takes at a time
 STEEPEST = 1.25  # growth of the mean speed in a cycle that is not expected: the catalogue's greatest is 1.16
 MOST_CYCLES = 300  # after which particles that grow faster stay fast enough for any run never to end
 CAREFUL_COST = 50  # collisions in lanes that take as long as one careful step, measured at 40 to 80
@@ -48,7 +48,7 @@ def forecast(
 
     A pilot, some of the particles for a short time, says what a collision takes.
     """
-    workers, n_together = min(threads, n_particles), min(AT_ONCE, math.ceil(n_particles / threads))
+    workers, n_together = min(threads, n_particles), min(SHARE, math.ceil(n_particles / threads))
     is_mushroom = isinstance(scene, Mushroom)
     most_cycles = n_cycles * (STEEPEST ** min(n_cycles, MOST_CYCLES) if is_mushroom and n_cycles > 1 else 1.0)
     try:

@@ -11,7 +11,7 @@ from rich import progress
 from rich.console import Console
 
 # The compiled functions that a person waits for, and how long; the others take a second or two.
-SLOW_TO_COMPILE = {"follow_particles": "about half a minute", "fine": "about ten seconds"}
+SLOW_TO_COMPILE = {"follow_particles": "half a minute to a minute", "fine": "about ten seconds"}
 
 
 @contextmanager

@@ -156,7 +156,8 @@ def simulate(
         seed: 0 <= seed < 2^64.
         threads: how many to use, by default one for each core.
         phases: (P,) fractions of each cycle at which energies are wanted, rising, in (0, 1).
-        progress: called with the number of particles done so far, again and again.
+        progress: called with the number of particles done so far, again and again: first with 0, when all
+            is checked and compiled.
 
     Raises:
         BadInput: naming field, value and bound.
@@ -261,6 +262,8 @@ def follow(
         entries.follow_particles(worker, walls[part], in_lanes.slope, NO_PATHS)
 
     work(n)  # none at all: compiles, or loads from the disk cache, so that `seconds` holds work alone
+    if progress:
+        progress(0)
     begin = time.perf_counter()
     with ThreadPoolExecutor(threads) as pool:
         try:

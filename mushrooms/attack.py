@@ -11,7 +11,7 @@ from rich.console import Console
 from rich.table import Table
 
 from mushrooms import output
-from mushrooms.terminal import progress_bar
+from mushrooms.terminal import compilation_told, progress_bar
 from scene.files import write_file
 from scene.refusal import BadInput, check_count, check_seed
 
@@ -52,7 +52,7 @@ def attack(
         output.check_file(json_file, (".json",))
     from mushrooms.attack_steppers import steppers
 
-    with progress_bar() as bar:
+    with compilation_told(), progress_bar() as bar:
         task = bar.add_task("attack", total=cases * len(names))
         tallies = attacks.run(
             [attacks.FAMILIES[name] for name in names],

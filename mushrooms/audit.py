@@ -11,7 +11,7 @@ import typer
 from rich import progress
 
 from mushrooms import output
-from mushrooms.terminal import progress_bar
+from mushrooms.terminal import compilation_told, progress_bar
 from scene.files import write_files
 from scene.refusal import BadInput, check_seed
 
@@ -46,7 +46,7 @@ def audit(
         settings = AuditSettings(
             "full" if full else "quick", seed, threads, folder / "parts", resume, apart=True
         )
-        with progress_bar() as bar:
+        with compilation_told(), progress_bar() as bar:
             result = conduct(
                 AuditSteppers(fast.simulate, fast.trajectory),
                 settings,

@@ -17,7 +17,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from mushrooms import output
-from mushrooms.terminal import progress_bar
+from mushrooms.terminal import compilation_told, progress_bar
 from scene.files import Writer, write_files
 from scene.refusal import BadInput, check_seed
 
@@ -63,7 +63,7 @@ def bench(
     old = record.read(compare) if compare is not None else None
     if old is not None:
         comparison.check_alike(old, size, seed, QUESTIONS[size])
-    with output.writable_folder(out) as folder:
+    with output.writable_folder(out) as folder, compilation_told():
         found = _measured(size, seed, command or [])
         picture = figures_of_speed.speed(found)
         files: dict[str, bytes | str | Writer] = {

@@ -21,7 +21,7 @@ from mushrooms.attack import attack
 from mushrooms.audit import audit
 from mushrooms.bench import bench
 from mushrooms.check import check
-from mushrooms.terminal import progress_bar
+from mushrooms.terminal import compilation_told, progress_bar
 from scene.files import write_file, write_files
 from scene.load import read_data
 from scene.refusal import BadInput, check_seed
@@ -149,9 +149,13 @@ def simulate(
     """Simulate an ensemble; undecided particles are counted, never guessed.
 
     Prints particles, collisions, lost (not followed to the end), undecided (those of the lost
-    that the stepper could not decide), m1 (mean of log E/E0 per cycle) with its standard error, p_nc
-    (share of cycles without capture), ns_per_collision (and thread) and the SHA-256 of the result.
+    that the stepper could not decide), careful (collisions found by the careful step, some fifty times
+    slower), m1 (mean of log E/E0 per cycle) with its standard error, p_nc (share of cycles without
+    capture), ns_per_collision (and thread) and the SHA-256 of the result.
     Particles that no cycle ever frees from the island count neither in m1 nor in p_nc.
+
+    On stderr: before a run of over 20 s about how many collisions and how long; after a run of over a
+    second that careful steps took over a tenth of it, if they did.
     """
     if not (math.isfinite(energy) and energy > 0):
         raise BadInput(f"--energy = {energy}, must be finite and > 0")
@@ -164,19 +168,8 @@ def simulate(
     with output.writable_folder(out) if out else nullcontext() as folder:
         import numpy as np
 
-        import fast
-
-        with progress_bar() as bar:
-            task = bar.add_task(table.name or scene, total=particles)
-            ensemble = fast.simulate(
-                table,
-                n_particles=particles,
-                energy=energy,
-                n_cycles=cycles,
-                seed=seed,
-                threads=threads,
-                progress=lambda n_done: bar.update(task, completed=n_done),
-            )
+        asked = {"n_particles": particles, "energy": energy, "n_cycles": cycles, "seed": seed}
+        ensemble = _simulated(table, table.name or scene, threads, **asked)
         summary = _summary(table, ensemble, cycles)
         if folder is not None:
             fields = {k: v for k, v in ensemble._asdict().items() if k not in ("seconds", "threads")}
@@ -187,6 +180,30 @@ def simulate(
                 folder, {"ensemble.npz": lambda file: np.savez(file, **fields), "summary.json": text + "\n"}
             )
     _print_pairs(summary, as_json)
+
+
+def _simulated(table: scenes.Scene, name: str, threads: int | None, **asked: Any) -> Any:
+    """Return the ensemble; stderr says what to expect of a long run, and which steps slowed it."""
+    import fast
+    from mushrooms.forecast import careful_note, forecast
+
+    with compilation_told(), progress_bar() as bar:
+        task = bar.add_task(name, total=asked["n_particles"])
+
+        def advance(n_done: int) -> None:
+            if n_done == 0:  # what was asked for has been accepted, and the stepper compiled
+                n_threads = threads or os.cpu_count() or 1
+                ahead = forecast(table, threads=n_threads, **asked)
+                if ahead is not None:
+                    print(ahead.text(n_threads), file=sys.stderr, flush=True)
+            bar.update(task, completed=n_done)
+
+        ensemble = fast.simulate(table, threads=threads, progress=advance, **asked)
+    n_careful, n_collisions = int(ensemble.n_careful.sum()), int(ensemble.n_collisions.sum())
+    note = careful_note(n_careful, n_collisions, ensemble.seconds)
+    if note is not None:
+        print(note, file=sys.stderr)
+    return ensemble
 
 
 def _summary(table: scenes.Scene, ensemble: Any, n_cycles: int) -> dict[str, Any]:
@@ -201,6 +218,7 @@ def _summary(table: scenes.Scene, ensemble: Any, n_cycles: int) -> dict[str, Any
         "collisions": int(ensemble.n_collisions.sum()),
         "lost": len(ensemble.energy) - n_followed,
         "undecided": int((ensemble.outcome == 1).sum()),
+        "careful": int(ensemble.n_careful.sum()),
         "m1": _finite(gain.mean()) if n else None,
         "m1_se": _finite(gain.std(ddof=1) / math.sqrt(n)) if n > 1 else None,
         "p_nc": float(ensemble.p_nc().mean()) if n and has_island else None,

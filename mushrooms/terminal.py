@@ -1,9 +1,37 @@
-"""The progress bar that commands show on a terminal while they work."""
+"""What commands show while they work: a progress bar on a terminal, and what they wait for."""
 
 from __future__ import annotations
 
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
 from rich import progress
 from rich.console import Console
+
+# The compiled functions that a person waits for, and how long; the others take a second or two.
+SLOW_TO_COMPILE = {"follow_particles": "half a minute to a minute", "fine": "about ten seconds"}
+
+
+@contextmanager
+def compilation_told() -> Iterator[None]:
+    """Say on stderr when the fast stepper is compiled: numba tells so when it has found nothing kept."""
+    from numba.core import event
+
+    class Teller(event.Listener):  # type: ignore[misc]  # numba has no types
+        def on_start(self, told: Any) -> None:
+            compiled = told.data["dispatcher"]
+            duration = SLOW_TO_COMPILE.get(compiled.py_func.__name__)
+            if duration is not None and compiled.stats.cache_path:
+                what = f"compiling the fast stepper for this machine ({compiled.py_func.__name__})"
+                print(f"{what}: {duration}; kept for next time", file=sys.stderr, flush=True)
+
+        def on_end(self, told: Any) -> None:
+            pass
+
+    with event.install_listener("numba:compile", Teller()):
+        yield
 
 
 def progress_bar() -> progress.Progress:

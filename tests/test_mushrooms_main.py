@@ -174,11 +174,13 @@ def test_theory_prints_decimal_strings(call):
 
 def test_simulate_prints_and_saves_the_same_result(call, tmp_path):
     command = ["simulate", "moving-cap", "--particles", 40, "--energy", 1e4, "--seed", 7, "--json"]
+    call(*command)  # compiles, which stderr tells of, unless that is done
     code, out, err = call(*command, "--out", tmp_path / "run")
     assert (code, err) == (0, "")
     summary = json.loads(out)
     assert list(summary) == [
-        "particles", "collisions", "lost", "undecided", "m1", "m1_se", "p_nc", "ns_per_collision", "sha256",
+        "particles", "collisions", "lost", "undecided", "careful", "m1", "m1_se", "p_nc", "ns_per_collision",
+        "sha256",
     ]  # fmt: skip
     assert sorted(entry.name for entry in (tmp_path / "run").iterdir()) == ["ensemble.npz", "summary.json"]
     saved = json.loads((tmp_path / "run" / "summary.json").read_text())
@@ -189,6 +191,7 @@ def test_simulate_prints_and_saves_the_same_result(call, tmp_path):
         assert arrays["energy"].shape == (40,)
         assert np.log(arrays["energy"] / arrays["energy0"]).mean() == pytest.approx(summary["m1"], rel=1e-12)
         assert arrays["n_collisions"].sum() == summary["collisions"]
+        assert arrays["n_careful"].sum() == summary["careful"] > 0
     again = json.loads(call(*command, "--threads", 1)[1])
     assert again["sha256"] == summary["sha256"]
 

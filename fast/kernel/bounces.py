@@ -17,7 +17,7 @@ from fast.kernel.walls import off_the_arc, off_the_arc_spinning
 CLEARLY_CAPTURED = 1.05  # |L| over w v from which a particle moves to the disk's pool
 
 
-@kernel
+@packed
 def arrive(a, i, slope):
     """Take the laws and the place at the collision as the present ones."""
     a[T + i], a[T_LOW + i] = a[NEXT_T + i], a[NEXT_T_LOW + i]

@@ -132,6 +132,19 @@ def time_since(knot, n_periods, period, period_low, t_hi, t_lo):
 
 
 @kernel
+def whole_periods(first, period, period_low, t_hi, t_lo):
+    """Return how many whole periods lie between `first` and t, and the time since the last of them."""
+    n_periods = np.floor((t_hi - first) / period)
+    tau, _ = time_since(first, n_periods, period, period_low, t_hi, t_lo)
+    if tau < 0.0:
+        n_periods -= 1.0
+    elif tau >= period + period_low:
+        n_periods += 1.0
+    tau, _ = time_since(first, n_periods, period, period_low, t_hi, t_lo)
+    return n_periods, tau
+
+
+@kernel
 def on_parabola(value, a, a_low, u, u_low):
     """Return value + a u^2 / 2 as a sum of two floats, and a u."""
     p, p_low = two_product(u, u)
@@ -146,15 +159,9 @@ def set_leg(laws, anchors, row, t_hi, t_lo):
     n = int(laws[row, N_KNOTS])
     period, period_low = laws[row, PERIOD], laws[row, PERIOD_LOW]
     first = laws[row, KNOTS]
-    n_periods = np.floor((t_hi - first) / period)
+    n_periods, _ = whole_periods(first, period, period_low, t_hi, t_lo)
     if not abs(n_periods) < MAX_QUADRANT:
         return False
-    tau, _ = time_since(first, n_periods, period, period_low, t_hi, t_lo)
-    if tau < 0.0:
-        n_periods -= 1.0
-    elif tau >= period + period_low:
-        n_periods += 1.0
-    tau, _ = time_since(first, n_periods, period, period_low, t_hi, t_lo)
     i = 0
     while i < n - 2:
         since_next, _ = time_since(laws[row, KNOTS + i + 1], n_periods, period, period_low, t_hi, t_lo)

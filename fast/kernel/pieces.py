@@ -10,7 +10,7 @@ import numpy as np
 
 from fast.kernel.arithmetic import fma, two_product, two_sum
 from fast.kernel.compiling import kernel, packed
-from fast.kernel.laws import bend_of_half_leg, set_anchors, time_since
+from fast.kernel.laws import bend_of_half_leg, set_anchors, whole_periods
 
 from fast.kernel.records import (  # isort: skip
     AMPLITUDES, ANCHORS_SHAPE, BANG_BANG, COSINE, DEPTH, FOURIER, HALF_LEG, KIND, N_HARMONICS, OMEGA,
@@ -76,13 +76,7 @@ def piece_at(pieces, t, t_low):
     if not pieces.period < np.inf:
         return 0, pieces.references[0, 0], 0.0
     origin, period, period_low = pieces.origin, pieces.period, pieces.period_low
-    n_periods = np.floor((t - origin) / period)
-    tau, _ = time_since(origin, n_periods, period, period_low, t, t_low)
-    if tau < 0.0:
-        n_periods -= 1.0
-    elif tau >= period + period_low:
-        n_periods += 1.0
-    tau, _ = time_since(origin, n_periods, period, period_low, t, t_low)
+    n_periods, tau = whole_periods(origin, period, period_low, t, t_low)
     low, high = 0, pieces.begins.shape[0]
     while high - low > 1:
         middle = (low + high) // 2

@@ -47,8 +47,7 @@ def _entries(sources):
             pools.set_reference(a, i, particle.t - early, particle.t_low, scene, pieces, degree)
             if a[pools.END + i] > particle.t:
                 break
-        since = (a[pools.T + i] - a[pools.REF + i]) + (a[pools.T_LOW + i] - a[pools.REF_LOW + i])
-        pools.set_laws(a, i, pools.R0, since, scene, degree)
+        pools.set_laws(a, i, pools.R0, particle.t, particle.t_low, scene, degree)
         a[pools.SPIN + i] = particle.x * particle.vy - particle.y * particle.vx
 
     @njit(cache=True, error_model="numpy")

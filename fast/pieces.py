@@ -4,7 +4,8 @@ Idea. On a half-leg between knots a bang-bang law is a parabola, exactly. A Four
 Taylor polynomial of degree D, for times up to V before and after the reference time, by at most
 M(D + 1) V^(D + 1) / (D + 1)!, and its derivative by M(D + 1) V^D / D!, where M(j) = sum (k w)^j (|a_k| +
 |b_k|) bounds the law's derivative of order j. V is so short that the first is below 2^-54 of the law's least
-value, and the second below 2^-54 of M(1). A constant is its own polynomial.
+value (of a slope, which may be 0, below 2^-54 of M(1) / w), and the second below 2^-54 of M(1). A constant
+is its own polynomial.
 
 The period is cut at every knot and in the middle of every leg, and then into pieces of length V: a piece
 serves flights that begin in its first half, and holds for all of it, so that flights up to V end in it. Where
@@ -118,8 +119,7 @@ def _refined(
     """Halve pieces in which a law changes by more than half of itself."""
     while len(cuts) <= MAX_PIECES:
         pieces = _filled(compiled, period, origin, cuts, degree)
-        size = np.maximum(pieces.limits[:, 0], pieces.limits[:, 1])
-        powers = size[:, None] ** np.arange(1, degree + 1)
+        powers = pieces.limits[:, None] ** np.arange(1, degree + 1)
         rows = [row for row in (RADIUS, WIDTH, DEPTH) if compiled.laws[row, KIND] != CONSTANT]
         own = pieces.coefficients[:, rows]
         change = (np.abs(own[:, :, 2:]) * powers[:, None, :]).sum(axis=2)
@@ -153,9 +153,8 @@ def _filled(
     if period is None:
         half, serves = np.array([math.inf]), np.array([math.inf])
     high, low = _pair(period) if period is not None else (math.inf, 0.0)
-    limits = np.column_stack([half, half])
     until = 0.125 * MAX_QUADRANT * high
-    return Pieces(float(origin), high, low, begins, references, limits, serves, coefficients, until)
+    return Pieces(float(origin), high, low, begins, references, half, serves, coefficients, until)
 
 
 def _pair(number: Fraction) -> tuple[float, float]:

@@ -38,7 +38,7 @@ def worst_errors(scene, random, n):
     span = 7 * p.period if p.period < np.inf else 10.0
     for t in random.uniform(-span, span, n):
         piece, reference, low = piece_at(p, t, 0.0)
-        near, far = np.sort(random.choice([-1.0, 1.0, *random.uniform(-1, 1, 2)], 2)) * p.limits[piece, 0]
+        near, far = np.sort(random.choice([-1.0, 1.0, *random.uniform(-1, 1, 2)], 2)) * p.limits[piece]
         if p.period == np.inf:
             near, far = -1.0, 1.0
         for row, law in as_rows(scene).items():
@@ -106,8 +106,8 @@ def test_every_flight_that_begins_in_a_piece_has_room_there():
         middle = p.references[:, 0] + p.references[:, 1] - p.origin
         assert p.begins[0] == 0.0
         assert (np.diff(p.begins) > 0.0).all()
-        assert np.allclose(middle - p.limits[:, 0], p.begins, rtol=0, atol=1e-15 * p.period)
-        assert (middle + p.limits[:, 1] >= ends - 1e-15 * p.period).all()
+        assert np.allclose(middle - p.limits, p.begins, rtol=0, atol=1e-15 * p.period)
+        assert (middle + p.limits >= ends - 1e-15 * p.period).all()
         assert np.allclose(p.serves, ends - middle, rtol=0, atol=1e-15 * p.period)
 
 

@@ -24,9 +24,8 @@ from fast.kernel.flights import OFF, advance, correct
 
 from fast.kernel.pools import (  # isort: skip
     CERTAIN, CLOSED, DONE, END, HIT, LANES, NEVER, NEXT_R0, NEXT_T, NEXT_T_LOW, NEXT_VX, NEXT_VY, NEXT_W0,
-    NEXT_X, NEXT_Y, N_ARC, N_BASE, OK, REF, REF_LOW, ROUTINE, S, SINCE, SPIN, STAY_IN, STAY_OUT, STOP, STRIDE,
-    T, T_LOW, UNTIL, VX, VY, WALL, X, Y, change_lane, fold, load, refold, set_laws, set_reference,
-    whole_registers,
+    NEXT_X, NEXT_Y, N_ARC, N_BASE, OK, ROUTINE, S, SINCE, SPIN, STAY_IN, STAY_OUT, STOP, STRIDE, T, T_LOW,
+    UNTIL, VX, VY, WALL, X, Y, change_lane, fold, load, refold, set_laws, set_reference, whole_registers,
 )  # fmt: skip
 from fast.kernel.records import RADIUS, VALUE, WIDTH, Particle, particle_at, write_state
 from fast.kernel.worker import DISK, GENERAL, NEXT_STOP, PARTICLE
@@ -119,8 +118,7 @@ def step_carefully(pool, a, i, roster, worker, slope):
         a[HIT + i], a[DONE + i], a[S + i] = code, 1.0, s
         if code < HORIZON:
             set_reference(a, i, p.t, p.t_low, scene, worker.pieces, worker.degree)
-            u = (p.t - a[REF + i]) + (p.t_low - a[REF_LOW + i])
-            set_laws(a, i, NEXT_R0, u, scene, worker.degree)
+            set_laws(a, i, NEXT_R0, p.t, p.t_low, scene, worker.degree)
             w = anchors[WIDTH, VALUE]  # known where the lanes know nothing
             a[NEXT_W0 + i] = w * anchors[RADIUS, VALUE] if scene.is_relative else w
         if pool == GENERAL or code >= HORIZON:

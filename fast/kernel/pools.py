@@ -61,7 +61,7 @@ def set_reference(a, i, t, t_low, scene, pieces, degree):
     piece, reference, low = piece_at(pieces, t, t_low)
     a[REF + i], a[REF_LOW + i] = reference, low
     a[END + i] = reference + pieces.serves[piece]
-    a[BACK + i], a[LIMIT + i] = -pieces.limits[piece, 0], pieces.limits[piece, 1]
+    a[BACK + i], a[LIMIT + i] = -pieces.limits[piece], pieces.limits[piece]
     if scene.laws[RADIUS, KIND] == CONSTANT:
         a[BACK + i] = -NEVER
     for row in range(4):
@@ -88,8 +88,9 @@ def width_of(a, i, u, r, r1, r2, is_relative, degree):
 
 
 @kernel
-def set_laws(a, i, place, u, scene, degree):
-    """Write a lane's laws at a time since its reference, in the thirteen rows from `place` on."""
+def set_laws(a, i, place, t, t_low, scene, degree):
+    """Write a lane's laws at a time in its piece, in the thirteen rows from `place` on."""
+    u = (t - a[REF + i]) + (t_low - a[REF_LOW + i])
     r, r1, r2 = law_of(a, RADIUS_LAW + i, u, degree)
     w, w1, w2, _ = width_of(a, i, u, r, r1, r2, scene.is_relative, degree)
     h, h1, h2 = law_of(a, DEPTH_LAW + i, u, degree)
@@ -136,7 +137,7 @@ def fold(a, i, scene, pieces, degree):
     a[SPIN + i] = 0.0
     a[WALL + i] = ON_ARC
     set_reference(a, i, a[T + i], a[T_LOW + i], scene, pieces, degree)
-    set_laws(a, i, R0, (a[T + i] - a[REF + i]) + (a[T_LOW + i] - a[REF_LOW + i]), scene, degree)
+    set_laws(a, i, R0, a[T + i], a[T_LOW + i], scene, degree)
 
 
 @part

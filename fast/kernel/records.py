@@ -82,7 +82,7 @@ class Pieces(NamedTuple):
             infinite for none.
         begins: (P,) times since the origin at which pieces begin to serve, rising from 0.
         references: (P, 2) reference times in the first period, as sums of two floats.
-        limits: (P, 2) how long before and after it the polynomials hold.
+        limits: (P,) how long before and after it the polynomials hold.
         serves: (P,) until when after its reference time a piece is the best one.
         coefficients: (P, 4, D + 2) for r, w or nu, h, slope: the value at the reference time, its low part,
             and the coefficients of the powers 1 to D of the time since.

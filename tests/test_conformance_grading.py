@@ -12,6 +12,7 @@ import fast
 from conformance.grading.agreement import BOUND, middle
 from conformance.grading.grade import Grade, grade, precision_class
 from conformance.vectors import NUMBERS, Certified, Expectation, Vector, answer, load
+from fast.__main__ import carry as fast_carry
 from fast.__main__ import follow as fast_follow
 from scene import State
 
@@ -245,7 +246,7 @@ def graded(sample, *stepper) -> dict[str, Grade]:
 
 def test_the_fast_stepper_passes_or_declines_what_is_degenerate(corpus, tally):
     sample = corpus[::4]
-    grades = graded(sample, fast.next_collision, fast_follow)
+    grades = graded(sample, fast.next_collision, fast_follow, fast_carry)
     level = {asked.id: asked.level for asked in sample}
     tally.update(f"{level[name]} {found.verdict}" for name, found in grades.items())
     off = {name: found for name, found in grades.items() if found.verdict not in ("pass", "declined")}

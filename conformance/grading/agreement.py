@@ -109,6 +109,44 @@ def compare(
     return _judge_end(expected, answers[len(expected.steps) :]) or _judge_numbers(measured, bound)
 
 
+def compare_arrival(
+    answer: Outcome, captured: tuple[float, float] | None, expected: Expectation, state: State
+) -> Agreement:
+    """Compare what a flow says of one particle with the truth.
+
+    Args:
+        answer: the outcome at t_end.
+        captured: begin and end of the first captured stay [time]; None without one.
+        expected: certified, with every collision on the way and the captured stays.
+        state: the start.
+
+    Returns:
+        As `compare`; `numbers` too where a stay is missing, invented, or begins or ends at a wrong time.
+    """
+    clock = _Clock(state)
+    times = [clock.advance(certified) for certified in expected.steps]
+    if expected.outcome != "horizon":
+        return _judge_end(expected, [answer]) or _judge_numbers([], None)
+    if differing := _difference(answer, None):
+        return differing
+    judged = _judge_numbers([_measure(answer, expected.steps[-1], times[-1], "")], None)
+    if judged.kind != "agrees":
+        return judged
+    if (captured is None) != (not expected.stays):
+        said = "none" if captured is None else f"a captured stay from {captured[0]!r} to {captured[1]!r}"
+        first = f"the stay {expected.stays[0]} of its steps" if expected.stays else "none"
+        return judged._replace(kind="numbers", why=f"captured: {said}, must be {first}")
+    if captured is None:
+        return judged
+    for name, given, place in zip(("begin", "end"), captured, expected.stays[0], strict=True):
+        (low, high), allowance = times[place]
+        error = max(Fraction(given) - high, low - Fraction(given), Fraction(0))
+        if error > BOUND * (allowance + abs(Fraction(given))):
+            why = f"captured: its {name} is {given!r}, must be {float(low)!r} (step {place + 1})"
+            return judged._replace(kind="numbers", why=why)
+    return judged
+
+
 def middle(expected: Expectation, state: State) -> list[Outcome]:
     """Return the certified answer in the middle of its enclosures, rounded to binary64: one outcome a step.
 

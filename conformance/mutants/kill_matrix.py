@@ -4,7 +4,6 @@
 the answers and writes docs/kill-matrix.json and docs/kill-matrix.md: some minutes on one core. The matrix
 is a function of corpus and mutants alone. Only `fail` kills: a vector that a mutant declines, or at which it
 crashes or answers in a wrong format, does not count.
-Not handled: trajectories and steps are graded alike; what a mutant does in `flow` is for the properties.
 """
 
 from __future__ import annotations
@@ -34,7 +33,7 @@ _graded: dict[tuple[str, bytes], str] = {}
 def verdict(mutant: Mutant, vector: Vector) -> str:
     """Grade a mutant's answer; an exception is `crashed`."""
     try:
-        found = answer(vector, mutant.step, mutant.trajectory)
+        found = answer(vector, mutant.step, mutant.trajectory, mutant.flow)
     except (ArithmeticError, ValueError):
         return "crashed"
     key = vector.id, msgspec.json.encode(found)  # most answers are the plain stepper's: grade them once

@@ -24,7 +24,7 @@ from typing import Any, Literal, NamedTuple
 
 import msgspec
 
-from conformance.grading.agreement import Agreement, Answer, Kind, compare, compare_arrival
+from conformance.grading.agreement import BOUND, Agreement, Answer, Kind, compare, compare_arrival
 from conformance.vectors import Vector
 from scene import Collision, Outcome
 
@@ -62,12 +62,14 @@ class Grade(NamedTuple):
         ulps: worst backward ulps, nan when not measured.
         relative: worst backward error, nan when not measured.
         why: one line.
+        step: the one that `why` is about, counted from 0.
     """
 
     verdict: Verdict
     ulps: float
     relative: float
     why: str
+    step: int = 0
 
 
 class _Misshapen(Exception):  # noqa: N818 (a finding about the answer)
@@ -90,12 +92,22 @@ def grade(vector: Vector, answer: Any) -> Grade:
         return _unmeasured("error", " ".join(answer["error"].split())[:200])
     try:
         if vector.kind == "flow":
-            return _best([compare_arrival(*_arrival(answer), known, vector.state) for known in vector.expect])
+            found = [compare_arrival(*_arrival(answer), known, vector.state) for known in vector.expect]
+            return _noted(vector, _best(found))
         outcomes = _outcomes(vector, answer)
     except _Misshapen as finding:
         return _unmeasured("wrong-format", str(finding))
     asked: Answer | list[Answer] = outcomes if vector.kind == "trajectory" else outcomes[0]
-    return _best([compare(asked, expected, vector.state) for expected in vector.expect])
+    return _noted(vector, _best([compare(asked, expected, vector.state) for expected in vector.expect]))
+
+
+def _noted(vector: Vector, found: Grade) -> Grade:
+    """Say of a right answer that its numbers could not have been wrong, where the condition allows none."""
+    if found.verdict != "pass" or math.isnan(found.relative) or vector.condition * BOUND < 1:
+        return found
+    return found._replace(
+        why=f"the walls alone are graded: condition {vector.condition:.1g} allows no number"
+    )
 
 
 def precision_class(ulps: Sequence[float]) -> PrecisionClass:
@@ -110,7 +122,7 @@ def precision_class(ulps: Sequence[float]) -> PrecisionClass:
 
 def _best(found: Sequence[Agreement]) -> Grade:
     """Return the grade against the certified answer that fits best."""
-    grades = [Grade(_VERDICTS[one.kind], one.ulps, one.relative, one.why) for one in found]
+    grades = [Grade(_VERDICTS[one.kind], one.ulps, one.relative, one.why, one.step) for one in found]
     return min(grades, key=lambda grade: _PREFERENCE.index(grade.verdict))
 
 

@@ -16,7 +16,7 @@ from matplotlib import rc_context
 from conformance import vectors
 from conformance.grading.grade import FAIR, SHARP
 from conformance.suite import reports
-from conformance.suite.run import Result, Run
+from conformance.suite.result import Result, Run
 from conformance.vectors import Certified, Vector
 from mushrooms.figures import style as plots
 from mushrooms.figures import table as draw

@@ -202,7 +202,7 @@ def _missed(answer: Answer, certified: Certified) -> str:
     low, high = certified.ends("dt")
     slack = BOUND * (Fraction(certified.allowance[0]) + abs(high))
     if Fraction(answer.dt) > high + slack:
-        return ", an earlier hit was missed"
+        return ", an earlier hit was missed" if certified.wall else ", beyond t_end"
     return ", nothing is met so early" if Fraction(answer.dt) < low - slack else ""
 
 

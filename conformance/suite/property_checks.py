@@ -72,8 +72,8 @@ def ask_properties(session: Session, questions: Sequence[tuple[Scene, State, flo
         questions: scene, state and t_end, of kinds that it offers.
 
     Yields:
-        Name, verdict, reason, seconds: `declined` where nothing could be compared or too much was undecided,
-        `unsupported` where the property needs more than is offered; nothing when there are no questions.
+        Name, verdict, reason, seconds: `declined` where too much was undecided, `unsupported` where the
+        property needs more than is offered or has nothing to say; nothing when there are no questions.
     """
     assert session.introduction is not None
     for name, check in properties.PROPERTIES.items() if questions else ():
@@ -121,7 +121,7 @@ def _hold(
     why = f"{n_compared} of {len(questions)} compared{how}"
     if asking.n_undecided > MAX_UNDECIDED * asking.n_asked:
         return "declined", f"{why}; {asking.n_undecided} of {asking.n_asked} steps were left undecided"
-    return ("pass" if n_compared else "declined"), why
+    return ("pass", why) if n_compared else ("unsupported", f"{why}: it is not about these scenes")
 
 
 def ask_profiles(session: Session, level: str, seed: int) -> Iterator[Verdict]:
@@ -152,7 +152,7 @@ def _judged(findings: Sequence[Statistic]) -> tuple[str, str]:
     if not all(finding.is_met for finding in findings):
         return "fail", why
     if any(finding.lost > MAX_LOST * finding.n for finding in findings):
-        return "declined", why
+        return "fail", f"{why}: at most {MAX_LOST:.0%} may be lost"
     if idle := [finding for finding in findings if not finding.has_power]:
         alternatives = ", ".join(f"{finding.alternative:g}" for finding in idle)
         return "declined", f"{why}: could not have failed at {alternatives}; a higher level follows more"

@@ -62,5 +62,10 @@ def graded_parts(passed: Sequence[Vector], *, is_timed: bool) -> dict[str, list[
         seen.add(("profile", "time"))
     every = {"tables": ("table", TABLES), "laws": ("law", LAWS), "profiles": ("profile", PROFILES)}
     found = {part: [n for n in names if (what, n) in seen] for part, (what, names) in every.items()}
-    lacking = [n for what, names in reversed(every.values()) for n in names if (what, n) not in seen]
+    lacking = [
+        name
+        for part in ("profiles", "tables", "laws")
+        for name in every[part][1]
+        if (every[part][0], name) not in seen
+    ]
     return {**found, "not_graded": lacking}

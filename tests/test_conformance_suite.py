@@ -127,7 +127,7 @@ def test_known_failures_are_marked_in_a_run(monkeypatch):
     monkeypatch.setattr(suite, "choose", lambda *_: [made_up(0), made_up(1)])
     monkeypatch.setattr(suite, "drawn_disguise", lambda *_: disguise.Disguise())  # it knows one answer
     monkeypatch.setattr(suite, "N_STATES", 0)
-    monkeypatch.setattr(disguise, "N_DRAWN", 0)
+    monkeypatch.setattr(suite, "drawn_horizons", lambda *_: [])
     assert suite.check(command("crash-at-second")).exit_code() == 1
     fixed = frozenset({"made-up/0", "made-up/1", "protocol/stop"})
     run = suite.check(command("crash-at-second"), known=fixed)
@@ -199,7 +199,7 @@ def test_what_must_be_refused_is_asked_of_all():
 def test_the_reference_passes(monkeypatch):
     known = [v for v in vectors.load("core") if v.expect[0].steps and v.group != "hard-case-14"][::100]
     monkeypatch.setattr(suite, "N_STATES", 0)
-    monkeypatch.setattr(disguise, "N_DRAWN", 0)
+    monkeypatch.setattr(suite, "drawn_horizons", lambda *_: [])
     monkeypatch.setattr(suite, "measure_speed", lambda _: None)
     monkeypatch.setattr(suite, "choose", lambda *_: known)
     run = suite.check([sys.executable, "-m", "reference"])

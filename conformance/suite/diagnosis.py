@@ -13,6 +13,7 @@ from importlib import resources
 from conformance.suite.result import Result
 
 ALIKE = 0.5  # least share that common failures have of all failures of the two
+NEARLY = 0.9  # of the likest one's share, that another must have to be named beside it
 MAX_NAMED = 3
 
 
@@ -37,5 +38,5 @@ def diagnose(results: Sequence[Result]) -> list[str]:
         f"like {name} on {len(failed & killed[name])} of {len(failed)} failures (it has"
         f" {len(killed[name])}): {matrix['mutants'][name]['fault']}"
         for name in likest
-        if scores[name] >= ALIKE
+        if scores[name] >= max(ALIKE, NEARLY * scores[likest[0]])
     ]

@@ -161,7 +161,9 @@ def one_cycle(
     free = np.array([not _is_captured(scene, o) for o in arrived], dtype=float)
     ended = [o for o, _ in flow(scene, states, span) if isinstance(o, Horizon)]
     widest = largest + bias
-    s = np.clip([log(_energy(o) / energy) for o in ended], -widest, widest) + widest
+    with np.errstate(divide="ignore"):  # a particle that lost all its energy is cut, as all are
+        change = np.log([_energy(o) / energy for o in ended])
+    s = np.clip(change, -widest, widest) + widest
     tests = (("p_nc", free, p_nc, 1.0), ("m1", s, m1 + widest, 2 * widest))
     found = [_statistic(name, x, mean, b, n_particles, alarm / 2) for name, x, mean, b in tests]
     found = [finding._replace(margin=finding.margin + bias) for finding in found]
@@ -225,7 +227,8 @@ def _is_captured(scene: Mushroom, at: Horizon) -> bool:
 
 def _energy(at: State | Outcome) -> float:
     assert isinstance(at, State | Horizon)
-    return (at.vx**2 + at.vy**2) / 2
+    # Of a nonsense answer it may be infinite; `**` would raise instead.
+    return (at.vx * at.vx + at.vy * at.vy) / 2
 
 
 def _generator(seed: int, stream: int) -> np.random.Generator:

@@ -73,7 +73,7 @@ class TableAt(NamedTuple):
         return self.half_width(y) + (x if wall == "left" else -x)
 
     def nearest_wall(self, x: float, y: float) -> Wall:
-        """Return the wall nearest to a place: least |f| / |grad f|, counted from the wall's ends beyond them."""
+        """Return the wall nearest to a place: least |f| / |grad f|, beyond the wall's ends more."""
         above, below = max(0.0, y), max(0.0, -y)
         distances: dict[Wall, float] = {}
         if not isinstance(self.scene, Stem):

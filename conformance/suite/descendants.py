@@ -1,6 +1,6 @@
 """What a command started and left behind: found by descent, by its process group and by a mark, and killed.
 
-On Linux, while a command runs, this process is the reaper of what descends from it (`PR_SET_CHILD_SUBREAPER`):
+On Linux this process reaps, while a command runs, what descends from it (`PR_SET_CHILD_SUBREAPER`):
 a process whose parents are gone becomes a child of this one, not of init, however it was forked, whatever
 session it opened and whatever it cleared from its environment. So the descendants of a command are those
 below its leader, and those children of this process that are in another session than this process (the

@@ -2,10 +2,10 @@
 
 What is no answer becomes a verdict (`Trouble`): crashed, timed-out, wrong-format; `error` when the
 restarts are used up and nothing was asked. After trouble the process is killed and the next question
-goes to a fresh one, to which `start` is replayed. When the time for the whole session is spent, all that is still
-asked is `timed-out`. Sequence numbers are random, so that no answer can be given before its question. Texts are
-kept without control characters, and a wall that an answer leaves out is named from the place. Whether an answer is
-right is not judged here.
+goes to a fresh one, to which `start` is replayed. When the time for the whole session is spent, all that is
+still asked is `timed-out`. Sequence numbers are random, so that no answer can be given before its question.
+Texts are kept without control characters, and a wall that an answer leaves out is named from the place.
+Whether an answer is right is not judged here.
 """
 
 from __future__ import annotations
@@ -184,6 +184,7 @@ class Session:
         """
         process, self._process = self._process, None
         if process is None:
+            self._check_time()
             raise self._end or Trouble("error", "not asked: no process was left")
         try:
             process.finish(_encode({"cmd": "stop"}), min(STOP_TIMEOUT, self._limits.timeout))
@@ -199,10 +200,7 @@ class Session:
     def _say(self, line: bytes, cmd: str, seq: int | None, *, may_be_null: bool = False) -> dict[str, Any]:
         if self._end is not None:
             raise self._end
-        if time.monotonic() >= self._deadline:
-            why = f"not asked: the total time of {self._limits.total:g} s is spent"
-            self._give_up(Trouble("timed-out", why))
-            raise self._end  # type: ignore[misc]  # it was set in the line before
+        self._check_time()
         if self._process is None:
             self._restart()
         begin = time.monotonic()
@@ -213,6 +211,12 @@ class Session:
         except Trouble:
             self.kill()
             raise
+
+    def _check_time(self) -> None:
+        if self._end is None and time.monotonic() >= self._deadline:
+            why = f"not asked: the total time of {self._limits.total:g} s is spent"
+            self._give_up(trouble := Trouble("timed-out", why))
+            raise trouble
 
     def _exchange(self, line: bytes) -> bytes:
         assert self._process is not None

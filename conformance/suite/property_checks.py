@@ -62,6 +62,8 @@ SIZES = (
     Size(2_000, 1000.0, 0.08),
     Size(200, 200.0, 0.18),
 )  # first that BUDGET allows
+# What calculating with numbers of a nonsense answer may raise, however a formula is written.
+NOT_NUMBERS = (ArithmeticError, ValueError)
 Verdict = tuple[str, str, str, float]  # name, verdict, why, seconds
 
 
@@ -112,6 +114,8 @@ def _hold(
             return "fail", str(broken)
         except Trouble as trouble:
             return trouble.verdict, trouble.why
+        except NOT_NUMBERS as error:
+            return "fail", f"its answers cannot be calculated with: {error}"
     how = f", {n_compared - n_rounded} bit for bit" if is_exact else ""
     return ("pass" if n_compared else "declined"), f"{n_compared} of {len(questions)} compared{how}"
 
@@ -142,6 +146,9 @@ def ask_profiles(session: Session) -> Iterator[Verdict]:
             findings = test()
         except Trouble as trouble:
             yield name, trouble.verdict, trouble.why, time.monotonic() - begin
+            continue
+        except NOT_NUMBERS as error:
+            yield name, "fail", f"its answers cannot be calculated with: {error}", time.monotonic() - begin
             continue
         yield name, _judged(findings), "; ".join(map(str, findings)), time.monotonic() - begin
 

@@ -80,7 +80,6 @@ class Session:
     Attributes:
         introduction: what the implementation said of itself, once opened.
         n_restarts: fresh processes that were needed so far.
-        seconds: from the last question to its answer.
         stderr: what it wrote to standard error, bounded.
     """
 
@@ -95,7 +94,6 @@ class Session:
         self._deadline = math.inf if total is None else time.monotonic() + total
         self.introduction: Introduction | None = None
         self.n_restarts = 0
-        self.seconds = 0.0
         self.stderr = Transcript()
 
     def __enter__(self) -> Session:
@@ -203,11 +201,8 @@ class Session:
         self._check_time()
         if self._process is None:
             self._restart()
-        begin = time.monotonic()
         try:
-            received = self._exchange(line)
-            self.seconds = time.monotonic() - begin
-            return read_answer(received, cmd, seq, may_be_null=may_be_null)
+            return read_answer(self._exchange(line), cmd, seq, may_be_null=may_be_null)
         except Trouble:
             self.kill()
             raise

@@ -10,7 +10,7 @@ import msgspec
 import pytest
 from support.saboteurs import HONEST, SABOTEURS, command
 
-from conformance.suite import property_checks
+from conformance.suite import promises, property_checks
 from conformance.suite import run as suite
 from conformance.suite.process import CommandNotFound, Trouble
 from conformance.suite.session import Limits, Session, probe_values, read_answer
@@ -48,6 +48,7 @@ def verdicts(monkeypatch):
     """Return what runs the suite on a saboteur and gives its results by case; nothing may be left running."""
     monkeypatch.setenv("SABOTAGE", token := secrets.token_hex(8))
     monkeypatch.setattr(property_checks, "N_QUESTIONS", 0)
+    monkeypatch.setattr(promises, "ask_promises", lambda _: iter(()))
     monkeypatch.setattr(suite, "choose", lambda *_: [made_up(i) for i in range(N)])
 
     def run(name: str, limits: Limits) -> suite.Run:

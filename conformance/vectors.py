@@ -1,9 +1,9 @@
 """Vectors: questions with certified answers, and the corpus that they are kept in.
 
-A vector asks for one step or one trajectory; its answers are enclosures that the reference proved and a
-second arithmetic proved again. The corpus is one file of JSON lines for each group, beside a manifest with
-its version and every file's SHA-256; `load` refuses a corpus that does not match its manifest. Answers
-never leave the harness: `request` builds the line that an implementation is sent.
+A vector asks for one step, one trajectory or one particle's flow; its answers are enclosures that the
+reference proved and a second arithmetic proved again. The corpus is one file of JSON lines for each group,
+beside a manifest with its version and every file's SHA-256; `load` refuses a corpus that does not match its
+manifest. Answers never leave the harness: `request` builds the line that an implementation is sent.
 
 Levels say how delicate a question is, by the condition number (the largest relative change of an answer per
 relative change of the inputs) and by what nudging the inputs does:
@@ -39,6 +39,7 @@ from typing import Annotated, Any, Literal
 import msgspec
 
 from scene import BadInput, Outcome, Rejected, Scene, State, Wall, from_data
+from scene.protocol.wire import Flowing
 
 Level = Literal["core", "extended", "stress"]
 LEVELS: tuple[Level, ...] = ("core", "extended", "stress")
@@ -98,11 +99,14 @@ class Expectation(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_
         outcome: of the step; of a trajectory: how it ends, "collision" when all asked for are found.
         steps: the collisions, and the horizon when it ends there; empty for undefined and rejected steps.
         reason: of an undefined outcome.
+        stays: of a flow, the captured stays (docs/protocol.md) as places in `steps`, counted from 0: the arc
+            hit that begins it and the collision that ends it, or the horizon. Empty for none.
     """
 
     outcome: Literal["collision", "horizon", "undefined", "undecided", "rejected"]
     steps: tuple[Certified, ...] = ()
     reason: str = ""
+    stays: tuple[tuple[int, int], ...] = ()
 
 
 class Vector(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
@@ -112,7 +116,8 @@ class Vector(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defau
         id: "<group>/<number>", never reused.
         group: what it belongs to: a table, a hard case, a generated family.
         level: core, extended or stress.
-        kind: step or trajectory.
+        kind: step, trajectory or flow; a flow vector certifies every collision up to the horizon, though
+            the horizon and the first captured stay alone are asked for.
         rule: what it tests, in words.
         source: place in the paper, or hard case number.
         scene: the wire's form.
@@ -127,7 +132,7 @@ class Vector(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defau
     id: Annotated[str, msgspec.Meta(pattern="^[a-z0-9-]+/[0-9]+$")]
     group: str
     level: Level
-    kind: Literal["step", "trajectory"]
+    kind: Literal["step", "trajectory", "flow"]
     rule: str
     source: str
     scene: dict[str, Any]
@@ -262,7 +267,10 @@ def request(vector: Vector, seq: int) -> dict[str, Any]:
         seq: number of the request.
     """
     state = msgspec.structs.asdict(vector.state)
-    asked = {"cmd": vector.kind, "seq": seq, "scene": vector.scene, "state": state}
+    asked = {"cmd": vector.kind, "seq": seq, "scene": vector.scene}
+    if vector.kind == "flow":
+        return {**asked, "states": [state], "t_end": vector.t_end}
+    asked["state"] = state
     if vector.kind == "trajectory":
         asked["collisions"] = vector.collisions
     return {**asked, "t_end": vector.t_end}
@@ -273,18 +281,22 @@ def _scene(encoded: str) -> Scene:
     return from_data(json.loads(encoded))
 
 
-def answer(vector: Vector, step: Step, follow: Follow) -> dict[str, Any]:
+def answer(vector: Vector, step: Step, follow: Follow, carry: Flowing) -> dict[str, Any]:
     """Return how a stepper of functions answers a vector, in the wire's form.
 
     Args:
         vector: the question.
         step: (scene, state, t_end) -> outcome.
         follow: (scene, state, collisions, t_end) -> collisions, and last what came instead of one.
+        carry: (scene, states, t_end) -> outcome and first captured stay of each.
     """
     try:
         scene = _scene(json.dumps(vector.scene))
         if vector.kind == "step":
             return dict(msgspec.to_builtins(step(scene, vector.state, vector.t_end)))
+        if vector.kind == "flow":
+            arrivals = carry(scene, [vector.state], vector.t_end)
+            return {"states": [{**msgspec.to_builtins(at), "captured": stay} for at, stay in arrivals]}
         return {"steps": msgspec.to_builtins(follow(scene, vector.state, vector.collisions, vector.t_end))}
     except BadInput as error:
         return dict(msgspec.to_builtins(Rejected(str(error))))

@@ -38,8 +38,8 @@ def test_an_example_passes_at_level_core(language, commands, monkeypatch, tally)
     command = runnable(commands[language])
     chosen = vectors.load("core")[:: EVERY[language]]
     monkeypatch.setattr(suite, "choose", lambda *_: chosen)
-    monkeypatch.setattr(property_checks, "N_QUESTIONS", 4)
-    monkeypatch.setattr(property_checks, "SIZES", (property_checks.Size(20, 50.0, 0.5),))
+    monkeypatch.setattr(suite, "N_STATES", 4)
+    monkeypatch.setattr(property_checks, "SIZES", {"core": property_checks.Size(20, 50.0, 0.5)})
     monkeypatch.setattr(property_checks, "BATCH", 20)
     run = suite.check(command)
     assert run.objections() == []

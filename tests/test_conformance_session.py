@@ -10,8 +10,9 @@ import msgspec
 import pytest
 from support.saboteurs import HONEST, SABOTEURS, command
 
-from conformance.suite import promises, property_checks
+from conformance.suite import promises
 from conformance.suite import run as suite
+from conformance.suite.disguise import Disguise
 from conformance.suite.process import CommandNotFound, Trouble
 from conformance.suite.session import Limits, Session, probe_values, read_answer
 from conformance.vectors import Certified, Expectation, Vector
@@ -47,8 +48,10 @@ def made_up(number: int) -> Vector:
 def verdicts(monkeypatch):
     """Return what runs the suite on a saboteur and gives its results by case; nothing may be left running."""
     monkeypatch.setenv("SABOTAGE", token := secrets.token_hex(8))
-    monkeypatch.setattr(property_checks, "N_QUESTIONS", 0)
     monkeypatch.setattr(promises, "ask_promises", lambda _: iter(()))
+    monkeypatch.setattr(suite, "N_STATES", 0)
+    monkeypatch.setattr(suite, "drawn_horizons", lambda *_: [])
+    monkeypatch.setattr(suite, "drawn_disguise", lambda *_: Disguise())  # saboteurs know one answer
     monkeypatch.setattr(suite, "choose", lambda *_: [made_up(i) for i in range(N)])
 
     def run(name: str, limits: Limits) -> suite.Run:

@@ -33,8 +33,8 @@ def _few(monkeypatch):
     ]
     assert {vector.kind for vector in found} == {"step", "trajectory"}
     monkeypatch.setattr(suite, "choose", lambda *_: found)
-    monkeypatch.setattr(property_checks, "N_QUESTIONS", 2)
-    monkeypatch.setattr(property_checks, "SIZES", (property_checks.Size(20, 50.0, 0.5),))
+    monkeypatch.setattr(suite, "N_STATES", 2)
+    monkeypatch.setattr(property_checks, "SIZES", {"core": property_checks.Size(20, 50.0, 0.5)})
     monkeypatch.setattr(property_checks, "BATCH", 20)
     monkeypatch.setattr(suite, "TIMED_LEAST", 100_000)
 

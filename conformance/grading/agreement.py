@@ -59,22 +59,31 @@ class Agreement(NamedTuple):
         ulps: worst backward ulps of a component, nan when not measured.
         relative: worst backward error, likewise.
         why: one line.
+        step: the one that differs first, counted from 0; of a flow its end, 0.
     """
 
     kind: Kind
     ulps: float = math.nan
     relative: float = math.nan
     why: str = ""
+    step: int = 0
 
 
 class _Measured(NamedTuple):
-    """Bounds of an error over the enclosures; `where` names the worst component."""
+    """Bounds of an error over the enclosures.
+
+    Attributes:
+        where: the first component that is wrong, for what is computed later follows from it; of a right
+            answer the worst.
+        off: the backward error of that component.
+    """
 
     least: Fraction | float
     most: Fraction | float
     least_ulps: Fraction | float
     most_ulps: Fraction | float
     where: str
+    off: Fraction | float
 
 
 def compare(
@@ -100,13 +109,54 @@ def compare(
     for i, certified in enumerate(expected.steps):
         place = f"step {i + 1}: " if isinstance(answer, list) else ""
         if i >= len(answers):
-            return Agreement("length", why=f"{place}missing, {i} of {len(expected.steps)} were given")
-        if differing := _difference(answers[i], certified.wall):
-            return differing._replace(why=(place + differing.why)[:200])
+            return Agreement("length", why=f"{place}missing, {i} of {len(expected.steps)} were given", step=i)
+        if differing := _difference(answers[i], certified):
+            return differing._replace(why=(place + differing.why)[:200], step=i)
         measured.append(_measure(answers[i], certified, clock.advance(certified), place))
         if measured[-1].least > BOUND:
-            return _judge_numbers(measured, bound)
-    return _judge_end(expected, answers[len(expected.steps) :]) or _judge_numbers(measured, bound)
+            hint = _missed(answers[i], certified)
+            judged = _judge_numbers(measured, bound)
+            return judged._replace(why=judged.why + hint, step=i)
+    end = _judge_end(expected, answers[len(expected.steps) :])
+    return end._replace(step=len(expected.steps)) if end else _judge_numbers(measured, bound)
+
+
+def compare_arrival(
+    answer: Outcome, captured: tuple[float, float] | None, expected: Expectation, state: State
+) -> Agreement:
+    """Compare what a flow says of one particle with the truth.
+
+    Args:
+        answer: the outcome at t_end.
+        captured: begin and end of the first captured stay [time]; None without one.
+        expected: certified, with every collision on the way and the captured stays.
+        state: the start.
+
+    Returns:
+        As `compare`; `numbers` too where a stay is missing, invented, or begins or ends at a wrong time.
+    """
+    clock = _Clock(state)
+    times = [clock.advance(certified) for certified in expected.steps]
+    if expected.outcome != "horizon":
+        return _judge_end(expected, [answer]) or _judge_numbers([], None)
+    if differing := _difference(answer, expected.steps[-1]):
+        return differing
+    judged = _judge_numbers([_measure(answer, expected.steps[-1], times[-1], "")], None)
+    if judged.kind != "agrees":
+        return judged
+    if (captured is None) != (not expected.stays):
+        said = "none" if captured is None else f"a captured stay from {captured[0]!r} to {captured[1]!r}"
+        first = f"the stay {expected.stays[0]} of its steps" if expected.stays else "none"
+        return judged._replace(kind="numbers", why=f"captured: {said}, must be {first}")
+    if captured is None:
+        return judged
+    for name, given, place in zip(("begin", "end"), captured, expected.stays[0], strict=True):
+        (low, high), allowance = times[place]
+        error = max(Fraction(given) - high, low - Fraction(given), Fraction(0))
+        if error > BOUND * (allowance + abs(Fraction(given))):
+            why = f"captured: its {name} is {given!r}, must be {float(low)!r} (step {place + 1})"
+            return judged._replace(kind="numbers", why=why)
+    return judged
 
 
 def middle(expected: Expectation, state: State) -> list[Outcome]:
@@ -129,18 +179,31 @@ def middle(expected: Expectation, state: State) -> list[Outcome]:
     return found
 
 
-def _difference(answer: Answer, wall: Wall | None) -> Agreement | None:
+def _difference(answer: Answer, certified: Certified) -> Agreement | None:
     """Return how an answer differs in outcome or wall; None when it does not."""
     if isinstance(answer, Undecided):
         return Agreement("undecided", why=f"undecided: {answer.reason}")
+    due = certified.wall or "horizon"
     if isinstance(answer, Rejected | Undefined):
-        why = f"{_name(answer)}, must be {wall or 'horizon'}: {answer.reason}"
-        return Agreement("outcome", why=why)
+        return Agreement("outcome", why=f"{_name(answer)}, must be {due}: {answer.reason}")
     met = None if isinstance(answer, Horizon) else answer.wall
-    if met == wall:
+    if met == certified.wall:
         return None
-    why = f"{met or 'horizon'}, must be {wall or 'horizon'}"
-    return Agreement("wall" if met and wall else "outcome", why=why)
+    why = f"{met or 'horizon'}, must be {due}{_missed(answer, certified)}"
+    return Agreement("wall" if met and certified.wall else "outcome", why=why)
+
+
+def _missed(answer: Answer, certified: Certified) -> str:
+    """Say what the flight time alone shows of a wrong answer: an earlier hit was missed, or one invented."""
+    if isinstance(answer, Horizon):
+        return ", an earlier hit was missed" if certified.wall else ""
+    if not isinstance(answer, Collision) or not math.isfinite(answer.dt):
+        return ""
+    low, high = certified.ends("dt")
+    slack = BOUND * (Fraction(certified.allowance[0]) + abs(high))
+    if Fraction(answer.dt) > high + slack:
+        return ", an earlier hit was missed" if certified.wall else ", beyond t_end"
+    return ", nothing is met so early" if Fraction(answer.dt) < low - slack else ""
 
 
 def _judge_end(expected: Expectation, rest: Sequence[Answer]) -> Agreement | None:
@@ -167,10 +230,12 @@ def _judge_numbers(measured: Sequence[_Measured], bound: float | None) -> Agreem
     if not measured:
         return Agreement("agrees", why="the right outcome")
     worst = max(measured, key=lambda found: found.most)
+    last = measured[-1]
     ulps = _rounded(max(found.most_ulps for found in measured))
     found = Agreement("agrees", ulps, _rounded(worst.most), f"{ulps:.3g} backward ulps")
-    if measured[-1].least > BOUND:
-        return found._replace(kind="numbers", why=f"{worst.where} is off by {found.relative:.3g} (backward)")
+    if last.least > BOUND:
+        off = f"{last.where} is off by {_rounded(last.off):.3g} (backward)"
+        return found._replace(kind="numbers", why=off)
     if bound is not None and any(step.least_ulps > bound for step in measured):
         return found._replace(kind="numbers", why=f"numbers are off by {ulps:.3g} backward ulps")
     if worst.most > BOUND or (bound is not None and ulps > bound):
@@ -197,24 +262,30 @@ def _measure(answer: Answer, certified: Certified, time: tuple[Ends, Fraction], 
     """Measure dt (but of a horizon), t (but of an enclosed answer), place and velocity."""
     numbers = _given(answer)
     if not all(math.isfinite(end) for ends in numbers.values() for end in ends if isinstance(end, float)):
-        return _Measured(math.inf, math.inf, math.inf, math.inf, f"{place}a number that is not finite")
+        what = f"{place}a number that is not finite"
+        return _Measured(math.inf, math.inf, math.inf, math.inf, what, math.inf)
     given = {name: (Fraction(low), Fraction(high)) for name, (low, high) in numbers.items()}
     truth = {name: certified.ends(name) for name in NUMBERS} | {"t": time[0]}
     allowances = dict(zip(NUMBERS, map(Fraction, certified.allowance), strict=True)) | {"t": time[1]}
     sizes = {name: allowances[name] + max(map(abs, ends)) for name, ends in given.items()}
-    found = _Measured(Fraction(0), Fraction(-1), Fraction(0), Fraction(0), "")
+    found = _Measured(Fraction(0), Fraction(-1), Fraction(0), Fraction(0), "", Fraction(0))
     for vector in VECTORS:
         scale = max([LEAST / U, *(sizes[name] for name in vector if name in given)])
         for name in (name for name in vector if name in given):
             (low, high), (certified_low, certified_high) = given[name], truth[name]
             most = max(abs(high - certified_low), abs(certified_high - low))
             least = max(certified_low - high, low - certified_high, Fraction(0))
+            # An exact zero that nothing can move, as y on the base, has no size of its own to be measured by.
+            is_zero = not allowances[name] and not any(truth[name])
+            size = scale if is_zero else sizes[name]
+            is_named = found.most <= BOUND and most / scale > found.most
             found = _Measured(
                 max(found.least, least / scale),
                 max(found.most, most / scale),
-                max(found.least_ulps, backward_ulps(least, sizes[name])),
-                max(found.most_ulps, backward_ulps(most, sizes[name])),
-                place + name if most / scale > found.most else found.where,
+                max(found.least_ulps, backward_ulps(least, size)),
+                max(found.most_ulps, backward_ulps(most, size)),
+                place + name if is_named else found.where,
+                most / scale if is_named else found.off,
             )
     return found
 

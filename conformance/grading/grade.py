@@ -24,7 +24,7 @@ from typing import Any, Literal, NamedTuple
 
 import msgspec
 
-from conformance.grading.agreement import Agreement, Answer, Kind, compare
+from conformance.grading.agreement import BOUND, Agreement, Answer, Kind, compare, compare_arrival
 from conformance.vectors import Vector
 from scene import Collision, Outcome
 
@@ -62,12 +62,14 @@ class Grade(NamedTuple):
         ulps: worst backward ulps, nan when not measured.
         relative: worst backward error, nan when not measured.
         why: one line.
+        step: the one that `why` is about, counted from 0.
     """
 
     verdict: Verdict
     ulps: float
     relative: float
     why: str
+    step: int = 0
 
 
 class _Misshapen(Exception):  # noqa: N818 (a finding about the answer)
@@ -89,12 +91,23 @@ def grade(vector: Vector, answer: Any) -> Grade:
     if isinstance(answer.get("error"), str):
         return _unmeasured("error", " ".join(answer["error"].split())[:200])
     try:
+        if vector.kind == "flow":
+            found = [compare_arrival(*_arrival(answer), known, vector.state) for known in vector.expect]
+            return _noted(vector, _best(found))
         outcomes = _outcomes(vector, answer)
     except _Misshapen as finding:
         return _unmeasured("wrong-format", str(finding))
     asked: Answer | list[Answer] = outcomes if vector.kind == "trajectory" else outcomes[0]
-    grades = [_grade(compare(asked, expected, vector.state)) for expected in vector.expect]
-    return min(grades, key=lambda found: _PREFERENCE.index(found.verdict))
+    return _noted(vector, _best([compare(asked, expected, vector.state) for expected in vector.expect]))
+
+
+def _noted(vector: Vector, found: Grade) -> Grade:
+    """Say of a right answer that its numbers could not have been wrong, where the condition allows none."""
+    if found.verdict != "pass" or math.isnan(found.relative) or vector.condition * BOUND < 1:
+        return found
+    return found._replace(
+        why=f"the walls alone are graded: condition {vector.condition:.1g} allows no number"
+    )
 
 
 def precision_class(ulps: Sequence[float]) -> PrecisionClass:
@@ -107,8 +120,10 @@ def precision_class(ulps: Sequence[float]) -> PrecisionClass:
     return "A" if worst <= SHARP else "B" if worst <= FAIR else "C"
 
 
-def _grade(found: Agreement) -> Grade:
-    return Grade(_VERDICTS[found.kind], found.ulps, found.relative, found.why)
+def _best(found: Sequence[Agreement]) -> Grade:
+    """Return the grade against the certified answer that fits best."""
+    grades = [Grade(_VERDICTS[one.kind], one.ulps, one.relative, one.why, one.step) for one in found]
+    return min(grades, key=lambda grade: _PREFERENCE.index(grade.verdict))
 
 
 def _unmeasured(verdict: Verdict, why: str) -> Grade:
@@ -129,6 +144,25 @@ def _outcomes(vector: Vector, answer: Mapping[str, Any]) -> list[Answer]:
         if not isinstance(outcome, Collision):
             raise _Misshapen(f"steps[{i}]: only the last may be other than a collision")
     return found
+
+
+def _arrival(answer: Mapping[str, Any]) -> tuple[Outcome, tuple[float, float] | None]:
+    """Decode a flow of one particle: its outcome and first captured stay, strictly."""
+    states = answer.get("states")
+    if states is None and answer.get("outcome") in ("undefined", "undecided", "rejected"):
+        return _outcome(answer, ""), None
+    if not isinstance(states, Sequence) or isinstance(states, str) or len(states) != 1:
+        raise _Misshapen("`states` must be an array of one, as many as were asked")
+    outcome = _outcome(states[0], "states[0]: ")
+    if isinstance(outcome, Collision):
+        raise _Misshapen("states[0]: a flow ends at t_end, not at a collision")
+    try:
+        captured = msgspec.convert(states[0].get("captured"), tuple[float, float] | None)
+    except msgspec.ValidationError as error:
+        raise _Misshapen(f"states[0].captured: {error}") from None
+    if captured is not None and not all(map(math.isfinite, captured)):
+        raise _Misshapen("states[0].captured must be finite")
+    return outcome, captured
 
 
 def _outcome(data: Any, place: str) -> Outcome:

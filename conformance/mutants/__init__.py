@@ -13,7 +13,8 @@ from typing import NamedTuple
 
 from conformance import plain
 from conformance.mutants import of_laws, of_roots, of_walls
-from conformance.plain.step import Captured, Flight
+from conformance.plain.flow import Captured
+from conformance.plain.step import Flight
 from scene import Outcome, Scene, State
 
 

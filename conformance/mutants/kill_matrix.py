@@ -1,10 +1,9 @@
-"""Which vector kills which mutant: the proof that the corpus can fail, published in docs/.
+"""Which vector kills which mutant: the proof that the corpus can fail, and what failures are compared with.
 
-`python -m conformance.mutants.kill_matrix` answers every vector with every mutant, grades
-the answers and writes docs/kill-matrix.json and docs/kill-matrix.md: some minutes on one core. The matrix
-is a function of corpus and mutants alone. Only `fail` kills: a vector that a mutant declines, or at which it
+`python -m conformance.mutants.kill_matrix` answers every vector with every mutant, grades the answers and
+writes kill-matrix.json beside this file and docs/kill-matrix.md: some minutes on one core. The matrix is a
+function of corpus and mutants alone. Only `fail` kills: a vector that a mutant declines, or at which it
 crashes or answers in a wrong format, does not count.
-Not handled: trajectories and steps are graded alike; what a mutant does in `flow` is for the properties.
 """
 
 from __future__ import annotations
@@ -25,7 +24,8 @@ from conformance.vectors import LEVELS, Vector, answer, load, manifest
 from scene import BadInput
 from scene.files import write_file
 
-DOCS = Path(__file__).parent.parent.parent / "docs"
+DATA = Path(__file__).parent  # it ships with the package: `suite.diagnosis` reads it
+DOCS = DATA.parent.parent / "docs"
 N_WITNESSES = 3
 PLAIN = Mutant("plain", "none", Flight)
 _graded: dict[tuple[str, bytes], str] = {}
@@ -34,7 +34,7 @@ _graded: dict[tuple[str, bytes], str] = {}
 def verdict(mutant: Mutant, vector: Vector) -> str:
     """Grade a mutant's answer; an exception is `crashed`."""
     try:
-        found = answer(vector, mutant.step, mutant.trajectory)
+        found = answer(vector, mutant.step, mutant.trajectory, mutant.flow)
     except (ArithmeticError, ValueError):
         return "crashed"
     key = vector.id, msgspec.json.encode(found)  # most answers are the plain stepper's: grade them once
@@ -98,8 +98,8 @@ def table(found: dict[str, Any]) -> str:
         "",
         f"{len(ordered)} mutants of the plain stepper against the {found['vectors']} vectors of corpus"
         f" {found['corpus']}: {len(ordered) - len(found['survivors'])} killed by a `fail`."
-        f" {found['vectors'] - len(idle)} vectors kill at least one. Written by"
-        " `python -m conformance.mutants.kill_matrix`; kill-matrix.json has it by vector.",
+        f" {found['vectors'] - len(idle)} vectors kill at least one. Written by `python -m"
+        " conformance.mutants.kill_matrix`; conformance/mutants/kill-matrix.json has it by vector.",
         "",
         "The least killed come first.",
         "",
@@ -114,7 +114,7 @@ def table(found: dict[str, Any]) -> str:
     return "\n".join(lines) + "\n"
 
 
-def run(docs: Path = DOCS, progress: Callable[[str], None] = print) -> int:
+def run(docs: Path = DOCS, data: Path = DATA, progress: Callable[[str], None] = print) -> int:
     """Compute and write the matrix.
 
     Returns:
@@ -134,7 +134,7 @@ def run(docs: Path = DOCS, progress: Callable[[str], None] = print) -> int:
         **matrix(vectors, found),
     }
     docs.mkdir(parents=True, exist_ok=True)
-    write_file(docs / "kill-matrix.json", json.dumps(published, indent=1) + "\n")
+    write_file(data / "kill-matrix.json", json.dumps(published, indent=1) + "\n")
     write_file(docs / "kill-matrix.md", table(published))
     progress(
         f"survivors: {', '.join(published['survivors']) or 'none'}; plain fails: {', '.join(wrong) or 'none'}"

@@ -2,7 +2,7 @@
 
 import sys
 
-from conformance.plain.step import flow, next_collision, trajectory
+from conformance.plain import flow, next_collision, trajectory
 from scene.protocol.wire import serve
 
 if __name__ == "__main__":

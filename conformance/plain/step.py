@@ -12,7 +12,7 @@ The third implementation beside `reference` and `fast`, the subject of the tutor
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import hypot, inf, prod
+from math import hypot, inf
 from typing import ClassVar, NamedTuple
 
 from conformance.plain.motion import BangBangMotion, ConstantMotion, FourierMotion, LawMotion, LawValue
@@ -36,12 +36,11 @@ from scene import (
 )
 from scene.laws import bounds
 from scene.states import ON_WALL, check_numbers
-from scene.tables import laws, width_factors
+from scene.tables import laws
 
 ROUNDING = 2.0**-48  # f and f' are sums of a few terms, each rounded to some 2^-52 of its size
 LARGEST = 2.0**400  # squares of greater numbers overflow
 MAX_PARTS = 20_000  # intervals looked at for one wall
-MAX_COLLISIONS = 20_000  # of one particle in a flow: some seconds
 SIDES: tuple[Wall, ...] = ("left", "right", "floor")
 
 
@@ -352,42 +351,3 @@ def trajectory(
             break
         state = outcome.state()
     return steps
-
-
-Captured = tuple[float, float] | None
-
-
-def flow(
-    scene: Scene, states: Sequence[State], t_end: float, flight: type[Flight] = Flight
-) -> list[tuple[Outcome, Captured]]:
-    """Carry particles to t_end: the outcome of each there, and (begin, end) of its first captured stay."""
-    return [carried(scene, state, t_end, flight) for state in states]
-
-
-def carried(scene: Scene, state: State, t_end: float, flight: type[Flight]) -> tuple[Outcome, Captured]:
-    """Carry one particle. A stay in the cap is captured from an arc hit that cannot see the mouth on."""
-    begin, stay = None, None
-    for _ in range(MAX_COLLISIONS):
-        outcome = next_collision(scene, state, t_end, flight)
-        if not isinstance(outcome, Collision):
-            break
-        if isinstance(scene, Mushroom) and outcome.wall != "base":
-            is_captured = outcome.wall == "arc" and misses_mouth(
-                scene, outcome.t, outcome, state.vx, state.vy
-            )
-            if is_captured and begin is None:
-                begin = outcome.t
-            if not is_captured and begin is not None:
-                stay, begin = stay or (begin, outcome.t), None
-        state = outcome.state()
-    else:
-        outcome = Undecided(f"more than {MAX_COLLISIONS} collisions")
-    if begin is not None:
-        stay = stay or (begin, t_end)
-    return outcome, stay
-
-
-def misses_mouth(scene: Mushroom, t: float, at: Collision | State, vx: float, vy: float) -> bool:
-    """Tell whether |sin phi_hat| > nu: the chord through a place keeps further from the centre than w."""
-    w = prod(Flight.kinds[type(law)](law, t).value for law in width_factors(scene))
-    return bool(abs(at.x * vy - at.y * vx) > w * hypot(vx, vy))

@@ -240,16 +240,25 @@ def missing(introduction: Introduction, profile: str, scene: Mapping[str, Any] |
     Args:
         introduction: what it said of itself.
         profile: step, trajectory, flow or time.
+        scene: as for `needs`.
+    """
+    offered = {"profile": introduction.profiles, "table": introduction.tables, "law": introduction.laws}
+    return ", ".join(f"{what} {name}" for what, name in needs(profile, scene) if name not in offered[what])
+
+
+def needs(profile: str, scene: Mapping[str, Any] | None) -> list[tuple[str, str]]:
+    """Return what a question needs: its profile, its table and the kinds of its laws.
+
+    Args:
+        profile: step, trajectory, flow or time.
         scene: of the question, in the wire's form; None for one that must be refused, so that no
             table and no law is needed.
     """
-    needs = [("profile", profile, introduction.profiles)]
-    if scene is not None:
-        parts = {name: part for name, part in scene.items() if name not in ("table", "name", "notes")}
-        kinds = {law["kind"] if isinstance(law, Mapping) else "constant" for law in parts.values()}
-        needs.append(("table", str(scene["table"]), introduction.tables))
-        needs += [("law", kind, introduction.laws) for kind in sorted(kinds)]
-    return ", ".join(f"{what} {name}" for what, name, offered in needs if name not in offered)
+    if scene is None:
+        return [("profile", profile)]
+    parts = {name: part for name, part in scene.items() if name not in ("table", "name", "notes")}
+    kinds = {law["kind"] if isinstance(law, Mapping) else "constant" for law in parts.values()}
+    return [("profile", profile), ("table", str(scene["table"])), *(("law", kind) for kind in sorted(kinds))]
 
 
 def read_introduction(line: bytes) -> Introduction:

@@ -204,7 +204,9 @@ def mean_growth(
     states = microcanonical_states(scene, n_particles, energy, _generator(seed, 1))
     ended = [o for o, _ in flow(scene, states, _span(scene, alarm)) if isinstance(o, Horizon)]
     widest = largest + bias
-    s = np.clip([log(_energy(o) / energy) for o in ended], -widest, widest) + widest
+    with np.errstate(divide="ignore"):  # a particle that lost all its energy is cut, as all are
+        change = np.log([_energy(o) / energy for o in ended])
+    s = np.clip(change, -widest, widest) + widest
     found = _statistic(
         "m1", s, m1 + widest, bound=2 * widest, n=n_particles, alarm=alarm, alternative=widest
     )  # energy that does not grow
@@ -290,7 +292,8 @@ def _is_captured(scene: Mushroom, at: Horizon) -> bool:
 
 def _energy(at: State | Outcome) -> float:
     assert isinstance(at, State | Horizon)
-    return (at.vx**2 + at.vy**2) / 2
+    # Of a nonsense answer it may be infinite; `**` would raise instead.
+    return (at.vx * at.vx + at.vy * at.vy) / 2
 
 
 def _generator(seed: int, stream: int) -> np.random.Generator:

@@ -61,6 +61,8 @@ SIZES = {
     "extended": Size(4_000, 4000.0, 0.04),
     "stress": Size(4_000, 4000.0, 0.04),
 }
+# What calculating with numbers of a nonsense answer may raise, however a formula is written.
+NOT_NUMBERS = (ArithmeticError, ValueError)
 Verdict = tuple[str, str, str, float]  # name, verdict, why, seconds
 
 
@@ -117,6 +119,8 @@ def _hold(
             return "fail", str(broken)
         except Trouble as trouble:
             return trouble.verdict, trouble.why
+        except NOT_NUMBERS as error:
+            return "fail", f"its answers cannot be calculated with: {error}"
     how = f", {n_compared - n_rounded} bit for bit" if is_exact else ""
     why = f"{n_compared} of {len(questions)} compared{how}"
     if asking.n_undecided > MAX_UNDECIDED * asking.n_asked:
@@ -143,6 +147,9 @@ def ask_profiles(session: Session, level: str, seed: int) -> Iterator[Verdict]:
             findings = test(session, scene, SIZES[level], seed)
         except Trouble as trouble:
             yield name, trouble.verdict, trouble.why, time.monotonic() - begin
+            continue
+        except NOT_NUMBERS as error:
+            yield name, "fail", f"its answers cannot be calculated with: {error}", time.monotonic() - begin
             continue
         yield name, *_judged(findings), time.monotonic() - begin
 

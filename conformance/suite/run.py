@@ -24,7 +24,7 @@ import msgspec
 from conformance import properties, vectors
 from conformance.grading.agreement import middle
 from conformance.grading.grade import Grade, grade
-from conformance.suite import property_checks
+from conformance.suite import promises, property_checks, timing
 from conformance.suite.diagnosis import diagnose
 from conformance.suite.disguise import (
     Disguise,
@@ -39,21 +39,19 @@ from conformance.suite.result import Result, Run, Speed
 from conformance.suite.scope import graded_parts
 from conformance.suite.session import Limits, Session, missing
 from conformance.vectors import Vector
-from scene import BadInput, load, to_data
+from scene import BadInput, State, load, to_data
 from scene.refusal import check_seed
 
 NEW_SEEDS = 10**6  # short enough to be typed again
 N_STATES = 24  # drawn for the exact properties
-TIMED_SCENE, TIMED_STATE = (
-    "moving-cap",
-    {"t": 0.0, "x": 0.1, "y": 0.2, "vx": 300.0, "vy": 400.0, "wall": None},
-)
+TIMED_SCENE, TIMED_STATE = "moving-cap", State(0.0, 0.1, 0.2, 300.0, 400.0)
 TIMED_REPEATS, TIMED_LEAST = 5, 20_000_000  # timings; nanoseconds that each must last to be read from a clock
 PROTOCOL_CASES = ("start", "echo", "rejects", "stop")
 OTHER_CASES = (
     *(f"protocol/{name}" for name in PROTOCOL_CASES),
     *(f"property/{name}" for name in properties.PROPERTIES),
     *(f"profile/{name}" for name in property_checks.PROFILES),
+    *(f"promise/{name}" for name in promises.PROMISES),
 )
 Progress = Callable[[int, int], None]
 
@@ -233,20 +231,20 @@ def _compared(
 
 
 def measure_speed(session: Session) -> Speed | None:
-    """Time a trajectory on the moving cap, longer until the clock can read it; None where not offered."""
+    """Time a trajectory on the moving cap, longer until the clock can read it.
+
+    None where it is not offered, or where it does not end as `trajectory` says (`conformance.suite.timing`).
+    """
     assert session.introduction is not None
-    scene = to_data(load(TIMED_SCENE))
-    if missing(session.introduction, "time", scene):
+    scene, state = load(TIMED_SCENE), TIMED_STATE
+    if missing(session.introduction, "time", to_data(scene)):
         return None
     n_collisions, ns = 10, [0]
-    request = {"cmd": "time", "scene": scene, "state": TIMED_STATE}
     try:
         while min(ns) < TIMED_LEAST and n_collisions < 100_000:
             n_collisions *= 10 if min(ns) * 10 < TIMED_LEAST else 2
-            answer = session.ask({**request, "collisions": n_collisions, "repeat": TIMED_REPEATS})
-            ns = answer.get("ns") or [0]
-            if not answer.get("steps") or answer["steps"][-1]["outcome"] != "collision":
-                return None
+            ns, _, last = timing.timed(session, scene, state, n_collisions, TIMED_REPEATS)
+        timing.check_last(session, scene, state, n_collisions, last)
     except Trouble:
         return None
     return Speed(TIMED_SCENE, n_collisions, len(ns), min(ns) / n_collisions, median(ns) / n_collisions)
@@ -254,7 +252,7 @@ def measure_speed(session: Session) -> Speed | None:
 
 def _ask_nonsense(session: Session) -> None:
     """A state without `vy` must be rejected, not guessed, and the process must live on."""
-    state = {name: value for name, value in TIMED_STATE.items() if name != "vy"}
+    state = {name: value for name, value in msgspec.to_builtins(TIMED_STATE).items() if name != "vy"}
     answer = session.ask({"cmd": "step", "scene": {"table": "cap", "r": 1.0}, "state": state, "t_end": 1.0})
     if answer.get("outcome") != "rejected":
         raise Trouble("fail", f"a state without vy was answered {answer}"[:200])
@@ -269,6 +267,8 @@ def _ask_further(session: Session, chosen: Sequence[Vector], level: str, seed: i
         yield Result(f"property/{name}", "property", verdict, why, seconds)
     for name, verdict, why, seconds in property_checks.ask_profiles(session, level, seed):
         yield Result(f"profile/{name}", "profile", verdict, why, seconds)
+    for name, verdict, why, seconds in promises.ask_promises(session):
+        yield Result(f"promise/{name}", "promise", verdict, why, seconds)
 
 
 def _result(vector: Vector, trouble: Trouble, seconds: float = 0.0) -> Result:

@@ -25,6 +25,7 @@ from conformance.vectors import NUMBERS, Certified, Ends, Expectation
 from scene import Collision, Horizon, Outcome, Rejected, State, Undecided, Undefined, Wall
 
 BOUND = Fraction(1, 10**9)  # physics: far above rounding, far below any error of principle
+NEAR_HIT = Fraction(1, 10)  # of the flight time
 # dt, t, place, velocity: what is judged as one vector.
 VECTORS = (("dt",), ("t",), ("x", "y"), ("vx", "vy"))
 Kind = Literal["agrees", "numbers", "indeterminate", "wall", "outcome", "length", "undecided"]
@@ -200,7 +201,8 @@ def _missed(answer: Answer, certified: Certified) -> str:
     if not isinstance(answer, Collision) or not math.isfinite(answer.dt):
         return ""
     low, high = certified.ends("dt")
-    slack = BOUND * (Fraction(certified.allowance[0]) + abs(high))
+    near = NEAR_HIT if answer.wall == certified.wall else BOUND  # a little off, it is the same hit
+    slack = near * (Fraction(certified.allowance[0]) + abs(high))
     if Fraction(answer.dt) > high + slack:
         return ", an earlier hit was missed" if certified.wall else ", beyond t_end"
     return ", nothing is met so early" if Fraction(answer.dt) < low - slack else ""

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 from math import hypot, prod
 from typing import NamedTuple
 
@@ -11,6 +12,7 @@ from scene import Collision, Mushroom, Outcome, Scene, State, Undecided
 from scene.tables import width_factors
 
 MAX_COLLISIONS = 20_000  # of one particle: some seconds
+Step = Callable[[Scene, State, float], Outcome]
 Captured = tuple[float, float] | None
 
 
@@ -18,14 +20,15 @@ def flow(
     scene: Scene, states: Sequence[State], t_end: float, flight: type[Flight] = Flight
 ) -> list[tuple[Outcome, Captured]]:
     """Carry particles to t_end: the outcome of each there, and (begin, end) of its first captured stay."""
-    return [carried(scene, state, t_end, flight) for state in states]
+    step = partial(next_collision, flight=flight)
+    return [carried(step, scene, state, t_end) for state in states]
 
 
-def carried(scene: Scene, state: State, t_end: float, flight: type[Flight]) -> tuple[Outcome, Captured]:
-    """Carry one particle, and watch its captured stays (docs/protocol.md)."""
+def carried(step: Step, scene: Scene, state: State, t_end: float) -> tuple[Outcome, Captured]:
+    """Carry one particle by any stepper, and watch its captured stays (docs/protocol.md)."""
     stay, first = Stay(), None
     for _ in range(MAX_COLLISIONS):
-        outcome = next_collision(scene, state, t_end, flight)
+        outcome = step(scene, state, t_end)
         if not isinstance(outcome, Collision):
             break
         if outcome.wall in SIDES:

@@ -56,20 +56,21 @@ MALFORMED: tuple[tuple[bytes, int | None], ...] = (
 )
 
 
-def ask_promises(session: Session) -> Iterator[Verdict]:
+def ask_promises(session: Session, names: Sequence[str] = ()) -> Iterator[Verdict]:
     """Hold an implementation to what the protocol promises.
 
     Args:
         session: open.
+        names: of PROMISES; all when empty.
 
     Yields:
-        Name, verdict, reason, seconds, for each name of PROMISES: `unsupported` where the promise is about
-        something that is not offered, `declined` where an answer is undecided.
+        Name, verdict, reason, seconds of each: `unsupported` where the promise is about something that is
+        not offered, `declined` where an answer is undecided.
     """
-    for name, check in _CHECKS.items():
+    for name in names or PROMISES:
         begin, verdict = time.monotonic(), "pass"
         try:
-            why = check(session)
+            why = _CHECKS[name](session)
         except Trouble as trouble:
             verdict, why = trouble.verdict, trouble.why
         yield name, verdict, why, time.monotonic() - begin

@@ -70,7 +70,7 @@ def on(cmd: str, change: Callable[[Line, Line], Line]) -> Fault:
 
 def absent_is_arc(request: Line, answer: Callable[[Line], Line]) -> Line:
     """Take a wall that is not named for the arc."""
-    if request.get("cmd") == "step" and "wall" not in request.get("state", ("wall",)):
+    if isinstance(request.get("state"), dict) and "wall" not in request["state"]:
         request["state"]["wall"] = "arc"
     return answer(request)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import msgspec
 import typer
@@ -14,6 +14,7 @@ from mushrooms.check import in_one_line
 from scene.refusal import BadInput, check_seed
 
 if TYPE_CHECKING:
+    from conformance.suite import Result
     from conformance.suite.disguise import Disguise
     from conformance.vectors import Vector
 
@@ -34,11 +35,12 @@ def ask(
 
     vector = _find(case, seed)
     disguise = Disguise() if seed is None else drawn_disguise(vector, seed)
+    result = _put(command, vector, disguise) if command else None
     if as_json:
         print(msgspec.json.format(msgspec.json.encode(vector), indent=1).decode())
     else:
         _show(vector, disguise)
-    return _put(command, vector, disguise) if command else 0
+    return 0 if result is None else _judge(result)
 
 
 def _find(case: str, seed: int | None) -> Vector:
@@ -80,7 +82,7 @@ def _show(vector: Vector, disguise: Disguise) -> None:
             console.print(f"  captured from step {begin + 1} to step {end + 1}")
 
 
-def _put(command: list[str], vector: Vector, disguise: Disguise) -> int:
+def _put(command: list[str], vector: Vector, disguise: Disguise) -> Result:
     from conformance.suite import ask_vector
     from conformance.suite.process import Trouble
     from conformance.suite.session import Session
@@ -91,14 +93,14 @@ def _put(command: list[str], vector: Vector, disguise: Disguise) -> int:
             session.probe()
         except Trouble as trouble:
             raise BadInput(f"the command does not speak protocol 1: {trouble}") from None
-        result = ask_vector(session, vector, disguise)
+        return ask_vector(session, vector, disguise)
+
+
+def _judge(result: Result) -> int:
     console = Console(soft_wrap=True, highlight=False)
     if result.answer is not None:
-        console.print(f"given      {escape(_given(result.answer))}")
+        steps = result.answer.get("steps") or result.answer.get("states") or [result.answer]
+        given = "\n           ".join(in_one_line(step) for step in steps)
+        console.print(f"given      {escape(given)}")
     console.print(f"[bold]{result.verdict}[/]: {escape(result.why)}")
-    return 0 if result.verdict in ("pass", "declined", "unsupported") else 1
-
-
-def _given(answer: dict[str, Any]) -> str:
-    steps = answer.get("steps") or answer.get("states") or [answer]
-    return "\n           ".join(in_one_line(step) for step in steps)
+    return 0 if result.is_right else 1

@@ -17,7 +17,7 @@ import msgspec
 from mpmath import fp
 
 from conformance.suite import timing
-from conformance.suite.process import Trouble
+from conformance.suite.process import NOT_NUMBERS, Trouble
 from conformance.suite.questions import MOVING, STANDING, distance, follow, is_same, offered, question
 from conformance.suite.session import Session, missing, read_outcome
 from scene import Cap, Collision, Horizon, Mushroom, Outcome, Scene, State, Stem, Undecided, to_data
@@ -73,6 +73,8 @@ def ask_promises(session: Session, names: Sequence[str] = ()) -> Iterator[Verdic
             why = _CHECKS[name](session)
         except Trouble as trouble:
             verdict, why = trouble.verdict, trouble.why
+        except NOT_NUMBERS as error:
+            verdict, why = "fail", f"its answers cannot be calculated with: {error}"
         yield name, verdict, why, time.monotonic() - begin
 
 

@@ -34,7 +34,7 @@ from conformance.suite.disguise import (
     drawn_states,
     published,
 )
-from conformance.suite.process import Trouble
+from conformance.suite.process import NOT_NUMBERS, Trouble
 from conformance.suite.result import Result, Run, Speed
 from conformance.suite.scope import graded_parts
 from conformance.suite.session import Limits, Session, missing
@@ -247,7 +247,7 @@ def measure_speed(session: Session) -> Speed | None:
             n_collisions *= 10 if min(ns) * 10 < TIMED_LEAST else 2
             ns, seconds, last = timing.timed(session, scene, state, n_collisions, TIMED_REPEATS)
         timing.check_last(session, scene, state, n_collisions, last)
-    except Trouble:
+    except (Trouble, *NOT_NUMBERS):
         return None
     if not min(ns):
         return None

@@ -24,8 +24,9 @@ def lean():
 
 @needs_compiler
 def test_a_lean_stepper_without_checks_passes_the_easy_and_fails_the_hard(lean):
-    assert lean.counts("moving-cap")["fail"] == 0
-    assert lean.counts("fast-wall")["fail"] >= 5
+    easy, hard = (lean.counts(group) for group in ("moving-cap", "fast-wall"))
+    assert easy["pass"] > 0.9 * sum(easy.values())
+    assert hard["fail"] >= 5
     assert lean.verdict() == "not accepted"
     assert "fast-wall" in reasons(lean)[0]
 

@@ -11,12 +11,13 @@ from xml.etree import ElementTree
 import jsonschema
 import msgspec
 import pytest
+from support.promise_breakers import FAULTS, Breaker
 from support.saboteurs import command
 from test_conformance_session import made_up
 
 from conformance import plain, vectors
 from conformance.mutants import MUTANTS, kill_matrix
-from conformance.suite import disguise, property_checks, reports
+from conformance.suite import disguise, promises, property_checks, reports, session
 from conformance.suite import run as suite
 from conformance.suite.process import Trouble
 from conformance.suite.result import VERDICTS, Result, Run
@@ -128,6 +129,7 @@ def test_known_failures_are_marked_in_a_run(monkeypatch):
     monkeypatch.setattr(suite, "drawn_disguise", lambda *_: disguise.Disguise())  # it knows one answer
     monkeypatch.setattr(suite, "N_STATES", 0)
     monkeypatch.setattr(suite, "drawn_horizons", lambda *_: [])
+    monkeypatch.setattr(promises, "ask_promises", lambda _: iter(()))
     assert suite.check(command("crash-at-second")).exit_code() == 1
     fixed = frozenset({"made-up/0", "made-up/1", "protocol/stop"})
     run = suite.check(command("crash-at-second"), known=fixed)
@@ -313,15 +315,14 @@ def test_a_profile_that_loses_particles_is_of_wrong_format(monkeypatch):
     }
 
 
-def test_speed_is_not_measured_where_nothing_is_hit():
-    introduction = msgspec.structs.replace(
-        INTRODUCTION, profiles=("step", "time"), laws=("fourier", "constant")
-    )
-    last = msgspec.to_builtins(Horizon(*[0.0] * 5))
-    session = SimpleNamespace(introduction=introduction, ask=lambda _: {"ns": [1], "steps": [last]})
-    assert suite.measure_speed(session) is None
-    hit = msgspec.to_builtins(Collision("arc", *[0.0] * 6))
-    session.ask = lambda request: {"ns": [100 * request["collisions"]] * request["repeat"], "steps": [hit]}
-    speed = suite.measure_speed(session)
-    assert (speed.best_ns, speed.median_ns) == (100.0, 100.0)
+@pytest.mark.parametrize("fault", ["no-time", "elsewhere", "tenfold", "fewer"])
+def test_no_speed_is_shown_for_what_is_not_followed(monkeypatch, fault):
+    monkeypatch.setattr(suite, "TIMED_LEAST", 1_000_000)
+    for broken, is_shown in ((FAULTS[fault][2], False), (lambda request, answer: answer(request), True)):
+        monkeypatch.setattr(session, "Process", lambda *_, fault=broken: Breaker(fault))
+        opened = session.Session(["in-process"])
+        opened.start()
+        speed = suite.measure_speed(opened)
+        assert (speed is not None) == is_shown
+    assert speed.best_ns > 0
     assert suite.measure_speed(Stub()) is None

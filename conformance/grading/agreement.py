@@ -23,6 +23,7 @@ import msgspec
 from conformance.grading.error import LEAST, U, backward_ulps
 from conformance.vectors import NUMBERS, Certified, Ends, Expectation
 from scene import Collision, Horizon, Outcome, Rejected, State, Undecided, Undefined, Wall
+from scene.protocol.messages import Answered, AnsweredCollision
 
 BOUND = Fraction(1, 10**9)  # physics: far above rounding, far below any error of principle
 NEAR_HIT = Fraction(1, 10)  # of the flight time
@@ -43,7 +44,7 @@ class Enclosed(NamedTuple):
     ends: Sequence[Ends]
 
 
-Answer = Outcome | Enclosed
+Answer = Outcome | AnsweredCollision | Enclosed
 
 
 def exact(wall: Wall | None, numbers: Sequence[Fraction]) -> Enclosed:
@@ -123,7 +124,7 @@ def compare(
 
 
 def compare_arrival(
-    answer: Outcome, captured: tuple[float, float] | None, expected: Expectation, state: State
+    answer: Answered, captured: tuple[float, float] | None, expected: Expectation, state: State
 ) -> Agreement:
     """Compare what a flow says of one particle with the truth.
 
@@ -198,7 +199,11 @@ def _missed(answer: Answer, certified: Certified) -> str:
     """Say what the flight time alone shows of a wrong answer: an earlier hit was missed, or one invented."""
     if isinstance(answer, Horizon):
         return ", an earlier hit was missed" if certified.wall else ""
-    if not isinstance(answer, Collision) or not math.isfinite(answer.dt):
+    if (
+        not isinstance(answer, Collision | AnsweredCollision)
+        or answer.dt is None
+        or not math.isfinite(answer.dt)
+    ):
         return ""
     low, high = certified.ends("dt")
     near = NEAR_HIT if answer.wall == certified.wall else BOUND  # a little off, it is the same hit
@@ -224,6 +229,8 @@ def _judge_end(expected: Expectation, rest: Sequence[Answer]) -> Agreement | Non
 def _name(answer: Answer) -> str:
     if isinstance(answer, Enclosed):
         return "collision" if answer.wall else "horizon"
+    if isinstance(answer, AnsweredCollision):
+        return "collision"
     return type(answer).__name__.lower()
 
 
@@ -261,7 +268,7 @@ class _Clock:
 
 
 def _measure(answer: Answer, certified: Certified, time: tuple[Ends, Fraction], place: str) -> _Measured:
-    """Measure dt (but of a horizon), t (but of an enclosed answer), place and velocity."""
+    """Measure dt (of a horizon none is given), t (but of an enclosed answer), place and velocity."""
     numbers = _given(answer)
     if not all(math.isfinite(end) for ends in numbers.values() for end in ends if isinstance(end, float)):
         what = f"{place}a number that is not finite"

@@ -26,6 +26,8 @@ MAX_LINE = 2**24  # bytes of one answer: a trajectory of 10^5 collisions
 MAX_STDERR = 2**15  # bytes kept of the first and of the last that it wrote there
 GRACE = 1.0  # seconds between the end of its output and its exit, and between `stop` and both
 POLL = 0.05  # seconds between looks at a silent process: a child of it may hold the pipe when it is gone
+# What calculating with numbers of a nonsense answer may raise, however a formula is written.
+NOT_NUMBERS = (ArithmeticError, ValueError)
 MAX_TEXT = 500  # characters kept of a reason, a name, or another text that came from it
 
 

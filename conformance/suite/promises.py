@@ -17,7 +17,7 @@ import msgspec
 from mpmath import fp
 
 from conformance.suite import timing
-from conformance.suite.process import Trouble
+from conformance.suite.process import NOT_NUMBERS, Trouble
 from conformance.suite.questions import MOVING, STANDING, distance, follow, is_same, offered, question
 from conformance.suite.session import Session, missing, read_outcome
 from scene import Cap, Collision, Horizon, Mushroom, Outcome, Scene, State, Stem, Undecided, to_data
@@ -56,22 +56,25 @@ MALFORMED: tuple[tuple[bytes, int | None], ...] = (
 )
 
 
-def ask_promises(session: Session) -> Iterator[Verdict]:
+def ask_promises(session: Session, names: Sequence[str] = ()) -> Iterator[Verdict]:
     """Hold an implementation to what the protocol promises.
 
     Args:
         session: open.
+        names: of PROMISES; all when empty.
 
     Yields:
-        Name, verdict, reason, seconds, for each name of PROMISES: `unsupported` where the promise is about
-        something that is not offered, `declined` where an answer is undecided.
+        Name, verdict, reason, seconds of each: `unsupported` where the promise is about something that is
+        not offered, `declined` where an answer is undecided.
     """
-    for name, check in _CHECKS.items():
+    for name in names or PROMISES:
         begin, verdict = time.monotonic(), "pass"
         try:
-            why = check(session)
+            why = _CHECKS[name](session)
         except Trouble as trouble:
             verdict, why = trouble.verdict, trouble.why
+        except NOT_NUMBERS as error:
+            verdict, why = "fail", f"its answers cannot be calculated with: {error}"
         yield name, verdict, why, time.monotonic() - begin
 
 

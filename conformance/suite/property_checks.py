@@ -22,7 +22,7 @@ import msgspec
 import theory
 from conformance import profiles, properties
 from conformance.profiles import Captured, Statistic
-from conformance.suite.process import Trouble
+from conformance.suite.process import NOT_NUMBERS, Trouble
 from conformance.suite.session import Session, missing
 from scene import Fourier, Horizon, Mushroom, Outcome, Scene, State, Undecided, load, to_data
 from scene.geometry import area
@@ -61,8 +61,6 @@ SIZES = {
     "extended": Size(4_000, 4000.0, 0.04),
     "stress": Size(4_000, 4000.0, 0.04),
 }
-# What calculating with numbers of a nonsense answer may raise, however a formula is written.
-NOT_NUMBERS = (ArithmeticError, ValueError)
 Verdict = tuple[str, str, str, float]  # name, verdict, why, seconds
 
 

@@ -356,8 +356,8 @@ def _with_walls(answer: dict[str, Any], scene: Any) -> dict[str, Any]:
         if part.get("outcome") == "collision" and "wall" not in part:
             try:
                 table = table_at(fp, from_data(scene), part["t"])
-            except BadInput:
-                return answer  # no scene at all: there is nothing that could have been met
+            except (ValueError, ArithmeticError):
+                return answer  # no scene at all, or a time beyond its numbers: nothing can have been met
             part["wall"] = table.nearest_wall(part["x"], part["y"])
     return answer
 

@@ -9,7 +9,7 @@ import pytest
 
 from conformance import suite
 from conformance.bench import scoreboard, serve
-from conformance.bench.scoreboard import Entry, page, reasons
+from conformance.bench.scoreboard import Graded, page, reasons
 from conformance.suite.session import Limits
 from scene import BadInput
 
@@ -33,7 +33,7 @@ def test_a_lean_stepper_without_checks_passes_the_easy_and_fails_the_hard(lean):
 
 @needs_compiler
 def test_the_page_has_a_row_for_each_and_a_reason_for_failure(lean):
-    text = page([Entry("lean-c", lean), Entry("example in C", None, "no compiler")], lean.corpus)
+    text = page([Graded("lean-c", lean), Graded("example in C", None, "no compiler")], lean.corpus)
     assert "| lean-c | not accepted |" in text
     assert "| example in C | not run |" in text
     assert f"- **lean-c**: {lean.scope()}." in text

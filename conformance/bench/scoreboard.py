@@ -44,7 +44,7 @@ with events. A precision class is of the answers that passed, few as they may be
 """
 
 
-class Entry(NamedTuple):
+class Graded(NamedTuple):
     """A row: a name, and the run, or why there is none."""
 
     name: str
@@ -62,7 +62,7 @@ def commands(folder: Path) -> Iterator[tuple[str, tuple[str, ...], str]]:
         yield name, (sys.executable, "-m", "conformance.bench.serve", name), ""
 
 
-def page(entries: list[Entry], corpus: str) -> str:
+def page(entries: list[Graded], corpus: str) -> str:
     """Return the page: a table, and for each that fails what fails and why."""
     lines = [HEAD.format(corpus=corpus, seed=SEED).rstrip("\n")]
     lines += [_row(entry) for entry in entries]
@@ -88,7 +88,7 @@ def reasons(run: Run) -> list[str]:
     return found + [line.rstrip(".") for line in run.diagnosis]
 
 
-def _row(entry: Entry) -> str:
+def _row(entry: Graded) -> str:
     if entry.run is None:
         return f"| {entry.name} | not run | | | | | |"
     counts, classes = entry.run.counts(), "/".join(map(str, entry.run.classes().values()))
@@ -103,7 +103,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
         for name, command, why_not in commands(Path(folder)):
             run = suite.check(command, seed=SEED, limits=LIMITS) if command else None
-            entries.append(Entry(name, run, why_not))
+            entries.append(Graded(name, run, why_not))
             print(f"{name}: {run.verdict() if run else why_not}", file=sys.stderr, flush=True)
     corpus = next(entry.run.corpus for entry in entries if entry.run)
     write_file(PAGE, page(entries, corpus))

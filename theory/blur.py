@@ -26,7 +26,7 @@ from theory.rates import table_error
 from theory.volumes import as_mushroom
 
 N_PLACES = 2000  # at which distribution functions are computed; linear between them
-N_CAPTURES = 600  # atoms of a valley that lies in no other; of one among several a quarter
+N_CAPTURES = 600  # atoms of a valley that lies in no other; of one among several a fifth
 MOST_ATOMS = 40_000  # of several captures; more are joined with their neighbours in gain
 MOST_DRAWN = 100_000_000
 REACH = 7.0  # standard deviations beyond which no blur is computed
@@ -107,12 +107,13 @@ class FiniteEnergy:
         cycle, root = course(scene), tree(scene)
         self.s_nc = root.s_nc
         self._course, self._fields = cycle, Fields(cycle, energy)
-        self._n_captures = N_CAPTURES // 4 if root.children else N_CAPTURES
+        self._n_captures = N_CAPTURES // 5 if root.children else N_CAPTURES
         start = Atoms(np.ones(1), np.zeros(1), np.zeros(1), np.zeros(1), np.full(1, np.nan))
         passed, now = self._through(root, root, start, cycle.start)
         found = self._drift(passed, now, cycle.start + cycle.step * N_TIMES)
         self.atoms = found._replace(weight=found.weight / found.weight.sum())
         self.p_nc = float(self.atoms.weight[self.atoms.is_free].sum())
+        self._below: dict[str, tuple[Floats, Floats]] = {}
 
     @property
     def mean_s(self) -> float:
@@ -158,7 +159,7 @@ class FiniteEnergy:
 
     def free_cdf(self, s: ArrayLike) -> Floats:
         """Return the probability, among those never captured, of log E1 / E0 <= s."""
-        return self._cdf(s, self.atoms.those(self.atoms.is_free))
+        return self._cdf(s, "free")
 
     def captured_cdf(self, s: ArrayLike) -> Floats:
         """Return the probability, among the captured, of log E1 / E0 <= s.
@@ -166,11 +167,11 @@ class FiniteEnergy:
         Raises:
             BadInput: nobody is captured.
         """
-        return self._cdf(s, self.atoms.those(~self.atoms.is_free))
+        return self._cdf(s, "captured")
 
     def cdf(self, s: ArrayLike) -> Floats:
         """Return the probability of log E1 / E0 <= s."""
-        return self._cdf(s, self.atoms)
+        return self._cdf(s, "all")
 
     def mean_of_exp(self, q: float) -> float:
         """Return the mean of exp(q s), to the second order in the blurs."""
@@ -219,8 +220,17 @@ class FiniteEnergy:
     def _centres(self, atoms: Atoms) -> Floats:
         return np.asarray(self.s_nc + atoms.gain + atoms.shift + atoms.variance / 4, dtype=np.float64)
 
-    def _cdf(self, s: ArrayLike, a: Atoms) -> Floats:
+    def _cdf(self, s: ArrayLike, who: str) -> Floats:
         levels = finite_array("s", s)
+        if who not in self._below:
+            self._below[who] = self._sampled(who)
+        found: Floats = np.interp(levels, *self._below[who])
+        return found
+
+    def _sampled(self, who: str) -> tuple[Floats, Floats]:
+        """Return places and the distribution function there of the "free", the "captured" or "all"."""
+        free = self.atoms.is_free
+        a = self.atoms.those({"free": free, "captured": ~free, "all": free | True}[who])
         if not len(a.weight):
             raise BadInput("nobody is captured in this cycle: there is no distribution of the captured")
         centre, reach = self.s_nc + a.gain + a.shift, REACH * np.sqrt(np.maximum(a.variance, LEAST))
@@ -228,8 +238,7 @@ class FiniteEnergy:
         below = np.zeros(N_PLACES)
         for part in np.array_split(np.arange(len(centre)), 1 + len(centre) // 1000):
             below += blur_cdf(places[:, None] - centre[part], a.variance[part]) @ a.weight[part]
-        found: Floats = np.interp(levels, places, below / a.weight.sum())
-        return found
+        return np.asarray(places, dtype=np.float64), below / a.weight.sum()
 
     def _drift(self, atoms: Atoms, now: Floats | float, until: Floats | float) -> Atoms:
         """Let particles in the chaotic zone diffuse, and correct for those captured meanwhile."""

@@ -24,8 +24,10 @@ from scene.files import write_file
 
 try:
     from conformance.generator.certify import Unfit, certify
+    from conformance.generator.coverage_families import at_the_horizon, coverage_families
     from conformance.generator.draws import Draw
     from conformance.generator.families import VectorFamily, families
+    from conformance.generator.flow_families import flow_families
     from conformance.generator.mouth_and_time_cases import cases
 except ModuleNotFoundError as error:
     if error.name != "flint":
@@ -43,16 +45,17 @@ Maker = Callable[[int], Vector]
 def groups() -> dict[str, list[Maker]]:
     """Return for every group what makes its vectors, in order; number n is made by entry n - 1."""
     found: dict[str, list[Maker]] = {}
-    for case in cases():
+    for case in [*cases(), *at_the_horizon()]:
         found.setdefault(case.group, []).append(partial(certify, case))
-    for family in families():
+    for family in [*families(), *flow_families(), *coverage_families()]:
         found[family.group] = [partial(drawn, family)] * family.n_vectors
     return found
 
 
 def drawn(family: VectorFamily, number: int) -> Vector:
     """Return a family's vector of that number: its first draw that has a certified answer."""
-    for attempt in range(ATTEMPTS):
+    first = family.first_attempts[number - 1] if family.first_attempts else 0
+    for attempt in range(first, first + ATTEMPTS):
         question = family.ask(Draw(f"{family.group}/{number}/{attempt}"))
         try:
             vector = certify(question, number)
@@ -115,7 +118,7 @@ def _made(most: int | None, n_jobs: int) -> dict[str, list[Vector]]:
 
 def _summary(files: Mapping[str, list[Vector]]) -> str:
     kinds = Counter((vector.kind, vector.level) for vectors in files.values() for vector in vectors)
-    names = {"step": "steps", "trajectory": "trajectories"}
+    names = {"step": "steps", "trajectory": "trajectories", "flow": "flows"}
     return ", ".join(f"{n} {level} {names[kind]}" for (kind, level), n in sorted(kinds.items()))
 
 

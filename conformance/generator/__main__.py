@@ -2,7 +2,7 @@
 
 Every vector is drawn from a stream seeded by its id, or written down as a hard case; certified by the
 reference; and re-proved in a second arithmetic. The same corpus comes out on every machine, bit for bit.
-Some seven minutes on one core; `--jobs N` shares them out. Needs the `test` extra (python-flint).
+Some twenty minutes on one core; `--jobs N` shares them out. Needs the `test` extra (python-flint).
 """
 
 from __future__ import annotations
@@ -23,19 +23,23 @@ from scene import BadInput
 from scene.files import write_file
 
 try:
-    from conformance.generator.certify import Unfit, certify
+    from conformance.generator.certify import certify
     from conformance.generator.coverage_families import at_the_horizon, coverage_families
     from conformance.generator.draws import Draw
     from conformance.generator.families import VectorFamily, families
     from conformance.generator.flow_families import flow_families
+    from conformance.generator.links import Unfit
     from conformance.generator.mouth_and_time_cases import cases
 except ModuleNotFoundError as error:
     if error.name != "flint":
         raise
     sys.exit("conformance.generator needs python-flint: pip install 'oscillating-mushrooms[test]'")
 
-VERSION = "1.0"
+VERSION = "1.1"
 RETIRED: tuple[str, ...] = ()
+# Published when the reference enclosed a place after 10^323 units of time closer by a unit of the last
+# decimal. Both enclosures are right; a published line never changes.
+KEPT = ("hard-case-41/1", "hard-case-41/2", "hard-case-41/3", "hard-case-41/4")
 FOLDER = Path(__file__).parent.parent / "corpus"
 ATTEMPTS = 64
 Maker = Callable[[int], Vector]
@@ -76,6 +80,8 @@ def make(group: str, number: int) -> Vector:
     makers = groups().get(group, [])
     if not 1 <= number <= len(makers) or f"{group}/{number}" in RETIRED:
         raise BadInput(f"vector = {group}/{number}, must be one of the corpus")
+    if f"{group}/{number}" in KEPT:
+        return next(vector for vector in load("stress", FOLDER) if vector.id == f"{group}/{number}")
     return makers[number - 1](number)
 
 

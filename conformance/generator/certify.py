@@ -172,11 +172,11 @@ def _path(scene: Scene, question: Question, working: int | None = None) -> _Prov
         return _path(scene, question, 2 * path.digits)
     recheck(scene, state, t_end, steps, captured)
     if question.flow:
-        found = arrival(steps, stays(captured))
-        largest = max(links.condition, timing_condition(found, state))
+        arrived = arrival(steps, stays(captured))
+        largest = max(links.condition, timing_condition(arrived, state))
         if largest > question.longest:
             raise Unfit("the horizon is too delicate")
-        return _Proved((found,), largest, len(steps))
+        return _Proved((arrived,), largest, len(steps))
     expect = [Expectation("horizon" if end else "collision", tuple(steps))]
     if isinstance(end, Undefined):
         expect = [

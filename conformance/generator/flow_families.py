@@ -2,8 +2,8 @@
 
 A flow tells its end and its first captured stay only, so an error anywhere on the way shows there or not at
 all: these families end where the condition number still lets it show. Long paths need motion that
-does not forget its start exponentially fast: a fixed cap or mushroom, a breathing circle, a particle captured in
-a moving mushroom, a stem with level floor, all much faster than the walls.
+does not forget its start exponentially fast: a fixed cap or mushroom, a breathing circle, a particle
+captured in a moving mushroom, a stem with level floor, all much faster than the walls.
 """
 
 from __future__ import annotations
@@ -32,7 +32,13 @@ from scene.laws import bounds
 Marks = Sequence[Mark]
 MOST = 40  # collisions of a drawn flow
 MANY = 64  # of a flow with several stays
-STAYS_AT = (23, 75, 509, 399, 88, 82, 182, 134, 132, 3, 297, 157)  # `VectorFamily.first_attempts`
+# See `VectorFamily.first_attempts`.
+STAYS_AT = (23, 75, 509, 399, 88, 82, 182, 134, 132, 3, 297, 157)
+AT_THE_END_AT = (17, 0, 0, 2, 13, 0, 0, 5, 7, 8)
+LONG_AT = (2, 1, 2, 0, 5, 1, 2, 3, 0, 1, 1, 0, 0, 2, 1, 2)
+INTERRUPTED_AT = (45, 91, 9, 65, 5, 125, 8, 132)
+REGULAR = ("breathing-circle", "frozen-mushroom", "moving-cap", "fixed-cap-clockwise", "fermi-ulam")
+LEAST_COSTLY = ("frozen-mushroom", "frozen-mushroom", "breathing-circle")
 MUSHROOMS = (*MOVING, *FIXED, "frozen-mushroom")
 
 
@@ -45,11 +51,10 @@ def flow_families() -> list[VectorFamily]:
         VectorFamily("flow-bang-bang", 16, _bang_bang),
         VectorFamily("flow-starts-captured", 16, _starts_captured),
         VectorFamily("flow-stays", 12, _several_stays, None, STAYS_AT),
-        VectorFamily("flow-stay-interrupted", 8, _interrupted),
-        VectorFamily("flow-stay-at-the-end", 10, _stay_at_the_end),
+        VectorFamily("flow-stay-interrupted", 8, _interrupted, None, INTERRUPTED_AT),
+        VectorFamily("flow-stay-at-the-end", 10, _stay_at_the_end, None, AT_THE_END_AT),
         VectorFamily("flow-brief", 10, _brief),
-        VectorFamily("long-flow", 24, partial(_long, "long-flow", (100, 160, 240))),
-        VectorFamily("long-trajectory", 8, partial(_long, "long-trajectory", (100, 160))),
+        VectorFamily("long-flow", 16, partial(_long, "long-flow", 60, REGULAR), None, LONG_AT),
     ]
 
 
@@ -89,7 +94,9 @@ def _catalogue(draw: Draw) -> Question:
     name = draw.pick((*MUSHROOMS, *MUSHROOMS, "breathing-circle", "fermi-ulam"))
     of = load(name)
     at = {"speed": draw.power(0, 6) * draw.between(1.0, 2.0), "patience": draw.pick((2.0, 4.0, 6.0))}
-    return _flow("flow", f"a particle carried through the scene {name}", CATALOGUE[name], of, state(draw, of, at))
+    return _flow(
+        "flow", f"a particle carried through the scene {name}", CATALOGUE[name], of, state(draw, of, at)
+    )
 
 
 def _generated(draw: Draw) -> Question:
@@ -180,10 +187,9 @@ def _brief(draw: Draw) -> Question:
     return _flow("flow-brief", "little or nothing is met before t_end", "protocol 1", of, state(draw, of, at))
 
 
-def _long(group: str, lengths: tuple[int, ...], draw: Draw) -> Question:
-    """Ask for a long path: of a flow, up to a time by which it is about that long."""
-    n = draw.pick(lengths)
-    name = draw.pick(("breathing-circle", "frozen-mushroom", "moving-cap", "fixed-cap-clockwise", "fermi-ulam"))
+def _long(group: str, least: int, names: tuple[str, ...], draw: Draw) -> Question:
+    """Ask for a long path: of a flow, up to a time by which it has so many collisions, to twice that."""
+    name = draw.pick(names)
     of = load(name)
     t = time(draw, of)
     speed = draw.power(6, 8) * draw.between(1.0, 2.0) * (walls_speed(of) or 1.0)
@@ -191,7 +197,9 @@ def _long(group: str, lengths: tuple[int, ...], draw: Draw) -> Question:
         start, _ = state(draw, of, {"t": t, "site": "stem", "speed": speed / walls_speed(of)})
     else:
         start = gallery(draw, of, t, speed)
-    now = rounded(of, t)
-    rule = f"a path of about {n} collisions in the scene {name}: errors that begin late, or grow"
-    asked = _flow(group, rule, CATALOGUE[name], of, (start, t + 0.25 * n * now.size / speed), most=n + n // 2)
-    return asked if group == "long-flow" else asked._replace(collisions=n, flow=None)
+    t_end = t + 0.5 * least * draw.between(0.6, 1.2) * rounded(of, t).size / speed
+    rule = f"a path of {least} collisions and more in the scene {name}: errors that begin late, or grow"
+    asked = _flow(
+        group, rule, CATALOGUE[name], of, (start, t_end), lambda found: len(found) >= least, 2 * least
+    )
+    return asked if group != "long-trajectory" else asked._replace(collisions=least, flow=None)

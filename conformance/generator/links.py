@@ -26,10 +26,10 @@ class Links:
     """The steps of a trajectory: their Jacobians chained from each state that a stepper has held.
 
     Each Jacobian is that of the step from the rounded state, with the residual of the wall moving along.
-    `held` is (n, 5, 5): d(dt, x, y, vx, vy) after the last step by t, x, y, vx, vy of each state held, but that
-    its first row is of t in place of dt; `inputs` is (n, 5). Sums go over whole arrays: four digits of the
-    allowances are kept, which no order of summation changes. A flow tells no flight times: how delicate these
-    are does not count where `is_timed` is false.
+    `held` is (n, 5, 5): d(t, x, y, vx, vy) after the last step by t, x, y, vx, vy of each state held, and
+    `inputs` is (n, 5). Sums go over whole arrays: four digits of the allowances are kept, which no order of
+    summation changes. A flow tells no flight times: how delicate these are does not count where `is_timed`
+    is false.
     """
 
     def __init__(self, scene: Scene, state: State, t_end: float, *, is_timed: bool = True) -> None:

@@ -339,17 +339,3 @@ def next_collision(scene: Scene, state: State, t_end: float, flight: type[Flight
         return Undecided(str(question))
     except OverflowError:
         return Undecided("a number overflows")
-
-
-def trajectory(
-    scene: Scene, state: State, n_collisions: int, t_end: float, flight: type[Flight] = Flight
-) -> list[Outcome]:
-    """Follow a particle: its collisions, and last what came instead of one."""
-    steps: list[Outcome] = []
-    while len(steps) < n_collisions:
-        outcome = next_collision(scene, state, t_end, flight)
-        steps.append(outcome)
-        if not isinstance(outcome, Collision):
-            break
-        state = outcome.state()
-    return steps

@@ -32,8 +32,8 @@ def recheck(
         state: the exact start.
         t_end: horizon [time].
         steps: the enclosures of each collision, and of the horizon where it is met.
-        marks: of each collision of a flow: "captured" and "free" are claims about arc hits, and are proved; what
-            the walls alone tell is not looked at.
+        marks: of each collision of a flow: "captured" and "free" are claims about arc hits, and are proved;
+            what the walls alone tell is not looked at.
 
     Raises:
         Refuted: saying which one does not.

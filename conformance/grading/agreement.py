@@ -131,7 +131,7 @@ def compare_arrival(
     Args:
         answer: the outcome at t_end.
         captured: begin and end of the first captured stay [time]; None without one.
-        expected: certified, with every collision on the way and the captured stays.
+        expected: certified, with the captured stays and the collisions that begin and end them.
         state: the start.
 
     Returns:

@@ -294,4 +294,6 @@ CHECKS = {
     "X6": untilted,
     "X7": trivial_loops,
     "X8": both_ways,
+    "C1": many_cycles.independence,
+    "D1": many_cycles.losses,
 }

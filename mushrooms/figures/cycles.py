@@ -68,6 +68,30 @@ def _bars(axes: Axes, values: FloatArray, edges: FloatArray, n: int, **style: An
     return heights
 
 
+def retraced(sample: Sample) -> Figure:
+    """Draw the retraced arc in the plane of sec. 3.5, captures joined to their releases, and its energies."""
+    figure, (left, right) = new_figure(9.6, 3.6, 1, 2)
+    scene = scene_of(sample.run)
+    assert isinstance(scene, Mushroom)
+    left.plot(*volume_loop(scene, N_LOOP), color=BLACK, linewidth=1.2)
+    curve = theory.capture_curve(scene, 2 * N_PHASES + 1)
+    for colour, label, times in ((BLUE, "captures", curve.t_in), (ORANGE, "releases", curve.t_out)):
+        left.plot(*_places(scene, times), "o", color=colour, markersize=5, label=label)
+    for pair in zip(curve.t_in, curve.t_out, strict=True):
+        left.plot(*_places(scene, np.array(pair)), color=BLUE, linewidth=0.8, linestyle=":")
+    left.set(xlabel="V_ell / V_cap", ylabel="V_cap / V", title=sample.run.scene)
+    left.legend(loc="best")
+    _energies(right, sample)
+    right.legend(loc="best")
+    return figure
+
+
+def _places(scene: Mushroom, times: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return V_ell/V_cap and V_cap/V at times."""
+    now = [theory.volumes_at(fp, scene, t) for t in times.tolist()]
+    return np.array([v.v_ell / v.v_cap for v in now]), np.array([v.v_cap / (v.v_cap + v.v_stem) for v in now])
+
+
 def gain_of_capture() -> Figure:
     """Draw log E1/E0 against the time of capture, theory (the paper's figure beside its loop)."""
     figure, axes = new_figure(5.2, 3.2)

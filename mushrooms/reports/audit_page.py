@@ -28,6 +28,8 @@ from mushrooms.reports.page import embed, render
 GROUPS = {
     "M": "Misprints and gaps",
     "X": "Experiments",
+    "C": "Claims in passing",
+    "D": "Beyond the paper",
     "L": "Laws",
     "I": "Identities",
     "N": "Formulas checked one by one",

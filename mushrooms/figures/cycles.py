@@ -74,15 +74,17 @@ def retraced(sample: Sample) -> Figure:
     scene = scene_of(sample.run)
     assert isinstance(scene, Mushroom)
     left.plot(*volume_loop(scene, N_LOOP), color=BLACK, linewidth=1.2)
-    curve = theory.capture_curve(scene, 2 * N_PHASES + 1)
-    for colour, label, times in ((BLUE, "captures", curve.t_in), (ORANGE, "releases", curve.t_out)):
+    curve = theory.capture_curve(scene, 4 * N_PHASES + 1)
+    first = curve.t_in < curve.t_out.min()  # on the way back captures and releases change places
+    t_in, t_out = curve.t_in[first], curve.t_out[first]
+    for colour, label, times in ((BLUE, "captures", t_in), (ORANGE, "releases", t_out)):
         left.plot(*_places(scene, times), "o", color=colour, markersize=5, label=label)
-    for pair in zip(curve.t_in, curve.t_out, strict=True):
+    for pair in zip(t_in, t_out, strict=True):
         left.plot(*_places(scene, np.array(pair)), color=BLUE, linewidth=0.8, linestyle=":")
-    left.set(xlabel="V_ell / V_cap", ylabel="V_cap / V", title=sample.run.scene)
+    left.set(xlabel="V_ell / V_cap", ylabel="V_cap / V", title=f"{sample.run.scene}, the way there")
     left.legend(loc="best")
     _energies(right, sample)
-    right.legend(loc="best")
+    right.legend(loc="upper right", fontsize=7)
     return figure
 
 

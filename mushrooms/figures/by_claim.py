@@ -116,6 +116,12 @@ ALL = (
         ("retraced-arc@1e6",),
     ),
     Picture(
+        "D1",
+        "How rare it is to end with less energy: the probability falls as exp(-n I).",
+        lambda s: cycles.losses(s[N5X30]),
+        (N5X30,),
+    ),
+    Picture(
         "L3",
         "The frozen mushroom: orbits in the island (blue) and in the chaotic zone (orange).",
         lambda _: laws.frozen(),

@@ -11,13 +11,13 @@ from mpmath import fp
 from scipy.stats import norm
 
 import theory
-from conformance.audit.claims.broadened import predicted, summed
+from conformance.audit.claims.broadened import DRAWN_SEED, N_DRAWN, predicted, summed
 from conformance.audit.claims.finite_energy import width
 from conformance.audit.claims.misprints import volume_loop
 from conformance.audit.evidence import energies_of
 from conformance.audit.runs import scene_of
 from conformance.audit.samples import Sample
-from conformance.audit.tolerances import mean, spread
+from conformance.audit.tolerances import mean, share, spread
 from mushrooms.figures.style import BLACK, BLUE, GREEN, ORANGE, SKY, FloatArray, new_figure, phase_colours
 from scene import load
 from scene.laws import value
@@ -185,6 +185,35 @@ def _sum(axes: Axes, sample: Sample, n: int, scale: str) -> None:
         ylabel="density",
         title=f"n = {n}, E0 = {sample.run.energy:.0e}, {sample.n:,} particles",
     )
+
+
+def losses(sample: Sample) -> Figure:
+    """Draw the share with less energy than at first against the number of cycles."""
+    figure, axes = new_figure(5.6, 3.6)
+    scene = scene_of(sample.run)
+    n = np.arange(1, sample.run.n_cycles + 1)
+    found = predicted(sample).draw(sample.run.n_cycles, N_DRAWN // sample.run.n_cycles, DRAWN_SEED)
+    axes.plot(n, (found < 0).mean(axis=0), color=BLACK, linewidth=1.3, label="theory at this energy, drawn")
+    places = np.unique(np.geomspace(1, n[-1], 12).astype(int))
+    far = [theory.loss_probability(scene, int(k)) for k in places]
+    axes.plot(places, far, "s", color=ORANGE, markersize=4, label="theory at infinite energy")
+    rate = float(theory.rarity(scene).rate)
+    late = np.array([places[len(places) // 2], places[-1]])
+    axes.plot(
+        late, far[-1] * np.exp(rate * (late[-1] - late)), ":", color=ORANGE, label=f"exp(-{rate:.4f} n)"
+    )
+    shares = [share(sample.s[:, k - 1] < 0) for k in places]
+    errors = [one.error for one in shares]
+    values = [one.value for one in shares]
+    axes.errorbar(places, values, errors, fmt="o", color=BLUE, markersize=4, label="simulation")
+    axes.set(
+        yscale="log",
+        xlabel="cycles n",
+        ylabel="P(E_n < E0)",
+        title=f"{sample.run.name}, {sample.n:,} particles",
+    )
+    axes.legend(fontsize=8)
+    return figure
 
 
 def ergodic(sample: Sample) -> Figure:

@@ -6,6 +6,7 @@ import json
 import math
 import os
 import sys
+from collections.abc import Mapping
 from contextlib import nullcontext
 from pathlib import Path
 from typing import Annotated, Any, NoReturn
@@ -122,14 +123,26 @@ def _catalogue_row(name: str) -> dict[str, Any]:
 def predict(
     scene: SceneName,
     digits: Annotated[int, typer.Option(help=f"Correct digits, 1 to {MAX_DIGITS}.")] = 15,
+    energy: Annotated[
+        float | None, typer.Option(help="Add the same figures at this initial energy v²/2, > 0.")
+    ] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Print the paper's predictions for one cycle as decimal strings."""
+    """Print the paper's predictions for one cycle as decimal strings, and what each is.
+
+    With --energy, what particles that begin with it will show, and the size of what that leaves out. It takes
+    rates of frozen tables: those of the audit's scenes are known (python -m conformance.audit.frozen).
+    """
     import theory
+    from mushrooms.explained import FIGURES, at_energy
 
     _check_range("--digits", digits, 1, MAX_DIGITS)
-    strings = theory.predict(scenes.load(scene), digits).strings(digits)
-    _print_pairs(strings, as_json)
+    if energy is not None and not (math.isfinite(energy) and energy > 0):
+        raise BadInput(f"--energy = {energy}, must be finite and > 0")
+    found = scenes.load(scene)
+    pairs: dict[str, Any] = dict(theory.predict(found, digits).strings(digits))
+    pairs |= at_energy(found, energy) if energy is not None else {}
+    _print_pairs(pairs, as_json, FIGURES)
 
 
 @app.command(
@@ -269,10 +282,13 @@ def _console() -> Console:
     return Console() if sys.stdout.isatty() else Console(width=140)
 
 
-def _print_pairs(pairs: dict[str, Any], as_json: bool) -> None:
+def _print_pairs(pairs: dict[str, Any], as_json: bool, meanings: Mapping[str, str] | None = None) -> None:
     if as_json:
         print(json.dumps(pairs, indent=2))
         return
     width = max(map(len, pairs))
-    for name, value in pairs.items():
-        print(f"{name:<{width}}  {'–' if value is None else value}")
+    texts = {name: "–" if value is None else str(value) for name, value in pairs.items()}
+    longest = max(map(len, texts.values()))
+    for name, text in texts.items():
+        meaning = (meanings or {}).get(name)
+        print(f"{name:<{width}}  {text:<{longest}}  {meaning}" if meaning else f"{name:<{width}}  {text}")

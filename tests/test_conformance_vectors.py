@@ -71,7 +71,8 @@ def test_what_the_corpus_holds(corpus, tally):
     assert all(vector.id.startswith(f"{vector.group}/") for vector in corpus)
     groups = {vector.group for vector in corpus}
     assert {f"hard-case-{number:02}" for number in range(1, 49)} <= groups
-    assert set(CATALOGUE) == set(catalogue()) - {"moving-cap-as-printed"} <= groups
+    # One is no valid scene; the other asks nothing of a stepper that the rest do not, but of the theory.
+    assert set(CATALOGUE) == set(catalogue()) - {"moving-cap-as-printed", "retraced-arc"} <= groups
     assert {f"static-{table}" for table in ("cap", "stem", "mushroom")} <= groups
     outcomes = Counter(vector.expect[0].outcome for vector in corpus)
     assert min(outcomes[kind] for kind in ("collision", "horizon", "undefined", "rejected")) >= 12

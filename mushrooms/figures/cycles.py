@@ -11,13 +11,13 @@ from mpmath import fp
 from scipy.stats import norm
 
 import theory
-from conformance.audit.claims.broadened import predicted, summed
+from conformance.audit.claims.broadened import DRAWN_SEED, N_DRAWN, predicted, summed
 from conformance.audit.claims.finite_energy import width
 from conformance.audit.claims.misprints import volume_loop
 from conformance.audit.evidence import energies_of
 from conformance.audit.runs import scene_of
 from conformance.audit.samples import Sample
-from conformance.audit.tolerances import mean, spread
+from conformance.audit.tolerances import mean, share, spread
 from mushrooms.figures.style import BLACK, BLUE, GREEN, ORANGE, SKY, FloatArray, new_figure, phase_colours
 from scene import load
 from scene.laws import value
@@ -67,6 +67,32 @@ def _bars(axes: Axes, values: FloatArray, edges: FloatArray, n: int, **style: An
     usual: dict[str, Any] = {"fill": True, "color": SKY, "label": "simulation"}
     axes.stairs(heights, edges, **usual | style)
     return heights
+
+
+def retraced(sample: Sample) -> Figure:
+    """Draw the retraced arc in the plane of sec. 3.5, captures joined to their releases, and its energies."""
+    figure, (left, right) = new_figure(9.6, 3.6, 1, 2)
+    scene = scene_of(sample.run)
+    assert isinstance(scene, Mushroom)
+    left.plot(*volume_loop(scene, N_LOOP), color=BLACK, linewidth=1.2)
+    curve = theory.capture_curve(scene, 4 * N_PHASES + 1)
+    first = curve.t_in < curve.t_out.min()  # on the way back captures and releases change places
+    t_in, t_out = curve.t_in[first], curve.t_out[first]
+    for colour, label, times in ((BLUE, "captures", t_in), (ORANGE, "releases", t_out)):
+        left.plot(*_places(scene, times), "o", color=colour, markersize=5, label=label)
+    for pair in zip(t_in, t_out, strict=True):
+        left.plot(*_places(scene, np.array(pair)), color=BLUE, linewidth=0.8, linestyle=":")
+    left.set(xlabel="V_ell / V_cap", ylabel="V_cap / V", title=f"{sample.run.scene}, the way there")
+    left.legend(loc="best")
+    _energies(right, sample)
+    right.legend(loc="upper right", fontsize=7)
+    return figure
+
+
+def _places(scene: Mushroom, times: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return V_ell/V_cap and V_cap/V at times."""
+    now = [theory.volumes_at(fp, scene, t) for t in times.tolist()]
+    return np.array([v.v_ell / v.v_cap for v in now]), np.array([v.v_cap / (v.v_cap + v.v_stem) for v in now])
 
 
 def gain_of_capture() -> Figure:
@@ -182,6 +208,35 @@ def _sum(axes: Axes, sample: Sample, n: int, scale: str) -> None:
         ylabel="density",
         title=f"n = {n}, E0 = {sample.run.energy:.0e}, {sample.n:,} particles",
     )
+
+
+def losses(sample: Sample) -> Figure:
+    """Draw the share with less energy than at first against the number of cycles."""
+    figure, axes = new_figure(5.6, 3.6)
+    scene = scene_of(sample.run)
+    n = np.arange(1, sample.run.n_cycles + 1)
+    found = predicted(sample).draw(sample.run.n_cycles, N_DRAWN // sample.run.n_cycles, DRAWN_SEED)
+    axes.plot(n, (found < 0).mean(axis=0), color=BLACK, linewidth=1.3, label="theory at this energy, drawn")
+    places = np.unique(np.geomspace(1, n[-1], 12).astype(int))
+    far = [theory.loss_probability(scene, int(k)) for k in places]
+    axes.plot(places, far, "s", color=ORANGE, markersize=4, label="theory at infinite energy")
+    rate = float(theory.rarity(scene).rate)
+    late = np.array([places[len(places) // 2], places[-1]])
+    axes.plot(
+        late, far[-1] * np.exp(rate * (late[-1] - late)), ":", color=ORANGE, label=f"exp(-{rate:.4f} n)"
+    )
+    shares = [share(sample.s[:, k - 1] < 0) for k in places]
+    errors = [one.error for one in shares]
+    values = [one.value for one in shares]
+    axes.errorbar(places, values, errors, fmt="o", color=BLUE, markersize=4, label="simulation")
+    axes.set(
+        yscale="log",
+        xlabel="cycles n",
+        ylabel="P(E_n < E0)",
+        title=f"{sample.run.name}, {sample.n:,} particles",
+    )
+    axes.legend(fontsize=8)
+    return figure
 
 
 def ergodic(sample: Sample) -> Figure:

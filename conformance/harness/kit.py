@@ -7,7 +7,7 @@ Copy this file, or import it. An engine gives one of two things:
 
 The kit reads and checks the questions, keeps the horizon, names the wall (least |f| / |grad f| at the place
 of the hit), chains trajectories, times them, and refuses what is no state of the scene. Where rounding leaves
-two answers open it says `undecided`; so may an engine, by raising `Open`. What an engine returns that is no hit
+two answers open it says `undecided`; so may an engine, by raising `Open`. What it returns that is no hit
 (nan, a time that has passed) is answered as a failure of its own.
 Not offered: `flow`.
 """

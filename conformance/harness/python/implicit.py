@@ -15,7 +15,7 @@ same min and max of these times are a time in which phi is positive. Such steps 
 never past it. Where one wall must be crossed and no other can be, Newton steps find the crossing, the last
 of them in forty digits: in a short flight the difference of two nearly equal f has lost its own.
 
-An engine of this kind is not told which wall the particle leaves: a place on a wall, and a rate off it, tell.
+On the wall that the particle leaves f(0) is rounding, and is taken out of f.
 """
 
 from __future__ import annotations
@@ -25,13 +25,12 @@ import math
 from mpmath import fp
 
 from conformance.harness.kit import Hit, Open, serve_engine
-from scene import Cap, Mushroom, Scene, Wall
+from scene import Cap, Mushroom, Scene, State, Wall
 from scene.geometry import TableAt, table_at
 from scene.laws import Bounds, bounds
 from scene.precision import decimals
 from scene.tables import laws
 
-ON = 2.0**-36  # of a wall's size: nearer to it than this, and flying off it, the particle leaves it
 STEM: tuple[Wall, ...] = ("left", "right", "floor")
 SHORT = 1 - 2.0**-6  # of a safe step: at rest f is the parabola itself, and would be left with no sign
 DIGITS, MAX_STEPS = 40, 20_000
@@ -41,23 +40,18 @@ Times = dict[Wall, float]
 class Path:
     """A straight flight through a domain whose walls move; s is the time since departure."""
 
-    def __init__(self, scene: Scene, t: float, x: float, y: float, vx: float, vy: float) -> None:
-        self.scene, self.t, self.x, self.y, self.vx, self.vy = scene, t, x, y, vx, vy
-        self.bends, self.sizes = _limits(scene, vx, vy)
-        table, self.left = table_at(fp, scene, t), dict[Wall, float]()
-        for wall in self.bends:
-            gap, late = float(table.gap(wall, x, y)), abs(t * self.still(table, wall, y))
-            if abs(gap) <= ON * self.sizes[wall] + 2.0**-50 * late and self.rate(table, wall, 0.0) > 0:
-                self.left[wall] = gap
-
-    def still(self, table: TableAt, wall: Wall, y: float) -> float:
-        """Return d f / dt at a place at rest."""
-        return float(table.gap_rate(wall, 0.0, y, 0.0, 0.0))
+    def __init__(self, scene: Scene, state: State) -> None:
+        self.scene, self.wall = scene, state.wall
+        self.t, self.x, self.y, self.vx, self.vy = state.t, state.x, state.y, state.vx, state.vy
+        self.bends = _bends(scene, self.vx, self.vy)
+        self.residual = 0.0
+        if self.wall:
+            self.residual = self.gap(table_at(fp, scene, self.t), self.wall, 0.0)
 
     def gap(self, table: TableAt, wall: Wall, s: float) -> float:
-        """Return a wall's f; on the walls left f(0) is 0."""
+        """Return a wall's f; on the wall left f(0) is 0."""
         f = float(table.gap(wall, self.x + s * self.vx, self.y + s * self.vy))
-        return f - self.left.get(wall, 0.0)
+        return f - self.residual if wall == self.wall else f
 
     def rate(self, table: TableAt, wall: Wall, s: float) -> float:
         """Return d f / ds of a wall."""
@@ -70,8 +64,6 @@ class Path:
             table = table_at(fp, self.scene, self.t + s)
             gaps = {wall: self.gap(table, wall, s) for wall in self.bends}
             rates = {wall: self.rate(table, wall, s) for wall in self.bends}
-            if s == 0.0:
-                gaps |= dict.fromkeys(self.left, 0.0)
             safe = {wall: self.safe(wall, gaps[wall], rates[wall]) for wall in self.bends}
             step, wall = self.together(safe, s)
             ahead = self.ahead(wall, gaps[wall], rates[wall])
@@ -86,7 +78,7 @@ class Path:
     def safe(self, wall: Wall, gap: float, rate: float) -> float:
         """Return a time for which a wall's f stays positive; 0 where it is not."""
         bend = self.bends[wall]
-        if gap < 0 or (gap == 0 and wall not in self.left):
+        if gap < 0 or (gap == 0 and wall != self.wall):
             return 0.0
         if gap == 0:
             return rate / bend if bend else math.inf  # half of the time until it may be back
@@ -139,7 +131,7 @@ class Path:
         """Return a crossing known to some digits to all of binary64's."""
         ctx = decimals(DIGITS)
         t, x, y, vx, vy = map(ctx.mpf, (self.t, self.x, self.y, self.vx, self.vy))
-        given = table_at(ctx, self.scene, t).gap(wall, x, y) if wall in self.left else 0
+        given = table_at(ctx, self.scene, t).gap(wall, x, y) if wall == self.wall else 0
         exact = ctx.mpf(s)
         for _ in range(3):
             table, place = table_at(ctx, self.scene, t + exact), (x + exact * vx, y + exact * vy)
@@ -152,36 +144,34 @@ class Path:
         return float(exact)
 
 
-def _limits(scene: Scene, vx: float, vy: float) -> tuple[Times, Times]:
-    """Return bounds on |f''| of every wall along a flight, and the sizes of its terms."""
+def _bends(scene: Scene, vx: float, vy: float) -> Times:
+    """Return bounds on |f''| of every wall along a flight."""
     known: dict[str, Bounds] = {name: bounds(law) for name, law in laws(scene).items()}
     bends: Times = {"base": 0.0}
-    sizes: Times = {"base": sum(law.highest for law in known.values())}
     if "r" in known:
         r = known["r"]
         bends["arc"] = 2 * (r.slope**2 + r.highest * r.curvature + vx * vx + vy * vy)
-        sizes["arc"] = 2 * r.highest**2
     if isinstance(scene, Cap):
-        return bends, sizes
-    w, h, lean = known.get("w"), known["h"], known["slope"]
-    if w is None:
+        return bends
+    lean, h = known["slope"], known["h"]
+    if "nu" in known:
         nu, r = known["nu"], known["r"]
-        bend = nu.curvature * r.highest + 2 * nu.slope * r.slope + nu.highest * r.curvature
-        w = nu._replace(highest=nu.highest * r.highest, curvature=bend)
+        widening = nu.curvature * r.highest + 2 * nu.slope * r.slope + nu.highest * r.curvature
+    else:
+        widening = known["w"].curvature
     for side in STEM[:2]:
-        bends[side] = w.curvature + lean.curvature * h.highest + 2 * lean.slope * abs(vy)
-        sizes[side] = 2 * w.highest + h.highest * max(abs(lean.lowest), abs(lean.highest))
-    bends["floor"], sizes["floor"] = h.curvature, 2 * h.highest
-    return bends, sizes
+        bends[side] = widening + lean.curvature * h.highest + 2 * lean.slope * abs(vy)
+    return {**bends, "floor": h.curvature}
 
 
-def next_hit(scene: Scene, t: float, x: float, y: float, vx: float, vy: float) -> Hit | None:
+def next_hit(scene: Scene, state: State) -> Hit | None:
     """Return time, place and velocity just after the next hit."""
-    s, wall = Path(scene, t, x, y, vx, vy).first_hit()
-    table, x, y = table_at(fp, scene, t + s), x + s * vx, y + s * vy
+    s, wall = Path(scene, state).first_hit()
+    vx, vy = state.vx, state.vy
+    table, x, y = table_at(fp, scene, state.t + s), state.x + s * vx, state.y + s * vy
     nx, ny = table.normal(wall, x, y)
     along = vx * nx + vy * ny + table.receding(wall, y)
-    return t + s, x, y, vx - 2 * along * nx, vy - 2 * along * ny
+    return state.t + s, x, y, vx - 2 * along * nx, vy - 2 * along * ny
 
 
 if __name__ == "__main__":

@@ -32,6 +32,7 @@ from scene.tables import laws
 
 ROUNDING = 2.0**-44  # of the table's size: nearer to a wall than this, a place may be on either side of it
 TIE = 2.0**-46  # relative: hits nearer to each other than this may come in either order
+LARGEST = 1e100  # squares of numbers far beyond overflow
 Hit = tuple[float, float, float, float, float]  # t, x, y, vx, vy, after the bounce
 NextHit = Callable[[Scene, State], Hit | None]
 # (scene, wall, state, after, until) -> the first s, after < s <= until, at which the wall's f falls through
@@ -87,6 +88,8 @@ def judged(scene: Scene, state: State, t_end: float) -> Outcome | None:
         BadInput: numbers that are none; `serve` answers `rejected`.
     """
     check_numbers(scene, state, t_end)
+    if max(abs(number) for number in (state.x, state.y, state.vx, state.vy)) > LARGEST:
+        return Undecided(f"numbers beyond {LARGEST:g} may overflow")
     table, wall = table_at(fp, scene, state.t), leaving(scene, state).wall
     place = f"state (x, y) = ({state.x!r}, {state.y!r}) at t = {state.t!r}"
     if wall is None and state.y == state.vy == 0:
@@ -147,6 +150,8 @@ def _answer_of(next_hit: NextHit, scene: Scene, state: State, t_end: float) -> A
         hit = next_hit(scene, state)
     except Open as question:
         return Undecided(str(question))
+    except (ArithmeticError, ValueError) as error:  # of its arithmetic: it has no answer
+        raise OwnFailure(f"the engine raised {type(error).__name__}: {error}") from None
     if hit is not None and not (all(map(math.isfinite, hit)) and hit[0] >= state.t):
         raise OwnFailure(f"the engine returned {hit}")
     if hit is None or hit[0] >= t_end:

@@ -62,7 +62,8 @@ class Certified(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_de
     """The proved state just after a collision, or at the horizon.
 
     Attributes:
-        dt: flight time since the collision before [time], enclosed: lower and upper end, both decimal.
+        dt: flight time since the collision before [time], enclosed: lower and upper end, both decimal; of a
+            flow, the time since the one written before.
         x: place [length], likewise.
         y: likewise.
         vx: velocity [length/time], likewise.
@@ -97,7 +98,8 @@ class Expectation(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_
 
     Attributes:
         outcome: of the step; of a trajectory: how it ends, "collision" when all asked for are found.
-        steps: the collisions, and the horizon when it ends there; empty for undefined and rejected steps.
+        steps: the collisions, and the horizon when it ends there; empty for undefined and rejected steps. Of
+            a flow, whose whole path is proved, the collisions that begin or end a stay, and the horizon.
         reason: of an undefined outcome.
         stays: of a flow, the captured stays (docs/protocol.md) as places in `steps`, counted from 0: the arc
             hit that begins it and the collision that ends it, or the horizon. Empty for none.
@@ -116,15 +118,15 @@ class Vector(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defau
         id: "<group>/<number>", never reused.
         group: what it belongs to: a table, a hard case, a generated family.
         level: core, extended or stress.
-        kind: step, trajectory or flow; a flow vector certifies every collision up to the horizon, though
-            the horizon and the first captured stay alone are asked for.
+        kind: step, trajectory or flow.
         rule: what it tests, in words.
         source: place in the paper, or hard case number.
         scene: the wire's form.
         state: the start.
         t_end: horizon [time].
         expect: the right answers; any of them passes. The first is what the reference proved.
-        collisions: how many a trajectory is asked for.
+        collisions: how many a trajectory is asked for; of a flow how many steps its path has, the last to
+            the horizon.
         condition: condition number, the largest over a trajectory; 0 where nothing is met, and
             1e300 stands for infinity.
     """

@@ -21,6 +21,7 @@ from scene.refusal import BadInput
 if TYPE_CHECKING:
     from conformance.suite.result import Run
 
+LONGEST = 7 * 86_400  # seconds
 MAX_SHOWN = 20  # objections on the terminal; all are in the reports
 MAX_TAUGHT = 5  # of them with what was given and what is certified
 COLOURS = {"pass": "green", "declined": "yellow", "unsupported": "yellow"}
@@ -31,6 +32,9 @@ def check(
     level: Annotated[str, typer.Option(help="core, extended or stress.")] = "core",
     seed: Annotated[int | None, typer.Option(help="Of all that is drawn; a new one each run.")] = None,
     timeout: Annotated[float, typer.Option(help="Seconds for one answer, compilation included.")] = 120.0,
+    total: Annotated[
+        float | None, typer.Option(help="Seconds for the whole run; no limit by default.")
+    ] = None,
     restarts: Annotated[int, typer.Option(help="Fresh processes after the first, 0 to 1000.")] = 10,
     groups: Annotated[str, typer.Option(help="Groups of vectors, with commas; all by default.")] = "",
     known_failures: Annotated[
@@ -50,8 +54,9 @@ def check(
     from conformance import suite
     from conformance.suite.session import Limits
 
-    if not (math.isfinite(timeout) and 0 < timeout <= 86_400):
-        raise BadInput(f"--timeout = {timeout}, must be > 0 and at most 86400 seconds")
+    for name, seconds in (("--timeout", timeout), ("--total", total)):
+        if seconds is not None and not (math.isfinite(seconds) and 0 < seconds <= LONGEST):
+            raise BadInput(f"{name} = {seconds}, must be > 0 and at most {LONGEST} seconds")
     if not 0 <= restarts <= 1000:
         raise BadInput(f"--restarts = {restarts}, must be 0 to 1000")
     asked_for = zip((json_file, junit, html, badge, summary), _writers(), strict=True)
@@ -68,7 +73,7 @@ def check(
             level=level,
             seed=seed,
             groups=[name.strip() for name in groups.split(",") if name.strip()],
-            limits=Limits(timeout, restarts),
+            limits=Limits(timeout, restarts, total),
             known=known,
             progress=lambda n_done, n_total: bar.update(task, completed=n_done, total=n_total),
         )

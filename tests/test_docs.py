@@ -85,7 +85,8 @@ def test_the_figures_of_the_corpus_are_right():
     kinds = Counter(vector.kind for vector in corpus)
     levels = Counter(vector.level for vector in corpus)
     assert (
-        f"Corpus {vectors.manifest().corpus} holds {kinds['step']:,} steps and {kinds['trajectory']}" in text
+        f"Corpus {vectors.manifest().corpus} holds {kinds['step']:,} steps, {kinds['trajectory']}"
+        f" trajectories and {kinds['flow']} flows" in text
     )
     shown = "{core:,} of them at level core, {extended} at extended, {stress} at stress".format(**levels)
     assert shown in text

@@ -148,6 +148,7 @@ def test_markup_in_what_it_says_is_text(call, tmp_path):
         (["--", "./no-such-stepper"], "no-such-stepper"),
         (["--timeout", "0", "--", *PYTHON], "--timeout = 0.0"),
         (["--timeout", "nan", "--", *PYTHON], "--timeout = nan"),
+        (["--total", "0", "--", *PYTHON], "--total = 0.0"),
         (["--restarts", "-1", "--", *PYTHON], "--restarts = -1"),
         (["--json", "report.txt", "--", *PYTHON], ".json"),
         (["--seed", "-1", "--", *PYTHON], "seed = -1"),

@@ -2,7 +2,7 @@
 
 Every vector is drawn from a stream seeded by its id, or written down as a hard case; certified by the
 reference; and re-proved in a second arithmetic. The same corpus comes out on every machine, bit for bit.
-Some seven minutes on one core; `--jobs N` shares them out. Needs the `test` extra (python-flint).
+Some twenty minutes on one core; `--jobs N` shares them out. Needs the `test` extra (python-flint).
 """
 
 from __future__ import annotations
@@ -23,17 +23,23 @@ from scene import BadInput
 from scene.files import write_file
 
 try:
-    from conformance.generator.certify import Unfit, certify
+    from conformance.generator.certify import certify
+    from conformance.generator.coverage_families import at_the_horizon, coverage_families
     from conformance.generator.draws import Draw
     from conformance.generator.families import VectorFamily, families
+    from conformance.generator.flow_families import flow_families
+    from conformance.generator.links import Unfit
     from conformance.generator.mouth_and_time_cases import cases
 except ModuleNotFoundError as error:
     if error.name != "flint":
         raise
     sys.exit("conformance.generator needs python-flint: pip install 'oscillating-mushrooms[test]'")
 
-VERSION = "1.0"
+VERSION = "1.1"
 RETIRED: tuple[str, ...] = ()
+# Published when the reference enclosed a place after 10^323 units of time closer by a unit of the last
+# decimal. Both enclosures are right; a published line never changes.
+KEPT = ("hard-case-41/1", "hard-case-41/2", "hard-case-41/3", "hard-case-41/4")
 FOLDER = Path(__file__).parent.parent / "corpus"
 ATTEMPTS = 64
 Maker = Callable[[int], Vector]
@@ -43,16 +49,17 @@ Maker = Callable[[int], Vector]
 def groups() -> dict[str, list[Maker]]:
     """Return for every group what makes its vectors, in order; number n is made by entry n - 1."""
     found: dict[str, list[Maker]] = {}
-    for case in cases():
+    for case in [*cases(), *at_the_horizon()]:
         found.setdefault(case.group, []).append(partial(certify, case))
-    for family in families():
+    for family in [*families(), *flow_families(), *coverage_families()]:
         found[family.group] = [partial(drawn, family)] * family.n_vectors
     return found
 
 
 def drawn(family: VectorFamily, number: int) -> Vector:
     """Return a family's vector of that number: its first draw that has a certified answer."""
-    for attempt in range(ATTEMPTS):
+    first = family.first_attempts[number - 1] if family.first_attempts else 0
+    for attempt in range(first, first + ATTEMPTS):
         question = family.ask(Draw(f"{family.group}/{number}/{attempt}"))
         try:
             vector = certify(question, number)
@@ -73,6 +80,8 @@ def make(group: str, number: int) -> Vector:
     makers = groups().get(group, [])
     if not 1 <= number <= len(makers) or f"{group}/{number}" in RETIRED:
         raise BadInput(f"vector = {group}/{number}, must be one of the corpus")
+    if f"{group}/{number}" in KEPT:
+        return next(vector for vector in load("stress", FOLDER) if vector.id == f"{group}/{number}")
     return makers[number - 1](number)
 
 
@@ -115,7 +124,7 @@ def _made(most: int | None, n_jobs: int) -> dict[str, list[Vector]]:
 
 def _summary(files: Mapping[str, list[Vector]]) -> str:
     kinds = Counter((vector.kind, vector.level) for vectors in files.values() for vector in vectors)
-    names = {"step": "steps", "trajectory": "trajectories"}
+    names = {"step": "steps", "trajectory": "trajectories", "flow": "flows"}
     return ", ".join(f"{n} {level} {names[kind]}" for (kind, level), n in sorted(kinds.items()))
 
 

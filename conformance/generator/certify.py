@@ -9,15 +9,18 @@ first; and the written enclosures are re-proved along the whole path by `second_
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from math import fsum, inf, isfinite
+from collections.abc import Callable, Sequence
+from fractions import Fraction
+from math import inf
 from typing import Any, Literal, NamedTuple
 
 import msgspec
 
 import reference
-from conformance.generator.prover import ask, coasted, collided, ends, expectation, flight_of
-from conformance.grading.error import Matrix, condition_number, free_flight, inputs_of, moved
+from conformance.generator.links import Links, Unfit, condition, finite
+from conformance.generator.prover import ask, collided, expectation, flight_of
+from conformance.generator.stays import Mark, OpenSign, arrival, marks, stays, timing_condition
+from conformance.grading.error import inputs_of
 from conformance.second_proof.chain import recheck
 from conformance.second_proof.step import check
 from conformance.second_proof.trajectory import check_path
@@ -27,6 +30,7 @@ from scene import BadInput, InvalidState, Rejected, Scene, State, Undecided, Und
 
 NUDGES: tuple[tuple[Level, float], ...] = (("core", 2.0**-30), ("extended", 2.0**-44))
 CONDITIONS = {"core": 1e6, "extended": 1e12}
+WIDEST = Fraction(1, 2**72)  # of an enclosure of a path: a millionth of a backward ulp and less
 LONGEST = 1e8  # condition number up to which a trajectory is followed
 INFINITE = 1e300
 # Pairs, so that one of each pair lies on either side of a tie; a trajectory takes the first pair.
@@ -44,10 +48,11 @@ class Question(NamedTuple):
         scene: the wire's form.
         state: the start.
         t_end: horizon [time].
-        collisions: None for a step; for a trajectory how many are tried.
+        collisions: None for a step; for a trajectory how many are tried, for a flow how many at most.
         also: outcomes that are right beside the proved one.
         level: None to measure it.
-        longest: condition number up to which a trajectory is followed.
+        longest: condition number up to which a trajectory or a flow is followed.
+        flow: None when it is none; else which of its collisions' marks (`stays.marks`) are looked for.
     """
 
     group: str
@@ -60,10 +65,7 @@ class Question(NamedTuple):
     also: tuple[Outcome, ...] = ()
     level: Level | None = None
     longest: float = LONGEST
-
-
-class Unfit(Exception):  # noqa: N818 (a finding about the draw)
-    """The question has no certified answer that fits its rule; another must be asked."""
+    flow: Callable[[Sequence[Mark]], bool] | None = None
 
 
 class _Proved(NamedTuple):
@@ -83,14 +85,13 @@ def certify(question: Question, number: int) -> Vector:
         Unfit: when there is no answer to certify.
         Refuted: when the second arithmetic does not confirm the first.
     """
-    is_path = question.collisions is not None
     scene: Scene | None = None
     try:
         scene = from_data(question.scene)
     except BadInput:
         proved = _Proved((Expectation("rejected"),))
     else:
-        proved = _trajectory(scene, question) if is_path else _step(scene, question)
+        proved = _step(scene, question) if question.collisions is None else _path(scene, question)
     also = [Expectation(kind) for kind in question.also]
     expect = tuple(dict.fromkeys([*proved.expect, *also]))
     if not expect:
@@ -99,7 +100,7 @@ def certify(question: Question, number: int) -> Vector:
         id=f"{question.group}/{number}",
         group=question.group,
         level="stress",
-        kind="trajectory" if is_path else "step",
+        kind=_kind(question),
         rule=question.rule,
         source=question.source,
         scene=question.scene,
@@ -110,6 +111,10 @@ def certify(question: Question, number: int) -> Vector:
         condition=four_digits(min(proved.condition, INFINITE)),
     )
     return msgspec.structs.replace(vector, level=question.level or _level(scene, vector))
+
+
+def _kind(question: Question) -> Literal["step", "trajectory", "flow"]:
+    return "step" if question.collisions is None else "flow" if question.flow else "trajectory"
 
 
 def _step(scene: Scene, question: Question) -> _Proved:
@@ -125,98 +130,69 @@ def _step(scene: Scene, question: Question) -> _Proved:
         # A stepper in binary64 may find the tie within rounding, and say no more than that.
         return _Proved((answer, Expectation("undecided")), inf)
     flight = flight_of(outcome, state, t_end)
-    allowance = _finite(flight.allowance(state))
-    return _Proved((answer,), _condition(flight.centre(), allowance))
+    allowance = finite(flight.allowance(state))
+    return _Proved((answer,), condition(flight.centre(), allowance))
 
 
-def _trajectory(scene: Scene, question: Question) -> _Proved:
-    """Follow a particle as far as the chained condition number allows, or to the horizon."""
+def _path(scene: Scene, question: Question, working: int | None = None) -> _Proved:
+    """Follow a particle as far as the chained condition number allows, or to the horizon.
+
+    `working` is the number of decimals to work with, by default what the reference takes. It answers for the
+    digits of the last collision asked for; a path that ends at a horizon may need more.
+    """
     assert question.collisions is not None
+    state, t_end = question.state, question.t_end
     try:
-        path = reference.trajectory(scene, question.state, question.collisions, question.t_end)
-    except InvalidState as error:
+        path = reference.trajectory(scene, state, question.collisions, t_end, working=working)
+        captured = marks(scene, path.steps) if question.flow else []
+    except (InvalidState, OpenSign) as error:
         raise Unfit(str(error)) from None
-    check_path(path_certificate(scene, question.state, question.t_end, path))
-    links = _Links(scene, question.state, question.t_end)
+    end = path.outcome
+    if question.flow and not (isinstance(end, reference.Horizon) and question.flow(captured)):
+        raise Unfit("not the flow that is looked for")
+    check_path(path_certificate(scene, state, t_end, path))
+    links = Links(scene, state, t_end, is_timed=question.flow is None)
     steps: list[Certified] = []
     for found in path.steps:
         allowance = links.add(found)
         if links.condition > question.longest:
             break
         links.largest = max(links.largest, links.condition)
-        steps.append(certified(collided(found), _finite(allowance), found.wall, is_wide=True))
-    if not steps:
+        steps.append(certified(collided(found), finite(allowance), found.wall, is_wide=True))
+    if len(steps) < (len(path.steps) if question.flow else 1):
         raise Unfit("no collision is met, or the first is too delicate")
-    expect = [Expectation("collision", tuple(steps))]
-    end = path.outcome if len(steps) == len(path.steps) else None
+    if len(steps) < len(path.steps):
+        end = None
     if isinstance(end, reference.Horizon):
-        steps.append(links.coast(end, path.steps[-1].after.t))
+        steps.append(links.coast(end, path.steps[-1].after.t if path.steps else None))
         links.largest = max(links.largest, links.condition)
-        expect = [Expectation("horizon", tuple(steps))]
-    elif isinstance(end, Undefined):
+    elif end is not None and not isinstance(end, Undefined):
+        raise Unfit("the reference is undecided")
+    if any(map(_is_wide, steps)):
+        return _path(scene, question, 2 * path.digits)
+    recheck(scene, state, t_end, steps, captured)
+    if question.flow:
+        arrived = arrival(steps, stays(captured))
+        largest = max(links.condition, timing_condition(arrived, state))
+        if largest > question.longest:
+            raise Unfit("the horizon is too delicate")
+        return _Proved((arrived,), largest, len(steps))
+    expect = [Expectation("horizon" if end else "collision", tuple(steps))]
+    if isinstance(end, Undefined):
         expect = [
             Expectation("undefined", tuple(steps), end.reason),
             Expectation("undecided", tuple(steps)),
         ]
-    elif end is not None:
-        raise Unfit("the reference is undecided")
-    recheck(scene, question.state, question.t_end, steps)
     return _Proved(tuple(expect), links.largest, len(steps) + isinstance(end, Undefined))
 
 
-class _Links:
-    """The steps of a trajectory: their Jacobians chained from each state that a stepper has held.
-
-    Each Jacobian is that of the step from the rounded state, with the residual of the wall moving along.
-    """
-
-    def __init__(self, scene: Scene, state: State, t_end: float) -> None:
-        self.scene, self.state, self.t_end = scene, state, t_end
-        self.held: list[tuple[Matrix, list[float]]] = []
-        self.condition = self.largest = 0.0
-
-    def add(self, found: reference.Collision) -> list[float]:
-        """Add a step: prove it again from the rounded state, and return what all rounding may do to it."""
-        proved = ask(self.scene, self.state, self.t_end)
-        if not isinstance(proved, reference.Collision) or proved.wall != found.wall:
-            raise Unfit("a rounded state takes another path")
-        check(certificate(self.scene, self.state, self.t_end, proved))
-        centre = [float(found.dt), *(float(c) for c in found.after[1:])]
-        allowance = self._chain(flight_of(proved, self.state, self.t_end).jacobian, centre)
-        self.state = found.rounded().state()
-        return allowance
-
-    def coast(self, horizon: reference.Horizon, since: reference.Enclosure) -> Certified:
-        """Return the horizon after the last collision, at time `since`."""
-        numbers = coasted(horizon, ends(since))
-        centre = [float(sum(numbers[name]) / 2) for name in NUMBERS]
-        allowance = self._chain(free_flight(self.state, centre[0]), centre)
-        return certified(numbers, _finite(allowance), None, is_wide=True)
-
-    def _chain(self, jacobian: Matrix, centre: list[float]) -> list[float]:
-        self.held.append(([[float(i == j) for j in range(5)] for i in range(5)], inputs_of(self.state)))
-        allowance = [0.0] * 5
-        for k, (earlier, inputs) in enumerate(self.held):
-            rows = [
-                [fsum(a * b[j] for a, b in zip(row, earlier, strict=True)) for j in range(5)]
-                for row in jacobian
-            ]
-            allowance = [a + moved(row, inputs) for a, row in zip(allowance, rows, strict=True)]
-            rows[0] = [a + b for a, b in zip(rows[0], earlier[0], strict=True)]
-            self.held[k] = (rows, inputs)
-        self.condition = _condition(centre, allowance)
-        return allowance
-
-
-def _condition(centre: Sequence[float], allowance: Sequence[float]) -> float:
-    # The inputs' part in each output is summed already.
-    return condition_number(centre, [[part] for part in allowance], [1.0])
-
-
-def _finite(allowance: Sequence[float]) -> Sequence[float]:
-    if not all(map(isfinite, allowance)):
-        raise Unfit("an allowance overflows")
-    return allowance
+def _is_wide(step: Certified) -> bool:
+    """Tell whether an enclosure is wider than a small part of what rounding may do."""
+    for name, allowance in zip(NUMBERS, step.allowance, strict=True):
+        low, high = step.ends(name)
+        if high - low > WIDEST * (Fraction(allowance) + max(abs(low), abs(high))):
+            return True
+    return False
 
 
 def _level(scene: Scene | None, vector: Vector) -> Level:
@@ -245,12 +221,13 @@ def _nudged(state: State, t_end: float, signs: Sequence[int], nudge: float) -> S
 
 
 def _walls_met(scene: Scene, vector: Vector, state: State) -> list[str]:
-    """Return the walls that a state meets, and how it ends."""
+    """Return the walls that a state meets, which hits are captured where that is asked, and how it ends."""
     if vector.kind == "step":
         outcome = reference.next_collision(scene, state, vector.t_end, digits=15)
         return [outcome.wall if isinstance(outcome, reference.Collision) else type(outcome).__name__]
     try:
         path = reference.trajectory(scene, state, vector.collisions, vector.t_end, digits=10)
-    except InvalidState:
+        found = marks(scene, path.steps) if vector.kind == "flow" else []
+    except (InvalidState, OpenSign):
         return ["Rejected"]
-    return [*(step.wall for step in path.steps), type(path.outcome).__name__]
+    return [*(step.wall for step in path.steps), *found, type(path.outcome).__name__]

@@ -15,6 +15,7 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple, TypeVar
 
 import msgspec
+from msgspec.structs import replace
 
 from scene import BangBang, Cap, Fourier, Law, Mushroom, Scene, State, Stem, Wall, to_data
 from scene.geometry import TableAt, rounded
@@ -22,6 +23,8 @@ from scene.laws import bounds, breakpoints
 from scene.tables import cycle_length, laws
 
 T = TypeVar("T")
+FEW_HARMONICS = ((1, 0), (0, 1), (1, 1), (2, 0), (0, 2), (2, 2), (1, 3))  # of cosines, of sines
+MANY_HARMONICS = ((4, 0), (0, 6), (5, 5), (8, 3), (16, 16))
 
 
 class Draw:
@@ -61,7 +64,11 @@ class Draw:
 
 
 class SharedPeriod(NamedTuple):
-    """What the moving laws of a scene share: kind, and omega or the period."""
+    """What the moving laws of a scene share: kind, and omega or the period.
+
+    Of kind "mixed" each law is of its own kind, and of "harmonics" a Fourier law of four to sixteen; both
+    share a period.
+    """
 
     kind: str
     rate: float
@@ -75,6 +82,9 @@ def clock(draw: Draw, kinds: Sequence[str] = ("fourier", "bang-bang", "constant"
 
 def law(draw: Draw, low: float, high: float, shared: SharedPeriod) -> Law:
     """Draw a law that stays within [low, high]; now and then one that stands still."""
+    if shared.kind == "mixed":
+        found = law(draw, low, high, shared._replace(kind=draw.pick(("fourier", "bang-bang", "constant"))))
+        return replace(found, omega=None, period=shared.rate) if isinstance(found, Fourier) else found
     if shared.kind == "constant" or draw.pick(range(6)) == 0:
         return draw.short(low, high)
     if shared.kind == "bang-bang":
@@ -84,10 +94,13 @@ def law(draw: Draw, low: float, high: float, shared: SharedPeriod) -> Law:
         values = [draw.short(low, high) for _ in times[1:]]
         return BangBang(knots=tuple(zip(times, [*values, values[0]], strict=True)))
     mean = draw.short(0.75 * low + 0.25 * high, 0.25 * low + 0.75 * high)
-    n_cos, n_sin = draw.pick(((1, 0), (0, 1), (1, 1), (2, 0), (0, 2), (2, 2), (1, 3)))
+    n_cos, n_sin = draw.pick(MANY_HARMONICS if shared.kind == "harmonics" else FEW_HARMONICS)
     size = 0.999 * min(high - mean, mean - low) / (n_cos + n_sin)
     amplitudes = [draw.short(-size, size) for _ in range(n_cos + n_sin)]
-    return Fourier(mean=mean, omega=shared.rate, cos=tuple(amplitudes[:n_cos]), sin=tuple(amplitudes[n_cos:]))
+    cos, sin = tuple(amplitudes[:n_cos]), tuple(amplitudes[n_cos:])
+    if shared.kind == "harmonics":
+        return Fourier(mean=mean, period=shared.rate, cos=cos, sin=sin)
+    return Fourier(mean=mean, omega=shared.rate, cos=cos, sin=sin)
 
 
 def scene(draw: Draw, table: str, shared: SharedPeriod) -> Scene:
@@ -186,7 +199,7 @@ def state(draw: Draw, scene: Scene, at: dict[str, Any]) -> tuple[State, float]:
     t = at["t"] if "t" in at else time(draw, scene)
     table = rounded(scene, t)
     site = at["site"] if "site" in at else draw.pick(sites(scene))
-    x, y = place(draw, table, site)
+    x, y = at["place"] if "place" in at else place(draw, table, site)
     factor = at["speed"] if "speed" in at else draw.power(-2, 12) * draw.between(1.0, 2.0)
     speed = factor * (walls_speed(scene) or table.size)
     vx, vy = (speed * c for c in draw.direction())

@@ -41,12 +41,15 @@ class VectorFamily(NamedTuple):
         n_vectors: how many.
         ask: from a stream of numbers to a question.
         wanted: the outcome it must have; None for any answer of a valid question.
+        first_attempts: for each number which draw is tried first, 0 by default. What a family looks for may
+            be rare: the plain stepper has been asked before, so that few draws are certified in vain.
     """
 
     group: str
     n_vectors: int
     ask: Ask
     wanted: str | None = None
+    first_attempts: tuple[int, ...] = ()
 
 
 def families() -> list[VectorFamily]:

@@ -54,8 +54,17 @@ def flight_of(outcome: reference.Collision | reference.Horizon, state: State, t_
         dt = Fraction(t_end) - Fraction(state.t)
         return ProvedFlight(None, _numbers((dt, dt), outcome.at), free_flight(state, float(dt)))
     assert outcome.jacobian is not None
-    jacobian = [[float(d) for d in row] for row in outcome.jacobian]
+    largest = max(abs(float(end)) for row in outcome.jacobian for d in row for end in d)
+    jacobian = [[_steepest(d, largest) for d in row] for row in outcome.jacobian]
     return ProvedFlight(outcome.wall, collided(outcome), jacobian)
+
+
+def _steepest(derivative: reference.Enclosure, largest: float) -> float:
+    """Return a derivative rounded; at a knot, where it is enclosed between two, the greater in size."""
+    low, high = float(derivative.lo), float(derivative.hi)
+    if high - low <= 2.0**-40 * largest:
+        return float(derivative)
+    return max(low, high, key=abs)
 
 
 def expectation(

@@ -26,6 +26,7 @@ from scene import Collision, Horizon, Outcome, Rejected, State, Undecided, Undef
 from scene.protocol.messages import Answered, AnsweredCollision
 
 BOUND = Fraction(1, 10**9)  # physics: far above rounding, far below any error of principle
+NEAR_HIT = Fraction(1, 10)  # of the flight time
 # dt, t, place, velocity: what is judged as one vector.
 VECTORS = (("dt",), ("t",), ("x", "y"), ("vx", "vy"))
 Kind = Literal["agrees", "numbers", "indeterminate", "wall", "outcome", "length", "undecided"]
@@ -130,7 +131,7 @@ def compare_arrival(
     Args:
         answer: the outcome at t_end.
         captured: begin and end of the first captured stay [time]; None without one.
-        expected: certified, with every collision on the way and the captured stays.
+        expected: certified, with the captured stays and the collisions that begin and end them.
         state: the start.
 
     Returns:
@@ -205,7 +206,8 @@ def _missed(answer: Answer, certified: Certified) -> str:
     ):
         return ""
     low, high = certified.ends("dt")
-    slack = BOUND * (Fraction(certified.allowance[0]) + abs(high))
+    near = NEAR_HIT if answer.wall == certified.wall else BOUND  # a little off, it is the same hit
+    slack = near * (Fraction(certified.allowance[0]) + abs(high))
     if Fraction(answer.dt) > high + slack:
         return ", an earlier hit was missed" if certified.wall else ", beyond t_end"
     return ", nothing is met so early" if Fraction(answer.dt) < low - slack else ""

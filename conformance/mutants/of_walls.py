@@ -207,7 +207,8 @@ class _Heedless(Flight):
             return None
 
     def require_clear(self, walls: Sequence[Wall], s: float) -> None:
-        return None
+        if self.is_horizon and s == self.end:
+            super().require_clear(walls, s)
 
 
 class MouthTestedAtDeparture(_Heedless):

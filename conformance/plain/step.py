@@ -95,8 +95,10 @@ class Flight:
             hit = self.first_hit(("left", "right"), 0.0, self.end)
             return Undefined("mouth-edge") if hit else self.horizon()
         near = self.walls_near(in_cap=self.is_in_cap)
+        if self.is_horizon and abs(self.crossing - self.end) <= ROUNDING * self.end:
+            raise Open("y = 0 is crossed at t_end within rounding")
         hit = self.first_hit(near, 0.0, min(self.crossing, self.end))
-        if hit is None and self.crossing <= self.end:
+        if hit is None and self.crossing < self.end:
             self.require_clear(near, self.crossing)
             if not self.is_mouth_open(self.crossing):
                 return self.collision("base", self.crossing)
@@ -337,17 +339,3 @@ def next_collision(scene: Scene, state: State, t_end: float, flight: type[Flight
         return Undecided(str(question))
     except OverflowError:
         return Undecided("a number overflows")
-
-
-def trajectory(
-    scene: Scene, state: State, n_collisions: int, t_end: float, flight: type[Flight] = Flight
-) -> list[Outcome]:
-    """Follow a particle: its collisions, and last what came instead of one."""
-    steps: list[Outcome] = []
-    while len(steps) < n_collisions:
-        outcome = next_collision(scene, state, t_end, flight)
-        steps.append(outcome)
-        if not isinstance(outcome, Collision):
-            break
-        state = outcome.state()
-    return steps

@@ -22,8 +22,18 @@ from conformance.vectors import Certified
 from scene import Scene, State, Wall
 
 
-def recheck(scene: Scene, state: State, t_end: float, steps: Sequence[Certified]) -> None:
+def recheck(
+    scene: Scene, state: State, t_end: float, steps: Sequence[Certified], marks: Sequence[str] = ()
+) -> None:
     """Prove that every written enclosure of a trajectory holds the truth.
+
+    Args:
+        scene: table and laws.
+        state: the exact start.
+        t_end: horizon [time].
+        steps: the enclosures of each collision, and of the horizon where it is met.
+        marks: of each collision of a flow: "captured" and "free" are claims about arc hits, and are proved;
+            what the walls alone tell is not looked at.
 
     Raises:
         Refuted: saying which one does not.
@@ -32,8 +42,9 @@ def recheck(scene: Scene, state: State, t_end: float, steps: Sequence[Certified]
         try:
             with precision(bits):
                 path = _WrittenPath(SignedFlight(Table(scene), line_of(state), state.wall))
-                for number, certified in enumerate(steps, 1):
-                    path.advance(certified, exact(t_end), f"step {number}")
+                told = itertools.chain(marks, itertools.repeat(""))
+                for number, (certified, mark) in enumerate(zip(steps, told, strict=False), 1):
+                    path.advance(certified, exact(t_end), f"step {number}", mark)
         except _NotShown:
             # Balls grow along a path: more bits may yet decide.
             if bits == 8192:
@@ -58,8 +69,8 @@ class _WrittenPath:
         if flight.wall is not None and flight.wall != "base":
             flight.residuals = {flight.wall: flight.jet(flight.wall, ZERO)[0]}
 
-    def advance(self, certified: Certified, t_end: fmpq, place: str) -> None:
-        """Prove one step and go on to the state after it."""
+    def advance(self, certified: Certified, t_end: fmpq, place: str, mark: str = "") -> None:
+        """Prove one step, and its mark if it has one, and go on to the state after it."""
         f, wall = self.flight, certified.wall
         low, high = (exact(Fraction(end)) for end in certified.dt)
         if wall is None:
@@ -71,6 +82,8 @@ class _WrittenPath:
         else:
             low, high = self._root(wall, low, high, place)
             s, centre = hull(low, high), (low + high) / 2
+        if mark in ("captured", "free"):
+            self._require_mark(mark, s, place)
         x, y = f.place(s)
         vx, vy = (f.line.vx, f.line.vy) if wall is None else f.reflected(wall, s)
         numbers = {"dt": s + self.since, "x": x, "y": ZERO if wall == "base" else y, "vx": vx, "vy": vy}
@@ -82,6 +95,16 @@ class _WrittenPath:
                 raise _NotShown(f"{place}: {name} is not shown to be what was written")
         if wall is not None:
             self._go_on(wall, centre, centre - s, numbers)
+
+    def _require_mark(self, mark: str, s: Number, place: str) -> None:
+        """Prove that an arc hit is captured, or that it is not: |x vy - y vx| > w |v| before the bounce."""
+        f, line = self.flight, self.flight.line
+        spin, width = line.x * line.vy - line.y * line.vx, f.width(s)[0]
+        excess = spin * spin - width * width * (line.vx * line.vx + line.vy * line.vy)
+        if excess < 0 if mark == "captured" else excess > 0:
+            raise Refuted(f"{place}: the arc hit is not {mark}")
+        if not (excess > 0 or excess < 0):
+            raise _NotShown(f"{place}: the arc hit is not shown to be {mark}")
 
     def _root(self, wall: Wall, low: fmpq, high: fmpq, place: str) -> tuple[fmpq, fmpq]:
         """Enclose the wall's root near the written flight time, proved to be one and falling."""

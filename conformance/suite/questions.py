@@ -17,7 +17,6 @@ from scene.geometry import table_at
 from scene.tables import Cap, Stem
 
 FOREVER = sys.float_info.max  # t_end of a question that only collisions end
-PIECE = 10_000  # collisions in one answer
 STANDING: tuple[Scene, ...] = (
     Mushroom(r=1.0, w=0.5, h=1.0),
     Cap(r=1.0),
@@ -106,19 +105,15 @@ def _check_ending(found: Sequence[Outcome], n: int) -> None:
 
 
 def last_collision(session: Session, scene: Scene, state: State, n: int) -> Collision:
-    """Follow n collisions in pieces, and return the last.
+    """Follow n collisions, and return the last.
 
     Raises:
         Trouble: as `follow`; fail when there is another end to it.
     """
-    while True:
-        last = follow(session, scene, state, min(n, PIECE))[-1]
-        if not isinstance(last, Collision):
-            raise Trouble("fail", f"a collision must come, and {last} is answered")
-        n -= PIECE
-        if n <= 0:
-            return last
-        state = last.state()
+    last = follow(session, scene, state, n)[-1]
+    if not isinstance(last, Collision):
+        raise Trouble("fail", f"a collision must come, and {last} is answered")
+    return last
 
 
 def distance(scene: Scene, a: Outcome, b: Outcome) -> float:

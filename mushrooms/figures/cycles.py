@@ -11,9 +11,8 @@ from mpmath import fp
 from scipy.stats import norm
 
 import theory
-from conformance.audit.claims import broadened
+from conformance.audit.claims.broadened import predicted, summed
 from conformance.audit.claims.finite_energy import width
-from conformance.audit.claims.many_cycles import blur_of_sum
 from conformance.audit.claims.misprints import volume_loop
 from conformance.audit.evidence import energies_of
 from conformance.audit.runs import scene_of
@@ -25,6 +24,8 @@ from scene.laws import value
 from scene.tables import Mushroom
 
 N_BINS = 80
+LEAST_EXPECTED = 5.0  # particles in a bin, to speak of standard errors
+N_SUM_BINS = 300
 N_LOOP = 240
 N_PHASES = 6
 
@@ -85,34 +86,56 @@ def gain_of_capture() -> Figure:
 
 
 def energies(samples: list[Sample]) -> Figure:
-    """Draw histograms of log E1/E0 with theory over them."""
-    figure, axes = new_figure(9.6, 3.6, 1, len(samples))
-    for panel, sample in zip(np.atleast_1d(axes), samples, strict=True):
-        _energies(panel, sample)
-    np.atleast_1d(axes)[0].legend(loc="best")
+    """Draw histograms of log E1/E0 with theory over them, and below what is left, in standard errors."""
+    figure, _ = new_figure(4.8 * len(samples), 4.8)
+    figure.clear()
+    axes = figure.subplots(2, len(samples), height_ratios=[3, 1], sharex="col", squeeze=False)
+    for (panel, rest), sample in zip(axes.T, samples, strict=True):
+        _energies(panel, rest, sample)
+    axes[0, 0].legend(loc="best")
     return figure
 
 
-def _energies(axes: Axes, sample: Sample) -> None:
+def _energies(axes: Axes, rest: Axes, sample: Sample) -> None:
     prediction = theory.predict(scene_of(sample.run), 15)
-    sigma, centre, p_nc = width(sample).value, float(prediction.log_e_nc), float(prediction.p_nc)
+    found, centre = predicted(sample), float(prediction.log_e_nc)
+    sigma = found.peak[1] ** 0.5
     low, high = (float(np.quantile(sample.gain, q)) for q in (0.0005, 0.9995))
     edges = np.linspace(low - sigma, high + sigma, N_BINS + 1)
     heights = _bars(axes, sample.gain, edges, sample.n)
+    counts, width_of_bin = heights * sample.n * (edges[1] - edges[0]), edges[1] - edges[0]
+    axes.errorbar(
+        (edges[1:] + edges[:-1]) / 2,
+        heights,
+        np.sqrt(counts) / (sample.n * width_of_bin),
+        fmt="none",
+        ecolor=BLUE,
+        elinewidth=0.7,
+    )
+    _residuals(rest, counts, np.diff(found.cdf(edges)) * sample.n, edges)
     x = np.linspace(edges[0], edges[-1], 1500)
-    below = broadened.captured(sample)[0]
-    total = (1 - p_nc) * np.gradient(below(x), x) + p_nc * norm.pdf(x, centre + sigma**2 / 4, sigma)
-    axes.plot(x, total, color=BLACK, linewidth=1.3, label=f"theory, blurred by {sigma:.4f}")
+    total = np.gradient(found.cdf(x), x)
+    axes.plot(x, total, color=BLACK, linewidth=1.3, label=f"theory at this energy, peak {sigma:.4f} wide")
     sharp = np.diff(energies_of(sample.run.name).captured_below(x)) / np.diff(x)
     axes.plot((x[1:] + x[:-1]) / 2, sharp, color=ORANGE, linewidth=1.2, label="theory, captured, sharp")
     axes.axvline(centre, color=ORANGE, linestyle="--", linewidth=1.2, label="theory, never captured")
     axes.set(
         xlim=(edges[0], edges[-1]),
         ylim=(0, 1.15 * max(heights.max(), total.max())),
-        xlabel="log E1/E0",
         ylabel="density",
         title=f"{sample.run.scene}, E0 = {sample.run.energy:.0e}, {sample.n:,} particles",
     )
+
+
+def _residuals(axes: Axes, counts: FloatArray, expected: FloatArray, edges: FloatArray) -> None:
+    """Draw counts less those expected, in standard errors, where a bin expects enough for that to mean it."""
+    enough = expected >= LEAST_EXPECTED
+    left = np.where(enough, (counts - expected) / np.sqrt(np.where(enough, expected, 1.0)), np.nan)
+    axes.axhspan(-2, 2, color=SKY, alpha=0.5, linewidth=0)
+    axes.axhline(0, color=BLACK, linewidth=0.8)
+    axes.plot((edges[1:] + edges[:-1]) / 2, left, ".", color=BLUE, markersize=4)
+    reach = max(4.0, 1.1 * float(np.nanmax(np.abs(left)))) if enough.any() else 4.0
+    axes.set(xlabel="log E1/E0", ylabel="pull", ylim=(-reach, reach))
 
 
 def capture_times(samples: list[Sample]) -> Figure:
@@ -142,16 +165,13 @@ def sums(cases: list[tuple[Sample, int]]) -> Figure:
 
 def _sum(axes: Axes, sample: Sample, n: int, scale: str) -> None:
     total = sample.s[:, n - 1] / n
-    k = [float(c) for c in theory.cumulants(scene_of(sample.run), 2)]
-    noise, bias, _ = blur_of_sum(sample, n)
-    places, below = broadened.summed(sample.run.name, n, noise, bias)
-    x = (places[1:] + places[:-1]) / 2 / n
-    density = np.diff(below) / np.diff(places) * n
-    sd = float(np.hypot(np.sqrt(k[2] * n), noise)) / n
-    centre = k[1] + bias / n
+    drawn = summed(sample.run.name, n)
+    centre, sd = drawn.mean / n, drawn.sd / n
+    density, places = np.histogram(drawn.values / n, N_SUM_BINS, density=True)
+    x = (places[1:] + places[:-1]) / 2
     edges = np.linspace(centre - 5 * sd, centre + 5 * sd, 51)
     _bars(axes, total, edges, sample.n, baseline=1e-9)
-    axes.plot(x, density, color=BLACK, linewidth=1.3, label="convolution of n cycles")
+    axes.plot(x, density, color=BLACK, linewidth=1.3, label="sums of n cycles, by theory")
     axes.plot(x, norm.pdf(x, centre, sd), color=ORANGE, linestyle="--", linewidth=1.2, label="Gaussian")
     top = float(norm.pdf(0) / sd)
     axes.set(

@@ -70,8 +70,9 @@ def on(cmd: str, change: Callable[[Line, Line], Line]) -> Fault:
 
 def absent_is_arc(request: Line, answer: Callable[[Line], Line]) -> Line:
     """Take a wall that is not named for the arc."""
-    if isinstance(request.get("state"), dict) and "wall" not in request["state"]:
-        request["state"]["wall"] = "arc"
+    state = request.get("state")
+    if request.get("cmd") == "step" and isinstance(state, dict) and "wall" not in state:
+        state["wall"] = "arc"
     return answer(request)
 
 

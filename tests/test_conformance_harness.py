@@ -8,21 +8,23 @@ import subprocess
 import pytest
 
 from conformance import vectors
-from conformance.harness.examples import Example, find_examples
+from conformance.harness.examples import Example, find_examples, find_kit_examples
 from conformance.suite import property_checks
 from conformance.suite import run as suite
 from scene.load import read_data
 
-LANGUAGES = ("Python", "C", "JavaScript")
+KITS = ("C++, next hit", "Python, implicit domain", "Python, intersection and reflection")
+LANGUAGES = ("Python", "C", "JavaScript", *KITS)
 # One vector in so many, to save time; `mushrooms check` grades them with all.
-EVERY = {"Python": 16, "C": 3, "JavaScript": 6}
+EVERY = {"Python": 16, "C": 3, "JavaScript": 6, **dict(zip(KITS, (3, 24, 16), strict=True))}
 STRICT = ("-O3", "-Wall", "-Wextra", "-Werror")
 
 
 @pytest.fixture(scope="session")
 def commands(tmp_path_factory) -> dict[str, Example]:
     """Return each example's command, or why it cannot run here."""
-    return find_examples(tmp_path_factory.mktemp("c"), STRICT)
+    folder = tmp_path_factory.mktemp("built")
+    return find_examples(folder, STRICT) | find_kit_examples(folder, STRICT)
 
 
 def runnable(example: Example) -> list[str]:

@@ -42,15 +42,37 @@ def find_examples(folder: Path, flags: Sequence[str] = ("-O3",)) -> dict[str, Ex
     }
 
 
+def find_kit_examples(folder: Path, flags: Sequence[str] = ("-O3",)) -> dict[str, Example]:
+    """Return the examples of the adapter kits, by what the engine gives; as `find_examples`."""
+    python = FOLDER / "python"
+    return {
+        "C++, next hit": _build_cpp(folder, flags),
+        "Python, implicit domain": Example((sys.executable, str(python / "implicit.py"))),
+        "Python, intersection and reflection": Example((sys.executable, str(python / "parts.py"))),
+    }
+
+
 def _build_c(folder: Path, flags: Sequence[str]) -> Example:
     compiler = shutil.which("gcc") or shutil.which("cc")
     if not compiler:
         return Example((), "no C compiler is installed")
-    source, program = FOLDER / "c" / "stepper.c", folder / "stepper"
-    line = [*flags, "-std=gnu11", "-o", str(program), str(source), "-ljansson", "-lm"]
-    done = subprocess.run([compiler, *line], capture_output=True, text=True, check=False)
+    built = _build(compiler, [*flags, "-std=gnu11"], FOLDER / "c" / "stepper.c", folder, ["-ljansson", "-lm"])
+    if "jansson.h" in built.why_not:
+        return Example((), "jansson.h is not installed (Debian: libjansson-dev)")
+    return built
+
+
+def _build_cpp(folder: Path, flags: Sequence[str]) -> Example:
+    compiler = shutil.which("g++") or shutil.which("c++")
+    if not compiler:
+        return Example((), "no C++ compiler is installed")
+    return _build(compiler, [*flags, "-std=c++17"], FOLDER / "cpp" / "engine.cpp", folder, [])
+
+
+def _build(compiler: str, flags: list[str], source: Path, folder: Path, libraries: list[str]) -> Example:
+    program = folder / source.stem
+    line = [compiler, *flags, "-o", str(program), str(source), *libraries]
+    done = subprocess.run(line, capture_output=True, text=True, check=False)
     if done.returncode:
-        if "jansson.h" in done.stderr:
-            return Example((), "jansson.h is not installed (Debian: libjansson-dev)")
-        return Example((), f"it does not compile: {' '.join(done.stderr.split())[:200]}")
-    return Example((str(program),), built=" ".join([Path(compiler).name, *flags, "stepper.c -ljansson -lm"]))
+        return Example((), f"it does not compile: {' '.join(done.stderr.split())[:400]}")
+    return Example((str(program),), built=" ".join([Path(compiler).name, *flags, source.name, *libraries]))

@@ -2,13 +2,13 @@
 
 Copy this file, or import it. An engine gives one of two things:
 
-    serve_engine(name, next_hit)            (scene, t, x, y, vx, vy) -> (t, x, y, vx, vy) after its next hit
+    serve_engine(name, next_hit)            (scene, state) -> (t, x, y, vx, vy) just after its next hit
     serve_parts(name, intersect, reflect)   the first crossing of one wall, and the bounce off it
 
 The kit reads and checks the questions, keeps the horizon, names the wall (least |f| / |grad f| at the place
 of the hit), chains trajectories, times them, and refuses what is no state of the scene. Where rounding leaves
-two answers open it says `undecided`; so may an engine, by raising `Open`. What an engine returns that is no
-hit (nan, a time that has passed) is answered as a failure of its own.
+two answers open it says `undecided`; so may an engine, by raising `Open`. What it returns that is no hit
+(nan, a time that has passed) is answered as a failure of its own.
 Not offered: `flow`.
 """
 
@@ -20,6 +20,7 @@ from collections.abc import Callable
 from time import perf_counter_ns
 
 from mpmath import fp
+from msgspec.structs import replace
 
 from scene import Cap, Horizon, Mushroom, Outcome, Rejected, Scene, State, Undecided, Undefined, Wall
 from scene.geometry import TableAt, table_at
@@ -31,8 +32,9 @@ from scene.tables import laws
 
 ROUNDING = 2.0**-44  # of the table's size: nearer to a wall than this, a place may be on either side of it
 TIE = 2.0**-46  # relative: hits nearer to each other than this may come in either order
+LARGEST = 1e100  # squares of numbers far beyond overflow
 Hit = tuple[float, float, float, float, float]  # t, x, y, vx, vy, after the bounce
-NextHit = Callable[[Scene, float, float, float, float, float], Hit | None]
+NextHit = Callable[[Scene, State], Hit | None]
 # (scene, wall, state, after, until) -> the first s, after < s <= until, at which the wall's f falls through
 # 0, at the time state.t + s, on the line of the flight, wherever the wall ends; None for none. On state.wall
 # f(0) is 0.
@@ -50,12 +52,12 @@ def serve_engine(name: str, next_hit: NextHit) -> None:
 
     Args:
         name: of the engine.
-        next_hit: (scene, t, x, y, vx, vy) -> t, x, y, vx, vy just after the next hit. It is not told the wall
-            that the particle is leaving: a place on a wall, and a velocity off it, tell that.
+        next_hit: (scene, state) -> t, x, y, vx, vy just after the next hit, however late. state.wall is the
+            wall that the particle leaves; an engine that has no use for it takes the other five.
     """
 
     def step(scene: Scene, state: State, t_end: float) -> Answered | Outcome:
-        return judged(scene, state, t_end) or _answer_of(next_hit, scene, state, t_end)
+        return judged(scene, state, t_end) or _answer_of(next_hit, scene, leaving(scene, state), t_end)
 
     _serve(name, step)
 
@@ -71,7 +73,8 @@ def serve_parts(name: str, intersect: Intersect, reflect: Reflect) -> None:
 
     def step(scene: Scene, state: State, t_end: float) -> Answered | Outcome:
         try:
-            return judged(scene, state, t_end) or _first_of(intersect, reflect, scene, state, t_end)
+            start = leaving(scene, state)
+            return judged(scene, state, t_end) or _first_of(intersect, reflect, scene, start, t_end)
         except Open as question:
             return Undecided(str(question))
 
@@ -85,13 +88,12 @@ def judged(scene: Scene, state: State, t_end: float) -> Outcome | None:
         BadInput: numbers that are none; `serve` answers `rejected`.
     """
     check_numbers(scene, state, t_end)
-    table, wall = table_at(fp, scene, state.t), state.wall
+    if max(abs(number) for number in (state.x, state.y, state.vx, state.vy)) > LARGEST:
+        return Undecided(f"numbers beyond {LARGEST:g} may overflow")
+    table, wall = table_at(fp, scene, state.t), leaving(scene, state).wall
     place = f"state (x, y) = ({state.x!r}, {state.y!r}) at t = {state.t!r}"
-    if wall is None and state.y == 0:
-        if not isinstance(scene, Mushroom):
-            wall = "base"
-        elif state.vy == 0:
-            return Undecided("it flies along the mouth")
+    if wall is None and state.y == state.vy == 0:
+        return Undecided("it flies along the mouth")
     size = float(table.size) + abs(state.t) * _rates(table, state)
     for other in near_walls(scene, is_in_cap(scene, state)):
         gap = gap_at(table, other, state.x, state.y)
@@ -109,6 +111,12 @@ def judged(scene: Scene, state: State, t_end: float) -> Outcome | None:
     if rate < 0:
         return Rejected(f"state.wall = {wall!r}: the particle moves into it")
     return None if rate else Undecided(f"it rests on wall {wall}")
+
+
+def leaving(scene: Scene, state: State) -> State:
+    """Return a state that names its wall: on y = 0 of a cap or a stem that is the base, said or not."""
+    is_on_base = state.wall is None and state.y == 0 and not isinstance(scene, Mushroom)
+    return replace(state, wall="base") if is_on_base else state
 
 
 def gap_at(table: TableAt, wall: Wall, x: float, y: float) -> float:
@@ -139,9 +147,11 @@ def near_walls(scene: Scene, is_in_cap: bool) -> tuple[Wall, ...]:
 
 def _answer_of(next_hit: NextHit, scene: Scene, state: State, t_end: float) -> Answered:
     try:
-        hit = next_hit(scene, state.t, state.x, state.y, state.vx, state.vy)
+        hit = next_hit(scene, state)
     except Open as question:
         return Undecided(str(question))
+    except (ArithmeticError, ValueError) as error:  # of its arithmetic: it has no answer
+        raise OwnFailure(f"the engine raised {type(error).__name__}: {error}") from None
     if hit is not None and not (all(map(math.isfinite, hit)) and hit[0] >= state.t):
         raise OwnFailure(f"the engine returned {hit}")
     if hit is None or hit[0] >= t_end:

@@ -258,7 +258,8 @@ def check_symplectic(
     gap = max(abs(a - b) for rows in zip(coarse, fine, strict=True) for a, b in zip(*rows, strict=True))
     # The time of the hit is rounded like t, whatever the stepper.
     noise = bound + 2.0**-50 * max(abs(begin.t), abs(end)) / scale.time
-    allowed = 16 * max(entries) * gap + SLACK * max(entries) ** 2 * noise / STEP
+    largest = max(entries)
+    allowed = 16 * largest * gap + SLACK * largest * largest * noise / STEP
     for i in range(4):
         for j in range(i):
             form = sum(M[k][i] * M[k + 2][j] - M[k + 2][i] * M[k][j] for k in (0, 1))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import shlex
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -18,16 +19,22 @@ from scene.files import write_file
 from scene.refusal import BadInput
 
 if TYPE_CHECKING:
-    from conformance.suite.run import Run
+    from conformance.suite.result import Run
 
+LONGEST = 7 * 86_400  # seconds
 MAX_SHOWN = 20  # objections on the terminal; all are in the reports
+MAX_TAUGHT = 5  # of them with what was given and what is certified
 COLOURS = {"pass": "green", "declined": "yellow", "unsupported": "yellow"}
 
 
 def check(
     command: Annotated[list[str], typer.Argument(metavar="-- COMMAND...", help="Speaks protocol 1.")],
     level: Annotated[str, typer.Option(help="core, extended or stress.")] = "core",
+    seed: Annotated[int | None, typer.Option(help="Of all that is drawn; a new one each run.")] = None,
     timeout: Annotated[float, typer.Option(help="Seconds for one answer, compilation included.")] = 120.0,
+    total: Annotated[
+        float | None, typer.Option(help="Seconds for the whole run; no limit by default.")
+    ] = None,
     restarts: Annotated[int, typer.Option(help="Fresh processes after the first, 0 to 1000.")] = 10,
     groups: Annotated[str, typer.Option(help="Groups of vectors, with commas; all by default.")] = "",
     known_failures: Annotated[
@@ -36,65 +43,77 @@ def check(
     json_file: Annotated[Path | None, typer.Option("--json", metavar="FILE", help="JSON report.")] = None,
     junit: Annotated[Path | None, typer.Option(metavar="FILE", help="JUnit XML report.")] = None,
     html: Annotated[Path | None, typer.Option(metavar="FILE", help="HTML report.")] = None,
+    badge: Annotated[Path | None, typer.Option(metavar="FILE", help="Badge (SVG) to publish.")] = None,
+    summary: Annotated[Path | None, typer.Option(metavar="FILE", help="Verdict and scope as JSON.")] = None,
 ) -> None:
     """Grade a stepper in any language: a command that speaks protocol 1 on stdin and stdout.
 
+    Every question is asked in disguise, drawn from a seed that is printed: --seed repeats a run.
     Exit code 0 when everything passes, 1 when something fails, 2 when the options or the suite are at fault.
     """
     from conformance import suite
     from conformance.suite.session import Limits
 
-    if not (math.isfinite(timeout) and 0 < timeout <= 86_400):
-        raise BadInput(f"--timeout = {timeout}, must be > 0 and at most 86400 seconds")
+    for name, seconds in (("--timeout", timeout), ("--total", total)):
+        if seconds is not None and not (math.isfinite(seconds) and 0 < seconds <= LONGEST):
+            raise BadInput(f"{name} = {seconds}, must be > 0 and at most {LONGEST} seconds")
     if not 0 <= restarts <= 1000:
         raise BadInput(f"--restarts = {restarts}, must be 0 to 1000")
-    files = {
-        path: suffix for path, suffix in ((json_file, ".json"), (junit, ".xml"), (html, ".html")) if path
-    }
-    for path, suffix in files.items():
+    asked_for = zip((json_file, junit, html, badge, summary), _writers(), strict=True)
+    files = [(path, suffix, content) for path, (suffix, content) in asked_for if path]
+    for i, (path, suffix, _) in enumerate(files):
         output.check_file(path, (suffix,))
+        if path in [other for other, _, _ in files[:i]]:
+            raise BadInput(f"output {str(path)!r} is asked for twice, must be a file for each report")
     known = suite.read_known(known_failures) if known_failures else frozenset()
     with progress_bar() as bar:
         task = bar.add_task("cases", total=None)
         run = suite.check(
             command,
             level=level,
+            seed=seed,
             groups=[name.strip() for name in groups.split(",") if name.strip()],
-            limits=Limits(timeout, restarts),
+            limits=Limits(timeout, restarts, total),
             known=known,
             progress=lambda n_done, n_total: bar.update(task, completed=n_done, total=n_total),
         )
-    for path, suffix in files.items():
-        write_file(path, _content(run, suffix))
+    for path, _, content in files:
+        write_file(path, content(run))
     show(run)
     raise typer.Exit(run.exit_code())
 
 
-def _content(run: Run, suffix: str) -> bytes:
-    from conformance.suite import reports
-    from mushrooms.reports import check_page
+def _writers() -> tuple[tuple[str, Callable[[Run], bytes | str]], ...]:
+    """Return the ending and the content of each report file, in the order of the options."""
+    from conformance.suite import badge, reports
 
-    if suffix == ".json":
-        return reports.to_json(run)
-    return reports.to_junit(run) if suffix == ".xml" else check_page.to_html(run)
+    def to_html(run: Run) -> bytes:
+        from mushrooms.reports import check_page  # it draws, and drawing takes a second to import
+
+        return check_page.to_html(run)
+
+    kinds = reports.to_json, reports.to_junit, to_html, badge.svg, badge.summary
+    return tuple(zip((".json", ".xml", ".html", ".svg", ".json"), kinds, strict=True))
 
 
 def show(run: Run) -> None:
     """Print verdicts by group, with every denominator, and what stands against success."""
     from conformance.suite import reports
-    from conformance.suite.run import VERDICTS
+    from conformance.suite.result import VERDICTS
 
     groups = [*(reports.summarise(run, group) for group in run.groups()), reports.summarise(run)]
     seen = [verdict for verdict in VERDICTS if verdict == "pass" or groups[-1].counts[verdict]]
-    table = Table("group", "cases", *seen, "worst ulps", "class", title=_title(run))
+    table = Table("group", "cases", *seen, "worst ulps", "A/B/C", "class", title=_title(run))
     for column in table.columns[1:]:
         column.justify = "right"
     for group in groups:
         cells = [_cell(verdict, group.counts[verdict]) for verdict in seen]
         worst = "inf" if group.worst_ulps is None else f"{group.worst_ulps:.3g}"
         table.add_section() if group is groups[-1] else None
+        graded = group.precision != "–"
+        counts = "/".join(map(str, group.classes.values())) if graded else "–"
         table.add_row(
-            group.group, str(group.cases), *cells, "–" if group.precision == "–" else worst, group.precision
+            group.group, str(group.cases), *cells, worst if graded else "–", counts, group.precision
         )
     console = Console(width=None if Console().is_terminal else 140, soft_wrap=True, highlight=False)
     console.print(table)
@@ -106,12 +125,34 @@ def show(run: Run) -> None:
     for result in run.results:
         if result.group == "profile" and result.verdict == "pass":
             console.print(f"{result.id}: {result.why}.")
+    _show_objections(console, run)
+    console.print(_verdict(run, groups[-1]))
+    colour = "green" if run.exit_code() == 0 else "red"
+    console.print(f"[bold {colour}]{run.verdict()}[/]: {escape(str(run.scope()))}")
+
+
+def _show_objections(console: Console, run: Run) -> None:
+    """Print why the run does not succeed: what was given beside what is certified, and what fails alike."""
     objections = run.objections()
     for line in objections[:MAX_SHOWN]:
         console.print(f"[red]{escape(line)}[/]")
     if len(objections) > MAX_SHOWN:
         console.print(f"... and {len(objections) - MAX_SHOWN} more: --json FILE has them all.")
-    console.print(_verdict(run, groups[-1]))
+    for result in [r for r in run.results if r.expected and not r.is_known and not r.is_right][:MAX_TAUGHT]:
+        console.print(f"{result.id}, asked {escape(result.asked)}; mushrooms ask {result.id} prints it")
+        console.print(f"  given     {escape(in_one_line(result.given))}")
+        console.print(f"  certified {escape(in_one_line(result.expected))}")
+    for line in run.diagnosis:
+        console.print(f"[yellow]{escape(line)}[/]")
+
+
+def in_one_line(outcome: dict[str, Any] | None) -> str:
+    """Return an outcome's fields on a line."""
+    if outcome is None:
+        return "nothing"
+    return " ".join(
+        f"{name}={value!r}" if name != "outcome" else str(value) for name, value in outcome.items()
+    )
 
 
 def _title(run: Run) -> str:
@@ -126,9 +167,6 @@ def _cell(verdict: str, n: int) -> str:
 
 def _verdict(run: Run, total: Any) -> str:
     passed = f"{total.counts['pass']} of {total.cases} cases pass"
-    more = f", precision class {total.precision}" if total.precision != "–" else ""
-    more += f", {run.n_restarts} restarts" if run.n_restarts else ""
-    words = {0: "[bold green]accepted[/]", 1: "[bold red]not accepted[/]"}
-    return f"{passed}{more}, {run.seconds:.1f} s: " + words.get(
-        run.exit_code(), "[bold red]undecided: the corpus could not tell, which is its own fault[/]"
-    )
+    restarts = f", {run.n_restarts} restarts" if run.n_restarts else ""
+    doubt = ": the corpus could not tell, which is its own fault" if run.exit_code() == 2 else ""
+    return f"{passed}{restarts}, {run.seconds:.1f} s{doubt}."

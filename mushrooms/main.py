@@ -17,6 +17,7 @@ from rich.table import Table
 import mushrooms
 import scene as scenes
 from mushrooms import output
+from mushrooms.ask import ask
 from mushrooms.attack import attack
 from mushrooms.audit import audit
 from mushrooms.bench import bench
@@ -253,6 +254,7 @@ app.command(epilog="Example: mushrooms attack --family knot-at-event --cases 200
 app.command(epilog="Example: mushrooms audit --only X2,L4 --out audit-report")(audit)
 app.command(epilog="Example: mushrooms bench --quick --out bench-report")(bench)
 app.command(epilog="Example: mushrooms check --html report.html -- ./my_stepper")(check)
+app.command(epilog="Example: mushrooms ask near-corner/3 -- ./my_stepper")(ask)
 
 
 def _check_range(option: str, value: int, low: int, high: int | None = None) -> None:

@@ -72,6 +72,21 @@ class TableAt(NamedTuple):
             return -y if isinstance(self.scene, Stem) else y
         return self.half_width(y) + (x if wall == "left" else -x)
 
+    def nearest_wall(self, x: float, y: float) -> Wall:
+        """Return the wall nearest to a place: least |f| / |grad f|, beyond the wall's ends more."""
+        above, below = max(0.0, y), max(0.0, -y)
+        distances: dict[Wall, float] = {}
+        if not isinstance(self.scene, Stem):
+            distances["arc"] = abs(self.r - math.hypot(x, y)) + below
+        if not isinstance(self.scene, Cap):
+            steep = math.sqrt(1 + self.slope * self.slope)
+            distances["left"] = abs(self.half_width(y) + x) / steep + above
+            distances["right"] = abs(self.half_width(y) - x) / steep + above
+            distances["floor"] = abs(y + self.h)
+        is_open = not isinstance(self.scene, Cap | Stem)
+        distances["base"] = abs(y) + (max(0.0, self.w - abs(x)) if is_open else 0.0)
+        return min(distances, key=lambda wall: distances[wall])
+
     def gap_rate(self, wall: Wall, x: Any, y: Any, vx: Any, vy: Any) -> Any:
         """Return d f / dt along a flight at (x, y) with velocity (vx, vy)."""
         if wall == "arc":

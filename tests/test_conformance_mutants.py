@@ -12,7 +12,7 @@ from conformance.mutants.kill_matrix import PLAIN, kills, table, verdict
 from conformance.vectors import load, manifest
 
 DOCS = Path(__file__).parent.parent / "docs"
-PUBLISHED = json.loads((DOCS / "kill-matrix.json").read_text("utf-8"))
+PUBLISHED = json.loads((kill_matrix.DATA / "kill-matrix.json").read_text("utf-8"))
 
 
 @pytest.fixture(scope="module")
@@ -82,7 +82,7 @@ def test_the_command_writes_both_files_and_judges(monkeypatch, tmp_path, vectors
     monkeypatch.setattr(kill_matrix, "load", lambda level: sample)
     monkeypatch.setattr(kill_matrix, "MUTANTS", {"base-closed": MUTANTS["base-closed"]})
     lines: list[str] = []
-    assert kill_matrix.run(tmp_path / "docs", lines.append) == 0
+    assert kill_matrix.run(tmp_path / "docs", tmp_path / "docs", lines.append) == 0
     written = json.loads((tmp_path / "docs" / "kill-matrix.json").read_text())
     assert written["mutants"]["base-closed"]["kills"] == len(sample)
     assert "| base-closed |" in (tmp_path / "docs" / "kill-matrix.md").read_text()
@@ -97,7 +97,7 @@ def test_a_survivor_makes_the_command_fail(monkeypatch, tmp_path, vectors):
     name = "wall-velocity-once"
     monkeypatch.setattr(kill_matrix, "load", lambda level: list(vectors.values())[:3])
     monkeypatch.setattr(kill_matrix, "MUTANTS", {name: MUTANTS[name]._replace(flight=PLAIN.flight)})
-    assert kill_matrix.run(tmp_path, lambda line: None) == 1
+    assert kill_matrix.run(tmp_path, tmp_path, lambda line: None) == 1
     assert json.loads((tmp_path / "kill-matrix.json").read_text())["survivors"] == [name]
     text = (tmp_path / "kill-matrix.md").read_text()
     assert "1 mutants" in text

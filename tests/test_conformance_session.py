@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import secrets
+from collections.abc import Iterator
 from pathlib import Path
 
+import msgspec
 import pytest
 from support.saboteurs import HONEST, SABOTEURS, command
 
-from conformance.suite import property_checks
+from conformance.suite import promises
 from conformance.suite import run as suite
+from conformance.suite.disguise import Disguise
 from conformance.suite.process import CommandNotFound, Trouble
 from conformance.suite.session import Limits, Session, probe_values, read_answer
 from conformance.vectors import Certified, Expectation, Vector
@@ -44,9 +47,11 @@ def made_up(number: int) -> Vector:
 @pytest.fixture
 def verdicts(monkeypatch):
     """Return what runs the suite on a saboteur and gives its results by case; nothing may be left running."""
-    token = f"SABOTAGE={secrets.token_hex(8)}"
-    monkeypatch.setenv(*token.split("="))
-    monkeypatch.setattr(property_checks, "N_QUESTIONS", 0)
+    monkeypatch.setenv("SABOTAGE", token := secrets.token_hex(8))
+    monkeypatch.setattr(promises, "ask_promises", lambda _: iter(()))
+    monkeypatch.setattr(suite, "N_STATES", 0)
+    monkeypatch.setattr(suite, "drawn_horizons", lambda *_: [])
+    monkeypatch.setattr(suite, "drawn_disguise", lambda *_: Disguise())  # saboteurs know one answer
     monkeypatch.setattr(suite, "choose", lambda *_: [made_up(i) for i in range(N)])
 
     def run(name: str, limits: Limits) -> suite.Run:
@@ -63,11 +68,12 @@ def verdicts(monkeypatch):
 
 
 def alive(token: str) -> list[int]:
-    """List the processes whose environment holds the token."""
+    """List the processes whose environment or arguments hold the token."""
     found = []
     for entry in Path("/proc").glob("[0-9]*"):
         try:
-            if token.encode() in (entry / "environ").read_bytes():
+            given = (entry / "environ").read_bytes() + (entry / "cmdline").read_bytes()
+            if token.encode() in given:
                 found.append(int(entry.name))
         except OSError:
             continue
@@ -81,6 +87,22 @@ def test_honest_ones_pass_whatever_their_manners(verdicts, name):
     assert run.exit_code() == 0
     assert len(run.stderr) < 100_000
     assert ("bytes left out" in run.stderr) == (name == "noise")
+    assert shows_no_controls(run)
+
+
+def shows_no_controls(run: suite.Run) -> bool:
+    """Tell whether all text of a run prints as it is; standard error keeps its lines."""
+    return all(text.isprintable() for text in texts(msgspec.to_builtins(run)) if text != run.stderr) and all(
+        line.isprintable() for line in run.stderr.replace("\t", " ").split("\n")
+    )
+
+
+def texts(data) -> Iterator[str]:
+    if isinstance(data, str):
+        yield data
+    elif isinstance(data, dict | list | tuple):
+        for part in data.values() if isinstance(data, dict) else data:
+            yield from texts(part)
 
 
 # What each saboteur gets for every question, and a word of the reason.
@@ -97,7 +119,7 @@ AT_EVERY_STEP = {
     "deep-nesting": ("wrong-format", "[[["),
     "nan": ("wrong-format", "JSON"),
     "infinity": ("wrong-format", "out of range"),
-    "number-as-text": ("wrong-format", "`float`"),
+    "number-as-text": ("wrong-format", "`float | null`"),
     "missing-field": ("wrong-format", "`vy`"),
     "unknown-wall": ("wrong-format", "lid"),
     "reason-of-its-own": ("wrong-format", "reason"),
@@ -106,6 +128,9 @@ AT_EVERY_STEP = {
     "close-stdout": ("crashed", "closed its standard output"),
     "fork-and-die": ("crashed", "exited with status 3"),
     "daemon": ("crashed", "exited with status 3"),
+    "orphan": ("crashed", "exited with status 3"),
+    "control-characters-in-errors": ("error", r"\x1b]0;owned\x07\x1b[2J \x9b31m\u202e \x00"),
+    "control-characters-in-reasons": ("fail", r"\x1b]0;owned\x07"),
 }
 
 
@@ -120,7 +145,8 @@ def test_a_fault_in_every_answer(verdicts, name):
     assert run.counts()["pass"] <= 4
     assert run.exit_code() == 1
     # An error of its own is no reason to restart; all else is.
-    assert run.n_restarts == (0 if verdict == "error" else N - 1)
+    assert run.n_restarts == (0 if verdict in ("error", "fail") else N - 1)
+    assert shows_no_controls(run)
 
 
 # What each that breaks the introduction or the probe gets, for the whole session.
@@ -172,6 +198,16 @@ def test_silence_ends_at_the_limit(verdicts, name):
     assert run.exit_code() == 1
 
 
+def test_the_total_time_ends_a_check_that_every_answer_keeps_alive(verdicts):
+    run = verdicts("slow", Limits(timeout=30.0, restarts=N, total=2.0))
+    asked = {result.id: result for result in run.results}
+    assert asked["made-up/0"].verdict == "pass"
+    assert asked["made-up/2"].verdict == asked["protocol/stop"].verdict == "timed-out"
+    assert asked["protocol/stop"].why == "not asked: the total time of 2 s is spent"
+    assert run.seconds < 5.0
+    assert run.exit_code() == 1
+
+
 def test_silence_at_the_start_is_the_verdict_of_all(verdicts):
     run = verdicts("hang-at-start", HASTY)
     assert run.counts() == {"timed-out": N + 1}
@@ -185,6 +221,7 @@ ONCE = {
     "crash-at-second": ("made-up/1", "crashed", "SIGSEGV"),
     "ignore-stop": ("protocol/stop", "timed-out", "after `stop`"),
     "leave-a-child": ("protocol/stop", "fail", "child"),
+    "leave-an-orphan": ("protocol/stop", "fail", "child"),
     "talk-after-stop": ("protocol/stop", "wrong-format", "goodbye"),
 }
 
@@ -208,7 +245,7 @@ def test_an_answer_to_the_question_before(verdicts):
 
 
 def test_every_saboteur_is_met():
-    met = {*HONEST, *AT_EVERY_STEP, *AT_THE_DOOR, *SILENT, *ONCE, "hang-at-start", "stale-answer"}
+    met = {*HONEST, *AT_EVERY_STEP, *AT_THE_DOOR, *SILENT, *ONCE, "hang-at-start", "stale-answer", "slow"}
     assert met == set(SABOTEURS)
 
 
@@ -241,7 +278,7 @@ def test_the_probe_sends_every_kind_of_number():
 @pytest.mark.parametrize(
     ("line", "cmd", "word"),
     [
-        (b'{"seq":1,"steps":[{"outcome":"collision"}]}', "trajectory", "wall"),
+        (b'{"seq":1,"steps":[{"outcome":"collision"}]}', "trajectory", "steps[0]"),
         (b'{"seq":1,"ns":[-1],"steps":[]}', "time", "ns"),
         (b'{"seq":1,"states":[{"outcome":"horizon"}]}', "flow", "states"),
         (b'{"seq":true,"outcome":"undecided","reason":""}', "step", "seq True"),

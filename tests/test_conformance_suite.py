@@ -11,15 +11,16 @@ from xml.etree import ElementTree
 import jsonschema
 import msgspec
 import pytest
+from support.promise_breakers import FAULTS, Breaker
 from support.saboteurs import command
 from test_conformance_session import made_up
 
 from conformance import plain, vectors
 from conformance.mutants import MUTANTS, kill_matrix
-from conformance.suite import property_checks, reports
+from conformance.suite import disguise, promises, property_checks, reports, session
 from conformance.suite import run as suite
 from conformance.suite.process import Trouble
-from conformance.suite.run import Result, Run
+from conformance.suite.result import VERDICTS, Result, Run
 from conformance.suite.session import Limits, missing
 from scene import Collision, Horizon, State, from_data
 from scene.protocol.messages import Introduction
@@ -48,6 +49,7 @@ def made(*verdicts: str, known: tuple[int, ...] = (), **more) -> Run:
     fields = {
         "command": ["./made-up"],
         "level": "core",
+        "seed": 7,
         "corpus": "1.0",
         "digest": "0" * 64,
         "limits": Limits(),
@@ -57,6 +59,8 @@ def made(*verdicts: str, known: tuple[int, ...] = (), **more) -> Run:
         "n_restarts": 0,
         "stderr": "",
         "seconds": 1.5,
+        "graded": {"tables": ["cap"], "laws": ["constant"], "profiles": ["step"], "not_graded": ["flow"]},
+        "diagnosis": [],
     }
     return Run(**fields | more)
 
@@ -122,7 +126,10 @@ def test_known_failures_are_read(tmp_path):
 
 def test_known_failures_are_marked_in_a_run(monkeypatch):
     monkeypatch.setattr(suite, "choose", lambda *_: [made_up(0), made_up(1)])
-    monkeypatch.setattr(property_checks, "N_QUESTIONS", 0)
+    monkeypatch.setattr(suite, "drawn_disguise", lambda *_: disguise.Disguise())  # it knows one answer
+    monkeypatch.setattr(suite, "N_STATES", 0)
+    monkeypatch.setattr(suite, "drawn_horizons", lambda *_: [])
+    monkeypatch.setattr(promises, "ask_promises", lambda _: iter(()))
     assert suite.check(command("crash-at-second")).exit_code() == 1
     fixed = frozenset({"made-up/0", "made-up/1", "protocol/stop"})
     run = suite.check(command("crash-at-second"), known=fixed)
@@ -154,9 +161,7 @@ def test_the_json_report_follows_its_published_schema():
     data = json.loads(reports.to_json(run))
     jsonschema.validate(data, schema)
     assert data["total"]["cases"] == 4
-    assert data["total"]["counts"] == {
-        v: int(v in ("pass", "fail", "declined", "crashed")) for v in suite.VERDICTS
-    }
+    assert data["total"]["counts"] == {v: int(v in ("pass", "fail", "declined", "crashed")) for v in VERDICTS}
     assert data["exit_code"] == 1
     assert [r.get("answer") for r in data["results"]] == [None, {"x": 1.0}, {"x": 1.0}, {"x": 1.0}]
     with pytest.raises(jsonschema.ValidationError):
@@ -195,7 +200,8 @@ def test_what_must_be_refused_is_asked_of_all():
 
 def test_the_reference_passes(monkeypatch):
     known = [v for v in vectors.load("core") if v.expect[0].steps and v.group != "hard-case-14"][::100]
-    monkeypatch.setattr(property_checks, "N_QUESTIONS", 0)
+    monkeypatch.setattr(suite, "N_STATES", 0)
+    monkeypatch.setattr(suite, "drawn_horizons", lambda *_: [])
     monkeypatch.setattr(suite, "measure_speed", lambda _: None)
     monkeypatch.setattr(suite, "choose", lambda *_: known)
     run = suite.check([sys.executable, "-m", "reference"])
@@ -208,17 +214,21 @@ def test_the_reference_passes(monkeypatch):
 
 def test_the_cases_beside_the_vectors_are_all_listed(monkeypatch):
     """What a run of an implementation that offers everything contains, and no more."""
-    tiny = property_checks.Size(20, 50.0, 0.5)
-    for name, value in (("SIZES", (tiny,)), ("BATCH", 20), ("LIGHTER", 1), ("N_QUESTIONS", 2)):
-        monkeypatch.setattr(property_checks, name, value)
-    run = suite.check([sys.executable, "-m", "conformance.plain"], groups=["static-cap"])
+    monkeypatch.setattr(property_checks, "SIZES", {"core": property_checks.Size(20, 50.0, 0.5)})
+    monkeypatch.setattr(suite, "N_STATES", 2)
+    run = suite.check([sys.executable, "-m", "conformance.plain"], groups=["static-cap"], seed=1)
     others = {result.id for result in run.results if not result.level}
     assert others == set(suite.OTHER_CASES)
     assert run.exit_code() == 0
+    assert str(run.scope()) == (
+        f"core {run.corpus}; cap; constant; step; trajectory, flow, time, mushroom, stem, fourier, bang-bang"
+        f" not graded; 0.0 % declined; class {run.precision()}; seed 1"
+    )
 
 
-def core_steps() -> list[vectors.Vector]:
-    return [v for v in vectors.load("core") if v.group in ("moving-cap", "breathing-circle")]
+def core_steps(*groups: str) -> list:
+    steps = [v for v in vectors.load("core") if v.group in (groups or ("moving-cap", "breathing-circle"))]
+    return disguise.drawn_states(steps, 5, 24)
 
 
 def test_properties_can_fail():
@@ -238,13 +248,13 @@ def test_properties_can_fail():
 def test_what_a_property_needs_is_asked_for_first():
     without = Stub(step=plain.next_collision)
     without.introduction = msgspec.structs.replace(INTRODUCTION, laws=("constant",))
-    still = [v for v in vectors.load("core") if v.group == "static-cap"]
+    still = core_steps("static-cap")
     found = {name: verdict for name, verdict, _, _ in property_checks.ask_properties(without, still)}
     assert found.pop("static-limit") == "unsupported"
-    assert found.pop("period-shift") == "declined"
+    assert found.pop("period-shift") == "unsupported"
     assert set(found.values()) == {"pass"}
-    assert list(property_checks.ask_properties(without, core_steps())) == []
-    assert list(property_checks.ask_profiles(without)) == []
+    assert list(property_checks.ask_properties(without, [])) == []
+    assert list(property_checks.ask_profiles(without, "core", 1)) == []
 
 
 def flows(name: str) -> Stub:
@@ -259,49 +269,60 @@ def flows(name: str) -> Stub:
     return Stub(ask=ask)
 
 
+# A slow particle is sooner done; 20 particles cannot tell anything from anything.
+FEW, SLOW, LITTLE = (
+    property_checks.Size(*size) for size in ((100, 1000.0, 0.08), (400, 20.0, 0.2), (20, 20.0, 0.3))
+)
+
+
 @pytest.mark.parametrize(
     ("name", "case", "size", "verdict"),
     [
-        ("none", "work-identity", (100, 1000.0, 0.08), "pass"),
-        ("wall-velocity-once", "work-identity", (100, 1000.0, 0.08), "fail"),
-        ("energy-kept", "work-identity", (100, 1000.0, 0.08), "fail"),
+        ("none", "work-identity", FEW, "pass"),
+        ("none", "work-identity", LITTLE, "declined"),
+        ("wall-velocity-once", "work-identity", FEW._replace(n_particles=400), "fail"),
+        ("energy-kept", "work-identity", FEW, "fail"),
         # Loses nearly all its particles.
-        ("phase-restarts-at-each-step", "work-identity", (100, 1000.0, 0.08), "declined"),
-        # The slower, the sooner done.
-        ("none", "one-cycle", property_checks.SIZES[-1]._replace(energy=20.0), "pass"),
-        ("hole-static", "one-cycle", property_checks.SIZES[-1]._replace(energy=200.0), "fail"),
+        ("phase-restarts-at-each-step", "work-identity", FEW, "fail"),
+        ("none", "captured-share", SLOW._replace(bias=0.1), "pass"),
+        ("none", "captured-share", LITTLE, "declined"),
+        ("hole-static", "captured-share", SLOW._replace(bias=0.1), "fail"),
+        ("none", "mean-growth", FEW, "declined"),
     ],
 )
 def test_profiles_tell_a_mutant_from_an_honest_stepper(monkeypatch, name, case, size, verdict):
-    monkeypatch.setattr(property_checks, "_affordable", lambda *_: property_checks.Size(*size))
-    if case == "work-identity":
-        monkeypatch.setattr(property_checks, "_one_cycle", lambda *_: [])
-    else:
-        monkeypatch.setattr(property_checks.profiles, "work_identity", lambda *_, **__: [])
-    found = {name: verdict for name, verdict, *_ in property_checks.ask_profiles(flows(name))}
-    assert found[case] == verdict
+    monkeypatch.setattr(property_checks, "SIZES", {"core": size})
+    for other in {"work-identity", "captured-share"} - {case}:
+        monkeypatch.setattr(property_checks, f"_{other.replace('-', '_')}", lambda *_: [])
+    found = {
+        name: (verdict, why) for name, verdict, why, _ in property_checks.ask_profiles(flows(name), "core", 3)
+    }
+    assert found[case][0] == verdict, found[case]
 
 
 def test_a_profile_that_loses_particles_is_of_wrong_format(monkeypatch):
-    monkeypatch.setattr(property_checks, "SIZES", (property_checks.Size(400, 200.0, 0.18),))
+    monkeypatch.setattr(property_checks, "SIZES", {"core": FEW})
 
     def lose(request):
         last = Horizon(request["t_end"], 0.0, -0.1, 1.0, 0.0)
         return {"states": [{**msgspec.to_builtins(last), "captured": None}] * (len(request["states"]) - 1)}
 
-    found = {name: verdict for name, verdict, _, _ in property_checks.ask_profiles(Stub(ask=lose))}
-    assert found == {"work-identity": "wrong-format", "one-cycle": "wrong-format"}
+    found = {name: verdict for name, verdict, *_ in property_checks.ask_profiles(Stub(ask=lose), "core", 1)}
+    assert found == {
+        "work-identity": "wrong-format",
+        "captured-share": "wrong-format",
+        "mean-growth": "declined",
+    }
 
 
-def test_speed_is_not_measured_where_nothing_is_hit():
-    introduction = msgspec.structs.replace(
-        INTRODUCTION, profiles=("step", "time"), laws=("fourier", "constant")
-    )
-    last = msgspec.to_builtins(Horizon(*[0.0] * 5))
-    session = SimpleNamespace(introduction=introduction, ask=lambda _: {"ns": [1], "steps": [last]})
-    assert suite.measure_speed(session) is None
-    hit = msgspec.to_builtins(Collision("arc", *[0.0] * 6))
-    session.ask = lambda request: {"ns": [100 * request["collisions"]] * request["repeat"], "steps": [hit]}
-    speed = suite.measure_speed(session)
-    assert (speed.best_ns, speed.median_ns) == (100.0, 100.0)
+@pytest.mark.parametrize("fault", ["no-time", "elsewhere", "tenfold", "fewer"])
+def test_no_speed_is_shown_for_what_is_not_followed(monkeypatch, fault):
+    monkeypatch.setattr(suite, "TIMED_LEAST", 1_000_000)
+    for broken, is_shown in ((FAULTS[fault][2], False), (lambda request, answer: answer(request), True)):
+        monkeypatch.setattr(session, "Process", lambda *_, fault=broken: Breaker(fault))
+        opened = session.Session(["in-process"])
+        opened.start()
+        speed = suite.measure_speed(opened)
+        assert (speed is not None) == is_shown
+    assert speed.best_ns > 0
     assert suite.measure_speed(Stub()) is None

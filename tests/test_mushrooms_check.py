@@ -20,6 +20,7 @@ import conformance
 from conformance import vectors
 from conformance.suite import property_checks, pytest_suite
 from conformance.suite import run as suite
+from conformance.suite.disguise import Disguise
 from conformance.suite.session import Session
 
 PYTHON = [sys.executable, str(Path(conformance.__file__).parent / "harness" / "python" / "stepper.py")]
@@ -33,8 +34,8 @@ def _few(monkeypatch):
     ]
     assert {vector.kind for vector in found} == {"step", "trajectory"}
     monkeypatch.setattr(suite, "choose", lambda *_: found)
-    monkeypatch.setattr(property_checks, "N_QUESTIONS", 2)
-    monkeypatch.setattr(property_checks, "SIZES", (property_checks.Size(20, 50.0, 0.5),))
+    monkeypatch.setattr(suite, "N_STATES", 2)
+    monkeypatch.setattr(property_checks, "SIZES", {"core": property_checks.Size(20, 50.0, 0.5)})
     monkeypatch.setattr(property_checks, "BATCH", 20)
     monkeypatch.setattr(suite, "TIMED_LEAST", 100_000)
 
@@ -45,9 +46,11 @@ def call(command_line):
 
 
 def test_a_good_stepper_is_accepted_and_reported(call, tmp_path):
-    files = [tmp_path / name for name in ("r.json", "r.xml", "r.html")]
-    options = ["--json", files[0], "--junit", files[1], "--html", files[2]]
-    code, out, err = call(*options, "--", *PYTHON)
+    names = ("r.json", "r.xml", "r.html", "r.svg", "s.json")
+    files = [tmp_path / name for name in names]
+    kinds = ("--json", "--junit", "--html", "--badge", "--summary")
+    options = [part for pair in zip(kinds, files, strict=True) for part in pair]
+    code, out, err = call("--seed", "77", *options, "--", *PYTHON)
     assert (code, err) == (0, "")
     assert "accepted" in out
     assert "ns per collision" in out
@@ -57,12 +60,21 @@ def test_a_good_stepper_is_accepted_and_reported(call, tmp_path):
     assert f"{data['total']['counts']['pass']} of {n} cases pass" in out
     assert data["implementation"]["name"] == "example-python"
     assert int(ElementTree.fromstring(files[1].read_bytes()).get("tests")) == n
+    line = "core 1."
+    assert data["verdict"].startswith(f"accepted: {line}")
+    assert data["verdict"].endswith("seed 77")
+    assert data["verdict"] in out.replace("\n", " ")
+    assert data["verdict"] in files[3].read_text("utf-8")
+    ElementTree.fromstring(files[3].read_bytes())
+    summary = json.loads(files[4].read_text())
+    assert (summary["verdict"], summary["scope"]) == ("accepted", data["scope"])
+    assert {"schemaVersion", "label", "message", "color"} <= set(summary)
     page = files[2].read_text("utf-8")
     assert "example-python" in page
     assert "Worst cases" in page
     assert "Speed against error" in page
     assert "property/mirror" in page
-    assert_stands_alone(page, n_figures=page.count("<figure>"))
+    assert_stands_alone(page, n_figures=page.count("<figure"))
 
 
 def assert_stands_alone(page: str, n_figures: int) -> None:
@@ -87,6 +99,24 @@ def test_a_bad_stepper_is_not(call, tmp_path):
     assert counts["fail"] > 5
     assert counts["unsupported"] >= 1  # it offers no trajectory
     assert counts["crashed"] == counts["wrong-format"] == counts["timed-out"] == 0
+
+
+def test_a_faulty_stepper_is_told_its_fault(call, tmp_path):
+    """What was given beside what is certified, and the mutant whose failures are the same."""
+    served = tmp_path / "faulty.py"
+    served.write_text(
+        "import sys\nfrom conformance.mutants import MUTANTS\nfrom scene.protocol.wire import serve\n"
+        "m = MUTANTS['wall-velocity-once']\n"
+        "serve('faulty', m.step, m.trajectory, sys.stdin.buffer, sys.stdout.buffer)\n"
+    )
+    code, out, _ = call("--seed", 1, "--html", tmp_path / "r.html", "--", sys.executable, served)
+    assert code == 1
+    assert "like wall-velocity-once on " in out
+    assert "  certified collision wall=" in out
+    page = (tmp_path / "r.html").read_text("utf-8")
+    drawn = re.findall(r'<figure id="([^"]+)">', page)
+    assert drawn
+    assert all(f'href="#{name}"' in page for name in drawn)
 
 
 @pytest.mark.parametrize("name", ["exit-silently", "other-protocol", "fifteen-digits"])
@@ -118,8 +148,12 @@ def test_markup_in_what_it_says_is_text(call, tmp_path):
         (["--", "./no-such-stepper"], "no-such-stepper"),
         (["--timeout", "0", "--", *PYTHON], "--timeout = 0.0"),
         (["--timeout", "nan", "--", *PYTHON], "--timeout = nan"),
+        (["--total", "0", "--", *PYTHON], "--total = 0.0"),
         (["--restarts", "-1", "--", *PYTHON], "--restarts = -1"),
         (["--json", "report.txt", "--", *PYTHON], ".json"),
+        (["--seed", "-1", "--", *PYTHON], "seed = -1"),
+        (["--badge", "badge.png", "--", *PYTHON], ".svg"),
+        (["--json", "r.json", "--summary", "r.json", "--", *PYTHON], "asked for twice"),
         (["--html", "no/such/folder/r.html", "--", *PYTHON], "cannot be written"),
         (["--known-failures", "absent.txt", "--", *PYTHON], "absent.txt"),
         ([], "COMMAND"),
@@ -153,7 +187,7 @@ def test_the_pytest_case_fails_and_skips_with_the_verdict():
     with Session(command("missing-field")) as session:
         session.start()
         with pytest.raises(pytest.fail.Exception, match="wrong-format: "):
-            pytest_suite.test_vector(session, vector)
+            pytest_suite.test_vector(session, vector, Disguise())
         session.introduction = msgspec.structs.replace(session.introduction, tables=())
         with pytest.raises(pytest.skip.Exception, match="unsupported: table"):
-            pytest_suite.test_vector(session, vector)
+            pytest_suite.test_vector(session, vector, Disguise())

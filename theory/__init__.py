@@ -1,6 +1,7 @@
 """The paper's closed forms and quadratures, at any precision."""
 
 from theory.adiabatic import NotConverged
+from theory.blur import FiniteEnergy, at_energy, blur_cdf
 from theory.curves import (
     CaptureCurve,
     ChaoticZone,
@@ -32,6 +33,7 @@ from theory.invariants import (
     sin_phi_hat,
 )
 from theory.prediction import Prediction, cumulants, mean_of, moments, predict, reversed_cycle
+from theory.rates import Rates, frozen_rates
 from theory.saddle import Saddle
 from theory.volumes import NotCovered, Volumes, delta, v_cap, v_cha, v_ell, v_stem, volumes_at
 
@@ -42,16 +44,20 @@ __all__ = [
     "ChaoticZone",
     "Cycle",
     "Energies",
+    "FiniteEnergy",
     "Limit",
     "NotConverged",
     "NotCovered",
     "PowerFit",
     "Prediction",
+    "Rates",
     "Saddle",
     "Sum",
     "Volumes",
     "Width",
+    "at_energy",
     "bias",
+    "blur_cdf",
     "cap_invariant",
     "capture_curve",
     "capture_rate_at",
@@ -68,6 +74,7 @@ __all__ = [
     "energy_density",
     "extrapolate",
     "fit_power",
+    "frozen_rates",
     "largest_gain",
     "log_energy_rate_chaotic",
     "log_energy_rate_island",

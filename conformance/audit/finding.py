@@ -13,7 +13,13 @@ if TYPE_CHECKING:
     from conformance.audit.evidence import ClaimEvidence
 
 Verdict = Literal[
-    "confirmed", "misprint", "not reproducible as stated", "inferred", "refuted", "indeterminate"
+    "confirmed",
+    "misprint",
+    "false",
+    "not reproducible as stated",
+    "inferred",
+    "refuted",
+    "indeterminate",
 ]
 Form = Literal["claim", "printed", "corrected"]
 

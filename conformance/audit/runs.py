@@ -58,6 +58,9 @@ _ALL = (
     # Sec. 4.1 at its size and energy.
     Simulation("fixed-cap-anticlockwise", 1e9, 10_000, 100_000, 2_500, phases=EIGHTHS),
     Simulation("fixed-cap-clockwise", 1e9, 10_000, 100_000, 2_500, phases=EIGHTHS),
+    # A hundred times slower there, diffusion and lags are ten times larger.
+    Simulation("fixed-cap-anticlockwise", 1e7, 10_000, 100_000, 10_000, phases=EIGHTHS),
+    Simulation("fixed-cap-clockwise", 1e7, 10_000, 100_000, 10_000, phases=EIGHTHS),
     # Sec. 4.2 at its energies; the ladder of energies carries the laws and the limits.
     Simulation("moving-cap", 1e3, 20_000, 100_000, 20_000),
     Simulation("moving-cap", 1e4, 20_000, 100_000, 20_000, phases=SIXTEENTHS),
@@ -71,6 +74,7 @@ _ALL = (
     Simulation("moving-cap-reversed", 1e6, 10_000, 50_000, 5_000),
     Simulation("moving-cap-trivial", 1e6, 10_000, 50_000, 5_000),
     Simulation("only-mouth", 1e6, 5_000, 25_000, 5_000),
+    Simulation("retraced-arc", 1e6, 10_000, 50_000, 5_000),
     Simulation("untilted", 1e6, 10_000, 25_000, 5_000),
     Simulation("ergodic", 1e4, 10_000, 25_000, 5_000, phases=EIGHTHS),
     Simulation("ergodic", 1e5, 10_000, 25_000, 5_000, phases=EIGHTHS),

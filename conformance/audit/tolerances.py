@@ -151,7 +151,7 @@ def critical_gap(n: int) -> float:
 def fits(
     what: str,
     values: FloatArray,
-    cdfs: list[Cdf],
+    cdf: Cdf,
     *,
     band: float = 0.0,
     scale: float = 0.5,
@@ -159,13 +159,10 @@ def fits(
 ) -> Check:
     """Test a whole distribution by Kolmogorov's distance (one sample, two sides).
 
-    With several distribution functions the nearest counts: finite energy leaves a width open, and a
-    true law among them is rejected no oftener than alone.
-
     Args:
         what: what is tested.
         values: the sample.
-        cdfs: the laws admitted.
+        cdf: its distribution function.
         band: distance that finite energy may add.
         scale: distance that must be seen: with a wider reach the check tells nothing.
         note: what else is worth knowing.
@@ -173,10 +170,9 @@ def fits(
     n = len(values)
     if n < 2:
         return Check(what, None, "a sample", n_tests=1, note="no particles")
-    gaps = [largest_gap(values, cdf) for cdf in cdfs]
-    gap, reach = min(gaps), critical_gap(n) + band
+    gap, reach = largest_gap(values, cdf), critical_gap(n) + band
     holds = None if reach >= scale else bool(gap <= reach)
-    p = float(kstwo.sf(max(gap - band, 0.0), n))
+    p = float(kstwo.sf(gap, n))  # of no band at all
     more = f"; {note}" if note else ""
     text = f"Kolmogorov's distance, n = {n}, p = {p:.2g}{more}"
     return Check(what, holds, f"<= {reach:.4g}", gap, band=band, n_tests=1, note=text)

@@ -28,6 +28,7 @@ from conformance import vectors
 from conformance.bench import codes
 from conformance.bench.contenders import Ask, Contender, Family, Given, Lap
 from conformance.bench.workloads import SINGLE_STEPS, WINDOW, Workload
+from conformance.plain.flow import Step
 from conformance.suite.process import Trouble
 from scene import BangBang, Cap, Collision, Fourier, Horizon, Law, Outcome, Scene, State, Stem, Wall
 from scene.geometry import rounded
@@ -160,7 +161,13 @@ def in_numba() -> Contender:
 
 
 def asker(contender: Contender) -> Ask:
-    """Return how a baseline answers a vector, for the hard cases; states are taken as they are."""
+    """Return how a baseline answers a vector, for the hard cases."""
+    step = stepper(contender)
+    return partial(vectors.answer, step=step, follow=partial(followed, step))
+
+
+def stepper(contender: Contender) -> Step:
+    """Return a baseline as a stepper of one state, taken as it is; t_end alone ends a flight."""
     assert contender.steps is not None
     steps = contender.steps
 
@@ -171,16 +178,18 @@ def asker(contender: Contender) -> Ask:
         left = t_end - state.t
         return Horizon(t_end, state.x + left * state.vx, state.y + left * state.vy, state.vx, state.vy)
 
-    def follow(scene: Scene, state: State, n_collisions: int, t_end: float) -> list[Outcome]:
-        found: list[Outcome] = []
-        while len(found) < n_collisions:
-            found.append(met := step(scene, state, t_end))
-            if not isinstance(met, Collision):
-                break
-            state = met.state()
-        return found
+    return step
 
-    return partial(vectors.answer, step=step, follow=follow)
+
+def followed(step: Step, scene: Scene, state: State, n_collisions: int, t_end: float) -> list[Outcome]:
+    """Return a trajectory by a stepper of one state: its collisions, and what came instead of one."""
+    found: list[Outcome] = []
+    while len(found) < n_collisions:
+        found.append(met := step(scene, state, t_end))
+        if not isinstance(met, Collision):
+            break
+        state = met.state()
+    return found
 
 
 def _contender(name: str, family: Family, engine: Engine, flights: float = WINDOW) -> Contender:

@@ -17,9 +17,9 @@ from conformance.bench.workloads import SINGLE_STEPS, Workload
 from conformance.grading.agreement import Answer
 from conformance.suite.process import Trouble
 from conformance.suite.run import put
-from conformance.suite.session import Limits, Session, missing
+from conformance.suite.session import Limits, Session, missing, read_outcome
 from conformance.vectors import Vector
-from scene import Outcome, Scene, State, to_data
+from scene import Scene, State, to_data
 
 Family = Literal[
     "proof", "compiled", "interpreted", "time-stepping", "fixed-step", "lean", "example", "command"
@@ -122,8 +122,7 @@ def by_command(
             if not found.get("steps") or len(found["ns"]) != n_times or not sum(found["ns"]):
                 raise Trouble("fail", f"a time request is answered {found}"[:200])
             laps.append(statistics.fmean(found["ns"]))
-            outcome: Outcome = msgspec.convert(found["steps"][-1], Outcome)
-            answers.append(outcome)
+            answers.append(read_outcome(found["steps"][-1], question.state.t))
         ns = statistics.fmean(laps)
         return Lap(ns, answers, ns * n_times * len(laps))
 

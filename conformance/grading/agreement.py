@@ -23,8 +23,10 @@ import msgspec
 from conformance.grading.error import LEAST, U, backward_ulps
 from conformance.vectors import NUMBERS, Certified, Ends, Expectation
 from scene import Collision, Horizon, Outcome, Rejected, State, Undecided, Undefined, Wall
+from scene.protocol.messages import Answered, AnsweredCollision
 
 BOUND = Fraction(1, 10**9)  # physics: far above rounding, far below any error of principle
+NEAR_HIT = Fraction(1, 10)  # of the flight time
 # dt, t, place, velocity: what is judged as one vector.
 VECTORS = (("dt",), ("t",), ("x", "y"), ("vx", "vy"))
 Kind = Literal["agrees", "numbers", "indeterminate", "wall", "outcome", "length", "undecided"]
@@ -42,7 +44,7 @@ class Enclosed(NamedTuple):
     ends: Sequence[Ends]
 
 
-Answer = Outcome | Enclosed
+Answer = Outcome | AnsweredCollision | Enclosed
 
 
 def exact(wall: Wall | None, numbers: Sequence[Fraction]) -> Enclosed:
@@ -59,22 +61,31 @@ class Agreement(NamedTuple):
         ulps: worst backward ulps of a component, nan when not measured.
         relative: worst backward error, likewise.
         why: one line.
+        step: the one that differs first, counted from 0; of a flow its end, 0.
     """
 
     kind: Kind
     ulps: float = math.nan
     relative: float = math.nan
     why: str = ""
+    step: int = 0
 
 
 class _Measured(NamedTuple):
-    """Bounds of an error over the enclosures; `where` names the worst component."""
+    """Bounds of an error over the enclosures.
+
+    Attributes:
+        where: the first component that is wrong, for what is computed later follows from it; of a right
+            answer the worst.
+        off: the backward error of that component.
+    """
 
     least: Fraction | float
     most: Fraction | float
     least_ulps: Fraction | float
     most_ulps: Fraction | float
     where: str
+    off: Fraction | float
 
 
 def compare(
@@ -100,17 +111,20 @@ def compare(
     for i, certified in enumerate(expected.steps):
         place = f"step {i + 1}: " if isinstance(answer, list) else ""
         if i >= len(answers):
-            return Agreement("length", why=f"{place}missing, {i} of {len(expected.steps)} were given")
-        if differing := _difference(answers[i], certified.wall):
-            return differing._replace(why=(place + differing.why)[:200])
+            return Agreement("length", why=f"{place}missing, {i} of {len(expected.steps)} were given", step=i)
+        if differing := _difference(answers[i], certified):
+            return differing._replace(why=(place + differing.why)[:200], step=i)
         measured.append(_measure(answers[i], certified, clock.advance(certified), place))
         if measured[-1].least > BOUND:
-            return _judge_numbers(measured, bound)
-    return _judge_end(expected, answers[len(expected.steps) :]) or _judge_numbers(measured, bound)
+            hint = _missed(answers[i], certified)
+            judged = _judge_numbers(measured, bound)
+            return judged._replace(why=judged.why + hint, step=i)
+    end = _judge_end(expected, answers[len(expected.steps) :])
+    return end._replace(step=len(expected.steps)) if end else _judge_numbers(measured, bound)
 
 
 def compare_arrival(
-    answer: Outcome, captured: tuple[float, float] | None, expected: Expectation, state: State
+    answer: Answered, captured: tuple[float, float] | None, expected: Expectation, state: State
 ) -> Agreement:
     """Compare what a flow says of one particle with the truth.
 
@@ -127,7 +141,7 @@ def compare_arrival(
     times = [clock.advance(certified) for certified in expected.steps]
     if expected.outcome != "horizon":
         return _judge_end(expected, [answer]) or _judge_numbers([], None)
-    if differing := _difference(answer, None):
+    if differing := _difference(answer, expected.steps[-1]):
         return differing
     judged = _judge_numbers([_measure(answer, expected.steps[-1], times[-1], "")], None)
     if judged.kind != "agrees":
@@ -167,18 +181,36 @@ def middle(expected: Expectation, state: State) -> list[Outcome]:
     return found
 
 
-def _difference(answer: Answer, wall: Wall | None) -> Agreement | None:
+def _difference(answer: Answer, certified: Certified) -> Agreement | None:
     """Return how an answer differs in outcome or wall; None when it does not."""
     if isinstance(answer, Undecided):
         return Agreement("undecided", why=f"undecided: {answer.reason}")
+    due = certified.wall or "horizon"
     if isinstance(answer, Rejected | Undefined):
-        why = f"{_name(answer)}, must be {wall or 'horizon'}: {answer.reason}"
-        return Agreement("outcome", why=why)
+        return Agreement("outcome", why=f"{_name(answer)}, must be {due}: {answer.reason}")
     met = None if isinstance(answer, Horizon) else answer.wall
-    if met == wall:
+    if met == certified.wall:
         return None
-    why = f"{met or 'horizon'}, must be {wall or 'horizon'}"
-    return Agreement("wall" if met and wall else "outcome", why=why)
+    why = f"{met or 'horizon'}, must be {due}{_missed(answer, certified)}"
+    return Agreement("wall" if met and certified.wall else "outcome", why=why)
+
+
+def _missed(answer: Answer, certified: Certified) -> str:
+    """Say what the flight time alone shows of a wrong answer: an earlier hit was missed, or one invented."""
+    if isinstance(answer, Horizon):
+        return ", an earlier hit was missed" if certified.wall else ""
+    if (
+        not isinstance(answer, Collision | AnsweredCollision)
+        or answer.dt is None
+        or not math.isfinite(answer.dt)
+    ):
+        return ""
+    low, high = certified.ends("dt")
+    near = NEAR_HIT if answer.wall == certified.wall else BOUND  # a little off, it is the same hit
+    slack = near * (Fraction(certified.allowance[0]) + abs(high))
+    if Fraction(answer.dt) > high + slack:
+        return ", an earlier hit was missed" if certified.wall else ", beyond t_end"
+    return ", nothing is met so early" if Fraction(answer.dt) < low - slack else ""
 
 
 def _judge_end(expected: Expectation, rest: Sequence[Answer]) -> Agreement | None:
@@ -197,6 +229,8 @@ def _judge_end(expected: Expectation, rest: Sequence[Answer]) -> Agreement | Non
 def _name(answer: Answer) -> str:
     if isinstance(answer, Enclosed):
         return "collision" if answer.wall else "horizon"
+    if isinstance(answer, AnsweredCollision):
+        return "collision"
     return type(answer).__name__.lower()
 
 
@@ -205,10 +239,12 @@ def _judge_numbers(measured: Sequence[_Measured], bound: float | None) -> Agreem
     if not measured:
         return Agreement("agrees", why="the right outcome")
     worst = max(measured, key=lambda found: found.most)
+    last = measured[-1]
     ulps = _rounded(max(found.most_ulps for found in measured))
     found = Agreement("agrees", ulps, _rounded(worst.most), f"{ulps:.3g} backward ulps")
-    if measured[-1].least > BOUND:
-        return found._replace(kind="numbers", why=f"{worst.where} is off by {found.relative:.3g} (backward)")
+    if last.least > BOUND:
+        off = f"{last.where} is off by {_rounded(last.off):.3g} (backward)"
+        return found._replace(kind="numbers", why=off)
     if bound is not None and any(step.least_ulps > bound for step in measured):
         return found._replace(kind="numbers", why=f"numbers are off by {ulps:.3g} backward ulps")
     if worst.most > BOUND or (bound is not None and ulps > bound):
@@ -232,27 +268,33 @@ class _Clock:
 
 
 def _measure(answer: Answer, certified: Certified, time: tuple[Ends, Fraction], place: str) -> _Measured:
-    """Measure dt (but of a horizon), t (but of an enclosed answer), place and velocity."""
+    """Measure dt (of a horizon none is given), t (but of an enclosed answer), place and velocity."""
     numbers = _given(answer)
     if not all(math.isfinite(end) for ends in numbers.values() for end in ends if isinstance(end, float)):
-        return _Measured(math.inf, math.inf, math.inf, math.inf, f"{place}a number that is not finite")
+        what = f"{place}a number that is not finite"
+        return _Measured(math.inf, math.inf, math.inf, math.inf, what, math.inf)
     given = {name: (Fraction(low), Fraction(high)) for name, (low, high) in numbers.items()}
     truth = {name: certified.ends(name) for name in NUMBERS} | {"t": time[0]}
     allowances = dict(zip(NUMBERS, map(Fraction, certified.allowance), strict=True)) | {"t": time[1]}
     sizes = {name: allowances[name] + max(map(abs, ends)) for name, ends in given.items()}
-    found = _Measured(Fraction(0), Fraction(-1), Fraction(0), Fraction(0), "")
+    found = _Measured(Fraction(0), Fraction(-1), Fraction(0), Fraction(0), "", Fraction(0))
     for vector in VECTORS:
         scale = max([LEAST / U, *(sizes[name] for name in vector if name in given)])
         for name in (name for name in vector if name in given):
             (low, high), (certified_low, certified_high) = given[name], truth[name]
             most = max(abs(high - certified_low), abs(certified_high - low))
             least = max(certified_low - high, low - certified_high, Fraction(0))
+            # An exact zero that nothing can move, as y on the base, has no size of its own to be measured by.
+            is_zero = not allowances[name] and not any(truth[name])
+            size = scale if is_zero else sizes[name]
+            is_named = found.most <= BOUND and most / scale > found.most
             found = _Measured(
                 max(found.least, least / scale),
                 max(found.most, most / scale),
-                max(found.least_ulps, backward_ulps(least, sizes[name])),
-                max(found.most_ulps, backward_ulps(most, sizes[name])),
-                place + name if most / scale > found.most else found.where,
+                max(found.least_ulps, backward_ulps(least, size)),
+                max(found.most_ulps, backward_ulps(most, size)),
+                place + name if is_named else found.where,
+                most / scale if is_named else found.off,
             )
     return found
 

@@ -24,9 +24,9 @@ from typing import Any, Literal, NamedTuple
 
 import msgspec
 
-from conformance.grading.agreement import Agreement, Answer, Kind, compare, compare_arrival
+from conformance.grading.agreement import BOUND, Agreement, Answer, Kind, compare, compare_arrival
 from conformance.vectors import Vector
-from scene import Collision, Outcome
+from scene.protocol.messages import Answered, AnsweredCollision
 
 Verdict = Literal[
     "pass",
@@ -62,12 +62,14 @@ class Grade(NamedTuple):
         ulps: worst backward ulps, nan when not measured.
         relative: worst backward error, nan when not measured.
         why: one line.
+        step: the one that `why` is about, counted from 0.
     """
 
     verdict: Verdict
     ulps: float
     relative: float
     why: str
+    step: int = 0
 
 
 class _Misshapen(Exception):  # noqa: N818 (a finding about the answer)
@@ -90,12 +92,25 @@ def grade(vector: Vector, answer: Any) -> Grade:
         return _unmeasured("error", " ".join(answer["error"].split())[:200])
     try:
         if vector.kind == "flow":
-            return _best([compare_arrival(*_arrival(answer), known, vector.state) for known in vector.expect])
+            found = [compare_arrival(*_arrival(answer), known, vector.state) for known in vector.expect]
+            return _noted(vector, _best(found))
         outcomes = _outcomes(vector, answer)
     except _Misshapen as finding:
         return _unmeasured("wrong-format", str(finding))
     asked: Answer | list[Answer] = outcomes if vector.kind == "trajectory" else outcomes[0]
-    return _best([compare(asked, expected, vector.state) for expected in vector.expect])
+    graded = _noted(vector, _best([compare(asked, expected, vector.state) for expected in vector.expect]))
+    if any(isinstance(outcome, AnsweredCollision) and outcome.dt is None for outcome in outcomes):
+        return graded._replace(why=f"{graded.why}; without dt, t is graded in its place")
+    return graded
+
+
+def _noted(vector: Vector, found: Grade) -> Grade:
+    """Say of a right answer that its numbers could not have been wrong, where the condition allows none."""
+    if found.verdict != "pass" or math.isnan(found.relative) or vector.condition * BOUND < 1:
+        return found
+    return found._replace(
+        why=f"the walls alone are graded: condition {vector.condition:.1g} allows no number"
+    )
 
 
 def precision_class(ulps: Sequence[float]) -> PrecisionClass:
@@ -110,7 +125,7 @@ def precision_class(ulps: Sequence[float]) -> PrecisionClass:
 
 def _best(found: Sequence[Agreement]) -> Grade:
     """Return the grade against the certified answer that fits best."""
-    grades = [Grade(_VERDICTS[one.kind], one.ulps, one.relative, one.why) for one in found]
+    grades = [Grade(_VERDICTS[one.kind], one.ulps, one.relative, one.why, one.step) for one in found]
     return min(grades, key=lambda grade: _PREFERENCE.index(grade.verdict))
 
 
@@ -129,12 +144,12 @@ def _outcomes(vector: Vector, answer: Mapping[str, Any]) -> list[Answer]:
         raise _Misshapen("`steps` must be an array")
     found: list[Answer] = [_outcome(step, f"steps[{i}]: ") for i, step in enumerate(steps)]
     for i, outcome in enumerate(found[:-1]):
-        if not isinstance(outcome, Collision):
+        if not isinstance(outcome, AnsweredCollision):
             raise _Misshapen(f"steps[{i}]: only the last may be other than a collision")
     return found
 
 
-def _arrival(answer: Mapping[str, Any]) -> tuple[Outcome, tuple[float, float] | None]:
+def _arrival(answer: Mapping[str, Any]) -> tuple[Answered, tuple[float, float] | None]:
     """Decode a flow of one particle: its outcome and first captured stay, strictly."""
     states = answer.get("states")
     if states is None and answer.get("outcome") in ("undefined", "undecided", "rejected"):
@@ -142,7 +157,7 @@ def _arrival(answer: Mapping[str, Any]) -> tuple[Outcome, tuple[float, float] | 
     if not isinstance(states, Sequence) or isinstance(states, str) or len(states) != 1:
         raise _Misshapen("`states` must be an array of one, as many as were asked")
     outcome = _outcome(states[0], "states[0]: ")
-    if isinstance(outcome, Collision):
+    if isinstance(outcome, AnsweredCollision):
         raise _Misshapen("states[0]: a flow ends at t_end, not at a collision")
     try:
         captured = msgspec.convert(states[0].get("captured"), tuple[float, float] | None)
@@ -153,11 +168,14 @@ def _arrival(answer: Mapping[str, Any]) -> tuple[Outcome, tuple[float, float] | 
     return outcome, captured
 
 
-def _outcome(data: Any, place: str) -> Outcome:
+def _outcome(data: Any, place: str) -> Answered:
+    """Decode an outcome; a collision without `dt` is graded by its `t`, one without `wall` not at all."""
     try:
-        outcome: Outcome = msgspec.convert(data, Outcome)
+        outcome: Answered = msgspec.convert(data, Answered)
     except (msgspec.ValidationError, OverflowError, RecursionError) as error:
         raise _Misshapen(place + " ".join(str(error).split())) from None
+    if isinstance(outcome, AnsweredCollision) and outcome.wall is None:
+        raise _Misshapen(f"{place}`wall` is missing")
     for name in outcome.__struct_fields__:
         number = getattr(outcome, name)
         if isinstance(number, float) and not math.isfinite(number):

@@ -1,8 +1,8 @@
-"""Which vector kills which mutant: the proof that the corpus can fail, published in docs/.
+"""Which vector kills which mutant: the proof that the corpus can fail, and what failures are compared with.
 
-`python -m conformance.mutants.kill_matrix` answers every vector with every mutant, grades
-the answers and writes docs/kill-matrix.json and docs/kill-matrix.md: some minutes on one core. The matrix
-is a function of corpus and mutants alone. Only `fail` kills: a vector that a mutant declines, or at which it
+`python -m conformance.mutants.kill_matrix` answers every vector with every mutant, grades the answers and
+writes kill-matrix.json beside this file and docs/kill-matrix.md: some minutes on one core. The matrix is a
+function of corpus and mutants alone. Only `fail` kills: a vector that a mutant declines, or at which it
 crashes or answers in a wrong format, does not count.
 """
 
@@ -24,7 +24,8 @@ from conformance.vectors import LEVELS, Vector, answer, load, manifest
 from scene import BadInput
 from scene.files import write_file
 
-DOCS = Path(__file__).parent.parent.parent / "docs"
+DATA = Path(__file__).parent  # it ships with the package: `suite.diagnosis` reads it
+DOCS = DATA.parent.parent / "docs"
 N_WITNESSES = 3
 PLAIN = Mutant("plain", "none", Flight)
 _graded: dict[tuple[str, bytes], str] = {}
@@ -97,8 +98,8 @@ def table(found: dict[str, Any]) -> str:
         "",
         f"{len(ordered)} mutants of the plain stepper against the {found['vectors']} vectors of corpus"
         f" {found['corpus']}: {len(ordered) - len(found['survivors'])} killed by a `fail`."
-        f" {found['vectors'] - len(idle)} vectors kill at least one. Written by"
-        " `python -m conformance.mutants.kill_matrix`; kill-matrix.json has it by vector.",
+        f" {found['vectors'] - len(idle)} vectors kill at least one. Written by `python -m"
+        " conformance.mutants.kill_matrix`; conformance/mutants/kill-matrix.json has it by vector.",
         "",
         "The least killed come first.",
         "",
@@ -113,7 +114,7 @@ def table(found: dict[str, Any]) -> str:
     return "\n".join(lines) + "\n"
 
 
-def run(docs: Path = DOCS, progress: Callable[[str], None] = print) -> int:
+def run(docs: Path = DOCS, data: Path = DATA, progress: Callable[[str], None] = print) -> int:
     """Compute and write the matrix.
 
     Returns:
@@ -133,7 +134,7 @@ def run(docs: Path = DOCS, progress: Callable[[str], None] = print) -> int:
         **matrix(vectors, found),
     }
     docs.mkdir(parents=True, exist_ok=True)
-    write_file(docs / "kill-matrix.json", json.dumps(published, indent=1) + "\n")
+    write_file(data / "kill-matrix.json", json.dumps(published, indent=1) + "\n")
     write_file(docs / "kill-matrix.md", table(published))
     progress(
         f"survivors: {', '.join(published['survivors']) or 'none'}; plain fails: {', '.join(wrong) or 'none'}"

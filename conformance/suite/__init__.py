@@ -1,23 +1,15 @@
 """The suite: every question put to one implementation as a process, the verdicts, and their reports."""
 
-from conformance.suite.run import (
-    BAD,
-    VERDICTS,
-    Result,
-    Run,
-    Speed,
-    ask_vector,
-    check,
-    choose,
-    measure_speed,
-    read_known,
-)
+from conformance.suite.result import BAD, VERDICTS, Result, Run, Speed
+from conformance.suite.run import ask_vector, check, choose, measure_speed, read_known
+from conformance.suite.scope import Scope
 
 __all__ = [
     "BAD",
     "VERDICTS",
     "Result",
     "Run",
+    "Scope",
     "Speed",
     "ask_vector",
     "check",

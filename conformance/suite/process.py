@@ -1,8 +1,9 @@
 """One implementation as a subprocess: a line in, a line out, and no way to hang or outlive its session.
 
 Everything happens in one thread, without blocking: writing, reading both of its outputs, and looking at
-the clock and at the process. It leads its own process group and carries a mark in its environment, so
-that what it forked is found and killed with it, even what left the group (where /proc exists).
+the clock and at the process. It leads its own session; what it forked is found and killed with it
+(`conformance.suite.descendants` says how, and what is left on systems other than Linux). Text that came from
+it is shown only as `clean` returns it: no control character of its choice reaches a terminal or a report.
 Needs a POSIX system; nothing is known here of what the lines mean.
 """
 
@@ -11,30 +12,31 @@ from __future__ import annotations
 import contextlib
 import errno
 import os
-import secrets
 import selectors
 import signal
 import subprocess
 import time
 from collections.abc import Sequence
-from pathlib import Path
 from typing import IO
 
+from conformance.suite.descendants import Descendants
 from scene.refusal import BadInput
 
 MAX_LINE = 2**24  # bytes of one answer: a trajectory of 10^5 collisions
 MAX_STDERR = 2**15  # bytes kept of the first and of the last that it wrote there
 GRACE = 1.0  # seconds between the end of its output and its exit, and between `stop` and both
 POLL = 0.05  # seconds between looks at a silent process: a child of it may hold the pipe when it is gone
-MARK = "MUSHROOMS_SESSION"
+# What calculating with numbers of a nonsense answer may raise, however a formula is written.
+NOT_NUMBERS = (ArithmeticError, ValueError)
+MAX_TEXT = 500  # characters kept of a reason, a name, or another text that came from it
 
 
 class Trouble(Exception):  # noqa: N818 (the implementation's trouble, not this program's)
     """No usable answer: the verdict it gets (crashed, timed-out, wrong-format, error) and why."""
 
     def __init__(self, verdict: str, why: str) -> None:
-        super().__init__(f"{verdict}: {why}")
-        self.verdict, self.why = verdict, why
+        self.verdict, self.why = verdict, clean(why)
+        super().__init__(f"{verdict}: {self.why}")
 
 
 class CommandNotFound(BadInput):
@@ -57,9 +59,10 @@ class Transcript:
         del self.tail[:excess]
 
     def text(self) -> str:
-        """Return what was kept, with a note of what was not."""
+        """Return what was kept, with a note of what was not; lines and tabs stay as they are."""
         gap = f"\n[... {self.n_dropped} bytes left out ...]\n" if self.n_dropped else ""
-        return self.head.decode("utf-8", "replace") + gap + self.tail.decode("utf-8", "replace")
+        text = self.head.decode("utf-8", "replace") + gap + self.tail.decode("utf-8", "replace")
+        return escaped(text, kept="\n\t")
 
 
 class Process:
@@ -74,8 +77,8 @@ class Process:
     """
 
     def __init__(self, command: Sequence[str], stderr: Transcript) -> None:
-        self._mark = f"{MARK}={secrets.token_hex(16)}"
-        name, token = self._mark.split("=")
+        self._descendants = Descendants()
+        name, token = self._descendants.mark
         try:
             self._child = subprocess.Popen(
                 command,
@@ -87,8 +90,10 @@ class Process:
                 env={**os.environ, name: token},
             )
         except (OSError, ValueError) as error:
+            self._descendants.follow(0)
             reason = error.strerror if isinstance(error, OSError) else str(error)
             raise CommandNotFound(f"command {command[0]!r} cannot be started: {reason}") from None
+        self._descendants.follow(self._child.pid)
         self._stdin, self._stdout, self._stderr = self._streams()
         self._transcript = stderr
         self._received = bytearray()
@@ -154,19 +159,14 @@ class Process:
             raise Trouble("timed-out", f"still running {timeout:g} s after `stop`")
         if status := self._status():
             raise Trouble("crashed", f"{status} after `stop`")
-        if self._strays():
+        if self._descendants.alive():
             raise Trouble("fail", "left a child process running after `stop`")
 
     def kill(self) -> None:
         """End the process, its group and whatever else it started; safe to call twice."""
-        with contextlib.suppress(ProcessLookupError, PermissionError):
-            os.killpg(self._child.pid, signal.SIGKILL)
-        while strays := self._strays():
-            for pid in strays:
-                with contextlib.suppress(ProcessLookupError):
-                    os.kill(pid, signal.SIGKILL)
-            time.sleep(POLL / 5)
-        self._child.wait()
+        if self._child.returncode is None:
+            self._descendants.kill()
+            self._child.wait()
         for stream in (self._stdin, self._stdout, self._stderr):
             with contextlib.suppress(OSError):
                 stream.close()
@@ -228,14 +228,20 @@ class Process:
             return "closed its standard output"
         return (self._status() or "exited with status 0") + " before it answered"
 
-    def _strays(self) -> list[int]:
-        # Live processes, other than the leader, that carry the mark: its descendants.
-        mark, found = self._mark.encode(), []
-        for entry in Path("/proc").glob("[0-9]*"):
-            with contextlib.suppress(OSError):
-                if mark in (entry / "environ").read_bytes() and int(entry.name) != self._child.pid:
-                    found.append(int(entry.name))
-        return found
+
+def clean(text: str) -> str:
+    """Return text that came from an implementation as one line, bounded, without control characters."""
+    line = escaped(" ".join(text[: 2 * MAX_TEXT].split()))
+    return line if len(line) <= MAX_TEXT else line[: MAX_TEXT - 3] + "..."
+
+
+def escaped(text: str, kept: str = "") -> str:
+    """Write what does not print (controls, marks of direction, lone surrogates) as Python escapes it."""
+    if text.isprintable():
+        return text
+    return "".join(
+        c if c.isprintable() or c in kept else c.encode("unicode_escape").decode("ascii") for c in text
+    )
 
 
 def shown(data: bytes | bytearray, n: int = 60) -> str:

@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
+import secrets
 import shlex
 from collections.abc import Iterator
+from typing import Any
 
 import pytest
 
 from conformance import suite, vectors
+from conformance.suite.disguise import Disguise, drawn_disguise
+from conformance.suite.run import NEW_SEEDS
 from conformance.suite.session import Limits, Session
+from conformance.vectors import Vector
+from scene.refusal import check_seed
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -16,7 +22,27 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     group = parser.getgroup("mushrooms")
     group.addoption("--mushrooms-command", metavar="COMMAND", help="A stepper that speaks protocol 1.")
     group.addoption("--mushrooms-level", default="core", choices=vectors.LEVELS, help="Hardest level asked.")
+    group.addoption("--mushrooms-seed", type=int, help="Of the disguises; a new one each run, printed.")
     group.addoption("--mushrooms-timeout", default=120.0, type=float, help="Seconds for one answer.")
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Draw a seed where none is given, the same for every worker of a run."""
+    if config.option.mushrooms_seed is None:
+        inherited = getattr(config, "workerinput", {}).get("mushrooms_seed")
+        config.option.mushrooms_seed = secrets.randbelow(NEW_SEEDS) if inherited is None else inherited
+    check_seed(config.option.mushrooms_seed, "--mushrooms-seed")
+
+
+def pytest_report_header(config: pytest.Config) -> str:
+    """Print the seed, which repeats a run."""
+    return f"mushrooms: --mushrooms-seed {config.option.mushrooms_seed}"
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_configure_node(node: Any) -> None:
+    """Hand the seed to a worker of pytest-xdist."""
+    node.workerinput["mushrooms_seed"] = node.config.option.mushrooms_seed
 
 
 def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
@@ -24,6 +50,12 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
     if "mushrooms_vector" in metafunc.fixturenames:
         chosen = suite.choose(metafunc.config.getoption("--mushrooms-level"))
         metafunc.parametrize("mushrooms_vector", chosen, ids=[vector.id for vector in chosen])
+
+
+@pytest.fixture
+def mushrooms_disguise(request: pytest.FixtureRequest, mushrooms_vector: Vector) -> Disguise:
+    """Return the disguise in which a vector is asked."""
+    return drawn_disguise(mushrooms_vector, request.config.option.mushrooms_seed)
 
 
 @pytest.fixture(scope="session")

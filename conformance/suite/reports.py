@@ -14,7 +14,9 @@ from xml.etree import ElementTree
 
 import msgspec
 
-from conformance.suite.run import VERDICTS, Result, Run, Speed
+from conformance.grading.grade import PrecisionClass
+from conformance.suite.result import VERDICTS, Result, Run, Speed
+from conformance.suite.scope import Scope
 from scene.protocol.messages import Introduction
 
 TAGS = {"failures": "failure", "errors": "error", "skipped": "skipped"}  # of JUnit, by what counts them
@@ -30,6 +32,7 @@ class Group(msgspec.Struct, frozen=True):
         cases: how many there are, asked or not.
         counts: cases by verdict, all nine.
         precision: class A, B or C of the answers that passed, or a dash.
+        classes: how many of these answers are of each class.
         worst_ulps: of those; null when not measured or beyond binary64.
     """
 
@@ -37,16 +40,20 @@ class Group(msgspec.Struct, frozen=True):
     cases: int
     counts: dict[str, int]
     precision: str
+    classes: dict[PrecisionClass, int]
     worst_ulps: float | None
 
 
 class Report(msgspec.Struct, frozen=True):
-    """The JSON report of a run; `report` is the version of this form."""
+    """The JSON report of a run; `report` is the version of this form, `verdict` the scope in a line."""
 
     report: int
     command: list[str]
     implementation: Introduction | None
     level: str
+    seed: int
+    verdict: str
+    scope: Scope
     corpus: str
     digest: str
     timeout_s: float
@@ -55,6 +62,7 @@ class Report(msgspec.Struct, frozen=True):
     seconds: float
     exit_code: int
     objections: list[str]
+    diagnosis: list[str]
     total: Group
     groups: list[Group]
     speed: Speed | None
@@ -71,6 +79,7 @@ def summarise(run: Run, group: str | None = None) -> Group:
         sum(counts.values()),
         {verdict: counts[verdict] for verdict in VERDICTS},
         run.precision(group),
+        run.classes(group),
         None if worst == float("inf") else worst,
     )
 
@@ -78,9 +87,11 @@ def summarise(run: Run, group: str | None = None) -> Group:
 def new_report(run: Run) -> Report:
     """Return the report of a run; answers are kept where they did not pass."""
     kept = [r if r.verdict != "pass" else msgspec.structs.replace(r, answer=None) for r in run.results]
-    same = ("command", "level", "corpus", "digest", "seconds", "speed", "stderr")
+    same = ("command", "level", "seed", "corpus", "digest", "seconds", "speed", "stderr", "diagnosis")
     return Report(
-        report=1,
+        report=2,
+        verdict=f"{run.verdict()}: {run.scope()}",
+        scope=run.scope(),
         **{name: getattr(run, name) for name in same},
         implementation=run.introduction,
         timeout_s=run.limits.timeout,

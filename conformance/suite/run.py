@@ -1,17 +1,18 @@
 """The suite: puts every question to one implementation and collects the verdicts.
 
 First the protocol itself (start, the number-transport probe, bad input), then the vectors up to a level,
-then the exact properties and the statistical profiles, then its speed where it offers `time`, then `stop`.
-Physics and precision stay apart: a verdict for each case, a precision class for each group. What ends the
-session is the verdict of every case not reached; what the implementation does not offer is `unsupported`.
+each in disguise (`suite.disguise`), and questions that no file holds; then the exact properties and the
+statistical profiles, then its speed where it offers `time`, then `stop`. What ends the session is the verdict
+of every case not reached; what the implementation does not offer is `unsupported`. Verdicts follow from the
+implementation, the level and the seed, not from the machine or its load, but for time limits.
 """
 
 from __future__ import annotations
 
 import itertools
 import math
+import secrets
 import time
-from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from pathlib import Path
@@ -21,135 +22,46 @@ from typing import Any
 import msgspec
 
 from conformance import properties, vectors
-from conformance.grading.grade import grade, precision_class
-from conformance.suite import property_checks
-from conformance.suite.process import Trouble
+from conformance.grading.agreement import middle
+from conformance.grading.grade import Grade, grade
+from conformance.suite import promises, property_checks, timing
+from conformance.suite.diagnosis import diagnose
+from conformance.suite.disguise import (
+    Disguise,
+    asked,
+    drawn_disguise,
+    drawn_horizons,
+    drawn_states,
+    published,
+)
+from conformance.suite.process import NOT_NUMBERS, Trouble
+from conformance.suite.result import Result, Run, Speed
+from conformance.suite.scope import graded_parts
 from conformance.suite.session import Limits, Session, missing
 from conformance.vectors import Vector
-from scene import BadInput, load, to_data
-from scene.protocol.messages import Introduction
+from scene import BadInput, State, load, to_data
+from scene.refusal import check_seed
 
-# An implementation that declines more than one question in twenty has not been graded.
-MAX_DECLINED = 0.05
-BAD = ("fail", "crashed", "timed-out", "wrong-format", "error")
-VERDICTS = ("pass", "fail", "indeterminate", "declined", "unsupported", *BAD[1:])
-TIMED_SCENE, TIMED_STATE = (
-    "moving-cap",
-    {"t": 0.0, "x": 0.1, "y": 0.2, "vx": 300.0, "vy": 400.0, "wall": None},
-)
+NEW_SEEDS = 10**6  # short enough to be typed again
+N_STATES = 24  # drawn for the exact properties
+TIMED_SCENE, TIMED_STATE = "moving-cap", State(0.0, 0.1, 0.2, 300.0, 400.0)
+TIMED_MOST = 2.0  # seconds, after which no longer trajectory is asked
 TIMED_REPEATS, TIMED_LEAST = 5, 20_000_000  # timings; nanoseconds that each must last to be read from a clock
 PROTOCOL_CASES = ("start", "echo", "rejects", "stop")
 OTHER_CASES = (
     *(f"protocol/{name}" for name in PROTOCOL_CASES),
     *(f"property/{name}" for name in properties.PROPERTIES),
-    *(f"profile/{name}" for name in ("work-identity", "one-cycle")),
+    *(f"profile/{name}" for name in property_checks.PROFILES),
+    *(f"promise/{name}" for name in promises.PROMISES),
 )
 Progress = Callable[[int, int], None]
-
-
-class Result(msgspec.Struct, frozen=True, omit_defaults=True):
-    """One case and what came of it.
-
-    Attributes:
-        id: of the vector, or protocol/..., property/..., profile/...
-        group: what it is counted with.
-        verdict: see `VERDICTS`.
-        why: one line.
-        seconds: until the answer.
-        level: of a vector.
-        ulps: worst backward ulps, absent when not measured (or beyond binary64).
-        relative: worst backward error, likewise.
-        answer: what the implementation said, where it is of use.
-        is_known: listed in the known-failures file.
-    """
-
-    id: str
-    group: str
-    verdict: str
-    why: str = ""
-    seconds: float = 0.0
-    level: str = ""
-    ulps: float | None = None
-    relative: float | None = None
-    answer: dict[str, Any] | None = None
-    is_known: bool = False
-
-    @property
-    def is_right(self) -> bool:
-        """Tell whether this result lets the run succeed: a known failure must fail, all else must not."""
-        return self.verdict != "pass" if self.is_known else self.verdict not in BAD
-
-
-class Speed(msgspec.Struct, frozen=True):
-    """Nanoseconds per collision, by the implementation's own clock, best and median of the repeats."""
-
-    scene: str
-    collisions: int
-    repeats: int
-    best_ns: float
-    median_ns: float
-
-
-class Run(msgspec.Struct, frozen=True):
-    """A whole run: what was asked of whom, and every result."""
-
-    command: list[str]
-    level: str
-    corpus: str
-    digest: str
-    limits: Limits
-    introduction: Introduction | None
-    results: list[Result]
-    speed: Speed | None
-    n_restarts: int
-    stderr: str
-    seconds: float
-
-    def counts(self, group: str | None = None) -> Counter[str]:
-        """Count the verdicts, of one group or of all."""
-        return Counter(r.verdict for r in self.results if group in (None, r.group))
-
-    def groups(self) -> list[str]:
-        """Return the groups in the order they were run."""
-        return list(dict.fromkeys(result.group for result in self.results))
-
-    def ulps(self, group: str | None = None) -> list[float]:
-        """Return the backward ulps of the answers that passed, inf where binary64 does not hold them."""
-        passed = [r for r in self.results if r.verdict == "pass" and group in (None, r.group)]
-        return [math.inf if r.ulps is None else r.ulps for r in passed if r.relative is not None]
-
-    def precision(self, group: str | None = None) -> str:
-        """Return the class that the passing answers reach, or a dash when none was measured."""
-        ulps = self.ulps(group)
-        return precision_class(ulps) if ulps else "–"
-
-    def objections(self) -> list[str]:
-        """Say, one line each, why the run does not succeed."""
-        found = [_objection(result) for result in self.results if not result.is_right]
-        counts = self.counts()
-        asked = sum(counts.values()) - counts["unsupported"]
-        if counts["declined"] > MAX_DECLINED * asked:
-            found.append(f"declined {counts['declined']} of {asked} cases, more than {MAX_DECLINED:.0%}")
-        vectors_passed = any(r.verdict == "pass" and r.level for r in self.results)
-        return found if vectors_passed or found else ["no vector passed: nothing was graded"]
-
-    def exit_code(self) -> int:
-        """Return 0 when all is right, 1 when not, 2 when the corpus could not tell (indeterminate)."""
-        if self.objections():
-            return 1
-        return 2 if self.counts()["indeterminate"] else 0
-
-
-def _objection(result: Result) -> str:
-    if result.is_known:
-        return f"{result.id}: passes, though it is listed as a known failure"
-    return f"{result.id}: {result.verdict}: {result.why}"
 
 
 def check(
     command: Sequence[str],
     *,
     level: str = "core",
+    seed: int | None = None,
     groups: Sequence[str] = (),
     limits: Limits | None = None,
     known: frozenset[str] = frozenset(),
@@ -160,33 +72,40 @@ def check(
     Args:
         command: program and arguments; it speaks protocol 1.
         level: core, extended or stress.
+        seed: of all that is drawn, 0 to 2^64 - 1; None for a new one.
         groups: of vectors; all when empty.
         limits: time and restarts.
         known: ids of the cases that are known to fail.
         progress: called with the number of cases done and their total, as far as it is known.
 
     Raises:
-        BadInput: for a command that cannot be started, an unknown level or group, a broken corpus.
+        BadInput: for a command that cannot be started, an unknown level or group, a seed out of its
+            bounds, a broken corpus.
     """
     chosen = choose(level, groups)
     manifest = vectors.manifest()
+    seed = secrets.randbelow(NEW_SEEDS) if seed is None else check_seed(seed)
     limits = limits or Limits()
     begin = time.monotonic()
     with Session(command, limits) as session:
-        results, speed = _converse(session, chosen, progress or (lambda _done, _total: None))
-        marked = [msgspec.structs.replace(result, is_known=result.id in known) for result in results]
+        results, speed = _converse(session, chosen, (level, seed), progress or (lambda _done, _total: None))
+        results = [msgspec.structs.replace(result, is_known=result.id in known) for result in results]
+        passed = {result.id for result in results if result.verdict == "pass"}
         return Run(
             command=list(command),
             level=level,
+            seed=seed,
             corpus=manifest.corpus,
             digest=manifest.digest,
             limits=limits,
             introduction=session.introduction,
-            results=marked,
+            results=results,
             speed=speed,
             n_restarts=session.n_restarts,
             stderr=session.stderr.text(),
             seconds=time.monotonic() - begin,
+            graded=graded_parts([v for v in chosen if v.id in passed], is_timed=speed is not None),
+            diagnosis=diagnose(results),
         )
 
 
@@ -228,18 +147,21 @@ def read_known(path: Path) -> frozenset[str]:
 
 
 def _converse(
-    session: Session, chosen: Sequence[Vector], progress: Progress
+    session: Session, chosen: Sequence[Vector], drawn: tuple[str, int], progress: Progress
 ) -> tuple[list[Result], Speed | None]:
     results: list[Result] = []
+    level, seed = drawn
     for name, act in (("start", session.start), ("echo", session.probe)):
         results.append(_tried(name, act))
         if results[-1].verdict != "pass":
             unreached = Trouble(results[-1].verdict, f"not asked: {name} failed")
             return [*results, *(_result(vector, unreached) for vector in chosen)], None
     results.append(_tried("rejects", partial(_ask_nonsense, session)))
-    total = len(results) + len(chosen) + len(OTHER_CASES) - len(PROTOCOL_CASES)
+    questions = [*chosen, *drawn_horizons([v for v in chosen if v.level == "core"], seed)]
+    total = len(results) + len(questions) + len(OTHER_CASES) - len(PROTOCOL_CASES)
     for result in itertools.chain(
-        (ask_vector(session, vector) for vector in chosen), _ask_further(session, chosen)
+        (ask_vector(session, vector, drawn_disguise(vector, seed)) for vector in questions),
+        _ask_further(session, chosen, level, seed),
     ):
         results.append(result)
         progress(len(results), total)
@@ -270,14 +192,15 @@ def put(session: Session, vector: Vector) -> dict[str, Any]:
     return session.ask(vectors.request(vector, 0))
 
 
-def ask_vector(session: Session, vector: Vector) -> Result:
-    """Put one vector to an open session and grade the answer."""
+def ask_vector(session: Session, vector: Vector, disguise: Disguise = Disguise()) -> Result:  # noqa: B008
+    """Put one vector to an open session, in disguise, and grade the answer to the question as published."""
     begin = time.monotonic()
     try:
-        answer = put(session, vector)
+        answer = published(put(session, asked(vector, disguise)), disguise)
     except Trouble as trouble:
         return _result(vector, trouble, time.monotonic() - begin)
     graded = grade(vector, answer)
+    given, expected = _compared(vector, answer, graded)
     return Result(
         vector.id,
         vector.group,
@@ -285,45 +208,71 @@ def ask_vector(session: Session, vector: Vector) -> Result:
         graded.why,
         time.monotonic() - begin,
         vector.level,
+        str(disguise),
         ulps=graded.ulps if math.isfinite(graded.ulps) else None,
         relative=graded.relative if math.isfinite(graded.relative) else None,
         answer=answer,
+        given=given,
+        expected=expected,
     )
 
 
+def _compared(
+    vector: Vector, answer: dict[str, Any], graded: Grade
+) -> tuple[dict[str, Any] | None, dict[str, Any] | None]:
+    """Return the outcome that did not pass and the certified one in its place; None where there is none."""
+    if graded.verdict in ("pass", "wrong-format", "error"):
+        return None, None
+    certified = msgspec.to_builtins(middle(vector.expect[0], vector.state))
+    given = answer.get("steps") or answer.get("states") or [answer]
+    if vector.kind == "flow":
+        certified = certified[-1:]
+    at = graded.step
+    return given[at] if at < len(given) else None, certified[at] if at < len(certified) else None
+
+
 def measure_speed(session: Session) -> Speed | None:
-    """Time a trajectory on the moving cap, longer until the clock can read it; None where not offered."""
+    """Time a trajectory on the moving cap, longer until the clock can read it.
+
+    None where it is not offered, or where it does not end as `trajectory` says (`conformance.suite.timing`).
+    """
     assert session.introduction is not None
-    scene = to_data(load(TIMED_SCENE))
-    if missing(session.introduction, "time", scene):
+    scene, state = load(TIMED_SCENE), TIMED_STATE
+    if missing(session.introduction, "time", to_data(scene)):
         return None
-    n_collisions, ns = 10, [0]
-    request = {"cmd": "time", "scene": scene, "state": TIMED_STATE}
+    n_collisions, ns, seconds = 10, [0], 0.0
     try:
-        while min(ns) < TIMED_LEAST and n_collisions < 100_000:
+        # An answer that takes long, and is said to have taken no time, will not grow more credible.
+        while min(ns) < TIMED_LEAST and n_collisions < 100_000 and seconds < TIMED_MOST:
             n_collisions *= 10 if min(ns) * 10 < TIMED_LEAST else 2
-            answer = session.ask({**request, "collisions": n_collisions, "repeat": TIMED_REPEATS})
-            ns = answer.get("ns") or [0]
-            if not answer.get("steps") or answer["steps"][-1]["outcome"] != "collision":
-                return None
-    except Trouble:
+            ns, seconds, last = timing.timed(session, scene, state, n_collisions, TIMED_REPEATS)
+        timing.check_last(session, scene, state, n_collisions, last)
+    except (Trouble, *NOT_NUMBERS):
+        return None
+    if not min(ns):
         return None
     return Speed(TIMED_SCENE, n_collisions, len(ns), min(ns) / n_collisions, median(ns) / n_collisions)
 
 
 def _ask_nonsense(session: Session) -> None:
     """A state without `vy` must be rejected, not guessed, and the process must live on."""
-    state = {name: value for name, value in TIMED_STATE.items() if name != "vy"}
+    state = {name: value for name, value in msgspec.to_builtins(TIMED_STATE).items() if name != "vy"}
     answer = session.ask({"cmd": "step", "scene": {"table": "cap", "r": 1.0}, "state": state, "t_end": 1.0})
     if answer.get("outcome") != "rejected":
         raise Trouble("fail", f"a state without vy was answered {answer}"[:200])
 
 
-def _ask_further(session: Session, chosen: Sequence[Vector]) -> Iterator[Result]:
-    for name, verdict, why, seconds in property_checks.ask_properties(session, chosen):
+def _ask_further(session: Session, chosen: Sequence[Vector], level: str, seed: int) -> Iterator[Result]:
+    assert session.introduction is not None
+    offered = [v for v in chosen if not missing(session.introduction, "step", v.scene)]
+    steps = [v for v in offered if v.kind == "step" and v.level == "core"]
+    questions = drawn_states(steps, seed, N_STATES)
+    for name, verdict, why, seconds in property_checks.ask_properties(session, questions):
         yield Result(f"property/{name}", "property", verdict, why, seconds)
-    for name, verdict, why, seconds in property_checks.ask_profiles(session):
+    for name, verdict, why, seconds in property_checks.ask_profiles(session, level, seed):
         yield Result(f"profile/{name}", "profile", verdict, why, seconds)
+    for name, verdict, why, seconds in promises.ask_promises(session):
+        yield Result(f"promise/{name}", "promise", verdict, why, seconds)
 
 
 def _result(vector: Vector, trouble: Trouble, seconds: float = 0.0) -> Result:

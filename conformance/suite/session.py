@@ -2,30 +2,47 @@
 
 What is no answer becomes a verdict (`Trouble`): crashed, timed-out, wrong-format; `error` when the
 restarts are used up and nothing was asked. After trouble the process is killed and the next question
-goes to a fresh one, to which `start` is replayed. Sequence numbers are random, so that no answer can be
-given before its question. Whether an answer is right is not judged here.
+goes to a fresh one, to which `start` is replayed. When the time for the whole session is spent, all that is
+still asked is `timed-out`. Sequence numbers are random, so that no answer can be given before its question.
+Texts are kept without control characters, and a wall that an answer leaves out is named from the place.
+Whether an answer is right is not judged here.
 """
 
 from __future__ import annotations
 
+import math
 import random
 import struct
 import sys
+import time
 from collections.abc import Mapping, Sequence
 from types import TracebackType
 from typing import Any
 
 import msgspec
+from mpmath import fp
 
-from conformance.suite.process import Process, Transcript, Trouble, shown
-from scene import Outcome, Scene, State, to_data
-from scene.protocol.messages import PROTOCOL, Echoed, Failed, Flown, Introduction, Steps, Timed
+from conformance.suite.process import Process, Transcript, Trouble, clean, shown
+from scene import Collision, Outcome, Scene, State, from_data, to_data
+from scene.geometry import table_at
+from scene.protocol.messages import (
+    PROTOCOL,
+    Answered,
+    AnsweredCollision,
+    Echoed,
+    Failed,
+    Flown,
+    Introduction,
+    Steps,
+    Timed,
+)
 from scene.refusal import BadInput
 
 MAX_SEQ = 2**31 - 1  # the integers of every language
 STOP_TIMEOUT = 5.0  # seconds to exit after `stop`
 UNREADABLE = (msgspec.DecodeError, UnicodeDecodeError, RecursionError)
-ANSWERS = {"step": Outcome, "trajectory": Steps, "flow": Flown, "time": Timed}
+MAX_OFFERED = 100  # profiles, tables or laws that an introduction may list
+ANSWERS = {"step": Answered, "trajectory": Steps, "flow": Flown, "time": Timed}
 
 
 class Limits(msgspec.Struct, frozen=True):
@@ -34,10 +51,12 @@ class Limits(msgspec.Struct, frozen=True):
     Attributes:
         timeout: seconds for one answer, start-up and just-in-time compilation included.
         restarts: fresh processes after the first.
+        total: seconds for the whole session, restarts included; None for as long as it takes.
     """
 
     timeout: float = 120.0
     restarts: int = 10
+    total: float | None = None
 
 
 class _Envelope(msgspec.Struct):
@@ -47,7 +66,7 @@ class _Envelope(msgspec.Struct):
     reason: Any = ""
 
 
-_outcomes: msgspec.json.Decoder[Any] = msgspec.json.Decoder(Outcome)
+_outcomes: msgspec.json.Decoder[Any] = msgspec.json.Decoder(Answered)
 _envelopes = msgspec.json.Decoder(_Envelope)
 _failures: msgspec.json.Decoder[Any] = msgspec.json.Decoder(Failed)
 _answers: dict[str, msgspec.json.Decoder[Any]] = {
@@ -71,6 +90,8 @@ class Session:
         self._process: Process | None = None
         self._end: Trouble | None = None
         self._draw = random.Random()
+        total = self._limits.total
+        self._deadline = math.inf if total is None else time.monotonic() + total
         self.introduction: Introduction | None = None
         self.n_restarts = 0
         self.stderr = Transcript()
@@ -94,7 +115,7 @@ class Session:
             raise RuntimeError("this session has started")
         self._process = Process(self._command, self.stderr)
         try:
-            line = self._exchange({"cmd": "start", "protocol": PROTOCOL})
+            line = self._exchange(_encode({"cmd": "start", "protocol": PROTOCOL}))
             self.introduction = read_introduction(line)
         except Trouble as trouble:
             self._give_up(trouble)
@@ -109,42 +130,49 @@ class Session:
         """
         values = probe_values()
         try:
-            line = self._exchange({"cmd": "echo", "values": values})
+            line = self._exchange(_encode({"cmd": "echo", "values": values}))
             check_echo(values, line)
         except Trouble as trouble:
             self._give_up(trouble)
             raise
 
     def ask(self, request: Mapping[str, Any]) -> dict[str, Any]:
-        """Put one question and return its answer as plain data.
+        """Put one question and return its answer as plain data, every collision with its wall.
 
         Args:
             request: a step, trajectory, flow or time request; its seq is replaced by a random one.
 
         Raises:
-            Trouble: crashed, timed-out or wrong-format; error when the session is over.
+            Trouble: crashed, timed-out or wrong-format; error or timed-out when the session is over.
         """
-        if self._end is not None:
-            raise self._end
-        if self._process is None:
-            self._restart()
         seq = self._draw.randint(1, MAX_SEQ)
-        try:
-            return read_answer(self._exchange({**request, "seq": seq}), request["cmd"], seq)
-        except Trouble:
-            self.kill()
-            raise
+        answer = self._say(_encode({**request, "seq": seq}), request["cmd"], seq)
+        return _with_walls(answer, request.get("scene"))
+
+    def say(self, line: bytes, seq: int | None) -> dict[str, Any]:
+        """Send a line that is no request, and return what it is answered.
+
+        Args:
+            line: without its newline.
+            seq: that can be read in it; the answer has this one or null.
+
+        Raises:
+            Trouble: as `ask`.
+        """
+        return self._say(line, "step", seq, may_be_null=True)
 
     def step(self, scene: Scene, state: State, t_end: float) -> Outcome:
         """Ask for one step: the session as a stepper, for properties.
 
         Raises:
-            Trouble: as `ask`.
+            Trouble: as `ask`; error when that is the answer; fail for a question with a number that is
+                not finite, as only the answers before can have made it.
         """
         fields = msgspec.to_builtins(state)
+        if not all(math.isfinite(number) for number in (*msgspec.structs.astuple(state)[:5], t_end)):
+            raise Trouble("fail", f"its answers lead to the state {fields} and t_end = {t_end}")
         request = {"cmd": "step", "scene": to_data(scene), "state": fields, "t_end": t_end}
-        outcome: Outcome = msgspec.convert(self.ask(request), Outcome)
-        return outcome
+        return read_outcome(self.ask(request), state.t)
 
     def stop(self) -> None:
         """Ask the process to stop and see it end by itself.
@@ -154,7 +182,8 @@ class Session:
         """
         process, self._process = self._process, None
         if process is None:
-            raise Trouble("error", "not asked: no process was left")
+            self._check_time()
+            raise self._end or Trouble("error", "not asked: no process was left")
         try:
             process.finish(_encode({"cmd": "stop"}), min(STOP_TIMEOUT, self._limits.timeout))
         finally:
@@ -166,9 +195,28 @@ class Session:
         if process is not None:
             process.kill()
 
-    def _exchange(self, request: Mapping[str, Any]) -> bytes:
+    def _say(self, line: bytes, cmd: str, seq: int | None, *, may_be_null: bool = False) -> dict[str, Any]:
+        if self._end is not None:
+            raise self._end
+        self._check_time()
+        if self._process is None:
+            self._restart()
+        try:
+            return read_answer(self._exchange(line), cmd, seq, may_be_null=may_be_null)
+        except Trouble:
+            self.kill()
+            raise
+
+    def _check_time(self) -> None:
+        if self._end is None and time.monotonic() >= self._deadline:
+            why = f"not asked: the total time of {self._limits.total:g} s is spent"
+            self._give_up(trouble := Trouble("timed-out", why))
+            raise trouble
+
+    def _exchange(self, line: bytes) -> bytes:
         assert self._process is not None
-        return self._process.exchange(_encode(request), self._limits.timeout)
+        left = max(0.0, self._deadline - time.monotonic())
+        return self._process.exchange(line, min(self._limits.timeout, left))
 
     def _restart(self) -> None:
         if self.n_restarts >= self._limits.restarts:
@@ -192,16 +240,25 @@ def missing(introduction: Introduction, profile: str, scene: Mapping[str, Any] |
     Args:
         introduction: what it said of itself.
         profile: step, trajectory, flow or time.
+        scene: as for `needs`.
+    """
+    offered = {"profile": introduction.profiles, "table": introduction.tables, "law": introduction.laws}
+    return ", ".join(f"{what} {name}" for what, name in needs(profile, scene) if name not in offered[what])
+
+
+def needs(profile: str, scene: Mapping[str, Any] | None) -> list[tuple[str, str]]:
+    """Return what a question needs: its profile, its table and the kinds of its laws.
+
+    Args:
+        profile: step, trajectory, flow or time.
         scene: of the question, in the wire's form; None for one that must be refused, so that no
             table and no law is needed.
     """
-    needs = [("profile", profile, introduction.profiles)]
-    if scene is not None:
-        parts = {name: part for name, part in scene.items() if name not in ("table", "name", "notes")}
-        kinds = {law["kind"] if isinstance(law, Mapping) else "constant" for law in parts.values()}
-        needs.append(("table", str(scene["table"]), introduction.tables))
-        needs += [("law", kind, introduction.laws) for kind in sorted(kinds)]
-    return ", ".join(f"{what} {name}" for what, name, offered in needs if name not in offered)
+    if scene is None:
+        return [("profile", profile)]
+    parts = {name: part for name, part in scene.items() if name not in ("table", "name", "notes")}
+    kinds = {law["kind"] if isinstance(law, Mapping) else "constant" for law in parts.values()}
+    return [("profile", profile), ("table", str(scene["table"])), *(("law", kind) for kind in sorted(kinds))]
 
 
 def read_introduction(line: bytes) -> Introduction:
@@ -216,7 +273,10 @@ def read_introduction(line: bytes) -> Introduction:
         raise Trouble("wrong-format", f"start: {_reason(error)} in {shown(line)}") from None
     if introduction.protocol != PROTOCOL:
         raise Trouble("wrong-format", f"start: it speaks protocol {introduction.protocol}, not {PROTOCOL}")
-    return introduction
+    texts = {name: clean(getattr(introduction, name)) for name in ("name", "version", "language")}
+    lists = {name: getattr(introduction, name)[:MAX_OFFERED] for name in ("profiles", "tables", "laws")}
+    offered = {name: tuple(map(clean, given)) for name, given in lists.items()}
+    return msgspec.structs.replace(introduction, **texts, **offered)
 
 
 def check_echo(values: Sequence[float], line: bytes) -> None:
@@ -236,13 +296,14 @@ def check_echo(values: Sequence[float], line: bytes) -> None:
             raise Trouble("wrong-format", f"echo: values[{i}] = {sent!r} came back as {came!r}")
 
 
-def read_answer(line: bytes, cmd: str, seq: int) -> dict[str, Any]:
+def read_answer(line: bytes, cmd: str, seq: int | None, *, may_be_null: bool = False) -> dict[str, Any]:
     """Decode the answer to one question, strictly.
 
     Args:
         line: as received.
         cmd: step, trajectory, flow or time.
         seq: that of the question.
+        may_be_null: whether null will do for it.
 
     Returns:
         The answer as plain data, without its seq: an outcome, what the command asks for, or an error.
@@ -252,8 +313,9 @@ def read_answer(line: bytes, cmd: str, seq: int) -> dict[str, Any]:
     """
     try:
         envelope = _envelopes.decode(line)
-        if type(envelope.seq) is not int or envelope.seq != seq:
-            said = f": {' '.join(str(envelope.reason).split())[:200]}" if envelope.reason else ""
+        is_null = may_be_null and envelope.seq is None
+        if not is_null and (type(envelope.seq) is not int or envelope.seq != seq):
+            said = f": {str(envelope.reason)[:200]}" if envelope.reason else ""
             given = repr(envelope.seq)[:40]
             raise Trouble("wrong-format", f"answered seq {given} to seq {seq}{said}")
         own = _failures if envelope.error is not None else _answers[cmd]
@@ -262,7 +324,42 @@ def read_answer(line: bytes, cmd: str, seq: int) -> dict[str, Any]:
     except UNREADABLE as error:
         raise Trouble("wrong-format", f"{cmd}: {_reason(error)} in {shown(line)}") from None
     data.pop("seq", None)
+    for part in (data, *data.get("steps", ()), *data.get("states", ())):
+        part.update({name: clean(part[name]) for name in ("reason", "error") if name in part})
     return data
+
+
+def read_outcome(answer: Mapping[str, Any], t: float) -> Outcome:
+    """Return the outcome that an answer to `step` is, or one of the steps of a trajectory.
+
+    Args:
+        answer: as `Session.ask` returns it.
+        t: when the flight began, for a collision that does not tell its flight time.
+
+    Raises:
+        Trouble: error, when that is the answer; wrong-format, for a collision that names no wall.
+    """
+    if "error" in answer:
+        raise Trouble("error", answer["error"])
+    answered: Answered = msgspec.convert(answer, Answered)
+    if not isinstance(answered, AnsweredCollision):
+        return answered
+    if answered.wall is None:
+        raise Trouble("wrong-format", "`wall` is missing")
+    dt = answered.t - t if answered.dt is None else answered.dt
+    return Collision(answered.wall, dt, answered.t, answered.x, answered.y, answered.vx, answered.vy)
+
+
+def _with_walls(answer: dict[str, Any], scene: Any) -> dict[str, Any]:
+    """Name the wall of each collision that leaves it out: the wall nearest to its place at its time."""
+    for part in (answer, *answer.get("steps", ())):
+        if part.get("outcome") == "collision" and "wall" not in part:
+            try:
+                table = table_at(fp, from_data(scene), part["t"])
+            except (ValueError, ArithmeticError):
+                return answer  # no scene at all, or a time beyond its numbers: nothing can have been met
+            part["wall"] = table.nearest_wall(part["x"], part["y"])
+    return answer
 
 
 def probe_values() -> list[float]:
@@ -283,4 +380,4 @@ def _encode(request: Mapping[str, Any]) -> bytes:
 
 
 def _reason(error: Exception) -> str:
-    return " ".join(str(error).split()).replace("$.", "")[:200]
+    return clean(str(error)).replace("$.", "")[:200]

@@ -11,9 +11,8 @@ from mpmath import fp
 from scipy.stats import norm
 
 import theory
-from conformance.audit.claims import broadened
+from conformance.audit.claims.broadened import predicted, summed
 from conformance.audit.claims.finite_energy import width
-from conformance.audit.claims.many_cycles import blur_of_sum
 from conformance.audit.claims.misprints import volume_loop
 from conformance.audit.evidence import energies_of
 from conformance.audit.runs import scene_of
@@ -25,6 +24,7 @@ from scene.laws import value
 from scene.tables import Mushroom
 
 N_BINS = 80
+N_SUM_BINS = 300
 N_LOOP = 240
 N_PHASES = 6
 
@@ -95,14 +95,14 @@ def energies(samples: list[Sample]) -> Figure:
 
 def _energies(axes: Axes, sample: Sample) -> None:
     prediction = theory.predict(scene_of(sample.run), 15)
-    sigma, centre, p_nc = width(sample).value, float(prediction.log_e_nc), float(prediction.p_nc)
+    found, centre = predicted(sample), float(prediction.log_e_nc)
+    sigma = found.peak[1] ** 0.5
     low, high = (float(np.quantile(sample.gain, q)) for q in (0.0005, 0.9995))
     edges = np.linspace(low - sigma, high + sigma, N_BINS + 1)
     heights = _bars(axes, sample.gain, edges, sample.n)
     x = np.linspace(edges[0], edges[-1], 1500)
-    below = broadened.captured(sample)[0]
-    total = (1 - p_nc) * np.gradient(below(x), x) + p_nc * norm.pdf(x, centre + sigma**2 / 4, sigma)
-    axes.plot(x, total, color=BLACK, linewidth=1.3, label=f"theory, blurred by {sigma:.4f}")
+    total = np.gradient(found.cdf(x), x)
+    axes.plot(x, total, color=BLACK, linewidth=1.3, label=f"theory at this energy, peak {sigma:.4f} wide")
     sharp = np.diff(energies_of(sample.run.name).captured_below(x)) / np.diff(x)
     axes.plot((x[1:] + x[:-1]) / 2, sharp, color=ORANGE, linewidth=1.2, label="theory, captured, sharp")
     axes.axvline(centre, color=ORANGE, linestyle="--", linewidth=1.2, label="theory, never captured")
@@ -142,16 +142,13 @@ def sums(cases: list[tuple[Sample, int]]) -> Figure:
 
 def _sum(axes: Axes, sample: Sample, n: int, scale: str) -> None:
     total = sample.s[:, n - 1] / n
-    k = [float(c) for c in theory.cumulants(scene_of(sample.run), 2)]
-    noise, bias, _ = blur_of_sum(sample, n)
-    places, below = broadened.summed(sample.run.name, n, noise, bias)
-    x = (places[1:] + places[:-1]) / 2 / n
-    density = np.diff(below) / np.diff(places) * n
-    sd = float(np.hypot(np.sqrt(k[2] * n), noise)) / n
-    centre = k[1] + bias / n
+    drawn = summed(sample.run.name, n)
+    centre, sd = drawn.mean / n, drawn.sd / n
+    density, places = np.histogram(drawn.values / n, N_SUM_BINS, density=True)
+    x = (places[1:] + places[:-1]) / 2
     edges = np.linspace(centre - 5 * sd, centre + 5 * sd, 51)
     _bars(axes, total, edges, sample.n, baseline=1e-9)
-    axes.plot(x, density, color=BLACK, linewidth=1.3, label="convolution of n cycles")
+    axes.plot(x, density, color=BLACK, linewidth=1.3, label="sums of n cycles, by theory")
     axes.plot(x, norm.pdf(x, centre, sd), color=ORANGE, linestyle="--", linewidth=1.2, label="Gaussian")
     top = float(norm.pdf(0) / sd)
     axes.set(

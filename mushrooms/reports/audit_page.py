@@ -8,6 +8,7 @@ from __future__ import annotations
 import json
 import os
 import platform
+import re
 from typing import Any, TypedDict, cast
 
 import msgspec
@@ -25,18 +26,28 @@ from mushrooms.figures import by_claim
 from mushrooms.figures import style as plots
 from mushrooms.reports.page import embed, render
 
+PAPER = "https://arxiv.org/abs/1305.2624"
+# First the paper's claims in its order, then its misprints, then what nobody claimed but must hold.
 GROUPS = {
-    "M": "Misprints and gaps",
-    "X": "Experiments",
-    "L": "Laws",
-    "I": "Identities",
-    "N": "Formulas checked one by one",
+    "Claims, in the paper's order": "XLC",
+    "Misprints and gaps": "M",
+    "Formulas and identities, one by one": "IN",
+}
+# A verdict is told by its sign and its word, and coloured: paper right, paper wrong, not decided.
+SIGNS = {
+    "confirmed": ("✓", "good"),
+    "misprint": ("✎", "bad"),
+    "false": ("✗", "bad"),
+    "not reproducible as stated": ("≁", "bad"),
+    "inferred": ("≈", "open"),
+    "refuted": ("✗", "bad"),
+    "indeterminate": ("?", "open"),
 }
 PIXELS_PER_INCH = 104  # of a screen: a figure is shown no larger
 
 
 class CheckData(TypedDict):
-    """One comparison; `form` is claim, printed or corrected."""
+    """One comparison; `form` is claim, printed or corrected; `pull` is the difference in standard errors."""
 
     what: str
     holds: bool | None
@@ -47,6 +58,7 @@ class CheckData(TypedDict):
     form: str
     n_tests: int
     note: str
+    pull: float | None
 
 
 class FindingData(TypedDict):
@@ -164,7 +176,17 @@ def _finding(entry: Entry, finding: Finding) -> FindingData:
 
 def _check(check: Check) -> CheckData:
     numbers = {name: _number(getattr(check, name)) for name in ("value", "error", "band")}
-    return cast(CheckData, check._asdict() | numbers)
+    return cast(CheckData, check._asdict() | numbers | {"pull": _pull(check)})
+
+
+def _pull(check: Check) -> float | None:
+    """Return how many standard errors a value is from the number expected; None where none is."""
+    if check.value is None or not check.error:
+        return None
+    try:
+        return _number((check.value - float(check.expected)) / check.error)
+    except ValueError:  # it is held against a bound
+        return None
 
 
 def _run(sample: Sample) -> RunData:
@@ -209,8 +231,8 @@ def to_html(data: ReportData, samples: by_claim.Samples) -> str:
         image = {"source": embed(plots.svg(figure)), "caption": picture.caption, "width": wide}
         figures.setdefault(picture.entry, []).append(image)
     groups = [
-        (title, [finding for finding in data["findings"] if finding["id"][0] == letter])
-        for letter, title in GROUPS.items()
+        (title, sorted((f for f in data["findings"] if f["id"][0] in letters), key=_place))
+        for title, letters in GROUPS.items()
     ]
     tables = {run["name"].partition("@")[0]: run["scene"] for run in data["runs"]}
     return render(
@@ -220,7 +242,16 @@ def to_html(data: ReportData, samples: by_claim.Samples) -> str:
         images=figures,
         scenes=tables,
         figures_text=figures_text,
+        signs=SIGNS,
+        paper=PAPER,
     )
+
+
+def _place(finding: FindingData) -> tuple[list[int], str, int]:
+    """Return where in the paper a finding belongs: its first section, then its letter and number."""
+    sections = re.findall(r"sec[s]?\. (\d(?:\.\d)*)", finding["where"])
+    first = [int(part) for part in sections[0].split(".")] if sections else [9]
+    return first, finding["id"][0], int(finding["id"][1:])
 
 
 def figures_text(check: CheckData) -> str:

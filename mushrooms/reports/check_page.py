@@ -7,7 +7,6 @@ one, the errors by precision class, and the implementation's point in the plane 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -16,12 +15,12 @@ from matplotlib import rc_context
 from conformance import vectors
 from conformance.grading.grade import FAIR, SHARP
 from conformance.suite import reports
-from conformance.suite.run import Result, Run
-from conformance.vectors import Certified, Vector
+from conformance.suite.result import Result, Run
+from conformance.vectors import Vector
+from mushrooms.figures import case
 from mushrooms.figures import style as plots
-from mushrooms.figures import table as draw
 from mushrooms.reports.page import embed, render
-from scene import BadInput, Scene, from_data
+from scene import BadInput
 
 N_FAILED, N_SHARPEST = 8, 4  # cases drawn: those that failed, or else the least precise that passed
 MAX_LISTED = 200
@@ -34,6 +33,7 @@ def to_html(run: Run) -> bytes:
     seen = [verdict for verdict in report.total.counts if verdict == "pass" or report.total.counts[verdict]]
     others = [r for r in run.results if r.verdict != "pass" or r.is_known]
     by_id = {vector.id: vector for vector in vectors.load(run.level)}
+    cases = [_case(result, by_id[result.id]) for result in _worst(run) if result.id in by_id]
     page = render(
         "check.html.jinja",
         report=report,
@@ -41,7 +41,9 @@ def to_html(run: Run) -> bytes:
         further=[r for r in run.results if r.group in ("property", "profile")],
         others=others[:MAX_LISTED],
         n_unlisted=max(0, len(others) - MAX_LISTED),
-        cases=[_case(result, by_id[result.id]) for result in _worst(run) if result.id in by_id],
+        cases=cases,
+        drawn={shown["result"].id for shown in cases},
+        legend=case.LEGEND,
         errors=embed(_errors(run)) if run.ulps() else "",
         speed=embed(_speed(run)) if run.speed and run.ulps() else "",
         sharp=SHARP,
@@ -60,57 +62,21 @@ def _worst(run: Run) -> list[Result]:
 
 def _case(result: Result, vector: Vector) -> dict[str, Any]:
     try:
-        figure = embed(_paths(result, vector))
+        figure = embed(case.paths(result, vector))
     except BadInput:  # a vector whose scene must be refused has no table to draw
         figure = ""
-    return {"result": result, "vector": vector, "figure": figure}
+    return {"result": result, "vector": vector, "figure": figure, "rows": _rows(result)}
 
 
-@rc_context(plots.STYLE)
-def _paths(result: Result, vector: Vector) -> bytes:
-    """Draw the walls at the start and at the certified end, the certified path and the given one."""
-    scene = from_data(vector.scene)
-    figure, axes = plots.new_figure(4.2, 4.2)
-    start = (vector.state.x, vector.state.y)
-    steps = vector.expect[0].steps
-    certified = [start, *((_middle(step.x), _middle(step.y)) for step in steps)]
-    end = vector.state.t + sum(_middle(step.dt) for step in steps)
-    for line in draw.walls(scene, vector.state.t):
-        axes.plot(*line, color=plots.GREY, linewidth=1, label="walls at the start")
-    for line in draw.walls(scene, end):
-        axes.plot(*line, color=plots.BLACK, linewidth=1, linestyle=":", label="walls at the end")
-    axes.plot(*np.transpose(certified), color=plots.ORANGE, linewidth=4, alpha=0.6, label="certified")
-    answer = result.answer or {}
-    given = [step for step in answer.get("steps", [answer]) if "x" in step]
-    path = [start, *((step["x"], step["y"]) for step in given)]
-    axes.plot(*np.transpose(path), color=plots.BLUE, linewidth=1.5, marker=".", label="given")
-    for step, colour, width in (
-        (_last(steps), plots.ORANGE, 4),
-        (given[-1] if given else None, plots.BLUE, 1.5),
-    ):
-        if step is not None:
-            _draw_velocity(axes, step, scene, colour, width)
-    axes.plot(*start, marker="o", color=plots.BLACK, markersize=4, label="start", linestyle="none")
-    axes.set(aspect="equal", xlabel="x [length]", ylabel="y [length]")
-    handles, labels = axes.get_legend_handles_labels()
-    unique = dict(zip(labels, handles, strict=True))
-    figure.legend(unique.values(), unique.keys(), loc="outside upper center", ncols=3, frameon=False)
-    return plots.svg(figure)
+def _rows(result: Result) -> list[tuple[str, str, str]]:
+    """Return the fields of a failure: name, certified, given."""
+    certified, given = result.expected or {}, result.given or {}
+    names = [name for name in dict.fromkeys([*certified, *given]) if certified.get(name) != given.get(name)]
+    return [(name, _cell(certified.get(name)), _cell(given.get(name))) for name in names]
 
 
-def _last(steps: Sequence[Certified]) -> dict[str, float] | None:
-    return {name: _middle(getattr(steps[-1], name)) for name in ("x", "y", "vx", "vy")} if steps else None
-
-
-def _draw_velocity(axes: Any, step: dict[str, float], scene: Scene, colour: str, width: float) -> None:
-    # Where it goes on: its direction, a tenth of the table long.
-    size = 0.1 * float(np.ptp(np.hstack(draw.walls(scene, step.get("t", 0.0))), axis=1).max())
-    speed = math.hypot(step["vx"], step["vy"])
-    if speed > 0:
-        x, y = (step[a] + size * step[v] / speed for a, v in (("x", "vx"), ("y", "vy")))
-        axes.plot(
-            [step["x"], x], [step["y"], y], color=colour, linewidth=width, alpha=0.6, linestyle=(0, (1, 0.6))
-        )
+def _cell(value: Any) -> str:
+    return "–" if value is None else f"{value:.17g}" if isinstance(value, float) else str(value)
 
 
 @rc_context(plots.STYLE)
@@ -149,8 +115,3 @@ def _speed(run: Run) -> bytes:
 def _mark_classes(axes: Any, line: Any) -> None:
     for bound, name in ((SHARP, "A"), (FAIR, "B")):
         line(bound, color=plots.ORANGE, linewidth=1, linestyle="--", label=f"class {name} ends")
-
-
-def _middle(enclosure: Sequence[str]) -> float:
-    low, high = map(float, enclosure)
-    return low + (high - low) / 2

@@ -11,6 +11,7 @@ from typing import Any
 import jinja2
 
 from mushrooms import __version__
+from mushrooms.reports.typeset import typeset
 
 
 def render(template: str, **fields: Any) -> str:
@@ -23,6 +24,7 @@ def render(template: str, **fields: Any) -> str:
         lstrip_blocks=True,
     )
     environment.filters["number"] = number
+    environment.filters["typeset"] = typeset
     return environment.get_template(template).render(version=__version__, **fields)
 
 

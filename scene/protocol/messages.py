@@ -1,9 +1,10 @@
 """The messages of protocol 1, both directions, and their published JSON Schema.
 
-Requests are decoded strictly: an unknown field is refused. Answers may carry further fields, which
-are ignored, so that an implementation can say more than it is asked. A scene stays raw here: it is
-decoded and proved valid once, by whoever steps in it. On the wire and in the schema a request has its
-class's name without the suffix.
+Requests are decoded strictly: an unknown field is refused (`docs/protocol.md` says where an implementation
+may ignore one). Answers may carry further fields, which are ignored, so that an implementation can say more
+than it is asked; and `dt` and `wall` of a collision may be absent, for engines that do not know them. A scene
+stays raw here: it is decoded and proved valid once, by whoever steps in it. On the wire and in the schema a
+request has its class's name without the suffix.
 `python -m scene.protocol.messages > docs/protocol.schema.json` prints the schema.
 """
 
@@ -15,8 +16,8 @@ from typing import Annotated, Any, get_args
 import msgspec
 
 from scene.load import state_omega_or_period
-from scene.states import Outcome, Rejected, State, Undecided, Undefined
-from scene.tables import Scene
+from scene.states import Horizon, Rejected, State, Undecided, Undefined
+from scene.tables import Scene, Wall
 
 PROTOCOL = 1
 MAX_SEQ = 2**53  # the integers that every JSON parser keeps
@@ -103,11 +104,34 @@ class Echoed(msgspec.Struct, frozen=True):
     values: tuple[float, ...]
 
 
+class AnsweredCollision(
+    msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True, tag_field="outcome", tag="collision"
+):
+    """A collision as it is answered: `scene.Collision`, but for what may be absent.
+
+    Attributes:
+        wall: met; where it is absent the asking side takes the wall that the place is nearest to.
+        dt: flight time; where it is absent `t` alone is graded.
+        t: time; x, y: place; vx, vy: velocity after the bounce.
+    """
+
+    wall: Wall | None = None
+    dt: float | None = None
+    t: float
+    x: float
+    y: float
+    vx: float
+    vy: float
+
+
+Answered = AnsweredCollision | Horizon | Undefined | Undecided | Rejected
+
+
 class Steps(msgspec.Struct, frozen=True):
     """The collisions of a trajectory, and last what came instead of a further one."""
 
     seq: Seq
-    steps: tuple[Outcome, ...]
+    steps: tuple[Answered, ...]
 
 
 class Arrival(msgspec.Struct, frozen=True, tag_field="outcome", tag="horizon"):
@@ -136,7 +160,7 @@ class Timed(msgspec.Struct, frozen=True):
 
     seq: Seq
     ns: tuple[Annotated[int, msgspec.Meta(ge=0)], ...]
-    steps: tuple[Outcome, ...]
+    steps: tuple[Answered, ...]
 
 
 class Failed(msgspec.Struct, frozen=True):
@@ -148,7 +172,7 @@ class Failed(msgspec.Struct, frozen=True):
 
 def json_schema() -> dict[str, Any]:
     """Return the JSON Schema of one line of protocol 1, published as docs/protocol.schema.json."""
-    requests, outcomes = get_args(Command), get_args(Outcome)
+    requests, outcomes = get_args(Command), get_args(Answered)
     answers = (Introduction, Echoed, Steps, Flown, Timed, Failed)
     _, definitions = msgspec.json.schema_components(
         [*requests, *outcomes, *answers, Scene], ref_template="#/$defs/{name}"
@@ -163,7 +187,7 @@ def json_schema() -> dict[str, Any]:
     # A step is answered by an outcome that carries the seq of the request (null where it had none).
     seq = {"type": "object", "properties": {"seq": {"type": ["integer", "null"]}}, "required": ["seq"]}
     definitions["Request"] = {"anyOf": [_reference(published[kind.__name__]) for kind in requests]}
-    stepped = {"allOf": [seq, {"anyOf": [_reference(kind.__name__) for kind in outcomes]}]}
+    stepped = {"allOf": [seq, {"anyOf": [_reference(published[kind.__name__]) for kind in outcomes]}]}
     definitions["Answer"] = {"anyOf": [stepped, *(_reference(kind.__name__) for kind in answers)]}
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",

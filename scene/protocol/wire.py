@@ -2,7 +2,7 @@
 
 `serve` answers every request for a stepper given as Python functions. It holds no numerics: a line
 that cannot be understood is answered by `rejected` with the reason, naming the field, and the next
-line is read.
+line is read. A stepper that does not know flight times or walls answers `AnsweredCollision` without them.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ from scene.load import from_data
 from scene.protocol.messages import (
     MAX_SEQ,
     PROTOCOL,
+    Answered,
     Command,
     EchoRequest,
     FlowRequest,
@@ -33,11 +34,17 @@ from scene.tables import Scene
 MAX_COLLISIONS = 1_000_000
 MAX_REPEAT = 1_000
 MAX_STATES = 1_000_000
-Stepper = Callable[[Scene, State, float], Outcome]
-Follower = Callable[[Scene, State, int, float], list[Outcome]]
+Stepper = Callable[[Scene, State, float], Answered | Outcome]
+Follower = Callable[[Scene, State, int, float], Sequence[Answered | Outcome]]
 Captured = tuple[float, float] | None
 Flowing = Callable[[Scene, Sequence[State], float], Sequence[tuple[Outcome, Captured]]]
-Timer = Callable[[Scene, State, int, int], tuple[Sequence[int], Outcome]]
+Timer = Callable[[Scene, State, int, int], tuple[Sequence[int], Answered | Outcome]]
+
+
+class OwnFailure(Exception):  # noqa: N818 (a failure that is owned to, not an error of this program)
+    """Raised by a stepper that has no outcome to give: answered as an error of its own, with this text."""
+
+
 # What a line may do to the decoder: bad JSON, bad fields, bad UTF-8, too deep a nesting.
 UNREADABLE = (msgspec.DecodeError, UnicodeDecodeError, RecursionError)
 _decoder = msgspec.json.Decoder(Command)
@@ -126,6 +133,8 @@ class _Server:
             return {"steps": [_plain(outcome) for outcome in steps]}
         except BadInput as error:
             return _plain(Rejected(str(error)))
+        except OwnFailure as failure:
+            return {"error": str(failure)}
         except UNREADABLE as error:
             return _plain(_refusal(error))
 
@@ -167,7 +176,7 @@ def _sequence_number(line: bytes) -> int | None:
     return seq if type(seq) is int and 0 <= seq <= MAX_SEQ else None
 
 
-def _plain(outcome: Outcome) -> dict[str, Any]:
+def _plain(outcome: Answered | Outcome) -> dict[str, Any]:
     data: dict[str, Any] = msgspec.to_builtins(outcome)
     return data
 

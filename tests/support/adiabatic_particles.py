@@ -1,13 +1,15 @@
-"""A stand-in for the fast stepper: ensembles drawn from theory itself, with the finite-energy terms it names.
+"""A stand-in for the fast stepper: ensembles drawn from theory itself, finite energy included.
 
-The uncaptured peak has a width ~ E0^(-1/4) and drifts by a quarter of its variance, gathered evenly
-through the cycle; the captured gather theirs outside the cap. nu at release exceeds nu at capture by O(1/v).
-Cycles are independent.
+Where frozen rates are known, energies are drawn from `theory.at_energy`; where a particle is captured
+several times in a cycle its windows are drawn one by one, and finite energy adds its means. Without rates the
+uncaptured peak has a width ~ E0^(-1/4) and drifts by a quarter of its variance. nu at release exceeds
+nu at capture by O(1/v). Cycles are independent.
 """
 
 from __future__ import annotations
 
 from functools import cache
+from itertools import pairwise
 
 import numpy as np
 from mpmath import fp
@@ -17,7 +19,7 @@ import theory
 from conformance.audit.evidence import DIGITS
 from scene.tables import cycle_length
 
-WIDTHS = {"fixed-cap-anticlockwise": 15.4, "fixed-cap-clockwise": 15.4, "ergodic": 1.9, "untilted": 11.0}
+WIDTH = 11.0  # of the uncaptured peak, times E0^(1/4), where no frozen rates are known
 
 predict = cache(theory.predict)
 
@@ -33,17 +35,27 @@ def curves(scene):
     return float(prediction.p_nc), float(prediction.log_e_nc), theory.capture_curve(scene, 2001), zone
 
 
+@cache
+def windows(scene):
+    """Return the captures of each valley that follows another in time: p_cha falling, t_in, t_out, gain."""
+    _, s_nc, curve, _ = curves(scene)
+    starts = [0, *(np.flatnonzero(np.diff(curve.p_cha) > 0) + 1), len(curve.p_cha)]
+    parts = [slice(i, j) for i, j in pairwise(starts) if j > i]
+    return [(curve.p_cha[k], curve.t_in[k], curve.t_out[k], curve.s[k] - s_nc) for k in parts]
+
+
 def simulate(scene, *, n_particles, energy, n_cycles=1, seed=0, threads=None, phases=(), progress=None):
     rng = np.random.default_rng(seed)
     p_nc, _, _, _ = curves(scene)
-    s, t_in, t_out = (np.zeros((n_particles, n_cycles)) for _ in range(3))
+    n_windows = max(1, len(windows(scene)))
+    s = np.zeros((n_particles, n_cycles))
+    t_in, t_out = np.zeros((2, n_particles, n_cycles, n_windows))
     phase_s = np.zeros((n_particles, n_cycles, len(phases)))
     inside = np.zeros(phase_s.shape, bool)
     total = np.zeros(n_particles)
     for k in range(n_cycles):
-        sigma = WIDTHS.get(scene.name, 3.3) * (energy * np.exp(total)) ** -0.25
         gain, t_in[:, k], t_out[:, k], phase_s[:, k], inside[:, k] = one_cycle(
-            scene, energy, sigma, phases, rng
+            scene, energy, total, phases, rng
         )
         total = total + gain
         s[:, k] = total
@@ -54,7 +66,7 @@ def simulate(scene, *, n_particles, energy, n_cycles=1, seed=0, threads=None, ph
         "energy0": energy, "energy": energy * np.exp(total), "cycle_energies": energy * np.exp(s),
         **dict.fromkeys(("t", "x", "y", "vx", "vy"), np.zeros(n_particles)),
         "n_collisions": counts.sum(axis=1), "outcome": np.zeros(n_particles, np.int8),
-        "t_in": t_in[..., None], "t_out": t_out[..., None],
+        "t_in": t_in, "t_out": t_out,
         "wall_counts": counts, "n_careful": np.zeros(n_particles, np.int64),
         "phase_energies": energy * np.exp(phase_s), "phase_captured": inside, "seconds": 1.0, "threads": 1,
     }  # fmt: skip
@@ -63,26 +75,58 @@ def simulate(scene, *, n_particles, energy, n_cycles=1, seed=0, threads=None, ph
     return fast.Ensemble(**{name: fields[name] for name in fast.Ensemble._fields})
 
 
-def one_cycle(scene, energy, sigma, phases, rng):
-    n, speed = len(sigma), np.sqrt(2 * energy)
-    p_nc, s_nc, curve, zone = curves(scene)
-    u, noise = rng.random(n), rng.standard_normal(n)
-    captured = u > p_nc
-    s = s_nc + sigma**2 / 4 + sigma * noise
-    t_in, t_out = np.full((2, n), np.nan)
-    if captured.any():
-        places = np.interp(u[captured], curve.p_cha[::-1], np.arange(len(curve.s))[::-1])
-        t_in[captured], t_out[captured], gain = (
-            np.interp(places, np.arange(len(curve.s)), column)
-            for column in (curve.t_in, curve.t_out, curve.s)
-        )
-        span = cycle_length(scene)
-        after = (1 - t_out[captured] / span) * np.exp(-(gain - s_nc) / 2)
-        blur = sigma[captured] * np.sqrt(t_in[captured] / span + after)
-        s[captured] = gain + blur**2 / 4 + blur * noise[captured]
-        if not scene.name.startswith("fixed"):
-            late = np.cos(t_in[captured]) + rng.random(captured.sum()) / speed
-            t_out[captured] = 2 * np.pi - np.arccos(np.clip(late, -1, 1))
+def blurred(variance, noise, rng):
+    """Return 4 log of the distance from 0, in four dimensions, of a unit vector that diffused."""
+    step = np.sqrt(np.maximum(variance, 0) / 16)
+    return 2 * np.log((1 + step * noise) ** 2 + step**2 * rng.chisquare(3, len(noise)))
+
+
+def stays_in(scene, n, rng):
+    """Return gain over the uncaptured, and begin and end of the stay in each window, nan for none."""
+    rows = windows(scene)
+    gain, t_in, t_out = np.zeros(n), *np.full((2, n, max(1, len(rows))), np.nan)
+    for k, (p_cha, begins, ends, gains) in enumerate(rows):
+        u = rng.random(n)
+        those = u > p_cha[-1]
+        place = np.arange(len(p_cha))
+        at = np.interp(u[those], p_cha[::-1], place[::-1])
+        t_in[those, k], t_out[those, k] = np.interp(at, place, begins), np.interp(at, place, ends)
+        gain[those] += np.interp(at, place, gains)
+    return gain, t_in, t_out
+
+
+def captured_ever(t_in):
+    return np.isfinite(t_in).any(axis=1)
+
+
+def one_cycle(scene, energy, total, phases, rng):
+    n, speed = len(total), np.sqrt(2 * energy)
+    _, s_nc, curve, zone = curves(scene)
+    noise, slower = rng.standard_normal(n), np.exp(-total / 2)
+    try:
+        found = theory.at_energy(scene, energy)
+    except theory.NotCovered:
+        found = None
+    if found and len(windows(scene)) == 1:
+        a = found.atoms
+        i = np.minimum(np.searchsorted(np.cumsum(a.weight), rng.random(n)), len(a.weight) - 1)
+        t_in = a.t_in[i][:, None]
+        t_out = np.interp(t_in, curve.t_in, curve.t_out)
+        gain, shift, variance = a.gain[i], a.shift[i], a.variance[i]
+    else:
+        gain, t_in, t_out = stays_in(scene, n, rng)
+        variance = np.full(n, WIDTH**2 * energy**-0.5)
+        shift = np.zeros(n)
+        if found:
+            a = found.atoms
+            for atoms, those in ((a.is_free, ~captured_ever(t_in)), (~a.is_free, captured_ever(t_in))):
+                weight = a.weight[atoms] / max(a.weight[atoms].sum(), 1e-300)
+                variance[those], shift[those] = weight @ a.variance[atoms], weight @ a.shift[atoms]
+    s = s_nc + gain + shift * slower + blurred(variance * slower, noise, rng)
+    captured = np.isfinite(t_in[:, 0])
+    if captured.any() and not scene.name.startswith("fixed") and t_in.shape[1] == 1:
+        late = np.cos(t_in[captured]) + rng.random((captured.sum(), 1)) / speed
+        t_out[captured] = 2 * np.pi - np.arccos(np.clip(late, -1, 1))
     inside = np.zeros((n, len(phases)), bool)
     phase_s = np.zeros((n, len(phases)))
     if phases:
@@ -90,12 +134,12 @@ def one_cycle(scene, energy, sigma, phases, rng):
         gained = gained - gained[0]
         for k, phase in enumerate(phases):
             t = phase * grid[-1]
-            wobble = sigma * np.sqrt(phase)
-            now = np.interp(t, grid, gained) + wobble**2 / 4 + wobble * noise
+            centre, spread = (x[0] for x in found.zone([t]))
+            now = centre - spread / 4 + blurred(np.full(n, spread), noise, rng)
             with np.errstate(invalid="ignore"):
-                inside[:, k] = (t_in < t) & (t < t_out)
-            entered = np.interp(t_in[inside[:, k]], grid, gained)
-            change = np.interp(t, grid, cap) - np.interp(t_in[inside[:, k]], grid, cap)
+                inside[:, k] = ((t_in < t) & (t < t_out)).any(axis=1)
+            entered = np.interp(t_in[inside[:, k], 0], grid, gained)
+            change = np.interp(t, grid, cap) - np.interp(t_in[inside[:, k], 0], grid, cap)
             now[inside[:, k]] = entered - change * (1 + noise[inside[:, k]] / speed)
             phase_s[:, k] = now
     return s, t_in, t_out, phase_s, inside

@@ -99,6 +99,13 @@ def places(data: Any, path: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]:
         yield from places(value, (*path, key))
 
 
+def at(data: Any, path: tuple[Any, ...]) -> Any:
+    """Return the value at a path."""
+    for key in path:
+        data = data[key]
+    return data
+
+
 def spoil(draw: random.Random, data: dict[str, Any]) -> Any:
     """Change a copy of the data in one to three places."""
     data = json.loads(json.dumps(data))
@@ -106,10 +113,7 @@ def spoil(draw: random.Random, data: dict[str, Any]) -> Any:
         path = draw.choice(list(places(data)) or [()])
         if not path:
             return draw.choice(OTHERS)
-        holder = data
-        for key in path[:-1]:
-            holder = holder[key]
-        key = path[-1]
+        holder, key = at(data, path[:-1]), path[-1]
         how = draw.randrange(10)
         if key in ("collisions", "repeat"):
             holder[key] = draw.choice(COUNTS)

@@ -40,7 +40,11 @@ def run(name: str) -> None:
     """Answer requests until `stop`."""
     place, fault = SABOTEURS[name]
     for line in sys.stdin:
-        request = json.loads(line)
+        try:
+            request = json.loads(line)
+        except ValueError:
+            say({"seq": None, "outcome": "rejected", "reason": "no JSON"})
+            continue
         where = request["cmd"]
         if where == "step":
             where = "step" if "vy" in request["state"] else "reject"
@@ -120,6 +124,21 @@ def child(*, is_detached: bool) -> Act:
     return lambda _: subprocess.Popen(program, start_new_session=is_detached)
 
 
+def orphan(_: Answer) -> None:
+    """Start a process that nothing ties to this one: forked twice, in its own session, all cleared."""
+    token = os.environ.get("SABOTAGE", "")  # for the tests alone, in the arguments
+    if os.fork():
+        os.wait()
+        return
+    os.setsid()
+    if not os.fork():
+        for stream in range(3):
+            os.close(stream)
+        program = f"import time; time.sleep({SLEEP})"
+        os.execve(sys.executable, [sys.executable, "-I", "-S", "-c", program, token], {})
+    os._exit(0)
+
+
 def cry(what: bytes) -> Act:
     """Write to standard error."""
     return lambda _: os.write(2, what)
@@ -169,7 +188,8 @@ def answer_before_being_asked(answer: Answer) -> None:
 
 sleep = wait(SLEEP)  # longer than anyone waits
 # Odd manners that are no faults: these must pass.
-HONEST = ("honest", "dribble", "noise", "more-fields", "answer-and-exit")
+HONEST = ("honest", "dribble", "noise", "more-fields", "answer-and-exit", "control-characters")
+CONTROLS = "\x1b]0;owned\x07\x1b[2J\r\x9b31m\u202e\u2028\x00"  # for terminals, and what XML cannot hold
 # Where each differs from an honest citizen (in what it makes of `start`, `echo`, a step, a step without vy,
 # or `stop`), and what it does there.
 SABOTEURS: dict[str, tuple[str, Act]] = {
@@ -178,6 +198,13 @@ SABOTEURS: dict[str, tuple[str, Act]] = {
     "noise": ("step", then(cry(b"stepping " * 50_000), say)),
     "more-fields": ("step", says(lambda hit: {**hit, "iterations": 7, "note": "\u221e"})),
     "answer-and-exit": ("stop", leave(0)),
+    "control-characters": (
+        "start",
+        then(
+            cry(CONTROLS.encode()),
+            says(lambda said: {**said, "name": CONTROLS, "laws": [*said["laws"], CONTROLS]}),
+        ),
+    ),
     # Something else is said.
     "huge-line": ("step", says(lambda hit: {"seq": hit["seq"], "filler": "x" * (2**24 + 2**20)})),
     "wrong-seq": ("step", says(lambda hit: {**hit, "seq": hit["seq"] + 1})),
@@ -192,6 +219,11 @@ SABOTEURS: dict[str, tuple[str, Act]] = {
         says(lambda hit: {"seq": hit["seq"], "outcome": "undefined", "reason": "too hard"}),
     ),
     "own-error": ("step", says(lambda hit: {"seq": hit["seq"], "error": "out of memory"})),
+    "control-characters-in-errors": ("step", says(lambda hit: {"seq": hit["seq"], "error": CONTROLS})),
+    "control-characters-in-reasons": (
+        "step",
+        says(lambda hit: {"seq": hit["seq"], "outcome": "rejected", "reason": CONTROLS * 10**5}),
+    ),
     "other-protocol": ("start", says(lambda introduction: {**introduction, "protocol": 2})),
     "early-answers": ("start", answer_before_being_asked),
     "guess-on-invalid": ("reject", says(lambda refusal: {"seq": refusal["seq"], **HIT})),
@@ -218,6 +250,7 @@ SABOTEURS: dict[str, tuple[str, Act]] = {
     "hang-at-start": ("start", sleep),
     "ignore-stop": ("stop", sleep),
     "late-answer": ("step", then(wait(3.0), say)),
+    "slow": ("step", then(wait(0.7), say)),
     "ignore-sigterm": ("step", then(ignore_termination, sleep)),
     "flood-stderr": ("step", forever(cry(b"help! " * 10_000))),
     # The process ends, or its children stay.
@@ -228,6 +261,8 @@ SABOTEURS: dict[str, tuple[str, Act]] = {
     "fork-and-die": ("step", then(child(is_detached=False), leave(3))),
     "daemon": ("step", then(child(is_detached=True), leave(3))),
     "leave-a-child": ("stop", child(is_detached=True)),
+    "orphan": ("step", then(orphan, leave(3))),
+    "leave-an-orphan": ("stop", orphan),
 }
 
 

@@ -13,8 +13,8 @@ import numpy as np
 from mpmath import fp
 
 import theory
-from conformance.audit.claims.broadened import phase_times, zone_energy
-from conformance.audit.claims.experiments import MEAN_RETURNS, mouth_speed, return_time
+from conformance.audit.claims.broadened import phase_times, predicted, share_in_the_zone, zone_energy
+from conformance.audit.claims.experiments import chord_time, mouth_speed
 from conformance.audit.claims.finite_energy import ACW, ERGODIC, LADDER
 from conformance.audit.evidence import ClaimEvidence
 from conformance.audit.finding import Check
@@ -94,9 +94,13 @@ def invariants(evidence: ClaimEvidence) -> Iterator[Check]:
     yield _exponent(
         "c = 0, log(E V) at half a cycle: spread against E0", free, [spread(c) for c in changes], -0.25
     )
-    drift = spread(changes[-1]).value ** 2 / 4
+    found = predicted(free[-1])
+    drift = float(found.zone([math.pi])[1][0]) / 4
     yield close(
-        f"{free[-1].run.name}: its mean, less the drift", mean(changes[-1]).less(drift), 0.0, band=drift
+        f"{free[-1].run.name}: its mean, less the predicted drift",
+        mean(changes[-1]).less(drift),
+        0.0,
+        band=found.next_order.mean_s,
     )
 
 
@@ -199,23 +203,18 @@ def nu_gap(sample: Sample) -> FloatArray:
 
 
 def energy_through_the_cycle(evidence: ClaimEvidence) -> Iterator[Check]:
-    """L5: mean log E in the chaotic zone against eq. (dE)."""
-    for run, every in (("moving-cap@1e7", 2), (ACW, 1)):
+    """L5: mean log E in the chaotic zone against eq. (dE), with its drift and the others' lags."""
+    for run, every in (("moving-cap@1e7", 2), (ACW, 1), ("fixed-cap-anticlockwise@1e7", 1)):
         sample = evidence.sample(run)
-        times, means, spreads = zone_energy(sample)
-        scene, delay = scene_of(sample.run), return_time(sample)
-        late, now, early = (
-            theory.chaotic_zone(scene, np.array(times) + d).log_energy for d in (-delay, 0.0, delay)
-        )
-        start = theory.chaotic_zone(scene, [0.0]).log_energy[0]
+        times, means, _ = zone_energy(sample)
+        found = predicted(sample)
+        expected, wait = found.zone(times)[0], found.zone(np.array(times) - chord_time(sample))[0]
         for k in range(every - 1, len(times), every):
-            drift = spreads[k] ** 2 / 4
-            wait = max(abs(late[k] - now[k]), abs(early[k] - now[k]))
             yield close(
-                f"{run}: mean log E/E0 at phase {sample.run.phases[k]:g}, less the drift",
-                (means[k].value - drift, means[k].error),
-                float(now[k] - start),
-                band=drift + wait + 2 * mouth_speed(sample) / sample.speed,
+                f"{run}: mean log E/E0 at phase {sample.run.phases[k]:g}",
+                means[k],
+                float(expected[k]),
+                band=found.next_order.peak_mean + abs(float(expected[k] - wait[k])),
             )
 
 
@@ -228,18 +227,18 @@ def zone_share(sample: Sample, times: FloatArray) -> FloatArray:
 
 
 def population_through_the_cycle(evidence: ClaimEvidence) -> Iterator[Check]:
-    """L6: p_cha(t) against eq. (ps)."""
-    for run, every in (("moving-cap@1e7", 2), (ACW, 1)):
+    """L6: p_cha(t) against eq. (ps), with what lags do to it."""
+    for run, every in (("moving-cap@1e7", 2), (ACW, 1), ("fixed-cap-anticlockwise@1e7", 1)):
         sample = evidence.sample(run)
-        times = np.array(phase_times(sample))
-        scene, delay = scene_of(sample.run), MEAN_RETURNS * return_time(sample)
-        late, now, early = (theory.chaotic_zone(scene, times + d).p_cha for d in (-delay, 0.0, delay))
-        measured = zone_share(sample, times)
+        times, wait = np.array(phase_times(sample)), chord_time(sample)
+        expected, earlier = share_in_the_zone(sample, times), share_in_the_zone(sample, times - wait)
+        measured, left = zone_share(sample, times), predicted(sample).next_order
         for k in range(every - 1, len(times), every):
-            error = math.sqrt(max(now[k] * (1 - now[k]), 1 / sample.n) / sample.n)
-            band = max(abs(late[k] - now[k]), abs(early[k] - now[k])) + 2 * mouth_speed(sample) / sample.speed
+            p = float(expected[k])
+            error = math.sqrt(max(p * (1 - p), 1 / sample.n) / sample.n)
+            band = abs(p - float(earlier[k])) + left.p_nc
             what = f"{run}: share in the chaotic zone at phase {sample.run.phases[k]:g}"
-            yield close(what, (float(measured[k]), error), float(now[k]), band=float(band))
+            yield close(what, (float(measured[k]), error), p, band=band)
 
 
 def work(evidence: ClaimEvidence) -> Iterator[Check]:

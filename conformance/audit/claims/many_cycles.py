@@ -1,4 +1,4 @@
-"""Many cycles: X4, the sum of n cycles against the exact convolution and against a Gaussian."""
+"""Many cycles: X4, the sum of n cycles against sums drawn from the theory of one, and against a Gaussian."""
 
 from __future__ import annotations
 
@@ -8,13 +8,23 @@ import numpy as np
 from scipy.stats import norm
 
 import theory
-from conformance.audit.claims import broadened
-from conformance.audit.claims.finite_energy import bias_of_mean, width
-from conformance.audit.evidence import ClaimEvidence
+from conformance.audit.claims.broadened import N_DRAWN, PEAK_DENSITY, predicted, summed
+from conformance.audit.evidence import ClaimEvidence, energies_of
 from conformance.audit.finding import Check
 from conformance.audit.runs import RUNS, scene_of
 from conformance.audit.samples import Sample
-from conformance.audit.tolerances import FloatArray, Mean, close, fits, mean, share, spread, stated
+from conformance.audit.tolerances import (
+    N_SIGMA,
+    FloatArray,
+    Mean,
+    close,
+    critical_gap,
+    fits,
+    mean,
+    share,
+    spread,
+    stated,
+)
 
 
 def sums(evidence: ClaimEvidence) -> Iterator[Check]:
@@ -29,54 +39,46 @@ def sums(evidence: ClaimEvidence) -> Iterator[Check]:
 
 def _sum_of(evidence: ClaimEvidence, sample: Sample, n: int, cumulants: list[float]) -> Iterator[Check]:
     label = f"{sample.run.name}, n = {n}"
-    total = sample.s[:, n - 1]
-    m1, sd = cumulants[1], cumulants[2] ** 0.5
-    noise, bias, band = blur_of_sum(sample, n)
-    places, below = broadened.summed(sample.run.name, n, noise, bias)
+    total, sums, left = sample.s[:, n - 1], summed(sample.run.name, n), predicted(sample).next_order
+    m1, centre, scale = cumulants[1], sums.mean, sums.sd
+    bias = centre - n * m1
     per_cycle = Mean((mean(total).value - bias) / n, mean(total).error / n)
-    centre, scale = n * m1 + bias, float(np.hypot(sd * np.sqrt(n), noise))
-    inner = np.abs(total - centre) < scale
-    expected = float(np.diff(np.interp([centre - scale, centre + scale], places, below))[0])
-    skewness = cumulants[3] * n / scale**3
-    z = (total - mean(total).value) / spread(total).value
-    gap = float(np.max(np.abs(below - _gaussian(places, centre, scale))))
-    yield close(f"{label}: mean of log E_n/E0 over n, less its bias", per_cycle, m1, band=band / n, scale=m1)
+    own = scale / N_DRAWN**0.5  # the drawn sums' standard error
+    what = f"{label}: mean of log E_n/E0 over n, less its bias {bias / n:.5f}"
+    yield close(what, per_cycle, m1, band=left.mean_s + N_SIGMA * own / n, scale=m1)
+    blurred = 1 - n * cumulants[2] / scale**2  # of the variance
     what = f"{label}: standard deviation over n"
-    yield close(what, (spread(total).value / n, spread(total).error / n), scale / n, band=0.03 * scale / n)
+    band = (abs(blurred) * left.variance / 2 + N_SIGMA / (2 * N_DRAWN) ** 0.5) * scale / n
+    yield close(what, (spread(total).value / n, spread(total).error / n), scale / n, band=band)
+    places = np.linspace(sums.values[0], sums.values[-1], 2000)
+    gap = float(np.max(np.abs(sums.cdf(places) - _gaussian(places, centre, scale))))
     yield fits(
-        f"{label}: log E_n/E0 against the convolution of n cycles",
+        f"{label}: log E_n/E0 against sums of n cycles drawn from theory",
         total,
-        [lambda s: np.asarray(np.interp(s, places, below))],
-        band=band / scale * 0.4,
+        sums.cdf,
+        band=PEAK_DENSITY * n * left.mean_s / scale + critical_gap(N_DRAWN),
         scale=0.3,
-        note=f"the Gaussian is off by {gap:.3f} of itself",
+        note=f"the Gaussian is off by {gap:.3f} of itself, {len(total)} tell {critical_gap(len(total)):.3f}",
     )
-    yield close(f"{label}: share within one standard deviation", share(inner), expected, band=0.01)
+    inner, theirs = (np.abs(x - centre) < scale for x in (total, sums.values))
+    what = f"{label}: share within one standard deviation"
+    yield close(what, share(inner), share(theirs).value, band=N_SIGMA * share(theirs).error)
+    z, drawn = (total - centre) / scale, (sums.values - centre) / scale
     what = f"{label}: skewness, 0 for a Gaussian"
-    yield close(what, (float(np.mean(z**3)), float(np.sqrt(6 / len(z)))), skewness, band=0.1)
-    yield stated(f"{label}: the tails are no Gaussian's, by theory", *_tails(places, below, centre, scale))
-
-
-def blur_of_sum(sample: Sample, n: int) -> tuple[float, float, float]:
-    """Return noise, bias and its band, in log E_n/E0 after n cycles.
-
-    A cycle that starts at energy E adds the variance and the bias of one at E0 times (E/E0)^(-1/2);
-    both are taken from the width of the first.
-    """
-    bias, band = bias_of_mean(sample)
-    weights = np.concatenate([[1.0], np.exp(-sample.s[:, : n - 1] / 2).mean(axis=0)])
-    total = float(weights.sum())
-    diffusing = 0.6  # of the particles' time in the chaotic zone, give or take: the blur is small anyway
-    return float(np.sqrt(diffusing * total) * width(sample).value), bias * total, band * total
+    band = N_SIGMA * mean(drawn**3).error
+    yield close(what, mean(z**3), mean(drawn**3).value, band=band)
+    yield stated(f"{label}: the tails are no Gaussian's, by theory", *_tails(sample.run.name, n, cumulants))
 
 
 def _gaussian(x: FloatArray, centre: float, scale: float) -> FloatArray:
     return np.asarray(norm.cdf(x, centre, scale))
 
 
-def _tails(places: FloatArray, below: FloatArray, centre: float, scale: float) -> tuple[bool, str, str]:
-    left, right = (np.interp(centre + side * 3 * scale, places, below) for side in (-1, 1))
-    normal = float(_gaussian(np.array([-3.0]), 0.0, 1.0)[0])
+def _tails(run: str, n: int, cumulants: list[float]) -> tuple[bool, str, str]:
+    """Weigh the tails of the adiabatic sums, those of high energies."""
+    sums, scale = theory.sum_of_cycles(energies_of(run), n), (n * cumulants[2]) ** 0.5
+    left, right = (float(sums.cdf(n * cumulants[1] + side * 3 * scale)) for side in (-1, 1))
+    normal = float(norm.cdf(-3))
     ratios = left / normal, (1 - right) / normal
     text = f"beyond 3 sd: {ratios[0]:.2f} and {ratios[1]:.2f} times the Gaussian's"
     return bool(max(abs(ratio - 1) for ratio in ratios) > 0.1), text, "another mass"

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 from math import hypot, prod
 from typing import NamedTuple
 
@@ -11,6 +12,7 @@ from scene import Collision, Mushroom, Outcome, Scene, State, Undecided
 from scene.tables import width_factors
 
 MAX_COLLISIONS = 20_000  # of one particle's flow: some seconds
+Step = Callable[[Scene, State, float], Outcome]
 Captured = tuple[float, float] | None
 
 
@@ -20,15 +22,15 @@ class PlainPath:
     A mutant that errs along the way, and not in a single flight, overrides a method.
     """
 
-    def __init__(self, scene: Scene, state: State, t_end: float, flight: type[Flight] = Flight) -> None:
-        self.scene, self.state, self.t_end, self.flight = scene, state, t_end, flight
+    def __init__(self, scene: Scene, state: State, t_end: float, step: Step = next_collision) -> None:
+        self.scene, self.state, self.t_end, self.step = scene, state, t_end, step
         self.n_hits = 0
         self.stay = Stay()
         self.stays: list[tuple[float, float]] = []
 
     def advance(self) -> Outcome:
         """Take the next step; after a collision the particle stands where it led."""
-        outcome = next_collision(self.scene, self.state, self.t_end, self.flight)
+        outcome = self.step(self.scene, self.state, self.t_end)
         if isinstance(outcome, Collision):
             self.n_hits += 1
             outcome = self.told(outcome)
@@ -105,7 +107,7 @@ def trajectory(
     path: type[PlainPath] = PlainPath,
 ) -> list[Outcome]:
     """Follow a particle: its collisions, and last what came instead of one."""
-    along = path(scene, state, t_end, flight)
+    along = path(scene, state, t_end, partial(next_collision, flight=flight))
     steps: list[Outcome] = []
     while len(steps) < n_collisions:
         steps.append(along.advance())
@@ -122,4 +124,10 @@ def flow(
     path: type[PlainPath] = PlainPath,
 ) -> list[tuple[Outcome, Captured]]:
     """Carry particles to t_end: the outcome of each there, and (begin, end) of its first captured stay."""
-    return [path(scene, state, t_end, flight).arrival() for state in states]
+    step = partial(next_collision, flight=flight)
+    return [path(scene, state, t_end, step).arrival() for state in states]
+
+
+def carried(step: Step, scene: Scene, state: State, t_end: float) -> tuple[Outcome, Captured]:
+    """Carry one particle by any stepper, and watch its captured stays."""
+    return PlainPath(scene, state, t_end, step).arrival()

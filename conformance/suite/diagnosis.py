@@ -1,0 +1,42 @@
+"""A diagnosis of failures: the mutants of the plain stepper that fail the same vectors.
+
+Every mutant has one known fault, and the kill matrix says which vectors it fails. A stepper that fails the
+same ones, of those that it was asked, probably has the same fault, or one near it.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from importlib import resources
+
+from conformance.suite.result import Result
+
+ALIKE = 0.5  # least share that common failures have of all failures of the two
+NEARLY = 0.9  # of the likest one's share, that another must have to be named beside it
+MAX_NAMED = 3
+
+
+def diagnose(results: Sequence[Result]) -> list[str]:
+    """Name the mutants that fail most like this, one line each, the likest first; nothing without a likeness.
+
+    Args:
+        results: of a run; failures and passes of vectors count.
+    """
+    failed = {r.id for r in results if r.level and r.verdict == "fail"}
+    asked = failed | {r.id for r in results if r.level and r.verdict == "pass"}
+    if not failed:
+        return []
+    matrix = json.loads((resources.files("conformance") / "mutants" / "kill-matrix.json").read_bytes())
+    killed: dict[str, set[str]] = {name: set() for name in matrix["mutants"]}
+    for vector, names in matrix["killed_by"].items():
+        for name in names if vector in asked else ():
+            killed[name].add(vector)
+    scores = {name: len(failed & own) / len(failed | own) for name, own in killed.items()}
+    likest = sorted(scores, key=lambda name: -scores[name])[:MAX_NAMED]
+    return [
+        f"like {name} on {len(failed & killed[name])} of {len(failed)} failures (it has"
+        f" {len(killed[name])}): {matrix['mutants'][name]['fault']}"
+        for name in likest
+        if scores[name] >= max(ALIKE, NEARLY * scores[likest[0]])
+    ]

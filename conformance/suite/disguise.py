@@ -1,0 +1,215 @@
+"""Disguises: every question is asked as one of its exact images, so that nobody passes by memory.
+
+A disguise is drawn from the run's seed: the mirror image in x, lengths and times by powers of two, and
+bang-bang knots that begin at another knot, whole periods away. The law of motion is the same function after
+the last, and the others are symmetries of the billiard, so the certified answer is carried over without a
+rounding: the implementation's answer is taken back to the question as it is published, and graded there.
+Scales are drawn for a scene and not for a question, so that a scene stays one scene for a whole run.
+
+Beside its vectors a run asks `drawn` questions, whose answers are in no file: a flight that is certified to
+meet its first wall after dt meets nothing before, so that at any earlier t_end the particle is at the
+exact place x + vx s, y + vy s.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from fractions import Fraction
+from typing import Any, NamedTuple
+
+import msgspec
+
+from conformance.generator.draws import Draw
+from conformance.grading.error import condition_number, free_flight, inputs_of, moved
+from conformance.vectors import NUMBERS, Expectation, Vector, certified
+from scene import BadInput, BangBang, Scene, State, from_data, to_data, transforms
+from scene.tables import laws
+
+LARGEST = 12  # exponents of two are drawn between this and its negative
+RANGE = 2.0**-350, 2.0**350  # numbers that a scale may lead to: their squares are far from both ends
+TIMES = ("dt", "t")
+N_DRAWN = 60  # questions of the group `drawn`
+PARTS = 0.05, 0.95  # of the certified flight, at which the particle is asked for
+
+
+class Disguise(NamedTuple):
+    """An exact symmetry of a question.
+
+    Attributes:
+        is_mirrored: x -> -x, left and right exchanged.
+        length: lengths are multiplied by 2^length.
+        time: times are multiplied by 2^time.
+        first_knot: bang-bang laws begin at this knot, counted from 0.
+        periods: and so many whole periods later.
+    """
+
+    is_mirrored: bool = False
+    length: int = 0
+    time: int = 0
+    first_knot: int = 0
+    periods: int = 0
+
+    def __str__(self) -> str:
+        """Say what was asked in place of the question as published."""
+        said = ["mirrored"] if self.is_mirrored else []
+        said += [f"lengths x 2^{self.length}"] if self.length else []
+        said += [f"times x 2^{self.time}"] if self.time else []
+        if self.first_knot or self.periods:
+            said.append(f"knots from number {self.first_knot} on, {self.periods} periods later")
+        return ", ".join(said) or "as published"
+
+
+def drawn_disguise(vector: Vector, seed: int) -> Disguise:
+    """Draw the symmetry by which a vector is asked in the run of a seed."""
+    own, shared = Draw(f"{seed}/{vector.id}"), Draw(f"{seed}/{msgspec.json.encode(vector.scene).decode()}")
+    is_mirrored = own.pick((False, True))
+    scene = _scene(vector)
+    exponents = [k for k in range(-LARGEST, LARGEST + 1) if k]
+    length, time = shared.pick(exponents), shared.pick(exponents)
+    if scene is None or not _stays_in_range(vector, length, time):
+        return Disguise(is_mirrored=True)
+    first_knot, periods = shared.pick(range(8)), shared.pick((-1, 0, 1))
+    if not any(isinstance(law, BangBang) for law in laws(scene).values()) or not _with_knots(
+        scene, first_knot, periods
+    ):
+        first_knot = periods = 0
+    return Disguise(is_mirrored, length, time, first_knot, periods)
+
+
+def asked(vector: Vector, disguise: Disguise) -> Vector:
+    """Return the question in disguise; its certified answers are still those of the question as published."""
+    state, scene = vector.state, _scene(vector)
+    if disguise.is_mirrored:
+        state = transforms.mirrored(state)
+    if scene is None or disguise._replace(is_mirrored=False) == Disguise():
+        return msgspec.structs.replace(vector, state=state)
+    scene = _with_knots(scene, disguise.first_knot, disguise.periods) or scene
+    scene = transforms.scaled(scene, disguise.length, disguise.time)
+    return msgspec.structs.replace(
+        vector,
+        scene=to_data(scene),
+        state=transforms.scaled_state(state, disguise.length, disguise.time),
+        t_end=vector.t_end * 2.0**disguise.time,
+    )
+
+
+def published(answer: Any, disguise: Disguise) -> Any:
+    """Return an answer to the question in disguise as one to the question as published."""
+    if isinstance(answer, list | tuple):
+        return [published(part, disguise) for part in answer]
+    if not isinstance(answer, dict):
+        return answer
+    factors = dict.fromkeys(TIMES, -disguise.time) | dict.fromkeys(("x", "y"), -disguise.length)
+    factors |= dict.fromkeys(("vx", "vy"), disguise.time - disguise.length)
+    found = {**answer}
+    for name, exponent in factors.items():
+        found[name] = _scaled(answer.get(name), exponent)
+    for name in ("x", "vx") if disguise.is_mirrored else ():
+        found[name] = -found[name] if isinstance(found[name], float) else found[name]
+    if disguise.is_mirrored and isinstance(answer.get("wall"), str):
+        found["wall"] = transforms.mirrored_wall(answer["wall"])
+    if isinstance(stay := answer.get("captured"), list | tuple):
+        found["captured"] = [_scaled(time, -disguise.time) for time in stay]
+    for name in ("steps", "states"):
+        found[name] = published(answer.get(name), disguise)
+    return {name: found[name] for name in answer}
+
+
+def drawn_horizons(vectors: Sequence[Vector], seed: int) -> list[Vector]:
+    """Draw questions that no file holds: certified flights, asked for at a time before their end."""
+    draw = Draw(f"{seed}/drawn")
+    usable = [v for v in vectors if v.kind == "step" and [e.outcome for e in v.expect] == ["collision"]]
+    found: list[Vector] = []
+    for _ in range(2 * N_DRAWN if usable else 0):
+        early = _before_the_hit(draw.pick(usable), draw.between(*PARTS), len(found) + 1)
+        found += [early] if early is not None else []
+    return found[:N_DRAWN]
+
+
+def drawn_states(vectors: Sequence[Vector], seed: int, n: int) -> list[tuple[Scene, State, float]]:
+    """Draw questions for exact properties: vectors in disguise, with velocities of their own."""
+    draw = Draw(f"{seed}/properties")
+    found = []
+    for _ in range(n if vectors else 0):
+        vector = draw.pick(vectors)
+        image = asked(vector, drawn_disguise(vector, seed))
+        across, along = (1.0 + draw.between(-0.125, 0.125) for _ in range(2))
+        state = image.state
+        changed = msgspec.structs.replace(state, vx=state.vx * across, vy=state.vy * along)
+        found.append((from_data(image.scene), changed, image.t_end))
+    return found
+
+
+def _scene(vector: Vector) -> Scene | None:
+    """Return a vector's scene; None where it is a bad one, which is to be refused."""
+    try:
+        return from_data(vector.scene)
+    except BadInput:
+        return None
+
+
+def _stays_in_range(vector: Vector, length: int, time: int) -> bool:
+    """Tell whether a scale leads to no number, asked or certified, that is near an end of binary64."""
+    least, most = RANGE
+    state = vector.state
+    numbers = [state.t, state.x, state.y, state.vx, state.vy, vector.t_end, *_leaves(vector.scene)]
+    for step in (step for known in vector.expect for step in known.steps):
+        numbers += [float(end) for name in NUMBERS for end in getattr(step, name)]
+    factors = [2.0**k for k in (0, length, time, -time, length - time)]
+    return all(least < abs(number) * factor < most for number in numbers if number for factor in factors)
+
+
+def _leaves(data: Any) -> Iterable[float]:
+    if isinstance(data, dict | list | tuple):
+        for part in data.values() if isinstance(data, dict) else data:
+            yield from _leaves(part)
+    elif isinstance(data, int | float):
+        yield float(data)
+
+
+def _scaled(number: Any, exponent: int) -> Any:
+    return number * 2.0**exponent if isinstance(number, int | float) else number
+
+
+def _with_knots(scene: Scene, first: int, periods: int) -> Scene | None:
+    """Return the scene with every bang-bang law begun at another knot; None where a knot would be rounded."""
+    changed: dict[str, Any] = {
+        name: _begun_at(law, first, periods) if isinstance(law, BangBang) else law
+        for name, law in laws(scene).items()
+    }
+    return None if None in changed.values() else type(scene)(**changed)
+
+
+def _begun_at(law: BangBang, first: int, periods: int) -> BangBang | None:
+    """Return the same law with knots from number `first` (modulo their count) on, whole periods later."""
+    legs, times = len(law.knots) - 1, [Fraction(t) for t, _ in law.knots]
+    numbers = range(first % legs, first % legs + legs + 1)
+    moved_times = [times[i % legs] + (i // legs + periods) * (times[-1] - times[0]) for i in numbers]
+    if any(Fraction(float(t)) != t for t in moved_times):
+        return None
+    return BangBang(
+        knots=tuple((float(t), law.knots[i % legs][1]) for i, t in zip(numbers, moved_times, strict=True))
+    )
+
+
+def _before_the_hit(vector: Vector, part: float, number: int) -> Vector | None:
+    """Return a vector's question with t_end within its certified flight; None where none fits."""
+    state, step = vector.state, vector.expect[0].steps[0]
+    t_end = state.t + part * float(step.ends("dt")[0])
+    s = Fraction(t_end) - Fraction(state.t)
+    if not 0 < s < step.ends("dt")[0]:
+        return None
+    place = {"x": Fraction(state.x) + Fraction(state.vx) * s, "y": Fraction(state.y) + Fraction(state.vy) * s}
+    numbers = {"dt": s, **place, "vx": Fraction(state.vx), "vy": Fraction(state.vy)}
+    centre, jacobian = [float(numbers[name]) for name in NUMBERS], free_flight(state, float(s))
+    inputs = inputs_of(state)
+    step = certified({n: (v, v) for n, v in numbers.items()}, [moved(row, inputs) for row in jacobian], None)
+    return msgspec.structs.replace(
+        vector,
+        id=f"drawn/{number}",
+        group="drawn",
+        rule=f"{vector.id} at a time before its hit",
+        t_end=t_end,
+        expect=(Expectation("horizon", (step,)),),
+        condition=condition_number(centre, jacobian, inputs),
+    )

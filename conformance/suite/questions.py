@@ -1,0 +1,148 @@
+"""Questions that promises and timings are held to, on whatever tables and laws an implementation offers."""
+
+from __future__ import annotations
+
+import math
+import sys
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import msgspec
+from mpmath import fp
+
+from conformance.suite.process import Trouble
+from conformance.suite.session import Session, missing, read_outcome
+from scene import Collision, Fourier, Horizon, Mushroom, Outcome, Scene, State, Undecided, to_data
+from scene.geometry import table_at
+from scene.tables import Cap, Stem
+
+FOREVER = sys.float_info.max  # t_end of a question that only collisions end
+STANDING: tuple[Scene, ...] = (
+    Mushroom(r=1.0, w=0.5, h=1.0),
+    Cap(r=1.0),
+    Stem(w=1.0, h=1.25),
+)
+MOVING: tuple[Scene, ...] = (
+    Mushroom(
+        r=Fourier(mean=1.0, cos=(0.1,), omega=1.0),
+        nu=Fourier(mean=0.55, sin=(0.25,), omega=1.0),
+        h=Fourier(mean=1.0, sin=(0.0, 0.1), omega=1.0),
+        slope=Fourier(mean=0.1, cos=(0.05,), omega=1.0),
+    ),
+    Cap(r=Fourier(mean=1.0, cos=(0.1,), omega=1.0)),
+    Stem(w=Fourier(mean=1.0, cos=(0.1,), omega=1.0), h=Fourier(mean=1.25, sin=(0.1,), omega=1.0), slope=0.1),
+    *STANDING,
+)
+
+
+def offered(session: Session, scenes: Sequence[Scene], *profiles: str) -> Scene:
+    """Return the first scene that an implementation can be asked about in some profiles.
+
+    Raises:
+        Trouble: unsupported, naming what is lacking.
+    """
+    assert session.introduction is not None
+    lacking = [
+        [part for profile in profiles if (part := missing(session.introduction, profile, to_data(scene)))]
+        for scene in scenes
+    ]
+    if [] in lacking:
+        return scenes[lacking.index([])]
+    raise Trouble("unsupported", lacking[0][0])
+
+
+def question(cmd: str, scene: Scene, start: State | Sequence[State], **more: float) -> dict[str, Any]:
+    """Return a request, all but its seq; several starts are the states of a flow."""
+    place = {"state" if isinstance(start, State) else "states": msgspec.to_builtins(start)}
+    return {"cmd": cmd, "scene": to_data(scene), **place, **more}
+
+
+def follow(session: Session, scene: Scene, state: State, n: int, t_end: float = FOREVER) -> list[Outcome]:
+    """Ask for n successive collisions, in one trajectory or, where that is not offered, step by step.
+
+    Raises:
+        Trouble: also wrong-format, for a number of steps that cannot be, and declined where it ends
+            undecided.
+    """
+    assert session.introduction is not None
+    if missing(session.introduction, "trajectory", to_data(scene)):
+        return _follow_by_steps(session, scene, state, n, t_end)
+    answer = session.ask(question("trajectory", scene, state, collisions=n, t_end=t_end))
+    if "error" in answer:
+        raise Trouble("error", answer["error"])
+    if "steps" not in answer:
+        raise Trouble("fail", f"a trajectory of {n} collisions is answered {answer}"[:200])
+    found: list[Outcome] = []
+    t = state.t
+    for step in answer["steps"]:
+        found.append(read_outcome(step, t))
+        t = getattr(found[-1], "t", t)
+    _check_ending(found, n)
+    return found
+
+
+def _follow_by_steps(session: Session, scene: Scene, state: State, n: int, t_end: float) -> list[Outcome]:
+    found: list[Outcome] = []
+    while len(found) < n:
+        found.append(outcome := session.step(scene, state, t_end))
+        if not isinstance(outcome, Collision):
+            break
+        state = outcome.state()
+    _check_ending(found, n)
+    return found
+
+
+def _check_ending(found: Sequence[Outcome], n: int) -> None:
+    *before, last = found or [Undecided("nothing is answered")]
+    if len(found) > n or not all(isinstance(outcome, Collision) for outcome in before):
+        raise Trouble("wrong-format", f"{len(found)} steps are answered to a trajectory of {n} collisions")
+    if isinstance(last, Undecided):
+        raise Trouble("declined", f"step {len(found)} of {n}: undecided: {last.reason}")
+    if isinstance(last, Collision) and len(found) < n:
+        raise Trouble(
+            "fail", f"{len(found)} of {n} collisions are answered, and not what came instead of more"
+        )
+
+
+def last_collision(session: Session, scene: Scene, state: State, n: int) -> Collision:
+    """Follow n collisions, and return the last.
+
+    Raises:
+        Trouble: as `follow`; fail when there is another end to it.
+    """
+    last = follow(session, scene, state, n)[-1]
+    if not isinstance(last, Collision):
+        raise Trouble("fail", f"a collision must come, and {last} is answered")
+    return last
+
+
+def distance(scene: Scene, a: Outcome, b: Outcome) -> float:
+    """Return how far two outcomes are apart: the worst of time, place and velocity, each by its size.
+
+    Infinite for different outcomes or walls. Sizes are those of b, and for the place that of the table.
+    """
+    if type(a) is not type(b) or getattr(a, "wall", None) != getattr(b, "wall", None):
+        return math.inf
+    if not (isinstance(a, Collision | Horizon) and isinstance(b, Collision | Horizon)):
+        return 0.0
+    size = float(table_at(fp, scene, b.t).size)
+    parts = (
+        (abs(a.t - b.t), abs(b.t)),
+        (math.hypot(a.x - b.x, a.y - b.y), size),
+        (math.hypot(a.vx - b.vx, a.vy - b.vy), math.hypot(b.vx, b.vy)),
+    )
+    found = max(gap / extent if extent else (math.inf if gap else 0.0) for gap, extent in parts)
+    return math.inf if math.isnan(found) else found
+
+
+def off_wall(scene: Scene, at: Collision) -> float:
+    """Return how far a place is from the wall that it names, as a part of the table's size."""
+    table = table_at(fp, scene, at.t)
+    gap = abs(table.gap(at.wall, at.x, at.y)) / (table.r if at.wall == "arc" else 1.0)
+    found = float(gap / table.size)
+    return math.inf if math.isnan(found) else found
+
+
+def is_same(a: Mapping[str, Any], b: Mapping[str, Any]) -> bool:
+    """Tell whether two answers to one question are the same, numbers and outcome; reasons may differ."""
+    return {**a, "reason": ""} == {**b, "reason": ""}

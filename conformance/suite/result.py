@@ -1,0 +1,164 @@
+"""What a run found: a result for each case, and what it comes to in the end.
+
+Physics and precision stay apart: a verdict for each case, a precision class for each group.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Iterator
+from typing import Any
+
+import msgspec
+
+from conformance.grading.grade import PrecisionClass, precision_class
+from conformance.suite.scope import Scope
+from conformance.suite.session import Limits
+from scene.protocol.messages import Introduction
+
+BAD = ("fail", "crashed", "timed-out", "wrong-format", "error")
+VERDICTS = ("pass", "fail", "indeterminate", "declined", "unsupported", *BAD[1:])
+# An implementation that declines more has not been graded: of all questions, and of those of one group.
+MAX_DECLINED, MAX_DECLINED_OF_GROUP = 0.05, 0.25
+
+
+class Result(msgspec.Struct, frozen=True, omit_defaults=True):
+    """One case and what came of it.
+
+    Attributes:
+        id: of the vector, or protocol/..., property/..., profile/...
+        group: what it is counted with.
+        verdict: see `VERDICTS`.
+        why: one line.
+        seconds: until the answer.
+        level: of a vector.
+        asked: the disguise in which it was asked (`suite.disguise`).
+        ulps: worst backward ulps, absent when not measured (or beyond binary64).
+        relative: worst backward error, likewise.
+        answer: what the implementation said, taken back to the question as it is published.
+        given: of the answer, the outcome that did not pass.
+        expected: the certified outcome in its place, in the middle of its enclosures.
+        is_known: listed in the known-failures file.
+    """
+
+    id: str
+    group: str
+    verdict: str
+    why: str = ""
+    seconds: float = 0.0
+    level: str = ""
+    asked: str = ""
+    ulps: float | None = None
+    relative: float | None = None
+    answer: dict[str, Any] | None = None
+    given: dict[str, Any] | None = None
+    expected: dict[str, Any] | None = None
+    is_known: bool = False
+
+    @property
+    def is_right(self) -> bool:
+        """Tell whether this result lets the run succeed: a known failure must fail, all else must not."""
+        return self.verdict != "pass" if self.is_known else self.verdict not in BAD
+
+
+class Speed(msgspec.Struct, frozen=True):
+    """Nanoseconds per collision, by the implementation's own clock, best and median of the repeats."""
+
+    scene: str
+    collisions: int
+    repeats: int
+    best_ns: float
+    median_ns: float
+
+
+class Run(msgspec.Struct, frozen=True):
+    """A whole run: what was asked of whom, and every result.
+
+    Attributes:
+        seed: all that is drawn follows from it, so that a run can be repeated.
+        graded: tables, laws, profiles of vectors that passed, and what no vector graded (`suite.scope`).
+        diagnosis: of the failures, by the mutants that fail alike; empty without any.
+    """
+
+    command: list[str]
+    level: str
+    seed: int
+    corpus: str
+    digest: str
+    limits: Limits
+    introduction: Introduction | None
+    results: list[Result]
+    speed: Speed | None
+    n_restarts: int
+    stderr: str
+    seconds: float
+    graded: dict[str, list[str]]
+    diagnosis: list[str]
+
+    def counts(self, group: str | None = None) -> Counter[str]:
+        """Count the verdicts, of one group or of all."""
+        return Counter(r.verdict for r in self.results if group in (None, r.group))
+
+    def groups(self) -> list[str]:
+        """Return the groups in the order they were run."""
+        return list(dict.fromkeys(result.group for result in self.results))
+
+    def ulps(self, group: str | None = None) -> list[float]:
+        """Return the backward ulps of the answers that passed, inf where binary64 does not hold them."""
+        passed = [r for r in self.results if r.verdict == "pass" and group in (None, r.group)]
+        return [math.inf if r.ulps is None else r.ulps for r in passed if r.relative is not None]
+
+    def precision(self, group: str | None = None) -> str:
+        """Return the class that the passing answers reach, or a dash when none was measured."""
+        ulps = self.ulps(group)
+        return precision_class(ulps) if ulps else "–"
+
+    def classes(self, group: str | None = None) -> dict[PrecisionClass, int]:
+        """Count the answers that passed by the precision class of each."""
+        found = Counter(precision_class([ulps]) for ulps in self.ulps(group))
+        return {"A": found["A"], "B": found["B"], "C": found["C"]}
+
+    def objections(self) -> list[str]:
+        """Say, one line each, why the run does not succeed."""
+        found = [_objection(result) for result in self.results if not result.is_right]
+        found += self._declined_too_often()
+        vectors_passed = any(r.verdict == "pass" and r.level for r in self.results)
+        return found if vectors_passed or found else ["no vector passed: nothing was graded"]
+
+    def _declined_too_often(self) -> Iterator[str]:
+        """Say where too much was declined for the rest to speak for it: of everything, and of a group."""
+        for group, most in ((None, MAX_DECLINED), *((name, MAX_DECLINED_OF_GROUP) for name in self.groups())):
+            declined, asked = self.declined(group)
+            if declined > max(most * asked, 1 if group else 0):
+                of = f"in group {group}" if group else "cases"
+                yield f"declined {declined} of {asked} {of}, more than {most:.0%}"
+
+    def declined(self, group: str | None = None) -> tuple[int, int]:
+        """Count the questions declined and those asked; profiles, which the suite declines, are left out."""
+        counts = Counter(r.verdict for r in self.results if group in (None, r.group) and r.group != "profile")
+        return counts["declined"], sum(counts.values()) - counts["unsupported"]
+
+    def scope(self) -> Scope:
+        """Say what the verdict is about."""
+        declined, asked = self.declined()
+        share = declined / max(1, asked)
+        return Scope(
+            self.level, self.corpus, **self.graded, declined=share, precision=self.precision(), seed=self.seed
+        )
+
+    def verdict(self) -> str:
+        """Say in a word or two what the exit code says."""
+        return {0: "accepted", 1: "not accepted", 2: "undecided"}[self.exit_code()]
+
+    def exit_code(self) -> int:
+        """Return 0 when all is right, 1 when not, 2 when the corpus could not tell (indeterminate)."""
+        if self.objections():
+            return 1
+        return 2 if self.counts()["indeterminate"] else 0
+
+
+def _objection(result: Result) -> str:
+    if result.is_known:
+        return f"{result.id}: passes, though it is listed as a known failure"
+    return f"{result.id}: {result.verdict}: {result.why}"

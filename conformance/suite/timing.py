@@ -1,0 +1,163 @@
+"""Is an answer to `time` true: a trajectory's steps, and nanoseconds that the asking side's clock bears out?
+
+What can be held to a clock on this side of the pipe: all repeats together last no longer than the answer took
+to come; each further repeat makes the answer come later by what it is said to last; following another start
+costs no more than following the same again (nothing is remembered); twice the collisions last longer. The
+load of a machine delays answers now and then: a clock is taken for false only when every one of N_TRIES tries
+says so, except that no load makes the sum of the repeats longer than the wait.
+Not seen: a program that does part of its work outside its clock, once for each question.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping
+from statistics import median
+from typing import Any, NamedTuple
+
+from msgspec.structs import replace
+
+from conformance.suite.process import Trouble
+from conformance.suite.questions import (
+    MOVING,
+    distance,
+    last_collision,
+    off_wall,
+    offered,
+    question,
+)
+from conformance.suite.session import Session, read_outcome
+from scene import Collision, Scene, State, Stem, Undecided
+
+N_STEPS = 60  # collisions of the trajectory that `time` and `trajectory` both follow
+NEAR = 1e-6  # of sizes; see conformance.suite.promises
+FAR = 10.0  # factor between flight times, of the first collisions and of all: energy may grow or fall
+ON_WALL = 1e-9  # of the table's size
+READABLE = 0.02  # seconds that a question must take here, so that delays of milliseconds do not matter
+MAX_COLLISIONS, MAX_REPEAT = 20_000, 1000
+AMPLE = 3.0  # times as long as one repeat must the answer to many take
+FACTOR = 4.0  # between nanoseconds that are said and those that are measured
+GROWTH = 1.3  # twice the collisions last longer by this, at least
+N_TRIES = 5
+DRIFT = 1.01  # of two clocks of one machine
+START = State(0.0, 0.1, 0.2, 3.0, 4.0)
+
+
+class Timing(NamedTuple):
+    """One answer to `time`: what it says, in nanoseconds, and the seconds that it took to come."""
+
+    ns: list[int]
+    seconds: float
+    last: Collision
+
+
+def timed(session: Session, scene: Scene, state: State, n: int, repeat: int) -> Timing:
+    """Ask for a timing.
+
+    Raises:
+        Trouble: also fail, when it does not end in one collision, or when its repeats cannot have taken place
+            in the time that the answer took; declined when it ends undecided.
+    """
+    request = question("time", scene, state, collisions=n, repeat=repeat)
+    begin = time.monotonic()
+    answer = session.ask(request)
+    return read_timing(answer, repeat, time.monotonic() - begin)
+
+
+def read_timing(answer: Mapping[str, Any], repeat: int, seconds: float) -> Timing:
+    """Read an answer to `time`; see `timed`."""
+    if "error" in answer:
+        raise Trouble("error", answer["error"])
+    ns, steps = answer.get("ns"), answer.get("steps")
+    if ns is None or steps is None or len(ns) != repeat or len(steps) != 1:
+        raise Trouble("fail", f"{repeat} repeats are answered {answer}"[:300])
+    last = read_outcome(steps[0], 0.0)
+    if isinstance(last, Undecided):
+        raise Trouble("declined", f"undecided: {last.reason}")
+    if not isinstance(last, Collision):
+        raise Trouble("fail", f"a trajectory that goes on for ever ends with {last}")
+    if sum(ns) > DRIFT * 1e9 * seconds:
+        waited = f"the answer came after {1e9 * seconds:.0f} ns"
+        raise Trouble("fail", f"{repeat} repeats are said to last {sum(ns)} ns in all, and {waited}")
+    return Timing(list(ns), seconds, last)
+
+
+def check_last(session: Session, scene: Scene, state: State, n: int, last: Collision) -> None:
+    """Hold the last state of a timing to what `trajectory` says, and to lie on its wall.
+
+    Raises:
+        Trouble: fail; what following it runs into.
+    """
+    if (away := off_wall(scene, last)) > ON_WALL:
+        raise Trouble(
+            "fail", f"the last of {n} collisions, {last}, is off its wall by {away:.3g} of the table's size"
+        )
+    truth = last_collision(session, scene, state, min(n, N_STEPS))
+    if n <= N_STEPS:
+        if distance(scene, last, truth) > NEAR:
+            raise Trouble("fail", f"the last of {n} collisions is {last} by time, {truth} by trajectory")
+        return
+    # Rounding grows from bounce to bounce; after many, only about how long they last can be told.
+    lasting = (truth.t - state.t) / N_STEPS * n
+    if not lasting / FAR < last.t - state.t < lasting * FAR:
+        found = (
+            f"{n} collisions last {last.t - state.t:.3g} by time, the first {N_STEPS} {truth.t - state.t:.3g}"
+        )
+        raise Trouble("fail", found)
+
+
+def same_steps(session: Session) -> str:
+    """`time` ends where the trajectory does."""
+    scene, state = _asked(session)
+    for n in (1, 2, N_STEPS):
+        check_last(session, scene, state, n, timed(session, scene, state, n, 2).last)
+    return f"1, 2 and {N_STEPS} collisions"
+
+
+def honest_clock(session: Session) -> str:
+    """The nanoseconds that `time` says are those that pass."""
+    scene, state = _asked(session)
+    n, one = 10, timed(session, scene, state, 10, 1)  # it may compile
+    while one.seconds < READABLE and n < MAX_COLLISIONS:
+        n *= 2
+        one = timed(session, scene, _other(state, n.bit_length()), n, 1)
+    repeat, many = 8, timed(session, scene, state, n, 8)
+    while many.seconds < AMPLE * one.seconds and repeat < MAX_REPEAT:
+        repeat = min(4 * repeat, MAX_REPEAT)
+        many = timed(session, scene, state, n, repeat)
+    objection = ""
+    for i in range(N_TRIES):
+        ones = [timed(session, scene, _other(state, 3 * i + k), n, 1) for k in range(3)]
+        many = timed(session, scene, state, n, repeat)
+        twice = timed(session, scene, state, 2 * n, 3)
+        if not (objection := _objection(n, ones, many, twice)):
+            return f"{repeat} repeats of {n} collisions"
+    raise Trouble("fail", objection)
+
+
+def _objection(n: int, ones: list[Timing], many: Timing, twice: Timing) -> str:
+    """Say what the nanoseconds of one try do not bear out; empty when they do."""
+    repeat, said = len(many.ns), median(many.ns)
+    each = 1e9 * (many.seconds - min(one.seconds for one in ones)) / (repeat - 1)
+    if not FACTOR * said > each:
+        later = f"makes the answer {each:.0f} ns later"
+        return f"a repeat of {n} collisions is said to last {said:.0f} ns, and {later}"
+    if said > FACTOR * each:
+        return f"{repeat} repeats are said to last {said:.0f} ns each, but are answered as if made once"
+    anew = min(one.ns[0] for one in ones)
+    if anew > FACTOR * min(many.ns):
+        again = f"the same again {min(many.ns)} ns: it is not followed anew"
+        return f"a new start is said to last {anew} ns, {again}"
+    if not min(twice.ns) > GROWTH * min(many.ns):
+        return f"{n} collisions are said to last {min(many.ns)} ns, {2 * n} of them {min(twice.ns)} ns"
+    return ""
+
+
+def _asked(session: Session) -> tuple[Scene, State]:
+    scene = offered(session, (*MOVING[1:], MOVING[0]), "time")  # in a cap rounding hardly grows
+    return scene, replace(START, y=-START.y) if isinstance(scene, Stem) else START
+
+
+def _other(state: State, i: int) -> State:
+    """Return another start like it."""
+    return replace(state, x=state.x + (i + 1) * 2.0**-12)

@@ -1,0 +1,106 @@
+"""`mushrooms ask`: one case of the suite, its certified answer and rule, and what a command says to it."""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING, Annotated
+
+import msgspec
+import typer
+from rich.console import Console
+from rich.markup import escape
+
+from mushrooms.check import in_one_line
+from scene.refusal import BadInput, check_seed
+
+if TYPE_CHECKING:
+    from conformance.suite import Result
+    from conformance.suite.disguise import Disguise
+    from conformance.vectors import Vector
+
+
+def ask(
+    case: Annotated[str, typer.Argument(metavar="ID", help="Of a vector, as check prints it.")],
+    command: Annotated[
+        list[str] | None, typer.Argument(metavar="[-- COMMAND...]", help="Asks it, and grades its answer.")
+    ] = None,
+    seed: Annotated[int | None, typer.Option(help="Asks as the run of this seed did, in disguise.")] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the vector as JSON.")] = False,
+) -> int:
+    """Print a case's question, certified answer and rule; put it to a stepper, if one is given.
+
+    Exit code 0; 1 when the stepper given does not pass; 2 for bad input.
+    """
+    from conformance.suite.disguise import Disguise, drawn_disguise
+
+    vector = _find(case, seed)
+    disguise = Disguise() if seed is None else drawn_disguise(vector, seed)
+    result = _put(command, vector, disguise) if command else None
+    if as_json:
+        print(msgspec.json.format(msgspec.json.encode(vector), indent=1).decode())
+    else:
+        _show(vector, disguise)
+    return 0 if result is None else _judge(result)
+
+
+def _find(case: str, seed: int | None) -> Vector:
+    from conformance import vectors
+    from conformance.suite.disguise import drawn_horizons
+
+    if seed is not None:
+        check_seed(seed, "--seed")
+    elif case.startswith("drawn/"):
+        raise BadInput(f"ID = {case!r} is of one run's questions: give the run's --seed")
+    known = vectors.load("stress")
+    drawn = [] if seed is None else drawn_horizons([v for v in known if v.level == "core"], seed)
+    for vector in (*known, *drawn):
+        if vector.id == case:
+            return vector
+    raise BadInput(f"ID = {case!r}, must be a vector's, such as {known[0].id}")
+
+
+def _show(vector: Vector, disguise: Disguise) -> None:
+    from conformance import vectors
+    from conformance.grading.agreement import middle
+    from conformance.suite.disguise import asked
+
+    console = Console(width=None if Console().is_terminal else 140, soft_wrap=True, highlight=False)
+    condition = f", condition {vector.condition:.3g}" if vector.condition else ""
+    console.print(f"[bold]{vector.id}[/], level {vector.level}{condition}")
+    console.print(f"rule       {escape(vector.rule)}")
+    console.print(f"source     {escape(vector.source)}")
+    if str(disguise) != str(type(disguise)()):
+        console.print(f"asked      {disguise}; certified answers below are of the question as published")
+    console.print(f"question   {escape(json.dumps(vectors.request(asked(vector, disguise), 0)))}")
+    for i, expectation in enumerate(vector.expect):
+        console.print(
+            f"{'certified' if i == 0 else 'or'}  {expectation.outcome} {expectation.reason}".rstrip()
+        )
+        for number, outcome in enumerate(middle(expectation, vector.state), 1):
+            console.print(f"  {number:>4}  {escape(in_one_line(msgspec.to_builtins(outcome)))}")
+        for begin, end in expectation.stays:
+            console.print(f"  captured from step {begin + 1} to step {end + 1}")
+
+
+def _put(command: list[str], vector: Vector, disguise: Disguise) -> Result:
+    from conformance.suite import ask_vector
+    from conformance.suite.process import Trouble
+    from conformance.suite.session import Session
+
+    with Session(command) as session:
+        try:
+            session.start()
+            session.probe()
+        except Trouble as trouble:
+            raise BadInput(f"the command does not speak protocol 1: {trouble}") from None
+        return ask_vector(session, vector, disguise)
+
+
+def _judge(result: Result) -> int:
+    console = Console(soft_wrap=True, highlight=False)
+    if result.answer is not None:
+        steps = result.answer.get("steps") or result.answer.get("states") or [result.answer]
+        given = "\n           ".join(in_one_line(step) for step in steps)
+        console.print(f"given      {escape(given)}")
+    console.print(f"[bold]{result.verdict}[/]: {escape(result.why)}")
+    return 0 if result.is_right else 1

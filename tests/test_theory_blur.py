@@ -1,0 +1,166 @@
+"""Finite energy with nothing fitted: its exact parts, its conservation of phase volume, its limits."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from scipy.stats import ncx2
+
+import theory
+from scene import BadInput, Fourier, Mushroom, load
+from theory.blur import FiniteEnergy, _joined, at_energy, blur_cdf
+from theory.course import Fields
+from theory.rates import PHASES, SPEEDS, frozen_rates, kick_rate, rates_at
+
+CYCLES = (
+    "fixed-cap-anticlockwise",
+    "fixed-cap-clockwise",
+    "moving-cap",
+    "moving-cap-reversed",
+    "retraced-arc",
+)
+
+
+@pytest.mark.parametrize("variance", [1e-4, 0.003, 0.03, 0.1])
+def test_the_blur_is_a_brownian_motion_in_four_dimensions(variance: float) -> None:
+    x = np.linspace(-5, 5, 201) * math.sqrt(variance)
+    exact = ncx2.cdf(np.exp(x / 2) * 16 / variance, 4, 16 / variance)
+    assert np.abs(blur_cdf(x, variance) - exact).max() < 0.5 * (variance / 16) ** 1.5
+    fine = np.linspace(-9, 9, 40001) * math.sqrt(variance)
+    mass, middle = np.diff(blur_cdf(fine, variance)), (fine[1:] + fine[:-1]) / 2
+    assert mass @ middle == pytest.approx(variance / 4, rel=1e-3)
+    assert mass @ np.exp(-middle / 2) == pytest.approx(1, abs=0.1 * (variance / 16) ** 1.5 + 1e-9)
+
+
+def test_the_diffusion_that_keeps_the_measure_de_has_this_blur() -> None:
+    rng, n, n_steps = np.random.default_rng(7), 100_000, 200
+    e, variance = np.full(n, 1e4), 0.05  # of log E, 2 D / E^2 at the start
+    for _ in range(n_steps):
+        step = variance / n_steps
+        e = e + 0.75 * e**0.5 * step * 100 + np.sqrt(e**1.5 * step * 100) * rng.standard_normal(n)
+    s = np.sort(np.log(e / 1e4))
+    gap = np.abs(blur_cdf(s, variance) - (np.arange(n) + 0.5) / n).max()
+    assert gap < 1.95 / math.sqrt(n)  # p = 1e-3
+    drifted = (s - variance / 4) / math.sqrt(variance)
+    gaussian = np.abs(
+        0.5 * np.array([math.erfc(-z / math.sqrt(2)) for z in drifted]) - (np.arange(n) + 0.5) / n
+    )
+    assert gaussian.max() > 1.95 / math.sqrt(n)
+
+
+def phase_volume_gap(name: str, energy: float, width: float = 0.3) -> float:
+    """Return how far particles of all energies, uniform in phase space, end from uniform near an energy."""
+    y, step = math.log(energy), 0.1
+    total = 0.0
+    for x in np.arange(y - 3.2, y + 2.6, step):
+        f = FiniteEnergy(load(name), math.exp(x))
+        centre = x + f.s_nc + f.atoms.gain + f.atoms.shift + f.atoms.variance / 4
+        spread = f.atoms.variance + width**2
+        bump = np.exp(-((centre - y) ** 2) / (2 * spread)) * width / np.sqrt(spread)
+        total += math.exp(x - y) * float(f.atoms.weight @ bump) * step
+    return total / (math.exp(width**2 / 2) * width * math.sqrt(2 * math.pi)) - 1
+
+
+@pytest.mark.parametrize(("name", "size"), [("fixed-cap-clockwise", 5e-5), ("moving-cap", 5e-6)])
+def test_phase_volume_is_kept(name: str, size: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert abs(phase_volume_gap(name, 1e8)) < size
+    real = Fields.at
+
+    def forgetful(self: Fields, name: str, gain: np.ndarray, t: np.ndarray | float) -> np.ndarray:
+        return real(self, name, gain, t) * (name not in ("likelier", "hazards"))
+
+    monkeypatch.setattr(Fields, "at", forgetful)  # capture as likely as without a lag
+    assert abs(phase_volume_gap(name, 1e8)) > 4 * size
+
+
+@pytest.mark.parametrize("name", CYCLES)
+def test_great_energies_have_the_adiabatic_theory(name: str) -> None:
+    scene = load(name)
+    found, right = at_energy(scene, 1e20), theory.predict(scene, 10)
+    assert found.p_nc == pytest.approx(float(right.p_nc), abs=1e-6)
+    assert found.mean_s == pytest.approx(float(right.m1), abs=2e-6)
+    assert math.sqrt(found.variance_s) == pytest.approx(float(right.sd), rel=1e-4)
+    assert found.mean_of_exp(-0.5) == pytest.approx(float(theory.unbiased_mean(scene, 8)), abs=2e-6)
+    below = theory.energy_cdf(scene, s := np.linspace(-1.2, 1.2, 49))
+    assert np.abs(found.cdf(s) - below)[np.abs(s - found.s_nc) > 1e-3].max() < 3e-3
+
+
+def test_figures_fit_the_drawn_cycles() -> None:
+    found = at_energy(load("fixed-cap-clockwise"), 1e7)
+    s = found.draw(2, 400_000, 5)
+    first, second = s[:, 0], s[:, 1] - s[:, 0]
+    error = math.sqrt(found.variance_s / len(first))
+    assert abs(first.mean() - found.mean_s) < 4 * error
+    assert first.var() == pytest.approx(found.variance_s, rel=0.01)
+    assert abs(np.exp(-first / 2).mean() - found.mean_of_exp(-0.5)) < 4 * error
+    gap = np.abs(found.cdf(np.sort(first)) - (np.arange(len(first)) + 0.5) / len(first)).max()
+    assert gap < 1.95 / math.sqrt(len(first))
+    assert abs(np.corrcoef(first, second)[0, 1]) < 0.02  # the richer blur and drift less
+    assert np.array_equal(s, found.draw(2, 400_000, 5))
+
+
+def test_reversed_cycles_turn_the_lags_and_keep_the_diffusion() -> None:
+    forward, backward = load("fixed-cap-anticlockwise"), load("fixed-cap-clockwise")
+    t = np.array([0.06, 0.125, 0.2, 0.3, 0.45, 0.55, 0.7, 0.9])
+    a, b = rates_at(forward, t), rates_at(backward, 1 - t)
+    assert np.allclose(a.diffusion, b.diffusion)
+    assert np.allclose(a.lag, -b.lag)
+    assert np.allclose(a.square, b.square)
+    assert frozen_rates(forward)[0] is frozen_rates(backward)[0]
+
+
+@pytest.mark.parametrize("name", ["moving-cap", "fixed-cap-anticlockwise"])
+def test_the_mean_kick_is_eq_de_without_the_flux(name: str) -> None:
+    scene, h = load(name), 1e-5
+    for t in (0.1, 0.3, 0.6, 0.9):
+        t *= 2 * math.pi if name == "moving-cap" else 1
+        log_e = theory.chaotic_zone(scene, [t - h, t + h]).log_energy
+        assert kick_rate(scene, t) == pytest.approx((log_e[1] - log_e[0]) / (2 * h), rel=2e-3)
+
+
+def test_the_zone_ends_at_the_peak_and_begins_at_nothing() -> None:
+    found = at_energy(load("moving-cap"), 1e7)
+    mean, variance = found.zone([0.0, math.pi, 2 * math.pi])
+    assert mean[0] == pytest.approx(0, abs=1e-5)
+    assert variance[0] == pytest.approx(0, abs=1e-9)
+    assert (mean[-1], variance[-1]) == pytest.approx(found.peak, abs=2e-5)
+    assert 0 < variance[1] < variance[2]
+
+
+def test_joining_keeps_mass_and_mean() -> None:
+    rng = np.random.default_rng(3)
+    n = 60_000
+    t_in = np.where(rng.random(n) < 0.1, np.nan, rng.random(n))
+    a = theory.blur.Atoms(rng.random(n), rng.standard_normal(n), rng.random(n), rng.random(n), t_in)
+    b = _joined([a])
+    assert len(b.gain) <= 40_000 < n
+    assert b.weight.sum() == pytest.approx(a.weight.sum())
+    for x, y in ((a.gain, b.gain), (a.shift, b.shift), (a.variance, b.variance)):
+        assert a.weight @ x == pytest.approx(b.weight @ y)
+    assert b.weight[b.is_free].sum() == pytest.approx(a.weight[a.is_free].sum())
+
+
+def test_what_the_theory_of_finite_energy_does_not_know_is_refused() -> None:
+    with pytest.raises(theory.NotCovered, match="no frozen rates of scene 'untilted'"):
+        at_energy(load("untilted"), 1e6)
+    with pytest.raises(theory.NotCovered, match="mushrooms"):
+        at_energy(load("fermi-ulam"), 1e6)
+    with pytest.raises(BadInput, match="energy = 0"):
+        at_energy(load("moving-cap"), 0.0)
+    with pytest.raises(BadInput, match="nobody is captured"):
+        at_energy(load("ergodic"), 1e6).captured_cdf([0.0])
+    moved = Mushroom(r=Fourier(1.0, 1.0, (), (0.5,)), h=Fourier(1.0, 1.0, (), (-0.5,)), nu=0.9, slope=0.1111)
+    with pytest.raises(theory.NotCovered):
+        at_energy(moved, 1e6)
+
+
+def test_the_table_covers_every_phase_with_its_errors() -> None:
+    for name in CYCLES:
+        rates, _ = frozen_rates(load(name))
+        assert rates.diffusion.shape == (len(PHASES), 2)
+        assert rates.lag.shape == rates.square.shape == (len(PHASES), len(SPEEDS))
+        assert (rates.diffusion_error > 0).all()
+        assert (rates.diffusion_error < 0.3 * rates.diffusion).all()
+        assert (rates.diffusion[:, 1] > rates.diffusion[:, 0] - 5 * rates.diffusion_error.sum(axis=1)).all()

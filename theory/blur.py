@@ -1,0 +1,351 @@
+"""Energies after one cycle at finite energy: the adiabatic theory, blurred and shifted, with nothing to fit.
+
+The chaotic zone's log E diffuses by the kicks of its walls, and the particles about to be captured, like
+those just released, lag behind the zone's mean. Both are known from frozen tables (`theory.course`). Beside
+its gain over the uncaptured a particle has a shift and a variance, of the orders v^-1 to v^(-2/3) and v^-1.
+Diffusion alone is exact: E^(1/4) is the distance from 0 of a Brownian motion in four dimensions, which
+is what keeping phase volume leaves of it. theory/equations.md derives all this and says what is left out.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.special import ndtr
+
+from scene.refusal import BadInput, check_count, check_number
+from scene.tables import Mushroom, Scene
+from theory.branches import Branch, Floats, Node, at, tree
+from theory.course import N_TIMES, Fields, Flags, course
+from theory.curves import chaotic_zone
+from theory.entries import finite_array
+from theory.rates import table_error
+from theory.volumes import as_mushroom
+
+N_PLACES = 2000  # at which distribution functions are computed; linear between them
+N_CAPTURES = 600  # atoms of a valley that lies in no other; of one among several a fifth
+MOST_ATOMS = 40_000  # of several captures; more are joined with their neighbours in gain
+MOST_DRAWN = 100_000_000
+REACH = 7.0  # standard deviations beyond which no blur is computed
+LEAST = 1e-12  # variance of a blur, in log E: a lag's square may leave less than none
+
+
+def blur_cdf(x: ArrayLike, variance: ArrayLike) -> Floats:
+    """Return the probability of log E / E_adiabatic <= x for a particle that diffused.
+
+    (E / E_adiabatic)^(1/4) is |e + N|, with e a unit vector and N normal with `variance` / 16 along each
+    of four axes. Up to terms of the order variance^2 it is normal, with the mean and variance used here.
+
+    Args:
+        x: in log E.
+        variance: what diffusion at the uncaptured's speed gives, small beside 1.
+    """
+    step = np.maximum(np.asarray(variance, dtype=np.float64), LEAST) / 16
+    excess = np.exp(np.asarray(x) / 4) - 1 - 1.5 * step + 0.375 * step**2
+    return np.asarray(ndtr(excess / np.sqrt(step * (1 - 1.5 * step))), dtype=np.float64)
+
+
+class Atoms(NamedTuple):
+    """A distribution of log E1 / E0 as weighted blurs, (n,) each.
+
+    weight: probabilities.
+    gain: over the uncaptured, as in the adiabatic theory.
+    shift: of log E, by lags.
+    variance: as `blur_cdf` takes it.
+    t_in: time of the first capture; nan for the uncaptured.
+    """
+
+    weight: Floats
+    gain: Floats
+    shift: Floats
+    variance: Floats
+    t_in: Floats
+
+    @property
+    def is_free(self) -> Flags:
+        """Tell who is never captured."""
+        return np.isnan(self.t_in)
+
+    def those(self, chosen: Flags) -> Atoms:
+        """Return some of them."""
+        return Atoms(*(column[chosen] for column in self))
+
+
+class NextOrder(NamedTuple):
+    """What the theory leaves out, by the size of the terms that follow.
+
+    mean_s, captured_mean, peak_mean, p_nc: the square of the lags in the place where each enters.
+    variance: of the peak, relatively: as much as the kicks' memory took off, twice what moving sides do to
+        it, and the rates' own errors.
+    skewness: of the kicks: blocks as long as twice their memory are taken to be independent, and each to
+        have a skewness of at most 1.
+    """
+
+    mean_s: float
+    captured_mean: float
+    peak_mean: float
+    p_nc: float
+    variance: float
+    skewness: float
+
+
+class FiniteEnergy:
+    """One cycle's energies at an initial energy.
+
+    Attributes:
+        scene, energy: as given.
+        s_nc: log E_nc / E0 of the adiabatic theory.
+        p_nc: probability of never being captured.
+        atoms: the distribution of s = log E1 / E0.
+    """
+
+    def __init__(self, scene: Mushroom, energy: float) -> None:
+        self.scene, self.energy = scene, energy
+        cycle, root = course(scene), tree(scene)
+        self.s_nc = root.s_nc
+        self._course, self._fields = cycle, Fields(cycle, energy)
+        self._n_captures = N_CAPTURES // 5 if root.children else N_CAPTURES
+        start = Atoms(np.ones(1), np.zeros(1), np.zeros(1), np.zeros(1), np.full(1, np.nan))
+        passed, now = self._through(root, root, start, cycle.start)
+        found = self._drift(passed, now, cycle.start + cycle.step * N_TIMES)
+        self.atoms = found._replace(weight=found.weight / found.weight.sum())
+        self.p_nc = float(self.atoms.weight[self.atoms.is_free].sum())
+        self._below: dict[str, tuple[Floats, Floats]] = {}
+
+    @property
+    def mean_s(self) -> float:
+        """Mean of log E1 / E0."""
+        return float(self.atoms.weight @ self._centres(self.atoms))
+
+    @property
+    def variance_s(self) -> float:
+        """Variance of log E1 / E0."""
+        a = self.atoms
+        square = (self._centres(a) - self.mean_s) ** 2
+        return float(a.weight @ (square + a.variance - a.variance**2 / 8))
+
+    @property
+    def captured_mean(self) -> float:
+        """Mean of log E1 / E0 of the captured."""
+        a = self.atoms.those(~self.atoms.is_free)
+        return float(a.weight @ self._centres(a) / a.weight.sum())
+
+    @property
+    def peak(self) -> tuple[float, float]:
+        """Mean and variance of log E1 / E0 of those never captured."""
+        a = self.atoms.those(self.atoms.is_free)
+        return float(self._centres(a)[0]), float(a.variance[0] - a.variance[0] ** 2 / 8)
+
+    @property
+    def next_order(self) -> NextOrder:
+        """What is left out of each figure."""
+        captured = self.atoms.those(~self.atoms.is_free)
+        p = float(captured.weight.sum())
+        second = float(captured.weight @ captured.shift**2) / p if p else 0.0
+        error = table_error(self.scene)
+        # A shift of a size has an error by the rates too, in the same proportion.
+        captured_mean = second + error.lag * second**0.5
+        return NextOrder(
+            p * captured_mean + error.diffusion * self.peak[1] / 4,
+            captured_mean + error.diffusion * self.peak[1] / 4,
+            -np.log(max(1 - p, LEAST)) * captured_mean + error.diffusion * self.peak[1] / 4,
+            p * (1 - p) * captured_mean,
+            self._fields.missed + 2 * self._fields.turned + error.diffusion,
+            self._fields.n_blocks**-0.5,
+        )
+
+    def free_cdf(self, s: ArrayLike) -> Floats:
+        """Return the probability, among those never captured, of log E1 / E0 <= s."""
+        return self._cdf(s, "free")
+
+    def captured_cdf(self, s: ArrayLike) -> Floats:
+        """Return the probability, among the captured, of log E1 / E0 <= s.
+
+        Raises:
+            BadInput: nobody is captured.
+        """
+        return self._cdf(s, "captured")
+
+    def cdf(self, s: ArrayLike) -> Floats:
+        """Return the probability of log E1 / E0 <= s."""
+        return self._cdf(s, "all")
+
+    def mean_of_exp(self, q: float) -> float:
+        """Return the mean of exp(q s), to the second order in the blurs."""
+        a, q = self.atoms, check_number("q", q)
+        drift = q * (1 + 2 * q) / 4 * a.variance
+        return float(a.weight @ np.exp(q * (self.s_nc + a.gain + a.shift) + drift))
+
+    def capture_cdf(self, t: ArrayLike) -> Floats:
+        """Return the probability, among the captured, of a first capture at or before each time."""
+        a = self.atoms.those(~self.atoms.is_free)
+        order = np.argsort(a.t_in)
+        below = np.cumsum(a.weight[order]) - a.weight[order] / 2
+        found: Floats = np.interp(finite_array("t", t), a.t_in[order], below / a.weight.sum())
+        return found
+
+    def zone(self, times: ArrayLike) -> tuple[Floats, Floats]:
+        """Return mean and variance of log E / E0 at times of the cycle of those not captured so far."""
+        t = finite_array("times", times, n_dimensions=1)
+        none = np.zeros(len(t))
+        gathered = {name: self._fields.at(name, none, t) for name in ("variance", "squares", "lags")}
+        variance = gathered["variance"] - gathered["squares"]
+        begun = chaotic_zone(self.scene, [self._course.start]).log_energy[0]
+        mean = chaotic_zone(self.scene, t).log_energy - begun + variance / 4 - gathered["lags"]
+        return mean, variance - variance**2 / 8
+
+    def draw(self, n_cycles: int, n: int, seed: int) -> Floats:
+        """Draw log E / E0 of n particles after each of n_cycles independent cycles; shape (n, n_cycles).
+
+        A cycle that begins at energy E adds shifts and variances in proportion to (E / E0)^(-1/2).
+        """
+        n_cycles = check_count("n_cycles", n_cycles, 1, MOST_DRAWN)
+        n = check_count("n", n, 1, MOST_DRAWN // n_cycles)
+        random, a = np.random.default_rng(check_count("seed", seed, 0, 2**64 - 1)), self.atoms
+        found = np.zeros((n, n_cycles))
+        total = np.zeros(n)
+        share = np.cumsum(a.weight)
+        for k in range(n_cycles):
+            i = np.minimum(np.searchsorted(share, random.random(n)), len(share) - 1)
+            slower = np.exp(-total / 2)
+            step = np.sqrt(np.maximum(a.variance[i] * slower, 0.0) / 16)
+            along, across = 1 + step * random.standard_normal(n), step**2 * random.chisquare(3, n)
+            total = total + self.s_nc + a.gain[i] + a.shift[i] * slower + 2 * np.log(along**2 + across)
+            found[:, k] = total
+        return found
+
+    def _centres(self, atoms: Atoms) -> Floats:
+        return np.asarray(self.s_nc + atoms.gain + atoms.shift + atoms.variance / 4, dtype=np.float64)
+
+    def _cdf(self, s: ArrayLike, who: str) -> Floats:
+        levels = finite_array("s", s)
+        if who not in self._below:
+            self._below[who] = self._sampled(who)
+        found: Floats = np.interp(levels, *self._below[who])
+        return found
+
+    def _sampled(self, who: str) -> tuple[Floats, Floats]:
+        """Return places and the distribution function there of the "free", the "captured" or "all"."""
+        free = self.atoms.is_free
+        a = self.atoms.those({"free": free, "captured": ~free, "all": free | True}[who])
+        if not len(a.weight):
+            raise BadInput("nobody is captured in this cycle: there is no distribution of the captured")
+        centre, reach = self.s_nc + a.gain + a.shift, REACH * np.sqrt(np.maximum(a.variance, LEAST))
+        places = np.linspace((centre - reach).min(), (centre + reach).max(), N_PLACES)
+        below = np.zeros(N_PLACES)
+        for part in np.array_split(np.arange(len(centre)), 1 + len(centre) // 1000):
+            below += blur_cdf(places[:, None] - centre[part], a.variance[part]) @ a.weight[part]
+        return np.asarray(places, dtype=np.float64), below / a.weight.sum()
+
+    def _drift(self, atoms: Atoms, now: Floats | float, until: Floats | float) -> Atoms:
+        """Let particles in the chaotic zone diffuse, and correct for those captured meanwhile."""
+
+        def gathered(name: str) -> Floats:
+            return self._fields.at(name, atoms.gain, until) - self._fields.at(name, atoms.gain, now)
+
+        return atoms._replace(
+            weight=atoms.weight * np.exp(-gathered("hazards")),
+            shift=atoms.shift - gathered("lags"),
+            variance=atoms.variance + gathered("variance") - gathered("squares"),
+        )
+
+    def _through(self, root: Node, node: Node, atoms: Atoms, now: float) -> tuple[Atoms, float]:
+        """Take particles that are in the chaotic zone through a valley; return them, and when it ends."""
+        if not node.branches:
+            for child in node.children:
+                atoms, now = self._through(root, child, atoms, now)
+            return atoms, now
+        end, below = float(node.branches[0].ends[2, 0]), float(node.branches[-1].ends[1, 1])
+        free = self._drift(atoms, now, below)
+        free = free._replace(weight=free.weight * node.passed)
+        for child in node.children:
+            free, below = self._through(root, child, free, below)
+        parts = [self._drift(free, below, end)]
+        for branch in node.branches:
+            stays = _stays(node, branch, self._n_captures, root.s_nc)
+            parts += [self._captured(atoms, now, stays, end)]
+        return _joined(parts), end
+
+    def _captured(self, atoms: Atoms, now: float, stays: Stays, end: float) -> Atoms:
+        """Let each particle have each stay in the island; return them at the valley's end."""
+        n = len(stays.t_in)
+        t_in, t_out, gain, probability = (np.tile(column, len(atoms.gain)) for column in stays)
+        found = self._drift(Atoms(*(np.repeat(column, n) for column in atoms)), now, t_in)
+        gain = found.gain + gain
+        lag, square, likelier = (self._fields.at(k, found.gain, t_in) for k in ("lag", "square", "likelier"))
+        late, late_square = (self._fields.at(name, gain, t_out) for name in ("lag", "square"))
+        released = Atoms(
+            found.weight * probability * np.exp(likelier),
+            gain,
+            found.shift + lag + late,
+            found.variance + (square - lag**2) + (late_square - late**2),
+            np.where(found.is_free, t_in, found.t_in),
+        )
+        return self._drift(released, t_out, end)
+
+
+class Stays(NamedTuple):
+    """Stays in the island that begin on a panel, (n,) each.
+
+    t_in, t_out: times of capture and release.
+    gain: over the uncaptured, in log E.
+    probability: of each, given the chaotic zone at the valley's top.
+    """
+
+    t_in: Floats
+    t_out: Floats
+    gain: Floats
+    probability: Floats
+
+
+def at_energy(scene: Scene, energy: float) -> FiniteEnergy:
+    """Return the distribution of log E1 / E0 for an initial energy.
+
+    Args:
+        scene: a mushroom that `theory.rates` knows, or the reverse of one.
+        energy: E = v^2 / 2 of every particle when the cycle begins [length^2 / time^2].
+
+    Raises:
+        BadInput: energy is not finite or not > 0.
+        NotCovered: no frozen rates of the scene are known.
+    """
+    energy = check_number("energy", energy)
+    if not energy > 0:
+        raise BadInput(f"energy = {energy}, must be finite and > 0")
+    return _solved(as_mushroom(scene), energy)
+
+
+@lru_cache(maxsize=64)
+def _solved(scene: Mushroom, energy: float) -> FiniteEnergy:
+    return FiniteEnergy(scene, energy)
+
+
+def _stays(node: Node, branch: Branch, n: int, s_nc: float) -> Stays:
+    """Divide a panel's captures among atoms: of the valley's n as many as it has of the captures."""
+    ends = branch.chaotic(np.array([0.0, 1.0])) / node.p_top
+    n = max(8, int(n * (ends[0] - ends[1]) / max(1 - node.passed, LEAST)))
+    edges = np.linspace(0.0, 1.0, n + 1)
+    middle = (edges[1:] + edges[:-1]) / 2
+    _, t_in, t_out, *_ = branch.evaluate(middle)
+    return Stays(t_in, t_out, at(branch.s, middle) - s_nc, -np.diff(branch.chaotic(edges)) / node.p_top)
+
+
+def _joined(parts: list[Atoms]) -> Atoms:
+    """Put atoms together; where they are too many, join neighbours in gain."""
+    whole = Atoms(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))
+    n = len(whole.gain)
+    if n <= MOST_ATOMS:
+        return whole
+    order = np.lexsort((whole.gain, whole.is_free))
+    _, group = np.unique(
+        np.arange(n) * (MOST_ATOMS // 2) // n + MOST_ATOMS * whole.is_free[order], return_inverse=True
+    )
+    weight = np.bincount(group, whole.weight[order])
+
+    def middle(column: Floats) -> Floats:
+        return np.asarray(np.bincount(group, (whole.weight * column)[order]) / weight, dtype=np.float64)
+
+    return Atoms(np.asarray(weight), *(middle(column) for column in whole[1:]))

@@ -1,0 +1,162 @@
+"""A cycle in time, for particles of one initial energy: what the chaotic zone gathers, and who lags behind.
+
+Rates of frozen tables (`theory.rates`) are joined with the adiabatic theory's energies and hazards. Particles
+that were captured have other speeds, so lags and sums are functions of their gain over the uncaptured too.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+from mpmath import fp
+from numpy.typing import NDArray
+
+from scene.geometry import table_at
+from scene.laws import BangBang
+from scene.tables import Mushroom, cycle_length, laws
+from theory.branches import Floats, tree
+from theory.curves import chaotic_zone
+from theory.cycle import Cycle
+from theory.rates import SPEEDS, RatesAt, pace, rates_at
+from theory.volumes import NotCovered, delta_slope, volumes_at
+
+N_TIMES = 1024  # steps of a cycle, the midpoint rule's
+GAINS = np.linspace(-4.0, 4.0, 17)  # in log E, at which lags are integrated
+NUDGE = 1e-3  # in log E, for a derivative
+ROUNDING = 1e-9
+
+Flags = NDArray[np.bool_]
+
+
+class Course(NamedTuple):
+    """A cycle at T times, midpoints of equal steps from its start.
+
+    start, step: of time.
+    times: (T,).
+    log_energy: (T,) of the uncaptured, over its value at the start (Eq:dE).
+    hazard: (T,) of capture per time, where nu rises that of the reversed cycle (Eq:dps/ps).
+    is_capture: (T,) whether nu falls.
+    bend: (T,) square of the walls' acceleration over their speed [1 / time^2].
+    turning: (T,) speed of the sides over their tilt [length / time].
+    rates: from frozen tables.
+    """
+
+    start: float
+    step: float
+    times: Floats
+    log_energy: Floats
+    hazard: Floats
+    is_capture: Flags
+    bend: Floats
+    turning: Floats
+    rates: RatesAt
+
+
+@lru_cache(maxsize=16)
+def course(scene: Mushroom) -> Course:
+    """Follow a cycle whose frozen rates are known.
+
+    Raises:
+        NotCovered: they are not.
+    """
+    rates_at(scene, np.zeros(1))
+    start, step = _clock_start(scene), cycle_length(scene) / N_TIMES
+    times: Floats = np.asarray(start + step * (np.arange(N_TIMES) + 0.5), dtype=np.float64)
+    now = [table_at(fp, scene, t) for t in times]
+    volumes = [volumes_at(fp, scene, t) for t in times]
+    nu_rate = np.array([(one.w_rate * one.r - one.w * one.r_rate) / one.r**2 for one in now])
+    flux = np.array([delta_slope(fp, v.nu) * v.v_cap / v.v_cha for v in volumes])
+    speed = np.array([pace(scene, t) for t in times])
+    bend = np.asarray((np.gradient(speed, step) / speed) ** 2, dtype=np.float64)
+    log_energy = chaotic_zone(scene, times).log_energy - chaotic_zone(scene, [start]).log_energy[0]
+    turning = np.array([abs(one.w_rate) / max(abs(one.slope), ROUNDING) for one in now])
+    hazard, rates = np.abs(flux * nu_rate), rates_at(scene, times)
+    return Course(start, step, times, log_energy, hazard, nu_rate < 0, bend, turning, rates)
+
+
+def _clock_start(scene: Mushroom) -> float:
+    """Return when an ensemble's cycle begins: at a bang-bang law's first knot, else at 0; or cycles later.
+
+    Raises:
+        NotCovered: some particles are in the island then that leave it later.
+    """
+    length, opening = cycle_length(scene), float(Cycle.of(scene, 15).start)
+    start = next((law.knots[0][0] for law in laws(scene).values() if isinstance(law, BangBang)), 0.0)
+    start += length * float(np.floor((opening - start) / length + ROUNDING))
+    last = max((float(branch.ends[2].max()) for branch in tree(scene).all_branches()), default=start)
+    if last > start + length * (1 + ROUNDING):
+        raise NotCovered("the cycle must begin with its mouth at the widest: who is captured then is unknown")
+    return start
+
+
+class Fields:
+    """Functions of time and of a particle's gain over the uncaptured, in log E.
+
+    lag, square: mean of what the captured and released lag by, and of its square less diffusion's.
+    likelier: by how much, relatively, capture is likelier.
+    variance: gathered by diffusion since the cycle's start.
+    lags, squares, hazards: sums of hazard times `lag`, `square` and, while nu falls, `likelier`.
+
+    Args:
+        cycle: from `course`.
+        energy: of the ensemble when the cycle begins.
+
+    Attributes, of the uncaptured, weighted by diffusion:
+        missed: the share of it that the kicks' memory takes off.
+        turned: speed of the sides over their tilt and v. A side turns a near-vertical flight, which has the
+            longest memory, by twice its tilt, and by 2 u / v more when it moves.
+        n_blocks: of path, each twice as long as the memory, in a cycle.
+    """
+
+    def __init__(self, cycle: Course, energy: float) -> None:
+        self._start, self._step = cycle.start, cycle.step
+        speed = np.sqrt(2 * energy) * np.exp((cycle.log_energy + GAINS[:, None]) / 2)
+        faster, rates = speed * np.exp(NUDGE / 2), cycle.rates
+        lag = _at_speeds(rates.lag, speed) / speed
+        # Phase volume is kept: those who lag by J(E) are captured likelier by J + dJ / d log E.
+        likelier = lag + (_at_speeds(rates.lag, faster) / faster - lag) / NUDGE
+        square = _at_speeds(rates.square, speed) / speed**2
+        # Kicks remembered over a length m miss (m / v)^2 of the walls' acceleration squared.
+        missed = np.minimum((rates.memory / speed) ** 2 * cycle.bend, 1.0)
+        spread = rates.diffusion / speed
+        self._values = {
+            "lag": lag,
+            "square": square,
+            "likelier": likelier,
+            "variance": self._gathered(spread * (1 - missed)),
+            "lags": self._gathered(cycle.hazard * lag),
+            "squares": self._gathered(cycle.hazard * square),
+            "hazards": self._gathered(cycle.hazard * cycle.is_capture * likelier),
+        }
+        uncaptured = len(GAINS) // 2
+        share = spread[uncaptured] / spread[uncaptured].sum()
+        self.missed = float(share @ missed[uncaptured])
+        self.turned = float(share @ (cycle.turning / speed[uncaptured]))
+        self.n_blocks = float(speed[uncaptured].sum() * self._step / (2 * (share @ rates.memory)))
+
+    def at(self, name: str, gain: Floats, t: Floats | float) -> Floats:
+        """Interpolate a field; sums are known at the steps' ends, the others in their middles."""
+        values = self._values[name]
+        first = 0.0 if values.shape[1] > N_TIMES else 0.5
+        place = np.clip((t - self._start) / self._step - first, 0, values.shape[1] - 1)
+        level = np.clip((gain - GAINS[0]) / (GAINS[1] - GAINS[0]), 0, len(GAINS) - 1)
+        i = np.minimum(level.astype(int), len(GAINS) - 2)
+        k = np.minimum(np.asarray(place).astype(int), values.shape[1] - 2)
+        a, b = level - i, place - k
+        low = (1 - b) * values[i, k] + b * values[i, k + 1]
+        high = (1 - b) * values[i + 1, k] + b * values[i + 1, k + 1]
+        return np.asarray((1 - a) * low + a * high, dtype=np.float64)
+
+    def _gathered(self, rate: Floats) -> Floats:
+        return np.pad(np.cumsum(rate, axis=1) * self._step, ((0, 0), (1, 0)))
+
+
+def _at_speeds(rows: Floats, speed: Floats) -> Floats:
+    """Interpolate (T, S) rows, linear in the cube root of SPEEDS, at speeds (G, T); beyond them too."""
+    knots, x = np.cbrt(SPEEDS), np.cbrt(speed)
+    i = np.clip(np.searchsorted(knots, x) - 1, 0, len(knots) - 2)
+    column = np.arange(rows.shape[0])[None, :]
+    share = (x - knots[i]) / (knots[i + 1] - knots[i])
+    return np.asarray(rows[column, i] * (1 - share) + rows[column, i + 1] * share, dtype=np.float64)

@@ -1,0 +1,206 @@
+"""What frozen tables say of finite energy: `frozen_rates.json`, read and interpolated.
+
+For each of PHASES of a cycle the file holds, in the scene's own units, how fast kicks of the walls diffuse,
+and how far particles near capture lag behind the rest, at each of SPEEDS; each with its standard error.
+`python -m conformance.audit.frozen` measures them on tables at rest. They are even (diffusion, squares)
+or odd (lags) in the walls' velocities, so they serve the reversed cycle too. theory/equations.md derives
+what is done with them.
+"""
+
+from __future__ import annotations
+
+import json
+from functools import lru_cache
+from importlib import resources
+from typing import Any, NamedTuple
+
+import numpy as np
+from mpmath import fp
+
+import scene as scenes
+from scene.geometry import table_at
+from scene.laws import breakpoints, value
+from scene.tables import Mushroom, Scene, cycle_length, laws
+from scene.transforms import backwards
+from theory.branches import Floats
+from theory.volumes import NotCovered, as_mushroom, volumes_at
+
+FILE = "frozen_rates.json"
+N_PHASES = 64
+PHASES = (np.arange(N_PHASES) + 0.5) / N_PHASES  # of the period; walls at rest at a knot have no rates there
+SPEEDS = np.array([500.0, 2500.0, 12500.0, 62500.0])
+PATHS = (1000.0, 4000.0)  # over which diffusion is gathered
+TINY = 1e-300
+SAME = 1e-9  # relative difference of parameters below which two cycles are one
+
+
+class Rates(NamedTuple):
+    """A cycle's rates at PHASES, each divided by a power of `pace`, the walls' speed: that makes them smooth.
+
+    diffusion: (N, 2) variance of the kicks' sum per path length, over pace^2, gathered over PATHS.
+    lag: (N, S) mean lag of those being captured or released at SPEEDS, over pace; 0 where the mouth rests.
+    square: (N, S) mean square lag, less diffusion's, over pace^2.
+    diffusion_error, lag_error, square_error: their standard errors.
+    """
+
+    diffusion: Floats
+    lag: Floats
+    square: Floats
+    diffusion_error: Floats
+    lag_error: Floats
+    square_error: Floats
+
+
+class TableError(NamedTuple):
+    """Relative standard errors of what a whole cycle gathers by diffusion and by lags."""
+
+    diffusion: float
+    lag: float
+
+
+class RatesAt(NamedTuple):
+    """Rates at T times of a cycle.
+
+    diffusion: (T,) the kicks' variance per path length.
+    memory: (T,) the length over which kicks are remembered [length].
+    lag, square: (T, S) at SPEEDS.
+    """
+
+    diffusion: Floats
+    memory: Floats
+    lag: Floats
+    square: Floats
+
+
+def pace(scene: Scene, t: float) -> float:
+    """Return the root of the sum of squares of all parameters' rates at time t, as the scene names them."""
+    return float(np.sqrt(sum(float(value(fp, law, t, 1)) ** 2 for law in laws(scene).values())))
+
+
+def kick_rate(scene: Scene, t: float) -> float:
+    """Return the chaotic zone's mean d log E / dt at time t, the flux of particles apart. Source: Eq:dE."""
+    now, volumes = table_at(fp, scene, t), volumes_at(fp, scene, t)
+    cap = 2 * fp.pi**2 * now.r * now.r_rate
+    widening = now.w_rate * now.h + now.w * now.h_rate - now.h * now.h_rate * now.slope
+    stem = 2 * fp.pi * (2 * widening - now.h**2 * now.slope_rate)
+    free = 1 - volumes.v_ell / volumes.v_cap
+    return float(-(cap * free + stem) / volumes.v_cha)
+
+
+def frozen_rates(scene: Scene) -> tuple[Rates, bool]:
+    """Return the rates of a cycle that was measured, and whether they are those of its reverse.
+
+    Raises:
+        NotCovered: neither the scene nor its reverse is in the table.
+    """
+    mushroom = as_mushroom(scene)
+    for turned in (False, True):
+        sought = _outline(backwards(mushroom) if turned else mushroom)
+        for outline, rates in _table().values():
+            if outline.shape == sought.shape and np.allclose(outline, sought, rtol=SAME, atol=0.0):
+                return rates, turned
+    known = ", ".join(_table())
+    raise NotCovered(
+        f"no frozen rates of scene {mushroom.name!r} are known, only of {known} and their reverses"
+    )
+
+
+def rates_at(scene: Scene, times: Floats) -> RatesAt:
+    """Interpolate a cycle's rates.
+
+    Args:
+        scene: one of those measured, or the reverse of one.
+        times: (T,) any times.
+
+    Raises:
+        NotCovered: as `frozen_rates`.
+    """
+    rates, turned = frozen_rates(scene)
+    length = cycle_length(scene)
+    phase = (times / length) % 1.0
+    spans = _spans(as_mushroom(scene), length)
+    if turned:
+        phase, spans = 1 - phase, (1 - spans)[::-1]
+    memory = _memory(rates.diffusion, np.searchsorted(spans, PHASES, side="right"))
+    columns = np.column_stack([_unbiased(rates.diffusion, memory), memory, rates.lag, rates.square])
+    found = _between(columns, phase, spans)
+    speed = np.array([pace(scene, t) for t in times])
+    n, sign = len(SPEEDS), -1.0 if turned else 1.0
+    lag, square = found[:, 2 : 2 + n], found[:, 2 + n :]
+    return RatesAt(
+        found[:, 0] * speed**2,
+        np.sqrt(found[:, 1]),
+        sign * lag * speed[:, None],
+        square * speed[:, None] ** 2,
+    )
+
+
+def table_error(scene: Scene) -> TableError:
+    """Return how far a cycle's rates may be wrong altogether, phases weighted by the walls' speed.
+
+    Raises:
+        NotCovered: as `frozen_rates`.
+    """
+    rates, turned = frozen_rates(scene)
+    phases = 1 - PHASES if turned else PHASES
+    speed = np.array([pace(scene, float(t)) for t in phases * cycle_length(scene)])
+    spread, lag = rates.diffusion[:, 1] * speed**2, rates.lag.mean(axis=1) * speed
+    errors = [rates.diffusion_error[:, 1] * speed**2, rates.lag_error.mean(axis=1) * speed]
+    sums = np.abs(spread).sum(), max(float(np.abs(lag).sum()), TINY)
+    return TableError(*(float(np.sqrt((e**2).sum()) / s) for e, s in zip(errors, sums, strict=True)))
+
+
+def _memory(diffusion: Floats, span: Any) -> Floats:
+    """Return the square of the kicks' memory on each span, from what a shorter path misses.
+
+    With correlations exp(-l / m), a path of one sway of length P shows 1 / (1 + (2 pi m / P)^2) of the whole.
+    """
+    short, long = ((2 * np.pi / path) ** 2 for path in PATHS)
+    found = np.zeros(len(span))
+    for k in np.unique(span):
+        ratio = diffusion[span == k, 1].mean() / diffusion[span == k, 0].mean()
+        found[span == k] = max(ratio - 1, 0.0) / (short - ratio * long)
+    return found
+
+
+def _unbiased(diffusion: Floats, memory: Floats) -> Floats:
+    found: Floats = diffusion[:, 1] * (1 + memory * (2 * np.pi / PATHS[1]) ** 2)
+    return found
+
+
+def _between(columns: Floats, phase: Floats, spans: Floats) -> Floats:
+    """Interpolate linearly within each span on which the laws are analytic; if it is one, round the cycle."""
+    found = np.empty((len(phase), columns.shape[1]))
+    mine, wanted = (np.searchsorted(spans, x, side="right") for x in (PHASES, phase))
+    for k in np.unique(wanted):
+        inside, here = mine == k, wanted == k
+        period = 1.0 if len(spans) == 0 else None
+        for j in range(columns.shape[1]):
+            found[here, j] = np.interp(phase[here], PHASES[inside], columns[inside, j], period=period)
+    return found
+
+
+def _spans(scene: Mushroom, length: float) -> Floats:
+    """Return the phases, in (0, 1), at which a law stops being analytic and its walls rest."""
+    knots = {float(t) / length % 1.0 for law in laws(scene).values() for t in breakpoints(law)[::2]}
+    return np.array(sorted(knots - {0.0}))
+
+
+def _outline(scene: Mushroom) -> Floats:
+    """Return period and parameters at some phases, by which a cycle is known."""
+    length = cycle_length(scene)
+    rows = [table_at(fp, scene, float(length * phase)) for phase in PHASES[::5]]
+    return np.array([length, *(float(x) for row in rows for x in (row.r, row.w, row.h, row.slope))])
+
+
+@lru_cache(maxsize=1)
+def _table() -> dict[str, tuple[Floats, Rates]]:
+    data = json.loads((resources.files("theory") / FILE).read_text("utf-8"))
+    found = {}
+    for name, entry in data["scenes"].items():
+        scene = scenes.from_data(entry["scene"])
+        found[name] = (
+            _outline(as_mushroom(scene)),
+            Rates(*(np.array(entry[field]) for field in Rates._fields)),
+        )
+    return found

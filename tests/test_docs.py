@@ -84,8 +84,10 @@ def test_the_figures_of_the_corpus_are_right():
     corpus = vectors.load("stress")
     kinds = Counter(vector.kind for vector in corpus)
     levels = Counter(vector.level for vector in corpus)
-    counts = "{step:,} steps, {trajectory} trajectories and {flow} flows".format(**kinds)
-    assert f"Corpus {vectors.manifest().corpus} holds {counts}" in text
+    assert (
+        f"Corpus {vectors.manifest().corpus} holds {kinds['step']:,} steps, {kinds['trajectory']}"
+        f" trajectories and {kinds['flow']} flows" in text
+    )
     shown = "{core:,} of them at level core, {extended} at extended, {stress} at stress".format(**levels)
     assert shown in text
 

@@ -7,9 +7,9 @@ import math
 import numpy as np
 import pytest
 
-from scene import Fourier, Mushroom, load
-from theory import cumulants, predict
-from theory.finite_energy import bias, extrapolate, fit_power, peak_width, unbiased_mean
+from scene import load
+from theory import cumulants
+from theory.finite_energy import extrapolate, fit_power, peak_width, unbiased_mean
 
 
 def diffused(n: int, energy: float, seed: int) -> tuple[np.ndarray, float]:
@@ -29,26 +29,11 @@ def test_a_diffusion_that_keeps_phase_volume_drifts_by_a_quarter_of_its_variance
     found = peak_width(s)
     assert found.sigma == pytest.approx(sigma, abs=4 * found.error + 2e-4)
     error = sigma / math.sqrt(s.size)
-    drift = bias(load("ergodic"), found.sigma)
-    assert drift.mean_s == (drift.log_e_nc, drift.log_e_nc) == (found.sigma**2 / 4,) * 2
-    assert abs(s.mean() - drift.log_e_nc) < 4 * error
+    assert abs(s.mean() - found.sigma**2 / 4) < 4 * error
     assert abs(np.exp(-s / 2).mean() - 1) < 4 * error / 2
     # A half, or none, would be seen; and exp(-s) has a bias where exp(-s / 2) has none.
     assert abs(s.mean() - found.sigma**2 / 2) > 3 * error
     assert abs(s.mean()) > 3 * error
-
-
-def test_the_share_of_diffusion_is_bounded_by_who_is_in_the_chaotic_zone() -> None:
-    found, p_nc = bias(load("moving-cap"), 0.2), float(predict(load("moving-cap"), 6).p_nc)
-    assert found.log_e_nc == pytest.approx(0.01)
-    assert found.mean_s == pytest.approx((0.01 * p_nc, 0.01))
-    assert found.unknown == pytest.approx(0.04)
-    twice = Mushroom(
-        r=Fourier(mean=1.0, omega=1.0, sin=(0.5,)), h=1.0, nu=Fourier(mean=0.5, omega=1.0, cos=(0.125, 0.25))
-    )
-    low, high = bias(twice, 0.2).mean_s
-    assert 0.01 * float(predict(twice, 4).p_nc) < low < high
-    assert high >= 0.01
 
 
 def test_the_unbiased_mean_is_the_generating_function_at_minus_a_half() -> None:
@@ -92,8 +77,6 @@ def test_a_wrong_exponent_shows_in_the_residuals() -> None:
 def test_bad_data_is_named() -> None:
     with pytest.raises(ValueError, match="s has 3 values: a width needs at least 4"):
         peak_width([0.0, 1.0, 2.0])
-    with pytest.raises(ValueError, match=r"sigma_w = -1\.0, must be finite and >= 0"):
-        bias(load("ergodic"), -1.0)
     with pytest.raises(ValueError, match="two different x"):
         fit_power([1.0, 1.0], [1.0, 2.0], [1.0, 1.0])
     with pytest.raises(ValueError, match="a power law needs y > 0"):

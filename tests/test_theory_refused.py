@@ -40,6 +40,7 @@ cycle = cache(lambda: theory.Cycle.of(SCENE, 15))
 prediction = cache(lambda: theory.predict(SCENE, 4))
 sum_of_three = cache(lambda: theory.sum_of_cycles(energies(), 3))
 saddle = cache(lambda: theory.Saddle(energies()))
+finite = cache(lambda: theory.at_energy(SCENE, 1e6))
 OF_A_SCENE, WITH_DIGITS = {"scene": SCENE}, {"scene": SCENE, "digits": 4}
 COLUMNS = {"x": [1.0, 2.0], "y": [1.0, 2.0], "errors": [1.0, 1.0]}
 # What each entry takes: a function of its arguments by name, and arguments that are good.
@@ -64,7 +65,17 @@ ENTRIES = {
     "energy_cdf": (theory.energy_cdf, {"found": SCENE, "s": [0.0]}),
     "sum_of_cycles": (theory.sum_of_cycles, {"found": SCENE, "n_cycles": 2, "q": 0.5}),
     "Saddle": (theory.Saddle, {"found": SCENE}),
-    "bias": (theory.bias, {"found": SCENE, "sigma_w": 0.1}),
+    "rarity": (theory.rarity, WITH_DIGITS),
+    "loss_probability": (theory.loss_probability, {"found": SCENE, "n_cycles": 2}),
+    "frozen_rates": (theory.frozen_rates, OF_A_SCENE),
+    "at_energy": (theory.at_energy, {**OF_A_SCENE, "energy": 1e6}),
+    "FiniteEnergy.cdf": (lambda **given: finite().cdf(**given), {"s": [0.0]}),
+    "FiniteEnergy.free_cdf": (lambda **given: finite().free_cdf(**given), {"s": [0.0]}),
+    "FiniteEnergy.captured_cdf": (lambda **given: finite().captured_cdf(**given), {"s": [0.0]}),
+    "FiniteEnergy.capture_cdf": (lambda **given: finite().capture_cdf(**given), {"t": [0.0]}),
+    "FiniteEnergy.zone": (lambda **given: finite().zone(**given), {"times": [0.0]}),
+    "FiniteEnergy.mean_of_exp": (lambda **given: finite().mean_of_exp(**given), {"q": 0.5}),
+    "FiniteEnergy.draw": (lambda **given: finite().draw(**given), {"n_cycles": 2, "n": 3, "seed": 4}),
     "peak_width": (theory.peak_width, {"s": [0.0]}),
     "fit_power": (theory.fit_power, COLUMNS),
     "extrapolate": (theory.extrapolate, {**COLUMNS, "exponent": -0.5}),

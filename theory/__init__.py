@@ -1,7 +1,7 @@
 """The paper's closed forms and quadratures, at any precision."""
 
 from theory.adiabatic import NotConverged
-from theory.blur import FiniteEnergy, at_energy, blur_cdf
+from theory.blur import FiniteEnergy, at_energy
 from theory.curves import (
     CaptureCurve,
     ChaoticZone,
@@ -15,11 +15,9 @@ from theory.cycle import Cycle
 from theory.density import Caustic, capture_rate_at, caustics, cdf_at, density_at
 from theory.distribution import Energies, Sum, energies, energy_cdf, sum_of_cycles
 from theory.finite_energy import (
-    Bias,
     Limit,
     PowerFit,
     Width,
-    bias,
     extrapolate,
     fit_power,
     peak_width,
@@ -32,13 +30,13 @@ from theory.invariants import (
     log_energy_rate_island,
     sin_phi_hat,
 )
+from theory.large_deviations import Rarity, loss_probability, rarity
 from theory.prediction import Prediction, cumulants, mean_of, moments, predict, reversed_cycle
 from theory.rates import Rates, frozen_rates
 from theory.saddle import Saddle
 from theory.volumes import NotCovered, Volumes, delta, v_cap, v_cha, v_ell, v_stem, volumes_at
 
 __all__ = [
-    "Bias",
     "CaptureCurve",
     "Caustic",
     "ChaoticZone",
@@ -50,14 +48,13 @@ __all__ = [
     "NotCovered",
     "PowerFit",
     "Prediction",
+    "Rarity",
     "Rates",
     "Saddle",
     "Sum",
     "Volumes",
     "Width",
     "at_energy",
-    "bias",
-    "blur_cdf",
     "cap_invariant",
     "capture_curve",
     "capture_rate_at",
@@ -78,10 +75,12 @@ __all__ = [
     "largest_gain",
     "log_energy_rate_chaotic",
     "log_energy_rate_island",
+    "loss_probability",
     "mean_of",
     "moments",
     "peak_width",
     "predict",
+    "rarity",
     "reversed_cycle",
     "sin_phi_hat",
     "sum_of_cycles",

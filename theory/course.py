@@ -30,7 +30,7 @@ ROUNDING = 1e-9
 Flags = NDArray[np.bool_]
 
 
-class Course(NamedTuple):
+class CycleCourse(NamedTuple):
     """A cycle at T times, midpoints of equal steps from its start.
 
     start, step: of time.
@@ -55,7 +55,7 @@ class Course(NamedTuple):
 
 
 @lru_cache(maxsize=16)
-def course(scene: Mushroom) -> Course:
+def course(scene: Mushroom) -> CycleCourse:
     """Follow a cycle whose frozen rates are known.
 
     Raises:
@@ -73,7 +73,7 @@ def course(scene: Mushroom) -> Course:
     log_energy = chaotic_zone(scene, times).log_energy - chaotic_zone(scene, [start]).log_energy[0]
     turning = np.array([abs(one.w_rate) / max(abs(one.slope), ROUNDING) for one in now])
     hazard, rates = np.abs(flux * nu_rate), rates_at(scene, times)
-    return Course(start, step, times, log_energy, hazard, nu_rate < 0, bend, turning, rates)
+    return CycleCourse(start, step, times, log_energy, hazard, nu_rate < 0, bend, turning, rates)
 
 
 def _clock_start(scene: Mushroom) -> float:
@@ -110,7 +110,7 @@ class Fields:
         n_blocks: of path, each twice as long as the memory, in a cycle.
     """
 
-    def __init__(self, cycle: Course, energy: float) -> None:
+    def __init__(self, cycle: CycleCourse, energy: float) -> None:
         self._start, self._step = cycle.start, cycle.step
         speed = np.sqrt(2 * energy) * np.exp((cycle.log_energy + GAINS[:, None]) / 2)
         faster, rates = speed * np.exp(NUDGE / 2), cycle.rates

@@ -1,10 +1,6 @@
-"""What finite energy adds to the adiabatic theory: widths, biases, and fits over energy.
+"""How what is measured at finite energy is brought to its limit: widths, an unbiased mean, fits over energy.
 
-At finite speed v the chaotic zone's log E diffuses: some v T collisions, each off by u / v, give the
-peak of the uncaptured a variance sigma_w^2 ~ 1 / v, so a width ~ E0^(-1/4). Phase volume is preserved
-(the density of states of a plane billiard does not depend on E), and that alone ties a drift of
-log E to it, a quarter of the variance. theory/equations.md derives what follows from this and says
-where the argument is heuristic. Nothing here knows sigma_w: it is measured.
+What finite energy does is predicted by `theory.blur`; this works for any cycle, with frozen rates or without.
 """
 
 from __future__ import annotations
@@ -16,8 +12,7 @@ from numpy.typing import ArrayLike
 
 from scene.refusal import BadInput, check_number
 from scene.tables import Scene
-from theory.branches import Floats, Node
-from theory.distribution import Energies, energies
+from theory.branches import Floats
 from theory.entries import finite_array
 from theory.prediction import mean_of
 
@@ -27,21 +22,6 @@ class Width(NamedTuple):
 
     sigma: float
     error: float
-
-
-class Bias(NamedTuple):
-    """What sigma_w adds to the theory of one cycle.
-
-    mean_s: least and largest bias of the mean of s through diffusion, of order sigma_w^2.
-    log_e_nc: bias of the mean of s over the uncaptured through diffusion, sigma_w^2 / 4.
-    unknown: the order, 1 / v, of what volumes do not tell (delayed capture, correlation of capture
-        with gain, skewness between mean and median): sigma_w^2 times a number of order 1. It is the
-        whole bias of p_nc, which energy does not enter.
-    """
-
-    mean_s: tuple[float, float]
-    log_e_nc: float
-    unknown: float
 
 
 class PowerFit(NamedTuple):
@@ -96,43 +76,6 @@ def peak_width(s: ArrayLike) -> Width:
     sigma = float(np.sqrt(variance * values.size / (values.size - 1)))
     error = np.sqrt(max(spread, 0.0) / values.size) / (2 * sigma) if sigma else 0.0
     return Width(sigma, float(error))
-
-
-def bias(found: Energies | Scene, sigma_w: float) -> Bias:
-    """Return what a measured width of the uncaptured peak adds to the theory of one cycle.
-
-    Args:
-        found: from `theory.energies`, or a scene to solve.
-        sigma_w: width at the initial energy in question, >= 0, see `peak_width`.
-
-    Raises:
-        BadInput: sigma_w is negative or not finite.
-        NotCovered, NotConverged: as `theory.predict`.
-
-    Source: none in the paper, which has the width alone (sec. 4.1); see theory/equations.md.
-    """
-    sigma_w = check_number("sigma_w", sigma_w)
-    if sigma_w < 0:
-        raise BadInput(f"sigma_w = {sigma_w}, must be finite and >= 0")
-    drift = sigma_w**2 / 4
-    lowest, highest, _ = _diffusing(energies(found).root)
-    return Bias((lowest * drift, highest * drift), drift, sigma_w**2)
-
-
-def _diffusing(node: Node) -> tuple[float, float, float]:
-    """Bound the ensemble's share of diffusion while nu is in a valley; give it also at the valley's end.
-
-    The share at a time is the mean over particles of [in the chaotic zone] (E / E_nc)^(-1/2), E_nc
-    the energy of the uncaptured, for diffusion goes as E^(-1/2). It is 1 at the valley's top, falls with
-    p_cha and rises as particles return, so its extremes are where nu turns.
-    """
-    now, lowest, highest = node.passed, node.passed, 1.0
-    for child in node.children:
-        low, high, end = _diffusing(child)
-        lowest, highest = min(lowest, now * low), max(highest, now * high)
-        now *= end
-    returned = float(node.weights @ np.exp(-(node.s - node.s_nc) / 2))
-    return lowest, max(highest, now + returned), now + returned
 
 
 def unbiased_mean(scene: Scene, digits: int = 15) -> Any:

@@ -28,8 +28,8 @@ from conformance import vectors
 from conformance.bench import codes
 from conformance.bench.contenders import Ask, Contender, Family, Given, Lap
 from conformance.bench.workloads import SINGLE_STEPS, WINDOW, Workload
-from conformance.plain.flow import Step
 from conformance.suite.process import Trouble
+from conformance.vectors import Step
 from scene import BangBang, Cap, Collision, Fourier, Horizon, Law, Outcome, Scene, State, Stem, Wall
 from scene.geometry import rounded
 from scene.laws import frequency

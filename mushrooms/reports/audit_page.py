@@ -14,6 +14,7 @@ from typing import Any, TypedDict, cast
 import msgspec
 import numba
 import numpy as np
+from matplotlib import rc_context
 
 import scene as scenes
 from conformance.audit.finding import Check, Entry, Finding
@@ -22,8 +23,9 @@ from conformance.audit.samples import Sample
 from conformance.audit.session import AuditResult
 from conformance.audit.tolerances import FAMILY_LEVEL, LEVEL, N_SIGMA, mean, spread
 from mushrooms import __version__
-from mushrooms.figures import by_claim
+from mushrooms.figures import by_claim, cycles
 from mushrooms.figures import style as plots
+from mushrooms.reports.headline import headline
 from mushrooms.reports.page import embed, render
 
 PAPER = "https://arxiv.org/abs/1305.2624"
@@ -238,13 +240,24 @@ def to_html(data: ReportData, samples: by_claim.Samples) -> str:
     return render(
         "audit.html.jinja",
         report=data,
+        headline=headline(samples),
+        first=_first_figure(samples),
         groups=groups,
         images=figures,
         scenes=tables,
         figures_text=figures_text,
+        expected_text=expected_text,
         signs=SIGNS,
         paper=PAPER,
     )
+
+
+def _first_figure(samples: by_claim.Samples) -> str:
+    """Return the histogram of the moving cap at the paper's energy; empty where it was not simulated."""
+    if by_claim.N7 not in samples:
+        return ""
+    with rc_context(plots.STYLE):
+        return embed(plots.svg(cycles.energies([samples[by_claim.N7]])))
 
 
 def _place(finding: FindingData) -> tuple[list[int], str, int]:
@@ -259,11 +272,23 @@ def figures_text(check: CheckData) -> str:
     if check["value"] is None:
         return check["note"]
     if check["error"] is None:
-        return f"{check['value']:.10g}"
-    digits = max(0, 1 - int(np.floor(np.log10(check["error"])))) if check["error"] > 0 else 6
+        return f"{check['value']:.4g}" if check["n_tests"] else f"{check['value']:.10g}"
+    digits = _digits(check["error"])
     if digits > 7:
         return f"{check['value']:.3g} ± {check['error']:.2g}"
     return f"{check['value']:.{digits}f} ± {check['error']:.{digits}f}"
+
+
+def expected_text(check: CheckData) -> str:
+    """Return what a check expects; a number to one digit more than the error beside it has."""
+    if check["pull"] is None or check["error"] is None:
+        return check["expected"]
+    return f"{float(check['expected']):.{min(_digits(check['error']) + 1, 10)}f}"
+
+
+def _digits(error: float) -> int:
+    """Return the decimals that a number with this error is worth."""
+    return max(0, 1 - int(np.floor(np.log10(error)))) if error > 0 else 6
 
 
 def to_text(data: ReportData) -> str:

@@ -84,7 +84,8 @@ def retraced(sample: Sample) -> Figure:
         left.plot(*_places(scene, np.array(pair)), color=BLUE, linewidth=0.8, linestyle=":")
     left.set(xlabel="V_ell / V_cap", ylabel="V_cap / V", title=f"{sample.run.scene}, the way there")
     left.legend(loc="best")
-    _energies(right, sample)
+    _energies(right, None, sample)
+    right.set(xlabel="log E1/E0")
     right.legend(loc="upper right", fontsize=7)
     return figure
 
@@ -122,7 +123,7 @@ def energies(samples: list[Sample]) -> Figure:
     return figure
 
 
-def _energies(axes: Axes, rest: Axes, sample: Sample) -> None:
+def _energies(axes: Axes, rest: Axes | None, sample: Sample) -> None:
     prediction = theory.predict(scene_of(sample.run), 15)
     found, centre = predicted(sample), float(prediction.log_e_nc)
     sigma = found.peak[1] ** 0.5
@@ -138,7 +139,8 @@ def _energies(axes: Axes, rest: Axes, sample: Sample) -> None:
         ecolor=BLUE,
         elinewidth=0.7,
     )
-    _residuals(rest, counts, np.diff(found.cdf(edges)) * sample.n, edges)
+    if rest is not None:
+        _residuals(rest, counts, np.diff(found.cdf(edges)) * sample.n, edges)
     x = np.linspace(edges[0], edges[-1], 1500)
     total = np.gradient(found.cdf(x), x)
     axes.plot(x, total, color=BLACK, linewidth=1.3, label=f"theory at this energy, peak {sigma:.4f} wide")

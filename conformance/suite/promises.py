@@ -18,7 +18,16 @@ from mpmath import fp
 
 from conformance.suite import timing
 from conformance.suite.process import NOT_NUMBERS, Trouble
-from conformance.suite.questions import BREATHING, MOVING, STANDING, distance, follow, is_same, offered, question
+from conformance.suite.questions import (
+    BREATHING,
+    MOVING,
+    STANDING,
+    distance,
+    follow,
+    is_same,
+    offered,
+    question,
+)
 from conformance.suite.session import Session, missing, read_outcome
 from scene import Cap, Collision, Horizon, Mushroom, Outcome, Scene, State, Stem, Undecided, to_data
 from scene.geometry import half_width

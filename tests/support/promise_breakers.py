@@ -142,7 +142,7 @@ def one_too_few(request: Line, found: Line) -> Line:
 
 
 def tired(after: int) -> Callable[[Line, Line], Line]:
-    """Lose a hundred-thousandth of the speed at a bounce of a trajectory, and at no other; what follows is honest."""
+    """Lose 1e-5 of the speed at a bounce of a trajectory, and at no other; what follows is honest."""
 
     def change(request: Line, found: Line) -> Line:
         steps = found["steps"]

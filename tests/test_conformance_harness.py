@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import io
 import json
 import subprocess
+import sys
+from types import SimpleNamespace
 
 import pytest
 
 from conformance import vectors
+from conformance.harness import kit
 from conformance.harness.examples import Example, find_examples, find_kit_examples
 from conformance.suite import property_checks
 from conformance.suite import run as suite
@@ -91,3 +95,36 @@ def test_an_example_refuses_bad_input_and_lives_on(language, commands):
     assert [a["outcome"] for a in answers[4:-2]] == ["rejected"] * len(BAD)
     assert answers[-2]["outcome"] in ("rejected", "undecided")  # squares may overflow
     assert (answers[-1]["seq"], answers[-1]["outcome"], answers[-1]["wall"]) == (5, "collision", "arc")
+
+
+def refuse_to_say(*_):
+    raise kit.Open("too close")
+
+
+ENGINES = {
+    "a hit": (lambda *_: (1.0, 0.75, 0.5, -1.0, 0.0), {"outcome": "collision", "wall": "arc", "t": 1.0}),
+    "too late": (lambda *_: (10.0, 0.75, 0.5, -1.0, 0.0), {"outcome": "horizon", "t": 9.0, "x": 9.0}),
+    "none": (lambda *_: None, {"outcome": "horizon", "t": 9.0}),
+    "nan": (
+        lambda *_: (1.0, float("nan"), 0.5, -1.0, 0.0),
+        {"error": "the engine returned (1.0, nan, 0.5, -1.0, 0.0)"},
+    ),
+    "in the past": (
+        lambda *_: (-1.0, 0.75, 0.5, -1.0, 0.0),
+        {"error": "the engine returned (-1.0, 0.75, 0.5, -1.0, 0.0)"},
+    ),
+    "a slip": (lambda *_: 1 / 0, {"error": "the engine raised ZeroDivisionError: division by zero"}),
+    "open": (refuse_to_say, {"outcome": "undecided", "reason": "too close"}),
+}
+
+
+@pytest.mark.parametrize("name", ENGINES)
+def test_the_kit_makes_an_answer_of_whatever_an_engine_returns(name, monkeypatch):
+    engine, expected = ENGINES[name]
+    out = io.BytesIO()
+    monkeypatch.setattr(sys, "stdin", SimpleNamespace(buffer=io.BytesIO(json.dumps(GOOD).encode() + b"\n")))
+    monkeypatch.setattr(sys, "stdout", SimpleNamespace(buffer=out))
+    kit.serve_engine("made-up", engine)
+    answer = json.loads(out.getvalue())
+    assert {field: answer[field] for field in expected} == expected
+    assert answer["seq"] == 5

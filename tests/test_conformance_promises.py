@@ -5,8 +5,12 @@ from __future__ import annotations
 import pytest
 from support.promise_breakers import FAULTS, Breaker
 
+from conformance import vectors
 from conformance.suite import promises, session, timing
+from conformance.suite import run as suite
 from conformance.suite.session import Session
+from scene import Wall, from_data
+from scene.geometry import rounded
 
 
 @pytest.fixture
@@ -41,3 +45,37 @@ def test_a_breach_is_met(opened, name):
 
 def test_every_promise_has_its_breach():
     assert {promise for promise, _, _ in FAULTS.values()} == set(promises.PROMISES)
+
+
+def without_names(request, answer):
+    """Answer as an engine that knows neither walls nor flight times."""
+    found = answer(request)
+    for part in (found, *found.get("steps", ())):
+        part.pop("dt", None)
+        part.pop("wall", None)
+    return found
+
+
+def test_an_engine_that_names_no_walls_and_keeps_no_flight_times_is_graded(monkeypatch, tally):
+    monkeypatch.setattr(session, "Process", lambda *_: Breaker(without_names))
+    monkeypatch.setattr(suite, "choose", lambda *_: vectors.load("core")[::16])
+    monkeypatch.setattr(suite, "N_STATES", 4)
+    monkeypatch.setattr(suite.property_checks, "ask_profiles", lambda *_: iter(()))
+    run = suite.check(["in-process"], seed=1)
+    assert run.objections() == []
+    hits = [r for r in run.results if r.verdict == "pass" and "without dt, t is graded" in r.why]
+    assert len(hits) > 60
+    tally["without dt"] += len(hits)
+
+
+def test_every_certified_hit_is_nearest_to_its_wall(tally):
+    for vector in vectors.load("core"):
+        expected = vector.expect[0]
+        if vector.kind == "step" and expected.outcome == "collision":
+            (step,) = expected.steps
+            t = float(step.centre("dt")) + vector.state.t
+            place = float(step.centre("x")), float(step.centre("y"))
+            met: Wall = rounded(from_data(vector.scene), t).nearest_wall(*place)
+            assert met == step.wall, vector.id
+            tally[met] += 1
+    assert set(tally) == {"arc", "base", "left", "right", "floor"}

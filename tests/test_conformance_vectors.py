@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import hashlib
 import json
+import math
 import shutil
 from collections import Counter
 from fractions import Fraction
@@ -35,9 +36,11 @@ from conformance.vectors import (
     manifest,
     request,
 )
-from scene import BadInput, State, catalogue, from_data
+from scene import BadInput, BangBang, Fourier, State, catalogue, from_data
 from scene import load as load_scene
+from scene.laws import bounds
 from scene.protocol.messages import Command
+from scene.tables import cycle_length, laws
 
 ROOT = Path(__file__).parent.parent
 SCHEMA = ROOT / "docs" / "vector.schema.json"
@@ -79,6 +82,52 @@ def test_what_the_corpus_holds(corpus, tally):
 def test_lines_published_with_1_0_are_unchanged():
     files = {name: file for name, file in manifest().files.items() if name not in NEW_IN_1_1}
     assert digest(files, ()) == DIGEST_OF_1_0
+
+
+def periods_late(vector):
+    return abs(vector.state.t) / (cycle_length(from_data(vector.scene)) or math.inf)
+
+
+def periods_in_flight(vector):
+    (step,) = vector.expect[0].steps
+    return float(step.centre("dt")) / (cycle_length(from_data(vector.scene)) or math.inf)
+
+
+def first_knot(vector):
+    found = [law for law in laws(from_data(vector.scene)).values() if isinstance(law, BangBang)]
+    return abs(found[0].knots[0][0]) if found else 0.0
+
+
+def most_harmonics(vector):
+    found = [law for law in laws(from_data(vector.scene)).values() if isinstance(law, Fourier)]
+    return max((len(law.harmonics()) for law in found), default=0)
+
+
+def kinds_of_laws(vector):
+    return len({type(law) for law in laws(from_data(vector.scene)).values()})
+
+
+def sharpness_of_edge(vector):
+    """How near 1 nu comes, as a number that grows."""
+    return 1 / (1 - float(bounds(from_data(vector.scene).nu).highest))
+
+
+@pytest.mark.parametrize(
+    ("group", "measure", "bound", "least"),
+    [
+        ("knots-off-zero", first_knot, 0.25, 30),
+        ("waiting", periods_in_flight, 20, 25),
+        ("waiting", periods_in_flight, 100, 5),
+        ("far-phase", periods_late, 2**31, 20),
+        ("far-mouth", periods_late, 2**31, 20),
+        ("many-harmonics", most_harmonics, 4, 20),
+        ("mixed-laws", kinds_of_laws, 2, 30),
+        ("mixed-laws", kinds_of_laws, 3, 10),
+        ("mouth-nearly-whole", sharpness_of_edge, 0.99e9, 25),
+    ],
+)
+def test_groups_hold_what_they_promise(corpus, group, measure, bound, least):
+    assert sum(measure(vector) >= bound for vector in corpus if vector.group == group) >= least
 
 
 def test_levels_are_cumulative(corpus):

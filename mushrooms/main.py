@@ -157,6 +157,12 @@ def simulate(
     out: Annotated[
         Path | None, typer.Option(metavar="DIR", help="Folder for ensemble.npz and summary.json.")
     ] = None,
+    plot: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE", help="Histogram of log E1/E0 after one cycle (.svg, .png), with theory."
+        ),
+    ] = None,
     threads: Threads = None,
     as_json: AsJson = False,
 ) -> None:
@@ -178,6 +184,10 @@ def simulate(
     check_seed(seed, "--seed")
     if threads is not None:
         _check_range("--threads", threads, 1)
+    if plot is not None:
+        if cycles != 1:
+            raise BadInput(f"--cycles = {cycles}, must be 1 for --plot")
+        output.check_file(plot, (".svg", ".png"))
     table = scenes.load(scene)
     with output.writable_folder(out) if out else nullcontext() as folder:
         import numpy as np
@@ -193,7 +203,26 @@ def simulate(
             write_files(
                 folder, {"ensemble.npz": lambda file: np.savez(file, **fields), "summary.json": text + "\n"}
             )
+        if plot is not None:
+            _plot(plot, table, table.name or scene, ensemble)
     _print_pairs(summary, as_json)
+
+
+def _plot(path: Path, table: scenes.Scene, name: str, ensemble: Any) -> None:
+    """Write the histogram of those who take part."""
+    import io
+
+    import numpy as np
+
+    from mushrooms.figures import energies, style
+
+    gain = np.log(ensemble.energy[ensemble.takes_part()] / ensemble.energy0)
+    if len(gain) < 2:
+        raise BadInput(f"--plot: {len(gain)} particles were followed to the end, must be at least 2")
+    title = f"{name}, E0 = {ensemble.energy0:.0e}, {len(gain):,} particles"
+    file = io.BytesIO()
+    style.save(energies.histogram(table, ensemble.energy0, gain, title), file, path.suffix)
+    write_file(path, file.getvalue())
 
 
 def _simulated(table: scenes.Scene, name: str, threads: int | None, **asked: Any) -> Any:

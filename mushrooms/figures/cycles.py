@@ -18,13 +18,12 @@ from conformance.audit.evidence import energies_of
 from conformance.audit.runs import scene_of
 from conformance.audit.samples import Sample
 from conformance.audit.tolerances import mean, share, spread
+from mushrooms.figures.energies import N_PLACES, draw, panels
 from mushrooms.figures.style import BLACK, BLUE, GREEN, ORANGE, SKY, FloatArray, new_figure, phase_colours
 from scene import load
 from scene.laws import value
 from scene.tables import Mushroom
 
-N_BINS = 80
-LEAST_EXPECTED = 5.0  # particles in a bin, to speak of standard errors
 N_SUM_BINS = 300
 N_LOOP = 240
 N_PHASES = 6
@@ -85,7 +84,6 @@ def retraced(sample: Sample) -> Figure:
     left.set(xlabel="V_ell / V_cap", ylabel="V_cap / V", title=f"{sample.run.scene}, the way there")
     left.legend(loc="best")
     _energies(right, None, sample)
-    right.set(xlabel="log E1/E0")
     right.legend(loc="upper right", fontsize=7)
     return figure
 
@@ -114,56 +112,22 @@ def gain_of_capture() -> Figure:
 
 def energies(samples: list[Sample]) -> Figure:
     """Draw histograms of log E1/E0 with theory over them, and below what is left, in standard errors."""
-    figure, _ = new_figure(4.8 * len(samples), 4.8)
-    figure.clear()
-    axes = figure.subplots(2, len(samples), height_ratios=[3, 1], sharex="col", squeeze=False)
-    for (panel, rest), sample in zip(axes.T, samples, strict=True):
+    figure, pairs = panels(len(samples))
+    for (panel, rest), sample in zip(pairs, samples, strict=True):
         _energies(panel, rest, sample)
-    axes[0, 0].legend(loc="best")
+    pairs[0][0].legend(loc="best")
     return figure
 
 
 def _energies(axes: Axes, rest: Axes | None, sample: Sample) -> None:
     prediction = theory.predict(scene_of(sample.run), 15)
-    found, centre = predicted(sample), float(prediction.log_e_nc)
-    sigma = found.peak[1] ** 0.5
-    low, high = (float(np.quantile(sample.gain, q)) for q in (0.0005, 0.9995))
-    edges = np.linspace(low - sigma, high + sigma, N_BINS + 1)
-    heights = _bars(axes, sample.gain, edges, sample.n)
-    counts, width_of_bin = heights * sample.n * (edges[1] - edges[0]), edges[1] - edges[0]
-    axes.errorbar(
-        (edges[1:] + edges[:-1]) / 2,
-        heights,
-        np.sqrt(counts) / (sample.n * width_of_bin),
-        fmt="none",
-        ecolor=BLUE,
-        elinewidth=0.7,
-    )
-    if rest is not None:
-        _residuals(rest, counts, np.diff(found.cdf(edges)) * sample.n, edges)
-    x = np.linspace(edges[0], edges[-1], 1500)
-    total = np.gradient(found.cdf(x), x)
-    axes.plot(x, total, color=BLACK, linewidth=1.3, label=f"theory at this energy, peak {sigma:.4f} wide")
+    title = f"{sample.run.scene}, E0 = {sample.run.energy:.0e}, {sample.n:,} particles"
+    edges = draw(axes, rest, sample.gain, predicted(sample), title)
+    x = np.linspace(edges[0], edges[-1], N_PLACES)
     sharp = np.diff(energies_of(sample.run.name).captured_below(x)) / np.diff(x)
     axes.plot((x[1:] + x[:-1]) / 2, sharp, color=ORANGE, linewidth=1.2, label="theory, captured, sharp")
+    centre = float(prediction.log_e_nc)
     axes.axvline(centre, color=ORANGE, linestyle="--", linewidth=1.2, label="theory, never captured")
-    axes.set(
-        xlim=(edges[0], edges[-1]),
-        ylim=(0, 1.15 * max(heights.max(), total.max())),
-        ylabel="density",
-        title=f"{sample.run.scene}, E0 = {sample.run.energy:.0e}, {sample.n:,} particles",
-    )
-
-
-def _residuals(axes: Axes, counts: FloatArray, expected: FloatArray, edges: FloatArray) -> None:
-    """Draw counts less those expected, in standard errors, where a bin expects enough for that to mean it."""
-    enough = expected >= LEAST_EXPECTED
-    left = np.where(enough, (counts - expected) / np.sqrt(np.where(enough, expected, 1.0)), np.nan)
-    axes.axhspan(-2, 2, color=SKY, alpha=0.5, linewidth=0)
-    axes.axhline(0, color=BLACK, linewidth=0.8)
-    axes.plot((edges[1:] + edges[:-1]) / 2, left, ".", color=BLUE, markersize=4)
-    reach = max(4.0, 1.1 * float(np.nanmax(np.abs(left)))) if enough.any() else 4.0
-    axes.set(xlabel="log E1/E0", ylabel="pull", ylim=(-reach, reach))
 
 
 def capture_times(samples: list[Sample]) -> Figure:

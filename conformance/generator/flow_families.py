@@ -53,8 +53,8 @@ def flow_families() -> list[VectorFamily]:
         VectorFamily("flow-stay-at-the-end", 10, _stay_at_the_end, None, AT_THE_END_AT),
         VectorFamily("flow-brief", 10, _brief),
         VectorFamily("long-flow", 16, _long, None, LONG_AT),
-        VectorFamily("longest-flow", 8, _longest),
-        VectorFamily("long-trajectory", 4, _long_trajectory),
+        VectorFamily("longest-flow", 5, _longest),
+        VectorFamily("long-trajectory", 3, _long_trajectory),
     ]
 
 

@@ -194,8 +194,15 @@ class FiniteEnergy:
         gathered = {name: self._fields.at(name, none, t) for name in ("variance", "squares", "lags")}
         variance = gathered["variance"] - gathered["squares"]
         begun = chaotic_zone(self.scene, [self._course.start]).log_energy[0]
-        mean = chaotic_zone(self.scene, t).log_energy - begun + variance / 4 - gathered["lags"]
-        return mean, variance - variance**2 / 8
+        drift = gathered["variance"] / 4 - gathered["lags"]
+        return chaotic_zone(self.scene, t).log_energy - begun + drift, variance - variance**2 / 8
+
+    def at_capture(self, times: ArrayLike) -> tuple[Floats, Floats]:
+        """Return mean and variance of log E / E0 of those first captured at each time, when they are."""
+        mean, variance = self.zone(times)
+        t = finite_array("times", times, n_dimensions=1)
+        lag, square = (self._fields.at(name, np.zeros(len(t)), t) for name in ("lag", "square"))
+        return mean + lag, variance + square - lag**2
 
     def draw(self, n_cycles: int, n: int, seed: int) -> Floats:
         """Draw log E / E0 of n particles after each of n_cycles independent cycles; shape (n, n_cycles).
@@ -246,10 +253,11 @@ class FiniteEnergy:
         def gathered(name: str) -> Floats:
             return self._fields.at(name, atoms.gain, until) - self._fields.at(name, atoms.gain, now)
 
+        squares = gathered("squares")
         return atoms._replace(
             weight=atoms.weight * np.exp(-gathered("hazards")),
-            shift=atoms.shift - gathered("lags"),
-            variance=atoms.variance + gathered("variance") - gathered("squares"),
+            shift=atoms.shift - gathered("lags") + squares / 4,  # a square is no diffusion, and has no drift
+            variance=atoms.variance + gathered("variance") - squares,
         )
 
     def _through(self, root: Node, node: Node, atoms: Atoms, now: float) -> tuple[Atoms, float]:
@@ -277,11 +285,12 @@ class FiniteEnergy:
         gain = found.gain + gain
         lag, square, likelier = (self._fields.at(k, found.gain, t_in) for k in ("lag", "square", "likelier"))
         late, late_square = (self._fields.at(name, gain, t_out) for name in ("lag", "square"))
+        spread = square - lag**2 + late_square - late**2
         released = Atoms(
             found.weight * probability * np.exp(likelier),
             gain,
-            found.shift + lag + late,
-            found.variance + (square - lag**2) + (late_square - late**2),
+            found.shift + lag + late - spread / 4,
+            found.variance + spread,
             np.where(found.is_free, t_in, found.t_in),
         )
         return self._drift(released, t_out, end)

@@ -130,16 +130,16 @@ def one_cycle(scene, energy, total, phases, rng):
     inside = np.zeros((n, len(phases)), bool)
     phase_s = np.zeros((n, len(phases)))
     if phases:
-        grid, gained, cap = zone
-        gained = gained - gained[0]
+        grid, _, cap = zone
         for k, phase in enumerate(phases):
             t = phase * grid[-1]
             centre, spread = (x[0] for x in found.zone([t]))
             now = centre - spread / 4 + blurred(np.full(n, spread), noise, rng)
             with np.errstate(invalid="ignore"):
                 inside[:, k] = ((t_in < t) & (t < t_out)).any(axis=1)
-            entered = np.interp(t_in[inside[:, k], 0], grid, gained)
-            change = np.interp(t, grid, cap) - np.interp(t_in[inside[:, k], 0], grid, cap)
-            now[inside[:, k]] = entered - change * (1 + noise[inside[:, k]] / speed)
+            begun, own = t_in[inside[:, k], 0], noise[inside[:, k]]
+            entered, wide = found.at_capture(begun)
+            change = np.interp(t, grid, cap) - np.interp(begun, grid, cap)
+            now[inside[:, k]] = entered + np.sqrt(np.maximum(wide, 0)) * own - change * (1 + own / speed)
             phase_s[:, k] = now
     return s, t_in, t_out, phase_s, inside

@@ -15,7 +15,7 @@ from mpmath import fp
 import theory
 from conformance.audit.claims.broadened import phase_times, predicted, share_in_the_zone, zone_energy
 from conformance.audit.claims.experiments import chord_time, mouth_speed
-from conformance.audit.claims.finite_energy import ACW, ERGODIC, LADDER
+from conformance.audit.claims.finite_energy import ACW, ERGODIC, FIXED, LADDER
 from conformance.audit.evidence import ClaimEvidence
 from conformance.audit.finding import Check
 from conformance.audit.runs import RUNS, block_seed, scene_of
@@ -216,6 +216,25 @@ def energy_through_the_cycle(evidence: ClaimEvidence) -> Iterator[Check]:
                 float(expected[k]),
                 band=found.next_order.peak_mean + abs(float(expected[k] - wait[k])),
             )
+    for run in FIXED:
+        yield _lag_at_capture(evidence.sample(run))
+
+
+def _lag_at_capture(sample: Sample) -> Check:
+    """Compare log E of captured particles, which a cap at rest keeps, with what they had when captured."""
+    found, times = predicted(sample), sample.first_stay[0]
+    k = int(np.argmax(sample.phase_captured[:, 0].sum(axis=0)))
+    inside = sample.phase_captured[:, 0, k] & sample.captured
+    expected = found.at_capture(times[inside])[0]
+    seen_late = expected - found.at_capture(times[inside] - chord_time(sample))[0]
+    lag = float(np.mean(expected - found.zone(times[inside])[0]))
+    return close(
+        f"{sample.run.name}: log E of the captured when captured, less its prediction",
+        mean(sample.phase_s[inside, 0, k] - expected),
+        0.0,
+        band=found.next_order.captured_mean + abs(float(seen_late.mean())),
+        note=f"a lag of {lag:.4f} behind the uncaptured is part of it",
+    )
 
 
 def zone_share(sample: Sample, times: FloatArray) -> FloatArray:

@@ -315,7 +315,7 @@ def test_a_profile_that_loses_particles_is_of_wrong_format(monkeypatch):
     }
 
 
-@pytest.mark.parametrize("fault", ["no-time", "elsewhere", "tenfold", "fewer"])
+@pytest.mark.parametrize("fault", ["no-time", "elsewhere", "tenfold"])
 def test_no_speed_is_shown_for_what_is_not_followed(monkeypatch, fault):
     monkeypatch.setattr(suite, "TIMED_LEAST", 1_000_000)
     for broken, is_shown in ((FAULTS[fault][2], False), (lambda request, answer: answer(request), True)):

@@ -6,6 +6,7 @@ import json
 import math
 import os
 import sys
+from collections.abc import Mapping
 from contextlib import nullcontext
 from pathlib import Path
 from typing import Annotated, Any, NoReturn
@@ -122,14 +123,26 @@ def _catalogue_row(name: str) -> dict[str, Any]:
 def predict(
     scene: SceneName,
     digits: Annotated[int, typer.Option(help=f"Correct digits, 1 to {MAX_DIGITS}.")] = 15,
+    energy: Annotated[
+        float | None, typer.Option(help="Add the same figures at this initial energy v²/2, > 0.")
+    ] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Print the paper's predictions for one cycle as decimal strings."""
+    """Print the paper's predictions for one cycle as decimal strings, and what each is.
+
+    With --energy, what particles that begin with it will show, and the size of what that leaves out. It takes
+    rates of frozen tables: those of the audit's scenes are known (python -m conformance.audit.frozen).
+    """
     import theory
+    from mushrooms.explained import FIGURES, at_energy
 
     _check_range("--digits", digits, 1, MAX_DIGITS)
-    strings = theory.predict(scenes.load(scene), digits).strings(digits)
-    _print_pairs(strings, as_json)
+    if energy is not None and not (math.isfinite(energy) and energy > 0):
+        raise BadInput(f"--energy = {energy}, must be finite and > 0")
+    found = scenes.load(scene)
+    pairs: dict[str, Any] = dict(theory.predict(found, digits).strings(digits))
+    pairs |= at_energy(found, energy) if energy is not None else {}
+    _print_pairs(pairs, as_json, FIGURES)
 
 
 @app.command(
@@ -143,6 +156,12 @@ def simulate(
     seed: Seed = 0,
     out: Annotated[
         Path | None, typer.Option(metavar="DIR", help="Folder for ensemble.npz and summary.json.")
+    ] = None,
+    plot: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE", help="Histogram of log E1/E0 after one cycle (.svg, .png), with theory."
+        ),
     ] = None,
     threads: Threads = None,
     as_json: AsJson = False,
@@ -165,6 +184,10 @@ def simulate(
     check_seed(seed, "--seed")
     if threads is not None:
         _check_range("--threads", threads, 1)
+    if plot is not None:
+        if cycles != 1:
+            raise BadInput(f"--cycles = {cycles}, must be 1 for --plot")
+        output.check_file(plot, (".svg", ".png"))
     table = scenes.load(scene)
     with output.writable_folder(out) if out else nullcontext() as folder:
         import numpy as np
@@ -180,7 +203,26 @@ def simulate(
             write_files(
                 folder, {"ensemble.npz": lambda file: np.savez(file, **fields), "summary.json": text + "\n"}
             )
+        if plot is not None:
+            _plot(plot, table, table.name or scene, ensemble)
     _print_pairs(summary, as_json)
+
+
+def _plot(path: Path, table: scenes.Scene, name: str, ensemble: Any) -> None:
+    """Write the histogram of those who take part."""
+    import io
+
+    import numpy as np
+
+    from mushrooms.figures import energies, style
+
+    gain = np.log(ensemble.energy[ensemble.takes_part()] / ensemble.energy0)
+    if len(gain) < 2:
+        raise BadInput(f"--plot: {len(gain)} particles were followed to the end, must be at least 2")
+    title = f"{name}, E0 = {ensemble.energy0:.0e}, {len(gain):,} particles"
+    file = io.BytesIO()
+    style.save(energies.histogram(table, ensemble.energy0, gain, title), file, path.suffix)
+    write_file(path, file.getvalue())
 
 
 def _simulated(table: scenes.Scene, name: str, threads: int | None, **asked: Any) -> Any:
@@ -269,10 +311,13 @@ def _console() -> Console:
     return Console() if sys.stdout.isatty() else Console(width=140)
 
 
-def _print_pairs(pairs: dict[str, Any], as_json: bool) -> None:
+def _print_pairs(pairs: dict[str, Any], as_json: bool, meanings: Mapping[str, str] | None = None) -> None:
     if as_json:
         print(json.dumps(pairs, indent=2))
         return
     width = max(map(len, pairs))
-    for name, value in pairs.items():
-        print(f"{name:<{width}}  {'–' if value is None else value}")
+    texts = {name: "–" if value is None else str(value) for name, value in pairs.items()}
+    longest = max(map(len, texts.values()))
+    for name, text in texts.items():
+        meaning = (meanings or {}).get(name)
+        print(f"{name:<{width}}  {text:<{longest}}  {meaning}" if meaning else f"{name:<{width}}  {text}")

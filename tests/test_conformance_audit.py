@@ -119,6 +119,8 @@ FAULTS = {
     "X6": changed(untilted=narrowed),
     "X7": changed(only_mouth=raised(1.05)),
     "X8": changed(moving_cap_reversed=raised(0.8)),
+    "C1": changed(moving_cap=repeated),
+    "D1": changed(moving_cap=raised(1.3)),
     "L2": changed(ergodic=heated),
     "L3": changed(frozen_mushroom=lambda e: e._replace(wall_counts=e.wall_counts * 0)),
     "L4": changed(moving_cap=lambda e: e._replace(t_out=e.t_out + 0.1)),
@@ -133,6 +135,42 @@ def test_a_faulty_stepper_does_not_get_the_expected_verdict(name):
     (entry,) = ledger.select(name)
     (finding,) = audited(name, FAULTS[name]).findings
     assert finding.verdict != entry.expected, finding.checks
+
+
+def without_finite_energy(scene, **options):
+    """Follow an ensemble of the adiabatic theory with a Gaussian peak, as wide as ours."""
+    ensemble = adiabatic_particles.simulate(scene, **options)
+    return bare(ensemble, theory.at_energy(scene, options["energy"]))
+
+
+def bare(e, found):
+    s = np.log(e.cycle_energies / e.energy0)
+    free = np.isnan(e.t_in[:, 0]).all(axis=1)
+    noise = np.random.default_rng(3).standard_normal(free.sum())
+    s[free, 0] = found.s_nc + found.peak[1] ** 0.5 * noise  # no drift, no lags, no skewness
+    return e._replace(cycle_energies=e.energy0 * np.exp(s))
+
+
+@pytest.mark.parametrize("fault", [raised(0.95), raised(0.985), freed], ids=["trivial", "unbiased", "freed"])
+def test_a_retraced_arc_that_does_not_accelerate_as_predicted_is_found_out(fault):
+    (entry,) = ledger.select("X7")
+    assert entry.expected == "false"
+    (finding,) = audited("X7", changed(retraced_arc=fault)).findings
+    assert finding.verdict != "false", finding.checks
+
+
+def test_the_audit_sees_what_finite_energy_adds_at_the_papers_size(fixed_caps):
+    runs = ("fixed-cap-anticlockwise@1e7", "fixed-cap-clockwise@1e7")
+    known = {name: draw(adiabatic_particles.simulate, RUNS[name], size="full", seed=6) for name in runs}
+    drifting = {name: draw(without_finite_energy, RUNS[name], size="full", seed=6) for name in runs}
+    for name in runs:
+        evidence = ClaimEvidence(drifting, STAND_IN, size="full", predict=CACHED)
+        assert experiments.peak_place(evidence, drifting[name]).holds is False
+        assert experiments.peak_shape(drifting[name]).holds is False
+        evidence = ClaimEvidence(known, STAND_IN, size="full", predict=CACHED)
+        assert experiments.peak_place(evidence, known[name]).holds
+        assert experiments.peak_shape(known[name]).holds
+        assert experiments.captured_energies(known[name]).holds
 
 
 @pytest.mark.parametrize("name", ["M1", "M2", "M4", "X1", "X8", "N1", "N4"])

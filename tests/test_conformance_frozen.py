@@ -38,6 +38,16 @@ def test_entries_measured_anew_agree_with_the_table(anew: Rates) -> None:
     assert np.abs(pulls(anew, table)).max() < PULL
 
 
+def test_the_tables_seed_gives_its_diffusion_again() -> None:
+    scene = load("fixed-cap-anticlockwise")
+    assert isinstance(scene, Mushroom)
+    table, _ = frozen_rates(scene)
+    again = measured(scene, phases=PHASES[[20]])  # the mouth rests there
+    assert np.allclose(again.diffusion, table.diffusion[[20]], rtol=2e-5)
+    assert np.allclose(again.diffusion_error, table.diffusion_error[[20]], rtol=2e-5)
+    assert not again.lag.any()
+
+
 @pytest.mark.parametrize(
     ("field", "factor"), [("diffusion", 1.5), ("lag", 1.3), ("lag", -1.0), ("square", 8.0)]
 )

@@ -15,6 +15,7 @@ from support.refusals import assert_refused
 
 import fast
 import scene as scenes
+from mushrooms.explained import FIGURES
 from scene.files import write_files
 
 MOVING_CAP = """\
@@ -170,6 +171,26 @@ def test_theory_prints_decimal_strings(call):
     code, out, _ = call("theory", "moving-cap")
     assert code == 0
     assert values["m1"][:12] in out
+    assert all(FIGURES[name] in out for name in values)
+
+
+def test_theory_adds_what_finite_energy_does(call):
+    code, out, _ = call("theory", "fixed-cap-anticlockwise", "--energy", "1e9", "--json")
+    values = json.loads(out)
+    assert code == 0
+    assert set(values) <= set(FIGURES)
+    assert float(values["m1"]) == pytest.approx(0.044926243)
+    assert values["m1_at"] == pytest.approx(0.0469, abs=2e-4)  # the paper's run: 0.0463 +- 0.0009
+    assert values["peak_width_at"] == pytest.approx(0.0873, rel=0.02)
+    assert 0 < values["m1_left_out"] < 1e-4
+    assert call("theory", "ergodic", "--energy", "1e7", "--json")[0] == 0
+    for arguments, words in (
+        (["moving-cap", "--energy", "0"], ["--energy = 0.0"]),
+        (["untilted", "--energy", "1e6"], ["no frozen rates", "untilted"]),
+    ):
+        code, _, err = call("theory", *arguments)
+        assert code == 2
+        assert all(word in err for word in words)
 
 
 def test_simulate_prints_and_saves_the_same_result(call, tmp_path):

@@ -148,6 +148,11 @@ def critical_gap(n: int) -> float:
     return float(kstwo.isf(LEVEL, n))
 
 
+def chance(values: FloatArray, cdf: Cdf) -> float:
+    """Return Kolmogorov's p: how likely so large a distance is if the law is right."""
+    return float(kstwo.sf(largest_gap(values, cdf), len(values)))
+
+
 def fits(
     what: str,
     values: FloatArray,
@@ -172,7 +177,6 @@ def fits(
         return Check(what, None, "a sample", n_tests=1, note="no particles")
     gap, reach = largest_gap(values, cdf), critical_gap(n) + band
     holds = None if reach >= scale else bool(gap <= reach)
-    p = float(kstwo.sf(gap, n))  # of no band at all
     more = f"; {note}" if note else ""
-    text = f"Kolmogorov's distance, n = {n}, p = {p:.2g}{more}"
+    text = f"Kolmogorov's distance, n = {n}, p = {chance(values, cdf):.2g} without a band{more}"
     return Check(what, holds, f"<= {reach:.4g}", gap, band=band, n_tests=1, note=text)

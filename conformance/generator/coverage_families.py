@@ -31,6 +31,7 @@ def coverage_families() -> list[VectorFamily]:
         VectorFamily("many-harmonics", 30, _many_harmonics),
         VectorFamily("tilting-side", 40, _tilting_side),
         VectorFamily("mixed-laws", 40, _mixed),
+        VectorFamily("far-mouth", 24, _far_mouth),
     ]
 
 
@@ -118,6 +119,21 @@ def _far_phase(draw: Draw) -> Question:
         "far-phase", rule, "hard case 39", of, state(draw, of, {"t": t, "speed": draw.power(0, 4)})
     )
     # A stepper may refuse times at which much of a phase is lost in rounding, if it says so.
+    return asked._replace(also=("rejected",))
+
+
+def _far_mouth(draw: Draw) -> Question:
+    """Ask which wall is met where the phase decides: allowances grow with t, so numbers alone say little."""
+    turns = float(draw.power(31, 34) + draw.pick(range(2**20))) + draw.pick(range(64)) / 64
+    shared = SharedPeriod(draw.pick(("fourier", "bang-bang", "bang-bang")), draw.pick((0.5, 1.0, 4.0)))
+    of = Mushroom(r=draw.short(1.0, 1.5), h=draw.short(1.0, 1.5), nu=law(draw, 0.1, 0.9, shared))
+    t = draw.pick((1.0, 1.0, -1.0)) * turns * (cycle_length(of) or shared.rate)
+    y, flight = draw.between(0.1, 0.3), draw.between(0.02, 0.1)
+    widths = rounded(of, t + flight).w, rounded(of, flight).w
+    x = draw.pick((0.5, -0.5)) * (widths[0] + widths[1])
+    start = State(t, x, y, 0.0, -y / flight)
+    rule = "the mouth more than 2^31 periods late: open or closed, as it is not at time 0"
+    asked = _question("far-mouth", rule, "hard case 39", of, (start, t + 4 * flight))
     return asked._replace(also=("rejected",))
 
 

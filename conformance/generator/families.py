@@ -30,6 +30,7 @@ CATALOGUE = {
     "frozen-mushroom": "sec. 2",
     "breathing-circle": "sec. 3.1",
     "fermi-ulam": "introduction",
+    "retraced-arc": "sec. 5",
 }
 
 

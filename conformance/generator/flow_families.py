@@ -9,7 +9,6 @@ captured in a moving mushroom, a stem with level floor, all much faster than the
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from functools import partial
 
 from conformance.generator.certify import Question
 from conformance.generator.draws import (
@@ -25,7 +24,7 @@ from conformance.generator.draws import (
 )
 from conformance.generator.families import CATALOGUE, FIXED, MOVING, VectorFamily
 from conformance.generator.stays import Mark, stays
-from scene import Mushroom, Scene, State, load
+from scene import Mushroom, Scene, State, Stem, load
 from scene.geometry import rounded
 from scene.laws import bounds
 
@@ -38,7 +37,6 @@ AT_THE_END_AT = (17, 0, 0, 2, 13, 0, 0, 5, 7, 8)
 LONG_AT = (2, 1, 2, 0, 5, 1, 2, 3, 0, 1, 1, 0, 0, 2, 1, 2)
 INTERRUPTED_AT = (45, 91, 9, 65, 5, 125, 8, 132)
 REGULAR = ("breathing-circle", "frozen-mushroom", "moving-cap", "fixed-cap-clockwise", "fermi-ulam")
-LEAST_COSTLY = ("frozen-mushroom", "frozen-mushroom", "breathing-circle")
 MUSHROOMS = (*MOVING, *FIXED, "frozen-mushroom")
 
 
@@ -54,7 +52,9 @@ def flow_families() -> list[VectorFamily]:
         VectorFamily("flow-stay-interrupted", 8, _interrupted, None, INTERRUPTED_AT),
         VectorFamily("flow-stay-at-the-end", 10, _stay_at_the_end, None, AT_THE_END_AT),
         VectorFamily("flow-brief", 10, _brief),
-        VectorFamily("long-flow", 16, partial(_long, "long-flow", 60, REGULAR), None, LONG_AT),
+        VectorFamily("long-flow", 16, _long, None, LONG_AT),
+        VectorFamily("longest-flow", 5, _longest),
+        VectorFamily("long-trajectory", 3, _long_trajectory),
     ]
 
 
@@ -66,6 +66,11 @@ def any_marks(found: Marks) -> bool:
 def has_stays(number: int) -> Callable[[Marks], bool]:
     """Look for flows of so many stays, or more."""
     return lambda found: len(stays(found)) >= number
+
+
+def has_hits(number: int) -> Callable[[Marks], bool]:
+    """Look for flows of so many collisions, or more."""
+    return lambda found: len(found) >= number
 
 
 def is_interrupted(found: Marks) -> bool:
@@ -187,9 +192,9 @@ def _brief(draw: Draw) -> Question:
     return _flow("flow-brief", "little or nothing is met before t_end", "protocol 1", of, state(draw, of, at))
 
 
-def _long(group: str, least: int, names: tuple[str, ...], draw: Draw) -> Question:
-    """Ask for a long path: of a flow, up to a time by which it has so many collisions, to twice that."""
-    name = draw.pick(names)
+def _long(draw: Draw) -> Question:
+    """Ask for a path of 60 to 120 collisions."""
+    name, least = draw.pick(REGULAR), 60
     of = load(name)
     t = time(draw, of)
     speed = draw.power(6, 8) * draw.between(1.0, 2.0) * (walls_speed(of) or 1.0)
@@ -199,7 +204,21 @@ def _long(group: str, least: int, names: tuple[str, ...], draw: Draw) -> Questio
         start = gallery(draw, of, t, speed)
     t_end = t + 0.5 * least * draw.between(0.6, 1.2) * rounded(of, t).size / speed
     rule = f"a path of {least} collisions and more in the scene {name}: errors that begin late, or grow"
-    asked = _flow(
-        group, rule, CATALOGUE[name], of, (start, t_end), lambda found: len(found) >= least, 2 * least
-    )
-    return asked if group != "long-trajectory" else asked._replace(collisions=least, flow=None)
+    return _flow("long-flow", rule, CATALOGUE[name], of, (start, t_end), has_hits(least), 2 * least)
+
+
+def _longest(draw: Draw) -> Question:
+    """Ask for a path of 510 collisions and more in an upright stem, where enclosures are not turned."""
+    least = 510
+    of = load("fermi-ulam")
+    if draw.pick((False, True)):
+        of = Stem(w=draw.short(0.5, 2.0), h=draw.short(0.5, 2.0))
+    at = {"site": "stem", "speed": draw.power(5, 7) * draw.between(1.0, 2.0), "patience": 0.45 * least}
+    rule = f"a path of {least} collisions and more in an upright stem: errors that begin late, or grow"
+    return _flow("longest-flow", rule, "introduction", of, state(draw, of, at), has_hits(least), 2 * least)
+
+
+def _long_trajectory(draw: Draw) -> Question:
+    asked = _longest(draw)
+    rule = "120 collisions in an upright stem: errors that begin late, or grow"
+    return asked._replace(group="long-trajectory", rule=rule, collisions=120, flow=None)

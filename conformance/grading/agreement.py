@@ -26,6 +26,7 @@ from scene import Collision, Horizon, Outcome, Rejected, State, Undecided, Undef
 from scene.protocol.messages import Answered, AnsweredCollision
 
 BOUND = Fraction(1, 10**9)  # physics: far above rounding, far below any error of principle
+DIGITS, SHARPEST = Fraction(1, 1000), Fraction(1, 2**43)  # what passes is right to; a thousand backward ulps
 NEAR_HIT = Fraction(1, 10)  # of the flight time
 # dt, t, place, velocity: what is judged as one vector.
 VECTORS = (("dt",), ("t",), ("x", "y"), ("vx", "vy"))
@@ -88,8 +89,21 @@ class _Measured(NamedTuple):
     off: Fraction | float
 
 
+def physics_bound(condition: float) -> Fraction:
+    """Return the backward error that is granted as physics, for a question of some condition number.
+
+    An answer that passes is right to three digits, as long as a thousand backward ulps allow that: 1e-9 up
+    to a condition of 1e6, and 1e-3 / condition beyond. A phase ten billion periods on must not be off by ten.
+    """
+    return min(BOUND, max(DIGITS / Fraction(max(condition, 1.0)), SHARPEST))
+
+
 def compare(
-    answer: Answer | list[Answer], expected: Expectation | None, state: State, bound: float | None = None
+    answer: Answer | list[Answer],
+    expected: Expectation | None,
+    state: State,
+    bound: float | None = None,
+    physics: Fraction = BOUND,
 ) -> Agreement:
     """Compare an answer with the truth.
 
@@ -98,6 +112,7 @@ def compare(
         expected: certified; None where the proof itself is undecided.
         state: the start.
         bound: backward ulps allowed in every component; None where physics is all that is asked.
+        physics: backward error allowed, of vectors.
 
     Returns:
         What differs first, with the worst errors of the numbers where they were compared.
@@ -114,17 +129,21 @@ def compare(
             return Agreement("length", why=f"{place}missing, {i} of {len(expected.steps)} were given", step=i)
         if differing := _difference(answers[i], certified):
             return differing._replace(why=(place + differing.why)[:200], step=i)
-        measured.append(_measure(answers[i], certified, clock.advance(certified), place))
-        if measured[-1].least > BOUND:
+        measured.append(_measure(answers[i], certified, clock.advance(certified), place, physics))
+        if measured[-1].least > physics:
             hint = _missed(answers[i], certified)
-            judged = _judge_numbers(measured, bound)
+            judged = _judge_numbers(measured, bound, physics)
             return judged._replace(why=judged.why + hint, step=i)
     end = _judge_end(expected, answers[len(expected.steps) :])
-    return end._replace(step=len(expected.steps)) if end else _judge_numbers(measured, bound)
+    return end._replace(step=len(expected.steps)) if end else _judge_numbers(measured, bound, physics)
 
 
 def compare_arrival(
-    answer: Answered, captured: tuple[float, float] | None, expected: Expectation, state: State
+    answer: Answered,
+    captured: tuple[float, float] | None,
+    expected: Expectation,
+    state: State,
+    physics: Fraction = BOUND,
 ) -> Agreement:
     """Compare what a flow says of one particle with the truth.
 
@@ -133,6 +152,7 @@ def compare_arrival(
         captured: begin and end of the first captured stay [time]; None without one.
         expected: certified, with the captured stays and the collisions that begin and end them.
         state: the start.
+        physics: backward error allowed.
 
     Returns:
         As `compare`; `numbers` too where a stay is missing, invented, or begins or ends at a wrong time.
@@ -140,10 +160,11 @@ def compare_arrival(
     clock = _Clock(state)
     times = [clock.advance(certified) for certified in expected.steps]
     if expected.outcome != "horizon":
-        return _judge_end(expected, [answer]) or _judge_numbers([], None)
+        return _judge_end(expected, [answer]) or _judge_numbers([], None, physics)
     if differing := _difference(answer, expected.steps[-1]):
         return differing
-    judged = _judge_numbers([_measure(answer, expected.steps[-1], times[-1], "")], None)
+    measured = _measure(answer, expected.steps[-1], times[-1], "", physics)
+    judged = _judge_numbers([measured], None, physics)
     if judged.kind != "agrees":
         return judged
     if (captured is None) != (not expected.stays):
@@ -155,7 +176,7 @@ def compare_arrival(
     for name, given, place in zip(("begin", "end"), captured, expected.stays[0], strict=True):
         (low, high), allowance = times[place]
         error = max(Fraction(given) - high, low - Fraction(given), Fraction(0))
-        if error > BOUND * (allowance + abs(Fraction(given))):
+        if error > physics * (allowance + abs(Fraction(given))):
             why = f"captured: its {name} is {given!r}, must be {float(low)!r} (step {place + 1})"
             return judged._replace(kind="numbers", why=why)
     return judged
@@ -234,7 +255,7 @@ def _name(answer: Answer) -> str:
     return type(answer).__name__.lower()
 
 
-def _judge_numbers(measured: Sequence[_Measured], bound: float | None) -> Agreement:
+def _judge_numbers(measured: Sequence[_Measured], bound: float | None, physics: Fraction) -> Agreement:
     """Judge the numbers of an answer whose outcomes and walls are right."""
     if not measured:
         return Agreement("agrees", why="the right outcome")
@@ -242,12 +263,12 @@ def _judge_numbers(measured: Sequence[_Measured], bound: float | None) -> Agreem
     last = measured[-1]
     ulps = _rounded(max(found.most_ulps for found in measured))
     found = Agreement("agrees", ulps, _rounded(worst.most), f"{ulps:.3g} backward ulps")
-    if last.least > BOUND:
+    if last.least > physics:
         off = f"{last.where} is off by {_rounded(last.off):.3g} (backward)"
         return found._replace(kind="numbers", why=off)
     if bound is not None and any(step.least_ulps > bound for step in measured):
         return found._replace(kind="numbers", why=f"numbers are off by {ulps:.3g} backward ulps")
-    if worst.most > BOUND or (bound is not None and ulps > bound):
+    if worst.most > physics or (bound is not None and ulps > bound):
         return found._replace(kind="indeterminate", why=f"{worst.where} is enclosed too widely")
     return found
 
@@ -267,7 +288,9 @@ class _Clock:
         return (self.low, self.high), self.allowance
 
 
-def _measure(answer: Answer, certified: Certified, time: tuple[Ends, Fraction], place: str) -> _Measured:
+def _measure(
+    answer: Answer, certified: Certified, time: tuple[Ends, Fraction], place: str, physics: Fraction
+) -> _Measured:
     """Measure dt (of a horizon none is given), t (but of an enclosed answer), place and velocity."""
     numbers = _given(answer)
     if not all(math.isfinite(end) for ends in numbers.values() for end in ends if isinstance(end, float)):
@@ -287,7 +310,7 @@ def _measure(answer: Answer, certified: Certified, time: tuple[Ends, Fraction], 
             # An exact zero that nothing can move, as y on the base, has no size of its own to be measured by.
             is_zero = not allowances[name] and not any(truth[name])
             size = scale if is_zero else sizes[name]
-            is_named = found.most <= BOUND and most / scale > found.most
+            is_named = found.most <= physics and most / scale > found.most
             found = _Measured(
                 max(found.least, least / scale),
                 max(found.most, most / scale),

@@ -1,11 +1,12 @@
 """The verdict on one answer: physics apart from precision.
 
 Physics asks for the right outcome, the right walls in order, and numbers with a backward error of at most
-1e-9 (`grading.agreement`). Precision is measured in backward ulps, component by component. Where the
-enclosures of the truth are too wide to tell, the verdict is `indeterminate`, which is the corpus's defect.
+1e-9, less where the condition number is above 1e6 (`agreement.physics_bound`). Precision is measured in
+backward ulps, component by component. Where the enclosures of the truth are too wide to tell, the verdict is
+`indeterminate`, which is the corpus's defect.
 
-Trajectories end before the condition number reaches 1e8, so 1e-9 leaves at least one digit; only hard case 30
-goes on, where the walls are the question.
+Trajectories end before the condition number reaches 1e8; only hard case 30 goes on, where the walls are the
+question.
 
 - `undecided` where an answer is due is `declined`; so is a trajectory that ends so, after right steps.
 - Where the mathematics gives no answer (`undefined`), `undecided` is right too, and listed in the vector.
@@ -24,7 +25,7 @@ from typing import Any, Literal, NamedTuple
 
 import msgspec
 
-from conformance.grading.agreement import BOUND, Agreement, Answer, Kind, compare, compare_arrival
+from conformance.grading.agreement import Agreement, Answer, Kind, compare, compare_arrival, physics_bound
 from conformance.vectors import Vector
 from scene.protocol.messages import Answered, AnsweredCollision
 
@@ -90,15 +91,18 @@ def grade(vector: Vector, answer: Any) -> Grade:
         return _unmeasured("wrong-format", f"an answer must be an object, not {type(answer).__name__}")
     if isinstance(answer.get("error"), str):
         return _unmeasured("error", " ".join(answer["error"].split())[:200])
+    physics = physics_bound(vector.condition)
     try:
         if vector.kind == "flow":
-            found = [compare_arrival(*_arrival(answer), known, vector.state) for known in vector.expect]
+            arrival = _arrival(answer)
+            found = [compare_arrival(*arrival, known, vector.state, physics) for known in vector.expect]
             return _noted(vector, _best(found))
         outcomes = _outcomes(vector, answer)
     except _Misshapen as finding:
         return _unmeasured("wrong-format", str(finding))
     asked: Answer | list[Answer] = outcomes if vector.kind == "trajectory" else outcomes[0]
-    graded = _noted(vector, _best([compare(asked, expected, vector.state) for expected in vector.expect]))
+    found = [compare(asked, known, vector.state, physics=physics) for known in vector.expect]
+    graded = _noted(vector, _best(found))
     if any(isinstance(outcome, AnsweredCollision) and outcome.dt is None for outcome in outcomes):
         return graded._replace(why=f"{graded.why}; without dt, t is graded in its place")
     return graded
@@ -106,7 +110,11 @@ def grade(vector: Vector, answer: Any) -> Grade:
 
 def _noted(vector: Vector, found: Grade) -> Grade:
     """Say of a right answer that its numbers could not have been wrong, where the condition allows none."""
-    if found.verdict != "pass" or math.isnan(found.relative) or vector.condition * BOUND < 1:
+    if (
+        found.verdict != "pass"
+        or math.isnan(found.relative)
+        or vector.condition * physics_bound(vector.condition) < 1
+    ):
         return found
     return found._replace(
         why=f"the walls alone are graded: condition {vector.condition:.1g} allows no number"

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 from conformance import plain
 from conformance.mutants import of_laws, of_mouths, of_paths, of_phases, of_roots, of_stays, of_walls
-from conformance.plain.path import Captured, PlainPath
+from conformance.plain.flow import Captured, PlainPath
 from conformance.plain.step import Flight
 from scene import Outcome, Scene, State
 

@@ -21,14 +21,32 @@ from conformance.grading.grade import grade
 from conformance.mutants import MUTANTS, Mutant
 from conformance.plain.step import Flight
 from conformance.vectors import LEVELS, Vector, answer, load, manifest
-from scene import BadInput
+from scene import BadInput, from_data
 from scene.files import write_file
+from scene.tables import laws
 
 DATA = Path(__file__).parent  # it ships with the package: `suite.diagnosis` reads it
 DOCS = DATA.parent.parent / "docs"
 N_WITNESSES = 3
+LEAST_KILLS = 5  # of every mutant: one vector alone might be lost, or passed by luck
 PLAIN = Mutant("plain", "none", Flight)
 _graded: dict[tuple[str, bytes], str] = {}
+
+
+def is_plain_at(mutant: Mutant, vector: Vector) -> bool:
+    """Tell whether a mutant answers a vector as the plain stepper does, because its fault is not used.
+
+    A path is not followed by a step, and a law of a kind that the scene lacks is not evaluated.
+    """
+    if mutant.flight is Flight:
+        return vector.kind == "step"
+    others = {kind for kind, motion in Flight.kinds.items() if mutant.flight.kinds[kind] is not motion}
+    if not others:
+        return False
+    try:
+        return not {type(law) for law in laws(from_data(vector.scene)).values()} & others
+    except BadInput:
+        return True
 
 
 def verdict(mutant: Mutant, vector: Vector) -> str:
@@ -45,14 +63,15 @@ def verdict(mutant: Mutant, vector: Vector) -> str:
 
 def kills(vectors: Sequence[Vector], mutant: Mutant) -> list[str]:
     """Return the ids of the vectors that kill a mutant, in the order of the corpus."""
-    return [vector.id for vector in vectors if verdict(mutant, vector) == "fail"]
+    asked = (vector for vector in vectors if not is_plain_at(mutant, vector))
+    return [vector.id for vector in asked if verdict(mutant, vector) == "fail"]
 
 
 def witnesses(killing: Sequence[str], vectors: dict[str, Vector]) -> list[str]:
     """Choose the few vectors that a quick test needs: the easiest first, of different groups."""
     order = sorted(
         (vectors[name] for name in killing),
-        key=lambda v: (LEVELS.index(v.level), v.kind == "trajectory", v.collisions, v.id),
+        key=lambda v: (LEVELS.index(v.level), v.kind != "step", v.collisions, v.id),
     )
     chosen: dict[str, str] = {}
     for vector in order:
@@ -97,7 +116,8 @@ def table(found: dict[str, Any]) -> str:
         "# Kill matrix",
         "",
         f"{len(ordered)} mutants of the plain stepper against the {found['vectors']} vectors of corpus"
-        f" {found['corpus']}: {len(ordered) - len(found['survivors'])} killed by a `fail`."
+        f" {found['corpus']}: {len(ordered) - len(found['survivors'])} killed by a `fail`, each by"
+        f" {min(entry['kills'] for _, entry in ordered)} vectors or more."
         f" {found['vectors'] - len(idle)} vectors kill at least one. Written by `python -m"
         " conformance.mutants.kill_matrix`; conformance/mutants/kill-matrix.json has it by vector.",
         "",
@@ -118,7 +138,7 @@ def run(docs: Path = DOCS, data: Path = DATA, progress: Callable[[str], None] = 
     """Compute and write the matrix.
 
     Returns:
-        0 when every mutant is killed and the plain stepper by no vector, 1 otherwise.
+        0 when every mutant is killed by LEAST_KILLS vectors and the plain stepper by none, 1 otherwise.
     """
     vectors = load("stress")
     wrong = kills(vectors, PLAIN)
@@ -136,10 +156,10 @@ def run(docs: Path = DOCS, data: Path = DATA, progress: Callable[[str], None] = 
     docs.mkdir(parents=True, exist_ok=True)
     write_file(data / "kill-matrix.json", json.dumps(published, indent=1) + "\n")
     write_file(docs / "kill-matrix.md", table(published))
-    progress(
-        f"survivors: {', '.join(published['survivors']) or 'none'}; plain fails: {', '.join(wrong) or 'none'}"
-    )
-    return 1 if wrong or published["survivors"] else 0
+    weak = [name for name, killing in found.items() if len(killing) < LEAST_KILLS]
+    progress(f"killed by fewer than {LEAST_KILLS}: {', '.join(weak) or 'none'}")
+    progress(f"plain fails: {', '.join(wrong) or 'none'}")
+    return 1 if wrong or weak else 0
 
 
 if __name__ == "__main__":

@@ -13,7 +13,7 @@ from math import hypot
 from msgspec.structs import replace
 
 from conformance.mutants.of_laws import single
-from conformance.plain.path import PlainPath
+from conformance.plain.flow import PlainPath
 from conformance.plain.step import Flight
 from scene import Collision, Horizon, Outcome, Scene, State
 

@@ -11,7 +11,7 @@ from math import hypot
 
 from msgspec.structs import replace
 
-from conformance.plain.path import Captured, PlainPath, Stay, misses_mouth, width
+from conformance.plain.flow import Captured, PlainPath, Stay, misses_mouth, width
 from conformance.plain.step import SIDES, Flight
 from scene import Collision, Horizon, Mushroom, Outcome, State
 from scene.tables import laws

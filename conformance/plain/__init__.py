@@ -1,6 +1,6 @@
 """A plain stepper: scalar binary64, readable, and right; its mutants are in `conformance.mutants`."""
 
-from conformance.plain.path import Captured, PlainPath, flow, trajectory
+from conformance.plain.flow import Captured, PlainPath, flow, trajectory
 from conformance.plain.step import Flight, Gap, Open, next_collision
 
 __all__ = ["Captured", "Flight", "Gap", "Open", "PlainPath", "flow", "next_collision", "trajectory"]

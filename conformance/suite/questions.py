@@ -22,6 +22,7 @@ STANDING: tuple[Scene, ...] = (
     Cap(r=1.0),
     Stem(w=1.0, h=1.25),
 )
+BREATHING = Cap(r=Fourier(mean=1.0, cos=(0.1,), omega=1.0))
 MOVING: tuple[Scene, ...] = (
     Mushroom(
         r=Fourier(mean=1.0, cos=(0.1,), omega=1.0),
@@ -29,7 +30,7 @@ MOVING: tuple[Scene, ...] = (
         h=Fourier(mean=1.0, sin=(0.0, 0.1), omega=1.0),
         slope=Fourier(mean=0.1, cos=(0.05,), omega=1.0),
     ),
-    Cap(r=Fourier(mean=1.0, cos=(0.1,), omega=1.0)),
+    BREATHING,
     Stem(w=Fourier(mean=1.0, cos=(0.1,), omega=1.0), h=Fourier(mean=1.25, sin=(0.1,), omega=1.0), slope=0.1),
     *STANDING,
 )

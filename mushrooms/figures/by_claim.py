@@ -61,8 +61,8 @@ ALL = (
         "M7",
         "Width of the uncaptured peak against energy, with fitted powers, and the power as printed. "
         "Error bars are smaller than the marks.",
-        lambda s: laws.widths(_there(s, *LADDER[1:6]), _there(s, *ERGODIC)),
-        (*LADDER[1:6], *ERGODIC),
+        lambda s: laws.widths(_there(s, *LADDER[3:6]), _there(s, *ERGODIC[1:])),
+        (*LADDER[3:6], *ERGODIC[1:]),
     ),
     Picture(
         "M9",
@@ -74,8 +74,8 @@ ALL = (
     Picture(
         "X1",
         "Energies after one cycle, fixed cap. In theory (orange) the never captured share one energy,"
-        " dashed; black: the same theory with the finite-energy blur: what the never captured gather "
-        "through the cycle, and of it, for the captured, what they gather outside the cap.",
+        " dashed; black: the theory at this energy, with diffusion and lags from frozen tables and nothing "
+        "fitted.",
         lambda s: cycles.energies(_there(s, ACW, CW)),
         (ACW, CW),
     ),
@@ -94,8 +94,8 @@ ALL = (
     ),
     Picture(
         "X4",
-        "Many cycles: the centre and, on a logarithmic axis, the tails. The exact convolution leaves "
-        "the Gaussian there.",
+        "Many cycles: the centre and, on a logarithmic axis, the tails, with sums drawn from the theory at "
+        "this energy.",
         _sums,
         (N5X30,),
     ),
@@ -106,6 +106,20 @@ ALL = (
         "log E_nc. Parabolic orbits between the upright sides spread them far.",
         lambda s: cycles.stems(s["moving-cap@1e6"], s["untilted@1e6"]),
         ("moving-cap@1e6", "untilted@1e6"),
+    ),
+    Picture(
+        "X7",
+        "A loop without an interior that accelerates. Left: one parameter moves along the arc and back; "
+        "captures (blue) and their releases (orange), at the same V_ell/V_cap, lie at different V_cap/V. "
+        "Right: energies after one cycle, as in X1.",
+        lambda s: cycles.retraced(s["retraced-arc@1e6"]),
+        ("retraced-arc@1e6",),
+    ),
+    Picture(
+        "D1",
+        "How rare it is to end with less energy: the probability falls as exp(-n I).",
+        lambda s: cycles.losses(s[N5X30]),
+        (N5X30,),
     ),
     Picture(
         "L3",

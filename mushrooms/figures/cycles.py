@@ -11,20 +11,19 @@ from mpmath import fp
 from scipy.stats import norm
 
 import theory
-from conformance.audit.claims.broadened import predicted, summed
+from conformance.audit.claims.broadened import DRAWN_SEED, N_DRAWN, predicted, summed
 from conformance.audit.claims.finite_energy import width
 from conformance.audit.claims.misprints import volume_loop
 from conformance.audit.evidence import energies_of
 from conformance.audit.runs import scene_of
 from conformance.audit.samples import Sample
-from conformance.audit.tolerances import mean, spread
+from conformance.audit.tolerances import mean, share, spread
+from mushrooms.figures.energies import N_PLACES, draw, panels
 from mushrooms.figures.style import BLACK, BLUE, GREEN, ORANGE, SKY, FloatArray, new_figure, phase_colours
 from scene import load
 from scene.laws import value
 from scene.tables import Mushroom
 
-N_BINS = 80
-LEAST_EXPECTED = 5.0  # particles in a bin, to speak of standard errors
 N_SUM_BINS = 300
 N_LOOP = 240
 N_PHASES = 6
@@ -69,6 +68,32 @@ def _bars(axes: Axes, values: FloatArray, edges: FloatArray, n: int, **style: An
     return heights
 
 
+def retraced(sample: Sample) -> Figure:
+    """Draw the retraced arc in the plane of sec. 3.5, captures joined to their releases, and its energies."""
+    figure, (left, right) = new_figure(9.6, 3.6, 1, 2)
+    scene = scene_of(sample.run)
+    assert isinstance(scene, Mushroom)
+    left.plot(*volume_loop(scene, N_LOOP), color=BLACK, linewidth=1.2)
+    curve = theory.capture_curve(scene, 4 * N_PHASES + 1)
+    first = curve.t_in < curve.t_out.min()  # on the way back captures and releases change places
+    t_in, t_out = curve.t_in[first], curve.t_out[first]
+    for colour, label, times in ((BLUE, "captures", t_in), (ORANGE, "releases", t_out)):
+        left.plot(*_places(scene, times), "o", color=colour, markersize=5, label=label)
+    for pair in zip(t_in, t_out, strict=True):
+        left.plot(*_places(scene, np.array(pair)), color=BLUE, linewidth=0.8, linestyle=":")
+    left.set(xlabel="V_ell / V_cap", ylabel="V_cap / V", title=f"{sample.run.scene}, the way there")
+    left.legend(loc="best")
+    _energies(right, None, sample)
+    right.legend(loc="upper right", fontsize=7)
+    return figure
+
+
+def _places(scene: Mushroom, times: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return V_ell/V_cap and V_cap/V at times."""
+    now = [theory.volumes_at(fp, scene, t) for t in times.tolist()]
+    return np.array([v.v_ell / v.v_cap for v in now]), np.array([v.v_cap / (v.v_cap + v.v_stem) for v in now])
+
+
 def gain_of_capture() -> Figure:
     """Draw log E1/E0 against the time of capture, theory (the paper's figure beside its loop)."""
     figure, axes = new_figure(5.2, 3.2)
@@ -87,55 +112,22 @@ def gain_of_capture() -> Figure:
 
 def energies(samples: list[Sample]) -> Figure:
     """Draw histograms of log E1/E0 with theory over them, and below what is left, in standard errors."""
-    figure, _ = new_figure(4.8 * len(samples), 4.8)
-    figure.clear()
-    axes = figure.subplots(2, len(samples), height_ratios=[3, 1], sharex="col", squeeze=False)
-    for (panel, rest), sample in zip(axes.T, samples, strict=True):
+    figure, pairs = panels(len(samples))
+    for (panel, rest), sample in zip(pairs, samples, strict=True):
         _energies(panel, rest, sample)
-    axes[0, 0].legend(loc="best")
+    pairs[0][0].legend(loc="best")
     return figure
 
 
-def _energies(axes: Axes, rest: Axes, sample: Sample) -> None:
+def _energies(axes: Axes, rest: Axes | None, sample: Sample) -> None:
     prediction = theory.predict(scene_of(sample.run), 15)
-    found, centre = predicted(sample), float(prediction.log_e_nc)
-    sigma = found.peak[1] ** 0.5
-    low, high = (float(np.quantile(sample.gain, q)) for q in (0.0005, 0.9995))
-    edges = np.linspace(low - sigma, high + sigma, N_BINS + 1)
-    heights = _bars(axes, sample.gain, edges, sample.n)
-    counts, width_of_bin = heights * sample.n * (edges[1] - edges[0]), edges[1] - edges[0]
-    axes.errorbar(
-        (edges[1:] + edges[:-1]) / 2,
-        heights,
-        np.sqrt(counts) / (sample.n * width_of_bin),
-        fmt="none",
-        ecolor=BLUE,
-        elinewidth=0.7,
-    )
-    _residuals(rest, counts, np.diff(found.cdf(edges)) * sample.n, edges)
-    x = np.linspace(edges[0], edges[-1], 1500)
-    total = np.gradient(found.cdf(x), x)
-    axes.plot(x, total, color=BLACK, linewidth=1.3, label=f"theory at this energy, peak {sigma:.4f} wide")
+    title = f"{sample.run.scene}, E0 = {sample.run.energy:.0e}, {sample.n:,} particles"
+    edges = draw(axes, rest, sample.gain, predicted(sample), title)
+    x = np.linspace(edges[0], edges[-1], N_PLACES)
     sharp = np.diff(energies_of(sample.run.name).captured_below(x)) / np.diff(x)
     axes.plot((x[1:] + x[:-1]) / 2, sharp, color=ORANGE, linewidth=1.2, label="theory, captured, sharp")
+    centre = float(prediction.log_e_nc)
     axes.axvline(centre, color=ORANGE, linestyle="--", linewidth=1.2, label="theory, never captured")
-    axes.set(
-        xlim=(edges[0], edges[-1]),
-        ylim=(0, 1.15 * max(heights.max(), total.max())),
-        ylabel="density",
-        title=f"{sample.run.scene}, E0 = {sample.run.energy:.0e}, {sample.n:,} particles",
-    )
-
-
-def _residuals(axes: Axes, counts: FloatArray, expected: FloatArray, edges: FloatArray) -> None:
-    """Draw counts less those expected, in standard errors, where a bin expects enough for that to mean it."""
-    enough = expected >= LEAST_EXPECTED
-    left = np.where(enough, (counts - expected) / np.sqrt(np.where(enough, expected, 1.0)), np.nan)
-    axes.axhspan(-2, 2, color=SKY, alpha=0.5, linewidth=0)
-    axes.axhline(0, color=BLACK, linewidth=0.8)
-    axes.plot((edges[1:] + edges[:-1]) / 2, left, ".", color=BLUE, markersize=4)
-    reach = max(4.0, 1.1 * float(np.nanmax(np.abs(left)))) if enough.any() else 4.0
-    axes.set(xlabel="log E1/E0", ylabel="pull", ylim=(-reach, reach))
 
 
 def capture_times(samples: list[Sample]) -> Figure:
@@ -182,6 +174,35 @@ def _sum(axes: Axes, sample: Sample, n: int, scale: str) -> None:
         ylabel="density",
         title=f"n = {n}, E0 = {sample.run.energy:.0e}, {sample.n:,} particles",
     )
+
+
+def losses(sample: Sample) -> Figure:
+    """Draw the share with less energy than at first against the number of cycles."""
+    figure, axes = new_figure(5.6, 3.6)
+    scene = scene_of(sample.run)
+    n = np.arange(1, sample.run.n_cycles + 1)
+    found = predicted(sample).draw(sample.run.n_cycles, N_DRAWN // sample.run.n_cycles, DRAWN_SEED)
+    axes.plot(n, (found < 0).mean(axis=0), color=BLACK, linewidth=1.3, label="theory at this energy, drawn")
+    places = np.unique(np.geomspace(1, n[-1], 12).astype(int))
+    far = [theory.loss_probability(scene, int(k)) for k in places]
+    axes.plot(places, far, "s", color=ORANGE, markersize=4, label="theory at infinite energy")
+    rate = float(theory.rarity(scene).rate)
+    late = np.array([places[len(places) // 2], places[-1]])
+    axes.plot(
+        late, far[-1] * np.exp(rate * (late[-1] - late)), ":", color=ORANGE, label=f"exp(-{rate:.4f} n)"
+    )
+    shares = [share(sample.s[:, k - 1] < 0) for k in places]
+    errors = [one.error for one in shares]
+    values = [one.value for one in shares]
+    axes.errorbar(places, values, errors, fmt="o", color=BLUE, markersize=4, label="simulation")
+    axes.set(
+        yscale="log",
+        xlabel="cycles n",
+        ylabel="P(E_n < E0)",
+        title=f"{sample.run.name}, {sample.n:,} particles",
+    )
+    axes.legend(fontsize=8)
+    return figure
 
 
 def ergodic(sample: Sample) -> Figure:

@@ -33,6 +33,7 @@ PAPER = "https://arxiv.org/abs/1305.2624"
 GROUPS = {
     "Claims, in the paper's order": "XLC",
     "Misprints and gaps": "M",
+    "Beyond the paper": "D",
     "Formulas and identities, one by one": "IN",
 }
 # A verdict is told by its sign and its word, and coloured: paper right, paper wrong, not decided.

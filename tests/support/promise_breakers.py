@@ -142,7 +142,7 @@ def one_too_few(request: Line, found: Line) -> Line:
 
 
 def tired(after: int) -> Callable[[Line, Line], Line]:
-    """Lose a millionth of the speed at a bounce of a trajectory, and at no other; what follows is honest."""
+    """Lose 1e-5 of the speed at a bounce of a trajectory, and at no other; what follows is honest."""
 
     def change(request: Line, found: Line) -> Line:
         steps = found["steps"]
@@ -259,6 +259,7 @@ FAULTS: dict[str, tuple[str, str, Fault]] = {
     "one-too-few": ("long-trajectory", "fail", on("trajectory", one_too_few)),
     "tired-at-50": ("long-trajectory", "fail", on("trajectory", tired(50))),
     "tired-at-450": ("long-trajectory", "fail", on("trajectory", tired(450))),
+    "tired-at-1000": ("long-trajectory", "fail", on("trajectory", tired(1000))),
     "never-captured": ("flow-arrivals", "fail", captured_as(lambda _, __: None)),
     "captured-from-the-start": (
         "flow-arrivals",

@@ -39,11 +39,14 @@ def remembered(seed: int | None, groups: Sequence[str]) -> dict[str, dict[str, A
     for vector in (v for v in vectors.load("stress") if v.group in groups):
         disguise = Disguise() if seed is None else drawn_disguise(vector, seed)
         inverse = disguise._replace(length=-disguise.length, time=-disguise.time)
-        found[_key(vectors.request(asked(vector, disguise), 0))] = published(_answer(vector), inverse)
+        found[_key(vectors.request(asked(vector, disguise), 0))] = published(
+            certified_answer(vector), inverse
+        )
     return found
 
 
-def _answer(vector: vectors.Vector) -> dict[str, Any]:
+def certified_answer(vector: vectors.Vector) -> dict[str, Any]:
+    """Return the answer in the middle of the enclosures, rounded, as it comes over the wire."""
     steps = msgspec.to_builtins(middle(vector.expect[0], vector.state))
     if vector.kind == "trajectory":
         return {"steps": steps}

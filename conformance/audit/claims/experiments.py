@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-from scipy.stats import ks_2samp
+from scipy.stats import ks_2samp, norm
 
 from conformance.audit.claims import many_cycles
 from conformance.audit.claims.broadened import (
@@ -24,6 +24,7 @@ from conformance.audit.tolerances import (
     LEVEL,
     FloatArray,
     above,
+    chance,
     close,
     critical_gap,
     fits,
@@ -86,7 +87,10 @@ def peak_shape(sample: Sample) -> Check:
     """Test the uncaptured peak against the predicted one."""
     kept, found = sample.gain[~sample.captured], predicted(sample)
     what = f"{sample.run.name}: log E1/E0 of the never captured"
-    return fits(what, kept, found.free_cdf, band=peak_band(sample), scale=0.2)
+    s_nc, sigma = found.s_nc, found.peak[1] ** 0.5
+    still = chance(kept, lambda s: np.asarray(norm.cdf(s, s_nc, sigma)))
+    note = f"of a Gaussian at log E_nc {still:.1g}"
+    return fits(what, kept, found.free_cdf, band=peak_band(sample), scale=0.2, note=note)
 
 
 def peak_width(sample: Sample) -> Check:
@@ -102,7 +106,9 @@ def captured_energies(sample: Sample) -> Check:
     values, what = sample.gain[sample.captured], f"{sample.run.name}: log E1/E0 of the captured"
     if len(values) < 2:
         return Check(what, None, "a sample", n_tests=1, note="no particles")
-    return fits(what, values, predicted(sample).captured_cdf, band=captured_band(sample), scale=0.2)
+    note = f"of the adiabatic theory {chance(values, adiabatic(sample).captured_cdf):.1g}"
+    found = predicted(sample)
+    return fits(what, values, found.captured_cdf, band=captured_band(sample), scale=0.2, note=note)
 
 
 def one_cycle(evidence: ClaimEvidence, runs: tuple[str, ...]) -> Iterator[Check]:
@@ -294,4 +300,6 @@ CHECKS = {
     "X6": untilted,
     "X7": trivial_loops,
     "X8": both_ways,
+    "C1": many_cycles.independence,
+    "D1": many_cycles.losses,
 }

@@ -1,4 +1,4 @@
-"""Many cycles: X4, the sum of n cycles against sums drawn from the theory of one, and against a Gaussian."""
+"""Many cycles: X4, C1 and D1, sums of cycles against sums drawn from the theory of one, and a Gaussian."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 from scipy.stats import norm
 
 import theory
-from conformance.audit.claims.broadened import N_DRAWN, PEAK_DENSITY, predicted, summed
+from conformance.audit.claims.broadened import DRAWN_SEED, N_DRAWN, PEAK_DENSITY, predicted, summed
 from conformance.audit.evidence import ClaimEvidence, energies_of
 from conformance.audit.finding import Check
 from conformance.audit.runs import RUNS, scene_of
@@ -19,12 +19,15 @@ from conformance.audit.tolerances import (
     Mean,
     close,
     critical_gap,
+    exact,
     fits,
     mean,
     share,
     spread,
     stated,
 )
+
+MANY = ("moving-cap@1e5x30", "moving-cap@1e7x10")
 
 
 def sums(evidence: ClaimEvidence) -> Iterator[Check]:
@@ -82,3 +85,55 @@ def _tails(run: str, n: int, cumulants: list[float]) -> tuple[bool, str, str]:
     ratios = left / normal, (1 - right) / normal
     text = f"beyond 3 sd: {ratios[0]:.2f} and {ratios[1]:.2f} times the Gaussian's"
     return bool(max(abs(ratio - 1) for ratio in ratios) > 0.1), text, "another mass"
+
+
+def independence(evidence: ClaimEvidence) -> Iterator[Check]:
+    """C1: cycles are independent, so log E_n/E0 is a sum of as many like variables."""
+    for sample in evidence.samples(*MANY):
+        n, run = sample.run.n_cycles, sample.run.name
+        drawn = _gains(predicted(sample).draw(n, N_DRAWN // n, DRAWN_SEED))
+        for label, first, second in (
+            ("one", slice(None, -1), slice(1, None)),
+            ("two", slice(None, -2), slice(2, None)),
+        ):
+            gains = _gains(sample.s)
+            theirs = _correlation(drawn[:, first], drawn[:, second])
+            what = f"{run}: correlation of the gains of cycles {label} apart"
+            ours = _correlation(gains[:, first], gains[:, second])
+            yield close(what, ours, theirs.value, band=N_SIGMA * theirs.error, scale=0.1)
+        ratio = spread(sample.s[:, -1]).over(spread(sample.s[:, 0]))
+        theirs = spread(drawn.sum(axis=1)).over(spread(drawn[:, 0]))
+        what = f"{run}: spread of log E_n/E0 over that of one cycle, sqrt(n) but for the first's wider blur"
+        yield close(what, ratio, theirs.value, band=N_SIGMA * theirs.error, scale=n**0.5 / 4)
+
+
+def _gains(s: FloatArray) -> FloatArray:
+    return np.diff(s, axis=1, prepend=0.0)
+
+
+def _correlation(x: FloatArray, y: FloatArray) -> Mean:
+    """Return the correlation of two columns of numbers, its error that of independent ones."""
+    return Mean(float(np.corrcoef(x.ravel(), y.ravel())[0, 1]), x.size**-0.5)
+
+
+def losses(evidence: ClaimEvidence) -> Iterator[Check]:
+    """D1: how many end with less energy than they began with."""
+    scene = scene_of(RUNS[MANY[0]])
+    one, other = theory.rarity(scene), theory.rarity(theory.reversed_cycle(scene))
+    what = "P(E_n < E0) falls as exp(-n I), and so does the reverse's: I by theory"
+    yield exact(what, other.rate, one.rate, 1e-14)
+    for sample in evidence.samples(*MANY):
+        for n in sorted({1, 10, sample.run.n_cycles}):
+            lost, sums = share(sample.s[:, n - 1] < 0), summed(sample.run.name, n)
+            theirs = share(sums.values < 0)
+            adiabatic = theory.loss_probability(scene, n)
+            # Who ends near E0 is moved across it by what finite energy leaves out.
+            near = float(np.mean(np.abs(sums.values) < 0.05)) / 0.1
+            yield close(
+                f"{sample.run.name}: share with less energy after {n} cycles",
+                lost,
+                theirs.value,
+                band=N_SIGMA * theirs.error + near * n * predicted(sample).next_order.mean_s,
+                scale=0.2,
+                note=f"{adiabatic:.4f} at infinite energy",
+            )

@@ -1,0 +1,56 @@
+"""What the figures of `mushrooms theory` are, in a line each, and those of finite energy."""
+
+from __future__ import annotations
+
+from scene import Scene
+
+# s = log E1/E0 over one cycle.
+FIGURES = {
+    "p_nc": "probability of never being captured in a cycle (eq. ps)",
+    "m1": "mean of s = log E1/E0 over a cycle (eq. Erate)",
+    "log_e_nc": "s of those never captured (eq. lnEnc/E0)",
+    "sd": "standard deviation of s",
+    "mean_exp_minus": "mean of E0/E1: 1 for every cycle, phase volume is kept",
+    "mean_exp_plus": "mean of E1/E0, by which the mean energy grows",
+    "energy": "initial energy of what follows",
+    "p_nc_at": "p_nc at this energy: those who lag are captured more or less likely",
+    "m1_at": "mean of s at this energy: diffusion and lags raise or lower it",
+    "sd_at": "standard deviation of s at this energy",
+    "peak_at": "mean s of the never captured at this energy",
+    "peak_width_at": "standard deviation of the s of the never captured, about E0^(-1/4)",
+    "captured_at": "mean s of the captured at this energy; - without any",
+    "p_nc_left_out": "next order of p_nc_at",
+    "m1_left_out": "next order of m1_at",
+    "peak_left_out": "next order of peak_at",
+    "peak_width_left_out": "next order of peak_width_at",
+}
+
+
+def at_energy(scene: Scene, energy: float) -> dict[str, float | None]:
+    """Return the figures of one cycle at an initial energy.
+
+    Raises:
+        NotCovered: no frozen rates of the scene are known.
+    """
+    import theory
+
+    found = theory.at_energy(scene, energy)
+    (peak, variance), left = found.peak, found.next_order
+    figures = {
+        "energy": energy,
+        "p_nc_at": found.p_nc,
+        "m1_at": found.mean_s,
+        "sd_at": found.variance_s**0.5,
+        "peak_at": peak,
+        "peak_width_at": variance**0.5,
+        "captured_at": found.captured_mean if found.p_nc < 1 else None,
+        "p_nc_left_out": left.p_nc,
+        "m1_left_out": left.mean_s,
+        "peak_left_out": left.peak_mean,
+        "peak_width_left_out": variance**0.5 * left.variance / 2,
+    }
+    digits = {name: 2 if name.endswith("_left_out") else 7 for name in figures}
+    return {
+        name: None if number is None else float(f"{number:.{digits[name]}g}")
+        for name, number in figures.items()
+    }

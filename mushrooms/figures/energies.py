@@ -1,0 +1,103 @@
+"""Histograms of log E1/E0 after one cycle, the theory at that energy over them, and what is left below."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib import rc_context
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+import theory
+from mushrooms.figures.style import BLACK, BLUE, ORANGE, SKY, STYLE, FloatArray, new_figure
+from scene import Mushroom, Scene
+from scene.refusal import BadInput
+
+N_BINS = 80
+N_PLACES = 1500
+LEAST_EXPECTED = 5.0  # particles in a bin, to speak of standard errors
+TAIL = 0.0005  # left out at either side
+
+
+def panels(n: int) -> tuple[Figure, list[tuple[Axes, Axes]]]:
+    """Return a figure of n histograms side by side, each with a panel for residuals below it."""
+    figure, _ = new_figure(4.8 * n, 4.8)
+    figure.clear()
+    grid = figure.subplots(2, n, height_ratios=[3, 1], sharex="col", squeeze=False)
+    return figure, [(above, below) for above, below in grid.T]
+
+
+@rc_context(STYLE)
+def histogram(scene: Scene, energy: float, gain: FloatArray, title: str) -> Figure:
+    """Draw one ensemble's log E1/E0 after a cycle; the theory over it, where it covers the scene.
+
+    Args:
+        scene: that was simulated.
+        energy: of every start [length^2 / time^2].
+        gain: (n,) log E1/E0.
+        title: of the figure.
+    """
+    found = known(scene, energy)
+    if found is None:
+        figure, axes = new_figure(4.8, 3.6)
+        _bars(axes, gain, _edges(gain, 0.0))
+        axes.set(xlabel="log E1/E0", ylabel="density", title=title)
+        return figure
+    figure, [(axes, rest)] = panels(1)
+    draw(axes, rest, gain, found, title)
+    axes.axvline(float(found.peak[0]), color=ORANGE, linestyle="--", label="theory, never captured")
+    axes.legend(loc="best")
+    return figure
+
+
+def known(scene: Scene, energy: float) -> theory.FiniteEnergy | None:
+    """Return the theory of a scene at an energy; None where it covers no such scene."""
+    try:
+        return theory.at_energy(scene, energy) if isinstance(scene, Mushroom) else None
+    except (BadInput, theory.NotCovered, theory.NotConverged):
+        return None
+
+
+def draw(
+    axes: Axes, rest: Axes | None, gain: FloatArray, found: theory.FiniteEnergy, title: str
+) -> FloatArray:
+    """Draw a histogram, the theory over it, residuals into `rest` if there is one; return its edges."""
+    sigma = float(found.peak[1] ** 0.5)
+    edges = _edges(gain, sigma)
+    heights = _bars(axes, gain, edges)
+    if rest is None:
+        axes.set(xlabel="log E1/E0")
+    else:
+        _residuals(rest, heights * len(gain) * np.diff(edges), np.diff(found.cdf(edges)) * len(gain), edges)
+    x = np.linspace(edges[0], edges[-1], N_PLACES)
+    total = np.gradient(found.cdf(x), x)
+    axes.plot(x, total, color=BLACK, linewidth=1.3, label=f"theory at this energy, peak {sigma:.4f} wide")
+    top = 1.15 * max(float(heights.max()), float(total.max()))
+    axes.set(xlim=(edges[0], edges[-1]), ylim=(0, top), ylabel="density", title=title)
+    return edges
+
+
+def _edges(gain: FloatArray, sigma: float) -> FloatArray:
+    low, high = (float(np.quantile(gain, q)) for q in (TAIL, 1 - TAIL))
+    return np.linspace(low - sigma, max(high + sigma, low - sigma + 1e-9), N_BINS + 1)
+
+
+def _bars(axes: Axes, gain: FloatArray, edges: FloatArray) -> FloatArray:
+    """Draw densities with their standard errors, and return them."""
+    n, widths = len(gain), np.diff(edges)
+    counts = np.histogram(gain, edges)[0]
+    heights: FloatArray = counts / (n * widths)
+    axes.stairs(heights, edges, fill=True, color=SKY, label="simulation")
+    bars = np.sqrt(counts) / (n * widths)
+    axes.errorbar((edges[1:] + edges[:-1]) / 2, heights, bars, fmt="none", ecolor=BLUE, elinewidth=0.7)
+    return heights
+
+
+def _residuals(axes: Axes, counts: FloatArray, expected: FloatArray, edges: FloatArray) -> None:
+    """Draw counts less those expected, in standard errors, where a bin expects enough for that to mean it."""
+    enough = expected >= LEAST_EXPECTED
+    left = np.where(enough, (counts - expected) / np.sqrt(np.where(enough, expected, 1.0)), np.nan)
+    axes.axhspan(-2, 2, color=SKY, alpha=0.5, linewidth=0)
+    axes.axhline(0, color=BLACK, linewidth=0.8)
+    axes.plot((edges[1:] + edges[:-1]) / 2, left, ".", color=BLUE, markersize=4)
+    reach = max(4.0, 1.1 * float(np.nanmax(np.abs(left)))) if enough.any() else 4.0
+    axes.set(xlabel="log E1/E0", ylabel="pull", ylim=(-reach, reach))

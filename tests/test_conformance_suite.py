@@ -199,7 +199,9 @@ def test_what_must_be_refused_is_asked_of_all():
 
 
 def test_the_reference_passes(monkeypatch):
-    known = [v for v in vectors.load("core") if v.expect[0].steps and v.group != "hard-case-14"][::100]
+    offered = [v for v in vectors.load("core") if v.kind != "flow"]
+    known = [v for v in offered if v.expect[0].steps and v.group != "hard-case-14"][::100]
+    monkeypatch.setattr(promises, "ask_promises", lambda _: iter(()))
     monkeypatch.setattr(suite, "N_STATES", 0)
     monkeypatch.setattr(suite, "drawn_horizons", lambda *_: [])
     monkeypatch.setattr(suite, "measure_speed", lambda _: None)

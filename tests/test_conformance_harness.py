@@ -50,13 +50,10 @@ def test_an_example_passes_at_level_core(language, commands, monkeypatch, tally)
     run = suite.check(command, seed=1)
     assert run.objections() == []
     assert run.exit_code() == 0
-    lacking = {result.id for result in run.results if result.verdict == "unsupported"}
-    assert {name for name in lacking if "property" not in name} <= {
-        "promise/flow-alone",
-        "promise/flow-arrivals",
-    }
+    lacking = [result for result in run.results if result.verdict == "unsupported"]
+    assert {result.why for result in lacking if result.group != "property"} <= {"profile flow"}
     assert set(run.counts()) <= {"pass", "declined", "unsupported"}
-    assert run.counts()["declined"] <= 3
+    assert run.counts()["declined"] <= max(3, len(chosen) // 100)
     assert run.precision() in ("A", "B")
     assert run.n_restarts == 0
     assert run.stderr == ""

@@ -17,6 +17,7 @@ from scene.geometry import rounded
 def opened(monkeypatch):
     """Return what opens a session with a faulty implementation."""
     monkeypatch.setattr(timing, "N_TRIES", 2)
+    monkeypatch.setattr(timing, "READABLE", 0.1)
 
     def start(fault) -> Session:
         monkeypatch.setattr(session, "Process", lambda *_: Breaker(fault))

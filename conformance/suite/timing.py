@@ -27,11 +27,12 @@ from conformance.suite.questions import (
     question,
 )
 from conformance.suite.session import Session, read_outcome
-from scene import Collision, Scene, State, Stem, Undecided
+from scene import Collision, Mushroom, Scene, State, Stem, Undecided
 
 N_STEPS = 60  # collisions of the trajectory that `time` and `trajectory` both follow
 NEAR = 1e-6  # of sizes; see conformance.suite.promises
 FAR = 10.0  # factor between flight times, of the first collisions and of all: energy may grow or fall
+LATE = 1e-3  # of time, after many collisions where motion is regular
 ON_WALL = 1e-9  # of the table's size
 READABLE = 0.02  # seconds that a question must take here, so that delays of milliseconds do not matter
 MAX_COLLISIONS, MAX_REPEAT = 20_000, 1000
@@ -125,6 +126,11 @@ def honest_clock(session: Session) -> str:
     while many.seconds < AMPLE * one.seconds and repeat < MAX_REPEAT:
         repeat = min(4 * repeat, MAX_REPEAT)
         many = timed(session, scene, state, n, repeat)
+    truth = last_collision(session, scene, state, n)
+    if not isinstance(scene, Mushroom) and abs(many.last.t - truth.t) > LATE * abs(truth.t - state.t):
+        raise Trouble(
+            "fail", f"{n} collisions last to {many.last.t:.6g} by time, to {truth.t:.6g} by trajectory"
+        )
     objection = ""
     for i in range(N_TRIES):
         ones = [timed(session, scene, _other(state, 3 * i + k), n, 1) for k in range(3)]

@@ -228,11 +228,15 @@ def remembering() -> Fault:
     return fault
 
 
-def fewer(request: Line, answer: Callable[[Line], Line]) -> Line:
-    """Follow half of the collisions only, when more than a few are asked for."""
-    if request.get("cmd") == "time" and request["collisions"] > 8:
-        request["collisions"] //= 2
-    return answer(request)
+def fewer(most: int) -> Fault:
+    """Follow half of the collisions only, when many are asked for."""
+
+    def fault(request: Line, answer: Callable[[Line], Line]) -> Line:
+        if request.get("cmd") == "time" and request["collisions"] > most:
+            request["collisions"] //= 2
+        return answer(request)
+
+    return fault
 
 
 def elsewhere(_: Line, found: Line) -> Line:
@@ -270,7 +274,8 @@ FAULTS: dict[str, tuple[str, str, Fault]] = {
     "without-slope": ("flow-arrivals", "fail", without_slope("flow")),
     "slope-of-single-steps": ("trajectory-steps", "fail", without_slope("trajectory")),
     "frozen-after-50": ("flow-arrivals", "fail", frozen_after(50)),
-    "fewer": ("time-steps", "fail", fewer),
+    "fewer": ("time-steps", "fail", fewer(8)),
+    "fewer-of-many": ("time-clock", "fail", fewer(100)),
     "elsewhere": ("time-steps", "fail", on("time", elsewhere)),
     "no-time": ("time-clock", "fail", ns(lambda _, said: [0] * len(said))),
     "a-tenth": ("time-clock", "fail", ns(lambda _, said: [n // 10 for n in said])),

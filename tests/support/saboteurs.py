@@ -42,12 +42,14 @@ def run(name: str) -> None:
     for line in sys.stdin:
         try:
             request = json.loads(line)
-        except ValueError:
-            say({"seq": None, "outcome": "rejected", "reason": "no JSON"})
+            where = request["cmd"]
+            if where == "step":
+                where = "step" if "vy" in request["state"] else "reject"
+            elif where not in ("start", "echo", "stop"):
+                raise ValueError(where)
+        except (ValueError, TypeError, KeyError):
+            say({"seq": None, "outcome": "rejected", "reason": "no request"})
             continue
-        where = request["cmd"]
-        if where == "step":
-            where = "step" if "vy" in request["state"] else "reject"
         if where == "step":
             asked.append(request["seq"])
         (fault if where == place else say)(honest_answer(where, request))

@@ -14,9 +14,8 @@ from pathlib import Path
 
 from conformance.bench import baselines
 from conformance.bench.time_stepping import TOLERANCES, next_collision_by
-from conformance.plain.path import PlainPath, flow
-from conformance.vectors import Step
-from scene import BadInput, Outcome
+from conformance.plain.flow import Captured, Step, carried
+from scene import BadInput, Outcome, Scene, State
 from scene.protocol.wire import serve
 
 FLAGS = ("-O3", "-march=native")
@@ -49,14 +48,10 @@ def main(arguments: Sequence[str]) -> None:
         raise BadInput(f"NAME = {name!r}, must be one of {', '.join(NAMES)}")
     step = NAMES[name]()
 
-    class BaselinePath(PlainPath):
-        """A path by this baseline's steps."""
+    def flow(scene: Scene, states: Sequence[State], t_end: float) -> list[tuple[Outcome, Captured]]:
+        return [carried(step, scene, state, t_end) for state in states]
 
-        def flown(self) -> Outcome:
-            return step(self.scene, self.state, self.t_end)
-
-    carry = partial(flow, path=BaselinePath)
-    serve(name, step, partial(baselines.followed, step), sys.stdin.buffer, sys.stdout.buffer, flow=carry)
+    serve(name, step, partial(baselines.followed, step), sys.stdin.buffer, sys.stdout.buffer, flow=flow)
 
 
 if __name__ == "__main__":

@@ -177,13 +177,7 @@ def simulate(
     On stderr: before a run of over 20 s about how many collisions and how long; after a run of over a
     second that careful steps took over a tenth of it, if they did.
     """
-    if not (math.isfinite(energy) and energy > 0):
-        raise BadInput(f"--energy = {energy}, must be finite and > 0")
-    _check_range("--particles", particles, 1, MAX_PARTICLES)
-    _check_range("--cycles", cycles, 1)
-    check_seed(seed, "--seed")
-    if threads is not None:
-        _check_range("--threads", threads, 1)
+    _check_ensemble(particles, energy, cycles, seed, threads)
     if plot is not None:
         if cycles != 1:
             raise BadInput(f"--cycles = {cycles}, must be 1 for --plot")
@@ -206,6 +200,16 @@ def simulate(
         if plot is not None:
             _plot(plot, table, table.name or scene, ensemble)
     _print_pairs(summary, as_json)
+
+
+def _check_ensemble(particles: int, energy: float, cycles: int, seed: int, threads: int | None) -> None:
+    if not (math.isfinite(energy) and energy > 0):
+        raise BadInput(f"--energy = {energy}, must be finite and > 0")
+    _check_range("--particles", particles, 1, MAX_PARTICLES)
+    _check_range("--cycles", cycles, 1)
+    check_seed(seed, "--seed")
+    if threads is not None:
+        _check_range("--threads", threads, 1)
 
 
 def _plot(path: Path, table: scenes.Scene, name: str, ensemble: Any) -> None:

@@ -7,13 +7,14 @@ same ones, of those that it was asked, probably has the same fault, or one near 
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Sequence
 from importlib import resources
 
 from conformance.suite.result import Result
 
-ALIKE = 0.5  # least share that common failures have of all failures of the two
-NEARLY = 0.9  # of the likest one's share, that another must have to be named beside it
+ALIKE = 0.5  # least correlation of two verdicts over the vectors asked
+NEARLY = 0.9  # of the likest one's correlation, that another must have to be named beside it
 MAX_NAMED = 3
 
 
@@ -32,7 +33,7 @@ def diagnose(results: Sequence[Result]) -> list[str]:
     for vector, names in matrix["killed_by"].items():
         for name in names if vector in asked else ():
             killed[name].add(vector)
-    scores = {name: len(failed & own) / len(failed | own) for name, own in killed.items()}
+    scores = {name: _correlation(failed, own, len(asked)) for name, own in killed.items()}
     likest = sorted(scores, key=lambda name: -scores[name])[:MAX_NAMED]
     return [
         f"like {name} on {len(failed & killed[name])} of {len(failed)} failures (it has"
@@ -40,3 +41,14 @@ def diagnose(results: Sequence[Result]) -> list[str]:
         for name in likest
         if scores[name] >= max(ALIKE, NEARLY * scores[likest[0]])
     ]
+
+
+def _correlation(failed: set[str], killed: set[str], n: int) -> float:
+    """Return the correlation of two failures over n vectors: what neither fails counts too.
+
+    Without it a mutant that fails everything would be like every stepper that fails much.
+    """
+    both, neither = len(failed & killed), n - len(failed | killed)
+    one, other = len(failed) - both, len(killed) - both
+    spread = len(failed) * len(killed) * (neither + one) * (neither + other)
+    return (both * neither - one * other) / math.sqrt(spread) if spread else float(failed == killed)

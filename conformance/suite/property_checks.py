@@ -212,13 +212,15 @@ def _flow(session: Session) -> profiles.Flow:
             arrived = answer.get("states")
             if arrived is None or len(arrived) != len(batch):
                 raise Trouble("wrong-format", f"flow of {len(batch)} states was answered {answer}"[:200])
-            found += [_arrival(data) for data in arrived]
+            found += [_arrival(data, t_end) for data in arrived]
         return found
 
     return flow
 
 
-def _arrival(data: dict[str, object]) -> tuple[Outcome, Captured]:
+def _arrival(data: dict[str, object], t_end: float) -> tuple[Outcome, Captured]:
     captured = data.pop("captured", None)
     outcome: Outcome = msgspec.convert(data, Outcome)
+    if isinstance(outcome, Horizon) and not math.isclose(outcome.t, t_end, rel_tol=properties.BOUND):
+        raise Trouble("fail", f"a flow to t_end = {t_end!r} is answered at t = {outcome.t!r}")
     return outcome, captured if isinstance(outcome, Horizon) else None  # type: ignore[return-value]

@@ -74,6 +74,7 @@ ENTRIES = {
     "FiniteEnergy.captured_cdf": (lambda **given: finite().captured_cdf(**given), {"s": [0.0]}),
     "FiniteEnergy.capture_cdf": (lambda **given: finite().capture_cdf(**given), {"t": [0.0]}),
     "FiniteEnergy.zone": (lambda **given: finite().zone(**given), {"times": [0.0]}),
+    "FiniteEnergy.at_capture": (lambda **given: finite().at_capture(**given), {"times": [0.0]}),
     "FiniteEnergy.mean_of_exp": (lambda **given: finite().mean_of_exp(**given), {"q": 0.5}),
     "FiniteEnergy.draw": (lambda **given: finite().draw(**given), {"n_cycles": 2, "n": 3, "seed": 4}),
     "peak_width": (theory.peak_width, {"s": [0.0]}),

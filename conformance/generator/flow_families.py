@@ -34,6 +34,7 @@ MANY = 64  # of a flow with several stays
 # See `VectorFamily.first_attempts`.
 STAYS_AT = (23, 75, 509, 399, 88, 82, 182, 134, 132, 3, 297, 157)
 AT_THE_END_AT = (17, 0, 0, 2, 13, 0, 0, 5, 7, 8)
+LONGEST_AT = (0, 0, 1, 0, 2)
 LONG_AT = (2, 1, 2, 0, 5, 1, 2, 3, 0, 1, 1, 0, 0, 2, 1, 2)
 INTERRUPTED_AT = (45, 91, 9, 65, 5, 125, 8, 132)
 REGULAR = ("breathing-circle", "frozen-mushroom", "moving-cap", "fixed-cap-clockwise", "fermi-ulam")
@@ -53,8 +54,8 @@ def flow_families() -> list[VectorFamily]:
         VectorFamily("flow-stay-at-the-end", 10, _stay_at_the_end, None, AT_THE_END_AT),
         VectorFamily("flow-brief", 10, _brief),
         VectorFamily("long-flow", 16, _long, None, LONG_AT),
-        VectorFamily("longest-flow", 5, _longest),
-        VectorFamily("long-trajectory", 3, _long_trajectory),
+        VectorFamily("longest-flow", 5, _longest, None, LONGEST_AT),
+        VectorFamily("long-trajectory", 5, _long_trajectory),
     ]
 
 

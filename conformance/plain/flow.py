@@ -22,6 +22,8 @@ class PlainPath:
     A mutant that errs along the way, and not in a single flight, overrides a method.
     """
 
+    most = MAX_COLLISIONS  # up to t_end
+
     def __init__(self, scene: Scene, state: State, t_end: float, step: Step = next_collision) -> None:
         self.scene, self.state, self.t_end, self.step = scene, state, t_end, step
         self.n_hits = 0
@@ -65,12 +67,12 @@ class PlainPath:
 
     def arrival(self) -> tuple[Outcome, Captured]:
         """Carry the particle to t_end, and return its first captured stay too."""
-        for _ in range(MAX_COLLISIONS):
+        for _ in range(self.most):
             outcome = self.advance()
             if not isinstance(outcome, Collision):
                 break
         else:
-            outcome = Undecided(f"more than {MAX_COLLISIONS} collisions")
+            outcome = Undecided(f"more than {self.most} collisions")
         self.close(self.t_end)
         return outcome, self.stays[0] if self.stays else None
 

@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 from conformance import suite
 from conformance.bench.serve import NAMES
-from conformance.harness.examples import find_examples
+from conformance.harness.examples import find_examples, find_kit_examples
 from conformance.suite.result import Run
 from conformance.suite.session import Limits
 from scene.files import write_file
@@ -35,7 +35,7 @@ KINDS = {
 HEAD = """# Scoreboard
 
 Level core of corpus {corpus}, seed {seed}: `python -m conformance.bench.scoreboard` makes this page anew. The
-first two are ours; the examples are in `conformance/harness/`; the rest is what most people would write, from
+first two are ours; the examples and the engines behind the adapter kits are in `conformance/harness/`; the rest is what most people would write, from
 the benchmark (`python -m conformance.bench.serve NAME` puts each behind the protocol): event-driven Newton
 without checks in C and numba, fixed time steps of a tenth to a thousandth of a flight, scipy's `solve_ivp`
 with events. A precision class is of the answers that passed, few as they may be.
@@ -59,6 +59,8 @@ def commands(folder: Path) -> Iterator[tuple[str, tuple[str, ...], str]]:
         yield name, (sys.executable, "-m", module), ""
     for language, example in find_examples(folder).items():
         yield f"example in {language}", example.command, example.why_not
+    for engine, example in find_kit_examples(folder).items():
+        yield f"kit, {engine}", example.command, example.why_not
     for name in (name for name in NAMES if name not in LEFT_OUT):
         yield name, (sys.executable, "-m", "conformance.bench.serve", name), ""
 

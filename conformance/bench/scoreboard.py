@@ -34,11 +34,12 @@ KINDS = {
 }
 HEAD = """# Scoreboard
 
-Level core of corpus {corpus}, seed {seed}: `python -m conformance.bench.scoreboard` makes this page anew. The
-first two are ours; the examples and the engines behind the adapter kits are in `conformance/harness/`; the rest
-is what most people would write, from the benchmark (`python -m conformance.bench.serve NAME` puts each behind
-the protocol): event-driven Newton without checks in C and numba, fixed time steps of a tenth to a thousandth of
-a flight, scipy's `solve_ivp` with events. A precision class is of the answers that passed, few as they may be.
+Level core of corpus {corpus}, seed {seed}: `python -m conformance.bench.scoreboard` makes this page
+anew. The first two are ours; the examples and the engines behind the adapter kits are in
+`conformance/harness/`; the rest is what most people would write, from the benchmark (`python -m
+conformance.bench.serve NAME` puts each behind the protocol): event-driven Newton without checks in
+C and numba, fixed time steps of a tenth to a thousandth of a flight, scipy's `solve_ivp` with
+events. A precision class is of the answers that passed, few as they may be.
 
 | stepper | verdict | pass | fail | other | A/B/C | seconds |
 | --- | --- | ---: | ---: | ---: | ---: | ---: |

@@ -51,7 +51,7 @@ def test_mutant_is_killed_by_its_witnesses(vectors, name):
     assert entry["witnesses"]
     for witness in entry["witnesses"]:
         assert verdict(MUTANTS[name], vectors[witness]) == "fail", witness
-        assert verdict(PLAIN, vectors[witness]) == "pass", witness
+        assert verdict(PLAIN, vectors[witness]) in ("pass", "declined"), witness
 
 
 def test_plain_fails_no_vector(vectors):

@@ -49,7 +49,12 @@ N_STEPS, N_TRAJECTORIES, N_FLOWS = 36, 4, 4  # made again, bit for bit
 DIGEST_OF_1_0 = "7b4dfba08bb334232cba9faca64601138b9b7b53a4b45b5984747379d26c70eb"
 NEW_IN_1_1 = {
     f"{name}.jsonl"
-    for name in ("at-the-horizon", *(family.group for family in [*flow_families(), *coverage_families()]))
+    for name in (
+        "at-the-horizon",
+        "retraced-arc",
+        "retraced-arc-trajectory",
+        *(family.group for family in [*flow_families(), *coverage_families()]),
+    )
 }
 MOST_BYTES = 15e6
 
@@ -70,7 +75,7 @@ def test_what_the_corpus_holds(corpus, tally):
     groups = {vector.group for vector in corpus}
     assert {f"hard-case-{number:02}" for number in range(1, 49)} <= groups
     # One is no valid scene; the other asks nothing of a stepper that the rest do not, but of the theory.
-    assert set(CATALOGUE) == set(catalogue()) - {"moving-cap-as-printed", "retraced-arc"} <= groups
+    assert set(CATALOGUE) == set(catalogue()) - {"moving-cap-as-printed"} <= groups
     assert {f"static-{table}" for table in ("cap", "stem", "mushroom")} <= groups
     outcomes = Counter(vector.expect[0].outcome for vector in corpus)
     assert min(outcomes[kind] for kind in ("collision", "horizon", "undefined", "rejected")) >= 12

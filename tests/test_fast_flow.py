@@ -35,6 +35,29 @@ def test_flow_ends_where_the_trajectory_does(name):
         assert ends[0] == pytest.approx(ends[1], rel=1e-5, abs=1e-5)
 
 
+@pytest.mark.parametrize("name", ["a cap at rest", "breathing-circle"])
+def test_through_the_centre_and_unfolded_all_the_same(name, tally):
+    """With no angular momentum at all a particle of a cap is unfolded like any other."""
+    scene = Cap(r=1.0) if name == "a cap at rest" else load(name)
+    random = np.random.default_rng(11)
+    for _ in range(60):
+        p, q = (float(part) for part in random.integers(-8, 9, 2))
+        k, m = 2.0 ** -random.integers(5, 8), 2.0 ** -random.integers(0, 3) * random.choice([-1.0, 1.0])
+        if q == 0:
+            continue
+        state = State(0.0, k * p, k * abs(q), m * p, m * abs(q))
+        assert state.x * state.vy == state.y * state.vx
+        t_end = float(random.integers(1, 60)) / 8 + 0.01
+        (outcome,) = fast.flow(scene, [state], t_end).outcomes
+        path = fast.trajectory(scene, state, 10_000, t_end=t_end)
+        assert isinstance(outcome, Horizon)
+        assert isinstance(path.outcome, Horizon)
+        assert outcome.y >= 0
+        ends = [(o.x, o.y, o.vx, o.vy) for o in (outcome, path.outcome)]
+        assert ends[0] == pytest.approx(ends[1], rel=1e-9, abs=1e-9)
+        tally["through the centre"] += 1
+
+
 def test_starts_on_walls_are_taken_as_given():
     """From a wall, the flow goes on as the trajectory did."""
     path = fast.trajectory(SCENE, STARTS[0], 6)

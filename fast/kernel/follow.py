@@ -79,15 +79,17 @@ def note_stay(a, i, roster, stops, followed):
 
 
 @part
-def finish(a, i, j, code, end, followed):
-    """Write down a particle's end: at the last stop for HORIZON, else where trouble met it."""
+def finish(pool, a, i, j, code, end, followed):
+    """Write down a particle's end: at the last stop for HORIZON, else where trouble met it.
+
+    In the disk a particle is unfolded, whatever its spin: in a cap that may be 0.
+    """
     t, t_low, x, y, vx, vy = a[T + i], a[T_LOW + i], a[X + i], a[Y + i], a[VX + i], a[VY + i]
     if code == HORIZON:
         dt = (end - t) - t_low
         t, t_low = end, 0.0
         x, y_end = fma(vx, dt, x), fma(vy, dt, y)
-        if a[SPIN + i] != 0.0:
-            # Unfolded: the base may lie between.
+        if pool == DISK:  # the base may lie between
             if y * y_end < 0.0:
                 a[N_BASE + i] += 1.0
             if y_end < 0.0:
@@ -160,7 +162,7 @@ def attend(pool, a, i, roster, worker, slope):
         code = HORIZON
     elif code == HORIZON:
         note_stops(a, i, roster, end, stops, followed)
-    finish(a, i, roster[PARTICLE, i], code, end, followed)
+    finish(pool, a, i, roster[PARTICLE, i], code, end, followed)
     return ENDS
 
 

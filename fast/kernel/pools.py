@@ -145,6 +145,6 @@ def refold(a, i):
     """Bring an unfolded particle of a cap back to y >= 0, on the arc if it was unfolded at all."""
     if a[Y + i] < 0.0:
         a[Y + i], a[VY + i] = -a[Y + i], -a[VY + i]
-    if a[SPIN + i] != 0.0:
+    if a[END + i] > -NEVER:  # its laws are known: it has hit the arc, and went on unfolded
         a[WALL + i] = ON_ARC
     a[SPIN + i] = 0.0

@@ -225,7 +225,7 @@ def shifted(asked: Vector, index: int, name: str, by: float):
 
 def test_shifted_answers_fail_and_slightly_shifted_ones_pass(corpus):
     n_shifted = 0
-    for i, asked in enumerate(corpus[::2]):
+    for i, asked in enumerate(corpus[::3]):
         steps = asked.expect[0].steps
         if not steps or "hard-case-4" in asked.group:
             continue  # extreme numbers: a shift would overflow or vanish
@@ -241,7 +241,7 @@ def test_shifted_answers_fail_and_slightly_shifted_ones_pass(corpus):
         assert found.why.split(" is off")[0].split(": ")[-1] == name
         assert grade(asked, shifted(asked, index, name, bound / 4)).verdict == "pass", asked.id
         n_shifted += 1
-    assert n_shifted > 0.4 * len(corpus)
+    assert n_shifted > 0.27 * len(corpus)
 
 
 def graded(sample, *stepper) -> dict[str, Grade]:
@@ -249,7 +249,7 @@ def graded(sample, *stepper) -> dict[str, Grade]:
 
 
 def test_the_fast_stepper_passes_or_declines_what_is_degenerate(corpus, tally):
-    sample = corpus[::4]
+    sample = corpus[::6]
     grades = graded(sample, fast.next_collision, fast_follow, fast_carry)
     level = {asked.id: asked.level for asked in sample}
     tally.update(f"{level[name]} {found.verdict}" for name, found in grades.items())

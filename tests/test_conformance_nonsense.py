@@ -18,7 +18,7 @@ from conformance.suite import run as suite
 from conformance.suite.result import VERDICTS
 from conformance.suite.session import Limits
 
-N_RUNS = int(os.environ.get("MUSHROOMS_RUNS", "24"))
+N_RUNS = int(os.environ.get("MUSHROOMS_RUNS", "12"))
 FEW = (*vectors.load("core")[::350], *vectors.load("stress")[-3:])
 
 

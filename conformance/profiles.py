@@ -29,7 +29,7 @@ widened by `bias`.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from math import inf, log, pi, prod, sqrt
+from math import log, pi, prod, sqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -61,7 +61,7 @@ class Statistic(NamedTuple):
     @property
     def is_met(self) -> bool:
         """Tell whether the mean is within its margin."""
-        return not abs(self.measured - self.expected) > self.margin
+        return bool(abs(self.measured - self.expected) <= self.margin)  # never with nan
 
     @property
     def has_power(self) -> bool:
@@ -304,7 +304,7 @@ def _statistic(
     name: str, x: Floats, expected: float, *, bound: float, n: int, alarm: float, alternative: float
 ) -> Statistic:
     if len(x) < 2:
-        return Statistic(name, float("nan"), expected, inf, n, n - len(x), alternative)
+        return Statistic(name, float("nan"), expected, 0.0, n, n - len(x), alternative)
     lost = n - len(x)
     allowed = margin(x, bound, alarm) + bound * lost / n
     return Statistic(name, float(x.mean()), expected, allowed, n, lost, alternative)

@@ -12,9 +12,10 @@ import fast
 import reference
 from conformance import plain
 from conformance.mutants import MUTANTS
+from conformance.profiles import check_work_identity
 from conformance.properties import PROPERTIES, check_mirror, check_period_shift, check_scaling
 from conformance.strategies import scenes_and_states
-from scene import Collision, Fourier, Mushroom, State, Stem, load, transforms
+from scene import Collision, Fourier, Mushroom, State, Stem, Undecided, load, transforms
 from scene.laws import is_constant
 from scene.tables import laws, period
 
@@ -138,6 +139,14 @@ def test_period_shift_is_exact_where_the_period_is():
 def test_an_undecided_answer_is_not_compared():
     corner = (tables.CIRCLE, State(0.0, 0.5, 0.5, 0.5, -0.5), 9.0)
     assert not any(check(plain.next_collision, *corner) for check in PROPERTIES.values())
+
+
+def test_a_flow_that_loses_everybody_does_not_keep_the_work_identity():
+    def lost(_scene, states, _t_end):
+        return [(Undecided("shy"), None)] * len(states)
+
+    with pytest.raises(AssertionError, match="nan"):
+        check_work_identity(lost, load("breathing-circle"), n_particles=20, kT=100.0)
 
 
 def test_transforms_keep_the_physics():

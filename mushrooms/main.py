@@ -181,6 +181,7 @@ def simulate(
     if plot is not None:
         if cycles != 1:
             raise BadInput(f"--cycles = {cycles}, must be 1 for --plot")
+        _check_range("--particles", particles, 2)
         output.check_file(plot, (".svg", ".png"))
     table = scenes.load(scene)
     with output.writable_folder(out) if out else nullcontext() as folder:
@@ -197,9 +198,9 @@ def simulate(
             write_files(
                 folder, {"ensemble.npz": lambda file: np.savez(file, **fields), "summary.json": text + "\n"}
             )
-        if plot is not None:
-            _plot(plot, table, table.name or scene, ensemble)
     _print_pairs(summary, as_json)
+    if plot is not None:
+        _plot(plot, table, table.name or scene, ensemble)
 
 
 def _check_ensemble(particles: int, energy: float, cycles: int, seed: int, threads: int | None) -> None:

@@ -24,7 +24,11 @@ def test_the_same_run_writes_the_same_picture(command_line, tmp_path):
 
 @pytest.mark.parametrize(
     ("arguments", "word"),
-    [(["--plot", "a.pdf"], ".svg, .png"), (["--plot", "a.svg", "--cycles", "2"], "--cycles = 2, must be 1")],
+    [
+        (["--plot", "a.pdf"], ".svg, .png"),
+        (["--plot", "a.svg", "--cycles", "2"], "--cycles = 2, must be 1"),
+        (["--plot", "a.svg", "--particles", "1"], "--particles = 1, must be >= 2"),
+    ],
 )
 def test_bad_options_are_one_line(command_line, monkeypatch, tmp_path, arguments, word):
     monkeypatch.chdir(tmp_path)

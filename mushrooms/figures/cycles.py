@@ -102,9 +102,8 @@ def gain_of_capture() -> Figure:
     assert best is not None
     axes.plot(curve.t_in, curve.s, color=ORANGE, linewidth=1.8)
     axes.plot(*best, "o", color=BLACK, label=f"largest: {best[1]:.6f} at t = {best[0]:.5f}")
-    axes.axhline(
-        curve.s[-1], color=BLACK, linestyle=":", linewidth=1, label=f"never captured: {curve.s[-1]:.6f}"
-    )
+    free = float(theory.predict(load("moving-cap"), 15).log_e_nc)
+    axes.axhline(free, color=BLACK, linestyle=":", linewidth=1, label=f"never captured: {free:.6f}")
     axes.set(xlabel="time of capture, t_in", ylabel="log E1/E0 (theory)")
     axes.legend()
     return figure

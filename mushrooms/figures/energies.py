@@ -78,7 +78,7 @@ def draw(
 
 def _edges(gain: FloatArray, sigma: float) -> FloatArray:
     low, high = (float(np.quantile(gain, q)) for q in (TAIL, 1 - TAIL))
-    return np.linspace(low - sigma, max(high + sigma, low - sigma + 1e-9), N_BINS + 1)
+    return np.histogram_bin_edges(gain, N_BINS, (low - sigma, high + sigma))
 
 
 def _bars(axes: Axes, gain: FloatArray, edges: FloatArray) -> FloatArray:

@@ -28,7 +28,7 @@ widened by `bias`.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from math import log, pi, prod, sqrt
 from typing import NamedTuple
 
@@ -39,10 +39,10 @@ from mpmath import fp
 from scene import BadInput, Horizon, Mushroom, Outcome, Scene, State
 from scene.geometry import area, half_width, table_at
 from scene.laws import bounds, value
+from scene.protocol.wire import Flowing
 from scene.tables import cycle_length, laws
 
-Captured = tuple[float, float] | None
-Flow = Callable[[Scene, Sequence[State], float], Sequence[tuple[Outcome, Captured]]]
+Flow = Flowing
 Floats = npt.NDArray[np.float64]
 ALARM = 1e-6
 

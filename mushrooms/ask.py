@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Annotated
 
 import msgspec
 import typer
-from rich.console import Console
 from rich.markup import escape
 
 from mushrooms.check import in_one_line
+from mushrooms.terminal import new_console
 from scene.refusal import BadInput, check_seed
 
 if TYPE_CHECKING:
@@ -64,7 +64,7 @@ def _show(vector: Vector, disguise: Disguise) -> None:
     from conformance.grading.agreement import middle
     from conformance.suite.disguise import asked
 
-    console = Console(width=None if Console().is_terminal else 140, soft_wrap=True, highlight=False)
+    console = new_console()
     condition = f", condition {vector.condition:.3g}" if vector.condition else ""
     console.print(f"[bold]{vector.id}[/], level {vector.level}{condition}")
     console.print(f"rule       {escape(vector.rule)}")
@@ -97,10 +97,11 @@ def _put(command: list[str], vector: Vector, disguise: Disguise) -> Result:
 
 
 def _judge(result: Result) -> int:
-    console = Console(soft_wrap=True, highlight=False)
+    from conformance.suite.result import outcomes_of
+
+    console = new_console()
     if result.answer is not None:
-        steps = result.answer.get("steps") or result.answer.get("states") or [result.answer]
-        given = "\n           ".join(in_one_line(step) for step in steps)
+        given = "\n           ".join(map(in_one_line, outcomes_of(result.answer)))
         console.print(f"given      {escape(given)}")
     console.print(f"[bold]{result.verdict}[/]: {escape(result.why)}")
     return 0 if result.is_right else 1

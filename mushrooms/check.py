@@ -14,7 +14,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from mushrooms import output
-from mushrooms.terminal import progress_bar
+from mushrooms.terminal import new_console, progress_bar
 from scene.files import write_file
 from scene.refusal import BadInput
 
@@ -115,7 +115,7 @@ def show(run: Run) -> None:
         table.add_row(
             group.group, str(group.cases), *cells, worst if graded else "–", counts, group.precision
         )
-    console = Console(width=None if Console().is_terminal else 140, soft_wrap=True, highlight=False)
+    console = new_console()
     console.print(table)
     if run.speed:
         best = f"{run.speed.best_ns:.4g} ns per collision"

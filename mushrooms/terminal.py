@@ -34,6 +34,11 @@ def compilation_told() -> Iterator[None]:
         yield
 
 
+def new_console() -> Console:
+    """Return a console for stdout whose long lines are not broken; a pipe has no width: enough for tables."""
+    return Console(width=None if Console().is_terminal else 140, soft_wrap=True, highlight=False)
+
+
 def progress_bar() -> progress.Progress:
     """Return a progress bar on stderr, silent where that is no terminal."""
     console = Console(stderr=True)

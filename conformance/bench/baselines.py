@@ -24,12 +24,11 @@ import numpy as np
 import numpy.typing as npt
 from mpmath import fp
 
-from conformance import vectors
+from conformance import plain, vectors
 from conformance.bench import codes
 from conformance.bench.contenders import Ask, Contender, Family, Given, Lap
 from conformance.bench.workloads import SINGLE_STEPS, WINDOW, Workload
 from conformance.suite.process import Trouble
-from conformance.vectors import Step
 from scene import BangBang, Cap, Collision, Fourier, Horizon, Law, Outcome, Scene, State, Stem, Wall
 from scene.geometry import rounded
 from scene.laws import frequency
@@ -163,10 +162,10 @@ def in_numba() -> Contender:
 def asker(contender: Contender) -> Ask:
     """Return how a baseline answers a vector, for the hard cases."""
     step = stepper(contender)
-    return partial(vectors.answer, step=step, follow=partial(followed, step))
+    return partial(vectors.answer, step=step, follow=partial(plain.trajectory, step=step))
 
 
-def stepper(contender: Contender) -> Step:
+def stepper(contender: Contender) -> plain.Step:
     """Return a baseline as a stepper of one state, taken as it is; t_end alone ends a flight."""
     assert contender.steps is not None
     steps = contender.steps
@@ -179,17 +178,6 @@ def stepper(contender: Contender) -> Step:
         return Horizon(t_end, state.x + left * state.vx, state.y + left * state.vy, state.vx, state.vy)
 
     return step
-
-
-def followed(step: Step, scene: Scene, state: State, n_collisions: int, t_end: float) -> list[Outcome]:
-    """Return a trajectory by a stepper of one state: its collisions, and what came instead of one."""
-    found: list[Outcome] = []
-    while len(found) < n_collisions:
-        found.append(met := step(scene, state, t_end))
-        if not isinstance(met, Collision):
-            break
-        state = met.state()
-    return found
 
 
 def _contender(name: str, family: Family, engine: Engine, flights: float = WINDOW) -> Contender:

@@ -12,23 +12,23 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 
+from conformance import plain
 from conformance.bench import baselines
 from conformance.bench.time_stepping import TOLERANCES, next_collision_by
-from conformance.plain.flow import Captured, Step, carried
-from scene import BadInput, Outcome, Scene, State
+from scene import BadInput
 from scene.protocol.wire import serve
 
 FLAGS = ("-O3", "-march=native")
 
 
-def _in_c(name: str) -> Step:
+def _in_c(name: str) -> plain.Step:
     with tempfile.TemporaryDirectory() as folder:  # the library stays loaded
         library, _ = baselines.build(Path(folder), FLAGS)
         found = next(one for one in baselines.in_c(library) if one.name == name)
         return baselines.stepper(found)
 
 
-NAMES: dict[str, Callable[[], Step]] = {
+NAMES: dict[str, Callable[[], plain.Step]] = {
     "lean-c": partial(_in_c, "lean C"),
     "lean-numba": lambda: baselines.stepper(baselines.in_numba()),
     **{f"steps-{parts}": partial(_in_c, f"steps, flight/{parts}") for parts in baselines.PARTS},
@@ -48,10 +48,8 @@ def main(arguments: Sequence[str]) -> None:
         raise BadInput(f"NAME = {name!r}, must be one of {', '.join(NAMES)}")
     step = NAMES[name]()
 
-    def flow(scene: Scene, states: Sequence[State], t_end: float) -> list[tuple[Outcome, Captured]]:
-        return [carried(step, scene, state, t_end) for state in states]
-
-    serve(name, step, partial(baselines.followed, step), sys.stdin.buffer, sys.stdout.buffer, flow=flow)
+    follow, carry = partial(plain.trajectory, step=step), partial(plain.flow, step=step)
+    serve(name, step, follow, sys.stdin.buffer, sys.stdout.buffer, flow=carry)
 
 
 if __name__ == "__main__":

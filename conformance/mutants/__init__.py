@@ -9,14 +9,14 @@ a mutant that changes no answer proves nothing.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import partial
 from typing import NamedTuple
 
 from conformance import plain
 from conformance.mutants import of_laws, of_mouths, of_paths, of_phases, of_roots, of_stays, of_walls
-from conformance.plain.flow import Captured, PlainPath
+from conformance.plain.flow import PlainPath
 from conformance.plain.step import Flight
 from scene import Outcome, Scene, State
+from scene.protocol.wire import Captured
 
 MOST_COLLISIONS = 1_000  # of a flow, where a mutant may never get to t_end; the corpus has fewer
 
@@ -42,12 +42,11 @@ class Mutant(NamedTuple):
 
     def trajectory(self, scene: Scene, state: State, n_collisions: int, t_end: float) -> list[Outcome]:
         """Return the mutant's answer to a trajectory."""
-        return plain.trajectory(scene, state, n_collisions, t_end, self.flight, self.path)
+        return plain.trajectory(scene, state, n_collisions, t_end, self.step, self.path)
 
     def flow(self, scene: Scene, states: Sequence[State], t_end: float) -> list[tuple[Outcome, Captured]]:
         """Return the mutant's answer to a flow."""
-        step = partial(plain.next_collision, flight=self.flight)
-        paths = [self.path(scene, state, t_end, step) for state in states]
+        paths = [self.path(scene, state, t_end, self.step) for state in states]
         for path in paths:
             path.most = MOST_COLLISIONS
         return [path.arrival() for path in paths]

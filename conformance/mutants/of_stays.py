@@ -11,9 +11,10 @@ from math import hypot
 
 from msgspec.structs import replace
 
-from conformance.plain.flow import Captured, PlainPath, Stay, misses_mouth, width
+from conformance.plain.flow import PlainPath, Stay, misses_mouth, width
 from conformance.plain.step import SIDES, Flight
 from scene import Collision, Horizon, Mushroom, Outcome, State
+from scene.protocol.wire import Captured
 from scene.tables import laws
 
 

@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from functools import partial
 from math import hypot, prod
 from typing import NamedTuple
 
 from conformance.plain.step import SIDES, Flight, next_collision
 from scene import Collision, Mushroom, Outcome, Scene, State, Undecided
+from scene.protocol.wire import Captured
 from scene.tables import width_factors
 
 MAX_COLLISIONS = 20_000  # of one particle's flow: some seconds
 Step = Callable[[Scene, State, float], Outcome]
-Captured = tuple[float, float] | None
 
 
 class PlainPath:
@@ -105,11 +104,11 @@ def trajectory(
     state: State,
     n_collisions: int,
     t_end: float,
-    flight: type[Flight] = Flight,
+    step: Step = next_collision,
     path: type[PlainPath] = PlainPath,
 ) -> list[Outcome]:
-    """Follow a particle: its collisions, and last what came instead of one."""
-    along = path(scene, state, t_end, partial(next_collision, flight=flight))
+    """Follow a particle by any stepper: its collisions, and last what came instead of one."""
+    along = path(scene, state, t_end, step)
     steps: list[Outcome] = []
     while len(steps) < n_collisions:
         steps.append(along.advance())
@@ -122,14 +121,7 @@ def flow(
     scene: Scene,
     states: Sequence[State],
     t_end: float,
-    flight: type[Flight] = Flight,
-    path: type[PlainPath] = PlainPath,
+    step: Step = next_collision,
 ) -> list[tuple[Outcome, Captured]]:
-    """Carry particles to t_end: the outcome of each there, and (begin, end) of its first captured stay."""
-    step = partial(next_collision, flight=flight)
-    return [path(scene, state, t_end, step).arrival() for state in states]
-
-
-def carried(step: Step, scene: Scene, state: State, t_end: float) -> tuple[Outcome, Captured]:
-    """Carry one particle by any stepper, and watch its captured stays."""
-    return PlainPath(scene, state, t_end, step).arrival()
+    """Carry particles to t_end by any stepper: the outcome of each there, and its first captured stay."""
+    return [PlainPath(scene, state, t_end, step).arrival() for state in states]

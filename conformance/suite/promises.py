@@ -23,6 +23,7 @@ from conformance.suite.questions import (
     MOVING,
     STANDING,
     distance,
+    flown,
     follow,
     is_same,
     offered,
@@ -149,15 +150,15 @@ def flow_alone(session: Session) -> str:
     """Each state of a flow is answered in its place, and as when asked alone, whatever the others are."""
     scene = offered(session, STANDING, "flow")
     states, allowed = mixed_states(scene)
-    together = _flown(session, scene, states, 1.5)
+    together = flown(session, scene, states, 1.5)
     for i, (state, found) in enumerate(zip(states, together, strict=True)):
-        (alone,) = _flown(session, scene, [state], 1.5)
+        (alone,) = flown(session, scene, [state], 1.5)
         if found["outcome"] not in allowed[i]:
             raise Trouble("fail", f"states[{i}]: {found}, must be {' or '.join(allowed[i])}")
         gap = distance(scene, _arrival(found), _arrival(alone))
         if gap > NEAR or not _is_same_stay(found.get("captured"), alone.get("captured"), 1.5):
             raise Trouble("fail", f"states[{i}]: {found} among others, {alone} alone")
-    if _flown(session, scene, [], 1.5):
+    if flown(session, scene, [], 1.5):
         raise Trouble("fail", "a flow of no states is answered with some")
     n_open = sum(
         found["outcome"] == "undecided" for found, ways in zip(together, allowed, strict=True) if ways == GOOD
@@ -257,7 +258,7 @@ def flow_arrivals(session: Session) -> str:
 def _compared(session: Session, scene: Scene, states: Sequence[State], t_end: float) -> list[int]:
     """Compare arrivals with trajectories: the number of states, of those compared, and of captured stays."""
     n_stays = n_compared = 0
-    for state, found in zip(states, _flown(session, scene, states, t_end), strict=True):
+    for state, found in zip(states, flown(session, scene, states, t_end), strict=True):
         arrival = _arrival(found)
         try:
             *hits, last = follow(session, scene, state, 1000, t_end)
@@ -322,16 +323,6 @@ def _start(scene: Scene, i: int, speed: float = 0.0) -> State:
     up = -1.0 if isinstance(scene, Stem) else 1.0
     x, y = size * math.cos(turn), size * math.sin(turn)
     return State(0.0, x, up * y, speed * math.cos(course), up * speed * math.sin(course))
-
-
-def _flown(session: Session, scene: Scene, states: Sequence[State], t_end: float) -> Sequence[dict[str, Any]]:
-    answer = session.ask(question("flow", scene, list(states), t_end=t_end))
-    if "error" in answer:
-        raise Trouble("error", answer["error"])
-    found: Sequence[dict[str, Any]] | None = answer.get("states")
-    if found is None or len(found) != len(states):
-        raise Trouble("wrong-format", f"a flow of {len(states)} states is answered {answer}")
-    return found
 
 
 def _arrival(data: Mapping[str, Any]) -> Outcome:

@@ -15,17 +15,20 @@ import inspect
 import math
 import time
 from collections.abc import Callable, Iterator, Sequence
+from functools import cache
 from typing import NamedTuple
 
 import msgspec
 
 import theory
 from conformance import profiles, properties
-from conformance.profiles import Captured, Statistic
+from conformance.profiles import Statistic
 from conformance.suite.process import NOT_NUMBERS, Trouble
+from conformance.suite.questions import flown
 from conformance.suite.session import Session, missing
 from scene import Fourier, Horizon, Mushroom, Outcome, Scene, State, Undecided, load, to_data
 from scene.geometry import area
+from scene.protocol.wire import Captured
 from scene.tables import cycle_length
 
 NEEDS_FOURIER = ("static-limit",)  # asks for constants written as laws
@@ -181,7 +184,7 @@ def _captured_share(session: Session, scene: Mushroom, size: Size, seed: int) ->
     share = profiles.captured_share(
         _flow(session),
         scene,
-        p_nc=float(theory.predict(scene, 10).p_nc),
+        p_nc=float(_predicted().p_nc),
         **size._asdict(),
         seed=seed,
         alarm=profiles.ALARM / len(PROFILES),
@@ -192,7 +195,7 @@ def _captured_share(session: Session, scene: Mushroom, size: Size, seed: int) ->
 def _mean_growth(session: Session, scene: Mushroom, size: Size, seed: int) -> list[Statistic]:
     areas = [area(scene, cycle_length(scene) * k / 64) for k in range(64)]
     largest = math.log(max(areas) / min(areas))  # free particles keep E times the area at most
-    m1, alarm = float(theory.predict(scene, 10).m1), profiles.ALARM / len(PROFILES)
+    m1, alarm = float(_predicted().m1), profiles.ALARM / len(PROFILES)
     if abs(m1) < size.bias + profiles.least_margin(size.n_particles, 2 * (largest + size.bias), alarm):
         raise Trouble("declined", f"not asked: {size.n_particles} particles cannot tell m1 from 0")
     return [
@@ -202,17 +205,18 @@ def _mean_growth(session: Session, scene: Mushroom, size: Size, seed: int) -> li
     ]
 
 
+@cache
+def _predicted() -> theory.Prediction:
+    """Return the theory of SCENE, which both profiles of a cycle are held to."""
+    return theory.predict(load(SCENE), 10)
+
+
 def _flow(session: Session) -> profiles.Flow:
     def flow(scene: Scene, states: Sequence[State], t_end: float) -> list[tuple[Outcome, Captured]]:
         found: list[tuple[Outcome, Captured]] = []
         for start in range(0, len(states), BATCH):
-            batch = msgspec.to_builtins(list(states[start : start + BATCH]))
-            request = {"cmd": "flow", "scene": to_data(scene), "states": batch, "t_end": t_end}
-            answer = session.ask(request)
-            arrived = answer.get("states")
-            if arrived is None or len(arrived) != len(batch):
-                raise Trouble("wrong-format", f"flow of {len(batch)} states was answered {answer}"[:200])
-            found += [_arrival(data, t_end) for data in arrived]
+            batch = flown(session, scene, states[start : start + BATCH], t_end)
+            found += [_arrival(data, t_end) for data in batch]
         return found
 
     return flow

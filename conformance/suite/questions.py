@@ -105,6 +105,21 @@ def _check_ending(found: Sequence[Outcome], n: int) -> None:
         )
 
 
+def flown(session: Session, scene: Scene, states: Sequence[State], t_end: float) -> Sequence[dict[str, Any]]:
+    """Carry states to t_end, and return what is answered for each.
+
+    Raises:
+        Trouble: also error, when that is the answer, and wrong-format for another number of states.
+    """
+    answer = session.ask(question("flow", scene, list(states), t_end=t_end))
+    if "error" in answer:
+        raise Trouble("error", answer["error"])
+    found: Sequence[dict[str, Any]] | None = answer.get("states")
+    if found is None or len(found) != len(states):
+        raise Trouble("wrong-format", f"a flow of {len(states)} states is answered {answer}"[:200])
+    return found
+
+
 def last_collision(session: Session, scene: Scene, state: State, n: int) -> Collision:
     """Follow n collisions, and return the last.
 

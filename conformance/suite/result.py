@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import msgspec
@@ -37,6 +37,7 @@ class Result(msgspec.Struct, frozen=True, omit_defaults=True):
         ulps: worst backward ulps, absent when not measured (or beyond binary64).
         relative: worst backward error, likewise.
         answer: what the implementation said, taken back to the question as it is published.
+        step: of a vector that did not pass, the place of the outcome in question, from 0.
         given: of the answer, the outcome that did not pass.
         expected: the certified outcome in its place, in the middle of its enclosures.
         is_known: listed in the known-failures file.
@@ -52,6 +53,7 @@ class Result(msgspec.Struct, frozen=True, omit_defaults=True):
     ulps: float | None = None
     relative: float | None = None
     answer: dict[str, Any] | None = None
+    step: int = 0
     given: dict[str, Any] | None = None
     expected: dict[str, Any] | None = None
     is_known: bool = False
@@ -60,6 +62,11 @@ class Result(msgspec.Struct, frozen=True, omit_defaults=True):
     def is_right(self) -> bool:
         """Tell whether this result lets the run succeed: a known failure must fail, all else must not."""
         return self.verdict != "pass" if self.is_known else self.verdict not in BAD
+
+
+def outcomes_of(answer: Mapping[str, Any]) -> list[Any]:
+    """Return the outcomes that an answer holds: a trajectory's steps, a flow's states, or itself."""
+    return list(answer.get("steps") or answer.get("states") or [answer])
 
 
 class Speed(msgspec.Struct, frozen=True):

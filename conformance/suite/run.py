@@ -4,7 +4,8 @@ First the protocol itself (start, the number-transport probe, bad input), then t
 each in disguise (`suite.disguise`), and questions that no file holds; then the exact properties and the
 statistical profiles, then its speed where it offers `time`, then `stop`. What ends the session is the verdict
 of every case not reached; what the implementation does not offer is `unsupported`. Verdicts follow from the
-implementation, the level and the seed, not from the machine or its load, but for time limits.
+implementation, the level and the seed, not from the machine or its load, but for time limits and what holds
+`time` to a clock.
 """
 
 from __future__ import annotations
@@ -35,7 +36,7 @@ from conformance.suite.disguise import (
     published,
 )
 from conformance.suite.process import NOT_NUMBERS, Trouble
-from conformance.suite.result import Result, Run, Speed
+from conformance.suite.result import Result, Run, Speed, outcomes_of
 from conformance.suite.scope import graded_parts
 from conformance.suite.session import Limits, Session, missing
 from conformance.vectors import Vector
@@ -212,6 +213,7 @@ def ask_vector(session: Session, vector: Vector, disguise: Disguise = Disguise()
         ulps=graded.ulps if math.isfinite(graded.ulps) else None,
         relative=graded.relative if math.isfinite(graded.relative) else None,
         answer=answer,
+        step=graded.step,
         given=given,
         expected=expected,
     )
@@ -224,7 +226,7 @@ def _compared(
     if graded.verdict in ("pass", "wrong-format", "error"):
         return None, None
     certified = msgspec.to_builtins(middle(vector.expect[0], vector.state))
-    given = answer.get("steps") or answer.get("states") or [answer]
+    given = outcomes_of(answer)
     if vector.kind == "flow":
         certified = certified[-1:]
     at = graded.step

@@ -13,7 +13,7 @@ import numpy as np
 from matplotlib import rc_context
 
 from conformance.grading.agreement import middle
-from conformance.suite.result import Result
+from conformance.suite.result import Result, outcomes_of
 from conformance.vectors import Vector
 from mushrooms.figures import style as plots
 from mushrooms.figures import table as draw
@@ -39,7 +39,7 @@ def paths(result: Result, vector: Vector) -> bytes:
     scene = from_data(vector.scene)
     certified = [o for o in middle(vector.expect[0], vector.state) if isinstance(o, Collision | Horizon)]
     given = _given(result)
-    at = _in_question(vector, given, certified)
+    at = _in_question(result, vector, certified)
     t = certified[at].t if certified else vector.state.t
     start = (vector.state.x, vector.state.y)
     certified, given = certified[: at + 1], given[: at + 1]  # what follows a wrong step follows from it
@@ -60,22 +60,14 @@ def paths(result: Result, vector: Vector) -> bytes:
 
 
 def _given(result: Result) -> list[dict[str, Any]]:
-    answer = result.answer or {}
-    steps = answer.get("steps") or answer.get("states") or [answer]
-    return [step for step in steps if isinstance(step, dict) and "x" in step and "y" in step]
+    return [step for step in outcomes_of(result.answer or {}) if "x" in step and "y" in step]
 
 
-def _in_question(vector: Vector, given: Sequence[Any], certified: Sequence[Outcome]) -> int:
-    """Return the first step whose place differs to the eye, or the last certified one."""
-    if vector.kind == "flow":
-        return max(0, len(certified) - 1)
-    for i, (said, true) in enumerate(zip(given, certified, strict=False)):
-        assert isinstance(true, Collision | Horizon)
-        if not math.isclose(said["x"], true.x, rel_tol=1e-6) or not math.isclose(
-            said["y"], true.y, rel_tol=1e-6
-        ):
-            return i
-    return max(0, min(len(given), len(certified)) - 1)
+def _in_question(result: Result, vector: Vector, certified: Sequence[Outcome]) -> int:
+    """Return the place of the certified step to look at: of a failure the one that differs, else the last."""
+    last = max(0, len(certified) - 1)
+    is_wrong = result.verdict != "pass" and vector.kind != "flow"
+    return min(result.step, last) if is_wrong else last
 
 
 def _draw_walls(axes: Any, scene: Scene, begin: float, end: float) -> None:

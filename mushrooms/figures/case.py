@@ -44,18 +44,20 @@ def paths(result: Result, vector: Vector) -> bytes:
     start = (vector.state.x, vector.state.y)
     certified, given = certified[: at + 1], given[: at + 1]  # what follows a wrong step follows from it
     routes = [start, *((o.x, o.y) for o in certified)], [start, *((step["x"], step["y"]) for step in given)]
+    line = "none" if vector.kind == "flow" else "-"  # a flow says where it ends, not how it came there
     figure, both = plots.new_figure(7.4, 3.7, 1, 2)
     for axes in both:
         _draw_walls(axes, scene, vector.state.t, t)
         for route, colour, width in zip(routes, (plots.ORANGE, plots.BLUE), (4, 1.5), strict=True):
-            axes.plot(*np.transpose(route), color=colour, linewidth=width, alpha=0.75, marker=".")
+            style = {"color": colour, "linewidth": width, "markersize": 3 * width}
+            axes.plot(*np.transpose(route), linestyle=line, alpha=0.75, marker=".", **style)
         axes.plot(*start, marker="o", color=plots.BLACK, markersize=4, linestyle="none")
         axes.set(aspect="equal", xlabel="x [length]", ylabel="y [length]")
     size = float(np.ptp(np.hstack(draw.walls(scene, t)), axis=1).max())
     ends = [route[at + 1] for route in routes if at + 1 < len(route)]
     _directions(both, certified[at:], given[at:], 0.1 * size)
     _close_up(both[1], ends or [start], CLOSE * size)
-    both[1].set_title(f"close to step {at + 1}")
+    both[1].set_title("close to the end" if vector.kind == "flow" else f"close to step {at + 1}")
     return plots.svg(figure)
 
 

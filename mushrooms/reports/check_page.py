@@ -69,9 +69,13 @@ def _case(result: Result, vector: Vector) -> dict[str, Any]:
 
 
 def _rows(result: Result) -> list[tuple[str, str, str]]:
-    """Return the fields of a failure: name, certified, given."""
+    """Return the fields of a failure: name, certified, given; its reason stands in the caption."""
     certified, given = result.expected or {}, result.given or {}
-    names = [name for name in dict.fromkeys([*certified, *given]) if certified.get(name) != given.get(name)]
+    names = [
+        name
+        for name in dict.fromkeys([*certified, *given])
+        if certified.get(name) != given.get(name) and name != "reason"
+    ]
     return [(name, _cell(certified.get(name)), _cell(given.get(name))) for name in names]
 
 

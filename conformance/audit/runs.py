@@ -81,8 +81,8 @@ _ALL = (
     Simulation("ergodic", 1e6, 10_000, 25_000, 5_000, phases=EIGHTHS),
     Simulation("ergodic", 1e7, 10_000, 25_000, 5_000, phases=EIGHTHS),
     Simulation("frozen-mushroom", 1e8, 2_000, 10_000, 1_000),
-    # Many cycles cost most: energies, and with them collisions, grow exponentially. Sec. 4.2 at its size: looked
-    # at after 10 cycles and after 30, some 1.8e11 collisions, in few blocks, for the energetic few are waited for.
+    # Many cycles cost most: energies, and with them collisions, grow exponentially. Sec. 4.2 at its size, for
+    # n = 10 and n = 30: some 1.8e11 collisions, in few blocks, since each waits for its energetic few.
     Simulation("moving-cap", 1e5, 500, 500, 500, n_cycles=30),
     Simulation("moving-cap", 1e7, 0, 25_000, 5_000, n_cycles=30),
 )

@@ -22,6 +22,7 @@ from mushrooms.audit import audit
 from mushrooms.bench import bench
 from mushrooms.check import check
 from mushrooms.simulate import simulate
+from mushrooms.stored import draw_run, export, is_stored
 from mushrooms.terminal import AsJson, SceneName, check_range, print_pairs
 from scene.files import write_file
 from scene.load import read_data
@@ -144,7 +145,13 @@ def draw(
         typer.Option(metavar="FILE", help="A .svg, .png or .gif file; SCENE's name with .svg by default."),
     ] = None,
 ) -> None:
-    """Draw the walls through the cycle, with a few chords of one particle; a .gif moves."""
+    """Draw the walls through the cycle, with a few chords of one particle; a .gif moves.
+
+    Given the folder of a run (simulate --out), draw its histogram of log E1/E0, with theory.
+    """
+    if is_stored(scene):
+        print(draw_run(Path(scene), out))
+        return
     table = scenes.load(scene)
     path = out or Path(f"{Path(scene).stem}.svg")
     from mushrooms.figures import table as pictures
@@ -157,6 +164,7 @@ def draw(
 app.command(
     epilog="Example: mushrooms simulate moving-cap --particles 25000 --energy 1e7 --seed 1 --out run"
 )(simulate)
+app.command(epilog="Example: mushrooms export run --to run.parquet")(export)
 app.command(epilog="Example: mushrooms attack --family knot-at-event --cases 20000 --seed 1")(attack)
 app.command(epilog="Example: mushrooms audit --only X2,L4 --out audit-report")(audit)
 app.command(epilog="Example: mushrooms bench --quick --out bench-report")(bench)

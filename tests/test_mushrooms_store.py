@@ -1,0 +1,401 @@
+"""Stored runs: the same bits whatever the blocks and whatever went wrong, and what is refused in one line."""
+
+from __future__ import annotations
+
+import ast
+import errno
+import json
+import os
+import subprocess
+import sys
+import time
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+import pytest
+from support.refusals import assert_refused
+
+import fast
+import mushrooms
+from mushrooms.store import asked, blocks, conduct, digest, engines, tally
+from scene import load
+from scene.files import LOCK, locked, sealed
+
+ROOT = Path(__file__).parent.parent
+N, ENERGY, SEED = 330, 40.0, 7
+RUN = ["simulate", "fermi-ulam", "--energy", ENERGY, "--seed", SEED, "--threads", 1, "--json"]
+
+
+def arguments(folder, *more, n=N, block=64):
+    return [*RUN, "--particles", n, "--out", folder, *(["--block", block] if block else []), *more]
+
+
+@pytest.fixture(autouse=True)
+def _unsynced(monkeypatch):
+    """Leave files to the system's buffers: no test can cut the power, and a busy disk would take minutes."""
+    monkeypatch.setattr(os, "fsync", lambda _descriptor: None)
+
+
+@pytest.fixture(scope="module")
+def whole():
+    """Return the SHA-256 of a run at once, by its number of particles."""
+    return {n: run_at_once("fermi-ulam", n) for n in (N, 500)}
+
+
+def run_at_once(name, n, energy=ENERGY, n_cycles=1):
+    run = fast.simulate(load(name), n_particles=n, energy=energy, n_cycles=n_cycles, seed=SEED)
+    return run.sha256()
+
+
+@pytest.fixture
+def followed(monkeypatch):
+    """Return the list of pieces that are followed: first particle and how many."""
+    pieces, simulate = [], fast.simulate
+
+    def noted(scene, **options):
+        pieces.append((options["first"], options["n_particles"]))
+        return simulate(scene, **options)
+
+    monkeypatch.setattr(fast, "simulate", noted)
+    return pieces
+
+
+def digest_of(ended):
+    assert ended.code == 0, ended.err
+    return json.loads(ended.out)["sha256"]
+
+
+@pytest.mark.parametrize(
+    ("name", "energy", "n_cycles"),
+    [("fermi-ulam", 40.0, 3), ("breathing-circle", 40.0, 2), ("moving-cap", 60.0, 2)],
+)
+def test_blocks_of_any_size_have_one_digest(tmp_path, name, energy, n_cycles):
+    """In memory and on disk, in order and not, with arrays that hold nothing."""
+    scene, random = load(name), np.random.default_rng(3)
+    wish, wanted = asked.Asked(scene, energy, n_cycles, SEED), run_at_once(name, 150, energy, n_cycles)
+    tallies = set()
+    for block in (7, 150, 1000, *random.integers(2, 150, 3).tolist()):
+        shape = conduct.shape_of(wish, 150, block)
+        folder = tmp_path / str(block)
+        folder.mkdir()
+        for run in (blocks.RunInMemory(shape), blocks.RunFolder(folder, wish, shape, "")):
+            pieces = list(run.missing())
+            for i in random.permutation(len(pieces)).tolist():
+                run.keep(pieces[i], engines.follow(wish, pieces[i], 1))
+            assert digest.sha256(run) == wanted
+            tallies.add(json.dumps(run.tally.to_data()))
+    assert len(tallies) == 1
+
+
+def test_a_run_goes_on_and_is_widened_without_following_anybody_twice(
+    command_line, tmp_path, followed, whole, monkeypatch
+):
+    keep, n_kept = blocks.RunFolder.keep, 0
+
+    def interrupted(self, piece, block):
+        nonlocal n_kept
+        keep(self, piece, block)
+        n_kept += 1
+        if n_kept == 2:
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr(blocks.RunFolder, "keep", interrupted)
+    code, out, err = command_line(*arguments(tmp_path))
+    assert (code, out) == (130, "")
+    assert f"interrupted: 128 of {N} particles are kept; go on with: mushrooms simulate fermi-ulam" in err
+    assert f"--out {tmp_path} --resume" in err
+    followed.clear()
+    assert digest_of(command_line(*arguments(tmp_path, "--resume"))) == whole[N]
+    assert followed == [(0, conduct.PROBED), (128, 64), (192, 64), (256, 64), (320, 10)]
+    followed.clear()
+    wider = command_line(*arguments(tmp_path, "--resume", n=500, block=None))
+    assert digest_of(wider) == whole[500]
+    assert followed == [(0, conduct.PROBED), (330, 54), (384, 64), (448, 52)]
+    saved = json.loads((tmp_path / "summary.json").read_text())
+    assert saved.items() >= json.loads(wider.out).items()
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["blocks", "ensemble.zarr", "summary.json"]
+
+
+def truncated(content):
+    return content[: len(content) // 2]
+
+
+def flipped(content):
+    return bytes([content[0] ^ 1]) + content[1:]
+
+
+def emptied(_content):
+    return b""
+
+
+@pytest.mark.parametrize("damage", [truncated, flipped, emptied])
+@pytest.mark.parametrize("name", ["ensemble.zarr/t/c.2", "ensemble.zarr/collisions/c.2.0", "blocks/2.marker"])
+def test_a_damaged_file_is_found_and_its_block_followed_again(
+    command_line, tmp_path, followed, whole, damage, name
+):
+    digest_of(command_line(*arguments(tmp_path)))
+    path = tmp_path / name
+    path.write_bytes(damage(path.read_bytes()))
+    code, _, err = command_line("export", tmp_path, "--to", tmp_path / "run.npz")
+    assert (code, err.count("\n")) == (2, 1)
+    assert not (tmp_path / "run.npz").exists()
+    followed.clear()
+    again = command_line(*arguments(tmp_path, "--resume"))
+    assert digest_of(again) == whole[N]
+    assert "1 blocks (2)" in again.err
+    assert followed == [(0, conduct.PROBED), (128, 64)]
+
+
+def test_the_digest_does_not_take_a_chunk_that_changes_at_the_last_moment(
+    command_line, tmp_path, monkeypatch
+):
+    complete = conduct.complete
+
+    def then_damaged(run, *arguments):
+        complete(run, *arguments)
+        path = run.folder / "ensemble.zarr" / "x" / "c.1"
+        path.write_bytes(flipped(path.read_bytes()))
+
+    monkeypatch.setattr(conduct, "complete", then_damaged)
+    assert_refused(command_line(*arguments(tmp_path)), "c.1", "damaged")
+
+
+@pytest.mark.parametrize("n_writes", [0, 1, 5, 20, 28, 29])
+def test_a_full_disk_leaves_a_run_that_goes_on(command_line, tmp_path, monkeypatch, whole, n_writes):
+    """Whichever file the disk has no room for: of the description, a chunk, a marker."""
+    fsync, left = os.fsync, n_writes
+
+    def full(descriptor):
+        nonlocal left
+        left -= 1
+        if left < 0:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        fsync(descriptor)
+
+    monkeypatch.setattr(os, "fsync", full)
+    ended = command_line(*arguments(tmp_path))
+    assert_refused(ended, "No space left on device", "go on with: mushrooms simulate")
+    monkeypatch.setattr(os, "fsync", fsync)
+    assert not list(tmp_path.rglob(".*"))
+    assert digest_of(command_line(*arguments(tmp_path, "--resume"))) == whole[N]
+
+
+def test_a_run_that_the_disk_cannot_hold_is_refused_before_it_begins(command_line, tmp_path, monkeypatch):
+    usage = conduct.shutil.disk_usage(tmp_path)
+    monkeypatch.setattr(conduct.shutil, "disk_usage", lambda _path: usage._replace(free=10**6))
+    monkeypatch.setattr(fast, "simulate", None)
+    assert_refused(command_line(*arguments(tmp_path / "a", n=10**9, block=None)), "GB to be written", "free")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_target_that_is_read_only_is_refused(command_line, tmp_path, monkeypatch):
+    digest_of(command_line(*arguments(tmp_path)))
+    before = sorted(tmp_path.rglob("*"))
+
+    def read_only(*_arguments, **_options):
+        raise OSError(errno.EROFS, os.strerror(errno.EROFS))
+
+    monkeypatch.setattr(Path, "write_bytes", read_only)
+    assert_refused(command_line(*arguments(tmp_path, "--resume")), str(tmp_path), "Read-only file system")
+    assert sorted(tmp_path.rglob("*")) == before
+
+
+def test_one_writer_holds_a_folder(command_line, tmp_path, whole):
+    with locked(tmp_path):
+        assert_refused(command_line(*arguments(tmp_path)), f"process {os.getpid()} on", "one run at a time")
+        other = "import sys; from pathlib import Path; from scene.files import locked\n"
+        other += "with locked(Path(sys.argv[1])): pass"
+        done = subprocess.run(
+            [sys.executable, "-c", other, str(tmp_path)], capture_output=True, text=True, check=False
+        )
+        assert "BadInput" in done.stderr
+    assert digest_of(command_line(*arguments(tmp_path))) == whole[N]
+    (tmp_path / LOCK).write_text("process 1 on a machine that lost power")  # nobody holds it
+    assert digest_of(command_line(*arguments(tmp_path, "--resume"))) == whole[N]
+
+
+@pytest.mark.parametrize(
+    ("change", "options", "words"),
+    [
+        ({}, [], ["holds this run", "--resume"]),
+        ({}, ["--resume", "--seed", 8], ["seed = 7 there, 8 asked for"]),
+        ({}, ["--resume", "--energy", 41], ["energy = 40.0 there, 41.0 asked for"]),
+        ({}, ["--resume", "--cycles", 2], ["cycles = 1 there, 2 asked for"]),
+        ({}, ["--resume", "--particles", 5], ["particles = 330 there, 5 asked for"]),
+        ({}, ["--resume", "--block", 65], ["block = 64 there, 65 asked for"]),
+        ({"schema": 0}, ["--resume"], ["schema = 0 there, 1 asked for"]),
+        ({"version": "0.0.9"}, ["--resume"], ["version = '0.0.9' there", repr(mushrooms.__version__)]),
+        ({"scene": {"table": "stem"}}, ["--resume"], ["scene: ", "= None there"]),
+    ],
+)
+def test_another_run_in_the_folder_is_refused(command_line, tmp_path, change, options, words):
+    digest_of(command_line(*arguments(tmp_path)))
+    path = tmp_path / "ensemble.zarr" / "zarr.json"
+    data = json.loads(path.read_text())
+    data["attributes"] |= change
+    path.write_text(json.dumps(data))
+    before = {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()}
+    assert_refused(command_line(*arguments(tmp_path, *options)), *words)
+    assert before == {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()}
+
+
+def test_a_description_that_is_damaged_is_refused(command_line, tmp_path):
+    digest_of(command_line(*arguments(tmp_path)))
+    path = tmp_path / "ensemble.zarr" / "zarr.json"
+    path.write_bytes(path.read_bytes()[:100])
+    assert_refused(command_line(*arguments(tmp_path, "--resume")), "description is damaged")
+    assert_refused(command_line("draw", tmp_path, "--out", tmp_path / "a.svg"), "description is damaged")
+
+
+def test_blocks_of_another_run_do_not_count(command_line, tmp_path, followed, whole):
+    """Files that somebody moved here: each is as it was written, but of another seed."""
+    digest_of(command_line(*arguments(tmp_path / "other", "--seed", 8)))
+    (tmp_path / "other" / "ensemble.zarr" / "zarr.json").unlink()
+    assert digest_of(command_line(*arguments(tmp_path / "other"))) == whole[N]
+
+
+def test_a_machine_with_other_numbers_does_not_go_on(command_line, tmp_path, monkeypatch):
+    digest_of(command_line(*arguments(tmp_path)))
+    simulate = fast.simulate
+
+    def other(scene, **options):
+        run = simulate(scene, **options)
+        return run._replace(x=np.nextafter(run.x, 1.0))
+
+    monkeypatch.setattr(fast, "simulate", other)
+    assert_refused(command_line(*arguments(tmp_path, "--resume", n=500)), "x of its first particles", "numba")
+
+
+def test_limits_end_in_a_run_that_goes_on(command_line, tmp_path, monkeypatch, whole):
+    code, out, err = command_line(*arguments(tmp_path, "--max-collisions", 3))
+    assert (code, out) == (3, "")
+    assert "makes" in err
+    assert "--max-collisions = 3: 0 of 330 particles are kept; go on with: mushrooms simulate" in err
+    now = iter(range(10**6))
+    monkeypatch.setattr(conduct, "CLOCK", lambda: float(next(now)))
+    code, out, err = command_line(*arguments(tmp_path, "--resume", "--max-seconds", 20))
+    assert (code, out) == (3, "")
+    n_kept = int(err.split("passed: ")[1].split(" of")[0])
+    assert 0 < n_kept < N
+    done = command_line(*arguments(tmp_path, "--resume", "--max-collisions", 10**6))
+    assert digest_of(done) == whole[N]
+
+
+@pytest.mark.parametrize(
+    ("options", "word"),
+    [
+        (["--resume"], "--resume needs --out"),
+        (["--max-seconds", 1], "--max-seconds needs --out"),
+        (["--dask", "tcp://here:1"], "--dask needs --out"),
+        (["--block", 0], "--block = 0"),
+    ],
+)
+def test_what_needs_a_folder_says_so(command_line, options, word):
+    assert_refused(command_line(*RUN, "--particles", 5, *options), word)
+
+
+def test_the_time_of_day_decides_nothing(command_line, tmp_path, monkeypatch, whole):
+    """It jumps back and forth; and no module of the store asks for it."""
+    jumps = np.random.default_rng(1).uniform(0, 4e9, 10**5).tolist()
+    monkeypatch.setattr(time, "time", jumps.pop)
+    assert digest_of(command_line(*arguments(tmp_path, "--max-seconds", 1e6))) == whole[N]
+    assert digest_of(command_line(*arguments(tmp_path, "--resume"))) == whole[N]
+    for path in [*(ROOT / "mushrooms" / "store").glob("*.py"), ROOT / "mushrooms" / "simulate.py"]:
+        names = {n.attr for n in ast.walk(ast.parse(path.read_text())) if isinstance(n, ast.Attribute)}
+        assert not names & {"time", "time_ns", "now", "utcnow", "today", "st_mtime", "localtime"}, path
+
+
+def test_progress_tells_rate_and_losses(capsys, monkeypatch):
+    from mushrooms.store import watch
+
+    now = iter(range(0, 10**6, 50))
+    monkeypatch.setattr(conduct, "CLOCK", lambda: float(next(now)))
+    counts = tally.Tally(particles=500, followed=498, undecided=1, collisions=10**6)
+    with watch.Watch("run", 2000, tally.Tally(particles=500)) as seen:
+        seen.kept(blocks.Block({}, counts, 1.0))
+        seen.tick(3)
+    lines = capsys.readouterr().err.splitlines()
+    assert lines
+    assert "run: 1,000 of 2,000 particles," in lines[-1]
+    assert all(
+        word in lines[-1]
+        for word in (" a second, ", "left", "collisions a second", "502 lost", "1 undecided")
+    )
+
+
+def test_sums_are_exact_and_merge_in_any_order():
+    random = np.random.default_rng(2)
+    values = np.concatenate(
+        [random.normal(size=3000) * 10.0 ** random.integers(-300, 30, 3000), [0.0, -0.0, 5e-324, -3e-310]]
+    )
+    wanted = sum((Fraction(x) for x in values.tolist()), Fraction(0))
+    assert Fraction(tally.exact_sum(values), 2**1074) == wanted
+    gains = random.normal(0.1, 0.4, 5000) * 10.0 ** random.integers(-5, 2, 5000)
+    moments = tally.moments_of(gains)
+    assert moments.mean == pytest.approx(gains.mean(), rel=1e-12)
+    assert moments.variance == pytest.approx(gains.var(ddof=1), rel=1e-12)
+    floats = set()
+    for _ in range(5):
+        parts = np.split(random.permutation(gains), np.sort(random.integers(0, 5001, 7)))
+        merged, histogram, plain = tally.Moments(), tally.Histogram(), 0.0
+        for part in parts:
+            merged = merged.merged(tally.moments_of(part))
+            plain = float(np.cumsum([plain, *part])[-1])
+            histogram = histogram.merged(tally.histogram_of(part))
+        floats.add(plain)
+        assert merged == moments
+        assert histogram.counts.tolist() == tally.histogram_of(gains).counts.tolist()
+    assert len(floats) > 1  # a faulty tally, of plain floats, would be found out
+    assert tally.moments_of(np.array([1.0, -np.inf])).mean is None
+
+
+def faulty_chunk(self, number, name, _marker):
+    return (self.folder / blocks.GROUP / self.shape.chunk(name, number)).read_bytes()
+
+
+def faulty_follow(wish, piece, threads, tick=None):
+    return follow(wish, piece._replace(first=0), threads, tick)
+
+
+def faulty_digest(run):
+    """Go block by block, all fields of each."""
+    import hashlib
+
+    found = hashlib.sha256()
+    for number in range(run.shape.n_blocks):
+        for source in digest.DIGESTED:
+            found.update(b"" if (array := digest.part(run, number, source)) is None else array.tobytes())
+    return found.hexdigest()
+
+
+follow = engines.follow
+
+
+@pytest.mark.parametrize(
+    ("owner", "name", "faulty"),
+    [
+        (blocks.RunFolder, "_chunk", faulty_chunk),
+        (engines, "follow", faulty_follow),
+        (digest, "sha256", faulty_digest),
+    ],
+)
+def test_faulty_stores_are_found_out(command_line, tmp_path, monkeypatch, whole, owner, name, faulty):
+    monkeypatch.setattr(owner, name, faulty)
+    command_line(*arguments(tmp_path))
+    path = tmp_path / "ensemble.zarr" / "t" / "c.2"
+    path.write_bytes(flipped(path.read_bytes()))
+    ended = command_line(*arguments(tmp_path, "--resume"))
+    assert ended.code != 0 or json.loads(ended.out)["sha256"] != whole[N]
+
+
+def test_a_seal_tells_every_flipped_bit(tmp_path):
+    from scene.files import unsealed
+
+    path = tmp_path / "a"
+    content = sealed(b"numbers")
+    path.write_bytes(content)
+    assert unsealed(path) == b"numbers"
+    for i in range(8 * len(content)):
+        path.write_bytes(content[: i // 8] + bytes([content[i // 8] ^ 1 << i % 8]) + content[i // 8 + 1 :])
+        assert unsealed(path) is None

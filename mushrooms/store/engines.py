@@ -25,6 +25,7 @@ Engine = Callable[[Asked, Iterator[Piece], Tick], Following]
 SCALE = "pip install 'oscillating-mushrooms[scale]'"
 RETRIES = 10  # of a block whose workers fail or die
 AHEAD = 2  # blocks waiting for each thread of the cluster: no worker idles, and few blocks are in memory
+PATIENCE = 10.0  # seconds in which a scheduler must answer
 LOOK = 0.5  # seconds after which limits are looked at while no block comes
 
 
@@ -85,7 +86,7 @@ def by_dask(address: str, threads: int | None) -> Engine:
 
     def engine(asked: Asked, pieces: Iterator[Piece], tick: Tick) -> Following:
         try:
-            client = Client(address, timeout=10, set_as_default=False)
+            client = Client(address, timeout=PATIENCE)
         except (OSError, ValueError) as error:
             raise BadInput(f"--dask = {address}: no scheduler answers ({type(error).__name__})") from None
         with client:

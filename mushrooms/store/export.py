@@ -12,7 +12,7 @@ import zipfile
 from collections.abc import Callable, Iterator
 from itertools import product
 from pathlib import Path
-from typing import BinaryIO
+from typing import Any, BinaryIO
 
 import numpy as np
 
@@ -107,5 +107,6 @@ def _tables(run: RunFolder) -> Iterator[Arrays]:
             array = run.read(number, name)
             for place in product(*map(range, array.shape[1:])):
                 words = [WALLS[i] if FIELDS[name].dims[-1] == "wall" else str(i + 1) for i in place]
-                columns["_".join([name, *words])] = array[(slice(None), *place)]
+                at: Any = (slice(None), *place)
+                columns["_".join([name, *words])] = array[at]
         yield columns

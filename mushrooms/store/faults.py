@@ -27,8 +27,8 @@ from mushrooms.store.blocks import GROUP, MARKERS
 from scene.files import write_file
 
 SCENE, ENERGY = "fermi-ulam", 1e3
-PARTICLES, BLOCK = 2000, 100
-LONGEST = 3.0  # seconds after which a child is killed at the latest
+PARTICLES, BLOCK = 3000, 20  # so that most of the time files are being written
+LONGEST = 1.5  # seconds after which a child is killed at the latest
 
 
 def main(
@@ -41,16 +41,13 @@ def main(
     ).sha256()
     random, moments, digests = np.random.default_rng(seed), Counter[str](), Counter[str]()
     with TemporaryDirectory() as place:
-        began = time.perf_counter()
-        _child(Path(place) / "whole", seed, None)
-        lasts = min(LONGEST, time.perf_counter() - began)
         n_killed, number = 0, 0
         while n_killed < kills:
             number += 1
             folder = Path(place) / str(number)
             # Each run is killed until it has come to its end before it could be.
             while n_killed < kills and not (folder / "sha256").exists():
-                code = _child(folder, seed, float(random.uniform(0.0, 0.5 * lasts)))
+                code = _child(folder, seed, float(random.uniform(0.0, LONGEST)))
                 if code == -signal.SIGKILL:
                     n_killed += 1
                     moments[_left(folder)] += 1
@@ -96,10 +93,11 @@ def _left(folder: Path) -> str:
     if any(folder.rglob(".*.part")):
         return "while a file was written"
     n_chunks = len(list((folder / GROUP).glob("*/c.*")))
+    n_arrays = len(list((folder / GROUP).glob("*/zarr.json")))
     n_markers = len(list((folder / MARKERS).glob("*.marker")))
     if not n_chunks:
         return "before a block was there"
-    return "between a block's files" if n_chunks % max(n_markers, 1) else "between blocks"
+    return "between blocks" if n_chunks == n_arrays * n_markers else "between a block's files"
 
 
 if __name__ == "__main__":

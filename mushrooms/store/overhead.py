@@ -43,7 +43,8 @@ def main(
     asked = Asked(scenes.load(scene), energy, 1, 1)
     fast.simulate(asked.scene, n_particles=1, energy=energy)  # compiled
     block = conduct.block_size(asked, threads or os.cpu_count() or 1)
-    bare, stored, digests = [], [], set()
+    digests: set[str] = set()
+    bare, stored = list[Lap](), list[Lap]()
 
     def follow() -> str:
         return fast.simulate(
@@ -61,7 +62,7 @@ def main(
     for _ in range(laps):
         with TemporaryDirectory(dir=folder) as place:
             bare.append(_timed(follow, digests))
-            stored.append(_timed(lambda: keep(Path(place)), digests))  # noqa: B023 (called at once)
+            stored.append(_timed(lambda: keep(Path(place)), digests))
     print(f"{scene} at E0 = {energy:g}: {particles:,} particles in blocks of {block:,}, {laps} laps each")
     for name in Lap._fields:
         a, b = (min(getattr(lap, name) for lap in those) for those in (bare, stored))

@@ -5,14 +5,14 @@ A file gets its name only when it is complete and on the disk. A sealed one ends
 
 from __future__ import annotations
 
-import fcntl
 import hashlib
 import os
 import platform
+import sys
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import BinaryIO
+from typing import BinaryIO, TextIO
 
 from scene.refusal import BadInput
 
@@ -84,7 +84,7 @@ def locked(folder: Path) -> Iterator[None]:
     path = folder / LOCK
     with path.open("a+", encoding="utf-8") as file:
         try:
-            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            _hold(file)
             # A holder that has just ended may have removed the file that we opened.
             is_ours = os.path.samestat(os.fstat(file.fileno()), path.stat())
         except OSError:
@@ -99,4 +99,18 @@ def locked(folder: Path) -> Iterator[None]:
         try:
             yield
         finally:
-            path.unlink(missing_ok=True)
+            with suppress(PermissionError):  # Windows removes no open file; one that nobody holds is harmless
+                path.unlink(missing_ok=True)
+
+
+def _hold(file: TextIO) -> None:
+    """Lock an open file, or raise OSError at once; the system unlocks it when the process ends."""
+    if sys.platform == "win32":
+        import msvcrt
+
+        file.seek(2**30)  # what is locked cannot be read there, and the holder's name is to be read
+        msvcrt.locking(file.fileno(), msvcrt.LK_NBLCK, 1)
+    else:
+        import fcntl
+
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)

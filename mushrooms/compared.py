@@ -6,14 +6,14 @@ import math
 from typing import Any
 
 from mushrooms.store.asked import Asked
-from mushrooms.store.tally import Tally
+from mushrooms.store.tally import RunTally
 from scene import Mushroom
 from scene.refusal import BadInput
 
 DIGITS = 10  # of the adiabatic theory: a run knows six at most
 
 
-def measured(asked: Asked, tally: Tally) -> dict[str, Any]:
+def measured(asked: Asked, tally: RunTally) -> dict[str, Any]:
     """Return m1 and p_nc as measured, as predicted, and the difference in standard errors (z).
 
     The prediction is that at the run's energy where rates of the scene's frozen tables are known. Elsewhere

@@ -68,37 +68,24 @@ def simulate(
 
     Prints particles, collisions, lost (not followed to the end), undecided (those of the lost
     that the stepper could not decide), careful (collisions found by the careful step, some fifty times
-    slower), m1 (mean of log E/E0 per cycle) with its standard error, p_nc (share of cycles without
-    capture), what theory says of both and how many standard errors they are off (z),
-    ns_per_collision (and thread) and the SHA-256 of the result.
+    slower), m1 (mean of log E/E0 per cycle) with its standard error, p_nc (share of cycles without capture),
+    what theory says of both, how many standard errors they are off (z), ns_per_collision and the SHA-256.
     Particles that no cycle ever frees from the island count neither in m1 nor in p_nc.
 
-    With --out particles are kept block by block in DIR/ensemble.zarr: whatever ends a run, --resume goes on
-    with it, to the same bits. Exit code 0; 3 when a limit has stopped it, 130 when it was interrupted: both
-    say how to go on.
+    With --out particles are kept block by block: whatever ends a run, --resume goes on with it, to the same
+    bits. Exit code 0; 3 when a limit has stopped it, 130 when it was interrupted: both say how to go on.
 
-    On stderr: before a run of over 20 s about how many collisions and how long; after a run of over a
-    second that careful steps took over a tenth of it, if they did.
+    On stderr: before a run of over 20 s about how many collisions and how long; after one of over a second
+    that careful steps took over a tenth of it, if they did.
     """
     _check_ensemble(particles, energy, cycles, seed, threads)
-    _check_stored(
-        out, particles, resume=resume, dask=dask, max_collisions=max_collisions, max_seconds=max_seconds
-    )
+    kept = {"resume": resume, "dask": dask, "max_collisions": max_collisions, "max_seconds": max_seconds}
+    _check_stored(out, particles, block, **kept)
     _check_plot(plot, particles, cycles)
-    if block is not None:
-        check_range("--block", block, 1)
     from mushrooms.store.asked import Asked
 
-    wish = Wish(
-        scene,
-        Asked(scenes.load(scene), energy, cycles, seed),
-        particles,
-        threads,
-        dask,
-        block,
-        max_collisions,
-        max_seconds,
-    )
+    asked = Asked(scenes.load(scene), energy, cycles, seed)
+    wish = Wish(scene, asked, particles, threads, dask, block, max_collisions, max_seconds)
     if out is None:
         summary, first = _in_memory(wish)
     else:
@@ -147,9 +134,11 @@ def _check_ensemble(particles: int, energy: float, cycles: int, seed: int, threa
         check_range("--threads", threads, 1)
 
 
-def _check_stored(out: Path | None, particles: int, **options: Any) -> None:
+def _check_stored(out: Path | None, particles: int, block: int | None, **options: Any) -> None:
     """Check what only a run on disk can have."""
     check_range("--particles", particles, 1, MOST_IN_MEMORY if out is None else MOST_ON_DISK)
+    if block is not None:
+        check_range("--block", block, 1)
     for name, value in options.items():
         option = f"--{name.replace('_', '-')}"
         if out is None and value not in (None, False):
@@ -258,7 +247,7 @@ def _complete(wish: Wish, run: Any) -> None:
     seconds = run.seconds
     is_told = wish.dask is not None  # of how fast a cluster is nothing is known here
     engine = engines.by_dask(wish.dask, wish.threads) if wish.dask else engines.in_process(wish.threads)
-    limits = conduct.Limits(wish.max_collisions, wish.max_seconds)
+    limits = conduct.RunLimits(wish.max_collisions, wish.max_seconds)
 
     with compilation_told(), Watch(wish.name, wish.particles, before) as watch:
 

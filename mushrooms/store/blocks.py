@@ -17,7 +17,7 @@ import numpy as np
 
 from mushrooms.store.asked import Asked, asked_of, made_by
 from mushrooms.store.layout import Array, Arrays, Shape, from_chunk, metadata, to_chunk
-from mushrooms.store.tally import Tally, tally_from
+from mushrooms.store.tally import RunTally, tally_from
 from scene.files import sealed, unsealed, write_file, write_files
 from scene.refusal import BadInput
 
@@ -48,7 +48,7 @@ class Block(NamedTuple):
     """
 
     arrays: Arrays
-    tally: Tally
+    tally: RunTally
     seconds: float
 
     def joined(self, rest: Block) -> Block:
@@ -57,11 +57,11 @@ class Block(NamedTuple):
         return Block(arrays, self.tally.merged(rest.tally), self.seconds + rest.seconds)
 
 
-class Run(Protocol):
+class AnyRun(Protocol):
     """Where blocks are kept."""
 
     shape: Shape
-    tally: Tally
+    tally: RunTally
     seconds: float
 
     def missing(self) -> Iterator[Piece]:
@@ -75,10 +75,10 @@ class Run(Protocol):
 
 
 class RunInMemory:
-    """A run that is kept nowhere else; see `Run`."""
+    """A run that is kept nowhere else; see `AnyRun`."""
 
     def __init__(self, shape: Shape) -> None:
-        self.shape, self.tally, self.seconds = shape, Tally(), 0.0
+        self.shape, self.tally, self.seconds = shape, RunTally(), 0.0
         self._blocks: dict[int, Arrays] = {}
 
     def missing(self) -> Iterator[Piece]:
@@ -107,12 +107,12 @@ class Marker(NamedTuple):
 
     rows: int
     sums: dict[str, str]
-    tally: Tally
+    tally: RunTally
     seconds: float
 
 
 class RunFolder:
-    """A run in a folder; see `Run`. Whoever writes must hold the folder (`scene.files.locked`).
+    """A run in a folder; see `AnyRun`. Whoever writes must hold the folder (`scene.files.locked`).
 
     Attributes:
         folder: holds GROUP, which xarray reads, and MARKERS.
@@ -124,7 +124,7 @@ class RunFolder:
 
     def __init__(self, folder: Path, asked: Asked, shape: Shape, command: str) -> None:
         self.folder, self.asked, self.shape, self.command = folder, asked, shape, command
-        self.tally, self.seconds = Tally(), 0.0
+        self.tally, self.seconds = RunTally(), 0.0
         self._rows: dict[int, int] = {}  # particles that are there, by block
         self._is_described = False
         # A marker of another run, left in the folder by whoever moved files, is none of this one.
@@ -145,7 +145,7 @@ class RunFolder:
     def check(self) -> list[int]:
         """Look at every block, count those that are as they were written, and return the damaged ones."""
         damaged = []
-        self._rows, self.tally, self.seconds = {}, Tally(), 0.0
+        self._rows, self.tally, self.seconds = {}, RunTally(), 0.0
         for path in self.folder.rglob(".*.part"):  # what a process was writing when it ended
             path.unlink(missing_ok=True)
         for number in range(self.shape.n_blocks):
@@ -221,7 +221,7 @@ class RunFolder:
                 f"run {str(self.folder)!r} has {there} of {n} particles: go on with {self.command}"
             )
 
-    def _count(self, number: int, rows: int, tally: Tally, seconds: float) -> None:
+    def _count(self, number: int, rows: int, tally: RunTally, seconds: float) -> None:
         self._rows[number] = rows
         self.tally, self.seconds = self.tally.merged(tally), self.seconds + seconds
 

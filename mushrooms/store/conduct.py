@@ -18,7 +18,7 @@ import numpy as np
 from fast.narrowings import narrowings
 from mushrooms.forecast import expected_collisions
 from mushrooms.store.asked import Asked, difference
-from mushrooms.store.blocks import Block, Piece, Run, RunFolder, attributes_of, is_run
+from mushrooms.store.blocks import AnyRun, Block, Piece, RunFolder, attributes_of, is_run
 from mushrooms.store.engines import Engine, Tick, follow
 from mushrooms.store.layout import Shape
 from scene.refusal import BadInput
@@ -31,7 +31,7 @@ MARKER_BYTES = 2**16  # of a block's files beside its chunks, at most
 CLOCK = time.monotonic
 
 
-class Limits(NamedTuple):
+class RunLimits(NamedTuple):
     """Where a run stops although it is not at its end; None for no limit.
 
     Attributes:
@@ -102,7 +102,7 @@ def opened(
 
 
 def complete(
-    run: Run, asked: Asked, engine: Engine, limits: Limits, tick: Tick, kept: Callable[[Block], None]
+    run: AnyRun, asked: Asked, engine: Engine, limits: RunLimits, tick: Tick, kept: Callable[[Block], None]
 ) -> None:
     """Follow what is missing, and keep it block by block.
 

@@ -10,14 +10,14 @@ import hashlib
 import numpy as np
 
 from fast import Ensemble
-from mushrooms.store.blocks import Run
+from mushrooms.store.blocks import AnyRun
 from mushrooms.store.layout import FIELDS, Array
 
 BY_SOURCE = {field.source: name for name, field in FIELDS.items()}
 DIGESTED = Ensemble._fields[1:-2]  # neither energy0 nor times
 
 
-def sha256(run: Run) -> str:
+def sha256(run: AnyRun) -> str:
     """Return the SHA-256 of a run that has all its blocks.
 
     Raises:
@@ -32,7 +32,7 @@ def sha256(run: Run) -> str:
     return digest.hexdigest()
 
 
-def part(run: Run, number: int, source: str) -> Array | None:
+def part(run: AnyRun, number: int, source: str) -> Array | None:
     """Return a field of `fast.Ensemble` for the particles of a block; None where it holds nothing."""
     if source == "energy":
         return run.read(number, "energy")[:, -1]

@@ -24,7 +24,7 @@ from mushrooms.store.engines import in_process
 from scene.files import locked
 
 
-class Lap(NamedTuple):
+class Took(NamedTuple):
     """What one lap took [s]."""
 
     wall: float
@@ -44,7 +44,7 @@ def main(
     fast.simulate(asked.scene, n_particles=1, energy=energy)  # compiled
     block = conduct.block_size(asked, threads or os.cpu_count() or 1)
     digests: set[str] = set()
-    bare, stored = list[Lap](), list[Lap]()
+    bare, stored = list[Took](), list[Took]()
 
     def follow() -> str:
         return fast.simulate(
@@ -55,7 +55,7 @@ def main(
         with locked(place):
             run, _ = conduct.opened(place, asked, particles, None, block, "", False)
             conduct.complete(
-                run, asked, in_process(threads), conduct.Limits(), lambda _n: None, lambda _b: None
+                run, asked, in_process(threads), conduct.RunLimits(), lambda _n: None, lambda _b: None
             )
             return digest.sha256(run)
 
@@ -64,16 +64,16 @@ def main(
             bare.append(_timed(follow, digests))
             stored.append(_timed(lambda: keep(Path(place)), digests))
     print(f"{scene} at E0 = {energy:g}: {particles:,} particles in blocks of {block:,}, {laps} laps each")
-    for name in Lap._fields:
+    for name in Took._fields:
         a, b = (min(getattr(lap, name) for lap in those) for those in (bare, stored))
         print(f"{name:<4}  bare {a:.2f} s, stored {b:.2f} s: {b / a - 1:+.1%}")
     raise typer.Exit(0 if len(digests) == 1 else 1)
 
 
-def _timed(work: Callable[[], str], digests: set[str]) -> Lap:
+def _timed(work: Callable[[], str], digests: set[str]) -> Took:
     wall, cpu = time.perf_counter(), time.process_time()
     digests.add(work())
-    return Lap(time.perf_counter() - wall, time.process_time() - cpu)
+    return Took(time.perf_counter() - wall, time.process_time() - cpu)
 
 
 if __name__ == "__main__":

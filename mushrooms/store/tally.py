@@ -104,7 +104,7 @@ def histogram_of(values: FloatArray) -> Histogram:
     return Histogram(low, np.bincount(bins - low).astype(np.int64))
 
 
-class Tally(NamedTuple):
+class RunTally(NamedTuple):
     """What some particles of a run come to.
 
     Attributes:
@@ -126,9 +126,9 @@ class Tally(NamedTuple):
     gain: Moments = Moments()
     first: Histogram = Histogram()
 
-    def merged(self, other: Tally) -> Tally:
+    def merged(self, other: RunTally) -> RunTally:
         """Return the tally of both."""
-        return Tally(
+        return RunTally(
             particles=self.particles + other.particles,
             followed=self.followed + other.followed,
             undecided=self.undecided + other.undecided,
@@ -147,21 +147,21 @@ class Tally(NamedTuple):
         return {**counts, "gain": [hex(number) for number in self.gain], "first": first}
 
 
-def tally_from(data: dict[str, Any]) -> Tally:
-    """Return a tally from what `Tally.to_data` has made of it."""
+def tally_from(data: dict[str, Any]) -> RunTally:
+    """Return a tally from what `RunTally.to_data` has made of it."""
     gain = Moments(*(int(number, 16) for number in data["gain"]))
     low, counts = data["first"]
-    rest = {name: data[name] for name in Tally._fields[:7]}
-    return Tally(**rest, gain=gain, first=Histogram(low, np.array(counts, np.int64)))
+    rest = {name: data[name] for name in RunTally._fields[:7]}
+    return RunTally(**rest, gain=gain, first=Histogram(low, np.array(counts, np.int64)))
 
 
-def tally_of(ensemble: Ensemble) -> Tally:
+def tally_of(ensemble: Ensemble) -> RunTally:
     """Return the tally of an ensemble."""
     takes_part = ensemble.takes_part()
     energies = ensemble.cycle_energies[takes_part]
     with np.errstate(divide="ignore"):
         first, last = (np.log(energies[:, k] / ensemble.energy0) for k in (0, -1))
-    return Tally(
+    return RunTally(
         particles=len(ensemble.energy),
         followed=int((ensemble.outcome == FOLLOWED).sum()),
         undecided=int((ensemble.outcome == UNDECIDED).sum()),

@@ -8,7 +8,7 @@ from types import TracebackType
 from mushrooms.forecast import in_words
 from mushrooms.store import conduct
 from mushrooms.store.blocks import Block
-from mushrooms.store.tally import Tally
+from mushrooms.store.tally import RunTally
 from mushrooms.terminal import progress_bar
 
 EVERY = 60.0  # seconds between lines where there is no terminal
@@ -23,7 +23,7 @@ class Watch:
         before: what was there already.
     """
 
-    def __init__(self, name: str, n_particles: int, before: Tally) -> None:
+    def __init__(self, name: str, n_particles: int, before: RunTally) -> None:
         self._name, self._n, self._before, self._all = name, n_particles, before, before
         self._bar, self._begin = progress_bar(), conduct.CLOCK()
         self._told = self._begin

@@ -288,6 +288,10 @@ def test_limits_end_in_a_run_that_goes_on(command_line, tmp_path, monkeypatch, w
         (["--max-seconds", 1], "--max-seconds needs --out"),
         (["--dask", "tcp://here:1"], "--dask needs --out"),
         (["--block", 0], "--block = 0"),
+        (
+            ["--block", 2, "--particles", 10**8],
+            "--block = 2: 100000000 particles need blocks of at least 100",
+        ),
     ],
 )
 def test_what_needs_a_folder_says_so(command_line, options, word):

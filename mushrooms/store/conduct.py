@@ -26,6 +26,7 @@ from scene.refusal import BadInput
 BLOCK_COLLISIONS = 2e8  # of a block, some seconds: what a fault can cost, and long beside a block's files
 LEAST_BLOCK, MOST_BLOCK = 256, 2**17  # particles: a thread's lanes are full, and memory stays small
 LANES_OF_A_THREAD = 128  # particles that a thread needs to be quick
+MOST_BLOCKS = 10**6
 PROBED = 4  # particles followed again before a run is gone on with
 MARKER_BYTES = 2**16  # of a block's files beside its chunks, at most
 CLOCK = time.monotonic
@@ -57,7 +58,14 @@ def block_size(asked: Asked, threads: int) -> int:
 
 
 def shape_of(asked: Asked, n_particles: int, block: int) -> Shape:
-    """Return the sizes of a run."""
+    """Return the sizes of a run.
+
+    Raises:
+        BadInput: it would have more blocks than a folder can hold well.
+    """
+    if n_particles > MOST_BLOCKS * block:
+        least = -(-n_particles // MOST_BLOCKS)
+        raise BadInput(f"--block = {block}: {n_particles} particles need blocks of at least {least}")
     return Shape(n_particles, block, asked.n_cycles, len(narrowings(asked.scene)))
 
 
@@ -154,8 +162,7 @@ def _probe(run: RunFolder) -> None:
 
 
 def _check_disk(run: RunFolder) -> None:
-    pieces = list(run.missing())
-    needed = sum(piece.n for piece in pieces) * run.shape.bytes_of_a_particle + len(pieces) * MARKER_BYTES
+    needed = sum(piece.n * run.shape.bytes_of_a_particle + MARKER_BYTES for piece in run.missing())
     free = shutil.disk_usage(run.folder).free
     if needed > free:
         raise BadInput(

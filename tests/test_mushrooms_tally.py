@@ -58,6 +58,5 @@ def test_progress_tells_rate_and_losses(capsys, monkeypatch):
     assert lines
     assert "run: 1,000 of 2,000 particles," in lines[-1]
     assert all(
-        word in lines[-1]
-        for word in (" a second, ", "left", "collisions a second", "502 lost", "1 undecided")
+        word in lines[-1] for word in (" particles/s, ", "left", "collisions/s", "502 lost", "1 undecided")
     )

@@ -48,18 +48,22 @@ class Watch:
     def kept(self, block: Block) -> None:
         """Take note of a block."""
         self._all = self._all.merged(block.tally)
-        self._bar.update(self._task, description=f"{self._name}: {self.text()}")
+        self._bar.update(self._task, description=f"{self._name}\n{self._pace()}")  # the bar tells the rest
         self.tick(0)
 
     def text(self) -> str:
         """Return how far the run is, by the blocks that are kept."""
-        now, seconds = self._all, max(conduct.CLOCK() - self._begin, 1e-9)
-        n_here = now.particles - self._before.particles
-        rate = n_here / seconds
-        left = in_words((self._n - now.particles) / rate) + " left" if rate else "time left unknown"
-        collisions = (now.collisions - self._before.collisions) / seconds
-        lost = now.particles - now.followed
-        return (
-            f"{now.particles:,} of {self._n:,} particles, {rate:.3g} a second, {left},"
-            f" {collisions:.2g} collisions a second, {lost} lost, {now.undecided} undecided"
-        )
+        left = self._n - self._all.particles
+        rate = self._rate("particles")
+        told = in_words(left / rate) + " left" if rate else "time left unknown"
+        return f"{self._all.particles:,} of {self._n:,} particles, {told}, {self._pace()}"
+
+    def _pace(self) -> str:
+        rates = f"{self._rate('particles'):.3g} particles/s, {self._rate('collisions'):.2g} collisions/s"
+        lost = self._all.particles - self._all.followed
+        return f"{rates}, {lost} lost, {self._all.undecided} undecided"
+
+    def _rate(self, what: str) -> float:
+        """Return how many of them a second have been kept here."""
+        n = getattr(self._all, what) - getattr(self._before, what)
+        return float(n / max(conduct.CLOCK() - self._begin, 1e-9))

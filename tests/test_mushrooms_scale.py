@@ -10,6 +10,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import distributed
 import numpy as np
 import pytest
 from support.refusals import assert_refused
@@ -19,7 +20,6 @@ from mushrooms.main import run
 from mushrooms.store import blocks, engines
 from scene import load
 
-distributed = pytest.importorskip("distributed", reason="the extra [scale] is not installed")
 DOCS = Path(__file__).parent.parent / "docs"
 N, ENERGY, SEED = 300, 60.0, 5
 RUN = ["simulate", "moving-cap", "--particles", N, "--energy", ENERGY, "--seed", SEED, "--json"]

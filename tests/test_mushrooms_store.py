@@ -128,8 +128,16 @@ def emptied(_content):
     return b""
 
 
-@pytest.mark.parametrize("damage", [truncated, flipped, emptied])
-@pytest.mark.parametrize("name", ["ensemble.zarr/t/c.2", "ensemble.zarr/collisions/c.2.0", "blocks/2.marker"])
+@pytest.mark.parametrize(
+    ("damage", "name"),
+    [
+        (truncated, "ensemble.zarr/t/c.2"),
+        (flipped, "ensemble.zarr/collisions/c.2.0"),
+        (emptied, "ensemble.zarr/outcome/c.2"),
+        (truncated, "blocks/2.marker"),
+        (flipped, "blocks/2.marker"),
+    ],
+)
 def test_a_damaged_file_is_found_and_its_block_followed_again(
     command_line, tmp_path, followed, whole, damage, name
 ):
@@ -160,7 +168,7 @@ def test_the_digest_does_not_take_a_chunk_that_changes_at_the_last_moment(
     assert_refused(command_line(*arguments(tmp_path)), "c.1", "damaged")
 
 
-@pytest.mark.parametrize("n_writes", [0, 1, 5, 20, 28, 29])
+@pytest.mark.parametrize("n_writes", [0, 5, 20, 28])
 def test_a_full_disk_leaves_a_run_that_goes_on(command_line, tmp_path, monkeypatch, whole, n_writes):
     """Whichever file the disk has no room for: of the description, a chunk, a marker."""
     fsync, left = os.fsync, n_writes

@@ -13,13 +13,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from support.harm import harmed
 from support.refusals import assert_refused
 
 import fast
 import mushrooms
 from mushrooms.store import asked, blocks, conduct, digest, engines
 from scene import load
-from scene.files import LOCK, locked
+from scene.files import LOCK, locked, sealed, unsealed
 
 ROOT = Path(__file__).parent.parent
 N, ENERGY, SEED = 330, 40.0, 7
@@ -238,19 +239,27 @@ def test_one_writer_holds_a_folder(command_line, tmp_path, whole):
 )
 def test_another_run_in_the_folder_is_refused(command_line, tmp_path, change, options, words):
     digest_of(command_line(*arguments(tmp_path)))
-    path = tmp_path / "ensemble.zarr" / "zarr.json"
-    data = json.loads(path.read_text())
-    data["attributes"] |= change
-    path.write_text(json.dumps(data))
+    path = tmp_path / "blocks" / blocks.DESCRIPTION
+    path.write_bytes(sealed(json.dumps(json.loads(unsealed(path)) | change).encode()))
     before = {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()}
     assert_refused(command_line(*arguments(tmp_path, *options)), *words)
     assert before == {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()}
 
 
-def test_a_description_that_is_damaged_is_refused(command_line, tmp_path):
+def test_a_description_is_there_twice_and_refused_when_both_are_damaged(
+    command_line, tmp_path, followed, whole
+):
     digest_of(command_line(*arguments(tmp_path)))
-    path = tmp_path / "ensemble.zarr" / "zarr.json"
-    path.write_bytes(path.read_bytes()[:100])
+    paths = [tmp_path / "ensemble.zarr" / "zarr.json", tmp_path / "blocks" / blocks.DESCRIPTION]
+    for path in paths:
+        content = path.read_bytes()
+        path.write_bytes(truncated(content))
+        followed.clear()
+        assert digest_of(command_line(*arguments(tmp_path, "--resume"))) == whole[N]
+        assert followed == [(0, conduct.PROBED)]
+        assert len(path.read_bytes()) == len(content)
+    for path in paths:
+        path.write_bytes(truncated(path.read_bytes()))
     assert_refused(command_line(*arguments(tmp_path, "--resume")), "description is damaged")
     assert_refused(command_line("draw", tmp_path, "--out", tmp_path / "a.svg"), "description is damaged")
 
@@ -259,6 +268,7 @@ def test_blocks_of_another_run_do_not_count(command_line, tmp_path, followed, wh
     """Files that somebody moved here: each is as it was written, but of another seed."""
     digest_of(command_line(*arguments(tmp_path / "other", "--seed", 8)))
     (tmp_path / "other" / "ensemble.zarr" / "zarr.json").unlink()
+    (tmp_path / "other" / "blocks" / blocks.DESCRIPTION).unlink()
     assert digest_of(command_line(*arguments(tmp_path / "other"))) == whole[N]
 
 
@@ -315,6 +325,32 @@ def test_the_time_of_day_decides_nothing(command_line, tmp_path, monkeypatch, wh
     for path in [*(ROOT / "mushrooms" / "store").glob("*.py"), ROOT / "mushrooms" / "simulate.py"]:
         names = {n.attr for n in ast.walk(ast.parse(path.read_text())) if isinstance(n, ast.Attribute)}
         assert not names & {"time", "time_ns", "now", "utcnow", "today", "st_mtime", "localtime"}, path
+
+
+def test_whatever_happens_in_whatever_order_the_bits_are_the_same(command_line, tmp_path, monkeypatch):
+    """Runs that are broken off, harmed and widened at random."""
+    random, keep = np.random.default_rng(11), blocks.RunFolder.keep
+    left = 0
+
+    def sometimes(self, piece, block):
+        nonlocal left
+        left -= 1
+        if left < 0:
+            raise [KeyboardInterrupt, OSError(errno.EIO, "input/output error")][random.integers(2)]
+        keep(self, piece, block)
+
+    monkeypatch.setattr(blocks.RunFolder, "keep", sometimes)
+    for number in range(int(os.environ.get("MUSHROOMS_HARMS", "4"))):
+        folder, n = tmp_path / str(number), 20
+        block = int(random.integers(5, 40))
+        for _ in range(6):
+            n, left = n + int(random.integers(0, 40)), int(random.integers(0, 8))
+            assert command_line(*arguments(folder, "--resume", n=n, block=block)).code in (0, 2, 130)
+            if folder.exists():
+                harmed(folder, random)
+        left = 10**6
+        ended = command_line(*arguments(folder, "--resume", n=n, block=block))
+        assert digest_of(ended) == run_at_once("fermi-ulam", n)
 
 
 def faulty_chunk(self, number, name, _marker):

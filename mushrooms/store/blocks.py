@@ -22,6 +22,7 @@ from scene.files import sealed, unsealed, write_file, write_files
 from scene.refusal import BadInput
 
 GROUP, MARKERS = "ensemble.zarr", "blocks"
+DESCRIPTION = "run.marker"  # among the markers: the group's attributes once more, sealed
 
 
 class Piece(NamedTuple):
@@ -174,6 +175,7 @@ class RunFolder:
         write_files(self.folder / GROUP, paths)
         marker_data = {
             "run": self._identity,
+            "number": piece.number,
             "rows": there + piece.n,
             "sums": {name: hashlib.sha256(content).hexdigest() for name, content in chunks.items()},
             "tally": whole.tally.to_data(),
@@ -189,6 +191,7 @@ class RunFolder:
             (self.folder / GROUP / name).mkdir(parents=True, exist_ok=True)
         sizes = {"particles": self.shape.n_particles, "block": self.shape.block}
         attributes = self.asked.to_data() | sizes | {"command": self.command} | made_by()
+        write_file(self.folder / MARKERS / DESCRIPTION, sealed(json.dumps(attributes).encode()))
         write_files(self.folder / GROUP, metadata(self.shape, attributes))
         self._is_described = True
 
@@ -233,7 +236,8 @@ class RunFolder:
         if content is None:
             return None
         data = json.loads(content)
-        if data["run"] != self._identity or data["rows"] > self.shape.rows(number):
+        is_ours = data.get("run") == self._identity and data["number"] == number
+        if not is_ours or data["rows"] > self.shape.rows(number):
             return None
         return Marker(data["rows"], data["sums"], tally_from(data["tally"]), data["seconds"])
 
@@ -246,26 +250,30 @@ class RunFolder:
 
 
 def is_run(folder: Path) -> bool:
-    """Tell whether a folder holds a run."""
-    return (folder / GROUP / "zarr.json").is_file()
+    """Tell whether a folder holds a run, damaged or not."""
+    return (folder / MARKERS / DESCRIPTION).is_file() or (folder / GROUP / "zarr.json").is_file()
 
 
 def attributes_of(folder: Path) -> dict[str, Any]:
-    """Return what a stored run says of itself.
+    """Return what a stored run says of itself: what is sealed, or where that is damaged what xarray reads.
 
     Raises:
-        BadInput: the folder holds no run, or its description is damaged.
+        BadInput: the folder holds no run, or both are damaged.
     """
     path = folder / GROUP / "zarr.json"
+    why = "its description is damaged"
     try:
-        attributes = json.loads(path.read_text("utf-8"))["attributes"]
-        if isinstance(attributes, dict) and isinstance(attributes["schema"], int):
-            return attributes
-        why = "it has no schema"
+        described = [unsealed(folder / MARKERS / DESCRIPTION), path.read_bytes()]
     except OSError as error:
-        why = error.strerror or str(error)
-    except (ValueError, KeyError, TypeError):
-        why = "its description is damaged"
+        described, why = [unsealed(folder / MARKERS / DESCRIPTION)], error.strerror or str(error)
+    for content in described:
+        try:
+            found = json.loads(content or b"")
+            found = found.get("attributes", found)
+            if isinstance(found["schema"], int):
+                return dict(found)
+        except (ValueError, KeyError, TypeError, AttributeError):
+            continue
     raise BadInput(f"run {str(folder)!r}: {path.name}: {why}")
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import errno
+import hashlib
 import json
 import os
 import subprocess
@@ -299,6 +300,15 @@ def test_limits_end_in_a_run_that_goes_on(command_line, tmp_path, monkeypatch, w
     assert digest_of(done) == whole[N]
 
 
+def test_blocks_take_seconds_and_fit_into_memory():
+    sizes = {}
+    for energy, n_cycles in ((10.0, 1), (1e4, 1), (1e7, 1), (1e12, 1), (10.0, 10**6)):
+        wish = asked.Asked(load("moving-cap"), energy, n_cycles, SEED)
+        size = sizes[energy, n_cycles] = conduct.block_size(wish, 4)
+        assert size * conduct.shape_of(wish, 1, 1).bytes_of_a_particle <= conduct.BLOCK_BYTES
+    assert list(sizes.values()) == [2**17, 2**17, 2**12, 2**9, 2]
+
+
 @pytest.mark.parametrize(
     ("options", "word"),
     [
@@ -363,8 +373,6 @@ def faulty_follow(wish, piece, threads, tick=None):
 
 def faulty_digest(run):
     """Go block by block, all fields of each."""
-    import hashlib
-
     found = hashlib.sha256()
     for number in range(run.shape.n_blocks):
         for source in digest.DIGESTED:

@@ -25,6 +25,7 @@ from scene.refusal import BadInput
 
 BLOCK_COLLISIONS = 2e8  # of a block, some seconds: what a fault can cost, and long beside a block's files
 LEAST_BLOCK, MOST_BLOCK = 256, 2**17  # particles: a thread's lanes are full, and memory stays small
+BLOCK_BYTES = 2**26  # on disk; in memory several times that
 LANES_OF_A_THREAD = 128  # particles that a thread needs to be quick
 MOST_BLOCKS = 10**6
 PROBED = 4  # particles followed again before a run is gone on with
@@ -49,12 +50,12 @@ class LimitReached(Exception):  # noqa: N818 (nothing is wrong: the run goes on 
 
 
 def block_size(asked: Asked, threads: int) -> int:
-    """Return how many particles a block has: so many that it takes seconds, a power of two."""
+    """Return how many particles a block has, a power of two: it takes seconds, and fits into memory."""
     each = expected_collisions(asked.scene, asked.energy, asked.n_cycles)
     least = max(LEAST_BLOCK, LANES_OF_A_THREAD * threads)
     wanted = BLOCK_COLLISIONS / max(each, 1.0) if math.isfinite(each) else LEAST_BLOCK
-    most = max(least, MOST_BLOCK // asked.n_cycles)
-    return int(2 ** round(math.log2(min(max(wanted, least), most))))
+    most = min(MOST_BLOCK, BLOCK_BYTES // shape_of(asked, 1, 1).bytes_of_a_particle)
+    return int(2 ** math.floor(math.log2(max(1, min(max(wanted, least), most)))))
 
 
 def shape_of(asked: Asked, n_particles: int, block: int) -> Shape:

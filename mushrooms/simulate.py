@@ -78,7 +78,7 @@ def simulate(
     On stderr: before a run of over 20 s about how many collisions and how long; after one of over a second
     that careful steps took over a tenth of it, if they did.
     """
-    _check_ensemble(particles, energy, cycles, seed, threads)
+    _check_ensemble(energy, cycles, seed, threads)
     kept = {"resume": resume, "dask": dask, "max_collisions": max_collisions, "max_seconds": max_seconds}
     _check_stored(out, particles, block, **kept)
     _check_plot(plot, particles, cycles)
@@ -124,10 +124,9 @@ class Wish(NamedTuple):
         return self.asked.scene.name or self.scene
 
 
-def _check_ensemble(particles: int, energy: float, cycles: int, seed: int, threads: int | None) -> None:
+def _check_ensemble(energy: float, cycles: int, seed: int, threads: int | None) -> None:
     if not (math.isfinite(energy) and energy > 0):
         raise BadInput(f"--energy = {energy}, must be finite and > 0")
-    check_range("--particles", particles, 1)
     check_range("--cycles", cycles, 1)
     check_seed(seed, "--seed")
     if threads is not None:

@@ -6,8 +6,6 @@ import json
 import math
 import os
 import sys
-from collections.abc import Mapping
-from contextlib import nullcontext
 from pathlib import Path
 from typing import Annotated, Any, NoReturn
 
@@ -23,14 +21,15 @@ from mushrooms.attack import attack
 from mushrooms.audit import audit
 from mushrooms.bench import bench
 from mushrooms.check import check
-from mushrooms.terminal import compilation_told, progress_bar
-from scene.files import write_file, write_files
+from mushrooms.simulate import simulate
+from mushrooms.stored import draw_run, export, is_stored
+from mushrooms.terminal import AsJson, SceneName, check_range, print_pairs
+from scene.files import write_file
 from scene.load import read_data
-from scene.refusal import BadInput, check_seed
+from scene.refusal import BadInput
 from scene.tables import cycle_length
 
 PROGRAM = "mushrooms"
-MAX_PARTICLES = 10**8
 MAX_DIGITS = 1000
 # Typer 0.26 carries a click of its own, older ones import it: this is the error class of the one in use.
 UsageError: type[Any] = typer.BadParameter.__bases__[0]
@@ -42,13 +41,6 @@ app = typer.Typer(
     help="Particles between moving walls: theory, simulation and the audit of Oscillating mushrooms.",
     epilog="Example: mushrooms audit --out audit-report",
 )
-
-SceneName = Annotated[
-    str, typer.Argument(metavar="SCENE", help="A catalogue name, or a .toml or .json file.")
-]
-AsJson = Annotated[bool, typer.Option("--json", help="Print JSON.")]
-Seed = Annotated[int, typer.Option(help="Seed of the random starts, 0 to 2^64 - 1.")]
-Threads = Annotated[int | None, typer.Option(help="Threads; all cores by default.")]
 
 
 def run(arguments: list[str] | None = None) -> NoReturn:
@@ -136,147 +128,13 @@ def predict(
     import theory
     from mushrooms.explained import FIGURES, at_energy
 
-    _check_range("--digits", digits, 1, MAX_DIGITS)
+    check_range("--digits", digits, 1, MAX_DIGITS)
     if energy is not None and not (math.isfinite(energy) and energy > 0):
         raise BadInput(f"--energy = {energy}, must be finite and > 0")
     found = scenes.load(scene)
     pairs: dict[str, Any] = dict(theory.predict(found, digits).strings(digits))
     pairs |= at_energy(found, energy) if energy is not None else {}
-    _print_pairs(pairs, as_json, FIGURES)
-
-
-@app.command(
-    epilog="Example: mushrooms simulate moving-cap --particles 25000 --energy 1e7 --seed 1 --out run"
-)
-def simulate(
-    scene: SceneName,
-    particles: Annotated[int, typer.Option(help="Number of particles, 1 to 10^8.")],
-    energy: Annotated[float, typer.Option(help="Initial energy v²/2 of every particle, > 0.")],
-    cycles: Annotated[int, typer.Option(help="Cycles of the walls, at least 1.")] = 1,
-    seed: Seed = 0,
-    out: Annotated[
-        Path | None, typer.Option(metavar="DIR", help="Folder for ensemble.npz and summary.json.")
-    ] = None,
-    plot: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FILE", help="Histogram of log E1/E0 after one cycle (.svg, .png), with theory."
-        ),
-    ] = None,
-    threads: Threads = None,
-    as_json: AsJson = False,
-) -> None:
-    """Simulate an ensemble; undecided particles are counted, never guessed.
-
-    Prints particles, collisions, lost (not followed to the end), undecided (those of the lost
-    that the stepper could not decide), careful (collisions found by the careful step, some fifty times
-    slower), m1 (mean of log E/E0 per cycle) with its standard error, p_nc (share of cycles without
-    capture), ns_per_collision (and thread) and the SHA-256 of the result.
-    Particles that no cycle ever frees from the island count neither in m1 nor in p_nc.
-
-    On stderr: before a run of over 20 s about how many collisions and how long; after a run of over a
-    second that careful steps took over a tenth of it, if they did.
-    """
-    _check_ensemble(particles, energy, cycles, seed, threads)
-    if plot is not None:
-        if cycles != 1:
-            raise BadInput(f"--cycles = {cycles}, must be 1 for --plot")
-        _check_range("--particles", particles, 2)
-        output.check_file(plot, (".svg", ".png"))
-    table = scenes.load(scene)
-    with output.writable_folder(out) if out else nullcontext() as folder:
-        import numpy as np
-
-        asked = {"n_particles": particles, "energy": energy, "n_cycles": cycles, "seed": seed}
-        ensemble = _simulated(table, table.name or scene, threads, **asked)
-        summary = _summary(table, ensemble, cycles)
-        if folder is not None:
-            fields = {k: v for k, v in ensemble._asdict().items() if k not in ("seconds", "threads")}
-            text = json.dumps(
-                {"scene": scenes.to_data(table), "energy": energy, "cycles": cycles, "seed": seed} | summary
-            )
-            write_files(
-                folder, {"ensemble.npz": lambda file: np.savez(file, **fields), "summary.json": text + "\n"}
-            )
-    _print_pairs(summary, as_json)
-    if plot is not None:
-        _plot(plot, table, table.name or scene, ensemble)
-
-
-def _check_ensemble(particles: int, energy: float, cycles: int, seed: int, threads: int | None) -> None:
-    if not (math.isfinite(energy) and energy > 0):
-        raise BadInput(f"--energy = {energy}, must be finite and > 0")
-    _check_range("--particles", particles, 1, MAX_PARTICLES)
-    _check_range("--cycles", cycles, 1)
-    check_seed(seed, "--seed")
-    if threads is not None:
-        _check_range("--threads", threads, 1)
-
-
-def _plot(path: Path, table: scenes.Scene, name: str, ensemble: Any) -> None:
-    """Write the histogram of those who take part."""
-    import io
-
-    import numpy as np
-
-    from mushrooms.figures import energies, style
-
-    gain = np.log(ensemble.energy[ensemble.takes_part()] / ensemble.energy0)
-    if len(gain) < 2:
-        raise BadInput(f"--plot: {len(gain)} particles were followed to the end, must be at least 2")
-    title = f"{name}, E0 = {ensemble.energy0:.0e}, {len(gain):,} particles"
-    file = io.BytesIO()
-    style.save(energies.histogram(table, ensemble.energy0, gain, title), file, path.suffix)
-    write_file(path, file.getvalue())
-
-
-def _simulated(table: scenes.Scene, name: str, threads: int | None, **asked: Any) -> Any:
-    """Return the ensemble; stderr says what to expect of a long run, and which steps slowed it."""
-    import fast
-    from mushrooms.forecast import careful_note, forecast
-
-    with compilation_told(), progress_bar() as bar:
-        task = bar.add_task(name, total=asked["n_particles"])
-
-        def advance(n_done: int) -> None:
-            if n_done == 0:  # what was asked for has been accepted, and the stepper compiled
-                n_threads = threads or os.cpu_count() or 1
-                ahead = forecast(table, threads=n_threads, **asked)
-                if ahead is not None:
-                    print(ahead.text(n_threads), file=sys.stderr, flush=True)
-            bar.update(task, completed=n_done)
-
-        ensemble = fast.simulate(table, threads=threads, progress=advance, **asked)
-    n_careful, n_collisions = int(ensemble.n_careful.sum()), int(ensemble.n_collisions.sum())
-    note = careful_note(n_careful, n_collisions, ensemble.seconds)
-    if note is not None:
-        print(note, file=sys.stderr)
-    return ensemble
-
-
-def _summary(table: scenes.Scene, ensemble: Any, n_cycles: int) -> dict[str, Any]:
-    import numpy as np
-
-    n_followed = int((ensemble.outcome == 0).sum())
-    gain = np.log(ensemble.energy[ensemble.takes_part()] / ensemble.energy0) / n_cycles
-    n = len(gain)
-    has_island = isinstance(table, scenes.Mushroom)
-    return {
-        "particles": len(ensemble.energy),
-        "collisions": int(ensemble.n_collisions.sum()),
-        "lost": len(ensemble.energy) - n_followed,
-        "undecided": int((ensemble.outcome == 1).sum()),
-        "careful": int(ensemble.n_careful.sum()),
-        "m1": _finite(gain.mean()) if n else None,
-        "m1_se": _finite(gain.std(ddof=1) / math.sqrt(n)) if n > 1 else None,
-        "p_nc": float(ensemble.p_nc().mean()) if n and has_island else None,
-        "ns_per_collision": _finite(ensemble.ns_per_collision()),
-        "sha256": ensemble.sha256(),
-    }
-
-
-def _finite(value: float) -> float | None:
-    return float(value) if math.isfinite(value) else None
+    print_pairs(pairs, as_json, FIGURES)
 
 
 @app.command(epilog="Example: mushrooms draw moving-cap --out moving-cap.svg")
@@ -287,7 +145,13 @@ def draw(
         typer.Option(metavar="FILE", help="A .svg, .png or .gif file; SCENE's name with .svg by default."),
     ] = None,
 ) -> None:
-    """Draw the walls through the cycle, with a few chords of one particle; a .gif moves."""
+    """Draw the walls through the cycle, with a few chords of one particle; a .gif moves.
+
+    Given the folder of a run (simulate --out), draw its histogram of log E1/E0, with theory.
+    """
+    if is_stored(scene):
+        print(draw_run(Path(scene), out))
+        return
     table = scenes.load(scene)
     path = out or Path(f"{Path(scene).stem}.svg")
     from mushrooms.figures import table as pictures
@@ -297,6 +161,10 @@ def draw(
     print(path)
 
 
+app.command(
+    epilog="Example: mushrooms simulate moving-cap --particles 25000 --energy 1e7 --seed 1 --out run"
+)(simulate)
+app.command(epilog="Example: mushrooms export run --to run.parquet")(export)
 app.command(epilog="Example: mushrooms attack --family knot-at-event --cases 20000 --seed 1")(attack)
 app.command(epilog="Example: mushrooms audit --only X2,L4 --out audit-report")(audit)
 app.command(epilog="Example: mushrooms bench --quick --out bench-report")(bench)
@@ -304,25 +172,6 @@ app.command(epilog="Example: mushrooms check --html report.html -- ./my_stepper"
 app.command(epilog="Example: mushrooms ask near-corner/3 -- ./my_stepper")(ask)
 
 
-def _check_range(option: str, value: int, low: int, high: int | None = None) -> None:
-    if value < low or (high is not None and value > high):
-        raise BadInput(
-            f"{option} = {value}, must be " + (f">= {low}" if high is None else f"{low} to {high}")
-        )
-
-
 def _console() -> Console:
     # A pipe has no width: lines long enough for the tables.
     return Console() if sys.stdout.isatty() else Console(width=140)
-
-
-def _print_pairs(pairs: dict[str, Any], as_json: bool, meanings: Mapping[str, str] | None = None) -> None:
-    if as_json:
-        print(json.dumps(pairs, indent=2))
-        return
-    width = max(map(len, pairs))
-    texts = {name: "–" if value is None else str(value) for name, value in pairs.items()}
-    longest = max(map(len, texts.values()))
-    for name, text in texts.items():
-        meaning = (meanings or {}).get(name)
-        print(f"{name:<{width}}  {text:<{longest}}  {meaning}" if meaning else f"{name:<{width}}  {text}")

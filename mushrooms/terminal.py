@@ -1,14 +1,23 @@
-"""What commands show while they work: a progress bar on a terminal, and what they wait for."""
+"""What commands share: arguments, results as lines, and what is shown while one waits."""
 
 from __future__ import annotations
 
+import json
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from typing import Any
+from typing import Annotated, Any
 
+import typer
 from rich import progress
 from rich.console import Console
+
+from scene.refusal import BadInput
+
+SceneName = Annotated[
+    str, typer.Argument(metavar="SCENE", help="A catalogue name, or a .toml or .json file.")
+]
+AsJson = Annotated[bool, typer.Option("--json", help="Print JSON.")]
 
 # The compiled functions that a person waits for, and how long; the others take a second or two.
 SLOW_TO_COMPILE = {"follow_particles": "half a minute to a minute", "fine": "about ten seconds"}
@@ -51,3 +60,24 @@ def progress_bar() -> progress.Progress:
         disable=not console.is_terminal,
         transient=True,
     )
+
+
+def check_range(option: str, value: int, low: int, high: int | None = None) -> None:
+    """Refuse an option's number that is out of bounds."""
+    if value < low or (high is not None and value > high):
+        raise BadInput(
+            f"{option} = {value}, must be " + (f">= {low}" if high is None else f"{low} to {high}")
+        )
+
+
+def print_pairs(pairs: dict[str, Any], as_json: bool, meanings: Mapping[str, str] | None = None) -> None:
+    """Print names, their values and what they mean, a line each, or all as JSON."""
+    if as_json:
+        print(json.dumps(pairs, indent=2))
+        return
+    width = max(map(len, pairs))
+    texts = {name: "–" if value is None else str(value) for name, value in pairs.items()}
+    longest = max(map(len, texts.values()))
+    for name, text in texts.items():
+        meaning = (meanings or {}).get(name)
+        print(f"{name:<{width}}  {text:<{longest}}  {meaning}" if meaning else f"{name:<{width}}  {text}")

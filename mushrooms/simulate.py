@@ -1,0 +1,286 @@
+"""`mushrooms simulate`: an ensemble on a scene, its summary, its run on disk and its histogram."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated, Any, NamedTuple
+
+import typer
+
+import scene as scenes
+from mushrooms import output
+from mushrooms.terminal import AsJson, SceneName, check_range, compilation_told, print_pairs
+from scene.files import locked, write_file
+from scene.refusal import BadInput, check_seed
+
+MOST_IN_MEMORY, MOST_ON_DISK = 10**8, 10**10
+LIMITED = 3  # exit code of a run that a limit has stopped
+FOR_STORED = "needs --out: without a folder nothing is kept to go on with"
+
+Particles = Annotated[int, typer.Option(help="Number of particles, 1 to 10^8; with --out to 10^10.")]
+Energy = Annotated[float, typer.Option(help="Initial energy v²/2 of every particle, > 0.")]
+Cycles = Annotated[int, typer.Option(help="Cycles of the walls, at least 1.")]
+Seed = Annotated[int, typer.Option(help="Seed of the random starts, 0 to 2^64 - 1.")]
+Threads = Annotated[int | None, typer.Option(help="Threads; all cores by default, with --dask one a block.")]
+Out = Annotated[
+    Path | None, typer.Option(metavar="DIR", help="Folder for the run (ensemble.zarr) and summary.json.")
+]
+Resume = Annotated[
+    bool, typer.Option("--resume", help="Go on with the run in DIR, or widen it by more --particles.")
+]
+Dask = Annotated[
+    str | None, typer.Option(metavar="ADDRESS", help="Dask scheduler whose workers follow the particles.")
+]
+BlockSize = Annotated[
+    int | None, typer.Option("--block", help="Particles kept at a time; by default seconds' work.")
+]
+MostCollisions = Annotated[int | None, typer.Option(help="Stop when a particle makes more collisions.")]
+MostSeconds = Annotated[float | None, typer.Option(help="Stop after so long; --resume goes on.")]
+Plot = Annotated[
+    Path | None,
+    typer.Option(metavar="FILE", help="Histogram of log E1/E0 after one cycle (.svg, .png), with theory."),
+]
+
+
+def simulate(
+    scene: SceneName,
+    particles: Particles,
+    energy: Energy,
+    cycles: Cycles = 1,
+    seed: Seed = 0,
+    out: Out = None,
+    resume: Resume = False,
+    dask: Dask = None,
+    block: BlockSize = None,
+    max_collisions: MostCollisions = None,
+    max_seconds: MostSeconds = None,
+    plot: Plot = None,
+    threads: Threads = None,
+    as_json: AsJson = False,
+) -> int:
+    """Simulate an ensemble; undecided particles are counted, never guessed.
+
+    Prints particles, collisions, lost (not followed to the end), undecided (those of the lost
+    that the stepper could not decide), careful (collisions found by the careful step, some fifty times
+    slower), m1 (mean of log E/E0 per cycle) with its standard error, p_nc (share of cycles without capture),
+    what theory says of both, how many standard errors they are off (z), ns_per_collision and the SHA-256.
+    Particles that no cycle ever frees from the island count neither in m1 nor in p_nc.
+
+    With --out particles are kept block by block: whatever ends a run, --resume goes on with it, to the same
+    bits. Exit code 0; 3 when a limit has stopped it, 130 when it was interrupted: both say how to go on.
+
+    On stderr: before a run of over 20 s about how many collisions and how long; after one of over a second
+    that careful steps took over a tenth of it, if they did.
+    """
+    _check_ensemble(energy, cycles, seed, threads)
+    kept = {"resume": resume, "dask": dask, "max_collisions": max_collisions, "max_seconds": max_seconds}
+    _check_stored(out, particles, block, **kept)
+    _check_plot(plot, particles, cycles)
+    from mushrooms.store.asked import Asked
+
+    asked = Asked(scenes.load(scene), energy, cycles, seed)
+    wish = Wish(scene, asked, particles, threads, dask, block, max_collisions, max_seconds)
+    if out is None:
+        summary, first = _in_memory(wish)
+    else:
+        with output.writable_folder(out) as folder, locked(folder):
+            found = _on_disk(wish, folder, resume)
+            if found is None:
+                return LIMITED
+            summary, first = found
+    print_pairs(summary, as_json)
+    if plot is not None:
+        draw_histogram(plot, wish.asked, first, wish.name)
+    return 0
+
+
+class Wish(NamedTuple):
+    """What `simulate` was asked for, and with what it shall be done.
+
+    Attributes:
+        scene: as given.
+        asked: what decides the bits.
+        particles, threads, dask, block, max_collisions, max_seconds: see `simulate`.
+    """
+
+    scene: str
+    asked: Any
+    particles: int
+    threads: int | None
+    dask: str | None
+    block: int | None
+    max_collisions: int | None
+    max_seconds: float | None
+
+    @property
+    def name(self) -> str:
+        """Return the scene's name."""
+        return self.asked.scene.name or self.scene
+
+
+def _check_ensemble(energy: float, cycles: int, seed: int, threads: int | None) -> None:
+    if not (math.isfinite(energy) and energy > 0):
+        raise BadInput(f"--energy = {energy}, must be finite and > 0")
+    check_range("--cycles", cycles, 1)
+    check_seed(seed, "--seed")
+    if threads is not None:
+        check_range("--threads", threads, 1)
+
+
+def _check_stored(out: Path | None, particles: int, block: int | None, **options: Any) -> None:
+    """Check what only a run on disk can have."""
+    check_range("--particles", particles, 1, MOST_IN_MEMORY if out is None else MOST_ON_DISK)
+    if block is not None:
+        check_range("--block", block, 1)
+    for name, value in options.items():
+        option = f"--{name.replace('_', '-')}"
+        if out is None and value not in (None, False):
+            raise BadInput(f"{option} {FOR_STORED}")
+        if name.startswith("max") and value is not None and not value > 0:
+            raise BadInput(f"{option} = {value}, must be > 0")
+
+
+def _check_plot(plot: Path | None, particles: int, cycles: int) -> None:
+    if plot is None:
+        return
+    if cycles != 1:
+        raise BadInput(f"--cycles = {cycles}, must be 1 for --plot")
+    check_range("--particles", particles, 2)
+    output.check_file(plot, (".svg", ".png"))
+
+
+def _in_memory(wish: Wish) -> tuple[dict[str, Any], Any]:
+    """Return the summary of a run that nobody keeps, and its histogram."""
+    from fast.given import check_kept
+    from mushrooms.store import blocks, conduct
+
+    default = conduct.block_size(wish.asked, wish.threads or os.cpu_count() or 1)
+    shape = conduct.shape_of(wish.asked, wish.particles, wish.block or default)
+    check_kept(wish.particles, wish.asked.n_cycles, 0, shape.n_narrowings)
+    run = blocks.RunInMemory(shape)
+    _complete(wish, run)
+    return _summary(wish, run), run.tally.first
+
+
+def _on_disk(wish: Wish, folder: Path, resume: bool) -> tuple[dict[str, Any], Any] | None:
+    """Bring the run in a folder to its end; return its summary and histogram, None if a limit came first."""
+    from mushrooms.store import conduct
+
+    command = wish.asked.command(wish.scene, wish.particles, folder)
+    default = conduct.block_size(wish.asked, wish.threads or os.cpu_count() or 1)
+    with compilation_told():
+        run, damaged = conduct.opened(
+            folder, wish.asked, wish.particles, wish.block, default, command, resume
+        )
+    if damaged:
+        few = ", ".join(map(str, damaged[:5])) + (" ..." if len(damaged) > 5 else "")
+        print(f"damaged or broken off: {len(damaged)} blocks ({few}), followed again", file=sys.stderr)
+    try:
+        with _told_how_to_go_on(run, command):
+            _complete(wish, run)
+    except conduct.LimitReached:
+        return None
+    summary = _summary(wish, run)
+    asked = wish.asked.to_data()
+    kept = {name: asked[name] for name in ("scene", "energy", "cycles", "seed")} | summary
+    write_file(folder / "summary.json", json.dumps(kept) + "\n")
+    return summary, run.tally.first
+
+
+@contextmanager
+def _told_how_to_go_on(run: Any, command: str) -> Iterator[None]:
+    """Say on stderr what is kept of a run that ends early, and which command goes on with it."""
+    from mushrooms.store.conduct import LimitReached
+
+    def how() -> str:
+        n = run.tally.particles
+        return f"{n:,} of {run.shape.n_particles:,} particles are kept; go on with: {command}"
+
+    try:
+        yield
+    except LimitReached as limit:
+        print(f"{limit}: {how()}", file=sys.stderr)
+        raise
+    except KeyboardInterrupt:
+        if run.tally.particles:
+            print(f"interrupted: {how()}", file=sys.stderr)
+        raise
+    except OSError as error:
+        raise BadInput(f"output {str(run.folder)!r}: {error.strerror or error}: {how()}") from None
+
+
+def draw_histogram(path: Path, asked: Any, first: Any, name: str) -> None:
+    """Write the histogram of log E1 / E0 of those who take part.
+
+    Raises:
+        BadInput: they are too few.
+    """
+    import io
+
+    from mushrooms.figures import energies, style
+
+    n = int(first.counts.sum())
+    if n < 2:
+        raise BadInput(f"histogram: {n} particles were followed to the end, must be at least 2")
+    title = f"{name}, E0 = {asked.energy:.0e}, {n:,} particles"
+    file = io.BytesIO()
+    figure = energies.histogram(asked.scene, asked.energy, first.middles, title, first.counts)
+    style.save(figure, file, path.suffix)
+    write_file(path, file.getvalue())
+
+
+def _complete(wish: Wish, run: Any) -> None:
+    """Follow what a run lacks; stderr says what to expect of a long one, and which steps slowed it."""
+    from mushrooms.forecast import careful_note, forecast
+    from mushrooms.store import conduct, engines
+    from mushrooms.store.watch import Watch
+
+    asked, before = wish.asked, run.tally
+    n_threads = wish.threads or os.cpu_count() or 1
+    seconds = run.seconds
+    is_told = wish.dask is not None  # of how fast a cluster is nothing is known here
+    engine = engines.by_dask(wish.dask, wish.threads) if wish.dask else engines.in_process(wish.threads)
+    limits = conduct.RunLimits(wish.max_collisions, wish.max_seconds)
+
+    with compilation_told(), Watch(wish.name, wish.particles, before) as watch:
+
+        def tick(n_done: int) -> None:
+            nonlocal is_told
+            if not is_told:  # what was asked for has been accepted, and the stepper compiled
+                is_told = True
+                n = wish.particles - before.particles
+                known = {"energy": asked.energy, "n_cycles": asked.n_cycles, "seed": asked.seed}
+                ahead = forecast(asked.scene, n_particles=n, threads=n_threads, **known)
+                if ahead is not None:
+                    print(ahead.text(n_threads), file=sys.stderr, flush=True)
+            watch.tick(n_done)
+
+        conduct.complete(run, asked, engine, limits, tick, watch.kept)
+    n_careful = run.tally.careful - before.careful
+    seconds = (run.seconds - seconds) / n_threads
+    note = careful_note(n_careful, run.tally.collisions - before.collisions, seconds)
+    if note is not None:
+        print(note, file=sys.stderr)
+
+
+def _summary(wish: Wish, run: Any) -> dict[str, Any]:
+    from mushrooms.compared import measured
+    from mushrooms.store.digest import sha256
+
+    tally = run.tally
+    return {
+        "particles": tally.particles,
+        "collisions": tally.collisions,
+        "lost": tally.particles - tally.followed,
+        "undecided": tally.undecided,
+        "careful": tally.careful,
+        **measured(wish.asked, tally),
+        "ns_per_collision": run.seconds / max(tally.collisions, 1) * 1e9,
+        "sha256": sha256(run),
+    }

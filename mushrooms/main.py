@@ -23,6 +23,8 @@ from mushrooms.attack import attack
 from mushrooms.audit import audit
 from mushrooms.bench import bench
 from mushrooms.check import check
+from mushrooms.draw import draw
+from mushrooms.options import AsJson, SceneName, Seed, check_range
 from mushrooms.terminal import compilation_told, progress_bar
 from scene.files import write_file, write_files
 from scene.load import read_data
@@ -43,11 +45,6 @@ app = typer.Typer(
     epilog="Example: mushrooms audit --out audit-report",
 )
 
-SceneName = Annotated[
-    str, typer.Argument(metavar="SCENE", help="A catalogue name, or a .toml or .json file.")
-]
-AsJson = Annotated[bool, typer.Option("--json", help="Print JSON.")]
-Seed = Annotated[int, typer.Option(help="Seed of the random starts, 0 to 2^64 - 1.")]
 Threads = Annotated[int | None, typer.Option(help="Threads; all cores by default.")]
 
 
@@ -136,7 +133,7 @@ def predict(
     import theory
     from mushrooms.explained import FIGURES, at_energy
 
-    _check_range("--digits", digits, 1, MAX_DIGITS)
+    check_range("--digits", digits, 1, MAX_DIGITS)
     if energy is not None and not (math.isfinite(energy) and energy > 0):
         raise BadInput(f"--energy = {energy}, must be finite and > 0")
     found = scenes.load(scene)
@@ -181,7 +178,7 @@ def simulate(
     if plot is not None:
         if cycles != 1:
             raise BadInput(f"--cycles = {cycles}, must be 1 for --plot")
-        _check_range("--particles", particles, 2)
+        check_range("--particles", particles, 2)
         output.check_file(plot, (".svg", ".png"))
     table = scenes.load(scene)
     with output.writable_folder(out) if out else nullcontext() as folder:
@@ -206,11 +203,11 @@ def simulate(
 def _check_ensemble(particles: int, energy: float, cycles: int, seed: int, threads: int | None) -> None:
     if not (math.isfinite(energy) and energy > 0):
         raise BadInput(f"--energy = {energy}, must be finite and > 0")
-    _check_range("--particles", particles, 1, MAX_PARTICLES)
-    _check_range("--cycles", cycles, 1)
+    check_range("--particles", particles, 1, MAX_PARTICLES)
+    check_range("--cycles", cycles, 1)
     check_seed(seed, "--seed")
     if threads is not None:
-        _check_range("--threads", threads, 1)
+        check_range("--threads", threads, 1)
 
 
 def _plot(path: Path, table: scenes.Scene, name: str, ensemble: Any) -> None:
@@ -279,36 +276,12 @@ def _finite(value: float) -> float | None:
     return float(value) if math.isfinite(value) else None
 
 
-@app.command(epilog="Example: mushrooms draw moving-cap --out moving-cap.svg")
-def draw(
-    scene: SceneName,
-    out: Annotated[
-        Path | None,
-        typer.Option(metavar="FILE", help="A .svg, .png or .gif file; SCENE's name with .svg by default."),
-    ] = None,
-) -> None:
-    """Draw the walls through the cycle, with a few chords of one particle; a .gif moves."""
-    table = scenes.load(scene)
-    path = out or Path(f"{Path(scene).stem}.svg")
-    from mushrooms.figures import table as pictures
-
-    output.check_file(path, pictures.SUFFIXES)
-    write_file(path, lambda file: pictures.write_picture(table, path.suffix, file))
-    print(path)
-
-
 app.command(epilog="Example: mushrooms attack --family knot-at-event --cases 20000 --seed 1")(attack)
 app.command(epilog="Example: mushrooms audit --only X2,L4 --out audit-report")(audit)
 app.command(epilog="Example: mushrooms bench --quick --out bench-report")(bench)
 app.command(epilog="Example: mushrooms check --html report.html -- ./my_stepper")(check)
+app.command(epilog="Example: mushrooms draw moving-cap --trajectory --seed 1 --out orbit.gif")(draw)
 app.command(epilog="Example: mushrooms ask near-corner/3 -- ./my_stepper")(ask)
-
-
-def _check_range(option: str, value: int, low: int, high: int | None = None) -> None:
-    if value < low or (high is not None and value > high):
-        raise BadInput(
-            f"{option} = {value}, must be " + (f">= {low}" if high is None else f"{low} to {high}")
-        )
 
 
 def _console() -> Console:

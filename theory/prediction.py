@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 
 import msgspec
 
+from scene.notebook import rows
 from scene.refusal import BadInput, check_count, check_number, shown
 from scene.tables import Mushroom, Scene
 from scene.transforms import backwards
@@ -51,6 +52,9 @@ class Prediction(NamedTuple):
             name: x.context.nstr(x, digits, strip_zeros=False).removesuffix(".")
             for name, x in zip(self._fields, self, strict=True)
         }
+
+    def _repr_html_(self) -> str:
+        return rows("theory of one cycle, s = log E1 / E0", self.strings(15))
 
     @guarded
     def sd_of_mean(self, n_cycles: int) -> Any:

@@ -35,17 +35,37 @@ PICTURES = {
 }
 
 
+Picture = Annotated[
+    Path | None,
+    typer.Option(
+        "--out",
+        metavar="FILE",
+        parser=place,
+        help="A .svg, .png, .pdf or .gif file; SCENE's name with .svg by default. Of several pictures each "
+        "gets its kind into the name.",
+    ),
+]
+Export = Annotated[
+    Path | None,
+    typer.Option(
+        metavar="FILE", parser=place, help="A .csv or .parquet file for the start and every collision."
+    ),
+]
+Energy = Annotated[
+    float | None, typer.Option(help="Initial energy v²/2, > 0; by default one that suits the picture.")
+]
+Length = Annotated[
+    int | None, typer.Option(parser=count, metavar="N", help="Collisions of each particle, 1 to 10^6.")
+]
+Many = Annotated[
+    int | None,
+    typer.Option(parser=count, metavar="N", help="Particles of a section, a map, exponents; 1 to 1000."),
+]
+
+
 def draw(
     scene: SceneName,
-    out: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FILE",
-            parser=place,
-            help="A .svg, .png, .pdf or .gif file; SCENE's name with .svg by default. Of several pictures "
-            "each gets its kind into the name.",
-        ),
-    ] = None,
+    out: Picture = None,
     trajectory: Annotated[
         bool, typer.Option("--trajectory", help="One particle's path; a .gif shows it on its way.")
     ] = False,
@@ -59,24 +79,10 @@ def draw(
     lyapunov: Annotated[
         bool, typer.Option("--lyapunov", help="Finite-time Lyapunov exponents with their errors.")
     ] = False,
-    export: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FILE", parser=place, help="A .csv or .parquet file for the start and every collision."
-        ),
-    ] = None,
-    energy: Annotated[
-        float | None, typer.Option(help="Initial energy v²/2, > 0; by default one that suits the picture.")
-    ] = None,
-    collisions: Annotated[
-        int | None, typer.Option(parser=count, metavar="N", help="Collisions of each particle, 1 to 10^6.")
-    ] = None,
-    particles: Annotated[
-        int | None,
-        typer.Option(
-            parser=count, metavar="N", help="Particles of a section, a map or exponents, 1 to 1000."
-        ),
-    ] = None,
+    export: Export = None,
+    energy: Energy = None,
+    collisions: Length = None,
+    particles: Many = None,
     seed: Seed = 0,
 ) -> None:
     """Draw the walls through the cycle, or what particles do between them; export a trajectory.

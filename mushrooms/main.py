@@ -27,7 +27,7 @@ from mushrooms.draw import draw
 from mushrooms.options import AsJson, SceneName, Seed, check_range
 from mushrooms.terminal import compilation_told, progress_bar
 from scene.files import write_file, write_files
-from scene.load import read_data
+from scene.load import catalogue_text, read_data
 from scene.refusal import BadInput, check_seed
 from scene.tables import cycle_length
 
@@ -88,9 +88,17 @@ def main(
     """Hold the options that come before any command."""
 
 
-@app.command("scenes", epilog="Example: mushrooms scenes --json")
-def list_scenes(as_json: AsJson = False) -> None:
-    """List the catalogue; the scene that is refused is shown with its reason."""
+@app.command("scenes", epilog="Example: mushrooms scenes moving-cap --toml > mine.toml")
+def list_scenes(
+    name: Annotated[str, typer.Argument(metavar="[NAME]", help="Print this scene of the catalogue.")] = "",
+    as_toml: Annotated[bool, typer.Option("--toml", help="Print NAME as a file to begin from.")] = False,
+    as_json: AsJson = False,
+) -> None:
+    """List the catalogue; the scene that is refused is shown with its reason. With NAME print that scene."""
+    if name or as_toml:
+        text = catalogue_text(name)
+        print(json.dumps(read_data(name), indent=2, ensure_ascii=False) if as_json else text.rstrip("\n"))
+        return
     rows = [_catalogue_row(name) for name in scenes.catalogue()]
     if as_json:
         print(json.dumps(rows, indent=2, ensure_ascii=False))

@@ -145,7 +145,13 @@ def predict(
     if energy is not None and not (math.isfinite(energy) and energy > 0):
         raise BadInput(f"--energy = {energy}, must be finite and > 0")
     found = scenes.load(scene)
-    pairs: dict[str, Any] = dict(theory.predict(found, digits).strings(digits))
+    with progress_bar() as bar:
+        task = bar.add_task("first of two resolutions", total=100)
+
+        def advance(number: int, share: float) -> None:
+            bar.update(task, completed=round(100 * share), description=f"resolution {number} of two or more")
+
+        pairs: dict[str, Any] = dict(theory.predict(found, digits, progress=advance).strings(digits))
     pairs |= at_energy(found, energy) if energy is not None else {}
     _print_pairs(pairs, as_json, FIGURES)
 

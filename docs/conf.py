@@ -122,17 +122,15 @@ def draw_gallery(app: Any) -> None:
             gallery.draw(page, DOCS / "generated")
 
 
-def write_commands(app: Any) -> None:
+def write_commands(_: Any) -> None:
     """Write what every command says of itself."""
-    from typer.main import get_command
     from typer.testing import CliRunner
 
-    from mushrooms.main import PROGRAM
-    from mushrooms.main import app as commands
+    from mushrooms.main import COMMANDS, PROGRAM, app
 
     sections = []
-    for name in sorted(get_command(commands).commands):
-        shown = CliRunner().invoke(commands, [name, "--help"], prog_name=PROGRAM, terminal_width=100)
+    for name in COMMANDS:
+        shown = CliRunner().invoke(app, [name, "--help"], prog_name=PROGRAM, terminal_width=100)
         sections.append(f"## {PROGRAM} {name}\n\n```none\n{shown.output.strip()}\n```\n")
     (DOCS / "generated").mkdir(exist_ok=True)
     (DOCS / "generated" / "commands.md").write_text("\n".join(sections), "utf-8")

@@ -11,8 +11,9 @@ import typer
 
 import scene as scenes
 from mushrooms import output
-from mushrooms.options import SceneName, Seed, check_range, count, place
-from mushrooms.terminal import compilation_told, progress_bar
+from mushrooms.options import count, place
+from mushrooms.simulate import Seed
+from mushrooms.terminal import SceneName, check_range, compilation_told, progress_bar
 from scene import Scene
 from scene.files import write_file
 from scene.refusal import BadInput, check_seed

@@ -1,20 +1,11 @@
-"""Options that several commands share, and what they make of the text given."""
+"""What options make of the text given: whole numbers, places to write to."""
 
 from __future__ import annotations
 
 from decimal import Decimal, InvalidOperation
 from pathlib import Path
-from typing import Annotated
 
 import typer
-
-from scene.refusal import BadInput
-
-SceneName = Annotated[
-    str, typer.Argument(metavar="SCENE", help="A catalogue name, or a .toml or .json file.")
-]
-AsJson = Annotated[bool, typer.Option("--json", help="Print JSON.")]
-Seed = Annotated[int, typer.Option(help="Seed of the random starts, 0 to 2^64 - 1.")]
 
 
 def count(text: str | int) -> int:
@@ -41,14 +32,3 @@ def place(text: str) -> Path:
     if not text.strip():
         raise typer.BadParameter("'' is empty, must name a file or folder")
     return Path(text)
-
-
-def check_range(option: str, value: int, low: int, high: int | None = None) -> None:
-    """Refuse a number out of bounds.
-
-    Raises:
-        BadInput: naming option, value and bounds.
-    """
-    if value < low or (high is not None and value > high):
-        bound = f">= {low}" if high is None else f"{low} to {high}"
-        raise BadInput(f"{option} = {value}, must be {bound}")

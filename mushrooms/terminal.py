@@ -1,14 +1,26 @@
-"""What commands show while they work: a progress bar on a terminal, and what they wait for."""
+"""What commands share: arguments, results as lines, and what is shown while one waits."""
 
 from __future__ import annotations
 
+import json
+import os
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from typing import Any
+from typing import TYPE_CHECKING, Annotated, Any
 
-from rich import progress
-from rich.console import Console
+import typer
+
+from scene.refusal import BadInput
+
+if TYPE_CHECKING:  # loaded where they are used: most commands end before they need a bar or a table
+    from rich.console import Console
+    from rich.progress import Progress
+
+SceneName = Annotated[
+    str, typer.Argument(metavar="SCENE", help="A catalogue name, or a .toml or .json file.")
+]
+AsJson = Annotated[bool, typer.Option("--json", help="Print JSON.")]
 
 # The compiled functions that a person waits for, and how long; the others take a second or two.
 SLOW_TO_COMPILE = {"follow_particles": "half a minute to a minute", "fine": "about ten seconds"}
@@ -35,12 +47,29 @@ def compilation_told() -> Iterator[None]:
 
 
 def new_console() -> Console:
-    """Return a console for stdout whose long lines are not broken; a pipe has no width: enough for tables."""
-    return Console(width=None if Console().is_terminal else 140, soft_wrap=True, highlight=False)
+    """Return a console for stdout whose long lines are not broken."""
+    from rich.console import Console
+
+    return Console(width=_width(), soft_wrap=True, highlight=False)
 
 
-def progress_bar() -> progress.Progress:
+def table_console() -> Console:
+    """Return a console for stdout whose tables fit its width, or COLUMNS where it has none."""
+    from rich.console import Console
+
+    return Console(width=_width())
+
+
+def _width() -> int | None:
+    # A pipe has no width: enough for the tables, unless the reader says.
+    return None if sys.stdout.isatty() or os.environ.get("COLUMNS", "").isdigit() else 140
+
+
+def progress_bar() -> Progress:
     """Return a progress bar on stderr, silent where that is no terminal."""
+    from rich import progress
+    from rich.console import Console
+
     console = Console(stderr=True)
     return progress.Progress(
         progress.TextColumn("{task.description}"),
@@ -51,3 +80,24 @@ def progress_bar() -> progress.Progress:
         disable=not console.is_terminal,
         transient=True,
     )
+
+
+def check_range(option: str, value: int, low: int, high: int | None = None) -> None:
+    """Refuse an option's number that is out of bounds."""
+    if value < low or (high is not None and value > high):
+        raise BadInput(
+            f"{option} = {value}, must be " + (f">= {low}" if high is None else f"{low} to {high}")
+        )
+
+
+def print_pairs(pairs: dict[str, Any], as_json: bool, meanings: Mapping[str, str] | None = None) -> None:
+    """Print names, their values and what they mean, a line each, or all as JSON."""
+    if as_json:
+        print(json.dumps(pairs, indent=2))
+        return
+    width = max(map(len, pairs))
+    texts = {name: "–" if value is None else str(value) for name, value in pairs.items()}
+    longest = max(map(len, texts.values()))
+    for name, text in texts.items():
+        meaning = (meanings or {}).get(name)
+        print(f"{name:<{width}}  {text:<{longest}}  {meaning}" if meaning else f"{name:<{width}}  {text}")

@@ -11,7 +11,7 @@ import typer
 
 import scene as scenes
 from mushrooms import output
-from mushrooms.options import count, place
+from mushrooms.options import count
 from mushrooms.simulate import Seed
 from mushrooms.terminal import SceneName, check_range, compilation_told, progress_bar
 from scene import Scene
@@ -41,16 +41,13 @@ Picture = Annotated[
     typer.Option(
         "--out",
         metavar="FILE",
-        parser=place,
         help="A .svg, .png, .pdf or .gif file; SCENE's name with .svg by default. Of several pictures each "
         "gets its kind into the name.",
     ),
 ]
 Export = Annotated[
     Path | None,
-    typer.Option(
-        metavar="FILE", parser=place, help="A .csv or .parquet file for the start and every collision."
-    ),
+    typer.Option(metavar="FILE", help="A .csv or .parquet file for the start and every collision."),
 ]
 Energy = Annotated[
     float | None, typer.Option(help="Initial energy v²/2, > 0; by default one that suits the picture.")

@@ -8,6 +8,7 @@ from __future__ import annotations
 import os
 import sys
 from importlib import import_module
+from itertools import pairwise
 from typing import Annotated, Any, NamedTuple, NoReturn
 
 import typer
@@ -18,44 +19,54 @@ PROGRAM = "mushrooms"
 UsageError: type[Any] = typer.BadParameter.__bases__[0]
 
 
-class Entry(NamedTuple):
-    """A command: where its function is, what the list of commands says of it, and an example."""
+INTERRUPTED = 130
+NOTHING_KEPT = "nothing is kept: files are written whole, at the end"
+
+
+class Listed(NamedTuple):
+    """A command: where its function is, what the list says of it, an example, and what Ctrl-C leaves."""
 
     function: str
     summary: str
     example: str
+    kept: str = NOTHING_KEPT
 
 
 COMMANDS = {
-    "scenes": Entry(
+    "scenes": Listed(
         "mushrooms.catalogue:list_scenes",
         "List the catalogue, or print a scene of it.",
         "moving-cap --toml > mine.toml",
     ),
-    "theory": Entry(
+    "theory": Listed(
         "mushrooms.predict:predict", "Print the paper's predictions for one cycle.", "moving-cap --digits 40"
     ),
-    "draw": Entry(
+    "draw": Listed(
         "mushrooms.draw:draw",
         "Draw a table through its cycle, or what particles do in it.",
         "moving-cap --trajectory --seed 1 --out orbit.gif",
     ),
-    "simulate": Entry(
+    "simulate": Listed(
         "mushrooms.simulate:simulate",
         "Simulate an ensemble.",
         "moving-cap --particles 25000 --energy 1e7 --seed 1 --out run",
     ),
-    "attack": Entry(
+    "attack": Listed(
         "mushrooms.attack:attack",
         "Ask nasty questions, and compare the answers with a second stepper's.",
         "--family knot-at-event --cases 20000 --seed 1",
     ),
-    "audit": Entry("mushrooms.audit:audit", "Check the paper's claims.", "--only X2,L4 --out audit-report"),
-    "bench": Entry("mushrooms.bench:bench", "Measure speed against error.", "--quick --out bench-report"),
-    "check": Entry(
+    "audit": Listed(
+        "mushrooms.audit:audit",
+        "Check the paper's claims.",
+        "--only X2,L4 --out audit-report",
+        "finished parts are kept in the folder of the report: --resume goes on with them",
+    ),
+    "bench": Listed("mushrooms.bench:bench", "Measure speed against error.", "--quick --out bench-report"),
+    "check": Listed(
         "mushrooms.check:check", "Grade a stepper in any language.", "--html report.html -- ./my_stepper"
     ),
-    "ask": Entry(
+    "ask": Listed(
         "mushrooms.ask:ask",
         "Print a case's question and its certified answer.",
         "near-corner/3 -- ./my_stepper",
@@ -104,11 +115,13 @@ app = typer.Typer(
 
 def run(arguments: list[str] | None = None) -> NoReturn:
     """Run the command line and exit: 0 done, 1 a claim failed, 2 bad input, 130 interrupted."""
+    given = sys.argv[1:] if arguments is None else arguments
+    _refuse_empty(given)
     try:
-        code = typer.main.get_command(app)(arguments, prog_name=PROGRAM, standalone_mode=False)
+        code = typer.main.get_command(app)(given, prog_name=PROGRAM, standalone_mode=False)
         sys.stdout.flush()
     except (KeyboardInterrupt, typer.Abort):
-        sys.exit(130)
+        code = INTERRUPTED  # which typer makes of Ctrl-C itself, in some versions
     except BrokenPipeError:
         # The reader has gone: nothing to say, and nothing left for the interpreter to flush.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
@@ -122,10 +135,30 @@ def run(arguments: list[str] | None = None) -> NoReturn:
 
         if not isinstance(error, BadInput):
             raise
-        _refuse(str(error))
+        _refuse(_in_options(str(error), given))
     except MemoryError:
         _refuse("not enough memory for so many particles")
+    if code == INTERRUPTED:
+        kept = next((COMMANDS[word].kept for word in given if word in COMMANDS), "")
+        if kept:
+            print(f"{PROGRAM}: interrupted; {kept}", file=sys.stderr)
     sys.exit(code if isinstance(code, int) else 0)
+
+
+def _refuse_empty(given: list[str]) -> None:
+    """Refuse an option of no text: for a path it would mean the folder that one is in."""
+    for option, value in pairwise([*given, "-"]):
+        if option == "--":
+            return
+        if option.startswith("--") and (not value.strip() or option.endswith("=")):
+            _refuse(f"{option.rstrip('=')} is empty, must have a value")
+
+
+def _in_options(message: str, given: list[str]) -> str:
+    """Return a message that begins with the name of an argument in Python with that of the option given."""
+    field, equals, rest = message.partition(" = ")
+    option = f"--{field.replace('_', '-')}"
+    return f"{option} = {rest}" if equals and any(word.split("=")[0] == option for word in given) else message
 
 
 def _refuse(message: str) -> NoReturn:

@@ -1,9 +1,8 @@
-"""What options make of the text given: whole numbers, places to write to."""
+"""What options make of the text given."""
 
 from __future__ import annotations
 
 from decimal import Decimal, InvalidOperation
-from pathlib import Path
 
 import typer
 
@@ -21,14 +20,3 @@ def count(text: str | int) -> int:
     except InvalidOperation:
         pass
     raise typer.BadParameter(f"{text!r} is not a whole number (as 1000 or 1e3)")
-
-
-def place(text: str) -> Path:
-    """Return the path of a file or folder to write.
-
-    Raises:
-        BadParameter: the text is empty.
-    """
-    if not text.strip():
-        raise typer.BadParameter("'' is empty, must name a file or folder")
-    return Path(text)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 import sys
 from collections.abc import Iterator, Mapping
@@ -91,13 +92,26 @@ def check_range(option: str, value: int, low: int, high: int | None = None) -> N
 
 
 def print_pairs(pairs: dict[str, Any], as_json: bool, meanings: Mapping[str, str] | None = None) -> None:
-    """Print names, their values and what they mean, a line each, or all as JSON."""
+    """Print names, their values and what they mean, a line each; or all as JSON, which keeps every digit.
+
+    A value `x` with a standard error `x_se` is rounded to the error's second digit.
+    """
     if as_json:
         print(json.dumps(pairs, indent=2))
         return
     width = max(map(len, pairs))
-    texts = {name: "–" if value is None else str(value) for name, value in pairs.items()}
+    texts = {name: _rounded(name, pairs) for name in pairs}
     longest = max(map(len, texts.values()))
     for name, text in texts.items():
         meaning = (meanings or {}).get(name)
         print(f"{name:<{width}}  {text:<{longest}}  {meaning}" if meaning else f"{name:<{width}}  {text}")
+
+
+def _rounded(name: str, pairs: dict[str, Any]) -> str:
+    value, error = pairs[name], pairs.get(f"{name.removesuffix('_se')}_se")
+    if value is None:
+        return "–"
+    if not (isinstance(value, float) and isinstance(error, float) and 0 < error < math.inf):
+        return str(value)
+    places = 1 - math.floor(math.log10(error))
+    return f"{value:.{max(places, 0)}f}"

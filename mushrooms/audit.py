@@ -48,7 +48,7 @@ def audit(
         )
         with compilation_told(), progress_bar() as bar:
             result = conduct(
-                AuditSteppers(fast.simulate, fast.trajectory),
+                AuditSteppers(fast.simulate, fast.trajectory, fast.flow),
                 settings,
                 entries=entries,
                 progress=_advance(bar),

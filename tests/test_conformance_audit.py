@@ -20,13 +20,13 @@ from conformance.audit.tolerances import MAX_TESTS, N_SIGMA
 
 REAL = ("L1", "L7")  # follow single particles or slow ones: not the stand-in's matter
 CACHED = adiabatic_particles.predict
-STAND_IN = AuditSteppers(adiabatic_particles.simulate, fast.trajectory)
+STAND_IN = AuditSteppers(adiabatic_particles.simulate, fast.trajectory, fast.flow)
 
 
 def audited(only="", simulate=adiabatic_particles.simulate, predict=CACHED):
     entries = [entry for entry in ledger.select(only) if only or entry.id not in REAL]
     return conduct(
-        AuditSteppers(simulate, fast.trajectory), AuditSettings(), entries=entries, predict=predict
+        AuditSteppers(simulate, fast.trajectory, fast.flow), AuditSettings(), entries=entries, predict=predict
     )
 
 
@@ -243,7 +243,9 @@ def test_lost_particles_leave_a_claim_open(code):
 
 def test_the_fast_stepper_keeps_the_laws_of_single_particles():
     entries = ledger.select("L1,L7")
-    result = conduct(AuditSteppers(fast.simulate, fast.trajectory), AuditSettings(threads=1), entries=entries)
+    result = conduct(
+        AuditSteppers(fast.simulate, fast.trajectory, fast.flow), AuditSettings(threads=1), entries=entries
+    )
     assert [finding.verdict for finding in result.findings] == ["confirmed", "confirmed"]
 
 
@@ -255,7 +257,9 @@ def test_a_leaking_circle_is_refuted():
         return done._replace(steps=steps)
 
     (entry,) = ledger.select("L1")
-    checks = entry.examine(ClaimEvidence({}, AuditSteppers(fast.simulate, leaking), predict=CACHED))
+    checks = entry.examine(
+        ClaimEvidence({}, AuditSteppers(fast.simulate, leaking, fast.flow), predict=CACHED)
+    )
     assert verdict_of(entry, list(checks)) == "refuted"
 
 
@@ -268,7 +272,7 @@ def test_work_that_is_not_conserved_is_refuted(monkeypatch):
 
     (entry,) = ledger.select("L7")
     checks = entry.examine(
-        ClaimEvidence({}, AuditSteppers(cooled, fast.trajectory), predict=CACHED, threads=1)
+        ClaimEvidence({}, AuditSteppers(cooled, fast.trajectory, fast.flow), predict=CACHED, threads=1)
     )
     assert verdict_of(entry, list(checks)) == "refuted"
     assert N_SIGMA > 4

@@ -182,7 +182,7 @@ def test_without_resume_everything_is_made_again(call, tmp_path, blocks):
 
 def test_entries_without_simulations_may_be_examined_apart(tmp_path):
     result = session.conduct(
-        AuditSteppers(adiabatic_particles.simulate, fast.trajectory),
+        AuditSteppers(adiabatic_particles.simulate, fast.trajectory, fast.flow),
         AuditSettings(folder=tmp_path, apart=True),
         entries=ledger.select("M3,M10"),
     )

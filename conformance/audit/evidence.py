@@ -13,7 +13,7 @@ from scene import Scene, load
 from theory.distribution import Energies
 
 if TYPE_CHECKING:
-    from fast import Collisions
+    from fast import Collisions, Flow
 
 DIGITS = 30
 Predict = Callable[[Scene, int], theory.Prediction]
@@ -24,6 +24,7 @@ class AuditSteppers(NamedTuple):
 
     simulate: Simulate
     trajectory: Callable[..., Collisions]
+    flow: Callable[..., Flow]
 
 
 @cache

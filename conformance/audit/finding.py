@@ -17,6 +17,8 @@ Verdict = Literal[
     "misprint",
     "false",
     "not reproducible as stated",
+    "loosely worded",
+    "remark",
     "inferred",
     "refuted",
     "indeterminate",
@@ -37,6 +39,9 @@ class Check(NamedTuple):
         form: see the module.
         n_tests: how many chances to be wrong by accident it took, 0 where nothing is random.
         note: what else is worth knowing.
+        sees: the departure that it would refute 19 times in 20, None where nothing is random.
+        against: the alternative that it is meant to tell from the claim, in words.
+        power: the probability with which that alternative is refuted, at least.
     """
 
     what: str
@@ -48,6 +53,9 @@ class Check(NamedTuple):
     form: Form = "claim"
     n_tests: int = 0
     note: str = ""
+    sees: float | None = None
+    against: str = ""
+    power: float | None = None
 
 
 class Entry(NamedTuple):

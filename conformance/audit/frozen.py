@@ -43,6 +43,8 @@ MEASURED = (
     "ergodic",
     "only-mouth",
     "retraced-arc",
+    "fixed-cap-other-legs",
+    "fixed-cap-irregular",
 )
 SWAY = 1e-5  # of the parameter that moves fastest [length, or none]: a relative error of this order
 TAIL = 250.0  # some five times the longest memory of a table

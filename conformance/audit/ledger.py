@@ -6,7 +6,16 @@ import tomllib
 from functools import cache
 from importlib import resources
 
-from conformance.audit.claims import experiments, exponents, finite_energy, identities, misprints
+from conformance.audit.claims import (
+    experiments,
+    exponents,
+    filling,
+    finite_energy,
+    identities,
+    misprints,
+    shapes,
+    slow_growth,
+)
 from conformance.audit.finding import Entry
 from conformance.audit.tolerances import N_SIGMA
 from scene.refusal import BadInput
@@ -17,6 +26,9 @@ CHECKS = {
     **experiments.CHECKS,
     **exponents.CHECKS,
     **identities.CHECKS,
+    **filling.CHECKS,
+    **shapes.CHECKS,
+    **slow_growth.CHECKS,
 }
 
 

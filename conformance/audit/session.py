@@ -151,7 +151,9 @@ def _examine_apart(entry_id: str, settings: AuditSettings) -> Finding:
     import fast
 
     entry = ledger.select(entry_id)[0]
-    return examine(entry, {}, AuditSteppers(fast.simulate, fast.trajectory), settings, cache(theory.predict))
+    return examine(
+        entry, {}, AuditSteppers(fast.simulate, fast.trajectory, fast.flow), settings, cache(theory.predict)
+    )
 
 
 @contextmanager

@@ -4,6 +4,10 @@ An audit makes fewer than MAX_TESTS comparisons with random data. Each is allowe
 with probability LEVEL; so a whole audit raises a false alarm with probability below FAMILY_LEVEL
 (Bonferroni's bound: no independence is assumed). Errors are taken to be normal: means over thousands of
 particles are, and so are shares when a few dozen particles or more lie on either side.
+
+A comparison that holds says little unless it could have failed. So each tells the departure that it would
+refute with probability SEEN; and where a rival of the claim has a name, how likely that rival is refuted: the
+power of the test against it.
 """
 
 from __future__ import annotations
@@ -23,9 +27,10 @@ BoolArray = npt.NDArray[np.bool_]
 Cdf = Callable[[FloatArray], FloatArray]
 
 FAMILY_LEVEL = 1e-3
-MAX_TESTS = 250
+MAX_TESTS = 400
 LEVEL = FAMILY_LEVEL / MAX_TESTS
-N_SIGMA = float(norm.isf(LEVEL / 2))  # 4.61
+N_SIGMA = float(norm.isf(LEVEL / 2))  # 4.71
+SEEN = 0.95
 
 
 class Mean(NamedTuple):
@@ -81,6 +86,7 @@ def close(
     scale: float = np.inf,
     form: Form = "claim",
     note: str = "",
+    against: tuple[str, float] | None = None,
 ) -> Check:
     """Compare a measured value with an expected one.
 
@@ -92,11 +98,13 @@ def close(
         scale: size that must be resolved: with a wider reach the check tells nothing.
         form: of the check.
         note: what else is worth knowing.
+        against: an alternative to be told from it, its name and the value that it predicts.
     """
     value, error = found
     reach = N_SIGMA * error + band
     holds = bool(abs(value - float(expected)) <= reach)  # never with nan
     is_coarse = holds and reach >= scale
+    name, other = against or ("", None)
     return Check(
         what,
         None if is_coarse else holds,
@@ -107,7 +115,24 @@ def close(
         form,
         1,
         note,
+        sees=_seen(reach, error),
+        against=name,
+        power=None if other is None else power(other - float(expected), reach, error),
     )
+
+
+def _seen(reach: float, error: float) -> float | None:
+    """Return the departure that a reach misses only with probability 1 - SEEN; None for an error of nan."""
+    return reach + float(norm.isf(1 - SEEN)) * error if np.isfinite(reach + error) else None
+
+
+def power(departure: float, reach: float, error: float) -> float | None:
+    """Return how likely a normal value is further than `reach` from where it is not, but `departure` off."""
+    if not np.isfinite(departure + reach + error):
+        return None
+    if error == 0:
+        return float(abs(departure) > reach)
+    return float(norm.sf((reach - departure) / error) + norm.cdf((-reach - departure) / error))
 
 
 def above(
@@ -120,7 +145,19 @@ def above(
     """Check that a measured value exceeds a bound beyond its error; within it, it is undecided."""
     value, error = found
     holds = None if abs(value - bound) <= N_SIGMA * error else bool(value > bound)
-    return Check(what, holds, f"> {bound:.6g}", value, error, 0.0, form, 1)
+    return Check(
+        what,
+        holds,
+        f"> {bound:.6g}",
+        value,
+        error,
+        0.0,
+        form,
+        1,
+        sees=_seen(N_SIGMA * error, error),
+        against="no more than the bound",
+        power=1 - LEVEL / 2,
+    )
 
 
 def exact(what: str, value: Any, expected: Any, size: float, *, form: Form = "claim") -> Check:
@@ -161,6 +198,7 @@ def fits(
     band: float = 0.0,
     scale: float = 0.5,
     note: str = "",
+    against: tuple[str, Cdf] | None = None,
 ) -> Check:
     """Test a whole distribution by Kolmogorov's distance (one sample, two sides).
 
@@ -171,6 +209,7 @@ def fits(
         band: distance that finite energy may add.
         scale: distance that must be seen: with a wider reach the check tells nothing.
         note: what else is worth knowing.
+        against: an alternative to be told from it, its name and its distribution function.
     """
     n = len(values)
     if n < 2:
@@ -179,4 +218,25 @@ def fits(
     holds = None if reach >= scale else bool(gap <= reach)
     more = f"; {note}" if note else ""
     text = f"Kolmogorov's distance, n = {n}, p = {chance(values, cdf):.2g} without a band{more}"
-    return Check(what, holds, f"<= {reach:.4g}", gap, band=band, n_tests=1, note=text)
+    name, other = against or ("", None)
+    return Check(
+        what,
+        holds,
+        f"<= {reach:.4g}",
+        gap,
+        band=band,
+        n_tests=1,
+        note=text,
+        sees=_seen(reach, 0.5 / n**0.5),  # a share has its largest error at one half
+        against=name,
+        power=None if other is None else _power_of_gap(values, cdf, other, reach),
+    )
+
+
+def _power_of_gap(values: FloatArray, cdf: Cdf, other: Cdf, reach: float) -> float:
+    """Return how likely a sample of `other` is further than `reach` from `cdf` at one place, at least."""
+    lowest, highest = np.quantile(values, (0.001, 0.999)).tolist()
+    places = np.linspace(lowest, highest, 2001)
+    g = np.clip(other(places), 0.0, 1.0)
+    error = np.sqrt(np.maximum(g * (1 - g), 1 / len(values)) / len(values))
+    return float(np.max(norm.sf((reach - np.abs(g - cdf(places))) / error)))

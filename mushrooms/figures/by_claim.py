@@ -15,7 +15,7 @@ from mushrooms.figures import scaling as laws
 from mushrooms.figures.style import STYLE
 
 Samples = Mapping[str, Sample]
-N7, N7X10, N7X30, N5X30 = "moving-cap@1e7", "moving-cap@1e7x10", "moving-cap@1e7x30", "moving-cap@1e5x30"
+N7, N7X30, N5X30 = "moving-cap@1e7", "moving-cap@1e7x30", "moving-cap@1e5x30"
 
 
 class Picture(NamedTuple):
@@ -35,9 +35,8 @@ class Picture(NamedTuple):
 
 
 def _sums(samples: Samples) -> Figure:
-    if N7X30 in samples:
-        return cycles.sums([(samples[N7X10], 10), (samples[N7X30], 30)])
-    return cycles.sums([(samples[N5X30], 10), (samples[N5X30], 30)])
+    run = N7X30 if N7X30 in samples else N5X30
+    return cycles.sums([(samples[run], 10), (samples[run], 30)])
 
 
 def _there(samples: Samples, *names: str) -> list[Sample]:

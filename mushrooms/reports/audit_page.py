@@ -42,7 +42,9 @@ SIGNS = {
     "misprint": ("✎", "bad"),
     "false": ("✗", "bad"),
     "not reproducible as stated": ("≁", "bad"),
-    "inferred": ("≈", "open"),
+    "loosely worded": ("≈", "open"),
+    "remark": ("§", "open"),
+    "inferred": ("∴", "open"),
     "refuted": ("✗", "bad"),
     "indeterminate": ("?", "open"),
 }
@@ -50,7 +52,10 @@ PIXELS_PER_INCH = 104  # of a screen: a figure is shown no larger
 
 
 class CheckData(TypedDict):
-    """One comparison; `form` is claim, printed or corrected; `pull` is the difference in standard errors."""
+    """One comparison; `form` is claim, printed or corrected; `pull` is the difference in standard errors.
+
+    `sees` is the departure that it would refute 19 times in 20; `power` how likely it refutes `against`.
+    """
 
     what: str
     holds: bool | None
@@ -61,6 +66,9 @@ class CheckData(TypedDict):
     form: str
     n_tests: int
     note: str
+    sees: float | None
+    against: str
+    power: float | None
     pull: float | None
 
 
@@ -178,7 +186,7 @@ def _finding(entry: Entry, finding: Finding) -> FindingData:
 
 
 def _check(check: Check) -> CheckData:
-    numbers = {name: _number(getattr(check, name)) for name in ("value", "error", "band")}
+    numbers = {name: _number(getattr(check, name)) for name in ("value", "error", "band", "sees", "power")}
     return cast(CheckData, check._asdict() | numbers | {"pull": _pull(check)})
 
 
@@ -248,6 +256,7 @@ def to_html(data: ReportData, samples: by_claim.Samples) -> str:
         scenes=tables,
         figures_text=figures_text,
         expected_text=expected_text,
+        power_text=power_text,
         signs=SIGNS,
         paper=PAPER,
     )
@@ -285,6 +294,15 @@ def expected_text(check: CheckData) -> str:
     if check["pull"] is None or check["error"] is None:
         return check["expected"]
     return f"{float(check['expected']):.{min(_digits(check['error']) + 1, 10)}f}"
+
+
+def power_text(check: CheckData) -> str:
+    """Return what a check is worth: the smallest departure seen, and its named alternative's chances."""
+    seen = "" if check["sees"] is None else f"{check['sees']:.1g}"
+    if check["power"] is None:
+        return seen
+    p = check["power"]
+    return f"{seen}; {check['against']}: {'> 0.999' if p > 0.999 else f'{p:.2g}'}"
 
 
 def _digits(error: float) -> int:

@@ -16,6 +16,7 @@ from conformance.audit.claims.broadened import (
     predicted,
 )
 from conformance.audit.claims.finite_energy import ACW, CW, FIXED, width
+from conformance.audit.claims.misprints import ZERO, loop_area
 from conformance.audit.evidence import ClaimEvidence
 from conformance.audit.finding import Check
 from conformance.audit.runs import scene_of
@@ -23,10 +24,13 @@ from conformance.audit.samples import Sample
 from conformance.audit.tolerances import (
     LEVEL,
     N_SIGMA,
+    Cdf,
+    FloatArray,
     above,
     chance,
     close,
     critical_gap,
+    exact,
     fits,
     mean,
     share,
@@ -35,20 +39,11 @@ from conformance.audit.tolerances import (
 )
 from scene import Fourier
 from scene.laws import bounds
-from scene.tables import Mushroom, laws, width_factors
+from scene.tables import Mushroom, laws
 
 MOVING = ("moving-cap@1e6", "moving-cap@1e7")
 MODE_BINS = np.linspace(-0.8, 1.1, 77)
 TROUGH = 0.2  # of the density of s, between its modes
-
-
-def mouth_speed(sample: Sample) -> float:
-    """Return the fastest speed of arc or mouth: capture is decided by w/r alone, not by the floor."""
-    scene = scene_of(sample.run)
-    assert isinstance(scene, Mushroom)
-    factors = [bounds(law) for law in width_factors(scene)]
-    mouth = sum(f.slope * np.prod([g.highest for g in factors if g is not f]) for f in factors)
-    return float(max(bounds(laws(scene)["r"]).slope, mouth))
 
 
 def chord_time(sample: Sample) -> float:
@@ -63,7 +58,9 @@ def growth(evidence: ClaimEvidence, sample: Sample) -> Check:
     theirs = float(evidence.theory_of(sample).m1)
     bias, band = bias_of_mean(sample)
     what = f"{sample.run.name}: mean of log E1/E0, less its bias {bias:.5f}"
-    return close(what, mean(sample.gain).less(bias), theirs, band=band, scale=abs(theirs) or np.inf)
+    rival = ("no growth", 0.0) if theirs else None
+    found = mean(sample.gain).less(bias)
+    return close(what, found, theirs, band=band, scale=abs(theirs) or np.inf, against=rival)
 
 
 def escape(evidence: ClaimEvidence, sample: Sample) -> Check:
@@ -71,8 +68,10 @@ def escape(evidence: ClaimEvidence, sample: Sample) -> Check:
     found = predicted(sample)
     bias = found.p_nc - adiabatic(sample).p_nc
     what = f"{sample.run.name}: share never captured, less its bias {bias:.5f}"
-    theirs = evidence.theory_of(sample).p_nc
-    return close(what, share(sample.never_captured).less(bias), theirs, band=found.next_order.p_nc, scale=0.1)
+    theirs, s_nc = (float(getattr(evidence.theory_of(sample), name)) for name in ("p_nc", "log_e_nc"))
+    rival = ("that of the reversed cycle", theirs * np.exp(-s_nc)) if s_nc else ("nobody is captured", 1.0)
+    ours, band = share(sample.never_captured).less(bias), found.next_order.p_nc
+    return close(what, ours, theirs, band=band, scale=0.1, against=rival)
 
 
 def peak_place(evidence: ClaimEvidence, sample: Sample) -> Check:
@@ -82,7 +81,8 @@ def peak_place(evidence: ClaimEvidence, sample: Sample) -> Check:
     theirs = float(evidence.theory_of(sample).log_e_nc)
     what = f"{sample.run.name}: mean log E1/E0 of the never captured, less its bias {bias:.5f}"
     band = found.next_order.peak_mean
-    return close(what, mean(kept).less(bias), theirs, band=band, scale=abs(theirs) or np.inf)
+    rival = ("no bias", theirs - bias)
+    return close(what, mean(kept).less(bias), theirs, band=band, scale=abs(theirs) or np.inf, against=rival)
 
 
 def peak_shape(sample: Sample) -> Check:
@@ -90,9 +90,12 @@ def peak_shape(sample: Sample) -> Check:
     kept, found = sample.gain[~sample.captured], predicted(sample)
     what = f"{sample.run.name}: log E1/E0 of the never captured"
     s_nc, sigma = found.s_nc, found.peak[1] ** 0.5
-    still = chance(kept, lambda s: np.asarray(norm.cdf(s, s_nc, sigma)))
-    note = f"of a Gaussian at log E_nc {still:.1g}"
-    return fits(what, kept, found.free_cdf, band=peak_band(sample), scale=0.2, note=note)
+
+    def still(s: FloatArray) -> FloatArray:
+        return np.asarray(norm.cdf(s, s_nc, sigma))
+
+    note, rival = f"of a Gaussian at log E_nc {chance(kept, still):.1g}", ("a Gaussian at log E_nc", still)
+    return fits(what, kept, found.free_cdf, band=peak_band(sample), scale=0.2, note=note, against=rival)
 
 
 def peak_width(sample: Sample) -> Check:
@@ -108,9 +111,9 @@ def captured_energies(sample: Sample) -> Check:
     values, what = sample.gain[sample.captured], f"{sample.run.name}: log E1/E0 of the captured"
     if len(values) < 2:
         return Check(what, None, "a sample", n_tests=1, note="no particles")
-    note = f"of the adiabatic theory {chance(values, adiabatic(sample).captured_cdf):.1g}"
-    found = predicted(sample)
-    return fits(what, values, found.captured_cdf, band=captured_band(sample), scale=0.2, note=note)
+    sharp, found = adiabatic(sample).captured_cdf, predicted(sample).captured_cdf
+    note, rival = f"of the adiabatic theory {chance(values, sharp):.1g}", ("no blur", sharp)
+    return fits(what, values, found, band=captured_band(sample), scale=0.2, note=note, against=rival)
 
 
 def one_cycle(evidence: ClaimEvidence, runs: tuple[str, ...]) -> Iterator[Check]:
@@ -176,7 +179,12 @@ def capture_times(evidence: ClaimEvidence) -> Iterator[Check]:
             found.capture_cdf,
             band=seen + found.next_order.captured_mean,
             scale=0.2,
+            against=("evenly spread", _even(grid[0], grid[-1])),
         )
+
+
+def _even(first: float, last: float) -> Cdf:
+    return lambda t: np.asarray((t - first) / (last - first))
 
 
 def ergodic(evidence: ClaimEvidence) -> Iterator[Check]:
@@ -228,6 +236,11 @@ def trivial_loops(evidence: ClaimEvidence) -> Iterator[Check]:
     yield stated(what, theirs.m1 == 0, f"m1 = {float(theirs.m1):.7f}", "m1 = 0", form="printed")
     what = f"{retraced.run.name}: mean of log E1/E0, less its bias {bias:.5f}, is 0"
     yield close(what, mean(retraced.gain).less(bias), 0.0, band=band, form="printed")
+    turn = loop_area("retraced-arc")
+    what = (
+        "an area in sec. 3.5's plane means growth (M12), but growth needs none: signed area of retraced-arc"
+    )
+    yield exact(what, turn, 0, ZERO)
     yield from one_cycle(evidence, ("retraced-arc@1e6",))
     twice = np.isfinite(retraced.t_in[:, 0]).sum(axis=1) == 2
     yield close(
@@ -303,5 +316,6 @@ CHECKS = {
     "X7": trivial_loops,
     "X8": both_ways,
     "C1": many_cycles.independence,
+    "C9": many_cycles.tails,
     "D1": many_cycles.losses,
 }

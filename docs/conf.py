@@ -130,7 +130,7 @@ def write_commands(_: Any) -> None:
 
     sections = []
     for name in COMMANDS:
-        shown = CliRunner().invoke(app, [name, "--help"], prog_name=PROGRAM, terminal_width=100)
+        shown = CliRunner().invoke(app, [name, "--help"], prog_name=PROGRAM, terminal_width=86)
         sections.append(f"## {PROGRAM} {name}\n\n```none\n{shown.output.strip()}\n```\n")
     (DOCS / "generated").mkdir(exist_ok=True)
     (DOCS / "generated" / "commands.md").write_text("\n".join(sections), "utf-8")

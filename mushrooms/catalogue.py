@@ -15,7 +15,7 @@ from scene.tables import cycle_length
 
 
 def list_scenes(
-    name: Annotated[str, typer.Argument(metavar="[NAME]", help="Print this scene of the catalogue.")] = "",
+    name: Annotated[str, typer.Argument(metavar="NAME", help="Print this scene of the catalogue.")] = "",
     as_toml: Annotated[bool, typer.Option("--toml", help="Print NAME as a file to begin from.")] = False,
     as_json: AsJson = False,
 ) -> None:

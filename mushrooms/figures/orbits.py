@@ -132,7 +132,7 @@ def section(orbits: Sequence[Orbit] | Orbit) -> Figure:
     sections = [orbit.section() for orbit in found]
     place, sine = (np.concatenate([one[k] for one in sections]) for k in (2, 3))
     captured = np.concatenate([one.is_captured() for one in sections])
-    size = min(4.0, max(0.6, 40.0 / math.sqrt(len(place) or 1)))
+    size = _size(len(place))
     for which, colour, name in ((captured, CAPTURED, "captured"), (~captured, FREE, "free")):
         if which.any():
             axes.plot(place[which], sine[which], ".", color=colour, markersize=size, rasterized=True)
@@ -142,6 +142,11 @@ def section(orbits: Sequence[Orbit] | Orbit) -> Figure:
     )
     figure.legend(loc="outside lower center", ncols=2)
     return figure
+
+
+def _size(n: int) -> float:
+    # Of n points [points]: the more, the finer.
+    return min(4.0, max(0.6, 90.0 / math.sqrt(n or 1)))
 
 
 def _of(orbits: Sequence[Orbit]) -> str:
@@ -160,7 +165,7 @@ def collision_map(orbits: Sequence[Orbit] | Orbit) -> Figure:
     scene = found[0].scene
     points = np.vstack([boundary_map(orbit) for orbit in found])
     captured = np.concatenate([orbit.captured()[1:] for orbit in found])
-    size = min(4.0, max(0.6, 40.0 / math.sqrt(len(points))))
+    size = _size(len(points))
     for which, colour, name in ((captured, CAPTURED, "captured"), (~captured, FREE, "free")):
         if which.any():
             axes.plot(*points[which].T, ".", color=colour, markersize=size, rasterized=True)

@@ -203,16 +203,18 @@ def _placed(window: Window, before: Any, after: Any, absorbed: Any) -> Iterator[
 
 
 class Headway:
-    """How far a resolution has come: told as the share of its pieces that are sampled."""
+    """How far a resolution has come: told as the share of its pieces that is sampled, which never falls."""
 
     def __init__(self, n_pieces: int, told: Callable[[float], None] | None) -> None:
         self._n_pieces, self._told = n_pieces, told
-        self._n_done = 0.0
+        self._n_done, self._most = 0, 0.0
 
     def at(self, share: float) -> None:
         """Tell that a share of the present piece is sampled; of 1, that it is done."""
+        # A part that turns out to be unresolved is sampled again by halves: the share waits for these.
+        self._most = max(self._most, (self._n_done + share) / self._n_pieces)
         if self._told is not None:
-            self._told((self._n_done + share) / self._n_pieces)
+            self._told(self._most)
         self._n_done += share == 1.0
 
 

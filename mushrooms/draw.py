@@ -11,7 +11,6 @@ import typer
 
 import scene as scenes
 from mushrooms import output
-from mushrooms.options import count
 from mushrooms.simulate import Seed
 from mushrooms.terminal import SceneName, check_range, compilation_told, progress_bar
 from scene import Scene
@@ -52,12 +51,10 @@ Export = Annotated[
 Energy = Annotated[
     float | None, typer.Option(help="Initial energy v²/2, > 0; by default one that suits the picture.")
 ]
-Length = Annotated[
-    int | None, typer.Option(parser=count, metavar="N", help="Collisions of each particle, 1 to 10^6.")
-]
+Length = Annotated[int | None, typer.Option(help="Collisions of each particle, 1 to 10^6.")]
 Many = Annotated[
     int | None,
-    typer.Option(parser=count, metavar="N", help="Particles of a section, a map, exponents; 1 to 1000."),
+    typer.Option(help="Particles of a section, a map, exponents; 1 to 1000."),
 ]
 
 

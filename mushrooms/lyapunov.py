@@ -19,7 +19,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mushrooms.orbits import FloatArray, Orbit
+from mushrooms.orbits import FloatArray, FollowedOrbit
 from scene.refusal import BadInput
 
 N_BLOCKS = 16
@@ -44,7 +44,7 @@ class Stretching(NamedTuple):
     flight: float
 
 
-def jacobians(orbit: Orbit, progress: Callable[[int], None] | None = None) -> FloatArray:
+def jacobians(orbit: FollowedOrbit, progress: Callable[[int], None] | None = None) -> FloatArray:
     """Return (n, 5, 5): d(t, x, y, vx, vy) after each collision by d(t, x, y, vx, vy) before it.
 
     Args:
@@ -70,7 +70,7 @@ def jacobians(orbit: Orbit, progress: Callable[[int], None] | None = None) -> Fl
     return out
 
 
-def stretching(orbit: Orbit, progress: Callable[[int], None] | None = None) -> Stretching:
+def stretching(orbit: FollowedOrbit, progress: Callable[[int], None] | None = None) -> Stretching:
     """Follow a deviation along an orbit.
 
     Args:

@@ -7,12 +7,14 @@ from __future__ import annotations
 
 import os
 import sys
+from decimal import Decimal, InvalidOperation
 from importlib import import_module
 from itertools import pairwise
-from typing import Annotated, Any, NamedTuple, NoReturn
+from typing import Annotated, Any, NamedTuple, NoReturn, get_args, get_origin, get_type_hints
 
 import typer
 from typer.core import TyperCommand, TyperGroup
+from typer.models import OptionInfo
 
 PROGRAM = "mushrooms"
 # Typer 0.26 carries a click of its own, older ones import it: this is the error class of the one in use.
@@ -20,6 +22,7 @@ UsageError: type[Any] = typer.BadParameter.__bases__[0]
 
 
 INTERRUPTED = 130
+MOST = Decimal(10) ** 30  # of a whole number on the command line, written with an exponent
 NOTHING_KEPT = "nothing is kept: files are written whole, at the end"
 
 
@@ -99,8 +102,34 @@ def command(name: str) -> Any:
     module, _, function = entry.function.partition(":")
     alone = typer.Typer(add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None)
     epilog = f"Example: {PROGRAM} {name} {entry.example}"
-    alone.command(name, epilog=epilog)(getattr(import_module(module), function))
+    alone.command(name, epilog=epilog)(_with_exponents(getattr(import_module(module), function)))
     return typer.main.get_command(alone)
+
+
+def _with_exponents(function: Any) -> Any:
+    """Let every option of a command that is a whole number be written as 1e6 too."""
+    function.__annotations__ = get_type_hints(function, include_extras=True)
+    for hint in function.__annotations__.values():
+        if get_origin(hint) is Annotated and int in (hint.__origin__, *get_args(hint.__origin__)):
+            for told in hint.__metadata__:
+                if isinstance(told, OptionInfo) and told.parser is None:
+                    told.parser, told.metavar = whole, told.metavar or "N"
+    return function
+
+
+def whole(text: str | int) -> int:
+    """Return a whole number, written as 1000, 1e3 or 1000.0.
+
+    Raises:
+        BadParameter: it is none.
+    """
+    try:
+        number = Decimal(text)
+        if number.is_finite() and abs(number) < MOST and number == number.to_integral_value():
+            return int(number)
+    except InvalidOperation:
+        pass
+    raise typer.BadParameter(f"{text!r} is not a whole number")
 
 
 app = typer.Typer(

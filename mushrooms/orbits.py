@@ -60,7 +60,7 @@ class Section(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Orbit:
+class FollowedOrbit:
     """One particle: where it starts, its collisions, and why they ended.
 
     Attributes:
@@ -231,7 +231,7 @@ def follow(
     energy: float | None = None,
     seed: int = 0,
     n_orbits: int = 1,
-) -> list[Orbit]:
+) -> list[FollowedOrbit]:
     """Follow particles from drawn starts, uniform in area and direction when the cycle begins.
 
     Args:
@@ -258,7 +258,7 @@ def follow(
     return [from_state(scene, State(row[0], *row[2:]), n_collisions) for row in rows.tolist()]
 
 
-def from_state(scene: Scene, start: State, n_collisions: int) -> Orbit:
+def from_state(scene: Scene, start: State, n_collisions: int) -> FollowedOrbit:
     """Follow a particle from a state of your own, as `fast.trajectory`.
 
     Raises:
@@ -267,7 +267,7 @@ def from_state(scene: Scene, start: State, n_collisions: int) -> Orbit:
     import fast
 
     found = fast.trajectory(scene, start, n_collisions)
-    return Orbit(scene, start, found.walls, np.asarray(found.steps, np.float64), found.outcome)
+    return FollowedOrbit(scene, start, found.walls, np.asarray(found.steps, np.float64), found.outcome)
 
 
 class Slot(NamedTuple):
@@ -300,7 +300,7 @@ def _lengths(now: TableAt) -> list[tuple[Wall, float]]:
     return [("arc", math.pi * r), ("base", r - w), *around, ("base", r - w)]
 
 
-def boundary_map(orbit: Orbit) -> FloatArray:
+def boundary_map(orbit: FollowedOrbit) -> FloatArray:
     """Return (n, 2): place along the boundary and sin of the angle to the normal after each collision.
 
     The place runs anticlockwise, 0 to 1; each wall has the slot that `boundary` gives it, and a hit

@@ -30,7 +30,7 @@ def moving():
     return orbits.follow(MOVING, N_COLLISIONS, energy=ENERGY, seed=SEED, n_orbits=6)
 
 
-def whispering(scene: scenes.Scene = STATIC, n: int = N_COLLISIONS) -> orbits.Orbit:
+def whispering(scene: scenes.Scene = STATIC, n: int = N_COLLISIONS) -> orbits.FollowedOrbit:
     """Return an orbit in the cap that never sees the mouth."""
     return orbits.from_state(scene, scenes.State(0.0, 0.9, 0.0, 0.05, 1.0), n)
 
@@ -242,7 +242,7 @@ def test_the_path_of_a_particle_in_every_kind_of_file(command_line, tmp_path, su
         (["moving-cap", "--out", ""], ["--out", "empty"]),
         (["moving-cap", "--trajectory", "--energy", "0"], ["--energy = 0.0", "> 0"]),
         (["moving-cap", "--trajectory", "--collisions", "0"], ["--collisions = 0", "1 to 1000000"]),
-        (["moving-cap", "--trajectory", "--collisions", "1.5"], ["--collisions", "whole number"]),
+        (["moving-cap", "--trajectory", "--collisions", "1.5"], ["--collisions", "1.5"]),
         (["moving-cap", "--map", "--particles", "1001"], ["--particles = 1001", "1 to 1000"]),
         (["moving-cap", "--lyapunov", "--collisions", "9"], ["collisions = 9", ">= 32"]),
         (["moving-cap", "--export", "a.txt"], ["a.txt", ".csv, .parquet"]),

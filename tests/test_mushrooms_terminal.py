@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import subprocess
 import sys
 
@@ -102,3 +103,19 @@ def test_tables_obey_columns(monkeypatch):
     assert table_console().width == 60
     monkeypatch.delenv("COLUMNS")
     assert table_console().width == 140
+
+
+@pytest.mark.parametrize(("given", "meant"), [("2e1", 20), ("20", 20), ("0.2e2", 20), ("+20.0", 20)])
+def test_whole_numbers_may_have_exponents(command_line, given, meant):
+    code, out, _ = command_line(
+        "simulate", "breathing-circle", "--particles", given, "--energy", "1", "--json"
+    )
+    assert code == 0
+    assert json.loads(out)["particles"] == meant
+
+
+@pytest.mark.parametrize("given", ["1e400", "1.5", "1e-1", "nan", "inf", "many", "0x10"])
+def test_other_numbers_may_not(command_line, given):
+    assert_refused(
+        command_line("simulate", "moving-cap", "--energy", "1", "--particles", given), "--particles", given
+    )

@@ -23,7 +23,7 @@ import theory
 from mushrooms import lyapunov
 from mushrooms.figures import style as plots
 from mushrooms.figures import table as tables
-from mushrooms.orbits import Orbit, boundary, boundary_map, span_of_nu
+from mushrooms.orbits import FollowedOrbit, boundary, boundary_map, span_of_nu
 from scene import Mushroom, Scene, Stem
 from scene.geometry import table_at
 from scene.refusal import BadInput
@@ -36,15 +36,15 @@ CAPTURED, FREE = plots.BLUE, plots.ORANGE
 HALO = [withStroke(linewidth=2.5, foreground="white")]
 
 
-def _given(orbits: Sequence[Orbit] | Orbit) -> list[Orbit]:
-    found = [orbits] if isinstance(orbits, Orbit) else list(orbits)
+def _given(orbits: Sequence[FollowedOrbit] | FollowedOrbit) -> list[FollowedOrbit]:
+    found = [orbits] if isinstance(orbits, FollowedOrbit) else list(orbits)
     if not found or not all(len(orbit.walls) for orbit in found):
         raise BadInput("orbits: nothing to draw, the particle meets no wall")
     return found
 
 
 @rc_context(plots.STYLE)
-def trajectory(orbit: Orbit) -> Figure:
+def trajectory(orbit: FollowedOrbit) -> Figure:
     """Draw an orbit's path in its table: walls at its start and end, their names, the mouth, the start."""
     [orbit] = _given(orbit)
     figure, axes = plots.new_figure(6.4, 6.0)
@@ -82,7 +82,7 @@ def _unit(v: Any) -> Any:
     return v / (np.hypot(*v) or 1.0)
 
 
-def _title(orbit: Orbit) -> str:
+def _title(orbit: FollowedOrbit) -> str:
     energy = orbit.energies()[0]
     many = len(orbit.walls)
     return f"{orbit.scene.name or 'a table'}: {many:,} collisions from energy {energy:.4g}"
@@ -110,7 +110,7 @@ def _names(axes: Axes, scene: Scene, t: float) -> None:
 
 
 @rc_context(plots.STYLE)
-def section(orbits: Sequence[Orbit] | Orbit) -> Figure:
+def section(orbits: Sequence[FollowedOrbit] | FollowedOrbit) -> Figure:
     """Draw a Poincare section: place on the arc against sin phi, with the captured and the chaotic zone.
 
     The edge is |sin phi| = nu. Where nu moves, what lies beyond its largest value is captured at all times,
@@ -149,7 +149,7 @@ def _size(n: int) -> float:
     return min(4.0, max(0.6, 90.0 / math.sqrt(n or 1)))
 
 
-def _of(orbits: Sequence[Orbit]) -> str:
+def _of(orbits: Sequence[FollowedOrbit]) -> str:
     n = len(orbits)
     if n == 1:
         return _title(orbits[0])
@@ -158,7 +158,7 @@ def _of(orbits: Sequence[Orbit]) -> str:
 
 
 @rc_context(plots.STYLE)
-def collision_map(orbits: Sequence[Orbit] | Orbit) -> Figure:
+def collision_map(orbits: Sequence[FollowedOrbit] | FollowedOrbit) -> Figure:
     """Draw the boundary map: place along the whole boundary against the sine after each collision."""
     found = _given(orbits)
     figure, axes = plots.new_figure(7.6, 5.0)
@@ -184,7 +184,7 @@ def collision_map(orbits: Sequence[Orbit] | Orbit) -> Figure:
 
 
 @rc_context(plots.STYLE)
-def energy_in_time(orbit: Orbit) -> Figure:
+def energy_in_time(orbit: FollowedOrbit) -> Figure:
     """Draw log E / E0 against time, theory's line for these captured stays, and these stays shaded."""
     [orbit] = _given(orbit)
     figure, axes = plots.new_figure(7.2, 4.4)
@@ -213,7 +213,9 @@ def energy_in_time(orbit: Orbit) -> Figure:
 
 
 @rc_context(plots.STYLE)
-def exponents(orbits: Sequence[Orbit] | Orbit, progress: Callable[[int], None] | None = None) -> Figure:
+def exponents(
+    orbits: Sequence[FollowedOrbit] | FollowedOrbit, progress: Callable[[int], None] | None = None
+) -> Figure:
     """Draw finite-time Lyapunov exponents against the number of collisions, the last with its error.
 
     Raises:
@@ -237,7 +239,7 @@ def exponents(orbits: Sequence[Orbit] | Orbit, progress: Callable[[int], None] |
     return figure
 
 
-def write_animation(orbit: Orbit, file: BinaryIO, n_frames: int = N_FRAMES) -> None:
+def write_animation(orbit: FollowedOrbit, file: BinaryIO, n_frames: int = N_FRAMES) -> None:
     """Write a GIF of the walls in motion and the particle with its last flights behind it.
 
     Args:

@@ -23,7 +23,7 @@ RUN_ELSEWHERE = {
     "protocol.md": {"json"},  # test_docs: against the schema and the plain stepper
     "corpus.md": {""},
 }
-INSTALLS = ("pip install", "mushrooms --version")
+INSTALLS = ("pip install", "mushrooms --version", "sphinx-build")
 
 
 def blocks(page: Path) -> list[tuple[str, str]]:

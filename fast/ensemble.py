@@ -43,6 +43,7 @@ from fast.pieces import laws_in_lanes
 from fast.starts import cycle_length, cycle_stops, initial_states, least_collisions
 from fast.units import Units, fit, inward
 from scene import Scene
+from scene.notebook import rows
 from scene.refusal import BadInput, check_count, check_scene
 
 FOLLOWED, UNDECIDED, UNDEFINED, REJECTED = 0, 1, 2, 3
@@ -127,6 +128,22 @@ class Ensemble(NamedTuple):
     def ns_per_collision(self) -> float:
         """Return kernel wall time x threads / collisions, in nanoseconds."""
         return self.seconds * self.threads / max(int(self.n_collisions.sum()), 1) * 1e9
+
+    def _repr_html_(self) -> str:
+        taking_part = self.energy[self.takes_part()]
+        shown = {
+            "particles": f"{len(self.energy):,}",
+            "followed to the end": f"{int((self.outcome == FOLLOWED).sum()):,}",
+            "cycles": self.cycle_energies.shape[1],
+            "initial energy": f"{self.energy0:.6g}",
+            "collisions": f"{int(self.n_collisions.sum()):,}",
+            "mean of log E1/E0": f"{np.log(taking_part / self.energy0).mean():.6g}"
+            if len(taking_part)
+            else "–",
+            "never captured, a cycle": ", ".join(f"{share:.4g}" for share in self.p_nc()[:6]),
+            "sha256": self.sha256(),
+        }
+        return rows("an ensemble", shown)
 
     def sha256(self) -> str:
         """Return the SHA-256 of the result's bits (times and thread count left out)."""

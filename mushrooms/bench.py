@@ -49,6 +49,11 @@ def bench(
     compare: Annotated[
         Path | None, typer.Option(metavar="OLD.json", help="An earlier bench.json to compare with.")
     ] = None,
+    table: Annotated[
+        Path | None,
+        typer.Option(metavar="OLD.json", help="Print a table of an earlier bench.json as Markdown, and end."),
+    ] = None,
+    workload: Annotated[str, typer.Option(metavar="NAME", help="Which table.")] = "moving-cap-1e7",
 ) -> None:
     """Measure speed against error; writes bench.json, bench.svg, bench.html and hard-cases.md.
 
@@ -58,6 +63,9 @@ def bench(
     from mushrooms.figures import speed as figures_of_speed
     from mushrooms.reports import bench_page
 
+    if table is not None:
+        print(bench_page.to_markdown(record.read(table), workload), end="")
+        return
     check_seed(seed, "--seed")
     size: Size = "quick" if quick else "full"
     old = record.read(compare) if compare is not None else None

@@ -1,40 +1,141 @@
-"""The command line. Bad input of any kind is one line on stderr and exit code 2."""
+"""The command line. Bad input of any kind is one line on stderr and exit code 2.
+
+A command's module is imported when the command is used: the list of commands needs none of them.
+"""
 
 from __future__ import annotations
 
-import json
-import math
 import os
 import sys
-from pathlib import Path
-from typing import Annotated, Any, NoReturn
+from decimal import Decimal, InvalidOperation
+from importlib import import_module
+from itertools import pairwise
+from typing import Annotated, Any, NamedTuple, NoReturn, get_args, get_origin, get_type_hints
 
 import typer
-from rich.console import Console
-from rich.table import Table
-
-import mushrooms
-import scene as scenes
-from mushrooms import output
-from mushrooms.ask import ask
-from mushrooms.attack import attack
-from mushrooms.audit import audit
-from mushrooms.bench import bench
-from mushrooms.check import check
-from mushrooms.simulate import simulate
-from mushrooms.stored import draw_run, export, is_stored
-from mushrooms.terminal import AsJson, SceneName, check_range, print_pairs
-from scene.files import write_file
-from scene.load import read_data
-from scene.refusal import BadInput
-from scene.tables import cycle_length
+from typer.core import TyperCommand, TyperGroup
+from typer.models import OptionInfo
 
 PROGRAM = "mushrooms"
-MAX_DIGITS = 1000
 # Typer 0.26 carries a click of its own, older ones import it: this is the error class of the one in use.
 UsageError: type[Any] = typer.BadParameter.__bases__[0]
 
+
+INTERRUPTED = 130
+MOST = Decimal(10) ** 30  # of a whole number on the command line, written with an exponent
+NOTHING_KEPT = "nothing is kept: files are written whole, at the end"
+
+
+class Listed(NamedTuple):
+    """A command: where its function is, what the list says of it, an example, and what Ctrl-C leaves."""
+
+    function: str
+    summary: str
+    example: str
+    kept: str = NOTHING_KEPT
+
+
+COMMANDS = {
+    "scenes": Listed(
+        "mushrooms.catalogue:list_scenes",
+        "List the catalogue, or print a scene of it.",
+        "moving-cap --toml > mine.toml",
+    ),
+    "theory": Listed(
+        "mushrooms.predict:predict", "Print the paper's predictions for one cycle.", "moving-cap --digits 40"
+    ),
+    "draw": Listed(
+        "mushrooms.draw:draw",
+        "Draw a table through its cycle, or what particles do in it.",
+        "moving-cap --trajectory --seed 1 --out orbit.gif",
+    ),
+    "simulate": Listed(
+        "mushrooms.simulate:simulate",
+        "Simulate an ensemble.",
+        "moving-cap --particles 25000 --energy 1e7 --seed 1 --out run",
+        "of a run with --out every finished block is: --resume goes on with them",
+    ),
+    "export": Listed("mushrooms.stored:export", "Write a finished run as one table.", "run --to run.parquet"),
+    "attack": Listed(
+        "mushrooms.attack:attack",
+        "Ask nasty questions, and compare the answers with a second stepper's.",
+        "--family knot-at-event --cases 20000 --seed 1",
+    ),
+    "audit": Listed(
+        "mushrooms.audit:audit",
+        "Check the paper's claims.",
+        "--only X2,L4 --out audit-report",
+        "finished parts are kept in the folder of the report: --resume goes on with them",
+    ),
+    "bench": Listed("mushrooms.bench:bench", "Measure speed against error.", "--quick --out bench-report"),
+    "check": Listed(
+        "mushrooms.check:check", "Grade a stepper in any language.", "--html report.html -- ./my_stepper"
+    ),
+    "ask": Listed(
+        "mushrooms.ask:ask",
+        "Print a case's question and its certified answer.",
+        "near-corner/3 -- ./my_stepper",
+    ),
+}
+
+
+class LateCommand(TyperCommand):
+    """A command that is imported when it is used."""
+
+    def __init__(self, name: str) -> None:
+        super().__init__(name=name, help=COMMANDS[name].summary, rich_markup_mode=None)
+
+    def make_context(self, *arguments: Any, **options: Any) -> Any:
+        """Return the context of the command itself, which acts in place of this one."""
+        return command(self.name or "").make_context(*arguments, **options)
+
+
+class Commands(TyperGroup):
+    """All commands, none of them imported."""
+
+    def __init__(self, **attributes: Any) -> None:
+        super().__init__(**attributes)
+        self.commands = {name: LateCommand(name) for name in COMMANDS}
+
+
+def command(name: str) -> Any:
+    """Import a command."""
+    entry = COMMANDS[name]
+    module, _, function = entry.function.partition(":")
+    alone = typer.Typer(add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None)
+    epilog = f"Example: {PROGRAM} {name} {entry.example}"
+    alone.command(name, epilog=epilog)(_with_exponents(getattr(import_module(module), function)))
+    return typer.main.get_command(alone)
+
+
+def _with_exponents(function: Any) -> Any:
+    """Let every option of a command that is a whole number be written as 1e6 too."""
+    function.__annotations__ = get_type_hints(function, include_extras=True)
+    for hint in function.__annotations__.values():
+        if get_origin(hint) is Annotated and int in (hint.__origin__, *get_args(hint.__origin__)):
+            for told in hint.__metadata__:
+                if isinstance(told, OptionInfo) and told.parser is None:
+                    told.parser, told.metavar = whole, told.metavar or "N"
+    return function
+
+
+def whole(text: str | int) -> int:
+    """Return a whole number, written as 1000, 1e3 or 1000.0.
+
+    Raises:
+        BadParameter: it is none.
+    """
+    try:
+        number = Decimal(text)
+        if number.is_finite() and abs(number) < MOST and number == number.to_integral_value():
+            return int(number)
+    except InvalidOperation:
+        pass
+    raise typer.BadParameter(f"{text!r} is not a whole number")
+
+
 app = typer.Typer(
+    cls=Commands,
     add_completion=False,
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
@@ -45,22 +146,50 @@ app = typer.Typer(
 
 def run(arguments: list[str] | None = None) -> NoReturn:
     """Run the command line and exit: 0 done, 1 a claim failed, 2 bad input, 130 interrupted."""
+    given = sys.argv[1:] if arguments is None else arguments
+    _refuse_empty(given)
     try:
-        code = typer.main.get_command(app)(arguments, prog_name=PROGRAM, standalone_mode=False)
+        code = typer.main.get_command(app)(given, prog_name=PROGRAM, standalone_mode=False)
         sys.stdout.flush()
     except (KeyboardInterrupt, typer.Abort):
-        sys.exit(130)
+        code = INTERRUPTED  # which typer makes of Ctrl-C itself, in some versions
     except BrokenPipeError:
         # The reader has gone: nothing to say, and nothing left for the interpreter to flush.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         sys.exit(1)
     except UsageError as error:
         _refuse(error.format_message())
-    except (BadInput, OSError) as error:
+    except OSError as error:
         _refuse(str(error))
+    except ValueError as error:
+        from scene.refusal import BadInput  # not above: the list of commands needs no scene
+
+        if not isinstance(error, BadInput):
+            raise
+        _refuse(_in_options(str(error), given))
     except MemoryError:
         _refuse("not enough memory for so many particles")
+    if code == INTERRUPTED:
+        kept = next((COMMANDS[word].kept for word in given if word in COMMANDS), "")
+        if kept:
+            print(f"{PROGRAM}: interrupted; {kept}", file=sys.stderr)
     sys.exit(code if isinstance(code, int) else 0)
+
+
+def _refuse_empty(given: list[str]) -> None:
+    """Refuse an option of no text: for a path it would mean the folder that one is in."""
+    for option, value in pairwise([*given, "-"]):
+        if option == "--":
+            return
+        if option.startswith("--") and (not value.strip() or option.endswith("=")):
+            _refuse(f"{option.rstrip('=')} is empty, must have a value")
+
+
+def _in_options(message: str, given: list[str]) -> str:
+    """Return a message that begins with the name of an argument in Python with that of the option given."""
+    field, equals, rest = message.partition(" = ")
+    option = f"--{field.replace('_', '-')}"
+    return f"{option} = {rest}" if equals and any(word.split("=")[0] == option for word in given) else message
 
 
 def _refuse(message: str) -> NoReturn:
@@ -70,7 +199,9 @@ def _refuse(message: str) -> NoReturn:
 
 def _print_version(is_wanted: bool) -> None:
     if is_wanted:
-        print(f"{PROGRAM} {mushrooms.__version__}")
+        from mushrooms import __version__
+
+        print(f"{PROGRAM} {__version__}")
         raise typer.Exit
 
 
@@ -81,97 +212,3 @@ def main(
     ] = False,
 ) -> None:
     """Hold the options that come before any command."""
-
-
-@app.command("scenes", epilog="Example: mushrooms scenes --json")
-def list_scenes(as_json: AsJson = False) -> None:
-    """List the catalogue; the scene that is refused is shown with its reason."""
-    rows = [_catalogue_row(name) for name in scenes.catalogue()]
-    if as_json:
-        print(json.dumps(rows, indent=2, ensure_ascii=False))
-        return
-    table = Table("name", "table", "period", "notes", title="Catalogue")
-    for row in rows:
-        length = (
-            "refused" if row["refused"] else "static" if row["period"] is None else f"{row['period']:.6g}"
-        )
-        notes = f"Refused: {row['refused']}" if row["refused"] else row["notes"]
-        table.add_row(row["name"], row["table"], length, notes)
-    _console().print(table)
-
-
-def _catalogue_row(name: str) -> dict[str, Any]:
-    data = read_data(name)
-    row = {"name": name, "table": data["table"], "period": None, "notes": data.get("notes", "")}
-    row |= {"refused": None}
-    try:
-        length = cycle_length(scenes.load(name))
-    except scenes.InvalidScene as error:
-        return row | {"refused": str(error).partition(": ")[2]}
-    return row | {"period": length or None}
-
-
-@app.command("theory", epilog="Example: mushrooms theory moving-cap --digits 40")
-def predict(
-    scene: SceneName,
-    digits: Annotated[int, typer.Option(help=f"Correct digits, 1 to {MAX_DIGITS}.")] = 15,
-    energy: Annotated[
-        float | None, typer.Option(help="Add the same figures at this initial energy v²/2, > 0.")
-    ] = None,
-    as_json: AsJson = False,
-) -> None:
-    """Print the paper's predictions for one cycle as decimal strings, and what each is.
-
-    With --energy, what particles that begin with it will show, and the size of what that leaves out. It takes
-    rates of frozen tables: those of the audit's scenes are known (python -m conformance.audit.frozen).
-    """
-    import theory
-    from mushrooms.explained import FIGURES, at_energy
-
-    check_range("--digits", digits, 1, MAX_DIGITS)
-    if energy is not None and not (math.isfinite(energy) and energy > 0):
-        raise BadInput(f"--energy = {energy}, must be finite and > 0")
-    found = scenes.load(scene)
-    pairs: dict[str, Any] = dict(theory.predict(found, digits).strings(digits))
-    pairs |= at_energy(found, energy) if energy is not None else {}
-    print_pairs(pairs, as_json, FIGURES)
-
-
-@app.command(epilog="Example: mushrooms draw moving-cap --out moving-cap.svg")
-def draw(
-    scene: SceneName,
-    out: Annotated[
-        Path | None,
-        typer.Option(metavar="FILE", help="A .svg, .png or .gif file; SCENE's name with .svg by default."),
-    ] = None,
-) -> None:
-    """Draw the walls through the cycle, with a few chords of one particle; a .gif moves.
-
-    Given the folder of a run (simulate --out), draw its histogram of log E1/E0, with theory.
-    """
-    if is_stored(scene):
-        print(draw_run(Path(scene), out))
-        return
-    table = scenes.load(scene)
-    path = out or Path(f"{Path(scene).stem}.svg")
-    from mushrooms.figures import table as pictures
-
-    output.check_file(path, pictures.SUFFIXES)
-    write_file(path, lambda file: pictures.write_picture(table, path.suffix, file))
-    print(path)
-
-
-app.command(
-    epilog="Example: mushrooms simulate moving-cap --particles 25000 --energy 1e7 --seed 1 --out run"
-)(simulate)
-app.command(epilog="Example: mushrooms export run --to run.parquet")(export)
-app.command(epilog="Example: mushrooms attack --family knot-at-event --cases 20000 --seed 1")(attack)
-app.command(epilog="Example: mushrooms audit --only X2,L4 --out audit-report")(audit)
-app.command(epilog="Example: mushrooms bench --quick --out bench-report")(bench)
-app.command(epilog="Example: mushrooms check --html report.html -- ./my_stepper")(check)
-app.command(epilog="Example: mushrooms ask near-corner/3 -- ./my_stepper")(ask)
-
-
-def _console() -> Console:
-    # A pipe has no width: lines long enough for the tables.
-    return Console() if sys.stdout.isatty() else Console(width=140)

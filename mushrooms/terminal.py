@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 import json
+import math
+import os
 import sys
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-from rich import progress
-from rich.console import Console
 
 from scene.refusal import BadInput
+
+if TYPE_CHECKING:  # loaded where they are used: most commands end before they need a bar or a table
+    from rich.console import Console
+    from rich.progress import Progress
 
 SceneName = Annotated[
     str, typer.Argument(metavar="SCENE", help="A catalogue name, or a .toml or .json file.")
@@ -44,12 +48,29 @@ def compilation_told() -> Iterator[None]:
 
 
 def new_console() -> Console:
-    """Return a console for stdout whose long lines are not broken; a pipe has no width: enough for tables."""
-    return Console(width=None if Console().is_terminal else 140, soft_wrap=True, highlight=False)
+    """Return a console for stdout whose long lines are not broken."""
+    from rich.console import Console
+
+    return Console(width=_width(), soft_wrap=True, highlight=False)
 
 
-def progress_bar() -> progress.Progress:
+def table_console() -> Console:
+    """Return a console for stdout whose tables fit its width, or COLUMNS where it has none."""
+    from rich.console import Console
+
+    return Console(width=_width())
+
+
+def _width() -> int | None:
+    # A pipe has no width: enough for the tables, unless the reader says.
+    return None if sys.stdout.isatty() or os.environ.get("COLUMNS", "").isdigit() else 140
+
+
+def progress_bar() -> Progress:
     """Return a progress bar on stderr, silent where that is no terminal."""
+    from rich import progress
+    from rich.console import Console
+
     console = Console(stderr=True)
     return progress.Progress(
         progress.TextColumn("{task.description}"),
@@ -71,13 +92,26 @@ def check_range(option: str, value: int, low: int, high: int | None = None) -> N
 
 
 def print_pairs(pairs: dict[str, Any], as_json: bool, meanings: Mapping[str, str] | None = None) -> None:
-    """Print names, their values and what they mean, a line each, or all as JSON."""
+    """Print names, their values and what they mean, a line each; or all as JSON, which keeps every digit.
+
+    A value `x` with a standard error `x_se` is rounded to the error's second digit.
+    """
     if as_json:
         print(json.dumps(pairs, indent=2))
         return
     width = max(map(len, pairs))
-    texts = {name: "–" if value is None else str(value) for name, value in pairs.items()}
+    texts = {name: _rounded(name, pairs) for name in pairs}
     longest = max(map(len, texts.values()))
     for name, text in texts.items():
         meaning = (meanings or {}).get(name)
         print(f"{name:<{width}}  {text:<{longest}}  {meaning}" if meaning else f"{name:<{width}}  {text}")
+
+
+def _rounded(name: str, pairs: dict[str, Any]) -> str:
+    value, error = pairs[name], pairs.get(f"{name.removesuffix('_se')}_se")
+    if value is None:
+        return "–"
+    if not (isinstance(value, float) and isinstance(error, float) and 0 < error < math.inf):
+        return str(value)
+    places = 1 - math.floor(math.log10(error))
+    return f"{value:.{max(places, 0)}f}"

@@ -47,7 +47,7 @@ def read_data(source: str | Path) -> Any:
         raise InvalidScene(f"scene = {shown(source)}, must be a name of the catalogue or a path")
     name = str(source)
     if name in catalogue():
-        return tomllib.loads((resources.files("scene") / "catalogue" / f"{name}.toml").read_text("utf-8"))
+        return tomllib.loads(catalogue_text(name))
     path = Path(source)
     if path.suffix not in (".toml", ".json"):
         raise InvalidScene(
@@ -116,6 +116,17 @@ def to_data(scene: Scene) -> dict[str, Any]:
     check_scene(scene)
     data: dict[str, Any] = msgspec.to_builtins(scene)
     return {name: _without_none(field) for name, field in data.items()}
+
+
+def catalogue_text(name: str) -> str:
+    """Return the TOML of a scene of the catalogue as it was written, its comments too.
+
+    Raises:
+        InvalidScene: there is no such scene.
+    """
+    if name not in catalogue():
+        raise InvalidScene(f"scene {shown(name)} is none of: {', '.join(catalogue())}")
+    return (resources.files("scene") / "catalogue" / f"{name}.toml").read_text("utf-8")
 
 
 def _without_none(field: Any) -> Any:

@@ -63,6 +63,11 @@ class _Table(
                 raise InvalidScene(f"{field} = {shown(getattr(self, field))}, must be text")
         _prove(type(self), tuple(getattr(self, name, None) for name in PARAMETERS))
 
+    def _repr_html_(self) -> str:
+        from scene.notebook import of_scene  # not above: it needs the tables
+
+        return of_scene(self)  # type: ignore[arg-type]  # a _Table is one of the three
+
 
 class Cap(_Table, frozen=True, tag="cap", kw_only=True):
     """The half disk x^2 + y^2 <= r^2, y >= 0 (the breathing circle of sec. 3.1, folded)."""

@@ -4,19 +4,18 @@ from __future__ import annotations
 
 import re
 import shutil
-import statistics
 import sys
 from functools import partial
 from pathlib import Path
 
 import msgspec
 import pytest
+from matplotlib.text import Text
 
 from conformance import vectors
 from conformance.bench import comparison, record, work, workloads
 from mushrooms import bench
 from mushrooms.figures import speed as figures_of_speed
-from mushrooms.reports.bench_page import astray, middle_and_worst
 
 ROOT = Path(__file__).parent.parent
 FILES = ["bench.html", "bench.json", "bench.svg", "hard-cases.md"]
@@ -144,26 +143,47 @@ def test_the_front_holds_only_what_nothing_beats():
     assert figures_of_speed.pareto(points) == [(pytest.approx(15.0), 10.0), (pytest.approx(30.0), 30.0)]
 
 
-def shown_rows(kept: record.Record) -> list[str]:
-    """The table of the page on speed: every stepper on moving-cap-1e7."""
-    rows = []
-    for p in kept.points:
-        if p.workload == "moving-cap-1e7":
-            worst = middle_and_worst(p.ulps, ".2g")[1]
-            relative = middle_and_worst(p.relative, ".0e")[1]
-            wrong = f"{p.wrong} of {kept.questions}"
-            row = (p.contender, f"{statistics.median(p.ns):,.0f}", worst, relative, wrong, astray(p))
-            rows.append(f"| {' | '.join(row)} |")
-    return rows
-
-
-def test_the_page_on_speed_shows_what_the_record_holds():
+def test_the_page_on_speed_shows_what_the_record_holds(call):
     kept = record.read(ROOT / "docs" / "bench" / "bench.json")
     text = (ROOT / "docs" / "speed.md").read_text("utf-8")
     assert kept.size == "full"
-    rows = shown_rows(kept)
-    assert len(rows) > 12
-    for row in rows:
-        assert row in text
+    code, table, _ = call("--table", ROOT / "docs" / "bench" / "bench.json")
+    assert code == 0
+    assert len(table.splitlines()) > 14
+    assert table in text
+    code, _, err = call("--table", ROOT / "docs" / "bench" / "bench.json", "--workload", "nowhere")
+    assert code == 2
+    assert "moving-cap-1e7" in err
     for name, n in kept.growth.lasts.items():
         assert f"{name}: {'over ' if n >= kept.growth.collisions else ''}{n:.0f}" in text
+
+
+def luminance(colour: str) -> float:
+    parts = [int(colour[k : k + 2], 16) / 255 for k in (1, 3, 5)]
+    red, green, blue = (c / 12.92 if c <= 0.03928 else ((c + 0.055) / 1.055) ** 2.4 for c in parts)
+    return 0.2126 * red + 0.7152 * green + 0.0722 * blue
+
+
+def test_the_kept_figure_reads_at_a_glance():
+    """No two labels of a panel touch, none is smaller than 9 points; colours have contrast and marks.
+
+    The front begins at its first point: what is right to no digit is not on it.
+    """
+    kept = record.read(ROOT / "docs" / "bench" / "bench.json")
+    for colour in [*figures_of_speed.COLOURS.values(), figures_of_speed.RED]:
+        assert 1.05 / (luminance(colour) + 0.05) >= 4.5
+    assert len(set(figures_of_speed.MARKS.values())) == len(figures_of_speed.COLOURS)
+    figure = figures_of_speed.speed_figure(kept)
+    figure.draw_without_rendering()
+    assert min(text.get_fontsize() for text in figure.findobj(Text) if text.get_text()) >= 9
+    for axes in figure.axes:
+        boxes = [Text.get_window_extent(text) for text in axes.texts]  # without the lines to them
+        assert not any(a.overlaps(b) for k, a in enumerate(boxes) for b in boxes[:k])
+        (front,) = [line for line in axes.lines if line.get_drawstyle() != "default"]
+        assert min(front.get_xdata()) > figures_of_speed.LEAST_DIGITS
+
+
+def test_labels_are_spread_and_no_further_than_needed():
+    assert figures_of_speed.spread([0.1, 0.5, 0.9], 0.1) == pytest.approx([0.1, 0.5, 0.9])
+    assert figures_of_speed.spread([0.5, 0.5, 0.5], 0.1) == pytest.approx([0.4, 0.5, 0.6])
+    assert figures_of_speed.spread([0.1, 0.5, 0.52], 0.1) == pytest.approx([0.1, 0.46, 0.56])

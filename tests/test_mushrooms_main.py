@@ -89,7 +89,7 @@ SIMULATE = ["simulate", "moving-cap", "--particles", "5", "--energy", "100", "--
         (["audit", "--only", "X2,X99"], ["X99", "M1", "L7"]),
         (["audit", "--seed", "-1"], ["--seed = -1", "0 to 18446744073709551615"]),
         (["audit", "--threads", "0"], ["--threads = 0"]),
-        (["draw", "moving-cap", "--out", "picture.pdf"], ["picture.pdf", ".svg"]),
+        (["draw", "moving-cap", "--out", "picture.jpeg"], ["picture.jpeg", ".svg"]),
         (["draw", "moving-cap", "--out", "nowhere/picture.svg"], ["nowhere/picture.svg", "No such"]),
     ],
 )

@@ -22,13 +22,17 @@ from math import comb
 from typing import Any, NamedTuple
 
 from scene.refusal import BadInput
-from theory.chebyshev import Grid
+from theory.chebyshev import Grid, even_degree
 from theory.cycle import Cycle
 from theory.measure import Atoms, convolve, product, shifted
 from theory.valleys import CapturePiece, Valley
 from theory.volumes import delta, delta_slope
 
 MAX_HALVINGS = 24  # a panel of 2^-24 of its piece: nearer singularities are given up
+
+MANY = 200  # degree of a grid from which parts are first tried at few points
+TRIAL, TRIAL_BITS = 48, 320  # degree and precision of the trial
+HOPELESS = 0.75  # of the digits wanted are not promised by the trial's
 
 
 class NotConverged(BadInput):
@@ -198,39 +202,61 @@ def _placed(window: Window, before: Any, after: Any, absorbed: Any) -> Iterator[
         )
 
 
-def captures(cycle: Cycle, target: int) -> Captures:
+class Headway:
+    """How far a resolution has come: told as the share of its pieces that is sampled, which never falls."""
+
+    def __init__(self, n_pieces: int, told: Callable[[float], None] | None) -> None:
+        self._n_pieces, self._told = n_pieces, told
+        self._n_done, self._most = 0, 0.0
+
+    def at(self, share: float) -> None:
+        """Tell that a share of the present piece is sampled; of 1, that it is done."""
+        # A part that turns out to be unresolved is sampled again by halves: the share waits for these.
+        self._most = max(self._most, (self._n_done + share) / self._n_pieces)
+        if self._told is not None:
+            self._told(self._most)
+        self._n_done += share == 1.0
+
+
+def captures(cycle: Cycle, target: int, told: Callable[[float], None] | None = None) -> Captures:
     """Resolve a cycle's captured particles by Chebyshev panels.
 
     Args:
         cycle: the cycle.
         target: decimals to which a, b and log g are resolved, at most digits + GUARD of the cycle.
+        told: called with the share of the work that is done, again and again.
 
     Raises:
         NotConverged: panels as small as 2^-MAX_HALVINGS of a piece do not resolve it.
     """
-    grid = Grid(cycle.ctx, 2 * (12 + target))
+    grid = Grid(cycle.ctx, even_degree(2 * (12 + target)))
     start = cycle.ctx.zero, cycle.ctx.zero
-    return Captures(cycle, grid, target, _window(cycle, grid, cycle.valley, start, target))
+    headway = Headway(len(cycle.pieces), told)
+    return Captures(cycle, grid, target, _window(cycle, grid, cycle.valley, start, target, headway))
 
 
-def _window(cycle: Cycle, grid: Grid, valley: Valley, start: tuple[Any, Any], target: int) -> Window:
+def _window(
+    cycle: Cycle, grid: Grid, valley: Valley, start: tuple[Any, Any], target: int, headway: Headway
+) -> Window:
     A, B = start
     panels: list[Panel] = []
     for piece in valley.pieces:
-        panels += _resolved(cycle, grid, piece, (A, B), target)
+        panels += _resolved(cycle, grid, piece, (A, B), target, headway)
         A, B = panels[-1].A[-1], panels[-1].B[-1]
-    children = tuple(_window(cycle, grid, child, (A, B), target) for child in valley.children)
+    children = tuple(_window(cycle, grid, child, (A, B), target, headway) for child in valley.children)
     return Window(tuple(panels), children, *start, A, B)
 
 
 def _resolved(
-    cycle: Cycle, grid: Grid, piece: CapturePiece, start: tuple[Any, Any], target: int
+    cycle: Cycle, grid: Grid, piece: CapturePiece, start: tuple[Any, Any], target: int, headway: Headway
 ) -> list[Panel]:
     panels: list[Panel] = []
     todo = [(0, 0)]  # part i of the piece's 2^halvings equal parts in u
     while todo:
         i, halvings = todo.pop()
-        panel = _panel(cycle, grid, piece, (i, halvings), start, cycle.ctx.mpf(10) ** -target)
+        panel = None
+        if grid.n < MANY or not _is_hopeless(cycle, grid, piece, (i, halvings), target):
+            panel = _panel(cycle, grid, piece, (i, halvings), start, cycle.ctx.mpf(10) ** -target, headway)
         if panel is not None:
             panels.append(panel)
             start = panel.A[-1], panel.B[-1]
@@ -242,7 +268,60 @@ def _resolved(
                 f"the cycle is not resolved to {target} digits near nu = {float(nu):.6g}"
                 f" by panels of 2^-{MAX_HALVINGS} of a piece"
             )
+    headway.at(1.0)
     return panels
+
+
+def _is_hopeless(cycle: Cycle, grid: Grid, piece: CapturePiece, part: tuple[int, int], target: int) -> bool:
+    """Tell whether a part is seen, at few points and digits, to need far more points than the grid's.
+
+    Coefficients fall geometrically, or more slowly near a singularity. Were this wrong, the part would only
+    be halved once more than needed.
+    """
+    ctx = cycle.ctx
+    with ctx.workprec(TRIAL_BITS):
+        trial = Grid(ctx, TRIAL)
+        sampled = _sampled(cycle, trial, piece, part)
+        for values in (sampled.a, sampled.b, sampled.log_g):
+            found = trial.coefficients(values)
+            first, last = max(map(abs, found)), _tail(found)
+            fallen = -ctx.log10(last / first) if last else ctx.inf
+            if fallen * grid.n / TRIAL < HOPELESS * target:
+                return True
+    return False
+
+
+class Sampled(NamedTuple):
+    """What a panel is made of, at the points of a grid: a, b are dA / dx and dB / dx, x in [0, 1]."""
+
+    nu: list[Any]
+    t_in: list[Any]
+    t_out: list[Any]
+    a: list[Any]
+    b: list[Any]
+    log_g: list[Any]
+
+
+def _sampled(
+    cycle: Cycle, grid: Grid, piece: CapturePiece, part: tuple[int, int], headway: Headway | None = None
+) -> Sampled:
+    ctx, width = cycle.ctx, cycle.ctx.ldexp(1, -part[1])
+    found = Sampled([], [], [], [], [], [])
+    for k, x in enumerate(grid.points):
+        nu, slope = _descent(ctx, piece, (part[0] + x) * width)
+        found.t_in.append(piece.capture.time(nu, grid.forecast(found.t_in)))
+        found.t_out.append(piece.release.time(nu, grid.forecast(found.t_out)))
+        before = piece.capture.motion.volumes(found.t_in[-1], nu)
+        after = piece.release.motion.volumes(found.t_out[-1], nu)
+        a, b = before.v_cap / before.v_cha, after.v_cap / after.v_cha
+        d_delta = delta_slope(ctx, nu) * slope * width
+        found.nu.append(nu)
+        found.a.append(a * d_delta)
+        found.b.append(b * d_delta)
+        found.log_g.append(ctx.log(b / a))
+        if headway is not None and k < grid.n:
+            headway.at((part[0] + k / grid.n) * 0.5 ** part[1])
+    return found
 
 
 def _panel(
@@ -252,25 +331,11 @@ def _panel(
     part: tuple[int, int],
     start: tuple[Any, Any],
     tolerance: Any,
+    headway: Headway,
 ) -> Panel | None:
     """Sample a part of a piece and integrate from `start` = (A, B); None when it is not resolved."""
-    ctx, width = cycle.ctx, cycle.ctx.ldexp(1, -part[1])
-    levels: list[Any] = []
-    t_in: list[Any] = []
-    t_out: list[Any] = []
-    dA, dB, log_g = [], [], []
-    for x in grid.points:
-        nu, slope = _descent(ctx, piece, (part[0] + x) * width)
-        t_in.append(piece.capture.time(nu, grid.forecast(t_in)))
-        t_out.append(piece.release.time(nu, grid.forecast(t_out)))
-        before = piece.capture.motion.volumes(t_in[-1], nu)
-        after = piece.release.motion.volumes(t_out[-1], nu)
-        a, b = before.v_cap / before.v_cha, after.v_cap / after.v_cha
-        d_delta = delta_slope(ctx, nu) * slope * width
-        levels.append(nu)
-        dA.append(a * d_delta)
-        dB.append(b * d_delta)
-        log_g.append(ctx.log(b / a))
+    ctx = cycle.ctx
+    nu, t_in, t_out, dA, dB, log_g = _sampled(cycle, grid, piece, part, headway)
     c_A, c_B = grid.coefficients(dA), grid.coefficients(dB)
     swing = delta(ctx, cycle.nu_min) - delta(ctx, cycle.nu_max)
     if _tail(c_A) > tolerance * swing or _tail(c_B) > tolerance * swing:
@@ -279,7 +344,7 @@ def _panel(
         return None
     A = [start[0] + rise for rise in grid.running_integral(c_A)]
     B = [start[1] + rise for rise in grid.running_integral(c_B)]
-    return Panel(levels, t_in, t_out, dA, log_g, A, B)
+    return Panel(nu, t_in, t_out, dA, log_g, A, B)
 
 
 def _descent(ctx: Any, piece: CapturePiece, u: Any) -> tuple[Any, Any]:

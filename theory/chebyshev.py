@@ -3,12 +3,19 @@
 Functions live on [0, 1], sampled at the n + 1 points (1 - cos(pi j / n)) / 2. What is analytic
 around the interval converges geometrically in n (Clenshaw and Curtis, 1960). Endpoint
 singularities are the caller's to remove.
+
+From FEW points on, sums of cosines are taken by halving (Lee, 1984): those at even k are sums of cosines over
+half the points, those at odd k two more such sums; n log n products in place of n^2. `even_degree` rounds a
+degree up to one that halves well.
 """
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import Any
 
+FEW = 200  # degree from which sums are taken by halving
+LEAST = 32  # degree below which they are taken one by one
 REACH = 8  # points that a forecast extrapolates from; more of them would save no further Newton steps
 
 
@@ -26,19 +33,56 @@ class Grid:
         self.n = n
         half = [ctx.cos(ctx.pi * m / n) for m in range(n // 2)] + [ctx.zero]
         quarter_turns = half + [-c for c in reversed(half[:-1])]  # cos(pi m / n), m = 0 ... n
-        full_turn = quarter_turns + quarter_turns[-2:0:-1]
-        self._cosines = [[full_turn[j * k % (2 * n)] for j in range(n // 2 + 1)] for k in range(n + 1)]
+        self._full_turn = quarter_turns + quarter_turns[-2:0:-1]
         self.points = [(1 - c) / 2 for c in quarter_turns]
+        self._rows: dict[int, list[list[Any]]] = {}
         self.weights = self._clenshaw_curtis()
         self._forecasts = [self._extrapolation(j) for j in range(n + 1)]
 
     def _cosine_sums(self, values: list[Any]) -> list[Any]:
         """Return the sums over j of values[j] cos(pi j k / n), k = 0 ... n."""
+        return self._sums_of_all(values) if self.n < FEW else self._sums_by_halving(values)
+
+    def _sums_of_all(self, values: list[Any]) -> list[Any]:
         # cos(pi (n - j) k / n) = (-1)^k cos(pi j k / n): the second half of the sums repeats the first.
-        middle = self.n // 2
-        pairs = list(zip(values[:middle], values[:middle:-1], strict=True))
-        even, odd = [a + b for a, b in pairs] + [values[middle]], [a - b for a, b in pairs]
-        return [self.ctx.fdot(odd if k % 2 else even, row) for k, row in enumerate(self._cosines)]
+        n = len(values) - 1
+        even, odd = _folded(values)
+        step = self.n // n
+        if n not in self._rows:
+            turn = self._full_turn
+            self._rows[n] = [
+                [turn[j * k * step % (2 * self.n)] for j in range(n // 2 + 1)] for k in range(n + 1)
+            ]
+        return [self.ctx.fdot(odd if k % 2 else even, row) for k, row in enumerate(self._rows[n])]
+
+    def _sums_by_halving(self, values: list[Any]) -> list[Any]:
+        n = len(values) - 1
+        if n % 4 or n <= LEAST:
+            return self._sums_of_all(values)
+        even, odd = _folded(values)
+        found = [self.ctx.zero] * (n + 1)
+        found[::2], found[1::2] = self._sums_by_halving(even), self._odd_sums(odd)
+        return found
+
+    def _odd_sums(self, values: list[Any]) -> list[Any]:
+        """Return the sums over j of values[j] cos(pi j (2 k + 1) / (2 N)), j and k = 0 ... N - 1."""
+        size = len(values)
+        step = self.n // size  # cos(pi m / (2 N)) is cos(pi m (n / N) / (2 n)): N divides n / 2
+        turn, around = self._full_turn, 2 * self.n
+        if size % 2 or size <= LEAST // 2:
+            key = -size
+            if key not in self._rows:
+                half = step // 2
+                self._rows[key] = [
+                    [turn[j * (2 * k + 1) * half % around] for j in range(size)] for k in range(size)
+                ]
+            return [self.ctx.fdot(values, row) for row in self._rows[key]]
+        own = self._odd_sums(values[::2])
+        odd = values[1::2]
+        pairs = self._odd_sums([odd[0], *(a + b for a, b in pairwise(odd))])
+        others = [pair / (2 * turn[(2 * k + 1) * step // 2]) for k, pair in enumerate(pairs)]
+        first = [a + b for a, b in zip(own, others, strict=True)]
+        return first + [a - b for a, b in zip(own[::-1], others[::-1], strict=True)]
 
     def coefficients(self, values: list[Any]) -> list[Any]:
         """Return the interpolant's coefficients c_k, f = sum c_k T_k(2 x - 1)."""
@@ -82,6 +126,21 @@ class Grid:
         n, ctx = self.n, self.ctx
         even = [ctx.mpf(1) / (1 - k * k) if k % 2 == 0 else ctx.zero for k in range(n + 1)]
         return self._interpolated(even)
+
+
+def even_degree(n: int) -> int:
+    """Return a degree of at least n that halves down to some LEAST; n itself while it is small."""
+    if n < FEW:
+        return n
+    unit = 1 << (n // LEAST).bit_length()
+    return -(-n // unit) * unit
+
+
+def _folded(values: list[Any]) -> tuple[list[Any], list[Any]]:
+    """Return values[j] + values[n - j], j = 0 ... n / 2 (the middle once), and the differences, j < n / 2."""
+    middle = (len(values) - 1) // 2
+    pairs = list(zip(values[:middle], values[:middle:-1], strict=True))
+    return [a + b for a, b in pairs] + [values[middle]], [a - b for a, b in pairs]
 
 
 def _with_halved_ends(values: list[Any]) -> list[Any]:

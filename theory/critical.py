@@ -24,6 +24,7 @@ from theory.volumes import NotCovered
 
 # An isolating interval this narrow lets Newton's method take over from bisection.
 NARROW = Fraction(1, 2**24)
+MANY_BITS = 512  # beyond which Newton's method begins with fewer
 
 
 class Span(NamedTuple):
@@ -189,6 +190,9 @@ def _refined(ctx: Any, root: CriticalRoot) -> Any:
 def solve_rising(ctx: Any, f: Any, low: Any, high: Any, guess: Any = None) -> Any:
     """Find the root of a rising function by Newton's method, kept in its bracket by bisection.
 
+    At many digits the root is first found to five eighths of them, and so on down: a step of Newton's method
+    doubles the digits, so that one step with all of them is enough.
+
     Args:
         ctx: number system.
         f: function returning (value, slope), negative at low, positive at high.
@@ -196,6 +200,9 @@ def solve_rising(ctx: Any, f: Any, low: Any, high: Any, guess: Any = None) -> An
         high: upper end.
         guess: first trial; the middle by default.
     """
+    if ctx.prec > MANY_BITS:
+        with ctx.workprec(5 * ctx.prec // 8):
+            guess = solve_rising(ctx, f, low, high, guess)
     close = ctx.ldexp(high - low, -6 * int(ctx.prec) // 10)  # the step after one this small is below rounding
     x = (low + high) / 2 if guess is None or not low < guess < high else guess
     for trial in range(20 + 4 * int(ctx.prec)):

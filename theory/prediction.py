@@ -8,10 +8,12 @@ captured several times is covered too.
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any, NamedTuple
 
 import msgspec
 
+from scene.notebook import rows
 from scene.refusal import BadInput, check_count, check_number, shown
 from scene.tables import Mushroom, Scene
 from scene.transforms import backwards
@@ -52,6 +54,9 @@ class Prediction(NamedTuple):
             for name, x in zip(self._fields, self, strict=True)
         }
 
+    def _repr_html_(self) -> str:
+        return rows("theory of one cycle, s = log E1 / E0", self.strings(15))
+
     @guarded
     def sd_of_mean(self, n_cycles: int) -> Any:
         """Return the standard deviation of (1/n) log E_n / E0, whose mean is m1, for independent cycles."""
@@ -60,12 +65,16 @@ class Prediction(NamedTuple):
 
 
 @guarded
-def predict(scene: Scene, digits: int = 15) -> Prediction:
+def predict(
+    scene: Scene, digits: int = 15, *, progress: Callable[[int, float], None] | None = None
+) -> Prediction:
     """Predict one cycle.
 
     Args:
         scene: a valid mushroom.
         digits: correct significant digits wanted, 1 to 1000.
+        progress: called with the number of the resolution (two or more are compared), from 1, and how much of
+            it is done, 0 to 1.
 
     Returns:
         The prediction. What is smaller than 10^-(digits + 30) is given as zero.
@@ -77,7 +86,7 @@ def predict(scene: Scene, digits: int = 15) -> Prediction:
 
     Source: Eq:ps, Eq:Erate, Eq:lnE/E0, Eq:lnEnc/E0.
     """
-    return Prediction(*converged(scene, digits, _figures))
+    return Prediction(*converged(scene, digits, _figures, progress))
 
 
 @guarded
@@ -165,7 +174,12 @@ def _figures(found: Captures) -> tuple[Any, ...]:
     )
 
 
-def converged(scene: Scene, digits: int, figures: Callable[[Captures], tuple[Any, ...]]) -> tuple[Any, ...]:
+def converged(
+    scene: Scene,
+    digits: int,
+    figures: Callable[[Captures], tuple[Any, ...]],
+    progress: Callable[[int, float], None] | None = None,
+) -> tuple[Any, ...]:
     """Return figures of a cycle once two resolutions in a row agree on them to the digits asked.
 
     Raises:
@@ -176,8 +190,10 @@ def converged(scene: Scene, digits: int, figures: Callable[[Captures], tuple[Any
     ctx = cycle.ctx
     noise, agreement = ctx.mpf(10) ** -(digits + GUARD - 10), ctx.mpf(10) ** -(digits + 2)
     previous: tuple[Any, ...] | None = None
-    for target in range(digits + 4, digits + GUARD - 8, 12):
-        current = tuple(ctx.zero if abs(x) < noise else x for x in figures(captures(cycle, target)))
+    for number, target in enumerate(range(digits + 4, digits + GUARD - 8, 12), 1):
+        told = None if progress is None else partial(progress, number)
+        found = captures(cycle, target, told)
+        current = tuple(ctx.zero if abs(x) < noise else x for x in figures(found))
         if previous is not None and len(current) == len(previous):
             changes = (abs(x - y) <= agreement * abs(x) for x, y in zip(current, previous, strict=True))
             if all(changes):

@@ -14,7 +14,7 @@ from math import factorial
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.stats import norm
+from scipy.special import ndtr
 
 from scene.refusal import BadInput, check_count
 from scene.tables import Scene
@@ -104,7 +104,7 @@ class Saddle:
         is_near = np.abs(w) < NEAR_MEAN
         at_mean = -K3 / K2**1.5 / (6 * np.sqrt(n_cycles))
         gap = np.where(is_near, at_mean, 1 / np.where(is_near, 1, u) - 1 / np.where(is_near, 1, w))
-        tail: Floats = norm.sf(side * w) + side * norm.pdf(w) * gap
+        tail: Floats = ndtr(-side * w) + side * np.exp(-w * w / 2) / np.sqrt(2 * np.pi) * gap
         return tail
 
 

@@ -8,24 +8,36 @@ from typing import Any
 
 import numpy as np
 from matplotlib import rc_context
+from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import FixedLocator, NullLocator
 
 from conformance.bench.record import CostSeries, Growth, Point, Record, quartiles
 from mushrooms.figures import style as plots
 
+# Contrast with white is 4.5 to 1 and more; families differ by their marks too, whatever colours one sees.
 COLOURS = {
-    "proof": plots.ORANGE,
+    "proof": "#B34A00",
     "compiled": plots.BLUE,
-    "interpreted": plots.GREEN,
-    "time-stepping": plots.GREY,
-    "fixed-step": "#8C6D1F",
+    "interpreted": "#00775A",
+    "time-stepping": "#666666",
+    "fixed-step": "#7A5C00",
     "lean": plots.BLACK,
-    "example": "#CC79A7",
+    "example": "#A3417A",
     "command": "#7A3E9D",
 }
+MARKS = {
+    "proof": "s",
+    "compiled": "o",
+    "interpreted": "D",
+    "time-stepping": "v",
+    "fixed-step": "^",
+    "lean": "P",
+    "example": "h",
+    "command": "*",
+}
 WORDS = {
-    "proof": "proof (reference)",
+    "proof": "proof (reference), by digits asked",
     "compiled": "fast",
     "interpreted": "plain Python",
     "time-stepping": "scipy solve_ivp with events",
@@ -35,8 +47,10 @@ WORDS = {
     "command": "command",
 }
 RED = "#C00000"
-CHARACTER, LINE = 0.035, 0.4  # sizes of labels, in decades of the axes
+LABEL = 9  # size of text [points]
+SPACE = 0.0725  # of a panel's height, from one label to the next
 MOST_DIGITS, LEAST_DIGITS = 300.0, 0.5
+LEAST_NS, MOST_NS = 10.0, 3e9
 BINARY64 = 53 * math.log10(2)
 TICKS = (1, 2, 4, 8, 16, 32, 64, 128, 256)
 
@@ -46,32 +60,37 @@ def digits(error: float) -> float:
     return min(max(-math.log10(error), LEAST_DIGITS), MOST_DIGITS) if error > 0 else BINARY64
 
 
-@rc_context(plots.STYLE)
 def speed(record: Record) -> bytes:
+    """Draw time per collision against correct digits, one panel per workload, as SVG."""
+    return plots.svg(speed_figure(record))
+
+
+@rc_context(plots.STYLE)
+def speed_figure(record: Record) -> Figure:
     """Draw time per collision against correct digits, one panel per workload."""
     n_rows = (len(record.workloads) + 1) // 2
-    figure, axes = plots.new_figure(10.5, 2.8 * n_rows, n_rows, 2)
-    axes = np.atleast_2d(axes)
-    panels = axes.ravel()
+    figure, axes = plots.new_figure(12.0, 3.3 * n_rows + 0.9, n_rows, 2)
+    panels = np.atleast_2d(axes).ravel()
     for panel in panels[len(record.workloads) :]:
         panel.set_visible(False)
     for panel, workload in zip(panels, record.workloads, strict=False):
         points = [p for p in record.points if p.workload == workload.name]
         _panel(panel, points, record.digits)
         panel.set_title(f"{workload.name}: {workload.what}", loc="left")
-    for panel in axes[-1]:
-        panel.set_xlabel("correct digits of dt, place and velocity (−log₁₀ relative error)")
-    for panel in axes[:, 0]:
-        panel.set_ylabel("ns per collision")
+        panel.set_xlabel("correct digits of dt, place and velocity", fontsize=LABEL)
+        panel.set_ylabel("ns per collision", fontsize=LABEL)
     figure.legend(handles=_legend(record), loc="outside upper left", ncols=3)
-    return plots.svg(figure)
+    return figure
 
 
 def _panel(axes: Any, points: list[Point], floor: int) -> None:
-    axes.set(xscale="log", yscale="log", xlim=(LEAST_DIGITS / 1.25, MOST_DIGITS * 1.6), ylim=(10, 3e9))
-    axes.xaxis.set_major_locator(FixedLocator(TICKS))
+    axes.set(
+        xscale="log", yscale="log", xlim=(LEAST_DIGITS / 1.4, MOST_DIGITS * 1.6), ylim=(LEAST_NS, MOST_NS)
+    )
+    axes.xaxis.set_major_locator(FixedLocator([LEAST_DIGITS, *TICKS]))
     axes.xaxis.set_minor_locator(NullLocator())
-    axes.set_xticklabels([str(n) for n in TICKS])
+    axes.set_xticklabels(["none", *(str(n) for n in TICKS)])
+    axes.tick_params(labelsize=LABEL)
     axes.axvspan(floor, MOST_DIGITS * 1.6, color=plots.BLACK, alpha=0.12, linewidth=0)
     axes.axvline(BINARY64, color=plots.BLACK, linewidth=0.8, linestyle=":")
     for p in points:
@@ -79,9 +98,8 @@ def _panel(axes: Any, points: list[Point], floor: int) -> None:
     _label(axes, points)
     front = pareto(points)
     if front:
-        digits_of, times = zip(*front, strict=True)
+        x, y = zip(*front, strict=True)
         # To be right to so many digits, so much time is needed.
-        x, y = [LEAST_DIGITS, *digits_of], [times[0], *times]
         axes.step(x, y, where="pre", color=plots.BLACK, linewidth=0.8, zorder=0)
 
 
@@ -89,48 +107,56 @@ def _mark(axes: Any, p: Point) -> None:
     colour, (first, ns, third) = COLOURS[p.family], quartiles(p.ns)
     middle, worst = _digits_of(p)
     if p.right:
-        axes.plot([middle, middle], [first, third], color=colour, marker="_", markersize=5, linewidth=0.8)
-        axes.plot([worst, middle], [ns, ns], color=colour, linewidth=1.2)
-        axes.plot(middle, ns, marker="o", markersize=4.5, color=colour, linestyle="none")
-        axes.plot(worst, ns, marker="<", markersize=4.5, color=colour, linestyle="none")
+        axes.plot([middle, middle], [first, third], color=colour, marker="_", markersize=6, linewidth=1.2)
+        axes.plot([worst, middle], [ns, ns], color=colour, marker="|", markersize=7, linewidth=1.2)
+        axes.plot(middle, ns, marker=MARKS[p.family], markersize=5.5, color=colour, linestyle="none")
     if p.wrong or p.astray:
-        axes.plot(LEAST_DIGITS, ns, marker="x", markersize=6, color=RED, linestyle="none")
+        axes.plot(LEAST_DIGITS, ns, marker="x", markersize=7, color=RED, linestyle="none")
 
 
 def _label(axes: Any, points: list[Point]) -> None:
-    """Name the points: the proofs by their digits, the time-stepping ones at once."""
-    style = {"fontsize": 7, "annotation_clip": True}
+    """Name the points: the proofs by their digits, the others in a column at the right, a line to each."""
+    for p in (p for p in points if p.family == "proof"):
+        above = _digits_of(p)[0], statistics.median(p.ns) * 2
+        axes.annotate(short_name(p.contender), above, ha="center", color=COLOURS["proof"], fontsize=LABEL)
+    named = [
+        (math.log10(statistics.median(p.ns)), _digits_of(p)[0], _name(p), COLOURS[p.family])
+        for p in points
+        if p.family not in ("proof", "time-stepping")
+    ]
     slow = [p for p in points if p.family == "time-stepping"]
     if slow:
-        ns = statistics.median(statistics.median(p.ns) for p in slow)
-        shares = [p.wrong / (p.wrong + p.right + p.undecided) for p in slow]
-        wrong = f"\n{max(shares):.0%} of walls wrong" if max(shares) else ""
-        place = (min(_digits_of(p)[0] for p in slow) / 1.15, ns)
-        side = "left" if place[0] < 1 else "right"
+        share = max(p.wrong / (p.wrong + p.right + p.undecided) for p in slow)
+        name = f"solve_ivp: {share:.0%} wrong" if share else "solve_ivp"
+        height = math.log10(statistics.median(statistics.median(p.ns) for p in slow))
+        named.append((height, max(_digits_of(p)[0] for p in slow), name, COLOURS["time-stepping"]))
+    named.sort()
+    low, high = math.log10(LEAST_NS), math.log10(MOST_NS)
+    heights = spread([(height - low) / (high - low) for height, *_ in named], SPACE)
+    for (height, x, name, colour), place in zip(named, heights, strict=True):
         axes.annotate(
-            f"solve_ivp{wrong}", place if side == "right" else (0.6, 2.5 * ns), ha=side, va="bottom",
-            color=COLOURS["time-stepping"], **style,
+            name, (x, 10**height), (1.02, place), textcoords="axes fraction", va="center", fontsize=LABEL,
+            arrowprops={"arrowstyle": "-", "color": colour, "linewidth": 0.7, "shrinkA": 0, "shrinkB": 3,
+                        "relpos": (0.0, 0.5)},
         )  # fmt: skip
-    taken: list[tuple[float, float, float]] = []  # from and to which digits, and how high, in decades
-    for p in sorted(points, key=lambda p: statistics.median(p.ns)):
-        middle, worst = _digits_of(p)
-        ns, colour = statistics.median(p.ns), COLOURS[p.family]
-        if p.family == "proof":
-            axes.annotate(short_name(p.contender), (middle, ns * 1.6), ha="center", color=colour, **style)
-        elif p.family != "time-stepping":
-            name = short_name(p.contender)
-            if p.astray:
-                name += f": {100 * p.astray / p.further:.2g} % wrong"
-            is_left = p.family in ("example", "command") or (p.family == "lean" and middle < BINARY64 / 2)
-            x, width = math.log10(worst / 1.15 if is_left else middle * 1.15), CHARACTER * len(name)
-            low, high = (x - width, x) if is_left else (x, x + width)
-            height = math.log10(ns)
-            for other_low, other_high, other_height in sorted(taken, key=lambda place: place[2]):
-                if low < other_high and other_low < high and abs(height - other_height) < LINE:
-                    height = max(height, other_height + LINE)
-            taken.append((low, high, height))
-            side = "right" if is_left else "left"
-            axes.annotate(name, (10**x, 10**height), ha=side, va="center", color=colour, **style)
+
+
+def spread(wanted: list[float], space: float) -> list[float]:
+    """Return places at least `space` apart, with the least sum of squares from those wanted, which rise."""
+    groups: list[list[float]] = []  # of wanted places, less what stands before them, that end side by side
+    for k, place in enumerate(wanted):
+        groups.append([place - k * space])
+        while len(groups) > 1 and statistics.mean(groups[-2]) > statistics.mean(groups[-1]):
+            last = groups.pop()
+            groups[-1] += last
+    starts = [statistics.mean(group) for group in groups for _ in group]
+    return [start + k * space for k, start in enumerate(starts)]
+
+
+def _name(p: Point) -> str:
+    name = short_name(p.contender)
+    share = p.astray / p.further if p.further else p.wrong / max(1, p.wrong + p.right + p.undecided)
+    return f"{name}: {100 * share:.2g} % wrong" if share else name
 
 
 def _digits_of(p: Point) -> tuple[float, float]:
@@ -164,16 +190,17 @@ def short_name(contender: str) -> str:
 
 def _legend(record: Record) -> list[Line2D]:
     families = [f for f in COLOURS if any(p.family == f for p in record.points)]
-    handles = [Line2D([], [], color=COLOURS[f], marker="o", markersize=4.5, label=WORDS[f]) for f in families]
-    none: dict[str, Any] = {"linestyle": "none"}
-    thin: dict[str, Any] = {"color": plots.BLACK, "linewidth": 0.8}
+    bare: dict[str, Any] = {"linestyle": "none", "markersize": 6}
+    black: dict[str, Any] = {"color": plots.BLACK, "linewidth": 1.0}
     return [
-        *handles,
-        Line2D([], [], marker="o", markersize=4.5, label="median", color=plots.BLACK, **none),
-        Line2D([], [], marker="<", markersize=4.5, label="worst", color=plots.BLACK, **none),
-        Line2D([], [], marker="x", color=RED, label="some walls wrong", **none),
-        Line2D([], [], label="front: least time for so many digits, at worst", **thin),
-        Line2D([], [], label="binary64; shaded: beyond the proofs", linestyle=":", **thin),
+        *(Line2D([], [], color=COLOURS[f], marker=MARKS[f], label=WORDS[f], **bare) for f in families),
+        Line2D([], [], marker="|", markersize=7, label="from the median to the worst answer", **black),
+        Line2D(
+            [], [], marker="_", label="up and down: quartiles of the laps", **black | {"linestyle": "none"}
+        ),
+        Line2D([], [], marker="x", color=RED, label="some walls wrong", **bare),
+        Line2D([], [], label="front: least time for so many digits, at worst", **black),
+        Line2D([], [], label="binary64; shaded: beyond the proofs", **black | {"linestyle": ":"}),
     ]
 
 
@@ -182,10 +209,19 @@ def growth(found: Growth) -> bytes:
     """Draw errors along trajectories with the Lyapunov slope and the predicted bound."""
     figure, axes = plots.new_figure(7.2, 4.4)
     count = np.arange(1, found.collisions + 1)
-    colours = (plots.GREEN, plots.BLUE, "#56B4E9", plots.ORANGE, "#E69F00")
-    for (name, errors), colour in zip(found.followers.items(), colours, strict=False):
+    colours = (
+        COLOURS["interpreted"],
+        plots.BLUE,
+        COLOURS["example"],
+        COLOURS["proof"],
+        COLOURS["fixed-step"],
+    )
+    for (name, errors), colour, mark in zip(found.followers.items(), colours, "os^Dv", strict=False):
         shown = np.where(np.array(errors) > 0, errors, np.nan)
-        axes.plot(count, shown, color=colour, marker=".", markersize=4, linewidth=1, label=name)
+        every = max(1, len(count) // 16)
+        axes.plot(
+            count, shown, color=colour, marker=mark, markevery=every, markersize=5, linewidth=1, label=name
+        )
     label = "one ulp a step, grown"
     axes.plot(count, found.bound, color=plots.BLACK, linestyle="--", linewidth=1, label=label)
     early = count[: 2 * (found.collisions // 3)]

@@ -45,10 +45,10 @@ def new_figure(width: float, height: float, n_rows: int = 1, n_columns: int = 1)
 
 
 def save(figure: Figure, file: BinaryIO, suffix: str) -> None:
-    """Write a figure as ".svg" or ".png"; the bytes depend on the picture alone."""
+    """Write a figure as ".svg", ".png" or ".pdf"; the bytes depend on the picture alone."""
     kind = suffix.removeprefix(".")
     with rc_context(STYLE):
-        metadata = {"Date": None} if kind == "svg" else None
+        metadata = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}.get(kind)
         figure.savefig(file, format=kind, dpi=160, bbox_inches="tight", metadata=metadata)
 
 

@@ -11,6 +11,7 @@ from conformance.bench.hard_cases import cell
 from conformance.bench.record import Point, Record, quartiles
 from mushrooms.figures import speed as figures_of_speed
 from mushrooms.reports.page import embed, render
+from scene.refusal import BadInput
 
 
 def to_html(record: Record, speed: bytes) -> bytes:
@@ -39,6 +40,39 @@ def _row(p: Point) -> dict[str, Any]:
         "ulps": middle_and_worst(p.ulps, ".2g"),
         "relative": middle_and_worst(p.relative, ".1e"),
     }
+
+
+def to_markdown(record: Record, workload: str) -> str:
+    """Return one workload's table, as the page on speed has it.
+
+    Raises:
+        BadInput: the record has no such workload.
+    """
+    names = [w.name for w in record.workloads]
+    if workload not in names:
+        raise BadInput(f"workload = {workload!r}, must be one of {', '.join(names)}")
+    head = (
+        "stepper",
+        "ns per collision",
+        "worst backward ulps",
+        "worst relative error",
+        "wrong walls",
+        "of further steps",
+    )
+    rows = [head, ("---",) * len(head)]
+    rows += [
+        (
+            p.contender,
+            f"{statistics.median(p.ns):,.0f}",
+            middle_and_worst(p.ulps, ".2g")[1],
+            middle_and_worst(p.relative, ".0e")[1],
+            f"{p.wrong} of {record.questions}",
+            astray(p),
+        )
+        for p in record.points
+        if p.workload == workload
+    ]
+    return "".join(f"| {' | '.join(row)} |\n" for row in rows)
 
 
 def astray(p: Point) -> str:

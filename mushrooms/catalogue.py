@@ -1,0 +1,49 @@
+"""`mushrooms scenes`: the catalogue, or one scene of it as a file to begin from."""
+
+from __future__ import annotations
+
+import json
+from typing import Annotated, Any
+
+import typer
+from rich.table import Table
+
+import scene as scenes
+from mushrooms.terminal import AsJson, table_console
+from scene.load import catalogue_text, read_data
+from scene.tables import cycle_length
+
+
+def list_scenes(
+    name: Annotated[str, typer.Argument(metavar="NAME", help="Print this scene of the catalogue.")] = "",
+    as_toml: Annotated[bool, typer.Option("--toml", help="Print NAME as a file to begin from.")] = False,
+    as_json: AsJson = False,
+) -> None:
+    """List the catalogue; the scene that is refused is shown with its reason. With NAME print that scene."""
+    if name or as_toml:
+        text = catalogue_text(name)
+        print(json.dumps(read_data(name), indent=2, ensure_ascii=False) if as_json else text.rstrip("\n"))
+        return
+    rows = [_catalogue_row(name) for name in scenes.catalogue()]
+    if as_json:
+        print(json.dumps(rows, indent=2, ensure_ascii=False))
+        return
+    table = Table("name", "table", "period", "notes", title="Catalogue")
+    for row in rows:
+        length = (
+            "refused" if row["refused"] else "static" if row["period"] is None else f"{row['period']:.6g}"
+        )
+        notes = f"Refused: {row['refused']}" if row["refused"] else row["notes"]
+        table.add_row(row["name"], row["table"], length, notes)
+    table_console().print(table)
+
+
+def _catalogue_row(name: str) -> dict[str, Any]:
+    data = read_data(name)
+    row = {"name": name, "table": data["table"], "period": None, "notes": data.get("notes", "")}
+    row |= {"refused": None}
+    try:
+        length = cycle_length(scenes.load(name))
+    except scenes.InvalidScene as error:
+        return row | {"refused": str(error).partition(": ")[2]}
+    return row | {"period": length or None}

@@ -1,0 +1,180 @@
+"""`mushrooms draw`: a table through its cycle, and what particles do in it; the export of a trajectory."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from pathlib import Path
+from typing import Annotated, Any, BinaryIO, NamedTuple
+
+import typer
+
+import scene as scenes
+from mushrooms import output
+from mushrooms.simulate import Seed
+from mushrooms.stored import draw_run, is_stored
+from mushrooms.terminal import SceneName, check_range, compilation_told, progress_bar
+from scene import Scene
+from scene.files import write_file
+from scene.refusal import BadInput, check_seed
+
+
+class Usual(NamedTuple):
+    """What a picture takes when nothing is asked: collisions, particles, crossings of the table a cycle."""
+
+    n_collisions: int
+    n_orbits: int
+    crossings: float
+
+
+PICTURES = {
+    "trajectory": Usual(60, 1, 60.0),
+    "section": Usual(400, 40, 1000.0),
+    "map": Usual(400, 40, 1000.0),
+    "growth": Usual(12_000, 1, 1000.0),
+    "lyapunov": Usual(256, 3, 1000.0),
+}
+
+
+Picture = Annotated[
+    Path | None,
+    typer.Option(
+        "--out",
+        metavar="FILE",
+        help="A .svg, .png, .pdf or .gif file; SCENE's name with .svg by default. Of several pictures each "
+        "gets its kind into the name.",
+    ),
+]
+Export = Annotated[
+    Path | None,
+    typer.Option(metavar="FILE", help="A .csv or .parquet file for the start and every collision."),
+]
+Energy = Annotated[
+    float | None, typer.Option(help="Initial energy v²/2, > 0; by default one that suits the picture.")
+]
+Length = Annotated[int | None, typer.Option(help="Collisions of each particle, 1 to 10^6.")]
+Many = Annotated[
+    int | None,
+    typer.Option(help="Particles of a section, a map, exponents; 1 to 1000."),
+]
+
+
+def draw(
+    scene: SceneName,
+    out: Picture = None,
+    trajectory: Annotated[
+        bool, typer.Option("--trajectory", help="One particle's path; a .gif shows it on its way.")
+    ] = False,
+    section: Annotated[
+        bool, typer.Option("--section", help="Poincare section: place on the arc against sin phi.")
+    ] = False,
+    boundary_map: Annotated[
+        bool, typer.Option("--map", help="Boundary map: place along all walls against the angle's sine.")
+    ] = False,
+    growth: Annotated[bool, typer.Option("--growth", help="log E against time, with theory's line.")] = False,
+    lyapunov: Annotated[
+        bool, typer.Option("--lyapunov", help="Finite-time Lyapunov exponents with their errors.")
+    ] = False,
+    export: Export = None,
+    energy: Energy = None,
+    collisions: Length = None,
+    particles: Many = None,
+    seed: Seed = 0,
+) -> None:
+    """Draw the walls through the cycle, or what particles do between them; export a trajectory.
+
+    The particles are the first of `mushrooms simulate SCENE --energy E --seed S`. Given the folder of a run
+    (simulate --out), draw its histogram of log E1/E0, with theory.
+    """
+    if is_stored(scene):
+        print(draw_run(Path(scene), out))
+        return
+    table = scenes.load(scene)
+    _check(energy, collisions, particles, seed)
+    asked = (trajectory, section, boundary_map, growth, lyapunov)
+    kinds = [kind for kind, is_asked in zip(PICTURES, asked, strict=True) if is_asked]
+    if export is not None:
+        output.check_file(export, (".csv", ".parquet"))
+    paths = _paths(out or Path(f"{Path(scene).stem}.svg"), kinds, is_drawn=bool(kinds) or export is None)
+    follow = _Asked(table, energy, collisions, particles, seed)
+    if export is not None:
+        follow("trajectory", 1)[0].write(export)
+        print(export)
+    for kind, path in paths.items():
+        write_file(path, _picture(table, kind, path.suffix, follow))
+        print(path)
+
+
+class _Asked(NamedTuple):
+    """What was asked of the orbits of every picture."""
+
+    table: Scene
+    energy: float | None
+    n_collisions: int | None
+    n_orbits: int | None
+    seed: int
+
+    def __call__(self, kind: str, n_orbits: int | None = None) -> list[Any]:
+        """Return the orbits for a kind of picture."""
+        from mushrooms import orbits
+
+        usual = PICTURES[kind]
+        with compilation_told():
+            return orbits.follow(
+                self.table,
+                self.n_collisions or usual.n_collisions,
+                energy=self.energy or orbits.usual_energy(self.table, usual.crossings),
+                seed=self.seed,
+                n_orbits=n_orbits or self.n_orbits or usual.n_orbits,
+            )
+
+
+def _check(energy: float | None, collisions: int | None, particles: int | None, seed: int) -> None:
+    if energy is not None and not (math.isfinite(energy) and energy > 0):
+        raise BadInput(f"--energy = {energy}, must be finite and > 0")
+    if collisions is not None:
+        check_range("--collisions", collisions, 1, 10**6)
+    if particles is not None:
+        check_range("--particles", particles, 1, 1000)
+    check_seed(seed, "--seed")
+
+
+def _paths(out: Path, kinds: list[str], *, is_drawn: bool) -> dict[str, Path]:
+    """Return the file of each picture; several get their names into that of the one given.
+
+    Raises:
+        BadInput: one of them cannot be written, or does not move and is to be a .gif.
+    """
+    from mushrooms.figures import table as pictures
+
+    if not is_drawn:
+        return {}
+    paths = dict.fromkeys(kinds or ["walls"], out)
+    if len(kinds) > 1:
+        paths = {kind: out.with_stem(f"{out.stem}-{kind}") for kind in kinds}
+    for kind, path in paths.items():
+        moves = kind in ("walls", "trajectory")
+        output.check_file(path, tuple(s for s in pictures.SUFFIXES if moves or s != ".gif"))
+    return paths
+
+
+def _picture(table: Scene, kind: str, suffix: str, follow: _Asked) -> bytes | Callable[[BinaryIO], object]:
+    from mushrooms.figures import orbits, style
+    from mushrooms.figures import table as pictures
+
+    if kind == "walls":
+        return lambda file: pictures.write_picture(table, suffix, file)
+    found = follow(kind, 1 if kind in ("trajectory", "growth") else None)
+    if kind == "trajectory" and suffix == ".gif":
+        return lambda file: orbits.write_animation(found[0], file)
+    if kind == "trajectory":
+        figure = orbits.trajectory(found[0])
+    elif kind == "growth":
+        figure = orbits.energy_in_time(found[0])
+    elif kind == "lyapunov":
+        with progress_bar() as bar:
+            task = bar.add_task("Jacobians", total=sum(len(orbit.walls) for orbit in found))
+            figure = orbits.exponents(found, lambda n: bar.update(task, completed=n))
+    else:
+        figure = orbits.section(found) if kind == "section" else orbits.collision_map(found)
+    return lambda file: style.save(figure, file, suffix)

@@ -1,0 +1,271 @@
+"""Pictures of orbits: the path in its table, sections, the boundary map, energies, stretching; an animation.
+
+Each function returns a matplotlib figure, which a notebook shows; `save` of `mushrooms.figures.style` writes
+one. Captured is blue, free is orange, in all of them.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from typing import Any, BinaryIO
+
+import numpy as np
+from matplotlib import rc_context
+from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection
+from matplotlib.colors import Normalize
+from matplotlib.figure import Figure
+from matplotlib.patheffects import withStroke
+from mpmath import fp
+
+import theory
+from mushrooms import lyapunov
+from mushrooms.figures import style as plots
+from mushrooms.figures import table as tables
+from mushrooms.orbits import FollowedOrbit, boundary, boundary_map, span_of_nu
+from scene import Mushroom, Scene, Stem
+from scene.geometry import table_at
+from scene.refusal import BadInput
+from scene.tables import cycle_length
+
+N_FRAMES = 96
+TRAIL = 6  # collisions that the animation's particle draws behind it
+N_PLACES = 400
+CAPTURED, FREE = plots.BLUE, plots.ORANGE
+HALO = [withStroke(linewidth=2.5, foreground="white")]
+
+
+def _given(orbits: Sequence[FollowedOrbit] | FollowedOrbit) -> list[FollowedOrbit]:
+    found = [orbits] if isinstance(orbits, FollowedOrbit) else list(orbits)
+    if not found or not all(len(orbit.walls) for orbit in found):
+        raise BadInput("orbits: nothing to draw, the particle meets no wall")
+    return found
+
+
+@rc_context(plots.STYLE)
+def trajectory(orbit: FollowedOrbit) -> Figure:
+    """Draw an orbit's path in its table: walls at its start and end, their names, the mouth, the start."""
+    [orbit] = _given(orbit)
+    figure, axes = plots.new_figure(6.4, 6.0)
+    states = orbit.states()
+    begin, end = float(states[0, 0]), float(states[-1, 0])
+    if cycle_length(orbit.scene):
+        for line in tables.walls(orbit.scene, end):
+            axes.plot(*line, color=plots.GREY, linewidth=1.2, linestyle="--")
+        axes.plot([], [], color=plots.GREY, linewidth=1.2, linestyle="--", label="walls at the end")
+    for line in tables.walls(orbit.scene, begin):
+        axes.plot(*line, color=plots.BLACK, linewidth=2)
+    axes.plot([], [], color=plots.BLACK, linewidth=2, label="walls at the start")
+    points = states[:, 1:3]
+    lines = LineCollection(
+        list(np.stack([points[:-1], points[1:]], axis=1)),
+        cmap="viridis",
+        norm=Normalize(0, len(points) / 0.88),  # the palest end is left out
+        array=np.arange(len(points) - 1),
+        linewidths=1.0,
+    )
+    axes.add_collection(lines)
+    _names(axes, orbit.scene, begin)
+    axes.plot(*points[0], "o", color=FREE, markeredgecolor="white", markersize=9, label="start", zorder=4)
+    ahead = points[-1] + 0.08 * np.ptp(points, axis=0).max() * _unit(states[-1, 3:])
+    axes.annotate("", ahead, points[-1], arrowprops={"arrowstyle": "-|>", "color": plots.BLACK})
+    bar = figure.colorbar(lines, ax=axes, shrink=0.6, label="collision")
+    bar.ax.set_ylim(0, len(points) - 1)
+    axes.set(aspect="equal", xlabel="x [length]", ylabel="y [length]", title=_title(orbit))
+    axes.margins(0.08)
+    figure.legend(loc="outside lower center", ncols=3)
+    return figure
+
+
+def _unit(v: Any) -> Any:
+    return v / (np.hypot(*v) or 1.0)
+
+
+def _title(orbit: FollowedOrbit) -> str:
+    energy = orbit.energies()[0]
+    many = len(orbit.walls)
+    return f"{orbit.scene.name or 'a table'}: {many:,} collisions from energy {energy:.4g}"
+
+
+def _names(axes: Axes, scene: Scene, t: float) -> None:
+    """Name the walls where they are at time t, and draw the mouth."""
+    table = table_at(fp, scene, t)
+    r, w, h = float(table.r), float(table.w), float(table.h)
+    style: dict[str, Any] = {"fontsize": 9, "path_effects": HALO, "ha": "center", "va": "center", "zorder": 5}
+    places: list[tuple[str, float, float]] = []
+    if not isinstance(scene, Stem):
+        places.append(("arc", 0.0, r))
+        places.append(("base", 0.5 * (r + w) if w else 0.0, 0.0))
+    else:
+        places.append(("base", 0.0, 0.0))
+    if h:
+        half = float(table.half_width(-0.5 * h))
+        places += [("left", -half, -0.5 * h), ("right", half, -0.5 * h), ("floor", 0.0, -h)]
+    for name, x, y in places:
+        axes.text(x, y, name, **style)
+    if isinstance(scene, Mushroom):
+        axes.plot([-w, w], [0, 0], color=plots.GREEN, linestyle=":", linewidth=1.8)
+        axes.text(0.0, 0.0, "mouth", color="#00624A", **style)
+
+
+@rc_context(plots.STYLE)
+def section(orbits: Sequence[FollowedOrbit] | FollowedOrbit) -> Figure:
+    """Draw a Poincare section: place on the arc against sin phi, with the captured and the chaotic zone.
+
+    The edge is |sin phi| = nu. Where nu moves, what lies beyond its largest value is captured at all times,
+    what lies below its least value at none, and between the two it depends on the time: each hit has the
+    colour of its own.
+    """
+    found = _given(orbits)
+    figure, axes = plots.new_figure(6.4, 5.2)
+    span = span_of_nu(found[0].scene)
+    low, high = span or (0.0, 0.0)
+    for sign in (1, -1):
+        axes.axhspan(sign * high, sign, color=CAPTURED, alpha=0.10, linewidth=0)
+        for level in {low, high} if span else ():
+            axes.axhline(sign * level, color=plots.BLACK, linewidth=1)
+    if span:
+        axes.axhspan(-low, low, color=FREE, alpha=0.10, linewidth=0)
+        edge = f"nu = {low:.3g}" if high - low < 1e-12 else f"nu = {low:.3g} to {high:.3g}"
+        axes.plot([], [], color=plots.BLACK, linewidth=1, label=f"edge |sin φ| = nu, {edge}")
+    sections = [orbit.section() for orbit in found]
+    place, sine = (np.concatenate([one[k] for one in sections]) for k in (2, 3))
+    captured = np.concatenate([one.is_captured() for one in sections])
+    size = _size(len(place))
+    for which, colour, name in ((captured, CAPTURED, "captured"), (~captured, FREE, "free")):
+        if which.any():
+            axes.plot(place[which], sine[which], ".", color=colour, markersize=size, rasterized=True)
+            axes.plot([], [], "o", color=colour, markersize=5, label=f"{name}, {which.sum():,} hits")
+    axes.set(
+        xlim=(0, 1), ylim=(-1, 1), xlabel="place on the arc, from the right", ylabel="sin φ", title=_of(found)
+    )
+    figure.legend(loc="outside lower center", ncols=2)
+    return figure
+
+
+def _size(n: int) -> float:
+    # Of n points [points]: the more, the finer.
+    return min(4.0, max(0.6, 90.0 / math.sqrt(n or 1)))
+
+
+def _of(orbits: Sequence[FollowedOrbit]) -> str:
+    n = len(orbits)
+    if n == 1:
+        return _title(orbits[0])
+    energy = orbits[0].energies()[0]
+    return f"{orbits[0].scene.name or 'a table'}: {n} particles from energy {energy:.4g}"
+
+
+@rc_context(plots.STYLE)
+def collision_map(orbits: Sequence[FollowedOrbit] | FollowedOrbit) -> Figure:
+    """Draw the boundary map: place along the whole boundary against the sine after each collision."""
+    found = _given(orbits)
+    figure, axes = plots.new_figure(7.6, 5.0)
+    scene = found[0].scene
+    points = np.vstack([boundary_map(orbit) for orbit in found])
+    captured = np.concatenate([orbit.captured()[1:] for orbit in found])
+    size = _size(len(points))
+    for which, colour, name in ((captured, CAPTURED, "captured"), (~captured, FREE, "free")):
+        if which.any():
+            axes.plot(*points[which].T, ".", color=colour, markersize=size, rasterized=True)
+            axes.plot([], [], "o", color=colour, markersize=5, label=f"{name}, {which.sum():,} collisions")
+    for slot in boundary(scene):
+        axes.axvline(slot.end, color=plots.BLACK, linewidth=0.8)
+        if slot.end - slot.begin > 0:
+            where = ((slot.begin + slot.end) / 2, 1.03)
+            axes.text(*where, slot.wall, ha="center", va="bottom", fontsize=9, transform=axes.transData)
+    axes.set(
+        xlim=(0, 1), ylim=(-1, 1), xlabel="place along the boundary, anticlockwise", ylabel="sin of the angle"
+    )
+    figure.suptitle(_of(found), fontsize=10)
+    figure.legend(loc="outside lower center", ncols=2)
+    return figure
+
+
+@rc_context(plots.STYLE)
+def energy_in_time(orbit: FollowedOrbit) -> Figure:
+    """Draw log E / E0 against time, theory's line for these captured stays, and these stays shaded."""
+    [orbit] = _given(orbit)
+    figure, axes = plots.new_figure(7.2, 4.4)
+    span = cycle_length(orbit.scene)
+    states = orbit.states()
+    time = (states[:, 0] - states[0, 0]) / span if span else states[:, 0]
+    energies = orbit.energies()
+    axes.plot(time, np.log(energies / energies[0]), color=plots.BLUE, linewidth=0.9, label="this particle")
+    try:
+        axes.plot(time, orbit.adiabatic(), color=plots.BLACK, linewidth=1.3, label="theory, given its stays")
+        if isinstance(orbit.scene, Mushroom):
+            free = theory.chaotic_zone(orbit.scene, states[:, 0]).log_energy
+            label = "theory, never captured"
+            axes.plot(time, free - free[0], color=FREE, linestyle="--", linewidth=1.3, label=label)
+    except (theory.NotCovered, theory.NotConverged):
+        pass  # no theory of this table: the simulation alone
+    if isinstance(orbit.scene, Mushroom):
+        captured = orbit.captured()
+        edges = np.flatnonzero(np.diff(np.concatenate([[False], captured[:-1], [False]]).astype(int)))
+        for k, (begin, end) in enumerate(edges.reshape(-1, 2)):
+            label = "captured" if k == 0 else "_"
+            axes.axvspan(time[begin], time[end], color=CAPTURED, alpha=0.15, linewidth=0, label=label)
+    axes.set(xlabel="t / T" if span else "t [time]", ylabel="log E / E0", title=_title(orbit))
+    figure.legend(loc="outside lower center", ncols=2)
+    return figure
+
+
+@rc_context(plots.STYLE)
+def exponents(
+    orbits: Sequence[FollowedOrbit] | FollowedOrbit, progress: Callable[[int], None] | None = None
+) -> Figure:
+    """Draw finite-time Lyapunov exponents against the number of collisions, the last with its error.
+
+    Raises:
+        BadInput: as `mushrooms.lyapunov.stretching`.
+    """
+    found = _given(orbits)
+    figure, axes = plots.new_figure(7.2, 4.4)
+    n_before = 0
+    for k, (orbit, colour) in enumerate(zip(found, plots.phase_colours(len(found)), strict=True)):
+        told = None if progress is None else (lambda n, before=n_before: progress(before + n))
+        one = lyapunov.stretching(orbit, told)
+        n_before += len(orbit.walls)
+        count = np.arange(1, len(one.logs) + 1)
+        share = orbit.captured()[1:].mean()
+        label = f"{one.exponent:.3f} ± {one.error:.3f} a collision, {share:.0%} of it captured"
+        axes.plot(count, one.exponents, color=colour, linewidth=1.2, label=label)
+        axes.errorbar(count[-1] * (1 + 0.01 * k), one.exponent, one.error, color=colour, capsize=3)
+    axes.axhline(0, color=plots.BLACK, linewidth=0.8)
+    axes.set(xscale="log", xlabel="collisions", ylabel="exponent [1/collision]", title=_of(found))
+    figure.legend(loc="outside lower center", ncols=1 + (len(found) > 3))
+    return figure
+
+
+def write_animation(orbit: FollowedOrbit, file: BinaryIO, n_frames: int = N_FRAMES) -> None:
+    """Write a GIF of the walls in motion and the particle with its last flights behind it.
+
+    Args:
+        orbit: shown from its start to its last collision, at frames evenly spaced in time.
+        file: open for binary writing.
+        n_frames: how many.
+    """
+    [orbit] = _given(orbit)
+    states = orbit.states()
+    times = np.linspace(states[0, 0], states[-1, 0], n_frames)
+    places, last = orbit.at(times), np.searchsorted(states[:, 0], times, side="right") - 1
+    span = cycle_length(orbit.scene)
+
+    def prepare(axes: Axes) -> Callable[[int], str]:
+        axes.plot(*places[0], "o", color=FREE, markersize=6, markerfacecolor="none", label="start")
+        (trail,) = axes.plot([], [], color=plots.SKY, linewidth=1, animated=True)
+        (dot,) = axes.plot([], [], "o", color=plots.BLACK, markersize=6, animated=True)
+        axes.legend(loc="upper right")
+
+        def show(k: int) -> str:
+            path = np.vstack([states[max(0, last[k] - TRAIL) : last[k] + 1, 1:3], places[k]])
+            trail.set_data(*path.T)
+            dot.set_data(*places[k : k + 1].T)
+            turn = (times[k] - times[0]) / span if span else times[k] - times[0]
+            return f"{orbit.scene.name}   {'t/T' if span else 't'} = {turn:.2f}"
+
+        return show
+
+    tables.write_frames(orbit.scene, times.tolist(), prepare, file)

@@ -1,0 +1,62 @@
+"""The pictures of the documentation: code blocks of a page that name one, run one after the other.
+
+A block whose first line is three backticks and `python NAME.svg` leaves a matplotlib `figure`, or bytes: they
+are written as NAME.svg. The blocks of a page share their names, as a notebook's cells do. `python -m
+mushrooms.gallery PAGE.md FOLDER` makes the pictures of one page; the site makes all of them, and the tests
+run the same blocks.
+"""
+
+from __future__ import annotations
+
+import io
+import re
+import sys
+from pathlib import Path
+from typing import Any
+
+from matplotlib.figure import Figure
+
+from mushrooms.figures import style
+from scene.files import write_file
+
+BLOCK = re.compile(r"^```python (\S+\.(?:svg|png|gif))\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+
+
+def blocks(page: Path) -> list[tuple[str, str]]:
+    """List the picture's name and the code of each block of a page."""
+    return BLOCK.findall(page.read_text("utf-8"))
+
+
+def pages(folder: Path) -> list[Path]:
+    """List the pages in a folder that have pictures of their own."""
+    return [page for page in sorted(folder.glob("*.md")) if blocks(page)]
+
+
+def draw(page: Path, folder: Path) -> list[Path]:
+    """Run the blocks of a page and write their pictures.
+
+    Args:
+        page: a Markdown file.
+        folder: for the pictures; made if it is missing.
+
+    Returns:
+        The files written.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    names: dict[str, Any] = {}
+    written = []
+    for name, code in blocks(page):
+        exec(compile(code, f"{page.name}: {name}", "exec"), names)
+        picture = names.pop("figure")
+        if isinstance(picture, Figure):
+            file = io.BytesIO()
+            style.save(picture, file, Path(name).suffix)
+            picture = file.getvalue()
+        write_file(folder / name, picture)
+        written.append(folder / name)
+    return written
+
+
+if __name__ == "__main__":
+    for path in draw(Path(sys.argv[1]), Path(sys.argv[2])):
+        print(path)

@@ -1,0 +1,350 @@
+"""Orbits: one particle's start and its collisions, with what one looks at along them, and their export.
+
+`follow` draws starts as an ensemble does (particle i of seed S is particle i of `fast.simulate(..., seed=S)`)
+and follows each through the same number of collisions. An orbit knows its energies, its hits of the arc in
+the coordinates of a Poincare section, all its hits in those of the boundary map, its captured stays, and what
+the adiabatic theory says of its energy, given these stays. Pictures: `mushrooms.figures.orbits`.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, BinaryIO, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+from mpmath import fp
+
+import scene as scenes
+from scene import Outcome, Scene, State, Stem, Wall
+from scene.files import write_file
+from scene.geometry import TableAt, half_width, table_at
+from scene.laws import value
+from scene.refusal import BadInput, check_count, check_number, check_scene, check_seed
+from scene.tables import cycle_length
+
+FloatArray = npt.NDArray[np.float64]
+BoolArray = npt.NDArray[np.bool_]
+MAX_COLLISIONS = 1_000_000
+MAX_ORBITS = 1000
+SUFFIXES = (".csv", ".parquet")
+N_PHASES = 48  # of a cycle, for mean lengths of walls
+CROSSINGS = 60.0  # of the table in a cycle, at the energy taken when none is asked for
+
+
+class Section(NamedTuple):
+    """The hits of the arc, n of them, as a Poincare section has them.
+
+    Attributes:
+        collision: (n,) which collision of the orbit each is, from 0.
+        t: (n,) when [time].
+        place: (n,) arc length from the right end over the arc's whole length at that time, 0 to 1.
+        sin_phi: (n,) sin of the angle to the normal before the bounce; positive: clockwise (Eq:sinphi).
+        nu: (n,) the mouth over the radius at that time; 0 in a cap.
+    """
+
+    collision: npt.NDArray[np.int64]
+    t: FloatArray
+    place: FloatArray
+    sin_phi: FloatArray
+    nu: FloatArray
+
+    def is_captured(self) -> BoolArray:
+        """Return (n,): |sin phi| > nu."""
+        return np.asarray(np.abs(self.sin_phi) > self.nu)
+
+
+@dataclass(frozen=True)
+class FollowedOrbit:
+    """One particle: where it starts, its collisions, and why they ended.
+
+    Attributes:
+        scene: the table and its laws.
+        start: the state it starts from.
+        walls: (n,) the walls hit.
+        steps: (n, 6) dt, t, x, y, vx, vy after each collision.
+        outcome: None when all collisions asked for were found, else what came instead.
+    """
+
+    scene: Scene
+    start: State
+    walls: list[Wall]
+    steps: FloatArray
+    outcome: Outcome | None
+
+    def states(self) -> FloatArray:
+        """Return (n + 1, 5): t, x, y, vx, vy at the start and after each collision."""
+        first = [getattr(self.start, name) for name in ("t", "x", "y", "vx", "vy")]
+        return np.vstack([first, self.steps[:, 1:]])
+
+    def state(self, k: int) -> State:
+        """Return the state after k collisions; the start for 0."""
+        if k == 0:
+            return self.start
+        _, t, x, y, vx, vy = self.steps[k - 1].tolist()
+        return State(t, x, y, vx, vy, self.walls[k - 1])
+
+    def energies(self) -> FloatArray:
+        """Return (n + 1,): v^2 / 2 at the start and after each collision [length^2 / time^2]."""
+        states = self.states()
+        return np.asarray((states[:, 3] ** 2 + states[:, 4] ** 2) / 2)
+
+    def at(self, times: FloatArray) -> FloatArray:
+        """Return (m, 2): the place at times between the start and the last collision [length]."""
+        states = self.states()
+        return np.column_stack([np.interp(times, states[:, 0], states[:, k]) for k in (1, 2)])
+
+    def section(self) -> Section:
+        """Return the hits of the arc.
+
+        Raises:
+            BadInput: the table is a stem, which has no arc.
+        """
+        if isinstance(self.scene, Stem):
+            raise BadInput("the section is of arc hits: table is stem, must be cap or mushroom")
+        states, index = (
+            self.states(),
+            np.array([k for k, wall in enumerate(self.walls) if wall == "arc"], int),
+        )
+        before, (t, x, y, vx, vy) = states[index], states[index + 1].T
+        r = np.array([float(value(fp, self.scene.r, time)) for time in t])
+        w = np.array([float(half_width(fp, self.scene, time)) for time in t])
+        # The speed of the flight that ends here; the bounce keeps the angular momentum about the centre.
+        spin = y * vx - x * vy
+        speed = np.hypot(before[:, 3], before[:, 4])
+        return Section(index, t, np.arctan2(y, x) / math.pi, spin / (speed * r), w / r)
+
+    def captured(self) -> BoolArray:
+        """Return (n + 1,): whether the particle is captured on the flight from each state.
+
+        A stay begins with a captured arc hit and ends with an arc hit that is not, or below the mouth. A cap
+        holds all it has.
+        """
+        n = len(self.walls)
+        if not isinstance(self.scene, scenes.Mushroom):
+            return np.full(n + 1, not isinstance(self.scene, Stem))
+        section = self.section()
+        at_arc = dict(zip(section.collision.tolist(), section.is_captured().tolist(), strict=True))
+        found = np.zeros(n + 1, bool)
+        found[0] = at_arc.get(0, False)  # what is captured at its first hit was so before
+        for k, wall in enumerate(self.walls):
+            found[k + 1] = at_arc[k] if wall == "arc" else found[k] and wall == "base"
+        return found
+
+    def adiabatic(self) -> FloatArray:
+        """Return (n + 1,): log E / E0 by theory, given when this particle is captured and when not.
+
+        In the cap E V_cap stays as it is, outside the chaotic zone's own law holds.
+
+        Raises:
+            NotCovered: the table is a stem.
+
+        Source: Eq:dEe, Eq:dE.
+        """
+        import theory
+
+        times = self.states()[:, 0]
+        captured = self.captured()[:-1]
+        if isinstance(self.scene, Stem):
+            raise theory.NotCovered("the theory is of caps and mushrooms: table is stem")
+        inside = np.array([-2 * math.log(value(fp, self.scene.r, t)) for t in times])
+        rise = np.diff(inside)
+        if isinstance(self.scene, scenes.Mushroom) and not captured.all():
+            rise = np.where(captured, rise, np.diff(theory.chaotic_zone(self.scene, times).log_energy))
+        return np.concatenate([[0.0], np.cumsum(rise)])
+
+    def columns(self) -> dict[str, list[Any]]:
+        """Return the orbit as columns of n + 1 rows, the start first; None where there is nothing to say.
+
+        They are collision, wall, dt, t, x, y, vx, vy, energy; at the arc also place, sin_phi, nu and captured
+        (see `Section`).
+        """
+        states = self.states()
+        n = len(states)
+        found: dict[str, list[Any]] = {"collision": list(range(n)), "wall": [self.start.wall, *self.walls]}
+        found["dt"] = [None, *self.steps[:, 0].tolist()]
+        found |= dict(zip(("t", "x", "y", "vx", "vy"), states.T.tolist(), strict=True))
+        found["energy"] = self.energies().tolist()
+        names = ("place", "sin_phi", "nu", "captured")
+        found |= {name: [None] * n for name in names}
+        if not isinstance(self.scene, Stem):
+            section = self.section()
+            rows = (section.place, section.sin_phi, section.nu, section.is_captured())
+            for name, row in zip(names, rows, strict=True):
+                for k, number in zip(section.collision.tolist(), row.tolist(), strict=True):
+                    found[name][k + 1] = number
+        return found
+
+    def write(self, path: Path | str) -> None:
+        """Write the columns as .csv (floats in shortest round-trip form) or .parquet, the scene beside them.
+
+        Raises:
+            BadInput: the ending is neither, or pyarrow is not installed.
+        """
+        path = Path(path)
+        if path.suffix not in SUFFIXES:
+            raise BadInput(f"output {str(path)!r}: its ending must be one of {', '.join(SUFFIXES)}")
+        if path.suffix == ".parquet":
+            arrow, parquet = _arrow()
+            table = arrow.table(self.columns()).replace_schema_metadata(
+                {"scene": json.dumps(scenes.to_data(self.scene))}
+            )
+
+            def write_table(file: BinaryIO) -> None:
+                parquet.write_table(table, file)
+
+            write_file(path, write_table)
+            return
+        text, columns = io.StringIO(), self.columns()
+        writer = csv.writer(text, lineterminator="\n")
+        writer.writerow(columns)
+        writer.writerows(zip(*columns.values(), strict=True))
+        write_file(path, text.getvalue())
+
+
+def _arrow() -> tuple[Any, Any]:
+    try:
+        import pyarrow
+        import pyarrow.parquet
+    except ImportError:
+        raise BadInput(
+            "a .parquet file needs pyarrow: pip install 'oscillating-mushrooms[parquet]'"
+        ) from None
+    return pyarrow, pyarrow.parquet
+
+
+def usual_energy(scene: Scene, crossings: float = CROSSINGS) -> float:
+    """Return an energy at which a particle crosses the table so often in a cycle [length^2 / time^2]."""
+    size = float(table_at(fp, scene, 0.0).size)
+    return 0.5 * (crossings * size / (cycle_length(scene) or CROSSINGS * size)) ** 2
+
+
+def follow(
+    scene: Scene,
+    n_collisions: int,
+    *,
+    energy: float | None = None,
+    seed: int = 0,
+    n_orbits: int = 1,
+) -> list[FollowedOrbit]:
+    """Follow particles from drawn starts, uniform in area and direction when the cycle begins.
+
+    Args:
+        scene: table and laws.
+        n_collisions: of each particle, 1 to 10^6.
+        energy: v^2 / 2 at the start [length^2 / time^2], > 0; by default what crosses the table some
+            sixty times in a cycle.
+        seed: 0 to 2^64 - 1; particle i is particle i of `fast.simulate` at this energy and seed.
+        n_orbits: how many particles, 1 to 1000.
+
+    Raises:
+        BadInput: naming field, value and bound.
+    """
+    check_scene(scene)
+    n_collisions = check_count("n_collisions", n_collisions, 1, MAX_COLLISIONS)
+    n_orbits = check_count("n_orbits", n_orbits, 1, MAX_ORBITS)
+    seed = check_seed(seed)
+    energy = usual_energy(scene) if energy is None else check_number("energy", energy)
+    if not energy > 0:
+        raise BadInput(f"energy = {energy}, must be > 0")
+    from fast.starts import initial_states  # compiles for seconds: only when all that was given is right
+
+    rows = initial_states(scene, n_orbits, energy, seed)
+    return [from_state(scene, State(row[0], *row[2:]), n_collisions) for row in rows.tolist()]
+
+
+def from_state(scene: Scene, start: State, n_collisions: int) -> FollowedOrbit:
+    """Follow a particle from a state of your own, as `fast.trajectory`.
+
+    Raises:
+        BadInput: naming field, value and bound.
+    """
+    import fast
+
+    found = fast.trajectory(scene, start, n_collisions)
+    return FollowedOrbit(scene, start, found.walls, np.asarray(found.steps, np.float64), found.outcome)
+
+
+class Slot(NamedTuple):
+    """A wall's part of the boundary map: its name and from where to where along the boundary, 0 to 1."""
+
+    wall: Wall
+    begin: float
+    end: float
+
+
+def boundary(scene: Scene) -> list[Slot]:
+    """Return the walls anticlockwise from the right end of the cap, by their mean lengths in a cycle."""
+    span = cycle_length(scene)
+    found = [_lengths(table_at(fp, scene, span * k / N_PHASES)) for k in range(N_PHASES if span else 1)]
+    walls = [wall for wall, _ in found[0]]
+    ends = np.cumsum([0.0, *np.mean([[length for _, length in one] for one in found], axis=0)])
+    ends /= ends[-1]
+    return [Slot(*row) for row in zip(walls, ends[:-1].tolist(), ends[1:].tolist(), strict=True)]
+
+
+def _lengths(now: TableAt) -> list[tuple[Wall, float]]:
+    r, w, h = float(now.r), float(now.w), float(now.h)
+    if isinstance(now.scene, scenes.Cap):
+        return [("arc", math.pi * r), ("base", 2 * r)]
+    foot = float(now.half_width(-now.h))
+    side = math.hypot(h, w - foot)
+    around: list[tuple[Wall, float]] = [("left", side), ("floor", 2 * foot), ("right", side)]
+    if isinstance(now.scene, Stem):
+        return [("base", 2 * w), *around]
+    return [("arc", math.pi * r), ("base", r - w), *around, ("base", r - w)]
+
+
+def boundary_map(orbit: FollowedOrbit) -> FloatArray:
+    """Return (n, 2): place along the boundary and sin of the angle to the normal after each collision.
+
+    The place runs anticlockwise, 0 to 1; each wall has the slot that `boundary` gives it, and a hit
+    its share of that. The sine is positive along that direction.
+    """
+    scene = orbit.scene
+    slots = boundary(scene)
+    out = np.empty((len(orbit.walls), 2))
+    for k, (wall, (_, t, x, y, vx, vy)) in enumerate(zip(orbit.walls, orbit.steps.tolist(), strict=True)):
+        now = table_at(fp, scene, t)
+        normal_x, normal_y = now.normal(wall, x, y)
+        own = [slot for slot in slots if slot.wall == wall]
+        slot = own[0] if len(own) == 1 or x < 0 else own[1]
+        share = min(max(_share(now, wall, x, y, len(own) > 1), 0.0), 1.0)
+        # Anticlockwise along the wall: the inward normal turned by a right angle, clockwise.
+        along = (normal_y * vx - normal_x * vy) / math.hypot(vx, vy)
+        out[k] = slot.begin + share * (slot.end - slot.begin), along
+    return out
+
+
+def _share(now: TableAt, wall: Wall, x: float, y: float, is_split: bool) -> float:
+    """Return how far along a wall a place is, anticlockwise, 0 to 1."""
+    if wall == "arc":
+        return math.atan2(y, x) / math.pi
+    if wall == "left":
+        return -y / float(now.h)
+    if wall == "right":
+        return 1 + y / float(now.h)
+    if wall == "floor":
+        foot = float(now.half_width(-now.h))
+        return (x + foot) / (2 * foot)
+    if is_split:
+        r, w = float(now.r), float(now.w)
+        return (x + r if x < 0 else x - w) / (r - w) if r > w else 0.0
+    if isinstance(now.scene, Stem):
+        return (float(now.w) - x) / (2 * float(now.w))
+    return (x + float(now.r)) / (2 * float(now.r))
+
+
+def span_of_nu(scene: Scene) -> tuple[float, float] | None:
+    """Return the least and the largest nu = w / r of a cycle; None where there is no mouth."""
+    if not isinstance(scene, scenes.Mushroom):
+        return None
+    from theory import Cycle
+
+    cycle = Cycle.of(scene, 15)
+    return float(cycle.nu_min), float(cycle.nu_max)

@@ -1,0 +1,125 @@
+"""The pages of the site do what they say: every block of code is run, here or in tests/test_docs.py."""
+
+from __future__ import annotations
+
+import doctest
+import json
+import re
+import shlex
+from pathlib import Path
+
+import pytest
+
+from mushrooms import gallery
+from scene import load
+from scene.load import catalogue, catalogue_text, from_data
+
+DOCS = Path(__file__).parent.parent / "docs"
+FENCE = re.compile(r"^```([^\n]*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+# Blocks that another test runs, by page and first line; "" is a line for a shell that installs something.
+RUN_ELSEWHERE = {
+    "tutorial.md": {"python", "console"},  # test_docs: the tutorial, one block after the other
+    "scenes.md": {"toml", "text", "python", "console"},  # test_docs: files loaded, doctests
+    "protocol.md": {"json"},  # test_docs: against the schema and the plain stepper
+    "corpus.md": {""},
+}
+INSTALLS = ("pip install", "mushrooms --version", "sphinx-build")
+
+
+def blocks(page: Path) -> list[tuple[str, str]]:
+    """List the first line and the text of each block of a page."""
+    return FENCE.findall(page.read_text("utf-8"))
+
+
+@pytest.mark.parametrize("name", ["start.md", "theory.md"])
+def test_the_python_of_a_page_does_what_it_says(name):
+    found = doctest.testfile(str(DOCS / name), module_relative=False, optionflags=doctest.ELLIPSIS)
+    assert found.attempted >= 5
+    assert found.failed == 0
+
+
+@pytest.mark.parametrize("name", ["start.md", "scenes.md"])
+def test_the_commands_of_a_page_do_what_they_say(command_line, tmp_path, monkeypatch, name):
+    monkeypatch.chdir(tmp_path)
+    consoles = 0
+    for first, text in blocks(DOCS / name):
+        kind, _, file = first.partition(" ")
+        if kind == "toml":
+            (tmp_path / file).write_text(text, "utf-8")
+        if kind != "console":
+            continue
+        consoles += 1
+        command, _, shown = text.removeprefix("$ mushrooms ").partition("\n")
+        command, _, target = command.partition(" > ")
+        code, out, _ = command_line(*shlex.split(command))
+        assert code == 0
+        if target:
+            (tmp_path / target).write_text(out, "utf-8")
+            load(tmp_path / target)
+        assert re.search(re.escape(shown.strip()).replace(r"\.\.\.", ".*?"), out, re.DOTALL), out
+    assert consoles
+
+
+def test_the_pictures_of_the_pages_are_made(tmp_path):
+    """All of them, by the code that stands above each; a page shows every picture that it makes."""
+    for page in gallery.pages(DOCS):
+        shown = re.findall(r"\]\(generated/([^)]+)\)", page.read_text("utf-8"))
+        made = gallery.draw(page, tmp_path)
+        assert [path.name for path in made] == [name for name, _ in gallery.blocks(page)]
+        assert sorted(path.name for path in made) == sorted(shown)
+        for path in made:
+            start = {".svg": b"<?xml", ".png": b"\x89PNG", ".gif": b"GIF89a"}[path.suffix]
+            assert path.read_bytes().startswith(start)
+
+
+def test_a_block_that_fails_is_not_passed_over(tmp_path):
+    page = tmp_path / "page.md"
+    page.write_text("```python a.svg\nfigure = nothing\n```\n")
+    with pytest.raises(NameError):
+        gallery.draw(page, tmp_path / "pictures")
+
+
+def unaccounted(name: str, page: str) -> list[str]:
+    """List the first lines of blocks that no test runs."""
+    found = []
+    for first, text in FENCE.findall(page):
+        kind = first.partition(" ")[0]
+        is_run = (
+            kind in RUN_ELSEWHERE.get(name, ())
+            or kind.startswith("{")  # a directive: Sphinx acts on it, and warnings are errors
+            or (kind == "python" and (" " in first or text.startswith(">>>")))
+            or kind in ("console", "toml")
+            or all(line.startswith(INSTALLS) for line in text.splitlines())
+        )
+        if not is_run:
+            found.append(first)
+    return found
+
+
+def test_every_block_of_the_site_is_run():
+    pages = [path for path in DOCS.rglob("*.md") if "generated" not in path.parts]
+    assert {
+        page.name: missed for page in pages if (missed := unaccounted(page.name, page.read_text("utf-8")))
+    } == {}
+    runs = {
+        page.name for page in pages if re.search(r"^(```console|>>>)", page.read_text("utf-8"), re.MULTILINE)
+    }
+    assert runs == {"start.md", "theory.md", "scenes.md", "tutorial.md"}  # those that tests go through
+
+
+@pytest.mark.parametrize(
+    "planted", ["```python\nx = 1\n```\n", "```\nrm -r x\n```\n", "```yaml\na: 1\n```\n"]
+)
+def test_a_block_that_nobody_runs_is_seen(planted):
+    assert len(unaccounted("start.md", planted)) == 1
+
+
+def test_scenes_are_printed_as_files_to_begin_from(command_line, tmp_path):
+    for name in catalogue():
+        code, out, _ = command_line("scenes", name, "--toml")
+        assert (code, out) == (0, catalogue_text(name).rstrip("\n") + "\n")
+    assert from_data(json.loads(command_line("scenes", "moving-cap", "--json")[1])) == load("moving-cap")
+    for arguments in (["nowhere"], ["--toml"]):
+        code, _, err = command_line("scenes", *arguments)
+        assert code == 2
+        assert "moving-cap" in err

@@ -1,0 +1,59 @@
+"""What is published: typed packages, one version and address everywhere, a README with absolute links."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parent.parent
+PYPROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))
+PROJECT = PYPROJECT["project"]
+REPOSITORY = PROJECT["urls"]["Repository"]
+
+
+def published_readme(text: str) -> str:
+    """Return the README as a package index shows it."""
+    for change in PYPROJECT["tool"]["hatch"]["metadata"]["hooks"]["fancy-pypi-readme"]["substitutions"]:
+        text = re.sub(change["pattern"], change["replacement"], text)
+    return text
+
+
+def test_every_package_says_that_it_is_typed():
+    for package in PYPROJECT["tool"]["hatch"]["build"]["targets"]["wheel"]["packages"]:
+        assert (ROOT / package / "py.typed").is_file()
+
+
+def test_the_published_readme_has_no_relative_link():
+    readme = (ROOT / "README.md").read_text("utf-8")
+    published = published_readme(readme)
+    links = re.findall(r"\]\(([^)]+)\)", published)
+    assert len(links) > 20
+    owner = REPOSITORY.removeprefix("https://github.com/")
+    raw = f"https://raw.githubusercontent.com/{owner}/main/"
+    for address, given in zip(links, re.findall(r"\]\(([^)]+)\)", readme), strict=True):
+        if given.startswith("https://"):
+            assert address == given
+            continue
+        start = raw if given.endswith(".svg") else f"{REPOSITORY}/blob/main/"
+        assert address == start + given
+    assert published_readme(published) == published
+
+
+def test_the_citation_is_of_this_version():
+    citation = (ROOT / "CITATION.cff").read_text("utf-8")
+    assert f"\nversion: {PROJECT['version']}\n" in citation
+    assert f"\nrepository-code: {REPOSITORY}\n" in citation
+    assert PROJECT["authors"] == [{"name": "The Oscillating Mushrooms authors"}]
+    assert "family-names: Gelfreich" in citation
+    assert PROJECT["urls"]["Paper"].endswith(re.search(r"doi: (\S+)", citation)[1])
+
+
+@pytest.mark.parametrize("name", ["ci.yml", "release.yml"])
+def test_what_the_workflows_run_exists(name):
+    text = (ROOT / ".github" / "workflows" / name).read_text("utf-8")
+    for path in re.findall(r"\.ci/[\w.]+", text):
+        assert (ROOT / path).is_file()
+    assert text.count("id-token: write") == 1  # only the job that publishes may sign

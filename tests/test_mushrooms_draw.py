@@ -1,0 +1,255 @@
+"""Orbits and their pictures: starts, sections, captured stays, exponents, exports, and the command on top."""
+
+from __future__ import annotations
+
+import csv
+import math
+
+import msgspec
+import numpy as np
+import pyarrow.parquet
+import pytest
+from mpmath import fp
+from support.refusals import assert_refused
+
+import fast
+import reference
+import scene as scenes
+import theory
+from mushrooms import lyapunov, orbits
+from mushrooms.figures import orbits as pictures
+from scene.laws import value
+
+STATIC = scenes.load("frozen-mushroom")
+MOVING = scenes.load("moving-cap")
+N_COLLISIONS, ENERGY, SEED = 300, 1e5, 3
+
+
+@pytest.fixture(scope="module")
+def moving():
+    return orbits.follow(MOVING, N_COLLISIONS, energy=ENERGY, seed=SEED, n_orbits=6)
+
+
+def whispering(scene: scenes.Scene = STATIC, n: int = N_COLLISIONS) -> orbits.FollowedOrbit:
+    """Return an orbit in the cap that never sees the mouth."""
+    return orbits.from_state(scene, scenes.State(0.0, 0.9, 0.0, 0.05, 1.0), n)
+
+
+def test_an_orbit_is_the_particle_of_the_ensemble(moving):
+    ensemble = fast.simulate(MOVING, n_particles=6, energy=10.0, seed=SEED)
+    for i, orbit in enumerate(orbits.follow(MOVING, 1, energy=10.0, seed=SEED, n_orbits=6)):
+        assert orbit.energies()[0] == pytest.approx(10.0, rel=1e-14)
+        whole = fast.trajectory(MOVING, orbit.start, 10**6, math.tau).outcome
+        assert isinstance(whole, scenes.Horizon)
+        assert whole.x == pytest.approx(ensemble.x[i], abs=1e-6)
+
+
+def test_places_between_collisions_are_on_the_path(moving):
+    orbit = moving[0]
+    states = orbit.states()
+    assert np.array_equal(orbit.at(states[:, 0]), states[:, 1:3])
+    t = 0.5 * (states[4, 0] + states[5, 0])
+    x = states[4, 1] + (t - states[4, 0]) * states[4, 3]
+    assert orbit.at(np.array([t]))[0, 0] == pytest.approx(x, rel=1e-12)
+
+
+def test_the_section_is_eq_sinphi_before_the_bounce(moving):
+    for orbit in moving:
+        section, states = orbit.section(), orbit.states()
+        k = int(section.collision[3])
+        _, _, _, vx, vy = states[k]
+        t, x, y, _, _ = states[k + 1]
+        r = float(value(fp, MOVING.r, t))
+        assert section.sin_phi[3] == pytest.approx(theory.sin_phi_hat(np, x, y, vx, vy, r), rel=1e-12)
+        assert section.nu[3] == pytest.approx(float(value(fp, MOVING.nu, t)), rel=1e-12)
+        assert np.all((section.place >= 0) & (section.place <= 1) & (np.abs(section.sin_phi) <= 1 + 1e-12))
+
+
+def test_captured_stays_are_those_of_the_flow():
+    orbit = orbits.follow(MOVING, 3000, energy=ENERGY, seed=SEED, n_orbits=6)
+    n_stays = 0
+    for one in orbit:
+        captured, times = one.captured(), one.states()[:, 0]
+        told = fast.flow(MOVING, [one.start], float(times[-1]))
+        begin = told.t_in[0]
+        rises = np.flatnonzero(captured[1:] & ~captured[:-1]) + 1
+        if np.isfinite(begin) and not captured[0]:
+            n_stays += 1
+            assert times[rises[0]] == pytest.approx(begin, rel=1e-12)
+        elif not captured[0]:
+            assert len(rises) == 0
+    assert n_stays >= 1
+
+
+def test_an_island_keeps_its_angle_and_a_chaotic_orbit_does_not():
+    section = whispering().section()
+    assert section.is_captured().all()
+    assert np.ptp(np.abs(section.sin_phi)) < 1e-10
+    free = next(o for o in orbits.follow(STATIC, N_COLLISIONS, n_orbits=4, seed=1) if not o.captured().any())
+    assert np.ptp(np.abs(free.section().sin_phi)) > 0.3
+
+
+def test_a_wrong_edge_would_be_seen():
+    """Were the mouth half as wide, orbits that leave the cap would count as captured."""
+    wide = orbits.follow(STATIC, N_COLLISIONS, n_orbits=4, seed=1)
+    narrow = msgspec.structs.replace(STATIC, nu=STATIC.nu / 2)
+    n_below = [
+        np.count_nonzero(np.isin(o.walls, ["left", "right", "floor"]) & o.captured()[1:]) for o in wide
+    ]
+    assert sum(n_below) == 0
+    crossed = 0
+    for orbit in wide:
+        section = orbit.section()
+        beyond = section.collision[np.abs(section.sin_phi) > narrow.nu]
+        after = [orbit.walls[k + 1] for k in beyond if k + 1 < len(orbit.walls)]
+        crossed += sum(wall in ("left", "right", "floor") for wall in after)
+    assert crossed > 0
+
+
+def test_energies_follow_theory_given_the_stays():
+    for orbit in orbits.follow(MOVING, 6000, energy=1e7, seed=SEED, n_orbits=2):
+        gain = np.log(orbit.energies() / orbit.energies()[0])
+        assert (
+            np.abs(gain - orbit.adiabatic()).max() < 0.12
+        )  # a particle's own wander, about E^(-1/4) in size
+    captive = whispering(scenes.load("breathing-circle"))
+    first, last = captive.states()[[0, -1], 0]
+    ratio = value(fp, captive.scene.r, first) / value(fp, captive.scene.r, last)
+    assert captive.adiabatic()[-1] == pytest.approx(2 * math.log(ratio), rel=1e-9)
+    with pytest.raises(theory.NotCovered):
+        orbits.follow(scenes.load("fermi-ulam"), 10)[0].adiabatic()
+
+
+@pytest.mark.parametrize("name", ["moving-cap", "fermi-ulam", "breathing-circle"])
+def test_the_boundary_map_keeps_to_its_slots(name):
+    scene = scenes.load(name)
+    [orbit] = orbits.follow(scene, N_COLLISIONS, seed=2)
+    slots = orbits.boundary(scene)
+    assert (slots[0].begin, slots[-1].end) == (0.0, 1.0)
+    for wall, (place, sine) in zip(orbit.walls, orbits.boundary_map(orbit), strict=True):
+        assert any(slot.wall == wall and slot.begin <= place <= slot.end for slot in slots)
+        assert abs(sine) <= 1 + 1e-12
+    if name != "fermi-ulam":  # at the arc the section has the other sense
+        at_arc = orbit.section()
+        assert (
+            np.sign(orbits.boundary_map(orbit)[at_arc.collision, 1]).tolist()
+            == np.sign(-at_arc.sin_phi).tolist()
+        )
+
+
+def test_chained_jacobians_are_those_of_the_proved_trajectory():
+    [orbit] = orbits.follow(MOVING, 6, seed=SEED)
+    product = np.eye(5)
+    for matrix in lyapunov.jacobians(orbit):
+        product = matrix @ product
+    proved = reference.trajectory(MOVING, orbit.start, 6, is_differentiated=True).jacobian
+    assert proved is not None
+    truth = np.array([[float(entry) for entry in row] for row in proved])
+    scale = np.abs(truth).max()
+    assert (
+        np.abs(product - truth).max() < 1e-9 * scale
+    )  # the orbit is the proved one but for rounding, stretched
+    without_time = np.eye(5)
+    for matrix in lyapunov.jacobians(orbit):
+        without_time = (matrix - np.diag([1.0, 0, 0, 0, 0])) @ without_time  # dt in place of t + dt
+    assert np.abs(without_time - truth).max() > 1e-3 * scale
+
+
+def test_a_chaotic_orbit_stretches_and_an_island_does_not():
+    free = next(o for o in orbits.follow(STATIC, 64, n_orbits=4, seed=1) if not o.captured().any())
+    found = lyapunov.stretching(free)
+    assert found.exponent > 5 * found.error > 0
+    assert found.logs.mean() == pytest.approx(found.exponent)
+    assert found.exponents[-1] == found.exponent
+    still = lyapunov.stretching(whispering(n=64))
+    assert abs(still.exponent) < 3 * math.log(64) / 64
+    with pytest.raises(scenes.BadInput, match="collisions = 31, must be >= 32"):
+        lyapunov.stretching(whispering(n=31))
+
+
+def test_an_orbit_is_written_and_read_again(tmp_path, moving):
+    orbit = moving[0]
+    orbit.write(tmp_path / "orbit.csv")
+    with (tmp_path / "orbit.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert len(rows) == N_COLLISIONS + 1
+    first = scenes.State(*(float(rows[0][name]) for name in ("t", "x", "y", "vx", "vy")))
+    assert first == orbit.start
+    assert [row["wall"] for row in rows[1:]] == orbit.walls
+    assert [float(row["x"]) for row in rows[1:]] == orbit.steps[:, 2].tolist()
+    orbit.write(tmp_path / "orbit.parquet")
+    table = pyarrow.parquet.read_table(tmp_path / "orbit.parquet")
+    assert table["vy"].to_pylist() == orbit.states()[:, 4].tolist()
+    assert table.column_names == list(rows[0])
+    assert scenes.from_data(msgspec.json.decode(table.schema.metadata[b"scene"])) == MOVING
+    with pytest.raises(scenes.BadInput, match=r"\.csv, \.parquet"):
+        orbit.write(tmp_path / "orbit.txt")
+
+
+def test_parquet_without_pyarrow_names_the_extra(tmp_path, moving, monkeypatch):
+    monkeypatch.setitem(__import__("sys").modules, "pyarrow", None)
+    with pytest.raises(scenes.BadInput, match=r"oscillating-mushrooms\[parquet\]"):
+        moving[0].write(tmp_path / "orbit.parquet")
+
+
+def test_figures_are_returned(moving):
+    assert [text.get_text() for text in pictures.trajectory(moving[0]).axes[0].texts if text.get_text()] == [
+        "arc", "base", "left", "right", "floor", "mouth",
+    ]  # fmt: skip
+    labels = [text.get_text() for text in pictures.section(moving).legends[0].get_texts()]
+    assert labels[0] == "edge |sin φ| = nu, nu = 0.2 to 1"
+    assert pictures.collision_map(moving).axes
+    drawn = [line.get_label() for line in pictures.energy_in_time(moving[0]).axes[0].lines]
+    assert drawn == ["this particle", "theory, given its stays", "theory, never captured"]
+
+
+def test_notebooks_show_scenes_predictions_and_ensembles():
+    assert "<svg" in MOVING._repr_html_()
+    assert "&lt;b&gt;" in msgspec.structs.replace(STATIC, name="<b>")._repr_html_()
+    assert "0.122767964937387" in theory.predict(MOVING)._repr_html_()
+    assert "sha256" in fast.simulate(MOVING, n_particles=3, energy=100.0)._repr_html_()
+
+
+def test_the_command_draws_several_pictures_and_exports(command_line, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    code, out, _ = command_line(
+        "draw", "moving-cap", "--section", "--map", "--particles", "3", "--collisions", "1e2",
+        "--out", "orbits.png", "--export", "orbit.csv",
+    )  # fmt: skip
+    assert code == 0
+    assert out.split() == ["orbit.csv", "orbits-section.png", "orbits-map.png"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == sorted(out.split())
+    assert len((tmp_path / "orbit.csv").read_text().splitlines()) == 102
+
+
+@pytest.mark.parametrize(("suffix", "start"), [("pdf", b"%PDF"), ("gif", b"GIF89a"), ("svg", b"<?xml")])
+def test_the_path_of_a_particle_in_every_kind_of_file(command_line, tmp_path, suffix, start):
+    path = tmp_path / f"path.{suffix}"
+    command = ["draw", "untilted", "--trajectory", "--collisions", 20, "--seed", 4, "--out", path]
+    assert command_line(*command)[0] == 0
+    first = path.read_bytes()
+    assert first.startswith(start)
+    if suffix != "gif":  # whose frames take longer
+        assert command_line(*command)[0] == 0
+        assert path.read_bytes() == first
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["fermi-ulam", "--section"], ["stem"]),
+        (["moving-cap", "--section", "--out", "a.gif"], ["a.gif", ".svg, .png, .pdf"]),
+        (["moving-cap", "--out", ""], ["--out", "empty"]),
+        (["moving-cap", "--trajectory", "--energy", "0"], ["--energy = 0.0", "> 0"]),
+        (["moving-cap", "--trajectory", "--collisions", "0"], ["--collisions = 0", "1 to 1000000"]),
+        (["moving-cap", "--trajectory", "--collisions", "1.5"], ["--collisions", "1.5"]),
+        (["moving-cap", "--map", "--particles", "1001"], ["--particles = 1001", "1 to 1000"]),
+        (["moving-cap", "--lyapunov", "--collisions", "9"], ["collisions = 9", ">= 32"]),
+        (["moving-cap", "--export", "a.txt"], ["a.txt", ".csv, .parquet"]),
+        (["moving-cap", "--seed", "-1"], ["--seed = -1"]),
+    ],
+)
+def test_what_cannot_be_drawn_is_refused(command_line, tmp_path, monkeypatch, arguments, words):
+    monkeypatch.chdir(tmp_path)
+    assert_refused(command_line("draw", *arguments), *words)
+    assert list(tmp_path.iterdir()) == []

@@ -1,0 +1,121 @@
+"""The manners of every command: what is imported, what is refused, how numbers and tables are printed."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+
+import pytest
+from support.refusals import assert_refused
+
+import theory
+from mushrooms.main import COMMANDS, INTERRUPTED, command
+from mushrooms.terminal import print_pairs, table_console
+
+HEAVY = {"numpy", "numba", "mpmath", "msgspec", "scipy", "matplotlib", "rich", "scene", "fast", "theory"}
+
+
+def loaded_by(code: str) -> set[str]:
+    """Return which of the heavy packages are imported after some code has run in a process of its own."""
+    command = [sys.executable, "-c", f"import sys\n{code}\nprint(*sys.modules, file=sys.stderr)"]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    return HEAVY & set(done.stderr.split())
+
+
+def test_the_list_of_commands_imports_none_of_them():
+    listed = "from mushrooms.main import run\ntry:\n run(['--help'])\nexcept SystemExit: pass"
+    assert loaded_by(listed) == set()
+    assert loaded_by("import fast") == {"fast"}
+    assert "numba" in loaded_by("import fast\nfast.simulate")
+
+
+def test_functions_stand_before_the_modules_that_have_their_names():
+    code = "import fast.flow\nfrom fast.trajectory import Collisions\nassert callable(fast.flow)\n"
+    loaded_by(code + "assert callable(fast.trajectory)\nassert fast.Collisions is Collisions")
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_every_command_is_found_and_has_its_example(command_line, name):
+    assert command(name).name == name
+    code, out, _ = command_line(name, "--help")
+    assert code == 0
+    assert f"Example: mushrooms {name} {COMMANDS[name].example}" in " ".join(out.split())
+    assert COMMANDS[name].summary.split(",")[0].rstrip(".") in " ".join(command_line("--help")[1].split())
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["draw", "moving-cap", "--out", ""],
+        ["draw", "moving-cap", "--out="],
+        ["simulate", "moving-cap", "--particles", "5", "--energy", "1", "--out", " "],
+        ["audit", "--out", ""],
+        ["bench", "--compare", ""],
+    ],
+)
+def test_an_empty_option_is_refused(command_line, tmp_path, monkeypatch, arguments):
+    monkeypatch.chdir(tmp_path)
+    assert_refused(command_line(*arguments), "is empty, must have a value")
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (
+            ["simulate", "moving-cap", "--particles", "5", "--energy", "1", "--threads", "999"],
+            ["--threads = 999"],
+        ),
+        (["check", "--level", "hard", "--", "true"], ["--level = 'hard'", "core, extended, stress"]),
+        (["attack", "--family", "none"], ["--family = 'none'", "knot-at-event"]),
+    ],
+)
+def test_a_refusal_names_the_option_and_what_is_valid(command_line, arguments, words):
+    assert_refused(command_line(*arguments), *words)
+
+
+def test_an_interruption_says_what_is_kept(command_line, monkeypatch):
+    def interrupted(*_arguments, **_options):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(theory, "predict", interrupted)
+    code, out, err = command_line("theory", "moving-cap")
+    assert (code, out) == (INTERRUPTED, "")
+    assert err.strip().splitlines() == [
+        "mushrooms: interrupted; nothing is kept: files are written whole, at the end"
+    ]
+    assert "--resume" in COMMANDS["audit"].kept
+
+
+def test_a_mean_is_rounded_to_its_error(capsys):
+    pairs = {"m1": 0.0358545588507, "m1_se": 0.0063475245, "n": 3, "none": None}
+    print_pairs(pairs, as_json=False)
+    assert capsys.readouterr().out.split() == ["m1", "0.0359", "m1_se", "0.0063", "n", "3", "none", "–"]
+    print_pairs(pairs, as_json=True)
+    assert "0.0358545588507" in capsys.readouterr().out
+    print_pairs({"m1": 12345.678, "m1_se": 250.0}, as_json=False)
+    assert capsys.readouterr().out.split() == ["m1", "12346", "m1_se", "250"]
+
+
+def test_tables_obey_columns(monkeypatch):
+    monkeypatch.setenv("COLUMNS", "60")
+    assert table_console().width == 60
+    monkeypatch.delenv("COLUMNS")
+    assert table_console().width == 140
+
+
+@pytest.mark.parametrize(("given", "meant"), [("2e1", 20), ("20", 20), ("0.2e2", 20), ("+20.0", 20)])
+def test_whole_numbers_may_have_exponents(command_line, given, meant):
+    code, out, _ = command_line(
+        "simulate", "breathing-circle", "--particles", given, "--energy", "1", "--json"
+    )
+    assert code == 0
+    assert json.loads(out)["particles"] == meant
+
+
+@pytest.mark.parametrize("given", ["1e400", "1.5", "1e-1", "nan", "inf", "many", "0x10"])
+def test_other_numbers_may_not(command_line, given):
+    assert_refused(
+        command_line("simulate", "moving-cap", "--energy", "1", "--particles", given), "--particles", given
+    )

@@ -1,0 +1,95 @@
+"""Many digits: sums of cosines by halving, roots found with few digits first, parts tried at few points."""
+
+from __future__ import annotations
+
+import pytest
+from mpmath import MPContext
+
+import scene
+import theory
+from theory.adiabatic import MANY, captures
+from theory.chebyshev import FEW, Grid, even_degree
+from theory.critical import MANY_BITS, solve_rising
+from theory.cycle import Cycle
+
+# m1 of the moving cap to 100 digits, by sums of all cosines and every Newton step at full precision.
+M1 = "0.1227679649373872211752779164798956665418006027565599953695922200419445092518695629088300949849377621"
+
+
+@pytest.fixture(scope="module")
+def ctx():
+    found = MPContext()
+    found.dps = 120
+    return found
+
+
+def values(ctx, n):
+    """Return n + 1 numbers that fall from 1 to 1e-100."""
+    return [ctx.mpf(10) ** (-100 * j / ctx.mpf(n)) * ((7 * j) % 11 - 5) for j in range(n + 1)]
+
+
+@pytest.mark.parametrize("n", [208, 216])
+def test_sums_by_halving_are_the_sums_of_all(ctx, n):
+    grid, given = Grid(ctx, n), values(ctx, n)
+    truth = grid._sums_of_all(given)
+    found = grid._cosine_sums(given)
+    assert max(abs(a - b) for a, b in zip(found, truth, strict=True)) < ctx.mpf(10) ** -115
+    direct = ctx.fsum(v * ctx.cos(ctx.pi * j * 5 / n) for j, v in enumerate(given))
+    assert abs(direct - found[5]) < ctx.mpf(10) ** -115
+
+
+def test_halves_put_together_wrongly_would_be_seen(ctx):
+    class Unmirrored(Grid):
+        """Does not turn the second half round."""
+
+        def _odd_sums(self, given):
+            found = super()._odd_sums(given)
+            return found[: len(found) // 2] + found[len(found) // 2 :][::-1]
+
+    n, given = 208, values(ctx, 208)
+    found, truth = Unmirrored(ctx, n)._cosine_sums(given), Grid(ctx, n)._sums_of_all(given)
+    assert max(abs(a - b) for a, b in zip(found, truth, strict=True)) > 1e-3
+
+
+def test_a_degree_is_rounded_up_to_what_halves_well():
+    assert [even_degree(n) for n in (62, 198)] == [62, 198]  # as ever, while there are few points
+    for n in range(FEW, 2200, 2):
+        found = even_degree(n)
+        assert n <= found <= 1.1 * n
+        odd = found
+        while odd % 2 == 0 and odd > 64:
+            odd //= 2
+        assert odd <= 64
+
+
+def test_a_root_has_all_its_digits_and_is_found_with_few():
+    found = MPContext()
+    found.prec = 4 * MANY_BITS
+    precisions = []
+
+    def rising(x):
+        precisions.append(found.prec)
+        return found.exp(x) - 3, found.exp(x)
+
+    root = solve_rising(found, rising, found.mpf(0), found.mpf(2))
+    assert abs(root - found.log(3)) < found.ldexp(1, 3 - found.prec)
+    assert found.prec == 4 * MANY_BITS
+    assert sum(p == found.prec for p in precisions) <= 2
+    assert min(precisions) <= MANY_BITS
+
+
+def test_many_digits_are_what_they_were():
+    digits, told = 84, []
+    assert even_degree(2 * (12 + digits + 4)) >= MANY  # so that all of the above is at work
+    found = captures(Cycle.of(scene.load("moving-cap"), digits), digits + 4, told.append)
+    assert abs(found.growth() - found.cycle.ctx.mpf(M1)) < found.cycle.ctx.mpf(10) ** -digits
+    assert told == sorted(told)
+    assert (told[0], told[-1]) == (0.0, 1.0)
+
+
+def test_progress_tells_the_resolution_and_how_far_it_is():
+    told = []
+    theory.predict(scene.load("moving-cap"), 2, progress=lambda *done: told.append(done))
+    assert told == sorted(told)
+    assert {number for number, _ in told} == {1, 2}
+    assert told[-1] == (2, 1.0)

@@ -94,7 +94,7 @@ def _left(folder: Path) -> str:
         return "while a file was written"
     n_chunks = len(list((folder / GROUP).glob("*/c.*")))
     n_arrays = len(list((folder / GROUP).glob("*/zarr.json")))
-    n_markers = len(list((folder / MARKERS).glob("*.marker")))
+    n_markers = len(list((folder / MARKERS).glob("[0-9]*.marker")))
     if not n_chunks:
         return "before a block was there"
     return "between blocks" if n_chunks == n_arrays * n_markers else "between a block's files"

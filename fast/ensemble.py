@@ -19,6 +19,7 @@ import numpy.typing as npt
 from fast.compiled import LARGEST
 from fast.given import (
     MAX_CYCLES,
+    MAX_FIRST,
     MAX_PARTICLES,
     check_kept,
     given_energy,
@@ -159,6 +160,7 @@ def simulate(
     energy: float,
     n_cycles: int = 1,
     seed: int = 0,
+    first: int = 0,
     threads: int | None = None,
     phases: Sequence[float] = (),
     progress: Callable[[int], None] | None = None,
@@ -171,6 +173,8 @@ def simulate(
         energy: initial energy E = v^2 / 2 of every particle [length^2 / time^2], > 0.
         n_cycles: cycles to follow, 1 to 10^6.
         seed: 0 <= seed < 2^64.
+        first: number of the first particle, 0 to 2^62. Particle i starts the same in every run of the seed:
+            blocks that begin at 0, n, 2 n hold the particles of one run at once, to the bit.
         threads: how many to use, by default one for each core.
         phases: (P,) fractions of each cycle at which energies are wanted, rising, in (0, 1).
         progress: called with the number of particles done so far, again and again: first with 0, when all
@@ -185,6 +189,7 @@ def simulate(
     n_particles = check_count("n_particles", n_particles, 1, MAX_PARTICLES)
     n_cycles = check_count("n_cycles", n_cycles, 1, MAX_CYCLES)
     seed = check_count("seed", seed, 0, 2**64 - 1)
+    first = check_count("first", first, 0, MAX_FIRST)
     energy, phases = given_energy(energy), given_phases(phases)
     threads, progress = given_threads(threads), given_progress(progress)
     fitted = fit(scene)
@@ -202,7 +207,7 @@ def simulate(
         raise BadInput(
             f"energy = {energy}: the speed must be at least 2^-400 beside the table's size and period"
         )
-    start = initial_states(scene, n_particles, 0.5 * speed2, seed)
+    start = initial_states(scene, n_particles, 0.5 * speed2, seed, first)
     free = np.full(n_particles, codes.NO_WALL)
     done, seconds = follow(laws_in_lanes(scene), start, free, stops, threads, progress)
     return _ensemble(energy, done, seconds, units, (n_particles, n_cycles, len(phases) + 1), threads)

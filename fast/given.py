@@ -19,6 +19,7 @@ from scene.refusal import BadInput, check_count, check_number, shown
 
 MAX_STEPS = 10**7  # collisions of one trajectory, kept in memory: half a gigabyte
 MAX_PARTICLES = 10**8
+MAX_FIRST = 2**62  # number of a first particle: what is added to it stays a 64-bit integer
 MAX_CYCLES = 10**6
 MAX_KEPT = 10**9  # energies and times of capture that an ensemble keeps: eight gigabytes
 LARGEST_ENERGY = 2.0**800

@@ -21,14 +21,14 @@ from scene.laws import bounds
 from scene.tables import laws, period
 
 
-def initial_states(scene: Scene, n_particles: int, energy: float, seed: int) -> FloatArray:
+def initial_states(scene: Scene, n_particles: int, energy: float, seed: int, first: int = 0) -> FloatArray:
     """Draw states uniform in area and direction when the cycle begins, all of one energy.
 
     Returns:
-        (N, 6) array: t, its low part 0, x, y, vx, vy.
+        (N, 6) array: t, its low part 0, x, y, vx, vy of particles `first` to `first` + N - 1.
     """
     # One Philox block gives four numbers, and four is what a particle needs.
-    raw = np.random.Philox(key=seed).random_raw(4 * n_particles).reshape(n_particles, 4)
+    raw = np.random.Philox(key=seed, counter=first).random_raw(4 * n_particles).reshape(n_particles, 4)
     u = (raw >> np.uint64(11)) * 2.0**-53
     start = start_time(scene)
     x, y = _uniform_in_area(scene, start, u[:, 0], u[:, 1], u[:, 2])

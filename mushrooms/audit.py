@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -12,7 +13,7 @@ from rich import progress
 
 from mushrooms import output
 from mushrooms.terminal import compilation_told, progress_bar
-from scene.files import write_files
+from scene.files import locked, write_files
 from scene.refusal import BadInput, check_seed
 
 
@@ -21,7 +22,9 @@ def audit(
     full: Annotated[
         bool, typer.Option("--full", help="The paper's sizes; half an hour on two cores.")
     ] = False,
-    only: Annotated[str, typer.Option(metavar="IDS", help="Claims to check, with commas: X2,L4.")] = "",
+    only: Annotated[
+        str | None, typer.Option(metavar="IDS", help="Claims to check, with commas: X2,L4.")
+    ] = None,
     seed: Annotated[int, typer.Option(help="Seed of the random starts, 0 to 2^64 - 1.")] = 0,
     threads: Annotated[int | None, typer.Option(help="Threads; all cores by default.")] = None,
     resume: Annotated[bool, typer.Option("--resume", help="Go on with what DIR/parts holds.")] = False,
@@ -29,23 +32,30 @@ def audit(
 ) -> None:
     """Check the paper's claims; writes report.html, report.json and report.txt.
 
-    Finished parts are kept in DIR/parts, for --resume after an interruption or with other --only.
+    Finished parts are kept in DIR/parts, for --resume after an interruption or with other --only: the report
+    then has the claims of both, and never fewer than before.
     Exit code 0 when every claim has its expected verdict, 1 when one has not, 2 on bad input.
     """
     import fast
     from conformance.audit import ledger
     from conformance.audit.evidence import AuditSteppers
-    from conformance.audit.session import AuditSettings, conduct
+    from conformance.audit.session import AuditSettings, conduct, kept
     from mushrooms.reports import audit_page
 
-    entries = ledger.select(only)
+    if only is not None and not only.replace(",", " ").split():
+        raise BadInput(f"--only = {only!r}, must name a claim such as X2; all are checked without it")
+    entries = ledger.select(only or "")
     check_seed(seed, "--seed")
     if threads is not None and threads < 1:
         raise BadInput(f"--threads = {threads}, must be >= 1")
-    with output.writable_folder(out) as folder:
+    with output.writable_folder(out) as folder, locked(folder):
         settings = AuditSettings(
             "full" if full else "quick", seed, threads, folder / "parts", resume, apart=True
         )
+        if resume:
+            wanted = {entry.id for entry in entries} | kept(settings)
+            entries = tuple(entry for entry in ledger.entries() if entry.id in wanted)
+            _check_report(folder, wanted)
         with compilation_told(), progress_bar() as bar:
             result = conduct(
                 AuditSteppers(fast.simulate, fast.trajectory, fast.flow),
@@ -66,6 +76,20 @@ def audit(
         print(texts["report.txt"], end="")
         print(f"Report: {folder / 'report.html'}")
     raise typer.Exit(0 if result.is_passed else 1)
+
+
+def _check_report(folder: Path, wanted: set[str]) -> None:
+    """Refuse to replace a report by one that has fewer claims, as other settings would."""
+    try:
+        report = json.loads((folder / "report.json").read_text("utf-8"))
+        there = {finding["id"] for finding in report["findings"]}
+    except (OSError, ValueError, KeyError, TypeError):  # there is no report that could be lost
+        return
+    if there - wanted:
+        raise BadInput(
+            f"output {str(folder)!r} has a report of {len(there)} claims, size = {report.get('size')!r} and"
+            f" seed = {report.get('seed')}; {len(wanted)} are asked for: with --resume none is given up"
+        )
 
 
 def _advance(bar: progress.Progress) -> Callable[[str, int, int], None]:

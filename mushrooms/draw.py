@@ -82,8 +82,14 @@ def draw(
 ) -> None:
     """Draw the walls through the cycle, or what particles do between them; export a trajectory.
 
-    The particles are the first of `mushrooms simulate SCENE --energy E --seed S`.
+    The particles are the first of `mushrooms simulate SCENE --energy E --seed S`. Given the folder of a run
+    (simulate --out), draw its histogram of log E1/E0, with theory.
     """
+    from mushrooms.stored import draw_run, is_stored
+
+    if is_stored(scene):
+        print(draw_run(Path(scene), out))
+        return
     table = scenes.load(scene)
     _check(energy, collisions, particles, seed)
     asked = (trajectory, section, boundary_map, growth, lyapunov)

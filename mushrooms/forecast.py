@@ -34,11 +34,15 @@ class Forecast(NamedTuple):
 
     def text(self, threads: int) -> str:
         """Return the forecast as a line."""
-        size, unit = next(u for u in reversed(UNITS) if self.seconds >= 1.5 * u[0] or u is UNITS[0])
-        n = self.seconds / size
-        took = f"{n:.2g}" if n < 10 or n > 1e6 else f"{n:.0f}"
         on = f"on {threads} thread{'' if threads == 1 else 's'}"
-        return f"about {self.collisions:.2g} collisions ahead: some {took} {unit} {on}"
+        return f"about {self.collisions:.2g} collisions ahead: some {in_words(self.seconds)} {on}"
+
+
+def in_words(seconds: float) -> str:
+    """Return a duration in the unit that suits it."""
+    size, unit = next(u for u in reversed(UNITS) if seconds >= 1.5 * u[0] or u is UNITS[0])
+    n = seconds / size
+    return f"{n:.2g} {unit}" if n < 10 or n > 1e6 else f"{n:.0f} {unit}"
 
 
 def forecast(
@@ -61,6 +65,16 @@ def forecast(
     except (BadInput, ArithmeticError):  # a table at the edge of binary64 runs without a forecast
         return None
     return Forecast(collisions, collisions * pace) if LONG < collisions * pace < math.inf else None
+
+
+def expected_collisions(scene: Scene, energy: float, n_cycles: int) -> float:
+    """Return how many collisions to expect of a particle; nan at the edge of binary64."""
+    try:
+        first = _collisions_of_a_cycle(scene, energy)
+        is_growth_wanted = isinstance(scene, Mushroom) and n_cycles > 1
+        return first * (_as_first_cycles(scene, n_cycles) if is_growth_wanted else n_cycles)
+    except (BadInput, ArithmeticError):
+        return math.nan
 
 
 def _collisions_of_a_cycle(scene: Scene, energy: float) -> float:

@@ -24,6 +24,9 @@ UsageError: type[Any] = typer.BadParameter.__bases__[0]
 INTERRUPTED = 130
 MOST = Decimal(10) ** 30  # of a whole number on the command line, written with an exponent
 NOTHING_KEPT = "nothing is kept: files are written whole, at the end"
+WITHOUT_OUT = (
+    "nothing is kept; with --out a run is kept as it goes"  # with it `simulate` itself says how much
+)
 
 
 class Listed(NamedTuple):
@@ -53,7 +56,9 @@ COMMANDS = {
         "mushrooms.simulate:simulate",
         "Simulate an ensemble.",
         "moving-cap --particles 25000 --energy 1e7 --seed 1 --out run",
+        WITHOUT_OUT,
     ),
+    "export": Listed("mushrooms.stored:export", "Write a finished run as one table.", "run --to run.parquet"),
     "attack": Listed(
         "mushrooms.attack:attack",
         "Ask nasty questions, and compare the answers with a second stepper's.",
@@ -169,7 +174,7 @@ def run(arguments: list[str] | None = None) -> NoReturn:
         _refuse("not enough memory for so many particles")
     if code == INTERRUPTED:
         kept = next((COMMANDS[word].kept for word in given if word in COMMANDS), "")
-        if kept:
+        if kept and not (kept == WITHOUT_OUT and any(word.startswith("--out") for word in given)):
             print(f"{PROGRAM}: interrupted; {kept}", file=sys.stderr)
     sys.exit(code if isinstance(code, int) else 0)
 

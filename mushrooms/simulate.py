@@ -1,4 +1,4 @@
-"""`mushrooms simulate`: an ensemble on a scene, its summary, its files and its histogram."""
+"""`mushrooms simulate`: an ensemble on a scene, its summary, its run on disk and its histogram."""
 
 from __future__ import annotations
 
@@ -6,150 +6,281 @@ import json
 import math
 import os
 import sys
-from contextlib import nullcontext
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, NamedTuple
 
 import typer
 
 import scene as scenes
 from mushrooms import output
-from mushrooms.terminal import AsJson, SceneName, check_range, compilation_told, print_pairs, progress_bar
-from scene.files import write_file, write_files
+from mushrooms.terminal import AsJson, SceneName, check_range, compilation_told, print_pairs
+from scene.files import locked, write_file
 from scene.refusal import BadInput, check_seed
 
-MAX_PARTICLES = 10**8
+MOST_IN_MEMORY, MOST_ON_DISK = 10**8, 10**10
+LIMITED = 3  # exit code of a run that a limit has stopped
+FOR_STORED = "needs --out: without a folder nothing is kept to go on with"
 
+Particles = Annotated[int, typer.Option(help="Number of particles, 1 to 10^8; with --out to 10^10.")]
+Energy = Annotated[float, typer.Option(help="Initial energy v²/2 of every particle, > 0.")]
+Cycles = Annotated[int, typer.Option(help="Cycles of the walls, at least 1.")]
 Seed = Annotated[int, typer.Option(help="Seed of the random starts, 0 to 2^64 - 1.")]
-Threads = Annotated[int | None, typer.Option(help="Threads; all cores by default.")]
+Threads = Annotated[int | None, typer.Option(help="Threads; all cores by default, with --dask one a block.")]
+Out = Annotated[
+    Path | None, typer.Option(metavar="DIR", help="Folder for the run (ensemble.zarr) and summary.json.")
+]
+Resume = Annotated[
+    bool, typer.Option("--resume", help="Go on with the run in DIR, or widen it by more --particles.")
+]
+Dask = Annotated[
+    str | None, typer.Option(metavar="ADDRESS", help="Dask scheduler whose workers follow the particles.")
+]
+BlockSize = Annotated[
+    int | None, typer.Option("--block", help="Particles kept at a time; by default seconds' work.")
+]
+MostCollisions = Annotated[int | None, typer.Option(help="Stop when a particle makes more collisions.")]
+MostSeconds = Annotated[float | None, typer.Option(help="Stop after so long; --resume goes on.")]
+Plot = Annotated[
+    Path | None,
+    typer.Option(metavar="FILE", help="Histogram of log E1/E0 after one cycle (.svg, .png), with theory."),
+]
 
 
 def simulate(
     scene: SceneName,
-    particles: Annotated[int, typer.Option(help="Number of particles, 1 to 10^8.")],
-    energy: Annotated[float, typer.Option(help="Initial energy v²/2 of every particle, > 0.")],
-    cycles: Annotated[int, typer.Option(help="Cycles of the walls, at least 1.")] = 1,
+    particles: Particles,
+    energy: Energy,
+    cycles: Cycles = 1,
     seed: Seed = 0,
-    out: Annotated[
-        Path | None, typer.Option(metavar="DIR", help="Folder for ensemble.npz and summary.json.")
-    ] = None,
-    plot: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FILE", help="Histogram of log E1/E0 after one cycle (.svg, .png), with theory."
-        ),
-    ] = None,
+    out: Out = None,
+    resume: Resume = False,
+    dask: Dask = None,
+    block: BlockSize = None,
+    max_collisions: MostCollisions = None,
+    max_seconds: MostSeconds = None,
+    plot: Plot = None,
     threads: Threads = None,
     as_json: AsJson = False,
-) -> None:
+) -> int:
     """Simulate an ensemble; undecided particles are counted, never guessed.
 
     Prints particles, collisions, lost (not followed to the end), undecided (those of the lost
     that the stepper could not decide), careful (collisions found by the careful step, some fifty times
-    slower), m1 (mean of log E/E0 per cycle) with its standard error, p_nc (share of cycles without
-    capture), ns_per_collision (and thread) and the SHA-256 of the result.
+    slower), m1 (mean of log E/E0 per cycle) with its standard error, p_nc (share of cycles without capture),
+    what theory says of both, how many standard errors they are off (z), ns_per_collision and the SHA-256.
     Particles that no cycle ever frees from the island count neither in m1 nor in p_nc.
 
-    On stderr: before a run of over 20 s about how many collisions and how long; after a run of over a
-    second that careful steps took over a tenth of it, if they did.
-    """
-    _check_ensemble(particles, energy, cycles, seed, threads)
-    if plot is not None:
-        if cycles != 1:
-            raise BadInput(f"--cycles = {cycles}, must be 1 for --plot")
-        check_range("--particles", particles, 2)
-        output.check_file(plot, (".svg", ".png"))
-    table = scenes.load(scene)
-    with output.writable_folder(out) if out else nullcontext() as folder:
-        import numpy as np
+    With --out particles are kept block by block: whatever ends a run, --resume goes on with it, to the same
+    bits. Exit code 0; 3 when a limit has stopped it, 130 when it was interrupted: both say how to go on.
 
-        asked = {"n_particles": particles, "energy": energy, "n_cycles": cycles, "seed": seed}
-        ensemble = _simulated(table, table.name or scene, threads, **asked)
-        summary = _summary(table, ensemble, cycles)
-        if folder is not None:
-            fields = {k: v for k, v in ensemble._asdict().items() if k not in ("seconds", "threads")}
-            text = json.dumps(
-                {"scene": scenes.to_data(table), "energy": energy, "cycles": cycles, "seed": seed} | summary
-            )
-            write_files(
-                folder, {"ensemble.npz": lambda file: np.savez(file, **fields), "summary.json": text + "\n"}
-            )
+    On stderr: before a run of over 20 s about how many collisions and how long; after one of over a second
+    that careful steps took over a tenth of it, if they did.
+    """
+    _check_ensemble(energy, cycles, seed, threads)
+    kept = {"resume": resume, "dask": dask, "max_collisions": max_collisions, "max_seconds": max_seconds}
+    _check_stored(out, particles, block, **kept)
+    _check_plot(plot, particles, cycles)
+    from mushrooms.store.asked import Asked
+
+    asked = Asked(scenes.load(scene), energy, cycles, seed)
+    wish = Wish(scene, asked, particles, threads, dask, block, max_collisions, max_seconds)
+    if out is None:
+        summary, first = _in_memory(wish)
+    else:
+        with output.writable_folder(out) as folder, locked(folder):
+            found = _on_disk(wish, folder, resume)
+            if found is None:
+                return LIMITED
+            summary, first = found
     print_pairs(summary, as_json)
     if plot is not None:
-        _plot(plot, table, table.name or scene, ensemble)
+        draw_histogram(plot, wish.asked, first, wish.name)
+    return 0
 
 
-def _check_ensemble(particles: int, energy: float, cycles: int, seed: int, threads: int | None) -> None:
+class Wish(NamedTuple):
+    """What `simulate` was asked for, and with what it shall be done.
+
+    Attributes:
+        scene: as given.
+        asked: what decides the bits.
+        particles, threads, dask, block, max_collisions, max_seconds: see `simulate`.
+    """
+
+    scene: str
+    asked: Any
+    particles: int
+    threads: int | None
+    dask: str | None
+    block: int | None
+    max_collisions: int | None
+    max_seconds: float | None
+
+    @property
+    def name(self) -> str:
+        """Return the scene's name."""
+        return self.asked.scene.name or self.scene
+
+
+def _check_ensemble(energy: float, cycles: int, seed: int, threads: int | None) -> None:
     if not (math.isfinite(energy) and energy > 0):
         raise BadInput(f"--energy = {energy}, must be finite and > 0")
-    check_range("--particles", particles, 1, MAX_PARTICLES)
     check_range("--cycles", cycles, 1)
     check_seed(seed, "--seed")
     if threads is not None:
         check_range("--threads", threads, 1)
 
 
-def _plot(path: Path, table: scenes.Scene, name: str, ensemble: Any) -> None:
-    """Write the histogram of those who take part."""
-    import io
+def _check_stored(out: Path | None, particles: int, block: int | None, **options: Any) -> None:
+    """Check what only a run on disk can have."""
+    check_range("--particles", particles, 1, MOST_IN_MEMORY if out is None else MOST_ON_DISK)
+    if block is not None:
+        check_range("--block", block, 1)
+    for name, value in options.items():
+        option = f"--{name.replace('_', '-')}"
+        if out is None and value not in (None, False):
+            raise BadInput(f"{option} {FOR_STORED}")
+        if name.startswith("max") and value is not None and not value > 0:
+            raise BadInput(f"{option} = {value}, must be > 0")
 
-    import numpy as np
+
+def _check_plot(plot: Path | None, particles: int, cycles: int) -> None:
+    if plot is None:
+        return
+    if cycles != 1:
+        raise BadInput(f"--cycles = {cycles}, must be 1 for --plot")
+    check_range("--particles", particles, 2)
+    output.check_file(plot, (".svg", ".png"))
+
+
+def _in_memory(wish: Wish) -> tuple[dict[str, Any], Any]:
+    """Return the summary of a run that nobody keeps, and its histogram."""
+    from fast.given import check_kept
+    from mushrooms.store import blocks, conduct
+
+    default = conduct.block_size(wish.asked, wish.threads or os.cpu_count() or 1)
+    shape = conduct.shape_of(wish.asked, wish.particles, wish.block or default)
+    check_kept(wish.particles, wish.asked.n_cycles, 0, shape.n_narrowings)
+    run = blocks.RunInMemory(shape)
+    _complete(wish, run)
+    return _summary(wish, run), run.tally.first
+
+
+def _on_disk(wish: Wish, folder: Path, resume: bool) -> tuple[dict[str, Any], Any] | None:
+    """Bring the run in a folder to its end; return its summary and histogram, None if a limit came first."""
+    from mushrooms.store import conduct
+
+    command = wish.asked.command(wish.scene, wish.particles, folder)
+    default = conduct.block_size(wish.asked, wish.threads or os.cpu_count() or 1)
+    with compilation_told():
+        run, damaged = conduct.opened(
+            folder, wish.asked, wish.particles, wish.block, default, command, resume
+        )
+    if damaged:
+        few = ", ".join(map(str, damaged[:5])) + (" ..." if len(damaged) > 5 else "")
+        print(f"damaged or broken off: {len(damaged)} blocks ({few}), followed again", file=sys.stderr)
+    try:
+        with _told_how_to_go_on(run, command):
+            _complete(wish, run)
+    except conduct.LimitReached:
+        return None
+    summary = _summary(wish, run)
+    asked = wish.asked.to_data()
+    kept = {name: asked[name] for name in ("scene", "energy", "cycles", "seed")} | summary
+    write_file(folder / "summary.json", json.dumps(kept) + "\n")
+    return summary, run.tally.first
+
+
+@contextmanager
+def _told_how_to_go_on(run: Any, command: str) -> Iterator[None]:
+    """Say on stderr what is kept of a run that ends early, and which command goes on with it."""
+    from mushrooms.store.conduct import LimitReached
+
+    def how() -> str:
+        n = run.tally.particles
+        return f"{n:,} of {run.shape.n_particles:,} particles are kept; go on with: {command}"
+
+    try:
+        yield
+    except LimitReached as limit:
+        print(f"{limit}: {how()}", file=sys.stderr)
+        raise
+    except KeyboardInterrupt:
+        if run.tally.particles:
+            print(f"interrupted: {how()}", file=sys.stderr)
+        raise
+    except OSError as error:
+        raise BadInput(f"output {str(run.folder)!r}: {error.strerror or error}: {how()}") from None
+
+
+def draw_histogram(path: Path, asked: Any, first: Any, name: str) -> None:
+    """Write the histogram of log E1 / E0 of those who take part.
+
+    Raises:
+        BadInput: they are too few.
+    """
+    import io
 
     from mushrooms.figures import energies, style
 
-    gain = np.log(ensemble.energy[ensemble.takes_part()] / ensemble.energy0)
-    if len(gain) < 2:
-        raise BadInput(f"--plot: {len(gain)} particles were followed to the end, must be at least 2")
-    title = f"{name}, E0 = {ensemble.energy0:.0e}, {len(gain):,} particles"
+    n = int(first.counts.sum())
+    if n < 2:
+        raise BadInput(f"histogram: {n} particles were followed to the end, must be at least 2")
+    title = f"{name}, E0 = {asked.energy:.0e}, {n:,} particles"
     file = io.BytesIO()
-    style.save(energies.histogram(table, ensemble.energy0, gain, title), file, path.suffix)
+    figure = energies.histogram(asked.scene, asked.energy, first.middles, title, first.counts)
+    style.save(figure, file, path.suffix)
     write_file(path, file.getvalue())
 
 
-def _simulated(table: scenes.Scene, name: str, threads: int | None, **asked: Any) -> Any:
-    """Return the ensemble; stderr says what to expect of a long run, and which steps slowed it."""
-    import fast
+def _complete(wish: Wish, run: Any) -> None:
+    """Follow what a run lacks; stderr says what to expect of a long one, and which steps slowed it."""
     from mushrooms.forecast import careful_note, forecast
+    from mushrooms.store import conduct, engines
+    from mushrooms.store.watch import Watch
 
-    with compilation_told(), progress_bar() as bar:
-        task = bar.add_task(name, total=asked["n_particles"])
+    asked, before = wish.asked, run.tally
+    n_threads = wish.threads or os.cpu_count() or 1
+    seconds = run.seconds
+    is_told = wish.dask is not None  # of how fast a cluster is nothing is known here
+    engine = engines.by_dask(wish.dask, wish.threads) if wish.dask else engines.in_process(wish.threads)
+    limits = conduct.RunLimits(wish.max_collisions, wish.max_seconds)
 
-        def advance(n_done: int) -> None:
-            if n_done == 0:  # what was asked for has been accepted, and the stepper compiled
-                n_threads = threads or os.cpu_count() or 1
-                ahead = forecast(table, threads=n_threads, **asked)
+    with compilation_told(), Watch(wish.name, wish.particles, before) as watch:
+
+        def tick(n_done: int) -> None:
+            nonlocal is_told
+            if not is_told:  # what was asked for has been accepted, and the stepper compiled
+                is_told = True
+                n = wish.particles - before.particles
+                known = {"energy": asked.energy, "n_cycles": asked.n_cycles, "seed": asked.seed}
+                ahead = forecast(asked.scene, n_particles=n, threads=n_threads, **known)
                 if ahead is not None:
                     print(ahead.text(n_threads), file=sys.stderr, flush=True)
-            bar.update(task, completed=n_done)
+            watch.tick(n_done)
 
-        ensemble = fast.simulate(table, threads=threads, progress=advance, **asked)
-    n_careful, n_collisions = int(ensemble.n_careful.sum()), int(ensemble.n_collisions.sum())
-    note = careful_note(n_careful, n_collisions, ensemble.seconds)
+        conduct.complete(run, asked, engine, limits, tick, watch.kept)
+    n_careful = run.tally.careful - before.careful
+    seconds = (run.seconds - seconds) / n_threads
+    note = careful_note(n_careful, run.tally.collisions - before.collisions, seconds)
     if note is not None:
         print(note, file=sys.stderr)
-    return ensemble
 
 
-def _summary(table: scenes.Scene, ensemble: Any, n_cycles: int) -> dict[str, Any]:
-    import numpy as np
+def _summary(wish: Wish, run: Any) -> dict[str, Any]:
+    from mushrooms.compared import measured
+    from mushrooms.store.digest import sha256
 
-    n_followed = int((ensemble.outcome == 0).sum())
-    gain = np.log(ensemble.energy[ensemble.takes_part()] / ensemble.energy0) / n_cycles
-    n = len(gain)
-    has_island = isinstance(table, scenes.Mushroom)
+    tally = run.tally
     return {
-        "particles": len(ensemble.energy),
-        "collisions": int(ensemble.n_collisions.sum()),
-        "lost": len(ensemble.energy) - n_followed,
-        "undecided": int((ensemble.outcome == 1).sum()),
-        "careful": int(ensemble.n_careful.sum()),
-        "m1": _finite(gain.mean()) if n else None,
-        "m1_se": _finite(gain.std(ddof=1) / math.sqrt(n)) if n > 1 else None,
-        "p_nc": float(ensemble.p_nc().mean()) if n and has_island else None,
-        "ns_per_collision": _finite(ensemble.ns_per_collision()),
-        "sha256": ensemble.sha256(),
+        "particles": tally.particles,
+        "collisions": tally.collisions,
+        "lost": tally.particles - tally.followed,
+        "undecided": tally.undecided,
+        "careful": tally.careful,
+        **measured(wish.asked, tally),
+        "ns_per_collision": run.seconds / max(tally.collisions, 1) * 1e9,
+        "sha256": sha256(run),
     }
-
-
-def _finite(value: float) -> float | None:
-    return float(value) if math.isfinite(value) else None

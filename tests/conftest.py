@@ -37,6 +37,7 @@ LONGEST = [
     "test_conformance_attacks.py",
     "test_theory_prediction.py",
     "test_mushrooms_audit.py",
+    "test_mushrooms_scale.py",
     "test_conformance_suite.py",
     "test_reference_mutants.py",
     "test_docs.py",

@@ -9,7 +9,7 @@ import pytest
 from mpmath import fp
 
 from conformance.audit.frozen import MEASURED, SEED, lag, measured, passages
-from scene import Mushroom, load
+from scene import BangBang, Mushroom, load
 from scene.geometry import table_at
 from theory.rates import PHASES, SPEEDS, Rates, frozen_rates
 
@@ -94,3 +94,13 @@ def test_a_faster_particle_lags_less_in_time() -> None:
     ]
     assert lags[0] < lags[1] < 0  # the stem's sides close in: the captured have missed kicks
     assert math.isfinite(sum(lags))
+
+
+def test_a_mouth_that_comes_to_rest_wide_open_has_fewer_passages_and_they_end() -> None:
+    """A phase's cell that reaches over the knot where nu = 1 begins to rest: its rim would turn for ever."""
+    opening = BangBang(((0.0, 0.5), (0.4964, 1.0), (0.7, 1.0), (1.0, 0.5)))
+    scene = Mushroom(r=1.0, h=1.0, w=opening, slope=0.1)
+    t = float(PHASES[31])
+    found = passages(scene, table_at(fp, scene, t), t, 2500.0, 40, np.random.default_rng(1))
+    assert 0 < len(found.states) < 40
+    assert np.isfinite(found.path).all()

@@ -198,6 +198,13 @@ def test_what_must_be_refused_is_asked_of_all():
     assert asked[0]["scene"] == vector.scene
 
 
+@pytest.mark.parametrize("level", vectors.LEVELS)
+def test_properties_are_drawn_from_steps_that_can_be_read_at_every_level(level):
+    steps = suite._steps_to_draw_from(INTRODUCTION, vectors.load(level))
+    assert len(steps) > 100
+    assert len(disguise.drawn_states(steps, 3, 50)) == 50
+
+
 def test_the_reference_passes(monkeypatch):
     offered = [v for v in vectors.load("core") if v.kind != "flow"]
     known = [v for v in offered if v.expect[0].steps and v.group != "hard-case-14"][::100]

@@ -8,7 +8,7 @@ from scipy import stats
 
 import fast
 from fast.starts import cycle_stops, initial_states
-from scene import State, load
+from scene import BadInput, State, load
 
 
 def test_more_particles_keep_the_first_ones():
@@ -17,6 +17,30 @@ def test_more_particles_keep_the_first_ones():
     assert np.array_equal(few.cycle_energies, many.cycle_energies[:20])
     other = fast.simulate(load("fixed-cap-clockwise"), n_particles=20, energy=1e4, seed=2)
     assert not np.array_equal(few.energy, other.energy)
+
+
+@pytest.mark.parametrize("name", ["moving-cap", "breathing-circle", "fermi-ulam"])
+def test_particles_start_alike_in_every_block(name):
+    """Whatever block a particle is drawn in, the first and the last of all among them."""
+    scene, random = load(name), np.random.default_rng(5)
+    whole = initial_states(scene, 5000, 50.0, 9)
+    for first in [0, 1, 4999, *random.integers(0, 5000, 20).tolist()]:
+        n = int(random.integers(1, 5001 - first))
+        assert np.array_equal(initial_states(scene, n, 50.0, 9, first), whole[first : first + n])
+    last = 2**62
+    assert np.array_equal(
+        initial_states(scene, 4, 50.0, 9, last)[3:], initial_states(scene, 1, 50.0, 9, last + 3)
+    )
+
+
+def test_blocks_are_parts_of_the_whole():
+    whole = fast.simulate(load("moving-cap"), n_particles=90, energy=1e3, n_cycles=2, seed=4)
+    for first, n in ((0, 1), (1, 88), (37, 53)):
+        part = fast.simulate(load("moving-cap"), n_particles=n, energy=1e3, n_cycles=2, seed=4, first=first)
+        for got, wanted in zip(part[1:-2], whole[1:-2], strict=True):
+            assert np.array_equal(got, wanted[first : first + n], equal_nan=True)
+    with pytest.raises(BadInput, match="first = -1, must be 0 to"):
+        fast.simulate(load("moving-cap"), n_particles=1, energy=1e3, first=-1)
 
 
 def test_cycles_continue_one_another():

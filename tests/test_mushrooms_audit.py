@@ -10,8 +10,10 @@ from html.parser import HTMLParser
 from pathlib import Path
 
 import jsonschema
+import numpy as np
 import pytest
 from support import adiabatic_particles
+from support.refusals import assert_refused
 
 import fast
 from conformance.audit import ledger, session
@@ -20,6 +22,7 @@ from conformance.audit.finding import Check, Finding
 from conformance.audit.session import AuditResult, AuditSettings
 from mushrooms.figures import by_claim
 from mushrooms.reports import audit_page
+from scene.files import locked
 
 SCHEMA = Path(__file__).parent.parent / "docs" / "report.schema.json"
 CHEAP = "M3,M10,X5,N6"
@@ -171,6 +174,47 @@ def test_other_settings_or_broken_files_are_not_taken_up(call, tmp_path, blocks)
         path.write_bytes(path.read_bytes()[:100])
     assert call("--only", "X5", "--out", tmp_path, "--resume", "--seed", 1).code == 0
     assert len(blocks) == 12
+
+
+def test_resumed_with_other_claims_a_report_has_both(call, tmp_path, blocks):
+    """Never fewer: what other settings would leave out is not given up."""
+    for ids, wanted in (("X5,M3", "M3,X5"), ("M10", "M3,M10,X5"), ("M3", "M3,M10,X5")):
+        done = call("--only", ids, "--out", tmp_path, "--resume", "--json")
+        assert done.code == 0
+        assert [finding["id"] for finding in json.loads(done.out)["findings"]] == wanted.split(",")
+    assert len(blocks) == 4
+    before = (tmp_path / "report.json").read_bytes()
+    for more in (["--seed", 1], ["--full"]):
+        done = call("--only", "M3", "--out", tmp_path, "--resume", *more)
+        assert_refused(done, "a report of 3 claims", "seed = 0; 1 are asked for")
+    assert (tmp_path / "report.json").read_bytes() == before
+
+
+@pytest.mark.parametrize("only", ["", " ", ",,"])
+def test_no_claim_at_all_is_refused(call, tmp_path, only):
+    assert_refused(call("--only", only, "--out", tmp_path / "a"), "--only = ", "must name a claim")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_one_audit_or_run_holds_a_folder(call, command_line, tmp_path):
+    with locked(tmp_path):
+        assert_refused(call("--only", "M3", "--out", tmp_path), "one run at a time")
+    simulate = ["simulate", "fermi-ulam", "--particles", 1, "--energy", 1, "--out", tmp_path]
+    with locked(tmp_path):
+        assert_refused(command_line(*simulate), "one run at a time")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_part_with_a_flipped_bit_is_not_taken_up(call, tmp_path, blocks):
+    """Wherever it is: in numbers, names or a finding's text."""
+    call("--only", "X5", "--out", tmp_path)
+    random = np.random.default_rng(4)
+    for path in sorted((tmp_path / "parts").iterdir()):
+        content = bytearray(path.read_bytes())
+        content[random.integers(len(content))] ^= 1 << int(random.integers(8))
+        path.write_bytes(content)
+    assert call("--only", "X5", "--out", tmp_path, "--resume").code == 0
+    assert len(blocks) == 8
 
 
 def test_without_resume_everything_is_made_again(call, tmp_path, blocks):

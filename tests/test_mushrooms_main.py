@@ -56,8 +56,8 @@ def test_a_broken_scene_is_refused(call, tmp_path, command, kind):
 
 # Of `simulate`, and what the refusal says beside them.
 BAD_NUMBERS = [
-    ("--particles", "0", "1 to 100000000"),
-    ("--particles", "100000001", "1 to 100000000"),
+    ("--particles", "0", "1 to 10000000000"),
+    ("--particles", "10000000001", "1 to 10000000000"),
     ("--energy", "-1", "> 0"),
     ("--energy", "0", "> 0"),
     ("--energy", "nan", "finite"),
@@ -85,6 +85,7 @@ SIMULATE = ["simulate", "moving-cap", "--particles", "5", "--energy", "100", "--
         (["theory", "moving-cap", "--digits", "1001"], ["--digits = 1001", "1 to 1000"]),
         (["theory", "moving-cap", "--digits", "many"], ["--digits"]),
         (["simulate", "moving-cap", "--energy", "1"], ["--particles"]),
+        ([*SIMULATE[:-2], "--particles", "100000001"], ["--particles = 100000001", "1 to 100000000"]),
         (["audit", "--only", "X2,X99"], ["X99", "M1", "L7"]),
         (["audit", "--seed", "-1"], ["--seed = -1", "0 to 18446744073709551615"]),
         (["audit", "--threads", "0"], ["--threads = 0"]),
@@ -200,15 +201,17 @@ def test_simulate_prints_and_saves_the_same_result(call, tmp_path):
     assert (code, err) == (0, "")
     summary = json.loads(out)
     assert list(summary) == [
-        "particles", "collisions", "lost", "undecided", "careful", "m1", "m1_se", "p_nc", "ns_per_collision",
-        "sha256",
+        "particles", "collisions", "lost", "undecided", "careful", "m1", "m1_se", "m1_theory", "m1_z", "p_nc",
+        "p_nc_theory", "p_nc_z", "ns_per_collision", "sha256",
     ]  # fmt: skip
-    assert sorted(entry.name for entry in (tmp_path / "run").iterdir()) == ["ensemble.npz", "summary.json"]
+    names = ["blocks", "ensemble.zarr", "summary.json"]
+    assert sorted(entry.name for entry in (tmp_path / "run").iterdir()) == names
     saved = json.loads((tmp_path / "run" / "summary.json").read_text())
     assert saved.items() >= summary.items()
     assert saved["seed"] == 7
     assert scenes.from_data(saved["scene"]) == scenes.load("moving-cap")
-    with np.load(tmp_path / "run" / "ensemble.npz") as arrays:
+    assert call("export", tmp_path / "run", "--to", tmp_path / "ensemble.npz").code == 0
+    with np.load(tmp_path / "ensemble.npz") as arrays:
         assert arrays["energy"].shape == (40,)
         assert np.log(arrays["energy"] / arrays["energy0"]).mean() == pytest.approx(summary["m1"], rel=1e-12)
         assert arrays["n_collisions"].sum() == summary["collisions"]

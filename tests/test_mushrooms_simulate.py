@@ -133,7 +133,7 @@ def test_a_refused_run_has_no_forecast(command_line):
 def test_careful_steps_are_told_of_where_they_took_the_time(
     command_line, monkeypatch, seconds, per_thousand, said
 ):
-    run = fast.simulate(load("moving-cap"), n_particles=40, energy=1e4)
+    run = fast.simulate(load("moving-cap"), n_particles=40, energy=1e4, threads=1)
     n_careful = np.array([run.n_collisions.sum() * per_thousand // 1000])
     run = run._replace(seconds=seconds, n_careful=n_careful)
     monkeypatch.setattr(fast, "simulate", lambda *_args, **_options: run)

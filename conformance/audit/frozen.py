@@ -134,6 +134,10 @@ def passages(
     cell = np.linspace(-0.5, 0.5, 9)
     tables = [table_at(fp, scene, t + x * cycle_length(scene) / N_PHASES) for x in cell]
     sigma = np.interp(random.uniform(-0.5, 0.5, n), cell, [float(one.w / one.r) for one in tables])
+    sigma = sigma[
+        sigma < 1.0
+    ]  # where the mouth rests wide open there is no island, and the rim does not turn
+    n = len(sigma)
     widening = abs(now.w_rate * now.r - now.w * now.r_rate) / now.r**2 / speed
     half, turn = np.sqrt(1 - sigma**2), 2 * np.arccos(sigma)
     alpha = random.uniform(0, 2 * math.pi, n)

@@ -1,25 +1,24 @@
 """Samples: what a run's particles did, followed in blocks that outlive an interruption.
 
-Every block is saved as soon as it is followed. A saved block is used again only if it was made from the
-same scene, energy, seed and number of particles.
+Every block is saved as soon as it is followed, sealed by a checksum. A saved block is used again only if no
+bit of it has changed, and it was made from the same scene, energy, seed and number of particles.
 """
 
 from __future__ import annotations
 
 import hashlib
+import io
 import json
-import zipfile
 from collections.abc import Callable
-from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, BinaryIO, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 import scene as scenes
 from conformance.audit.runs import Simulation, Size, block_seed, scene_of
-from scene.files import write_file
+from scene.files import sealed, unsealed, write_file
 
 if TYPE_CHECKING:
     from fast import Ensemble
@@ -141,8 +140,7 @@ def draw(
         if block is None:
             block = _follow(simulate, run, n, block_seed(seed, run, number), threads)
             if path:
-                content = {"key": np.array(key), **block}
-                write_file(path, partial(_write_block, content=content))
+                write_file(path, _packed({"key": np.array(key), **block}))
         blocks.append(block)
         if progress:
             progress(run.name, first + n, total)
@@ -203,16 +201,18 @@ def gathered(run: Simulation, blocks: list[Arrays]) -> Sample:
     return Sample(run, **arrays, **dict(zip(COUNTS, counts, strict=True)), seconds=seconds, sha256=digest)
 
 
-def _write_block(file: BinaryIO, content: Arrays) -> None:
+def _packed(content: Arrays) -> bytes:
+    file = io.BytesIO()
     np.savez_compressed(file, **content)  # type: ignore[arg-type]  # its other argument is no array
+    return sealed(file.getvalue())
 
 
 def _load(path: Path, key: str) -> Arrays | None:
     """Return a saved block; None when there is none, it is broken or was made from something else."""
-    try:
-        with path.open("rb") as file, np.load(file, allow_pickle=False) as saved:
-            if str(saved["key"]) != key:
-                return None
-            return {name: saved[name] for name in saved.files if name != "key"}
-    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
+    content = unsealed(path)
+    if content is None:
         return None
+    with np.load(io.BytesIO(content), allow_pickle=False) as saved:
+        if str(saved["key"]) != key:
+            return None
+        return {name: saved[name] for name in saved.files if name != "key"}

@@ -23,7 +23,7 @@ from conformance.audit.evidence import AuditSteppers, ClaimEvidence, Predict
 from conformance.audit.finding import Entry, Finding, from_data, to_data, verdict_of
 from conformance.audit.runs import RUNS, Size
 from conformance.audit.samples import Progress, Sample, draw
-from scene.files import write_file
+from scene.files import sealed, unsealed, write_file
 from scene.refusal import check_seed
 
 
@@ -128,6 +128,11 @@ def conduct(
     return AuditResult(settings, tuple(entries), ordered, samples, time.perf_counter() - begin)
 
 
+def kept(settings: AuditSettings) -> set[str]:
+    """Return the ids of the entries whose findings are taken up."""
+    return {entry.id for entry in ledger.entries() if _load(entry, settings) is not None}
+
+
 def examine(
     entry: Entry,
     samples: dict[str, Sample],
@@ -176,17 +181,19 @@ def _key(entry: Entry, settings: AuditSettings) -> str:
 
 
 def _load(entry: Entry, settings: AuditSettings) -> Finding | None:
-    if not (settings.folder and settings.resume):
+    content = unsealed(settings.folder / _file(entry)) if settings.folder and settings.resume else None
+    if content is None:
         return None
-    try:
-        data = json.loads((settings.folder / f"{entry.id}.json").read_text("utf-8"))
-        return from_data(data["finding"]) if data["key"] == _key(entry, settings) else None
-    except (OSError, ValueError, KeyError, TypeError):
-        return None
+    data = json.loads(content)
+    return from_data(data["finding"]) if data["key"] == _key(entry, settings) else None
+
+
+def _file(entry: Entry) -> str:
+    return f"{entry.id}.finding"
 
 
 def _save(finding: Finding, settings: AuditSettings) -> None:
     if settings.folder:
         entry = ledger.select(finding.id)[0]
         content = json.dumps({"key": _key(entry, settings), "finding": to_data(finding)})
-        write_file(settings.folder / f"{finding.id}.json", content)
+        write_file(settings.folder / _file(entry), sealed(content.encode()))

@@ -38,7 +38,7 @@ from conformance.suite.disguise import (
 from conformance.suite.process import NOT_NUMBERS, Trouble
 from conformance.suite.result import Result, Run, Speed, outcomes_of
 from conformance.suite.scope import graded_parts
-from conformance.suite.session import Limits, Session, missing
+from conformance.suite.session import Introduction, Limits, Session, missing
 from conformance.vectors import Vector
 from scene import BadInput, State, load, to_data
 from scene.refusal import check_seed
@@ -266,15 +266,21 @@ def _ask_nonsense(session: Session) -> None:
 
 def _ask_further(session: Session, chosen: Sequence[Vector], level: str, seed: int) -> Iterator[Result]:
     assert session.introduction is not None
-    offered = [v for v in chosen if not missing(session.introduction, "step", v.scene)]
-    steps = [v for v in offered if v.kind == "step" and v.level == "core"]
-    questions = drawn_states(steps, seed, N_STATES)
+    questions = drawn_states(_steps_to_draw_from(session.introduction, chosen), seed, N_STATES)
     for name, verdict, why, seconds in property_checks.ask_properties(session, questions):
         yield Result(f"property/{name}", "property", verdict, why, seconds)
     for name, verdict, why, seconds in property_checks.ask_profiles(session, level, seed):
         yield Result(f"profile/{name}", "profile", verdict, why, seconds)
     for name, verdict, why, seconds in promises.ask_promises(session):
         yield Result(f"promise/{name}", "promise", verdict, why, seconds)
+
+
+def _steps_to_draw_from(introduction: Introduction, chosen: Sequence[Vector]) -> list[Vector]:
+    """Return core steps that can be asked; what must be refused is left out: its scene may not be read."""
+    steps = (
+        v for v in chosen if v.kind == "step" and v.level == "core" and v.expect[0].outcome != "rejected"
+    )
+    return [v for v in steps if not missing(introduction, "step", v.scene)]
 
 
 def _result(vector: Vector, trouble: Trouble, seconds: float = 0.0) -> Result:

@@ -21,7 +21,7 @@ SLOW = ("ergodic@1e4x200", "moving-cap-trivial@1e4x200")
 BOUNDED = ("breathing-circle", "moving-cap", "fixed-cap-clockwise")
 N_HITS, ROUNDING = 3000, 1e-12
 MOVING = 0.06  # half the moving cap's growth rate of log E in a cycle: that of its speeds
-N_SPEEDS = 7
+N_SPEEDS = 4
 STARTS = ((0.3, 0.4, 0.3), (-0.5, 0.2, 1.1), (0.1, 0.6, 2.0), (0.0, 0.3, 2.9))  # x, y, direction
 
 

@@ -1,0 +1,92 @@
+"""Theory beside what a run has measured: m1 and p_nc, and how far off they are in standard errors."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+from mushrooms.store.asked import Asked
+from mushrooms.store.tally import RunTally
+from scene import Mushroom
+from scene.refusal import BadInput
+
+DIGITS = 10  # of the adiabatic theory: a run knows six at most
+
+
+class Theory(NamedTuple):
+    """What theory says of a run.
+
+    Attributes:
+        m1, p_nc: predicted.
+        m1_left_out, p_nc_left_out: the size of what that leaves out; None where nobody knows.
+    """
+
+    m1: float
+    p_nc: float
+    m1_left_out: float | None = None
+    p_nc_left_out: float | None = None
+
+
+def measured(asked: Asked, tally: RunTally) -> dict[str, Any]:
+    """Return m1 and p_nc as measured, as predicted, and the difference in errors of both (z).
+
+    The prediction is that at the run's energy where rates of the scene's frozen tables are known. Elsewhere
+    it is the limit of high energies, and without z: what that leaves out is not known. None is what nobody
+    knows.
+    """
+    n, k = tally.gain.n, asked.n_cycles
+    mean, error = (None if x is None else x / k for x in (tally.gain.mean, tally.gain.standard_error))
+    has_island = isinstance(asked.scene, Mushroom)
+    free = 1.0 - tally.captured / (n * k) if n and has_island else None
+    found = _predicted(asked)
+    pulls: tuple[float | None, float | None] = (None, None)
+    if found is not None and n:
+        spread = math.sqrt(max(0.0, found.p_nc * (1.0 - found.p_nc)) / (n * k))
+        pulls = (
+            _pull(mean, found.m1, error, found.m1_left_out),
+            _pull(free, found.p_nc, spread, found.p_nc_left_out),
+        )
+    return {
+        "m1": mean,
+        "m1_se": error,
+        "m1_theory": found.m1 if found else None,
+        "m1_z": pulls[0],
+        "p_nc": free,
+        "p_nc_theory": found.p_nc if found else None,
+        "p_nc_z": pulls[1],
+    }
+
+
+def _pull(found: float | None, wanted: float, error: float | None, left_out: float | None) -> float | None:
+    if found is None or error is None or left_out is None or not (error or left_out):
+        return None
+    return round((found - wanted) / math.hypot(error, left_out), 3)
+
+
+def _predicted(asked: Asked) -> Theory | None:
+    """Return what theory says of a run; None where it covers nothing.
+
+    What finite energy adds to a cycle goes as E^(-1/2) with the energy at which the cycle begins. Cycles are
+    independent, so its mean falls by the mean of exp(-s / 2) each.
+    """
+    import theory
+
+    if not isinstance(asked.scene, Mushroom):
+        return None
+    try:
+        limit = theory.predict(asked.scene, DIGITS)
+        m1, p_nc = float(limit.m1), float(limit.p_nc)
+    except (BadInput, theory.NotCovered, theory.NotConverged):
+        return None
+    try:
+        there = theory.at_energy(asked.scene, asked.energy)
+        slower, left = there.mean_of_exp(-0.5), there.next_order
+    except (BadInput, theory.NotCovered, theory.NotConverged):
+        return Theory(m1, p_nc)
+    share = math.fsum(slower**k for k in range(asked.n_cycles)) / asked.n_cycles
+    return Theory(
+        m1 + share * (there.mean_s - m1),
+        p_nc + share * (there.p_nc - p_nc),
+        share * left.mean_s,
+        share * left.p_nc,
+    )

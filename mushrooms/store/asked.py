@@ -1,0 +1,96 @@
+"""What a run is asked for: that which decides its bits, and how two runs differ."""
+
+from __future__ import annotations
+
+import json
+import platform
+import shlex
+import subprocess
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numba
+import numpy as np
+
+import mushrooms
+import scene as scenes
+from scene import Scene
+
+SCHEMA = 1  # of a stored run: raised when its files change, so that older ones are refused
+
+
+class Asked(NamedTuple):
+    """What decides every bit of a particle; its number does the rest.
+
+    Attributes:
+        scene: table and laws.
+        energy: E = v^2 / 2 of every start [length^2 / time^2].
+        n_cycles: cycles followed.
+        seed: of the starts.
+    """
+
+    scene: Scene
+    energy: float
+    n_cycles: int
+    seed: int
+
+    def to_data(self) -> dict[str, Any]:
+        """Return what a store keeps of this, as JSON can hold it."""
+        return {
+            "schema": SCHEMA,
+            "version": mushrooms.__version__,
+            "scene": json.loads(json.dumps(scenes.to_data(self.scene))),  # lists, as they are read back
+            "energy": self.energy,
+            "cycles": self.n_cycles,
+            "seed": self.seed,
+        }
+
+    def command(self, scene: str, n_particles: int, folder: Path) -> str:
+        """Return the command that makes this run, or goes on with it."""
+        options: dict[str, object] = {"particles": n_particles, "energy": self.energy}
+        options |= {"cycles": self.n_cycles, "seed": self.seed, "out": folder}
+        words = [str(word) for name, value in options.items() for word in (f"--{name}", value)]
+        return shlex.join(["mushrooms", "simulate", scene, *words, "--resume"])
+
+
+def asked_of(data: dict[str, Any]) -> Asked:
+    """Return what a store says it was asked for."""
+    return Asked(scenes.from_data(data["scene"]), data["energy"], data["cycles"], data["seed"])
+
+
+def difference(stored: dict[str, Any], wanted: dict[str, Any]) -> str | None:
+    """Return the first thing in which a stored run is not the one wanted, both values named; None if none."""
+    for name, value in wanted.items():
+        found = stored.get(name)
+        if found == value:
+            continue
+        if isinstance(found, dict) and isinstance(value, dict):  # the scene: its first part that differs
+            part = next(key for key in {**found, **value} if found.get(key) != value.get(key))
+            return f"{name}: {part} = {found.get(part)!r} there, {value.get(part)!r} asked for"
+        return f"{name} = {found!r} there, {value!r} asked for"
+    return None
+
+
+def made_by() -> dict[str, Any]:
+    """Return what a result may owe its bits to: versions, and the revision of a source tree."""
+    return {
+        "versions": {
+            "oscillating-mushrooms": mushrooms.__version__,
+            "python": platform.python_version(),
+            "numpy": np.__version__,
+            "numba": numba.__version__,
+            "machine": platform.machine(),
+        },
+        "revision": _revision(),
+    }
+
+
+def _revision() -> str | None:
+    """Return the commit of the source tree that runs, `+` where files differ from it; None outside of one."""
+    here = Path(__file__).parent
+    try:
+        command = ["git", "describe", "--always", "--abbrev=40", "--dirty=+", "--exclude=*"]
+        done = subprocess.run(command, cwd=here, capture_output=True, text=True, timeout=20, check=False)
+    except (OSError, subprocess.TimeoutExpired):
+        return None
+    return done.stdout.strip() or None

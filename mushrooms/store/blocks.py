@@ -1,0 +1,301 @@
+"""A run's blocks, in a folder or in memory: written whole, read with their checksums, found after a fault.
+
+A block is there when its marker is: a small sealed file, written after the block's chunks are on the disk,
+that holds their SHA-256 and the block's tally. What has no marker, or is not what its marker says, is
+followed anew. So it does not matter when a process ends, nor what a disk does to a file.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+
+from mushrooms.store.asked import Asked, asked_of, made_by
+from mushrooms.store.layout import Array, Arrays, Shape, from_chunk, metadata, to_chunk
+from mushrooms.store.tally import RunTally, tally_from
+from scene.files import sealed, unsealed, write_file, write_files
+from scene.refusal import BadInput
+
+GROUP, MARKERS = "ensemble.zarr", "blocks"
+DESCRIPTION = "run.marker"  # among the markers: the group's attributes once more, sealed
+
+
+class Piece(NamedTuple):
+    """Particles that are to be followed: a block, or what a block lacks.
+
+    Attributes:
+        number: of the block.
+        first: number of the first particle.
+        n: how many.
+    """
+
+    number: int
+    first: int
+    n: int
+
+
+class Block(NamedTuple):
+    """What became of the particles of a block, or of a part of one.
+
+    Attributes:
+        arrays: as stored.
+        tally: of them.
+        seconds: kernel time x threads [s].
+    """
+
+    arrays: Arrays
+    tally: RunTally
+    seconds: float
+
+    def joined(self, rest: Block) -> Block:
+        """Return this block with more particles behind its own."""
+        arrays = {name: np.concatenate([array, rest.arrays[name]]) for name, array in self.arrays.items()}
+        return Block(arrays, self.tally.merged(rest.tally), self.seconds + rest.seconds)
+
+
+class AnyRun(Protocol):
+    """Where blocks are kept."""
+
+    shape: Shape
+    tally: RunTally
+    seconds: float
+
+    def missing(self) -> Iterator[Piece]:
+        """Yield what is still to be followed."""
+
+    def keep(self, piece: Piece, block: Block) -> None:
+        """Keep what was followed."""
+
+    def read(self, number: int, name: str) -> Array:
+        """Return one array of a block."""
+
+
+class RunInMemory:
+    """A run that is kept nowhere else; see `AnyRun`."""
+
+    def __init__(self, shape: Shape) -> None:
+        self.shape, self.tally, self.seconds = shape, RunTally(), 0.0
+        self._blocks: dict[int, Arrays] = {}
+
+    def missing(self) -> Iterator[Piece]:
+        """Yield what is still to be followed."""
+        for number in range(self.shape.n_blocks):
+            yield Piece(number, number * self.shape.block, self.shape.rows(number))
+
+    def keep(self, piece: Piece, block: Block) -> None:
+        """Keep what was followed."""
+        self._blocks[piece.number] = block.arrays
+        self.tally, self.seconds = self.tally.merged(block.tally), self.seconds + block.seconds
+
+    def read(self, number: int, name: str) -> Array:
+        """Return one array of a block."""
+        return self._blocks[number][name]
+
+
+class Marker(NamedTuple):
+    """What says that a block is there.
+
+    Attributes:
+        rows: how many particles it holds.
+        sums: SHA-256 of each chunk.
+        tally, seconds: see `Block`.
+    """
+
+    rows: int
+    sums: dict[str, str]
+    tally: RunTally
+    seconds: float
+
+
+class RunFolder:
+    """A run in a folder; see `AnyRun`. Whoever writes must hold the folder (`scene.files.locked`).
+
+    Attributes:
+        folder: holds GROUP, which xarray reads, and MARKERS.
+        asked: what decides its bits.
+        shape: its sizes.
+        command: how it is made.
+        tally, seconds: of the blocks that are there, once `check` has looked.
+    """
+
+    def __init__(self, folder: Path, asked: Asked, shape: Shape, command: str) -> None:
+        self.folder, self.asked, self.shape, self.command = folder, asked, shape, command
+        self.tally, self.seconds = RunTally(), 0.0
+        self._rows: dict[int, int] = {}  # particles that are there, by block
+        self._is_described = False
+        # A marker of another run, left in the folder by whoever moved files, is none of this one.
+        identity = json.dumps(asked.to_data() | {"block": shape.block}, sort_keys=True)
+        self._identity = hashlib.sha256(identity.encode()).hexdigest()
+
+    def missing(self) -> Iterator[Piece]:
+        """Yield what is still to be followed."""
+        for number in range(self.shape.n_blocks):
+            there = self._rows.get(number, 0)
+            if there < self.shape.rows(number):
+                yield Piece(number, number * self.shape.block + there, self.shape.rows(number) - there)
+
+    def is_there(self, number: int) -> bool:
+        """Tell whether a block, or a part of it, is there."""
+        return number in self._rows
+
+    def check(self) -> list[int]:
+        """Look at every block, count those that are as they were written, and return the damaged ones."""
+        damaged = []
+        self._rows, self.tally, self.seconds = {}, RunTally(), 0.0
+        for path in self.folder.rglob(".*.part"):  # what a process was writing when it ended
+            path.unlink(missing_ok=True)
+        for number in range(self.shape.n_blocks):
+            marker = self._marker(number)
+            if marker is not None and all(self._chunk(number, name, marker) for name in self.shape.names):
+                self._count(number, marker.rows, marker.tally, marker.seconds)
+            elif self._path(number).exists():
+                damaged.append(number)
+        return damaged
+
+    def keep(self, piece: Piece, block: Block) -> None:
+        """Write a block: first its chunks, then its marker.
+
+        Raises:
+            OSError: it could not be written; the run is as it was without it.
+        """
+        if not self._is_described:
+            self.describe()
+        there, marker = self._rows.get(piece.number, 0), self._marker(piece.number)
+        whole = block
+        if there and marker is not None:  # the run was widened: the block gets more particles
+            old = {name: self.read(piece.number, name) for name in self.shape.names}
+            whole = Block(old, marker.tally, marker.seconds).joined(block)
+        chunks = {name: to_chunk(whole.arrays[name], self.shape.block) for name in self.shape.names}
+        paths = {self.shape.chunk(name, piece.number): content for name, content in chunks.items()}
+        write_files(self.folder / GROUP, paths)
+        marker_data = {
+            "run": self._identity,
+            "number": piece.number,
+            "rows": there + piece.n,
+            "sums": {name: hashlib.sha256(content).hexdigest() for name, content in chunks.items()},
+            "tally": whole.tally.to_data(),
+            "seconds": whole.seconds,
+        }
+        write_file(self._path(piece.number), sealed(json.dumps(marker_data).encode()))
+        self._count(piece.number, there + piece.n, block.tally, block.seconds)
+
+    def describe(self) -> None:
+        """Write what the group's arrays are, and what the run was asked for."""
+        (self.folder / MARKERS).mkdir(exist_ok=True)
+        for name in self.shape.names:
+            (self.folder / GROUP / name).mkdir(parents=True, exist_ok=True)
+        sizes = {"particles": self.shape.n_particles, "block": self.shape.block}
+        attributes = self.asked.to_data() | sizes | {"command": self.command} | made_by()
+        write_file(self.folder / MARKERS / DESCRIPTION, sealed(json.dumps(attributes).encode()))
+        write_files(self.folder / GROUP, metadata(self.shape, attributes))
+        self._is_described = True
+
+    def read(self, number: int, name: str) -> Array:
+        """Return one array of a block.
+
+        Raises:
+            BadInput: it is not there, or not as it was written.
+        """
+        marker = self._marker(number)
+        content = None if marker is None else self._chunk(number, name, marker)
+        if marker is None or content is None:
+            path = self.folder / GROUP / self.shape.chunk(name, number)
+            raise BadInput(f"{str(path)!r} is missing or damaged: mushrooms simulate --resume mends it")
+        return from_chunk(content, self.shape, name, marker.rows)
+
+    def load(self) -> None:
+        """Count the blocks by their markers alone: what is read later is checked then.
+
+        Raises:
+            BadInput: particles are missing.
+        """
+        for number in range(self.shape.n_blocks):
+            marker = self._marker(number)
+            if marker is not None:
+                self._count(number, marker.rows, marker.tally, marker.seconds)
+        if any(self.missing()):
+            there, n = self.tally.particles, self.shape.n_particles
+            raise BadInput(
+                f"run {str(self.folder)!r} has {there} of {n} particles: go on with {self.command}"
+            )
+
+    def _count(self, number: int, rows: int, tally: RunTally, seconds: float) -> None:
+        self._rows[number] = rows
+        self.tally, self.seconds = self.tally.merged(tally), self.seconds + seconds
+
+    def _path(self, number: int) -> Path:
+        return self.folder / MARKERS / f"{number}.marker"
+
+    def _marker(self, number: int) -> Marker | None:
+        content = unsealed(self._path(number))
+        if content is None:
+            return None
+        data = json.loads(content)
+        is_ours = data.get("run") == self._identity and data["number"] == number
+        if not is_ours or data["rows"] > self.shape.rows(number):
+            return None
+        return Marker(data["rows"], data["sums"], tally_from(data["tally"]), data["seconds"])
+
+    def _chunk(self, number: int, name: str, marker: Marker) -> bytes | None:
+        try:
+            content = (self.folder / GROUP / self.shape.chunk(name, number)).read_bytes()
+        except OSError:
+            return None
+        return content if hashlib.sha256(content).hexdigest() == marker.sums[name] else None
+
+
+def is_run(folder: Path) -> bool:
+    """Tell whether a folder holds a run, damaged or not."""
+    return (folder / MARKERS / DESCRIPTION).is_file() or (folder / GROUP / "zarr.json").is_file()
+
+
+def attributes_of(folder: Path) -> dict[str, Any]:
+    """Return what a stored run says of itself: what is sealed, or where that is damaged what xarray reads.
+
+    Raises:
+        BadInput: the folder holds no run, or both are damaged.
+    """
+    path = folder / GROUP / "zarr.json"
+    why = "its description is damaged"
+    try:
+        described = [unsealed(folder / MARKERS / DESCRIPTION), path.read_bytes()]
+    except OSError as error:
+        described, why = [unsealed(folder / MARKERS / DESCRIPTION)], error.strerror or str(error)
+    for content in described:
+        try:
+            found = json.loads(content or b"")
+            found = found.get("attributes", found)
+            if isinstance(found["schema"], int):
+                return dict(found)
+        except (ValueError, KeyError, TypeError, AttributeError):
+            continue
+    raise BadInput(f"run {str(folder)!r}: {path.name}: {why}")
+
+
+def open_run(folder: Path) -> RunFolder:
+    """Return a finished run, to be read.
+
+    Raises:
+        BadInput: the folder holds none, one of another schema, or one that is not finished.
+    """
+    from fast.narrowings import narrowings
+    from mushrooms.store.asked import SCHEMA
+
+    found = attributes_of(folder)
+    if found["schema"] != SCHEMA:
+        raise BadInput(f"run {str(folder)!r}: schema = {found['schema']} there, {SCHEMA} is read here")
+    asked = asked_of(found)
+    n_narrowings = len(narrowings(asked.scene))
+    run = RunFolder(
+        folder,
+        asked,
+        Shape(found["particles"], found["block"], asked.n_cycles, n_narrowings),
+        found["command"],
+    )
+    run.load()
+    return run

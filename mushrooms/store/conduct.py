@@ -1,0 +1,171 @@
+"""A run, from what there is of it to its end: what was asked for, what is there, limits, and what is missing.
+
+No decision rests on the time of day: limits and rates are read from a clock that only goes forwards.
+"""
+
+from __future__ import annotations
+
+import math
+import shutil
+import time
+from collections.abc import Callable
+from contextlib import closing
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from fast.narrowings import narrowings
+from mushrooms.forecast import expected_collisions
+from mushrooms.store.asked import Asked, difference
+from mushrooms.store.blocks import AnyRun, Block, Piece, RunFolder, attributes_of, is_run
+from mushrooms.store.engines import Engine, Tick, follow
+from mushrooms.store.layout import Shape
+from scene.refusal import BadInput
+
+BLOCK_COLLISIONS = 2e8  # of a block, some seconds: what a fault can cost, and long beside a block's files
+LEAST_BLOCK, MOST_BLOCK = 256, 2**17  # particles: a thread's lanes are full, and memory stays small
+BLOCK_BYTES = 2**26  # on disk; in memory several times that
+LANES_OF_A_THREAD = 128  # particles that a thread needs to be quick
+MOST_BLOCKS = 10**6
+PROBED = 4  # particles followed again before a run is gone on with
+MARKER_BYTES = 2**16  # of a block's files beside its chunks, at most
+CLOCK = time.monotonic
+
+
+class RunLimits(NamedTuple):
+    """Where a run stops although it is not at its end; None for no limit.
+
+    Attributes:
+        collisions: of a particle.
+        seconds: on the clock, from the command's begin.
+    """
+
+    collisions: int | None = None
+    seconds: float | None = None
+
+
+class LimitReached(Exception):  # noqa: N818 (nothing is wrong: the run goes on with --resume)
+    """A run stopped at a limit, in a state from which it goes on; the limit in a line."""
+
+
+def block_size(asked: Asked, threads: int) -> int:
+    """Return how many particles a block has, a power of two: it takes seconds, and fits into memory."""
+    each = expected_collisions(asked.scene, asked.energy, asked.n_cycles)
+    least = max(LEAST_BLOCK, LANES_OF_A_THREAD * threads)
+    wanted = BLOCK_COLLISIONS / max(each, 1.0) if math.isfinite(each) else LEAST_BLOCK
+    most = min(MOST_BLOCK, BLOCK_BYTES // shape_of(asked, 1, 1).bytes_of_a_particle)
+    return int(2 ** math.floor(math.log2(max(1, min(max(wanted, least), most)))))
+
+
+def shape_of(asked: Asked, n_particles: int, block: int) -> Shape:
+    """Return the sizes of a run.
+
+    Raises:
+        BadInput: it would have more blocks than a folder can hold well.
+    """
+    if n_particles > MOST_BLOCKS * block:
+        least = -(-n_particles // MOST_BLOCKS)
+        raise BadInput(f"--block = {block}: {n_particles} particles need blocks of at least {least}")
+    return Shape(n_particles, block, asked.n_cycles, len(narrowings(asked.scene)))
+
+
+def opened(
+    folder: Path, asked: Asked, n_particles: int, block: int | None, default: int, command: str, resume: bool
+) -> tuple[RunFolder, list[int]]:
+    """Return the run of a folder, new or gone on with, and the numbers of the blocks found damaged.
+
+    Args:
+        folder: held by the caller.
+        asked: for the run.
+        n_particles: as many as there are, or more: then it is widened.
+        block: particles of a block; None for what is there, or `default`.
+        default: for a new run.
+        command: that makes it.
+        resume: whether a run that is there may be gone on with.
+
+    Raises:
+        BadInput: the folder has another run, or this one and `resume` was not asked for; it is of another
+            version or its numbers do not come out here; the disk is too small.
+    """
+    if not is_run(folder):
+        run = RunFolder(folder, asked, shape_of(asked, n_particles, block or default), command)
+        run.check()
+        _check_disk(run)
+        return run, []
+    found = attributes_of(folder)
+    wanted = asked.to_data() | ({} if block is None else {"block": block})
+    other = difference(found, wanted)
+    if other is None and found["particles"] > n_particles:
+        other = f"particles = {found['particles']} there, {n_particles} asked for: a run only grows"
+    if other is not None:
+        raise BadInput(f"output {str(folder)!r} holds another run: {other}")
+    if not resume:
+        raise BadInput(f"output {str(folder)!r} holds this run: --resume goes on with it")
+    run = RunFolder(folder, asked, shape_of(asked, n_particles, found["block"]), command)
+    damaged = run.check()
+    _probe(run)
+    _check_disk(run)
+    run.describe()
+    return run, damaged
+
+
+def complete(
+    run: AnyRun, asked: Asked, engine: Engine, limits: RunLimits, tick: Tick, kept: Callable[[Block], None]
+) -> None:
+    """Follow what is missing, and keep it block by block.
+
+    Args:
+        run: to be completed.
+        asked: what it was asked for.
+        engine: that follows.
+        limits: at which to stop.
+        tick: told of the particles done in the block under way.
+        kept: told of every block that is kept.
+
+    Raises:
+        LimitReached: a limit; what was kept stays.
+        OSError: a block could not be written.
+    """
+    begin = CLOCK()
+
+    def looked(n_done: int) -> None:
+        tick(n_done)
+        if limits.seconds is not None and CLOCK() - begin > limits.seconds:
+            raise LimitReached(f"--max-seconds = {limits.seconds:g} have passed")
+
+    with closing(engine(asked, run.missing(), looked)) as found:
+        for piece, block in found:
+            if limits.collisions is not None and block.tally.most > limits.collisions:
+                raise LimitReached(
+                    f"a particle of block {piece.number} makes {block.tally.most} collisions,"
+                    f" --max-collisions = {limits.collisions}"
+                )
+            run.keep(piece, block)
+            kept(block)
+
+
+def _probe(run: RunFolder) -> None:
+    """Refuse to go on where the particles that are there would come out otherwise."""
+    there = next((n for n in range(run.shape.n_blocks) if run.is_there(n)), None)
+    if there is None:
+        return
+    n = min(PROBED, run.shape.rows(there))
+    again = follow(run.asked, Piece(there, there * run.shape.block, n), None)
+    for name in run.shape.names:
+        stored = run.read(there, name)[:n]
+        if not np.array_equal(stored, again.arrays[name][: len(stored)], equal_nan=stored.dtype.kind == "f"):
+            made = attributes_of(run.folder)["versions"]
+            raise BadInput(
+                f"output {str(run.folder)!r}: {name} of its first particles comes out otherwise here; it was"
+                f" made by {made}"
+            )
+
+
+def _check_disk(run: RunFolder) -> None:
+    needed = sum(piece.n * run.shape.bytes_of_a_particle + MARKER_BYTES for piece in run.missing())
+    free = shutil.disk_usage(run.folder).free
+    if needed > free:
+        raise BadInput(
+            f"output {str(run.folder)!r}: {needed / 1e9:.3g} GB to be written, {free / 1e9:.3g} GB are free"
+        )

@@ -1,0 +1,137 @@
+"""Engines: what follows the blocks of a run, in this process or on the workers of a Dask cluster.
+
+An engine is handed pieces and yields blocks, in any order. Every particle's bits depend on its number alone,
+so that it does not matter which engine, machine or block followed it, nor how often it was tried.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator, Iterator
+from itertools import islice
+from typing import Any
+
+import fast
+import mushrooms
+from mushrooms.store.asked import Asked, asked_of
+from mushrooms.store.blocks import Block, Piece
+from mushrooms.store.layout import columns
+from mushrooms.store.tally import tally_of
+from scene.refusal import BadInput
+
+# Told of the particles done in the piece under way, again and again; what it raises ends the engine.
+Tick = Callable[[int], None]
+Following = Generator[tuple[Piece, Block], None, None]
+Engine = Callable[[Asked, Iterator[Piece], Tick], Following]
+SCALE = "pip install 'oscillating-mushrooms[scale]'"
+RETRIES = 10  # of a block whose workers fail or die
+AHEAD = 2  # blocks waiting for each thread of the cluster: no worker idles, and few blocks are in memory
+PATIENCE = 10.0  # seconds in which a scheduler must answer
+LOOK = 0.5  # seconds after which limits are looked at while no block comes
+
+
+def follow(asked: Asked, piece: Piece, threads: int | None, tick: Tick | None = None) -> Block:
+    """Follow the particles of a piece.
+
+    Raises:
+        BadInput: as `fast.simulate`.
+    """
+    ensemble = fast.simulate(
+        asked.scene,
+        n_particles=piece.n,
+        energy=asked.energy,
+        n_cycles=asked.n_cycles,
+        seed=asked.seed,
+        first=piece.first,
+        threads=threads,
+        progress=tick,
+    )
+    return Block(columns(ensemble), tally_of(ensemble), ensemble.seconds * ensemble.threads)
+
+
+def in_process(threads: int | None) -> Engine:
+    """Return the engine that follows one block after another with all threads."""
+
+    def engine(asked: Asked, pieces: Iterator[Piece], tick: Tick) -> Following:
+        for piece in pieces:
+            yield piece, follow(asked, piece, threads, tick)
+
+    return engine
+
+
+def follow_elsewhere(data: dict[str, Any], piece: tuple[int, int, int], threads: int) -> Block:
+    """Follow a piece on a worker, which must be of the version that asks.
+
+    Raises:
+        BadInput: it is of another.
+    """
+    if data["version"] != mushrooms.__version__:
+        raise BadInput(f"a worker has version {mushrooms.__version__}, must be {data['version']}")
+    return follow(asked_of(data), Piece(*piece), threads)
+
+
+def by_dask(address: str, threads: int | None) -> Engine:
+    """Return the engine that hands blocks to the workers of a Dask scheduler.
+
+    Args:
+        address: of the scheduler, as tcp://host:8786.
+        threads: for each block; 1 by default, as a worker has as many blocks at a time as it has threads.
+
+    Raises:
+        BadInput: dask.distributed is not installed, or no scheduler answers.
+    """
+    try:
+        from distributed import Client
+    except ImportError:
+        raise BadInput(f"--dask needs dask.distributed: {SCALE}") from None
+
+    def engine(asked: Asked, pieces: Iterator[Piece], tick: Tick) -> Following:
+        try:
+            client = Client(address, timeout=PATIENCE)
+        except (OSError, ValueError) as error:
+            raise BadInput(f"--dask = {address}: no scheduler answers ({type(error).__name__})") from None
+        with client:
+            yield from _handed_out(client, asked, pieces, tick, threads or 1)
+
+    return engine
+
+
+def _handed_out(client: Any, asked: Asked, pieces: Iterator[Piece], tick: Tick, threads: int) -> Following:
+    """Keep every worker busy, and yield what comes back; what is still out is dropped at the end."""
+    from distributed import KilledWorker, wait
+
+    data, out, n_killed = asked.to_data(), {}, dict[Piece, int]()
+
+    def submit(piece: Piece) -> None:
+        future = client.submit(
+            follow_elsewhere, data, tuple(piece), threads, pure=False, retries=RETRIES, priority=-piece.number
+        )
+        out[future] = piece
+
+    try:
+        while True:
+            n_wanted = max(1, AHEAD * sum(client.nthreads().values())) - len(out)
+            for piece in islice(pieces, max(0, n_wanted)):
+                submit(piece)
+            if not out:
+                return
+            tick(0)
+            try:
+                done = wait(list(out), timeout=LOOK, return_when="FIRST_COMPLETED").done
+            except TimeoutError:
+                continue
+            for future in done:
+                piece = out.pop(future)
+                try:
+                    block = future.result()
+                except KilledWorker:
+                    # So many workers died with it that the scheduler gave it up; it may not be its fault.
+                    n_killed[piece] = n_killed.get(piece, 0) + 1
+                    if n_killed[piece] > RETRIES:
+                        raise BadInput(
+                            f"--dask: workers die of block {piece.number} again and again"
+                        ) from None
+                    submit(piece)
+                    continue
+                yield piece, block
+    finally:
+        client.cancel(list(out))

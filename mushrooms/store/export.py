@@ -1,0 +1,112 @@
+"""A run as one file: Parquet, CSV or npz, written block by block, with the same bits.
+
+Tables have a row a particle; what a particle has for each cycle, narrowing or wall stands in columns of its
+own, counted from 1, or named by the wall: energy_1, t_in_1_1, collisions_arc.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import zipfile
+from collections.abc import Callable, Iterator
+from itertools import product
+from pathlib import Path
+from typing import Any, BinaryIO
+
+import numpy as np
+
+from mushrooms.store.blocks import RunFolder
+from mushrooms.store.digest import DIGESTED, part
+from mushrooms.store.engines import SCALE
+from mushrooms.store.layout import FIELDS, WALLS, Arrays
+from scene.refusal import BadInput
+
+MAX_COLUMNS = 10_000
+
+
+def write_csv(run: RunFolder, file: BinaryIO) -> None:
+    """Write a table whose numbers read back to the same bits."""
+    text = io.TextIOWrapper(file, encoding="utf-8", newline="")
+    writer = csv.writer(text)
+    for number, columns in enumerate(_tables(run)):
+        if number == 0:
+            writer.writerow(columns)
+        writer.writerows(zip(*(column.tolist() for column in columns.values()), strict=True))
+    text.flush()
+    text.detach()
+
+
+def write_parquet(run: RunFolder, file: BinaryIO) -> None:
+    """Write a Parquet file, a row group a block.
+
+    Raises:
+        BadInput: pyarrow is not installed.
+    """
+    try:
+        import pyarrow
+        from pyarrow import parquet
+    except ImportError:
+        raise BadInput(f"--to a .parquet file needs pyarrow: {SCALE}") from None
+    writer = None
+    for columns in _tables(run):
+        table = pyarrow.table(columns)
+        if writer is None:
+            writer = parquet.ParquetWriter(file, table.schema)
+        writer.write_table(table)
+    if writer is not None:
+        writer.close()
+
+
+def write_npz(run: RunFolder, file: BinaryIO) -> None:
+    """Write the fields of `fast.Ensemble` (times left out) as numpy reads them."""
+    with zipfile.ZipFile(file, "w") as archive:
+        with archive.open("energy0.npy", "w") as member:
+            np.lib.format.write_array(member, np.array(run.asked.energy))
+        for source in DIGESTED:
+            head = part(run, 0, source)
+            if head is None:
+                continue
+            with archive.open(f"{source}.npy", "w", force_zip64=True) as member:
+                shape = (run.shape.n_particles, *head.shape[1:])
+                kind = np.lib.format.dtype_to_descr(head.dtype)
+                header = {"descr": kind, "fortran_order": False, "shape": shape}
+                np.lib.format.write_array_header_1_0(member, header)
+                for number in range(run.shape.n_blocks):
+                    array = part(run, number, source)
+                    if array is not None:
+                        member.write(np.ascontiguousarray(array).tobytes())
+
+
+WRITERS: dict[str, Callable[[RunFolder, BinaryIO], None]] = {
+    ".parquet": write_parquet,
+    ".csv": write_csv,
+    ".npz": write_npz,
+}
+
+
+def export(run: RunFolder, path: Path, file: BinaryIO) -> None:
+    """Write a run into an open file, in the form that the path's ending names.
+
+    Raises:
+        BadInput: a block is damaged, a table would have too many columns, or a package is missing.
+    """
+    WRITERS[path.suffix](run, file)
+
+
+def _tables(run: RunFolder) -> Iterator[Arrays]:
+    """Yield each block as columns by their names."""
+    shape = run.shape
+    n_columns = sum(int(np.prod(shape.of(name, 1))) for name in shape.names)
+    if n_columns > MAX_COLUMNS:
+        raise BadInput(f"a table of {n_columns} columns, must be at most {MAX_COLUMNS}: read it with xarray")
+    for number in range(shape.n_blocks):
+        first = number * shape.block
+        columns: Arrays = {"particle": np.arange(first, first + shape.rows(number))}
+        for name in shape.names:
+            array = run.read(number, name)
+            for place in product(*map(range, array.shape[1:])):
+                words = [WALLS[i] if FIELDS[name].dims[-1] == "wall" else str(i + 1) for i in place]
+                at: Any = (slice(None), *place)
+                columns["_".join([name, *words])] = array[at]
+        yield columns

@@ -1,0 +1,49 @@
+"""Commands on stored runs: `mushrooms export`, and the histogram of `mushrooms draw DIR`."""
+
+from __future__ import annotations
+
+from functools import partial
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from mushrooms import output
+from scene.files import write_file
+
+PLOTS = (".svg", ".png")
+
+
+def export(
+    run: Annotated[Path, typer.Argument(metavar="DIR", help="What `simulate --out` has written.")],
+    to: Annotated[Path, typer.Option(metavar="FILE", help="A .parquet, .csv or .npz file.")],
+) -> None:
+    """Write a finished run as one table, a row a particle; an .npz holds the arrays of `fast.Ensemble`.
+
+    The run is read block by block and checked on the way: a damaged one is refused.
+    """
+    from mushrooms.store import export as forms
+    from mushrooms.store.blocks import open_run
+
+    output.check_file(to, tuple(forms.WRITERS))
+    write_file(to, partial(forms.export, open_run(run), to))
+    print(to)
+
+
+def is_stored(name: str) -> bool:
+    """Tell whether what `draw` is given is the folder of a run."""
+    from mushrooms.store.blocks import is_run
+
+    return is_run(Path(name))
+
+
+def draw_run(folder: Path, out: Path | None) -> Path:
+    """Draw the histogram of log E1 / E0 of a stored run, with theory; return the file's path."""
+    from mushrooms.simulate import draw_histogram
+    from mushrooms.store.blocks import open_run
+
+    path = out or Path(f"{folder.resolve().name}.svg")
+    output.check_file(path, PLOTS)
+    run = open_run(folder)
+    draw_histogram(path, run.asked, run.tally.first, run.asked.scene.name or "a scene")
+    return path

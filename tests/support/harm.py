@@ -1,0 +1,17 @@
+"""What a disk, a person or a bad day may do to a file of a stored run."""
+
+from __future__ import annotations
+
+
+def harmed(folder, random):
+    """Do something bad to a random file of a run: a chunk, a marker, a description of an array."""
+    paths = sorted(path for path in folder.rglob("*") if path.is_file())
+    path, kind = paths[random.integers(len(paths))], random.integers(4)
+    if kind == 0:
+        path.unlink()
+        return
+    content = path.read_bytes()
+    at = int(random.integers(len(content)))
+    flip = content[:at] + bytes([content[at] ^ 1 << int(random.integers(8))]) + content[at + 1 :]
+    other = paths[random.integers(len(paths))].read_bytes()
+    path.write_bytes([content[:at], flip, other][kind - 1])

@@ -1,0 +1,175 @@
+"""Many machines and other programs: workers that die, xarray, tables, a run killed, a package missing."""
+
+from __future__ import annotations
+
+import csv
+import json
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import distributed
+import numpy as np
+import pytest
+from support.refusals import assert_refused
+
+import fast
+from mushrooms.main import run
+from mushrooms.store import blocks, engines
+from scene import load
+
+DOCS = Path(__file__).parent.parent / "docs"
+N, ENERGY, SEED = 300, 60.0, 5
+RUN = ["simulate", "moving-cap", "--particles", N, "--energy", ENERGY, "--seed", SEED, "--json"]
+
+
+@pytest.fixture(scope="module")
+def ensemble():
+    return fast.simulate(load("moving-cap"), n_particles=N, energy=ENERGY, seed=SEED)
+
+
+@pytest.fixture(scope="module")
+def stored(tmp_path_factory):
+    """Return the folder of a run."""
+    folder = tmp_path_factory.mktemp("stored") / "run"
+    with pytest.raises(SystemExit, match="0"):
+        run([*map(str, RUN), "--out", str(folder), "--block", "64"])
+    return folder
+
+
+def cluster(n_workers, processes):
+    return distributed.LocalCluster(
+        n_workers=n_workers,
+        threads_per_worker=1,
+        processes=processes,
+        dashboard_address=None,
+        worker_dashboard_address=None,
+        scheduler_port=0,
+    )
+
+
+@pytest.mark.parametrize("n_workers", [1, 2, 4])
+def test_workers_of_a_cluster_follow_to_the_same_bits(command_line, tmp_path, ensemble, n_workers):
+    with cluster(n_workers, processes=False) as there:
+        address = there.scheduler_address
+        ended = command_line(*RUN, "--out", tmp_path, "--block", 32, "--dask", address)
+    assert ended.code == 0, ended.err
+    assert json.loads(ended.out)["sha256"] == ensemble.sha256()
+
+
+def test_workers_may_die(command_line, tmp_path, ensemble, monkeypatch):
+    """One is killed, in the middle of a block most likely; another takes its place."""
+    keep, killed = blocks.RunFolder.keep, []
+
+    with cluster(2, processes=True) as there:
+        pids = [worker.process.pid for worker in there.workers.values()]
+
+        def then_killed(self, piece, block):
+            keep(self, piece, block)
+            if not killed:
+                os.kill(pids[0], 9)
+                killed.append(pids[0])
+
+        monkeypatch.setattr(blocks.RunFolder, "keep", then_killed)
+        ended = command_line(*RUN, "--out", tmp_path, "--block", 8, "--dask", there.scheduler_address)
+    assert ended.code == 0, ended.err
+    assert killed
+    assert json.loads(ended.out)["sha256"] == ensemble.sha256()
+
+
+def test_no_scheduler_is_one_line(command_line, tmp_path, monkeypatch):
+    monkeypatch.setattr(engines, "PATIENCE", 0.3)
+    for address in ("tcp://127.0.0.1:9", "nonsense://x"):
+        ended = command_line(*RUN, "--out", tmp_path, "--dask", address)
+        assert_refused(ended, f"--dask = {address}", "no scheduler")
+
+
+def test_xarray_and_zarr_read_every_bit(stored, ensemble):
+    import xarray
+    import zarr
+
+    run = xarray.open_zarr(stored / "ensemble.zarr")
+    assert dict(run.sizes) == {"particle": N, "cycle": 1, "narrowing": 1, "wall": 5}
+    wanted = {"energy": "cycle_energies", "t_in": "t_in", "collisions": "wall_counts", "outcome": "outcome"}
+    for name, source in wanted.items():
+        assert np.array_equal(run[name].values, getattr(ensemble, source), equal_nan=name != "outcome")
+    assert run.attrs["seed"] == SEED
+    assert run.attrs["scene"]["name"] == "moving-cap"
+    assert "--seed 5" in run.attrs["command"]
+    assert set(run.attrs["versions"]) >= {"oscillating-mushrooms", "numpy", "numba", "python"}
+    group = zarr.open_group(stored / "ensemble.zarr", mode="r")
+    assert {name for name, _ in group.arrays()} == set(run.data_vars)
+
+
+def test_exports_have_every_bit(command_line, stored, tmp_path, ensemble):
+    from pyarrow import parquet
+
+    for kind in ("csv", "parquet", "npz"):
+        ended = command_line("export", stored, "--to", tmp_path / f"run.{kind}")
+        assert (ended.code, ended.err) == (0, "")
+    with np.load(tmp_path / "run.npz") as arrays:
+        for name in ensemble._fields[:-2]:
+            if not name.startswith("phase_"):
+                assert arrays[name].tobytes() == np.asarray(getattr(ensemble, name)).tobytes()
+    table = parquet.read_table(tmp_path / "run.parquet")
+    with (tmp_path / "run.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert len(rows) == table.num_rows == N
+    assert list(rows[0]) == table.column_names
+    for name, wanted in (("energy_1", ensemble.energy), ("t_in_1_1", ensemble.t_in[:, 0, 0])):
+        assert table[name].to_numpy().tobytes() == wanted.tobytes()
+        assert np.array([float(row[name]) for row in rows]).tobytes() == wanted.tobytes()
+    assert [int(row["collisions_floor"]) for row in rows] == ensemble.wall_counts[:, 4].tolist()
+    assert table["particle"].to_pylist() == list(range(N))
+
+
+@pytest.mark.parametrize(
+    ("package", "command"),
+    [("distributed", [*RUN, "--dask", "tcp://here:1"]), ("pyarrow", ["export"])],
+)
+def test_a_missing_package_is_one_line(command_line, stored, tmp_path, monkeypatch, package, command):
+    monkeypatch.setitem(sys.modules, package, None)
+    more = [stored, "--to", tmp_path / "a.parquet"] if command == ["export"] else ["--out", tmp_path / "b"]
+    assert_refused(command_line(*command, *more), package, "pip install 'oscillating-mushrooms[scale]'")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_stored_run_is_drawn_as_when_it_was_made(command_line, stored, tmp_path):
+    ended = command_line("draw", stored, "--out", tmp_path / "a.svg")
+    assert (ended.code, ended.out) == (0, f"{tmp_path / 'a.svg'}\n")
+    assert command_line(*RUN, "--plot", tmp_path / "b.svg").code == 0
+    assert (tmp_path / "a.svg").read_bytes() == (tmp_path / "b.svg").read_bytes()
+    assert_refused(command_line("draw", stored, "--out", tmp_path / "a.gif"), ".svg, .png")
+
+
+def test_an_unfinished_run_is_neither_exported_nor_drawn(command_line, stored, tmp_path):
+    path = stored / "blocks" / "1.marker"
+    content = path.read_bytes()
+    path.unlink()
+    try:
+        words = [f"has {N - 64} of {N} particles", "--resume"]
+        assert_refused(command_line("export", stored, "--to", tmp_path / "a.csv"), *words)
+        assert_refused(command_line("draw", stored, "--out", tmp_path / "a.svg"), *words)
+    finally:
+        path.write_bytes(content)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_run_killed_at_random_moments_goes_on_to_the_same_bits():
+    """Two here; `python -m mushrooms.store.faults --kills 50` is the whole of it."""
+    command = [sys.executable, "-m", "mushrooms.store.faults", "--kills", "2"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert done.stdout.startswith("2 killed: ")
+
+
+def test_the_page_s_python_plots_a_histogram(stored, monkeypatch):
+    """Five lines, run where the page says, on a run that is there."""
+    text = (DOCS / "ensembles.md").read_text("utf-8")
+    (snippet,) = re.findall(r"^```python\n(.*?)^```$", text, re.MULTILINE | re.DOTALL)
+    assert sum(map(bool, snippet.splitlines())) == 5
+    monkeypatch.chdir(stored.parent)
+    exec(snippet, {})
+    assert (stored.parent / "histogram.png").stat().st_size > 5000

@@ -1,0 +1,400 @@
+"""Stored runs: the same bits whatever the blocks and whatever went wrong, and what is refused in one line."""
+
+from __future__ import annotations
+
+import ast
+import errno
+import hashlib
+import json
+import os
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from support.harm import harmed
+from support.refusals import assert_refused
+
+import fast
+import mushrooms
+from mushrooms.store import asked, blocks, conduct, digest, engines
+from scene import load
+from scene.files import LOCK, locked, sealed, unsealed
+
+ROOT = Path(__file__).parent.parent
+N, ENERGY, SEED = 330, 40.0, 7
+RUN = ["simulate", "fermi-ulam", "--energy", ENERGY, "--seed", SEED, "--threads", 1, "--json"]
+
+
+def arguments(folder, *more, n=N, block=64):
+    return [*RUN, "--particles", n, "--out", folder, *(["--block", block] if block else []), *more]
+
+
+@pytest.fixture(autouse=True)
+def _unsynced(monkeypatch):
+    """Leave files to the system's buffers: no test can cut the power, and a busy disk would take minutes."""
+    monkeypatch.setattr(os, "fsync", lambda _descriptor: None)
+
+
+@pytest.fixture(scope="module")
+def whole():
+    """Return the SHA-256 of a run at once, by its number of particles."""
+    return {n: run_at_once("fermi-ulam", n) for n in (N, 500)}
+
+
+def run_at_once(name, n, energy=ENERGY, n_cycles=1):
+    run = fast.simulate(load(name), n_particles=n, energy=energy, n_cycles=n_cycles, seed=SEED)
+    return run.sha256()
+
+
+@pytest.fixture
+def followed(monkeypatch):
+    """Return the list of pieces that are followed: first particle and how many."""
+    pieces, simulate = [], fast.simulate
+
+    def noted(scene, **options):
+        pieces.append((options["first"], options["n_particles"]))
+        return simulate(scene, **options)
+
+    monkeypatch.setattr(fast, "simulate", noted)
+    return pieces
+
+
+def digest_of(ended):
+    assert ended.code == 0, ended.err
+    return json.loads(ended.out)["sha256"]
+
+
+@pytest.mark.parametrize(
+    ("name", "energy", "n_cycles"),
+    [("fermi-ulam", 40.0, 3), ("breathing-circle", 40.0, 2), ("moving-cap", 60.0, 2)],
+)
+def test_blocks_of_any_size_have_one_digest(tmp_path, name, energy, n_cycles):
+    """In memory and on disk, in order and not, with arrays that hold nothing."""
+    scene, random = load(name), np.random.default_rng(3)
+    wish, wanted = asked.Asked(scene, energy, n_cycles, SEED), run_at_once(name, 150, energy, n_cycles)
+    tallies = set()
+    for block in (7, 150, 1000, *random.integers(2, 150, 3).tolist()):
+        shape = conduct.shape_of(wish, 150, block)
+        folder = tmp_path / str(block)
+        folder.mkdir()
+        for run in (blocks.RunInMemory(shape), blocks.RunFolder(folder, wish, shape, "")):
+            pieces = list(run.missing())
+            for i in random.permutation(len(pieces)).tolist():
+                run.keep(pieces[i], engines.follow(wish, pieces[i], 1))
+            assert digest.sha256(run) == wanted
+            tallies.add(json.dumps(run.tally.to_data()))
+    assert len(tallies) == 1
+
+
+def test_a_run_goes_on_and_is_widened_without_following_anybody_twice(
+    command_line, tmp_path, followed, whole, monkeypatch
+):
+    keep, n_kept = blocks.RunFolder.keep, 0
+
+    def interrupted(self, piece, block):
+        nonlocal n_kept
+        keep(self, piece, block)
+        n_kept += 1
+        if n_kept == 2:
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr(blocks.RunFolder, "keep", interrupted)
+    code, out, err = command_line(*arguments(tmp_path))
+    assert (code, out) == (130, "")
+    assert f"interrupted: 128 of {N} particles are kept; go on with: mushrooms simulate fermi-ulam" in err
+    assert f"--out {tmp_path} --resume" in err
+    followed.clear()
+    assert digest_of(command_line(*arguments(tmp_path, "--resume"))) == whole[N]
+    assert followed == [(0, conduct.PROBED), (128, 64), (192, 64), (256, 64), (320, 10)]
+    followed.clear()
+    wider = command_line(*arguments(tmp_path, "--resume", n=500, block=None))
+    assert digest_of(wider) == whole[500]
+    assert followed == [(0, conduct.PROBED), (330, 54), (384, 64), (448, 52)]
+    saved = json.loads((tmp_path / "summary.json").read_text())
+    assert saved.items() >= json.loads(wider.out).items()
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["blocks", "ensemble.zarr", "summary.json"]
+
+
+def truncated(content):
+    return content[: len(content) // 2]
+
+
+def flipped(content):
+    return bytes([content[0] ^ 1]) + content[1:]
+
+
+def emptied(_content):
+    return b""
+
+
+@pytest.mark.parametrize(
+    ("damage", "name"),
+    [
+        (truncated, "ensemble.zarr/t/c.2"),
+        (flipped, "ensemble.zarr/collisions/c.2.0"),
+        (emptied, "ensemble.zarr/outcome/c.2"),
+        (truncated, "blocks/2.marker"),
+        (flipped, "blocks/2.marker"),
+    ],
+)
+def test_a_damaged_file_is_found_and_its_block_followed_again(
+    command_line, tmp_path, followed, whole, damage, name
+):
+    digest_of(command_line(*arguments(tmp_path)))
+    path = tmp_path / name
+    path.write_bytes(damage(path.read_bytes()))
+    code, _, err = command_line("export", tmp_path, "--to", tmp_path / "run.npz")
+    assert (code, err.count("\n")) == (2, 1)
+    assert not (tmp_path / "run.npz").exists()
+    followed.clear()
+    again = command_line(*arguments(tmp_path, "--resume"))
+    assert digest_of(again) == whole[N]
+    assert "1 blocks (2)" in again.err
+    assert followed == [(0, conduct.PROBED), (128, 64)]
+
+
+def test_the_digest_does_not_take_a_chunk_that_changes_at_the_last_moment(
+    command_line, tmp_path, monkeypatch
+):
+    complete = conduct.complete
+
+    def then_damaged(run, *arguments):
+        complete(run, *arguments)
+        path = run.folder / "ensemble.zarr" / "x" / "c.1"
+        path.write_bytes(flipped(path.read_bytes()))
+
+    monkeypatch.setattr(conduct, "complete", then_damaged)
+    assert_refused(command_line(*arguments(tmp_path)), "c.1", "damaged")
+
+
+@pytest.mark.parametrize("n_writes", [0, 5, 20, 28])
+def test_a_full_disk_leaves_a_run_that_goes_on(command_line, tmp_path, monkeypatch, whole, n_writes):
+    """Whichever file the disk has no room for: of the description, a chunk, a marker."""
+    fsync, left = os.fsync, n_writes
+
+    def full(descriptor):
+        nonlocal left
+        left -= 1
+        if left < 0:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        fsync(descriptor)
+
+    monkeypatch.setattr(os, "fsync", full)
+    ended = command_line(*arguments(tmp_path))
+    assert_refused(ended, "No space left on device", "go on with: mushrooms simulate")
+    monkeypatch.setattr(os, "fsync", fsync)
+    assert not list(tmp_path.rglob(".*"))
+    assert digest_of(command_line(*arguments(tmp_path, "--resume"))) == whole[N]
+
+
+def test_a_run_that_the_disk_cannot_hold_is_refused_before_it_begins(command_line, tmp_path, monkeypatch):
+    usage = conduct.shutil.disk_usage(tmp_path)
+    monkeypatch.setattr(conduct.shutil, "disk_usage", lambda _path: usage._replace(free=10**6))
+    monkeypatch.setattr(fast, "simulate", None)
+    assert_refused(command_line(*arguments(tmp_path / "a", n=10**9, block=None)), "GB to be written", "free")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_target_that_is_read_only_is_refused(command_line, tmp_path, monkeypatch):
+    digest_of(command_line(*arguments(tmp_path)))
+    before = sorted(tmp_path.rglob("*"))
+
+    def read_only(*_arguments, **_options):
+        raise OSError(errno.EROFS, os.strerror(errno.EROFS))
+
+    monkeypatch.setattr(Path, "write_bytes", read_only)
+    assert_refused(command_line(*arguments(tmp_path, "--resume")), str(tmp_path), "Read-only file system")
+    assert sorted(tmp_path.rglob("*")) == before
+
+
+def test_one_writer_holds_a_folder(command_line, tmp_path, whole):
+    with locked(tmp_path):
+        assert_refused(command_line(*arguments(tmp_path)), f"process {os.getpid()} on", "one run at a time")
+        other = "import sys; from pathlib import Path; from scene.files import locked\n"
+        other += "with locked(Path(sys.argv[1])): pass"
+        done = subprocess.run(
+            [sys.executable, "-c", other, str(tmp_path)], capture_output=True, text=True, check=False
+        )
+        assert "BadInput" in done.stderr
+    assert digest_of(command_line(*arguments(tmp_path))) == whole[N]
+    (tmp_path / LOCK).write_text("process 1 on a machine that lost power")  # nobody holds it
+    assert digest_of(command_line(*arguments(tmp_path, "--resume"))) == whole[N]
+
+
+@pytest.mark.parametrize(
+    ("change", "options", "words"),
+    [
+        ({}, [], ["holds this run", "--resume"]),
+        ({}, ["--resume", "--seed", 8], ["seed = 7 there, 8 asked for"]),
+        ({}, ["--resume", "--energy", 41], ["energy = 40.0 there, 41.0 asked for"]),
+        ({}, ["--resume", "--cycles", 2], ["cycles = 1 there, 2 asked for"]),
+        ({}, ["--resume", "--particles", 5], ["particles = 330 there, 5 asked for"]),
+        ({}, ["--resume", "--block", 65], ["block = 64 there, 65 asked for"]),
+        ({"schema": 0}, ["--resume"], ["schema = 0 there, 1 asked for"]),
+        ({"version": "0.0.9"}, ["--resume"], ["version = '0.0.9' there", repr(mushrooms.__version__)]),
+        ({"scene": {"table": "stem"}}, ["--resume"], ["scene: ", "= None there"]),
+    ],
+)
+def test_another_run_in_the_folder_is_refused(command_line, tmp_path, change, options, words):
+    digest_of(command_line(*arguments(tmp_path)))
+    path = tmp_path / "blocks" / blocks.DESCRIPTION
+    path.write_bytes(sealed(json.dumps(json.loads(unsealed(path)) | change).encode()))
+    before = {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()}
+    assert_refused(command_line(*arguments(tmp_path, *options)), *words)
+    assert before == {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()}
+
+
+def test_a_description_is_there_twice_and_refused_when_both_are_damaged(
+    command_line, tmp_path, followed, whole
+):
+    digest_of(command_line(*arguments(tmp_path)))
+    paths = [tmp_path / "ensemble.zarr" / "zarr.json", tmp_path / "blocks" / blocks.DESCRIPTION]
+    for path in paths:
+        content = path.read_bytes()
+        path.write_bytes(truncated(content))
+        followed.clear()
+        assert digest_of(command_line(*arguments(tmp_path, "--resume"))) == whole[N]
+        assert followed == [(0, conduct.PROBED)]
+        assert len(path.read_bytes()) == len(content)
+    for path in paths:
+        path.write_bytes(truncated(path.read_bytes()))
+    assert_refused(command_line(*arguments(tmp_path, "--resume")), "description is damaged")
+    assert_refused(command_line("draw", tmp_path, "--out", tmp_path / "a.svg"), "description is damaged")
+
+
+def test_blocks_of_another_run_do_not_count(command_line, tmp_path, followed, whole):
+    """Files that somebody moved here: each is as it was written, but of another seed."""
+    digest_of(command_line(*arguments(tmp_path / "other", "--seed", 8)))
+    (tmp_path / "other" / "ensemble.zarr" / "zarr.json").unlink()
+    (tmp_path / "other" / "blocks" / blocks.DESCRIPTION).unlink()
+    assert digest_of(command_line(*arguments(tmp_path / "other"))) == whole[N]
+
+
+def test_a_machine_with_other_numbers_does_not_go_on(command_line, tmp_path, monkeypatch):
+    digest_of(command_line(*arguments(tmp_path)))
+    simulate = fast.simulate
+
+    def other(scene, **options):
+        run = simulate(scene, **options)
+        return run._replace(x=np.nextafter(run.x, 1.0))
+
+    monkeypatch.setattr(fast, "simulate", other)
+    assert_refused(command_line(*arguments(tmp_path, "--resume", n=500)), "x of its first particles", "numba")
+
+
+def test_limits_end_in_a_run_that_goes_on(command_line, tmp_path, monkeypatch, whole):
+    code, out, err = command_line(*arguments(tmp_path, "--max-collisions", 3))
+    assert (code, out) == (3, "")
+    assert "makes" in err
+    assert "--max-collisions = 3: 0 of 330 particles are kept; go on with: mushrooms simulate" in err
+    now = iter(range(10**6))
+    monkeypatch.setattr(conduct, "CLOCK", lambda: float(next(now)))
+    code, out, err = command_line(*arguments(tmp_path, "--resume", "--max-seconds", 20))
+    assert (code, out) == (3, "")
+    n_kept = int(err.split("passed: ")[1].split(" of")[0])
+    assert 0 < n_kept < N
+    done = command_line(*arguments(tmp_path, "--resume", "--max-collisions", 10**6))
+    assert digest_of(done) == whole[N]
+
+
+def test_blocks_take_seconds_and_fit_into_memory():
+    sizes = {}
+    for energy, n_cycles in ((10.0, 1), (1e4, 1), (1e7, 1), (1e12, 1), (10.0, 10**6)):
+        wish = asked.Asked(load("moving-cap"), energy, n_cycles, SEED)
+        size = sizes[energy, n_cycles] = conduct.block_size(wish, 4)
+        assert size * conduct.shape_of(wish, 1, 1).bytes_of_a_particle <= conduct.BLOCK_BYTES
+    assert list(sizes.values()) == [2**17, 2**17, 2**12, 2**9, 2]
+
+
+@pytest.mark.parametrize(
+    ("options", "word"),
+    [
+        (["--resume"], "--resume needs --out"),
+        (["--max-seconds", 1], "--max-seconds needs --out"),
+        (["--dask", "tcp://here:1"], "--dask needs --out"),
+        (["--block", 0], "--block = 0"),
+        (
+            ["--block", 2, "--particles", 10**8],
+            "--block = 2: 100000000 particles need blocks of at least 100",
+        ),
+    ],
+)
+def test_what_needs_a_folder_says_so(command_line, options, word):
+    assert_refused(command_line(*RUN, "--particles", 5, *options), word)
+
+
+def test_the_time_of_day_decides_nothing(command_line, tmp_path, monkeypatch, whole):
+    """It jumps back and forth; and no module of the store asks for it."""
+    jumps = np.random.default_rng(1).uniform(0, 4e9, 10**5).tolist()
+    monkeypatch.setattr(time, "time", jumps.pop)
+    assert digest_of(command_line(*arguments(tmp_path, "--max-seconds", 1e6))) == whole[N]
+    assert digest_of(command_line(*arguments(tmp_path, "--resume"))) == whole[N]
+    for path in [*(ROOT / "mushrooms" / "store").glob("*.py"), ROOT / "mushrooms" / "simulate.py"]:
+        names = {n.attr for n in ast.walk(ast.parse(path.read_text())) if isinstance(n, ast.Attribute)}
+        assert not names & {"time", "time_ns", "now", "utcnow", "today", "st_mtime", "localtime"}, path
+
+
+def test_whatever_happens_in_whatever_order_the_bits_are_the_same(command_line, tmp_path, monkeypatch):
+    """Runs that are broken off, harmed and widened at random."""
+    random, keep = np.random.default_rng(11), blocks.RunFolder.keep
+    left = 0
+
+    def sometimes(self, piece, block):
+        nonlocal left
+        left -= 1
+        if left < 0:
+            raise [KeyboardInterrupt, OSError(errno.EIO, "input/output error")][random.integers(2)]
+        keep(self, piece, block)
+
+    monkeypatch.setattr(blocks.RunFolder, "keep", sometimes)
+    for number in range(int(os.environ.get("MUSHROOMS_HARMS", "4"))):
+        folder, n = tmp_path / str(number), 20
+        block = int(random.integers(5, 40))
+        for _ in range(6):
+            n, left = n + int(random.integers(0, 40)), int(random.integers(0, 8))
+            assert command_line(*arguments(folder, "--resume", n=n, block=block)).code in (0, 2, 130)
+            if folder.exists():
+                harmed(folder, random)
+        left = 10**6
+        ended = command_line(*arguments(folder, "--resume", n=n, block=block))
+        assert digest_of(ended) == run_at_once("fermi-ulam", n)
+
+
+def faulty_chunk(self, number, name, _marker):
+    return (self.folder / blocks.GROUP / self.shape.chunk(name, number)).read_bytes()
+
+
+def faulty_follow(wish, piece, threads, tick=None):
+    return follow(wish, piece._replace(first=0), threads, tick)
+
+
+def faulty_digest(run):
+    """Go block by block, all fields of each."""
+    found = hashlib.sha256()
+    for number in range(run.shape.n_blocks):
+        for source in digest.DIGESTED:
+            found.update(b"" if (array := digest.part(run, number, source)) is None else array.tobytes())
+    return found.hexdigest()
+
+
+follow = engines.follow
+
+
+@pytest.mark.parametrize(
+    ("owner", "name", "faulty"),
+    [
+        (blocks.RunFolder, "_chunk", faulty_chunk),
+        (engines, "follow", faulty_follow),
+        (digest, "sha256", faulty_digest),
+    ],
+)
+def test_faulty_stores_are_found_out(command_line, tmp_path, monkeypatch, whole, owner, name, faulty):
+    monkeypatch.setattr(owner, name, faulty)
+    command_line(*arguments(tmp_path))
+    path = tmp_path / "ensemble.zarr" / "t" / "c.2"
+    path.write_bytes(flipped(path.read_bytes()))
+    ended = command_line(*arguments(tmp_path, "--resume"))
+    assert ended.code != 0 or json.loads(ended.out)["sha256"] != whole[N]

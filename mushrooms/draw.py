@@ -12,6 +12,7 @@ import typer
 import scene as scenes
 from mushrooms import output
 from mushrooms.simulate import Seed
+from mushrooms.stored import draw_run, is_stored
 from mushrooms.terminal import SceneName, check_range, compilation_told, progress_bar
 from scene import Scene
 from scene.files import write_file
@@ -85,8 +86,6 @@ def draw(
     The particles are the first of `mushrooms simulate SCENE --energy E --seed S`. Given the folder of a run
     (simulate --out), draw its histogram of log E1/E0, with theory.
     """
-    from mushrooms.stored import draw_run, is_stored
-
     if is_stored(scene):
         print(draw_run(Path(scene), out))
         return

@@ -24,9 +24,6 @@ UsageError: type[Any] = typer.BadParameter.__bases__[0]
 INTERRUPTED = 130
 MOST = Decimal(10) ** 30  # of a whole number on the command line, written with an exponent
 NOTHING_KEPT = "nothing is kept: files are written whole, at the end"
-WITHOUT_OUT = (
-    "nothing is kept; with --out a run is kept as it goes"  # with it `simulate` itself says how much
-)
 
 
 class Listed(NamedTuple):
@@ -56,7 +53,7 @@ COMMANDS = {
         "mushrooms.simulate:simulate",
         "Simulate an ensemble.",
         "moving-cap --particles 25000 --energy 1e7 --seed 1 --out run",
-        WITHOUT_OUT,
+        "of a run with --out every finished block is: --resume goes on with them",
     ),
     "export": Listed("mushrooms.stored:export", "Write a finished run as one table.", "run --to run.parquet"),
     "attack": Listed(
@@ -174,7 +171,7 @@ def run(arguments: list[str] | None = None) -> NoReturn:
         _refuse("not enough memory for so many particles")
     if code == INTERRUPTED:
         kept = next((COMMANDS[word].kept for word in given if word in COMMANDS), "")
-        if kept and not (kept == WITHOUT_OUT and any(word.startswith("--out") for word in given)):
+        if kept:
             print(f"{PROGRAM}: interrupted; {kept}", file=sys.stderr)
     sys.exit(code if isinstance(code, int) else 0)
 

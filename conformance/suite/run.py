@@ -38,9 +38,10 @@ from conformance.suite.disguise import (
 from conformance.suite.process import NOT_NUMBERS, Trouble
 from conformance.suite.result import Result, Run, Speed, outcomes_of
 from conformance.suite.scope import graded_parts
-from conformance.suite.session import Introduction, Limits, Session, missing
+from conformance.suite.session import Limits, Session, missing
 from conformance.vectors import Vector
 from scene import BadInput, State, load, to_data
+from scene.protocol.messages import Introduction
 from scene.refusal import check_seed
 
 NEW_SEEDS = 10**6  # short enough to be typed again

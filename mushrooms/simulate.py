@@ -164,7 +164,11 @@ def _in_memory(wish: Wish) -> tuple[dict[str, Any], Any]:
     shape = conduct.shape_of(wish.asked, wish.particles, wish.block or default)
     check_kept(wish.particles, wish.asked.n_cycles, 0, shape.n_narrowings)
     run = blocks.RunInMemory(shape)
-    _complete(wish, run)
+    try:
+        _complete(wish, run)
+    except KeyboardInterrupt:
+        print("mushrooms: interrupted; nothing is kept without --out", file=sys.stderr)
+        raise
     return _summary(wish, run), run.tally.first
 
 
@@ -209,7 +213,7 @@ def _told_how_to_go_on(run: Any, command: str) -> Iterator[None]:
         raise
     except KeyboardInterrupt:
         if run.tally.particles:
-            print(f"interrupted: {how()}", file=sys.stderr)
+            print(f"mushrooms: interrupted; {how()}", file=sys.stderr)
         raise
     except OSError as error:
         raise BadInput(f"output {str(run.folder)!r}: {error.strerror or error}: {how()}") from None

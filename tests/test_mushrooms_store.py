@@ -104,7 +104,7 @@ def test_a_run_goes_on_and_is_widened_without_following_anybody_twice(
     monkeypatch.setattr(blocks.RunFolder, "keep", interrupted)
     code, out, err = command_line(*arguments(tmp_path))
     assert (code, out) == (130, "")
-    assert f"interrupted: 128 of {N} particles are kept; go on with: mushrooms simulate fermi-ulam" in err
+    assert f"interrupted; 128 of {N} particles are kept; go on with: mushrooms simulate fermi-ulam" in err
     assert f"--out {tmp_path} --resume" in err
     followed.clear()
     assert digest_of(command_line(*arguments(tmp_path, "--resume"))) == whole[N]

@@ -23,10 +23,11 @@ FIGURES = {
     "m1_left_out": "next order of m1_at",
     "peak_left_out": "next order of peak_at",
     "peak_width_left_out": "next order of peak_width_at",
+    "is_in_reach": "false where the theory leaves out half of the variance or more: walls turn too soon",
 }
 
 
-def at_energy(scene: Scene, energy: float) -> dict[str, float | None]:
+def at_energy(scene: Scene, energy: float) -> dict[str, float | bool | None]:
     """Return the figures of one cycle at an initial energy.
 
     Raises:
@@ -49,8 +50,9 @@ def at_energy(scene: Scene, energy: float) -> dict[str, float | None]:
         "peak_left_out": left.peak_mean,
         "peak_width_left_out": variance**0.5 * left.variance / 2,
     }
+    reach = {"is_in_reach": left.variance < 0.5}
     digits = {name: 2 if name.endswith("_left_out") else 7 for name in figures}
     return {
         name: None if number is None else float(f"{number:.{digits[name]}g}")
         for name, number in figures.items()
-    }
+    } | reach

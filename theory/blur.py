@@ -77,7 +77,8 @@ class Atoms(NamedTuple):
 class NextOrder(NamedTuple):
     """What the theory leaves out, by the size of the terms that follow.
 
-    mean_s, captured_mean, peak_mean, p_nc: the square of the lags in the place where each enters.
+    mean_s, captured_mean, peak_mean, p_nc: the square of the lags in the place where each enters; of means
+        also what the variance leaves out, for a quarter of it is their drift.
     variance: of the peak, relatively: as much as the kicks' memory took off, twice what moving sides do to
         it, and the rates' own errors.
     skewness: of the kicks: blocks as long as twice their memory are taken to be independent, and each to
@@ -148,12 +149,14 @@ class FiniteEnergy:
         error = table_error(self.scene)
         # A shift of a size has an error by the rates too, in the same proportion.
         captured_mean = second + error.lag * second**0.5
+        variance = self._fields.missed + 2 * self._fields.turned + error.diffusion
+        drift = variance * self.peak[1] / 4  # of every mean: the drift is a quarter of the variance
         return NextOrder(
-            p * captured_mean + error.diffusion * self.peak[1] / 4,
-            captured_mean + error.diffusion * self.peak[1] / 4,
-            -np.log(max(1 - p, LEAST)) * captured_mean + error.diffusion * self.peak[1] / 4,
+            p * captured_mean + drift,
+            captured_mean + drift,
+            -np.log(max(1 - p, LEAST)) * captured_mean + drift,
             p * (1 - p) * captured_mean,
-            self._fields.missed + 2 * self._fields.turned + error.diffusion,
+            variance,
             self._fields.n_blocks**-0.5,
         )
 

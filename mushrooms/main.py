@@ -53,7 +53,7 @@ COMMANDS = {
         "mushrooms.simulate:simulate",
         "Simulate an ensemble.",
         "moving-cap --particles 25000 --energy 1e7 --seed 1 --out run",
-        "of a run with --out every finished block is: --resume goes on with them",
+        "of a run with --out every finished block is kept: --resume goes on with them",
     ),
     "export": Listed("mushrooms.stored:export", "Write a finished run as one table.", "run --to run.parquet"),
     "attack": Listed(

@@ -102,7 +102,8 @@ def captured_ever(t_in):
 def one_cycle(scene, energy, total, phases, rng):
     n, speed = len(total), np.sqrt(2 * energy)
     _, s_nc, curve, zone = curves(scene)
-    noise, slower = rng.standard_normal(n), np.exp(-total / 2)
+    # Nothing is said of particles as slow as the walls, which hardly lose more.
+    noise, slower = rng.standard_normal(n), np.exp(-np.maximum(total, -4.0) / 2)
     try:
         found = theory.at_energy(scene, energy)
     except theory.NotCovered:

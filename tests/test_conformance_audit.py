@@ -11,7 +11,15 @@ from support import adiabatic_particles
 import fast
 import theory
 from conformance.audit import ledger
-from conformance.audit.claims import experiments, exponents, filling, slow_growth
+from conformance.audit.claims import (
+    broadened,
+    experiments,
+    exponents,
+    filling,
+    many_cycles,
+    shapes,
+    slow_growth,
+)
 from conformance.audit.evidence import AuditSteppers, ClaimEvidence
 from conformance.audit.finding import verdict_of
 from conformance.audit.runs import RUNS, scene_of
@@ -20,15 +28,27 @@ from conformance.audit.session import AuditSettings, conduct
 from conformance.audit.tolerances import MAX_TESTS, N_SIGMA, close, fits, power
 
 REAL = ("L1", "L7", "C2", "C6")  # follow single particles, slow ones or flows: not the stand-in's matter
+FORMULAS = ("N1", "N2", "N3", "N4", "N5")  # theory against itself, the same whoever simulates
 CACHED = adiabatic_particles.predict
 STAND_IN = AuditSteppers(adiabatic_particles.simulate, fast.trajectory, fast.flow)
 
 
 def audited(only="", simulate=adiabatic_particles.simulate, predict=CACHED):
-    entries = [entry for entry in ledger.select(only) if only or entry.id not in REAL]
+    entries = [entry for entry in ledger.select(only) if only or entry.id not in REAL + FORMULAS]
     return conduct(
         AuditSteppers(simulate, fast.trajectory, fast.flow), AuditSettings(), entries=entries, predict=predict
     )
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _fewer():
+    """Draw fewer sums of cycles, whose own errors are part of every comparison, and fewer other paces."""
+    with pytest.MonkeyPatch.context() as patch:
+        for module in (broadened, many_cycles):
+            patch.setattr(module, "N_DRAWN", 100_000)
+        patch.setattr(shapes, "N_CLOCKS", 1)
+        yield
+        broadened.summed.cache_clear()
 
 
 @pytest.fixture(scope="module")
@@ -54,7 +74,7 @@ def test_every_misprint_fails_as_printed_and_holds_corrected(honest):
 
 
 def test_false_alarms_stay_below_the_bound(honest):
-    # REAL ones add 22 tests; a full audit has one more run of many cycles, and three more energies.
+    # REAL ones add 22, the formulas none; a full audit has one more run of many cycles, and three energies.
     assert honest.n_tests + 22 + 30 <= MAX_TESTS
 
 
@@ -221,7 +241,8 @@ def test_a_theory_that_upholds_the_print_is_no_misprint():
 def fixed_caps():
     samples = {}
     for name in ("fixed-cap-anticlockwise@1e9", "fixed-cap-clockwise@1e9"):
-        samples[name] = draw(adiabatic_particles.simulate, RUNS[name], size="full", seed=5)
+        at_once = RUNS[name]._replace(block=100_000)
+        samples[name] = draw(adiabatic_particles.simulate, at_once, size="full", seed=5)
     return samples
 
 

@@ -44,8 +44,8 @@ def test_the_search_sees_a_stepper_that_does_not_scale(monkeypatch, tally):
     monkeypatch.setattr(stepper, "fit", unfitted)
     monkeypatch.setattr(import_module("fast.flow"), "fit", unfitted)
     with np.errstate(all="ignore"):
-        tally["wrong"] = len(search(4, 300, tally))
-        assert tally["wrong"] > 10
+        tally["wrong"] = len(search(4, 60, tally))
+        assert tally["wrong"] > 5
         question = Question(Cap(r=1.0), State(0.0, 0.3, 0.2, -0.9, 0.2), 100.0)
         assert not is_scaled(step, question, 150, -230, tally)
 

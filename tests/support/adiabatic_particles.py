@@ -45,6 +45,13 @@ def windows(scene):
 
 
 def simulate(scene, *, n_particles, energy, n_cycles=1, seed=0, threads=None, phases=(), progress=None):
+    if progress:
+        progress(n_particles)
+    return drawn(scene, n_particles, energy, n_cycles, seed, tuple(phases))
+
+
+@cache  # whoever plants a fault changes copies
+def drawn(scene, n_particles, energy, n_cycles, seed, phases):
     rng = np.random.default_rng(seed)
     p_nc, _, _, _ = curves(scene)
     n_windows = max(1, len(windows(scene)))
@@ -70,8 +77,6 @@ def simulate(scene, *, n_particles, energy, n_cycles=1, seed=0, threads=None, ph
         "wall_counts": counts, "n_careful": np.zeros(n_particles, np.int64),
         "phase_energies": energy * np.exp(phase_s), "phase_captured": inside, "seconds": 1.0, "threads": 1,
     }  # fmt: skip
-    if progress:
-        progress(n_particles)
     return fast.Ensemble(**{name: fields[name] for name in fast.Ensemble._fields})
 
 

@@ -20,9 +20,7 @@ from scene.tables import laws, width_factors
 SLOW = ("ergodic@1e4x200", "moving-cap-trivial@1e4x200")
 BOUNDED = ("breathing-circle", "moving-cap", "fixed-cap-clockwise")
 N_HITS, ROUNDING = 3000, 1e-12
-SLOWEST = (
-    0.02  # share of the speeds that is taken to gain as the next do: theory does not reach down to the walls'
-)
+SLOWEST = 0.02  # share of the speeds taken to gain as the next do: theory does not reach to the walls' own
 MOVING = 0.06  # half the moving cap's growth rate of log E in a cycle: that of its speeds
 N_SPEEDS = 5
 STARTS = ((0.3, 0.4, 0.3), (-0.5, 0.2, 1.1), (0.1, 0.6, 2.0), (0.0, 0.3, 2.9))  # x, y, direction

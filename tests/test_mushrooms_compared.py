@@ -13,7 +13,7 @@ from scene import load
 
 
 @pytest.mark.parametrize("n_cycles", [1, 4])
-@pytest.mark.parametrize("energy", [1e4, 1e7])
+@pytest.mark.parametrize("energy", [1e5, 1e7])  # at 1e4 theory leaves out as much as the directions differ by
 def test_energies_drawn_from_theory_agree_with_it(n_cycles, energy):
     """And those of the reversed cycle do not."""
     n, pulls = 100_000, {}

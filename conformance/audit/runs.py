@@ -110,8 +110,8 @@ _ALL = (
     Simulation("ergodic", 1e7, 10_000, 25_000, 5_000, phases=EIGHTHS),
     Simulation("frozen-mushroom", 1e8, 2_000, 10_000, 1_000),
     # Nothing exponential: many cycles at speeds that grow slowly (C5).
-    Simulation("ergodic", 1e4, 500, 4_000, 500, n_cycles=200),
-    Simulation("moving-cap-trivial", 1e4, 500, 4_000, 500, n_cycles=200),
+    Simulation("ergodic", 1e4, 800, 4_000, 800, n_cycles=120),
+    Simulation("moving-cap-trivial", 1e4, 800, 4_000, 800, n_cycles=120),
     # Many cycles cost most: energies, and with them collisions, grow exponentially. Sec. 4.2 at its size, for
     # n = 10 and n = 30: some 1.8e11 collisions, in few blocks, since each waits for its energetic few.
     Simulation("moving-cap", 1e5, 500, 500, 500, n_cycles=30),

@@ -11,7 +11,7 @@ from mpmath import fp
 from scipy.stats import norm
 
 import theory
-from conformance.audit.claims.broadened import DRAWN_SEED, N_DRAWN, predicted, summed
+from conformance.audit.claims.broadened import DRAWN_SEED, N_DRAWN, adiabatic_limit, predicted, summed
 from conformance.audit.claims.finite_energy import width
 from conformance.audit.claims.misprints import volume_loop
 from conformance.audit.evidence import energies_of
@@ -119,7 +119,7 @@ def energies(samples: list[Sample]) -> Figure:
 
 
 def _energies(axes: Axes, rest: Axes | None, sample: Sample) -> None:
-    prediction = theory.predict(scene_of(sample.run), 15)
+    prediction = adiabatic_limit(sample.run)
     title = f"{sample.run.scene}, E0 = {sample.run.energy:.0e}, {sample.n:,} particles"
     edges = draw(axes, rest, sample.gain, predicted(sample), title)
     x = np.linspace(edges[0], edges[-1], N_PLACES)
@@ -233,7 +233,7 @@ def stems(tilted: Sample, upright: Sample) -> Figure:
     )
     for panel, scale in zip(axes, ("linear", "log"), strict=True):
         for sample, style in styles:
-            kept = sample.gain[~sample.captured] - float(theory.predict(scene_of(sample.run), 15).log_e_nc)
+            kept = sample.gain[~sample.captured] - float(adiabatic_limit(sample.run).log_e_nc)
             _bars(panel, kept, edges, len(kept), baseline=1e-3 if scale == "log" else 0, **style)
         x, sigma = np.linspace(-0.4, 0.8, 600), width(tilted).value
         gaussian = norm.pdf(x, sigma**2 / 4, sigma)

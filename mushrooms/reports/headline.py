@@ -5,9 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import NamedTuple
 
-import theory
-from conformance.audit.claims.broadened import predicted
-from conformance.audit.runs import scene_of
+from conformance.audit.claims.broadened import adiabatic_limit, predicted
 from conformance.audit.samples import Sample
 from conformance.audit.tolerances import Mean, mean, share
 
@@ -53,7 +51,7 @@ def headline(samples: Mapping[str, Sample]) -> list[Headline]:
 
 
 def _row(sample: Sample, quantity: str, simulated_there: str, theory_there: str) -> Headline:
-    limit, here = theory.predict(scene_of(sample.run), 15), predicted(sample)
+    limit, here = adiabatic_limit(sample.run), predicted(sample)
     if quantity == M1:
         value, expected, found = float(limit.m1), here.mean_s, mean(sample.gain)
     else:

@@ -40,6 +40,12 @@ def adiabatic(sample: Sample) -> theory.FiniteEnergy:
     return theory.at_energy(scene_of(sample.run), INFINITE)
 
 
+@cache
+def adiabatic_limit(run: Simulation) -> theory.Prediction:
+    """Return the adiabatic theory of a run's cycle, to 15 digits."""
+    return theory.predict(scene_of(run), 15)
+
+
 def bias_of_mean(sample: Sample) -> tuple[float, float]:
     """Return what finite energy adds to the mean of s, and the next order."""
     found = predicted(sample)

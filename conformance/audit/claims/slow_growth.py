@@ -17,7 +17,7 @@ from scene import Mushroom, State, load
 from scene.laws import bounds
 from scene.tables import laws, width_factors
 
-SLOW = ("ergodic@1e4x200", "moving-cap-trivial@1e4x200")
+SLOW = ("ergodic@1e4x120", "moving-cap-trivial@1e4x120")
 BOUNDED = ("breathing-circle", "moving-cap", "fixed-cap-clockwise")
 N_HITS, ROUNDING = 3000, 1e-12
 SLOWEST = 0.02  # share of the speeds taken to gain as the next do: theory does not reach to the walls' own

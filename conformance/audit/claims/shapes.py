@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from conformance.audit.claims.experiments import captured_energies, escape, growth, peak_place, peak_shape
+from conformance.audit.claims.experiments import one_cycle
 from conformance.audit.claims.finite_energy import ACW
 from conformance.audit.evidence import DIGITS, ClaimEvidence
 from conformance.audit.finding import Check
@@ -31,7 +31,7 @@ def other_clocks(evidence: ClaimEvidence) -> Iterator[Check]:
         for name in ("m1", "p_nc"):
             value = getattr(known, name)
             yield exact(f"{what}: {name}", getattr(found, name), value, 10.0 ** (5 - DIGITS))
-    yield from one_loop(evidence, OTHER_LEGS)
+    yield from one_cycle(evidence, (OTHER_LEGS,))
 
 
 def at_another_pace(legs: np.ndarray) -> Mushroom:
@@ -47,19 +47,9 @@ def at_another_pace(legs: np.ndarray) -> Mushroom:
     return Mushroom(r=table.r, h=h, w=w, slope=table.slope, name="another-pace")
 
 
-def one_loop(evidence: ClaimEvidence, run: str) -> Iterator[Check]:
-    """Hold a run against theory in all that its particles gain."""
-    sample = evidence.sample(run)
-    yield growth(evidence, sample)
-    yield escape(evidence, sample)
-    yield peak_place(evidence, sample)
-    yield peak_shape(sample)
-    yield captured_energies(sample)
-
-
 def irregular(evidence: ClaimEvidence) -> Iterator[Check]:
     """C10: two turns in one period, not alike in shapes or times."""
-    yield from one_loop(evidence, IRREGULAR)
+    yield from one_cycle(evidence, (IRREGULAR,))
 
 
 def sliding(evidence: ClaimEvidence) -> Iterator[Check]:

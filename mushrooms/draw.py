@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, Any, BinaryIO, NamedTuple
@@ -13,10 +12,10 @@ import scene as scenes
 from mushrooms import output
 from mushrooms.simulate import Seed
 from mushrooms.stored import draw_run, is_stored
-from mushrooms.terminal import SceneName, check_range, compilation_told, progress_bar
+from mushrooms.terminal import SceneName, check_energy, check_range, compilation_told, progress_bar
 from scene import Scene
 from scene.files import write_file
-from scene.refusal import BadInput, check_seed
+from scene.refusal import check_seed
 
 
 class Usual(NamedTuple):
@@ -130,8 +129,7 @@ class _Asked(NamedTuple):
 
 
 def _check(energy: float | None, collisions: int | None, particles: int | None, seed: int) -> None:
-    if energy is not None and not (math.isfinite(energy) and energy > 0):
-        raise BadInput(f"--energy = {energy}, must be finite and > 0")
+    check_energy(energy)
     if collisions is not None:
         check_range("--collisions", collisions, 1, 10**6)
     if particles is not None:

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from typing import Annotated, Any
 
 import typer
 
 import scene as scenes
-from mushrooms.terminal import AsJson, SceneName, check_range, print_pairs, progress_bar
-from scene.refusal import BadInput
+from mushrooms.terminal import AsJson, SceneName, check_energy, check_range, print_pairs, progress_bar
 
 MAX_DIGITS = 1000
 
@@ -31,8 +29,7 @@ def predict(
     from mushrooms.explained import FIGURES, at_energy
 
     check_range("--digits", digits, 1, MAX_DIGITS)
-    if energy is not None and not (math.isfinite(energy) and energy > 0):
-        raise BadInput(f"--energy = {energy}, must be finite and > 0")
+    check_energy(energy)
     found = scenes.load(scene)
     with progress_bar() as bar:
         task = bar.add_task("resolution 1 of two or more", total=100)

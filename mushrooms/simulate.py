@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 import os
 import sys
 from collections.abc import Iterator
@@ -15,7 +14,7 @@ import typer
 
 import scene as scenes
 from mushrooms import output
-from mushrooms.terminal import AsJson, SceneName, check_range, compilation_told, print_pairs
+from mushrooms.terminal import AsJson, SceneName, check_energy, check_range, compilation_told, print_pairs
 from scene.files import locked, write_file
 from scene.refusal import BadInput, check_seed
 
@@ -125,8 +124,7 @@ class Wish(NamedTuple):
 
 
 def _check_ensemble(energy: float, cycles: int, seed: int, threads: int | None) -> None:
-    if not (math.isfinite(energy) and energy > 0):
-        raise BadInput(f"--energy = {energy}, must be finite and > 0")
+    check_energy(energy)
     check_range("--cycles", cycles, 1)
     check_seed(seed, "--seed")
     if threads is not None:

@@ -91,6 +91,12 @@ def check_range(option: str, value: int, low: int, high: int | None = None) -> N
         )
 
 
+def check_energy(energy: float | None) -> None:
+    """Refuse an --energy that is none; None where it was not given."""
+    if energy is not None and not (math.isfinite(energy) and energy > 0):
+        raise BadInput(f"--energy = {energy}, must be finite and > 0")
+
+
 def print_pairs(pairs: dict[str, Any], as_json: bool, meanings: Mapping[str, str] | None = None) -> None:
     """Print names, their values and what they mean, a line each; or all as JSON, which keeps every digit.
 

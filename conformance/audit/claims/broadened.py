@@ -87,6 +87,15 @@ def phase_times(sample: Sample) -> list[float]:
     return [span * phase for phase in sample.run.phases]
 
 
+def captured_change(sample: Sample, first: int, last: int) -> FloatArray:
+    """Return the change of log E from one of the run's phases to another of those captured throughout."""
+    begin, end = (phase_times(sample)[k] for k in (first, last))
+    with np.errstate(invalid="ignore"):
+        inside = (sample.first_stay[0] < begin) & (sample.first_stay[1] > end)
+    found: FloatArray = sample.phase_s[inside, 0, last] - sample.phase_s[inside, 0, first]
+    return found
+
+
 def share_in_the_zone(sample: Sample, times: FloatArray) -> FloatArray:
     """Return the predicted share of particles in the chaotic zone, for cycles with a single valley."""
     curve, found = theory.capture_curve(scene_of(sample.run), N_PLACES), predicted(sample)

@@ -7,14 +7,21 @@ its standard error, that of orbits drawn (L1, C6) too.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
-from typing import NamedTuple
+from collections.abc import Callable, Iterator
+from functools import lru_cache
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from mpmath import fp
 
 import theory
-from conformance.audit.claims.broadened import phase_times, predicted, share_in_the_zone, zone_energy
+from conformance.audit.claims.broadened import (
+    captured_change,
+    phase_times,
+    predicted,
+    share_in_the_zone,
+    zone_energy,
+)
 from conformance.audit.claims.experiments import chord_time
 from conformance.audit.claims.finite_energy import ACW, ERGODIC, FIXED, LADDER
 from conformance.audit.evidence import ClaimEvidence
@@ -27,6 +34,9 @@ from scene.geometry import area, table_at
 from scene.laws import bounds, value
 from scene.tables import cycle_length, laws
 
+if TYPE_CHECKING:
+    from fast import Collisions
+
 SPEEDS = tuple(10.0 ** (k / 2) for k in range(4, 9))  # 100 to 10,000
 N_ORBITS = 12
 DURATION = 1.0  # of the 2 pi of a cycle: O(v) hits
@@ -38,7 +48,7 @@ PER_ENERGY = 20
 
 def circle(evidence: ClaimEvidence) -> Iterator[Check]:
     """L1: the breathing circle, hit by hit."""
-    orbits = _orbits(evidence)
+    orbits = _orbits(evidence.steppers.trajectory, evidence.seed)
     momentum = max(orbit.momentum for row in orbits for orbit in row)
     what = f"angular momentum at arc hits, {N_ORBITS} orbits: largest relative change"
     yield stated(what, momentum < 1e-12, f"{momentum:.1e}", "rounding of up to 10,000 hits, < 1e-12")
@@ -50,7 +60,7 @@ def circle(evidence: ClaimEvidence) -> Iterator[Check]:
 
 def impact_angle(evidence: ClaimEvidence) -> Iterator[Check]:
     """C6: phi_hat through the breathing cap, at impacts and between them."""
-    orbits = _orbits(evidence)
+    orbits = _orbits(evidence.steppers.trajectory, evidence.seed)
     for what, name in (("at impacts", "angle"), ("half-way between impacts", "between")):
         drifts = [[getattr(orbit, name) for orbit in row] for row in orbits]
         yield _orbits_exponent(f"largest change of phi_hat {what} over a fixed time", drifts, -1, 0)
@@ -72,17 +82,20 @@ class Orbit(NamedTuple):
     between: float
 
 
-def _orbits(evidence: ClaimEvidence) -> list[list[Orbit]]:
+@lru_cache(maxsize=1)  # L1 and C6 look at the same
+def _orbits(follow: Callable[..., Collisions], seed: int) -> list[list[Orbit]]:
     """Return drawn orbits, a row for each with its speeds in SPEEDS."""
     scene = load("breathing-circle")
-    random = np.random.default_rng(block_seed(evidence.seed, RUNS["frozen-mushroom@1e8"], -3))
+    random = np.random.default_rng(block_seed(seed, RUNS["frozen-mushroom@1e8"], -3))
     starts = random.uniform((-0.6, 0.1, 0.0), (0.6, 0.7, 2 * np.pi), size=(N_ORBITS, 3)).tolist()
-    return [[_orbit(evidence, scene, speed, *start) for speed in SPEEDS] for start in starts]
+    return [[_orbit(follow, scene, speed, *start) for speed in SPEEDS] for start in starts]
 
 
-def _orbit(evidence: ClaimEvidence, scene: Scene, speed: float, x: float, y: float, turn: float) -> Orbit:
+def _orbit(
+    follow: Callable[..., Collisions], scene: Scene, speed: float, x: float, y: float, turn: float
+) -> Orbit:
     state = State(0.0, x, y, speed * math.cos(turn), speed * math.sin(turn))
-    done = evidence.steppers.trajectory(scene, state, int(4 * speed), DURATION)
+    done = follow(scene, state, int(4 * speed), DURATION)
     at_arc = np.array([wall == "arc" for wall in done.walls])
     _, t, x_, y_, vx, vy = done.steps[at_arc].T
     momentum = np.abs(x_ * vy - y_ * vx)
@@ -145,18 +158,8 @@ def invariants(evidence: ClaimEvidence) -> Iterator[Check]:
 
 def cap_change(sample: Sample) -> FloatArray:
     """Return the change of log(E V_cap) from phase 7/16 to 9/16 of those in the island at both."""
-    first, last = 6, 8
-    inside = _stays(sample, 7 / 16, 9 / 16)
     volumes = [theory.volumes_at(fp, scene_of(sample.run), 2 * fp.pi * k / 16).v_cap for k in (7, 9)]
-    change: FloatArray = sample.phase_s[inside, 0, last] - sample.phase_s[inside, 0, first]
-    return change + math.log(volumes[1] / volumes[0])
-
-
-def _stays(sample: Sample, first: float, last: float) -> BoolArray:
-    with np.errstate(invalid="ignore"):
-        t_in, t_out = sample.first_stay
-        inside: BoolArray = (t_in < 2 * np.pi * first) & (t_out > 2 * np.pi * last)
-    return inside
+    return captured_change(sample, 6, 8) + math.log(volumes[1] / volumes[0])
 
 
 def log_volume(sample: Sample, phase: float) -> float:
@@ -238,7 +241,7 @@ def release(evidence: ClaimEvidence) -> Iterator[Check]:
 
 
 def _largest_gap(sample: Sample) -> float:
-    """Return a bound on |nu(t_out) - nu(t_in)| v for the moving cap.
+    """Return a bound on |nu(t_out) - nu(t_in)| v for the moving cap, to the first order in 1/v.
 
     Capture and release are each seen up to a chord late, 2 r/v, in which nu changes by its rate times that.
     Meanwhile v r changes relatively by up to (1/v) (2 u + the integral of u^2/r): at each hit the radius has

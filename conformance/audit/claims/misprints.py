@@ -15,6 +15,7 @@ from mpmath import fp
 
 import scene as scenes
 import theory
+from conformance.audit.claims.broadened import captured_change
 from conformance.audit.claims.printed import rounds_to
 from conformance.audit.evidence import DIGITS, ClaimEvidence
 from conformance.audit.finding import Check, Form
@@ -107,9 +108,7 @@ def radius_squared(evidence: ClaimEvidence) -> Iterator[Check]:
     table = scene_of(sample.run)
     assert isinstance(table, Mushroom)
     first, last = (fp.log(value(fp, table.r, 2 * fp.pi * phase)) for phase in (7 / 16, 9 / 16))
-    with np.errstate(invalid="ignore"):
-        inside = (sample.first_stay[0] < 2 * fp.pi * 7 / 16) & (sample.first_stay[1] > 2 * fp.pi * 9 / 16)
-    gain = sample.phase_s[inside, 0, 8] - sample.phase_s[inside, 0, 6]
+    gain = captured_change(sample, 6, 8)
     # E is seen since the last hit, half a chord before on average, in which log r changes by u/v.
     band = 2 * float(bounds(table.r).slope) / sample.speed / abs(last - first)
     for power, form in zip((1, 2), FORMS, strict=True):

@@ -17,7 +17,9 @@ from scene.files import locked, write_files
 from scene.refusal import BadInput, check_seed
 
 if TYPE_CHECKING:
+    from conformance.audit.finding import Entry
     from conformance.audit.runs import Size
+    from conformance.audit.session import AuditResult, AuditSettings
 
 
 def audit(
@@ -46,10 +48,8 @@ def audit(
     with more particles too. No run is ever replaced.
     Exit code 0 when every claim has its expected verdict, 1 when one has not, 2 on bad input.
     """
-    import fast
     from conformance.audit import ledger
-    from conformance.audit.evidence import AuditSteppers
-    from conformance.audit.session import AuditSettings, conduct, kept
+    from conformance.audit.session import AuditSettings
     from mushrooms import audit_runs
     from mushrooms.reports import audit_page
 
@@ -66,20 +66,7 @@ def audit(
         return
     with output.writable_folder(out) as folder, locked(folder):
         settings = AuditSettings(size, seed, threads, folder / "findings", resume, apart=True)
-        if resume:
-            wanted = {entry.id for entry in entries} | kept(settings)
-            entries = tuple(entry for entry in ledger.entries() if entry.id in wanted)
-            _check_report(folder, wanted)
-        runs = audit_runs.KeptRuns(folder, resume)
-        runs.check(audit_runs.needed(entries, size), seed)
-        with compilation_told(), progress_bar() as bar:
-            result = conduct(
-                AuditSteppers(fast.simulate, fast.trajectory, fast.flow),
-                settings,
-                entries=entries,
-                simulate_run=runs.simulate,
-                progress=_advance(bar),
-            )
+        result = _conducted(folder, settings, entries)
         data = audit_page.to_data(result)
         texts = {
             "report.json": audit_page.to_json(data),
@@ -93,6 +80,30 @@ def audit(
         print(texts["report.txt"], end="")
         print(f"Report: {folder / 'report.html'}")
     raise typer.Exit(0 if result.is_passed else 1)
+
+
+def _conducted(folder: Path, settings: AuditSettings, entries: tuple[Entry, ...]) -> AuditResult:
+    """Conduct an audit of the entries, and of those that are taken up, in a folder that is held."""
+    import fast
+    from conformance.audit import ledger
+    from conformance.audit.evidence import AuditSteppers
+    from conformance.audit.session import conduct, kept
+    from mushrooms import audit_runs
+
+    if settings.resume:
+        wanted = {entry.id for entry in entries} | kept(settings)
+        entries = tuple(entry for entry in ledger.entries() if entry.id in wanted)
+        _check_report(folder, wanted)
+    runs = audit_runs.KeptRuns(folder, settings.resume)
+    runs.check(audit_runs.needed(entries, settings.size), settings.seed)
+    with compilation_told(), progress_bar() as bar:
+        return conduct(
+            AuditSteppers(fast.simulate, fast.trajectory, fast.flow),
+            settings,
+            entries=entries,
+            simulate_run=runs.simulate,
+            progress=_advance(bar),
+        )
 
 
 def _check_report(folder: Path, wanted: set[str]) -> None:

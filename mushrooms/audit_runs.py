@@ -65,7 +65,9 @@ class KeptRuns:
                 with locked(place):
                     conduct.described(place, asked_of(run, seed), {})
                 if not self._resume:
-                    raise BadInput(f"output {str(place)!r} holds a run of this audit: --resume takes it up")
+                    raise BadInput(
+                        f"output {str(place)!r} holds a run of this audit: --resume takes it up, another --out begins anew"
+                    )
 
     def simulate(self, name: str) -> Callable[..., Ensemble]:
         """Return what stands for `fast.simulate` in a run: it follows only what the run's folder lacks."""
@@ -86,7 +88,7 @@ class KeptRuns:
     ) -> Ensemble:
         asked = Asked(scene, energy, n_cycles, seed, phases)
         line = asked.command(scene.name, n_particles, place)
-        default = block_size(asked, threads or os.cpu_count() or 1)
+        default = block_size(asked, n_particles, threads or os.cpu_count() or 1)
         with output.writable_folder(place), locked(place):
             run, damaged = conduct.opened(
                 place, asked, n_particles, None, default, line, self._resume, at_least=True
@@ -100,10 +102,10 @@ class KeptRuns:
             return head.ensemble_of(run, n_particles)
 
 
-def block_size(asked: Asked, threads: int) -> int:
-    """Return how many particles of a new run are kept at a time.
+def block_size(asked: Asked, n_particles: int, threads: int) -> int:
+    """Return how many particles of a new run are kept at a time, at most all of them.
 
     At the end of a block the lanes wait for its slowest particle. Energies spread with the cycles, so that
     what takes seconds has too few particles to wait for; `fast` shares work out by the same rule.
     """
-    return min(conduct.block_size(asked, threads) * asked.n_cycles, conduct.MOST_BLOCK)
+    return min(conduct.block_size(asked, threads) * asked.n_cycles, conduct.MOST_BLOCK, n_particles)

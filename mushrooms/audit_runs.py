@@ -65,9 +65,8 @@ class KeptRuns:
                 with locked(place):
                     conduct.described(place, asked_of(run, seed), {})
                 if not self._resume:
-                    raise BadInput(
-                        f"output {str(place)!r} holds a run of this audit: --resume takes it up, another --out begins anew"
-                    )
+                    how = "--resume takes it up, another --out begins anew"
+                    raise BadInput(f"output {str(place)!r} holds a run of this audit: {how}")
 
     def simulate(self, name: str) -> Callable[..., Ensemble]:
         """Return what stands for `fast.simulate` in a run: it follows only what the run's folder lacks."""

@@ -94,7 +94,7 @@ def test_a_kept_run_is_the_one_at_once_and_quick_is_the_begin_of_full(tmp_path, 
     np.testing.assert_array_equal(quick.s, full.s[: quick.n])
 
 
-@pytest.mark.parametrize("name", SMALL)
+@pytest.mark.parametrize("name", ["breathing", "mouth"])
 def test_what_simulate_has_made_is_taken_up(command_line, tmp_path, followed, name):
     """One with more particles too; and the audit's report tells the digest that `simulate` prints."""
     run = SMALL[name]
@@ -287,9 +287,9 @@ def test_what_is_not_there_yet_has_no_phase(tmp_path):
         np.testing.assert_array_equal(np.isfinite(found.phase_energy.values).all(axis=(1, 2)), there)
 
 
-def test_without_phases_a_run_says_what_it_always_said(tmp_path, command_line):
+def test_without_phases_a_run_says_what_it_always_said(tmp_path):
     run = SMALL["cycles"]
-    made(command_line, run, tmp_path, 70)
+    kept(tmp_path, run)
     place = tmp_path / "runs" / run.name
     assert "phases" not in blocks.attributes_of(place)
     assert "phases" not in audit_runs.asked_of(run, SEED).to_data()  # nor in what markers are held to

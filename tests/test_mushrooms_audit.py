@@ -159,8 +159,8 @@ def blocks(monkeypatch, request):
     def counted(scene, **options):
         if options["n_particles"] != conduct.PROBED:
             followed.append((options["seed"], options["first"]))
-        if len(followed) == last:
-            raise KeyboardInterrupt
+            if len(followed) == last:
+                raise KeyboardInterrupt
         return adiabatic_particles.simulate(scene, **options)
 
     monkeypatch.setattr(fast, "simulate", counted)

@@ -6,7 +6,7 @@ import json
 import sys
 from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich import progress
@@ -15,6 +15,11 @@ from mushrooms import output
 from mushrooms.terminal import compilation_told, progress_bar
 from scene.files import locked, write_files
 from scene.refusal import BadInput, check_seed
+
+if TYPE_CHECKING:
+    from conformance.audit.finding import Entry
+    from conformance.audit.runs import Size
+    from conformance.audit.session import AuditResult, AuditSettings
 
 
 def audit(
@@ -27,19 +32,25 @@ def audit(
     ] = None,
     seed: Annotated[int, typer.Option(help="Seed of the random starts, 0 to 2^64 - 1.")] = 0,
     threads: Annotated[int | None, typer.Option(help="Threads; all cores by default.")] = None,
-    resume: Annotated[bool, typer.Option("--resume", help="Go on with what DIR/parts holds.")] = False,
+    resume: Annotated[
+        bool, typer.Option("--resume", help="Go on with what DIR/runs and DIR/findings hold.")
+    ] = False,
+    commands: Annotated[
+        bool, typer.Option("--commands", help="Print the runs as simulate commands, a line each, and end.")
+    ] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
     """Check the paper's claims; writes report.html, report.json and report.txt.
 
-    Finished parts are kept in DIR/parts, for --resume after an interruption or with other --only: the report
-    then has the claims of both, and never fewer than before.
+    Particles are kept in DIR/runs/NAME as simulate --out keeps them, findings in DIR/findings, for --resume
+    after an interruption, with --full or with other --only: the report then has the claims of both, and never
+    fewer than before. The commands of --commands may be run anywhere; --resume takes up what they have made,
+    with more particles too. No run is ever replaced.
     Exit code 0 when every claim has its expected verdict, 1 when one has not, 2 on bad input.
     """
-    import fast
     from conformance.audit import ledger
-    from conformance.audit.evidence import AuditSteppers
-    from conformance.audit.session import AuditSettings, conduct, kept
+    from conformance.audit.session import AuditSettings
+    from mushrooms import audit_runs
     from mushrooms.reports import audit_page
 
     if only is not None and not only.replace(",", " ").split():
@@ -48,21 +59,14 @@ def audit(
     check_seed(seed, "--seed")
     if threads is not None and threads < 1:
         raise BadInput(f"--threads = {threads}, must be >= 1")
+    size: Size = "full" if full else "quick"
+    if commands:
+        lines = [audit_runs.command(run, size, seed, out) for run in audit_runs.needed(entries, size)]
+        print(json.dumps(lines, indent=2) if as_json else "\n".join(lines))
+        return
     with output.writable_folder(out) as folder, locked(folder):
-        settings = AuditSettings(
-            "full" if full else "quick", seed, threads, folder / "parts", resume, apart=True
-        )
-        if resume:
-            wanted = {entry.id for entry in entries} | kept(settings)
-            entries = tuple(entry for entry in ledger.entries() if entry.id in wanted)
-            _check_report(folder, wanted)
-        with compilation_told(), progress_bar() as bar:
-            result = conduct(
-                AuditSteppers(fast.simulate, fast.trajectory, fast.flow),
-                settings,
-                entries=entries,
-                progress=_advance(bar),
-            )
+        settings = AuditSettings(size, seed, threads, folder / "findings", resume, apart=True)
+        result = _conducted(folder, settings, entries)
         data = audit_page.to_data(result)
         texts = {
             "report.json": audit_page.to_json(data),
@@ -76,6 +80,30 @@ def audit(
         print(texts["report.txt"], end="")
         print(f"Report: {folder / 'report.html'}")
     raise typer.Exit(0 if result.is_passed else 1)
+
+
+def _conducted(folder: Path, settings: AuditSettings, entries: tuple[Entry, ...]) -> AuditResult:
+    """Conduct an audit of the entries, and of those that are taken up, in a folder that is held."""
+    import fast
+    from conformance.audit import ledger
+    from conformance.audit.evidence import AuditSteppers
+    from conformance.audit.session import conduct, kept
+    from mushrooms import audit_runs
+
+    if settings.resume:
+        wanted = {entry.id for entry in entries} | kept(settings)
+        entries = tuple(entry for entry in ledger.entries() if entry.id in wanted)
+        _check_report(folder, wanted)
+    runs = audit_runs.KeptRuns(folder, settings.resume)
+    runs.check(audit_runs.needed(entries, settings.size), settings.seed)
+    with compilation_told(), progress_bar() as bar:
+        return conduct(
+            AuditSteppers(fast.simulate, fast.trajectory, fast.flow),
+            settings,
+            entries=entries,
+            simulate_run=runs.simulate,
+            progress=_advance(bar),
+        )
 
 
 def _check_report(folder: Path, wanted: set[str]) -> None:
@@ -94,12 +122,14 @@ def _check_report(folder: Path, wanted: set[str]) -> None:
 
 def _advance(bar: progress.Progress) -> Callable[[str, int, int], None]:
     tasks: dict[str, progress.TaskID] = {}
+    finished = set[str]()
 
     def advance(run: str, n_done: int, n_total: int) -> None:
         if run not in tasks:
             tasks[run] = bar.add_task(run, total=n_total)
         bar.update(tasks[run], completed=n_done)
-        if n_done == n_total and bar.disable:
+        if n_done == n_total and run not in finished and bar.disable:
+            finished.add(run)
             print(f"{run}: {n_done:,} particles", file=sys.stderr)
 
     return advance

@@ -9,20 +9,22 @@ import typer
 from rich.table import Table
 
 import scene as scenes
+from conformance.audit.runs import SCENES
 from mushrooms.terminal import AsJson, table_console
 from scene.load import catalogue_text, read_data
 from scene.tables import cycle_length
 
 
 def list_scenes(
-    name: Annotated[str, typer.Argument(metavar="NAME", help="Print this scene of the catalogue.")] = "",
+    name: Annotated[
+        str, typer.Argument(metavar="NAME", help="Print this scene of the catalogue or of the audit.")
+    ] = "",
     as_toml: Annotated[bool, typer.Option("--toml", help="Print NAME as a file to begin from.")] = False,
     as_json: AsJson = False,
 ) -> None:
     """List the catalogue; the scene that is refused is shown with its reason. With NAME print that scene."""
     if name or as_toml:
-        text = catalogue_text(name)
-        print(json.dumps(read_data(name), indent=2, ensure_ascii=False) if as_json else text.rstrip("\n"))
+        _print_scene(name, as_json)
         return
     rows = [_catalogue_row(name) for name in scenes.catalogue()]
     if as_json:
@@ -36,6 +38,25 @@ def list_scenes(
         notes = f"Refused: {row['refused']}" if row["refused"] else row["notes"]
         table.add_row(row["name"], row["table"], length, notes)
     table_console().print(table)
+
+
+def _print_scene(name: str, as_json: bool) -> None:
+    data = scenes.to_data(SCENES[name]) if name in SCENES else None
+    if as_json:
+        print(json.dumps(data or read_data(name), indent=2, ensure_ascii=False))
+    else:
+        print((_toml(data) if data else catalogue_text(name)).rstrip("\n"))
+
+
+def _toml(data: dict[str, Any]) -> str:
+    """Return a scene as TOML: a line for each field, a law in one of them."""
+
+    def text(value: Any) -> str:
+        if isinstance(value, dict):
+            return "{ " + ", ".join(f"{name} = {text(part)}" for name, part in value.items()) + " }"
+        return json.dumps(value)  # of numbers, lists and plain strings TOML says the same
+
+    return "\n".join(f"{name} = {text(value)}" for name, value in data.items())
 
 
 def _catalogue_row(name: str) -> dict[str, Any]:

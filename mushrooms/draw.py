@@ -8,11 +8,17 @@ from typing import Annotated, Any, BinaryIO, NamedTuple
 
 import typer
 
-import scene as scenes
 from mushrooms import output
 from mushrooms.simulate import Seed
 from mushrooms.stored import draw_run, is_stored
-from mushrooms.terminal import SceneName, check_energy, check_range, compilation_told, progress_bar
+from mushrooms.terminal import (
+    SceneName,
+    check_energy,
+    check_range,
+    compilation_told,
+    load_scene,
+    progress_bar,
+)
 from scene import Scene
 from scene.files import write_file
 from scene.refusal import check_seed
@@ -88,7 +94,7 @@ def draw(
     if is_stored(scene):
         print(draw_run(Path(scene), out))
         return
-    table = scenes.load(scene)
+    table = load_scene(scene)
     _check(energy, collisions, particles, seed)
     asked = (trajectory, section, boundary_map, growth, lyapunov)
     kinds = [kind for kind, is_asked in zip(PICTURES, asked, strict=True) if is_asked]

@@ -6,8 +6,15 @@ from typing import Annotated, Any
 
 import typer
 
-import scene as scenes
-from mushrooms.terminal import AsJson, SceneName, check_energy, check_range, print_pairs, progress_bar
+from mushrooms.terminal import (
+    AsJson,
+    SceneName,
+    check_energy,
+    check_range,
+    load_scene,
+    print_pairs,
+    progress_bar,
+)
 
 MAX_DIGITS = 1000
 
@@ -30,7 +37,7 @@ def predict(
 
     check_range("--digits", digits, 1, MAX_DIGITS)
     check_energy(energy)
-    found = scenes.load(scene)
+    found = load_scene(scene)
     with progress_bar() as bar:
         task = bar.add_task("resolution 1 of two or more", total=100)
 

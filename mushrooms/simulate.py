@@ -12,19 +12,30 @@ from typing import Annotated, Any, NamedTuple
 
 import typer
 
-import scene as scenes
 from mushrooms import output
-from mushrooms.terminal import AsJson, SceneName, check_energy, check_range, compilation_told, print_pairs
+from mushrooms.terminal import (
+    AsJson,
+    SceneName,
+    check_energy,
+    check_range,
+    compilation_told,
+    load_scene,
+    print_pairs,
+)
 from scene.files import locked, write_file
 from scene.refusal import BadInput, check_seed
 
 MOST_IN_MEMORY, MOST_ON_DISK = 10**8, 10**10
 LIMITED = 3  # exit code of a run that a limit has stopped
-FOR_STORED = "needs --out: without a folder nothing is kept to go on with"
+FOR_STORED = "needs --out: without a folder nothing is kept"
 
 Particles = Annotated[int, typer.Option(help="Number of particles, 1 to 10^8; with --out to 10^10.")]
 Energy = Annotated[float, typer.Option(help="Initial energy v²/2 of every particle, > 0.")]
 Cycles = Annotated[int, typer.Option(help="Cycles of the walls, at least 1.")]
+Phases = Annotated[
+    str | None,
+    typer.Option(metavar="A,B,...", help="Fractions of a cycle at which energies are kept too, with --out."),
+]
 Seed = Annotated[int, typer.Option(help="Seed of the random starts, 0 to 2^64 - 1.")]
 Threads = Annotated[int | None, typer.Option(help="Threads; all cores by default, with --dask one a block.")]
 Out = Annotated[
@@ -53,6 +64,7 @@ def simulate(
     energy: Energy,
     cycles: Cycles = 1,
     seed: Seed = 0,
+    phases: Phases = None,
     out: Out = None,
     resume: Resume = False,
     dask: Dask = None,
@@ -78,12 +90,12 @@ def simulate(
     that careful steps took over a tenth of it, if they did.
     """
     _check_ensemble(energy, cycles, seed, threads)
-    kept = {"resume": resume, "dask": dask, "max_collisions": max_collisions, "max_seconds": max_seconds}
-    _check_stored(out, particles, block, **kept)
+    limits = {"max_collisions": max_collisions, "max_seconds": max_seconds}
+    _check_stored(out, particles, block, phases=phases, resume=resume, dask=dask, **limits)
     _check_plot(plot, particles, cycles)
     from mushrooms.store.asked import Asked
 
-    asked = Asked(scenes.load(scene), energy, cycles, seed)
+    asked = Asked(load_scene(scene), energy, cycles, seed, _given_phases(phases))
     wish = Wish(scene, asked, particles, threads, dask, block, max_collisions, max_seconds)
     if out is None:
         summary, first = _in_memory(wish)
@@ -129,6 +141,17 @@ def _check_ensemble(energy: float, cycles: int, seed: int, threads: int | None) 
     check_seed(seed, "--seed")
     if threads is not None:
         check_range("--threads", threads, 1)
+
+
+def _given_phases(text: str | None) -> tuple[float, ...]:
+    from fast.given import given_phases
+
+    if text is None:
+        return ()
+    try:
+        return given_phases([float(part) for part in text.split(",")])
+    except (BadInput, ValueError):
+        raise BadInput(f"--phases = {text}, must be numbers that rise and lie in (0, 1)") from None
 
 
 def _check_stored(out: Path | None, particles: int, block: int | None, **options: Any) -> None:
@@ -180,9 +203,7 @@ def _on_disk(wish: Wish, folder: Path, resume: bool) -> tuple[dict[str, Any], An
         run, damaged = conduct.opened(
             folder, wish.asked, wish.particles, wish.block, default, command, resume
         )
-    if damaged:
-        few = ", ".join(map(str, damaged[:5])) + (" ..." if len(damaged) > 5 else "")
-        print(f"damaged or broken off: {len(damaged)} blocks ({few}), followed again", file=sys.stderr)
+    tell_damaged(damaged)
     try:
         with _told_how_to_go_on(run, command):
             _complete(wish, run)
@@ -193,6 +214,13 @@ def _on_disk(wish: Wish, folder: Path, resume: bool) -> tuple[dict[str, Any], An
     kept = {name: asked[name] for name in ("scene", "energy", "cycles", "seed")} | summary
     write_file(folder / "summary.json", json.dumps(kept) + "\n")
     return summary, run.tally.first
+
+
+def tell_damaged(numbers: list[int]) -> None:
+    """Say on stderr which blocks of a run are followed again."""
+    if numbers:
+        few = ", ".join(map(str, numbers[:5])) + (" ..." if len(numbers) > 5 else "")
+        print(f"damaged or broken off: {len(numbers)} blocks ({few}), followed again", file=sys.stderr)
 
 
 @contextmanager

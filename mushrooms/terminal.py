@@ -18,8 +18,11 @@ if TYPE_CHECKING:  # loaded where they are used: most commands end before they n
     from rich.console import Console
     from rich.progress import Progress
 
+    from scene import Scene
+
 SceneName = Annotated[
-    str, typer.Argument(metavar="SCENE", help="A catalogue name, or a .toml or .json file.")
+    str,
+    typer.Argument(metavar="SCENE", help="A name of the catalogue or the audit, or a .toml or .json file."),
 ]
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON.")]
 
@@ -81,6 +84,17 @@ def progress_bar() -> Progress:
         disable=not console.is_terminal,
         transient=True,
     )
+
+
+def load_scene(name: str) -> Scene:
+    """Return a scene of the catalogue or of the audit, or from a file.
+
+    Raises:
+        InvalidScene: one line naming the file, the field, the value and the bound.
+    """
+    from conformance.audit.runs import scene_named
+
+    return scene_named(name)
 
 
 def check_range(option: str, value: int, low: int, high: int | None = None) -> None:

@@ -241,8 +241,7 @@ def test_a_theory_that_upholds_the_print_is_no_misprint():
 def fixed_caps():
     samples = {}
     for name in ("fixed-cap-anticlockwise@1e9", "fixed-cap-clockwise@1e9"):
-        at_once = RUNS[name]._replace(block=100_000)
-        samples[name] = draw(adiabatic_particles.simulate, at_once, size="full", seed=5)
+        samples[name] = draw(adiabatic_particles.simulate, RUNS[name], size="full", seed=5)
     return samples
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import json
+import os
 import re
 from functools import partial
 from html.parser import HTMLParser
@@ -22,10 +23,17 @@ from conformance.audit.finding import Check, Finding
 from conformance.audit.session import AuditResult, AuditSettings
 from mushrooms.figures import by_claim
 from mushrooms.reports import audit_page
+from mushrooms.store import conduct
 from scene.files import locked
 
 SCHEMA = Path(__file__).parent.parent / "docs" / "report.schema.json"
 CHEAP = "M4,M10,X5,N6"
+
+
+@pytest.fixture(autouse=True)
+def _unsynced(monkeypatch):
+    """Leave files to the system's buffers: no test can cut the power, and a busy disk would take minutes."""
+    monkeypatch.setattr(os, "fsync", lambda _descriptor: None)
 
 
 @pytest.fixture
@@ -42,7 +50,7 @@ def everything():
     pictured = {name for picture in by_claim.ALL for name in picture.needs}
     for name, each in session.RUNS.items():
         if each.quick and name in pictured:
-            small = each._replace(quick=min(each.quick, 2000), block=2000)
+            small = each._replace(quick=min(each.quick, 2000))
             samples[name] = session.draw(adiabatic_particles.simulate, small, size="quick", seed=1)
     checks = [
         Check("as it is", True, "0.5", 0.51, 0.01, 0.002, "claim", 1, "a note"),
@@ -123,7 +131,7 @@ def test_a_few_claims_are_checked_and_reported(call, tmp_path):
     assert [finding["id"] for finding in data["findings"]] == CHEAP.split(",")
     assert {entry["name"] for entry in data["runs"]} == {"ergodic@1e6", "ergodic@1e7"}
     names = sorted(entry.name for entry in (tmp_path / "a").iterdir())
-    assert names == ["parts", "report.html", "report.json", "report.txt"]
+    assert names == ["findings", "report.html", "report.json", "report.txt", "runs"]
     assert (tmp_path / "a" / "report.json").read_text("utf-8") == done.out
 
 
@@ -141,40 +149,47 @@ def test_a_failed_claim_exits_with_1(call, tmp_path, monkeypatch):
 
 @pytest.fixture
 def blocks(monkeypatch, request):
-    """Return the list to which each simulated block adds its seed; a parameter says which one breaks off."""
-    seeds, last = [], getattr(request, "param", None)
+    """Return the list of blocks followed, (run's seed, first particle); a parameter says which breaks off.
+
+    A resumed run's first few particles, followed again to see whether they come out the same, are none.
+    """
+    followed, last = [], getattr(request, "param", None)
+    monkeypatch.setattr(conduct, "MOST_BLOCK", 4096)
 
     def counted(scene, **options):
-        seeds.append(options["seed"])
-        if len(seeds) == last:
-            raise KeyboardInterrupt
+        if options["n_particles"] != conduct.PROBED:
+            followed.append((options["seed"], options["first"]))
+            if len(followed) == last:
+                raise KeyboardInterrupt
         return adiabatic_particles.simulate(scene, **options)
 
     monkeypatch.setattr(fast, "simulate", counted)
-    return seeds
+    return followed
 
 
 @pytest.mark.parametrize("blocks", [3], indirect=True)
 def test_a_broken_off_audit_goes_on(call, tmp_path, blocks):
     assert call("--only", "X5", "--out", tmp_path).code == 130
     assert call("--only", "X5", "--out", tmp_path, "--resume").code == 0
-    assert len(blocks) == len(set(blocks)) + 1 == 5
+    assert len(blocks) == len(set(blocks)) + 1 == 7  # two runs of three blocks
     fresh = json.loads((tmp_path / "report.json").read_text("utf-8"))
     assert call("--only", "X5", "--out", tmp_path, "--resume").code == 0
-    assert len(blocks) == 5
+    assert len(blocks) == 7
     again = json.loads((tmp_path / "report.json").read_text("utf-8"))
     assert again["runs"] == fresh["runs"]
     assert again["findings"] == fresh["findings"]
 
 
-def test_other_settings_or_broken_files_are_not_taken_up(call, tmp_path, blocks):
+def test_another_seed_is_refused_and_broken_findings_are_made_again(call, tmp_path, blocks):
     call("--only", "X5", "--out", tmp_path)
-    call("--only", "X5", "--out", tmp_path, "--resume", "--seed", 1)
-    assert len(set(blocks)) == len(blocks) == 8
-    for path in (tmp_path / "parts").iterdir():
+    before = {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()}
+    refused = call("--only", "X5", "--out", tmp_path, "--resume", "--seed", 1)
+    assert_refused(refused, "holds another run: seed = ", " there, ", "asked for", "ergodic@1e7")
+    assert before == {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()}
+    for path in (tmp_path / "findings").iterdir():
         path.write_bytes(path.read_bytes()[:100])
-    assert call("--only", "X5", "--out", tmp_path, "--resume", "--seed", 1).code == 0
-    assert len(blocks) == 12
+    assert call("--only", "X5", "--out", tmp_path, "--resume").code == 0
+    assert len(blocks) == 6
 
 
 def test_resumed_with_other_claims_a_report_has_both(call, tmp_path, blocks):
@@ -183,7 +198,7 @@ def test_resumed_with_other_claims_a_report_has_both(call, tmp_path, blocks):
         done = call("--only", ids, "--out", tmp_path, "--resume", "--json")
         assert done.code == 0
         assert [finding["id"] for finding in json.loads(done.out)["findings"]] == wanted.split(",")
-    assert len(blocks) == 4
+    assert len(blocks) == 6
     before = (tmp_path / "report.json").read_bytes()
     for more in (["--seed", 1], ["--full"]):
         done = call("--only", "N6", "--out", tmp_path, "--resume", *more)
@@ -209,20 +224,30 @@ def test_one_audit_or_run_holds_a_folder(call, command_line, tmp_path):
 def test_a_part_with_a_flipped_bit_is_not_taken_up(call, tmp_path, blocks):
     """Wherever it is: in numbers, names or a finding's text."""
     call("--only", "X5", "--out", tmp_path)
+    fresh = json.loads((tmp_path / "report.json").read_text("utf-8"))
     random = np.random.default_rng(4)
-    for path in sorted((tmp_path / "parts").iterdir()):
-        content = bytearray(path.read_bytes())
-        content[random.integers(len(content))] ^= 1 << int(random.integers(8))
-        path.write_bytes(content)
-    assert call("--only", "X5", "--out", tmp_path, "--resume").code == 0
-    assert len(blocks) == 8
+    for path in sorted(tmp_path.rglob("*")):
+        if path.suffix == ".finding" or path.name.startswith(("c.0", "2.")):  # a chunk, a block's marker
+            content = bytearray(path.read_bytes())
+            content[random.integers(len(content))] ^= 1 << int(random.integers(8))
+            path.write_bytes(content)
+    ended = call("--only", "X5", "--out", tmp_path, "--resume")
+    assert ended.code == 0
+    assert ended.err.count("damaged or broken off: 2 blocks (0, 2), followed again") == 2
+    assert len(blocks) == 6 + 4
+    again = json.loads((tmp_path / "report.json").read_text("utf-8"))
+    for name in ("name", "seed", "sha256", "m1"):
+        assert [run[name] for run in again["runs"]] == [run[name] for run in fresh["runs"]]
 
 
-def test_without_resume_everything_is_made_again(call, tmp_path, blocks):
+def test_without_resume_no_run_is_replaced(call, tmp_path, blocks):
     call("--only", "X5", "--out", tmp_path)
-    call("--only", "X5", "--out", tmp_path)
-    assert len(blocks) == 8
-    assert blocks[:4] == blocks[4:]
+    before = {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()}
+    refused = call("--only", "X5", "--out", tmp_path)
+    assert_refused(refused, str(tmp_path / "runs" / "ergodic@1e7"), "--resume takes it up")
+    assert before == {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()}
+    assert call("--only", "N6", "--out", tmp_path).code == 0  # it has no runs
+    assert len(blocks) == 6
 
 
 def test_entries_without_simulations_may_be_examined_apart(tmp_path):

@@ -26,7 +26,7 @@ from mpmath import fp
 import fast
 import scene as scenes
 import theory
-from conformance.audit.runs import SCENES
+from conformance.audit.runs import scene_named
 from conformance.audit.tolerances import FloatArray, Mean, mean
 from fast.flow import carry_judged
 from scene import Fourier, Horizon, Mushroom, State
@@ -196,7 +196,7 @@ def main() -> None:
     """Measure the rates of the audit's cycles and write theory's table."""
     table: dict[str, Any] = {}
     for name in MEASURED:
-        scene = SCENES.get(name) or scenes.load(name)
+        scene = scene_named(name)
         assert isinstance(scene, Mushroom)
         rates = measured(scene)
         kept = {key: np.vectorize(_rounded)(column).tolist() for key, column in rates._asdict().items()}

@@ -1,24 +1,14 @@
-"""Samples: what a run's particles did, followed in blocks that outlive an interruption.
-
-Every block is saved as soon as it is followed, sealed by a checksum. A saved block is used again only if no
-bit of it has changed, and it was made from the same scene, energy, seed and number of particles.
-"""
+"""Samples: what a run's particles did, as the checks of claims look at it."""
 
 from __future__ import annotations
 
-import hashlib
-import io
-import json
 from collections.abc import Callable
-from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-import scene as scenes
-from conformance.audit.runs import Simulation, Size, block_seed, scene_of
-from scene.files import sealed, unsealed, write_file
+from conformance.audit.runs import Simulation, Size, run_seed, scene_of
 
 if TYPE_CHECKING:
     from fast import Ensemble
@@ -27,11 +17,7 @@ FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]
 Simulate = Callable[..., "Ensemble"]
 Progress = Callable[[str, int, int], None]  # run, particles done, particles in all
-Arrays = dict[str, npt.NDArray[Any]]
 
-FORM = 2  # of a saved block: raised when its arrays change, so that older ones are followed anew
-ARRAYS = ("s", "t_in", "t_out", "takes_part", "phase_s", "phase_captured", "stem_hits")
-COUNTS = ("n_particles", "n_undecided", "n_undefined", "n_collisions", "n_careful")
 MAX_LOST = 1e-3  # a larger unfollowed share could hide a bias as large as the errors themselves
 
 
@@ -50,7 +36,7 @@ class Sample(NamedTuple):
         n_undecided, n_undefined: of those not followed.
         n_collisions, n_careful: in all.
         seconds: kernel time x threads [s].
-        sha256: of all blocks' results.
+        sha256: of the ensemble, as `fast.Ensemble` has it.
     """
 
     run: Simulation
@@ -114,105 +100,57 @@ def draw(
     size: Size,
     seed: int,
     threads: int | None = None,
-    folder: Path | None = None,
-    resume: bool = False,
     progress: Progress | None = None,
 ) -> Sample:
-    """Follow a run's particles, or take up what was saved of them.
+    """Follow a run's particles.
 
     Args:
-        simulate: `fast.simulate`, or another with its signature.
+        simulate: `fast.simulate`, or another with its signature; it may know the particles from before.
         run: what to simulate.
         size: quick or full.
         seed: the audit's.
         threads: for the stepper; all by default.
-        folder: where blocks are saved; None to keep none.
-        resume: whether blocks saved earlier may be used.
-        progress: told of every block.
+        progress: told of the particles done, again and again.
     """
-    total = run.n_particles(size)
-    blocks = []
-    for number, first in enumerate(range(0, total, run.block)):
-        n = min(run.block, total - first)
-        path = folder / f"{run.name}-{number:03}.npz" if folder else None
-        key = _key(run, n, block_seed(seed, run, number))
-        block = _load(path, key) if path and resume else None
-        if block is None:
-            block = _follow(simulate, run, n, block_seed(seed, run, number), threads)
-            if path:
-                write_file(path, _packed({"key": np.array(key), **block}))
-        blocks.append(block)
+    n_particles = run.n_particles(size)
+
+    def tell(n_done: int) -> None:
         if progress:
-            progress(run.name, first + n, total)
-    return gathered(run, blocks)
+            progress(run.name, n_done, n_particles)
 
-
-def _key(run: Simulation, n: int, seed: int) -> str:
-    scene = scenes.to_data(scene_of(run))
-    return json.dumps([FORM, scene, run.energy, n, run.n_cycles, run.phases, seed])
-
-
-def _follow(simulate: Simulate, run: Simulation, n: int, seed: int, threads: int | None) -> Arrays:
     ensemble = simulate(
         scene_of(run),
-        n_particles=n,
+        n_particles=n_particles,
         energy=run.energy,
         n_cycles=run.n_cycles,
-        seed=seed,
+        seed=run_seed(seed, run),
         threads=threads,
         phases=run.phases,
+        progress=tell,
     )
-    return reduced(ensemble)
+    return reduced(run, ensemble)
 
 
-def reduced(ensemble: Ensemble) -> Arrays:
+def reduced(run: Simulation, ensemble: Ensemble) -> Sample:
     """Return what the audit keeps of an ensemble, particles not followed left out."""
     energies = ensemble.cycle_energies
     followed = (ensemble.outcome == 0) & np.all(np.isfinite(energies) & (energies > 0), axis=1)
     with np.errstate(divide="ignore", invalid="ignore"):
         s, phase_s = np.log(energies / ensemble.energy0), np.log(ensemble.phase_energies / ensemble.energy0)
-    counts = [
-        len(followed),
-        np.sum(ensemble.outcome == 1),
-        np.sum(ensemble.outcome == 2),
-        np.sum(ensemble.n_collisions),
-        np.sum(ensemble.n_careful),
-    ]
-    return {
-        "s": s[followed],
-        "t_in": ensemble.t_in[followed],
-        "t_out": ensemble.t_out[followed],
-        "takes_part": ensemble.takes_part()[followed],
-        "phase_s": phase_s[followed],
-        "phase_captured": ensemble.phase_captured[followed],
-        "stem_hits": ensemble.wall_counts[followed, 2:].sum(axis=1),
-        "counts": np.array(counts, dtype=np.int64),
-        "seconds": np.array(ensemble.seconds * ensemble.threads),
-        "sha256": np.array(ensemble.sha256()),
-    }
-
-
-def gathered(run: Simulation, blocks: list[Arrays]) -> Sample:
-    """Join blocks into a sample."""
-    arrays: dict[str, Any] = {name: np.concatenate([block[name] for block in blocks]) for name in ARRAYS}
-    counts = sum((block["counts"] for block in blocks), np.zeros(len(COUNTS), np.int64)).tolist()
-    digest = hashlib.sha256("".join(str(block["sha256"]) for block in blocks).encode()).hexdigest()
-    seconds = sum(float(block["seconds"]) for block in blocks)
-    return Sample(run, **arrays, **dict(zip(COUNTS, counts, strict=True)), seconds=seconds, sha256=digest)
-
-
-def _packed(content: Arrays) -> bytes:
-    file = io.BytesIO()
-    np.savez_compressed(file, **content)  # type: ignore[arg-type]  # its other argument is no array
-    return sealed(file.getvalue())
-
-
-def _load(path: Path, key: str) -> Arrays | None:
-    """Return a saved block; None when there is none, it is broken or was made from something else."""
-    content = unsealed(path)
-    if content is None:
-        return None
-    with np.load(io.BytesIO(content), allow_pickle=False) as saved:
-        if str(saved["key"]) != key:
-            return None
-        return {name: saved[name] for name in saved.files if name != "key"}
+    return Sample(
+        run=run,
+        s=s[followed],
+        t_in=ensemble.t_in[followed],
+        t_out=ensemble.t_out[followed],
+        takes_part=ensemble.takes_part()[followed],
+        phase_s=phase_s[followed],
+        phase_captured=ensemble.phase_captured[followed],
+        stem_hits=ensemble.wall_counts[followed, 2:].sum(axis=1),
+        n_particles=len(followed),
+        n_undecided=int(np.sum(ensemble.outcome == 1)),
+        n_undefined=int(np.sum(ensemble.outcome == 2)),
+        n_collisions=int(np.sum(ensemble.n_collisions)),
+        n_careful=int(np.sum(ensemble.n_careful)),
+        seconds=ensemble.seconds * ensemble.threads,
+        sha256=ensemble.sha256(),
+    )

@@ -1,15 +1,15 @@
 """One audit: simulate what the entries need, examine each, keep what is finished.
 
-Entries that need no simulation are examined in another process at the same time. Every block of particles
-and every finding is saved in the results' folder when it is done; `resume` takes up those that were made
-with the same settings.
+Entries that need no simulation are examined in another process at the same time. Every finding is saved in
+the results' folder when it is made; `resume` takes up those that were made with the same settings. Whether
+particles are kept is up to who hands in `simulate_run`.
 """
 
 from __future__ import annotations
 
 import json
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor
 from contextlib import contextmanager
 from functools import cache
@@ -22,7 +22,7 @@ from conformance.audit import ledger
 from conformance.audit.evidence import AuditSteppers, ClaimEvidence, Predict
 from conformance.audit.finding import Entry, Finding, from_data, to_data, verdict_of
 from conformance.audit.runs import RUNS, Size
-from conformance.audit.samples import Progress, Sample, draw
+from conformance.audit.samples import Progress, Sample, Simulate, draw
 from scene.files import sealed, unsealed, write_file
 from scene.refusal import check_seed
 
@@ -34,7 +34,7 @@ class AuditSettings(NamedTuple):
         size: quick or full.
         seed: of all random numbers.
         threads: for the stepper; None for all cores.
-        folder: for blocks and findings; None to keep none.
+        folder: for findings; None to keep none.
         resume: whether what the folder holds may be used.
         apart: whether entries without simulations are examined in another process.
     """
@@ -82,6 +82,7 @@ def conduct(
     *,
     entries: Sequence[Entry] | None = None,
     predict: Predict = theory.predict,
+    simulate_run: Callable[[str], Simulate] | None = None,
     progress: Progress | None = None,
 ) -> AuditResult:
     """Conduct an audit.
@@ -91,7 +92,9 @@ def conduct(
         settings: size, seed, threads, folder.
         entries: of the ledger, all by default.
         predict: theory, or a wrong one that must be found out.
-        progress: told of every block of particles.
+        simulate_run: what simulates the run of a name, with the signature of `steppers.simulate`, which
+            does so by default.
+        progress: told of each run's particles.
 
     Raises:
         BadInput: a setting out of bounds.
@@ -109,13 +112,11 @@ def conduct(
         for name in dict.fromkeys(run for entry in entries for run in entry.runs):
             if RUNS[name].n_particles(settings.size):
                 samples[name] = draw(
-                    steppers.simulate,
+                    simulate_run(name) if simulate_run else steppers.simulate,
                     RUNS[name],
                     size=settings.size,
                     seed=settings.seed,
                     threads=settings.threads,
-                    folder=folder,
-                    resume=settings.resume,
                     progress=progress,
                 )
         for entry in entries:
@@ -174,7 +175,7 @@ def _elsewhere(settings: AuditSettings, entries: list[Entry]) -> Iterator[dict[s
 
 
 def _key(entry: Entry, settings: AuditSettings) -> str:
-    runs = [(run, RUNS[run].n_particles(settings.size), RUNS[run].block) for run in entry.runs]
+    runs = [(run, RUNS[run].n_particles(settings.size)) for run in entry.runs]
     return json.dumps(
         [entry.id, entry.statement, entry.method, entry.tolerance, settings.size, settings.seed, runs]
     )

@@ -18,7 +18,7 @@ from matplotlib import rc_context
 
 import scene as scenes
 from conformance.audit.finding import Check, Entry, Finding
-from conformance.audit.runs import scene_of
+from conformance.audit.runs import run_seed, scene_of
 from conformance.audit.samples import Sample
 from conformance.audit.session import AuditResult
 from conformance.audit.tolerances import FAMILY_LEVEL, LEVEL, N_SIGMA, mean, spread
@@ -96,7 +96,8 @@ class RunData(TypedDict):
     energy: float
     cycles: int
     particles: int
-    block: int
+    phases: list[float]
+    seed: int
     followed: int
     undecided: int
     undefined: int
@@ -165,7 +166,7 @@ def to_data(result: AuditResult) -> ReportData:
             "standard_errors": N_SIGMA,
         },
         "findings": [_finding(entry, finding) for entry, finding in pairs],
-        "runs": [_run(sample) for sample in result.samples.values()],
+        "runs": [_run(sample, result.settings.seed) for sample in result.samples.values()],
     }
 
 
@@ -200,7 +201,7 @@ def _pull(check: Check) -> float | None:
         return None
 
 
-def _run(sample: Sample) -> RunData:
+def _run(sample: Sample, seed: int) -> RunData:
     found = mean(sample.gain)
     return {
         "name": sample.run.name,
@@ -208,7 +209,8 @@ def _run(sample: Sample) -> RunData:
         "energy": sample.run.energy,
         "cycles": sample.run.n_cycles,
         "particles": sample.n_particles,
-        "block": sample.run.block,
+        "phases": list(sample.run.phases),
+        "seed": run_seed(seed, sample.run),
         "followed": sample.n,
         "undecided": sample.n_undecided,
         "undefined": sample.n_undefined,

@@ -27,12 +27,14 @@ class Asked(NamedTuple):
         energy: E = v^2 / 2 of every start [length^2 / time^2].
         n_cycles: cycles followed.
         seed: of the starts.
+        phases: fractions of each cycle at which energies are kept too, rising, in (0, 1).
     """
 
     scene: Scene
     energy: float
     n_cycles: int
     seed: int
+    phases: tuple[float, ...] = ()
 
     def to_data(self) -> dict[str, Any]:
         """Return what a store keeps of this, as JSON can hold it."""
@@ -43,23 +45,28 @@ class Asked(NamedTuple):
             "energy": self.energy,
             "cycles": self.n_cycles,
             "seed": self.seed,
+            **({"phases": list(self.phases)} if self.phases else {}),  # as older runs say it that have none
         }
 
     def command(self, scene: str, n_particles: int, folder: Path) -> str:
         """Return the command that makes this run, or goes on with it."""
         options: dict[str, object] = {"particles": n_particles, "energy": self.energy}
-        options |= {"cycles": self.n_cycles, "seed": self.seed, "out": folder}
+        options |= {"cycles": self.n_cycles, "seed": self.seed}
+        options |= {"phases": ",".join(map(repr, self.phases))} if self.phases else {}
+        options["out"] = folder
         words = [str(word) for name, value in options.items() for word in (f"--{name}", value)]
         return shlex.join(["mushrooms", "simulate", scene, *words, "--resume"])
 
 
 def asked_of(data: dict[str, Any]) -> Asked:
     """Return what a store says it was asked for."""
-    return Asked(scenes.from_data(data["scene"]), data["energy"], data["cycles"], data["seed"])
+    phases = tuple(data.get("phases", ()))
+    return Asked(scenes.from_data(data["scene"]), data["energy"], data["cycles"], data["seed"], phases)
 
 
 def difference(stored: dict[str, Any], wanted: dict[str, Any]) -> str | None:
     """Return the first thing in which a stored run is not the one wanted, both values named; None if none."""
+    stored, wanted = ({**data, "phases": data.get("phases", [])} for data in (stored, wanted))
     for name, value in wanted.items():
         found = stored.get(name)
         if found == value:

@@ -294,7 +294,7 @@ def open_run(folder: Path) -> RunFolder:
     run = RunFolder(
         folder,
         asked,
-        Shape(found["particles"], found["block"], asked.n_cycles, n_narrowings),
+        Shape(found["particles"], found["block"], asked.n_cycles, n_narrowings, len(asked.phases)),
         found["command"],
     )
     run.load()

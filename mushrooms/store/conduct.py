@@ -11,7 +11,7 @@ import time
 from collections.abc import Callable
 from contextlib import closing
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -67,11 +67,19 @@ def shape_of(asked: Asked, n_particles: int, block: int) -> Shape:
     if n_particles > MOST_BLOCKS * block:
         least = -(-n_particles // MOST_BLOCKS)
         raise BadInput(f"--block = {block}: {n_particles} particles need blocks of at least {least}")
-    return Shape(n_particles, block, asked.n_cycles, len(narrowings(asked.scene)))
+    return Shape(n_particles, block, asked.n_cycles, len(narrowings(asked.scene)), len(asked.phases))
 
 
 def opened(
-    folder: Path, asked: Asked, n_particles: int, block: int | None, default: int, command: str, resume: bool
+    folder: Path,
+    asked: Asked,
+    n_particles: int,
+    block: int | None,
+    default: int,
+    command: str,
+    resume: bool,
+    *,
+    at_least: bool = False,
 ) -> tuple[RunFolder, list[int]]:
     """Return the run of a folder, new or gone on with, and the numbers of the blocks found damaged.
 
@@ -83,6 +91,7 @@ def opened(
         default: for a new run.
         command: that makes it.
         resume: whether a run that is there may be gone on with.
+        at_least: whether one that has more particles will do, and stays as large as it is.
 
     Raises:
         BadInput: the folder has another run, or this one and `resume` was not asked for; it is of another
@@ -93,12 +102,11 @@ def opened(
         run.check()
         _check_disk(run)
         return run, []
-    found = attributes_of(folder)
-    wanted = asked.to_data() | ({} if block is None else {"block": block})
-    other = difference(found, wanted)
-    if other is None and found["particles"] > n_particles:
+    found = described(folder, asked, {} if block is None else {"block": block})
+    if at_least and found["particles"] > n_particles:
+        n_particles, command = found["particles"], found["command"]
+    if found["particles"] > n_particles:
         other = f"particles = {found['particles']} there, {n_particles} asked for: a run only grows"
-    if other is not None:
         raise BadInput(f"output {str(folder)!r} holds another run: {other}")
     if not resume:
         raise BadInput(f"output {str(folder)!r} holds this run: --resume goes on with it")
@@ -108,6 +116,19 @@ def opened(
     _check_disk(run)
     run.describe()
     return run, damaged
+
+
+def described(folder: Path, asked: Asked, more: dict[str, object]) -> dict[str, Any]:
+    """Return what a stored run says of itself, if it is the one asked for.
+
+    Raises:
+        BadInput: it is another: in what, and both values; or its description is damaged.
+    """
+    found = attributes_of(folder)
+    other = difference(found, asked.to_data() | more)
+    if other is not None:
+        raise BadInput(f"output {str(folder)!r} holds another run: {other}")
+    return found
 
 
 def complete(

@@ -38,5 +38,8 @@ def part(run: AnyRun, number: int, source: str) -> Array | None:
         return run.read(number, "energy")[:, -1]
     if source == "n_collisions":
         return np.asarray(run.read(number, "collisions").sum(axis=1))
-    name = BY_SOURCE.get(source)  # energies at phases are not stored: `simulate` asks for none
-    return run.read(number, name) if name in run.shape.names else None
+    name = BY_SOURCE[source]
+    if name not in run.shape.names:
+        return None
+    array = run.read(number, name)
+    return array.astype(bool) if source == "phase_captured" else array  # of Zarr's -1 none is left

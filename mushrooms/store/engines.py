@@ -43,6 +43,7 @@ def follow(asked: Asked, piece: Piece, threads: int | None, tick: Tick | None = 
         seed=asked.seed,
         first=piece.first,
         threads=threads,
+        phases=asked.phases,
         progress=tick,
     )
     return Block(columns(ensemble), tally_of(ensemble), ensemble.seconds * ensemble.threads)

@@ -37,6 +37,7 @@ class Stored(NamedTuple):
 
 
 ONE, CYCLES, SLOTS = ("particle",), ("particle", "cycle"), ("particle", "cycle", "narrowing")
+LOOKS = ("particle", "cycle", "phase")
 FIELDS = {
     "energy": Stored(CYCLES, "float64", "cycle_energies", "energy v^2/2 at the end of each cycle"),
     "t": Stored(ONE, "float64", "t", "time of the last state"),
@@ -49,6 +50,8 @@ FIELDS = {
     "t_out": Stored(SLOTS, "float64", "t_out", "end of that stay"),
     "collisions": Stored(("particle", "wall"), "int64", "wall_counts", "collisions with each wall"),
     "careful": Stored(ONE, "int64", "n_careful", "collisions left to the careful step"),
+    "phase_energy": Stored(LOOKS, "float64", "phase_energies", "energy v^2/2 at the phases of each cycle"),
+    "phase_captured": Stored(LOOKS, "int8", "phase_captured", "1: captured there; -1: not followed yet"),
 }
 
 
@@ -58,13 +61,14 @@ class Shape(NamedTuple):
     Attributes:
         n_particles: in all.
         block: particles of a block; the last one may have fewer.
-        n_cycles, n_narrowings: looks at each.
+        n_cycles, n_narrowings, n_phases: looks at each.
     """
 
     n_particles: int
     block: int
     n_cycles: int
     n_narrowings: int
+    n_phases: int = 0
 
     @property
     def n_blocks(self) -> int:
@@ -78,6 +82,7 @@ class Shape(NamedTuple):
     def of(self, name: str, n: int) -> tuple[int, ...]:
         """Return the shape of an array for n particles."""
         sizes = {"cycle": self.n_cycles, "narrowing": self.n_narrowings, "wall": len(WALLS)}
+        sizes["phase"] = self.n_phases
         return (n, *(sizes[dim] for dim in FIELDS[name].dims[1:]))
 
     @property
@@ -99,7 +104,7 @@ class Shape(NamedTuple):
 
 def columns(ensemble: Ensemble) -> Arrays:
     """Return the arrays that are stored of an ensemble."""
-    return {name: getattr(ensemble, field.source) for name, field in FIELDS.items()}
+    return {n: getattr(ensemble, field.source).astype(field.kind, copy=False) for n, field in FIELDS.items()}
 
 
 def to_chunk(array: Array, block: int) -> bytes:

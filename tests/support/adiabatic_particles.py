@@ -19,6 +19,7 @@ import theory
 from conformance.audit.evidence import DIGITS
 from scene.tables import cycle_length
 
+TOGETHER = 4000  # particles drawn at a time
 WIDTH = 11.0  # of the uncaptured peak, times E0^(1/4), where no frozen rates are known
 
 predict = cache(theory.predict)
@@ -44,13 +45,26 @@ def windows(scene):
     return [(curve.p_cha[k], curve.t_in[k], curve.t_out[k], curve.s[k] - s_nc) for k in parts]
 
 
-def simulate(scene, *, n_particles, energy, n_cycles=1, seed=0, threads=None, phases=(), progress=None):
+def simulate(
+    scene, *, n_particles, energy, n_cycles=1, seed=0, first=0, threads=None, phases=(), progress=None
+):
     if progress:
         progress(n_particles)
-    return drawn(scene, n_particles, energy, n_cycles, seed, tuple(phases))
+    return joined(scene, n_particles, energy, n_cycles, seed, first, tuple(phases))
 
 
 @cache  # whoever plants a fault changes copies
+def joined(scene, n_particles, energy, n_cycles, seed, first, phases):
+    """Return particles that are the same in every run of the seed, as those of `fast.simulate` are."""
+    size = TOGETHER if n_cycles == 1 else TOGETHER // 5
+    numbers = range(first // size, -(-(first + n_particles) // size))
+    parts = [drawn(scene, size, energy, n_cycles, (seed, number), phases) for number in numbers]
+    cut = slice(first % size, first % size + n_particles)
+    names = fast.Ensemble._fields[1:-2]
+    fields = {name: np.concatenate([getattr(part, name) for part in parts])[cut] for name in names}
+    return parts[0]._replace(**fields)
+
+
 def drawn(scene, n_particles, energy, n_cycles, seed, phases):
     rng = np.random.default_rng(seed)
     p_nc, _, _, _ = curves(scene)
@@ -100,6 +114,22 @@ def stays_in(scene, n, rng):
     return gain, t_in, t_out
 
 
+@cache
+def at_phases(scene, energy, phases):
+    """Return mean and variance of the uncaptured's log E / E0 at each phase."""
+    return theory.at_energy(scene, energy).zone([phase * cycle_length(scene) for phase in phases])
+
+
+@cache
+def at_capture(scene, energy):
+    """Return mean and variance of log E / E0 of each atom of captures when it is captured."""
+    found = theory.at_energy(scene, energy)
+    times, places = np.unique(found.atoms.t_in[~found.atoms.is_free], return_inverse=True)
+    entered = np.full((2, len(found.atoms.t_in)), np.nan)
+    entered[:, ~found.atoms.is_free] = np.array(found.at_capture(times))[:, places]
+    return entered
+
+
 def captured_ever(t_in):
     return np.isfinite(t_in).any(axis=1)
 
@@ -139,13 +169,14 @@ def one_cycle(scene, energy, total, phases, rng):
         grid, _, cap = zone
         for k, phase in enumerate(phases):
             t = phase * grid[-1]
-            centre, spread = (x[0] for x in found.zone([t]))
+            centre, spread = (x[k] for x in at_phases(scene, energy, phases))
             now = centre - spread / 4 + blurred(np.full(n, spread), noise, rng)
             with np.errstate(invalid="ignore"):
                 inside[:, k] = ((t_in < t) & (t < t_out)).any(axis=1)
-            begun, own = t_in[inside[:, k], 0], noise[inside[:, k]]
-            entered, wide = found.at_capture(begun)
-            change = np.interp(t, grid, cap) - np.interp(begun, grid, cap)
-            now[inside[:, k]] = entered + np.sqrt(np.maximum(wide, 0)) * own - change * (1 + own / speed)
+            if inside[:, k].any():  # nobody where captures are no atoms
+                begun, own = t_in[inside[:, k], 0], noise[inside[:, k]]
+                entered, wide = at_capture(scene, energy)[:, i[inside[:, k]]]
+                change = np.interp(t, grid, cap) - np.interp(begun, grid, cap)
+                now[inside[:, k]] = entered + np.sqrt(np.maximum(wide, 0)) * own - change * (1 + own / speed)
             phase_s[:, k] = now
     return s, t_in, t_out, phase_s, inside

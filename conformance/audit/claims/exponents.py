@@ -26,7 +26,7 @@ from conformance.audit.claims.experiments import chord_time
 from conformance.audit.claims.finite_energy import ACW, ERGODIC, FIXED, LADDER
 from conformance.audit.evidence import ClaimEvidence
 from conformance.audit.finding import Check
-from conformance.audit.runs import RUNS, block_seed, scene_of
+from conformance.audit.runs import RUNS, run_seed, scene_of
 from conformance.audit.samples import Sample
 from conformance.audit.tolerances import BoolArray, FloatArray, Mean, close, mean, share, spread, stated
 from scene import Mushroom, Scene, State, load
@@ -86,7 +86,7 @@ class Orbit(NamedTuple):
 def _orbits(follow: Callable[..., Collisions], seed: int) -> list[list[Orbit]]:
     """Return drawn orbits, a row for each with its speeds in SPEEDS."""
     scene = load("breathing-circle")
-    random = np.random.default_rng(block_seed(seed, RUNS["frozen-mushroom@1e8"], -3))
+    random = np.random.default_rng(run_seed(seed, RUNS["frozen-mushroom@1e8"], -3))
     starts = random.uniform((-0.6, 0.1, 0.0), (0.6, 0.7, 2 * np.pi), size=(N_ORBITS, 3)).tolist()
     return [[_orbit(follow, scene, speed, *start) for speed in SPEEDS] for start in starts]
 
@@ -186,7 +186,7 @@ def _exponent(what: str, samples: list[Sample], values: list[Mean], exponent: fl
 def volumes(evidence: ClaimEvidence) -> Iterator[Check]:
     """L3: volumes as shares of random phase points, and of particles that stay in the frozen cap."""
     n = N_POINTS[evidence.size]
-    random = np.random.default_rng(block_seed(evidence.seed, RUNS["frozen-mushroom@1e8"], -1))
+    random = np.random.default_rng(run_seed(evidence.seed, RUNS["frozen-mushroom@1e8"], -1))
     scene = load("moving-cap")
     for phase in (1 / 8, 3 / 8, 1 / 2):
         now = theory.volumes_at(fp, scene, 2 * fp.pi * phase)
@@ -328,10 +328,10 @@ def work(evidence: ClaimEvidence) -> Iterator[Check]:
     """L7: mean exp(-W/kT) = A(t)/A(0), exact at any speed of the walls."""
     phases = (0.25, 0.5, 0.75)
     scene = load("moving-cap")
-    random = np.random.default_rng(block_seed(evidence.seed, RUNS["moving-cap@1e3"], -1))
+    random = np.random.default_rng(run_seed(evidence.seed, RUNS["moving-cap@1e3"], -1))
     rows, n_lost = [], 0
     for k, energy in enumerate(random.exponential(HOTTER * KT, N_ENERGIES[evidence.size])):
-        seed = block_seed(evidence.seed, RUNS["moving-cap@1e3"], -2 - k)
+        seed = run_seed(evidence.seed, RUNS["moving-cap@1e3"], -2 - k)
         done = evidence.steppers.simulate(
             scene,
             n_particles=PER_ENERGY,

@@ -16,7 +16,7 @@ from mpmath import fp
 import theory
 from conformance.audit.evidence import ClaimEvidence
 from conformance.audit.finding import Check
-from conformance.audit.runs import RUNS, block_seed
+from conformance.audit.runs import RUNS, run_seed
 from conformance.audit.tolerances import Cdf, FloatArray, Mean, close, fits, share
 from scene import Horizon, Mushroom, Scene, State, load
 from scene.geometry import table_at
@@ -33,7 +33,7 @@ def filling(evidence: ClaimEvidence) -> Iterator[Check]:
     for name in SCENES:
         table, places = load(name), []
         assert isinstance(table, Mushroom)
-        n, seed = N_PARTICLES[evidence.size], block_seed(evidence.seed, RUNS["moving-cap@1e7"], -2)
+        n, seed = N_PARTICLES[evidence.size], run_seed(evidence.seed, RUNS["moving-cap@1e7"], -2)
         states = starts(table, n, seed)
         for phase in PHASES:
             t = cycle_length(table) * phase

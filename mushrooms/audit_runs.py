@@ -1,0 +1,110 @@
+"""The audit's runs on disk: DIR/runs/NAME is what `mushrooms simulate --out` makes, here or elsewhere."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Sequence
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from conformance.audit.runs import RUNS, Simulation, Size, run_seed, scene_of
+from mushrooms import output
+from mushrooms.simulate import tell_damaged
+from mushrooms.store import conduct, engines, head
+from mushrooms.store.asked import Asked
+from mushrooms.store.blocks import is_run
+from scene.files import locked
+from scene.refusal import BadInput
+
+if TYPE_CHECKING:
+    from conformance.audit.finding import Entry
+    from fast import Ensemble
+    from scene import Scene
+
+FOLDER = "runs"
+
+
+def needed(entries: Sequence[Entry], size: Size) -> list[Simulation]:
+    """Return the runs that entries rest on, in the order in which they are made."""
+    runs = [RUNS[name] for name in dict.fromkeys(name for entry in entries for name in entry.runs)]
+    return [run for run in runs if run.n_particles(size)]
+
+
+def asked_of(run: Simulation, seed: int) -> Asked:
+    """Return what decides the bits of a run in the audit of a seed."""
+    return Asked(scene_of(run), run.energy, run.n_cycles, run_seed(seed, run), run.phases)
+
+
+def command(run: Simulation, size: Size, seed: int, folder: Path) -> str:
+    """Return the command that makes a run where an audit in the folder takes it up with --resume."""
+    return asked_of(run, seed).command(run.scene, run.n_particles(size), folder / FOLDER / run.name)
+
+
+class KeptRuns:
+    """Runs in the folder of an audit.
+
+    Args:
+        folder: of the audit, held by the caller.
+        resume: whether runs that are there may be gone on with.
+    """
+
+    def __init__(self, folder: Path, resume: bool) -> None:
+        self._folder, self._resume = folder / FOLDER, resume
+
+    def check(self, runs: Sequence[Simulation], seed: int) -> None:
+        """Refuse at once what would be refused when its turn has come.
+
+        Raises:
+            BadInput: the folder of one of these runs holds another, or this one and `resume` was not
+                asked for, or somebody else writes in it.
+        """
+        for run in runs:
+            place = self._folder / run.name
+            if is_run(place):
+                with locked(place):
+                    conduct.described(place, asked_of(run, seed), {})
+                if not self._resume:
+                    how = "--resume takes it up, another --out begins anew"
+                    raise BadInput(f"output {str(place)!r} holds a run of this audit: {how}")
+
+    def simulate(self, name: str) -> Callable[..., Ensemble]:
+        """Return what stands for `fast.simulate` in a run: it follows only what the run's folder lacks."""
+        return partial(self._simulate, self._folder / name)
+
+    def _simulate(
+        self,
+        place: Path,
+        scene: Scene,
+        *,
+        n_particles: int,
+        energy: float,
+        n_cycles: int,
+        seed: int,
+        threads: int | None,
+        phases: tuple[float, ...],
+        progress: Callable[[int], None],
+    ) -> Ensemble:
+        asked = Asked(scene, energy, n_cycles, seed, phases)
+        line = asked.command(scene.name, n_particles, place)
+        default = block_size(asked, n_particles, threads or os.cpu_count() or 1)
+        with output.writable_folder(place), locked(place):
+            run, damaged = conduct.opened(
+                place, asked, n_particles, None, default, line, self._resume, at_least=True
+            )
+            tell_damaged(damaged)
+            try:
+                head.complete(run, n_particles, engines.in_process(threads), progress)
+            except OSError as error:
+                why = error.strerror or error
+                raise BadInput(f"output {str(place)!r}: {why}; --resume takes up what is kept") from None
+            return head.ensemble_of(run, n_particles)
+
+
+def block_size(asked: Asked, n_particles: int, threads: int) -> int:
+    """Return how many particles of a new run are kept at a time, at most all of them.
+
+    At the end of a block the lanes wait for its slowest particle. Energies spread with the cycles, so that
+    what takes seconds has too few particles to wait for; `fast` shares work out by the same rule.
+    """
+    return min(conduct.block_size(asked, threads) * asked.n_cycles, conduct.MOST_BLOCK, n_particles)

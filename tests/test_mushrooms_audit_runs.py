@@ -1,0 +1,319 @@
+"""The audit's runs on disk: those that `mushrooms simulate` makes, gone on with, widened and read in part."""
+
+from __future__ import annotations
+
+import json
+import os
+import shlex
+import tomllib
+from contextlib import suppress
+
+import numpy as np
+import pytest
+import xarray
+from support import adiabatic_particles
+from support.harm import harmed
+from support.refusals import assert_refused
+
+import fast
+import scene as scenes
+from conformance.audit import ledger
+from conformance.audit.runs import RUNS, SCENES, Simulation, run_seed, scene_of
+from conformance.audit.samples import Sample, draw
+from mushrooms import audit_runs
+from mushrooms.store import blocks, conduct, head
+from scene import BadInput
+from scene.files import locked
+
+SMALL = {
+    "breathing": Simulation("breathing-circle", 60.0, 100, 270, n_cycles=2, phases=(0.25, 0.5)),
+    "mouth": Simulation("only-mouth", 60.0, 100, 270, phases=(0.1, 0.5, 0.9)),
+    "cycles": Simulation("moving-cap", 40.0, 100, 270, n_cycles=3),
+}
+N_QUICK, SEED = 100, 5
+
+
+@pytest.fixture(autouse=True)
+def _small(monkeypatch):
+    """Have small blocks, and leave files to the system's buffers, since a busy disk would take minutes."""
+    monkeypatch.setattr(os, "fsync", lambda _descriptor: None)
+    monkeypatch.setattr(conduct, "MOST_BLOCK", 64)
+
+
+@pytest.fixture
+def followed(monkeypatch):
+    """Return the list of pieces that are followed, (first particle, how many), without probes."""
+    pieces, simulate = [], fast.simulate
+
+    def noted(scene, **options):
+        if options["n_particles"] != conduct.PROBED:
+            pieces.append((options.get("first", 0), options["n_particles"]))
+        return simulate(scene, **options)
+
+    monkeypatch.setattr(fast, "simulate", noted)
+    return pieces
+
+
+def kept(folder, run, size="quick", *, resume=True, seed=SEED):
+    """Return a run's sample as an audit in the folder has it."""
+    runs = audit_runs.KeptRuns(folder, resume=resume)
+    runs.check([run], seed)
+    return draw(runs.simulate(run.name), run, size=size, seed=seed, threads=1)
+
+
+def at_once(run, size="quick"):
+    return draw(fast.simulate, run, size=size, seed=SEED, threads=1)
+
+
+def assert_same(found, wanted):
+    """Hold that two samples are one to the bit; times are none."""
+    for name in set(Sample._fields) - {"run", "seconds"}:
+        np.testing.assert_array_equal(getattr(found, name), getattr(wanted, name), err_msg=name)
+
+
+def made(command_line, run, folder, n, *more):
+    """Make a run as the audit's command says, with n particles."""
+    words = shlex.split(audit_runs.command(run, "quick", SEED, folder))[1:]
+    words[words.index("--particles") + 1] = n
+    ended = command_line(*words, "--threads", 1, "--json", *more)
+    assert ended.code == 0, ended.err
+    return json.loads(ended.out)
+
+
+@pytest.mark.parametrize("name", SMALL)
+def test_a_kept_run_is_the_one_at_once_and_quick_is_the_begin_of_full(tmp_path, followed, name):
+    run = SMALL[name]
+    quick, full = at_once(run), at_once(run, "full")
+    followed.clear()
+    assert_same(kept(tmp_path, run, resume=False), quick)
+    assert followed == [(0, 64), (64, 36)]
+    assert_same(kept(tmp_path, run, "full"), full)
+    assert followed[2:] == [(100, 28), (128, 64), (192, 64), (256, 14)]
+    assert_same(kept(tmp_path, run), quick)  # of the larger run
+    assert len(followed) == 6
+    np.testing.assert_array_equal(quick.s, full.s[: quick.n])
+
+
+@pytest.mark.parametrize("name", ["breathing", "mouth"])
+def test_what_simulate_has_made_is_taken_up(command_line, tmp_path, followed, name):
+    """One with more particles too; and the audit's report tells the digest that `simulate` prints."""
+    run = SMALL[name]
+    summary = made(command_line, run, tmp_path, N_QUICK)
+    found = kept(tmp_path, run)
+    assert found.sha256 == summary["sha256"]
+    assert_same(found, at_once(run))
+    larger = made(command_line, run, tmp_path, 300)
+    followed.clear()
+    assert_same(kept(tmp_path, run), found)
+    wanted = kept(tmp_path, run, "full")
+    assert followed == []
+    assert_same(wanted, at_once(run, "full"))
+    assert made(command_line, run, tmp_path, 300)["sha256"] == larger["sha256"]  # as it was
+
+
+def test_of_a_larger_run_only_what_the_audit_needs_is_followed(command_line, tmp_path, followed):
+    run = SMALL["mouth"]
+    wanted = at_once(run)
+    larger = made(command_line, run, tmp_path, 300)
+    place = tmp_path / "runs" / run.name
+    for number in (1, 3):  # broken off there
+        (place / "blocks" / f"{number}.marker").unlink()
+    followed.clear()
+    assert_same(kept(tmp_path, run), wanted)
+    assert followed == [(64, 36)]
+    assert made(command_line, run, tmp_path, 300)["sha256"] == larger["sha256"]
+    assert followed[1:] == [(100, 28), (192, 64)]
+
+
+def test_whatever_happens_to_a_kept_run_the_audit_sees_the_same_bits(tmp_path, monkeypatch):
+    """It is broken off, harmed and widened at random."""
+    random, keep, left = np.random.default_rng(23), blocks.RunFolder.keep, 0
+    run = SMALL["breathing"]
+    wanted = {size: at_once(run, size) for size in ("quick", "full")}
+
+    def sometimes(self, piece, block):
+        nonlocal left
+        left -= 1
+        if left < 0:
+            raise [KeyboardInterrupt, OSError(5, "input/output error")][random.integers(2)]
+        keep(self, piece, block)
+
+    monkeypatch.setattr(blocks.RunFolder, "keep", sometimes)
+    for number in range(3):
+        folder, size = tmp_path / str(number), "quick"
+        folder.mkdir()
+        for _ in range(5):
+            left = int(random.integers(0, 5))
+            size = "full" if random.random() < 0.3 else "quick"
+            with suppress(KeyboardInterrupt, BadInput):
+                assert_same(kept(folder, run, size), wanted[size])
+            if any(folder.rglob("*.*")):
+                harmed(folder, random)
+        left = 10**6
+        assert_same(kept(folder, run, "full"), wanted["full"])
+
+
+def test_another_run_or_one_in_use_is_refused_before_anything_is_followed(command_line, tmp_path, followed):
+    run = SMALL["mouth"]
+    made(command_line, run, tmp_path, N_QUICK)
+    followed.clear()
+    place = str(tmp_path / "runs" / run.name)
+    seeds = f"seed = {run_seed(SEED, run)} there, {run_seed(6, run)} asked for"
+    for change, words in (
+        ({"seed": 6}, [place, seeds]),
+        ({"run": run._replace(phases=(0.1, 0.5))}, ["phases = [0.1, 0.5, 0.9] there, [0.1, 0.5] asked for"]),
+        ({"run": run._replace(phases=())}, ["phases = [0.1, 0.5, 0.9] there, [] asked for"]),
+        ({"resume": False}, [place, "--resume takes it up"]),
+    ):
+        with pytest.raises(BadInput) as refusal:
+            kept(tmp_path, **{"run": run, **change})
+        assert all(word in str(refusal.value) for word in words), refusal.value
+    with locked(tmp_path / "runs" / run.name), pytest.raises(BadInput, match="one run at a time"):
+        kept(tmp_path, run)
+    assert followed == []
+
+
+def test_a_run_is_held_while_the_audit_follows_it(command_line, tmp_path, monkeypatch):
+    run, simulate = SMALL["mouth"], fast.simulate
+    words = shlex.split(audit_runs.command(run, "quick", SEED, tmp_path))[1:]
+    refused = []
+
+    def meanwhile(scene, **options):
+        monkeypatch.setattr(fast, "simulate", simulate)
+        refused.append(command_line(*words))
+        return simulate(scene, **options)
+
+    monkeypatch.setattr(fast, "simulate", meanwhile)
+    assert kept(tmp_path, run).n_particles == N_QUICK
+    assert_refused(refused[0], "one run at a time")
+
+
+def cut_off(run, n, source):
+    """Read whole blocks."""
+    parts = [head.part(run, number, source) for number in range(-(-n // run.shape.block))]
+    return np.concatenate(parts)
+
+
+def begun_anew(run, n):
+    """Follow a block from its first particle, whatever there is of it."""
+    for piece in run.missing():
+        if piece.first < n:
+            yield piece._replace(first=piece.number * run.shape.block)
+
+
+@pytest.mark.parametrize(("name", "faulty"), [("_first", cut_off), ("missing", begun_anew)])
+def test_faulty_ways_to_read_and_widen_are_found_out(tmp_path, monkeypatch, name, faulty):
+    run = SMALL["mouth"]
+    monkeypatch.setattr(head, name, faulty)
+    sizes = ("quick", "full", "quick")
+    found = [kept(tmp_path, run, size).sha256 for size in sizes]
+    assert found != [at_once(run, size).sha256 for size in sizes]
+
+
+def test_the_commands_of_an_audit_make_its_runs(command_line, tmp_path, monkeypatch):
+    """Each asks for what the audit asks for, of a scene that `simulate` knows; nothing is made yet."""
+    monkeypatch.chdir(tmp_path)
+    for more, size in (([], "quick"), (["--full"], "full")):
+        ended = command_line("audit", "--commands", "--out", "here", "--seed", 3, *more)
+        assert ended.code == 0
+        lines = ended.out.splitlines()
+        runs = audit_runs.needed(ledger.entries(), size)
+        assert {run.name for run in runs} == {name for name, run in RUNS.items() if run.n_particles(size)}
+        assert len({run_seed(3, run) for run in runs}) == len(lines) == len(runs)
+        for line, run in zip(lines, runs, strict=True):
+            words = shlex.split(line)
+            assert words[:3] == ["mushrooms", "simulate", run.scene]
+            options = dict(zip(words[3:-1:2], words[4:-1:2], strict=True))
+            assert (float(options["--energy"]), int(options["--cycles"])) == (run.energy, run.n_cycles)
+            assert int(options["--seed"]) == run_seed(3, run)
+            assert int(options["--particles"]) == run.n_particles(size)
+            assert options["--out"] == f"here/runs/{run.name}"
+            assert tuple(map(float, filter(None, options.get("--phases", "").split(",")))) == run.phases
+            assert scene_of(run).name == run.scene
+    ended = command_line("audit", "--commands", "--only", "X5", "--json")
+    assert len(json.loads(ended.out)) == 2
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_the_audit_s_scenes_are_known_by_name(command_line, tmp_path, name):
+    for option, read in (("--toml", tomllib.loads), ("--json", json.loads)):
+        ended = command_line("scenes", name, option)
+        assert scenes.from_data(read(ended.out)) == SCENES[name]
+    path = tmp_path / "a.toml"
+    path.write_text(command_line("scenes", name, "--toml").out)
+    assert scenes.load(path) == SCENES[name]
+
+
+def test_energies_at_phases_are_kept_drawn_and_exported(command_line, tmp_path):
+    phases = (0.25, 0.5)
+    wanted = fast.simulate(
+        scenes.load("moving-cap"), n_particles=90, energy=60.0, seed=SEED, n_cycles=2, phases=phases
+    )
+    run = ["simulate", "moving-cap", "--particles", 90, "--energy", 60, "--seed", SEED, "--cycles", 2]
+    run += ["--out", tmp_path / "run", "--block", 64, "--json"]
+    ended = command_line(*run, "--phases", "0.25,0.5")
+    assert json.loads(ended.out)["sha256"] == wanted.sha256()
+    with xarray.open_zarr(tmp_path / "run" / "ensemble.zarr") as found:
+        assert found.attrs["phases"] == list(phases)
+        for name, source in (("phase_energy", "phase_energies"), ("phase_captured", "phase_captured")):
+            assert found[name].dims == ("particle", "cycle", "phase")
+            np.testing.assert_array_equal(found[name].values, getattr(wanted, source))
+        assert found.phase_captured.dtype == np.int8
+    assert command_line("draw", tmp_path / "run", "--out", tmp_path / "a.svg").code == 0
+    assert (tmp_path / "a.svg").stat().st_size > 5000
+    assert command_line("export", tmp_path / "run", "--to", tmp_path / "a.npz").code == 0
+    with np.load(tmp_path / "a.npz") as arrays:
+        np.testing.assert_array_equal(arrays["phase_captured"], wanted.phase_captured)
+        assert arrays["phase_captured"].dtype == bool
+    assert command_line("export", tmp_path / "run", "--to", tmp_path / "a.csv").code == 0
+    assert "phase_energy_2_1,phase_energy_2_2,phase_captured_1_1" in (tmp_path / "a.csv").read_text()
+    for other, there in (([], "[]"), (["--phases", "0.25"], "[0.25]")):
+        refused = command_line(*run, "--resume", *other)
+        assert_refused(refused, f"phases = [0.25, 0.5] there, {there} asked for")
+
+
+def test_what_is_not_there_yet_has_no_phase(tmp_path):
+    """A run of three blocks of which only the second is kept."""
+    asked = audit_runs.asked_of(SMALL["mouth"], SEED)
+    run, _ = conduct.opened(tmp_path, asked, 150, 64, 64, "", False)
+    piece = list(run.missing())[1]
+    run.keep(piece, audit_runs.engines.follow(asked, piece, 1))
+    with xarray.open_zarr(tmp_path / "ensemble.zarr", mask_and_scale=False) as found:
+        there = np.zeros(150, bool)
+        there[64:128] = True
+        np.testing.assert_array_equal((found.phase_captured.values >= 0).all(axis=(1, 2)), there)
+        np.testing.assert_array_equal((found.phase_captured.values == -1).all(axis=(1, 2)), ~there)
+        np.testing.assert_array_equal(np.isfinite(found.phase_energy.values).all(axis=(1, 2)), there)
+
+
+def test_without_phases_a_run_says_what_it_always_said(tmp_path):
+    run = SMALL["cycles"]
+    kept(tmp_path, run)
+    place = tmp_path / "runs" / run.name
+    assert "phases" not in blocks.attributes_of(place)
+    assert "phases" not in audit_runs.asked_of(run, SEED).to_data()  # nor in what markers are held to
+    assert not list(place.rglob("phase*"))
+
+
+@pytest.mark.parametrize("phases", ["", "a", "0.5,0.25", "0", "0.5,1", "0.5,", "nan", "0.5;0.6"])
+def test_phases_that_are_none_are_refused(command_line, tmp_path, phases):
+    run = ["simulate", "moving-cap", "--particles", 5, "--energy", 1, "--phases", phases]
+    assert_refused(command_line(*run, "--out", tmp_path / "a"), "--phases ")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_phases_need_a_folder(command_line):
+    run = ["simulate", "moving-cap", "--particles", 5, "--energy", 1, "--phases", "0.5"]
+    assert_refused(command_line(*run), "--phases needs --out")
+
+
+def test_the_stand_in_s_particles_depend_on_their_numbers_alone():
+    options = {"energy": 1e4, "seed": 3, "phases": (0.5,)}
+    size = adiabatic_particles.TOGETHER
+    whole = adiabatic_particles.simulate(scenes.load("moving-cap"), n_particles=size + 500, **options)
+    part = adiabatic_particles.simulate(
+        scenes.load("moving-cap"), n_particles=200, first=size - 100, **options
+    )
+    for name in fast.Ensemble._fields[1:-2]:
+        np.testing.assert_array_equal(getattr(whole, name)[size - 100 : size + 100], getattr(part, name))

@@ -75,7 +75,7 @@ def _fine(sources):
 
 
 def _follow(sources):
-    @njit(cache=True, nogil=True, error_model="numpy")
+    @njit(cache=True, nogil=True, error_model="numpy", _nrt=False)
     def follow_particles(worker, walls, slope, paths):
         """Follow particles to the last stop, or where `paths` has room from collision to collision.
 
@@ -96,7 +96,7 @@ def _fill_pieces(sources):
     def fill_pieces(laws, references, coefficients):
         """Write the polynomials of all laws about reference times: see fast.kernel.pieces."""
         sources  # noqa: B018
-        fill_coefficients(laws, references, coefficients)
+        fill_coefficients(laws, references, coefficients, np.zeros(ANCHORS_SHAPE))
 
     return fill_pieces
 

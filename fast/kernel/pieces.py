@@ -13,7 +13,7 @@ from fast.kernel.compiling import kernel, packed
 from fast.kernel.laws import bend_of_half_leg, set_anchors, whole_periods
 
 from fast.kernel.records import (  # isort: skip
-    AMPLITUDES, ANCHORS_SHAPE, BANG_BANG, COSINE, DEPTH, FOURIER, HALF_LEG, KIND, N_HARMONICS, OMEGA,
+    AMPLITUDES, BANG_BANG, COSINE, DEPTH, FOURIER, HALF_LEG, KIND, N_HARMONICS, OMEGA,
     PHASE, RADIUS, RATE, SINE, SLOPE, VALUE, VALUE_LOW, WIDTH,
 )  # fmt: skip
 

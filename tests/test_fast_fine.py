@@ -8,6 +8,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 from hypothesis import given, settings
+from support.from_python import from_python
 from support.truth import centre, proved_step
 
 import fast
@@ -40,10 +41,10 @@ def test_pairs_are_right_to_31_decimals(operation, seed):
     highs, lows = random.normal(size=2), random.normal(size=2) * 2.0**-54
     if seed % 2:
         highs[1] = -highs[0] * (1.0 + 2.0 ** -random.integers(1, 52))  # they cancel
-    a, b = (dd.two_sum(*ends) for ends in zip(highs, lows * highs, strict=True))
+    a, b = (from_python(dd.two_sum)(*ends) for ends in zip(highs, lows * highs, strict=True))
     truth = {"add": exact(a) + exact(b), "sub": exact(a) - exact(b)}
     truth |= {"mul": exact(a) * exact(b), "div": exact(a) / exact(b)}
-    error = abs(exact(getattr(dd, operation)(a, b)) - truth[operation])
+    error = abs(exact(from_python(getattr(dd, operation))(a, b)) - truth[operation])
     assert error <= abs(truth[operation]) * Fraction(2) ** -101
 
 
@@ -53,7 +54,7 @@ def test_sine_and_cosine_to_32_decimals(angle):
 
     with mp.workdps(60):
         truth = mp.sin(mp.mpf(angle)), mp.cos(mp.mpf(angle))
-        *found, is_in_reach = dd.sine_cosine((angle, 0.0))
+        *found, is_in_reach = from_python(dd.sine_cosine)((angle, 0.0))
         assert is_in_reach
         for a, b in zip(found, truth, strict=True):
             assert abs(mp.mpf(float(a[0])) + mp.mpf(float(a[1])) - b) <= mp.mpf(2) ** -103 * max(

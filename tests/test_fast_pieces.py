@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from mpmath import MPContext
+from support.from_python import from_python
 
 from conformance.strategies import scenes
 from fast import pieces
@@ -37,12 +38,12 @@ def worst_errors(scene, random, n):
     p, degree = in_lanes.pieces, in_lanes.degree
     span = 7 * p.period if p.period < np.inf else 10.0
     for t in random.uniform(-span, span, n):
-        piece, reference, low = piece_at(p, t, 0.0)
+        piece, reference, low = from_python(piece_at)(p, t, 0.0)
         near, far = np.sort(random.choice([-1.0, 1.0, *random.uniform(-1, 1, 2)], 2)) * p.limits[piece]
         if p.period == np.inf:
             near, far = -1.0, 1.0
         for row, law in as_rows(scene).items():
-            f, rate, _, mean = law_at(p.coefficients[piece, row], 0, 1, far, near, degree)
+            f, rate, _, mean = from_python(law_at)(p.coefficients[piece, row], 0, 1, far, near, degree)
             at = [CTX.mpf(reference) + CTX.mpf(low) + CTX.mpf(u) for u in (near, far)]
             true = [value(CTX, law, u) for u in at]
             rates = terms_of_rate(law)

@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from mpmath import mp, workprec
+from support.from_python import from_python
 from support.tables import CIRCLE, STATIC
 from support.truth import proved_step
 
@@ -41,7 +42,7 @@ from scene.tables import laws
     st.floats(-1e-12, 1e-12),
 )
 def test_sine_and_cosine(omega, k, t, t_low):
-    s, s_low, c, c_low, is_reduced = arithmetic.sine_cosine(omega, 0.0, float(k), t, t_low)
+    s, s_low, c, c_low, is_reduced = from_python(arithmetic.sine_cosine)(omega, 0.0, float(k), t, t_low)
     with workprec(200):
         phase = k * mp.mpf(omega) * (mp.mpf(t) + mp.mpf(t_low))
         if not is_reduced:
@@ -63,10 +64,10 @@ def test_increments_of_laws(name, t, s):
     scene = load(name)
     compiled = compile_scene(scene)
     anchors = np.zeros(ANCHORS_SHAPE)
-    assert set_anchors(compiled.laws, anchors, t, 0.0)
+    assert from_python(set_anchors)(compiled.laws, anchors, t, 0.0)
     with workprec(200):
         law, then = laws(scene)["h"], mp.mpf(t) + mp.mpf(s)
-        change, rate, size, _ = increment(compiled.laws, anchors, DEPTH, s)
+        change, rate, size, _ = from_python(increment)(compiled.laws, anchors, DEPTH, s)
         exact = value(mp, law, then) - value(mp, law, mp.mpf(t))
         # Small increments keep their relative accuracy: 16 roundings of the summed terms, and
         # the rounding of a knot's time by one unit in the last place, at speeds up to 32.
@@ -172,3 +173,11 @@ def test_lanes_with_a_start_that_names_no_wall(state):
     (found,) = lane_steps(STATIC, [state])
     truth = fast.next_collision(STATIC, state, 9.0)
     assert found is None or found.wall == truth.wall
+
+
+def test_a_kernel_refuses_python():
+    """It is compiled without what Python would call; before and after compiled callers have used it."""
+    for _ in range(2):
+        with pytest.raises(TypeError, match="by compiled functions only"):
+            arithmetic.sine_cosine(1.0, 0.0, 1.0, 0.5, 0.0)
+        from_python(arithmetic.sine_cosine)(1.0, 0.0, 1.0, 0.5, 0.0)

@@ -6,20 +6,46 @@ so long chains of calls compile slowly. A function with one or two callers is be
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 from llvmlite import ir
 from numba import config, njit, types
 from numba.extending import intrinsic
 
-# A function of its own. No fastmath, so that results are the same bits on every machine; quotients by zero
-# are infinite or nan, as in numpy. Wrappers for callers in C, which there are none of, are left out.
-kernel = njit(error_model="numpy", no_cfunc_wrapper=True)
-# A function whose text is put into its callers before types are inferred. In a loop over lanes it may not be
-# given an array: numba counts one more reference to it there, and the loop is not packed.
-part = njit(error_model="numpy", no_cfunc_wrapper=True, inline="always")
-# A function that LLVM always inlines: a loop over lanes with a call in it is not packed either.
-packed = njit(error_model="numpy", no_cfunc_wrapper=True, forceinline=True)
+# No fastmath, so that results are the same bits on every machine; quotients by zero are infinite or nan, as
+# in numpy. Who enters the kernel holds its arrays while it runs, hence no references are counted in it: each
+# count is an atomic operation, and much to compile. So a kernel cannot allocate.
+HOW: dict[str, Any] = {"error_model": "numpy", "no_cfunc_wrapper": True, "_nrt": False}
+
+
+def _for_compiled_callers(**options: Any) -> Callable[[Any], Any]:
+    """Return a decorator that compiles without what Python would need to call a function; it is refused."""
+
+    def compiled(function: Any) -> Any:
+        dispatcher = njit(**HOW, no_cpython_wrapper=True, **options)(function)
+        if not config.DISABLE_JIT:
+            dispatcher._insert = _kept_from_python
+            dispatcher._compile_for_args = _refused_to_python
+        return dispatcher
+
+    return compiled
+
+
+def _kept_from_python(*_: Any, **__: Any) -> None:
+    pass
+
+
+def _refused_to_python(*_: Any, **__: Any) -> None:
+    raise TypeError("a kernel can be called by compiled functions only; Python can call its .py_func")
+
+
+# A function of its own.
+kernel = _for_compiled_callers()
+# A function that LLVM always inlines: a loop over lanes with a call in it is not packed.
+packed = _for_compiled_callers(forceinline=True)
+# A function whose text is put into its callers before types are inferred.
+part = njit(**HOW, inline="always")
 
 
 @intrinsic
@@ -39,23 +65,3 @@ def _no_registers() -> None:
 # Asks, in the function that calls it, for the widest registers there are: left to itself the compiler takes
 # 256 bits on machines that have 512. The answers are the same bits.
 widest_registers = _no_registers if config.DISABLE_JIT else _compiled_widest_registers
-
-
-@intrinsic
-def _compiled_borrowed(_context: Any, array: Any) -> Any:
-    def generate(context: Any, builder: ir.IRBuilder, signature: Any, arguments: Any) -> Any:
-        view = context.make_array(array)(context, builder, arguments[0])
-        view.meminfo = ir.Constant(view.meminfo.type, None)
-        view.parent = ir.Constant(view.parent.type, None)
-        return view._getvalue()
-
-    return array(array), generate
-
-
-def _itself(array: Any) -> Any:
-    return array
-
-
-# A view of an array that keeps no count of its references: one that is taken from a tuple is counted, and
-# each count is an atomic operation. Only for what a caller holds while the view is used.
-borrowed = _itself if config.DISABLE_JIT else _compiled_borrowed

@@ -17,6 +17,7 @@ from numba import njit
 from fast.kernel.arithmetic import sine_cosine
 from fast.kernel.careful import first_step, step
 from fast.kernel.codes import HORIZON
+from fast.kernel.compiling import HOW
 from fast.kernel.follow import follow
 from fast.kernel.laws import set_anchors
 from fast.kernel.path import follow_one
@@ -24,7 +25,6 @@ from fast.kernel.pieces import fill_coefficients
 from fast.kernel.records import ANCHORS_SHAPE, particle_at, write_state, write_step
 from fast.kernel.refine import fine_path
 from fast.kernel.single import single_step, wall_gap
-from fast.kernel.worker import without_counts
 
 
 def digest_of_sources(folder: Path) -> str:
@@ -75,7 +75,7 @@ def _fine(sources):
 
 
 def _follow(sources):
-    @njit(cache=True, nogil=True, error_model="numpy")
+    @njit(cache=True, nogil=True, **HOW)
     def follow_particles(worker, walls, slope, paths):
         """Follow particles to the last stop, or where `paths` has room from collision to collision.
 
@@ -84,9 +84,9 @@ def _follow(sources):
         """
         sources  # noqa: B018
         if paths.walls.shape[1] > 0:
-            follow_one(without_counts(worker), walls, slope, paths)
+            follow_one(worker, walls, slope, paths)
         else:
-            follow(without_counts(worker), walls, slope)
+            follow(worker, walls, slope)
 
     return follow_particles
 
@@ -96,7 +96,7 @@ def _fill_pieces(sources):
     def fill_pieces(laws, references, coefficients):
         """Write the polynomials of all laws about reference times: see fast.kernel.pieces."""
         sources  # noqa: B018
-        fill_coefficients(laws, references, coefficients)
+        fill_coefficients(laws, references, coefficients, np.zeros(ANCHORS_SHAPE))
 
     return fill_pieces
 

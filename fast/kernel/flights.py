@@ -53,7 +53,7 @@ def gather(a, n, spare, places, worker, slope):
             continue
         if a[OK + i] == FAR:
             set_reference(a, i, a[T + i] + a[S + i], a[T_LOW + i], worker.scene, worker.pieces, worker.degree)
-        copy_rows(a, i, spare, n_open, 0, OK)
+        copy_rows(a, i, spare, n_open, T, OK)
         copy_rows(a, i, spare, n_open, LAWS, LAWS + (4 if slope is None else 3) * N_COEFFICIENTS * STRIDE)
         places[n_open] = i
         n_open += 1

@@ -13,7 +13,7 @@ from fast.kernel.compiling import kernel, packed
 from fast.kernel.laws import bend_of_half_leg, set_anchors, whole_periods
 
 from fast.kernel.records import (  # isort: skip
-    AMPLITUDES, ANCHORS_SHAPE, BANG_BANG, COSINE, DEPTH, FOURIER, HALF_LEG, KIND, N_HARMONICS, OMEGA,
+    AMPLITUDES, BANG_BANG, COSINE, DEPTH, FOURIER, HALF_LEG, KIND, N_HARMONICS, OMEGA,
     PHASE, RADIUS, RATE, SINE, SLOPE, VALUE, VALUE_LOW, WIDTH,
 )  # fmt: skip
 
@@ -109,9 +109,8 @@ def expand_waves(laws, anchors, row, out):
 
 
 @kernel
-def fill_coefficients(laws, references, coefficients):
+def fill_coefficients(laws, references, coefficients, anchors):
     """Write the polynomials of all laws about reference times (P, 2): see `Pieces.coefficients`."""
-    anchors = np.zeros(ANCHORS_SHAPE)
     for i in range(references.shape[0]):
         set_anchors(laws, anchors, references[i, 0], references[i, 1])
         for row in (RADIUS, WIDTH, DEPTH, SLOPE):

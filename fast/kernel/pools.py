@@ -42,8 +42,8 @@ RADIUS_LAW, WIDTH_LAW, DEPTH_LAW, SLOPE_LAW = LAWS + STRIDE * N_COEFFICIENTS * n
 # right.
 ON_ARC, ON_BASE, ON_LEFT, ON_RIGHT, ON_FLOOR = map(float, (ARC, BASE, LEFT, RIGHT, FLOOR))
 FAR, REFUSED, COARSE, CERTAIN = -1.0, 0.0, 1.0, 2.0
-POOL_SIZE = N_ROWS * STRIDE
-REGISTER = 8  # lanes of the widest registers
+POOL_SIZE = np.int64(N_ROWS * STRIDE)
+REGISTER = np.int64(8)  # lanes of the widest registers
 
 
 @part
@@ -125,7 +125,7 @@ def copy_rows(a, i, b, j, first, last):
 @part
 def change_lane(a, i, b, j):
     """Copy lane i of one pool to lane j of another."""
-    copy_rows(a, i, b, j, 0, POOL_SIZE)
+    copy_rows(a, i, b, j, T, POOL_SIZE)
 
 
 @part

@@ -14,7 +14,7 @@ from numba import config
 
 from fast.kernel.careful import step
 from fast.kernel.codes import ARC, BASE, BEYOND, FAR_TIME, FLOOR, HORIZON, NO_WALL
-from fast.kernel.compiling import borrowed, kernel, part
+from fast.kernel.compiling import kernel, part
 from fast.kernel.laws import set_anchors
 from fast.kernel.records import ANCHORS_SHAPE, DEPTH, RADIUS, SHARED, VALUE, WIDTH, Compiled, Particle
 from fast.kernel.walls import crossed_wall, wall_residual
@@ -43,10 +43,9 @@ def packed(scene):
     return np.concatenate([[scene.table, scene.is_relative], scene.bounds.ravel(), scene.laws.ravel()])
 
 
-@kernel
+@part
 def unpacked(numbers):
-    """Return the Compiled that `packed` was given; whoever owns the array must hold it meanwhile."""
-    numbers = borrowed(numbers)
+    """Return the Compiled that `packed` was given."""
     bounds, laws = numbers[2:18].reshape((4, 4)), numbers[18:]
     return Compiled(
         int(numbers[0]), numbers[1] != 0.0, laws.reshape((SHARED + 1, len(laws) // (SHARED + 1))), bounds
@@ -80,11 +79,7 @@ def wall_gap(particle, scene, anchors):
 
 @kernel
 def judged_step(particle, t_end, scene, anchors):
-    """Return the careful step's code, flight time and particle; REFUSED for one off the wall that it names.
-
-    The caller holds the anchors until this returns, hence they can be borrowed.
-    """
-    anchors = borrowed(anchors)
+    """Return the careful step's code, time of flight and particle; REFUSED for one off its wall."""
     if not set_anchors(scene.laws, anchors, particle.t, 0.0):
         return FAR_TIME, 0.0, particle
     if particle.wall != NO_WALL:

@@ -6,7 +6,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fast.kernel.compiling import borrowed, kernel
 from fast.kernel.limits import LawLimits, limits_of
 from fast.kernel.pools import LANES, POOL_SIZE
 
@@ -68,48 +67,4 @@ def new_worker(in_lanes: LawsInLanes, stops: Stops, followed: Followed) -> Worke
         np.zeros(2, np.int64),
         stops,
         followed,
-    )
-
-
-@kernel
-def without_counts(worker):
-    """Return a worker whose arrays count no references: see fast.kernel.compiling.borrowed."""
-    scene, pieces, stops, followed = worker.scene, worker.pieces, worker.stops, worker.followed
-    return Worker(
-        Compiled(scene.table, scene.is_relative, borrowed(scene.laws), borrowed(scene.bounds)),
-        worker.limits,
-        Pieces(
-            pieces.origin,
-            pieces.period,
-            pieces.period_low,
-            borrowed(pieces.begins),
-            borrowed(pieces.references),
-            borrowed(pieces.limits),
-            borrowed(pieces.serves),
-            borrowed(pieces.coefficients),
-            pieces.until,
-        ),
-        worker.degree,
-        borrowed(worker.anchors),
-        worker.is_laned,
-        borrowed(worker.pools),
-        borrowed(worker.rosters),
-        borrowed(worker.n_held),
-        Stops(
-            borrowed(stops.times),
-            borrowed(stops.columns),
-            borrowed(stops.cycles),
-            borrowed(stops.narrowings),
-            stops.is_first_kept,
-        ),
-        Followed(
-            borrowed(followed.states),
-            borrowed(followed.codes),
-            borrowed(followed.counts),
-            borrowed(followed.careful),
-            borrowed(followed.energies),
-            borrowed(followed.is_captured),
-            borrowed(followed.t_in),
-            borrowed(followed.t_out),
-        ),
     )

@@ -31,7 +31,11 @@ Out = Annotated[
     Path | None, typer.Option(metavar="DIR", help="Folder for the run (ensemble.zarr) and summary.json.")
 ]
 Resume = Annotated[
-    bool, typer.Option("--resume", help="Go on with the run in DIR, or widen it by more --particles.")
+    bool,
+    typer.Option(
+        "--resume",
+        help="Go on with the run in DIR, or widen it by more --particles, or lengthen it by more --cycles.",
+    ),
 ]
 Dask = Annotated[
     str | None, typer.Option(metavar="ADDRESS", help="Dask scheduler whose workers follow the particles.")

@@ -18,17 +18,19 @@ import numpy as np
 from fast.kernel.arithmetic import fma
 from fast.kernel.bounces import arrive, bounce, rebound
 from fast.kernel.careful import first_step
-from fast.kernel.codes import ARC, CAP, HORIZON, MUSHROOM, N_WALLS
+from fast.kernel.codes import ANEW, ARC, CAP, HORIZON, MUSHROOM, N_WALLS
 from fast.kernel.compiling import kernel, part
 from fast.kernel.flights import OFF, advance, correct
+from fast.kernel.kept import keep_lane, take_lane
 
 from fast.kernel.pools import (  # isort: skip
     CERTAIN, CLOSED, DONE, END, HIT, LANES, NEVER, NEXT_R0, NEXT_T, NEXT_T_LOW, NEXT_VX, NEXT_VY, NEXT_W0,
-    NEXT_X, NEXT_Y, N_ARC, N_BASE, OK, ROUTINE, S, SINCE, SPIN, STAY_IN, STAY_OUT, STOP, STRIDE, T, T_LOW,
-    UNTIL, VX, VY, WALL, X, Y, change_lane, fold, load, refold, set_laws, set_reference, whole_registers,
+    NEXT_X, NEXT_Y, N_ARC, N_BASE, OK, REGISTER, ROUTINE, S, SINCE, SPIN, STAY_IN, STAY_OUT, STOP, STRIDE, T,
+    T_LOW, UNTIL, VX, VY, WALL, X, Y, change_lane, fold, load, refold, set_laws, set_reference,
+    whole_registers,
 )  # fmt: skip
 from fast.kernel.records import RADIUS, VALUE, WIDTH, Particle, particle_at, write_state
-from fast.kernel.worker import DISK, GENERAL, NEXT_STOP, PARTICLE
+from fast.kernel.worker import DISK, GENERAL, NEXT_STOP, PARTICLE, SPARE
 
 STAYS, MOVES, ENDS = 0, 1, 2
 
@@ -97,6 +99,8 @@ def finish(pool, a, i, j, code, end, followed):
         y = y_end
     write_state(followed.states, j, Particle(t, t_low, x, y, vx, vy, int(a[WALL + i])))
     followed.codes[j] = code
+    if code != HORIZON and followed.lanes.shape[1] > 0:
+        followed.lanes[j] = np.nan  # nothing goes on from there
     for wall in range(N_WALLS):
         followed.counts[j, wall] = int(a[N_ARC + wall * STRIDE + i])
 
@@ -145,8 +149,10 @@ def attend(pool, a, i, roster, worker, slope):
         note_stay(a, i, roster, stops, followed)
     if pool == GENERAL and a[SPIN + i] != 0.0 and worker.is_laned:
         return MOVES
-    is_known = worker.is_laned and a[END + i] > -NEVER
-    if is_known and a[OK + i] == CERTAIN:
+    is_certain = worker.is_laned and a[END + i] > -NEVER and a[OK + i] == CERTAIN
+    if followed.lanes.shape[1] > 0 and not (is_certain and a[NEXT_T + i] < end):
+        keep_lane(pool, a, i, roster, is_certain, slope, followed)  # it may end here
+    if is_certain:
         if a[NEXT_T + i] >= a[END + i]:
             set_reference(a, i, a[NEXT_T + i], a[NEXT_T_LOW + i], scene, worker.pieces, worker.degree)
         code = int(a[HIT + i])
@@ -204,11 +210,38 @@ def scan(pool, worker, slope):
 
 
 @part
+def put_back(worker, j, slope):
+    """Put a kept particle back into its pool, from where later stops make a difference.
+
+    It is attended to once more, then bounces. It has to pass again all stops that it has passed: otherwise the
+    last of them had come within rounding of a collision, or the careful step, which now looks further, is
+    undecided. What has been written at these stops is then not what a run at once would have written.
+    """
+    a, roster, code = worker.pools[SPARE], worker.rosters[SPARE], worker.followed.codes
+    i = np.int64(0)
+    pool = take_lane(a, i, roster, j, worker)
+    if pool < 0:
+        code[j] = ANEW
+    else:
+        fate = attend(pool, a, i, roster, worker, slope)
+        if roster[NEXT_STOP, i] < worker.n_passed:
+            code[j] = ANEW
+        elif fate == STAYS:
+            if pool == GENERAL:
+                bounce(a, REGISTER, slope, worker.scene.table == MUSHROOM)
+            else:
+                rebound(a, REGISTER)
+            change_place(worker, SPARE, i, pool, worker.n_held[pool])
+            worker.n_held[pool] += 1
+
+
+@part
 def follow(worker, walls, slope):
     """Follow particles to the last stop.
 
     Args:
-        worker: it holds no particle yet; its `followed.states` are the particles' starts.
+        worker: it holds no particle yet; its `followed.states` are the particles' starts, or are not looked at
+            where particles go on from `followed.lanes`.
         walls: codes of the walls that the particles leave (N,).
         slope: see `advance`.
     """
@@ -218,12 +251,13 @@ def follow(worker, walls, slope):
     home = DISK if scene.table == CAP else GENERAL
     while True:
         while n_held[GENERAL] + n_held[DISK] < LANES and first < last:
-            i = n_held[home]
-            load(
-                pools[home], i, particle_at(states, first, walls[first]), stops.times[0], stops.is_first_kept
-            )
-            worker.rosters[home, PARTICLE, i], worker.rosters[home, NEXT_STOP, i] = first, 0
-            n_held[home] += 1
+            if worker.n_passed > 0:
+                put_back(worker, first, slope)
+            else:
+                i, start = n_held[home], particle_at(states, first, walls[first])
+                load(pools[home], i, start, stops.times[0], stops.is_first_kept)
+                worker.rosters[home, PARTICLE, i], worker.rosters[home, NEXT_STOP, i] = first, 0
+                n_held[home] += 1
             first += 1
         if n_held[GENERAL] + n_held[DISK] == 0:
             break

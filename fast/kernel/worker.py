@@ -29,10 +29,11 @@ class Worker(NamedTuple):
         anchors: room for its laws at one time.
         is_laned: the lanes may be used.
         pools: (3, POOL_SIZE) general, disk and spare pool.
-        rosters: (2, 3, LANES) rosters of the first two pools.
+        rosters: (3, 3, LANES) rosters of the pools.
         n_held: (2,) number of lanes in use in each.
         stops: when particles are looked at.
         followed: what is filled in.
+        n_passed: stops passed before; if any, particles go on from `followed.lanes`.
     """
 
     scene: Compiled
@@ -46,6 +47,7 @@ class Worker(NamedTuple):
     n_held: IntArray
     stops: Stops
     followed: Followed
+    n_passed: int
 
 
 def is_known_throughout(in_lanes: LawsInLanes, last: float) -> bool:
@@ -54,7 +56,7 @@ def is_known_throughout(in_lanes: LawsInLanes, last: float) -> bool:
     return until > 0.0 and (abs(last) < until or last == np.inf)
 
 
-def new_worker(in_lanes: LawsInLanes, stops: Stops, followed: Followed) -> Worker:
+def new_worker(in_lanes: LawsInLanes, stops: Stops, followed: Followed, n_passed: int = 0) -> Worker:
     """Return a worker that holds no particle yet."""
     return Worker(
         in_lanes.compiled,
@@ -64,10 +66,11 @@ def new_worker(in_lanes: LawsInLanes, stops: Stops, followed: Followed) -> Worke
         np.zeros(ANCHORS_SHAPE),
         is_known_throughout(in_lanes, float(stops.times[-1])),
         np.zeros((3, POOL_SIZE)),
-        np.zeros((2, 3, LANES), np.int64),
+        np.zeros((3, 3, LANES), np.int64),
         np.zeros(2, np.int64),
         stops,
         followed,
+        n_passed,
     )
 
 
@@ -111,5 +114,7 @@ def without_counts(worker):
             borrowed(followed.is_captured),
             borrowed(followed.t_in),
             borrowed(followed.t_out),
+            borrowed(followed.lanes),
         ),
+        worker.n_passed,
     )

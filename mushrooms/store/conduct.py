@@ -20,7 +20,7 @@ from mushrooms.forecast import expected_collisions
 from mushrooms.store.asked import Asked, difference
 from mushrooms.store.blocks import AnyRun, Block, Piece, RunFolder, attributes_of, is_run
 from mushrooms.store.engines import Engine, Tick, follow
-from mushrooms.store.layout import Shape
+from mushrooms.store.layout import Arrays, Shape
 from scene.refusal import BadInput
 
 BLOCK_COLLISIONS = 2e8  # of a block, some seconds: what a fault can cost, and long beside a block's files
@@ -58,8 +58,8 @@ def block_size(asked: Asked, threads: int) -> int:
     return int(2 ** math.floor(math.log2(max(1, min(max(wanted, least), most)))))
 
 
-def shape_of(asked: Asked, n_particles: int, block: int) -> Shape:
-    """Return the sizes of a run.
+def shape_of(asked: Asked, n_particles: int, block: int, chunked: int | None = None) -> Shape:
+    """Return the sizes of a run; in a chunk it has so many cycles, by default all.
 
     Raises:
         BadInput: it would have more blocks than a folder can hold well.
@@ -67,7 +67,8 @@ def shape_of(asked: Asked, n_particles: int, block: int) -> Shape:
     if n_particles > MOST_BLOCKS * block:
         least = -(-n_particles // MOST_BLOCKS)
         raise BadInput(f"--block = {block}: {n_particles} particles need blocks of at least {least}")
-    return Shape(n_particles, block, asked.n_cycles, len(narrowings(asked.scene)))
+    n_narrowings = len(narrowings(asked.scene))
+    return Shape(n_particles, block, asked.n_cycles, n_narrowings, chunked or asked.n_cycles)
 
 
 def opened(
@@ -77,7 +78,7 @@ def opened(
 
     Args:
         folder: held by the caller.
-        asked: for the run.
+        asked: for the run; with as many cycles as there are, or more: then it is lengthened.
         n_particles: as many as there are, or more: then it is widened.
         block: particles of a block; None for what is there, or `default`.
         default: for a new run.
@@ -95,14 +96,16 @@ def opened(
         return run, []
     found = attributes_of(folder)
     wanted = asked.to_data() | ({} if block is None else {"block": block})
-    other = difference(found, wanted)
-    if other is None and found["particles"] > n_particles:
-        other = f"particles = {found['particles']} there, {n_particles} asked for: a run only grows"
+    other = difference(found, {name: value for name, value in wanted.items() if name != "cycles"})
+    for name, n in (("cycles", asked.n_cycles), ("particles", n_particles)):
+        if other is None and found[name] > n:
+            other = f"{name} = {found[name]} there, {n} asked for: a run only grows"
     if other is not None:
         raise BadInput(f"output {str(folder)!r} holds another run: {other}")
     if not resume:
         raise BadInput(f"output {str(folder)!r} holds this run: --resume goes on with it")
-    run = RunFolder(folder, asked, shape_of(asked, n_particles, found["block"]), command)
+    shape = shape_of(asked, n_particles, found["block"], found["cycles_of_a_chunk"])
+    run = RunFolder(folder, asked, shape, command)
     damaged = run.check()
     _probe(run)
     _check_disk(run)
@@ -146,15 +149,27 @@ def complete(
 
 
 def _probe(run: RunFolder) -> None:
-    """Refuse to go on where the particles that are there would come out otherwise."""
+    """Refuse to go on where the particles that are there would come out otherwise.
+
+    The first ones are followed again, and where they are to be lengthened once more, from their starts and from
+    where they are, through all cycles.
+    """
     there = next((n for n in range(run.shape.n_blocks) if run.is_there(n)), None)
     if there is None:
         return
-    n = min(PROBED, run.shape.rows(there))
-    again = follow(run.asked, Piece(there, there * run.shape.block, n), None)
-    for name in run.shape.names:
-        stored = run.read(there, name)[:n]
-        if not np.array_equal(stored, again.arrays[name][: len(stored)], equal_nan=stored.dtype.kind == "f"):
+    stored = {name: array[:PROBED] for name, array in run.block(there).arrays.items()}
+    n, n_cycles = stored["energy"].shape
+    piece, asked = Piece(there, there * run.shape.block, n), run.asked
+    first = follow(asked._replace(n_cycles=n_cycles), piece, None)
+    _compare(run, stored, first.arrays)
+    if n_cycles < asked.n_cycles:
+        longer = follow(asked, piece._replace(before=first._replace(arrays=stored)), None)
+        _compare(run, longer.arrays, follow(asked, piece, None).arrays)
+
+
+def _compare(run: RunFolder, ones: Arrays, others: Arrays) -> None:
+    for name, one in ones.items():
+        if not np.array_equal(one, others[name], equal_nan=one.dtype.kind == "f"):
             made = attributes_of(run.folder)["versions"]
             raise BadInput(
                 f"output {str(run.folder)!r}: {name} of its first particles comes out otherwise here; it was"
@@ -163,7 +178,7 @@ def _probe(run: RunFolder) -> None:
 
 
 def _check_disk(run: RunFolder) -> None:
-    needed = sum(piece.n * run.shape.bytes_of_a_particle + MARKER_BYTES for piece in run.missing())
+    needed = sum(piece.n * run.shape.bytes_of_a_particle + MARKER_BYTES for piece in run.lacking())
     free = shutil.disk_usage(run.folder).free
     if needed > free:
         raise BadInput(

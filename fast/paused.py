@@ -27,8 +27,8 @@ class Paused(NamedTuple):
 
     Attributes:
         ensemble: up to the end of its last cycle.
-        lanes: (N, LANE_ROWS) each particle at its last collision, and its next one, in the stepper's own units
-            (`fast.kernel.kept`); nan for one that was not followed to the end.
+        lanes: (N, LANE_ROWS) each particle at its last collision, and its next one, in the stepper's own
+            units (`fast.kernel.kept`); nan for one that was not followed to the end.
     """
 
     ensemble: Ensemble
@@ -48,21 +48,18 @@ def go_on(
     progress: Callable[[int], None] | None = None,
     before: Paused | None = None,
 ) -> Paused:
-    """Follow an ensemble as `fast.simulate` does, so that it can go on later, or go on with one.
+    """Follow an ensemble as `fast.simulate` does, which tells of the arguments, so that it can go on.
 
-    Args:
-        scene, n_particles, energy, seed, first, threads, phases, progress: see `fast.simulate`; all that
-            decides bits must be as it was for `before`.
-        n_cycles: cycles in all, those of `before` included.
-        before: what the same call with fewer cycles has returned; None to begin.
+    `before` is what the same call with fewer cycles has returned, None to begin. `n_cycles` counts all
+    cycles, those before too.
 
     Returns:
-        The ensemble that `fast.simulate` returns, to the bit, and what it takes to go on with that. Who was not
-        followed to the end before, or had a collision within rounding of it, is followed from its start.
+        The ensemble that `fast.simulate` returns, to the bit, and what it takes to go on with that. Who was
+        not followed to the end before, or had a collision within rounding of it, is followed from its start.
 
     Raises:
-        BadInput: naming field, value and bound; `before` is of other sizes, or so many cycles reach beyond the
-            time up to which the lanes that followed it know the phases of the laws.
+        BadInput: naming field, value and bound; `before` is of other sizes, or so many cycles reach beyond
+            the time up to which the lanes that followed it know the phases of the laws.
     """
     plan = planned(scene, n_particles, energy, n_cycles, seed, first, threads, phases, progress)
     if before is None:
@@ -102,7 +99,7 @@ def _passed(plan: Plan, before: Paused) -> tuple[int, int]:
     in_lanes, times = laws_in_lanes(plan.scene), plan.stops.times
     if is_known_throughout(in_lanes, times[n_passed - 1]) != is_known_throughout(in_lanes, times[-1]):
         raise BadInput(
-            f"n_cycles = {n_cycles}: beyond the time up to which phases are known to the lanes, which followed"
-            f" the first {n_before}; such a run is not lengthened"
+            f"n_cycles = {n_cycles}: beyond the time up to which lanes know the laws' phases. Lanes followed"
+            f" the first {n_before} cycles: they cannot be gone on from"
         )
     return n_before, n_passed

@@ -213,9 +213,9 @@ def scan(pool, worker, slope):
 def put_back(worker, j, slope):
     """Put a kept particle back into its pool, from where later stops make a difference.
 
-    It is attended to once more, then bounces. It has to pass again all stops that it has passed: otherwise the
-    last of them had come within rounding of a collision, or the careful step, which now looks further, is
-    undecided. What has been written at these stops is then not what a run at once would have written.
+    It is attended to once more, then bounces. It has to pass again all stops that it has passed: otherwise
+    the last of them had come within rounding of a collision, or the careful step, which now looks further,
+    is undecided. What was written at these stops is then not what a run at once would have written.
     """
     a, roster, code = worker.pools[SPARE], worker.rosters[SPARE], worker.followed.codes
     i = np.int64(0)
@@ -240,8 +240,8 @@ def follow(worker, walls, slope):
     """Follow particles to the last stop.
 
     Args:
-        worker: it holds no particle yet; its `followed.states` are the particles' starts, or are not looked at
-            where particles go on from `followed.lanes`.
+        worker: it holds no particle yet; its `followed.states` are the particles' starts, or are not looked
+            at where particles go on from `followed.lanes`.
         walls: codes of the walls that the particles leave (N,).
         slope: see `advance`.
     """

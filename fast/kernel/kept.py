@@ -1,17 +1,17 @@
 """What is kept of a lane whose next flight passes the last stop, so that it can go on with later stops.
 
-A last state does not do: it lies in the middle of a flight, and a flight that begins there is rounded otherwise
-than the one that passes. Kept is the lane as `attend` meets it, with the step that the lanes have found, if that
-is right. All that comes before does not look at later stops, for up to there the lane has passed the same ones;
-all that comes after is decided by what is kept:
+A last state does not do: it lies in the middle of a flight, and a flight that begins there is rounded
+otherwise than the one that passes. Kept is the lane as `attend` meets it, and the step that the lanes have
+found where that is right. What came before does not look at later stops: a lane looks no further than its
+next one. What comes after is decided by what is kept:
 
-- `attend` and the bounce after a step that is right read the state, the stay, the counts, and the step;
-- a careful step, after a step that is not, reads the state alone;
-- the piece of the laws is kept by its number and reference time. It is not always the one that serves at the
-  lane's time: a flight that ran out of its piece was given another one in mid-flight. For the same reason the step
-  is kept and not found again: it may have been found with two pieces.
+- where the step is right, `attend` and the bounce read it, the state, the stay and the counts;
+- where it is not, a careful step reads the state alone, or a captured particle is folded back by it;
+- the piece of the laws is kept by its number and its reference time. It is not always the one that serves at
+  the lane's time: a flight that ran out of its piece was given another in mid-flight. For the same reason the
+  step is kept and not found again: it may have been found with two pieces.
 
-What no one reads is not kept, so that the same particle leaves the same bits whoever flew beside it.
+What nobody reads is not kept, so that a particle leaves the same bits whoever flew beside it.
 """
 
 from __future__ import annotations
@@ -31,10 +31,8 @@ from fast.kernel.worker import DISK, NEXT_STOP, PARTICLE
 # Columns of what is kept: the pool, the number of the next stop, and careful steps so far; then these rows of
 # the pool; of the step the wall, NO_WALL where it is not right, and these rows; the laws after it.
 POOL, NEXT, CAREFUL = np.arange(3)
-ROWS = np.array(
-    [T, T_LOW, X, Y, VX, VY, WALL, SPIN, SINCE, UNTIL, STAY_IN, STAY_OUT]
-    + [N_ARC, N_BASE, N_LEFT, N_RIGHT, N_FLOOR, REF, REF_LOW]
-)
+STATE = (T, T_LOW, X, Y, VX, VY, WALL, SPIN, SINCE, UNTIL, STAY_IN, STAY_OUT)
+ROWS = np.array([*STATE, N_ARC, N_BASE, N_LEFT, N_RIGHT, N_FLOOR, REF, REF_LOW])
 STEP = np.array([NEXT_T, NEXT_T_LOW, NEXT_X, NEXT_X_LOW, NEXT_Y, NEXT_Y_LOW])
 N_LAWS, N_LAWS_OF_DISK, N_LAWS_BUT_SLOPE = 13, 6, 10  # rows of laws after a step, and which of them are read
 FIRST_ROW = 3
@@ -67,7 +65,7 @@ def keep_lane(pool, a, i, roster, is_certain, slope, followed):
 
 @kernel
 def take_lane(a, i, roster, j, worker):
-    """Put a particle that was kept into a lane, before it is attended to; returns its pool, or -1 for none."""
+    """Put a kept particle into a lane, before it is attended to; returns its pool, or -1 for none."""
     kept = worker.followed.lanes[j]
     if not kept[POOL] >= 0.0:
         return np.int64(-1)

@@ -151,8 +151,8 @@ def complete(
 def _probe(run: RunFolder) -> None:
     """Refuse to go on where the particles that are there would come out otherwise.
 
-    The first ones are followed again, and where they are to be lengthened once more, from their starts and from
-    where they are, through all cycles.
+    The first ones are followed again, and where they are to be lengthened once more through all cycles, from
+    their starts and from where they are.
     """
     there = next((n for n in range(run.shape.n_blocks) if run.is_there(n)), None)
     if there is None:

@@ -1,7 +1,8 @@
 """How an ensemble lies on disk: a Zarr group (format 3), one chunk of each array a block of particles.
 
-Along the cycles a chunk holds as many as the run began with: one that is lengthened gets further chunks. Chunks are the bare little-endian numbers of an array, so that writing them needs numpy alone; xarray and
-zarr read them. A chunk that is not there yet reads as nan, or -1.
+Along the cycles a chunk holds as many as the run began with: one that is lengthened gets further chunks. They
+are the bare little-endian numbers of an array, so that writing them needs numpy alone; xarray and zarr read
+them. What is not there yet reads as nan, or -1.
 """
 
 from __future__ import annotations

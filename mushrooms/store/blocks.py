@@ -154,9 +154,9 @@ class RunFolder:
             if there < self.shape.rows(number):
                 yield Piece(number, number * self.shape.block + there, self.shape.rows(number) - there)
 
-    def is_there(self, number: int) -> bool:
-        """Tell whether a block, or a part of it, is there."""
-        return number in self._rows or number in self._shorter
+    def first_there(self) -> int | None:
+        """Return the first block of which anything is there, one of fewer cycles before others."""
+        return min(self._shorter or self._rows, default=None)
 
     def block(self, number: int) -> Block:
         """Return what is there of a block.

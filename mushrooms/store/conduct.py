@@ -154,7 +154,7 @@ def _probe(run: RunFolder) -> None:
     The first ones are followed again, and where they are to be lengthened once more through all cycles, from
     their starts and from where they are.
     """
-    there = next((n for n in range(run.shape.n_blocks) if run.is_there(n)), None)
+    there = run.first_there()
     if there is None:
         return
     stored = {name: array[:PROBED] for name, array in run.block(there).arrays.items()}

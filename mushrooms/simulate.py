@@ -249,7 +249,7 @@ def _complete(wish: Wish, run: Any) -> None:
 
     asked, before = wish.asked, run.tally
     n_threads = wish.threads or os.cpu_count() or 1
-    seconds = run.seconds
+    seconds, cycles_there = run.seconds, run.cycles_there
     is_told = wish.dask is not None  # of how fast a cluster is nothing is known here
     engine = engines.by_dask(wish.dask, wish.threads) if wish.dask else engines.in_process(wish.threads)
     limits = conduct.RunLimits(wish.max_collisions, wish.max_seconds)
@@ -262,6 +262,7 @@ def _complete(wish: Wish, run: Any) -> None:
                 is_told = True
                 n = wish.particles - before.particles
                 known = {"energy": asked.energy, "n_cycles": asked.n_cycles, "seed": asked.seed}
+                known["n_before"] = cycles_there
                 ahead = forecast(asked.scene, n_particles=n, threads=n_threads, **known)
                 if ahead is not None:
                     print(ahead.text(n_threads), file=sys.stderr, flush=True)

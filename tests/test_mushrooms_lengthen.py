@@ -188,6 +188,12 @@ def test_a_chunk_holds_the_cycles_that_a_run_began_with(command_line, tmp_path):
     assert np.isnan(last[:, 1]).all()
 
 
+def test_a_run_may_be_lengthened_many_times_over_but_not_endlessly(command_line, tmp_path, monkeypatch):
+    summary_of(command_line(*arguments(tmp_path, 2)))
+    monkeypatch.setattr(fast, "go_on", None)
+    assert_refused(command_line(*arguments(tmp_path, 401)), "--cycles = 401, must be at most 400")
+
+
 def test_what_is_kept_takes_the_room_that_the_page_says():
     shape = conduct.shape_of(asked.Asked(load("moving-cap"), ENERGY, 1, SEED), 1, 1)
     assert shape.bytes_of_a_particle == 113 + 8 * kept.LANE_ROWS == 457

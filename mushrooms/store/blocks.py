@@ -67,6 +67,10 @@ class AnyRun(Protocol):
     tally: RunTally
     seconds: float
 
+    @property
+    def cycles_there(self) -> int:
+        """Return how many cycles have been followed of all that is missing."""
+
     def missing(self) -> Iterator[Piece]:
         """Yield what is still to be followed."""
 
@@ -79,6 +83,8 @@ class AnyRun(Protocol):
 
 class RunInMemory:
     """A run that is kept nowhere else; see `AnyRun`."""
+
+    cycles_there = 0
 
     def __init__(self, shape: Shape) -> None:
         self.shape, self.tally, self.seconds = shape, RunTally(), 0.0
@@ -131,7 +137,7 @@ class RunFolder:
         self.folder, self.asked, self.shape, self.command = folder, asked, shape, command
         self.tally, self.seconds = RunTally(), 0.0
         self._rows: dict[int, int] = {}  # particles that are there, by block
-        self._shorter = set[int]()  # blocks that are there with fewer cycles
+        self._shorter: dict[int, int] = {}  # blocks that are there with fewer cycles, and how many
         self._is_described = False
         # A marker of another run, left in the folder by whoever moved files, is none of this one.
         sizes = {"cycles": shape.chunked, "block": shape.block}
@@ -154,6 +160,11 @@ class RunFolder:
             if there < self.shape.rows(number):
                 yield Piece(number, number * self.shape.block + there, self.shape.rows(number) - there)
 
+    @property
+    def cycles_there(self) -> int:
+        """Return how many cycles have been followed of all that is missing."""
+        return min((self._shorter.get(piece.number, 0) for piece in self.lacking()), default=0)
+
     def first_there(self) -> int | None:
         """Return the first block of which anything is there, one of fewer cycles before others."""
         return min(self._shorter or self._rows, default=None)
@@ -172,7 +183,7 @@ class RunFolder:
     def check(self) -> list[int]:
         """Look at every block, count those that are as they were written, and return the damaged ones."""
         damaged = []
-        self._rows, self._shorter, self.tally, self.seconds = {}, set(), RunTally(), 0.0
+        self._rows, self._shorter, self.tally, self.seconds = {}, {}, RunTally(), 0.0
         for path in self.folder.rglob(".*.part"):  # what a process was writing when it ended
             path.unlink(missing_ok=True)
         for number in range(self.shape.n_blocks):
@@ -254,9 +265,9 @@ class RunFolder:
 
     def _count(self, number: int, marker: Marker) -> None:
         if marker.cycles < self.shape.n_cycles:
-            self._shorter.add(number)
+            self._shorter[number] = marker.cycles
             return
-        self._shorter.discard(number)
+        self._shorter.pop(number, None)
         self._rows[number] = marker.rows
         self.tally, self.seconds = self.tally.merged(marker.tally), self.seconds + marker.seconds
 

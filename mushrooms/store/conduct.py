@@ -28,6 +28,7 @@ LEAST_BLOCK, MOST_BLOCK = 256, 2**17  # particles: a thread's lanes are full, an
 BLOCK_BYTES = 2**26  # on disk; in memory several times that
 LANES_OF_A_THREAD = 128  # particles that a thread needs to be quick
 MOST_BLOCKS = 10**6
+MOST_CHUNKS = 200  # of a block's array along the cycles: so many fit into MARKER_BYTES of their sums
 PROBED = 4  # particles followed again before a run is gone on with
 MARKER_BYTES = 2**16  # of a block's files beside its chunks, at most
 CLOCK = time.monotonic
@@ -104,6 +105,12 @@ def opened(
         raise BadInput(f"output {str(folder)!r} holds another run: {other}")
     if not resume:
         raise BadInput(f"output {str(folder)!r} holds this run: --resume goes on with it")
+    most = MOST_CHUNKS * found["cycles_of_a_chunk"]
+    if asked.n_cycles > most:
+        raise BadInput(
+            f"output {str(folder)!r}: --cycles = {asked.n_cycles}, must be at most {most} for a run that began"
+            f" with {found['cycles_of_a_chunk']}: more need another folder"
+        )
     shape = shape_of(asked, n_particles, found["block"], found["cycles_of_a_chunk"])
     run = RunFolder(folder, asked, shape, command)
     damaged = run.check()

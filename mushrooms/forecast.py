@@ -57,7 +57,8 @@ def forecast(
 ) -> Forecast | None:
     """Return what to expect of `fast.simulate`; None where that is short, or beyond what floats can tell.
 
-    Of `n_cycles` some, `n_before`, have been followed. A pilot, some of the particles for a short time, says what a collision takes.
+    Of `n_cycles` some, `n_before`, have been followed. A pilot, some of the particles for a short time, says
+    what a collision takes.
     """
     workers, n_together = min(threads, n_particles), min(SHARE, math.ceil(n_particles / threads))
     is_mushroom = isinstance(scene, Mushroom)

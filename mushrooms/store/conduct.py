@@ -108,8 +108,8 @@ def opened(
     most = MOST_CHUNKS * found["cycles_of_a_chunk"]
     if asked.n_cycles > most:
         raise BadInput(
-            f"output {str(folder)!r}: --cycles = {asked.n_cycles}, must be at most {most} for a run that began"
-            f" with {found['cycles_of_a_chunk']}: more need another folder"
+            f"output {str(folder)!r}: --cycles = {asked.n_cycles}, must be at most {most} for a run that"
+            f" began with {found['cycles_of_a_chunk']}: more need another folder"
         )
     shape = shape_of(asked, n_particles, found["block"], found["cycles_of_a_chunk"])
     run = RunFolder(folder, asked, shape, command)

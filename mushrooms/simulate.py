@@ -180,10 +180,13 @@ def _on_disk(wish: Wish, folder: Path, resume: bool) -> tuple[dict[str, Any], An
 
     command = wish.asked.command(wish.scene, wish.particles, folder)
     default = conduct.block_size(wish.asked, wish.threads or os.cpu_count() or 1)
-    with compilation_told():
-        run, damaged = conduct.opened(
-            folder, wish.asked, wish.particles, wish.block, default, command, resume
-        )
+    try:
+        with compilation_told():
+            run, damaged = conduct.opened(
+                folder, wish.asked, wish.particles, wish.block, default, command, resume
+            )
+    except OSError as error:
+        raise BadInput(f"output {str(folder)!r}: {error.strerror or error}") from None
     if damaged:
         few = ", ".join(map(str, damaged[:5])) + (" ..." if len(damaged) > 5 else "")
         print(f"damaged or broken off: {len(damaged)} blocks ({few}), followed again", file=sys.stderr)

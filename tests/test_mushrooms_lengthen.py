@@ -59,31 +59,23 @@ def test_a_run_is_lengthened_and_widened_to_the_bits_of_one_at_once(command_line
     """In several goes, with blocks of any size: arrays, digest, and whole sums."""
     import xarray
 
-    random = np.random.default_rng(len(name))
-    for number in range(2):
-        n, cycles, block = (
-            int(random.integers(20, 90)),
-            int(random.integers(1, 4)),
-            int(random.integers(5, 60)),
-        )
-        folder = tmp_path / str(number)
-        for _ in range(3):
-            found = summary_of(command_line(*arguments(folder, cycles, n=n, block=block, name=name)))
-            last = (n, cycles)
-            n, cycles = n + int(random.integers(0, 3)) * 20, cycles + int(random.integers(1, 4))
-        n, cycles = last
-        wanted = at_once(cycles, n, name)
-        assert found["sha256"] == wanted.sha256()
-        other = arguments(tmp_path / f"{number}-other", cycles, n=n, block=50, name=name)
-        assert summary_of(command_line(*other)) == found
-        run = xarray.open_zarr(folder / "ensemble.zarr")
-        assert run.attrs["cycles"] == cycles
-        for field, stored in layout.FIELDS.items():
-            if field in run and field != layout.LANE:
-                assert run[field].values.tobytes() == getattr(wanted, stored.source).tobytes()
-        assert f"--cycles {cycles}" in run.attrs["command"]
-        once = xarray.open_zarr(tmp_path / f"{number}-other" / "ensemble.zarr")
-        assert run.drop_attrs().equals(once.drop_attrs())  # what it takes to go on among them
+    random, n, cycles, last = np.random.default_rng(len(name)), 30, 1, (0, 0)
+    for _ in range(3):
+        last = (n, cycles)
+        found = summary_of(command_line(*arguments(tmp_path / "a", cycles, n=n, block=13, name=name)))
+        n, cycles = n + int(random.integers(0, 3)) * 10, cycles + int(random.integers(1, 4))
+    n, cycles = last
+    wanted = at_once(cycles, n, name)
+    assert found["sha256"] == wanted.sha256()
+    other = arguments(tmp_path / "b", cycles, n=n, block=25, name=name)
+    assert summary_of(command_line(*other)) == found
+    run, once = (xarray.open_zarr(tmp_path / folder / "ensemble.zarr") for folder in "ab")
+    assert run.drop_attrs().equals(once.drop_attrs())  # what it takes to go on among them
+    assert run.attrs["cycles"] == cycles
+    assert f"--cycles {cycles}" in run.attrs["command"]
+    for field, stored in layout.FIELDS.items():
+        if field in run and field != layout.LANE:
+            assert run[field].values.tobytes() == getattr(wanted, stored.source).tobytes()
 
 
 def test_a_run_that_is_long_enough_is_not_followed_again(command_line, tmp_path, followed):

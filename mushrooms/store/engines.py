@@ -45,7 +45,8 @@ def follow(asked: Asked, piece: Piece, threads: int | None, tick: Tick | None = 
     longer = _followed(asked, piece.first, n, threads, tick, before)
     if n == piece.n:
         return longer
-    return longer.joined(_followed(asked, piece.first + n, piece.n - n, threads, tick))
+    rest = None if tick is None else lambda n_done: tick(n + n_done)
+    return longer.joined(_followed(asked, piece.first + n, piece.n - n, threads, rest))
 
 
 def _followed(

@@ -25,12 +25,12 @@ from fast.kernel.kept import keep_lane, take_lane
 
 from fast.kernel.pools import (  # isort: skip
     CERTAIN, CLOSED, DONE, END, HIT, LANES, NEVER, NEXT_R0, NEXT_T, NEXT_T_LOW, NEXT_VX, NEXT_VY, NEXT_W0,
-    NEXT_X, NEXT_Y, N_ARC, N_BASE, OK, REGISTER, ROUTINE, S, SINCE, SPIN, STAY_IN, STAY_OUT, STOP, STRIDE, T,
+    NEXT_X, NEXT_Y, N_ARC, N_BASE, OK, ROUTINE, S, SINCE, SPIN, STAY_IN, STAY_OUT, STOP, STRIDE, T,
     T_LOW, UNTIL, VX, VY, WALL, X, Y, change_lane, fold, load, refold, set_laws, set_reference,
     whole_registers,
 )  # fmt: skip
 from fast.kernel.records import RADIUS, VALUE, WIDTH, Particle, particle_at, write_state
-from fast.kernel.worker import DISK, GENERAL, NEXT_STOP, PARTICLE, SPARE
+from fast.kernel.worker import DISK, GENERAL, NEXT_STOP, PARTICLE
 
 STAYS, MOVES, ENDS = 0, 1, 2
 
@@ -163,11 +163,15 @@ def attend(pool, a, i, roster, worker, slope):
         code = step_carefully(pool, a, i, roster, worker, slope)
     if code < HORIZON:
         note_stops(a, i, roster, a[NEXT_T + i], stops, followed)
-        if roster[NEXT_STOP, i] < stops.times.shape[0]:
+        if worker.n_passed <= roster[NEXT_STOP, i] < stops.times.shape[0]:
             return STAYS
         code = HORIZON
     elif code == HORIZON:
         note_stops(a, i, roster, end, stops, followed)
+    if roster[NEXT_STOP, i] < worker.n_passed:
+        # Put back, it does not pass all stops again: the last had come within rounding of a collision, or the
+        # careful step, which now looks further, is undecided. A run at once would have written otherwise.
+        code = ANEW
     finish(pool, a, i, roster[PARTICLE, i], code, end, followed)
     return ENDS
 
@@ -210,29 +214,21 @@ def scan(pool, worker, slope):
 
 
 @part
-def put_back(worker, j, slope):
-    """Put a kept particle back into its pool, from where later stops make a difference.
+def put_back(worker, pool, first, last):
+    """Put kept particles back into their pool, up to one of the other pool; returns the next one's number.
 
-    It is attended to once more, then bounces. It has to pass again all stops that it has passed: otherwise
-    the last of them had come within rounding of a collision, or the careful step, which now looks further,
-    is undecided. What was written at these stops is then not what a run at once would have written.
+    They come between a flight and its bounce, with the step found before or in want of a careful one.
     """
-    a, roster, code = worker.pools[SPARE], worker.rosters[SPARE], worker.followed.codes
-    i = np.int64(0)
-    pool = take_lane(a, i, roster, j, worker)
-    if pool < 0:
-        code[j] = ANEW
-    else:
-        fate = attend(pool, a, i, roster, worker, slope)
-        if roster[NEXT_STOP, i] < worker.n_passed:
-            code[j] = ANEW
-        elif fate == STAYS:
-            if pool == GENERAL:
-                bounce(a, REGISTER, slope, worker.scene.table == MUSHROOM)
-            else:
-                rebound(a, REGISTER)
-            change_place(worker, SPARE, i, pool, worker.n_held[pool])
-            worker.n_held[pool] += 1
+    n_held, is_ours = worker.n_held, True
+    while is_ours and first < last and n_held[GENERAL] + n_held[DISK] < LANES:
+        i = n_held[pool]
+        place = take_lane(worker.pools[pool], i, worker.rosters[pool], first, worker)
+        is_ours = place == pool or place < 0
+        if is_ours:
+            first += 1
+        if place == pool:
+            n_held[pool] += 1
+    return first
 
 
 @part
@@ -248,25 +244,27 @@ def follow(worker, walls, slope):
     scene, stops, pools, n_held = worker.scene, worker.stops, worker.pools, worker.n_held
     states = worker.followed.states
     first, last = 0, states.shape[0]
-    home = DISK if scene.table == CAP else GENERAL
+    home, is_resumed = DISK if scene.table == CAP else GENERAL, worker.n_passed > 0
     while True:
-        while n_held[GENERAL] + n_held[DISK] < LANES and first < last:
-            if worker.n_passed > 0:
-                put_back(worker, first, slope)
-            else:
-                i, start = n_held[home], particle_at(states, first, walls[first])
-                load(pools[home], i, start, stops.times[0], stops.is_first_kept)
-                worker.rosters[home, PARTICLE, i], worker.rosters[home, NEXT_STOP, i] = first, 0
-                n_held[home] += 1
+        while not is_resumed and n_held[GENERAL] + n_held[DISK] < LANES and first < last:
+            i = n_held[home]
+            load(
+                pools[home], i, particle_at(states, first, walls[first]), stops.times[0], stops.is_first_kept
+            )
+            worker.rosters[home, PARTICLE, i], worker.rosters[home, NEXT_STOP, i] = first, 0
+            n_held[home] += 1
             first += 1
-        if n_held[GENERAL] + n_held[DISK] == 0:
+        if n_held[GENERAL] + n_held[DISK] == 0 and first == last:
             break
         for pool in (GENERAL, DISK):
             a = pools[pool]
-            if n_held[pool] == 0:
+            if n_held[pool] == 0 and not is_resumed:
                 continue
             n = whole_registers(n_held[pool])
             advance(pool, a, n, OFF, scene, slope, worker.degree, worker.limits)
+            if is_resumed and first < last:
+                first = put_back(worker, pool, first, last)
+                n = whole_registers(n_held[pool])
             if not (worker.is_laned and are_routine(a, n_held[pool])):
                 if worker.is_laned:
                     correct(pool, a, n_held[pool], worker, slope)

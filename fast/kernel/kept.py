@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fast.kernel.codes import NO_WALL
+from fast.kernel.codes import ANEW, NO_WALL
 from fast.kernel.compiling import kernel
 
 from fast.kernel.pools import (  # isort: skip
@@ -26,7 +26,7 @@ from fast.kernel.pools import (  # isort: skip
     N_ARC, N_BASE, N_FLOOR, N_LEFT, N_RIGHT, N_ROWS, OK, PIECE, REF, REF_LOW, SINCE, SPIN, STAY_IN, STAY_OUT,
     STRIDE, T, T_LOW, UNTIL, VX, VY, WALL, X, Y, set_piece,
 )  # fmt: skip
-from fast.kernel.worker import DISK, NEXT_STOP, PARTICLE
+from fast.kernel.worker import DISK, GENERAL, NEXT_STOP, PARTICLE
 
 # Columns of what is kept: the pool, the number of the next stop, and careful steps so far; then these rows of
 # the pool; of the step the wall, NO_WALL where it is not right, and these rows; the laws after it.
@@ -68,6 +68,7 @@ def take_lane(a, i, roster, j, worker):
     """Put a kept particle into a lane, before it is attended to; returns its pool, or -1 for none."""
     kept = worker.followed.lanes[j]
     if not kept[POOL] >= 0.0:
+        worker.followed.codes[j] = ANEW
         return np.int64(-1)
     for row in range(N_ROWS):
         a[row * STRIDE + i] = 0.0
@@ -85,4 +86,4 @@ def take_lane(a, i, roster, j, worker):
             a[STEP[k] + i] = kept[FIRST_OF_STEP + k]
         for k in range(N_LAWS):
             a[NEXT_R0 + k * STRIDE + i] = kept[FIRST_OF_LAWS + k]
-    return int(kept[POOL])
+    return DISK if kept[POOL] > 0.0 else GENERAL

@@ -29,7 +29,7 @@ class Worker(NamedTuple):
         anchors: room for its laws at one time.
         is_laned: the lanes may be used.
         pools: (3, POOL_SIZE) general, disk and spare pool.
-        rosters: (3, 3, LANES) rosters of the pools.
+        rosters: (2, 3, LANES) rosters of the first two pools.
         n_held: (2,) number of lanes in use in each.
         stops: when particles are looked at.
         followed: what is filled in.
@@ -66,7 +66,7 @@ def new_worker(in_lanes: LawsInLanes, stops: Stops, followed: Followed, n_passed
         np.zeros(ANCHORS_SHAPE),
         is_known_throughout(in_lanes, float(stops.times[-1])),
         np.zeros((3, POOL_SIZE)),
-        np.zeros((3, 3, LANES), np.int64),
+        np.zeros((2, 3, LANES), np.int64),
         np.zeros(2, np.int64),
         stops,
         followed,

@@ -38,8 +38,9 @@ def main(
     seed: Annotated[int, typer.Option(help="Of the moments, and of the run.")] = 1,
 ) -> None:
     """Kill a run at random moments, and compare what it comes to with one undisturbed; exit code 1 if not."""
-    asked = {"n_particles": PARTICLES, "n_cycles": STAGES[-1], "seed": seed, "threads": 1}
-    wanted = fast.simulate(scenes.load(SCENE), energy=ENERGY, **asked).sha256()
+    wanted = fast.simulate(
+        scenes.load(SCENE), n_particles=PARTICLES, energy=ENERGY, n_cycles=STAGES[-1], seed=seed, threads=1
+    ).sha256()
     random, moments, digests = np.random.default_rng(seed), Counter[str](), Counter[str]()
     with TemporaryDirectory() as place:
         n_killed, number = 0, 0

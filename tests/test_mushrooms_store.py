@@ -350,8 +350,7 @@ def test_whatever_happens_in_whatever_order_the_bits_are_the_same(command_line, 
 
     monkeypatch.setattr(blocks.RunFolder, "keep", sometimes)
     for number in range(int(os.environ.get("MUSHROOMS_HARMS", "4"))):
-        folder, n, cycles = tmp_path / str(number), 20, 1
-        block = int(random.integers(5, 40))
+        folder, n, cycles, block = tmp_path / str(number), 20, 1, int(random.integers(5, 40))
         for _ in range(6):
             n, left = n + int(random.integers(0, 40)), int(random.integers(0, 8))
             cycles += int(random.integers(0, 2))

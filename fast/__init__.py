@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from fast.ensemble import Ensemble, simulate
     from fast.fine import FineTrajectory, fine_trajectory
     from fast.flow import Flow, flow
+    from fast.paused import Paused, go_on
     from fast.step import next_collision
     from fast.trajectory import Collisions, trajectory
 
@@ -22,8 +23,10 @@ __all__ = [
     "Ensemble",
     "FineTrajectory",
     "Flow",
+    "Paused",
     "fine_trajectory",
     "flow",
+    "go_on",
     "next_collision",
     "simulate",
     "trajectory",
@@ -33,6 +36,7 @@ _PLACES = {
     "ensemble": ("Ensemble", "simulate"),
     "fine": ("FineTrajectory", "fine_trajectory"),
     "flow": ("Flow", "flow"),
+    "paused": ("Paused", "go_on"),
     "step": ("next_collision",),
     "trajectory": ("Collisions", "trajectory"),
 }

@@ -185,6 +185,103 @@ def simulate(
 
     Source: secs. 4.1, 4.2 (initial conditions); capture as in sec. 3.2.
     """
+    plan = planned(scene, n_particles, energy, n_cycles, seed, first, threads, phases, progress)
+    done, seconds = plan.followed(plan.starts())
+    return plan.ensemble(done, seconds)
+
+
+class Plan(NamedTuple):
+    """What an ensemble is asked for, checked, as the kernel takes it.
+
+    Attributes:
+        scene, units: the scene in the kernel's units, and these.
+        energy0: of every particle, as given.
+        energy: the same in the kernel's units.
+        size: particles, cycles, looks at a particle in a cycle.
+        seed, first, threads, progress: see `simulate`.
+        stops: when particles are looked at.
+    """
+
+    scene: Scene
+    units: Units
+    energy0: float
+    energy: float
+    size: tuple[int, int, int]
+    seed: int
+    first: int
+    threads: int
+    progress: Callable[[int], None] | None
+    stops: Stops
+
+    def starts(self) -> FloatArray:
+        """Return the states that particles start from."""
+        return initial_states(self.scene, self.size[0], self.energy, self.seed, self.first)
+
+    def followed(
+        self, states: FloatArray, n_lane_rows: int = 0, lanes: FloatArray | None = None, n_passed: int = 0
+    ) -> tuple[Followed, float]:
+        """Follow particles to the last stop.
+
+        Args:
+            states: (N, 6) where they start; overwritten by their ends.
+            n_lane_rows: of what is kept of a lane; 0 to keep none.
+            lanes: (N, n_lane_rows) what has been kept of them, for those who go on.
+            n_passed: stops that these have passed.
+
+        Returns:
+            What became of them, and the seconds that took.
+        """
+        n_columns = int(self.stops.columns.max()) + 1
+        done = unfilled_ends(states, n_columns, self.stops.narrowings.shape, n_lane_rows)
+        if lanes is not None:
+            done.lanes[:] = lanes
+        free, in_lanes = np.full(len(states), codes.NO_WALL), laws_in_lanes(self.scene)
+        return done, follow(in_lanes, done, free, self.stops, self.threads, self.progress, n_passed)
+
+    def ensemble(self, done: Followed, seconds: float) -> Ensemble:
+        """Name what the kernel filled in for some particles."""
+        units, every = self.units, (-1, *self.size[1:])
+        energies, captured = units.energies(done.energies).reshape(every), done.is_captured.reshape(every)
+        columns = [units.times(done.states[:, 0]), *units.places(done.states[:, 2:]).T]
+        t, x, y, vx, vy = (np.ascontiguousarray(column) for column in columns)
+        return Ensemble(
+            energy0=self.energy0,
+            energy=np.ascontiguousarray(energies[:, -1, -1]),
+            cycle_energies=np.ascontiguousarray(energies[:, :, -1]),
+            t=t,
+            x=x,
+            y=y,
+            vx=vx,
+            vy=vy,
+            n_collisions=done.counts.sum(axis=1),
+            outcome=outcomes(done.codes),
+            t_in=units.times(done.t_in),
+            t_out=units.times(done.t_out),
+            wall_counts=done.counts,
+            phase_energies=energies[:, :, :-1],
+            phase_captured=captured[:, :, :-1],
+            n_careful=done.careful,
+            seconds=seconds,
+            threads=self.threads,
+        )
+
+
+def planned(
+    scene: Scene,
+    n_particles: int,
+    energy: float,
+    n_cycles: int,
+    seed: int,
+    first: int,
+    threads: int | None,
+    phases: Sequence[float],
+    progress: Callable[[int], None] | None,
+) -> Plan:
+    """Check what an ensemble is asked for: see `simulate`.
+
+    Raises:
+        BadInput: naming field, value and bound.
+    """
     check_scene(scene)
     n_particles = check_count("n_particles", n_particles, 1, MAX_PARTICLES)
     n_cycles = check_count("n_cycles", n_cycles, 1, MAX_CYCLES)
@@ -197,7 +294,6 @@ def simulate(
     units = Units(fitted.length, fitted.time or 0)
     scene, speed2 = fitted.scene, 2.0 * inward("energy", energy, 2 * (units.length - units.time))
     check_kept(n_particles, n_cycles, len(phases), len(narrowings(scene)))
-    stops = cycle_stops(scene, n_cycles, phases)
     ahead = least_collisions(scene, math.sqrt(speed2), n_cycles * cycle_length(scene))
     if ahead > MAX_COLLISIONS:
         raise BadInput(
@@ -207,10 +303,8 @@ def simulate(
         raise BadInput(
             f"energy = {energy}: the speed must be at least 2^-400 beside the table's size and period"
         )
-    start = initial_states(scene, n_particles, 0.5 * speed2, seed, first)
-    free = np.full(n_particles, codes.NO_WALL)
-    done, seconds = follow(laws_in_lanes(scene), start, free, stops, threads, progress)
-    return _ensemble(energy, done, seconds, units, (n_particles, n_cycles, len(phases) + 1), threads)
+    size, stops = (n_particles, n_cycles, len(phases) + 1), cycle_stops(scene, n_cycles, phases)
+    return Plan(scene, units, energy, 0.5 * speed2, size, seed, first, threads, progress, stops)
 
 
 def _share(n: int, threads: int, n_cycles: int) -> int:
@@ -224,40 +318,6 @@ def _share(n: int, threads: int, n_cycles: int) -> int:
     return math.ceil(max(n, 1) / (threads * math.ceil(n_shares / threads)))
 
 
-def _ensemble(
-    energy0: float,
-    done: Followed,
-    seconds: float,
-    units: Units,
-    every: tuple[int, int, int],
-    threads: int,
-) -> Ensemble:
-    """Name what the kernel filled in; `every`: particles, cycles, looks at a particle in a cycle."""
-    energies, captured = units.energies(done.energies).reshape(every), done.is_captured.reshape(every)
-    columns = [units.times(done.states[:, 0]), *units.places(done.states[:, 2:]).T]
-    t, x, y, vx, vy = (np.ascontiguousarray(column) for column in columns)
-    return Ensemble(
-        energy0=energy0,
-        energy=np.ascontiguousarray(energies[:, -1, -1]),
-        cycle_energies=np.ascontiguousarray(energies[:, :, -1]),
-        t=t,
-        x=x,
-        y=y,
-        vx=vx,
-        vy=vy,
-        n_collisions=done.counts.sum(axis=1),
-        outcome=outcomes(done.codes),
-        t_in=units.times(done.t_in),
-        t_out=units.times(done.t_out),
-        wall_counts=done.counts,
-        phase_energies=energies[:, :, :-1],
-        phase_captured=captured[:, :, :-1],
-        n_careful=done.careful,
-        seconds=seconds,
-        threads=threads,
-    )
-
-
 def outcomes(ends: IntArray) -> npt.NDArray[np.int8]:
     """Return 0, 1, 2, 3 for particles followed to the end, undecided, undefined, rejected."""
     kinds = [ends == codes.HORIZON, ends < codes.FAR_TIME, ends < codes.APPROACHING]
@@ -266,32 +326,33 @@ def outcomes(ends: IntArray) -> npt.NDArray[np.int8]:
 
 def follow(
     in_lanes: LawsInLanes,
-    states: FloatArray,
+    followed: Followed,
     walls: IntArray,
     stops: Stops,
     threads: int,
     progress: Callable[[int], None] | None = None,
-) -> tuple[Followed, float]:
+    n_passed: int = 0,
+) -> float:
     """Follow particles to the last stop.
 
     Args:
         in_lanes: the scene as the lanes know it.
-        states: (N, 6) as kernels take them; overwritten by the last states.
+        followed: what is filled in; its states are their starts as kernels take them.
         walls: (N,) codes of the walls that they leave.
         stops: when particles are looked at.
         threads: how many to use.
         progress: called with the number of particles done so far, again and again.
+        n_passed: how many stops they have passed; if any, they go on from `followed.lanes`.
 
     Returns:
-        What became of them, and the seconds that took.
+        The seconds that took.
     """
-    n = len(states)
-    followed = unfilled_ends(states, int(stops.columns.max()) + 1, stops.narrowings.shape)
+    n = len(followed.states)
     size = _share(n, threads, len(stops.narrowings))
 
     def work(first: int) -> None:
         part = slice(first, first + size)
-        worker = new_worker(in_lanes, stops, followed.part(part))
+        worker = new_worker(in_lanes, stops, followed.part(part), n_passed)
         entries.follow_particles(worker, walls[part], in_lanes.slope, NO_PATHS)
 
     work(n)  # none at all: compiles, or loads from the disk cache, so that `seconds` holds work alone
@@ -306,4 +367,4 @@ def follow(
         except BaseException:  # an interrupt does not wait for chunks that have not begun
             pool.shutdown(wait=False, cancel_futures=True)
             raise
-    return followed, time.perf_counter() - begin
+    return time.perf_counter() - begin

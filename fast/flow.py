@@ -91,14 +91,14 @@ def follow_to(scene: Scene, states: Sequence[State], t_end: float, threads: int)
     for units in sorted({start.units for start in starts}):
         those = np.array([i for i, start in enumerate(starts) if start.units == units])
         stop = only_stop(units.horizon(t_end))
-        done, their_seconds = follow(in_lanes, rows[those], walls[those], stop, threads)
+        done = unfilled_ends(rows[those], 1, (1, 1))
+        seconds += follow(in_lanes, done, walls[those], stop, threads)
         times, places = units.times(done.states[:, :2]), units.places(done.states[:, 2:])
         done = done._replace(
             states=np.hstack([times, places]), t_in=units.times(done.t_in), t_out=units.times(done.t_out)
         )
         for whole, own in zip(followed, done, strict=True):
             whole[those] = own
-        seconds += their_seconds
     return followed, seconds
 
 

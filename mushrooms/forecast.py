@@ -46,11 +46,19 @@ def in_words(seconds: float) -> str:
 
 
 def forecast(
-    scene: Scene, *, n_particles: int, energy: float, n_cycles: int, seed: int, threads: int
+    scene: Scene,
+    *,
+    n_particles: int,
+    energy: float,
+    n_cycles: int,
+    seed: int,
+    threads: int,
+    n_before: int = 0,
 ) -> Forecast | None:
     """Return what to expect of `fast.simulate`; None where that is short, or beyond what floats can tell.
 
-    A pilot, some of the particles for a short time, says what a collision takes.
+    Of `n_cycles` some, `n_before`, have been followed. A pilot, some of the particles for a short time, says
+    what a collision takes.
     """
     workers, n_together = min(threads, n_particles), min(SHARE, math.ceil(n_particles / threads))
     is_mushroom = isinstance(scene, Mushroom)
@@ -61,7 +69,9 @@ def forecast(
             return None
         pace = _pace(scene, n_together, energy, seed, PILOT_SHARE * first * n_cycles) / workers
         is_growth_wanted = is_mushroom and n_cycles > 1 and first * most_cycles * pace > LONG
-        collisions = first * (_as_first_cycles(scene, n_cycles) if is_growth_wanted else n_cycles)
+        ends = (n_cycles, n_before)
+        last, begin = (_as_first_cycles(scene, n) for n in ends) if is_growth_wanted else ends
+        collisions = first * (last - begin)
     except (BadInput, ArithmeticError):  # a table at the edge of binary64 runs without a forecast
         return None
     return Forecast(collisions, collisions * pace) if LONG < collisions * pace < math.inf else None

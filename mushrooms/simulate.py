@@ -42,7 +42,11 @@ Out = Annotated[
     Path | None, typer.Option(metavar="DIR", help="Folder for the run (ensemble.zarr) and summary.json.")
 ]
 Resume = Annotated[
-    bool, typer.Option("--resume", help="Go on with the run in DIR, or widen it by more --particles.")
+    bool,
+    typer.Option(
+        "--resume",
+        help="Go on with the run in DIR, or widen it by more --particles, or lengthen it by more --cycles.",
+    ),
 ]
 Dask = Annotated[
     str | None, typer.Option(metavar="ADDRESS", help="Dask scheduler whose workers follow the particles.")
@@ -199,10 +203,13 @@ def _on_disk(wish: Wish, folder: Path, resume: bool) -> tuple[dict[str, Any], An
 
     command = wish.asked.command(wish.scene, wish.particles, folder)
     default = conduct.block_size(wish.asked, wish.threads or os.cpu_count() or 1)
-    with compilation_told():
-        run, damaged = conduct.opened(
-            folder, wish.asked, wish.particles, wish.block, default, command, resume
-        )
+    try:
+        with compilation_told():
+            run, damaged = conduct.opened(
+                folder, wish.asked, wish.particles, wish.block, default, command, resume
+            )
+    except OSError as error:
+        raise BadInput(f"output {str(folder)!r}: {error.strerror or error}") from None
     tell_damaged(damaged)
     try:
         with _told_how_to_go_on(run, command):
@@ -273,7 +280,7 @@ def _complete(wish: Wish, run: Any) -> None:
 
     asked, before = wish.asked, run.tally
     n_threads = wish.threads or os.cpu_count() or 1
-    seconds = run.seconds
+    seconds, cycles_there = run.seconds, run.cycles_there
     is_told = wish.dask is not None  # of how fast a cluster is nothing is known here
     engine = engines.by_dask(wish.dask, wish.threads) if wish.dask else engines.in_process(wish.threads)
     limits = conduct.RunLimits(wish.max_collisions, wish.max_seconds)
@@ -286,6 +293,7 @@ def _complete(wish: Wish, run: Any) -> None:
                 is_told = True
                 n = wish.particles - before.particles
                 known = {"energy": asked.energy, "n_cycles": asked.n_cycles, "seed": asked.seed}
+                known["n_before"] = cycles_there
                 ahead = forecast(asked.scene, n_particles=n, threads=n_threads, **known)
                 if ahead is not None:
                     print(ahead.text(n_threads), file=sys.stderr, flush=True)

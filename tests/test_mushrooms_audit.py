@@ -39,6 +39,7 @@ def _unsynced(monkeypatch):
 @pytest.fixture
 def call(command_line, monkeypatch):
     monkeypatch.setattr(fast, "simulate", adiabatic_particles.simulate)
+    monkeypatch.setattr(fast, "go_on", adiabatic_particles.go_on)
     return partial(command_line, "audit")
 
 
@@ -137,10 +138,10 @@ def test_a_few_claims_are_checked_and_reported(call, tmp_path):
 
 def test_a_failed_claim_exits_with_1(call, tmp_path, monkeypatch):
     def warmed(scene, **options):
-        done = adiabatic_particles.simulate(scene, **options)
-        return done._replace(cycle_energies=done.cycle_energies * 1.01)
+        ensemble, lanes = adiabatic_particles.go_on(scene, **options)
+        return fast.Paused(ensemble._replace(cycle_energies=ensemble.cycle_energies * 1.01), lanes)
 
-    monkeypatch.setattr(fast, "simulate", warmed)
+    monkeypatch.setattr(fast, "go_on", warmed)
     done = call("--only", "X5", "--out", tmp_path)
     assert done.code == 1
     assert "! X5  refuted" in done.out
@@ -161,9 +162,9 @@ def blocks(monkeypatch, request):
             followed.append((options["seed"], options["first"]))
             if len(followed) == last:
                 raise KeyboardInterrupt
-        return adiabatic_particles.simulate(scene, **options)
+        return adiabatic_particles.go_on(scene, **options)
 
-    monkeypatch.setattr(fast, "simulate", counted)
+    monkeypatch.setattr(fast, "go_on", counted)
     return followed
 
 

@@ -43,14 +43,14 @@ def _small(monkeypatch):
 @pytest.fixture
 def followed(monkeypatch):
     """Return the list of pieces that are followed, (first particle, how many), without probes."""
-    pieces, simulate = [], fast.simulate
+    pieces, go_on = [], fast.go_on
 
     def noted(scene, **options):
         if options["n_particles"] != conduct.PROBED:
             pieces.append((options.get("first", 0), options["n_particles"]))
-        return simulate(scene, **options)
+        return go_on(scene, **options)
 
-    monkeypatch.setattr(fast, "simulate", noted)
+    monkeypatch.setattr(fast, "go_on", noted)
     return pieces
 
 
@@ -174,16 +174,16 @@ def test_another_run_or_one_in_use_is_refused_before_anything_is_followed(comman
 
 
 def test_a_run_is_held_while_the_audit_follows_it(command_line, tmp_path, monkeypatch):
-    run, simulate = SMALL["mouth"], fast.simulate
+    run, go_on = SMALL["mouth"], fast.go_on
     words = shlex.split(audit_runs.command(run, "quick", SEED, tmp_path))[1:]
     refused = []
 
     def meanwhile(scene, **options):
-        monkeypatch.setattr(fast, "simulate", simulate)
+        monkeypatch.setattr(fast, "go_on", go_on)
         refused.append(command_line(*words))
-        return simulate(scene, **options)
+        return go_on(scene, **options)
 
-    monkeypatch.setattr(fast, "simulate", meanwhile)
+    monkeypatch.setattr(fast, "go_on", meanwhile)
     assert kept(tmp_path, run).n_particles == N_QUICK
     assert_refused(refused[0], "one run at a time")
 

@@ -6,6 +6,7 @@ import csv
 import json
 import os
 import re
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -16,6 +17,7 @@ import pytest
 from support.refusals import assert_refused
 
 import fast
+from fast.kernel.kept import LANE_ROWS
 from mushrooms.main import run
 from mushrooms.store import blocks, engines
 from scene import load
@@ -59,6 +61,16 @@ def test_workers_of_a_cluster_follow_to_the_same_bits(command_line, tmp_path, en
     assert json.loads(ended.out)["sha256"] == ensemble.sha256()
 
 
+def test_workers_lengthen_a_run(command_line, tmp_path, stored):
+    """They are handed what is there."""
+    folder, more = shutil.copytree(stored, tmp_path / "run"), ["--cycles", 2, "--resume"]
+    with cluster(2, processes=True) as there:
+        ended = command_line(*RUN, "--out", folder, "--dask", there.scheduler_address, *more)
+    assert ended.code == 0, ended.err
+    wanted = fast.simulate(load("moving-cap"), n_particles=N, energy=ENERGY, n_cycles=2, seed=SEED)
+    assert json.loads(ended.out)["sha256"] == wanted.sha256()
+
+
 def test_workers_may_die(command_line, tmp_path, ensemble, monkeypatch):
     """One is killed, in the middle of a block most likely; another takes its place."""
     keep, killed = blocks.RunFolder.keep, []
@@ -91,7 +103,7 @@ def test_xarray_and_zarr_read_every_bit(stored, ensemble):
     import zarr
 
     run = xarray.open_zarr(stored / "ensemble.zarr")
-    assert dict(run.sizes) == {"particle": N, "cycle": 1, "narrowing": 1, "wall": 5}
+    assert dict(run.sizes) == {"particle": N, "cycle": 1, "narrowing": 1, "wall": 5, "row": LANE_ROWS}
     wanted = {"energy": "cycle_energies", "t_in": "t_in", "collisions": "wall_counts", "outcome": "outcome"}
     for name, source in wanted.items():
         assert np.array_equal(run[name].values, getattr(ensemble, source), equal_nan=name != "outcome")

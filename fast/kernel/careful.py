@@ -126,7 +126,8 @@ def first_root(wall, start, limit, particle, scene, anchors):
 def earliest_side_or_floor(start, limit, particle, scene, anchors):
     """Find the first hit of left, right and floor; (code, s, error of s)."""
     code, s, error = NO_WALL, limit, 0.0
-    for candidate in (LEFT, RIGHT, FLOOR):
+    # The floor first: what bounds a side that leans takes |y| <= h, which holds no longer below the floor.
+    for candidate in (FLOOR, LEFT, RIGHT):
         # Look a little beyond the best so far, so that ties are seen from both sides.
         beyond = min(limit, s + 8.0 * error + SAFETY * s)
         found, root, _, root_error = first_root(candidate, start, beyond, particle, scene, anchors)

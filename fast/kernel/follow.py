@@ -18,14 +18,16 @@ import numpy as np
 from fast.kernel.arithmetic import fma
 from fast.kernel.bounces import arrive, bounce, rebound
 from fast.kernel.careful import first_step
-from fast.kernel.codes import ARC, CAP, HORIZON, MUSHROOM, N_WALLS
+from fast.kernel.codes import ANEW, ARC, CAP, HORIZON, MUSHROOM, N_WALLS
 from fast.kernel.compiling import kernel, part
 from fast.kernel.flights import OFF, advance, correct
+from fast.kernel.kept import keep_lane, take_lane
 
 from fast.kernel.pools import (  # isort: skip
     CERTAIN, CLOSED, DONE, END, HIT, LANES, NEVER, NEXT_R0, NEXT_T, NEXT_T_LOW, NEXT_VX, NEXT_VY, NEXT_W0,
-    NEXT_X, NEXT_Y, N_ARC, N_BASE, OK, ROUTINE, S, SINCE, SPIN, STAY_IN, STAY_OUT, STOP, STRIDE, T, T_LOW,
-    UNTIL, VX, VY, WALL, X, Y, change_lane, fold, load, refold, set_laws, set_reference, whole_registers,
+    NEXT_X, NEXT_Y, N_ARC, N_BASE, OK, ROUTINE, S, SINCE, SPIN, STAY_IN, STAY_OUT, STOP, STRIDE, T,
+    T_LOW, UNTIL, VX, VY, WALL, X, Y, change_lane, fold, load, refold, set_laws, set_reference,
+    whole_registers,
 )  # fmt: skip
 from fast.kernel.records import RADIUS, VALUE, WIDTH, Particle, particle_at, write_state
 from fast.kernel.worker import DISK, GENERAL, NEXT_STOP, PARTICLE
@@ -97,6 +99,8 @@ def finish(pool, a, i, j, code, end, followed):
         y = y_end
     write_state(followed.states, j, Particle(t, t_low, x, y, vx, vy, int(a[WALL + i])))
     followed.codes[j] = code
+    if code != HORIZON and followed.lanes.shape[1] > 0:
+        followed.lanes[j] = np.nan  # nothing goes on from there
     for wall in range(N_WALLS):
         followed.counts[j, wall] = int(a[N_ARC + wall * STRIDE + i])
 
@@ -145,8 +149,10 @@ def attend(pool, a, i, roster, worker, slope):
         note_stay(a, i, roster, stops, followed)
     if pool == GENERAL and a[SPIN + i] != 0.0 and worker.is_laned:
         return MOVES
-    is_known = worker.is_laned and a[END + i] > -NEVER
-    if is_known and a[OK + i] == CERTAIN:
+    is_certain = worker.is_laned and a[END + i] > -NEVER and a[OK + i] == CERTAIN
+    if followed.lanes.shape[1] > 0 and not (is_certain and a[NEXT_T + i] < end):
+        keep_lane(pool, a, i, roster, is_certain, slope, followed)  # it may end here
+    if is_certain:
         if a[NEXT_T + i] >= a[END + i]:
             set_reference(a, i, a[NEXT_T + i], a[NEXT_T_LOW + i], scene, worker.pieces, worker.degree)
         code = int(a[HIT + i])
@@ -157,11 +163,15 @@ def attend(pool, a, i, roster, worker, slope):
         code = step_carefully(pool, a, i, roster, worker, slope)
     if code < HORIZON:
         note_stops(a, i, roster, a[NEXT_T + i], stops, followed)
-        if roster[NEXT_STOP, i] < stops.times.shape[0]:
+        if worker.n_passed <= roster[NEXT_STOP, i] < stops.times.shape[0]:
             return STAYS
         code = HORIZON
     elif code == HORIZON:
         note_stops(a, i, roster, end, stops, followed)
+    if roster[NEXT_STOP, i] < worker.n_passed:
+        # Put back, it does not pass all stops again: the last had come within rounding of a collision, or the
+        # careful step, which now looks further, is undecided. A run at once would have written otherwise.
+        code = ANEW
     finish(pool, a, i, roster[PARTICLE, i], code, end, followed)
     return ENDS
 
@@ -204,20 +214,39 @@ def scan(pool, worker, slope):
 
 
 @part
+def put_back(worker, pool, first, last):
+    """Put kept particles back into their pool, up to one of the other pool; returns the next one's number.
+
+    They come between a flight and its bounce, with the step found before or in want of a careful one.
+    """
+    n_held, is_ours = worker.n_held, True
+    while is_ours and first < last and n_held[GENERAL] + n_held[DISK] < LANES:
+        i = n_held[pool]
+        place = take_lane(worker.pools[pool], i, worker.rosters[pool], first, worker)
+        is_ours = place == pool or place < 0
+        if is_ours:
+            first += 1
+        if place == pool:
+            n_held[pool] += 1
+    return first
+
+
+@part
 def follow(worker, walls, slope):
     """Follow particles to the last stop.
 
     Args:
-        worker: it holds no particle yet; its `followed.states` are the particles' starts.
+        worker: it holds no particle yet; its `followed.states` are the particles' starts, or are not looked
+            at where particles go on from `followed.lanes`.
         walls: codes of the walls that the particles leave (N,).
         slope: see `advance`.
     """
     scene, stops, pools, n_held = worker.scene, worker.stops, worker.pools, worker.n_held
     states = worker.followed.states
     first, last = 0, states.shape[0]
-    home = DISK if scene.table == CAP else GENERAL
+    home, is_resumed = DISK if scene.table == CAP else GENERAL, worker.n_passed > 0
     while True:
-        while n_held[GENERAL] + n_held[DISK] < LANES and first < last:
+        while not is_resumed and n_held[GENERAL] + n_held[DISK] < LANES and first < last:
             i = n_held[home]
             load(
                 pools[home], i, particle_at(states, first, walls[first]), stops.times[0], stops.is_first_kept
@@ -225,14 +254,17 @@ def follow(worker, walls, slope):
             worker.rosters[home, PARTICLE, i], worker.rosters[home, NEXT_STOP, i] = first, 0
             n_held[home] += 1
             first += 1
-        if n_held[GENERAL] + n_held[DISK] == 0:
+        if n_held[GENERAL] + n_held[DISK] == 0 and first == last:
             break
         for pool in (GENERAL, DISK):
             a = pools[pool]
-            if n_held[pool] == 0:
+            if n_held[pool] == 0 and not is_resumed:
                 continue
             n = whole_registers(n_held[pool])
             advance(pool, a, n, OFF, scene, slope, worker.degree, worker.limits)
+            if is_resumed and first < last:
+                first = put_back(worker, pool, first, last)
+                n = whole_registers(n_held[pool])
             if not (worker.is_laned and are_routine(a, n_held[pool])):
                 if worker.is_laned:
                     correct(pool, a, n_held[pool], worker, slope)

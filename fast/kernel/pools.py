@@ -24,6 +24,7 @@ NEVER = np.inf
     T, T_LOW, X, Y, VX, VY, WALL,  # state at the last collision
     R0, R1, R2, R3, W0, W1, W2, H0, H1, H2, M0, M1, M2,  # radius, half-width, depth, slope; derivatives
     REF, REF_LOW, END, LIMIT, BACK,  # the laws' reference time, until when it serves; how far they hold
+    PIECE,  # which of them it is
     STOP, CLOSED, SPIN,  # next time to look at the particle; end of a captured stay; angular momentum in one
     HIT, SURE, S,  # the step: wall, mouth, time
     OK, ROUTINE,  # is it right, and is nothing else to do
@@ -34,9 +35,9 @@ NEVER = np.inf
     SINCE, UNTIL, STAY_IN, STAY_OUT,  # a captured stay that spans an instant between is kept; begin and end
     N_ARC, N_BASE, N_LEFT, N_RIGHT, N_FLOOR,  # collisions so far
     LAWS,  # from here on the laws' coefficients: see Pieces.coefficients
-) = STRIDE * np.arange(65)  # fmt: skip
+) = STRIDE * np.arange(66)  # fmt: skip
 N_COEFFICIENTS = 16  # of each law, as many as the highest degree asks for
-N_ROWS = 64 + 4 * N_COEFFICIENTS
+N_ROWS = 65 + 4 * N_COEFFICIENTS
 RADIUS_LAW, WIDTH_LAW, DEPTH_LAW, SLOPE_LAW = LAWS + STRIDE * N_COEFFICIENTS * np.arange(4)
 # Codes of walls as they stand in a row, and of OK: out of the laws' reach, not shown right, to be corrected,
 # right.
@@ -52,21 +53,26 @@ def whole_registers(n):
     return (n + REGISTER - 1) // REGISTER * REGISTER
 
 
-@kernel
-def set_reference(a, i, t, t_low, scene, pieces, degree):
-    """Give a lane the piece of the laws that serves at a time; END is minus infinity where none does."""
-    if not abs(t) < pieces.until:
-        a[END + i] = -NEVER
-        return
-    piece, reference, low = piece_at(pieces, t, t_low)
-    a[REF + i], a[REF_LOW + i] = reference, low
-    a[END + i] = reference + pieces.serves[piece]
+@part
+def set_piece(a, i, piece, scene, pieces, degree):
+    """Give a lane a piece of the laws whose reference time it has."""
+    a[PIECE + i], a[END + i] = piece, a[REF + i] + pieces.serves[piece]
     a[BACK + i], a[LIMIT + i] = -pieces.limits[piece], pieces.limits[piece]
     if scene.laws[RADIUS, KIND] == CONSTANT:
         a[BACK + i] = -NEVER
     for row in range(4):
         for j in range(len(degree) + 2):
             a[LAWS + (row * N_COEFFICIENTS + j) * STRIDE + i] = pieces.coefficients[piece, row, j]
+
+
+@kernel
+def set_reference(a, i, t, t_low, scene, pieces, degree):
+    """Give a lane the piece of the laws that serves at a time; END is minus infinity where none does."""
+    if not abs(t) < pieces.until:
+        a[END + i] = -NEVER
+        return
+    piece, a[REF + i], a[REF_LOW + i] = piece_at(pieces, t, t_low)
+    set_piece(a, i, piece, scene, pieces, degree)
 
 
 @packed

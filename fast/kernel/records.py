@@ -193,6 +193,8 @@ class Followed(NamedTuple):
         energies: (N, C) energy at each stop that asks for it.
         is_captured: (N, C) whether the last arc hit before had |sin phi| > nu.
         t_in, t_out: (N, K, M) the captured stays that are kept; nan for none.
+        lanes: (N, LANE_ROWS) what goes on from the last stop, nan for who ended before it: see
+            fast.kernel.kept; (N, 0) where nobody asks for it.
     """
 
     states: FloatArray
@@ -203,22 +205,16 @@ class Followed(NamedTuple):
     is_captured: BoolArray
     t_in: FloatArray
     t_out: FloatArray
+    lanes: FloatArray
 
     def part(self, those: slice) -> Followed:
         """Return views of some of the particles."""
-        return Followed(
-            self.states[those],
-            self.codes[those],
-            self.counts[those],
-            self.careful[those],
-            self.energies[those],
-            self.is_captured[those],
-            self.t_in[those],
-            self.t_out[those],
-        )
+        return Followed._make(array[those] for array in self)
 
 
-def unfilled_ends(states: FloatArray, n_columns: int, slots: tuple[int, int]) -> Followed:
+def unfilled_ends(
+    states: FloatArray, n_columns: int, slots: tuple[int, int], n_lane_rows: int = 0
+) -> Followed:
     """Return what is to be filled in for particles that start from `states`, which are overwritten."""
     n = len(states)
     return Followed(
@@ -230,6 +226,7 @@ def unfilled_ends(states: FloatArray, n_columns: int, slots: tuple[int, int]) ->
         np.zeros((n, n_columns), np.bool_),
         np.full((n, *slots), np.nan),
         np.full((n, *slots), np.nan),
+        np.full((n, n_lane_rows), np.nan),
     )
 
 

@@ -32,6 +32,7 @@ class Worker(NamedTuple):
         n_held: (2,) number of lanes in use in each.
         stops: when particles are looked at.
         followed: what is filled in.
+        n_passed: stops passed before; if any, particles go on from `followed.lanes`.
     """
 
     scene: Compiled
@@ -45,6 +46,7 @@ class Worker(NamedTuple):
     n_held: IntArray
     stops: Stops
     followed: Followed
+    n_passed: int
 
 
 def is_known_throughout(in_lanes: LawsInLanes, last: float) -> bool:
@@ -53,7 +55,7 @@ def is_known_throughout(in_lanes: LawsInLanes, last: float) -> bool:
     return until > 0.0 and (abs(last) < until or last == np.inf)
 
 
-def new_worker(in_lanes: LawsInLanes, stops: Stops, followed: Followed) -> Worker:
+def new_worker(in_lanes: LawsInLanes, stops: Stops, followed: Followed, n_passed: int = 0) -> Worker:
     """Return a worker that holds no particle yet."""
     return Worker(
         in_lanes.compiled,
@@ -67,4 +69,5 @@ def new_worker(in_lanes: LawsInLanes, stops: Stops, followed: Followed) -> Worke
         np.zeros(2, np.int64),
         stops,
         followed,
+        n_passed,
     )

@@ -16,7 +16,7 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 
 from mushrooms.store.asked import Asked, asked_of, made_by
-from mushrooms.store.layout import Array, Arrays, Shape, from_chunk, metadata, to_chunk
+from mushrooms.store.layout import LANE, Array, Arrays, Shape, from_chunks, metadata, to_chunks
 from mushrooms.store.tally import RunTally, tally_from
 from scene.files import sealed, unsealed, write_file, write_files
 from scene.refusal import BadInput
@@ -32,11 +32,13 @@ class Piece(NamedTuple):
         number: of the block.
         first: number of the first particle.
         n: how many.
+        before: what became of the first of them through fewer cycles; they go on from there.
     """
 
     number: int
     first: int
     n: int
+    before: Block | None = None
 
 
 class Block(NamedTuple):
@@ -65,6 +67,10 @@ class AnyRun(Protocol):
     tally: RunTally
     seconds: float
 
+    @property
+    def cycles_there(self) -> int:
+        """Return how many cycles have been followed of all that is missing."""
+
     def missing(self) -> Iterator[Piece]:
         """Yield what is still to be followed."""
 
@@ -78,6 +84,8 @@ class AnyRun(Protocol):
 class RunInMemory:
     """A run that is kept nowhere else; see `AnyRun`."""
 
+    cycles_there = 0
+
     def __init__(self, shape: Shape) -> None:
         self.shape, self.tally, self.seconds = shape, RunTally(), 0.0
         self._blocks: dict[int, Arrays] = {}
@@ -89,7 +97,7 @@ class RunInMemory:
 
     def keep(self, piece: Piece, block: Block) -> None:
         """Keep what was followed."""
-        self._blocks[piece.number] = block.arrays
+        self._blocks[piece.number] = {name: a for name, a in block.arrays.items() if name != LANE}
         self.tally, self.seconds = self.tally.merged(block.tally), self.seconds + block.seconds
 
     def read(self, number: int, name: str) -> Array:
@@ -101,12 +109,13 @@ class Marker(NamedTuple):
     """What says that a block is there.
 
     Attributes:
-        rows: how many particles it holds.
-        sums: SHA-256 of each chunk.
+        rows, cycles: how many particles it holds, and through how many cycles they were followed.
+        sums: SHA-256 of each chunk, by its path.
         tally, seconds: see `Block`.
     """
 
     rows: int
+    cycles: int
     sums: dict[str, str]
     tally: RunTally
     seconds: float
@@ -120,39 +129,67 @@ class RunFolder:
         asked: what decides its bits.
         shape: its sizes.
         command: how it is made.
-        tally, seconds: of the blocks that are there, once `check` has looked.
+        tally, seconds: of the blocks that are there, once `check` has looked; without those that hold
+            fewer cycles.
     """
 
     def __init__(self, folder: Path, asked: Asked, shape: Shape, command: str) -> None:
         self.folder, self.asked, self.shape, self.command = folder, asked, shape, command
         self.tally, self.seconds = RunTally(), 0.0
         self._rows: dict[int, int] = {}  # particles that are there, by block
+        self._shorter: dict[int, int] = {}  # blocks that are there with fewer cycles, and how many
         self._is_described = False
         # A marker of another run, left in the folder by whoever moved files, is none of this one.
-        identity = json.dumps(asked.to_data() | {"block": shape.block}, sort_keys=True)
+        sizes = {"cycles": shape.chunked, "block": shape.block}
+        identity = json.dumps(asked.to_data() | sizes, sort_keys=True)
         self._identity = hashlib.sha256(identity.encode()).hexdigest()
 
     def missing(self) -> Iterator[Piece]:
+        """Yield what is still to be followed, with what is there of it.
+
+        Raises:
+            BadInput: that has been damaged since `check`.
+        """
+        for piece in self.lacking():
+            yield piece._replace(before=self.block(piece.number)) if piece.number in self._shorter else piece
+
+    def lacking(self) -> Iterator[Piece]:
         """Yield what is still to be followed."""
         for number in range(self.shape.n_blocks):
             there = self._rows.get(number, 0)
             if there < self.shape.rows(number):
                 yield Piece(number, number * self.shape.block + there, self.shape.rows(number) - there)
 
-    def is_there(self, number: int) -> bool:
-        """Tell whether a block, or a part of it, is there."""
-        return number in self._rows
+    @property
+    def cycles_there(self) -> int:
+        """Return how many cycles have been followed of all that is missing."""
+        return min((self._shorter.get(piece.number, 0) for piece in self.lacking()), default=0)
+
+    def first_there(self) -> int | None:
+        """Return the first block of which anything is there, one of fewer cycles before others."""
+        return min(self._shorter or self._rows, default=None)
+
+    def block(self, number: int) -> Block:
+        """Return what is there of a block.
+
+        Raises:
+            BadInput: it is not there, or not as it was written.
+        """
+        arrays = {name: self.read(number, name) for name in self.shape.names}
+        marker = self._marker(number)
+        assert marker is not None
+        return Block(arrays, marker.tally, marker.seconds)
 
     def check(self) -> list[int]:
         """Look at every block, count those that are as they were written, and return the damaged ones."""
         damaged = []
-        self._rows, self.tally, self.seconds = {}, RunTally(), 0.0
+        self._rows, self._shorter, self.tally, self.seconds = {}, {}, RunTally(), 0.0
         for path in self.folder.rglob(".*.part"):  # what a process was writing when it ended
             path.unlink(missing_ok=True)
         for number in range(self.shape.n_blocks):
             marker = self._marker(number)
-            if marker is not None and all(self._chunk(number, name, marker) for name in self.shape.names):
-                self._count(number, marker.rows, marker.tally, marker.seconds)
+            if marker is not None and all(self._chunks(number, name, marker) for name in self.shape.names):
+                self._count(number, marker)
             elif self._path(number).exists():
                 damaged.append(number)
         return damaged
@@ -165,24 +202,25 @@ class RunFolder:
         """
         if not self._is_described:
             self.describe()
-        there, marker = self._rows.get(piece.number, 0), self._marker(piece.number)
-        whole = block
-        if there and marker is not None:  # the run was widened: the block gets more particles
-            old = {name: self.read(piece.number, name) for name in self.shape.names}
-            whole = Block(old, marker.tally, marker.seconds).joined(block)
-        chunks = {name: to_chunk(whole.arrays[name], self.shape.block) for name in self.shape.names}
-        paths = {self.shape.chunk(name, piece.number): content for name, content in chunks.items()}
-        write_files(self.folder / GROUP, paths)
-        marker_data = {
-            "run": self._identity,
-            "number": piece.number,
-            "rows": there + piece.n,
-            "sums": {name: hashlib.sha256(content).hexdigest() for name, content in chunks.items()},
-            "tally": whole.tally.to_data(),
-            "seconds": whole.seconds,
-        }
-        write_file(self._path(piece.number), sealed(json.dumps(marker_data).encode()))
-        self._count(piece.number, there + piece.n, block.tally, block.seconds)
+        there, whole, written = self._rows.get(piece.number, 0), block, dict[str, str]()
+        if there:  # the run was widened: the block gets more particles
+            whole = self.block(piece.number).joined(block)
+        old = self._marker(piece.number)
+        if piece.before is not None and old is not None:  # first cycles that are full stay as they are
+            written = old.sums
+        chunks: dict[str, bytes] = {}
+        for name in self.shape.names:
+            paths = self.shape.chunks(name, piece.number, self.shape.n_cycles)
+            chunks |= zip(paths, to_chunks(whole.arrays[name], self.shape, name), strict=True)
+        sums = {path: hashlib.sha256(content).hexdigest() for path, content in chunks.items()}
+        write_files(
+            self.folder / GROUP, {path: chunks[path] for path in chunks if sums[path] != written.get(path)}
+        )
+        marker = Marker(there + piece.n, self.shape.n_cycles, sums, whole.tally, whole.seconds)
+        data = {"run": self._identity, "number": piece.number, **marker._asdict()}
+        data["tally"] = whole.tally.to_data()
+        write_file(self._path(piece.number), sealed(json.dumps(data).encode()))
+        self._count(piece.number, marker._replace(tally=block.tally, seconds=block.seconds))
 
     def describe(self) -> None:
         """Write what the group's arrays are, and what the run was asked for."""
@@ -190,6 +228,7 @@ class RunFolder:
         for name in self.shape.names:
             (self.folder / GROUP / name).mkdir(parents=True, exist_ok=True)
         sizes = {"particles": self.shape.n_particles, "block": self.shape.block}
+        sizes |= {"cycles_of_a_chunk": self.shape.chunked}
         attributes = self.asked.to_data() | sizes | {"command": self.command} | made_by()
         write_file(self.folder / MARKERS / DESCRIPTION, sealed(json.dumps(attributes).encode()))
         write_files(self.folder / GROUP, metadata(self.shape, attributes))
@@ -202,11 +241,11 @@ class RunFolder:
             BadInput: it is not there, or not as it was written.
         """
         marker = self._marker(number)
-        content = None if marker is None else self._chunk(number, name, marker)
-        if marker is None or content is None:
+        contents = None if marker is None else self._chunks(number, name, marker)
+        if marker is None or contents is None:
             path = self.folder / GROUP / self.shape.chunk(name, number)
             raise BadInput(f"{str(path)!r} is missing or damaged: mushrooms simulate --resume mends it")
-        return from_chunk(content, self.shape, name, marker.rows)
+        return from_chunks(contents, self.shape, name, marker.rows, marker.cycles)
 
     def load(self) -> None:
         """Count the blocks by their markers alone: what is read later is checked then.
@@ -217,16 +256,20 @@ class RunFolder:
         for number in range(self.shape.n_blocks):
             marker = self._marker(number)
             if marker is not None:
-                self._count(number, marker.rows, marker.tally, marker.seconds)
-        if any(self.missing()):
+                self._count(number, marker)
+        if any(self.lacking()):
             there, n = self.tally.particles, self.shape.n_particles
             raise BadInput(
                 f"run {str(self.folder)!r} has {there} of {n} particles: go on with {self.command}"
             )
 
-    def _count(self, number: int, rows: int, tally: RunTally, seconds: float) -> None:
-        self._rows[number] = rows
-        self.tally, self.seconds = self.tally.merged(tally), self.seconds + seconds
+    def _count(self, number: int, marker: Marker) -> None:
+        if marker.cycles < self.shape.n_cycles:
+            self._shorter[number] = marker.cycles
+            return
+        self._shorter.pop(number, None)
+        self._rows[number] = marker.rows
+        self.tally, self.seconds = self.tally.merged(marker.tally), self.seconds + marker.seconds
 
     def _path(self, number: int) -> Path:
         return self.folder / MARKERS / f"{number}.marker"
@@ -237,16 +280,19 @@ class RunFolder:
             return None
         data = json.loads(content)
         is_ours = data.get("run") == self._identity and data["number"] == number
-        if not is_ours or data["rows"] > self.shape.rows(number):
+        if not is_ours or data["rows"] > self.shape.rows(number) or data["cycles"] > self.shape.n_cycles:
             return None
-        return Marker(data["rows"], data["sums"], tally_from(data["tally"]), data["seconds"])
+        fields = {name: data[name] for name in Marker._fields} | {"tally": tally_from(data["tally"])}
+        return Marker(**fields)
 
-    def _chunk(self, number: int, name: str, marker: Marker) -> bytes | None:
+    def _chunks(self, number: int, name: str, marker: Marker) -> list[bytes] | None:
+        paths = self.shape.chunks(name, number, marker.cycles)
         try:
-            content = (self.folder / GROUP / self.shape.chunk(name, number)).read_bytes()
+            contents = [(self.folder / GROUP / path).read_bytes() for path in paths]
         except OSError:
             return None
-        return content if hashlib.sha256(content).hexdigest() == marker.sums[name] else None
+        sums = [hashlib.sha256(content).hexdigest() for content in contents]
+        return contents if sums == [marker.sums[path] for path in paths] else None
 
 
 def is_run(folder: Path) -> bool:
@@ -294,7 +340,14 @@ def open_run(folder: Path) -> RunFolder:
     run = RunFolder(
         folder,
         asked,
-        Shape(found["particles"], found["block"], asked.n_cycles, n_narrowings, len(asked.phases)),
+        Shape(
+            found["particles"],
+            found["block"],
+            asked.n_cycles,
+            n_narrowings,
+            len(asked.phases),
+            found["cycles_of_a_chunk"],
+        ),
         found["command"],
     )
     run.load()

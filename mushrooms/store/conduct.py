@@ -20,7 +20,7 @@ from mushrooms.forecast import expected_collisions
 from mushrooms.store.asked import Asked, difference
 from mushrooms.store.blocks import AnyRun, Block, Piece, RunFolder, attributes_of, is_run
 from mushrooms.store.engines import Engine, Tick, follow
-from mushrooms.store.layout import Shape
+from mushrooms.store.layout import Arrays, Shape
 from scene.refusal import BadInput
 
 BLOCK_COLLISIONS = 2e8  # of a block, some seconds: what a fault can cost, and long beside a block's files
@@ -28,6 +28,7 @@ LEAST_BLOCK, MOST_BLOCK = 256, 2**17  # particles: a thread's lanes are full, an
 BLOCK_BYTES = 2**26  # on disk; in memory several times that
 LANES_OF_A_THREAD = 128  # particles that a thread needs to be quick
 MOST_BLOCKS = 10**6
+MOST_CHUNKS = 200  # of a block's array along the cycles: so many fit into MARKER_BYTES of their sums
 PROBED = 4  # particles followed again before a run is gone on with
 MARKER_BYTES = 2**16  # of a block's files beside its chunks, at most
 CLOCK = time.monotonic
@@ -58,8 +59,8 @@ def block_size(asked: Asked, threads: int) -> int:
     return int(2 ** math.floor(math.log2(max(1, min(max(wanted, least), most)))))
 
 
-def shape_of(asked: Asked, n_particles: int, block: int) -> Shape:
-    """Return the sizes of a run.
+def shape_of(asked: Asked, n_particles: int, block: int, chunked: int | None = None) -> Shape:
+    """Return the sizes of a run; in a chunk it has so many cycles, by default all.
 
     Raises:
         BadInput: it would have more blocks than a folder can hold well.
@@ -67,7 +68,8 @@ def shape_of(asked: Asked, n_particles: int, block: int) -> Shape:
     if n_particles > MOST_BLOCKS * block:
         least = -(-n_particles // MOST_BLOCKS)
         raise BadInput(f"--block = {block}: {n_particles} particles need blocks of at least {least}")
-    return Shape(n_particles, block, asked.n_cycles, len(narrowings(asked.scene)), len(asked.phases))
+    n_narrowings, n_phases = len(narrowings(asked.scene)), len(asked.phases)
+    return Shape(n_particles, block, asked.n_cycles, n_narrowings, n_phases, chunked or asked.n_cycles)
 
 
 def opened(
@@ -85,7 +87,7 @@ def opened(
 
     Args:
         folder: held by the caller.
-        asked: for the run.
+        asked: for the run; with as many cycles as there are, or more: then it is lengthened.
         n_particles: as many as there are, or more: then it is widened.
         block: particles of a block; None for what is there, or `default`.
         default: for a new run.
@@ -105,12 +107,22 @@ def opened(
     found = described(folder, asked, {} if block is None else {"block": block})
     if at_least and found["particles"] > n_particles:
         n_particles, command = found["particles"], found["command"]
-    if found["particles"] > n_particles:
-        other = f"particles = {found['particles']} there, {n_particles} asked for: a run only grows"
+    other = None
+    for name, n in (("cycles", asked.n_cycles), ("particles", n_particles)):
+        if other is None and found[name] > n:
+            other = f"{name} = {found[name]} there, {n} asked for: a run only grows"
+    if other is not None:
         raise BadInput(f"output {str(folder)!r} holds another run: {other}")
     if not resume:
         raise BadInput(f"output {str(folder)!r} holds this run: --resume goes on with it")
-    run = RunFolder(folder, asked, shape_of(asked, n_particles, found["block"]), command)
+    most = MOST_CHUNKS * found["cycles_of_a_chunk"]
+    if asked.n_cycles > most:
+        raise BadInput(
+            f"output {str(folder)!r}: --cycles = {asked.n_cycles}, must be at most {most} for a run that"
+            f" began with {found['cycles_of_a_chunk']}: more need another folder"
+        )
+    shape = shape_of(asked, n_particles, found["block"], found["cycles_of_a_chunk"])
+    run = RunFolder(folder, asked, shape, command)
     damaged = run.check()
     _probe(run)
     _check_disk(run)
@@ -119,13 +131,13 @@ def opened(
 
 
 def described(folder: Path, asked: Asked, more: dict[str, object]) -> dict[str, Any]:
-    """Return what a stored run says of itself, if it is the one asked for.
+    """Return what a stored run says of itself, if it is the one asked for, with any number of cycles.
 
     Raises:
         BadInput: it is another: in what, and both values; or its description is damaged.
     """
-    found = attributes_of(folder)
-    other = difference(found, asked.to_data() | more)
+    found, wanted = attributes_of(folder), asked.to_data() | more
+    other = difference(found, {name: value for name, value in wanted.items() if name != "cycles"})
     if other is not None:
         raise BadInput(f"output {str(folder)!r} holds another run: {other}")
     return found
@@ -167,15 +179,27 @@ def complete(
 
 
 def _probe(run: RunFolder) -> None:
-    """Refuse to go on where the particles that are there would come out otherwise."""
-    there = next((n for n in range(run.shape.n_blocks) if run.is_there(n)), None)
+    """Refuse to go on where the particles that are there would come out otherwise.
+
+    The first ones are followed again, and where they are to be lengthened once more through all cycles, from
+    their starts and from where they are.
+    """
+    there = run.first_there()
     if there is None:
         return
-    n = min(PROBED, run.shape.rows(there))
-    again = follow(run.asked, Piece(there, there * run.shape.block, n), None)
-    for name in run.shape.names:
-        stored = run.read(there, name)[:n]
-        if not np.array_equal(stored, again.arrays[name][: len(stored)], equal_nan=stored.dtype.kind == "f"):
+    stored = {name: array[:PROBED] for name, array in run.block(there).arrays.items()}
+    n, n_cycles = stored["energy"].shape
+    piece, asked = Piece(there, there * run.shape.block, n), run.asked
+    first = follow(asked._replace(n_cycles=n_cycles), piece, None)
+    _compare(run, stored, first.arrays)
+    if n_cycles < asked.n_cycles:
+        longer = follow(asked, piece._replace(before=first._replace(arrays=stored)), None)
+        _compare(run, longer.arrays, follow(asked, piece, None).arrays)
+
+
+def _compare(run: RunFolder, ones: Arrays, others: Arrays) -> None:
+    for name, one in ones.items():
+        if not np.array_equal(one, others[name], equal_nan=one.dtype.kind == "f"):
             made = attributes_of(run.folder)["versions"]
             raise BadInput(
                 f"output {str(run.folder)!r}: {name} of its first particles comes out otherwise here; it was"
@@ -184,7 +208,7 @@ def _probe(run: RunFolder) -> None:
 
 
 def _check_disk(run: RunFolder) -> None:
-    needed = sum(piece.n * run.shape.bytes_of_a_particle + MARKER_BYTES for piece in run.missing())
+    needed = sum(piece.n * run.shape.bytes_of_a_particle + MARKER_BYTES for piece in run.lacking())
     free = shutil.disk_usage(run.folder).free
     if needed > free:
         raise BadInput(

@@ -6,15 +6,17 @@ so that it does not matter which engine, machine or block followed it, nor how o
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Generator, Iterator
 from itertools import islice
 from typing import Any
 
 import fast
 import mushrooms
+from fast import Paused
 from mushrooms.store.asked import Asked, asked_of
 from mushrooms.store.blocks import Block, Piece
-from mushrooms.store.layout import columns
+from mushrooms.store.layout import columns, paused_of
 from mushrooms.store.tally import tally_of
 from scene.refusal import BadInput
 
@@ -33,20 +35,38 @@ def follow(asked: Asked, piece: Piece, threads: int | None, tick: Tick | None = 
     """Follow the particles of a piece.
 
     Raises:
-        BadInput: as `fast.simulate`.
+        BadInput: as `fast.go_on`.
     """
-    ensemble = fast.simulate(
+    if piece.before is None:
+        return _followed(asked, piece.first, piece.n, threads, tick)
+    arrays, _, seconds = piece.before
+    before = paused_of(arrays, asked.energy, seconds)
+    n = len(before.lanes)
+    longer = _followed(asked, piece.first, n, threads, tick, before)
+    if n == piece.n:
+        return longer
+    rest = None if tick is None else lambda n_done: tick(n + n_done)
+    return longer.joined(_followed(asked, piece.first + n, piece.n - n, threads, rest))
+
+
+def _followed(
+    asked: Asked, first: int, n: int, threads: int | None, tick: Tick | None, before: Paused | None = None
+) -> Block:
+    """Follow particles from their starts, or from where they were."""
+    paused = fast.go_on(
         asked.scene,
-        n_particles=piece.n,
+        n_particles=n,
         energy=asked.energy,
         n_cycles=asked.n_cycles,
         seed=asked.seed,
-        first=piece.first,
+        first=first,
         threads=threads,
         phases=asked.phases,
         progress=tick,
+        before=before,
     )
-    return Block(columns(ensemble), tally_of(ensemble), ensemble.seconds * ensemble.threads)
+    ensemble = paused.ensemble
+    return Block(columns(paused), tally_of(ensemble), ensemble.seconds * ensemble.threads)
 
 
 def in_process(threads: int | None) -> Engine:
@@ -59,7 +79,7 @@ def in_process(threads: int | None) -> Engine:
     return engine
 
 
-def follow_elsewhere(data: dict[str, Any], piece: tuple[int, int, int], threads: int) -> Block:
+def follow_elsewhere(data: dict[str, Any], piece: Piece, threads: int) -> Block:
     """Follow a piece on a worker, which must be of the version that asks.
 
     Raises:
@@ -67,7 +87,7 @@ def follow_elsewhere(data: dict[str, Any], piece: tuple[int, int, int], threads:
     """
     if data["version"] != mushrooms.__version__:
         raise BadInput(f"a worker has version {mushrooms.__version__}, must be {data['version']}")
-    return follow(asked_of(data), Piece(*piece), threads)
+    return follow(asked_of(data), piece, threads)
 
 
 def by_dask(address: str, threads: int | None) -> Engine:
@@ -100,11 +120,11 @@ def _handed_out(client: Any, asked: Asked, pieces: Iterator[Piece], tick: Tick, 
     """Keep every worker busy, and yield what comes back; what is still out is dropped at the end."""
     from distributed import KilledWorker, wait
 
-    data, out, n_killed = asked.to_data(), {}, dict[Piece, int]()
+    data, out, n_killed = asked.to_data(), {}, Counter[int]()
 
     def submit(piece: Piece) -> None:
         future = client.submit(
-            follow_elsewhere, data, tuple(piece), threads, pure=False, retries=RETRIES, priority=-piece.number
+            follow_elsewhere, data, piece, threads, pure=False, retries=RETRIES, priority=-piece.number
         )
         out[future] = piece
 
@@ -126,8 +146,8 @@ def _handed_out(client: Any, asked: Asked, pieces: Iterator[Piece], tick: Tick, 
                     block = future.result()
                 except KilledWorker:
                     # So many workers died with it that the scheduler gave it up; it may not be its fault.
-                    n_killed[piece] = n_killed.get(piece, 0) + 1
-                    if n_killed[piece] > RETRIES:
+                    n_killed[piece.number] += 1
+                    if n_killed[piece.number] > RETRIES:
                         raise BadInput(
                             f"--dask: workers die of block {piece.number} again and again"
                         ) from None

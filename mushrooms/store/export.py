@@ -19,7 +19,7 @@ import numpy as np
 from mushrooms.store.blocks import RunFolder
 from mushrooms.store.digest import DIGESTED, part
 from mushrooms.store.engines import SCALE
-from mushrooms.store.layout import FIELDS, WALLS, Arrays
+from mushrooms.store.layout import FIELDS, LANE, WALLS, Arrays
 from scene.refusal import BadInput
 
 MAX_COLUMNS = 10_000
@@ -96,14 +96,14 @@ def export(run: RunFolder, path: Path, file: BinaryIO) -> None:
 
 def _tables(run: RunFolder) -> Iterator[Arrays]:
     """Yield each block as columns by their names."""
-    shape = run.shape
-    n_columns = sum(int(np.prod(shape.of(name, 1))) for name in shape.names)
+    shape, names = run.shape, [name for name in run.shape.names if name != LANE]
+    n_columns = sum(int(np.prod(shape.of(name, 1))) for name in names)
     if n_columns > MAX_COLUMNS:
         raise BadInput(f"a table of {n_columns} columns, must be at most {MAX_COLUMNS}: read it with xarray")
     for number in range(shape.n_blocks):
         first = number * shape.block
         columns: Arrays = {"particle": np.arange(first, first + shape.rows(number))}
-        for name in shape.names:
+        for name in names:
             array = run.read(number, name)
             for place in product(*map(range, array.shape[1:])):
                 words = [WALLS[i] if FIELDS[name].dims[-1] == "wall" else str(i + 1) for i in place]

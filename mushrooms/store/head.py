@@ -17,8 +17,8 @@ from mushrooms.store.layout import Array
 def missing(run: RunFolder, n: int) -> Iterator[Piece]:
     """Yield what is still to be followed of the first n particles."""
     for piece in run.missing():
-        if piece.first < n:
-            yield piece._replace(n=min(piece.n, n - piece.first))
+        if piece.first < n:  # what goes on from where it was does so whole
+            yield piece if piece.before is not None else piece._replace(n=min(piece.n, n - piece.first))
 
 
 def complete(run: RunFolder, n: int, engine: Engine, told: Callable[[int], None]) -> None:
@@ -33,12 +33,12 @@ def complete(run: RunFolder, n: int, engine: Engine, told: Callable[[int], None]
     Raises:
         OSError: a block could not be written.
     """
-    there = n - sum(piece.n for piece in missing(run, n))
+    there = n - sum(min(piece.n, n - piece.first) for piece in run.lacking() if piece.first < n)
     told(there)
     with closing(engine(run.asked, missing(run, n), lambda n_done: told(there + n_done))) as found:
         for piece, block in found:
             run.keep(piece, block)
-            there += piece.n
+            there += min(piece.n, n - piece.first)
             told(there)
 
 

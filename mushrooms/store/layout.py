@@ -1,7 +1,8 @@
 """How an ensemble lies on disk: a Zarr group (format 3), one chunk of each array a block of particles.
 
-Chunks are the bare little-endian numbers of an array, so that writing them needs numpy alone; xarray and
-zarr read them. A chunk that is not there yet reads as nan, or -1.
+Along the cycles a chunk holds as many as the run began with: one that is lengthened gets further chunks. They
+are the bare little-endian numbers of an array, so that writing them needs numpy alone; xarray and zarr read
+them. What is not there yet reads as nan, or -1.
 """
 
 from __future__ import annotations
@@ -12,7 +13,8 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from fast import Ensemble
+from fast import Ensemble, Paused
+from fast.kernel.kept import LANE_ROWS
 
 Array = npt.NDArray[Any]
 Arrays = dict[str, Array]
@@ -26,7 +28,7 @@ class Stored(NamedTuple):
     Attributes:
         dims: its dimensions.
         kind: the type of its numbers, as Zarr names it.
-        source: the name in `fast.Ensemble`.
+        source: the name in `fast.Ensemble`, or in `fast.Paused`.
         meaning: in a line.
     """
 
@@ -52,7 +54,9 @@ FIELDS = {
     "careful": Stored(ONE, "int64", "n_careful", "collisions left to the careful step"),
     "phase_energy": Stored(LOOKS, "float64", "phase_energies", "energy v^2/2 at the phases of each cycle"),
     "phase_captured": Stored(LOOKS, "int8", "phase_captured", "1: captured there; -1: not followed yet"),
+    "lane": Stored(("particle", "row"), "float64", "lanes", "what it takes to go on: see fast.Paused"),
 }
+LANE = "lane"  # no result: neither digested nor exported
 
 
 class Shape(NamedTuple):
@@ -62,13 +66,15 @@ class Shape(NamedTuple):
         n_particles: in all.
         block: particles of a block; the last one may have fewer.
         n_cycles, n_narrowings, n_phases: looks at each.
+        chunked: cycles of a chunk.
     """
 
     n_particles: int
     block: int
     n_cycles: int
     n_narrowings: int
-    n_phases: int = 0
+    n_phases: int
+    chunked: int
 
     @property
     def n_blocks(self) -> int:
@@ -79,10 +85,11 @@ class Shape(NamedTuple):
         """Return how many particles a block has."""
         return min(self.block, self.n_particles - number * self.block)
 
-    def of(self, name: str, n: int) -> tuple[int, ...]:
-        """Return the shape of an array for n particles."""
-        sizes = {"cycle": self.n_cycles, "narrowing": self.n_narrowings, "wall": len(WALLS)}
-        sizes["phase"] = self.n_phases
+    def of(self, name: str, n: int, n_cycles: int | None = None) -> tuple[int, ...]:
+        """Return the shape of an array for n particles and so many cycles, by default for all."""
+        sizes = {"cycle": self.n_cycles if n_cycles is None else n_cycles}
+        sizes |= {"narrowing": self.n_narrowings, "phase": self.n_phases}
+        sizes |= {"wall": len(WALLS), "row": LANE_ROWS}
         return (n, *(sizes[dim] for dim in FIELDS[name].dims[1:]))
 
     @property
@@ -96,30 +103,68 @@ class Shape(NamedTuple):
         sizes = (int(np.prod(self.of(name, 1))) * np.dtype(FIELDS[name].kind).itemsize for name in self.names)
         return sum(sizes)
 
-    def chunk(self, name: str, number: int) -> str:
-        """Return the path of a chunk in the group."""
-        zeros = ".0" * (len(FIELDS[name].dims) - 1)
-        return f"{name}/c.{number}{zeros}"
+    def chunk(self, name: str, number: int, k: int = 0) -> str:
+        """Return the path in the group of a block's chunk, the k-th along the cycles."""
+        places = [str(k if dim == "cycle" else 0) for dim in FIELDS[name].dims[1:]]
+        return f"{name}/c.{'.'.join([str(number), *places])}"
+
+    def chunks(self, name: str, number: int, n_cycles: int) -> list[str]:
+        """Return the paths of a block's chunks, up to a cycle."""
+        n = -(-n_cycles // self.chunked) if "cycle" in FIELDS[name].dims else 1
+        return [self.chunk(name, number, k) for k in range(n)]
 
 
-def columns(ensemble: Ensemble) -> Arrays:
+def columns(paused: Paused) -> Arrays:
     """Return the arrays that are stored of an ensemble."""
-    return {n: getattr(ensemble, field.source).astype(field.kind, copy=False) for n, field in FIELDS.items()}
+    found = {**paused.ensemble._asdict(), "lanes": paused.lanes}
+    return {name: found[field.source].astype(field.kind, copy=False) for name, field in FIELDS.items()}
 
 
-def to_chunk(array: Array, block: int) -> bytes:
-    """Return a chunk's bytes; a last block that is not full is filled up, as Zarr has it."""
+def paused_of(arrays: Arrays, energy0: float, seconds: float) -> Paused:
+    """Return the ensemble that arrays were stored of, which has taken so many seconds in one thread."""
+    found: dict[str, Any] = {field.source: arrays[name] for name, field in FIELDS.items() if name in arrays}
+    none = np.zeros((*found["cycle_energies"].shape, 0))
+    empty = {"t_in": none, "t_out": none, "phase_energies": none, "phase_captured": none}
+    found = empty | found | {"energy0": energy0, "seconds": seconds, "threads": 1}
+    found |= {"energy": found["cycle_energies"][:, -1], "n_collisions": found["wall_counts"].sum(axis=1)}
+    found["phase_captured"] = found["phase_captured"].astype(bool)  # of Zarr's -1 none is left
+    return Paused(Ensemble(**{name: found[name] for name in Ensemble._fields}), found["lanes"])
+
+
+def to_chunks(array: Array, shape: Shape, name: str) -> list[bytes]:
+    """Return the bytes of a block's chunks; those that are not full are filled up, as Zarr has it."""
+    sizes = shape.of(name, shape.block, shape.chunked)
     little = array.astype(array.dtype.newbyteorder("<"), copy=False)
-    rest = np.full((block - len(array), *array.shape[1:]), _filler(array.dtype), little.dtype)
-    return little.tobytes() + rest.tobytes()
+    axis = _cycle_axis(name)
+    parts = [little] if axis is None else _cut(little, shape.chunked, axis)
+    return [_filled_up(part, sizes).tobytes() for part in parts]
 
 
-def from_chunk(content: bytes, shape: Shape, name: str, n: int) -> Array:
-    """Return the first n rows of a chunk."""
-    kind = np.dtype(FIELDS[name].kind)
-    wanted = shape.of(name, n)
-    found = np.frombuffer(content, kind.newbyteorder("<"), int(np.prod(wanted)))
-    return found.reshape(wanted).astype(kind, copy=False)
+def from_chunks(contents: list[bytes], shape: Shape, name: str, n: int, n_cycles: int) -> Array:
+    """Return the first n rows of a block's chunks, up to a cycle."""
+    kind, axis = np.dtype(FIELDS[name].kind), _cycle_axis(name)
+    sizes = shape.of(name, n, shape.chunked)
+    found = [np.frombuffer(c, kind.newbyteorder("<"), int(np.prod(sizes))).reshape(sizes) for c in contents]
+    is_one = axis is None or n_cycles == shape.chunked
+    whole = found[0] if is_one else np.concatenate(found, axis).take(range(n_cycles), axis)
+    return whole.astype(kind, copy=False)
+
+
+def _cycle_axis(name: str) -> int | None:
+    dims = FIELDS[name].dims
+    return dims.index("cycle") if "cycle" in dims else None
+
+
+def _cut(array: Array, length: int, axis: int) -> list[Array]:
+    return np.split(array, range(length, array.shape[axis], length), axis)
+
+
+def _filled_up(array: Array, sizes: tuple[int, ...]) -> Array:
+    if array.shape == sizes:
+        return array
+    whole = np.full(sizes, _filler(array.dtype), array.dtype)
+    whole[tuple(map(slice, array.shape))] = array
+    return whole
 
 
 def _filler(kind: np.dtype[Any]) -> float | int:
@@ -141,7 +186,7 @@ def metadata(shape: Shape, attributes: dict[str, Any]) -> dict[str, bytes]:
 
 
 def _array(shape: Shape, name: str) -> dict[str, Any]:
-    field = FIELDS[name]
+    field, chunk = FIELDS[name], shape.of(name, shape.block, shape.chunked)
     attributes: dict[str, Any] = {"long_name": field.meaning}
     if name == "outcome":
         attributes |= {"flag_values": list(range(len(OUTCOMES))), "flag_meanings": " ".join(OUTCOMES)}
@@ -152,7 +197,7 @@ def _array(shape: Shape, name: str) -> dict[str, Any]:
         "node_type": "array",
         "shape": shape.of(name, shape.n_particles),
         "data_type": field.kind,
-        "chunk_grid": {"name": "regular", "configuration": {"chunk_shape": shape.of(name, shape.block)}},
+        "chunk_grid": {"name": "regular", "configuration": {"chunk_shape": chunk}},
         "chunk_key_encoding": {"name": "default", "configuration": {"separator": "."}},
         "fill_value": "NaN" if field.kind == "float64" else -1,
         "codecs": [{"name": "bytes", "configuration": {"endian": "little"}}],

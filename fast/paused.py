@@ -1,0 +1,105 @@
+"""Ensembles that go on: through some cycles now and more of them later, to the bits of all at once."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from fast.ensemble import Ensemble, Plan, planned
+from fast.kernel import codes
+from fast.kernel.kept import LANE_ROWS
+from fast.kernel.records import FloatArray
+from fast.kernel.worker import is_known_throughout
+from fast.pieces import laws_in_lanes
+from scene import Scene
+from scene.refusal import BadInput
+
+BY_CYCLE = ("cycle_energies", "t_in", "t_out", "phase_energies", "phase_captured")
+
+
+class Paused(NamedTuple):
+    """An ensemble, and what it takes to go on with it.
+
+    A last state is not enough: it lies in the middle of a flight, and a flight that begins there is rounded
+    otherwise than the one that passes.
+
+    Attributes:
+        ensemble: up to the end of its last cycle.
+        lanes: (N, LANE_ROWS) each particle at its last collision, and its next one, in the stepper's own
+            units (`fast.kernel.kept`); nan for one that was not followed to the end.
+    """
+
+    ensemble: Ensemble
+    lanes: FloatArray
+
+
+def go_on(
+    scene: Scene,
+    *,
+    n_particles: int,
+    energy: float,
+    n_cycles: int = 1,
+    seed: int = 0,
+    first: int = 0,
+    threads: int | None = None,
+    phases: Sequence[float] = (),
+    progress: Callable[[int], None] | None = None,
+    before: Paused | None = None,
+) -> Paused:
+    """Follow an ensemble as `fast.simulate` does, which tells of the arguments, so that it can go on.
+
+    `before` is what the same call with fewer cycles has returned, None to begin. `n_cycles` counts all
+    cycles, those before too.
+
+    Returns:
+        The ensemble that `fast.simulate` returns, to the bit, and what it takes to go on with that. Who was
+        not followed to the end before, or had a collision within rounding of it, is followed from its start.
+
+    Raises:
+        BadInput: naming field, value and bound; `before` is of other sizes, or so many cycles reach beyond
+            the time up to which the lanes that followed it know the phases of the laws.
+    """
+    plan = planned(scene, n_particles, energy, n_cycles, seed, first, threads, phases, progress)
+    if before is None:
+        done, seconds = plan.followed(plan.starts(), LANE_ROWS)
+        return Paused(plan.ensemble(done, seconds), done.lanes)
+    n_before, n_passed = _passed(plan, before)
+    done, seconds = plan.followed(np.full((n_particles, 6), np.nan), LANE_ROWS, before.lanes, n_passed)
+    after, anew = plan.ensemble(done, seconds), np.flatnonzero(done.codes == codes.ANEW)
+    for name in BY_CYCLE:
+        getattr(after, name)[:, :n_before] = getattr(before.ensemble, name)
+    if len(anew):
+        starts = plan.starts()[anew]
+        again, more = plan._replace(progress=None).followed(starts, LANE_ROWS)
+        fresh, seconds = plan.ensemble(again, more), seconds + more
+        for whole, own in zip(after[1:-2], fresh[1:-2], strict=True):
+            whole[anew] = own
+        done.lanes[anew] = again.lanes
+    seconds += before.ensemble.seconds * before.ensemble.threads / plan.threads
+    return Paused(after._replace(seconds=seconds), done.lanes)
+
+
+def _passed(plan: Plan, before: Paused) -> tuple[int, int]:
+    """Return how many cycles and stops an ensemble has passed, after a look at whether it can go on so."""
+    n, n_cycles, looks = plan.size
+    old = before.ensemble
+    n_before = old.cycle_energies.shape[1]
+    there = (old.energy0, *before.lanes.shape, old.phase_energies.shape[2], old.t_in.shape[2])
+    wanted = (plan.energy0, n, LANE_ROWS, looks - 1, plan.stops.narrowings.shape[1])
+    for name, found, value in zip(
+        ("energy", "n_particles", "rows of lanes", "phases", "narrowings"), there, wanted, strict=True
+    ):
+        if found != value:
+            raise BadInput(f"before: {name} = {found}, must be {value}")
+    if not 1 <= n_before <= n_cycles:
+        raise BadInput(f"n_cycles = {n_cycles}, must be at least the {n_before} of before")
+    n_passed = n_before * (len(plan.stops.times) // n_cycles)
+    in_lanes, times = laws_in_lanes(plan.scene), plan.stops.times
+    if is_known_throughout(in_lanes, times[n_passed - 1]) != is_known_throughout(in_lanes, times[-1]):
+        raise BadInput(
+            f"n_cycles = {n_cycles}: beyond the time up to which lanes know the laws' phases. Lanes followed"
+            f" the first {n_before} cycles: they cannot be gone on from"
+        )
+    return n_before, n_passed

@@ -1,0 +1,66 @@
+"""The first collision is the same however far a step may look beyond it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from support.faulty_kernels import output_of
+
+import fast
+from scene import BangBang, Collision, Fourier, Mushroom, State
+
+# Sides that lean, now more and now less. What bounds them for all time bounds them above the floor alone.
+WAVING = Mushroom(r=1.0, h=1.0, nu=Fourier(0.6, 1.0, (-0.3,)), slope=Fourier(0.1, 1.0, (0.05,)))
+TILTING = Mushroom(
+    r=1.0,
+    h=BangBang(knots=((0.0, 1.0), (3.0, 1.5), (6.0, 1.0))),
+    w=BangBang(knots=((0.0, 0.7), (2.0, 0.4), (6.0, 0.7))),
+    slope=BangBang(knots=((0.0, 0.0), (2.0, 0.2), (4.0, -0.2), (6.0, 0.0))),
+)
+# A slow flight to the floor. Below it, had there been none, it would have met the left side later.
+MISSED = State(
+    19.567471529586616,
+    0.3255672736818292,
+    -0.35216875914665585,
+    -0.08157687079110951,
+    -0.15007099796621198,
+    "right",
+)
+PROGRAM = """
+from test_fast_horizons import MISSED, WAVING
+import fast
+print(fast.next_collision(WAVING, MISSED, 50.0).wall)
+"""
+
+
+def slow_starts(random, n):
+    """Draw states in the stem, slow beside the walls, most on their way down."""
+    for _ in range(n):
+        t, x, y, vx, vy = random.uniform((0.0, -0.15, -0.9, -0.3, -0.3), (60.0, 0.15, -0.1, 0.3, 0.1))
+        yield State(float(t), float(x), float(y), float(vx), float(vy))
+
+
+@pytest.mark.parametrize("scene", [WAVING, TILTING])
+def test_a_step_does_not_depend_on_how_far_it_may_look(scene):
+    n_met = 0
+    for state in slow_starts(np.random.default_rng(7), 400):
+        far = fast.next_collision(scene, state, state.t + 300.0)
+        if isinstance(far, Collision):
+            n_met += 1
+            for factor in (1.0 + 2.0**-20, 1.3, 4.0):
+                assert fast.next_collision(scene, state, state.t + factor * far.dt) == far
+            assert far.y >= -1.5 * (1.0 + 2.0**-50)
+    assert n_met > 300
+
+
+def test_the_floor_is_not_missed():
+    assert fast.next_collision(WAVING, MISSED, 50.0) == fast.next_collision(WAVING, MISSED, 25.0)
+
+
+def test_a_stepper_that_looks_for_sides_below_the_floor_misses_it(tmp_path):
+    order = "for candidate in (FLOOR, LEFT, RIGHT):"
+    assert output_of(tmp_path / "honest", PROGRAM).strip() == "floor"
+    faulty = output_of(
+        tmp_path / "faulty", PROGRAM, "careful.py", order, "for candidate in (LEFT, RIGHT, FLOOR):"
+    )
+    assert faulty.strip() == "left"

@@ -1,0 +1,194 @@
+"""Ensembles that go on: the bits of all cycles at once, wherever they are cut, and who may not go on."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import fast
+from fast import paused, pieces
+from fast.kernel import kept
+from fast.kernel.arithmetic import MAX_QUADRANT
+from fast.pieces import laws_in_lanes
+from fast.starts import cycle_stops
+from fast.units import Units, fit
+from scene import BadInput, BangBang, Cap, Fourier, Mushroom, load
+
+TWICE = tuple(zip(map(float, range(9)), (1.0, 1.0, 0.3, 0.3, 1.0, 1.0, 0.3, 0.3, 1.0), strict=True))
+BREATH = ((0.0, 1.0), (2.0, 1.0), (2.5, 1.25), (6.0, 1.25), (6.5, 1.0), (8.0, 1.0))
+WAVE = Fourier(mean=1.0, omega=1.0, sin=(0.3,))
+# By what is special in them: a cap alone is always unfolded, a mouth as wide as the cap captures nobody.
+SCENES = {
+    "moving cap": load("moving-cap"),
+    "fixed cap": load("fixed-cap-clockwise"),
+    "a cap alone": load("breathing-circle"),
+    "a stem alone": load("fermi-ulam"),
+    "ergodic": load("ergodic"),
+    "frozen": load("frozen-mushroom"),
+    "nu = 1 at rest": Mushroom(r=WAVE, h=1.0, nu=1.0, slope=0.0),
+    "two narrowings": Mushroom(r=BangBang(knots=BREATH), h=1.0, nu=BangBang(knots=TWICE), slope=0.1),
+    "narrowest at the end": Mushroom(
+        r=1.0, h=1.0, nu=Fourier(mean=0.6, omega=1.0, cos=(-0.3,)), slope=Fourier(0.1, 1.0, (0.05,))
+    ),
+}
+
+
+def in_goes(scene, cuts, **asked):
+    found = None
+    for n_cycles in cuts:
+        found = fast.go_on(scene, n_cycles=n_cycles, before=found, **asked)
+    return found
+
+
+def cuts_of(random, most=8):
+    """Draw after how many cycles a run is cut; it may be gone on with for no more cycles than it has."""
+    n_cycles = int(random.integers(2, most + 1))
+    return [*sorted(random.integers(1, n_cycles + 1, 3).tolist()), n_cycles]
+
+
+def is_same(found, wanted):
+    """Tell whether two runs are the same to the bit, also in what they would go on from."""
+    ones, others = ((*run.ensemble[1:-2], run.lanes) for run in (found, wanted))
+    pairs = zip(ones, others, strict=True)
+    return all(one.tobytes() == other.tobytes() for one, other in pairs)
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_cycles_in_goes_are_those_at_once(name):
+    scene, random = SCENES[name], np.random.default_rng(len(name))
+    for energy in (1.0, 40.0, 1500.0):
+        cuts, phases = cuts_of(random), sorted(random.uniform(0.01, 0.99, 2).tolist())
+        asked = {"n_particles": 80, "energy": energy, "seed": int(energy), "phases": phases}
+        found = in_goes(scene, cuts, threads=1, **asked)
+        assert is_same(found, fast.go_on(scene, n_cycles=cuts[-1], threads=2, **asked))
+        assert found.ensemble.sha256() == fast.simulate(scene, n_cycles=cuts[-1], **asked).sha256()
+        assert found.ensemble.ns_per_collision() > 0.0
+
+
+def test_cycles_in_goes_without_lanes(monkeypatch):
+    """Laws of too many pieces: every step is a careful one."""
+    scene = Mushroom(r=WAVE, h=1.0, nu=0.4, slope=0.1)
+    monkeypatch.setattr(pieces, "MAX_PIECES", 8)
+    laws_in_lanes.cache_clear()
+    try:
+        for one in (scene, Cap(r=WAVE)):
+            asked = {"n_particles": 40, "energy": 30.0, "seed": 2}
+            found = in_goes(one, (1, 2, 5), **asked)
+            assert (found.ensemble.n_careful >= found.ensemble.n_collisions).all()
+            assert is_same(found, fast.go_on(one, n_cycles=5, **asked))
+    finally:
+        laws_in_lanes.cache_clear()
+
+
+def test_a_particle_s_lane_is_kept_alike_beside_any_others():
+    scene, asked = SCENES["moving cap"], {"energy": 300.0, "seed": 4, "n_cycles": 2}
+    whole = fast.go_on(scene, n_particles=90, **asked)
+    for first, n in ((0, 1), (1, 88), (37, 53)):
+        part = fast.go_on(scene, n_particles=n, first=first, **asked)
+        assert np.array_equal(part.lanes, whole.lanes[first : first + n], equal_nan=True)
+
+
+def test_who_cannot_go_on_is_followed_from_the_start(monkeypatch):
+    """A lane that is not kept, or that on second sight had its collision just before the last stop."""
+    scene, asked = SCENES["moving cap"], {"n_particles": 60, "energy": 100.0, "seed": 6}
+    one, three = (fast.go_on(scene, n_cycles=n, **asked) for n in (1, 3))
+    lost = one._replace(lanes=one.lanes.copy())
+    lost.lanes[::3] = np.nan
+    assert is_same(fast.go_on(scene, n_cycles=3, before=lost, **asked), three)
+    tied = one._replace(lanes=one.lanes.copy())
+    is_right = tied.lanes[:, kept.WALL_HIT] >= 0
+    assert is_right.any()
+    last = cycle_stops(fit(scene).scene, 1, ()).times[-1]
+    tied.lanes[is_right, kept.FIRST_OF_STEP] = np.nextafter(last, 0.0)
+    assert is_same(fast.go_on(scene, n_cycles=3, before=tied, **asked), three)
+    monkeypatch.setattr(paused.codes, "ANEW", 99)  # nobody is followed anew
+    found = fast.go_on(scene, n_cycles=3, before=tied, **asked)
+    assert found.ensemble.sha256() != three.ensemble.sha256()
+
+
+def from_the_last_state(found, units):
+    """Return particles that begin a flight where they were when the last cycle ended."""
+    lanes, run = found.lanes.copy(), found.ensemble
+    rows = [run.t, np.zeros(len(run.t)), run.x, run.y, run.vx, run.vy]
+    sizes = [*units.times(np.ones(2)), *units.places(np.ones((1, 4)))[0]]  # powers of 2
+    for k, (row, size) in enumerate(zip(rows, sizes, strict=True)):
+        lanes[:, kept.FIRST_ROW + k] = row / size
+    lanes[:, [kept.WALL_HIT, kept.FIRST_ROW + 6]] = -1.0  # on no wall, and no step is known
+    return found._replace(lanes=lanes)
+
+
+def test_a_last_state_is_not_enough():
+    scene, asked = SCENES["moving cap"], {"n_particles": 60, "energy": 1e4, "seed": 6}
+    one, two = (fast.go_on(scene, n_cycles=n, **asked) for n in (1, 2))
+    fitted = fit(scene)
+    units = Units(fitted.length, fitted.time)
+    found = fast.go_on(scene, n_cycles=2, before=from_the_last_state(one, units), **asked)
+    assert (found.ensemble.outcome == 0).all()
+    assert (found.ensemble.energy != two.ensemble.energy).mean() > 0.5
+    assert is_same(fast.go_on(scene, n_cycles=2, before=one, **asked), two)
+
+
+def test_no_number_of_a_lane_may_be_forgotten(halves):
+    """Each is needed somewhere."""
+    needed = {column for column in range(kept.LANE_ROWS) if any(misses(half, column) for half in halves)}
+    assert needed == set(range(kept.LANE_ROWS))
+
+
+def misses(half, column):
+    """Tell whether a run comes out otherwise without a number of its lanes, or with it a little off."""
+    scene, asked, one, wanted = half
+    for factor in (0.0, 1.0 + 2.0**-40):
+        lanes = one.lanes.copy()
+        lanes[:, column] = factor * lanes[:, column] if factor else 0.0
+        found = fast.go_on(scene, before=one._replace(lanes=lanes), **asked)
+        if not is_same(found, wanted):
+            return True
+    return False
+
+
+@pytest.fixture
+def halves(monkeypatch):
+    """Return runs that are half done, and what they shall come to; nobody of them is followed anew."""
+    monkeypatch.setattr(paused.codes, "ANEW", 99)
+    found = []
+    for scene in SCENES.values():
+        for energy in (3.0, 300.0):
+            asked = {"n_particles": 100, "energy": energy, "seed": 8, "phases": (0.3, 0.8)}
+            one, three = (fast.go_on(scene, n_cycles=n, **asked) for n in (1, 3))
+            half = (scene, asked | {"n_cycles": 3}, one, three)
+            if is_same(fast.go_on(scene, before=one, **half[1]), three):
+                found.append(half)
+    assert len(found) > len(SCENES)
+    return found
+
+
+def test_what_does_not_fit_is_refused():
+    scene, asked = SCENES["moving cap"], {"n_particles": 4, "energy": 10.0}
+    two = fast.go_on(scene, n_cycles=2, **asked)
+    for change, words in (
+        ({}, "n_cycles = 1, must be at least the 2 of before"),
+        ({"n_cycles": 3, "n_particles": 5}, "before: n_particles = 4, must be 5"),
+        ({"n_cycles": 3, "energy": 11.0}, "before: energy = 10.0, must be 11.0"),
+        ({"n_cycles": 3, "phases": (0.5,)}, "before: phases = 0, must be 1"),
+        ({"n_cycles": 3, "first": -1}, "first = -1, must be 0 to"),
+    ):
+        with pytest.raises(BadInput, match=words):
+            fast.go_on(scene, **{**asked, **change}, before=two)
+
+
+def test_lanes_that_lose_the_laws_phases_are_not_gone_on_from():
+    """A run at once would not have used them at all."""
+    start = 0.125 * MAX_QUADRANT - 1.5
+    law = BangBang(knots=((start, 1.0), (start + 0.5, 1.25), (start + 1.0, 1.0)))
+    asked = {"n_particles": 4, "energy": 1e4}
+    one = fast.go_on(Cap(r=law), n_cycles=1, **asked)
+    assert (one.ensemble.n_careful < one.ensemble.n_collisions).any()
+    with pytest.raises(BadInput, match="n_cycles = 2: beyond the time"):
+        fast.go_on(Cap(r=law), n_cycles=2, before=one, **asked)
+    two = fast.go_on(Cap(r=law), n_cycles=2, **asked)
+    assert is_same(two, in_goes(Cap(r=law), (2, 2), **asked))
+    asked["n_cycles"] = 3
+    assert (
+        fast.go_on(Cap(r=law), before=two, **asked).ensemble.sha256()
+        == fast.simulate(Cap(r=law), **asked).sha256()
+    )

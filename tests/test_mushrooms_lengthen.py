@@ -1,0 +1,221 @@
+"""Stored runs that get more cycles: the bits of all cycles at once, however often and whatever went wrong."""
+
+from __future__ import annotations
+
+import errno
+import json
+import os
+
+import numpy as np
+import pytest
+from support.refusals import assert_refused
+
+import fast
+from fast.kernel import kept
+from mushrooms import compared
+from mushrooms.store import asked, blocks, conduct, engines, layout
+from scene import load
+
+N, BLOCK, ENERGY, SEED = 150, 32, 40.0, 7
+
+
+def arguments(folder, cycles, *more, n=N, block=BLOCK, name="fermi-ulam"):
+    words = ["simulate", name, "--particles", n, "--energy", ENERGY, "--seed", SEED, "--cycles", cycles]
+    sizes = ["--block", block] if block else []
+    return [*words, "--threads", 1, "--json", "--out", folder, "--resume", *sizes, *more]
+
+
+def at_once(n_cycles, n=N, name="fermi-ulam"):
+    return fast.simulate(load(name), n_particles=n, energy=ENERGY, n_cycles=n_cycles, seed=SEED)
+
+
+def summary_of(ended):
+    assert ended.code == 0, ended.err
+    return {name: value for name, value in json.loads(ended.out).items() if name != "ns_per_collision"}
+
+
+@pytest.fixture(autouse=True)
+def _unsynced(monkeypatch):
+    """Leave files to the system's buffers: no test can cut the power, and a busy disk would take minutes."""
+    monkeypatch.setattr(os, "fsync", lambda _descriptor: None)
+
+
+@pytest.fixture(autouse=True)
+def _whole_sums(monkeypatch):
+    """Have exact sums stand in the summary, in place of what theory makes of them in seconds."""
+    monkeypatch.setattr(compared, "measured", lambda _asked, tally: tally.to_data())
+
+
+@pytest.fixture
+def followed(monkeypatch):
+    """Return the list of what is followed: first particle, how many, from which cycle on and up to which."""
+    pieces, go_on = [], fast.go_on
+
+    def noted(scene, **options):
+        before = options["before"]
+        n_before = 0 if before is None else before.ensemble.cycle_energies.shape[1]
+        pieces.append((options["first"], options["n_particles"], n_before, options["n_cycles"]))
+        return go_on(scene, **options)
+
+    monkeypatch.setattr(fast, "go_on", noted)
+    return pieces
+
+
+@pytest.mark.parametrize("name", ["fermi-ulam", "moving-cap", "breathing-circle"])
+def test_a_run_is_lengthened_and_widened_to_the_bits_of_one_at_once(command_line, tmp_path, name):
+    """In several goes, with blocks of any size: arrays, digest, and whole sums."""
+    import xarray
+
+    random, n, cycles, last = np.random.default_rng(len(name)), 30, 1, (0, 0)
+    for _ in range(3):
+        last = (n, cycles)
+        found = summary_of(command_line(*arguments(tmp_path / "a", cycles, n=n, block=13, name=name)))
+        n, cycles = n + int(random.integers(0, 3)) * 10, cycles + int(random.integers(1, 4))
+    n, cycles = last
+    wanted = at_once(cycles, n, name)
+    assert found["sha256"] == wanted.sha256()
+    other = arguments(tmp_path / "b", cycles, n=n, block=25, name=name)
+    assert summary_of(command_line(*other)) == found
+    run, once = (xarray.open_zarr(tmp_path / folder / "ensemble.zarr") for folder in "ab")
+    assert run.drop_attrs().equals(once.drop_attrs())  # what it takes to go on among them
+    assert run.attrs["cycles"] == cycles
+    assert f"--cycles {cycles}" in run.attrs["command"]
+    for field, stored in layout.FIELDS.items():
+        if field in run and field != layout.LANE:
+            assert run[field].values.tobytes() == getattr(wanted, stored.source).tobytes()
+
+
+def test_a_run_that_is_long_enough_is_not_followed_again(command_line, tmp_path, followed):
+    summary_of(command_line(*arguments(tmp_path, 2)))
+    followed.clear()
+    assert summary_of(command_line(*arguments(tmp_path, 2)))["sha256"] == at_once(2).sha256()
+    assert followed == [(0, 4, 0, 2)]
+    followed.clear()
+    summary_of(command_line(*arguments(tmp_path, 3, n=170)))
+    probes, rest = followed[:3], followed[3:]
+    assert probes == [(0, 4, 0, 2), (0, 4, 2, 3), (0, 4, 0, 3)]
+    whole = [(first, 32, 2, 3) for first in range(0, 128, 32)]
+    assert rest == [*whole, (128, 22, 2, 3), (150, 10, 0, 3), (160, 10, 0, 3)]
+    saved = json.loads((tmp_path / "summary.json").read_text())
+    assert (saved["cycles"], saved["particles"]) == (3, 170)
+
+
+def test_a_lengthening_that_is_broken_off_goes_on(command_line, tmp_path, followed, monkeypatch):
+    """Also to more cycles than it was broken off at; blocks of three lengths stand side by side."""
+    keep, left = blocks.RunFolder.keep, 0
+
+    def interrupted(self, piece, block):
+        nonlocal left
+        left -= 1
+        if left < 0:
+            raise KeyboardInterrupt
+        keep(self, piece, block)
+
+    monkeypatch.setattr(blocks.RunFolder, "keep", interrupted)
+    left = 10
+    summary_of(command_line(*arguments(tmp_path, 1)))
+    for cycles, n_kept in ((2, 3), (4, 1)):
+        left = n_kept
+        code, out, err = command_line(*arguments(tmp_path, cycles))
+        assert (code, out) == (130, "")
+        assert f"{32 * n_kept} of {N} particles are kept; go on with: mushrooms simulate fermi-ulam" in err
+        assert f"--cycles {cycles}" in err
+    assert_refused(command_line("export", tmp_path, "--to", tmp_path / "a.csv"), f"has 32 of {N} particles")
+    assert_refused(command_line(*arguments(tmp_path, 3)), "cycles = 4 there, 3 asked for: a run only grows")
+    left = 10
+    followed.clear()
+    assert summary_of(command_line(*arguments(tmp_path, 4)))["sha256"] == at_once(4).sha256()
+    assert followed[:3] == [(32, 4, 0, 2), (32, 4, 2, 4), (32, 4, 0, 4)]  # they can be lengthened
+    assert followed[3:] == [(32, 32, 2, 4), (64, 32, 2, 4), (96, 32, 1, 4), (128, 22, 1, 4)]
+
+
+@pytest.mark.parametrize("n_renamed", [0, 1, 5, 100])
+def test_a_block_that_is_half_lengthened_is_followed_from_the_start(
+    command_line, tmp_path, followed, monkeypatch, n_renamed
+):
+    """The process dies after some of the block's chunks, or before its marker."""
+    summary_of(command_line(*arguments(tmp_path, 1)))
+    write_files = blocks.write_files
+
+    def dying(folder, contents):
+        if folder.name != blocks.GROUP or "zarr.json" in contents:
+            return write_files(folder, contents)
+        write_files(folder, dict(list(contents.items())[:n_renamed]))
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(blocks, "write_files", dying)
+    assert command_line(*arguments(tmp_path, 3)).code == 130
+    monkeypatch.setattr(blocks, "write_files", write_files)
+    followed.clear()
+    ended = command_line(*arguments(tmp_path, 3))
+    assert summary_of(ended)["sha256"] == at_once(3).sha256()
+    # Its first new chunk holds later cycles alone, and those before do not miss it.
+    is_harmed = n_renamed > 1
+    assert ((0, 32, 0, 3) in followed) == ("1 blocks (0)" in ended.err) == is_harmed
+    assert ((0, 32, 1, 3) in followed) != is_harmed
+
+
+def test_a_full_disk_leaves_a_lengthening_that_goes_on(command_line, tmp_path, monkeypatch):
+    summary_of(command_line(*arguments(tmp_path, 1)))
+    left = 0
+
+    def full(_descriptor):
+        nonlocal left
+        left -= 1
+        if left < 0:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    for n_writes in (0, 3, 12, 14, 40):
+        left = n_writes
+        monkeypatch.setattr(os, "fsync", full)
+        assert_refused(command_line(*arguments(tmp_path, 2)), "No space left on device", str(tmp_path))
+    monkeypatch.setattr(os, "fsync", lambda _descriptor: None)
+    assert summary_of(command_line(*arguments(tmp_path, 2)))["sha256"] == at_once(2).sha256()
+
+
+def test_a_chunk_holds_the_cycles_that_a_run_began_with(command_line, tmp_path):
+    import zarr
+
+    for cycles in (2, 5):
+        summary_of(command_line(*arguments(tmp_path, cycles)))
+        energy = zarr.open_group(tmp_path / "ensemble.zarr", mode="r")["energy"]
+        assert (energy.shape, energy.chunks) == ((N, cycles), (BLOCK, 2))
+    names = sorted(path.name for path in (tmp_path / "ensemble.zarr" / "energy").glob("c.1.*"))
+    assert names == ["c.1.0", "c.1.1", "c.1.2"]
+    last = np.fromfile(tmp_path / "ensemble.zarr" / "energy" / "c.1.2").reshape(BLOCK, 2)
+    assert np.isfinite(last[:, 0]).all()
+    assert np.isnan(last[:, 1]).all()
+
+
+def test_a_run_may_be_lengthened_many_times_over_but_not_endlessly(command_line, tmp_path, monkeypatch):
+    summary_of(command_line(*arguments(tmp_path, 2)))
+    monkeypatch.setattr(fast, "go_on", None)
+    assert_refused(command_line(*arguments(tmp_path, 401)), "--cycles = 401, must be at most 400")
+
+
+def test_what_is_kept_takes_the_room_that_the_page_says():
+    shape = conduct.shape_of(asked.Asked(load("moving-cap"), ENERGY, 1, SEED), 1, 1)
+    assert shape.bytes_of_a_particle == 113 + 8 * kept.LANE_ROWS == 457
+
+
+def forgotten(column):
+    def faulty(arrays, *more):
+        lanes = arrays[layout.LANE].copy()
+        lanes[:, column] = 0.0
+        return layout.paused_of({**arrays, layout.LANE: lanes}, *more)
+
+    return faulty
+
+
+def of_others(arrays, *more):
+    return layout.paused_of({**arrays, layout.LANE: arrays[layout.LANE][::-1]}, *more)
+
+
+@pytest.mark.parametrize("faulty", [forgotten(kept.FIRST_ROW + 4), forgotten(kept.FIRST_ROW + 5), of_others])
+def test_a_run_that_would_go_on_otherwise_does_not(command_line, tmp_path, monkeypatch, faulty):
+    """The first particles are followed both ways before a block is touched."""
+    summary_of(command_line(*arguments(tmp_path, 1)))
+    before = {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()}
+    monkeypatch.setattr(engines, "paused_of", faulty)
+    assert_refused(command_line(*arguments(tmp_path, 2)), "of its first particles comes out otherwise here")
+    assert before == {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()}

@@ -10,12 +10,12 @@ from pathlib import Path
 from types import FunctionType, ModuleType
 
 import numpy as np
-from numba import njit
 from numba.core.dispatcher import Dispatcher
 
 import fast
 from fast.kernel import pieces, pools
 from fast.kernel.arithmetic import fma
+from support.from_python import from_python
 
 HOUSE = Path(fast.__file__).parent.parent
 
@@ -67,13 +67,9 @@ def faulty_lanes(*changes: str) -> ModuleType:
         if isinstance(found, Dispatcher) and found.py_func.__module__ in names:
             # What it calls is looked up among the faulty ones.
             setattr(module, name, FunctionType(found.py_func.__code__, vars(module)))
+        elif isinstance(found, Dispatcher):
+            setattr(module, name, from_python(found))
         elif isinstance(found, np.integer):
             setattr(module, name, int(found))
-    vars(module).update(fma=compiled_fma, widest_registers=lambda: None)
+    vars(module).update(fma=from_python(fma), widest_registers=lambda: None)
     return module
-
-
-@njit
-def compiled_fma(a, b, c):
-    """Return a b + c, rounded once."""
-    return fma(a, b, c)

@@ -24,9 +24,7 @@ if TYPE_CHECKING:
 
 def audit(
     out: Annotated[Path, typer.Option(metavar="DIR", help="Folder for the report.")] = Path("audit-report"),
-    full: Annotated[
-        bool, typer.Option("--full", help="The paper's sizes; an hour on two cores.")
-    ] = False,
+    full: Annotated[bool, typer.Option("--full", help="The paper's sizes; an hour on two cores.")] = False,
     only: Annotated[
         str | None, typer.Option(metavar="IDS", help="Claims to check, with commas: X2,L4.")
     ] = None,

@@ -74,8 +74,8 @@ def go_on(
         starts = plan.starts()[anew]
         again, more = plan._replace(progress=None).followed(starts, LANE_ROWS)
         fresh, seconds = plan.ensemble(again, more), seconds + more
-        for whole, own in zip(after[1:-2], fresh[1:-2], strict=True):
-            whole[anew] = own
+        for name in Ensemble._fields[1:-2]:
+            getattr(after, name)[anew] = getattr(fresh, name)
         done.lanes[anew] = again.lanes
     seconds += before.ensemble.seconds * before.ensemble.threads / plan.threads
     return Paused(after._replace(seconds=seconds), done.lanes)

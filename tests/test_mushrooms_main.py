@@ -114,7 +114,8 @@ def test_output_on_a_file_is_refused_before_any_work(call, tmp_path, monkeypatch
     def never(*_args, **_options):
         raise AssertionError("simulated although the output cannot be written")
 
-    monkeypatch.setattr(fast, "simulate", never)
+    for name in ("simulate", "go_on"):
+        monkeypatch.setattr(fast, name, never)
     blocker = tmp_path / "file.txt"
     blocker.write_text("kept")
     assert_refused(call(*arguments, "--out", tmp_path / out), "file.txt", word)
@@ -129,7 +130,7 @@ def test_a_broken_off_simulation_leaves_nothing(call, tmp_path, monkeypatch, err
     def broken(*_args, **_options):
         raise error
 
-    monkeypatch.setattr(fast, "simulate", broken)
+    monkeypatch.setattr(fast, "go_on", broken)
     result = call("simulate", "moving-cap", "--particles", 5, "--energy", 100, "--out", tmp_path / "a" / "b")
     assert result[0] == code
     assert "Traceback" not in result[2]

@@ -56,7 +56,7 @@ def test_compilation_is_told_when_nothing_is_kept_and_only_then(fresh, capsys):
 @pytest.mark.parametrize(
     ("command", "owner", "name"),
     [
-        (RUN, fast, "simulate"),
+        (RUN, fast, "go_on"),
         (["audit", "--out"], session, "conduct"),
         (["bench", "--quick", "--out"], bench, "_measured"),
         (["attack", "--cases", 1, "--json"], attack_steppers, "steppers"),
@@ -103,7 +103,7 @@ def test_a_long_run_begins_with_a_forecast(command_line, monkeypatch):
         raise KeyboardInterrupt
 
     fast.simulate(load("moving-cap"), n_particles=1, energy=10.0)  # compiled
-    monkeypatch.setattr(fast, "simulate", broken_off)
+    monkeypatch.setattr(fast, "go_on", broken_off)
     run = ["simulate", "moving-cap", "--energy", 1e7, "--threads", 1, "--particles"]
     code, _, err = command_line(*run, 10**7)
     assert (code, err.count("\n"), begun) == (130, 2, [True])
@@ -133,10 +133,10 @@ def test_a_refused_run_has_no_forecast(command_line):
 def test_careful_steps_are_told_of_where_they_took_the_time(
     command_line, monkeypatch, seconds, per_thousand, said
 ):
-    run = fast.simulate(load("moving-cap"), n_particles=40, energy=1e4, threads=1)
+    run, lanes = fast.go_on(load("moving-cap"), n_particles=40, energy=1e4, threads=1)
     n_careful = np.array([run.n_collisions.sum() * per_thousand // 1000])
     run = run._replace(seconds=seconds, n_careful=n_careful)
-    monkeypatch.setattr(fast, "simulate", lambda *_args, **_options: run)
+    monkeypatch.setattr(fast, "go_on", lambda *_args, **_options: fast.Paused(run, lanes))
     code, out, err = command_line(*RUN)
     assert (code, json.loads(out)["careful"]) == (0, run.n_careful.sum())
     assert (said in err) if said else err == ""

@@ -22,6 +22,7 @@ RUN_ELSEWHERE = {
     "scenes.md": {"toml", "text", "python", "console"},  # test_docs: files loaded, doctests
     "protocol.md": {"json"},  # test_docs: against the schema and the plain stepper
     "corpus.md": {""},
+    "audit.md": {""},  # test_mushrooms_audit_runs: the commands, and the runs that they make taken up
     "ensembles.md": {"", "python"},  # test_mushrooms_scale, with fewer particles
 }
 INSTALLS = ("pip install", "mushrooms --version", "sphinx-build")

@@ -173,6 +173,15 @@ def test_another_run_or_one_in_use_is_refused_before_anything_is_followed(comman
     assert followed == []
 
 
+def test_a_run_with_more_cycles_is_refused_before_any_is_followed(tmp_path):
+    run, runs = SMALL["cycles"], audit_runs.KeptRuns(tmp_path, resume=True)
+    asked = {"energy": run.energy, "seed": run_seed(SEED, run), "phases": run.phases, "threads": 1}
+    longer = {"n_particles": 5, "n_cycles": 4, "progress": lambda _: None}
+    runs.simulate(run.name)(scene_of(run), **asked, **longer)
+    with pytest.raises(BadInput, match="cycles = 4 there, 3 asked for: a run only grows"):
+        runs.check([run], SEED)
+
+
 def test_a_run_is_held_while_the_audit_follows_it(command_line, tmp_path, monkeypatch):
     run, go_on = SMALL["mouth"], fast.go_on
     words = shlex.split(audit_runs.command(run, "quick", SEED, tmp_path))[1:]

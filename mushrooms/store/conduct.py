@@ -107,12 +107,7 @@ def opened(
     found = described(folder, asked, {} if block is None else {"block": block})
     if at_least and found["particles"] > n_particles:
         n_particles, command = found["particles"], found["command"]
-    other = None
-    for name, n in (("cycles", asked.n_cycles), ("particles", n_particles)):
-        if other is None and found[name] > n:
-            other = f"{name} = {found[name]} there, {n} asked for: a run only grows"
-    if other is not None:
-        raise BadInput(f"output {str(folder)!r} holds another run: {other}")
+    _check_growth(folder, "particles", found["particles"], n_particles)
     if not resume:
         raise BadInput(f"output {str(folder)!r} holds this run: --resume goes on with it")
     most = MOST_CHUNKS * found["cycles_of_a_chunk"]
@@ -131,7 +126,7 @@ def opened(
 
 
 def described(folder: Path, asked: Asked, more: dict[str, object]) -> dict[str, Any]:
-    """Return what a stored run says of itself, if it is the one asked for, with any number of cycles.
+    """Return what a stored run says of itself, if it is the one asked for, with as many cycles or fewer.
 
     Raises:
         BadInput: it is another: in what, and both values; or its description is damaged.
@@ -140,7 +135,14 @@ def described(folder: Path, asked: Asked, more: dict[str, object]) -> dict[str, 
     other = difference(found, {name: value for name, value in wanted.items() if name != "cycles"})
     if other is not None:
         raise BadInput(f"output {str(folder)!r} holds another run: {other}")
+    _check_growth(folder, "cycles", found["cycles"], asked.n_cycles)
     return found
+
+
+def _check_growth(folder: Path, name: str, there: int, wanted: int) -> None:
+    if there > wanted:
+        why = f"{name} = {there} there, {wanted} asked for: a run only grows"
+        raise BadInput(f"output {str(folder)!r} holds another run: {why}")
 
 
 def complete(

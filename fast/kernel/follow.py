@@ -150,15 +150,15 @@ def attend(pool, a, i, roster, worker, slope):
     if pool == GENERAL and a[SPIN + i] != 0.0 and worker.is_laned:
         return MOVES
     is_certain = worker.is_laned and a[END + i] > -NEVER and a[OK + i] == CERTAIN
+    if not is_certain and pool == DISK and scene.table == MUSHROOM:
+        fold(a, i, scene, worker.pieces, worker.degree)
+        return MOVES
     if followed.lanes.shape[1] > 0 and not (is_certain and a[NEXT_T + i] < end):
         keep_lane(pool, a, i, roster, is_certain, slope, followed)  # it may end here
     if is_certain:
         if a[NEXT_T + i] >= a[END + i]:
             set_reference(a, i, a[NEXT_T + i], a[NEXT_T_LOW + i], scene, worker.pieces, worker.degree)
         code = int(a[HIT + i])
-    elif pool == DISK and scene.table == MUSHROOM:
-        fold(a, i, scene, worker.pieces, worker.degree)
-        return MOVES
     else:
         code = step_carefully(pool, a, i, roster, worker, slope)
     if code < HORIZON:

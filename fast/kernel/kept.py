@@ -6,7 +6,8 @@ found where that is right. What came before does not look at later stops: a lane
 next one. What comes after is decided by what is kept:
 
 - where the step is right, `attend` and the bounce read it, the state, the stay and the counts;
-- where it is not, a careful step reads the state alone, or a captured particle is folded back by it;
+- where it is not, a careful step reads the state alone. A captured particle is folded back instead, and
+  kept where it is met next;
 - the piece of the laws is kept by its number and its reference time. It is not always the one that serves at
   the lane's time: a flight that ran out of its piece was given another in mid-flight. For the same reason the
   step is kept and not found again: it may have been found with two pieces.

@@ -29,6 +29,7 @@ from scene.refusal import BadInput
 from scene.tables import laws, period
 
 LENGTH, TIME = 96, 32  # exponents of a table's size and period in the kernel
+SLAB = 2**11  # rows brought back at a time: what lies in between stays in the cache
 ANSWER_LOST = "the answer holds a number beyond binary64: every one must be 0 or 2^-1022 to 2^1023"
 
 
@@ -189,6 +190,16 @@ def outward(numbers: FloatArray, exponents: FloatArray) -> FloatArray:
     Raises:
         BadInput: one of them would lose bits, or overflow.
     """
+    if numbers.ndim <= exponents.ndim:
+        return _outward(numbers, exponents)
+    out = np.empty_like(numbers)
+    for first in range(0, len(numbers), SLAB):
+        part = slice(first, first + SLAB)
+        out[part] = _outward(numbers[part], exponents)
+    return out
+
+
+def _outward(numbers: FloatArray, exponents: FloatArray) -> FloatArray:
     with np.errstate(over="ignore", under="ignore"):
         if np.abs(exponents).max() <= 1000:  # a product is exact too, and many times quicker
             factors = np.ldexp(1.0, exponents)

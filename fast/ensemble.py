@@ -149,7 +149,7 @@ class Ensemble(NamedTuple):
         """Return the SHA-256 of the result's bits (times and thread count left out)."""
         digest = hashlib.sha256()
         for array in self[1:-2]:
-            digest.update(np.ascontiguousarray(array).tobytes())
+            digest.update(np.ascontiguousarray(array).data)
         return digest.hexdigest()
 
 

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from conformance.audit.runs import RUNS, Simulation, Size, run_seed, scene_of
+from fast.ensemble import SHARE
 from mushrooms import output
 from mushrooms.simulate import tell_damaged
 from mushrooms.store import conduct, engines, head
@@ -105,6 +106,7 @@ def block_size(asked: Asked, n_particles: int, threads: int) -> int:
     """Return how many particles of a new run are kept at a time, at most all of them.
 
     At the end of a block the lanes wait for its slowest particle. Energies spread with the cycles, so that
-    what takes seconds has too few particles to wait for; `fast` shares work out by the same rule.
+    what takes seconds has too few particles to wait for: each thread has a share of `fast`, at the least.
     """
-    return min(conduct.block_size(asked, threads) * asked.n_cycles, conduct.MOST_BLOCK, n_particles)
+    wanted = max(conduct.block_size(asked, threads), SHARE * threads) * asked.n_cycles
+    return min(wanted, conduct.MOST_BLOCK, n_particles)

@@ -28,6 +28,7 @@ from scene.refusal import BadInput, check_seed
 MOST_IN_MEMORY, MOST_ON_DISK = 10**8, 10**10
 LIMITED = 3  # exit code of a run that a limit has stopped
 FOR_STORED = "needs --out: without a folder nothing is kept"
+NO_BLOCK = "no block was finished: raise the limit, or begin in another folder with a smaller --block"
 
 Particles = Annotated[int, typer.Option(help="Number of particles, 1 to 10^8; with --out to 10^10.")]
 Energy = Annotated[float, typer.Option(help="Initial energy v²/2 of every particle, > 0.")]
@@ -235,6 +236,8 @@ def _told_how_to_go_on(run: Any, command: str) -> Iterator[None]:
     """Say on stderr what is kept of a run that ends early, and which command goes on with it."""
     from mushrooms.store.conduct import LimitReached
 
+    there = run.tally.particles
+
     def how() -> str:
         n = run.tally.particles
         return f"{n:,} of {run.shape.n_particles:,} particles are kept; go on with: {command}"
@@ -243,6 +246,8 @@ def _told_how_to_go_on(run: Any, command: str) -> Iterator[None]:
         yield
     except LimitReached as limit:
         print(f"{limit}: {how()}", file=sys.stderr)
+        if run.tally.particles == there:  # it would stop there again and again
+            print(f"{NO_BLOCK} than {run.shape.block}", file=sys.stderr)
         raise
     except KeyboardInterrupt:
         if run.tally.particles:

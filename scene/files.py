@@ -21,7 +21,7 @@ LOCK = ".lock"
 SEAL = len(hashlib.sha256().digest())  # bytes
 
 
-def write_files(folder: Path, contents: Mapping[str, bytes | str | Writer]) -> None:
+def write_files(folder: Path, contents: Mapping[str, bytes | memoryview | str | Writer]) -> None:
     """Write files completely under hidden names, then give all of them their names.
 
     Args:

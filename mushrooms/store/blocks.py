@@ -208,7 +208,7 @@ class RunFolder:
         old = self._marker(piece.number)
         if piece.before is not None and old is not None:  # first cycles that are full stay as they are
             written = old.sums
-        chunks: dict[str, bytes] = {}
+        chunks: dict[str, memoryview] = {}
         for name in self.shape.names:
             paths = self.shape.chunks(name, piece.number, self.shape.n_cycles)
             chunks |= zip(paths, to_chunks(whole.arrays[name], self.shape, name), strict=True)

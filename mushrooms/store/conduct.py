@@ -8,7 +8,8 @@ from __future__ import annotations
 import math
 import shutil
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import closing
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -19,7 +20,7 @@ from fast.narrowings import narrowings
 from mushrooms.forecast import expected_collisions
 from mushrooms.store.asked import Asked, difference
 from mushrooms.store.blocks import AnyRun, Block, Piece, RunFolder, attributes_of, is_run
-from mushrooms.store.engines import Engine, Tick, follow
+from mushrooms.store.engines import Engine, Following, Tick, follow
 from mushrooms.store.layout import Arrays, Shape
 from scene.refusal import BadInput
 
@@ -169,15 +170,47 @@ def complete(
         if limits.seconds is not None and CLOCK() - begin > limits.seconds:
             raise LimitReached(f"--max-seconds = {limits.seconds:g} have passed")
 
-    with closing(engine(asked, run.missing(), looked)) as found:
-        for piece, block in found:
-            if limits.collisions is not None and block.tally.most > limits.collisions:
-                raise LimitReached(
-                    f"a particle of block {piece.number} makes {block.tally.most} collisions,"
-                    f" --max-collisions = {limits.collisions}"
-                )
-            run.keep(piece, block)
+    with (
+        closing(engine(asked, run.missing(), looked)) as found,
+        closing(keeping(run, _within(limits.collisions, found))) as blocks,
+    ):
+        for _, block in blocks:
             kept(block)
+
+
+def _within(most: int | None, found: Iterable[tuple[Piece, Block]]) -> Iterator[tuple[Piece, Block]]:
+    """Hand on blocks up to one with a particle that makes too many collisions."""
+    for piece, block in found:
+        if most is not None and block.tally.most > most:
+            raise LimitReached(
+                f"a particle of block {piece.number} makes {block.tally.most} collisions,"
+                f" --max-collisions = {most}"
+            )
+        yield piece, block
+
+
+def keeping(run: AnyRun, found: Iterable[tuple[Piece, Block]]) -> Following:
+    """Keep blocks, each while the next one is followed, and yield those that are kept.
+
+    One is written at a time, so that no more than two are in memory. However this ends, the block being
+    written is written first.
+
+    Raises:
+        OSError: a block could not be written; the one followed meanwhile is dropped.
+    """
+
+    def keep(piece: Piece, block: Block) -> tuple[Piece, Block]:
+        run.keep(piece, block)
+        return piece, block
+
+    with ThreadPoolExecutor(1) as writer:
+        under_way: Future[tuple[Piece, Block]] | None = None
+        for piece, block in found:
+            if under_way is not None:
+                yield under_way.result()
+            under_way = writer.submit(keep, piece, block)
+        if under_way is not None:
+            yield under_way.result()
 
 
 def _probe(run: RunFolder) -> None:

@@ -28,7 +28,7 @@ def sha256(run: AnyRun) -> str:
         for number in range(run.shape.n_blocks):
             array = part(run, number, source)
             if array is not None:
-                digest.update(np.ascontiguousarray(array).tobytes())
+                digest.update(np.ascontiguousarray(array).data)
     return digest.hexdigest()
 
 

@@ -131,13 +131,16 @@ def paused_of(arrays: Arrays, energy0: float, seconds: float) -> Paused:
     return Paused(Ensemble(**{name: found[name] for name in Ensemble._fields}), found["lanes"])
 
 
-def to_chunks(array: Array, shape: Shape, name: str) -> list[bytes]:
-    """Return the bytes of a block's chunks; those that are not full are filled up, as Zarr has it."""
+def to_chunks(array: Array, shape: Shape, name: str) -> list[memoryview]:
+    """Return the bytes of a block's chunks; those that are not full are filled up, as Zarr has it.
+
+    Bytes of the array itself where it is a chunk: a block's are tens of megabytes.
+    """
     sizes = shape.of(name, shape.block, shape.chunked)
     little = array.astype(array.dtype.newbyteorder("<"), copy=False)
     axis = _cycle_axis(name)
     parts = [little] if axis is None else _cut(little, shape.chunked, axis)
-    return [_filled_up(part, sizes).tobytes() for part in parts]
+    return [np.ascontiguousarray(_filled_up(part, sizes)).data.cast("B") for part in parts]
 
 
 def from_chunks(contents: list[bytes], shape: Shape, name: str, n: int, n_cycles: int) -> Array:

@@ -12,11 +12,13 @@ from fast.kernel.flights import OFF, advance, correct
 from fast.kernel.follow import step_carefully
 
 from fast.kernel.pools import (  # isort: skip
-    CERTAIN, END, HIT, NEVER, NEXT_T, NEXT_T_LOW, NEXT_VX, NEXT_VY, NEXT_X, NEXT_Y, OK, REGISTER, S, T,
+    CERTAIN, END, HIT, NEVER, NEXT_T, NEXT_T_LOW, NEXT_VX, NEXT_VY, NEXT_X, NEXT_Y, OK, S, T,
     T_LOW, VX, VY, WALL, X, Y, load, set_reference,
 )  # fmt: skip
 from fast.kernel.records import Particle, particle_at, write_state, write_step
 from fast.kernel.worker import GENERAL, PARTICLE
+
+ALONE = np.int64(1)  # lanes in use
 
 
 @part
@@ -27,7 +29,7 @@ def next_hit(a, roster, worker, slope):
     """
     i, limit = np.int64(0), (worker.stops.times[-1] - a[T]) - a[T_LOW]
     if worker.is_laned and a[END + i] > -NEVER:
-        advance(GENERAL, a, REGISTER, OFF, worker.scene, slope, worker.degree, worker.limits)
+        advance(GENERAL, a, ALONE, OFF, worker.scene, slope, worker.degree, worker.limits)
         if a[OK + i] != CERTAIN:
             correct(GENERAL, a, 1, worker, slope)
         if a[OK + i] == CERTAIN and a[S + i] < limit * (1.0 - 4.0 * NEAR):
@@ -52,7 +54,7 @@ def follow_one(worker, walls, slope, paths):
                 a[T], a[T_LOW], a[X], a[Y] = a[NEXT_T], a[NEXT_T_LOW], a[NEXT_X], a[NEXT_Y]
                 a[VX], a[VY] = a[NEXT_VX], a[NEXT_VY]
                 break
-            bounce(a, REGISTER, slope, worker.scene.table == MUSHROOM)
+            bounce(a, ALONE, slope, worker.scene.table == MUSHROOM)
             paths.walls[j, n] = code
             particle = Particle(a[T], a[T_LOW], a[X], a[Y], a[VX], a[VY], code)
             write_step(paths.steps, j, n, a[S], particle)

@@ -49,8 +49,11 @@ REGISTER = np.int64(8)  # lanes of the widest registers
 
 @part
 def whole_registers(n):
-    """Return the number of lanes rounded up to whole registers: what they hold too many is not looked at."""
-    return (n + REGISTER - 1) // REGISTER * REGISTER
+    """Return the number of lanes rounded up to whole registers: what they hold too many is not looked at.
+
+    One lane alone is left alone: what is done for it is then not packed, and roots and quotients come sooner.
+    """
+    return n if n == 1 else (n + REGISTER - 1) // REGISTER * REGISTER
 
 
 @part

@@ -22,11 +22,11 @@ def export(
 
     The run is read block by block and checked on the way: a damaged one is refused.
     """
-    from mushrooms.store import export as forms
     from mushrooms.store.blocks import open_run
+    from mushrooms.store.export import WRITERS
 
-    output.check_file(to, tuple(forms.WRITERS))
-    write_file(to, partial(forms.export, open_run(run), to))
+    output.check_file(to, tuple(WRITERS))
+    write_file(to, partial(WRITERS[to.suffix], open_run(run)))
     print(to)
 
 

@@ -28,7 +28,7 @@ from conformance.suite.questions import flown
 from conformance.suite.session import Session, missing
 from scene import Fourier, Horizon, Mushroom, Outcome, Scene, State, Undecided, load, to_data
 from scene.geometry import area
-from scene.protocol.wire import Captured
+from scene.protocol.wire import Captured, Flowing
 from scene.tables import cycle_length
 
 NEEDS_FOURIER = ("static-limit",)  # asks for constants written as laws
@@ -211,7 +211,7 @@ def _predicted() -> theory.Prediction:
     return theory.predict(load(SCENE), 10)
 
 
-def _flow(session: Session) -> profiles.Flow:
+def _flow(session: Session) -> Flowing:
     def flow(scene: Scene, states: Sequence[State], t_end: float) -> list[tuple[Outcome, Captured]]:
         found: list[tuple[Outcome, Captured]] = []
         for start in range(0, len(states), BATCH):

@@ -58,10 +58,7 @@ Energy = Annotated[
     float | None, typer.Option(help="Initial energy v²/2, > 0; by default one that suits the picture.")
 ]
 Length = Annotated[int | None, typer.Option(help="Collisions of each particle, 1 to 10^6.")]
-Many = Annotated[
-    int | None,
-    typer.Option(help="Particles of a section, a map, exponents; 1 to 1000."),
-]
+Many = Annotated[int | None, typer.Option(help="Particles of a section, a map, exponents; 1 to 1000.")]
 
 
 def draw(

@@ -209,12 +209,7 @@ def usual_energy(scene: Scene, crossings: float = CROSSINGS) -> float:
 
 
 def follow(
-    scene: Scene,
-    n_collisions: int,
-    *,
-    energy: float | None = None,
-    seed: int = 0,
-    n_orbits: int = 1,
+    scene: Scene, n_collisions: int, *, energy: float | None = None, seed: int = 0, n_orbits: int = 1
 ) -> list[FollowedOrbit]:
     """Follow particles from drawn starts, uniform in area and direction when the cycle begins.
 

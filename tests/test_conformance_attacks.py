@@ -193,13 +193,7 @@ def test_the_command_prints_wrong_cases(command_line, tmp_path, monkeypatch):
 
 @pytest.mark.parametrize(
     "arguments",
-    [
-        ("--family", "no-such"),
-        ("--cases", 0),
-        ("--seed", -1),
-        ("--stepper", "slow"),
-        ("--json", "file.txt"),
-    ],
+    [("--family", "no-such"), ("--cases", 0), ("--seed", -1), ("--stepper", "slow"), ("--json", "file.txt")],
 )
 def test_the_command_refuses_bad_input(command_line, arguments):
     assert_refused(command_line("attack", *arguments), str(arguments[1]))

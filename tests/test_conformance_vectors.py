@@ -26,15 +26,7 @@ from conformance.generator.flow_families import flow_families
 from conformance.generator.links import Unfit
 from conformance.second_proof.chain import recheck
 from conformance.second_proof.step import Refuted
-from conformance.vectors import (
-    MANIFEST,
-    NUMBERS,
-    BadCorpus,
-    digest,
-    load,
-    manifest,
-    request,
-)
+from conformance.vectors import MANIFEST, NUMBERS, BadCorpus, digest, load, manifest, request
 from scene import BadInput, BangBang, Fourier, State, catalogue, from_data
 from scene import load as load_scene
 from scene.laws import bounds

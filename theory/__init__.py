@@ -14,15 +14,7 @@ from theory.curves import (
 from theory.cycle import Cycle
 from theory.density import Caustic, capture_rate_at, caustics, cdf_at, density_at
 from theory.distribution import Energies, Sum, energies, energy_cdf, sum_of_cycles
-from theory.finite_energy import (
-    Limit,
-    PowerFit,
-    Width,
-    extrapolate,
-    fit_power,
-    peak_width,
-    unbiased_mean,
-)
+from theory.finite_energy import Limit, PowerFit, Width, extrapolate, fit_power, peak_width, unbiased_mean
 from theory.invariants import (
     cap_invariant,
     energy,

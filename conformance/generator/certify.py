@@ -179,10 +179,7 @@ def _path(scene: Scene, question: Question, working: int | None = None) -> _Prov
         return _Proved((arrived,), largest, len(steps))
     expect = [Expectation("horizon" if end else "collision", tuple(steps))]
     if isinstance(end, Undefined):
-        expect = [
-            Expectation("undefined", tuple(steps), end.reason),
-            Expectation("undecided", tuple(steps)),
-        ]
+        expect = [Expectation("undefined", tuple(steps), end.reason), Expectation("undecided", tuple(steps))]
     return _Proved(tuple(expect), links.largest, len(steps) + isinstance(end, Undefined))
 
 

@@ -118,10 +118,7 @@ def trajectory(
 
 
 def flow(
-    scene: Scene,
-    states: Sequence[State],
-    t_end: float,
-    step: Step = next_collision,
+    scene: Scene, states: Sequence[State], t_end: float, step: Step = next_collision
 ) -> list[tuple[Outcome, Captured]]:
     """Carry particles to t_end by any stepper: the outcome of each there, and its first captured stay."""
     return [PlainPath(scene, state, t_end, step).arrival() for state in states]

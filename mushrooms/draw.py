@@ -10,7 +10,7 @@ import typer
 
 from mushrooms import output
 from mushrooms.simulate import Seed
-from mushrooms.stored import draw_run, is_stored
+from mushrooms.stored import draw_run
 from mushrooms.terminal import (
     SceneName,
     check_energy,
@@ -88,7 +88,9 @@ def draw(
     The particles are the first of `mushrooms simulate SCENE --energy E --seed S`. Given the folder of a run
     (simulate --out), draw its histogram of log E1/E0, with theory.
     """
-    if is_stored(scene):
+    from mushrooms.store.blocks import is_run
+
+    if is_run(Path(scene)):
         print(draw_run(Path(scene), out))
         return
     table = load_scene(scene)

@@ -30,13 +30,6 @@ def export(
     print(to)
 
 
-def is_stored(name: str) -> bool:
-    """Tell whether what `draw` is given is the folder of a run."""
-    from mushrooms.store.blocks import is_run
-
-    return is_run(Path(name))
-
-
 def draw_run(folder: Path, out: Path | None) -> Path:
     """Draw the histogram of log E1 / E0 of a stored run, with theory; return the file's path."""
     from mushrooms.simulate import draw_histogram

@@ -15,7 +15,7 @@ from support.refusals import assert_refused
 
 import fast
 import scene as scenes
-from mushrooms.explained import FIGURES
+from mushrooms.predict import FIGURES
 from scene.files import write_files
 
 MOVING_CAP = """\

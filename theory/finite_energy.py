@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from scene.refusal import BadInput, check_number
 from scene.tables import Scene
 from theory.branches import Floats
-from theory.entries import finite_array
+from theory.given import finite_array
 from theory.prediction import mean_of
 
 

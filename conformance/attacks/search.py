@@ -23,6 +23,7 @@ from conformance.second_proof.step import check
 from conformance.second_proof.trajectory import check_path
 from conformance.vectors import NUMBERS, Certified, Ends, Expectation, certified
 from scene import Outcome, Rejected, Scene, State, Undecided, Undefined
+from scene.states import Stepper
 
 KINDS = ("agreed", "undecided", "refused", "open", "wrong")
 BOUND = 4.0  # backward ulps: the sharpest class of grades
@@ -42,7 +43,6 @@ class Claim(NamedTuple):
 
 
 Prover = Callable[[Attack], Claim]
-Stepper = Callable[[Scene, State, float], Outcome]
 Flow = Callable[[Scene, State, float], "dict[str, int] | None"]  # None: undecided
 
 

@@ -35,7 +35,7 @@ LONGEST = 1e8  # condition number up to which a trajectory is followed
 INFINITE = 1e300
 # Pairs, so that one of each pair lies on either side of a tie; a trajectory takes the first pair.
 SIGNS = ((1, 1, -1, 1, -1), (-1, -1, 1, -1, 1), (1, 1, 1, 1, 1), (-1, -1, -1, -1, -1))
-Outcome = Literal["collision", "horizon", "undefined", "undecided", "rejected"]
+OutcomeName = Literal["collision", "horizon", "undefined", "undecided", "rejected"]
 
 
 class Question(NamedTuple):
@@ -62,7 +62,7 @@ class Question(NamedTuple):
     state: State
     t_end: float
     collisions: int | None = None
-    also: tuple[Outcome, ...] = ()
+    also: tuple[OutcomeName, ...] = ()
     level: Level | None = None
     longest: float = LONGEST
     flow: Callable[[Sequence[Mark]], bool] | None = None

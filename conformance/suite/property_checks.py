@@ -25,6 +25,7 @@ from conformance import profiles, properties
 from conformance.profiles import Statistic
 from conformance.suite.process import NOT_NUMBERS, Trouble
 from conformance.suite.questions import flown
+from conformance.suite.result import NamedVerdict
 from conformance.suite.session import Session, missing
 from scene import Fourier, Horizon, Mushroom, Outcome, Scene, State, Undecided, load, to_data
 from scene.geometry import area
@@ -64,10 +65,11 @@ SIZES = {
     "extended": Size(4_000, 4000.0, 0.04),
     "stress": Size(4_000, 4000.0, 0.04),
 }
-Verdict = tuple[str, str, str, float]  # name, verdict, why, seconds
 
 
-def ask_properties(session: Session, questions: Sequence[tuple[Scene, State, float]]) -> Iterator[Verdict]:
+def ask_properties(
+    session: Session, questions: Sequence[tuple[Scene, State, float]]
+) -> Iterator[NamedVerdict]:
     """Hold an implementation to every exact property.
 
     Args:
@@ -129,7 +131,7 @@ def _hold(
     return ("pass", why) if n_compared else ("unsupported", f"{why}: it is not about these scenes")
 
 
-def ask_profiles(session: Session, level: str, seed: int) -> Iterator[Verdict]:
+def ask_profiles(session: Session, level: str, seed: int) -> Iterator[NamedVerdict]:
     """Follow ensembles through `flow`; nothing when it, or what they need, is not offered.
 
     Args:

@@ -43,6 +43,7 @@ from scene.protocol.wire import Flowing
 from scene.states import Stepper
 
 Level = Literal["core", "extended", "stress"]
+OutcomeName = Literal["collision", "horizon", "undefined", "undecided", "rejected"]
 LEVELS: tuple[Level, ...] = ("core", "extended", "stress")
 NUMBERS = ("dt", "x", "y", "vx", "vy")
 MANIFEST = "manifest.json"
@@ -105,7 +106,7 @@ class Expectation(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_
             hit that begins it and the collision that ends it, or the horizon. Empty for none.
     """
 
-    outcome: Literal["collision", "horizon", "undefined", "undecided", "rejected"]
+    outcome: OutcomeName
     steps: tuple[Certified, ...] = ()
     reason: str = ""
     stays: tuple[tuple[int, int], ...] = ()

@@ -42,7 +42,6 @@ class Claim(NamedTuple):
     certificate: dict[str, Any] | None = None
 
 
-Prover = Callable[[Attack], Claim]
 Flow = Callable[[Scene, State, float], "dict[str, int] | None"]  # None: undecided
 
 
@@ -57,7 +56,7 @@ class Judgement(NamedTuple):
 class UnderAttack(NamedTuple):
     """What is under attack; None leaves one out."""
 
-    prover: Prover | None = None
+    prover: Callable[[Attack], Claim] | None = None
     stepper: Stepper | None = None
     flow: Flow | None = None
 

@@ -24,7 +24,16 @@ from conformance.grading.error import inputs_of
 from conformance.second_proof.chain import recheck
 from conformance.second_proof.step import check
 from conformance.second_proof.trajectory import check_path
-from conformance.vectors import NUMBERS, Certified, Expectation, Level, Vector, certified, four_digits
+from conformance.vectors import (
+    NUMBERS,
+    Certified,
+    Expectation,
+    Level,
+    OutcomeName,
+    Vector,
+    certified,
+    four_digits,
+)
 from reference.certificate import certificate, path_certificate
 from scene import BadInput, InvalidState, Rejected, Scene, State, Undecided, Undefined, from_data
 
@@ -35,7 +44,6 @@ LONGEST = 1e8  # condition number up to which a trajectory is followed
 INFINITE = 1e300
 # Pairs, so that one of each pair lies on either side of a tie; a trajectory takes the first pair.
 SIGNS = ((1, 1, -1, 1, -1), (-1, -1, 1, -1, 1), (1, 1, 1, 1, 1), (-1, -1, -1, -1, -1))
-OutcomeName = Literal["collision", "horizon", "undefined", "undecided", "rejected"]
 
 
 class Question(NamedTuple):

@@ -75,12 +75,12 @@ def our_askers() -> dict[str, Ask]:
 
 def our_followers() -> dict[str, PathFollower]:
     """Return followers of trajectories: binary64, with compensated time, and proofs of fixed precision."""
-    found: dict[str, PathFollower] = {
+    return {
         "binary64 (plain Python)": _plain_path,
         "compensated (fast)": _fast_path,
+        "double-double (fast)": _fine_path,
+        **{f"proof, {digits} decimals": _proof_path(digits) for digits in PATH_DIGITS},
     }
-    found["double-double (fast)"] = _fine_path
-    return found | {f"proof, {digits} decimals": _proof_path(digits) for digits in PATH_DIGITS}
 
 
 def _proof(digits: int) -> Contender:

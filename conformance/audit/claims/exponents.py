@@ -163,7 +163,8 @@ def log_volume(sample: Sample, phase: float) -> float:
 def _exponent(what: str, samples: list[Sample], values: list[Mean], exponent: float) -> Check:
     """Compare the exponent of E0 with an expected one, the next order, ~ 1/v, being fitted beside it."""
     energies = [sample.run.energy for sample in samples]
-    fit = theory.fit_power(energies, *np.array(values).T, orders=(-0.5,))
+    found, errors = np.array(values).T
+    fit = theory.fit_power(energies, found, errors, (-0.5,))
     return close(
         what,
         (fit.exponent, fit.exponent_error),

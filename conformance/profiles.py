@@ -42,7 +42,6 @@ from scene.laws import bounds, value
 from scene.protocol.wire import Flowing
 from scene.tables import cycle_length, laws
 
-Flow = Flowing
 Floats = npt.NDArray[np.float64]
 ALARM = 1e-6
 
@@ -77,7 +76,7 @@ class Statistic(NamedTuple):
 
 
 def work_identity(
-    flow: Flow,
+    flow: Flowing,
     scene: Scene,
     *,
     n_particles: int,
@@ -139,7 +138,7 @@ def work_identity(
 
 
 def captured_share(
-    flow: Flow,
+    flow: Flowing,
     scene: Mushroom,
     *,
     p_nc: float,
@@ -174,7 +173,7 @@ def captured_share(
 
 
 def mean_growth(
-    flow: Flow,
+    flow: Flowing,
     scene: Mushroom,
     *,
     m1: float,
@@ -223,7 +222,7 @@ def _span(scene: Scene, alarm: float) -> float:
     return span
 
 
-def check_work_identity(flow: Flow, scene: Scene, *, n_particles: int, kT: float, seed: int = 0) -> None:
+def check_work_identity(flow: Flowing, scene: Scene, *, n_particles: int, kT: float, seed: int = 0) -> None:
     """Raise AssertionError, in one line, where `work_identity` is not met."""
     for finding in work_identity(flow, scene, n_particles=n_particles, kT=kT, seed=seed):
         if not finding.is_met:

@@ -27,10 +27,11 @@ from math import hypot
 import msgspec
 
 from conformance.grading import sensitivity
-from conformance.grading.sensitivity import Stepper, measured, numbers
+from conformance.grading.sensitivity import measured, numbers
 from scene import Collision, Horizon, Outcome, Rejected, Scene, State, Undecided, to_data, transforms
 from scene.laws import is_constant
 from scene.precision import decimals
+from scene.states import Stepper
 from scene.tables import laws, period
 
 BOUND = 1e-9

@@ -40,12 +40,13 @@ import msgspec
 
 from scene import BadInput, Outcome, Rejected, Scene, State, Wall, from_data
 from scene.protocol.wire import Flowing
+from scene.states import Stepper
 
 Level = Literal["core", "extended", "stress"]
+OutcomeName = Literal["collision", "horizon", "undefined", "undecided", "rejected"]
 LEVELS: tuple[Level, ...] = ("core", "extended", "stress")
 NUMBERS = ("dt", "x", "y", "vx", "vy")
 MANIFEST = "manifest.json"
-Step = Callable[[Scene, State, float], Outcome]
 Follow = Callable[[Scene, State, int, float], list[Outcome]]
 Decimal = Annotated[str, msgspec.Meta(pattern=r"^-?[0-9]{1,40}(\.[0-9]{1,40})?(E[+-]?[0-9]{1,4})?$")]
 Enclosure = tuple[Decimal, Decimal]
@@ -105,7 +106,7 @@ class Expectation(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_
             hit that begins it and the collision that ends it, or the horizon. Empty for none.
     """
 
-    outcome: Literal["collision", "horizon", "undefined", "undecided", "rejected"]
+    outcome: OutcomeName
     steps: tuple[Certified, ...] = ()
     reason: str = ""
     stays: tuple[tuple[int, int], ...] = ()
@@ -283,7 +284,7 @@ def _scene(encoded: str) -> Scene:
     return from_data(json.loads(encoded))
 
 
-def answer(vector: Vector, step: Step, follow: Follow, carry: Flowing | None = None) -> dict[str, Any]:
+def answer(vector: Vector, step: Stepper, follow: Follow, carry: Flowing | None = None) -> dict[str, Any]:
     """Return how a stepper of functions answers a vector, in the wire's form.
 
     Args:

@@ -95,7 +95,7 @@ def least_of(compiled: Compiled, row: int | np.integer) -> float:
 def pieces_of(compiled: Compiled, degree: int) -> Pieces | None:
     """Return a scene's laws as polynomials of a degree, or None where that would take too many."""
     laws = compiled.laws
-    period, origin = period_of(laws)
+    period, origin = _period_and_origin(laws)
     if period is None:
         return _filled(compiled, None, Fraction(0), [Cut(Fraction(0), Fraction(0), Fraction(0))], degree)
     longest = reach(compiled, degree)
@@ -162,7 +162,7 @@ def _pair(number: Fraction) -> tuple[float, float]:
     return high, float(number - Fraction(high))
 
 
-def period_of(laws: FloatArray) -> tuple[Fraction | None, Fraction]:
+def _period_and_origin(laws: FloatArray) -> tuple[Fraction | None, Fraction]:
     """Return the period that all moving laws share, None for none, and when it begins."""
     for row in laws[:SHARED]:
         if row[KIND] == BANG_BANG:

@@ -34,14 +34,7 @@ def initial_states(scene: Scene, n_particles: int, energy: float, seed: int, fir
     x, y = _uniform_in_area(scene, start, u[:, 0], u[:, 1], u[:, 2])
     speed, along = math.sqrt(2.0 * energy), _directions(u[:, 3])
     out: FloatArray = np.column_stack(
-        [
-            np.full(n_particles, start),
-            np.zeros(n_particles),
-            x,
-            y,
-            speed * along[:, 0],
-            speed * along[:, 1],
-        ]
+        [np.full(n_particles, start), np.zeros(n_particles), x, y, speed * along[:, 0], speed * along[:, 1]]
     )
     return out
 

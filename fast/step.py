@@ -9,15 +9,7 @@ import numpy as np
 
 from fast.given import given_state
 from fast.kernel import careful, codes, entries, single
-from fast.kernel.records import (
-    ANCHORS_SHAPE,
-    Compiled,
-    FloatArray,
-    IntArray,
-    Particle,
-    Paths,
-    unfilled_paths,
-)
+from fast.kernel.records import ANCHORS_SHAPE, Compiled, FloatArray, IntArray, Particle, Paths, unfilled_paths
 from fast.units import ANSWER_LOST, Units, fit
 from scene import (
     Cap,

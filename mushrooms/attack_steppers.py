@@ -13,10 +13,9 @@ from conformance.generator.prover import coasted, ends
 from conformance.grading.agreement import Answer, Enclosed
 from conformance.vectors import Ends
 from reference.certificate import certificate, path_certificate
-from scene import BadInput, Horizon, Rejected, Scene, State, Undecided, Undefined
+from scene import BadInput, Horizon, Mushroom, Rejected, Scene, State, Undecided, Undefined
 
 DIGITS = 25  # of a single step: enough to tell enclosures from wrong answers
-WALLS = ("arc", "base", "left", "right", "floor")
 
 
 def steppers(choice: str) -> UnderAttack:
@@ -72,4 +71,4 @@ def flow(scene: Scene, state: State, t_end: float) -> dict[str, int] | None:
         return None
     if not isinstance(carried.outcomes[0], Horizon | Undefined):
         return None
-    return dict(zip(WALLS, map(int, carried.wall_counts[0]), strict=True))
+    return dict(zip(Mushroom.walls, map(int, carried.wall_counts[0]), strict=True))

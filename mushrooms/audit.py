@@ -12,7 +12,7 @@ import typer
 from rich import progress
 
 from mushrooms import output
-from mushrooms.terminal import compilation_told, progress_bar
+from mushrooms.terminal import check_range, compilation_told, progress_bar
 from scene.files import locked, write_files
 from scene.refusal import BadInput, check_seed
 
@@ -55,8 +55,8 @@ def audit(
         raise BadInput(f"--only = {only!r}, must name a claim such as X2; all are checked without it")
     entries = ledger.select(only or "")
     check_seed(seed, "--seed")
-    if threads is not None and threads < 1:
-        raise BadInput(f"--threads = {threads}, must be >= 1")
+    if threads is not None:
+        check_range("--threads", threads, 1)
     size: Size = "full" if full else "quick"
     if commands:
         lines = [audit_runs.command(run, size, seed, out) for run in audit_runs.needed(entries, size)]

@@ -178,14 +178,14 @@ def _contenders(
 ) -> tuple[list[Contender], dict[str, Ask], dict[str, str], dict[str, str]]:
     """Return contenders, how each answers a vector, what was compiled, and what cannot run."""
     from conformance.bench import baselines
-    from conformance.bench import contenders as those
+    from conformance.bench.contenders import by_command, plain_python, time_steppers
     from conformance.harness.examples import find_examples
     from conformance.suite.process import Trouble
     from conformance.suite.session import Limits
     from mushrooms import bench_contenders as ours
 
-    patience = Limits(TIMEOUT, RESTARTS)
-    contenders = [*ours.our_contenders(), baselines.in_numba(), those.plain_python(), *those.time_steppers()]
+    limits = Limits(TIMEOUT, RESTARTS)
+    contenders = [*ours.our_contenders(), baselines.in_numba(), plain_python(), *time_steppers()]
     askers = ours.our_askers()
     built, not_run = {}, {}
     folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
@@ -198,7 +198,7 @@ def _contenders(
         not_run["lean C, time steps"] = trouble.why
 
     def add(name: str, family: Family, line: Sequence[str]) -> None:
-        contender, askers[name] = those.by_command(name, family, line, stack, patience)
+        contender, askers[name] = by_command(name, family, line, stack, limits)
         contenders.append(contender)
 
     examples = find_examples(folder, C_FLAGS)

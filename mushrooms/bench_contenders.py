@@ -16,7 +16,7 @@ import fast
 import reference
 from conformance import plain, vectors
 from conformance.bench.contenders import Ask, Contender, Given, Lap, by_call
-from conformance.bench.growth import FAR, Follower, Place
+from conformance.bench.growth import FAR, PathFollower, Place
 from conformance.bench.work import SCENE, Cost, Load
 from conformance.bench.workloads import WINDOW, Workload
 from conformance.generator import prover
@@ -73,11 +73,14 @@ def our_askers() -> dict[str, Ask]:
     }
 
 
-def our_followers() -> dict[str, Follower]:
+def our_followers() -> dict[str, PathFollower]:
     """Return followers of trajectories: binary64, with compensated time, and proofs of fixed precision."""
-    found: dict[str, Follower] = {"binary64 (plain Python)": _plain_path, "compensated (fast)": _fast_path}
-    found["double-double (fast)"] = _fine_path
-    return found | {f"proof, {digits} decimals": _proof_path(digits) for digits in PATH_DIGITS}
+    return {
+        "binary64 (plain Python)": _plain_path,
+        "compensated (fast)": _fast_path,
+        "double-double (fast)": _fine_path,
+        **{f"proof, {digits} decimals": _proof_path(digits) for digits in PATH_DIGITS},
+    }
 
 
 def _proof(digits: int) -> Contender:
@@ -151,7 +154,7 @@ def _fine_path(scene: Scene, state: State, n_collisions: int) -> list[Place]:
     return found
 
 
-def _proof_path(digits: int) -> Follower:
+def _proof_path(digits: int) -> PathFollower:
     def follow(scene: Scene, state: State, n_collisions: int) -> list[Place]:
         return _places(reference.trajectory(scene, state, n_collisions, working=digits))
 

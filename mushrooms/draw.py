@@ -10,7 +10,7 @@ import typer
 
 from mushrooms import output
 from mushrooms.simulate import Seed
-from mushrooms.stored import draw_run, is_stored
+from mushrooms.stored import draw_run
 from mushrooms.terminal import (
     SceneName,
     check_energy,
@@ -58,10 +58,7 @@ Energy = Annotated[
     float | None, typer.Option(help="Initial energy v²/2, > 0; by default one that suits the picture.")
 ]
 Length = Annotated[int | None, typer.Option(help="Collisions of each particle, 1 to 10^6.")]
-Many = Annotated[
-    int | None,
-    typer.Option(help="Particles of a section, a map, exponents; 1 to 1000."),
-]
+Many = Annotated[int | None, typer.Option(help="Particles of a section, a map, exponents; 1 to 1000.")]
 
 
 def draw(
@@ -91,7 +88,9 @@ def draw(
     The particles are the first of `mushrooms simulate SCENE --energy E --seed S`. Given the folder of a run
     (simulate --out), draw its histogram of log E1/E0, with theory.
     """
-    if is_stored(scene):
+    from mushrooms.store.blocks import is_run
+
+    if is_run(Path(scene)):
         print(draw_run(Path(scene), out))
         return
     table = load_scene(scene)

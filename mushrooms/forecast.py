@@ -61,17 +61,16 @@ def forecast(
     what a collision takes.
     """
     workers, n_together = min(threads, n_particles), min(SHARE, math.ceil(n_particles / threads))
-    is_mushroom = isinstance(scene, Mushroom)
-    most_cycles = n_cycles * (STEEPEST ** min(n_cycles, MOST_CYCLES) if is_mushroom and n_cycles > 1 else 1.0)
+    steepest = STEEPEST ** min(n_cycles, MOST_CYCLES) if isinstance(scene, Mushroom) and n_cycles > 1 else 1.0
     try:
         first = n_particles * _collisions_of_a_cycle(scene, energy)
-        if not LONG < first * most_cycles * SLOWEST / workers < math.inf:
+        most = first * n_cycles * steepest
+        if not LONG < most * SLOWEST / workers < math.inf:
             return None
         pace = _pace(scene, n_together, energy, seed, PILOT_SHARE * first * n_cycles) / workers
-        is_growth_wanted = is_mushroom and n_cycles > 1 and first * most_cycles * pace > LONG
-        ends = (n_cycles, n_before)
-        last, begin = (_as_first_cycles(scene, n) for n in ends) if is_growth_wanted else ends
-        collisions = first * (last - begin)
+        if not most * pace > LONG:  # nor need theory be asked
+            return None
+        collisions = first * (_as_first_cycles(scene, n_cycles) - _as_first_cycles(scene, n_before))
     except (BadInput, ArithmeticError):  # a table at the edge of binary64 runs without a forecast
         return None
     return Forecast(collisions, collisions * pace) if LONG < collisions * pace < math.inf else None
@@ -80,9 +79,7 @@ def forecast(
 def expected_collisions(scene: Scene, energy: float, n_cycles: int) -> float:
     """Return how many collisions to expect of a particle; nan at the edge of binary64."""
     try:
-        first = _collisions_of_a_cycle(scene, energy)
-        is_growth_wanted = isinstance(scene, Mushroom) and n_cycles > 1
-        return first * (_as_first_cycles(scene, n_cycles) if is_growth_wanted else n_cycles)
+        return _collisions_of_a_cycle(scene, energy) * _as_first_cycles(scene, n_cycles)
     except (BadInput, ArithmeticError):
         return math.nan
 
@@ -101,7 +98,9 @@ def _collisions_of_a_cycle(scene: Scene, energy: float) -> float:
 
 
 def _as_first_cycles(scene: Scene, n_cycles: int) -> float:
-    """Return how many first cycles make as many collisions: theory says how the mean of v grows."""
+    """Return how many first cycles make as many collisions; theory says how v grows in a mushroom."""
+    if n_cycles <= 1 or not isinstance(scene, Mushroom):
+        return n_cycles
     import theory
 
     growth = float(theory.mean_of(scene, lambda s: s.context.exp(s / 2), 5))

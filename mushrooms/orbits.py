@@ -14,13 +14,14 @@ import json
 import math
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, BinaryIO, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 from mpmath import fp
 
 import scene as scenes
+from mushrooms.output import import_arrow
 from scene import Outcome, Scene, State, Stem, Wall
 from scene.files import write_file
 from scene.geometry import TableAt, half_width, table_at
@@ -107,10 +108,8 @@ class FollowedOrbit:
         """
         if isinstance(self.scene, Stem):
             raise BadInput("the section is of arc hits: table is stem, must be cap or mushroom")
-        states, index = (
-            self.states(),
-            np.array([k for k, wall in enumerate(self.walls) if wall == "arc"], int),
-        )
+        states = self.states()
+        index = np.array([k for k, wall in enumerate(self.walls) if wall == "arc"], int)
         before, (t, x, y, vx, vy) = states[index], states[index + 1].T
         r = np.array([float(value(fp, self.scene.r, time)) for time in t])
         w = np.array([float(half_width(fp, self.scene, time)) for time in t])
@@ -190,32 +189,17 @@ class FollowedOrbit:
         if path.suffix not in SUFFIXES:
             raise BadInput(f"output {str(path)!r}: its ending must be one of {', '.join(SUFFIXES)}")
         if path.suffix == ".parquet":
-            arrow, parquet = _arrow()
+            arrow, parquet = import_arrow()
             table = arrow.table(self.columns()).replace_schema_metadata(
                 {"scene": json.dumps(scenes.to_data(self.scene))}
             )
-
-            def write_table(file: BinaryIO) -> None:
-                parquet.write_table(table, file)
-
-            write_file(path, write_table)
+            write_file(path, lambda file: parquet.write_table(table, file))
             return
         text, columns = io.StringIO(), self.columns()
         writer = csv.writer(text, lineterminator="\n")
         writer.writerow(columns)
         writer.writerows(zip(*columns.values(), strict=True))
         write_file(path, text.getvalue())
-
-
-def _arrow() -> tuple[Any, Any]:
-    try:
-        import pyarrow
-        import pyarrow.parquet
-    except ImportError:
-        raise BadInput(
-            "a .parquet file needs pyarrow: pip install 'oscillating-mushrooms[parquet]'"
-        ) from None
-    return pyarrow, pyarrow.parquet
 
 
 def usual_energy(scene: Scene, crossings: float = CROSSINGS) -> float:
@@ -225,12 +209,7 @@ def usual_energy(scene: Scene, crossings: float = CROSSINGS) -> float:
 
 
 def follow(
-    scene: Scene,
-    n_collisions: int,
-    *,
-    energy: float | None = None,
-    seed: int = 0,
-    n_orbits: int = 1,
+    scene: Scene, n_collisions: int, *, energy: float | None = None, seed: int = 0, n_orbits: int = 1
 ) -> list[FollowedOrbit]:
     """Follow particles from drawn starts, uniform in area and direction when the cycle begins.
 

@@ -1,4 +1,4 @@
-"""Output refused early: a folder or a file is proved writable before work starts."""
+"""Output refused early: a folder or a file is proved writable before work starts; the import of pyarrow."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 from scene.files import part
 from scene.refusal import BadInput
@@ -59,6 +60,21 @@ def check_file(path: Path, suffixes: tuple[str, ...]) -> None:
         probe.unlink()
     except OSError as error:
         raise BadInput(f"output {str(path)!r} cannot be written: {error.strerror}") from None
+
+
+def import_arrow() -> tuple[Any, Any]:
+    """Import pyarrow and its Parquet module.
+
+    Raises:
+        BadInput: it is not installed.
+    """
+    try:
+        import pyarrow
+        import pyarrow.parquet
+    except ImportError:
+        how = "pip install 'oscillating-mushrooms[parquet]'"
+        raise BadInput(f"a .parquet file needs pyarrow: {how}") from None
+    return pyarrow, pyarrow.parquet
 
 
 def _remove_empty(folders: list[Path]) -> None:

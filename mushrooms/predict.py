@@ -1,4 +1,4 @@
-"""`mushrooms theory`: what the theory predicts for one cycle, as decimal strings."""
+"""`mushrooms theory`: what the theory predicts for one cycle, as decimal strings, and what each figure is."""
 
 from __future__ import annotations
 
@@ -15,8 +15,30 @@ from mushrooms.terminal import (
     print_pairs,
     progress_bar,
 )
+from scene import Scene
 
 MAX_DIGITS = 1000
+# s = log E1/E0 over one cycle.
+FIGURES = {
+    "p_nc": "probability of never being captured in a cycle (eq. ps)",
+    "m1": "mean of s = log E1/E0 over a cycle (eq. Erate)",
+    "log_e_nc": "s of those never captured (eq. lnEnc/E0)",
+    "sd": "standard deviation of s",
+    "mean_exp_minus": "mean of E0/E1: 1 for every cycle, phase volume is kept",
+    "mean_exp_plus": "mean of E1/E0, by which the mean energy grows",
+    "energy": "initial energy of what follows",
+    "p_nc_at": "p_nc at this energy: those who lag are captured more or less likely",
+    "m1_at": "mean of s at this energy: diffusion and lags raise or lower it",
+    "sd_at": "standard deviation of s at this energy",
+    "peak_at": "mean s of the never captured at this energy",
+    "peak_width_at": "standard deviation of the s of the never captured, about E0^(-1/4)",
+    "captured_at": "mean s of the captured at this energy; - without any",
+    "p_nc_left_out": "next order of p_nc_at",
+    "m1_left_out": "next order of m1_at",
+    "peak_left_out": "next order of peak_at",
+    "peak_width_left_out": "next order of peak_width_at",
+    "is_in_reach": "false where the theory leaves out half of the variance or more: walls turn too soon",
+}
 
 
 def predict(
@@ -33,7 +55,6 @@ def predict(
     rates of frozen tables: those of the audit's scenes are known (python -m conformance.audit.frozen).
     """
     import theory
-    from mushrooms.explained import FIGURES, at_energy
 
     check_range("--digits", digits, 1, MAX_DIGITS)
     check_energy(energy)
@@ -45,5 +66,33 @@ def predict(
             bar.update(task, completed=round(100 * share), description=f"resolution {number} of two or more")
 
         pairs: dict[str, Any] = dict(theory.predict(found, digits, progress=advance).strings(digits))
-    pairs |= at_energy(found, energy) if energy is not None else {}
+    pairs |= _at_energy(found, energy) if energy is not None else {}
     print_pairs(pairs, as_json, FIGURES)
+
+
+def _at_energy(scene: Scene, energy: float) -> dict[str, float | bool | None]:
+    """Return the figures of one cycle at an initial energy.
+
+    Raises:
+        NotCovered: no frozen rates of the scene are known.
+    """
+    import theory
+
+    found = theory.at_energy(scene, energy)
+    (peak, variance), left = found.peak, found.next_order
+    figures = {
+        "energy": energy,
+        "p_nc_at": found.p_nc,
+        "m1_at": found.mean_s,
+        "sd_at": found.variance_s**0.5,
+        "peak_at": peak,
+        "peak_width_at": variance**0.5,
+        "captured_at": found.captured_mean if found.p_nc < 1 else None,
+        "p_nc_left_out": left.p_nc,
+        "m1_left_out": left.mean_s,
+        "peak_left_out": left.peak_mean,
+        "peak_width_left_out": variance**0.5 * left.variance / 2,
+    }
+    digits = {name: 2 if name.endswith("_left_out") else 7 for name in figures}
+    told = {name: x if x is None else float(f"{x:.{digits[name]}g}") for name, x in figures.items()}
+    return {**told, "is_in_reach": left.variance < 0.5}

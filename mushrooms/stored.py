@@ -22,19 +22,12 @@ def export(
 
     The run is read block by block and checked on the way: a damaged one is refused.
     """
-    from mushrooms.store import export as forms
     from mushrooms.store.blocks import open_run
+    from mushrooms.store.export import WRITERS
 
-    output.check_file(to, tuple(forms.WRITERS))
-    write_file(to, partial(forms.export, open_run(run), to))
+    output.check_file(to, tuple(WRITERS))
+    write_file(to, partial(WRITERS[to.suffix], open_run(run)))
     print(to)
-
-
-def is_stored(name: str) -> bool:
-    """Tell whether what `draw` is given is the folder of a run."""
-    from mushrooms.store.blocks import is_run
-
-    return is_run(Path(name))
 
 
 def draw_run(folder: Path, out: Path | None) -> Path:

@@ -1,4 +1,9 @@
-"""Ground truth: a slow stepper whose every answer is an enclosure, proved to be first."""
+"""Ground truth: a slow stepper whose every answer is an enclosure, proved to be first.
+
+`step` answers one step and `path` many, each with what `answers` describes. A flight (`course`) starts where
+`start` finds it; `isolation` finds its first root on the walls of `walls`, in the arithmetic of `arithmetic`
+or, for ties, of `rational`; `chain` bounces it. `certificate` writes the proof down.
+"""
 
 from reference.answers import Moment, Outcome, Trajectory
 from reference.answers import ProvedCollision as Collision

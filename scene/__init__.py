@@ -1,4 +1,8 @@
-"""The language all rooms speak: laws of motion, tables, states, outcomes."""
+"""The language that all packages speak: laws of motion, tables, states, outcomes.
+
+`laws` and `tables` make a scene, which `validity` proves valid where it is made; `load` reads one. `geometry`
+is a table at one instant, and `transforms` are the changes under which the physics stays the same.
+"""
 
 from scene.laws import BangBang, Fourier, Law
 from scene.load import catalogue, from_data, load, to_data

@@ -12,6 +12,7 @@ from __future__ import annotations
 import itertools
 import math
 from bisect import bisect_right
+from collections.abc import Iterable
 from fractions import Fraction
 from functools import lru_cache
 from typing import Any, NamedTuple
@@ -194,6 +195,11 @@ def period_of(law: Law) -> Period | None:
         return Period(None, Fraction(law.knots[-1][0]) - Fraction(law.knots[0][0]))
     assert isinstance(law, Fourier)
     return Period(law.omega, None if law.period is None else Fraction(law.period))
+
+
+def shared_period(laws: Iterable[Law]) -> Period | None:
+    """Return the period of the first law that moves, which a scene's others share; None where none moves."""
+    return next((found for law in laws if (found := period_of(law)) is not None), None)
 
 
 def piece_at(law: Law, time: Fraction) -> Piece:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Literal
 
 import msgspec
@@ -74,6 +75,7 @@ class Rejected(msgspec.Struct, frozen=True, tag_field="outcome", tag="rejected")
 
 
 Outcome = Collision | Horizon | Undefined | Undecided | Rejected
+Stepper = Callable[[Scene, State, float], Outcome]  # (scene, state, t_end): what comes first
 
 # A state on a wall whose residual exceeds this share of the wall's distance from the origin is
 # not on that wall: coordinates rounded to binary64 are on it to about 2^-50, and to 2^-20 even

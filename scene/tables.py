@@ -25,7 +25,7 @@ from typing import ClassVar, Literal
 import msgspec
 from mpmath import fp
 
-from scene.laws import BangBang, Fourier, Law, Period, finite, period_of
+from scene.laws import BangBang, Fourier, Law, Period, finite, shared_period
 from scene.refusal import InvalidScene, shown
 from scene.validity import Condition, prove
 
@@ -122,7 +122,7 @@ def width_factors(scene: Stem | Mushroom) -> tuple[Law, ...]:
 
 def period(scene: Scene) -> Period | None:
     """Return the period that all moving laws of a scene share; None for a static table."""
-    return next((found for law in laws(scene).values() if (found := period_of(law)) is not None), None)
+    return shared_period(laws(scene).values())
 
 
 def cycle_length(scene: Scene) -> float:

@@ -17,7 +17,7 @@ from math import isfinite, prod
 from typing import Any, NamedTuple
 
 from scene import exact, mixed
-from scene.laws import BangBang, Law, Period, bounds, is_constant, period_of, value
+from scene.laws import BangBang, Law, Period, bounds, is_constant, period_of, shared_period, value
 from scene.laws import exact as number
 from scene.polynomials import half_angle, leg_intervals, leg_polynomial, one_plus_square
 from scene.precision import decimals
@@ -152,7 +152,7 @@ def _on_circle(condition: Condition) -> Iterator[tuple[exact.Polynomial, Fractio
 def _message(laws: Laws, condition: Condition, known: Fraction | None = None) -> str:
     # The proof is done; this only looks for a telling instant to show. In mp no scene overflows.
     ctx = decimals()
-    shared = next((found for law in laws.values() if (found := period_of(law)) is not None), None)
+    shared = shared_period(laws.values())
     span = shared.value(ctx) if shared else ctx.mpf(0)
     start = next((law.knots[0][0] for law in laws.values() if isinstance(law, BangBang)), 0.0)
     times = [ctx.mpf(start) + span * i / 512 for i in range(512 if span else 1)]

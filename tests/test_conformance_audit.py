@@ -360,7 +360,6 @@ def test_work_that_is_not_conserved_is_refuted(monkeypatch):
         ClaimEvidence({}, AuditSteppers(cooled, fast.trajectory, fast.flow), predict=CACHED, threads=1)
     )
     assert verdict_of(entry, list(checks)) == "refuted"
-    assert N_SIGMA > 4
 
 
 def test_the_power_of_a_comparison_is_how_often_it_refutes_the_alternative():

@@ -14,9 +14,9 @@ import time
 from collections import Counter
 from contextlib import contextmanager, suppress
 
-import jsonschema
 import pytest
 from support import fuzz
+from support.schemas import validator
 from test_conformance_session import made_up
 
 import fast
@@ -27,7 +27,6 @@ from conformance.grading.grade import grade
 from conformance.suite import session
 from conformance.suite.process import Trouble
 from scene import BadInput, load
-from scene.protocol.messages import json_schema
 from scene.protocol.wire import serve
 
 N_LINES = int(os.environ.get("MUSHROOMS_LINES", "300"))
@@ -47,7 +46,6 @@ SERVERS = {
     ),
     "plain": lambda feed, out: serve("p", plain.next_collision, plain.trajectory, feed, out, flow=plain.flow),
 }
-ANSWER = jsonschema.Draft202012Validator({"$ref": "#/$defs/Answer", "$defs": json_schema()["$defs"]})
 
 
 @contextmanager
@@ -80,7 +78,7 @@ def test_a_server_answers_every_line_with_one_line(name, tally):
         assert found.count(b"\n") == bool(line.strip()), (line, found)
         if found:
             answer = json.loads(found)
-            assert ANSWER.is_valid(answer), (line, answer)
+            assert validator("protocol", "Answer").is_valid(answer), (line, answer)
             tally[answer.get("outcome", "other")] += 1
     assert min(tally["rejected"], tally["collision"]) > N_LINES / 20
     tally["slowest in ms"] = round(1000 * slowest)

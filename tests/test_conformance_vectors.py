@@ -11,9 +11,9 @@ from collections import Counter
 from fractions import Fraction
 from pathlib import Path
 
-import jsonschema
 import msgspec
 import pytest
+from support.schemas import validator
 from support.tables import LIFT
 
 import reference
@@ -26,25 +26,14 @@ from conformance.generator.flow_families import flow_families
 from conformance.generator.links import Unfit
 from conformance.second_proof.chain import recheck
 from conformance.second_proof.step import Refuted
-from conformance.vectors import (
-    MANIFEST,
-    NUMBERS,
-    BadCorpus,
-    digest,
-    json_schema,
-    load,
-    manifest,
-    request,
-)
+from conformance.vectors import MANIFEST, NUMBERS, BadCorpus, digest, load, manifest, request
 from scene import BadInput, BangBang, Fourier, State, catalogue, from_data
 from scene import load as load_scene
 from scene.laws import bounds
 from scene.protocol.messages import Command
 from scene.tables import cycle_length, laws
 
-ROOT = Path(__file__).parent.parent
-SCHEMA = ROOT / "docs" / "vector.schema.json"
-CORPUS = ROOT / "conformance" / "corpus"
+CORPUS = Path(__file__).parent.parent / "conformance" / "corpus"
 N_STEPS, N_TRAJECTORIES, N_FLOWS = 36, 4, 4  # made again, bit for bit
 DIGEST_OF_1_0 = "7b4dfba08bb334232cba9faca64601138b9b7b53a4b45b5984747379d26c70eb"
 NEW_IN_1_1 = {
@@ -154,25 +143,13 @@ def test_requests_are_of_the_protocol_and_tell_no_answer(corpus):
         assert json.loads(json.dumps(asked)) == asked
 
 
-def test_the_published_schema_is_up_to_date():
-    # Regenerate with: python -m conformance.vectors > docs/vector.schema.json
-    assert json.loads(SCHEMA.read_text("utf-8")) == json.loads(json.dumps(json_schema()))
-
-
-@pytest.fixture(scope="module")
-def validator():
-    schema = json.loads(SCHEMA.read_text("utf-8"))
-    jsonschema.Draft202012Validator.check_schema(schema)
-    return jsonschema.Draft202012Validator(schema)
-
-
 def lines():
     return [line for path in sorted(CORPUS.glob("*.jsonl")) for line in path.read_bytes().splitlines()]
 
 
-def test_lines_fit_the_schema(validator):
+def test_lines_fit_the_schema():
     for line in lines()[::20]:
-        validator.validate(json.loads(line))
+        validator("vector").validate(json.loads(line))
 
 
 def spoilt_lines():
@@ -202,10 +179,10 @@ def spoilt_lines():
 
 
 @pytest.mark.parametrize("name", spoilt_lines())
-def test_a_spoilt_line_is_refused(name, validator, tmp_path):
+def test_a_spoilt_line_is_refused(name, tmp_path):
     """By the schema; and by `load`, even where the manifest has been made to fit."""
     spoilt = spoilt_lines()[name]
-    assert not validator.is_valid(spoilt)
+    assert not validator("vector").is_valid(spoilt)
     (tmp_path / "spoilt.jsonl").write_text(json.dumps(spoilt) + "\n")
     write_manifest(tmp_path, {"spoilt.jsonl": 1})
     with pytest.raises(BadCorpus, match=r"spoilt.jsonl:1: .*"):

@@ -9,6 +9,7 @@ import shlex
 from pathlib import Path
 
 import pytest
+from support.refusals import assert_refused
 
 from mushrooms import gallery
 from scene import load
@@ -122,6 +123,4 @@ def test_scenes_are_printed_as_files_to_begin_from(command_line, tmp_path):
         assert (code, out) == (0, catalogue_text(name).rstrip("\n") + "\n")
     assert from_data(json.loads(command_line("scenes", "moving-cap", "--json")[1])) == load("moving-cap")
     for arguments in (["nowhere"], ["--toml"]):
-        code, _, err = command_line("scenes", *arguments)
-        assert code == 2
-        assert "moving-cap" in err
+        assert_refused(command_line("scenes", *arguments), "moving-cap")

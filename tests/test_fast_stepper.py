@@ -19,28 +19,12 @@ from fast.compiled import compile_scene
 from fast.kernel import arithmetic
 from fast.kernel.laws import increment, set_anchors
 from fast.kernel.records import ANCHORS_SHAPE, DEPTH, VALUE
-from scene import (
-    BangBang,
-    Cap,
-    Collision,
-    Fourier,
-    Horizon,
-    Mushroom,
-    State,
-    Undecided,
-    Undefined,
-    load,
-)
+from scene import BangBang, Cap, Collision, Fourier, Horizon, Mushroom, State, Undecided, Undefined, load
 from scene.laws import value
 from scene.tables import laws
 
 
-@given(
-    st.floats(1e-3, 1e3),
-    st.integers(1, 16),
-    st.floats(-1e5, 1e5),
-    st.floats(-1e-12, 1e-12),
-)
+@given(st.floats(1e-3, 1e3), st.integers(1, 16), st.floats(-1e5, 1e5), st.floats(-1e-12, 1e-12))
 def test_sine_and_cosine(omega, k, t, t_low):
     s, s_low, c, c_low, is_reduced = from_python(arithmetic.sine_cosine)(omega, 0.0, float(k), t, t_low)
     with workprec(200):

@@ -17,12 +17,7 @@ from support.hard_cases import case, is_enclosed, scene_of
 
 import fast
 import reference
-from scene import (
-    Collision,
-    Horizon,
-    State,
-    Undecided,
-)
+from scene import Collision, Horizon, State, Undecided
 from scene.protocol.wire import MAX_COLLISIONS, serve
 from scene.transforms import mirrored_wall
 

@@ -92,7 +92,7 @@ def test_workers_may_die(command_line, tmp_path, ensemble, monkeypatch):
 
 
 def test_no_scheduler_is_one_line(command_line, tmp_path, monkeypatch):
-    monkeypatch.setattr(engines, "PATIENCE", 0.3)
+    monkeypatch.setattr(engines, "CONNECT_TIMEOUT", 0.3)
     for address in ("tcp://127.0.0.1:9", "nonsense://x"):
         ended = command_line(*RUN, "--out", tmp_path, "--dask", address)
         assert_refused(ended, f"--dask = {address}", "no scheduler")
@@ -138,13 +138,13 @@ def test_exports_have_every_bit(command_line, stored, tmp_path, ensemble):
 
 
 @pytest.mark.parametrize(
-    ("package", "command"),
-    [("distributed", [*RUN, "--dask", "tcp://here:1"]), ("pyarrow", ["export"])],
+    ("package", "extra", "command"),
+    [("distributed", "scale", [*RUN, "--dask", "tcp://here:1"]), ("pyarrow", "parquet", ["export"])],
 )
-def test_a_missing_package_is_one_line(command_line, stored, tmp_path, monkeypatch, package, command):
+def test_a_missing_package_is_one_line(command_line, stored, tmp_path, monkeypatch, package, extra, command):
     monkeypatch.setitem(sys.modules, package, None)
     more = [stored, "--to", tmp_path / "a.parquet"] if command == ["export"] else ["--out", tmp_path / "b"]
-    assert_refused(command_line(*command, *more), package, "pip install 'oscillating-mushrooms[scale]'")
+    assert_refused(command_line(*command, *more), package, f"pip install 'oscillating-mushrooms[{extra}]'")
     assert list(tmp_path.iterdir()) == []
 
 

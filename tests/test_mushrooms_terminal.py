@@ -35,6 +35,10 @@ def test_functions_stand_before_the_modules_that_have_their_names():
     loaded_by(code + "assert callable(fast.trajectory)\nassert fast.Collisions is Collisions")
 
 
+def test_the_list_of_commands_has_an_example(command_line):
+    assert "Example: mushrooms " in command_line("--help").out
+
+
 @pytest.mark.parametrize("name", COMMANDS)
 def test_every_command_is_found_and_has_its_example(command_line, name):
     assert command(name).name == name

@@ -162,11 +162,7 @@ FORGED = {
         "floor may sweep",
     ),
     "end past the root": (end_past_the_root, CIRCLE_HIT, "arc is not excluded, falling"),
-    "changed velocity": (
-        put("state", "vx", -1.0 - 2.0**-52),
-        CIRCLE_HIT,
-        "arc is not excluded|change sign",
-    ),
+    "changed velocity": (put("state", "vx", -1.0 - 2.0**-52), CIRCLE_HIT, "arc is not excluded|change sign"),
     "changed side": (put("state", "y", -0.5), HONEST["base"], "y = 0 is not crossed"),
     "changed law": (
         put("scene", "r", "cos", [0.25 * (1 + 2.0**-52)]),

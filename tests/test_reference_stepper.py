@@ -23,17 +23,7 @@ from reference.isolation import Isolator
 from reference.jets import Jet
 from reference.start import flight_from
 from reference.walls import MovingWalls
-from scene import (
-    BadInput,
-    Cap,
-    Fourier,
-    Rejected,
-    State,
-    Stem,
-    Undecided,
-    Undefined,
-    load,
-)
+from scene import BadInput, Cap, Fourier, Rejected, State, Stem, Undecided, Undefined, load
 
 
 def hit(scene, state, t_end=100.0, digits=40):

@@ -3,19 +3,17 @@
 import json
 import math
 import sys
-from pathlib import Path
 
-import jsonschema
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from support.fuzz import as_toml
+from support.schemas import validator
 
 from conformance.strategies import scenes
 from scene import InvalidScene, catalogue, from_data, load, to_data
-from scene.load import json_schema, read_data
+from scene.load import read_data
 
-SCHEMA = Path(__file__).parent.parent / "docs" / "scene.schema.json"
 CAP = {"table": "cap", "r": 1.0}
 STEM = {"table": "stem", "w": 1.0, "h": 1.0}
 MUSHROOM = {"table": "mushroom", "r": 1.0, "h": 1.0, "nu": 0.5}
@@ -172,28 +170,16 @@ def test_a_law_nested_too_deep_is_refused():
     assert "r" in refusal(from_data, {"table": "cap", "r": {**LEGS, "knots": nested}})
 
 
-def test_the_published_schema_is_up_to_date():
-    # Regenerate with: python -m scene > docs/scene.schema.json
-    assert json.loads(SCHEMA.read_text("utf-8")) == json.loads(json.dumps(json_schema()))
-
-
-@pytest.fixture(scope="module")
-def published():
-    schema = json.loads(SCHEMA.read_text("utf-8"))
-    jsonschema.Draft202012Validator.check_schema(schema)
-    return jsonschema.Draft202012Validator(schema)
-
-
 @pytest.mark.parametrize("name", catalogue())
-def test_the_schema_accepts_the_catalogue(published, name):
-    published.validate(read_data(name))
+def test_the_schema_accepts_the_catalogue(name):
+    validator("scene").validate(read_data(name))
 
 
-@given(scene=scenes())
-def test_the_schema_accepts_every_scene(published, scene):
-    published.validate(json.loads(json.dumps(to_data(scene))))
+@given(scenes())
+def test_the_schema_accepts_every_scene(scene):
+    validator("scene").validate(json.loads(json.dumps(to_data(scene))))
 
 
 @pytest.mark.parametrize(("data", "_"), ILL_FORMED)
-def test_the_schema_refuses_what_the_loader_refuses(published, data, _):
-    assert not published.is_valid(data)
+def test_the_schema_refuses_what_the_loader_refuses(data, _):
+    assert not validator("scene").is_valid(data)

@@ -183,7 +183,7 @@ def test_an_equal_scene_is_proved_once(name):
     assert best < 100e-6  # 2 to 4 on an idle machine
 
 
-def test_zeros_of_either_sign_are_one_number():
+def test_a_zero_keeps_its_sign():
     for slope in (0.0, -0.0):
         assert math.copysign(1.0, Stem(w=1.0, h=1.0, slope=slope).slope) == math.copysign(1.0, slope)
 

@@ -9,7 +9,7 @@ from mpmath import MPContext
 
 from conformance.strategies import Clock, laws, scenes
 from scene import BangBang, Cap, Fourier, InvalidScene, Mushroom, Stem, catalogue, from_data, load, to_data
-from scene.laws import bounds, breakpoints, exact, is_constant, period_of, value
+from scene.laws import bounds, breakpoints, exact, is_constant, shared_period, value
 from scene.tables import laws as laws_of
 from scene.tables import period
 
@@ -104,15 +104,11 @@ def careless_mushrooms(draw):
 N_SAMPLES = 128
 
 
-def shared_period(found):
-    return next((shared for law in found.values() if (shared := period_of(law)) is not None), None)
-
-
 def least_margin(found):
     """The smallest of all conditions of a mushroom with these laws over dense sampling, at 30 digits."""
     ctx = MPContext()
     ctx.dps = 30
-    shared = shared_period(found)
+    shared = shared_period(found.values())
     times = [ctx.mpf(0)]
     if shared is not None:
         times = [shared.value(ctx) * k / N_SAMPLES for k in range(N_SAMPLES)]
@@ -127,7 +123,7 @@ def least_margin(found):
 
 def most_missed(given):
     """How far a condition may dip between two samples: bound on its curvature times spacing^2 / 8."""
-    shared = shared_period(given)
+    shared = shared_period(given.values())
     if shared is None:
         return 0.0
 

@@ -67,6 +67,13 @@ def test_a_power_law_and_a_limit_are_recovered_within_their_errors() -> None:
     np.testing.assert_allclose(np.std(pulls, axis=0), 1, atol=0.15)
 
 
+def test_next_orders_are_told_from_the_power() -> None:
+    x = np.logspace(3, 8, 7)
+    y = 3.0 * x**-0.25 * np.exp(2.0 * (x / x[0]) ** -0.5 - (x / x[0]) ** -1.0)
+    assert fit_power(x, y, 1e-6 * y, (-0.5, -1.0)).exponent == pytest.approx(-0.25, abs=1e-10)
+    assert abs(fit_power(x, y, 1e-6 * y).exponent + 0.25) > 0.01
+
+
 def test_a_wrong_exponent_shows_in_the_residuals() -> None:
     energies = np.logspace(4, 9, 6)
     law = fit_power(energies, 1.9 * energies**0.25, 0.01 * energies**0.25)  # as sec. 4.1 prints it
@@ -77,8 +84,12 @@ def test_a_wrong_exponent_shows_in_the_residuals() -> None:
 def test_bad_data_is_named() -> None:
     with pytest.raises(ValueError, match="s has 3 values: a width needs at least 4"):
         peak_width([0.0, 1.0, 2.0])
-    with pytest.raises(ValueError, match="two different x"):
+    with pytest.raises(ValueError, match="2 different x"):
         fit_power([1.0, 1.0], [1.0, 2.0], [1.0, 1.0])
+    with pytest.raises(ValueError, match="3 different x"):
+        fit_power([1.0, 2.0], [1.0, 2.0], [1.0, 1.0], (-0.5,))
+    with pytest.raises(ValueError, match="orders must be < 0"):
+        fit_power([1.0, 2.0, 3.0], [1.0, 2.0, 3.0], [1.0, 1.0, 1.0], (0.5,))
     with pytest.raises(ValueError, match="a power law needs y > 0"):
         fit_power([1.0, 2.0], [1.0, -2.0], [1.0, 1.0])
     with pytest.raises(ValueError, match="errors must be positive"):

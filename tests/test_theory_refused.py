@@ -12,7 +12,7 @@ from support.refusals import one_line
 
 import theory
 from scene import BangBang, Cap, Fourier, Mushroom, Stem, load
-from theory.entries import MAX_DIGITS, MAX_ORDER
+from theory.given import MAX_DIGITS, MAX_ORDER
 
 SCENE = load("moving-cap")
 FP = mpmath.fp
@@ -78,7 +78,7 @@ ENTRIES = {
     "FiniteEnergy.mean_of_exp": (lambda **given: finite().mean_of_exp(**given), {"q": 0.5}),
     "FiniteEnergy.draw": (lambda **given: finite().draw(**given), {"n_cycles": 2, "n": 3, "seed": 4}),
     "peak_width": (theory.peak_width, {"s": [0.0]}),
-    "fit_power": (theory.fit_power, COLUMNS),
+    "fit_power": (theory.fit_power, {**COLUMNS, "orders": [-0.5]}),
     "extrapolate": (theory.extrapolate, {**COLUMNS, "exponent": -0.5}),
     "Cycle.of": (theory.Cycle.of, WITH_DIGITS),
     "Cycle.t_in": (lambda **given: cycle().t_in(**given), {"nu": 0.5}),

@@ -1,4 +1,9 @@
-"""The paper's closed forms and quadratures, at any precision."""
+"""The paper's closed forms and quadratures, at any precision.
+
+`volumes` and `invariants` are its formulas. `cycle` says when particles are captured and released,
+`adiabatic` what they gain, and `prediction` the figures that follow; `density` and `distribution` are of
+energies after one cycle, `saddle` and `large_deviations` after many. `blur` is all this at finite energy.
+"""
 
 from theory.adiabatic import NotConverged
 from theory.blur import FiniteEnergy, at_energy
@@ -14,15 +19,7 @@ from theory.curves import (
 from theory.cycle import Cycle
 from theory.density import Caustic, capture_rate_at, caustics, cdf_at, density_at
 from theory.distribution import Energies, Sum, energies, energy_cdf, sum_of_cycles
-from theory.finite_energy import (
-    Limit,
-    PowerFit,
-    Width,
-    extrapolate,
-    fit_power,
-    peak_width,
-    unbiased_mean,
-)
+from theory.finite_energy import Limit, PowerFit, Width, extrapolate, fit_power, peak_width, unbiased_mean
 from theory.invariants import (
     cap_invariant,
     energy,

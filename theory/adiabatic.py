@@ -24,7 +24,7 @@ from typing import Any, NamedTuple
 from scene.refusal import BadInput
 from theory.chebyshev import Grid, even_degree
 from theory.cycle import Cycle
-from theory.measure import Atoms, convolve, product, shifted
+from theory.measure import WeightedPoints, convolve, product, shifted
 from theory.valleys import CapturePiece, Valley
 from theory.volumes import delta, delta_slope
 
@@ -132,7 +132,7 @@ class Captures:
         return tuple(_placed(self.root, zero, zero, zero))
 
     @cached_property
-    def atoms(self) -> Atoms:
+    def atoms(self) -> WeightedPoints:
         """The distribution of s as weighted points, exact for what the grid resolves."""
         return self._atoms(self.root)
 
@@ -153,7 +153,7 @@ class Captures:
         """Return the coefficients, up to `order`, of mean exp((q + x) s) in powers of x."""
         return self._taylor(self.root, self.cycle.ctx.mpf(q), order)
 
-    def captured(self, window: Window) -> Atoms:
+    def captured(self, window: Window) -> WeightedPoints:
         """Return the particles captured on a valley's own panels, from its top: d p_ell = exp(-A) dA."""
         ctx, gain = self.cycle.ctx, window.B_top - window.A_top
         return [
@@ -162,9 +162,9 @@ class Captures:
             for weight, rate, a, s in zip(self.grid.weights, panel.rate, panel.A, panel.s, strict=True)
         ]
 
-    def _atoms(self, window: Window) -> Atoms:
+    def _atoms(self, window: Window) -> WeightedPoints:
         ctx = self.cycle.ctx
-        below: Atoms = [(ctx.one, ctx.zero)]
+        below: WeightedPoints = [(ctx.one, ctx.zero)]
         if window.children:
             grid = Grid(ctx, 2 * (6 + self.target // 3))
             below = reduce(lambda x, y: convolve(grid, x, y), map(self._atoms, window.children))

@@ -21,7 +21,7 @@ from scene.tables import Mushroom, Scene
 from theory.branches import Branch, Floats, Node, at, tree
 from theory.course import N_TIMES, Fields, Flags, course
 from theory.curves import chaotic_zone
-from theory.entries import finite_array
+from theory.given import finite_array
 from theory.rates import table_error
 from theory.volumes import as_mushroom
 

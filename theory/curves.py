@@ -20,7 +20,7 @@ from theory.branches import DIGITS, Branch, Floats, X, tree, turns
 from theory.constants import guarded
 from theory.cycle import Cycle
 from theory.distribution import energies
-from theory.entries import finite_array
+from theory.given import finite_array
 from theory.volumes import volumes_at
 
 MAX_POINTS = 10_000_000

@@ -16,7 +16,7 @@ from mpmath import MPContext
 from scene.refusal import BadInput, check_count
 from scene.tables import Scene, period
 from theory.constants import guarded, settle
-from theory.entries import MAX_DIGITS, check_real
+from theory.given import MAX_DIGITS, check_real
 from theory.parameters import MovingMushroom
 from theory.valleys import CapturePiece, Valley, stretches, valley
 from theory.volumes import as_mushroom

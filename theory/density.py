@@ -21,7 +21,7 @@ from theory.adiabatic import Captures, Placed
 from theory.branches import turns
 from theory.constants import guarded
 from theory.critical import solve_rising
-from theory.entries import real_numbers
+from theory.given import real_numbers
 from theory.prediction import converged
 from theory.volumes import NotCovered, delta_slope
 

@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 from scene.refusal import BadInput, check_count, check_number, shown
 from scene.tables import Scene
 from theory.branches import Branch, Floats, Node, X, at, tree
-from theory.entries import finite_array
+from theory.given import finite_array
 
 STEP = 2.0**-12  # the lattice's, at best: its square times a density of order 1 is the error
 MAX_POINTS = 2**20

@@ -5,6 +5,7 @@ What finite energy does is predicted by `theory.blur`; this works for any cycle,
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -13,7 +14,7 @@ from numpy.typing import ArrayLike
 from scene.refusal import BadInput, check_number
 from scene.tables import Scene
 from theory.branches import Floats
-from theory.entries import finite_array
+from theory.given import finite_array
 from theory.prediction import mean_of
 
 
@@ -25,12 +26,12 @@ class Width(NamedTuple):
 
 
 class PowerFit(NamedTuple):
-    """y = coefficient x^exponent, fitted to log y.
+    """y = coefficient x^exponent, and next orders where they were asked for, fitted to log y.
 
     exponent, exponent_error: with the standard errors of the data.
-    coefficient, coefficient_error: value at x = 1 and the error of its logarithm times it.
+    coefficient, coefficient_error: value at x = 1 but for next orders; the error of its logarithm, times it.
     residuals: (log y - fit) in standard errors, in the order of the data.
-    chi_square: their sum of squares, for len(y) - 2 degrees of freedom.
+    chi_square: their sum of squares, for len(y) - 2 degrees of freedom, less one for each next order.
     """
 
     exponent: float
@@ -94,21 +95,26 @@ def unbiased_mean(scene: Scene, digits: int = 15) -> Any:
     return mean_of(scene, lambda s: s.context.exp(-s / 2), digits)
 
 
-def fit_power(x: ArrayLike, y: ArrayLike, errors: ArrayLike) -> PowerFit:
+def fit_power(x: ArrayLike, y: ArrayLike, errors: ArrayLike, orders: ArrayLike = ()) -> PowerFit:
     """Fit a power law; for the width against the energy the theory's exponent is -1/4.
 
     Args:
-        x: shape (n,), positive, n >= 2 with two different.
+        x: shape (n,), positive, with two different, and one more for each next order.
         y: shape (n,), positive.
         errors: standard errors of y, positive.
+        orders: powers of x, < 0, by which the next orders are smaller: a term in log y is fitted for each.
 
     Raises:
         BadInput: the shapes differ or a number is out of bounds.
     """
-    x_, y_, errors_ = _data(x, y, errors)
+    orders_ = finite_array("orders", orders, 1)
+    if not np.all(orders_ < 0) or np.unique(orders_).size < orders_.size:
+        raise BadInput("orders must be < 0, no two of them alike")
+    x_, y_, errors_ = _data(x, y, errors, 2 + orders_.size)
     if not np.all(y_ > 0):
         raise BadInput("a power law needs y > 0")
-    (level, slope), (level_error, slope_error), residuals = _line(np.log(x_), np.log(y_), errors_ / y_)
+    terms = [np.log(x_), *((x_ / x_[0]) ** order for order in orders_)]
+    (level, slope, *_), (level_error, slope_error, *_), residuals = _fitted(terms, np.log(y_), errors_ / y_)
     coefficient = float(np.exp(level))
     return PowerFit(
         slope, slope_error, coefficient, coefficient * level_error, residuals, float(residuals @ residuals)
@@ -127,30 +133,27 @@ def extrapolate(x: ArrayLike, y: ArrayLike, errors: ArrayLike, exponent: float =
     Raises:
         BadInput: the shapes differ, a number is out of bounds or exponent is not < 0.
     """
-    x_, y_, errors_ = _data(x, y, errors)
+    x_, y_, errors_ = _data(x, y, errors, 2)
     exponent = check_number("exponent", exponent)
     if not exponent < 0:
         raise BadInput(f"exponent = {exponent}, must be < 0")
-    (limit, slope), (limit_error, slope_error), residuals = _line(x_**exponent, y_, errors_)
+    (limit, slope), (limit_error, slope_error), residuals = _fitted([x_**exponent], y_, errors_)
     return Limit(limit, limit_error, slope, slope_error, residuals, float(residuals @ residuals))
 
 
-def _data(x: ArrayLike, y: ArrayLike, errors: ArrayLike) -> tuple[Floats, Floats, Floats]:
+def _data(x: ArrayLike, y: ArrayLike, errors: ArrayLike, least: int) -> tuple[Floats, Floats, Floats]:
     x_, y_, errors_ = (finite_array(*named) for named in (("x", x), ("y", y), ("errors", errors)))
-    if x_.ndim != 1 or not x_.shape == y_.shape == errors_.shape or np.unique(x_).size < 2:
-        raise BadInput("x, y and errors must be of one length, with at least two different x")
+    if x_.ndim != 1 or not x_.shape == y_.shape == errors_.shape or np.unique(x_).size < least:
+        raise BadInput(f"x, y and errors must be of one length, with at least {least} different x")
     if not (np.all(x_ > 0) and np.all(errors_ > 0)):
         raise BadInput("x and errors must be positive, and all numbers finite")
     return x_, y_, errors_
 
 
-def _line(x: Floats, y: Floats, errors: Floats) -> tuple[tuple[float, float], tuple[float, float], Floats]:
-    """Fit y = level + slope x by least squares; return both, their standard errors and the residuals."""
-    weights = errors**-2
-    centre = weights @ x / weights.sum()
-    spread = weights @ (x - centre) ** 2
-    slope = float(weights @ ((x - centre) * y) / spread)
-    mean = weights @ y / weights.sum()
-    level = float(mean - slope * centre)
-    level_error = float(np.sqrt(1 / weights.sum() + centre**2 / spread))
-    return (level, slope), (level_error, float(spread**-0.5)), (y - level - slope * x) / errors
+def _fitted(terms: Sequence[Floats], y: Floats, errors: Floats) -> tuple[list[float], list[float], Floats]:
+    """Fit y = a + the sum of b_k term_k by least squares; return a, b_k, their errors, and the residuals."""
+    columns = np.column_stack([np.ones_like(y), *terms]) / errors[:, None]
+    q, triangle = np.linalg.qr(columns)
+    inverse = np.linalg.inv(triangle)  # inverse inverse^T is the covariance
+    found = inverse @ (q.T @ (y / errors))
+    return found.tolist(), np.linalg.norm(inverse, axis=1).tolist(), y / errors - columns @ found

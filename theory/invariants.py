@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from scene.refusal import BadInput, shown
-from theory.entries import check_real, check_system
+from theory.given import check_real, check_system
 from theory.volumes import v_cap
 
 

@@ -12,21 +12,21 @@ from typing import Any
 
 from theory.chebyshev import Grid
 
-Atoms = list[tuple[Any, Any]]  # weight and place
+WeightedPoints = list[tuple[Any, Any]]  # weight and place
 
 
-def shifted(atoms: Atoms, weight: Any, shift: Any) -> Atoms:
+def shifted(atoms: WeightedPoints, weight: Any, shift: Any) -> WeightedPoints:
     """Return the points moved by `shift`, their weights times `weight`."""
     return [(weight * w, s + shift) for w, s in atoms]
 
 
-def convolve(grid: Grid, first: Atoms, second: Atoms) -> Atoms:
+def convolve(grid: Grid, first: WeightedPoints, second: WeightedPoints) -> WeightedPoints:
     """Return the distribution of a sum of independent variables, on few points."""
     few, other = compressed(grid, first), compressed(grid, second)
     return compressed(grid, [(v * w, r + s) for v, r in few for w, s in other])
 
 
-def compressed(grid: Grid, atoms: Atoms) -> Atoms:
+def compressed(grid: Grid, atoms: WeightedPoints) -> WeightedPoints:
     """Return at most n + 1 points with the same means of polynomials up to degree n, the grid's."""
     if len(atoms) <= grid.n + 1:
         return atoms

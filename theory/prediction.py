@@ -20,7 +20,7 @@ from scene.transforms import backwards
 from theory.adiabatic import Captures, NotConverged, captures
 from theory.constants import guarded
 from theory.cycle import GUARD, Cycle
-from theory.entries import MAX_DIGITS, MAX_ORDER
+from theory.given import MAX_DIGITS, MAX_ORDER
 from theory.measure import logarithm
 from theory.volumes import as_mushroom
 

@@ -20,7 +20,7 @@ from scene.refusal import BadInput, check_count
 from scene.tables import Scene
 from theory.branches import Floats, Node
 from theory.distribution import Energies, energies
-from theory.entries import finite_array
+from theory.given import finite_array
 from theory.measure import logarithm, product
 from theory.prediction import MAX_CYCLES
 

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 from scene.laws import Law, value
 from scene.refusal import BadInput, check_scene
 from scene.tables import Mushroom, Scene
-from theory.entries import check_real, check_system
+from theory.given import check_real, check_system
 
 
 class NotCovered(BadInput):

@@ -23,6 +23,7 @@ from conformance.second_proof.step import check
 from conformance.second_proof.trajectory import check_path
 from conformance.vectors import NUMBERS, Certified, Ends, Expectation, certified
 from scene import Outcome, Rejected, Scene, State, Undecided, Undefined
+from scene.states import Stepper
 
 KINDS = ("agreed", "undecided", "refused", "open", "wrong")
 BOUND = 4.0  # backward ulps: the sharpest class of grades
@@ -41,8 +42,6 @@ class Claim(NamedTuple):
     certificate: dict[str, Any] | None = None
 
 
-Prover = Callable[[Attack], Claim]
-Stepper = Callable[[Scene, State, float], Outcome]
 Flow = Callable[[Scene, State, float], "dict[str, int] | None"]  # None: undecided
 
 
@@ -57,7 +56,7 @@ class Judgement(NamedTuple):
 class UnderAttack(NamedTuple):
     """What is under attack; None leaves one out."""
 
-    prover: Prover | None = None
+    prover: Callable[[Attack], Claim] | None = None
     stepper: Stepper | None = None
     flow: Flow | None = None
 

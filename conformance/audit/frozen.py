@@ -10,7 +10,7 @@ kicks is seen, each wall in proportion to its speed there. At speed 1 that gives
   less the chaotic zone's mean of it, has the mean `lag`; its mean square, less diffusion's, is `square`.
 
 All are of tables at rest: nothing is taken from a moving one, or fitted to it. `theory.rates` reads them,
- theory/equations.md says what follows. `python -m conformance.audit.frozen` measures them anew.
+`theory/equations.md` says what follows. `python -m conformance.audit.frozen` measures them anew.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ MEASURED = (
 )
 SWAY = 1e-5  # of the parameter that moves fastest [length, or none]: a relative error of this order
 TAIL = 250.0  # some five times the longest memory of a table
-CALM = 200.0  # periods of the sway per TAIL: the walls' speed is then constant to 5e-4
+SWAY_PERIOD = 200.0  # in units of TAIL, for the lag: the walls' speed is then constant to 5e-4
 N_DIFFUSING, N_LAGGING = 3000, 4000
 SEED = 20140317
 DIGITS = 5  # kept of each number
@@ -110,7 +110,7 @@ def lag(
     """
     now = table_at(fp, scene, t)
     found = passages(scene, now, t, speed, n, random)
-    table, share = swaying(scene, t, CALM * TAIL)
+    table, share = swaying(scene, t, SWAY_PERIOD * TAIL)
     done = carry_judged(table, found.states, TAIL, 1)
     ends = [o.vx**2 + o.vy**2 if isinstance(o, Horizon) else math.nan for o in done.outcomes]
     length = found.path + TAIL
@@ -134,9 +134,7 @@ def passages(
     cell = np.linspace(-0.5, 0.5, 9)
     tables = [table_at(fp, scene, t + x * cycle_length(scene) / N_PHASES) for x in cell]
     sigma = np.interp(random.uniform(-0.5, 0.5, n), cell, [float(one.w / one.r) for one in tables])
-    sigma = sigma[
-        sigma < 1.0
-    ]  # where the mouth rests wide open there is no island, and the rim does not turn
+    sigma = sigma[sigma < 1.0]  # a mouth that rests wide open leaves no island, and its rim does not turn
     n = len(sigma)
     widening = abs(now.w_rate * now.r - now.w * now.r_rate) / now.r**2 / speed
     half, turn = np.sqrt(1 - sigma**2), 2 * np.arccos(sigma)

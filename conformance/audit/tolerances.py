@@ -135,13 +135,7 @@ def power(departure: float, reach: float, error: float) -> float | None:
     return float(norm.sf((reach - departure) / error) + norm.cdf((-reach - departure) / error))
 
 
-def above(
-    what: str,
-    found: tuple[float, float],
-    bound: float,
-    *,
-    form: Form = "claim",
-) -> Check:
+def above(what: str, found: tuple[float, float], bound: float, *, form: Form = "claim") -> Check:
     """Check that a measured value exceeds a bound beyond its error; within it, it is undecided."""
     value, error = found
     holds = None if abs(value - bound) <= N_SIGMA * error else bool(value > bound)

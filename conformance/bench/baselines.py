@@ -29,15 +29,16 @@ from conformance.bench import codes
 from conformance.bench.contenders import Ask, Contender, Family, Given, Lap
 from conformance.bench.workloads import SINGLE_STEPS, WINDOW, Workload
 from conformance.suite.process import Trouble
-from scene import BangBang, Cap, Collision, Fourier, Horizon, Law, Outcome, Scene, State, Stem, Wall
+from scene import BangBang, Cap, Collision, Fourier, Horizon, Law, Mushroom, Outcome, Scene, State, Stem
 from scene.geometry import rounded
 from scene.laws import frequency
+from scene.states import Stepper
 from scene.tables import laws, width_factors
 
 FloatArray = npt.NDArray[np.float64]
 SOURCE = Path(__file__).parent / "baselines.c"
 PARTS = (10, 100, 1000)  # time steps in a flight
-WALLS: tuple[Wall, ...] = ("arc", "base", "left", "right", "floor")
+WALLS = Mushroom.walls
 LAW_LENGTH, PAIRS = 516, 4
 MOST = 10 * int(WINDOW)  # collisions of a particle: one that hops along the arc would never end
 
@@ -165,7 +166,7 @@ def asker(contender: Contender) -> Ask:
     return partial(vectors.answer, step=step, follow=partial(plain.trajectory, step=step))
 
 
-def stepper(contender: Contender) -> plain.Step:
+def stepper(contender: Contender) -> Stepper:
     """Return a baseline as a stepper of one state, taken as it is; t_end alone ends a flight."""
     assert contender.steps is not None
     steps = contender.steps

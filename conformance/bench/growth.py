@@ -37,15 +37,15 @@ class Place(NamedTuple):
     width: float = 0.0
 
 
-Follower = Callable[[Scene, State, int], list[Place]]
+PathFollower = Callable[[Scene, State, int], list[Place]]
 Linearised = Callable[[Scene, State, float], tuple[Collision, Matrix]]  # a proved step and its Jacobian
 
 
 def grow(
-    followers: dict[str, Follower],
+    followers: dict[str, PathFollower],
     prove: Prover,
     linearise: Linearised,
-    prove_path: Follower,
+    prove_path: PathFollower,
     seed: int,
     n_paths: int,
     n_collisions: int,

@@ -17,18 +17,19 @@ from conformance.bench import baselines
 from conformance.bench.time_stepping import TOLERANCES, next_collision_by
 from scene import BadInput
 from scene.protocol.wire import serve
+from scene.states import Stepper
 
 FLAGS = ("-O3", "-march=native")
 
 
-def _in_c(name: str) -> plain.Step:
+def _in_c(name: str) -> Stepper:
     with tempfile.TemporaryDirectory() as folder:  # the library stays loaded
         library, _ = baselines.build(Path(folder), FLAGS)
         found = next(one for one in baselines.in_c(library) if one.name == name)
         return baselines.stepper(found)
 
 
-NAMES: dict[str, Callable[[], plain.Step]] = {
+NAMES: dict[str, Callable[[], Stepper]] = {
     "lean-c": partial(_in_c, "lean C"),
     "lean-numba": lambda: baselines.stepper(baselines.in_numba()),
     **{f"steps-{parts}": partial(_in_c, f"steps, flight/{parts}") for parts in baselines.PARTS},

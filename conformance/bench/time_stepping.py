@@ -77,10 +77,7 @@ def _gaps(scene: Scene, part: str) -> dict[Any, Gap]:
     law = {name: _law(scene, name) for name in laws(scene)}
     if part == "cap":
         r = law["r"]
-        return {
-            "arc": lambda t, q: r(t) ** 2 - q[0] ** 2 - q[1] ** 2,
-            "base": lambda _, q: float(q[1]),
-        }
+        return {"arc": lambda t, q: r(t) ** 2 - q[0] ** 2 - q[1] ** 2, "base": lambda _, q: float(q[1])}
     slope = law["slope"]
     top = "mouth" if isinstance(scene, Mushroom) else "base"
     return {

@@ -19,8 +19,9 @@ from mpmath import fp
 from conformance.generator.draws import Draw, place, state, walls_speed
 from conformance.grading.agreement import middle
 from conformance.vectors import Expectation
-from scene import BangBang, Cap, Collision, Fourier, Mushroom, Outcome, Scene, State, Wall, load
+from scene import BangBang, Cap, Collision, Fourier, Mushroom, Scene, State, Wall, load
 from scene.geometry import rounded
+from scene.states import Stepper
 from scene.tables import period
 
 DIGITS = 230  # of the proved answers: beyond any contender's
@@ -29,7 +30,6 @@ PHASE = 0.3  # of the cycle, where the window begins
 MAX_DRAWS = 100
 # (scene, state, t_end, digits) -> certified answer of a step; None where the proof is undecided.
 Prover = Callable[[Scene, State, float, int], Expectation | None]
-Stepper = Callable[[Scene, State, float], Outcome]
 Drawn = tuple[State, float]  # with its horizon
 
 

@@ -24,7 +24,16 @@ from conformance.grading.error import inputs_of
 from conformance.second_proof.chain import recheck
 from conformance.second_proof.step import check
 from conformance.second_proof.trajectory import check_path
-from conformance.vectors import NUMBERS, Certified, Expectation, Level, Vector, certified, four_digits
+from conformance.vectors import (
+    NUMBERS,
+    Certified,
+    Expectation,
+    Level,
+    OutcomeName,
+    Vector,
+    certified,
+    four_digits,
+)
 from reference.certificate import certificate, path_certificate
 from scene import BadInput, InvalidState, Rejected, Scene, State, Undecided, Undefined, from_data
 
@@ -35,7 +44,6 @@ LONGEST = 1e8  # condition number up to which a trajectory is followed
 INFINITE = 1e300
 # Pairs, so that one of each pair lies on either side of a tie; a trajectory takes the first pair.
 SIGNS = ((1, 1, -1, 1, -1), (-1, -1, 1, -1, 1), (1, 1, 1, 1, 1), (-1, -1, -1, -1, -1))
-Outcome = Literal["collision", "horizon", "undefined", "undecided", "rejected"]
 
 
 class Question(NamedTuple):
@@ -62,7 +70,7 @@ class Question(NamedTuple):
     state: State
     t_end: float
     collisions: int | None = None
-    also: tuple[Outcome, ...] = ()
+    also: tuple[OutcomeName, ...] = ()
     level: Level | None = None
     longest: float = LONGEST
     flow: Callable[[Sequence[Mark]], bool] | None = None
@@ -179,10 +187,7 @@ def _path(scene: Scene, question: Question, working: int | None = None) -> _Prov
         return _Proved((arrived,), largest, len(steps))
     expect = [Expectation("horizon" if end else "collision", tuple(steps))]
     if isinstance(end, Undefined):
-        expect = [
-            Expectation("undefined", tuple(steps), end.reason),
-            Expectation("undecided", tuple(steps)),
-        ]
+        expect = [Expectation("undefined", tuple(steps), end.reason), Expectation("undecided", tuple(steps))]
     return _Proved(tuple(expect), links.largest, len(steps) + isinstance(end, Undefined))
 
 

@@ -10,9 +10,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
-from conformance.generator.certify import Outcome, Question
+from conformance.generator.certify import Question
 from conformance.generator.draws import unproved, wire_form
-from conformance.vectors import Level
+from conformance.vectors import Level, OutcomeName
 from scene import BangBang, Cap, Fourier, Mushroom, Scene, State, Stem
 
 CIRCLE = Cap(r=1.0)
@@ -30,7 +30,7 @@ def case(
     state: State,
     t_end: float = 100.0,
     collisions: int | None = None,
-    also: tuple[Outcome, ...] = (),
+    also: tuple[OutcomeName, ...] = (),
     level: Level | None = None,
 ) -> Question:
     """Return the question of a hard case."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
-from conformance.generator.certify import Outcome, Question
+from conformance.generator.certify import Question
 from conformance.generator.draws import unproved, wire_form
 from conformance.generator.grazing_and_stem_cases import (
     BOX,
@@ -16,6 +16,7 @@ from conformance.generator.grazing_and_stem_cases import (
     grazing_and_slow,
     stem,
 )
+from conformance.vectors import OutcomeName
 from scene import BangBang, Fourier, Mushroom, Scene, State, load
 from scene.tables import laws
 from scene.transforms import backwards
@@ -100,7 +101,7 @@ def times() -> Iterator[Question]:
     yield case(38, "a late start: full precision in dt", load("moving-cap"), late, 200.0)
     for t in (2.0**24, 2.0**30, 1e15):
         # A stepper may refuse times at which a period is lost in rounding, if it says so.
-        also: tuple[Outcome, ...] = ("rejected",) if t > 2.0**24 else ()
+        also: tuple[OutcomeName, ...] = ("rejected",) if t > 2.0**24 else ()
         start = State(t, 0.0, -1.75, 0.0, 0.0)
         yield case(39, "an astronomical time", LIFT, start, t + 64, None, also)
     start = State(1e15, 0.1, 0.3, 10.0, 7.0)

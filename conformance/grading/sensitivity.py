@@ -8,7 +8,7 @@ and nothing is said about it.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from math import hypot
 from typing import NamedTuple
 
@@ -16,9 +16,9 @@ from msgspec.structs import replace
 
 from scene import Collision, Horizon, Outcome, Scene, State
 from scene.laws import bounds
+from scene.states import Stepper
 from scene.tables import laws
 
-Stepper = Callable[[Scene, State, float], Outcome]
 Numbers = tuple[float, ...]
 NUDGE = 2.0**-26  # relative: the differences of central differences then keep half of binary64's digits
 INPUTS = ("t", "x", "y", "vx", "vy")

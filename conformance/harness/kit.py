@@ -26,7 +26,7 @@ from scene import Cap, Horizon, Mushroom, Outcome, Rejected, Scene, State, Undec
 from scene.geometry import TableAt, table_at
 from scene.laws import bounds
 from scene.protocol.messages import Answered, AnsweredCollision
-from scene.protocol.wire import OwnFailure, Stepper, serve
+from scene.protocol.wire import AnsweringStepper, OwnFailure, serve
 from scene.states import ON_WALL, check_numbers
 from scene.tables import laws
 
@@ -214,7 +214,7 @@ def _hits(
     return sorted(found)
 
 
-def _serve(name: str, step: Stepper) -> None:
+def _serve(name: str, step: AnsweringStepper) -> None:
     def follow(scene: Scene, state: State, n_collisions: int, t_end: float) -> list[Answered | Outcome]:
         steps: list[Answered | Outcome] = []
         while len(steps) < n_collisions:

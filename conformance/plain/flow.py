@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from math import hypot, prod
 from typing import NamedTuple
 
 from conformance.plain.step import SIDES, Flight, next_collision
 from scene import Collision, Mushroom, Outcome, Scene, State, Undecided
 from scene.protocol.wire import Captured
+from scene.states import Stepper
 from scene.tables import width_factors
 
 MAX_COLLISIONS = 20_000  # of one particle's flow: some seconds
-Step = Callable[[Scene, State, float], Outcome]
 
 
 class PlainPath:
@@ -23,7 +23,7 @@ class PlainPath:
 
     most = MAX_COLLISIONS  # up to t_end
 
-    def __init__(self, scene: Scene, state: State, t_end: float, step: Step = next_collision) -> None:
+    def __init__(self, scene: Scene, state: State, t_end: float, step: Stepper = next_collision) -> None:
         self.scene, self.state, self.t_end, self.step = scene, state, t_end, step
         self.n_hits = 0
         self.stay = Stay()
@@ -104,7 +104,7 @@ def trajectory(
     state: State,
     n_collisions: int,
     t_end: float,
-    step: Step = next_collision,
+    step: Stepper = next_collision,
     path: type[PlainPath] = PlainPath,
 ) -> list[Outcome]:
     """Follow a particle by any stepper: its collisions, and last what came instead of one."""
@@ -118,10 +118,7 @@ def trajectory(
 
 
 def flow(
-    scene: Scene,
-    states: Sequence[State],
-    t_end: float,
-    step: Step = next_collision,
+    scene: Scene, states: Sequence[State], t_end: float, step: Stepper = next_collision
 ) -> list[tuple[Outcome, Captured]]:
     """Carry particles to t_end by any stepper: the outcome of each there, and its first captured stay."""
     return [PlainPath(scene, state, t_end, step).arrival() for state in states]

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal, NamedTuple
+from typing import Any, NamedTuple
 
+from conformance.vectors import OutcomeName
 from scene import Wall
-
-Kind = Literal["collision", "horizon", "undefined", "undecided", "rejected"]
 
 
 class OpenQuestion(Exception):  # noqa: N818 (a question left open is no error: precision is raised)
@@ -26,7 +25,7 @@ class Answer(NamedTuple):
         bits: precision that decided it.
     """
 
-    kind: Kind
+    kind: OutcomeName
     wall: Wall | None = None
     reason: str = ""
     numbers: tuple[Any, ...] = ()

@@ -25,8 +25,8 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import ClassVar, NamedTuple
 
-PATIENCE = 5.0  # seconds until what cannot be killed is given up
-LOOK = 0.01  # seconds between looks
+KILL_TIMEOUT = 5.0  # seconds until what cannot be killed is given up
+POLL_INTERVAL = 0.01  # seconds between looks
 SUBREAPER = 36  # PR_SET_CHILD_SUBREAPER of <linux/prctl.h>
 
 
@@ -84,12 +84,12 @@ class Descendants:
         """Kill the leader's group and all descendants; the leader is not reaped."""
         with contextlib.suppress(ProcessLookupError, PermissionError):
             os.killpg(self._leader, signal.SIGKILL)
-        deadline = time.monotonic() + PATIENCE
+        deadline = time.monotonic() + KILL_TIMEOUT
         while (alive := self.alive()) and time.monotonic() < deadline:
             for pid in alive:
                 with contextlib.suppress(ProcessLookupError, PermissionError):
                     os.kill(pid, signal.SIGKILL)
-            time.sleep(LOOK)
+            time.sleep(POLL_INTERVAL)
         self._leaders.discard(self._leader)
         _adopt_orphans(bool(self._leaders))
 

@@ -29,11 +29,11 @@ from conformance.suite.questions import (
     offered,
     question,
 )
+from conformance.suite.result import NamedVerdict
 from conformance.suite.session import Session, missing, read_outcome
 from scene import Cap, Collision, Horizon, Mushroom, Outcome, Scene, State, Stem, Undecided, to_data
 from scene.geometry import half_width
 
-Verdict = tuple[str, str, str, float]  # name, verdict, why, seconds
 N_LONG, N_PIECE = 1200, 430  # collisions of a whole trajectory, and of its first piece
 N_MOVING, N_SINGLE = 150, 12  # collisions of a trajectory between moving walls, and how many are asked alone
 N_FLOWN = 16  # particles that `flow` and `trajectory` both carry
@@ -66,7 +66,7 @@ MALFORMED: tuple[tuple[bytes, int | None], ...] = (
 )
 
 
-def ask_promises(session: Session, names: Sequence[str] = ()) -> Iterator[Verdict]:
+def ask_promises(session: Session, names: Sequence[str] = ()) -> Iterator[NamedVerdict]:
     """Hold an implementation to what the protocol promises.
 
     Args:

@@ -25,10 +25,11 @@ from conformance import profiles, properties
 from conformance.profiles import Statistic
 from conformance.suite.process import NOT_NUMBERS, Trouble
 from conformance.suite.questions import flown
+from conformance.suite.result import NamedVerdict
 from conformance.suite.session import Session, missing
 from scene import Fourier, Horizon, Mushroom, Outcome, Scene, State, Undecided, load, to_data
 from scene.geometry import area
-from scene.protocol.wire import Captured
+from scene.protocol.wire import Captured, Flowing
 from scene.tables import cycle_length
 
 NEEDS_FOURIER = ("static-limit",)  # asks for constants written as laws
@@ -64,10 +65,11 @@ SIZES = {
     "extended": Size(4_000, 4000.0, 0.04),
     "stress": Size(4_000, 4000.0, 0.04),
 }
-Verdict = tuple[str, str, str, float]  # name, verdict, why, seconds
 
 
-def ask_properties(session: Session, questions: Sequence[tuple[Scene, State, float]]) -> Iterator[Verdict]:
+def ask_properties(
+    session: Session, questions: Sequence[tuple[Scene, State, float]]
+) -> Iterator[NamedVerdict]:
     """Hold an implementation to every exact property.
 
     Args:
@@ -129,7 +131,7 @@ def _hold(
     return ("pass", why) if n_compared else ("unsupported", f"{why}: it is not about these scenes")
 
 
-def ask_profiles(session: Session, level: str, seed: int) -> Iterator[Verdict]:
+def ask_profiles(session: Session, level: str, seed: int) -> Iterator[NamedVerdict]:
     """Follow ensembles through `flow`; nothing when it, or what they need, is not offered.
 
     Args:
@@ -211,7 +213,7 @@ def _predicted() -> theory.Prediction:
     return theory.predict(load(SCENE), 10)
 
 
-def _flow(session: Session) -> profiles.Flow:
+def _flow(session: Session) -> Flowing:
     def flow(scene: Scene, states: Sequence[State], t_end: float) -> list[tuple[Outcome, Captured]]:
         found: list[tuple[Outcome, Captured]] = []
         for start in range(0, len(states), BATCH):

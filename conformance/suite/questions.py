@@ -17,11 +17,7 @@ from scene.geometry import table_at
 from scene.tables import Cap, Stem
 
 FOREVER = sys.float_info.max  # t_end of a question that only collisions end
-STANDING: tuple[Scene, ...] = (
-    Mushroom(r=1.0, w=0.5, h=1.0),
-    Cap(r=1.0),
-    Stem(w=1.0, h=1.25),
-)
+STANDING: tuple[Scene, ...] = (Mushroom(r=1.0, w=0.5, h=1.0), Cap(r=1.0), Stem(w=1.0, h=1.25))
 BREATHING = Cap(r=Fourier(mean=1.0, cos=(0.1,), omega=1.0))
 MOVING: tuple[Scene, ...] = (
     Mushroom(

@@ -21,6 +21,7 @@ BAD = ("fail", "crashed", "timed-out", "wrong-format", "error")
 VERDICTS = ("pass", "fail", "indeterminate", "declined", "unsupported", *BAD[1:])
 # An implementation that declines more has not been graded: of all questions, and of those of one group.
 MAX_DECLINED, MAX_DECLINED_OF_GROUP = 0.05, 0.25
+NamedVerdict = tuple[str, str, str, float]  # a case's name, verdict, why, seconds
 
 
 class Result(msgspec.Struct, frozen=True, omit_defaults=True):

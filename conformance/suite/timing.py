@@ -18,14 +18,7 @@ from typing import Any, NamedTuple
 from msgspec.structs import replace
 
 from conformance.suite.process import Trouble
-from conformance.suite.questions import (
-    MOVING,
-    distance,
-    last_collision,
-    off_wall,
-    offered,
-    question,
-)
+from conformance.suite.questions import MOVING, distance, last_collision, off_wall, offered, question
 from conformance.suite.session import Session, read_outcome
 from scene import Collision, Mushroom, Scene, State, Stem, Undecided
 

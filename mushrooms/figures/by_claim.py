@@ -10,12 +10,11 @@ from matplotlib.figure import Figure
 
 from conformance.audit.claims.finite_energy import ACW, CW, ERGODIC, LADDER
 from conformance.audit.samples import Sample
-from mushrooms.figures import cycles as cycles
-from mushrooms.figures import scaling as laws
+from mushrooms.figures import cycles, scaling
 from mushrooms.figures.style import STYLE
 
 Samples = Mapping[str, Sample]
-N7, N7X30, N5X30 = "moving-cap@1e7", "moving-cap@1e7x30", "moving-cap@1e5x30"
+MAIN_RUN, MANY_CYCLES, MANY_SLOWER = "moving-cap@1e7", "moving-cap@1e7x30", "moving-cap@1e5x30"
 
 
 class Picture(NamedTuple):
@@ -35,7 +34,7 @@ class Picture(NamedTuple):
 
 
 def _sums(samples: Samples) -> Figure:
-    run = N7X30 if N7X30 in samples else N5X30
+    run = MANY_CYCLES if MANY_CYCLES in samples else MANY_SLOWER
     return cycles.sums([(samples[run], 10), (samples[run], 30)])
 
 
@@ -60,14 +59,14 @@ ALL = (
         "M7",
         "Width of the uncaptured peak against energy, with fitted powers, and the power as printed. "
         "Error bars are smaller than the marks.",
-        lambda s: laws.widths(_there(s, *LADDER[3:6]), _there(s, *ERGODIC[1:])),
+        lambda s: scaling.widths(_there(s, *LADDER[3:6]), _there(s, *ERGODIC[1:])),
         (*LADDER[3:6], *ERGODIC[1:]),
     ),
     Picture(
         "M9",
         "How the moving cap's means approach the theory as E0 grows. The mean of exp(-s/2), right, "
         "has no bias of order E0^(-1/2).",
-        lambda s: laws.convergence(_there(s, *LADDER)),
+        lambda s: scaling.convergence(_there(s, *LADDER)),
         LADDER[:6],
     ),
     Picture(
@@ -82,21 +81,21 @@ ALL = (
         "X2",
         "Energies after one cycle, moving cap; as above. The orange density is infinite at its right "
         "end, the caustic of N5.",
-        lambda s: cycles.energies(_there(s, "moving-cap@1e6", N7)),
-        ("moving-cap@1e6", N7),
+        lambda s: cycles.energies(_there(s, "moving-cap@1e6", MAIN_RUN)),
+        ("moving-cap@1e6", MAIN_RUN),
     ),
     Picture(
         "X3",
         "When particles are captured. The area is the captured share.",
-        lambda s: cycles.capture_times(_there(s, N7, ACW, CW)),
-        (N7, ACW, CW),
+        lambda s: cycles.capture_times(_there(s, MAIN_RUN, ACW, CW)),
+        (MAIN_RUN, ACW, CW),
     ),
     Picture(
         "X4",
         "Many cycles: the centre and, on a logarithmic axis, the tails, with sums drawn from the theory at "
         "this energy.",
         _sums,
-        (N5X30,),
+        (MANY_SLOWER,),
     ),
     Picture("X5", "c = 0: one narrow peak.", lambda s: cycles.ergodic(s["ergodic@1e7"]), ("ergodic@1e7",)),
     Picture(
@@ -117,27 +116,27 @@ ALL = (
     Picture(
         "D1",
         "How rare it is to end with less energy: the probability falls as exp(-n I).",
-        lambda s: cycles.losses(s[N5X30]),
-        (N5X30,),
+        lambda s: cycles.losses(s[MANY_SLOWER]),
+        (MANY_SLOWER,),
     ),
     Picture(
         "L3",
         "The frozen mushroom: orbits in the island (blue) and in the chaotic zone (orange).",
-        lambda _: laws.frozen(),
+        lambda _: scaling.frozen(),
     ),
     Picture(
         "L4",
         "Release: how far nu at release is from nu at capture, against 1/v (grey: single particles), "
         "and its distribution in units of 1/v.",
-        lambda s: laws.release(_there(s, *LADDER[1:6])),
+        lambda s: scaling.release(_there(s, *LADDER[1:6])),
         LADDER[1:6],
     ),
     Picture(
         "L5",
         "Through the cycle: mean log E of the particles not captured so far, and the share of "
         "particles in the chaotic zone (L6).",
-        lambda s: laws.zone(_there(s, N7, ACW)),
-        (N7, ACW),
+        lambda s: scaling.zone(_there(s, MAIN_RUN, ACW)),
+        (MAIN_RUN, ACW),
     ),
 )
 

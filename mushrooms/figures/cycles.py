@@ -114,7 +114,9 @@ def energies(samples: list[Sample]) -> Figure:
     figure, pairs = panels(len(samples))
     for (panel, rest), sample in zip(pairs, samples, strict=True):
         _energies(panel, rest, sample)
-    pairs[0][0].legend(loc="best")
+        # Below: within the panel it would cover the caustic or a peak, wherever a scene has them.
+        told = panel.get_legend_handles_labels()
+        rest.legend(*told, loc="upper center", bbox_to_anchor=(0.5, -0.5))
     return figure
 
 

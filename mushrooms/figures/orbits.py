@@ -23,7 +23,7 @@ import theory
 from mushrooms import lyapunov
 from mushrooms.figures import style as plots
 from mushrooms.figures import table as tables
-from mushrooms.orbits import FollowedOrbit, boundary, boundary_map, span_of_nu
+from mushrooms.orbits import BoolArray, FloatArray, FollowedOrbit, boundary, boundary_map, span_of_nu
 from scene import Mushroom, Scene, Stem
 from scene.geometry import table_at
 from scene.refusal import BadInput
@@ -117,8 +117,14 @@ def section(orbits: Sequence[FollowedOrbit] | FollowedOrbit) -> Figure:
     what lies below its least value at none, and between the two it depends on the time: each hit has the
     colour of its own.
     """
-    found = _given(orbits)
     figure, axes = plots.new_figure(6.4, 5.2)
+    draw_section(axes, _given(orbits))
+    figure.legend(loc="outside lower center", ncols=2)
+    return figure
+
+
+def draw_section(axes: Axes, found: Sequence[FollowedOrbit]) -> None:
+    """Draw the Poincare section of one orbit or more of a scene; see `section`."""
     span = span_of_nu(found[0].scene)
     low, high = span or (0.0, 0.0)
     for sign in (1, -1):
@@ -131,22 +137,19 @@ def section(orbits: Sequence[FollowedOrbit] | FollowedOrbit) -> Figure:
         axes.plot([], [], color=plots.BLACK, linewidth=1, label=f"edge |sin φ| = nu, {edge}")
     sections = [orbit.section() for orbit in found]
     place, sine = (np.concatenate([one[k] for one in sections]) for k in (2, 3))
-    captured = np.concatenate([one.is_captured() for one in sections])
-    size = _size(len(place))
-    for which, colour, name in ((captured, CAPTURED, "captured"), (~captured, FREE, "free")):
-        if which.any():
-            axes.plot(place[which], sine[which], ".", color=colour, markersize=size, rasterized=True)
-            axes.plot([], [], "o", color=colour, markersize=5, label=f"{name}, {which.sum():,} hits")
+    _points(axes, place, sine, np.concatenate([one.is_captured() for one in sections]), "hits")
     axes.set(
         xlim=(0, 1), ylim=(-1, 1), xlabel="place on the arc, from the right", ylabel="sin φ", title=_of(found)
     )
-    figure.legend(loc="outside lower center", ncols=2)
-    return figure
 
 
-def _size(n: int) -> float:
-    # Of n points [points]: the more, the finer.
-    return min(4.0, max(0.6, 90.0 / math.sqrt(n or 1)))
+def _points(axes: Axes, x: FloatArray, y: FloatArray, captured: BoolArray, what: str) -> None:
+    """Draw points, the captured apart from the free, and count both in the legend; many points are finer."""
+    size = min(4.0, max(0.6, 90.0 / math.sqrt(len(x) or 1)))
+    for which, colour, name in ((captured, CAPTURED, "captured"), (~captured, FREE, "free")):
+        if which.any():
+            axes.plot(x[which], y[which], ".", color=colour, markersize=size, rasterized=True)
+            axes.plot([], [], "o", color=colour, markersize=5, label=f"{name}, {which.sum():,} {what}")
 
 
 def _of(orbits: Sequence[FollowedOrbit]) -> str:
@@ -160,17 +163,17 @@ def _of(orbits: Sequence[FollowedOrbit]) -> str:
 @rc_context(plots.STYLE)
 def collision_map(orbits: Sequence[FollowedOrbit] | FollowedOrbit) -> Figure:
     """Draw the boundary map: place along the whole boundary against the sine after each collision."""
-    found = _given(orbits)
     figure, axes = plots.new_figure(7.6, 5.0)
-    scene = found[0].scene
-    points = np.vstack([boundary_map(orbit) for orbit in found])
-    captured = np.concatenate([orbit.captured()[1:] for orbit in found])
-    size = _size(len(points))
-    for which, colour, name in ((captured, CAPTURED, "captured"), (~captured, FREE, "free")):
-        if which.any():
-            axes.plot(*points[which].T, ".", color=colour, markersize=size, rasterized=True)
-            axes.plot([], [], "o", color=colour, markersize=5, label=f"{name}, {which.sum():,} collisions")
-    for slot in boundary(scene):
+    draw_map(axes, _given(orbits))
+    figure.legend(loc="outside lower center", ncols=2)
+    return figure
+
+
+def draw_map(axes: Axes, found: Sequence[FollowedOrbit]) -> None:
+    """Draw the boundary map of one orbit or more of a scene; see `collision_map`."""
+    place, sine = np.vstack([boundary_map(orbit) for orbit in found]).T
+    _points(axes, place, sine, np.concatenate([orbit.captured()[1:] for orbit in found]), "collisions")
+    for slot in boundary(found[0].scene):
         axes.axvline(slot.end, color=plots.BLACK, linewidth=0.8)
         if slot.end - slot.begin > 0:
             where = ((slot.begin + slot.end) / 2, 1.03)
@@ -178,9 +181,7 @@ def collision_map(orbits: Sequence[FollowedOrbit] | FollowedOrbit) -> Figure:
     axes.set(
         xlim=(0, 1), ylim=(-1, 1), xlabel="place along the boundary, anticlockwise", ylabel="sin of the angle"
     )
-    figure.suptitle(_of(found), fontsize=10)
-    figure.legend(loc="outside lower center", ncols=2)
-    return figure
+    axes.set_title(_of(found), pad=18)  # above the names of the walls
 
 
 @rc_context(plots.STYLE)

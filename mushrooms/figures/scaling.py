@@ -6,7 +6,6 @@ import math
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
@@ -17,11 +16,14 @@ from conformance.audit.claims.finite_energy import fitted_width, width
 from conformance.audit.runs import scene_of
 from conformance.audit.samples import Sample
 from conformance.audit.tolerances import Mean, mean, share
-from mushrooms.figures.style import BLACK, BLUE, GREEN, GREY, ORANGE, FloatArray, new_figure
-from scene import Mushroom, State, load
+from mushrooms.figures.orbits import draw_map, draw_section
+from mushrooms.figures.style import BLACK, BLUE, GREEN, GREY, ORANGE, new_figure
+from mushrooms.orbits import follow
+from scene import load
 
 N_ORBITS = 40
 N_HITS = 400
+SEED = 7
 
 
 def zone(samples: list[Sample]) -> Figure:
@@ -114,59 +116,11 @@ def release(samples: list[Sample]) -> Figure:
 
 
 def frozen() -> Figure:
-    """Draw the frozen mushroom: hits on the arc, and the boundary map over the whole boundary."""
-    import fast
-
-    scene = load("frozen-mushroom")
-    assert isinstance(scene, Mushroom)
-    nu = float(scene.nu)  # type: ignore[arg-type]
-    figure, axes = new_figure(9.6, 3.8, 1, 2)
-    random = np.random.default_rng(7)
-    for _ in range(N_ORBITS):
-        psi, turn = random.uniform(0, math.pi), random.uniform(0, 2 * math.pi)
-        rho = math.sqrt(random.uniform(0, 1)) * 0.98
-        state = State(0.0, rho * math.cos(psi), rho * math.sin(psi), math.cos(turn), math.sin(turn))
-        island = abs(state.x * state.vy - state.y * state.vx) >= nu
-        done = fast.trajectory(scene, state, N_HITS)
-        walls, steps = np.array(done.walls), done.steps
-        place, angle = _boundary(scene, walls, steps)
-        colour = BLUE if island else ORANGE
-        arc = walls == "arc"
-        style = {"linestyle": "none", "marker": ".", "markersize": 1.2, "color": colour, "rasterized": True}
-        axes[0].plot(np.arctan2(steps[arc, 3], steps[arc, 2]), angle[arc], **style)
-        axes[1].plot(place, angle, **style)
-    for side in (-1, 1):
-        axes[0].axhline(side * nu, color=BLACK, linewidth=1)
-    axes[0].set(xlabel="place on the arc, psi", ylabel="sin phi", title="arc hits; lines: |sin phi| = nu")
-    axes[1].set(
-        xlabel="arclength along the boundary: arc, base, left, floor, right",
-        ylabel="sin of the angle",
-        title="boundary map: island blue, chaotic zone orange",
-    )
+    """Draw the frozen mushroom: hits of the arc, and the boundary map."""
+    figure, axes = new_figure(9.6, 4.2, 1, 2)
+    found = follow(load("frozen-mushroom"), N_HITS, seed=SEED, n_orbits=N_ORBITS)
+    draw_section(axes[0], found)
+    draw_map(axes[1], found)
+    for panel in axes:
+        panel.legend(loc="upper center", bbox_to_anchor=(0.5, -0.15))
     return figure
-
-
-def _boundary(
-    scene: Mushroom, walls: npt.NDArray[np.str_], steps: npt.NDArray[np.floating[Any]]
-) -> tuple[FloatArray, FloatArray]:
-    """Return arclength and sine of the angle with the inward normal, after each hit."""
-    _, _, x, y, vx, vy = steps.T
-    r, h, slope = float(scene.r), float(scene.h), float(scene.slope)  # type: ignore[arg-type]
-    w = r * float(scene.nu)  # type: ignore[arg-type]
-    foot, side = w - h * slope, math.hypot(h, h * slope)
-    starts = {"arc": 0.0, "base": math.pi * r, "left": math.pi * r + 2 * (r - w)}
-    starts["floor"] = starts["left"] + side
-    starts["right"] = starts["floor"] + 2 * foot
-    tilt = math.hypot(1, slope)
-    rows = {
-        "arc": (r * np.arctan2(y, x), (vy * x - vx * y) / r),
-        "base": (np.where(x < 0, x + r, x + r - 2 * w), vx),
-        "left": (-y * tilt, (-vy + slope * vx) / tilt),
-        "floor": (x + foot, vx),
-        "right": ((y + h) * tilt, (vy + slope * vx) / tilt),
-    }
-    place, angle = np.zeros(len(x)), np.zeros(len(x))
-    for wall, (along, sine) in rows.items():
-        here = walls == wall
-        place[here], angle[here] = starts[wall] + along[here], sine[here]
-    return place, angle / np.hypot(vx, vy)

@@ -128,7 +128,7 @@ class ReportData(TypedDict):
     runs: list[RunData]
 
 
-def schema() -> dict[str, Any]:
+def json_schema() -> dict[str, Any]:
     """Return the JSON Schema of report.json, published as docs/report.schema.json."""
     found = msgspec.json.schema(ReportData)
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": "Audit report", **found}
@@ -266,10 +266,10 @@ def to_html(data: ReportData, samples: by_claim.Samples) -> str:
 
 def _first_figure(samples: by_claim.Samples) -> str:
     """Return the histogram of the moving cap at the paper's energy; empty where it was not simulated."""
-    if by_claim.N7 not in samples:
+    if by_claim.MAIN_RUN not in samples:
         return ""
     with rc_context(plots.STYLE):
-        return embed(plots.svg(cycles.energies([samples[by_claim.N7]])))
+        return embed(plots.svg(cycles.energies([samples[by_claim.MAIN_RUN]])))
 
 
 def _place(finding: FindingData) -> tuple[list[int], str, int]:
@@ -346,4 +346,4 @@ def _failed(finding: FindingData) -> list[str]:
 
 
 if __name__ == "__main__":
-    print(json.dumps(schema(), indent=2))
+    print(json.dumps(json_schema(), indent=2))

@@ -24,11 +24,10 @@ from scene.refusal import BadInput
 Tick = Callable[[int], None]
 Following = Generator[tuple[Piece, Block], None, None]
 Engine = Callable[[Asked, Iterator[Piece], Tick], Following]
-SCALE = "pip install 'oscillating-mushrooms[scale]'"
 RETRIES = 10  # of a block whose workers fail or die
-AHEAD = 2  # blocks waiting for each thread of the cluster: no worker idles, and few blocks are in memory
-PATIENCE = 10.0  # seconds in which a scheduler must answer
-LOOK = 0.5  # seconds after which limits are looked at while no block comes
+BLOCKS_AHEAD = 2  # waiting for each thread of the cluster: no worker idles, and few blocks are in memory
+CONNECT_TIMEOUT = 10.0  # seconds in which a scheduler must answer
+POLL_INTERVAL = 0.5  # seconds after which limits are looked at while no block comes
 
 
 def follow(asked: Asked, piece: Piece, threads: int | None, tick: Tick | None = None) -> Block:
@@ -103,11 +102,11 @@ def by_dask(address: str, threads: int | None) -> Engine:
     try:
         from distributed import Client
     except ImportError:
-        raise BadInput(f"--dask needs dask.distributed: {SCALE}") from None
+        raise BadInput("--dask needs dask.distributed: pip install 'oscillating-mushrooms[scale]'") from None
 
     def engine(asked: Asked, pieces: Iterator[Piece], tick: Tick) -> Following:
         try:
-            client = Client(address, timeout=PATIENCE)
+            client = Client(address, timeout=CONNECT_TIMEOUT)
         except (OSError, ValueError) as error:
             raise BadInput(f"--dask = {address}: no scheduler answers ({type(error).__name__})") from None
         with client:
@@ -130,14 +129,14 @@ def _handed_out(client: Any, asked: Asked, pieces: Iterator[Piece], tick: Tick, 
 
     try:
         while True:
-            n_wanted = max(1, AHEAD * sum(client.nthreads().values())) - len(out)
+            n_wanted = max(1, BLOCKS_AHEAD * sum(client.nthreads().values())) - len(out)
             for piece in islice(pieces, max(0, n_wanted)):
                 submit(piece)
             if not out:
                 return
             tick(0)
             try:
-                done = wait(list(out), timeout=LOOK, return_when="FIRST_COMPLETED").done
+                done = wait(list(out), timeout=POLL_INTERVAL, return_when="FIRST_COMPLETED").done
             except TimeoutError:
                 continue
             for future in done:

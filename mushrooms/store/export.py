@@ -11,14 +11,13 @@ import io
 import zipfile
 from collections.abc import Callable, Iterator
 from itertools import product
-from pathlib import Path
 from typing import Any, BinaryIO
 
 import numpy as np
 
+from mushrooms.output import import_arrow
 from mushrooms.store.blocks import RunFolder
 from mushrooms.store.digest import DIGESTED, part
-from mushrooms.store.engines import SCALE
 from mushrooms.store.layout import FIELDS, LANE, WALLS, Arrays
 from scene.refusal import BadInput
 
@@ -43,11 +42,7 @@ def write_parquet(run: RunFolder, file: BinaryIO) -> None:
     Raises:
         BadInput: pyarrow is not installed.
     """
-    try:
-        import pyarrow
-        from pyarrow import parquet
-    except ImportError:
-        raise BadInput(f"--to a .parquet file needs pyarrow: {SCALE}") from None
+    pyarrow, parquet = import_arrow()
     writer = None
     for columns in _tables(run):
         table = pyarrow.table(columns)
@@ -78,20 +73,12 @@ def write_npz(run: RunFolder, file: BinaryIO) -> None:
                         member.write(np.ascontiguousarray(array).tobytes())
 
 
+# By the ending of the file. Each refuses a damaged block, a table of too many columns, a missing package.
 WRITERS: dict[str, Callable[[RunFolder, BinaryIO], None]] = {
     ".parquet": write_parquet,
     ".csv": write_csv,
     ".npz": write_npz,
 }
-
-
-def export(run: RunFolder, path: Path, file: BinaryIO) -> None:
-    """Write a run into an open file, in the form that the path's ending names.
-
-    Raises:
-        BadInput: a block is damaged, a table would have too many columns, or a package is missing.
-    """
-    WRITERS[path.suffix](run, file)
 
 
 def _tables(run: RunFolder) -> Iterator[Arrays]:

@@ -34,7 +34,7 @@ from scene.tables import Scene
 MAX_COLLISIONS = 1_000_000
 MAX_REPEAT = 1_000
 MAX_STATES = 1_000_000
-Stepper = Callable[[Scene, State, float], Answered | Outcome]
+AnsweringStepper = Callable[[Scene, State, float], Answered | Outcome]
 Follower = Callable[[Scene, State, int, float], Sequence[Answered | Outcome]]
 Captured = tuple[float, float] | None
 Flowing = Callable[[Scene, Sequence[State], float], Sequence[tuple[Outcome, Captured]]]
@@ -52,7 +52,7 @@ _decoder = msgspec.json.Decoder(Command)
 
 def serve(
     name: str,
-    stepper: Stepper,
+    stepper: AnsweringStepper,
     follower: Follower,
     lines: BinaryIO,
     out: BinaryIO,
@@ -78,7 +78,12 @@ def serve(
 
 class _Server:
     def __init__(
-        self, name: str, stepper: Stepper, follower: Follower, flow: Flowing | None, timer: Timer | None
+        self,
+        name: str,
+        stepper: AnsweringStepper,
+        follower: Follower,
+        flow: Flowing | None,
+        timer: Timer | None,
     ) -> None:
         self.name, self.stepper, self.follower = name, stepper, follower
         self.flow, self.timer = flow, timer

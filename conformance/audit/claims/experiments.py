@@ -8,13 +8,7 @@ import numpy as np
 from scipy.stats import ks_2samp, norm
 
 from conformance.audit.claims import many_cycles
-from conformance.audit.claims.broadened import (
-    adiabatic,
-    bias_of_mean,
-    captured_band,
-    peak_band,
-    predicted,
-)
+from conformance.audit.claims.broadened import adiabatic, bias_of_mean, captured_band, peak_band, predicted
 from conformance.audit.claims.finite_energy import ACW, CW, FIXED, width
 from conformance.audit.claims.misprints import ZERO, loop_area
 from conformance.audit.evidence import ClaimEvidence

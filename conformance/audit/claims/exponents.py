@@ -116,18 +116,9 @@ def _orbit(
 
 def _orbits_exponent(what: str, rows: list[list[float]], exponent: int, rival: int) -> Check:
     """Compare the exponent of v with an expected one; its error is of the mean over orbits."""
-    fits = [_power(np.array(SPEEDS), np.array(row), np.full(len(row), 0.1), (-1.0, -2.0))[0] for row in rows]
+    fits = [theory.fit_power(SPEEDS, row, np.full(len(row), 0.1), (-1.0, -2.0)).exponent for row in rows]
     label = f"{what}: exponent of v, {len(rows)} orbits"
     return close(label, mean(fits), exponent, scale=0.5, against=(f"{rival}", rival))
-
-
-def _power(x: FloatArray, y: FloatArray, errors: FloatArray, orders: tuple[float, ...]) -> Mean:
-    """Fit y = a x^p (1 + the sum of b_k x^order_k), next orders beside the power; return p and its error."""
-    weights = y / errors
-    columns = np.column_stack([np.ones(len(x)), np.log(x), *((x / x[0]) ** order for order in orders)])
-    columns *= weights[:, None]
-    inverse = np.linalg.inv(columns.T @ columns)
-    return Mean(float((inverse @ columns.T @ (np.log(y) * weights))[1]), float(inverse[1, 1] ** 0.5))
 
 
 def invariants(evidence: ClaimEvidence) -> Iterator[Check]:
@@ -173,9 +164,10 @@ def _exponent(what: str, samples: list[Sample], values: list[Mean], exponent: fl
     """Compare the exponent of E0 with an expected one, the next order, ~ 1/v, being fitted beside it."""
     energies = [sample.run.energy for sample in samples]
     found, errors = np.array(values).T
+    fit = theory.fit_power(energies, found, errors, (-0.5,))
     return close(
         what,
-        _power(np.array(energies), found, errors, (-0.5,)),
+        (fit.exponent, fit.exponent_error),
         exponent,
         scale=0.25,
         against=("half of it", exponent / 2),

@@ -117,7 +117,7 @@ MUTANTS = {
     "the part of the table that a wall is in": (
         "arc to stem",
         500,
-        "place -= SAFETY * (abs(y) + abs(vy) * s)",
+        "place -= SAFETY * (abs(y) + abs(vy) * s) + abs(vy) * slack",
         "place = 1.0",
     ),
     "what Newton's step leaves": ("arc to stem", 500, "CERTAIN if error < s else COARSE", "CERTAIN"),
@@ -148,7 +148,7 @@ MUTANTS = {
     "the mouth's curvature under a chord": (
         "captured beside a moving mouth",
         400,
-        "fma(k_w * s, s, SAFETY * size)",
+        "fma(k_w * s, s, fma(rate_w, slack, SAFETY * size))",
         "SAFETY * size",
     ),
     "the floor before the mouth": (
@@ -217,7 +217,7 @@ ROUNDING = {
     ),
     "the height at the end": (
         "at the end of the arc",
-        "place -= SAFETY * (abs(y) + abs(vy) * s)",
+        "place -= SAFETY * (abs(y) + abs(vy) * s) + abs(vy) * slack",
         "place -= 0.0",
     ),
     "the base inside the arc": (
@@ -227,7 +227,7 @@ ROUNDING = {
     ),
     "walls that are not met": (
         "at the floor's corner",
-        "far = k_side * s * s + SAFETY * (limits.size + abs(x) + abs(y) + way)",
+        "far = k_side * s * s + blur",
         "far = k_side * s * s",
     ),
 }

@@ -325,7 +325,7 @@ def chord(a, n, is_again, is_cap, is_relative, degree, limits):
     `is_again`: correct the times found before once more, in place of a new guess.
     """
     widest_registers()
-    bend, k_w, rate_w, size = limits.bend, limits.curvature, limits.rate, limits.size
+    bend, k_w, size = limits.bend, limits.curvature, limits.size
     for i in range(n):
         x, y, vx, vy, spin = a[X + i], a[Y + i], a[VX + i], a[VY + i], a[SPIN + i]
         r0, r1_0, r2_0 = a[R0 + i], a[R1 + i], a[R2 + i]
@@ -345,15 +345,13 @@ def chord(a, n, is_again, is_cap, is_relative, degree, limits):
         error = 2.0**58 * abs((bend + v2) * inverse) * delta * delta
         x_s, x_low = moved(x, vx, s)
         y_s, y_low = moved(y, vy, s)
-        sizes = arc_sizes(s, x, y, vx, vy, v2, r, limits)
-        slack = slack_of(ON_ARC, ON_ARC, s, delta, inverse, error, r, sizes, 0.0)
         # The widest that the mouth can be during the flight, from both ends.
-        reach = max(a[W0 + i], w) + fma(k_w * s, s, fma(rate_w, slack, SAFETY * size))
+        reach = max(a[W0 + i], w) + fma(k_w * s, s, SAFETY * size)
         clear = spin * spin - (1.0 + 4.0 * SAFETY) * reach * reach * v2
         clear = 1.0 if is_cap else clear
+        sizes = arc_sizes(s, x, y, vx, vy, v2, r, limits)
         first = -slope - 2.0 * SAFETY * sizes
-        height = abs(y_s) - SAFETY * (abs(y) + abs(vy) * s) - abs(vy) * slack
-        quality = min(min(clear, height), min(first, v2 - bend))
+        quality = min(min(clear, abs(y_s) - SAFETY * (abs(y) + abs(vy) * s)), min(first, v2 - bend))
         quality = min(min(quality, s), before - a[BACK + i])
         within = a[LIMIT + i] - abs(since)
         result = verdict(quality, min(within, a[LIMIT + i] - abs(since + delta)), s, error)

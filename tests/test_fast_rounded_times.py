@@ -1,0 +1,78 @@
+"""Where an answer hangs on rounding of a time, the careful step has the right one or says that it has none."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+from support.faulty_kernels import output_of
+from support.rounded_times import FAMILIES, questions
+
+import fast
+import reference
+from scene import Collision, Horizon
+
+N_QUESTIONS = 60
+
+
+def told(outcome):
+    """Return the wall of a collision, "horizon", else None: undecided, or refused for its phases."""
+    if isinstance(outcome, Collision | reference.Collision):
+        return outcome.wall
+    return "horizon" if isinstance(outcome, Horizon | reference.Horizon) else None
+
+
+def answers(family, n):
+    """Return what the careful step tells of n questions of a family."""
+    return [told(fast.next_collision(*question)) for question in questions(family, 1, n)]
+
+
+def wrong(family, found):
+    """Return how many answers are decided, and how many of them the reference contradicts."""
+    decided = [(q, told_) for q, told_ in zip(questions(family, 1, len(found)), found, strict=True) if told_]
+    truths = [told(reference.next_collision(*q, digits=20)) for q, _ in decided]
+    return len(decided), sum(truth not in (None, told_) for truth, (_, told_) in zip(truths, decided, strict=True))
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+def test_what_is_decided_is_right(family, tally):
+    tally["decided"], tally["wrong"] = wrong(family, answers(family, N_QUESTIONS))
+    assert tally["wrong"] == 0
+
+
+# What is taken out of the kernels, and the family that misses it.
+MUTANTS = {
+    "a wall that has come back": ("after a spike", "careful.py", "if side > 0 and s < limit:", "if s < 0.0:"),
+    "the same, slowly": ("after a long wait", "careful.py", "if side > 0 and s < limit:", "if s < 0.0:"),
+    "the mouth's own motion": (
+        "beside a moving mouth",
+        "walls.py",
+        "rounding * (abs(vx) + drift)",
+        "rounding * abs(vx)",
+    ),
+    "what is wrong with f' on the way": (
+        "along a leaning side",
+        "careful.py",
+        "(error + slope_error * h) / -slope",
+        "error / -slope",
+    ),
+    "a hit that may come before the limit": (
+        "along a leaning side",
+        "careful.py",
+        "if root - error >= limit:",
+        "if root >= limit:",
+    ),
+}
+PROGRAM = """
+import json
+from test_fast_rounded_times import answers
+print(json.dumps(answers({family!r}, {n})))
+"""
+
+
+@pytest.mark.parametrize("name", MUTANTS)
+def test_a_stepper_without_it_is_wrong(name, tmp_path, tally):
+    family, *change = MUTANTS[name]
+    found = json.loads(output_of(tmp_path, PROGRAM.format(family=family, n=N_QUESTIONS), *change))
+    tally["decided"], tally["wrong"] = wrong(family, found)
+    assert tally["wrong"] > 0

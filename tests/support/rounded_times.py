@@ -64,7 +64,7 @@ def along_a_leaning_side(random: np.random.Generator) -> Question:
     x = float(Fraction(w) + Fraction(lean) * Fraction(y) - Fraction(2.0 ** random.uniform(-30, -3)))
     end = Fraction(0 if is_up else -1)
     vx = (Fraction(w) + Fraction(lean) * end - Fraction(x)) * Fraction(vy) / (end - Fraction(y))
-    nearby = float(vx) * (1.0 + int(random.integers(-8, 9)) * 2.0**-53)
+    nearby = float(vx * (1 + Fraction(float(random.choice([-1.0, 1.0]) * 2.0 ** random.uniform(-54, -42)))))
     scene: Scene = Mushroom(r=1.0, w=w, h=1.0, slope=lean)
     if not is_up or random.random() < 0.5:
         scene = Stem(w=w, h=1.0, slope=lean)

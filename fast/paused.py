@@ -84,7 +84,9 @@ def go_on(
 def _passed(plan: Plan, before: Paused) -> tuple[int, int]:
     """Return how many cycles and stops an ensemble has passed, after a look at whether it can go on so."""
     n, n_cycles, looks = plan.size
-    if not (isinstance(before, Paused) and isinstance(before.ensemble, Ensemble) and np.ndim(before.lanes) == 2):
+    if not (
+        isinstance(before, Paused) and isinstance(before.ensemble, Ensemble) and np.ndim(before.lanes) == 2
+    ):
         raise BadInput(f"before = {shown(before)}, must be None or what go_on has returned")
     old = before.ensemble
     n_before = old.cycle_energies.shape[1]

@@ -77,7 +77,7 @@ def _check_text(field: str, text: object) -> None:
         raise InvalidScene(f"{field} = {shown(text)}, must be text")
     found = HIDDEN.search(text)
     if found is not None:
-        raise InvalidScene(f"{field} holds {ascii(found[0])}, must be text without control characters")
+        raise InvalidScene(f"{field} holds {found[0]!a}, must be text without control characters")
 
 
 class Cap(_Table, frozen=True, tag="cap", kw_only=True):

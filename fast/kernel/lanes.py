@@ -183,7 +183,7 @@ def arc_sizes(s, x, y, vx, vy, v2, r, limits):
 
 @part
 def slack_of(hit, wall, s, delta, inverse, error, r, sizes, blur):
-    """Return `slack` of docs/lanes.md: how much later or earlier than s the hit may be, where it is certain."""
+    """Return `slack` of docs/lanes.md: how far off s a certain hit may be."""
     f_error = 2.0 * SAFETY * s * sizes if wall == ON_ARC else 2.0 * r * blur
     f_error = f_error if hit == ON_ARC else blur
     f_error = 0.0 if hit == ON_BASE else f_error

@@ -75,7 +75,7 @@ def set_turn(laws, anchors, s):
 
 @part
 def phase_room(laws, t):
-    """Return for how long after t the phases of all laws are known, as far as sines and cosines are reduced."""
+    """Return for how long after t the phases of all laws are known."""
     room, omega = np.inf, laws[SHARED, OMEGA]
     if omega > 0.0:
         room = MAX_QUADRANT / (TWO_OVER_PI * omega * laws[SHARED, N_HARMONICS]) - abs(t)

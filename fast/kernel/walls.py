@@ -189,8 +189,7 @@ def wall_rest(wall, s, scene, anchors):
 def reach_time(wall, x, y, vx, vy, bounds):
     """Return a time before which the particle cannot reach what the wall ever sweeps.
 
-    This lets a slow particle cross the middle of the table in one step. Rounding is taken off the gap: what is
-    left of it may be no more than that.
+    This lets a slow particle cross the middle of the table in one step. Rounding is taken off the gap.
     """
     if wall == ARC:
         inner = bounds[RADIUS, LOWEST]

@@ -1,7 +1,7 @@
 """Flights that end near a corner of walls in motion: within 1e-16 to 1e-8 of it, on either side.
 
-The place where the wall is met and the time are drawn, the velocity follows. The wall moves, so that the lanes'
-time of flight is corrected by about so much, and what holds before that correction may not hold after it.
+The place where the wall is met and the time are drawn, the velocity follows. The wall moves, so that the
+lanes' time of flight is corrected by about so much: what holds before may not hold after it.
 """
 
 from __future__ import annotations

@@ -45,11 +45,17 @@ def beside_a_moving_mouth(random: np.random.Generator) -> Question:
     period = float(random.choice([1.0, 0.3, 2.0**-6]))
     if random.random() < 0.5:
         turns = int(random.integers(0, 6))
-        w: Law = Fourier(0.5, period=period, cos=(0.0,) * turns + (0.1,), sin=(float(random.uniform(-0.2, 0.2)),))
+        w: Law = Fourier(
+            0.5, period=period, cos=(0.0,) * turns + (0.1,), sin=(float(random.uniform(-0.2, 0.2)),)
+        )
     else:
         w = BangBang(((0.0, 0.7), (float(period * random.uniform(0.2, 0.8)), 0.3), (period, 0.7)))
     s = period * 10.0 ** random.uniform(0, 4.5)
-    t, y, along = float(random.uniform(-1, 5)), float(random.uniform(0.01, 0.6)), float(random.uniform(-0.2, 0.2))
+    t, y, along = (
+        float(random.uniform(-1, 5)),
+        float(random.uniform(0.01, 0.6)),
+        float(random.uniform(-0.2, 0.2)),
+    )
     vx, vy = along / s, -y / s
     crossing = _real(Fraction(y) / Fraction(-vy))
     edge = value(CTX, w, t + crossing) * (1 + random.choice([-1, 1]) * CTX.mpf(2) ** random.uniform(-56, -40))
@@ -58,7 +64,7 @@ def beside_a_moving_mouth(random: np.random.Generator) -> Question:
 
 
 def along_a_leaning_side(random: np.random.Generator) -> Question:
-    """Fly beside a side at rest, nearly along it, to its end: the floor's corner, the top's or the mouth's edge."""
+    """Fly beside a side at rest, nearly along it, to its end: a corner or the mouth's edge."""
     lean, w, is_up = float(random.uniform(-0.4, 0.4)), 0.7, random.random() < 0.5
     y, vy = -float(random.uniform(0.2, 0.8)), float(random.uniform(0.3, 1.0)) * (1 if is_up else -1)
     x = float(Fraction(w) + Fraction(lean) * Fraction(y) - Fraction(2.0 ** random.uniform(-30, -3)))

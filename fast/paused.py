@@ -14,7 +14,7 @@ from fast.kernel.records import FloatArray
 from fast.kernel.worker import is_known_throughout
 from fast.pieces import laws_in_lanes
 from scene import Scene
-from scene.refusal import BadInput
+from scene.refusal import BadInput, shown
 
 BY_CYCLE = ("cycle_energies", "t_in", "t_out", "phase_energies", "phase_captured")
 
@@ -84,6 +84,10 @@ def go_on(
 def _passed(plan: Plan, before: Paused) -> tuple[int, int]:
     """Return how many cycles and stops an ensemble has passed, after a look at whether it can go on so."""
     n, n_cycles, looks = plan.size
+    if not (
+        isinstance(before, Paused) and isinstance(before.ensemble, Ensemble) and np.ndim(before.lanes) == 2
+    ):
+        raise BadInput(f"before = {shown(before)}, must be None or what go_on has returned")
     old = before.ensemble
     n_before = old.cycle_energies.shape[1]
     there = (old.energy0, *before.lanes.shape, old.phase_energies.shape[2], old.t_in.shape[2])

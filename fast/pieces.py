@@ -37,6 +37,7 @@ from scene import Cap, Scene
 PARABOLA, SERIES = 2, 12  # degrees; with one of the latter a harmonic takes 27 pieces
 MAX_PIECES = 2**15
 REMAINDER = 2.0**-54
+INSIDE = 1.0 - 2.0**-50  # of a piece: how far a flight ends from its middle is a sum that lanes round
 FIXED = Cap(r=1.0)
 
 
@@ -148,7 +149,7 @@ def _filled(
     coefficients = np.empty((len(cuts), 4, degree + 2))
     entries.fill_pieces(compiled.laws, references, coefficients)
     begins = np.array([float(cut.begin) for cut in cuts])
-    half = np.array([float(cut.holds / 2) for cut in cuts])
+    half = INSIDE * np.array([float(cut.holds / 2) for cut in cuts])
     serves = np.array([float(cut.serves - cut.holds / 2) for cut in cuts])
     if period is None:
         half, serves = np.array([math.inf]), np.array([math.inf])

@@ -18,6 +18,7 @@ repeated knots.
 
 from __future__ import annotations
 
+import re
 from functools import lru_cache
 from numbers import Real
 from typing import ClassVar, Literal
@@ -31,6 +32,8 @@ from scene.validity import Condition, prove
 
 Wall = Literal["arc", "base", "left", "right", "floor"]
 PARAMETERS = ("r", "w", "nu", "h", "slope")
+# Controls but tab and line ends, lone surrogates, and what XML has no place for.
+HIDDEN = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\ud800-\udfff\ufffe\uffff]")
 
 
 class _Table(
@@ -59,14 +62,22 @@ class _Table(
                 raise InvalidScene(f"{field} = {shown(given)}, must be a number, a Fourier or a BangBang law")
             msgspec.structs.force_setattr(self, field, finite(field, given))
         for field in ("name", "notes"):
-            if not isinstance(getattr(self, field), str):
-                raise InvalidScene(f"{field} = {shown(getattr(self, field))}, must be text")
+            _check_text(field, getattr(self, field))
         _prove(type(self), tuple(getattr(self, name, None) for name in PARAMETERS))
 
     def _repr_html_(self) -> str:
         from scene.notebook import of_scene  # not above: it needs the tables
 
         return of_scene(self)  # type: ignore[arg-type]  # a _Table is one of the three
+
+
+def _check_text(field: str, text: object) -> None:
+    """Refuse what is no text, and characters that no terminal, page or picture can show."""
+    if not isinstance(text, str):
+        raise InvalidScene(f"{field} = {shown(text)}, must be text")
+    found = HIDDEN.search(text)
+    if found is not None:
+        raise InvalidScene(f"{field} holds {found[0]!a}, must be text without control characters")
 
 
 class Cap(_Table, frozen=True, tag="cap", kw_only=True):

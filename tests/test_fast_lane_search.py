@@ -10,6 +10,7 @@ import os
 import numpy as np
 import pytest
 from support.faulty_kernels import faulty_lanes
+from support.lane_corners import CORNERS
 from support.lane_draws import GROUPS, draw_starts
 from support.lane_draws import draw_scene as draw_directed_scene
 from support.lane_search import ANYWHERE, Round, draw_scene, draw_start, search
@@ -18,7 +19,7 @@ from support.lane_traps import TRAPS
 
 import fast
 from fast.batch import LaneRound, lane_steps
-from fast.kernel import lanes, pools
+from fast.kernel import codes, lanes, pools
 from fast.step import WALL_NAMES
 from scene import Cap, Collision, Fourier, Mushroom, Rejected, State
 
@@ -117,7 +118,7 @@ MUTANTS = {
     "the part of the table that a wall is in": (
         "arc to stem",
         500,
-        "place -= SAFETY * (abs(y) + abs(vy) * s)",
+        "place -= SAFETY * (abs(y) + abs(vy) * s) + abs(vy) * slack",
         "place = 1.0",
     ),
     "what Newton's step leaves": ("arc to stem", 500, "CERTAIN if error < s else COARSE", "CERTAIN"),
@@ -217,7 +218,7 @@ ROUNDING = {
     ),
     "the height at the end": (
         "at the end of the arc",
-        "place -= SAFETY * (abs(y) + abs(vy) * s)",
+        "place -= SAFETY * (abs(y) + abs(vy) * s) + abs(vy) * slack",
         "place -= 0.0",
     ),
     "the base inside the arc": (
@@ -227,10 +228,39 @@ ROUNDING = {
     ),
     "walls that are not met": (
         "at the floor's corner",
-        "far = k_side * s * s + SAFETY * (limits.size + abs(x) + abs(y) + way)",
-        "far = k_side * s * s",
+        "blur\n    far = fma(abs(vx) + limits.lean * abs(vy) + limits.rate, slack, far)",
+        "0.0",
     ),
 }
+
+
+def count_wrong_corners(draw, kernels, n_scenes, tally):
+    random = np.random.default_rng(5)
+    for _ in range(n_scenes):
+        scene, starts = CORNERS[draw](pools.LANES, random)
+        pool = Round(scene, kernels)
+        for lane, start in enumerate(starts):
+            pool.fill(lane, *start)
+        right, hits, _ = pool.step(len(starts))
+        for i in np.flatnonzero(right):
+            code, _ = pool.careful(*starts[i])
+            tally["answered"] += 1
+            # What the careful step cannot decide, or refuses, it cannot contradict.
+            tally["wrong"] += code < codes.HORIZON and code != hits[i]
+    return tally["wrong"]
+
+
+@pytest.mark.parametrize("draw", CORNERS)
+def test_a_hit_near_a_corner_is_on_the_right_side_of_it(draw, tally):
+    """Where Newton's step leads, and not only where it begins."""
+    assert count_wrong_corners(draw, lanes, 40, tally) == 0
+    assert tally["answered"] > 300
+
+
+@pytest.mark.parametrize("draw", CORNERS)
+def test_without_slack_hits_are_beyond_corners(draw, tally):
+    old = "return slack if error < s else 0.0"
+    assert count_wrong_corners(draw, faulty_lanes(old, "return 0.0"), 6, tally) > 0
 
 
 @pytest.mark.parametrize("draw", TIES)

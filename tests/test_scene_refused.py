@@ -43,7 +43,7 @@ NO_LENGTHS = [*NO_VALUES, 0.0, -0.0, -1.0, -1]
 NO_SCENES = [None, 1.0, "moving-cap", Cap, *(bad for bad in NO_NUMBERS if not isinstance(bad, Cap))]
 NO_COUNTS = [*NO_VALUES, 2.0, 2.5, 10]
 NO_FILES = [None, 3, 1.5, b"moving-cap", ["moving-cap"], CIRCLE, "", "a\nb", "nul\0.toml"]
-NO_TEXTS = [None, 3, b"x", ["x"]]
+NO_TEXTS = [None, 3, b"x", ["x"], "a\x00", "\x1b[2J", "\x9b", "\ud800", "\uffff"]
 START = State(0.0, 0.1, 0.2, 1.0, 0.0)
 
 

@@ -28,6 +28,7 @@ ENTRIES = {
         {"scene": CAP, "n_particles": 1, "energy": 1.0, "n_cycles": 1, "seed": 0, "phases": (0.5,)}
         | {"threads": 1, "progress": None},
     ),
+    "go_on": (fast.go_on, {"scene": CAP, "n_particles": 1, "energy": 1.0, "threads": 1, "before": None}),
 }
 PROVED = {
     "reference.next_collision": (
@@ -69,6 +70,7 @@ BAD = {
         *((0.5, 0.5), (0.6, 0.5), (0.5, INFINITY)),
     ],
     "progress": [1, "print", [], START],
+    "before": [*NO_NUMBERS, fast.Paused(None, None), fast.Paused(START, np.zeros((1, 2)))],
     "digits": [None, *NO_COUNT, 0, 10**4 + 1, HUGE],
     "working": [*NO_COUNT, 0, 10**4 + 1, HUGE],
 }

@@ -7,6 +7,11 @@ bounds f from below, so up to the parabola's root there is no hit: stepping from
 can never skip a collision, and converges quadratically to the first. Every value of f carries
 a bound on its rounding error; where that bound leaves a question open the answer is `undecided`.
 
+That bound is for f at the time as it stands. Times are rounded as well, a sum s + h, the quotient at which
+y = 0 is crossed, the difference to the horizon, and a wall that has rested may come and go in less than the
+last place of s. So no sum is rounded up where that matters, and what is asked at a crossing or at the
+horizon is asked for all times within rounding of it: with f' of the wall there, and its change.
+
 Once the wall is known, the time is polished: the laws are anchored at the hit and the remainder
 of f there gives the time's low part, so that what follows (place, wall speed, velocity) is as
 accurate as its last rounding, however long the flight was.
@@ -24,7 +29,7 @@ from fast.kernel.codes import (  # isort: skip
     MUSHROOM, NO_WALL, ON_CORNER, RIGHT, SLIDING, START, STEM, TANGENT, TOO_MANY,
 )  # fmt: skip
 from fast.kernel.hits import move
-from fast.kernel.laws import set_anchors
+from fast.kernel.laws import phase_room, set_anchors
 from fast.kernel.records import PHASE, PHASE_ERROR, Particle, released
 
 from fast.kernel.walls import (  # isort: skip
@@ -35,6 +40,8 @@ from fast.kernel.walls import (  # isort: skip
 MAX_PARABOLAS = 1_000_000
 LEAST = 2.0**-1022  # a time in which nothing is met
 NEAR = 2.0**-30  # how much beyond the limit hits are looked for, relatively
+BEFORE = 1.0 - 2.0**-52  # of a sum, so that it is not rounded up: a leg may be shorter than its last place
+CLOSE = 2.0**-40  # how near to the limit trouble is trouble with the limit, relatively
 # How many parabolas are tried before asking whether the wall is out of the particle's reach.
 PARABOLAS_BEFORE_REACH = 6
 
@@ -60,19 +67,27 @@ def reached_at_least(wall, s, f, slope, moved, particle, scene, anchors):
     """Return a time, at least `moved`, before which a wall is not met, from what holds of it for long."""
     vx, vy = particle.vx, particle.vy
     reach = reach_time(wall, particle.x + vx * s, particle.y + vy * s, vx, vy, scene.bounds)
-    moved = max(moved, s + reach)
+    moved = max(moved, (s + reach) * BEFORE)
     still = wall_rest(wall, s, scene, anchors)
     if s + still > moved:
-        moved = max(moved, s + still_reach(wall, f, slope, still, vx, vy))
+        moved = max(moved, (s + still_reach(wall, f, slope, still, vx, vy)) * BEFORE)
     return moved
+
+
+@part
+def root_before(limit, wall, root, slope, error):
+    """Return a hit as `first_root` does, NO_WALL for one that comes after the limit whatever its error is."""
+    if root - error >= limit:
+        return NO_WALL, limit, 0.0, 0.0
+    return wall, root, slope, error
 
 
 @kernel
 def first_root(wall, start, limit, particle, scene, anchors):
     """Find the first s in (start, limit) with f = 0, f' < 0.
 
-    Returns (code, s, f', error of s): code is the wall for a hit, NO_WALL for none before
-    the limit, else a reason for `undecided`.
+    Returns (code, s, f', error of s): code is the wall for a hit, which may come after the limit by less than
+    its error, NO_WALL for none before the limit, else a reason for `undecided`.
     """
     is_leaving = wall == particle.wall
     residual = residual_error = 0.0
@@ -81,10 +96,13 @@ def first_root(wall, start, limit, particle, scene, anchors):
         residual, doubt = wall_residual(wall, particle.x, particle.y, scene, anchors)
         residual_error = anchors[PHASE, PHASE_ERROR] * law_size(wall, particle.y, scene.bounds)
     down, up = curvature_bounds(wall, particle.vx, particle.vy, scene.bounds)
+    known = phase_room(scene.laws, particle.t)
     s = start
     for n_steps in range(MAX_PARABOLAS):
         if s >= limit:
             return NO_WALL, limit, 0.0, 0.0
+        if s > known:
+            return FAR_TIME, s, 0.0, 0.0
         f, slope, error, slope_error = wall_function(wall, s, particle, residual, scene, anchors)
         error += residual_error
         if s == 0.0 and is_leaving:
@@ -101,20 +119,19 @@ def first_root(wall, start, limit, particle, scene, anchors):
             # A simple root from above. Were f convex enough to turn back within its error: undecided.
             if slope >= -slope_error or (up > 0.0 and slope * slope <= 4.0 * up * error):
                 return TANGENT, s, slope, 0.0
-            root = s - f / slope
-            if root >= limit:
-                return NO_WALL, limit, 0.0, 0.0
-            return wall, root, slope, error / -slope
+            return root_before(limit, wall, s - f / slope, slope, error / -slope)
         h = parabola_root(f, slope, down)
         if h == np.inf:
             return NO_WALL, limit, 0.0, 0.0
+        is_simple = slope < -slope_error and up * h <= -0.25 * slope
+        if is_simple and down * h * h <= 2.0**-54 * (s + h) * -slope:
+            # So little curvature that the parabola's root is the function's to the last bit. f is known no
+            # better there than here, and changed by what is wrong with f' on the way.
+            return root_before(limit, wall, s + h, slope, (error + slope_error * h) / -slope)
+        h = parabola_root(f - 0.5 * error, slope, down)
         moved = s + h
-        if slope < -slope_error and down * h * h <= 2.0**-54 * moved * -slope:
-            # So little curvature that the parabola's root is the function's to the last bit.
-            if moved >= limit:
-                return NO_WALL, limit, 0.0, 0.0
-            return wall, moved, slope, error / -slope
-        if moved <= s:
+        # Where h is less than the last place of s, rounded up, a wall might come and go in between.
+        if moved <= s or (h < 2.0**-51 * s and moved - s > h):
             return TANGENT, s, slope, 0.0
         if n_steps >= PARABOLAS_BEFORE_REACH:
             moved = reached_at_least(wall, s, f, slope, moved, particle, scene, anchors)
@@ -177,7 +194,10 @@ def side_of_wall(candidate, s, particle, scene, anchors):
         if particle.wall != candidate:
             residual, residual_error = wall_residual(candidate, particle.x, y, scene, anchors)
         f, slope, error, slope_error = wall_function(candidate, s, particle, residual, scene, anchors)
-        error += residual_error + SAFETY * s * (abs(slope) + slope_error)
+        # The time is rounded. f' may be larger a moment later, where a leg begins.
+        rounding = SAFETY * s
+        down, up = curvature_bounds(candidate, particle.vx, particle.vy, scene.bounds)
+        error += residual_error + rounding * (abs(slope) + slope_error + rounding * max(down, up))
     if abs(f) <= error:
         return 0
     return 1 if f > 0.0 else -1
@@ -218,11 +238,7 @@ def event_from_cap(crossing, limit, particle, scene, anchors):
     code, s = cap_flight(0.0, min(crossing, limit), crossing < np.inf, particle, scene, anchors)
     if code != NO_WALL or crossing >= limit:
         return code, s
-    residual = residual_error = 0.0
-    if particle.wall != ARC:
-        residual, residual_error = wall_residual(ARC, particle.x, particle.y, scene, anchors)
-    gap, _, gap_error, _ = wall_function(ARC, crossing, particle, residual, scene, anchors)
-    if gap <= gap_error + residual_error:
+    if side_of_wall(ARC, crossing, particle, scene, anchors) <= 0:
         return CORNER, crossing
     if scene.table == CAP:
         return BASE, crossing
@@ -275,6 +291,15 @@ def first_event(particle, limit, scene, anchors):
     return (HORIZON if code == NO_WALL else code), s
 
 
+@part
+def step_before(wall, s, limit, particle, scene, anchors):
+    """Return the step to a hit that is clearly before the limit, else AT_END."""
+    code, time, after = move(wall, s, particle, scene, anchors)
+    if code == wall and limit - time > CLOSE * limit + 1024.0 * abs(time - s):
+        return code, time, after
+    return AT_END, s, particle
+
+
 @kernel
 def step(particle, limit, scene, anchors):
     """Find the next collision of a particle within a time, and what it is then.
@@ -291,10 +316,16 @@ def step(particle, limit, scene, anchors):
     code, s = first_event(particle, ahead, scene, anchors)
     if limit == 0.0 and code < HORIZON:
         code = HORIZON
-    if code > HORIZON and s > limit and limit > 0.0:
-        code, s = first_event(particle, limit, scene, anchors)
+    if code > HORIZON and limit > 0.0 and s > limit * (1.0 - CLOSE):
+        if s <= limit * (1.0 + CLOSE):
+            code = AT_END
+        else:
+            code, s = first_event(particle, limit, scene, anchors)
     elif code < HORIZON and s > limit * (1.0 - NEAR):
         side = side_of_wall(code, limit, particle, scene, anchors)
+        if side > 0 and s < limit:
+            # The wall has come back before the limit, unless s is not known so well.
+            return step_before(code, s, limit, particle, scene, anchors)
         if side >= 0:
             code = HORIZON if side > 0 else AT_END
     if code > HORIZON:

@@ -176,25 +176,41 @@ def hop_along_arc(s, q, v2, r0, dr):
 
 
 @part
-def clearance(hit, s, x, y, vx, vy, x_s, y_s, w, h, m, k_side, limits):
+def arc_sizes(s, x, y, vx, vy, v2, r, limits):
+    """Return the summed sizes of the terms of half the slope of the arc's function."""
+    return abs(x * vx) + abs(y * vy) + fma(s, v2, r * limits.rate)
+
+
+@part
+def slack_of(hit, wall, s, delta, inverse, error, r, sizes, blur):
+    """Return `slack` of docs/lanes.md: how far off s a certain hit may be."""
+    f_error = 2.0 * SAFETY * s * sizes if wall == ON_ARC else 2.0 * r * blur
+    f_error = f_error if hit == ON_ARC else blur
+    f_error = 0.0 if hit == ON_BASE else f_error
+    slack = fma(f_error, abs(inverse), abs(delta))
+    return slack if error < s else 0.0
+
+
+@part
+def clearance(hit, s, x_s, y_s, vx, vy, w, h, m, k_side, slack, blur, limits):
     """Return `clear` of docs/lanes.md: how far inside the walls below that are not met a flight ends."""
     edge = fma(m, y_s, w)
     clear_r = edge - x_s if hit != ON_RIGHT else NEVER
     clear_l = edge + x_s if hit != ON_LEFT else NEVER
     clear_f = y_s + h if hit != ON_FLOOR else NEVER
-    way = (abs(vx) + abs(vy)) * s
-    far = k_side * s * s + SAFETY * (limits.size + abs(x) + abs(y) + way)
+    far = k_side * s * s + blur
+    far = fma(abs(vx) + limits.lean * abs(vy) + limits.rate, slack, far)
     return min(clear_r, min(clear_l, clear_f)) - far
 
 
 @part
-def place_on_wall(hit, s, x, y, vx, vy, v2, x_s, y_s, r, is_stem, limits):
+def place_on_wall(hit, s, x, y, vx, vy, v2, x_s, y_s, r, is_stem, slack, limits):
     """Return `place` of docs/lanes.md: positive where the wall met is met in its own part of the table.
 
     The arc is met above y = 0, sides and floor below it, the base inside the arc.
     """
     place = y_s if hit == ON_ARC else -y_s
-    place -= SAFETY * (abs(y) + abs(vy) * s)
+    place -= SAFETY * (abs(y) + abs(vy) * s) + abs(vy) * slack
     excess = limits.bend - v2
     excess = excess if excess > 0.0 else 0.0
     size_w = limits.size
@@ -205,11 +221,9 @@ def place_on_wall(hit, s, x, y, vx, vy, v2, x_s, y_s, r, is_stem, limits):
 
 
 @part
-def way_out(hit, s, x, y, vx, vy, v2, r, slope, k_side, limits):
+def way_out(hit, s, vx, vy, slope, k_side, sizes, limits):
     """Return `first` of docs/lanes.md: positive where the wall is met on the way out."""
-    rate_w = limits.rate
-    first = -slope - (k_side * s + SAFETY * (abs(vx) + limits.lean * abs(vy) + rate_w))
-    sizes = abs(x * vx) + abs(y * vy) + fma(s, v2, r * rate_w)
+    first = -slope - (k_side * s + SAFETY * (abs(vx) + limits.lean * abs(vy) + limits.rate))
     first = -slope - 2.0 * SAFETY * sizes if hit == ON_ARC else first
     return 1.0 if hit == ON_BASE else first
 
@@ -277,11 +291,14 @@ def fly(a, n, is_stem, is_relative, slope, degree, limits):
         inverse = ONE / rate
         delta = -f * inverse
         error = 2.0**58 * abs(0.5 * bend_s * inverse) * delta * delta
+        sizes = arc_sizes(s, x, y, vx, vy, v2, r, limits)
+        blur = SAFETY * (limits.size + abs(x) + abs(y) + (abs(vx) + abs(vy)) * s)
+        slack = slack_of(hit, wall, s, delta, inverse, error, r, sizes, blur)
         # The others are not reached: see the error analysis. The mouth was looked at.
-        clear = clearance(hit, s, x, y, vx, vy, x_s, y_s, w, h, m, k_side, limits)
+        clear = clearance(hit, s, x_s, y_s, vx, vy, w, h, m, k_side, slack, blur, limits)
         quality = min(a[SURE + i], clear if hit >= (ON_ARC if is_stem else ON_LEFT) else 1.0)
-        place = place_on_wall(hit, s, x, y, vx, vy, v2, x_s, y_s, r, is_stem, limits)
-        first = way_out(hit, s, x, y, vx, vy, v2, r, rate, k_side, limits)
+        place = place_on_wall(hit, s, x, y, vx, vy, v2, x_s, y_s, r, is_stem, slack, limits)
+        first = way_out(hit, s, vx, vy, rate, k_side, sizes, limits)
         quality = min(min(quality, place), min(first, s))
         # A hop needs the radius at both of its ends.
         known = before - a[BACK + i] if hit == ON_ARC else 1.0
@@ -308,7 +325,7 @@ def chord(a, n, is_again, is_cap, is_relative, degree, limits):
     `is_again`: correct the times found before once more, in place of a new guess.
     """
     widest_registers()
-    bend, k_w, rate_w, size = limits.bend, limits.curvature, limits.rate, limits.size
+    bend, k_w, size = limits.bend, limits.curvature, limits.size
     for i in range(n):
         x, y, vx, vy, spin = a[X + i], a[Y + i], a[VX + i], a[VY + i], a[SPIN + i]
         r0, r1_0, r2_0 = a[R0 + i], a[R1 + i], a[R2 + i]
@@ -332,7 +349,7 @@ def chord(a, n, is_again, is_cap, is_relative, degree, limits):
         reach = max(a[W0 + i], w) + fma(k_w * s, s, SAFETY * size)
         clear = spin * spin - (1.0 + 4.0 * SAFETY) * reach * reach * v2
         clear = 1.0 if is_cap else clear
-        sizes = abs(x * vx) + abs(y * vy) + fma(s, v2, r * rate_w)
+        sizes = arc_sizes(s, x, y, vx, vy, v2, r, limits)
         first = -slope - 2.0 * SAFETY * sizes
         quality = min(min(clear, abs(y_s) - SAFETY * (abs(y) + abs(vy) * s)), min(first, v2 - bend))
         quality = min(min(quality, s), before - a[BACK + i])

@@ -18,6 +18,7 @@ import numpy as np
 from fast.kernel.arithmetic import (
     MAX_QUADRANT,
     SAFETY,
+    TWO_OVER_PI,
     beyond_first_order,
     sine_cosine,
     two_product,
@@ -70,6 +71,18 @@ def set_turn(laws, anchors, s):
             sine, _, cosine, _, _ = sine_cosine(omega, omega_low, 0.5 * k, s, 0.0)
             anchors[TURN, SINE + k] = 2.0 * sine * cosine
         anchors[TURN, COSINE + k] = -2.0 * sine * sine
+
+
+@part
+def phase_room(laws, t):
+    """Return for how long after t the phases of all laws are known."""
+    room, omega = np.inf, laws[SHARED, OMEGA]
+    if omega > 0.0:
+        room = MAX_QUADRANT / (TWO_OVER_PI * omega * laws[SHARED, N_HARMONICS]) - abs(t)
+    for row in (RADIUS, WIDTH, DEPTH, SLOPE):
+        if laws[row, KIND] == BANG_BANG:
+            room = min(room, MAX_QUADRANT * laws[row, PERIOD] - abs(t - laws[row, KNOTS]))
+    return room
 
 
 @kernel
@@ -247,7 +260,9 @@ def whole_periods_off(laws, row, s):
     n_periods = np.floor(s / period)
     p, e = two_product(n_periods, period)
     left, left_low = difference(s, 0.0, p, e + n_periods * period_low)
-    return (left, left_low) if left > 0.0 else (0.0, 0.0)
+    if left < 0.0:  # the quotient was rounded up
+        left, left_low = difference(left, left_low, -period, -period_low)
+    return left, left_low
 
 
 @kernel

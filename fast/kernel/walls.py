@@ -49,7 +49,8 @@ def wall_function(wall, s, particle, residual, scene, anchors):
     y_s = y + vy * s
     f = residual + (d_w + d_m * y_s + s * (m * vy - outward))
     slope = w_rate + m_rate * y_s + (m + d_m) * vy - outward
-    error = abs(residual) + w_size + m_size * abs(y_s) + s * (abs(m * vy) + abs(vx))
+    # y_s is rounded as its terms are, however small it is.
+    error = abs(residual) + w_size + m_size * (abs(y) + abs(vy) * s) + s * (abs(m * vy) + abs(vx))
     slope_error = w_rate_size + m_rate_size * (abs(y) + abs(vy) * s) + (abs(m) + m_size) * abs(vy) + abs(vx)
     return f, slope, SAFETY * error, SAFETY * slope_error
 
@@ -188,14 +189,15 @@ def wall_rest(wall, s, scene, anchors):
 def reach_time(wall, x, y, vx, vy, bounds):
     """Return a time before which the particle cannot reach what the wall ever sweeps.
 
-    This lets a slow particle cross the middle of the table in one step.
+    This lets a slow particle cross the middle of the table in one step. Rounding is taken off the gap.
     """
     if wall == ARC:
         inner = bounds[RADIUS, LOWEST]
         gap = inner * inner - (x * x + y * y)
         v2 = vx * vx + vy * vy
-        if gap <= SAFETY * inner * inner or v2 == 0.0:
-            return np.inf if gap > SAFETY * inner * inner else 0.0
+        gap -= SAFETY * inner * inner
+        if gap <= 0.0 or v2 == 0.0:
+            return np.inf if gap > 0.0 else 0.0
         q = x * vx + y * vy
         root = np.sqrt(q * q + v2 * gap)
         return (gap / (q + root) if q > 0.0 else (root - q) / v2) * (1.0 - 4.0 * SAFETY)
@@ -214,7 +216,8 @@ def reach_time(wall, x, y, vx, vy, bounds):
             gap = bounds[WIDTH, LOWEST] - max(abs(m_lo), abs(m_hi)) * bounds[DEPTH, HIGHEST] - position
             speed = outward
         size = bounds[WIDTH, LOWEST] + max(abs(m_lo), abs(m_hi)) * bounds[DEPTH, HIGHEST] + abs(x)
-    if gap <= SAFETY * size:
+    gap -= SAFETY * size
+    if gap <= 0.0:
         return 0.0
     if speed <= 0.0:
         return np.inf
@@ -224,10 +227,13 @@ def reach_time(wall, x, y, vx, vy, bounds):
 @kernel
 def side_of_mouth(s, x, vx, scene, anchors):
     """Return +1 when the crossing of y = 0 after time s is within |x| < w, -1 beyond, 0 too close."""
-    w, d_w, _, w_size, _ = width(scene, anchors, s)
+    w, d_w, w_rate, w_size, w_rate_size = width(scene, anchors, s)
     x_s = abs(x + vx * s)
     margin = (w - x_s) + d_w
-    error = SAFETY * (w + w_size + abs(x) + 2.0 * abs(vx) * s)
+    # s is rounded, too: for a mouth that moves a long time after the event that counts most.
+    rounding = SAFETY * s
+    drift = abs(w_rate) + SAFETY * w_rate_size + rounding * scene.bounds[WIDTH, BEND]
+    error = SAFETY * (w + w_size + abs(x) + abs(vx) * s) + rounding * (abs(vx) + drift)
     if margin > error:
         return 1
     return -1 if margin < -error else 0

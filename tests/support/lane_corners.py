@@ -1,0 +1,79 @@
+"""Flights that end near a corner of walls in motion: within 1e-16 to 1e-8 of it, on either side.
+
+The place where the wall is met and the time are drawn, the velocity follows. The wall moves, so that the
+lanes' time of flight is corrected by about so much: what holds before may not hold after it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from mpmath import fp
+
+from fast.kernel import codes
+from scene import BangBang, Fourier, Law, Mushroom, Scene
+from scene.laws import value
+
+Array = npt.NDArray[np.floating[Any]]
+Start = tuple[Array, int]
+Draw = Callable[[int, np.random.Generator], tuple[Scene, list[Start]]]
+
+
+def at_the_end_of_the_arc(n: int, random: np.random.Generator) -> tuple[Scene, list[Start]]:
+    """From the arc to where it meets the base, far or near."""
+    r = _moving(1.0, random)
+    starts = []
+    for t, s in _times(n, random):
+        angle = min(10.0 ** random.uniform(-2.5, 0.4), 2.9)
+        here, there = _at(r, t), _at(r, t + s)
+        x, y = here * np.cos(angle), here * np.sin(angle)
+        starts.append((_state(t, s, x, y, there, _offset(random)), int(codes.ARC)))
+    return Mushroom(r=r, w=0.1, h=1.0), starts
+
+
+def at_the_edge_of_the_mouth(n: int, random: np.random.Generator) -> tuple[Scene, list[Start]]:
+    """From the left side or the floor to the upper end of the right side."""
+    w, lean = _moving(0.5, random), float(random.choice([0.0, random.uniform(-0.3, 0.3)]))
+    starts = []
+    for t, s in _times(n, random):
+        here, there, off = _at(w, t), _at(w, t + s), _offset(random)
+        y, wall = -float(random.uniform(0.01, 0.95)), codes.LEFT
+        x = -(here + lean * y)
+        if random.random() < 0.4:
+            y, wall = -1.0, codes.FLOOR
+            x = random.uniform(-0.9, 0.9) * (here - lean)
+        starts.append((_state(t, s, x, y, there + lean * off, off), int(wall)))
+    return Mushroom(r=1.0, w=w, h=1.0, slope=lean), starts
+
+
+CORNERS: dict[str, Draw] = {
+    "at the end of the arc": at_the_end_of_the_arc,
+    "at the edge of the mouth": at_the_edge_of_the_mouth,
+}
+
+
+def _moving(mean: float, random: np.random.Generator) -> Law:
+    swing = mean * float(random.choice([0.04, 0.3]))
+    if random.random() < 0.5:
+        return Fourier(mean, 1.0, (swing,), (0.2 * swing,))
+    inner = 6.0 * float(random.uniform(0.2, 0.8))
+    return BangBang(((0.0, mean), (inner, mean + swing * float(random.uniform(-1, 1))), (6.0, mean)))
+
+
+def _times(n: int, random: np.random.Generator) -> Array:
+    return np.column_stack([random.uniform(0.0, 6.0, n), 10.0 ** random.uniform(-2.5, -0.3, n)])
+
+
+def _offset(random: np.random.Generator) -> float:
+    return float(random.choice([-1.0, 1.0]) * 10.0 ** random.uniform(-16, -8))
+
+
+def _at(law: Law, t: float) -> float:
+    return float(value(fp, law, float(t)))
+
+
+def _state(t: float, s: float, x: float, y: float, x_end: float, y_end: float) -> Array:
+    return np.array([t, 0.0, x, y, (x_end - x) / s, (y_end - y) / s])

@@ -287,14 +287,14 @@ def test_a_machine_with_other_numbers_does_not_go_on(command_line, tmp_path, mon
 def test_limits_end_in_a_run_that_goes_on(command_line, tmp_path, monkeypatch, whole):
     code, out, err = command_line(*arguments(tmp_path, "--max-collisions", 3))
     assert (code, out) == (3, "")
-    assert "--max-collisions = 3: 0 of 330 particles are kept; go on with: mushrooms simulate" in err
-    assert "makes" in err and "no block was finished" in err
+    assert "collisions, --max-collisions = 3: 0 of 330 particles are kept; go on with: mushrooms" in err
+    assert "no block was finished" in err
     now = iter(range(10**6))
     monkeypatch.setattr(conduct, "CLOCK", lambda: float(next(now)))
     code, out, err = command_line(*arguments(tmp_path, "--resume", "--max-seconds", 20))
     assert (code, out) == (3, "")
-    n_kept = int(err.split("passed: ")[1].split(" of")[0])
-    assert 0 < n_kept < N and "no block" not in err
+    assert 0 < int(err.split("passed: ")[1].split(" of")[0]) < N
+    assert "no block" not in err
     done = command_line(*arguments(tmp_path, "--resume", "--max-collisions", 10**6))
     assert digest_of(done) == whole[N]
 

@@ -23,6 +23,7 @@ UsageError: type[Any] = typer.BadParameter.__bases__[0]
 
 INTERRUPTED = 130
 MOST = Decimal(10) ** 30  # of a whole number on the command line, written with an exponent
+SHOWN = 60  # characters of what was written in its place
 NOTHING_KEPT = "nothing is kept: files are written whole, at the end"
 
 
@@ -131,7 +132,8 @@ def whole(text: str | int) -> int:
             return int(number)
     except InvalidOperation:
         pass
-    raise typer.BadParameter(f"{text!r} is not a whole number")
+    few = text if len(str(text)) <= SHOWN else f"{str(text)[:SHOWN]}..."
+    raise typer.BadParameter(f"{few!r} is not a whole number below {MOST:.0e} in size")
 
 
 app = typer.Typer(

@@ -55,12 +55,21 @@ def read_data(source: str | Path) -> Any:
         )
     try:
         text = path.read_text("utf-8")
-        return tomllib.loads(text) if path.suffix == ".toml" else json.loads(text)
+        return tomllib.loads(text) if path.suffix == ".toml" else json.loads(text, object_pairs_hook=_once)
     except OSError as error:
         raise InvalidScene(f"scene {name!r} cannot be read: {error.strerror}") from None
     except (ValueError, RecursionError) as error:
         kind = path.suffix.removeprefix(".").upper()
         raise InvalidScene(f"scene {name!r} is not valid {kind}: {error}") from None
+
+
+def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    """Return a JSON object; a key that comes twice is refused, as TOML has it: one of both would be lost."""
+    found = dict(pairs)
+    if len(found) < len(pairs):
+        keys = [key for key, _ in pairs]
+        raise ValueError(f"{shown(next(key for key in keys if keys.count(key) > 1))} is given twice")
+    return found
 
 
 def from_data(data: Any, origin: str = "") -> Scene:

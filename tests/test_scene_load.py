@@ -111,6 +111,8 @@ BAD_FILES = [
     ("a.json", b'{"table": "cap", "r": 1e400}', "r = inf, must be finite"),
     ("a.json", b'{"table": "cap", "r": ' + b"9" * 5000 + b"}", "is not valid JSON"),
     ("a.json", b"\xff\xfe", "is not valid JSON"),
+    ("a.json", b'{"table": "cap", "r": 1, "r": 2}', "is not valid JSON: 'r' is given twice"),
+    ("a.json", b'{"table": "cap", "r": {"kind": "fourier", "mean": 1, "mean": 2}}', "'mean' is given twice"),
     ("a.json", b'{"table": "cap", "r": "\\ud800"}', "surrogates not allowed"),
     ("a.json", b'{"table": "cap", "r": ' + b"[" * 100_000, "is not valid JSON"),
     ("a.json", b'{"table": "cap", "radius": 1}', "unknown field `radius`"),

@@ -129,6 +129,12 @@ class Ensemble(NamedTuple):
         """Return kernel wall time x threads / collisions, in nanoseconds."""
         return self.seconds * self.threads / max(int(self.n_collisions.sum()), 1) * 1e9
 
+    def __repr__(self) -> str:
+        n, n_cycles = self.cycle_energies.shape
+        n_followed = int((self.outcome == FOLLOWED).sum())
+        what = f"{n} particles, {n_cycles} cycles, {n_followed} followed to the end"
+        return f"Ensemble(E0 = {self.energy0:.6g}, {what})"
+
     def _repr_html_(self) -> str:
         taking_part = self.energy[self.takes_part()]
         shown = {

@@ -105,7 +105,8 @@ def draw(
         follow("trajectory", 1)[0].write(export)
         print(export)
     for kind, path in paths.items():
-        write_file(path, _picture(table, kind, path.suffix, follow))
+        with compilation_told():
+            write_file(path, _picture(table, kind, path.suffix, follow))
         print(path)
 
 

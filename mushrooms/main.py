@@ -56,7 +56,7 @@ COMMANDS = {
         "moving-cap --particles 25000 --energy 1e7 --seed 1 --out run",
         "",  # it says so itself
     ),
-    "export": Listed("mushrooms.stored:export", "Write a finished run as one table.", "run --to run.parquet"),
+    "export": Listed("mushrooms.stored:export", "Write a finished run as one table.", "run --to run.csv"),
     "attack": Listed(
         "mushrooms.attack:attack",
         "Ask nasty questions, and compare the answers with a second stepper's.",

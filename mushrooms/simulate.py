@@ -250,8 +250,8 @@ def _told_how_to_go_on(run: Any, command: str) -> Iterator[None]:
             print(f"{NO_BLOCK} than {run.shape.block}", file=sys.stderr)
         raise
     except KeyboardInterrupt:
-        if run.tally.particles:
-            print(f"mushrooms: interrupted; {how()}", file=sys.stderr)
+        told = how() if run.tally.particles else "no block was finished: nothing is kept"
+        print(f"mushrooms: interrupted; {told}", file=sys.stderr)
         raise
     except OSError as error:
         raise BadInput(f"output {str(run.folder)!r}: {error.strerror or error}: {how()}") from None

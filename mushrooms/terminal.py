@@ -27,7 +27,11 @@ SceneName = Annotated[
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON.")]
 
 # The compiled functions that a person waits for, and how long; the others take a second or two.
-SLOW_TO_COMPILE = {"follow_particles": "half a minute to a minute", "fine": "about ten seconds"}
+SLOW_TO_COMPILE = {
+    "follow_particles": "half a minute to a minute",
+    "single": "about ten seconds",
+    "fine": "about ten seconds",
+}
 
 
 @contextmanager
@@ -114,7 +118,7 @@ def check_energy(energy: float | None) -> None:
 def print_pairs(pairs: dict[str, Any], as_json: bool, meanings: Mapping[str, str] | None = None) -> None:
     """Print names, their values and what they mean, a line each; or all as JSON, which keeps every digit.
 
-    A value `x` with a standard error `x_se` is rounded to the error's second digit.
+    A value `x` with a standard error `x_se` is rounded to the error's second digit, and so is `x_theory`.
     """
     if as_json:
         print(json.dumps(pairs, indent=2))
@@ -128,7 +132,7 @@ def print_pairs(pairs: dict[str, Any], as_json: bool, meanings: Mapping[str, str
 
 
 def _rounded(name: str, pairs: dict[str, Any]) -> str:
-    value, error = pairs[name], pairs.get(f"{name.removesuffix('_se')}_se")
+    value, error = pairs[name], pairs.get(f"{name.removesuffix('_se').removesuffix('_theory')}_se")
     if value is None:
         return "–"
     if not (isinstance(value, float) and isinstance(error, float) and 0 < error < math.inf):

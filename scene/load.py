@@ -104,14 +104,31 @@ def _in_words(error: Exception, data: Any) -> str:
         return f"{place} = {shown(_at(data, names))}, must be one of {_tags(place.removeprefix('table'))}"
     if "required field `table`" in text or "required field `kind`" in text:
         return f"{place or 'scene'} has no `{'kind' if place else 'table'}`, must be one of {_tags(place)}"
+    told = re.match(r"Object (contains unknown|missing required) field `(.*?)`$", text)
+    if told:
+        return _fields_in_words(place, _at(data, names), told[1] == "contains unknown", told[2])
     if "`float | object" in text:
         text = "must be a number or a law"
     return f"{place} = {shown(_at(data, names))}: {text}" if place else text
 
 
-def _tags(place: str) -> str:
+def _kinds(place: str) -> dict[str, Any]:
+    """Return the laws by their kinds, or at the top the tables by theirs."""
     valid = (Fourier, BangBang) if place else (Cap, Stem, Mushroom)
-    return ", ".join(str(kind.__struct_config__.tag) for kind in valid)
+    return {str(kind.__struct_config__.tag): kind for kind in valid}
+
+
+def _tags(place: str) -> str:
+    return ", ".join(_kinds(place))
+
+
+def _fields_in_words(place: str, given: Any, is_unknown: bool, field: str) -> str:
+    """Say which field of a table or a law is unknown or missing, and which there are."""
+    tag = given["kind" if place else "table"]
+    valid = ", ".join(("kind" if place else "table", *_kinds(place)[tag].__struct_fields__))
+    if is_unknown:
+        return f"{place or 'scene'} has an unknown field `{field}`, must be one of {valid}"
+    return f"{place or 'scene'}: missing required field `{field}`; a {tag} has {valid}"
 
 
 def _at(data: Any, names: list[str]) -> Any:

@@ -101,7 +101,8 @@ def frozen_rates(scene: Scene) -> tuple[Rates, bool]:
                 return rates, turned
     known = ", ".join(_table())
     raise NotCovered(
-        f"no frozen rates of scene {mushroom.name!r} are known, only of {known} and their reverses"
+        f"no frozen rates of scene {mushroom.name!r} are known, without which nothing is said of a finite"
+        f" energy, only of {known} and their reverses"
     )
 
 

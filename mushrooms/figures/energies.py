@@ -15,6 +15,7 @@ from scene.refusal import BadInput
 
 IntArray = npt.NDArray[np.int64]
 N_BINS = 80
+LIMIT_DIGITS = 6  # of a line in a picture
 N_PLACES = 1500
 LEAST_EXPECTED = 5.0  # particles in a bin, to speak of standard errors
 TAIL = 0.0005  # left out at either side
@@ -46,6 +47,10 @@ def histogram(
         figure, axes = new_figure(4.8, 3.6)
         _bars(axes, gain, _edges(gain, 0.0, counts), counts)
         axes.set(xlabel="log E1/E0", ylabel="density", title=title)
+        limit = high_energy_peak(scene)
+        if limit is not None:
+            axes.axvline(limit, color=ORANGE, linestyle="--", label="theory, never captured, E0 → ∞")
+            figure.legend(loc="outside lower center")
         return figure
     figure, [(axes, rest)] = panels(1)
     draw(axes, rest, gain, found, title, counts)
@@ -60,6 +65,15 @@ def known(scene: Scene, energy: float) -> theory.FiniteEnergy | None:
         return theory.at_energy(scene, energy) if isinstance(scene, Mushroom) else None
     except (BadInput, theory.NotCovered, theory.NotConverged):
         return None
+
+
+def high_energy_peak(scene: Scene) -> float | None:
+    """Return log E1/E0 of those never captured in the limit of high energies; None where theory has none."""
+    try:
+        found = theory.predict(scene, LIMIT_DIGITS) if isinstance(scene, Mushroom) else None
+    except (BadInput, theory.NotCovered, theory.NotConverged):
+        return None
+    return float(found.log_e_nc) if found is not None and found.p_nc > 0 else None
 
 
 def draw(

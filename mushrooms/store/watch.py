@@ -11,6 +11,7 @@ from mushrooms.store.blocks import Block
 from mushrooms.store.tally import RunTally
 from mushrooms.terminal import progress_bar
 
+WIDE = 110  # columns of a terminal that leave room for rates beside the bar
 EVERY = 60.0  # seconds between lines where there is no terminal
 
 
@@ -48,7 +49,8 @@ class Watch:
     def kept(self, block: Block) -> None:
         """Take note of a block."""
         self._all = self._all.merged(block.tally)
-        self._bar.update(self._task, description=f"{self._name}\n{self._pace()}")  # the bar tells the rest
+        if self._bar.console.width >= WIDE:  # the bar tells the rest
+            self._bar.update(self._task, description=f"{self._name}\n{self._pace()}")
         self.tick(0)
 
     def text(self) -> str:

@@ -17,11 +17,23 @@ from math import isfinite, prod
 from typing import Any, NamedTuple
 
 from scene import exact, mixed
-from scene.laws import BangBang, Law, Period, bounds, is_constant, period_of, shared_period, value
+from scene.laws import (
+    MAX_HARMONICS,
+    BangBang,
+    Law,
+    Period,
+    bounds,
+    is_constant,
+    period_of,
+    shared_period,
+    value,
+)
 from scene.laws import exact as number
 from scene.polynomials import half_angle, leg_intervals, leg_polynomial, one_plus_square
 from scene.precision import decimals
 from scene.refusal import InvalidScene
+
+ALIKE = 2.0**-40  # how near a ratio of two periods, as given, is to one of small numbers
 
 Laws = Mapping[str, Law]
 
@@ -81,7 +93,15 @@ def _remedy(laws: Laws, first: str, second: str, a: Period, b: Period) -> str:
         )
     if isinstance(laws[first], BangBang) and isinstance(laws[second], BangBang):
         return "repeat the knots of the shorter, or let it rest until the longer ends"
-    return "give both the longer one, and put faster waves further back in cos and sin (or repeat the knots)"
+    ctx = decimals()
+    ratio = float(a.value(ctx) / b.value(ctx))
+    near = Fraction(ratio).limit_denominator(MAX_HARMONICS)
+    common = "a period that holds a whole number of each"
+    if near.numerator <= MAX_HARMONICS and abs(ratio - near) <= ALIKE * ratio:
+        shared = ctx.nstr(a.value(ctx) * near.denominator, 6)
+        times = f"{near.denominator} times that of {first} and {near.numerator} times that of {second}"
+        common = f"the period {shared}, {times}"
+    return f"let both have {common}, and put waves further back in cos and sin (or repeat the knots)"
 
 
 def _is_clear(condition: Condition) -> bool:

@@ -201,6 +201,12 @@ BY_OMEGA, BY_PERIOD = wave(1.0, 0.1), Fourier(mean=1.0, period=1.0, cos=(0.1,))
         (BY_PERIOD, Fourier(1.0, period=0.5, cos=(0.1,)), "r has period 1.0 and h has 0.5: .* cos and sin"),
         (BY_PERIOD, BangBang(((0.0, 1.0), (1.0, 2.0), (2.0, 1.0))), "h has 2.0: .* repeat the knots"),
         (
+            Fourier(1.0, period=3.0, cos=(0.1,)),
+            Fourier(1.0, period=2.5, cos=(0.1,)),
+            r"let both have the period 15.0, 5 times that of r and 6 times that of h, and put waves",
+        ),
+        (BY_OMEGA, Fourier(1.0, 2**0.5, (0.1,)), "let both have a period that holds a whole number of each"),
+        (
             LEGS,
             BangBang(((0.0, 1.0), (1.0, 2.0), (2.0, 1.0))),
             "h has 2.0: .* repeat the knots of the shorter",

@@ -28,7 +28,7 @@ class Theory(NamedTuple):
 
 
 def measured(asked: Asked, tally: RunTally) -> dict[str, Any]:
-    """Return m1 and p_nc as measured, as predicted, and the difference in errors of both (z).
+    """Return m1 and p_nc as measured, with standard errors, as predicted, and the difference in errors (z).
 
     The prediction is that at the run's energy where rates of the scene's frozen tables are known. Elsewhere
     it is the limit of high energies, and without z: what that leaves out is not known. None is what nobody
@@ -38,13 +38,14 @@ def measured(asked: Asked, tally: RunTally) -> dict[str, Any]:
     mean, error = (None if x is None else x / k for x in (tally.gain.mean, tally.gain.standard_error))
     has_island = isinstance(asked.scene, Mushroom)
     free = 1.0 - tally.captured / (n * k) if n and has_island else None
+    free_error = None if free is None else _binomial_error(free, n * k)
     found = _predicted(asked)
     pulls: tuple[float | None, float | None] = (None, None)
     if found is not None and n:
-        spread = math.sqrt(max(0.0, found.p_nc * (1.0 - found.p_nc)) / (n * k))
+        expected_error = _binomial_error(found.p_nc, n * k)
         pulls = (
             _pull(mean, found.m1, error, found.m1_left_out),
-            _pull(free, found.p_nc, spread, found.p_nc_left_out),
+            _pull(free, found.p_nc, expected_error, found.p_nc_left_out),
         )
     return {
         "m1": mean,
@@ -52,9 +53,14 @@ def measured(asked: Asked, tally: RunTally) -> dict[str, Any]:
         "m1_theory": found.m1 if found else None,
         "m1_z": pulls[0],
         "p_nc": free,
+        "p_nc_se": free_error,
         "p_nc_theory": found.p_nc if found else None,
         "p_nc_z": pulls[1],
     }
+
+
+def _binomial_error(share: float, n: int) -> float:
+    return math.sqrt(max(0.0, share * (1.0 - share)) / n)
 
 
 def _pull(found: float | None, wanted: float, error: float | None, left_out: float | None) -> float | None:

@@ -35,5 +35,6 @@ def test_the_limit_of_high_energies_has_no_z():
     beside = measured(Asked(load("untilted"), 1e4, 1, 1), counts)
     assert beside["m1_theory"] == pytest.approx(0.19134361)
     assert (beside["m1_z"], beside["p_nc_z"]) == (None, None)
+    assert (beside["p_nc"], beside["p_nc_se"]) == (pytest.approx(0.4), pytest.approx(0.24**0.5 / 10))
     nothing = measured(Asked(load("breathing-circle"), 1e4, 1, 1), RunTally(1, 1))
     assert set(nothing.values()) == {None}

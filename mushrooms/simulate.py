@@ -85,8 +85,8 @@ def simulate(
     Prints particles, collisions, lost (not followed to the end), undecided (those of the lost
     that the stepper could not decide), careful (collisions found by the careful step, some fifty times
     slower), m1 (mean of log E/E0 per cycle) and p_nc (share of cycles without capture) with standard
-    errors (se), what theory says of both, how many standard errors they are off (z), ns_per_collision and the SHA-256.
-    Particles that no cycle ever frees from the island count neither in m1 nor in p_nc.
+    errors (se), what theory says of both, how many standard errors they are off (z), ns_per_collision and the
+    SHA-256. Particles that no cycle ever frees from the island count neither in m1 nor in p_nc.
 
     With --out particles are kept block by block: whatever ends a run, --resume goes on with it, to the same
     bits. Exit code 0; 3 when a limit has stopped it, 130 when it was interrupted: both say how to go on.

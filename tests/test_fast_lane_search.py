@@ -10,7 +10,7 @@ import os
 import numpy as np
 import pytest
 from support.faulty_kernels import faulty_lanes
-from support.lane_corners import CORNERS
+from support.lane_corners import CORNERS, at_the_end_of_a_chord
 from support.lane_draws import GROUPS, draw_starts
 from support.lane_draws import draw_scene as draw_directed_scene
 from support.lane_search import ANYWHERE, Round, draw_scene, draw_start, search
@@ -18,6 +18,7 @@ from support.lane_ties import TIES, wrong_walls
 from support.lane_traps import TRAPS
 
 import fast
+import reference
 from fast.batch import LaneRound, lane_steps
 from fast.kernel import codes, lanes, pools
 from fast.step import WALL_NAMES
@@ -234,6 +235,9 @@ ROUNDING = {
 }
 
 
+NO_SLACK = ("return slack if error < s else 0.0", "return 0.0")
+
+
 def count_wrong_corners(draw, kernels, n_scenes, tally):
     random = np.random.default_rng(5)
     for _ in range(n_scenes):
@@ -259,8 +263,33 @@ def test_a_hit_near_a_corner_is_on_the_right_side_of_it(draw, tally):
 
 @pytest.mark.parametrize("draw", CORNERS)
 def test_without_slack_hits_are_beyond_corners(draw, tally):
-    old = "return slack if error < s else 0.0"
-    assert count_wrong_corners(draw, faulty_lanes(old, "return 0.0"), 6, tally) > 0
+    assert count_wrong_corners(draw, faulty_lanes(*NO_SLACK), 6, tally) > 0
+
+
+def count_wrong_chords(kernels, n_scenes, tally):
+    random = np.random.default_rng(7)
+    for _ in range(n_scenes):
+        scene, starts = at_the_end_of_a_chord(pools.LANES, random)
+        pool = Round(scene, kernels)
+        for lane, start in enumerate(starts):
+            pool.fill(lane, *start)
+        right, _, rows = pool.step(len(starts))
+        for i in np.flatnonzero(right):
+            t, _, *numbers = starts[i][0].tolist()
+            proved = reference.next_collision(scene, State(t, *numbers, wall="arc"), t + 10.0, digits=25)
+            tally["answered"] += 1
+            tally["wrong"] += proved.wall != ("base" if rows[i, 2] < 0.0 else "arc")
+    return tally["wrong"]
+
+
+def test_a_chord_ends_on_the_right_side_of_the_base(tally):
+    """The careful step leaves those open; the proof has them."""
+    assert count_wrong_chords(lanes, 12, tally) == 0
+    assert tally["answered"] > 50
+
+
+def test_without_slack_a_chord_ends_beyond_the_base(tally):
+    assert count_wrong_chords(faulty_lanes(*NO_SLACK), 6, tally) > 0
 
 
 @pytest.mark.parametrize("draw", TIES)

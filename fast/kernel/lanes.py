@@ -351,7 +351,9 @@ def chord(a, n, is_again, is_cap, is_relative, degree, limits):
         clear = 1.0 if is_cap else clear
         sizes = arc_sizes(s, x, y, vx, vy, v2, r, limits)
         first = -slope - 2.0 * SAFETY * sizes
-        quality = min(min(clear, abs(y_s) - SAFETY * (abs(y) + abs(vy) * s)), min(first, v2 - bend))
+        slack = slack_of(ON_ARC, ON_ARC, s, delta, inverse, error, r, sizes, 0.0)
+        place = abs(y_s) - (SAFETY * (abs(y) + abs(vy) * s) + abs(vy) * slack)
+        quality = min(min(clear, place), min(first, v2 - bend))
         quality = min(min(quality, s), before - a[BACK + i])
         within = a[LIMIT + i] - abs(since)
         result = verdict(quality, min(within, a[LIMIT + i] - abs(since + delta)), s, error)

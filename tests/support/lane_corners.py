@@ -14,7 +14,7 @@ import numpy.typing as npt
 from mpmath import fp
 
 from fast.kernel import codes
-from scene import BangBang, Fourier, Law, Mushroom, Scene
+from scene import BangBang, Cap, Fourier, Law, Mushroom, Scene
 from scene.laws import value
 
 Array = npt.NDArray[np.floating[Any]]
@@ -25,13 +25,26 @@ Draw = Callable[[int, np.random.Generator], tuple[Scene, list[Start]]]
 def at_the_end_of_the_arc(n: int, random: np.random.Generator) -> tuple[Scene, list[Start]]:
     """From the arc to where it meets the base, far or near."""
     r = _moving(1.0, random)
+    return Mushroom(r=r, w=0.1, h=1.0), _along_the_arc(r, n, random, -8)
+
+
+def at_the_end_of_a_chord(n: int, random: np.random.Generator) -> tuple[Scene, list[Start]]:
+    """The same in a cap, where lanes go through the base: on which side the chord ends tells what is first.
+
+    They know the height where they arrive, after Newton's step, so that only rounding is left to mislead.
+    """
+    r = _moving(1.0, random)
+    return Cap(r=r), _along_the_arc(r, n, random, -13)
+
+
+def _along_the_arc(r: Law, n: int, random: np.random.Generator, farthest: float) -> list[Start]:
     starts = []
     for t, s in _times(n, random):
         angle = min(10.0 ** random.uniform(-2.5, 0.4), 2.9)
         here, there = _at(r, t), _at(r, t + s)
         x, y = here * np.cos(angle), here * np.sin(angle)
-        starts.append((_state(t, s, x, y, there, _offset(random)), int(codes.ARC)))
-    return Mushroom(r=r, w=0.1, h=1.0), starts
+        starts.append((_state(t, s, x, y, there, _offset(random, farthest)), int(codes.ARC)))
+    return starts
 
 
 def at_the_edge_of_the_mouth(n: int, random: np.random.Generator) -> tuple[Scene, list[Start]]:
@@ -67,8 +80,8 @@ def _times(n: int, random: np.random.Generator) -> Array:
     return np.column_stack([random.uniform(0.0, 6.0, n), 10.0 ** random.uniform(-2.5, -0.3, n)])
 
 
-def _offset(random: np.random.Generator) -> float:
-    return float(random.choice([-1.0, 1.0]) * 10.0 ** random.uniform(-16, -8))
+def _offset(random: np.random.Generator, farthest: float = -8) -> float:
+    return float(random.choice([-1.0, 1.0]) * 10.0 ** random.uniform(farthest - 8, farthest))
 
 
 def _at(law: Law, t: float) -> float:

@@ -101,13 +101,13 @@ def draw(
         output.check_file(export, (".csv", ".parquet"))
     paths = _paths(out or Path(f"{Path(scene).stem}.svg"), kinds, is_drawn=bool(kinds) or export is None)
     follow = _Asked(table, energy, collisions, particles, seed)
-    if export is not None:
-        follow("trajectory", 1)[0].write(export)
-        print(export)
-    for kind, path in paths.items():
-        with compilation_told():
+    with compilation_told():
+        if export is not None:
+            follow("trajectory", 1)[0].write(export)
+            print(export)
+        for kind, path in paths.items():
             write_file(path, _picture(table, kind, path.suffix, follow))
-        print(path)
+            print(path)
 
 
 class _Asked(NamedTuple):
@@ -124,14 +124,13 @@ class _Asked(NamedTuple):
         from mushrooms import orbits
 
         usual = PICTURES[kind]
-        with compilation_told():
-            return orbits.follow(
-                self.table,
-                self.n_collisions or usual.n_collisions,
-                energy=self.energy or orbits.usual_energy(self.table, usual.crossings),
-                seed=self.seed,
-                n_orbits=n_orbits or self.n_orbits or usual.n_orbits,
-            )
+        return orbits.follow(
+            self.table,
+            self.n_collisions or usual.n_collisions,
+            energy=self.energy or orbits.usual_energy(self.table, usual.crossings),
+            seed=self.seed,
+            n_orbits=n_orbits or self.n_orbits or usual.n_orbits,
+        )
 
 
 def _check(energy: float | None, collisions: int | None, particles: int | None, seed: int) -> None:

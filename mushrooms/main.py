@@ -23,7 +23,6 @@ UsageError: type[Any] = typer.BadParameter.__bases__[0]
 
 INTERRUPTED = 130
 MOST = Decimal(10) ** 30  # of a whole number on the command line, written with an exponent
-SHOWN = 60  # characters of what was written in its place
 NOTHING_KEPT = "nothing is kept: files are written whole, at the end"
 
 
@@ -132,8 +131,9 @@ def whole(text: str | int) -> int:
             return int(number)
     except InvalidOperation:
         pass
-    few = text if len(str(text)) <= SHOWN else f"{str(text)[:SHOWN]}..."
-    raise typer.BadParameter(f"{few!r} is not a whole number below {MOST:.0e} in size")
+    from scene.refusal import shown  # not above: the list of commands needs no scene
+
+    raise typer.BadParameter(f"{shown(text)} is not a whole number below {MOST:.0e} in size")
 
 
 app = typer.Typer(

@@ -240,7 +240,10 @@ def _told_how_to_go_on(run: Any, command: str) -> Iterator[None]:
 
     def how() -> str:
         n = run.tally.particles
-        return f"{n:,} of {run.shape.n_particles:,} particles are kept; go on with: {command}"
+        kept = f"{n:,} of {run.shape.n_particles:,} particles are kept"
+        if not n and run.first_there() is not None:  # with fewer cycles
+            kept = "what was there is kept"
+        return f"{kept}; go on with: {command}"
 
     try:
         yield
@@ -250,7 +253,7 @@ def _told_how_to_go_on(run: Any, command: str) -> Iterator[None]:
             print(f"{NO_BLOCK} than {run.shape.block}", file=sys.stderr)
         raise
     except KeyboardInterrupt:
-        told = how() if run.tally.particles else "no block was finished: nothing is kept"
+        told = "no block was finished: nothing is kept" if run.first_there() is None else how()
         print(f"mushrooms: interrupted; {told}", file=sys.stderr)
         raise
     except OSError as error:
@@ -304,7 +307,7 @@ def _complete(wish: Wish, run: Any) -> None:
                     print(ahead.text(n_threads), file=sys.stderr, flush=True)
             watch.tick(n_done)
 
-        conduct.complete(run, asked, engine, limits, tick, watch.kept)
+        conduct.complete(run, asked, engine, limits, tick, watch.followed)
     n_careful = run.tally.careful - before.careful
     seconds = (run.seconds - seconds) / n_threads
     note = careful_note(n_careful, run.tally.collisions - before.collisions, seconds)

@@ -93,15 +93,25 @@ def _remedy(laws: Laws, first: str, second: str, a: Period, b: Period) -> str:
         )
     if isinstance(laws[first], BangBang) and isinstance(laws[second], BangBang):
         return "repeat the knots of the shorter, or let it rest until the longer ends"
-    ctx = decimals()
-    ratio = float(a.value(ctx) / b.value(ctx))
-    near = Fraction(ratio).limit_denominator(MAX_HARMONICS)
+    found = _multiples(a, b)
     common = "a period that holds a whole number of each"
-    if near.numerator <= MAX_HARMONICS and abs(ratio - near) <= ALIKE * ratio:
-        shared = ctx.nstr(a.value(ctx) * near.denominator, 6)
-        times = f"{near.denominator} times that of {first} and {near.numerator} times that of {second}"
-        common = f"the period {shared}, {times}"
+    if found is not None:
+        shared = decimals().nstr(found[0] * a.value(decimals()), 6)
+        common = (
+            f"the period {shared}, {found[0]} times that of {first} and {found[1]} times that of {second}"
+        )
     return f"let both have {common}, and put waves further back in cos and sin (or repeat the knots)"
+
+
+def _multiples(a: Period, b: Period) -> tuple[int, int] | None:
+    """Return how many of two periods, as given, are as long; None where harmonics do not go so far."""
+    ctx = decimals()
+    ratio = a.value(ctx) / b.value(ctx)
+    if not 1 <= MAX_HARMONICS * ratio <= MAX_HARMONICS**2:  # far beyond, it is no float either
+        return None
+    near = Fraction(float(ratio)).limit_denominator(MAX_HARMONICS)
+    is_near = near.numerator <= MAX_HARMONICS and abs(float(ratio) - near) <= ALIKE * near
+    return (near.denominator, near.numerator) if is_near else None
 
 
 def _is_clear(condition: Condition) -> bool:

@@ -114,11 +114,12 @@ def test_a_lengthening_that_is_broken_off_goes_on(command_line, tmp_path, follow
     monkeypatch.setattr(blocks.RunFolder, "keep", interrupted)
     left = 10
     summary_of(command_line(*arguments(tmp_path, 1)))
-    for cycles, n_kept in ((2, 3), (4, 1)):
+    for cycles, n_kept in ((2, 3), (4, 0), (4, 1)):
         left = n_kept
         code, out, err = command_line(*arguments(tmp_path, cycles))
         assert (code, out) == (130, "")
-        assert f"{32 * n_kept} of {N} particles are kept; go on with: mushrooms simulate fermi-ulam" in err
+        told = f"{32 * n_kept} of {N} particles are" if n_kept else "what was there is"
+        assert f"interrupted; {told} kept; go on with: mushrooms simulate fermi-ulam" in err
         assert f"--cycles {cycles}" in err
     assert_refused(command_line("export", tmp_path, "--to", tmp_path / "a.csv"), f"has 32 of {N} particles")
     assert_refused(command_line(*arguments(tmp_path, 3)), "cycles = 4 there, 3 asked for: a run only grows")

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import time
+import weakref
 from fractions import Fraction
 
 import numpy as np
 import pytest
 
 from mushrooms.store import blocks, conduct, tally, watch
+from mushrooms.store.asked import Asked
+from scene import load
 from scene.files import sealed, unsealed
 
 
@@ -47,12 +51,34 @@ def test_a_seal_tells_every_flipped_bit(tmp_path):
         assert unsealed(path) is None
 
 
+def test_a_block_is_told_at_once_and_two_are_in_memory():
+    """Not when it has been written: progress would fall back by a block."""
+    begun, told, kept = [], [], []
+
+    def followed():
+        for number in range(6):
+            begun.append(weakref.ref(energies := np.zeros(3)))
+            assert told == list(range(number))
+            assert sum(ref() is not None for ref in begun) <= 2
+            yield blocks.Piece(number, 0, 3), blocks.Block({"energy": energies}, tally.RunTally(), 0.0)
+            del energies
+
+    class Slow(blocks.RunInMemory):
+        def keep(self, piece, block):
+            time.sleep(0.01)
+            kept.append(piece.number)
+
+    run = Slow(conduct.shape_of(Asked(load("fermi-ulam"), 1e3, 1, 0), 18, 3))
+    conduct.keep_all(run, followed(), lambda piece, _block: told.append(piece.number))
+    assert told == kept == list(range(6))
+
+
 def test_progress_tells_rate_and_losses(capsys, monkeypatch):
     now = iter(range(0, 10**6, 50))
     monkeypatch.setattr(conduct, "CLOCK", lambda: float(next(now)))
     counts = tally.RunTally(particles=500, followed=498, undecided=1, collisions=10**6)
     with watch.Watch("run", 2000, tally.RunTally(particles=500)) as seen:
-        seen.kept(blocks.Block({}, counts, 1.0))
+        seen.followed(blocks.Block({}, counts, 1.0))
         seen.tick(3)
     lines = capsys.readouterr().err.splitlines()
     assert lines

@@ -1,5 +1,6 @@
 """Validity over the whole period: exact at contact, and in step with dense sampling elsewhere."""
 
+import itertools
 import math
 
 import pytest
@@ -204,6 +205,10 @@ BY_OMEGA, BY_PERIOD = wave(1.0, 0.1), Fourier(mean=1.0, period=1.0, cos=(0.1,))
             Fourier(1.0, period=3.0, cos=(0.1,)),
             Fourier(1.0, period=2.5, cos=(0.1,)),
             r"let both have the period 15.0, 5 times that of r and 6 times that of h, and put waves",
+        ),
+        *(
+            (Fourier(1.0, period=p, cos=(0.1,)), Fourier(1.0, period=q, cos=(0.1,)), "a whole number of each")
+            for p, q in itertools.permutations((1e300, 1.0, 1e-300), 2)
         ),
         (BY_OMEGA, Fourier(1.0, 2**0.5, (0.1,)), "let both have a period that holds a whole number of each"),
         (

@@ -20,7 +20,7 @@ from fast.narrowings import narrowings
 from mushrooms.forecast import expected_collisions
 from mushrooms.store.asked import Asked, difference
 from mushrooms.store.blocks import AnyRun, Block, Piece, RunFolder, attributes_of, is_run
-from mushrooms.store.engines import Engine, Following, Tick, follow
+from mushrooms.store.engines import Engine, Tick, follow
 from mushrooms.store.layout import Arrays, Shape
 from scene.refusal import BadInput
 
@@ -147,7 +147,12 @@ def _check_growth(folder: Path, name: str, there: int, wanted: int) -> None:
 
 
 def complete(
-    run: AnyRun, asked: Asked, engine: Engine, limits: RunLimits, tick: Tick, kept: Callable[[Block], None]
+    run: AnyRun,
+    asked: Asked,
+    engine: Engine,
+    limits: RunLimits,
+    tick: Tick,
+    followed: Callable[[Block], None],
 ) -> None:
     """Follow what is missing, and keep it block by block.
 
@@ -157,7 +162,7 @@ def complete(
         engine: that follows.
         limits: at which to stop.
         tick: told of the particles done in the block under way.
-        kept: told of every block that is kept.
+        followed: told of every block, before it is kept.
 
     Raises:
         LimitReached: a limit; what was kept stays.
@@ -170,12 +175,8 @@ def complete(
         if limits.seconds is not None and CLOCK() - begin > limits.seconds:
             raise LimitReached(f"--max-seconds = {limits.seconds:g} have passed")
 
-    with (
-        closing(engine(asked, run.missing(), looked)) as found,
-        closing(keeping(run, _within(limits.collisions, found))) as blocks,
-    ):
-        for _, block in blocks:
-            kept(block)
+    with closing(engine(asked, run.missing(), looked)) as found:
+        keep_all(run, _within(limits.collisions, found), lambda _piece, block: followed(block))
 
 
 def _within(most: int | None, found: Iterable[tuple[Piece, Block]]) -> Iterator[tuple[Piece, Block]]:
@@ -189,28 +190,29 @@ def _within(most: int | None, found: Iterable[tuple[Piece, Block]]) -> Iterator[
         yield piece, block
 
 
-def keeping(run: AnyRun, found: Iterable[tuple[Piece, Block]]) -> Following:
-    """Keep blocks, each while the next one is followed, and yield those that are kept.
+def keep_all(
+    run: AnyRun, found: Iterable[tuple[Piece, Block]], followed: Callable[[Piece, Block], None]
+) -> None:
+    """Keep blocks, each while the next one is followed: so that two are in memory, and no more.
 
-    One is written at a time, so that no more than two are in memory. However this ends, the block being
-    written is written first.
+    Args:
+        run: keeps them.
+        found: the blocks, followed as they are asked for.
+        followed: told of each as soon as it is there, before it is kept.
 
     Raises:
-        OSError: a block could not be written; the one followed meanwhile is dropped.
+        OSError: a block could not be written; the one followed meanwhile is dropped. However this ends, the
+            block being written is written first.
     """
-
-    def keep(piece: Piece, block: Block) -> tuple[Piece, Block]:
-        run.keep(piece, block)
-        return piece, block
-
     with ThreadPoolExecutor(1) as writer:
-        under_way: Future[tuple[Piece, Block]] | None = None
+        under_way: Future[None] | None = None
         for piece, block in found:
             if under_way is not None:
-                yield under_way.result()
-            under_way = writer.submit(keep, piece, block)
+                under_way.result()
+            under_way = writer.submit(run.keep, piece, block)
+            followed(piece, block)
         if under_way is not None:
-            yield under_way.result()
+            under_way.result()
 
 
 def _probe(run: RunFolder) -> None:

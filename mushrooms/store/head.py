@@ -8,8 +8,8 @@ from contextlib import closing
 import numpy as np
 
 from fast import Ensemble
-from mushrooms.store.blocks import Piece, RunFolder
-from mushrooms.store.conduct import keeping
+from mushrooms.store.blocks import Block, Piece, RunFolder
+from mushrooms.store.conduct import keep_all
 from mushrooms.store.digest import DIGESTED, part
 from mushrooms.store.engines import Engine
 from mushrooms.store.layout import Array
@@ -36,13 +36,14 @@ def complete(run: RunFolder, n: int, engine: Engine, told: Callable[[int], None]
     """
     there = n - sum(min(piece.n, n - piece.first) for piece in run.lacking() if piece.first < n)
     told(there)
-    with (
-        closing(engine(run.asked, missing(run, n), lambda n_done: told(there + n_done))) as found,
-        closing(keeping(run, found)) as blocks,
-    ):
-        for piece, _ in blocks:
-            there += min(piece.n, n - piece.first)
-            told(there)
+
+    def followed(piece: Piece, _block: Block) -> None:
+        nonlocal there
+        there += min(piece.n, n - piece.first)
+        told(there)
+
+    with closing(engine(run.asked, missing(run, n), lambda n_done: told(there + n_done))) as found:
+        keep_all(run, found, followed)
 
 
 def ensemble_of(run: RunFolder, n: int) -> Ensemble:

@@ -15,10 +15,11 @@ import numpy.typing as npt
 
 from fast import Ensemble, Paused
 from fast.kernel.kept import LANE_ROWS
+from scene import Mushroom
 
 Array = npt.NDArray[Any]
 Arrays = dict[str, Array]
-WALLS = ("arc", "base", "left", "right", "floor")
+WALLS = Mushroom.walls
 OUTCOMES = ("followed", "undecided", "undefined", "rejected")
 
 

@@ -46,7 +46,7 @@ class Watch:
             self._told = conduct.CLOCK()
             print(f"{self._name}: {self.text()}", file=sys.stderr, flush=True)
 
-    def kept(self, block: Block) -> None:
+    def followed(self, block: Block) -> None:
         """Take note of a block."""
         self._all = self._all.merged(block.tally)
         if self._bar.console.width >= WIDE:  # the bar tells the rest
@@ -54,7 +54,7 @@ class Watch:
         self.tick(0)
 
     def text(self) -> str:
-        """Return how far the run is, by the blocks that are kept."""
+        """Return how far the run is, by the blocks that were followed."""
         left = self._n - self._all.particles
         rate = self._rate("particles")
         told = in_words(left / rate) + " left" if rate else "time left unknown"
@@ -66,6 +66,6 @@ class Watch:
         return f"{rates}, {lost} lost, {self._all.undecided} undecided"
 
     def _rate(self, what: str) -> float:
-        """Return how many of them a second have been kept here."""
+        """Return how many of them a second have been followed here."""
         n = getattr(self._all, what) - getattr(self._before, what)
         return float(n / max(conduct.CLOCK() - self._begin, 1e-9))

@@ -76,6 +76,7 @@ def test_every_misprint_fails_as_printed_and_holds_corrected(honest):
 def test_false_alarms_stay_below_the_bound(honest):
     # REAL ones add 22, the formulas none; a full audit has one more run of many cycles, and three energies.
     assert honest.n_tests + 22 + 30 <= MAX_TESTS
+    assert N_SIGMA > 4
 
 
 def changed(**faults):

@@ -18,10 +18,10 @@ from fast.compiled import compile_scene
 from fast.fine import FineTrajectory, as_pairs, as_trajectory, fill_path
 from fast.flow import follow_to
 from fast.kernel import codes, pools
-from fast.kernel.bounces import bounce, rebound
-from fast.kernel.entries import SOURCES
+from fast.kernel.compiling import SOURCES
 from fast.kernel.flights import OFF, advance, correct
 from fast.kernel.laws import set_anchors
+from fast.kernel.loops import loops_of, run_bounce, run_rebound
 from fast.kernel.pools import whole_registers
 from fast.kernel.records import ANCHORS_SHAPE, FloatArray, Particle, unfilled_ends
 from fast.kernel.walls import wall_residual
@@ -51,20 +51,21 @@ def _entries(sources):
         a[pools.SPIN + i] = particle.x * particle.vy - particle.y * particle.vx
 
     @njit(cache=True, error_model="numpy")
-    def find_hits(pool, a, n, worker, slope):
+    def find_hits(pool, a, n, worker):
         """Find the next collision of n lanes, and correct what is coarse."""
         sources  # noqa: B018
-        advance(pool, a, whole_registers(n), OFF, worker.scene, slope, worker.degree, worker.limits)
-        correct(pool, a, n, worker, slope)
+        advance(pool, a, whole_registers(n), OFF, worker)
+        correct(pool, a, n, worker)
 
     @njit(cache=True, error_model="numpy")
-    def bounce_lanes(pool, a, n, slope, is_mushroom):
+    def bounce_lanes(pool, a, n, worker):
         """Bounce n lanes off the walls that they have met."""
         sources  # noqa: B018
         if pool == DISK:
-            rebound(a, n)
+            run_rebound(worker.loops.rebound, (a, n))
         else:
-            bounce(a, n, slope, is_mushroom)
+            is_mushroom = worker.scene.table == codes.MUSHROOM
+            run_bounce(worker.loops.bounce, (a, n, worker.slope, is_mushroom))
 
     @njit(cache=True, error_model="numpy")
     def residual(particle, scene, anchors):
@@ -151,7 +152,8 @@ class LaneRound:
         self.compiled = compile_scene(scene)
         self.is_disk = bool(self.compiled.table == codes.CAP)
         self.in_lanes = laws_in_lanes(scene)
-        self.worker = new_worker(self.in_lanes, only_stop(np.inf), unfilled_ends(np.empty((0, 6)), 1, (1, 1)))
+        nobody = unfilled_ends(np.empty((0, 6)), 1, (1, 1))
+        self.worker = new_worker(self.in_lanes, loops_of(self.in_lanes), only_stop(np.inf), nobody)
         self.serves = float(np.diff(self.in_lanes.pieces.begins, append=self.in_lanes.pieces.period).max())
         self.anchors = np.zeros(ANCHORS_SHAPE)
         self.pool = np.zeros(pools.POOL_SIZE)
@@ -183,13 +185,12 @@ class LaneRound:
 
     def bounced(self, pool: np.integer[Any], n: int, dt: FloatArray) -> FloatArray:
         """Bounce n lanes off the walls that they have met; returns rows of dt, x, y, vx, vy."""
-        is_mushroom = self.compiled.table == codes.MUSHROOM
-        bounce_lanes(pool, self.pool, np.int64(n), self.in_lanes.slope, is_mushroom)
+        bounce_lanes(pool, self.pool, np.int64(n), self.worker)
         return np.column_stack([dt, *(self.row(r, n) for r in PLACE)])
 
     def find(self, pool: np.integer[Any], n: int) -> tuple[npt.NDArray[np.bool_], FloatArray, FloatArray]:
         """Find the next collision of n lanes: which are shown right, walls met, and times."""
-        find_hits(pool, self.pool, np.int64(n), self.worker, self.in_lanes.slope)
+        find_hits(pool, self.pool, np.int64(n), self.worker)
         return self.answers(n)
 
     def answers(self, n: int) -> tuple[npt.NDArray[np.bool_], FloatArray, FloatArray]:

@@ -28,6 +28,7 @@ from fast.given import (
     given_threads,
 )
 from fast.kernel import codes, entries
+from fast.kernel.loops import loops_of
 from fast.kernel.records import (
     FloatArray,
     Followed,
@@ -354,12 +355,12 @@ def follow(
         The seconds that took.
     """
     n = len(followed.states)
-    size = _share(n, threads, len(stops.narrowings))
+    size, loops = _share(n, threads, len(stops.narrowings)), loops_of(in_lanes)
 
     def work(first: int) -> None:
         part = slice(first, first + size)
-        worker = new_worker(in_lanes, stops, followed.part(part), n_passed)
-        entries.follow_particles(worker, walls[part], in_lanes.slope, NO_PATHS)
+        worker = new_worker(in_lanes, loops, stops, followed.part(part), n_passed)
+        entries.follow_particles(worker, walls[part], NO_PATHS)
 
     work(n)  # none at all: compiles, or loads from the disk cache, so that `seconds` holds work alone
     if progress:

@@ -26,6 +26,7 @@ import numpy as np
 from fast.compiled import HALF_PI, compile_scene
 from fast.kernel import entries
 from fast.kernel.arithmetic import MAX_QUADRANT
+from fast.kernel.pieces import PARABOLA, SERIES
 
 from fast.kernel.records import (  # isort: skip
     AMPLITUDES, BANG_BANG, CONSTANT, DEPTH, FOURIER, HIGHEST, KIND, KNOTS, LEVEL, LOWEST, N_HARMONICS,
@@ -34,7 +35,6 @@ from fast.kernel.records import (  # isort: skip
 )  # fmt: skip
 from scene import Cap, Scene
 
-PARABOLA, SERIES = 2, 12  # degrees; with one of the latter a harmonic takes 27 pieces
 MAX_PIECES = 2**15
 REMAINDER = 2.0**-54
 INSIDE = 1.0 - 2.0**-50  # of a piece: how far a flight ends from its middle is a sum that lanes round
@@ -61,7 +61,7 @@ def laws_in_lanes(scene: Scene) -> LawsInLanes:
         pieces = none._replace(until=-1.0)
     moves = compiled.laws[SLOPE, KIND] != CONSTANT
     slope = None if moves else float(compiled.laws[SLOPE, LEVEL])
-    return LawsInLanes(compiled, pieces, (0,) * degree, slope)
+    return LawsInLanes(compiled, pieces, degree, slope)
 
 
 def reach(compiled: Compiled, degree: int) -> float:

@@ -9,6 +9,7 @@ import numpy as np
 
 from fast.given import given_state
 from fast.kernel import careful, codes, entries, single
+from fast.kernel.loops import careful_at
 from fast.kernel.records import ANCHORS_SHAPE, Compiled, FloatArray, IntArray, Particle, Paths, unfilled_paths
 from fast.units import ANSWER_LOST, Units, fit
 from scene import (
@@ -119,7 +120,7 @@ def followed_paths(
         n_times: how often to do all this, where its time is measured.
     """
     paths = unfilled_paths(len(states), n_collisions)
-    entries.careful(compiled, np.zeros(ANCHORS_SHAPE), states, walls, t_end, n_times, paths)
+    entries.careful(careful_at(), compiled, np.zeros(ANCHORS_SHAPE), states, walls, t_end, n_times, paths)
     return paths
 
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from fast.given import MAX_STEPS, given_end
 from fast.kernel import codes, entries
+from fast.kernel.loops import loops_of
 from fast.kernel.records import FloatArray, unfilled_ends, unfilled_paths
 from fast.kernel.worker import new_worker
 from fast.pieces import laws_in_lanes
@@ -58,9 +59,10 @@ def trajectory(scene: Scene, state: State, n_collisions: int, t_end: float = np.
     rows, walls = as_arrays([start])
     paths = unfilled_paths(1, n_collisions)
     in_lanes = laws_in_lanes(fit(scene).scene)
-    worker = new_worker(in_lanes, only_stop(start.units.horizon(t_end)), unfilled_ends(rows, 1, (1, 1)))
     if n_collisions:
-        entries.follow_particles(worker, walls, in_lanes.slope, paths)
+        stop = only_stop(start.units.horizon(t_end))
+        worker = new_worker(in_lanes, loops_of(in_lanes), stop, unfilled_ends(rows, 1, (1, 1)))
+        entries.follow_particles(worker, walls, paths)
     n, code = paths.counts.item(), paths.codes.item()
     steps = start.units.steps(paths.steps[0, :n])
     walls = NAMES[paths.walls[0, :n]].tolist()

@@ -26,26 +26,25 @@ SceneName = Annotated[
 ]
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON.")]
 
-# The compiled functions that a person waits for, and how long; the others take a second or two.
-SLOW_TO_COMPILE = {
-    "follow_particles": "half a minute to a minute",
-    "single": "about ten seconds",
-    "fine": "about ten seconds",
-}
+# The compiled functions that a person waits for; the others take a second or two.
+SLOW_TO_COMPILE = ("careful_step", "follow_particles")
 
 
 @contextmanager
 def compilation_told() -> Iterator[None]:
-    """Say on stderr when the fast stepper is compiled: numba tells so when it has found nothing kept."""
+    """Say once on stderr when the fast stepper is compiled: numba tells when it has found nothing kept."""
     from numba.core import event
+
+    was_told = False
 
     class Teller(event.Listener):  # type: ignore[misc]  # numba has no types
         def on_start(self, told: Any) -> None:
+            nonlocal was_told
             compiled = told.data["dispatcher"]
-            duration = SLOW_TO_COMPILE.get(compiled.py_func.__name__)
-            if duration is not None and compiled.stats.cache_path:
-                what = f"compiling the fast stepper for this machine ({compiled.py_func.__name__})"
-                print(f"{what}: {duration}; kept for next time", file=sys.stderr, flush=True)
+            if compiled.py_func.__name__ in SLOW_TO_COMPILE and compiled.stats.cache_path and not was_told:
+                was_told = True
+                what = "compiling the fast stepper for this machine: half a minute to a minute"
+                print(f"{what}; kept for next time", file=sys.stderr, flush=True)
 
         def on_end(self, told: Any) -> None:
             pass

@@ -17,9 +17,8 @@ from typing import Any, NamedTuple
 import pytest
 from hypothesis import settings
 from numba.core.dispatcher import Dispatcher
+from support.entries import kept_entries
 
-from fast import batch
-from fast.kernel import entries
 from mushrooms.main import run
 
 settings.register_profile("quick", derandomize=True, deadline=None, print_blob=True)
@@ -61,8 +60,10 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 def _compiled_once() -> None:
     """Let one worker compile an entry of the kernel while the others wait, and then load what it has kept."""
 
-    def one_at_a_time(name: str, entry: Dispatcher) -> Callable[[Any], Any]:
-        compile_or_load, lock = entry.compile, Path(entry.stats.cache_path) / f"{name}.lock"
+    def one_at_a_time(entry: Dispatcher) -> Callable[[Any], Any]:
+        # Variants of a loop share an index in the cache, and hence a lock.
+        compile_or_load, name = entry.compile, entry.py_func.__name__
+        lock = Path(entry.stats.cache_path) / f"{name}.lock"
 
         def compile_alone(signature: Any) -> Any:
             lock.parent.mkdir(parents=True, exist_ok=True)
@@ -72,9 +73,8 @@ def _compiled_once() -> None:
 
         return compile_alone
 
-    for name, entry in (vars(entries) | vars(batch)).items():
-        if isinstance(entry, Dispatcher) and entry.stats.cache_path:
-            entry.compile = one_at_a_time(name, entry)
+    for entry in kept_entries():
+        entry.compile = one_at_a_time(entry)
 
 
 @pytest.fixture

@@ -12,11 +12,12 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from support.entries import kept_entries
 
 import fast
 from conformance.strategies import scenes_and_states
 from fast import ensemble
-from fast.kernel import entries
+from fast.kernel import compiling
 from scene import State, load
 from scene.transforms import mirrored, mirrored_wall, scaled, scaled_state
 
@@ -89,13 +90,13 @@ def test_a_change_in_any_source_makes_the_kernels_anew(tmp_path):
     """Numba's cache looks at one file only; the digest that entries close over looks at all."""
     folder = Path(fast.__file__).parent
     copy = shutil.copytree(folder, tmp_path / "fast", ignore=shutil.ignore_patterns("__pycache__"))
-    assert entries.digest_of_sources(copy) == entries.SOURCES
+    assert compiling.digest_of_sources(copy) == compiling.SOURCES
     for path in (copy / "units.py", copy / "kernel" / "walls.py"):
         path.write_text(path.read_text("utf-8") + "\n", "utf-8")
-        assert entries.digest_of_sources(copy) != entries.SOURCES
+        assert compiling.digest_of_sources(copy) != compiling.SOURCES
         path.write_text(path.read_text("utf-8")[:-1], "utf-8")
-    for entry in (entries.careful, entries.single, entries.fine, entries.follow_particles):
-        assert entries.SOURCES in [cell.cell_contents for cell in entry.py_func.__closure__]
+    for entry in kept_entries():
+        assert compiling.SOURCES in [cell.cell_contents for cell in entry.py_func.__closure__]
 
 
 @settings(max_examples=60)

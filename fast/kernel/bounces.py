@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from fast.kernel.arithmetic import dot, fma
-from fast.kernel.compiling import kernel, packed, widest_registers
+from fast.kernel.compiling import packed, widest_registers
 
 from fast.kernel.pools import (  # isort: skip
     CLOSED, DONE, H0, H1, H2, HIT, M0, M1, M2, NEVER, NEXT_H0, NEXT_H1, NEXT_H2, NEXT_M0, NEXT_M1,
@@ -38,7 +38,7 @@ def off_the_side(sign, vx, vy, m, rate):
     return sign * fma(tilt, out, inverse * fma(m, vy, rate)), fma(inverse * m, out - rate, -tilt * vy)
 
 
-@kernel
+@packed
 def bounce(a, n, slope, is_mushroom):
     """Bounce off the wall met, v - 2 f' grad f / |grad f|^2; count the hit; watch captured stays.
 
@@ -98,7 +98,7 @@ def bounce(a, n, slope, is_mushroom):
         arrive(a, i, slope)
 
 
-@kernel
+@packed
 def rebound(a, n):
     """Bounce off the arc with the angular momentum of the whole stay, constant to the bit; count."""
     widest_registers()

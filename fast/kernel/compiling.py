@@ -6,17 +6,34 @@ so long chains of calls compile slowly. A function with one or two callers is be
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 from llvmlite import ir
 from numba import config, njit, types
+from numba.core import cgutils
+from numba.core.typing import Signature
 from numba.extending import intrinsic
 
 # No fastmath, so that results are the same bits on every machine; quotients by zero are infinite or nan, as
 # in numpy. Who enters the kernel holds its arrays while it runs, hence no references are counted in it: each
 # count is an atomic operation, and much to compile. So a kernel cannot allocate.
 HOW: dict[str, Any] = {"error_model": "numpy", "no_cfunc_wrapper": True, "_nrt": False}
+
+
+def digest_of_sources(folder: Path) -> str:
+    """Return a digest of the Python files in a folder and the folders in it."""
+    digest = hashlib.sha256()
+    for path in sorted(folder.rglob("*.py")):
+        digest.update(path.read_bytes())
+    return digest.hexdigest()
+
+
+# numba's disk cache looks only at the file of the function it keeps, not at those of the functions compiled
+# into it. Hence what is kept closes over this: a change in any source of ours makes it compile anew.
+SOURCES = digest_of_sources(Path(__file__).parent.parent)
 
 
 def _for_compiled_callers(**options: Any) -> Callable[[Any], Any]:
@@ -38,6 +55,32 @@ def _kept_from_python(*_: Any, **__: Any) -> None:
 
 def _refused_to_python(*_: Any, **__: Any) -> None:
     raise TypeError("a kernel can be called by compiled functions only; Python can call its .py_func")
+
+
+def _called(function: Callable[..., Any], arguments: tuple[Any, ...]) -> Any:
+    return function(*arguments)
+
+
+def caller(signature: Signature) -> Callable[..., Any]:
+    """Return a function for kernels that calls what lies at an address with a tuple of arguments."""
+    if config.DISABLE_JIT:
+        return _called
+
+    @intrinsic
+    def call(_context: Any, _address: Any, _arguments: Any) -> Any:
+        def generate(context: Any, builder: ir.IRBuilder, _: Any, given: Any) -> Any:
+            result, parameters = signature.return_type, signature.args
+            convention = context.call_conv
+            kind = convention.get_function_type(result, parameters)
+            function = builder.inttoptr(given[0], ir.PointerType(kind))
+            arguments = cgutils.unpack_tuple(builder, given[1])
+            _, found = convention.call_function(builder, function, result, parameters, arguments)
+            return found
+
+        return signature.return_type(types.int64, types.Tuple(signature.args)), generate
+
+    called: Callable[..., Any] = call
+    return called
 
 
 # A function of its own.

@@ -1,47 +1,33 @@
 """The compiled functions that Python calls, kept in numba's disk cache.
 
-numba's cache looks only at the file of the function it keeps, not at those of the functions
-compiled into it. Hence each entry closes over a digest of all of this folder's sources: a change
-anywhere makes it compile anew.
+Each closes over fast.kernel.compiling.SOURCES, so that a change in any source compiles it anew.
 """
 
 from __future__ import annotations
 
-import hashlib
 import math
-from pathlib import Path
 
 import numpy as np
 from numba import njit
 
 from fast.kernel.arithmetic import sine_cosine
-from fast.kernel.careful import first_step, step
 from fast.kernel.codes import HORIZON
-from fast.kernel.compiling import HOW
+from fast.kernel.compiling import HOW, SOURCES
 from fast.kernel.follow import follow
 from fast.kernel.laws import set_anchors
+from fast.kernel.loops import run_careful
 from fast.kernel.path import follow_one
 from fast.kernel.pieces import fill_coefficients
 from fast.kernel.records import ANCHORS_SHAPE, particle_at, write_state, write_step
 from fast.kernel.refine import fine_path
 from fast.kernel.single import single_step, wall_gap
 
-
-def digest_of_sources(folder: Path) -> str:
-    """Return a digest of the Python files in a folder and the folders in it."""
-    digest = hashlib.sha256()
-    for path in sorted(folder.rglob("*.py")):
-        digest.update(path.read_bytes())
-    return digest.hexdigest()
-
-
 QUARTER_TURN, QUARTER_TURN_LOW = math.pi / 2, 6.123233995736766e-17  # pi/2 as two floats
-SOURCES = digest_of_sources(Path(__file__).parent.parent)
 
 
 def _careful(sources):
     @njit(cache=True, error_model="numpy")
-    def careful(scene, anchors, states, walls, t_end, n_times, paths):
+    def careful(step_at, scene, anchors, states, walls, t_end, n_times, paths):
         """Fill in the paths from each start by careful steps, n_times over: see fast.kernel.records.Paths."""
         sources  # noqa: B018
         for i in range(n_times * states.shape[0]):
@@ -49,10 +35,7 @@ def _careful(sources):
             particle, code, n = particle_at(states, i, walls[i]), walls[i], 0
             while n < paths.walls.shape[1]:
                 limit = (t_end - particle.t) - particle.t_low
-                if n == 0:
-                    code, dt, particle = first_step(particle, limit, scene, anchors)
-                else:
-                    code, dt, particle = step(particle, limit, scene, anchors)
+                code, dt, particle = run_careful(step_at, (particle, limit, n == 0, scene, anchors))
                 if code >= HORIZON:
                     break
                 paths.walls[i, n] = code
@@ -76,17 +59,17 @@ def _fine(sources):
 
 def _follow(sources):
     @njit(cache=True, nogil=True, **HOW)
-    def follow_particles(worker, walls, slope, paths):
+    def follow_particles(worker, walls, paths):
         """Follow particles to the last stop, or where `paths` has room from collision to collision.
 
-        See fast.kernel.follow and fast.kernel.path; one entry, for half a minute is compiled once for both.
+        See fast.kernel.follow and fast.kernel.path; one entry for both.
         Threads may call it side by side.
         """
         sources  # noqa: B018
         if paths.walls.shape[1] > 0:
-            follow_one(worker, walls, slope, paths)
+            follow_one(worker, walls, paths)
         else:
-            follow(worker, walls, slope)
+            follow(worker, walls)
 
     return follow_particles
 

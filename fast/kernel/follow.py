@@ -16,12 +16,12 @@ from __future__ import annotations
 import numpy as np
 
 from fast.kernel.arithmetic import fma
-from fast.kernel.bounces import arrive, bounce, rebound
-from fast.kernel.careful import first_step
+from fast.kernel.bounces import arrive
 from fast.kernel.codes import ANEW, ARC, CAP, HORIZON, MUSHROOM, N_WALLS
 from fast.kernel.compiling import kernel, part
 from fast.kernel.flights import OFF, advance, correct
 from fast.kernel.kept import keep_lane, take_lane
+from fast.kernel.loops import run_bounce, run_careful, run_rebound
 
 from fast.kernel.pools import (  # isort: skip
     CERTAIN, CLOSED, DONE, END, HIT, LANES, NEVER, NEXT_R0, NEXT_T, NEXT_T_LOW, NEXT_VX, NEXT_VY, NEXT_W0,
@@ -105,8 +105,8 @@ def finish(pool, a, i, j, code, end, followed):
         followed.counts[j, wall] = int(a[N_ARC + wall * STRIDE + i])
 
 
-@part
-def step_carefully(pool, a, i, roster, worker, slope):
+@kernel
+def step_carefully(pool, a, i, roster, worker):
     """Find a lane's next collision carefully, in the disk the next one with the arc; returns the last code.
 
     The lane then needs no bounce.
@@ -117,7 +117,8 @@ def step_carefully(pool, a, i, roster, worker, slope):
     while True:
         t, t_low = a[T + i], a[T_LOW + i]
         p = Particle(t, t_low, a[X + i], a[Y + i], a[VX + i], a[VY + i], int(a[WALL + i]))
-        code, s, p = first_step(p, (stops.times[-1] - t) - t_low, scene, anchors)
+        limit = (stops.times[-1] - t) - t_low
+        code, s, p = run_careful(worker.loops.careful, (p, limit, True, scene, anchors))
         followed.careful[roster[PARTICLE, i]] += 1
         a[NEXT_T + i], a[NEXT_T_LOW + i] = p.t, p.t_low
         a[NEXT_X + i], a[NEXT_Y + i], a[NEXT_VX + i], a[NEXT_VY + i] = p.x, p.y, p.vx, p.vy
@@ -135,13 +136,13 @@ def step_carefully(pool, a, i, roster, worker, slope):
             a[SPIN + i] = p.x * p.vy - p.y * p.vx
             break
         a[N_BASE + i] += 1.0
-        arrive(a, i, slope)
+        arrive(a, i, None)
         a[VX + i], a[VY + i] = p.vx, p.vy
     return code
 
 
 @kernel
-def attend(pool, a, i, roster, worker, slope):
+def attend(pool, a, i, roster, worker):
     """Do for a lane what `advance` could not; returns whether it stays, moves to the other pool or ends."""
     scene, stops, followed = worker.scene, worker.stops, worker.followed
     end = stops.times[-1]
@@ -154,13 +155,13 @@ def attend(pool, a, i, roster, worker, slope):
         fold(a, i, scene, worker.pieces, worker.degree)
         return MOVES
     if followed.lanes.shape[1] > 0 and not (is_certain and a[NEXT_T + i] < end):
-        keep_lane(pool, a, i, roster, is_certain, slope, followed)  # it may end here
+        keep_lane(pool, a, i, roster, is_certain, worker)  # it may end here
     if is_certain:
         if a[NEXT_T + i] >= a[END + i]:
             set_reference(a, i, a[NEXT_T + i], a[NEXT_T_LOW + i], scene, worker.pieces, worker.degree)
         code = int(a[HIT + i])
     else:
-        code = step_carefully(pool, a, i, roster, worker, slope)
+        code = step_carefully(pool, a, i, roster, worker)
     if code < HORIZON:
         note_stops(a, i, roster, a[NEXT_T + i], stops, followed)
         if worker.n_passed <= roster[NEXT_STOP, i] < stops.times.shape[0]:
@@ -194,14 +195,14 @@ def change_place(worker, pool, i, other, j):
 
 
 @part
-def scan(pool, worker, slope):
+def scan(pool, worker):
     """Attend to every lane of a pool that needs it; the last lane fills the place of one that leaves."""
     a, roster, n_held = worker.pools[pool], worker.rosters[pool], worker.n_held
     i = np.int64(0)
     while i < n_held[pool]:
         fate = STAYS
         if not (a[ROUTINE + i] > 0.0 and worker.is_laned):
-            fate = attend(pool, a, i, roster, worker, slope)
+            fate = attend(pool, a, i, roster, worker)
         if fate == STAYS:
             i += 1
             continue
@@ -231,15 +232,14 @@ def put_back(worker, pool, first, last):
     return first
 
 
-@part
-def follow(worker, walls, slope):
+@kernel
+def follow(worker, walls):
     """Follow particles to the last stop.
 
     Args:
         worker: it holds no particle yet; its `followed.states` are the particles' starts, or are not looked
             at where particles go on from `followed.lanes`.
         walls: codes of the walls that the particles leave (N,).
-        slope: see `advance`.
     """
     scene, stops, pools, n_held = worker.scene, worker.stops, worker.pools, worker.n_held
     states = worker.followed.states
@@ -261,15 +261,15 @@ def follow(worker, walls, slope):
             if n_held[pool] == 0 and not is_resumed:
                 continue
             n = whole_registers(n_held[pool])
-            advance(pool, a, n, OFF, scene, slope, worker.degree, worker.limits)
+            advance(pool, a, n, OFF, worker)
             if is_resumed and first < last:
                 first = put_back(worker, pool, first, last)
                 n = whole_registers(n_held[pool])
             if not (worker.is_laned and are_routine(a, n_held[pool])):
                 if worker.is_laned:
-                    correct(pool, a, n_held[pool], worker, slope)
-                scan(pool, worker, slope)
+                    correct(pool, a, n_held[pool], worker)
+                scan(pool, worker)
             if pool == GENERAL:
-                bounce(a, n, slope, scene.table == MUSHROOM)
+                run_bounce(worker.loops.bounce, (a, n, worker.slope, scene.table == MUSHROOM))
             else:
-                rebound(a, n)
+                run_rebound(worker.loops.rebound, (a, n))

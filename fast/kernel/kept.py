@@ -45,9 +45,9 @@ LANE_ROWS = FIRST_OF_LAWS + N_LAWS
 
 
 @kernel
-def keep_lane(pool, a, i, roster, is_certain, slope, followed):
+def keep_lane(pool, a, i, roster, is_certain, worker):
     """Keep a lane as it is before it is attended to."""
-    j = roster[PARTICLE, i]
+    j, followed = roster[PARTICLE, i], worker.followed
     out = followed.lanes[j]
     out[:] = 0.0
     out[POOL], out[NEXT], out[CAREFUL] = pool, roster[NEXT_STOP, i], followed.careful[j]
@@ -59,7 +59,7 @@ def keep_lane(pool, a, i, roster, is_certain, slope, followed):
         out[WALL_HIT] = a[HIT + i]
         for k in range(len(STEP)):
             out[FIRST_OF_STEP + k] = a[STEP[k] + i]
-        n_laws = N_LAWS_OF_DISK if pool == DISK else (N_LAWS if slope is None else N_LAWS_BUT_SLOPE)
+        n_laws = N_LAWS_OF_DISK if pool == DISK else (N_LAWS if worker.is_slope_moving else N_LAWS_BUT_SLOPE)
         for k in range(n_laws):
             out[FIRST_OF_LAWS + k] = a[NEXT_R0 + k * STRIDE + i]
 

@@ -20,7 +20,7 @@ from __future__ import annotations
 import numpy as np
 
 from fast.kernel.arithmetic import SAFETY, fma, two_sum
-from fast.kernel.compiling import kernel, packed, part, widest_registers
+from fast.kernel.compiling import packed, part, widest_registers
 
 from fast.kernel.pools import (  # isort: skip
     BACK, CERTAIN, CLOSED, COARSE, DEPTH_LAW, END, FAR, H0, H1, H2, HIT, LIMIT, M0, M1, M2, NEVER,
@@ -105,7 +105,7 @@ def cube_of_arc(r0, r1, r2, r3):
     return fma(r1, r2, r0 * r3 * (1.0 / 3.0))
 
 
-@kernel
+@packed
 def aim(a, n, is_stem, slope, limits):
     """Choose each lane's wall and guess the time, walls moving at their speed now.
 
@@ -259,7 +259,7 @@ def laws_at_hit(a, i, delta, r, r1, r2, w, w1):
     a[NEXT_W0 + i] = fma(w1, delta, w)
 
 
-@kernel
+@packed
 def fly(a, n, is_stem, is_relative, slope, degree, limits):
     """Correct each lane's time of flight once, and tell whether the step is then right and routine."""
     widest_registers()
@@ -317,7 +317,7 @@ def fly(a, n, is_stem, is_relative, slope, degree, limits):
             a[NEXT_M0 + i], a[NEXT_M1 + i], a[NEXT_M2 + i] = fma(m1, delta, m), fma(m2, delta, m1), m2
 
 
-@kernel
+@packed
 def chord(a, n, is_again, is_cap, is_relative, degree, limits):
     """Find the next arc hit of captured particles: the base is unfolded, |L| is constant.
 

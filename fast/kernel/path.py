@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from fast.kernel.bounces import bounce
 from fast.kernel.careful import NEAR
 from fast.kernel.codes import HORIZON, MUSHROOM
-from fast.kernel.compiling import part
+from fast.kernel.compiling import kernel, part
 from fast.kernel.flights import OFF, advance, correct
 from fast.kernel.follow import step_carefully
+from fast.kernel.loops import run_bounce
 
 from fast.kernel.pools import (  # isort: skip
     CERTAIN, END, HIT, NEVER, NEXT_T, NEXT_T_LOW, NEXT_VX, NEXT_VY, NEXT_X, NEXT_Y, OK, S, T,
@@ -22,26 +22,26 @@ ALONE = np.int64(1)  # lanes in use
 
 
 @part
-def next_hit(a, roster, worker, slope):
+def next_hit(a, roster, worker):
     """Find the next collision of the particle in the first lane; returns its wall, or what comes instead.
 
     The lanes' answer is taken unless the end may come before: there the careful step looks from both sides.
     """
     i, limit = np.int64(0), (worker.stops.times[-1] - a[T]) - a[T_LOW]
     if worker.is_laned and a[END + i] > -NEVER:
-        advance(GENERAL, a, ALONE, OFF, worker.scene, slope, worker.degree, worker.limits)
+        advance(GENERAL, a, ALONE, OFF, worker)
         if a[OK + i] != CERTAIN:
-            correct(GENERAL, a, 1, worker, slope)
+            correct(GENERAL, a, ALONE, worker)
         if a[OK + i] == CERTAIN and a[S + i] < limit * (1.0 - 4.0 * NEAR):
             if a[NEXT_T + i] >= a[END + i]:
                 t, t_low = a[NEXT_T + i], a[NEXT_T_LOW + i]
                 set_reference(a, i, t, t_low, worker.scene, worker.pieces, worker.degree)
             return int(a[HIT + i])
-    return step_carefully(GENERAL, a, i, roster, worker, slope)
+    return step_carefully(GENERAL, a, i, roster, worker)
 
 
-@part
-def follow_one(worker, walls, slope, paths):
+@kernel
+def follow_one(worker, walls, paths):
     """Follow each particle of a worker by itself, through as many collisions as `paths` has room for."""
     states, a, roster = worker.followed.states, worker.pools[GENERAL], worker.rosters[GENERAL]
     for j in range(states.shape[0]):
@@ -49,12 +49,12 @@ def follow_one(worker, walls, slope, paths):
         roster[PARTICLE, 0] = j
         code, n = walls[j], 0
         while n < paths.walls.shape[1]:
-            code = next_hit(a, roster, worker, slope)
+            code = next_hit(a, roster, worker)
             if code >= HORIZON:
                 a[T], a[T_LOW], a[X], a[Y] = a[NEXT_T], a[NEXT_T_LOW], a[NEXT_X], a[NEXT_Y]
                 a[VX], a[VY] = a[NEXT_VX], a[NEXT_VY]
                 break
-            bounce(a, ALONE, slope, worker.scene.table == MUSHROOM)
+            run_bounce(worker.loops.bounce, (a, ALONE, worker.slope, worker.scene.table == MUSHROOM))
             paths.walls[j, n] = code
             particle = Particle(a[T], a[T_LOW], a[X], a[Y], a[VX], a[VY], code)
             write_step(paths.steps, j, n, a[S], particle)

@@ -18,6 +18,10 @@ from fast.kernel.records import (  # isort: skip
 )  # fmt: skip
 
 
+PARABOLA, SERIES = DEGREES = 2, 12  # with the latter a harmonic takes 27 pieces
+SHORT, LONG = (0,) * PARABOLA, (0,) * SERIES  # as `law_at` takes them
+
+
 @packed
 def one_power(half_bend, rate, mean, rise, u, u_before, coefficient):
     """Take one step of Horner's rule, for the value's quotient `rise` by the time and what is made of it."""
@@ -38,7 +42,7 @@ def law_at(a, place, stride, u, u_before, degree):
         stride: how far they are apart.
         u: time since the reference.
         u_before: another one.
-        degree: a tuple as long as the degree, fast.pieces.PARABOLA or SERIES. The compiler knows its length
+        degree: a tuple as long as the degree, PARABOLA or SERIES. The compiler knows its length
             and keeps those steps that there are; a loop inside a loop over lanes would not be packed.
     """
     n = len(degree)

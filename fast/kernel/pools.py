@@ -10,7 +10,7 @@ import numpy as np
 from fast.kernel.arithmetic import fma
 from fast.kernel.codes import ARC, BASE, FLOOR, LEFT, RIGHT
 from fast.kernel.compiling import kernel, packed, part
-from fast.kernel.pieces import law_at, piece_at, third_derivative
+from fast.kernel.pieces import LONG, PARABOLA, SHORT, law_at, piece_at, third_derivative
 from fast.kernel.records import CONSTANT, KIND, RADIUS
 
 LANES = 64  # all rows of a pool stay in the first-level cache
@@ -64,7 +64,7 @@ def set_piece(a, i, piece, scene, pieces, degree):
     if scene.laws[RADIUS, KIND] == CONSTANT:
         a[BACK + i] = -NEVER
     for row in range(4):
-        for j in range(len(degree) + 2):
+        for j in range(degree + 2):
             a[LAWS + (row * N_COEFFICIENTS + j) * STRIDE + i] = pieces.coefficients[piece, row, j]
 
 
@@ -97,9 +97,8 @@ def width_of(a, i, u, r, r1, r2, is_relative, degree):
 
 
 @kernel
-def set_laws(a, i, place, t, t_low, scene, degree):
-    """Write a lane's laws at a time in its piece, in the thirteen rows from `place` on."""
-    u = (t - a[REF + i]) + (t_low - a[REF_LOW + i])
+def write_laws(a, i, place, u, scene, degree):
+    """Write a lane's laws at a time since its reference, in the thirteen rows from `place` on."""
     r, r1, r2 = law_of(a, RADIUS_LAW + i, u, degree)
     w, w1, w2, _ = width_of(a, i, u, r, r1, r2, scene.is_relative, degree)
     h, h1, h2 = law_of(a, DEPTH_LAW + i, u, degree)
@@ -107,6 +106,16 @@ def set_laws(a, i, place, t, t_low, scene, degree):
     r3 = third_derivative(a, RADIUS_LAW + i, STRIDE, u, degree)
     for j, number in enumerate((r, r1, r2, r3, w, w1, w2, h, h1, h2, m, m1, m2)):
         a[place + j * STRIDE + i] = number
+
+
+@kernel
+def set_laws(a, i, place, t, t_low, scene, degree):
+    """Write a lane's laws at a time in its piece; the degree is a number here, and the lane one of many."""
+    u = (t - a[REF + i]) + (t_low - a[REF_LOW + i])
+    if degree == PARABOLA:
+        write_laws(a, i, place, u, scene, SHORT)
+    else:
+        write_laws(a, i, place, u, scene, LONG)
 
 
 @part

@@ -106,13 +106,13 @@ class LawsInLanes(NamedTuple):
     Attributes:
         compiled: the scene's numbers.
         pieces: its laws as polynomials.
-        degree: as many zeros as their degree: numba compiles the loops anew for each, and unrolls them.
+        degree: of their polynomials, PARABOLA or SERIES of fast.kernel.pieces.
         slope: of the sides; None where it moves.
     """
 
     compiled: Compiled
     pieces: Pieces
-    degree: tuple[int, ...]
+    degree: int
     slope: float | None
 
 

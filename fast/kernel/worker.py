@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from fast.kernel.limits import LawLimits, limits_of
+from fast.kernel.loops import Loops
 from fast.kernel.pools import LANES, POOL_SIZE
 
 from fast.kernel.records import (  # isort: skip
@@ -24,7 +25,9 @@ class Worker(NamedTuple):
     Attributes:
         scene, limits: the scene, and what holds of it for all time.
         pieces: its laws as the lanes know them.
-        degree: see fast.kernel.pieces.law_at.
+        degree: of its polynomials.
+        slope, is_slope_moving: of the sides, where it stands still; whether it moves.
+        loops: the compiled loops for laws of this degree and such a slope.
         anchors: room for its laws at one time.
         is_laned: the lanes may be used.
         pools: (3, POOL_SIZE) general, disk and spare pool.
@@ -38,7 +41,10 @@ class Worker(NamedTuple):
     scene: Compiled
     limits: LawLimits
     pieces: Pieces
-    degree: tuple[int, ...]
+    degree: int
+    slope: float
+    is_slope_moving: bool
+    loops: Loops
     anchors: FloatArray
     is_laned: bool
     pools: FloatArray
@@ -55,13 +61,18 @@ def is_known_throughout(in_lanes: LawsInLanes, last: float) -> bool:
     return until > 0.0 and (abs(last) < until or last == np.inf)
 
 
-def new_worker(in_lanes: LawsInLanes, stops: Stops, followed: Followed, n_passed: int = 0) -> Worker:
+def new_worker(
+    in_lanes: LawsInLanes, loops: Loops, stops: Stops, followed: Followed, n_passed: int = 0
+) -> Worker:
     """Return a worker that holds no particle yet."""
     return Worker(
         in_lanes.compiled,
         limits_of(in_lanes.compiled),
         in_lanes.pieces,
         in_lanes.degree,
+        0.0 if in_lanes.slope is None else in_lanes.slope,
+        in_lanes.slope is None,
+        loops,
         np.zeros(ANCHORS_SHAPE),
         is_known_throughout(in_lanes, float(stops.times[-1])),
         np.zeros((3, POOL_SIZE)),

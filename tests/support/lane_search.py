@@ -84,14 +84,14 @@ class Round(LaneRound):
 
     def advance(self, a: list[float], count: int, *, is_again: bool) -> None:
         """Call the loops of the kernels that `flights.advance` calls."""
-        scene, is_stem = self.compiled, self.compiled.table == codes.STEM
-        slope, degree, limits, k = self.in_lanes.slope, self.in_lanes.degree, self.worker.limits, self.kernels
+        scene, limits, k = self.compiled, self.worker.limits, self.kernels
+        slope, degree = self.in_lanes.slope, (0,) * self.in_lanes.degree
         if self.is_disk:
             k.chord(a, count, is_again, self.is_cap, scene.is_relative, degree, limits)
             return
         if not is_again:
-            k.aim(a, count, is_stem, slope, limits)
-        k.fly(a, count, is_stem, scene.is_relative, slope, degree, limits)
+            k.aim(a, count, scene.table == codes.STEM, slope, limits)
+        k.fly(a, count, scene.table == codes.STEM, scene.is_relative, slope, degree, limits)
 
     def correct_lane(self, a: list[float], i: int) -> None:
         """Correct a step that is not yet right again, as `flights.correct` does."""

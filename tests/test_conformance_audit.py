@@ -10,13 +10,15 @@ from support import adiabatic_particles
 
 import fast
 import theory
-from conformance.audit import ledger
+from conformance.audit import evidence, ledger
 from conformance.audit.claims import (
     broadened,
     experiments,
     exponents,
     filling,
+    identities,
     many_cycles,
+    misprints,
     shapes,
     slow_growth,
 )
@@ -42,11 +44,13 @@ def audited(only="", simulate=adiabatic_particles.simulate, predict=CACHED):
 
 @pytest.fixture(scope="module", autouse=True)
 def _fewer():
-    """Draw fewer sums of cycles, whose own errors are part of every comparison, and fewer other paces."""
+    """Draw fewer sums of cycles, whose own errors are part of every comparison; and fewer digits."""
     with pytest.MonkeyPatch.context() as patch:
         for module in (broadened, many_cycles):
             patch.setattr(module, "N_DRAWN", 100_000)
         patch.setattr(shapes, "N_CLOCKS", 1)
+        for module in (evidence, identities, misprints, shapes):
+            patch.setattr(module, "DIGITS", adiabatic_particles.DIGITS)  # what is predicted is shared
         yield
         broadened.summed.cache_clear()
 

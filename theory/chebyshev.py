@@ -11,8 +11,11 @@ degree up to one that halves well.
 
 from __future__ import annotations
 
+from functools import lru_cache
 from itertools import pairwise
 from typing import Any
+
+from mpmath import MPContext
 
 FEW = 200  # degree from which sums are taken by halving
 LEAST = 32  # degree below which they are taken one by one
@@ -31,13 +34,14 @@ class Grid:
     def __init__(self, ctx: Any, n: int) -> None:
         self.ctx = ctx
         self.n = n
-        half = [ctx.cos(ctx.pi * m / n) for m in range(n // 2)] + [ctx.zero]
+        half = [*map(ctx.make_mpf, _cosines(n, ctx.prec)), ctx.zero]
         quarter_turns = half + [-c for c in reversed(half[:-1])]  # cos(pi m / n), m = 0 ... n
         self._full_turn = quarter_turns + quarter_turns[-2:0:-1]
         self.points = [(1 - c) / 2 for c in quarter_turns]
         self._rows: dict[int, list[list[Any]]] = {}
         self.weights = self._clenshaw_curtis()
-        self._forecasts = [self._extrapolation(j) for j in range(n + 1)]
+        rows = _extrapolations(n, ctx.prec)
+        self._forecasts = [[*map(ctx.make_mpf, row)] for row in rows]
 
     def _cosine_sums(self, values: list[Any]) -> list[Any]:
         """Return the sums over j of values[j] cos(pi j k / n), k = 0 ... n."""
@@ -117,15 +121,32 @@ class Grid:
         weights = self._forecasts[len(values)]
         return self.ctx.fdot(weights, values[-len(weights) :]) if weights else None
 
-    def _extrapolation(self, j: int) -> list[Any]:
-        # Lagrange weights at point j of the last points before it.
-        known = self.points[max(0, j - REACH) : j]
-        return [self.ctx.fprod((self.points[j] - x) / (y - x) for x in known if x != y) for y in known]
-
     def _clenshaw_curtis(self) -> list[Any]:
         n, ctx = self.n, self.ctx
         even = [ctx.mpf(1) / (1 - k * k) if k % 2 == 0 else ctx.zero for k in range(n + 1)]
         return self._interpolated(even)
+
+
+@lru_cache(maxsize=64)
+def _cosines(n: int, prec: int) -> tuple[Any, ...]:
+    """Return cos(pi m / n), m = 0 ... n / 2 - 1, as numbers that belong to no context; cycles share them."""
+    ctx = MPContext()
+    ctx.prec = prec
+    return tuple(ctx.cos(ctx.pi * m / n)._mpf_ for m in range(n // 2))
+
+
+@lru_cache(maxsize=64)
+def _extrapolations(n: int, prec: int) -> tuple[tuple[Any, ...], ...]:
+    """Return for each point the Lagrange weights there of the last REACH points before it, likewise."""
+    ctx = MPContext()
+    ctx.prec = prec
+    half = [*map(ctx.make_mpf, _cosines(n, prec)), ctx.zero]
+    points = [(1 - c) / 2 for c in half] + [(1 + c) / 2 for c in reversed(half[:-1])]
+    rows = []
+    for j, point in enumerate(points):
+        known = points[max(0, j - REACH) : j]
+        rows.append(tuple(ctx.fprod((point - x) / (y - x) for x in known if x != y)._mpf_ for y in known))
+    return tuple(rows)
 
 
 def even_degree(n: int) -> int:

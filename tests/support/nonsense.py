@@ -1,6 +1,6 @@
 """An implementation whose answers are nonsense of the right seq, now and then: no process, for many seeds.
 
-`Nonsense` stands in for `conformance.suite.process.Process`. The plain stepper answers, and a share of its
+`Nonsense` stands in for `conformance.suite.process.Process`. The fast stepper answers, and a share of its
 answers is spoilt: numbers, walls, whole parts changed, or an answer to another command, or an error. Lines
 stay lines of JSON: what is no JSON, or no line, is the saboteurs' business.
 """
@@ -12,9 +12,9 @@ import json
 import random
 from typing import Any
 
-from conformance import plain
-from conformance.harness.python import stepper
+import fast.__main__ as server
 from conformance.suite.process import Trouble
+from fast import next_collision
 from scene.protocol.wire import serve
 from support import fuzz
 
@@ -35,7 +35,7 @@ class Nonsense:
     def exchange(self, line: bytes, _: float) -> bytes:
         """Answer one line."""
         out = io.BytesIO()
-        serve("n", plain.next_collision, plain.trajectory, [line], out, flow=plain.flow, timer=stepper.timed)
+        serve("n", next_collision, server.follow, [line], out, flow=server.carry, timer=server.clock)
         data = json.loads(out.getvalue())
         if "profiles" in data and self.draw.random() < 0.9:
             return out.getvalue()

@@ -1,6 +1,6 @@
 """Implementations that are right in every step, and break one promise of protocol 1; no process is started.
 
-Each is the plain stepper behind `scene.protocol.wire`, in place of a process; its fault changes the request
+Each is the fast stepper behind `scene.protocol.wire`, in place of a process; its fault changes the request
 before it is answered, or the answer.
 """
 
@@ -12,9 +12,9 @@ import time
 from collections.abc import Callable
 from typing import Any
 
-from conformance import plain
-from conformance.harness.python import stepper
+import fast.__main__ as server
 from conformance.suite.process import Trouble
+from fast import next_collision
 from scene.protocol.wire import serve
 
 Line = dict[str, Any]
@@ -49,11 +49,11 @@ class Breaker:
 
 
 def honest(request: Line) -> Line:
-    """Answer as the plain stepper does."""
+    """Answer as the fast stepper does."""
     out = io.BytesIO()
     line = request["line"] if "line" in request else json.dumps(request)
     lines = [line.encode()]
-    serve("breaker", plain.next_collision, plain.trajectory, lines, out, flow=plain.flow, timer=stepper.timed)
+    serve("breaker", next_collision, server.follow, lines, out, flow=server.carry, timer=server.clock)
     answer: Line = json.loads(out.getvalue())
     return answer
 

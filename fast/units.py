@@ -22,13 +22,14 @@ import msgspec
 import numpy as np
 
 from fast.compiled import compile_scene
-from fast.kernel.records import Compiled, FloatArray
+from fast.kernel.records import Compiled, FloatArray, IntArray
 from fast.kernel.single import LARGEST, packed
 from scene import BangBang, Fourier, InvalidState, Law, Scene, State
 from scene.refusal import BadInput
 from scene.tables import laws, period
 
 LENGTH, TIME = 96, 32  # exponents of a table's size and period in the kernel
+LEAST_NORMAL = float(np.finfo(np.float64).smallest_normal)
 SLAB = 2**11  # rows brought back at a time: what lies in between stays in the cache
 ANSWER_LOST = "the answer holds a number beyond binary64: every one must be 0 or 2^-1022 to 2^1023"
 
@@ -184,30 +185,36 @@ def inward(field: str, number: float, exponent: int) -> float:
     raise InvalidState(f"{field} = {number!r}, must be {bound} beside the table's size and period")
 
 
-def outward(numbers: FloatArray, exponents: FloatArray) -> FloatArray:
+def outward(numbers: FloatArray, exponents: IntArray) -> FloatArray:
     """Return kernel numbers times 2^exponents, exactly; infinities and nans as they are.
 
     Raises:
         BadInput: one of them would lose bits, or overflow.
     """
-    if numbers.ndim <= exponents.ndim:
-        return _outward(numbers, exponents)
+    slab = numbers[:SLAB] if numbers.ndim > exponents.ndim else numbers
+    # One for each number of a slab: numpy multiplies long rows, not many short ones.
+    exponents = np.ascontiguousarray(np.broadcast_to(exponents, slab.shape))
+    is_small = exponents.size > 0 and int(np.abs(exponents).max()) <= 1000
+    factors = np.ldexp(1.0, exponents) if is_small else None
+    if slab.shape == numbers.shape:
+        return _outward(numbers, exponents, factors)
     out = np.empty_like(numbers)
     for first in range(0, len(numbers), SLAB):
-        part = slice(first, first + SLAB)
-        out[part] = _outward(numbers[part], exponents)
+        part = numbers[first : first + SLAB]
+        n = len(part)
+        out[first : first + n] = _outward(part, exponents[:n], factors if factors is None else factors[:n])
     return out
 
 
-def _outward(numbers: FloatArray, exponents: FloatArray) -> FloatArray:
+def _outward(numbers: FloatArray, exponents: IntArray, factors: FloatArray | None) -> FloatArray:
     with np.errstate(over="ignore", under="ignore"):
-        if np.abs(exponents).max() <= 1000:  # a product is exact too, and many times quicker
-            factors = np.ldexp(1.0, exponents)
-            scaled = numbers * factors
-            is_kept = (scaled / factors == numbers) | ~np.isfinite(numbers)
-        else:
-            scaled = np.ldexp(numbers, exponents)
-            is_kept = (np.ldexp(scaled, -exponents) == numbers) | ~np.isfinite(numbers)
+        # A product is exact too, and many times quicker.
+        scaled = np.ldexp(numbers, exponents) if factors is None else numbers * factors
+        # What is neither infinite nor below the normal numbers has kept its bits; the rest is looked at.
+        size = np.abs(scaled)
+        is_kept = ((size >= LEAST_NORMAL) | (numbers == 0.0)) & (size < np.inf)
+        if not is_kept.all():
+            is_kept |= (np.ldexp(scaled, -exponents) == numbers) | ~np.isfinite(numbers)
     if not is_kept.all():
         raise BadInput(ANSWER_LOST)
     return scaled

@@ -98,6 +98,17 @@ def test_no_scheduler_is_one_line(command_line, tmp_path, monkeypatch):
         assert_refused(ended, f"--dask = {address}", "no scheduler")
 
 
+@pytest.mark.parametrize("address", ["tcp://127.0.0.1:9", "nonsense://x"])
+def test_a_client_is_never_the_default_of_the_process(tmp_path, monkeypatch, address):
+    """Were it, whatever else computes with Dask would wait for a scheduler that never answers."""
+    monkeypatch.setattr(engines, "CONNECT_TIMEOUT", 0.3)
+    with pytest.raises(SystemExit) as kept:
+        run([*map(str, RUN), "--out", str(tmp_path), "--dask", address])
+    with pytest.raises(ValueError, match="No clients"):
+        distributed.default_client()
+    assert kept.value.code == 2  # its traceback holds the client until here
+
+
 def test_xarray_and_zarr_read_every_bit(stored, ensemble):
     import xarray
     import zarr

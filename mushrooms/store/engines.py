@@ -106,7 +106,9 @@ def by_dask(address: str, threads: int | None) -> Engine:
 
     def engine(asked: Asked, pieces: Iterator[Piece], tick: Tick) -> Following:
         try:
-            client = Client(address, timeout=CONNECT_TIMEOUT)
+            # Never the process's default: what else computes with Dask here would wait for this one, even
+            # after it has failed to connect.
+            client = Client(address, timeout=CONNECT_TIMEOUT, set_as_default=False)
         except (OSError, ValueError) as error:
             raise BadInput(f"--dask = {address}: no scheduler answers ({type(error).__name__})") from None
         with client:
@@ -136,7 +138,8 @@ def _handed_out(client: Any, asked: Asked, pieces: Iterator[Piece], tick: Tick, 
                 return
             tick(0)
             try:
-                done = wait(list(out), timeout=POLL_INTERVAL, return_when="FIRST_COMPLETED").done
+                with client.as_current():
+                    done = wait(list(out), timeout=POLL_INTERVAL, return_when="FIRST_COMPLETED").done
             except TimeoutError:
                 continue
             for future in done:

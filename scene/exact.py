@@ -59,8 +59,24 @@ def _primitive(p: Polynomial) -> Polynomial:
     if not p:
         return p
     common = lcm(*(a.denominator for a in p))
-    integers = [int(a * common) for a in p]
-    return [Fraction(a // gcd(*integers)) for a in integers]
+    integers = [a.numerator * (common // a.denominator) for a in p]
+    shared = gcd(*integers)
+    return [Fraction(a // shared) for a in integers]
+
+
+def remainder(p: Polynomial, q: Polynomial) -> Polynomial:
+    """Return a positive multiple of the remainder of p by q, all of them of coprime integers.
+
+    Whole numbers throughout: fractions would be reduced at every step.
+    """
+    rest, divisor = [a.numerator for a in p], [b.numerator for b in q]
+    size, sign = abs(divisor[-1]), 1 if divisor[-1] > 0 else -1
+    for shift in range(len(p) - len(q), -1, -1):
+        factor = sign * rest[shift + len(q) - 1]
+        rest = [size * a for a in rest]
+        for i, b in enumerate(divisor):
+            rest[shift + i] -= factor * b
+    return _primitive(trimmed([Fraction(a) for a in rest]))
 
 
 def divide(p: Polynomial, q: Polynomial) -> tuple[Polynomial, Polynomial]:
@@ -79,7 +95,7 @@ def squarefree(p: Polynomial) -> Polynomial:
     """Return p without the multiplicities of its roots (up to a positive factor)."""
     a, b = _primitive(p), _primitive(derivative(p))
     while b:
-        a, b = b, _primitive(divide(a, b)[1])
+        a, b = b, remainder(a, b)
     quotient = _primitive(divide(p, a)[0])
     return quotient if (quotient[-1] > 0) == (p[-1] > 0) else scale(quotient, Fraction(-1))
 
@@ -92,7 +108,7 @@ class Sturm:
         self.root_free_of_squares = squarefree(p)
         chain = [self.root_free_of_squares, _primitive(derivative(self.root_free_of_squares))]
         while chain[-1]:
-            chain.append(scale(_primitive(divide(chain[-2], chain[-1])[1]), Fraction(-1)))
+            chain.append(scale(remainder(chain[-2], chain[-1]), Fraction(-1)))
         self.chain = chain[:-1]
 
     def _variations(self, x: Fraction) -> int:

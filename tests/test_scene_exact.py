@@ -5,7 +5,7 @@ from fractions import Fraction
 from functools import reduce
 
 import pytest
-from hypothesis import given
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from scene.exact import (
@@ -16,6 +16,7 @@ from scene.exact import (
     divide,
     multiply,
     negative_point,
+    remainder,
     root_bound,
     scale,
     squarefree,
@@ -134,3 +135,19 @@ def test_the_root_bound_holds_all_roots(case):
 def test_the_zero_polynomial_vanishes_and_is_never_negative(a, b):
     assert vanishes([], Fraction(a), Fraction(b))
     assert negative_point([], Fraction(a), Fraction(b)) is None
+
+
+@given(
+    st.lists(st.integers(-9, 9), min_size=1, max_size=7), st.lists(st.integers(-9, 9), min_size=2, max_size=4)
+)
+def test_a_remainder_in_whole_numbers_is_a_positive_multiple_of_the_remainder(p, q):
+    """Sturm's chain counts changes of sign: a negative multiple would miscount."""
+    p, q = ([Fraction(a) for a in numbers] for numbers in (p, q))
+    p, q = trimmed(p), trimmed(q)
+    assume(len(q) > 1 and p)
+    found, true = remainder(p, q), divide(p, q)[1]
+    assert len(found) == len(true)
+    ratios = {a / b for a, b in zip(found, true, strict=True) if b != 0}
+    assert all(a == 0 for a, b in zip(found, true, strict=True) if b == 0)
+    assert len(ratios) <= 1
+    assert all(ratio > 0 for ratio in ratios)

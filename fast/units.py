@@ -210,9 +210,10 @@ def _outward(numbers: FloatArray, exponents: IntArray, factors: FloatArray | Non
     with np.errstate(over="ignore", under="ignore"):
         # A product is exact too, and many times quicker.
         scaled = np.ldexp(numbers, exponents) if factors is None else numbers * factors
-        # What is neither infinite nor below the normal numbers has kept its bits; the rest is looked at.
+        # What is finite and above the least normal number has kept its bits: only what lies below that number
+        # is rounded, at most up to it. The rest is looked at.
         size = np.abs(scaled)
-        is_kept = ((size >= LEAST_NORMAL) | (numbers == 0.0)) & (size < np.inf)
+        is_kept = ((size > LEAST_NORMAL) | (numbers == 0.0)) & (size < np.inf)
         if not is_kept.all():
             is_kept |= (np.ldexp(scaled, -exponents) == numbers) | ~np.isfinite(numbers)
     if not is_kept.all():

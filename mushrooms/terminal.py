@@ -26,24 +26,31 @@ SceneName = Annotated[
 ]
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON.")]
 
-# The compiled functions that a person waits for; the others take a second or two.
-SLOW_TO_COMPILE = ("careful_step", "follow_particles")
+# The compiled functions that a person waits for, and how long in all; the others take a few seconds.
+SLOW_TO_COMPILE = {
+    "careful_step": "half a minute to a minute",
+    "follow_particles": "half a minute to a minute",
+    "fine": "about ten seconds",
+}
 
 
 @contextmanager
 def compilation_told() -> Iterator[None]:
-    """Say once on stderr when the fast stepper is compiled: numba tells when it has found nothing kept."""
+    """Say on stderr when the fast stepper is compiled: numba tells when it has found nothing kept.
+
+    What is compiled one after the other and takes a while together is told once.
+    """
     from numba.core import event
 
-    was_told = False
+    told_before = set()
 
     class Teller(event.Listener):  # type: ignore[misc]  # numba has no types
         def on_start(self, told: Any) -> None:
-            nonlocal was_told
             compiled = told.data["dispatcher"]
-            if compiled.py_func.__name__ in SLOW_TO_COMPILE and compiled.stats.cache_path and not was_told:
-                was_told = True
-                what = "compiling the fast stepper for this machine: half a minute to a minute"
+            duration = SLOW_TO_COMPILE.get(compiled.py_func.__name__)
+            if duration is not None and compiled.stats.cache_path and duration not in told_before:
+                told_before.add(duration)
+                what = f"compiling the fast stepper for this machine: {duration}"
                 print(f"{what}; kept for next time", file=sys.stderr, flush=True)
 
         def on_end(self, told: Any) -> None:

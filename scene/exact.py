@@ -65,9 +65,10 @@ def _primitive(p: Polynomial) -> Polynomial:
 
 
 def remainder(p: Polynomial, q: Polynomial) -> Polynomial:
-    """Return a positive multiple of the remainder of p by q, all of them of coprime integers.
+    """Return a positive multiple of the remainder of p by q, with coprime integers.
 
-    Whole numbers throughout: fractions would be reduced at every step.
+    The coefficients of p and q must be whole numbers, as `_primitive` leaves them, and so are all on the
+    way: fractions would be reduced at every step.
     """
     rest, divisor = [a.numerator for a in p], [b.numerator for b in q]
     size, sign = abs(divisor[-1]), 1 if divisor[-1] > 0 else -1

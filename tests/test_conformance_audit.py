@@ -44,7 +44,7 @@ def audited(only="", simulate=adiabatic_particles.simulate, predict=CACHED):
 
 @pytest.fixture(scope="module", autouse=True)
 def _fewer():
-    """Draw fewer sums of cycles, whose own errors are part of every comparison; and fewer digits."""
+    """Draw fewer sums of cycles, whose own errors are part of every comparison; fewer paces and digits."""
     with pytest.MonkeyPatch.context() as patch:
         for module in (broadened, many_cycles):
             patch.setattr(module, "N_DRAWN", 100_000)

@@ -19,7 +19,7 @@ from conformance.grading.agreement import compare
 from fast import step as stepper
 from fast.compiled import compile_scene
 from fast.kernel.single import packed
-from fast.units import Fitted
+from fast.units import Fitted, outward
 from scene import BangBang, Cap, Collision, Fourier, Mushroom, Rejected, State, load
 from scene.refusal import BadInput
 from scene.transforms import scaled
@@ -113,3 +113,15 @@ def test_lanes_take_scenes_of_both_kinds_of_laws():
     scene = replace(MIXED, nu=Fourier(0.5, sin=(0.2,), period=1.0))
     run = fast.simulate(scene, n_particles=20, energy=1e5, seed=1)
     assert run.n_careful.sum() < 0.05 * run.n_collisions.sum()
+
+
+@pytest.mark.parametrize("exponent", [-1, -1001])
+def test_what_is_rounded_up_to_the_least_normal_number_is_refused(exponent):
+    """It looks like one that has kept its bits."""
+    least = np.finfo(np.float64).smallest_normal
+    kept = np.ldexp([least, 1.5 * least, 0.0, -least], -exponent)
+    assert np.array_equal(np.ldexp(outward(kept, np.array(exponent)), -exponent), kept)
+    rounded = np.ldexp([np.nextafter(1.0, 0.0)], -1022 - exponent)
+    assert np.ldexp(rounded, exponent) == least
+    with pytest.raises(BadInput, match="beyond binary64"):
+        outward(rounded, np.array(exponent))

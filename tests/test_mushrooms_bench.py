@@ -16,7 +16,6 @@ from support.refusals import assert_refused
 from conformance import vectors
 from conformance.bench import comparison, record, work, workloads
 from mushrooms import bench
-from mushrooms.figures import speed
 from mushrooms.figures import speed as figures_of_speed
 
 ROOT = Path(__file__).parent.parent
@@ -82,7 +81,7 @@ def test_a_slow_down_exits_with_1(call, tmp_path, monkeypatch):
     kept = msgspec.structs.replace(kept, points=points, questions=bench.QUESTIONS["quick"], size="quick")
     monkeypatch.setattr(bench, "_measured", lambda *_: kept)
     for picture in ("speed", "growth", "work"):  # another test looks at them
-        monkeypatch.setattr(speed, picture, lambda *_: b"<svg/>")
+        monkeypatch.setattr(figures_of_speed, picture, lambda *_: b"<svg/>")
     files = {}
     for name, factor in (("same", 1.0), ("faster", 0.5)):
         old = tuple(msgspec.structs.replace(p, ns=tuple(factor * ns for ns in p.ns)) for p in points)

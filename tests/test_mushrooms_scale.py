@@ -99,7 +99,7 @@ def test_no_scheduler_is_one_line(command_line, tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize("address", ["tcp://127.0.0.1:9", "nonsense://x"])
-def test_a_client_is_never_the_default_of_the_process(tmp_path, monkeypatch, address):
+def test_a_client_that_failed_is_not_the_default_of_the_process(tmp_path, monkeypatch, address):
     """Were it, whatever else computes with Dask would wait for a scheduler that never answers."""
     monkeypatch.setattr(engines, "CONNECT_TIMEOUT", 0.3)
     with pytest.raises(SystemExit) as kept:

@@ -106,7 +106,7 @@ def by_dask(address: str, threads: int | None) -> Engine:
 
     def engine(asked: Asked, pieces: Iterator[Piece], tick: Tick) -> Following:
         try:
-            # Never the process's default: what else computes with Dask here would wait for this one, even
+            # Not the process's default: what else computes with Dask here would wait for this one, even
             # after it has failed to connect.
             client = Client(address, timeout=CONNECT_TIMEOUT, set_as_default=False)
         except (OSError, ValueError) as error:

@@ -19,7 +19,7 @@ import theory
 from fast.kernel.kept import LANE_ROWS
 from scene.tables import cycle_length
 
-DIGITS = 12  # of predictions: three beyond what ten thousand particles tell would do
+DIGITS = 12  # of predictions, many more than thousands of particles can tell
 TOGETHER = 4000  # particles drawn at a time
 WIDTH = 11.0  # of the uncaptured peak, times E0^(1/4), where no frozen rates are known
 

@@ -19,9 +19,8 @@ from fast.fine import FineTrajectory, as_pairs, as_trajectory, fill_path
 from fast.flow import follow_to
 from fast.kernel import codes, pools
 from fast.kernel.compiling import SOURCES
-from fast.kernel.flights import OFF, advance, correct
+from fast.kernel.flights import OFF, advance, collide, correct
 from fast.kernel.laws import set_anchors
-from fast.kernel.loops import loops_of, run_bounce, run_rebound
 from fast.kernel.pools import whole_registers
 from fast.kernel.records import ANCHORS_SHAPE, FloatArray, Particle, unfilled_ends
 from fast.kernel.walls import wall_residual
@@ -58,14 +57,10 @@ def _entries(sources):
         correct(pool, a, n, worker)
 
     @njit(cache=True, error_model="numpy")
-    def bounce_lanes(pool, a, n, worker):
+    def collide_lanes(pool, a, n, worker):
         """Bounce n lanes off the walls that they have met."""
         sources  # noqa: B018
-        if pool == DISK:
-            run_rebound(worker.loops.rebound, (a, n))
-        else:
-            is_mushroom = worker.scene.table == codes.MUSHROOM
-            run_bounce(worker.loops.bounce, (a, n, worker.slope, is_mushroom))
+        collide(pool, a, n, worker)
 
     @njit(cache=True, error_model="numpy")
     def residual(particle, scene, anchors):
@@ -74,10 +69,10 @@ def _entries(sources):
         set_anchors(scene.laws, anchors, particle.t, particle.t_low)
         return wall_residual(particle.wall, particle.x, particle.y, scene, anchors)
 
-    return fill_lane, find_hits, bounce_lanes, residual
+    return fill_lane, find_hits, collide_lanes, residual
 
 
-fill_lane, find_hits, bounce_lanes, residual = _entries(SOURCES)
+fill_lane, find_hits, collide_lanes, residual = _entries(SOURCES)
 
 
 def careful_steps(scene: Scene, states: Sequence[State], n_times: int = 1) -> tuple[list[Outcome], float]:
@@ -152,8 +147,7 @@ class LaneRound:
         self.compiled = compile_scene(scene)
         self.is_disk = bool(self.compiled.table == codes.CAP)
         self.in_lanes = laws_in_lanes(scene)
-        nobody = unfilled_ends(np.empty((0, 6)), 1, (1, 1))
-        self.worker = new_worker(self.in_lanes, loops_of(self.in_lanes), only_stop(np.inf), nobody)
+        self.worker = new_worker(self.in_lanes, only_stop(np.inf), unfilled_ends(np.empty((0, 6)), 1, (1, 1)))
         self.serves = float(np.diff(self.in_lanes.pieces.begins, append=self.in_lanes.pieces.period).max())
         self.anchors = np.zeros(ANCHORS_SHAPE)
         self.pool = np.zeros(pools.POOL_SIZE)
@@ -185,7 +179,7 @@ class LaneRound:
 
     def bounced(self, pool: np.integer[Any], n: int, dt: FloatArray) -> FloatArray:
         """Bounce n lanes off the walls that they have met; returns rows of dt, x, y, vx, vy."""
-        bounce_lanes(pool, self.pool, np.int64(n), self.worker)
+        collide_lanes(pool, self.pool, np.int64(n), self.worker)
         return np.column_stack([dt, *(self.row(r, n) for r in PLACE)])
 
     def find(self, pool: np.integer[Any], n: int) -> tuple[npt.NDArray[np.bool_], FloatArray, FloatArray]:

@@ -28,7 +28,6 @@ from fast.given import (
     given_threads,
 )
 from fast.kernel import codes, entries
-from fast.kernel.loops import loops_of
 from fast.kernel.records import (
     FloatArray,
     Followed,
@@ -355,11 +354,11 @@ def follow(
         The seconds that took.
     """
     n = len(followed.states)
-    size, loops = _share(n, threads, len(stops.narrowings)), loops_of(in_lanes)
+    size = _share(n, threads, len(stops.narrowings))
 
     def work(first: int) -> None:
         part = slice(first, first + size)
-        worker = new_worker(in_lanes, loops, stops, followed.part(part), n_passed)
+        worker = new_worker(in_lanes, stops, followed.part(part), n_passed)
         entries.follow_particles(worker, walls[part], NO_PATHS)
 
     work(n)  # none at all: compiles, or loads from the disk cache, so that `seconds` holds work alone

@@ -8,7 +8,6 @@ import numpy as np
 
 from fast.given import MAX_STEPS, given_end
 from fast.kernel import codes, entries
-from fast.kernel.loops import loops_of
 from fast.kernel.records import FloatArray, unfilled_ends, unfilled_paths
 from fast.kernel.worker import new_worker
 from fast.pieces import laws_in_lanes
@@ -61,7 +60,7 @@ def trajectory(scene: Scene, state: State, n_collisions: int, t_end: float = np.
     in_lanes = laws_in_lanes(fit(scene).scene)
     if n_collisions:
         stop = only_stop(start.units.horizon(t_end))
-        worker = new_worker(in_lanes, loops_of(in_lanes), stop, unfilled_ends(rows, 1, (1, 1)))
+        worker = new_worker(in_lanes, stop, unfilled_ends(rows, 1, (1, 1)))
         entries.follow_particles(worker, walls, paths)
     n, code = paths.counts.item(), paths.codes.item()
     steps = start.units.steps(paths.steps[0, :n])

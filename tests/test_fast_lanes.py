@@ -12,11 +12,11 @@ import re
 import numpy as np
 import pytest
 from msgspec.structs import replace
-from numba import typeof
+from numba import typeof, types
 
 import fast
 from fast.compiled import compile_scene
-from fast.kernel import bounces, lanes
+from fast.kernel import bounces, lanes, loops
 from fast.kernel.limits import LawLimits
 from fast.pieces import PARABOLA, SERIES
 from fast.starts import initial_states
@@ -47,6 +47,12 @@ def test_the_compiler_packs_divisions_and_square_roots(loop, degree, slope):
     assert re.search(r"vdivpd\s+.*%[yz]mm", assembly)
     if loop == "aim":
         assert re.search(r"vsqrtpd\s+.*%[yz]mm", assembly)
+
+
+def test_an_address_is_refused_to_who_expects_another_result():
+    """Called all the same, it would write over what is not its own."""
+    with pytest.raises(TypeError, match="rebound_lanes returns none"):
+        loops.address(loops.rebound_lanes, types.float64(*loops.REBOUND.args))
 
 
 def moving_cap(**laws):

@@ -1,7 +1,8 @@
 """How kernels are compiled: by themselves, or as parts of their callers.
 
 numba optimises every compiled function together with all that it calls, and again with each of its callers,
-so long chains of calls compile slowly. A function with one or two callers is better a part of them.
+so long chains of calls compile slowly. A short function is better a part of its callers; a long one costs
+more as a part, whose text is copied and typed again with each. What many need is called by its address.
 """
 
 from __future__ import annotations

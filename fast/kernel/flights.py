@@ -1,12 +1,12 @@
-"""The next collision of all lanes of a pool, and corrections of those that are not yet right."""
+"""The next collision of all lanes of a pool, corrections of those not yet right, and the bounce."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from fast.kernel.codes import CAP, STEM
+from fast.kernel.codes import CAP, MUSHROOM, STEM
 from fast.kernel.compiling import kernel, part
-from fast.kernel.loops import run_aim, run_chord, run_fly
+from fast.kernel.loops import run_aim, run_bounce, run_chord, run_fly, run_rebound
 
 from fast.kernel.pools import (  # isort: skip
     COARSE, END, FAR, LAWS, NEVER, NEXT_VX, N_COEFFICIENTS, OK, S, STRIDE, T, T_LOW, copy_rows,
@@ -37,6 +37,15 @@ def advance(pool, a, n, is_again, worker):
     if not is_again:
         run_aim(loops.aim, (a, n, table == STEM, worker.slope, limits))
     run_fly(loops.fly, (a, n, table == STEM, is_relative, worker.slope, limits))
+
+
+@part
+def collide(pool, a, n, worker):
+    """Bounce the first n lanes of a pool off the walls that they have met."""
+    if pool == DISK:
+        run_rebound(worker.loops.rebound, (a, n))
+    else:
+        run_bounce(worker.loops.bounce, (a, n, worker.slope, worker.scene.table == MUSHROOM))
 
 
 @part

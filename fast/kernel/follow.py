@@ -19,9 +19,9 @@ from fast.kernel.arithmetic import fma
 from fast.kernel.bounces import arrive
 from fast.kernel.codes import ANEW, ARC, CAP, HORIZON, MUSHROOM, N_WALLS
 from fast.kernel.compiling import kernel, part
-from fast.kernel.flights import OFF, advance, correct
+from fast.kernel.flights import OFF, advance, collide, correct
 from fast.kernel.kept import keep_lane, take_lane
-from fast.kernel.loops import run_bounce, run_careful, run_rebound
+from fast.kernel.loops import run_careful
 
 from fast.kernel.pools import (  # isort: skip
     CERTAIN, CLOSED, DONE, END, HIT, LANES, NEVER, NEXT_R0, NEXT_T, NEXT_T_LOW, NEXT_VX, NEXT_VY, NEXT_W0,
@@ -141,6 +141,14 @@ def step_carefully(pool, a, i, roster, worker):
     return code
 
 
+@part
+def keep_up_laws(a, i, worker):
+    """Give a lane the piece of the laws that serves at its next collision, where its own does no longer."""
+    t, t_low = a[NEXT_T + i], a[NEXT_T_LOW + i]
+    if t >= a[END + i]:
+        set_reference(a, i, t, t_low, worker.scene, worker.pieces, worker.degree)
+
+
 @kernel
 def attend(pool, a, i, roster, worker):
     """Do for a lane what `advance` could not; returns whether it stays, moves to the other pool or ends."""
@@ -157,8 +165,7 @@ def attend(pool, a, i, roster, worker):
     if followed.lanes.shape[1] > 0 and not (is_certain and a[NEXT_T + i] < end):
         keep_lane(pool, a, i, roster, is_certain, worker)  # it may end here
     if is_certain:
-        if a[NEXT_T + i] >= a[END + i]:
-            set_reference(a, i, a[NEXT_T + i], a[NEXT_T_LOW + i], scene, worker.pieces, worker.degree)
+        keep_up_laws(a, i, worker)
         code = int(a[HIT + i])
     else:
         code = step_carefully(pool, a, i, roster, worker)
@@ -198,6 +205,8 @@ def change_place(worker, pool, i, other, j):
 def needs_a_piece_alone(pool, a, i, roster, worker):
     """Tell whether all that `attend` would do for a lane is to give it the next piece of the laws.
 
+    As `fly` and `chord` have it in ROUTINE, but for END: no stay ends, no pool changes, and no stop comes
+    before the collision, the last one neither, so that nothing is noted or kept.
     Where laws are quick that is so for every few flights, and a call of `attend` takes longer than a flight.
     """
     is_certain = a[OK + i] == CERTAIN and a[END + i] > -NEVER and worker.n_passed <= roster[NEXT_STOP, i]
@@ -218,9 +227,7 @@ def scan(pool, worker):
         fate = STAYS
         if not (a[ROUTINE + i] > 0.0 and worker.is_laned):
             if worker.is_laned and needs_a_piece_alone(pool, a, i, roster, worker):
-                if a[NEXT_T + i] >= a[END + i]:
-                    t, t_low = a[NEXT_T + i], a[NEXT_T_LOW + i]
-                    set_reference(a, i, t, t_low, worker.scene, worker.pieces, worker.degree)
+                keep_up_laws(a, i, worker)
             else:
                 fate = attend(pool, a, i, roster, worker)
         if fate == STAYS:
@@ -289,7 +296,4 @@ def follow(worker, walls):
                 if worker.is_laned:
                     correct(pool, a, n_held[pool], worker)
                 scan(pool, worker)
-            if pool == GENERAL:
-                run_bounce(worker.loops.bounce, (a, n, worker.slope, scene.table == MUSHROOM))
-            else:
-                run_rebound(worker.loops.rebound, (a, n))
+            collide(pool, a, n, worker)

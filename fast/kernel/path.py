@@ -5,15 +5,14 @@ from __future__ import annotations
 import numpy as np
 
 from fast.kernel.careful import NEAR
-from fast.kernel.codes import HORIZON, MUSHROOM
+from fast.kernel.codes import HORIZON
 from fast.kernel.compiling import kernel, part
-from fast.kernel.flights import OFF, advance, correct
-from fast.kernel.follow import step_carefully
-from fast.kernel.loops import run_bounce
+from fast.kernel.flights import OFF, advance, collide, correct
+from fast.kernel.follow import keep_up_laws, step_carefully
 
 from fast.kernel.pools import (  # isort: skip
     CERTAIN, END, HIT, NEVER, NEXT_T, NEXT_T_LOW, NEXT_VX, NEXT_VY, NEXT_X, NEXT_Y, OK, S, T,
-    T_LOW, VX, VY, WALL, X, Y, load, set_reference,
+    T_LOW, VX, VY, WALL, X, Y, load,
 )  # fmt: skip
 from fast.kernel.records import Particle, particle_at, write_state, write_step
 from fast.kernel.worker import GENERAL, PARTICLE
@@ -33,9 +32,7 @@ def next_hit(a, roster, worker):
         if a[OK + i] != CERTAIN:
             correct(GENERAL, a, ALONE, worker)
         if a[OK + i] == CERTAIN and a[S + i] < limit * (1.0 - 4.0 * NEAR):
-            if a[NEXT_T + i] >= a[END + i]:
-                t, t_low = a[NEXT_T + i], a[NEXT_T_LOW + i]
-                set_reference(a, i, t, t_low, worker.scene, worker.pieces, worker.degree)
+            keep_up_laws(a, i, worker)
             return int(a[HIT + i])
     return step_carefully(GENERAL, a, i, roster, worker)
 
@@ -54,7 +51,7 @@ def follow_one(worker, walls, paths):
                 a[T], a[T_LOW], a[X], a[Y] = a[NEXT_T], a[NEXT_T_LOW], a[NEXT_X], a[NEXT_Y]
                 a[VX], a[VY] = a[NEXT_VX], a[NEXT_VY]
                 break
-            run_bounce(worker.loops.bounce, (a, ALONE, worker.slope, worker.scene.table == MUSHROOM))
+            collide(GENERAL, a, ALONE, worker)
             paths.walls[j, n] = code
             particle = Particle(a[T], a[T_LOW], a[X], a[Y], a[VX], a[VY], code)
             write_step(paths.steps, j, n, a[S], particle)

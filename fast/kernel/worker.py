@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from fast.kernel.limits import LawLimits, limits_of
-from fast.kernel.loops import Loops
+from fast.kernel.loops import Loops, loops_of
 from fast.kernel.pools import LANES, POOL_SIZE
 
 from fast.kernel.records import (  # isort: skip
@@ -61,9 +61,7 @@ def is_known_throughout(in_lanes: LawsInLanes, last: float) -> bool:
     return until > 0.0 and (abs(last) < until or last == np.inf)
 
 
-def new_worker(
-    in_lanes: LawsInLanes, loops: Loops, stops: Stops, followed: Followed, n_passed: int = 0
-) -> Worker:
+def new_worker(in_lanes: LawsInLanes, stops: Stops, followed: Followed, n_passed: int = 0) -> Worker:
     """Return a worker that holds no particle yet."""
     return Worker(
         in_lanes.compiled,
@@ -72,7 +70,7 @@ def new_worker(
         in_lanes.degree,
         0.0 if in_lanes.slope is None else in_lanes.slope,
         in_lanes.slope is None,
-        loops,
+        loops_of(in_lanes),
         np.zeros(ANCHORS_SHAPE),
         is_known_throughout(in_lanes, float(stops.times[-1])),
         np.zeros((3, POOL_SIZE)),

@@ -1,8 +1,9 @@
 """How kernels are compiled: by themselves, or as parts of their callers.
 
 numba optimises every compiled function together with all that it calls, and again with each of its callers,
-so long chains of calls compile slowly. A short function is better a part of its callers; a long one costs
-more as a part, whose text is copied and typed again with each. What many need is called by its address.
+so long chains of calls compile slowly. Kernels stop short of that: see fast.kernel.linked. A short function
+is better a part of its callers; a long one costs more as a part, whose text is copied and typed again with
+each. What many need is called by its address.
 """
 
 from __future__ import annotations
@@ -17,6 +18,8 @@ from numba import config, njit, types
 from numba.core import cgutils
 from numba.core.typing import Signature
 from numba.extending import intrinsic
+
+from fast.kernel.linked import ForCallers
 
 # No fastmath, so that results are the same bits on every machine; quotients by zero are infinite or nan, as
 # in numpy. Who enters the kernel holds its arrays while it runs, hence no references are counted in it: each
@@ -41,7 +44,7 @@ def _for_compiled_callers(**options: Any) -> Callable[[Any], Any]:
     """Return a decorator that compiles without what Python would need to call a function; it is refused."""
 
     def compiled(function: Any) -> Any:
-        dispatcher = njit(**HOW, no_cpython_wrapper=True, **options)(function)
+        dispatcher = njit(**HOW, no_cpython_wrapper=True, pipeline_class=ForCallers, **options)(function)
         if not config.DISABLE_JIT:
             dispatcher._insert = _kept_from_python
             dispatcher._compile_for_args = _refused_to_python

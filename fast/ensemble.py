@@ -40,7 +40,7 @@ from fast.kernel.records import (
 from fast.kernel.worker import new_worker
 from fast.narrowings import narrowings
 from fast.pieces import laws_in_lanes
-from fast.starts import cycle_length, cycle_stops, initial_states, least_collisions
+from fast.starts import cycle_stops, initial_states, least_collisions, one_cycle
 from fast.units import Units, fit, inward
 from scene import Scene
 from scene.notebook import rows
@@ -300,7 +300,7 @@ def planned(
     units = Units(fitted.length, fitted.time or 0)
     scene, speed2 = fitted.scene, 2.0 * inward("energy", energy, 2 * (units.length - units.time))
     check_kept(n_particles, n_cycles, len(phases), len(narrowings(scene)))
-    ahead = least_collisions(scene, math.sqrt(speed2), n_cycles * cycle_length(scene))
+    ahead = least_collisions(scene, math.sqrt(speed2), n_cycles * one_cycle(scene))
     if ahead > MAX_COLLISIONS:
         raise BadInput(
             f"energy = {energy}: over {ahead:.0e} collisions of each particle, must be at most 1e9"

@@ -18,7 +18,7 @@ from fast.narrowings import narrowings, start_time
 from scene import Scene
 from scene.geometry import table_at
 from scene.laws import bounds
-from scene.tables import laws, period
+from scene.tables import cycle_length, laws
 
 
 def initial_states(scene: Scene, n_particles: int, energy: float, seed: int, first: int = 0) -> FloatArray:
@@ -57,10 +57,9 @@ def _directions(turns: FloatArray) -> FloatArray:
     return out
 
 
-def cycle_length(scene: Scene) -> float:
-    """Return the period of the laws, 1 for a static scene."""
-    shared = period(scene)
-    return float(shared.value(fp)) if shared else 1.0
+def one_cycle(scene: Scene) -> float:
+    """Return how long a cycle takes [time]: the period of the laws, 1 for a static scene."""
+    return cycle_length(scene) or 1.0
 
 
 def cycle_stops(scene: Scene, n_cycles: int, phases: Sequence[float]) -> Stops:
@@ -68,7 +67,7 @@ def cycle_stops(scene: Scene, n_cycles: int, phases: Sequence[float]) -> Stops:
 
     The mouth's narrowings are stops too; one at the end of a cycle comes before that end.
     """
-    start, span = start_time(scene), cycle_length(scene)
+    start, span = start_time(scene), one_cycle(scene)
     count = np.arange(n_cycles)
     narrow = np.array(narrowings(scene))
     parts = np.array([*narrow, *phases, 1.0])

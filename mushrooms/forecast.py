@@ -10,7 +10,7 @@ from mpmath import fp
 from fast.batch import flights
 from fast.ensemble import SHARE
 from fast.narrowings import start_time
-from fast.starts import cycle_length, initial_states
+from fast.starts import initial_states, one_cycle
 from scene import Cap, Mushroom, Scene, State, Stem
 from scene.geometry import table_at
 from scene.refusal import BadInput
@@ -90,7 +90,7 @@ def _collisions_of_a_cycle(scene: Scene, energy: float) -> float:
     Particles uniform in place and direction meet the walls, of length P around an area A, at the rate
     v P / (pi A), however they move; in a cycle v^2 goes as 1 / A.
     """
-    begin, span, n_times = start_time(scene), cycle_length(scene), 64
+    begin, span, n_times = start_time(scene), one_cycle(scene), 64
     area, _ = _size(scene, begin)
     sizes = [_size(scene, begin + span * (k + 0.5) / n_times) for k in range(n_times)]
     rates = [math.sqrt(2.0 * energy * area / a) * walls / (math.pi * a) for a, walls in sizes]

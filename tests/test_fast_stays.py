@@ -15,7 +15,7 @@ import fast
 import theory
 from fast import starts
 from fast.narrowings import narrowings, start_time
-from fast.starts import cycle_length, cycle_stops, initial_states
+from fast.starts import cycle_stops, initial_states, one_cycle
 from scene import BangBang, Fourier, Mushroom, State, load
 from scene.laws import value
 from scene.tables import width_factors
@@ -61,7 +61,7 @@ def stays_along(scene, start, hits):
 
 def slots_along(scene, start, path, cycle):
     """Return (2, M): t_in, t_out of a cycle, from what is known when it ends."""
-    span = cycle_length(scene)
+    span = one_cycle(scene)
     begin_of_cycle, end_of_cycle = (start_time(scene) + span * k for k in (cycle, cycle + 1.0))
     hits = zip(path.walls, path.steps.tolist(), strict=True)
     stays = stays_along(scene, start, [hit for hit in hits if hit[1][1] < end_of_cycle])
@@ -80,7 +80,7 @@ CASES = {**MOUTHS, "at the cycle's end": AT_THE_END, "moving-cap": load("moving-
 def test_stays_are_those_of_the_definition(name, tally):
     """In the cycles before chaos parts a particle from its trajectory, which other roundings lead."""
     scene, n, n_cycles = CASES[name], 100, 3
-    span = cycle_length(scene)
+    span = one_cycle(scene)
     energy = 0.5 * (25.0 / span) ** 2
     run = fast.simulate(scene, n_particles=n, energy=energy, n_cycles=n_cycles, seed=3)
     assert run.t_in.shape == run.t_out.shape == (n, n_cycles, len(narrowings(scene)))

@@ -59,7 +59,7 @@ def clocks() -> st.SearchStrategy[Clock]:
     sixteenths = st.integers(8, 64).map(lambda n: n / 16)
     starts = st.one_of(st.just(0.0), st.integers(-32, 32).map(lambda n: n / 16))
     return st.one_of(
-        _between(0.5, 8.0).map(lambda omega: Clock("fourier", omega)),
+        _SHARES.map(lambda share: Clock("fourier", 0.5 + 7.5 * share)),
         st.builds(Clock, st.just("bang-bang"), sixteenths, starts),
         st.just(Clock("constant")),
     )
@@ -70,21 +70,32 @@ def _scatter(n: int, bits: int) -> int:
     return (n * 648055) & ((1 << bits) - 1)
 
 
-# Made once: Hypothesis validates every strategy anew that is made while it draws.
+# Made once, and functions that draw from them: Hypothesis looks through every strategy anew that is made
+# while it draws, which takes longer than to draw from it.
 _SHARES = st.integers(0, 2**20).map(lambda n: 1.0 if n == 2**20 else _scatter(n, 20) / 2**20)
 _PLACES = st.integers(0, 2**20 - 1)
 _KNOTS = st.integers(1, 4095).map(lambda n: _scatter(n, 12))
 _N_WAVES = st.sampled_from([(i, j) for i in range(5) for j in range(5) if i + j])
 _TURNS = st.one_of(st.integers(-2, 3), st.sampled_from((0, 0, 1000, -1000)))
+_ONE_OF_SIX, _ONE_OF_FIVE, _ONE_OF_FOUR, _ONE_OF_THREE = (st.integers(0, n) for n in (5, 4, 3, 2))
+_COIN = st.booleans()
+_N_LEGS = st.integers(2, 6)
+_INNER_KNOTS = {n: st.lists(_KNOTS, min_size=n, max_size=n, unique=True) for n in range(1, 6)}
+_SHIFTS = st.sampled_from((0.0, 1 / 3))
+_POWERS = st.integers(-20, 20)
+_CLEARANCES = st.sampled_from((0.5, 2.0**-4, 2.0**-20))
+_SLOPES = st.sampled_from(("positive", "zero", "negative", "moving"))
+_WAITS = st.sampled_from((4.0, 1.0, 0.125, 2.0**-20, 0.0))
+_LIFTS = st.integers(2, 50)
 
 
-def _between(low: float, high: float) -> st.SearchStrategy[float]:
+def _between(draw: st.DrawFn, low: float, high: float) -> float:
     # Even on a grid of 2^-20 of the range, the ends included.
-    return _SHARES.map(lambda share: min(low + (high - low) * share, high))
+    return min(low + (high - low) * draw(_SHARES), high)
 
 
-def _one_of(options: Sequence[T]) -> st.SearchStrategy[T]:
-    return _PLACES.map(lambda n: options[_scatter(n, 20) * len(options) >> 20])
+def _one_of(draw: st.DrawFn, options: Sequence[T]) -> T:
+    return options[_scatter(draw(_PLACES), 20) * len(options) >> 20]
 
 
 @st.composite
@@ -101,42 +112,40 @@ def laws(draw: st.DrawFn, low: float = 0.5, high: float = 2.0, clock: Clock | No
         A constant (sometimes under any clock, and then sometimes written as a law that moves by
         nothing), 1 to 4 harmonics, or 2 to 6 legs. Fourier laws sometimes touch a bound exactly.
     """
-    clock = draw(clocks()) if clock is None else clock
-    if clock.kind == "constant" or draw(st.integers(0, 5)) == 5:
-        constant = draw(_between(low, high))
+    return _law(draw, low, high, draw(clocks()) if clock is None else clock)
+
+
+def _law(draw: st.DrawFn, low: float, high: float, clock: Clock) -> Law:
+    if clock.kind == "constant" or draw(_ONE_OF_SIX) == 5:
+        constant = _between(draw, low, high)
         still = BangBang(knots=((clock.start, constant), (clock.start + clock.rate, constant)))
         flat = Fourier(mean=constant, omega=clock.rate, cos=(0.0,))
         ways: list[Law] = [constant, constant, flat, still]
-        return draw(st.sampled_from(ways))
+        return ways[draw(_ONE_OF_FOUR)]
     if clock.kind == "fourier":
-        return draw(_fourier(low, high, clock.rate))
-    return draw(_bang_bang(low, high, clock))
+        return _fourier(draw, low, high, clock.rate)
+    return _bang_bang(draw, low, high, clock)
 
 
-@st.composite
 def _fourier(draw: st.DrawFn, low: float, high: float, omega: float) -> Fourier:
-    mean = draw(_between(0.75 * low + 0.25 * high, 0.25 * low + 0.75 * high))
+    mean = _between(draw, 0.75 * low + 0.25 * high, 0.25 * low + 0.75 * high)
     swing = min(high - mean, mean - low)
     n_cos, n_sin = draw(_N_WAVES)
     if (n_cos, n_sin) == (1, 0):
         # One cosine that reaches the nearer bound, exactly where mean and bound are dyadic.
         return Fourier(mean=mean, omega=omega, cos=(swing if mean + swing <= high else swing * MARGIN,))
     size = swing * MARGIN / (n_cos + n_sin)
-    amplitudes = st.one_of(st.just(size), _between(-size, size))
-    cos = tuple(draw(st.lists(amplitudes, min_size=n_cos, max_size=n_cos)))
-    sin = tuple(draw(st.lists(amplitudes, min_size=n_sin, max_size=n_sin)))
-    return Fourier(mean=mean, omega=omega, cos=cos, sin=sin)
+    amplitudes = [_between(draw, -size, size) if draw(_COIN) else size for _ in range(n_cos + n_sin)]
+    return Fourier(mean=mean, omega=omega, cos=tuple(amplitudes[:n_cos]), sin=tuple(amplitudes[n_cos:]))
 
 
-@st.composite
 def _bang_bang(draw: st.DrawFn, low: float, high: float, clock: Clock) -> BangBang:
     # Inner knots on a grid of 1/4096 of the period; or off every grid, to 1/3 of a step.
-    n_legs = draw(st.integers(2, 6))
-    places = draw(st.lists(_KNOTS, min_size=n_legs - 1, max_size=n_legs - 1, unique=True))
-    shift = draw(st.sampled_from((0.0, 1 / 3)))
+    n_legs = draw(_N_LEGS)
+    places = draw(_INNER_KNOTS[n_legs - 1])
+    shift = draw(_SHIFTS)
     times = [clock.start + clock.rate * ((place + shift) / 4096) for place in sorted(places)]
-    levels = st.one_of(_between(low, high), st.sampled_from((low, high)))
-    values = draw(st.lists(levels, min_size=n_legs, max_size=n_legs))
+    values = [(low, high)[draw(_COIN)] if draw(_COIN) else _between(draw, low, high) for _ in range(n_legs)]
     times = [clock.start, *times, clock.start + clock.rate]
     return BangBang(knots=tuple(zip(times, [*values, values[0]], strict=True)))
 
@@ -154,47 +163,45 @@ def scenes(draw: st.DrawFn, table: str | None = None) -> Scene:
         nu = 1; slope positive, zero, negative or moving. Sizes [length] and periods [time] are of
         order 1, in one scene of three scaled by powers of two from 2^-20 to 2^20.
     """
-    table = draw(_one_of(("mushroom", "cap", "stem"))) if table is None else table
+    table = _one_of(draw, ("mushroom", "cap", "stem")) if table is None else table
     clock = draw(clocks())
     scene: Scene
     if table == "cap":
-        scene = Cap(r=draw(laws(0.25, 2.0, clock)))
+        scene = Cap(r=_law(draw, 0.25, 2.0, clock))
     elif table == "stem":
-        w = draw(laws(0.125, 2.0, clock))
-        h = draw(laws(0.25, 4.0, clock))
-        scene = Stem(w=w, h=h, slope=draw(_slopes(bounds(w).lowest, bounds(h).highest, clock)))
+        w = _law(draw, 0.125, 2.0, clock)
+        h = _law(draw, 0.25, 4.0, clock)
+        scene = Stem(w=w, h=h, slope=_slopes(draw, bounds(w).lowest, bounds(h).highest, clock))
     else:
-        scene = draw(_mushrooms(clock))
-    if draw(st.integers(0, 2)) == 2:
-        scene = rescale(scene, draw(st.integers(-20, 20)), draw(st.integers(-20, 20)))
+        scene = _mushroom(draw, clock)
+    if draw(_ONE_OF_THREE) == 2:
+        scene = rescale(scene, draw(_POWERS), draw(_POWERS))
     return scene
 
 
-@st.composite
-def _mushrooms(draw: st.DrawFn, clock: Clock) -> Mushroom:
-    r = draw(laws(0.5, 2.0, clock))
-    h = draw(laws(0.25, 4.0, clock))
+def _mushroom(draw: st.DrawFn, clock: Clock) -> Mushroom:
+    r = _law(draw, 0.5, 2.0, clock)
+    h = _law(draw, 0.25, 4.0, clock)
     narrowest, deepest = bounds(r).lowest, bounds(h).highest
-    if draw(st.booleans()):
-        nu = draw(laws(0.125, 1.0, clock))
+    if draw(_COIN):
+        nu = _law(draw, 0.125, 1.0, clock)
         narrowest *= bounds(nu).lowest
-        return Mushroom(r=r, nu=nu, h=h, slope=draw(_slopes(narrowest, deepest, clock)))
-    w = draw(laws(narrowest / 8, narrowest * MARGIN, clock))
-    return Mushroom(r=r, w=w, h=h, slope=draw(_slopes(bounds(w).lowest, deepest, clock)))
+        return Mushroom(r=r, nu=nu, h=h, slope=_slopes(draw, narrowest, deepest, clock))
+    w = _law(draw, narrowest / 8, narrowest * MARGIN, clock)
+    return Mushroom(r=r, w=w, h=h, slope=_slopes(draw, bounds(w).lowest, deepest, clock))
 
 
-@st.composite
 def _slopes(draw: st.DrawFn, narrowest: float, deepest: float, clock: Clock) -> Law:
     # A stem that widens downwards may do so freely; one that narrows must stay open at its floor.
-    steepest = narrowest / deepest * (1 - draw(st.sampled_from((0.5, 2.0**-4, 2.0**-20))))
-    kind = draw(st.sampled_from(("positive", "zero", "negative", "moving")))
+    steepest = narrowest / deepest * (1 - draw(_CLEARANCES))
+    kind = draw(_SLOPES)
     if kind == "zero":
         return 0.0
     if kind == "positive":
-        return draw(_between(steepest / 64, steepest))
+        return _between(draw, steepest / 64, steepest)
     if kind == "negative":
-        return draw(_between(-1.0, -1 / 64))
-    return draw(laws(-0.5, steepest, clock))
+        return _between(draw, -1.0, -1 / 64)
+    return _law(draw, -0.5, steepest, clock)
 
 
 def rescale(scene: Scene, length: int, time: int) -> Scene:
@@ -274,14 +281,14 @@ def states(draw: st.DrawFn, scene: Scene) -> tuple[State, float]:
         late enough for a collision, or early, or t itself. Half of the states leave a wall: they
         lie on it up to the rounding of x and y, and their gap to it grows.
     """
-    t = draw(_times(scene))
+    t = _time(draw, scene)
     place = _Place.of(scene, t)
-    wall: Wall | None = draw(_one_of([*(None for _ in scene.walls), *scene.walls]))
-    wall, x, y = draw(_places(place, wall))
-    speed = (walls_speed(scene) or place.near.size) * 10 ** draw(_between(-3.0, 6.0))
-    vx, vy = draw(_headings(place, wall, x, y))
+    wall: Wall | None = _one_of(draw, [*(None for _ in scene.walls), *scene.walls])
+    wall, x, y = _placed(draw, place, wall)
+    speed = (walls_speed(scene) or place.near.size) * 10 ** _between(draw, -3.0, 6.0)
+    vx, vy = _heading(draw, place, wall, x, y)
     vx, vy = _leaving(place, wall, x, y, speed * vx, speed * vy)
-    flight = place.near.size / speed * draw(st.sampled_from((4.0, 1.0, 0.125, 2.0**-20, 0.0)))
+    flight = place.near.size / speed * draw(_WAITS)
     if length := cycle_length(scene):
         flight = min(flight, LONGEST_FLIGHT * length)
     state, t_end = State(t, x, y, vx, vy, wall), t + flight
@@ -307,22 +314,21 @@ def adversarial(family: str | None = None) -> st.SearchStrategy[Any]:
     return st.builds(lambda name, index: FAMILIES[name].attack(0, index), names, st.integers(0, 2**32 - 1))
 
 
-@st.composite
-def _times(draw: st.DrawFn, scene: Scene) -> float:
+def _time(draw: st.DrawFn, scene: Scene) -> float:
     length = cycle_length(scene) or 1.0
     knots = [float(t) for law in laws_of(scene).values() for t in breakpoints(law)] or [0.0]
     turns = draw(_TURNS)
-    inside = fractions().map(lambda part: length * (turns + part))
-    at_knot = st.sampled_from(knots).map(lambda knot: length * turns + knot)
-    return draw(st.one_of(st.just(0.0), inside, inside, inside, at_knot))
+    way = draw(_ONE_OF_FIVE)
+    if way == 4:
+        return length * turns + _one_of(draw, knots)
+    return length * (turns + draw(fractions())) if way else 0.0
 
 
-@st.composite
-def _places(draw: st.DrawFn, place: _Place, wall: Wall | None) -> tuple[Wall | None, float, float]:
+def _placed(draw: st.DrawFn, place: _Place, wall: Wall | None) -> tuple[Wall | None, float, float]:
     regions = {Cap: ("cap",), Stem: ("stem",), Mushroom: ("mouth", "cap", "stem", "cap", "stem")}
-    site: str = wall or draw(_one_of(regions[type(place.near.scene)]))
+    site: str = wall or _one_of(draw, regions[type(place.near.scene)])
     a, b = draw(fractions()), draw(fractions())
-    if site == "cap" and draw(st.integers(0, 5)) == 5:
+    if site == "cap" and draw(_ONE_OF_SIX) == 5:
         # Low over the base, near the mouth's edge (in a cap: near the centre).
         a = min(a, 1 - a)
         b = min(place.near.w / place.near.r * (0.5 + b), 1 - 2.0**-30)
@@ -332,11 +338,10 @@ def _places(draw: st.DrawFn, place: _Place, wall: Wall | None) -> tuple[Wall | N
         if place.is_clear(x, y, wall):
             return wall, x, y
     # Only the base of a mushroom may be too short to hold a point: the mouth is as wide as the cap.
-    return draw(_places(place, "arc"))
+    return _placed(draw, place, "arc")
 
 
-@st.composite
-def _headings(draw: st.DrawFn, place: _Place, wall: Wall | None, x: float, y: float) -> tuple[float, float]:
+def _heading(draw: st.DrawFn, place: _Place, wall: Wall | None, x: float, y: float) -> tuple[float, float]:
     # A unit vector: any direction; along an axis; to or around the centre; grazing the wall it leaves.
     turn = 2 * math.pi * draw(fractions())
     any_way = (math.cos(turn), math.sin(turn))
@@ -344,11 +349,11 @@ def _headings(draw: st.DrawFn, place: _Place, wall: Wall | None, x: float, y: fl
     distance = math.hypot(x, y) or 1.0
     radial = [(-x / distance, -y / distance), (-y / distance, x / distance)] if x or y else axes[:2]
     if wall is None:
-        return draw(st.one_of(st.just(any_way), st.just(any_way), st.sampled_from(axes + radial)))
+        return _one_of(draw, axes + radial) if draw(_ONE_OF_THREE) == 2 else any_way
     nx, ny = place.near.normal(wall, x, y)
-    lift, sense = 2.0 ** -draw(st.integers(2, 50)), draw(st.sampled_from((1.0, -1.0)))
+    lift, sense = 2.0 ** -draw(_LIFTS), 1.0 if draw(_COIN) else -1.0
     grazing = (lift * nx - sense * ny, lift * ny + sense * nx)
-    return draw(st.sampled_from((any_way, any_way, grazing, grazing, (nx, ny), *axes)))
+    return _one_of(draw, (any_way, any_way, grazing, grazing, (nx, ny), *axes))
 
 
 def _leaving(place: _Place, wall: Wall | None, x: float, y: float, *v: float) -> tuple[float, float]:

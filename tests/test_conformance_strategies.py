@@ -19,15 +19,16 @@ from scene.states import ON_WALL, check_numbers
 from scene.tables import laws as laws_of
 from scene.tables import period
 
+CTX = MPContext()  # making one takes longer than what is computed in it
+CTX.dps = 60
+
 
 class Table:
     """Positions and rates of all walls at one instant, by the definitions of sec. 2."""
 
     def __init__(self, scene, t):
-        self.ctx = MPContext()
-        self.ctx.dps = 60
-        at = {name: value(self.ctx, law, t) for name, law in laws_of(scene).items()}
-        rate = {name: value(self.ctx, law, t, 1) for name, law in laws_of(scene).items()}
+        at = {name: value(CTX, law, t) for name, law in laws_of(scene).items()}
+        rate = {name: value(CTX, law, t, 1) for name, law in laws_of(scene).items()}
         if "nu" in at:
             at["w"] = at["nu"] * at["r"]
             rate["w"] = rate["nu"] * at["r"] + at["nu"] * rate["r"]
@@ -35,7 +36,7 @@ class Table:
 
     def walls(self, state):
         """Each wall's (f, f') at the particle: f > 0 inside, f' along its flight."""
-        x, y, vx, vy = map(self.ctx.mpf, (state.x, state.y, state.vx, state.vy))
+        x, y, vx, vy = map(CTX.mpf, (state.x, state.y, state.vx, state.vy))
         at, rate = self.at, self.rate
         found = {"base": (-y, -vy) if self.is_stem else (y, vy)}
         if "r" in at:
@@ -57,10 +58,10 @@ def walls_around(scene, table, state):
     if state.y > 0 or state.wall == "arc":
         return ("arc", "base")
     if state.y == 0 and state.wall == "base":
-        assert abs(table.ctx.mpf(state.x)) > table.at["w"]
+        assert abs(CTX.mpf(state.x)) > table.at["w"]
         return ("arc", "base")
     if state.y == 0:
-        assert abs(table.ctx.mpf(state.x)) < table.at["w"]
+        assert abs(CTX.mpf(state.x)) < table.at["w"]
         return ("arc",)
     return ("left", "right", "floor")
 
@@ -219,7 +220,7 @@ def test_times_reach_zero_knots_and_negative_times(drawn):
         knots = {t for law in laws_of(scene).values() if isinstance(law, BangBang) for t, _ in law.knots}
         when["knot"] += state.t in knots
         if shared is not None:
-            when["late"] += abs(state.t) > 100 * shared.value(MPContext())
+            when["late"] += abs(state.t) > 100 * shared.value(CTX)
     assert_reached(when, ["zero", "negative", "knot", "late"], 5)
 
 

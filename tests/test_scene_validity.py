@@ -103,20 +103,20 @@ def careless_mushrooms(draw):
 
 
 N_SAMPLES = 128
+CTX = MPContext()
+CTX.dps = 30
 
 
 def least_margin(found):
     """The smallest of all conditions of a mushroom with these laws over dense sampling, at 30 digits."""
-    ctx = MPContext()
-    ctx.dps = 30
     shared = shared_period(found.values())
-    times = [ctx.mpf(0)]
+    times = [CTX.mpf(0)]
     if shared is not None:
-        times = [shared.value(ctx) * k / N_SAMPLES for k in range(N_SAMPLES)]
-        times += [exact(ctx, t) for law in found.values() for t in breakpoints(law)]
-    least = ctx.inf
+        times = [shared.value(CTX) * k / N_SAMPLES for k in range(N_SAMPLES)]
+        times += [exact(CTX, t) for law in found.values() for t in breakpoints(law)]
+    least = CTX.inf
     for t in times:
-        at = {name: value(ctx, law, t) for name, law in found.items()}
+        at = {name: value(CTX, law, t) for name, law in found.items()}
         w = at["w"] if "w" in at else at["nu"] * at["r"]
         least = min(least, at["r"], at["h"], w, at["r"] - w, w - at["h"] * at["slope"])
     return least
@@ -135,7 +135,7 @@ def most_missed(given):
     found = {name: bounds(law) for name, law in given.items()}
     bend_w = found["w"].curvature if "w" in found else product(found["nu"], found["r"])
     bends = bend_w + found["r"].curvature + found["h"].curvature + product(found["h"], found["slope"])
-    return bends * float(shared.value(MPContext()) / N_SAMPLES) ** 2 / 8
+    return bends * float(shared.value(CTX) / N_SAMPLES) ** 2 / 8
 
 
 def test_the_proof_agrees_with_dense_sampling(tally):

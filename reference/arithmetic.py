@@ -25,7 +25,7 @@ BITS_PER_DIGIT = 3.3219280948873626
 # needs at 50 digits, some 15,000 for a plain step at 10,000 digits; 0.1 to 0.35 ms a unit on one idle core.
 MAX_WORK = 20_000.0
 LONG_NUMBER = 1024  # bits; arithmetic with so long a number takes twice as long as with a short one
-_FLOOR = "f"
+_FLOOR, _CEILING = "f", "c"
 # mpmath keeps pi and the precision it was computed to in two variables that all contexts share:
 # a thread that reads one before and the other after a change would get a wrong pi.
 _CONSTANTS = threading.Lock()
@@ -129,8 +129,9 @@ class Arithmetic:
     def number(self, value: float | int | Fraction) -> Interval:
         """Enclose a number: exactly when it is a float or a short integer."""
         if isinstance(value, Fraction):
-            return self.context.mpf(value.numerator) / self.context.mpf(value.denominator)
-        return self.context.mpf(value)
+            return self.number(value.numerator) / self.number(value.denominator)
+        exactly = libmpf.from_int if isinstance(value, int) else libmpf.from_float
+        return self.context.make_mpf((exactly(value, self.prec, _FLOOR), exactly(value, self.prec, _CEILING)))
 
     def dyadic(self, value: Fraction) -> Interval:
         """Return the thin interval at a rational whose denominator is a power of two, exactly."""
@@ -234,7 +235,7 @@ class Arithmetic:
 
     def _pi(self, bits: int) -> Interval:
         with _CONSTANTS:
-            low, high = libelefun.mpf_pi(bits, _FLOOR), libelefun.mpf_pi(bits, "c")
+            low, high = libelefun.mpf_pi(bits, _FLOOR), libelefun.mpf_pi(bits, _CEILING)
         return self.context.make_mpf((low, high))
 
     def enclosure(self, x: Interval) -> Enclosure:

@@ -22,6 +22,10 @@ def _sum(a: Interval | None, b: Interval | None) -> Interval | None:
     return a + b
 
 
+def _twice(x: Interval) -> Interval:
+    return x + x  # exact, and no 2 is to be enclosed
+
+
 def add(p: Jet, q: Jet) -> Jet:
     """Return p + q."""
     return Jet(p.f + q.f, _sum(p.d1, q.d1), _sum(p.d2, q.d2))
@@ -39,7 +43,7 @@ def multiply(p: Jet, q: Jet) -> Jet:
         d1 = p.d1 * q.f
     if q.d1 is not None:
         d1 = _sum(d1, p.f * q.d1)
-        d2 = None if p.d1 is None else 2 * (p.d1 * q.d1)
+        d2 = None if p.d1 is None else _twice(p.d1 * q.d1)
     if p.d2 is not None:
         d2 = _sum(d2, p.d2 * q.f)
     if q.d2 is not None:
@@ -54,7 +58,7 @@ def square(arithmetic: Arithmetic, p: Jet) -> Jet:
     d2 = arithmetic.square(p.d1)
     if p.d2 is not None:
         d2 = d2 + p.f * p.d2
-    return Jet(arithmetic.square(p.f), 2 * (p.f * p.d1), 2 * d2)
+    return Jet(arithmetic.square(p.f), _twice(p.f * p.d1), _twice(d2))
 
 
 def united(arithmetic: Arithmetic, jets: Sequence[Jet]) -> Jet:

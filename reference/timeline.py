@@ -96,25 +96,29 @@ class Waves:
         self.arithmetic = arithmetic
         self.mean = arithmetic.number(law.mean)
         self.omega, self.phase = arithmetic.turning(law.omega, law.period, instant)
-        self.terms = [(k, a, b) for k, a, b in law.harmonics()]
+        number = arithmetic.number
+        self.terms = []
+        for k, a, b in law.harmonics():
+            frequency = number(k) * self.omega
+            amplitudes = number(a) if a else None, number(b) if b else None
+            self.terms.append((number(k), frequency, arithmetic.square(frequency), *amplitudes))
 
     def jet(self, s: Interval) -> Jet:
         """Sum the harmonics and their derivatives."""
-        number, arithmetic = self.arithmetic.number, self.arithmetic
+        arithmetic = self.arithmetic
         arithmetic.spend(WORK_OF_A_WAVE * len(self.terms))
         f, d1, d2 = self.mean, arithmetic.zero, arithmetic.zero
         phase = self.phase + self.omega * s
-        for k, a, b in self.terms:
+        for k, frequency, frequency_squared, a, b in self.terms:
             cos, sin = arithmetic.cos_sin(k * phase)
-            frequency = k * self.omega
             wave, quadrature = arithmetic.zero, arithmetic.zero
-            if a:
-                wave, quadrature = number(a) * cos, -(number(a) * sin)
-            if b:
-                wave, quadrature = wave + number(b) * sin, quadrature + number(b) * cos
+            if a is not None:
+                wave, quadrature = a * cos, -(a * sin)
+            if b is not None:
+                wave, quadrature = wave + b * sin, quadrature + b * cos
             f = f + wave
             d1 = d1 + frequency * quadrature
-            d2 = d2 - arithmetic.square(frequency) * wave
+            d2 = d2 - frequency_squared * wave
         return Jet(f, d1, d2)
 
     def knots(self, low: Fraction, high: Fraction) -> list[Fraction]:

@@ -8,7 +8,7 @@ With an interval of flight times, each enclosure holds over all of it, knots inc
 from __future__ import annotations
 
 from fractions import Fraction
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from reference.arithmetic import Arithmetic, Interval
 from reference.jets import Jet, add, multiply, negative, square
@@ -42,6 +42,8 @@ class MovingWalls:
         self.flight = flight
         self.is_stem = isinstance(scene, Stem)
         self.timeline = Timeline(arithmetic, scene, flight.instant)
+        # Neighbouring intervals ask for the ends they share, and each proof for what the one before it found.
+        self._known: dict[tuple[Wall, Any], tuple[Jet, float]] = {}
 
     def law(self, name: str, s: Interval) -> Jet:
         """Enclose a law and its derivatives over an interval of flight time."""
@@ -55,6 +57,17 @@ class MovingWalls:
 
     def wall(self, wall: Wall, s: Interval) -> Jet:
         """Enclose f, f', f'' of a wall over flight times s."""
+        key = wall, s._mpi_
+        if key in self._known:
+            jet, cost = self._known[key]
+            self.arithmetic.work.spend(cost)  # a limit on work must not depend on what is kept
+            return jet
+        before = self.arithmetic.work.spent
+        jet = self._evaluated(wall, s)
+        self._known[key] = jet, self.arithmetic.work.spent - before
+        return jet
+
+    def _evaluated(self, wall: Wall, s: Interval) -> Jet:
         q = self.flight
         y = Jet(q.y + q.vy * s, q.vy, None)
         if wall == "base":

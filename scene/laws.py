@@ -293,7 +293,7 @@ def _trigonometric(ctx: Any, law: Fourier, t: Any, order: int) -> Any:
     omega = frequency(ctx, law)
     for k, c, s in law.harmonics():
         rate = k * omega
-        cos, sin = ctx.cos(rate * t), ctx.sin(rate * t)
+        cos, sin = ctx.cos_sin(rate * t)
         if order == 1:
             cos, sin = -rate * sin, rate * cos
         elif order == 2:

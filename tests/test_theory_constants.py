@@ -5,12 +5,13 @@ from __future__ import annotations
 import threading
 from typing import Any
 
+import pytest
 from mpmath import MPContext
 from mpmath.libmp import libelefun
 
 import theory
 from scene import load
-from theory import constants, mean_of, predict
+from theory import constants, mean_of, predict, solutions
 
 
 def test_no_thread_computes_while_another_does() -> None:
@@ -44,7 +45,8 @@ def test_whatever_computes_with_mpmath_holds_the_lock() -> None:
         assert hasattr(getattr(theory.Cycle, method), "__wrapped__"), method
 
 
-def test_constants_rest_once_settled() -> None:
+def test_constants_rest_once_settled(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(solutions, "FEW_DIGITS", 0)  # nothing is known already
     ctx = MPContext()
     ctx.dps = 200
     constants.settle(ctx)

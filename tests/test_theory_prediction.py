@@ -11,7 +11,7 @@ import pytest
 from mpmath import MPContext
 
 from scene import BangBang, Fourier, Mushroom, Scene, load
-from theory import NotConverged, Prediction, predict, v_cap, v_cha, volumes_at
+from theory import NotConverged, Prediction, predict, solutions, v_cap, v_cha, volumes_at
 from theory.volumes import delta_slope
 
 MAIN = ("fixed-cap-anticlockwise", "fixed-cap-clockwise", "moving-cap", "moving-cap-reversed")
@@ -246,7 +246,8 @@ def test_strings_have_the_digits_asked() -> None:
     assert found.sd_of_mean(4) == found.sd / 2
 
 
-def test_threads_at_different_digits_do_not_disturb_each_other() -> None:
+def test_threads_at_different_digits_do_not_disturb_each_other(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(solutions, "FEW_DIGITS", 0)  # each computes
     before = mpmath.mp.prec
     scene = load("fixed-cap-clockwise")
     alone = [predict(scene, digits).strings(digits) for digits in (12, 25)]

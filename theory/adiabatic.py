@@ -229,10 +229,15 @@ def captures(cycle: Cycle, target: int, told: Callable[[float], None] | None = N
     Raises:
         NotConverged: panels as small as 2^-MAX_HALVINGS of a piece do not resolve it.
     """
-    grid = Grid(cycle.ctx, even_degree(2 * (12 + target)))
+    grid = grid_for(cycle.ctx, target)
     start = cycle.ctx.zero, cycle.ctx.zero
     headway = Headway(len(cycle.pieces), told)
     return Captures(cycle, grid, target, _window(cycle, grid, cycle.valley, start, target, headway))
+
+
+def grid_for(ctx: Any, target: int) -> Grid:
+    """Return the points at which panels are sampled."""
+    return Grid(ctx, even_degree(2 * (12 + target)))
 
 
 def _window(
@@ -311,8 +316,9 @@ def _sampled(
         nu, slope = _descent(ctx, piece, (part[0] + x) * width)
         found.t_in.append(piece.capture.time(nu, grid.forecast(found.t_in)))
         found.t_out.append(piece.release.time(nu, grid.forecast(found.t_out)))
-        before = piece.capture.motion.volumes(found.t_in[-1], nu)
-        after = piece.release.motion.volumes(found.t_out[-1], nu)
+        share = delta(ctx, nu)
+        before = piece.capture.motion.volumes(found.t_in[-1], nu, share)
+        after = piece.release.motion.volumes(found.t_out[-1], nu, share)
         a, b = before.v_cap / before.v_cha, after.v_cap / after.v_cha
         d_delta = delta_slope(ctx, nu) * slope * width
         found.nu.append(nu)

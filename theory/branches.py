@@ -20,9 +20,10 @@ from numpy.typing import NDArray
 
 from scene.refusal import check_scene
 from scene.tables import Scene
-from theory.adiabatic import Captures, Window, captures
+from theory.adiabatic import Captures, Window
 from theory.constants import guarded
 from theory.cycle import Cycle
+from theory.solutions import solved
 
 Floats = NDArray[np.float64]
 
@@ -181,7 +182,7 @@ def tree(scene: Scene) -> Node:
 @lru_cache(maxsize=32)
 def _solved(scene: Scene) -> Node:
     # Every curve and histogram of a scene asks for its tree again. Its arrays are shared, hence read only.
-    found = captures(Cycle.of(scene, DIGITS), DIGITS + 4)
+    found = solved(scene, Cycle.of(scene, DIGITS), DIGITS + 4)
     return _node(found, found.root, iter([_branch(found, k) for k in range(len(found.placed))]))
 
 

@@ -11,11 +11,14 @@ degree up to one that halves well.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import lru_cache
 from itertools import pairwise
+from operator import mul
 from typing import Any
 
 from mpmath import MPContext
+from mpmath.libmp import from_man_exp
 
 FEW = 200  # degree from which sums are taken by halving
 LEAST = 32  # degree below which they are taken one by one
@@ -37,6 +40,7 @@ class Grid:
         half = [*map(ctx.make_mpf, _cosines(n, ctx.prec)), ctx.zero]
         quarter_turns = half + [-c for c in reversed(half[:-1])]  # cos(pi m / n), m = 0 ... n
         self._full_turn = quarter_turns + quarter_turns[-2:0:-1]
+        self._whole_turn, self._exponent = _aligned(self._full_turn)
         self.points = [(1 - c) / 2 for c in quarter_turns]
         self._rows: dict[int, list[list[Any]]] = {}
         self.weights = self._clenshaw_curtis()
@@ -53,11 +57,20 @@ class Grid:
         even, odd = _folded(values)
         step = self.n // n
         if n not in self._rows:
-            turn = self._full_turn
+            turn = self._whole_turn
             self._rows[n] = [
                 [turn[j * k * step % (2 * self.n)] for j in range(n // 2 + 1)] for k in range(n + 1)
             ]
-        return [self.ctx.fdot(odd if k % 2 else even, row) for k, row in enumerate(self._rows[n])]
+        dot_even, dot_odd = self._products(even), self._products(odd)
+        return [(dot_odd if k % 2 else dot_even)(row) for k, row in enumerate(self._rows[n])]
+
+    def _products(self, values: list[Any]) -> Callable[[list[Any]], Any]:
+        """Return a function from whole cosines, or the first of them, to their sum with values as weights."""
+        whole, exponent = _aligned(values)
+        exponent += self._exponent
+        prec, rounding = self.ctx._prec_rounding
+        make = self.ctx.make_mpf
+        return lambda row: make(from_man_exp(sum(map(mul, whole, row)), exponent, prec, rounding))
 
     def _sums_by_halving(self, values: list[Any]) -> list[Any]:
         n = len(values) - 1
@@ -77,10 +90,12 @@ class Grid:
             key = -size
             if key not in self._rows:
                 half = step // 2
+                whole = self._whole_turn
                 self._rows[key] = [
-                    [turn[j * (2 * k + 1) * half % around] for j in range(size)] for k in range(size)
+                    [whole[j * (2 * k + 1) * half % around] for j in range(size)] for k in range(size)
                 ]
-            return [self.ctx.fdot(values, row) for row in self._rows[key]]
+            dot = self._products(values)
+            return [dot(row) for row in self._rows[key]]
         own = self._odd_sums(values[::2])
         odd = values[1::2]
         pairs = self._odd_sums([odd[0], *(a + b for a, b in pairwise(odd))])
@@ -125,6 +140,16 @@ class Grid:
         n, ctx = self.n, self.ctx
         even = [ctx.mpf(1) / (1 - k * k) if k % 2 == 0 else ctx.zero for k in range(n + 1)]
         return self._interpolated(even)
+
+
+def _aligned(values: list[Any]) -> tuple[list[Any], int]:
+    """Return numbers as whole multiples of one power of two, exactly, and its exponent."""
+    raw = [value._mpf_ for value in values]
+    least = min((exponent for _, mantissa, exponent, _ in raw if mantissa), default=0)
+    return [
+        (-mantissa if sign else mantissa) << (exponent - least) if mantissa else 0
+        for sign, mantissa, exponent, _ in raw
+    ], least
 
 
 @lru_cache(maxsize=64)

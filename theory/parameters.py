@@ -39,10 +39,10 @@ class MovingMushroom:
         (w, w_rate), (r, r_rate) = self._at(t, "w", "r")
         return w / r, (w_rate * r - w * r_rate) / (r * r)
 
-    def volumes(self, t: Any, nu: Any) -> Volumes:
-        """Return the volumes at time t, where the mouth is known to be nu."""
+    def volumes(self, t: Any, nu: Any, share: Any = None) -> Volumes:
+        """Return the volumes at time t, where the mouth is known to be nu; share: delta(nu), if known."""
         (r, _), (h, _), (slope, _) = self._at(t, "r", "h", "slope")
-        return volumes_of(self.ctx, r, nu, h, slope)
+        return volumes_of(self.ctx, r, nu, h, slope, share)
 
 
 def _parameter(ctx: Any, piece: Piece) -> Parameter:

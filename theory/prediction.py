@@ -17,11 +17,12 @@ from scene.notebook import rows
 from scene.refusal import BadInput, check_count, check_number, shown
 from scene.tables import Mushroom, Scene
 from scene.transforms import backwards
-from theory.adiabatic import Captures, NotConverged, captures
+from theory.adiabatic import Captures, NotConverged
 from theory.constants import guarded
 from theory.cycle import GUARD, Cycle
 from theory.given import MAX_DIGITS, MAX_ORDER
 from theory.measure import logarithm
+from theory.solutions import solved
 from theory.volumes import as_mushroom
 
 MAX_CYCLES = 2**53
@@ -192,7 +193,7 @@ def converged(
     previous: tuple[Any, ...] | None = None
     for number, target in enumerate(range(digits + 4, digits + GUARD - 8, 12), 1):
         told = None if progress is None else partial(progress, number)
-        found = captures(cycle, target, told)
+        found = solved(scene, cycle, target, told)
         current = tuple(ctx.zero if abs(x) < noise else x for x in figures(found))
         if previous is not None and len(current) == len(previous):
             changes = (abs(x - y) <= agreement * abs(x) for x, y in zip(current, previous, strict=True))

@@ -111,10 +111,10 @@ def volumes_at(ctx: Any, scene: Scene, t: Any) -> Volumes:
     return volumes_of(ctx, r, nu, h, slope)
 
 
-def volumes_of(ctx: Any, r: Any, nu: Any, h: Any, slope: Any) -> Volumes:
-    """Return all volumes from the table's parameters, the mouth given by nu = w / r."""
+def volumes_of(ctx: Any, r: Any, nu: Any, h: Any, slope: Any, share: Any = None) -> Volumes:
+    """Return all volumes from the table's parameters, nu = w / r; share: delta(nu) where it is known."""
     cap, stem = v_cap(ctx, r), v_stem(ctx, nu * r, h, slope)
-    island = delta(ctx, nu) * cap
+    island = (delta(ctx, nu) if share is None else share) * cap
     return Volumes(cap, stem, island, cap + stem - island, nu)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 import shutil
 import sys
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 
 import msgspec
@@ -22,10 +22,15 @@ ROOT = Path(__file__).parent.parent
 FILES = ["bench.html", "bench.json", "bench.svg", "hard-cases.md"]
 
 
+@cache
+def hard_cases():
+    return [v for v in vectors.load("stress") if v.group in ("hard-case-01", "hard-case-23")]
+
+
 @pytest.fixture(autouse=True)
 def _small(monkeypatch):
     """Two workloads, a few questions, hard cases and particles."""
-    hard = [v for v in vectors.load("stress") if v.group in ("hard-case-01", "hard-case-23")]
+    hard = list(hard_cases())
     monkeypatch.setattr(vectors, "load", lambda *_: hard)
     monkeypatch.setattr(workloads, "RULES", workloads.RULES[:1] + workloads.RULES[2:3])
     monkeypatch.setattr(bench, "QUESTIONS", {"quick": 2, "full": 64})

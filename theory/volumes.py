@@ -33,6 +33,10 @@ def v_cap(ctx: Any, r: Any) -> Any:
     """Return pi^2 r^2, the volume over the half disk of radius r [length]. Source: Eq:Vcap."""
     check_system(ctx)
     check_real(r=r)
+    return _over_cap(ctx, r)
+
+
+def _over_cap(ctx: Any, r: Any) -> Any:
     return ctx.pi**2 * r * r
 
 
@@ -40,6 +44,10 @@ def v_stem(ctx: Any, w: Any, h: Any, slope: Any) -> Any:
     """Return 2 pi (2 w h - h^2 slope), the volume over the stem. Source: Eq:Vcap."""
     check_system(ctx)
     check_real(w=w, h=h, slope=slope)
+    return _over_stem(ctx, w, h, slope)
+
+
+def _over_stem(ctx: Any, w: Any, h: Any, slope: Any) -> Any:
     return 2 * ctx.pi * (2 * w * h - h * h * slope)
 
 
@@ -113,7 +121,8 @@ def volumes_at(ctx: Any, scene: Scene, t: Any) -> Volumes:
 
 def volumes_of(ctx: Any, r: Any, nu: Any, h: Any, slope: Any, share: Any = None) -> Volumes:
     """Return all volumes from the table's parameters, nu = w / r; share: delta(nu) where it is known."""
-    cap, stem = v_cap(ctx, r), v_stem(ctx, nu * r, h, slope)
+    # The numbers of a scene need no check; most of theory comes by here.
+    cap, stem = _over_cap(ctx, r), _over_stem(ctx, nu * r, h, slope)
     island = (delta(ctx, nu) if share is None else share) * cap
     return Volumes(cap, stem, island, cap + stem - island, nu)
 

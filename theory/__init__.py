@@ -1,8 +1,9 @@
 """The paper's closed forms and quadratures, at any precision.
 
 `volumes` and `invariants` are its formulas. `cycle` says when particles are captured and released,
-`adiabatic` what they gain, and `prediction` the figures that follow; `density` and `distribution` are of
-energies after one cycle, `saddle` and `large_deviations` after many. `blur` is all this at finite energy.
+`adiabatic` what they gain, which `solutions` keeps, and `prediction` the figures that follow; `density` and
+`distribution` are of energies after one cycle, `saddle` and `large_deviations` after many. `blur` is all this
+at finite energy.
 """
 
 from theory.adiabatic import NotConverged

@@ -74,7 +74,7 @@ def _at_energy(scene: Scene, energy: float) -> dict[str, float | bool | None]:
     """Return the figures of one cycle at an initial energy.
 
     Raises:
-        NotCovered: no frozen rates of the scene are known.
+        NotCovered: no frozen rates of the scene are known, or the energy is too low for them.
     """
     import theory
 

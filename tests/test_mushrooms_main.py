@@ -184,6 +184,7 @@ def test_theory_adds_what_finite_energy_does(command_line):
     for arguments, words in (
         (["moving-cap", "--energy", "0"], ["--energy = 0.0"]),
         (["untilted", "--energy", "1e6"], ["no frozen rates", "untilted"]),
+        (["fixed-cap-anticlockwise", "--energy", "1e4"], ["energy = 10000.0", "too soon"]),
     ):
         assert_refused(command_line("theory", *arguments), *words)
 

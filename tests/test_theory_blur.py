@@ -164,3 +164,27 @@ def test_the_table_covers_every_phase_with_its_errors() -> None:
         assert (rates.diffusion_error > 0).all()
         assert (rates.diffusion_error < 0.3 * rates.diffusion).all()
         assert (rates.diffusion[:, 1] > rates.diffusion[:, 0] - 5 * rates.diffusion_error.sum(axis=1)).all()
+
+
+def known_at(name: str, energy: float) -> FiniteEnergy | None:
+    try:
+        return at_energy(load(name), energy)
+    except theory.NotCovered:
+        return None
+
+
+@pytest.mark.parametrize("name", CYCLES)
+@pytest.mark.parametrize("energy", [1e-300, 1e-3, 1.0, 10.0, 100.0, 1e4, 1e6, 1e300])
+def test_at_any_energy_there_is_a_distribution_or_none_is_told(name: str, energy: float) -> None:
+    """Corrections of the order v^-1 and v^(-2/3) that outweigh what they correct had left sd = 51 i."""
+    found = known_at(name, energy)
+    if found is None:
+        assert energy <= 1e4
+        return
+    assert energy > 10
+    figures = [found.p_nc, found.mean_s, found.variance_s**0.5, found.peak[1] ** 0.5, found.captured_mean]
+    assert np.isrealobj(figures)
+    assert np.isfinite([*figures, *found.next_order]).all()
+    below = found.cdf(np.linspace(-20, 20, 201))
+    assert np.all(np.diff(below) >= -1e-12)
+    assert below[[0, -1]] == pytest.approx([0, 1], abs=1e-3)

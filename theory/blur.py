@@ -23,7 +23,7 @@ from theory.course import N_TIMES, Fields, Flags, course
 from theory.curves import chaotic_zone
 from theory.given import finite_array
 from theory.rates import table_error
-from theory.volumes import as_mushroom
+from theory.volumes import NotCovered, as_mushroom
 
 N_PLACES = 2000  # at which distribution functions are computed; linear between them
 N_CAPTURES = 600  # atoms of a valley that lies in no other; of one among several a fifth
@@ -31,6 +31,7 @@ MOST_ATOMS = 40_000  # of several captures; more are joined with their neighbour
 MOST_DRAWN = 100_000_000
 REACH = 7.0  # standard deviations beyond which no blur is computed
 LEAST = 1e-12  # variance of a blur, in log E: a lag's square may leave less than none
+MOST = 4.0  # variance of a blur, in log E: beyond it what the peak has of it, v - v^2 / 8, falls again
 
 
 def blur_cdf(x: ArrayLike, variance: ArrayLike) -> Floats:
@@ -322,7 +323,8 @@ def at_energy(scene: Scene, energy: float) -> FiniteEnergy:
 
     Raises:
         BadInput: energy is not finite or not > 0.
-        NotCovered: no frozen rates of the scene are known.
+        NotCovered: no frozen rates of the scene are known; or particles are so slow that blurs and lags,
+            corrections of the order v^-1 and v^(-2/3), leave no variance or have no distribution.
     """
     energy = check_number("energy", energy)
     if not energy > 0:
@@ -332,7 +334,14 @@ def at_energy(scene: Scene, energy: float) -> FiniteEnergy:
 
 @lru_cache(maxsize=64)
 def _solved(scene: Mushroom, energy: float) -> FiniteEnergy:
-    return FiniteEnergy(scene, energy)
+    with np.errstate(over="ignore", invalid="ignore"):  # lags as large as log E itself: refused below
+        found = FiniteEnergy(scene, energy)
+        is_one = bool(found.atoms.variance.max() < MOST and found.variance_s > 0 and found.peak[1] > 0)
+    if not is_one:
+        raise NotCovered(
+            f"energy = {energy}: walls turn too soon for particles so slow, and theory has no distribution"
+        )
+    return found
 
 
 def _stays(node: Node, branch: Branch, n: int, s_nc: float) -> Stays:

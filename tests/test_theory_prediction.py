@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import mpmath
+import numpy as np
 import pytest
 from mpmath import MPContext
 
@@ -266,3 +268,20 @@ def test_knots_may_start_anywhere_in_the_period() -> None:
     h = BangBang(knots=((3.5, 2.0), (3.75, 6.0), (4.0, 6.0), (4.25, 2.0), (4.5, 2.0)))
     turned = Mushroom(r=scene.r, w=w, h=h, slope=scene.slope)
     assert predict(turned, digits=20).strings(20) == predict(scene, digits=20).strings(20)
+
+
+@pytest.mark.parametrize("narrow", [1e-9, 1e-20, 1e-43, 1e-50, 1e-300])
+def test_a_mouth_that_is_nearly_closed_captures_as_its_width_falls(narrow: float) -> None:
+    """Of such a mouth V_cap d delta / V_cha is d nu / (nu (1 + h / r)): p_nc is a power of the widths' ratio.
+
+    A swing far below the digits asked for, or an island that fills the cap within rounding, had been none.
+    """
+    still = Mushroom(r=1.0, h=1.0, nu=Fourier(2 * narrow, 1.0, (narrow,)))
+    assert float(predict(still, 15).p_nc) == pytest.approx(3**-0.5, rel=1e-14)
+    breathing = Mushroom(r=Fourier(1.0, 1.0, (), (0.25,)), h=1.0, nu=Fourier(2 * narrow, 1.0, (narrow,)))
+    found = predict(breathing, 15)
+    assert abs(found.mean_exp_minus - 1) < 1e-15
+    t = np.linspace(0, np.pi, 20_001)
+    r = 1 + 0.25 * np.sin(t)
+    p_nc = math.exp(np.trapezoid(r / (r + 1), np.log(2 + np.cos(t))))
+    assert float(found.p_nc) == pytest.approx(p_nc, rel=1e-7)

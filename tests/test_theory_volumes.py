@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from mpmath import MPContext, fp
 
-from scene import load
+from scene import Mushroom, load
 from theory import delta, sin_phi_hat, v_cap, v_cha, v_ell, v_stem, volumes_at
 from theory.volumes import delta_slope
 
@@ -72,3 +72,14 @@ def test_moving_cap_volumes_are_the_formulas_of_the_scene(ctx: Any) -> None:
     found = volumes_at(ctx, load("moving-cap"), t)
     assert abs(found.nu - nu) < ctx.mpf(10) ** -48
     assert abs(found.v_cha - v_cha(ctx, r, nu * r, h, ctx.mpf(0.1111))) < ctx.mpf(10) ** -46
+
+
+@pytest.mark.parametrize("nu", [1.0, 0.3, 1e-5, 1e-12, 1e-40, 1e-300])
+def test_the_chaotic_zone_keeps_its_digits_however_narrow_the_mouth(ctx: Any, nu: float) -> None:
+    """Cap and stem less the island left none of them where the island fills the cap within rounding."""
+    w, h = ctx.mpf(nu), ctx.mpf(0.25)
+    strip = ctx.quad(lambda s: ctx.sqrt(1 - (w * s) ** 2), [0, 1])
+    zone = 4 * ctx.pi * w * strip + v_stem(ctx, w, h, 0)
+    assert abs(v_cha(ctx, ctx.one, w, h, 0) / zone - 1) < ctx.mpf(10) ** -40
+    assert v_cha(fp, 1.0, nu, 0.25, 0.0) == pytest.approx(float(zone), rel=1e-15)
+    assert volumes_at(fp, Mushroom(r=1.0, h=0.25, w=nu), 0.0).v_cha == pytest.approx(float(zone), rel=1e-15)

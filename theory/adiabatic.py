@@ -26,7 +26,7 @@ from theory.chebyshev import Grid, even_degree
 from theory.cycle import Cycle
 from theory.measure import WeightedPoints, convolve, product, shifted
 from theory.valleys import CapturePiece, Valley
-from theory.volumes import delta, delta_slope
+from theory.volumes import delta_slope, free_share, shares
 
 MAX_HALVINGS = 24  # a panel of 2^-24 of its piece: nearer singularities are given up
 
@@ -316,9 +316,9 @@ def _sampled(
         nu, slope = _descent(ctx, piece, (part[0] + x) * width)
         found.t_in.append(piece.capture.time(nu, grid.forecast(found.t_in)))
         found.t_out.append(piece.release.time(nu, grid.forecast(found.t_out)))
-        share = delta(ctx, nu)
-        before = piece.capture.motion.volumes(found.t_in[-1], nu, share)
-        after = piece.release.motion.volumes(found.t_out[-1], nu, share)
+        known = shares(ctx, nu)
+        before = piece.capture.motion.volumes(found.t_in[-1], nu, known)
+        after = piece.release.motion.volumes(found.t_out[-1], nu, known)
         a, b = before.v_cap / before.v_cha, after.v_cap / after.v_cha
         d_delta = delta_slope(ctx, nu) * slope * width
         found.nu.append(nu)
@@ -343,8 +343,9 @@ def _panel(
     ctx = cycle.ctx
     nu, t_in, t_out, dA, dB, log_g = _sampled(cycle, grid, piece, part, headway)
     c_A, c_B = grid.coefficients(dA), grid.coefficients(dB)
-    swing = delta(ctx, cycle.nu_min) - delta(ctx, cycle.nu_max)
-    if _tail(c_A) > tolerance * swing or _tail(c_B) > tolerance * swing:
+    swing = free_share(ctx, cycle.nu_max) - free_share(ctx, cycle.nu_min)
+    # Of a narrow mouth a and b are large, and A and B in proportion.
+    if any(_tail(c) > tolerance * max(swing, *map(abs, c)) for c in (c_A, c_B)):
         return None
     if _tail(grid.coefficients(log_g)) > tolerance:
         return None

@@ -18,7 +18,7 @@ from scene.tables import Scene, period
 from theory.constants import guarded, settle
 from theory.given import MAX_DIGITS, check_real
 from theory.parameters import MovingMushroom
-from theory.valleys import CapturePiece, Valley, stretches, valley
+from theory.valleys import CapturePiece, Valley, stretches, tolerance, valley
 from theory.volumes import as_mushroom
 
 # Digits beyond those asked. A loop that binary64 cannot tell from a trivial one has g - 1 ~ 1e-16 and
@@ -74,7 +74,7 @@ class Cycle:
         if not run:
             nu, _ = MovingMushroom(ctx, mushroom, Fraction(0)).nu(ctx.zero)
             return cls(ctx, digits, ctx.zero, length, nu, nu, Valley((), ()))
-        found = valley(ctx, run)
+        found = valley(ctx, run, tolerance(ctx, run))
         levels = [nu for piece in found.all_pieces() for nu in (piece.nu_upper, piece.nu_lower)]
         return cls(ctx, digits, run[0].upper, length, max(levels), min(levels), found)
 

@@ -39,10 +39,10 @@ class MovingMushroom:
         (w, w_rate), (r, r_rate) = self._at(t, "w", "r")
         return w / r, (w_rate * r - w * r_rate) / (r * r)
 
-    def volumes(self, t: Any, nu: Any, share: Any = None) -> Volumes:
-        """Return the volumes at time t, where the mouth is known to be nu; share: delta(nu), if known."""
+    def volumes(self, t: Any, nu: Any, known: tuple[Any, Any] | None = None) -> Volumes:
+        """Return the volumes at time t, where the mouth is nu; known: its `theory.volumes.shares`."""
         (r, _), (h, _), (slope, _) = self._at(t, "r", "h", "slope")
-        return volumes_of(self.ctx, r, nu, h, slope, share)
+        return volumes_of(self.ctx, r, nu, h, slope, known)
 
 
 def _parameter(ctx: Any, piece: Piece) -> Parameter:

@@ -6,7 +6,7 @@ leaves rising at one level, staying below between. From its top down to its high
 a fall and a rise face each other, cut into pieces over which law and branch are analytic; at
 the level of that peak the valley splits into valleys that follow one another in time. Plateaus and
 inflections are allowed everywhere. The binary64 numbers of a scene are exact; a swing of nu
-below 10^-(digits + 30) counts as none.
+below 10^-(digits + 30) of its largest value counts as none.
 """
 
 from __future__ import annotations
@@ -101,32 +101,39 @@ class Valley(NamedTuple):
 
 def stretches(ctx: Any, scene: Mushroom) -> list[MonotoneStretch]:
     """Return one period's stretches in order of time, from a highest maximum of nu; [] if nu is constant."""
-    found = [(span, s) for span in spans(ctx, scene) if (s := _stretch(ctx, scene, span)) is not None]
+    every = [(span, _stretch(ctx, scene, span)) for span in spans(ctx, scene)]
+    small = tolerance(ctx, [s for _, s in every])
+    found = [(span, s) for span, s in every if s.nu_upper - s.nu_lower > small]  # the others are plateaus
     tops = [i for i, (_, s) in enumerate(found) if is_fall(s) and not is_fall(found[i - 1][1])]
     if not tops:
         return []
     highest = max(found[i][1].nu_upper for i in tops)
-    first = next(i for i in tops if highest - found[i][1].nu_upper <= tolerance(ctx))
+    first = next(i for i in tops if highest - found[i][1].nu_upper <= small)
     later = [_stretch(ctx, scene, _next_period(ctx, scene, span)) for span, _ in found[:first]]
-    return [s for _, s in found[first:]] + [s for s in later if s is not None]
+    return [s for _, s in found[first:]] + [s for s in later if s.nu_upper - s.nu_lower > small]
 
 
-def valley(ctx: Any, run: list[MonotoneStretch]) -> Valley:
-    """Nest stretches, in order of time, that start falling from a level and end rising to it."""
-    small = tolerance(ctx)
+def valley(ctx: Any, run: list[MonotoneStretch], small: Any) -> Valley:
+    """Nest stretches, in order of time, that start falling from a level and end rising to it.
+
+    Args:
+        ctx: number system.
+        run: the stretches.
+        small: the `tolerance` of the whole period.
+    """
     peaks = [i for i in range(1, len(run)) if is_fall(run[i]) and not is_fall(run[i - 1])]
     n_fall = next(i for i, s in enumerate(run) if not is_fall(s))
     last_fall = max(i for i, s in enumerate(run) if is_fall(s))
     fall, rise = run[:n_fall], run[last_fall + 1 :]
     if not peaks:
-        return Valley(_pieces(ctx, fall, rise[::-1]), ())
+        return Valley(_pieces(ctx, fall, rise[::-1], small), ())
     level = max(run[i].nu_upper for i in peaks)
     pieces: tuple[CapturePiece, ...] = ()
     if run[0].nu_upper - level > small:
-        pieces = _pieces(ctx, _above(fall, level, small), _above(rise, level, small)[::-1])
+        pieces = _pieces(ctx, _above(fall, level, small), _above(rise, level, small)[::-1], small)
     parts = [0, *(i for i in peaks if level - run[i].nu_upper <= small), len(run)]
     groups = [run[start:stop] for start, stop in pairwise(parts)]
-    return Valley(pieces, tuple(valley(ctx, _below(group, level, small)) for group in groups))
+    return Valley(pieces, tuple(valley(ctx, _below(group, level, small), small) for group in groups))
 
 
 def is_fall(s: MonotoneStretch) -> bool:
@@ -134,9 +141,9 @@ def is_fall(s: MonotoneStretch) -> bool:
     return bool(s.upper < s.lower)
 
 
-def tolerance(ctx: Any) -> Any:
+def tolerance(ctx: Any, run: list[MonotoneStretch]) -> Any:
     """Return how far equal values of nu, reached along different branches, differ by rounding alone."""
-    return ctx.mpf(10) ** (10 - ctx.dps)
+    return ctx.mpf(10) ** (10 - ctx.dps) * max((s.nu_upper for s in run), default=ctx.one)
 
 
 def _above(branch: list[MonotoneStretch], level: Any, small: Any) -> list[MonotoneStretch]:
@@ -158,23 +165,20 @@ def _next_period(ctx: Any, scene: Mushroom, span: Span) -> Span:
     )
 
 
-def _stretch(ctx: Any, scene: Mushroom, span: Span) -> MonotoneStretch | None:
-    """Return the stretch of a span; None on a plateau."""
+def _stretch(ctx: Any, scene: Mushroom, span: Span) -> MonotoneStretch:
+    """Return the stretch of a span, or of a plateau what looks like one."""
     motion = MovingMushroom(ctx, scene, span.inside)
     ends = [
         (motion.nu(span.start)[0], span.start, span.start_order),
         (motion.nu(span.end)[0], span.end, span.end_order),
     ]
     (nu_lower, lower, lower_order), (nu_upper, upper, upper_order) = sorted(ends)
-    if nu_upper - nu_lower <= tolerance(ctx):
-        return None
     return MonotoneStretch(motion, upper, lower, nu_upper, nu_lower, upper_order, lower_order)
 
 
 def _pieces(
-    ctx: Any, capture: list[MonotoneStretch], release: list[MonotoneStretch]
+    ctx: Any, capture: list[MonotoneStretch], release: list[MonotoneStretch], small: Any
 ) -> tuple[CapturePiece, ...]:
-    small = tolerance(ctx)
     values = sorted({nu for s in capture + release for nu in (s.nu_upper, s.nu_lower)}, reverse=True)
     cuts = [values[0]]
     for nu in values[1:]:

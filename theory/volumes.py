@@ -64,6 +64,17 @@ def delta(ctx: Any, nu: Any) -> Any:
     return 2 * (ctx.acos(nu) - nu * ctx.sqrt((1 - nu) * (1 + nu))) / ctx.pi
 
 
+def free_share(ctx: Any, nu: Any) -> Any:
+    """Return 1 - delta(nu), the share of the cap that is not island: right however narrow the mouth.
+
+    Raises:
+        BadInput: nu is outside [0, 1].
+    """
+    check_system(ctx)
+    _check_nu(nu)
+    return 2 * (ctx.asin(nu) + nu * ctx.sqrt((1 - nu) * (1 + nu))) / ctx.pi
+
+
 def delta_slope(ctx: Any, nu: Any) -> Any:
     """Return d delta / d nu = -(4 / pi) sqrt(1 - nu^2).
 
@@ -91,7 +102,7 @@ def v_cha(ctx: Any, r: Any, w: Any, h: Any, slope: Any) -> Any:
     cap, stem = v_cap(ctx, r), v_stem(ctx, w, h, slope)
     if not r > 0:
         raise BadInput(f"r = {r}, must be > 0")
-    return cap + stem - v_ell(ctx, r, w / r)
+    return cap * free_share(ctx, w / r) + stem
 
 
 def volumes_at(ctx: Any, scene: Scene, t: Any) -> Volumes:
@@ -119,12 +130,17 @@ def volumes_at(ctx: Any, scene: Scene, t: Any) -> Volumes:
     return volumes_of(ctx, r, nu, h, slope)
 
 
-def volumes_of(ctx: Any, r: Any, nu: Any, h: Any, slope: Any, share: Any = None) -> Volumes:
-    """Return all volumes from the table's parameters, nu = w / r; share: delta(nu) where it is known."""
+def shares(ctx: Any, nu: Any) -> tuple[Any, Any]:
+    """Return delta(nu) and 1 - delta(nu), each right where it is small."""
+    return delta(ctx, nu), free_share(ctx, nu)
+
+
+def volumes_of(ctx: Any, r: Any, nu: Any, h: Any, slope: Any, known: tuple[Any, Any] | None = None) -> Volumes:
+    """Return all volumes from the table's parameters, nu = w / r; known: the `shares` of nu, once computed."""
     # The numbers of a scene need no check; most of theory comes by here.
     cap, stem = _over_cap(ctx, r), _over_stem(ctx, nu * r, h, slope)
-    island = (delta(ctx, nu) if share is None else share) * cap
-    return Volumes(cap, stem, island, cap + stem - island, nu)
+    island, free = known or shares(ctx, nu)
+    return Volumes(cap, stem, island * cap, free * cap + stem, nu)
 
 
 def as_mushroom(scene: Scene) -> Mushroom:

@@ -12,6 +12,9 @@ import fast
 from conformance import suite, vectors
 from conformance.grading.agreement import middle
 from conformance.grading.grade import grade
+from conformance.mutants import Mutant
+from conformance.plain.motion import BangBangMotion
+from conformance.plain.step import Flight
 from conformance.suite import disguise
 from conformance.suite.disguise import (
     Disguise,
@@ -22,7 +25,7 @@ from conformance.suite.disguise import (
     published,
 )
 from fast.__main__ import carry, follow
-from scene import BangBang, from_data
+from scene import BangBang, Fourier, from_data
 from scene.laws import value
 from scene.precision import decimals
 from scene.tables import laws
@@ -65,16 +68,58 @@ def test_knots_that_begin_elsewhere_are_the_same_law(corpus, tally):
     ctx = decimals(40)
     for vector in corpus[::3]:
         worn = drawn_disguise(vector, 11)._replace(is_mirrored=False, length=0, time=0)
-        if not (worn.first_knot or worn.periods):
+        if not (worn.first_knot or worn.periods or worn.rounds > 1):
             continue
         before, after = (laws(from_data(v.scene)) for v in (vector, asked(vector, worn)))
         for name, law in before.items():
-            if isinstance(law, BangBang):
-                tally["laws"] += law != after[name]
-                for part in (0.0, 0.123, 0.4, 0.77):
-                    t = law.knots[0][0] + part
-                    assert abs(value(ctx, law, t) - value(ctx, after[name], t)) < 1e-38
-    assert tally["laws"] > 80
+            tally["laws"] += law != after[name]
+            tally["rounds"] += isinstance(law, BangBang) and len(after[name].knots) > len(law.knots)
+            tally["waves beside knots"] += isinstance(law, Fourier) and law != after[name]
+            for part in (0.0, 0.123, 0.4, 0.77, 3.1, -5.9):
+                t = (law.knots[0][0] if isinstance(law, BangBang) else 0.0) + part
+                assert abs(value(ctx, law, t) - value(ctx, after[name], t)) < 1e-38
+    assert min(tally["laws"], tally["rounds"]) > 80
+    assert tally["waves beside knots"] > 0
+
+
+class FourLegsAtMost(BangBangMotion):
+    """Has room for four legs: joins what comes later to one."""
+
+    def __init__(self, law, t):
+        most = law.knots if len(law.knots) <= 5 else (*law.knots[:4], law.knots[-1])
+        super().__init__(BangBang(knots=most), t)
+
+
+class WavesFromFirstKnot(Flight):
+    """Counts the time of every law from the first knot of any."""
+
+    def law(self, law):
+        if not isinstance(law, Fourier):
+            return super().law(law)
+        knots = [other.knots for other in laws(self.scene).values() if isinstance(other, BangBang)]
+        return self.kinds[Fourier](law, self.state.t - (knots[0][0][0] if knots else 0.0))
+
+
+def failures(flight, questions, seed):
+    """Return how many of a faulty stepper's answers fail as published, and how many in disguise."""
+    faulty, counts = Mutant("faulty", "", flight), [0, 0]
+    for vector in questions:
+        for i, worn in enumerate((Disguise(), drawn_disguise(vector, seed))):
+            answer = vectors.answer(asked(vector, worn), faulty.step, faulty.trajectory, faulty.flow)
+            counts[i] += grade(vector, published(answer, worn)).verdict == "fail"
+    return counts
+
+
+FEW_LEGS = type("FewLegs", (Flight,), {"kinds": {**Flight.kinds, BangBang: FourLegsAtMost}})
+
+
+@pytest.mark.parametrize("flight", [FEW_LEGS, WavesFromFirstKnot])
+def test_what_no_published_scene_has_is_asked_in_disguise(flight, corpus):
+    """More legs than the corpus has, and waves beside knots that do not begin at 0."""
+    steps = [v for v in corpus if v.kind == "step" and v.group in ("mixed-laws", "knots-off-zero", "waiting")]
+    as_published, in_disguise = failures(flight, steps, 1)
+    assert as_published == 0
+    assert in_disguise >= 5
 
 
 def test_a_scene_stays_one_scene_in_a_run(corpus):

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from fast.ensemble import Ensemble, Plan, planned
+from fast.given import given_phases
 from fast.kernel import codes
 from fast.kernel.kept import LANE_ROWS
 from fast.kernel.records import FloatArray
@@ -15,6 +16,7 @@ from fast.kernel.worker import is_known_throughout
 from fast.pieces import laws_in_lanes
 from scene import Scene
 from scene.refusal import BadInput, shown
+from scene.tables import laws
 
 BY_CYCLE = ("cycle_energies", "t_in", "t_out", "phase_energies", "phase_captured")
 
@@ -29,10 +31,13 @@ class Paused(NamedTuple):
         ensemble: up to the end of its last cycle.
         lanes: (N, LANE_ROWS) each particle at its last collision, and its next one, in the stepper's own
             units (`fast.kernel.kept`); nan for one that was not followed to the end.
+        asked: table, laws, seed, first and phases that it was asked for with, by name; None for one that a
+            caller has put together again, who then vouches for them.
     """
 
     ensemble: Ensemble
     lanes: FloatArray
+    asked: dict[str, Any] | None = None
 
 
 def go_on(
@@ -58,14 +63,18 @@ def go_on(
         not followed to the end before, or had a collision within rounding of it, is followed from its start.
 
     Raises:
-        BadInput: naming field, value and bound; `before` is of other sizes, or so many cycles reach beyond
-            the time up to which the lanes that followed it know the phases of the laws.
+        BadInput: naming field, value and bound; `before` is of another scene, energy, seed, first or phases,
+            or of other sizes, or so many cycles reach beyond the time up to which the lanes that followed it
+            know the phases of the laws.
     """
     plan = planned(scene, n_particles, energy, n_cycles, seed, first, threads, phases, progress)
+    own: dict[str, Any] = {"seed": plan.seed, "first": plan.first, "phases": given_phases(phases)}
+    asked = {"table": type(scene).__name__, **laws(scene), **own}
     if before is None:
         done, seconds = plan.followed(plan.starts(), LANE_ROWS)
-        return Paused(plan.ensemble(done, seconds), done.lanes)
+        return Paused(plan.ensemble(done, seconds), done.lanes, asked)
     n_before, n_passed = _passed(plan, before)
+    _check_same(before.asked or asked, asked)
     done, seconds = plan.followed(np.full((n_particles, 6), np.nan), LANE_ROWS, before.lanes, n_passed)
     after, anew = plan.ensemble(done, seconds), np.flatnonzero(done.codes == codes.ANEW)
     for name in BY_CYCLE:
@@ -78,14 +87,24 @@ def go_on(
             getattr(after, name)[anew] = getattr(fresh, name)
         done.lanes[anew] = again.lanes
     seconds += before.ensemble.seconds * before.ensemble.threads / plan.threads
-    return Paused(after._replace(seconds=seconds), done.lanes)
+    return Paused(after._replace(seconds=seconds), done.lanes, asked)
+
+
+def _check_same(there: dict[str, Any], asked: dict[str, Any]) -> None:
+    # Two runs of one shape would be joined without a seam: some particles of one, some of the other.
+    for name in dict.fromkeys((*asked, *there)):
+        if there.get(name) != asked.get(name):
+            raise BadInput(f"before: {name} = {there.get(name)}, must be {asked.get(name)}")
 
 
 def _passed(plan: Plan, before: Paused) -> tuple[int, int]:
     """Return how many cycles and stops an ensemble has passed, after a look at whether it can go on so."""
     n, n_cycles, looks = plan.size
     if not (
-        isinstance(before, Paused) and isinstance(before.ensemble, Ensemble) and np.ndim(before.lanes) == 2
+        isinstance(before, Paused)
+        and isinstance(before.ensemble, Ensemble)
+        and np.ndim(before.lanes) == 2
+        and isinstance(before.asked, dict | None)
     ):
         raise BadInput(f"before = {shown(before)}, must be None or what go_on has returned")
     old = before.ensemble

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from msgspec.structs import replace
 
 import fast
 from fast import paused, pieces
@@ -171,9 +172,28 @@ def test_what_does_not_fit_is_refused():
         ({"n_cycles": 3, "energy": 11.0}, "before: energy = 10.0, must be 11.0"),
         ({"n_cycles": 3, "phases": (0.5,)}, "before: phases = 0, must be 1"),
         ({"n_cycles": 3, "first": -1}, "first = -1, must be 0 to"),
+        ({"n_cycles": 3, "seed": 1}, "before: seed = 0, must be 1"),
+        ({"n_cycles": 3, "first": 4}, "before: first = 0, must be 4"),
     ):
         with pytest.raises(BadInput, match=words):
             fast.go_on(scene, **{**asked, **change}, before=two)
+
+
+def test_another_run_of_the_same_shape_is_refused():
+    """Its particles would be gone on with, but for those followed anew: they would be this run's."""
+    scene, asked = SCENES["moving cap"], {"n_particles": 4, "energy": 10.0}
+    two = fast.go_on(scene, n_cycles=2, phases=(0.5,), **asked)
+    for other, phases, words in (
+        (load("moving-cap-reversed"), (0.5,), r"before: r = Fourier\(.* must be Fourier\("),
+        (scene, (0.25,), r"before: phases = \(0.5,\), must be \(0.25,\)"),
+    ):
+        with pytest.raises(BadInput, match=words):
+            fast.go_on(other, n_cycles=3, phases=phases, **asked, before=two)
+    renamed = replace(scene, name="mine")
+    assert is_same(
+        fast.go_on(renamed, n_cycles=3, phases=(0.5,), **asked, before=two),
+        fast.go_on(scene, n_cycles=3, phases=(0.5,), **asked),
+    )
 
 
 def test_lanes_that_lose_the_laws_phases_are_not_gone_on_from():

@@ -7,11 +7,13 @@ import struct
 import subprocess
 import sys
 
+import msgspec
 import pytest
 
 import fast
 import reference
-from scene import State, catalogue, load, to_data
+from scene import Horizon, State, catalogue, load, to_data
+from scene.protocol.messages import Timed
 
 STATE = {"t": 0.0, "x": 0.1, "y": 0.3, "vx": 10.0, "vy": 7.0, "wall": None}
 SCENE = to_data(load("moving-cap"))
@@ -81,6 +83,18 @@ def test_trajectories_are_chained(module):
     assert short["steps"][-1]["t"] == 0.5
     assert bad["outcome"] == "rejected"
     assert "collisions = -1" in bad["reason"]
+
+
+def test_what_is_never_met_is_timed_up_to_a_number(module):
+    """A particle at rest has no last collision; a horizon at infinity had been written as null."""
+    rest = {**STATE, "vx": 0.0, "vy": 0.0}
+    still = {"table": "cap", "r": 2.0}
+    (answer,) = converse(
+        module, {"cmd": "time", "seq": 1, "scene": still, "state": rest, "collisions": 2, "repeat": 1}
+    )
+    (last,) = msgspec.convert(answer, Timed).steps
+    assert isinstance(last, Horizon)
+    assert (last.x, last.y, last.vx, last.vy) == (rest["x"], rest["y"], 0.0, 0.0)
 
 
 BAD = [

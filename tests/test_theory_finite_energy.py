@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from scene import load
+from scene import BadInput, load
 from theory import cumulants
 from theory.finite_energy import extrapolate, fit_power, peak_width, unbiased_mean
 
@@ -96,3 +96,17 @@ def test_bad_data_is_named() -> None:
         extrapolate([1.0, 2.0], [1.0, 2.0], [1.0, 0.0])
     with pytest.raises(ValueError, match=r"exponent = 0\.5, must be < 0"):
         extrapolate([1.0, 2.0], [1.0, 2.0], [1.0, 1.0], 0.5)
+
+
+@pytest.mark.parametrize(
+    "fit",
+    [
+        lambda: extrapolate([1e5, 1e6], [1.0, 2.0], [1.0, 1.0], -1e-300),  # both terms are 1
+        lambda: extrapolate([1e5, 1e6], [1.0, 2.0], [1.0, 1.0], -1e3),  # and one is 0
+        lambda: extrapolate([1e-300, 1e300], [1.0, 2.0], [1.0, 1.0], -2.0),  # or infinite
+        lambda: fit_power([1e300, 1.0, 1e-300], [1.0, 2.0, 3.0], [1.0, 1.0, 1.0], (-2.0,)),
+    ],
+)
+def test_terms_that_binary64_does_not_hold_or_tell_apart_are_refused(fit):
+    with pytest.raises(BadInput, match="term"):
+        fit()

@@ -17,6 +17,8 @@ from theory.branches import Floats
 from theory.given import finite_array
 from theory.prediction import mean_of
 
+ALIKE = 2.0**-46  # share of a term that the others leave: below it they leave rounding
+
 
 class Width(NamedTuple):
     """Standard deviation of a peak and its standard error, from the sample's own fourth moment."""
@@ -113,9 +115,12 @@ def fit_power(x: ArrayLike, y: ArrayLike, errors: ArrayLike, orders: ArrayLike =
     x_, y_, errors_ = _data(x, y, errors, 2 + orders_.size)
     if not np.all(y_ > 0):
         raise BadInput("a power law needs y > 0")
-    terms = [np.log(x_), *((x_ / x_[0]) ** order for order in orders_)]
-    (level, slope, *_), (level_error, slope_error, *_), residuals = _fitted(terms, np.log(y_), errors_ / y_)
-    coefficient = float(np.exp(level))
+    with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
+        terms = [np.log(x_), *((x_ / x_[0]) ** order for order in orders_)]
+        (level, slope, *_), (level_error, slope_error, *_), residuals = _fitted(
+            terms, np.log(y_), errors_ / y_
+        )
+        coefficient = float(np.exp(level))
     return PowerFit(
         slope, slope_error, coefficient, coefficient * level_error, residuals, float(residuals @ residuals)
     )
@@ -137,7 +142,8 @@ def extrapolate(x: ArrayLike, y: ArrayLike, errors: ArrayLike, exponent: float =
     exponent = check_number("exponent", exponent)
     if not exponent < 0:
         raise BadInput(f"exponent = {exponent}, must be < 0")
-    (limit, slope), (limit_error, slope_error), residuals = _fitted([x_**exponent], y_, errors_)
+    with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
+        (limit, slope), (limit_error, slope_error), residuals = _fitted([x_**exponent], y_, errors_)
     return Limit(limit, limit_error, slope, slope_error, residuals, float(residuals @ residuals))
 
 
@@ -151,9 +157,17 @@ def _data(x: ArrayLike, y: ArrayLike, errors: ArrayLike, least: int) -> tuple[Fl
 
 
 def _fitted(terms: Sequence[Floats], y: Floats, errors: Floats) -> tuple[list[float], list[float], Floats]:
-    """Fit y = a + the sum of b_k term_k by least squares; return a, b_k, their errors, and the residuals."""
+    """Fit y = a + the sum of b_k term_k by least squares; return a, b_k, their errors, and the residuals.
+
+    Raises:
+        BadInput: binary64 does not hold the terms, or does not tell them apart.
+    """
     columns = np.column_stack([np.ones_like(y), *terms]) / errors[:, None]
+    if not (np.all(np.isfinite(columns)) and np.all(np.isfinite(y / errors))):
+        raise BadInput("x, y and errors: a term of the fit, divided by its error, is beyond binary64")
     q, triangle = np.linalg.qr(columns)
+    if np.any(np.abs(np.diag(triangle)) <= ALIKE * np.linalg.norm(columns, axis=0)):
+        raise BadInput("x, exponent and orders: two terms of the fit are alike within rounding")
     inverse = np.linalg.inv(triangle)  # inverse inverse^T is the covariance
     found = inverse @ (q.T @ (y / errors))
     return found.tolist(), np.linalg.norm(inverse, axis=1).tolist(), y / errors - columns @ found

@@ -135,8 +135,10 @@ def shares(ctx: Any, nu: Any) -> tuple[Any, Any]:
     return delta(ctx, nu), free_share(ctx, nu)
 
 
-def volumes_of(ctx: Any, r: Any, nu: Any, h: Any, slope: Any, known: tuple[Any, Any] | None = None) -> Volumes:
-    """Return all volumes from the table's parameters, nu = w / r; known: the `shares` of nu, once computed."""
+def volumes_of(
+    ctx: Any, r: Any, nu: Any, h: Any, slope: Any, known: tuple[Any, Any] | None = None
+) -> Volumes:
+    """Return all volumes from the table's parameters, nu = w / r; known: the `shares` of nu."""
     # The numbers of a scene need no check; most of theory comes by here.
     cap, stem = _over_cap(ctx, r), _over_stem(ctx, nu * r, h, slope)
     island, free = known or shares(ctx, nu)

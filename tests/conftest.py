@@ -107,6 +107,12 @@ def tally(request: pytest.FixtureRequest) -> Iterator[Counter[str]]:
     request.node.user_properties.append(("tally", line))  # with the report it travels from any worker
 
 
+@pytest.fixture
+def unsynced(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Leave files to the system's buffers: no test can cut the power, and a busy disk would take minutes."""
+    monkeypatch.setattr(os, "fsync", lambda _descriptor: None)
+
+
 class Ended(NamedTuple):
     """How a command ended: exit code, standard output, standard error."""
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import base64
 import json
-import os
 import re
 from functools import partial
 from html.parser import HTMLParser
@@ -13,6 +12,7 @@ import jsonschema
 import numpy as np
 import pytest
 from support import adiabatic_particles
+from support.harm import held
 from support.refusals import assert_refused
 from support.schemas import validator
 
@@ -26,13 +26,8 @@ from mushrooms.reports import audit_page
 from mushrooms.store import conduct
 from scene.files import locked
 
+pytestmark = pytest.mark.usefixtures("unsynced")
 CHEAP = "M4,M10,X5,N6"
-
-
-@pytest.fixture(autouse=True)
-def _unsynced(monkeypatch):
-    """Leave files to the system's buffers: no test can cut the power, and a busy disk would take minutes."""
-    monkeypatch.setattr(os, "fsync", lambda _descriptor: None)
 
 
 @pytest.fixture
@@ -180,10 +175,10 @@ def test_a_broken_off_audit_goes_on(call, tmp_path, blocks):
 
 def test_another_seed_is_refused_and_broken_findings_are_made_again(call, tmp_path, blocks):
     call("--only", "X5", "--out", tmp_path)
-    before = {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()}
+    before = held(tmp_path)
     refused = call("--only", "X5", "--out", tmp_path, "--resume", "--seed", 1)
     assert_refused(refused, "holds another run: seed = ", " there, ", "asked for", "ergodic@1e7")
-    assert before == {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()}
+    assert held(tmp_path) == before
     for path in (tmp_path / "findings").iterdir():
         path.write_bytes(path.read_bytes()[:100])
     assert call("--only", "X5", "--out", tmp_path, "--resume").code == 0
@@ -240,10 +235,10 @@ def test_a_part_with_a_flipped_bit_is_not_taken_up(call, tmp_path, blocks):
 
 def test_without_resume_no_run_is_replaced(call, tmp_path, blocks):
     call("--only", "X5", "--out", tmp_path)
-    before = {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()}
+    before = held(tmp_path)
     refused = call("--only", "X5", "--out", tmp_path)
     assert_refused(refused, str(tmp_path / "runs" / "ergodic@1e7"), "--resume takes it up")
-    assert before == {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()}
+    assert held(tmp_path) == before
     assert call("--only", "N6", "--out", tmp_path).code == 0  # it has no runs
     assert len(blocks) == 6
 

@@ -8,6 +8,7 @@ import os
 
 import numpy as np
 import pytest
+from support.harm import held
 from support.refusals import assert_refused
 
 import fast
@@ -16,6 +17,7 @@ from mushrooms import compared
 from mushrooms.store import asked, blocks, conduct, engines, layout
 from scene import load
 
+pytestmark = pytest.mark.usefixtures("unsynced")
 N, BLOCK, ENERGY, SEED = 150, 32, 40.0, 7
 
 
@@ -32,12 +34,6 @@ def at_once(n_cycles, n=N, name="fermi-ulam"):
 def summary_of(ended):
     assert ended.code == 0, ended.err
     return {name: value for name, value in json.loads(ended.out).items() if name != "ns_per_collision"}
-
-
-@pytest.fixture(autouse=True)
-def _unsynced(monkeypatch):
-    """Leave files to the system's buffers: no test can cut the power, and a busy disk would take minutes."""
-    monkeypatch.setattr(os, "fsync", lambda _descriptor: None)
 
 
 @pytest.fixture(autouse=True)
@@ -216,7 +212,7 @@ def of_others(arrays, *more):
 def test_a_run_that_would_go_on_otherwise_does_not(command_line, tmp_path, monkeypatch, faulty):
     """The first particles are followed both ways before a block is touched."""
     summary_of(command_line(*arguments(tmp_path, 1)))
-    before = {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()}
+    before = held(tmp_path)
     monkeypatch.setattr(engines, "paused_of", faulty)
     assert_refused(command_line(*arguments(tmp_path, 2)), "of its first particles comes out otherwise here")
-    assert before == {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()}
+    assert held(tmp_path) == before

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from support.harm import harmed
+from support.harm import harmed, held
 from support.refusals import assert_refused
 
 import fast
@@ -23,6 +23,7 @@ from mushrooms.store import asked, blocks, conduct, digest, engines
 from scene import load
 from scene.files import LOCK, locked, sealed, unsealed
 
+pytestmark = pytest.mark.usefixtures("unsynced")
 ROOT = Path(__file__).parent.parent
 N, ENERGY, SEED = 330, 40.0, 7
 RUN = ["simulate", "fermi-ulam", "--energy", ENERGY, "--seed", SEED, "--threads", 1, "--json"]
@@ -30,12 +31,6 @@ RUN = ["simulate", "fermi-ulam", "--energy", ENERGY, "--seed", SEED, "--threads"
 
 def arguments(folder, *more, n=N, block=64):
     return [*RUN, "--particles", n, "--out", folder, *(["--block", block] if block else []), *more]
-
-
-@pytest.fixture(autouse=True)
-def _unsynced(monkeypatch):
-    """Leave files to the system's buffers: no test can cut the power, and a busy disk would take minutes."""
-    monkeypatch.setattr(os, "fsync", lambda _descriptor: None)
 
 
 @pytest.fixture(scope="module")
@@ -241,9 +236,9 @@ def test_another_run_in_the_folder_is_refused(command_line, tmp_path, change, op
     digest_of(command_line(*arguments(tmp_path)))
     path = tmp_path / "blocks" / blocks.DESCRIPTION
     path.write_bytes(sealed(json.dumps(json.loads(unsealed(path)) | change).encode()))
-    before = {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()}
+    before = held(tmp_path)
     assert_refused(command_line(*arguments(tmp_path, *options)), *words)
-    assert before == {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()}
+    assert held(tmp_path) == before
 
 
 def test_a_description_is_there_twice_and_refused_when_both_are_damaged(

@@ -15,3 +15,8 @@ def harmed(folder, random):
     flip = content[:at] + bytes([content[at] ^ 1 << int(random.integers(8))]) + content[at + 1 :]
     other = paths[random.integers(len(paths))].read_bytes()
     path.write_bytes([content[:at], flip, other][kind - 1])
+
+
+def held(folder):
+    """Return what the files in a folder hold, by path."""
+    return {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}

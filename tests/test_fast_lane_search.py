@@ -132,8 +132,20 @@ MUTANTS = {
     "how long the radius was known before": (
         "base to arc",
         500,
-        "known = before - a[BACK + i] if hit == ON_ARC else 1.0",
+        "known = known if hit == ON_ARC else 1.0",
         "known = 1.0",
+    ),
+    "what a hop hangs on": (
+        "early hop",
+        100,
+        "known = min(before - a[BACK + i], told_rate(a[T + i], r, r1, r2, sizes, limits))",
+        "known = before - a[BACK + i]",
+    ),
+    "what a hop through the base hangs on": (
+        "early hop through the base",
+        100,
+        "quality = min(quality, told_rate(a[T + i], r, r1, r2, sizes, limits))",
+        "quality = min(quality, 1.0)",
     ),
     "the mouth under a chord": (
         "captured beside a moving mouth",

@@ -130,8 +130,9 @@ def test_a_few_claims_are_checked_and_reported(call, tmp_path):
 
 def test_a_failed_claim_exits_with_1(call, tmp_path, monkeypatch):
     def warmed(scene, **options):
-        ensemble, lanes = adiabatic_particles.go_on(scene, **options)
-        return fast.Paused(ensemble._replace(cycle_energies=ensemble.cycle_energies * 1.01), lanes)
+        paused = adiabatic_particles.go_on(scene, **options)
+        energies = 1.01 * paused.ensemble.cycle_energies
+        return paused._replace(ensemble=paused.ensemble._replace(cycle_energies=energies))
 
     monkeypatch.setattr(fast, "go_on", warmed)
     done = call("--only", "X5", "--out", tmp_path)

@@ -134,10 +134,10 @@ def test_a_refused_run_has_no_forecast(command_line):
 def test_careful_steps_are_told_of_where_they_took_the_time(
     command_line, monkeypatch, seconds, per_thousand, said
 ):
-    run, lanes = fast.go_on(load("moving-cap"), n_particles=40, energy=1e4, threads=1)
-    n_careful = np.array([run.n_collisions.sum() * per_thousand // 1000])
-    run = run._replace(seconds=seconds, n_careful=n_careful)
-    monkeypatch.setattr(fast, "go_on", lambda *_args, **_options: fast.Paused(run, lanes))
+    paused = fast.go_on(load("moving-cap"), n_particles=40, energy=1e4, threads=1)
+    n_careful = np.array([paused.ensemble.n_collisions.sum() * per_thousand // 1000])
+    run = paused.ensemble._replace(seconds=seconds, n_careful=n_careful)
+    monkeypatch.setattr(fast, "go_on", lambda *_args, **_options: paused._replace(ensemble=run))
     code, out, err = command_line(*RUN)
     assert (code, json.loads(out)["careful"]) == (0, run.n_careful.sum())
     assert (said in err) if said else err == ""

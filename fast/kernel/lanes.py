@@ -182,6 +182,12 @@ def arc_sizes(s, x, y, vx, vy, v2, r, limits):
 
 
 @part
+def told_rate(t, r, r1, r2, sizes, limits):
+    """Return `told` of docs/lanes.md: positive where a hop hangs on r' no more than on what enters."""
+    return (sizes - r * limits.rate) + r * (abs(r1) + abs(t * r2) - limits.arc_rate)
+
+
+@part
 def slack_of(hit, wall, s, delta, inverse, error, r, sizes, blur):
     """Return `slack` of docs/lanes.md: how far off s a certain hit may be."""
     f_error = 2.0 * SAFETY * s * sizes if wall == ON_ARC else 2.0 * r * blur
@@ -300,8 +306,9 @@ def fly(a, n, is_stem, is_relative, slope, degree, limits):
         place = place_on_wall(hit, s, x, y, vx, vy, v2, x_s, y_s, r, is_stem, slack, limits)
         first = way_out(hit, s, vx, vy, rate, k_side, sizes, limits)
         quality = min(min(quality, place), min(first, s))
-        # A hop needs the radius at both of its ends.
-        known = before - a[BACK + i] if hit == ON_ARC else 1.0
+        # A hop needs the radius at both of its ends, and its rate as well as what enters.
+        known = min(before - a[BACK + i], told_rate(a[T + i], r, r1, r2, sizes, limits))
+        known = known if hit == ON_ARC else 1.0
         quality = min(quality, known if wall == ON_ARC else 1.0)
         within = a[LIMIT + i] - abs(since)
         result = verdict(quality, min(within, a[LIMIT + i] - abs(since + delta)), s, error)
@@ -355,6 +362,7 @@ def chord(a, n, is_again, is_cap, is_relative, degree, limits):
         place = abs(y_s) - (SAFETY * (abs(y) + abs(vy) * s) + abs(vy) * slack)
         quality = min(min(clear, place), min(first, v2 - bend))
         quality = min(min(quality, s), before - a[BACK + i])
+        quality = min(quality, told_rate(a[T + i], r, r1, r2, sizes, limits))
         within = a[LIMIT + i] - abs(since)
         result = verdict(quality, min(within, a[LIMIT + i] - abs(since + delta)), s, error)
         y_s, a[ROUTINE + i] = arrive_at(a, i, s, delta, within, result, x_s, x_low, y_s, y_low, vx, vy)

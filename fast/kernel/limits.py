@@ -18,6 +18,7 @@ class LawLimits(NamedTuple):
         curvature: at least |w''| + |m''| h and |h''|, for a slope m.
         turning: at least 2 |m'|, which comes times |vy| to a side's curvature.
         rate: at least |r'|, |w'| + |m'| h and |h'|.
+        arc_rate: at least |r'|.
         size: at least r + w + (1 + |m|) h, which bounds the terms that a wall's function is summed of.
         lean: at least 1 + |m|.
         least_r, least_h: at most the least radius and depth. Where a bound says no more than that the
@@ -28,6 +29,7 @@ class LawLimits(NamedTuple):
     curvature: float
     turning: float
     rate: float
+    arc_rate: float
     size: float
     lean: float
     least_r: float
@@ -44,6 +46,7 @@ def limits_of(scene: Compiled) -> LawLimits:
         grow * max(w[BEND] + m[BEND] * h[HIGHEST], h[BEND]),
         2.0 * m[FASTEST],
         grow * max(r[FASTEST], w[FASTEST] + m[FASTEST] * h[HIGHEST], h[FASTEST]),
+        grow * r[FASTEST],
         grow * (r[HIGHEST] + w[HIGHEST] + lean * h[HIGHEST]),
         grow * lean,
         max(r[LOWEST], LEAST_RADIUS),

@@ -2,7 +2,7 @@
 
 `misled chord` and `misled side` solve for a flight whose f has two or three roots close together, and for
 which Newton's method from the lane's guess lands on the second or third of them. `corner over a rising floor`
-starts on a side so near the floor that its f is computed as 0.
+starts on a side so near the floor that its f is computed as 0. `early hop` is drawn in lane_hops.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ from mpmath import fp
 from fast.kernel import codes
 from scene import Fourier, Mushroom, Scene
 from scene.laws import value
+from support.lane_hops import early_hop
 
 Array = npt.NDArray[np.floating[Any]]
 Start = tuple[Array, int]
@@ -160,4 +161,6 @@ TRAPS = {
     "corner over a rising floor": Trap(corner_over_a_rising_floor),
     "misled chord": Trap(misled_chord, is_captured=True),
     "misled side": Trap(misled_side),
+    "early hop": Trap(early_hop),
+    "early hop through the base": Trap(early_hop, is_captured=True),
 }

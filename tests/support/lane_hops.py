@@ -1,0 +1,46 @@
+"""Short hops along an arc whose rate is a small difference of large terms, for the search in lane_search.
+
+How long a hop is depends on the arc's rate less the particle's, and an error of the one is an error of the
+other. As a rule rounding of the state or the time does as much. It does not where those are small: early,
+when the phase itself is nearly 0, near an axis and nearly along the arc.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+from mpmath import fp
+
+from fast.kernel import codes
+from scene import BangBang, Fourier, Law, Mushroom, Scene
+from scene.laws import value
+
+Start = tuple[npt.NDArray[np.floating], int]
+
+
+def early_hop(n: int, random: np.random.Generator) -> tuple[Scene, list[Start]]:
+    """Draw starts on the arc near t = 0, near an axis, with a velocity nearly along it."""
+    r = _radius(random)
+    return Mushroom(r=r, w=1e-3, h=0.1), [_start(r, random) for _ in range(n)]
+
+
+def _radius(random: np.random.Generator) -> Law:
+    swing = float(10.0 ** random.uniform(-2, -0.1))
+    if random.random() < 0.3:
+        inner = float(random.uniform(0.2, 0.8))
+        return BangBang(((0.0, 1.0), (inner, 1.0 - swing), (1.0, 1.0)))
+    cos = (swing,) if random.random() < 0.5 else (0.7 * swing, -0.3 * swing)
+    sin = (0.0,) if random.random() < 0.5 else (float(0.1 * swing * 10.0 ** random.uniform(-9, 0)),)
+    return Fourier(1.0, 1.0, cos, sin)
+
+
+def _start(r: Law, random: np.random.Generator) -> Start:
+    t = 0.0 if random.random() < 0.3 else float(10.0 ** random.uniform(-12, 0))
+    now, rate = float(value(fp, r, t)), float(value(fp, r, t, 1))
+    off = 0.0 if random.random() < 0.3 else float(10.0 ** random.uniform(-12, 0))
+    angle = 0.5 * np.pi - off if random.random() < 0.8 else off + 1e-3
+    along = float(random.choice([-1.0, 1.0]) * 10.0 ** random.uniform(-1, 3))
+    out = rate - abs(along) * 10.0 ** random.uniform(-9, -0.3)
+    e_x, e_y = float(np.cos(angle)) if off else 0.0, float(np.sin(angle))
+    place = (now * e_x, now * e_y, out * e_x - along * e_y, out * e_y + along * e_x)
+    return np.array([t, 0.0, *place]), int(codes.ARC)

@@ -135,6 +135,12 @@ MUTANTS = {
         "known = known if hit == ON_ARC else 1.0",
         "known = 1.0",
     ),
+    "what Newton's step leaves of the place": (
+        "up a deep stem",
+        600,
+        "return NEVER if hit == ON_ARC and error",
+        "return NEVER if hit != hit and error",
+    ),
     "what a hop hangs on": (
         "early hop",
         100,

@@ -182,6 +182,15 @@ def arc_sizes(s, x, y, vx, vy, v2, r, limits):
 
 
 @part
+def left_in_place(error, hit, vx, vy, r):
+    """Return `error` of docs/lanes.md, infinite where the place on the arc is not as well known as the time.
+
+    That is so after flights that are many radii long.
+    """
+    return NEVER if hit == ON_ARC and error * (abs(vx) + abs(vy)) > 16.0 * r else error
+
+
+@part
 def told_rate(t, r, r1, r2, sizes, limits):
     """Return `told` of docs/lanes.md: positive where a hop hangs on r' no more than on what enters."""
     return (sizes - r * limits.rate) + r * (abs(r1) + abs(t * r2) - limits.arc_rate)
@@ -297,6 +306,7 @@ def fly(a, n, is_stem, is_relative, slope, degree, limits):
         inverse = ONE / rate
         delta = -f * inverse
         error = 2.0**58 * abs(0.5 * bend_s * inverse) * delta * delta
+        error = left_in_place(error, hit, vx, vy, r)
         sizes = arc_sizes(s, x, y, vx, vy, v2, r, limits)
         blur = SAFETY * (limits.size + abs(x) + abs(y) + (abs(vx) + abs(vy)) * s)
         slack = slack_of(hit, wall, s, delta, inverse, error, r, sizes, blur)

@@ -2,7 +2,8 @@
 
 `misled chord` and `misled side` solve for a flight whose f has two or three roots close together, and for
 which Newton's method from the lane's guess lands on the second or third of them. `corner over a rising floor`
-starts on a side so near the floor that its f is computed as 0. `early hop` is drawn in lane_hops.
+starts on a side so near the floor that its f is computed as 0. The last three are
+drawn in lane_rounding.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from mpmath import fp
 from fast.kernel import codes
 from scene import Fourier, Mushroom, Scene
 from scene.laws import value
-from support.lane_hops import early_hop
+from support.lane_rounding import early_hop, up_a_deep_stem
 
 Array = npt.NDArray[np.floating[Any]]
 Start = tuple[Array, int]
@@ -163,4 +164,5 @@ TRAPS = {
     "misled side": Trap(misled_side),
     "early hop": Trap(early_hop),
     "early hop through the base": Trap(early_hop, is_captured=True),
+    "up a deep stem": Trap(up_a_deep_stem),
 }

@@ -1,8 +1,11 @@
-"""Short hops along an arc whose rate is a small difference of large terms, for the search in lane_search.
+"""Flights whose answers hang on a rounding that as a rule goes unnoticed, for the search in lane_search.
 
 How long a hop is depends on the arc's rate less the particle's, and an error of the one is an error of the
 other. As a rule rounding of the state or the time does as much. It does not where those are small: early,
 when the phase itself is nearly 0, near an axis and nearly along the arc.
+
+A flight up a deep stem may be a million times as long as the cap is high: what is left of its time moves the
+place of the hit along the path, and no rounding of the start does, which moves it across.
 """
 
 from __future__ import annotations
@@ -44,3 +47,17 @@ def _start(r: Law, random: np.random.Generator) -> Start:
     e_x, e_y = float(np.cos(angle)) if off else 0.0, float(np.sin(angle))
     place = (now * e_x, now * e_y, out * e_x - along * e_y, out * e_y + along * e_x)
     return np.array([t, 0.0, *place]), int(codes.ARC)
+
+
+def up_a_deep_stem(n: int, random: np.random.Generator) -> tuple[Scene, list[Start]]:
+    """Draw starts on the floor of a deep stem, through the mouth to the arc."""
+    depth, swing = float(10.0 ** random.uniform(2, 6)), float(random.choice([0.0, 0.3]))
+    scene = Mushroom(r=Fourier(1.0, 1.0, (swing,)), nu=0.95, h=depth)
+    starts = []
+    for _ in range(n):
+        t, speed = float(random.uniform(0, 9)), float(depth * 10.0 ** random.uniform(1, 4))
+        width = 0.95 * (1.0 - swing)
+        x, at_mouth = random.uniform(-width, width, 2)
+        state = np.array([t, 0.0, x, -depth, speed * (at_mouth - x) / depth, speed])
+        starts.append((state, int(codes.FLOOR)))
+    return scene, starts

@@ -21,7 +21,7 @@ from fast.fine import fill_path
 from fast.kernel import codes
 from fast.kernel import double_double as dd
 from fast.step import WALL_CODES
-from scene import Collision, State, Stem, Undecided, load
+from scene import Collision, Mushroom, State, Stem, Undecided, load
 
 N_STEPS = int(os.environ.get("MUSHROOMS_STEPS", "250"))
 UNIT = 2.0**51  # backward units of 2^-104 in a backward ulp
@@ -125,6 +125,15 @@ def test_the_first_collision_is_the_careful_one_to_its_last_bits():
     assert isinstance(found, Collision)
     numbers = [found.dt, found.t, found.x, found.y, found.vx, found.vy]
     assert row[:, 0].tolist() == pytest.approx(numbers, rel=1e-15)
+
+
+@pytest.mark.parametrize("depth", [1e2, 1e4, 1e6])
+def test_a_flight_up_a_deep_stem_keeps_its_decimals(depth):
+    scene, start = Mushroom(r=1.3, h=depth, nu=0.7), State(0.0, 0.3, -0.9 * depth, 0.1 / depth, 1.0)
+    path, truth = fast.fine_trajectory(scene, start, 1), proved_step(scene, start, 2.0 * depth, digits=60)
+    dt, _, *place = path.numbers(0)
+    assert path.walls == ["arc"]
+    assert compare(enclosed("arc", [dt, *place]), truth, start, WORST / UNIT).kind == "agrees"
 
 
 def test_rounding_a_state_of_pairs_is_not_taken_for_a_gap():

@@ -7,6 +7,7 @@ a wall keeps its digits; place, wall speed and reflection follow in pairs. A pat
 
 Not handled: a hop along a wall across a knot of its law is the difference of two values, and one along a
 wall whose harmonics cancel in its speed meets their rounding: both keep 2^-104 of the table's size only.
+Nor is the place after a long flight: it keeps 2^-104 of the way.
 """
 
 from __future__ import annotations
@@ -207,10 +208,16 @@ def corrected(wall, s, is_again, state, scene):
     if wall == BASE:
         return div(times(-1.0, state.y), state.vy), True
     start = ZERO if is_again else residual(wall, state, scene)
+    # In the stem, maybe many radii deep, f of the arc is as large as the square of that, and so its rounding.
+    is_from_afar = wall == ARC and state.y[0] < 0.0
     time, change = (s, 0.0), s
     for _ in range(MAX_CORRECTIONS):
-        f = add(start, increase(wall, time, state, scene))
-        _, _, slope = gradient(wall, moved(state, time), scene)
+        after = moved(state, time)
+        if is_from_afar:
+            f = residual(wall, after, scene)
+        else:
+            f = add(start, increase(wall, time, state, scene))
+        _, _, slope = gradient(wall, after, scene)
         change = -f[0] / slope[0]
         time = add(time, (change, 0.0))
         if abs(change) <= SETTLED * time[0]:

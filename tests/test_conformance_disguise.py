@@ -163,3 +163,10 @@ def test_a_replayer_would_pass_without_disguise(monkeypatch):
     assert {r.verdict for r in run.results if r.group in GROUPS} == {"pass"}
     assert run.exit_code() == 1  # but not what no file holds
     assert run.counts("drawn")["declined"] == disguise.N_DRAWN
+
+
+def test_a_law_of_many_legs_is_written_once():
+    legs = [(k / 64, 1.0 + 0.5 * (k % 2)) for k in range(65)]
+    law = BangBang(knots=tuple(legs))
+    assert len(disguise._begun_at(law, 0, 0, 3).knots) == 193
+    assert disguise._begun_at(law, 0, 0, 6) is None

@@ -141,6 +141,12 @@ MUTANTS = {
         "return NEVER if hit == ON_ARC and error",
         "return NEVER if hit != hit and error",
     ),
+    "what a bounce hangs on": (
+        "slow beside a plateau",
+        100,
+        "return told if hit >= ON_LEFT else 1.0",
+        "return 1.0",
+    ),
     "what a hop hangs on": (
         "early hop",
         100,
@@ -186,7 +192,7 @@ MUTANTS = {
     ),
     "the slope of the side that is met": (
         "misled side",
-        100,
+        300,
         "return 1.0 if hit == ON_BASE else first",
         "return 1.0 if hit != ON_ARC else first",
     ),

@@ -189,6 +189,9 @@ def test_another_run_of_the_same_shape_is_refused():
     ):
         with pytest.raises(BadInput, match=words):
             fast.go_on(other, n_cycles=3, phases=phases, **asked, before=two)
+    for unlike in ({}, two.asked | {"phases": np.array([0.5, 0.6])}):
+        with pytest.raises(BadInput, match=r"before: \w+ = .*, must be"):
+            fast.go_on(scene, n_cycles=3, phases=(0.5,), **asked, before=two._replace(asked=unlike))
     renamed = replace(scene, name="mine")
     assert is_same(
         fast.go_on(renamed, n_cycles=3, phases=(0.5,), **asked, before=two),

@@ -94,3 +94,11 @@ def test_progress_tells_the_resolution_and_how_far_it_is(monkeypatch):
     assert told == sorted(told)
     assert {number for number, _ in told} == {1, 2}
     assert told[-1] == (2, 1.0)
+
+
+@pytest.mark.parametrize("n", [16, 256])
+@pytest.mark.parametrize("bad", ["inf", "nan"])
+def test_a_sample_that_is_no_number_is_not_lost(ctx, n, bad):
+    """Sums are taken in whole numbers, which know none of them."""
+    samples = [ctx.mpf(bad), *map(ctx.mpf, range(n))]
+    assert any(ctx.isnan(c) for c in Grid(ctx, n).coefficients(samples))

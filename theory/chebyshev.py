@@ -66,6 +66,8 @@ class Grid:
 
     def _products(self, values: list[Any]) -> Callable[[list[Any]], Any]:
         """Return a function from whole cosines, or the first of them, to their sum with values as weights."""
+        if not all(map(self.ctx.isfinite, values)):
+            return lambda _row: self.ctx.nan  # whole numbers know no infinity
         whole, exponent = _aligned(values)
         exponent += self._exponent
         prec, rounding = self.ctx._prec_rounding

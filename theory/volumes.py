@@ -131,7 +131,7 @@ def volumes_at(ctx: Any, scene: Scene, t: Any) -> Volumes:
 
 
 def shares(ctx: Any, nu: Any) -> tuple[Any, Any]:
-    """Return delta(nu) and 1 - delta(nu), each right where it is small."""
+    """Return delta(nu) and 1 - delta(nu), which is right where it is small too: see `free_share`."""
     return delta(ctx, nu), free_share(ctx, nu)
 
 

@@ -24,7 +24,7 @@ from conformance.generator.draws import Draw
 from conformance.grading.error import condition_number, free_flight, inputs_of, moved
 from conformance.vectors import NUMBERS, Expectation, Vector, certified
 from scene import BadInput, BangBang, Fourier, Scene, State, from_data, to_data, transforms
-from scene.laws import MAX_HARMONICS
+from scene.laws import MAX_HARMONICS, MAX_KNOTS
 from scene.tables import laws
 
 LARGEST = 12  # exponents of two are drawn between this and its negative
@@ -198,7 +198,7 @@ def _begun_at(law: BangBang, first: int, periods: int, rounds: int) -> BangBang 
     legs, times = len(law.knots) - 1, [Fraction(t) for t, _ in law.knots]
     numbers = range(first % legs, first % legs + rounds * legs + 1)
     moved_times = [times[i % legs] + (i // legs + periods) * (times[-1] - times[0]) for i in numbers]
-    if any(Fraction(float(t)) != t for t in moved_times):
+    if len(moved_times) > MAX_KNOTS or any(Fraction(float(t)) != t for t in moved_times):
         return None
     return BangBang(
         knots=tuple((float(t), law.knots[i % legs][1]) for i, t in zip(numbers, moved_times, strict=True))

@@ -197,6 +197,19 @@ def told_rate(t, r, r1, r2, sizes, limits):
 
 
 @part
+def told_push(hit, t, y_s, vx, vy, w1, w2, h1, h2, m1, m2, limits):
+    """Return `pushed` of docs/lanes.md: positive where a bounce hangs on a rate no more than on what enters.
+
+    Of sides and floor; the arc is met by nobody slower than it.
+    """
+    rate = h1 if hit == ON_FLOOR else fma(m1, y_s, w1)
+    bend = h2 if hit == ON_FLOOR else fma(m2, y_s, w2)
+    told = (abs(vx) + abs(vy)) + (abs(rate) + abs(t * bend)) - limits.rate
+    told = 1.0 if abs(rate) + abs(bend) == 0.0 else told
+    return told if hit >= ON_LEFT else 1.0
+
+
+@part
 def slack_of(hit, wall, s, delta, inverse, error, r, sizes, blur):
     """Return `slack` of docs/lanes.md: how far off s a certain hit may be."""
     f_error = 2.0 * SAFETY * s * sizes if wall == ON_ARC else 2.0 * r * blur
@@ -316,6 +329,8 @@ def fly(a, n, is_stem, is_relative, slope, degree, limits):
         place = place_on_wall(hit, s, x, y, vx, vy, v2, x_s, y_s, r, is_stem, slack, limits)
         first = way_out(hit, s, vx, vy, rate, k_side, sizes, limits)
         quality = min(min(quality, place), min(first, s))
+        pushed = told_push(hit, a[T + i], y_s, vx, vy, w1, w2, h1, h2, m1, m2, limits)
+        quality = min(quality, pushed)
         # A hop needs the radius at both of its ends, and its rate as well as what enters.
         known = min(before - a[BACK + i], told_rate(a[T + i], r, r1, r2, sizes, limits))
         known = known if hit == ON_ARC else 1.0

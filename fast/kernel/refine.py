@@ -209,7 +209,7 @@ def corrected(wall, s, is_again, state, scene):
         return div(times(-1.0, state.y), state.vy), True
     start = ZERO if is_again else residual(wall, state, scene)
     # In the stem, maybe many radii deep, f of the arc is as large as the square of that, and so its rounding.
-    is_from_afar = wall == ARC and state.y[0] < 0.0
+    is_from_afar = wall == ARC and not is_again and state.y[0] < 0.0
     time, change = (s, 0.0), s
     for _ in range(MAX_CORRECTIONS):
         after = moved(state, time)

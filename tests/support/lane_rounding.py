@@ -4,11 +4,16 @@ How long a hop is depends on the arc's rate less the particle's, and an error of
 other. As a rule rounding of the state or the time does as much. It does not where those are small: early,
 when the phase itself is nearly 0, near an axis and nearly along the arc.
 
+A side or the floor hands its rate to who is much slower, rounded as it is where the wall was quick, and where
+it stands nearly still for long no rounding of time or place does as much.
+
 A flight up a deep stem may be a million times as long as the cap is high: what is left of its time moves the
 place of the hit along the path, and no rounding of the start does, which moves it across.
 """
 
 from __future__ import annotations
+
+from math import comb
 
 import numpy as np
 import numpy.typing as npt
@@ -61,3 +66,27 @@ def up_a_deep_stem(n: int, random: np.random.Generator) -> tuple[Scene, list[Sta
         state = np.array([t, 0.0, x, -depth, speed * (at_mouth - x) / depth, speed])
         starts.append((state, int(codes.FLOOR)))
     return scene, starts
+
+
+def slow_beside_a_plateau(n: int, random: np.random.Generator) -> tuple[Scene, list[Start]]:
+    """Draw short slow flights to a floor or a side that stands nearly still, and is quick at other times."""
+    law, is_floor, starts = _plateau(int(random.integers(2, 9))), random.random() < 0.5, []
+    scene = Mushroom(r=3.0, w=1.0, h=law) if is_floor else Mushroom(r=3.0, w=law, h=1.0)
+    for _ in range(n):
+        t = float(2.0 * np.pi * random.integers(0, 5) + random.uniform(-0.4, 0.2))
+        speed, along = 10.0 ** random.uniform(-4, -1.5), random.random()
+        s = speed * 10.0 ** random.uniform(-3, -1)
+        there, rate = float(value(fp, law, t + s)), float(value(fp, law, t + s, 1))
+        if is_floor:
+            place, wall = (1.0, (speed + rate) * s - there, -speed * along, -speed - rate), codes.RIGHT
+        else:
+            place, wall = (there - (speed + rate) * s, -1.0, speed + rate, speed * along), codes.FLOOR
+        starts.append((np.array([t, 0.0, *place]), int(wall)))
+    return scene, starts
+
+
+def _plateau(n: int) -> Fourier:
+    """Return 1 + 0.4 ((1 - cos t) / 2)^n, flat about t = 0."""
+    shares = [0.4 * comb(2 * n, n - k) / 4.0**n for k in range(n + 1)]
+    waves = tuple(2.0 * (-1) ** k * share for k, share in enumerate(shares))
+    return Fourier(1.0 + shares[0], 1.0, waves[1:])

@@ -2,7 +2,7 @@
 
 `misled chord` and `misled side` solve for a flight whose f has two or three roots close together, and for
 which Newton's method from the lane's guess lands on the second or third of them. `corner over a rising floor`
-starts on a side so near the floor that its f is computed as 0. The last three are
+starts on a side so near the floor that its f is computed as 0. The last four are
 drawn in lane_rounding.
 """
 
@@ -18,7 +18,7 @@ from mpmath import fp
 from fast.kernel import codes
 from scene import Fourier, Mushroom, Scene
 from scene.laws import value
-from support.lane_rounding import early_hop, up_a_deep_stem
+from support.lane_rounding import early_hop, slow_beside_a_plateau, up_a_deep_stem
 
 Array = npt.NDArray[np.floating[Any]]
 Start = tuple[Array, int]
@@ -165,4 +165,5 @@ TRAPS = {
     "early hop": Trap(early_hop),
     "early hop through the base": Trap(early_hop, is_captured=True),
     "up a deep stem": Trap(up_a_deep_stem),
+    "slow beside a plateau": Trap(slow_beside_a_plateau),
 }

@@ -19,7 +19,7 @@ class LinkedLibrary(JITCodeLibrary):  # type: ignore[misc]
     """A function's text with that of what it calls, to be linked into others."""
 
     def finalize(self) -> None:
-        """Link what is called, as numba does, and leave it at that."""
+        """Link what is called, and leave it at that; kernels use nothing that numba must reload."""
         self._raise_if_finalized()
         for library in dict.fromkeys(self._linking_libraries):
             self._final_module.link_in(library._get_module_for_linking(), preserve=True)

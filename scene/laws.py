@@ -19,10 +19,9 @@ from typing import Any, NamedTuple
 
 import msgspec
 
-from scene.refusal import InvalidScene, check_number, shown
+from scene.given import MAX_KNOTS, amplitudes, check_legs, checked_knot, finite
+from scene.refusal import InvalidScene, shown
 
-MAX_HARMONICS = 16  # validity is decided by exact algebra, whose cost grows steeply with the degree
-MAX_KNOTS = 256
 LEAST_NORMAL = 2.0**-1022
 
 
@@ -53,7 +52,7 @@ class Fourier(
         """
         _keep(self, "mean", finite("fourier.mean", self.mean))
         for field in ("cos", "sin"):
-            _keep(self, field, _amplitudes(f"fourier.{field}", getattr(self, field)))
+            _keep(self, field, amplitudes(f"fourier.{field}", getattr(self, field)))
         if (self.omega is None) == (self.period is None):
             raise InvalidScene("fourier needs exactly one of `omega` and `period`")
         field = "omega" if self.period is None else "period"
@@ -86,61 +85,16 @@ class BangBang(msgspec.Struct, frozen=True, tag_field="kind", tag="bang-bang", f
             raise InvalidScene(f"bang-bang.knots = {shown(knots)}, must be a list of pairs [time, value]")
         if not 2 <= len(knots) <= MAX_KNOTS:
             raise InvalidScene(f"bang-bang.knots has {len(knots)} knots, must have 2 to {MAX_KNOTS}")
-        _keep(self, "knots", tuple(_knot(i, knot) for i, knot in enumerate(knots)))
-        _check_legs(self.knots)
+        _keep(self, "knots", tuple(checked_knot(i, knot) for i, knot in enumerate(knots)))
+        check_legs(self.knots)
 
 
 Law = float | Fourier | BangBang
 
 
-def finite(field: str, number: object) -> float:
-    """Return a finite number as a float.
-
-    Raises:
-        InvalidScene: it is none.
-    """
-    if type(number) is float and -math.inf < number < math.inf:
-        return number
-    return check_number(field, number, InvalidScene)
-
-
 def _keep(law: msgspec.Struct, field: str, value: Any) -> None:
     if getattr(law, field) is not value:
         msgspec.structs.force_setattr(law, field, value)
-
-
-def _amplitudes(field: str, numbers: object) -> tuple[float, ...]:
-    if not isinstance(numbers, tuple | list):
-        raise InvalidScene(f"{field} = {shown(numbers)}, must be a list of numbers")
-    if len(numbers) > MAX_HARMONICS:
-        raise InvalidScene(f"{field} has {len(numbers)} harmonics, at most {MAX_HARMONICS} are allowed")
-    return tuple(finite(f"{field}[{k}]", number) for k, number in enumerate(numbers))
-
-
-def _knot(i: int, knot: object) -> tuple[float, float]:
-    if not (isinstance(knot, tuple | list) and len(knot) == 2):
-        raise InvalidScene(f"bang-bang.knots[{i}] = {shown(knot)}, must be a pair [time, value]")
-    time, value = knot
-    if type(time) is type(value) is float and abs(time) < math.inf and abs(value) < math.inf:
-        return time, value
-    return (
-        check_number(f"bang-bang.knots[{i}] time", time, InvalidScene),
-        check_number(f"bang-bang.knots[{i}] value", value, InvalidScene),
-    )
-
-
-def _check_legs(knots: tuple[tuple[float, float], ...]) -> None:
-    for i, ((before, _), (after, _)) in enumerate(itertools.pairwise(knots), 1):
-        if after <= before:
-            raise InvalidScene(f"bang-bang.knots[{i}] time = {after}, must be > {before}")
-    (start, first), (end, last) = knots[0], knots[-1]
-    if last != first:
-        raise InvalidScene(
-            f"bang-bang.knots[{len(knots) - 1}] value = {last}, must equal the first ({first}): no jumps"
-        )
-    span = end - start
-    if not math.isfinite(span) or Fraction(span) != Fraction(end) - Fraction(start):
-        raise InvalidScene(f"bang-bang.knots span {start} to {end}: the period must be a binary64 number")
 
 
 class Period(NamedTuple):

@@ -26,7 +26,8 @@ from typing import ClassVar, Literal
 import msgspec
 from mpmath import fp
 
-from scene.laws import BangBang, Fourier, Law, Period, finite, shared_period
+from scene.given import finite
+from scene.laws import BangBang, Fourier, Law, Period, shared_period
 from scene.refusal import InvalidScene, shown
 from scene.validity import Condition, prove
 

@@ -19,8 +19,8 @@ from typing import Any, NamedTuple
 from mpmath import fp
 
 from scene import exact, mixed
+from scene.given import MAX_HARMONICS
 from scene.laws import (
-    MAX_HARMONICS,
     BangBang,
     Law,
     Period,

@@ -13,7 +13,7 @@ from flint import arb, ctx, fmpq
 
 from conformance.arb.laws import ball_law
 from scene import BangBang, Fourier, InvalidScene, Mushroom, mixed
-from scene.laws import MAX_HARMONICS
+from scene.given import MAX_HARMONICS
 from scene.mixed import BITS, PI, PI_ERROR, TaylorBounds, jet, multiply, sign_on_legs, turns
 from scene.polynomials import leg_intervals
 

@@ -24,7 +24,7 @@ from conformance.generator.draws import Draw
 from conformance.grading.error import condition_number, free_flight, inputs_of, moved
 from conformance.vectors import NUMBERS, Expectation, Vector, certified
 from scene import BadInput, BangBang, Fourier, Scene, State, from_data, to_data, transforms
-from scene.laws import MAX_HARMONICS, MAX_KNOTS
+from scene.given import MAX_HARMONICS, MAX_KNOTS
 from scene.tables import laws
 
 LARGEST = 12  # exponents of two are drawn between this and its negative

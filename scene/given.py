@@ -1,0 +1,75 @@
+"""Checks of what is given for a law's numbers, made before a law exists.
+
+Each returns the number as the law keeps it, or raises `InvalidScene` with one line.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from fractions import Fraction
+
+from scene.refusal import InvalidScene, check_number, shown
+
+MAX_HARMONICS = 16  # validity is decided by exact algebra, whose cost grows steeply with the degree
+MAX_KNOTS = 256
+
+
+def finite(field: str, number: object) -> float:
+    """Return a finite number as a float.
+
+    Raises:
+        InvalidScene: it is none.
+    """
+    if type(number) is float and -math.inf < number < math.inf:
+        return number
+    return check_number(field, number, InvalidScene)
+
+
+def amplitudes(field: str, numbers: object) -> tuple[float, ...]:
+    """Return a Fourier law's amplitudes.
+
+    Raises:
+        InvalidScene: they are no list of finite numbers, or too many.
+    """
+    if not isinstance(numbers, tuple | list):
+        raise InvalidScene(f"{field} = {shown(numbers)}, must be a list of numbers")
+    if len(numbers) > MAX_HARMONICS:
+        raise InvalidScene(f"{field} has {len(numbers)} harmonics, at most {MAX_HARMONICS} are allowed")
+    return tuple(finite(f"{field}[{k}]", number) for k, number in enumerate(numbers))
+
+
+def checked_knot(i: int, knot: object) -> tuple[float, float]:
+    """Return a bang-bang law's knot number i.
+
+    Raises:
+        InvalidScene: it is no pair of finite numbers.
+    """
+    if not (isinstance(knot, tuple | list) and len(knot) == 2):
+        raise InvalidScene(f"bang-bang.knots[{i}] = {shown(knot)}, must be a pair [time, value]")
+    time, value = knot
+    if type(time) is type(value) is float and abs(time) < math.inf and abs(value) < math.inf:
+        return time, value
+    return (
+        check_number(f"bang-bang.knots[{i}] time", time, InvalidScene),
+        check_number(f"bang-bang.knots[{i}] value", value, InvalidScene),
+    )
+
+
+def check_legs(knots: tuple[tuple[float, float], ...]) -> None:
+    """Refuse knots that do not rise in time, do not close, or span no binary64 number.
+
+    Raises:
+        InvalidScene: naming the knot, the value and the bound.
+    """
+    for i, ((before, _), (after, _)) in enumerate(itertools.pairwise(knots), 1):
+        if after <= before:
+            raise InvalidScene(f"bang-bang.knots[{i}] time = {after}, must be > {before}")
+    (start, first), (end, last) = knots[0], knots[-1]
+    if last != first:
+        raise InvalidScene(
+            f"bang-bang.knots[{len(knots) - 1}] value = {last}, must equal the first ({first}): no jumps"
+        )
+    span = end - start
+    if not math.isfinite(span) or Fraction(span) != Fraction(end) - Fraction(start):
+        raise InvalidScene(f"bang-bang.knots span {start} to {end}: the period must be a binary64 number")

@@ -25,7 +25,7 @@ from mushrooms.output import import_arrow
 from scene import Outcome, Scene, State, Stem, Wall
 from scene.files import write_file
 from scene.geometry import TableAt, half_width, table_at
-from scene.laws import value
+from scene.laws import values
 from scene.refusal import BadInput, check_count, check_number, check_scene, check_seed
 from scene.tables import cycle_length
 
@@ -111,8 +111,7 @@ class FollowedOrbit:
         states = self.states()
         index = np.array([k for k, wall in enumerate(self.walls) if wall == "arc"], int)
         before, (t, x, y, vx, vy) = states[index], states[index + 1].T
-        r = np.array([float(value(fp, self.scene.r, time)) for time in t])
-        w = np.array([float(half_width(fp, self.scene, time)) for time in t])
+        r, w = values(self.scene.r, t), half_width(fp, self.scene, t)
         # The speed of the flight that ends here; the bounce keeps the angular momentum about the centre.
         spin = y * vx - x * vy
         speed = np.hypot(before[:, 3], before[:, 4])
@@ -151,8 +150,7 @@ class FollowedOrbit:
         captured = self.captured()[:-1]
         if isinstance(self.scene, Stem):
             raise theory.NotCovered("the theory is of caps and mushrooms: table is stem")
-        inside = np.array([-2 * math.log(value(fp, self.scene.r, t)) for t in times])
-        rise = np.diff(inside)
+        rise = np.diff(-2 * np.log(values(self.scene.r, times)))
         if isinstance(self.scene, scenes.Mushroom) and not captured.all():
             rise = np.where(captured, rise, np.diff(theory.chaotic_zone(self.scene, times).log_energy))
         return np.concatenate([[0.0], np.cumsum(rise)])

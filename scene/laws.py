@@ -18,11 +18,15 @@ from functools import lru_cache
 from typing import Any, NamedTuple
 
 import msgspec
+import numpy as np
+from numpy.typing import NDArray
 
 from scene.given import MAX_KNOTS, amplitudes, check_legs, checked_knot, finite
 from scene.refusal import InvalidScene, shown
 
 LEAST_NORMAL = 2.0**-1022
+
+FloatArray = NDArray[np.float64]
 
 
 class Fourier(
@@ -181,7 +185,7 @@ def _exact_times(knots: tuple[tuple[float, float], ...]) -> list[Fraction]:
 def _leg_at(knots: tuple[tuple[float, float], ...], time: Fraction) -> Quadratic:
     times = _exact_times(knots)
     period = times[-1] - times[0]
-    n_periods = (time - times[0]) // period
+    n_periods = 0 if times[0] <= time < times[-1] else (time - times[0]) // period
     early, late = _halves(knots, bisect_right(times, time - n_periods * period) - 1, n_periods)
     return early if time < early.end else late
 
@@ -260,7 +264,9 @@ def _trigonometric(ctx: Any, law: Fourier, t: Any, order: int) -> Any:
 
 
 def value(ctx: Any, law: Law, t: Any, order: int = 0) -> Any:
-    """Evaluate a law at a point (not an interval) of time, in `mp` or `fp`."""
+    """Evaluate a law at a point (not an interval) of time, in `mp` or `fp`; at an array: `values`."""
+    if isinstance(t, np.ndarray):
+        return values(law, t, order)
     if isinstance(law, BangBang):
         # A Python float passes through as it is; an mpf becomes the exact rational it stands for.
         time = (
@@ -270,6 +276,39 @@ def value(ctx: Any, law: Law, t: Any, order: int = 0) -> Any:
         )
         return evaluate(ctx, piece_at(law, time), t, order)
     return evaluate(ctx, law, t, order)
+
+
+class _Arrays:
+    """A number system for `evaluate`: arrays of binary64."""
+
+    mpf, pi = float, math.pi
+
+    @staticmethod
+    def cos_sin(x: FloatArray) -> tuple[FloatArray, FloatArray]:
+        return np.cos(x), np.sin(x)
+
+
+def values(law: Law, times: FloatArray, order: int = 0) -> FloatArray:
+    """Evaluate a law, or its first or second derivative, at many times in binary64.
+
+    Args:
+        law: a sound law.
+        times: of any shape [time].
+        order: 0, 1 or 2.
+
+    Returns:
+        Of the times' shape; a phase is rounded as its time is, and no other error is larger.
+    """
+    if is_constant(law) or not isinstance(law, BangBang):
+        return np.full(times.shape, evaluate(_Arrays, piece_at(law, Fraction(0)), times, order))
+    (start, _), (end, _) = law.knots[0], law.knots[-1]
+    phases = times - np.floor((times - start) / (end - start)) * (end - start)
+    found = np.empty(times.shape)
+    halves = np.searchsorted(np.array(breakpoints(law)[1:-1], dtype=np.float64), phases, side="right")
+    for half in np.unique(halves):
+        those = halves == half
+        found[those] = evaluate(_Arrays, _halves(law.knots, half // 2, 0)[half % 2], phases[those], order)
+    return found
 
 
 def bounds(law: Law) -> Bounds:

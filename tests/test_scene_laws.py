@@ -22,6 +22,7 @@ from scene.laws import (
     is_constant,
     piece_at,
     value,
+    values,
 )
 
 LEGS = BangBang(knots=((0.0, 1.0), (0.25, 0.3), (0.5, 0.3), (0.75, 1.0), (1.0, 1.0)))
@@ -58,6 +59,26 @@ def test_bang_bang_is_half_way_and_fastest_at_mid_leg():
     assert value(ctx, LEGS, 0.0625, 2) == -value(ctx, LEGS, 0.1875, 2)
     # A quarter of the way in time is an eighth of the way in value.
     assert value(ctx, LEGS, 0.0625) == high + (low - high) / 8
+
+
+@given(moving, st.lists(times, min_size=1, max_size=5))
+def test_many_times_at_once_are_as_right_as_they_are_rounded(law, given_times):
+    ctx, limits = context(40), bounds(law)
+    sizes = max(abs(limits.lowest), abs(limits.highest)), limits.slope, limits.curvature
+    for order in (0, 1):
+        found = values(law, np.array(given_times), order)
+        far = 2 * max((abs(float(t)) for t in breakpoints(law)), default=0.0)
+        for t, number in zip(given_times, found, strict=True):
+            late = 4 * np.spacing(abs(t) + far)
+            assert abs(number - value(ctx, law, t, order)) <= 1e-14 * sizes[order] + late * sizes[order + 1]
+
+
+def test_many_times_at_once_know_their_legs():
+    inside = np.array([t + turns for t in (0.0625, 0.1875, 0.3, 0.5625, 0.6875, 0.8) for turns in (-3, 0, 7)])
+    for order in (0, 1, 2):
+        expected = [value(fp, LEGS, float(t), order) for t in inside]
+        assert values(LEGS, inside, order) == pytest.approx(expected, abs=1e-13)
+    assert values(LEGS, np.array([0.25, 1.25]), 2).tolist() == [0.0, 0.0]  # of the leg that follows
 
 
 def test_a_knot_belongs_to_the_leg_that_follows():

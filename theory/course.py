@@ -64,14 +64,12 @@ def course(scene: Mushroom) -> CycleCourse:
     rates_at(scene, np.zeros(1))
     start, step = _clock_start(scene), cycle_length(scene) / N_TIMES
     times: Floats = np.asarray(start + step * (np.arange(N_TIMES) + 0.5), dtype=np.float64)
-    now = [table_at(fp, scene, t) for t in times]
-    volumes = [volumes_at(fp, scene, t) for t in times]
-    nu_rate = np.array([(one.w_rate * one.r - one.w * one.r_rate) / one.r**2 for one in now])
-    flux = np.array([delta_slope(fp, v.nu) * v.v_cap / v.v_cha for v in volumes])
-    speed = np.array([pace(scene, t) for t in times])
+    now, volumes, speed = table_at(fp, scene, times), volumes_at(np, scene, times), pace(scene, times)
+    nu_rate = (now.w_rate * now.r - now.w * now.r_rate) / now.r**2
+    flux = delta_slope(np, volumes.nu) * volumes.v_cap / volumes.v_cha
     bend = np.asarray((np.gradient(speed, step) / speed) ** 2, dtype=np.float64)
     log_energy = chaotic_zone(scene, times).log_energy - chaotic_zone(scene, [start]).log_energy[0]
-    turning = np.array([abs(one.w_rate) / max(abs(one.slope), ROUNDING) for one in now])
+    turning = np.abs(now.w_rate) / np.maximum(np.abs(now.slope), ROUNDING)
     hazard, rates = np.abs(flux * nu_rate), rates_at(scene, times)
     return CycleCourse(start, step, times, log_energy, hazard, nu_rate < 0, bend, turning, rates)
 

@@ -169,8 +169,7 @@ def chaotic_zone(scene: Scene, times: ArrayLike) -> ChaoticZone:
     if cycle.period is not None:
         n_before = np.floor((t - start) / float(cycle.period))
         t = t - n_before * float(cycle.period)
-    volume = np.array([volumes_at(fp, scene, float(x)).v_cha for x in t])
-    log_energy = -np.log(volume / volumes_at(fp, scene, start).v_cha)
+    log_energy = -np.log(volumes_at(np, scene, t).v_cha / volumes_at(fp, scene, start).v_cha)
     root = tree(scene)
     branches = tuple(root.all_branches())
     if not branches:

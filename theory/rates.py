@@ -19,7 +19,7 @@ from mpmath import fp
 
 import scene as scenes
 from scene.geometry import table_at
-from scene.laws import breakpoints, value
+from scene.laws import breakpoints, values
 from scene.tables import Mushroom, Scene, cycle_length, laws
 from scene.transforms import backwards
 from theory.branches import Floats
@@ -72,9 +72,10 @@ class RatesAt(NamedTuple):
     square: Floats
 
 
-def pace(scene: Scene, t: float) -> float:
-    """Return the root of the sum of squares of all parameters' rates at time t, as the scene names them."""
-    return float(np.sqrt(sum(float(value(fp, law, t, 1)) ** 2 for law in laws(scene).values())))
+def pace(scene: Scene, times: Floats) -> Floats:
+    """Return the root of the sum of squares of all parameters' rates at times (T,), as a scene names them."""
+    squares = np.array([values(law, times, 1) ** 2 for law in laws(scene).values()])
+    return np.asarray(np.sqrt(squares.sum(axis=0)), dtype=np.float64)
 
 
 def kick_rate(scene: Scene, t: float) -> float:
@@ -125,7 +126,7 @@ def rates_at(scene: Scene, times: Floats) -> RatesAt:
     memory = _memory(rates.diffusion, np.searchsorted(spans, PHASES, side="right"))
     columns = np.column_stack([_unbiased(rates.diffusion, memory), memory, rates.lag, rates.square])
     found = _between(columns, phase, spans)
-    speed = np.array([pace(scene, t) for t in times])
+    speed = pace(scene, times)
     n, sign = len(SPEEDS), -1.0 if turned else 1.0
     lag, square = found[:, 2 : 2 + n], found[:, 2 + n :]
     return RatesAt(
@@ -144,7 +145,7 @@ def table_error(scene: Scene) -> TableError:
     """
     rates, turned = frozen_rates(scene)
     phases = 1 - PHASES if turned else PHASES
-    speed = np.array([pace(scene, float(t)) for t in phases * cycle_length(scene)])
+    speed = pace(scene, phases * cycle_length(scene))
     spread, lag = rates.diffusion[:, 1] * speed**2, rates.lag.mean(axis=1) * speed
     errors = [rates.diffusion_error[:, 1] * speed**2, rates.lag_error.mean(axis=1) * speed]
     sums = np.abs(spread).sum(), max(float(np.abs(lag).sum()), TINY)
@@ -190,8 +191,9 @@ def _spans(scene: Mushroom, length: float) -> Floats:
 def _outline(scene: Mushroom) -> Floats:
     """Return period and parameters at some phases, by which a cycle is known."""
     length = cycle_length(scene)
-    rows = [table_at(fp, scene, float(length * phase)) for phase in PHASES[::5]]
-    return np.array([length, *(float(x) for row in rows for x in (row.r, row.w, row.h, row.slope))])
+    now = table_at(fp, scene, length * PHASES[::5])
+    columns = np.broadcast_arrays(now.r, now.w, now.h, now.slope)
+    return np.array([length, *np.stack(columns, axis=1).ravel()])
 
 
 @lru_cache(maxsize=1)

@@ -2,12 +2,14 @@
 
 A volume is 2 pi times an area, weighted by the share of directions; at energy E it is
 sqrt(2 E) times larger. Every formula takes the number system first: `mpmath.fp` for floats,
-an `MPContext` for many digits. Intervals are not handled.
+an `MPContext` for many digits, `numpy` for arrays. Intervals are not handled.
 """
 
 from __future__ import annotations
 
 from typing import Any, NamedTuple
+
+import numpy as np
 
 from scene.laws import Law, value
 from scene.refusal import BadInput, check_scene
@@ -88,7 +90,7 @@ def delta_slope(ctx: Any, nu: Any) -> Any:
 
 def _check_nu(nu: Any) -> None:
     check_real(nu=nu)
-    if not 0 <= nu <= 1:
+    if not (np.min(nu) >= 0 and np.max(nu) <= 1 if isinstance(nu, np.ndarray) else 0 <= nu <= 1):
         raise BadInput(f"nu = {nu}, must be in [0, 1]")
 
 
@@ -111,7 +113,7 @@ def volumes_at(ctx: Any, scene: Scene, t: Any) -> Volumes:
     Args:
         ctx: number system.
         scene: a valid mushroom.
-        t: time, a number of ctx.
+        t: time, a number of ctx; of numpy an array.
 
     Raises:
         NotCovered: the table is no mushroom.
@@ -126,7 +128,8 @@ def volumes_at(ctx: Any, scene: Scene, t: Any) -> Volumes:
 
     r, h, slope = at(mushroom.r), at(mushroom.h), at(mushroom.slope)
     nu = at(mushroom.w) / r if mushroom.w is not None else at(mushroom.nu or 0.0)
-    nu = min(nu, ctx.mpf(1))  # a valid scene has nu <= 1: what exceeds it is rounding
+    # A valid scene has nu <= 1: what exceeds it is rounding.
+    nu = np.minimum(nu, 1.0) if ctx is np else min(nu, ctx.mpf(1))
     return volumes_of(ctx, r, nu, h, slope)
 
 

@@ -178,7 +178,7 @@ def measured(scene: Mushroom, *, phases: FloatArray = PHASES, n: float = 1.0, se
 
 
 def _row(scene: Mushroom, t: float, n: float, random: np.random.Generator) -> list[Mean]:
-    unit, now = pace(scene, t), table_at(fp, scene, t)
+    unit, now = float(pace(scene, np.array([t]))[0]), table_at(fp, scene, t)
     seeds = random.integers(2**63, size=len(PATHS)).tolist()
     n_diffusing, n_lagging = int(n * N_DIFFUSING), int(n * N_LAGGING)
     spread = [diffusion(scene, t, path, n_diffusing, seed) for path, seed in zip(PATHS, seeds, strict=True)]

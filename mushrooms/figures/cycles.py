@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from mpmath import fp
 from scipy.stats import norm
 
 import theory
@@ -21,7 +20,7 @@ from conformance.audit.tolerances import mean, share, spread
 from mushrooms.figures.energies import N_PLACES, draw, panels
 from mushrooms.figures.style import BLACK, BLUE, GREEN, ORANGE, SKY, FloatArray, new_figure, phase_colours
 from scene import load
-from scene.laws import value
+from scene.laws import values
 from scene.tables import Mushroom
 
 N_SUM_BINS = 300
@@ -35,7 +34,7 @@ def loops() -> Figure:
     fixed, moving = load("fixed-cap-anticlockwise"), load("moving-cap")
     assert isinstance(fixed, Mushroom)
     times = np.linspace(0, 1, N_LOOP + 1)
-    w, h = (np.array([float(value(fp, law, float(t))) for t in times]) for law in (fixed.w or 0.0, fixed.h))
+    w, h = (values(law, times) for law in (fixed.w or 0.0, fixed.h))
     _loop(axes[0], w, h)
     axes[0].set(xlabel="half-width w", ylabel="depth h", title="fixed cap, anticlockwise")
     for panel, scene, title in (
@@ -90,8 +89,8 @@ def retraced(sample: Sample) -> Figure:
 
 def _places(scene: Mushroom, times: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return V_ell/V_cap and V_cap/V at times."""
-    now = [theory.volumes_at(fp, scene, t) for t in times.tolist()]
-    return np.array([v.v_ell / v.v_cap for v in now]), np.array([v.v_cap / (v.v_cap + v.v_stem) for v in now])
+    now = theory.volumes_at(np, scene, times)
+    return now.v_ell / now.v_cap, now.v_cap / (now.v_cap + now.v_stem)
 
 
 def gain_of_capture() -> Figure:

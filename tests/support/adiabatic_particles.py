@@ -32,7 +32,7 @@ def curves(scene):
     zone = None
     if span := cycle_length(scene):
         grid = np.linspace(0, span, 2001)
-        cap = np.log([theory.volumes_at(fp, scene, float(t)).v_cap for t in grid])
+        cap = np.log(theory.volumes_at(np, scene, grid).v_cap)
         zone = grid, theory.chaotic_zone(scene, grid).log_energy, cap
     return float(prediction.p_nc), float(prediction.log_e_nc), theory.capture_curve(scene, 2001), zone
 

@@ -31,7 +31,7 @@ from conformance.audit.samples import Sample
 from conformance.audit.tolerances import BoolArray, FloatArray, Mean, close, mean, share, spread, stated
 from scene import Mushroom, Scene, State, load
 from scene.geometry import area, table_at
-from scene.laws import bounds, value
+from scene.laws import bounds, values
 from scene.tables import cycle_length, laws
 
 if TYPE_CHECKING:
@@ -100,7 +100,7 @@ def _orbit(
     _, t, x_, y_, vx, vy = done.steps[at_arc].T
     momentum = np.abs(x_ * vy - y_ * vx)
     times = np.concatenate([t, (t[1:] + t[:-1]) / 2])
-    r, middle = np.split(np.array([float(value(fp, scene.r, time)) for time in times]), [len(t)])  # type: ignore[union-attr]
+    r, middle = np.split(values(scene.r, times), [len(t)])  # type: ignore[union-attr]
     after = np.hypot(vx, vy)
     before = np.concatenate([[speed], after[:-1]])  # the base stands still
     phi, flown = np.arcsin(momentum / (r * before)), np.arcsin(momentum[:-1] / (middle * after[:-1]))

@@ -17,6 +17,7 @@ from numba import config, njit, types
 from numba.core.typing import Signature
 from numba.core.typing import signature as returns
 
+from fast.kernel.beside import compiled_beside
 from fast.kernel.bounces import bounce, rebound
 from fast.kernel.careful import first_step, step
 from fast.kernel.compiling import HOW, SOURCES, caller
@@ -160,14 +161,15 @@ def careful_at() -> Any:
 @cache
 def loops_for(is_slope_moving: bool, degree: int) -> Loops:
     """Compile the loops for scenes of such a slope and laws of such a degree, or load them."""
-    return Loops(
-        careful_at(),
-        address(AIMS[is_slope_moving], AIM),
-        address(FLIES[is_slope_moving, degree], FLY),
-        address(CHORDS[degree], CHORD),
-        address(BOUNCES[is_slope_moving], BOUNCE),
-        address(rebound_lanes, REBOUND),
-    )
+    with compiled_beside(lambda entry: entry is careful_step):
+        return Loops(
+            careful_at(),
+            address(AIMS[is_slope_moving], AIM),
+            address(FLIES[is_slope_moving, degree], FLY),
+            address(CHORDS[degree], CHORD),
+            address(BOUNCES[is_slope_moving], BOUNCE),
+            address(rebound_lanes, REBOUND),
+        )
 
 
 def loops_of(in_lanes: LawsInLanes) -> Loops:

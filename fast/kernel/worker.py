@@ -61,8 +61,10 @@ def is_known_throughout(in_lanes: LawsInLanes, last: float) -> bool:
     return until > 0.0 and (abs(last) < until or last == np.inf)
 
 
-def new_worker(in_lanes: LawsInLanes, stops: Stops, followed: Followed, n_passed: int = 0) -> Worker:
-    """Return a worker that holds no particle yet."""
+def new_worker(
+    in_lanes: LawsInLanes, stops: Stops, followed: Followed, n_passed: int = 0, loops: Loops | None = None
+) -> Worker:
+    """Return a worker that holds no particle yet; with its scene's loops, or the given ones."""
     return Worker(
         in_lanes.compiled,
         limits_of(in_lanes.compiled),
@@ -70,7 +72,7 @@ def new_worker(in_lanes: LawsInLanes, stops: Stops, followed: Followed, n_passed
         in_lanes.degree,
         0.0 if in_lanes.slope is None else in_lanes.slope,
         in_lanes.slope is None,
-        loops_of(in_lanes),
+        loops or loops_of(in_lanes),
         np.zeros(ANCHORS_SHAPE),
         is_known_throughout(in_lanes, float(stops.times[-1])),
         np.zeros((3, POOL_SIZE)),

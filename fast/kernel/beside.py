@@ -1,0 +1,75 @@
+"""Compiling in two processes at once: numba compiles one function after another, but keeps them on disk.
+
+A run needs the careful step, its loops and `follow_particles`, which calls those by their addresses and
+takes about as long to compile as they do together. When the careful step is about to be compiled, a second
+process begins with `follow_particles`; this one will find it kept. Whatever goes wrong there, it is compiled
+here as if nobody had tried.
+"""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+from numba.core import event
+
+COMMAND = ("-m", "fast.following")
+PATIENCE = 300.0  # seconds beyond our own, after which we go on alone
+
+
+class _Beside(event.Listener):  # type: ignore[misc]  # numba has no types
+    """Starts the second process when numba has found an entry not kept."""
+
+    def __init__(self, is_meant: Callable[[Any], bool]) -> None:
+        self._is_meant = is_meant
+        self.process: subprocess.Popen[bytes] | None = None
+
+    def on_start(self, told: Any) -> None:
+        """See numba's `Listener`."""
+        if self.process is None and self._is_meant(told.data["dispatcher"]):
+            self.process = start()
+
+    def on_end(self, told: Any) -> None:
+        """See numba's `Listener`."""
+
+
+def start() -> subprocess.Popen[bytes] | None:
+    """Start the second process; None where it would be of no use, or cannot be."""
+    if not sys.executable or (os.cpu_count() or 1) < 2:
+        return None
+    nowhere, found_as_here = subprocess.DEVNULL, os.pathsep.join(sys.path)
+    try:
+        return subprocess.Popen(
+            [sys.executable, *COMMAND],
+            stdin=nowhere,
+            stdout=nowhere,
+            stderr=nowhere,
+            env={**os.environ, "PYTHONPATH": found_as_here},
+        )
+    except OSError:
+        return None
+
+
+@contextmanager
+def compiled_beside(is_meant: Callable[[Any], bool]) -> Iterator[None]:
+    """Let a second process compile `follow_particles` while the caller compiles, if it does.
+
+    Args:
+        is_meant: tells whether to begin with a dispatcher that the caller is about to compile.
+    """
+    beside = _Beside(is_meant)
+    with event.install_listener("numba:compile", beside):
+        try:
+            yield
+            if beside.process is not None:
+                beside.process.wait(PATIENCE)
+        except subprocess.TimeoutExpired:
+            pass
+        finally:
+            if beside.process is not None and beside.process.poll() is None:
+                beside.process.kill()
+                beside.process.wait()

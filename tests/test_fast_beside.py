@@ -1,0 +1,105 @@
+"""A second process compiles beside a run's own; whatever becomes of it, the run goes on."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import pytest
+from numba import njit
+
+import fast
+from fast import following
+from fast.kernel import beside, entries
+from fast.kernel.beside import start as really_start
+from scene import load
+
+
+@pytest.fixture
+def started(monkeypatch):
+    """Start a made-up program in place of the second process; return the list of those started."""
+    found = []
+
+    def with_program(text):
+        def start():
+            found.append(subprocess.Popen([sys.executable, "-c", text]))
+            return found[-1]
+
+        monkeypatch.setattr(beside, "start", start)
+        return found
+
+    return with_program
+
+
+def compiled():
+    function = njit(lambda x: x + 1)
+    with beside.compiled_beside(lambda entry: entry is function):
+        return function(1)
+
+
+@pytest.mark.parametrize("text", ["", "raise SystemExit(3)", "import time; time.sleep(0.3)"])
+def test_it_is_waited_for_and_its_fate_is_no_matter(started, text):
+    processes = started(text)
+    assert compiled() == 2
+    assert [process.returncode is None for process in processes] == [False]
+
+
+def test_without_a_second_process_all_is_as_before(monkeypatch):
+    monkeypatch.setattr(beside, "start", lambda: None)
+    assert compiled() == 2
+
+
+def test_what_is_kept_or_not_meant_starts_nothing(started):
+    processes = started("")
+    function = njit(lambda x: x + 1)
+    assert function(1) == 2
+    with beside.compiled_beside(lambda _: True):
+        assert function(1) == 2
+    with beside.compiled_beside(lambda _: False):
+        assert njit(lambda x: x + 2)(1) == 3
+    assert processes == []
+
+
+def test_one_that_hangs_is_left_behind(started, monkeypatch):
+    monkeypatch.setattr(beside, "PATIENCE", 0.1)
+    processes = started("import time; time.sleep(600)")
+    assert compiled() == 2
+    assert processes[0].returncode not in (None, 0)
+
+
+def test_an_interrupt_ends_it_too(started):
+    processes = started("import time; time.sleep(600)")
+    function = njit(lambda x: x + 1)
+
+    def interrupted():
+        with beside.compiled_beside(lambda entry: entry is function):
+            function(1)
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        interrupted()
+    assert processes[0].returncode not in (None, 0)
+
+
+def test_it_is_told_where_our_modules_are(monkeypatch, tmp_path):
+    given = []
+    monkeypatch.setattr(subprocess, "Popen", lambda command, **options: given.append((command, options)))
+    monkeypatch.setattr(beside.os, "cpu_count", lambda: 2)
+    monkeypatch.setattr(sys, "path", [*sys.path, str(tmp_path)])
+    really_start()
+    ((command, options),) = given
+    assert command == [sys.executable, "-m", "fast.following"]
+    assert options["env"]["PYTHONPATH"].endswith(str(tmp_path))
+    monkeypatch.setattr(beside.os, "cpu_count", lambda: 1)
+    assert really_start() is None
+    assert len(given) == 1
+
+
+def test_what_it_compiles_is_what_a_run_asks_for(monkeypatch):
+    """Else the second process would compile for nobody."""
+    fast.simulate(load("moving-cap"), n_particles=1, energy=1e2, seed=1)
+    fast.trajectory(load("tilting-stem"), fast.starts.__dict__ and None, 1) if False else None
+    asked = []
+    monkeypatch.setattr(entries.follow_particles, "compile", asked.append)
+    following.compile_following()
+    assert asked == entries.follow_particles.signatures

@@ -26,7 +26,7 @@ from theory.chebyshev import Grid, even_degree
 from theory.cycle import Cycle
 from theory.measure import WeightedPoints, convolve, product, shifted
 from theory.valleys import CapturePiece, Valley
-from theory.volumes import delta_slope, free_share, shares
+from theory.volumes import delta_slope, free_share
 
 MAX_HALVINGS = 256  # a panel of 2^-256 of its piece
 NARROWEST = 1e-20  # of the widest mouth: `theory.valleys.tolerance` and rounding stay far below what nu is
@@ -334,7 +334,8 @@ def _sampled(
         nu, slope = _descent(ctx, piece, (part[0] + x) * width)
         found.t_in.append(piece.capture.time(nu, grid.forecast(found.t_in)))
         found.t_out.append(piece.release.time(nu, grid.forecast(found.t_out)))
-        known = shares(ctx, nu)
+        free = free_share(ctx, nu)
+        known = 1 - free, free  # of the island, V_cha needs nothing
         before = piece.capture.motion.volumes(found.t_in[-1], nu, known)
         after = piece.release.motion.volumes(found.t_out[-1], nu, known)
         a, b = before.v_cap / before.v_cha, after.v_cap / after.v_cha

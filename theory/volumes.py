@@ -14,7 +14,7 @@ from scene.refusal import BadInput, check_scene
 from scene.tables import Mushroom, Scene
 from theory.given import check_real, check_system
 
-WIDE = 0.9  # nu from which the island's share is summed as a series
+WIDE = 0.75  # nu from which the island's share is summed as a series
 
 
 class NotCovered(BadInput):
@@ -56,10 +56,10 @@ def _over_stem(ctx: Any, w: Any, h: Any, slope: Any) -> Any:
 def delta(ctx: Any, nu: Any) -> Any:
     """Return the island's share of the cap, (2 / pi) (acos nu - nu sqrt(1 - nu^2)).
 
-    Near nu = 1 the two terms cancel but for the order z^(3/2), z = 1 - nu, which is exact there. It is (4 / pi)
-    times the integral of sqrt(2 u - u^2) over [0, z], too, whose binomial series is summed there: all terms but
-    the first have one sign and add up to less than a twelfth of it, so that it is right to rounding however
-    small the island.
+    Near nu = 1 the two terms cancel but for the order z^(3/2), z = 1 - nu, which is exact there. It is (4 /
+    pi) times the integral of sqrt(2 u - u^2) over [0, z], too, whose binomial series is summed there: all
+    terms but the first have one sign and add up to less than a twelfth of it, so that it is right to
+    rounding however small the island.
 
     Raises:
         BadInput: nu is outside [0, 1].

@@ -11,7 +11,7 @@ import pytest
 
 import fast
 from fast import __main__ as served
-from scene import BangBang, Cap, Horizon, InvalidState, Rejected, State, Undefined, load
+from scene import BangBang, Cap, Fourier, Horizon, InvalidState, Rejected, State, Undefined, load
 from scene.protocol.wire import serve
 
 SCENE = load("moving-cap")
@@ -56,6 +56,46 @@ def test_through_the_centre_and_unfolded_all_the_same(name, tally):
         ends = [(o.x, o.y, o.vx, o.vy) for o in (outcome, path.outcome)]
         assert ends[0] == pytest.approx(ends[1], rel=1e-9, abs=1e-9)
         tally["through the centre"] += 1
+
+
+BREATHING = [Cap(r=BangBang(((0.0, 1.0), (1.0, 0.5), (2.0, 1.0)))), Cap(r=Fourier(1.0, 1.0, (0.5,)))]
+
+
+def lost_in_slow_caps(flow, n):
+    """Return how many of n particles, about as slow as the arc of their cap, do not end where they should.
+
+    There a lane's guess of the time of the next hit may be any number, or none.
+    """
+    random, n_lost = np.random.default_rng(7), 0
+    for scene in BREATHING:
+        for _ in range(n // 2):
+            x, y = float(random.uniform(-0.25, 0.25)), float(random.uniform(0.02, 0.3))
+            speed, angle = random.uniform(0.4, 2.5), random.uniform(0.0, 2 * np.pi)
+            t, velocity = float(random.uniform(0.0, 8.0)), speed * np.exp(1j * angle)
+            state = State(t, x, y, float(velocity.real), float(velocity.imag))
+            found, path = flow(scene, state, t + 8.0), fast.trajectory(scene, state, 1000, t + 8.0)
+            ends = [(o.x, o.y, o.vx, o.vy) if isinstance(o, Horizon) else () for o in (found, path.outcome)]
+            assert ends[1]
+            n_lost += ends[0] != pytest.approx(ends[1], rel=1e-6, abs=1e-6)
+    return n_lost
+
+
+def test_slow_particles_of_a_cap_are_not_lost():
+    def flow(scene, state, t_end):
+        return fast.flow(scene, [state], t_end).outcomes[0]
+
+    assert lost_in_slow_caps(flow, 60) == 0
+
+
+def test_a_flow_that_forgets_which_wall_was_met_last_loses_them():
+    def forgetful(scene, state, t_end):
+        """At its first hit with the arc after one with the base it does not know that it is there."""
+        path = fast.trajectory(scene, state, 1000, t_end)
+        if path.walls[:2] != ["base", "arc"]:
+            return path.outcome
+        return fast.trajectory(scene, State(*map(float, path.steps[1, 1:]), None), 1000, t_end).outcome
+
+    assert lost_in_slow_caps(forgetful, 60) > 5
 
 
 def test_starts_on_walls_are_taken_as_given():

@@ -6,8 +6,9 @@ import mpmath
 import numpy as np
 import pytest
 from mpmath import fp
+from numpy.typing import NDArray
 
-from scene import Fourier, Mushroom, load
+from scene import BangBang, Fourier, Mushroom, load
 from theory import (
     Energies,
     NotCovered,
@@ -19,6 +20,7 @@ from theory import (
     cdf_at,
     cumulants,
     density_at,
+    distribution,
     energies,
     energy_cdf,
     energy_density,
@@ -28,6 +30,7 @@ from theory import (
     sum_of_cycles,
     volumes_at,
 )
+from theory.branches import at
 from theory.volumes import delta_slope
 
 TWICE = Mushroom(
@@ -38,6 +41,14 @@ TWICE = Mushroom(
 @pytest.fixture(scope="module")
 def solved() -> tuple[Energies, Energies]:
     return energies(load("moving-cap")), energies(TWICE)
+
+
+# Captured up to twice, as in TWICE, while the cap breathes by 2^-12: s is of order 1e-4.
+NEARLY_TRIVIAL = Mushroom(
+    r=BangBang(((0.0, 1.0), (1.0, 1 + 2.0**-12), (4.0, 1.0))),
+    h=1.0,
+    nu=BangBang(((0.0, 0.875), (1.0, 0.25), (2.0, 0.625), (3.0, 0.25), (4.0, 0.875))),
+)
 
 
 @pytest.fixture(scope="module")
@@ -163,6 +174,45 @@ def test_many_cycles_keep_mass_mean_spread_and_mean_exp_minus(
         assert variance == pytest.approx(n_cycles * float(one.sd**2), abs=error + 1e-5)
         assert found.mean_of(lambda s: np.exp(-s)) == pytest.approx(1, abs=error)
         assert np.sqrt(variance) / n_cycles == pytest.approx(float(one.sd_of_mean(n_cycles)), abs=1e-5)
+
+
+def spread_of_ten(scene: Mushroom) -> float:
+    """Return the variance of ten cycles' sum over ten times one cycle's, which the panels have exactly."""
+    found = energies(scene)
+    ten, one = sum_of_cycles(found, 10), float(Saddle(found).cumulants([0.0])[2, 0])
+    mean = ten.mean_of(lambda s: s)
+    return ten.mean_of(lambda s: (s - mean) ** 2) / (10 * one)
+
+
+def test_the_lattice_is_as_fine_as_the_cycle_is_small(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert spread_of_ten(NEARLY_TRIVIAL) == pytest.approx(1, abs=1e-6)
+    monkeypatch.setattr(distribution, "LEAST_REACH", 1.0)  # one step for all cycles
+    assert spread_of_ten(NEARLY_TRIVIAL) > 2
+
+
+def twice_below(found: Energies, levels: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the probability of two captures and s below each level: one stay integrated over the other."""
+    place, weight = np.polynomial.legendre.leggauss(200)
+    angle = (place + 1) * np.pi / 4
+    x, share = np.sin(angle) ** 2, weight * np.pi / 4 * np.sin(2 * angle)  # the ends' roots removed
+    early, late = found.root.children
+    total = np.zeros_like(levels)
+    for branch in early.branches:
+        rate = 2 * at(np.polynomial.chebyshev.chebder(branch.coefficients[3]), x)
+        masses = share * rate * branch.chaotic(x) / early.p_top
+        rest = (levels[:, None] - at(branch.s, x) + found.s_nc).ravel()
+        below = sum((b.below(b.s, rest) for b in late.branches), np.zeros_like(rest))
+        total += below.reshape(len(levels), -1) @ masses
+    return total
+
+
+def test_two_captures_in_a_small_cycle_are_their_double_integral() -> None:
+    found = energies(NEARLY_TRIVIAL)
+    levels = np.array([-2e-5, 0.0, 2e-5, 4e-5])
+    once = sum(np.exp(-b.absorbed) * b.below(b.s, levels) for b in found.root.all_branches())
+    twice = twice_below(found, levels)
+    assert twice[-1] > 0.05
+    np.testing.assert_allclose(found.captured_below(levels) - once, twice, atol=1e-6)
 
 
 def test_many_cycles_agree_with_chance(solved: tuple[Energies, Energies]) -> None:

@@ -13,7 +13,9 @@ import pytest
 from mpmath import MPContext
 
 from scene import BangBang, Fourier, Mushroom, Scene, load
-from theory import NotConverged, Prediction, predict, solutions, v_cap, v_cha, volumes_at
+from scene.laws import value
+from theory import Cycle, NotConverged, Prediction, adiabatic, predict, solutions, v_cap, v_cha, volumes_at
+from theory.adiabatic import captures
 from theory.volumes import delta_slope
 
 MAIN = ("fixed-cap-anticlockwise", "fixed-cap-clockwise", "moving-cap", "moving-cap-reversed")
@@ -230,12 +232,33 @@ def test_degenerate_turns_converge_like_plain_ones(cos: tuple[float, ...]) -> No
         assert abs(getattr(found, name) - x) < 1e-13, name
 
 
+# A leg from 0.9 to 0.1 passes its middle 3e-17 beside the knot at 0.5, where nu rests.
+BESIDE_A_KNOT = Mushroom(
+    r=1.0,
+    h=BangBang(((0.0, 1.0), (1.5, 1.5), (4.0, 1.0))),
+    nu=BangBang(((0.0, 0.9), (1.0, 0.5), (2.0, 0.1), (4.0, 0.9))),
+)
+
+
+def test_values_of_nu_as_near_as_binary64_tells_them_apart_are_resolved(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    cycle = Cycle.of(BESIDE_A_KNOT, 1)
+    t = np.linspace(0.0, 2.0, 1_001)
+    nu, h = (np.array([value(mpmath.fp, law, x) for x in t]) for law in (BESIDE_A_KNOT.nu, BESIDE_A_KNOT.h))
+    delta = (2 / np.pi) * (np.arccos(nu) - nu * np.sqrt(1 - nu**2))
+    ratio = np.pi / (np.pi * (1 - delta) + 4 * nu * h)
+    p_nc = math.exp(-np.trapezoid(ratio, delta))
+    assert float(captures(cycle, 6).p_not_captured) == pytest.approx(p_nc, rel=1e-4)
+    monkeypatch.setattr(adiabatic, "MAX_HALVINGS", 5)  # more digits want more
+    with pytest.raises(NotConverged, match=r"not resolved to 6 digits near nu = 0\.50"):
+        captures(cycle, 6)
+
+
 def test_digits_out_of_reach_are_refused_not_guessed() -> None:
-    # nu' almost touches zero (2^-50 away): the branch's inverse is singular 1e-23 beside the real line.
-    nu = Fourier(mean=0.5, omega=1.0, cos=(0.1875 * (1 + 2.0**-50), 0.0, 0.0625))
-    r = Fourier(mean=1.0, omega=1.0, sin=(0.5,))
-    with pytest.raises(NotConverged, match=r"not resolved to 9 digits near nu = 0\.5"):
-        predict(Mushroom(r=r, h=1.0, nu=nu), digits=5)
+    nu = BangBang(((0.0, 1.0), (1.0, 1e-30), (2.0, 1.0)))
+    with pytest.raises(NotConverged, match=r"closes to 1\.0e-30 of its widest, must stay above 1e-20 of it"):
+        predict(Mushroom(r=1.0, h=1.0, nu=nu), digits=5)
 
 
 def test_strings_have_the_digits_asked() -> None:

@@ -18,7 +18,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property, reduce
-from math import comb
+from math import comb, log2
 from typing import Any, NamedTuple
 
 from scene.refusal import BadInput
@@ -26,9 +26,10 @@ from theory.chebyshev import Grid, even_degree
 from theory.cycle import Cycle
 from theory.measure import WeightedPoints, convolve, product, shifted
 from theory.valleys import CapturePiece, Valley
-from theory.volumes import delta_slope, free_share, shares
+from theory.volumes import delta_slope, free_share
 
-MAX_HALVINGS = 24  # a panel of 2^-24 of its piece: nearer singularities are given up
+MAX_HALVINGS = 256  # a panel of 2^-256 of its piece
+NARROWEST = 1e-20  # of the widest mouth: `theory.valleys.tolerance` and rounding stay far below what nu is
 
 MANY = 200  # degree of a grid from which parts are first tried at few points
 TRIAL, TRIAL_BITS = 48, 320  # degree and precision of the trial
@@ -227,8 +228,11 @@ def captures(cycle: Cycle, target: int, told: Callable[[float], None] | None = N
         told: called with the share of the work that is done, again and again.
 
     Raises:
-        NotConverged: panels as small as 2^-MAX_HALVINGS of a piece do not resolve it.
+        NotConverged: panels as small as `most_halvings` allows do not resolve it, or the mouth nearly closes.
     """
+    if cycle.nu_min < NARROWEST * cycle.nu_max:
+        share = cycle.ctx.nstr(cycle.nu_min / cycle.nu_max, 3)
+        raise NotConverged(f"the mouth closes to {share} of its widest, must stay above {NARROWEST:g} of it")
     grid = grid_for(cycle.ctx, target)
     start = cycle.ctx.zero, cycle.ctx.zero
     headway = Headway(len(cycle.pieces), told)
@@ -256,6 +260,7 @@ def _resolved(
     cycle: Cycle, grid: Grid, piece: CapturePiece, start: tuple[Any, Any], target: int, headway: Headway
 ) -> list[Panel]:
     panels: list[Panel] = []
+    most = most_halvings(cycle)
     todo = [(0, 0)]  # part i of the piece's 2^halvings equal parts in u
     while todo:
         i, halvings = todo.pop()
@@ -265,16 +270,29 @@ def _resolved(
         if panel is not None:
             panels.append(panel)
             start = panel.A[-1], panel.B[-1]
-        elif halvings < MAX_HALVINGS:
+        elif halvings < most:
             todo += [(2 * i + 1, halvings + 1), (2 * i, halvings + 1)]
         else:
             nu, _ = _descent(cycle.ctx, piece, cycle.ctx.ldexp(i, -halvings))
             raise NotConverged(
                 f"the cycle is not resolved to {target} digits near nu = {float(nu):.6g}"
-                f" by panels of 2^-{MAX_HALVINGS} of a piece"
+                f" by panels of 2^-{most} of a piece"
             )
     headway.at(1.0)
     return panels
+
+
+def most_halvings(cycle: Cycle) -> int:
+    """Return how often a piece may be halved, which is enough wherever its functions have a singularity.
+
+    Singularities on a branch lie at the values of nu at its knots and critical points. Values that differ by
+    more than `theory.valleys.tolerance` are ends of pieces; what differs by less is one value. So a
+    singularity is an end of the piece, where its orders take it away, or further off the end than the
+    tolerance: a part as short as that is resolved, and so is any other that is shorter than its distance.
+    Binary64 laws come so near: a leg from 0.9 to 0.1 has its middle 3e-17 off a knot at 0.5. What lies
+    beside the real line may be nearer still, and is given up.
+    """
+    return min(MAX_HALVINGS, int((cycle.ctx.dps - 10) * log2(10)))
 
 
 def _is_hopeless(cycle: Cycle, grid: Grid, piece: CapturePiece, part: tuple[int, int], target: int) -> bool:
@@ -316,7 +334,8 @@ def _sampled(
         nu, slope = _descent(ctx, piece, (part[0] + x) * width)
         found.t_in.append(piece.capture.time(nu, grid.forecast(found.t_in)))
         found.t_out.append(piece.release.time(nu, grid.forecast(found.t_out)))
-        known = shares(ctx, nu)
+        free = free_share(ctx, nu)
+        known = 1 - free, free  # of the island, V_cha needs nothing
         before = piece.capture.motion.volumes(found.t_in[-1], nu, known)
         after = piece.release.motion.volumes(found.t_out[-1], nu, known)
         a, b = before.v_cap / before.v_cha, after.v_cap / after.v_cha

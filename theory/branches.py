@@ -1,10 +1,12 @@
 """The panels of a solution in binary64: functions of place along each panel, inverted in whole arrays.
 
-A panel's functions are Chebyshev series in x on [0, 1] from a 15-digit solution, right to about 1e-14. Where
-s(x) turns, the panel is cut into monotone stretches; the turns are searched among FINE samples. The place at
-which s reaches a level is then found by bisection, so the probability below a level is exact to rounding.
-Near a caustic an error e in the level becomes sqrt(e) in the probability; no method avoids this. Two turns
-nearer to each other than 1 / FINE of a panel are not told apart; s varies by about FINE^-3 between them.
+A panel's functions are Chebyshev series in x on [0, 1] from a 15-digit solution, right to about 1e-14. But
+s may be far smaller than what it is a difference of: it is subtracted before it is rounded, and errs by
+UNRESOLVED and by rounding of its own size. Where s(x) turns, the panel is cut into monotone stretches; the
+turns are searched among FINE samples. The place at which s reaches a level is then found by bisection, so
+the probability below a level is exact to rounding. Near a caustic an error e in the level becomes sqrt(e)
+in the probability; no method avoids this. Two turns nearer to each other than 1 / FINE of a panel are not
+told apart; s varies by about FINE^-3 between them.
 """
 
 from __future__ import annotations
@@ -28,6 +30,8 @@ from theory.solutions import solved
 Floats = NDArray[np.float64]
 
 DIGITS = 15
+TARGET = DIGITS + 4  # decimals to which panels are resolved
+UNRESOLVED = 1e-18  # what differs by less is not told from nothing by them
 FINE = 2048  # samples of a panel; linear interpolation between them errs by FINE^-2, 2e-7
 X = np.linspace(0.0, 1.0, FINE + 1)
 BISECTIONS = 52
@@ -38,34 +42,23 @@ class Branch(NamedTuple):
 
     coefficients: Chebyshev series in 2 x - 1 of nu, t_in, t_out, A, B, log g, shape (6, n).
     ends: their values at x = 0 and 1, shape (6, 2).
+    s: the same of log E1 / E0 of a particle captured here and nowhere else (Eq:lnE/E0), shape (n,).
     s_before, s_after, absorbed, s_below: as in `theory.adiabatic.Placed`.
     """
 
     coefficients: Floats
     ends: Floats
+    s: Floats
     s_before: float
     s_after: float
     absorbed: float
     s_below: float
 
     @property
-    def s(self) -> Floats:
-        """Series of log E1 / E0 of a particle captured here and nowhere else (Eq:lnE/E0)."""
-        A, B, log_g = self.coefficients[3:]
-        s: Floats = np.asarray(B - A - log_g)
-        s[0] += self.s_before + self.s_after
-        return s
-
-    @property
     def t_in(self) -> Floats:
         """Series of the capture time."""
         t_in: Floats = self.coefficients[1]
         return t_in
-
-    @property
-    def scale(self) -> float:
-        """Size of A, B and log g, whose difference is s."""
-        return float(np.abs(self.coefficients[3:]).max())
 
     def evaluate(self, x: Floats) -> Floats:
         """Return nu, t_in, t_out, A, B, log g at x in [0, 1], exact at the ends; shape (6, len(x))."""
@@ -82,7 +75,7 @@ class Branch(NamedTuple):
     def below(self, series: Floats, levels: Floats) -> Floats:
         """Return the probability of being captured here with the series' value <= each level."""
         total = np.zeros_like(levels)
-        bounds = turns(series, self.scale)
+        bounds = turns(series)
         p = self.chaotic(bounds)
         values = at(series, bounds)
         for i in range(len(bounds) - 1):
@@ -99,15 +92,10 @@ def at(series: Floats, x: Floats) -> Floats:
     return np.asarray(chebyshev.chebval(2 * x - 1, series), dtype=np.float64)
 
 
-def turns(series: Floats, scale: float = 0.0) -> Floats:
-    """Return 0, the places in (0, 1) at which the series turns, and 1.
-
-    Args:
-        series: Chebyshev coefficients.
-        scale: size of the numbers the series was computed from, whose rounding is no turn.
-    """
+def turns(series: Floats) -> Floats:
+    """Return 0, the places in (0, 1) at which the series, given by its coefficients, turns, and 1."""
     values = at(series, X)
-    noise = 64 * np.finfo(float).eps * max(scale, np.max(np.abs(series)))
+    noise = max(64 * np.finfo(float).eps * np.max(np.abs(series)), UNRESOLVED)
     slopes = np.where(np.abs(np.diff(values)) > noise, np.sign(np.diff(values)), 0)
     told = np.flatnonzero(slopes)
     rate = chebyshev.chebder(series)
@@ -182,7 +170,7 @@ def tree(scene: Scene) -> Node:
 @lru_cache(maxsize=32)
 def _solved(scene: Scene) -> Node:
     # Every curve and histogram of a scene asks for its tree again. Its arrays are shared, hence read only.
-    found = solved(scene, Cycle.of(scene, DIGITS), DIGITS + 4)
+    found = solved(scene, Cycle.of(scene, DIGITS), TARGET)
     return _node(found, found.root, iter([_branch(found, k) for k in range(len(found.placed))]))
 
 
@@ -192,10 +180,11 @@ def _branch(found: Captures, k: int) -> Branch:
     functions = (p.nu, p.t_in, p.t_out, p.A, p.B, p.log_g)
     coefficients = [[float(c) for c in found.grid.coefficients(values)] for values in functions]
     ends = [[float(values[0]), float(values[-1])] for values in functions]
-    return Branch(_kept(coefficients), _kept(ends), *(float(x) for x in placed[1:]))
+    s = _kept([float(c) for c in found.grid.coefficients(placed.s)])
+    return Branch(_kept(coefficients), _kept(ends), s, *(float(x) for x in placed[1:]))
 
 
-def _kept(numbers: list[list[float]]) -> Floats:
+def _kept(numbers: list[float] | list[list[float]]) -> Floats:
     array = np.array(numbers)
     array.setflags(write=False)
     return array

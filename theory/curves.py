@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 
 from scene.refusal import BadInput, check_count
 from scene.tables import Scene
-from theory.branches import DIGITS, Branch, Floats, X, tree, turns
+from theory.branches import DIGITS, Branch, Floats, X, at, tree, turns
 from theory.constants import guarded
 from theory.cycle import Cycle
 from theory.distribution import energies
@@ -72,9 +72,8 @@ def capture_curve(scene: Scene, n: int = 400) -> CaptureCurve:
 
 
 def _curve(branch: Branch, x: Floats) -> CaptureCurve:
-    nu, t_in, t_out, A, B, log_g = branch.evaluate(x)
-    s = B - A - log_g + (branch.s_before + branch.s_after)
-    return CaptureCurve(nu, t_in, t_out, np.exp(-A), log_g, s)
+    nu, t_in, t_out, A, _, log_g = branch.evaluate(x)
+    return CaptureCurve(nu, t_in, t_out, np.exp(-A), log_g, at(branch.s, x))
 
 
 def largest_gain(scene: Scene) -> tuple[float, float] | None:
@@ -87,7 +86,7 @@ def largest_gain(scene: Scene) -> tuple[float, float] | None:
     """
     best: tuple[float, float] | None = None
     for branch in tree(scene).all_branches():
-        curve = _curve(branch, turns(branch.s, branch.scale))
+        curve = _curve(branch, turns(branch.s))
         k = int(np.argmax(curve.s))
         if best is None or curve.s[k] > best[1]:
             best = float(curve.t_in[k]), float(curve.s[k])

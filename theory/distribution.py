@@ -4,7 +4,9 @@ One cycle: an atom at s_nc; particles captured once, whose implicit density (Eq:
 integrated exactly; those captured more often, a convolution on a lattice (right to about 1e-6).
 Many cycles, taken as independent (sec. 4.2, Fig:n=10): powers of the Fourier transform of the
 lattice distribution. The lattice's origin is the uncaptured energy, so the atom is one of its points. The
-mass of a particle between two points is shared among them so that mass and mean are kept. Far tails are
+mass of a particle between two points is shared among them so that mass and mean are kept; its variance grows
+by at most step^2 / 4. So the step has to be small against what s does: it is STEP of the reach of s in one
+cycle, which in a nearly trivial cycle may be far below 1. Far tails are
 smaller than the rounding of the transform unless the distribution is first tilted by exp(q s);
 `theory.saddle` reaches them without a transform.
 """
@@ -22,7 +24,8 @@ from scene.tables import Scene
 from theory.branches import Branch, Floats, Node, X, at, tree
 from theory.given import finite_array
 
-STEP = 2.0**-12  # the lattice's, at best: its square times a density of order 1 is the error
+STEP = 2.0**-12  # the lattice's, at best, and as a share of one cycle's reach
+LEAST_REACH = 1e-12  # of s in a cycle; below, its differences are partly rounding
 MAX_POINTS = 2**20
 MAX_CYCLES = 10_000
 LARGEST_EXPONENT = 600.0  # exp of it stays finite, and so do sums
@@ -80,7 +83,8 @@ def energy_cdf(found: Energies | Scene, s: ArrayLike) -> Floats:
 
     Returns:
         An array of that shape. Error about 1e-14, at a distance d from a caustic 1e-15 / sqrt(d),
-        at most 1e-7; in cycles with several captures of one particle 1e-6. The uncaptured are a step at
+        at most 1e-7; in cycles with several captures of one particle 1e-6, however small the reach of s
+        (but for LEAST_REACH) and unless most of them crowd in a hundredth of it. The uncaptured are a step at
         log_e_nc: finite energy makes it a peak, so compare whole distributions with
         `Energies.captured_below`, or away from it.
 
@@ -100,8 +104,11 @@ class Lattice:
     """
 
     def __init__(self, root: Node, n_cycles: int, tilt: float = 0.0) -> None:
-        low, high = (n_cycles * d for d in _reach(root, root.s_nc))
-        self.step = max(STEP, (high - low) / (MAX_POINTS - 16))
+        one = _reach(root, root.s_nc)
+        low, high = (n_cycles * d for d in one)
+        # Densities are of order 1 / reach, and jump by as much: the error is of order (step / reach)^2.
+        own = STEP * min(1.0, max(one[1] - one[0], LEAST_REACH))
+        self.step = max(own, (high - low) / (MAX_POINTS - 16))
         self.n_points = 1 << int(np.ceil(np.log2((high - low) / self.step + 16)))
         self.first = int(np.floor(low / self.step)) - 4
         self.root, self.s_nc, self.tilt = root, root.s_nc, tilt
@@ -208,8 +215,9 @@ def sum_of_cycles(found: Energies | Scene, n_cycles: int, *, q: float = 0.0) -> 
             around the s with K'(q) = s / n (`theory.cumulants`), and noise elsewhere.
 
     Returns:
-        The distribution. Mass is 1 to rounding, the mean n m1 within 1e-7 n, the variance n sd^2 and mean
-        exp(-s) = 1 within n (step^2 / 4 + 1e-7).
+        The distribution. Mass is 1 to rounding, the mean n m1 within 1e-7 n R, the variance n sd^2 within
+        n (step^2 / 4 + 1e-7 R^2) and the mean of exp(-s) 1 within n (step^2 / 4 + 1e-7 R), R the reach of s
+        in one cycle, at least LEAST_REACH.
 
     Raises:
         BadInput: n_cycles out of bounds.

@@ -16,6 +16,8 @@ from scene.refusal import BadInput, check_scene
 from scene.tables import Mushroom, Scene
 from theory.given import check_real, check_system
 
+WIDE = 0.75  # nu from which the island's share is summed as a series
+
 
 class NotCovered(BadInput):
     """A scene the theory says nothing about: one line that tells why."""
@@ -56,6 +58,11 @@ def _over_stem(ctx: Any, w: Any, h: Any, slope: Any) -> Any:
 def delta(ctx: Any, nu: Any) -> Any:
     """Return the island's share of the cap, (2 / pi) (acos nu - nu sqrt(1 - nu^2)).
 
+    Near nu = 1 the two terms cancel but for the order z^(3/2), z = 1 - nu, which is exact there. It is (4 /
+    pi) times the integral of sqrt(2 u - u^2) over [0, z], too, whose binomial series is summed there: all
+    terms but the first have one sign and add up to less than a twelfth of it, so that it is right to
+    rounding however small the island.
+
     Raises:
         BadInput: nu is outside [0, 1].
 
@@ -63,7 +70,18 @@ def delta(ctx: Any, nu: Any) -> Any:
     """
     check_system(ctx)
     _check_nu(nu)
+    if nu > WIDE:
+        z = 1 - nu
+        return 8 * z * ctx.sqrt(2 * z) * _integral_of_root(z / 2) / (3 * ctx.pi)
     return 2 * (ctx.acos(nu) - nu * ctx.sqrt((1 - nu) * (1 + nu))) / ctx.pi
+
+
+def _integral_of_root(x: Any) -> Any:
+    """Return 3 / 2 times the integral over [0, 1] of sqrt(u) sqrt(1 - x u), by powers of x."""
+    total, binomial, k = 1 + 0 * x, -x / 2, 1
+    while (more := total + 3 * binomial / (2 * k + 3)) != total:
+        total, binomial, k = more, binomial * x * (2 * k - 1) / (2 * k + 2), k + 1
+    return total
 
 
 def free_share(ctx: Any, nu: Any) -> Any:

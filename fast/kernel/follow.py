@@ -25,7 +25,7 @@ from fast.kernel.loops import run_careful
 
 from fast.kernel.pools import (  # isort: skip
     CERTAIN, CLOSED, DONE, END, HIT, LANES, NEVER, NEXT_R0, NEXT_T, NEXT_T_LOW, NEXT_VX, NEXT_VY, NEXT_W0,
-    NEXT_X, NEXT_Y, N_ARC, N_BASE, OK, ROUTINE, S, SINCE, SPIN, STAY_IN, STAY_OUT, STOP, STRIDE, T,
+    NEXT_X, NEXT_Y, N_ARC, N_BASE, OK, ON_ARC, ROUTINE, S, SINCE, SPIN, STAY_IN, STAY_OUT, STOP, STRIDE, T,
     T_LOW, UNTIL, VX, VY, WALL, X, Y, change_lane, fold, load, refold, set_laws, set_reference,
     whole_registers,
 )  # fmt: skip
@@ -134,6 +134,9 @@ def step_carefully(pool, a, i, roster, worker):
         if code == ARC:
             a[N_ARC + i] += 1.0
             a[SPIN + i] = p.x * p.vy - p.y * p.vx
+            # It goes on unfolded, from arc to arc, and nothing else says so: its laws may be lost where a
+            # guess of the next flight's time lies beyond all pieces.
+            a[WALL + i] = ON_ARC
             break
         a[N_BASE + i] += 1.0
         arrive(a, i, None)

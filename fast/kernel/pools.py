@@ -160,9 +160,7 @@ def fold(a, i, scene, pieces, degree):
 
 @part
 def refold(a, i):
-    """Bring an unfolded particle of a cap back to y >= 0, on the arc if it was unfolded at all."""
+    """Bring an unfolded particle of a cap back to y >= 0; its wall is known since it first hit the arc."""
     if a[Y + i] < 0.0:
         a[Y + i], a[VY + i] = -a[Y + i], -a[VY + i]
-    if a[END + i] > -NEVER:  # its laws are known: it has hit the arc, and went on unfolded
-        a[WALL + i] = ON_ARC
     a[SPIN + i] = 0.0

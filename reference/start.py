@@ -93,15 +93,6 @@ def motion_at(scene: Scene, state: State, arithmetic: Arithmetic) -> MovingWalls
     return MovingWalls(arithmetic, scene, flight_from(arithmetic, state))
 
 
-def origin_of(
-    scene: Scene, state: State, start: JudgedStart, wall: Wall, arithmetic: Arithmetic
-) -> tuple[Interval, Interval, Interval] | None:
-    """Return f_x, f_y, f_t at the start of the wall met, when that is the one being left: f(0) moves too."""
-    if wall not in start.leaving:
-        return None
-    return motion_at(scene, state, arithmetic).gradient(wall, arithmetic.zero)
-
-
 def _walls_near(scene: Scene, state: State) -> list[Wall]:
     """List the walls that bound the state's part of the table; in a mushroom the arc ends at the base."""
     if isinstance(scene, Cap):

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from support.answers_by_hand import UNDEFINED
-from support.forgery import drop, put, shift
+from support.forgery import both, drop, put, shift
 from support.tables import LIFT
 from support.truth import IS_DEEP
 
@@ -172,6 +172,11 @@ FORGED_NOWHERE = [
         (name, shift(2.0**-40, "state", "y"))
         for name in ("on two walls", "at the edge", "along the base, unnamed")
     ),
+    *(
+        ("where the base ends, " + name, both(put("walls", ["base"]), put("reason", "sliding")))
+        for name in ("level", "upwards")
+    ),
+    *((name, shift(2.0, "state", "x")) for name in ("along the base", "along the base, unnamed")),
     *((name, put("t_end", 2.0**-4)) for name in ("corner", "mouth's edge from below", "along the mouth")),
 ]
 

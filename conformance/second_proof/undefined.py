@@ -59,6 +59,7 @@ class _Undefined:
         """Prove that the state lies on two walls, at the mouth's edge, or slides along one."""
         if not self.walls or not all(map(self._is_on, self.walls)):
             raise Refuted("the state is not shown to lie on these walls")
+        self._require_inside()
         flight = self.flight
         is_edge = flight.table.is_mushroom and flight.line.y == 0 and {"left", "right"} & set(self.walls)
         if self.reason in ("corner", "mouth-edge"):
@@ -76,6 +77,16 @@ class _Undefined:
             raise Refuted("f'' is not shown to let the particle rest on the wall")
         is_at_rest = all(is_constant(law) for law in laws(self.flight.table.scene).values())
         self._require_reason("sliding" if bend < 0 or is_at_rest or wall == "base" else "tangency")
+
+    def _require_inside(self) -> None:
+        """Prove that the state lies inside every other wall of its part of the table."""
+        f = self.flight
+        is_beside = f.wall is None and "base" in self.walls
+        in_cap = f.begins_in_cap() or (f.table.is_mushroom and is_beside)
+        near: tuple[Wall, ...] = ("arc",) if in_cap else SIDES
+        for wall in set(near) - set(self.walls):
+            if not f.jet(wall, ZERO)[0] > 0:
+                raise Refuted(f"the state is not shown to be inside {wall}")
 
     def later(self) -> None:
         """Prove that two walls are met together, for the first time, and no other before."""

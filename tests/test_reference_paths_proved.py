@@ -160,10 +160,13 @@ def test_undefined_outcomes_are_proved_again(name):
     check(claim)
 
 
+THROUGH = "corner of the floor, through the mouth"
 FORGED_NOWHERE = [
     *((name, put("reason", "tangency")) for name in UNDEFINED),
     *((name, drop("walls", 1)) for name in ("corner", "on two walls")),
     *((name, put("excluded", {})) for name in ("corner", "along the mouth")),
+    *((THROUGH, drop("excluded", wall)) for wall in ("arc", "right")),
+    (THROUGH, put("scene", "w", 0.0625)),
     *(
         (name, shift(2.0**-40, "state", "x"))
         for name in ("corner", "corner above", "arc and base", "mouth's edge from above")
@@ -206,3 +209,16 @@ def test_a_corner_less_a_residual_is_none():
         check(forged | corner | {"outcome": "undefined"})
     with pytest.raises(BadInput, match="must be undefined"):
         certificate(scene, state, 3.0, Undefined("corner"))
+
+
+def test_a_stretch_of_very_many_periods_is_proved_at_once():
+    """Of 2^42 periods nobody lists the knots: the wall left rises over all of them, whatever it does."""
+    shivering = BangBang(((0.0, 1.0), (2.0**-41, 1.0 - 2.0**-52), (2.0**-40, 1.0)))
+    scene, start = Stem(w=shivering, h=4.0), State(0.0, 1.0, -2.0, -0.5, 0.01, "right")
+    claim = certificate(scene, start, 9.0, reference.next_collision(scene, start, 9.0))
+    assert [kind for _, _, kind in claim["excluded"]["right"]] == ["rising"]
+    check(claim)
+    for kind in ("falling", "concave", "plain", "centred", "lifting", "swept"):
+        put("excluded", "right", 0, 2, kind)(claim)
+        with pytest.raises(Refuted):
+            check(claim)

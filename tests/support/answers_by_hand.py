@@ -69,6 +69,7 @@ ANSWERS = {
     "arc and base": by_hand(CIRCLE, State(0.0, 0.5, 0.5, 0.5, -0.5), "corner"),
     "corner": by_hand(BOX, State(0.0, 0.5, -0.5, 0.5, -0.5), "corner"),
     "corner above": by_hand(BOX, State(0.0, 0.5, -0.5, 0.5, 0.5), "corner"),
+    "corner of the floor, through the mouth": by_hand(STATIC, State(0.0, 0.125, 0.5, 0.25, -1.0), "corner"),
     "mouth's edge from above": by_hand(STATIC, State(0.0, 0.25, 0.25, 1.0, -1.0), "mouth-edge"),
     "mouth's edge from below": by_hand(STATIC, State(0.0, 0.25, -0.25, 1.0, 1.0), "mouth-edge"),
     "along the mouth": by_hand(STATIC, State(0.0, 0.0, 0.0, 1.0, 0.0), "mouth-edge"),

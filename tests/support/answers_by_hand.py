@@ -87,6 +87,9 @@ ANSWERS = {
     "where the base ends, inside by 1e-71": by_hand(SWAYING, State(0.5, 1.0, 0.0, -1.0, 0.0), "sliding"),
     "where the base ends, beyond by 1e-71": by_hand(SWAYING, State(-0.5, 1.0, 0.0, -1.0, 0.0), "rejected"),
     "at the edge": by_hand(STATIC, State(0.0, -0.5, 0.0, 1.0, 0.3, "left"), "mouth-edge"),
+    "at the edge of a mouth as wide as the cap": by_hand(
+        Mushroom(r=1.0, h=1.0, nu=1.0), State(0.0, 1.0, 0.0, -0.5, 1.0), "mouth-edge"
+    ),
     "at the edge, level": by_hand(STATIC, State(0.0, -0.5, 0.0, 1.0, 0.0, "left"), "mouth-edge"),
     "at the edge, downwards": by_hand(STATIC, State(0.0, 0.5, 0.0, -1.0, -0.3, "right"), "mouth-edge"),
 }

@@ -222,3 +222,17 @@ def test_a_stretch_of_very_many_periods_is_proved_at_once():
         put("excluded", "right", 0, 2, kind)(claim)
         with pytest.raises(Refuted):
             check(claim)
+
+
+@pytest.mark.parametrize("off", [-1.0, 1.0])
+def test_a_swept_stretch_is_swept_less_the_residual(off):
+    """Of an arc that trembles by 1e-30, left as slowly: what is removed, 1e-13 or -1e-13, counts far more."""
+    scene = Cap(r=Fourier(1.0, 1.0, (-1e-30,)))
+    start = State(0.0, 0.0, 1.0 + off * 2.0**-44, 0.0, -(2.0**-103), "arc")
+    claim = certificate(scene, start, 900.0, reference.next_collision(scene, start, 900.0))
+    assert claim["excluded"]["arc"][-1][2] == "swept"
+    check(claim)
+    early = [[first, last, "swept"] for first, last, _ in claim["excluded"]["arc"]]
+    put("excluded", "arc", early)(claim)
+    with pytest.raises(Refuted, match="may sweep"):
+        check(claim)

@@ -63,11 +63,12 @@ class SignedFlight(BallFlight):
         return self.jet(wall, hull(a, b), within=(a + b) / 2)
 
     def is_never_swept(self, wall: Wall, a: Rational, b: Rational) -> bool:
-        """Tell whether f > 0 on [a, b], whatever the laws do between their bounds.
+        """Tell whether f, less its residual, is above 0 on [a, b], whatever the laws do between their bounds.
 
         With laws held still f is concave in s, and linear in the slope: its least value is at ends.
         """
-        return all(self._lowest(wall, s) > 0 for s in (a, b))
+        residual = self.residuals.get(wall, ZERO)
+        return all(self._lowest(wall, s) - residual > 0 for s in (a, b))
 
     def _lowest(self, wall: Wall, s: Rational) -> Number:
         laws, (x, y) = self.table.laws, self.place(s)

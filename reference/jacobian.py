@@ -3,16 +3,19 @@
 With event point q = (x + vx s, y + vy s, t + s) and D = f'(s), the root's condition gives
 ds = -(f_q . dq at fixed s) / D, and the bounce v' = v - 2 D N / |N|^2 with N = (f_x, f_y) is
 differentiated through the second partials of f. Where the wall being left is met again, the
-equation is f(s) = f(0), and f(0) moves with the state too.
+equation is f(s) = f(0), and f(0) moves with the state too. Along a path that stays so: the residual of a
+wall met again and again is that of the first start, but each flight begins where f is just this, so that
+f at its own begin moves as much, whatever start moves it. After another wall it is 0, and moves not at all.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 from reference.arithmetic import Arithmetic, Enclosure, Interval
 from reference.course import Hit
 from reference.walls import EnclosedFlight
+from scene import Wall
 
 Matrix = list[list[Interval]]
 
@@ -21,7 +24,7 @@ def step_jacobian(
     arithmetic: Arithmetic,
     flight: EnclosedFlight,
     hit: Hit,
-    origin: tuple[Interval, Interval, Interval] | None,
+    leaving: Iterable[Wall],
 ) -> Matrix:
     """Enclose the derivatives of (dt, x, y, vx, vy) after the bounce by (t, x, y, vx, vy) before.
 
@@ -29,8 +32,7 @@ def step_jacobian(
         arithmetic: working precision.
         flight: the state before.
         hit: the first collision.
-        origin: f_x, f_y, f_t at the start when the wall hit is the one being left, else None; None
-            there too gives the derivative with the residual held fixed, as a chain of steps needs.
+        leaving: the wall being left, if any.
 
     Returns:
         5 rows (outputs) of 5 columns (inputs), intervals.
@@ -38,6 +40,7 @@ def step_jacobian(
     zero, one = arithmetic.zero, arithmetic.number(1)
     s, d = hit.time - flight.begin, hit.slope
     f_x, f_y, f_t = hit.motion.gradient(hit.wall, hit.time)
+    origin = hit.motion.gradient(hit.wall, flight.begin) if hit.wall in leaving else None
     # At a knot the second derivatives jump: both sides' are enclosed, or those after it at an exact time.
     f_xx, f_yy, f_yt, f_tt = hit.motion.hessian(hit.wall, hit.time)
     n2 = arithmetic.square(f_x) + arithmetic.square(f_y)
@@ -66,7 +69,7 @@ def chained(later: Matrix, earlier: Matrix) -> Matrix:
     """Return d(state after) / d(state before all): the product, with t' = t + dt in row t.
 
     Args:
-        later: Jacobian of the last step, residual held fixed.
+        later: Jacobian of the last step.
         earlier: d(t, x, y, vx, vy) at its start / d(initial state).
     """
     rows = [[sum_of(a * b[j] for a, b in zip(row, earlier, strict=True)) for j in range(5)] for row in later]

@@ -11,11 +11,10 @@ from fractions import Fraction
 from reference.answers import Outcome, ProvedCollision, Trajectory
 from reference.arithmetic import Arithmetic, Exhausted, Undecidable, WorkLimit
 from reference.chain import bounce, collision, horizon
-from reference.course import Course, Event
+from reference.course import Course
 from reference.jacobian import chained, enclosures, identity, step_jacobian
-from reference.start import JudgedStart, flight_from, is_in_cap, judge_start, origin_of
+from reference.start import flight_from, is_in_cap, judge_start
 from reference.step import GUARD_DIGITS, MAX_DIGITS, checked_digits, checked_state, require_digits
-from reference.walls import EnclosedFlight
 from scene import Scene, State, Stem, Undecided
 from scene.refusal import check_count, check_number
 
@@ -119,7 +118,9 @@ class _EnclosedPath:
                 return event.undefined
             if event.hit is None:
                 return horizon(course)
-            self._chain_jacobian(flight, event, start)
+            if self.matrix is not None:
+                matrix = step_jacobian(arithmetic, flight, event.hit, leaving)
+                self.matrix = chained(matrix, self.matrix)
             after = bounce(course, event.hit)
             self.steps.append(collision(course, event.hit, after))
             flight, leaving, flat, exact = after.flight, after.leaving, frozenset(), None
@@ -128,11 +129,3 @@ class _EnclosedPath:
         if self.steps and self.digits is not None:
             require_digits(self.steps[-1], self.digits)
         return None
-
-    def _chain_jacobian(self, flight: EnclosedFlight, event: Event, start: JudgedStart) -> None:
-        if self.matrix is None or event.hit is None:
-            return
-        origin = None
-        if not self.steps:
-            origin = origin_of(self.scene, self.state, start, event.hit.wall, self.arithmetic)
-        self.matrix = chained(step_jacobian(self.arithmetic, flight, event.hit, origin), self.matrix)

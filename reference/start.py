@@ -59,9 +59,9 @@ def judge_start(scene: Scene, state: State, arithmetic: Arithmetic) -> JudgedSta
     motion = motion_at(scene, state, arithmetic)
     if state.wall is not None:
         _check_residual(scene, state, motion)
+    if _is_beside_mouth(scene, state, motion):
+        return _judge_on_base(scene, state, motion)
     on = [wall for wall in _walls_near(scene, state) if _is_on(scene, state, wall, motion)]
-    if state.vy == 0 and _is_beside_mouth(scene, state, motion):
-        return JudgedStart({}, undefined=Undefined("sliding"), walls=("base",))
     if state.wall is not None:
         on.append(state.wall)
     # A place on two walls is undefined whichever way it moves; a side ends at the mouth's edge.
@@ -93,15 +93,6 @@ def motion_at(scene: Scene, state: State, arithmetic: Arithmetic) -> MovingWalls
     return MovingWalls(arithmetic, scene, flight_from(arithmetic, state))
 
 
-def origin_of(
-    scene: Scene, state: State, start: JudgedStart, wall: Wall, arithmetic: Arithmetic
-) -> tuple[Interval, Interval, Interval] | None:
-    """Return f_x, f_y, f_t at the start of the wall met, when that is the one being left: f(0) moves too."""
-    if wall not in start.leaving:
-        return None
-    return motion_at(scene, state, arithmetic).gradient(wall, arithmetic.zero)
-
-
 def _walls_near(scene: Scene, state: State) -> list[Wall]:
     """List the walls that bound the state's part of the table; in a mushroom the arc ends at the base."""
     if isinstance(scene, Cap):
@@ -118,10 +109,6 @@ def _is_on(scene: Scene, state: State, wall: Wall, motion: MovingWalls) -> bool:
     if wall == state.wall:
         return False
     side = sign(motion.wall(wall, motion.arithmetic.zero).f)
-    is_unnamed_and_level = isinstance(scene, Mushroom) and state.y == 0 and state.wall is None
-    if is_unnamed_and_level and wall in ("left", "right") and side < 0:
-        # Level with the mouth but beside it: on the base, which belongs to the cap.
-        return _is_on_base(scene, state, motion)
     if side < 0:
         raise InvalidState(
             f"state (x, y) = ({state.x!r}, {state.y!r}) at t = {state.t!r} is beyond wall {wall}"
@@ -131,12 +118,18 @@ def _is_on(scene: Scene, state: State, wall: Wall, motion: MovingWalls) -> bool:
     return side == 0
 
 
-def _is_on_base(scene: Scene, state: State, motion: MovingWalls) -> bool:
-    if sign(motion.wall("arc", motion.arithmetic.zero).f) < 0:
-        raise InvalidState(f"state (x, y) = ({state.x!r}, 0) at t = {state.t!r} is beyond wall arc")
+def _judge_on_base(scene: Scene, state: State, motion: MovingWalls) -> JudgedStart:
+    """Judge a state that names no wall, level with the mouth but beside it: on the base, which is the cap's.
+
+    The base ends at the arc. A sign of the arc's f that is open is no sign: the state may lie beyond.
+    """
+    if _is_on(scene, state, "arc", motion):
+        return JudgedStart({}, undefined=Undefined("corner"), walls=("arc", "base"))
     if state.vy < 0:
         raise InvalidState(f"state.vy = {state.vy!r}: the particle starts on wall base and moves into it")
-    return False
+    if state.vy == 0:
+        return JudgedStart({}, undefined=Undefined("sliding"), walls=("base",))
+    return JudgedStart({})
 
 
 def _is_beside_mouth(scene: Scene, state: State, motion: MovingWalls) -> bool:

@@ -16,7 +16,7 @@ from reference.chain import bounce, collision, horizon
 from reference.course import Course, UndefinedProof
 from reference.jacobian import enclosures, step_jacobian
 from reference.margins import measure
-from reference.start import flight_from, is_in_cap, judge_start, origin_of
+from reference.start import flight_from, is_in_cap, judge_start
 from scene import BadInput, InvalidState, Rejected, Scene, State, Undecided
 from scene.refusal import check_count, check_scene
 from scene.states import check_numbers
@@ -148,8 +148,7 @@ def _attempt(question: _Question, arithmetic: Arithmetic) -> tuple[Outcome, Unde
     found = collision(course, event.hit, bounce(course, event.hit))
     require_digits(found, question.digits)
     if question.is_differentiated:
-        origin = origin_of(scene, state, start, event.hit.wall, arithmetic)
-        matrix = step_jacobian(arithmetic, flight, event.hit, origin)
+        matrix = step_jacobian(arithmetic, flight, event.hit, start.leaving)
         found = replace(found, jacobian=enclosures(arithmetic, matrix))
     if question.is_measured:
         found = replace(found, margins=measure(arithmetic, course, event.hit))

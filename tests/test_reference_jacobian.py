@@ -2,20 +2,25 @@
 
 from __future__ import annotations
 
+import math
+import random
 from fractions import Fraction
 
+import msgspec
 import pytest
 from hypothesis import given, settings
+from mpmath import fp
 from support.truth import centre, proved_step
 
 import fast
-import reference
+import reference.path
 from conformance.generator.prover import ask, ends, flight_of
 from conformance.grading.agreement import compare, exact
 from conformance.grading.error import condition_number, inputs_of, moved
 from conformance.strategies import scenes_and_states
 from conformance.vectors import NUMBERS, Expectation, certified
-from scene import Cap, State, load
+from scene import Cap, Fourier, State, load
+from scene.laws import value
 
 INPUTS = ("t", "x", "y", "vx", "vy")
 FROM_THE_CAP = State(0.3, 0.1, 0.2, 3.0, 4.0)
@@ -107,6 +112,50 @@ def test_jacobian_against_differences(start, n):
         for row in range(5):
             difference = float((centre(ends[0][row]) - centre(ends[1][row])) / Fraction(2 * h))
             assert float(path.jacobian[row][column]) == pytest.approx(difference, rel=1e-6, abs=1e-5)
+
+
+def hops(rng):
+    """Return a cap and a start on its arc, residual and all, from which the arc is met again and again."""
+    r = Fourier(mean=1.0, omega=1.0, cos=(rng.choice((0.0, 0.1)),)) if rng.random() < 0.5 else 1.0
+    t, angle, lift = rng.uniform(-3.0, 3.0), rng.uniform(0.05, 0.2), rng.uniform(0.02, 0.1)
+    now, off = float(value(fp, r, t)), 1.0 + rng.uniform(-1.0, 1.0) * 2.0**-24
+    x, y = now * off * math.cos(angle), now * off * math.sin(angle)
+    return Cap(r=r), State(t, x, y, -4.0 * math.sin(angle + lift), 4.0 * math.cos(angle + lift), "arc")
+
+
+def jacobian_error(scene, start, n, walls):
+    """Return how far a path's Jacobian is from differences, as a share of its largest entry."""
+    path = reference.trajectory(scene, start, n, is_differentiated=True)
+    assert [step.wall for step in path.steps] == walls
+    h, worst = 2.0**-40, 0.0
+    largest = max(abs(float(d)) for row in path.jacobian for d in row)
+    for column, field in enumerate(INPUTS):
+        starts = [msgspec.structs.replace(start, **{field: getattr(start, field) + d}) for d in (h, -h)]
+        ends = [reference.trajectory(scene, s, n).steps[-1].after for s in starts]
+        step = Fraction(getattr(starts[0], field)) - Fraction(getattr(starts[1], field))
+        for row in range(5):
+            difference = float((centre(ends[0][row]) - centre(ends[1][row])) / step)
+            worst = max(worst, abs(float(path.jacobian[row][column]) - difference) / largest)
+    return worst
+
+
+def test_a_wall_met_again_and_again_keeps_a_residual_that_moves_with_the_first_start():
+    """On the second hop, too, the residual is f(0) of the start: held fixed, the chain would be wrong."""
+    rng = random.Random(7)
+    for n in (1, 2, 2, 3):
+        assert jacobian_error(*hops(rng), n, ["arc"] * n) < 1e-9
+
+
+def test_a_residual_held_fixed_after_the_first_hop_is_found_out(monkeypatch):
+    honest = reference.path.step_jacobian
+
+    def fixed(arithmetic, flight, hit, leaving):
+        return honest(arithmetic, flight, hit, leaving if flight.begin == 0 else {})
+
+    monkeypatch.setattr(reference.path, "step_jacobian", fixed)
+    rng = random.Random(7)
+    assert jacobian_error(*hops(rng), 1, ["arc"]) < 1e-9
+    assert jacobian_error(*hops(rng), 2, ["arc", "arc"]) > 1e-3
 
 
 @pytest.mark.parametrize("name", ["moving-cap", "fixed-cap-clockwise", "breathing-circle", "fermi-ulam"])

@@ -6,12 +6,13 @@ import pytest
 from support.reference_battery import BATTERY
 
 from reference import chain, rational, start, timeline, walls
-from reference.arithmetic import Arithmetic, exact_ends
+from reference.arithmetic import Arithmetic, exact_ends, sign
 from reference.course import SIDES, Course
 from reference.isolation import Isolator
 from reference.jets import Jet
+from reference.start import JudgedStart
 from reference.walls import MovingWalls
-from scene import Mushroom
+from scene import InvalidState, Mushroom, Undefined
 
 first_root = Isolator.first_root
 first_hit = Course._first_hit
@@ -149,6 +150,13 @@ def hessian_without_time(self, wall, s):
     return (two, two, zero, zero) if wall == "arc" else (zero, zero, zero, zero)
 
 
+def base_without_an_end(scene, state, motion):
+    """The arc is asked only whether the state is surely beyond it."""
+    if sign(motion.wall("arc", motion.arithmetic.zero).f) < 0:
+        raise InvalidState("beyond wall arc")
+    return JudgedStart({}, undefined=Undefined("sliding") if state.vy == 0 else None, walls=("base",))
+
+
 MUTANTS = {
     "first root skipped": (Isolator, "first_root", skip_the_first_root),
     "first wall in the list wins": (Course, "_first_hit", exclude_nothing),
@@ -159,6 +167,7 @@ MUTANTS = {
     "mouth's edge with the residual": (Course, "_beyond_crossing", edge_with_the_residual),
     "met at the horizon is met": (Course, "_is_at_horizon", met_before_the_horizon),
     "a start is on one wall at most": (start, "_walls_near", one_wall_at_most),
+    "a base without an end": (start, "_judge_on_base", base_without_an_end),
     "no limit to the work": (Arithmetic, "spend", lambda self, units: None),
     "mouth's width at departure": (Course, "_beyond_crossing", width_at_departure),
     "mouth always open": (Course, "_beyond_crossing", open_always),

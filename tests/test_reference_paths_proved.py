@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from support.answers_by_hand import UNDEFINED
-from support.forgery import drop, put, shift
+from support.forgery import both, drop, put, shift
 from support.tables import LIFT
 from support.truth import IS_DEEP
 
@@ -160,10 +160,13 @@ def test_undefined_outcomes_are_proved_again(name):
     check(claim)
 
 
+THROUGH = "corner of the floor, through the mouth"
 FORGED_NOWHERE = [
     *((name, put("reason", "tangency")) for name in UNDEFINED),
     *((name, drop("walls", 1)) for name in ("corner", "on two walls")),
     *((name, put("excluded", {})) for name in ("corner", "along the mouth")),
+    *((THROUGH, drop("excluded", wall)) for wall in ("arc", "right")),
+    (THROUGH, put("scene", "w", 0.0625)),
     *(
         (name, shift(2.0**-40, "state", "x"))
         for name in ("corner", "corner above", "arc and base", "mouth's edge from above")
@@ -172,6 +175,11 @@ FORGED_NOWHERE = [
         (name, shift(2.0**-40, "state", "y"))
         for name in ("on two walls", "at the edge", "along the base, unnamed")
     ),
+    *(
+        ("where the base ends, " + name, both(put("walls", ["base"]), put("reason", "sliding")))
+        for name in ("level", "upwards")
+    ),
+    *((name, shift(2.0, "state", "x")) for name in ("along the base", "along the base, unnamed")),
     *((name, put("t_end", 2.0**-4)) for name in ("corner", "mouth's edge from below", "along the mouth")),
 ]
 
@@ -201,3 +209,30 @@ def test_a_corner_less_a_residual_is_none():
         check(forged | corner | {"outcome": "undefined"})
     with pytest.raises(BadInput, match="must be undefined"):
         certificate(scene, state, 3.0, Undefined("corner"))
+
+
+def test_a_stretch_of_very_many_periods_is_proved_at_once():
+    """Of 2^42 periods nobody lists the knots: the wall left rises over all of them, whatever it does."""
+    shivering = BangBang(((0.0, 1.0), (2.0**-41, 1.0 - 2.0**-52), (2.0**-40, 1.0)))
+    scene, start = Stem(w=shivering, h=4.0), State(0.0, 1.0, -2.0, -0.5, 0.01, "right")
+    claim = certificate(scene, start, 9.0, reference.next_collision(scene, start, 9.0))
+    assert [kind for _, _, kind in claim["excluded"]["right"]] == ["rising"]
+    check(claim)
+    for kind in ("falling", "concave", "plain", "centred", "lifting", "swept"):
+        put("excluded", "right", 0, 2, kind)(claim)
+        with pytest.raises(Refuted):
+            check(claim)
+
+
+@pytest.mark.parametrize("off", [-1.0, 1.0])
+def test_a_swept_stretch_is_swept_less_the_residual(off):
+    """Of an arc that trembles by 1e-30, left as slowly: what is removed, 1e-13 or -1e-13, counts far more."""
+    scene = Cap(r=Fourier(1.0, 1.0, (-1e-30,)))
+    start = State(0.0, 0.0, 1.0 + off * 2.0**-44, 0.0, -(2.0**-103), "arc")
+    claim = certificate(scene, start, 900.0, reference.next_collision(scene, start, 900.0))
+    assert claim["excluded"]["arc"][-1][2] == "swept"
+    check(claim)
+    early = [[first, last, "swept"] for first, last, _ in claim["excluded"]["arc"]]
+    put("excluded", "arc", early)(claim)
+    with pytest.raises(Refuted, match="may sweep"):
+        check(claim)

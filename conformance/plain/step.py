@@ -274,9 +274,19 @@ class Flight:
             return Undecided("the state is in a corner within rounding")
         for near in self.walls_near(in_cap=self.is_in_cap):
             if near != wall and self.f(near, 0.0)[0] < -self.noise(near, 0.0):
+                if self.is_along_base(near):
+                    return Undefined("sliding")
                 return Rejected(f"state {where} is beyond wall {near}")
         self.require_clear(self.walls_near(in_cap=self.is_in_cap), 0.0)
         return None if wall is None else self.refusal_of_departure(wall)
+
+    def is_along_base(self, beyond: Wall) -> bool:
+        """Tell whether a state beyond a side, which names no wall, moves along a mushroom's base."""
+        is_level = isinstance(self.scene, Mushroom) and self.wall is None and self.y == self.vy == 0
+        if not is_level or beyond == "floor":
+            return False
+        self.require_clear(("arc",), 0.0)
+        return self.f("arc", 0.0)[0] > 0
 
     def refusal_of_departure(self, wall: Wall) -> Outcome | None:
         """Judge f(0) and f'(0) on the wall being left."""

@@ -12,7 +12,7 @@ from typing import Any
 
 from flint import fmpq
 
-from conformance.arb.numbers import bisected, dyadic
+from conformance.arb.numbers import bisected, dyadic, hull
 from conformance.second_proof.signs import SignedFlight
 from scene import Wall
 
@@ -73,8 +73,11 @@ class Exclusion:
             if not self.flight.is_never_swept(wall, a, b):
                 raise Refuted(f"{wall} may sweep [{float(a)!r}, {float(b)!r}]")
             return
-        pieces = list(itertools.pairwise(self.flight.cuts(a, b)))
-        if kind == "falling":
+        is_long = self.flight.is_long(a, b)
+        pieces = [] if is_long else list(itertools.pairwise(self.flight.cuts(a, b)))
+        if is_long:
+            holds = self._holds_at_once(wall, a, b, kind)
+        elif kind == "falling":
             holds = self.falls(wall, a, b) and bool(self.flight.jet(wall, b)[0] > 0)
         elif kind == "concave":
             holds = self._is_concave(wall, a, b, pieces)
@@ -105,6 +108,20 @@ class Exclusion:
             jet = flight.jet(wall, self.begin[0])
             return is_flat and bool(jet[1] == 0) and bool(flight.over(wall, a, b)[2] > 0)
         raise Refuted(f"no such kind: {kind}")
+
+    def _holds_at_once(self, wall: Wall, a: fmpq, b: fmpq, kind: str) -> bool:
+        """Prove what a kind says over many periods, with laws and rates taken anywhere within their ranges.
+
+        (C1) of the reference's argument holds across knots: signs of f' and f'' over all of it are enough.
+        """
+        flight, middle = self.flight, (a + b) / 2
+        f, slope, bend = flight.jet(wall, hull(a, b))
+        if kind == "centred":
+            return bool(flight.jet(wall, middle)[0] + slope * hull(a - middle, b - middle) > 0)
+        if kind in ("falling", "concave"):
+            is_bent = slope < 0 if kind == "falling" else bend <= 0
+            return bool(is_bent) and bool(flight.jet(wall, b)[0] > 0)
+        return bool(slope > 0 if kind == "rising" else kind == "plain" and f > 0)
 
     def _is_concave(self, wall: Wall, a: fmpq, b: fmpq, pieces: list[tuple[fmpq, fmpq]]) -> bool:
         """Prove that f lies above its chord, or, where f'' touches 0 and no ball shows its sign, f > 0."""

@@ -9,9 +9,11 @@ from typing import Any
 from flint import arb, fmpq
 
 from conformance.arb.flight import BallFlight, Line, Table
+from conformance.arb.laws import BallBangBang
 from conformance.arb.numbers import ZERO, Jet, Number, Rational, exact, hull
 from scene import Scene, Wall
 
+MAX_PERIODS = 100  # of a law whose knots are listed
 MAX_SPLITS = 2000  # a near miss by 1e-300 takes half as many halvings as it has bits
 
 
@@ -51,16 +53,22 @@ class SignedFlight(BallFlight):
         knots = {time - t for law in self.table.laws.values() for time in law.knots(t + a, t + b)}
         return sorted({a, b, *knots})
 
+    def is_long(self, a: Rational, b: Rational) -> bool:
+        """Tell whether [a, b] holds so many periods of a law that its knots are not worth listing."""
+        bang_bang = [law for law in self.table.laws.values() if isinstance(law, BallBangBang)]
+        return any(b - a > MAX_PERIODS * law.period for law in bang_bang)
+
     def over(self, wall: Wall, a: Rational, b: Rational) -> Jet:
         """Enclose f, f', f'' over [a, b], which lies on one piece of every law."""
         return self.jet(wall, hull(a, b), within=(a + b) / 2)
 
     def is_never_swept(self, wall: Wall, a: Rational, b: Rational) -> bool:
-        """Tell whether f > 0 on [a, b], whatever the laws do between their bounds.
+        """Tell whether f, less its residual, is above 0 on [a, b], whatever the laws do between their bounds.
 
         With laws held still f is concave in s, and linear in the slope: its least value is at ends.
         """
-        return all(self._lowest(wall, s) > 0 for s in (a, b))
+        residual = self.residuals.get(wall, ZERO)
+        return all(self._lowest(wall, s) - residual > 0 for s in (a, b))
 
     def _lowest(self, wall: Wall, s: Rational) -> Number:
         laws, (x, y) = self.table.laws, self.place(s)

@@ -12,7 +12,7 @@ from typing import Any
 from flint import fmpq
 
 from conformance.arb.flight import SIDES
-from conformance.arb.numbers import ZERO, interval
+from conformance.arb.numbers import ZERO, Number, interval
 from conformance.second_proof.exclusion import Exclusion, Refuted
 from conformance.second_proof.signs import SignedFlight
 from scene import Wall
@@ -59,6 +59,7 @@ class _Undefined:
         """Prove that the state lies on two walls, at the mouth's edge, or slides along one."""
         if not self.walls or not all(map(self._is_on, self.walls)):
             raise Refuted("the state is not shown to lie on these walls")
+        self._require_inside()
         flight = self.flight
         is_edge = flight.table.is_mushroom and flight.line.y == 0 and {"left", "right"} & set(self.walls)
         if self.reason in ("corner", "mouth-edge"):
@@ -77,6 +78,20 @@ class _Undefined:
         is_at_rest = all(is_constant(law) for law in laws(self.flight.table.scene).values())
         self._require_reason("sliding" if bend < 0 or is_at_rest or wall == "base" else "tangency")
 
+    def _require_inside(self) -> None:
+        """Prove that the state lies inside every other wall of its part of the table.
+
+        Of a mouth as wide as the cap the edge is on the arc too, which need not be named.
+        """
+        f = self.flight
+        is_beside = f.wall is None and "base" in self.walls
+        in_cap = f.begins_in_cap() or (f.table.is_mushroom and is_beside)
+        near: tuple[Wall, ...] = ("arc",) if in_cap else SIDES
+        for wall in set(near) - set(self.walls):
+            gap = f.jet(wall, ZERO)[0]
+            if not (gap > 0 or (gap == 0 and self.reason == "mouth-edge")):
+                raise Refuted(f"the state is not shown to be inside {wall}")
+
     def later(self) -> None:
         """Prove that two walls are met together, for the first time, and no other before."""
         f, s = self.flight, self.instant
@@ -90,20 +105,33 @@ class _Undefined:
         is_crossing = crossing is not None and crossing > 0
         if "base" in self.walls and not (is_crossing and crossing == s):
             raise Refuted("y = 0 is not crossed then")
-        if is_crossing and crossing < s:
-            raise Refuted("y = 0 is crossed before")
-        exclusion = Exclusion(f, START, self.excluded)
+        exclusion, begin = Exclusion(f, START, self.excluded), ZERO
+        if crossing is not None and 0 < crossing < s:
+            self._pass_mouth(exclusion, near, crossing)
+            near, begin = (("arc",) if near == SIDES else SIDES), crossing
         for wall in set(self.walls) - {"base"}:
             if not f.jet(wall, s)[0] == 0:
                 raise Refuted(f"{wall} is not shown to be met exactly then")
             if wall in near:
-                self._require_first(exclusion, wall)
+                self._require_first(exclusion, wall, begin)
             elif not ("base" in self.walls and wall in ("left", "right")):
                 raise Refuted(f"{wall} cannot be met on this side of y = 0")
         for wall in set(near) - set(self.walls):
-            exclusion.cover(wall, ZERO, s)
+            exclusion.cover(wall, begin, s)
         is_edge = self.flight.table.is_mushroom and "base" in self.walls and "arc" not in self.walls
         self._require_reason("mouth-edge" if is_edge else "corner")
+
+    def _pass_mouth(self, exclusion: Exclusion, near: tuple[Wall, ...], crossing: fmpq) -> None:
+        """Prove that y = 0 is crossed within the mouth, before any wall is met."""
+        f = self.flight
+        if not f.table.is_mushroom:
+            raise Refuted("y = 0 is crossed before")
+        for wall in near:
+            exclusion.cover(wall, ZERO, crossing)
+        width, x = f.width(crossing)[0], f.place(crossing)[0]
+        gaps: dict[Wall, Number] = {"left": width + x, "right": width - x}
+        if not all(gap - f.residuals.get(wall, ZERO) > 0 for wall, gap in gaps.items()):
+            raise Refuted("the mouth is not open where y = 0 is crossed")
 
     def along_mouth(self) -> None:
         """Prove that a path along y = 0 inside the mouth comes to its edge."""
@@ -116,22 +144,22 @@ class _Undefined:
         if f.residuals:
             raise Refuted("the path begins at the mouth's edge")
         exclusion = Exclusion(f, START, self.excluded)
-        ends = [exclusion.refined_root(wall, *self._lead(exclusion, wall), 0)[1] for wall in self.roots]
+        ends = [exclusion.refined_root(wall, *self._lead(exclusion, wall, ZERO), 0)[1] for wall in self.roots]
         if not min(ends) < self.end:
             raise Refuted("the edge is not met before the horizon")
         for wall in sides:
             if wall not in self.roots:
                 exclusion.cover(wall, ZERO, min(ends))
 
-    def _lead(self, exclusion: Exclusion, wall: Wall) -> tuple[fmpq, fmpq]:
-        exclusion.cover(wall, ZERO, self.roots[wall][0])
+    def _lead(self, exclusion: Exclusion, wall: Wall, begin: fmpq) -> tuple[fmpq, fmpq]:
+        exclusion.cover(wall, begin, self.roots[wall][0])
         return self.roots[wall]
 
-    def _require_first(self, exclusion: Exclusion, wall: Wall) -> None:
+    def _require_first(self, exclusion: Exclusion, wall: Wall, begin: fmpq) -> None:
         """Prove that the exact zero is the first root: f > 0 up to an interval on which f falls, once."""
         if wall not in self.roots or not self.roots[wall][0] <= self.instant <= self.roots[wall][1]:
             raise Refuted(f"{wall} has no root claimed around the instant")
-        exclusion.refined_root(wall, *self._lead(exclusion, wall), 0)
+        exclusion.refined_root(wall, *self._lead(exclusion, wall, begin), 0)
 
     def _require_reason(self, reason: str) -> None:
         if self.reason != reason:

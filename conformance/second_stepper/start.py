@@ -78,10 +78,12 @@ def _in_mouth(flight: SearchedFlight, state: State) -> Beginning | Answer:
     side = _sign(flight, "arc")
     if side < 0:
         return Answer("rejected", reason="the state is beyond wall arc")
+    if side == 0:
+        return Answer("undefined", reason="corner")
     if state.vy < 0:
         return Answer("rejected", reason="the particle starts on wall base and moves into it")
-    if side == 0 or state.vy == 0:
-        return Answer("undefined", reason="sliding" if state.vy == 0 else "corner")
+    if state.vy == 0:
+        return Answer("undefined", reason="sliding")
     flight.leave("base")
     return Beginning(in_cap=True)
 

@@ -228,6 +228,10 @@ def trouble_at_start(is_in_cap, particle, scene, anchors):
         if side == 0:
             return EDGE
         if side < 0:
+            # On the base, which ends at the arc.
+            room, room_error = wall_residual(ARC, x, y, scene, anchors)
+            if room <= room_error:
+                return START
             return SLIDING if vy == 0.0 else APPROACHING
     return NO_WALL
 

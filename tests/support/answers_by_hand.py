@@ -10,7 +10,7 @@ from math import isqrt
 
 from msgspec.structs import replace
 
-from scene import BangBang, Cap, Mushroom, State, Stem
+from scene import BangBang, Cap, Fourier, Mushroom, State, Stem
 from support.tables import BOX, CIRCLE, LIFT, STATIC
 
 
@@ -34,6 +34,8 @@ TILTED = Stem(w=BangBang(knots=((0.0, 1.0), (1.0, 2.0), (2.0, 1.0))), h=4.0, slo
 TILTING = replace(TILTED, slope=BangBang(knots=((-0.25, 0.0), (0.75, -(2.0**-300)), (1.75, 0.0))))
 ON_THE_SIDE = State(0.25, -1.125, -1.5, 0.0, 1.0, "left")
 VIOLENT = Cap(r=BangBang(((0.0, 1.0), (1.0, 1.0), (1.0 + 2.0**-20, 0.5), (2.0, 0.5), (4.0, 1.0))))
+# Its radius is 1 to 70 decimals, and not exactly at any time but t = 0.
+SWAYING = Mushroom(r=Fourier(1.0, 1.0, sin=(1e-70,)), h=1.0, w=0.5)
 ANSWERS = {
     "a chord": by_hand(CIRCLE, State(0.0, 0.25, 0.5, 2.0, 1.0), "arc", dt=(root(Fraction(71, 16)) - 1) / 5),
     "from the arc": by_hand(CIRCLE, State(0.0, 0.0, 1.0, 1.0, -0.75, "arc"), "arc", dt=Fraction(24, 25)),
@@ -67,6 +69,7 @@ ANSWERS = {
     "arc and base": by_hand(CIRCLE, State(0.0, 0.5, 0.5, 0.5, -0.5), "corner"),
     "corner": by_hand(BOX, State(0.0, 0.5, -0.5, 0.5, -0.5), "corner"),
     "corner above": by_hand(BOX, State(0.0, 0.5, -0.5, 0.5, 0.5), "corner"),
+    "corner of the floor, through the mouth": by_hand(STATIC, State(0.0, 0.125, 0.5, 0.25, -1.0), "corner"),
     "mouth's edge from above": by_hand(STATIC, State(0.0, 0.25, 0.25, 1.0, -1.0), "mouth-edge"),
     "mouth's edge from below": by_hand(STATIC, State(0.0, 0.25, -0.25, 1.0, 1.0), "mouth-edge"),
     "along the mouth": by_hand(STATIC, State(0.0, 0.0, 0.0, 1.0, 0.0), "mouth-edge"),
@@ -78,7 +81,15 @@ ANSWERS = {
     "on arc and base": by_hand(CIRCLE, State(0.0, 1.0, 0.0, -1.0, 0.1, "arc"), "corner"),
     "on side and base": by_hand(BOX, State(0.0, 1.0, 0.0, -1.0, -0.1, "right"), "corner"),
     "on side and floor": by_hand(STATIC, State(0.0, 0.5, -1.0, -1.0, 1.0, "right"), "corner"),
+    "where the base ends, level": by_hand(STATIC, State(0.0, 1.0, 0.0, -1.0, 0.0), "corner"),
+    "where the base ends, upwards": by_hand(STATIC, State(0.0, -1.0, 0.0, 1.0, 1.0), "corner"),
+    "where the base ends, downwards": by_hand(STATIC, State(0.0, 1.0, 0.0, -1.0, -1.0), "corner"),
+    "where the base ends, inside by 1e-71": by_hand(SWAYING, State(0.5, 1.0, 0.0, -1.0, 0.0), "sliding"),
+    "where the base ends, beyond by 1e-71": by_hand(SWAYING, State(-0.5, 1.0, 0.0, -1.0, 0.0), "rejected"),
     "at the edge": by_hand(STATIC, State(0.0, -0.5, 0.0, 1.0, 0.3, "left"), "mouth-edge"),
+    "at the edge of a mouth as wide as the cap": by_hand(
+        Mushroom(r=1.0, h=1.0, nu=1.0), State(0.0, 1.0, 0.0, -0.5, 1.0), "mouth-edge"
+    ),
     "at the edge, level": by_hand(STATIC, State(0.0, -0.5, 0.0, 1.0, 0.0, "left"), "mouth-edge"),
     "at the edge, downwards": by_hand(STATIC, State(0.0, 0.5, 0.0, -1.0, -0.3, "right"), "mouth-edge"),
 }

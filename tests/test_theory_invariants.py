@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from mpmath import MPContext, fp
 
-from scene import load
+from scene import BadInput, load
 from theory import (
     cap_invariant,
     capture_curve,
@@ -19,7 +19,7 @@ from theory import (
     sin_phi_hat,
     volumes_at,
 )
-from theory.volumes import delta_slope
+from theory.volumes import delta, delta_slope
 
 
 def test_sin_phi_hat_is_the_incidence_angle_on_the_arc() -> None:
@@ -70,3 +70,13 @@ def test_formulas_take_arrays_with_numpy_as_number_system() -> None:
     x = np.array([0.5, 0.0])
     expected = [sin_phi_hat(fp, float(a), 0.25, 1.0, 2.0, 1.5) for a in x]
     np.testing.assert_allclose(sin_phi_hat(np, x, 0.25, 1.0, 2.0, 1.5), expected, rtol=1e-15)
+
+
+@pytest.mark.parametrize("name", ["moving-cap", "fixed-cap-anticlockwise", "frozen-mushroom"])
+def test_the_volumes_at_many_times_are_those_at_each(name):
+    scene = load(name)
+    times = np.linspace(-1.0, 9.0, 41)
+    at_each = np.array([volumes_at(fp, scene, float(t)) for t in times])
+    np.testing.assert_allclose(volumes_at(np, scene, times), at_each.T, rtol=1e-13, atol=1e-13)
+    with pytest.raises(BadInput, match=r"nu = .*, must be in \[0, 1\]"):
+        delta(np, np.array([0.5, np.nextafter(1.0, 2.0)]))

@@ -70,16 +70,26 @@ def delta(ctx: Any, nu: Any) -> Any:
     """
     check_system(ctx)
     _check_nu(nu)
-    if nu > WIDE:
-        z = 1 - nu
-        return 8 * z * ctx.sqrt(2 * z) * _integral_of_root(z / 2) / (3 * ctx.pi)
+    if isinstance(nu, np.ndarray):
+        found, is_wide = np.empty(nu.shape), nu > WIDE
+        found[is_wide], found[~is_wide] = _small_island(ctx, nu[is_wide]), _island(ctx, nu[~is_wide])
+        return found
+    return _small_island(ctx, nu) if nu > WIDE else _island(ctx, nu)
+
+
+def _island(ctx: Any, nu: Any) -> Any:
     return 2 * (ctx.acos(nu) - nu * ctx.sqrt((1 - nu) * (1 + nu))) / ctx.pi
+
+
+def _small_island(ctx: Any, nu: Any) -> Any:
+    z = 1 - nu
+    return 8 * z * ctx.sqrt(2 * z) * _integral_of_root(z / 2) / (3 * ctx.pi)
 
 
 def _integral_of_root(x: Any) -> Any:
     """Return 3 / 2 times the integral over [0, 1] of sqrt(u) sqrt(1 - x u), by powers of x."""
     total, binomial, k = 1 + 0 * x, -x / 2, 1
-    while (more := total + 3 * binomial / (2 * k + 3)) != total:
+    while np.any((more := total + 3 * binomial / (2 * k + 3)) != total):
         total, binomial, k = more, binomial * x * (2 * k - 1) / (2 * k + 2), k + 1
     return total
 

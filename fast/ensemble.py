@@ -21,6 +21,7 @@ from fast.given import (
     MAX_CYCLES,
     MAX_FIRST,
     MAX_PARTICLES,
+    MOST_IN_CYCLES,
     check_kept,
     given_energy,
     given_phases,
@@ -47,7 +48,6 @@ from scene.notebook import rows
 from scene.refusal import BadInput, check_count, check_scene
 
 FOLLOWED, UNDECIDED, UNDEFINED, REJECTED = 0, 1, 2, 3
-MAX_COLLISIONS = 10**9  # of one particle, a minute of work
 NO_PATHS = unfilled_paths(0, 0)
 SHARE = 256  # particles a worker takes at a time, for each cycle: several times what it holds at once
 
@@ -301,7 +301,7 @@ def planned(
     scene, speed2 = fitted.scene, 2.0 * inward("energy", energy, 2 * (units.length - units.time))
     check_kept(n_particles, n_cycles, len(phases), len(narrowings(scene)))
     ahead = least_collisions(scene, math.sqrt(speed2), n_cycles * one_cycle(scene))
-    if ahead > MAX_COLLISIONS:
+    if ahead > MOST_IN_CYCLES:
         raise BadInput(
             f"energy = {energy}: over {ahead:.0e} collisions of each particle, must be at most 1e9"
         )

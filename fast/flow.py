@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from fast.ensemble import follow
-from fast.given import given_states, given_threads
+from fast.given import MOST_TO_A_TIME, given_states, given_threads
 from fast.kernel import codes
 from fast.kernel.records import FloatArray, Followed, IntArray, unfilled_ends
 from fast.pieces import laws_in_lanes
@@ -19,14 +19,13 @@ from fast.units import fit
 from scene import Horizon, InvalidState, Outcome, Rejected, Scene, State
 from scene.refusal import check_number, check_scene
 
-MAX_COLLISIONS = 10**7  # of one particle, some seconds of work
-
 
 class Flow(NamedTuple):
     """Where N particles are at t_end.
 
     Attributes:
-        outcomes: (N,) Horizon with the state at t_end; Undefined or Undecided for a particle lost before.
+        outcomes: (N,) Horizon with the state at t_end; Undefined or Undecided for a particle lost before, or
+            that gathers speed and has had over 10^7 collisions.
         t_in, t_out: (N,) the first captured stay in the cap [time], cut at t_end; nan for none.
         wall_counts: (N, 5) collisions with arc, base, left, right, floor.
         n_careful: (N,) collisions that the lanes left to the careful step.
@@ -110,6 +109,6 @@ def refuse(scene: Scene, state: State, t_end: float) -> Rejected | None:
     fitted, start = fit(scene), fitted_start(scene, state)
     s = start.state
     ahead = least_collisions(fitted.scene, math.hypot(s.vx, s.vy), start.units.horizon(t_end) - s.t)
-    if ahead > MAX_COLLISIONS:
+    if ahead > MOST_TO_A_TIME:
         return Rejected(f"t_end = {t_end!r} is over {ahead:.0e} collisions away, must be at most 1e7")
     return None

@@ -12,6 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 from mpmath import fp
 
+from fast.given import MOST_IN_CYCLES, MOST_TO_A_TIME
 from fast.kernel import entries
 from fast.kernel.records import FloatArray, Stops
 from fast.narrowings import narrowings, start_time
@@ -83,13 +84,19 @@ def cycle_stops(scene: Scene, n_cycles: int, phases: Sequence[float]) -> Stops:
         cycles[:, order].ravel(),
         np.ascontiguousarray(times[:, : len(narrow)]),  # a slice would have `follow` compiled once more
         is_first_kept=False,
+        most=MOST_IN_CYCLES,
     )
 
 
 def only_stop(t_end: float) -> Stops:
     """Return one stop, that keeps the first captured stay of any length."""
     return Stops(
-        np.array([t_end]), np.array([0]), np.array([0]), np.full((1, 1), math.nan), is_first_kept=True
+        np.array([t_end]),
+        np.array([0]),
+        np.array([0]),
+        np.full((1, 1), math.nan),
+        is_first_kept=True,
+        most=MOST_TO_A_TIME,
     )
 
 

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fast.given import given_state
+from fast.given import MOST_TO_A_TIME, given_state
 from fast.kernel import careful, codes, entries, single
 from fast.kernel.loops import careful_at
 from fast.kernel.records import ANCHORS_SHAPE, Compiled, FloatArray, IntArray, Particle, Paths, unfilled_paths
@@ -48,6 +48,7 @@ REASONS: dict[int, Outcome] = {
     int(codes.CORNER): Undecided("two walls are hit together within rounding"),
     int(codes.EDGE): Undecided("the mouth's edge is hit within rounding"),
     int(codes.AT_END): Undecided("a wall is hit at the horizon within rounding"),
+    int(codes.TOO_FAR): Undecided(f"t_end is over {MOST_TO_A_TIME:.0e} collisions away"),
     int(codes.START): Undecided("the state is on another wall within rounding"),
     int(single.ANSWER_LOST): Rejected(ANSWER_LOST),
     int(codes.APPROACHING): Rejected("state.wall: the particle starts on a wall and moves into it"),

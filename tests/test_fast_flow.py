@@ -11,7 +11,9 @@ import pytest
 
 import fast
 from fast import __main__ as served
-from scene import BangBang, Cap, Fourier, Horizon, InvalidState, Rejected, State, Undefined, load
+from fast import starts
+from fast.ensemble import UNDECIDED
+from scene import BangBang, Cap, Fourier, Horizon, InvalidState, Rejected, State, Undecided, Undefined, load
 from scene.protocol.wire import serve
 
 SCENE = load("moving-cap")
@@ -33,6 +35,21 @@ def test_flow_ends_where_the_trajectory_does(name):
         # Chaos multiplies rounding: some tens of hits lose as many bits.
         ends = [(o.x, o.y, o.vx, o.vy) for o in (outcome, path.outcome)]
         assert ends[0] == pytest.approx(ends[1], rel=1e-5, abs=1e-5)
+
+
+def test_who_gathers_speed_for_ever_is_given_up(monkeypatch):
+    """The first speed says little of how many collisions are to come: they are counted."""
+    start, most = State(0.0, 0.1, 0.2, 3.0, 4.0), 500
+    monkeypatch.setattr(starts, "MOST_TO_A_TIME", most)
+    monkeypatch.setattr(starts, "MOST_IN_CYCLES", most)
+    run = fast.flow(SCENE, [start, STARTS[0]], 400.0)
+    assert run.outcomes == [Undecided("t_end is over 1e+07 collisions away")] * 2
+    assert all(most < n < 10 * most for n in run.wall_counts.sum(axis=1))
+    assert isinstance(fast.flow(SCENE, [start], 20.0).outcomes[0], Horizon)
+    ensemble = fast.simulate(SCENE, n_particles=4, energy=12.5, n_cycles=60, seed=1)
+    assert ensemble.outcome.tolist() == [UNDECIDED] * 4
+    circling = fast.flow(load("breathing-circle"), [start], 400.0)  # unfolded, and as many in the end
+    assert isinstance(circling.outcomes[0], Undecided)
 
 
 @pytest.mark.parametrize("name", ["a cap at rest", "breathing-circle"])

@@ -17,7 +17,7 @@ import numpy as np
 
 from fast.kernel.arithmetic import fma
 from fast.kernel.bounces import arrive
-from fast.kernel.codes import ANEW, ARC, CAP, HORIZON, MUSHROOM, N_WALLS
+from fast.kernel.codes import ANEW, ARC, CAP, HORIZON, MUSHROOM, N_WALLS, TOO_FAR
 from fast.kernel.compiling import kernel, part
 from fast.kernel.flights import OFF, advance, collide, correct
 from fast.kernel.kept import keep_lane, take_lane
@@ -222,14 +222,29 @@ def needs_a_piece_alone(pool, a, i, roster, worker):
 
 
 @part
+def collisions_of(a, i):
+    """Return how many collisions a lane's particle has had."""
+    total = 0.0
+    for wall in range(N_WALLS):
+        total += a[N_ARC + wall * STRIDE + i]
+    return total
+
+
+@part
 def scan(pool, worker):
-    """Attend to every lane of a pool that needs it; the last lane fills the place of one that leaves."""
+    """Attend to every lane of a pool that needs it; the last lane fills the place of one that leaves.
+
+    Who gathers speed for ever is given up here: its laws' pieces end again and again, whatever its speed.
+    """
     a, roster, n_held = worker.pools[pool], worker.rosters[pool], worker.n_held
     i = np.int64(0)
     while i < n_held[pool]:
         fate = STAYS
         if not (a[ROUTINE + i] > 0.0 and worker.is_laned):
-            if worker.is_laned and needs_a_piece_alone(pool, a, i, roster, worker):
+            if collisions_of(a, i) > worker.stops.most:
+                finish(pool, a, i, roster[PARTICLE, i], TOO_FAR, 0.0, worker.followed)
+                fate = ENDS
+            elif worker.is_laned and needs_a_piece_alone(pool, a, i, roster, worker):
                 keep_up_laws(a, i, worker)
             else:
                 fate = attend(pool, a, i, roster, worker)

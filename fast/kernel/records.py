@@ -173,6 +173,7 @@ class Stops(NamedTuple):
         narrowings: (K, M) when the mouth narrows in each cycle: a captured stay is kept in slot m of cycle k
             when it spans that instant.
         is_first_kept: the first captured stay is kept in slot 0, whatever its length.
+        most: collisions after which a particle is given up; energy may grow without end.
     """
 
     times: FloatArray
@@ -180,6 +181,7 @@ class Stops(NamedTuple):
     cycles: IntArray
     narrowings: FloatArray
     is_first_kept: bool
+    most: int
 
 
 class Followed(NamedTuple):

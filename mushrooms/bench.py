@@ -53,7 +53,7 @@ def bench(
         Path | None,
         typer.Option(metavar="OLD.json", help="Print a table of an earlier bench.json as Markdown, and end."),
     ] = None,
-    workload: Annotated[str, typer.Option(metavar="NAME", help="Which table.")] = "moving-cap-1e7",
+    workload: Annotated[str, typer.Option(metavar="NAME", help="Which table; or `all`.")] = "moving-cap-1e7",
 ) -> None:
     """Measure speed against error; writes bench.json, bench.svg, bench.html and hard-cases.md.
 

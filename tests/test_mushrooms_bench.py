@@ -142,6 +142,9 @@ def test_the_page_on_speed_shows_what_the_record_holds(call):
     assert code == 0
     assert len(table.splitlines()) > 14
     assert table in text
+    code, lanes, _ = call("--table", ROOT / "docs" / "bench" / "bench.json", "--workload", "all")
+    assert code == 0
+    assert lanes in text
     refused = call("--table", ROOT / "docs" / "bench" / "bench.json", "--workload", "nowhere")
     assert_refused(refused, "moving-cap-1e7")
     for name, n in kept.growth.lasts.items():

@@ -13,6 +13,9 @@ from mushrooms.figures import speed as figures_of_speed
 from mushrooms.reports.page import embed, render
 from scene.refusal import BadInput
 
+ALL = "all"  # workloads, in one table
+BESIDE = "moving-cap-1e7"  # what its times are compared with
+
 
 def to_html(record: Record, speed: bytes) -> bytes:
     """Return the page; `speed` is its first picture, as SVG."""
@@ -43,14 +46,16 @@ def _row(p: Point) -> dict[str, Any]:
 
 
 def to_markdown(record: Record, workload: str) -> str:
-    """Return one workload's table, as the page on speed has it.
+    """Return one workload's table, or of "all" that of the lanes, as the page on speed has them.
 
     Raises:
         BadInput: the record has no such workload.
     """
     names = [w.name for w in record.workloads]
-    if workload not in names:
-        raise BadInput(f"workload = {workload!r}, must be one of {', '.join(names)}")
+    if workload not in [*names, ALL]:
+        raise BadInput(f"workload = {workload!r}, must be {ALL} or one of {', '.join(names)}")
+    if workload == ALL:
+        return _by_workload(record)
     head = (
         "stepper",
         "ns per collision",
@@ -72,6 +77,24 @@ def to_markdown(record: Record, workload: str) -> str:
         for p in record.points
         if p.workload == workload
     ]
+    return _as_table(rows)
+
+
+def _by_workload(record: Record) -> str:
+    """Return what a collision takes in the lanes on each workload that they serve, beside the lean C."""
+    ns = {(p.workload, p.contender): statistics.median(p.ns) for p in record.points}
+    head = ("workload", "lanes, ns per collision", f"beside {BESIDE}", "lean C over lanes")
+    rows = [head, ("---",) * len(head)]
+    for name in (w.name for w in record.workloads):
+        lanes, lean = (ns.get((name, contender)) for contender in ("fast, lanes", "lean C"))
+        if lanes is not None:
+            usual = ns.get((BESIDE, "fast, lanes"))
+            parts = [None if usual is None else lanes / usual, None if lean is None else lean / lanes]
+            rows.append((name, f"{lanes:,.0f}", *("–" if x is None else f"{x:.2g}" for x in parts)))
+    return _as_table(rows)
+
+
+def _as_table(rows: Sequence[Sequence[str]]) -> str:
     return "".join(f"| {' | '.join(row)} |\n" for row in rows)
 
 

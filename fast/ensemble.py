@@ -66,7 +66,8 @@ class Ensemble(NamedTuple):
         cycle_energies: (N, K) energy at the end of each cycle.
         t, x, y, vx, vy: (N,) the last states.
         n_collisions: (N,) collisions followed.
-        outcome: (N,) 0 followed to the end, 1 undecided, 2 undefined, 3 rejected.
+        outcome: (N,) 0 followed to the end, 1 undecided, or given up after 10^9 collisions, 2 undefined, 3
+            rejected.
         t_in, t_out: (N, K, M) begin and end [time] of the captured stay that spans narrowing m of cycle k,
             t_in <= its instant <= t_out; nan when the particle is not captured at that instant. There is at
             most one. A stay that spans several narrowings stands in the slot of each, with the same begin

@@ -25,7 +25,7 @@ class Flow(NamedTuple):
 
     Attributes:
         outcomes: (N,) Horizon with the state at t_end; Undefined or Undecided for a particle lost before, or
-            that gathers speed and has had over 10^7 collisions.
+            given up after 10^7 collisions, which are counted where walls move.
         t_in, t_out: (N,) the first captured stay in the cap [time], cut at t_end; nan for none.
         wall_counts: (N, 5) collisions with arc, base, left, right, floor.
         n_careful: (N,) collisions that the lanes left to the careful step.

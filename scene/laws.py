@@ -297,17 +297,19 @@ def values(law: Law, times: FloatArray, order: int = 0) -> FloatArray:
         order: 0, 1 or 2.
 
     Returns:
-        Of the times' shape; a phase is rounded as its time is, and no other error is larger.
+        Of the times' shape; times since the first knot are rounded, and then phases are exact.
     """
     if is_constant(law) or not isinstance(law, BangBang):
         return np.full(times.shape, evaluate(_Arrays, piece_at(law, Fraction(0)), times, order))
-    (start, _), (end, _) = law.knots[0], law.knots[-1]
-    phases = times - np.floor((times - start) / (end - start)) * (end - start)
+    knots = np.array([t for t, _ in law.knots])
+    phases = knots[0] + np.mod(times - knots[0], knots[-1] - knots[0])
+    legs = np.minimum(np.searchsorted(knots, phases, side="right"), len(knots) - 1) - 1
+    is_late = phases - knots[legs] >= knots[legs + 1] - phases  # the middle of a leg need not be a float
     found = np.empty(times.shape)
-    halves = np.searchsorted(np.array(breakpoints(law)[1:-1], dtype=np.float64), phases, side="right")
-    for half in np.unique(halves):
-        those = halves == half
-        found[those] = evaluate(_Arrays, _halves(law.knots, half // 2, 0)[half % 2], phases[those], order)
+    for leg in np.unique(legs):
+        for piece, half in zip(_halves(law.knots, int(leg), 0), (~is_late, is_late), strict=True):
+            those = (legs == leg) & half
+            found[those] = evaluate(_Arrays, piece, phases[those], order)
     return found
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+import threading
 
 import pytest
 from numba import njit
@@ -85,20 +86,48 @@ def test_it_is_told_where_our_modules_are(monkeypatch, tmp_path):
     given = []
     monkeypatch.setattr(subprocess, "Popen", lambda command, **options: given.append((command, options)))
     monkeypatch.setattr(beside.os, "cpu_count", lambda: 2)
-    monkeypatch.setattr(sys, "path", [*sys.path, str(tmp_path)])
+    monkeypatch.setattr(beside, "_ONCE", threading.Lock())
+    monkeypatch.setattr(sys, "path", [*sys.path, tmp_path, str(tmp_path)])  # import passes by what is no text
     really_start()
     ((command, options),) = given
-    assert command == [sys.executable, "-m", "fast.following"]
+    assert command == [sys.executable, "-P", "-m", "fast.following"]
     assert options["env"]["PYTHONPATH"].endswith(str(tmp_path))
-    monkeypatch.setattr(beside.os, "cpu_count", lambda: 1)
+    assert options["env"][beside.MARK]
+
+
+@pytest.mark.parametrize(
+    "why", ["one core", "a second process", "started before", "an application", "no room"]
+)
+def test_it_is_started_once_and_where_it_is_of_use(why, monkeypatch):
+    def refused(*_, **__):
+        if why != "no room":
+            raise AssertionError(why)
+        raise OSError("no room")
+
+    monkeypatch.setattr(subprocess, "Popen", refused)
+    monkeypatch.setattr(beside.os, "cpu_count", lambda: 1 if why == "one core" else 2)
+    monkeypatch.setattr(beside, "_ONCE", threading.Lock())
+    if why == "a second process":
+        monkeypatch.setenv(beside.MARK, "1")
+    if why == "started before":
+        beside._ONCE.acquire()
+    if why == "an application":
+        monkeypatch.setattr(sys, "frozen", True, raising=False)
     assert really_start() is None
-    assert len(given) == 1
+
+
+def test_the_second_process_itself_finds_what_is_kept_whatever_lies_about(tmp_path, monkeypatch):
+    fast.simulate(load("moving-cap"), n_particles=1, energy=1e2, seed=1)
+    (tmp_path / "fast.py").write_text("raise SystemExit(3)")
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(beside.os, "cpu_count", lambda: 2)
+    monkeypatch.setattr(beside, "_ONCE", threading.Lock())
+    assert really_start().wait() == 0
 
 
 def test_what_it_compiles_is_what_a_run_asks_for(monkeypatch):
     """Else the second process would compile for nobody."""
     fast.simulate(load("moving-cap"), n_particles=1, energy=1e2, seed=1)
-    fast.trajectory(load("tilting-stem"), fast.starts.__dict__ and None, 1) if False else None
     asked = []
     monkeypatch.setattr(entries.follow_particles, "compile", asked.append)
     following.compile_following()

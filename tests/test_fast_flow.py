@@ -8,12 +8,14 @@ import math
 
 import numpy as np
 import pytest
+from mpmath import fp
 
 import fast
 from fast import __main__ as served
 from fast import starts
 from fast.ensemble import UNDECIDED
 from scene import BangBang, Cap, Fourier, Horizon, InvalidState, Rejected, State, Undecided, Undefined, load
+from scene.geometry import table_at
 from scene.protocol.wire import serve
 
 SCENE = load("moving-cap")
@@ -48,8 +50,18 @@ def test_who_gathers_speed_for_ever_is_given_up(monkeypatch):
     assert isinstance(fast.flow(SCENE, [start], 20.0).outcomes[0], Horizon)
     ensemble = fast.simulate(SCENE, n_particles=4, energy=12.5, n_cycles=60, seed=1)
     assert ensemble.outcome.tolist() == [UNDECIDED] * 4
-    circling = fast.flow(load("breathing-circle"), [start], 400.0)  # unfolded, and as many in the end
-    assert isinstance(circling.outcomes[0], Undecided)
+    # Captured ones are unfolded: they are given up where they are in the table, all the same.
+    for name in ("breathing-circle", "moving-cap"):
+        scene = load(name)
+        lost = fast.simulate(scene, n_particles=200, energy=1250.0, n_cycles=4, seed=1)
+        assert (lost.outcome == UNDECIDED).sum() > 100
+        for t, x, y in zip(lost.t, lost.x, lost.y, strict=True):
+            now = table_at(fp, scene, t)
+            walls = ("arc", "base") if y >= 0 else ("left", "right", "floor")
+            assert min(now.gap(wall, x, y) for wall in walls if wall in scene.walls) > -1e-9
+    at_rest = fast.flow(load("frozen-mushroom"), [start], 400.0)
+    assert isinstance(at_rest.outcomes[0], Horizon)
+    assert at_rest.wall_counts.sum() > 2 * most
 
 
 @pytest.mark.parametrize("name", ["a cap at rest", "breathing-circle"])

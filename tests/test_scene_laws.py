@@ -79,6 +79,12 @@ def test_many_times_at_once_know_their_legs():
         expected = [value(fp, LEGS, float(t), order) for t in inside]
         assert values(LEGS, inside, order) == pytest.approx(expected, abs=1e-13)
     assert values(LEGS, np.array([0.25, 1.25]), 2).tolist() == [0.0, 0.0]  # of the leg that follows
+    # The phase of a far time is lost, but it is one; a leg's middle may round onto its knot.
+    law = BangBang(knots=((0.0, 1.0), (0.1, 0.5), (0.3, 1.0)))
+    far = values(law, np.logspace(10, 20, 200))
+    assert (far.min() >= 0.5, far.max() <= 1.0) == (True, True)
+    steep = BangBang(knots=((1.0, 1.0), (1.0 + 2.0**-52, 4.0), (2.0, 1.0)))
+    assert values(steep, np.array([1.0, 1.0 + 2.0**-52])).tolist() == [1.0, 4.0]
 
 
 def test_a_knot_belongs_to_the_leg_that_follows():

@@ -78,5 +78,6 @@ def test_the_volumes_at_many_times_are_those_at_each(name):
     times = np.linspace(-1.0, 9.0, 41)
     at_each = np.array([volumes_at(fp, scene, float(t)) for t in times])
     np.testing.assert_allclose(volumes_at(np, scene, times), at_each.T, rtol=1e-13, atol=1e-13)
+    assert all(column.size == 0 for column in volumes_at(np, scene, times[:0]))
     with pytest.raises(BadInput, match=r"nu = .*, must be in \[0, 1\]"):
         delta(np, np.array([0.5, np.nextafter(1.0, 2.0)]))

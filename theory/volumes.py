@@ -118,7 +118,7 @@ def delta_slope(ctx: Any, nu: Any) -> Any:
 
 def _check_nu(nu: Any) -> None:
     check_real(nu=nu)
-    if not (np.min(nu) >= 0 and np.max(nu) <= 1 if isinstance(nu, np.ndarray) else 0 <= nu <= 1):
+    if not (np.all((nu >= 0) & (nu <= 1)) if isinstance(nu, np.ndarray) else 0 <= nu <= 1):
         raise BadInput(f"nu = {nu}, must be in [0, 1]")
 
 

@@ -11,14 +11,17 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
 from numba.core import event
 
-COMMAND = ("-m", "fast.following")
-PATIENCE = 300.0  # seconds beyond our own, after which we go on alone
+COMMAND = ("-P", "-m", "fast.following")  # -P: not what lies in the folder that a user happens to be in
+MARK = "OSCILLATING_MUSHROOMS_BESIDE"  # in the second process's environment: it starts no third
+PATIENCE = 60.0  # seconds beyond our own, after which we go on alone
+_ONCE = threading.Lock()  # taken by the thread that starts the second process, for good
 
 
 class _Beside(event.Listener):  # type: ignore[misc]  # numba has no types
@@ -38,19 +41,21 @@ class _Beside(event.Listener):  # type: ignore[misc]  # numba has no types
 
 
 def start() -> subprocess.Popen[bytes] | None:
-    """Start the second process; None where it would be of no use, or cannot be."""
-    if not sys.executable or (os.cpu_count() or 1) < 2:
+    """Start the second process, once; None where it would be of no use, or cannot be."""
+    is_python = bool(sys.executable) and not getattr(sys, "frozen", False)
+    if not is_python or MARK in os.environ or (os.cpu_count() or 1) < 2 or not _ONCE.acquire(blocking=False):
         return None
-    nowhere, found_as_here = subprocess.DEVNULL, os.pathsep.join(sys.path)
+    nowhere = subprocess.DEVNULL
+    found_as_here = os.pathsep.join(place for place in sys.path if isinstance(place, str))
     try:
         return subprocess.Popen(
             [sys.executable, *COMMAND],
             stdin=nowhere,
             stdout=nowhere,
             stderr=nowhere,
-            env={**os.environ, "PYTHONPATH": found_as_here},
+            env={**os.environ, "PYTHONPATH": found_as_here, MARK: "1"},
         )
-    except OSError:
+    except (OSError, ValueError):
         return None
 
 

@@ -234,20 +234,23 @@ def collisions_of(a, i):
 def scan(pool, worker):
     """Attend to every lane of a pool that needs it; the last lane fills the place of one that leaves.
 
-    Who gathers speed for ever is given up here: its laws' pieces end again and again, whatever its speed.
+    Who gathers speed for ever is given up here: its laws' pieces end again and again, whatever its speed. In
+    a table at rest nobody gathers any.
     """
     a, roster, n_held = worker.pools[pool], worker.rosters[pool], worker.n_held
     i = np.int64(0)
     while i < n_held[pool]:
         fate = STAYS
         if not (a[ROUTINE + i] > 0.0 and worker.is_laned):
-            if collisions_of(a, i) > worker.stops.most:
-                finish(pool, a, i, roster[PARTICLE, i], TOO_FAR, 0.0, worker.followed)
-                fate = ENDS
-            elif worker.is_laned and needs_a_piece_alone(pool, a, i, roster, worker):
+            if worker.is_laned and needs_a_piece_alone(pool, a, i, roster, worker):
                 keep_up_laws(a, i, worker)
             else:
                 fate = attend(pool, a, i, roster, worker)
+            if fate == STAYS and collisions_of(a, i) > worker.stops.most:
+                if pool == DISK:
+                    refold(a, i)
+                finish(pool, a, i, roster[PARTICLE, i], TOO_FAR, 0.0, worker.followed)
+                fate = ENDS
         if fate == STAYS:
             i += 1
             continue

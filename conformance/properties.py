@@ -82,7 +82,7 @@ def check_scaling(
     Bit for bit as long as all numbers, before and after, lie between 2^-400 and 2^400 in size or are 0;
     elsewhere nothing is compared. Arguments and results otherwise as in `check_mirror`.
     """
-    unit, size, speed = 2.0**time, 2.0**length, 2.0 ** (length - time)
+    unit, size, speed = (transforms.times_power(1.0, exponent) for exponent in (time, length, length - time))
     answer = stepper(scene, state, t_end)
     inputs = [t_end, state.t, state.x, state.y, state.vx, state.vy, *(numbers(answer, state) or ())]
     if any(part and not LEAST < abs(part) * f < MOST for part in inputs for f in (1.0, unit, size, speed)):

@@ -165,10 +165,14 @@ def _check_residual(scene: Scene, state: State, motion: MovingWalls) -> None:
     if wall == "arc":
         gap = gap / (2 * size)
     low, high = exact_ends(gap)
-    if max(abs(low), abs(high)) > Fraction(ON_WALL) * exact_ends(size)[0]:
-        # Decimal, because the gap may be too large for a float.
-        shown = Decimal(low.numerator) / Decimal(low.denominator)
-        raise InvalidState(f"state.wall = {wall!r}, but the state is {shown:.3g} away from that wall")
+    least, largest = exact_ends(size)
+    if max(-low, high) <= Fraction(ON_WALL) * least:
+        return
+    if max(low, -high) <= Fraction(ON_WALL) * largest:
+        raise Undecidable(f"whether the state is on wall {wall} is open")
+    # Decimal, because the gap may be too large for a float.
+    shown = Decimal(low.numerator) / Decimal(low.denominator)
+    raise InvalidState(f"state.wall = {wall!r}, but the state is {shown:.3g} away from that wall")
 
 
 def _distance_of(scene: Scene, wall: Wall, motion: MovingWalls) -> Interval:

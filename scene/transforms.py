@@ -6,6 +6,7 @@ images and powers of two are exact as long as no number overflows or becomes sub
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import Any, TypeVar
 
@@ -31,32 +32,41 @@ def mirrored(state: State) -> State:
     return State(state.t, -state.x, state.y, -state.vx, state.vy, mirrored_wall(state.wall))
 
 
+def times_power(number: float, exponent: int) -> float:
+    """Return a number times 2^exponent, infinite where that overflows.
+
+    The power itself need not be a float: 2^1000 times 2^-1080 is 2^-80, though 2^-1080 is rounded to 0.
+    """
+    try:
+        return math.ldexp(number, exponent)
+    except OverflowError:
+        return math.copysign(math.inf, number)
+
+
 def scaled_state(state: State, length: int, time: int) -> State:
     """Return the state with lengths times 2^length and times times 2^time, velocities accordingly."""
-    size, speed = 2.0**length, 2.0 ** (length - time)
-    return State(
-        2.0**time * state.t, size * state.x, size * state.y, speed * state.vx, speed * state.vy, state.wall
-    )
+    x, y = (times_power(number, length) for number in (state.x, state.y))
+    vx, vy = (times_power(number, length - time) for number in (state.vx, state.vy))
+    return State(times_power(state.t, time), x, y, vx, vy, state.wall)
 
 
 def scaled(scene: Table, length: int, time: int) -> Table:
     """Return the scene with lengths times 2^length and times times 2^time; `nu` and `slope` stay."""
-    unit = 2.0**time
     return _with_laws(
-        scene, lambda name, law: scaled_law(law, 1.0 if name in ("nu", "slope") else 2.0**length, unit)
+        scene, lambda name, law: scaled_law(law, 0 if name in ("nu", "slope") else length, time)
     )
 
 
-def scaled_law(law: Law, size: float, time: float) -> Law:
-    """Return the law with its values times `size` and its times times `time`; exact for powers of two."""
+def scaled_law(law: Law, size: int, time: int) -> Law:
+    """Return the law with its values times 2^size and its times times 2^time."""
     if isinstance(law, BangBang):
-        return BangBang(knots=tuple((time * t, size * v) for t, v in law.knots))
+        return BangBang(knots=tuple((times_power(t, time), times_power(v, size)) for t, v in law.knots))
     if isinstance(law, Fourier):
-        cos, sin = (tuple(size * a for a in amplitudes) for amplitudes in (law.cos, law.sin))
-        omega = None if law.omega is None else law.omega / time
-        period = None if law.period is None else law.period * time
-        return Fourier(mean=size * law.mean, omega=omega, cos=cos, sin=sin, period=period)
-    return size * law
+        cos, sin = (tuple(times_power(a, size) for a in amplitudes) for amplitudes in (law.cos, law.sin))
+        omega = None if law.omega is None else times_power(law.omega, -time)
+        period = None if law.period is None else times_power(law.period, time)
+        return Fourier(mean=times_power(law.mean, size), omega=omega, cos=cos, sin=sin, period=period)
+    return times_power(law, size)
 
 
 def backwards(scene: Table) -> Table:

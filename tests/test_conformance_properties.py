@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 
 import pytest
@@ -153,6 +154,11 @@ def test_transforms_keep_the_physics():
     film = transforms.backwards(transforms.backwards(LIFT[0]))
     assert film == LIFT[0]
     assert transforms.scaled(transforms.scaled(GALLERY[0], 3, 4), -3, -4) == GALLERY[0]
+    far = transforms.scaled(GALLERY[0], 700, -400)
+    assert transforms.scaled(far, -1400, 800) == transforms.scaled(GALLERY[0], -700, 400)
+    start = transforms.scaled_state(GALLERY[1], 600, -400)
+    assert transforms.scaled_state(start, -1080, 0) == transforms.scaled_state(GALLERY[1], -480, -400)
+    assert transforms.scaled_state(State(0.0, 0.0, 1.0, 0.0, -1.0), 600, -600).vy == -math.inf
     assert transforms.mirrored(transforms.mirrored(LIFT[1])) == LIFT[1]
     still = transforms.idle(transforms.frozen(BREATHING[0], 1.0))
     assert all(is_constant(law) and isinstance(law, Fourier) for law in laws(still).values())

@@ -6,14 +6,16 @@ import math
 import os
 
 import pytest
-from support.answers_by_hand import ON_TWO_WALLS
+from support.answers_by_hand import ON_TWO_WALLS, UNDEFINED
 from support.faulty_kernels import output_of
 from support.recollisions import recollisions
+from support.tables import BOX, LIFT
 from support.truth import proved_step
 
 import fast
+import reference
 from conformance.grading.agreement import compare
-from scene import BangBang, Cap, Collision, Fourier, Mushroom, Rejected, State, Undefined
+from scene import BangBang, Cap, Collision, Fourier, Mushroom, Rejected, State, Undecided, Undefined
 
 N_RECOLLISIONS = int(os.environ.get("MUSHROOMS_RECOLLISIONS", "25"))
 
@@ -73,6 +75,22 @@ def test_a_start_on_two_walls_is_a_corner(name):
     assert fast.next_collision(scene, state, t_end) == Undefined(reason)
     assert fast.trajectory(scene, state, 3).outcome == Undefined(reason)
     assert fast.fine_trajectory(scene, state, 3).outcome == Undefined(reason)
+
+
+@pytest.mark.parametrize("name", UNDEFINED)
+def test_what_is_undefined_is_so_for_its_reason_or_undecided(name):
+    """Of one wall alone nothing is told where another is: neither that it slides nor that it moves in."""
+    scene, state, t_end, reason, _ = UNDEFINED[name]
+    outcome = fast.next_collision(scene, state, t_end)
+    assert outcome == Undefined(reason) or isinstance(outcome, Undecided)
+
+
+def test_along_a_wall_that_rests_where_others_move():
+    """The rule: f' = f'' = 0 is a tangency, and sliding only along a base or where nothing moves."""
+    along = State(0.0, 1.0, -1.0, 0.0, 0.0, "right")
+    assert reference.next_collision(LIFT, along, 0.1) == Undefined("tangency")
+    assert isinstance(fast.next_collision(LIFT, along, 0.1), Undecided)
+    assert fast.next_collision(BOX, State(0.0, 1.0, -0.5, 0.0, 0.0, "right"), 0.1) == Undefined("sliding")
 
 
 def test_on_its_wall_is_judged_by_todays_size():

@@ -23,7 +23,7 @@ from reference.isolation import Isolator
 from reference.jets import Jet
 from reference.start import flight_from
 from reference.walls import MovingWalls
-from scene import BadInput, Cap, Fourier, Rejected, State, Stem, Undecided, Undefined, load
+from scene import BadInput, Cap, Fourier, InvalidState, Rejected, State, Stem, Undecided, Undefined, load
 
 
 def hit(scene, state, t_end=100.0, digits=40):
@@ -199,3 +199,15 @@ def test_wall_functions_enclose_plain_values(drawn, a, b):
             # Mean value: f(hi) - f(lo) lies in f'(I) (hi - lo).
             ends = motion.wall(wall, arithmetic.number(hi)).f - motion.wall(wall, arithmetic.number(lo)).f
             assert sign(ends - jet.d1 * (arithmetic.number(hi) - arithmetic.number(lo))) == 0
+
+
+def test_few_digits_refuse_no_start_on_its_wall():
+    """Whether a place is on its wall is left open where digits are too few to tell, and not denied."""
+    scene, start = Stem(w=1 / 3, h=1.0, slope=0.3), State(0.1, 1 / 3 - 0.3 * 0.7, -0.7, -1.0, 0.3, "right")
+    paths = [reference.trajectory(scene, start, 1, working=digits) for digits in range(1, 12)]
+    assert isinstance(paths[0].outcome, Undecided)
+    assert [step.wall for step in paths[-1].steps] == ["left"]
+    off = State(0.1, start.x * (1 - 2.0**-17), -0.7, -1.0, 0.3, "right")
+    assert isinstance(reference.trajectory(scene, off, 1, working=2).outcome, Undecided)
+    with pytest.raises(InvalidState, match="away from that wall"):
+        reference.trajectory(scene, off, 1, working=12)

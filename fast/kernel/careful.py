@@ -30,7 +30,11 @@ from fast.kernel.codes import (  # isort: skip
 )  # fmt: skip
 from fast.kernel.hits import move
 from fast.kernel.laws import phase_room, set_anchors
-from fast.kernel.records import PHASE, PHASE_ERROR, Particle, released
+
+from fast.kernel.records import (  # isort: skip
+    BEND, DEPTH, PHASE, PHASE_ERROR, RADIUS, SLOPE, WIDTH, Particle, released,
+)  # fmt: skip
+
 
 from fast.kernel.walls import (  # isort: skip
     crossed_wall, curvature_bounds, law_size, reach_time, side_of_mouth, wall_function,
@@ -82,6 +86,13 @@ def root_before(limit, wall, root, slope, error):
     return wall, root, slope, error
 
 
+@part
+def is_at_rest(scene):
+    """Tell whether no law of a scene ever changes."""
+    b = scene.bounds
+    return b[RADIUS, BEND] + b[WIDTH, BEND] + b[DEPTH, BEND] + b[SLOPE, BEND] == 0.0
+
+
 @kernel
 def first_root(wall, start, limit, particle, scene, anchors):
     """Find the first s in (start, limit) with f = 0, f' < 0.
@@ -109,8 +120,9 @@ def first_root(wall, start, limit, particle, scene, anchors):
             if slope < -slope_error:
                 return APPROACHING, s, slope, 0.0
             if slope <= slope_error:
-                # With slope and curvature exactly 0 the path runs along a wall that stands still.
-                is_along = slope == 0.0 and slope_error == 0.0 and down == 0.0
+                # With slope and curvature exactly 0 the path runs along a wall that stands still; by the rule
+                # of docs/proof.md that is sliding where nothing moves, and else a tangency.
+                is_along = slope == 0.0 and slope_error == 0.0 and is_at_rest(scene)
                 return (SLIDING if is_along else TANGENT), s, slope, 0.0
             f = 0.0
         elif s == start and f <= error + doubt:
@@ -204,21 +216,53 @@ def side_of_wall(candidate, s, particle, scene, anchors):
 
 
 @part
+def is_within_rounding(wall, x, y, scene, anchors):
+    """Tell whether a place, rounded, may lie on a wall."""
+    room, error = wall_residual(wall, x, y, scene, anchors)
+    return room <= error
+
+
+@part
+def at_foot(code, particle, scene, anchors):
+    """Return why no flight begins on a wall of the stem: START where another one is within rounding."""
+    if code in (SLIDING, APPROACHING):
+        for candidate in (FLOOR, LEFT, RIGHT):
+            if candidate != particle.wall and is_within_rounding(
+                candidate, particle.x, particle.y, scene, anchors
+            ):
+                return START
+    return code
+
+
+@part
+def at_base(inward, x, y, scene, anchors):
+    """Return why no flight begins on the base, its ends left open; NO_WALL where one does."""
+    if inward > 0.0:
+        return NO_WALL
+    # Where the base ends is another wall, and a corner whichever way the particle moves.
+    is_stem = scene.table == STEM
+    if is_within_rounding(LEFT if is_stem else ARC, x, y, scene, anchors):
+        return START
+    if is_within_rounding(RIGHT if is_stem else ARC, x, y, scene, anchors):
+        return START
+    return SLIDING if inward == 0.0 else APPROACHING
+
+
+@part
 def trouble_at_start(is_in_cap, particle, scene, anchors):
     """Return why no flight begins on y = 0, NO_WALL where one does.
 
     A start on two walls at once, here a named wall and y = 0, is a corner whichever way it moves; a second
-    wall of any other pair is found within rounding of f = 0 by `first_root`, and then left undecided.
+    wall of any other pair is found within rounding of f = 0 by `first_root`, and then left undecided. So what
+    is told of one wall alone, that the state slides along it or moves into it, waits until no other is near.
     """
     x, y, vx, vy, wall = particle.x, particle.y, particle.vx, particle.vy, particle.wall
     is_mushroom = scene.table == MUSHROOM
     if y == 0.0 and wall in (ARC, LEFT, RIGHT):
         return MOUTH_EDGE if is_mushroom and wall != ARC else ON_CORNER
     if wall == BASE or (y == 0.0 and wall == NO_WALL and not is_mushroom):
-        inward = vy if is_in_cap else -vy
-        if inward <= 0.0:
-            return SLIDING if inward == 0.0 else APPROACHING
-    elif y == 0.0 and wall == NO_WALL and vy > 0.0:
+        return at_base(vy if is_in_cap else -vy, x, y, scene, anchors)
+    if y == 0.0 and wall == NO_WALL and vy > 0.0:
         # In the cap from the mouth or from the base, all the same, but not from the edge between them.
         gap, _ = wall_residual(RIGHT if x > 0.0 else LEFT, x, y, scene, anchors)
         if gap == 0.0:
@@ -228,11 +272,7 @@ def trouble_at_start(is_in_cap, particle, scene, anchors):
         if side == 0:
             return EDGE
         if side < 0:
-            # On the base, which ends at the arc.
-            room, room_error = wall_residual(ARC, x, y, scene, anchors)
-            if room <= room_error:
-                return START
-            return SLIDING if vy == 0.0 else APPROACHING
+            return at_base(vy, x, y, scene, anchors)
     return NO_WALL
 
 
@@ -262,6 +302,7 @@ def event_from_stem(crossing, limit, particle, scene, anchors):
         # A side met at the height of the mouth is its edge.
         depth = -(y + vy * s)
         is_at_mouth = depth <= SAFETY * (abs(y) + abs(vy) * s) + abs(vy) * error
+        code = at_foot(code, particle, scene, anchors)
         return (EDGE if crossing < np.inf and code <= FLOOR and is_at_mouth else code), s
     if crossing >= limit:
         return NO_WALL, s

@@ -86,8 +86,14 @@ ANSWERS = {
     "where the base ends, downwards": by_hand(STATIC, State(0.0, 1.0, 0.0, -1.0, -1.0), "corner"),
     "where the base ends, inside by 1e-71": by_hand(SWAYING, State(0.5, 1.0, 0.0, -1.0, 0.0), "sliding"),
     "where the base ends, beyond by 1e-71": by_hand(SWAYING, State(-0.5, 1.0, 0.0, -1.0, 0.0), "rejected"),
+    "where the base ends, named": by_hand(STATIC, State(0.0, 1.0, 0.0, -1.0, 0.0, "base"), "corner"),
+    "where a cap's base ends, named": by_hand(CIRCLE, State(0.0, -1.0, 0.0, 1.0, -1.0, "base"), "corner"),
+    "where a stem's top ends, named": by_hand(BOX, State(0.0, 1.0, 0.0, -1.0, 0.0, "base"), "corner"),
+    "where the floor ends, along it": by_hand(STATIC, State(0.0, 0.5, -1.0, -1.0, 0.0, "floor"), "corner"),
+    "where the floor ends, into it": by_hand(STATIC, State(0.0, 0.5, -1.0, -1.0, -1.0, "floor"), "corner"),
+    "where the floor ends, along a side": by_hand(STATIC, State(0.0, 0.5, -1.0, 0.0, 1.0, "right"), "corner"),
     "at the edge": by_hand(STATIC, State(0.0, -0.5, 0.0, 1.0, 0.3, "left"), "mouth-edge"),
-    "at the edge of a mouth as wide as the cap": by_hand(
+    "the edge of a mouth as wide as the cap": by_hand(
         Mushroom(r=1.0, h=1.0, nu=1.0), State(0.0, 1.0, 0.0, -0.5, 1.0), "mouth-edge"
     ),
     "at the edge, level": by_hand(STATIC, State(0.0, -0.5, 0.0, 1.0, 0.0, "left"), "mouth-edge"),

@@ -236,3 +236,16 @@ def test_a_swept_stretch_is_swept_less_the_residual(off):
     put("excluded", "arc", early)(claim)
     with pytest.raises(Refuted, match="may sweep"):
         check(claim)
+
+
+def test_a_wall_met_where_its_rate_turns_is_proved_again():
+    """Met when the floor is as quick as ever, its speed is known far better than the time is."""
+    h = Fourier(2.0**-180, omega=2.0**-20, sin=(2.0**-200,))
+    scene = Stem(w=5.659799424266695e-73, h=h)
+    start = State(0.5, 4.25e-73, -6.52530446800149e-55, 8.59e-80, -8.796729055475663e-77)
+    path, claim = path_claim(scene, start, 2)
+    assert [step.wall for step in path.steps] == ["right", "floor"]
+    check_path(claim)
+    shift(2.0**-300, "steps", 1, "after", "vy")(claim)
+    with pytest.raises(Refuted, match="vy afterwards"):
+        check_path(claim)

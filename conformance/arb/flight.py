@@ -106,13 +106,17 @@ class BallFlight:
             return -2 * x, -2 * y
         return fmpq(1 if wall == "left" else -1), self.law("slope", s)[0]
 
+    def rate(self, wall: Wall, s: Number) -> Number:
+        """Enclose f' of a wall, as evaluated."""
+        return self.jet(wall, s)[1]
+
     def reflected(self, wall: Wall, s: Number) -> tuple[Number, Number]:
         """Enclose the velocity after a hit: v - 2 f' grad f / |grad f|^2, which is v - 2 (v.n - u) n."""
         line = self._line(s)
         if wall == "base":
             return line.vx, -line.vy
         f_x, f_y = self.gradient(wall, s)
-        push = 2 * self.jet(wall, s)[1] / (f_x * f_x + f_y * f_y)
+        push = 2 * self.rate(wall, s) / (f_x * f_x + f_y * f_y)
         return line.vx - push * f_x, line.vy - push * f_y
 
     def _line(self, s: Number) -> Line:

@@ -62,6 +62,15 @@ class SignedFlight(BallFlight):
         """Enclose f, f', f'' over [a, b], which lies on one piece of every law."""
         return self.jet(wall, hull(a, b), within=(a + b) / 2)
 
+    def rate(self, wall: Wall, s: Number) -> Number:
+        """Enclose f' of a wall, by the mean value theorem too: where it turns, balls are too wide."""
+        found = self.jet(wall, s)
+        if not isinstance(s, arb):
+            return found[1]
+        middle = s.mid()
+        centred = self.jet(wall, middle)[1] + found[2] * (s - middle)
+        return arb(found[1]).intersection(centred)
+
     def is_never_swept(self, wall: Wall, a: Rational, b: Rational) -> bool:
         """Tell whether f, less its residual, is above 0 on [a, b], whatever the laws do between their bounds.
 

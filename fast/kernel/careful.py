@@ -226,7 +226,7 @@ def is_within_rounding(wall, x, y, scene, anchors):
 def at_foot(code, particle, scene, anchors):
     """Return why no flight begins on a wall of the stem: START where another one is within rounding."""
     if code in (SLIDING, APPROACHING):
-        for candidate in (FLOOR, LEFT, RIGHT):
+        for candidate in (LEFT, RIGHT, FLOOR):
             if candidate != particle.wall and is_within_rounding(
                 candidate, particle.x, particle.y, scene, anchors
             ):

@@ -17,6 +17,8 @@ import fast
 from fast.compiled import compile_scene
 from fast.kernel import loops
 from fast.kernel.compiling import HOW
+from fast.kernel.pools import POOL_SIZE
+from fast.kernel.worker import CACHE_LINE, new_pools
 from fast.pieces import PARABOLA, SERIES
 from fast.starts import initial_states
 from fast.step import WALL_CODES, followed_paths
@@ -141,3 +143,14 @@ def test_a_spoilt_lane_is_seen(column):
     answers[:, column] *= 1.0 + 2.0**-47
     _, ulps = errors_of(SCENES["moving-cap"], rows, codes, answers)
     assert ulps.max() > BOUND
+
+
+def test_pools_begin_with_a_cache_line_wherever_memory_lies():
+    held = []
+    for n in range(40):
+        held.append(np.zeros(2 * n + 1))  # moves what is allocated next
+        pools = new_pools()
+        held.append(pools)
+        assert pools.ctypes.data % CACHE_LINE == 0
+        assert pools.flags.c_contiguous
+        assert pools.shape == (3, POOL_SIZE)

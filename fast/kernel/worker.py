@@ -14,6 +14,7 @@ from fast.kernel.records import (  # isort: skip
     ANCHORS_SHAPE, Compiled, FloatArray, Followed, IntArray, LawsInLanes, Pieces, Stops,
 )  # fmt: skip
 
+CACHE_LINE = 64  # bytes
 GENERAL, DISK, SPARE = np.arange(3)  # pools; SPARE is one to correct single lanes in
 # Rows of a roster: each lane's particle, the number of its next stop, and places for `correct`.
 PARTICLE, NEXT_STOP, SPARE_PLACES = np.arange(3)
@@ -61,6 +62,17 @@ def is_known_throughout(in_lanes: LawsInLanes, last: float) -> bool:
     return until > 0.0 and (abs(last) < until or last == np.inf)
 
 
+def new_pools() -> FloatArray:
+    """Return (3, POOL_SIZE) empty pools that begin with a cache line, as then do all their rows.
+
+    numpy begins at any multiple of 16 bytes, and a register that is loaded across two lines takes longer: how
+    quick the same loops were hung on where a process happened to put them.
+    """
+    room = np.zeros(3 * POOL_SIZE + CACHE_LINE // 8)
+    first = -room.ctypes.data % CACHE_LINE // 8
+    return room[first : first + 3 * POOL_SIZE].reshape(3, POOL_SIZE)
+
+
 def new_worker(
     in_lanes: LawsInLanes, stops: Stops, followed: Followed, n_passed: int = 0, loops: Loops | None = None
 ) -> Worker:
@@ -75,7 +87,7 @@ def new_worker(
         loops or loops_of(in_lanes),
         np.zeros(ANCHORS_SHAPE),
         is_known_throughout(in_lanes, float(stops.times[-1])),
-        np.zeros((3, POOL_SIZE)),
+        new_pools(),
         np.zeros((2, 3, LANES), np.int64),
         np.zeros(2, np.int64),
         stops,

@@ -38,7 +38,7 @@ from mpmath import fp
 
 from scene import BadInput, Horizon, Mushroom, Outcome, Scene, State
 from scene.geometry import area, half_width, table_at
-from scene.laws import bounds, value
+from scene.laws import bounds, values
 from scene.protocol.wire import Flowing
 from scene.tables import cycle_length, laws
 
@@ -256,7 +256,7 @@ def least_ratio(scene: Scene) -> float:
 def least_nu(scene: Mushroom, span: float) -> float:
     """Return the instant of least nu as a part of the period, the middle of a plateau."""
     parts = np.arange(4096) / 4096
-    nu = np.array([half_width(fp, scene, span * p) / value(fp, scene.r, span * p) for p in parts])
+    nu = half_width(fp, scene, span * parts) / values(scene.r, span * parts)
     low = parts[nu <= nu.min() * (1 + 2.0**-40)]
     return float(low[0] + low[-1]) / 2
 

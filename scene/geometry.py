@@ -168,7 +168,10 @@ class TableAt(NamedTuple):
 
 
 def half_width(ctx: Any, scene: Scene, t: Any, order: int = 0) -> Any:
-    """Return the half width w(t), given as w or as nu r [length], or its rate for order 1; 0 in a cap."""
+    """Return the half width w(t), given as w or as nu r [length], or its rate for order 1; 0 in a cap.
+
+    With `fp` t may be an array of times.
+    """
     if isinstance(scene, Cap):
         return ctx.mpf(0)
     w, rate = ctx.mpf(1), ctx.mpf(0)
@@ -181,7 +184,10 @@ def half_width(ctx: Any, scene: Scene, t: Any, order: int = 0) -> Any:
 
 
 def table_at(ctx: Any, scene: Scene, t: Any) -> TableAt:
-    """Evaluate a table at time t in mpmath's `fp` or in numbers of `scene.precision.decimals`."""
+    """Evaluate a table at time t in mpmath's `fp` or in numbers of `scene.precision.decimals`.
+
+    With `fp` t may be an array of times: what moves is then an array, too.
+    """
     given = laws(scene)
     columns = []
     for order in (0, 1):

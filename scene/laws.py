@@ -297,7 +297,7 @@ def values(law: Law, times: FloatArray, order: int = 0) -> FloatArray:
         order: 0, 1 or 2.
 
     Returns:
-        Of the times' shape; times since the first knot are rounded, and then phases are exact.
+        Of the times' shape. Times since the first knot, phases and omega t are rounded as floats are.
     """
     if is_constant(law) or not isinstance(law, BangBang):
         return np.full(times.shape, evaluate(_Arrays, piece_at(law, Fraction(0)), times, order))

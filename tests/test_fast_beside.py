@@ -34,7 +34,7 @@ def started(monkeypatch):
 
 def compiled():
     function = njit(lambda x: x + 1)
-    with beside.compiled_beside(lambda entry: entry is function):
+    with beside.compiled_beside(function):
         return function(1)
 
 
@@ -54,9 +54,9 @@ def test_what_is_kept_or_not_meant_starts_nothing(started):
     processes = started("")
     function = njit(lambda x: x + 1)
     assert function(1) == 2
-    with beside.compiled_beside(lambda _: True):
+    with beside.compiled_beside(function):
         assert function(1) == 2
-    with beside.compiled_beside(lambda _: False):
+    with beside.compiled_beside(function):
         assert njit(lambda x: x + 2)(1) == 3
     assert processes == []
 
@@ -73,7 +73,7 @@ def test_an_interrupt_ends_it_too(started):
     function = njit(lambda x: x + 1)
 
     def interrupted():
-        with beside.compiled_beside(lambda entry: entry is function):
+        with beside.compiled_beside(function):
             function(1)
             raise KeyboardInterrupt
 

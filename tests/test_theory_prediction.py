@@ -13,7 +13,7 @@ import pytest
 from mpmath import MPContext
 
 from scene import BangBang, Fourier, Mushroom, Scene, load
-from scene.laws import value
+from scene.laws import values
 from theory import Cycle, NotConverged, Prediction, adiabatic, predict, solutions, v_cap, v_cha, volumes_at
 from theory.adiabatic import captures
 from theory.volumes import delta_slope
@@ -245,7 +245,7 @@ def test_values_of_nu_as_near_as_binary64_tells_them_apart_are_resolved(
 ) -> None:
     cycle = Cycle.of(BESIDE_A_KNOT, 1)
     t = np.linspace(0.0, 2.0, 1_001)
-    nu, h = (np.array([value(mpmath.fp, law, x) for x in t]) for law in (BESIDE_A_KNOT.nu, BESIDE_A_KNOT.h))
+    nu, h = values(BESIDE_A_KNOT.nu, t), values(BESIDE_A_KNOT.h, t)
     delta = (2 / np.pi) * (np.arccos(nu) - nu * np.sqrt(1 - nu**2))
     ratio = np.pi / (np.pi * (1 - delta) + 4 * nu * h)
     p_nc = math.exp(-np.trapezoid(ratio, delta))

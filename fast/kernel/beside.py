@@ -12,7 +12,7 @@ import os
 import subprocess
 import sys
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
@@ -25,15 +25,15 @@ _ONCE = threading.Lock()  # taken by the thread that starts the second process, 
 
 
 class _Beside(event.Listener):  # type: ignore[misc]  # numba has no types
-    """Starts the second process when numba has found an entry not kept."""
+    """Starts the second process when numba has found an entry not kept, and is about to compile it."""
 
-    def __init__(self, is_meant: Callable[[Any], bool]) -> None:
-        self._is_meant = is_meant
+    def __init__(self, entry: Any) -> None:
+        self._entry = entry
         self.process: subprocess.Popen[bytes] | None = None
 
     def on_start(self, told: Any) -> None:
         """See numba's `Listener`."""
-        if self.process is None and self._is_meant(told.data["dispatcher"]):
+        if self.process is None and told.data["dispatcher"] is self._entry:
             self.process = start()
 
     def on_end(self, told: Any) -> None:
@@ -60,13 +60,13 @@ def start() -> subprocess.Popen[bytes] | None:
 
 
 @contextmanager
-def compiled_beside(is_meant: Callable[[Any], bool]) -> Iterator[None]:
+def compiled_beside(entry: Any) -> Iterator[None]:
     """Let a second process compile `follow_particles` while the caller compiles, if it does.
 
     Args:
-        is_meant: tells whether to begin with a dispatcher that the caller is about to compile.
+        entry: the dispatcher with whose compilation it begins.
     """
-    beside = _Beside(is_meant)
+    beside = _Beside(entry)
     with event.install_listener("numba:compile", beside):
         try:
             yield

@@ -161,7 +161,7 @@ def careful_at() -> Any:
 @cache
 def loops_for(is_slope_moving: bool, degree: int) -> Loops:
     """Compile the loops for scenes of such a slope and laws of such a degree, or load them."""
-    with compiled_beside(lambda entry: entry is careful_step):
+    with compiled_beside(careful_step):
         return Loops(
             careful_at(),
             address(AIMS[is_slope_moving], AIM),

@@ -13,6 +13,7 @@ import fast
 from conformance.bench import baselines, hard_cases, measure, workloads
 from conformance.bench.codes import FACTOR, SLOPE, WIDTH, H, R
 from conformance.generator import draws
+from conformance.harness import examples
 from conformance.suite.process import Trouble
 from scene import Collision, Horizon, Mushroom, State, load
 
@@ -149,8 +150,8 @@ def test_further_steps_come_from_the_seed():
 
 def test_without_a_compiler_the_reason_is_told(monkeypatch, tmp_path):
     monkeypatch.setattr(baselines, "SOURCE", tmp_path / "absent.c")
-    with pytest.raises(Trouble, match="it does not compile" if baselines.shutil.which("cc") else "no C"):
+    with pytest.raises(Trouble, match="it does not compile" if examples.shutil.which("cc") else "no C"):
         baselines.build(tmp_path, [])
-    monkeypatch.setattr(baselines.shutil, "which", lambda _: None)
+    monkeypatch.setattr(examples.shutil, "which", lambda _: None)
     with pytest.raises(Trouble, match="no C compiler is installed"):
         baselines.build(tmp_path, [])

@@ -11,8 +11,6 @@ k = 1, 2, ... n, or n knots (time, value). A state is t, x, y, vx, vy, the wall 
 from __future__ import annotations
 
 import ctypes
-import shutil
-import subprocess
 import time
 from collections.abc import Callable, Sequence
 from functools import partial
@@ -28,6 +26,7 @@ from conformance import plain, vectors
 from conformance.bench import codes
 from conformance.bench.contenders import Ask, Contender, Family, Given, Lap
 from conformance.bench.workloads import SINGLE_STEPS, WINDOW, Workload
+from conformance.harness import examples
 from conformance.suite.process import Trouble
 from scene import BangBang, Cap, Collision, Fourier, Horizon, Law, Mushroom, Outcome, Scene, State, Stem
 from scene.geometry import rounded
@@ -135,15 +134,11 @@ def build(folder: Path, flags: Sequence[str]) -> tuple[Path, str]:
     Raises:
         Trouble: there is no compiler, or it fails.
     """
-    compiler = shutil.which("cc") or shutil.which("gcc")
-    if not compiler:
-        raise Trouble("unsupported", "no C compiler is installed")
-    options, library = [*flags, "-std=gnu11", "-shared", "-fPIC"], folder / "baselines.so"
-    line = [compiler, *options, "-o", str(library), str(SOURCE), "-lm"]
-    done = subprocess.run(line, capture_output=True, text=True, check=False)
-    if done.returncode:
-        raise Trouble("error", f"it does not compile: {' '.join(done.stderr.split())[:200]}")
-    return library, " ".join([Path(compiler).name, *options, SOURCE.name, "-lm"])
+    library = folder / "baselines.so"
+    built = examples.compiled("C", [*flags, "-std=gnu11", "-shared", "-fPIC"], SOURCE, library, ["-lm"])
+    if built.why_not:
+        raise Trouble("unsupported" if "installed" in built.why_not else "error", built.why_not)
+    return library, built.built
 
 
 def in_c(library: Path) -> list[Contender]:

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 FOLDER = Path(__file__).parent
+COMPILERS = {"C": ("gcc", "cc"), "C++": ("g++", "c++")}
 
 
 class Example(NamedTuple):
@@ -52,27 +53,36 @@ def find_kit_examples(folder: Path, flags: Sequence[str] = ("-O3",)) -> dict[str
     }
 
 
-def _build_c(folder: Path, flags: Sequence[str]) -> Example:
-    compiler = shutil.which("gcc") or shutil.which("cc")
+def compiled(
+    language: str, flags: Sequence[str], source: Path, program: Path, libraries: Sequence[str] = ()
+) -> Example:
+    """Compile one file; the example's command is what was built, whether or not it is a program.
+
+    Args:
+        language: "C" or "C++".
+        flags: for the compiler.
+        source: the file.
+        program: what to write.
+        libraries: flags that come after the file.
+    """
+    compiler = next(filter(None, map(shutil.which, COMPILERS[language])), None)
     if not compiler:
-        return Example((), "no C compiler is installed")
-    built = _build(compiler, [*flags, "-std=gnu11"], FOLDER / "c" / "stepper.c", folder, ["-ljansson", "-lm"])
+        return Example((), f"no {language} compiler is installed")
+    line = [compiler, *flags, "-o", str(program), str(source), *libraries]
+    done = subprocess.run(line, capture_output=True, text=True, check=False)
+    if done.returncode:
+        return Example((), f"it does not compile: {' '.join(done.stderr.split())[:400]}")
+    return Example((str(program),), built=" ".join([Path(compiler).name, *flags, source.name, *libraries]))
+
+
+def _build_c(folder: Path, flags: Sequence[str]) -> Example:
+    source = FOLDER / "c" / "stepper.c"
+    built = compiled("C", [*flags, "-std=gnu11"], source, folder / source.stem, ["-ljansson", "-lm"])
     if "jansson.h" in built.why_not:
         return Example((), "jansson.h is not installed (Debian: libjansson-dev)")
     return built
 
 
 def _build_cpp(folder: Path, flags: Sequence[str]) -> Example:
-    compiler = shutil.which("g++") or shutil.which("c++")
-    if not compiler:
-        return Example((), "no C++ compiler is installed")
-    return _build(compiler, [*flags, "-std=c++17"], FOLDER / "cpp" / "engine.cpp", folder, [])
-
-
-def _build(compiler: str, flags: list[str], source: Path, folder: Path, libraries: list[str]) -> Example:
-    program = folder / source.stem
-    line = [compiler, *flags, "-o", str(program), str(source), *libraries]
-    done = subprocess.run(line, capture_output=True, text=True, check=False)
-    if done.returncode:
-        return Example((), f"it does not compile: {' '.join(done.stderr.split())[:400]}")
-    return Example((str(program),), built=" ".join([Path(compiler).name, *flags, source.name, *libraries]))
+    source = FOLDER / "cpp" / "engine.cpp"
+    return compiled("C++", [*flags, "-std=c++17"], source, folder / source.stem)

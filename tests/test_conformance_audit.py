@@ -60,6 +60,7 @@ def honest():
     return audited()
 
 
+@pytest.mark.deep
 def test_ensembles_of_theory_meet_every_expected_verdict(honest):
     pairs = zip(honest.entries, honest.findings, strict=True)
     wrong = [(finding.id, finding.checks) for entry, finding in pairs if finding.verdict != entry.expected]
@@ -67,6 +68,7 @@ def test_ensembles_of_theory_meet_every_expected_verdict(honest):
     assert honest.is_passed
 
 
+@pytest.mark.deep
 def test_every_misprint_fails_as_printed_and_holds_corrected(honest):
     by_id = {finding.id: finding for finding in honest.findings}
     for entry in honest.entries:
@@ -77,6 +79,7 @@ def test_every_misprint_fails_as_printed_and_holds_corrected(honest):
             assert not any(check.form == "claim" for check in checks)
 
 
+@pytest.mark.deep
 def test_false_alarms_stay_below_the_bound(honest):
     # REAL ones add 22, the formulas none; a full audit has one more run of many cycles, and three energies.
     assert honest.n_tests + 22 + 30 <= MAX_TESTS

@@ -61,6 +61,7 @@ def test_workers_of_a_cluster_follow_to_the_same_bits(command_line, tmp_path, en
     assert json.loads(ended.out)["sha256"] == ensemble.sha256()
 
 
+@pytest.mark.deep
 def test_workers_lengthen_a_run(command_line, tmp_path, stored):
     """They are handed what is there."""
     folder, more = shutil.copytree(stored, tmp_path / "run"), ["--cycles", 2, "--resume"]

@@ -11,6 +11,7 @@ import mpmath
 import numpy as np
 import pytest
 from mpmath import MPContext
+from support.depth import deep_but
 
 from scene import BangBang, Fourier, Mushroom, Scene, load
 from scene.laws import values
@@ -293,7 +294,7 @@ def test_knots_may_start_anywhere_in_the_period() -> None:
     assert predict(turned, digits=20).strings(20) == predict(scene, digits=20).strings(20)
 
 
-@pytest.mark.parametrize("narrow", [1e-9, 1e-20, 1e-43, 1e-50, 1e-300])
+@pytest.mark.parametrize("narrow", deep_but([1e-9, 1e-20, 1e-43, 1e-50, 1e-300], 1e-20, 1e-300))
 def test_a_mouth_that_is_nearly_closed_captures_as_its_width_falls(narrow: float) -> None:
     """Of such a mouth V_cap d delta / V_cha is d nu / (nu (1 + h / r)): p_nc is a power of the widths' ratio.
 

@@ -25,7 +25,7 @@ from fast.kernel import codes, lanes, pools
 from fast.step import WALL_NAMES
 from scene import Cap, Collision, Fourier, Mushroom, Rejected, State
 
-N_ANSWERS = int(os.environ.get("MUSHROOMS_LANE_ANSWERS", "300"))  # of each group of draws
+N_ANSWERS = int(os.environ.get("MUSHROOMS_LANE_ANSWERS", "150"))  # of each group of draws
 
 
 @pytest.mark.parametrize("group", [ANYWHERE, *GROUPS, *TRAPS])

@@ -147,7 +147,7 @@ def test_all_that_is_drawn_follows_from_the_seed(corpus):
         assert draw(steps, 4) != draw(steps, 5)
 
 
-@pytest.mark.parametrize("seed", [None, 9])
+@pytest.mark.parametrize("seed", deep_but([None, 9], 9))
 @pytest.mark.parametrize("otherwise", deep_but(["undecided", "last"], "last"))
 def test_a_replayer_is_not_accepted(seed, otherwise):
     """One who knows every answer, and one who knows the run's seed beside."""

@@ -128,6 +128,7 @@ def test_the_summary_tells_what_is_not_as_expected(everything):
     assert f"{len(findings) - 1} of {len(findings)} claims" in text
 
 
+@pytest.mark.deep
 def test_a_few_claims_are_checked_and_reported(call, tmp_path):
     done = call("--only", CHEAP, "--out", tmp_path / "a", "--json")
     assert done.code == 0
@@ -197,6 +198,7 @@ def test_another_seed_is_refused_and_broken_findings_are_made_again(call, tmp_pa
     assert len(blocks) == 6
 
 
+@pytest.mark.deep
 def test_resumed_with_other_claims_a_report_has_both(call, tmp_path, blocks):
     """Never fewer: what other settings would leave out is not given up."""
     for ids, wanted in (("X5,N6", "X5,N6"), ("M10", "M10,X5,N6"), ("N6", "M10,X5,N6")):

@@ -81,6 +81,7 @@ def test_figures_of_eight_gain_though_their_areas_cancel(seed: int) -> None:
     assert theory.predict(eight, 10).m1 > 1e-7
 
 
+@pytest.mark.deep
 def test_the_retraced_arc_is_the_counterexample() -> None:
     scene = load("retraced-arc")
     assert isinstance(scene, Mushroom)

@@ -23,7 +23,7 @@ from support.entries import kept_entries
 from fast.kernel import beside
 from mushrooms.main import run
 
-settings.register_profile("quick", derandomize=True, deadline=None, print_blob=True)
+settings.register_profile("quick", max_examples=50, derandomize=True, deadline=None, print_blob=True)
 settings.register_profile("deep", max_examples=10_000, deadline=None, print_blob=True)
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "quick"))
 

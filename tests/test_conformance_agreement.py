@@ -15,7 +15,7 @@ from conformance.strategies import scenes_and_states
 from conformance.vectors import NUMBERS, Expectation, certified
 from scene import Collision, Horizon, State, Undecided, load
 
-N_STEPS = int(os.environ.get("MUSHROOMS_STEPS", "1000"))  # MUSHROOMS_STEPS=20000 for the whole
+N_STEPS = int(os.environ.get("MUSHROOMS_STEPS", "400"))  # MUSHROOMS_STEPS=20000 for the whole
 BOUND = 4.0  # backward ulps
 UNDECIDED_SHARE = 0.04  # the strategies aim at corners and edges on purpose
 

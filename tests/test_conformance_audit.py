@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 from support import adiabatic_particles
+from support.depth import deep_among
 
 import fast
 import theory
@@ -60,6 +61,7 @@ def honest():
     return audited()
 
 
+@pytest.mark.deep
 def test_ensembles_of_theory_meet_every_expected_verdict(honest):
     pairs = zip(honest.entries, honest.findings, strict=True)
     wrong = [(finding.id, finding.checks) for entry, finding in pairs if finding.verdict != entry.expected]
@@ -67,6 +69,7 @@ def test_ensembles_of_theory_meet_every_expected_verdict(honest):
     assert honest.is_passed
 
 
+@pytest.mark.deep
 def test_every_misprint_fails_as_printed_and_holds_corrected(honest):
     by_id = {finding.id: finding for finding in honest.findings}
     for entry in honest.entries:
@@ -77,6 +80,7 @@ def test_every_misprint_fails_as_printed_and_holds_corrected(honest):
             assert not any(check.form == "claim" for check in checks)
 
 
+@pytest.mark.deep
 def test_false_alarms_stay_below_the_bound(honest):
     # REAL ones add 22, the formulas none; a full audit has one more run of many cycles, and three energies.
     assert honest.n_tests + 22 + 30 <= MAX_TESTS
@@ -177,7 +181,7 @@ FAULTS = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("name", FAULTS)
+@pytest.mark.parametrize("name", deep_among(FAULTS, "L5"))
 def test_a_faulty_stepper_does_not_get_the_expected_verdict(name):
     (entry,) = ledger.select(name)
     (finding,) = audited(name, FAULTS[name]).findings
@@ -220,7 +224,7 @@ def test_the_audit_sees_what_finite_energy_adds_at_the_papers_size(fixed_caps):
         assert experiments.captured_energies(known[name]).holds
 
 
-@pytest.mark.parametrize("name", ["M1", "M2", "M4", "X1", "X8", "N1", "N4"])
+@pytest.mark.parametrize("name", deep_among(["M1", "M2", "M4", "X1", "X8", "N1", "N4"], "N1"))
 def test_a_wrong_theory_does_not_get_the_expected_verdict(name):
     def wrong(scene, digits):
         right = CACHED(scene, digits)

@@ -333,6 +333,7 @@ def test_a_file_that_is_no_record_is_refused(tmp_path, content, words):
         record.read(tmp_path / "none.json")
 
 
+@pytest.mark.deep
 def test_the_table_of_hard_cases_is_right_for_our_steppers():
     """docs/bench/hard-cases.md, regenerated: verdict by verdict."""
     cases = hard_cases.tabulate(ours.our_askers(), lambda _: None)

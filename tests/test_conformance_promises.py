@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pytest
+from support.depth import deep_among
 from support.promise_breakers import FAULTS, Breaker
 
 from conformance import vectors
@@ -36,7 +37,7 @@ def test_an_honest_one_keeps_them_all(opened):
     assert {verdict for verdict, _ in found.values()} == {"pass"}, found
 
 
-@pytest.mark.parametrize("name", FAULTS)
+@pytest.mark.parametrize("name", deep_among(FAULTS, "a-tenth", "remembering"))
 def test_a_breach_is_met(opened, name):
     promise, verdict, fault = FAULTS[name]
     ((_, met, why, _),) = promises.ask_promises(opened(fault), (promise,))

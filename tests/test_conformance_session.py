@@ -8,6 +8,7 @@ from pathlib import Path
 
 import msgspec
 import pytest
+from support.depth import deep_among, deep_but
 from support.saboteurs import HONEST, SABOTEURS, command
 
 from conformance.suite import promises
@@ -134,7 +135,7 @@ AT_EVERY_STEP = {
 }
 
 
-@pytest.mark.parametrize("name", AT_EVERY_STEP)
+@pytest.mark.parametrize("name", deep_among(AT_EVERY_STEP, "close-stdout"))
 def test_a_fault_in_every_answer(verdicts, name):
     run = verdicts(name, PATIENT)
     verdict, word = AT_EVERY_STEP[name]
@@ -185,7 +186,7 @@ SILENT = {
 }
 
 
-@pytest.mark.parametrize("name", SILENT)
+@pytest.mark.parametrize("name", deep_but(SILENT, "hang", "flood-stderr"))
 def test_silence_ends_at_the_limit(verdicts, name):
     run = verdicts(name, HASTY)
     first, *others = [result for result in run.results if result.group == "made-up"]
@@ -226,7 +227,7 @@ ONCE = {
 }
 
 
-@pytest.mark.parametrize("name", ONCE)
+@pytest.mark.parametrize("name", deep_among(ONCE, "ignore-stop"))
 def test_a_single_fault_is_found_and_nothing_else_suffers(verdicts, name):
     case, verdict, word = ONCE[name]
     run = verdicts(name, PATIENT)

@@ -41,6 +41,7 @@ def matches(shown: str, output: str) -> bool:
     return re.search(pattern, output, re.DOTALL) is not None
 
 
+@pytest.mark.deep
 def test_the_tutorial_does_what_it_says(tmp_path):
     """One block after the other, in the reader's folder."""
     for name, text in blocks("tutorial.md", "python"):

@@ -9,6 +9,7 @@ import shlex
 from pathlib import Path
 
 import pytest
+from support.depth import deep_among
 from support.refusals import assert_refused
 
 from mushrooms import gallery
@@ -41,7 +42,7 @@ def test_the_python_of_a_page_does_what_it_says(name):
     assert found.failed == 0
 
 
-@pytest.mark.parametrize("name", ["start.md", "scenes.md"])
+@pytest.mark.parametrize("name", deep_among(["start.md", "scenes.md"], "start.md"))
 def test_the_commands_of_a_page_do_what_they_say(command_line, tmp_path, monkeypatch, name):
     monkeypatch.chdir(tmp_path)
     consoles = 0
@@ -63,6 +64,7 @@ def test_the_commands_of_a_page_do_what_they_say(command_line, tmp_path, monkeyp
     assert consoles
 
 
+@pytest.mark.deep
 def test_the_pictures_of_the_pages_are_made(tmp_path):
     """All of them, by the code that stands above each; a page shows every picture that it makes."""
     for page in gallery.pages(DOCS):

@@ -72,6 +72,7 @@ def test_a_benchmark_is_written_whole_and_compared(call, tmp_path, monkeypatch):
     # The same seed asks the same questions, so that the errors are the same to the last bit.
     for picture in ("speed", "growth", "work"):  # drawn above
         monkeypatch.setattr(figures_of_speed, picture, lambda *_: b"<svg/>")
+    monkeypatch.setattr(workloads, "RULES", workloads.RULES[:1])
     old = tmp_path / "one" / "bench.json"
     code, out, err = call("--quick", "--out", tmp_path / "two", "--seed", 5, "--compare", old)
     assert "New time over old" in out
@@ -157,6 +158,7 @@ def luminance(colour: str) -> float:
     return 0.2126 * red + 0.7152 * green + 0.0722 * blue
 
 
+@pytest.mark.deep
 def test_the_kept_figure_reads_at_a_glance():
     """No two labels of a panel touch, none is smaller than 9 points; colours have contrast and marks.
 

@@ -45,6 +45,7 @@ def call(command_line):
     return partial(command_line, "check")
 
 
+@pytest.mark.deep
 def test_a_good_stepper_is_accepted_and_reported(call, tmp_path):
     names = ("r.json", "r.xml", "r.html", "r.svg", "s.json")
     files = [tmp_path / name for name in names]

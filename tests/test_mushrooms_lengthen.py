@@ -8,6 +8,7 @@ import os
 
 import numpy as np
 import pytest
+from support.depth import deep_but
 from support.harm import held
 from support.refusals import assert_refused
 
@@ -57,7 +58,7 @@ def followed(monkeypatch):
     return pieces
 
 
-@pytest.mark.parametrize("name", ["fermi-ulam", "moving-cap", "breathing-circle"])
+@pytest.mark.parametrize("name", deep_but(["fermi-ulam", "moving-cap", "breathing-circle"], "moving-cap"))
 def test_a_run_is_lengthened_and_widened_to_the_bits_of_one_at_once(command_line, tmp_path, name):
     """In several goes, with blocks of any size: arrays, digest, and whole sums."""
     import xarray

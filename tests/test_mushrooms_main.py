@@ -11,6 +11,7 @@ from decimal import Decimal
 
 import numpy as np
 import pytest
+from support.depth import deep_but
 from support.refusals import assert_refused
 
 import fast
@@ -223,7 +224,10 @@ def test_simulate_one_particle_in_a_cap_says_what_it_cannot_know(command_line):
     assert summary["p_nc"] is None
 
 
-@pytest.mark.parametrize("name", [name for name in scenes.catalogue() if name != "moving-cap-as-printed"])
+DRAWABLE = [name for name in scenes.catalogue() if name != "moving-cap-as-printed"]
+
+
+@pytest.mark.parametrize("name", deep_but(DRAWABLE, "breathing-circle", "fermi-ulam", "fixed-cap-clockwise"))
 def test_every_scene_can_be_drawn(command_line, tmp_path, monkeypatch, name):
     monkeypatch.chdir(tmp_path)
     code, out, _ = command_line("draw", name)

@@ -61,6 +61,7 @@ def test_workers_of_a_cluster_follow_to_the_same_bits(command_line, tmp_path, en
     assert json.loads(ended.out)["sha256"] == ensemble.sha256()
 
 
+@pytest.mark.deep
 def test_workers_lengthen_a_run(command_line, tmp_path, stored):
     """They are handed what is there."""
     folder, more = shutil.copytree(stored, tmp_path / "run"), ["--cycles", 2, "--resume"]
@@ -180,6 +181,7 @@ def test_an_unfinished_run_is_neither_exported_nor_drawn(command_line, stored, t
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.deep
 def test_a_run_killed_at_random_moments_goes_on_to_the_same_bits():
     """Two here; `python -m mushrooms.store.faults --kills 50` is the whole of it."""
     command = [sys.executable, "-m", "mushrooms.store.faults", "--kills", "2"]

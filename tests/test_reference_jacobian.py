@@ -10,6 +10,7 @@ import msgspec
 import pytest
 from hypothesis import given, settings
 from mpmath import fp
+from support.depth import deep_but
 from support.truth import centre, proved_step
 
 import fast
@@ -158,7 +159,9 @@ def test_a_residual_held_fixed_after_the_first_hop_is_found_out(monkeypatch):
     assert jacobian_error(*hops(rng), 2, ["arc", "arc"]) > 1e-3
 
 
-@pytest.mark.parametrize("name", ["moving-cap", "fixed-cap-clockwise", "breathing-circle", "fermi-ulam"])
+@pytest.mark.parametrize(
+    "name", deep_but(["moving-cap", "fixed-cap-clockwise", "breathing-circle", "fermi-ulam"], "moving-cap")
+)
 def test_fast_trajectories_within_their_chained_bound(name, tally):
     """50 collisions in floats stay within what rounding each of the steps can do, chained."""
     scene = load(name)

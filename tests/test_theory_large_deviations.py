@@ -5,12 +5,16 @@ from __future__ import annotations
 import mpmath
 import numpy as np
 import pytest
+from support.depth import deep_among, deep_but
 
 import theory
 from scene import BadInput, load
 from theory.large_deviations import loss_probability, rarity
 
-PAIRS = (("moving-cap", "moving-cap-reversed"), ("fixed-cap-anticlockwise", "fixed-cap-clockwise"))
+PAIRS = (
+    pytest.param("moving-cap", "moving-cap-reversed", marks=pytest.mark.deep),
+    ("fixed-cap-anticlockwise", "fixed-cap-clockwise"),
+)
 RATES = {
     "moving-cap": "0.029519254122468750926605527",
     "fixed-cap-anticlockwise": "0.012188849602495742952738075",
@@ -23,7 +27,7 @@ LOSSES = {
 }
 
 
-@pytest.mark.parametrize("name", RATES)
+@pytest.mark.parametrize("name", deep_among(RATES, "retraced-arc"))
 def test_the_rate_is_the_least_of_minus_log_phi(name: str) -> None:
     found = rarity(load(name), 25)
     assert abs(found.rate - found.rate.context.mpf(RATES[name])) < mpmath.mpf(10) ** -25
@@ -53,7 +57,7 @@ def test_phi_of_the_reverse_is_phi_of_minus_one_less_q_to_30_digits(forward: str
         assert abs(one - mirrored) > 1e-3  # about another place it does not hold
 
 
-@pytest.mark.parametrize("name", LOSSES)
+@pytest.mark.parametrize("name", deep_but(LOSSES, "fixed-cap-clockwise"))
 def test_losses_are_those_of_sums_of_cycles(name: str) -> None:
     energies = theory.energies(load(name))
     for n, expected in LOSSES[name].items():

@@ -175,7 +175,9 @@ WAVE = Fourier(0.625, period=1.0, cos=(0.25,), sin=(0.125,))
 @pytest.mark.parametrize(
     "scene",
     [
-        Mushroom(r=LEGS, h=Fourier(1.0, period=1.0, sin=(0.25,)), nu=WAVE),
+        pytest.param(
+            Mushroom(r=LEGS, h=Fourier(1.0, period=1.0, sin=(0.25,)), nu=WAVE), marks=pytest.mark.deep
+        ),
         Mushroom(
             r=Fourier(1.0, period=1.0, sin=(0.25,)),
             h=LEGS,

@@ -39,6 +39,8 @@ def spelling(session: Session) -> str:
         answers.append(session.say(write({**request, "seq": seq}).encode(), seq))
     if answers[0].get("outcome") == "undecided":
         raise Trouble("declined", f"undecided: {answers[0]['reason']}")
+    if answers[0].get("outcome") != "collision":
+        raise Trouble("fail", f"a state inside is answered {answers[0]}"[:200])
     for name, answer in zip(SPELLINGS, answers[1:], strict=True):
         if not is_same(answer, answers[0]):
             raise Trouble("fail", f"{name}: {answer}, as a rule {answers[0]}")

@@ -17,15 +17,26 @@ import msgspec
 
 import reference
 from conformance import plain
-from conformance.generator.draws import Draw, SharedPeriod, clock, law, scene, state, time, wire_form
+from conformance.generator.draws import (
+    Draw,
+    SharedPeriod,
+    clock,
+    law,
+    scene,
+    state,
+    time,
+    walls_speed,
+    wire_form,
+)
 from conformance.generator.prover import CONDITIONS, NUDGES, SIGNS, ask, flight_of, nudged
 from conformance.grading.error import condition_number, inputs_of
 from conformance.vectors import Expectation, Vector
-from scene import BadInput, BangBang, Collision, Fourier, Law, Scene, State, from_data
+from scene import BadInput, BangBang, Collision, Fourier, Law, Mushroom, Scene, State, from_data
 from scene.geometry import rounded
-from scene.laws import bounds
+from scene.laws import bounds, is_constant
 from scene.states import ON_WALL
 from scene.tables import cycle_length, laws
+from scene.transforms import scaled_law
 
 GROUP = "fresh"
 WALLS = (
@@ -35,6 +46,9 @@ WALLS = (
 )
 KINDS = ("fourier", "bang-bang", "mixed", "mixed", "mixed", "harmonics")  # mixed: each law of its own
 LEGS = 7, 23, 40, 120  # of a law with many: the corpus has at most four
+SHAPES = {"h": (-5, -3, 3, 5), "nu": (-8, -4), "w": (-8, -4)}  # powers of two that a law is multiplied with
+FAINT = 8, 20, 30  # powers of a half that what a law moves by is multiplied with
+LONGEST = 8.0  # periods of one flight
 NAMES = "", "", "scene", "scene", "1"
 ATTEMPTS = 400
 NUDGE = dict(NUDGES)["core"]
@@ -75,20 +89,45 @@ def _questions(seed: int, number: int, before: Vector | None) -> Iterator[tuple[
                 start, t_end = _start(draw, of)
         except BadInput:
             continue
-        met = {_wall_met(of, nudged(start, t_end, signs, NUDGE), t_end) for signs in ((0,) * 5, *SIGNS)}
-        if len(met) == 1 and (is_like_before or met == {wanted}) and met <= set(of.walls):
+        met = _wall_met(of, start, t_end)
+        if met not in of.walls or not (is_like_before or met == wanted):
+            continue
+        if all(_wall_met(of, nudged(start, t_end, signs, NUDGE), t_end) == met for signs in SIGNS):
             yield of, start, t_end
     raise BadInput(f"{GROUP}/{number}: none of {ATTEMPTS} draws has a certified answer")
 
 
 def drawn_scene(draw: Draw, table: str) -> Scene:
-    """Draw a scene of a table: laws of all kinds, also long ones, that begin anywhere."""
+    """Draw a scene of a table: laws of all kinds, of any shape, also long ones, that begin anywhere."""
     shared = clock(draw, KINDS)
     of = scene(draw, table, shared)
+    of = msgspec.structs.replace(of, **{name: _shaped(draw, name, found) for name, found in laws(of).items()})
     if table != "cap" and draw.part() < 0.5:
         of = msgspec.structs.replace(of, slope=law(draw, -0.4, _steepest(of), shared))
     changed = {name: _begun_elsewhere(draw, found, shared) for name, found in laws(of).items()}
     return msgspec.structs.replace(of, **changed, name=draw.pick(NAMES))
+
+
+def _shaped(draw: Draw, name: str, of: Law) -> Law:
+    """Return a law as it is, or of a shape seldom drawn.
+
+    That is: a stem far deeper or shallower, a mouth far narrower than the cap is wide; a law that hardly
+    moves, and one that does not, but is written as one that might, with a period that no other has.
+    """
+    if draw.part() < 0.25 and name in SHAPES:
+        of = scaled_law(of, draw.pick(SHAPES[name]), 0)
+    if draw.part() > (0.5 if isinstance(of, float) else 0.25):
+        return of
+    if isinstance(of, Fourier):
+        part = 2.0 ** -draw.pick(FAINT)
+        cos, sin = (tuple(part * a for a in amplitudes) for amplitudes in (of.cos, of.sin))
+        return msgspec.structs.replace(of, cos=cos, sin=sin)
+    if isinstance(of, BangBang):
+        first, part = of.knots[0][1], 2.0 ** -draw.pick(FAINT)
+        return BangBang(knots=tuple((t, first + part * (v - first)) for t, v in of.knots))
+    if draw.part() < 0.5:
+        return Fourier(mean=of, omega=draw.short(0.5, 6.0))
+    return BangBang(knots=tuple((draw.short(0.1, 1.0) + k, of) for k in range(0, 9, 4)))
 
 
 def _steepest(of: Scene) -> float:
@@ -100,7 +139,7 @@ def _steepest(of: Scene) -> float:
 
 def _begun_elsewhere(draw: Draw, of: Law, shared: SharedPeriod) -> Law:
     """Return a bang-bang law with its knots moved by a part of the period, now and then one of many legs."""
-    if not isinstance(of, BangBang):
+    if not isinstance(of, BangBang) or is_constant(of):
         return of
     knots = of.knots
     if draw.pick(range(4)) == 0:
@@ -114,12 +153,28 @@ def _begun_elsewhere(draw: Draw, of: Law, shared: SharedPeriod) -> Law:
 
 
 def _start(draw: Draw, of: Scene) -> tuple[State, float]:
-    periods = draw.pick((0, 0, 1, 4, 60))
-    t = time(draw, of) - periods * (cycle_length(of) or 1.0)
-    at = {"t": t, "speed": draw.power(-2, 8) * draw.between(1.0, 2.0), "patience": 32.0}
-    found, t_end = state(draw, of, at)
+    """Draw a state: of any speed, in any direction and in those that formulas divide by."""
+    length, moving = cycle_length(of) or 1.0, walls_speed(of)
+    t = time(draw, of) - draw.pick((0, 0, 1, 4, 60)) * length
+    table = rounded(of, t)
+    usual = moving or table.size
+    speed = draw.between(1.0, 2.0) * draw.pick(
+        (usual * draw.power(-2, 8), table.size / length * draw.power(-2, 6))
+    )
+    found, t_end = state(draw, of, {"t": t, "speed": speed / usual, "patience": 32.0})
+    t_end = min(t_end, t + LONGEST * length)
+    way = draw.pick(range(12))
+    if way == 0 and isinstance(of, Mushroom):
+        x, vy = draw.pick((0.0, draw.between(-0.99, 0.99) * table.w)), abs(found.vy)
+        return State(t, x, 0.0, found.vx, vy, "base"), t_end
     if found.wall and draw.part() < 0.5:
-        found = _off_its_wall(draw, of, found)
+        return _off_its_wall(draw, of, found), t_end
+    if way == 1:
+        return msgspec.structs.replace(found, vx=0.0), t_end
+    if way == 2:
+        return msgspec.structs.replace(found, vy=0.0), t_end
+    if way == 3:
+        return msgspec.structs.replace(found, vx=-speed * found.x, vy=-speed * found.y), t_end
     return found, t_end
 
 

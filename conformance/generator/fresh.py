@@ -45,7 +45,7 @@ WALLS = (
     *(("mushroom", wall) for wall in ("arc", "base", "left", "right", "floor")),
 )
 KINDS = ("fourier", "bang-bang", "mixed", "mixed", "mixed", "harmonics")  # mixed: each law of its own
-LEGS = 7, 23, 40, 120  # of a law with many: the corpus has at most four
+LEGS = 7, 7, 7, 12, 12, 23, 40, 120  # of a law with many: the corpus has at most four
 SHAPES = {"h": (-5, -3, 3, 5), "nu": (-8, -4), "w": (-8, -4)}  # powers of two that a law is multiplied with
 FAINT = 8, 20, 30  # powers of a half that what a law moves by is multiplied with
 LONGEST = 8.0  # periods of one flight

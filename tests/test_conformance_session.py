@@ -52,6 +52,7 @@ def verdicts(monkeypatch):
     monkeypatch.setattr(promises, "ask_promises", lambda _: iter(()))
     monkeypatch.setattr(suite, "N_STATES", 0)
     monkeypatch.setattr(suite, "drawn_horizons", lambda *_: [])
+    monkeypatch.setattr(suite, "fresh", lambda *_: [])
     monkeypatch.setattr(suite, "drawn_disguise", lambda *_: Disguise())  # saboteurs know one answer
     monkeypatch.setattr(suite, "choose", lambda *_: [made_up(i) for i in range(N)])
 

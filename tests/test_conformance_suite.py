@@ -127,6 +127,7 @@ def test_known_failures_are_marked_in_a_run(monkeypatch):
     monkeypatch.setattr(suite, "drawn_disguise", lambda *_: disguise.Disguise())  # it knows one answer
     monkeypatch.setattr(suite, "N_STATES", 0)
     monkeypatch.setattr(suite, "drawn_horizons", lambda *_: [])
+    monkeypatch.setattr(suite, "fresh", lambda *_: [])
     monkeypatch.setattr(promises, "ask_promises", lambda _: iter(()))
     assert suite.check(command("crash-at-second")).exit_code() == 1
     fixed = frozenset({"made-up/0", "made-up/1", "protocol/stop"})
@@ -206,6 +207,7 @@ def test_the_reference_passes(monkeypatch):
     monkeypatch.setattr(promises, "ask_promises", lambda _: iter(()))
     monkeypatch.setattr(suite, "N_STATES", 0)
     monkeypatch.setattr(suite, "drawn_horizons", lambda *_: [])
+    monkeypatch.setattr(suite, "fresh", lambda *_: [])
     monkeypatch.setattr(suite, "measure_speed", lambda _: None)
     monkeypatch.setattr(suite, "choose", lambda *_: known)
     run = suite.check([sys.executable, "-m", "reference"])

@@ -47,6 +47,13 @@ def test_it_grades_a_stepper(call, arguments):
     assert ("asked " in out) == ("--seed" in arguments)
 
 
+def test_a_fresh_question_is_asked_as_it_is(call):
+    code, out, _ = call("fresh/3", "--seed", 4, "--", *PLAIN)
+    assert code == 0
+    assert "pass: " in out
+    assert "asked " not in out
+
+
 def test_a_wrong_answer_is_exit_code_1(call):
     code, out, _ = call("moving-cap/3", "--", *command("honest"))
     assert code == 1
@@ -58,6 +65,8 @@ def test_a_wrong_answer_is_exit_code_1(call):
     [
         (["no-such/1"], "ID = 'no-such/1'"),
         (["drawn/1"], "--seed"),
+        (["fresh/1"], "--seed"),
+        (["fresh/265", "--seed", "1"], "ID = 'fresh/265'"),
         (["drawn/1", "--seed", "-1"], "--seed = -1"),
         (["moving-cap/3", "--", "./no-such-stepper"], "no-such-stepper"),
         (["moving-cap/3", "--", *command("other-protocol")], "does not speak protocol 1"),

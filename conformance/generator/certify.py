@@ -18,9 +18,17 @@ import msgspec
 
 import reference
 from conformance.generator.links import Links, Unfit, condition, finite
-from conformance.generator.prover import ask, collided, expectation, flight_of
+from conformance.generator.prover import (
+    CONDITIONS,
+    NUDGES,
+    SIGNS,
+    ask,
+    collided,
+    expectation,
+    flight_of,
+    nudged,
+)
 from conformance.generator.stays import Mark, OpenSign, arrival, marks, stays, timing_condition
-from conformance.grading.error import inputs_of
 from conformance.second_proof.chain import recheck
 from conformance.second_proof.step import check
 from conformance.second_proof.trajectory import check_path
@@ -37,13 +45,9 @@ from conformance.vectors import (
 from reference.certificate import certificate, path_certificate
 from scene import BadInput, InvalidState, Rejected, Scene, State, Undecided, Undefined, from_data
 
-NUDGES: tuple[tuple[Level, float], ...] = (("core", 2.0**-30), ("extended", 2.0**-44))
-CONDITIONS = {"core": 1e6, "extended": 1e12}
 WIDEST = Fraction(1, 2**72)  # of an enclosure of a path: a millionth of a backward ulp and less
 LONGEST = 1e8  # condition number up to which a trajectory is followed
 INFINITE = 1e300
-# Pairs, so that one of each pair lies on either side of a tie; a trajectory takes the first pair.
-SIGNS = ((1, 1, -1, 1, -1), (-1, -1, 1, -1, 1), (1, 1, 1, 1, 1), (-1, -1, -1, -1, -1))
 
 
 class Question(NamedTuple):
@@ -209,20 +213,12 @@ def _level(scene: Scene | None, vector: Vector) -> Level:
     expected = _walls_met(scene, vector, vector.state)
     patterns = SIGNS if vector.kind == "step" else SIGNS[:2]
     for level, nudge in NUDGES:
-        nudged = (_nudged(vector.state, vector.t_end, signs, nudge) for signs in patterns)
+        nudged = (nudged(vector.state, vector.t_end, signs, nudge) for signs in patterns)
         if vector.condition <= CONDITIONS[level] and all(
             _walls_met(scene, vector, state) == expected for state in nudged
         ):
             return level
     return "stress"
-
-
-def _nudged(state: State, t_end: float, signs: Sequence[int], nudge: float) -> State:
-    place, speed = max(abs(state.x), abs(state.y)), max(abs(state.vx), abs(state.vy))
-    sizes = (abs(state.t), place, place, speed, speed)
-    values = [v + nudge * sign * size for v, sign, size in zip(inputs_of(state), signs, sizes, strict=True)]
-    t, x, y, vx, vy = values
-    return State(min(t, t_end), x, y, vx, vy, state.wall)
 
 
 def _walls_met(scene: Scene, vector: Vector, state: State) -> list[str]:

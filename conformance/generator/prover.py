@@ -5,15 +5,21 @@ The reference proves every answer by itself; for the corpus, `certify` has it pr
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from fractions import Fraction
 from typing import NamedTuple
 
 import reference
 from conformance.grading.error import Matrix, free_flight, inputs_of, moved
-from conformance.vectors import DIGITS, NUMBERS, Certified, Ends, Expectation, certified
+from conformance.vectors import DIGITS, NUMBERS, Certified, Ends, Expectation, Level, certified
 from reference.arithmetic import rational
 from scene import Rejected, Scene, State, Undecided, Undefined, Wall
 
+# What a level asks (docs/corpus.md): nudges that change no wall, and the largest condition number.
+NUDGES: tuple[tuple[Level, float], ...] = (("core", 2.0**-30), ("extended", 2.0**-44))
+CONDITIONS = {"core": 1e6, "extended": 1e12}
+# Pairs, so that one of each pair lies on either side of a tie; a trajectory takes the first pair.
+SIGNS = ((1, 1, -1, 1, -1), (-1, -1, 1, -1, 1), (1, 1, 1, 1, 1), (-1, -1, -1, -1, -1))
 GUARD = 6  # decimals asked of the reference beyond those that are written down
 
 
@@ -94,6 +100,22 @@ def proved_step(scene: Scene, state: State, t_end: float, digits: int = DIGITS) 
         The certified answer; None where the reference is undecided.
     """
     return expectation(ask(scene, state, t_end, digits), state, t_end, digits)
+
+
+def nudged(state: State, t_end: float, signs: Sequence[int], nudge: float) -> State:
+    """Return a state whose numbers are moved by a part of their sizes, each in a direction of its own.
+
+    Args:
+        state: the start.
+        t_end: horizon [time]; no later time is given.
+        signs: of the moves of t, x, y, vx, vy.
+        nudge: relative; to the greater component for place and velocity.
+    """
+    place, speed = max(abs(state.x), abs(state.y)), max(abs(state.vx), abs(state.vy))
+    sizes = (abs(state.t), place, place, speed, speed)
+    values = [v + nudge * sign * size for v, sign, size in zip(inputs_of(state), signs, sizes, strict=True)]
+    t, x, y, vx, vy = values
+    return State(min(t, t_end), x, y, vx, vy, state.wall)
 
 
 def ends(enclosure: reference.Enclosure) -> Ends:

@@ -9,7 +9,7 @@ Scales are drawn for a scene and not for a question, so that a scene stays one s
 
 Beside its vectors a run asks `drawn` questions, whose answers are in no file: a flight that is certified to
 meet its first wall after dt meets nothing before, so that at any earlier t_end the particle is at the
-exact place x + vx s, y + vy s.
+exact place x + vx s, y + vy s. `generator.fresh` draws questions in scenes that no file holds.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ from typing import Any, NamedTuple
 import msgspec
 
 from conformance.generator.draws import Draw
+from conformance.generator.fresh import GROUP
 from conformance.grading.error import condition_number, free_flight, inputs_of, moved
 from conformance.vectors import NUMBERS, Expectation, Vector, certified
 from scene import BadInput, BangBang, Fourier, Scene, State, from_data, to_data, transforms
@@ -66,7 +67,9 @@ class Disguise(NamedTuple):
 
 
 def drawn_disguise(vector: Vector, seed: int) -> Disguise:
-    """Draw the symmetry by which a vector is asked in the run of a seed."""
+    """Draw the symmetry by which a vector is asked in the run of a seed; what is fresh needs none."""
+    if vector.group == GROUP:
+        return Disguise()
     own, shared = Draw(f"{seed}/{vector.id}"), Draw(f"{seed}/{msgspec.json.encode(vector.scene).decode()}")
     is_mirrored = own.pick((False, True))
     scene = _scene(vector)

@@ -2,7 +2,8 @@
 
 An answer is compared with another answer of the same implementation: what a field left out means, that bad
 lines do no harm, that many particles or collisions asked at once are answered as when asked one by one.
-Whether such answers are right is for the vectors. `conformance.suite.timing` does the same for `time`.
+Whether such answers are right is for the vectors. What an answer may depend on is in
+`conformance.suite.sameness`, and what holds `time` to a clock in `conformance.suite.timing`.
 """
 
 from __future__ import annotations
@@ -16,10 +17,11 @@ from typing import Any
 import msgspec
 from mpmath import fp
 
-from conformance.suite import timing
+from conformance.suite import sameness, timing
 from conformance.suite.process import NOT_NUMBERS, Trouble
 from conformance.suite.questions import (
     BREATHING,
+    INSIDE,
     MOVING,
     STANDING,
     distance,
@@ -35,15 +37,11 @@ from scene import Cap, Collision, Horizon, Mushroom, Outcome, Scene, State, Stem
 from scene.geometry import half_width
 
 N_LONG, N_PIECE = 1200, 430  # collisions of a whole trajectory, and of its first piece
-N_MOVING, N_SINGLE = 150, 12  # collisions of a trajectory between moving walls, and how many are asked alone
+N_MOVING, N_SINGLE = 600, 16  # collisions of a trajectory between moving walls, and how many are asked alone
+FAR_TIMES = -1000.0, 10_000.0  # from which such trajectories begin
 N_FLOWN = 16  # particles that `flow` and `trajectory` both carry
 NEAR = 1e-6  # of sizes: far above rounding that a few steps carry along, far below an error of principle
 CARRIED = 1e-4  # likewise, where a dozen bounces may have multiplied it
-INSIDE = {
-    Mushroom: State(0.0, 0.1, 0.3, 0.4, -0.9),
-    Cap: State(0.0, 0.1, 0.3, 0.4, 0.9),
-    Stem: State(0.0, 0.1, -0.3, 0.4, -0.9),
-}
 # Starts on orbits whose errors grow slowly: of a mushroom, one that stays in the cap.
 REGULAR = {
     Mushroom: State(0.0, 0.75, 0.25, 0.1, 4.0),
@@ -101,13 +99,22 @@ def _one(session: Session) -> tuple[Scene, dict[str, Any], dict[str, Any]]:
 
 
 def absent_wall(session: Session) -> str:
-    """A state without `wall` is one whose wall is null."""
-    _, request, answer = _one(session)
-    state = {name: value for name, value in request["state"].items() if name != "wall"}
-    without = session.ask({**request, "state": state})
-    if not is_same(without, answer):
-        raise Trouble("fail", f"without wall {without}, with null {answer}")
-    return "the answer is the same"
+    """A state without `wall` is one whose wall is null, in every command."""
+    scene, request, _ = _one(session)
+    assert session.introduction is not None
+    more: dict[str, dict[str, Any]] = {"step": {}, "trajectory": {"collisions": 3}, "flow": {}}
+    offering = [cmd for cmd in more if not missing(session.introduction, cmd, to_data(scene))]
+    state = request.pop("state")
+    nameless = {name: value for name, value in state.items() if name != "wall"}
+    for cmd in offering:
+        told, bare = (
+            {**request, "cmd": cmd, **more[cmd], **({"states": [one]} if cmd == "flow" else {"state": one})}
+            for one in (state, nameless)
+        )
+        answer, without = session.ask(told), session.ask(bare)
+        if not is_same(without, answer):
+            raise Trouble("fail", f"{cmd}: without wall {without}, with null {answer}")
+    return f"the answer is the same: {', '.join(offering)}"
 
 
 def malformed_lines(session: Session) -> str:
@@ -219,13 +226,22 @@ def long_trajectory(session: Session) -> str:
 
 
 def trajectory_steps(session: Session) -> str:
-    """A trajectory between moving walls consists of what `step` answers, late steps included."""
+    """A trajectory between moving walls consists of what `step` answers, also late, and at far times."""
     scene = offered(session, MOVING, "trajectory", "step")
-    path = follow(session, scene, INSIDE[type(scene)], N_MOVING)
-    draw = random.Random(N_MOVING)
-    late = sorted(draw.sample(range(1, len(path)), min(N_SINGLE, len(path) - 1)))
+    paths = [(INSIDE[type(scene)], N_MOVING)]
+    paths += [(msgspec.structs.replace(paths[0][0], t=t), N_MOVING // 8) for t in FAR_TIMES]
+    n_compared = [_single_steps(session, scene, *path) for path in paths]
+    if not all(n_compared):
+        raise Trouble("declined", "every single step is undecided")
+    return f"{sum(n_compared)} of {N_MOVING + len(FAR_TIMES) * (N_MOVING // 8)} collisions"
+
+
+def _single_steps(session: Session, scene: Scene, start: State, n: int) -> int:
+    """Compare some collisions of a trajectory, the last among them, with steps; return how many."""
+    path = follow(session, scene, start, n)
+    late = sorted(random.Random(n).sample(range(1, len(path)), min(N_SINGLE, len(path) - 1)))
     n_compared = 0
-    for i in late:
+    for i in {*late, len(path) - 1}:
         before = path[i - 1]
         assert isinstance(before, Collision)
         alone = session.step(scene, before.state(), math.nextafter(math.inf, 0.0))
@@ -234,15 +250,15 @@ def trajectory_steps(session: Session) -> str:
         n_compared += 1
         if distance(scene, path[i], alone) > NEAR:
             raise Trouble("fail", f"collision {i + 1}: {path[i]} in a trajectory, {alone} as a step")
-    if not n_compared:
-        raise Trouble("declined", "every single step is undecided")
-    return f"{n_compared} of {len(path)} collisions"
+    return n_compared
 
 
 def flow_arrivals(session: Session) -> str:
     """A flow arrives where the trajectory does, and its captured stays are those of the trajectory's hits."""
     scene, t_end = offered(session, MOVING, "flow", "trajectory"), 5.0
-    found = _compared(session, scene, [_start(scene, i) for i in range(N_FLOWN)], t_end)
+    starts = [_start(scene, i) for i in range(N_FLOWN)]
+    later = [after for start in starts if (after := _after_a_hit(session, scene, start, t_end))]
+    found = _compared(session, scene, [*starts, *later], t_end)
     assert session.introduction is not None
     circle = MOVING[1]
     if not missing(session.introduction, "flow", to_data(circle)):
@@ -253,6 +269,17 @@ def flow_arrivals(session: Session) -> str:
     if 2 * n_compared < n:
         raise Trouble("declined", f"{n_compared} of {n} could be compared")
     return f"{n_compared} of {n} states, {n_stays} captured"
+
+
+def _after_a_hit(session: Session, scene: Scene, start: State, t_end: float) -> State | None:
+    """Return the state after the first hit: on a wall, at a time of its own; None where none is decided."""
+    try:
+        (hit,) = follow(session, scene, start, 1, t_end)
+    except Trouble as trouble:
+        if trouble.verdict == "declined":
+            return None
+        raise
+    return hit.state() if isinstance(hit, Collision) else None
 
 
 def _compared(session: Session, scene: Scene, states: Sequence[State], t_end: float) -> list[int]:
@@ -343,6 +370,9 @@ _CHECKS: dict[str, Callable[[Session], str]] = {
     "long-trajectory": long_trajectory,
     "trajectory-steps": trajectory_steps,
     "flow-arrivals": flow_arrivals,
+    "spelling": sameness.spelling,
+    "near-questions": sameness.near_questions,
+    "many-particles": sameness.many_particles,
     "time-steps": timing.same_steps,
     "time-clock": timing.honest_clock,
 }

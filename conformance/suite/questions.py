@@ -30,6 +30,11 @@ MOVING: tuple[Scene, ...] = (
     Stem(w=Fourier(mean=1.0, cos=(0.1,), omega=1.0), h=Fourier(mean=1.25, sin=(0.1,), omega=1.0), slope=0.1),
     *STANDING,
 )
+INSIDE = {
+    Mushroom: State(0.0, 0.1, 0.3, 0.4, -0.9),
+    Cap: State(0.0, 0.1, 0.3, 0.4, 0.9),
+    Stem: State(0.0, 0.1, -0.3, 0.4, -0.9),
+}
 
 
 def offered(session: Session, scenes: Sequence[Scene], *profiles: str) -> Scene:

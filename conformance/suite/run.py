@@ -1,7 +1,8 @@
 """The suite: puts every question to one implementation and collects the verdicts.
 
 First the protocol itself (start, the number-transport probe, bad input), then the vectors up to a level,
-each in disguise (`suite.disguise`), and questions that no file holds; then the exact properties and the
+each in disguise (`suite.disguise`), and questions that no file holds, of scenes in the corpus and of others
+(`generator.fresh`); then the exact properties and the
 statistical profiles, then its speed where it offers `time`, then `stop`. What ends the session is the verdict
 of every case not reached; what the implementation does not offer is `unsupported`. Verdicts follow from the
 implementation, the level and the seed, not from the machine or its load, but for time limits and what holds
@@ -23,6 +24,7 @@ from typing import Any
 import msgspec
 
 from conformance import properties, vectors
+from conformance.generator.fresh import fresh
 from conformance.grading.agreement import middle
 from conformance.grading.grade import Grade, grade
 from conformance.suite import promises, property_checks, timing
@@ -45,6 +47,7 @@ from scene.protocol.messages import Introduction
 from scene.refusal import check_seed
 
 NEW_SEEDS = 10**6  # short enough to be typed again
+N_FRESH = {"core": 132, "extended": 264, "stress": 264}  # by level: each wall of each table 8 or 16 times
 N_STATES = 24  # drawn for the exact properties
 TIMED_SCENE, TIMED_STATE = "moving-cap", State(0.0, 0.1, 0.2, 300.0, 400.0)
 TIMED_MOST = 2.0  # seconds, after which no longer trajectory is asked
@@ -88,9 +91,12 @@ def check(
     manifest = vectors.manifest()
     seed = secrets.randbelow(NEW_SEEDS) if seed is None else check_seed(seed)
     limits = limits or Limits()
+    drawn = drawn_horizons([v for v in chosen if v.level == "core"], seed)
+    drawn += [] if groups else fresh(seed, N_FRESH[level])
     begin = time.monotonic()
     with Session(command, limits) as session:
-        results, speed = _converse(session, chosen, (level, seed), progress or (lambda _done, _total: None))
+        tell = progress or (lambda _done, _total: None)
+        results, speed = _converse(session, chosen, drawn, (level, seed), tell)
         results = [msgspec.structs.replace(result, is_known=result.id in known) for result in results]
         passed = {result.id for result in results if result.verdict == "pass"}
         return Run(
@@ -149,17 +155,21 @@ def read_known(path: Path) -> frozenset[str]:
 
 
 def _converse(
-    session: Session, chosen: Sequence[Vector], drawn: tuple[str, int], progress: Progress
+    session: Session,
+    chosen: Sequence[Vector],
+    drawn: Sequence[Vector],
+    run: tuple[str, int],
+    progress: Progress,
 ) -> tuple[list[Result], Speed | None]:
     results: list[Result] = []
-    level, seed = drawn
+    level, seed = run
     for name, act in (("start", session.start), ("echo", session.probe)):
         results.append(_tried(name, act))
         if results[-1].verdict != "pass":
             unreached = Trouble(results[-1].verdict, f"not asked: {name} failed")
             return [*results, *(_result(vector, unreached) for vector in chosen)], None
     results.append(_tried("rejects", partial(_ask_nonsense, session)))
-    questions = [*chosen, *drawn_horizons([v for v in chosen if v.level == "core"], seed)]
+    questions = [*chosen, *drawn]
     total = len(results) + len(questions) + len(OTHER_CASES) - len(PROTOCOL_CASES)
     for result in itertools.chain(
         (ask_vector(session, vector, drawn_disguise(vector, seed)) for vector in questions),

@@ -197,6 +197,76 @@ def frozen_after(n: int) -> Fault:
     return on("flow", change)
 
 
+def path_absent_is_arc(request: Line, answer: Callable[[Line], Line]) -> Line:
+    """Take a wall that is not named for the arc, in a trajectory."""
+    if request.get("cmd") == "trajectory":
+        request["state"].setdefault("wall", "arc")
+    return answer(request)
+
+
+def nameless_only(request: Line, answer: Callable[[Line], Line]) -> Line:
+    """Refuse a scene that has a name."""
+    if request.get("cmd") == "step" and "name" in request["scene"]:
+        return {"seq": request["seq"], "outcome": "rejected", "reason": "scene.name is unknown"}
+    return answer(request)
+
+
+def as_fortran_reads(request: Line, answer: Callable[[Line], Line]) -> Line:
+    """Take a number without a point for one with six decimals."""
+    if request.get("cmd") == "step" and type(request["t_end"]) is int:
+        request["t_end"] /= 10**6
+    return answer(request)
+
+
+def remembering_steps(digits: int) -> Fault:
+    """Keep every answer, by the question's numbers rounded to so many digits."""
+    book: dict[str, Line] = {}
+
+    def rounded(part: Any) -> Any:
+        if isinstance(part, dict):
+            return {name: rounded(value) for name, value in part.items() if name != "seq"}
+        return float(f"{part:.{digits}g}") if isinstance(part, float) else part
+
+    def fault(request: Line, answer: Callable[[Line], Line]) -> Line:
+        if request.get("cmd") != "step":
+            return answer(request)
+        key = json.dumps(rounded(request))
+        found = book.setdefault(key, answer(request))
+        return {**found, "seq": request["seq"]}
+
+    return fault
+
+
+def first_time_for_all(request: Line, answer: Callable[[Line], Line]) -> Line:
+    """Let all particles of a flow begin when the first does."""
+    for state in request.get("states", ()):
+        state["t"] = request["states"][0]["t"]
+    return answer(request)
+
+
+def room_for(n: int) -> Fault:
+    """Have room for n particles, and give the last one's arrival to all beyond."""
+    return on(
+        "flow",
+        lambda _, found: {
+            **found,
+            "states": [s if i < n else found["states"][n - 1] for i, s in enumerate(found["states"])],
+        },
+    )
+
+
+def late_speed(after: float) -> Callable[[Line, Line], Line]:
+    """Gain 1e-5 of the speed in a trajectory at every hit after some time."""
+
+    def change(_: Line, found: Line) -> Line:
+        for step in found["steps"]:
+            if step["outcome"] == "collision" and step["t"] > after:
+                step["vx"], step["vy"] = step["vx"] * (1 + 1e-5), step["vy"] * (1 + 1e-5)
+        return found
+
+    return change
+
+
 def ns(change: Callable[[Line, list[int]], list[int]]) -> Fault:
     """Say other nanoseconds."""
     return on("time", lambda request, found: {**found, "ns": change(request, found["ns"])})
@@ -274,6 +344,17 @@ FAULTS: dict[str, tuple[str, str, Fault]] = {
     "without-slope": ("flow-arrivals", "fail", without_slope("flow")),
     "slope-of-single-steps": ("trajectory-steps", "fail", without_slope("trajectory")),
     "frozen-after-50": ("flow-arrivals", "fail", frozen_after(50)),
+    "absent-is-arc-in-paths": ("absent-wall", "fail", path_absent_is_arc),
+    "faster-after-1000": ("trajectory-steps", "fail", on("trajectory", late_speed(1000.0))),
+    "nameless-only": ("spelling", "fail", nameless_only),
+    "as-fortran-reads": ("spelling", "fail", as_fortran_reads),
+    "remembering-6-digits": ("near-questions", "fail", remembering_steps(6)),
+    "remembering-9-digits": ("near-questions", "fail", remembering_steps(9)),
+    "remembering-12-digits": ("near-questions", "fail", remembering_steps(12)),
+    "first-time-for-all": ("many-particles", "fail", first_time_for_all),
+    "room-for-64": ("many-particles", "fail", room_for(64)),
+    "room-for-256": ("many-particles", "fail", room_for(256)),
+    "first-time-in-flows": ("flow-arrivals", "fail", first_time_for_all),
     "fewer": ("time-steps", "fail", fewer(8)),
     "fewer-of-many": ("time-clock", "fail", fewer(100)),
     "elsewhere": ("time-steps", "fail", on("time", elsewhere)),

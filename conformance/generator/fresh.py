@@ -1,0 +1,245 @@
+"""Questions in scenes that no file holds, drawn from a run's seed and proved while the suite waits.
+
+A disguise changes how a published question is asked, and not what is asked: whoever is right in the scenes of
+the corpus, and wrong in others, is found out here alone. So tables, walls, kinds of laws, signs of the time
+and places of the start are drawn together, and each wall of each table is met equally often. Every third
+question keeps the scene before but for one law, and its state: an implementation that knows a scene by less
+than all of it answers the question before. Scenes carry names, which mean nothing: different ones the same.
+Answers are proved by the reference alone, and are no more delicate than those of level core. The plain
+stepper chooses which draws are asked: those that meet the wall that is looked for, and keep it when nudged.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import msgspec
+
+import reference
+from conformance import plain
+from conformance.generator.draws import (
+    Draw,
+    SharedPeriod,
+    clock,
+    law,
+    scene,
+    state,
+    time,
+    walls_speed,
+    wire_form,
+)
+from conformance.generator.prover import CONDITIONS, NUDGES, SIGNS, ask, flight_of, nudged
+from conformance.grading.error import condition_number, inputs_of
+from conformance.vectors import Expectation, Vector
+from scene import BadInput, BangBang, Collision, Fourier, Law, Mushroom, Scene, State, from_data
+from scene.geometry import rounded
+from scene.laws import bounds, is_constant
+from scene.states import ON_WALL
+from scene.tables import cycle_length, laws
+from scene.transforms import scaled_law
+
+GROUP = "fresh"
+WALLS = (
+    *(("cap", wall) for wall in ("arc", "base")),
+    *(("stem", wall) for wall in ("left", "right", "floor", "base")),
+    *(("mushroom", wall) for wall in ("arc", "base", "left", "right", "floor")),
+)
+KINDS = ("fourier", "bang-bang", "mixed", "mixed", "mixed", "harmonics")  # mixed: each law of its own
+LEGS = 7, 7, 7, 12, 12, 23, 40, 120  # of a law with many: the corpus has at most four
+SHAPES = {"h": (-5, -3, 3, 5), "nu": (-8, -4), "w": (-8, -4)}  # powers of two that a law is multiplied with
+FAINT = 8, 20, 30  # powers of a half that what a law moves by is multiplied with
+LONGEST = 8.0  # periods of one flight
+NAMES = "", "", "scene", "scene", "1"
+ATTEMPTS = 400
+NUDGE = dict(NUDGES)["core"]
+
+
+def fresh(seed: int, n: int) -> list[Vector]:
+    """Draw questions and prove their answers.
+
+    Args:
+        seed: of the run.
+        n: how many.
+
+    Returns:
+        Steps of level core that end in a collision, `fresh/1` to `fresh/n`; a greater n only adds some.
+
+    Raises:
+        BadInput: for none of very many draws an answer is proved.
+    """
+    found: list[Vector] = []
+    for number in range(1, n + 1):
+        before = found[-1] if number % 3 == 0 else None
+        proved = (_proved(question, number) for question in _questions(seed, number, before))
+        found.append(next(vector for vector in proved if vector))
+    return found
+
+
+def _questions(seed: int, number: int, before: Vector | None) -> Iterator[tuple[Scene, State, float]]:
+    """Yield questions of one number that are not delicate; first some that change one law of that before."""
+    table, wanted = WALLS[(number - number // 3) % len(WALLS)]
+    for attempt in range(ATTEMPTS):
+        draw = Draw(f"{seed}/{GROUP}/{number}/{attempt}")
+        is_like_before = before is not None and attempt < ATTEMPTS // 8
+        try:
+            if before is not None and is_like_before:
+                of, start, t_end = _one_law_changed(draw, from_data(before.scene)), before.state, before.t_end
+            else:
+                of = drawn_scene(draw, table)
+                start, t_end = _start(draw, of)
+        except BadInput:
+            continue
+        met = _wall_met(of, start, t_end)
+        if met not in of.walls or not (is_like_before or met == wanted):
+            continue
+        if all(_wall_met(of, nudged(start, t_end, signs, NUDGE), t_end) == met for signs in SIGNS):
+            yield of, start, t_end
+    raise BadInput(f"{GROUP}/{number}: none of {ATTEMPTS} draws has a certified answer")
+
+
+def drawn_scene(draw: Draw, table: str) -> Scene:
+    """Draw a scene of a table: laws of all kinds, of any shape, also long ones, that begin anywhere."""
+    shared = clock(draw, KINDS)
+    of = scene(draw, table, shared)
+    of = msgspec.structs.replace(of, **{name: _shaped(draw, name, found) for name, found in laws(of).items()})
+    if table != "cap" and draw.part() < 0.5:
+        of = msgspec.structs.replace(of, slope=law(draw, -0.4, _steepest(of), shared))
+    changed = {name: _begun_elsewhere(draw, found, shared) for name, found in laws(of).items()}
+    return msgspec.structs.replace(of, **changed, name=draw.pick(NAMES))
+
+
+def _shaped(draw: Draw, name: str, of: Law) -> Law:
+    """Return a law as it is, or of a shape seldom drawn.
+
+    That is: a stem far deeper or shallower, a mouth far narrower than the cap is wide; a law that hardly
+    moves, and one that does not, but is written as one that might, with a period that no other has.
+    """
+    if draw.part() < 0.25 and name in SHAPES:
+        of = scaled_law(of, draw.pick(SHAPES[name]), 0)
+    if draw.part() > (0.5 if isinstance(of, float) else 0.25):
+        return of
+    if isinstance(of, Fourier):
+        part = 2.0 ** -draw.pick(FAINT)
+        cos, sin = (tuple(part * a for a in amplitudes) for amplitudes in (of.cos, of.sin))
+        return msgspec.structs.replace(of, cos=cos, sin=sin)
+    if isinstance(of, BangBang):
+        first, part = of.knots[0][1], 2.0 ** -draw.pick(FAINT)
+        return BangBang(knots=tuple((t, first + part * (v - first)) for t, v in of.knots))
+    if draw.part() < 0.5:
+        return Fourier(mean=of, omega=draw.short(0.5, 6.0))
+    return BangBang(knots=tuple((draw.short(0.1, 1.0) + k, of) for k in range(0, 9, 4)))
+
+
+def _steepest(of: Scene) -> float:
+    """Return a slope that no stem of this scene closes under."""
+    found = {name: bounds(known) for name, known in laws(of).items()}
+    narrowest = found["w"].lowest if "w" in found else found["nu"].lowest * found["r"].lowest
+    return 0.9 * narrowest / found["h"].highest
+
+
+def _begun_elsewhere(draw: Draw, of: Law, shared: SharedPeriod) -> Law:
+    """Return a bang-bang law with its knots moved by a part of the period, now and then one of many legs."""
+    if not isinstance(of, BangBang) or is_constant(of):
+        return of
+    knots = of.knots
+    if draw.pick(range(4)) == 0:
+        n, low, high = draw.pick(LEGS), min(v for _, v in knots), max(v for _, v in knots)
+        values = [draw.between(low, high) for _ in range(n)]
+        places = sorted({0, *(draw.pick(range(1, 1024)) for _ in range(n - 1))})
+        times = [*(shared.rate * place / 1024 for place in places), shared.rate]
+        knots = tuple(zip(times, [*values[: len(places)], values[0]], strict=True))
+    by = shared.rate * draw.pick(range(-256, 256)) / 64  # all sums are exact
+    return BangBang(knots=tuple((t + by, v) for t, v in knots))
+
+
+def _start(draw: Draw, of: Scene) -> tuple[State, float]:
+    """Draw a state: of any speed, in any direction and in those that formulas divide by."""
+    length, moving = cycle_length(of) or 1.0, walls_speed(of)
+    t = time(draw, of) - draw.pick((0, 0, 1, 4, 60)) * length
+    table = rounded(of, t)
+    usual = moving or table.size
+    speed = draw.between(1.0, 2.0) * draw.pick(
+        (usual * draw.power(-2, 8), table.size / length * draw.power(-2, 6))
+    )
+    found, t_end = state(draw, of, {"t": t, "speed": speed / usual, "patience": 32.0})
+    t_end = min(t_end, t + LONGEST * length)
+    way = draw.pick(range(12))
+    if way == 0 and isinstance(of, Mushroom):
+        x, vy = draw.pick((0.0, draw.between(-0.99, 0.99) * table.w)), abs(found.vy)
+        return State(t, x, 0.0, found.vx, vy, "base"), t_end
+    if found.wall and draw.part() < 0.5:
+        return _off_its_wall(draw, of, found), t_end
+    if way == 1:
+        return msgspec.structs.replace(found, vx=0.0), t_end
+    if way == 2:
+        return msgspec.structs.replace(found, vy=0.0), t_end
+    if way == 3:
+        return msgspec.structs.replace(found, vx=-speed * found.x, vy=-speed * found.y), t_end
+    return found, t_end
+
+
+def _off_its_wall(draw: Draw, of: Scene, start: State) -> State:
+    """Return a start farther from its wall than rounding leads, on either side, and on it by definition."""
+    assert start.wall is not None
+    if start.wall == "base":
+        return start  # at y = 0 it is, or it is not
+    table = rounded(of, start.t)
+    nx, ny = table.normal(start.wall, start.x, start.y)
+    reach = {"arc": table.r, "floor": table.h}.get(start.wall, table.w)
+    by = reach * ON_WALL * draw.power(-9, -2) * draw.pick((1.0, -1.0))
+    return msgspec.structs.replace(start, x=start.x + by * nx, y=start.y + by * ny)
+
+
+def _one_law_changed(draw: Draw, of: Scene) -> Scene:
+    """Return the scene with one law exchanged for another of the same range and period."""
+    known = laws(of)
+    name = draw.pick(sorted(known))
+    within = bounds(known[name])
+    low, high = within.lowest, within.highest
+    margin = 0.0 if low < high else 0.05 * abs(low)
+    moving = [other for other in known.values() if isinstance(other, Fourier | BangBang)]
+    changed: Law = draw.between(low - margin, high + margin)
+    if moving and draw.part() < 0.5:
+        other = draw.pick(moving)
+        if isinstance(other, Fourier):
+            size = (high - low + 2 * margin) * draw.between(0.1, 0.4)
+            changed = msgspec.structs.replace(other, mean=(low + high) / 2, cos=(), sin=(size,))
+        else:
+            changed = BangBang(knots=_within(other, draw, low - margin, high + margin))
+    return msgspec.structs.replace(of, **{name: changed})
+
+
+def _within(of: BangBang, draw: Draw, low: float, high: float) -> tuple[tuple[float, float], ...]:
+    values = [draw.between(low, high) for _ in of.knots[1:]]
+    return tuple((t, v) for (t, _), v in zip(of.knots, [*values, values[0]], strict=True))
+
+
+def _wall_met(of: Scene, start: State, t_end: float) -> str | None:
+    """Return which wall the plain stepper says: it chooses questions, and answers none."""
+    outcome = plain.next_collision(of, start, t_end)
+    return outcome.wall if isinstance(outcome, Collision) else None
+
+
+def _proved(question: tuple[Scene, State, float], number: int) -> Vector | None:
+    """Return a question with its proved answer; None where it is no collision, or its condition is high."""
+    of, start, t_end = question
+    outcome = ask(of, start, t_end)
+    if not isinstance(outcome, reference.Collision):
+        return None
+    flight = flight_of(outcome, start, t_end)
+    condition = condition_number(flight.centre(), flight.jacobian, inputs_of(start))
+    if condition > CONDITIONS["core"]:
+        return None
+    return Vector(
+        id=f"{GROUP}/{number}",
+        group=GROUP,
+        level="core",
+        kind="step",
+        rule="a flight in a scene that no file holds",
+        source="sec. 2",
+        scene={**wire_form(of), **({"name": of.name} if of.name else {})},
+        state=start,
+        t_end=t_end,
+        expect=(Expectation("collision", (flight.certified(start),)),),
+        condition=condition,
+    )

@@ -1,0 +1,188 @@
+"""Promises on what an answer depends on: all of the question, and nothing else.
+
+A question may be written in many ways, which all mean the same numbers; one that is nearly the question
+before, in its state or in a law of its scene, is another question; and in a flow of hundreds, begun at many
+times and on walls, a particle arrives where it does alone. What an implementation keeps from question to
+question, by which key, and how much room it has, shows here.
+"""
+
+from __future__ import annotations
+
+import json
+import random
+from collections.abc import Callable, Sequence
+from decimal import Decimal
+from typing import Any, NamedTuple
+
+from msgspec.structs import replace
+
+from conformance.suite.process import Trouble
+from conformance.suite.questions import INSIDE, MOVING, STANDING, distance, flown, is_same, offered, question
+from conformance.suite.session import MAX_SEQ, Session, read_outcome
+from scene import Collision, Horizon, Scene, State, Stem, Undecided
+
+CARRIED = 1e-4  # of sizes: what a dozen bounces may make of rounding
+N_POOL, N_FLOWN, T_END = 24, 300, 5.0  # different particles, and how many of them in one flow
+SHIFTS = 2.0**-24, 2.0**-34, 2.0**-44  # of a state: nearly the same, and told apart in binary64
+ROUNDING = 2.0**-48  # of numbers of size 1, after one straight flight
+Spelling = Callable[[dict[str, Any]], str]
+
+
+def spelling(session: Session) -> str:
+    """A question means the same however its JSON is written."""
+    scene = offered(session, MOVING, "step")
+    request = question("step", scene, INSIDE[type(scene)], t_end=100.0)
+    draw = random.Random(len(request))
+    answers = []
+    for write in (json.dumps, *SPELLINGS.values()):
+        seq = draw.randint(1, MAX_SEQ)
+        answers.append(session.say(write({**request, "seq": seq}).encode(), seq))
+    if answers[0].get("outcome") == "undecided":
+        raise Trouble("declined", f"undecided: {answers[0]['reason']}")
+    if answers[0].get("outcome") != "collision":
+        raise Trouble("fail", f"a state inside is answered {answers[0]}"[:200])
+    for name, answer in zip(SPELLINGS, answers[1:], strict=True):
+        if not is_same(answer, answers[0]):
+            raise Trouble("fail", f"{name}: {answer}, as a rule {answers[0]}")
+    return f"{len(SPELLINGS)} ways to write it"
+
+
+def _turned(part: Any) -> Any:
+    """Return data with the fields of every object in the opposite order."""
+    if isinstance(part, dict):
+        return {name: _turned(part[name]) for name in reversed(part)}
+    return [_turned(one) for one in part] if isinstance(part, list | tuple) else part
+
+
+def _spelt(number: Callable[[float], str]) -> Spelling:
+    """Write numbers in a way of one's own."""
+
+    def write(part: Any) -> str:
+        if isinstance(part, dict):
+            return "{" + ",".join(f"{json.dumps(name)}:{write(value)}" for name, value in part.items()) + "}"
+        if isinstance(part, list | tuple):
+            return "[" + ",".join(map(write, part)) + "]"
+        return number(part) if isinstance(part, float) else json.dumps(part)
+
+    return write
+
+
+def _bare(request: dict[str, Any]) -> str:
+    """Leave out what may be left out, but for the wall."""
+    laws = {
+        name: {key: part for key, part in law.items() if part not in ((), [])}
+        if isinstance(law, dict)
+        else law
+        for name, law in request["scene"].items()
+        if not (name == "slope" and law == 0.0)
+    }
+    return json.dumps({**request, "scene": {name: law for name, law in laws.items() if law != ""}})
+
+
+def _named(request: dict[str, Any]) -> str:
+    return json.dumps({**request, "scene": {**request["scene"], "name": "a name", "notes": '{"r":2.0}'}})
+
+
+SPELLINGS: dict[str, Spelling] = {
+    "fields in another order": lambda request: json.dumps(_turned(request)),
+    "no spaces": lambda request: json.dumps(request, separators=(",", ":")),
+    "more spaces": lambda request: " \t" + json.dumps(request, separators=(" ,\t", "  :  ")) + "  ",
+    "whole numbers without a point": _spelt(lambda x: str(int(x)) if x == int(x) else repr(x)),
+    "numbers with exponents": _spelt(lambda x: f"{x:.16e}"),
+    "numbers to the last digit": _spelt(lambda x: f"{Decimal(x):f}"),
+    "what is optional left out": _bare,
+    "a scene with name and notes": _named,
+}
+
+
+class _Exact(NamedTuple):
+    """A question whose answer is known: a straight flight that ends in time, or at rest walls head on."""
+
+    scene: Scene
+    state: State
+    t_end: float
+    due: State
+
+
+def near_questions(session: Session) -> str:
+    """A question nearly the same as the one before is answered as itself, and that one again as before."""
+    n = 0
+    for standing in STANDING:
+        try:
+            scene = offered(session, (standing,), "step")
+        except Trouble:
+            continue
+        n += _told_apart(session, _flights_that_end(scene))
+        n += _told_apart(session, _flights_to_the_end(scene))
+    if not n:
+        raise Trouble("unsupported", "no table is offered, or no laws that are constant")
+    return f"{n} questions"
+
+
+def _flights_that_end(scene: Scene) -> list[_Exact]:
+    """Return flights between the walls, from places nearly the same."""
+    way = -1.0 if isinstance(scene, Stem) else 1.0
+    return [
+        _Exact(scene, State(0.0, x, way / 4, 0.0, way), 0.125, State(0.125, x, 0.375 * way, 0.0, way))
+        for x in (0.0, *SHIFTS)
+    ]
+
+
+def _flights_to_the_end(scene: Scene) -> list[_Exact]:
+    """Return flights from one place straight into arc or floor, in tables nearly the same."""
+    way, name = (-1.0, "h") if isinstance(scene, Stem) else (1.0, "r")
+    found = []
+    for shift in (0.0, *SHIFTS):
+        size = getattr(scene, name) * (1.0 + shift)
+        due = State(size - 0.25, 0.0, size * way, 0.0, -way)
+        found.append(_Exact(replace(scene, **{name: size}), State(0.0, 0.0, way / 4, 0.0, way), 10.0, due))
+    return found
+
+
+def _told_apart(session: Session, questions: Sequence[_Exact]) -> int:
+    """Ask the first question before and after each of the others, and hold every answer to the exact one."""
+    first, *others = questions
+    for asked in (first, *(one for other in others for one in (other, first))):
+        outcome = session.step(asked.scene, asked.state, asked.t_end)
+        if isinstance(outcome, Undecided):
+            raise Trouble("declined", f"undecided: {outcome.reason}")
+        if not isinstance(outcome, Collision | Horizon):
+            raise Trouble("fail", f"{outcome} where a flight is straight and short: {asked}")
+        for name in ("t", "x", "y", "vx", "vy"):
+            found, wanted = getattr(outcome, name), getattr(asked.due, name)
+            if not abs(found - wanted) <= ROUNDING:
+                raise Trouble("fail", f"{name} = {found!r}, must be {wanted!r}, of {asked}")
+    return 2 * len(others) + 1
+
+
+def many_particles(session: Session) -> str:
+    """Each of hundreds of particles, begun at its own time and on walls, arrives where it does alone."""
+    scene = offered(session, MOVING, "flow", "step")
+    pool = _pool(session, scene)
+    alone = [flown(session, scene, [state], T_END)[0] for state in pool]
+    order = [random.Random(N_FLOWN + i).randrange(len(pool)) for i in range(N_FLOWN)]
+    together = flown(session, scene, [pool[which] for which in order], T_END)
+    n_compared = 0
+    for i, (which, found) in enumerate(zip(order, together, strict=True)):
+        one, other = (
+            read_outcome({k: v for k, v in part.items() if k != "captured"}, 0.0)
+            for part in (found, alone[which])
+        )
+        if not isinstance(one, Horizon) and not isinstance(other, Horizon):
+            continue
+        n_compared += 1
+        if distance(scene, one, other) > CARRIED:
+            raise Trouble("fail", f"states[{i}] of {N_FLOWN}: {one} among others, {other} alone")
+    if 2 * n_compared < N_FLOWN:
+        raise Trouble("declined", f"{n_compared} of {N_FLOWN} could be compared")
+    return f"{N_FLOWN} states"
+
+
+def _pool(session: Session, scene: Scene) -> list[State]:
+    """Return starts within the table, and the states after their first hits: other times, and walls."""
+    inside, found = INSIDE[type(scene)], []
+    for i in range(N_POOL // 2):
+        state = replace(inside, vx=inside.vx * (1.0 + i / 8), vy=inside.vy * (1.5 - i / 16))
+        hit = session.step(scene, state, T_END)
+        found += [state, hit.state() if isinstance(hit, Collision) and hit.t < T_END / 2 else state]
+    return found

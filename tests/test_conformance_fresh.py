@@ -1,0 +1,205 @@
+"""Questions in scenes that no file holds: right steppers pass, who is right in the corpus alone does not."""
+
+from __future__ import annotations
+
+import json
+from typing import ClassVar
+
+import msgspec
+import pytest
+
+import fast
+from conformance import plain, vectors
+from conformance.generator.fresh import WALLS, fresh
+from conformance.grading.grade import grade
+from conformance.mutants import Mutant
+from conformance.plain.motion import BangBangMotion
+from conformance.plain.step import Flight
+from conformance.suite.disguise import Disguise, drawn_disguise
+from conformance.suite.run import N_FRESH
+from fast.__main__ import carry, follow
+from scene import BangBang, Fourier, Mushroom, Rejected, from_data
+from scene.tables import laws
+
+SEEDS = (1, 2)
+N = N_FRESH["core"]
+
+
+@pytest.fixture(scope="module")
+def questions():
+    return {seed: fresh(seed, N) for seed in SEEDS}
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_right_steppers_pass(seed, questions):
+    for vector in questions[seed]:
+        for step, path, flow in (
+            (fast.next_collision, follow, carry),
+            (plain.next_collision, plain.trajectory, plain.flow),
+        ):
+            found = grade(vector, vectors.answer(vector, step, path, flow))
+            assert found.verdict == "pass", (vector, found)
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_all_is_asked_that_the_corpus_asks_seldom(seed, questions, tally):
+    asked = questions[seed]
+    known = {msgspec.json.encode(vector.scene) for vector in vectors.load("stress")}
+    for i, vector in enumerate(asked):
+        scene, (step,) = from_data(vector.scene), vector.expect[0].steps
+        kinds = {type(law) for law in laws(scene).values()}
+        assert msgspec.json.encode(vector.scene) not in known
+        assert drawn_disguise(vector, seed) == Disguise()
+        tally[f"{vector.scene['table']}, {step.wall}"] += 1
+        tally["before 0"] += vector.state.t < 0
+        tally["of mixed laws"] += kinds >= {Fourier, BangBang}
+        tally["like the one before"] += i > 0 and vector.state == asked[i - 1].state
+        tally["named"] += "name" in vector.scene
+        tally["more than 20 legs"] += any(len(getattr(law, "knots", ())) > 20 for law in laws(scene).values())
+    assert all(tally[f"{table}, {wall}"] >= 6 for table, wall in WALLS)
+    assert min(tally["before 0"], tally["like the one before"], tally["named"]) > N / 5
+    assert tally["of mixed laws"] > N / 12
+    assert tally["more than 20 legs"] >= 3
+
+
+def test_what_is_drawn_follows_from_the_seed(questions):
+    assert fresh(1, 12) == questions[1][:12]
+    assert fresh(3, 12) != questions[1][:12]
+
+
+class RoomForThirtyLegs(BangBangMotion):
+    """Joins all later legs to one."""
+
+    def __init__(self, law, t):
+        most = law.knots if len(law.knots) <= 31 else (*law.knots[:30], law.knots[-1])
+        super().__init__(BangBang(knots=most), t)
+
+
+class ManyLegs(Flight):
+    """A flight between walls with room for thirty legs."""
+
+    kinds: ClassVar = {**Flight.kinds, BangBang: RoomForThirtyLegs}
+
+
+class OnlyOnItsWall(Flight):
+    """Refuses a start that is farther from its wall than rounding of the place."""
+
+    def refusal(self):
+        is_off = self.wall and abs(self.gap(self.wall, 0.0).start) > 1e-9 * (self.x**2 + self.y**2)
+        return Rejected("off its wall") if is_off else super().refusal()
+
+
+class Keeping(Flight):
+    """Keeps the table by its name, or by all but one of its laws."""
+
+    kept: ClassVar[dict[str, object]] = {}
+
+    def __init__(self, scene, state, t_end):
+        super().__init__(self.kept.setdefault(self.key(scene), scene), state, t_end)
+
+
+class KeptByName(Keeping):
+    """Takes two scenes of one name for the same."""
+
+    def key(self, scene):
+        return scene.name or repr(scene)
+
+
+class KeptWithoutDepth(Keeping):
+    """Forgets the depth of the stem and its slope in the key of a table."""
+
+    def key(self, scene):
+        return repr(
+            msgspec.structs.replace(scene, name="", **{n: 0.0 for n in ("h", "slope") if n in laws(scene)})
+        )
+
+
+def wrong_where(condition):
+    """Return a flight that gives a speed off by a thousandth, where a condition on flight and wall holds."""
+
+    class WrongThere(Flight):
+        def bounce(self, wall, s):
+            vx, vy = super().bounce(wall, s)
+            return (1.001 * vx, 1.001 * vy) if condition(self, wall) else (vx, vy)
+
+    return WrongThere
+
+
+def family(scene):
+    """Return what a law is in a scene, and its numbers in proportion: the same in all its disguises."""
+    return json.dumps([sorted(laws(scene)), *(_proportions(law) for law in laws(scene).values())])
+
+
+def _proportions(law):
+    if isinstance(law, BangBang):
+        return sorted({f"{v / (law.knots[0][1] or 1.0):.6g}" for _, v in law.knots})
+    return (
+        [f"{a / (law.mean or 1.0):.6g}" for a in (*law.cos, *law.sin)]
+        if isinstance(law, Fourier)
+        else "constant"
+    )
+
+
+KNOWN = {family(from_data(v.scene)) for v in vectors.load("stress") if v.expect[0].outcome != "rejected"}
+
+
+class OmegaOfTheFirst(Flight):
+    """Takes omega of the first wave of a scene for all: one that stands still may have any."""
+
+    def law(self, law):
+        if isinstance(law, Fourier):
+            first = next(other for other in laws(self.scene).values() if isinstance(other, Fourier))
+            law = msgspec.structs.replace(law, omega=first.omega, period=first.period)
+        return super().law(law)
+
+
+class NoBaseInTheMouth(Flight):
+    """Refuses a state that names the base in the open mouth, where the mouth may have been narrower."""
+
+    def refusal(self):
+        is_open = isinstance(self.scene, Mushroom) and abs(self.x) < self.width(0.0).value
+        return Rejected("no base") if is_open and self.wall == "base" else super().refusal()
+
+
+def is_shallow(flight, wall):
+    """Tell whether a stem is ten times as wide as it is deep, where one of its walls is met."""
+    widths = [flight.bounds[name].lowest for name in ("w", "r") if name in flight.bounds]
+    return wall in ("left", "right", "floor") and 10 * flight.bounds["h"].highest < min(widths)
+
+
+def hardly_moves(flight, wall):
+    """Tell whether the arc is met that moves by less than a hundredth of its radius."""
+    r = flight.bounds.get("r")
+    return wall == "arc" and 0 < r.highest - r.lowest < r.lowest / 100
+
+
+FAULTY = {
+    "omega of the first": OmegaOfTheFirst,
+    "no base in the mouth": NoBaseInTheMouth,
+    "where the stem is shallow": wrong_where(is_shallow),
+    "where the arc hardly moves": wrong_where(hardly_moves),
+    "straight at the centre": wrong_where(
+        lambda flight, wall: wall == "arc" and flight.x * flight.vy == flight.y * flight.vx
+    ),
+    "right in known scenes": wrong_where(lambda flight, _: family(flight.scene) not in KNOWN),
+    "before time 0, in waves": wrong_where(
+        lambda flight, _: flight.state.t < 0 and Fourier in map(type, laws(flight.scene).values())
+    ),
+    "room for thirty legs": ManyLegs,
+    "only on its wall": OnlyOnItsWall,
+    "kept by name": KeptByName,
+    "kept without depth": KeptWithoutDepth,
+}
+
+
+def n_failures(flight, asked):
+    """Return how many answers of a faulty stepper fail."""
+    Keeping.kept.clear()
+    faulty = Mutant("faulty", "", flight)
+    answers = ((v, vectors.answer(v, faulty.step, faulty.trajectory, faulty.flow)) for v in asked)
+    return sum(grade(vector, answer).verdict == "fail" for vector, answer in answers)
+
+
+@pytest.mark.parametrize("name", FAULTY)
+def test_who_is_right_in_the_corpus_alone_is_found_out(name, questions):
+    assert sum(n_failures(FAULTY[name], questions[seed]) for seed in SEEDS) >= 1

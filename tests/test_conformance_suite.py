@@ -9,6 +9,7 @@ from xml.etree import ElementTree
 
 import msgspec
 import pytest
+from msgspec.structs import replace
 from support.promise_breakers import FAULTS, Breaker, ns
 from support.saboteurs import command
 from support.schemas import validator
@@ -97,6 +98,21 @@ def test_objections_say_what_is_wrong():
     ]
     assert "no vector passed" in made("unsupported").objections()[0]
     assert "declined 2 of 3" in made("pass", "declined", "declined").objections()[0]
+
+
+def test_at_level_stress_a_group_may_be_declined_but_not_all_that_is_asked():
+    """Hits at the horizon within a unit in the last place are no reason to refuse a stepper."""
+    levels = {"a": "core", "b": "stress"}
+
+    def of(*verdicts):
+        run = made(*(verdict for _, verdict in verdicts))
+        told = [replace(r, group=g, level=levels[g]) for r, (g, _) in zip(run.results, verdicts, strict=True)]
+        return made(results=told)
+
+    easy = [("a", "pass")] * 60
+    assert of(*easy, *[("b", "declined")] * 3).objections() == []
+    assert "declined 4 of 64 cases" in of(*easy, *[("b", "declined")] * 4).objections()[0]
+    assert "in group a" in of(*easy[:4], *[("a", "declined")] * 3, *[("b", "pass")] * 90).objections()[0]
 
 
 @pytest.mark.parametrize(

@@ -135,7 +135,10 @@ class Run(msgspec.Struct, frozen=True):
         return found if vectors_passed or found else ["no vector passed: nothing was graded"]
 
     def _declined_too_often(self) -> Iterator[str]:
-        """Say where too much was declined for the rest to speak for it: of everything, and of a group."""
+        """Say where too much was declined for the rest to speak for it: of everything, and of a group.
+
+        What is at level stress may be declined in any group, where binary64 cannot tell; it counts in everything.
+        """
         for group, most in ((None, MAX_DECLINED), *((name, MAX_DECLINED_OF_GROUP) for name in self.groups())):
             declined, asked = self.declined(group)
             if declined > max(most * asked, 1 if group else 0):
@@ -143,8 +146,14 @@ class Run(msgspec.Struct, frozen=True):
                 yield f"declined {declined} of {asked} {of}, more than {most:.0%}"
 
     def declined(self, group: str | None = None) -> tuple[int, int]:
-        """Count the questions declined and those asked; profiles, which the suite declines, are left out."""
-        counts = Counter(r.verdict for r in self.results if group in (None, r.group) and r.group != "profile")
+        """Count the questions declined and those asked: of all, or of a group's below level stress.
+
+        Profiles, which the suite declines, are left out.
+        """
+        counted = [r for r in self.results if r.group != "profile"]
+        if group:
+            counted = [r for r in counted if r.group == group and r.level != "stress"]
+        counts = Counter(r.verdict for r in counted)
         return counts["declined"], sum(counts.values()) - counts["unsupported"]
 
     def scope(self) -> Scope:

@@ -260,7 +260,8 @@ def _told_how_to_go_on(run: Any, command: str) -> Iterator[None]:
         tell_interrupted(told)
         raise
     except OSError as error:
-        raise BadInput(f"output {str(run.folder)!r}: {error.strerror or error}: {how()}") from None
+        at = error.filename or str(run.folder)
+        raise BadInput(f"output {at!r}: {error.strerror or error}: {how()}") from None
 
 
 def draw_histogram(path: Path, asked: Any, first: Any, name: str) -> None:

@@ -18,7 +18,7 @@ import numpy as np
 
 from fast.narrowings import narrowings
 from mushrooms.forecast import expected_collisions
-from mushrooms.store.asked import Asked, difference
+from mushrooms.store.asked import Asked, difference, made_by
 from mushrooms.store.blocks import AnyRun, Block, Piece, RunFolder, attributes_of, is_run
 from mushrooms.store.engines import Engine, Tick, follow
 from mushrooms.store.layout import Arrays, Shape
@@ -244,10 +244,11 @@ def _probe(run: RunFolder) -> None:
 def _compare(run: RunFolder, ones: Arrays, others: Arrays) -> None:
     for name, one in ones.items():
         if not np.array_equal(one, others[name], equal_nan=one.dtype.kind == "f"):
-            made = attributes_of(run.folder)["versions"]
+            made, here = attributes_of(run.folder), made_by()
+            by = next((key for key in here if made.get(key) != here[key]), "versions")
             raise BadInput(
-                f"output {str(run.folder)!r}: {name} of its first particles comes out otherwise here; it was"
-                f" made by {made}"
+                f"output {str(run.folder)!r}: {name} of its first particles comes out otherwise here, where"
+                f" {by} = {here[by]}; it was made by {made.get(by)}; another --out begins anew"
             )
 
 

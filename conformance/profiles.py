@@ -188,7 +188,7 @@ def mean_growth(
 
     Args:
         flow: as for `work_identity`.
-        scene: a mushroom that moves.
+        scene: a mushroom, nu greatest at t = 0.
         m1: the mean, from `theory.predict`.
         largest: bound on |log E1 / E0| in theory.
         n_particles: as for `captured_share`.

@@ -121,7 +121,8 @@ class Ensemble(NamedTuple):
     def p_nc(self) -> FloatArray:
         """Return (K,): the share of those who take part without a captured stay in each cycle; nan of no one.
 
-        Source: Eq:ps, the probability of never being captured.
+        Source: Eq:ps, the probability of never being captured, where a cycle begins at the greatest nu; of
+        another start those count as captured in the first cycle who began so.
         """
         captured = self.is_captured()[self.takes_part()]
         return 1.0 - captured.mean(axis=0) if len(captured) else np.full(captured.shape[1], np.nan)

@@ -53,7 +53,10 @@ def bench(
         Path | None,
         typer.Option(metavar="OLD.json", help="Print a table of an earlier bench.json as Markdown, and end."),
     ] = None,
-    workload: Annotated[str, typer.Option(metavar="NAME", help="Which table; or `all`.")] = "moving-cap-1e7",
+    workload: Annotated[
+        str | None,
+        typer.Option(metavar="NAME", help="Which table; or `all`. By default moving-cap-1e7."),
+    ] = None,
 ) -> None:
     """Measure speed against error; writes bench.json, bench.svg, bench.html and hard-cases.md.
 
@@ -63,8 +66,9 @@ def bench(
     from mushrooms.figures import speed as figures_of_speed
     from mushrooms.reports import bench_page
 
+    _check_table(table, workload, {"--quick": quick, "--compare": compare, "COMMAND": command})
     if table is not None:
-        print(bench_page.to_markdown(record.read(table), workload), end="")
+        print(bench_page.to_markdown(record.read(table), workload or "moving-cap-1e7"), end="")
         return
     check_seed(seed, "--seed")
     size: Size = "quick" if quick else "full"
@@ -94,6 +98,15 @@ def bench(
         slower = [r for r in ratios if r.is_slower]
         print(f"{len(slower)} of {len(ratios)} slower than {comparison.SLOWER} times {compare}")
         raise typer.Exit(1 if slower else 0)
+
+
+def _check_table(table: Path | None, workload: str | None, measuring: dict[str, object]) -> None:
+    """Refuse options that would change nothing: a table is of an earlier run, and a run has all workloads."""
+    if table is None and workload is not None:
+        raise BadInput(f"--workload = {workload!r} would change nothing here: it needs --table")
+    for name, value in measuring.items() if table is not None else ():
+        if value:
+            raise BadInput(f"{name} would change nothing here: --table measures nothing")
 
 
 def _measured(size: Size, seed: int, command: list[str]) -> Record:

@@ -12,6 +12,7 @@ import scene as scenes
 from conformance.audit.runs import SCENES
 from mushrooms.terminal import AsJson, table_console
 from scene.load import catalogue_text, read_data
+from scene.refusal import BadInput
 from scene.tables import cycle_length
 
 
@@ -23,7 +24,11 @@ def list_scenes(
     as_json: AsJson = False,
 ) -> None:
     """List the catalogue; the scene that is refused is shown with its reason. With NAME print that scene."""
-    if name or as_toml:
+    if as_toml and as_json:
+        raise BadInput("--toml and --json: must be one of them")
+    if as_toml and not name:
+        raise BadInput("--toml needs NAME: which scene of the catalogue")
+    if name:
         _print_scene(name, as_json)
         return
     rows = [_catalogue_row(name) for name in scenes.catalogue()]

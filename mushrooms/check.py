@@ -65,6 +65,8 @@ def check(
         output.check_file(path, (suffix,))
         if path in [other for other, _, _ in files[:i]]:
             raise BadInput(f"output {str(path)!r} is asked for twice, must be a file for each report")
+    if groups and not groups.replace(",", " ").split():
+        raise BadInput(f"--groups = {groups!r}, must name a group; all are asked without it")
     known = suite.read_known(known_failures) if known_failures else frozenset()
     with progress_bar() as bar:
         task = bar.add_task("cases", total=None)

@@ -5,12 +5,17 @@ from __future__ import annotations
 import math
 from typing import Any, NamedTuple
 
+from mpmath import fp
+
+from fast.narrowings import start_time
 from mushrooms.store.asked import Asked
 from mushrooms.store.tally import RunTally
 from scene import Mushroom
+from scene.geometry import table_at
 from scene.refusal import BadInput
 
 DIGITS = 10  # of the adiabatic theory: a run knows six at most
+SAME = 2.0**-40  # of nu: far above rounding, and nobody starts in so thin a part of the island
 
 
 class Theory(NamedTuple):
@@ -32,7 +37,7 @@ def measured(asked: Asked, tally: RunTally) -> dict[str, Any]:
 
     The prediction is that at the run's energy where rates of the scene's frozen tables are known. Elsewhere
     it is the limit of high energies, and without z: what that leaves out is not known. None is what nobody
-    knows.
+    knows: of a cycle that does not begin where the mouth is widest too (see `begins_widest`).
     """
     n, k = tally.gain.n, asked.n_cycles
     mean, error = (None if x is None else x / k for x in (tally.gain.mean, tally.gain.standard_error))
@@ -69,6 +74,20 @@ def _pull(found: float | None, wanted: float, error: float | None, left_out: flo
     return round((found - wanted) / math.hypot(error, left_out), 3)
 
 
+def begins_widest(scene: Mushroom) -> bool:
+    """Tell whether the cycles that are simulated begin where theory's do: where nu is greatest.
+
+    There everybody who takes part is free. At a narrower mouth some of the starts, uniform in all of the
+    table, lie in the part of the island that opens later: they count as captured, with the energy of those
+    who are free, and no energy however high mends that. Later cycles do not know of it.
+    """
+    import theory
+
+    now = table_at(fp, scene, start_time(scene))
+    widest = theory.Cycle.of(scene, DIGITS).nu_max
+    return bool(now.w / now.r >= widest * (1 - SAME))
+
+
 def _predicted(asked: Asked) -> Theory | None:
     """Return what theory says of a run; None where it covers nothing.
 
@@ -77,7 +96,7 @@ def _predicted(asked: Asked) -> Theory | None:
     """
     import theory
 
-    if not isinstance(asked.scene, Mushroom):
+    if not isinstance(asked.scene, Mushroom) or not begins_widest(asked.scene):
         return None
     try:
         limit = theory.predict(asked.scene, DIGITS)

@@ -9,7 +9,6 @@ from typing import Annotated, Any, BinaryIO, NamedTuple
 import typer
 
 from mushrooms import output
-from mushrooms.simulate import Seed
 from mushrooms.stored import draw_run
 from mushrooms.terminal import (
     SceneName,
@@ -21,7 +20,7 @@ from mushrooms.terminal import (
 )
 from scene import Scene
 from scene.files import write_file
-from scene.refusal import check_seed
+from scene.refusal import BadInput, check_seed
 
 
 class Usual(NamedTuple):
@@ -59,6 +58,8 @@ Energy = Annotated[
 ]
 Length = Annotated[int | None, typer.Option(help="Collisions of each particle, 1 to 10^6.")]
 Many = Annotated[int | None, typer.Option(help="Particles of a section, a map, exponents; 1 to 1000.")]
+Seed = Annotated[int | None, typer.Option(help="Seed of the random starts, 0 to 2^64 - 1; by default 0.")]
+OF_MANY = ("section", "map", "lyapunov")
 
 
 def draw(
@@ -81,7 +82,7 @@ def draw(
     energy: Energy = None,
     collisions: Length = None,
     particles: Many = None,
-    seed: Seed = 0,
+    seed: Seed = None,
 ) -> None:
     """Draw the walls through the cycle, or what particles do between them; export a trajectory.
 
@@ -90,17 +91,24 @@ def draw(
     """
     from mushrooms.store.blocks import is_run
 
+    asked = (trajectory, section, boundary_map, growth, lyapunov)
+    kinds = [kind for kind, is_asked in zip(PICTURES, asked, strict=True) if is_asked]
+    options = {"energy": energy, "collisions": collisions, "seed": seed, "particles": particles}
     if is_run(Path(scene)):
+        _refuse_options(dict.fromkeys(kinds, True) | {"export": export} | options, f"{scene!r} is a run")
         print(draw_run(Path(scene), out))
         return
     table = load_scene(scene)
     _check(energy, collisions, particles, seed)
-    asked = (trajectory, section, boundary_map, growth, lyapunov)
-    kinds = [kind for kind, is_asked in zip(PICTURES, asked, strict=True) if is_asked]
+    if not kinds and export is None:
+        _refuse_options(options, "the picture of the walls has no particles")
+    if not set(kinds) & set(OF_MANY):
+        _refuse_options({"particles": particles}, f"it is of --{', --'.join(OF_MANY)}")
     if export is not None:
         output.check_file(export, (".csv", ".parquet"))
-    paths = _paths(out or Path(f"{Path(scene).stem}.svg"), kinds, is_drawn=bool(kinds) or export is None)
-    follow = _Asked(table, energy, collisions, particles, seed)
+    is_drawn = bool(kinds) or export is None or out is not None
+    paths = _paths(out or Path(f"{Path(scene).stem}.svg"), kinds, is_drawn=is_drawn)
+    follow = _Asked(table, energy, collisions, particles, seed or 0)
     with compilation_told():
         if export is not None:
             follow("trajectory", 1)[0].write(export)
@@ -133,13 +141,26 @@ class _Asked(NamedTuple):
         )
 
 
-def _check(energy: float | None, collisions: int | None, particles: int | None, seed: int) -> None:
+def _refuse_options(options: dict[str, Any], why: str) -> None:
+    """Refuse options that nothing which is drawn would heed: whoever gives one counts on it.
+
+    Raises:
+        BadInput: naming the first that is given.
+    """
+    for name, value in options.items():
+        if value is not None:
+            given = f"--{name}" if value is True else f"--{name} = {value}"
+            raise BadInput(f"{given} would change nothing here: {why}")
+
+
+def _check(energy: float | None, collisions: int | None, particles: int | None, seed: int | None) -> None:
     check_energy(energy)
     if collisions is not None:
         check_range("--collisions", collisions, 1, 10**6)
     if particles is not None:
         check_range("--particles", particles, 1, 1000)
-    check_seed(seed, "--seed")
+    if seed is not None:
+        check_seed(seed, "--seed")
 
 
 def _paths(out: Path, kinds: list[str], *, is_drawn: bool) -> dict[str, Path]:

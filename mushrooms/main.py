@@ -5,8 +5,14 @@ A command's module is imported when the command is used: the list of commands ne
 
 from __future__ import annotations
 
+import errno
+import io
 import os
+import signal
 import sys
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from decimal import Decimal, InvalidOperation
 from importlib import import_module
 from itertools import pairwise
@@ -53,7 +59,7 @@ COMMANDS = {
         "mushrooms.simulate:simulate",
         "Simulate an ensemble.",
         "moving-cap --particles 25000 --energy 1e7 --seed 1 --out run",
-        "",  # it says so itself
+        "finished blocks are kept in the folder of --out: --resume goes on with them",
     ),
     "export": Listed("mushrooms.stored:export", "Write a finished run as one table.", "run --to run.csv"),
     "attack": Listed(
@@ -109,13 +115,14 @@ def command(name: str) -> Any:
 
 
 def _with_exponents(function: Any) -> Any:
-    """Let every option of a command that is a whole number be written as 1e6 too."""
+    """Let every option that is a whole number be written as 1e6 too, and one that is no number be shown."""
     function.__annotations__ = get_type_hints(function, include_extras=True)
     for hint in function.__annotations__.values():
-        if get_origin(hint) is Annotated and int in (hint.__origin__, *get_args(hint.__origin__)):
-            for told in hint.__metadata__:
-                if isinstance(told, OptionInfo) and told.parser is None:
-                    told.parser, told.metavar = whole, told.metavar or "N"
+        kinds = (hint.__origin__, *get_args(hint.__origin__)) if get_origin(hint) is Annotated else ()
+        for told in hint.__metadata__ if int in kinds or float in kinds else ():
+            if isinstance(told, OptionInfo) and told.parser is None:
+                told.parser, letter = (whole, "N") if int in kinds else (number, "X")
+                told.metavar = told.metavar or letter
     return function
 
 
@@ -136,6 +143,20 @@ def whole(text: str | int) -> int:
     raise typer.BadParameter(f"{shown(text)} is not a whole number below {MOST:.0e} in size")
 
 
+def number(text: str | float) -> float:
+    """Return a number; whether it is finite, or in bounds, is for the command to say.
+
+    Raises:
+        BadParameter: it is none.
+    """
+    try:
+        return float(text)
+    except ValueError:
+        from scene.refusal import shown
+
+        raise typer.BadParameter(f"{shown(text)} is not a number") from None
+
+
 app = typer.Typer(
     cls=Commands,
     add_completion=False,
@@ -146,12 +167,47 @@ app = typer.Typer(
 )
 
 
+_told = list[str]()  # of an interruption, in this call of `run`
+
+
+def tell_interrupted(kept: str) -> None:
+    """Say on stderr that the command was interrupted, and what is kept; a command that knows more says it."""
+    _told.append(kept)
+    print(f"{PROGRAM}: interrupted; {kept}", file=sys.stderr)
+
+
+@contextmanager
+def _ended_as_by_keyboard() -> Iterator[None]:
+    """Let SIGTERM and a terminal that closes do what Ctrl-C does: what is half written is taken away.
+
+    A batch system ends its jobs so, and where the process just died hidden files would stay. Whoever has them
+    ignored (`nohup`) or handled otherwise keeps that.
+    """
+
+    def end(_number: int, _frame: object) -> NoReturn:
+        raise KeyboardInterrupt
+
+    before = {}
+    if threading.current_thread() is threading.main_thread():  # nobody else may
+        for number in (getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name)):
+            if signal.getsignal(number) is signal.SIG_DFL:
+                before[number] = signal.signal(number, end)
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
 def run(arguments: list[str] | None = None) -> NoReturn:
     """Run the command line and exit: 0 done, 1 a claim failed, 2 bad input, 130 interrupted."""
     given = sys.argv[1:] if arguments is None else arguments
+    _told.clear()
+    _make_printable()
     _refuse_empty(given)
     try:
-        code = typer.main.get_command(app)(given, prog_name=PROGRAM, standalone_mode=False)
+        with _ended_as_by_keyboard():
+            code = typer.main.get_command(app)(given, prog_name=PROGRAM, standalone_mode=False)
         sys.stdout.flush()
     except (KeyboardInterrupt, typer.Abort):
         code = INTERRUPTED  # which typer makes of Ctrl-C itself, in some versions
@@ -162,7 +218,7 @@ def run(arguments: list[str] | None = None) -> NoReturn:
     except UsageError as error:
         _refuse(error.format_message())
     except OSError as error:
-        _refuse(str(error))
+        _refuse(_in_words(error))
     except ValueError as error:
         from scene.refusal import BadInput  # not above: the list of commands needs no scene
 
@@ -173,16 +229,45 @@ def run(arguments: list[str] | None = None) -> NoReturn:
         _refuse("not enough memory for so many particles")
     if code == INTERRUPTED:
         kept = next((COMMANDS[word].kept for word in given if word in COMMANDS), "")
-        if kept:
-            print(f"{PROGRAM}: interrupted; {kept}", file=sys.stderr)
+        if kept and not _told:
+            tell_interrupted(kept)
     sys.exit(code if isinstance(code, int) else 0)
 
 
+def _make_printable() -> None:
+    """See to it that nothing fails for want of a place to print it, or of a letter, or of a width.
+
+    Work is done before its result is printed: it must not be lost there. What was closed takes everything and
+    keeps nothing, and no file that a command opens becomes its standard output. A letter that the encoding
+    lacks is printed by its number. Of COLUMNS and LINES what is no number above 0 says nothing: `rich` would
+    print tables of no width, or fail.
+    """
+    for name in ("stdin", "stdout", "stderr"):
+        if getattr(sys, name) is None:
+            mode = "r" if name == "stdin" else "w"
+            setattr(sys, name, open(os.devnull, mode, encoding="utf-8"))  # noqa: SIM115 (till the end)
+    if isinstance(sys.stdout, io.TextIOWrapper) and sys.stdout.errors in ("strict", "surrogateescape"):
+        sys.stdout.reconfigure(errors="backslashreplace")
+    for name in ("COLUMNS", "LINES"):
+        size = os.environ.get(name, "1")
+        if not (size.isascii() and size.isdigit() and len(size) < 6 and int(size) > 0):
+            del os.environ[name]
+
+
+def _in_words(error: OSError) -> str:
+    """Return what the system refused; of a file it gives the name (`scene.files` sees to that)."""
+    if error.filename is None and error.errno in (errno.ENOSPC, errno.EIO, errno.EBADF, errno.EDQUOT):
+        return f"standard output cannot be written: {error.strerror}"
+    return str(error)
+
+
 def _refuse_empty(given: list[str]) -> None:
-    """Refuse an option of no text: for a path it would mean the folder that one is in."""
+    """Refuse an option or an argument of no text: for a path it would mean the folder that one is in."""
     for option, value in pairwise([*given, "-"]):
         if option == "--":
             return
+        if not option.strip():
+            _refuse("an argument is empty, must have a value")
         if option.startswith("--") and (not value.strip() or option.endswith("=")):
             _refuse(f"{option.rstrip('=')} is empty, must have a value")
 
@@ -195,7 +280,8 @@ def _in_options(message: str, given: list[str]) -> str:
 
 
 def _refuse(message: str) -> NoReturn:
-    print(f"{PROGRAM}: {' '.join(message.split())}", file=sys.stderr)
+    with suppress(OSError):  # where standard error is full, the exit code still tells
+        print(f"{PROGRAM}: {' '.join(message.split())}", file=sys.stderr, flush=True)
     sys.exit(2)
 
 

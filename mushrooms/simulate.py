@@ -13,6 +13,7 @@ from typing import Annotated, Any, NamedTuple
 import typer
 
 from mushrooms import output
+from mushrooms.main import tell_interrupted
 from mushrooms.terminal import (
     AsJson,
     SceneName,
@@ -163,7 +164,9 @@ def _check_stored(out: Path | None, particles: int, block: int | None, **options
     """Check what only a run on disk can have."""
     check_range("--particles", particles, 1, MOST_IN_MEMORY if out is None else MOST_ON_DISK)
     if block is not None:
-        check_range("--block", block, 1)
+        from mushrooms.store.conduct import LARGEST_BLOCK  # it takes the stepper: most commands end before
+
+        check_range("--block", block, 1, LARGEST_BLOCK)
     for name, value in options.items():
         option = f"--{name.replace('_', '-')}"
         if out is None and value not in (None, False):
@@ -193,7 +196,7 @@ def _in_memory(wish: Wish) -> tuple[dict[str, Any], Any]:
     try:
         _complete(wish, run)
     except KeyboardInterrupt:
-        print("mushrooms: interrupted; nothing is kept without --out", file=sys.stderr)
+        tell_interrupted("nothing is kept without --out")
         raise
     return _summary(wish, run), run.tally.first
 
@@ -203,7 +206,7 @@ def _on_disk(wish: Wish, folder: Path, resume: bool) -> tuple[dict[str, Any], An
     from mushrooms.store import conduct
 
     command = wish.asked.command(wish.scene, wish.particles, folder)
-    default = conduct.block_size(wish.asked, wish.threads or os.cpu_count() or 1)
+    default = conduct.block_of_new(wish.asked, wish.particles, wish.threads or os.cpu_count() or 1)
     try:
         with compilation_told():
             run, damaged = conduct.opened(
@@ -215,9 +218,9 @@ def _on_disk(wish: Wish, folder: Path, resume: bool) -> tuple[dict[str, Any], An
     try:
         with _told_how_to_go_on(run, command):
             _complete(wish, run)
+            summary = _summary(wish, run)
     except conduct.LimitReached:
         return None
-    summary = _summary(wish, run)
     asked = wish.asked.to_data()
     kept = {name: asked[name] for name in ("scene", "energy", "cycles", "seed")} | summary
     write_file(folder / "summary.json", json.dumps(kept) + "\n")
@@ -254,10 +257,11 @@ def _told_how_to_go_on(run: Any, command: str) -> Iterator[None]:
         raise
     except KeyboardInterrupt:
         told = "no block was finished: nothing is kept" if run.first_there() is None else how()
-        print(f"mushrooms: interrupted; {told}", file=sys.stderr)
+        tell_interrupted(told)
         raise
     except OSError as error:
-        raise BadInput(f"output {str(run.folder)!r}: {error.strerror or error}: {how()}") from None
+        at = error.filename or str(run.folder)
+        raise BadInput(f"output {at!r}: {error.strerror or error}: {how()}") from None
 
 
 def draw_histogram(path: Path, asked: Any, first: Any, name: str) -> None:

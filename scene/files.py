@@ -27,10 +27,13 @@ def write_files(folder: Path, contents: Mapping[str, bytes | memoryview | str | 
     Args:
         folder: an existing folder.
         contents: per file name its bytes, its text, or what writes it into an open binary file.
+
+    Raises:
+        OSError: one of them cannot be written; it names the file.
     """
     try:
         for name, content in contents.items():
-            with part(folder / name).open("wb") as file:
+            with _named(folder / name), part(folder / name).open("wb") as file:
                 if callable(content):
                     content(file)
                 else:
@@ -42,6 +45,17 @@ def write_files(folder: Path, contents: Mapping[str, bytes | memoryview | str | 
     finally:
         for name in contents:
             part(folder / name).unlink(missing_ok=True)
+
+
+@contextmanager
+def _named(path: Path) -> Iterator[None]:
+    """Let what fails say of which file: a full disk is found out by writing, where the system names none."""
+    try:
+        yield
+    except OSError as error:
+        if error.filename is None and error.errno is not None:
+            raise OSError(error.errno, error.strerror, str(path)) from None
+        raise
 
 
 def write_file(path: Path, content: bytes | str | Writer) -> None:

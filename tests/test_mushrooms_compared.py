@@ -5,11 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+import fast
 import theory
-from mushrooms.compared import measured
+from conformance.audit.runs import SCENES
+from mushrooms.compared import begins_widest, measured
 from mushrooms.store.asked import Asked
 from mushrooms.store.tally import RunTally, moments_of
-from scene import load
+from scene import Fourier, Mushroom, load
 
 
 @pytest.mark.parametrize("n_cycles", [1, 4])
@@ -38,3 +40,36 @@ def test_the_limit_of_high_energies_has_no_z():
     assert (beside["p_nc"], beside["p_nc_se"]) == (pytest.approx(0.4), pytest.approx(0.24**0.5 / 10))
     nothing = measured(Asked(load("breathing-circle"), 1e4, 1, 1), RunTally(1, 1))
     assert set(nothing.values()) == {None}
+
+
+def turned(phase):
+    """Return a mushroom whose cycle begins at a phase of its mouth's, the widest at 0."""
+
+    def law(mean, amplitude, lag):
+        cos, sin = amplitude * np.cos(phase - lag), -amplitude * np.sin(phase - lag)
+        return Fourier(mean=mean, omega=1.0, cos=(float(cos),), sin=(float(sin),))
+
+    return Mushroom(r=1.0, h=law(1.2, 0.5, 1.2), nu=law(0.55, 0.4, 0.0), slope=0.1)
+
+
+@pytest.mark.parametrize("phase", [0.0, *np.random.default_rng(23).uniform(0.1, 6.1, 6), 2 * np.pi])
+def test_theory_stands_beside_cycles_that_begin_where_its_own_do(phase):
+    beside = measured(Asked(turned(phase), 1e6, 1, 1), RunTally(10, 10))
+    assert (
+        (beside["p_nc_theory"] is not None) == (beside["m1_theory"] is not None) == (phase in (0, 2 * np.pi))
+    )
+
+
+@pytest.mark.parametrize("name", [name for name in SCENES if isinstance(SCENES[name], Mushroom)])
+def test_the_audits_cycles_begin_where_theorys_do(name):
+    assert begins_widest(SCENES[name])
+
+
+def test_a_cycle_that_begins_at_a_narrow_mouth_is_another_one():
+    """Whoever starts in what opens later counts as captured; the next cycle does not know of it."""
+    found = fast.simulate(turned(3.0), n_particles=1500, energy=1e6, n_cycles=2, seed=1)
+    wanted = float(theory.predict(turned(3.0), 6).p_nc)
+    error = np.sqrt(wanted * (1 - wanted) / 1500)
+    first, second = np.abs(found.p_nc() - wanted) / error
+    assert first > 10
+    assert second < 4

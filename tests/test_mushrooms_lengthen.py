@@ -217,3 +217,14 @@ def test_a_run_that_would_go_on_otherwise_does_not(command_line, tmp_path, monke
     monkeypatch.setattr(engines, "paused_of", faulty)
     assert_refused(command_line(*arguments(tmp_path, 2)), "of its first particles comes out otherwise here")
     assert held(tmp_path) == before
+
+
+@pytest.mark.parametrize("n", [1, 5, 20])
+def test_the_room_that_is_asked_of_a_disk_is_that_which_a_run_takes(command_line, tmp_path, monkeypatch, n):
+    usage = conduct.shutil.disk_usage(tmp_path)
+    summary_of(command_line(*arguments(tmp_path / "whole", 1, n=n, block=None)))
+    taken = sum(path.stat().st_size for path in (tmp_path / "whole").rglob("c.*"))
+    assert taken < 2**21  # as much as a few thousand particles take
+    monkeypatch.setattr(conduct.shutil, "disk_usage", lambda _path: usage._replace(free=taken - 1))
+    monkeypatch.setattr(fast, "go_on", None)
+    assert_refused(command_line(*arguments(tmp_path / "a", 1, n=n, block=None)), "GB to be written", "free")

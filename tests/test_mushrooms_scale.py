@@ -94,7 +94,14 @@ def test_workers_may_die(command_line, tmp_path, ensemble, monkeypatch):
 
 def test_no_scheduler_is_one_line(command_line, tmp_path, monkeypatch):
     monkeypatch.setattr(engines, "CONNECT_TIMEOUT", 0.3)
-    for address in ("tcp://127.0.0.1:9", "nonsense://x"):
+    made = distributed.Client.__init__
+
+    def made_at(client, address, **options):
+        assert ":" in address.removeprefix("tcp://"), "a client that was never made whole cannot be closed"
+        made(client, address, **options)
+
+    monkeypatch.setattr(distributed.Client, "__init__", made_at)
+    for address in ("tcp://127.0.0.1:9", "nonsense://x", "nonsense", "tcp://nonsense", "tcp://127.0.0.1:x"):
         ended = command_line(*RUN, "--out", tmp_path, "--dask", address)
         assert_refused(ended, f"--dask = {address}", "no scheduler")
 
@@ -166,6 +173,23 @@ def test_a_stored_run_is_drawn_as_when_it_was_made(command_line, stored, tmp_pat
     assert command_line(*RUN, "--plot", tmp_path / "b.svg").code == 0
     assert (tmp_path / "a.svg").read_bytes() == (tmp_path / "b.svg").read_bytes()
     assert_refused(command_line("draw", stored, "--out", tmp_path / "a.gif"), ".svg, .png")
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        ["--trajectory"],
+        ["--map"],
+        ["--export", "a.csv"],
+        ["--energy", "nan"],
+        ["--seed", 0],
+        ["--particles", 3],
+    ],
+)
+def test_of_a_stored_run_only_its_histogram_is_drawn(command_line, stored, tmp_path, options):
+    refused = command_line("draw", stored, "--out", tmp_path / "a.svg", *options)
+    assert_refused(refused, options[0], "would change nothing here", "is a run")
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_an_unfinished_run_is_neither_exported_nor_drawn(command_line, stored, tmp_path):

@@ -310,6 +310,7 @@ def test_blocks_take_seconds_and_fit_into_memory():
         (["--max-seconds", 1], "--max-seconds needs --out"),
         (["--dask", "tcp://here:1"], "--dask needs --out"),
         (["--block", 0], "--block = 0"),
+        (["--block", "1e29"], f"must be 1 to {conduct.LARGEST_BLOCK}"),
         (
             ["--block", 2, "--particles", 10**8],
             "--block = 2: 100000000 particles need blocks of at least 100",

@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+import io
 import json
+import os
 import subprocess
 import sys
+from pathlib import Path
 
+import numpy as np
 import pytest
 from support.refusals import assert_refused
 
 import theory
-from mushrooms.main import COMMANDS, INTERRUPTED, command
+from mushrooms.main import COMMANDS, INTERRUPTED, NOTHING_KEPT, command, run
 from mushrooms.terminal import print_pairs, table_console
 
+ROOT = Path(__file__).parent.parent
 HEAVY = {"numpy", "numba", "mpmath", "msgspec", "scipy", "matplotlib", "rich", "scene", "fast", "theory"}
 
 
@@ -56,6 +61,8 @@ def test_every_command_is_found_and_has_its_example(command_line, name):
         ["simulate", "moving-cap", "--particles", "5", "--energy", "1", "--out", " "],
         ["audit", "--out", ""],
         ["bench", "--compare", ""],
+        ["export", "", "--to", "a.csv"],
+        ["draw", " "],
     ],
 )
 def test_an_empty_option_is_refused(command_line, tmp_path, monkeypatch, arguments):
@@ -123,3 +130,87 @@ def test_other_numbers_may_not(command_line, given):
     assert_refused(
         command_line("simulate", "moving-cap", "--energy", "1", "--particles", given), "--particles", given
     )
+
+
+@pytest.mark.parametrize("given", ["x", "1,5", "0x10", "--"])
+@pytest.mark.parametrize("option", ["--energy", "--max-seconds"])
+def test_what_is_no_number_is_shown(command_line, option, given):
+    arguments = ["simulate", "moving-cap", "--energy", "1", "--particles", "5", f"{option}={given}"]
+    assert_refused(command_line(*arguments), option, f"{given!r} is not a number")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["scenes", "moving-cap", "--toml", "--json"], ["--toml and --json"]),
+        (["scenes", "--toml"], ["--toml needs NAME"]),
+        (["bench", "--workload", "all"], ["--workload = 'all'", "needs --table"]),
+        (["bench", "--table", "a.json", "--quick"], ["--quick", "--table measures nothing"]),
+        (["check", "--groups", ",", "--", "true"], ["--groups = ','"]),
+        (["draw", "moving-cap", "--seed", "1"], ["--seed = 1", "the picture of the walls has no particles"]),
+        (["draw", "moving-cap", "--energy", "1"], ["--energy = 1.0", "no particles"]),
+        (["draw", "moving-cap", "--growth", "--particles", "3"], ["--particles = 3", "--section, --map"]),
+        (["draw", "moving-cap", "--export", "a.csv", "--particles", "3"], ["--particles = 3"]),
+    ],
+)
+def test_options_that_would_change_nothing_are_refused(command_line, tmp_path, monkeypatch, arguments, words):
+    monkeypatch.chdir(tmp_path)
+    assert_refused(command_line(*arguments), *words)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_wherever_it_prints_nothing_is_lost_for_want_of_a_letter_or_a_width(monkeypatch):
+    rng = np.random.default_rng(20261123)
+    sizes = ["", "0", "-1", "60", "200", "\N{SUPERSCRIPT TWO}", "9" * 5000, "1e2", "wide"]
+    for _ in range(60):
+        for name in ("COLUMNS", "LINES"):
+            monkeypatch.setenv(name, sizes[rng.integers(len(sizes))])
+        encoding = ["ascii", "latin-1", "cp1252", "utf-8"][rng.integers(4)]
+        kept = io.TextIOWrapper(io.BytesIO(), encoding=encoding)
+        monkeypatch.setattr(sys, "stdout", kept)
+        with pytest.raises(SystemExit) as stop:
+            run([["scenes"], ["scenes", "--json"], ["scenes", "moving-cap"]][rng.integers(3)])
+        assert stop.value.code == 0
+        assert len(kept.buffer.getvalue()) > 200
+
+
+@pytest.mark.parametrize(
+    ("to", "code", "word"),
+    [(">&-", 0, ""), (">/dev/full", 2, "standard output cannot be written"), ("", 0, "")],
+)
+@pytest.mark.parametrize("more", ["", "2>&-"])
+def test_standard_output_may_be_closed_or_full(tmp_path, to, code, word, more):
+    line = f'"{sys.executable}" -m mushrooms scenes moving-cap --json {to} {more}'
+    done = subprocess.run(line, shell=True, cwd=ROOT, capture_output=True, text=True, timeout=60)
+    assert done.returncode == code
+    assert word in done.stderr or more
+    assert "Traceback" not in done.stderr
+    assert done.stdout == "" or (not to and json.loads(done.stdout)["name"] == "moving-cap")
+
+
+@pytest.mark.parametrize("name", ["SIGINT", "SIGTERM", "SIGHUP"])
+def test_whatever_ends_a_command_no_half_written_file_stays(tmp_path, name):
+    code = f"""if True:
+        import os, signal
+        from mushrooms.figures import table
+        from mushrooms.main import run
+
+        def ended(_table, _suffix, file):
+            file.write(b"half")
+            os.kill(os.getpid(), signal.{name})
+
+        table.write_picture = ended
+        run(["draw", "moving-cap", "--out", "a.svg"])
+    """
+    words = [sys.executable, "-c", code]
+    done = subprocess.run(
+        words,
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        timeout=60,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+    )
+    assert done.returncode == INTERRUPTED
+    assert done.stderr == f"mushrooms: interrupted; {NOTHING_KEPT}\n"
+    assert list(tmp_path.iterdir()) == []

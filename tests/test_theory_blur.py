@@ -150,6 +150,8 @@ def test_what_the_theory_of_finite_energy_does_not_know_is_refused() -> None:
         at_energy(load("fermi-ulam"), 1e6)
     with pytest.raises(BadInput, match="energy = 0"):
         at_energy(load("moving-cap"), 0.0)
+    with pytest.raises(BadInput, match=r"energy = 1e\+308, must be > 0 and at most 2\^1000"):
+        at_energy(load("moving-cap"), 1e308)
     with pytest.raises(BadInput, match="nobody is captured"):
         at_energy(load("ergodic"), 1e6).captured_cdf([0.0])
     moved = Mushroom(r=Fourier(1.0, 1.0, (), (0.5,)), h=Fourier(1.0, 1.0, (), (-0.5,)), nu=0.9, slope=0.1111)

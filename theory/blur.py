@@ -31,6 +31,7 @@ MOST_ATOMS = 40_000  # of several captures; more are joined with their neighbour
 MOST_DRAWN = 100_000_000
 REACH = 7.0  # standard deviations beyond which no blur is computed
 LEAST = 1e-12  # variance of a blur, in log E: a lag's square may leave less than none
+LARGEST = 2.0**1000  # of an energy: where its double is no float, fast particles seem slow
 MOST = 4.0  # variance of a blur, in log E: beyond it what the peak has of it, v - v^2 / 8, falls again
 
 
@@ -322,13 +323,13 @@ def at_energy(scene: Scene, energy: float) -> FiniteEnergy:
         energy: E = v^2 / 2 of every particle when the cycle begins [length^2 / time^2].
 
     Raises:
-        BadInput: energy is not finite or not > 0.
+        BadInput: energy is not finite, not > 0, or above 2^1000.
         NotCovered: no frozen rates of the scene are known; or particles are so slow that blurs and lags,
             corrections of the order v^-1 and v^(-2/3), leave no variance or have no distribution.
     """
     energy = check_number("energy", energy)
-    if not energy > 0:
-        raise BadInput(f"energy = {energy}, must be finite and > 0")
+    if not 0 < energy <= LARGEST:
+        raise BadInput(f"energy = {energy}, must be > 0 and at most 2^1000")
     return _solved(as_mushroom(scene), energy)
 
 

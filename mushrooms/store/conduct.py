@@ -18,7 +18,7 @@ import numpy as np
 
 from fast.narrowings import narrowings
 from mushrooms.forecast import expected_collisions
-from mushrooms.store.asked import Asked, difference
+from mushrooms.store.asked import Asked, difference, made_by
 from mushrooms.store.blocks import AnyRun, Block, Piece, RunFolder, attributes_of, is_run
 from mushrooms.store.engines import Engine, Tick, follow
 from mushrooms.store.layout import Arrays, Shape
@@ -26,6 +26,8 @@ from scene.refusal import BadInput
 
 BLOCK_COLLISIONS = 2e8  # of a block, some seconds: what a fault can cost, and long beside a block's files
 LEAST_BLOCK, MOST_BLOCK = 256, 2**17  # particles: a thread's lanes are full, and memory stays small
+ROOM = 2**12  # particles of a new run's block, however few it has: it may be widened
+LARGEST_BLOCK = 2**20  # particles that may be asked for: in memory some gigabytes
 BLOCK_BYTES = 2**26  # on disk; in memory several times that
 LANES_OF_A_THREAD = 128  # particles that a thread needs to be quick
 MOST_BLOCKS = 10**6
@@ -58,6 +60,11 @@ def block_size(asked: Asked, threads: int) -> int:
     wanted = BLOCK_COLLISIONS / max(each, 1.0) if math.isfinite(each) else LEAST_BLOCK
     most = min(MOST_BLOCK, BLOCK_BYTES // shape_of(asked, 1, 1).bytes_of_a_particle)
     return int(2 ** math.floor(math.log2(max(1, min(max(wanted, least), most)))))
+
+
+def block_of_new(asked: Asked, n_particles: int, threads: int) -> int:
+    """Return how many particles a new run's blocks have: no more than it takes, as chunks are filled up."""
+    return min(block_size(asked, threads), max(ROOM, 1 << (n_particles - 1).bit_length()))
 
 
 def shape_of(asked: Asked, n_particles: int, block: int, chunked: int | None = None) -> Shape:
@@ -237,15 +244,18 @@ def _probe(run: RunFolder) -> None:
 def _compare(run: RunFolder, ones: Arrays, others: Arrays) -> None:
     for name, one in ones.items():
         if not np.array_equal(one, others[name], equal_nan=one.dtype.kind == "f"):
-            made = attributes_of(run.folder)["versions"]
+            made, here = attributes_of(run.folder), made_by()
+            by = next((key for key in here if made.get(key) != here[key]), "versions")
             raise BadInput(
-                f"output {str(run.folder)!r}: {name} of its first particles comes out otherwise here; it was"
-                f" made by {made}"
+                f"output {str(run.folder)!r}: {name} of its first particles comes out otherwise here, where"
+                f" {by} = {here[by]}; it was made by {made.get(by)}; another --out begins anew"
             )
 
 
 def _check_disk(run: RunFolder) -> None:
-    needed = sum(piece.n * run.shape.bytes_of_a_particle + MARKER_BYTES for piece in run.lacking())
+    # A block's chunks are filled up, whatever it lacks and however few particles it has.
+    each = run.shape.block * run.shape.bytes_of_a_particle + MARKER_BYTES
+    needed = each * sum(1 for _ in run.lacking())
     free = shutil.disk_usage(run.folder).free
     if needed > free:
         raise BadInput(

@@ -101,11 +101,13 @@ def by_dask(address: str, threads: int | None) -> Engine:
     """
     try:
         from distributed import Client
+        from distributed.comm import resolve_address
     except ImportError:
         raise BadInput("--dask needs dask.distributed: pip install 'oscillating-mushrooms[scale]'") from None
 
     def engine(asked: Asked, pieces: Iterator[Piece], tick: Tick) -> Following:
         try:
+            resolve_address(address)  # of what is no address the client is made, and cannot be closed
             # Not the process's default: what else computes with Dask here would wait for this one, even
             # after it has failed to connect.
             client = Client(address, timeout=CONNECT_TIMEOUT, set_as_default=False)

@@ -56,7 +56,7 @@ def _find(case: str, seed: int | None) -> Vector:
     known = vectors.load("stress")
     drawn = [] if seed is None else drawn_horizons([v for v in known if v.level == "core"], seed)
     if seed is not None and case in {f"fresh/{number}" for number in range(1, max(N_FRESH.values()) + 1)}:
-        drawn = fresh(seed, int(case.removeprefix("fresh/")))
+        drawn = list(fresh(seed, int(case.removeprefix("fresh/"))))
     for vector in (*known, *drawn):
         if vector.id == case:
             return vector

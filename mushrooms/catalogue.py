@@ -27,7 +27,7 @@ def list_scenes(
     if as_toml and as_json:
         raise BadInput("--toml and --json: must be one of them")
     if as_toml and not name:
-        raise BadInput("--toml needs NAME: which scene of the catalogue")
+        raise BadInput(f"--toml needs NAME, one of {', '.join(scenes.catalogue())}")
     if name:
         _print_scene(name, as_json)
         return

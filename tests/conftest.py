@@ -20,6 +20,7 @@ from hypothesis import settings
 from numba.core.dispatcher import Dispatcher
 from support.entries import kept_entries
 
+from conformance.suite import run as suite
 from fast.kernel import beside
 from mushrooms.main import run
 
@@ -98,6 +99,14 @@ def _compiled_once() -> None:
     for entry in kept_entries():
         entry.compile = one_at_a_time(entry)
     beside.start = lambda: None  # who waits for a lock has nothing to compile beside it
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _few_fresh_questions() -> Iterator[None]:
+    """Prove few questions in each run of the suite in this process; test_conformance_fresh.py asks all."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(suite, "N_FRESH", dict.fromkeys(suite.N_FRESH, 3))
+        yield
 
 
 @pytest.fixture

@@ -48,4 +48,4 @@ def test_nonsense_ends_in_verdicts(monkeypatch, small, tally):
         assert run.exit_code() in (0, 1, 2)
         reports.to_json(run)
         reports.to_junit(run)
-    assert min(tally["wrong-format"], tally["error"], tally["fail"], tally["pass"]) > N_RUNS
+    assert min(tally["wrong-format"], tally["error"], tally["fail"], tally["pass"]) > N_RUNS // 2

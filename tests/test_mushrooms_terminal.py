@@ -202,6 +202,9 @@ def test_whatever_ends_a_command_no_half_written_file_stays(tmp_path, name, is_f
             os.kill(os.getpid(), signal.{name})
 
         table.write_picture = ended
+        # As a terminal starts a command: where these are ignored from the start they stay so.
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+        signal.signal(signal.SIGHUP, signal.SIG_DFL)
         run(["draw", "moving-cap", "--out", "a.svg"])
     """
     with Path("/dev/full").open("w") as full:

@@ -213,9 +213,9 @@ def _level(scene: Scene | None, vector: Vector) -> Level:
     expected = _walls_met(scene, vector, vector.state)
     patterns = SIGNS if vector.kind == "step" else SIGNS[:2]
     for level, nudge in NUDGES:
-        nudged = (nudged(vector.state, vector.t_end, signs, nudge) for signs in patterns)
+        states = (nudged(vector.state, vector.t_end, signs, nudge) for signs in patterns)
         if vector.condition <= CONDITIONS[level] and all(
-            _walls_met(scene, vector, state) == expected for state in nudged
+            _walls_met(scene, vector, state) == expected for state in states
         ):
             return level
     return "stress"

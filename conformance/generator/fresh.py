@@ -56,25 +56,25 @@ ATTEMPTS, LIKE_BEFORE = 4000, 50
 NUDGE = dict(NUDGES)["core"]
 
 
-def fresh(seed: int, n: int) -> list[Vector]:
-    """Draw questions and prove their answers.
+def fresh(seed: int, n: int) -> Iterator[Vector]:
+    """Draw questions and prove their answers, each when it is asked for.
 
     Args:
         seed: of the run.
         n: how many.
 
-    Returns:
+    Yields:
         Steps of level core that end in a collision, `fresh/1` to `fresh/n`; a greater n only adds some.
 
     Raises:
         BadInput: for none of very many draws an answer is proved.
     """
-    found: list[Vector] = []
+    last: Vector | None = None
     for number in range(1, n + 1):
-        before = found[-1] if number % 3 == 0 else None
+        before = last if number % 3 == 0 else None
         proved = (_proved(question, number) for question in _questions(seed, number, before))
-        found.append(next(vector for vector in proved if vector))
-    return found
+        last = next(vector for vector in proved if vector)
+        yield last
 
 
 def _questions(seed: int, number: int, before: Vector | None) -> Iterator[tuple[Scene, State, float]]:

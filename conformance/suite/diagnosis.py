@@ -11,6 +11,8 @@ import math
 from collections.abc import Sequence
 from importlib import resources
 
+from conformance.generator.fresh import GROUP as FRESH
+from conformance.suite.disguise import DRAWN
 from conformance.suite.result import Result
 
 ALIKE = 0.5  # least correlation of two verdicts over the vectors asked
@@ -22,10 +24,11 @@ def diagnose(results: Sequence[Result]) -> list[str]:
     """Name the mutants that fail most like this, one line each, the likest first; nothing without a likeness.
 
     Args:
-        results: of a run; failures and passes of vectors count.
+        results: of a run; failures and passes of vectors count, of those that the mutants were asked.
     """
-    failed = {r.id for r in results if r.level and r.verdict == "fail"}
-    asked = failed | {r.id for r in results if r.level and r.verdict == "pass"}
+    kept = [r for r in results if r.level and r.group not in (DRAWN, FRESH)]
+    failed = {r.id for r in kept if r.verdict == "fail"}
+    asked = failed | {r.id for r in kept if r.verdict == "pass"}
     if not failed:
         return []
     matrix = json.loads((resources.files("conformance") / "mutants" / "kill-matrix.json").read_bytes())

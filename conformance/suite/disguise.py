@@ -21,7 +21,7 @@ from typing import Any, NamedTuple
 import msgspec
 
 from conformance.generator.draws import Draw
-from conformance.generator.fresh import GROUP
+from conformance.generator.fresh import GROUP as FRESH
 from conformance.grading.error import condition_number, free_flight, inputs_of, moved
 from conformance.vectors import NUMBERS, Expectation, Vector, certified
 from scene import BadInput, BangBang, Fourier, Scene, State, from_data, to_data, transforms
@@ -32,7 +32,7 @@ LARGEST = 12  # exponents of two are drawn between this and its negative
 RANGE = 2.0**-350, 2.0**350  # numbers that a scale may lead to: their squares are far from both ends
 TIMES = ("dt", "t")
 ROUNDS = 1, 2, 3, 6  # the corpus itself has at most four legs
-N_DRAWN = 60  # questions of the group `drawn`
+DRAWN, N_DRAWN = "drawn", 60  # a group of questions, and how many it has
 PARTS = 0.05, 0.95  # of the certified flight, at which the particle is asked for
 
 
@@ -68,7 +68,7 @@ class Disguise(NamedTuple):
 
 def drawn_disguise(vector: Vector, seed: int) -> Disguise:
     """Draw the symmetry by which a vector is asked in the run of a seed; what is fresh needs none."""
-    if vector.group == GROUP:
+    if vector.group == FRESH:
         return Disguise()
     own, shared = Draw(f"{seed}/{vector.id}"), Draw(f"{seed}/{msgspec.json.encode(vector.scene).decode()}")
     is_mirrored = own.pick((False, True))
@@ -233,8 +233,8 @@ def _before_the_hit(vector: Vector, part: float, number: int) -> Vector | None:
     step = certified({n: (v, v) for n, v in numbers.items()}, [moved(row, inputs) for row in jacobian], None)
     return msgspec.structs.replace(
         vector,
-        id=f"drawn/{number}",
-        group="drawn",
+        id=f"{DRAWN}/{number}",
+        group=DRAWN,
         rule=f"{vector.id} at a time before its hit",
         t_end=t_end,
         expect=(Expectation("horizon", (step,)),),

@@ -24,12 +24,14 @@ from typing import Any
 import msgspec
 
 from conformance import properties, vectors
-from conformance.generator.fresh import GROUP, fresh
+from conformance.generator.fresh import GROUP as FRESH
+from conformance.generator.fresh import fresh
 from conformance.grading.agreement import middle
 from conformance.grading.grade import Grade, grade
 from conformance.suite import promises, property_checks, timing
 from conformance.suite.diagnosis import diagnose
 from conformance.suite.disguise import (
+    DRAWN,
     N_DRAWN,
     Disguise,
     asked,
@@ -92,12 +94,11 @@ def check(
     manifest = vectors.manifest()
     seed = secrets.randbelow(NEW_SEEDS) if seed is None else check_seed(seed)
     limits = limits or Limits()
-    drawn = drawn_horizons([v for v in chosen if v.level == "core"], seed)
-    drawn += [] if groups else fresh(seed, N_FRESH[level])
     begin = time.monotonic()
     with Session(command, limits) as session:
         tell = progress or (lambda _done, _total: None)
-        results, speed = _converse(session, chosen, drawn, (level, seed), tell)
+        n_fresh = 0 if groups else N_FRESH[level]
+        results, speed = _converse(session, chosen, n_fresh, (level, seed), tell)
         results = [msgspec.structs.replace(result, is_known=result.id in known) for result in results]
         passed = {result.id for result in results if result.verdict == "pass"}
         return Run(
@@ -143,7 +144,7 @@ def read_known(path: Path) -> frozenset[str]:
     except (OSError, UnicodeDecodeError) as error:
         raise BadInput(f"known failures {str(path)!r} cannot be read: {error}") from None
     ids = {vector.id for vector in vectors.load("stress")} | set(OTHER_CASES)
-    for group, n in (("drawn", N_DRAWN), (GROUP, max(N_FRESH.values()))):
+    for group, n in ((DRAWN, N_DRAWN), (FRESH, max(N_FRESH.values()))):
         ids |= {f"{group}/{number}" for number in range(1, n + 1)}
     found: set[str] = set()
     for number, line in enumerate(lines, 1):
@@ -160,7 +161,7 @@ def read_known(path: Path) -> frozenset[str]:
 def _converse(
     session: Session,
     chosen: Sequence[Vector],
-    drawn: Sequence[Vector],
+    n_fresh: int,
     run: tuple[str, int],
     progress: Progress,
 ) -> tuple[list[Result], Speed | None]:
@@ -172,8 +173,9 @@ def _converse(
             unreached = Trouble(results[-1].verdict, f"not asked: {name} failed")
             return [*results, *(_result(vector, unreached) for vector in chosen)], None
     results.append(_tried("rejects", partial(_ask_nonsense, session)))
-    questions = [*chosen, *drawn]
-    total = len(results) + len(questions) + len(OTHER_CASES) - len(PROTOCOL_CASES)
+    known = [*chosen, *drawn_horizons([v for v in chosen if v.level == "core"], seed)]
+    questions = itertools.chain(known, fresh(seed, n_fresh))
+    total = len(results) + len(known) + n_fresh + len(OTHER_CASES) - len(PROTOCOL_CASES)
     for result in itertools.chain(
         (ask_vector(session, vector, drawn_disguise(vector, seed)) for vector in questions),
         _ask_further(session, chosen, level, seed),

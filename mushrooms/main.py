@@ -173,7 +173,8 @@ _told = list[str]()  # of an interruption, in this call of `run`
 def tell_interrupted(kept: str) -> None:
     """Say on stderr that the command was interrupted, and what is kept; a command that knows more says it."""
     _told.append(kept)
-    print(f"{PROGRAM}: interrupted; {kept}", file=sys.stderr)
+    with suppress(OSError):  # the terminal may be what has gone, or be full: the exit code still tells
+        print(f"{PROGRAM}: interrupted; {kept}", file=sys.stderr, flush=True)
 
 
 @contextmanager

@@ -10,7 +10,7 @@ import pytest
 
 import fast
 from conformance import plain, vectors
-from conformance.generator.fresh import WALLS, fresh
+from conformance.generator.fresh import WALLS, drawn_scene, fresh
 from conformance.grading.grade import grade
 from conformance.mutants import Mutant
 from conformance.plain.motion import BangBangMotion
@@ -18,7 +18,7 @@ from conformance.plain.step import Flight
 from conformance.suite.disguise import Disguise, drawn_disguise
 from conformance.suite.run import N_FRESH
 from fast.__main__ import carry, follow
-from scene import BangBang, Fourier, Mushroom, Rejected, from_data
+from scene import BadInput, BangBang, Fourier, Mushroom, Rejected, from_data
 from scene.tables import laws
 
 SEEDS = (1, 2)
@@ -65,6 +65,21 @@ def test_all_is_asked_that_the_corpus_asks_seldom(seed, questions, tally):
 def test_what_is_drawn_follows_from_the_seed(questions):
     assert fresh(1, 12) == questions[1][:12]
     assert fresh(3, 12) != questions[1][:12]
+
+
+def test_hundreds_of_draws_that_are_none_end_no_run(monkeypatch):
+    """One in forty meets the base of a mushroom: in some runs of thousands four hundred in a row do not."""
+    n_left = 1000
+
+    def drawn(draw, table):
+        nonlocal n_left
+        n_left -= 1
+        if n_left >= 0:
+            raise BadInput("none")
+        return drawn_scene(draw, table)
+
+    monkeypatch.setattr("conformance.generator.fresh.drawn_scene", drawn)
+    assert len(fresh(1, 1)) == 1
 
 
 class RoomForThirtyLegs(BangBangMotion):

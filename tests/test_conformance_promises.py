@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 from support.depth import deep_among
-from support.promise_breakers import FAULTS, Breaker
+from support.promise_breakers import FAULTS, Breaker, bisecting, remembering_steps
 
 from conformance import vectors
 from conformance.suite import promises, session, timing
@@ -43,6 +43,15 @@ def test_a_breach_is_met(opened, name):
     ((_, met, why, _),) = promises.ask_promises(opened(fault), (promise,))
     assert met == verdict, why
     assert why.isprintable()
+
+
+@pytest.mark.parametrize("cell", [10 * 2.0**-n for n in (32, 37, 41, 44, 46)])
+def test_a_coarse_one_may_not_tell_near_questions_apart_but_those_that_it_can(opened, cell):
+    """Vectors let it pass, and say class B or C; a promise is no place to ask for more."""
+    coarse, keeping = (bisecting(cell), "pass"), (bisecting(cell, remembering_steps(6)), "fail")
+    for fault, wanted in (coarse, keeping):
+        ((_, verdict, why, _),) = promises.ask_promises(opened(fault), ("near-questions",))
+        assert verdict == wanted, why
 
 
 def test_every_promise_has_its_breach():

@@ -120,6 +120,7 @@ def test_at_level_stress_a_group_may_be_declined_but_not_all_that_is_asked():
     [
         ("breathing-circle/1\nno-such/1", ":2: no-such/1"),
         ("property/no-such", "no case"),
+        ("fresh/265", "no case"),
         ("grazing/1\ngrazing/1 # again", "twice"),
     ],
 )
@@ -132,8 +133,8 @@ def test_a_known_failures_file_is_checked(tmp_path, text, word):
 
 def test_known_failures_are_read(tmp_path):
     path = tmp_path / "known.txt"
-    path.write_text("# ours\n\nbreathing-circle/1   # issue 7\nproperty/mirror\n")
-    assert suite.read_known(path) == {"breathing-circle/1", "property/mirror"}
+    path.write_text("# ours\n\nbreathing-circle/1   # issue 7\nproperty/mirror\nfresh/7\ndrawn/60\n")
+    assert suite.read_known(path) == {"breathing-circle/1", "property/mirror", "fresh/7", "drawn/60"}
     with pytest.raises(BadInput, match="cannot be read"):
         suite.read_known(tmp_path / "absent.txt")
 

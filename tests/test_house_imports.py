@@ -11,7 +11,8 @@ PACKAGES = {"scene", "reference", "fast", "theory", "conformance", "mushrooms"}
 STEPPERS = {"reference", "fast"}
 # What the files of a folder may import of ours, besides their own package; the deepest folder named here
 # decides. The audit compares the steppers, and the generator certifies vectors: of `conformance` they alone
-# meet steppers by import. The rest is given commands, or functions.
+# meet steppers by import. The rest is given commands, or functions; the suite has questions drawn and proved
+# by the generator (`conformance.generator.fresh`).
 MAY_IMPORT = {
     "scene": set(),
     "reference": {"scene"},

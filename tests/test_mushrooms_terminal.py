@@ -188,8 +188,10 @@ def test_standard_output_may_be_closed_or_full(tmp_path, to, code, word, more):
     assert done.stdout == "" or (not to and json.loads(done.stdout)["name"] == "moving-cap")
 
 
+@pytest.mark.parametrize("is_full", [False, True])
 @pytest.mark.parametrize("name", ["SIGINT", "SIGTERM", "SIGHUP"])
-def test_whatever_ends_a_command_no_half_written_file_stays(tmp_path, name):
+def test_whatever_ends_a_command_no_half_written_file_stays(tmp_path, name, is_full):
+    """Also where nothing can be said of it: a terminal that has gone takes no more."""
     code = f"""if True:
         import os, signal
         from mushrooms.figures import table
@@ -202,15 +204,16 @@ def test_whatever_ends_a_command_no_half_written_file_stays(tmp_path, name):
         table.write_picture = ended
         run(["draw", "moving-cap", "--out", "a.svg"])
     """
-    words = [sys.executable, "-c", code]
-    done = subprocess.run(
-        words,
-        cwd=tmp_path,
-        capture_output=True,
-        text=True,
-        timeout=60,
-        env={**os.environ, "PYTHONPATH": str(ROOT)},
-    )
+    with Path("/dev/full").open("w") as full:
+        done = subprocess.run(
+            [sys.executable, "-c", code],
+            cwd=tmp_path,
+            stdout=subprocess.PIPE,
+            stderr=full if is_full else subprocess.PIPE,
+            text=True,
+            timeout=60,
+            env={**os.environ, "PYTHONPATH": str(ROOT)},
+        )
     assert done.returncode == INTERRUPTED
-    assert done.stderr == f"mushrooms: interrupted; {NOTHING_KEPT}\n"
+    assert is_full or done.stderr == f"mushrooms: interrupted; {NOTHING_KEPT}\n"
     assert list(tmp_path.iterdir()) == []

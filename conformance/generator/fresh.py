@@ -50,7 +50,9 @@ SHAPES = {"h": (-5, -3, 3, 5), "nu": (-8, -4), "w": (-8, -4)}  # powers of two t
 FAINT = 8, 20, 30  # powers of a half that what a law moves by is multiplied with
 LONGEST = 8.0  # periods of one flight
 NAMES = "", "", "scene", "scene", "1"
-ATTEMPTS = 400
+# Draws for one question, and how many of them are like the one before. Every fortieth meets a mushroom's
+# base: of four hundred, none would in one of some thousands of runs.
+ATTEMPTS, LIKE_BEFORE = 4000, 50
 NUDGE = dict(NUDGES)["core"]
 
 
@@ -80,7 +82,7 @@ def _questions(seed: int, number: int, before: Vector | None) -> Iterator[tuple[
     table, wanted = WALLS[(number - number // 3) % len(WALLS)]
     for attempt in range(ATTEMPTS):
         draw = Draw(f"{seed}/{GROUP}/{number}/{attempt}")
-        is_like_before = before is not None and attempt < ATTEMPTS // 8
+        is_like_before = before is not None and attempt < LIKE_BEFORE
         try:
             if before is not None and is_like_before:
                 of, start, t_end = _one_law_changed(draw, from_data(before.scene)), before.state, before.t_end

@@ -137,7 +137,7 @@ class Run(msgspec.Struct, frozen=True):
     def _declined_too_often(self) -> Iterator[str]:
         """Say where too much was declined for the rest to speak for it: of everything, and of a group.
 
-        What is at level stress may be declined in any group, where binary64 cannot tell; it counts in everything.
+        What is at level stress may be declined in any group, as binary64 cannot tell; it counts in all.
         """
         for group, most in ((None, MAX_DECLINED), *((name, MAX_DECLINED_OF_GROUP) for name in self.groups())):
             declined, asked = self.declined(group)

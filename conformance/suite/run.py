@@ -24,12 +24,13 @@ from typing import Any
 import msgspec
 
 from conformance import properties, vectors
-from conformance.generator.fresh import fresh
+from conformance.generator.fresh import GROUP, fresh
 from conformance.grading.agreement import middle
 from conformance.grading.grade import Grade, grade
 from conformance.suite import promises, property_checks, timing
 from conformance.suite.diagnosis import diagnose
 from conformance.suite.disguise import (
+    N_DRAWN,
     Disguise,
     asked,
     drawn_disguise,
@@ -132,7 +133,7 @@ def choose(level: str, groups: Sequence[str] = ()) -> list[Vector]:
 
 
 def read_known(path: Path) -> frozenset[str]:
-    """Read a known-failures file: one id a line, # begins a comment.
+    """Read a known-failures file: one id a line, # begins a comment; what is drawn is of one seed's run.
 
     Raises:
         BadInput: naming the line whose id the suite does not have, or that comes twice.
@@ -142,6 +143,8 @@ def read_known(path: Path) -> frozenset[str]:
     except (OSError, UnicodeDecodeError) as error:
         raise BadInput(f"known failures {str(path)!r} cannot be read: {error}") from None
     ids = {vector.id for vector in vectors.load("stress")} | set(OTHER_CASES)
+    for group, n in (("drawn", N_DRAWN), (GROUP, max(N_FRESH.values()))):
+        ids |= {f"{group}/{number}" for number in range(1, n + 1)}
     found: set[str] = set()
     for number, line in enumerate(lines, 1):
         name = line.partition("#")[0].strip()

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import io
 import json
+import math
 import time
 from collections.abc import Callable
 from typing import Any
@@ -235,6 +236,19 @@ def remembering_steps(digits: int) -> Fault:
         return {**found, "seq": request["seq"]}
 
     return fault
+
+
+def bisecting(cell: float, then: Fault = lambda request, answer: answer(request)) -> Fault:
+    """Find hits down to a tolerance, as honest ones do that halve an interval; a fault may come upon that."""
+
+    def change(request: Line, found: Line) -> Line:
+        if found["outcome"] == "collision":
+            start, dt = request["state"], math.floor(found["dt"] / cell) * cell
+            found |= {"dt": dt, "t": start["t"] + dt}
+            found |= {"x": start["x"] + start["vx"] * dt, "y": start["y"] + start["vy"] * dt}
+        return found
+
+    return lambda request, answer: then(request, lambda asked: on("step", change)(asked, answer))
 
 
 def first_time_for_all(request: Line, answer: Callable[[Line], Line]) -> Line:

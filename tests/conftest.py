@@ -50,6 +50,7 @@ LONGEST = [
     "test_mushrooms_scale.py",
     "test_reference_mutants.py",
     "test_conformance_properties.py",
+    "test_conformance_fresh.py",
     "test_theory_distribution.py",
     "test_conformance_bench.py",
     "test_conformance_session.py",

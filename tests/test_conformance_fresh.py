@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import json
+from functools import cache
 from typing import ClassVar
 
 import msgspec
 import pytest
+from support.depth import deep_but
 
 import fast
 from conformance import plain, vectors
@@ -25,14 +27,14 @@ SEEDS = (1, 2)
 N = N_FRESH["core"]
 
 
-@pytest.fixture(scope="module")
-def questions():
-    return {seed: list(fresh(seed, N)) for seed in SEEDS}
+@cache
+def questions(seed):
+    return list(fresh(seed, N))
 
 
-@pytest.mark.parametrize("seed", SEEDS)
-def test_right_steppers_pass(seed, questions):
-    for vector in questions[seed]:
+@pytest.mark.parametrize("seed", deep_but(SEEDS, 1))
+def test_right_steppers_pass(seed):
+    for vector in questions(seed):
         for step, path, flow in (
             (fast.next_collision, follow, carry),
             (plain.next_collision, plain.trajectory, plain.flow),
@@ -41,9 +43,9 @@ def test_right_steppers_pass(seed, questions):
             assert found.verdict == "pass", (vector, found)
 
 
-@pytest.mark.parametrize("seed", SEEDS)
-def test_all_is_asked_that_the_corpus_asks_seldom(seed, questions, tally):
-    asked = questions[seed]
+@pytest.mark.parametrize("seed", deep_but(SEEDS, 1))
+def test_all_is_asked_that_the_corpus_asks_seldom(seed, tally):
+    asked = questions(seed)
     known = {msgspec.json.encode(vector.scene) for vector in vectors.load("stress")}
     for i, vector in enumerate(asked):
         scene, (step,) = from_data(vector.scene), vector.expect[0].steps
@@ -62,9 +64,9 @@ def test_all_is_asked_that_the_corpus_asks_seldom(seed, questions, tally):
     assert tally["more than 20 legs"] >= 3
 
 
-def test_what_is_drawn_follows_from_the_seed(questions):
-    assert list(fresh(1, 12)) == questions[1][:12]
-    assert list(fresh(3, 12)) != questions[1][:12]
+def test_what_is_drawn_follows_from_the_seed():
+    assert list(fresh(1, 12)) == questions(1)[:12]
+    assert list(fresh(3, 12)) != questions(1)[:12]
 
 
 def test_hundreds_of_draws_that_are_none_end_no_run(monkeypatch):
@@ -80,6 +82,21 @@ def test_hundreds_of_draws_that_are_none_end_no_run(monkeypatch):
 
     monkeypatch.setattr("conformance.generator.fresh.drawn_scene", drawn)
     assert len(list(fresh(1, 1))) == 1
+
+
+def test_hundreds_of_draws_that_are_none_end_no_run(monkeypatch):
+    """One in forty meets the base of a mushroom: in some runs of thousands four hundred in a row do not."""
+    n_left = 1000
+
+    def drawn(draw, table):
+        nonlocal n_left
+        n_left -= 1
+        if n_left >= 0:
+            raise BadInput("none")
+        return drawn_scene(draw, table)
+
+    monkeypatch.setattr("conformance.generator.fresh.drawn_scene", drawn)
+    assert len(fresh(1, 1)) == 1
 
 
 class RoomForThirtyLegs(BangBangMotion):
@@ -216,5 +233,5 @@ def n_failures(flight, asked):
 
 
 @pytest.mark.parametrize("name", FAULTY)
-def test_who_is_right_in_the_corpus_alone_is_found_out(name, questions):
-    assert sum(n_failures(FAULTY[name], questions[seed]) for seed in SEEDS) >= 1
+def test_who_is_right_in_the_corpus_alone_is_found_out(name):
+    assert any(n_failures(FAULTY[name], questions(seed)) for seed in SEEDS)

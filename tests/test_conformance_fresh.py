@@ -84,21 +84,6 @@ def test_hundreds_of_draws_that_are_none_end_no_run(monkeypatch):
     assert len(list(fresh(1, 1))) == 1
 
 
-def test_hundreds_of_draws_that_are_none_end_no_run(monkeypatch):
-    """One in forty meets the base of a mushroom: in some runs of thousands four hundred in a row do not."""
-    n_left = 1000
-
-    def drawn(draw, table):
-        nonlocal n_left
-        n_left -= 1
-        if n_left >= 0:
-            raise BadInput("none")
-        return drawn_scene(draw, table)
-
-    monkeypatch.setattr("conformance.generator.fresh.drawn_scene", drawn)
-    assert len(fresh(1, 1)) == 1
-
-
 class RoomForThirtyLegs(BangBangMotion):
     """Joins all later legs to one."""
 

@@ -114,7 +114,7 @@ def failures(flight, questions, seed):
 FEW_LEGS = type("FewLegs", (Flight,), {"kinds": {**Flight.kinds, BangBang: FourLegsAtMost}})
 
 
-@pytest.mark.parametrize("flight", deep_but([FEW_LEGS, WavesFromFirstKnot], WavesFromFirstKnot))
+@pytest.mark.parametrize("flight", deep_but([FEW_LEGS, WavesFromFirstKnot], FEW_LEGS))
 def test_what_no_published_scene_has_is_asked_in_disguise(flight, corpus):
     """More legs than the corpus has, and waves beside knots that do not begin at 0."""
     steps = [v for v in corpus if v.kind == "step" and v.group in ("mixed-laws", "knots-off-zero", "waiting")]

@@ -26,6 +26,7 @@ def lean():
         return suite.check(command, seed=1, groups=["moving-cap", "fast-wall"], limits=Limits(total=300.0))
 
 
+@pytest.mark.deep
 @needs_compiler
 def test_a_lean_stepper_without_checks_passes_the_easy_and_fails_the_hard(lean):
     easy, hard = (lean.counts(group) for group in ("moving-cap", "fast-wall"))

@@ -257,6 +257,7 @@ def test_without_resume_no_run_is_replaced(call, tmp_path, blocks):
     assert len(blocks) == 6
 
 
+@pytest.mark.deep
 def test_entries_without_simulations_may_be_examined_apart(tmp_path):
     result = session.conduct(
         AuditSteppers(adiabatic_particles.simulate, fast.trajectory, fast.flow),

@@ -45,6 +45,7 @@ def call(command_line):
     return partial(command_line, "bench")
 
 
+@pytest.mark.deep
 def test_a_benchmark_is_written_whole_and_compared(call, tmp_path, monkeypatch):
     one = [sys.executable, "-m", "fast"]
     code, out, err = call("--quick", "--out", tmp_path / "one", "--seed", 5, "--", *one)

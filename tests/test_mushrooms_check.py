@@ -174,6 +174,7 @@ def test_a_group_that_does_not_exist_is_refused():
     assert refused.stderr.count("\n") == 1
 
 
+@pytest.mark.deep
 def test_one_test_per_vector_for_pytest(tmp_path):
     plugin = ["-p", "conformance.suite.pytest_plugin", "--pyargs", "conformance.suite.pytest_suite"]
     options = ["-q", "-k", "near-corner", "-p", "no:cacheprovider", "--rootdir", str(tmp_path)]

@@ -72,6 +72,7 @@ def test_workers_lengthen_a_run(command_line, tmp_path, stored):
     assert json.loads(ended.out)["sha256"] == wanted.sha256()
 
 
+@pytest.mark.deep
 def test_workers_may_die(command_line, tmp_path, ensemble, monkeypatch):
     """One is killed, in the middle of a block most likely; another takes its place."""
     keep, killed = blocks.RunFolder.keep, []

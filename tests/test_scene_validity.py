@@ -212,6 +212,7 @@ def refusals():
     return found
 
 
+@pytest.mark.deep
 def test_floats_find_the_same_instant_to_show(monkeypatch):
     def messages():
         tables._prove.cache_clear()

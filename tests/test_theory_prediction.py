@@ -124,6 +124,7 @@ def moving_cap_quadrature(ctx: Any) -> dict[str, Any]:
     return quadrature(ctx, ratio, lambda t: ratio(2 * ctx.pi - t), slope, [0, ctx.pi / 2, ctx.pi])
 
 
+@pytest.mark.deep
 def test_thirty_digits_agree_with_an_independent_quadrature() -> None:
     ctx = MPContext()
     ctx.dps = 36

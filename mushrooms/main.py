@@ -16,7 +16,7 @@ from contextlib import contextmanager, suppress
 from decimal import Decimal, InvalidOperation
 from importlib import import_module
 from itertools import pairwise
-from typing import Annotated, Any, NamedTuple, NoReturn, get_args, get_origin, get_type_hints
+from typing import IO, Annotated, Any, NamedTuple, NoReturn, get_args, get_origin, get_type_hints
 
 import typer
 from typer.core import TyperCommand, TyperGroup
@@ -202,9 +202,16 @@ def _ended_as_by_keyboard() -> Iterator[None]:
 
 def run(arguments: list[str] | None = None) -> NoReturn:
     """Run the command line and exit: 0 done, 1 a claim failed, 2 bad input, 130 interrupted."""
-    given = sys.argv[1:] if arguments is None else arguments
     _told.clear()
     _make_printable()
+    try:
+        _call(sys.argv[1:] if arguments is None else arguments)
+    finally:
+        for stream in (sys.stdout, sys.stderr):
+            _let_go(stream)
+
+
+def _call(given: list[str]) -> NoReturn:
     _refuse_empty(given)
     try:
         with _ended_as_by_keyboard():
@@ -213,9 +220,7 @@ def run(arguments: list[str] | None = None) -> NoReturn:
     except (KeyboardInterrupt, typer.Abort):
         code = INTERRUPTED  # which typer makes of Ctrl-C itself, in some versions
     except BrokenPipeError:
-        # The reader has gone: nothing to say, and nothing left for the interpreter to flush.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        sys.exit(1)
+        sys.exit(1)  # the reader has gone: nothing to say
     except UsageError as error:
         _refuse(error.format_message())
     except OSError as error:
@@ -253,6 +258,15 @@ def _make_printable() -> None:
         size = os.environ.get(name, "1")
         if not (size.isascii() and size.isdigit() and len(size) < 6 and int(size) > 0):
             del os.environ[name]
+
+
+def _let_go(stream: IO[str]) -> None:
+    """Leave nothing for the interpreter to flush at its end: what fails there makes every exit code 120."""
+    try:
+        stream.flush()
+    except (OSError, ValueError):
+        with suppress(OSError, ValueError):  # a stream that is no file of the system's
+            os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
 
 
 def _in_words(error: OSError) -> str:

@@ -5,13 +5,14 @@ from __future__ import annotations
 import base64
 import json
 import re
+import time
 from functools import partial
 from html.parser import HTMLParser
 
 import jsonschema
 import numpy as np
 import pytest
-from support import adiabatic_particles
+from support import adiabatic_particles, naps
 from support.depth import deep_among
 from support.harm import held
 from support.refusals import assert_refused
@@ -265,3 +266,19 @@ def test_entries_without_simulations_may_be_examined_apart(tmp_path):
         entries=ledger.select("M10,M13"),
     )
     assert result.is_passed
+
+
+def test_an_interruption_waits_for_no_process_of_the_audits_own(tmp_path, monkeypatch):
+    """One that reaches this process alone, as a batch system's signal does."""
+    monkeypatch.setattr(session, "_examine_apart", naps.nap)
+    settings = AuditSettings(folder=tmp_path, apart=True)
+
+    def interrupted():
+        with session._elsewhere(settings, ledger.select("M10")):
+            while not (tmp_path / "begun").exists():
+                time.sleep(0.01)
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        interrupted()
+    assert not (tmp_path / "ended").exists()

@@ -19,6 +19,8 @@ from mushrooms.main import COMMANDS, INTERRUPTED, NOTHING_KEPT, command, run
 from mushrooms.terminal import print_pairs, table_console
 
 ROOT = Path(__file__).parent.parent
+# As a shell has it: what could not be written is still there when the interpreter ends.
+BUFFERED = {name: value for name, value in os.environ.items() if name != "PYTHONUNBUFFERED"}
 HEAVY = {"numpy", "numba", "mpmath", "msgspec", "scipy", "matplotlib", "rich", "scene", "fast", "theory"}
 
 
@@ -182,7 +184,9 @@ def test_wherever_it_prints_nothing_is_lost_for_want_of_a_letter_or_a_width(monk
 @pytest.mark.parametrize("more", ["", "2>&-"])
 def test_standard_output_may_be_closed_or_full(tmp_path, to, code, word, more):
     line = f'"{sys.executable}" -m mushrooms scenes moving-cap --json {to} {more}'
-    done = subprocess.run(line, shell=True, cwd=ROOT, capture_output=True, text=True, timeout=60)
+    done = subprocess.run(
+        line, shell=True, cwd=ROOT, env=BUFFERED, capture_output=True, text=True, timeout=60
+    )
     assert done.returncode == code
     assert word in done.stderr or more
     assert "Traceback" not in done.stderr
@@ -216,7 +220,7 @@ def test_whatever_ends_a_command_no_half_written_file_stays(tmp_path, name, is_f
             stderr=full if is_full else subprocess.PIPE,
             text=True,
             timeout=60,
-            env={**os.environ, "PYTHONPATH": str(ROOT)},
+            env={**BUFFERED, "PYTHONPATH": str(ROOT)},
         )
     assert done.returncode == INTERRUPTED
     assert is_full or done.stderr == f"mushrooms: interrupted; {NOTHING_KEPT}\n"

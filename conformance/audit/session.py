@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor
 from contextlib import contextmanager
 from functools import cache
-from multiprocessing import get_context
+from multiprocessing import active_children, get_context
 from pathlib import Path
 from typing import NamedTuple
 
@@ -170,6 +170,11 @@ def _elsewhere(settings: AuditSettings, entries: list[Entry]) -> Iterator[dict[s
     pool = ProcessPoolExecutor(1, mp_context=get_context("spawn"))
     try:
         yield {entry.id: pool.submit(_examine_apart, entry.id, settings) for entry in entries}
+    except KeyboardInterrupt:
+        # Ctrl-C in a terminal reaches it too, a batch system's signal does not: a claim can take minutes.
+        for process in active_children():
+            process.terminate()
+        raise
     finally:
         pool.shutdown(cancel_futures=True)
 

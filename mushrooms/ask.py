@@ -45,7 +45,7 @@ def ask(
 
 def _find(case: str, seed: int | None) -> Vector:
     from conformance import vectors
-    from conformance.generator.fresh import fresh
+    from conformance.generator.fresh import fresh_one
     from conformance.suite.disguise import drawn_horizons
     from conformance.suite.run import N_FRESH
 
@@ -56,7 +56,7 @@ def _find(case: str, seed: int | None) -> Vector:
     known = vectors.load("stress")
     drawn = [] if seed is None else drawn_horizons([v for v in known if v.level == "core"], seed)
     if seed is not None and case in {f"fresh/{number}" for number in range(1, max(N_FRESH.values()) + 1)}:
-        drawn = list(fresh(seed, int(case.removeprefix("fresh/"))))
+        return fresh_one(seed, int(case.removeprefix("fresh/")))
     for vector in (*known, *drawn):
         if vector.id == case:
             return vector

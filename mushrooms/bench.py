@@ -17,7 +17,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from mushrooms import output
-from mushrooms.terminal import compilation_told, progress_bar
+from mushrooms.terminal import compilation_told, progress_bar, refuse_unheeded
 from scene.files import Writer, write_files
 from scene.refusal import BadInput, check_seed
 
@@ -66,7 +66,7 @@ def bench(
     from mushrooms.figures import speed as figures_of_speed
     from mushrooms.reports import bench_page
 
-    _check_table(table, workload, {"--quick": quick, "--compare": compare, "COMMAND": command})
+    _check_table(table, workload, quick, compare, command)
     if table is not None:
         print(bench_page.to_markdown(record.read(table), workload or "moving-cap-1e7"), end="")
         return
@@ -100,13 +100,15 @@ def bench(
         raise typer.Exit(1 if slower else 0)
 
 
-def _check_table(table: Path | None, workload: str | None, measuring: dict[str, object]) -> None:
+def _check_table(
+    table: Path | None, workload: str | None, quick: bool, compare: Path | None, command: list[str] | None
+) -> None:
     """Refuse options that would change nothing: a table is of an earlier run, and a run has all workloads."""
-    if table is None and workload is not None:
-        raise BadInput(f"--workload = {workload!r} would change nothing here: it needs --table")
-    for name, value in measuring.items() if table is not None else ():
-        if value:
-            raise BadInput(f"{name} would change nothing here: --table measures nothing")
+    if table is None:
+        refuse_unheeded({"--workload": workload}, "it needs --table")
+    else:
+        measuring = {"--quick": quick or None, "--compare": compare, "COMMAND": command or None}
+        refuse_unheeded(measuring, "--table measures nothing")
 
 
 def _measured(size: Size, seed: int, command: list[str]) -> Record:

@@ -17,10 +17,11 @@ from mushrooms.terminal import (
     compilation_told,
     load_scene,
     progress_bar,
+    refuse_unheeded,
 )
 from scene import Scene
 from scene.files import write_file
-from scene.refusal import BadInput, check_seed
+from scene.refusal import check_seed
 
 
 class Usual(NamedTuple):
@@ -59,6 +60,7 @@ Energy = Annotated[
 Length = Annotated[int | None, typer.Option(help="Collisions of each particle, 1 to 10^6.")]
 Many = Annotated[int | None, typer.Option(help="Particles of a section, a map, exponents; 1 to 1000.")]
 Seed = Annotated[int | None, typer.Option(help="Seed of the random starts, 0 to 2^64 - 1; by default 0.")]
+OF_PARTICLES = ("--energy", "--collisions", "--seed", "--particles")
 OF_MANY = ("section", "map", "lyapunov")
 
 
@@ -93,17 +95,18 @@ def draw(
 
     asked = (trajectory, section, boundary_map, growth, lyapunov)
     kinds = [kind for kind, is_asked in zip(PICTURES, asked, strict=True) if is_asked]
-    options = {"energy": energy, "collisions": collisions, "seed": seed, "particles": particles}
+    options = dict(zip(OF_PARTICLES, (energy, collisions, seed, particles), strict=True))
     if is_run(Path(scene)):
-        _refuse_options(dict.fromkeys(kinds, True) | {"export": export} | options, f"{scene!r} is a run")
+        pictures = {f"--{kind}": True for kind in kinds}
+        refuse_unheeded({**pictures, "--export": export, **options}, f"{scene!r} is a run")
         print(draw_run(Path(scene), out))
         return
     table = load_scene(scene)
     _check(energy, collisions, particles, seed)
     if not kinds and export is None:
-        _refuse_options(options, "the picture of the walls has no particles")
+        refuse_unheeded(options, "the picture of the walls has no particles")
     if not set(kinds) & set(OF_MANY):
-        _refuse_options({"particles": particles}, f"it is of --{', --'.join(OF_MANY)}")
+        refuse_unheeded({"--particles": particles}, f"it is of --{', --'.join(OF_MANY)}")
     if export is not None:
         output.check_file(export, (".csv", ".parquet"))
     is_drawn = bool(kinds) or export is None or out is not None
@@ -139,18 +142,6 @@ class _Asked(NamedTuple):
             seed=self.seed,
             n_orbits=n_orbits or self.n_orbits or usual.n_orbits,
         )
-
-
-def _refuse_options(options: dict[str, Any], why: str) -> None:
-    """Refuse options that nothing which is drawn would heed: whoever gives one counts on it.
-
-    Raises:
-        BadInput: naming the first that is given.
-    """
-    for name, value in options.items():
-        if value is not None:
-            given = f"--{name}" if value is True else f"--{name} = {value}"
-            raise BadInput(f"{given} would change nothing here: {why}")
 
 
 def _check(energy: float | None, collisions: int | None, particles: int | None, seed: int | None) -> None:

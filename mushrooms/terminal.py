@@ -107,6 +107,23 @@ def load_scene(name: str) -> Scene:
     return scene_named(name)
 
 
+def refuse_unheeded(options: Mapping[str, object], why: str) -> None:
+    """Refuse options that nothing here would heed: whoever gives one counts on it.
+
+    Args:
+        options: by name; None is one that is not given, True one that has no value.
+        why: nothing heeds them.
+
+    Raises:
+        BadInput: naming the first that is given.
+    """
+    for name, value in options.items():
+        if value is not None:
+            shown = repr(value) if isinstance(value, str) else value
+            given = name if value is True else f"{name} = {shown}"
+            raise BadInput(f"{given} would change nothing here: {why}")
+
+
 def check_range(option: str, value: int, low: int, high: int | None = None) -> None:
     """Refuse an option's number that is out of bounds."""
     if value < low or (high is not None and value > high):

@@ -167,12 +167,13 @@ def _elsewhere(settings: AuditSettings, entries: list[Entry]) -> Iterator[dict[s
     if not (settings.apart and entries):
         yield {}
         return
+    others = active_children()
     pool = ProcessPoolExecutor(1, mp_context=get_context("spawn"))
     try:
         yield {entry.id: pool.submit(_examine_apart, entry.id, settings) for entry in entries}
     except KeyboardInterrupt:
         # Ctrl-C in a terminal reaches it too, a batch system's signal does not: a claim can take minutes.
-        for process in active_children():
+        for process in set(active_children()) - set(others):
             process.terminate()
         raise
     finally:

@@ -1,10 +1,11 @@
 """Questions in scenes that no file holds, drawn from a run's seed and proved while the suite waits.
 
 A disguise changes how a published question is asked, and not what is asked: whoever is right in the scenes of
-the corpus, and wrong in others, is found out here alone. So tables, walls, kinds of laws, signs of the time
-and places of the start are drawn together, and each wall of each table is met equally often. Every third
+the corpus, and wrong in others, passes all of them. So tables, walls, kinds of laws, signs of the time and
+places of the start are drawn together, and each wall of each table is met about as often. Every third
 question keeps the scene before but for one law, and its state: an implementation that knows a scene by less
-than all of it answers the question before. Scenes carry names, which mean nothing: different ones the same.
+than all of it answers the question before, which is seen where that law acts on the flight, in about half of
+them. Scenes carry names, which mean nothing: different ones the same.
 Answers are proved by the reference alone, and are no more delicate than those of level core. The plain
 stepper chooses which draws are asked: those that meet the wall that is looked for, and keep it when nudged.
 """
@@ -71,10 +72,24 @@ def fresh(seed: int, n: int) -> Iterator[Vector]:
     """
     last: Vector | None = None
     for number in range(1, n + 1):
-        before = last if number % 3 == 0 else None
-        proved = (_proved(question, number) for question in _questions(seed, number, before))
-        last = next(vector for vector in proved if vector)
+        last = _drawn(seed, number, last)
         yield last
+
+
+def fresh_one(seed: int, number: int) -> Vector:
+    """Draw and prove one question of `fresh`, and at most the one before, which it may be like."""
+    return _drawn(seed, number, _drawn(seed, number - 1, None) if _is_like_before(number) else None)
+
+
+def _is_like_before(number: int) -> bool:
+    return number % 3 == 0
+
+
+def _drawn(seed: int, number: int, last: Vector | None) -> Vector:
+    """Return a question, given the one before, which is looked at where this one is like it."""
+    before = last if _is_like_before(number) else None
+    proved = (_proved(question, number) for question in _questions(seed, number, before))
+    return next(vector for vector in proved if vector)
 
 
 def _questions(seed: int, number: int, before: Vector | None) -> Iterator[tuple[Scene, State, float]]:
@@ -82,17 +97,17 @@ def _questions(seed: int, number: int, before: Vector | None) -> Iterator[tuple[
     table, wanted = WALLS[(number - number // 3) % len(WALLS)]
     for attempt in range(ATTEMPTS):
         draw = Draw(f"{seed}/{GROUP}/{number}/{attempt}")
-        is_like_before = before is not None and attempt < LIKE_BEFORE
+        like = before if attempt < LIKE_BEFORE else None
         try:
-            if before is not None and is_like_before:
-                of, start, t_end = _one_law_changed(draw, from_data(before.scene)), before.state, before.t_end
+            if like:
+                of, start, t_end = _one_law_changed(draw, from_data(like.scene)), like.state, like.t_end
             else:
                 of = drawn_scene(draw, table)
                 start, t_end = _start(draw, of)
         except BadInput:
             continue
         met = _wall_met(of, start, t_end)
-        if met not in of.walls or not (is_like_before or met == wanted):
+        if met not in of.walls or not (like or met == wanted):
             continue
         if all(_wall_met(of, nudged(start, t_end, signs, NUDGE), t_end) == met for signs in SIGNS):
             yield of, start, t_end

@@ -21,6 +21,7 @@ from conformance.suite import sameness, timing
 from conformance.suite.process import NOT_NUMBERS, Trouble
 from conformance.suite.questions import (
     BREATHING,
+    CARRIED,
     INSIDE,
     MOVING,
     STANDING,
@@ -41,7 +42,6 @@ N_MOVING, N_SINGLE = 600, 16  # collisions of a trajectory between moving walls,
 FAR_TIMES = -1000.0, 10_000.0  # from which such trajectories begin
 N_FLOWN = 16  # particles that `flow` and `trajectory` both carry
 NEAR = 1e-6  # of sizes: far above rounding that a few steps carry along, far below an error of principle
-CARRIED = 1e-4  # likewise, where a dozen bounces may have multiplied it
 # Starts on orbits whose errors grow slowly: of a mushroom, one that stays in the cap.
 REGULAR = {
     Mushroom: State(0.0, 0.75, 0.25, 0.1, 4.0),

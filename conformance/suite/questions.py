@@ -16,6 +16,7 @@ from scene import Collision, Fourier, Horizon, Mushroom, Outcome, Scene, State, 
 from scene.geometry import table_at
 from scene.tables import Cap, Stem
 
+CARRIED = 1e-4  # of sizes: what a dozen bounces may make of rounding, far below an error of principle
 FOREVER = sys.float_info.max  # t_end of a question that only collisions end
 STANDING: tuple[Scene, ...] = (Mushroom(r=1.0, w=0.5, h=1.0), Cap(r=1.0), Stem(w=1.0, h=1.25))
 BREATHING = Cap(r=Fourier(mean=1.0, cos=(0.1,), omega=1.0))

@@ -17,11 +17,20 @@ from typing import Any, NamedTuple
 from msgspec.structs import replace
 
 from conformance.suite.process import Trouble
-from conformance.suite.questions import INSIDE, MOVING, STANDING, distance, flown, is_same, offered, question
+from conformance.suite.questions import (
+    CARRIED,
+    INSIDE,
+    MOVING,
+    STANDING,
+    distance,
+    flown,
+    is_same,
+    offered,
+    question,
+)
 from conformance.suite.session import MAX_SEQ, Session, read_outcome
 from scene import Collision, Horizon, Scene, State, Stem, Undecided
 
-CARRIED = 1e-4  # of sizes: what a dozen bounces may make of rounding
 N_POOL, N_FLOWN, T_END = 24, 300, 5.0  # different particles, and how many of them in one flow
 SHIFTS = 2.0**-24, 2.0**-34, 2.0**-44  # of a state: nearly the same, and told apart in binary64
 ROUNDING = 2.0**-48  # of numbers of size 1, after one straight flight

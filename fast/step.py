@@ -83,10 +83,8 @@ def next_collision(scene: Scene, state: State, t_end: float) -> Outcome:
         except BadInput:
             check_numbers(scene, state, t_end)  # what is wrong with the question comes first
             raise
-        code, dt, t, x, y, vx, vy = entries.single(
+        code, dt, t, x, y, vx, vy = entries.single_at_once()(
             fitted.packed,
-            fitted.length,
-            fitted.time_at(max(abs(state.vx), abs(state.vy))) if fitted.time is None else fitted.time,
             state.t,
             state.x,
             state.y,

@@ -23,12 +23,11 @@ import numpy as np
 
 from fast.compiled import compile_scene
 from fast.kernel.records import Compiled, FloatArray, IntArray
-from fast.kernel.single import LARGEST, packed
+from fast.kernel.single import LARGEST, LENGTH, TIME, packed, static_time
 from scene import BangBang, Fourier, InvalidState, Law, Scene, State
 from scene.refusal import BadInput
 from scene.tables import laws, period
 
-LENGTH, TIME = 96, 32  # exponents of a table's size and period in the kernel
 LEAST_NORMAL = float(np.finfo(np.float64).smallest_normal)
 SLAB = 2**11  # rows brought back at a time: what lies in between stays in the cache
 ANSWER_LOST = "the answer holds a number beyond binary64: every one must be 0 or 2^-1022 to 2^1023"
@@ -125,7 +124,8 @@ class Fitted(NamedTuple):
 
     def time_at(self, speed: float) -> int:
         """Return the exponent of a static table's unit of time for such a state."""
-        return self.length + LENGTH - TIME - exponent(speed) if speed > 0.0 else 0
+        found: int = static_time(self.length, speed)
+        return found
 
 
 @lru_cache(maxsize=256)
@@ -151,7 +151,7 @@ def fit(scene: Scene) -> Fitted:
     }
     fitted = msgspec.structs.replace(scene, **changed)
     compiled = compile_scene(fitted)
-    return Fitted(fitted, length, time, compiled, packed(compiled))
+    return Fitted(fitted, length, time, compiled, packed(compiled, length, time))
 
 
 def exponent(size: float) -> int:

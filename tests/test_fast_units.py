@@ -39,7 +39,7 @@ def test_the_search_sees_a_stepper_that_does_not_scale(monkeypatch, tally):
 
     def unfitted(scene):
         compiled = compile_scene(scene)
-        return Fitted(scene, 0, 0, compiled, packed(compiled))
+        return Fitted(scene, 0, 0, compiled, packed(compiled, 0, 0))
 
     monkeypatch.setattr(stepper, "fit", unfitted)
     monkeypatch.setattr(import_module("fast.flow"), "fit", unfitted)

@@ -24,6 +24,7 @@ from scene.states import ON_WALL
 REFUSED, ANSWER_LOST = np.array([50, 51])
 # Squares of what is larger overflow.
 LARGEST = 2.0**400
+LENGTH, TIME = 96, 32  # exponents of a table's size and period in the kernel
 LARGEST_FLOAT = float(np.finfo(np.float64).max)
 
 
@@ -38,23 +39,39 @@ def _plain_ldexp(number, exponent):
 ldexp = _plain_ldexp if config.DISABLE_JIT else math.ldexp
 
 
-def packed(scene):
-    """Return a Compiled as one array of floats: every argument more costs a call a tenth of a microsecond."""
-    return np.concatenate([[scene.table, scene.is_relative], scene.bounds.ravel(), scene.laws.ravel()])
+def packed(scene, length, time):
+    """Return a Compiled and its units as one array of floats; see fast.units.
+
+    Every argument more costs a call some twentieth of a microsecond.
+    """
+    time = math.nan if time is None else time
+    first = [scene.table, scene.is_relative, length, time]
+    return np.concatenate([first, scene.bounds.ravel(), scene.laws.ravel()])
 
 
 @part
 def unpacked(numbers):
     """Return the Compiled that `packed` was given."""
-    bounds, laws = numbers[2:18].reshape((4, 4)), numbers[18:]
+    bounds, laws = numbers[4:20].reshape((4, 4)), numbers[20:]
     return Compiled(
         int(numbers[0]), numbers[1] != 0.0, laws.reshape((SHARED + 1, len(laws) // (SHARED + 1))), bounds
     )
 
 
+def static_time(length, speed):
+    """Return the exponent of a static table's unit of time, for a state of this speed; see fast.units."""
+    return length + LENGTH - TIME - (math.frexp(speed)[1] - 1) if speed > 0.0 else 0
+
+
+static_time_inside = kernel(static_time)
+
+
 @kernel
 def scaled(number, exponent):
     """Return a number times 2^exponent, and whether that is finite and exact."""
+    if -1000 <= exponent <= 1000:  # a product is exact as well, and quicker
+        found = float(number) * ldexp(1.0, exponent)
+        return found, abs(found) < np.inf and found * ldexp(1.0, -exponent) == number
     found = ldexp(number, exponent)
     return found, abs(found) < np.inf and ldexp(found, -exponent) == number
 
@@ -129,13 +146,15 @@ def answer(length, time, code, dt, particle):
 
 
 @part
-def single_step(numbers, length, time, t, x, y, vx, vy, wall, t_end):
-    """Take a careful step in a packed scene, whose units are 2^length and 2^time of the kernel's.
+def single_step(numbers, t, x, y, vx, vy, wall, t_end):
+    """Take a careful step in a packed scene.
 
     Returns:
         (code, dt, t, x, y, vx, vy): a wall's code and the collision there, HORIZON and the place then, or why
         there is neither.
     """
+    length = int(numbers[2])
+    time = static_time_inside(length, max(abs(vx), abs(vy))) if np.isnan(numbers[3]) else int(numbers[3])
     is_good, particle, end = question(length, time, t, x, y, vx, vy, wall, t_end)
     if not is_good:
         return REFUSED, 0.0, t, x, y, vx, vy

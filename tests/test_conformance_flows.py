@@ -8,11 +8,12 @@ from collections import Counter
 import pytest
 
 import reference
-from conformance.generator.certify import Question, certify
+from conformance.generator.certify import certify
 from conformance.generator.draws import wire_form
 from conformance.generator.flow_families import any_marks
-from conformance.generator.links import Links, Unfit
+from conformance.generator.links import Confirmation, Links, Unfit
 from conformance.generator.prover import ask, flight_of
+from conformance.generator.question import Question
 from conformance.generator.stays import OpenSign, arrival, marks, stays
 from conformance.grading.error import inputs_of, moved
 from conformance.second_proof.chain import recheck
@@ -119,7 +120,7 @@ def test_a_flow_keeps_of_its_path_what_is_asked():
 def test_chained_allowances_are_those_of_sums_without_rounding():
     """One entry at a time and by fsum, as the first corpus was made."""
     path = reference.trajectory(MUSHROOM, GALLERY, 12, 9.0)
-    links, held = Links(MUSHROOM, GALLERY, 9.0), []
+    links, held = Links(MUSHROOM, GALLERY, 9.0, Confirmation()), []
     for found in path.steps:
         state = links.state
         allowance = links.add(found)

@@ -15,6 +15,7 @@ from conformance import plain, vectors
 from conformance.generator.fresh import WALLS, drawn_scene, fresh
 from conformance.grading.grade import grade
 from conformance.mutants import Mutant
+from conformance.plain.flow import MAX_COLLISIONS, PlainPath
 from conformance.plain.motion import BangBangMotion
 from conformance.plain.step import Flight
 from conformance.suite.disguise import Disguise, drawn_disguise
@@ -30,6 +31,11 @@ N = N_FRESH["core"]
 @cache
 def questions(seed):
     return list(fresh(seed, N))
+
+
+def answer_to(vector):
+    """Return the right answer of a step."""
+    return vectors.answer(vector, plain.next_collision, plain.trajectory)
 
 
 @pytest.mark.parametrize("seed", deep_but(SEEDS, 1))
@@ -48,18 +54,26 @@ def test_all_is_asked_that_the_corpus_asks_seldom(seed, tally):
     asked = questions(seed)
     known = {msgspec.json.encode(vector.scene) for vector in vectors.load("stress")}
     for i, vector in enumerate(asked):
-        scene, (step,) = from_data(vector.scene), vector.expect[0].steps
+        scene, step = from_data(vector.scene), vector.expect[0].steps[0]
         kinds = {type(law) for law in laws(scene).values()}
         assert msgspec.json.encode(vector.scene) not in known
         assert drawn_disguise(vector, seed) == Disguise()
-        tally[f"{vector.scene['table']}, {step.wall}"] += 1
+        if vector.kind == "step":
+            tally[f"{vector.scene['table']}, {step.wall}"] += 1
         tally["before 0"] += vector.state.t < 0
         tally["of mixed laws"] += kinds >= {Fourier, BangBang}
-        tally["like the one before"] += i > 0 and vector.state == asked[i - 1].state
+        tally[vector.kind] += 1
+        tally["hits beyond the first"] += (vector.collisions - 1) if vector.kind == "trajectory" else 0
+        if i > 0 and vector.state == asked[i - 1].state:
+            tally["like the one before"] += 1
+            assert grade(vector, answer_to(asked[i - 1])).verdict == "fail"
         tally["named"] += "name" in vector.scene
         tally["more than 20 legs"] += any(len(getattr(law, "knots", ())) > 20 for law in laws(scene).values())
     assert all(tally[f"{table}, {wall}"] >= 6 for table, wall in WALLS)
-    assert min(tally["before 0"], tally["like the one before"], tally["named"]) > N / 5
+    assert min(tally["before 0"], tally["named"]) > N / 5
+    assert tally["like the one before"] > N / 8
+    assert tally["trajectory"] == tally["flow"] == N / 6
+    assert tally["hits beyond the first"] > N / 6
     assert tally["of mixed laws"] > N / 12
     assert tally["more than 20 legs"] >= 3
 
@@ -209,10 +223,36 @@ FAULTY = {
 }
 
 
-def n_failures(flight, asked):
+class LaterHitsInKnownScenes(PlainPath):
+    """Gains a thousandth of its speed at the second hit, where no file holds the scene."""
+
+    kind = "trajectory"
+
+    def told(self, hit):
+        is_wrong = self.n_hits == 2 and self.is_followed and family(self.scene) not in KNOWN
+        return msgspec.structs.replace(hit, vx=1.001 * hit.vx, vy=1.001 * hit.vy) if is_wrong else hit
+
+    @property
+    def is_followed(self):
+        return (self.most != MAX_COLLISIONS) == (self.kind == "flow")
+
+
+class FlowsInKnownScenes(LaterHitsInKnownScenes):
+    """Does so in a flow."""
+
+    kind = "flow"
+
+
+FAULTY_PATHS = {
+    "later hits in known scenes": LaterHitsInKnownScenes,
+    "flows in known scenes": FlowsInKnownScenes,
+}
+
+
+def n_failures(flight, asked, path=PlainPath):
     """Return how many answers of a faulty stepper fail."""
     Keeping.kept.clear()
-    faulty = Mutant("faulty", "", flight)
+    faulty = Mutant("faulty", "", flight, path)
     answers = ((v, vectors.answer(v, faulty.step, faulty.trajectory, faulty.flow)) for v in asked)
     return sum(grade(vector, answer).verdict == "fail" for vector, answer in answers)
 
@@ -220,3 +260,12 @@ def n_failures(flight, asked):
 @pytest.mark.parametrize("name", FAULTY)
 def test_who_is_right_in_the_corpus_alone_is_found_out(name):
     assert any(n_failures(FAULTY[name], questions(seed)) for seed in SEEDS)
+
+
+@pytest.mark.parametrize("name", FAULTY_PATHS)
+def test_who_goes_on_right_in_the_corpus_alone_is_found_out(name):
+    """All of its single steps are right."""
+    steps, paths = ([v for v in questions(1) if (v.kind == "step") == is_step] for is_step in (True, False))
+    assert not n_failures(Flight, steps, FAULTY_PATHS[name])
+    kinds = {v.kind for v in paths if n_failures(Flight, [v], FAULTY_PATHS[name])}
+    assert kinds == {FAULTY_PATHS[name].kind}

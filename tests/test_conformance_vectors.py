@@ -18,12 +18,13 @@ from support.tables import LIFT
 
 import reference
 from conformance.generator import __main__ as generate
-from conformance.generator.certify import Question, certify
+from conformance.generator.certify import certify
 from conformance.generator.coverage_families import coverage_families
 from conformance.generator.draws import wire_form
 from conformance.generator.families import CATALOGUE
 from conformance.generator.flow_families import flow_families
 from conformance.generator.links import Unfit
+from conformance.generator.question import Question
 from conformance.second_proof.chain import recheck
 from conformance.second_proof.step import Refuted
 from conformance.vectors import MANIFEST, NUMBERS, BadCorpus, digest, load, manifest, request

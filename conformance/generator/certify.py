@@ -9,81 +9,44 @@ first; and the written enclosures are re-proved along the whole path by `second_
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from fractions import Fraction
+from collections.abc import Sequence
 from math import inf
-from typing import Any, Literal, NamedTuple
+from typing import Literal
 
 import msgspec
 
 import reference
-from conformance.generator.links import Links, Unfit, condition, finite
-from conformance.generator.prover import (
-    CONDITIONS,
-    NUDGES,
-    SIGNS,
-    ask,
-    collided,
-    expectation,
-    flight_of,
-    nudged,
-)
-from conformance.generator.stays import Mark, OpenSign, arrival, marks, stays, timing_condition
+from conformance.generator.links import Confirmation, Unfit, condition, finite
+from conformance.generator.paths import Proved, proved_path
+from conformance.generator.prover import CONDITIONS, NUDGES, SIGNS, ask, expectation, flight_of, nudged
+from conformance.generator.question import Question
+from conformance.generator.stays import Mark, OpenSign, marks
 from conformance.second_proof.chain import recheck
 from conformance.second_proof.step import check
 from conformance.second_proof.trajectory import check_path
-from conformance.vectors import (
-    NUMBERS,
-    Certified,
-    Expectation,
-    Level,
-    OutcomeName,
-    Vector,
-    certified,
-    four_digits,
-)
+from conformance.vectors import Certified, Expectation, Level, Vector, four_digits
 from reference.certificate import certificate, path_certificate
 from scene import BadInput, InvalidState, Rejected, Scene, State, Undecided, Undefined, from_data
 
-WIDEST = Fraction(1, 2**72)  # of an enclosure of a path: a millionth of a backward ulp and less
-LONGEST = 1e8  # condition number up to which a trajectory is followed
 INFINITE = 1e300
 
 
-class Question(NamedTuple):
-    """What a vector asks, and how its vector is filed.
+class InArb(Confirmation):
+    """Proves again in Arb what the reference has proved."""
 
-    Attributes:
-        group: first part of its id.
-        rule: what it tests.
-        source: place in the paper, or hard case.
-        scene: the wire's form.
-        state: the start.
-        t_end: horizon [time].
-        collisions: None for a step; for a trajectory how many are tried, for a flow how many at most.
-        also: outcomes that are right beside the proved one.
-        level: None to measure it.
-        longest: condition number up to which a trajectory or a flow is followed.
-        flow: None when it is none; else which of its collisions' marks (`stays.marks`) are looked for.
-    """
+    def step(self, scene: Scene, state: State, t_end: float, found: reference.Collision) -> None:
+        """Confirm a collision from a state."""
+        check(certificate(scene, state, t_end, found))
 
-    group: str
-    rule: str
-    source: str
-    scene: dict[str, Any]
-    state: State
-    t_end: float
-    collisions: int | None = None
-    also: tuple[OutcomeName, ...] = ()
-    level: Level | None = None
-    longest: float = LONGEST
-    flow: Callable[[Sequence[Mark]], bool] | None = None
+    def path(self, scene: Scene, state: State, t_end: float, found: reference.Trajectory) -> None:
+        """Confirm a path from a state, each step from the box that the one before leads to."""
+        check_path(path_certificate(scene, state, t_end, found))
 
-
-class _Proved(NamedTuple):
-    expect: tuple[Expectation, ...]
-    condition: float = 0.0
-    collisions: int = 1
+    def chain(
+        self, scene: Scene, state: State, t_end: float, steps: Sequence[Certified], marks: Sequence[Mark]
+    ) -> None:
+        """Confirm the enclosures that are written down, and which hits are captured, along a whole path."""
+        recheck(scene, state, t_end, steps, marks)
 
 
 def certify(question: Question, number: int) -> Vector:
@@ -101,9 +64,11 @@ def certify(question: Question, number: int) -> Vector:
     try:
         scene = from_data(question.scene)
     except BadInput:
-        proved = _Proved((Expectation("rejected"),))
+        proved = Proved((Expectation("rejected"),))
     else:
-        proved = _step(scene, question) if question.collisions is None else _path(scene, question)
+        proved = (
+            _step(scene, question) if question.collisions is None else proved_path(scene, question, InArb())
+        )
     also = [Expectation(kind) for kind in question.also]
     expect = tuple(dict.fromkeys([*proved.expect, *also]))
     if not expect:
@@ -129,79 +94,21 @@ def _kind(question: Question) -> Literal["step", "trajectory", "flow"]:
     return "step" if question.collisions is None else "flow" if question.flow else "trajectory"
 
 
-def _step(scene: Scene, question: Question) -> _Proved:
+def _step(scene: Scene, question: Question) -> Proved:
     state, t_end = question.state, question.t_end
     outcome = ask(scene, state, t_end)
     answer = expectation(outcome, state, t_end)
     if answer is None:
-        return _Proved(())
+        return Proved(())
     if isinstance(outcome, Rejected | Undecided):
-        return _Proved((answer,))
+        return Proved((answer,))
     check(certificate(scene, state, t_end, outcome))
     if isinstance(outcome, Undefined):
         # A stepper in binary64 may find the tie within rounding, and say no more than that.
-        return _Proved((answer, Expectation("undecided")), inf)
+        return Proved((answer, Expectation("undecided")), inf)
     flight = flight_of(outcome, state, t_end)
     allowance = finite(flight.allowance(state))
-    return _Proved((answer,), condition(flight.centre(), allowance))
-
-
-def _path(scene: Scene, question: Question, working: int | None = None) -> _Proved:
-    """Follow a particle as far as the chained condition number allows, or to the horizon.
-
-    `working` is the number of decimals to work with, by default what the reference takes. It answers for the
-    digits of the last collision asked for; a path that ends at a horizon may need more.
-    """
-    assert question.collisions is not None
-    state, t_end = question.state, question.t_end
-    try:
-        path = reference.trajectory(scene, state, question.collisions, t_end, working=working)
-        captured = marks(scene, path.steps) if question.flow else []
-    except (InvalidState, OpenSign) as error:
-        raise Unfit(str(error)) from None
-    end = path.outcome
-    if question.flow and not (isinstance(end, reference.Horizon) and question.flow(captured)):
-        raise Unfit("not the flow that is looked for")
-    check_path(path_certificate(scene, state, t_end, path))
-    links = Links(scene, state, t_end, is_timed=question.flow is None)
-    steps: list[Certified] = []
-    for found in path.steps:
-        allowance = links.add(found)
-        if links.condition > question.longest:
-            break
-        links.largest = max(links.largest, links.condition)
-        steps.append(certified(collided(found), finite(allowance), found.wall, is_wide=True))
-    if len(steps) < (len(path.steps) if question.flow else 1):
-        raise Unfit("no collision is met, or the first is too delicate")
-    if len(steps) < len(path.steps):
-        end = None
-    if isinstance(end, reference.Horizon):
-        steps.append(links.coast(end, path.steps[-1].after.t if path.steps else None))
-        links.largest = max(links.largest, links.condition)
-    elif end is not None and not isinstance(end, Undefined):
-        raise Unfit("the reference is undecided")
-    if any(map(_is_wide, steps)):
-        return _path(scene, question, 2 * path.digits)
-    recheck(scene, state, t_end, steps, captured)
-    if question.flow:
-        arrived = arrival(steps, stays(captured))
-        largest = max(links.condition, timing_condition(arrived, state))
-        if largest > question.longest:
-            raise Unfit("the horizon is too delicate")
-        return _Proved((arrived,), largest, len(steps))
-    expect = [Expectation("horizon" if end else "collision", tuple(steps))]
-    if isinstance(end, Undefined):
-        expect = [Expectation("undefined", tuple(steps), end.reason), Expectation("undecided", tuple(steps))]
-    return _Proved(tuple(expect), links.largest, len(steps) + isinstance(end, Undefined))
-
-
-def _is_wide(step: Certified) -> bool:
-    """Tell whether an enclosure is wider than a small part of what rounding may do."""
-    for name, allowance in zip(NUMBERS, step.allowance, strict=True):
-        low, high = step.ends(name)
-        if high - low > WIDEST * (Fraction(allowance) + max(abs(low), abs(high))):
-            return True
-    return False
+    return Proved((answer,), condition(flight.centre(), allowance))
 
 
 def _level(scene: Scene | None, vector: Vector) -> Level:

@@ -7,11 +7,11 @@ from math import inf, nextafter
 
 import msgspec
 
-from conformance.generator.certify import Question
 from conformance.generator.draws import Draw, SharedPeriod, clock, law, scene, state, time, wire_form
 from conformance.generator.families import VectorFamily
 from conformance.generator.flow_families import any_marks, tilted
 from conformance.generator.grazing_and_stem_cases import BOX, CIRCLE, LIFT, STATIC
+from conformance.generator.question import Question
 from scene import BangBang, Cap, Fourier, Mushroom, Scene, State, Stem
 from scene.geometry import rounded
 from scene.tables import cycle_length, laws

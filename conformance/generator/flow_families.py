@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from conformance.generator.certify import Question
 from conformance.generator.draws import (
     Draw,
     SharedPeriod,
@@ -23,6 +22,7 @@ from conformance.generator.draws import (
     wire_form,
 )
 from conformance.generator.families import CATALOGUE, FIXED, MOVING, VectorFamily
+from conformance.generator.question import Question
 from conformance.generator.stays import Mark, stays
 from scene import Mushroom, Scene, State, Stem, load
 from scene.geometry import rounded

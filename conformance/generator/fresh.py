@@ -2,10 +2,11 @@
 
 A disguise changes how a published question is asked, and not what is asked: whoever is right in the scenes of
 the corpus, and wrong in others, passes all of them. So tables, walls, kinds of laws, signs of the time and
-places of the start are drawn together, and each wall of each table is met about as often. Every third
-question keeps the scene before but for one law, and its state: an implementation that knows a scene by less
-than all of it answers the question before, which is seen where that law acts on the flight, in about half of
-them. Scenes carry names, which mean nothing: different ones the same.
+places of the start are drawn together, and each wall of each table is met first about as often. A sixth of
+them ask for a trajectory, another sixth for a flow: what comes after the first collision is new as well.
+Every third question keeps the scene before but for one law, and its state, and has another answer, if such a
+law is soon found (none acts on a flight to the base): an implementation that knows a scene by less than all
+of it gives the answer before. Scenes carry names, which mean nothing: different ones the same.
 Answers are proved by the reference alone, and are no more delicate than those of level core. The plain
 stepper chooses which draws are asked: those that meet the wall that is looked for, and keep it when nudged.
 """
@@ -13,6 +14,7 @@ stepper chooses which draws are asked: those that meet the wall that is looked f
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import Literal
 
 import msgspec
 
@@ -29,7 +31,11 @@ from conformance.generator.draws import (
     walls_speed,
     wire_form,
 )
+from conformance.generator.flow_families import any_marks
+from conformance.generator.links import Confirmation, Unfit
+from conformance.generator.paths import Proved, proved_path
 from conformance.generator.prover import CONDITIONS, NUDGES, SIGNS, ask, flight_of, nudged
+from conformance.generator.question import Question
 from conformance.grading.error import condition_number, inputs_of
 from conformance.vectors import Expectation, Vector
 from scene import BadInput, BangBang, Collision, Fourier, Law, Mushroom, Scene, State, from_data
@@ -40,6 +46,13 @@ from scene.tables import cycle_length, laws
 from scene.transforms import scaled_law
 
 GROUP = "fresh"
+Kind = Literal["step", "trajectory", "flow"]
+RULES: dict[Kind, str] = {
+    "step": "a flight in a scene that no file holds",
+    "trajectory": "some flights in a scene that no file holds",
+    "flow": "a particle carried through a scene that no file holds",
+}
+ALONE = Confirmation()  # the reference's word is taken
 WALLS = (
     *(("cap", wall) for wall in ("arc", "base")),
     *(("stem", wall) for wall in ("left", "right", "floor", "base")),
@@ -54,6 +67,9 @@ NAMES = "", "", "scene", "scene", "1"
 # Draws for one question, and how many of them are like the one before. Every fortieth meets a mushroom's
 # base: of four hundred, none would in one of some thousands of runs.
 ATTEMPTS, LIKE_BEFORE = 4000, 50
+# An answer is another one that is farther off than any error that passes where conditions are those of core.
+ANOTHER = 2.0**-7
+HITS = 2, 3, 4, 5  # of trajectories and flows
 NUDGE = dict(NUDGES)["core"]
 
 
@@ -65,7 +81,8 @@ def fresh(seed: int, n: int) -> Iterator[Vector]:
         n: how many.
 
     Yields:
-        Steps of level core that end in a collision, `fresh/1` to `fresh/n`; a greater n only adds some.
+        Steps of level core that end in a collision, trajectories and flows, `fresh/1` to `fresh/n`; a greater
+        n only adds some.
 
     Raises:
         BadInput: for none of very many draws an answer is proved.
@@ -85,6 +102,11 @@ def _is_like_before(number: int) -> bool:
     return number % 3 == 0
 
 
+def _kind(number: int) -> Kind:
+    """Return what a question asks for: of those that are like the one before, and of these, a step."""
+    return "trajectory" if number % 6 == 1 else "flow" if number % 6 == 4 else "step"
+
+
 def _drawn(seed: int, number: int, last: Vector | None) -> Vector:
     """Return a question, given the one before, which is looked at where this one is like it."""
     before = last if _is_like_before(number) else None
@@ -92,7 +114,7 @@ def _drawn(seed: int, number: int, last: Vector | None) -> Vector:
     return next(vector for vector in proved if vector)
 
 
-def _questions(seed: int, number: int, before: Vector | None) -> Iterator[tuple[Scene, State, float]]:
+def _questions(seed: int, number: int, before: Vector | None) -> Iterator[Question]:
     """Yield questions of one number that are not delicate; first some that change one law of that before."""
     table, wanted = WALLS[(number - number // 3) % len(WALLS)]
     for attempt in range(ATTEMPTS):
@@ -106,12 +128,53 @@ def _questions(seed: int, number: int, before: Vector | None) -> Iterator[tuple[
                 start, t_end = _start(draw, of)
         except BadInput:
             continue
-        met = _wall_met(of, start, t_end)
-        if met not in of.walls or not (like or met == wanted):
+        met = plain.next_collision(of, start, t_end)
+        if not isinstance(met, Collision) or not (_is_another(met, like) if like else met.wall == wanted):
             continue
-        if all(_wall_met(of, nudged(start, t_end, signs, NUDGE), t_end) == met for signs in SIGNS):
-            yield of, start, t_end
+        question = _asked(draw, _kind(number), of, start, t_end)
+        if question and _is_steady(of, question):
+            yield question
     raise BadInput(f"{GROUP}/{number}: none of {ATTEMPTS} draws has a certified answer")
+
+
+def _is_another(met: Collision, before: Vector) -> bool:
+    """Tell whether a collision is clearly not that of the question before."""
+    (step,) = before.expect[0].steps
+    return met.wall != step.wall or any(
+        abs(getattr(met, name) - float(step.centre(name))) > ANOTHER * max(abs(getattr(met, n)) for n in part)
+        for part in (("dt",), ("x", "y"), ("vx", "vy"))
+        for name in part
+    )
+
+
+def _asked(draw: Draw, kind: Kind, of: Scene, start: State, t_end: float) -> Question | None:
+    """Return a question of a kind; None where fewer hits follow than it is to have."""
+    scene = {**wire_form(of), **({"name": of.name} if of.name else {})}
+    question = Question(GROUP, RULES[kind], "sec. 2", scene, start, t_end, longest=CONDITIONS["core"])
+    if kind == "step":
+        return question
+    n_hits = draw.pick(HITS)
+    hits = plain.trajectory(of, start, n_hits + 1, t_end)
+    if not all(isinstance(hit, Collision) for hit in hits):
+        return None
+    if kind == "trajectory":
+        return question._replace(collisions=n_hits)
+    before, after = hits[-2:]
+    assert isinstance(before, Collision)
+    assert isinstance(after, Collision)
+    return question._replace(t_end=(before.t + after.t) / 2, collisions=n_hits + 1, flow=any_marks)
+
+
+def _is_steady(of: Scene, question: Question) -> bool:
+    """Tell whether the plain stepper meets the same walls from starts nearby: it answers none of this."""
+
+    def met(start: State) -> list[str]:
+        path = plain.trajectory(of, start, question.collisions or 1, question.t_end)
+        return [hit.wall if isinstance(hit, Collision) else type(hit).__name__ for hit in path]
+
+    start, t_end = question.state, question.t_end
+    expected = met(start)
+    return all(met(nudged(start, t_end, signs, NUDGE)) == expected for signs in SIGNS)
 
 
 def drawn_scene(draw: Draw, table: str) -> Scene:
@@ -231,32 +294,36 @@ def _within(of: BangBang, draw: Draw, low: float, high: float) -> tuple[tuple[fl
     return tuple((t, v) for (t, _), v in zip(of.knots, [*values, values[0]], strict=True))
 
 
-def _wall_met(of: Scene, start: State, t_end: float) -> str | None:
-    """Return which wall the plain stepper says: it chooses questions, and answers none."""
-    outcome = plain.next_collision(of, start, t_end)
-    return outcome.wall if isinstance(outcome, Collision) else None
-
-
-def _proved(question: tuple[Scene, State, float], number: int) -> Vector | None:
-    """Return a question with its proved answer; None where it is no collision, or its condition is high."""
-    of, start, t_end = question
-    outcome = ask(of, start, t_end)
-    if not isinstance(outcome, reference.Collision):
+def _proved(question: Question, number: int) -> Vector | None:
+    """Return a question with its proved answer; None where there is none, or its condition is high."""
+    of, is_step = from_data(question.scene), question.collisions is None
+    try:
+        found = _proved_step(of, question) if is_step else proved_path(of, question, ALONE)
+    except Unfit:
         return None
-    flight = flight_of(outcome, start, t_end)
-    condition = condition_number(flight.centre(), flight.jacobian, inputs_of(start))
-    if condition > CONDITIONS["core"]:
+    if found.condition > CONDITIONS["core"]:
         return None
     return Vector(
         id=f"{GROUP}/{number}",
         group=GROUP,
         level="core",
-        kind="step",
-        rule="a flight in a scene that no file holds",
-        source="sec. 2",
-        scene={**wire_form(of), **({"name": of.name} if of.name else {})},
-        state=start,
-        t_end=t_end,
-        expect=(Expectation("collision", (flight.certified(start),)),),
-        condition=condition,
+        kind=_kind(number),
+        rule=question.rule,
+        source=question.source,
+        scene=question.scene,
+        state=question.state,
+        t_end=question.t_end,
+        expect=found.expect,
+        collisions=found.collisions,
+        condition=found.condition,
     )
+
+
+def _proved_step(of: Scene, question: Question) -> Proved:
+    start, t_end = question.state, question.t_end
+    outcome = ask(of, start, t_end)
+    if not isinstance(outcome, reference.Collision):
+        raise Unfit("no collision is met")
+    flight = flight_of(outcome, start, t_end)
+    condition = condition_number(flight.centre(), flight.jacobian, inputs_of(start))
+    return Proved((Expectation("collision", (flight.certified(start),)),), condition)

@@ -1,0 +1,102 @@
+"""Certified answers of trajectories and flows, made from the reference's paths.
+
+The reference proves every path by itself. For the corpus each part is proved again, by a `Confirmation`
+that does so; for questions drawn while the suite waits, one that does nothing is enough.
+"""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from typing import NamedTuple
+
+import reference
+from conformance.generator.links import Confirmation, Links, Unfit, finite
+from conformance.generator.prover import collided
+from conformance.generator.question import Question
+from conformance.generator.stays import OpenSign, arrival, marks, stays, timing_condition
+from conformance.vectors import NUMBERS, Certified, Expectation, certified
+from scene import InvalidState, Scene, Undefined
+
+WIDEST = Fraction(1, 2**72)  # of an enclosure of a path: a millionth of a backward ulp and less
+
+
+class Proved(NamedTuple):
+    """What is certified: the right answers, how delicate they are, and how many collisions they have."""
+
+    expect: tuple[Expectation, ...]
+    condition: float = 0.0
+    collisions: int = 1
+
+
+def proved_path(
+    scene: Scene, question: Question, confirm: Confirmation, working: int | None = None
+) -> Proved:
+    """Follow a particle as far as the chained condition number allows, or to the horizon.
+
+    Args:
+        scene: table and laws, of the question.
+        question: of a trajectory or a flow.
+        confirm: proves again what the reference has proved.
+        working: number of decimals to work with, by default what the reference takes. It answers for the
+            digits of the last collision asked for; a path that ends at a horizon may need more.
+
+    Raises:
+        Unfit: there is no answer to certify.
+        Refuted: the second proof does not confirm the first.
+    """
+    assert question.collisions is not None
+    state, t_end = question.state, question.t_end
+    try:
+        path = reference.trajectory(scene, state, question.collisions, t_end, working=working)
+        captured = marks(scene, path.steps) if question.flow else []
+    except (InvalidState, OpenSign) as error:
+        raise Unfit(str(error)) from None
+    end = path.outcome
+    if question.flow and not (isinstance(end, reference.Horizon) and question.flow(captured)):
+        raise Unfit("not the flow that is looked for")
+    confirm.path(scene, state, t_end, path)
+    links = Links(scene, state, t_end, confirm, is_timed=question.flow is None)
+    steps = _steps(links, path, question)
+    if len(steps) < len(path.steps):
+        end = None
+    if isinstance(end, reference.Horizon):
+        steps.append(links.coast(end, path.steps[-1].after.t if path.steps else None))
+        links.largest = max(links.largest, links.condition)
+    elif end is not None and not isinstance(end, Undefined):
+        raise Unfit("the reference is undecided")
+    if any(map(_is_wide, steps)):
+        return proved_path(scene, question, confirm, 2 * path.digits)
+    confirm.chain(scene, state, t_end, steps, captured)
+    if question.flow:
+        arrived = arrival(steps, stays(captured))
+        largest = max(links.condition, timing_condition(arrived, state))
+        if largest > question.longest:
+            raise Unfit("the horizon is too delicate")
+        return Proved((arrived,), largest, len(steps))
+    expect = [Expectation("horizon" if end else "collision", tuple(steps))]
+    if isinstance(end, Undefined):
+        expect = [Expectation("undefined", tuple(steps), end.reason), Expectation("undecided", tuple(steps))]
+    return Proved(tuple(expect), links.largest, len(steps) + isinstance(end, Undefined))
+
+
+def _steps(links: Links, path: reference.Trajectory, question: Question) -> list[Certified]:
+    """Write down the collisions of a path as far as the condition number allows; of a flow all."""
+    steps: list[Certified] = []
+    for found in path.steps:
+        allowance = links.add(found)
+        if links.condition > question.longest:
+            break
+        links.largest = max(links.largest, links.condition)
+        steps.append(certified(collided(found), finite(allowance), found.wall, is_wide=True))
+    if len(steps) < (len(path.steps) if question.flow else 1):
+        raise Unfit("no collision is met, or the first is too delicate")
+    return steps
+
+
+def _is_wide(step: Certified) -> bool:
+    """Tell whether an enclosure is wider than a small part of what rounding may do."""
+    for name, allowance in zip(NUMBERS, step.allowance, strict=True):
+        low, high = step.ends(name)
+        if high - low > WIDEST * (Fraction(allowance) + max(abs(low), abs(high))):
+            return True
+    return False

@@ -137,7 +137,7 @@ def build(folder: Path, flags: Sequence[str]) -> tuple[Path, str]:
     library = folder / "baselines.so"
     built = examples.compiled("C", [*flags, "-std=gnu11", "-shared", "-fPIC"], SOURCE, library, ["-lm"])
     if built.why_not:
-        raise Trouble("unsupported" if "installed" in built.why_not else "error", built.why_not)
+        raise Trouble("unsupported" if built.is_absent else "error", built.why_not)
     return library, built.built
 
 

@@ -19,12 +19,18 @@ class Example(NamedTuple):
     Attributes:
         command: that speaks protocol 1; empty when it cannot run here.
         why_not: the reason.
+        is_absent: what it needs is not installed; else it is at fault.
         built: the line that compiled it, paths left out; empty when nothing was compiled.
     """
 
     command: tuple[str, ...]
     why_not: str = ""
     built: str = ""
+    is_absent: bool = False
+
+
+def _absent(why_not: str) -> Example:
+    return Example((), why_not, is_absent=True)
 
 
 def find_examples(folder: Path, flags: Sequence[str] = ("-O3",)) -> dict[str, Example]:
@@ -35,10 +41,10 @@ def find_examples(folder: Path, flags: Sequence[str] = ("-O3",)) -> dict[str, Ex
         flags: for the C compiler.
     """
     node = shutil.which("node")
-    script = (node, str(FOLDER / "javascript" / "stepper.js")) if node else ()
+    script = FOLDER / "javascript" / "stepper.js"
     return {
         "C": _build_c(folder, flags),
-        "JavaScript": Example(script, "" if node else "node is not installed"),
+        "JavaScript": Example((node, str(script))) if node else _absent("node is not installed"),
         "Python": Example((sys.executable, str(FOLDER / "python" / "stepper.py"))),
     }
 
@@ -67,7 +73,7 @@ def compiled(
     """
     compiler = next(filter(None, map(shutil.which, COMPILERS[language])), None)
     if not compiler:
-        return Example((), f"no {language} compiler is installed")
+        return _absent(f"no {language} compiler is installed")
     line = [compiler, *flags, "-o", str(program), str(source), *libraries]
     done = subprocess.run(line, capture_output=True, text=True, check=False)
     if done.returncode:
@@ -79,7 +85,7 @@ def _build_c(folder: Path, flags: Sequence[str]) -> Example:
     source = FOLDER / "c" / "stepper.c"
     built = compiled("C", [*flags, "-std=gnu11"], source, folder / source.stem, ["-ljansson", "-lm"])
     if "jansson.h" in built.why_not:
-        return Example((), "jansson.h is not installed (Debian: libjansson-dev)")
+        return _absent("jansson.h is not installed (Debian: libjansson-dev)")
     return built
 
 

@@ -240,10 +240,12 @@ def at_base(inward, x, y, scene, anchors):
     if inward > 0.0:
         return NO_WALL
     # Where the base ends is another wall, and a corner whichever way the particle moves.
-    is_stem = scene.table == STEM
-    if is_within_rounding(LEFT if is_stem else ARC, x, y, scene, anchors):
-        return START
-    if is_within_rounding(RIGHT if is_stem else ARC, x, y, scene, anchors):
+    if scene.table == STEM:
+        is_corner = is_within_rounding(LEFT, x, y, scene, anchors)
+        is_corner = is_corner or is_within_rounding(RIGHT, x, y, scene, anchors)
+    else:
+        is_corner = is_within_rounding(ARC, x, y, scene, anchors)
+    if is_corner:
         return START
     return SLIDING if inward == 0.0 else APPROACHING
 

@@ -5,6 +5,7 @@ import re
 import shutil
 import subprocess
 import tomllib
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -39,6 +40,11 @@ def python_files() -> list[Path]:
     return [path for path in project_files() if path.suffix == ".py"]
 
 
+@cache
+def parsed(text: str) -> ast.Module:
+    return ast.parse(text)
+
+
 def test_no_file_names_a_place_outside_the_project():
     found = []
     for path in project_files():
@@ -62,7 +68,7 @@ def test_every_module_opens_with_a_docstring():
     bare = [
         str(path.relative_to(ROOT))
         for path in python_files()
-        if not ast.get_docstring(ast.parse(path.read_text("utf-8")))
+        if not ast.get_docstring(parsed(path.read_text("utf-8")))
     ]
     assert bare == []
 
@@ -82,7 +88,7 @@ def long_functions(sources: dict[str, str]) -> list[str]:
     return [
         f"{path}: {node.name}"
         for path, text in sources.items()
-        for node in ast.walk(ast.parse(text))
+        for node in ast.walk(parsed(text))
         if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef)
         and (node.end_lineno or 0) - min(d.lineno for d in [node, *node.decorator_list]) >= MAX_FUNCTION
     ]
@@ -93,7 +99,7 @@ def repeated_classes(sources: dict[str, str]) -> dict[str, list[str]]:
     places: dict[str, list[str]] = {}
     for path, text in sources.items():
         if path.startswith(PACKAGES) and not path.startswith(EXAMPLES):
-            for node in ast.walk(ast.parse(text)):
+            for node in ast.walk(parsed(text)):
                 if isinstance(node, ast.ClassDef):
                     places.setdefault(node.name, []).append(path)
     return {name: paths for name, paths in places.items() if len(paths) > 1}

@@ -4,10 +4,16 @@ from __future__ import annotations
 
 import base64
 import json
+import os
 import re
+import signal
+import subprocess
+import sys
 import time
+from contextlib import suppress
 from functools import partial
 from html.parser import HTMLParser
+from pathlib import Path
 
 import jsonschema
 import numpy as np
@@ -282,3 +288,24 @@ def test_an_interruption_waits_for_no_process_of_the_audits_own(tmp_path, monkey
     with pytest.raises(KeyboardInterrupt):
         interrupted()
     assert not (tmp_path / "ended").exists()
+
+
+@pytest.mark.skipif(os.name != "posix", reason="kills by a POSIX signal")
+def test_an_audit_that_is_killed_leaves_no_process(tmp_path):
+    """Its second process waited for the next claim for good, and held what the first had as its output."""
+    audit = subprocess.Popen(
+        [sys.executable, "-m", "support.naps", str(tmp_path)],
+        cwd=Path(__file__).parent,
+        stdout=subprocess.PIPE,
+        start_new_session=True,
+    )
+    try:
+        while not (tmp_path / "begun").exists():
+            assert audit.poll() is None
+            time.sleep(0.01)
+        audit.kill()
+        assert audit.communicate(timeout=20) == (b"", None)  # nobody else holds the pipe
+        assert not (tmp_path / "ended").exists()
+    finally:
+        with suppress(ProcessLookupError):
+            os.killpg(audit.pid, signal.SIGKILL)

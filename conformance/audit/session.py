@@ -8,13 +8,15 @@ particles are kept is up to who hands in `simulate_run`.
 from __future__ import annotations
 
 import json
+import os
 import time
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor
 from contextlib import contextmanager
 from functools import cache
-from multiprocessing import active_children, get_context
+from multiprocessing import active_children, get_context, parent_process
 from pathlib import Path
+from threading import Thread
 from typing import NamedTuple
 
 import theory
@@ -168,7 +170,7 @@ def _elsewhere(settings: AuditSettings, entries: list[Entry]) -> Iterator[dict[s
         yield {}
         return
     others = active_children()
-    pool = ProcessPoolExecutor(1, mp_context=get_context("spawn"))
+    pool = ProcessPoolExecutor(1, mp_context=get_context("spawn"), initializer=_end_with_parent)
     try:
         yield {entry.id: pool.submit(_examine_apart, entry.id, settings) for entry in entries}
     except KeyboardInterrupt:
@@ -178,6 +180,18 @@ def _elsewhere(settings: AuditSettings, entries: list[Entry]) -> Iterator[dict[s
         raise
     finally:
         pool.shutdown(cancel_futures=True)
+
+
+def _end_with_parent() -> None:
+    """Let this process end when the audit's has: one that was killed calls nobody off."""
+    parent = parent_process()
+    assert parent is not None
+
+    def watch() -> None:
+        parent.join()
+        os._exit(1)
+
+    Thread(target=watch, daemon=True).start()
 
 
 def _key(entry: Entry, settings: AuditSettings) -> str:

@@ -205,6 +205,28 @@ def test_another_seed_is_refused_and_broken_findings_are_made_again(call, tmp_pa
     assert len(blocks) == 6
 
 
+def test_what_other_sources_found_is_found_again(call, tmp_path, monkeypatch):
+    """A claim's code had changed and its words had not: what the old code said was told as the new one's."""
+    assert call("--only", "X5", "--out", tmp_path).code == 0
+    monkeypatch.setattr(session, "examine", lambda entry, *_: Finding(entry.id, "refuted", [], 0.0))
+    assert call("--only", "X5", "--out", tmp_path, "--resume").code == 0
+    monkeypatch.setattr(session, "code", lambda: "of another day")
+    done = call("--only", "M8", "--out", tmp_path, "--resume")
+    assert done.code == 1
+    assert "! X5  refuted" in done.out  # neither given up nor taken over
+    assert "! M8  refuted" in done.out
+
+
+def test_a_byte_of_the_sources_makes_other_code(tmp_path, monkeypatch):
+    before = session.code()
+    assert session.code.__wrapped__() == before
+    (tmp_path / "law.py").write_bytes(b"1")
+    for package in (session.scene, session.fast, session.theory):
+        with monkeypatch.context() as other:
+            other.setattr(package, "__path__", [str(tmp_path)])
+            assert session.code.__wrapped__() != before
+
+
 @pytest.mark.deep
 def test_resumed_with_other_claims_a_report_has_both(call, tmp_path, blocks):
     """Never fewer: what other settings would leave out is not given up."""

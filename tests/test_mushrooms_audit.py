@@ -205,6 +205,16 @@ def test_another_seed_is_refused_and_broken_findings_are_made_again(call, tmp_pa
     assert len(blocks) == 6
 
 
+def test_what_a_killed_audit_was_writing_is_taken_away(call, tmp_path):
+    (tmp_path / "findings").mkdir()
+    left = tmp_path / ".report.html.7.part", tmp_path / "findings" / ".M8.finding.7.part"
+    other = tmp_path / ".picture.svg.7.part"  # somebody else's, and under way perhaps
+    for path in (*left, other):
+        path.write_bytes(b"half of it")
+    assert call("--only", "M8", "--out", tmp_path, "--resume").code == 0
+    assert [path.exists() for path in (*left, other)] == [False, False, True]
+
+
 def test_what_other_sources_found_is_found_again(call, tmp_path, monkeypatch):
     """A claim's code had changed and its words had not: what the old code said was told as the new one's."""
     assert call("--only", "X5", "--out", tmp_path).code == 0

@@ -64,6 +64,9 @@ def audit(
         return
     with output.writable_folder(out) as folder, locked(folder):
         settings = AuditSettings(size, seed, threads, folder / "findings", resume, apart=True)
+        # What an audit that was killed was writing. Nobody else writes under these names: the folder is held.
+        for path in (*folder.glob(".report.*.part"), *folder.glob("findings/.*.finding.*.part")):
+            path.unlink(missing_ok=True)
         result = _conducted(folder, settings, entries)
         data = audit_page.to_data(result)
         texts = {

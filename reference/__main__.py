@@ -4,13 +4,18 @@ import sys
 import time
 
 import reference
-from scene import Outcome, Scene, State
+from scene import Outcome, Scene, State, Undecided
 from scene.protocol.wire import serve
 
 
 def rounded(outcome: reference.Outcome) -> Outcome:
-    """Return a proved outcome with its numbers rounded to binary64."""
-    return outcome.rounded() if isinstance(outcome, reference.Collision | reference.Horizon) else outcome
+    """Return a proved outcome with its numbers rounded to binary64; undecided where one is beyond it."""
+    if not isinstance(outcome, reference.Collision | reference.Horizon):
+        return outcome
+    try:
+        return outcome.rounded()
+    except OverflowError:
+        return Undecided("the answer holds a number beyond binary64")
 
 
 def step(scene: Scene, state: State, t_end: float) -> Outcome:

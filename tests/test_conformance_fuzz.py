@@ -14,6 +14,7 @@ import time
 from collections import Counter
 from contextlib import contextmanager, suppress
 
+import msgspec
 import pytest
 from support import fuzz
 from support.schemas import validator
@@ -24,7 +25,7 @@ import fast.__main__ as fast_server
 import reference.__main__ as reference_server
 from conformance import plain
 from conformance.grading.grade import grade
-from conformance.suite import session
+from conformance.suite import answers
 from conformance.suite.process import Trouble
 from scene import BadInput, load
 from scene.protocol.wire import serve
@@ -67,7 +68,7 @@ def limit(line):
 @pytest.mark.parametrize("name", SERVERS)
 def test_a_server_answers_every_line_with_one_line(name, tally):
     slowest = 0.0
-    SERVERS[name](map(json.dumps, fuzz.WARM_UP), io.BytesIO())  # compiles
+    SERVERS[name](map(msgspec.json.encode, fuzz.WARM_UP), io.BytesIO())  # compiles
     for line in fuzz.lines(1, N_LINES, fuzz.requests):
         out = io.BytesIO()
         with limit(line):
@@ -86,7 +87,7 @@ def test_a_server_answers_every_line_with_one_line(name, tally):
 
 def judged(line, cmd, vector) -> tuple[str, str]:
     try:
-        found = grade(vector, session.read_answer(line, cmd, 1))
+        found = grade(vector, answers.read_answer(line, cmd, 1))
     except Trouble as trouble:
         return trouble.verdict, trouble.why
     return found.verdict, found.why
@@ -95,10 +96,10 @@ def judged(line, cmd, vector) -> tuple[str, str]:
 def test_the_runner_reads_every_line_or_says_wrong_format(tally):
     vector = made_up(0)
     for line in fuzz.lines(2, N_LINES, fuzz.answers):
-        for read in (session.read_introduction, lambda sent: session.check_echo([0.1, -0.0], sent)):
+        for read in (answers.read_introduction, lambda sent: answers.check_echo([0.1, -0.0], sent)):
             with suppress(Trouble):
                 read(line)
-        for cmd in session.ANSWERS:
+        for cmd in answers.ANSWERS:
             verdict, why = judged(line, cmd, vector)
             assert "\n" not in why
             assert len(why) < 1000

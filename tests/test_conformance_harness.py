@@ -10,6 +10,7 @@ from types import SimpleNamespace
 
 import pytest
 from support.depth import deep_but
+from support.edges import EDGES, is_among
 
 from conformance import vectors
 from conformance.harness import kit
@@ -73,6 +74,16 @@ BAD = [
     {"state": {"t": 0.0, "x": 0.0, "y": 0.5, "vx": 1.0, "vy": 0.0, "wall": "lid"}},
     {"state": {"t": 0.0, "x": 0.0, "y": 0.5, "vx": 1.0, "vy": 0.0, "wall": "arc"}},
     {"t_end": -1.0},
+    {"t_end": None},
+    {"state": {"t": 0.0, "x": 0.0, "y": 0.5, "vx": 1.0, "vy": 0.0, "wall": 5}},
+    {"cmd": "dance", "collisions": 1, "repeat": 1},
+    *({"cmd": "trajectory", "collisions": n} for n in (-1, 1.5, None)),
+    *({"cmd": "time", "collisions": n, "repeat": k} for n, k in ((0, 1), (1, 0), (1, 1.5))),
+]
+# Lines in which no seq can be read.
+NAMELESS = [
+    *(json.dumps({"cmd": "echo", "values": values}) for values in (["a"], None, 5)),
+    *(json.dumps({"cmd": "step", "seq": seq}) for seq in (None, -1, 1.5, "5")),
 ]
 FAST = {"state": {"t": 0.0, "x": 0.0, "y": 0.5, "vx": 1e200, "vy": 0.0, "wall": None}}
 GOOD = {"cmd": "step", "seq": 5, "scene": {"table": "cap", "r": 1.0}, "t_end": 9.0}
@@ -82,7 +93,9 @@ GOOD["state"] = {"t": 0.0, "x": 0.0, "y": 0.5, "vx": 1.0, "vy": 0.0, "wall": Non
 @pytest.mark.parametrize("language", LANGUAGES)
 def test_an_example_refuses_bad_input_and_lives_on(language, commands):
     command = runnable(commands[language])
+    spoilt = [{name: part for name, part in GOOD.items() if name != left} for left in GOOD if left != "seq"]
     lines = ["nonsense", "[]", "5", '{"cmd":"dance","seq":1}']
+    lines += [*NAMELESS, *map(json.dumps, spoilt)]
     lines += [json.dumps({**GOOD, **changes}) for changes in (*BAD, FAST, {})] + ['{"cmd":"stop"}']
     run = subprocess.run(
         command, input="\n".join(lines) + "\n", capture_output=True, text=True, timeout=60, check=True
@@ -90,9 +103,22 @@ def test_an_example_refuses_bad_input_and_lives_on(language, commands):
     assert run.stderr == ""
     answers = [json.loads(line) for line in run.stdout.splitlines()]
     assert [a["outcome"] for a in answers[:4]] == ["rejected"] * 4
-    assert [a["outcome"] for a in answers[4:-2]] == ["rejected"] * len(BAD)
+    assert [a["outcome"] for a in answers[4:-2]] == ["rejected"] * len(NAMELESS + spoilt + BAD)
+    n_null = 4 + len(NAMELESS)
+    assert [a["seq"] for a in answers[4:n_null]] == [None] * len(NAMELESS)
+    assert {a["seq"] for a in answers[n_null:-2]} <= {5, None}  # null is never wrong
     assert answers[-2]["outcome"] in ("rejected", "undecided")  # squares may overflow
     assert (answers[-1]["seq"], answers[-1]["outcome"], answers[-1]["wall"]) == (5, "collision", "arc")
+
+
+@pytest.mark.parametrize("language", LANGUAGES)
+def test_an_example_answers_the_edges_of_the_protocol(language, commands):
+    lines = "\n".join(json.dumps(question) for question, _ in EDGES) + "\n"
+    run = subprocess.run(
+        runnable(commands[language]), input=lines, capture_output=True, text=True, timeout=60, check=True
+    )
+    for (question, allowed), line in zip(EDGES, run.stdout.splitlines(), strict=True):
+        assert is_among(json.loads(line), allowed), (question, line)
 
 
 def refuse_to_say(*_):

@@ -79,6 +79,19 @@ def test_an_engine_that_names_no_walls_and_keeps_no_flight_times_is_graded(monke
     tally["without dt"] += len(hits)
 
 
+def test_a_wall_left_out_is_named_though_the_scene_has_a_field_too_many(opened):
+    """The runner reads no such scene, and took the same answer for another: its walls were not named."""
+
+    def ignoring(request, answer):
+        for place in (request, request.get("scene"), request.get("state")):
+            if isinstance(place, dict):
+                place.pop("hint", None)
+        return without_names(request, answer)
+
+    ((_, verdict, why, _),) = promises.ask_promises(opened(ignoring), ("extra-fields",))
+    assert (verdict, why) == ("pass", "refused in: none; elsewhere ignored")
+
+
 def test_every_certified_hit_is_nearest_to_its_wall(tally):
     for vector in vectors.load("core"):
         expected = vector.expect[0]

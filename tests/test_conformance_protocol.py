@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import json
+import math
 import struct
 import subprocess
 import sys
 
 import msgspec
 import pytest
+from support.edges import EDGES, is_among
 
 import fast
 import reference
@@ -36,6 +38,15 @@ def step(seq, scene=SCENE, **changes):
 @pytest.fixture(params=["reference", "fast"])
 def module(request):
     return request.param
+
+
+@pytest.mark.parametrize("server", ["reference", "fast", "conformance.plain"])
+def test_the_edges_of_the_protocol(server):
+    answers = converse(server, *(question for question, _ in EDGES), '{"cmd":"echo","values":[-0,0]}')
+    for (question, allowed), answer in zip(EDGES, answers, strict=False):
+        assert is_among(answer, allowed), (question, answer)
+    assert len(answers) == len(EDGES) + 1
+    assert [math.copysign(1.0, value) for value in answers[-1]["values"]] == [-1.0, 1.0]
 
 
 def test_session(module):

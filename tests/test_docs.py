@@ -18,7 +18,7 @@ import pytest
 from support.schemas import MODULES, validator
 
 from conformance import plain, vectors
-from conformance.suite.session import read_answer
+from conformance.suite.answers import read_answer
 from scene import BadInput, load
 from scene.tables import laws
 

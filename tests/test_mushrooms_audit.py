@@ -4,10 +4,16 @@ from __future__ import annotations
 
 import base64
 import json
+import os
 import re
+import signal
+import subprocess
+import sys
 import time
+from contextlib import suppress
 from functools import partial
 from html.parser import HTMLParser
+from pathlib import Path
 
 import jsonschema
 import numpy as np
@@ -199,6 +205,38 @@ def test_another_seed_is_refused_and_broken_findings_are_made_again(call, tmp_pa
     assert len(blocks) == 6
 
 
+def test_what_a_killed_audit_was_writing_is_taken_away(call, tmp_path):
+    (tmp_path / "findings").mkdir()
+    left = tmp_path / ".report.html.7.part", tmp_path / "findings" / ".M8.finding.7.part"
+    other = tmp_path / ".picture.svg.7.part"  # somebody else's, and under way perhaps
+    for path in (*left, other):
+        path.write_bytes(b"half of it")
+    assert call("--only", "M8", "--out", tmp_path, "--resume").code == 0
+    assert [path.exists() for path in (*left, other)] == [False, False, True]
+
+
+def test_what_other_sources_found_is_found_again(call, tmp_path, monkeypatch):
+    """A claim's code had changed and its words had not: what the old code said was told as the new one's."""
+    assert call("--only", "X5", "--out", tmp_path).code == 0
+    monkeypatch.setattr(session, "examine", lambda entry, *_: Finding(entry.id, "refuted", [], 0.0))
+    assert call("--only", "X5", "--out", tmp_path, "--resume").code == 0
+    monkeypatch.setattr(session, "code", lambda: "of another day")
+    done = call("--only", "M8", "--out", tmp_path, "--resume")
+    assert done.code == 1
+    assert "! X5  refuted" in done.out  # neither given up nor taken over
+    assert "! M8  refuted" in done.out
+
+
+def test_a_byte_of_the_sources_makes_other_code(tmp_path, monkeypatch):
+    before = session.code()
+    assert session.code.__wrapped__() == before
+    (tmp_path / "law.py").write_bytes(b"1")
+    for package in (session.scene, session.fast, session.theory):
+        with monkeypatch.context() as other:
+            other.setattr(package, "__path__", [str(tmp_path)])
+            assert session.code.__wrapped__() != before
+
+
 @pytest.mark.deep
 def test_resumed_with_other_claims_a_report_has_both(call, tmp_path, blocks):
     """Never fewer: what other settings would leave out is not given up."""
@@ -282,3 +320,24 @@ def test_an_interruption_waits_for_no_process_of_the_audits_own(tmp_path, monkey
     with pytest.raises(KeyboardInterrupt):
         interrupted()
     assert not (tmp_path / "ended").exists()
+
+
+@pytest.mark.skipif(os.name != "posix", reason="kills by a POSIX signal")
+def test_an_audit_that_is_killed_leaves_no_process(tmp_path):
+    """Its second process waited for the next claim for good, and held what the first had as its output."""
+    audit = subprocess.Popen(
+        [sys.executable, "-m", "support.naps", str(tmp_path)],
+        cwd=Path(__file__).parent,
+        stdout=subprocess.PIPE,
+        start_new_session=True,
+    )
+    try:
+        while not (tmp_path / "begun").exists():
+            assert audit.poll() is None
+            time.sleep(0.01)
+        audit.kill()
+        assert audit.communicate(timeout=20) == (b"", None)  # nobody else holds the pipe
+        assert not (tmp_path / "ended").exists()
+    finally:
+        with suppress(ProcessLookupError):
+            os.killpg(audit.pid, signal.SIGKILL)

@@ -120,7 +120,7 @@ def test_a_faulty_stepper_is_told_its_fault(call, tmp_path):
     assert all(f'href="#{name}"' in page for name in drawn)
 
 
-@pytest.mark.parametrize("name", ["exit-silently", "other-protocol", "fifteen-digits"])
+@pytest.mark.parametrize("name", ["exit-silently", "other-protocol", "fourteen-digits"])
 def test_reports_of_broken_sessions_are_written_too(call, tmp_path, name):
     options = ["--json", tmp_path / "r.json", "--junit", tmp_path / "r.xml", "--html", tmp_path / "r.html"]
     code, out, _ = call("--restarts", 1, *options, "--", *command(name))

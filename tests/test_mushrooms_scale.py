@@ -61,6 +61,23 @@ def test_workers_of_a_cluster_follow_to_the_same_bits(command_line, tmp_path, en
     assert json.loads(ended.out)["sha256"] == ensemble.sha256()
 
 
+@pytest.mark.parametrize("name", ["particles", "block", "cycles_of_a_chunk", "command", "scene"])
+def test_a_description_without_its_seal_has_all_that_a_run_needs_or_is_refused(
+    command_line, tmp_path, stored, name
+):
+    """A page of Python's own words for what is missing, or is no number, came out."""
+    path = tmp_path / "run" / blocks.GROUP / "zarr.json"
+    shutil.copytree(stored, tmp_path / "run")
+    (tmp_path / "run" / blocks.MARKERS / blocks.DESCRIPTION).unlink()
+    told = json.loads(path.read_text("utf-8"))
+    for value in (["many"], -5, None):
+        path.write_text(json.dumps({**told, "attributes": told["attributes"] | {name: value}}), "utf-8")
+        assert_refused(command_line(*RUN, "--out", tmp_path / "run", "--resume"), "description is damaged")
+    del told["attributes"][name]
+    path.write_text(json.dumps(told), "utf-8")
+    assert_refused(command_line(*RUN, "--out", tmp_path / "run", "--resume"), "description is damaged")
+
+
 @pytest.mark.deep
 def test_workers_lengthen_a_run(command_line, tmp_path, stored):
     """They are handed what is there."""

@@ -1,22 +1,27 @@
 """One audit: simulate what the entries need, examine each, keep what is finished.
 
 Entries that need no simulation are examined in another process at the same time. Every finding is saved in
-the results' folder when it is made; `resume` takes up those that were made with the same settings. Whether
+the results' folder; `resume` takes up those that the same sources made with the same settings. Whether
 particles are kept is up to who hands in `simulate_run`.
 """
 
 from __future__ import annotations
 
+import hashlib
 import json
+import os
 import time
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor
 from contextlib import contextmanager
 from functools import cache
-from multiprocessing import active_children, get_context
+from multiprocessing import active_children, get_context, parent_process
 from pathlib import Path
-from typing import NamedTuple
+from threading import Thread
+from typing import Any, NamedTuple
 
+import fast
+import scene
 import theory
 from conformance.audit import ledger
 from conformance.audit.evidence import AuditSteppers, ClaimEvidence, Predict
@@ -130,8 +135,8 @@ def conduct(
 
 
 def kept(settings: AuditSettings) -> set[str]:
-    """Return the ids of the entries whose findings are taken up."""
-    return {entry.id for entry in ledger.entries() if _load(entry, settings) is not None}
+    """Return the ids of the entries whose findings are there; what other sources found is found again."""
+    return {entry.id for entry in ledger.entries() if _kept(entry, settings)}
 
 
 def examine(
@@ -168,7 +173,7 @@ def _elsewhere(settings: AuditSettings, entries: list[Entry]) -> Iterator[dict[s
         yield {}
         return
     others = active_children()
-    pool = ProcessPoolExecutor(1, mp_context=get_context("spawn"))
+    pool = ProcessPoolExecutor(1, mp_context=get_context("spawn"), initializer=_end_with_parent)
     try:
         yield {entry.id: pool.submit(_examine_apart, entry.id, settings) for entry in entries}
     except KeyboardInterrupt:
@@ -180,6 +185,18 @@ def _elsewhere(settings: AuditSettings, entries: list[Entry]) -> Iterator[dict[s
         pool.shutdown(cancel_futures=True)
 
 
+def _end_with_parent() -> None:
+    """Let this process end when the audit's has: one that was killed calls nobody off."""
+    parent = parent_process()
+    assert parent is not None
+
+    def watch() -> None:
+        parent.join()
+        os._exit(1)
+
+    Thread(target=watch, daemon=True).start()
+
+
 def _key(entry: Entry, settings: AuditSettings) -> str:
     runs = [(run, RUNS[run].n_particles(settings.size)) for run in entry.runs]
     return json.dumps(
@@ -188,11 +205,28 @@ def _key(entry: Entry, settings: AuditSettings) -> str:
 
 
 def _load(entry: Entry, settings: AuditSettings) -> Finding | None:
+    data = _kept(entry, settings)
+    return from_data(data["finding"]) if data and data.get("code") == code() else None
+
+
+def _kept(entry: Entry, settings: AuditSettings) -> dict[str, Any]:
+    """Return what is kept of an entry for these settings, whoever made it; nothing where there is none."""
     content = unsealed(settings.folder / _file(entry)) if settings.folder and settings.resume else None
-    if content is None:
-        return None
-    data = json.loads(content)
-    return from_data(data["finding"]) if data["key"] == _key(entry, settings) else None
+    data: dict[str, Any] = json.loads(content) if content else {}
+    return data if data.get("key") == _key(entry, settings) else {}
+
+
+@cache
+def code() -> str:
+    """Return the SHA-256 of the sources that findings owe their numbers to."""
+    digest = hashlib.sha256()
+    for place in (Path(__file__).parent, *(Path(package.__path__[0]) for package in (scene, fast, theory))):
+        for path in sorted(place.rglob("*")):
+            if path.suffix in (".py", ".toml"):
+                content = path.read_bytes()
+                digest.update(f"{place.name}/{path.relative_to(place).as_posix()} {len(content)}\n".encode())
+                digest.update(content)
+    return digest.hexdigest()
 
 
 def _file(entry: Entry) -> str:
@@ -202,5 +236,5 @@ def _file(entry: Entry) -> str:
 def _save(finding: Finding, settings: AuditSettings) -> None:
     if settings.folder:
         entry = ledger.select(finding.id)[0]
-        content = json.dumps({"key": _key(entry, settings), "finding": to_data(finding)})
+        content = json.dumps({"key": _key(entry, settings), "code": code(), "finding": to_data(finding)})
         write_file(settings.folder / _file(entry), sealed(content.encode()))

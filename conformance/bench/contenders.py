@@ -15,9 +15,10 @@ from conformance import plain
 from conformance.bench.time_stepping import TOLERANCES, next_collision_by
 from conformance.bench.workloads import SINGLE_STEPS, Workload
 from conformance.grading.agreement import Answer
+from conformance.suite.answers import read_outcome
 from conformance.suite.process import Trouble
 from conformance.suite.run import put
-from conformance.suite.session import Limits, Session, missing, read_outcome
+from conformance.suite.session import Limits, Session, missing
 from conformance.vectors import Vector
 from scene import Scene, State, to_data
 

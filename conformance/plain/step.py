@@ -340,8 +340,8 @@ def next_collision(scene: Scene, state: State, t_end: float, flight: type[Flight
     try:
         check_numbers(scene, state, t_end)
         for field in ("x", "y", "vx", "vy"):
-            if abs(getattr(state, field)) > LARGEST:
-                return Rejected(f"state.{field} = {getattr(state, field)!r}, must be at most 2^400 in size")
+            if abs(value := getattr(state, field)) > LARGEST:
+                return Undecided(f"state.{field} = {value!r} is beyond 2^400: squares overflow")
         return flight(scene, state, t_end).outcome()
     except InvalidState as error:
         return Rejected(str(error))

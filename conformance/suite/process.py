@@ -24,7 +24,7 @@ from scene.refusal import BadInput
 
 MAX_LINE = 2**24  # bytes of one answer: a trajectory of 10^5 collisions
 MAX_STDERR = 2**15  # bytes kept of the first and of the last that it wrote there
-GRACE = 1.0  # seconds between the end of its output and its exit, and between `stop` and both
+GRACE = 1.0  # seconds between the end of its output and its exit, and between its exit and its helpers'
 POLL = 0.05  # seconds between looks at a silent process: a child of it may hold the pipe when it is gone
 # What calculating with numbers of a nonsense answer may raise, however a formula is written.
 NOT_NUMBERS = (ArithmeticError, ValueError)
@@ -145,22 +145,25 @@ class Process:
         """
         deadline = time.monotonic() + timeout
         pending = line + b"\n"
-        while self._is_open and not self._received and time.monotonic() < deadline:
-            if self._has_exited() and not self._is_readable():
+        while not self._received and time.monotonic() < deadline:
+            if self._has_exited() and not (self._is_open and self._is_readable()):
                 break
+            # Until the end: what it has to say on standard error may be more than a pipe holds.
             pending = self._advance(pending, POLL)
             if not pending and not self._stdin.closed:
                 self._stdin.close()
         if self._received:
             raise Trouble("wrong-format", f"wrote without being asked: {shown(self._received)}")
-        while not self._has_exited() and time.monotonic() < deadline:
-            time.sleep(POLL / 5)
         if not self._has_exited():
             raise Trouble("timed-out", f"still running {timeout:g} s after `stop`")
         if status := self._status():
             raise Trouble("crashed", f"{status} after `stop`")
-        if self._descendants.alive():
-            raise Trouble("fail", "left a child process running after `stop`")
+        # A helper that ends because the process has ended does so a little later.
+        deadline = time.monotonic() + GRACE
+        while self._descendants.alive():
+            if time.monotonic() >= deadline:
+                raise Trouble("fail", "left a child process running after `stop`")
+            time.sleep(POLL / 5)
 
     def kill(self) -> None:
         """End the process, its group and whatever else it started; safe to call twice."""
@@ -218,7 +221,10 @@ class Process:
             return ""
         if result.si_code == os.CLD_EXITED:
             return f"exited with status {result.si_status}"
-        return f"was killed by {signal.Signals(result.si_status).name}"
+        try:
+            return f"was killed by {signal.Signals(result.si_status).name}"
+        except ValueError:  # real-time signals have numbers only
+            return f"was killed by signal {result.si_status}"
 
     def _ending(self) -> str:
         deadline = time.monotonic() + GRACE

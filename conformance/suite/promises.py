@@ -18,6 +18,7 @@ import msgspec
 from mpmath import fp
 
 from conformance.suite import sameness, timing
+from conformance.suite.answers import read_outcome
 from conformance.suite.process import NOT_NUMBERS, Trouble
 from conformance.suite.questions import (
     BREATHING,
@@ -33,7 +34,7 @@ from conformance.suite.questions import (
     question,
 )
 from conformance.suite.result import NamedVerdict
-from conformance.suite.session import Session, missing, read_outcome
+from conformance.suite.session import Session, missing
 from scene import Cap, Collision, Horizon, Mushroom, Outcome, Scene, State, Stem, Undecided, to_data
 from scene.geometry import half_width
 
@@ -145,7 +146,7 @@ def extra_fields(session: Session) -> str:
     }
     refused = []
     for place, changed in asked.items():
-        found = session.ask(changed)
+        found = session.ask(changed, request["scene"])
         if found.get("outcome") == "rejected":
             refused.append(place)
         elif not is_same(found, answer):

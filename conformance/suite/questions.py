@@ -10,8 +10,9 @@ from typing import Any
 import msgspec
 from mpmath import fp
 
+from conformance.suite.answers import read_outcome
 from conformance.suite.process import Trouble
-from conformance.suite.session import Session, missing, read_outcome
+from conformance.suite.session import Session, missing
 from scene import Collision, Fourier, Horizon, Mushroom, Outcome, Scene, State, Undecided, to_data
 from scene.geometry import table_at
 from scene.tables import Cap, Stem

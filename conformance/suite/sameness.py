@@ -16,6 +16,7 @@ from typing import Any, NamedTuple
 
 from msgspec.structs import replace
 
+from conformance.suite.answers import read_outcome
 from conformance.suite.process import Trouble
 from conformance.suite.questions import (
     CARRIED,
@@ -28,7 +29,7 @@ from conformance.suite.questions import (
     offered,
     question,
 )
-from conformance.suite.session import MAX_SEQ, Session, read_outcome
+from conformance.suite.session import MAX_SEQ, Session
 from scene import Collision, Horizon, Scene, State, Stem, Undecided
 
 N_POOL, N_FLOWN, T_END = 24, 300, 5.0  # different particles, and how many of them in one flow

@@ -4,8 +4,7 @@ What is no answer becomes a verdict (`Trouble`): crashed, timed-out, wrong-forma
 restarts are used up and nothing was asked. After trouble the process is killed and the next question
 goes to a fresh one, to which `start` is replayed. When the time for the whole session is spent, all that is
 still asked is `timed-out`. Sequence numbers are random, so that no answer can be given before its question.
-Texts are kept without control characters, and a wall that an answer leaves out is named from the place.
-Whether an answer is right is not judged here.
+How an answer is read is in `conformance.suite.answers`; whether it is right is not judged here.
 """
 
 from __future__ import annotations
@@ -20,29 +19,15 @@ from types import TracebackType
 from typing import Any
 
 import msgspec
-from mpmath import fp
 
-from conformance.suite.process import Process, Transcript, Trouble, clean, shown
-from scene import Collision, Outcome, Scene, State, from_data, to_data
-from scene.geometry import table_at
-from scene.protocol.messages import (
-    PROTOCOL,
-    Answered,
-    AnsweredCollision,
-    Echoed,
-    Failed,
-    Flown,
-    Introduction,
-    Steps,
-    Timed,
-)
+from conformance.suite.answers import check_echo, read_answer, read_introduction, read_outcome, with_walls
+from conformance.suite.process import Process, Transcript, Trouble
+from scene import Outcome, Scene, State, to_data
+from scene.protocol.messages import PROTOCOL, Introduction
 from scene.refusal import BadInput
 
 MAX_SEQ = 2**31 - 1  # the integers of every language
 STOP_TIMEOUT = 5.0  # seconds to exit after `stop`
-UNREADABLE = (msgspec.DecodeError, UnicodeDecodeError, RecursionError)
-MAX_OFFERED = 100  # profiles, tables or laws that an introduction may list
-ANSWERS = {"step": Answered, "trajectory": Steps, "flow": Flown, "time": Timed}
 
 
 class Limits(msgspec.Struct, frozen=True):
@@ -57,21 +42,6 @@ class Limits(msgspec.Struct, frozen=True):
     timeout: float = 120.0
     restarts: int = 10
     total: float | None = None
-
-
-class _Envelope(msgspec.Struct):
-    seq: Any = None
-    outcome: Any = None
-    error: Any = None
-    reason: Any = ""
-
-
-_outcomes: msgspec.json.Decoder[Any] = msgspec.json.Decoder(Answered)
-_envelopes = msgspec.json.Decoder(_Envelope)
-_failures: msgspec.json.Decoder[Any] = msgspec.json.Decoder(Failed)
-_answers: dict[str, msgspec.json.Decoder[Any]] = {
-    cmd: msgspec.json.Decoder(form) for cmd, form in ANSWERS.items()
-}
 
 
 class Session:
@@ -136,18 +106,19 @@ class Session:
             self._give_up(trouble)
             raise
 
-    def ask(self, request: Mapping[str, Any]) -> dict[str, Any]:
+    def ask(self, request: Mapping[str, Any], scene: Mapping[str, Any] | None = None) -> dict[str, Any]:
         """Put one question and return its answer as plain data, every collision with its wall.
 
         Args:
             request: a step, trajectory, flow or time request; its seq is replaced by a random one.
+            scene: that names walls left out, where the request's own is not a scene; None for that one.
 
         Raises:
             Trouble: crashed, timed-out or wrong-format; error or timed-out when the session is over.
         """
         seq = self._draw.randint(1, MAX_SEQ)
         answer = self._say(_encode({**request, "seq": seq}), request["cmd"], seq)
-        return _with_walls(answer, request.get("scene"))
+        return with_walls(answer, request.get("scene") if scene is None else scene)
 
     def say(self, line: bytes, seq: int | None) -> dict[str, Any]:
         """Send a line that is no request, and return what it is answered.
@@ -261,107 +232,6 @@ def needs(profile: str, scene: Mapping[str, Any] | None) -> list[tuple[str, str]
     return [("profile", profile), ("table", str(scene["table"])), *(("law", kind) for kind in sorted(kinds))]
 
 
-def read_introduction(line: bytes) -> Introduction:
-    """Decode the answer to `start`.
-
-    Raises:
-        Trouble: wrong-format.
-    """
-    try:
-        introduction = msgspec.json.decode(line, type=Introduction)
-    except UNREADABLE as error:
-        raise Trouble("wrong-format", f"start: {_reason(error)} in {shown(line)}") from None
-    if introduction.protocol != PROTOCOL:
-        raise Trouble("wrong-format", f"start: it speaks protocol {introduction.protocol}, not {PROTOCOL}")
-    texts = {name: clean(getattr(introduction, name)) for name in ("name", "version", "language")}
-    lists = {name: getattr(introduction, name)[:MAX_OFFERED] for name in ("profiles", "tables", "laws")}
-    offered = {name: tuple(map(clean, given)) for name, given in lists.items()}
-    return msgspec.structs.replace(introduction, **texts, **offered)
-
-
-def check_echo(values: Sequence[float], line: bytes) -> None:
-    """Compare an echo bit for bit.
-
-    Raises:
-        Trouble: wrong-format, naming the first number that differs.
-    """
-    try:
-        echoed = msgspec.json.decode(line, type=Echoed).values
-    except UNREADABLE as error:
-        raise Trouble("wrong-format", f"echo: {_reason(error)} in {shown(line)}") from None
-    if len(echoed) != len(values):
-        raise Trouble("wrong-format", f"echo: {len(echoed)} numbers came back of {len(values)}")
-    for i, (sent, came) in enumerate(zip(values, echoed, strict=True)):
-        if struct.pack("<d", sent) != struct.pack("<d", came):
-            raise Trouble("wrong-format", f"echo: values[{i}] = {sent!r} came back as {came!r}")
-
-
-def read_answer(line: bytes, cmd: str, seq: int | None, *, may_be_null: bool = False) -> dict[str, Any]:
-    """Decode the answer to one question, strictly.
-
-    Args:
-        line: as received.
-        cmd: step, trajectory, flow or time.
-        seq: that of the question.
-        may_be_null: whether null will do for it.
-
-    Returns:
-        The answer as plain data, without its seq: an outcome, what the command asks for, or an error.
-
-    Raises:
-        Trouble: wrong-format, naming the field.
-    """
-    try:
-        envelope = _envelopes.decode(line)
-        is_null = may_be_null and envelope.seq is None
-        if not is_null and (type(envelope.seq) is not int or envelope.seq != seq):
-            said = f": {str(envelope.reason)[:200]}" if envelope.reason else ""
-            given = repr(envelope.seq)[:40]
-            raise Trouble("wrong-format", f"answered seq {given} to seq {seq}{said}")
-        own = _failures if envelope.error is not None else _answers[cmd]
-        decoder = _outcomes if envelope.outcome is not None else own
-        data: dict[str, Any] = msgspec.to_builtins(decoder.decode(line))
-    except UNREADABLE as error:
-        raise Trouble("wrong-format", f"{cmd}: {_reason(error)} in {shown(line)}") from None
-    data.pop("seq", None)
-    for part in (data, *data.get("steps", ()), *data.get("states", ())):
-        part.update({name: clean(part[name]) for name in ("reason", "error") if name in part})
-    return data
-
-
-def read_outcome(answer: Mapping[str, Any], t: float) -> Outcome:
-    """Return the outcome that an answer to `step` is, or one of the steps of a trajectory.
-
-    Args:
-        answer: as `Session.ask` returns it.
-        t: when the flight began, for a collision that does not tell its flight time.
-
-    Raises:
-        Trouble: error, when that is the answer; wrong-format, for a collision that names no wall.
-    """
-    if "error" in answer:
-        raise Trouble("error", answer["error"])
-    answered: Answered = msgspec.convert(answer, Answered)
-    if not isinstance(answered, AnsweredCollision):
-        return answered
-    if answered.wall is None:
-        raise Trouble("wrong-format", "`wall` is missing")
-    dt = answered.t - t if answered.dt is None else answered.dt
-    return Collision(answered.wall, dt, answered.t, answered.x, answered.y, answered.vx, answered.vy)
-
-
-def _with_walls(answer: dict[str, Any], scene: Any) -> dict[str, Any]:
-    """Name the wall of each collision that leaves it out: the wall nearest to its place at its time."""
-    for part in (answer, *answer.get("steps", ())):
-        if part.get("outcome") == "collision" and "wall" not in part:
-            try:
-                table = table_at(fp, from_data(scene), part["t"])
-            except (ValueError, ArithmeticError):
-                return answer  # no scene at all, or a time beyond its numbers: nothing can have been met
-            part["wall"] = table.nearest_wall(part["x"], part["y"])
-    return answer
-
-
 def probe_values() -> list[float]:
     """Return the numbers of the transport probe: every kind, and random bits of every exponent."""
     least, largest = 5e-324, sys.float_info.max
@@ -377,7 +247,3 @@ def probe_values() -> list[float]:
 
 def _encode(request: Mapping[str, Any]) -> bytes:
     return msgspec.json.encode(request)
-
-
-def _reason(error: Exception) -> str:
-    return clean(str(error)).replace("$.", "")[:200]

@@ -17,9 +17,10 @@ from typing import Any, NamedTuple
 
 from msgspec.structs import replace
 
+from conformance.suite.answers import read_outcome
 from conformance.suite.process import Trouble
 from conformance.suite.questions import MOVING, distance, last_collision, off_wall, offered, question
-from conformance.suite.session import Session, read_outcome
+from conformance.suite.session import Session
 from scene import Collision, Mushroom, Scene, State, Stem, Undecided
 
 N_STEPS = 60  # collisions of the trajectory that `time` and `trajectory` both follow

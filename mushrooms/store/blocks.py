@@ -15,7 +15,7 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
-from mushrooms.store.asked import Asked, asked_of, made_by
+from mushrooms.store.asked import SCHEMA, Asked, asked_of, made_by
 from mushrooms.store.layout import LANE, Array, Arrays, Shape, from_chunks, metadata, to_chunks
 from mushrooms.store.tally import RunTally, tally_from
 from scene.files import sealed, unsealed, write_file, write_files
@@ -316,11 +316,18 @@ def attributes_of(folder: Path) -> dict[str, Any]:
         try:
             found = json.loads(content or b"")
             found = found.get("attributes", found)
-            if isinstance(found["schema"], int):
+            if found["schema"] != SCHEMA or _is_description(found):
                 return dict(found)
         except (ValueError, KeyError, TypeError, AttributeError):
             continue
     raise BadInput(f"run {str(folder)!r}: {path.name}: {why}")
+
+
+def _is_description(found: dict[str, Any]) -> bool:
+    """Tell whether a description has what runs are opened by: only one of its two copies is sealed."""
+    wholes = [found[name] for name in ("particles", "block", "cycles", "cycles_of_a_chunk")]
+    numbers = all(type(n) is int and n > 0 for n in wholes)
+    return numbers and isinstance(found["command"], str) and isinstance(found["scene"], dict)
 
 
 def open_run(folder: Path) -> RunFolder:
@@ -330,7 +337,6 @@ def open_run(folder: Path) -> RunFolder:
         BadInput: the folder holds none, one of another schema, or one that is not finished.
     """
     from fast.narrowings import narrowings
-    from mushrooms.store.asked import SCHEMA
 
     found = attributes_of(folder)
     if found["schema"] != SCHEMA:

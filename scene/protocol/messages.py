@@ -11,6 +11,7 @@ request has its class's name without the suffix.
 from __future__ import annotations
 
 import json
+import re
 from typing import Annotated, Any, get_args
 
 import msgspec
@@ -168,6 +169,22 @@ class Failed(msgspec.Struct, frozen=True):
 
     seq: Seq
     error: str
+
+
+# Strings are passed over; the last one may have no end.
+_ZEROS = re.compile(rb'"(?:[^"\\]|\\.)*+\\?(?:"|\Z)|(?<![\w.+-])-0(?=[\s,\]}]|\Z)', re.DOTALL)
+_MAY_HAVE_ZEROS = re.compile(rb"-0(?:[\s,\]}]|\Z)")
+
+
+def with_minus_zeros(line: bytes) -> bytes:
+    """Return a line of JSON with -0.0 for -0: C writes minus zero so, and decoders take it for an integer.
+
+    Args:
+        line: of JSON, or of anything.
+    """
+    if not _MAY_HAVE_ZEROS.search(line):
+        return line
+    return _ZEROS.sub(lambda found: b"-0.0" if found[0] == b"-0" else found[0], line)
 
 
 def json_schema() -> dict[str, Any]:

@@ -26,6 +26,7 @@ from scene.protocol.messages import (
     StopRequest,
     TimeRequest,
     TrajectoryRequest,
+    with_minus_zeros,
 )
 from scene.refusal import BadInput
 from scene.states import Outcome, Rejected, State
@@ -95,7 +96,7 @@ class _Server:
             if not line.strip():
                 continue
             try:
-                command = _decoder.decode(line)
+                command = _decoder.decode(with_minus_zeros(line))
             except UNREADABLE as error:
                 _reply(out, {"seq": _sequence_number(line), **_plain(_refusal(error))})
                 continue

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import sys
 import time
+from pathlib import Path
 from typing import Any
 
+from conformance.audit import ledger, session
 from conformance.audit.session import AuditSettings
 
 
@@ -14,3 +17,11 @@ def nap(_entry_id: str, settings: AuditSettings) -> Any:
     (settings.folder / "begun").touch()
     time.sleep(30.0)
     (settings.folder / "ended").touch()
+
+
+if __name__ == "__main__":
+    from support import naps
+
+    session._examine_apart = naps.nap
+    with session._elsewhere(AuditSettings(folder=Path(sys.argv[1]), apart=True), list(ledger.select("M10"))):
+        time.sleep(60.0)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -28,6 +29,7 @@ HIT = {"outcome": "collision", "wall": "arc", "dt": 1.0, "t": 1.0, "x": 0.6, "y"
 SLEEP = 600.0
 Answer = dict[str, Any]
 Act = Callable[[Answer], object]  # what is done with the honest answer, in place of saying it
+helpers: list[subprocess.Popen[bytes]] = []  # held, so that their pipes are open while this process lives
 asked: list[int] = []  # the seq of every step so far
 
 
@@ -141,6 +143,12 @@ def orphan(_: Answer) -> None:
     os._exit(0)
 
 
+def helper(_: Answer) -> None:
+    """Start a child that ends a little after this process, because it has ended."""
+    program = "import sys, time; sys.stdin.read(); time.sleep(0.2)"
+    helpers.append(subprocess.Popen([sys.executable, "-I", "-S", "-c", program], stdin=subprocess.PIPE))
+
+
 def cry(what: bytes) -> Act:
     """Write to standard error."""
     return lambda _: os.write(2, what)
@@ -166,9 +174,17 @@ def write_bytes(answer: Answer) -> None:
     sys.stdout.flush()
 
 
-def print_fifteen_digits(answer: Answer) -> None:
-    """Echo numbers to fifteen digits."""
-    write('{"values": [' + ", ".join(f"{value:.15g}" for value in answer["values"]) + "]}\n")
+def write_latin_note(answer: Answer) -> None:
+    """Write what is no UTF-8 where nobody looks."""
+    sys.stdout.buffer.write(json.dumps(answer).encode()[:-1] + b', "note": "\xe9"}\n')
+    sys.stdout.flush()
+
+
+def print_digits(n: int) -> Act:
+    """Echo numbers to so many digits, as C writes them: minus zero is -0."""
+    return lambda answer: write(
+        '{"values": [' + ", ".join(f"{value:.{n}g}" for value in answer["values"]) + "]}\n"
+    )
 
 
 def crash(_: Answer) -> None:
@@ -190,7 +206,19 @@ def answer_before_being_asked(answer: Answer) -> None:
 
 sleep = wait(SLEEP)  # longer than anyone waits
 # Odd manners that are no faults: these must pass.
-HONEST = ("honest", "dribble", "noise", "more-fields", "answer-and-exit", "control-characters")
+HONEST = (
+    "honest",
+    "dribble",
+    "noise",
+    "more-fields",
+    "answer-and-exit",
+    "control-characters",
+    "numbers-as-c-writes-them",
+    "whole-numbers-with-a-point",
+    "lines-as-windows-ends-them",
+    "helper-that-ends-later",
+    "last-words",
+)
 CONTROLS = "\x1b]0;owned\x07\x1b[2J\r\x9b31m\u202e\u2028\x00"  # for terminals, and what XML cannot hold
 # Where each differs from an honest citizen (in what it makes of `start`, `echo`, a step, a step without vy,
 # or `stop`), and what it does there.
@@ -207,6 +235,14 @@ SABOTEURS: dict[str, tuple[str, Act]] = {
             says(lambda said: {**said, "name": CONTROLS, "laws": [*said["laws"], CONTROLS]}),
         ),
     ),
+    "numbers-as-c-writes-them": ("echo", print_digits(17)),
+    "whole-numbers-with-a-point": (
+        "step",
+        writes(lambda line: re.sub(r'"seq": (\d+)', r'"seq": \1.0', line)),
+    ),
+    "lines-as-windows-ends-them": ("step", writes(lambda line: f" {line[:-1]} \t\r\n")),
+    "helper-that-ends-later": ("start", then(helper, say)),
+    "last-words": ("stop", then(lambda _: os.close(1), cry(b"statistics " * 50_000), leave(0))),
     # Something else is said.
     "huge-line": ("step", says(lambda hit: {"seq": hit["seq"], "filler": "x" * (2**24 + 2**20)})),
     "wrong-seq": ("step", says(lambda hit: {**hit, "seq": hit["seq"] + 1})),
@@ -240,12 +276,13 @@ SABOTEURS: dict[str, tuple[str, Act]] = {
     "endless-line": ("step", forever(writes(lambda _: "9" * 2**20))),
     "half-a-line": ("step", then(writes(lambda line: line[:40]), sleep)),
     "not-utf8": ("step", write_bytes),
+    "not-utf8-in-a-further-field": ("step", write_latin_note),
     "banner": ("start", writes(lambda line: "Welcome to the stepper!\n" + line)),
     # Numbers are misread or misprinted.
     "no-minus-zero": ("echo", echoes(lambda value: value or 0.0)),
     "flush-subnormals": ("echo", echoes(lambda v: v if abs(v) >= sys.float_info.min else 0.0 * v)),
     "misread-exponents": ("echo", echoes(lambda value: float(repr(value).replace("e+22", "e+21")))),
-    "fifteen-digits": ("echo", print_fifteen_digits),
+    "fourteen-digits": ("echo", print_digits(14)),
     "fewer-numbers": ("echo", says(lambda answer: {"values": answer["values"][:-1]})),
     # Nothing is said, or too late, or nothing but noise.
     "hang": ("step", sleep),
@@ -260,6 +297,7 @@ SABOTEURS: dict[str, tuple[str, Act]] = {
     "crash-at-second": ("step", crash_at_the_second),
     "exit-silently": ("step", leave(0)),
     "close-stdout": ("step", then(lambda _: os.close(1), sleep)),
+    "end-by-a-nameless-signal": ("step", lambda _: os.kill(os.getpid(), 40)),
     "fork-and-die": ("step", then(child(is_detached=False), leave(3))),
     "daemon": ("step", then(child(is_detached=True), leave(3))),
     "leave-a-child": ("stop", child(is_detached=True)),

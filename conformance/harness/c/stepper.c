@@ -426,12 +426,19 @@ static int read_state(json_t *request, State *state, double *t_end) {
     if (read_number(data, "t", &state->t) || read_number(data, "x", &state->x) || read_number(data, "y", &state->y) ||
         read_number(data, "vx", &state->vx) || read_number(data, "vy", &state->vy))
         return REJECTED;
+    if (wall && !json_is_null(wall) && !json_is_string(wall)) return refuse("state.wall", 0, "null or the name of a wall");
     state->wall = json_is_string(wall) ? 0 : NOWHERE;
     while (state->wall < N_WALLS && strcmp(WALLS[state->wall], json_string_value(wall))) state->wall++;
     if (state->wall == N_WALLS) return refuse("state.wall", 0, "null or the name of a wall");
     *t_end = DBL_MAX;
-    if (json_object_get(request, "t_end") && read_number(request, "t_end", t_end)) return REJECTED;
+    if (strcmp(json_string_value(json_object_get(request, "cmd")), "time") && read_number(request, "t_end", t_end))
+        return REJECTED;
     return *t_end < state->t ? refuse("t_end", *t_end, ">= state.t") : FOUND;
+}
+
+static int read_count(json_t *request, const char *name, double least, double *count) {
+    if (read_number(request, name, count)) return REJECTED;
+    return *count >= least && *count <= 0x1p53 && *count == floor(*count) ? FOUND : refuse(name, *count, "a whole number, and not less");
 }
 
 /* A number that returns with all its bits; "-0" would be read as an integer. */
@@ -452,38 +459,47 @@ static void print_outcome(const Flight *flight, const Event *event, const State 
     print_number(",\"vx\":", state->vx), print_number(",\"vy\":", state->vy);
 }
 
-static void answer(json_t *request, const char *command, json_int_t seq) {
+static void answer(json_t *request, const char *command) {
     static Table table;
     State start, state;
     Flight flight;
     Event event;
-    double t_end;
-    json_int_t n = json_integer_value(json_object_get(request, "collisions"));
-    printf("{\"seq\":%" JSON_INTEGER_FORMAT ",", seq);
-    if (read_table(json_object_get(request, "scene"), &table) || read_state(request, &start, &t_end)) {
+    double t_end, seq, n = 0, repeat = 0;
+    int is_step = strcmp(command, "step") == 0, is_time = strcmp(command, "time") == 0;
+    if (read_count(request, "seq", 0, &seq)) {
+        printf("{\"seq\":null,\"outcome\":\"rejected\",\"reason\":\"%s\"}\n", reason);
+        return;
+    }
+    printf("{\"seq\":%.0f,", seq);
+    if (!is_step && !is_time && strcmp(command, "trajectory")) {
+        printf("\"outcome\":\"rejected\",\"reason\":\"there is no such cmd\"}\n");
+        return;
+    }
+    if (read_table(json_object_get(request, "scene"), &table) || read_state(request, &start, &t_end) ||
+        (!is_step && read_count(request, "collisions", is_time, &n)) ||
+        (is_time && read_count(request, "repeat", 1, &repeat))) {
         printf("\"outcome\":\"rejected\",\"reason\":\"%s\"}\n", reason);
         return;
     }
     state = start;
-    if (strcmp(command, "step") == 0) {
+    if (is_step) {
         event = step(&flight, &table, &state, t_end);
         print_outcome(&flight, &event, &state);
-    } else if (strcmp(command, "trajectory") == 0) {
+    } else if (!is_time) {
         printf("\"steps\":[");
-        for (json_int_t i = 0; i < n; i++) {
+        for (double i = 0; i < n; i++) {
             event = step(&flight, &table, &state, t_end);
             printf(i ? ",{" : "{"), print_outcome(&flight, &event, &state), printf("}");
             if (flight.status != FOUND || event.kind == HORIZON) break;
         }
         printf("]");
     } else {
-        json_int_t repeat = json_integer_value(json_object_get(request, "repeat"));
         printf("\"ns\":[");
-        for (json_int_t k = 0; k < repeat; k++) {
+        for (double k = 0; k < repeat; k++) {
             struct timespec begin, end;
             state = start;
             clock_gettime(CLOCK_MONOTONIC, &begin);
-            for (json_int_t i = 0; i < n; i++) {
+            for (double i = 0; i < n; i++) {
                 event = step(&flight, &table, &state, t_end);
                 if (flight.status != FOUND || event.kind == HORIZON) break;
             }
@@ -500,7 +516,7 @@ int main(void) {
     char *line = NULL;
     size_t room = 0, i;
     while (getline(&line, &room, stdin) > 0) {
-        json_t *request = json_loads(line, 0, NULL), *value, *values;
+        json_t *request = json_loads(line, JSON_DECODE_INT_AS_REAL, NULL), *value, *values;
         const char *command = json_string_value(json_object_get(request, "cmd"));
         if (!command) printf("{\"seq\":null,\"outcome\":\"rejected\",\"reason\":\"no JSON object with a cmd\"}\n");
         else if (strcmp(command, "stop") == 0) return 0;
@@ -509,11 +525,14 @@ int main(void) {
                    "\"profiles\":[\"step\",\"trajectory\",\"time\"],\"tables\":[\"cap\",\"stem\",\"mushroom\"],"
                    "\"laws\":[\"constant\",\"fourier\",\"bang-bang\"]}\n");
         else if (strcmp(command, "echo") == 0) {
-            values = json_object_get(request, "values");
-            printf("{\"values\":[");
-            json_array_foreach(values, i, value) print_number(i ? "," : "", json_number_value(value));
-            printf("]}\n");
-        } else answer(request, command, json_integer_value(json_object_get(request, "seq")));
+            int is_good = json_is_array(values = json_object_get(request, "values"));
+            json_array_foreach(values, i, value) is_good = is_good && json_is_number(value);
+            printf(is_good ? "{\"values\":[" : "{\"seq\":null,\"outcome\":\"rejected\",\"reason\":\"values must be numbers\"}\n");
+            if (is_good) {
+                json_array_foreach(values, i, value) print_number(i ? "," : "", json_number_value(value));
+                printf("]}\n");
+            }
+        } else answer(request, command);
         fflush(stdout);
         json_decref(request);
     }

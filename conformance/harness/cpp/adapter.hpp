@@ -331,8 +331,9 @@ inline std::string outcome(const Engine& engine, const json::Value& request) {
     bool goes_on = true;
     if (command == "step") return step(engine, scene, q, t_end, goes_on);
     double collisions = number_of(request, "collisions"), repeat = command == "time" ? number_of(request, "repeat") : 1;
-    if (!(collisions >= 0 && collisions <= MAX_COLLISIONS)) throw Refused("collisions must be 0 to 1000000");
-    if (!(repeat >= 1 && repeat <= MAX_REPEAT)) throw Refused("repeat must be 1 to 1000");
+    if (!(collisions >= (command == "time") && collisions <= MAX_COLLISIONS && collisions == std::floor(collisions)))
+        throw Refused("collisions must be a whole number, 0 (of `time`, 1) to 1000000");
+    if (!(repeat >= 1 && repeat <= MAX_REPEAT && repeat == std::floor(repeat))) throw Refused("repeat must be 1 to 1000");
     std::string steps, ns;
     for (int k = 0; k < static_cast<int>(repeat); k++) {
         auto begin = std::chrono::steady_clock::now();
@@ -352,17 +353,23 @@ inline std::string answer(const std::string& name, const Engine& engine, const s
     try {
         json::Value request = json::parse(line);
         const std::string& command = request.at("cmd").text;
-        if (request.at("seq").is_integer) seq = std::to_string(static_cast<long long>(request.at("seq").number));
+        if (request.at("seq").is_integer && request.at("seq").number >= 0) seq = std::to_string(static_cast<long long>(request.at("seq").number));
         if (command == "start")
             return "{\"protocol\":1,\"name\":\"" + name +
                    "\",\"version\":\"1\",\"language\":\"C++\",\"profiles\":[\"step\",\"trajectory\",\"time\"],"
                    "\"tables\":[\"cap\",\"stem\",\"mushroom\"],\"laws\":[\"constant\",\"fourier\",\"bang-bang\"]}";
         if (command == "echo") {
             std::string values;
-            for (const json::Value& value : request.at("values").items) values += (values.empty() ? "" : ",") + shown(value.number);
-            return "{\"values\":[" + values + "]}";
+            bool is_good = request.at("values").kind == json::Value::LIST;
+            for (const json::Value& value : request.at("values").items) {
+                is_good = is_good && value.is_number();
+                values += (values.empty() ? "" : ",") + shown(value.number);
+            }
+            if (is_good) return "{\"values\":[" + values + "]}";
+            throw Refused("values must be numbers");
         }
         if (command != "step" && command != "trajectory" && command != "time") throw Refused("there is no such cmd");
+        if (seq == "null") throw Refused("seq must be a whole number");
         return "{\"seq\":" + seq + "," + outcome(engine, request) + "}";
     } catch (const Open& question) {
         return "{\"seq\":" + seq + ",\"outcome\":\"undecided\",\"reason\":\"" + question.what() + "\"}";

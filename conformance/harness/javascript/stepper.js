@@ -360,9 +360,16 @@ function follow(table, state, nCollisions, tEnd) {
   return steps;
 }
 
-function answer({ cmd, scene, state, collisions, repeat, t_end: tEnd = Number.MAX_VALUE }) {
+function count(value, least, name) {
+  if (!Number.isSafeInteger(value) || value < least) throw new Refused(`${name} must be a whole number, at least ${least}`);
+}
+
+function answer({ cmd, scene, state, collisions, repeat, t_end }) {
   try {
+    const tEnd = cmd === "time" ? Number.MAX_VALUE : t_end;
     const [table, start] = [new Table(scene), readState(state, tEnd)];
+    if (cmd !== "step") count(collisions, cmd === "time" ? 1 : 0, "collisions");
+    if (cmd === "time") count(repeat, 1, "repeat");
     if (cmd === "step") return step(table, start, tEnd);
     if (cmd === "trajectory") return { steps: follow(table, start, collisions, tEnd) };
     const [ns, steps] = [[], []];
@@ -404,9 +411,14 @@ function reply(line) {
   const { cmd, seq = null } = request ?? {};
   if (cmd === "stop") process.exit(0);
   if (cmd === "start") return INTRODUCTION;
-  if (cmd === "echo") return { values: request.values };
-  if (!["step", "trajectory", "time"].includes(cmd)) return { seq, outcome: "rejected", reason: `no cmd ${cmd}` };
-  return { seq, ...answer(request) };
+  const isSeq = Number.isInteger(seq) && seq >= 0 && seq <= 2 ** 53;
+  const refuse = (reason) => ({ seq: isSeq ? seq : null, outcome: "rejected", reason });
+  if (cmd === "echo") {
+    const isGood = Array.isArray(request.values) && request.values.every(Number.isFinite);
+    return isGood ? { values: request.values } : refuse("values must be numbers");
+  }
+  if (!["step", "trajectory", "time"].includes(cmd)) return refuse(`no cmd ${cmd}`);
+  return isSeq ? { seq, ...answer(request) } : refuse("seq must be a whole number");
 }
 
 readline.createInterface({ input: process.stdin }).on("line", (line) => process.stdout.write(`${encode(reply(line))}\n`));

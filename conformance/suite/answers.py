@@ -1,0 +1,211 @@
+"""What an implementation says, decoded: strictly, but for manners that mean the same.
+
+A further field is ignored; a whole number is one however it is written, 17.0 too; -0 is minus zero; a wall
+that an answer leaves out is named from the place; texts lose their control characters. All else that the
+protocol does not name is `wrong-format`, with the field. Whether an answer is right is not judged here.
+"""
+
+from __future__ import annotations
+
+import json
+import struct
+from collections.abc import Mapping, Sequence
+from typing import Any, get_args
+
+import msgspec
+from mpmath import fp
+
+from conformance.suite.process import Trouble, clean, shown
+from scene import Collision, Outcome, from_data
+from scene.geometry import table_at
+from scene.protocol.messages import (
+    PROTOCOL,
+    Answered,
+    AnsweredCollision,
+    Arrival,
+    Echoed,
+    Failed,
+    Flown,
+    Introduction,
+    Steps,
+    Timed,
+    with_minus_zeros,
+)
+
+UNREADABLE = (msgspec.DecodeError, UnicodeDecodeError, RecursionError)
+MAX_OFFERED = 100  # profiles, tables or laws that an introduction may list
+ANSWERS = {"step": Answered, "trajectory": Steps, "flow": Flown, "time": Timed}
+
+
+class _Envelope(msgspec.Struct):
+    seq: Any = None
+    outcome: Any = None
+    error: Any = None
+    reason: Any = ""
+
+
+WHOLE = ("seq", "ns", "protocol")  # what is whole by the schema, where 17.0 is an integer
+_FORMS = (Introduction, Echoed, Failed, *get_args(Answered), Arrival, Steps, Flown, Timed)
+NAMED = {"outcome"}.union(*(form.__struct_fields__ for form in _FORMS))  # the fields of answers
+_introductions: msgspec.json.Decoder[Any] = msgspec.json.Decoder(Introduction)
+_echoes: msgspec.json.Decoder[Any] = msgspec.json.Decoder(Echoed)
+_outcomes: msgspec.json.Decoder[Any] = msgspec.json.Decoder(Answered)
+_envelopes: msgspec.json.Decoder[Any] = msgspec.json.Decoder(_Envelope)
+_failures: msgspec.json.Decoder[Any] = msgspec.json.Decoder(Failed)
+_answers: dict[str, msgspec.json.Decoder[Any]] = {
+    cmd: msgspec.json.Decoder(form) for cmd, form in ANSWERS.items()
+}
+
+
+def read_introduction(line: bytes) -> Introduction:
+    """Decode the answer to `start`.
+
+    Raises:
+        Trouble: wrong-format.
+    """
+    try:
+        introduction: Introduction = _decoded(_checked(line), _introductions)
+    except UNREADABLE as error:
+        raise Trouble("wrong-format", f"start: {_reason(error)} in {shown(line)}") from None
+    if introduction.protocol != PROTOCOL:
+        raise Trouble("wrong-format", f"start: it speaks protocol {introduction.protocol}, not {PROTOCOL}")
+    texts = {name: clean(getattr(introduction, name)) for name in ("name", "version", "language")}
+    lists = {name: getattr(introduction, name)[:MAX_OFFERED] for name in ("profiles", "tables", "laws")}
+    offered = {name: tuple(map(clean, given)) for name, given in lists.items()}
+    return msgspec.structs.replace(introduction, **texts, **offered)
+
+
+def check_echo(values: Sequence[float], line: bytes) -> None:
+    """Compare an echo bit for bit.
+
+    Raises:
+        Trouble: wrong-format, naming the first number that differs.
+    """
+    try:
+        echoed: Sequence[float] = _decoded(_checked(line), _echoes).values
+    except UNREADABLE as error:
+        raise Trouble("wrong-format", f"echo: {_reason(error)} in {shown(line)}") from None
+    if len(echoed) != len(values):
+        raise Trouble("wrong-format", f"echo: {len(echoed)} numbers came back of {len(values)}")
+    for i, (sent, came) in enumerate(zip(values, echoed, strict=True)):
+        if struct.pack("<d", sent) != struct.pack("<d", came):
+            raise Trouble("wrong-format", f"echo: values[{i}] = {sent!r} came back as {came!r}")
+
+
+def read_answer(line: bytes, cmd: str, seq: int | None, *, may_be_null: bool = False) -> dict[str, Any]:
+    """Decode the answer to one question, strictly.
+
+    Args:
+        line: as received.
+        cmd: step, trajectory, flow or time.
+        seq: that of the question.
+        may_be_null: whether null will do for it.
+
+    Returns:
+        The answer as plain data, without its seq: an outcome, what the command asks for, or an error.
+
+    Raises:
+        Trouble: wrong-format, naming the field.
+    """
+    try:
+        read = _checked(line)
+        envelope: _Envelope = _decoded(read, _envelopes)
+        is_null = may_be_null and envelope.seq is None
+        if not is_null and (type(envelope.seq) not in (int, float) or envelope.seq != seq):
+            said = f": {str(envelope.reason)[:200]}" if envelope.reason else ""
+            given = repr(envelope.seq)[:40]
+            raise Trouble("wrong-format", f"answered seq {given} to seq {seq}{said}")
+        own = _failures if envelope.error is not None else _answers[cmd]
+        decoder = _outcomes if envelope.outcome is not None else own
+        data: dict[str, Any] = msgspec.to_builtins(_decoded(read, decoder))
+    except UNREADABLE as error:
+        raise Trouble("wrong-format", f"{cmd}: {_reason(error)} in {shown(line)}") from None
+    data.pop("seq", None)
+    for part in (data, *data.get("steps", ()), *data.get("states", ())):
+        part.update({name: clean(part[name]) for name in ("reason", "error") if name in part})
+    return data
+
+
+def read_outcome(answer: Mapping[str, Any], t: float) -> Outcome:
+    """Return the outcome that an answer to `step` is, or one of the steps of a trajectory.
+
+    Args:
+        answer: as `Session.ask` returns it.
+        t: when the flight began, for a collision that does not tell its flight time.
+
+    Raises:
+        Trouble: error, when that is the answer; wrong-format, for a collision that names no wall.
+    """
+    if "error" in answer:
+        raise Trouble("error", answer["error"])
+    answered: Answered = msgspec.convert(answer, Answered)
+    if not isinstance(answered, AnsweredCollision):
+        return answered
+    if answered.wall is None:
+        raise Trouble("wrong-format", "`wall` is missing")
+    dt = answered.t - t if answered.dt is None else answered.dt
+    return Collision(answered.wall, dt, answered.t, answered.x, answered.y, answered.vx, answered.vy)
+
+
+def with_walls(answer: dict[str, Any], scene: Any) -> dict[str, Any]:
+    """Name the wall of each collision that leaves it out: the wall nearest to its place at its time.
+
+    Args:
+        answer: as `read_answer` returns it.
+        scene: of the question, in the wire's form; with one that is none nothing is named.
+    """
+    for part in (answer, *answer.get("steps", ())):
+        if part.get("outcome") == "collision" and "wall" not in part:
+            try:
+                table = table_at(fp, from_data(scene), part["t"])
+            except (ValueError, ArithmeticError):
+                return answer  # no scene at all, or a time beyond its numbers: nothing can have been met
+            part["wall"] = table.nearest_wall(part["x"], part["y"])
+    return answer
+
+
+def _checked(line: bytes) -> bytes:
+    """Return a line for the decoders: they look into no field that they ignore, and take the last of two."""
+    if not line.isascii():
+        line.decode()
+    try:
+        json.loads(line, object_pairs_hook=_once, parse_int=str, parse_float=str)
+    except msgspec.ValidationError:
+        raise
+    except (ValueError, RecursionError):
+        pass  # no JSON: the decoder says where
+    return with_minus_zeros(line)
+
+
+def _once(pairs: list[tuple[str, object]]) -> None:
+    """Refuse a named field that stands twice in one object: of two, readers take either."""
+    if len(names := {name for name, _ in pairs}) < len(pairs):
+        for name in names & NAMED:
+            if sum(other == name for other, _ in pairs) > 1:
+                raise msgspec.ValidationError(f"Field `{name}` stands twice")
+
+
+def _decoded(line: bytes, decoder: msgspec.json.Decoder[Any]) -> Any:
+    try:
+        return decoder.decode(line)
+    except msgspec.ValidationError:
+        data = msgspec.json.decode(line)
+        if isinstance(data, dict) and any(_is_float(data.get(name)) for name in WHOLE):
+            return msgspec.convert(
+                {**data, **{name: _whole(data[name]) for name in WHOLE if name in data}}, decoder.type
+            )
+        raise
+
+
+def _is_float(value: Any) -> bool:
+    return any(map(_is_float, value)) if isinstance(value, list) else isinstance(value, float)
+
+
+def _whole(value: Any) -> Any:
+    if isinstance(value, list):
+        return [_whole(one) for one in value]
+    return int(value) if isinstance(value, float) and value.is_integer() else value
+
+
+def _reason(error: Exception) -> str:
+    return clean(str(error)).replace("$.", "")[:200]

@@ -83,8 +83,8 @@ def upright_rate(scene: Scene, times: Floats) -> Floats:
 def upright_spread(scene: Scene) -> float:
     """Return B in the variance B log(v) / v + O(1 / v) of log E of the uncaptured after one cycle.
 
-    v is the speed at which the cycle begins, at the widest mouth. What is O(1 / v) is not known, and not small:
-    the narrower the mouth, the oftener the cap hands flights back, and the later log(v) wins.
+    v is the speed at which the cycle begins, at the widest mouth. What is O(1 / v) is not known, and not
+    small: the narrower the mouth, the oftener the cap hands flights back, and the later log(v) wins.
 
     Returns:
         B [length / time]; 0 when no wall moves.

@@ -3,18 +3,23 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import Any, NamedTuple
 
+import numpy as np
 from mpmath import fp
 
-from fast.narrowings import start_time
+from fast.narrowings import narrowings, start_time
 from mushrooms.store.asked import Asked
 from mushrooms.store.tally import RunTally
-from scene import Mushroom
+from scene import Mushroom, Scene
 from scene.geometry import table_at
+from scene.laws import values
 from scene.refusal import BadInput
+from scene.tables import cycle_length, laws
 
 DIGITS = 10  # of the adiabatic theory: a run knows six at most
+N_TIMES = 1025  # of a cycle, at which the sides are looked at
 SAME = 2.0**-40  # of nu: far above rounding, and nobody starts in so thin a part of the island
 
 
@@ -43,7 +48,7 @@ def measured(asked: Asked, tally: RunTally) -> dict[str, Any]:
     mean, error = (None if x is None else x / k for x in (tally.gain.mean, tally.gain.standard_error))
     has_island = isinstance(asked.scene, Mushroom)
     free = 1.0 - tally.captured / (n * k) if n and has_island else None
-    free_error = None if free is None else _binomial_error(free, n * k)
+    free_error = None if free is None else _measured_error(asked.scene, free, n * k)
     found = _predicted(asked)
     pulls: tuple[float | None, float | None] = (None, None)
     if found is not None and n:
@@ -62,6 +67,42 @@ def measured(asked: Asked, tally: RunTally) -> dict[str, Any]:
         "p_nc_theory": found.p_nc if found else None,
         "p_nc_z": pulls[1],
     }
+
+
+def limit_told(asked: Asked, summary: Mapping[str, Any]) -> str | None:
+    """Return a line that tells that theory beside a run is the limit of high energies, where it is.
+
+    Args:
+        asked: the run.
+        summary: as `measured` returns it, or more.
+    """
+    if summary["m1_theory"] is None or summary["m1"] is None or summary["m1_z"] is not None:
+        return None
+    told = "m1_theory, p_nc_theory: the limit of high energies; what is left at this one is not known"
+    if not leans_inward(asked.scene):
+        told += (
+            ", and falls slowly, as log(E) / sqrt(E):"
+            " where the slope is not above 0 some flights stay in the stem"
+        )
+    return told
+
+
+def leans_inward(scene: Scene) -> bool:
+    """Tell whether the stem narrows downward at all times, so that no flight can stay in it for ever."""
+    times = start_time(scene) + cycle_length(scene) * np.linspace(0.0, 1.0, N_TIMES)
+    return bool(values(laws(scene)["slope"], times).min() > 0)
+
+
+def _measured_error(scene: Scene, share: float, n: int) -> float:
+    """Return the standard error of a measured share of n that were free.
+
+    Of n that are all alike the binomial one would be 0, as if no more could tell: there it is that of a share
+    of 1 / (n + 1). Where the mouth never narrows nobody can be captured, and the share is known.
+    """
+    if not narrowings(scene):
+        return 0.0
+    least = 1.0 / (n + 1)
+    return _binomial_error(min(max(share, least), 1.0 - least), n)
 
 
 def _binomial_error(share: float, n: int) -> float:

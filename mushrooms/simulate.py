@@ -93,7 +93,8 @@ def simulate(
     bits. Exit code 0; 3 when a limit has stopped it, 130 when it was interrupted: both say how to go on.
 
     On stderr: before a run of over 20 s about how many collisions and how long; after one of over a second
-    that careful steps took over a tenth of it, if they did.
+    that careful steps took over a tenth of it, if they did; and that theory is the limit of high energies,
+    where that at the run's own is not known.
     """
     _check_ensemble(energy, cycles, seed, threads)
     limits = {"max_collisions": max_collisions, "max_seconds": max_seconds}
@@ -112,6 +113,7 @@ def simulate(
                 return LIMITED
             summary, first = found
     print_pairs(summary, as_json)
+    tell_limit(asked, summary)
     if plot is not None:
         draw_histogram(plot, wish.asked, first, wish.name)
     return 0
@@ -225,6 +227,15 @@ def _on_disk(wish: Wish, folder: Path, resume: bool) -> tuple[dict[str, Any], An
     kept = {name: asked[name] for name in ("scene", "energy", "cycles", "seed")} | summary
     write_file(folder / "summary.json", json.dumps(kept) + "\n")
     return summary, run.tally.first
+
+
+def tell_limit(asked: Any, summary: dict[str, Any]) -> None:
+    """Say on stderr where the theory printed is not that of the run's energy."""
+    from mushrooms.compared import limit_told
+
+    told = limit_told(asked, summary)
+    if told is not None:
+        print(told, file=sys.stderr)
 
 
 def tell_damaged(numbers: list[int]) -> None:

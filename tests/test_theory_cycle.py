@@ -8,6 +8,7 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from mpmath import MPContext
 
@@ -152,6 +153,24 @@ def test_motion_is_the_laws_of_the_scene(scene: Mushroom) -> None:
         assert abs(motion.volumes(at, nu).v_cap - ctx.pi**2 * r * r) < ctx.mpf(10) ** -37
         stem = 2 * ctx.pi * (2 * nu * r * h - h * h * slope)
         assert abs(motion.volumes(at, nu).v_stem - stem) < ctx.mpf(10) ** -36
+
+
+@pytest.mark.parametrize("size", [1.0, 1e-30, 1e-290])
+@pytest.mark.parametrize("digits", [15, 60, 300])
+def test_waves_are_summed_to_their_last_bits(size: float, digits: int) -> None:
+    """However small the waves: rates are right relatively to them, where one of them alone is seen."""
+    draw = np.random.default_rng(digits)
+    cos, sin = (
+        tuple((size * draw.uniform(-1, 1, 16) * 10.0 ** -draw.integers(0, 9, 16)).tolist()) for _ in "ab"
+    )
+    law = Fourier(mean=0.5, omega=1.7, cos=tuple(0.03 * c for c in cos), sin=tuple(0.03 * s for s in sin))
+    ctx, finer = MPContext(), MPContext()
+    ctx.dps, finer.dps = digits, digits + 400
+    motion = MovingMushroom(ctx, Mushroom(r=1.0, h=1.0, nu=law), Fraction(0))
+    for t in draw.uniform(0, 3, 5).tolist():
+        nu, rate = (finer.mpf(x) for x in motion.nu(ctx.mpf(t)))
+        assert abs(nu - value(finer, law, finer.mpf(t))) < finer.mpf(10) ** -(digits - 1)
+        assert abs(rate - value(finer, law, finer.mpf(t), 1)) < size * finer.mpf(10) ** -(digits - 2)
 
 
 def test_a_root_costs_a_handful_of_evaluations() -> None:

@@ -15,7 +15,18 @@ from support.depth import deep_but
 
 from scene import BangBang, Fourier, Mushroom, Scene, load
 from scene.laws import values
-from theory import Cycle, NotConverged, Prediction, adiabatic, predict, solutions, v_cap, v_cha, volumes_at
+from theory import (
+    Cycle,
+    NotConverged,
+    Prediction,
+    adiabatic,
+    mean_of,
+    predict,
+    solutions,
+    v_cap,
+    v_cha,
+    volumes_at,
+)
 from theory.adiabatic import captures
 from theory.volumes import delta_slope
 
@@ -308,3 +319,20 @@ def test_a_mouth_that_is_nearly_closed_captures_as_its_width_falls(narrow: float
     r = 1 + 0.25 * np.sin(t)
     p_nc = math.exp(np.trapezoid(r / (r + 1), np.log(2 + np.cos(t))))
     assert float(found.p_nc) == pytest.approx(p_nc, rel=1e-7)
+
+
+@pytest.mark.parametrize("size", [0.2, 1e-12])
+def test_figures_of_several_captures_are_means_over_them(size: float) -> None:
+    """Power series and weighted points: two ways to sum over valleys, of nearly trivial cycles too."""
+    twice = Fourier(mean=0.5, omega=1.0, cos=(0.1, 0.3))
+    moving = Mushroom(
+        r=1.0, h=Fourier(mean=1.2, omega=1.0, cos=(size / 2,), sin=(size,)), nu=twice, slope=0.1
+    )
+    found = predict(moving, 12)
+    square, plus, minus = (
+        mean_of(moving, f, 12)
+        for f in (lambda s: (s - found.m1) ** 2, lambda s: s.context.exp(s), lambda s: s.context.exp(-s))
+    )
+    assert abs(found.sd**2 / square - 1) < 1e-11
+    assert abs(found.mean_exp_plus - plus) < 1e-12
+    assert abs(found.mean_exp_minus - minus) < 1e-12

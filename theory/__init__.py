@@ -3,7 +3,7 @@
 `volumes` and `invariants` are its formulas. `cycle` says when particles are captured and released,
 `adiabatic` what they gain, which `solutions` keeps, and `prediction` the figures that follow; `density` and
 `distribution` are of energies after one cycle, `saddle` and `large_deviations` after many. `blur` is all this
-at finite energy.
+at finite energy, `upright` what upright sides do there.
 """
 
 from theory.adiabatic import NotConverged
@@ -32,6 +32,7 @@ from theory.large_deviations import Rarity, loss_probability, rarity
 from theory.prediction import Prediction, cumulants, mean_of, moments, predict, reversed_cycle
 from theory.rates import Rates, frozen_rates
 from theory.saddle import Saddle
+from theory.upright import is_upright, kept_by_the_cap, upright_rate, upright_spread
 from theory.volumes import NotCovered, Volumes, delta, v_cap, v_cha, v_ell, v_stem, volumes_at
 
 __all__ = [
@@ -70,6 +71,8 @@ __all__ = [
     "extrapolate",
     "fit_power",
     "frozen_rates",
+    "is_upright",
+    "kept_by_the_cap",
     "largest_gain",
     "log_energy_rate_chaotic",
     "log_energy_rate_island",
@@ -83,6 +86,8 @@ __all__ = [
     "sin_phi_hat",
     "sum_of_cycles",
     "unbiased_mean",
+    "upright_rate",
+    "upright_spread",
     "v_cap",
     "v_cha",
     "v_ell",

@@ -84,6 +84,9 @@ def peak_width(s: ArrayLike) -> Width:
 def unbiased_mean(scene: Scene, digits: int = 15) -> Any:
     """Return the mean of exp(-s / 2), which finite energy leaves unbiased to the order E0^(-1/2).
 
+    That is so where the sides lean inward at all times; elsewhere (`theory.upright`) it has a bias at any
+    energy that a run reaches.
+
     Args:
         scene: a valid mushroom.
         digits: correct significant digits wanted.
@@ -98,7 +101,7 @@ def unbiased_mean(scene: Scene, digits: int = 15) -> Any:
 
 
 def fit_power(x: ArrayLike, y: ArrayLike, errors: ArrayLike, orders: ArrayLike = ()) -> PowerFit:
-    """Fit a power law; for the width against the energy the theory's exponent is -1/4.
+    """Fit a power law; for the width against the energy the theory's exponent is -1/4 (sides lean inward).
 
     Args:
         x: shape (n,), positive, with two different, and one more for each next order.
@@ -133,7 +136,7 @@ def extrapolate(x: ArrayLike, y: ArrayLike, errors: ArrayLike, exponent: float =
         x: energies, shape (n,), positive, n >= 2 with two different.
         y: the quantity (mean of s, share not captured, ...), shape (n,).
         errors: standard errors of y, positive.
-        exponent: of the finite-energy term: -1/2 for everything of order sigma_w^2.
+        exponent: of the finite-energy term: -1/2 for everything of order sigma_w^2, if the sides lean inward.
 
     Raises:
         BadInput: the shapes differ, a number is out of bounds or exponent is not < 0.

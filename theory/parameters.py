@@ -10,9 +10,13 @@ from collections.abc import Callable
 from fractions import Fraction
 from typing import Any
 
+from mpmath.libmp import to_fixed
+
 from scene.laws import Fourier, Piece, Quadratic, exact, frequency, piece_at
 from scene.tables import Mushroom, laws
 from theory.volumes import Volumes, volumes_of
+
+SPARE_BITS = 24  # of whole numbers: sixteen harmonics, each a product with the one before, lose a few
 
 # From t and (cos, sin) of omega t to the law's value and rate.
 Parameter = Callable[[Any, Any], tuple[Any, Any]]
@@ -65,20 +69,37 @@ def _parabola(ctx: Any, piece: Quadratic) -> Parameter:
 
 
 def _wave(ctx: Any, law: Fourier) -> Parameter:
+    """Return a Fourier law, its harmonics summed in whole numbers of 2^-bits of the largest amplitude.
+
+    That is as exact as sums of floating point numbers, whose rounding is of the largest term's last bit
+    too, and takes a third of the time.
+    """
     mean, omega = ctx.mpf(law.mean), frequency(ctx, law)
-    amplitudes = {k: (ctx.mpf(c), ctx.mpf(s)) for k, c, s in law.harmonics()}
-    last = max(amplitudes)
+    amplitudes = {k: (Fraction(c), Fraction(s)) for k, c, s in law.harmonics()}
+    last, largest = max(amplitudes), max(abs(x) for pair in amplitudes.values() for x in pair)
+    exponent = largest.numerator.bit_length() - largest.denominator.bit_length() + 1
+    known: dict[int, list[tuple[int, int]]] = {}
+
+    def whole(bits: int) -> list[tuple[int, int]]:
+        unit = Fraction(2) ** (bits - exponent)
+        none = (Fraction(0), Fraction(0))
+        pairs = (amplitudes.get(k, none) for k in range(1, last + 1))
+        return [(round(c * unit), round(s * unit)) for c, s in pairs]
 
     def wave(t: Any, turn: Any) -> tuple[Any, Any]:
-        value, rate = mean, ctx.zero
-        cos, sin = turn
-        for k in range(1, last + 1):
+        bits = int(ctx.prec) + SPARE_BITS
+        if bits not in known:
+            known[bits] = whole(bits)
+        cos1, sin1 = (to_fixed(x._mpf_, bits) for x in turn)
+        cos, sin, value, rate = cos1, sin1, 0, 0
+        for k, (c, s) in enumerate(known[bits], 1):
             if k > 1:
-                cos, sin = cos * turn[0] - sin * turn[1], sin * turn[0] + cos * turn[1]
-            if k in amplitudes:
-                c, s = amplitudes[k]
-                value += c * cos + s * sin
-                rate += k * (s * cos - c * sin)
-        return value, omega * rate
+                cos, sin = (cos * cos1 - sin * sin1) >> bits, (sin * cos1 + cos * sin1) >> bits
+            value += c * cos + s * sin
+            rate += k * (s * cos - c * sin)
+        return (
+            mean + ctx.ldexp(value, exponent - 2 * bits),
+            omega * ctx.ldexp(rate, exponent - 2 * bits),
+        )
 
     return wave

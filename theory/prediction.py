@@ -163,15 +163,17 @@ def reversed_cycle(scene: Scene) -> Mushroom:
 
 
 def _figures(found: Captures) -> tuple[Any, ...]:
-    ctx, m1 = found.cycle.ctx, found.growth()
-    variance = found.mean(lambda s: (s - m1) ** 2)
+    ctx = found.cycle.ctx
+    # Valleys multiply in `taylor`; as weighted points, which `mean` takes, they would be convolved. As mean
+    # exp(-s) is 1, the mean of s is of the order of its variance, and no more than rounding cancels.
+    _, first, second = found.taylor(0, 2)
     return (
         found.p_not_captured,
-        m1,
+        found.growth(),
         found.s_not_captured,
-        ctx.sqrt(variance),
-        found.mean(lambda s: ctx.exp(-s)),
-        found.mean(ctx.exp),
+        ctx.sqrt(max(2 * second - first**2, ctx.zero)),
+        found.taylor(-1, 0)[0],
+        found.taylor(1, 0)[0],
     )
 
 

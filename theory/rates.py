@@ -80,12 +80,18 @@ def pace(scene: Scene, times: Floats) -> Floats:
 
 def kick_rate(scene: Scene, t: float) -> float:
     """Return the chaotic zone's mean d log E / dt at time t, the flux of particles apart. Source: Eq:dE."""
-    now, volumes = table_at(fp, scene, t), volumes_at(fp, scene, t)
-    cap = 2 * fp.pi**2 * now.r * now.r_rate
+    return float(kick_rates(scene, np.array([t]))[0])
+
+
+def kick_rates(scene: Scene, times: Floats) -> Floats:
+    """Return `kick_rate` at times (T,)."""
+    now, volumes = table_at(fp, scene, times), volumes_at(np, scene, times)
+    cap = 2 * np.pi**2 * now.r * now.r_rate
     widening = now.w_rate * now.h + now.w * now.h_rate - now.h * now.h_rate * now.slope
-    stem = 2 * fp.pi * (2 * widening - now.h**2 * now.slope_rate)
+    stem = 2 * np.pi * (2 * widening - now.h**2 * now.slope_rate)
     free = 1 - volumes.v_ell / volumes.v_cap
-    return float(-(cap * free + stem) / volumes.v_cha)
+    found: Floats = -(cap * free + stem) / volumes.v_cha
+    return np.broadcast_to(found, times.shape)
 
 
 def frozen_rates(scene: Scene) -> tuple[Rates, bool]:

@@ -6,6 +6,7 @@ import base64
 import json
 import os
 import re
+import shutil
 import signal
 import subprocess
 import sys
@@ -227,14 +228,42 @@ def test_what_other_sources_found_is_found_again(call, tmp_path, monkeypatch):
     assert "! M8  refuted" in done.out
 
 
-def test_a_byte_of_the_sources_makes_other_code(tmp_path, monkeypatch):
+@pytest.mark.parametrize(
+    "name",
+    [
+        "audit/claims/printed.py",
+        "audit/ledger.toml",
+        "scene/catalogue/moving-cap.toml",
+        "fast/kernel/careful.py",
+        "theory/frozen_rates.json",
+    ],
+)
+def test_a_byte_of_the_sources_makes_other_code(tmp_path, monkeypatch, name):
+    """Measured rates are one: predictions at an energy are made of them."""
+    for package in (session.scene, session.fast, session.theory):
+        place = Path(package.__path__[0])
+        shutil.copytree(place, tmp_path / place.name, ignore=shutil.ignore_patterns("__pycache__"))
+        monkeypatch.setattr(package, "__path__", [str(tmp_path / place.name)])
+    here = Path(session.__file__)
+    shutil.copytree(here.parent, tmp_path / "audit", ignore=shutil.ignore_patterns("__pycache__"))
+    monkeypatch.setattr(session, "__file__", str(tmp_path / "audit" / here.name))
     before = session.code()
     assert session.code.__wrapped__() == before
-    (tmp_path / "law.py").write_bytes(b"1")
-    for package in (session.scene, session.fast, session.theory):
-        with monkeypatch.context() as other:
-            other.setattr(package, "__path__", [str(tmp_path)])
-            assert session.code.__wrapped__() != before
+    with (tmp_path / name).open("ab") as file:
+        file.write(b"\n")
+    assert session.code.__wrapped__() != before
+
+
+def test_sources_are_looked_at_before_anything_is_examined(tmp_path, monkeypatch):
+    """What is edited while an audit runs would be told as what had run."""
+    order = []
+    monkeypatch.setattr(session, "code", lambda: order.append("code") or "of today")
+    monkeypatch.setattr(
+        session, "examine", lambda entry, *_: order.append(entry.id) or Finding(entry.id, "refuted", [], 0.0)
+    )
+    steppers = AuditSteppers(fast.simulate, fast.trajectory, fast.flow)
+    session.conduct(steppers, AuditSettings(folder=tmp_path), entries=ledger.select("X5"))
+    assert order[:2] == ["code", "X5"]
 
 
 @pytest.mark.deep

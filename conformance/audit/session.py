@@ -110,6 +110,7 @@ def conduct(
     folder = settings.folder
     if folder:
         folder.mkdir(parents=True, exist_ok=True)
+        code()  # before anything is examined: an edit meanwhile is not what runs, and must not be told as it
     found = {e.id: f for e in entries if (f := _load(e, settings)) is not None}
     predict = cache(predict)
     samples: dict[str, Sample] = {}
@@ -218,11 +219,14 @@ def _kept(entry: Entry, settings: AuditSettings) -> dict[str, Any]:
 
 @cache
 def code() -> str:
-    """Return the SHA-256 of the sources that findings owe their numbers to."""
+    """Return the SHA-256 of the sources that findings owe their numbers to, measured rates among them.
+
+    How a caller keeps particles is no part of it: what is kept is looked at when it is taken up.
+    """
     digest = hashlib.sha256()
     for place in (Path(__file__).parent, *(Path(package.__path__[0]) for package in (scene, fast, theory))):
         for path in sorted(place.rglob("*")):
-            if path.suffix in (".py", ".toml"):
+            if path.suffix in (".py", ".toml", ".json"):
                 content = path.read_bytes()
                 digest.update(f"{place.name}/{path.relative_to(place).as_posix()} {len(content)}\n".encode())
                 digest.update(content)

@@ -103,6 +103,15 @@ def test_theory_that_is_the_limit_says_so_and_where_it_is_slow():
     assert limit_of(turned(1.0)) is None  # no theory is shown
     assert limit_of(turned(0.0)).endswith("what is left at this one is not known")
     assert "slope is not above 0" in limit_of(load("untilted"))
+    assert limit_of(load("frozen-mushroom")) is None  # nothing moves: at any energy
+
+
+def test_one_particle_of_a_scene_whose_rates_are_known_has_theory_of_its_energy():
+    """Its m1 has no error and so no z, which was taken for want of a theory."""
+    alone = RunTally(1, 1, gain=moments_of(np.array([0.1])))
+    for name, is_limit in (("moving-cap", False), ("untilted", True)):
+        asked = Asked(load(name), 1e6, 1, 1)
+        assert (limit_told(asked, measured(asked, alone)) is not None) == is_limit
 
 
 def test_sides_lean_inward_at_all_times_or_not():

@@ -10,7 +10,7 @@ import sys
 
 import msgspec
 import pytest
-from support.edges import EDGES, is_among
+from support.edges import EDGES, asked, is_among
 
 import fast
 import reference
@@ -42,11 +42,14 @@ def module(request):
 
 @pytest.mark.parametrize("server", ["reference", "fast", "conformance.plain"])
 def test_the_edges_of_the_protocol(server):
-    answers = converse(server, *(question for question, _ in EDGES), '{"cmd":"echo","values":[-0,0]}')
+    none = json.dumps(asked("trajectory", collisions=0)).replace('"seq": 7', '"seq": -0')
+    lines = '{"cmd":"echo","values":[-0,0]}', none.replace('"collisions": 0', '"collisions": -0')
+    answers = converse(server, *(question for question, _ in EDGES), *lines)
     for (question, allowed), answer in zip(EDGES, answers, strict=False):
         assert is_among(answer, allowed), (question, answer)
-    assert len(answers) == len(EDGES) + 1
-    assert [math.copysign(1.0, value) for value in answers[-1]["values"]] == [-1.0, 1.0]
+    assert len(answers) == len(EDGES) + len(lines)
+    assert [math.copysign(1.0, value) for value in answers[-2]["values"]] == [-1.0, 1.0]
+    assert answers[-1] == {"seq": 0, "steps": []}
 
 
 def test_session(module):

@@ -319,6 +319,8 @@ def test_minus_zero_is_read_however_it_is_written():
     found = read_answer(line, "step", 1)
     assert [math.copysign(1.0, found[name]) for name in ("t", "x", "y", "vx", "vy")] == [-1.0] * 4 + [1.0]
     assert with_minus_zeros(b'{"-0":-0,"a":"\\"-0 ,-0","b":-0}') == b'{"-0":-0.0,"a":"\\"-0 ,-0","b":-0.0}'
+    whole = b'{"seq":-0,"collisions" : -0 ,"repeat":-0}'
+    assert with_minus_zeros(whole) == whole
     for line in (b'"' + b'\\"-0,' * 10**5, b'-0 "' * 10**5, b'"' + b"-0,\\" * 10**5):
         with_minus_zeros(line)  # to begin anew at each mark would take hours
 

@@ -171,13 +171,17 @@ class Failed(msgspec.Struct, frozen=True):
     error: str
 
 
-# Strings are passed over; the last one may have no end.
-_ZEROS = re.compile(rb'"(?:[^"\\]|\\.)*+\\?(?:"|\Z)|(?<![\w.+-])-0(?=[\s,\]}]|\Z)', re.DOTALL)
+# Strings are passed over, with what a request has as a whole number; the last one may have no end.
+_WHOLE = rb'"(?:protocol|seq|collisions|repeat)"\s*:\s*-0(?=[\s,}])'
+_STRING = rb'"(?:[^"\\]|\\.)*+\\?(?:"|\Z)'
+_ZEROS = re.compile(_WHOLE + rb"|" + _STRING + rb"|(?<![\w.+-])-0(?=[\s,\]}]|\Z)", re.DOTALL)
 _MAY_HAVE_ZEROS = re.compile(rb"-0(?:[\s,\]}]|\Z)")
 
 
 def with_minus_zeros(line: bytes) -> bytes:
     """Return a line of JSON with -0.0 for -0: C writes minus zero so, and decoders take it for an integer.
+
+    Where a request has a whole number -0 stays: it is 0.
 
     Args:
         line: of JSON, or of anything.

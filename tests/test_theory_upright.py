@@ -91,6 +91,15 @@ def test_what_is_not_covered_is_refused():
         upright_rate(load("retraced-arc"), np.zeros(1))
     with pytest.raises(NotCovered, match="mushrooms"):
         is_upright(load("breathing-circle"))
-    for nu in (0.0, 1.5, math.nan):
+    for nu in (0.0, 5e-324, 1e-7, 1.5, math.nan):
         with pytest.raises(BadInput, match="nu"):
             kept_by_the_cap(nu)
+    narrow = Fourier(mean=1e-8, omega=1.0, cos=(0.5e-8,))
+    with pytest.raises(BadInput, match="nu"):
+        upright_spread(Mushroom(r=1.0, h=1.0, nu=narrow))
+
+
+def test_what_the_cap_does_not_keep_goes_as_the_mouth_squared():
+    """2 nu^2 / 3 + O(nu^3), down to the narrowest that rounding leaves anything of."""
+    for nu in (1e-6, 1e-5, 1e-3):
+        assert (1 - kept_by_the_cap(nu)) / nu**2 == pytest.approx(2 / 3, rel=2 * nu + 1e-3)

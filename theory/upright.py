@@ -13,6 +13,7 @@ import math
 
 import numpy as np
 from mpmath import fp
+from numpy.typing import ArrayLike
 
 from scene.geometry import table_at
 from scene.laws import is_constant, value
@@ -21,10 +22,12 @@ from scene.tables import Scene, cycle_length
 from theory.branches import DIGITS, Floats
 from theory.curves import chaotic_zone
 from theory.cycle import Cycle
+from theory.given import finite_array
 from theory.rates import kick_rates
 from theory.volumes import NotCovered, as_mushroom, volumes_at
 
 N_TIMES = 2048  # steps of a cycle, the midpoint rule's
+NARROWEST = 1e-6  # mouth: what the cap does not keep goes as nu^2 and is lost to rounding below
 TILTED = "sides are tilted: flights along the base leave the stem, and no variance goes as log(v) / v"
 
 
@@ -44,20 +47,20 @@ def kept_by_the_cap(nu: float) -> float:
     That is how much of the next stay in the stem, which lasts as 1 / alpha', is foretold by this one.
 
     Args:
-        nu: the mouth w / r, in (0, 1].
+        nu: the mouth w / r, in [NARROWEST, 1].
 
     Raises:
-        BadInput: nu is outside (0, 1].
+        BadInput: nu is out of bounds.
     """
     nu = check_number("nu", nu)
-    if not 0 < nu <= 1:
-        raise BadInput(f"nu = {nu}, must be in (0, 1]")
+    if not NARROWEST <= nu <= 1:
+        raise BadInput(f"nu = {nu}, must be in [{NARROWEST}, 1]")
     n = math.ceil(1 / nu)
     wide, turned = math.log1p(2 * nu), math.log(max(2 * n * nu - 1, 1.0))
     return (wide + turned / n + (wide - turned) / (n + 1)) / (2 * nu)
 
 
-def upright_rate(scene: Scene, times: Floats) -> Floats:
+def upright_rate(scene: Scene, times: ArrayLike) -> Floats:
     """Return the factor of log(v) / v in the growth of the chaotic zone's variance of log E.
 
     Args:
@@ -69,13 +72,15 @@ def upright_rate(scene: Scene, times: Floats) -> Floats:
 
     Raises:
         NotCovered: not a mushroom, or its sides are tilted.
+        BadInput: times are no finite numbers in one dimension, or the mouth is below NARROWEST.
     """
+    at = finite_array("times", times, 1)
     if not is_upright(scene):
         raise NotCovered(TILTED)
-    now, volumes = table_at(fp, scene, times), volumes_at(np, scene, times)
-    w, h = np.broadcast_to(now.w, times.shape), np.broadcast_to(now.h, times.shape)
-    excess = -2 * np.broadcast_to(now.w_rate, times.shape) / w - kick_rates(scene, times)
-    kept = np.array([kept_by_the_cap(min(float(x), 1.0)) for x in volumes.nu])
+    now, volumes = table_at(fp, scene, at), volumes_at(np, scene, at)
+    w, h, w_rate = (np.broadcast_to(x, at.shape) for x in (now.w, now.h, now.w_rate))
+    excess = -2 * w_rate / w - kick_rates(scene, at)
+    kept = np.array([kept_by_the_cap(float(nu)) for nu in volumes.nu])
     found: Floats = 16 * w * h**2 * excess**2 / volumes.v_cha * (1 + kept) / (1 - kept)
     return found
 
@@ -91,6 +96,7 @@ def upright_spread(scene: Scene) -> float:
 
     Raises:
         NotCovered: not a mushroom, or its sides are tilted.
+        BadInput: the mouth falls below NARROWEST.
         NotConverged: as `theory.predict`.
     """
     if not is_upright(scene):

@@ -43,6 +43,7 @@ from scene.protocol.wire import Flowing
 from scene.states import Stepper
 
 Level = Literal["core", "extended", "stress"]
+Kind = Literal["step", "trajectory", "flow"]
 OutcomeName = Literal["collision", "horizon", "undefined", "undecided", "rejected"]
 LEVELS: tuple[Level, ...] = ("core", "extended", "stress")
 NUMBERS = ("dt", "x", "y", "vx", "vy")
@@ -135,7 +136,7 @@ class Vector(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defau
     id: Annotated[str, msgspec.Meta(pattern="^[a-z0-9-]+/[0-9]+$")]
     group: str
     level: Level
-    kind: Literal["step", "trajectory", "flow"]
+    kind: Kind
     rule: str
     source: str
     scene: dict[str, Any]

@@ -12,7 +12,10 @@ from support.depth import deep_among, deep_but
 
 import fast
 from conformance import plain, vectors
-from conformance.generator.fresh import WALLS, drawn_scene, fresh
+from conformance.generator.draws import wire_form
+from conformance.generator.flow_families import any_marks
+from conformance.generator.fresh import WALLS, _is_steady, drawn_scene, fresh
+from conformance.generator.question import Question
 from conformance.grading.grade import grade
 from conformance.mutants import Mutant
 from conformance.plain.flow import MAX_COLLISIONS, PlainPath
@@ -21,7 +24,7 @@ from conformance.plain.step import Flight
 from conformance.suite.disguise import Disguise, drawn_disguise
 from conformance.suite.run import N_FRESH
 from fast.__main__ import carry, follow
-from scene import BadInput, BangBang, Fourier, Mushroom, Rejected, from_data
+from scene import BadInput, BangBang, Fourier, Mushroom, Rejected, State, from_data
 from scene.tables import laws
 
 SEEDS = (1, 2)
@@ -83,6 +86,15 @@ def test_all_is_asked_that_the_corpus_asks_seldom(seed, tally):
 def test_what_is_drawn_follows_from_the_seed():
     assert list(fresh(1, 12)) == questions(1, SOME)[:12]
     assert list(fresh(3, 12)) != questions(1, SOME)[:12]
+
+
+@pytest.mark.parametrize(("x", "is_asked"), [(0.6, True), (0.5 + 2.0**-36, False), (0.5 - 2.0**-36, False)])
+def test_a_flow_whose_capture_hangs_by_a_thread_is_not_asked(x, is_asked):
+    """The walls that are met are the same on both sides of it."""
+    start = State(0.0, x, 0.25, 0.0, 4.0)
+    still = Mushroom(r=1.0, w=0.5, h=1.0)
+    asked = Question("fresh", "", "", wire_form(still), start, 0.25, collisions=2, flow=any_marks)
+    assert _is_steady(still, asked) == is_asked
 
 
 def test_hundreds_of_draws_that_are_none_end_no_run(monkeypatch):

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from math import inf
-from typing import Literal
 
 import msgspec
 
@@ -24,7 +23,7 @@ from conformance.generator.stays import Mark, OpenSign, marks
 from conformance.second_proof.chain import recheck
 from conformance.second_proof.step import check
 from conformance.second_proof.trajectory import check_path
-from conformance.vectors import Certified, Expectation, Level, Vector, four_digits
+from conformance.vectors import Certified, Expectation, Kind, Level, Vector, four_digits
 from reference.certificate import certificate, path_certificate
 from scene import BadInput, InvalidState, Rejected, Scene, State, Undecided, Undefined, from_data
 
@@ -90,7 +89,7 @@ def certify(question: Question, number: int) -> Vector:
     return msgspec.structs.replace(vector, level=question.level or _level(scene, vector))
 
 
-def _kind(question: Question) -> Literal["step", "trajectory", "flow"]:
+def _kind(question: Question) -> Kind:
     return "step" if question.collisions is None else "flow" if question.flow else "trajectory"
 
 

@@ -5,8 +5,8 @@ the corpus, and wrong in others, passes all of them. So tables, walls, kinds of 
 places of the start are drawn together, and each wall of each table is met first about as often. A sixth of
 them ask for a trajectory, another sixth for a flow: what comes after the first collision is new as well.
 Every third question keeps the scene before but for one law, and its state, and has another answer, if such a
-law is soon found (none acts on a flight to the base): an implementation that knows a scene by less than all
-of it gives the answer before. Scenes carry names, which mean nothing: different ones the same.
+law is soon found (few act on a flight to the base): an implementation that knows a scene by less than all of
+it gives the answer before. Scenes carry names, which mean nothing: different ones the same.
 Answers are proved by the reference alone, and are no more delicate than those of level core. The plain
 stepper chooses which draws are asked: those that meet the wall that is looked for, and keep it when nudged.
 """
@@ -14,7 +14,6 @@ stepper chooses which draws are asked: those that meet the wall that is looked f
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Literal
 
 import msgspec
 
@@ -37,7 +36,7 @@ from conformance.generator.paths import Proved, proved_path
 from conformance.generator.prover import CONDITIONS, NUDGES, SIGNS, ask, flight_of, nudged
 from conformance.generator.question import Question
 from conformance.grading.error import condition_number, inputs_of
-from conformance.vectors import Expectation, Vector
+from conformance.vectors import Expectation, Kind, Vector
 from scene import BadInput, BangBang, Collision, Fourier, Law, Mushroom, Scene, State, from_data
 from scene.geometry import rounded
 from scene.laws import bounds, is_constant
@@ -46,7 +45,6 @@ from scene.tables import cycle_length, laws
 from scene.transforms import scaled_law
 
 GROUP = "fresh"
-Kind = Literal["step", "trajectory", "flow"]
 RULES: dict[Kind, str] = {
     "step": "a flight in a scene that no file holds",
     "trajectory": "some flights in a scene that no file holds",
@@ -166,11 +164,17 @@ def _asked(draw: Draw, kind: Kind, of: Scene, start: State, t_end: float) -> Que
 
 
 def _is_steady(of: Scene, question: Question) -> bool:
-    """Tell whether the plain stepper meets the same walls from starts nearby: it answers none of this."""
+    """Tell whether the plain stepper meets the same walls from starts nearby: it answers none of this.
 
-    def met(start: State) -> list[str]:
+    Of a flow it is captured between the same hits, too.
+    """
+
+    def met(start: State) -> list[str | int]:
         path = plain.trajectory(of, start, question.collisions or 1, question.t_end)
-        return [hit.wall if isinstance(hit, Collision) else type(hit).__name__ for hit in path]
+        walls = [hit.wall if isinstance(hit, Collision) else type(hit).__name__ for hit in path]
+        ((_, stay),) = plain.flow(of, [start], question.t_end) if question.flow else [(None, None)]
+        times = [hit.t for hit in path if isinstance(hit, Collision)]
+        return [*walls, *(sum(hit <= t for hit in times) for t in stay or ())]
 
     start, t_end = question.state, question.t_end
     expected = met(start)

@@ -9,6 +9,7 @@ import math
 import shutil
 from collections import Counter
 from fractions import Fraction
+from importlib import import_module
 from pathlib import Path
 
 import msgspec
@@ -342,6 +343,21 @@ def test_a_false_certificate_makes_no_vector(monkeypatch):
         "lie", "", "", wire_form(load_scene("moving-cap")), State(0.3, 0.1, 0.2, 3.0, 4.0), 9.0
     )
     with pytest.raises(Refuted, match="x afterwards"):
+        certify(question, 1)
+
+
+@pytest.mark.parametrize("proof", ["check", "check_path", "recheck"])
+def test_a_path_makes_no_vector_that_the_second_arithmetic_refutes(monkeypatch, proof):
+    """Drawn questions take the reference's word; the corpus does not, at any of three places."""
+
+    def refuting(*_):
+        raise Refuted("not so")
+
+    scene, start = load_scene("moving-cap"), State(0.3, 0.1, 0.2, 3.0, 4.0)
+    question = Question("lie", "", "", wire_form(scene), start, 9.0, collisions=2)
+    assert certify(question, 1).collisions == 2
+    monkeypatch.setattr(import_module("conformance.generator.certify"), proof, refuting)
+    with pytest.raises(Refuted, match="not so"):
         certify(question, 1)
 
 

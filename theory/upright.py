@@ -92,7 +92,7 @@ def upright_spread(scene: Scene) -> float:
     small: the narrower the mouth, the oftener the cap hands flights back, and the later log(v) wins.
 
     Returns:
-        B [length / time]; 0 when no wall moves.
+        B [length / time], right to a thousandth (worst for laws of many legs); 0 when no wall moves.
 
     Raises:
         NotCovered: not a mushroom, or its sides are tilted.

@@ -61,7 +61,9 @@ def test_workers_of_a_cluster_follow_to_the_same_bits(command_line, tmp_path, en
     assert json.loads(ended.out)["sha256"] == ensemble.sha256()
 
 
-@pytest.mark.parametrize("name", ["particles", "block", "cycles_of_a_chunk", "command", "scene"])
+@pytest.mark.parametrize(
+    "name", ["particles", "block", "cycles_of_a_chunk", "command", "scene", "energy", "seed", "phases"]
+)
 def test_a_description_without_its_seal_has_all_that_a_run_needs_or_is_refused(
     command_line, tmp_path, stored, name
 ):
@@ -70,12 +72,16 @@ def test_a_description_without_its_seal_has_all_that_a_run_needs_or_is_refused(
     shutil.copytree(stored, tmp_path / "run")
     (tmp_path / "run" / blocks.MARKERS / blocks.DESCRIPTION).unlink()
     told = json.loads(path.read_text("utf-8"))
-    for value in (["many"], -5, None):
-        path.write_text(json.dumps({**told, "attributes": told["attributes"] | {name: value}}), "utf-8")
-        assert_refused(command_line(*RUN, "--out", tmp_path / "run", "--resume"), "description is damaged")
-    del told["attributes"][name]
-    path.write_text(json.dumps(told), "utf-8")
-    assert_refused(command_line(*RUN, "--out", tmp_path / "run", "--resume"), "description is damaged")
+    spoilt = [told["attributes"] | {name: value} for value in (["many"], -5, None)]
+    if name != "phases":  # they may be absent
+        spoilt.append({other: value for other, value in told["attributes"].items() if other != name})
+    for attributes in spoilt:
+        path.write_text(json.dumps({**told, "attributes": attributes}), "utf-8")
+        for command in (
+            (*RUN, "--out", tmp_path / "run", "--resume"),
+            ("export", tmp_path / "run", "--to", tmp_path / "run.csv"),
+        ):
+            assert_refused(command_line(*command), "description is damaged")
 
 
 @pytest.mark.deep

@@ -326,8 +326,14 @@ def attributes_of(folder: Path) -> dict[str, Any]:
 def _is_description(found: dict[str, Any]) -> bool:
     """Tell whether a description has what runs are opened by: only one of its two copies is sealed."""
     wholes = [found[name] for name in ("particles", "block", "cycles", "cycles_of_a_chunk")]
-    numbers = all(type(n) is int and n > 0 for n in wholes)
-    return numbers and isinstance(found["command"], str) and isinstance(found["scene"], dict)
+    phases, seed = found.get("phases", []), found["seed"]
+    return (
+        all(type(n) is int and n > 0 for n in wholes)
+        and (type(seed) is int and seed >= 0)
+        and all(type(number) in (int, float) and number > 0 for number in [found["energy"], *phases])
+        and isinstance(found["command"], str)
+        and isinstance(found["scene"], dict)
+    )
 
 
 def open_run(folder: Path) -> RunFolder:

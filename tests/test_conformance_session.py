@@ -230,6 +230,7 @@ ONCE = {
     "leave-a-child": ("protocol/stop", "fail", "child"),
     "leave-an-orphan": ("protocol/stop", "fail", "child"),
     "talk-after-stop": ("protocol/stop", "wrong-format", "goodbye"),
+    "helper-that-talks": ("protocol/stop", "wrong-format", "farewell"),
 }
 
 

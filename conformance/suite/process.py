@@ -118,8 +118,7 @@ class Process:
         """
         deadline = time.monotonic() + timeout
         self._advance(b"", 0.0)
-        if self._received:
-            raise Trouble("wrong-format", f"wrote without being asked: {shown(self._received)}")
+        self._check_silence()
         pending = line + b"\n"
         while b"\n" not in self._received:
             if len(self._received) > MAX_LINE:
@@ -152,8 +151,7 @@ class Process:
             pending = self._advance(pending, POLL)
             if not pending and not self._stdin.closed:
                 self._stdin.close()
-        if self._received:
-            raise Trouble("wrong-format", f"wrote without being asked: {shown(self._received)}")
+        self._check_silence()
         if not self._has_exited():
             raise Trouble("timed-out", f"still running {timeout:g} s after `stop`")
         if status := self._status():
@@ -164,6 +162,8 @@ class Process:
             if time.monotonic() >= deadline:
                 raise Trouble("fail", "left a child process running after `stop`")
             time.sleep(POLL / 5)
+        self._advance(b"", 0.0)
+        self._check_silence()  # of the helpers
 
     def kill(self) -> None:
         """End the process, its group and whatever else it started; safe to call twice."""
@@ -173,6 +173,10 @@ class Process:
         for stream in (self._stdin, self._stdout, self._stderr):
             with contextlib.suppress(OSError):
                 stream.close()
+
+    def _check_silence(self) -> None:
+        if self._received:
+            raise Trouble("wrong-format", f"wrote without being asked: {shown(self._received)}")
 
     def _advance(self, pending: bytes, timeout: float) -> bytes:
         # One look at all pipes; returns what is still to be written.

@@ -143,10 +143,11 @@ def orphan(_: Answer) -> None:
     os._exit(0)
 
 
-def helper(_: Answer) -> None:
-    """Start a child that ends a little after this process, because it has ended."""
-    program = "import sys, time; sys.stdin.read(); time.sleep(0.2)"
-    helpers.append(subprocess.Popen([sys.executable, "-I", "-S", "-c", program], stdin=subprocess.PIPE))
+def helper(last: str = "") -> Act:
+    """Start a child that ends a little after this process, because it has ended, with last words."""
+    program = f"import sys, time; sys.stdin.read(); time.sleep(0.2); sys.stdout.write({last!r})"
+    line = [sys.executable, "-I", "-S", "-c", program]
+    return lambda _: helpers.append(subprocess.Popen(line, stdin=subprocess.PIPE))
 
 
 def cry(what: bytes) -> Act:
@@ -241,7 +242,7 @@ SABOTEURS: dict[str, tuple[str, Act]] = {
         writes(lambda line: re.sub(r'"seq": (\d+)', r'"seq": \1.0', line)),
     ),
     "lines-as-windows-ends-them": ("step", writes(lambda line: f" {line[:-1]} \t\r\n")),
-    "helper-that-ends-later": ("start", then(helper, say)),
+    "helper-that-ends-later": ("start", then(helper(), say)),
     "last-words": ("stop", then(lambda _: os.close(1), cry(b"statistics " * 50_000), leave(0))),
     # Something else is said.
     "huge-line": ("step", says(lambda hit: {"seq": hit["seq"], "filler": "x" * (2**24 + 2**20)})),
@@ -266,6 +267,7 @@ SABOTEURS: dict[str, tuple[str, Act]] = {
     "early-answers": ("start", answer_before_being_asked),
     "guess-on-invalid": ("reject", says(lambda refusal: {"seq": refusal["seq"], **HIT})),
     "talk-after-stop": ("stop", lambda _: write("goodbye\n")),
+    "helper-that-talks": ("start", then(helper("farewell\n"), say)),
     # The line is spoilt.
     "duplicate": ("step", writes(lambda line: line + line)),
     "split-line": ("step", writes(lambda line: line[:20] + "\n" + line[20:])),

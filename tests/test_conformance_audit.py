@@ -202,6 +202,7 @@ def bare(e, found):
     return e._replace(cycle_energies=e.energy0 * np.exp(s))
 
 
+@pytest.mark.deep
 @pytest.mark.parametrize("fault", [raised(0.95), raised(0.985), freed], ids=["trivial", "unbiased", "freed"])
 def test_a_retraced_arc_that_does_not_accelerate_as_predicted_is_found_out(fault):
     (entry,) = ledger.select("X7")

@@ -181,7 +181,7 @@ FAULTS = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("name", deep_among(FAULTS, "L5", "C10", "X7"))
+@pytest.mark.parametrize("name", deep_among(FAULTS, "L5", "C10", "X7", "C3", "C5", "D1"))
 def test_a_faulty_stepper_does_not_get_the_expected_verdict(name):
     (entry,) = ledger.select(name)
     (finding,) = audited(name, FAULTS[name]).findings
@@ -202,6 +202,7 @@ def bare(e, found):
     return e._replace(cycle_energies=e.energy0 * np.exp(s))
 
 
+@pytest.mark.deep
 @pytest.mark.parametrize("fault", [raised(0.95), raised(0.985), freed], ids=["trivial", "unbiased", "freed"])
 def test_a_retraced_arc_that_does_not_accelerate_as_predicted_is_found_out(fault):
     (entry,) = ledger.select("X7")
@@ -224,7 +225,7 @@ def test_the_audit_sees_what_finite_energy_adds_at_the_papers_size(fixed_caps):
         assert experiments.captured_energies(known[name]).holds
 
 
-@pytest.mark.parametrize("name", deep_among(["M1", "M2", "M4", "X1", "X8", "N1", "N4"], "N1"))
+@pytest.mark.parametrize("name", deep_among(["M1", "M2", "M4", "X1", "X8", "N1", "N4"], "M1", "N1", "N4"))
 def test_a_wrong_theory_does_not_get_the_expected_verdict(name):
     def wrong(scene, digits):
         right = CACHED(scene, digits)

@@ -208,6 +208,7 @@ def test_a_contender_that_breaks_off_is_left_out(drawn):
     assert troubles == {"brief": "crashed: gone"}
 
 
+@pytest.mark.deep
 def test_errors_grow_as_the_jacobians_say():
     followers = ours.our_followers()
     grown = growth.grow(followers, proved_step, ours.linearise, ours.prove_path, 3, 2, 24, lambda _: None)
@@ -356,6 +357,7 @@ def test_the_table_of_hard_cases_is_right_for_our_steppers():
     assert all(set(case.verdicts["proof"]) == {"right"} for case in cases)
 
 
+@pytest.mark.deep
 def test_the_table_shows_a_wrong_stepper():
     def bold(scene, state, t_end):
         found = plain.next_collision(scene, state, t_end)

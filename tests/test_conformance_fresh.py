@@ -29,7 +29,7 @@ from scene.tables import laws
 
 SEEDS = (1, 2)
 N = N_FRESH["core"]
-SOME = N // 2  # of the first seed's: what every run of the tests asks
+SOME = N // 3  # of the first seed's: what every run of the tests asks
 
 
 @cache

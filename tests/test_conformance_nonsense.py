@@ -18,7 +18,7 @@ from conformance.suite import run as suite
 from conformance.suite.result import VERDICTS
 from conformance.suite.session import Limits
 
-N_RUNS = int(os.environ.get("MUSHROOMS_RUNS", "8"))
+N_RUNS = int(os.environ.get("MUSHROOMS_RUNS", "5"))
 STRESS = vectors.load("stress")
 UNREADABLE = next(v for v in STRESS if "table" not in v.scene)  # to be refused, whatever comes after it
 FEW = (*vectors.load("core")[::350], *STRESS[-3:], UNREADABLE)

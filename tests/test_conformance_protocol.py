@@ -7,6 +7,7 @@ import math
 import struct
 import subprocess
 import sys
+from contextlib import ExitStack
 
 import msgspec
 import pytest
@@ -22,13 +23,38 @@ SCENE = to_data(load("moving-cap"))
 
 
 def converse(module, *lines):
-    """Send lines, return the decoded answers; the server must end by itself and be silent."""
+    """Send lines to a server of their own, return the answers; it must end by itself and be silent."""
     text = "\n".join(line if isinstance(line, str) else json.dumps(line) for line in lines) + "\n"
     run = subprocess.run(
         [sys.executable, "-m", module], input=text, capture_output=True, text=True, timeout=120, check=True
     )
     assert run.stderr == ""
     return [json.loads(line) for line in run.stdout.splitlines()]
+
+
+@pytest.fixture(scope="module")
+def ask():
+    """Send lines to a server that has answered others before, and return the decoded answers."""
+    with ExitStack() as stack:
+        started = {}
+
+        def asked(module, *lines):
+            if module not in started:
+                pipe = subprocess.PIPE
+                server = subprocess.Popen([sys.executable, "-m", module], stdin=pipe, stdout=pipe, text=True)
+                started[module] = stack.enter_context(server)
+            answers = []
+            for line in lines:
+                print(
+                    line if isinstance(line, str) else json.dumps(line),
+                    file=started[module].stdin,
+                    flush=True,
+                )
+                answers.append(json.loads(started[module].stdout.readline()))
+            return answers
+
+        yield asked
+    assert all(server.returncode == 0 for server in started.values())
 
 
 def step(seq, scene=SCENE, **changes):
@@ -41,10 +67,10 @@ def module(request):
 
 
 @pytest.mark.parametrize("server", ["reference", "fast", "conformance.plain"])
-def test_the_edges_of_the_protocol(server):
+def test_the_edges_of_the_protocol(server, ask):
     none = json.dumps(asked("trajectory", collisions=0)).replace('"seq": 7', '"seq": -0')
     lines = '{"cmd":"echo","values":[-0,0]}', none.replace('"collisions": 0', '"collisions": -0')
-    answers = converse(server, *(question for question, _ in EDGES), *lines)
+    answers = ask(server, *(question for question, _ in EDGES), *lines)
     for (question, allowed), answer in zip(EDGES, answers, strict=False):
         assert is_among(answer, allowed), (question, answer)
     assert len(answers) == len(EDGES) + len(lines)
@@ -72,9 +98,9 @@ def test_session(module):
     assert two["outcome"] in ("collision", "horizon")
 
 
-def test_answers_are_those_of_the_package(module):
+def test_answers_are_those_of_the_package(module, ask):
     """Shortest round-trip printing: what arrives has the same bits."""
-    (answer,) = converse(module, step(7))
+    (answer,) = ask(module, step(7))
     state = State(**STATE)
     if module == "fast":
         expected = fast.next_collision(load("moving-cap"), state, 100.0)
@@ -83,9 +109,9 @@ def test_answers_are_those_of_the_package(module):
     assert all(answer[name] == getattr(expected, name) for name in ("wall", "dt", "t", "x", "y", "vx", "vy"))
 
 
-def test_trajectories_are_chained(module):
+def test_trajectories_are_chained(module, ask):
     line = {"cmd": "trajectory", "seq": 5, "scene": SCENE, "state": STATE, "collisions": 6, "t_end": 100.0}
-    six, short, bad = converse(module, line, {**line, "t_end": 0.5}, {**line, "collisions": -1})
+    six, short, bad = ask(module, line, {**line, "t_end": 0.5}, {**line, "collisions": -1})
     assert six["seq"] == 5
     assert [s["outcome"] for s in six["steps"]] == ["collision"] * 6
     state = State(**STATE)
@@ -99,11 +125,11 @@ def test_trajectories_are_chained(module):
     assert "collisions = -1" in bad["reason"]
 
 
-def test_what_is_never_met_is_timed_up_to_a_number(module):
+def test_what_is_never_met_is_timed_up_to_a_number(module, ask):
     """A particle at rest has no last collision; a horizon at infinity had been written as null."""
     rest = {**STATE, "vx": 0.0, "vy": 0.0}
     still = {"table": "cap", "r": 2.0}
-    (answer,) = converse(
+    (answer,) = ask(
         module, {"cmd": "time", "seq": 1, "scene": still, "state": rest, "collisions": 2, "repeat": 1}
     )
     (last,) = msgspec.convert(answer, Timed).steps
@@ -133,9 +159,9 @@ BAD = [
 
 
 @pytest.fixture(scope="module", params=["reference", "fast"])
-def replies(request):
+def replies(request, ask):
     """The answers of one session to all bad lines, each followed by a good one."""
-    found = converse(request.param, *(line for bad, _ in BAD for line in (bad, step(4))))
+    found = ask(request.param, *(line for bad, _ in BAD for line in (bad, step(4))))
     return list(zip(found[::2], found[1::2], strict=True))
 
 
@@ -149,12 +175,10 @@ def test_bad_lines_are_rejected_and_the_session_goes_on(replies, i):
     assert good["outcome"] == "collision"
 
 
-def test_every_catalogue_scene_is_served(module):
+def test_every_catalogue_scene_is_served(module, ask):
     names = [name for name in catalogue() if name != "moving-cap-as-printed"]
     scenes = [to_data(load(name)) for name in names]
     starts = [{"y": -0.3} if scene["table"] == "stem" else {} for scene in scenes]
-    answers = converse(
-        module, *(step(i, s, **c) for i, (s, c) in enumerate(zip(scenes, starts, strict=True)))
-    )
+    answers = ask(module, *(step(i, s, **c) for i, (s, c) in enumerate(zip(scenes, starts, strict=True))))
     assert [a["seq"] for a in answers] == list(range(len(names)))
     assert {a["outcome"] for a in answers} == {"collision"}

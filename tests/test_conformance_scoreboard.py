@@ -36,6 +36,7 @@ def test_a_lean_stepper_without_checks_passes_the_easy_and_fails_the_hard(lean):
     assert "fast-wall" in reasons(lean)[0]
 
 
+@pytest.mark.deep
 @needs_compiler
 def test_the_page_has_a_row_for_each_and_a_reason_for_failure(lean):
     text = page([Graded("lean-c", lean), Graded("example in C", None, "no compiler")], lean.corpus)

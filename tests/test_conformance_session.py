@@ -141,7 +141,7 @@ AT_EVERY_STEP = {
 }
 
 
-@pytest.mark.parametrize("name", deep_among(AT_EVERY_STEP, "close-stdout"))
+@pytest.mark.parametrize("name", deep_among(AT_EVERY_STEP, "close-stdout", "huge-line"))
 def test_a_fault_in_every_answer(verdicts, name):
     run = verdicts(name, PATIENT)
     verdict, word = AT_EVERY_STEP[name]

@@ -260,6 +260,7 @@ def sample():
     return [name for names, n in kinds for name in names[:: len(names) // n][:n]]
 
 
+@pytest.mark.deep
 def test_a_sample_is_made_again_bit_for_bit():
     there = {json.loads(line)["id"]: line for line in lines()}
     ids = sample()

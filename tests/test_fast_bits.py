@@ -74,6 +74,7 @@ for name in ("moving-cap", "breathing-circle"):
 """
 
 
+@pytest.mark.deep
 def test_same_bits_without_the_compiler():
     """Kernels are plain Python too: scalar, uncompiled, they give the bits of the packed machine code."""
     results = []

@@ -215,7 +215,10 @@ def test_uncompiled_lanes_give_the_bits_of_compiled_ones(group):
             assert np.array_equal(found, again, equal_nan=True)
 
 
-@pytest.mark.parametrize("name", deep_among(MUTANTS, "concavity of the arc"))
+@pytest.mark.parametrize(
+    "name",
+    deep_among(MUTANTS, "concavity of the arc", "how long the polynomials hold", "what Newton's step leaves"),
+)
 def test_the_search_kills(name, tally):
     group, n, *changes = MUTANTS[name]
     wrong = search(1, n, tally, group, faulty_lanes(*changes))

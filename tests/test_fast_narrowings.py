@@ -96,7 +96,7 @@ def drawn(random, kind):
     return Mushroom(r=r, h=1.0, w=law(0.1, 0.79, first))
 
 
-@pytest.mark.parametrize("kind", deep_among(["fourier", "bang-bang", "mixed"], "fourier"))
+@pytest.mark.parametrize("kind", deep_among(["fourier", "bang-bang", "mixed"], "fourier", "mixed"))
 def test_random_laws(kind, tally):
     random = np.random.default_rng(11)
     several = 0

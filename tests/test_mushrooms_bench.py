@@ -84,6 +84,7 @@ def test_a_benchmark_is_written_whole_and_compared(call, tmp_path, monkeypatch):
     assert all(errors[0][key] == errors[1][key] for key in errors[1])
 
 
+@pytest.mark.deep
 def test_a_slow_down_exits_with_1(call, tmp_path, monkeypatch):
     kept = record.read(ROOT / "docs" / "bench" / "bench.json")
     points = tuple(msgspec.structs.replace(p, ns=(100.0, 101.0, 102.0)) for p in kept.points)

@@ -102,6 +102,7 @@ def test_a_bad_stepper_is_not(call, tmp_path):
     assert counts["crashed"] == counts["wrong-format"] == counts["timed-out"] == 0
 
 
+@pytest.mark.deep
 def test_a_faulty_stepper_is_told_its_fault(call, tmp_path):
     """What was given beside what is certified, and the mutant whose failures are the same."""
     served = tmp_path / "faulty.py"

@@ -194,7 +194,7 @@ def test_standard_output_may_be_closed_or_full(tmp_path, to, code, word, more):
 
 
 @pytest.mark.parametrize("is_full", deep_but([False, True], False))
-@pytest.mark.parametrize("name", ["SIGINT", "SIGTERM", "SIGHUP"])
+@pytest.mark.parametrize("name", deep_but(["SIGINT", "SIGTERM", "SIGHUP"], "SIGTERM"))
 def test_whatever_ends_a_command_no_half_written_file_stays(tmp_path, name, is_full):
     """Also where nothing can be said of it: a terminal that has gone takes no more."""
     code = f"""if True:

@@ -101,6 +101,7 @@ def test_negative_point_against_signs_between_planted_roots(case, data):
         assert at(p, point) < 0
 
 
+@pytest.mark.deep
 @given(st.lists(quadratics, min_size=1, max_size=3), intervals)
 def test_double_irrational_roots_are_no_change_of_sign(factors, ends):
     a, b = ends

@@ -11,7 +11,7 @@ import mpmath
 import numpy as np
 import pytest
 from mpmath import MPContext
-from support.depth import deep_but
+from support.depth import deep_among, deep_but
 
 from scene import BangBang, Fourier, Mushroom, Scene, load
 from scene.laws import values
@@ -218,7 +218,7 @@ def test_a_plateau_within_the_capture_splits_the_integrals() -> None:
     assert abs(found.mean_exp_minus - 1) < 1e-18
 
 
-@pytest.mark.parametrize("cos", deep_but([(0.25, 0.0625), (0.1875, 0.0, 0.0625)], (0.1875, 0.0, 0.0625)))
+@pytest.mark.parametrize("cos", deep_among([(0.25, 0.0625), (0.1875, 0.0, 0.0625)], (0.1875, 0.0, 0.0625)))
 def test_degenerate_turns_converge_like_plain_ones(cos: tuple[float, ...]) -> None:
     r = Fourier(mean=1.0, omega=1.0, sin=(0.5,))
     found = predict(Mushroom(r=r, h=1.0, nu=Fourier(mean=0.5, omega=1.0, cos=cos)), digits=13)
@@ -321,7 +321,7 @@ def test_a_mouth_that_is_nearly_closed_captures_as_its_width_falls(narrow: float
     assert float(found.p_nc) == pytest.approx(p_nc, rel=1e-7)
 
 
-@pytest.mark.parametrize("size", [0.2, 1e-12])
+@pytest.mark.parametrize("size", deep_among([0.2, 1e-12], 1e-12))
 def test_figures_of_several_captures_are_means_over_them(size: float) -> None:
     """Power series and weighted points: two ways to sum over valleys, of nearly trivial cycles too."""
     twice = Fourier(mean=0.5, omega=1.0, cos=(0.1, 0.3))

@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import pytest
+from support.depth import deep_but
 
 import fast
 from conformance.audit.frozen import diffusion
@@ -38,7 +39,7 @@ def test_the_cap_hands_flights_along_the_base_back_as_is_told(nu):
     assert np.mean((angle / after) ** 2) == pytest.approx(1.0, abs=4 / n)  # phase volume is kept
 
 
-@pytest.mark.parametrize("nu", MOUTHS)
+@pytest.mark.parametrize("nu", deep_but(MOUTHS, 0.8))
 def test_kicks_of_a_frozen_upright_stem_spread_as_the_logarithm_of_the_path(nu):
     """As is told; without the cap's returns by a tenth of it."""
     table, now = breathing(nu), np.zeros(1)

@@ -7,6 +7,7 @@ import math
 import struct
 import subprocess
 import sys
+import threading
 from contextlib import ExitStack
 
 import msgspec
@@ -34,23 +35,25 @@ def converse(module, *lines):
 
 @pytest.fixture(scope="module")
 def ask():
-    """Send lines to a server that has answered others before, and return the decoded answers."""
+    """Send lines to a server that has answered others before, return the answers; it says nothing else."""
     with ExitStack() as stack:
         started = {}
 
         def asked(module, *lines):
             if module not in started:
-                pipe = subprocess.PIPE
-                server = subprocess.Popen([sys.executable, "-m", module], stdin=pipe, stdout=pipe, text=True)
+                pipe, command = subprocess.PIPE, [sys.executable, "-m", module]
+                server = subprocess.Popen(
+                    command, stdin=pipe, stdout=pipe, stderr=subprocess.STDOUT, text=True
+                )
                 started[module] = stack.enter_context(server)
+            limit = threading.Timer(120.0, started[module].kill)
+            limit.start()
             answers = []
             for line in lines:
-                print(
-                    line if isinstance(line, str) else json.dumps(line),
-                    file=started[module].stdin,
-                    flush=True,
-                )
+                text = line if isinstance(line, str) else json.dumps(line)
+                print(text, file=started[module].stdin, flush=True)
                 answers.append(json.loads(started[module].stdout.readline()))
+            limit.cancel()
             return answers
 
         yield asked

@@ -226,7 +226,7 @@ def code() -> str:
     digest = hashlib.sha256()
     for place in (Path(__file__).parent, *(Path(package.__path__[0]) for package in (scene, fast, theory))):
         for path in sorted(place.rglob("*")):
-            if path.suffix in (".py", ".toml", ".json"):
+            if path.suffix in (".py", ".toml", ".json") and path.is_file():  # not an editor's dangling link
                 content = path.read_bytes()
                 digest.update(f"{place.name}/{path.relative_to(place).as_posix()} {len(content)}\n".encode())
                 digest.update(content)

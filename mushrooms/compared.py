@@ -85,7 +85,7 @@ def limit_told(asked: Asked, summary: Mapping[str, Any]) -> str | None:
     told = "m1_theory, p_nc_theory: the limit of high energies; what is left at this one is not known"
     if not leans_inward(asked.scene):
         told += (
-            ", and falls slowly, as log(E) / sqrt(E):"
+            ", and falls slowly (of upright sides the variance as log(E) / sqrt(E)):"
             " where the slope is not above 0 some flights stay in the stem"
         )
     return told

@@ -3,8 +3,9 @@
 A flight at an angle alpha from the base stays in such a stem for a path of 2 h / alpha, all the while kicked
 by the sides alone. The cap hands it back nearly as it came, so it comes again and again. A kick that lasts
 as 1 / alpha has a mean square that diverges as the integral of d alpha / alpha, and only the walls' own time
-ends it: the variance of log E falls as log(v) / v, not as 1 / v, and a stem that is tilted has none of it.
-theory/equations.md derives what is computed here.
+ends it: the variance of log E falls as log(v) / v, not as 1 / v. Where sides lean inward flights must leave;
+where they lean outward some stay in another way. Neither is computed here. theory/equations.md derives what
+is, and says which steps are heuristic.
 """
 
 from __future__ import annotations
@@ -28,7 +29,7 @@ from theory.volumes import NotCovered, as_mushroom, volumes_at
 
 N_TIMES = 2048  # steps of a cycle, the midpoint rule's
 NARROWEST = 1e-6  # mouth: what the cap does not keep goes as nu^2 and is lost to rounding below
-TILTED = "sides are tilted: flights along the base leave the stem, and no variance goes as log(v) / v"
+TILTED = "sides are tilted: what is computed is of upright ones"
 
 
 def is_upright(scene: Scene) -> bool:

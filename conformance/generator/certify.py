@@ -16,14 +16,14 @@ import msgspec
 
 import reference
 from conformance.generator.links import Confirmation, Unfit, condition, finite
-from conformance.generator.paths import Proved, proved_path
+from conformance.generator.paths import proved_path
 from conformance.generator.prover import CONDITIONS, NUDGES, SIGNS, ask, expectation, flight_of, nudged
-from conformance.generator.question import Question
+from conformance.generator.question import Proved, Question, filed
 from conformance.generator.stays import Mark, OpenSign, marks
 from conformance.second_proof.chain import recheck
 from conformance.second_proof.step import check
 from conformance.second_proof.trajectory import check_path
-from conformance.vectors import Certified, Expectation, Kind, Level, Vector, four_digits
+from conformance.vectors import Certified, Expectation, Level, Vector, four_digits
 from reference.certificate import certificate, path_certificate
 from scene import BadInput, InvalidState, Rejected, Scene, State, Undecided, Undefined, from_data
 
@@ -65,32 +65,15 @@ def certify(question: Question, number: int) -> Vector:
     except BadInput:
         proved = Proved((Expectation("rejected"),))
     else:
-        proved = (
-            _step(scene, question) if question.collisions is None else proved_path(scene, question, InArb())
-        )
+        is_step = question.kind == "step"
+        proved = _step(scene, question) if is_step else proved_path(scene, question, InArb())
     also = [Expectation(kind) for kind in question.also]
     expect = tuple(dict.fromkeys([*proved.expect, *also]))
     if not expect:
         raise Unfit("the reference is undecided")
-    vector = Vector(
-        id=f"{question.group}/{number}",
-        group=question.group,
-        level="stress",
-        kind=_kind(question),
-        rule=question.rule,
-        source=question.source,
-        scene=question.scene,
-        state=question.state,
-        t_end=question.t_end,
-        expect=expect,
-        collisions=proved.collisions,
-        condition=four_digits(min(proved.condition, INFINITE)),
-    )
+    rounded = four_digits(min(proved.condition, INFINITE))
+    vector = filed(question, number, proved._replace(expect=expect, condition=rounded), "stress")
     return msgspec.structs.replace(vector, level=question.level or _level(scene, vector))
-
-
-def _kind(question: Question) -> Kind:
-    return "step" if question.collisions is None else "flow" if question.flow else "trajectory"
 
 
 def _step(scene: Scene, question: Question) -> Proved:

@@ -32,9 +32,9 @@ from conformance.generator.draws import (
 )
 from conformance.generator.flow_families import any_marks
 from conformance.generator.links import Confirmation, Unfit
-from conformance.generator.paths import Proved, proved_path
+from conformance.generator.paths import proved_path
 from conformance.generator.prover import CONDITIONS, NUDGES, SIGNS, ask, flight_of, nudged
-from conformance.generator.question import Question
+from conformance.generator.question import Proved, Question, filed
 from conformance.grading.error import condition_number, inputs_of
 from conformance.vectors import Expectation, Kind, Vector
 from scene import BadInput, BangBang, Collision, Fourier, Law, Mushroom, Scene, State, from_data
@@ -300,27 +300,12 @@ def _within(of: BangBang, draw: Draw, low: float, high: float) -> tuple[tuple[fl
 
 def _proved(question: Question, number: int) -> Vector | None:
     """Return a question with its proved answer; None where there is none, or its condition is high."""
-    of, is_step = from_data(question.scene), question.collisions is None
+    of, is_step = from_data(question.scene), question.kind == "step"
     try:
         found = _proved_step(of, question) if is_step else proved_path(of, question, ALONE)
     except Unfit:
         return None
-    if found.condition > CONDITIONS["core"]:
-        return None
-    return Vector(
-        id=f"{GROUP}/{number}",
-        group=GROUP,
-        level="core",
-        kind=_kind(number),
-        rule=question.rule,
-        source=question.source,
-        scene=question.scene,
-        state=question.state,
-        t_end=question.t_end,
-        expect=found.expect,
-        collisions=found.collisions,
-        condition=found.condition,
-    )
+    return filed(question, number, found, "core") if found.condition <= CONDITIONS["core"] else None
 
 
 def _proved_step(of: Scene, question: Question) -> Proved:

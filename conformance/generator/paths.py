@@ -7,25 +7,16 @@ that does so; for questions drawn while the suite waits, one that does nothing i
 from __future__ import annotations
 
 from fractions import Fraction
-from typing import NamedTuple
 
 import reference
 from conformance.generator.links import Confirmation, Links, Unfit, finite
 from conformance.generator.prover import collided
-from conformance.generator.question import Question
+from conformance.generator.question import Proved, Question
 from conformance.generator.stays import OpenSign, arrival, marks, stays, timing_condition
 from conformance.vectors import NUMBERS, Certified, Expectation, certified
 from scene import InvalidState, Scene, Undefined
 
 WIDEST = Fraction(1, 2**72)  # of an enclosure of a path: a millionth of a backward ulp and less
-
-
-class Proved(NamedTuple):
-    """What is certified: the right answers, how delicate they are, and how many collisions they have."""
-
-    expect: tuple[Expectation, ...]
-    condition: float = 0.0
-    collisions: int = 1
 
 
 def proved_path(

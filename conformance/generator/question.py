@@ -1,4 +1,4 @@
-"""What a vector asks, and how it is filed."""
+"""What a vector asks, what is proved of it, and how both are filed."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 from conformance.generator.stays import Mark
-from conformance.vectors import Level, OutcomeName
+from conformance.vectors import Expectation, Kind, Level, OutcomeName, Vector
 from scene import State
 
 LONGEST = 1e8  # condition number up to which a trajectory is followed
@@ -40,3 +40,34 @@ class Question(NamedTuple):
     level: Level | None = None
     longest: float = LONGEST
     flow: Callable[[Sequence[Mark]], bool] | None = None
+
+    @property
+    def kind(self) -> Kind:
+        """Return what is asked for."""
+        return "step" if self.collisions is None else "flow" if self.flow else "trajectory"
+
+
+class Proved(NamedTuple):
+    """What is certified: the right answers, how delicate they are, and how many collisions they have."""
+
+    expect: tuple[Expectation, ...]
+    condition: float = 0.0
+    collisions: int = 1
+
+
+def filed(question: Question, number: int, proved: Proved, level: Level) -> Vector:
+    """Return a question with its answers as a vector, of this number in its group."""
+    return Vector(
+        id=f"{question.group}/{number}",
+        group=question.group,
+        level=level,
+        kind=question.kind,
+        rule=question.rule,
+        source=question.source,
+        scene=question.scene,
+        state=question.state,
+        t_end=question.t_end,
+        expect=proved.expect,
+        collisions=proved.collisions,
+        condition=proved.condition,
+    )

@@ -40,7 +40,8 @@ def given_state(scene: Scene, state: object) -> State:
     wall = state.wall
     if wall is not None and not (isinstance(wall, str) and wall in scene.walls):
         raise InvalidState(f"state.wall = {shown(wall)}, must be null or one of {', '.join(scene.walls)}")
-    if type(state.t) is type(state.x) is type(state.y) is type(state.vx) is type(state.vy) is float:
+    is_float = type(state.t) is type(state.x) is type(state.y) is type(state.vx) is type(state.vy) is float
+    if is_float and type(state) is State:
         return state
     t, x, y, vx, vy = (check_number(f"state.{name}", getattr(state, name), InvalidState) for name in NUMBERS)
     return State(t, x, y, vx, vy, wall)

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
+import msgspec
 import numpy as np
 
 from fast.given import MOST_TO_A_TIME, given_state
@@ -13,16 +14,13 @@ from fast.kernel.loops import careful_at
 from fast.kernel.records import ANCHORS_SHAPE, Compiled, FloatArray, IntArray, Particle, Paths, unfilled_paths
 from fast.units import ANSWER_LOST, Units, fit
 from scene import (
-    Cap,
     Collision,
     Horizon,
     InvalidState,
-    Mushroom,
     Outcome,
     Rejected,
     Scene,
     State,
-    Stem,
     Undecided,
     Undefined,
     Wall,
@@ -30,7 +28,6 @@ from scene import (
 from scene.refusal import BadInput, check_number, check_scene
 from scene.states import ON_WALL, check_numbers
 
-TABLES = (Cap, Stem, Mushroom)
 WALL_NAMES: dict[int, Wall] = {
     int(codes.ARC): "arc",
     int(codes.BASE): "base",
@@ -73,26 +70,22 @@ def next_collision(scene: Scene, state: State, t_end: float) -> Outcome:
 
     Source: Gelfreich, Rom-Kedar, Turaev (2014), sec. 3.1.
     """
-    if type(scene) not in TABLES:  # the common case is not worth a call
+    asked = latest[0]
+    if asked is None or asked.scene is not scene:
         check_scene(scene)
+        asked = None
     try:
         t_end = t_end if type(t_end) is float else check_number("t_end", t_end)
-        state = given_state(scene, state)
-        try:
-            fitted = fit(scene)
-        except BadInput:
-            check_numbers(scene, state, t_end)  # what is wrong with the question comes first
-            raise
-        code, dt, t, x, y, vx, vy = entries.single_at_once()(
-            fitted.packed,
-            state.t,
-            state.x,
-            state.y,
-            state.vx,
-            state.vy,
-            WALL_CODES[state.wall],
-            t_end,
-        )
+        # What is common is not worth a call: a State of floats, in the scene of the question before.
+        if asked is None or type(state) is not State:
+            state = given_state(scene, state)
+            asked = ask(scene, state, t_end)
+        t, x, y, vx, vy, wall = state.t, state.x, state.y, state.vx, state.vy, state.wall
+        is_plain = type(t) is type(x) is type(y) is type(vx) is type(vy) is float
+        if not is_plain or (wall is not None and not (isinstance(wall, str) and wall in asked.walls)):
+            state = given_state(scene, state)
+            t, x, y, vx, vy, wall = msgspec.structs.astuple(state)
+        code, dt, t, x, y, vx, vy = asked.single(asked.packed, t, x, y, vx, vy, asked.walls[wall], t_end)
         if code in WALL_NAMES:
             return Collision(WALL_NAMES[code], dt, t, x, y, vx, vy)
         if code == codes.HORIZON:
@@ -103,6 +96,41 @@ def next_collision(scene: Scene, state: State, t_end: float) -> Outcome:
     except BadInput as error:
         return Rejected(str(error))
     return trouble(code, state)
+
+
+class Asked(NamedTuple):
+    """A scene that a question was about, with what the next one in it needs.
+
+    Attributes:
+        scene: kept, so that its address is no other scene's.
+        packed: its numbers for the kernels.
+        walls: codes of the walls that a state may name.
+        single: the compiled step.
+    """
+
+    scene: Scene
+    packed: FloatArray
+    walls: dict[Wall | None, int]
+    single: Callable[..., tuple[int, float, float, float, float, float, float]]
+
+
+latest: list[Asked | None] = [None]  # of all threads; what is read of it is read once, and never changes
+
+
+def ask(scene: Scene, state: State, t_end: float) -> Asked:
+    """Return what questions in a scene need, and keep it for the next.
+
+    Raises:
+        BadInput: the scene does not fit into binary64; what is wrong with the question comes first.
+    """
+    try:
+        packed = fit(scene).packed
+    except BadInput:
+        check_numbers(scene, state, t_end)
+        raise
+    walls = {wall: WALL_CODES[wall] for wall in (None, *scene.walls)}
+    asked = latest[0] = Asked(scene, packed, walls, entries.single_at_once())
+    return asked
 
 
 def followed_paths(

@@ -93,6 +93,7 @@ def test_a_kernel_that_overlooks_the_wall_is_found(monkeypatch):
         return single(*question[:-2], int(codes.NO_WALL), question[-1]) if found[0] == REFUSED else found
 
     monkeypatch.setattr(stepper.entries, "single_at_once", lambda: lenient)
+    monkeypatch.setattr(stepper, "latest", [None])
     assert differing(1, 300)
 
 

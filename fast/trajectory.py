@@ -13,9 +13,9 @@ from fast.kernel.worker import new_worker
 from fast.pieces import laws_in_lanes
 from fast.starts import only_stop
 from fast.step import WALL_NAMES, as_arrays, check_state, trouble
-from fast.units import fit
+from fast.units import ANSWER_LOST, fit
 from scene import Horizon, Outcome, Scene, State, Wall
-from scene.refusal import check_count, check_scene
+from scene.refusal import BadInput, check_count, check_scene
 
 NAMES = np.array([WALL_NAMES[code] for code in range(len(WALL_NAMES))], dtype=object)
 
@@ -56,14 +56,18 @@ def trajectory(scene: Scene, state: State, n_collisions: int, t_end: float = np.
     start = check_state(scene, state, None if t_end == np.inf else t_end)
     n_collisions = check_count("n_collisions", n_collisions, 0, MAX_STEPS)
     rows, walls = as_arrays([start])
-    paths = unfilled_paths(1, n_collisions)
+    factors = start.units.factors()  # multiplied in passing: a pass of its own costs as much as half a step
+    paths = unfilled_paths(1, n_collisions, factors)
     in_lanes = laws_in_lanes(fit(scene).scene)
     if n_collisions:
         stop = only_stop(start.units.horizon(t_end))
         worker = new_worker(in_lanes, stop, unfilled_ends(rows, 1, (1, 1)))
         entries.follow_particles(worker, walls, paths)
+    if not paths.is_exact.all():
+        raise BadInput(ANSWER_LOST)
     n, code = paths.counts.item(), paths.codes.item()
-    steps = start.units.steps(paths.steps[0, :n])
+    steps = paths.steps[0, :n] if n == n_collisions else paths.steps[0, :n].copy()  # not all room is held
+    steps = steps if factors is not None else start.units.steps(steps)
     walls = NAMES[paths.walls[0, :n]].tolist()
     outcome: Outcome | None = None
     if n < n_collisions:

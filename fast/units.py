@@ -30,6 +30,7 @@ from scene.tables import laws, period
 
 LEAST_NORMAL = float(np.finfo(np.float64).smallest_normal)
 SLAB = 2**11  # rows brought back at a time: what lies in between stays in the cache
+FARTHEST = 1000  # powers of two up to this, and their inverses, are floats
 ANSWER_LOST = "the answer holds a number beyond binary64: every one must be 0 or 2^-1022 to 2^1023"
 
 
@@ -79,9 +80,17 @@ class Units(NamedTuple):
 
     def steps(self, rows: FloatArray) -> FloatArray:
         """Return rows of [dt, t, x, y, vx, vy], each a number or a pair, in the scene's units."""
-        speed = self.length - self.time
-        exponents = np.array([self.time, self.time, self.length, self.length, speed, speed])
+        exponents = self._of_step()
         return outward(rows, exponents if rows.shape[-1] == 6 else exponents[:, None])
+
+    def factors(self) -> FloatArray | None:
+        """Return by what dt, t, x, y, vx, vy are multiplied; None where no product does it."""
+        exponents = self._of_step()
+        return np.ldexp(1.0, exponents) if int(np.abs(exponents).max()) <= FARTHEST else None
+
+    def _of_step(self) -> IntArray:
+        speed = self.length - self.time
+        return np.array([self.time, self.time, self.length, self.length, speed, speed])
 
     def places(self, rows: FloatArray) -> FloatArray:
         """Return rows of [x, y, vx, vy] in the scene's units."""
@@ -194,7 +203,7 @@ def outward(numbers: FloatArray, exponents: IntArray) -> FloatArray:
     slab = numbers[:SLAB] if numbers.ndim > exponents.ndim else numbers
     # One for each number of a slab: numpy multiplies long rows, not many short ones.
     exponents = np.ascontiguousarray(np.broadcast_to(exponents, slab.shape))
-    is_small = exponents.size > 0 and int(np.abs(exponents).max()) <= 1000
+    is_small = exponents.size > 0 and int(np.abs(exponents).max()) <= FARTHEST
     factors = np.ldexp(1.0, exponents) if is_small else None
     if slab.shape == numbers.shape:
         return _outward(numbers, exponents, factors)

@@ -40,7 +40,7 @@ def _careful(sources):
                 if code >= HORIZON:
                     break
                 paths.walls[i, n] = code
-                write_step(paths.steps, i, n, dt, particle)
+                write_step(paths, i, n, dt, particle)
                 n += 1
             paths.codes[i], paths.counts[i] = code, n
             write_state(paths.ends, i, particle)

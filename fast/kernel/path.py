@@ -54,7 +54,7 @@ def follow_one(worker, walls, paths):
             collide(GENERAL, a, ALONE, worker)
             paths.walls[j, n] = code
             particle = Particle(a[T], a[T_LOW], a[X], a[Y], a[VX], a[VY], code)
-            write_step(paths.steps, j, n, a[S], particle)
+            write_step(paths, j, n, a[S], particle)
             n += 1
         paths.codes[j], paths.counts[j] = code, n
         write_state(paths.ends, j, Particle(a[T], a[T_LOW], a[X], a[Y], a[VX], a[VY], int(a[WALL])))

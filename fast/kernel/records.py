@@ -138,7 +138,9 @@ class Paths(NamedTuple):
     """What the careful kernel fills in: paths of at most K collisions from each of N starts.
 
     Attributes:
-        steps: (N, K, 6) dt, t, x, y, vx, vy after each collision.
+        steps: (N, K, 6) dt, t, x, y, vx, vy after each collision, times `units`.
+        units: (2, 6) powers of two by which steps are multiplied, and their inverses.
+        is_exact: (N,) whether no step has lost a bit by that.
         walls: (N, K) codes of the walls hit.
         counts: (N,) how many collisions there are.
         codes: (N,) the last wall's code where there are K, else what came instead.
@@ -146,16 +148,21 @@ class Paths(NamedTuple):
     """
 
     steps: FloatArray
+    units: FloatArray
+    is_exact: BoolArray
     walls: IntArray
     counts: IntArray
     codes: IntArray
     ends: FloatArray
 
 
-def unfilled_paths(n_starts: int, n_collisions: int) -> Paths:
-    """Return what is to be filled in for paths from some starts."""
+def unfilled_paths(n_starts: int, n_collisions: int, units: FloatArray | None = None) -> Paths:
+    """Return what is to be filled in for paths from some starts; without units (6,) steps are as they are."""
+    factors = np.ones(6) if units is None else units
     return Paths(
         np.empty((n_starts, n_collisions, 6)),
+        np.stack([factors, 1.0 / factors]),
+        np.ones(n_starts, np.bool_),
         np.empty((n_starts, n_collisions), np.int64),
         np.zeros(n_starts, np.int64),
         np.zeros(n_starts, np.int64),
@@ -247,11 +254,17 @@ def write_state(states, i, particle):
 
 
 @kernel
-def write_step(steps, i, k, dt, particle):
+def write_step(paths, i, k, dt, particle):
     """Write collision k of path i: dt, t, x, y, vx, vy."""
-    steps[i, k, 0], steps[i, k, 1] = dt, particle.t
-    steps[i, k, 2], steps[i, k, 3] = particle.x, particle.y
-    steps[i, k, 4], steps[i, k, 5] = particle.vx, particle.vy
+    numbers = (dt, particle.t, particle.x, particle.y, particle.vx, particle.vy)
+    is_exact = True
+    for column in range(6):
+        number = numbers[column]
+        scaled = number * paths.units[0, column]
+        paths.steps[i, k, column] = scaled
+        is_exact = is_exact and scaled * paths.units[1, column] == number
+    if not is_exact:
+        paths.is_exact[i] = False
 
 
 @kernel

@@ -98,7 +98,7 @@ def next_collision(scene: Scene, state: State, t_end: float) -> Outcome:
     return trouble(code, state)
 
 
-class Asked(NamedTuple):
+class Prepared(NamedTuple):
     """A scene that a question was about, with what the next one in it needs.
 
     Attributes:
@@ -114,10 +114,10 @@ class Asked(NamedTuple):
     single: Callable[..., tuple[int, float, float, float, float, float, float]]
 
 
-latest: list[Asked | None] = [None]  # of all threads; what is read of it is read once, and never changes
+latest: list[Prepared | None] = [None]  # of all threads; what is read of it is read once, and never changes
 
 
-def ask(scene: Scene, state: State, t_end: float) -> Asked:
+def ask(scene: Scene, state: State, t_end: float) -> Prepared:
     """Return what questions in a scene need, and keep it for the next.
 
     Raises:
@@ -129,7 +129,7 @@ def ask(scene: Scene, state: State, t_end: float) -> Asked:
         check_numbers(scene, state, t_end)
         raise
     walls = {wall: WALL_CODES[wall] for wall in (None, *scene.walls)}
-    asked = latest[0] = Asked(scene, packed, walls, entries.single_at_once())
+    asked = latest[0] = Prepared(scene, packed, walls, entries.single_at_once())
     return asked
 
 

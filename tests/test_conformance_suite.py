@@ -296,6 +296,7 @@ def flows(name: str) -> Stub:
 FEW, SLOW, LITTLE = (
     property_checks.Size(*size) for size in ((100, 1000.0, 0.08), (400, 20.0, 0.2), (20, 20.0, 0.3))
 )
+MANY = FEW._replace(n_particles=400)
 
 
 @pytest.mark.parametrize(
@@ -303,7 +304,13 @@ FEW, SLOW, LITTLE = (
     [
         ("none", "work-identity", FEW, "pass"),
         ("none", "work-identity", LITTLE, "declined"),
-        ("wall-velocity-once", "work-identity", FEW._replace(n_particles=400), "fail"),
+        pytest.param(
+            "wall-velocity-once",
+            "work-identity",
+            FEW._replace(n_particles=400),
+            "fail",
+            marks=pytest.mark.deep,
+        ),
         ("energy-kept", "work-identity", FEW, "fail"),
         # Loses nearly all its particles.
         ("phase-restarts-at-each-step", "work-identity", FEW, "fail"),

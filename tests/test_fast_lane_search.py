@@ -217,7 +217,15 @@ def test_uncompiled_lanes_give_the_bits_of_compiled_ones(group):
 
 @pytest.mark.parametrize(
     "name",
-    deep_among(MUTANTS, "concavity of the arc", "how long the polynomials hold", "what Newton's step leaves"),
+    deep_among(
+        MUTANTS,
+        "concavity of the arc",
+        "how long the polynomials hold",
+        "how long the radius was known before",
+        "the slope of the side that is met",
+        "what Newton's step leaves",
+        "what Newton's step leaves of the place",
+    ),
 )
 def test_the_search_kills(name, tally):
     group, n, *changes = MUTANTS[name]

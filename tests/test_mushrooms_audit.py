@@ -257,13 +257,21 @@ def test_a_byte_of_the_sources_makes_other_code(tmp_path, monkeypatch, name):
 def test_sources_are_looked_at_before_anything_is_examined(tmp_path, monkeypatch):
     """What is edited while an audit runs would be told as what had run."""
     order = []
+
+    def simulate(*_, **__):
+        order.append("simulated")
+        raise InterruptedError
+
     monkeypatch.setattr(session, "code", lambda: order.append("code") or "of today")
     monkeypatch.setattr(
         session, "examine", lambda entry, *_: order.append(entry.id) or Finding(entry.id, "refuted", [], 0.0)
     )
-    steppers = AuditSteppers(fast.simulate, fast.trajectory, fast.flow)
-    session.conduct(steppers, AuditSettings(folder=tmp_path), entries=ledger.select("X5"))
-    assert order[:2] == ["code", "X5"]
+    steppers, settings = AuditSteppers(simulate, fast.trajectory, fast.flow), AuditSettings(folder=tmp_path)
+    session.conduct(steppers, settings, entries=ledger.select("N6"))
+    assert order[:2] == ["code", "N6"]
+    with pytest.raises(InterruptedError):
+        session.conduct(steppers, settings, entries=ledger.select("X5"))
+    assert order[-2:] == ["code", "simulated"]
 
 
 @pytest.mark.deep

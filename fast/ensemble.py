@@ -77,7 +77,8 @@ class Ensemble(NamedTuple):
             later (see above) its arc hit. Stays that span no narrowing are not kept.
         wall_counts: (N, 5) collisions with arc, base, left, right, floor.
         phase_energies: (N, K, P) energy at the phases asked for.
-        phase_captured: (N, K, P) whether the last arc hit before them had |sin phi| > nu.
+        phase_captured: (N, K, P) whether the last arc hit before them had |sin phi| > nu, and no wall of the
+            stem has been met since.
         n_careful: (N,) collisions that the lanes left to the careful step.
         seconds: wall time of the kernel.
         threads: number of threads used.
@@ -109,14 +110,17 @@ class Ensemble(NamedTuple):
     def takes_part(self) -> npt.NDArray[np.bool_]:
         """Return (N,): who was followed to the end, and was not in the island all the time.
 
-        Where nu is always below 1 some particles are never free: in every slot a stay, and no collision with
-        the stem's walls. No cycle captures or releases them, and the theory leaves them out.
+        Where nu is always below 1 some particles are never free: in every slot a stay, one that is on when
+        the last cycle ends, and no collision with the stem's walls. No cycle captures or releases them, and
+        the theory leaves them out. Slow particles that were captured and released, and have not come down
+        into the stem before the end, take part.
         """
         was_followed: npt.NDArray[np.bool_] = self.outcome == FOLLOWED
         if self.t_in.shape[2] == 0:
             return was_followed
         is_always_in = np.isfinite(self.t_in).all(axis=(1, 2)) & ~self.wall_counts[:, 2:].any(axis=1)
-        return was_followed & ~is_always_in
+        is_on_at_the_end: npt.NDArray[np.bool_] = self.t_out[:, -1, -1] == self.t
+        return was_followed & ~(is_always_in & is_on_at_the_end)
 
     def p_nc(self) -> FloatArray:
         """Return (K,): the share of those who take part without a captured stay in each cycle; nan of no one.

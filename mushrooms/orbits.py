@@ -129,7 +129,10 @@ class FollowedOrbit:
         section = self.section()
         at_arc = dict(zip(section.collision.tolist(), section.is_captured().tolist(), strict=True))
         found = np.zeros(n + 1, bool)
-        found[0] = at_arc.get(0, False)  # what is captured at its first hit was so before
+        # Who is captured at the first hit of the arc was so before, by way of the base too, which keeps
+        # |sin phi|; who comes through a mouth that narrows meanwhile was not.
+        first = next((k for k, wall in enumerate(self.walls) if wall != "base"), -1)
+        found[0] = self.start.y >= 0 and at_arc.get(first, False)
         for k, wall in enumerate(self.walls):
             found[k + 1] = at_arc[k] if wall == "arc" else found[k] and wall == "base"
         return found

@@ -155,6 +155,31 @@ def test_who_is_never_free_takes_no_part():
     assert np.all(np.ptp(run.t_in[~run.takes_part()], axis=(1, 2)) == 0)
 
 
+@pytest.mark.parametrize("energy", [1.0, 10.0])
+def test_who_is_released_takes_part_though_the_stem_was_not_met(energy):
+    """At its widest this mouth is the whole base: whoever is captured in the cycle is let out by its end."""
+    run = fast.simulate(load("moving-cap"), n_particles=2000, energy=energy, seed=1)
+    never_below = np.isfinite(run.t_in).all(axis=(1, 2)) & ~run.wall_counts[:, 2:].any(axis=1)
+    assert never_below.sum() > 5
+    assert run.takes_part().all()
+    assert run.p_nc()[0] == 1 - run.is_captured().mean()
+
+
+@pytest.mark.parametrize("energy", [10.0, 100.0])
+def test_who_takes_no_part_started_beyond_the_widest_mouth(energy):
+    """As the start has it: its chord misses the mouth at its widest by more than angles drift."""
+    scene, n, drift = MOUTHS["equal"], 1000, 0.2 / math.sqrt(energy)
+    _, _, x, y, vx, vy = initial_states(scene, n, energy, 2).T
+    miss = np.where(y > 0, np.abs(x * vy - y * vx) / np.hypot(vx, vy), 0.0)
+    for n_cycles in (1, 2):
+        run = fast.simulate(scene, n_particles=n, energy=energy, n_cycles=n_cycles, seed=2)
+        never_below = np.isfinite(run.t_in).all(axis=(1, 2)) & ~run.wall_counts[:, 2:].any(axis=1)
+        out = ~run.takes_part()
+        assert out.sum() > 15
+        assert miss[out].min() > 0.85 - drift > miss[never_below & ~out].min()
+        assert out[miss > 0.85 + drift].all()
+
+
 def z_score(run, scene):
     """Return how many standard errors p_nc is from theory, and their size."""
     expected = float(theory.predict(scene, 6).p_nc)

@@ -66,6 +66,24 @@ def test_the_section_is_eq_sinphi_before_the_bounce(moving):
         assert np.all((section.place >= 0) & (section.place <= 1) & (np.abs(section.sin_phi) <= 1 + 1e-12))
 
 
+def test_who_goes_to_the_arc_by_way_of_the_base_is_captured_from_the_start():
+    """In a mouth at rest |sin phi| decides, and a mirror in the base does not change it."""
+    walls = set()
+    for vy in (-1.0, 1.0):
+        one = orbits.from_state(STATIC, scenes.State(0.0, 0.9, 0.05, 0.1, vy), N_COLLISIONS)
+        walls.add(one.walls[0])
+        assert one.captured().all()
+    assert walls == {"base", "arc"}
+
+
+def test_who_meets_the_arc_through_a_mouth_that_closed_behind_was_not_captured_before():
+    closing = scenes.BangBang(knots=((0.0, 0.9), (0.5, 0.1), (1.0, 0.9)))
+    table = scenes.Mushroom(r=1.0, h=1.0, nu=closing)
+    one = orbits.from_state(table, scenes.State(0.0, 0.7, -0.05, 0.0, 1.5), 1)
+    assert one.walls == ["arc"]
+    assert one.captured().tolist() == [False, True]
+
+
 def test_captured_stays_are_those_of_the_flow():
     orbit = orbits.follow(MOVING, 3000, energy=ENERGY, seed=SEED, n_orbits=6)
     n_stays = 0

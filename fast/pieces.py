@@ -26,6 +26,7 @@ import numpy as np
 from fast.compiled import HALF_PI, compile_scene
 from fast.kernel import entries
 from fast.kernel.arithmetic import MAX_QUADRANT
+from fast.kernel.loops import most_compiled
 from fast.kernel.pieces import PARABOLA, SERIES
 
 from fast.kernel.records import (  # isort: skip
@@ -53,15 +54,31 @@ class Cut(NamedTuple):
 def laws_in_lanes(scene: Scene) -> LawsInLanes:
     """Return a scene, which is in the kernel's units, as the lanes know it."""
     compiled = compile_scene(scene)
-    degree = SERIES if (compiled.laws[:SHARED, KIND] == FOURIER).any() else PARABOLA
+    with most_compiled(is_slope_moving(compiled), degree_of(compiled)):
+        return known_in_lanes(scene)
+
+
+def known_in_lanes(scene: Scene) -> LawsInLanes:
+    """Return the same where nothing is to be followed."""
+    compiled = compile_scene(scene)
+    degree = degree_of(compiled)
     pieces = pieces_of(compiled, degree)
     if pieces is None:
         none = pieces_of(compile_scene(FIXED), degree)
         assert none is not None
         pieces = none._replace(until=-1.0)
-    moves = compiled.laws[SLOPE, KIND] != CONSTANT
-    slope = None if moves else float(compiled.laws[SLOPE, LEVEL])
+    slope = None if is_slope_moving(compiled) else float(compiled.laws[SLOPE, LEVEL])
     return LawsInLanes(compiled, pieces, degree, slope)
+
+
+def is_slope_moving(compiled: Compiled) -> bool:
+    """Tell whether a scene's sides turn."""
+    return bool(compiled.laws[SLOPE, KIND] != CONSTANT)
+
+
+def degree_of(compiled: Compiled) -> int:
+    """Return the degree of the polynomials that a scene's laws are in lanes."""
+    return SERIES if (compiled.laws[:SHARED, KIND] == FOURIER).any() else PARABOLA
 
 
 def reach(compiled: Compiled, degree: int) -> float:

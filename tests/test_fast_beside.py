@@ -1,4 +1,4 @@
-"""A second process compiles beside a run's own; whatever becomes of it, the run goes on."""
+"""Other processes compile beside a run's own; whatever becomes of them, the run goes on."""
 
 from __future__ import annotations
 
@@ -10,21 +10,21 @@ import pytest
 from numba import njit
 
 import fast
-from fast import following
-from fast.kernel import beside, entries
+from fast import first_run
+from fast.kernel import beside, entries, loops
 from fast.kernel.beside import start as really_start
 from scene import load
 
 
 @pytest.fixture
 def started(monkeypatch):
-    """Start a made-up program in place of the second process; return the list of those started."""
+    """Start a made-up program, twice, in place of the other processes; return the list of those started."""
     found = []
 
     def with_program(text):
         def start():
-            found.append(subprocess.Popen([sys.executable, "-c", text]))
-            return found[-1]
+            found.extend(subprocess.Popen([sys.executable, "-c", text]) for _ in range(2))
+            return found
 
         monkeypatch.setattr(beside, "start", start)
         return found
@@ -42,11 +42,11 @@ def compiled():
 def test_it_is_waited_for_and_its_fate_is_no_matter(started, text):
     processes = started(text)
     assert compiled() == 2
-    assert [process.returncode is None for process in processes] == [False]
+    assert [process.returncode is None for process in processes] == [False, False]
 
 
 def test_without_a_second_process_all_is_as_before(monkeypatch):
-    monkeypatch.setattr(beside, "start", lambda: None)
+    monkeypatch.setattr(beside, "start", list)
     assert compiled() == 2
 
 
@@ -65,7 +65,7 @@ def test_one_that_hangs_is_left_behind(started, monkeypatch):
     monkeypatch.setattr(beside, "PATIENCE", 0.1)
     processes = started("import time; time.sleep(600)")
     assert compiled() == 2
-    assert processes[0].returncode not in (None, 0)
+    assert {process.returncode for process in processes}.isdisjoint({None, 0})
 
 
 def test_an_interrupt_ends_it_too(started):
@@ -79,7 +79,7 @@ def test_an_interrupt_ends_it_too(started):
 
     with pytest.raises(KeyboardInterrupt):
         interrupted()
-    assert processes[0].returncode not in (None, 0)
+    assert {process.returncode for process in processes}.isdisjoint({None, 0})
 
 
 def test_it_is_told_where_our_modules_are(monkeypatch, tmp_path):
@@ -88,15 +88,16 @@ def test_it_is_told_where_our_modules_are(monkeypatch, tmp_path):
     monkeypatch.setattr(beside.os, "cpu_count", lambda: 2)
     monkeypatch.setattr(beside, "_ONCE", threading.Lock())
     monkeypatch.setattr(sys, "path", [*sys.path, tmp_path, str(tmp_path)])  # import passes by what is no text
-    really_start()
+    really_start("1", "12")
     ((command, options),) = given
-    assert command == [sys.executable, "-P", "-m", "fast.following"]
+    what = [sys.executable, "-P", "-m", "fast.first_run", "1", "12"]
+    assert command == [*what, "follow", "bounce"]
     assert options["env"]["PYTHONPATH"].endswith(str(tmp_path))
     assert options["env"][beside.MARK]
 
 
 @pytest.mark.parametrize(
-    "why", ["one core", "a second process", "started before", "an application", "no room"]
+    "why", ["one core", "another process", "started before", "an application", "no room"]
 )
 def test_it_is_started_once_and_where_it_is_of_use(why, monkeypatch):
     def refused(*_, **__):
@@ -107,22 +108,23 @@ def test_it_is_started_once_and_where_it_is_of_use(why, monkeypatch):
     monkeypatch.setattr(subprocess, "Popen", refused)
     monkeypatch.setattr(beside.os, "cpu_count", lambda: 1 if why == "one core" else 2)
     monkeypatch.setattr(beside, "_ONCE", threading.Lock())
-    if why == "a second process":
+    if why == "another process":
         monkeypatch.setenv(beside.MARK, "1")
     if why == "started before":
         beside._ONCE.acquire()
     if why == "an application":
         monkeypatch.setattr(sys, "frozen", True, raising=False)
-    assert really_start() is None
+    assert really_start() == []
 
 
-def test_the_second_process_itself_finds_what_is_kept_whatever_lies_about(tmp_path, monkeypatch):
+@pytest.mark.parametrize("n_cores", [2, 3, 64])
+def test_the_others_find_what_is_kept_whatever_lies_about(n_cores, tmp_path, monkeypatch):
     fast.simulate(load("moving-cap"), n_particles=1, energy=1e2, seed=1)
     (tmp_path / "fast.py").write_text("raise SystemExit(3)")
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(beside.os, "cpu_count", lambda: 2)
+    monkeypatch.setattr(beside.os, "cpu_count", lambda: n_cores)
     monkeypatch.setattr(beside, "_ONCE", threading.Lock())
-    assert really_start().wait() == 0
+    assert [process.wait() for process in really_start("0", "12")] == [0] * min(n_cores - 1, 2)
 
 
 def test_what_it_compiles_is_what_a_run_asks_for(monkeypatch):
@@ -130,5 +132,25 @@ def test_what_it_compiles_is_what_a_run_asks_for(monkeypatch):
     fast.simulate(load("moving-cap"), n_particles=1, energy=1e2, seed=1)
     asked = []
     monkeypatch.setattr(entries.follow_particles, "compile", asked.append)
-    following.compile_following()
+    first_run.compile_following()
     assert asked == entries.follow_particles.signatures
+
+
+@pytest.mark.parametrize("n_cores", beside.SHARES)
+def test_all_is_compiled_by_somebody(n_cores):
+    shared = [name for share in beside.SHARES[n_cores] for name in share]
+    wanted = ["careful"] if n_cores == 1 else ["follow", *loops.Loops._fields]
+    assert sorted(shared) == sorted(wanted)
+
+
+def test_a_loop_is_compiled_by_its_name_for_the_scenes_it_is_for(monkeypatch):
+    asked = []
+    monkeypatch.setattr(loops, "address", lambda entry, _: asked.append(entry))
+    first_run.main("1", "12", "aim", "fly", "chord", "bounce", "rebound")
+    assert asked == [
+        loops.AIMS[True],
+        loops.FLIES[True, 12],
+        loops.CHORDS[12],
+        loops.BOUNCES[True],
+        loops.rebound_lanes,
+    ]

@@ -1,9 +1,9 @@
-"""Compiling in two processes at once: numba compiles one function after another, but keeps them on disk.
+"""Compiling in several processes at once: numba compiles one function after another, but keeps them on disk.
 
-A run needs the careful step, its loops and `follow_particles`, which calls those by their addresses and
-takes about as long to compile as they do together. When the careful step is about to be compiled, a second
-process begins with `follow_particles`; this one will find it kept. Whatever goes wrong there, it is compiled
-here as if nobody had tried.
+A run needs the careful step, five loops, and `follow_particles`, which calls those by their addresses and
+takes longer to compile than all but the careful step together. When that is about to be compiled, other
+processes begin with the rest; this one will find it kept. Whatever goes wrong there, it is compiled here as
+if nobody had tried.
 """
 
 from __future__ import annotations
@@ -18,63 +18,90 @@ from typing import Any
 
 from numba.core import event
 
-COMMAND = ("-P", "-m", "fast.following")  # -P: not what lies in the folder that a user happens to be in
-MARK = "OSCILLATING_MUSHROOMS_BESIDE"  # in the second process's environment: it starts no third
+COMMAND = ("-P", "-m", "fast.first_run")  # -P: not what lies in the folder that a user happens to be in
+MARK = "OSCILLATING_MUSHROOMS_BESIDE"  # in the others' environment: they start none
 PATIENCE = 60.0  # seconds beyond our own, after which we go on alone
-_ONCE = threading.Lock()  # taken by the thread that starts the second process, for good
+# Who compiles what, the caller first, so that all are done at about the same time.
+SHARES = {
+    1: [["careful"]],
+    2: [["careful", "aim", "fly", "chord", "rebound"], ["follow", "bounce"]],
+    3: [["careful"], ["follow"], ["fly", "aim", "chord", "bounce", "rebound"]],
+}
+_ONCE = threading.Lock()  # taken by the thread that starts the others, for good
+
+
+def shares() -> list[list[str]]:
+    """Return who compiles what on this machine."""
+    return SHARES[min(os.cpu_count() or 1, max(SHARES))]
+
+
+def own_share() -> list[str]:
+    """Return what the caller compiles."""
+    return shares()[0]
 
 
 class _Beside(event.Listener):  # type: ignore[misc]  # numba has no types
-    """Starts the second process when numba has found an entry not kept, and is about to compile it."""
+    """Starts the others when numba has found an entry not kept, and is about to compile it."""
 
-    def __init__(self, entry: Any) -> None:
-        self._entry = entry
-        self.process: subprocess.Popen[bytes] | None = None
+    def __init__(self, entry: Any, arguments: tuple[str, ...]) -> None:
+        self._entry, self._arguments = entry, arguments
+        self.processes: list[subprocess.Popen[bytes]] = []
 
     def on_start(self, told: Any) -> None:
         """See numba's `Listener`."""
-        if self.process is None and told.data["dispatcher"] is self._entry:
-            self.process = start()
+        if not self.processes and told.data["dispatcher"] is self._entry:
+            self.processes = start(*self._arguments)
 
     def on_end(self, told: Any) -> None:
         """See numba's `Listener`."""
 
 
-def start() -> subprocess.Popen[bytes] | None:
-    """Start the second process, once; None where it would be of no use, or cannot be."""
+def start(*arguments: str) -> list[subprocess.Popen[bytes]]:
+    """Start the other processes, once; none where they would be of no use, or cannot be.
+
+    Args:
+        arguments: which loops are meant by their names; see fast.first_run.
+    """
     is_python = bool(sys.executable) and not getattr(sys, "frozen", False)
-    if not is_python or MARK in os.environ or (os.cpu_count() or 1) < 2 or not _ONCE.acquire(blocking=False):
-        return None
+    others = shares()[1:]
+    if not is_python or MARK in os.environ or not others or not _ONCE.acquire(blocking=False):
+        return []
     nowhere = subprocess.DEVNULL
     found_as_here = os.pathsep.join(place for place in sys.path if isinstance(place, str))
+    started: list[subprocess.Popen[bytes]] = []
     try:
-        return subprocess.Popen(
-            [sys.executable, *COMMAND],
-            stdin=nowhere,
-            stdout=nowhere,
-            stderr=nowhere,
-            env={**os.environ, "PYTHONPATH": found_as_here, MARK: "1"},
-        )
+        for what in others:
+            process = subprocess.Popen(
+                [sys.executable, *COMMAND, *arguments, *what],
+                stdin=nowhere,
+                stdout=nowhere,
+                stderr=nowhere,
+                env={**os.environ, "PYTHONPATH": found_as_here, MARK: "1"},
+            )
+            started.append(process)
     except (OSError, ValueError):
-        return None
+        pass
+    return started
 
 
 @contextmanager
-def compiled_beside(entry: Any) -> Iterator[None]:
-    """Let a second process compile `follow_particles` while the caller compiles, if it does.
+def compiled_beside(entry: Any, *arguments: str) -> Iterator[None]:
+    """Let other processes compile while the caller does, if it does; wait for them.
 
     Args:
-        entry: the dispatcher with whose compilation it begins.
+        entry: the dispatcher with whose compilation they begin.
+        arguments: what they are told.
     """
-    beside = _Beside(entry)
+    beside = _Beside(entry, arguments)
     with event.install_listener("numba:compile", beside):
         try:
             yield
-            if beside.process is not None:
-                beside.process.wait(PATIENCE)
+            for process in beside.processes:
+                process.wait(PATIENCE)
         except subprocess.TimeoutExpired:
             pass
         finally:
-            if beside.process is not None and beside.process.poll() is None:
-                beside.process.kill()
-                beside.process.wait()
+            for process in beside.processes:
+                if process.poll() is None:
+                    process.kill()
+                    process.wait()

@@ -10,6 +10,8 @@ numba converts arguments to the signature that the caller names; `address` sees 
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import cache
 from typing import Any, NamedTuple
 
@@ -17,7 +19,7 @@ from numba import config, njit, types
 from numba.core.typing import Signature
 from numba.core.typing import signature as returns
 
-from fast.kernel.beside import compiled_beside
+from fast.kernel.beside import compiled_beside, own_share
 from fast.kernel.bounces import bounce, rebound
 from fast.kernel.careful import first_step, step
 from fast.kernel.compiling import HOW, SOURCES, caller
@@ -158,18 +160,36 @@ def careful_at() -> Any:
     return address(careful_step, CAREFUL)
 
 
+def compile_loop(name: str, is_slope_moving: bool, degree: int) -> Any:
+    """Compile a loop, of the name it has in Loops, or load it; return its address."""
+    if name == "careful":
+        return careful_at()
+    entry, signature = {
+        "aim": (AIMS[is_slope_moving], AIM),
+        "fly": (FLIES[is_slope_moving, degree], FLY),
+        "chord": (CHORDS[degree], CHORD),
+        "bounce": (BOUNCES[is_slope_moving], BOUNCE),
+        "rebound": (rebound_lanes, REBOUND),
+    }[name]
+    return address(entry, signature)
+
+
+@contextmanager
+def most_compiled(is_slope_moving: bool, degree: int) -> Iterator[None]:
+    """See that all that a run needs is compiled, by several processes where it is not kept.
+
+    What the caller compiles meanwhile saves time as well.
+    """
+    with compiled_beside(careful_step, f"{is_slope_moving:d}", f"{degree}"):
+        for name in own_share():
+            compile_loop(name, is_slope_moving, degree)
+        yield
+
+
 @cache
 def loops_for(is_slope_moving: bool, degree: int) -> Loops:
     """Compile the loops for scenes of such a slope and laws of such a degree, or load them."""
-    with compiled_beside(careful_step):
-        return Loops(
-            careful_at(),
-            address(AIMS[is_slope_moving], AIM),
-            address(FLIES[is_slope_moving, degree], FLY),
-            address(CHORDS[degree], CHORD),
-            address(BOUNCES[is_slope_moving], BOUNCE),
-            address(rebound_lanes, REBOUND),
-        )
+    return Loops(*(compile_loop(name, is_slope_moving, degree) for name in Loops._fields))
 
 
 def loops_of(in_lanes: LawsInLanes) -> Loops:

@@ -143,6 +143,8 @@ class Flight:
 
     def first_root(self, wall: Wall, start: float, end: float) -> float | None:
         """Return the first s at which f turns negative, proved first by the bound on f''."""
+        if wall == "arc" and min(self.bounds["r"].highest, hypot(self.vx, self.vy) or LEAST) < LEAST:
+            raise Open("the cap is smaller, or the particle slower, than 2^-500: squares vanish")
         bend = self.bend(wall)
         if wall == self.wall:  # f(s) >= f'(0) s - bend s^2 / 2 > 0 up to twice this time
             start = max(start, self.f(wall, 0.0)[1] / bend if bend else inf)
@@ -282,8 +284,6 @@ class Flight:
             return Rejected(f"state {where} is not on wall {wall}")
         if self.y == 0 and wall not in (None, "base"):
             return Undecided("the state is in a corner within rounding")
-        if "r" in self.bounds and min(self.bounds["r"].highest, hypot(self.vx, self.vy) or LEAST) < LEAST:
-            return Undecided("the cap is smaller, or the particle slower, than 2^-500: squares vanish")
         for near in self.walls_near(in_cap=self.is_in_cap):
             if near != wall and self.f(near, 0.0)[0] < -self.noise(near, 0.0):
                 if self.is_along_base(near):

@@ -223,10 +223,12 @@ def _span(scene: Scene, alarm: float) -> float:
 
 
 def check_work_identity(flow: Flowing, scene: Scene, *, n_particles: int, kT: float, seed: int = 0) -> None:
-    """Raise AssertionError, in one line, where `work_identity` is not met."""
+    """Raise AssertionError, in one line, where `work_identity` is not met, or too many are lost to tell."""
     for finding in work_identity(flow, scene, n_particles=n_particles, kT=kT, seed=seed):
         if not finding.is_met:
             raise AssertionError(f"work identity: {finding}")
+        if finding.lost and not finding.has_power:
+            raise AssertionError(f"work identity: {finding}: {finding.alternative:g} would have done as well")
 
 
 def margin(x: Floats, bound: float, alarm: float) -> float:

@@ -1,9 +1,9 @@
 """Exact properties of the billiard, to hold any Python stepper to, with no certified answer at hand.
 
 A check takes a stepper, a question and raises AssertionError, in one line, when the answer breaks the
-property. It returns True when it compared numbers and False when it had nothing to say: the outcome
-is undecided or undefined, the property is not about this table, or the question is so delicate that nudging
-it changes the wall. In a Hypothesis test:
+property, or is no outcome of this scene at all. It returns True when it compared numbers and False when it
+had nothing to say: the outcome is undecided, undefined or rejected, the property is not about this table, or
+the question is so delicate that nudging it changes the wall. In a Hypothesis test:
 
     @given(conformance.strategies.scenes_and_states())
     def test_mirror(drawn):
@@ -18,7 +18,6 @@ identity, a property of whole ensembles, is `conformance.profiles.check_work_ide
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Sequence
 from fractions import Fraction
 from functools import partial
@@ -27,8 +26,9 @@ from math import hypot
 import msgspec
 
 from conformance.grading import sensitivity
+from conformance.grading.called import answering, fail
 from conformance.grading.sensitivity import measured, numbers
-from scene import Collision, Horizon, Outcome, Rejected, Scene, State, Undecided, to_data, transforms
+from scene import Collision, Horizon, Outcome, Rejected, Scene, State, Undecided, transforms
 from scene.laws import is_constant
 from scene.precision import decimals
 from scene.states import Stepper
@@ -60,6 +60,7 @@ def check_mirror(
     Raises:
         AssertionError: one line: what differs, and the question.
     """
+    stepper = answering(stepper)
     answer = stepper(scene, state, t_end)
     image = stepper(scene, transforms.mirrored(state), t_end)
     expected = _changed(answer, (1, 1, -1, 1, -1, 1), transforms.mirrored_wall)
@@ -82,6 +83,7 @@ def check_scaling(
     Bit for bit as long as all numbers, before and after, lie between 2^-400 and 2^400 in size or are 0;
     elsewhere nothing is compared. Arguments and results otherwise as in `check_mirror`.
     """
+    stepper = answering(stepper)
     unit, size, speed = (transforms.times_power(1.0, exponent) for exponent in (time, length, length - time))
     answer = stepper(scene, state, t_end)
     inputs = [t_end, state.t, state.x, state.y, state.vx, state.vy, *(numbers(answer, state) or ())]
@@ -101,6 +103,7 @@ def check_static_limit(
 
     Bit for bit where a law's value is its mean plus a sum of zeros. See `check_mirror`.
     """
+    stepper = answering(stepper)
     still = transforms.frozen(scene, state.t)
     answer = stepper(still, state, t_end)
     idle = stepper(transforms.idle(still), state, t_end)
@@ -121,6 +124,7 @@ def check_period_shift(
     The shifted times are rounded: by how much is known, and enters as an error of t. `is_exact` asks for
     equal bits where nothing is rounded at all. See `check_mirror`.
     """
+    stepper = answering(stepper)
     shared, answer = period(scene), stepper(scene, state, t_end)
     if shared is None or not isinstance(answer, Collision | Horizon):
         return False
@@ -145,6 +149,7 @@ def check_split_flight(
     stepper: Stepper, scene: Scene, state: State, t_end: float, *, bound: float = BOUND
 ) -> bool:
     """Hold a flight that is stopped halfway and taken up again to meet the same wall. See `check_mirror`."""
+    stepper = answering(stepper)
     whole = measured(stepper, scene, state, t_end, bound)
     if whole is None or not isinstance(whole.outcome, Collision):
         return False
@@ -153,12 +158,12 @@ def check_split_flight(
     if half is None or middle == state.t:
         return False
     if not isinstance(half.outcome, Horizon):
-        _fail("split flight", f"{half.outcome} before half of the flight", scene, state, t_end)
+        fail("split flight", f"{half.outcome} before half of the flight", scene, state, t_end)
     rest = measured(stepper, scene, half.state(), t_end, bound, half.errors[1:])
     if rest is None:
         return False
     if not isinstance(rest.outcome, Collision) or rest.outcome.wall != whole.outcome.wall:
-        _fail("split flight", f"then {rest.outcome}, at once {whole.outcome}", scene, state, t_end)
+        fail("split flight", f"then {rest.outcome}, at once {whole.outcome}", scene, state, t_end)
     taken = float(Fraction(middle) - Fraction(state.t)) + rest.numbers[0]
     allowed = [a + b for a, b in zip(whole.errors, rest.errors, strict=True)]
     _near("split flight", (taken, *rest.numbers[1:]), whole.numbers, allowed, scene, state, t_end)
@@ -174,11 +179,12 @@ def check_reversal(
     then back to half of the first. The errors granted are carried along through every step. See
     `check_mirror`.
     """
+    stepper = answering(stepper)
     there = measured(stepper, scene, state, t_end, bound)
     if there is None or not isinstance(there.outcome, Collision):
         return False
     if isinstance(refusal := stepper(scene, there.state(), max(t_end, there.outcome.t)), Rejected):
-        _fail("time reversal", f"{there.outcome} leads nowhere: {refusal.reason}", scene, state, t_end)
+        fail("time reversal", f"{there.outcome} leads nowhere: {refusal.reason}", scene, state, t_end)
     way = _across_bounce(stepper, scene, state, t_end)
     if way is None:
         return False
@@ -192,7 +198,7 @@ def check_reversal(
     if back is None:
         return False
     if not isinstance(back.outcome, Collision) or back.outcome.wall != hit.wall:
-        _fail("time reversal", f"{hit.wall} there, {back.outcome} on the way back", scene, state, t_end)
+        fail("time reversal", f"{hit.wall} there, {back.outcome} on the way back", scene, state, t_end)
     home = measured(stepper, film, back.state(), -begin.t, bound, back.errors[1:])
     if home is None or not isinstance(home.outcome, Horizon):
         return False
@@ -209,6 +215,7 @@ def check_angular_momentum(
 
     Where the base is met it changes sign, at rest as it is. Other walls are not compared.
     """
+    stepper = answering(stepper)
     step = measured(stepper, scene, state, t_end, bound)
     if step is None or not isinstance(step.outcome, Collision) or step.outcome.wall not in ("arc", "base"):
         return False
@@ -221,19 +228,20 @@ def check_angular_momentum(
     allowed += bound * hypot(state.x, state.y) * hypot(state.vx, state.vy)
     if not abs(after - before) <= SLACK * allowed:
         text = f"x vy - y vx = {before!r} before and {after!r} after {step.outcome.wall}"
-        _fail("angular momentum", text, scene, state, t_end)
+        fail("angular momentum", text, scene, state, t_end)
     return True
 
 
 def check_energy(stepper: Stepper, scene: Scene, state: State, t_end: float, *, bound: float = BOUND) -> bool:
     """Hold the speed to stay in a static table, whatever is met."""
+    stepper = answering(stepper)
     answer = stepper(scene, state, t_end)
     found = numbers(answer, state)
     if found is None or not all(is_constant(law) for law in laws(scene).values()):
         return False
     before, after = hypot(state.vx, state.vy), hypot(*found[4:])
     if not abs(after - before) <= SLACK * bound * before:
-        _fail("energy", f"speed {before!r} becomes {after!r} in a static table", scene, state, t_end)
+        fail("energy", f"speed {before!r} becomes {after!r} in a static table", scene, state, t_end)
     return True
 
 
@@ -245,6 +253,7 @@ def check_symplectic(
     Its matrix M is taken by central differences of two widths, extrapolated; their difference bounds what
     is left. M^T J M = J must hold within that, and within `bound` over the width.
     """
+    stepper = answering(stepper)
     way = _across_bounce(stepper, scene, state, t_end)
     if way is None:
         return False
@@ -267,7 +276,7 @@ def check_symplectic(
             wanted = {(2, 0): -1.0, (3, 1): -1.0}.get((i, j), 0.0)
             if not abs(form - wanted) <= allowed:
                 text = f"(M^T J M)[{i}][{j}] = {form:.9g}, must be {wanted:g} within {allowed:.3g}"
-                _fail("symplectic", text, scene, state, t_end)
+                fail("symplectic", text, scene, state, t_end)
     return True
 
 
@@ -362,7 +371,7 @@ def _compare(
             return False
         allowed = [2 * error for error in step.errors]
     if not is_same:
-        _fail(name, f"{answer}, must be {expected}", scene, state, t_end)
+        fail(name, f"{answer}, must be {expected}", scene, state, t_end)
     found, wanted = numbers(answer, state), numbers(expected, state)
     if found is None or wanted is None:
         return False
@@ -382,10 +391,4 @@ def _near(
     for part, a, b, error in zip(NAMES, found, wanted, allowed, strict=True):
         if not abs(a - b) <= SLACK * error:
             within = f" within {SLACK * error:.3g}" if error else ""
-            _fail(name, f"{part} = {a!r}, must be {b!r}{within}", scene, state, t_end)
-
-
-def _fail(name: str, text: str, scene: Scene, state: State, t_end: float) -> None:
-    asked = {"scene": to_data(scene), "state": msgspec.structs.asdict(state), "t_end": t_end}
-    line = {"cmd": "step", "seq": 1, **asked}
-    raise AssertionError(f"{name}: {text}; {json.dumps(line)}")
+            fail(name, f"{part} = {a!r}, must be {b!r}{within}", scene, state, t_end)

@@ -6,7 +6,6 @@ import json
 import math
 import re
 import sys
-from contextlib import ExitStack
 from functools import partial
 from pathlib import Path
 
@@ -17,7 +16,7 @@ from support.truth import proved_step
 
 import fast
 from conformance import plain, vectors
-from conformance.bench import comparison, contenders, growth, hard_cases, measure, record, work, workloads
+from conformance.bench import comparison, growth, hard_cases, measure, record, work, workloads
 from conformance.bench.contenders import Contender, Lap, by_call
 from conformance.bench.time_stepping import next_collision_by
 from conformance.suite.process import Trouble
@@ -143,45 +142,23 @@ def test_time_stepping_is_right_where_it_is_easy_and_wrong_where_it_skips(drawn)
     assert max(errors) > 0.5
 
 
-def test_commands_time_themselves_and_their_troubles_are_told(drawn):
-    with ExitStack() as stack:
-        able, _ = contenders.by_command("fast", "command", [sys.executable, "-m", "fast"], stack)
-        unable, _ = contenders.by_command(
-            "plain", "command", [sys.executable, "-m", "conformance.plain"], stack
-        )
-        points, troubles = tried(drawn["breathing-disk"], able, unable)
-    assert [p.contender for p in points] == ["fast"]
-    assert points[0].right == 3
-    assert min(points[0].ns) > 0
-    assert troubles["plain"].startswith("unsupported")
-
-
-IMPOSTOR = """
-import json, sys
-for line in sys.stdin:
-    asked = json.loads(line)
-    if asked["cmd"] == "start":
-        every = {"profiles": ["step", "time"], "tables": ["cap"], "laws": ["constant", "fourier"]}
-        answer = {"protocol": 1, "name": "impostor", "version": "1", "language": "Python", **every}
-    elif asked["cmd"] == "time":
-        answer = {"seq": asked["seq"], "ns": NS, "steps": STEPS}
-    print(json.dumps(answer), flush=True)
-"""
-
-
-@pytest.mark.parametrize(
-    ("ns", "steps"),
-    [("[]", "[]"), ("[0] * asked['repeat']", "[{'outcome': 'undecided', 'reason': ''}]"), ("[5]", "[]")],
-)
-def test_a_command_that_times_nothing_is_left_out(drawn, tmp_path, ns, steps):
-    (tmp_path / "impostor.py").write_text(IMPOSTOR.replace("NS", ns).replace("STEPS", steps))
-    with ExitStack() as stack:
-        impostor, _ = contenders.by_command(
-            "it", "command", [sys.executable, str(tmp_path / "impostor.py")], stack
-        )
-        points, troubles = tried(drawn["breathing-disk"], impostor)
+def test_a_clock_that_never_ticks_says_no_speed(drawn):
+    still = Contender("still", "command", lambda *_: Lap(0.0, [Undecided("")] * 3, 0.0))
+    points, troubles = tried(drawn["slow"], still)
     assert not points
-    assert troubles["it"].startswith("fail: a time request is answered")
+    assert troubles == {"still": "fail: a lap is said to last 0 ns in all"}
+
+
+def test_a_place_beyond_all_numbers_is_kept(drawn):
+    largest = sys.float_info.max
+
+    def far(*question):
+        return Collision(fast.next_collision(*question).wall, *[largest, -largest] * 3)
+
+    (point,) = measured(drawn["breathing-disk"], by_call("far", "compiled", far))
+    assert (point.right, point.relative) == (3, (1e308,) * 3)
+    kept = msgspec.json.decode(msgspec.json.encode(point), type=record.Point)
+    assert kept == point
 
 
 def test_a_contender_that_changes_its_answers_is_left_out(drawn):

@@ -17,7 +17,7 @@ from conformance import plain
 from conformance.grading.agreement import compare
 from conformance.plain.motion import BangBangMotion, FourierMotion
 from conformance.strategies import scenes_and_states
-from scene import Fourier, Horizon, Rejected, State, Undecided
+from scene import Cap, Collision, Fourier, Horizon, Rejected, State, Undecided
 
 N_STEPS = 150  # the corpus asks many more
 BOUND = 1024.0  # backward ulps; the worst of 2,500 steps was 218, at a slow particle before a fast wall
@@ -79,6 +79,30 @@ def test_legs_close_after_any_period(t, s):
 )
 def test_what_it_does_not_answer_it_says(scene, state, kind):
     assert isinstance(plain.next_collision(scene, state, 1.9), kind)
+
+
+@pytest.mark.parametrize("sign", [-1.0, 1.0])
+@pytest.mark.parametrize("ulps", range(-3, 4))
+def test_the_wall_being_left_met_again_at_the_horizon(sign, ulps):
+    """A diameter: the arc is met again after exactly one unit of time, which is not before t_end = 1."""
+    start = State(0.0, -sign, 2.0**-53, 2.0 * sign, 0.0, "arc")
+    t_end = 1.0 + ulps * 2.0**-52
+    assert isinstance(plain.next_collision(CIRCLE, start, t_end), Undecided)
+    assert isinstance(plain.next_collision(CIRCLE, start, 1.001), Collision)
+    assert isinstance(plain.next_collision(CIRCLE, start, 0.999), Horizon)
+    assert isinstance(plain.next_collision(CIRCLE, start, 2.0**-40), Horizon)
+    assert isinstance(plain.next_collision(CIRCLE, start, 0.0), Horizon)
+
+
+@pytest.mark.parametrize(
+    ("length", "speed"), [(-350, -636), (-400, -700), (-1000, -1000), (-600, -300), (0, -600)]
+)
+def test_a_hit_is_not_lost_where_squares_vanish(length, speed):
+    """The gap of the arc is one of squares: with v^2 = 0 no hit of it is seen."""
+    r, v = 2.0**length, 2.0**speed
+    for start in (State(0.0, r / 4, r / 2, -0.75 * v, v), State(0.0, 0.75 * r, 0.0, 0.0, v, "base")):
+        for t_end in (1.5 * r / v, 4.0 * r / v):
+            assert not isinstance(plain.next_collision(Cap(r=r), start, t_end), Horizon)
 
 
 def test_trajectory_ends_at_the_horizon():

@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 import re
 
+import msgspec
+import numpy as np
 import pytest
 from hypothesis import given, settings
 from support import tables
@@ -16,7 +18,7 @@ from conformance.mutants import MUTANTS
 from conformance.profiles import check_work_identity
 from conformance.properties import PROPERTIES, check_mirror, check_period_shift, check_scaling
 from conformance.strategies import scenes_and_states
-from scene import Collision, Fourier, Mushroom, State, Stem, Undecided, load, transforms
+from scene import Collision, Fourier, Horizon, Mushroom, State, Stem, Undecided, load, transforms
 from scene.laws import is_constant
 from scene.tables import laws, period
 
@@ -137,6 +139,48 @@ def test_period_shift_is_exact_where_the_period_is():
         check_period_shift(MUTANTS["root-in-absolute-time"].step, *LIFT, is_exact=True)
 
 
+NO_OUTCOMES = {
+    "nothing": lambda _: None,
+    "a tuple": lambda _: ("arc", 0.5),
+    "an array": lambda _: np.zeros(7),
+    "a class": lambda _: Undecided,
+    "a wall elsewhere": lambda c: msgspec.structs.replace(c, wall="roof"),
+    "no wall": lambda c: msgspec.structs.replace(c, wall=None),
+    "nan": lambda c: msgspec.structs.replace(c, dt=math.nan),
+    "infinity": lambda c: msgspec.structs.replace(c, vx=-math.inf),
+    "no number": lambda c: msgspec.structs.replace(c, x=None),
+    "a text": lambda c: msgspec.structs.replace(c, x="0.5"),
+    "an integer beyond all floats": lambda c: msgspec.structs.replace(c, t=10**400),
+    "a horizon nowhere": lambda c: Horizon(c.t, math.nan, c.y, c.vx, c.vy),
+}
+
+
+@pytest.mark.parametrize("name", PROPERTIES)
+@pytest.mark.parametrize("no_outcome", NO_OUTCOMES.values(), ids=NO_OUTCOMES)
+def test_what_is_no_outcome_is_refused(name, no_outcome):
+    """It is nothing to compare: a stepper that forgets to return would hold every property."""
+
+    def stepper(*question):
+        return no_outcome(plain.next_collision(*question))
+
+    with pytest.raises(AssertionError) as refusal:
+        PROPERTIES[name](stepper, *LIFT)
+    assert re.fullmatch(r"outcome: .*, must be .*; \{\"cmd\": \"step\".*\}", str(refusal.value))
+
+
+def test_numbers_of_other_kinds_are_taken():
+    def in_numpy(*question):
+        found = plain.next_collision(*question)
+        parts = {
+            field: np.float64(getattr(found, field)) for field in found.__struct_fields__ if field != "wall"
+        }
+        return msgspec.structs.replace(found, **parts)
+
+    assert [check(in_numpy, *LIFT) for check in PROPERTIES.values()] == [
+        check(plain.next_collision, *LIFT) for check in PROPERTIES.values()
+    ]
+
+
 def test_an_undecided_answer_is_not_compared():
     corner = (tables.CIRCLE, State(0.0, 0.5, 0.5, 0.5, -0.5), 9.0)
     assert not any(check(plain.next_collision, *corner) for check in PROPERTIES.values())
@@ -148,6 +192,20 @@ def test_a_flow_that_loses_everybody_does_not_keep_the_work_identity():
 
     with pytest.raises(AssertionError, match="nan"):
         check_work_identity(lost, load("breathing-circle"), n_particles=20, kT=100.0)
+
+
+def test_a_flow_must_not_lose_so_many_that_anything_would_do():
+    def standing(_scene, states, t_end):
+        return [(Horizon(t_end, s.x, s.y, s.vx, s.vy), None) for s in states]
+
+    def lost(scene, states, t_end):
+        arrived = standing(scene, states, t_end)
+        return [at if i % 2 else (Undecided("shy"), None) for i, at in enumerate(arrived)]
+
+    with pytest.raises(AssertionError, match="0 lost"):
+        check_work_identity(standing, load("breathing-circle"), n_particles=4000, kT=100.0)
+    with pytest.raises(AssertionError, match=r"2000 lost.* would have done as well"):
+        check_work_identity(lost, load("breathing-circle"), n_particles=4000, kT=100.0)
 
 
 def test_transforms_keep_the_physics():

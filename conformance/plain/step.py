@@ -40,6 +40,7 @@ from scene.tables import laws
 
 ROUNDING = 2.0**-48  # f and f' are sums of a few terms, each rounded to some 2^-52 of its size
 LARGEST = 2.0**400  # squares of greater numbers overflow
+LEAST = 2.0**-500  # squares of smaller ones vanish: f'' of the arc would be 0, and every hit excluded
 MAX_PARTS = 20_000  # intervals looked at for one wall
 SIDES: tuple[Wall, ...] = ("left", "right", "floor")
 
@@ -108,6 +109,7 @@ class Flight:
         elif self.crossing < inf:
             near = (*near, "base")  # a tie of hit and crossing is a corner
         self.require_clear(near, self.end if self.is_horizon else 0.0)
+        self.require_clear_of_own(near)
         if hit is None:
             return self.horizon()
         wall, s = hit
@@ -141,6 +143,8 @@ class Flight:
 
     def first_root(self, wall: Wall, start: float, end: float) -> float | None:
         """Return the first s at which f turns negative, proved first by the bound on f''."""
+        if wall == "arc" and min(self.bounds["r"].highest, hypot(self.vx, self.vy) or LEAST) < LEAST:
+            raise Open("the cap is smaller, or the particle slower, than 2^-500: squares vanish")
         bend = self.bend(wall)
         if wall == self.wall:  # f(s) >= f'(0) s - bend s^2 / 2 > 0 up to twice this time
             start = max(start, self.f(wall, 0.0)[1] / bend if bend else inf)
@@ -254,6 +258,14 @@ class Flight:
         for wall in walls:
             if wall != self.wall and abs(self.f(wall, s)[0]) <= self.noise(wall, s):
                 raise Open(f"at s = {s!r} the particle is on wall {wall} within rounding")
+
+    def require_clear_of_own(self, near: Sequence[Wall]) -> None:
+        """Leave open whether the wall being left is met again before t_end, where rounding decides it."""
+        if self.wall is None or self.wall not in near or not (self.is_horizon and self.end):
+            return
+        f, slope = self.f(self.wall, self.end)
+        if abs(f) <= ROUNDING * self.end * abs(slope):
+            raise Open(f"wall {self.wall} is met again at t_end within rounding")
 
     def escape(self) -> float:
         """Return a time by which no table is large enough to have kept the particle."""

@@ -11,10 +11,11 @@ import pytest
 
 from conformance import suite, vectors
 from conformance.suite.disguise import Disguise, drawn_disguise
+from conformance.suite.process import CommandNotFound, Trouble
 from conformance.suite.run import NEW_SEEDS
 from conformance.suite.session import Limits, Session
 from conformance.vectors import Vector
-from scene.refusal import check_seed
+from scene.refusal import BadInput, check_seed
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -27,11 +28,21 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Draw a seed where none is given, the same for every worker of a run."""
-    if config.option.mushrooms_seed is None:
+    """Refuse bad options, and draw a seed where none is given, the same for every worker of a run."""
+    given = config.option
+    if given.mushrooms_seed is None:
         inherited = getattr(config, "workerinput", {}).get("mushrooms_seed")
-        config.option.mushrooms_seed = secrets.randbelow(NEW_SEEDS) if inherited is None else inherited
-    check_seed(config.option.mushrooms_seed, "--mushrooms-seed")
+        given.mushrooms_seed = secrets.randbelow(NEW_SEEDS) if inherited is None else inherited
+    try:
+        check_seed(given.mushrooms_seed, "--mushrooms-seed")
+    except BadInput as error:
+        raise pytest.UsageError(str(error)) from None
+    if not given.mushrooms_timeout > 0:
+        raise pytest.UsageError(f"--mushrooms-timeout = {given.mushrooms_timeout}, must be above 0 seconds")
+    try:
+        shlex.split(given.mushrooms_command or "")
+    except ValueError as error:
+        raise pytest.UsageError(f"--mushrooms-command = {given.mushrooms_command!r}: {error}") from None
 
 
 def pytest_report_header(config: pytest.Config) -> str:
@@ -61,11 +72,14 @@ def mushrooms_disguise(request: pytest.FixtureRequest, mushrooms_vector: Vector)
 @pytest.fixture(scope="session")
 def mushrooms_session(request: pytest.FixtureRequest) -> Iterator[Session]:
     """Open a session with the command, its numbers proved to travel unharmed."""
-    command = request.config.getoption("--mushrooms-command")
+    command = shlex.split(request.config.getoption("--mushrooms-command") or "")
     if not command:
         pytest.fail("give the stepper as --mushrooms-command", pytrace=False)
     limits = Limits(timeout=request.config.getoption("--mushrooms-timeout"))
-    with Session(shlex.split(command), limits) as session:
-        session.start()
-        session.probe()
+    with Session(command, limits) as session:
+        try:
+            session.start()
+            session.probe()
+        except (CommandNotFound, Trouble) as trouble:
+            pytest.fail(str(trouble), pytrace=False)
         yield session

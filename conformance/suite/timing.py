@@ -21,7 +21,7 @@ from conformance.suite.answers import read_outcome
 from conformance.suite.process import Trouble
 from conformance.suite.questions import MOVING, distance, last_collision, off_wall, offered, question
 from conformance.suite.session import Session
-from scene import Collision, Mushroom, Scene, State, Stem, Undecided
+from scene import Collision, Mushroom, Outcome, Scene, State, Stem, Undecided
 
 N_STEPS = 60  # collisions of the trajectory that `time` and `trajectory` both follow
 NEAR = 1e-6  # of sizes; see conformance.suite.promises
@@ -61,20 +61,39 @@ def timed(session: Session, scene: Scene, state: State, n: int, repeat: int) -> 
 
 def read_timing(answer: Mapping[str, Any], repeat: int, seconds: float) -> Timing:
     """Read an answer to `time`; see `timed`."""
+    ns, last = read_repeats(answer, repeat, seconds, 0.0)
+    if isinstance(last, Undecided):
+        raise Trouble("declined", f"undecided: {last.reason}")
+    if not isinstance(last, Collision):
+        raise Trouble("fail", f"a trajectory that goes on for ever ends with {last}")
+    return Timing(ns, seconds, last)
+
+
+def read_repeats(
+    answer: Mapping[str, Any], repeat: int, seconds: float, t: float
+) -> tuple[list[int], Outcome]:
+    """Read the nanoseconds and the last outcome, whatever it is, of an answer to `time`.
+
+    Args:
+        answer: as `Session.ask` returns it.
+        repeat: as asked for.
+        seconds: that the answer took to come.
+        t: when the last flight began, or any time where the flight time is not looked at.
+
+    Raises:
+        Trouble: error, when that is the answer; fail, when it is no timing of so many repeats, or they
+            cannot have taken place in that time.
+    """
     if "error" in answer:
         raise Trouble("error", answer["error"])
     ns, steps = answer.get("ns"), answer.get("steps")
     if ns is None or steps is None or len(ns) != repeat or len(steps) != 1:
         raise Trouble("fail", f"{repeat} repeats are answered {answer}"[:300])
-    last = read_outcome(steps[0], 0.0)
-    if isinstance(last, Undecided):
-        raise Trouble("declined", f"undecided: {last.reason}")
-    if not isinstance(last, Collision):
-        raise Trouble("fail", f"a trajectory that goes on for ever ends with {last}")
+    last = read_outcome(steps[0], t)
     if sum(ns) > DRIFT * 1e9 * seconds:
         waited = f"the answer came after {1e9 * seconds:.0f} ns"
         raise Trouble("fail", f"{repeat} repeats are said to last {sum(ns)} ns in all, and {waited}")
-    return Timing(list(ns), seconds, last)
+    return list(ns), last
 
 
 def check_last(session: Session, scene: Scene, state: State, n: int, last: Collision) -> None:

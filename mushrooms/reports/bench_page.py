@@ -67,7 +67,7 @@ def to_markdown(record: Record, workload: str) -> str:
     rows = [head, ("---",) * len(head)]
     rows += [
         (
-            p.contender,
+            p.contender.replace("|", "\\|"),
             f"{statistics.median(p.ns):,.0f}",
             middle_and_worst(p.ulps, ".2g")[1],
             middle_and_worst(p.relative, ".0e")[1],

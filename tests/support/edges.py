@@ -8,6 +8,11 @@ from typing import Any
 Line = dict[str, Any]
 START = {"t": 5.0, "x": 0.25, "y": 0.5, "vx": 0.5, "vy": 1.0, "wall": None}
 HERE = {"outcome": "horizon", **{name: START[name] for name in ("t", "x", "y", "vx", "vy")}}
+TINY = {
+    "scene": {"table": "cap", "r": 2.0**-350},
+    "state": {"t": 0.0, "x": 0.75 * 2.0**-350, "y": 0.0, "vx": 0.0, "vy": 2.0**-636, "wall": "base"},
+    "t_end": 1.5 * 2.0**286,
+}
 BASE = {"scene": {"table": "cap", "r": 1.0}, "state": START, "t_end": 9.0}
 REFUSED = {"outcome": "rejected"}
 
@@ -38,6 +43,8 @@ EDGES: list[tuple[Line, list[Line]]] = [
     (asked("flow", states=[]), [REFUSED, {"states": []}]),
     # What overflows is left open, or beyond the bounds that a stepper names; the process lives on.
     (asked("step", state={**START, "vx": 1.7e308, "vy": 1.7e308}), [{"outcome": "undecided"}, REFUSED]),
+    # So is what vanishes: the square of this speed is 0, and the arc is met all the same.
+    (asked("step", **TINY), [{"outcome": "collision", "wall": "arc"}, {"outcome": "undecided"}, REFUSED]),
 ]
 
 

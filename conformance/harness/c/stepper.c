@@ -24,6 +24,7 @@ static const char *const WALLS[] = {"arc", "base", "left", "right", "floor"};
 static const double U = 0x1p-53;    /* a rounding error */
 static const double SLACK = 16.0;   /* how many of them one evaluation of f may add up */
 static const double LARGEST = 1e100; /* beyond it squares might overflow */
+static const double LEAST = 1e-150; /* below it they vanish, and with them hits of the arc */
 
 typedef struct { double frequency, cos, sin; } Wave;
 typedef struct { double start, length, value, rate, acceleration; } Piece;
@@ -303,6 +304,9 @@ static Event step(Flight *flight, const Table *table, State *state, double t_end
     }
     if (fmax(fmax(fabs(q.x), fabs(q.y)), fmax(fabs(q.vx), fabs(q.vy))) > LARGEST)
         stop(flight, UNDECIDED, "numbers beyond 1e100 may overflow");
+    double speed = fmax(fabs(q.vx), fabs(q.vy));
+    if ((table->kind & CAP) && (flight->r < LEAST || (speed > 0 && speed < LEAST)))
+        stop(flight, UNDECIDED, "squares of numbers below 1e-150 may vanish");
     check_wall(flight);
     Event event = first_hit(flight, t_end - q.t);
     double s = event.s, nx = 0, ny = table->kind == STEM && event.wall == BASE ? -1 : 1, rate;

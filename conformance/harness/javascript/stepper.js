@@ -16,6 +16,7 @@ const SLACK = 16; // rounding errors that one evaluation of f may add up, in uni
 const MAX_STEPS = 20000;
 const N_SAMPLES = 512;
 const LARGEST = 1e100; // beyond it squares might overflow
+const LEAST = 1e-150; // below it they vanish, and with them hits of the arc
 const WALLS = { cap: ["arc", "base"], stem: ["left", "right", "floor", "base"] };
 WALLS.mushroom = ["arc", "base", "left", "right", "floor"];
 const { abs, sqrt, sin, cos, max, min, hypot } = Math;
@@ -336,6 +337,9 @@ function step(table, state, tEnd) {
   const flight = new Flight(table, state);
   const { t, x, y, vx, vy } = state;
   if (max(abs(x), abs(y), abs(vx), abs(vy)) > LARGEST) throw new Open(`numbers beyond ${LARGEST} may overflow`);
+  const speed = max(abs(vx), abs(vy));
+  const isTiny = table.r?.at(t) < LEAST || (speed > 0 && speed < LEAST);
+  if (table.r && isTiny) throw new Open(`squares of numbers below ${LEAST} may vanish`);
   flight.checkWall();
   const { kind, s, slope } = flight.firstHit(tEnd - t);
   const [X, Y] = [x + s * vx, y + s * vy];

@@ -6,8 +6,10 @@ import json
 import math
 import subprocess
 import sys
+from fractions import Fraction
 from pathlib import Path
 
+import numpy as np
 import pytest
 from hypothesis import given, settings
 from support.tables import BOX, CIRCLE, LIFT, STATIC
@@ -92,6 +94,22 @@ def test_the_wall_being_left_met_again_at_the_horizon(sign, ulps):
     assert isinstance(plain.next_collision(CIRCLE, start, 0.999), Horizon)
     assert isinstance(plain.next_collision(CIRCLE, start, 2.0**-40), Horizon)
     assert isinstance(plain.next_collision(CIRCLE, start, 0.0), Horizon)
+
+
+@pytest.mark.parametrize("exponent", [-3, -10, -20])
+def test_a_flat_chord_that_ends_at_the_horizon(exponent):
+    """There f is a small difference of its terms, and so is f'."""
+    inward = 2.0**exponent
+    for angle in np.linspace(0.8, 2.3, 24):
+        x, y = float(np.cos(angle)), float(np.sin(angle))
+        start = State(0.0, x, y, -y - inward * x, x - inward * y, "arc")
+        x_is, vx_is, y_is, vy_is = map(Fraction, (x, start.vx, y, start.vy))
+        again = float(-2 * (x_is * vx_is + y_is * vy_is) / (vx_is**2 + vy_is**2))
+        for ulps in (-3, -1, 0, 1, 3):
+            t_end = again * (1.0 + ulps * 2.0**-52)
+            assert isinstance(plain.next_collision(CIRCLE, start, t_end), Undecided)
+        assert isinstance(plain.next_collision(CIRCLE, start, 1.001 * again), Collision)
+        assert isinstance(plain.next_collision(CIRCLE, start, 0.999 * again), Horizon)
 
 
 @pytest.mark.parametrize(

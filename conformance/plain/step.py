@@ -263,8 +263,10 @@ class Flight:
         """Leave open whether the wall being left is met again before t_end, where rounding decides it."""
         if self.wall is None or self.wall not in near or not (self.is_horizon and self.end):
             return
-        f, slope = self.f(self.wall, self.end)
-        if abs(f) <= ROUNDING * self.end * abs(slope):
+        # Its f is 0 now, by definition: what rounding has changed since is that of the terms of f'.
+        gap = self.gap(self.wall, self.end)
+        terms = abs(gap.ft) + abs(gap.fx * self.vx) + abs(gap.fy * self.vy)
+        if abs(self.f(self.wall, self.end)[0]) <= ROUNDING * self.end * terms:
             raise Open(f"wall {self.wall} is met again at t_end within rounding")
 
     def escape(self) -> float:

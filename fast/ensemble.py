@@ -113,7 +113,8 @@ class Ensemble(NamedTuple):
         Where nu is always below 1 some particles are never free: in every slot a stay, one that is on when
         the last cycle ends, and no collision with the stem's walls. No cycle captures or releases them, and
         the theory leaves them out. Slow particles that were captured and released, and have not come down
-        into the stem before the end, take part.
+        into the stem before the end, take part; but where the mouth is narrow at the end, those that it has
+        captured again by then look as if they were never free.
         """
         was_followed: npt.NDArray[np.bool_] = self.outcome == FOLLOWED
         if self.t_in.shape[2] == 0:

@@ -59,7 +59,7 @@ def laws_in_lanes(scene: Scene) -> LawsInLanes:
 
 
 def known_in_lanes(scene: Scene) -> LawsInLanes:
-    """Return the same where nothing is to be followed."""
+    """Return what `laws_in_lanes` does, and see to no compiled loops: where nothing is to be followed."""
     compiled = compile_scene(scene)
     degree = degree_of(compiled)
     pieces = pieces_of(compiled, degree)

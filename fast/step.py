@@ -70,22 +70,22 @@ def next_collision(scene: Scene, state: State, t_end: float) -> Outcome:
 
     Source: Gelfreich, Rom-Kedar, Turaev (2014), sec. 3.1.
     """
-    asked = latest[0]
-    if asked is None or asked.scene is not scene:
+    known = latest[0]
+    if known is None or known.scene is not scene:
         check_scene(scene)
-        asked = None
+        known = None
     try:
         t_end = t_end if type(t_end) is float else check_number("t_end", t_end)
         # What is common is not worth a call: a State of floats, in the scene of the question before.
-        if asked is None or type(state) is not State:
+        if known is None or type(state) is not State:
             state = given_state(scene, state)
-            asked = ask(scene, state, t_end)
+            known = prepare(scene, state, t_end)
         t, x, y, vx, vy, wall = state.t, state.x, state.y, state.vx, state.vy, state.wall
         is_plain = type(t) is type(x) is type(y) is type(vx) is type(vy) is float
-        if not is_plain or (wall is not None and not (isinstance(wall, str) and wall in asked.walls)):
+        if not is_plain or (wall is not None and not (isinstance(wall, str) and wall in known.walls)):
             state = given_state(scene, state)
             t, x, y, vx, vy, wall = msgspec.structs.astuple(state)
-        code, dt, t, x, y, vx, vy = asked.single(asked.packed, t, x, y, vx, vy, asked.walls[wall], t_end)
+        code, dt, t, x, y, vx, vy = known.single(known.packed, t, x, y, vx, vy, known.walls[wall], t_end)
         if code in WALL_NAMES:
             return Collision(WALL_NAMES[code], dt, t, x, y, vx, vy)
         if code == codes.HORIZON:
@@ -117,7 +117,7 @@ class Prepared(NamedTuple):
 latest: list[Prepared | None] = [None]  # of all threads; what is read of it is read once, and never changes
 
 
-def ask(scene: Scene, state: State, t_end: float) -> Prepared:
+def prepare(scene: Scene, state: State, t_end: float) -> Prepared:
     """Return what questions in a scene need, and keep it for the next.
 
     Raises:
@@ -129,8 +129,8 @@ def ask(scene: Scene, state: State, t_end: float) -> Prepared:
         check_numbers(scene, state, t_end)
         raise
     walls = {wall: WALL_CODES[wall] for wall in (None, *scene.walls)}
-    asked = latest[0] = Prepared(scene, packed, walls, entries.single_at_once())
-    return asked
+    found = latest[0] = Prepared(scene, packed, walls, entries.single_at_once())
+    return found
 
 
 def followed_paths(

@@ -58,11 +58,12 @@ def trajectory(scene: Scene, state: State, n_collisions: int, t_end: float = np.
     rows, walls = as_arrays([start])
     factors = start.units.factors()  # multiplied in passing: a pass of its own costs as much as half a step
     paths = unfilled_paths(1, n_collisions, factors)
-    in_lanes = laws_in_lanes(fit(scene).scene)
     if n_collisions:
+        in_lanes = laws_in_lanes(fit(scene).scene)
         stop = only_stop(start.units.horizon(t_end))
         worker = new_worker(in_lanes, stop, unfilled_ends(rows, 1, (1, 1)))
-        entries.follow_particles(worker, walls, paths)
+        with np.errstate(over="ignore", under="ignore"):  # without the compiler
+            entries.follow_particles(worker, walls, paths)
     if not paths.is_exact.all():
         raise BadInput(ANSWER_LOST)
     n, code = paths.counts.item(), paths.codes.item()

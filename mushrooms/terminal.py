@@ -28,8 +28,8 @@ AsJson = Annotated[bool, typer.Option("--json", help="Print JSON.")]
 
 # The compiled functions that a person waits for, and how long in all; the others take a few seconds.
 SLOW_TO_COMPILE = {
-    "careful_step": "half a minute to a minute",
-    "follow_particles": "half a minute to a minute",
+    "careful_step": "about half a minute",
+    "follow_particles": "about half a minute",
     "fine": "about ten seconds",
 }
 

@@ -99,7 +99,7 @@ def _compiled_once() -> None:
 
     for entry in kept_entries():
         entry.compile = one_at_a_time(entry)
-    beside.start = lambda *_: []  # who waits for a lock has nothing to compile beside it
+    beside.start = lambda *_: None  # who waits for a lock has nothing to compile beside it
 
 
 @pytest.fixture(scope="session", autouse=True)

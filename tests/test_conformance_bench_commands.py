@@ -9,6 +9,8 @@ import pytest
 from support.truth import proved_step
 
 from conformance.bench import contenders, measure, workloads
+from conformance.suite import timing
+from conformance.suite.process import Trouble
 
 
 @pytest.fixture(scope="module")
@@ -18,8 +20,17 @@ def breathing_disk() -> workloads.Workload:
 
 
 def tried(workload, *these):
-    brief = measure.Effort(repeats=3, least_ns=1.0, most_ns=1e9)
+    # Laps of several ticks of a clock that counts milliseconds: none adds up to nothing.
+    brief = measure.Effort(repeats=3, least_ns=5e6, most_ns=1e9)
     return measure.measure(workload, these, brief, lambda _: None, [])
+
+
+def test_a_tick_of_a_coarse_clock_is_no_lie():
+    """A repeat of .1 ms may be said to last 1 ms; not so 10 ms where the answer came after .2."""
+    steps = [{"outcome": "undecided", "reason": "x"}]
+    assert timing.read_repeats({"ns": [10**6], "steps": steps}, 1, 2e-4, 0.0)[0] == [10**6]
+    with pytest.raises(Trouble, match="the answer came after 200000 ns"):
+        timing.read_repeats({"ns": [10**7], "steps": steps}, 1, 2e-4, 0.0)
 
 
 def test_commands_time_themselves_and_their_troubles_are_told(breathing_disk):

@@ -304,13 +304,7 @@ MANY = FEW._replace(n_particles=400)
     [
         ("none", "work-identity", FEW, "pass"),
         ("none", "work-identity", LITTLE, "declined"),
-        pytest.param(
-            "wall-velocity-once",
-            "work-identity",
-            FEW._replace(n_particles=400),
-            "fail",
-            marks=pytest.mark.deep,
-        ),
+        pytest.param("wall-velocity-once", "work-identity", MANY, "fail", marks=pytest.mark.deep),
         ("energy-kept", "work-identity", FEW, "fail"),
         # Loses nearly all its particles.
         ("phase-restarts-at-each-step", "work-identity", FEW, "fail"),

@@ -22,14 +22,24 @@ def started(monkeypatch):
     found = []
 
     def with_program(text):
-        def start():
+        def start(into):
             found.extend(subprocess.Popen([sys.executable, "-c", text]) for _ in range(2))
-            return found
+            into.extend(found)
 
         monkeypatch.setattr(beside, "start", start)
         return found
 
     return with_program
+
+
+def on_cores(n, monkeypatch):
+    monkeypatch.setattr(beside.os, "sched_getaffinity", lambda _: range(n))
+
+
+def all_started(*arguments):
+    found = []
+    really_start(found, *arguments)
+    return found
 
 
 def compiled():
@@ -45,8 +55,8 @@ def test_it_is_waited_for_and_its_fate_is_no_matter(started, text):
     assert [process.returncode is None for process in processes] == [False, False]
 
 
-def test_without_a_second_process_all_is_as_before(monkeypatch):
-    monkeypatch.setattr(beside, "start", list)
+def test_without_others_all_is_as_before(monkeypatch):
+    monkeypatch.setattr(beside, "start", lambda _: None)
     assert compiled() == 2
 
 
@@ -68,6 +78,24 @@ def test_one_that_hangs_is_left_behind(started, monkeypatch):
     assert {process.returncode for process in processes}.isdisjoint({None, 0})
 
 
+def test_an_interrupt_while_they_are_started_ends_those_that_are(monkeypatch):
+    begun, really = [], subprocess.Popen
+
+    def popen(*_, **__):
+        if begun:
+            raise KeyboardInterrupt
+        begun.append(really([sys.executable, "-c", "import time; time.sleep(600)"]))
+        return begun[0]
+
+    on_cores(3, monkeypatch)
+    monkeypatch.setattr(beside, "start", really_start)
+    monkeypatch.setattr(beside, "_ONCE", threading.Lock())
+    monkeypatch.setattr(subprocess, "Popen", popen)
+    with pytest.raises(KeyboardInterrupt):
+        compiled()
+    assert begun[0].returncode not in (None, 0)
+
+
 def test_an_interrupt_ends_it_too(started):
     processes = started("import time; time.sleep(600)")
     function = njit(lambda x: x + 1)
@@ -85,10 +113,10 @@ def test_an_interrupt_ends_it_too(started):
 def test_it_is_told_where_our_modules_are(monkeypatch, tmp_path):
     given = []
     monkeypatch.setattr(subprocess, "Popen", lambda command, **options: given.append((command, options)))
-    monkeypatch.setattr(beside.os, "cpu_count", lambda: 2)
+    on_cores(2, monkeypatch)
     monkeypatch.setattr(beside, "_ONCE", threading.Lock())
     monkeypatch.setattr(sys, "path", [*sys.path, tmp_path, str(tmp_path)])  # import passes by what is no text
-    really_start("1", "12")
+    all_started("1", "12")
     ((command, options),) = given
     what = [sys.executable, "-P", "-m", "fast.first_run", "1", "12"]
     assert command == [*what, "follow", "bounce"]
@@ -106,7 +134,7 @@ def test_it_is_started_once_and_where_it_is_of_use(why, monkeypatch):
         raise OSError("no room")
 
     monkeypatch.setattr(subprocess, "Popen", refused)
-    monkeypatch.setattr(beside.os, "cpu_count", lambda: 1 if why == "one core" else 2)
+    on_cores(1 if why == "one core" else 2, monkeypatch)
     monkeypatch.setattr(beside, "_ONCE", threading.Lock())
     if why == "another process":
         monkeypatch.setenv(beside.MARK, "1")
@@ -114,7 +142,7 @@ def test_it_is_started_once_and_where_it_is_of_use(why, monkeypatch):
         beside._ONCE.acquire()
     if why == "an application":
         monkeypatch.setattr(sys, "frozen", True, raising=False)
-    assert really_start() == []
+    assert all_started("0", "12") == []
 
 
 @pytest.mark.parametrize("n_cores", [2, 3, 64])
@@ -122,13 +150,13 @@ def test_the_others_find_what_is_kept_whatever_lies_about(n_cores, tmp_path, mon
     fast.simulate(load("moving-cap"), n_particles=1, energy=1e2, seed=1)
     (tmp_path / "fast.py").write_text("raise SystemExit(3)")
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(beside.os, "cpu_count", lambda: n_cores)
+    on_cores(n_cores, monkeypatch)
     monkeypatch.setattr(beside, "_ONCE", threading.Lock())
-    assert [process.wait() for process in really_start("0", "12")] == [0] * min(n_cores - 1, 2)
+    assert [process.wait() for process in all_started("0", "12")] == [0] * min(n_cores - 1, 2)
 
 
 def test_what_it_compiles_is_what_a_run_asks_for(monkeypatch):
-    """Else the second process would compile for nobody."""
+    """Else another process would compile for nobody."""
     fast.simulate(load("moving-cap"), n_particles=1, energy=1e2, seed=1)
     asked = []
     monkeypatch.setattr(entries.follow_particles, "compile", asked.append)
@@ -136,9 +164,9 @@ def test_what_it_compiles_is_what_a_run_asks_for(monkeypatch):
     assert asked == entries.follow_particles.signatures
 
 
-@pytest.mark.parametrize("n_cores", beside.SHARES)
+@pytest.mark.parametrize("n_cores", beside.BY_CORES)
 def test_all_is_compiled_by_somebody(n_cores):
-    shared = [name for share in beside.SHARES[n_cores] for name in share]
+    shared = [name for share in beside.BY_CORES[n_cores] for name in share]
     wanted = ["careful"] if n_cores == 1 else ["follow", *loops.Loops._fields]
     assert sorted(shared) == sorted(wanted)
 

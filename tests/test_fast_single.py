@@ -129,6 +129,39 @@ def test_scenes_that_come_and_go_are_not_mistaken(monkeypatch):
     assert met()[300:] != expected[300:]
 
 
+class Marked(State, frozen=True):
+    """A state with a field more."""
+
+    mark: int = 1
+
+
+AT = {"t": 0.0, "x": 0.25, "y": 0.5, "vx": 1.0, "vy": 0.5}
+
+
+@pytest.mark.parametrize(
+    ("state", "is_taken"),
+    [
+        (Marked(**AT), True),
+        (State(**AT | {"x": np.float64(0.25)}), True),
+        (State(**AT | {"vx": 1}), True),
+        (State(**AT | {"vx": True}), False),
+        (State(**AT | {"vy": "0.5"}), False),
+        (State(**AT | {"wall": "floor"}), False),
+        (State(**AT | {"wall": ["arc"]}), False),
+        (State(**AT | {"wall": np.array(["arc"])}), False),
+        (None, False),
+    ],
+)
+def test_a_scene_asked_before_takes_no_other_states(state, is_taken, monkeypatch):
+    scene = load("moving-cap")
+    scene = Cap(r=scene.r)
+    expected = fast.next_collision(scene, State(**AT), 9.0)
+    for before in (stepper.latest, [None]):
+        monkeypatch.setattr(stepper, "latest", before)
+        found = fast.next_collision(scene, state, 9.0)
+        assert found == expected if is_taken else isinstance(found, Rejected)
+
+
 def test_threads_may_ask_side_by_side():
     asked = list(questions(2, 300))
     expected = [repr(fast.next_collision(*question)) for question in asked]

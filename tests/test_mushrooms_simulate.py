@@ -48,7 +48,7 @@ def test_compilation_is_told_when_nothing_is_kept_and_only_then(fresh, capsys):
             assert entry(1) == entry(1) == 2
         told.append(capsys.readouterr().err)
     assert told[0].count("\n") == 1
-    assert "this machine: half a minute to a minute; kept for next time" in told[0]
+    assert "this machine: about half a minute; kept for next time" in told[0]
     assert told[1] == ""
     entry(1.5)  # another type of argument: compiled, but nobody is told outside
     assert capsys.readouterr().err == ""

@@ -104,8 +104,6 @@ def by_command(
     Raises:
         CommandNotFound: there is no such program.
         Trouble: it does not introduce itself.
-
-    It is run when the suite finds its clock honest.
     """
     session = stack.enter_context(Session(command, limits))
     session.start()

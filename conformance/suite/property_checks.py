@@ -42,7 +42,6 @@ SHRINKING = Mushroom(
     h=Fourier(mean=0.75, omega=1.0, cos=(0.25,)),
     nu=Fourier(mean=0.5, omega=1.0, cos=(0.3,)),
 )
-MAX_LOST = 0.01  # of the particles: more, and what was left has shown nothing
 MAX_UNDECIDED = 0.05  # of the steps of a property
 PROFILES = ("work-identity", "captured-share", "mean-growth")
 
@@ -161,8 +160,8 @@ def _judged(findings: Sequence[Statistic]) -> tuple[str, str]:
     why = "; ".join(map(str, findings))
     if not all(finding.is_met for finding in findings):
         return "fail", why
-    if any(finding.lost > MAX_LOST * finding.n for finding in findings):
-        return "fail", f"{why}: at most {MAX_LOST:.0%} may be lost"
+    if any(finding.is_depleted for finding in findings):
+        return "fail", f"{why}: at most {profiles.MAX_LOST:.0%} may be lost"
     if idle := [finding for finding in findings if not finding.has_power]:
         alternatives = ", ".join(f"{finding.alternative:g}" for finding in idle)
         return "declined", f"{why}: could not have failed at {alternatives}; a higher level follows more"

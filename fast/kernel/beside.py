@@ -1,9 +1,9 @@
 """Compiling in several processes at once: numba compiles one function after another, but keeps them on disk.
 
 A run needs the careful step, five loops, and `follow_particles`, which calls those by their addresses and
-takes longer to compile than all but the careful step together. When that is about to be compiled, other
-processes begin with the rest; this one will find it kept. Whatever goes wrong there, it is compiled here as
-if nobody had tried.
+takes longest to compile. When the careful step is about to be compiled, other processes begin with what is
+their share; this one will find it kept. Whatever goes wrong there, it is compiled here as if nobody had
+tried.
 """
 
 from __future__ import annotations
@@ -13,7 +13,8 @@ import subprocess
 import sys
 import threading
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
+from time import monotonic
 from typing import Any
 
 from numba.core import event
@@ -22,7 +23,7 @@ COMMAND = ("-P", "-m", "fast.first_run")  # -P: not what lies in the folder that
 MARK = "OSCILLATING_MUSHROOMS_BESIDE"  # in the others' environment: they start none
 PATIENCE = 60.0  # seconds beyond our own, after which we go on alone
 # Who compiles what, the caller first, so that all are done at about the same time.
-SHARES = {
+BY_CORES = {
     1: [["careful"]],
     2: [["careful", "aim", "fly", "chord", "rebound"], ["follow", "bounce"]],
     3: [["careful"], ["follow"], ["fly", "aim", "chord", "bounce", "rebound"]],
@@ -32,7 +33,9 @@ _ONCE = threading.Lock()  # taken by the thread that starts the others, for good
 
 def shares() -> list[list[str]]:
     """Return who compiles what on this machine."""
-    return SHARES[min(os.cpu_count() or 1, max(SHARES))]
+    # As many cores as this process may use, where the system can tell.
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    return BY_CORES[min(cores, max(BY_CORES))]
 
 
 def own_share() -> list[str]:
@@ -50,38 +53,36 @@ class _Beside(event.Listener):  # type: ignore[misc]  # numba has no types
     def on_start(self, told: Any) -> None:
         """See numba's `Listener`."""
         if not self.processes and told.data["dispatcher"] is self._entry:
-            self.processes = start(*self._arguments)
+            start(self.processes, *self._arguments)
 
     def on_end(self, told: Any) -> None:
         """See numba's `Listener`."""
 
 
-def start(*arguments: str) -> list[subprocess.Popen[bytes]]:
+def start(started: list[subprocess.Popen[bytes]], *arguments: str) -> None:
     """Start the other processes, once; none where they would be of no use, or cannot be.
 
     Args:
+        started: each is appended at once, so that whoever interrupts this can end them.
         arguments: which loops are meant by their names; see fast.first_run.
     """
     is_python = bool(sys.executable) and not getattr(sys, "frozen", False)
     others = shares()[1:]
     if not is_python or MARK in os.environ or not others or not _ONCE.acquire(blocking=False):
-        return []
+        return
     nowhere = subprocess.DEVNULL
     found_as_here = os.pathsep.join(place for place in sys.path if isinstance(place, str))
-    started: list[subprocess.Popen[bytes]] = []
-    try:
-        for what in others:
-            process = subprocess.Popen(
-                [sys.executable, *COMMAND, *arguments, *what],
-                stdin=nowhere,
-                stdout=nowhere,
-                stderr=nowhere,
-                env={**os.environ, "PYTHONPATH": found_as_here, MARK: "1"},
+    for what in others:
+        with suppress(OSError, ValueError):
+            started.append(
+                subprocess.Popen(
+                    [sys.executable, *COMMAND, *arguments, *what],
+                    stdin=nowhere,
+                    stdout=nowhere,
+                    stderr=nowhere,
+                    env={**os.environ, "PYTHONPATH": found_as_here, MARK: "1"},
+                )
             )
-            started.append(process)
-    except (OSError, ValueError):
-        pass
-    return started
 
 
 @contextmanager
@@ -96,8 +97,9 @@ def compiled_beside(entry: Any, *arguments: str) -> Iterator[None]:
     with event.install_listener("numba:compile", beside):
         try:
             yield
+            last = monotonic() + PATIENCE
             for process in beside.processes:
-                process.wait(PATIENCE)
+                process.wait(max(0.0, last - monotonic()))
         except subprocess.TimeoutExpired:
             pass
         finally:

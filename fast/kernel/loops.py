@@ -176,9 +176,10 @@ def compile_loop(name: str, is_slope_moving: bool, degree: int) -> Any:
 
 @contextmanager
 def most_compiled(is_slope_moving: bool, degree: int) -> Iterator[None]:
-    """See that all that a run needs is compiled, by several processes where it is not kept.
+    """Compile what a run needs and is not kept, by several processes where there are cores for them.
 
-    What the caller compiles meanwhile saves time as well.
+    The others go on while the caller does, in the body of this context, what else it has to compile; at its
+    end they are waited for. What nobody has compiled `loops_for` does.
     """
     with compiled_beside(careful_step, f"{is_slope_moving:d}", f"{degree}"):
         for name in own_share():

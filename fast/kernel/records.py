@@ -138,8 +138,8 @@ class Paths(NamedTuple):
     """What the careful kernel fills in: paths of at most K collisions from each of N starts.
 
     Attributes:
-        steps: (N, K, 6) dt, t, x, y, vx, vy after each collision, times `units`.
-        units: (2, 6) powers of two by which steps are multiplied, and their inverses.
+        steps: (N, K, 6) dt, t, x, y, vx, vy after each collision, times `factors`.
+        factors: (2, 6) powers of two by which steps are multiplied, and their inverses.
         is_exact: (N,) whether no step has lost a bit by that.
         walls: (N, K) codes of the walls hit.
         counts: (N,) how many collisions there are.
@@ -148,7 +148,7 @@ class Paths(NamedTuple):
     """
 
     steps: FloatArray
-    units: FloatArray
+    factors: FloatArray
     is_exact: BoolArray
     walls: IntArray
     counts: IntArray
@@ -156,12 +156,12 @@ class Paths(NamedTuple):
     ends: FloatArray
 
 
-def unfilled_paths(n_starts: int, n_collisions: int, units: FloatArray | None = None) -> Paths:
-    """Return what is to be filled in for paths from some starts; without units (6,) steps are as they are."""
-    factors = np.ones(6) if units is None else units
+def unfilled_paths(n_starts: int, n_collisions: int, factors: FloatArray | None = None) -> Paths:
+    """Return what is to be filled in for paths from some starts; steps times factors (6,), if any."""
+    by = np.ones(6) if factors is None else factors
     return Paths(
         np.empty((n_starts, n_collisions, 6)),
-        np.stack([factors, 1.0 / factors]),
+        np.stack([by, 1.0 / by]),
         np.ones(n_starts, np.bool_),
         np.empty((n_starts, n_collisions), np.int64),
         np.zeros(n_starts, np.int64),
@@ -200,7 +200,8 @@ class Followed(NamedTuple):
         counts: (N, 5) collisions by wall: arc, base, left, right, floor.
         careful: (N,) collisions found by the careful step.
         energies: (N, C) energy at each stop that asks for it.
-        is_captured: (N, C) whether the last arc hit before had |sin phi| > nu.
+        is_captured: (N, C) whether the last arc hit before had |sin phi| > nu, and no wall of the
+            stem has been met since.
         t_in, t_out: (N, K, M) the captured stays that are kept; nan for none.
         lanes: (N, LANE_ROWS) what goes on from the last stop, nan for who ended before it: see
             fast.kernel.kept; (N, 0) where nobody asks for it.
@@ -260,9 +261,9 @@ def write_step(paths, i, k, dt, particle):
     is_exact = True
     for column in range(6):
         number = numbers[column]
-        scaled = number * paths.units[0, column]
+        scaled = number * paths.factors[0, column]
         paths.steps[i, k, column] = scaled
-        is_exact = is_exact and scaled * paths.units[1, column] == number
+        is_exact = is_exact and scaled * paths.factors[1, column] == number
     if not is_exact:
         paths.is_exact[i] = False
 

@@ -13,6 +13,7 @@ from xml.etree import ElementTree
 
 import msgspec
 import pytest
+from support.depth import deep_but
 from support.refusals import assert_refused
 from support.saboteurs import command
 
@@ -185,19 +186,20 @@ def test_one_test_per_vector_for_pytest(tmp_path):
     assert f"{len([v for v in vectors.load() if v.group == 'near-corner'])} passed" in done.stdout
 
 
-@pytest.mark.parametrize(
-    ("options", "code", "word"),
-    [
-        (["--mushrooms-seed", "-1"], 4, "ERROR: --mushrooms-seed = -1, must be 0 to"),
-        (["--mushrooms-timeout", "nan"], 4, "ERROR: --mushrooms-timeout = nan, must be above 0 seconds"),
-        (["--mushrooms-timeout", "0"], 4, "ERROR: --mushrooms-timeout = 0.0, must be above 0 seconds"),
-        (["--mushrooms-command", "a 'b"], 4, "ERROR: --mushrooms-command = "),
-        (["--mushrooms-command", " "], 1, "give the stepper as --mushrooms-command"),
-        (["--mushrooms-command", "./no-such"], 1, "command './no-such' cannot be started: No such file"),
-        (["--mushrooms-command", "echo"], 1, "wrong-format: start: "),
-    ],
+NOT_ASKED = (
+    (["--mushrooms-seed", "-1"], 4, "ERROR: --mushrooms-seed = -1, must be 0 to"),
+    (["--mushrooms-timeout", "nan"], 4, "ERROR: --mushrooms-timeout = nan, must be above 0 seconds"),
+    (["--mushrooms-timeout", "0"], 4, "ERROR: --mushrooms-timeout = 0.0, must be above 0 seconds"),
+    (["--mushrooms-command", "a 'b"], 4, "ERROR: --mushrooms-command = "),
+    (["--mushrooms-command", " "], 1, "give the stepper as --mushrooms-command"),
+    (["--mushrooms-command", "./no-such"], 1, "command './no-such' cannot be started: No such file"),
+    (["--mushrooms-command", "echo"], 1, "wrong-format: start: "),
 )
-def test_what_pytest_cannot_ask_is_told_without_a_traceback(tmp_path, options, code, word):
+
+
+@pytest.mark.parametrize("asked", deep_but(NOT_ASKED, NOT_ASKED[0], NOT_ASKED[5]))
+def test_what_pytest_cannot_ask_is_told_without_a_traceback(tmp_path, asked):
+    options, code, word = asked
     plugin = ["-p", "conformance.suite.pytest_plugin", "--pyargs", "conformance.suite.pytest_suite"]
     more = ["-q", "-k", "near-corner/1", "-p", "no:cacheprovider", "--rootdir", str(tmp_path)]
     line = [sys.executable, "-m", "pytest", *plugin, *more, *options]

@@ -11,6 +11,7 @@ import sys
 import numpy as np
 from numba import typeof
 
+from fast.compiled import compile_scene
 from fast.kernel import entries
 from fast.kernel.loops import Loops, compile_loop
 from fast.kernel.records import unfilled_ends, unfilled_paths
@@ -25,7 +26,7 @@ def compile_following() -> None:
     none = np.empty((0, 6))
     nowhere = Loops(*np.zeros(len(Loops._fields), np.int64).tolist())
     ends = unfilled_ends(none, 1, (1, 1))
-    worker = new_worker(known_in_lanes(Cap(r=1.0)), only_stop(np.inf), ends, loops=nowhere)
+    worker = new_worker(known_in_lanes(compile_scene(Cap(r=1.0))), only_stop(np.inf), ends, loops=nowhere)
     given = worker, np.empty(0, np.int64), unfilled_paths(0, 0)
     entries.follow_particles.compile(tuple(map(typeof, given)))
 

@@ -55,12 +55,11 @@ def laws_in_lanes(scene: Scene) -> LawsInLanes:
     """Return a scene, which is in the kernel's units, as the lanes know it."""
     compiled = compile_scene(scene)
     with most_compiled(is_slope_moving(compiled), degree_of(compiled)):
-        return known_in_lanes(scene)
+        return known_in_lanes(compiled)
 
 
-def known_in_lanes(scene: Scene) -> LawsInLanes:
+def known_in_lanes(compiled: Compiled) -> LawsInLanes:
     """Return what `laws_in_lanes` does, and see to no compiled loops: where nothing is to be followed."""
-    compiled = compile_scene(scene)
     degree = degree_of(compiled)
     pieces = pieces_of(compiled, degree)
     if pieces is None:

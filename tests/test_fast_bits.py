@@ -52,7 +52,7 @@ def test_lane_positions_do_not_change_a_bit():
     """A flow's particles, backwards: each lands in another lane, beside others."""
     scene, random = load("fixed-cap-clockwise"), np.random.default_rng(2)
     numbers = zip(
-        *random.uniform((-0.3, 0.01, -300, -300), (0.3, 0.4, 300, 300), size=(80, 4)).T, strict=True
+        *random.uniform((-0.3, 0.01, -300, -300), (0.3, 0.4, 300, 300), size=(150, 4)).T, strict=True
     )
     states = [State(0.0, *map(float, row)) for row in numbers]
     one = fast.flow(scene, states, 1.0, threads=1)

@@ -148,3 +148,14 @@ def test_a_path_loses_no_bit_that_one_question_keeps(exponent, tally):
         tally[alone.__class__.__name__] += 1
     assert tally["Collision"] > 5
     assert tally["Rejected"] > 5
+
+
+@pytest.mark.parametrize(("speed", "is_kept"), [(-20, True), (-26, False), (-30, False)])
+def test_a_path_that_overflows_is_refused(speed, is_kept):
+    """Of so large a table: dt = 2^(1000 - speed) is beyond the largest float from 2^1024 on."""
+    cap, state = Cap(r=2.0**1000), State(0.0, 0.0, 2.0**999, 0.0, 2.0**speed)
+    if is_kept:
+        assert fast.trajectory(cap, state, 1).steps[0, 0] == 2.0 ** (999 - speed)
+    else:
+        with pytest.raises(BadInput, match="beyond binary64"):
+            fast.trajectory(cap, state, 1)

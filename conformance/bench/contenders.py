@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
-from functools import partial
+from functools import cache, partial
 from typing import Any, Literal, NamedTuple
 
 import msgspec
@@ -107,7 +107,7 @@ def by_command(
     """
     session = stack.enter_context(Session(command, limits))
     session.start()
-    clock = list[Trouble | None]()  # what its own clock was found to be, once it was looked at
+    clock_trouble = cache(partial(_clock_trouble, session))  # its clock is looked at once
 
     def run(workload: Workload, n_times: int) -> Lap:
         assert session.introduction is not None
@@ -125,10 +125,8 @@ def by_command(
             ns, last = timing.read_repeats(found, n_times, seconds, question.state.t)
             lasted += sum(ns)
             answers.append(last)
-        if not clock:
-            clock.append(_clock_trouble(session))
-        if clock[0] is not None:
-            raise clock[0]
+        if (trouble := clock_trouble()) is not None:
+            raise trouble
         return Lap(lasted / (n_times * len(answers)), answers, lasted)
 
     return Contender(name, family, run), partial(put, session)

@@ -35,7 +35,9 @@ FACTOR = 4.0  # between nanoseconds that are said and those that are measured
 GROWTH = 1.3  # twice the collisions last longer by this, at least
 N_TRIES = 5
 DRIFT = 1.01  # of two clocks of one machine
-TICK = 2e6  # ns: a clock that counts milliseconds says one for repeats during which it went on
+# ns, two ticks of a clock that counts milliseconds: it says one for a short repeat during which it went on.
+# So much may be said too much of an answer; `honest_clock` asks for long ones, where it is nothing.
+TICK = 2e6
 START = State(0.0, 0.1, 0.2, 3.0, 4.0)
 
 

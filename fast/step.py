@@ -26,7 +26,7 @@ from scene import (
     Wall,
 )
 from scene.refusal import BadInput, check_number, check_scene
-from scene.states import ON_WALL, check_numbers
+from scene.states import check_numbers
 
 WALL_NAMES: dict[int, Wall] = {
     int(codes.ARC): "arc",
@@ -85,7 +85,8 @@ def next_collision(scene: Scene, state: State, t_end: float) -> Outcome:
         if not is_plain or (wall is not None and not (isinstance(wall, str) and wall in known.walls)):
             state = given_state(scene, state)
             t, x, y, vx, vy, wall = msgspec.structs.astuple(state)
-        code, dt, t, x, y, vx, vy = known.single(known.packed, t, x, y, vx, vy, known.walls[wall], t_end)
+        question = known.step_at, known.packed, t, x, y, vx, vy, known.walls[wall], t_end
+        code, dt, t, x, y, vx, vy = known.single(*question)
         if code in WALL_NAMES:
             return Collision(WALL_NAMES[code], dt, t, x, y, vx, vy)
         if code == codes.HORIZON:
@@ -105,12 +106,14 @@ class Prepared(NamedTuple):
         scene: kept, so that its address is no other scene's.
         packed: its numbers for the kernels.
         walls: codes of the walls that a state may name.
-        single: the compiled step.
+        step_at: address of the careful step.
+        single: the compiled function around it.
     """
 
     scene: Scene
     packed: FloatArray
     walls: dict[Wall | None, int]
+    step_at: int
     single: Callable[..., tuple[int, float, float, float, float, float, float]]
 
 
@@ -129,7 +132,7 @@ def prepare(scene: Scene, state: State, t_end: float) -> Prepared:
         check_numbers(scene, state, t_end)
         raise
     walls = {wall: WALL_CODES[wall] for wall in (None, *scene.walls)}
-    found = latest[0] = Prepared(scene, packed, walls, entries.single_at_once())
+    found = latest[0] = Prepared(scene, packed, walls, careful_at(), entries.single_at_once())
     return found
 
 
@@ -188,9 +191,9 @@ def fitted_start(scene: Scene, state: State) -> Start:
     inner = units.state(state)
     if state.wall is not None:
         particle = Particle(inner.t, 0.0, inner.x, inner.y, inner.vx, inner.vy, WALL_CODES[state.wall])
-        gap, size = entries.gap(fitted.compiled, particle)
-        if abs(gap) > ON_WALL * size:
-            away = f"{gap / size:.3g} of that wall's distance from the origin"
+        share = entries.off_wall(careful_at(), fitted.compiled, particle)
+        if share:
+            away = f"{share:.3g} of that wall's distance from the origin"
             raise InvalidState(f"state.wall = {state.wall!r}, but the state is {away} away from that wall")
     return Start(inner, units, fitted.compiled)
 

@@ -29,7 +29,7 @@ from fast.kernel.codes import (  # isort: skip
     MUSHROOM, NO_WALL, ON_CORNER, RIGHT, SLIDING, START, STEM, TANGENT, TOO_MANY,
 )  # fmt: skip
 from fast.kernel.hits import move
-from fast.kernel.laws import phase_room, set_anchors
+from fast.kernel.laws import phase_room
 
 from fast.kernel.records import (  # isort: skip
     BEND, DEPTH, PHASE, PHASE_ERROR, RADIUS, SLOPE, WIDTH, Particle, released,
@@ -37,7 +37,7 @@ from fast.kernel.records import (  # isort: skip
 
 
 from fast.kernel.walls import (  # isort: skip
-    crossed_wall, curvature_bounds, law_size, reach_time, side_of_mouth, wall_function,
+    curvature_bounds, law_size, reach_time, side_of_mouth, wall_function,
     wall_residual, wall_rest,
 )  # fmt: skip
 
@@ -383,14 +383,3 @@ def step(particle, limit, scene, anchors):
     t, low = two_sum(particle.t, limit)
     t, low = two_sum(t, low + particle.t_low)
     return code, limit, Particle(t, low, x, y, particle.vx, particle.vy, particle.wall)
-
-
-@part
-def first_step(particle, limit, scene, anchors):
-    """Judge a particle and take its step, for callers whose anchors are not set."""
-    if not set_anchors(scene.laws, anchors, particle.t, particle.t_low):
-        return FAR_TIME, 0.0, particle
-    crossed = crossed_wall(particle, scene, anchors)
-    if crossed != NO_WALL:
-        return BEYOND + crossed, 0.0, particle
-    return step(particle, limit, scene, anchors)

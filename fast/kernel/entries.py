@@ -12,16 +12,16 @@ import numpy as np
 from numba import config, njit, types
 
 from fast.kernel.arithmetic import sine_cosine
-from fast.kernel.codes import HORIZON
+from fast.kernel.codes import HORIZON, OFF_WALL
 from fast.kernel.compiling import HOW, SOURCES
 from fast.kernel.follow import follow
-from fast.kernel.laws import set_anchors
+from fast.kernel.judged import GIVEN, KNOWN, MET
 from fast.kernel.loops import run_careful
 from fast.kernel.path import follow_one
 from fast.kernel.pieces import fill_coefficients
 from fast.kernel.records import ANCHORS_SHAPE, particle_at, write_state, write_step
 from fast.kernel.refine import fine_path
-from fast.kernel.single import single_step, wall_gap
+from fast.kernel.single import single_step
 
 QUARTER_TURN, QUARTER_TURN_LOW = math.pi / 2, 6.123233995736766e-17  # pi/2 as two floats
 
@@ -36,7 +36,8 @@ def _careful(sources):
             particle, code, n = particle_at(states, i, walls[i]), walls[i], 0
             while n < paths.walls.shape[1]:
                 limit = (t_end - particle.t) - particle.t_low
-                code, dt, particle = run_careful(step_at, (particle, limit, n == 0, scene, anchors))
+                origin = KNOWN if n == 0 else MET
+                code, dt, particle = run_careful(step_at, (particle, limit, origin, scene, anchors))
                 if code >= HORIZON:
                     break
                 paths.walls[i, n] = code
@@ -87,28 +88,26 @@ def _fill_pieces(sources):
 
 def _single(sources):
     @njit(cache=True, error_model="numpy")
-    def single(numbers, t, x, y, vx, vy, wall, t_end):
+    def single(step_at, numbers, t, x, y, vx, vy, wall, t_end):
         """Take one step: see fast.kernel.single."""
         sources  # noqa: B018
-        return single_step(numbers, t, x, y, vx, vy, wall, t_end)
+        return single_step(step_at, numbers, t, x, y, vx, vy, wall, t_end)
 
     return single
 
 
-def _gap(sources):
+def _off_wall(sources):
     @njit(cache=True, error_model="numpy")
-    def gap(scene, particle):
-        """Return a particle's distance from its wall and that wall's size; 0 and 1 where a phase is lost.
+    def off_wall(step_at, scene, particle):
+        """Return the share of its wall's distance from 0 by which a particle is off it; 0 for one on it.
 
-        Such a time is left to the step, which refuses it.
+        And for one at a time whose phase is lost: that is left to the step, which refuses it.
         """
         sources  # noqa: B018
-        anchors = np.zeros(ANCHORS_SHAPE)
-        if not set_anchors(scene.laws, anchors, particle.t, particle.t_low):
-            return 0.0, 1.0
-        return wall_gap(particle, scene, anchors)
+        code, share, _ = run_careful(step_at, (particle, 0.0, GIVEN, scene, np.zeros(ANCHORS_SHAPE)))
+        return share if code == OFF_WALL else 0.0
 
-    return gap
+    return off_wall
 
 
 def _directions(sources):
@@ -128,18 +127,18 @@ fine = _fine(SOURCES)
 follow_particles = _follow(SOURCES)
 fill_pieces = _fill_pieces(SOURCES)
 single = _single(SOURCES)
-gap = _gap(SOURCES)
+off_wall = _off_wall(SOURCES)
 directions = _directions(SOURCES)
 
 NUMBERS, REAL, WHOLE = types.float64[::1], types.float64, types.int64
-SINGLE = (NUMBERS, REAL, REAL, REAL, REAL, REAL, WHOLE, REAL)
+SINGLE = (WHOLE, NUMBERS, REAL, REAL, REAL, REAL, REAL, WHOLE, REAL)
 
 
 @cache
 def single_at_once():
     """Return `single` for arguments that are known to be of the right types: they are not looked at again.
 
-    To find out what each of eight arguments is takes numba a tenth of the time of a whole question.
+    To find out what each of nine arguments is takes numba a tenth of the time of a whole question.
     """
     if config.DISABLE_JIT:
         return single

@@ -20,6 +20,7 @@ from fast.kernel.bounces import arrive
 from fast.kernel.codes import ANEW, ARC, CAP, HORIZON, MUSHROOM, N_WALLS, TOO_FAR
 from fast.kernel.compiling import kernel, part
 from fast.kernel.flights import OFF, advance, collide, correct
+from fast.kernel.judged import KNOWN
 from fast.kernel.kept import keep_lane, take_lane
 from fast.kernel.loops import run_careful
 
@@ -118,7 +119,7 @@ def step_carefully(pool, a, i, roster, worker):
         t, t_low = a[T + i], a[T_LOW + i]
         p = Particle(t, t_low, a[X + i], a[Y + i], a[VX + i], a[VY + i], int(a[WALL + i]))
         limit = (stops.times[-1] - t) - t_low
-        code, s, p = run_careful(worker.loops.careful, (p, limit, True, scene, anchors))
+        code, s, p = run_careful(worker.loops.careful, (p, limit, KNOWN, scene, anchors))
         followed.careful[roster[PARTICLE, i]] += 1
         a[NEXT_T + i], a[NEXT_T_LOW + i] = p.t, p.t_low
         a[NEXT_X + i], a[NEXT_Y + i], a[NEXT_VX + i], a[NEXT_VY + i] = p.x, p.y, p.vx, p.vy

@@ -21,8 +21,8 @@ from numba.core.typing import signature as returns
 
 from fast.kernel.beside import compiled_beside, own_share
 from fast.kernel.bounces import bounce, rebound
-from fast.kernel.careful import first_step, step
 from fast.kernel.compiling import HOW, SOURCES, caller
+from fast.kernel.judged import judged_step
 from fast.kernel.lanes import aim, chord, fly
 from fast.kernel.limits import LawLimits
 from fast.kernel.pieces import DEGREES
@@ -40,7 +40,7 @@ FLY = returns(types.none, POOL, _WHOLE, _TRUTH, _TRUTH, _REAL, LIMITS)
 CHORD = returns(types.none, POOL, _WHOLE, _TRUTH, _TRUTH, _TRUTH, LIMITS)
 BOUNCE = returns(types.none, POOL, _WHOLE, _REAL, _TRUTH)
 REBOUND = returns(types.none, POOL, _WHOLE)
-CAREFUL = returns(types.Tuple((_WHOLE, _REAL, PARTICLE)), PARTICLE, _REAL, _TRUTH, SCENE, _TABLE)
+CAREFUL = returns(types.Tuple((_WHOLE, _REAL, PARTICLE)), PARTICLE, _REAL, _WHOLE, SCENE, _TABLE)
 
 run_aim, run_fly, run_chord = caller(AIM), caller(FLY), caller(CHORD)
 run_bounce, run_rebound, run_careful = caller(BOUNCE), caller(REBOUND), caller(CAREFUL)
@@ -66,12 +66,10 @@ class Loops(NamedTuple):
 
 def _careful_step(sources):
     @njit(cache=True, **HOW)
-    def careful_step(particle, limit, is_first, scene, anchors):
-        """Take a careful step; the first also judges where the particle is: see fast.kernel.careful."""
+    def careful_step(particle, limit, origin, scene, anchors):
+        """Judge a particle as its origin asks, and take a careful step: see fast.kernel.judged."""
         sources  # noqa: B018
-        if is_first:
-            return first_step(particle, limit, scene, anchors)
-        return step(particle, limit, scene, anchors)
+        return judged_step(particle, limit, origin, scene, anchors)
 
     return careful_step
 

@@ -12,13 +12,11 @@ import math
 import numpy as np
 from numba import config
 
-from fast.kernel.careful import step
-from fast.kernel.codes import ARC, BASE, BEYOND, FAR_TIME, FLOOR, HORIZON, NO_WALL
+from fast.kernel.codes import HORIZON, OFF_WALL
 from fast.kernel.compiling import kernel, part
-from fast.kernel.laws import set_anchors
-from fast.kernel.records import ANCHORS_SHAPE, DEPTH, RADIUS, SHARED, VALUE, WIDTH, Compiled, Particle
-from fast.kernel.walls import crossed_wall, wall_residual
-from scene.states import ON_WALL
+from fast.kernel.judged import GIVEN
+from fast.kernel.loops import run_careful
+from fast.kernel.records import ANCHORS_SHAPE, SHARED, Compiled, Particle
 
 # Two more codes: the question is no good, and the answer does not fit into binary64.
 REFUSED, ANSWER_LOST = np.array([50, 51])
@@ -77,39 +75,6 @@ def scaled(number, exponent):
 
 
 @kernel
-def wall_gap(particle, scene, anchors):
-    """Return how far a particle is inside the wall that it leaves, and that wall's distance from 0, now.
-
-    Today's distance is the measure, not the largest of all time: a small cap is not allowed a large one's
-    slack. The anchors hold the laws at the particle's time.
-    """
-    r, w, h = anchors[RADIUS, VALUE], anchors[WIDTH, VALUE], anchors[DEPTH, VALUE]
-    if scene.is_relative:
-        w *= r
-    if particle.wall == BASE:
-        return particle.y, max(r, w)
-    f, _ = wall_residual(particle.wall, particle.x, particle.y, scene, anchors)
-    if particle.wall == ARC:
-        return f / (2.0 * r), r
-    return f, (h if particle.wall == FLOOR else w)
-
-
-@kernel
-def judged_step(particle, t_end, scene, anchors):
-    """Return the careful step's code, time of flight and particle; REFUSED for one off its wall."""
-    if not set_anchors(scene.laws, anchors, particle.t, 0.0):
-        return FAR_TIME, 0.0, particle
-    if particle.wall != NO_WALL:
-        gap, size = wall_gap(particle, scene, anchors)
-        if abs(gap) > ON_WALL * size:
-            return REFUSED, 0.0, particle
-    crossed = crossed_wall(particle, scene, anchors)
-    if crossed != NO_WALL:
-        return BEYOND + crossed, 0.0, particle
-    return step(particle, t_end - particle.t, scene, anchors)
-
-
-@kernel
 def question(length, time, t, x, y, vx, vy, wall, t_end):
     """Return whether a state and a horizon can be taken, and both in the kernel's units; see fast.units."""
     speed = length - time
@@ -146,8 +111,8 @@ def answer(length, time, code, dt, particle):
 
 
 @part
-def single_step(numbers, t, x, y, vx, vy, wall, t_end):
-    """Take a careful step in a packed scene.
+def single_step(step_at, numbers, t, x, y, vx, vy, wall, t_end):
+    """Take a careful step, whose address is given, in a packed scene.
 
     Returns:
         (code, dt, t, x, y, vx, vy): a wall's code and the collision there, HORIZON and the place then, or why
@@ -158,7 +123,8 @@ def single_step(numbers, t, x, y, vx, vy, wall, t_end):
     is_good, particle, end = question(length, time, t, x, y, vx, vy, wall, t_end)
     if not is_good:
         return REFUSED, 0.0, t, x, y, vx, vy
-    code, dt, particle = judged_step(particle, end, unpacked(numbers), np.zeros(ANCHORS_SHAPE))
+    known = particle, end - particle.t, GIVEN, unpacked(numbers), np.zeros(ANCHORS_SHAPE)
+    code, dt, particle = run_careful(step_at, known)
     if code > HORIZON:
-        return code, 0.0, t, x, y, vx, vy
+        return (REFUSED if code == OFF_WALL else code), 0.0, t, x, y, vx, vy
     return answer(length, time, code, dt, particle)

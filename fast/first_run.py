@@ -16,7 +16,7 @@ from fast.kernel import entries
 from fast.kernel.loops import Loops, compile_loop
 from fast.kernel.records import unfilled_ends, unfilled_paths
 from fast.kernel.worker import new_worker
-from fast.pieces import known_in_lanes
+from fast.pieces import in_lanes
 from fast.starts import only_stop
 from scene import Cap
 
@@ -26,7 +26,9 @@ def compile_following() -> None:
     none = np.empty((0, 6))
     nowhere = Loops(*np.zeros(len(Loops._fields), np.int64).tolist())
     ends = unfilled_ends(none, 1, (1, 1))
-    worker = new_worker(known_in_lanes(compile_scene(Cap(r=1.0))), only_stop(np.inf), ends, loops=nowhere)
+    # Of types alone: to find the pieces of a scene there is more to compile.
+    fixed = in_lanes(compile_scene(Cap(r=1.0)), None)
+    worker = new_worker(fixed, only_stop(np.inf), ends, loops=nowhere)
     given = worker, np.empty(0, np.int64), unfilled_paths(0, 0)
     entries.follow_particles.compile(tuple(map(typeof, given)))
 

@@ -34,12 +34,11 @@ from fast.kernel.records import (  # isort: skip
     N_KNOTS, OMEGA, OMEGA_LOW, PERIOD, PERIOD_LOW, RADIUS, SHARED, SLOPE, WIDTH, Compiled, FloatArray,
     LawsInLanes, Pieces,
 )  # fmt: skip
-from scene import Cap, Scene
+from scene import Scene
 
 MAX_PIECES = 2**15
 REMAINDER = 2.0**-54
 INSIDE = 1.0 - 2.0**-50  # of a piece: how far a flight ends from its middle is a sum that lanes round
-FIXED = Cap(r=1.0)
 
 
 class Cut(NamedTuple):
@@ -55,17 +54,15 @@ def laws_in_lanes(scene: Scene) -> LawsInLanes:
     """Return a scene, which is in the kernel's units, as the lanes know it."""
     compiled = compile_scene(scene)
     with most_compiled(is_slope_moving(compiled), degree_of(compiled)):
-        return known_in_lanes(compiled)
+        return in_lanes(compiled, pieces_of(compiled, degree_of(compiled)))
 
 
-def known_in_lanes(compiled: Compiled) -> LawsInLanes:
-    """Return what `laws_in_lanes` does, and see to no compiled loops: where nothing is to be followed."""
+def in_lanes(compiled: Compiled, pieces: Pieces | None) -> LawsInLanes:
+    """Return a scene as the lanes know it by its pieces; with none, each step is left to the careful one."""
     degree = degree_of(compiled)
-    pieces = pieces_of(compiled, degree)
     if pieces is None:
-        none = pieces_of(compile_scene(FIXED), degree)
-        assert none is not None
-        pieces = none._replace(until=-1.0)
+        always, nothing = np.array([math.inf]), np.zeros((1, 4, degree + 2))
+        pieces = Pieces(0.0, math.inf, 0.0, np.zeros(1), np.zeros((1, 2)), always, always, nothing, -1.0)
     slope = None if is_slope_moving(compiled) else float(compiled.laws[SLOPE, LEVEL])
     return LawsInLanes(compiled, pieces, degree, slope)
 

@@ -181,7 +181,7 @@ FAULTS = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("name", deep_among(FAULTS, "L5", "C10", "X7", "C3", "C5", "D1"))
+@pytest.mark.parametrize("name", deep_among(FAULTS, "L5", "C10", "X7", "X8", "C3", "C5", "C9", "D1"))
 def test_a_faulty_stepper_does_not_get_the_expected_verdict(name):
     (entry,) = ledger.select(name)
     (finding,) = audited(name, FAULTS[name]).findings

@@ -83,6 +83,7 @@ def test_all_is_asked_that_the_corpus_asks_seldom(seed, tally):
     assert tally["more than 20 legs"] >= 3
 
 
+@pytest.mark.deep
 def test_what_is_drawn_follows_from_the_seed():
     assert list(fresh(1, 12)) == questions(1, SOME)[:12]
     assert list(fresh(3, 12)) != questions(1, SOME)[:12]

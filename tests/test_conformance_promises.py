@@ -37,7 +37,7 @@ def test_an_honest_one_keeps_them_all(opened):
     assert {verdict for verdict, _ in found.values()} == {"pass"}, found
 
 
-@pytest.mark.parametrize("name", deep_among(FAULTS, "a-tenth", "no-time", "remembering"))
+@pytest.mark.parametrize("name", deep_among(FAULTS, "a-tenth", "no-time", "remembering", "constant"))
 def test_a_breach_is_met(opened, name):
     promise, verdict, fault = FAULTS[name]
     ((_, met, why, _),) = promises.ask_promises(opened(fault), (promise,))

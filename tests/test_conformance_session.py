@@ -141,7 +141,9 @@ AT_EVERY_STEP = {
 }
 
 
-@pytest.mark.parametrize("name", deep_among(AT_EVERY_STEP, "close-stdout", "huge-line"))
+@pytest.mark.parametrize(
+    "name", deep_among(AT_EVERY_STEP, "close-stdout", "huge-line", "endless-line", "daemon")
+)
 def test_a_fault_in_every_answer(verdicts, name):
     run = verdicts(name, PATIENT)
     verdict, word = AT_EVERY_STEP[name]

@@ -113,7 +113,7 @@ def test_a_slow_down_exits_with_1(call, tmp_path, monkeypatch):
         (["--compare", "absent.json"], "absent.json"),
         (["--compare", "bad.json"], "bad.json is no bench.json"),
         (["--", "./no-such-stepper"], "no-such-stepper"),
-        (["--", sys.executable, "-c", "print(1)"], "python"),
+        pytest.param(["--", sys.executable, "-c", "print(1)"], "python", marks=pytest.mark.deep),
     ],
 )
 def test_bad_options_are_one_line(call, monkeypatch, tmp_path, arguments, word):

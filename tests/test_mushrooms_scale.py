@@ -14,6 +14,7 @@ from pathlib import Path
 import distributed
 import numpy as np
 import pytest
+from support.depth import deep_but
 from support.refusals import assert_refused
 
 import fast
@@ -52,7 +53,7 @@ def cluster(n_workers, processes):
     )
 
 
-@pytest.mark.parametrize("n_workers", [1, 2, 4])
+@pytest.mark.parametrize("n_workers", deep_but([1, 2, 4], 2))
 def test_workers_of_a_cluster_follow_to_the_same_bits(command_line, tmp_path, ensemble, n_workers):
     with cluster(n_workers, processes=False) as there:
         address = there.scheduler_address

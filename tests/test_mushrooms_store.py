@@ -64,7 +64,11 @@ def digest_of(ended):
 
 @pytest.mark.parametrize(
     ("name", "energy", "n_cycles"),
-    [("fermi-ulam", 40.0, 3), ("breathing-circle", 40.0, 2), ("moving-cap", 60.0, 2)],
+    [
+        pytest.param("fermi-ulam", 40.0, 3, marks=pytest.mark.deep),
+        pytest.param("breathing-circle", 40.0, 2, marks=pytest.mark.deep),
+        ("moving-cap", 60.0, 2),
+    ],
 )
 def test_blocks_of_any_size_have_one_digest(tmp_path, name, energy, n_cycles):
     """In memory and on disk, in order and not, with arrays that hold nothing."""

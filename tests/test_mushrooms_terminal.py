@@ -181,7 +181,7 @@ def test_wherever_it_prints_nothing_is_lost_for_want_of_a_letter_or_a_width(monk
     ("to", "code", "word"),
     [(">&-", 0, ""), (">/dev/full", 2, "standard output cannot be written"), ("", 0, "")],
 )
-@pytest.mark.parametrize("more", ["", "2>&-"])
+@pytest.mark.parametrize("more", deep_but(["", "2>&-"], ""))
 def test_standard_output_may_be_closed_or_full(tmp_path, to, code, word, more):
     line = f'"{sys.executable}" -m mushrooms scenes moving-cap --json {to} {more}'
     done = subprocess.run(

@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from support.answers_by_hand import UNDEFINED
+from support.depth import deep_but
 from support.forgery import both, drop, put, shift
 from support.tables import LIFT
 from support.truth import IS_DEEP
@@ -61,7 +62,7 @@ def test_every_path_is_proved_again(tally):
     assert tally["enclosed starts"] >= N_EXAMPLES / 4
 
 
-@pytest.mark.parametrize("working", [6, 8, 12, 20, None])
+@pytest.mark.parametrize("working", deep_but([6, 8, 12, 20, None], 6, None))
 def test_knots_within_enclosed_times_are_proved_again(working, tally):
     """The mouth opens just when y = 0 is crossed, give or take what the crossing is enclosed to."""
     for i in range(-24, 24):

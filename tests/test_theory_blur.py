@@ -64,7 +64,10 @@ def phase_volume_gap(name: str, energy: float, width: float = 0.3) -> float:
     return total / (math.exp(width**2 / 2) * width * math.sqrt(2 * math.pi)) - 1
 
 
-@pytest.mark.parametrize(("name", "size"), [("fixed-cap-clockwise", 5e-5), ("moving-cap", 5e-6)])
+@pytest.mark.parametrize(
+    ("name", "size"),
+    [pytest.param("fixed-cap-clockwise", 5e-5, marks=pytest.mark.deep), ("moving-cap", 5e-6)],
+)
 def test_phase_volume_is_kept(name: str, size: float, monkeypatch: pytest.MonkeyPatch) -> None:
     assert abs(phase_volume_gap(name, 1e8)) < size
     real = Fields.at

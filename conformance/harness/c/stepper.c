@@ -225,20 +225,46 @@ static int has_wall(const Flight *flight, int inside, int wall) {
 }
 
 static void check_inside(Flight *flight, int inside) {
+    State from = flight->from;
+    /* On y = 0 the mouth ends at the sides, and the base at the arc. */
+    int is_level = flight->table->kind == MUSHROOM && from.wall == NOWHERE && from.y == 0;
     for (int wall = 0; wall < N_WALLS; wall++) {
-        if (!has_wall(flight, inside, wall) || wall == flight->from.wall) continue;
+        int is_near = has_wall(flight, inside, wall);
+        if (wall == from.wall || !(is_near || (is_level && wall != BASE && wall != FLOOR))) continue;
         Gap g = gap(flight, wall, 0);
-        if (wall == BASE && g.f == 0 && g.slope > 0) continue;
-        if (g.f < -g.error) stop(flight, REJECTED, "the state is beyond a wall, must be inside the table");
-        if (g.f <= g.error) stop(flight, UNDECIDED, "the state is on a wall within rounding");
+        if (wall == BASE && from.wall == NOWHERE && g.f == 0 && g.slope > 0) continue;
+        if (fabs(g.f) <= g.error) stop(flight, UNDECIDED, "the state is on a wall within rounding");
+        if (is_near && g.f < 0) stop(flight, REJECTED, "the state is beyond a wall, must be inside the table");
     }
+}
+
+static void check_wall(Flight *flight) {
+    int wall = flight->from.wall, kind = flight->table->kind;
+    double y = flight->from.y;
+    if (wall == NOWHERE) return;
+    if ((kind == CAP && wall > BASE) || (kind == STEM && wall == ARC) || (wall == ARC && y < 0) ||
+        (wall > BASE && kind == MUSHROOM && y > 0)) {
+        stop(flight, REJECTED, "state.wall: there is no such wall, or not at this y");
+        return;
+    }
+    if (kind == MUSHROOM && wall != BASE && y == 0) stop(flight, UNDECIDED, "the state is in a corner");
+    flight->from.wall = NOWHERE;
+    Gap g = gap(flight, wall, 0);
+    flight->from.wall = wall;
+    double size = wall == FLOOR ? flight->h : kind == STEM ? flight->w : flight->r; /* the wall's own, now */
+    if (wall == LEFT || wall == RIGHT) size = fmax(flight->w, fabs(flight->from.x));
+    if (fabs(g.f) > 0x1p-20 * size * (wall == ARC ? 2 * size : 1))
+        stop(flight, REJECTED, "state.wall: the state is not on that wall");
+    if (g.slope < 0) stop(flight, REJECTED, "state.wall: starts on it and moves into it");
+    if (g.slope == 0) stop(flight, UNDECIDED, "it rests on its wall");
 }
 
 static Event first_hit(Flight *flight, double horizon) {
     State from = flight->from;
     int inside = is_in_cap(flight);
     double begin = 0;
-    check_inside(flight, inside);
+    check_inside(flight, inside); /* first: a corner is one whichever way the particle moves */
+    check_wall(flight);
     for (;;) {
         int leaves = inside ? from.vy < 0 : from.vy > 0;
         double level = INFINITY; /* when it reaches the level of the mouth */
@@ -274,25 +300,6 @@ static Event first_hit(Flight *flight, double horizon) {
     }
 }
 
-static void check_wall(Flight *flight) {
-    int wall = flight->from.wall, kind = flight->table->kind;
-    double y = flight->from.y;
-    if (wall == NOWHERE) return;
-    if ((kind == CAP && wall > BASE) || (kind == STEM && wall == ARC) || (wall == ARC && y < 0) ||
-        (wall > BASE && kind == MUSHROOM && y > 0)) {
-        stop(flight, REJECTED, "state.wall: there is no such wall, or not at this y");
-        return;
-    }
-    flight->from.wall = NOWHERE;
-    Gap g = gap(flight, wall, 0);
-    flight->from.wall = wall;
-    double size = wall == FLOOR ? flight->table->h.high : kind == STEM ? flight->table->w.high : flight->table->r.high;
-    if (fabs(g.f) > 0x1p-20 * size * (wall == ARC ? 2 * size : 1))
-        stop(flight, REJECTED, "state.wall: the state is not on that wall");
-    if (g.slope < 0) stop(flight, REJECTED, "state.wall: starts on it and moves into it");
-    if (g.slope == 0) stop(flight, UNDECIDED, "it rests on its wall");
-}
-
 /* One step: moves *state on. The event says what happened; flight->status whether it did. */
 static Event step(Flight *flight, const Table *table, State *state, double t_end) {
     State q = *state;
@@ -307,7 +314,6 @@ static Event step(Flight *flight, const Table *table, State *state, double t_end
     double speed = fmax(fabs(q.vx), fabs(q.vy));
     if ((table->kind & CAP) && (flight->r < LEAST || (speed > 0 && speed < LEAST)))
         stop(flight, UNDECIDED, "squares of numbers below 1e-150 may vanish");
-    check_wall(flight);
     Event event = first_hit(flight, t_end - q.t);
     double s = event.s, nx = 0, ny = table->kind == STEM && event.wall == BASE ? -1 : 1, rate;
     state->x += s * q.vx, state->y = event.wall == BASE ? 0 : q.y + s * q.vy;

@@ -261,11 +261,14 @@ class Flight {
   }
 
   checkInside(walls) {
-    for (const wall of walls) {
+    // On y = 0 the mouth ends at the sides, and the base at the arc.
+    const isLevel = this.table.kind === "mushroom" && this.left === null && this.y === 0;
+    for (const wall of isLevel ? ["arc", "left", "right", "floor"] : walls) {
       const [f, slope, error] = this.gap(wall, 0);
-      if (wall === this.left || (wall === "base" && f === 0 && slope > 0)) continue;
-      if (f < -error) throw new Refused(`the state is beyond wall ${wall}`);
-      if (f <= error) throw new Open(`the state is on wall ${wall} within rounding`);
+      const isLeftUnsaid = this.left === null && wall === "base" && f === 0 && slope > 0;
+      if (wall === this.left || isLeftUnsaid) continue;
+      if (abs(f) <= error) throw new Open(`the state is on wall ${wall} within rounding`);
+      if (f < 0 && walls.includes(wall)) throw new Refused(`the state is beyond wall ${wall}`);
     }
   }
 
@@ -277,7 +280,10 @@ class Flight {
       const here = WALLS[inside ? "cap" : "stem"].filter((wall) => !(isMushroom && wall === "base"));
       const leaves = isMushroom && this.left !== "base" && (inside ? this.vy < 0 : this.vy > 0);
       const level = leaves ? max(0, -this.y / this.vy) : Infinity; // when it reaches the level of the mouth
-      if (begin === 0) this.checkInside(here);
+      if (begin === 0) {
+        this.checkInside(here); // first: a corner is one whichever way the particle moves
+        this.checkWall();
+      }
       const found = this.roots(here, begin, min(horizon, level, Number.MAX_VALUE / 2) * (1 + 8 * U));
       found.push({ kind: "mouth", s: level, error: 4 * U * level, slope: this.vy });
       found.push({ kind: "horizon", s: horizon, error: 2 * U * horizon });
@@ -306,10 +312,12 @@ class Flight {
     if (left === null) return;
     const isElsewhere = left === "arc" ? y < 0 : y > 0 && table.kind === "mushroom" && left !== "base";
     if (!WALLS[table.kind].includes(left) || isElsewhere) throw new Refused(`state.wall = ${left} at y = ${y}`);
+    if (table.kind === "mushroom" && left !== "base" && y === 0) throw new Open("the state is in a corner");
     this.left = null;
     const [f, slope] = this.gap(left, 0);
     this.left = left;
-    const size = left === "floor" ? table.h.high : (table.r ?? table.w).high;
+    const { h, r, w } = this.now; // of which a small part is what rounding may have moved a state
+    const size = left === "floor" ? h : left === "left" || left === "right" ? max(w, abs(this.x)) : (r ?? w);
     if (abs(f) > 2 ** -20 * size * (left === "arc" ? 2 * size : 1)) throw new Refused(`state is not on wall ${left}`);
     if (slope < 0) throw new Refused(`state.wall = ${left}: starts on it and moves into it`);
     if (slope === 0) throw new Open("it rests on its wall");
@@ -340,7 +348,6 @@ function step(table, state, tEnd) {
   const speed = max(abs(vx), abs(vy));
   const isTiny = table.r?.at(t) < LEAST || (speed > 0 && speed < LEAST);
   if (table.r && isTiny) throw new Open(`squares of numbers below ${LEAST} may vanish`);
-  flight.checkWall();
   const { kind, s, slope } = flight.firstHit(tEnd - t);
   const [X, Y] = [x + s * vx, y + s * vy];
   if (kind === "horizon") return { outcome: "horizon", t: tEnd, x: X, y: Y, vx, vy };

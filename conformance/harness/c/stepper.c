@@ -132,18 +132,19 @@ static Law mouth_bounds(const Table *table) {
 
 /* Flights ---------------------------------------------------------------------------------------------- */
 
-/* f is written as f(0) plus its change; f(0) is taken out for the wall that the particle leaves. */
+/* f is written as f(0) plus its change; f(0) is taken out for the wall that the particle leaves. Where a law's
+   argument is rounded, late in time, f moves by that of it: `late`, the part of f' that the laws make, times t. */
 static Gap gap(const Flight *flight, int wall, double s) {
     const Table *table = flight->table;
     double t = flight->from.t, x = flight->from.x, y = flight->from.y, vx = flight->from.vx, vy = flight->from.vy;
-    double first, size, change, moved, slope, rate, up;
+    double first, size, change, moved, slope, rate, up, late = 0;
     if (wall == ARC) {
         double grown = rise(&table->r, t, s, &rate), square = vx * vx + vy * vy, along = x * vx + y * vy;
         first = flight->r * flight->r - (x * x + y * y);
         size = table->r.high * table->r.high + x * x + y * y;
         change = grown * (2 * flight->r + grown) - s * (2 * along + s * square);
         moved = fabs(grown) * 2 * table->r.high + s * (2 * fabs(x * vx) + 2 * fabs(y * vy) + s * square);
-        slope = 2 * (flight->r + grown) * rate - 2 * (along + s * square);
+        late = 2 * (flight->r + grown) * rate, slope = late - 2 * (along + s * square);
     } else if (wall == LEFT || wall == RIGHT) {
         double side = wall == LEFT ? 1 : -1, tilt_rate;
         double grown = mouth_rise(flight, s, &rate), tilt = rise(&table->lean, t, s, &tilt_rate);
@@ -151,17 +152,17 @@ static Gap gap(const Flight *flight, int wall, double s) {
         size = mouth_bounds(table).high + table->lean.high * fabs(y) + fabs(x);
         change = grown + tilt * (y + s * vy) + s * (flight->lean * vy + side * vx);
         moved = fabs(grown) + fabs(tilt * (y + s * vy)) + s * (fabs(flight->lean * vy) + fabs(vx));
-        slope = rate + tilt_rate * (y + s * vy) + (flight->lean + tilt) * vy + side * vx;
+        late = rate + tilt_rate * (y + s * vy), slope = late + (flight->lean + tilt) * vy + side * vx;
     } else if (wall == FLOOR) {
         double grown = rise(&table->h, t, s, &rate);
         first = y + flight->h, size = fabs(y) + table->h.high;
-        change = s * vy + grown, moved = s * fabs(vy) + fabs(grown), slope = vy + rate;
+        change = s * vy + grown, moved = s * fabs(vy) + fabs(grown), late = rate, slope = vy + late;
     } else {
         up = table->kind == STEM ? -1 : 1;
         first = up * y, size = fabs(y), change = up * s * vy, moved = s * fabs(vy), slope = up * vy;
     }
-    if (wall == flight->from.wall) first = size = 0;
-    return (Gap){first + change, slope, SLACK * U * (size + moved)};
+    if (wall == flight->from.wall) first = size = late = 0;
+    return (Gap){first + change, slope, SLACK * U * (size + moved + fabs(late * t))};
 }
 
 static double curvature(const Flight *flight, int wall) {

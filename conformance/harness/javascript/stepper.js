@@ -179,34 +179,38 @@ class Flight {
   }
 
   // [f(s), f'(s), the rounding error that f may carry]. f is written as f(0) plus its change: f(0) is taken out
-  // for the wall that the particle leaves.
+  // for the wall that the particle leaves. Where a law's argument is rounded, late in time, f moves by that of it:
+  // `late`, the part of f' that the laws make, times t.
   gap(wall, s) {
     const { x, y, vx, vy, t, table, now } = this;
     let first, size, change, moved, slope;
+    let late = 0;
     if (wall === "arc") {
       const [rise, rate] = table.r.rise(t, s);
       const [square, along] = [vx * vx + vy * vy, x * vx + y * vy];
       [first, size] = [now.r * now.r - (x * x + y * y), table.r.high ** 2 + x * x + y * y];
       change = rise * (2 * now.r + rise) - s * (2 * along + s * square);
       moved = abs(rise) * 2 * table.r.high + s * (2 * abs(x * vx) + 2 * abs(y * vy) + s * square);
-      slope = 2 * (now.r + rise) * rate - 2 * (along + s * square);
+      late = 2 * (now.r + rise) * rate;
+      slope = late - 2 * (along + s * square);
     } else if (wall === "left" || wall === "right") {
       const side = wall === "left" ? 1 : -1;
       const [[rise, rate], [tilt, tiltRate]] = [table.w.rise(t, s), table.slope.rise(t, s)];
       [first, size] = [now.w + now.slope * y + side * x, table.w.high + table.slope.high * abs(y) + abs(x)];
       change = rise + tilt * (y + s * vy) + s * (now.slope * vy + side * vx);
       moved = abs(rise) + abs(tilt * (y + s * vy)) + s * (abs(now.slope * vy) + abs(vx));
-      slope = rate + tiltRate * (y + s * vy) + (now.slope + tilt) * vy + side * vx;
+      late = rate + tiltRate * (y + s * vy);
+      slope = late + (now.slope + tilt) * vy + side * vx;
     } else if (wall === "floor") {
       const [rise, rate] = table.h.rise(t, s);
       [first, size, change] = [y + now.h, abs(y) + table.h.high, s * vy + rise];
-      [moved, slope] = [s * abs(vy) + abs(rise), vy + rate];
+      [moved, late, slope] = [s * abs(vy) + abs(rise), rate, vy + rate];
     } else {
       const up = table.kind === "stem" ? -1 : 1;
       [first, size, change, moved, slope] = [up * y, abs(y), up * s * vy, s * abs(vy), up * vy];
     }
-    if (wall === this.left) first = size = 0;
-    return [first + change, slope, SLACK * U * (size + moved)];
+    if (wall === this.left) first = size = late = 0;
+    return [first + change, slope, SLACK * U * (size + moved + abs(late * t))];
   }
 
   curvature(wall) {

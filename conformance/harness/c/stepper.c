@@ -289,6 +289,7 @@ static Event first_hit(Flight *flight, double horizon) {
             hit.s = times[wall], times[wall] = INFINITY;
             if (hit.s < first.s) other = first, its_error = error, first = hit, error = hit_error;
             else if (hit.s < other.s) other = hit, its_error = hit_error;
+            else if (hit.s - first.s <= error + hit_error) stop(flight, UNDECIDED, "three events come within rounding");
         }
         if (flight->status != FOUND) return first;
         int on_base = first.kind == MOUTH && inside && is_on_base(flight, first.s);

@@ -291,10 +291,11 @@ class Flight {
       const found = this.roots(here, begin, min(horizon, level, Number.MAX_VALUE / 2) * (1 + 8 * U));
       found.push({ kind: "mouth", s: level, error: 4 * U * level, slope: this.vy });
       found.push({ kind: "horizon", s: horizon, error: 2 * U * horizon });
-      const [first, other] = found.sort((a, b) => a.s - b.s || 0);
+      const [first, other, third] = found.sort((a, b) => a.s - b.s || 0);
       const onBase = first.kind === "mouth" && inside && this.isOnBase(first.s);
       const kinds = [first.kind, other.kind];
-      const isPair = kinds.includes("mouth") && kinds.includes("horizon");
+      const isThree = third && third.s - first.s <= first.error + third.error;
+      const isPair = kinds.includes("mouth") && kinds.includes("horizon") && !isThree;
       if (other.s - first.s <= first.error + other.error && (onBase || !isPair))
         throw new Open(`${kinds.join(" and ")} come within rounding`);
       if (onBase) return { ...first, kind: "base" };

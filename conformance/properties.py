@@ -1,9 +1,10 @@
 """Exact properties of the billiard, to hold any Python stepper to, with no certified answer at hand.
 
 A check takes a stepper, a question and raises AssertionError, in one line, when the answer breaks the
-property, or is no outcome of this scene at all. It returns True when it compared numbers and False when it
-had nothing to say: the outcome is undecided, undefined or rejected, the property is not about this table, or
-the question is so delicate that nudging it changes the wall. In a Hypothesis test:
+property, is no outcome of this scene at all, or refuses a state clearly inside. It returns True when it
+compared numbers and False when it had nothing to say: the outcome is undecided, undefined or rightly
+rejected, the property is not about this table, or the question is so delicate that nudging it changes the
+wall. In a Hypothesis test:
 
     @given(conformance.strategies.scenes_and_states())
     def test_mirror(drawn):

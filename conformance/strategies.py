@@ -277,9 +277,10 @@ def states(draw: st.DrawFn, scene: Scene) -> tuple[State, float]:
     Returns:
         (state, t_end). The place is uniform or close to a wall, corner, the mouth or the centre;
         the speed is 10^-3 to 10^6 times that of the walls (of the table's size per unit of time
-        when nothing moves); t lies within a few periods, sometimes on a knot or at 0; t_end is
-        late enough for a collision, or early, or t itself. Half of the states leave a wall: they
-        lie on it up to the rounding of x and y, and their gap to it grows.
+        when nothing moves), or what a reflection from them makes of that; t lies within a few periods of 0 or
+        of a thousand of them, sometimes on a knot or at 0; t_end is mostly late enough for a collision, or
+        early, or t itself. About half of the states leave a wall: they lie on it up to the rounding of x and
+        y, and their gap to it grows. Of what is hit the base of a mushroom comes least, in 2 hits of 100.
     """
     t = _time(draw, scene)
     place = _Place.of(scene, t)

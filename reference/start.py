@@ -166,6 +166,9 @@ def _check_residual(scene: Scene, state: State, motion: MovingWalls) -> None:
         gap = gap / (2 * size)
     low, high = exact_ends(gap)
     least, largest = exact_ends(size)
+    if wall in ("left", "right"):
+        # Where a stem is wider below, its side is as far from the axis as the state, and x rounds with that.
+        least, largest = (max(end, abs(Fraction(state.x))) for end in (least, largest))
     if max(-low, high) <= Fraction(ON_WALL) * least:
         return
     if max(low, -high) <= Fraction(ON_WALL) * largest:

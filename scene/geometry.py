@@ -43,7 +43,7 @@ class TableAt(NamedTuple):
 
     @property
     def size(self) -> Any:
-        """Return a length that no chord of the table exceeds [length]."""
+        """Return a length [length] that no chord exceeds but in a stem that is wider below."""
         return 2 * self.r + 2 * self.w + self.h
 
     def rounded(self) -> TableAt:

@@ -19,11 +19,13 @@ from conformance import plain
 from conformance.grading.agreement import compare
 from conformance.plain.motion import BangBangMotion, FourierMotion
 from conformance.strategies import scenes_and_states
-from scene import Cap, Collision, Fourier, Horizon, Rejected, State, Undecided
+from scene import BangBang, Cap, Collision, Fourier, Horizon, Rejected, State, Stem, Undecided
 
 N_STEPS = 150  # the corpus asks many more
 BOUND = 1024.0  # backward ulps; the worst of 2,500 steps was 218, at a slow particle before a fast wall
 UNDECIDED_SHARE = 0.08
+# Its floor, left at speed 1/4 at t = 0, is touched again at t = 7/8: f = (s - 7/8)^2 / 2.
+DROP = Stem(w=1.0, h=BangBang(knots=((-1.0, 1.0), (0.125, 1.0), (1.125, 0.75), (2.0, 0.75), (3.0, 1.0))))
 
 
 def test_plain_agrees_with_reference(tally):
@@ -72,6 +74,12 @@ def test_legs_close_after_any_period(t, s):
         (STATIC, State(0.0, 0.25, 0.25, 1.0, -1.0), Undecided),  # the mouth's edge
         (LIFT, State(0.0, 0.0, -1.0, 0.0, 0.0), Undecided),  # a touch
         (LIFT, State(0.0, 0.0, -2.0, 0.0, 0.0, "floor"), Undecided),  # sliding
+        (DROP, State(0.0, 0.25, -1.0, 0.0, 0.25, "floor"), Undecided),  # a touch of the floor that is left
+        (DROP, State(0.0, 0.25, -1.0 + 2.0**-30, 0.0, 0.25, "floor"), Undecided),
+        (CIRCLE, State(0.0, 0.0, 1.0, 1.0, -1.0, "arc"), Undecided),  # a corner of the arc that is left
+        (STATIC, State(0.0, 0.025, 0.0, 0.25, 0.0), Undecided),  # along the mouth to its edge at t_end
+        (STATIC, State(0.0, 0.5, 0.0, 0.25, 1.0), Undecided),  # at the mouth's edge
+        (STATIC, State(0.0, 1.0, 0.0, 0.25, -1.0), Undecided),  # where the base ends
         (CIRCLE, State(0.0, 0.9, 0.9, 1.0, 0.0), Rejected),
         (CIRCLE, State(0.0, 0.6, 0.8, 1.0, 0.0, "arc"), Rejected),
         (CIRCLE, State(0.0, math.nan, 0.8, 1.0, 0.0), Rejected),
@@ -81,6 +89,12 @@ def test_legs_close_after_any_period(t, s):
 )
 def test_what_it_does_not_answer_it_says(scene, state, kind):
     assert isinstance(plain.next_collision(scene, state, 1.9), kind)
+
+
+def test_the_mouth_is_open_as_the_side_that_is_left_sees_it():
+    """2^-24 outside of the left side by rounding, and going inwards: no base is met from below."""
+    found = plain.next_collision(STATIC, State(0.0, -0.5 - 2.0**-24, -0.25, 2.0**-26, 1.0, "left"), 9.0)
+    assert found.wall == "arc"
 
 
 @pytest.mark.parametrize("sign", [-1.0, 1.0])

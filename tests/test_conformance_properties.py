@@ -9,17 +9,20 @@ import msgspec
 import numpy as np
 import pytest
 from hypothesis import given, settings
+from hypothesis import strategies as st
 from support import tables
 from support.depth import deep_but
 
 import fast
 import reference
 from conformance import plain
+from conformance.grading.called import is_clearly_inside
 from conformance.mutants import MUTANTS
 from conformance.profiles import check_work_identity
 from conformance.properties import PROPERTIES, check_mirror, check_period_shift, check_scaling
 from conformance.strategies import scenes_and_states
-from scene import Collision, Fourier, Horizon, Mushroom, State, Stem, Undecided, load, transforms
+from scene import Collision, Fourier, Horizon, Mushroom, Rejected, State, Stem, Undecided, load, transforms
+from scene.geometry import rounded
 from scene.laws import is_constant
 from scene.tables import laws, period
 
@@ -169,6 +172,34 @@ def test_what_is_no_outcome_is_refused(name, no_outcome):
     with pytest.raises(AssertionError) as refusal:
         PROPERTIES[name](stepper, *LIFT)
     assert re.fullmatch(r"outcome: .*, must be .*; \{\"cmd\": \"step\".*\}", str(refusal.value))
+
+
+@pytest.mark.parametrize("name", PROPERTIES)
+@pytest.mark.parametrize("question", [GALLERY, LIFT], ids=["cap", "stem"])
+def test_refusing_every_state_holds_no_property(name, question):
+    with pytest.raises(AssertionError, match=r"outcome: .*must be no refusal of a state clearly inside"):
+        PROPERTIES[name](lambda *_: Rejected("no"), *question)
+
+
+def test_what_is_clearly_inside_is_refused_by_nobody(tally):
+    """Drawn states and nudged ones, inside and out: where an honest stepper refuses, it is never clear."""
+    steppers = [reference.next_collision, *HONEST.values()]
+
+    @settings(max_examples=150)
+    @given(scenes_and_states(), st.sampled_from((0.0, 0.0, 0.5, 2.0**-12, 2.0**-18)))
+    def question(drawn, off):
+        scene, state, t_end = drawn
+        size = rounded(scene, state.t).size
+        state = msgspec.structs.replace(state, x=state.x + off * size, y=state.y - off * size)
+        is_clear = is_clearly_inside(scene, state, t_end)
+        tally["clear" if is_clear else "not clear"] += 1
+        for stepper in steppers:
+            is_refused = isinstance(stepper(scene, state, t_end), Rejected)
+            tally["refused"] += is_refused
+            assert not (is_clear and is_refused), stepper
+
+    question()
+    assert min(tally["clear"], tally["not clear"], tally["refused"]) > 20
 
 
 def test_numbers_of_other_kinds_are_taken():

@@ -130,6 +130,7 @@ AT_EVERY_STEP = {
     "unknown-wall": ("wrong-format", "lid"),
     "reason-of-its-own": ("wrong-format", "reason"),
     "own-error": ("error", "out of memory"),
+    "own-error-beside-an-outcome": ("error", "out of memory"),
     "exit-silently": ("crashed", "exited with status 0 before it answered"),
     "close-stdout": ("crashed", "closed its standard output"),
     "end-by-a-nameless-signal": ("crashed", "was killed by signal 40 before it answered"),
@@ -339,6 +340,31 @@ def test_whole_numbers_are_read_however_they_are_written():
     ):
         with pytest.raises(Trouble, match="wrong-format"):
             read_answer(line, "time", 1)
+
+
+@pytest.mark.parametrize(
+    ("cmd", "rest"),
+    [
+        ("step", '"outcome":"rejected","reason":"r"'),
+        ("trajectory", '"steps":[]'),
+        ("trajectory", '"outcome":"rejected","reason":"r"'),
+        ("flow", '"states":[]'),
+        ("time", '"ns":[1],"steps":[]'),
+    ],
+)
+def test_a_failure_counts_whatever_stands_beside_it(cmd, rest):
+    """One rule for every command: an outcome once hid the error, and an error hid steps."""
+    beside = '{"seq":1,"error":%s,' + rest + "}"
+    assert read_answer((beside % '"no"').encode(), cmd, 1) == {"error": "no"}
+    assert set(read_answer((beside % "null").encode(), cmd, 1)) < {
+        "outcome",
+        "reason",
+        "steps",
+        "states",
+        "ns",
+    }
+    with pytest.raises(Trouble, match=r"wrong-format.*error"):
+        read_answer((beside % "0.5").encode(), cmd, 1)
 
 
 def test_right_answers_are_read():

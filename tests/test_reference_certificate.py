@@ -36,6 +36,16 @@ def proved(scene, state, t_end=50.0):
     return certificate(scene, state, t_end, outcome)
 
 
+def test_a_wall_that_lifts_off_at_rest_is_proved_again():
+    """The arc's radius is 1/2 + s^2 / 2 up to s = 1: no ball of all of that shows f'' > 0."""
+    lifting = Cap(r=BangBang(knots=((0.0, 0.5), (2.0, 1.5), (2.25, 2.0), (4.0, 0.5))))
+    claim = proved(lifting, State(0.0, -0.3, 0.4, 0.0, 0.0, "arc"), 3.0)
+    assert claim["excluded"]["arc"][0][2] == "lifting"
+    check(claim)
+    with pytest.raises(Refuted):
+        check(proved(lifting, State(0.0, -0.3, 0.4, 0.0, 0.0, "arc"), 3.0) | {"t_end": 4.0})
+
+
 def test_every_answer_is_proved_again(tally):
     @settings(max_examples=N_EXAMPLES)
     @given(scenes_and_states())

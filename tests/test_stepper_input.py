@@ -11,8 +11,10 @@ from support.refusals import HUGE, NO_NUMBERS
 
 import fast
 import reference
+from conformance import plain, second_stepper
+from conformance.generator.draws import Draw
 from fast.batch import careful_steps
-from scene import BadInput, BangBang, Cap, Horizon, Mushroom, Rejected, State, load
+from scene import BadInput, BangBang, Cap, Collision, Horizon, Mushroom, Rejected, State, Stem, load
 
 CAP, MUSHROOM = Cap(r=1.0), Mushroom(r=1.0, h=1.0, w=0.5)
 GOOD = {"t": 0.0, "x": 0.1, "y": 0.3, "vx": 1.0, "vy": 0.7}
@@ -181,3 +183,36 @@ def test_catalogue_names_are_answered_with_a_hint():
     for name in ENTRIES:
         assert "scene.load('moving-cap')" in refusal(name, {"scene": "moving-cap"})
     assert refusal("simulate", {"scene": load("moving-cap")}) is None
+
+
+def deep_stem(draw):
+    """Draw a stem that is up to 2^60 times as wide below as at its mouth, and a start in it."""
+    w, h = draw.between(0.5, 1.5), draw.power(-10, 40)
+    slope = -draw.power(-10, 60) * w / h
+    y = -h * draw.between(0.0, 0.9)
+    x = (w + slope * y) * draw.between(-0.9, 0.9)
+    turn, speed = draw.between(0.0, 6.28), w - slope * h
+    table = Stem(w=w, h=h, slope=slope) if draw.part() < 0.5 else Mushroom(r=2.0, w=w, h=h, slope=slope)
+    return table, State(0.0, x, y, speed * math.cos(turn), speed * math.sin(turn) * draw.power(-10, 0))
+
+
+def test_no_outcome_is_refused_as_the_next_start(tally):
+    """However deep and slanted the stem: where x is rounded by more than 2^-20 of the mouth, too."""
+    steppers = {"fast": fast.next_collision, "plain": plain.next_collision}
+    for index in range(60):
+        table, state = deep_stem(Draw(f"deep/{index}"))
+        for _ in range(3):
+            found = reference.next_collision(table, state, 1e9, digits=20)
+            if not isinstance(found, reference.Collision):
+                assert not isinstance(found, Rejected), (table, state, found)
+                break
+            for name, step in steppers.items():
+                answer = step(table, state, 1e9)
+                tally[f"{name} {type(answer).__name__}"] += 1
+                assert not isinstance(answer, Collision) or answer.wall == found.wall, (table, state, name)
+                assert not isinstance(answer, Rejected), (table, state, answer)
+            assert second_stepper.next_collision(table, state, 1e9).wall in (found.wall, None)
+            state = found.rounded().state()
+            tally["deep"] += abs(state.x) > 2.0**33 * table.w
+    assert tally["deep"] > 30
+    assert min(tally["fast Collision"], tally["plain Collision"]) > 100

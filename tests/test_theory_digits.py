@@ -87,6 +87,14 @@ def test_many_digits_are_what_they_were():
     assert (told[0], told[-1]) == (0.0, 1.0)
 
 
+def test_many_digits_of_a_cycle_that_gains_nothing():
+    """Its log g is rounding alone, which no number of points resolves, nor need they."""
+    digits = 84
+    found = captures(Cycle.of(scene.load("moving-cap-trivial"), digits), digits + 4)
+    assert abs(found.growth()) < found.cycle.ctx.mpf(10) ** -digits
+    assert len(found.placed) < 50
+
+
 def test_progress_tells_the_resolution_and_how_far_it_is(monkeypatch):
     monkeypatch.setattr(theory.solutions, "FEW_DIGITS", 0)
     told = []

@@ -305,9 +305,10 @@ def _is_hopeless(cycle: Cycle, grid: Grid, piece: CapturePiece, part: tuple[int,
     with ctx.workprec(TRIAL_BITS):
         trial = Grid(ctx, TRIAL)
         sampled = _sampled(cycle, trial, piece, part)
-        for values in (sampled.a, sampled.b, sampled.log_g):
+        # As in `_panel`: log g beside 1, for in a cycle that gains nothing all of it is rounding.
+        for values, size in ((sampled.a, 0), (sampled.b, 0), (sampled.log_g, 1)):
             found = trial.coefficients(values)
-            first, last = max(map(abs, found)), _tail(found)
+            first, last = max(size, *map(abs, found)), _tail(found)
             fallen = -ctx.log10(last / first) if last else ctx.inf
             if fallen * grid.n / TRIAL < HOPELESS * target:
                 return True

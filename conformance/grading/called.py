@@ -1,8 +1,9 @@
 """A stepper called from Python: what it returns is an outcome of the question, or an AssertionError says not.
 
 A stepper that forgets to return would else leave every property with nothing to say, as one that is
-undecided does. Numbers of any kind that `float` takes are taken (numpy's too); whether they are right is not
-judged here.
+undecided does, and so would one that refuses every state: what is clearly inside, off all walls and of
+numbers that every stepper can hold, must not be `rejected`. Numbers of any kind that `float` takes are taken
+(numpy's too); whether they are right is not judged here.
 """
 
 from __future__ import annotations
@@ -14,9 +15,30 @@ from typing import Any, NoReturn
 
 import msgspec
 
-from scene import Collision, Horizon, Outcome, Rejected, Scene, State, Undecided, Undefined, to_data
+from scene import (
+    BadInput,
+    Cap,
+    Collision,
+    Horizon,
+    Mushroom,
+    Outcome,
+    Rejected,
+    Scene,
+    State,
+    Undecided,
+    Undefined,
+    to_data,
+)
+from scene.geometry import DIGITS, table_at
+from scene.laws import bounds
+from scene.precision import decimals
 from scene.refusal import shown
-from scene.states import Stepper
+from scene.states import Stepper, check_numbers
+from scene.tables import Wall, cycle_length, laws
+
+MOST = 2.0**100  # sizes, speeds and their inverses within it overflow nowhere
+FAR = 2.0**20  # periods from t = 0 that every stepper must reach
+CLEAR = 2.0**-20  # of a wall's f beside its terms: farther inside than any rounding leads
 
 
 def answering(stepper: Stepper) -> Stepper:
@@ -42,8 +64,35 @@ def fail(name: str, text: str, scene: Scene, state: State, t_end: float) -> NoRe
     raise AssertionError(f"{name}: {text}; {json.dumps(line)}")
 
 
+def is_clearly_inside(scene: Scene, state: State, t_end: float) -> bool:
+    """Tell whether a state is one that no stepper may refuse; of one on a wall this does not judge."""
+    try:
+        check_numbers(scene, state, t_end)
+    except BadInput:
+        return False
+    sizes = [abs(extent) for law in laws(scene).values() for extent in bounds(law)]
+    sizes += [abs(number) for number in (state.x, state.y, state.vx, state.vy)]
+    is_far = max(abs(state.t), abs(t_end)) > FAR * (cycle_length(scene) or 1.0)
+    if state.wall is not None or is_far or any(size and not 1 / MOST < size < MOST for size in sizes):
+        return False
+    ctx = decimals(DIGITS)
+    table, x, y = table_at(ctx, scene, state.t), ctx.mpf(state.x), ctx.mpf(state.y)
+    near: tuple[Wall, ...] = ("left", "right", "floor", "base")
+    if state.y > 0 or isinstance(scene, Cap):
+        near = ("arc", "base")
+    elif isinstance(scene, Mushroom) and state.y == 0:
+        return False
+    elif isinstance(scene, Mushroom):
+        near = near[:3]
+    terms = {"arc": table.r**2, "floor": table.h, "base": max(table.r, table.h)}
+    side = table.w + abs(table.slope * y)
+    return all(table.gap(wall, x, y) > CLEAR * terms.get(wall, side) for wall in near)
+
+
 def _outcome(stepper: Stepper, scene: Scene, state: State, t_end: float) -> Outcome:
     found: Any = stepper(scene, state, t_end)
+    if isinstance(found, Rejected) and is_clearly_inside(scene, state, t_end):
+        fail("outcome", f"{found}, must be no refusal of a state clearly inside", scene, state, t_end)
     if isinstance(found, Undefined | Undecided | Rejected):
         return found
     if not isinstance(found, Collision | Horizon):

@@ -94,16 +94,24 @@ def judged(scene: Scene, state: State, t_end: float) -> Outcome | None:
     place = f"state (x, y) = ({state.x!r}, {state.y!r}) at t = {state.t!r}"
     if wall is None and state.y == state.vy == 0:
         return Undecided("it flies along the mouth")
+    if wall not in (None, "base") and state.y == 0:
+        return Undecided(f"{place} is in a corner")
     size = float(table.size) + abs(state.t) * _rates(table, state)
-    for other in near_walls(scene, is_in_cap(scene, state)):
+    near = near_walls(scene, is_in_cap(scene, state))
+    # On y = 0 the mouth ends at the sides, and the base at the arc.
+    ends: tuple[Wall, ...] = ("arc", "left", "right") if wall is None and state.y == 0 else ()
+    for other in (*ends, *near):
         gap = gap_at(table, other, state.x, state.y)
-        if other != wall and gap < -ROUNDING * size:
-            return Rejected(f"{place} is beyond wall {other}")
-        if other != wall and gap <= ROUNDING * size:
+        if other != wall and abs(gap) <= ROUNDING * size:
             return Undecided(f"{place} is on wall {other} within rounding")
+        if other != wall and gap < 0 and other in near:
+            return Rejected(f"{place} is beyond wall {other}")
     if wall is None:
         return None
-    if abs(gap_at(table, wall, state.x, state.y)) > ON_WALL * float(table.size) / 2:
+    own = {"arc": table.r, "floor": table.h, "base": max(table.r, table.w)}.get(
+        wall, max(table.w, abs(state.x))
+    )
+    if abs(gap_at(table, wall, state.x, state.y)) > ON_WALL * own:
         return Rejected(f"{place} is not on wall {wall}")
     rate = float(table.gap_rate(wall, state.x, state.y, state.vx, state.vy))
     if wall == "base" and rate == 0:

@@ -94,6 +94,7 @@ class Flight:
             return refusal
         if self.wall is None and self.y == 0 and self.vy == 0:
             hit = self.first_hit(("left", "right"), 0.0, self.end)
+            self.require_clear(("left", "right"), self.end if self.is_horizon else 0.0)
             return Undefined("mouth-edge") if hit else self.horizon()
         near = self.walls_near(in_cap=self.is_in_cap)
         if self.is_horizon and abs(self.crossing - self.end) <= ROUNDING * self.end:
@@ -109,7 +110,6 @@ class Flight:
         elif self.crossing < inf:
             near = (*near, "base")  # a tie of hit and crossing is a corner
         self.require_clear(near, self.end if self.is_horizon else 0.0)
-        self.require_clear_of_own(near)
         if hit is None:
             return self.horizon()
         wall, s = hit
@@ -130,7 +130,7 @@ class Flight:
 
     def is_mouth_open(self, s: float) -> bool:
         """Tell whether |x| < w at the time of the crossing."""
-        room = self.width(s).now - abs(self.x + self.vx * s)
+        room = min(self.f(wall, s)[0] for wall in ("left", "right"))  # by f of the side left, as all is
         if abs(room) <= self.noise("right", s):
             raise Open("the mouth's edge is met within rounding")
         return room > 0
@@ -157,7 +157,7 @@ class Flight:
             fa, fb = self.f(wall, a)[0], self.f(wall, b)[0]
             if fa <= 0:
                 raise Open(f"f of {wall} has no sign where it should be positive")
-            noise = 0.0 if wall == self.wall else self.noise(wall, b)
+            noise = self.noise(wall, b)
             if min(fa, fb) > bend * width * width / 8 + noise:
                 continue
             slope = self.f(wall, middle)[1]
@@ -243,7 +243,12 @@ class Flight:
 
     def noise(self, wall: Wall, s: float) -> float:
         """Bound what rounding may change a wall's f by."""
-        late = abs(self.gap(wall, s).ft * self.state.t)
+        gap = self.gap(wall, s)
+        if (
+            wall == self.wall
+        ):  # 0 now, by definition: what rounding has changed since is that of the terms of f'
+            return ROUNDING * s * (abs(gap.ft) + abs(gap.fx * self.vx) + abs(gap.fy * self.vy))
+        late = abs(gap.ft * self.state.t)
         x, y = abs(self.x) + abs(self.vx) * s, abs(self.y) + abs(self.vy) * s
         size = {name: max(-law.lowest, law.highest) for name, law in self.bounds.items()}
         if wall == "arc":
@@ -254,20 +259,11 @@ class Flight:
         return ROUNDING * (w + size["slope"] * y + x + late)
 
     def require_clear(self, walls: Sequence[Wall], s: float) -> None:
-        """Leave open what comes first when a wall not being left passes the particle within rounding."""
+        """Leave open what comes first when a wall passes the particle, or is met again, within rounding."""
         for wall in walls:
-            if wall != self.wall and abs(self.f(wall, s)[0]) <= self.noise(wall, s):
+            is_there = wall != self.wall or s > 0
+            if is_there and abs(self.f(wall, s)[0]) <= self.noise(wall, s):
                 raise Open(f"at s = {s!r} the particle is on wall {wall} within rounding")
-
-    def require_clear_of_own(self, near: Sequence[Wall]) -> None:
-        """Leave open whether the wall being left is met again before t_end, where rounding decides it."""
-        if self.wall is None or self.wall not in near or not (self.is_horizon and self.end):
-            return
-        # Its f is 0 now, by definition: what rounding has changed since is that of the terms of f'.
-        gap = self.gap(self.wall, self.end)
-        terms = abs(gap.ft) + abs(gap.fx * self.vx) + abs(gap.fy * self.vy)
-        if abs(self.f(self.wall, self.end)[0]) <= ROUNDING * self.end * terms:
-            raise Open(f"wall {self.wall} is met again at t_end within rounding")
 
     def escape(self) -> float:
         """Return a time by which no table is large enough to have kept the particle."""
@@ -286,6 +282,8 @@ class Flight:
             return Rejected(f"state {where} is not on wall {wall}")
         if self.y == 0 and wall not in (None, "base"):
             return Undecided("the state is in a corner within rounding")
+        if self.y == 0 and wall is None:  # in a mushroom: in the mouth, or on the base, which end at these
+            self.require_clear(("left", "right", "arc"), 0.0)
         for near in self.walls_near(in_cap=self.is_in_cap):
             if near != wall and self.f(near, 0.0)[0] < -self.noise(near, 0.0):
                 if self.is_along_base(near):
@@ -297,23 +295,26 @@ class Flight:
     def is_along_base(self, beyond: Wall) -> bool:
         """Tell whether a state beyond a side, which names no wall, moves along a mushroom's base."""
         is_level = isinstance(self.scene, Mushroom) and self.wall is None and self.y == self.vy == 0
-        if not is_level or beyond == "floor":
-            return False
-        self.require_clear(("arc",), 0.0)
-        return self.f("arc", 0.0)[0] > 0
+        return is_level and beyond != "floor" and self.f("arc", 0.0)[0] > 0
 
     def refusal_of_departure(self, wall: Wall) -> Outcome | None:
         """Judge f(0) and f'(0) on the wall being left."""
         gap, slope = self.gap(wall, 0.0), self.f(wall, 0.0)[1]
-        size = {"arc": "r", "floor": "h"}.get(wall, "r" if "r" in self.bounds else "w")
-        extent = self.bounds[size].highest
-        if abs(gap.start) > ON_WALL * extent * (2 * extent if wall == "arc" else 1.0):
+        size = self.size(wall)
+        if abs(gap.start) > ON_WALL * size * (2 * size if wall == "arc" else 1.0):
             return Rejected(f"state.wall = {wall!r}, but f there is {gap.start!r}")
         if wall == "base" and slope == 0:
             return Undefined("sliding")
         if abs(slope) <= ROUNDING * (abs(gap.ft) + abs(gap.fx * self.vx) + abs(gap.fy * self.vy)):
             return Undecided(f"f' of {wall} vanishes at departure within rounding")
         return Rejected(f"state.wall = {wall!r}: the particle moves into it") if slope < 0 else None
+
+    def size(self, wall: Wall) -> float:
+        """Return the wall's size now: a state is on it up to a small part of that."""
+        if wall in ("left", "right"):
+            return max(self.width(0.0).value, abs(self.x))
+        name = "h" if wall == "floor" else "r" if "r" in self.laws else "w"
+        return self.laws[name].at(0.0).value
 
     def collision(self, wall: Wall, s: float) -> Collision:
         """Return the collision with a wall after the flight time s."""

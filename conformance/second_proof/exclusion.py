@@ -106,7 +106,7 @@ class Exclusion:
         if kind == "lifting":
             is_flat = self.begin[0] == self.begin[1] and wall in flight.residuals
             jet = flight.jet(wall, self.begin[0])
-            return is_flat and bool(jet[1] == 0) and bool(flight.over(wall, a, b)[2] > 0)
+            return is_flat and bool(jet[1] == 0) and flight.is_convex(wall, a, b)
         raise Refuted(f"no such kind: {kind}")
 
     def _holds_at_once(self, wall: Wall, a: fmpq, b: fmpq, kind: str) -> bool:

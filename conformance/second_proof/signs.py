@@ -110,6 +110,10 @@ class SignedFlight(BallFlight):
 
         return _everywhere(holds, a, b)
 
+    def is_convex(self, wall: Wall, a: Rational, b: Rational) -> bool:
+        """Tell whether f'' > 0 on [a, b], on one piece."""
+        return _everywhere(lambda low, high: bool(self.over(wall, low, high)[2] > 0), a, b)
+
     def is_concave(self, wall: Wall, a: Rational, b: Rational) -> bool:
         """Tell whether f'' <= 0 on [a, b], on one piece."""
         return _everywhere(lambda low, high: bool(self.over(wall, low, high)[2] <= 0), a, b)

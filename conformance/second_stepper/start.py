@@ -137,6 +137,8 @@ def _is_near(flight: SearchedFlight, wall: Wall) -> bool:
         size = flight.law("h", now)[0]
     elif wall in ("left", "right") or flight.table.is_stem:
         size = flight.width(now)[0]
+        if wall != "base":
+            size = size.max(abs(flight.balls.x))
     else:
         size = flight.law("r", now)[0]
     bound = size * arb(ON_WALL) * (2 * size if wall == "arc" else 1)

@@ -81,7 +81,7 @@ class Search:
     def along_mouth(self) -> Met:
         """Follow a particle along y = 0 in the mouth: to the horizon, or the mouth's edge."""
         met = self._first(("left", "right"), ZERO, self.end)
-        return self._nothing() if met is None else Met(None, reason="mouth-edge")
+        return self._nothing() if met is None or met == Met(None) else Met(None, reason="mouth-edge")
 
     def _nothing(self) -> Met:
         if not self.is_horizon:

@@ -115,8 +115,9 @@ def read_answer(line: bytes, cmd: str, seq: int | None, *, may_be_null: bool = F
             said = f": {str(envelope.reason)[:200]}" if envelope.reason else ""
             given = repr(envelope.seq)[:40]
             raise Trouble("wrong-format", f"answered seq {given} to seq {seq}{said}")
-        own = _failures if envelope.error is not None else _answers[cmd]
-        decoder = _outcomes if envelope.outcome is not None else own
+        # Who owns to a failure has answered nothing else, whatever stands beside it.
+        own = _outcomes if envelope.outcome is not None else _answers[cmd]
+        decoder = _failures if envelope.error is not None else own
         data: dict[str, Any] = msgspec.to_builtins(_decoded(read, decoder))
     except UNREADABLE as error:
         raise Trouble("wrong-format", f"{cmd}: {_reason(error)} in {shown(line)}") from None

@@ -32,7 +32,7 @@ def wall_gap(particle, scene, anchors):
     f, _ = wall_residual(particle.wall, particle.x, particle.y, scene, anchors)
     if particle.wall == ARC:
         return f / (2.0 * r), r
-    return f, (h if particle.wall == FLOOR else w)
+    return f, (h if particle.wall == FLOOR else max(w, abs(particle.x)))
 
 
 @kernel

@@ -36,7 +36,15 @@ ON_THE_SIDE = State(0.25, -1.125, -1.5, 0.0, 1.0, "left")
 VIOLENT = Cap(r=BangBang(((0.0, 1.0), (1.0, 1.0), (1.0 + 2.0**-20, 0.5), (2.0, 0.5), (4.0, 1.0))))
 # Its radius is 1 to 70 decimals, and not exactly at any time but t = 0.
 SWAYING = Mushroom(r=Fourier(1.0, 1.0, sin=(1e-70,)), h=1.0, w=0.5)
+# Its half-width is 1 at the mouth and 2e10 below: there x is rounded by more than 2^-20, after any bounce.
+DEEP = Stem(w=1.0, h=2.0**18, slope=-(2.0**18) / 3)
+IN_THE_DEEP = State(0.0, 18325211273.533333, -209715.40000000002, -1e10, 0.0, "right")
+ACROSS = 1 + Fraction(DEEP.slope) * Fraction(IN_THE_DEEP.y) + Fraction(IN_THE_DEEP.x)
 ANSWERS = {
+    "a side of which x is rounded off": by_hand(DEEP, IN_THE_DEEP, "left", dt=ACROSS / 10**10),
+    "along the mouth to its edge at t_end": by_hand(
+        STATIC, State(0.0, 0.25, 0.0, 0.25, 0.0), "horizon", t_end=1.0, x=Fraction(1, 2)
+    ),
     "a chord": by_hand(CIRCLE, State(0.0, 0.25, 0.5, 2.0, 1.0), "arc", dt=(root(Fraction(71, 16)) - 1) / 5),
     "from the arc": by_hand(CIRCLE, State(0.0, 0.0, 1.0, 1.0, -0.75, "arc"), "arc", dt=Fraction(24, 25)),
     "swept by the floor": by_hand(LIFT, State(0.0, 0.0, -1.75, 0.0, 0.0), "floor", dt=SWEPT, vy=32 * SWEPT),

@@ -13,8 +13,26 @@ TINY = {
     "state": {"t": 0.0, "x": 0.75 * 2.0**-350, "y": 0.0, "vx": 0.0, "vy": 2.0**-636, "wall": "base"},
     "t_end": 1.5 * 2.0**286,
 }
+MUSHROOM = {"table": "mushroom", "r": 1.0, "w": 0.125, "h": 1.0}
+# Its half-width is 1 at the mouth and 2e10 below: there x is rounded by more than 2^-20, after any bounce.
+DEEP = {"table": "stem", "w": 1.0, "h": 2.0**18, "slope": -(2.0**18) / 3}
+OFF_BY_ROUNDING = {
+    "t": 0.0,
+    "x": 18325211273.533333,
+    "y": -209715.40000000002,
+    "vx": -1e10,
+    "vy": 1e3,
+    "wall": "right",
+}
 BASE = {"scene": {"table": "cap", "r": 1.0}, "state": START, "t_end": 9.0}
+# The last place of t is worth more than a period: in binary64 no phase is known; right, exactly, comes first.
+LATE = {
+    "scene": {"table": "stem", "w": 1.0, "h": {"kind": "fourier", "mean": 1.0, "omega": 1.5, "cos": [0.5]}},
+    "state": {"t": -4.8138600903774904e16, "x": 0.25, "y": -0.125, "vx": 0.75, "vy": -0.625, "wall": None},
+    "t_end": -4.81386009037749e16,
+}
 REFUSED = {"outcome": "rejected"}
+OPEN = {"outcome": "undecided"}
 
 
 def asked(cmd: str, **changes: Any) -> Line:
@@ -23,6 +41,14 @@ def asked(cmd: str, **changes: Any) -> Line:
         changes = {"states": [START], "state": None, **changes}
     fields = {"cmd": cmd, "seq": 7, **BASE, **changes}
     return {name: part for name, part in fields.items() if name != "state" or part is not None}
+
+
+def _at(x: float, y: float, vx: float, vy: float, wall: str | None = None) -> Line:
+    return {"state": {"t": 0.0, "x": x, "y": y, "vx": vx, "vy": vy, "wall": wall}}
+
+
+def _undefined(reason: str) -> Line:
+    return {"outcome": "undefined", "reason": reason}
 
 
 # What is asked, and what may come: a part of the answer, or several of which one comes.
@@ -44,7 +70,21 @@ EDGES: list[tuple[Line, list[Line]]] = [
     # What overflows is left open, or beyond the bounds that a stepper names; the process lives on.
     (asked("step", state={**START, "vx": 1.7e308, "vy": 1.7e308}), [{"outcome": "undecided"}, REFUSED]),
     # So is what vanishes: the square of this speed is 0, and the arc is met all the same.
+    (asked("step", **LATE), [{"outcome": "collision", "wall": "right"}, {"outcome": "undecided"}, REFUSED]),
     (asked("step", **TINY), [{"outcome": "collision", "wall": "arc"}, {"outcome": "undecided"}, REFUSED]),
+    # A place on two walls is a corner whichever way it moves; where the mouth ends none need be named.
+    (asked("step", scene=MUSHROOM, **_at(0.125, 0.0, -0.5, 1.0)), [_undefined("mouth-edge"), OPEN]),
+    (asked("step", scene=MUSHROOM, **_at(-0.125, 0.0, 0.5, -1.0)), [_undefined("mouth-edge"), OPEN]),
+    (asked("step", scene=MUSHROOM, **_at(0.125, 0.0, -0.5, 0.5, "right")), [_undefined("mouth-edge"), OPEN]),
+    (asked("step", scene=MUSHROOM, **_at(1.0, 0.0, -0.5, -1.0)), [_undefined("corner"), OPEN]),
+    (asked("step", scene=MUSHROOM, **_at(1.0, 0.0, -0.5, 0.5, "arc")), [_undefined("corner"), OPEN]),
+    (
+        asked("step", scene={"table": "cap", "r": 1.0}, **_at(-1.0, 0.0, -1.0, 0.5, "arc")),
+        [_undefined("corner"), OPEN],
+    ),
+    # By the size of its own wall, now, a state is on it or not: not by the radius, nor by w far below.
+    (asked("step", scene=MUSHROOM, **_at(0.125 + 2.0**-22, -0.5, -1.0, 0.25, "right")), [REFUSED]),
+    (asked("step", scene=DEEP, state=OFF_BY_ROUNDING), [{"outcome": "collision", "wall": "left"}, OPEN]),
 ]
 
 

@@ -258,6 +258,7 @@ SABOTEURS: dict[str, tuple[str, Act]] = {
         says(lambda hit: {"seq": hit["seq"], "outcome": "undefined", "reason": "too hard"}),
     ),
     "own-error": ("step", says(lambda hit: {"seq": hit["seq"], "error": "out of memory"})),
+    "own-error-beside-an-outcome": ("step", says(lambda hit: {**hit, "error": "out of memory"})),
     "control-characters-in-errors": ("step", says(lambda hit: {"seq": hit["seq"], "error": CONTROLS})),
     "control-characters-in-reasons": (
         "step",

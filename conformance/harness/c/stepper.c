@@ -132,18 +132,19 @@ static Law mouth_bounds(const Table *table) {
 
 /* Flights ---------------------------------------------------------------------------------------------- */
 
-/* f is written as f(0) plus its change; f(0) is taken out for the wall that the particle leaves. */
+/* f is written as f(0) plus its change; f(0) is taken out for the wall that the particle leaves. Where a law's
+   argument is rounded, late in time, f moves by that of it: `late`, the part of f' that the laws make, times t. */
 static Gap gap(const Flight *flight, int wall, double s) {
     const Table *table = flight->table;
     double t = flight->from.t, x = flight->from.x, y = flight->from.y, vx = flight->from.vx, vy = flight->from.vy;
-    double first, size, change, moved, slope, rate, up;
+    double first, size, change, moved, slope, rate, up, late = 0;
     if (wall == ARC) {
         double grown = rise(&table->r, t, s, &rate), square = vx * vx + vy * vy, along = x * vx + y * vy;
         first = flight->r * flight->r - (x * x + y * y);
         size = table->r.high * table->r.high + x * x + y * y;
         change = grown * (2 * flight->r + grown) - s * (2 * along + s * square);
         moved = fabs(grown) * 2 * table->r.high + s * (2 * fabs(x * vx) + 2 * fabs(y * vy) + s * square);
-        slope = 2 * (flight->r + grown) * rate - 2 * (along + s * square);
+        late = 2 * (flight->r + grown) * rate, slope = late - 2 * (along + s * square);
     } else if (wall == LEFT || wall == RIGHT) {
         double side = wall == LEFT ? 1 : -1, tilt_rate;
         double grown = mouth_rise(flight, s, &rate), tilt = rise(&table->lean, t, s, &tilt_rate);
@@ -151,17 +152,17 @@ static Gap gap(const Flight *flight, int wall, double s) {
         size = mouth_bounds(table).high + table->lean.high * fabs(y) + fabs(x);
         change = grown + tilt * (y + s * vy) + s * (flight->lean * vy + side * vx);
         moved = fabs(grown) + fabs(tilt * (y + s * vy)) + s * (fabs(flight->lean * vy) + fabs(vx));
-        slope = rate + tilt_rate * (y + s * vy) + (flight->lean + tilt) * vy + side * vx;
+        late = rate + tilt_rate * (y + s * vy), slope = late + (flight->lean + tilt) * vy + side * vx;
     } else if (wall == FLOOR) {
         double grown = rise(&table->h, t, s, &rate);
         first = y + flight->h, size = fabs(y) + table->h.high;
-        change = s * vy + grown, moved = s * fabs(vy) + fabs(grown), slope = vy + rate;
+        change = s * vy + grown, moved = s * fabs(vy) + fabs(grown), late = rate, slope = vy + late;
     } else {
         up = table->kind == STEM ? -1 : 1;
         first = up * y, size = fabs(y), change = up * s * vy, moved = s * fabs(vy), slope = up * vy;
     }
-    if (wall == flight->from.wall) first = size = 0;
-    return (Gap){first + change, slope, SLACK * U * (size + moved)};
+    if (wall == flight->from.wall) first = size = late = 0;
+    return (Gap){first + change, slope, SLACK * U * (size + moved + fabs(late * t))};
 }
 
 static double curvature(const Flight *flight, int wall) {
@@ -225,20 +226,46 @@ static int has_wall(const Flight *flight, int inside, int wall) {
 }
 
 static void check_inside(Flight *flight, int inside) {
+    State from = flight->from;
+    /* On y = 0 the mouth ends at the sides, and the base at the arc. */
+    int is_level = flight->table->kind == MUSHROOM && from.wall == NOWHERE && from.y == 0;
     for (int wall = 0; wall < N_WALLS; wall++) {
-        if (!has_wall(flight, inside, wall) || wall == flight->from.wall) continue;
+        int is_near = has_wall(flight, inside, wall);
+        if (wall == from.wall || !(is_near || (is_level && wall != BASE && wall != FLOOR))) continue;
         Gap g = gap(flight, wall, 0);
-        if (wall == BASE && g.f == 0 && g.slope > 0) continue;
-        if (g.f < -g.error) stop(flight, REJECTED, "the state is beyond a wall, must be inside the table");
-        if (g.f <= g.error) stop(flight, UNDECIDED, "the state is on a wall within rounding");
+        if (wall == BASE && from.wall == NOWHERE && g.f == 0 && g.slope > 0) continue;
+        if (fabs(g.f) <= g.error) stop(flight, UNDECIDED, "the state is on a wall within rounding");
+        if (is_near && g.f < 0) stop(flight, REJECTED, "the state is beyond a wall, must be inside the table");
     }
+}
+
+static void check_wall(Flight *flight) {
+    int wall = flight->from.wall, kind = flight->table->kind;
+    double y = flight->from.y;
+    if (wall == NOWHERE) return;
+    if ((kind == CAP && wall > BASE) || (kind == STEM && wall == ARC) || (wall == ARC && y < 0) ||
+        (wall > BASE && kind == MUSHROOM && y > 0)) {
+        stop(flight, REJECTED, "state.wall: there is no such wall, or not at this y");
+        return;
+    }
+    if (kind == MUSHROOM && wall != BASE && y == 0) stop(flight, UNDECIDED, "the state is in a corner");
+    flight->from.wall = NOWHERE;
+    Gap g = gap(flight, wall, 0);
+    flight->from.wall = wall;
+    double size = wall == FLOOR ? flight->h : kind == STEM ? flight->w : flight->r; /* the wall's own, now */
+    if (wall == LEFT || wall == RIGHT) size = fmax(flight->w, fabs(flight->from.x));
+    if (fabs(g.f) > 0x1p-20 * size * (wall == ARC ? 2 * size : 1))
+        stop(flight, REJECTED, "state.wall: the state is not on that wall");
+    if (g.slope < 0) stop(flight, REJECTED, "state.wall: starts on it and moves into it");
+    if (g.slope == 0) stop(flight, UNDECIDED, "it rests on its wall");
 }
 
 static Event first_hit(Flight *flight, double horizon) {
     State from = flight->from;
     int inside = is_in_cap(flight);
     double begin = 0;
-    check_inside(flight, inside);
+    check_inside(flight, inside); /* first: a corner is one whichever way the particle moves */
+    check_wall(flight);
     for (;;) {
         int leaves = inside ? from.vy < 0 : from.vy > 0;
         double level = INFINITY; /* when it reaches the level of the mouth */
@@ -262,6 +289,7 @@ static Event first_hit(Flight *flight, double horizon) {
             hit.s = times[wall], times[wall] = INFINITY;
             if (hit.s < first.s) other = first, its_error = error, first = hit, error = hit_error;
             else if (hit.s < other.s) other = hit, its_error = hit_error;
+            else if (hit.s - first.s <= error + hit_error) stop(flight, UNDECIDED, "three events come within rounding");
         }
         if (flight->status != FOUND) return first;
         int on_base = first.kind == MOUTH && inside && is_on_base(flight, first.s);
@@ -272,25 +300,6 @@ static Event first_hit(Flight *flight, double horizon) {
         if (first.kind != MOUTH || flight->status != FOUND) return first;
         inside = !inside, begin = first.s;
     }
-}
-
-static void check_wall(Flight *flight) {
-    int wall = flight->from.wall, kind = flight->table->kind;
-    double y = flight->from.y;
-    if (wall == NOWHERE) return;
-    if ((kind == CAP && wall > BASE) || (kind == STEM && wall == ARC) || (wall == ARC && y < 0) ||
-        (wall > BASE && kind == MUSHROOM && y > 0)) {
-        stop(flight, REJECTED, "state.wall: there is no such wall, or not at this y");
-        return;
-    }
-    flight->from.wall = NOWHERE;
-    Gap g = gap(flight, wall, 0);
-    flight->from.wall = wall;
-    double size = wall == FLOOR ? flight->table->h.high : kind == STEM ? flight->table->w.high : flight->table->r.high;
-    if (fabs(g.f) > 0x1p-20 * size * (wall == ARC ? 2 * size : 1))
-        stop(flight, REJECTED, "state.wall: the state is not on that wall");
-    if (g.slope < 0) stop(flight, REJECTED, "state.wall: starts on it and moves into it");
-    if (g.slope == 0) stop(flight, UNDECIDED, "it rests on its wall");
 }
 
 /* One step: moves *state on. The event says what happened; flight->status whether it did. */
@@ -307,7 +316,6 @@ static Event step(Flight *flight, const Table *table, State *state, double t_end
     double speed = fmax(fabs(q.vx), fabs(q.vy));
     if ((table->kind & CAP) && (flight->r < LEAST || (speed > 0 && speed < LEAST)))
         stop(flight, UNDECIDED, "squares of numbers below 1e-150 may vanish");
-    check_wall(flight);
     Event event = first_hit(flight, t_end - q.t);
     double s = event.s, nx = 0, ny = table->kind == STEM && event.wall == BASE ? -1 : 1, rate;
     state->x += s * q.vx, state->y = event.wall == BASE ? 0 : q.y + s * q.vy;

@@ -26,7 +26,7 @@ enum Wall { ARC, BASE, LEFT, RIGHT, FLOOR, NO_WALL };
 constexpr std::array<const char*, 5> WALLS = {"arc", "base", "left", "right", "floor"};
 constexpr int N_SAMPLES = 512;
 constexpr double ROUNDING = 0x1p-44;  // of the table's size: nearer to a wall, a place may be on either side of it
-constexpr double ON_WALL = 0x1p-20;   // of it: farther from the wall that it names, a state is not on that wall
+constexpr double ON_WALL = 0x1p-20;   // of a wall's: farther from the wall that it names, a state is not on that wall
 constexpr double LARGEST = 1e100;     // beyond it squares might overflow
 constexpr long MAX_COLLISIONS = 1000000, MAX_REPEAT = 1000;
 
@@ -112,6 +112,11 @@ struct Scene {
         double r_now = r.at(t) + grown;
         rate = nu_rate * r_now + (nu->at(t) + change) * r_rate;
         return nu->at(t) * grown + change * r_now;
+    }
+    double size(const State& q) const {  // of the wall that a state names, now
+        double half = has_stem ? width(q.t) : 0, radius = has_cap ? r.at(q.t) : 0;
+        if (q.wall == FLOOR) return h.at(q.t);
+        return q.wall == LEFT || q.wall == RIGHT ? std::max(half, std::abs(q.x)) : std::max(half, radius);
     }
     double size() const { return 2 * r.high + 2 * (nu ? nu->high * r.high : w.high) + h.high; }
     bool is_in_cap(const State& q) const {
@@ -271,6 +276,11 @@ inline void judge(const Scene& scene, const State& q) {
     if (q.wall == NO_WALL && q.y == 0 && q.vy == 0) throw Open("it flies along the mouth");
     bool in_cap = scene.is_in_cap(q);
     double size = scene.size() + std::abs(q.t) * (scene.r.slope + scene.h.slope + scene.w.slope);
+    if (q.y == 0 && q.wall != NO_WALL && q.wall != BASE) throw Open("the state is in a corner");
+    if (scene.is_mushroom() && q.wall == NO_WALL && q.y == 0)
+        for (Wall wall : {ARC, LEFT, RIGHT})  // at which the mouth and the base end
+            if (std::abs(scene.distance(wall, q.t, q.x, q.y)) <= ROUNDING * size)
+                throw Open("the state is at the end of mouth or base within rounding");
     for (Wall wall : scene.near(in_cap)) {
         double gap = scene.distance(wall, q.t, q.x, q.y);
         if (wall == q.wall || gap > ROUNDING * size) continue;
@@ -280,7 +290,7 @@ inline void judge(const Scene& scene, const State& q) {
     if (q.wall == NO_WALL) return;
     bool is_beyond = scene.is_mushroom() && (q.wall == ARC ? q.y < 0 : q.wall > BASE && q.y > 0);
     double gap = std::abs(scene.distance(q.wall, q.t, q.x, q.y)), rate = scene.rate(q.wall, q);
-    if (is_beyond || gap > ON_WALL * scene.size() / 2) throw Refused("the state is not on the wall that it names");
+    if (is_beyond || gap > ON_WALL * scene.size(q)) throw Refused("the state is not on the wall that it names");
     if (rate < 0) throw Refused("the state is on a wall and moves into it");
     if (rate == 0) throw Open("the state rests on its wall");
 }

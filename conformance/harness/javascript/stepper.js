@@ -179,34 +179,38 @@ class Flight {
   }
 
   // [f(s), f'(s), the rounding error that f may carry]. f is written as f(0) plus its change: f(0) is taken out
-  // for the wall that the particle leaves.
+  // for the wall that the particle leaves. Where a law's argument is rounded, late in time, f moves by that of it:
+  // `late`, the part of f' that the laws make, times t.
   gap(wall, s) {
     const { x, y, vx, vy, t, table, now } = this;
     let first, size, change, moved, slope;
+    let late = 0;
     if (wall === "arc") {
       const [rise, rate] = table.r.rise(t, s);
       const [square, along] = [vx * vx + vy * vy, x * vx + y * vy];
       [first, size] = [now.r * now.r - (x * x + y * y), table.r.high ** 2 + x * x + y * y];
       change = rise * (2 * now.r + rise) - s * (2 * along + s * square);
       moved = abs(rise) * 2 * table.r.high + s * (2 * abs(x * vx) + 2 * abs(y * vy) + s * square);
-      slope = 2 * (now.r + rise) * rate - 2 * (along + s * square);
+      late = 2 * (now.r + rise) * rate;
+      slope = late - 2 * (along + s * square);
     } else if (wall === "left" || wall === "right") {
       const side = wall === "left" ? 1 : -1;
       const [[rise, rate], [tilt, tiltRate]] = [table.w.rise(t, s), table.slope.rise(t, s)];
       [first, size] = [now.w + now.slope * y + side * x, table.w.high + table.slope.high * abs(y) + abs(x)];
       change = rise + tilt * (y + s * vy) + s * (now.slope * vy + side * vx);
       moved = abs(rise) + abs(tilt * (y + s * vy)) + s * (abs(now.slope * vy) + abs(vx));
-      slope = rate + tiltRate * (y + s * vy) + (now.slope + tilt) * vy + side * vx;
+      late = rate + tiltRate * (y + s * vy);
+      slope = late + (now.slope + tilt) * vy + side * vx;
     } else if (wall === "floor") {
       const [rise, rate] = table.h.rise(t, s);
       [first, size, change] = [y + now.h, abs(y) + table.h.high, s * vy + rise];
-      [moved, slope] = [s * abs(vy) + abs(rise), vy + rate];
+      [moved, late, slope] = [s * abs(vy) + abs(rise), rate, vy + rate];
     } else {
       const up = table.kind === "stem" ? -1 : 1;
       [first, size, change, moved, slope] = [up * y, abs(y), up * s * vy, s * abs(vy), up * vy];
     }
-    if (wall === this.left) first = size = 0;
-    return [first + change, slope, SLACK * U * (size + moved)];
+    if (wall === this.left) first = size = late = 0;
+    return [first + change, slope, SLACK * U * (size + moved + abs(late * t))];
   }
 
   curvature(wall) {
@@ -261,11 +265,14 @@ class Flight {
   }
 
   checkInside(walls) {
-    for (const wall of walls) {
+    // On y = 0 the mouth ends at the sides, and the base at the arc.
+    const isLevel = this.table.kind === "mushroom" && this.left === null && this.y === 0;
+    for (const wall of isLevel ? ["arc", "left", "right", "floor"] : walls) {
       const [f, slope, error] = this.gap(wall, 0);
-      if (wall === this.left || (wall === "base" && f === 0 && slope > 0)) continue;
-      if (f < -error) throw new Refused(`the state is beyond wall ${wall}`);
-      if (f <= error) throw new Open(`the state is on wall ${wall} within rounding`);
+      const isLeftUnsaid = this.left === null && wall === "base" && f === 0 && slope > 0;
+      if (wall === this.left || isLeftUnsaid) continue;
+      if (abs(f) <= error) throw new Open(`the state is on wall ${wall} within rounding`);
+      if (f < 0 && walls.includes(wall)) throw new Refused(`the state is beyond wall ${wall}`);
     }
   }
 
@@ -277,14 +284,18 @@ class Flight {
       const here = WALLS[inside ? "cap" : "stem"].filter((wall) => !(isMushroom && wall === "base"));
       const leaves = isMushroom && this.left !== "base" && (inside ? this.vy < 0 : this.vy > 0);
       const level = leaves ? max(0, -this.y / this.vy) : Infinity; // when it reaches the level of the mouth
-      if (begin === 0) this.checkInside(here);
+      if (begin === 0) {
+        this.checkInside(here); // first: a corner is one whichever way the particle moves
+        this.checkWall();
+      }
       const found = this.roots(here, begin, min(horizon, level, Number.MAX_VALUE / 2) * (1 + 8 * U));
       found.push({ kind: "mouth", s: level, error: 4 * U * level, slope: this.vy });
       found.push({ kind: "horizon", s: horizon, error: 2 * U * horizon });
-      const [first, other] = found.sort((a, b) => a.s - b.s || 0);
+      const [first, other, third] = found.sort((a, b) => a.s - b.s || 0);
       const onBase = first.kind === "mouth" && inside && this.isOnBase(first.s);
       const kinds = [first.kind, other.kind];
-      const isPair = kinds.includes("mouth") && kinds.includes("horizon");
+      const isThree = third && third.s - first.s <= first.error + third.error;
+      const isPair = kinds.includes("mouth") && kinds.includes("horizon") && !isThree;
       if (other.s - first.s <= first.error + other.error && (onBase || !isPair))
         throw new Open(`${kinds.join(" and ")} come within rounding`);
       if (onBase) return { ...first, kind: "base" };
@@ -306,10 +317,12 @@ class Flight {
     if (left === null) return;
     const isElsewhere = left === "arc" ? y < 0 : y > 0 && table.kind === "mushroom" && left !== "base";
     if (!WALLS[table.kind].includes(left) || isElsewhere) throw new Refused(`state.wall = ${left} at y = ${y}`);
+    if (table.kind === "mushroom" && left !== "base" && y === 0) throw new Open("the state is in a corner");
     this.left = null;
     const [f, slope] = this.gap(left, 0);
     this.left = left;
-    const size = left === "floor" ? table.h.high : (table.r ?? table.w).high;
+    const { h, r, w } = this.now; // of which a small part is what rounding may have moved a state
+    const size = left === "floor" ? h : left === "left" || left === "right" ? max(w, abs(this.x)) : (r ?? w);
     if (abs(f) > 2 ** -20 * size * (left === "arc" ? 2 * size : 1)) throw new Refused(`state is not on wall ${left}`);
     if (slope < 0) throw new Refused(`state.wall = ${left}: starts on it and moves into it`);
     if (slope === 0) throw new Open("it rests on its wall");
@@ -340,7 +353,6 @@ function step(table, state, tEnd) {
   const speed = max(abs(vx), abs(vy));
   const isTiny = table.r?.at(t) < LEAST || (speed > 0 && speed < LEAST);
   if (table.r && isTiny) throw new Open(`squares of numbers below ${LEAST} may vanish`);
-  flight.checkWall();
   const { kind, s, slope } = flight.firstHit(tEnd - t);
   const [X, Y] = [x + s * vx, y + s * vy];
   if (kind === "horizon") return { outcome: "horizon", t: tEnd, x: X, y: Y, vx, vy };

@@ -45,10 +45,10 @@ def careful(step_at, scene, anchors, states, walls, t_end, n_times, paths):
         write_state(paths.ends, i, particle)
 
 
-@kept(error_model="numpy")
-def fine(scene, anchors, start, wall, limit, out, met):
+@kept(error_model="numpy", nogil=True)
+def fine(scene, anchors, start, wall, limit, out, met, called_off):
     """Follow a path in pairs of floats: see fast.kernel.refine."""
-    return fine_path(scene, anchors, start, wall, limit, out, met)
+    return fine_path(scene, anchors, start, wall, limit, out, met, called_off)
 
 
 @kept(nogil=True, **HOW)

@@ -117,7 +117,7 @@ def by_dask(address: str, threads: int | None) -> Engine:
             client = Client(address, timeout=CONNECT_TIMEOUT, set_as_default=False)
         except (OSError, ValueError) as error:
             raise BadInput(f"--dask = {address}: no scheduler answers ({type(error).__name__})") from None
-        with client, _lost_in_a_line(address):
+        with _lost_in_a_line(address), client:
             yield from _handed_out(client, asked, pieces, tick, threads or 1)
 
     return engine

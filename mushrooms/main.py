@@ -212,12 +212,23 @@ def _ended_as_by_keyboard() -> Iterator[None]:
                 before[number] = signal.signal(number, end)
     try:
         yield
+    except Exception as error:
+        if _is_of_an_interrupt(error):
+            raise KeyboardInterrupt from None
+        raise
     finally:
         sys.unraisablehook = told
         for timer in asked:
             timer.cancel()
         for number, handler in before.items():
             signal.signal(number, handler)
+
+
+def _is_of_an_interrupt(error: BaseException | None) -> bool:
+    """Tell whether an error came of an interruption: a compiled module loaded then says that it failed."""
+    while error is not None and not isinstance(error, KeyboardInterrupt):
+        error = error.__cause__ or error.__context__
+    return error is not None
 
 
 def run(arguments: list[str] | None = None) -> NoReturn:

@@ -166,6 +166,18 @@ def test_an_interrupt_that_python_loses_is_heeded(command_line, tmp_path, monkey
     assert "interrupted" in err
 
 
+def test_an_interrupt_that_is_made_another_error_is_heeded(command_line, tmp_path, monkeypatch):
+    """A compiled module loaded at that moment said "initialization failed": a page, and exit code 1."""
+
+    def loaded(*_args, **_options):
+        raise ImportError("initialization failed") from KeyboardInterrupt()
+
+    monkeypatch.setattr(fast, "go_on", loaded)
+    code, out, err = command_line(*SIMULATE[:-1], tmp_path / "run")
+    assert (code, out, err.count("\n")) == (130, "", 1)
+    assert "interrupted" in err
+
+
 def test_a_failed_write_leaves_older_results_alone(tmp_path):
     (tmp_path / "a.json").write_text("old")
 

@@ -12,13 +12,12 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from numba import njit
 
 from fast.compiled import compile_scene
 from fast.fine import FineTrajectory, as_pairs, as_trajectory, fill_path
 from fast.flow import follow_to
 from fast.kernel import codes, pools
-from fast.kernel.compiling import SOURCES
+from fast.kernel.compiling import kept
 from fast.kernel.flights import OFF, advance, collide, correct
 from fast.kernel.laws import set_anchors
 from fast.kernel.pools import whole_registers
@@ -34,45 +33,36 @@ from scene import Collision, Horizon, Outcome, Scene, State
 PLACE = (pools.X, pools.Y, pools.VX, pools.VY)
 
 
-def _entries(sources):
-    """Return the compiled functions of a round of lanes, kept on disk as those of fast.kernel.entries are."""
-
-    @njit(cache=True, error_model="numpy")
-    def fill_lane(a, i, particle, age, scene, pieces, degree):
-        """Put a particle into a lane, its laws known from `age` before its time, if they still serve then."""
-        sources  # noqa: B018
-        for early in (age, 0.0):
-            pools.load(a, i, particle, np.inf, OFF)
-            pools.set_reference(a, i, particle.t - early, particle.t_low, scene, pieces, degree)
-            if a[pools.END + i] > particle.t:
-                break
-        pools.set_laws(a, i, pools.R0, particle.t, particle.t_low, scene, degree)
-        a[pools.SPIN + i] = particle.x * particle.vy - particle.y * particle.vx
-
-    @njit(cache=True, error_model="numpy")
-    def find_hits(pool, a, n, worker):
-        """Find the next collision of n lanes, and correct what is coarse."""
-        sources  # noqa: B018
-        advance(pool, a, whole_registers(n), OFF, worker)
-        correct(pool, a, n, worker)
-
-    @njit(cache=True, error_model="numpy")
-    def collide_lanes(pool, a, n, worker):
-        """Bounce n lanes off the walls that they have met."""
-        sources  # noqa: B018
-        collide(pool, a, n, worker)
-
-    @njit(cache=True, error_model="numpy")
-    def residual(particle, scene, anchors):
-        """Return the function of a particle's wall where the particle is, and a bound on its rounding."""
-        sources  # noqa: B018
-        set_anchors(scene.laws, anchors, particle.t, particle.t_low)
-        return wall_residual(particle.wall, particle.x, particle.y, scene, anchors)
-
-    return fill_lane, find_hits, collide_lanes, residual
+@kept(error_model="numpy")
+def fill_lane(a, i, particle, age, scene, pieces, degree):
+    """Put a particle into a lane, its laws known from `age` before its time, if they still serve then."""
+    for early in (age, 0.0):
+        pools.load(a, i, particle, np.inf, OFF)
+        pools.set_reference(a, i, particle.t - early, particle.t_low, scene, pieces, degree)
+        if a[pools.END + i] > particle.t:
+            break
+    pools.set_laws(a, i, pools.R0, particle.t, particle.t_low, scene, degree)
+    a[pools.SPIN + i] = particle.x * particle.vy - particle.y * particle.vx
 
 
-fill_lane, find_hits, collide_lanes, residual = _entries(SOURCES)
+@kept(error_model="numpy")
+def find_hits(pool, a, n, worker):
+    """Find the next collision of n lanes, and correct what is coarse."""
+    advance(pool, a, whole_registers(n), OFF, worker)
+    correct(pool, a, n, worker)
+
+
+@kept(error_model="numpy")
+def collide_lanes(pool, a, n, worker):
+    """Bounce n lanes off the walls that they have met."""
+    collide(pool, a, n, worker)
+
+
+@kept(error_model="numpy")
+def residual(particle, scene, anchors):
+    """Return the function of a particle's wall where the particle is, and a bound on its rounding."""
+    set_anchors(scene.laws, anchors, particle.t, particle.t_low)
+    return wall_residual(particle.wall, particle.x, particle.y, scene, anchors)
 
 
 def careful_steps(scene: Scene, states: Sequence[State], n_times: int = 1) -> tuple[list[Outcome], float]:

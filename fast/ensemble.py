@@ -10,7 +10,6 @@ import hashlib
 import math
 import time
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from typing import NamedTuple
 
 import numpy as np
@@ -42,6 +41,7 @@ from fast.kernel.worker import new_worker
 from fast.narrowings import narrowings
 from fast.pieces import laws_in_lanes
 from fast.starts import cycle_stops, initial_states, least_collisions, one_cycle
+from fast.threads import interruptible
 from fast.units import Units, fit, inward
 from scene import Scene
 from scene.notebook import rows
@@ -372,12 +372,8 @@ def follow(
     if progress:
         progress(0)
     begin = time.perf_counter()
-    with ThreadPoolExecutor(threads) as pool:
-        try:
-            for first, _ in zip(range(0, n, size), pool.map(work, range(0, n, size)), strict=True):
-                if progress:
-                    progress(min(first + size, n))
-        except BaseException:  # an interrupt does not wait for chunks that have not begun
-            pool.shutdown(wait=False, cancel_futures=True)
-            raise
+    with interruptible(threads, stops.called_off) as pool:
+        for first, _ in zip(range(0, n, size), pool.map(work, range(0, n, size)), strict=True):
+            if progress:
+                progress(min(first + size, n))
     return time.perf_counter() - begin

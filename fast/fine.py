@@ -11,6 +11,7 @@ from fast.given import MAX_STEPS
 from fast.kernel import codes, entries
 from fast.kernel.records import ANCHORS_SHAPE, Compiled, FloatArray, IntArray
 from fast.step import WALL_CODES, WALL_NAMES, Start, check_state, trouble
+from fast.threads import follow_path
 from fast.units import Units
 from scene import Horizon, Outcome, Scene, State, Wall
 from scene.refusal import check_count, check_scene
@@ -66,7 +67,9 @@ def fill_path(
     compiled: Compiled, start: FloatArray, wall: int, steps: FloatArray, met: IntArray
 ) -> tuple[int, int]:
     """Fill `steps` and `met` from a start in pairs; returns the number of collisions and the last code."""
-    found: tuple[int, int] = entries.fine(compiled, np.zeros(ANCHORS_SHAPE), start, wall, np.inf, steps, met)
+    called_off = np.zeros(1, np.int64)
+    given = compiled, np.zeros(ANCHORS_SHAPE), start, wall, np.inf, steps, met, called_off
+    found: tuple[int, int] = follow_path(entries.fine, given, len(steps), called_off)
     return found
 
 

@@ -85,6 +85,7 @@ def cycle_stops(scene: Scene, n_cycles: int, phases: Sequence[float]) -> Stops:
         np.ascontiguousarray(times[:, : len(narrow)]),  # a slice would have `follow` compiled once more
         is_first_kept=False,
         most=MOST_IN_CYCLES,
+        called_off=np.zeros(1, np.int64),
     )
 
 
@@ -97,6 +98,7 @@ def only_stop(t_end: float) -> Stops:
         np.full((1, 1), math.nan),
         is_first_kept=True,
         most=MOST_TO_A_TIME,
+        called_off=np.zeros(1, np.int64),
     )
 
 

@@ -13,6 +13,7 @@ from fast.kernel.worker import new_worker
 from fast.pieces import laws_in_lanes
 from fast.starts import only_stop
 from fast.step import WALL_NAMES, as_arrays, check_state, trouble
+from fast.threads import follow_path
 from fast.units import ANSWER_LOST, fit
 from scene import Horizon, Outcome, Scene, State, Wall
 from scene.refusal import BadInput, check_count, check_scene
@@ -63,7 +64,7 @@ def trajectory(scene: Scene, state: State, n_collisions: int, t_end: float = np.
         stop = only_stop(start.units.horizon(t_end))
         worker = new_worker(in_lanes, stop, unfilled_ends(rows, 1, (1, 1)))
         with np.errstate(over="ignore", under="ignore"):  # without the compiler
-            entries.follow_particles(worker, walls, paths)
+            follow_path(entries.follow_particles, (worker, walls, paths), n_collisions, stop.called_off)
     if not paths.is_exact.all():
         raise BadInput(ANSWER_LOST)
     n, code = paths.counts.item(), paths.codes.item()

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from conformance.bench.comparison import Ratio
     from conformance.bench.contenders import Ask, Contender, Family
     from conformance.bench.measure import Effort
-    from conformance.bench.record import Record, Size
+    from conformance.bench.record import Drawn, Record, Size
 
 TIMEOUT, RESTARTS = 30.0, 1  # of a command
 C_FLAGS = ("-O3", "-march=native")
@@ -74,7 +74,7 @@ def bench(
     size: Size = "quick" if quick else "full"
     old = record.read(compare) if compare is not None else None
     if old is not None:
-        comparison.check_alike(old, size, seed, QUESTIONS[size])
+        comparison.check_alike(old, size, seed, QUESTIONS[size], _drawn(size))
     with output.writable_folder(out) as folder, compilation_told():
         found = _measured(size, seed, command or [])
         picture = figures_of_speed.speed(found)
@@ -160,9 +160,7 @@ def _measured(size: Size, seed: int, command: list[str]) -> Record:
         digits=workloads.DIGITS,
         machine=record.this_machine(built),
         clock_ns=tuple(clock),
-        workloads=tuple(
-            record.Drawn(r.name, r.what, r.scene, n_questions, n_further) for r in workloads.RULES
-        ),
+        workloads=_drawn(size),
         points=tuple(points),
         not_run=not_run,
         growth=grown,
@@ -170,6 +168,14 @@ def _measured(size: Size, seed: int, command: list[str]) -> Record:
         hard_cases=cases,
         seconds=round(time.monotonic() - begin, 1),
     )
+
+
+def _drawn(size: Size) -> tuple[Drawn, ...]:
+    """Describe the workloads of a run."""
+    from conformance.bench import record, workloads
+
+    numbers = QUESTIONS[size], FURTHER[size]
+    return tuple(record.Drawn(rule.name, rule.what, rule.scene, *numbers) for rule in workloads.RULES)
 
 
 def _compile_times(not_run: dict[str, str]) -> dict[str, float]:

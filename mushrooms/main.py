@@ -11,9 +11,11 @@ import os
 import signal
 import sys
 import threading
+from _thread import interrupt_main
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from decimal import Decimal, InvalidOperation
+from functools import partial
 from importlib import import_module
 from itertools import pairwise
 from typing import IO, Annotated, Any, NamedTuple, NoReturn, get_args, get_origin, get_type_hints
@@ -28,6 +30,7 @@ UsageError: type[Any] = typer.BadParameter.__bases__[0]
 
 
 INTERRUPTED = 130
+SOON = 0.05  # seconds, after which a signal that was lost is sent again
 MOST = Decimal(10) ** 30  # of a whole number on the command line, written with an exponent
 NOTHING_KEPT = "nothing is kept: files are written whole, at the end"
 
@@ -184,20 +187,48 @@ def _ended_as_by_keyboard() -> Iterator[None]:
     A batch system ends its jobs so, and where the process just died hidden files would stay. Whoever has them
     ignored (`nohup`) or handled otherwise keeps that.
     """
+    last, asked, told = signal.SIGINT, list[threading.Timer](), sys.unraisablehook
+    send = partial(signal.pthread_kill, threading.get_ident()) if hasattr(signal, "pthread_kill") else None
 
-    def end(_number: int, _frame: object) -> NoReturn:
+    def end(number: int, _frame: object) -> NoReturn:
+        nonlocal last
+        last = signal.Signals(number)
         raise KeyboardInterrupt
+
+    def ask_again(lost: Any) -> None:
+        # Where Python cannot hand on what is raised, in a `__del__` or the callback of a weak reference, it
+        # prints that and goes on, and nobody would hear of the signal any more.
+        if lost.exc_type is KeyboardInterrupt:
+            asked.append(threading.Timer(SOON, send or interrupt_main, (last,)))
+            asked[-1].start()
+        else:
+            told(lost)
 
     before = {}
     if threading.current_thread() is threading.main_thread():  # nobody else may
+        sys.unraisablehook = ask_again
         for number in (getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name)):
             if signal.getsignal(number) is signal.SIG_DFL:
                 before[number] = signal.signal(number, end)
     try:
         yield
+    except Exception as error:
+        if _is_of_an_interrupt(error):
+            raise KeyboardInterrupt from None
+        raise
     finally:
+        sys.unraisablehook = told
+        for timer in asked:
+            timer.cancel()
         for number, handler in before.items():
             signal.signal(number, handler)
+
+
+def _is_of_an_interrupt(error: BaseException | None) -> bool:
+    """Tell whether an error came of an interruption: a compiled module loaded then says that it failed."""
+    while error is not None and not isinstance(error, KeyboardInterrupt):
+        error = error.__cause__ or error.__context__
+    return error is not None
 
 
 def run(arguments: list[str] | None = None) -> NoReturn:

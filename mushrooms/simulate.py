@@ -270,6 +270,8 @@ def _told_how_to_go_on(run: Any, command: str) -> Iterator[None]:
         told = "no block was finished: nothing is kept" if run.first_there() is None else how()
         tell_interrupted(told)
         raise
+    except ConnectionError as error:  # to a cluster
+        raise BadInput(f"{error}: {how()}") from None
     except OSError as error:
         at = error.filename or str(run.folder)
         raise BadInput(f"output {at!r}: {error.strerror or error}: {how()}") from None

@@ -85,8 +85,7 @@ def _compiled_once() -> None:
     """Let one worker compile an entry of the kernel while the others wait, and then load what it has kept."""
 
     def one_at_a_time(entry: Dispatcher) -> Callable[[Any], Any]:
-        # Variants of a loop share an index in the cache, and hence a lock.
-        compile_or_load, name = entry.compile, entry.py_func.__name__
+        compile_or_load, name = entry.compile, entry.py_func.__qualname__
         lock = Path(entry.stats.cache_path) / f"{name}.lock"
 
         def compile_alone(signature: Any) -> Any:

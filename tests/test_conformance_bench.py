@@ -11,6 +11,8 @@ from pathlib import Path
 
 import msgspec
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from support.schemas import validator
 from support.truth import proved_step
 
@@ -228,6 +230,9 @@ def test_an_ensemble_of_twice_the_particles_has_twice_the_collisions():
     assert many.peak_bytes > few.peak_bytes > 0
 
 
+DRAWN = (record.Drawn("slow", "slow", "moving-cap", 1, 0),)
+
+
 def a_point(ns: list[float], contender: str = "fast") -> record.Point:
     return record.Point("slow", contender, "compiled", 1, tuple(ns), 1, 0, 0, 0, 0, 0, (0.5,), (1e-16,))
 
@@ -238,10 +243,9 @@ def a_record(*points: record.Point, clock: float = 1.0) -> record.Record:
         "moving-cap", (record.CostSeries("particles", (1.0, 2.0), (1.0, 2.0), (1.0, 2.0), 1.0, 0.0),), 1.0, {}
     )
     cases = (record.Case("01", "a graze", 1, {"fast": {"right": 1}}, {"fast": 0.5}),)
-    drawn = (record.Drawn("slow", "slow", "moving-cap", 1, 0),)
     machine = record.this_machine({})
     return record.Record(
-        2, "quick", 0, 1, 3, 230, machine, (clock,) * 3, drawn, points, {}, grown, costs, cases, 1.0
+        2, "quick", 0, 1, 3, 230, machine, (clock,) * 3, DRAWN, points, {}, grown, costs, cases, 1.0
     )
 
 
@@ -266,8 +270,27 @@ def test_a_slow_down_is_seen_and_noise_is_not():
 def test_only_like_is_compared_with_like(field, value):
     old = msgspec.structs.replace(a_record(a_point([1.0])), **{field: value})
     with pytest.raises(BadInput, match=f"{field} = {value} there"):
-        comparison.check_alike(old, "quick", 0, 1)
-    comparison.check_alike(a_record(a_point([1.0])), "quick", 0, 1)
+        comparison.check_alike(old, "quick", 0, 1, DRAWN)
+    comparison.check_alike(a_record(a_point([1.0])), "quick", 0, 1, DRAWN)
+
+
+@pytest.mark.parametrize(("field", "value"), [("what", "slower"), ("scene", "fixed-cap"), ("further", 7)])
+def test_a_workload_of_another_kind_is_not_compared(field, value):
+    """Times of another scene came out as ratios, since only names were looked at."""
+    old = a_record(a_point([1.0]))
+    others = tuple(msgspec.structs.replace(drawn, **{field: value}) for drawn in DRAWN)
+    with pytest.raises(BadInput, match=f"{field} of slow = .* there and {value} here"):
+        comparison.check_alike(old, "quick", 0, 1, others)
+    renamed = tuple(msgspec.structs.replace(drawn, name="new") for drawn in others)
+    comparison.check_alike(old, "quick", 0, 1, renamed)
+
+
+@given(st.lists(st.floats(1e-50, 1e50), min_size=4, max_size=4))
+@settings(max_examples=40)
+def test_whatever_times_a_record_may_hold_their_ratio_is_a_number(times):
+    old, new = (a_record(a_point([ns] * 3), clock=clock) for ns, clock in (times[:2], times[2:]))
+    (ratio,) = comparison.compare(old, new)
+    assert all(0.0 < number < math.inf for number in (ratio.low, ratio.ratio, ratio.high))
 
 
 def test_what_is_gone_is_told():
@@ -298,6 +321,15 @@ def test_a_record_returns_whole(tmp_path):
         (b"\xff", "bench.json"),
         (record.encode(a_record(a_point([0.0]))), "ns"),
         (record.encode(a_record(a_point([]))), "ns"),
+        (record.encode(a_record(a_point([1e300]))), "ns"),
+        (record.encode(a_record(a_point([1.0]), clock=5e-324)), "clock_ns"),
+        (record.encode(a_record(msgspec.structs.replace(a_point([1.0]), wrong=-1))), "wrong"),
+        (record.encode(a_record(msgspec.structs.replace(a_point([1.0]), relative=(-1.0,)))), "relative"),
+        (record.encode(a_record(a_point([1.0]), a_point([2.0]))), "'fast' on 'slow' is twice"),
+        (
+            record.encode(a_record(msgspec.structs.replace(a_point([1.0]), workload="other"))),
+            "'fast' on 'other' is of a workload that it does not name",
+        ),
         (record.encode(msgspec.structs.replace(a_record(), clock_ns=())), "clock_ns"),
         (record.encode(msgspec.structs.replace(a_record(), format=1)), "format = 1, must be 2"),
     ],

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import runpy
 import shutil
 import subprocess
 import sys
@@ -12,6 +13,8 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from numba import config
+from numba.core.caching import IndexDataCacheFile
 from support.entries import kept_entries
 
 import fast
@@ -62,6 +65,16 @@ def test_lane_positions_do_not_change_a_bit():
     assert one.n_careful.sum() < 0.1 * one.wall_counts.sum()
 
 
+HALF_KEPT = """
+from fast.kernel.compiling import kept
+
+def made(number, variant):
+    @kept(variant)
+    def entry(x):
+        return x + number
+
+    return entry
+"""
 PROGRAM = """
 import fast, scene
 path = fast.trajectory(scene.load("moving-cap"), scene.State(0.0, 0.1, 0.3, 20.0, 7.0), 40)
@@ -88,7 +101,7 @@ def test_same_bits_without_the_compiler():
 
 
 def test_a_change_in_any_source_makes_the_kernels_anew(tmp_path):
-    """Numba's cache looks at one file only; the digest that entries close over looks at all."""
+    """Numba's cache looks at one file only; the digest in the names of its files looks at all."""
     folder = Path(fast.__file__).parent
     copy = shutil.copytree(folder, tmp_path / "fast", ignore=shutil.ignore_patterns("__pycache__"))
     assert compiling.digest_of_sources(copy) == compiling.SOURCES
@@ -96,8 +109,36 @@ def test_a_change_in_any_source_makes_the_kernels_anew(tmp_path):
         path.write_text(path.read_text("utf-8") + "\n", "utf-8")
         assert compiling.digest_of_sources(copy) != compiling.SOURCES
         path.write_text(path.read_text("utf-8")[:-1], "utf-8")
-    for entry in kept_entries():
-        assert compiling.SOURCES in [cell.cell_contents for cell in entry.py_func.__closure__]
+    names = [entry.py_func.__qualname__ for entry in kept_entries()]
+    assert all(compiling.SOURCES[:16] in name for name in names)
+    assert len(set(names)) == len(names)
+
+
+@pytest.mark.skipif(config.DISABLE_JIT, reason="nothing is kept without the compiler")
+@pytest.mark.parametrize("what", ["variant", "sources", "processor"])
+def test_what_was_half_kept_leads_to_no_other_code(tmp_path, monkeypatch, what):
+    """The process ends when numba has written the index and not yet the code: that of another is there."""
+    monkeypatch.setattr(config, "CACHE_DIR", str(tmp_path / "kept"))
+    source = tmp_path / "half_kept.py"
+
+    def called(number: float) -> float:
+        source.write_text(f"{HALF_KEPT}\n# {number}\n")  # of another file numba forgets the index
+        if what == "sources":
+            monkeypatch.setattr(compiling, "SOURCES", f"{number:016}")
+        elif what == "processor":
+            monkeypatch.setattr(compiling, "get_host_cpu_name", lambda: f"{number}")
+        module = runpy.run_path(str(source))
+        return float(module["made"](number, number if what == "variant" else 0.0)(0.0))
+
+    def ended(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    assert called(1.0) == 1.0
+    with monkeypatch.context() as context:
+        context.setattr(IndexDataCacheFile, "_save_data", ended)
+        with pytest.raises(KeyboardInterrupt):
+            called(2.0)
+    assert called(2.0) == 2.0
 
 
 @settings(max_examples=60)

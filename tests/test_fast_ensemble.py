@@ -116,7 +116,7 @@ def test_energies_at_phases_are_the_flow_s():
 
 
 def test_an_interrupt_drops_the_chunks_not_begun():
-    """What `progress` raises, as an interrupt would, ends the run after the chunks under way."""
+    """What `progress` raises, as an interrupt would, ends the run."""
     seen: list[int] = []
 
     def stop(n_done: int) -> None:

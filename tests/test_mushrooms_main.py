@@ -5,8 +5,10 @@ from __future__ import annotations
 import json
 import os
 import re
+import signal
 import subprocess
 import sys
+import threading
 from decimal import Decimal
 
 import numpy as np
@@ -131,6 +133,49 @@ def test_a_broken_off_simulation_leaves_nothing(command_line, tmp_path, monkeypa
     assert ended.code == code
     assert "Traceback" not in ended.err
     assert list(tmp_path.iterdir()) == []
+
+
+class Interrupting:
+    """Is interrupted while it is cleared away, where nothing can be raised."""
+
+    def __init__(self, number: int, n_times: int) -> None:
+        self.number, self.n_times = number, n_times
+
+    def __del__(self) -> None:
+        if self.n_times > 1:
+            Interrupting(self.number, self.n_times - 1)
+        signal.raise_signal(self.number)
+
+
+@pytest.mark.parametrize(("name", "n_times"), [("SIGTERM", 1), ("SIGTERM", 3), ("SIGINT", 1)])
+def test_an_interrupt_that_python_loses_is_heeded(command_line, tmp_path, monkeypatch, name, n_times):
+    """While a plot is drawn one of forty was lost, in a weak reference's callback: a page, all went on."""
+
+    def slow(*_args, **_options):
+        Interrupting(getattr(signal, name), n_times)
+        threading.Event().wait(60)
+        raise AssertionError("it went on")
+
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        monkeypatch.setattr(fast, "go_on", slow)
+        code, out, err = command_line(*SIMULATE[:-1], tmp_path / "run")
+    finally:
+        signal.signal(signal.SIGINT, before)
+    assert (code, out, err.count("\n")) == (130, "", 1)
+    assert "interrupted" in err
+
+
+def test_an_interrupt_that_is_made_another_error_is_heeded(command_line, tmp_path, monkeypatch):
+    """A compiled module loaded at that moment said "initialization failed": a page, and exit code 1."""
+
+    def loaded(*_args, **_options):
+        raise ImportError("initialization failed") from KeyboardInterrupt()
+
+    monkeypatch.setattr(fast, "go_on", loaded)
+    code, out, err = command_line(*SIMULATE[:-1], tmp_path / "run")
+    assert (code, out, err.count("\n")) == (130, "", 1)
+    assert "interrupted" in err
 
 
 def test_a_failed_write_leaves_older_results_alone(tmp_path):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import gc
 import json
 import os
 import re
@@ -117,6 +118,37 @@ def test_workers_may_die(command_line, tmp_path, ensemble, monkeypatch):
     assert json.loads(ended.out)["sha256"] == ensemble.sha256()
 
 
+@pytest.mark.parametrize(
+    ("raised", "words"),
+    [
+        (distributed.comm.CommClosedError("closed"), "the scheduler has gone (CommClosedError)"),
+        (RuntimeError("Error during deserialization of the task graph"), "must have this project"),
+        (distributed.KilledWorker("follow", None, 0), "workers die of block"),
+    ],
+)
+def test_a_lost_cluster_is_one_line_that_says_how_to_go_on(
+    command_line, tmp_path, ensemble, monkeypatch, raised, words
+):
+    """Dask's own pages came out, with exit code 1."""
+    keep, result = blocks.RunFolder.keep, distributed.Future.result
+    with cluster(1, processes=False) as there:
+
+        def then_lost(self, piece, block):
+            keep(self, piece, block)
+            monkeypatch.setattr(distributed.Future, "result", lost)
+
+        def lost(_future):
+            raise raised
+
+        monkeypatch.setattr(blocks.RunFolder, "keep", then_lost)
+        ended = command_line(*RUN, "--out", tmp_path, "--block", 32, "--dask", there.scheduler_address)
+    assert_refused(ended, words, "particles are kept; go on with: mushrooms simulate")
+    monkeypatch.setattr(blocks.RunFolder, "keep", keep)
+    monkeypatch.setattr(distributed.Future, "result", result)
+    ended = command_line(*RUN, "--out", tmp_path, "--resume")
+    assert json.loads(ended.out)["sha256"] == ensemble.sha256()
+
+
 def test_no_scheduler_is_one_line(command_line, tmp_path, monkeypatch):
     monkeypatch.setattr(engines, "CONNECT_TIMEOUT", 0.3)
     made = distributed.Client.__init__
@@ -179,6 +211,20 @@ def test_exports_have_every_bit(command_line, stored, tmp_path, ensemble):
         assert np.array([float(row[name]) for row in rows]).tobytes() == wanted.tobytes()
     assert [int(row["collisions_floor"]) for row in rows] == ensemble.wall_counts[:, 4].tolist()
     assert table["particle"].to_pylist() == list(range(N))
+
+
+@pytest.mark.parametrize("kind", ["csv", "parquet", "npz"])
+def test_an_export_of_a_damaged_block_is_refused_in_a_line(command_line, stored, tmp_path, kind):
+    """What pyarrow had begun to write closed itself when nobody held it any more, with a page on stderr."""
+    folder, unraised = shutil.copytree(stored, tmp_path / "run"), []
+    (folder / blocks.GROUP / "energy" / "c.2.0").write_bytes(b"")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(sys, "unraisablehook", unraised.append)
+        ended = command_line("export", folder, "--to", tmp_path / f"run.{kind}")
+        gc.collect()
+    assert_refused(ended, "missing or damaged")
+    assert unraised == []
+    assert [path.name for path in tmp_path.iterdir()] == ["run"]
 
 
 @pytest.mark.parametrize(

@@ -11,11 +11,12 @@ judged.
 from __future__ import annotations
 
 import statistics
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
-from conformance.bench.record import Record
+from conformance.bench.record import Drawn, Record
 from scene.refusal import BadInput
 
 SLOWER = 1.5
@@ -40,18 +41,24 @@ class Ratio(NamedTuple):
         return self.is_judged and self.low > SLOWER
 
 
-def check_alike(old: Record, size: str, seed: int, questions: int) -> None:
-    """Refuse an old record whose questions were others.
+def check_alike(old: Record, size: str, seed: int, questions: int, drawn: Sequence[Drawn]) -> None:
+    """Refuse an old record whose questions were others, of all workloads or of one that both have.
 
     Raises:
         BadInput: naming the setting that differs.
     """
-    now = {"size": size, "seed": seed, "questions": questions}
-    for name, value in now.items():
-        if getattr(old, name) != value:
-            raise BadInput(
-                f"--compare: {name} = {getattr(old, name)} there and {value} here, must be the same"
-            )
+    now: dict[str, object] = {"size": size, "seed": seed, "questions": questions}
+    pairs = [(name, getattr(old, name), value) for name, value in now.items()]
+    there = {workload.name: workload for workload in old.workloads}
+    for new in drawn:
+        if new.name in there:
+            pairs += [
+                (f"{field} of {new.name}", getattr(there[new.name], field), getattr(new, field))
+                for field in new.__struct_fields__
+            ]
+    for name, before, value in pairs:
+        if before != value:
+            raise BadInput(f"--compare: {name} = {before} there and {value} here, must be the same")
 
 
 def gone(old: Record, new: Record) -> list[str]:

@@ -19,7 +19,10 @@ import numpy as np
 from scene.refusal import BadInput
 
 FORMAT = 2
-Time = Annotated[float, msgspec.Meta(gt=0)]
+# Quotients of such times, and quotients of those, are numbers too, neither 0 nor infinite.
+Time = Annotated[float, msgspec.Meta(ge=1e-50, le=1e50)]
+Count = Annotated[int, msgspec.Meta(ge=0)]
+Error = Annotated[float, msgspec.Meta(ge=0)]
 Times = Annotated[tuple[Time, ...], msgspec.Meta(min_length=1)]
 Size = Literal["quick", "full"]
 PACKAGES = ("oscillating-mushrooms", "numpy", "scipy", "numba", "llvmlite", "mpmath", "gmpy2")
@@ -42,8 +45,8 @@ class Drawn(msgspec.Struct, frozen=True):
     name: str
     what: str
     scene: str
-    questions: int
-    further: int
+    questions: Count
+    further: Count
 
 
 class Point(msgspec.Struct, frozen=True):
@@ -64,16 +67,16 @@ class Point(msgspec.Struct, frozen=True):
     workload: str
     contender: str
     family: str
-    n_times: int
+    n_times: Count
     ns: Times
-    right: int
-    wrong: int
-    undecided: int
-    left: int
-    further: int
-    astray: int
-    ulps: tuple[float | None, ...]
-    relative: tuple[float, ...]
+    right: Count
+    wrong: Count
+    undecided: Count
+    left: Count
+    further: Count
+    astray: Count
+    ulps: tuple[Error | None, ...]
+    relative: tuple[Error, ...]
 
 
 class Growth(msgspec.Struct, frozen=True):
@@ -219,6 +222,12 @@ def read(path: Path) -> Record:
         raise BadInput(f"{path} is no bench.json: {error}") from None
     if record.format != FORMAT:
         raise BadInput(f"{path}: format = {record.format}, must be {FORMAT}")
+    names, seen = {drawn.name for drawn in record.workloads}, set[tuple[str, str]]()
+    for p in record.points:
+        if p.workload not in names or (p.workload, p.contender) in seen:
+            why = "twice" if p.workload in names else "of a workload that it does not name"
+            raise BadInput(f"{path} is no bench.json: a point of {p.contender!r} on {p.workload!r} is {why}")
+        seen.add((p.workload, p.contender))
     return record
 
 

@@ -13,7 +13,9 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import numba
 from llvmlite import ir
+from llvmlite.binding import get_host_cpu_features, get_host_cpu_name
 from numba import config, njit, types
 from numba.core import cgutils
 from numba.core.typing import Signature
@@ -35,9 +37,31 @@ def digest_of_sources(folder: Path) -> str:
     return digest.hexdigest()
 
 
-# numba's disk cache looks only at the file of the function it keeps, not at those of the functions compiled
-# into it. Hence what is kept closes over this: a change in any source of ours makes it compile anew.
 SOURCES = digest_of_sources(Path(__file__).parent.parent)
+
+
+def kept(*variant: object, **options: Any) -> Callable[[Any], Any]:
+    """Return a decorator that compiles a function for Python, and keeps that on disk under a name of its own.
+
+    numba's disk cache looks only at the file of the function it keeps, not at those of the functions compiled
+    into it. Nor is what it keeps tied to what it was made of: an index says which number has which code, and
+    is written before that code. Let a process end in between, or two write at a time, and a number may lead
+    to code of other sources, of another variant or for another processor, which is then run. So all that
+    decides what a function compiles to is in the name of its files: whatever lies under it is the right code.
+
+    Args:
+        variant: values that it closes over, which tell it from others of its name.
+        options: for numba.
+    """
+
+    def compiled(function: Any) -> Any:
+        name = config.CPU_NAME or get_host_cpu_name()
+        can = config.CPU_FEATURES or get_host_cpu_features().flatten()
+        rest = hashlib.sha256(repr((variant, numba.__version__, name, can)).encode()).hexdigest()
+        function.__qualname__ += f"-{SOURCES[:16]}-{rest[:16]}"
+        return njit(cache=True, **options)(function)
+
+    return compiled
 
 
 def _for_compiled_callers(**options: Any) -> Callable[[Any], Any]:

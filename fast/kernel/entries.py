@@ -1,6 +1,7 @@
 """The compiled functions that Python calls, kept in numba's disk cache.
 
-Each closes over fast.kernel.compiling.SOURCES, so that a change in any source compiles it anew.
+Files of other sources have other names, so that a change in any source compiles them anew: see
+fast.kernel.compiling.
 """
 
 from __future__ import annotations
@@ -9,11 +10,11 @@ import math
 from functools import cache
 
 import numpy as np
-from numba import config, njit, types
+from numba import config, types
 
 from fast.kernel.arithmetic import sine_cosine
 from fast.kernel.codes import HORIZON, OFF_WALL
-from fast.kernel.compiling import HOW, SOURCES
+from fast.kernel.compiling import HOW, kept
 from fast.kernel.follow import follow
 from fast.kernel.judged import GIVEN, KNOWN, MET
 from fast.kernel.loops import run_careful
@@ -26,109 +27,73 @@ from fast.kernel.single import single_step
 QUARTER_TURN, QUARTER_TURN_LOW = math.pi / 2, 6.123233995736766e-17  # pi/2 as two floats
 
 
-def _careful(sources):
-    @njit(cache=True, error_model="numpy")
-    def careful(step_at, scene, anchors, states, walls, t_end, n_times, paths):
-        """Fill in the paths from each start by careful steps, n_times over: see fast.kernel.records.Paths."""
-        sources  # noqa: B018
-        for i in range(n_times * states.shape[0]):
-            i %= states.shape[0]
-            particle, code, n = particle_at(states, i, walls[i]), walls[i], 0
-            while n < paths.walls.shape[1]:
-                limit = (t_end - particle.t) - particle.t_low
-                origin = KNOWN if n == 0 else MET
-                code, dt, particle = run_careful(step_at, (particle, limit, origin, scene, anchors))
-                if code >= HORIZON:
-                    break
-                paths.walls[i, n] = code
-                write_step(paths, i, n, dt, particle)
-                n += 1
-            paths.codes[i], paths.counts[i] = code, n
-            write_state(paths.ends, i, particle)
-
-    return careful
+@kept(error_model="numpy")
+def careful(step_at, scene, anchors, states, walls, t_end, n_times, paths):
+    """Fill in the paths from each start by careful steps, n_times over: see fast.kernel.records.Paths."""
+    for i in range(n_times * states.shape[0]):
+        i %= states.shape[0]
+        particle, code, n = particle_at(states, i, walls[i]), walls[i], 0
+        while n < paths.walls.shape[1]:
+            limit = (t_end - particle.t) - particle.t_low
+            origin = KNOWN if n == 0 else MET
+            code, dt, particle = run_careful(step_at, (particle, limit, origin, scene, anchors))
+            if code >= HORIZON:
+                break
+            paths.walls[i, n] = code
+            write_step(paths, i, n, dt, particle)
+            n += 1
+        paths.codes[i], paths.counts[i] = code, n
+        write_state(paths.ends, i, particle)
 
 
-def _fine(sources):
-    @njit(cache=True, error_model="numpy")
-    def fine(scene, anchors, start, wall, limit, out, met):
-        """Follow a path in pairs of floats: see fast.kernel.refine."""
-        sources  # noqa: B018
-        return fine_path(scene, anchors, start, wall, limit, out, met)
-
-    return fine
+@kept(error_model="numpy", nogil=True)
+def fine(scene, anchors, start, wall, limit, out, met, called_off):
+    """Follow a path in pairs of floats: see fast.kernel.refine."""
+    return fine_path(scene, anchors, start, wall, limit, out, met, called_off)
 
 
-def _follow(sources):
-    @njit(cache=True, nogil=True, **HOW)
-    def follow_particles(worker, walls, paths):
-        """Follow particles to the last stop, or where `paths` has room from collision to collision.
+@kept(nogil=True, **HOW)
+def follow_particles(worker, walls, paths):
+    """Follow particles to the last stop, or where `paths` has room from collision to collision.
 
-        See fast.kernel.follow and fast.kernel.path; one entry for both.
-        Threads may call it side by side.
-        """
-        sources  # noqa: B018
-        if paths.walls.shape[1] > 0:
-            follow_one(worker, walls, paths)
-        else:
-            follow(worker, walls)
-
-    return follow_particles
+    See fast.kernel.follow and fast.kernel.path; one entry for both.
+    Threads may call it side by side.
+    """
+    if paths.walls.shape[1] > 0:
+        follow_one(worker, walls, paths)
+    else:
+        follow(worker, walls)
 
 
-def _fill_pieces(sources):
-    @njit(cache=True, error_model="numpy")
-    def fill_pieces(laws, references, coefficients):
-        """Write the polynomials of all laws about reference times: see fast.kernel.pieces."""
-        sources  # noqa: B018
-        fill_coefficients(laws, references, coefficients, np.zeros(ANCHORS_SHAPE))
-
-    return fill_pieces
+@kept(error_model="numpy")
+def fill_pieces(laws, references, coefficients):
+    """Write the polynomials of all laws about reference times: see fast.kernel.pieces."""
+    fill_coefficients(laws, references, coefficients, np.zeros(ANCHORS_SHAPE))
 
 
-def _single(sources):
-    @njit(cache=True, error_model="numpy")
-    def single(step_at, numbers, t, x, y, vx, vy, wall, t_end):
-        """Take one step: see fast.kernel.single."""
-        sources  # noqa: B018
-        return single_step(step_at, numbers, t, x, y, vx, vy, wall, t_end)
-
-    return single
+@kept(error_model="numpy")
+def single(step_at, numbers, t, x, y, vx, vy, wall, t_end):
+    """Take one step: see fast.kernel.single."""
+    return single_step(step_at, numbers, t, x, y, vx, vy, wall, t_end)
 
 
-def _off_wall(sources):
-    @njit(cache=True, error_model="numpy")
-    def off_wall(step_at, scene, particle):
-        """Return the share of its wall's distance from 0 by which a particle is off it; 0 for one on it.
+@kept(error_model="numpy")
+def off_wall(step_at, scene, particle):
+    """Return the share of its wall's distance from 0 by which a particle is off it; 0 for one on it.
 
-        And for one at a time whose phase is lost: that is left to the step, which refuses it.
-        """
-        sources  # noqa: B018
-        code, share, _ = run_careful(step_at, (particle, 0.0, GIVEN, scene, np.zeros(ANCHORS_SHAPE)))
-        return share if code == OFF_WALL else 0.0
-
-    return off_wall
+    And for one at a time whose phase is lost: that is left to the step, which refuses it.
+    """
+    code, share, _ = run_careful(step_at, (particle, 0.0, GIVEN, scene, np.zeros(ANCHORS_SHAPE)))
+    return share if code == OFF_WALL else 0.0
 
 
-def _directions(sources):
-    @njit(cache=True, error_model="numpy")
-    def directions(turns, out):
-        """Fill out (n, 2) with cosine and sine of whole turns; no libm, hence the same everywhere."""
-        sources  # noqa: B018
-        for i in range(turns.shape[0]):
-            s, _, c, _, _ = sine_cosine(4.0 * turns[i], 0.0, 1.0, QUARTER_TURN, QUARTER_TURN_LOW)
-            out[i, 0], out[i, 1] = c, s
+@kept(error_model="numpy")
+def directions(turns, out):
+    """Fill out (n, 2) with cosine and sine of whole turns; no libm, hence the same everywhere."""
+    for i in range(turns.shape[0]):
+        s, _, c, _, _ = sine_cosine(4.0 * turns[i], 0.0, 1.0, QUARTER_TURN, QUARTER_TURN_LOW)
+        out[i, 0], out[i, 1] = c, s
 
-    return directions
-
-
-careful = _careful(SOURCES)
-fine = _fine(SOURCES)
-follow_particles = _follow(SOURCES)
-fill_pieces = _fill_pieces(SOURCES)
-single = _single(SOURCES)
-off_wall = _off_wall(SOURCES)
-directions = _directions(SOURCES)
 
 NUMBERS, REAL, WHOLE = types.float64[::1], types.float64, types.int64
 SINGLE = (WHOLE, NUMBERS, REAL, REAL, REAL, REAL, REAL, WHOLE, REAL)

@@ -295,7 +295,7 @@ def follow(worker, walls):
     states = worker.followed.states
     first, last = 0, states.shape[0]
     home, is_resumed = DISK if scene.table == CAP else GENERAL, worker.n_passed > 0
-    while True:
+    while stops.called_off[0] == 0:
         while not is_resumed and n_held[GENERAL] + n_held[DISK] < LANES and first < last:
             i = n_held[home]
             load(

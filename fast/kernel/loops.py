@@ -15,13 +15,13 @@ from contextlib import contextmanager
 from functools import cache
 from typing import Any, NamedTuple
 
-from numba import config, njit, types
+from numba import config, types
 from numba.core.typing import Signature
 from numba.core.typing import signature as returns
 
 from fast.kernel.beside import compiled_beside, own_share
 from fast.kernel.bounces import bounce, rebound
-from fast.kernel.compiling import HOW, SOURCES, caller
+from fast.kernel.compiling import HOW, caller, kept
 from fast.kernel.judged import judged_step
 from fast.kernel.lanes import aim, chord, fly
 from fast.kernel.limits import LawLimits
@@ -64,77 +64,63 @@ class Loops(NamedTuple):
     rebound: int
 
 
-def _careful_step(sources):
-    @njit(cache=True, **HOW)
-    def careful_step(particle, limit, origin, scene, anchors):
-        """Judge a particle as its origin asks, and take a careful step: see fast.kernel.judged."""
-        sources  # noqa: B018
-        return judged_step(particle, limit, origin, scene, anchors)
-
-    return careful_step
+@kept(**HOW)
+def careful_step(particle, limit, origin, scene, anchors):
+    """Judge a particle as its origin asks, and take a careful step: see fast.kernel.judged."""
+    return judged_step(particle, limit, origin, scene, anchors)
 
 
-def _aim(sources, is_slope_moving):
-    @njit(cache=True, **HOW)
+def _aim(is_slope_moving):
+    @kept(is_slope_moving, **HOW)
     def aim_lanes(a, n, is_stem, slope, limits):
         """See fast.kernel.lanes.aim."""
-        sources  # noqa: B018
         aim(a, n, is_stem, None if is_slope_moving else slope, limits)
 
     return aim_lanes
 
 
-def _fly(sources, is_slope_moving, degree):
+def _fly(is_slope_moving, degree):
     terms = (0,) * degree
 
-    @njit(cache=True, **HOW)
+    @kept(is_slope_moving, degree, **HOW)
     def fly_lanes(a, n, is_stem, is_relative, slope, limits):
         """See fast.kernel.lanes.fly."""
-        sources  # noqa: B018
         fly(a, n, is_stem, is_relative, None if is_slope_moving else slope, terms, limits)
 
     return fly_lanes
 
 
-def _chord(sources, degree):
+def _chord(degree):
     terms = (0,) * degree
 
-    @njit(cache=True, **HOW)
+    @kept(degree, **HOW)
     def chord_lanes(a, n, is_again, is_cap, is_relative, limits):
         """See fast.kernel.lanes.chord."""
-        sources  # noqa: B018
         chord(a, n, is_again, is_cap, is_relative, terms, limits)
 
     return chord_lanes
 
 
-def _bounce(sources, is_slope_moving):
-    @njit(cache=True, **HOW)
+def _bounce(is_slope_moving):
+    @kept(is_slope_moving, **HOW)
     def bounce_lanes(a, n, slope, is_mushroom):
         """See fast.kernel.bounces.bounce."""
-        sources  # noqa: B018
         bounce(a, n, None if is_slope_moving else slope, is_mushroom)
 
     return bounce_lanes
 
 
-def _rebound(sources):
-    @njit(cache=True, **HOW)
-    def rebound_lanes(a, n):
-        """See fast.kernel.bounces.rebound."""
-        sources  # noqa: B018
-        rebound(a, n)
-
-    return rebound_lanes
+@kept(**HOW)
+def rebound_lanes(a, n):
+    """See fast.kernel.bounces.rebound."""
+    rebound(a, n)
 
 
-careful_step = _careful_step(SOURCES)
 # By degree of the laws, and whether the slope moves.
-AIMS = {moves: _aim(SOURCES, moves) for moves in (False, True)}
-FLIES = {(moves, degree): _fly(SOURCES, moves, degree) for moves in (False, True) for degree in DEGREES}
-CHORDS = {degree: _chord(SOURCES, degree) for degree in DEGREES}
-BOUNCES = {moves: _bounce(SOURCES, moves) for moves in (False, True)}
-rebound_lanes = _rebound(SOURCES)
+AIMS = {moves: _aim(moves) for moves in (False, True)}
+FLIES = {(moves, degree): _fly(moves, degree) for moves in (False, True) for degree in DEGREES}
+CHORDS = {degree: _chord(degree) for degree in DEGREES}
+BOUNCES = {moves: _bounce(moves) for moves in (False, True)}
 
 
 def address(entry: Any, signature: Signature) -> Any:

@@ -45,7 +45,7 @@ def follow_one(worker, walls, paths):
         load(a, 0, particle_at(states, j, walls[j]), NEVER, OFF)
         roster[PARTICLE, 0] = j
         code, n = walls[j], 0
-        while n < paths.walls.shape[1]:
+        while n < paths.walls.shape[1] and worker.stops.called_off[0] == 0:
             code = next_hit(a, roster, worker)
             if code >= HORIZON:
                 a[T], a[T_LOW], a[X], a[Y] = a[NEXT_T], a[NEXT_T_LOW], a[NEXT_X], a[NEXT_Y]

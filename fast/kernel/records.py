@@ -181,6 +181,8 @@ class Stops(NamedTuple):
             when it spans that instant.
         is_first_kept: the first captured stay is kept in slot 0, whatever its length.
         most: collisions after which a particle is given up; energy may grow without end.
+        called_off: (1,) whoever no longer wants what is followed sets this to 1, from another thread: the
+            kernel looks at it every few flights, and returns with whatever is there.
     """
 
     times: FloatArray
@@ -189,6 +191,7 @@ class Stops(NamedTuple):
     narrowings: FloatArray
     is_first_kept: bool
     most: int
+    called_off: IntArray
 
 
 class Followed(NamedTuple):

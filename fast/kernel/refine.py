@@ -256,10 +256,11 @@ def fine_step(wall, state, limit, scene, anchors):
 
 
 @part
-def fine_path(scene, anchors, start, wall, limit, out, met):
+def fine_path(scene, anchors, start, wall, limit, out, met, called_off):
     """Fill out[i] with dt, t, x, y, vx, vy as pairs and met[i] with the wall; returns number and last code.
 
-    `start` (5, 2): t, x, y, vx, vy as pairs. `limit` [time] is the horizon of every single step.
+    `start` (5, 2): t, x, y, vx, vy as pairs. `limit` [time] is the horizon of every single step. `called_off`
+    is as in fast.kernel.records.Stops.
     """
     state = FineState(
         (start[0, 0], start[0, 1]),
@@ -269,6 +270,8 @@ def fine_path(scene, anchors, start, wall, limit, out, met):
         (start[4, 0], start[4, 1]),
     )
     for i in range(out.shape[0]):
+        if called_off[0] != 0:
+            return i, wall
         if not set_anchors(scene.laws, anchors, state.t[0], state.t[1]):
             return i, FAR_TIME
         if state.t[1] != 0.0 or state.x[1] != 0.0 or state.y[1] != 0.0:

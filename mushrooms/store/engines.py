@@ -6,8 +6,11 @@ so that it does not matter which engine, machine or block followed it, nor how o
 
 from __future__ import annotations
 
+import logging
 from collections import Counter
 from collections.abc import Callable, Generator, Iterator
+from concurrent.futures import CancelledError
+from contextlib import contextmanager
 from itertools import islice
 from typing import Any
 
@@ -98,6 +101,7 @@ def by_dask(address: str, threads: int | None) -> Engine:
 
     Raises:
         BadInput: dask.distributed is not installed, or no scheduler answers.
+        ConnectionError: the engine; the cluster is lost.
     """
     try:
         from distributed import Client
@@ -113,10 +117,34 @@ def by_dask(address: str, threads: int | None) -> Engine:
             client = Client(address, timeout=CONNECT_TIMEOUT, set_as_default=False)
         except (OSError, ValueError) as error:
             raise BadInput(f"--dask = {address}: no scheduler answers ({type(error).__name__})") from None
-        with client:
+        with _lost_in_a_line(address), client:
             yield from _handed_out(client, asked, pieces, tick, threads or 1)
 
     return engine
+
+
+@contextmanager
+def _lost_in_a_line(address: str) -> Iterator[None]:
+    """Raise ConnectionError for what Dask raises when its scheduler ends, or cannot read what it is handed.
+
+    Dask logs pages of its own then, which nobody needs who goes on with the run.
+    """
+    from distributed.comm import CommClosedError
+
+    log = logging.getLogger("distributed.client")
+    level = log.level
+    log.setLevel(logging.CRITICAL + 1)
+    try:
+        yield
+    except (CancelledError, CommClosedError) as error:
+        why = type(error).__name__
+        raise ConnectionError(f"--dask = {address}: the scheduler has gone ({why})") from None
+    except RuntimeError as error:
+        if "deserialization" not in str(error):
+            raise
+        raise ConnectionError(f"--dask = {address}: the scheduler must have this project too") from None
+    finally:
+        log.setLevel(level)
 
 
 def _handed_out(client: Any, asked: Asked, pieces: Iterator[Piece], tick: Tick, threads: int) -> Following:
@@ -152,7 +180,7 @@ def _handed_out(client: Any, asked: Asked, pieces: Iterator[Piece], tick: Tick, 
                     # So many workers died with it that the scheduler gave it up; it may not be its fault.
                     n_killed[piece.number] += 1
                     if n_killed[piece.number] > RETRIES:
-                        raise BadInput(
+                        raise ConnectionError(
                             f"--dask: workers die of block {piece.number} again and again"
                         ) from None
                     submit(piece)

@@ -10,7 +10,7 @@ import csv
 import io
 import zipfile
 from collections.abc import Callable, Iterator
-from itertools import product
+from itertools import chain, product
 from typing import Any, BinaryIO
 
 import numpy as np
@@ -43,14 +43,11 @@ def write_parquet(run: RunFolder, file: BinaryIO) -> None:
         BadInput: pyarrow is not installed.
     """
     pyarrow, parquet = import_arrow()
-    writer = None
-    for columns in _tables(run):
-        table = pyarrow.table(columns)
-        if writer is None:
-            writer = parquet.ParquetWriter(file, table.schema)
-        writer.write_table(table)
-    if writer is not None:
-        writer.close()
+    tables = map(pyarrow.table, _tables(run))
+    first = next(tables)
+    with parquet.ParquetWriter(file, first.schema) as writer:  # else it would close itself later, in a page
+        for table in chain([first], tables):
+            writer.write_table(table)
 
 
 def write_npz(run: RunFolder, file: BinaryIO) -> None:

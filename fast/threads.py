@@ -1,0 +1,45 @@
+"""Threads in which kernels run, and which an interrupt ends.
+
+Python hears of an interrupt when a kernel returns, which may take minutes. So the main thread, where signals
+arrive, only waits for those that run kernels: it is woken, and calls off what they do.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
+from typing import Any
+
+from fast.kernel.records import IntArray
+
+LONG = 10_000  # collisions of a path, a millisecond at least: beside them a thread takes no time
+
+
+@contextmanager
+def interruptible(n_threads: int, called_off: IntArray) -> Iterator[ThreadPoolExecutor]:
+    """Provide threads for kernels that look at `called_off`: whoever raises does not wait for their ends."""
+    with ThreadPoolExecutor(n_threads) as pool:
+        try:
+            yield pool
+        except BaseException:
+            called_off[0] = 1
+            pool.shutdown(wait=False, cancel_futures=True)
+            raise
+
+
+def follow_path(
+    kernel: Callable[..., Any], given: tuple[Any, ...], n_collisions: int, called_off: IntArray
+) -> Any:
+    """Return what a kernel returns that follows a path: a long one can be interrupted.
+
+    Args:
+        kernel: to be called.
+        given: its arguments.
+        n_collisions: to be followed at most.
+        called_off: (1,) what the kernel looks at; set to 1 by an interrupt.
+    """
+    if n_collisions < LONG:
+        return kernel(*given)
+    with interruptible(1, called_off) as pool:
+        return pool.submit(kernel, *given).result()

@@ -1,0 +1,72 @@
+"""An interrupt ends what kernels do in the middle of one particle's path, and waits for nothing."""
+
+from __future__ import annotations
+
+import signal
+import threading
+from queue import SimpleQueue
+
+import pytest
+
+import fast
+from fast.kernel import entries
+from scene import State, load
+
+SCENE, START = load("moving-cap"), State(0.0, 0.1, 0.2, 3.0, 4.0)
+LENGTH = 300_000  # collisions: seconds
+
+
+@pytest.fixture
+def begun():
+    """Interrupt this thread as soon as a kernel has begun: an event, set then."""
+    event, main = threading.Event(), threading.get_ident()
+
+    def interrupt() -> None:
+        event.wait()
+        signal.pthread_kill(main, signal.SIGINT)
+
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    thread = threading.Thread(target=interrupt)
+    thread.start()
+    yield event
+    event.set()
+    thread.join()
+    signal.signal(signal.SIGINT, before)
+
+
+@pytest.mark.skipif(not hasattr(signal, "pthread_kill"), reason="no signal can be sent to a thread")
+@pytest.mark.parametrize("call", ["simulate", "go_on", "flow", "trajectory", "fine_trajectory"])
+def test_an_interrupt_is_heeded_in_the_middle_of_a_path(begun, monkeypatch, call):
+    followed = SimpleQueue()
+
+    def watched(name, how_many):
+        kernel = getattr(entries, name)
+
+        def watching(*given):
+            if how_many(given):
+                begun.set()
+            found = kernel(*given)
+            if how_many(given):
+                followed.put((found, given))
+            return found
+
+        monkeypatch.setattr(entries, name, watching)
+
+    watched("follow_particles", lambda given: len(given[1]))
+    watched("fine", lambda given: len(given[2]))
+    quick = State(0.0, 0.1, 0.2, 3e5, 4e5)
+    with pytest.raises(KeyboardInterrupt):
+        {
+            "simulate": lambda: fast.simulate(SCENE, n_particles=1, energy=1e12),
+            "go_on": lambda: fast.go_on(SCENE, n_particles=1, energy=1e12),
+            "flow": lambda: fast.flow(SCENE, [quick], 1.0),
+            "trajectory": lambda: fast.trajectory(SCENE, START, 10 * LENGTH),
+            "fine_trajectory": lambda: fast.fine_trajectory(SCENE, START, LENGTH),
+        }[call]()
+    found, given = followed.get()  # the kernel has ended, and not because it was done
+    if call == "fine_trajectory":
+        assert found[0] < LENGTH
+    elif call == "trajectory":
+        assert given[2].counts[0] < 10 * LENGTH
+    else:
+        assert given[0].followed.counts.sum() == 0

@@ -26,7 +26,7 @@ PATIENCE = 60.0  # seconds beyond our own, after which we go on alone
 # sooner still is reckoned from how long each part takes alone.
 BY_CORES = {
     1: [["careful"]],
-    2: [["careful", "aim", "fly", "chord", "rebound"], ["follow", "bounce"]],
+    2: [["careful", "fly", "chord", "rebound"], ["follow", "bounce", "aim"]],
     3: [["careful"], ["follow"], ["fly", "aim", "chord", "bounce", "rebound"]],
 }
 _ONCE = threading.Lock()  # taken by the thread that starts the others, for good

@@ -197,7 +197,7 @@ NOT_ASKED = (
 )
 
 
-@pytest.mark.parametrize("asked", deep_but(NOT_ASKED, NOT_ASKED[0], NOT_ASKED[5]))
+@pytest.mark.parametrize("asked", deep_but(NOT_ASKED, NOT_ASKED[0]))
 def test_what_pytest_cannot_ask_is_told_without_a_traceback(tmp_path, asked):
     options, code, word = asked
     plugin = ["-p", "conformance.suite.pytest_plugin", "--pyargs", "conformance.suite.pytest_suite"]

@@ -6,9 +6,10 @@ Copy this file, or import it. An engine gives one of two things:
     serve_parts(name, intersect, reflect)   the first crossing of one wall, and the bounce off it
 
 The kit reads and checks the questions, keeps the horizon, names the wall (least |f| / |grad f| at the place
-of the hit), chains trajectories, times them, and refuses what is no state of the scene. Where rounding leaves
-two answers open it says `undecided`; so may an engine, by raising `Open`. What it returns that is no hit
-(nan, a time that has passed) is answered as a failure of its own.
+of the hit), chains trajectories, times them, and refuses what is no state of the scene. Where it sees that
+rounding leaves two answers open it says `undecided`. So may an engine, by raising `Open`: of how near it came
+to another wall, or to the horizon, a next hit tells nothing. What it returns that is no hit (nan, a time that
+has passed) is answered as a failure of its own.
 Not offered: `flow`.
 """
 
@@ -111,14 +112,19 @@ def judged(scene: Scene, state: State, t_end: float) -> Outcome | None:
     own = {"arc": table.r, "floor": table.h, "base": max(table.r, table.w)}.get(
         wall, max(table.w, abs(state.x))
     )
-    if abs(gap_at(table, wall, state.x, state.y)) > ON_WALL * own:
+    is_beyond = isinstance(scene, Mushroom) and (
+        state.y < 0 if wall == "arc" else state.y > 0 and wall != "base"
+    )
+    if is_beyond or abs(gap_at(table, wall, state.x, state.y)) > ON_WALL * own:
         return Rejected(f"{place} is not on wall {wall}")
     rate = float(table.gap_rate(wall, state.x, state.y, state.vx, state.vy))
     if wall == "base" and rate == 0:
         return Undefined("sliding")
-    if rate < 0:
-        return Rejected(f"state.wall = {wall!r}: the particle moves into it")
-    return None if rate else Undecided(f"it rests on wall {wall}")
+    terms = math.hypot(state.vx, state.vy) + _rates(table, state)
+    terms *= float(table.r) + math.hypot(state.x, state.y) if wall == "arc" else 1.0
+    if wall != "base" and abs(rate) <= ROUNDING * terms:
+        return Undecided(f"it rests on wall {wall}, or nearly")
+    return Rejected(f"state.wall = {wall!r}: the particle moves into it") if rate < 0 else None
 
 
 def leaving(scene: Scene, state: State) -> State:
@@ -180,26 +186,36 @@ def _first_of(intersect: Intersect, reflect: Reflect, scene: Scene, state: State
     is_towards = state.y > 0 > state.vy or state.y < 0 < state.vy
     has_mouth = isinstance(scene, Mushroom) and is_towards and state.wall != "base"
     crossing = -state.y / state.vy if has_mouth else math.inf
-    hits = _hits(intersect, scene, state, inside, 0.0, min(crossing, end))
-    if not hits and crossing <= end:
-        x, w = state.x + crossing * state.vx, float(table_at(fp, scene, state.t + crossing).w)
-        if abs(abs(x) - w) <= TIE * w:
+    hits = _hits(intersect, scene, state, inside, 0.0, (1 + TIE) * min(crossing, end))
+    s, wall = _earliest([*hits, (crossing, None), (end, None)])
+    if s == crossing:
+        dx, w = crossing * state.vx, float(table_at(fp, scene, state.t + crossing).w)
+        room = w - abs(state.x + dx)
+        if abs(room) <= TIE * (w + abs(state.x) + abs(dx)):
             raise Open("the mouth's edge is met within rounding")
-        if abs(x) > w and inside:
-            hits = [(crossing, "base")]
-        elif abs(x) < w:
-            hits = _hits(intersect, scene, state, not inside, crossing, end)
-    elif len(hits) > 1 and hits[1][0] - hits[0][0] <= TIE * hits[0][0]:
-        raise Open("two walls are met within rounding")
-    if not hits and end < horizon:
+        if room > 0:
+            hits = _hits(intersect, scene, state, not inside, crossing, (1 + TIE) * end)
+            if hits and hits[0][0] - crossing <= TIE * crossing:
+                raise Open("a wall is met at the mouth within rounding")
+            s, wall = _earliest([*hits, (end, None)])
+        elif inside:
+            wall = "base"
+    if wall is None and s < horizon:
         raise Open("no wall is met in the time that it takes to leave the table")
-    if not hits:
+    if wall is None:
         return _horizon(state, t_end)
-    s, wall = hits[0]
     x, y, t = state.x + s * state.vx, state.y + s * state.vy, state.t + s
     vx, vy = reflect(scene, wall, t, x, y, state.vx, state.vy)
     y = 0.0 if wall == "base" else y
     return AnsweredCollision(wall=wall, dt=s, t=t, x=x, y=y, vx=vx, vy=vy)
+
+
+def _earliest(met: list[tuple[float, Wall | None]]) -> tuple[float, Wall | None]:
+    """Return the earliest of what is met, walls by name; Open where another is met within rounding of it."""
+    first, second, *_ = sorted([*met, (math.inf, None)], key=lambda found: found[0])
+    if second[0] - first[0] <= TIE * first[0]:
+        raise Open(f"{first[1] or 'no wall'} and {second[1] or 'no wall'} come within rounding of each other")
+    return first
 
 
 def _escape(scene: Scene, state: State) -> float:

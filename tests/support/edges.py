@@ -82,6 +82,9 @@ EDGES: list[tuple[Line, list[Line]]] = [
         asked("step", scene={"table": "cap", "r": 1.0}, **_at(-1.0, 0.0, -1.0, 0.5, "arc")),
         [_undefined("corner"), OPEN],
     ),
+    # Sides end at the mouth, and the arc does: a place beyond is on no wall.
+    (asked("step", scene=MUSHROOM, **_at(0.125, 0.5, -1.0, 0.25, "right")), [REFUSED]),
+    (asked("step", scene=MUSHROOM, **_at(0.6, -0.8, -0.25, 0.5, "arc")), [REFUSED]),
     # By the size of its own wall, now, a state is on it or not: not by the radius, nor by w far below.
     (asked("step", scene=MUSHROOM, **_at(0.125 + 2.0**-22, -0.5, -1.0, 0.25, "right")), [REFUSED]),
     (asked("step", scene=DEEP, state=OFF_BY_ROUNDING), [{"outcome": "collision", "wall": "left"}, OPEN]),

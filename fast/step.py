@@ -193,7 +193,7 @@ def fitted_start(scene: Scene, state: State) -> Start:
         particle = Particle(inner.t, 0.0, inner.x, inner.y, inner.vx, inner.vy, WALL_CODES[state.wall])
         share = entries.off_wall(careful_at(), fitted.compiled, particle)
         if share:
-            away = f"{share:.3g} of that wall's distance from the origin"
+            away = f"{share:.3g} of that wall's size"
             raise InvalidState(f"state.wall = {state.wall!r}, but the state is {away} away from that wall")
     return Start(inner, units, fitted.compiled)
 

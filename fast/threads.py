@@ -6,10 +6,12 @@ arrive, only waits for those that run kernels: it is woken, and calls off what t
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from typing import Any
+
+from numba import typeof
 
 from fast.kernel.records import IntArray
 
@@ -18,7 +20,7 @@ LONG = 10_000  # collisions of a path, a millisecond at least: beside them a thr
 
 @contextmanager
 def interruptible(n_threads: int, called_off: IntArray) -> Iterator[ThreadPoolExecutor]:
-    """Provide threads for kernels that look at `called_off`: whoever raises does not wait for their ends."""
+    """Provide threads for kernels that look at `called_off`: who raises waits until they have, no longer."""
     with ThreadPoolExecutor(n_threads) as pool:
         try:
             yield pool
@@ -28,18 +30,18 @@ def interruptible(n_threads: int, called_off: IntArray) -> Iterator[ThreadPoolEx
             raise
 
 
-def follow_path(
-    kernel: Callable[..., Any], given: tuple[Any, ...], n_collisions: int, called_off: IntArray
-) -> Any:
+def follow_path(kernel: Any, given: tuple[Any, ...], n_collisions: int, called_off: IntArray) -> Any:
     """Return what a kernel returns that follows a path: a long one can be interrupted.
 
     Args:
-        kernel: to be called.
+        kernel: a compiled function, to be called.
         given: its arguments.
         n_collisions: to be followed at most.
         called_off: (1,) what the kernel looks at; set to 1 by an interrupt.
     """
     if n_collisions < LONG:
         return kernel(*given)
+    if hasattr(kernel, "compile"):  # without the compiler it has none
+        kernel.compile(tuple(map(typeof, given)))  # here, where an interrupt ends that, too
     with interruptible(1, called_off) as pool:
         return pool.submit(kernel, *given).result()

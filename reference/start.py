@@ -157,7 +157,7 @@ def _departure(scene: Scene, state: State, wall: Wall, motion: MovingWalls) -> U
 
 
 def _check_residual(scene: Scene, state: State, motion: MovingWalls) -> None:
-    """Refuse a state too far from the wall it names, as measured by that wall's present distance from 0."""
+    """Refuse a state too far from the wall it names, as measured by that wall's present size."""
     wall, zero = state.wall, motion.arithmetic.zero
     assert wall is not None
     size = _distance_of(scene, wall, motion)

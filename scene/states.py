@@ -77,7 +77,7 @@ class Rejected(msgspec.Struct, frozen=True, tag_field="outcome", tag="rejected")
 Outcome = Collision | Horizon | Undefined | Undecided | Rejected
 Stepper = Callable[[Scene, State, float], Outcome]  # (scene, state, t_end): what comes first
 
-# A state on a wall whose residual exceeds this share of the wall's distance from the origin is
+# A state on a wall whose residual exceeds this share of the wall's size is
 # not on that wall: coordinates rounded to binary64 are on it to about 2^-50, and to 2^-20 even
 # when the time alone (t = 1e9) rounds by 1e-7.
 ON_WALL = 2.0**-20

@@ -274,7 +274,7 @@ def test_only_like_is_compared_with_like(field, value):
     comparison.check_alike(a_record(a_point([1.0])), "quick", 0, 1, DRAWN)
 
 
-@pytest.mark.parametrize(("field", "value"), [("what", "slower"), ("scene", "fixed-cap"), ("further", 7)])
+@pytest.mark.parametrize(("field", "value"), [("scene", "fixed-cap"), ("questions", 7), ("further", 7)])
 def test_a_workload_of_another_kind_is_not_compared(field, value):
     """Times of another scene came out as ratios, since only names were looked at."""
     old = a_record(a_point([1.0]))

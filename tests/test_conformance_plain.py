@@ -25,6 +25,7 @@ N_STEPS = 150  # the corpus asks many more
 BOUND = 1024.0  # backward ulps; the worst of 2,500 steps was 218, at a slow particle before a fast wall
 UNDECIDED_SHARE = 0.08
 # Its floor, left at speed 1/4 at t = 0, is touched again at t = 7/8: f = (s - 7/8)^2 / 2.
+BACK = Stem(w=1.0, h=BangBang(knots=((-1.0, 1.0), (1.0, 2.0), (1.5, 1.5), (2.0, 2.0), (3.0, 1.0))))
 DROP = Stem(w=1.0, h=BangBang(knots=((-1.0, 1.0), (0.125, 1.0), (1.125, 0.75), (2.0, 0.75), (3.0, 1.0))))
 
 
@@ -76,6 +77,12 @@ def test_legs_close_after_any_period(t, s):
         (LIFT, State(0.0, 0.0, -2.0, 0.0, 0.0, "floor"), Undecided),  # sliding
         (DROP, State(0.0, 0.25, -1.0, 0.0, 0.25, "floor"), Undecided),  # a touch of the floor that is left
         (DROP, State(0.0, 0.25, -1.0 + 2.0**-30, 0.0, 0.25, "floor"), Undecided),
+        (
+            BACK,
+            State(0.0, 0.25, -1.5, 0.0, 0.0, "floor"),
+            Undecided,
+        ),  # a touch with no net change of any term
+        (BACK, State(0.0, 0.25, -1.5, 0.0, 2.0**-60, "floor"), Undecided),
         (CIRCLE, State(0.0, 0.0, 1.0, 1.0, -1.0, "arc"), Undecided),  # a corner of the arc that is left
         (STATIC, State(0.0, 0.025, 0.0, 0.25, 0.0), Undecided),  # along the mouth to its edge at t_end
         (STATIC, State(0.0, 0.5, 0.0, 0.25, 1.0), Undecided),  # at the mouth's edge

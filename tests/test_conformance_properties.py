@@ -21,7 +21,19 @@ from conformance.mutants import MUTANTS
 from conformance.profiles import check_work_identity
 from conformance.properties import PROPERTIES, check_mirror, check_period_shift, check_scaling
 from conformance.strategies import scenes_and_states
-from scene import Collision, Fourier, Horizon, Mushroom, Rejected, State, Stem, Undecided, load, transforms
+from scene import (
+    Cap,
+    Collision,
+    Fourier,
+    Horizon,
+    Mushroom,
+    Rejected,
+    State,
+    Stem,
+    Undecided,
+    load,
+    transforms,
+)
 from scene.geometry import rounded
 from scene.laws import is_constant
 from scene.tables import laws, period
@@ -200,6 +212,13 @@ def test_what_is_clearly_inside_is_refused_by_nobody(tally):
 
     question()
     assert min(tally["clear"], tally["not clear"], tally["refused"]) > 20
+
+
+@pytest.mark.parametrize(("t", "t_end"), [(5e-324, 1.0), (0.0, 5e-324), (0.0, 1e-310)])
+def test_a_time_that_not_every_stepper_can_hold_makes_nothing_clear(t, t_end):
+    state = State(t, 0.125, 0.25, 2.0**-60, 2.0**-60)
+    assert isinstance(fast.next_collision(Cap(r=1.0), state, t_end), Rejected)
+    assert not is_clearly_inside(Cap(r=1.0), state, t_end)
 
 
 def test_numbers_of_other_kinds_are_taken():

@@ -45,7 +45,7 @@ def all_started(*arguments):
 
 def compiled():
     function = njit(lambda x: x + 1)
-    with beside.compiled_beside(function):
+    with beside.compiled_beside([function]):
         return function(1)
 
 
@@ -65,11 +65,23 @@ def test_what_is_kept_or_not_meant_starts_nothing(started):
     processes = started("")
     function = njit(lambda x: x + 1)
     assert function(1) == 2
-    with beside.compiled_beside(function):
+    with beside.compiled_beside([function]):
         assert function(1) == 2
-    with beside.compiled_beside(function):
+    with beside.compiled_beside([function]):
         assert njit(lambda x: x + 2)(1) == 3
     assert processes == []
+
+
+def test_the_first_that_is_not_kept_starts_them(started):
+    """The careful step may be kept before: whoever asks one question first compiles it."""
+    processes = started("")
+    kept, missing = njit(lambda x: x + 1), njit(lambda x: x + 2)
+    assert kept(1) == 2
+    with beside.compiled_beside([kept, missing]):
+        kept(1)
+        assert processes == []
+        missing(1)
+    assert len(processes) == 2
 
 
 def test_one_that_hangs_is_left_behind(started, monkeypatch):
@@ -102,7 +114,7 @@ def test_an_interrupt_ends_it_too(started):
     function = njit(lambda x: x + 1)
 
     def interrupted():
-        with beside.compiled_beside(function):
+        with beside.compiled_beside([function]):
             function(1)
             raise KeyboardInterrupt
 

@@ -6,10 +6,12 @@ import signal
 import threading
 from queue import SimpleQueue
 
+import numpy as np
 import pytest
 
 import fast
 from fast.kernel import entries
+from fast.threads import LONG, follow_path
 from scene import State, load
 
 SCENE, START = load("moving-cap"), State(0.0, 0.1, 0.2, 3.0, 4.0)
@@ -70,3 +72,22 @@ def test_an_interrupt_is_heeded_in_the_middle_of_a_path(begun, monkeypatch, call
         assert given[2].counts[0] < 10 * LENGTH
     else:
         assert given[0].followed.counts.sum() == 0
+
+
+@pytest.mark.parametrize(("length", "is_here"), [(LONG - 1, True), (LONG, False)])
+def test_a_long_path_is_followed_elsewhere_but_compiled_here(length, is_here):
+    """A compilation heeds an interrupt only in the thread that hears of it."""
+
+    class Kernel:
+        compiled_by = followed_by = None
+
+        def compile(self, _types):
+            self.compiled_by = threading.get_ident()
+
+        def __call__(self, _number):
+            self.followed_by = threading.get_ident()
+
+    kernel, here = Kernel(), threading.get_ident()
+    follow_path(kernel, (1.0,), length, np.zeros(1, np.int64))
+    assert (kernel.followed_by == here) == is_here
+    assert kernel.compiled_by == (None if is_here else here)

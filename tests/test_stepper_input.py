@@ -196,7 +196,7 @@ def deep_stem(draw):
     return table, State(0.0, x, y, speed * math.cos(turn), speed * math.sin(turn) * draw.power(-10, 0))
 
 
-def test_no_outcome_is_refused_as_the_next_start(tally):
+def test_no_outcome_is_refused_for_the_rounding_of_its_place(tally):
     """However deep and slanted the stem: where x is rounded by more than 2^-20 of the mouth, too."""
     steppers = {"fast": fast.next_collision, "plain": plain.next_collision}
     for index in range(60):

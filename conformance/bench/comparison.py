@@ -55,6 +55,7 @@ def check_alike(old: Record, size: str, seed: int, questions: int, drawn: Sequen
             pairs += [
                 (f"{field} of {new.name}", getattr(there[new.name], field), getattr(new, field))
                 for field in new.__struct_fields__
+                if field != "what"
             ]
     for name, before, value in pairs:
         if before != value:

@@ -71,7 +71,7 @@ def is_clearly_inside(scene: Scene, state: State, t_end: float) -> bool:
     except BadInput:
         return False
     sizes = [abs(extent) for law in laws(scene).values() for extent in bounds(law)]
-    sizes += [abs(number) for number in (state.x, state.y, state.vx, state.vy)]
+    sizes += [abs(number) for number in (state.x, state.y, state.vx, state.vy, state.t, t_end)]
     is_far = max(abs(state.t), abs(t_end)) > FAR * (cycle_length(scene) or 1.0)
     if state.wall is not None or is_far or any(size and not 1 / MOST < size < MOST for size in sizes):
         return False

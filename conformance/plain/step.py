@@ -130,10 +130,8 @@ class Flight:
 
     def is_mouth_open(self, s: float) -> bool:
         """Tell whether |x| < w at the time of the crossing."""
-        room = min(self.f(wall, s)[0] for wall in ("left", "right"))  # by f of the side left, as all is
-        if abs(room) <= self.noise("right", s):
-            raise Open("the mouth's edge is met within rounding")
-        return room > 0
+        self.require_clear(("left", "right"), s)  # by f of the side left, as all is
+        return min(self.f(wall, s)[0] for wall in ("left", "right")) > 0
 
     def first_hit(self, walls: Sequence[Wall], start: float, end: float) -> tuple[Wall, float] | None:
         """Return the wall met first in start < s <= end, and when."""
@@ -162,6 +160,8 @@ class Flight:
                 continue
             slope = self.f(wall, middle)[1]
             if abs(slope) > bend * width / 2:  # f is monotonic
+                if slope > 0 and fa <= self.noise(wall, a):
+                    break  # it turns at a, above 0 or below within rounding
                 if fb > 0:
                     continue
                 root = self.root_between(wall, a, b)
@@ -243,12 +243,9 @@ class Flight:
 
     def noise(self, wall: Wall, s: float) -> float:
         """Bound what rounding may change a wall's f by."""
-        gap = self.gap(wall, s)
-        if (
-            wall == self.wall
-        ):  # 0 now, by definition: what rounding has changed since is that of the terms of f'
-            return ROUNDING * s * (abs(gap.ft) + abs(gap.fx * self.vx) + abs(gap.fy * self.vy))
-        late = abs(gap.ft * self.state.t)
+        if wall == self.wall:  # 0 now, by definition: what rounding has changed since is that of f's terms
+            return ROUNDING * s * self.swiftness(wall, s)
+        late = abs(self.gap(wall, s).ft * self.state.t)
         x, y = abs(self.x) + abs(self.vx) * s, abs(self.y) + abs(self.vy) * s
         size = {name: max(-law.lowest, law.highest) for name, law in self.bounds.items()}
         if wall == "arc":
@@ -257,6 +254,19 @@ class Flight:
             return ROUNDING * (y + (size["h"] if wall == "floor" else 0.0) + late)
         w = size["w"] if "w" in size else size["nu"] * size["r"]
         return ROUNDING * (w + size["slope"] * y + x + late)
+
+    def swiftness(self, wall: Wall, s: float) -> float:
+        """Bound the sum of the sizes of the terms of a wall's f' up to s; at s itself they may vanish."""
+        b, vx, vy = self.bounds, abs(self.vx), abs(self.vy)
+        x, y = abs(self.x) + vx * s, abs(self.y) + vy * s
+        if wall == "arc":
+            return 2 * (b["r"].highest * b["r"].slope + x * vx + y * vy)
+        if wall in ("floor", "base"):
+            return vy + (b["h"].slope if wall == "floor" else 0.0)
+        tilting = b["slope"].slope * y + max(-b["slope"].lowest, b["slope"].highest) * vy
+        if "w" in b:
+            return b["w"].slope + tilting + vx
+        return b["nu"].highest * b["r"].slope + b["nu"].slope * b["r"].highest + tilting + vx
 
     def require_clear(self, walls: Sequence[Wall], s: float) -> None:
         """Leave open what comes first when a wall passes the particle, or is met again, within rounding."""

@@ -1,7 +1,7 @@
 """Compiling in several processes at once: numba compiles one function after another, but keeps them on disk.
 
 A run needs the careful step, five loops, and `follow_particles`, which calls those by their addresses and
-takes longest to compile. When the careful step is about to be compiled, other processes begin with what is
+takes longest to compile. When the first of them is about to be compiled, other processes begin with what is
 their share; this one will find it kept. Whatever goes wrong there, it is compiled here as if nobody had
 tried.
 """
@@ -12,7 +12,7 @@ import os
 import subprocess
 import sys
 import threading
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from time import monotonic
 from typing import Any
@@ -45,15 +45,15 @@ def own_share() -> list[str]:
 
 
 class _Beside(event.Listener):  # type: ignore[misc]  # numba has no types
-    """Starts the others when numba has found an entry not kept, and is about to compile it."""
+    """Starts the others when numba has found one of some entries not kept, and is about to compile it."""
 
-    def __init__(self, entry: Any, arguments: tuple[str, ...]) -> None:
-        self._entry, self._arguments = entry, arguments
+    def __init__(self, entries: Iterable[Any], arguments: tuple[str, ...]) -> None:
+        self._entries, self._arguments = list(entries), arguments
         self.processes: list[subprocess.Popen[bytes]] = []
 
     def on_start(self, told: Any) -> None:
         """See numba's `Listener`."""
-        if not self.processes and told.data["dispatcher"] is self._entry:
+        if not self.processes and told.data["dispatcher"] in self._entries:
             start(self.processes, *self._arguments)
 
     def on_end(self, told: Any) -> None:
@@ -87,14 +87,14 @@ def start(started: list[subprocess.Popen[bytes]], *arguments: str) -> None:
 
 
 @contextmanager
-def compiled_beside(entry: Any, *arguments: str) -> Iterator[None]:
+def compiled_beside(entries: Iterable[Any], *arguments: str) -> Iterator[None]:
     """Let other processes compile while the caller does, if it does; wait for them.
 
     Args:
-        entry: the dispatcher with whose compilation they begin.
+        entries: the dispatchers with the first of whose compilations they begin.
         arguments: what they are told.
     """
-    beside = _Beside(entry, arguments)
+    beside = _Beside(entries, arguments)
     with event.install_listener("numba:compile", beside):
         try:
             yield

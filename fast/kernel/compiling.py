@@ -13,11 +13,13 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import llvmlite
 import numba
 from llvmlite import ir
-from llvmlite.binding import get_host_cpu_features, get_host_cpu_name
+from llvmlite.binding import get_host_cpu_name
 from numba import config, njit, types
 from numba.core import cgutils
+from numba.core.codegen import get_host_cpu_features
 from numba.core.typing import Signature
 from numba.extending import intrinsic
 
@@ -46,8 +48,9 @@ def kept(*variant: object, **options: Any) -> Callable[[Any], Any]:
     numba's disk cache looks only at the file of the function it keeps, not at those of the functions compiled
     into it. Nor is what it keeps tied to what it was made of: an index says which number has which code, and
     is written before that code. Let a process end in between, or two write at a time, and a number may lead
-    to code of other sources, of another variant or for another processor, which is then run. So all that
-    decides what a function compiles to is in the name of its files: whatever lies under it is the right code.
+    to code of other sources, of another variant or for another processor, which is then run. So what
+    decides what a function compiles to is in the name of its files, but for numba's switches for debugging:
+    whatever lies under it is the right code. Files of other sources stay until somebody removes them.
 
     Args:
         variant: values that it closes over, which tell it from others of its name.
@@ -55,9 +58,10 @@ def kept(*variant: object, **options: Any) -> Callable[[Any], Any]:
     """
 
     def compiled(function: Any) -> Any:
-        name = config.CPU_NAME or get_host_cpu_name()
-        can = config.CPU_FEATURES or get_host_cpu_features().flatten()
-        rest = hashlib.sha256(repr((variant, numba.__version__, name, can)).encode()).hexdigest()
+        name = get_host_cpu_name() if config.CPU_NAME is None else config.CPU_NAME
+        can = get_host_cpu_features() if config.CPU_FEATURES is None else config.CPU_FEATURES
+        tools = numba.__version__, llvmlite.__version__, name, can
+        rest = hashlib.sha256(repr((variant, tools)).encode()).hexdigest()
         function.__qualname__ += f"-{SOURCES[:16]}-{rest[:16]}"
         return njit(cache=True, **options)(function)
 

@@ -79,7 +79,7 @@ def single(step_at, numbers, t, x, y, vx, vy, wall, t_end):
 
 @kept(error_model="numpy")
 def off_wall(step_at, scene, particle):
-    """Return the share of its wall's distance from 0 by which a particle is off it; 0 for one on it.
+    """Return the share of its wall's size by which a particle is off it; 0 for one on it.
 
     And for one at a time whose phase is lost: that is left to the step, which refuses it.
     """

@@ -19,9 +19,9 @@ MET, KNOWN, GIVEN = np.arange(3)
 
 @kernel
 def wall_gap(particle, scene, anchors):
-    """Return how far a particle is inside the wall that it leaves, and that wall's distance from 0, now.
+    """Return how far a particle is inside the wall that it leaves, and that wall's size, now.
 
-    Today's distance is the measure, not the largest of all time: a small cap is not allowed a large one's
+    Today's size is the measure, not the largest of all time: a small cap is not allowed a large one's
     slack. The anchors hold the laws at the particle's time.
     """
     r, w, h = anchors[RADIUS, VALUE], anchors[WIDTH, VALUE], anchors[DEPTH, VALUE]
@@ -39,7 +39,7 @@ def wall_gap(particle, scene, anchors):
 def judged_step(particle, limit, origin, scene, anchors):
     """Take a careful step of a particle, known as well as `origin` says: see fast.kernel.careful.
 
-    For OFF_WALL the time of flight is the share of the wall's distance by which the particle is off it.
+    For OFF_WALL the time of flight is the share of the wall's size by which the particle is off it.
     """
     if origin != MET:
         if not set_anchors(scene.laws, anchors, particle.t, particle.t_low):

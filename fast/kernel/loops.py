@@ -27,6 +27,7 @@ from fast.kernel.lanes import aim, chord, fly
 from fast.kernel.limits import LawLimits
 from fast.kernel.pieces import DEGREES
 from fast.kernel.records import Compiled, LawsInLanes, Particle
+from scene.states import ON_WALL
 
 _WHOLE, _REAL, _TRUTH = types.int64, types.float64, types.boolean
 _TABLE = types.float64[:, ::1]
@@ -64,7 +65,7 @@ class Loops(NamedTuple):
     rebound: int
 
 
-@kept(**HOW)
+@kept(ON_WALL, **HOW)
 def careful_step(particle, limit, origin, scene, anchors):
     """Judge a particle as its origin asks, and take a careful step: see fast.kernel.judged."""
     return judged_step(particle, limit, origin, scene, anchors)
@@ -144,18 +145,21 @@ def careful_at() -> Any:
     return address(careful_step, CAREFUL)
 
 
-def compile_loop(name: str, is_slope_moving: bool, degree: int) -> Any:
-    """Compile a loop, of the name it has in Loops, or load it; return its address."""
-    if name == "careful":
-        return careful_at()
-    entry, signature = {
+def entries_for(is_slope_moving: bool, degree: int) -> dict[str, tuple[Any, Signature]]:
+    """Return what serves scenes of such a slope and laws of such a degree, by the names in Loops."""
+    return {
+        "careful": (careful_step, CAREFUL),
         "aim": (AIMS[is_slope_moving], AIM),
         "fly": (FLIES[is_slope_moving, degree], FLY),
         "chord": (CHORDS[degree], CHORD),
         "bounce": (BOUNCES[is_slope_moving], BOUNCE),
         "rebound": (rebound_lanes, REBOUND),
-    }[name]
-    return address(entry, signature)
+    }
+
+
+def compile_loop(name: str, is_slope_moving: bool, degree: int) -> Any:
+    """Compile a loop, of the name it has in Loops, or load it; return its address."""
+    return careful_at() if name == "careful" else address(*entries_for(is_slope_moving, degree)[name])
 
 
 @contextmanager
@@ -165,7 +169,8 @@ def most_compiled(is_slope_moving: bool, degree: int) -> Iterator[None]:
     The others go on while the caller does, in the body of this context, what else it has to compile; at its
     end they are waited for. What nobody has compiled `loops_for` does.
     """
-    with compiled_beside(careful_step, f"{is_slope_moving:d}", f"{degree}"):
+    wanted = [entry for entry, _ in entries_for(is_slope_moving, degree).values()]
+    with compiled_beside(wanted, f"{is_slope_moving:d}", f"{degree}"):
         for name in own_share():
             compile_loop(name, is_slope_moving, degree)
         yield

@@ -31,6 +31,15 @@ LATE = {
     "state": {"t": -4.8138600903774904e16, "x": 0.25, "y": -0.125, "vx": 0.75, "vy": -0.625, "wall": None},
     "t_end": -4.81386009037749e16,
 }
+TOUCHED = {
+    "scene": {
+        "table": "stem",
+        "w": 1.0,
+        "h": {"kind": "bang-bang", "knots": [[-1, 1], [1, 2], [2, 1.5], [3, 2], [4, 1]]},
+    },
+    "state": {"t": 0.0, "x": 0.25, "y": -1.5, "vx": 0.0, "vy": 0.0, "wall": "floor"},
+    "t_end": 2.75,
+}
 REFUSED = {"outcome": "rejected"}
 OPEN = {"outcome": "undecided"}
 
@@ -85,6 +94,8 @@ EDGES: list[tuple[Line, list[Line]]] = [
     # Sides end at the mouth, and the arc does: a place beyond is on no wall.
     (asked("step", scene=MUSHROOM, **_at(0.125, 0.5, -1.0, 0.25, "right")), [REFUSED]),
     (asked("step", scene=MUSHROOM, **_at(0.6, -0.8, -0.25, 0.5, "arc")), [REFUSED]),
+    # The floor that it rests on goes, and comes back to just where it was: it touches, with no net change.
+    (asked("step", **TOUCHED), [{"outcome": "horizon"}, OPEN]),
     # By the size of its own wall, now, a state is on it or not: not by the radius, nor by w far below.
     (asked("step", scene=MUSHROOM, **_at(0.125 + 2.0**-22, -0.5, -1.0, 0.25, "right")), [REFUSED]),
     (asked("step", scene=DEEP, state=OFF_BY_ROUNDING), [{"outcome": "collision", "wall": "left"}, OPEN]),

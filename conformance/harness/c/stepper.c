@@ -138,12 +138,13 @@ static Gap gap(const Flight *flight, int wall, double s) {
     const Table *table = flight->table;
     double t = flight->from.t, x = flight->from.x, y = flight->from.y, vx = flight->from.vx, vy = flight->from.vy;
     double first, size, change, moved, slope, rate, up, late = 0;
+    int is_own = wall == flight->from.wall; /* it may have gone and come back: no net change is its rounding */
     if (wall == ARC) {
         double grown = rise(&table->r, t, s, &rate), square = vx * vx + vy * vy, along = x * vx + y * vy;
         first = flight->r * flight->r - (x * x + y * y);
         size = table->r.high * table->r.high + x * x + y * y;
         change = grown * (2 * flight->r + grown) - s * (2 * along + s * square);
-        moved = fabs(grown) * 2 * table->r.high + s * (2 * fabs(x * vx) + 2 * fabs(y * vy) + s * square);
+        moved = (is_own ? s * table->r.slope : fabs(grown)) * 2 * table->r.high + s * (2 * fabs(x * vx) + 2 * fabs(y * vy) + s * square);
         late = 2 * (flight->r + grown) * rate, slope = late - 2 * (along + s * square);
     } else if (wall == LEFT || wall == RIGHT) {
         double side = wall == LEFT ? 1 : -1, tilt_rate;
@@ -151,17 +152,20 @@ static Gap gap(const Flight *flight, int wall, double s) {
         first = flight->w + flight->lean * y + side * x;
         size = mouth_bounds(table).high + table->lean.high * fabs(y) + fabs(x);
         change = grown + tilt * (y + s * vy) + s * (flight->lean * vy + side * vx);
-        moved = fabs(grown) + fabs(tilt * (y + s * vy)) + s * (fabs(flight->lean * vy) + fabs(vx));
+        moved = is_own ? s * mouth_bounds(table).slope : fabs(grown);
+        moved += (is_own ? s * table->lean.slope : fabs(tilt)) * fabs(y + s * vy);
+        moved += s * (fabs(flight->lean * vy) + fabs(vx));
         late = rate + tilt_rate * (y + s * vy), slope = late + (flight->lean + tilt) * vy + side * vx;
     } else if (wall == FLOOR) {
         double grown = rise(&table->h, t, s, &rate);
         first = y + flight->h, size = fabs(y) + table->h.high;
-        change = s * vy + grown, moved = s * fabs(vy) + fabs(grown), late = rate, slope = vy + late;
+        change = s * vy + grown, late = rate, slope = vy + late;
+        moved = s * fabs(vy) + (is_own ? s * table->h.slope : fabs(grown));
     } else {
         up = table->kind == STEM ? -1 : 1;
         first = up * y, size = fabs(y), change = up * s * vy, moved = s * fabs(vy), slope = up * vy;
     }
-    if (wall == flight->from.wall) first = size = late = 0;
+    if (is_own) first = size = late = 0;
     return (Gap){first + change, slope, SLACK * U * (size + moved + fabs(late * t))};
 }
 

@@ -18,8 +18,8 @@ from fast.kernel.judged import GIVEN
 from fast.kernel.loops import run_careful
 from fast.kernel.records import ANCHORS_SHAPE, SHARED, Compiled, Particle
 
-# Two more codes: the question is no good, and the answer does not fit into binary64.
-REFUSED, ANSWER_LOST = np.array([50, 51])
+# Beside those of fast.kernel.codes: the question is no good, and the answer does not fit into binary64.
+REFUSED, ANSWER_LOST = np.array([53, 54])
 # Squares of what is larger overflow.
 LARGEST = 2.0**400
 LENGTH, TIME = 96, 32  # exponents of a table's size and period in the kernel

@@ -109,7 +109,10 @@ class Flight:
             hit = self.first_hit(near, self.crossing, self.end)
         elif self.crossing < inf:
             near = (*near, "base")  # a tie of hit and crossing is a corner
-        self.require_clear(near, self.end if self.is_horizon else 0.0)
+        if not self.is_horizon:
+            self.require_clear(near, 0.0)
+        elif hit is None or hit[1] > self.end / 2:  # who has met a wall long before is not there at t_end
+            self.require_clear(near, self.end)
         if hit is None:
             return self.horizon()
         wall, s = hit
@@ -260,13 +263,19 @@ class Flight:
         b, vx, vy = self.bounds, abs(self.vx), abs(self.vy)
         x, y = abs(self.x) + vx * s, abs(self.y) + vy * s
         if wall == "arc":
-            return 2 * (b["r"].highest * b["r"].slope + x * vx + y * vy)
+            return 2 * (b["r"].highest * self.fastest("r", s) + x * vx + y * vy)
         if wall in ("floor", "base"):
-            return vy + (b["h"].slope if wall == "floor" else 0.0)
-        tilting = b["slope"].slope * y + max(-b["slope"].lowest, b["slope"].highest) * vy
+            return vy + (self.fastest("h", s) if wall == "floor" else 0.0)
+        tilting = self.fastest("slope", s) * y + max(-b["slope"].lowest, b["slope"].highest) * vy
         if "w" in b:
-            return b["w"].slope + tilting + vx
-        return b["nu"].highest * b["r"].slope + b["nu"].slope * b["r"].highest + tilting + vx
+            return self.fastest("w", s) + tilting + vx
+        widening = b["nu"].highest * self.fastest("r", s) + self.fastest("nu", s) * b["r"].highest
+        return widening + tilting + vx
+
+    def fastest(self, name: str, s: float) -> float:
+        """Bound a law's |f'| up to s, by what it is there and what it may have changed by."""
+        bounds = self.bounds[name]
+        return min(bounds.slope, abs(self.laws[name].at(s).rate) + bounds.curvature * s)
 
     def require_clear(self, walls: Sequence[Wall], s: float) -> None:
         """Leave open what comes first when a wall passes the particle, or is met again, within rounding."""

@@ -132,6 +132,9 @@ static Law mouth_bounds(const Table *table) {
 
 /* Flights ---------------------------------------------------------------------------------------------- */
 
+/* Bound what a law may have changed by on the way to s, where it has this rate, and come back by. */
+static double swing(const Law *law, double rate, double s) { return s * fmin(law->slope, fabs(rate) + s * law->curvature); }
+
 /* f is written as f(0) plus its change; f(0) is taken out for the wall that the particle leaves. Where a law's
    argument is rounded, late in time, f moves by that of it: `late`, the part of f' that the laws make, times t. */
 static Gap gap(const Flight *flight, int wall, double s) {
@@ -144,7 +147,7 @@ static Gap gap(const Flight *flight, int wall, double s) {
         first = flight->r * flight->r - (x * x + y * y);
         size = table->r.high * table->r.high + x * x + y * y;
         change = grown * (2 * flight->r + grown) - s * (2 * along + s * square);
-        moved = (is_own ? s * table->r.slope : fabs(grown)) * 2 * table->r.high + s * (2 * fabs(x * vx) + 2 * fabs(y * vy) + s * square);
+        moved = (is_own ? swing(&table->r, rate, s) : fabs(grown)) * 2 * table->r.high + s * (2 * fabs(x * vx) + 2 * fabs(y * vy) + s * square);
         late = 2 * (flight->r + grown) * rate, slope = late - 2 * (along + s * square);
     } else if (wall == LEFT || wall == RIGHT) {
         double side = wall == LEFT ? 1 : -1, tilt_rate;
@@ -152,15 +155,16 @@ static Gap gap(const Flight *flight, int wall, double s) {
         first = flight->w + flight->lean * y + side * x;
         size = mouth_bounds(table).high + table->lean.high * fabs(y) + fabs(x);
         change = grown + tilt * (y + s * vy) + s * (flight->lean * vy + side * vx);
-        moved = is_own ? s * mouth_bounds(table).slope : fabs(grown);
-        moved += (is_own ? s * table->lean.slope : fabs(tilt)) * fabs(y + s * vy);
+        Law mouth = mouth_bounds(table);
+        moved = is_own ? swing(&mouth, rate, s) : fabs(grown);
+        moved += (is_own ? swing(&table->lean, tilt_rate, s) : fabs(tilt)) * (fabs(y) + s * fabs(vy));
         moved += s * (fabs(flight->lean * vy) + fabs(vx));
         late = rate + tilt_rate * (y + s * vy), slope = late + (flight->lean + tilt) * vy + side * vx;
     } else if (wall == FLOOR) {
         double grown = rise(&table->h, t, s, &rate);
         first = y + flight->h, size = fabs(y) + table->h.high;
         change = s * vy + grown, late = rate, slope = vy + late;
-        moved = s * fabs(vy) + (is_own ? s * table->h.slope : fabs(grown));
+        moved = s * fabs(vy) + (is_own ? swing(&table->h, rate, s) : fabs(grown));
     } else {
         up = table->kind == STEM ? -1 : 1;
         first = up * y, size = fabs(y), change = up * s * vy, moved = s * fabs(vy), slope = up * vy;

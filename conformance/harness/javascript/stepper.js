@@ -186,13 +186,14 @@ class Flight {
     let first, size, change, moved, slope;
     let late = 0;
     // The wall that is left may have gone and come back: no net change is its rounding.
-    const sizeOf = (law, rise) => (wall === this.left ? s * law.slope : abs(rise));
+    const swing = (law, rate) => s * min(law.slope, abs(rate) + s * law.curvature);
+    const sizeOf = (law, rise, rate) => (wall === this.left ? swing(law, rate) : abs(rise));
     if (wall === "arc") {
       const [rise, rate] = table.r.rise(t, s);
       const [square, along] = [vx * vx + vy * vy, x * vx + y * vy];
       [first, size] = [now.r * now.r - (x * x + y * y), table.r.high ** 2 + x * x + y * y];
       change = rise * (2 * now.r + rise) - s * (2 * along + s * square);
-      moved = sizeOf(table.r, rise) * 2 * table.r.high + s * (2 * abs(x * vx) + 2 * abs(y * vy) + s * square);
+      moved = sizeOf(table.r, rise, rate) * 2 * table.r.high + s * (2 * abs(x * vx) + 2 * abs(y * vy) + s * square);
       late = 2 * (now.r + rise) * rate;
       slope = late - 2 * (along + s * square);
     } else if (wall === "left" || wall === "right") {
@@ -200,14 +201,14 @@ class Flight {
       const [[rise, rate], [tilt, tiltRate]] = [table.w.rise(t, s), table.slope.rise(t, s)];
       [first, size] = [now.w + now.slope * y + side * x, table.w.high + table.slope.high * abs(y) + abs(x)];
       change = rise + tilt * (y + s * vy) + s * (now.slope * vy + side * vx);
-      moved = sizeOf(table.w, rise) + sizeOf(table.slope, tilt) * abs(y + s * vy);
+      moved = sizeOf(table.w, rise, rate) + sizeOf(table.slope, tilt, tiltRate) * (abs(y) + s * abs(vy));
       moved += s * (abs(now.slope * vy) + abs(vx));
       late = rate + tiltRate * (y + s * vy);
       slope = late + (now.slope + tilt) * vy + side * vx;
     } else if (wall === "floor") {
       const [rise, rate] = table.h.rise(t, s);
       [first, size, change] = [y + now.h, abs(y) + table.h.high, s * vy + rise];
-      [moved, late, slope] = [s * abs(vy) + sizeOf(table.h, rise), rate, vy + rate];
+      [moved, late, slope] = [s * abs(vy) + sizeOf(table.h, rise, rate), rate, vy + rate];
     } else {
       const up = table.kind === "stem" ? -1 : 1;
       [first, size, change, moved, slope] = [up * y, abs(y), up * s * vy, s * abs(vy), up * vy];

@@ -77,6 +77,7 @@ def test_a_sample_of_the_matrix_is_reproduced(vectors):
         assert kills(flows, MUTANTS[name]) == published
 
 
+@pytest.mark.deep
 def test_the_least_killed_are_killed_again_five_times(vectors):
     """By the vectors that the matrix names: it is not taken at its word where there is least to spare."""
     least = sorted(MUTANTS, key=lambda name: PUBLISHED["mutants"][name]["kills"])[:10]

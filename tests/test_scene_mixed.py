@@ -106,6 +106,7 @@ def decide(wave, legs):
         return str(refusal)
 
 
+@pytest.mark.deep
 def test_the_proof_agrees_with_sampling(many_bits, tally):
     """W <= r for w of legs and r of waves: random scenes, about half of them invalid."""
     draw = random.Random("scenes")

@@ -78,6 +78,7 @@ def test_moments_of_any_order_are_those_of_the_prediction() -> None:
     assert powers[0] == pytest.approx(1, abs=1e-12)
 
 
+@pytest.mark.deep
 def test_reversal_holds_to_40_digits() -> None:
     # p_nc' = p_nc exp(-s_nc), m1' = -mean s exp(-s), p'(-s) = p(s) exp(-s), mean exp(-s) = 1.
     scene, small = load("fixed-cap-clockwise"), mpmath.mpf(10) ** -40

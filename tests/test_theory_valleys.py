@@ -161,6 +161,7 @@ def test_a_model_without_recapture_is_refused(solved: Energies) -> None:
     assert kolmogorov(solved, *adiabatic_model(N, 20140601, most=1)) > 5
 
 
+@pytest.mark.deep
 def test_mean_exp_minus_s_is_one_to_40_digits_with_recapture() -> None:
     found = captures(Cycle.of(TWICE, 40), 46)
     ctx = found.cycle.ctx

@@ -88,8 +88,11 @@ def test_a_benchmark_is_written_whole_and_compared(call, tmp_path, monkeypatch):
 def test_a_slow_down_exits_with_1(call, tmp_path, monkeypatch):
     kept = record.read(ROOT / "docs" / "bench" / "bench.json")
     points = tuple(msgspec.structs.replace(p, ns=(100.0, 101.0, 102.0)) for p in kept.points)
-    quick = {"size": "quick", "questions": bench.QUESTIONS["quick"], "workloads": bench._drawn("quick")}
-    kept = msgspec.structs.replace(kept, points=points, **quick)
+    few = {"questions": bench.QUESTIONS["quick"], "further": bench.FURTHER["quick"]}
+    drawn = tuple(msgspec.structs.replace(workload, **few) for workload in kept.workloads)
+    kept = msgspec.structs.replace(
+        kept, points=points, size="quick", questions=few["questions"], workloads=drawn
+    )
     monkeypatch.setattr(bench, "_measured", lambda *_: kept)
     for picture in ("speed", "growth", "work"):  # another test looks at them
         monkeypatch.setattr(figures_of_speed, picture, lambda *_: b"<svg/>")

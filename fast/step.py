@@ -85,8 +85,9 @@ def next_collision(scene: Scene, state: State, t_end: float) -> Outcome:
         if not is_plain or (wall is not None and not (isinstance(wall, str) and wall in known.walls)):
             state = given_state(scene, state)
             t, x, y, vx, vy, wall = msgspec.structs.astuple(state)
-        question = known.step_at, known.packed, t, x, y, vx, vy, known.walls[wall], t_end
-        code, dt, t, x, y, vx, vy = known.single(*question)
+        code, dt, t, x, y, vx, vy = known.single(
+            known.step_at, known.packed, t, x, y, vx, vy, known.walls[wall], t_end
+        )
         if code in WALL_NAMES:
             return Collision(WALL_NAMES[code], dt, t, x, y, vx, vy)
         if code == codes.HORIZON:

@@ -40,6 +40,13 @@ def digest_of_sources(folder: Path) -> str:
 
 
 SOURCES = digest_of_sources(Path(__file__).parent.parent)
+# What makes machine code of them, and for which processor; numba's switches say otherwise where they are set.
+TOOLS = (
+    numba.__version__,
+    llvmlite.__version__,
+    get_host_cpu_name() if config.CPU_NAME is None else config.CPU_NAME,
+    get_host_cpu_features() if config.CPU_FEATURES is None else config.CPU_FEATURES,
+)
 
 
 def kept(*variant: object, **options: Any) -> Callable[[Any], Any]:
@@ -58,10 +65,7 @@ def kept(*variant: object, **options: Any) -> Callable[[Any], Any]:
     """
 
     def compiled(function: Any) -> Any:
-        name = get_host_cpu_name() if config.CPU_NAME is None else config.CPU_NAME
-        can = get_host_cpu_features() if config.CPU_FEATURES is None else config.CPU_FEATURES
-        tools = numba.__version__, llvmlite.__version__, name, can
-        rest = hashlib.sha256(repr((variant, tools)).encode()).hexdigest()
+        rest = hashlib.sha256(repr((variant, TOOLS)).encode()).hexdigest()
         function.__qualname__ += f"-{SOURCES[:16]}-{rest[:16]}"
         return njit(cache=True, **options)(function)
 

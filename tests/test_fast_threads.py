@@ -56,11 +56,11 @@ def test_an_interrupt_is_heeded_in_the_middle_of_a_path(begun, monkeypatch, call
 
     watched("follow_particles", lambda given: len(given[1]))
     watched("fine", lambda given: len(given[2]))
-    quick = State(0.0, 0.1, 0.2, 3e5, 4e5)
+    quick = State(0.0, 0.1, 0.2, 3e7, 4e7)  # a second or more, where nobody interrupts
     with pytest.raises(KeyboardInterrupt):
         {
-            "simulate": lambda: fast.simulate(SCENE, n_particles=1, energy=1e12),
-            "go_on": lambda: fast.go_on(SCENE, n_particles=1, energy=1e12),
+            "simulate": lambda: fast.simulate(SCENE, n_particles=1, energy=1e16),
+            "go_on": lambda: fast.go_on(SCENE, n_particles=1, energy=1e16),
             "flow": lambda: fast.flow(SCENE, [quick], 1.0),
             "trajectory": lambda: fast.trajectory(SCENE, START, 10 * LENGTH),
             "fine_trajectory": lambda: fast.fine_trajectory(SCENE, START, LENGTH),

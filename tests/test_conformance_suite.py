@@ -308,7 +308,7 @@ MANY = FEW._replace(n_particles=400)
         ("energy-kept", "work-identity", FEW, "fail"),
         # Loses nearly all its particles.
         ("phase-restarts-at-each-step", "work-identity", FEW, "fail"),
-        ("none", "captured-share", SLOW._replace(bias=0.1), "pass"),
+        pytest.param("none", "captured-share", SLOW._replace(bias=0.1), "pass", marks=pytest.mark.deep),
         ("none", "captured-share", LITTLE, "declined"),
         ("hole-static", "captured-share", SLOW._replace(bias=0.1), "fail"),
         ("none", "mean-growth", FEW, "declined"),

@@ -115,8 +115,11 @@ def judged(scene: Scene, state: State, t_end: float) -> Outcome | None:
     is_beyond = isinstance(scene, Mushroom) and (
         state.y < 0 if wall == "arc" else state.y > 0 and wall != "base"
     )
-    if is_beyond or abs(gap_at(table, wall, state.x, state.y)) > ON_WALL * own:
+    off = abs(gap_at(table, wall, state.x, state.y)) - ON_WALL * float(own)
+    if is_beyond or off > ROUNDING * size:
         return Rejected(f"{place} is not on wall {wall}")
+    if off > 0:
+        return Undecided(f"{place} may be on wall {wall} within rounding of its phase")
     rate = float(table.gap_rate(wall, state.x, state.y, state.vx, state.vy))
     if wall == "base" and rate == 0:
         return Undefined("sliding")

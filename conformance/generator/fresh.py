@@ -8,7 +8,7 @@ Every third question keeps the scene before but for one law, and its state, and 
 law is soon found (few act on a flight to the base): an implementation that knows a scene by less than all of
 it gives the answer before. Scenes carry names, which mean nothing: different ones the same.
 Some meet their wall for a short time only, some cross a mouth that opens or closes during the flight
-(`generator.in_flight`), and every seventh begins up to some ten million periods late, or before 0.
+(`generator.in_flight`), and every seventh begins up to a million periods late, or before 0.
 Answers are proved by the reference alone, and are no more delicate than those of level core, but for late
 ones, whose time when rounded tells less of the phase: these than level extended. The plain stepper chooses
 which draws are asked: those that meet the wall that is looked for, and keep it when nudged.
@@ -66,7 +66,9 @@ LEGS = 7, 7, 7, 12, 12, 23, 40, 120  # of a law with many: the corpus has at mos
 SHAPES = {"h": (-5, -3, 3, 5), "nu": (-8, -4), "w": (-8, -4)}  # powers of two that a law is multiplied with
 FAINT = 8, 20, 30  # powers of a half that what a law moves by is multiplied with
 LONGEST = 8.0  # periods of one flight
-LATE = 10, 13, 16, 18, 20, 22, 23  # periods before a late start, as powers of two; as many before time 0
+# Periods before a late start, or from it to time 0, as powers of two. Later ones a stepper may refuse: of
+# sixteen waves the last is 2^24 of its own periods late by then, and much of a phase is lost.
+LATE = 10, 12, 14, 16, 18, 20, 20
 NAMES = "", "", "scene", "scene", "1"
 # Draws for one question, and how many of them are like the one before. Every fortieth meets a mushroom's
 # base: of four hundred, none would in one of some thousands of runs.

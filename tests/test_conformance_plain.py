@@ -157,7 +157,15 @@ class RefusesByARoundedPhase(plain.Flight):
         return Rejected("not on its wall") if off else super().refusal_of_departure(wall)
 
 
-@pytest.mark.parametrize("flight", [plain.Flight, RefusesByARoundedPhase])
+class RefusesByARoundedTurn(plain.Flight):
+    """Takes f' at departure for exact, though late in time the phase that it is taken at is rounded."""
+
+    def refusal_of_departure(self, wall):
+        is_into = self.f(wall, 0.0)[1] < 0
+        return Rejected("it moves into it") if is_into else super().refusal_of_departure(wall)
+
+
+@pytest.mark.parametrize("flight", [plain.Flight, RefusesByARoundedPhase, RefusesByARoundedTurn])
 def test_no_state_is_refused_for_a_rounded_phase(flight):
     """The reference, which knows every phase, agrees with what may come."""
     for stepper, is_right in (

@@ -331,6 +331,8 @@ class Flight:
             return Undefined("sliding")
         if abs(slope) <= ROUNDING * (abs(gap.ft) + abs(gap.fx * self.vx) + abs(gap.fy * self.vy)):
             return Undecided(f"f' of {wall} vanishes at departure within rounding")
+        if -ROUNDING * abs(self.state.t) * self.bend(wall) <= slope < 0:
+            return Undecided(f"f' of {wall} is {slope!r} at departure, which the rounding of phases may be")
         return Rejected(f"state.wall = {wall!r}: the particle moves into it") if slope < 0 else None
 
     def size(self, wall: Wall) -> float:

@@ -294,8 +294,11 @@ inline void judge(const Scene& scene, const State& q) {
     double rate = scene.rate(q.wall, q), off = std::abs(scene.distance(q.wall, q.t, q.x, q.y)) - ON_WALL * scene.size(q);
     if (is_beyond || off > ROUNDING * size) throw Refused("the state is not on the wall that it names");
     if (off > 0) throw Open("the state may be on the wall that it names within rounding of its phase");
-    if (rate < 0) throw Refused("the state is on a wall and moves into it");
-    if (rate == 0) throw Open("the state rests on its wall");
+    double turns = scene.r.curvature + scene.h.curvature + scene.w.curvature + scene.slope.curvature * scene.h.high;
+    if (scene.nu) turns += scene.nu->curvature * scene.r.high;
+    if (q.wall == BASE) turns = 0;
+    if (rate < -ROUNDING * std::abs(q.t) * turns) throw Refused("the state is on a wall and moves into it");
+    if (rate <= 0) throw Open("the state rests on its wall, or does within rounding of its phase");
 }
 
 // Answering --------------------------------------------------------------------------------------------

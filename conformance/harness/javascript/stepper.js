@@ -330,8 +330,9 @@ class Flight {
     const off = abs(f) - 2 ** -20 * size * (left === "arc" ? 2 * size : 1);
     if (off > error) throw new Refused(`state is not on wall ${left}`);
     if (off > 0) throw new Open(`the state may be on wall ${left} within rounding of its phase`);
-    if (slope < 0) throw new Refused(`state.wall = ${left}: starts on it and moves into it`);
-    if (slope === 0) throw new Open("it rests on its wall");
+    if (slope < -SLACK * U * abs(this.t) * this.curvature(left))
+      throw new Refused(`state.wall = ${left}: starts on it and moves into it`);
+    if (slope <= 0) throw new Open("it rests on its wall, or does within rounding of its phase");
   }
 
   // The gradient of f by x and y.

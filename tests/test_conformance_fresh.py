@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from functools import cache
+from math import hypot, inf
 from typing import ClassVar
 
 import msgspec
@@ -18,14 +19,15 @@ from conformance.generator.fresh import WALLS, _is_steady, drawn_scene, fresh
 from conformance.generator.question import Question
 from conformance.grading.grade import grade
 from conformance.mutants import Mutant
+from conformance.mutants.of_laws import single
 from conformance.plain.flow import MAX_COLLISIONS, PlainPath
 from conformance.plain.motion import BangBangMotion
-from conformance.plain.step import Flight
+from conformance.plain.step import Flight, Open
 from conformance.suite.disguise import Disguise, drawn_disguise
 from conformance.suite.run import N_FRESH
 from fast.__main__ import carry, follow
 from scene import BadInput, BangBang, Fourier, Mushroom, Rejected, State, from_data
-from scene.tables import laws
+from scene.tables import cycle_length, laws
 
 SEEDS = (1, 2)
 N = N_FRESH["core"]
@@ -73,6 +75,7 @@ def test_all_is_asked_that_the_corpus_asks_seldom(seed, tally):
             tally["like the one before"] += 1
             assert grade(vector, answer_to(asked[i - 1])).verdict == "fail"
         tally["named"] += "name" in vector.scene
+        tally["late"] += abs(vector.state.t) > 500 * (cycle_length(scene) or inf)
         tally["more than 20 legs"] += any(len(getattr(law, "knots", ())) > 20 for law in laws(scene).values())
     assert all(tally[f"{table}, {wall}"] >= 6 for table, wall in WALLS)
     assert min(tally["before 0"], tally["named"]) > N / 5
@@ -81,6 +84,7 @@ def test_all_is_asked_that_the_corpus_asks_seldom(seed, tally):
     assert tally["hits beyond the first"] > N / 6
     assert tally["of mixed laws"] > N / 12
     assert tally["more than 20 legs"] >= 3
+    assert tally["late"] >= N / 12
 
 
 @pytest.mark.deep
@@ -206,6 +210,42 @@ class NoBaseInTheMouth(Flight):
         return Rejected("no base") if is_open and self.wall == "base" else super().refusal()
 
 
+class LooksByThePeriod(Flight):
+    """Looks at f 64 times in a period for a change of sign, and in a flight."""
+
+    def first_root(self, wall, start, end):
+        look = min((cycle_length(self.scene) or 1.0) / 64, (end - start) / 64)
+        a = start
+        while a < end:
+            b = min(a + look, end)
+            if self.f(wall, b)[0] <= 0:
+                return self.root_between(wall, a, b)
+            if b == a:
+                raise Open("a look of no length")
+            a = b
+        return None
+
+    def require_clear(self, walls, s):
+        """Goes on, outside a wall that it has missed."""
+
+
+class CapturedCannotLeave(Flight):
+    """Keeps a particle in the cap that leaves the arc on a chord which the mouth does not reach yet."""
+
+    def is_mouth_open(self, s):
+        reach = self.width(0.0).value * hypot(self.vx, self.vy)
+        is_captured = self.state.wall == "arc" and abs(self.x * self.vy - self.y * self.vx) > reach
+        return not is_captured and super().is_mouth_open(s)
+
+
+class LatePhaseInFloat32(Flight):
+    """Keeps the time of departure in binary32 from a hundred thousand on."""
+
+    def law(self, law):
+        t = self.state.t
+        return self.kinds[type(law)](law, single(t) if abs(t) > 1e5 else t)
+
+
 def is_shallow(flight, wall):
     """Tell whether a stem is ten times as wide as it is deep, where one of its walls is met."""
     widths = [flight.bounds[name].lowest for name in ("w", "r") if name in flight.bounds]
@@ -234,10 +274,18 @@ FAULTY = {
     "only on its wall": OnlyOnItsWall,
     "kept by name": KeptByName,
     "kept without depth": KeptWithoutDepth,
+    "looks by the period": LooksByThePeriod,
+    "captured cannot leave": CapturedCannotLeave,
+    "late phase in float32": LatePhaseInFloat32,
 }
 
 
-SELDOM_SEEN = "omega of the first", "where the stem is shallow", "room for thirty legs"
+SELDOM_SEEN = (
+    "omega of the first",
+    "where the stem is shallow",
+    "room for thirty legs",
+    "captured cannot leave",
+)
 
 
 class LaterHitsInKnownScenes(PlainPath):

@@ -10,7 +10,7 @@ from types import SimpleNamespace
 
 import pytest
 from support.depth import deep_but
-from support.edges import EDGES, is_among
+from support.edges import EDGES, LATE_EDGES, is_among
 
 from conformance import vectors
 from conformance.harness import kit
@@ -113,11 +113,12 @@ def test_an_example_refuses_bad_input_and_lives_on(language, commands):
 
 @pytest.mark.parametrize("language", LANGUAGES)
 def test_an_example_answers_the_edges_of_the_protocol(language, commands):
-    lines = "\n".join(json.dumps(question) for question, _ in EDGES) + "\n"
+    edges = [*EDGES, *LATE_EDGES]
+    lines = "\n".join(json.dumps(question) for question, _ in edges) + "\n"
     run = subprocess.run(
         runnable(commands[language]), input=lines, capture_output=True, text=True, timeout=60, check=True
     )
-    for (question, allowed), line in zip(EDGES, run.stdout.splitlines(), strict=True):
+    for (question, allowed), line in zip(edges, run.stdout.splitlines(), strict=True):
         assert is_among(json.loads(line), allowed), (question, line)
 
 

@@ -7,19 +7,24 @@ import math
 import subprocess
 import sys
 from fractions import Fraction
+from functools import partial
 from pathlib import Path
 
+import msgspec
 import numpy as np
 import pytest
 from hypothesis import given, settings
+from support.edges import LATE_EDGES, is_among
 from support.tables import BOX, CIRCLE, LIFT, STATIC
 from support.truth import proved_step
 
+import reference
 from conformance import plain
 from conformance.grading.agreement import compare
 from conformance.plain.motion import BangBangMotion, FourierMotion
 from conformance.strategies import scenes_and_states
-from scene import BangBang, Cap, Collision, Fourier, Horizon, Rejected, State, Stem, Undecided
+from scene import BangBang, Cap, Collision, Fourier, Horizon, Rejected, State, Stem, Undecided, from_data
+from scene.states import ON_WALL
 
 N_STEPS = 150  # the corpus asks many more
 BOUND = 1024.0  # backward ulps; the worst of 2,500 steps was 218, at a slow particle before a fast wall
@@ -142,6 +147,39 @@ def test_a_hit_is_not_lost_where_squares_vanish(length, speed):
     for start in (State(0.0, r / 4, r / 2, -0.75 * v, v), State(0.0, 0.75 * r, 0.0, 0.0, v, "base")):
         for t_end in (1.5 * r / v, 4.0 * r / v):
             assert not isinstance(plain.next_collision(Cap(r=r), start, t_end), Horizon)
+
+
+class RefusesByARoundedPhase(plain.Flight):
+    """Takes f at departure for exact, though late in time the phase that it is taken at is rounded."""
+
+    def refusal_of_departure(self, wall):
+        off = abs(self.gap(wall, 0.0).start) > ON_WALL * self.size(wall)
+        return Rejected("not on its wall") if off else super().refusal_of_departure(wall)
+
+
+class RefusesByARoundedTurn(plain.Flight):
+    """Takes f' at departure for exact, though late in time the phase that it is taken at is rounded."""
+
+    def refusal_of_departure(self, wall):
+        is_into = self.f(wall, 0.0)[1] < 0
+        return Rejected("it moves into it") if is_into else super().refusal_of_departure(wall)
+
+
+@pytest.mark.parametrize("flight", [plain.Flight, RefusesByARoundedPhase, RefusesByARoundedTurn])
+def test_no_state_is_refused_for_a_rounded_phase(flight):
+    """The reference, which knows every phase, agrees with what may come."""
+    for stepper, is_right in (
+        (reference.next_collision, True),
+        (partial(plain.next_collision, flight=flight), flight is plain.Flight),
+    ):
+        answers = []
+        for question, allowed in LATE_EDGES:
+            state = msgspec.convert(question["state"], State)
+            found = stepper(from_data(question["scene"]), state, question["t_end"])
+            kind = "collision" if hasattr(found, "dt") else type(found).__name__.lower()
+            answer = {"outcome": kind, "wall": getattr(found, "wall", None)}
+            answers.append(is_among(answer, allowed))
+        assert all(answers) == is_right
 
 
 def test_trajectory_ends_at_the_horizon():

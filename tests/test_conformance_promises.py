@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 from support.depth import deep_among
+from support.leaks import LEAKS, NO_LEAK
 from support.promise_breakers import FAULTS, Breaker, bisecting, remembering_steps
 
 from conformance import vectors
@@ -12,6 +13,8 @@ from conformance.suite import run as suite
 from conformance.suite.session import Session
 from scene import Wall, from_data
 from scene.geometry import rounded
+
+BREACHES = {**FAULTS, **LEAKS}
 
 
 @pytest.fixture
@@ -37,9 +40,9 @@ def test_an_honest_one_keeps_them_all(opened):
     assert {verdict for verdict, _ in found.values()} == {"pass"}, found
 
 
-@pytest.mark.parametrize("name", deep_among(FAULTS, "a-tenth", "no-time", "remembering", "constant"))
+@pytest.mark.parametrize("name", deep_among(BREACHES, "a-tenth", "no-time", "remembering", "constant"))
 def test_a_breach_is_met(opened, name):
-    promise, verdict, fault = FAULTS[name]
+    promise, verdict, fault = BREACHES[name]
     ((_, met, why, _),) = promises.ask_promises(opened(fault), (promise,))
     assert met == verdict, why
     assert why.isprintable()
@@ -54,8 +57,13 @@ def test_a_coarse_one_may_not_tell_near_questions_apart_but_those_that_it_can(op
         assert verdict == wanted, why
 
 
+def test_errors_that_do_not_add_up_are_no_breach(opened):
+    ((_, verdict, why, _),) = promises.ask_promises(opened(NO_LEAK), ("at-rest",))
+    assert verdict == "pass", why
+
+
 def test_every_promise_has_its_breach():
-    assert {promise for promise, _, _ in FAULTS.values()} == set(promises.PROMISES)
+    assert {promise for promise, _, _ in BREACHES.values()} == set(promises.PROMISES)
 
 
 def without_names(request, answer):

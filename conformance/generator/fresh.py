@@ -7,13 +7,17 @@ them ask for a trajectory, another sixth for a flow: what comes after the first 
 Every third question keeps the scene before but for one law, and its state, and has another answer, if such a
 law is soon found (few act on a flight to the base): an implementation that knows a scene by less than all of
 it gives the answer before. Scenes carry names, which mean nothing: different ones the same.
-Answers are proved by the reference alone, and are no more delicate than those of level core. The plain
-stepper chooses which draws are asked: those that meet the wall that is looked for, and keep it when nudged.
+Some meet their wall for a short time only, some cross a mouth that opens or closes during the flight
+(`generator.in_flight`), and every seventh begins up to a million periods late, or before 0.
+Answers are proved by the reference alone, and are no more delicate than those of level core, but for late
+ones, whose time when rounded tells less of the phase: these than level extended. The plain stepper chooses
+which draws are asked: those that meet the wall that is looked for, and keep it when nudged.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from math import inf
 
 import msgspec
 
@@ -31,13 +35,14 @@ from conformance.generator.draws import (
     wire_form,
 )
 from conformance.generator.flow_families import any_marks
+from conformance.generator.in_flight import arc_to_mouth, brief_start
 from conformance.generator.links import Confirmation, Unfit
 from conformance.generator.paths import proved_path
 from conformance.generator.prover import CONDITIONS, NUDGES, SIGNS, ask, flight_of, nudged
 from conformance.generator.question import Proved, Question, filed
 from conformance.grading.error import condition_number, inputs_of
-from conformance.vectors import Expectation, Kind, Vector
-from scene import BadInput, BangBang, Collision, Fourier, Law, Mushroom, Scene, State, from_data
+from conformance.vectors import Expectation, Kind, Level, Vector
+from scene import BadInput, BangBang, Collision, Fourier, Law, Mushroom, Scene, State, Wall, from_data
 from scene.geometry import rounded
 from scene.laws import bounds, is_constant
 from scene.states import ON_WALL
@@ -51,7 +56,7 @@ RULES: dict[Kind, str] = {
     "flow": "a particle carried through a scene that no file holds",
 }
 ALONE = Confirmation()  # the reference's word is taken
-WALLS = (
+WALLS: tuple[tuple[str, Wall], ...] = (
     *(("cap", wall) for wall in ("arc", "base")),
     *(("stem", wall) for wall in ("left", "right", "floor", "base")),
     *(("mushroom", wall) for wall in ("arc", "base", "left", "right", "floor")),
@@ -61,6 +66,9 @@ LEGS = 7, 7, 7, 12, 12, 23, 40, 120  # of a law with many: the corpus has at mos
 SHAPES = {"h": (-5, -3, 3, 5), "nu": (-8, -4), "w": (-8, -4)}  # powers of two that a law is multiplied with
 FAINT = 8, 20, 30  # powers of a half that what a law moves by is multiplied with
 LONGEST = 8.0  # periods of one flight
+# Periods before a late start, or from it to time 0, as powers of two. Later ones a stepper may refuse: of
+# sixteen waves the last is 2^24 of its own periods late by then, and much of a phase is lost.
+LATE = 10, 12, 14, 16, 18, 20, 20
 NAMES = "", "", "scene", "scene", "1"
 # Draws for one question, and how many of them are like the one before. Every fortieth meets a mushroom's
 # base: of four hundred, none would in one of some thousands of runs.
@@ -68,7 +76,7 @@ ATTEMPTS, LIKE_BEFORE = 4000, 50
 # An answer is another one that is farther off than any error that passes where conditions are those of core.
 ANOTHER = 2.0**-7
 HITS = 2, 3, 4, 5  # of trajectories and flows
-NUDGE = dict(NUDGES)["core"]
+NUDGE = dict(NUDGES)
 
 
 def fresh(seed: int, n: int) -> Iterator[Vector]:
@@ -114,7 +122,7 @@ def _drawn(seed: int, number: int, last: Vector | None) -> Vector:
 
 def _questions(seed: int, number: int, before: Vector | None) -> Iterator[Question]:
     """Yield questions of one number that are not delicate; first some that change one law of that before."""
-    table, wanted = WALLS[(number - number // 3) % len(WALLS)]
+    table, wanted = _wanted(number)
     for attempt in range(ATTEMPTS):
         draw = Draw(f"{seed}/{GROUP}/{number}/{attempt}")
         like = before if attempt < LIKE_BEFORE else None
@@ -123,7 +131,7 @@ def _questions(seed: int, number: int, before: Vector | None) -> Iterator[Questi
                 of, start, t_end = _one_law_changed(draw, from_data(like.scene)), like.state, like.t_end
             else:
                 of = drawn_scene(draw, table)
-                start, t_end = _start(draw, of)
+                start, t_end = _start_of(draw, number, of)
         except BadInput:
             continue
         met = plain.next_collision(of, start, t_end)
@@ -133,6 +141,24 @@ def _questions(seed: int, number: int, before: Vector | None) -> Iterator[Questi
         if question and _is_steady(of, question):
             yield question
     raise BadInput(f"{GROUP}/{number}: none of {ATTEMPTS} draws has a certified answer")
+
+
+def _wanted(number: int) -> tuple[str, Wall]:
+    """Return the table of a question, and the wall that is to be met first."""
+    return WALLS[(number - number // 3) % len(WALLS)]
+
+
+def _is_brief(number: int) -> bool:
+    return number % 12 == 5 and _wanted(number)[1] != "base"  # which never moves
+
+
+def _crosses_changed_mouth(number: int) -> bool:
+    table, wall = _wanted(number)
+    return number % 6 == 2 and table == "mushroom" and wall != "arc"
+
+
+def _is_late(number: int) -> bool:
+    return number % 7 == 5
 
 
 def _is_another(met: Collision, before: Vector) -> bool:
@@ -148,7 +174,9 @@ def _is_another(met: Collision, before: Vector) -> bool:
 def _asked(draw: Draw, kind: Kind, of: Scene, start: State, t_end: float) -> Question | None:
     """Return a question of a kind; None where fewer hits follow than it is to have."""
     scene = {**wire_form(of), **({"name": of.name} if of.name else {})}
-    question = Question(GROUP, RULES[kind], "sec. 2", scene, start, t_end, longest=CONDITIONS["core"])
+    question = Question(
+        GROUP, RULES[kind], "sec. 2", scene, start, t_end, longest=CONDITIONS[_delicacy(of, start)]
+    )
     if kind == "step":
         return question
     n_hits = draw.pick(HITS)
@@ -178,7 +206,14 @@ def _is_steady(of: Scene, question: Question) -> bool:
 
     start, t_end = question.state, question.t_end
     expected = met(start)
-    return all(met(nudged(start, t_end, signs, NUDGE)) == expected for signs in SIGNS)
+    nudge = NUDGE[_delicacy(of, start)]
+    return all(met(nudged(start, t_end, signs, nudge)) == expected for signs in SIGNS)
+
+
+def _delicacy(of: Scene, start: State) -> Level:
+    """Return the level that says how delicate a question may be: late, a part of the time is a phase."""
+    is_late = abs(start.t) > 2.0 ** (LATE[0] - 1) * (cycle_length(of) or inf)
+    return "extended" if is_late else "core"
 
 
 def drawn_scene(draw: Draw, table: str) -> Scene:
@@ -226,7 +261,7 @@ def _begun_elsewhere(draw: Draw, of: Law, shared: SharedPeriod) -> Law:
     if not isinstance(of, BangBang) or is_constant(of):
         return of
     knots = of.knots
-    if draw.pick(range(4)) == 0:
+    if draw.pick(range(3)) == 0:
         n, low, high = draw.pick(LEGS), min(v for _, v in knots), max(v for _, v in knots)
         values = [draw.between(low, high) for _ in range(n)]
         places = sorted({0, *(draw.pick(range(1, 1024)) for _ in range(n - 1))})
@@ -236,10 +271,24 @@ def _begun_elsewhere(draw: Draw, of: Law, shared: SharedPeriod) -> Law:
     return BangBang(knots=tuple((t + by, v) for t, v in knots))
 
 
-def _start(draw: Draw, of: Scene) -> tuple[State, float]:
-    """Draw a state: of any speed, in any direction and in those that formulas divide by."""
-    length, moving = cycle_length(of) or 1.0, walls_speed(of)
+def _start_of(draw: Draw, number: int, of: Scene) -> tuple[State, float]:
+    """Draw the start of a question and its horizon, as its number has it."""
+    length = cycle_length(of) or 1.0
     t = time(draw, of) - draw.pick((0, 0, 1, 4, 60)) * length
+    if _is_late(number):
+        t += draw.pick((1.0, -1.0)) * 2.0 ** draw.pick(LATE) * length
+    if _is_brief(number):
+        start, after = brief_start(draw, of, t, _wanted(number)[1])
+        return start, after + length * draw.between(0.5, LONGEST / 2)
+    if _crosses_changed_mouth(number):
+        assert isinstance(of, Mushroom)
+        return arc_to_mouth(draw, of, t), t + LONGEST * length
+    return _start(draw, of, t)
+
+
+def _start(draw: Draw, of: Scene, t: float) -> tuple[State, float]:
+    """Draw a state at a time: of any speed, in any direction and in those that formulas divide by."""
+    length, moving = cycle_length(of) or 1.0, walls_speed(of)
     table = rounded(of, t)
     usual = moving or table.size
     speed = draw.between(1.0, 2.0) * draw.pick(
@@ -305,7 +354,7 @@ def _proved(question: Question, number: int) -> Vector | None:
         found = _proved_step(of, question) if is_step else proved_path(of, question, ALONE)
     except Unfit:
         return None
-    return filed(question, number, found, "core") if found.condition <= CONDITIONS["core"] else None
+    return filed(question, number, found, "core") if found.condition <= question.longest else None
 
 
 def _proved_step(of: Scene, question: Question) -> Proved:

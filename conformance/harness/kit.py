@@ -115,14 +115,18 @@ def judged(scene: Scene, state: State, t_end: float) -> Outcome | None:
     is_beyond = isinstance(scene, Mushroom) and (
         state.y < 0 if wall == "arc" else state.y > 0 and wall != "base"
     )
-    if is_beyond or abs(gap_at(table, wall, state.x, state.y)) > ON_WALL * own:
+    off = abs(gap_at(table, wall, state.x, state.y)) - ON_WALL * float(own)
+    if is_beyond or off > ROUNDING * size:
         return Rejected(f"{place} is not on wall {wall}")
+    if off > 0:
+        return Undecided(f"{place} may be on wall {wall} within rounding of its phase")
     rate = float(table.gap_rate(wall, state.x, state.y, state.vx, state.vy))
     if wall == "base" and rate == 0:
         return Undefined("sliding")
     terms = math.hypot(state.vx, state.vy) + _rates(table, state)
-    terms *= float(table.r) + math.hypot(state.x, state.y) if wall == "arc" else 1.0
-    if wall != "base" and abs(rate) <= ROUNDING * terms:
+    turns = abs(state.t) * _curvatures(scene) if rate < 0 else 0.0
+    scale = float(table.r) + math.hypot(state.x, state.y) if wall == "arc" else 1.0
+    if wall != "base" and abs(rate) <= ROUNDING * (terms + turns) * scale:
         return Undecided(f"it rests on wall {wall}, or nearly")
     return Rejected(f"state.wall = {wall!r}: the particle moves into it") if rate < 0 else None
 
@@ -143,6 +147,16 @@ def _rates(table: TableAt, state: State) -> float:
     """Return the speed at which the walls may move under a time that is rounded, by its last digit's size."""
     speed = abs(table.r_rate) + abs(table.w_rate) + abs(table.h_rate) + abs(table.slope_rate * state.y)
     return float(speed)
+
+
+def _curvatures(scene: Scene) -> float:
+    """Return by how much walls may turn in a unit of time: their rates under a time that is rounded."""
+    known = {name: bounds(law) for name, law in laws(scene).items()}
+    reach = {
+        "nu": known["r"].highest if "r" in known else 0.0,
+        "slope": known["h"].highest if "h" in known else 0.0,
+    }
+    return sum(law.curvature * reach.get(name, 1.0) for name, law in known.items())
 
 
 def is_in_cap(scene: Scene, state: State) -> bool:

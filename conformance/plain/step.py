@@ -320,12 +320,19 @@ class Flight:
         """Judge f(0) and f'(0) on the wall being left."""
         gap, slope = self.gap(wall, 0.0), self.f(wall, 0.0)[1]
         size = self.size(wall)
-        if abs(gap.start) > ON_WALL * size * (2 * size if wall == "arc" else 1.0):
+        off = abs(gap.start) - ON_WALL * size * (2 * size if wall == "arc" else 1.0)
+        if off > ROUNDING * abs(gap.ft * self.state.t):
             return Rejected(f"state.wall = {wall!r}, but f there is {gap.start!r}")
+        if off > 0:  # late, the phase that f is taken at is rounded as t is
+            return Undecided(
+                f"f of {wall} is {gap.start!r} at departure, which the rounding of phases may be"
+            )
         if wall == "base" and slope == 0:
             return Undefined("sliding")
         if abs(slope) <= ROUNDING * (abs(gap.ft) + abs(gap.fx * self.vx) + abs(gap.fy * self.vy)):
             return Undecided(f"f' of {wall} vanishes at departure within rounding")
+        if -ROUNDING * abs(self.state.t) * self.bend(wall) <= slope < 0:
+            return Undecided(f"f' of {wall} is {slope!r} at departure, which the rounding of phases may be")
         return Rejected(f"state.wall = {wall!r}: the particle moves into it") if slope < 0 else None
 
     def size(self, wall: Wall) -> float:

@@ -2,8 +2,9 @@
 
 An answer is compared with another answer of the same implementation: what a field left out means, that bad
 lines do no harm, that many particles or collisions asked at once are answered as when asked one by one.
-Whether such answers are right is for the vectors. What an answer may depend on is in
-`conformance.suite.sameness`, and what holds `time` to a clock in `conformance.suite.timing`.
+Whether such answers are right is for the vectors. What a table at rest conserves is in
+`conformance.suite.conserved`, what an answer may depend on in `conformance.suite.sameness`, and what holds
+`time` to a clock in `conformance.suite.timing`.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from typing import Any
 import msgspec
 from mpmath import fp
 
-from conformance.suite import sameness, timing
+from conformance.suite import conserved, sameness, timing
 from conformance.suite.answers import read_outcome
 from conformance.suite.process import NOT_NUMBERS, Trouble
 from conformance.suite.questions import (
@@ -369,6 +370,7 @@ _CHECKS: dict[str, Callable[[Session], str]] = {
     "extra-fields": extra_fields,
     "flow-alone": flow_alone,
     "long-trajectory": long_trajectory,
+    "at-rest": conserved.at_rest,
     "trajectory-steps": trajectory_steps,
     "flow-arrivals": flow_arrivals,
     "spelling": sameness.spelling,

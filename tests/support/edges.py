@@ -101,6 +101,29 @@ EDGES: list[tuple[Line, list[Line]]] = [
     (asked("step", scene=DEEP, state=OFF_BY_ROUNDING), [{"outcome": "collision", "wall": "left"}, OPEN]),
 ]
 
+# A state on its floor, rightly rounded: but omega t has lost so many places that h is off by 2e-5. A state
+# off by far more than that is not on it. (`fast` refuses all times as late as this, and says so.)
+LATE_FLOOR = {
+    "scene": {"table": "stem", "w": 1.0, "h": {"kind": "fourier", "mean": 1.0, "omega": 0.7, "cos": [0.5]}},
+    "t_end": 1e12 + 9.0,
+}
+LATE_START = {"t": 1e12, "x": 0.25, "y": -0.7681813247020811, "vx": 0.75, "vy": 5.0, "wall": "floor"}
+# It leaves the floor by 1e-6; at the phase that is rounded the floor turns round, and comes faster by 1e-5.
+LATE_REST = {
+    "t": 1000000000006.0453,
+    "x": 0.25,
+    "y": -1.4999995038661325,
+    "vx": 0.75,
+    "vy": 0.0004940572730351366,
+    "wall": "floor",
+}
+LATE_EDGES: list[tuple[Line, list[Line]]] = [
+    (asked("step", **LATE_FLOOR, state=LATE_START), [{"outcome": "collision", "wall": "base"}, OPEN]),
+    (asked("step", **LATE_FLOOR, state={**LATE_START, "y": -0.5}), [REFUSED]),
+    (asked("step", **LATE_FLOOR, state=LATE_REST), [{"outcome": "collision", "wall": "floor"}, OPEN]),
+    (asked("step", **LATE_FLOOR, state={**LATE_REST, "vy": -0.125}), [REFUSED]),
+]
+
 
 def is_among(answer: Line, allowed: list[Line]) -> bool:
     """Tell whether an answer has all that one of the allowed ones has."""

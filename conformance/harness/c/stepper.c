@@ -262,10 +262,12 @@ static void check_wall(Flight *flight) {
     flight->from.wall = wall;
     double size = wall == FLOOR ? flight->h : kind == STEM ? flight->w : flight->r; /* the wall's own, now */
     if (wall == LEFT || wall == RIGHT) size = fmax(flight->w, fabs(flight->from.x));
-    if (fabs(g.f) > 0x1p-20 * size * (wall == ARC ? 2 * size : 1))
-        stop(flight, REJECTED, "state.wall: the state is not on that wall");
-    if (g.slope < 0) stop(flight, REJECTED, "state.wall: starts on it and moves into it");
-    if (g.slope == 0) stop(flight, UNDECIDED, "it rests on its wall");
+    double off = fabs(g.f) - 0x1p-20 * size * (wall == ARC ? 2 * size : 1);
+    if (off > g.error) stop(flight, REJECTED, "state.wall: the state is not on that wall");
+    if (off > 0) stop(flight, UNDECIDED, "state.wall: the state may be on that wall within rounding of its phase");
+    if (g.slope < -SLACK * U * fabs(flight->from.t) * curvature(flight, wall))
+        stop(flight, REJECTED, "state.wall: starts on it and moves into it");
+    if (g.slope <= 0) stop(flight, UNDECIDED, "it rests on its wall, or does within rounding of its phase");
 }
 
 static Event first_hit(Flight *flight, double horizon) {

@@ -4,10 +4,12 @@
 //     int main() { return mushrooms::serve("my-engine", next_hit); }
 //
 // The engine returns time, place and velocity just after the next hit, however late; nothing for a particle that
-// meets no wall. It may throw mushrooms::Open where it cannot decide. The kit reads and checks the questions, keeps
-// the horizon, names the wall (least |f| / |grad f| at the place of the hit), chains and times trajectories, and
-// refuses what is no state of the scene. A scene is refused where one of N_SAMPLES instants of its period breaks
-// it: sampling, not proof. Not offered: flow. JSON is read by json.hpp, which another library can replace.
+// meets no wall. It may throw mushrooms::Open where it cannot decide: of a tie (a corner, the mouth's edge, a hit
+// at t_end) a next hit tells nothing, so that the kit takes what the engine returns for its answer. The kit reads
+// and checks the questions, keeps the horizon, names the wall (least |f| / |grad f| at the place of the hit),
+// chains and times trajectories, and refuses what is no state of the scene. A scene is refused where one of
+// N_SAMPLES instants of its period breaks it: sampling, not proof. Not offered: flow. JSON is read by json.hpp,
+// which another library can replace.
 #pragma once
 #include <algorithm>
 #include <array>
@@ -289,10 +291,14 @@ inline void judge(const Scene& scene, const State& q) {
     }
     if (q.wall == NO_WALL) return;
     bool is_beyond = scene.is_mushroom() && (q.wall == ARC ? q.y < 0 : q.wall > BASE && q.y > 0);
-    double gap = std::abs(scene.distance(q.wall, q.t, q.x, q.y)), rate = scene.rate(q.wall, q);
-    if (is_beyond || gap > ON_WALL * scene.size(q)) throw Refused("the state is not on the wall that it names");
-    if (rate < 0) throw Refused("the state is on a wall and moves into it");
-    if (rate == 0) throw Open("the state rests on its wall");
+    double rate = scene.rate(q.wall, q), off = std::abs(scene.distance(q.wall, q.t, q.x, q.y)) - ON_WALL * scene.size(q);
+    if (is_beyond || off > ROUNDING * size) throw Refused("the state is not on the wall that it names");
+    if (off > 0) throw Open("the state may be on the wall that it names within rounding of its phase");
+    double turns = scene.r.curvature + scene.h.curvature + scene.w.curvature + scene.slope.curvature * scene.h.high;
+    if (scene.nu) turns += scene.nu->curvature * scene.r.high;
+    if (q.wall == BASE) turns = 0;
+    if (rate < -ROUNDING * std::abs(q.t) * turns) throw Refused("the state is on a wall and moves into it");
+    if (rate <= 0) throw Open("the state rests on its wall, or does within rounding of its phase");
 }
 
 // Answering --------------------------------------------------------------------------------------------

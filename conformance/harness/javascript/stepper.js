@@ -323,13 +323,16 @@ class Flight {
     if (!WALLS[table.kind].includes(left) || isElsewhere) throw new Refused(`state.wall = ${left} at y = ${y}`);
     if (table.kind === "mushroom" && left !== "base" && y === 0) throw new Open("the state is in a corner");
     this.left = null;
-    const [f, slope] = this.gap(left, 0);
+    const [f, slope, error] = this.gap(left, 0);
     this.left = left;
     const { h, r, w } = this.now; // of which a small part is what rounding may have moved a state
     const size = left === "floor" ? h : left === "left" || left === "right" ? max(w, abs(this.x)) : (r ?? w);
-    if (abs(f) > 2 ** -20 * size * (left === "arc" ? 2 * size : 1)) throw new Refused(`state is not on wall ${left}`);
-    if (slope < 0) throw new Refused(`state.wall = ${left}: starts on it and moves into it`);
-    if (slope === 0) throw new Open("it rests on its wall");
+    const off = abs(f) - 2 ** -20 * size * (left === "arc" ? 2 * size : 1);
+    if (off > error) throw new Refused(`state is not on wall ${left}`);
+    if (off > 0) throw new Open(`the state may be on wall ${left} within rounding of its phase`);
+    if (slope < -SLACK * U * abs(this.t) * this.curvature(left))
+      throw new Refused(`state.wall = ${left}: starts on it and moves into it`);
+    if (slope <= 0) throw new Open("it rests on its wall, or does within rounding of its phase");
   }
 
   // The gradient of f by x and y.

@@ -12,6 +12,7 @@ import fast
 from conformance.audit.frozen import diffusion
 from scene import BangBang, Fourier, Mushroom, State, load
 from scene.refusal import BadInput
+from scene.transforms import scaled
 from theory import NotCovered, is_upright, kept_by_the_cap, upright, upright_rate, upright_spread
 
 MOUTHS = (1.0, 0.8, 0.5)
@@ -117,12 +118,25 @@ def test_a_wave_that_narrows_the_mouth_spreads_as_an_integral_over_it(narrow, mo
         assert upright_spread(table) != pytest.approx(wanted, rel=1e-2)
 
 
-@pytest.mark.parametrize("unit", [2.0**390, 2.0**-390])
-def test_the_spread_is_a_length_however_large(unit):
-    """Not inf where w h^2 is no float."""
-    wave = Fourier(mean=0.6, omega=1.0, cos=(0.3,))
-    one, other = (upright_spread(Mushroom(r=x, h=1.5 * x, nu=wave)) for x in (1.0, unit))
-    assert other / unit == one
+@pytest.mark.parametrize(
+    ("length", "time"), [(390, 0), (-390, 0), (-900, 0), (990, 900), (0, 600), (0, -900)]
+)
+def test_the_spread_is_a_length_over_a_time_however_large(length, time):
+    """Not inf, nan or 0 where the cube of a length, or the square of a rate, is no float."""
+    table = Mushroom(r=1.0, h=1.5, nu=Fourier(mean=0.6, omega=1.0, cos=(0.3,)))
+    other = scaled(table, length, time)
+    assert upright_spread(other) == math.ldexp(upright_spread(table), length - time)
+    rate = upright_rate(table, np.ones(1))[0]
+    if abs(length - 2 * time) < 1000:
+        assert upright_rate(other, np.full(1, 2.0**time))[0] == math.ldexp(rate, length - 2 * time)
+
+
+def test_what_binary64_does_not_hold_is_refused():
+    table = Mushroom(r=1.0, h=1.5, nu=Fourier(mean=0.6, omega=1.0, cos=(0.3,)))
+    with pytest.raises(BadInput, match="beyond binary64"):
+        upright_spread(scaled(table, 900, -900))
+    with pytest.raises(BadInput, match="beyond binary64"):
+        upright_rate(scaled(table, 0, -900), np.full(1, 2.0**-900))
 
 
 def test_who_is_upright():

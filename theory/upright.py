@@ -21,6 +21,7 @@ from scene.geometry import table_at
 from scene.laws import breakpoints, is_constant, value
 from scene.refusal import BadInput, check_number
 from scene.tables import Scene, cycle_length, laws
+from scene.transforms import scaled
 from theory.branches import DIGITS, Floats
 from theory.curves import chaotic_zone
 from theory.cycle import Cycle
@@ -34,6 +35,7 @@ N_PANELS = (
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(8)  # of a panel
 SETTLED = 1e-6  # of the whole, by which a panel and its halves may differ
 MAX_HALVINGS = 60
+FAR = 100  # powers of two of a length or a time, beyond which others are taken for units
 NARROWEST = 1e-6  # mouth: what the cap does not keep goes as nu^2 and is lost to rounding below
 TILTED = "sides are tilted: what is computed is of upright ones"
 
@@ -79,18 +81,20 @@ def upright_rate(scene: Scene, times: ArrayLike) -> Floats:
 
     Raises:
         NotCovered: not a mushroom, or its sides are tilted.
-        BadInput: times are no finite numbers in one dimension, or the mouth is below NARROWEST.
+        BadInput: times are no finite numbers in one dimension, the mouth is below NARROWEST, or a rate is
+            beyond binary64.
     """
     at = finite_array("times", times, 1)
     if not is_upright(scene):
         raise NotCovered(TILTED)
+    scene, length, time = _in_near_units(scene)
+    at = np.ldexp(at, -time)
     now, volumes = table_at(fp, scene, at), volumes_at(np, scene, at)
     w, h, w_rate = (np.broadcast_to(x, at.shape) for x in (now.w, now.h, now.w_rate))
     excess = -2 * w_rate / w - kick_rates(scene, at)
     kept = np.array([kept_by_the_cap(float(nu)) for nu in volumes.nu])
-    # In this order nothing is a cube of a length: where w h^2 is no float, this still is.
-    found: Floats = 16 * (h * excess) ** 2 * (w / volumes.v_cha) * (1 + kept) / (1 - kept)
-    return found
+    found: Floats = 16 * w * (h * excess) ** 2 / volumes.v_cha * (1 + kept) / (1 - kept)
+    return _in_own_units(found, length - 2 * time)
 
 
 def upright_spread(scene: Scene) -> float:
@@ -104,11 +108,12 @@ def upright_spread(scene: Scene) -> float:
 
     Raises:
         NotCovered: not a mushroom, or its sides are tilted.
-        BadInput: the mouth falls below NARROWEST.
+        BadInput: the mouth falls below NARROWEST, or B is beyond binary64.
         NotConverged: as `theory.predict`.
     """
     if not is_upright(scene):
         raise NotCovered(TILTED)
+    scene, unit_length, unit_time = _in_near_units(scene)
     cycle = Cycle.of(scene, DIGITS)
     if cycle.period is None:
         return 0.0
@@ -119,7 +124,26 @@ def upright_spread(scene: Scene) -> float:
         slower = np.exp(-(chaotic_zone(scene, times).log_energy - begun) / 2)
         return np.asarray(upright_rate(scene, times) * slower, dtype=np.float64)
 
-    return _integral(growth, _edges(scene, start, cycle_length(scene)))
+    found = _integral(growth, _edges(scene, start, cycle_length(scene)))
+    return float(_in_own_units(np.array(found), unit_length - unit_time))
+
+
+def _in_near_units(scene: Scene) -> tuple[Scene, int, int]:
+    """Return a scene whose squares and cubes binary64 holds, and its units, as powers of two of the own."""
+    length, time = (
+        math.frexp(x)[1] for x in (float(value(fp, as_mushroom(scene).r, 0.0)), cycle_length(scene))
+    )
+    if max(abs(length), abs(time)) <= FAR:
+        return scene, 0, 0  # solved already, maybe
+    return scaled(scene, -length, -time), length, time
+
+
+def _in_own_units(found: Floats, exponent: int) -> Floats:
+    with np.errstate(over="ignore"):
+        own: Floats = np.ldexp(found, exponent)
+    if not np.all(np.isfinite(own)):
+        raise BadInput("the spread by upright sides is beyond binary64 in the scene's units")
+    return own
 
 
 def _edges(scene: Scene, start: float, length: float) -> Floats:

@@ -21,13 +21,12 @@ from scene.geometry import table_at
 from scene.laws import breakpoints, is_constant, value
 from scene.refusal import BadInput, check_number
 from scene.tables import Scene, cycle_length, laws
-from scene.transforms import scaled
 from theory.branches import DIGITS, Floats
 from theory.curves import chaotic_zone
 from theory.cycle import Cycle
 from theory.given import finite_array
 from theory.rates import kick_rates
-from theory.volumes import NotCovered, as_mushroom, volumes_at
+from theory.volumes import NotCovered, as_mushroom, in_near_units, volumes_at
 
 N_PANELS = (
     128  # of a cycle at first, cut at the laws' knots too; each is halved until its halves agree with it
@@ -35,7 +34,6 @@ N_PANELS = (
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(8)  # of a panel
 SETTLED = 1e-6  # of the whole, by which a panel and its halves may differ
 MAX_HALVINGS = 60
-FAR = 100  # powers of two of a length or a time, beyond which others are taken for units
 NARROWEST = 1e-6  # mouth: what the cap does not keep goes as nu^2 and is lost to rounding below
 TILTED = "sides are tilted: what is computed is of upright ones"
 
@@ -87,7 +85,7 @@ def upright_rate(scene: Scene, times: ArrayLike) -> Floats:
     at = finite_array("times", times, 1)
     if not is_upright(scene):
         raise NotCovered(TILTED)
-    scene, length, time = _in_near_units(scene)
+    scene, length, time = in_near_units(scene)
     at = np.ldexp(at, -time)
     now, volumes = table_at(fp, scene, at), volumes_at(np, scene, at)
     w, h, w_rate = (np.broadcast_to(x, at.shape) for x in (now.w, now.h, now.w_rate))
@@ -113,7 +111,7 @@ def upright_spread(scene: Scene) -> float:
     """
     if not is_upright(scene):
         raise NotCovered(TILTED)
-    scene, unit_length, unit_time = _in_near_units(scene)
+    scene, unit_length, unit_time = in_near_units(scene)
     cycle = Cycle.of(scene, DIGITS)
     if cycle.period is None:
         return 0.0
@@ -126,16 +124,6 @@ def upright_spread(scene: Scene) -> float:
 
     found = _integral(growth, _edges(scene, start, cycle_length(scene)))
     return float(_in_own_units(np.array(found), unit_length - unit_time))
-
-
-def _in_near_units(scene: Scene) -> tuple[Scene, int, int]:
-    """Return a scene whose squares and cubes binary64 holds, and its units, as powers of two of the own."""
-    length, time = (
-        math.frexp(x)[1] for x in (float(value(fp, as_mushroom(scene).r, 0.0)), cycle_length(scene))
-    )
-    if max(abs(length), abs(time)) <= FAR:
-        return scene, 0, 0  # solved already, maybe
-    return scaled(scene, -length, -time), length, time
 
 
 def _in_own_units(found: Floats, exponent: int) -> Floats:

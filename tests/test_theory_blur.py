@@ -162,6 +162,23 @@ def test_what_the_theory_of_finite_energy_does_not_know_is_refused() -> None:
         at_energy(moved, 1e6)
 
 
+def test_of_no_one_and_outside_the_cycle_nothing_is_said() -> None:
+    """These were a page of the array library, a warning with nan, a variance of -1e-5, and a mean of nan."""
+    nobody, found = at_energy(load("ergodic"), 1e6), at_energy(load("moving-cap"), 1e6)
+    with pytest.raises(BadInput, match="nobody is captured"):
+        nobody.capture_cdf([0.1])
+    assert math.isnan(nobody.captured_mean)
+    for times in ([-3.0], [0.0, 13.0], [1e300], [math.nan]):
+        for ask in (found.zone, found.at_capture):
+            with pytest.raises(BadInput, match="times holds"):
+                ask(times)
+    with pytest.raises(BadInput, match="beyond binary64"):
+        found.mean_of_exp(1e6)
+    for energy in (-1.0, 0.0, math.nan, 2.0**1001):
+        with pytest.raises(BadInput, match="energy ="):
+            FiniteEnergy(load("moving-cap"), energy)
+
+
 def test_the_table_covers_every_phase_with_its_errors() -> None:
     for name in CYCLES:
         rates, _ = frozen_rates(load(name))

@@ -7,6 +7,7 @@ import pytest
 from mpmath import fp
 
 from scene import load
+from scene.transforms import scaled
 from theory import (
     Cycle,
     capture_curve,
@@ -131,3 +132,14 @@ def test_a_trivial_loop_keeps_all_its_mass_at_zero() -> None:
 def test_edges_must_rise(edges: list[float]) -> None:
     with pytest.raises(ValueError, match="edges must be at least two rising numbers"):
         capture_time_mass(load("moving-cap"), edges)
+
+
+@pytest.mark.parametrize(("length", "time"), [(600, 0), (-1000, 0), (0, 900)])
+def test_the_chaotic_zone_is_the_same_in_any_units(length: int, time: int) -> None:
+    """Not nan where the square of a length is no float."""
+    table = load("moving-cap")
+    times = np.array([1.0, 4.0])
+    here = chaotic_zone(table, times)
+    there = chaotic_zone(scaled(table, length, time), np.ldexp(times, time))
+    for one, other in zip(here, there, strict=True):
+        assert other == pytest.approx(one, abs=1e-12)

@@ -10,9 +10,10 @@ from support.depth import deep_but
 
 import fast
 from conformance.audit.frozen import diffusion
-from scene import Fourier, Mushroom, State, load
+from scene import BangBang, Fourier, Mushroom, State, load
 from scene.refusal import BadInput
-from theory import NotCovered, is_upright, kept_by_the_cap, upright_rate, upright_spread
+from scene.transforms import scaled
+from theory import NotCovered, is_upright, kept_by_the_cap, upright, upright_rate, upright_spread
 
 MOUTHS = (1.0, 0.8, 0.5)
 
@@ -66,6 +67,76 @@ def test_the_variance_of_the_uncaptured_grows_with_log_v_over_v():
     found, error = (after - before) / math.log(10), math.hypot(error, more) / math.log(10)
     assert abs(found - upright_spread(table)) < 4 * error
     assert found > 4 * error
+
+
+def spread_over_the_mouth(narrow, pace):
+    """Return B where r = h = 1 and the mouth goes from 1 to `narrow` and back, each mouth w at speed pace(w).
+
+    An integral over w, in which a leg that lasts for an instant and a narrow mouth are like any other.
+    """
+    edges = np.geomspace(narrow, 1.0, 100_001)
+    w, dw = (edges[1:] + edges[:-1]) / 2, np.diff(edges)
+    v_cha = 2 * math.pi * (np.arcsin(w) + w * np.sqrt(1 - w * w) + 2 * w)
+    gain = 4 * math.pi * dw / v_cha  # of log E, while the stem loses dw
+    gathered = np.cumsum(gain[::-1])[::-1] - gain / 2
+    kept = np.array([kept_by_the_cap(x) for x in w])
+    kicks = 16 * w * (4 * math.pi / v_cha - 2 / w) ** 2 / v_cha * (1 + kept) / (1 - kept)
+    return float((kicks * np.exp(-gathered / 2) * pace(w)) @ dw)
+
+
+def by_equal_steps(f, edges):
+    """Integrate as was done once: by 2,048 equal steps of a cycle."""
+    step = (edges[-1] - edges[0]) / 2048
+    return float(f(edges[0] + step * (np.arange(2048) + 0.5)).sum() * step)
+
+
+def leg(narrow, lasting):
+    """Return the speed at which a bang-bang leg between 1 and `narrow` passes each mouth."""
+    fall = 1 - narrow
+    return lambda w: 4 * fall / lasting * np.sqrt(np.minimum(1 - w, w - narrow) / (2 * fall))
+
+
+@pytest.mark.parametrize(("narrow", "fall"), [(0.3, 1e-7), (0.3, 3e-4), (0.01, 0.04), (3e-4, 0.25)])
+def test_an_instant_of_a_leg_and_a_narrow_mouth_count_in_full(narrow, fall, monkeypatch):
+    """Equal steps, 2,048 a cycle, give 2e-7 of the first leg and 2.8 times the second."""
+    rise = 0.5
+    table = Mushroom(r=1.0, h=1.0, nu=BangBang(((0.0, 1.0), (fall, narrow), (0.5, narrow), (1.0, 1.0))))
+    wanted = spread_over_the_mouth(narrow, lambda w: leg(narrow, fall)(w) + leg(narrow, rise)(w))
+    assert upright_spread(table) == pytest.approx(wanted, rel=1e-4)
+    monkeypatch.setattr(upright, "_integral", by_equal_steps)
+    if fall < 0.01:
+        assert upright_spread(table) != pytest.approx(wanted, rel=1e-2)
+
+
+@pytest.mark.parametrize("narrow", [2.0**-19, 2.0**-7])
+def test_a_wave_that_narrows_the_mouth_spreads_as_an_integral_over_it(narrow, monkeypatch):
+    table = Mushroom(r=1.0, h=1.0, nu=Fourier((1 + narrow) / 2, 1.0, cos=((1 - narrow) / 2,)))
+    wanted = spread_over_the_mouth(narrow, lambda w: 2 * np.sqrt((1 - w) * (w - narrow)))
+    assert upright_spread(table) == pytest.approx(wanted, rel=1e-4)
+    monkeypatch.setattr(upright, "_integral", by_equal_steps)
+    if narrow < 1e-4:
+        assert upright_spread(table) != pytest.approx(wanted, rel=1e-2)
+
+
+@pytest.mark.parametrize(
+    ("length", "time"), [(390, 0), (-390, 0), (-900, 0), (990, 900), (0, 600), (0, -900)]
+)
+def test_the_spread_is_a_length_over_a_time_however_large(length, time):
+    """Not inf, nan or 0 where the cube of a length, or the square of a rate, is no float."""
+    table = Mushroom(r=1.0, h=1.5, nu=Fourier(mean=0.6, omega=1.0, cos=(0.3,)))
+    other = scaled(table, length, time)
+    assert upright_spread(other) == math.ldexp(upright_spread(table), length - time)
+    rate = upright_rate(table, np.ones(1))[0]
+    if abs(length - 2 * time) < 1000:
+        assert upright_rate(other, np.full(1, 2.0**time))[0] == math.ldexp(rate, length - 2 * time)
+
+
+def test_what_binary64_does_not_hold_is_refused():
+    table = Mushroom(r=1.0, h=1.5, nu=Fourier(mean=0.6, omega=1.0, cos=(0.3,)))
+    with pytest.raises(BadInput, match="beyond binary64"):
+        upright_spread(scaled(table, 900, -900))
+    with pytest.raises(BadInput, match="beyond binary64"):
+        upright_rate(scaled(table, 0, -900), np.full(1, 2.0**-900))
 
 
 def test_who_is_upright():

@@ -29,6 +29,7 @@ N_PLACES = 2000  # at which distribution functions are computed; linear between 
 N_CAPTURES = 600  # atoms of a valley that lies in no other; of one among several a fifth
 MOST_ATOMS = 40_000  # of several captures; more are joined with their neighbours in gain
 MOST_DRAWN = 100_000_000
+LATE = 16  # steps of a cycle, by which times may miss it: captures are seen from arc hit to arc hit
 REACH = 7.0  # standard deviations beyond which no blur is computed
 LEAST = 1e-12  # variance of a blur, in log E: a lag's square may leave less than none
 LARGEST = 2.0**1000  # of an energy: where its double is no float, fast particles seem slow
@@ -99,17 +100,19 @@ class FiniteEnergy:
     """One cycle's energies at an initial energy.
 
     Attributes:
-        scene, energy: as given.
+        scene, energy: as given; refused as by `at_energy`, but for particles that are too slow.
         s_nc: log E_nc / E0 of the adiabatic theory.
         p_nc: probability of never being captured.
         atoms: the distribution of s = log E1 / E0.
     """
 
-    def __init__(self, scene: Mushroom, energy: float) -> None:
-        self.scene, self.energy = scene, energy
+    def __init__(self, scene: Scene, energy: float) -> None:
+        self.scene, self.energy = as_mushroom(scene), check_number("energy", energy)
+        if not 0 < energy <= LARGEST:
+            raise BadInput(f"energy = {energy}, must be > 0 and at most 2^1000")
         cycle, root = course(scene), tree(scene)
         self.s_nc = root.s_nc
-        self._course, self._fields = cycle, Fields(cycle, energy)
+        self._course, self._fields = cycle, Fields(cycle, self.energy)
         self._n_captures = N_CAPTURES // 5 if root.children else N_CAPTURES
         start = Atoms(np.ones(1), np.zeros(1), np.zeros(1), np.zeros(1), np.full(1, np.nan))
         passed, now = self._through(root, root, start, cycle.start)
@@ -132,9 +135,9 @@ class FiniteEnergy:
 
     @property
     def captured_mean(self) -> float:
-        """Mean of log E1 / E0 of the captured."""
+        """Mean of log E1 / E0 of the captured; nan of no one."""
         a = self.atoms.those(~self.atoms.is_free)
-        return float(a.weight @ self._centres(a) / a.weight.sum())
+        return float(a.weight @ self._centres(a) / a.weight.sum()) if len(a.weight) else float("nan")
 
     @property
     def peak(self) -> tuple[float, float]:
@@ -167,11 +170,7 @@ class FiniteEnergy:
         return self._cdf(s, "free")
 
     def captured_cdf(self, s: ArrayLike) -> Floats:
-        """Return the probability, among the captured, of log E1 / E0 <= s.
-
-        Raises:
-            BadInput: nobody is captured.
-        """
+        """Return the probability, among the captured, of log E1 / E0 <= s; BadInput of no one."""
         return self._cdf(s, "captured")
 
     def cdf(self, s: ArrayLike) -> Floats:
@@ -179,22 +178,30 @@ class FiniteEnergy:
         return self._cdf(s, "all")
 
     def mean_of_exp(self, q: float) -> float:
-        """Return the mean of exp(q s), to the second order in the blurs."""
+        """Return the mean of exp(q s), to the second order in the blurs; BadInput if beyond binary64."""
         a, q = self.atoms, check_number("q", q)
-        drift = q * (1 + 2 * q) / 4 * a.variance
-        return float(a.weight @ np.exp(q * (self.s_nc + a.gain + a.shift) + drift))
+        with np.errstate(over="ignore", invalid="ignore"):
+            drift = q * (1 + 2 * q) / 4 * a.variance
+            found = float(a.weight @ np.exp(q * (self.s_nc + a.gain + a.shift) + drift))
+        if not np.isfinite(found):
+            raise BadInput(f"q = {q}: the mean of exp(q s) is beyond binary64")
+        return found
 
     def capture_cdf(self, t: ArrayLike) -> Floats:
-        """Return the probability, among the captured, of a first capture at or before each time."""
-        a = self.atoms.those(~self.atoms.is_free)
+        """Return the probability, among the captured, of a first capture by each time; BadInput of no one."""
+        a = self._those_of("captured")
         order = np.argsort(a.t_in)
         below = np.cumsum(a.weight[order]) - a.weight[order] / 2
         found: Floats = np.interp(finite_array("t", t), a.t_in[order], below / a.weight.sum())
         return found
 
     def zone(self, times: ArrayLike) -> tuple[Floats, Floats]:
-        """Return mean and variance of log E / E0 at times of the cycle of those not captured so far."""
-        t = finite_array("times", times, n_dimensions=1)
+        """Return mean and variance of log E / E0 at times of the cycle of those not captured so far.
+
+        Raises:
+            BadInput: times are no finite numbers in one dimension, or one is outside the cycle.
+        """
+        t = self._within(times)
         none = np.zeros(len(t))
         gathered = {name: self._fields.at(name, none, t) for name in ("variance", "squares", "lags")}
         variance = gathered["variance"] - gathered["squares"]
@@ -204,8 +211,7 @@ class FiniteEnergy:
 
     def at_capture(self, times: ArrayLike) -> tuple[Floats, Floats]:
         """Return mean and variance of log E / E0 of those first captured at each time, when they are."""
-        mean, variance = self.zone(times)
-        t = finite_array("times", times, n_dimensions=1)
+        (mean, variance), t = self.zone(times), self._within(times)
         lag, square = (self._fields.at(name, np.zeros(len(t)), t) for name in ("lag", "square"))
         return mean + lag, variance + square - lag**2
 
@@ -239,12 +245,25 @@ class FiniteEnergy:
         found: Floats = np.interp(levels, *self._below[who])
         return found
 
+    def _those_of(self, who: str) -> Atoms:
+        """Return the "free", the "captured" or "all"."""
+        free = self.atoms.is_free
+        found = self.atoms.those({"free": free, "captured": ~free, "all": free | True}[who])
+        if not len(found.weight):
+            raise BadInput("nobody is captured in this cycle: there is no distribution of the captured")
+        return found
+
+    def _within(self, times: ArrayLike) -> Floats:
+        """Return times in the cycle, beyond which nothing is gathered."""
+        t, (start, step) = finite_array("times", times, n_dimensions=1), self._course[:2]
+        first, last = start - LATE * step, start + (N_TIMES + LATE) * step
+        if np.any(outside := (t < first) | (t > last)):
+            raise BadInput(f"times holds {t[outside][0]}, must be in the cycle, [{first:.6g}, {last:.6g}]")
+        return t
+
     def _sampled(self, who: str) -> tuple[Floats, Floats]:
         """Return places and the distribution function there of the "free", the "captured" or "all"."""
-        free = self.atoms.is_free
-        a = self.atoms.those({"free": free, "captured": ~free, "all": free | True}[who])
-        if not len(a.weight):
-            raise BadInput("nobody is captured in this cycle: there is no distribution of the captured")
+        a = self._those_of(who)
         centre, reach = self.s_nc + a.gain + a.shift, REACH * np.sqrt(np.maximum(a.variance, LEAST))
         places = np.linspace((centre - reach).min(), (centre + reach).max(), N_PLACES)
         below = np.zeros(N_PLACES)
@@ -327,10 +346,7 @@ def at_energy(scene: Scene, energy: float) -> FiniteEnergy:
         NotCovered: no frozen rates of the scene are known; or particles are so slow that blurs and lags,
             corrections of the order v^-1 and v^(-2/3), leave no variance or have no distribution.
     """
-    energy = check_number("energy", energy)
-    if not 0 < energy <= LARGEST:
-        raise BadInput(f"energy = {energy}, must be > 0 and at most 2^1000")
-    return _solved(as_mushroom(scene), energy)
+    return _solved(as_mushroom(scene), check_number("energy", energy))
 
 
 @lru_cache(maxsize=64)

@@ -8,6 +8,7 @@ begins to fall, not from t = 0.
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -21,7 +22,7 @@ from theory.constants import guarded
 from theory.cycle import Cycle
 from theory.distribution import energies
 from theory.given import finite_array
-from theory.volumes import volumes_at
+from theory.volumes import in_near_units, volumes_at
 
 MAX_POINTS = 10_000_000
 
@@ -168,7 +169,9 @@ def chaotic_zone(scene: Scene, times: ArrayLike) -> ChaoticZone:
     if cycle.period is not None:
         n_before = np.floor((t - start) / float(cycle.period))
         t = t - n_before * float(cycle.period)
-    log_energy = -np.log(volumes_at(np, scene, t).v_cha / volumes_at(fp, scene, start).v_cha)
+    near, _, unit = in_near_units(scene)
+    then = volumes_at(fp, near, math.ldexp(start, -unit)).v_cha
+    log_energy = -np.log(volumes_at(np, near, np.ldexp(t, -unit)).v_cha / then)
     root = tree(scene)
     branches = tuple(root.all_branches())
     if not branches:

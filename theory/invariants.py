@@ -22,7 +22,9 @@ def energy(ctx: Any, vx: Any, vy: Any) -> Any:
 
 
 def sin_phi_hat(ctx: Any, x: Any, y: Any, vx: Any, vy: Any, r: Any) -> Any:
-    """Return sin of the angle phi_hat, the cap's adiabatic invariant.
+    """Return sin of the angle phi_hat; its modulus is the cap's adiabatic invariant.
+
+    Each hit of the base turns its sign. Between hits, and from arc hit to arc hit, it stays but for O(u / v).
 
     Args:
         ctx: number system.

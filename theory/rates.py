@@ -10,6 +10,7 @@ what is done with them.
 from __future__ import annotations
 
 import json
+import math
 from functools import lru_cache
 from importlib import resources
 from typing import Any, NamedTuple
@@ -102,9 +103,9 @@ def frozen_rates(scene: Scene) -> tuple[Rates, bool]:
     """
     mushroom = as_mushroom(scene)
     for turned in (False, True):
-        sought = _outline(backwards(mushroom) if turned else mushroom)
-        for outline, rates in _table().values():
-            if outline.shape == sought.shape and np.allclose(outline, sought, rtol=SAME, atol=0.0):
+        sought = backwards(mushroom) if turned else mushroom
+        for measured, rates in _table().values():
+            if _is_one_cycle(measured, sought):
                 return rates, turned
     known = ", ".join(_table())
     raise NotCovered(
@@ -194,22 +195,39 @@ def _spans(scene: Mushroom, length: float) -> Floats:
     return np.array(sorted(knots - {0.0}))
 
 
-def _outline(scene: Mushroom) -> Floats:
-    """Return period and parameters at some phases, by which a cycle is known."""
-    length = cycle_length(scene)
-    now = table_at(fp, scene, length * PHASES[::5])
-    columns = np.broadcast_arrays(now.r, now.w, now.h, now.slope)
-    return np.array([length, *np.stack(columns, axis=1).ravel()])
+def _is_one_cycle(measured: Mushroom, sought: Mushroom) -> bool:
+    """Tell whether two scenes move alike, however their laws are written.
+
+    Values and rates at PHASES tell apart all Fourier laws of up to 63 harmonics, more than a product of two
+    has. Between two neighbours among the breakpoints of both, bang-bang laws are parabolas, which values and
+    rates at both ends tell apart.
+    """
+    length = cycle_length(sought)
+    if length == 0 or not math.isclose(cycle_length(measured), length, rel_tol=SAME):
+        return False  # of tables at rest no rates are kept
+    both = [*laws(measured).values(), *laws(sought).values()]
+    times = np.array([*(length * PHASES), *(float(t) for law in both for t in breakpoints(law))])
+    for (place, rate), (its_place, its_rate) in zip(
+        _motions(measured, times), _motions(sought, times), strict=True
+    ):
+        size = np.abs(place).max()
+        pace = max(np.abs(rate).max(), size / length)  # of what rests, rounding may leave a rate
+        if np.abs(place - its_place).max() > SAME * size or np.abs(rate - its_rate).max() > SAME * pace:
+            return False
+    return True
+
+
+def _motions(scene: Mushroom, times: Floats) -> list[tuple[Any, Any]]:
+    """Return each parameter and its rate at times (T,), as numbers where they are constant."""
+    now = table_at(fp, scene, times)
+    return [(now.r, now.r_rate), (now.w, now.w_rate), (now.h, now.h_rate), (now.slope, now.slope_rate)]
 
 
 @lru_cache(maxsize=1)
-def _table() -> dict[str, tuple[Floats, Rates]]:
+def _table() -> dict[str, tuple[Mushroom, Rates]]:
     data = json.loads((resources.files("theory") / FILE).read_text("utf-8"))
     found = {}
     for name, entry in data["scenes"].items():
-        scene = scenes.from_data(entry["scene"])
-        found[name] = (
-            _outline(as_mushroom(scene)),
-            Rates(*(np.array(entry[field]) for field in Rates._fields)),
-        )
+        scene = as_mushroom(scenes.from_data(entry["scene"]))
+        found[name] = scene, Rates(*(np.array(entry[field]) for field in Rates._fields))
     return found

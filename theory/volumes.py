@@ -7,15 +7,19 @@ an `MPContext` for many digits, `numpy` for arrays. Intervals are not handled.
 
 from __future__ import annotations
 
+import math
 from typing import Any, NamedTuple
 
 import numpy as np
+from mpmath import fp
 
 from scene.laws import Law, value
 from scene.refusal import BadInput, check_scene
-from scene.tables import Mushroom, Scene
+from scene.tables import Mushroom, Scene, cycle_length
+from scene.transforms import scaled
 from theory.given import check_real, check_system
 
+FAR = 100  # powers of two of a length or a time, beyond which others are taken for units
 WIDE = 0.75  # nu from which the island's share is summed as a series
 
 
@@ -174,6 +178,16 @@ def volumes_of(
     cap, stem = _over_cap(ctx, r), _over_stem(ctx, nu * r, h, slope)
     island, free = known or shares(ctx, nu)
     return Volumes(cap, stem, island * cap, free * cap + stem, nu)
+
+
+def in_near_units(scene: Scene) -> tuple[Scene, int, int]:
+    """Return a scene whose squares and cubes binary64 holds, and its units, as powers of two of the own."""
+    length, time = (
+        math.frexp(x)[1] for x in (float(value(fp, as_mushroom(scene).r, 0.0)), cycle_length(scene))
+    )
+    if max(abs(length), abs(time)) <= FAR:
+        return scene, 0, 0  # solved already, maybe
+    return scaled(scene, -length, -time), length, time
 
 
 def as_mushroom(scene: Scene) -> Mushroom:

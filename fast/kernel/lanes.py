@@ -19,17 +19,17 @@ from __future__ import annotations
 
 import numpy as np
 
+from fast.kernel.ahead import cap_ahead, cap_at_hit, stem_ahead, stem_at_hit
 from fast.kernel.arithmetic import SAFETY, fma, two_sum
 from fast.kernel.compiling import packed, part, widest_registers
 
 from fast.kernel.pools import (  # isort: skip
-    BACK, CERTAIN, CLOSED, COARSE, DEPTH_LAW, END, FAR, H0, H1, H2, HIT, LIMIT, M0, M1, M2, NEVER,
-    NEXT_H0, NEXT_H1, NEXT_H2, NEXT_M0, NEXT_M1, NEXT_M2, NEXT_R0, NEXT_R1, NEXT_R2, NEXT_R3, NEXT_T,
-    NEXT_T_LOW, NEXT_W0, NEXT_W1, NEXT_W2, NEXT_X, NEXT_X_LOW, NEXT_Y, NEXT_Y_LOW, OK, ON_ARC, ON_BASE,
-    ON_FLOOR, ON_LEFT, ON_RIGHT, R0, R1, R2, R3, RADIUS_LAW, REF, REFUSED, REF_LOW, ROUTINE, S, SLOPE_LAW,
-    SPIN, STOP, STRIDE, SURE, T, T_LOW, VX, VY, W0, W1, W2, WALL, X, Y, law_of, width_of,
+    BACK, BEFORE, CERTAIN, CLOSED, COARSE, END, FAR, H0, H1, H2, HIT, LIMIT, M0, M1, M2, MEAN_RATE, NEVER,
+    NEXT_H0, NEXT_H1, NEXT_H2, NEXT_M0, NEXT_M1, NEXT_M2, NEXT_R0, NEXT_R1, NEXT_R2, NEXT_T, NEXT_T_LOW,
+    NEXT_W0, NEXT_W0_LOW, NEXT_W1, NEXT_W2, NEXT_X, NEXT_X_LOW, NEXT_Y, NEXT_Y_LOW, OK, ON_ARC, ON_BASE,
+    ON_FLOOR, ON_LEFT, ON_RIGHT, R0, R1, R2, R3, REFUSED, ROUTINE, S, SPIN, STOP, SURE, T, T_LOW, VX, VY,
+    W0, W1, W2, WALL, X, Y,
 )  # fmt: skip
-from fast.kernel.pieces import law_at, third_derivative
 from fast.kernel.short import moved, short_sum
 
 ONE = np.float64(1.0)  # its quotient by 0 is infinite without the compiler too
@@ -281,33 +281,29 @@ def arrive_at(a, i, s, delta, within, result, x_s, x_low, y_s, y_low, vx, vy):
 
 
 @packed
-def laws_at_hit(a, i, delta, r, r1, r2, w, w1):
-    """Write radius and half-width at the hit, which is `delta` after the time that they are given for."""
-    a[NEXT_R0 + i], a[NEXT_R1 + i], a[NEXT_R2 + i] = fma(r1, delta, r), fma(r2, delta, r1), r2
-    a[NEXT_W0 + i] = fma(w1, delta, w)
-
-
-@packed
 def fly(a, n, is_stem, is_relative, slope, degree, limits):
     """Correct each lane's time of flight once, and tell whether the step is then right and routine."""
     widest_registers()
     bend = limits.bend
     for i in range(n):
+        since, w2, w_low = cap_ahead(a, i, is_relative, degree)
+        stem_ahead(a, i, since, w2, w_low, slope, degree)
+    for i in range(n):
         x, y, vx, vy, wall = a[X + i], a[Y + i], a[VX + i], a[VY + i], a[WALL + i]
         hit, s = a[HIT + i], a[S + i]
-        before = (a[T + i] - a[REF + i]) + (a[T_LOW + i] - a[REF_LOW + i])
+        before, mean_rate = a[BEFORE + i], a[MEAN_RATE + i]
         since = before + s
-        r, r1, r2, mean = law_at(a, RADIUS_LAW + i, STRIDE, since, before, degree)
-        w, w1, w2, w_low = width_of(a, i, since, r, r1, r2, is_relative, degree)
-        h, h1, h2 = law_of(a, DEPTH_LAW + i, since, degree)
-        m, m1, m2 = law_of(a, SLOPE_LAW + i, since, degree) if slope is None else (slope, 0.0, 0.0)
+        r, r1, r2 = a[NEXT_R0 + i], a[NEXT_R1 + i], a[NEXT_R2 + i]
+        w, w1, w2, w_low = a[NEXT_W0 + i], a[NEXT_W1 + i], a[NEXT_W2 + i], a[NEXT_W0_LOW + i]
+        h, h1, h2 = a[NEXT_H0 + i], a[NEXT_H1 + i], a[NEXT_H2 + i]
+        m, m1, m2 = (a[NEXT_M0 + i], a[NEXT_M1 + i], a[NEXT_M2 + i]) if slope is None else (slope, 0.0, 0.0)
         k_side = side_curvature(vy, slope, limits)
         x_s, x_low = moved(x, vx, s)
         y_s, y_low = moved(y, vy, s)
         q, v2 = fma(x, vx, y * vy), fma(vx, vx, vy * vy)
         f, rate = at_side_or_floor(hit, x_s, x_low, y_s, y_low, vx, vy, w, w_low, w1, h, h1, m, m1)
         # The arc: its increments if it was left, else what is there.
-        hop = hop_along_arc(s, q, v2, a[R0 + i], s * mean)
+        hop = hop_along_arc(s, q, v2, a[R0 + i], s * mean_rate)
         f_arc = fma(-x_s, x_s, (r - y_s) * (r + y_s)) - 2.0 * fma(x_s, x_low, y_s * y_low)
         f_arc = hop if wall == ON_ARC else f_arc
         f = f_arc if hit == ON_ARC else f
@@ -341,12 +337,8 @@ def fly(a, n, is_stem, is_relative, slope, degree, limits):
         a[NEXT_Y + i] = 0.0 if hit == ON_BASE else y_s
         routine = routine if a[CLOSED + i] == NEVER else 0.0
         a[ROUTINE + i] = routine if a[SPIN + i] == 0.0 else 0.0
-        laws_at_hit(a, i, delta, r, r1, r2, w, w1)
-        a[NEXT_R3 + i] = third_derivative(a, RADIUS_LAW + i, STRIDE, since, degree)
-        a[NEXT_W1 + i], a[NEXT_W2 + i] = fma(w2, delta, w1), w2
-        a[NEXT_H0 + i], a[NEXT_H1 + i], a[NEXT_H2 + i] = fma(h1, delta, h), fma(h2, delta, h1), h2
-        if slope is None:
-            a[NEXT_M0 + i], a[NEXT_M1 + i], a[NEXT_M2 + i] = fma(m1, delta, m), fma(m2, delta, m1), m2
+        cap_at_hit(a, i, delta, r, r1, r2, w, w1)
+        stem_at_hit(a, i, delta, w1, w2, h, h1, h2, m, m1, m2, slope)
 
 
 @packed
@@ -359,18 +351,22 @@ def chord(a, n, is_again, is_cap, is_relative, degree, limits):
     widest_registers()
     bend, k_w, size = limits.bend, limits.curvature, limits.size
     for i in range(n):
-        x, y, vx, vy, spin = a[X + i], a[Y + i], a[VX + i], a[VY + i], a[SPIN + i]
+        x, y, vx, vy = a[X + i], a[Y + i], a[VX + i], a[VY + i]
         r0, r1_0, r2_0 = a[R0 + i], a[R1 + i], a[R2 + i]
         q, v2 = fma(x, vx, y * vy), fma(vx, vx, vy * vy)
         inverse = ONE / (v2 - fma(r1_0, r1_0, r0 * r2_0))
         s = 2.0 * fma(r0, r1_0, -q) * inverse
         s = s * fma(cube_of_arc(r0, r1_0, r2_0, a[R3 + i]) * s, inverse, 1.0)
-        s = a[S + i] if is_again else s
-        before = (a[T + i] - a[REF + i]) + (a[T_LOW + i] - a[REF_LOW + i])
+        a[S + i] = a[S + i] if is_again else s
+        cap_ahead(a, i, is_relative, degree)
+    for i in range(n):
+        x, y, vx, vy, spin = a[X + i], a[Y + i], a[VX + i], a[VY + i], a[SPIN + i]
+        q, v2 = fma(x, vx, y * vy), fma(vx, vx, vy * vy)
+        s, before = a[S + i], a[BEFORE + i]
         since = before + s
-        r, r1, r2, mean = law_at(a, RADIUS_LAW + i, STRIDE, since, before, degree)
-        w, w1, _, _ = width_of(a, i, since, r, r1, r2, is_relative, degree)
-        f = hop_along_arc(s, q, v2, r0, s * mean)
+        r, r1, r2 = a[NEXT_R0 + i], a[NEXT_R1 + i], a[NEXT_R2 + i]
+        w, w1 = a[NEXT_W0 + i], a[NEXT_W1 + i]
+        f = hop_along_arc(s, q, v2, a[R0 + i], s * a[MEAN_RATE + i])
         slope = 2.0 * fma(r, r1, -fma(s, v2, q))
         inverse = ONE / slope
         delta = -f * inverse
@@ -392,6 +388,4 @@ def chord(a, n, is_again, is_cap, is_relative, degree, limits):
         result = verdict(quality, min(within, a[LIMIT + i] - abs(since + delta)), s, error)
         y_s, a[ROUTINE + i] = arrive_at(a, i, s, delta, within, result, x_s, x_low, y_s, y_low, vx, vy)
         a[NEXT_Y + i] = y_s
-        laws_at_hit(a, i, delta, r, r1, r2, w, w1)
-        a[NEXT_R3 + i] = third_derivative(a, RADIUS_LAW + i, STRIDE, since, degree)
-        a[NEXT_W1 + i] = w1
+        cap_at_hit(a, i, delta, r, r1, r2, w, w1)

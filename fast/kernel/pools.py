@@ -34,10 +34,13 @@ NEVER = np.inf
     NEXT_VX, NEXT_VY, DONE,  # velocity after it where a careful step has found it
     SINCE, UNTIL, STAY_IN, STAY_OUT,  # a captured stay that spans an instant between is kept; begin and end
     N_ARC, N_BASE, N_LEFT, N_RIGHT, N_FLOOR,  # collisions so far
+    # What a step's first loop tells its second: the flight's begin since REF, the radius's mean rate, the
+    # half-width's low part.
+    BEFORE, MEAN_RATE, NEXT_W0_LOW,
     LAWS,  # from here on the laws' coefficients: see Pieces.coefficients
-) = STRIDE * np.arange(66)  # fmt: skip
+) = STRIDE * np.arange(69)  # fmt: skip
 N_COEFFICIENTS = 16  # of each law, as many as the highest degree asks for
-N_ROWS = 65 + 4 * N_COEFFICIENTS
+N_ROWS = 68 + 4 * N_COEFFICIENTS
 RADIUS_LAW, WIDTH_LAW, DEPTH_LAW, SLOPE_LAW = LAWS + STRIDE * N_COEFFICIENTS * np.arange(4)
 # Codes of walls as they stand in a row, and of OK: out of the laws' reach, not shown right, to be corrected,
 # right.

@@ -13,7 +13,7 @@ import numpy as np
 from numba.core.dispatcher import Dispatcher
 
 import fast
-from fast.kernel import pieces, pools
+from fast.kernel import ahead, pieces, pools
 from fast.kernel.arithmetic import fma
 from support.from_python import from_python
 
@@ -60,9 +60,9 @@ def faulty_lanes(*changes: str) -> ModuleType:
         source = source.replace(old, new)
     module = ModuleType("faulty_lanes")
     exec(compile(source, str(path), "exec"), module.__dict__)
-    for name, found in (vars(pieces) | vars(pools)).items():
+    for name, found in (vars(pieces) | vars(pools) | vars(ahead)).items():
         vars(module).setdefault(name, found)
-    names = module.__name__, pools.__name__, pieces.__name__
+    names = [each.__name__ for each in (module, ahead, pools, pieces)]
     for name, found in list(vars(module).items()):
         if isinstance(found, Dispatcher) and found.py_func.__module__ in names:
             # What it calls is looked up among the faulty ones.

@@ -25,10 +25,10 @@ from fast.kernel.kept import keep_lane, take_lane
 from fast.kernel.loops import run_careful
 
 from fast.kernel.pools import (  # isort: skip
-    CERTAIN, CLOSED, DONE, END, HIT, LANES, NEVER, NEXT_R0, NEXT_T, NEXT_T_LOW, NEXT_VX, NEXT_VY, NEXT_W0,
-    NEXT_X, NEXT_Y, N_ARC, N_BASE, OK, ON_ARC, PIECE, ROUTINE, S, SINCE, SPIN, STAY_IN, STAY_OUT, STOP,
-    STRIDE, T, T_LOW, UNTIL, VX, VY, WALL, X, Y, change_lane, fold, load, refold, set_laws, set_reference,
-    whole_registers,
+    AS_GIVEN, CERTAIN, CLOSED, DONE, END, HIT, LANES, NEVER, NEXT_R0, NEXT_T, NEXT_T_LOW, NEXT_VX, NEXT_VY,
+    NEXT_W0, NEXT_X, NEXT_Y, N_ARC, N_BASE, OK, ON_ARC, PIECE, ROUTINE, S, SINCE, SPIN, STAY_IN, STAY_OUT,
+    STOP, STRIDE, T, T_LOW, UNTIL, VX, VY, WALL, X, Y, change_lane, fold, load, refold, set_laws,
+    set_reference, whole_registers,
 )  # fmt: skip
 from fast.kernel.records import RADIUS, VALUE, WIDTH, Particle, particle_at, write_state
 from fast.kernel.worker import DISK, GENERAL, NEXT_STOP, PARTICLE
@@ -92,7 +92,7 @@ def finish(pool, a, i, j, code, end, followed):
         dt = (end - t) - t_low
         t, t_low = end, 0.0
         x, y_end = fma(vx, dt, x), fma(vy, dt, y)
-        if pool == DISK:  # the base may lie between
+        if pool == DISK and a[WALL + i] == ON_ARC:  # the base may lie between
             if y * y_end < 0.0:
                 a[N_BASE + i] += 1.0
             if y_end < 0.0:
@@ -124,6 +124,8 @@ def step_carefully(pool, a, i, roster, worker):
         a[NEXT_T + i], a[NEXT_T_LOW + i] = p.t, p.t_low
         a[NEXT_X + i], a[NEXT_Y + i], a[NEXT_VX + i], a[NEXT_VY + i] = p.x, p.y, p.vx, p.vy
         a[HIT + i], a[DONE + i], a[S + i] = code, 1.0, s
+        if code != ARC or a[WALL + i] != ON_ARC:
+            a[AS_GIVEN + i] = 0.0
         if code < HORIZON:
             set_reference(a, i, p.t, p.t_low, scene, worker.pieces, worker.degree)
             set_laws(a, i, NEXT_R0, p.t, p.t_low, scene, worker.degree)
@@ -301,6 +303,7 @@ def follow(worker, walls):
             load(
                 pools[home], i, particle_at(states, first, walls[first]), stops.times[0], stops.is_first_kept
             )
+            pools[home][AS_GIVEN + i] = 1.0 if walls[first] == ARC else 0.0
             worker.rosters[home, PARTICLE, i], worker.rosters[home, NEXT_STOP, i] = first, 0
             n_held[home] += 1
             first += 1

@@ -25,6 +25,7 @@ NEVER = np.inf
     R0, R1, R2, R3, W0, W1, W2, H0, H1, H2, M0, M1, M2,  # radius, half-width, depth, slope; derivatives
     REF, REF_LOW, END, LIMIT, BACK,  # the laws' reference time, until when it serves; how far they hold
     PIECE,  # which of them it is
+    AS_GIVEN,  # 1 where its distance from the arc is still that of a start that names it; hops keep it
     STOP, CLOSED, SPIN,  # next time to look at the particle; end of a captured stay; angular momentum in one
     HIT, SURE, S,  # the step: wall, mouth, time
     OK, ROUTINE,  # is it right, and is nothing else to do
@@ -38,9 +39,9 @@ NEVER = np.inf
     # half-width's low part.
     BEFORE, MEAN_RATE, NEXT_W0_LOW,
     LAWS,  # from here on the laws' coefficients: see Pieces.coefficients
-) = STRIDE * np.arange(69)  # fmt: skip
+) = STRIDE * np.arange(70)  # fmt: skip
 N_COEFFICIENTS = 16  # of each law, as many as the highest degree asks for
-N_ROWS = 68 + 4 * N_COEFFICIENTS
+N_ROWS = 69 + 4 * N_COEFFICIENTS
 RADIUS_LAW, WIDTH_LAW, DEPTH_LAW, SLOPE_LAW = LAWS + STRIDE * N_COEFFICIENTS * np.arange(4)
 # Codes of walls as they stand in a row, and of OK: out of the laws' reach, not shown right, to be corrected,
 # right.
@@ -66,6 +67,8 @@ def set_piece(a, i, piece, scene, pieces, degree):
     a[BACK + i], a[LIMIT + i] = -pieces.limits[piece], pieces.limits[piece]
     if scene.laws[RADIUS, KIND] == CONSTANT:
         a[BACK + i] = -NEVER
+    if a[AS_GIVEN + i] > 0.0:  # no chord may begin there: through the base it would not be a hop
+        a[BACK + i] = NEVER
     for row in range(4):
         for j in range(degree + 2):
             a[LAWS + (row * N_COEFFICIENTS + j) * STRIDE + i] = pieces.coefficients[piece, row, j]
@@ -163,7 +166,10 @@ def fold(a, i, scene, pieces, degree):
 
 @part
 def refold(a, i):
-    """Bring an unfolded particle of a cap back to y >= 0; its wall is known since it first hit the arc."""
-    if a[Y + i] < 0.0:
+    """Bring an unfolded particle of a cap back to y >= 0; its wall is known since it first hit the arc.
+
+    One that is below y = 0 as it leaves the base was given so, within what a start may be off its wall.
+    """
+    if a[Y + i] < 0.0 and a[WALL + i] == ON_ARC:
         a[Y + i], a[VY + i] = -a[Y + i], -a[VY + i]
     a[SPIN + i] = 0.0

@@ -15,8 +15,9 @@ import fast
 from conformance import plain, vectors
 from conformance.generator.draws import wire_form
 from conformance.generator.flow_families import any_marks
-from conformance.generator.fresh import WALLS, _is_steady, drawn_scene, fresh
+from conformance.generator.fresh import ANOTHER, TELLING, WALLS, _is_steady, drawn_scene, fresh, fresh_one
 from conformance.generator.question import Question
+from conformance.grading.agreement import physics_bound
 from conformance.grading.grade import grade
 from conformance.mutants import Mutant
 from conformance.mutants.of_laws import single
@@ -74,6 +75,7 @@ def test_all_is_asked_that_the_corpus_asks_seldom(seed, tally):
         if i > 0 and vector.state == asked[i - 1].state:
             tally["like the one before"] += 1
             assert grade(vector, answer_to(asked[i - 1])).verdict == "fail"
+            assert vector.condition * physics_bound(vector.condition) < ANOTHER
         tally["named"] += "name" in vector.scene
         tally["late"] += abs(vector.state.t) > 500 * (cycle_length(scene) or inf)
         tally["more than 20 legs"] += any(len(getattr(law, "knots", ())) > 20 for law in laws(scene).values())
@@ -91,6 +93,14 @@ def test_all_is_asked_that_the_corpus_asks_seldom(seed, tally):
 def test_what_is_drawn_follows_from_the_seed():
     assert list(fresh(1, 12)) == questions(1, SOME)[:12]
     assert list(fresh(3, 12)) != questions(1, SOME)[:12]
+
+
+def test_where_errors_that_pass_may_be_large_no_answer_is_taken_for_another(monkeypatch):
+    before, like = fresh_one(1, 5), fresh_one(1, 6)
+    assert like.state == before.state
+    monkeypatch.setattr("conformance.generator.fresh.TELLING", like.condition / 2)
+    assert fresh_one(1, 6).condition <= like.condition / 2 or fresh_one(1, 6).state != before.state
+    assert float(physics_bound(TELLING)) * TELLING < ANOTHER < float(physics_bound(1e12)) * 1e12
 
 
 @pytest.mark.parametrize(("x", "is_asked"), [(0.6, True), (0.5 + 2.0**-36, False), (0.5 - 2.0**-36, False)])

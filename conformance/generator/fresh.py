@@ -10,8 +10,9 @@ it gives the answer before. Scenes carry names, which mean nothing: different on
 Some meet their wall for a short time only, some cross a mouth that opens or closes during the flight
 (`generator.in_flight`), and every seventh begins up to a million periods late, or before 0.
 Answers are proved by the reference alone, and are no more delicate than those of level core, but for late
-ones, whose time when rounded tells less of the phase: these than level extended. The plain stepper chooses
-which draws are asked: those that meet the wall that is looked for, and keep it when nudged.
+ones, whose time when rounded tells less of the phase: these than level extended. All are filed as of level
+core. The plain stepper chooses which draws are asked: those that meet the wall that is looked for, and keep
+it when nudged.
 """
 
 from __future__ import annotations
@@ -40,6 +41,7 @@ from conformance.generator.links import Confirmation, Unfit
 from conformance.generator.paths import proved_path
 from conformance.generator.prover import CONDITIONS, NUDGES, SIGNS, ask, flight_of, nudged
 from conformance.generator.question import Proved, Question, filed
+from conformance.grading.agreement import DIGITS, SHARPEST
 from conformance.grading.error import condition_number, inputs_of
 from conformance.vectors import Expectation, Kind, Level, Vector
 from scene import BadInput, BangBang, Collision, Fourier, Law, Mushroom, Scene, State, Wall, from_data
@@ -73,8 +75,9 @@ NAMES = "", "", "scene", "scene", "1"
 # Draws for one question, and how many of them are like the one before. Every fortieth meets a mushroom's
 # base: of four hundred, none would in one of some thousands of runs.
 ATTEMPTS, LIKE_BEFORE = 4000, 50
-# An answer is another one that is farther off than any error that passes where conditions are those of core.
-ANOTHER = 2.0**-7
+# An answer is another one that is farther off than any error that passes, a thousandth of its size up to the
+# condition TELLING. Late questions may have higher ones: those are not asked as like the one before.
+ANOTHER, TELLING = 2.0**-7, float(DIGITS / SHARPEST)
 HITS = 2, 3, 4, 5  # of trajectories and flows
 NUDGE = dict(NUDGES)
 
@@ -87,8 +90,8 @@ def fresh(seed: int, n: int) -> Iterator[Vector]:
         n: how many.
 
     Yields:
-        Steps of level core that end in a collision, trajectories and flows, `fresh/1` to `fresh/n`; a greater
-        n only adds some.
+        Steps that end in a collision, trajectories and flows, `fresh/1` to `fresh/n`, filed as of level core,
+        though the conditions of late ones go up to those of extended; a greater n only adds some.
 
     Raises:
         BadInput: for none of very many draws an answer is proved.
@@ -138,6 +141,8 @@ def _questions(seed: int, number: int, before: Vector | None) -> Iterator[Questi
         if not isinstance(met, Collision) or not (_is_another(met, like) if like else met.wall == wanted):
             continue
         question = _asked(draw, _kind(number), of, start, t_end)
+        if question and like:
+            question = question._replace(longest=min(question.longest, TELLING))
         if question and _is_steady(of, question):
             yield question
     raise BadInput(f"{GROUP}/{number}: none of {ATTEMPTS} draws has a certified answer")
@@ -348,7 +353,7 @@ def _within(of: BangBang, draw: Draw, low: float, high: float) -> tuple[tuple[fl
 
 
 def _proved(question: Question, number: int) -> Vector | None:
-    """Return a question with its proved answer; None where there is none, or its condition is high."""
+    """Return a question with its proved answer; None where there is none, or its condition is too high."""
     of, is_step = from_data(question.scene), question.kind == "step"
     try:
         found = _proved_step(of, question) if is_step else proved_path(of, question, ALONE)

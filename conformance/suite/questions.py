@@ -68,6 +68,18 @@ def follow(session: Session, scene: Scene, state: State, n: int, t_end: float = 
         Trouble: also wrong-format, for a number of steps that cannot be, and declined where it ends
             undecided.
     """
+    found = follow_on(session, scene, state, n, t_end)
+    if isinstance(last := found[-1], Undecided):
+        raise Trouble("declined", f"step {len(found)} of {n}: undecided: {last.reason}")
+    return found
+
+
+def follow_on(session: Session, scene: Scene, state: State, n: int, t_end: float = FOREVER) -> list[Outcome]:
+    """Ask for n successive collisions as `follow`; a path may end undecided.
+
+    Raises:
+        Trouble: as `follow`, but for declined.
+    """
     assert session.introduction is not None
     if missing(session.introduction, "trajectory", to_data(scene)):
         return _follow_by_steps(session, scene, state, n, t_end)
@@ -81,8 +93,7 @@ def follow(session: Session, scene: Scene, state: State, n: int, t_end: float = 
     for step in answer["steps"]:
         found.append(read_outcome(step, t))
         t = getattr(found[-1], "t", t)
-    _check_ending(found, n)
-    return found
+    return _ending_well(found, n)
 
 
 def _follow_by_steps(session: Session, scene: Scene, state: State, n: int, t_end: float) -> list[Outcome]:
@@ -92,20 +103,19 @@ def _follow_by_steps(session: Session, scene: Scene, state: State, n: int, t_end
         if not isinstance(outcome, Collision):
             break
         state = outcome.state()
-    _check_ending(found, n)
-    return found
+    return _ending_well(found, n)
 
 
-def _check_ending(found: Sequence[Outcome], n: int) -> None:
-    *before, last = found or [Undecided("nothing is answered")]
+def _ending_well(found: list[Outcome], n: int) -> list[Outcome]:
+    """Return what is answered, at least that nothing is, where it may be the answer."""
+    *before, last = found = found or [Undecided("nothing is answered")]
     if len(found) > n or not all(isinstance(outcome, Collision) for outcome in before):
         raise Trouble("wrong-format", f"{len(found)} steps are answered to a trajectory of {n} collisions")
-    if isinstance(last, Undecided):
-        raise Trouble("declined", f"step {len(found)} of {n}: undecided: {last.reason}")
     if isinstance(last, Collision) and len(found) < n:
         raise Trouble(
             "fail", f"{len(found)} of {n} collisions are answered, and not what came instead of more"
         )
+    return found
 
 
 def flown(session: Session, scene: Scene, states: Sequence[State], t_end: float) -> Sequence[dict[str, Any]]:

@@ -12,7 +12,7 @@ from support.depth import deep_among, deep_but
 import theory
 from scene import BadInput, Fourier, Mushroom, load
 from theory.blur import FiniteEnergy, _joined, at_energy, blur_cdf
-from theory.course import Fields
+from theory.course import N_TIMES, Fields
 from theory.rates import PHASES, SPEEDS, frozen_rates, kick_rate, rates_at
 
 CYCLES = (
@@ -177,6 +177,37 @@ def test_of_no_one_and_outside_the_cycle_nothing_is_said() -> None:
     for energy in (-1.0, 0.0, math.nan, 2.0**1001):
         with pytest.raises(BadInput, match="energy ="):
             FiniteEnergy(load("moving-cap"), energy)
+
+
+ALLOWED = [
+    ("moving-cap", 1e4),
+    ("moving-cap", 1e6),
+    ("fixed-cap-anticlockwise", 1e6),
+    ("retraced-arc", 1e4),
+]
+
+
+@pytest.mark.parametrize("asked", deep_but(ALLOWED, *ALLOWED[:2]))
+def test_no_variance_is_negative_at_any_time_that_is_allowed(asked: tuple[str, float]) -> None:
+    """At the start of the moving cap's cycle it was -1e-5, and of slower particles -0.02 within it."""
+    name, energy = asked
+    found = at_energy(load(name), energy)
+    start, step = found._course[:2]
+    times = np.linspace(start - 16 * step, start + (N_TIMES + 16) * step, 4001)[1:-1]
+    for _, variance in (found.zone(times), found.at_capture(times)):
+        assert (variance >= 0).all()
+        assert (variance > 0).mean() > 0.3
+    lag, square = (found._fields.at(key, np.zeros(times.size), times) for key in ("lag", "square"))
+    uncut = found._in_zone(times)[1] + square - lag**2  # as was told once
+    assert uncut.min() < -1e-6
+    assert np.array_equal(found.at_capture(times)[1], np.maximum(uncut, 0.0))
+
+
+@pytest.mark.parametrize("make", [FiniteEnergy, at_energy])
+def test_slow_particles_are_refused_however_they_are_asked_for(make) -> None:
+    """The class itself told a peak with a variance of -2.7e9."""
+    with pytest.raises(theory.NotCovered, match="walls turn too soon for particles so slow"):
+        make(load("moving-cap"), 1e-3)
 
 
 def test_the_table_covers_every_phase_with_its_errors() -> None:

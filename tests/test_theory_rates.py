@@ -8,6 +8,7 @@ import msgspec
 import numpy as np
 import pytest
 
+import theory
 from scene import BangBang, Fourier, Mushroom, load
 from scene.tables import laws
 from scene.transforms import backwards
@@ -91,11 +92,34 @@ def test_a_measured_cycle_is_known_however_it_is_written(name, written):
     assert frozen_rates(backwards(again))[0] is frozen_rates(scene)[0]
 
 
-def test_a_mouth_given_by_its_width_is_known_too():
-    scene = load("retraced-arc")
-    again = Mushroom(r=scene.r, h=scene.h, w=scene.nu, slope=scene.slope)
-    assert scene.r == 1.0
-    assert frozen_rates(again)[0] is frozen_rates(scene)[0]
+def by_its_width(name):
+    """Return a scene whose mouth is told as w, not nu: w = nu r, and r moves."""
+    scene, wave = load(name), Fourier(mean=0.6, omega=1.0, cos=(0.4,), sin=(0.3, 0.1))
+    return Mushroom(r=scene.r, h=scene.h, w=wave if name == "moving-cap" else scene.r, slope=scene.slope)
+
+
+@pytest.mark.parametrize("name", ["moving-cap", "ergodic"])
+def test_a_mouth_given_by_its_width_has_the_same_rates(name, monkeypatch):
+    """Multiplied by another pace than they were divided by, they were two times too great."""
+    scene, again = load(name), by_its_width(name)
+    times = np.linspace(0.1, 6.1, 13)
+    for one, other in ((scene, again), (backwards(scene), backwards(again))):
+        assert frozen_rates(other)[0] is frozen_rates(one)[0]
+        for mine, its in zip(rates.rates_at(one, times), rates.rates_at(other, times), strict=True):
+            np.testing.assert_allclose(its, mine, rtol=1e-9, atol=1e-9)
+        assert rates.table_error(other) == pytest.approx(rates.table_error(one), rel=1e-9)
+    wanted = rates.rates_at(scene, times).diffusion
+    monkeypatch.setattr(rates._Found, "pace", lambda _, at: rates.pace(again, at))  # as was done once
+    assert np.abs(rates.rates_at(again, times).diffusion / wanted - 1).max() > 0.5
+
+
+@pytest.mark.parametrize("name", ["moving-cap", "ergodic"])
+def test_a_mouth_given_by_its_width_leads_to_the_same_energies(name):
+    one, other = (theory.at_energy(scene, 1e6) for scene in (load(name), by_its_width(name)))
+    assert other.peak == pytest.approx(one.peak, rel=1e-9, abs=1e-12)
+    assert other.next_order == pytest.approx(one.next_order, rel=1e-7)
+    for mine, its in zip(one.atoms, other.atoms, strict=True):
+        np.testing.assert_allclose(its, mine, rtol=1e-7, atol=1e-9)
 
 
 def test_a_table_at_rest_has_no_rates():

@@ -13,7 +13,15 @@ from conformance.audit.frozen import diffusion
 from scene import BangBang, Fourier, Mushroom, State, load
 from scene.refusal import BadInput
 from scene.transforms import scaled
-from theory import NotCovered, is_upright, kept_by_the_cap, upright, upright_rate, upright_spread
+from theory import (
+    NotConverged,
+    NotCovered,
+    is_upright,
+    kept_by_the_cap,
+    upright,
+    upright_rate,
+    upright_spread,
+)
 
 MOUTHS = (1.0, 0.8, 0.5)
 
@@ -87,7 +95,7 @@ def spread_over_the_mouth(narrow, pace):
 def by_equal_steps(f, edges):
     """Integrate as was done once: by 2,048 equal steps of a cycle."""
     step = (edges[-1] - edges[0]) / 2048
-    return float(f(edges[0] + step * (np.arange(2048) + 0.5)).sum() * step)
+    return float(f(edges[0] + step * (np.arange(2048) + 0.5))[0].sum() * step)
 
 
 def leg(narrow, lasting):
@@ -109,6 +117,43 @@ def test_an_instant_of_a_leg_and_a_narrow_mouth_count_in_full(narrow_and_fall, m
     monkeypatch.setattr(upright, "_integral", by_equal_steps)
     if fall < 0.01:
         assert upright_spread(table) != pytest.approx(wanted, rel=1e-2)
+
+
+def that_keeps_its_form(law):
+    """Return a table that breathes without a change of form: nothing is kicked but as all else."""
+    return Mushroom(r=law, h=law, nu=0.5)
+
+
+WAVE, JOLTS = Fourier(1.0, 1.0, cos=(0.2,)), BangBang(((0.0, 1.0), (0.3, 0.55), (0.7, 0.85), (1.0, 1.0)))
+
+
+@pytest.mark.parametrize("law", [WAVE, JOLTS])
+def test_a_spread_of_nothing_but_rounding_is_not_resolved_for_ever(law, monkeypatch):
+    """What was left by rounding had its panels halved for a minute, to 14 million times and a GiB."""
+    asked, growth = [], upright._growth
+
+    def counted(scene, at):
+        asked.append(at.size)
+        return growth(scene, at)
+
+    monkeypatch.setattr(upright, "_growth", counted)
+    assert 0 <= upright_spread(that_keeps_its_form(law)) < 1e-24
+    assert sum(asked) < 10_000
+    monkeypatch.setattr(upright, "ROUNDING", 0.0)
+    monkeypatch.setattr(upright, "MOST_PANELS", 1000)
+    with pytest.raises(NotConverged, match="the spread by upright sides is not resolved near t = "):
+        upright_spread(that_keeps_its_form(law))
+
+
+def test_legs_of_a_few_units_in_the_last_place_are_as_wrong_as_is_told():
+    """A leg at 0.25, where times are 2^-54 apart, and at 0, where they are as fine as they need be."""
+    for n, wrong in ((4096, 1e-4), (64, 0.01), (2, 0.1)):
+        brief = n * 2.0**-54
+        early = BangBang(((0.0, 1.0), (brief, 0.3), (0.5, 0.3), (0.75, 1.0), (1.0, 1.0)))
+        late = BangBang(((0.0, 1.0), (0.25, 1.0), (0.25 + brief, 0.3), (0.75, 0.3), (1.0, 1.0)))
+        right, found = (upright_spread(Mushroom(r=1.0, h=1.0, nu=nu)) for nu in (early, late))
+        assert found == pytest.approx(right, rel=wrong)
+        assert n == 4096 or found != pytest.approx(right, rel=wrong / 10)
 
 
 @pytest.mark.parametrize("narrow", deep_but([2.0**-19, 2.0**-7], 2.0**-7))

@@ -33,6 +33,7 @@ LATE = 16  # steps of a cycle, by which times may miss it: captures are seen fro
 REACH = 7.0  # standard deviations beyond which no blur is computed
 LEAST = 1e-12  # variance of a blur, in log E: a lag's square may leave less than none
 LARGEST = 2.0**1000  # of an energy: where its double is no float, fast particles seem slow
+TOO_SLOW = "energy = {}: walls turn too soon for particles so slow, and theory has no distribution"
 MOST = 4.0  # variance of a blur, in log E: beyond it what the peak has of it, v - v^2 / 8, falls again
 
 
@@ -100,7 +101,7 @@ class FiniteEnergy:
     """One cycle's energies at an initial energy.
 
     Attributes:
-        scene, energy: as given; refused as by `at_energy`, but for particles that are too slow.
+        scene, energy: as given; refused as by `at_energy`.
         s_nc: log E_nc / E0 of the adiabatic theory.
         p_nc: probability of never being captured.
         atoms: the distribution of s = log E1 / E0.
@@ -110,7 +111,15 @@ class FiniteEnergy:
         self.scene, self.energy = as_mushroom(scene), check_number("energy", energy)
         if not 0 < energy <= LARGEST:
             raise BadInput(f"energy = {energy}, must be > 0 and at most 2^1000")
-        cycle, root = course(scene), tree(scene)
+        with np.errstate(over="ignore", invalid="ignore"):  # lags as large as log E itself: refused below
+            self._solve()
+            is_one = self.atoms.variance.max() < MOST and self.variance_s > 0 and self.peak[1] > 0
+        if not is_one:
+            raise NotCovered(TOO_SLOW.format(energy))
+        self._below: dict[str, tuple[Floats, Floats]] = {}
+
+    def _solve(self) -> None:
+        cycle, root = course(self.scene), tree(self.scene)
         self.s_nc = root.s_nc
         self._course, self._fields = cycle, Fields(cycle, self.energy)
         self._n_captures = N_CAPTURES // 5 if root.children else N_CAPTURES
@@ -119,7 +128,6 @@ class FiniteEnergy:
         found = self._drift(passed, now, cycle.start + cycle.step * N_TIMES)
         self.atoms = found._replace(weight=found.weight / found.weight.sum())
         self.p_nc = float(self.atoms.weight[self.atoms.is_free].sum())
-        self._below: dict[str, tuple[Floats, Floats]] = {}
 
     @property
     def mean_s(self) -> float:
@@ -198,9 +206,14 @@ class FiniteEnergy:
     def zone(self, times: ArrayLike) -> tuple[Floats, Floats]:
         """Return mean and variance of log E / E0 at times of the cycle of those not captured so far.
 
+        A variance of 0 is one that corrections outweigh: it is below their error, and no more is known.
+
         Raises:
             BadInput: times are no finite numbers in one dimension, or one is outside the cycle.
         """
+        return (found := self._in_zone(times))[0], np.maximum(found[1], 0.0)
+
+    def _in_zone(self, times: ArrayLike) -> tuple[Floats, Floats]:
         t = self._within(times)
         none = np.zeros(len(t))
         gathered = {name: self._fields.at(name, none, t) for name in ("variance", "squares", "lags")}
@@ -210,10 +223,15 @@ class FiniteEnergy:
         return chaotic_zone(self.scene, t).log_energy - begun + drift, variance - variance**2 / 8
 
     def at_capture(self, times: ArrayLike) -> tuple[Floats, Floats]:
-        """Return mean and variance of log E / E0 of those first captured at each time, when they are."""
-        (mean, variance), t = self.zone(times), self._within(times)
+        """Return mean and variance of log E / E0 of those first captured at each time, when they are.
+
+        As of `zone`, which raises the same; soon after the start, and of slow particles, variances are 0.
+        """
+        (mean, variance), t = self._in_zone(times), self._within(times)
         lag, square = (self._fields.at(name, np.zeros(len(t)), t) for name in ("lag", "square"))
-        return mean + lag, variance + square - lag**2
+        # Lags go as v^(-2/3), diffusion as v^-1 and from 0: early, or if v is small, the square of a mean lag
+        # may exceed all variance there is. Blurs are cut there too (LEAST).
+        return mean + lag, np.maximum(variance + square - lag**2, 0.0)
 
     def draw(self, n_cycles: int, n: int, seed: int) -> Floats:
         """Draw log E / E0 of n particles after each of n_cycles independent cycles; shape (n, n_cycles).
@@ -351,14 +369,7 @@ def at_energy(scene: Scene, energy: float) -> FiniteEnergy:
 
 @lru_cache(maxsize=64)
 def _solved(scene: Mushroom, energy: float) -> FiniteEnergy:
-    with np.errstate(over="ignore", invalid="ignore"):  # lags as large as log E itself: refused below
-        found = FiniteEnergy(scene, energy)
-        is_one = bool(found.atoms.variance.max() < MOST and found.variance_s > 0 and found.peak[1] > 0)
-    if not is_one:
-        raise NotCovered(
-            f"energy = {energy}: walls turn too soon for particles so slow, and theory has no distribution"
-        )
-    return found
+    return FiniteEnergy(scene, energy)
 
 
 def _stays(node: Node, branch: Branch, n: int, s_nc: float) -> Stays:

@@ -19,7 +19,7 @@ from scene.tables import Mushroom, cycle_length, laws
 from theory.branches import Floats, tree
 from theory.curves import chaotic_zone
 from theory.cycle import Cycle
-from theory.rates import SPEEDS, RatesAt, pace, rates_at
+from theory.rates import SPEEDS, RatesAt, rates_at
 from theory.volumes import NotCovered, delta_slope, volumes_at
 
 N_TIMES = 1024  # steps of a cycle, the midpoint rule's
@@ -64,13 +64,13 @@ def course(scene: Mushroom) -> CycleCourse:
     rates_at(scene, np.zeros(1))
     start, step = _clock_start(scene), cycle_length(scene) / N_TIMES
     times: Floats = np.asarray(start + step * (np.arange(N_TIMES) + 0.5), dtype=np.float64)
-    now, volumes, speed = table_at(fp, scene, times), volumes_at(np, scene, times), pace(scene, times)
+    now, volumes, rates = table_at(fp, scene, times), volumes_at(np, scene, times), rates_at(scene, times)
     nu_rate = (now.w_rate * now.r - now.w * now.r_rate) / now.r**2
     flux = delta_slope(np, volumes.nu) * volumes.v_cap / volumes.v_cha
-    bend = np.asarray((np.gradient(speed, step) / speed) ** 2, dtype=np.float64)
+    bend = np.asarray((np.gradient(rates.pace, step) / rates.pace) ** 2, dtype=np.float64)
     log_energy = chaotic_zone(scene, times).log_energy - chaotic_zone(scene, [start]).log_energy[0]
     turning = np.abs(now.w_rate) / np.maximum(np.abs(now.slope), ROUNDING)
-    hazard, rates = np.abs(flux * nu_rate), rates_at(scene, times)
+    hazard = np.abs(flux * nu_rate)
     return CycleCourse(start, step, times, log_energy, hazard, nu_rate < 0, bend, turning, rates)
 
 

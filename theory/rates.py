@@ -62,11 +62,13 @@ class TableError(NamedTuple):
 class RatesAt(NamedTuple):
     """Rates at T times of a cycle.
 
+    pace: (T,) the walls' speed, as `pace` of the measured scene has it.
     diffusion: (T,) the kicks' variance per path length.
     memory: (T,) the length over which kicks are remembered [length].
     lag, square: (T, S) at SPEEDS.
     """
 
+    pace: Floats
     diffusion: Floats
     memory: Floats
     lag: Floats
@@ -74,7 +76,11 @@ class RatesAt(NamedTuple):
 
 
 def pace(scene: Scene, times: Floats) -> Floats:
-    """Return the root of the sum of squares of all parameters' rates at times (T,), as a scene names them."""
+    """Return the root of the sum of squares of all parameters' rates at times (T,), as a scene names them.
+
+    A mouth told as w has another pace than the same mouth told as nu. Rates are over the pace of the scene
+    that was measured, so they are to be multiplied by no other: `RatesAt` has it.
+    """
     squares = np.array([values(law, times, 1) ** 2 for law in laws(scene).values()])
     return np.asarray(np.sqrt(squares.sum(axis=0)), dtype=np.float64)
 
@@ -101,12 +107,34 @@ def frozen_rates(scene: Scene) -> tuple[Rates, bool]:
     Raises:
         NotCovered: neither the scene nor its reverse is in the table.
     """
+    found = _found(scene)
+    return found.rates, found.turned
+
+
+class _Found(NamedTuple):
+    """A measured scene, its rates, and whether it is the reverse of what was sought."""
+
+    measured: Mushroom
+    rates: Rates
+    turned: bool
+
+    def phases(self, times: Floats) -> Floats:
+        """Return the measured scene's phases at the sought one's times."""
+        phase: Floats = (times / cycle_length(self.measured)) % 1.0
+        return 1 - phase if self.turned else phase
+
+    def pace(self, times: Floats) -> Floats:
+        """Return the measured scene's `pace` at the sought one's times."""
+        return pace(self.measured, -times if self.turned else times)
+
+
+def _found(scene: Scene) -> _Found:
     mushroom = as_mushroom(scene)
     for turned in (False, True):
         sought = backwards(mushroom) if turned else mushroom
         for measured, rates in _table().values():
             if _is_one_cycle(measured, sought):
-                return rates, turned
+                return _Found(measured, rates, turned)
     known = ", ".join(_table())
     raise NotCovered(
         f"no frozen rates of scene {mushroom.name!r} are known, without which nothing is said of a finite"
@@ -124,19 +152,15 @@ def rates_at(scene: Scene, times: Floats) -> RatesAt:
     Raises:
         NotCovered: as `frozen_rates`.
     """
-    rates, turned = frozen_rates(scene)
-    length = cycle_length(scene)
-    phase = (times / length) % 1.0
-    spans = _spans(as_mushroom(scene), length)
-    if turned:
-        phase, spans = 1 - phase, (1 - spans)[::-1]
+    known = _found(scene)
+    rates, spans, speed = known.rates, _spans(known.measured), known.pace(times)
     memory = _memory(rates.diffusion, np.searchsorted(spans, PHASES, side="right"))
     columns = np.column_stack([_unbiased(rates.diffusion, memory), memory, rates.lag, rates.square])
-    found = _between(columns, phase, spans)
-    speed = pace(scene, times)
-    n, sign = len(SPEEDS), -1.0 if turned else 1.0
+    found = _between(columns, known.phases(times), spans)
+    n, sign = len(SPEEDS), -1.0 if known.turned else 1.0
     lag, square = found[:, 2 : 2 + n], found[:, 2 + n :]
     return RatesAt(
+        speed,
         found[:, 0] * speed**2,
         np.sqrt(found[:, 1]),
         sign * lag * speed[:, None],
@@ -150,9 +174,8 @@ def table_error(scene: Scene) -> TableError:
     Raises:
         NotCovered: as `frozen_rates`.
     """
-    rates, turned = frozen_rates(scene)
-    phases = 1 - PHASES if turned else PHASES
-    speed = pace(scene, phases * cycle_length(scene))
+    measured, rates, _ = _found(scene)
+    speed = pace(measured, PHASES * cycle_length(measured))
     spread, lag = rates.diffusion[:, 1] * speed**2, rates.lag.mean(axis=1) * speed
     errors = [rates.diffusion_error[:, 1] * speed**2, rates.lag_error.mean(axis=1) * speed]
     sums = np.abs(spread).sum(), max(float(np.abs(lag).sum()), TINY)
@@ -189,8 +212,9 @@ def _between(columns: Floats, phase: Floats, spans: Floats) -> Floats:
     return found
 
 
-def _spans(scene: Mushroom, length: float) -> Floats:
+def _spans(scene: Mushroom) -> Floats:
     """Return the phases, in (0, 1), at which a law stops being analytic and its walls rest."""
+    length = cycle_length(scene)
     knots = {float(t) / length % 1.0 for law in laws(scene).values() for t in breakpoints(law)[::2]}
     return np.array(sorted(knots - {0.0}))
 
@@ -201,6 +225,9 @@ def _is_one_cycle(measured: Mushroom, sought: Mushroom) -> bool:
     Values and rates at PHASES tell apart all Fourier laws of up to 63 harmonics, more than a product of two
     has. Between two neighbours among the breakpoints of both, bang-bang laws are parabolas, which values and
     rates at both ends tell apart.
+
+    A law written at twice its period (Fourier's with even harmonics only, a bang-bang law's knots told two
+    times) has another cycle length, and other units other numbers: these are not known for the same.
     """
     length = cycle_length(sought)
     if length == 0 or not math.isclose(cycle_length(measured), length, rel_tol=SAME):
@@ -211,8 +238,8 @@ def _is_one_cycle(measured: Mushroom, sought: Mushroom) -> bool:
         _motions(measured, times), _motions(sought, times), strict=True
     ):
         size = np.abs(place).max()
-        pace = max(np.abs(rate).max(), size / length)  # of what rests, rounding may leave a rate
-        if np.abs(place - its_place).max() > SAME * size or np.abs(rate - its_rate).max() > SAME * pace:
+        quickest = max(np.abs(rate).max(), size / length)  # of what rests, rounding may leave a rate
+        if np.abs(place - its_place).max() > SAME * size or np.abs(rate - its_rate).max() > SAME * quickest:
             return False
     return True
 

@@ -41,7 +41,7 @@ from fast.kernel.worker import new_worker
 from fast.narrowings import narrowings
 from fast.pieces import laws_in_lanes
 from fast.starts import cycle_stops, initial_states, least_collisions, one_cycle
-from fast.threads import interruptible
+from fast.threads import awaited, interruptible
 from fast.units import Units, fit, inward
 from scene import Scene
 from scene.notebook import rows
@@ -373,7 +373,9 @@ def follow(
         progress(0)
     begin = time.perf_counter()
     with interruptible(threads, stops.called_off) as pool:
-        for first, _ in zip(range(0, n, size), pool.map(work, range(0, n, size)), strict=True):
+        parts = {first: pool.submit(work, first) for first in range(0, n, size)}
+        for first, part in parts.items():
+            awaited(part)
             if progress:
                 progress(min(first + size, n))
     return time.perf_counter() - begin

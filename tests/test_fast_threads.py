@@ -18,14 +18,19 @@ SCENE, START = load("moving-cap"), State(0.0, 0.1, 0.2, 3.0, 4.0)
 LENGTH = 300_000  # collisions: seconds
 
 
-@pytest.fixture
-def begun():
-    """Interrupt this thread as soon as a kernel has begun: an event, set then."""
+@pytest.fixture(params=["to this thread", "to another"])
+def begun(request):
+    """Interrupt as soon as a kernel has begun: an event, set then.
+
+    A signal that is delivered to another thread does not end what this one waits for, as one that comes just
+    before the wait does not.
+    """
     event, main = threading.Event(), threading.get_ident()
 
     def interrupt() -> None:
         event.wait()
-        signal.pthread_kill(main, signal.SIGINT)
+        whom = main if request.param == "to this thread" else threading.get_ident()
+        signal.pthread_kill(whom, signal.SIGINT)
 
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
     thread = threading.Thread(target=interrupt)

@@ -26,9 +26,9 @@ from fast.kernel.loops import run_careful
 
 from fast.kernel.pools import (  # isort: skip
     AS_GIVEN, CERTAIN, CLOSED, DONE, END, HIT, LANES, NEVER, NEXT_R0, NEXT_T, NEXT_T_LOW, NEXT_VX, NEXT_VY,
-    NEXT_W0, NEXT_X, NEXT_Y, N_ARC, N_BASE, OK, ON_ARC, PIECE, ROUTINE, S, SINCE, SPIN, STAY_IN, STAY_OUT,
-    STOP, STRIDE, T, T_LOW, UNTIL, VX, VY, WALL, X, Y, change_lane, fold, load, refold, set_laws,
-    set_reference, whole_registers,
+    NEXT_W0, NEXT_X, NEXT_Y, N_ARC, N_BASE, N_FLOOR, N_LEFT, N_RIGHT, OK, ON_ARC, PIECE, ROUTINE, S, SINCE,
+    SPIN, STAY_IN, STAY_OUT, STOP, STRIDE, T, T_LOW, UNTIL, VX, VY, WALL, X, Y, change_lane, fold, load,
+    refold, set_laws, set_reference, whole_registers,
 )  # fmt: skip
 from fast.kernel.records import RADIUS, VALUE, WIDTH, Particle, particle_at, write_state
 from fast.kernel.worker import DISK, GENERAL, NEXT_STOP, PARTICLE
@@ -106,6 +106,12 @@ def finish(pool, a, i, j, code, end, followed):
         followed.counts[j, wall] = int(a[N_ARC + wall * STRIDE + i])
 
 
+@part
+def has_met_another(a, i):
+    """Tell whether a lane's particle has met any wall but the arc."""
+    return a[N_BASE + i] + a[N_LEFT + i] + a[N_RIGHT + i] + a[N_FLOOR + i] > 0.0
+
+
 @kernel
 def step_carefully(pool, a, i, roster, worker):
     """Find a lane's next collision carefully, in the disk the next one with the arc; returns the last code.
@@ -124,7 +130,7 @@ def step_carefully(pool, a, i, roster, worker):
         a[NEXT_T + i], a[NEXT_T_LOW + i] = p.t, p.t_low
         a[NEXT_X + i], a[NEXT_Y + i], a[NEXT_VX + i], a[NEXT_VY + i] = p.x, p.y, p.vx, p.vy
         a[HIT + i], a[DONE + i], a[S + i] = code, 1.0, s
-        if code != ARC or a[WALL + i] != ON_ARC:
+        if code != ARC or a[WALL + i] != ON_ARC or has_met_another(a, i):
             a[AS_GIVEN + i] = 0.0
         if code < HORIZON:
             set_reference(a, i, p.t, p.t_low, scene, worker.pieces, worker.degree)

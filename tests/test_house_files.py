@@ -13,6 +13,7 @@ import pytest
 ROOT = Path(__file__).parent.parent
 PACKAGES = ("scene", "reference", "fast", "theory", "conformance", "mushrooms")
 MAX_LINES = 400  # of a file
+LANGUAGES = (".py", ".c", ".h", ".cpp", ".hpp", ".js", ".css")
 MAX_FUNCTION = 60  # lines of a function, its decorators and docstring included
 # Files, and functions by `file: name`, that may be longer, and why.
 LONGER: dict[str, str] = {}
@@ -73,9 +74,13 @@ def test_every_module_opens_with_a_docstring():
     assert bare == []
 
 
-def python_sources() -> dict[str, str]:
-    """Return the text of every Python file of the project by its path."""
-    return {path.relative_to(ROOT).as_posix(): path.read_text("utf-8") for path in python_files()}
+def texts(suffixes: tuple[str, ...] = (".py",)) -> dict[str, str]:
+    """Return the text of every file of the project, in these languages, by its path."""
+    return {
+        path.relative_to(ROOT).as_posix(): path.read_text("utf-8")
+        for path in project_files()
+        if path.suffix in suffixes
+    }
 
 
 def long_files(sources: dict[str, str]) -> list[str]:
@@ -106,15 +111,15 @@ def repeated_classes(sources: dict[str, str]) -> dict[str, list[str]]:
 
 
 def test_files_and_functions_stay_short():
-    sources = python_sources()
-    assert len(sources) > 100
-    long = {*long_files(sources), *long_functions(sources)}
+    in_python, in_any = texts(), texts(LANGUAGES)
+    assert 100 < len(in_python) < len(in_any)
+    long = {*long_files(in_any), *long_functions(in_python)}
     assert long - set(LONGER) == set()
     assert set(LONGER) - long == set(), "no longer needed"
 
 
 def test_one_name_means_one_class():
-    assert repeated_classes(python_sources()) == {}
+    assert repeated_classes(texts()) == {}
 
 
 def test_planted_lengths_and_names_are_seen():

@@ -16,7 +16,7 @@ import fast
 import reference
 from conformance import plain, vectors
 from conformance.bench.contenders import Ask, Contender, Given, Lap, by_call
-from conformance.bench.growth import FAR, PathFollower, Place
+from conformance.bench.growth import FAR, PathFollower, PathPoint
 from conformance.bench.work import SCENE, Cost, Load
 from conformance.bench.workloads import WINDOW, Workload
 from conformance.generator import prover
@@ -47,7 +47,7 @@ def linearise(scene: Scene, state: State, t_end: float) -> tuple[Collision, Matr
     return outcome.rounded(), prover.flight_of(outcome, state, t_end).jacobian
 
 
-def prove_path(scene: Scene, state: State, n_collisions: int) -> list[Place]:
+def prove_path(scene: Scene, state: State, n_collisions: int) -> list[PathPoint]:
     """Follow a path by proof, right to twenty digits at its end."""
     return _places(reference.trajectory(scene, state, n_collisions, digits=20))
 
@@ -135,33 +135,33 @@ def _trajectory(workload: Workload, n_times: int) -> Lap:
     return Lap(ns / (n_times * workload.length), answers, ns)
 
 
-def _plain_path(scene: Scene, state: State, n_collisions: int) -> list[Place]:
+def _plain_path(scene: Scene, state: State, n_collisions: int) -> list[PathPoint]:
     found = plain.trajectory(scene, state, n_collisions, state.t + FAR)
-    return [Place(c.wall, c.x, c.y, c.vx, c.vy) for c in found if isinstance(c, Collision)]
+    return [PathPoint(c.wall, c.x, c.y, c.vx, c.vy) for c in found if isinstance(c, Collision)]
 
 
-def _fast_path(scene: Scene, state: State, n_collisions: int) -> list[Place]:
+def _fast_path(scene: Scene, state: State, n_collisions: int) -> list[PathPoint]:
     path = fast.trajectory(scene, state, n_collisions)
-    return [Place(wall, *row[2:]) for wall, row in zip(path.walls, path.steps.tolist(), strict=True)]
+    return [PathPoint(wall, *row[2:]) for wall, row in zip(path.walls, path.steps.tolist(), strict=True)]
 
 
-def _fine_path(scene: Scene, state: State, n_collisions: int) -> list[Place]:
+def _fine_path(scene: Scene, state: State, n_collisions: int) -> list[PathPoint]:
     path = fast.fine_trajectory(scene, state, n_collisions)
     found = []
     for i, wall in enumerate(path.walls):
         _, _, x, y, vx, vy = path.numbers(i)
-        found.append(Place(wall, x, y, vx, vy))
+        found.append(PathPoint(wall, x, y, vx, vy))
     return found
 
 
 def _proof_path(digits: int) -> PathFollower:
-    def follow(scene: Scene, state: State, n_collisions: int) -> list[Place]:
+    def follow(scene: Scene, state: State, n_collisions: int) -> list[PathPoint]:
         return _places(reference.trajectory(scene, state, n_collisions, working=digits))
 
     return follow
 
 
-def _places(path: reference.Trajectory) -> list[Place]:
+def _places(path: reference.Trajectory) -> list[PathPoint]:
     found = []
     for step in path.steps:
         ends = [c.centre() for c in step.after[1:]]
@@ -169,7 +169,7 @@ def _places(path: reference.Trajectory) -> list[Place]:
         widths = [c.width() for c in step.after[1:]]
         x, y, vx, vy = ends
         width = max(max(widths[:2]) / size, max(widths[2:]) / speed)
-        found.append(Place(step.wall, x, y, vx, vy, width))
+        found.append(PathPoint(step.wall, x, y, vx, vy, width))
     return found
 
 

@@ -93,7 +93,7 @@ def test_a_start_by_decree_is_left_to_the_careful_step():
 
 # A guess to third order is hardly ever misled. The checks that an arc is concave must not depend on that.
 POORER_GUESS = "return fma(r1, r2, r0 * r3 * (1.0 / 3.0))", "return 0.0"
-# What is taken out of lanes.py, and the group of draws and number of answers that miss it.
+# What is taken out of aiming.py or lanes.py, and the group of draws and number of answers that miss it.
 MUTANTS = {
     "the arc's chord on a flight to the base": (
         "arc to base",
@@ -106,7 +106,7 @@ MUTANTS = {
     "concavity of the arc": (
         ANYWHERE,
         4000,
-        "concave = fma(vx, vx, vy * vy) - bend if hit == ON_ARC else 1.0",
+        "concave = v2 - bend if hit == ON_ARC else 1.0",
         "concave = 1.0",
         *POORER_GUESS,
     ),
@@ -265,8 +265,8 @@ ROUNDING = {
     ),
     "walls that are not met": (
         "at the floor's corner",
-        "blur\n    far = fma(abs(vx) + limits.lean * abs(vy) + limits.rate, slack, far)",
-        "0.0",
+        "blur\n    return fma(abs(outset.vx) + limits.lean * abs(outset.vy) + limits.rate, slack, far)",
+        "0.0\n    return far",
     ),
 }
 

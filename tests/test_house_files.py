@@ -17,6 +17,13 @@ LANGUAGES = (".py", ".c", ".h", ".cpp", ".hpp", ".js", ".css")
 MAX_FUNCTION = 60  # lines of a function, its decorators and docstring included
 # Files, and functions by `file: name`, that may be longer, and why.
 LONGER: dict[str, str] = {}
+MAX_ARGUMENTS = 8  # of a kernel: what belongs together is a record
+# Python hands these a state number by number; a record would take longer than the step.
+CROWDED = {
+    "fast/kernel/entries.py: single",
+    "fast/kernel/single.py: single_step",
+    "fast/kernel/single.py: question",
+}
 # Examples for other people's steppers, each complete in itself: their classes may have our names.
 EXAMPLES = "conformance/harness/"
 # Joined here so that this file does not contain what it forbids.
@@ -99,6 +106,17 @@ def long_functions(sources: dict[str, str]) -> list[str]:
     ]
 
 
+def crowded_kernels(sources: dict[str, str]) -> list[str]:
+    """List the kernels that take too many arguments, as `file: name`."""
+    return [
+        f"{path}: {node.name}"
+        for path, text in sources.items()
+        if path.startswith("fast/kernel/")
+        for node in ast.walk(parsed(text))
+        if isinstance(node, ast.FunctionDef) and len(node.args.args) > MAX_ARGUMENTS
+    ]
+
+
 def repeated_classes(sources: dict[str, str]) -> dict[str, list[str]]:
     """Return the names that several classes of the packages have, with the files they are in."""
     places: dict[str, list[str]] = {}
@@ -118,6 +136,10 @@ def test_files_and_functions_stay_short():
     assert set(LONGER) - long == set(), "no longer needed"
 
 
+def test_kernels_take_records_and_few_arguments():
+    assert set(crowded_kernels(texts())) == CROWDED
+
+
 def test_one_name_means_one_class():
     assert repeated_classes(texts()) == {}
 
@@ -129,6 +151,8 @@ def test_planted_lengths_and_names_are_seen():
     right = "class A:\n    async def g(self):\n" + "        pass\n" * 59
     assert long_functions({"fast/a.py": long, "tests/b.py": right}) == ["fast/a.py: f"]
     assert long_functions({"tests/b.py": right + "        pass\n"}) == ["tests/b.py: g"]
+    crowded = "def f(a, b, c, d, e, f, g, h, i): pass\ndef g(a, b, c, d, e, f, g, h): pass"
+    assert crowded_kernels({"fast/kernel/a.py": crowded, "fast/b.py": crowded}) == ["fast/kernel/a.py: f"]
     ours = {"fast/a.py": "class Run: pass", "scene/b.py": "def f():\n    class Run: pass"}
     assert repeated_classes(ours) == {"Run": ["fast/a.py", "scene/b.py"]}
     theirs = {"tests/c.py": "class Run: pass", EXAMPLES + "python/d.py": "class Run: pass"}

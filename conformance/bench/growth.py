@@ -26,7 +26,7 @@ WORKLOAD, ENERGY = "moving-cap-1e4", 1e4
 FAR = 1e9  # horizon of a step that a trajectory takes
 
 
-class Place(NamedTuple):
+class PathPoint(NamedTuple):
     """Where a trajectory stands after a collision; `width`: relative, of what encloses it."""
 
     wall: str
@@ -37,7 +37,7 @@ class Place(NamedTuple):
     width: float = 0.0
 
 
-PathFollower = Callable[[Scene, State, int], list[Place]]
+PathFollower = Callable[[Scene, State, int], list[PathPoint]]
 Linearised = Callable[[Scene, State, float], tuple[Collision, Matrix]]  # a proved step and its Jacobian
 
 
@@ -92,7 +92,7 @@ def _sizes(scene: Scene, state: State) -> tuple[float, float]:
     return rounded(scene, state.t).r, math.hypot(state.vx, state.vy)
 
 
-def _errors(path: Sequence[Place], truth: Sequence[Place], size: float) -> FloatArray:
+def _errors(path: Sequence[PathPoint], truth: Sequence[PathPoint], size: float) -> FloatArray:
     """Return errors relative to table and speed, at most 1: no digit left."""
     found = np.ones(len(truth))
     for i, (place, exact) in enumerate(zip(path, truth, strict=False)):

@@ -7,6 +7,8 @@ of lanes before it begins with those of the next; that this is why was not measu
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 from fast.kernel.arithmetic import fma
 from fast.kernel.compiling import packed
 from fast.kernel.pieces import law_at, third_derivative
@@ -16,6 +18,21 @@ from fast.kernel.pools import (  # isort: skip
     NEXT_R2, NEXT_R3, NEXT_W0, NEXT_W0_LOW, NEXT_W1, NEXT_W2, RADIUS_LAW, REF, REF_LOW, S, SLOPE_LAW, STRIDE,
     T, T_LOW, law_of, width_of,
 )  # fmt: skip
+
+
+class StemLaws(NamedTuple):
+    """Half-width, with its low part, depth and slope at one time, with two derivatives each."""
+
+    w: float
+    w_low: float
+    w1: float
+    w2: float
+    h: float
+    h1: float
+    h2: float
+    m: float
+    m1: float
+    m2: float
 
 
 @packed
@@ -49,6 +66,14 @@ def stem_ahead(a, i, since, w2, w_low, slope, degree):
 
 
 @packed
+def stem_there(a, i, slope):
+    """Return what `stem_ahead` has written."""
+    m, m1, m2 = (a[NEXT_M0 + i], a[NEXT_M1 + i], a[NEXT_M2 + i]) if slope is None else (slope, 0.0, 0.0)
+    w, w_low, w1, w2 = a[NEXT_W0 + i], a[NEXT_W0_LOW + i], a[NEXT_W1 + i], a[NEXT_W2 + i]
+    return StemLaws(w, w_low, w1, w2, a[NEXT_H0 + i], a[NEXT_H1 + i], a[NEXT_H2 + i], m, m1, m2)
+
+
+@packed
 def cap_at_hit(a, i, delta, r, r1, r2, w, w1):
     """Write radius and half-width at the hit, which is `delta` after the end that was guessed."""
     a[NEXT_R0 + i], a[NEXT_R1 + i] = fma(r1, delta, r), fma(r2, delta, r1)
@@ -56,9 +81,9 @@ def cap_at_hit(a, i, delta, r, r1, r2, w, w1):
 
 
 @packed
-def stem_at_hit(a, i, delta, w1, w2, h, h1, h2, m, m1, m2, slope):
+def stem_at_hit(a, i, delta, stem, slope):
     """Write depth, slope and the half-width's rate at the hit, likewise."""
-    a[NEXT_W1 + i] = fma(w2, delta, w1)
-    a[NEXT_H0 + i], a[NEXT_H1 + i] = fma(h1, delta, h), fma(h2, delta, h1)
+    a[NEXT_W1 + i] = fma(stem.w2, delta, stem.w1)
+    a[NEXT_H0 + i], a[NEXT_H1 + i] = fma(stem.h1, delta, stem.h), fma(stem.h2, delta, stem.h1)
     if slope is None:
-        a[NEXT_M0 + i], a[NEXT_M1 + i] = fma(m1, delta, m), fma(m2, delta, m1)
+        a[NEXT_M0 + i], a[NEXT_M1 + i] = fma(stem.m1, delta, stem.m), fma(stem.m2, delta, stem.m1)

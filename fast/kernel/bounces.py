@@ -12,6 +12,7 @@ from fast.kernel.pools import (  # isort: skip
     ON_BASE, ON_FLOOR, ON_LEFT, ON_RIGHT, R0, R1, R2, R3, SINCE, SPIN, STAY_IN, STAY_OUT, T, T_LOW, UNTIL,
     VX, VY, W0, W1, W2, WALL, X, Y,
 )  # fmt: skip
+from fast.kernel.records import Place
 from fast.kernel.walls import off_the_arc, off_the_arc_spinning
 
 CLEARLY_CAPTURED = 1.05  # |L| over w v from which a particle moves to the disk's pool
@@ -50,9 +51,8 @@ def bounce(a, n, slope, is_mushroom):
         m = a[NEXT_M0 + i] if slope is None else slope
         x, y, vx, vy, hit = a[NEXT_X + i], a[NEXT_Y + i], a[VX + i], a[VY + i], a[HIT + i]
         w = a[NEXT_W0 + i]
-        off_x, off_y = off_the_arc(
-            x, a[NEXT_X_LOW + i], y, a[NEXT_Y_LOW + i], vx, vy, a[NEXT_R0 + i], a[NEXT_R1 + i]
-        )
+        place = Place(x, a[NEXT_X_LOW + i], y, a[NEXT_Y_LOW + i])
+        off_x, off_y = off_the_arc(place, vx, vy, a[NEXT_R0 + i], a[NEXT_R1 + i])
         rate = fma(a[NEXT_M1 + i], y, a[NEXT_W1 + i]) if slope is None else a[NEXT_W1 + i]
         vx_s, vy_s = off_the_side(1.0 if hit == ON_RIGHT else -1.0, vx, vy, m, rate)
         vx_s = vx if hit == ON_FLOOR else vx_s
@@ -104,8 +104,8 @@ def rebound(a, n):
     widest_registers()
     for i in range(n):
         x, y, vx, vy, spin = a[NEXT_X + i], a[NEXT_Y + i], a[VX + i], a[VY + i], a[SPIN + i]
-        low_x, low_y, r, rate = a[NEXT_X_LOW + i], a[NEXT_Y_LOW + i], a[NEXT_R0 + i], a[NEXT_R1 + i]
-        vx_s, vy_s = off_the_arc_spinning(x, low_x, y, low_y, vx, vy, r, rate, spin)
+        place = Place(x, a[NEXT_X_LOW + i], y, a[NEXT_Y_LOW + i])
+        vx_s, vy_s = off_the_arc_spinning(place, vx, vy, a[NEXT_R0 + i], a[NEXT_R1 + i], spin)
         is_done = a[DONE + i]
         a[VX + i] = a[NEXT_VX + i] if is_done > 0.0 else vx_s
         a[VY + i] = a[NEXT_VY + i] if is_done > 0.0 else vy_s

@@ -13,7 +13,7 @@ from fast.kernel.compiling import kernel, part
 from fast.kernel.laws import set_anchors
 
 from fast.kernel.records import (  # isort: skip
-    DEPTH, PHASE, PHASE_ERROR, RADIUS, RATE, SLOPE, VALUE, VALUE_LOW, Particle,
+    DEPTH, PHASE, PHASE_ERROR, RADIUS, RATE, SLOPE, VALUE, VALUE_LOW, Particle, Place,
 )  # fmt: skip
 from fast.kernel.walls import (  # isort: skip
     curvature_bounds, off_the_arc, wall_function, wall_residual, wall_slope, width_rate,
@@ -49,17 +49,17 @@ def remainder(wall, s, rest, residual, particle, scene, anchors):
 
 
 @kernel
-def bounce(wall, x, x_low, y, y_low, vx, vy, scene, anchors):
-    """Return the velocity after a hit at (x, y): v - 2 f' grad f / |grad f|^2 = v - 2 (v.n - u) n."""
+def bounce(wall, place, vx, vy, scene, anchors):
+    """Return the velocity after a hit at a place: v - 2 f' grad f / |grad f|^2 = v - 2 (v.n - u) n."""
     if wall == BASE:
         return vx, -vy
     if wall == ARC:
-        return off_the_arc(x, x_low, y, y_low, vx, vy, anchors[RADIUS, VALUE], anchors[RADIUS, RATE])
+        return off_the_arc(place, vx, vy, anchors[RADIUS, VALUE], anchors[RADIUS, RATE])
     if wall == FLOOR:
         return vx, -vy - 2.0 * anchors[DEPTH, RATE]
     m = anchors[SLOPE, VALUE]
     sign = 1.0 if wall == RIGHT else -1.0
-    rate = width_rate(scene, anchors) + anchors[SLOPE, RATE] * y
+    rate = width_rate(scene, anchors) + anchors[SLOPE, RATE] * place.y
     out = sign * vx
     # The reflection as a matrix: at slopes near +-1 the diagonal is small and must not cancel.
     tilt, n2 = ((m - 1.0) + anchors[SLOPE, VALUE_LOW]) * (m + 1.0), 1.0 + m * m
@@ -152,5 +152,5 @@ def move(wall, s, particle, scene, anchors):
     y_s, y_low = (0.0, 0.0) if wall == BASE else two_sum(y_s, y_low + vy * s_low)
     t, t_low = two_sum(t, low + particle.t_low + rest + s_low)
     set_anchors(laws, anchors, t, t_low)
-    vx, vy = bounce(wall, x_s, x_low, y_s, y_low, vx, vy, scene, anchors)
+    vx, vy = bounce(wall, Place(x_s, x_low, y_s, y_low), vx, vy, scene, anchors)
     return wall, time, Particle(t, t_low, x_s, y_s, vx, vy, wall)

@@ -19,11 +19,12 @@ from numba import config, types
 from numba.core.typing import Signature
 from numba.core.typing import signature as returns
 
+from fast.kernel.aiming import aim
 from fast.kernel.beside import compiled_beside, own_share
 from fast.kernel.bounces import bounce, rebound
 from fast.kernel.compiling import HOW, caller, kept
 from fast.kernel.judged import judged_step
-from fast.kernel.lanes import aim, chord, fly
+from fast.kernel.lanes import chord, fly
 from fast.kernel.limits import LawLimits
 from fast.kernel.pieces import DEGREES
 from fast.kernel.records import Compiled, LawsInLanes, Particle
@@ -74,7 +75,7 @@ def careful_step(particle, limit, origin, scene, anchors):
 def _aim(is_slope_moving):
     @kept(is_slope_moving, **HOW)
     def aim_lanes(a, n, is_stem, slope, limits):
-        """See fast.kernel.lanes.aim."""
+        """See fast.kernel.aiming.aim."""
         aim(a, n, is_stem, None if is_slope_moving else slope, limits)
 
     return aim_lanes

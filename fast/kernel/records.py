@@ -134,6 +134,15 @@ class Particle(NamedTuple):
     wall: int | np.integer[Any]
 
 
+class Place(NamedTuple):
+    """A place whose coordinates are sums of two floats: (x + x_low, y + y_low)."""
+
+    x: float
+    x_low: float
+    y: float
+    y_low: float
+
+
 class Paths(NamedTuple):
     """What the careful kernel fills in: paths of at most K collisions from each of N starts.
 

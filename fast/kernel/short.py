@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from fast.kernel.arithmetic import two_product, two_sum
 from fast.kernel.compiling import kernel
+from fast.kernel.records import Place
 
 
 @kernel
@@ -12,6 +13,14 @@ def moved(x, v, s):
     p, e = two_product(v, s)
     x_s, low = two_sum(x, p)
     return x_s, low + e
+
+
+@kernel
+def place_after(s, x, y, vx, vy):
+    """Return the place a time s after (x, y)."""
+    x_s, x_low = moved(x, vx, s)
+    y_s, y_low = moved(y, vy, s)
+    return Place(x_s, x_low, y_s, y_low)
 
 
 @kernel

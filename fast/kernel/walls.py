@@ -109,11 +109,12 @@ def wall_slope(wall, x, y, vx, vy, scene, anchors):
 
 
 @packed
-def off_the_arc(x, x_low, y, y_low, vx, vy, r, rate):
+def off_the_arc(place, vx, vy, r, rate):
     """Return the velocity after a hit on the arc: v - 2 f' grad f / |grad f|^2 = v - 2 (v.n - r') n.
 
     The place's low part matters: its rounding would turn the normal.
     """
+    x, x_low, y, y_low = place
     q, q_low = products(x, x_low, vx, 0.0, y, y_low, vy, 0.0)
     rho2, rho2_low = products(x, x_low, x, x_low, y, y_low, y, y_low)
     p, p_low = two_product(r, rate)
@@ -124,8 +125,9 @@ def off_the_arc(x, x_low, y, y_low, vx, vy, r, rate):
 
 
 @packed
-def off_the_arc_spinning(x, x_low, y, y_low, vx, vy, r, rate, spin):
+def off_the_arc_spinning(place, vx, vy, r, rate, spin):
     """Return the velocity after a hit on the arc where the angular momentum is known to be `spin`."""
+    x, x_low, y, y_low = place
     q, q_low = products(x, x_low, vx, 0.0, y, y_low, vy, 0.0)
     rho2, rho2_low = products(x, x_low, x, x_low, y, y_low, y, y_low)
     p, p_low = two_product(2.0 * r, rate)

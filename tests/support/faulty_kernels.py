@@ -48,18 +48,23 @@ def output_of(folder: Path, program: str, file: str = "", old: str = "", new: st
 
 
 def faulty_lanes(*changes: str) -> ModuleType:
-    """Return fast.kernel.lanes with texts in it replaced (old, new, old, new, ...); pools are lists there.
+    """Return the loops with texts in them replaced (old, new, old, new, ...); pools are lists there.
 
     The loops run as plain Python, which takes less time than to compile them and gives the same bits; what
     they call that takes no pool is compiled, once for all faults.
     """
-    path = HOUSE / "fast" / "kernel" / "lanes.py"
-    source = path.read_text("utf-8")
+    sources = {
+        name: (HOUSE / "fast" / "kernel" / name).read_text("utf-8") for name in ("lanes.py", "aiming.py")
+    }
     for old, new in zip(changes[::2], changes[1::2], strict=True):
-        assert old in source, old
-        source = source.replace(old, new)
+        assert any(old in source for source in sources.values()), old
+        sources = {name: source.replace(old, new) for name, source in sources.items()}
     module = ModuleType("faulty_lanes")
-    exec(compile(source, str(path), "exec"), module.__dict__)
+    for (
+        name,
+        source,
+    ) in sources.items():  # what the first imports from the second is replaced by the faulty ones
+        exec(compile(source, name, "exec"), module.__dict__)
     for name, found in (vars(pieces) | vars(pools) | vars(ahead)).items():
         vars(module).setdefault(name, found)
     names = [each.__name__ for each in (module, ahead, pools, pieces)]

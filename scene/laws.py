@@ -212,8 +212,22 @@ def breakpoints(law: Law) -> list[Fraction]:
 
 
 def exact(ctx: Any, number: Fraction) -> Any:
-    """Bring a rational into a number system (in `iv`: an enclosure of it)."""
-    return ctx.mpf(number.numerator) / ctx.mpf(number.denominator)
+    """Bring a rational into a number system (in `iv`: an enclosure of it); for floats it is rounded once."""
+    if ctx.mpf is not float:
+        return ctx.mpf(number.numerator) / ctx.mpf(number.denominator)
+    try:
+        return float(number)  # its parts alone may be beyond any float, as those of a knot at 1e-310 are
+    except OverflowError:
+        return math.inf if number > 0 else -math.inf
+
+
+def _at_float(piece: Quadratic, t: float | FloatArray, order: int) -> Any:
+    """Evaluate a parabola whose curvature is beyond any float, exactly, and round once."""
+    if isinstance(t, np.ndarray):
+        return np.array([_at_float(piece, each, order) for each in t.ravel().tolist()]).reshape(t.shape)
+    x = Fraction(t) - piece.origin
+    found = (piece.c0 + x * (piece.c1 + x * piece.c2), piece.c1 + 2 * piece.c2 * x, 2 * piece.c2)
+    return exact(_Arrays, found[order])
 
 
 def evaluate(ctx: Any, piece: Piece, t: Any, order: int = 0) -> Any:
@@ -231,6 +245,8 @@ def evaluate(ctx: Any, piece: Piece, t: Any, order: int = 0) -> Any:
     if isinstance(piece, Quadratic):
         x = t - exact(ctx, piece.origin)
         c2 = exact(ctx, piece.c2)
+        if ctx.mpf is float and math.isinf(c2):
+            return _at_float(piece, t, order)
         if order == 0:
             return exact(ctx, piece.c0) + x * (exact(ctx, piece.c1) + x * c2)
         return exact(ctx, piece.c1) + 2 * c2 * x if order == 1 else 2 * c2

@@ -105,6 +105,16 @@ def test_bang_bang_repeats_at_negative_and_large_times(turns):
             assert value(ctx, LEGS, exact(ctx, late), order) == value(ctx, LEGS, time, order)
 
 
+@pytest.mark.parametrize("leg", [1e-20, 1e-160, 1e-310, 5e-324])
+def test_floats_hold_the_values_of_legs_whose_parts_they_do_not(leg):
+    law, ctx = BangBang(((0.0, 1.0), (leg, 0.5), (1.0, 1.0))), context(700)
+    times = [0.0, 0.3 * leg, 0.7 * leg, leg, 0.25, 0.7]
+    for order in (0, 1, 2):
+        right = [float(value(ctx, law, time, order)) for time in times]
+        assert [value(fp, law, time, order) for time in times] == pytest.approx(right, rel=1e-15, abs=1e-15)
+        assert value(fp, law, np.array(times), order) == pytest.approx(right, rel=1e-15, abs=1e-15)
+
+
 def test_times_may_be_any_kind_of_number():
     ctx = context(50)
     third = ctx.mpf(1) / 3

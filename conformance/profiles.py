@@ -38,8 +38,9 @@ from mpmath import fp
 
 from scene import BadInput, Horizon, Mushroom, Outcome, Scene, State
 from scene.geometry import area, half_width, table_at
-from scene.laws import bounds, values
+from scene.laws import values
 from scene.protocol.wire import Flowing
+from scene.sizes import size_bounds
 from scene.tables import cycle_length, laws
 
 Floats = npt.NDArray[np.float64]
@@ -257,7 +258,7 @@ def _margin(n: int, variance: float, bound: float, alarm: float) -> float:
 
 def least_ratio(scene: Scene) -> float:
     """Return the product of (least / greatest)^2 over the lengths of the table."""
-    found = [bounds(law) for name, law in laws(scene).items() if name in ("r", "w", "h")]
+    found = [size_bounds(law) for name, law in laws(scene).items() if name in ("r", "w", "h")]
     return prod((law.lowest / law.highest) ** 2 for law in found)
 
 

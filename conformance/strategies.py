@@ -24,6 +24,7 @@ from scene import BangBang, Cap, Fourier, Law, Mushroom, Scene, State, Stem, Wal
 from scene.geometry import DIGITS, TableAt, table_at
 from scene.laws import bounds, breakpoints
 from scene.precision import decimals
+from scene.sizes import size_bounds
 from scene.tables import cycle_length
 from scene.tables import laws as laws_of
 from scene.transforms import scaled
@@ -110,7 +111,8 @@ def laws(draw: st.DrawFn, low: float = 0.5, high: float = 2.0, clock: Clock | No
 
     Returns:
         A constant (sometimes under any clock, and then sometimes written as a law that moves by
-        nothing), 1 to 4 harmonics, or 2 to 6 legs. Fourier laws sometimes touch a bound exactly.
+        nothing), 1 to 4 harmonics, or 2 to 6 legs. Fourier laws sometimes touch a bound exactly; those
+        of positive bounds sometimes have amplitudes that add up to more than their mean.
     """
     return _law(draw, low, high, draw(clocks()) if clock is None else clock)
 
@@ -130,6 +132,8 @@ def _law(draw: st.DrawFn, low: float, high: float, clock: Clock) -> Law:
 def _fourier(draw: st.DrawFn, low: float, high: float, omega: float) -> Fourier:
     mean = _between(draw, 0.75 * low + 0.25 * high, 0.25 * low + 0.75 * high)
     swing = min(high - mean, mean - low)
+    if low > 0.0 and draw(_ONE_OF_SIX) == 5:
+        return _deep_wave(draw, low, high, omega)
     n_cos, n_sin = draw(_N_WAVES)
     if (n_cos, n_sin) == (1, 0):
         # One cosine that reaches the nearer bound, exactly where mean and bound are dyadic.
@@ -137,6 +141,16 @@ def _fourier(draw: st.DrawFn, low: float, high: float, omega: float) -> Fourier:
     size = swing * MARGIN / (n_cos + n_sin)
     amplitudes = [_between(draw, -size, size) if draw(_COIN) else size for _ in range(n_cos + n_sin)]
     return Fourier(mean=mean, omega=omega, cos=tuple(amplitudes[:n_cos]), sin=tuple(amplitudes[n_cos:]))
+
+
+def _deep_wave(draw: st.DrawFn, low: float, high: float, omega: float) -> Fourier:
+    # |1 + a e^ix + b e^2ix|^2 is never negative, though its waves may add up to more than its mean.
+    a, b = (_between(draw, *ends) for ends in ((0.5, 1.5), (0.1, 0.6)))
+    unit = MARGIN * (high - low) / (1 + a + b) ** 2
+    floor = low + (1 - MARGIN) * (high - low) / 2
+    sign = 1.0 if draw(_COIN) else -1.0
+    waves = (2 * sign * a * (1 + b) * unit, 2 * b * unit)
+    return Fourier(mean=floor + (1 + a * a + b * b) * unit, omega=omega, cos=waves)
 
 
 def _bang_bang(draw: st.DrawFn, low: float, high: float, clock: Clock) -> BangBang:
@@ -171,7 +185,7 @@ def scenes(draw: st.DrawFn, table: str | None = None) -> Scene:
     elif table == "stem":
         w = _law(draw, 0.125, 2.0, clock)
         h = _law(draw, 0.25, 4.0, clock)
-        scene = Stem(w=w, h=h, slope=_slopes(draw, bounds(w).lowest, bounds(h).highest, clock))
+        scene = Stem(w=w, h=h, slope=_slopes(draw, size_bounds(w).lowest, bounds(h).highest, clock))
     else:
         scene = _mushroom(draw, clock)
     if draw(_ONE_OF_THREE) == 2:
@@ -182,13 +196,13 @@ def scenes(draw: st.DrawFn, table: str | None = None) -> Scene:
 def _mushroom(draw: st.DrawFn, clock: Clock) -> Mushroom:
     r = _law(draw, 0.5, 2.0, clock)
     h = _law(draw, 0.25, 4.0, clock)
-    narrowest, deepest = bounds(r).lowest, bounds(h).highest
+    narrowest, deepest = size_bounds(r).lowest, bounds(h).highest
     if draw(_COIN):
         nu = _law(draw, 0.125, 1.0, clock)
-        narrowest *= bounds(nu).lowest
+        narrowest *= size_bounds(nu).lowest
         return Mushroom(r=r, nu=nu, h=h, slope=_slopes(draw, narrowest, deepest, clock))
     w = _law(draw, narrowest / 8, narrowest * MARGIN, clock)
-    return Mushroom(r=r, w=w, h=h, slope=_slopes(draw, bounds(w).lowest, deepest, clock))
+    return Mushroom(r=r, w=w, h=h, slope=_slopes(draw, size_bounds(w).lowest, deepest, clock))
 
 
 def _slopes(draw: st.DrawFn, narrowest: float, deepest: float, clock: Clock) -> Law:

@@ -16,6 +16,7 @@ from fast.kernel.records import (  # isort: skip
 from scene import BangBang, Cap, Fourier, Law, Mushroom, Scene
 from scene.laws import Bounds, bounds, is_constant
 from scene.refusal import BadInput
+from scene.sizes import size_bounds
 from scene.tables import width_factors
 
 HALF_PI = half_pi()
@@ -58,7 +59,7 @@ def _laid_out(scene: Scene) -> Compiled:
     for row in waves:
         laws[SHARED, OMEGA], laws[SHARED, OMEGA_LOW] = row[OMEGA], omega_low
         laws[SHARED, N_HARMONICS] = max(laws[SHARED, N_HARMONICS], row[N_HARMONICS])
-    limits = np.array([bounds(r), _product_bounds(factors), bounds(h), bounds(slope)])
+    limits = np.array([size_bounds(r), _product_bounds(factors), size_bounds(h), bounds(slope)])
     return Compiled(TABLES[type(scene).__name__], len(factors) == 2, laws, limits)
 
 
@@ -106,12 +107,12 @@ def _row(law: Law) -> list[float]:
 
 def _product_bounds(factors: tuple[Law, ...]) -> Bounds:
     if len(factors) == 1:
-        return bounds(factors[0])
-    nu, r = bounds(factors[0]), bounds(factors[1])
+        return size_bounds(factors[0])
+    nu, r = size_bounds(factors[0]), size_bounds(factors[1])
     # Leibniz, rounded outward by a few units in the last place; nu and r are positive.
     grow = 1.0 + 2.0**-50
     return Bounds(
-        max(nu.lowest * r.lowest / grow, 0.0),
+        nu.lowest * r.lowest / grow,
         nu.highest * r.highest * grow,
         (nu.slope * r.highest + nu.highest * r.slope) * grow,
         (nu.curvature * r.highest + 2 * nu.slope * r.slope + nu.highest * r.curvature) * grow,

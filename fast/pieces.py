@@ -78,7 +78,10 @@ def degree_of(compiled: Compiled) -> int:
 
 
 def reach(compiled: Compiled, degree: int) -> float:
-    """Return V: how far from its reference time a polynomial holds [time]; infinite without a Fourier law."""
+    """Return V: how far from its reference time a polynomial holds [time]; infinite without a Fourier law.
+
+    It is 0 where no more is known of a law's least value than that it is positive.
+    """
     found = math.inf
     for row in (RADIUS, WIDTH, DEPTH, SLOPE):
         law = compiled.laws[row]
@@ -113,6 +116,8 @@ def pieces_of(compiled: Compiled, degree: int) -> Pieces | None:
     if period is None:
         return _filled(compiled, None, Fraction(0), [Cut(Fraction(0), Fraction(0), Fraction(0))], degree)
     longest = reach(compiled, degree)
+    if not longest > 0.0:
+        return None
     knots = sorted(_knots(laws, period, origin))
     edges = [Fraction(0), *knots, period]
     cuts: list[Cut] = []

@@ -110,7 +110,7 @@ class Period(NamedTuple):
     def value(self, ctx: Any) -> Any:
         """Return the period [time] in an mpmath number system."""
         if self.length is not None:
-            return ctx.mpf(self.length.numerator) / ctx.mpf(self.length.denominator)
+            return exact(ctx, self.length)
         return 2 * ctx.pi / ctx.mpf(self.omega)
 
 

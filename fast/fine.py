@@ -47,7 +47,8 @@ def fine_trajectory(scene: Scene, state: State, n_collisions: int) -> FineTrajec
 
     Returns:
         The collisions. Where nothing is met any more (a particle at rest that no wall sweeps) the outcome
-        is a Horizon at t = infinity with the place where it rests.
+        is a Horizon at t = infinity with the place where it rests. A wall met again within some 1e-10 of
+        a period may be Undecided, though `next_collision` decides it.
 
     Raises:
         BadInput: naming field, value and bound.

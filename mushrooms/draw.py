@@ -21,7 +21,7 @@ from mushrooms.terminal import (
 )
 from scene import Scene
 from scene.files import write_file
-from scene.refusal import check_seed
+from scene.refusal import BadInput, check_seed
 
 
 class Usual(NamedTuple):
@@ -61,6 +61,7 @@ Length = Annotated[int | None, typer.Option(help="Collisions of each particle, 1
 Many = Annotated[int | None, typer.Option(help="Particles of a section, a map, exponents; 1 to 1000.")]
 Seed = Annotated[int | None, typer.Option(help="Seed of the random starts, 0 to 2^64 - 1; by default 0.")]
 OF_PARTICLES = ("--energy", "--collisions", "--seed", "--particles")
+LEAST_DRAWN = 1e-100  # of lengths and times; their inverses are the greatest
 OF_MANY = ("section", "map", "lyapunov")
 
 
@@ -102,6 +103,8 @@ def draw(
         print(draw_run(Path(scene), out))
         return
     table = load_scene(scene)
+    if kinds or export is None:
+        _check_drawable(table)
     _check(energy, collisions, particles, seed)
     if not kinds and export is None:
         refuse_unheeded(options, "the picture of the walls has no particles")
@@ -142,6 +145,22 @@ class _Asked(NamedTuple):
             seed=self.seed,
             n_orbits=n_orbits or self.n_orbits or usual.n_orbits,
         )
+
+
+def _check_drawable(table: Scene) -> None:
+    """Refuse lengths and periods whose squares or sums a figure cannot hold."""
+    from mpmath import fp
+
+    from scene.laws import bounds
+    from scene.tables import laws, period
+
+    shared = period(table)
+    found = {f"scene.{name}": bounds(law).highest for name, law in laws(table).items() if name != "slope"}
+    if shared is not None:
+        found["period"] = float(shared.value(fp))
+    for name, size in found.items():
+        if not LEAST_DRAWN <= size <= 1 / LEAST_DRAWN:
+            raise BadInput(f"{name} = {size:.3g}, must be 1e-100 to 1e+100 in a picture")
 
 
 def _check(energy: float | None, collisions: int | None, particles: int | None, seed: int | None) -> None:

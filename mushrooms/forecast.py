@@ -92,7 +92,7 @@ def _collisions_of_a_cycle(scene: Scene, energy: float) -> float:
     """
     begin, span, n_times = start_time(scene), one_cycle(scene), 64
     area, _ = _size(scene, begin)
-    sizes = [_size(scene, begin + span * (k + 0.5) / n_times) for k in range(n_times)]
+    sizes = [_size(scene, begin + span * ((k + 0.5) / n_times)) for k in range(n_times)]
     rates = [math.sqrt(2.0 * energy * area / a) * walls / (math.pi * a) for a, walls in sizes]
     return math.fsum(rates) * span / n_times
 

@@ -137,7 +137,7 @@ def whole(text: str | int) -> int:
     """
     try:
         number = Decimal(text)
-        if number.is_finite() and abs(number) < MOST and number == number.to_integral_value():
+        if number.is_finite() and number.copy_abs() < MOST and number == number.to_integral_value():
             return int(number)
     except InvalidOperation:
         pass

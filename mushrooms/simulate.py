@@ -290,7 +290,7 @@ def draw_histogram(path: Path, asked: Any, first: Any, name: str) -> None:
     n = int(first.counts.sum())
     if n < 2:
         raise BadInput(f"histogram: {n} particles were followed to the end, must be at least 2")
-    title = f"{name}, E0 = {asked.energy:.0e}, {n:,} particles"
+    title = f"{style.plain(name)}, E0 = {asked.energy:.0e}, {n:,} particles"
     file = io.BytesIO()
     figure = energies.histogram(asked.scene, asked.energy, first.middles, title, first.counts)
     style.save(figure, file, path.suffix)

@@ -38,7 +38,7 @@ from scene.geometry import rounded
 from scene.laws import is_constant
 from scene.tables import laws, period
 
-N_QUESTIONS = 40
+N_QUESTIONS = 60
 HONEST = {"plain": plain.next_collision, "fast": fast.next_collision}
 
 

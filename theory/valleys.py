@@ -20,6 +20,7 @@ from typing import Any, NamedTuple
 from scene.tables import Mushroom, period
 from theory.critical import Span, solve_rising, spans
 from theory.parameters import MovingMushroom
+from theory.volumes import NotCovered
 
 
 class MonotoneStretch(NamedTuple):
@@ -167,6 +168,8 @@ def _next_period(ctx: Any, scene: Mushroom, span: Span) -> Span:
 
 def _stretch(ctx: Any, scene: Mushroom, span: Span) -> MonotoneStretch:
     """Return the stretch of a span, or of a plateau what looks like one."""
+    if not span.start < span.end:
+        raise NotCovered(f"the mouth turns twice in so short a time that {ctx.dps} digits do not tell when")
     motion = MovingMushroom(ctx, scene, span.inside)
     ends = [
         (motion.nu(span.start)[0], span.start, span.start_order),

@@ -85,7 +85,7 @@ def _unit(v: Any) -> Any:
 def _title(orbit: FollowedOrbit) -> str:
     energy = orbit.energies()[0]
     many = len(orbit.walls)
-    return f"{orbit.scene.name or 'a table'}: {many:,} collisions from energy {energy:.4g}"
+    return f"{plots.plain(orbit.scene.name or 'a table')}: {many:,} collisions from energy {energy:.4g}"
 
 
 def _names(axes: Axes, scene: Scene, t: float) -> None:
@@ -157,7 +157,7 @@ def _of(orbits: Sequence[FollowedOrbit]) -> str:
     if n == 1:
         return _title(orbits[0])
     energy = orbits[0].energies()[0]
-    return f"{orbits[0].scene.name or 'a table'}: {n} particles from energy {energy:.4g}"
+    return f"{plots.plain(orbits[0].scene.name or 'a table')}: {n} particles from energy {energy:.4g}"
 
 
 @rc_context(plots.STYLE)
@@ -265,7 +265,7 @@ def write_animation(orbit: FollowedOrbit, file: BinaryIO, n_frames: int = N_FRAM
             trail.set_data(*path.T)
             dot.set_data(*places[k : k + 1].T)
             turn = (times[k] - times[0]) / span if span else times[k] - times[0]
-            return f"{orbit.scene.name}   {'t/T' if span else 't'} = {turn:.2f}"
+            return f"{plots.plain(orbit.scene.name)}   {'t/T' if span else 't'} = {turn:.2f}"
 
         return show
 

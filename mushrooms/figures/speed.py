@@ -184,8 +184,7 @@ def short_name(contender: str) -> str:
     """Return a contender's label."""
     for part in ("proof, ", " digits", "fast, ", "solve_ivp, ", "example in ", "command ", "steps, flight"):
         contender = contender.replace(part, "1" if part == "steps, flight" else "")
-    contender = contender.replace("$", r"\$")  # no formula
-    return contender if len(contender) < 18 else contender[:17] + "…"
+    return plots.plain(contender if len(contender) < 18 else contender[:17] + "…")
 
 
 def _legend(record: Record) -> list[Line2D]:

@@ -37,6 +37,11 @@ def phase_colours(n: int) -> list[str]:
     return ["#" + "".join(f"{round(255 * part):02x}" for part in shade[:3]) for shade in shades]
 
 
+def plain(text: str) -> str:
+    """Return a text that a figure shows as it is: a dollar in it begins no formula."""
+    return text.replace("$", r"\$")
+
+
 def new_figure(width: float, height: float, n_rows: int = 1, n_columns: int = 1) -> tuple[Figure, Any]:
     """Return a figure [inches] and its axes (an array when there are several)."""
     figure = Figure(figsize=(width, height), layout="constrained")

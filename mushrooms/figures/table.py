@@ -99,15 +99,15 @@ def write_picture(scene: Scene, suffix: str, file: BinaryIO) -> None:
         _write_animation(scene, file)
     else:
         figure = new_strip(scene, 7.2, 6.0)
-        figure.suptitle(scene.name)
+        figure.suptitle(plots.plain(scene.name))
         plots.save(figure, file, suffix)
 
 
 def _write_animation(scene: Scene, file: BinaryIO) -> None:
-    times, span = phases(scene, N_FRAMES), cycle_length(scene)
+    times, span, name = phases(scene, N_FRAMES), cycle_length(scene), plots.plain(scene.name)
 
     def title(k: int) -> str:
-        return f"{scene.name}   t/T = {times[k] / span:.2f}" if span else f"{scene.name}   static"
+        return f"{name}   t/T = {times[k] / span:.2f}" if span else f"{name}   static"
 
     write_frames(scene, times, lambda _: title, file)
 

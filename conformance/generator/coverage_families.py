@@ -32,6 +32,7 @@ def coverage_families() -> list[VectorFamily]:
         VectorFamily("tilting-side", 40, _tilting_side),
         VectorFamily("mixed-laws", 40, _mixed),
         VectorFamily("far-mouth", 24, _far_mouth),
+        VectorFamily("deep-waves", 30, _deep_waves),
     ]
 
 
@@ -197,6 +198,32 @@ def _mixed(draw: Draw) -> Question:
     )
     rule = "laws of every kind in one scene, of one period"
     return _question("mixed-laws", rule, "sec. 2", of, state(draw, of, {"speed": draw.power(-2, 6)}))
+
+
+def _deep_wave(draw: Draw, low: float, high: float, shared: SharedPeriod) -> Fourier:
+    """Draw low and some of |1 + a e^ix + b e^2ix|^2: positive, though its waves exceed its mean."""
+    while True:
+        a, b = draw.short(0.5, 1.5), draw.short(0.2, 0.6)
+        unit = (high - low) / (1 + a + b) ** 2
+        mean, waves = low + (1 + a * a + b * b) * unit, (2 * a * (1 + b) * unit, 2 * b * unit)
+        if sum(waves) > 1.05 * mean:
+            return Fourier(mean=mean, omega=shared.rate, cos=(draw.pick((1.0, -1.0)) * waves[0], waves[1]))
+
+
+def _deep_waves(draw: Draw) -> Question:
+    """Ask about walls of whose laws the mean less all amplitudes says that they may vanish."""
+    shared, table = clock(draw, ("fourier",)), draw.pick(TABLES)
+    of: Scene
+    if table == "cap":
+        of = Cap(r=_deep_wave(draw, 0.05, 1.5, shared))
+    elif table == "stem":
+        of = Stem(w=_deep_wave(draw, 0.05, 1.0, shared), h=_deep_wave(draw, 0.1, 2.0, shared))
+    else:
+        nu = _deep_wave(draw, 0.02, 0.9, shared)
+        of = Mushroom(r=_deep_wave(draw, 0.05, 1.5, shared), h=draw.short(0.5, 1.5), nu=nu)
+    start = state(draw, of, {"speed": draw.power(-4, 2), "patience": draw.pick((1.0, 4.0))})
+    rule = "amplitudes that add up to more than the mean of a law that is positive all the same"
+    return _question("deep-waves", rule, "sec. 2", of, start)
 
 
 def at_the_horizon() -> Iterator[Question]:

@@ -25,8 +25,9 @@ from conformance.plain.motion import (
     turned,
 )
 from conformance.plain.step import Flight
-from scene import BangBang, Fourier, Law, Scene, State
-from scene.laws import frequency
+from scene import BangBang, Fourier, Law, Outcome, Rejected, Scene, State
+from scene.laws import bounds, frequency
+from scene.tables import laws
 
 
 def single(x: float) -> float:
@@ -185,3 +186,13 @@ class SlopeConstantThoughALaw(Flight):
         if "slope" in self.laws:
             law = getattr(scene, "slope")  # noqa: B009 (a cap has none)
             self.laws["slope"] = ConstantMotion(self.kinds[type(law)](law, 0.0).value, 0.0)
+
+
+class SizesJudgedByTheirAmplitudes(Flight):
+    """Refuses a scene in which a size's amplitudes add up to its mean or more, though it stays positive."""
+
+    def refusal(self) -> Outcome | None:
+        for name, law in laws(self.scene).items():
+            if name != "slope" and not bounds(law).lowest > 0:
+                return Rejected(f"scene.{name} is negative at times")
+        return super().refusal()

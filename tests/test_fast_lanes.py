@@ -74,6 +74,9 @@ SCENES |= {
         r=Fourier(1.0, 6.0, (), (0.4, 0.1)), h=2.0, nu=Fourier(0.6, 6.0, (0.3, 0.05))
     ),
     "sixteen harmonics": moving_cap(r=Fourier(1.0, 1.0, (), DECAYING), h=Fourier(1.0, 1.0, DECAYING)),
+    "deep waves": moving_cap(
+        r=Fourier(1.0, 1.0, (0.9, 0.0, -0.35)), h=1.0, nu=Fourier(0.5, 1.0, (0.45, 0.0, -0.17)), slope=0.001
+    ),
     "a moving slope": moving_cap(slope=Fourier(0.05, 1.0, (0.03,), (0.02,))),
     "a radius with knots": moving_cap(
         r=BangBang(((0.0, 1.0), (0.5, 1.5), (1.0, 1.0))),

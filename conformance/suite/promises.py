@@ -18,7 +18,7 @@ from typing import Any
 import msgspec
 from mpmath import fp
 
-from conformance.suite import conserved, sameness, timing
+from conformance.suite import conserved, refusals, sameness, timing
 from conformance.suite.answers import read_outcome
 from conformance.suite.process import NOT_NUMBERS, Trouble
 from conformance.suite.questions import (
@@ -368,12 +368,14 @@ _CHECKS: dict[str, Callable[[Session], str]] = {
     "absent-wall": absent_wall,
     "malformed-lines": malformed_lines,
     "extra-fields": extra_fields,
+    "bad-states": refusals.bad_states,
     "flow-alone": flow_alone,
     "long-trajectory": long_trajectory,
     "at-rest": conserved.at_rest,
     "trajectory-steps": trajectory_steps,
     "flow-arrivals": flow_arrivals,
     "spelling": sameness.spelling,
+    "minus-zero": sameness.minus_zero,
     "near-questions": sameness.near_questions,
     "many-particles": sameness.many_particles,
     "time-steps": timing.same_steps,

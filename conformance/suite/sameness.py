@@ -36,6 +36,7 @@ N_POOL, N_FLOWN, T_END = 24, 300, 5.0  # different particles, and how many of th
 SHIFTS = 2.0**-24, 2.0**-34, 2.0**-44  # of a state: nearly the same, and told apart in binary64
 ROUNDING = 2.0**-48  # of numbers of size 1, after one straight flight
 COARSE = 2.0**-28  # likewise, of one that looks for hits down to a tolerance: as coarse as vectors let pass
+NEAR = 1e-6  # of sizes; see conformance.suite.promises
 HEIGHTS = 0.2718281828, 0.3141592653, 0.1618033988, 0.1414213562  # of starts; on no grid of anybody's
 Spelling = Callable[[dict[str, Any]], str]
 
@@ -57,6 +58,28 @@ def spelling(session: Session) -> str:
         if not is_same(answer, answers[0]):
             raise Trouble("fail", f"{name}: {answer}, as a rule {answers[0]}")
     return f"{len(SPELLINGS)} ways to write it"
+
+
+def minus_zero(session: Session) -> str:
+    """A state with y = -0.0 is where one with y = 0.0 is: on the base, or as its velocity says in the mouth."""
+    n = n_open = 0
+    for scene in (*STANDING, *MOVING):
+        try:
+            offered(session, (scene,), "step")
+        except Trouble:
+            continue
+        for vy, t_end in ((0.75, 10.0), (-0.75, 10.0), (0.75, 0.125), (-0.75, 0.125)):
+            plus, minus = (session.step(scene, State(0.0, 0.125, y, 0.25, vy), t_end) for y in (0.0, -0.0))
+            n += 1
+            if isinstance(plus, Undecided) or isinstance(minus, Undecided):
+                n_open += 1
+            elif distance(scene, minus, plus) > NEAR:
+                raise Trouble("fail", f"y = -0.0, vy = {vy}: {minus}, with 0.0 {plus}, in {scene}")
+    if not n:
+        raise Trouble("unsupported", "no table is offered, or no laws that are constant")
+    if n_open:
+        raise Trouble("declined", f"{n_open} of {n} undecided")
+    return f"{n} states"
 
 
 def _turned(part: Any) -> Any:

@@ -18,7 +18,7 @@ from typing import Any
 import msgspec
 from mpmath import fp
 
-from conformance.suite import conserved, refusals, sameness, timing
+from conformance.suite import changes, conserved, crowds, endings, refusals, sameness, timing
 from conformance.suite.answers import read_outcome
 from conformance.suite.process import NOT_NUMBERS, Trouble
 from conformance.suite.questions import (
@@ -31,6 +31,7 @@ from conformance.suite.questions import (
     flown,
     follow,
     is_same,
+    is_same_stay,
     offered,
     question,
 )
@@ -165,7 +166,7 @@ def flow_alone(session: Session) -> str:
         if found["outcome"] not in allowed[i]:
             raise Trouble("fail", f"states[{i}]: {found}, must be {' or '.join(allowed[i])}")
         gap = distance(scene, _arrival(found), _arrival(alone))
-        if gap > NEAR or not _is_same_stay(found.get("captured"), alone.get("captured"), 1.5):
+        if gap > NEAR or not is_same_stay(found.get("captured"), alone.get("captured"), 1.5):
             raise Trouble("fail", f"states[{i}]: {found} among others, {alone} alone")
     if flown(session, scene, [], 1.5):
         raise Trouble("fail", "a flow of no states is answered with some")
@@ -305,7 +306,7 @@ def _compared(session: Session, scene: Scene, states: Sequence[State], t_end: fl
             if stay == UNCLEAR:
                 continue
             n_stays += stay is not None
-            if not _is_same_stay(found.get("captured"), stay, t_end):
+            if not is_same_stay(found.get("captured"), stay, t_end):
                 raise Trouble("fail", f"{state}: captured = {found.get('captured')}, must be {stay}")
     return [len(states), n_compared, n_stays]
 
@@ -358,12 +359,6 @@ def _arrival(data: Mapping[str, Any]) -> Outcome:
     return read_outcome({name: value for name, value in data.items() if name != "captured"}, 0.0)
 
 
-def _is_same_stay(a: Sequence[float] | None, b: Sequence[float] | None, span: float) -> bool:
-    if a is None or b is None:
-        return a is b
-    return all(abs(one - other) <= CARRIED * span for one, other in zip(a, b, strict=True))
-
-
 _CHECKS: dict[str, Callable[[Session], str]] = {
     "absent-wall": absent_wall,
     "malformed-lines": malformed_lines,
@@ -371,13 +366,17 @@ _CHECKS: dict[str, Callable[[Session], str]] = {
     "bad-states": refusals.bad_states,
     "flow-alone": flow_alone,
     "long-trajectory": long_trajectory,
+    "trajectory-ends": endings.trajectory_ends,
     "at-rest": conserved.at_rest,
     "trajectory-steps": trajectory_steps,
     "flow-arrivals": flow_arrivals,
     "spelling": sameness.spelling,
     "minus-zero": sameness.minus_zero,
     "near-questions": sameness.near_questions,
+    "changed-questions": changes.changed_questions,
     "many-particles": sameness.many_particles,
+    "twin-particles": crowds.twin_particles,
+    "long-flow": crowds.long_flow,
     "time-steps": timing.same_steps,
     "time-clock": timing.honest_clock,
 }

@@ -1,11 +1,11 @@
 """The promise that no state is let through which docs/protocol.md says is `rejected`.
 
-Bad states lie outside their table, near a wall or far beyond it; or name a wall and lie off it, lie on it where
-another wall has ended it, or move into it, though slowly. All are made of the table's own geometry, at rest and
-moving, and are bad by a margin that no rounding bridges: 8 times what a place may be off its wall, and more.
-Each is asked for by every command that is offered, by steps and flows up to its own time too, and in a flow all at
-once, where a particle that begins after the end is bad too. To refuse everything would not do: beside each
-wall a state that leaves it as slowly is asked for as well, and must not be refused.
+Bad states lie outside their table, near a wall or far beyond it; or name a wall and lie off it, lie where
+another wall has ended it, or move into it, though slowly. All are made of the table's own geometry, at rest
+and moving, and are bad by a margin that no rounding bridges: 8 times what a place may be off its wall, and
+more. Every command that is offered is asked about each, steps and flows up to the state's own time too, and
+in a flow, which has all at once, a particle that begins after the end is bad as well. To refuse everything
+would not do: beside each wall a state that leaves it as slowly is asked about too, and must not be refused.
 """
 
 from __future__ import annotations
@@ -50,7 +50,9 @@ def bad_states(session: Session) -> str:
     for scene, t in _tables():
         asked = list(states(scene, t))
         offering = [
-            cmd for cmd in ("step", "trajectory", "flow") if not missing(session.introduction, cmd, to_data(scene))
+            cmd
+            for cmd in ("step", "trajectory", "flow")
+            if not missing(session.introduction, cmd, to_data(scene))
         ]
         for cmd in offering:
             for t_end in (t + 1.0,) if cmd == "trajectory" else (t, t + 1.0):

@@ -181,7 +181,8 @@ def is_same_stay(a: Sequence[float] | None, b: Sequence[float] | None, span: flo
     """Tell whether two captured stays of one particle are the same, but for what bounces make of rounding.
 
     Args:
-        a, b: begin and end [time], or None for no stay.
+        a: begin and end [time], or None for no stay.
+        b: likewise.
         span: of the flow [time].
     """
     if a is None or b is None:

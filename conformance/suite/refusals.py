@@ -47,7 +47,7 @@ def bad_states(session: Session) -> str:
     """
     assert session.introduction is not None
     n = n_open = 0
-    for scene, t in _tables():
+    for scene, t in tables():
         asked = list(states(scene, t))
         offering = [
             cmd
@@ -66,7 +66,7 @@ def bad_states(session: Session) -> str:
     return f"{n} states"
 
 
-def _tables() -> list[tuple[Scene, float]]:
+def tables() -> list[tuple[Scene, float]]:
     """Return scenes, and when to ask about them: all tables, moving and at rest."""
     moving = [scene for scene in MOVING if scene not in STANDING]
     return [*((scene, 0.0) for scene in STANDING), *((scene, t) for scene in moving for t in TIMES)]

@@ -248,10 +248,10 @@ def many_particles(session: Session) -> str:
         n_compared += 1
         if distance(scene, one, other) > CARRIED:
             raise Trouble("fail", f"states[{i}] of {N_FLOWN}: {one} among others, {other} alone")
-        stays = [part.get("captured") for part in (found, alone[which])]
-        n_captured += stays[1] is not None
-        if not is_same_stay(*stays, T_END):
-            raise Trouble("fail", f"states[{i}] of {N_FLOWN}: captured = {stays[0]}, alone {stays[1]}")
+        stay, own = found.get("captured"), alone[which].get("captured")
+        n_captured += own is not None
+        if not is_same_stay(stay, own, T_END):
+            raise Trouble("fail", f"states[{i}] of {N_FLOWN}: captured = {stay}, alone {own}")
     if 2 * n_compared < N_FLOWN:
         raise Trouble("declined", f"{n_compared} of {N_FLOWN} could be compared")
     return f"{N_FLOWN} states, {n_captured} captured"

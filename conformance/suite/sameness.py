@@ -34,7 +34,8 @@ from conformance.suite.questions import (
 from conformance.suite.session import MAX_SEQ, Session
 from scene import Collision, Horizon, Mushroom, Scene, State, Stem, Undecided, Wall
 
-N_POOL, N_FLOWN, T_END = 24, 300, 5.0  # different particles, and how many of them in one flow
+# Different particles, and how many of them in one flow: a prime, so that blocks of no size come out even.
+N_POOL, N_FLOWN, T_END = 24, 307, 5.0
 SHIFTS = 2.0**-24, 2.0**-34, 2.0**-44  # of a state: nearly the same, and told apart in binary64
 ROUNDING = 2.0**-48  # of numbers of size 1, after one straight flight
 COARSE = 2.0**-28  # likewise, of one that looks for hits down to a tolerance: as coarse as vectors let pass

@@ -147,7 +147,7 @@ FORGETFUL: dict[str, tuple[str, str, Fault]] = {
     "particles-without-wall": ("twin-particles", "fail", particles_by("t", *PLACE)),
     "particles-by-place": ("twin-particles", "fail", particles_by("t", "x", "y", "wall")),
     "captured-up-to-100": ("many-particles", "fail", uncaptured(lambda i, _: i >= 100)),
-    **{f"captured-in-blocks-of-{n}": ("many-particles", "fail", last_block(n)) for n in (16, 32, 64)},
+    **{f"captured-in-blocks-of-{n}": ("many-particles", "fail", last_block(n)) for n in (16, 32, 64, 100)},
     "straight-after-1000": ("long-flow", "fail", straight_after(1000)),
     "one-at-least": ("trajectory-ends", "fail", one_at_least),
     "undefined-left-out": ("trajectory-ends", "fail", leaving_out("undefined")),

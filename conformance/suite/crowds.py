@@ -29,7 +29,7 @@ RETURNING = {
 }
 
 
-class Particle(NamedTuple):
+class Twin(NamedTuple):
     """A state of a flow that meets nothing, or must be refused."""
 
     state: State
@@ -57,7 +57,7 @@ def twin_particles(session: Session) -> str:
     return _told(n, n_open, "states")
 
 
-def twins(scene: Scene) -> list[Particle]:
+def twins(scene: Scene) -> list[Twin]:
     """Return particles that differ from one before in a single field."""
     way = -1.0 if isinstance(scene, Stem) else 1.0
     first = State(0.0, 0.125, 0.25 * way, 0.0625, 0.03125)
@@ -68,16 +68,16 @@ def twins(scene: Scene) -> list[Particle]:
         {"vx": 0.125},
         {"vy": -0.0625},
     ]
-    found = [Particle(first), *(Particle(replace(first, **change)) for change in changes), Particle(first)]
+    found = [Twin(first), *(Twin(replace(first, **change)) for change in changes), Twin(first)]
     beyond = State(0.0, -1.0 - ASIDE, -0.5, 0.125, 0.0, "left")
     if isinstance(scene, Mushroom):
         beyond = replace(beyond, x=-0.5 - ASIDE)
         # Who names the base, and moves down, moves into it; who does not is in the open mouth.
         falling = State(0.0, 0.125, 0.0, 0.0625, -0.125)
-        found += [Particle(replace(falling, wall="base"), is_good=False), Particle(falling)]
+        found += [Twin(replace(falling, wall="base"), is_good=False), Twin(falling)]
     elif isinstance(scene, Cap):
         beyond = State(0.0, 0.6 * (1.0 + ASIDE), 0.8 * (1.0 + ASIDE), -0.125, -0.125, "arc")
-    return [*found, Particle(beyond), Particle(replace(beyond, wall=None), is_good=False), Particle(beyond)]
+    return [*found, Twin(beyond), Twin(replace(beyond, wall=None), is_good=False), Twin(beyond)]
 
 
 def long_flow(session: Session) -> str:

@@ -28,7 +28,7 @@ CORNERS = {
 LATER_CORNER = State(0.0, 0.0, -0.5, 1.0, 2.0)
 
 
-class Path(NamedTuple):
+class AskedPath(NamedTuple):
     """A question for a trajectory, and the outcomes that its steps may have where that is known."""
 
     state: State
@@ -71,20 +71,20 @@ def trajectory_ends(session: Session) -> str:
     return f"{n} trajectories"
 
 
-def _paths(scene: Scene) -> Iterator[Path]:
+def _paths(scene: Scene) -> Iterator[AskedPath]:
     inside, corner = INSIDE[type(scene)], CORNERS[type(scene)]
     for n in (0, 1, 4):
-        yield Path(inside, n, T_END, ("collision",) * n)
-        yield Path(inside, n, 2.0**-6, ("horizon",)[:n])
-        yield Path(corner, n, T_END)
+        yield AskedPath(inside, n, T_END, ("collision",) * n)
+        yield AskedPath(inside, n, 2.0**-6, ("horizon",)[:n])
+        yield AskedPath(corner, n, T_END)
     sliding = State(0.0, 0.75, 0.0, 0.1, 0.0, "base")
-    yield Path(sliding, 3, T_END)
+    yield AskedPath(sliding, 3, T_END)
     if isinstance(scene, Stem):
-        yield Path(LATER_CORNER, 5, T_END)
-        yield Path(replace(LATER_CORNER, vx=0.25), 5, 0.5, ("collision", "horizon"))
+        yield AskedPath(LATER_CORNER, 5, T_END)
+        yield AskedPath(replace(LATER_CORNER, vx=0.25), 5, 0.5, ("collision", "horizon"))
 
 
-def _outcomes(session: Session, scene: Scene, path: Path) -> list[str]:
+def _outcomes(session: Session, scene: Scene, path: AskedPath) -> list[str]:
     """Ask for a path, and return the outcomes of its steps."""
     request = question("trajectory", scene, path.state, collisions=path.n, t_end=path.t_end)
     answer = session.ask(request)

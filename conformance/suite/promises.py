@@ -3,9 +3,9 @@
 An answer is compared with another answer of the same implementation: what a field left out means, that bad
 lines do no harm, that many particles or collisions asked at once are answered as when asked one by one.
 Whether such answers are right is for the vectors. Promises of one kind have a module each in
-`conformance.suite`: what must be refused in `refusals`, what a table at rest conserves in `conserved`, what an
-answer may depend on in `sameness` and `changes`, flows whose arrivals are known in `crowds`, how trajectories end
-in `endings`, and what holds `time` to a clock in `timing`.
+`conformance.suite`: what must be refused in `refusals`, what a table at rest conserves in `conserved`, what
+an answer may depend on in `sameness` and `changes`, flows whose arrivals are known in `crowds`, how
+trajectories end in `endings`, and what holds `time` to a clock in `timing`.
 """
 
 from __future__ import annotations

@@ -31,7 +31,7 @@ TIMES = 0.375, 3.5  # in the first walls of MOVING come one way, in the second t
 SIDES: tuple[Wall, ...] = ("left", "right")
 
 
-class Asked(NamedTuple):
+class JudgedState(NamedTuple):
     """A state, and what is bad about it; nothing when `why` is empty."""
 
     state: State
@@ -73,11 +73,11 @@ def tables() -> list[tuple[Scene, float]]:
 
 
 def _outcomes(
-    session: Session, cmd: str, scene: Scene, asked: list[Asked], t_end: float
-) -> list[tuple[Asked, str]]:
+    session: Session, cmd: str, scene: Scene, asked: list[JudgedState], t_end: float
+) -> list[tuple[JudgedState, str]]:
     """Ask one command about all states, and return how each is answered."""
     if cmd == "flow":
-        late = Asked(replace(INSIDE[type(scene)], t=t_end + 1.0), "begins after t_end")
+        late = JudgedState(replace(INSIDE[type(scene)], t=t_end + 1.0), "begins after t_end")
         asked = [*asked, late]
         found = flown(session, scene, [one.state for one in asked], t_end)
         return [(one, str(answer["outcome"])) for one, answer in zip(asked, found, strict=True)]
@@ -92,7 +92,7 @@ def _outcomes(
     return pairs
 
 
-def _is_open(one: Asked, outcome: str, asking: str) -> bool:
+def _is_open(one: JudgedState, outcome: str, asking: str) -> bool:
     """Hold a bad state to be refused, and a good one not to be; tell whether a bad one is left open."""
     if one.why and outcome not in ("rejected", "undecided"):
         raise Trouble("fail", f"{asking}: {one.state} {one.why}, is answered {outcome}, must be rejected")
@@ -101,7 +101,7 @@ def _is_open(one: Asked, outcome: str, asking: str) -> bool:
     return bool(one.why) and outcome == "undecided"
 
 
-def states(scene: Scene, t: float) -> Iterator[Asked]:
+def states(scene: Scene, t: float) -> Iterator[JudgedState]:
     """Make bad states, and some good ones, of every wall of a table at one time."""
     table = table_at(fp, scene, t)
     for wall in scene.walls:
@@ -109,16 +109,16 @@ def states(scene: Scene, t: float) -> Iterator[Asked]:
         for part in OUTSIDE:
             for way in (1.0, -1.0):
                 place = _moved(table, wall, x, y, -part)
-                yield Asked(_leaving(table, t, wall, place, way, None), f"is beyond {wall}")
+                yield JudgedState(_leaving(table, t, wall, place, way, None), f"is beyond {wall}")
         for part in OFF:
             for way in (1.0, -1.0):
                 place = _moved(table, wall, x, y, way * part)
-                yield Asked(_leaving(table, t, wall, place, 1.0, wall), "is not on its wall")
+                yield JudgedState(_leaving(table, t, wall, place, 1.0, wall), "is not on its wall")
         for part in SLOWLY:
-            yield Asked(_leaving(table, t, wall, (x, y), -part, wall), "moves into its wall")
-            yield Asked(_leaving(table, t, wall, (x, y), part, wall), "")
+            yield JudgedState(_leaving(table, t, wall, (x, y), -part, wall), "moves into its wall")
+            yield JudgedState(_leaving(table, t, wall, (x, y), part, wall), "")
         for place in _past_the_end(table, wall):
-            yield Asked(_leaving(table, t, wall, place, 1.0, wall), "is where its wall has ended")
+            yield JudgedState(_leaving(table, t, wall, place, 1.0, wall), "is where its wall has ended")
 
 
 def _place(table: TableAt, wall: Wall) -> tuple[float, float]:

@@ -32,7 +32,7 @@ from conformance.suite.questions import (
     question,
 )
 from conformance.suite.session import MAX_SEQ, Session
-from scene import Collision, Horizon, Mushroom, Scene, State, Stem, Undecided, Wall
+from scene import Collision, Horizon, Mushroom, Rejected, Scene, State, Stem, Undecided, Wall
 
 # Different particles, and how many of them in one flow: a prime, so that blocks of no size come out even.
 N_POOL, N_FLOWN, T_END = 24, 307, 5.0
@@ -80,6 +80,8 @@ def minus_zero(session: Session) -> str:
             n += 1
             if isinstance(plus, Undecided) or isinstance(minus, Undecided):
                 n_open += 1
+            elif isinstance(plus, Rejected) and (wall is None or (vy < 0) == isinstance(scene, Stem)):
+                raise Trouble("fail", f"y = 0.0, vy = {vy}: {plus}, though it leaves the base, in {scene}")
             elif distance(scene, minus, plus) > NEAR:
                 raise Trouble("fail", f"y = -0.0, vy = {vy}: {minus}, with 0.0 {plus}, in {scene}")
     if not n:

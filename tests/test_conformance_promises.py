@@ -4,17 +4,21 @@ from __future__ import annotations
 
 import pytest
 from support.depth import deep_among
+from support.forgetful import FORGETFUL
 from support.leaks import LEAKS, NO_LEAKS
+from support.lenient import LENIENT
 from support.promise_breakers import FAULTS, Breaker, bisecting, remembering_steps
 
+import reference
 from conformance import vectors
-from conformance.suite import promises, session, timing
+from conformance.suite import changes, promises, refusals, session, timing
 from conformance.suite import run as suite
 from conformance.suite.session import Session
-from scene import Wall, from_data
+from fast import next_collision
+from scene import Rejected, Wall, from_data
 from scene.geometry import rounded
 
-BREACHES = {**FAULTS, **LEAKS}
+BREACHES = {**FAULTS, **LEAKS, **LENIENT, **FORGETFUL}
 
 
 @pytest.fixture
@@ -55,6 +59,29 @@ def test_a_coarse_one_may_not_tell_near_questions_apart_but_those_that_it_can(op
     for fault, wanted in (coarse, keeping):
         ((_, verdict, why, _),) = promises.ask_promises(opened(fault), ("near-questions",))
         assert verdict == wanted, why
+
+
+def test_changed_scenes_are_told_apart_by_their_first_hits(tally):
+    """What a promise asks must show: a hit in one scene is none in another of its family."""
+    for state, (base, *others) in changes.families():
+        first = next_collision(base, state, 100.0)
+        assert changes.flaw_of(base, state, first) == ""
+        for other in others:
+            hit = next_collision(other, state, 100.0)
+            assert changes.flaw_of(other, state, hit) == ""
+            assert abs(hit.t - first.t) > 1e-3, other
+            assert changes.flaw_of(other, state, first), other
+            assert changes.flaw_of(base, state, hit), other
+            tally["changed scenes"] += 1
+
+
+def test_bad_states_are_bad_and_good_ones_good_by_the_reference(tally):
+    """What a promise asks must be so: the proving stepper says the same, and leaves nothing open."""
+    for scene, t in refusals.tables():
+        for state, why in refusals.states(scene, t):
+            outcome = reference.next_collision(scene, state, t + 2.0**-6)
+            assert isinstance(outcome, Rejected) == bool(why), (scene, state, why, outcome)
+            tally[why or "leaves its wall"] += 1
 
 
 @pytest.mark.parametrize("name", NO_LEAKS)

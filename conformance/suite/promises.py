@@ -2,9 +2,10 @@
 
 An answer is compared with another answer of the same implementation: what a field left out means, that bad
 lines do no harm, that many particles or collisions asked at once are answered as when asked one by one.
-Whether such answers are right is for the vectors. What a table at rest conserves is in
-`conformance.suite.conserved`, what an answer may depend on in `conformance.suite.sameness`, and what holds
-`time` to a clock in `conformance.suite.timing`.
+Whether such answers are right is for the vectors. Promises of one kind have a module each in
+`conformance.suite`: what must be refused in `refusals`, what a table at rest conserves in `conserved`, what
+an answer may depend on in `sameness` and `changes`, flows whose arrivals are known in `crowds`, how
+trajectories end in `endings`, and what holds `time` to a clock in `timing`.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from typing import Any
 import msgspec
 from mpmath import fp
 
-from conformance.suite import conserved, sameness, timing
+from conformance.suite import changes, conserved, crowds, endings, refusals, sameness, timing
 from conformance.suite.answers import read_outcome
 from conformance.suite.process import NOT_NUMBERS, Trouble
 from conformance.suite.questions import (
@@ -31,6 +32,7 @@ from conformance.suite.questions import (
     flown,
     follow,
     is_same,
+    is_same_stay,
     offered,
     question,
 )
@@ -165,7 +167,7 @@ def flow_alone(session: Session) -> str:
         if found["outcome"] not in allowed[i]:
             raise Trouble("fail", f"states[{i}]: {found}, must be {' or '.join(allowed[i])}")
         gap = distance(scene, _arrival(found), _arrival(alone))
-        if gap > NEAR or not _is_same_stay(found.get("captured"), alone.get("captured"), 1.5):
+        if gap > NEAR or not is_same_stay(found.get("captured"), alone.get("captured"), 1.5):
             raise Trouble("fail", f"states[{i}]: {found} among others, {alone} alone")
     if flown(session, scene, [], 1.5):
         raise Trouble("fail", "a flow of no states is answered with some")
@@ -305,7 +307,7 @@ def _compared(session: Session, scene: Scene, states: Sequence[State], t_end: fl
             if stay == UNCLEAR:
                 continue
             n_stays += stay is not None
-            if not _is_same_stay(found.get("captured"), stay, t_end):
+            if not is_same_stay(found.get("captured"), stay, t_end):
                 raise Trouble("fail", f"{state}: captured = {found.get('captured')}, must be {stay}")
     return [len(states), n_compared, n_stays]
 
@@ -358,24 +360,24 @@ def _arrival(data: Mapping[str, Any]) -> Outcome:
     return read_outcome({name: value for name, value in data.items() if name != "captured"}, 0.0)
 
 
-def _is_same_stay(a: Sequence[float] | None, b: Sequence[float] | None, span: float) -> bool:
-    if a is None or b is None:
-        return a is b
-    return all(abs(one - other) <= CARRIED * span for one, other in zip(a, b, strict=True))
-
-
 _CHECKS: dict[str, Callable[[Session], str]] = {
     "absent-wall": absent_wall,
     "malformed-lines": malformed_lines,
     "extra-fields": extra_fields,
+    "bad-states": refusals.bad_states,
     "flow-alone": flow_alone,
     "long-trajectory": long_trajectory,
+    "trajectory-ends": endings.trajectory_ends,
     "at-rest": conserved.at_rest,
     "trajectory-steps": trajectory_steps,
     "flow-arrivals": flow_arrivals,
     "spelling": sameness.spelling,
+    "minus-zero": sameness.minus_zero,
     "near-questions": sameness.near_questions,
+    "changed-questions": changes.changed_questions,
     "many-particles": sameness.many_particles,
+    "twin-particles": crowds.twin_particles,
+    "long-flow": crowds.long_flow,
     "time-steps": timing.same_steps,
     "time-clock": timing.honest_clock,
 }

@@ -175,3 +175,16 @@ def off_wall(scene: Scene, at: Collision) -> float:
 def is_same(a: Mapping[str, Any], b: Mapping[str, Any]) -> bool:
     """Tell whether two answers to one question are the same, numbers and outcome; reasons may differ."""
     return {**a, "reason": ""} == {**b, "reason": ""}
+
+
+def is_same_stay(a: Sequence[float] | None, b: Sequence[float] | None, span: float) -> bool:
+    """Tell whether two captured stays of one particle are the same, but for what bounces make of rounding.
+
+    Args:
+        a: begin and end [time], or None for no stay.
+        b: likewise.
+        span: of the flow [time].
+    """
+    if a is None or b is None:
+        return a is b
+    return all(abs(one - other) <= CARRIED * span for one, other in zip(a, b, strict=True))

@@ -9,6 +9,7 @@ question, by which key, and how much room it has, shows here.
 from __future__ import annotations
 
 import json
+import math
 import random
 from collections.abc import Callable, Sequence
 from decimal import Decimal
@@ -26,17 +27,22 @@ from conformance.suite.questions import (
     distance,
     flown,
     is_same,
+    is_same_stay,
     offered,
     question,
 )
 from conformance.suite.session import MAX_SEQ, Session
-from scene import Collision, Horizon, Scene, State, Stem, Undecided
+from scene import Collision, Horizon, Mushroom, Rejected, Scene, State, Stem, Undecided, Wall
 
-N_POOL, N_FLOWN, T_END = 24, 300, 5.0  # different particles, and how many of them in one flow
+# Different particles, and how many of them in one flow: a prime, so that blocks of no size come out even.
+N_POOL, N_FLOWN, T_END = 24, 307, 5.0
 SHIFTS = 2.0**-24, 2.0**-34, 2.0**-44  # of a state: nearly the same, and told apart in binary64
 ROUNDING = 2.0**-48  # of numbers of size 1, after one straight flight
 COARSE = 2.0**-28  # likewise, of one that looks for hits down to a tolerance: as coarse as vectors let pass
+LATE = 100_000.0  # a time whose last place in binary64 is 2^-36
+NEAR = 1e-6  # of sizes; see conformance.suite.promises
 HEIGHTS = 0.2718281828, 0.3141592653, 0.1618033988, 0.1414213562  # of starts; on no grid of anybody's
+CAPTURED = State(0.0, 0.75, 0.25, 0.1, 3.0)  # in a mushroom
 Spelling = Callable[[dict[str, Any]], str]
 
 
@@ -57,6 +63,32 @@ def spelling(session: Session) -> str:
         if not is_same(answer, answers[0]):
             raise Trouble("fail", f"{name}: {answer}, as a rule {answers[0]}")
     return f"{len(SPELLINGS)} ways to write it"
+
+
+def minus_zero(session: Session) -> str:
+    """A state with y = -0.0 is where one with y = 0.0 is: on the base, or, by its velocity, off the mouth."""
+    n = n_open = 0
+    for scene in MOVING:
+        try:
+            offered(session, (scene,), "step")
+        except Trouble:
+            continue
+        wall: Wall | None = None if isinstance(scene, Mushroom) else "base"
+        for vy, t_end in ((0.75, 10.0), (-0.75, 10.0), (0.75, 0.125), (-0.75, 0.125)):
+            states = (State(0.0, 0.125, y, 0.25, vy, wall) for y in (0.0, -0.0))
+            plus, minus = (session.step(scene, state, t_end) for state in states)
+            n += 1
+            if isinstance(plus, Undecided) or isinstance(minus, Undecided):
+                n_open += 1
+            elif isinstance(plus, Rejected) and (wall is None or (vy < 0) == isinstance(scene, Stem)):
+                raise Trouble("fail", f"y = 0.0, vy = {vy}: {plus}, though it leaves the base, in {scene}")
+            elif distance(scene, minus, plus) > NEAR:
+                raise Trouble("fail", f"y = -0.0, vy = {vy}: {minus}, with 0.0 {plus}, in {scene}")
+    if not n:
+        raise Trouble("unsupported", "no table is offered, or no laws that are constant")
+    if n_open:
+        raise Trouble("declined", f"{n_open} of {n} undecided")
+    return f"{n} states"
 
 
 def _turned(part: Any) -> Any:
@@ -127,8 +159,9 @@ def near_questions(session: Session) -> str:
         # Who is coarse is held to its own measure: vectors let it pass, and say its class.
         own = max(_error(session, _flight_to_the_end(scene, height)) for height in HEIGHTS)
         most = ROUNDING if own <= ROUNDING else COARSE
-        n += len(HEIGHTS) + _told_apart(session, _flights_that_end(scene), most)
-        n += _told_apart(session, _flights_to_the_end(scene), most)
+        n += len(HEIGHTS)
+        for flights in (_flights_that_end, _flights_to_the_end, _late_flights):
+            n += _told_apart(session, flights(scene), COARSE if flights is _late_flights else most)
     if not n:
         raise Trouble("unsupported", "no table is offered, or no laws that are constant")
     return f"{n} questions"
@@ -139,7 +172,21 @@ def _flights_that_end(scene: Scene) -> list[_Exact]:
     way = -1.0 if isinstance(scene, Stem) else 1.0
     return [
         _Exact(scene, State(0.0, x, way / 4, 0.0, way), 0.125, State(0.125, x, 0.375 * way, 0.0, way))
-        for x in (0.0, *SHIFTS)
+        for x in (0.0, *SHIFTS, 0.3, *(0.3 + shift for shift in SHIFTS))
+    ]
+
+
+def _late_flights(scene: Scene) -> list[_Exact]:
+    """Return fast flights from one place at late times that are the same to 15 digits.
+
+    Late, the last digits of the time are worth more than an error of the place can be.
+    """
+    way, v, t_end = (-1.0 if isinstance(scene, Stem) else 1.0), 64.0, LATE + 2.0**-8
+    starts = (LATE + n * math.ulp(LATE) for n in (0, 24, 28))
+    return [
+        _Exact(scene, State(t, 0.25, way / 4, 0.0, way * v), t_end, State(t_end, 0.25, y, 0.0, way * v))
+        for t in starts
+        for y in (way * (0.25 + v * (t_end - t)),)
     ]
 
 
@@ -187,13 +234,13 @@ def _error(session: Session, asked: _Exact, most: float = COARSE) -> float:
 
 
 def many_particles(session: Session) -> str:
-    """Each of hundreds of particles, begun at its own time and on walls, arrives where it does alone."""
+    """Each of hundreds of particles, begun at its own time and on walls, is answered as it is alone."""
     scene = offered(session, MOVING, "flow", "step")
     pool = _pool(session, scene)
     alone = [flown(session, scene, [state], T_END)[0] for state in pool]
     order = [random.Random(N_FLOWN + i).randrange(len(pool)) for i in range(N_FLOWN)]
     together = flown(session, scene, [pool[which] for which in order], T_END)
-    n_compared = 0
+    n_compared = n_captured = 0
     for i, (which, found) in enumerate(zip(order, together, strict=True)):
         one, other = (
             read_outcome({k: v for k, v in part.items() if k != "captured"}, 0.0)
@@ -204,9 +251,13 @@ def many_particles(session: Session) -> str:
         n_compared += 1
         if distance(scene, one, other) > CARRIED:
             raise Trouble("fail", f"states[{i}] of {N_FLOWN}: {one} among others, {other} alone")
+        stay, own = found.get("captured"), alone[which].get("captured")
+        n_captured += own is not None
+        if not is_same_stay(stay, own, T_END):
+            raise Trouble("fail", f"states[{i}] of {N_FLOWN}: captured = {stay}, alone {own}")
     if 2 * n_compared < N_FLOWN:
         raise Trouble("declined", f"{n_compared} of {N_FLOWN} could be compared")
-    return f"{N_FLOWN} states"
+    return f"{N_FLOWN} states, {n_captured} captured"
 
 
 def _pool(session: Session, scene: Scene) -> list[State]:
@@ -216,4 +267,6 @@ def _pool(session: Session, scene: Scene) -> list[State]:
         state = replace(inside, vx=inside.vx * (1.0 + i / 8), vy=inside.vy * (1.5 - i / 16))
         hit = session.step(scene, state, T_END)
         found += [state, hit.state() if isinstance(hit, Collision) and hit.t < T_END / 2 else state]
+    if isinstance(scene, Mushroom):
+        found += [replace(CAPTURED, vy=CAPTURED.vy * (1.0 + i / 8)) for i in range(N_POOL // 4)]
     return found

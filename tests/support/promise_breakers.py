@@ -365,6 +365,7 @@ FAULTS: dict[str, tuple[str, str, Fault]] = {
     "remembering-6-digits": ("near-questions", "fail", remembering_steps(6)),
     "remembering-9-digits": ("near-questions", "fail", remembering_steps(9)),
     "remembering-12-digits": ("near-questions", "fail", remembering_steps(12)),
+    "remembering-15-digits": ("near-questions", "fail", remembering_steps(15)),
     "first-time-for-all": ("many-particles", "fail", first_time_for_all),
     "room-for-64": ("many-particles", "fail", room_for(64)),
     "room-for-256": ("many-particles", "fail", room_for(256)),

@@ -1,0 +1,175 @@
+"""Implementations that let bad states through, or nearly good ones: each breaks `bad-states` or `minus-zero`.
+
+As in `support.promise_breakers` each is right beside that. What it lets through flies straight to t_end.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable
+
+from scene import from_data
+from scene.geometry import TableAt, rounded
+from support.promise_breakers import Fault, Line, honest, on
+
+Excuse = Callable[[TableAt, Line, str], bool]  # (table, state, why it was rejected)
+AWAY = re.compile(r"the state is (\S+) of that wall's size away")
+BEYOND = re.compile(r"beyond wall (\w+)")
+
+
+def letting(excuse: Excuse, *cmds: str) -> Fault:
+    """Let states through that an excuse is found for, in some commands; in all when none is named."""
+
+    def mended(request: Line, state: Line, answer: Line) -> Line:
+        if answer.get("outcome") != "rejected" or state["t"] > request["t_end"]:
+            return answer
+        table = rounded(from_data(request["scene"]), state["t"])
+        return straight(request, state) if excuse(table, state, answer["reason"]) else answer
+
+    def fault(request: Line, answer: Callable[[Line], Line]) -> Line:
+        found, cmd = answer(request), request.get("cmd")
+        if cmd not in (cmds or ("step", "trajectory", "flow")):
+            return found
+        if cmd == "flow":
+            pairs = zip(request["states"], found["states"], strict=True)
+            return {**found, "states": [mended(request, *pair) for pair in pairs]}
+        if "outcome" in found and isinstance(request.get("state"), dict) and "vy" in request["state"]:
+            there = mended(request, request["state"], found)
+            return there if cmd == "step" or there is found else {"seq": found["seq"], "steps": [there]}
+        return found
+
+    return fault
+
+
+def straight(request: Line, state: Line) -> Line:
+    """Fly straight to t_end."""
+    dt = request["t_end"] - state["t"]
+    place = {"x": state["x"] + state["vx"] * dt, "y": state["y"] + state["vy"] * dt}
+    found = {"outcome": "horizon", "t": request["t_end"], **place, "vx": state["vx"], "vy": state["vy"]}
+    return {**found, "seq": request["seq"]} if request["cmd"] == "step" else found
+
+
+def loose(tolerance: float) -> Excuse:
+    """Take a place to be on its wall up to another part of its size."""
+    return lambda _, __, why: bool(away := AWAY.search(why)) and abs(float(away[1])) < tolerance
+
+
+def near_by(part: float, *walls: str) -> Excuse:
+    """Let states through that lie beyond some walls by less than a part of the table's size."""
+
+    def excuse(table: TableAt, state: Line, why: str) -> bool:
+        beyond = BEYOND.search(why)
+        if not beyond or (walls and beyond[1] not in walls):
+            return False
+        gap = abs(table.gap(beyond[1], state["x"], state["y"]))  # type: ignore[arg-type]
+        return bool(gap < part * (2 * table.r if beyond[1] == "arc" else 1.0))
+
+    return excuse
+
+
+def slower(part: float) -> Excuse:
+    """Let states move into their wall by less than a part of their speed."""
+
+    def excuse(table: TableAt, state: Line, why: str) -> bool:
+        if "moves into it" not in why:
+            return False
+        rate = table.gap_rate(state["wall"], *(state[name] for name in ("x", "y", "vx", "vy")))
+        steep = 2 * table.r if state["wall"] == "arc" else 1.0
+        return bool(-rate < part * steep * math.hypot(state["vx"], state["vy"]))
+
+    return excuse
+
+
+def fleeing(_: TableAt, state: Line, why: str) -> bool:
+    """Ask for the particle's velocity alone, whatever the arc's."""
+    inwards = -state["x"] * state["vx"] - state["y"] * state["vy"]
+    return "moves into it" in why and state["wall"] == "arc" and inwards > 0
+
+
+def named_beyond(_: TableAt, state: Line, why: str) -> bool:
+    """Look at no other wall where one is named."""
+    return state["wall"] is not None and "beyond wall" in why
+
+
+def on_a_longer(*walls: str) -> Excuse:
+    """Let some walls go on beyond y = 0."""
+
+    def excuse(_: TableAt, state: Line, __: str) -> bool:
+        return state["wall"] in walls and (state["y"] < 0) == (state["wall"] == "arc") and state["y"] != 0
+
+    return excuse
+
+
+def in_a(table: str, excuse: Excuse) -> Excuse:
+    """Find an excuse in one table only."""
+    return lambda at, state, why: at.scene.__struct_config__.tag == table and excuse(at, state, why)
+
+
+def at_once(request: Line, answer: Callable[[Line], Line]) -> Line:
+    """Answer a step that lasts no time before any check."""
+    found = answer(request)
+    state = request.get("state")
+    if request.get("cmd") != "step" or not isinstance(state, dict) or state.get("t") != request.get("t_end"):
+        return found
+    return straight(request, state) if found["outcome"] == "rejected" else found
+
+
+def arrived(which: Callable[[float, float], bool]) -> Fault:
+    """Let particles of a flow have arrived whose time stands in some relation to t_end."""
+
+    def change(request: Line, found: Line) -> Line:
+        there = [
+            straight({**request, "t_end": state["t"]}, state) | {"t": request["t_end"]}
+            if which(state["t"], request["t_end"])
+            else answer
+            for state, answer in zip(request["states"], found["states"], strict=True)
+        ]
+        return {**found, "states": there}
+
+    return on("flow", change)
+
+
+def refusing_slow_ones(request: Line, answer: Callable[[Line], Line]) -> Line:
+    """Refuse who leaves the arc at rest by less than a hundredth of its speed."""
+    found, state = answer(request), request.get("state")
+    if request.get("cmd") != "step" or not isinstance(state, dict) or state.get("wall") != "arc":
+        return found
+    inwards = -state["x"] * state["vx"] - state["y"] * state["vy"]
+    is_slow = 0 < inwards < 0.01 * math.hypot(state["vx"], state["vy"])
+    return {"seq": request["seq"], "outcome": "rejected", "reason": "it slides"} if is_slow else found
+
+
+def minus_is_below(request: Line, answer: Callable[[Line], Line]) -> Line:
+    """Take y = -0.0 for a place in the stem, under a base that is closed."""
+    state = request.get("state")
+    is_minus = isinstance(state, dict) and state.get("y") == 0 and math.copysign(1.0, state["y"]) < 0
+    if request.get("cmd") != "step" or not is_minus or "w" not in (scene := request["scene"]):
+        return answer(request)
+    stem = {"table": "stem", "w": scene["w"], "h": scene["h"]}
+    return honest({**request, "scene": stem, "state": {**state, "y": -(2.0**-30)}})
+
+
+EXCUSES: dict[str, Excuse] = {
+    "loose-on-walls": loose(1e-2),
+    "loose-by-1e-5": loose(1e-5),
+    "a-tenth-outside": near_by(0.1),
+    "little-outside": near_by(2.0**-16),
+    "slowly-into-walls": slower(0.01),
+    "fleeing-a-faster-wall": fleeing,
+    "named-beyond-others": named_beyond,
+    "arc-below-the-mouth": in_a("mushroom", on_a_longer("arc")),
+    "sides-above-the-mouth": in_a("mushroom", on_a_longer("left", "right")),
+    "arc-below-a-cap": in_a("cap", on_a_longer("arc")),
+    "outside-left": in_a("mushroom", near_by(math.inf, "left")),
+}
+LENIENT: dict[str, tuple[str, str, Fault]] = {
+    **{name: ("bad-states", "fail", letting(excuse, "step")) for name, excuse in EXCUSES.items()},
+    "loose-paths": ("bad-states", "fail", letting(loose(1e-2), "trajectory")),
+    "loose-flows": ("bad-states", "fail", letting(loose(1e-2), "flow")),
+    "no-time-no-check": ("bad-states", "fail", at_once),
+    "late-is-arrived": ("bad-states", "fail", arrived(lambda t, t_end: t > t_end)),
+    "at-the-end-unchecked": ("bad-states", "fail", arrived(lambda t, t_end: t == t_end)),
+    "refusing-slow-ones": ("bad-states", "fail", refusing_slow_ones),
+    "minus-is-below": ("minus-zero", "fail", minus_is_below),
+}

@@ -19,7 +19,7 @@ import msgspec
 from hypothesis import currently_in_test_context, note
 from hypothesis import strategies as st
 
-from conformance.generator.draws import walls_speed
+from conformance.generator.draws import deep_wave, walls_speed
 from scene import BangBang, Cap, Fourier, Law, Mushroom, Scene, State, Stem, Wall, to_data
 from scene.geometry import DIGITS, TableAt, table_at
 from scene.laws import bounds, breakpoints
@@ -144,13 +144,10 @@ def _fourier(draw: st.DrawFn, low: float, high: float, omega: float) -> Fourier:
 
 
 def _deep_wave(draw: st.DrawFn, low: float, high: float, omega: float) -> Fourier:
-    # |1 + a e^ix + b e^2ix|^2 is never negative, though its waves may add up to more than its mean.
+    # The range is cut by MARGIN of it, half at either end.
     a, b = (_between(draw, *ends) for ends in ((0.5, 1.5), (0.1, 0.6)))
-    unit = MARGIN * (high - low) / (1 + a + b) ** 2
-    floor = low + (1 - MARGIN) * (high - low) / 2
-    sign = 1.0 if draw(_COIN) else -1.0
-    waves = (2 * sign * a * (1 + b) * unit, 2 * b * unit)
-    return Fourier(mean=floor + (1 + a * a + b * b) * unit, omega=omega, cos=waves)
+    room = (1 - MARGIN) * (high - low) / 2
+    return deep_wave(low + room, high - room, a if draw(_COIN) else -a, b, omega)
 
 
 def _bang_bang(draw: st.DrawFn, low: float, high: float, clock: Clock) -> BangBang:

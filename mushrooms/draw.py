@@ -61,8 +61,8 @@ Length = Annotated[int | None, typer.Option(help="Collisions of each particle, 1
 Many = Annotated[int | None, typer.Option(help="Particles of a section, a map, exponents; 1 to 1000.")]
 Seed = Annotated[int | None, typer.Option(help="Seed of the random starts, 0 to 2^64 - 1; by default 0.")]
 OF_PARTICLES = ("--energy", "--collisions", "--seed", "--particles")
-LEAST_DRAWN = 1e-100  # of lengths and times; their inverses are the greatest
 OF_MANY = ("section", "map", "lyapunov")
+LEAST_DRAWN = 1e-100  # of lengths and times; its inverse is the greatest
 
 
 def draw(
@@ -103,8 +103,6 @@ def draw(
         print(draw_run(Path(scene), out))
         return
     table = load_scene(scene)
-    if kinds or export is None:
-        _check_drawable(table)
     _check(energy, collisions, particles, seed)
     if not kinds and export is None:
         refuse_unheeded(options, "the picture of the walls has no particles")
@@ -113,6 +111,8 @@ def draw(
     if export is not None:
         output.check_file(export, (".csv", ".parquet"))
     is_drawn = bool(kinds) or export is None or out is not None
+    if is_drawn:
+        _check_drawable(table)
     paths = _paths(out or Path(f"{Path(scene).stem}.svg"), kinds, is_drawn=is_drawn)
     follow = _Asked(table, energy, collisions, particles, seed or 0)
     with compilation_told():

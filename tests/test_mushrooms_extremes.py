@@ -46,6 +46,19 @@ def test_what_no_figure_holds_is_not_drawn(command_line, file_of, tmp_path, name
     assert not list(tmp_path.glob("*.svg"))
 
 
+def test_nor_is_it_beside_an_export(command_line, file_of, tmp_path):
+    asked = [
+        "draw",
+        file_of(SCENES["huge"]),
+        "--export",
+        tmp_path / "path.csv",
+        "--out",
+        tmp_path / "picture.svg",
+    ]
+    assert_refused(command_line(*asked), "in a picture")
+    assert not list(tmp_path.glob("p*"))
+
+
 def test_a_leg_shorter_than_any_float_tells_is_drawn(command_line, file_of, tmp_path):
     assert command_line("draw", file_of(SCENES["brief"]), "--out", tmp_path / "picture.svg").code == 0
 

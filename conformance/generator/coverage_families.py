@@ -7,7 +7,17 @@ from math import inf, nextafter
 
 import msgspec
 
-from conformance.generator.draws import Draw, SharedPeriod, clock, law, scene, state, time, wire_form
+from conformance.generator.draws import (
+    Draw,
+    SharedPeriod,
+    clock,
+    deep_wave,
+    law,
+    scene,
+    state,
+    time,
+    wire_form,
+)
 from conformance.generator.families import VectorFamily
 from conformance.generator.flow_families import any_marks, tilted
 from conformance.generator.grazing_and_stem_cases import BOX, CIRCLE, LIFT, STATIC
@@ -201,13 +211,12 @@ def _mixed(draw: Draw) -> Question:
 
 
 def _deep_wave(draw: Draw, low: float, high: float, shared: SharedPeriod) -> Fourier:
-    """Draw low and some of |1 + a e^ix + b e^2ix|^2: positive, though its waves exceed its mean."""
+    """Draw a law whose amplitudes add up to more than its mean."""
     while True:
         a, b = draw.short(0.5, 1.5), draw.short(0.2, 0.6)
-        unit = (high - low) / (1 + a + b) ** 2
-        mean, waves = low + (1 + a * a + b * b) * unit, (2 * a * (1 + b) * unit, 2 * b * unit)
-        if sum(waves) > 1.05 * mean:
-            return Fourier(mean=mean, omega=shared.rate, cos=(draw.pick((1.0, -1.0)) * waves[0], waves[1]))
+        found = deep_wave(low, high, a, b, shared.rate)
+        if sum(found.cos) > 1.05 * found.mean:
+            return deep_wave(low, high, draw.pick((1.0, -1.0)) * a, b, shared.rate)
 
 
 def _deep_waves(draw: Draw) -> Question:

@@ -103,6 +103,16 @@ def law(draw: Draw, low: float, high: float, shared: SharedPeriod) -> Law:
     return Fourier(mean=mean, omega=shared.rate, cos=cos, sin=sin)
 
 
+def deep_wave(low: float, high: float, a: float, b: float, omega: float) -> Fourier:
+    """Return a law in [low, high]: low and a share of |1 + a e^ix + b e^2ix|^2, which is never negative.
+
+    Its amplitudes may add up to more than its mean.
+    """
+    unit = (high - low) / (1 + abs(a) + b) ** 2
+    waves = (2 * a * (1 + b) * unit, 2 * b * unit)
+    return Fourier(mean=low + (1 + a * a + b * b) * unit, omega=omega, cos=waves)
+
+
 def scene(draw: Draw, table: str, shared: SharedPeriod) -> Scene:
     """Draw a valid scene of a table: "cap", "stem" or "mushroom"."""
     if table == "cap":

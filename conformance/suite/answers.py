@@ -127,6 +127,11 @@ def read_answer(line: bytes, cmd: str, seq: int | None, *, may_be_null: bool = F
     return data
 
 
+def read_arrival(answer: Mapping[str, Any]) -> Outcome:
+    """Return the outcome that a flow tells of one particle, its captured stay left out."""
+    return read_outcome({name: part for name, part in answer.items() if name != "captured"}, 0.0)
+
+
 def read_outcome(answer: Mapping[str, Any], t: float) -> Outcome:
     """Return the outcome that an answer to `step` is, or one of the steps of a trajectory.
 

@@ -11,14 +11,13 @@ from typing import Any, NamedTuple
 
 from msgspec.structs import replace
 
-from conformance.suite.answers import read_outcome
+from conformance.suite.answers import read_arrival
 from conformance.suite.process import Trouble
-from conformance.suite.questions import CARRIED, STANDING, distance, flown, offered
+from conformance.suite.questions import CARRIED, NEAR, STANDING, distance, flown, offered
 from conformance.suite.session import Session
-from scene import Cap, Horizon, Mushroom, Outcome, Scene, State, Stem, Undecided
+from scene import Cap, Horizon, Mushroom, Scene, State, Stem, Undecided
 
 T_END = 1.5
-NEAR = 1e-6  # of sizes; see conformance.suite.promises
 ASIDE = 2.0**-22  # how far beyond its wall a state is: a quarter of what is allowed who names it
 N_HITS = 1500  # of a long flow; one a unit of time
 # Starts of orbits of period 2, and where they lead within the last quarter of a unit, which holds no hit.
@@ -44,7 +43,7 @@ def twin_particles(session: Session) -> str:
         for particles in (there, there[::-1]):
             found = flown(session, scene, [one.state for one in particles], T_END)
             for i, (one, answer) in enumerate(zip(particles, found, strict=True)):
-                outcome = _outcome(answer)
+                outcome = read_arrival(answer)
                 n += 1
                 if isinstance(outcome, Undecided):
                     n_open += 1
@@ -87,7 +86,7 @@ def long_flow(session: Session) -> str:
     for scene in _offered(session):
         start = RETURNING[type(scene)]
         (answer,) = flown(session, scene, [start], t_end)
-        outcome, due = _outcome(answer), replace(_flown_on(start, 0.25), t=t_end)
+        outcome, due = read_arrival(answer), replace(_flown_on(start, 0.25), t=t_end)
         n += 1
         if isinstance(outcome, Undecided):
             n_open += 1
@@ -107,10 +106,6 @@ def _offered(session: Session) -> list[Scene]:
     if not found:
         raise lacking
     return found
-
-
-def _outcome(answer: dict[str, Any]) -> Outcome:
-    return read_outcome({name: part for name, part in answer.items() if name != "captured"}, 0.0)
 
 
 def _flown_on(state: State, t: float) -> Horizon:

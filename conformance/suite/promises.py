@@ -13,20 +13,21 @@ from __future__ import annotations
 import math
 import random
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 import msgspec
 from mpmath import fp
 
 from conformance.suite import changes, conserved, crowds, endings, refusals, sameness, timing
-from conformance.suite.answers import read_outcome
+from conformance.suite.answers import read_arrival
 from conformance.suite.process import NOT_NUMBERS, Trouble
 from conformance.suite.questions import (
     BREATHING,
     CARRIED,
     INSIDE,
     MOVING,
+    NEAR,
     STANDING,
     distance,
     flown,
@@ -45,7 +46,6 @@ N_LONG, N_PIECE = 1200, 430  # collisions of a whole trajectory, and of its firs
 N_MOVING, N_SINGLE = 600, 16  # collisions of a trajectory between moving walls, and how many are asked alone
 FAR_TIMES = -1000.0, 10_000.0  # from which such trajectories begin
 N_FLOWN = 16  # particles that `flow` and `trajectory` both carry
-NEAR = 1e-6  # of sizes: far above rounding that a few steps carry along, far below an error of principle
 # Starts on orbits whose errors grow slowly: of a mushroom, one that stays in the cap.
 REGULAR = {
     Mushroom: State(0.0, 0.75, 0.25, 0.1, 4.0),
@@ -166,7 +166,7 @@ def flow_alone(session: Session) -> str:
         (alone,) = flown(session, scene, [state], 1.5)
         if found["outcome"] not in allowed[i]:
             raise Trouble("fail", f"states[{i}]: {found}, must be {' or '.join(allowed[i])}")
-        gap = distance(scene, _arrival(found), _arrival(alone))
+        gap = distance(scene, read_arrival(found), read_arrival(alone))
         if gap > NEAR or not is_same_stay(found.get("captured"), alone.get("captured"), 1.5):
             raise Trouble("fail", f"states[{i}]: {found} among others, {alone} alone")
     if flown(session, scene, [], 1.5):
@@ -290,7 +290,7 @@ def _compared(session: Session, scene: Scene, states: Sequence[State], t_end: fl
     """Compare arrivals with trajectories: the number of states, of those compared, and of captured stays."""
     n_stays = n_compared = 0
     for state, found in zip(states, flown(session, scene, states, t_end), strict=True):
-        arrival = _arrival(found)
+        arrival = read_arrival(found)
         try:
             *hits, last = follow(session, scene, state, 1000, t_end)
         except Trouble as trouble:
@@ -354,10 +354,6 @@ def _start(scene: Scene, i: int, speed: float = 0.0) -> State:
     up = -1.0 if isinstance(scene, Stem) else 1.0
     x, y = size * math.cos(turn), size * math.sin(turn)
     return State(0.0, x, up * y, speed * math.cos(course), up * speed * math.sin(course))
-
-
-def _arrival(data: Mapping[str, Any]) -> Outcome:
-    return read_outcome({name: value for name, value in data.items() if name != "captured"}, 0.0)
 
 
 _CHECKS: dict[str, Callable[[Session], str]] = {

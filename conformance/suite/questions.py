@@ -17,6 +17,7 @@ from scene import Collision, Fourier, Horizon, Mushroom, Outcome, Scene, State, 
 from scene.geometry import table_at
 from scene.tables import Cap, Stem
 
+NEAR = 1e-6  # of sizes: far above rounding that a few steps carry along, far below an error of principle
 CARRIED = 1e-4  # of sizes: what a dozen bounces may make of rounding, far below an error of principle
 FOREVER = sys.float_info.max  # t_end of a question that only collisions end
 STANDING: tuple[Scene, ...] = (Mushroom(r=1.0, w=0.5, h=1.0), Cap(r=1.0), Stem(w=1.0, h=1.25))

@@ -17,12 +17,13 @@ from typing import Any, NamedTuple
 
 from msgspec.structs import replace
 
-from conformance.suite.answers import read_outcome
+from conformance.suite.answers import read_arrival
 from conformance.suite.process import Trouble
 from conformance.suite.questions import (
     CARRIED,
     INSIDE,
     MOVING,
+    NEAR,
     STANDING,
     distance,
     flown,
@@ -40,7 +41,6 @@ SHIFTS = 2.0**-24, 2.0**-34, 2.0**-44  # of a state: nearly the same, and told a
 ROUNDING = 2.0**-48  # of numbers of size 1, after one straight flight
 COARSE = 2.0**-28  # likewise, of one that looks for hits down to a tolerance: as coarse as vectors let pass
 LATE = 100_000.0  # a time whose last place in binary64 is 2^-36
-NEAR = 1e-6  # of sizes; see conformance.suite.promises
 HEIGHTS = 0.2718281828, 0.3141592653, 0.1618033988, 0.1414213562  # of starts; on no grid of anybody's
 CAPTURED = State(0.0, 0.75, 0.25, 0.1, 3.0)  # in a mushroom
 Spelling = Callable[[dict[str, Any]], str]
@@ -242,10 +242,7 @@ def many_particles(session: Session) -> str:
     together = flown(session, scene, [pool[which] for which in order], T_END)
     n_compared = n_captured = 0
     for i, (which, found) in enumerate(zip(order, together, strict=True)):
-        one, other = (
-            read_outcome({k: v for k, v in part.items() if k != "captured"}, 0.0)
-            for part in (found, alone[which])
-        )
+        one, other = (read_arrival(part) for part in (found, alone[which]))
         if not isinstance(one, Horizon) and not isinstance(other, Horizon):
             continue
         n_compared += 1

@@ -53,17 +53,13 @@ def faulty_lanes(*changes: str) -> ModuleType:
     The loops run as plain Python, which takes less time than to compile them and gives the same bits; what
     they call that takes no pool is compiled, once for all faults.
     """
-    sources = {
-        name: (HOUSE / "fast" / "kernel" / name).read_text("utf-8") for name in ("lanes.py", "aiming.py")
-    }
+    folder = HOUSE / "fast" / "kernel"
+    sources = {name: (folder / name).read_text("utf-8") for name in ("lanes.py", "aiming.py")}
     for old, new in zip(changes[::2], changes[1::2], strict=True):
         assert any(old in source for source in sources.values()), old
         sources = {name: source.replace(old, new) for name, source in sources.items()}
     module = ModuleType("faulty_lanes")
-    for (
-        name,
-        source,
-    ) in sources.items():  # what the first imports from the second is replaced by the faulty ones
+    for name, source in sources.items():  # the second's functions replace those that the first imports
         exec(compile(source, name, "exec"), module.__dict__)
     for name, found in (vars(pieces) | vars(pools) | vars(ahead)).items():
         vars(module).setdefault(name, found)

@@ -193,7 +193,8 @@ NOT_ASKED = (
     (["--mushrooms-command", "a 'b"], 4, "ERROR: --mushrooms-command = "),
     (["--mushrooms-command", " "], 1, "give the stepper as --mushrooms-command"),
     (["--mushrooms-command", "./no-such"], 1, "command './no-such' cannot be started: No such file"),
-    (["--mushrooms-command", "echo"], 1, "wrong-format: start: "),
+    # It writes one line and ends: before it is asked or after, as the machine pleases; the verdict is the same.
+    (["--mushrooms-command", "echo"], 1, "wrong-format: "),
 )
 
 

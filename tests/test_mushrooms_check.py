@@ -193,7 +193,7 @@ NOT_ASKED = (
     (["--mushrooms-command", "a 'b"], 4, "ERROR: --mushrooms-command = "),
     (["--mushrooms-command", " "], 1, "give the stepper as --mushrooms-command"),
     (["--mushrooms-command", "./no-such"], 1, "command './no-such' cannot be started: No such file"),
-    # It writes one line and ends: before it is asked or after, as the machine pleases; the verdict is the same.
+    # It answers whenever the machine pleases, before it is asked or after; the verdict is the same.
     (["--mushrooms-command", "echo"], 1, "wrong-format: "),
 )
 

@@ -13,8 +13,9 @@ import pytest
 from support.nonsense import Nonsense
 
 from conformance import vectors
-from conformance.suite import property_checks, reports, session, timing
+from conformance.suite import property_checks, reports, session
 from conformance.suite import run as suite
+from conformance.suite.promises import timing
 from conformance.suite.result import VERDICTS
 from conformance.suite.session import Limits
 

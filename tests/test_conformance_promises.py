@@ -11,8 +11,9 @@ from support.promise_breakers import FAULTS, Breaker, bisecting, remembering_ste
 
 import reference
 from conformance import vectors
-from conformance.suite import changes, promises, refusals, session, timing
+from conformance.suite import promises, session
 from conformance.suite import run as suite
+from conformance.suite.promises import changes, refusals, timing
 from conformance.suite.session import Session
 from fast import next_collision
 from scene import Rejected, Wall, from_data

@@ -14,8 +14,8 @@ from conformance import plain
 from conformance.bench.time_stepping import TOLERANCES, next_collision_by
 from conformance.bench.workloads import SINGLE_STEPS, Workload
 from conformance.grading.agreement import Answer
-from conformance.suite import timing
 from conformance.suite.process import Trouble
+from conformance.suite.promises import timing
 from conformance.suite.run import put
 from conformance.suite.session import Limits, Session, missing
 from conformance.vectors import Vector

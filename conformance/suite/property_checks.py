@@ -24,7 +24,7 @@ import theory
 from conformance import profiles, properties
 from conformance.profiles import Statistic
 from conformance.suite.process import NOT_NUMBERS, Trouble
-from conformance.suite.questions import flown
+from conformance.suite.promises.questions import flown
 from conformance.suite.result import NamedVerdict
 from conformance.suite.session import Session, missing
 from scene import Fourier, Horizon, Mushroom, Outcome, Scene, State, Undecided, load, to_data

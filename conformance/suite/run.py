@@ -28,7 +28,7 @@ from conformance.generator.fresh import GROUP as FRESH
 from conformance.generator.fresh import fresh
 from conformance.grading.agreement import middle
 from conformance.grading.grade import Grade, grade
-from conformance.suite import promises, property_checks, timing
+from conformance.suite import promises, property_checks
 from conformance.suite.diagnosis import diagnose
 from conformance.suite.disguise import (
     DRAWN,
@@ -41,6 +41,7 @@ from conformance.suite.disguise import (
     published,
 )
 from conformance.suite.process import NOT_NUMBERS, Trouble
+from conformance.suite.promises import timing
 from conformance.suite.result import Result, Run, Speed, outcomes_of
 from conformance.suite.scope import graded_parts
 from conformance.suite.session import Limits, Session, missing
@@ -252,7 +253,7 @@ def _compared(
 def measure_speed(session: Session) -> Speed | None:
     """Time a trajectory on the moving cap, longer until the clock can read it.
 
-    None where it is not offered, or where it does not end as `trajectory` says (`conformance.suite.timing`).
+    None where it is not offered, or where it does not end as `trajectory` says (`promises.timing`).
     """
     assert session.introduction is not None
     scene, state = load(TIMED_SCENE), TIMED_STATE

@@ -22,7 +22,7 @@ from mpmath import fp
 from conformance.properties import BOUND, SLACK
 from conformance.suite.answers import read_outcome
 from conformance.suite.process import Trouble
-from conformance.suite.questions import INSIDE, flown, follow_on, off_wall
+from conformance.suite.promises.questions import INSIDE, flown, follow_on, off_wall
 from conformance.suite.session import Session, missing
 from scene import Cap, Collision, Horizon, Mushroom, Outcome, Scene, State, Stem, Undecided, to_data
 from scene.geometry import table_at

@@ -19,7 +19,7 @@ from msgspec.structs import replace
 
 from conformance.suite.answers import read_arrival
 from conformance.suite.process import Trouble
-from conformance.suite.questions import (
+from conformance.suite.promises.questions import (
     CARRIED,
     INSIDE,
     MOVING,

@@ -19,7 +19,7 @@ from msgspec.structs import replace
 
 from conformance.suite.answers import read_outcome
 from conformance.suite.process import Trouble
-from conformance.suite.questions import MOVING, distance, last_collision, off_wall, offered, question
+from conformance.suite.promises.questions import MOVING, distance, last_collision, off_wall, offered, question
 from conformance.suite.session import Session
 from scene import Collision, Mushroom, Outcome, Scene, State, Stem, Undecided
 

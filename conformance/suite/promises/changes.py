@@ -18,7 +18,7 @@ from mpmath import fp
 from msgspec.structs import replace
 
 from conformance.suite.process import Trouble
-from conformance.suite.questions import FOREVER, NEAR, follow_on, off_wall, offered
+from conformance.suite.promises.questions import FOREVER, NEAR, follow_on, off_wall, offered
 from conformance.suite.session import Session
 from scene import (
     BangBang,
@@ -37,7 +37,7 @@ from scene import (
 )
 from scene.geometry import table_at
 
-COARSE = 2.0**-28  # of a time of size 1; see conformance.suite.sameness
+COARSE = 2.0**-28  # of a time of size 1; see conformance.suite.promises.sameness
 ASIDE = 2.0**-22  # how far off its wall a state is: a quarter of what is allowed there
 WAVES = Fourier(mean=1.0, omega=1.0, cos=(0.05, 0.04), sin=(0.02, 0.0, 0.03))
 OTHER_WAVES = (

@@ -2,10 +2,10 @@
 
 An answer is compared with another answer of the same implementation: what a field left out means, that bad
 lines do no harm, that many particles or collisions asked at once are answered as when asked one by one.
-Whether such answers are right is for the vectors. Promises of one kind have a module each in
-`conformance.suite`: what must be refused in `refusals`, what a table at rest conserves in `conserved`, what
-an answer may depend on in `sameness` and `changes`, flows whose arrivals are known in `crowds`, how
-trajectories end in `endings`, and what holds `time` to a clock in `timing`.
+Whether such answers are right is for the vectors. Promises of one kind have a module each: what must be
+refused in `refusals`, what a table at rest conserves in `conserved`, what an answer may depend on in
+`sameness` and `changes`, flows whose arrivals are known in `crowds`, how trajectories end in `endings`, and
+what holds `time` to a clock in `timing`.
 """
 
 from __future__ import annotations
@@ -19,10 +19,10 @@ from typing import Any
 import msgspec
 from mpmath import fp
 
-from conformance.suite import changes, conserved, crowds, endings, refusals, sameness, timing
 from conformance.suite.answers import read_arrival
 from conformance.suite.process import NOT_NUMBERS, Trouble
-from conformance.suite.questions import (
+from conformance.suite.promises import changes, conserved, crowds, endings, refusals, sameness, timing
+from conformance.suite.promises.questions import (
     BREATHING,
     CARRIED,
     INSIDE,

@@ -12,7 +12,7 @@ from typing import NamedTuple
 from msgspec.structs import replace
 
 from conformance.suite.process import Trouble
-from conformance.suite.questions import INSIDE, offered, question
+from conformance.suite.promises.questions import INSIDE, offered, question
 from conformance.suite.session import Session
 from scene import Cap, Mushroom, Scene, State, Stem
 

@@ -18,7 +18,7 @@ from mpmath import fp
 from msgspec.structs import replace
 
 from conformance.suite.process import Trouble
-from conformance.suite.questions import INSIDE, MOVING, STANDING, flown, question
+from conformance.suite.promises.questions import INSIDE, MOVING, STANDING, flown, question
 from conformance.suite.session import Session, missing
 from scene import Cap, Mushroom, Scene, State, Stem, Wall, to_data
 from scene.geometry import TableAt, table_at

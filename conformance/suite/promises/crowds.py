@@ -13,7 +13,7 @@ from msgspec.structs import replace
 
 from conformance.suite.answers import read_arrival
 from conformance.suite.process import Trouble
-from conformance.suite.questions import CARRIED, NEAR, STANDING, distance, flown, offered
+from conformance.suite.promises.questions import CARRIED, NEAR, STANDING, distance, flown, offered
 from conformance.suite.session import Session
 from scene import Cap, Horizon, Mushroom, Scene, State, Stem, Undecided
 

@@ -9,7 +9,7 @@ import math
 import re
 from collections.abc import Callable
 
-from scene import from_data
+from scene import Mushroom, from_data
 from scene.geometry import TableAt, rounded
 from support.promise_breakers import Fault, Line, honest, on
 
@@ -150,6 +150,42 @@ def minus_is_below(request: Line, answer: Callable[[Line], Line]) -> Line:
     return honest({**request, "scene": stem, "state": {**state, "y": -(2.0**-30)}})
 
 
+def refusing(is_refused: Callable[[TableAt, Line], bool], cmd: str = "step") -> Fault:
+    """Refuse states that name a wall, and where something holds."""
+
+    def fault(request: Line, answer: Callable[[Line], Line]) -> Line:
+        found, state = answer(request), request.get("state")
+        if request.get("cmd") != cmd or not isinstance(state, dict) or not state.get("wall"):
+            return found
+        table = rounded(from_data(request["scene"]), state["t"])
+        if found.get("outcome") == "rejected" or not is_refused(table, state):
+            return found
+        return {"seq": request["seq"], "outcome": "rejected", "reason": "it is not on its wall"}
+
+    return fault
+
+
+def in_the_mouth(table: TableAt, state: Line) -> bool:
+    """Find the base nowhere in the open mouth."""
+    is_open = isinstance(table.scene, Mushroom) and abs(state["x"]) < table.w
+    return is_open and state["wall"] == "base"
+
+
+def strictly_off(*walls: str) -> Callable[[TableAt, Line], bool]:
+    """Allow a place off some walls rounding alone."""
+
+    def is_refused(table: TableAt, state: Line) -> bool:
+        gap = abs(table.gap(state["wall"], state["x"], state["y"]))
+        return state["wall"] in walls and bool(gap > 1e-9 * table.size * max(1.0, table.size))
+
+    return is_refused
+
+
+def sinking_through_the_mouth(table: TableAt, state: Line, why: str) -> bool:
+    """Let a state that names the base go down where the mouth is open."""
+    return "moves into it" in why and in_the_mouth(table, state)
+
+
 EXCUSES: dict[str, Excuse] = {
     "loose-on-walls": loose(1e-2),
     "loose-by-1e-5": loose(1e-5),
@@ -161,6 +197,7 @@ EXCUSES: dict[str, Excuse] = {
     "arc-below-the-mouth": in_a("mushroom", on_a_longer("arc")),
     "sides-above-the-mouth": in_a("mushroom", on_a_longer("left", "right")),
     "arc-below-a-cap": in_a("cap", on_a_longer("arc")),
+    "sinking-through-the-mouth": sinking_through_the_mouth,
     "outside-left": in_a("mushroom", near_by(math.inf, "left")),
 }
 LENIENT: dict[str, tuple[str, str, Fault]] = {
@@ -170,6 +207,12 @@ LENIENT: dict[str, tuple[str, str, Fault]] = {
     "no-time-no-check": ("bad-states", "fail", at_once),
     "late-is-arrived": ("bad-states", "fail", arrived(lambda t, t_end: t > t_end)),
     "at-the-end-unchecked": ("bad-states", "fail", arrived(lambda t, t_end: t == t_end)),
+    "no-base-in-the-mouth": ("bad-states", "fail", refusing(in_the_mouth)),
+    "no-base-in-the-mouth-of-paths": ("bad-states", "fail", refusing(in_the_mouth, "trajectory")),
+    **{
+        f"strictly-on-{wall}": ("bad-states", "fail", refusing(strictly_off(wall)))
+        for wall in ("arc", "base", "left", "floor")
+    },
     "refusing-slow-ones": ("bad-states", "fail", refusing_slow_ones),
     "minus-is-below": ("minus-zero", "fail", minus_is_below),
 }

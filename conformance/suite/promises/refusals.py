@@ -3,9 +3,11 @@
 Bad states lie outside their table, near a wall or far beyond it; or name a wall and lie off it, lie where
 another wall has ended it, or move into it, though slowly. All are made of the table's own geometry, at rest
 and moving, and are bad by a margin that no rounding bridges: 8 times what a place may be off its wall, and
-more. Every command that is offered is asked about each, steps and flows up to the state's own time too, and
-in a flow, which has all at once, a particle that begins after the end is bad as well. To refuse everything
-would not do: beside each wall a state that leaves it as slowly is asked about too, and must not be refused.
+more. In the open mouth a state that names the base is good when it rises, and bad when it sinks. Every command
+that is offered is asked about each, steps and flows up to the state's own time too, and in a flow, which has
+all at once, a particle that begins after the end is bad as well. To refuse everything would not do: beside
+each wall a state that leaves it as slowly is asked about too, and one that is off its wall by half of what it
+may be, and must not be refused.
 """
 
 from __future__ import annotations
@@ -25,7 +27,9 @@ from scene.geometry import TableAt, table_at
 
 OUTSIDE = 2.0**-4, 2.0**-10, 2.0**-18  # of a wall's size: how far beyond it
 OFF = 2.0**-12, 2.0**-17  # likewise: how far off the wall that it names, of which 2^-20 is allowed
+ALLOWED = 2.0**-21  # likewise: half of what is allowed
 PAST = 2.0**-4, 2.0**-10  # likewise: how far past its end
+IN_MOUTH = 0.0, 0.5, -0.9375  # places between the mouth's edges, as parts of its half-width
 SLOWLY = 2.0**-10, 0.5  # of its speed along the wall: how fast it moves into it, or off it
 TIMES = 0.375, 3.5  # in the first walls of MOVING come one way, in the second the other
 SIDES: tuple[Wall, ...] = ("left", "right")
@@ -97,7 +101,7 @@ def _is_open(one: JudgedState, outcome: str, asking: str) -> bool:
     if one.why and outcome not in ("rejected", "undecided"):
         raise Trouble("fail", f"{asking}: {one.state} {one.why}, is answered {outcome}, must be rejected")
     if not one.why and outcome == "rejected":
-        raise Trouble("fail", f"{asking}: {one.state} leaves its wall, and is rejected")
+        raise Trouble("fail", f"{asking}: {one.state} is on its wall and leaves it, and is rejected")
     return bool(one.why) and outcome == "undecided"
 
 
@@ -114,11 +118,25 @@ def states(scene: Scene, t: float) -> Iterator[JudgedState]:
             for way in (1.0, -1.0):
                 place = _moved(table, wall, x, y, way * part)
                 yield JudgedState(_leaving(table, t, wall, place, 1.0, wall), "is not on its wall")
+        for way in (1.0, -1.0):
+            place = _moved(table, wall, x, y, way * ALLOWED)
+            yield JudgedState(_leaving(table, t, wall, place, 1.0, wall), "")
         for part in SLOWLY:
             yield JudgedState(_leaving(table, t, wall, (x, y), -part, wall), "moves into its wall")
             yield JudgedState(_leaving(table, t, wall, (x, y), part, wall), "")
         for place in _past_the_end(table, wall):
             yield JudgedState(_leaving(table, t, wall, place, 1.0, wall), "is where its wall has ended")
+    if isinstance(scene, Mushroom):
+        yield from _in_the_mouth(table, t)
+
+
+def _in_the_mouth(table: TableAt, t: float) -> Iterator[JudgedState]:
+    """Make states that name the base in the open mouth: they leave it upwards, or move into it."""
+    for part in IN_MOUTH:
+        place = part * float(table.w), 0.0
+        for up in SLOWLY:
+            yield JudgedState(_leaving(table, t, "base", place, up, "base"), "")
+            yield JudgedState(_leaving(table, t, "base", place, -up, "base"), "moves into its wall")
 
 
 def _place(table: TableAt, wall: Wall) -> tuple[float, float]:

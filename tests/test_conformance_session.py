@@ -286,6 +286,9 @@ def test_the_probe_sends_every_kind_of_number():
     assert max(len(repr(v).strip("-0.").partition("e")[0].replace(".", "")) for v in values) == 17
 
 
+LOST = b'{"seq":1,"states":[{"outcome":"%b","reason":"corner","captured":[1,2]}]}'
+
+
 @pytest.mark.parametrize(
     ("line", "cmd", "word"),
     [
@@ -307,12 +310,20 @@ def test_the_probe_sends_every_kind_of_number():
             "trajectory",
             "Field `reason` stands twice",
         ),
+        *((LOST % kind, "flow", "null") for kind in (b"rejected", b"undefined", b"undecided")),
     ],
 )
 def test_misshapen_answers_are_named(line, cmd, word):
     with pytest.raises(Trouble, match="wrong-format") as caught:
         read_answer(line, cmd, 1)
     assert word in caught.value.why
+
+
+def test_a_particle_that_is_lost_may_say_that_it_has_no_stay():
+    lost = {"outcome": "rejected", "reason": "r"}
+    for more in (b"", b',"captured":null'):
+        line = b'{"seq":1,"states":[{"outcome":"rejected","reason":"r"%b}]}' % more
+        assert read_answer(line, "flow", 1) == {"states": (lost,)}
 
 
 def test_minus_zero_is_read_however_it_is_written():

@@ -27,6 +27,7 @@ import msgspec
 
 from conformance.grading.agreement import Agreement, Answer, Kind, compare, compare_arrival, physics_bound
 from conformance.vectors import Vector
+from scene import Horizon
 from scene.protocol.messages import Answered, AnsweredCollision
 
 Verdict = Literal[
@@ -171,6 +172,8 @@ def _arrival(answer: Mapping[str, Any]) -> tuple[Answered, tuple[float, float] |
         captured = msgspec.convert(states[0].get("captured"), tuple[float, float] | None)
     except msgspec.ValidationError as error:
         raise _Misshapen(f"states[0].captured: {error}") from None
+    if captured is not None and not isinstance(outcome, Horizon):
+        raise _Misshapen("states[0].captured must be null or absent where no particle arrives")
     if captured is not None and not all(map(math.isfinite, captured)):
         raise _Misshapen("states[0].captured must be finite")
     return outcome, captured

@@ -149,11 +149,29 @@ class Arrival(msgspec.Struct, frozen=True, tag_field="outcome", tag="horizon"):
     captured: tuple[float, float] | None = None
 
 
+class LostUndefined(Undefined, frozen=True, omit_defaults=True, tag="undefined"):
+    """A particle of a flow that mathematics leaves without an arrival, and so without a captured stay."""
+
+    captured: None = None
+
+
+class LostUndecided(Undecided, frozen=True, omit_defaults=True, tag="undecided"):
+    """A particle of a flow whose arrival is not decided, nor any captured stay."""
+
+    captured: None = None
+
+
+class LostRejected(Rejected, frozen=True, omit_defaults=True, tag="rejected"):
+    """A particle of a flow that was bad input, and has no captured stay."""
+
+    captured: None = None
+
+
 class Flown(msgspec.Struct, frozen=True):
-    """Where the particles of a flow are, in their order; what was lost says why."""
+    """Where the particles of a flow are, in their order; what was lost says why, and tells no stay."""
 
     seq: Seq
-    states: tuple[Arrival | Undefined | Undecided | Rejected, ...]
+    states: tuple[Arrival | LostUndefined | LostUndecided | LostRejected, ...]
 
 
 class Timed(msgspec.Struct, frozen=True):

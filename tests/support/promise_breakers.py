@@ -129,6 +129,14 @@ def no_bad_ones(_: Line, found: Line) -> Line:
     return {**found, "states": [state for state in found["states"] if state["outcome"] == "horizon"]}
 
 
+def stays_of_the_lost(request: Line, found: Line) -> Line:
+    """Tell a captured stay of particles that do not arrive."""
+    for state in found["states"]:
+        if state["outcome"] != "horizon":
+            state["captured"] = [0.0, request["t_end"]]
+    return found
+
+
 def same_wall_for_all(_: Line, found: Line) -> Line:
     """Give every particle the velocity of the first."""
     for state in found["states"]:
@@ -339,6 +347,7 @@ FAULTS: dict[str, tuple[str, str, Fault]] = {
     "one-bad-spoils-all": ("flow-alone", "fail", on("flow", one_bad_spoils_all)),
     "bad-ones-last": ("flow-alone", "fail", on("flow", bad_ones_last)),
     "no-bad-ones": ("flow-alone", "wrong-format", on("flow", no_bad_ones)),
+    "stays-of-the-lost": ("flow-alone", "wrong-format", on("flow", stays_of_the_lost)),
     "first-for-all": ("flow-alone", "fail", on("flow", same_wall_for_all)),
     "one-too-few": ("long-trajectory", "fail", on("trajectory", one_too_few)),
     "tired-at-50": ("long-trajectory", "fail", on("trajectory", tired(50))),

@@ -3,11 +3,11 @@
 Bad states lie outside their table, near a wall or far beyond it; or name a wall and lie off it, lie where
 another wall has ended it, or move into it, though slowly. All are made of the table's own geometry, at rest
 and moving, and are bad by a margin that no rounding bridges: 8 times what a place may be off its wall, and
-more. In the open mouth a state that names the base is good when it rises, and bad when it sinks. Every command
-that is offered is asked about each, steps and flows up to the state's own time too, and in a flow, which has
-all at once, a particle that begins after the end is bad as well. To refuse everything would not do: beside
-each wall a state that leaves it as slowly is asked about too, and one that is off its wall by half of what it
-may be, and must not be refused.
+more. In the open mouth a state that names the base is good when it rises, and bad when it sinks. Every
+command that is offered is asked about each, steps and flows up to the state's own time too, and in a flow,
+which has all at once, a particle that begins after the end is bad as well. To refuse everything would not do:
+beside each wall a state that leaves it as slowly is asked about too, and one that is off its wall by half of
+what it may be, and must not be refused.
 """
 
 from __future__ import annotations

@@ -11,7 +11,6 @@ from conformance.generator.draws import (
     Draw,
     SharedPeriod,
     clock,
-    deep_wave,
     law,
     scene,
     state,
@@ -22,6 +21,7 @@ from conformance.generator.families import VectorFamily
 from conformance.generator.flow_families import any_marks, tilted
 from conformance.generator.grazing_and_stem_cases import BOX, CIRCLE, LIFT, STATIC
 from conformance.generator.question import Question
+from conformance.generator.seldom import drawn_deep_wave
 from scene import BangBang, Cap, Fourier, Mushroom, Scene, State, Stem
 from scene.geometry import rounded
 from scene.tables import cycle_length, laws
@@ -210,26 +210,19 @@ def _mixed(draw: Draw) -> Question:
     return _question("mixed-laws", rule, "sec. 2", of, state(draw, of, {"speed": draw.power(-2, 6)}))
 
 
-def _deep_wave(draw: Draw, low: float, high: float, shared: SharedPeriod) -> Fourier:
-    """Draw a law whose amplitudes add up to more than its mean."""
-    while True:
-        a, b = draw.short(0.5, 1.5), draw.short(0.2, 0.6)
-        found = deep_wave(low, high, a, b, shared.rate)
-        if sum(found.cos) > 1.05 * found.mean:
-            return deep_wave(low, high, draw.pick((1.0, -1.0)) * a, b, shared.rate)
-
-
 def _deep_waves(draw: Draw) -> Question:
     """Ask about walls of whose laws the mean less all amplitudes says that they may vanish."""
     shared, table = clock(draw, ("fourier",)), draw.pick(TABLES)
     of: Scene
     if table == "cap":
-        of = Cap(r=_deep_wave(draw, 0.05, 1.5, shared))
+        of = Cap(r=drawn_deep_wave(draw, 0.05, 1.5, shared.rate))
     elif table == "stem":
-        of = Stem(w=_deep_wave(draw, 0.05, 1.0, shared), h=_deep_wave(draw, 0.1, 2.0, shared))
+        of = Stem(
+            w=drawn_deep_wave(draw, 0.05, 1.0, shared.rate), h=drawn_deep_wave(draw, 0.1, 2.0, shared.rate)
+        )
     else:
-        nu = _deep_wave(draw, 0.02, 0.9, shared)
-        of = Mushroom(r=_deep_wave(draw, 0.05, 1.5, shared), h=draw.short(0.5, 1.5), nu=nu)
+        nu = drawn_deep_wave(draw, 0.02, 0.9, shared.rate)
+        of = Mushroom(r=drawn_deep_wave(draw, 0.05, 1.5, shared.rate), h=draw.short(0.5, 1.5), nu=nu)
     start = state(draw, of, {"speed": draw.power(-4, 2), "patience": draw.pick((1.0, 4.0))})
     rule = "amplitudes that add up to more than the mean of a law that is positive all the same"
     return _question("deep-waves", rule, "sec. 2", of, start)

@@ -8,9 +8,12 @@ Every third question keeps the scene before but for one law, and its state, and 
 law is soon found (few act on a flight to the base): an implementation that knows a scene by less than all of
 it gives the answer before. Scenes carry names, which mean nothing: different ones the same.
 Some meet their wall for a short time only, some cross a mouth that opens or closes during the flight
-(`generator.in_flight`), and every seventh begins up to a million periods late, or before 0.
+(`generator.in_flight`); some have laws of many legs, sides that lean by next to nothing over a great depth,
+or meet again the wall that they were a little off (`generator.seldom`); and every seventh begins up to a
+million periods late, or before 0.
 Answers are proved by the reference alone, and are no more delicate than those of level core, but for late
-ones, whose time when rounded tells less of the phase: these than level extended. All are filed as of level
+ones, whose time when rounded tells less of the phase, and those in stems so deep that y when rounded tells
+less than x: these than level extended. All are filed as of level
 core. The plain stepper chooses which draws are asked: those that meet the wall that is looked for, and keep
 it when nudged.
 """
@@ -24,32 +27,37 @@ import msgspec
 
 import reference
 from conformance import plain
+from conformance.generator.drawn_scenes import KINDS, SIZES, drawn_scene
 from conformance.generator.draws import (
     Draw,
-    SharedPeriod,
     clock,
-    law,
-    scene,
     state,
     time,
     walls_speed,
     wire_form,
 )
 from conformance.generator.flow_families import any_marks
-from conformance.generator.in_flight import arc_to_mouth, brief_start
+from conformance.generator.in_flight import arc_to_mouth, brief_start, swept_scene, swept_start
 from conformance.generator.links import Confirmation, Unfit
 from conformance.generator.paths import proved_path
 from conformance.generator.prover import CONDITIONS, NUDGES, SIGNS, ask, flight_of, nudged
 from conformance.generator.question import Proved, Question, filed
+from conformance.generator.seldom import (
+    DEPTHS,
+    is_leaning,
+    leaning_start,
+    leaning_stem,
+    off_its_wall,
+    returning_start,
+    scene_of_many_legs,
+)
 from conformance.grading.agreement import DIGITS, SHARPEST
 from conformance.grading.error import condition_number, inputs_of
 from conformance.vectors import Expectation, Kind, Level, Vector
 from scene import BadInput, BangBang, Collision, Fourier, Law, Mushroom, Scene, State, Wall, from_data
 from scene.geometry import rounded
-from scene.laws import bounds, is_constant
-from scene.states import ON_WALL
+from scene.laws import bounds
 from scene.tables import cycle_length, laws
-from scene.transforms import scaled_law
 
 GROUP = "fresh"
 RULES: dict[Kind, str] = {
@@ -63,18 +71,13 @@ WALLS: tuple[tuple[str, Wall], ...] = (
     *(("stem", wall) for wall in ("left", "right", "floor", "base")),
     *(("mushroom", wall) for wall in ("arc", "base", "left", "right", "floor")),
 )
-KINDS = ("fourier", "bang-bang", "mixed", "mixed", "mixed", "harmonics")  # mixed: each law of its own
-LEGS = 7, 7, 7, 12, 12, 23, 40, 120  # of a law with many: the corpus has at most four
-SHAPES = {"h": (-5, -3, 3, 5), "nu": (-8, -4), "w": (-8, -4)}  # powers of two that a law is multiplied with
-FAINT = 8, 20, 30  # powers of a half that what a law moves by is multiplied with
 LONGEST = 8.0  # periods of one flight
 # Periods before a late start, or from it to time 0, as powers of two. Later ones a stepper may refuse: of
 # sixteen waves the last is 2^24 of its own periods late by then, and much of a phase is lost.
 LATE = 10, 12, 14, 16, 18, 20, 20
-NAMES = "", "", "scene", "scene", "1"
 # Draws for one question, and how many of them are like the one before. Every fortieth meets a mushroom's
 # base: of four hundred, none would in one of some thousands of runs.
-ATTEMPTS, LIKE_BEFORE = 4000, 50
+ATTEMPTS, LIKE_BEFORE = 4000, 24
 # An answer is another one that is farther off than any error that passes, a thousandth of its size up to the
 # condition TELLING. Late questions may have higher ones: those are not asked as like the one before.
 ANOTHER, TELLING = 2.0**-7, float(DIGITS / SHARPEST)
@@ -133,8 +136,7 @@ def _questions(seed: int, number: int, before: Vector | None) -> Iterator[Questi
             if like:
                 of, start, t_end = _one_law_changed(draw, from_data(like.scene)), like.state, like.t_end
             else:
-                of = drawn_scene(draw, table)
-                start, t_end = _start_of(draw, number, of)
+                of, start, t_end = _made(draw, number) or _usual(draw, number, table)
         except BadInput:
             continue
         met = plain.next_collision(of, start, t_end)
@@ -164,6 +166,31 @@ def _crosses_changed_mouth(number: int) -> bool:
 
 def _is_late(number: int) -> bool:
     return number % 7 == 5
+
+
+def _returns(number: int) -> bool:
+    return number % 12 == 11 and _wanted(number)[1] != "base"
+
+
+def _made(draw: Draw, number: int) -> tuple[Scene, State, float] | None:
+    """Draw scene, start and horizon of the numbers whose scenes are made for them; None for the others."""
+    table, wall = _wanted(number)
+    is_side = wall in ("left", "right")
+    if is_side and _is_brief(number) and (table == "stem" or draw.part() < 0.75):
+        of, t = swept_scene(draw, table)
+        return of, *swept_start(draw, of, t, wall)
+    if number % 6 == 2 and table == "stem" and is_side:
+        stem = leaning_stem(draw, clock(draw, KINDS), DEPTHS[number % 5 % len(DEPTHS)])  # each in turn
+        return stem, *leaning_start(draw, stem, time(draw, stem))
+    if number % 6 == 2 and (table, wall) in (("cap", "arc"), ("stem", "floor")):
+        of, t = scene_of_many_legs(draw, table)
+        return of, *_start(draw, of, t)
+    return None
+
+
+def _usual(draw: Draw, number: int, table: str) -> tuple[Scene, State, float]:
+    of = drawn_scene(draw, table)
+    return of, *_start_of(draw, number, of)
 
 
 def _is_another(met: Collision, before: Vector) -> bool:
@@ -216,64 +243,13 @@ def _is_steady(of: Scene, question: Question) -> bool:
 
 
 def _delicacy(of: Scene, start: State) -> Level:
-    """Return the level that says how delicate a question may be: late, a part of the time is a phase."""
-    is_late = abs(start.t) > 2.0 ** (LATE[0] - 1) * (cycle_length(of) or inf)
-    return "extended" if is_late else "core"
+    """Return the level that says how delicate a question may be.
 
-
-def drawn_scene(draw: Draw, table: str) -> Scene:
-    """Draw a scene of a table: laws of all kinds, of any shape, also long ones, that begin anywhere."""
-    shared = clock(draw, KINDS)
-    of = scene(draw, table, shared)
-    of = msgspec.structs.replace(of, **{name: _shaped(draw, name, found) for name, found in laws(of).items()})
-    if table != "cap" and draw.part() < 0.5:
-        of = msgspec.structs.replace(of, slope=law(draw, -0.4, _steepest(of), shared))
-    changed = {name: _begun_elsewhere(draw, found, shared) for name, found in laws(of).items()}
-    return msgspec.structs.replace(of, **changed, name=draw.pick(NAMES))
-
-
-def _shaped(draw: Draw, name: str, of: Law) -> Law:
-    """Return a law as it is, or of a shape seldom drawn.
-
-    That is: a stem far deeper or shallower, a mouth far narrower than the cap is wide; a law that hardly
-    moves, and one that does not, but is written as one that might, with a period that no other has.
+    Late, a part of the time is a phase; of a very deep stem a part of y is much of its width, though not an
+    error of x that is a part of x.
     """
-    if draw.part() < 0.25 and name in SHAPES:
-        of = scaled_law(of, draw.pick(SHAPES[name]), 0)
-    if draw.part() > (0.5 if isinstance(of, float) else 0.25):
-        return of
-    if isinstance(of, Fourier):
-        part = 2.0 ** -draw.pick(FAINT)
-        cos, sin = (tuple(part * a for a in amplitudes) for amplitudes in (of.cos, of.sin))
-        return msgspec.structs.replace(of, cos=cos, sin=sin)
-    if isinstance(of, BangBang):
-        first, part = of.knots[0][1], 2.0 ** -draw.pick(FAINT)
-        return BangBang(knots=tuple((t, first + part * (v - first)) for t, v in of.knots))
-    if draw.part() < 0.5:
-        return Fourier(mean=of, omega=draw.short(0.5, 6.0))
-    return BangBang(knots=tuple((draw.short(0.1, 1.0) + k, of) for k in range(0, 9, 4)))
-
-
-def _steepest(of: Scene) -> float:
-    """Return a slope that no stem of this scene closes under."""
-    found = {name: bounds(known) for name, known in laws(of).items()}
-    narrowest = found["w"].lowest if "w" in found else found["nu"].lowest * found["r"].lowest
-    return 0.9 * narrowest / found["h"].highest
-
-
-def _begun_elsewhere(draw: Draw, of: Law, shared: SharedPeriod) -> Law:
-    """Return a bang-bang law with its knots moved by a part of the period, now and then one of many legs."""
-    if not isinstance(of, BangBang) or is_constant(of):
-        return of
-    knots = of.knots
-    if draw.pick(range(3)) == 0:
-        n, low, high = draw.pick(LEGS), min(v for _, v in knots), max(v for _, v in knots)
-        values = [draw.between(low, high) for _ in range(n)]
-        places = sorted({0, *(draw.pick(range(1, 1024)) for _ in range(n - 1))})
-        times = [*(shared.rate * place / 1024 for place in places), shared.rate]
-        knots = tuple(zip(times, [*values[: len(places)], values[0]], strict=True))
-    by = shared.rate * draw.pick(range(-256, 256)) / 64  # all sums are exact
-    return BangBang(knots=tuple((t + by, v) for t, v in knots))
+    is_late = abs(start.t) > 2.0 ** (LATE[0] - 1) * (cycle_length(of) or inf)
+    return "extended" if is_late or is_leaning(of) else "core"
 
 
 def _start_of(draw: Draw, number: int, of: Scene) -> tuple[State, float]:
@@ -285,6 +261,8 @@ def _start_of(draw: Draw, number: int, of: Scene) -> tuple[State, float]:
     if _is_brief(number):
         start, after = brief_start(draw, of, t, _wanted(number)[1])
         return start, after + length * draw.between(0.5, LONGEST / 2)
+    if _returns(number):
+        return returning_start(draw, of, t, _wanted(number)[1])
     if _crosses_changed_mouth(number):
         assert isinstance(of, Mushroom)
         return arc_to_mouth(draw, of, t), t + LONGEST * length
@@ -306,7 +284,7 @@ def _start(draw: Draw, of: Scene, t: float) -> tuple[State, float]:
         x, vy = draw.pick((0.0, draw.between(-0.99, 0.99) * table.w)), abs(found.vy)
         return State(t, x, 0.0, found.vx, vy, "base"), t_end
     if found.wall and draw.part() < 0.5:
-        return _off_its_wall(draw, of, found), t_end
+        return off_its_wall(draw, of, found), t_end
     if way == 1:
         return msgspec.structs.replace(found, vx=0.0), t_end
     if way == 2:
@@ -316,24 +294,14 @@ def _start(draw: Draw, of: Scene, t: float) -> tuple[State, float]:
     return found, t_end
 
 
-def _off_its_wall(draw: Draw, of: Scene, start: State) -> State:
-    """Return a start farther from its wall than rounding leads, on either side, and on it by definition."""
-    assert start.wall is not None
-    if start.wall == "base":
-        return start  # at y = 0 it is, or it is not
-    table = rounded(of, start.t)
-    nx, ny = table.normal(start.wall, start.x, start.y)
-    reach = {"arc": table.r, "floor": table.h}.get(start.wall, table.w)
-    by = reach * ON_WALL * draw.power(-9, -2) * draw.pick((1.0, -1.0))
-    return msgspec.structs.replace(start, x=start.x + by * nx, y=start.y + by * ny)
-
-
 def _one_law_changed(draw: Draw, of: Scene) -> Scene:
     """Return the scene with one law exchanged for another of the same range and period."""
     known = laws(of)
     name = draw.pick(sorted(known))
     within = bounds(known[name])
     low, high = within.lowest, within.highest
+    if name in SIZES and low <= 0:  # of a deep wave no more is known than that it stays positive
+        low = 0.1 * high
     margin = 0.0 if low < high else 0.05 * abs(low)
     moving = [other for other in known.values() if isinstance(other, Fourier | BangBang)]
     changed: Law = draw.between(low - margin, high + margin)

@@ -75,7 +75,7 @@ def scene_of_many_legs(draw: Draw, table: str) -> tuple[Scene, float]:
 
 
 def leaning_stem(draw: Draw, shared: SharedPeriod, depth: int) -> Stem:
-    """Draw a stem so deep, 2^depth times its width, that a next to upright side leans by much of its width."""
+    """Draw a stem some 2^depth times as deep as wide, whose next to upright sides lean by much of that."""
     w, h = law(draw, 0.25, 0.5, shared), law(draw, 0.5, 1.0, shared)
     part = draw.pick((1.0, -1.0)) * draw.between(*LEANS)
     return Stem(w=w, h=scaled_law(h, depth, 0), slope=part * bounds(w).lowest * 2.0**-depth)

@@ -13,9 +13,8 @@ or meet again the wall that they were a little off (`generator.seldom`); and eve
 million periods late, or before 0.
 Answers are proved by the reference alone, and are no more delicate than those of level core, but for late
 ones, whose time when rounded tells less of the phase, and those in stems so deep that y when rounded tells
-less than x: these than level extended. All are filed as of level
-core. The plain stepper chooses which draws are asked: those that meet the wall that is looked for, and keep
-it when nudged.
+less than x: these than level extended. All are filed as of level core. The plain stepper chooses which draws
+are asked: those that meet the wall that is looked for, and keep it when nudged.
 """
 
 from __future__ import annotations
@@ -28,14 +27,7 @@ import msgspec
 import reference
 from conformance import plain
 from conformance.generator.drawn_scenes import KINDS, SIZES, drawn_scene
-from conformance.generator.draws import (
-    Draw,
-    clock,
-    state,
-    time,
-    walls_speed,
-    wire_form,
-)
+from conformance.generator.draws import Draw, clock, state, time, walls_speed, wire_form
 from conformance.generator.flow_families import any_marks
 from conformance.generator.in_flight import arc_to_mouth, brief_start, swept_scene, swept_start
 from conformance.generator.links import Confirmation, Unfit

@@ -24,10 +24,8 @@ from scene.tables import cycle_length
 from scene.transforms import scaled_law
 
 DEPTHS = 22, 28, 38, 34  # of a leaning stem, as powers of two of its width
-LEANS = (
-    0.1,
-    0.27,
-)  # of its width, by which a side is moved at the floor: at the deepest slopes are below 1e-12
+# Of its width, by which a side is moved at the floor: at the deepest slopes are below 1e-12.
+LEANS = 0.1, 0.27
 GRID = 1024  # parts of a period that knots lie on
 REACH = {"arc": "r", "floor": "h"}  # the law that says how large a wall is; that of a side is its width
 

@@ -9,6 +9,10 @@ throughout: a wall that is met again just after a knot has moved by the square o
 its speed is that time's multiple, so that time must be right relative to itself, not to the period that its
 knots are written in. All Fourier laws of a scene share their omega, so the sines and cosines of the harmonics
 are found once for all of them, at the event (row PHASE) and for the turn since then, at one s (row TURN).
+
+Whoever uses a size takes its value for right to a unit or two in its last place. Its terms are known to
+2^-62 of themselves, which is enough where they leave more than a small part of the mean; where they cancel
+further, and a mouth all but closes, the phases are found again to twice as many digits (`is_cancelled`).
 """
 
 from __future__ import annotations
@@ -25,12 +29,18 @@ from fast.kernel.arithmetic import (
     two_sum,
 )
 from fast.kernel.compiling import kernel, part
+from fast.kernel.double_double import mul, times
+from fast.kernel.double_double import sine_cosine as fine_sine_cosine
 
 from fast.kernel.records import (  # isort: skip
     AMPLITUDES, BANG_BANG, COSINE, COSINE_LOW, DEPTH, FOURIER, HALF_LEG, IS_SHORT, KIND, KNOTS, LEVEL,
     N_HARMONICS, N_KNOTS, OMEGA, OMEGA_LOW, PERIOD, PERIOD_LOW, PHASE, PHASE_ERROR, RADIUS, RATE, ROOM,
     ROOM_LOW, SHARED, SINE, SINE_LOW, SLOPE, TERMS, TURN, TURN_TIME, VALUE, VALUE_LOW, WIDTH,
 )  # fmt: skip
+
+# Part of its mean below which a size's terms cancel so far that their rounding shows in it. The terms of one
+# that stays positive add up to at most 46 times its mean (sixteen harmonics, each below twice the mean).
+CANCELLED = 2.0**-4
 
 
 @part
@@ -51,6 +61,17 @@ def set_phases(laws, anchors, t_hi, t_lo):
     # What the low parts lack: the sixth power of the angle from the nearest quarter turn.
     anchors[PHASE, PHASE_ERROR] = 2.0**-59 * worst**6 + 2.0**-98
     return True
+
+
+@kernel
+def set_fine_phases(laws, anchors, t_hi, t_lo):
+    """Store the sines and cosines of all harmonics at t, within reach, as `set_phases` does, to 2^-98."""
+    turn = mul((laws[SHARED, OMEGA], laws[SHARED, OMEGA_LOW]), (t_hi, t_lo))
+    for k in range(1, int(laws[SHARED, N_HARMONICS]) + 1):
+        sine, cosine, _ = fine_sine_cosine(times(float(k), turn))
+        anchors[PHASE, SINE + k], anchors[PHASE, SINE_LOW + k] = sine
+        anchors[PHASE, COSINE + k], anchors[PHASE, COSINE_LOW + k] = cosine
+    anchors[PHASE, PHASE_ERROR] = 2.0**-98
 
 
 @part
@@ -101,7 +122,22 @@ def set_anchors(laws, anchors, t_hi, t_lo):
             anchors[row, RATE] = 0.0
             anchors[row, TERMS] = 0.0
             anchors[row, VALUE_LOW] = 0.0
+    if is_cancelled(laws, anchors):
+        set_fine_phases(laws, anchors, t_hi, t_lo)
+        for row in (RADIUS, WIDTH, DEPTH, SLOPE):
+            if laws[row, KIND] == FOURIER:
+                set_waves(laws, anchors, row)
     return True
+
+
+@part
+def is_cancelled(laws, anchors):
+    """Tell whether a Fourier law that is a size is so small now that its terms must be known better."""
+    found = False
+    for row in (RADIUS, WIDTH, DEPTH):
+        if laws[row, KIND] == FOURIER and anchors[row, VALUE] < CANCELLED * laws[row, LEVEL]:
+            found = True
+    return found
 
 
 @kernel

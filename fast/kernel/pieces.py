@@ -10,11 +10,12 @@ import numpy as np
 
 from fast.kernel.arithmetic import fma, two_product, two_sum
 from fast.kernel.compiling import kernel, packed
-from fast.kernel.laws import bend_of_half_leg, set_anchors, whole_periods
+from fast.kernel.double_double import add, sub, times
+from fast.kernel.laws import bend_of_half_leg, is_cancelled, set_anchors, whole_periods
 
 from fast.kernel.records import (  # isort: skip
-    AMPLITUDES, BANG_BANG, COSINE, DEPTH, FOURIER, HALF_LEG, KIND, N_HARMONICS, OMEGA,
-    PHASE, RADIUS, RATE, SINE, SLOPE, VALUE, VALUE_LOW, WIDTH,
+    AMPLITUDES, BANG_BANG, COSINE, COSINE_LOW, DEPTH, FOURIER, HALF_LEG, KIND, N_HARMONICS, OMEGA, PHASE,
+    RADIUS, RATE, SINE, SINE_LOW, SLOPE, VALUE, VALUE_LOW, WIDTH,
 )  # fmt: skip
 
 
@@ -113,14 +114,42 @@ def expand_waves(laws, anchors, row, out):
 
 
 @kernel
+def expand_waves_finely(laws, anchors, row, out):
+    """Write what `expand_waves` does, each coefficient right to its last bits however far its waves cancel.
+
+    Where a law is nearly 0 its powers add up to little more than its value, and their rounding must, too.
+    """
+    n, scale = int(laws[row, N_HARMONICS]), laws[row, OMEGA]
+    out[2:] = 0.0
+    for j in range(3, out.shape[0]):
+        scale *= laws[row, OMEGA] / (j - 1)
+        total = (0.0, 0.0)
+        for k in range(1, n + 1):
+            sine = (anchors[PHASE, SINE + k], anchors[PHASE, SINE_LOW + k])
+            cosine = (anchors[PHASE, COSINE + k], anchors[PHASE, COSINE_LOW + k])
+            a, b = laws[row, AMPLITUDES + k], laws[row, AMPLITUDES + n + k]
+            wave = add(times(a, cosine), times(b, sine))
+            if j % 2 == 0:
+                wave = sub(times(b, cosine), times(a, sine))
+            power = 1.0  # exact: 16^12 is a float
+            for _ in range(1, j):
+                power *= k
+            total = add(total, times(power, wave))
+        out[j] = scale * (total[0] if (j - 1) % 4 < 2 else -total[0])
+
+
+@kernel
 def fill_coefficients(laws, references, coefficients, anchors):
     """Write the polynomials of all laws about reference times (P, 2): see `Pieces.coefficients`."""
     for i in range(references.shape[0]):
         set_anchors(laws, anchors, references[i, 0], references[i, 1])
+        is_fine = is_cancelled(laws, anchors)
         for row in (RADIUS, WIDTH, DEPTH, SLOPE):
             out = coefficients[i, row]
             out[:] = 0.0
-            if laws[row, KIND] == FOURIER:
+            if laws[row, KIND] == FOURIER and is_fine:
+                expand_waves_finely(laws, anchors, row, out)
+            elif laws[row, KIND] == FOURIER:
                 expand_waves(laws, anchors, row, out)
             elif laws[row, KIND] == BANG_BANG:
                 out[3] = 0.5 * bend_of_half_leg(laws, row, int(anchors[row, HALF_LEG]))

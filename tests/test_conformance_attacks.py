@@ -50,6 +50,8 @@ KILLS = {
     "rest-and-sweep": (faults.resting, 20),
     "narrow-base": (faults.faulty(faults.narrow_mouth), 60),
     "many-harmonics": (faults.faulty(faults.few_harmonics), 10),
+    "nearly-shut": (faults.faulty(faults.rough_terms), 40),
+    "all-but-gone": (faults.faulty(faults.rough_terms), 40),
     "mixed-laws": (faults.faulty(faults.rounded_omega), 20),
 }
 

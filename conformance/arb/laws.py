@@ -88,7 +88,8 @@ class BallFourier(BallLaw):
             turn = ZERO if time == 0 else None if self.period is None else time / self.period
             if turn is not None and (4 * turn).q == 1:
                 return self._at_quarter(int((4 * turn).p))
-        waves = ((frequency, a, b, *(frequency * time).sin_cos()) for frequency, a, b in self.terms)
+        sine_cosine = _sine_cosine_of_ball if isinstance(time, arb) else arb.sin_cos
+        waves = ((frequency, a, b, *sine_cosine(frequency * time)) for frequency, a, b in self.terms)
         return _added((arb(self.mean), arb(0), arb(0)), waves)
 
     def _at_quarter(self, quarter: int) -> Jet:
@@ -128,6 +129,22 @@ class Parabola(NamedTuple):
         u = local - self.rest
         rate = self.pull * u
         return self.value + rate * u / 2, rate, self.pull
+
+
+def _sine_cosine_of_ball(angle: arb) -> tuple[arb, arb]:
+    """Enclose sine and cosine of an angle, tightly where one of them turns.
+
+    Arb takes both to change by as much as the angle. Where waves cancel, near the least of a law that all but
+    vanishes, second derivatives would be lost in that.
+    """
+    sine, cosine = angle.mid().sin_cos()
+    across = arb(0, angle.rad())
+    down = arb(1, angle.rad() ** 2 / 2)  # cosine of what the angle is off its middle
+    wide_sine, wide_cosine = angle.sin_cos()
+    return (
+        wide_sine.intersection(sine * down + cosine * across),
+        wide_cosine.intersection(cosine * down - sine * across),
+    )
 
 
 class BallBangBang(BallLaw):

@@ -126,10 +126,9 @@ def _narrowed(flight: SearchedFlight, root: RootBracket) -> RootBracket:
         middle = (low + high) / 2
         value = flight.jet(wall, arb(middle))[0]
         rates = flight.over(wall, low, high)[1]
-        if not rates < 0:
-            # As an enclosure f' may lose its sign; it has one all the same: halve by the sign of f.
-            low, high = (middle, high) if value > 0 else (low, middle) if value < 0 else (low, high)
-        else:
+        # By the sign of f; and where f' keeps its own as enclosed, by Newton: far quicker, or no help.
+        low, high = (middle, high) if value > 0 else (low, middle) if value < 0 else (low, high)
+        if rates < 0:
             first, last = rational_ends(arb(middle) - value / rates)
             low, high = max(low, first), min(high, last)
             if low > high:

@@ -198,6 +198,11 @@ def reduced_time(attack: Attack) -> Claim:
     return claim(truths(attack._replace(state=msgspec.structs.replace(attack.state, t=t), t_end=t_end)))
 
 
+def rough_terms(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A law is known to 2^-62 of its mean only, however small it is."""
+    _spoil(monkeypatch, BallFourier, lambda law: setattr(law, "mean", law.mean * (1 + fmpq(1, 2**62))))
+
+
 def few_harmonics(monkeypatch: pytest.MonkeyPatch) -> None:
     """Harmonics beyond the third are dropped."""
     _spoil(monkeypatch, BallFourier, lambda law: setattr(law, "terms", law.terms[:3]))

@@ -205,11 +205,14 @@ def as_arrays(starts: Sequence[Start]) -> tuple[FloatArray, IntArray]:
     return rows, np.array([WALL_CODES[start.state.wall] for start in starts], dtype=np.int64)
 
 
+PHASE_LOST = "a phase k w t of 2^27 quarter turns or more is reached from there (harmonic k), and is lost"
+
+
 def trouble(code: int, state: State) -> Outcome:
     """Return the outcome that a code stands for, other than a wall's and HORIZON."""
     if code in REASONS:
         return REASONS[code]
     if code == codes.FAR_TIME:
-        return Rejected(f"state.t = {state.t!r} is more than 2^27 quarter periods from 0: its phase is lost")
+        return Rejected(f"state.t = {state.t!r}: {PHASE_LOST}")
     wall = WALL_NAMES[int(code - codes.BEYOND)]
     return Rejected(f"state (x, y) = ({state.x!r}, {state.y!r}) at t = {state.t!r} is beyond wall {wall}")

@@ -32,7 +32,11 @@ def carry(
     run = carry_judged(scene, starts, t_end, given_threads(None))
     times = zip(run.t_in.tolist(), run.t_out.tolist(), strict=True)
     stays = [None if math.isnan(begin) else (begin, end) for begin, end in times]
-    arrivals = iter(zip(run.outcomes, stays, strict=True))
+    arrivals = iter(
+        # Who is lost tells no stay, though it may have had one.
+        (outcome, stay if isinstance(outcome, Horizon) else None)
+        for outcome, stay in zip(run.outcomes, stays, strict=True)
+    )
     return [next(arrivals) if refusal is None else (refusal, None) for refusal in refusals]
 
 

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from functools import cache
+from types import SimpleNamespace
 
+import numpy as np
 import pytest
 from support.seldom_wrong import SELDOM_WRONG, AmplitudesAdded
 
@@ -16,8 +18,9 @@ from conformance.generator.seldom import DEPTHS, is_leaning, many_legs
 from conformance.grading.grade import grade
 from conformance.mutants import Mutant
 from conformance.plain.step import Flight
+from fast import __main__ as fast_program
 from fast.__main__ import carry, follow
-from scene import BadInput, BangBang, Collision, from_data
+from scene import BadInput, BangBang, Collision, Horizon, Mushroom, State, Undecided, from_data
 from scene.given import MAX_KNOTS
 from scene.laws import bounds
 from scene.tables import laws
@@ -77,6 +80,27 @@ def test_a_sweep_along_a_side_meets_it_for_a_short_time(table, tally):
             assert hit.t < t
             assert Flight(scene, start, t_end).f(hit.wall, t_end - start.t)[0] > 0
     assert tally["left"] + tally["right"] > 10
+
+
+def test_who_is_lost_after_a_captured_stay_tells_none(monkeypatch):
+    """The stay begins and ends at the arc, far below the mouth's edge; later no collision is decided."""
+    scene, start, t_end = Mushroom(r=1.0, w=0.25, h=1.0), State(0.0, 0.75, 0.25, 0.1, 4.0), 9.0
+    asked = []
+
+    def lost(of, state, until):
+        asked.append(state)
+        return Undecided("lost") if len(asked) == 9 else plain.next_collision(of, state, until)
+
+    ((arrived, stay),) = plain.flow(scene, [start], t_end)
+    assert isinstance(arrived, Horizon)
+    assert stay is not None
+    assert plain.flow(scene, [start], t_end, lost) == [(Undecided("lost"), None)]
+    ((arrived, stay),) = carry(scene, [start], t_end)
+    assert isinstance(arrived, Horizon)
+    assert stay is not None
+    run = SimpleNamespace(outcomes=[Undecided("lost")], t_in=np.array([1.0]), t_out=np.array([2.0]))
+    monkeypatch.setattr(fast_program, "carry_judged", lambda *_: run)
+    assert carry(scene, [start], t_end) == [(Undecided("lost"), None)]
 
 
 @pytest.mark.deep

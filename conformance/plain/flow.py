@@ -7,7 +7,7 @@ from math import hypot, prod
 from typing import NamedTuple
 
 from conformance.plain.step import SIDES, Flight, next_collision
-from scene import Collision, Mushroom, Outcome, Scene, State, Undecided
+from scene import Collision, Horizon, Mushroom, Outcome, Scene, State, Undecided
 from scene.protocol.wire import Captured
 from scene.states import Stepper
 from scene.tables import width_factors
@@ -65,13 +65,15 @@ class PlainPath:
         return misses_mouth(width(scene, hit.t), hit, self.state.vx, self.state.vy)
 
     def arrival(self) -> tuple[Outcome, Captured]:
-        """Carry the particle to t_end, and return its first captured stay too."""
+        """Carry the particle to t_end, and return its first captured stay too; who is lost tells none."""
         for _ in range(self.most):
             outcome = self.advance()
             if not isinstance(outcome, Collision):
                 break
         else:
             outcome = Undecided(f"more than {self.most} collisions")
+        if not isinstance(outcome, Horizon):
+            return outcome, None
         self.close(self.t_end)
         return outcome, self.stays[0] if self.stays else None
 

@@ -5,7 +5,6 @@ Their waves cancel to a part of 1e-4 to 1e-13, and terms known to 2^-62 of thems
 
 from __future__ import annotations
 
-import math
 import os
 
 import numpy as np
@@ -18,6 +17,7 @@ import fast
 import reference
 from conformance.attacks import FAMILIES, UnderAttack, run
 from conformance.attacks.search import stepped
+from conformance.attacks.vanishing import sunk
 from conformance.second_stepper import next_collision
 from fast.batch import lane_steps
 from fast.kernel.laws import set_anchors
@@ -31,16 +31,6 @@ NAMES = ("nearly-shut", "all-but-gone")
 N_ATTACKS = int(os.environ.get("MUSHROOMS_ATTACKS", "100"))
 CTX = MPContext()
 CTX.dps = 50
-
-
-def sunk(n, left, turn=0.0):
-    """Return ((1 - cos 2 pi (t - turn)) / 2)^n + left."""
-    waves = [math.comb(2 * n, n - k) * (-1.0) ** k * 2.0 / 4.0**n for k in range(1, n + 1)]
-    angles = [2.0 * math.pi * k * turn for k in range(1, n + 1)]
-    cos, sin = (
-        tuple(a * f(angle) for a, angle in zip(waves, angles, strict=True)) for f in (math.cos, math.sin)
-    )
-    return Fourier(mean=math.comb(2 * n, n) / 4.0**n + left, cos=cos, sin=sin, period=1.0)
 
 
 @pytest.mark.parametrize("name", NAMES)

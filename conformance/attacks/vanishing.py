@@ -20,17 +20,21 @@ FINE = MPContext()
 FINE.prec = 300  # bits, of the place of a wall
 
 
-def _all_but_vanishing(draw: Draw) -> tuple[Fourier, float]:
-    """Draw ((1 - cos 2 pi (t - least)) / 2)^n and a little more, and the time of its least."""
-    n, turn = draw.pick((1, 1, 2)), draw.pick((0.0, 0.25, draw.part(), draw.part()))
+def sunk(n: int, left: float, least: float = 0.0) -> Fourier:
+    """Return ((1 - cos 2 pi (t - least)) / 2)^n + left, of period 1: flatter at its least the higher n is."""
     waves = [math.comb(2 * n, n - k) * (-1.0) ** k * 2.0 / 4.0**n for k in range(1, n + 1)]
-    angles = [2 * math.pi * k * turn for k in range(1, n + 1)]
-    mean = math.comb(2 * n, n) / 4.0**n + 10.0 ** -draw.between(4.0, 13.0)
+    angles = [2 * math.pi * k * least for k in range(1, n + 1)]
     cos = tuple(wave * math.cos(angle) for wave, angle in zip(waves, angles, strict=True))
     sin = tuple(wave * math.sin(angle) for wave, angle in zip(waves, angles, strict=True))
-    law = Fourier(mean=mean, cos=cos, sin=sin, period=1.0)
+    return Fourier(mean=math.comb(2 * n, n) / 4.0**n + left, cos=cos, sin=sin, period=1.0)
+
+
+def _all_but_vanishing(draw: Draw) -> tuple[Fourier, float]:
+    """Draw such a law of which little is left, and the time of its least."""
+    n, least = draw.pick((1, 1, 2)), draw.pick((0.0, 0.25, draw.part(), draw.part()))
+    law = sunk(n, 10.0 ** -draw.between(4.0, 13.0), least)
     # By rounding of the amplitudes it may vanish.
-    return (law, turn) if built(lambda: Cap(r=law)) else _all_but_vanishing(draw)
+    return (law, least) if built(lambda: Cap(r=law)) else _all_but_vanishing(draw)
 
 
 def nearly_shut(draw: Draw) -> Attack:

@@ -65,7 +65,10 @@ def set_phases(laws, anchors, t_hi, t_lo):
 
 @kernel
 def set_fine_phases(laws, anchors, t_hi, t_lo):
-    """Store the sines and cosines of all harmonics at t, within reach, as `set_phases` does, to 2^-98."""
+    """Store the sines and cosines of all harmonics at t, within reach, as `set_phases` does, to 2^-98.
+
+    Of the phase, that is: it is itself rounded to 2^-104 of itself, which moves t by no more of itself.
+    """
     turn = mul((laws[SHARED, OMEGA], laws[SHARED, OMEGA_LOW]), (t_hi, t_lo))
     for k in range(1, int(laws[SHARED, N_HARMONICS]) + 1):
         sine, cosine, _ = fine_sine_cosine(times(float(k), turn))

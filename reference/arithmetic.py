@@ -21,9 +21,9 @@ from scene.precision import intervals
 Interval = Any  # mpmath's ivmpf, which has no type stubs
 
 BITS_PER_DIGIT = 3.3219280948873626
-# What one step may take, in the unit of `WorkLimit`. Measured: 4,700 for the most that a vector of the corpus
-# needs at 50 digits, some 15,000 for a plain step at 10,000 digits; 0.1 to 0.35 ms a unit on one idle core.
-MAX_WORK = 20_000.0
+# What one step may take, in the unit of `WorkLimit`. Measured: 6,400 for the most that a vector of the corpus
+# needs at 50 digits, 4,400 for a plain step at 10,000 digits; 0.03 to 0.2 ms a unit on one idle core.
+MAX_WORK = 50_000.0
 LONG_NUMBER = 1024  # bits; arithmetic with so long a number takes twice as long as with a short one
 _FLOOR, _CEILING = "f", "c"
 # mpmath keeps pi and the precision it was computed to in two variables that all contexts share:

@@ -6,7 +6,7 @@ f >= 0 at its left end, in one of six ways:
     rising   f' > 0 on it;
     falling  f' < 0 on it and f > 0 at its right end;
     concave  f'' <= 0 on it and f > 0 at its right end;
-    centred  f(m) + f'(I)(I - m) > 0, m inside I;
+    centred  f(m) + f'(m)(I - m) + f''(I)(I - m)^2 / 2 > 0, m inside I;
     lifting  f'' > 0 on it, f = f' = 0 exactly at its left end, the start.
 `swept` is `plain` over so long a time that every law is taken anywhere within its range.
 A root is accepted only on an interval with f' < 0 throughout, f > 0 at its left end and f < 0
@@ -104,6 +104,10 @@ class Isolator:
             whole = self.arithmetic.hull(a, b)
             jet = self._sharpened(a, b, whole)
             kind = self._kind(a, b, whole, jet)
+            if kind is None and not self._falls_or_bends_down(jet):
+                jet = self._expanded(whole, jet)
+                kind = self._kind(a, b, whole, jet)
+                kind = "centred" if kind in ("plain", "swept") else kind
             if kind is not None:
                 self.leaves.append(Leaf(a, b, kind))
                 continue
@@ -120,6 +124,27 @@ class Isolator:
             return jet
         first, last = self.jet(a).d1, self.jet(b).d1
         return jet._replace(d1=self.arithmetic.intersection(jet.d1, self.arithmetic.union([first, last])))
+
+    def _expanded(self, whole: Interval, jet: Jet) -> Jet:
+        """Enclose f and f' again, by Taylor's theorem: f' is Lipschitz, also across knots.
+
+        Near a flat least of a law its waves cancel. As evaluated, f is then known to some part of the
+        interval's length only; so it is to some part of the length's cube.
+        """
+        arithmetic, middle = self.arithmetic, self.arithmetic.middle(whole)
+        there, away = self.jet(middle), whole - middle
+        d1, f = jet.d1, there.f
+        if there.d1 is not None:
+            f = f + there.d1 * away
+        if there.d1 is not None and jet.d1 is not None and jet.d2 is not None:
+            d1 = arithmetic.intersection(jet.d1, there.d1 + jet.d2 * away)
+            f = f + jet.d2 * arithmetic.square(away) / 2
+        return jet._replace(f=arithmetic.intersection(jet.f, f), d1=d1)
+
+    @staticmethod
+    def _falls_or_bends_down(jet: Jet) -> bool:
+        """Tell whether f' < 0 or f'' <= 0 is known; f > 0 is then asked for at the end alone."""
+        return (jet.d1 is not None and sign(jet.d1) < 0) or jet.d2 is None or is_at_most_zero(jet.d2)
 
     def _may_begin(self, a: Interval) -> bool:
         """Tell whether the flight may begin, on this wall, at a or later."""
@@ -140,11 +165,9 @@ class Isolator:
             return "swept" if self._is_whole(whole) else "plain"
         if sign(slope) > 0:
             return "rising"
-        if sign(slope) < 0 or is_concave:
-            if sign(self.value(b)) > 0:
-                return "falling" if sign(slope) < 0 else "concave"
-            return None
-        return "centred" if self._is_centred_positive(whole, slope) else None
+        if (sign(slope) < 0 or is_concave) and sign(self.value(b)) > 0:
+            return "falling" if sign(slope) < 0 else "concave"
+        return None
 
     def _is_whole(self, whole: Interval) -> bool:
         if self.timeline is None:
@@ -195,10 +218,8 @@ class Isolator:
         return [(a, low), (low, high), (high, b)] if is_below(low, high) else [(a, low), (low, b)]
 
     def _is_positive(self, whole: Interval) -> bool:
-        jet = self.jet(whole)
-        f = jet.f if self.residual is None else jet.f - self.residual
-        assert jet.d1 is not None
-        return sign(f) > 0 or self._is_centred_positive(whole, jet.d1)
+        f = self._expanded(whole, self.jet(whole)).f
+        return sign(f if self.residual is None else f - self.residual) > 0
 
     def _split(self, a: Interval, b: Interval) -> Interval:
         """Return a point inside where f has a sign, so that no sub-interval ends on a root."""
@@ -220,10 +241,6 @@ class Isolator:
             return None
         knot = self.timeline.knot_between(exact_ends(a)[0], exact_ends(b)[0])
         return None if knot is None else self.arithmetic.dyadic(knot)
-
-    def _is_centred_positive(self, whole: Interval, slope: Interval) -> bool:
-        middle = self.arithmetic.middle(whole)
-        return sign(self.value(middle) + slope * (whole - middle)) > 0
 
     def _refine(self, a: Interval, b: Interval) -> IsolatedRoot:
         # Interval Newton on [a, b]: f' < 0 there, so each image encloses the one root. Where it

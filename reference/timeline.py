@@ -15,11 +15,10 @@ from typing import NamedTuple, Protocol
 
 from reference.arithmetic import Arithmetic, Interval, exact_ends
 from reference.jets import Jet, united
+from reference.waves import Waves
 from scene import BangBang, Fourier, Law, Scene
 from scene.laws import is_constant
 from scene.tables import laws
-
-WORK_OF_A_WAVE = 3  # a sine and cosine, in evaluations of a parabola
 
 
 class LawInTime(Protocol):
@@ -87,47 +86,6 @@ class Constant:
     def is_whole(self, length: Fraction) -> bool:
         """Return True: its range is its value."""
         return True
-
-
-class Waves:
-    """A Fourier law. The phase at the instant is reduced once, so that no digit of it is lost later."""
-
-    def __init__(self, arithmetic: Arithmetic, law: Fourier, instant: Fraction) -> None:
-        self.arithmetic = arithmetic
-        self.mean = arithmetic.number(law.mean)
-        self.omega, self.phase = arithmetic.turning(law.omega, law.period, instant)
-        number = arithmetic.number
-        self.terms = []
-        for k, a, b in law.harmonics():
-            frequency = number(k) * self.omega
-            amplitudes = number(a) if a else None, number(b) if b else None
-            self.terms.append((number(k), frequency, arithmetic.square(frequency), *amplitudes))
-
-    def jet(self, s: Interval) -> Jet:
-        """Sum the harmonics and their derivatives."""
-        arithmetic = self.arithmetic
-        arithmetic.spend(WORK_OF_A_WAVE * len(self.terms))
-        f, d1, d2 = self.mean, arithmetic.zero, arithmetic.zero
-        phase = self.phase + self.omega * s
-        for k, frequency, frequency_squared, a, b in self.terms:
-            cos, sin = arithmetic.cos_sin(k * phase)
-            wave, quadrature = arithmetic.zero, arithmetic.zero
-            if a is not None:
-                wave, quadrature = a * cos, -(a * sin)
-            if b is not None:
-                wave, quadrature = wave + b * sin, quadrature + b * cos
-            f = f + wave
-            d1 = d1 + frequency * quadrature
-            d2 = d2 - frequency_squared * wave
-        return Jet(f, d1, d2)
-
-    def knots(self, low: Fraction, high: Fraction) -> list[Fraction]:
-        """Return none: the law is analytic."""
-        return []
-
-    def is_whole(self, length: Fraction) -> bool:
-        """Tell whether the length is a period or more."""
-        return self.arithmetic.is_full_turn(self.omega, length)
 
 
 class HalfLeg(NamedTuple):

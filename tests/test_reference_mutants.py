@@ -6,7 +6,7 @@ import pytest
 from support.depth import deep_among
 from support.reference_battery import BATTERY
 
-from reference import chain, rational, start, timeline, walls
+from reference import chain, rational, start, timeline, walls, waves
 from reference.arithmetic import Arithmetic, exact_ends, sign
 from reference.course import SIDES, Course
 from reference.isolation import Isolator
@@ -27,6 +27,8 @@ width_of = MovingWalls.width
 reflected = chain.reflected
 wall_jet = rational.wall_jet
 legs_jet = timeline.Legs.jet
+waves_init, powers_of = waves.Waves.__init__, waves.Waves._powers
+expanded = Isolator._expanded
 
 
 def skip_the_first_root(self, start, end):
@@ -158,7 +160,26 @@ def base_without_an_end(scene, state, motion):
     return JudgedStart({}, undefined=Undefined("sliding") if state.vy == 0 else None, walls=("base",))
 
 
+def powers_of_later_times(self, away):
+    """As if the point of the expansion were the interval's begin."""
+    later = self.arithmetic.hull(self.arithmetic.zero, away)
+    return powers_of(self, later)
+
+
+def waves_without_a_remainder(self, arithmetic, law, instant):
+    waves_init(self, arithmetic, law, instant)
+    self.bound = arithmetic.zero
+
+
+def tangent_for_the_expansion(self, whole, jet):
+    """Without the second derivative's part."""
+    return expanded(self, whole, jet._replace(d2=self.arithmetic.zero))._replace(d2=jet.d2)
+
+
 MUTANTS = {
+    "waves without a remainder": (waves.Waves, "__init__", waves_without_a_remainder),
+    "odd powers of a negative time dropped": (waves.Waves, "_powers", powers_of_later_times),
+    "f by its tangent": (Isolator, "_expanded", tangent_for_the_expansion),
     "first root skipped": (Isolator, "first_root", skip_the_first_root),
     "first wall in the list wins": (Course, "_first_hit", exclude_nothing),
     "floor never asked": (Course, "_first_hit", exclude_all_but_the_floor),

@@ -117,7 +117,10 @@ class Exclusion:
         flight, middle = self.flight, (a + b) / 2
         f, slope, bend = flight.jet(wall, hull(a, b))
         if kind == "centred":
-            return bool(flight.jet(wall, middle)[0] + slope * hull(a - middle, b - middle) > 0)
+            value, rate, _ = flight.jet(wall, middle)
+            away = hull(a - middle, b - middle)
+            is_above = value + slope * away > 0 or value + rate * away + bend * away * away / 2 > 0
+            return bool(is_above)
         if kind in ("falling", "concave"):
             is_bent = slope < 0 if kind == "falling" else bend <= 0
             return bool(is_bent) and bool(flight.jet(wall, b)[0] > 0)

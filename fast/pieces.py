@@ -172,7 +172,7 @@ def _filled(
     if period is None:
         half, serves = np.array([math.inf]), np.array([math.inf])
     high, low = _pair(period) if period is not None else (math.inf, 0.0)
-    until = 0.125 * MAX_QUADRANT * high
+    until = 0.125 * MAX_QUADRANT * high / max(compiled.laws[SHARED, N_HARMONICS], 1.0)
     return Pieces(float(origin), high, low, begins, references, half, serves, coefficients, until)
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -13,6 +15,7 @@ from conformance.strategies import scenes
 from fast import pieces
 from fast.compiled import compile_scene
 from fast.kernel.pieces import law_at, piece_at
+from fast.kernel.records import N_HARMONICS, OMEGA, SHARED
 from fast.pieces import PARABOLA, SERIES, laws_in_lanes
 from fast.units import fit
 from scene import BangBang, Cap, Fourier, Mushroom, Stem
@@ -115,6 +118,14 @@ def test_every_flight_that_begins_in_a_piece_has_room_there():
 def test_degrees_are_no_higher_than_it_takes():
     assert [laws_in_lanes(scene).degree for scene in DEEP] == [SERIES] * 4 + [PARABOLA]
     assert len(laws_in_lanes(Cap(r=Fourier(1.0, 1.0, (0.1,)))).pieces.begins) == 27
+
+
+def test_lanes_know_no_phase_that_the_careful_step_calls_lost():
+    """It is lost from 2^27 quarter turns of the highest harmonic on."""
+    for scene in DEEP[:4]:
+        compiled = compile_scene(scene)
+        n, omega = compiled.laws[SHARED, N_HARMONICS], compiled.laws[SHARED, OMEGA]
+        assert 2.0**20 < omega * laws_in_lanes(scene).pieces.until < math.pi / 2 * 2.0**27 / n
 
 
 def test_laws_that_take_too_many_pieces_are_left_to_careful_steps(monkeypatch):

@@ -306,6 +306,7 @@ class Course:
             self.leaving.get(wall),
             is_flat=wall in self.flat,
             timeline=self.motion.timeline,
+            resting=partial(self.motion.resting, wall),
         )
 
     def _escape_time(self) -> Interval | None:

@@ -8,7 +8,9 @@ f >= 0 at its left end, in one of six ways:
     concave  f'' <= 0 on it and f > 0 at its right end;
     centred  f(m) + f'(m)(I - m) + f''(I)(I - m)^2 / 2 > 0, m inside I;
     lifting  f'' > 0 on it, f = f' = 0 exactly at its left end, the start.
-`swept` is `plain` over so long a time that every law is taken anywhere within its range.
+`swept` is `plain` over so long a time that every law is taken anywhere within its range, or, where that range
+is too wide: particles that rest where the sub-interval begins and ends are not met in a whole period. With
+laws held still f is concave along a flight, so it is above 0 between these places whatever the phase.
 A root is accepted only on an interval with f' < 0 throughout, f > 0 at its left end and f < 0
 at its right one. What none of this decides is bisected, then refused (`Undecidable`).
 
@@ -29,6 +31,7 @@ from typing import NamedTuple
 
 from reference.arithmetic import (
     Arithmetic,
+    Exhausted,
     Interval,
     Undecidable,
     exact_ends,
@@ -69,6 +72,7 @@ class Isolator:
         residual: f(0) when the particle leaves this wall (the root s = 0 is divided out), else None.
         is_flat: f(0) = f'(0) = 0 exactly, so that only f'' > 0 can prove the start.
         timeline: knows the laws' knots, at which intervals are best cut; None for a smooth function.
+        resting: f, f', f'' for a particle that rests where the flight is at a time; None without one.
         leaves: what has been excluded so far, from the left.
     """
 
@@ -78,6 +82,7 @@ class Isolator:
     residual: Interval | None = None
     is_flat: bool = field(default=False, kw_only=True)
     timeline: Timeline | None = field(default=None, kw_only=True)
+    resting: Callable[[Interval], Callable[[Interval], Jet]] | None = field(default=None, kw_only=True)
     leaves: list[Leaf] = field(default_factory=list, init=False)
 
     def value(self, s: Interval) -> Interval:
@@ -108,6 +113,8 @@ class Isolator:
                 jet = self._expanded(whole, jet)
                 kind = self._kind(a, b, whole, jet)
                 kind = "centred" if kind in ("plain", "swept") else kind
+            if kind is None and self._is_whole(whole) and self._is_never_swept(a, b):
+                kind = "swept"
             if kind is not None:
                 self.leaves.append(Leaf(a, b, kind))
                 continue
@@ -174,6 +181,27 @@ class Isolator:
             return False
         low, high = exact_ends(whole)
         return self.timeline.is_whole(high - low)
+
+    def _is_never_swept(self, a: Interval, b: Interval) -> bool:
+        """Tell whether the wall never comes to where the flight is at a nor to where it is at b."""
+        return not self._may_begin(a) and self._is_never_met(b) and self._is_never_met(a)
+
+    def _is_never_met(self, place: Interval) -> bool:
+        if self.resting is None or self.timeline is None or self.timeline.turn is None:
+            return False
+        jet, zero = self.resting(place), self.arithmetic.zero
+
+        def less_residual(s: Interval) -> Jet:
+            found = jet(s)
+            return found if self.residual is None else found._replace(f=found.f - self.residual)
+
+        watcher = Isolator(self.arithmetic, less_residual, zero, timeline=self.timeline)
+        try:
+            return sign(watcher.value(zero)) > 0 and watcher.first_root(zero, self.timeline.turn) is None
+        except Exhausted:
+            raise
+        except Undecidable:
+            return False
 
     def _parts(self, a: Interval, b: Interval, whole: Interval, jet: Jet) -> list[tuple[Interval, Interval]]:
         """Cut an interval: around its least value where f is convex, at a knot, or half way."""

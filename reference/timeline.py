@@ -18,7 +18,7 @@ from reference.jets import Jet, united
 from reference.waves import Waves
 from scene import BangBang, Fourier, Law, Scene
 from scene.laws import is_constant
-from scene.tables import laws
+from scene.tables import laws, period
 
 
 class LawInTime(Protocol):
@@ -45,6 +45,9 @@ class Timeline:
 
     def __init__(self, arithmetic: Arithmetic, scene: Scene, instant: Fraction) -> None:
         self.laws = {name: law_in_time(arithmetic, law, instant) for name, law in laws(scene).items()}
+        shared = period(scene)
+        length = None if shared is None else arithmetic.period(shared.omega, shared.length)
+        self.turn = None if length is None else arithmetic.upper(length)  # a period at least
 
     def jet(self, name: str, s: Interval) -> Jet:
         """Enclose a law and its derivatives at every time within s."""

@@ -7,7 +7,10 @@ With an interval of flight times, each enclosure holds over all of it, knots inc
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from copy import copy
 from fractions import Fraction
+from functools import partial
 from typing import Any, NamedTuple
 
 from reference.arithmetic import Arithmetic, Interval
@@ -44,6 +47,13 @@ class MovingWalls:
         self.timeline = Timeline(arithmetic, scene, flight.instant)
         # Neighbouring intervals ask for the ends they share, and each proof for what the one before it found.
         self._known: dict[tuple[Wall, Any], tuple[Jet, float]] = {}
+
+    def resting(self, wall: Wall, s: Interval) -> Callable[[Interval], Jet]:
+        """Return f, f', f'' of a wall for a particle that rests where the flight is at s."""
+        q, zero, still = self.flight, self.arithmetic.zero, copy(self)
+        still.flight = q._replace(x=q.x + q.vx * s, y=q.y + q.vy * s, vx=zero, vy=zero)
+        still._known = {}
+        return partial(still.wall, wall)
 
     def law(self, name: str, s: Interval) -> Jet:
         """Enclose a law and its derivatives over an interval of flight time."""

@@ -49,6 +49,7 @@ KILLS = {
     "long-wait": (faults.impatient, 10),
     "rest-and-sweep": (faults.resting, 20),
     "narrow-base": (faults.faulty(faults.narrow_mouth), 60),
+    "slow-towards-waves": (faults.faulty(faults.swept_begins_alone), 10),
     "many-harmonics": (faults.faulty(faults.few_harmonics), 10),
     "nearly-shut": (faults.faulty(faults.rough_terms), 40),
     "all-but-gone": (faults.faulty(faults.rough_terms), 40),

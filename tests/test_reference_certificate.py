@@ -23,6 +23,7 @@ N_EXAMPLES = 10_000 if IS_DEEP else 150
 
 CIRCLE = Cap(r=Fourier(mean=1.0, omega=1.0, cos=(0.25,)))
 GALLERY = State(0.0, 0.75, 1.0, -1.0, 0.6875, "arc")  # f rises, falls, all in dt = 0.07
+WAVES = Stem(w=1.0, h=Fourier(mean=1.0, period=1.0, sin=(0.1, 0.02), cos=(0.05,)))
 RESTING = State(0.0, 0.0, -1.875, 0.0, 0.0)  # met by the floor at 1/8 of each period
 WIDE_BOX = Stem(w=2.0, h=1.0)
 TO_RIGHT = State(0.0, 0.25, -0.25, 1.0, -0.75)
@@ -100,6 +101,7 @@ HONEST = {
         State(0.0, -0.17173856847426397, -0.59375, -0.000468749999999587, 5.740531870998161e-20, "left"),
         201.06192982974676,
     ),
+    "slow, towards waves": (WAVES, State(0.3, 0.0, -0.5, 2.0**-20, -(2.0**-14)), 1e5),
     "slow": (LIFT, State(0.0, 0.0, -0.5, 2.0**-8, 0.0), 500.0),
 }
 
@@ -118,6 +120,10 @@ def test_kinds_of_the_rare_cases_are_met():
 
 
 CIRCLE_HIT, LIFT_HIT = HONEST["grazing a circle"], HONEST["lifted by a floor"]
+
+
+def swept_until_it_is_met(claim):
+    claim["excluded"]["floor"] = [[claim["excluded"]["floor"][0][0], claim["root"][0], "swept"]]
 
 
 def end_past_the_root(claim):
@@ -171,6 +177,7 @@ FORGED = {
         LIFT_HIT,
         "floor may sweep",
     ),
+    "waves said to stay away": (swept_until_it_is_met, HONEST["slow, towards waves"], "floor may sweep"),
     "end past the root": (end_past_the_root, CIRCLE_HIT, "arc is not excluded, falling"),
     "changed velocity": (put("state", "vx", -1.0 - 2.0**-52), CIRCLE_HIT, "arc is not excluded|change sign"),
     "changed side": (put("state", "y", -0.5), HONEST["base"], "y = 0 is not crossed"),

@@ -29,6 +29,7 @@ wall_jet = rational.wall_jet
 legs_jet = timeline.Legs.jet
 waves_init, powers_of = waves.Waves.__init__, waves.Waves._powers
 expanded = Isolator._expanded
+timeline_init = timeline.Timeline.__init__
 
 
 def skip_the_first_root(self, start, end):
@@ -166,6 +167,11 @@ def powers_of_later_times(self, away):
     return powers_of(self, later)
 
 
+def half_a_turn(self, arithmetic, scene, instant):
+    timeline_init(self, arithmetic, scene, instant)
+    self.turn = None if self.turn is None else self.turn / 2
+
+
 def waves_without_a_remainder(self, arithmetic, law, instant):
     waves_init(self, arithmetic, law, instant)
     self.bound = arithmetic.zero
@@ -179,6 +185,12 @@ def tangent_for_the_expansion(self, whole, jet):
 MUTANTS = {
     "waves without a remainder": (waves.Waves, "__init__", waves_without_a_remainder),
     "odd powers of a negative time dropped": (waves.Waves, "_powers", powers_of_later_times),
+    "never swept where a flight begins": (
+        Isolator,
+        "_is_never_swept",
+        lambda self, a, b: not self._may_begin(a) and self._is_never_met(a),
+    ),
+    "never met in half a period": (timeline.Timeline, "__init__", half_a_turn),
     "f by its tangent": (Isolator, "_expanded", tangent_for_the_expansion),
     "first root skipped": (Isolator, "first_root", skip_the_first_root),
     "first wall in the list wins": (Course, "_first_hit", exclude_nothing),

@@ -15,9 +15,9 @@ from typing import NamedTuple
 from flint import arb, fmpq
 
 from conformance.arb.laws import BallLaw, ball_law
-from conformance.arb.numbers import ZERO, Jet, Number, Rational, add, exact, negative, product
+from conformance.arb.numbers import ZERO, Jet, Number, Rational, add, exact, negative, product, rational_ends
 from scene import Cap, Mushroom, Scene, State, Stem, Wall
-from scene.tables import laws, width_factors
+from scene.tables import laws, period, width_factors
 
 SIDES: tuple[Wall, ...] = ("left", "right", "floor")
 
@@ -30,6 +30,12 @@ class Table:
         self.is_mushroom, self.is_stem = isinstance(scene, Mushroom), isinstance(scene, Stem)
         self.laws: dict[str, BallLaw] = {name: ball_law(law) for name, law in laws(scene).items()}
         self.width = [] if isinstance(scene, Cap) else [ball_law(law) for law in width_factors(scene)]
+        shared = period(scene)
+        self.turn: Rational | None = None  # a period of all laws, or a little more
+        if shared is not None and shared.length is not None:
+            self.turn = fmpq(shared.length.numerator, shared.length.denominator)
+        elif shared is not None and shared.omega is not None:
+            self.turn = rational_ends(2 * arb.pi() / exact(shared.omega))[1]
 
 
 class Line(NamedTuple):
@@ -68,6 +74,10 @@ class BallFlight:
         """Return x and y."""
         line = self._line(s)
         return line.x + line.vx * s, line.y + line.vy * s
+
+    def at_rest(self, s: Number) -> Line:
+        """Return the line of a particle that rests where the flight is at s."""
+        return Line(self.line.t, *self.place(s), ZERO, ZERO)
 
     def law(self, name: str, s: Number, within: Rational | None = None) -> Jet:
         """Enclose a law of the scene and its derivatives."""

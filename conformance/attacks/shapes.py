@@ -144,7 +144,23 @@ def mixed_laws(draw: Draw) -> Attack:
     return Attack(made, start, t_end)
 
 
+def slow_towards_waves(draw: Draw) -> Attack:
+    """Come within thousands of periods to a wall of several harmonics, never all at their least together."""
+    sin, cos = _harmonics(draw, 3, 0.05), _harmonics(draw, 2, 0.05)
+    law = Fourier(mean=1.0, period=draw.pick((1.0, 0.375)), sin=(0.1, *sin), cos=cos)
+    v, across = 10.0 ** -draw.between(2.0, 5.0), draw.pick((0.0, 0.125, -0.5))
+    t, inside = draw.between(-9.0, 9.0), draw.between(0.25, 0.6)
+    options: tuple[tuple[Scene, State], ...] = (
+        (Stem(w=1.0, h=law), State(t, 0.0, -inside, across * v / 4, -v)),
+        (Stem(w=law, h=1.0), State(t, draw.pick((1.0, -1.0)) * inside, -0.5, v, across * v / 4)),
+        (Cap(r=law), State(t, 0.0, inside, across * v, v)),
+        (Mushroom(r=2.0, h=1.5, w=law), State(t, -inside, -0.75, -v, across * v / 4)),
+    )
+    return Attack(*draw.pick(options), t + 4.0 / v)
+
+
 FAMILIES = (
+    Family(slow_towards_waves, "walls go as far as all their waves together, so that the first hit is lost"),
     Family(extreme_scale, "squares overflow or vanish, though every number is in range"),
     Family(late_phase, "the phase of a late or negative start loses digits"),
     Family(long_wait, "a hit after many periods of waiting is given up or skipped"),

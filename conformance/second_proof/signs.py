@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable
 from math import prod
 from typing import Any
@@ -72,12 +73,23 @@ class SignedFlight(BallFlight):
         return arb(found[1]).intersection(centred)
 
     def is_never_swept(self, wall: Wall, a: Rational, b: Rational) -> bool:
-        """Tell whether f, less its residual, is above 0 on [a, b], whatever the laws do between their bounds.
+        """Tell whether f, less its residual, is above 0 on [a, b], whatever the phase.
 
-        With laws held still f is concave in s, and linear in the slope: its least value is at ends.
+        With laws held still f is concave in s, and linear in the slope: its least value is at ends. There
+        each law is taken anywhere between its bounds, or, where these are too wide, all over a period.
         """
         residual = self.residuals.get(wall, ZERO)
-        return all(self._lowest(wall, s) - residual > 0 for s in (a, b))
+        return all(
+            self._lowest(wall, s) - residual > 0 or self._is_never_met(wall, s, residual) for s in (a, b)
+        )
+
+    def _is_never_met(self, wall: Wall, s: Rational, residual: Number) -> bool:
+        """Tell whether f > 0 over a period for a particle that rests where the flight is at s."""
+        if self.table.turn is None:
+            return False
+        still = SignedFlight(self.table, self.at_rest(s), None, {wall: residual})
+        pieces = itertools.pairwise(still.cuts(ZERO, self.table.turn))
+        return all(still.is_positive(wall, *piece) for piece in pieces)
 
     def _lowest(self, wall: Wall, s: Rational) -> Number:
         laws, (x, y) = self.table.laws, self.place(s)

@@ -31,6 +31,13 @@ class SearchedFlight(BallFlight):
         """Take f(0) of a wall out of its function; `residual` gives it where an earlier flight fixed it."""
         self.residuals[wall] = self.jet(wall, ZERO)[0] if residual is None else residual
 
+    def resting(self, wall: Wall, s: Rational) -> SearchedFlight:
+        """Return the flight of a particle that rests where this one is at s, with the wall's residual."""
+        still = SearchedFlight(self.table, self.at_rest(s), None)
+        if wall in self.residuals:
+            still.leave(wall, self.residuals[wall])
+        return still
+
     def jet(self, wall: Wall, s: Number, within: Rational | None = None) -> Jet:
         """See `BallFlight`.
 

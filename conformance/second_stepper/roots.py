@@ -3,7 +3,10 @@
 Intervals are taken left first. One is passed when f > 0 on all of it: as it is enclosed, or by the expansion
 about its middle, f(m) + f'(m) d + f'' d^2 / 2 with f'' over the interval (f' is Lipschitz, so this holds
 across knots too). One on which f' < 0 and whose ends have opposite signs holds the root, the only one there.
-Everything else is halved. From the wall being left f(0) = 0, and f(s) >= s (f'(0) + s min f'' / 2).
+Everything else is halved; where it is longer than a period, it is also passed when particles that rest where
+it begins and ends are not met in a whole one. With laws held still f is concave along a flight, so that it is
+above 0 between such places whatever the phase. From the wall being left f(0) = 0, and
+f(s) >= s (f'(0) + s min f'' / 2).
 """
 
 from __future__ import annotations
@@ -18,6 +21,7 @@ from conformance.second_stepper.flight import SearchedFlight
 from scene import Wall
 
 UNIT = arb(0, 1)  # the ball [-1, 1]
+MAX_SPLITS = 500  # of a period, to see that a particle at rest is not met
 
 
 class RootBracket(NamedTuple):
@@ -82,11 +86,35 @@ def first_root(
                 if b - a < least:
                     raise OpenQuestion(f"f of {wall} has no sign near {float(b.p) / float(b.q)!r}")
                 continue
+        if is_never_swept(flight, wall, a, b):
+            continue
         if b - a < least:
             raise OpenQuestion(f"f and f' of {wall} vanish together, as far as this precision shows")
         middle = (a + b) / 2
         todo += [(middle, b), (a, middle)]
     return None
+
+
+def is_never_swept(flight: SearchedFlight, wall: Wall, a: Rational, b: Rational) -> bool:
+    """Tell whether a wall never comes to where a flight is at a, nor to where it is at b, a period later."""
+    turn = flight.table.turn
+    if turn is None or b - a < turn:
+        return False
+    return all(_is_never_met(flight.resting(wall, s), wall, turn) for s in (b, a))
+
+
+def _is_never_met(still: SearchedFlight, wall: Wall, turn: Rational) -> bool:
+    todo = [(fmpq(0), turn)]
+    for _ in range(MAX_SPLITS):
+        if not todo:
+            return True
+        a, b = todo.pop()
+        found = _judged(still, wall, a, b) if still.jet(wall, arb(a))[0] > 0 else "met"
+        if found not in ("positive", "open"):
+            return False
+        if found == "open":
+            todo += [((a + b) / 2, b), (a, (a + b) / 2)]
+    return False
 
 
 def _lifts(flight: SearchedFlight, wall: Wall, b: Rational) -> bool:

@@ -176,6 +176,13 @@ def ends_alone(at: SearchedFlight, wall: Any, a: Any, b: Any) -> Any:
     return None if at.jet(wall, arb(b))[0] > 0 else first_root(at, wall, a, b)
 
 
+@replacing(roots, "is_never_swept")
+def swept_begins_alone(at: SearchedFlight, wall: Any, a: Any, b: Any) -> bool:
+    """A wall is not met over many periods if it never comes to where the flight is at their begin."""
+    turn = at.table.turn
+    return turn is not None and b - a > turn and roots._is_never_met(at.resting(wall, a), wall, turn)
+
+
 def rounded_rates(scene: Scene, state: State, t_end: float) -> Outcome:
     """Answer a step in binary64, the wall's speed taken at the time of day as it rounds to binary64."""
     answer = next_collision(scene, state, t_end)

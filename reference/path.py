@@ -39,7 +39,8 @@ def trajectory(
         n_collisions: how many collisions to follow, 0 to 1,000,000.
         t_end: horizon [time], None for none: then a particle that is never met ends, a Horizon, at the
             flight time 2^1000.
-        digits: decimals wanted of the last state, relative to the size of its vectors; 1 to 10,000.
+        digits: decimals wanted of the last state, relative to the size of its vectors; 1 to 10,000. A place
+            that may be 0 is known to so many of the last flight's length.
         working: decimals to work with, and no more: the path ends, undecided, where they no longer tell
             what comes next, whatever `digits` says. By default they are doubled until they serve.
         is_differentiated: chain the steps' Jacobians too.

@@ -103,6 +103,8 @@ def checked_state(scene: Scene, state: State, t_end: float) -> State:
 def require_digits(found: ProvedCollision, digits: int) -> None:
     """Insist on the digits asked for: of dt, and of velocity and place relative to their vectors.
 
+    A place that may be 0, as on a path through the middle of a base, has digits of the flight's length.
+
     Raises:
         Undecidable: there are fewer.
     """
@@ -110,6 +112,8 @@ def require_digits(found: ProvedCollision, digits: int) -> None:
     vectors = {"dt": (found.dt,), "velocity": (after.vx, after.vy), "place": (after.x, after.y)}
     for name, vector in vectors.items():
         size = max(abs(number.centre()) for number in vector)
+        if name == "place" and all(number.contains(0.0) for number in vector):
+            size = found.dt.centre() * max(abs(number.centre()) for number in vectors["velocity"])
         if max(number.extent() for number in vector) > bound * size:
             raise Undecidable(f"{name} is enclosed too widely")
 

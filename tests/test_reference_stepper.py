@@ -104,6 +104,17 @@ def test_trajectory_encloses_its_last_state():
         assert a.width() < 1e-28
 
 
+def test_a_path_through_the_middle_of_the_base_has_its_digits_there():
+    """Its place there is 0, of which no share can be known."""
+    disk = Cap(r=Fourier(mean=1.0, omega=1.0, sin=(0.25,)))
+    for n in (2, 4):
+        path = reference.trajectory(disk, State(0.0, 0.0, 0.0, 3.0, 7.0, "base"), n, digits=25)
+        last = path.steps[-1]
+        assert [step.wall for step in path.steps] == ["arc", "base"] * (n // 2)
+        assert last.after.x.contains(0.0)
+        assert 0 < last.after.x.width() < 1e-25 * last.dt.hi * 8
+
+
 def test_trajectory_ends_at_its_horizon_and_at_corners():
     path = reference.trajectory(load("moving-cap"), State(0.0, 0.1, 0.3, 10.0, 7.0), 99, t_end=0.5)
     assert isinstance(path.outcome, reference.Horizon)

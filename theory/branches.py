@@ -72,13 +72,23 @@ class Branch(NamedTuple):
         p: Floats = np.exp(-self.evaluate(x)[3])
         return p
 
-    def below(self, series: Floats, levels: Floats) -> Floats:
-        """Return the probability of being captured here with the series' value <= each level."""
+    def below(self, series: Floats, levels: Floats, blur: float = 0.0) -> Floats:
+        """Return the probability of being captured here with the series' value <= each level.
+
+        Args:
+            series: of the branch.
+            levels: (n,) any values.
+            blur: where the series changes by no more it is constant, and all who are captured have one value:
+                what it seems to do there is rounding. They are counted from `blur` below that value on.
+        """
         total = np.zeros_like(levels)
         bounds = turns(series)
         p = self.chaotic(bounds)
         values = at(series, bounds)
         for i in range(len(bounds) - 1):
+            if abs(values[i + 1] - values[i]) <= blur:
+                total += np.where(levels >= values[i : i + 2].min() - blur, p[i] - p[i + 1], 0.0)
+                continue
             is_rising = values[i + 1] > values[i]
             u = crossing(series, bounds[i], bounds[i + 1], levels)
             # A level that is met at no inner point has an end for its place; p at the ends is known already.
@@ -92,11 +102,15 @@ def at(series: Floats, x: Floats) -> Floats:
     return np.asarray(chebyshev.chebval(2 * x - 1, series), dtype=np.float64)
 
 
+def noise(series: Floats) -> float:
+    """Return what a series of s may change by where it is constant, by rounding."""
+    return float(max(64 * np.finfo(float).eps * np.max(np.abs(series)), UNRESOLVED))
+
+
 def turns(series: Floats) -> Floats:
     """Return 0, the places in (0, 1) at which the series, given by its coefficients, turns, and 1."""
     values = at(series, X)
-    noise = max(64 * np.finfo(float).eps * np.max(np.abs(series)), UNRESOLVED)
-    slopes = np.where(np.abs(np.diff(values)) > noise, np.sign(np.diff(values)), 0)
+    slopes = np.where(np.abs(np.diff(values)) > noise(series), np.sign(np.diff(values)), 0)
     told = np.flatnonzero(slopes)
     rate = chebyshev.chebder(series)
     found = [0.0]
@@ -129,6 +143,8 @@ class Node(NamedTuple):
     branches: the same particles as functions of place.
     p_top: probability of being in the chaotic zone at its top.
     passed, gain: probability of not being captured on its own panels, and the gain in log E of that.
+    s_nc: gain in log E of passing the whole valley uncaptured (Eq:lnEnc/E0), summed before it is rounded: of
+        gains that cancel no rounding is left.
     """
 
     weights: Floats
@@ -138,6 +154,7 @@ class Node(NamedTuple):
     p_top: float
     passed: float
     gain: float
+    s_nc: float
 
     def all_branches(self) -> Iterator[Branch]:
         """Yield all panels, a valley's own before its children's."""
@@ -149,11 +166,6 @@ class Node(NamedTuple):
     def p_nc(self) -> float:
         """Probability of passing the whole valley uncaptured (Eq:ps)."""
         return self.passed * float(np.prod([child.p_nc for child in self.children]))
-
-    @property
-    def s_nc(self) -> float:
-        """Gain in log E of passing it uncaptured (Eq:lnEnc/E0)."""
-        return self.gain + sum(child.s_nc for child in self.children)
 
 
 @guarded
@@ -203,4 +215,5 @@ def _node(found: Captures, window: Window, branches: Iterator[Branch]) -> Node:
         float(ctx.exp(-window.A_top)),
         float(ctx.exp(-spent)),
         float(window.B_end - window.B_top - spent),
+        float(window.s_nc),
     )

@@ -21,13 +21,14 @@ from numpy.typing import ArrayLike, NDArray
 
 from scene.refusal import BadInput, check_count, check_number, shown
 from scene.tables import Scene
-from theory.branches import Branch, Floats, Node, X, at, tree
+from theory.branches import UNRESOLVED, Branch, Floats, Node, X, at, noise, tree
 from theory.given import finite_array
 
 STEP = 2.0**-12  # the lattice's, at best, and as a share of one cycle's reach
 LEAST_REACH = 1e-12  # of s in a cycle; below, its differences are partly rounding
 MAX_POINTS = 2**20
 MAX_CYCLES = 10_000
+KEPT = 4 * UNRESOLVED  # of s: who gains or loses less keeps the energy, and how the sign falls is rounding
 LARGEST_EXPONENT = 600.0  # exp of it stays finite, and so do sums
 
 Complexes = NDArray[np.complex128]
@@ -53,13 +54,17 @@ class Energies:
         s = finite_array("s", s)
         total = np.zeros_like(s)
         for branch in self.root.all_branches():
-            total += np.exp(-branch.absorbed) * branch.below(branch.s, s)
+            total += np.exp(-branch.absorbed) * branch.below(branch.s, s, noise(branch.s))
         return total + self._often.often_below(s) if self._often else total
 
     def cdf(self, s: Floats) -> Floats:
         """Return the probability of log E1 / E0 <= s."""
         s = finite_array("s", s)
-        return self.captured_below(s) + np.where(s >= self.s_nc, self.p_nc, 0.0)
+        return self.captured_below(s) + np.where(s >= self.s_nc - UNRESOLVED, self.p_nc, 0.0)
+
+    def lost(self) -> float:
+        """Return the probability of E1 < E0, those apart who keep their energy but for rounding."""
+        return float(self.cdf(np.array([-KEPT]))[0])
 
 
 def energies(found: Energies | Scene) -> Energies:
@@ -119,6 +124,14 @@ class Lattice:
         """Return the masses at `places` that have this Fourier transform."""
         return np.roll(np.fft.irfft(transform, self.n_points), -self.first)
 
+    def still(self) -> Complexes:
+        """Return the transform of those who keep their energy: in every valley, or as the uncaptured do.
+
+        They are an atom at s = 0, which the lattice shares among its points.
+        """
+        kept = abs(self.s_nc) <= KEPT and not _is_still(self.root)
+        return self._still(self.root) + (self.root.p_nc if kept else 0.0)
+
     def often_below(self, s: Floats) -> Floats:
         """Return the probability of being captured twice or more and ending at or below each s."""
         once = sum(np.exp(-b.absorbed) * self._captured(b) for b in self.root.all_branches())
@@ -132,6 +145,18 @@ class Lattice:
             found *= self._transform(child)
         for branch in node.branches:
             found += self._captured(branch) / node.p_top
+        return found
+
+    def _still(self, node: Node) -> Complexes:
+        found = np.zeros(self.n_points // 2 + 1, dtype=np.complex128)
+        if abs(node.gain) <= KEPT:
+            found += node.passed
+            for child in node.children:
+                found *= self._still(child)
+        gains = np.split(node.s, max(len(node.branches), 1))  # from the valley's top, panel after panel
+        for branch, gain in zip(node.branches, gains, strict=False):
+            if np.abs(gain).max() <= KEPT:
+                found += self._captured(branch) / node.p_top
         return found
 
     def _captured(self, branch: Branch) -> Complexes:
@@ -149,6 +174,11 @@ class Lattice:
 def cumulated(masses: Floats) -> Floats:
     """Return the distribution function at points whose masses lie spread around them."""
     return np.cumsum(masses) - masses / 2
+
+
+def _is_still(node: Node) -> bool:
+    """Tell whether the uncaptured keep their energy in every valley."""
+    return abs(node.gain) <= KEPT and all(map(_is_still, node.children))
 
 
 def _reach(node: Node, s_nc: float) -> tuple[float, float]:

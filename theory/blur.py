@@ -111,7 +111,7 @@ class FiniteEnergy:
         self.scene, self.energy = as_mushroom(scene), check_number("energy", energy)
         if not 0 < energy <= LARGEST:
             raise BadInput(f"energy = {energy}, must be > 0 and at most 2^1000")
-        with np.errstate(over="ignore", invalid="ignore"):  # lags as large as log E itself: refused below
+        with np.errstate(all="ignore"):  # lags as large as log E itself: refused below
             self._solve()
             is_one = self.atoms.variance.max() < MOST and self.variance_s > 0 and self.peak[1] > 0
         if not is_one:

@@ -16,7 +16,7 @@ from mpmath import MPContext
 from scene.refusal import BadInput, check_count
 from scene.tables import Scene, period
 from theory.constants import guarded, settle
-from theory.given import MAX_DIGITS, check_real
+from theory.given import MAX_DIGITS, one_of
 from theory.parameters import MovingMushroom
 from theory.valleys import CapturePiece, Valley, stretches, tolerance, valley
 from theory.volumes import as_mushroom
@@ -90,6 +90,7 @@ class Cycle:
         Raises:
             BadInput: no particle is captured at that nu.
         """
+        nu = one_of(self.ctx, "nu", nu)
         return self._piece(nu).capture.time(nu)
 
     @guarded
@@ -99,6 +100,7 @@ class Cycle:
         Raises:
             BadInput: no particle is captured at that nu.
         """
+        nu = one_of(self.ctx, "nu", nu)
         return self._piece(nu).release.time(nu)
 
     @guarded
@@ -107,8 +109,7 @@ class Cycle:
 
         Source: trelease.
         """
-        check_real(t=t)
-        t = self.ctx.mpf(t)
+        t = one_of(self.ctx, "t", t)
         if self.period is None:
             return t
         shift = self.ctx.floor((t - self.start) / self.period) * self.period
@@ -119,10 +120,10 @@ class Cycle:
         return t
 
     def _piece(self, nu: Any) -> CapturePiece:
-        check_real(nu=nu)
         for piece in self.pieces:  # a valley's own pieces come first: the first that fits is the earliest
             if piece.nu_lower <= nu <= piece.nu_upper:
                 return piece
+        given = self.ctx.nstr(nu, 15)
         if not self.pieces:
-            raise BadInput(f"nu = {nu}: nothing is captured, nu is constant")
-        raise BadInput(f"nu = {nu}, must be in [{float(self.nu_min):.6g}, {float(self.nu_max):.6g}]")
+            raise BadInput(f"nu = {given}: nothing is captured, nu is constant")
+        raise BadInput(f"nu = {given}, must be in [{float(self.nu_min):.6g}, {float(self.nu_max):.6g}]")

@@ -246,8 +246,9 @@ def sum_of_cycles(found: Energies | Scene, n_cycles: int, *, q: float = 0.0) -> 
 
     Returns:
         The distribution. Mass is 1 to rounding, the mean n m1 within 1e-7 n R, the variance n sd^2 within
-        n (step^2 / 4 + 1e-7 R^2) and the mean of exp(-s) 1 within n (step^2 / 4 + 1e-7 R), R the reach of s
-        in one cycle, at least LEAST_REACH.
+        n (step^2 / 4 + 1e-7 R^2) and, at q = -1, the mean of exp(-s) 1 within n (step^2 / 4 + 1e-7 R), R the
+        reach of s in one cycle, at least LEAST_REACH. At q = 0 that mean is off by 1e-15 exp(n L) more, L the
+        largest loss in a cycle: of many cycles it is made by tails that are rounding there.
 
     Raises:
         BadInput: n_cycles out of bounds.

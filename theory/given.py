@@ -7,13 +7,14 @@ Each raises `BadInput` with one line. Scenes, whole numbers and binary64 numbers
 from __future__ import annotations
 
 from collections.abc import Iterable
+from functools import partial
 from numbers import Real
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from scene.refusal import BadInput, shown
+from scene.refusal import BadInput, check_number, shown
 
 MAX_DIGITS = 1000  # excludes nonsense; so many digits of the moving cap may take far over ten minutes
 MAX_ORDER = 64  # of moments and cumulants
@@ -47,6 +48,52 @@ def check_real(**numbers: object) -> None:
             raise BadInput(f"{field} = {number}, must be finite")
 
 
+def in_system(ctx: Any, **numbers: object) -> list[Any]:
+    """Return numbers as those of a number system: of numpy binary64 or arrays of it, else one number each.
+
+    A number of another kind, a fraction say, would be reckoned with by its own rules, or never come to rest.
+
+    Args:
+        ctx: the number system.
+        numbers: by field name.
+
+    Raises:
+        BadInput: naming field, value and bound.
+    """
+    check_system(ctx)
+    one = _of_numpy if ctx is np else partial(one_of, ctx)
+    return [one(field, number) for field, number in numbers.items()]
+
+
+def _of_numpy(field: str, number: Any) -> Any:
+    if isinstance(number, np.ndarray):
+        return finite_array(field, number)
+    return np.float64(check_number(field, number))
+
+
+def one_of(ctx: Any, field: str, number: Any) -> Any:
+    """Return a finite real number as one of a number system that has no arrays.
+
+    Raises:
+        BadInput: naming field, value and bound.
+    """
+    if isinstance(number, np.ndarray):
+        if number.ndim:
+            raise BadInput(f"{field} = {shown(number)}, must be one number: arrays go with numpy")
+        number = finite_array(field, number).item()
+    check_real(**{field: number})
+    if isinstance(number, ctx.mpf):
+        return number
+    if isinstance(number, np.generic):
+        number = number.item() if isinstance(number, np.integer) else float(number)
+    try:
+        found = ctx.mpf(number)
+    except OverflowError:
+        raise BadInput(f"{field} = {shown(number)}, must be a finite binary64 number") from None
+    check_real(**{field: found})
+    return found
+
+
 def real_numbers(ctx: Any, field: str, values: object) -> list[Any]:
     """Return numbers of a context from floats, mpf or decimal strings.
 
@@ -63,8 +110,7 @@ def real_numbers(ctx: Any, field: str, values: object) -> list[Any]:
             except ValueError:
                 raise BadInput(f"{field}[{i}] = {shown(value)}, must be a decimal number") from None
         else:
-            check_real(**{f"{field}[{i}]": value})
-            number = ctx.mpf(value)
+            number = one_of(ctx, f"{field}[{i}]", value)
         check_real(**{f"{field}[{i}]": number})
         found.append(number)
     return found
@@ -87,7 +133,8 @@ def finite_array(field: str, values: ArrayLike, n_dimensions: int | None = None)
         raise BadInput(f"{field} must be an array of numbers, its rows of one length") from None
     if given.dtype.kind not in "iuf" and given.size:
         raise BadInput(f"{field} = {shown(given.ravel()[0])}, must be finite numbers")
-    found: NDArray[np.float64] = given.astype(np.float64)
+    with np.errstate(over="ignore"):  # of wider floats: refused as infinite
+        found: NDArray[np.float64] = given.astype(np.float64)
     if not np.all(np.isfinite(found)):
         raise BadInput(f"{field} holds {found[~np.isfinite(found)][0]}, must be finite")
     if n_dimensions is not None and found.ndim != n_dimensions:

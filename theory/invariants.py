@@ -9,16 +9,15 @@ from typing import Any
 
 import numpy as np
 
-from scene.refusal import BadInput, shown
-from theory.given import check_real, check_system
+from scene.refusal import BadInput, check_number, shown
+from theory.given import check_real, in_system
 from theory.volumes import v_cap
 
 
 def energy(ctx: Any, vx: Any, vy: Any) -> Any:
     """Return H = (vx^2 + vy^2) / 2 [length^2 / time^2]. Source: sec. 2."""
-    check_system(ctx)
-    check_real(vx=vx, vy=vy)
-    return ctx.mpf(vx * vx + vy * vy) / 2
+    vx, vy = in_system(ctx, vx=vx, vy=vy)
+    return (vx * vx + vy * vy) / 2
 
 
 def sin_phi_hat(ctx: Any, x: Any, y: Any, vx: Any, vy: Any, r: Any) -> Any:
@@ -42,13 +41,13 @@ def sin_phi_hat(ctx: Any, x: Any, y: Any, vx: Any, vy: Any, r: Any) -> Any:
 
     Source: Eq:sinphi.
     """
-    check_system(ctx)
-    check_real(x=x, y=y, vx=vx, vy=vy, r=r)
+    x, y, vx, vy, r = in_system(ctx, x=x, y=y, vx=vx, vy=vy, r=r)
     speed = ctx.hypot(vx, vy)
     if not np.all(speed > 0):
         raise BadInput("vx = vy = 0: a particle at rest has no direction")
     _check_positive("r", r)
-    return (y * vx - x * vy) / (speed * r)
+    # Of lengths and speeds as large or small as binary64 holds, products would be beyond it.
+    return (y / r) * (vx / speed) - (x / r) * (vy / speed)
 
 
 def cap_invariant(ctx: Any, vx: Any, vy: Any, r: Any) -> Any:
@@ -67,16 +66,24 @@ def log_energy_rate_chaotic(v_cha: Any, v_cap: Any, v_cha_rate: Any, delta_rate:
 
     Source: Eq:dE.
     """
-    check_real(v_cha=v_cha, v_cap=v_cap, v_cha_rate=v_cha_rate, delta_rate=delta_rate)
+    _check_held(v_cha=v_cha, v_cap=v_cap, v_cha_rate=v_cha_rate, delta_rate=delta_rate)
     _check_positive("v_cha", v_cha)
     return -(v_cha_rate + v_cap * delta_rate) / v_cha
 
 
 def log_energy_rate_island(v_cap: Any, v_cap_rate: Any) -> Any:
     """Return d log E / dt in the island, -V_cap' / V_cap. Source: Eq:dEe."""
-    check_real(v_cap=v_cap, v_cap_rate=v_cap_rate)
+    _check_held(v_cap=v_cap, v_cap_rate=v_cap_rate)
     _check_positive("v_cap", v_cap)
     return -v_cap_rate / v_cap
+
+
+def _check_held(**numbers: object) -> None:
+    """Refuse what is no finite real number, and integers whose quotients no float holds."""
+    check_real(**numbers)
+    for field, number in numbers.items():
+        if isinstance(number, int):
+            check_number(field, number)
 
 
 def _check_positive(field: str, size: Any) -> None:

@@ -20,7 +20,7 @@ from scene.transforms import backwards
 from theory.adiabatic import Captures, NotConverged
 from theory.constants import guarded
 from theory.cycle import GUARD, Cycle
-from theory.given import MAX_DIGITS, MAX_ORDER
+from theory.given import MAX_DIGITS, MAX_ORDER, one_of
 from theory.measure import logarithm
 from theory.solutions import solved
 from theory.volumes import as_mushroom
@@ -87,6 +87,8 @@ def predict(
 
     Source: Eq:ps, Eq:Erate, Eq:lnE/E0, Eq:lnEnc/E0.
     """
+    if not (progress is None or callable(progress)):
+        raise BadInput(f"progress = {shown(progress)}, must be a function")
     return Prediction(*converged(scene, digits, _figures, progress))
 
 
@@ -96,7 +98,7 @@ def mean_of(scene: Scene, f: Callable[[Any], Any], digits: int = 15) -> Any:
 
     Args:
         scene: as for `predict`.
-        f: takes and returns an mpf; smooth.
+        f: takes an mpf, returns one or another finite real number; smooth.
         digits: correct significant digits wanted.
 
     Raises:
@@ -104,7 +106,11 @@ def mean_of(scene: Scene, f: Callable[[Any], Any], digits: int = 15) -> Any:
     """
     if not callable(f):
         raise BadInput(f"f = {shown(f)}, must be a function")
-    return converged(scene, digits, lambda found: (found.mean(f),))[0]
+
+    def value(s: Any) -> Any:
+        return one_of(s.context, "f(s)", f(s))
+
+    return converged(scene, digits, lambda found: (found.mean(value),))[0]
 
 
 @guarded

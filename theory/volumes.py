@@ -17,7 +17,7 @@ from scene.laws import Law, value
 from scene.refusal import BadInput, check_scene
 from scene.tables import Mushroom, Scene, cycle_length
 from scene.transforms import scaled
-from theory.given import check_real, check_system
+from theory.given import in_system
 
 FAR = 100  # powers of two of a length or a time, beyond which others are taken for units
 WIDE = 0.75  # nu from which the island's share is summed as a series
@@ -39,9 +39,7 @@ class Volumes(NamedTuple):
 
 def v_cap(ctx: Any, r: Any) -> Any:
     """Return pi^2 r^2, the volume over the half disk of radius r [length]. Source: Eq:Vcap."""
-    check_system(ctx)
-    check_real(r=r)
-    return _over_cap(ctx, r)
+    return _over_cap(ctx, *in_system(ctx, r=r))
 
 
 def _over_cap(ctx: Any, r: Any) -> Any:
@@ -50,9 +48,7 @@ def _over_cap(ctx: Any, r: Any) -> Any:
 
 def v_stem(ctx: Any, w: Any, h: Any, slope: Any) -> Any:
     """Return 2 pi (2 w h - h^2 slope), the volume over the stem. Source: Eq:Vcap."""
-    check_system(ctx)
-    check_real(w=w, h=h, slope=slope)
-    return _over_stem(ctx, w, h, slope)
+    return _over_stem(ctx, *in_system(ctx, w=w, h=h, slope=slope))
 
 
 def _over_stem(ctx: Any, w: Any, h: Any, slope: Any) -> Any:
@@ -72,8 +68,7 @@ def delta(ctx: Any, nu: Any) -> Any:
 
     Source: the equation after volisl.
     """
-    check_system(ctx)
-    _check_nu(nu)
+    nu = _checked_nu(ctx, nu)
     if isinstance(nu, np.ndarray):
         found, is_wide = np.empty(nu.shape), nu > WIDE
         found[is_wide], found[~is_wide] = _small_island(ctx, nu[is_wide]), _island(ctx, nu[~is_wide])
@@ -104,8 +99,7 @@ def free_share(ctx: Any, nu: Any) -> Any:
     Raises:
         BadInput: nu is outside [0, 1].
     """
-    check_system(ctx)
-    _check_nu(nu)
+    nu = _checked_nu(ctx, nu)
     return 2 * (ctx.asin(nu) + nu * ctx.sqrt((1 - nu) * (1 + nu))) / ctx.pi
 
 
@@ -115,15 +109,15 @@ def delta_slope(ctx: Any, nu: Any) -> Any:
     Raises:
         BadInput: nu is outside [0, 1].
     """
-    check_system(ctx)
-    _check_nu(nu)
+    nu = _checked_nu(ctx, nu)
     return -4 * ctx.sqrt((1 - nu) * (1 + nu)) / ctx.pi
 
 
-def _check_nu(nu: Any) -> None:
-    check_real(nu=nu)
+def _checked_nu(ctx: Any, nu: Any) -> Any:
+    (nu,) = in_system(ctx, nu=nu)
     if not (np.all((nu >= 0) & (nu <= 1)) if isinstance(nu, np.ndarray) else 0 <= nu <= 1):
         raise BadInput(f"nu = {nu}, must be in [0, 1]")
+    return nu
 
 
 def v_ell(ctx: Any, r: Any, nu: Any) -> Any:
@@ -133,8 +127,9 @@ def v_ell(ctx: Any, r: Any, nu: Any) -> Any:
 
 def v_cha(ctx: Any, r: Any, w: Any, h: Any, slope: Any) -> Any:
     """Return V_cap + V_stem - V_ell, the chaotic zone's volume. Source: vchs."""
-    cap, stem = v_cap(ctx, r), v_stem(ctx, w, h, slope)
-    if not r > 0:
+    r, w, h, slope = in_system(ctx, r=r, w=w, h=h, slope=slope)
+    cap, stem = _over_cap(ctx, r), _over_stem(ctx, w, h, slope)
+    if not np.all(r > 0):
         raise BadInput(f"r = {r}, must be > 0")
     return cap * free_share(ctx, w / r) + stem
 
@@ -152,8 +147,9 @@ def volumes_at(ctx: Any, scene: Scene, t: Any) -> Volumes:
         BadInput: no scene, no number system or no finite time.
     """
     mushroom = as_mushroom(scene)
-    check_system(ctx)
-    check_real(t=t)
+    (t,) = in_system(ctx, t=t)
+    if ctx is np:
+        t = np.asarray(t)
 
     def at(law: Law) -> Any:
         return value(ctx, law, t)

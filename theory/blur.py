@@ -84,7 +84,7 @@ class NextOrder(NamedTuple):
     mean_s, captured_mean, peak_mean, p_nc: the square of the lags in the place where each enters; of means
         also what the variance leaves out, for a quarter of it is their drift.
     variance: of the peak, relatively: as much as the kicks' memory took off, twice what moving sides do to
-        it, and the rates' own errors.
+        it, and the rates' own errors. With captures up to three times as much is seen (theory/equations.md).
     skewness: of the kicks: blocks as long as twice their memory are taken to be independent, and each to
         have a skewness of at most 1.
     """

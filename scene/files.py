@@ -107,10 +107,11 @@ def locked(folder: Path) -> Iterator[None]:
             file.seek(0)
             holder = file.read(200) or "another process"
             raise BadInput(f"folder {str(folder)!r} is in use by {holder}: one run at a time")
-        file.truncate(0)
-        file.write(f"process {os.getpid()} on {platform.node()}")
-        file.flush()
         try:
+            file.truncate(0)
+            # Past the buffer: what a full disk does not take would stay in it, and fail unnamed on closing.
+            with _named(path):
+                os.write(file.fileno(), f"process {os.getpid()} on {platform.node()}".encode())
             yield
         finally:
             with suppress(PermissionError):  # Windows removes no open file; one that nobody holds is harmless

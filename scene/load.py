@@ -54,7 +54,7 @@ def read_data(source: str | Path) -> Any:
             f"scene {name!r} is neither a .toml or .json file nor one of: {', '.join(catalogue())}"
         )
     try:
-        text = path.read_text("utf-8")
+        text = path.read_text("utf-8-sig")  # without the mark that some editors put before it
         return tomllib.loads(text) if path.suffix == ".toml" else json.loads(text, object_pairs_hook=_once)
     except OSError as error:
         raise InvalidScene(f"scene {name!r} cannot be read: {error.strerror}") from None
@@ -128,6 +128,7 @@ def _fields_in_words(place: str, given: Any, is_unknown: bool, field: str) -> st
     tag = given["kind" if place else "table"]
     valid = ", ".join(("kind" if place else "table", *_kinds(place)[tag].__struct_fields__))
     if is_unknown:
+        field = field if len(field) <= 60 else f"{field[:57]}..."
         return f"{place or 'scene'} has an unknown field `{field}`, must be one of {valid}"
     return f"{place or 'scene'}: missing required field `{field}`; a {tag} has {valid}"
 

@@ -138,6 +138,18 @@ def test_bad_files_are_refused_in_one_line_that_names_them(tmp_path, name, text,
     assert name in found
 
 
+def test_a_byte_order_mark_is_no_part_of_a_file(tmp_path):
+    for name, text in (("a.toml", 'table = "cap"\nr = 1.0\n'), ("a.json", '{"table": "cap", "r": 1.0}')):
+        (tmp_path / name).write_text(text, "utf-8-sig")
+        assert load(tmp_path / name) == from_data(CAP)
+
+
+def test_a_key_of_any_length_is_refused_in_a_short_line():
+    with pytest.raises(InvalidScene, match=r"unknown field `k+\.\.\.`, must be one of") as refusal:
+        from_data({**CAP, "k" * 100_000: 1.0})
+    assert len(str(refusal.value)) < 300
+
+
 def test_files_that_cannot_be_read(tmp_path):
     (tmp_path / "folder.toml").mkdir()
     assert "cannot be read" in refusal(load, tmp_path / "folder.toml")

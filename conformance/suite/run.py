@@ -141,7 +141,7 @@ def read_known(path: Path) -> frozenset[str]:
         BadInput: naming the line whose id the suite does not have, or that comes twice.
     """
     try:
-        lines = path.read_text("utf-8").splitlines()
+        lines = path.read_text("utf-8-sig").splitlines()
     except (OSError, UnicodeDecodeError) as error:
         raise BadInput(f"known failures {str(path)!r} cannot be read: {error}") from None
     ids = {vector.id for vector in vectors.load("stress")} | set(OTHER_CASES)

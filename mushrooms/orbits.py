@@ -21,12 +21,13 @@ import numpy.typing as npt
 from mpmath import fp
 
 import scene as scenes
+from fast.given import given_energy
 from mushrooms.output import import_arrow
 from scene import Outcome, Scene, State, Stem, Wall
 from scene.files import write_file
 from scene.geometry import TableAt, half_width, table_at
 from scene.laws import values
-from scene.refusal import BadInput, check_count, check_number, check_scene, check_seed
+from scene.refusal import BadInput, check_count, check_scene, check_seed
 from scene.tables import cycle_length
 
 FloatArray = npt.NDArray[np.float64]
@@ -217,8 +218,8 @@ def follow(
     Args:
         scene: table and laws.
         n_collisions: of each particle, 1 to 10^6.
-        energy: v^2 / 2 at the start [length^2 / time^2], > 0; by default what crosses the table some
-            sixty times in a cycle.
+        energy: v^2 / 2 at the start [length^2 / time^2], > 0 and at most 2^800; by default what
+            crosses the table some sixty times in a cycle.
         seed: 0 to 2^64 - 1; particle i is particle i of `fast.simulate` at this energy and seed.
         n_orbits: how many particles, 1 to 1000.
 
@@ -229,9 +230,7 @@ def follow(
     n_collisions = check_count("n_collisions", n_collisions, 1, MAX_COLLISIONS)
     n_orbits = check_count("n_orbits", n_orbits, 1, MAX_ORBITS)
     seed = check_seed(seed)
-    energy = usual_energy(scene) if energy is None else check_number("energy", energy)
-    if not energy > 0:
-        raise BadInput(f"energy = {energy}, must be > 0")
+    energy = usual_energy(scene) if energy is None else given_energy(energy)
     from fast.starts import initial_states  # compiles for seconds: only when all that was given is right
 
     rows = initial_states(scene, n_orbits, energy, seed)

@@ -10,6 +10,7 @@ import numpy as np
 import pyarrow.parquet
 import pytest
 from mpmath import fp
+from PIL import Image
 from support.depth import deep_but
 from support.refusals import assert_refused
 
@@ -220,6 +221,24 @@ def test_figures_are_returned(moving):
     assert pictures.collision_map(moving).axes
     drawn = [line.get_label() for line in pictures.energy_in_time(moving[0]).axes[0].lines]
     assert drawn == ["this particle", "theory, given its stays", "theory, never captured"]
+
+
+@pytest.mark.parametrize("suffix", ["png", "gif"])
+def test_a_name_of_any_length_and_letter_is_a_title(command_line, tmp_path, recwarn, suffix):
+    sizes = []
+    for i, name in enumerate(["short", 1000 * "long" + "\\n" * 1000, "\U0001f344 $x$ \u00e4"]):
+        path = tmp_path / f"{i}.toml"
+        path.write_text(f'table = "cap"\nname = "{name}"\nr = 1.0\n', "utf-8")
+        picture = tmp_path / f"{i}.{suffix}"
+        assert command_line("draw", path, "--out", picture).code == 0
+        sizes.append(Image.open(picture).size)
+    assert np.ptp(sizes, axis=0).max() < 300  # pixels; without an end of lines, tens of thousands
+    assert not [warning for warning in recwarn if "Glyph" in str(warning.message)]
+
+
+def test_an_energy_beyond_squares_is_refused_by_its_name(command_line, tmp_path):
+    ended = command_line("draw", "moving-cap", "--section", "--energy", "1e308", "--out", tmp_path / "a.png")
+    assert_refused(ended, "--energy = 1e+308", "2^800")
 
 
 def test_notebooks_show_scenes_predictions_and_ensembles():

@@ -7,6 +7,10 @@ blue and filled, theory orange or black lines.
 from __future__ import annotations
 
 import io
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from itertools import islice
 from typing import Any, BinaryIO
 
 import numpy as np
@@ -18,6 +22,7 @@ from matplotlib.figure import Figure
 FloatArray = npt.NDArray[np.float64]
 
 BLUE, SKY, ORANGE, BLACK, GREY, GREEN = "#0072B2", "#A6CEE9", "#D55E00", "#1A1A1A", "#8C8C8C", "#009E73"
+LONGEST, MOST_LINES = 40, 3  # letters of a line, and lines, of a name in a title
 STYLE: dict[str, Any] = {
     "font.family": "sans-serif",
     "font.size": 10,
@@ -38,8 +43,12 @@ def phase_colours(n: int) -> list[str]:
 
 
 def plain(text: str) -> str:
-    """Return a text that a figure shows as it is: a dollar in it begins no formula."""
-    return text.replace("$", r"\$")
+    """Return a text that a figure shows as it is: a dollar in it begins no formula, and lines have an end.
+
+    A picture is made as wide as its title: the names of scenes may have any length.
+    """
+    lines = (line if len(line) <= LONGEST else line[: LONGEST - 1] + "…" for line in text.splitlines())
+    return "\n".join(islice(lines, MOST_LINES)).replace("$", r"\$")
 
 
 def new_figure(width: float, height: float, n_rows: int = 1, n_columns: int = 1) -> tuple[Figure, Any]:
@@ -49,10 +58,18 @@ def new_figure(width: float, height: float, n_rows: int = 1, n_columns: int = 1)
     return figure, figure.subplots(n_rows, n_columns)
 
 
+@contextmanager
+def any_letters() -> Iterator[None]:
+    """Draw a letter that the font lacks as a box, without a word: that tells enough."""
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", r"Glyph \d+")
+        yield
+
+
 def save(figure: Figure, file: BinaryIO, suffix: str) -> None:
     """Write a figure as ".svg", ".png" or ".pdf"; the bytes depend on the picture alone."""
     kind = suffix.removeprefix(".")
-    with rc_context(STYLE):
+    with rc_context(STYLE), any_letters():
         metadata = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}.get(kind)
         figure.savefig(file, format=kind, dpi=160, bbox_inches="tight", metadata=metadata)
 

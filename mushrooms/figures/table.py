@@ -113,6 +113,7 @@ def _write_animation(scene: Scene, file: BinaryIO) -> None:
 
 
 @rc_context(plots.STYLE)
+@plots.any_letters()
 def write_frames(
     scene: Scene, times: Sequence[float], prepare: Callable[[Axes], Callable[[int], str]], file: BinaryIO
 ) -> None:

@@ -19,6 +19,7 @@ from conformance import plain, vectors
 from conformance.mutants import MUTANTS, kill_matrix
 from conformance.suite import disguise, promises, property_checks, reports, session
 from conformance.suite import run as suite
+from conformance.suite.diagnosis import diagnose
 from conformance.suite.process import Trouble
 from conformance.suite.result import VERDICTS, Result, Run
 from conformance.suite.session import Limits, missing
@@ -100,6 +101,14 @@ def test_objections_say_what_is_wrong():
     assert "declined 2 of 3" in made("pass", "declined", "declined").objections()[0]
 
 
+def test_nothing_is_diagnosed_where_nothing_passed():
+    """Who refuses every question has the same vectors wrong as every mutant that spoils all answers."""
+    results = [replace(r, id=f"static-stem/{i}") for i, r in enumerate(made(*["fail"] * 20).results, start=1)]
+    assert diagnose(results) == []
+    passed = [replace(r, id=f"grazing/{i}", verdict="pass") for i, r in enumerate(results[:5], start=1)]
+    assert diagnose([*results, *passed])[0].startswith("like ")
+
+
 def test_at_level_stress_a_group_may_be_declined_but_not_all_that_is_asked():
     """Hits at the horizon within a unit in the last place are no reason to refuse a stepper."""
     levels = {"a": "core", "b": "stress"}
@@ -131,9 +140,12 @@ def test_a_known_failures_file_is_checked(tmp_path, text, word):
         suite.read_known(path)
 
 
-def test_known_failures_are_read(tmp_path):
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig"])
+def test_known_failures_are_read(tmp_path, encoding):
     path = tmp_path / "known.txt"
-    path.write_text("# ours\n\nbreathing-circle/1   # issue 7\nproperty/mirror\nfresh/2\ndrawn/60\n")
+    path.write_text(
+        "# ours\n\nbreathing-circle/1   # issue 7\nproperty/mirror\nfresh/2\ndrawn/60\n", encoding
+    )
     assert suite.read_known(path) == {"breathing-circle/1", "property/mirror", "fresh/2", "drawn/60"}
     with pytest.raises(BadInput, match="cannot be read"):
         suite.read_known(tmp_path / "absent.txt")

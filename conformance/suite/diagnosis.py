@@ -29,7 +29,8 @@ def diagnose(results: Sequence[Result]) -> list[str]:
     kept = [r for r in results if r.level and r.group not in (DRAWN, FRESH)]
     failed = {r.id for r in kept if r.verdict == "fail"}
     asked = failed | {r.id for r in kept if r.verdict == "pass"}
-    if not failed:
+    # Where nothing passed, every mutant that has the same vectors wrong is as like as any other.
+    if not failed or failed == asked:
         return []
     matrix = json.loads((resources.files("conformance") / "mutants" / "kill-matrix.json").read_bytes())
     killed: dict[str, set[str]] = {name: set() for name in matrix["mutants"]}

@@ -245,6 +245,8 @@ def run(arguments: list[str] | None = None) -> NoReturn:
 def _call(given: list[str]) -> NoReturn:
     _refuse_empty(given)
     try:
+        if given and not given[0].startswith("-"):  # the list of commands needs no library
+            _check_environment()
         with _ended_as_by_keyboard():
             code = typer.main.get_command(app)(given, prog_name=PROGRAM, standalone_mode=False)
         sys.stdout.flush()
@@ -257,11 +259,10 @@ def _call(given: list[str]) -> NoReturn:
     except OSError as error:
         _refuse(_in_words(error))
     except ValueError as error:
-        from scene.refusal import BadInput  # not above: the list of commands needs no scene
-
-        if not isinstance(error, BadInput):
+        told = _refused(error)
+        if told is None:
             raise
-        _refuse(_in_options(str(error), given))
+        _refuse(_in_options(told, given))
     except MemoryError:
         _refuse("not enough memory for so many particles")
     if code == INTERRUPTED:
@@ -269,6 +270,20 @@ def _call(given: list[str]) -> NoReturn:
         if kept and not _told:
             tell_interrupted(kept)
     sys.exit(code if isinstance(code, int) else 0)
+
+
+def _check_environment() -> None:
+    from mushrooms.environment import check_environment  # not above: the list of commands needs no scene
+
+    check_environment()
+
+
+def _refused(error: ValueError) -> str | None:
+    """Return what an error says of bad input; None when it is an error of the program."""
+    from mushrooms.environment import in_words
+    from scene.refusal import BadInput
+
+    return str(error) if isinstance(error, BadInput) else in_words(error)
 
 
 def _make_printable() -> None:
@@ -304,7 +319,7 @@ def _in_words(error: OSError) -> str:
     """Return what the system refused; of a file it gives the name (`scene.files` sees to that)."""
     if error.filename is None and error.errno in (errno.ENOSPC, errno.EIO, errno.EBADF, errno.EDQUOT):
         return f"standard output cannot be written: {error.strerror}"
-    return str(error)
+    return str(error) if error.filename is None else f"{os.fsdecode(error.filename)!r}: {error.strerror}"
 
 
 def _refuse_empty(given: list[str]) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import io
 import json
 import os
@@ -15,6 +16,7 @@ from support.depth import deep_but
 from support.refusals import assert_refused
 
 import theory
+from mushrooms.figures import table
 from mushrooms.main import COMMANDS, INTERRUPTED, NOTHING_KEPT, command, run
 from mushrooms.terminal import print_pairs, table_console
 
@@ -87,6 +89,44 @@ def test_an_empty_option_is_refused(command_line, tmp_path, monkeypatch, argumen
 )
 def test_a_refusal_names_the_option_and_what_is_valid(command_line, arguments, words):
     assert_refused(command_line(*arguments), *words)
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "word"),
+    [
+        ("NUMBA_NUM_THREADS", "0", ">= 1"),
+        ("NUMBA_NUM_THREADS", "many", ">= 1"),
+        ("SOURCE_DATE_EPOCH", "-1", ">= 0"),
+        ("SOURCE_DATE_EPOCH", "", ">= 0"),
+    ],
+)
+def test_a_variable_that_no_library_can_use_is_refused(command_line, monkeypatch, name, value, word):
+    monkeypatch.setenv(name, value)
+    assert_refused(command_line("theory", "moving-cap"), f"{name} = '{value}'", "a whole number", word)
+    assert command_line("--help").code == 0
+
+
+def test_a_backend_that_does_not_exist_is_refused(tmp_path):
+    done = subprocess.run(
+        [sys.executable, "-m", "mushrooms", "draw", "moving-cap", "--out", "a.svg"],
+        cwd=tmp_path,
+        env={**BUFFERED, "PYTHONPATH": str(ROOT), "MPLBACKEND": "bogus"},
+        capture_output=True,
+        text=True,
+        timeout=60,
+    )
+    assert_refused((done.returncode, done.stdout, done.stderr), "MPLBACKEND = 'bogus'", "agg")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_file_that_the_system_refuses_is_named_without_a_number(command_line, tmp_path, monkeypatch):
+    def full(_table, _suffix, file):
+        raise OSError(errno.EFBIG, os.strerror(errno.EFBIG))
+
+    monkeypatch.setattr(table, "write_picture", full)
+    ended = command_line("draw", "moving-cap", "--out", tmp_path / "a.svg")
+    assert_refused(ended, f"mushrooms: '{tmp_path / 'a.svg'}': File too large")
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_an_interruption_says_what_is_kept(command_line, monkeypatch):

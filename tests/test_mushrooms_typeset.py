@@ -2,6 +2,7 @@
 
 import pytest
 
+from mushrooms.reports.page import as_json
 from mushrooms.reports.typeset import typeset
 
 
@@ -38,3 +39,7 @@ def test_prose_is_left_alone(text):
 
 def test_what_could_be_markup_is_escaped():
     assert typeset("<script>a_b</script>") == "&lt;script&gt;<i>a</i><sub>b</sub>&lt;/script&gt;"
+
+
+def test_scenes_are_written_as_a_reader_sees_them():
+    assert as_json({"notes": "the captions' nu, größer"}) == '{"notes": "the captions\' nu, größer"}'

@@ -6,6 +6,7 @@ A page is one file: no scripts, and nothing is loaded from elsewhere.
 from __future__ import annotations
 
 import base64
+import json
 from typing import Any
 
 import jinja2
@@ -25,12 +26,18 @@ def render(template: str, **fields: Any) -> str:
     )
     environment.filters["number"] = number
     environment.filters["typeset"] = typeset
+    environment.filters["as_json"] = as_json
     return environment.get_template(template).render(version=__version__, **fields)
 
 
 def number(value: float | None, form: str) -> str:
     """Return a number in a format of Python's, such as ".2e" or ","; a dash when there is none."""
     return "–" if value is None else format(value, form)
+
+
+def as_json(value: Any) -> str:
+    """Return data as readers see it: jinja's own filter is for scripts and spells apostrophes by number."""
+    return json.dumps(value, ensure_ascii=False)
 
 
 def embed(svg: bytes) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import os
 import re
@@ -54,6 +55,8 @@ def read_data(source: str | Path) -> Any:
             f"scene {name!r} is neither a .toml or .json file nor one of: {', '.join(catalogue())}"
         )
     try:
+        if path.is_fifo() or path.is_char_device():  # which may have no end, or never begin
+            raise OSError(errno.EINVAL, "it is a pipe or a device, must be a file")
         text = path.read_text("utf-8-sig")  # without the mark that some editors put before it
         return tomllib.loads(text) if path.suffix == ".toml" else json.loads(text, object_pairs_hook=_once)
     except OSError as error:

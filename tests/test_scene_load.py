@@ -2,6 +2,7 @@
 
 import json
 import math
+import os
 import sys
 
 import pytest
@@ -142,6 +143,15 @@ def test_a_byte_order_mark_is_no_part_of_a_file(tmp_path):
     for name, text in (("a.toml", 'table = "cap"\nr = 1.0\n'), ("a.json", '{"table": "cap", "r": 1.0}')):
         (tmp_path / name).write_text(text, "utf-8-sig")
         assert load(tmp_path / name) == from_data(CAP)
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no such files on this system")
+def test_what_may_have_no_end_is_not_read(tmp_path):
+    os.mkfifo(tmp_path / "pipe.toml")
+    (tmp_path / "zero.json").symlink_to("/dev/zero")
+    for name in ("pipe.toml", "zero.json"):
+        with pytest.raises(InvalidScene, match=rf"{name}' cannot be read: it is a pipe or a device"):
+            load(tmp_path / name)
 
 
 def test_a_key_of_any_length_is_refused_in_a_short_line():

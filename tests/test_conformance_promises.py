@@ -13,10 +13,10 @@ import reference
 from conformance import vectors
 from conformance.suite import promises, session
 from conformance.suite import run as suite
-from conformance.suite.promises import changes, refusals, timing
+from conformance.suite.promises import changes, refusals, scenes, timing
 from conformance.suite.session import Session
 from fast import next_collision
-from scene import Rejected, Wall, from_data
+from scene import BadInput, Rejected, Wall, from_data
 from scene.geometry import rounded
 
 BREACHES = {**FAULTS, **LEAKS, **LENIENT, **FORGETFUL}
@@ -79,10 +79,21 @@ def test_changed_scenes_are_told_apart_by_their_first_hits(tally):
 def test_bad_states_are_bad_and_good_ones_good_by_the_reference(tally):
     """What a promise asks must be so: the proving stepper says the same, and leaves nothing open."""
     for scene, t in refusals.tables():
-        for state, why in refusals.states(scene, t):
+        for state, why, _ in refusals.states(scene, t):
             outcome = reference.next_collision(scene, state, t + 2.0**-6)
             assert isinstance(outcome, Rejected) == bool(why), (scene, state, why, outcome)
             tally[why or "leaves its wall"] += 1
+
+
+def test_bad_scenes_are_bad_and_good_ones_good_by_proof(tally):
+    judged = (*scenes.broken_at_times(), *scenes.broken_as_written(), *scenes.valid_though_near())
+    for data, why in judged:
+        if why:
+            with pytest.raises(BadInput):
+                from_data(data)
+        else:
+            from_data(data)
+        tally[why or "valid"] += 1
 
 
 @pytest.mark.parametrize("name", NO_LEAKS)

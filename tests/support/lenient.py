@@ -1,6 +1,7 @@
-"""Implementations that let bad states through, or nearly good ones: each breaks `bad-states` or `minus-zero`.
+"""Implementations that let bad states or scenes through, or refuse good ones.
 
-As in `support.promise_breakers` each is right beside that. What it lets through flies straight to t_end.
+Each breaks `bad-states`, `bad-scenes` or `minus-zero`, and as in `support.promise_breakers` is right beside
+that. What it lets through flies straight to t_end.
 """
 
 from __future__ import annotations
@@ -9,8 +10,9 @@ import math
 import re
 from collections.abc import Callable
 
-from scene import Mushroom, from_data
+from scene import Mushroom, Scene, from_data
 from scene.geometry import TableAt, rounded
+from scene.laws import bounds
 from support.promise_breakers import Fault, Line, honest, on
 
 Excuse = Callable[[TableAt, Line, str], bool]  # (table, state, why it was rejected)
@@ -186,6 +188,45 @@ def sinking_through_the_mouth(table: TableAt, state: Line, why: str) -> bool:
     return "moves into it" in why and in_the_mouth(table, state)
 
 
+def nameless_on_the_base(_: TableAt, state: Line, __: str) -> bool:
+    """Let a state at y = 0 that names no wall go anywhere."""
+    return state["wall"] is None and bool(state["y"] == 0)
+
+
+def scenes_refused_for(*words: str) -> Fault:
+    """Let scenes through that are refused for some reason, by words of it."""
+
+    def fault(request: Line, answer: Callable[[Line], Line]) -> Line:
+        found = answer(request)
+        is_question = request.get("cmd") in ("step", "trajectory", "flow")
+        if not is_question or not any(word in found.get("reason", "") for word in words):
+            return found
+        if request["cmd"] == "flow":
+            return {"seq": found["seq"], "states": [straight(request, state) for state in request["states"]]}
+        there = straight(request, request["state"])
+        return there if request["cmd"] == "step" else {"seq": found["seq"], "steps": [there]}
+
+    return fault
+
+
+def narrower(is_refused: Callable[[Scene], bool]) -> Fault:
+    """Refuse some valid scenes."""
+
+    def fault(request: Line, answer: Callable[[Line], Line]) -> Line:
+        found = answer(request)
+        if "reason" in found or "scene" not in request or not is_refused(from_data(request["scene"])):
+            return found
+        return {"seq": request["seq"], "outcome": "rejected", "reason": "the scene may break"}
+
+    return fault
+
+
+def wide_by_ranges(scene: Scene) -> bool:
+    """Compare the widest mouth with the smallest cap."""
+    w = getattr(scene, "w", None)
+    return isinstance(scene, Mushroom) and w is not None and bounds(w).highest > bounds(scene.r).lowest
+
+
 EXCUSES: dict[str, Excuse] = {
     "loose-on-walls": loose(1e-2),
     "loose-by-1e-5": loose(1e-5),
@@ -198,6 +239,7 @@ EXCUSES: dict[str, Excuse] = {
     "sides-above-the-mouth": in_a("mushroom", on_a_longer("left", "right")),
     "arc-below-a-cap": in_a("cap", on_a_longer("arc")),
     "sinking-through-the-mouth": sinking_through_the_mouth,
+    "nameless-through-the-base": nameless_on_the_base,
     "outside-left": in_a("mushroom", near_by(math.inf, "left")),
 }
 LENIENT: dict[str, tuple[str, str, Fault]] = {
@@ -214,5 +256,18 @@ LENIENT: dict[str, tuple[str, str, Fault]] = {
         for wall in ("arc", "base", "left", "floor")
     },
     "refusing-slow-ones": ("bad-states", "fail", refusing_slow_ones),
+    "scenes-unchecked": ("bad-scenes", "fail", scenes_refused_for("fails by")),
+    "scenes-checked-at-the-start": ("bad-scenes", "fail", scenes_refused_for("near t = 0.6875")),
+    **{
+        f"scenes-without-{name}": ("bad-scenes", "fail", scenes_refused_for(word))
+        for name, word in {
+            "w-up-to-r": "w <= r",
+            "nu-up-to-1": "nu <= 1",
+            "sides-apart": "w > h slope",
+            "one-period": "share one period",
+            "closed-knots": "no jumps",
+        }.items()
+    },
+    "scenes-by-ranges": ("bad-scenes", "fail", narrower(wide_by_ranges)),
     "minus-is-below": ("minus-zero", "fail", minus_is_below),
 }

@@ -3,10 +3,10 @@
 An answer is compared with another answer of the same implementation: what a field left out means, that bad
 lines do no harm, that many particles or collisions asked at once are answered as when asked one by one.
 Whether such answers are right is for the vectors. Promises of one kind have a module each: what a request
-may be in `requests`, what must be refused in `refusals`, where answers must agree in `consistency`, what a
-table at rest conserves in `conserved`, what an answer may depend on in `sameness` and `changes`, flows whose
-arrivals are known in `crowds`, how trajectories end in `endings`, and what holds `time` to a clock in
-`timing`.
+may be in `requests`, what must be refused in `refusals` and `scenes`, where answers must agree in
+`consistency`, what a table at rest conserves in `conserved`, what an answer may depend on in `sameness` and
+`changes`, flows whose arrivals are known in `crowds`, how trajectories end in `endings`, and what holds
+`time` to a clock in `timing`.
 """
 
 from __future__ import annotations
@@ -24,6 +24,7 @@ from conformance.suite.promises import (
     refusals,
     requests,
     sameness,
+    scenes,
     timing,
 )
 from conformance.suite.result import NamedVerdict
@@ -34,6 +35,7 @@ _CHECKS: dict[str, Callable[[Session], str]] = {
     "malformed-lines": requests.malformed_lines,
     "extra-fields": requests.extra_fields,
     "bad-states": refusals.bad_states,
+    "bad-scenes": scenes.bad_scenes,
     "flow-alone": consistency.flow_alone,
     "long-trajectory": consistency.long_trajectory,
     "trajectory-ends": endings.trajectory_ends,

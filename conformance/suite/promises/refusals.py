@@ -3,7 +3,8 @@
 Bad states lie outside their table, near a wall or far beyond it; or name a wall and lie off it, lie where
 another wall has ended it, or move into it, though slowly. All are made of the table's own geometry, at rest
 and moving, and are bad by a margin that no rounding bridges: 8 times what a place may be off its wall, and
-more. In the open mouth a state that names the base is good when it rises, and bad when it sinks. Every
+more. In the open mouth a state that names the base is good when it rises, and bad when it sinks, and so is
+one beside the mouth that names no wall. Every
 command that is offered is asked about each, steps and flows up to the state's own time too, and in a flow,
 which has all at once, a particle that begins after the end is bad as well. To refuse everything would not do:
 beside each wall a state that leaves it as slowly is asked about too, and one that is off its wall by half of
@@ -36,10 +37,11 @@ SIDES: tuple[Wall, ...] = ("left", "right")
 
 
 class JudgedState(NamedTuple):
-    """A state, and what is bad about it; nothing when `why` is empty."""
+    """A state, what is bad about it (nothing when `why` is empty), and whether it may be left undecided."""
 
     state: State
     why: str
+    may_be_open: bool = False
 
 
 def bad_states(session: Session) -> str:
@@ -102,7 +104,7 @@ def _is_open(one: JudgedState, outcome: str, asking: str) -> bool:
         raise Trouble("fail", f"{asking}: {one.state} {one.why}, is answered {outcome}, must be rejected")
     if not one.why and outcome == "rejected":
         raise Trouble("fail", f"{asking}: {one.state} is on its wall and leaves it, and is rejected")
-    return bool(one.why) and outcome == "undecided"
+    return bool(one.why) and outcome == "undecided" and not one.may_be_open
 
 
 def states(scene: Scene, t: float) -> Iterator[JudgedState]:
@@ -126,8 +128,21 @@ def states(scene: Scene, t: float) -> Iterator[JudgedState]:
             yield JudgedState(_leaving(table, t, wall, (x, y), part, wall), "")
         for place in _past_the_end(table, wall):
             yield JudgedState(_leaving(table, t, wall, place, 1.0, wall), "is where its wall has ended")
+    yield from _nameless_on_the_base(table, t)
     if isinstance(scene, Mushroom):
         yield from _in_the_mouth(table, t)
+
+
+def _nameless_on_the_base(table: TableAt, t: float) -> Iterator[JudgedState]:
+    """Make states at y = 0 that name no wall: beside the mouth these are on the base all the same.
+
+    They are within rounding of a wall that they do not name, and that may be the answer.
+    """
+    place = _place(table, "base")
+    for part in SLOWLY:
+        yield JudgedState(_leaving(table, t, "base", place, part, None), "")
+        sinking = _leaving(table, t, "base", place, -part, None)
+        yield JudgedState(sinking, "moves into the base that it is on", may_be_open=True)
 
 
 def _in_the_mouth(table: TableAt, t: float) -> Iterator[JudgedState]:

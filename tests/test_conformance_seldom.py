@@ -7,7 +7,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from support.seldom_wrong import SELDOM_WRONG, AmplitudesAdded
+from support.seldom_wrong import SELDOM_WRONG, SELDOM_WRONG_PATHS, AmplitudesAdded
 
 import fast
 from conformance import plain, vectors
@@ -49,6 +49,18 @@ def test_who_is_wrong_where_chance_seldom_looks_is_found_out(name):
             assert verdict(Flight, vector) == "pass", vector
             answer = vectors.answer(vector, fast.next_collision, follow, carry)
             assert grade(vector, answer).verdict == "pass", vector
+
+
+@pytest.mark.parametrize("name", SELDOM_WRONG_PATHS)
+def test_an_engine_of_paths_alone_that_is_wrong_there_is_found_out(name):
+    """Trajectories and flows are met, in a run of either seed, though steps may be right."""
+    flight, _ = SELDOM_WRONG[name]
+    for seed in SEEDS:
+        asked = [question(seed, number) for number in SELDOM_WRONG_PATHS[name]]
+        kinds = {vector.kind for vector in asked}
+        assert kinds <= {"trajectory", "flow"}
+        assert {vector.kind for vector in asked if verdict(flight, vector) == "fail"} == kinds, seed
+        assert {verdict(Flight, vector) for vector in asked} == {"pass"}
 
 
 def test_each_depth_is_asked_and_as_many_legs_as_there_may_be():

@@ -9,8 +9,10 @@ law is soon found (few act on a flight to the base): an implementation that know
 it gives the answer before. Scenes carry names, which mean nothing: different ones the same.
 Some meet their wall for a short time only, some cross a mouth that opens or closes during the flight
 (`generator.in_flight`); some have laws of many legs, sides that lean by next to nothing over a great depth,
-or meet again the wall that they were a little off (`generator.seldom`); and every seventh begins up to a
-million periods late, or before 0.
+or meet again the wall that they were a little off, in units of 2^-44 to 2^44 too, some fly past walls that
+seem to stand, or wait for thousands of periods (`generator.seldom`); and every seventh begins up to a
+million periods late, or before 0. Half of the trajectories and flows begin with such a flight as well:
+paths and ensembles often have an engine of their own, which no step shows.
 Answers are proved by the reference alone, and are no more delicate than those of level core, but for late
 ones, whose time when rounded tells less of the phase, and those in stems so deep that y when rounded tells
 less than x: these than level extended. All are filed as of level core. The plain stepper chooses which draws
@@ -36,17 +38,34 @@ from conformance.generator.prover import CONDITIONS, NUDGES, SIGNS, ask, flight_
 from conformance.generator.question import Proved, Question, filed
 from conformance.generator.seldom import (
     DEPTHS,
+    hurried_start,
+    in_other_units,
     is_leaning,
     leaning_start,
     leaning_stem,
     off_its_wall,
     returning_start,
     scene_of_many_legs,
+    under_a_growing_cap,
+    vibrating_scene,
+    waiting_start,
 )
 from conformance.grading.agreement import DIGITS, SHARPEST
 from conformance.grading.error import condition_number, inputs_of
 from conformance.vectors import Expectation, Kind, Level, Vector
-from scene import BadInput, BangBang, Collision, Fourier, Law, Mushroom, Scene, State, Wall, from_data
+from scene import (
+    BadInput,
+    BangBang,
+    Collision,
+    Fourier,
+    Horizon,
+    Law,
+    Mushroom,
+    Scene,
+    State,
+    Wall,
+    from_data,
+)
 from scene.geometry import rounded
 from scene.laws import bounds
 from scene.tables import cycle_length, laws
@@ -63,6 +82,18 @@ WALLS: tuple[tuple[str, Wall], ...] = (
     *(("stem", wall) for wall in ("left", "right", "floor", "base")),
     *(("mushroom", wall) for wall in ("arc", "base", "left", "right", "floor")),
 )
+# What trajectories and flows to some walls begin with, of `_aspect`: half of those to each.
+PATHS: dict[tuple[str, Wall], tuple[str, str]] = {
+    ("cap", "arc"): ("legs", "return"),
+    ("stem", "left"): ("lean", "sweep"),
+    ("stem", "right"): ("sweep", "lean"),
+    ("stem", "floor"): ("return", "legs"),
+    ("mushroom", "arc"): ("brief", "return"),
+    ("mushroom", "left"): ("sweep", "sweep"),
+    ("mushroom", "right"): ("return", "sweep"),
+    ("mushroom", "floor"): ("mouth", "brief"),
+    ("mushroom", "base"): ("mouth", "mouth"),
+}
 LONGEST = 8.0  # periods of one flight
 # Periods before a late start, or from it to time 0, as powers of two. Later ones a stepper may refuse: of
 # sixteen waves the last is 2^24 of its own periods late by then, and much of a phase is lost.
@@ -103,7 +134,8 @@ def fresh_one(seed: int, number: int) -> Vector:
 
 
 def _is_like_before(number: int) -> bool:
-    return number % 3 == 0
+    # In another table who waits so long may have very much to look through before anything is met.
+    return number % 3 == 0 and _aspect(number - 1) != "wait"
 
 
 def _kind(number: int) -> Kind:
@@ -129,12 +161,15 @@ def _questions(seed: int, number: int, before: Vector | None) -> Iterator[Questi
                 of, start, t_end = _one_law_changed(draw, from_data(like.scene)), like.state, like.t_end
             else:
                 of, start, t_end = _made(draw, number) or _usual(draw, number, table)
+                if _aspect(number) == "return":
+                    of, start, t_end = in_other_units(draw, of, start, t_end)
         except BadInput:
             continue
         met = plain.next_collision(of, start, t_end)
         if not isinstance(met, Collision) or not (_is_another(met, like) if like else met.wall == wanted):
             continue
-        question = _asked(draw, _kind(number), of, start, t_end)
+        ask_path = _asked_beyond if _aspect(number) and _kind(number) != "step" else _asked
+        question = ask_path(draw, _kind(number), of, start, t_end)
         if question and like:
             question = question._replace(longest=min(question.longest, TELLING))
         if question and _is_steady(of, question):
@@ -147,36 +182,48 @@ def _wanted(number: int) -> tuple[str, Wall]:
     return WALLS[(number - number // 3) % len(WALLS)]
 
 
-def _is_brief(number: int) -> bool:
-    return number % 12 == 5 and _wanted(number)[1] != "base"  # which never moves
-
-
-def _crosses_changed_mouth(number: int) -> bool:
+def _aspect(number: int) -> str:
+    """Return what a question is made for: a word of `_made` and `_start_of`, empty for those that are not."""
     table, wall = _wanted(number)
-    return number % 6 == 2 and table == "mushroom" and wall != "arc"
+    if number % 12 in (1, 4):
+        return PATHS.get((table, wall), ("", ""))[number % 12 == 4]
+    if number % 12 == 5 and wall != "base":  # which never moves
+        return "brief"
+    if number % 12 == 11 and wall != "base":
+        return "return"
+    if number % 6 != 2:
+        return ""
+    if table == "mushroom":
+        return "hurry" if wall == "arc" else "mouth"
+    return {"arc": "legs", "floor": "legs", "base": "wait"}.get(wall, "lean")
 
 
 def _is_late(number: int) -> bool:
     return number % 7 == 5
 
 
-def _returns(number: int) -> bool:
-    return number % 12 == 11 and _wanted(number)[1] != "base"
-
-
 def _made(draw: Draw, number: int) -> tuple[Scene, State, float] | None:
     """Draw scene, start and horizon of the numbers whose scenes are made for them; None for the others."""
-    table, wall = _wanted(number)
+    (table, wall), aspect = _wanted(number), _aspect(number)
     is_side = wall in ("left", "right")
-    if is_side and _is_brief(number) and (table == "stem" or draw.part() < 0.75):
+    if aspect == "sweep" or (is_side and aspect == "brief" and (table == "stem" or draw.part() < 0.75)):
         of, t = swept_scene(draw, table)
         return of, *swept_start(draw, of, t, wall)
-    if number % 6 == 2 and table == "stem" and is_side:
-        stem = leaning_stem(draw, clock(draw, KINDS), DEPTHS[number % 5 % len(DEPTHS)])  # each in turn
+    if aspect == "lean":
+        depth = (
+            DEPTHS[number % 5 % len(DEPTHS)] if _kind(number) != "trajectory" else max(DEPTHS)
+        )  # each in turn
+        stem = leaning_stem(draw, clock(draw, KINDS), depth)
         return stem, *leaning_start(draw, stem, time(draw, stem))
-    if number % 6 == 2 and (table, wall) in (("cap", "arc"), ("stem", "floor")):
+    if aspect == "legs":
         of, t = scene_of_many_legs(draw, table)
         return of, *_start(draw, of, t)
+    if aspect == "wait":
+        trembling = vibrating_scene(draw, table)
+        return trembling, *waiting_start(draw, trembling, time(draw, trembling))
+    if aspect == "return" and is_side and table == "mushroom":
+        mushroom = under_a_growing_cap(draw)
+        return mushroom, *_start_of(draw, number, mushroom)
     return None
 
 
@@ -215,6 +262,19 @@ def _asked(draw: Draw, kind: Kind, of: Scene, start: State, t_end: float) -> Que
     return question._replace(t_end=(before.t + after.t) / 2, collisions=n_hits + 1, flow=any_marks)
 
 
+def _asked_beyond(draw: Draw, kind: Kind, of: Scene, start: State, t_end: float) -> Question | None:
+    """Return a question for one hit, as the flight there may be delicate, or for a flow a little on."""
+    question = _asked(draw, "step", of, start, t_end)
+    assert question
+    question = question._replace(rule=RULES[kind], collisions=1)
+    if kind == "trajectory":
+        return question
+    hit, after = plain.trajectory(of, start, 2, t_end)
+    if not (isinstance(hit, Collision) and isinstance(after, Collision | Horizon)):
+        return None
+    return question._replace(t_end=(hit.t + after.t) / 2, collisions=2, flow=any_marks)
+
+
 def _is_steady(of: Scene, question: Question) -> bool:
     """Tell whether the plain stepper meets the same walls from starts nearby: it answers none of this.
 
@@ -250,14 +310,17 @@ def _start_of(draw: Draw, number: int, of: Scene) -> tuple[State, float]:
     t = time(draw, of) - draw.pick((0, 0, 1, 4, 60)) * length
     if _is_late(number):
         t += draw.pick((1.0, -1.0)) * 2.0 ** draw.pick(LATE) * length
-    if _is_brief(number):
+    aspect = _aspect(number)
+    if aspect == "brief":
         start, after = brief_start(draw, of, t, _wanted(number)[1])
         return start, after + length * draw.between(0.5, LONGEST / 2)
-    if _returns(number):
+    if aspect == "return":
         return returning_start(draw, of, t, _wanted(number)[1])
-    if _crosses_changed_mouth(number):
+    if aspect == "mouth":
         assert isinstance(of, Mushroom)
         return arc_to_mouth(draw, of, t), t + LONGEST * length
+    if aspect == "hurry":
+        return hurried_start(draw, of, t)
     return _start(draw, of, t)
 
 

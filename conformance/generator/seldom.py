@@ -5,7 +5,10 @@ same. A law of many legs has as many as a scene may have, and is asked about lat
 stem is so deep that a slope of 2^-22 to 2^-40 leads its sides together, or apart, by as much as they are
 apart: who takes them for upright meets them at quite another time. A returning start is off its wall by up to
 a quarter of what is allowed, and meets that wall again, which keeps the distance out of f at the later hit
-too.
+too; in other units no flight time is long that seems so, or short. The sides under a growing cap are met
+again though nothing of their own moves: w = nu r with nu at rest. A hurried start is so much faster than the
+walls that they seem to stand, which its time and velocity show; a waiting one comes to the base after
+thousands of periods that no wall disturbs.
 """
 
 from __future__ import annotations
@@ -14,19 +17,23 @@ from math import inf
 
 import msgspec
 
-from conformance.generator.draws import Draw, SharedPeriod, deep_wave, law, place, state
-from scene import BangBang, Cap, Fourier, Scene, State, Stem, Wall
+from conformance.generator.draws import Draw, SharedPeriod, clock, deep_wave, law, place, state, walls_speed
+from scene import BadInput, BangBang, Cap, Fourier, Law, Mushroom, Scene, State, Stem, Wall
 from scene.geometry import rounded
 from scene.given import MAX_KNOTS
 from scene.laws import bounds
 from scene.states import ON_WALL
 from scene.tables import cycle_length
-from scene.transforms import scaled_law
+from scene.transforms import scaled, scaled_law, scaled_state
 
 DEPTHS = 22, 28, 38, 34  # of a leaning stem, as powers of two of its width
 # Of its width, by which a side is moved at the floor: at the deepest slopes are below 1e-12.
 LEANS = 0.1, 0.27
 GRID = 1024  # parts of a period that knots lie on
+UNITS = -44, 0, 44  # powers of two that lengths and times are multiplied with
+HURRY = 22, 24  # of a speed, as powers of two of the walls': at 2^30 they do stand within 1e-9
+WAIT = 8, 10  # of a flight, as powers of two of a period
+TREMOR = -10, -8  # what a wall moves by that vibrates, as powers of two of its size
 REACH = {"arc": "r", "floor": "h"}  # the law that says how large a wall is; that of a side is its width
 
 
@@ -120,3 +127,49 @@ def off_its_wall(draw: Draw, of: Scene, start: State, least: int = -9) -> State:
     reach = getattr(table, REACH.get(start.wall, "w"))
     by = reach * ON_WALL * draw.power(least, -2) * draw.pick((1.0, -1.0))
     return msgspec.structs.replace(start, x=start.x + by * nx, y=start.y + by * ny)
+
+
+def in_other_units(draw: Draw, of: Scene, start: State, t_end: float) -> tuple[Scene, State, float]:
+    """Return the same question in other units of length and time; exactly, since they are powers of two."""
+    length, time = draw.pick(UNITS), draw.pick((-44, *UNITS))
+    return scaled(of, length, time), scaled_state(start, length, time), t_end * 2.0**time
+
+
+def under_a_growing_cap(draw: Draw) -> Mushroom:
+    """Draw a mushroom whose mouth and sides move with its cap alone."""
+    shared = clock(draw, ("fourier", "bang-bang"))
+    r = law(draw, 0.5, 2.0, shared)
+    if isinstance(r, float):
+        raise BadInput("the cap is at rest")
+    return Mushroom(r=r, nu=draw.short(0.3, 0.9), h=law(draw, 0.5, 1.5, shared), slope=draw.short(-0.3, 0.05))
+
+
+def hurried_start(draw: Draw, of: Scene, t: float) -> tuple[State, float]:
+    """Draw a start that crosses a table in next to no part of its period, and an end [time]."""
+    if not walls_speed(of):
+        raise BadInput("the walls are at rest")
+    return state(draw, of, {"t": t, "speed": draw.power(*HURRY) * draw.between(1.0, 2.0), "patience": 8.0})
+
+
+def vibrating_scene(draw: Draw, table: str) -> Cap | Stem:
+    """Draw a cap, or a stem, that moves by little: flights last for any number of its periods."""
+    shared, part = clock(draw, ("fourier", "bang-bang")), draw.power(*TREMOR)
+
+    def moving() -> Law:
+        size = draw.short(0.5, 2.0)
+        return law(draw, size * (1.0 - part), size * (1.0 + part), shared)
+
+    of = Cap(r=moving()) if table == "cap" else Stem(w=moving(), h=moving(), slope=draw.short(-0.2, 0.1))
+    if not cycle_length(of):
+        raise BadInput("the walls are at rest")
+    return of
+
+
+def waiting_start(draw: Draw, of: Cap | Stem, t: float) -> tuple[State, float]:
+    """Draw a start in a vibrating table that comes to the base after very many periods, and an end [time]."""
+    wide, high = (bounds(law).lowest for law in ((of.r, of.r) if isinstance(of, Cap) else (of.w, of.h)))
+    flight = (cycle_length(of) or 1.0) * draw.power(*WAIT) * draw.between(0.5, 1.0)
+    way, y = (1.0 if isinstance(of, Cap) else -1.0), high * draw.between(0.05, 0.3)
+    across = wide * draw.between(-0.3, 0.3), wide * draw.between(-0.3, 0.3)
+    start = State(t, across[0], way * y, (across[1] - across[0]) / flight, -way * y / flight)
+    return start, t + 4 * flight

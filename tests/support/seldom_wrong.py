@@ -1,19 +1,22 @@
 """Flights of the plain stepper that are wrong where chance seldom looks: each was once accepted.
 
-What each gets wrong is drawn on purpose by `conformance.generator.seldom` and `in_flight.swept_scene`.
+What each gets wrong is drawn on purpose by `conformance.generator.seldom` and `in_flight.swept_scene`, and
+most of it of trajectories and flows as well: who follows these by an engine of its own may be right in steps.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from math import hypot, inf
 from typing import ClassVar
 
 import msgspec
 
-from conformance.plain.motion import BangBangMotion
+from conformance.generator.draws import walls_speed
+from conformance.plain.motion import BangBangMotion, ConstantMotion
 from conformance.plain.step import Flight
-from scene import BangBang, Fourier, Outcome, Rejected, Scene, State, Wall
-from scene.tables import laws
+from scene import BangBang, Collision, Fourier, Horizon, Outcome, Rejected, Scene, State, Wall
+from scene.tables import cycle_length, laws
 
 
 def upright_below(least: float) -> type[Flight]:
@@ -86,6 +89,55 @@ class AmplitudesAdded(Flight):
         return super().refusal()
 
 
+def growing_with_the_cap(flight: Flight) -> float:
+    """Return the bound on nu r'', of a mouth whose nu is at rest too."""
+    known = flight.bounds
+    return known["nu"].highest * known["r"].curvature if "nu" in known else 0.0
+
+
+class RestingWithNu(Flight):
+    """Never meets again a side that it leaves where nu and slope are at rest, whatever the cap does."""
+
+    def first_root(self, wall: Wall, start: float, end: float) -> float | None:
+        own = [self.bounds[name].slope for name in ("nu", "slope") if name in self.bounds]
+        if wall == self.wall and wall in ("left", "right") and own == [0.0, 0.0]:
+            return None
+        return super().first_root(wall, start, end)
+
+
+class PatientForPeriods(Flight):
+    """Takes a particle that meets nothing for 150 periods for one that meets nothing."""
+
+    def outcome(self) -> Outcome:
+        found = super().outcome()
+        if not isinstance(found, Collision) or found.dt < 150 * (cycle_length(self.scene) or inf):
+            return found
+        return Horizon(self.t_end, *self.place(self.t_end - self.state.t), self.vx, self.vy)
+
+
+class WithinEpsilon(Flight):
+    """Takes what it meets of the wall that it left within 1e-12, of any unit, for the hit before."""
+
+    def require_clear(self, walls: object, s: float) -> None:
+        return None
+
+    def first_root(self, wall: Wall, start: float, end: float) -> float | None:
+        root = super().first_root(wall, start, end)
+        return None if root is not None and root < 1e-12 and wall == self.wall else root
+
+
+class FastPastStandingWalls(Flight):
+    """Looks for the hit of a particle 2^20 times as fast as walls as if these stood still."""
+
+    def first_root(self, wall: Wall, start: float, end: float) -> float | None:
+        moving = self.laws
+        if 0.0 < 2.0**20 * walls_speed(self.scene) < hypot(self.vx, self.vy):
+            self.laws = {name: ConstantMotion(law.at(0.0).value, 0.0) for name, law in moving.items()}
+        found = super().first_root(wall, start, end)
+        self.laws = moving
+        return found
+
+
 # The faulty flight, and numbers of fresh questions among which some are met by it.
 SELDOM_WRONG: dict[str, tuple[type[Flight], tuple[int, ...]]] = {
     "upright below 1e-6": (upright_below(1e-6), (2, 20)),
@@ -96,4 +148,17 @@ SELDOM_WRONG: dict[str, tuple[type[Flight], tuple[int, ...]]] = {
     "2 m' v_y forgotten": (bent(tilting_on_the_way), (53, 101)),
     "2 nu' r' forgotten": (bent(opening_with_the_cap), (29, 77)),
     "amplitudes added up": (AmplitudesAdded, (1, 13, 19)),
+    "sides rest with nu": (RestingWithNu, (11, 95)),
+    "nu r'' forgotten": (bent(growing_with_the_cap), (11, 95)),
+    "150 periods at most": (PatientForPeriods, (50, 56, 116, 122)),
+    "hits within 1e-12 skipped": (WithinEpsilon, (11, 35, 47, 71, 119)),
+    "walls stand for who is fast": (FastPastStandingWalls, (8, 74)),
+}
+# Numbers of trajectories, and of flows, that meet what an engine of their own may have got wrong.
+SELDOM_WRONG_PATHS: dict[str, tuple[int, ...]] = {
+    "upright below 1e-6": (4, 85),
+    "room for 128 legs": (49, 88),
+    "distance from its wall kept": (13, 16, 121, 124),
+    "2 m' v_y forgotten": (37, 52),
+    "sides rest with nu": (13,),
 }

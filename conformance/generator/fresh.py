@@ -11,7 +11,7 @@ Some meet their wall for a short time only, some cross a mouth that opens or clo
 (`generator.in_flight`); some have laws of many legs, sides that lean by next to nothing over a great depth,
 or meet again the wall that they were a little off, in units of 2^-44 to 2^44 too, some fly past walls that
 seem to stand, or wait for thousands of periods (`generator.seldom`); and every seventh begins up to a
-million periods late, or before 0. Half of the trajectories and flows begin with such a flight as well:
+million periods late, or before 0. Some further trajectories and flows begin with such a flight as well:
 paths and ensembles often have an engine of their own, which no step shows.
 Answers are proved by the reference alone, and are no more delicate than those of level core, but for late
 ones, whose time when rounded tells less of the phase, and those in stems so deep that y when rounded tells
@@ -38,6 +38,8 @@ from conformance.generator.prover import CONDITIONS, NUDGES, SIGNS, ask, flight_
 from conformance.generator.question import Proved, Question, filed
 from conformance.generator.seldom import (
     DEPTHS,
+    EXTRA,
+    Extra,
     hurried_start,
     in_other_units,
     is_leaning,
@@ -82,18 +84,7 @@ WALLS: tuple[tuple[str, Wall], ...] = (
     *(("stem", wall) for wall in ("left", "right", "floor", "base")),
     *(("mushroom", wall) for wall in ("arc", "base", "left", "right", "floor")),
 )
-# What trajectories and flows to some walls begin with, of `_aspect`: half of those to each.
-PATHS: dict[tuple[str, Wall], tuple[str, str]] = {
-    ("cap", "arc"): ("legs", "return"),
-    ("stem", "left"): ("lean", "sweep"),
-    ("stem", "right"): ("sweep", "lean"),
-    ("stem", "floor"): ("return", "legs"),
-    ("mushroom", "arc"): ("brief", "return"),
-    ("mushroom", "left"): ("sweep", "sweep"),
-    ("mushroom", "right"): ("return", "sweep"),
-    ("mushroom", "floor"): ("mouth", "brief"),
-    ("mushroom", "base"): ("mouth", "mouth"),
-}
+USUAL = 132  # questions, after which those of EXTRA come, and so on
 LONGEST = 8.0  # periods of one flight
 # Periods before a late start, or from it to time 0, as powers of two. Later ones a stepper may refuse: of
 # sixteen waves the last is 2^24 of its own periods late by then, and much of a phase is lost.
@@ -134,12 +125,19 @@ def fresh_one(seed: int, number: int) -> Vector:
 
 
 def _is_like_before(number: int) -> bool:
-    # In another table who waits so long may have very much to look through before anything is met.
-    return number % 3 == 0 and _aspect(number - 1) != "wait"
+    return number % 3 == 0 and not _extra(number)
+
+
+def _extra(number: int) -> Extra | None:
+    """Return kind, table, wall and aspect of the questions that are made for their own sake."""
+    place = (number - 1) % (USUAL + len(EXTRA)) - USUAL
+    return EXTRA[place] if place >= 0 else None
 
 
 def _kind(number: int) -> Kind:
     """Return what a question asks for: of those that are like the one before, and of these, a step."""
+    if extra := _extra(number):
+        return extra.kind
     return "trajectory" if number % 6 == 1 else "flow" if number % 6 == 4 else "step"
 
 
@@ -179,14 +177,16 @@ def _questions(seed: int, number: int, before: Vector | None) -> Iterator[Questi
 
 def _wanted(number: int) -> tuple[str, Wall]:
     """Return the table of a question, and the wall that is to be met first."""
+    if extra := _extra(number):
+        return extra.table, extra.wall
     return WALLS[(number - number // 3) % len(WALLS)]
 
 
 def _aspect(number: int) -> str:
     """Return what a question is made for: a word of `_made` and `_start_of`, empty for those that are not."""
     table, wall = _wanted(number)
-    if number % 12 in (1, 4):
-        return PATHS.get((table, wall), ("", ""))[number % 12 == 4]
+    if extra := _extra(number):
+        return extra.aspect
     if number % 12 == 5 and wall != "base":  # which never moves
         return "brief"
     if number % 12 == 11 and wall != "base":
@@ -194,8 +194,8 @@ def _aspect(number: int) -> str:
     if number % 6 != 2:
         return ""
     if table == "mushroom":
-        return "hurry" if wall == "arc" else "mouth"
-    return {"arc": "legs", "floor": "legs", "base": "wait"}.get(wall, "lean")
+        return "mouth" if wall != "arc" else ""
+    return {"arc": "legs", "floor": "legs", "base": ""}.get(wall, "lean")
 
 
 def _is_late(number: int) -> bool:
@@ -221,8 +221,10 @@ def _made(draw: Draw, number: int) -> tuple[Scene, State, float] | None:
     if aspect == "wait":
         trembling = vibrating_scene(draw, table)
         return trembling, *waiting_start(draw, trembling, time(draw, trembling))
-    if aspect == "return" and is_side and table == "mushroom":
+    if aspect == "hurry" or (aspect == "return" and is_side and table == "mushroom"):
         mushroom = under_a_growing_cap(draw)
+        if aspect == "hurry":
+            return mushroom, *hurried_start(draw, mushroom, time(draw, mushroom))
         return mushroom, *_start_of(draw, number, mushroom)
     return None
 
@@ -319,8 +321,6 @@ def _start_of(draw: Draw, number: int, of: Scene) -> tuple[State, float]:
     if aspect == "mouth":
         assert isinstance(of, Mushroom)
         return arc_to_mouth(draw, of, t), t + LONGEST * length
-    if aspect == "hurry":
-        return hurried_start(draw, of, t)
     return _start(draw, of, t)
 
 

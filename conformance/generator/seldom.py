@@ -14,10 +14,12 @@ thousands of periods that no wall disturbs.
 from __future__ import annotations
 
 from math import inf
+from typing import NamedTuple
 
 import msgspec
 
-from conformance.generator.draws import Draw, SharedPeriod, clock, deep_wave, law, place, state, walls_speed
+from conformance.generator.draws import Draw, SharedPeriod, clock, deep_wave, law, place, state
+from conformance.vectors import Kind
 from scene import BadInput, BangBang, Cap, Fourier, Law, Mushroom, Scene, State, Stem, Wall
 from scene.geometry import rounded
 from scene.given import MAX_KNOTS
@@ -31,10 +33,40 @@ DEPTHS = 22, 28, 38, 34  # of a leaning stem, as powers of two of its width
 LEANS = 0.1, 0.27
 GRID = 1024  # parts of a period that knots lie on
 UNITS = -44, 0, 44  # powers of two that lengths and times are multiplied with
-HURRY = 22, 24  # of a speed, as powers of two of the walls': at 2^30 they do stand within 1e-9
+HURRY = 20, 22  # of a speed, as powers of two of the walls': at 2^30 they do stand within 1e-9
 WAIT = 8, 10  # of a flight, as powers of two of a period
 TREMOR = -10, -8  # what a wall moves by that vibrates, as powers of two of its size
 REACH = {"arc": "r", "floor": "h"}  # the law that says how large a wall is; that of a side is its width
+
+
+class Extra(NamedTuple):
+    """A question that is asked for the sake of one seldom flight: kind, where it leads, and a word for it."""
+
+    kind: Kind
+    table: str
+    wall: Wall
+    aspect: str
+
+
+# What a trajectory and a flow to some walls begin with, and the word that `generator.fresh` has for it.
+PATHS: dict[tuple[str, Wall], tuple[str, str]] = {
+    ("cap", "arc"): ("legs", "return"),
+    ("stem", "left"): ("lean", "sweep"),
+    ("stem", "right"): ("sweep", "lean"),
+    ("stem", "floor"): ("return", "legs"),
+    ("mushroom", "arc"): ("brief", "return"),
+    ("mushroom", "left"): ("sweep", "sweep"),
+    ("mushroom", "right"): ("return", "sweep"),
+    ("mushroom", "floor"): ("mouth", "brief"),
+    ("mushroom", "base"): ("mouth", "mouth"),
+}
+EXTRA = (
+    *(Extra("trajectory", *to, begin) for to, (begin, _) in PATHS.items()),
+    *(Extra("flow", *to, begin) for to, (_, begin) in PATHS.items()),
+    *(Extra("step", "mushroom", "arc", "hurry"),) * 2,
+    *(Extra("step", "cap", "base", "wait"),) * 2,
+    *(Extra("step", "stem", "base", "wait"),) * 2,
+)
 
 
 def deeper(draw: Draw, of: Fourier) -> Fourier:
@@ -144,10 +176,8 @@ def under_a_growing_cap(draw: Draw) -> Mushroom:
     return Mushroom(r=r, nu=draw.short(0.3, 0.9), h=law(draw, 0.5, 1.5, shared), slope=draw.short(-0.3, 0.05))
 
 
-def hurried_start(draw: Draw, of: Scene, t: float) -> tuple[State, float]:
+def hurried_start(draw: Draw, of: Mushroom, t: float) -> tuple[State, float]:
     """Draw a start that crosses a table in next to no part of its period, and an end [time]."""
-    if not walls_speed(of):
-        raise BadInput("the walls are at rest")
     return state(draw, of, {"t": t, "speed": draw.power(*HURRY) * draw.between(1.0, 2.0), "patience": 8.0})
 
 

@@ -10,7 +10,7 @@ it gives the answer before. Scenes carry names, which mean nothing: different on
 Some meet their wall for a short time only, some cross a mouth that opens or closes during the flight
 (`generator.in_flight`); some have laws of many legs, sides that lean by next to nothing over a great depth,
 or meet again the wall that they were a little off, in units of 2^-44 to 2^44 too, some fly past walls that
-seem to stand, or wait for thousands of periods (`generator.seldom`); and every seventh begins up to a
+seem to stand, or wait for hundreds of periods (`generator.seldom`); and every seventh begins up to a
 million periods late, or before 0. Some further trajectories and flows begin with such a flight as well:
 paths and ensembles often have an engine of their own, which no step shows.
 Answers are proved by the reference alone, and are no more delicate than those of level core, but for late

@@ -8,7 +8,7 @@ a quarter of what is allowed, and meets that wall again, which keeps the distanc
 too; in other units no flight time is long that seems so, or short. The sides under a growing cap are met
 again though nothing of their own moves: w = nu r with nu at rest. A hurried start is so much faster than the
 walls that they seem to stand, which its time and velocity show; a waiting one comes to the base after
-thousands of periods that no wall disturbs.
+hundreds of periods that no wall disturbs.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ LEANS = 0.1, 0.27
 GRID = 1024  # parts of a period that knots lie on
 UNITS = -44, 0, 44  # powers of two that lengths and times are multiplied with
 HURRY = 20, 22  # of a speed, as powers of two of the walls': at 2^30 they do stand within 1e-9
-WAIT = 8, 10  # of a flight, as powers of two of a period
+WAIT = 8, 9  # of a flight, as powers of two of a period
 TREMOR = -10, -8  # what a wall moves by that vibrates, as powers of two of its size
 REACH = {"arc": "r", "floor": "h"}  # the law that says how large a wall is; that of a side is its width
 
@@ -64,8 +64,8 @@ EXTRA = (
     *(Extra("trajectory", *to, begin) for to, (begin, _) in PATHS.items()),
     *(Extra("flow", *to, begin) for to, (_, begin) in PATHS.items()),
     *(Extra("step", "mushroom", "arc", "hurry"),) * 2,
-    *(Extra("step", "cap", "base", "wait"),) * 2,
-    *(Extra("step", "stem", "base", "wait"),) * 2,
+    Extra("step", "cap", "base", "wait"),
+    Extra("step", "stem", "base", "wait"),
 )
 
 
@@ -198,7 +198,7 @@ def vibrating_scene(draw: Draw, table: str) -> Cap | Stem:
 def waiting_start(draw: Draw, of: Cap | Stem, t: float) -> tuple[State, float]:
     """Draw a start in a vibrating table that comes to the base after very many periods, and an end [time]."""
     wide, high = (bounds(law).lowest for law in ((of.r, of.r) if isinstance(of, Cap) else (of.w, of.h)))
-    flight = (cycle_length(of) or 1.0) * draw.power(*WAIT) * draw.between(0.5, 1.0)
+    flight = (cycle_length(of) or 1.0) * draw.power(*WAIT) * draw.between(0.625, 1.0)
     way, y = (1.0 if isinstance(of, Cap) else -1.0), high * draw.between(0.05, 0.3)
     across = wide * draw.between(-0.3, 0.3), wide * draw.between(-0.3, 0.3)
     start = State(t, across[0], way * y, (across[1] - across[0]) / flight, -way * y / flight)

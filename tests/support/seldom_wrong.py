@@ -150,7 +150,7 @@ SELDOM_WRONG: dict[str, tuple[type[Flight], tuple[int, ...]]] = {
     "amplitudes added up": (AmplitudesAdded, (1, 13, 19)),
     "sides rest with nu": (RestingWithNu, (11, 95)),
     "nu r'' forgotten": (bent(growing_with_the_cap), (11, 95)),
-    "150 periods at most": (PatientForPeriods, (153, 154, 155, 156)),
+    "150 periods at most": (PatientForPeriods, (153, 154)),
     "hits within 1e-12 skipped": (WithinEpsilon, (11, 35, 47, 71, 119)),
     "walls stand for who is fast": (FastPastStandingWalls, (151, 152)),
 }

@@ -43,6 +43,7 @@ from reference.jets import Jet
 from reference.timeline import Timeline
 
 MAX_LEAVES = 4000
+MAX_PARTS = 2 * MAX_LEAVES  # that are looked at: cutting in two, so many lead to the leaves allowed
 MAX_NEWTON = 200
 
 
@@ -101,10 +102,11 @@ class Isolator:
         Raises:
             Undecidable: when this precision cannot tell.
         """
-        todo = [(start, end)]
+        todo, n_parts = [(start, end)], 0
         while todo:
             a, b = todo.pop()
-            if len(self.leaves) > MAX_LEAVES:
+            n_parts += 1
+            if len(self.leaves) > MAX_LEAVES or n_parts > MAX_PARTS:
                 raise Undecidable(f"more than {MAX_LEAVES} sub-intervals are needed")
             whole = self.arithmetic.hull(a, b)
             jet = self._sharpened(a, b, whole)
@@ -121,7 +123,9 @@ class Isolator:
             is_falling = jet.d1 is not None and sign(jet.d1) < 0
             if is_falling and not self._may_begin(a) and sign(self.value(b)) < 0:
                 return self._refine(a, b)
-            todo += reversed(self._parts(a, b, whole, jet))
+            parts = self._parts(a, b, whole, jet)
+            self._require_rise(a, b, cut=parts[0][1])
+            todo += reversed(parts)
         return None
 
     def _sharpened(self, a: Interval, b: Interval, whole: Interval) -> Jet:
@@ -156,6 +160,21 @@ class Isolator:
     def _may_begin(self, a: Interval) -> bool:
         """Tell whether the flight may begin, on this wall, at a or later."""
         return self.residual is not None and not is_below(self.arithmetic.upper(self.begin), a)
+
+    def _require_rise(self, a: Interval, b: Interval, cut: Interval) -> None:
+        """Refuse to cut an interval whose parts must all rise up to where the flight has begun, and do not.
+
+        Those that hold not all of `begin`, nor begin after it, must. Where f' > 0 is not shown at a point of
+        theirs, cutting would go on there for ever.
+        """
+        latest = self.arithmetic.upper(self.begin)
+        holds_all = not is_below(self.arithmetic.lower(self.begin), a) and is_below(latest, cut)
+        if not self._may_begin(a) or holds_all:
+            return
+        for point in (a, cut, latest if is_below(latest, b) else b):
+            rate = self.jet(point).d1
+            if self._may_begin(point) and (rate is None or sign(rate) <= 0):
+                raise Undecidable("the flight begins along its wall, as far as this precision shows")
 
     def _kind(self, a: Interval, b: Interval, whole: Interval, jet: Jet) -> str | None:
         """Say what proves f > 0 on (a, b]; None when nothing does."""

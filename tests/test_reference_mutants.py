@@ -192,6 +192,7 @@ MUTANTS = {
     ),
     "never met in half a period": (timeline.Timeline, "__init__", half_a_turn),
     "f by its tangent": (Isolator, "_expanded", tangent_for_the_expansion),
+    "cut where nothing rises": (Isolator, "_require_rise", lambda self, a, b, cut: None),
     "first root skipped": (Isolator, "first_root", skip_the_first_root),
     "first wall in the list wins": (Course, "_first_hit", exclude_nothing),
     "floor never asked": (Course, "_first_hit", exclude_all_but_the_floor),

@@ -6,6 +6,7 @@ in it compares the reference with its own earlier results. Further answers: test
 
 from __future__ import annotations
 
+import math
 import random
 from fractions import Fraction
 
@@ -15,6 +16,7 @@ import pytest
 import reference
 from conformance.attacks.vanishing import sunk
 from reference.arithmetic import MAX_WORK, Arithmetic
+from reference.isolation import Isolator
 from reference.timeline import law_in_time
 from scene import BangBang, Cap, Fourier, Mushroom, Rejected, State, Stem, Undecided, Undefined
 from scene.laws import value
@@ -164,6 +166,30 @@ def bounded_work():
     assert isinstance(reference.next_collision(GRAZING, rests, 1e10, digits=DIGITS), reference.Horizon)
 
 
+def starts_along_a_wall_that_rests():
+    """Chords of a standing arc known so badly in the end that they may begin along it: given up at once.
+
+    A constant law costs no work, so that only reasoning ends the search for a time at which f rises.
+    """
+    draw, n_cuts, honest = random.Random(3), [0], Isolator._split
+
+    def watched(self, a, b):
+        n_cuts[0] += 1
+        assert n_cuts[0] < 500
+        return honest(self, a, b)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Isolator, "_split", watched)
+        for _ in range(300):
+            place, speed = draw.uniform(0.1, 3.0), 10.0 ** draw.uniform(-1.0, 3.0)
+            course = place + draw.choice((1.0, -1.0)) * draw.uniform(1.0, 1.5)
+            vx, vy = -speed * math.cos(course), -speed * math.sin(course)
+            start = State(0.0, math.cos(place), math.sin(place), vx, vy, "arc")
+            n_cuts[0] = 0
+            path = reference.trajectory(Cap(r=1.0), start, 40, working=draw.choice((6, 7, 8)))
+            assert isinstance(path.outcome, Undecided | Rejected | None)
+
+
 def slow_beside_waves():
     """Particles slower than a floor of waves that cancel at times, near it: no wall is skipped."""
     draw, context = random.Random(1), mpmath.MPContext()
@@ -226,6 +252,7 @@ BATTERY = (
     answers_by_hand,
     law_of_reflection,
     differentiated,
+    starts_along_a_wall_that_rests,
     waves_within_their_enclosures,
     slow_beside_waves,
     slow_across_periods,

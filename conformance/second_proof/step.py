@@ -255,11 +255,10 @@ class StepProof:
     def moment(self, low: fmpq, high: fmpq) -> tuple[Number, ...]:
         """Return t, x, y, vx, vy after the wall is met at [low, high]."""
         assert self.wall is not None
-        f, s = self.flight, hull(low, high)
-        x, y = f.place(s)
-        velocities = [f.reflected(self.wall, hull(*part)) for part in self._parts(low, high, self.n_parts)]
-        vx, vy = (reduce(hull, numbers) for numbers in zip(*velocities, strict=True))
-        return f.line.t + s, x, ZERO if self.wall == "base" else y, vx, vy
+        f, times = self.flight, [hull(*part) for part in self._parts(low, high, self.n_parts)]
+        found = [(*f.place(s), *f.reflected(self.wall, s)) for s in times]
+        x, y, vx, vy = (reduce(hull, numbers) for numbers in zip(*found, strict=True))
+        return f.line.t + hull(low, high), x, ZERO if self.wall == "base" else y, vx, vy
 
     def _misplaced(self, moment: tuple[Number, ...]) -> str | None:
         """Return the name of a number that is not shown to lie where it is claimed; None when all do."""

@@ -16,6 +16,7 @@ from support.tables import LIFT
 from support.truth import IS_DEEP
 
 import reference
+from conformance.arb.laws import BallBangBang
 from conformance.second_proof.step import Refuted, check
 from conformance.second_proof.trajectory import check_path
 from conformance.strategies import scenes_and_states
@@ -58,6 +59,24 @@ def test_places_known_to_some_tenths_are_found_where_claimed():
             refusals.append(str(refusal))
     assert all("is not excluded" in refusal for refusal in refusals)
     assert len(refusals) <= 5
+
+
+@pytest.mark.parametrize("working", [5, 6, 7, 8, 12])
+def test_a_root_known_to_many_periods_is_proved_without_listing_their_knots(working, monkeypatch):
+    """A floor trembles thousands of times within the time at which a crude path meets it."""
+    listed = BallBangBang.knots
+
+    def few(self, start, end):
+        assert end - start <= 1000 * self.period
+        return listed(self, start, end)
+
+    monkeypatch.setattr(BallBangBang, "knots", few)
+    half = 2.0**-31
+    floor = BangBang(knots=((0.0, 1.0), (half, 1.0 + 2.0**-52), (2 * half, 1.0)))
+    scene = Mushroom(r=1.0, w=0.5, h=floor)
+    path, claim = path_claim(scene, State(0.0, 0.1, 0.5, 0.3, -1.0), 6, working=working)
+    assert "floor" in [step.wall for step in path.steps]
+    check_path(claim)
 
 
 def test_every_path_is_proved_again(tally):

@@ -146,6 +146,8 @@ class Exclusion:
         return all(flight.is_positive(wall, *piece) for piece in itertools.pairwise(flight.cuts(rest, b)))
 
     def _has_slope(self, sign: int, wall: Wall, a: fmpq, b: fmpq) -> bool:
+        if self.flight.is_long(a, b):
+            return bool(sign * self.flight.jet(wall, hull(a, b))[1] > 0)
         pieces = itertools.pairwise(self.flight.cuts(a, b))
         return all(self.flight.has_slope(sign, wall, *piece) for piece in pieces)
 

@@ -12,6 +12,7 @@ all times. The derivatives at m are sums over waves too, but of numbers and not 
 from __future__ import annotations
 
 from fractions import Fraction
+from functools import cached_property
 
 from reference.arithmetic import Arithmetic, Interval, is_below, sign
 from reference.jets import Jet
@@ -31,16 +32,22 @@ class Waves:
         self.omega, self.phase = arithmetic.turning(law.omega, law.period, instant)
         number = arithmetic.number
         self.terms = []
-        self.bound = arithmetic.zero  # [-M, M]
-        both = arithmetic.context.mpf([-1, 1])
         for k, a, b in law.harmonics():
             frequency = number(k) * self.omega
             amplitudes = number(a) if a else None, number(b) if b else None
             self.terms.append((number(k), frequency, *amplitudes))
-            largest = both * (number(abs(a)) + number(abs(b)))
+
+    @cached_property
+    def bound(self) -> Interval:
+        """[-M, M]: derivatives of order ORDER at all times. One wave alone has no use for it."""
+        both = self.arithmetic.context.mpf([-1, 1])
+        total = self.arithmetic.zero
+        for _, frequency, *amplitudes in self.terms:
+            largest = sum((both * a for a in amplitudes if a is not None), self.arithmetic.zero)
             for _ in range(ORDER):
                 largest = frequency * largest
-            self.bound += largest
+            total += largest
+        return total
 
     def jet(self, s: Interval) -> Jet:
         """Enclose the law and its derivatives."""

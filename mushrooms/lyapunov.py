@@ -20,6 +20,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mushrooms.orbits import FloatArray, FollowedOrbit
+from scene import Undecided
 from scene.refusal import BadInput
 
 N_BLOCKS = 16
@@ -61,6 +62,8 @@ def jacobians(orbit: FollowedOrbit, progress: Callable[[int], None] | None = Non
         before, after = orbit.state(k), orbit.state(k + 1).t
         end = after + (after - before.t) + math.ulp(after)  # a horizon safely beyond the hit that is known
         proved = reference.next_collision(orbit.scene, before, end, digits=DIGITS, is_differentiated=True)
+        if isinstance(proved, Undecided):
+            raise BadInput(f"collision {k + 1} of the orbit: the reference is undecided, {proved.reason}")
         if not isinstance(proved, reference.Collision) or proved.jacobian is None or proved.wall != wall:
             raise BadInput(f"collision {k + 1} of the orbit: {wall} is not what the reference proves")
         out[k] = [[float(entry) for entry in row] for row in proved.jacobian]

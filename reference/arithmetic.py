@@ -118,7 +118,7 @@ class Arithmetic:
         self.context = intervals(self.prec)
         self.zero: Interval = self.context.mpf(0)
 
-    def spend(self, units: int) -> None:
+    def spend(self, units: float) -> None:
         """Count evaluations of a law at this precision.
 
         Raises:

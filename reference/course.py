@@ -9,14 +9,15 @@ what a precision leaves open is raised as `Undecidable`, and equalities are sett
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import partial
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from reference import rational
-from reference.arithmetic import Arithmetic, Interval, Undecidable, exact_ends, is_below, sign
-from reference.isolation import IsolatedRoot, Isolator, Leaf
+from reference.arithmetic import Arithmetic, Exhausted, Interval, Undecidable, exact_ends, is_below, sign
+from reference.isolation import Isolator, Leaf
 from reference.walls import EnclosedFlight, MovingWalls
 from scene import Cap, Mushroom, Scene, State, Stem, Undefined, Wall
 from scene.laws import bounds
@@ -96,7 +97,13 @@ class Course:
         self.horizon = arithmetic.number(FOR_EVER) if self.end is None else arithmetic.dyadic(self.end)
         self.motion = MovingWalls(arithmetic, self.scene, self.flight)
         self.start = arithmetic.lower(self.flight.begin)
-        self.proof: dict[str, list[Leaf]] = {}
+        self._searches: dict[Wall, Isolator] = {}
+        self._never_met: dict[Any, bool] = {}
+
+    @property
+    def proof(self) -> dict[str, list[Leaf]]:
+        """For each wall the sub-intervals on which f > 0 is proved."""
+        return {wall: search.leaves for wall, search in self._searches.items()}
 
     def event(self, *, in_cap: bool) -> Event:
         """Find how the flight ends."""
@@ -118,8 +125,9 @@ class Course:
         if wall == "base":
             crossing = self._crossing(in_cap=not isinstance(self.scene, Stem))
             return crossing if crossing is not None and is_below(start, crossing) else None
-        hit = self._hit(wall, start, self.horizon)
-        return None if hit is None else hit.time
+        searches: dict[Wall, Isolator] = {}
+        hits = (self._hit(wall, start, stop, searches) for stop in self._stops(start, self.horizon))
+        return next((hit.time for hit in hits if hit is not None), None)
 
     def _runs_along_mouth(self) -> bool:
         is_level = self.exact is not None and self.exact.y == 0 and self.exact.vy == 0
@@ -219,14 +227,27 @@ class Course:
 
         What is met at the horizon exactly is not met before it.
         """
-        until = self.horizon if limit is None else limit
-        hits = []
-        for wall in walls:
-            hit = self._hit(wall, start, until)
-            if hit is not None and not self._is_at_horizon(hit):
-                hits.append(hit)
-                until = hit.time
-        return hits
+        for stop in self._stops(start, self.horizon if limit is None else limit):
+            until, hits = stop, []
+            for wall in walls:
+                hit = self._hit(wall, start, until, self._searches)
+                if hit is not None and not self._is_at_horizon(hit):
+                    hits.append(hit)
+                    until = hit.time
+            if hits:
+                return hits
+        return []
+
+    def _stops(self, start: Interval, until: Interval) -> Iterator[Interval]:
+        """Yield ever later ends of a search, first a period on: what is met soon costs no more."""
+        upper = self.arithmetic.upper
+        farthest, last, length = self._escape_time(), upper(until), self.motion.timeline.turn
+        if farthest is not None and is_below(farthest, last):
+            last = farthest
+        while length is not None and is_below(upper(start + length), last):
+            yield upper(start + length)
+            length = 4 * length
+        yield last
 
     def _is_at_horizon(self, hit: Hit) -> bool:
         """Tell whether a hit is known to fall on the horizon exactly."""
@@ -278,22 +299,23 @@ class Course:
                 return ()
         return tuple(met)
 
-    def _hit(self, wall: Wall, start: Interval, until: Interval) -> Hit | None:
-        """Find the first root of one wall's function, if it may come before the end of `until`."""
+    def _hit(
+        self, wall: Wall, start: Interval, until: Interval, searches: dict[Wall, Isolator]
+    ) -> Hit | None:
+        """Find the first root of one wall's function, if it may come before the end of `until`.
+
+        A search that has begun goes on where it stopped; f > 0 is proved there.
+        """
         stop = self.arithmetic.upper(until)
-        farthest = self._escape_time()
-        is_cut = farthest is not None and is_below(farthest, stop)
-        if is_cut and farthest is not None:
-            stop = farthest
-        isolator = self._isolator(wall)
-        if wall not in self.leaving and sign(isolator.value(start)) <= 0:
-            raise Undecidable(f"f of {wall} has no sign where a stretch of the flight begins")
+        if wall not in searches:
+            searches[wall] = self._isolator(wall)
+            if wall not in self.leaving and sign(searches[wall].value(start)) <= 0:
+                raise Undecidable(f"f of {wall} has no sign where a stretch of the flight begins")
+        search = searches[wall]
+        reached = search.leaves[-1].end if search.leaves else start
         # We search a little beyond the end, so that a root exactly there still lies inside the interval.
         end = self.arithmetic.upper(stop + (stop - start) * BEYOND)
-        root: IsolatedRoot | None = None
-        if is_below(start, end):
-            root = isolator.first_root(start, end)
-        self.proof.setdefault(wall, []).extend(isolator.leaves)
+        root = search.first_root(reached, end) if is_below(reached, end) else None
         if root is None or is_below(stop, root.time):
             return None
         return Hit(wall, root.time, root.slope, self.motion)
@@ -306,8 +328,27 @@ class Course:
             self.leaving.get(wall),
             is_flat=wall in self.flat,
             timeline=self.motion.timeline,
-            resting=partial(self.motion.resting, wall),
+            is_never_met=partial(self._is_never_met, wall),
         )
+
+    def _is_never_met(self, wall: Wall, s: Interval) -> bool:
+        """Tell whether a wall never comes, in a whole period, to where the flight is at s."""
+        turn, motion = self.motion.timeline.turn, self.motion.at_rest(s)
+        if turn is None:
+            return False
+        place = wall, motion.flight.x._mpi_, motion.flight.y._mpi_
+        if place not in self._never_met:
+            arithmetic, start = self.arithmetic, self.arithmetic.zero
+            jet, before = partial(motion.wall, wall), arithmetic.number(-1)
+            search = Isolator(arithmetic, jet, before, self.leaving.get(wall), timeline=self.motion.timeline)
+            try:
+                is_clear = sign(search.value(start)) > 0 and search.first_fall(start, turn) is None
+            except Exhausted:
+                raise
+            except Undecidable:
+                is_clear = False
+            self._never_met[place] = is_clear
+        return self._never_met[place]
 
     def _escape_time(self) -> Interval | None:
         """Return a time by which the straight flight has left the table, wherever its walls are.

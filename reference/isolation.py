@@ -31,7 +31,6 @@ from typing import NamedTuple
 
 from reference.arithmetic import (
     Arithmetic,
-    Exhausted,
     Interval,
     Undecidable,
     exact_ends,
@@ -73,7 +72,7 @@ class Isolator:
         residual: f(0) when the particle leaves this wall (the root s = 0 is divided out), else None.
         is_flat: f(0) = f'(0) = 0 exactly, so that only f'' > 0 can prove the start.
         timeline: knows the laws' knots, at which intervals are best cut; None for a smooth function.
-        resting: f, f', f'' for a particle that rests where the flight is at a time; None without one.
+        is_never_met: tells whether the wall never comes to where the flight is at a time; None: not known.
         leaves: what has been excluded so far, from the left.
     """
 
@@ -83,7 +82,7 @@ class Isolator:
     residual: Interval | None = None
     is_flat: bool = field(default=False, kw_only=True)
     timeline: Timeline | None = field(default=None, kw_only=True)
-    resting: Callable[[Interval], Callable[[Interval], Jet]] | None = field(default=None, kw_only=True)
+    is_never_met: Callable[[Interval], bool] | None = field(default=None, kw_only=True)
     leaves: list[Leaf] = field(default_factory=list, init=False)
 
     def value(self, s: Interval) -> Interval:
@@ -92,12 +91,24 @@ class Isolator:
         return f if self.residual is None else f - self.residual
 
     def first_root(self, start: Interval, end: Interval) -> IsolatedRoot | None:
-        """Find the first root in (start, end], or prove that there is none.
+        """Find the first root in (start, end], or prove that there is none; see `first_fall`.
+
+        Raises:
+            Undecidable: when this precision cannot tell.
+        """
+        fall = self.first_fall(start, end)
+        return None if fall is None else self._refine(*fall)
+
+    def first_fall(self, start: Interval, end: Interval) -> tuple[Interval, Interval] | None:
+        """Find where f > 0 first falls below 0, by f' < 0 throughout, or prove that there is no root.
 
         Args:
             start: thin interval; that f > 0 there, or that the flight begins there on this wall and
                 f = 0, is the caller's claim.
             end: thin interval.
+
+        Returns:
+            The ends of a sub-interval of (start, end] that holds one root and no earlier one; None for none.
 
         Raises:
             Undecidable: when this precision cannot tell.
@@ -122,7 +133,7 @@ class Isolator:
                 continue
             is_falling = jet.d1 is not None and sign(jet.d1) < 0
             if is_falling and not self._may_begin(a) and sign(self.value(b)) < 0:
-                return self._refine(a, b)
+                return a, b
             parts = self._parts(a, b, whole, jet)
             self._require_rise(a, b, cut=parts[0][1])
             todo += reversed(parts)
@@ -187,7 +198,7 @@ class Isolator:
             if self.is_flat and jet.d2 is not None and sign(jet.d2) > 0:
                 return "lifting"
             return "concave" if is_concave and is_all_within and sign(self.value(b)) > 0 else None
-        if sign(jet.f if self.residual is None else jet.f - self.residual) > 0:
+        if self._sign_of(jet.f) > 0:
             return "swept" if self._is_whole(whole) else "plain"
         if sign(slope) > 0:
             return "rising"
@@ -203,70 +214,54 @@ class Isolator:
 
     def _is_never_swept(self, a: Interval, b: Interval) -> bool:
         """Tell whether the wall never comes to where the flight is at a nor to where it is at b."""
-        return not self._may_begin(a) and self._is_never_met(b) and self._is_never_met(a)
-
-    def _is_never_met(self, place: Interval) -> bool:
-        if self.resting is None or self.timeline is None or self.timeline.turn is None:
-            return False
-        jet, zero = self.resting(place), self.arithmetic.zero
-
-        def less_residual(s: Interval) -> Jet:
-            found = jet(s)
-            return found if self.residual is None else found._replace(f=found.f - self.residual)
-
-        watcher = Isolator(self.arithmetic, less_residual, zero, timeline=self.timeline)
-        try:
-            return sign(watcher.value(zero)) > 0 and watcher.first_root(zero, self.timeline.turn) is None
-        except Exhausted:
-            raise
-        except Undecidable:
-            return False
+        ask = self.is_never_met
+        return ask is not None and not self._may_begin(a) and ask(b) and ask(a)
 
     def _parts(self, a: Interval, b: Interval, whole: Interval, jet: Jet) -> list[tuple[Interval, Interval]]:
         """Cut an interval: around its least value where f is convex, at a knot, or half way."""
         is_convex = jet.d2 is not None and sign(jet.d2) > 0
         if is_convex and jet.d1 is not None and sign(jet.d1) == 0 and not self._may_begin(a):
-            bottom = self._bottom(whole)
-            if bottom is not None:
-                return self._around(a, b, bottom)
+            low, high = self._bottom(whole)
+            if is_below(a, low) and is_below(high, b):
+                return [(a, low), (low, high), (high, b)] if is_below(low, high) else [(a, low), (low, b)]
         middle = self._split(a, b)
         return [(a, middle), (middle, b)]
 
-    def _bottom(self, whole: Interval) -> Interval | None:
-        """Enclose where a convex f is least, by interval Newton on f'; None when that is at an end."""
+    def _bottom(self, whole: Interval) -> tuple[Interval, Interval]:
+        """Enclose where a convex f is least, by interval Newton on f', until f has a sign there.
+
+        Returns:
+            The ends of a wider enclosure, so that f clearly falls left of it and rises right of it; those of
+            `whole` when f may be least at an end.
+        """
         where = whole
         for _ in range(MAX_NEWTON):
-            middle = self.arithmetic.middle(where)
-            rate, bend = self.jet(middle).d1, self.jet(where).d2
-            assert rate is not None
-            assert bend is not None
-            image = middle - rate / bend
+            there, over = self.jet(self.arithmetic.middle(where)), self.jet(where)
+            assert there.d1 is not None
+            assert over.d2 is not None
+            image = self.arithmetic.middle(where) - there.d1 / over.d2
             if is_below(image, where) or is_below(where, image):
-                return None
+                break
             narrower = self.arithmetic.intersection(where, image)
-            if not is_below(2 * narrower.delta, where.delta):
-                return narrower
+            is_last = not is_below(2 * narrower.delta, where.delta)
+            if is_last or self._sign_of(over.f) > 0 or self._sign_of(there.f) < 0:
+                margin = self._margin(narrower)
+                low = self.arithmetic.lower(narrower - margin)
+                high = self.arithmetic.upper(narrower + margin)
+                at_low = sign(self.value(low))
+                if at_low < 0 or (at_low > 0 and self._is_positive(self.arithmetic.hull(low, high))):
+                    return low, high
+            if is_last:
+                raise Undecidable("f and f' vanish together, as far as this precision shows")
             where = narrower
-        return where
-
-    def _around(self, a: Interval, b: Interval, bottom: Interval) -> list[tuple[Interval, Interval]]:
-        """Cut out the bottom, wider than it is known, so that f clearly falls left and rises right of it."""
-        margin = self._margin(bottom)
-        low, high = self.arithmetic.lower(bottom - margin), self.arithmetic.upper(bottom + margin)
-        bottom = self.arithmetic.hull(low, high)
-        if not (is_below(a, low) and is_below(high, b)):
-            middle = self._split(a, b)
-            return [(a, middle), (middle, b)]
-        at_bottom = sign(self.value(low))
-        if at_bottom > 0 and not self._is_positive(bottom):
-            at_bottom = 0
-        if at_bottom == 0:
-            raise Undecidable("f and f' vanish together, as far as this precision shows")
-        return [(a, low), (low, high), (high, b)] if is_below(low, high) else [(a, low), (low, b)]
+        return self.arithmetic.lower(whole), self.arithmetic.upper(whole)
 
     def _is_positive(self, whole: Interval) -> bool:
-        f = self._expanded(whole, self.jet(whole)).f
-        return sign(f if self.residual is None else f - self.residual) > 0
+        return self._sign_of(self._expanded(whole, self.jet(whole)).f) > 0
+
+    def _sign_of(self, f: Interval) -> int:
+        """Return the sign of f less its residual, 0 for none."""
+        return sign(f if self.residual is None else f - self.residual)
 
     def _split(self, a: Interval, b: Interval) -> Interval:
         """Return a point inside where f has a sign, so that no sub-interval ends on a root."""

@@ -1,84 +1,191 @@
-"""Questions that rational arithmetic answers exactly: ties, corners and paths along a wall.
+"""Questions that exact arithmetic answers: ties, corners, starts along a wall, paths along y = 0.
 
-Intervals never prove an equality, so `undefined` outcomes rest on this module: wherever a law
-has a rational value (constants, bang-bang laws, Fourier laws at t = 0), wall functions of a
-binary64 state are rational numbers, and their signs are exact.
+Intervals never prove an equality, so `undefined` outcomes rest on this module. Wall functions of a binary64
+state are rational where laws are constant or bang-bang. A Fourier law adds cosines, which are kept as they
+are: cos x at a rational angle x where `omega` is given; at a rational part x of a turn where `period` is, and
+then each derivative brings a factor of pi. Such a sum is 0 in these ways alone:
+
+    cos x and sin x at different rational angles x > 0, and 1, are linearly independent over the rationals
+    (Lindemann and Weierstrass), so each factor is 0;
+    pi is transcendental, so what stands beside each power of it is 0 by itself;
+    a sum of n-th roots of unity is 0 where the polynomial of their exponents is 0 at a primitive one.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from dataclasses import dataclass
 from fractions import Fraction
+from math import lcm
+from typing import NamedTuple
 
-from scene import Cap, Fourier, Law, Mushroom, Scene, State, Stem, Wall
+from scene import Cap, Fourier, Law, Scene, State, Stem, Wall
 from scene.laws import Quadratic, is_constant, piece_at
 from scene.tables import laws, width_factors
 
-Jet = tuple[Fraction, Fraction, Fraction]
+MAX_ORDER = 4096  # of the roots of unity whose sum may be found to be 0
 
 
-def law_jet(law: Law, time: Fraction) -> Jet | None:
-    """Return value, first and second derivative just after `time`, or None when not rational."""
+class Wave(NamedTuple):
+    """pi^power cos(x + quarters pi / 2), or pi^power cos(2 pi x) where x is a part of a turn."""
+
+    power: int = 0
+    x: Fraction = Fraction(0)
+    quarters: int = 0
+    is_part: bool = True
+
+
+@dataclass(frozen=True)
+class ExactNumber:
+    """A sum of different waves, each with a rational factor that is not 0."""
+
+    terms: dict[Wave, Fraction]
+
+    def __add__(self, other: ExactNumber) -> ExactNumber:
+        """Return the sum."""
+        return _collected([*self.terms.items(), *other.terms.items()])
+
+    def __mul__(self, other: ExactNumber) -> ExactNumber:
+        """Return the product, by cos a cos b = (cos(a + b) + cos(a - b)) / 2."""
+        return _collected(
+            (
+                Wave(p.power + q.power, p.x + k * q.x, p.quarters + k * q.quarters, p.is_part and q.is_part),
+                a * b / 2,
+            )
+            for p, a in self.terms.items()
+            for q, b in other.terms.items()
+            for k in (1, -1)
+        )
+
+    def __neg__(self) -> ExactNumber:
+        """Return the number times -1."""
+        return ExactNumber({wave: -factor for wave, factor in self.terms.items()})
+
+    def fraction(self) -> Fraction | None:
+        """Return the number as a Fraction where it has no wave; else None."""
+        return self.terms.get(Wave(), Fraction(0)) if self.terms.keys() <= {Wave()} else None
+
+    def is_zero(self) -> bool:
+        """Tell whether the number is known to be 0."""
+        by_power: dict[int, dict[Fraction, Fraction]] = {}
+        for wave, factor in self.terms.items():
+            by_power.setdefault(wave.power, {})[wave.x] = factor
+        is_part = all(wave.is_part for wave in self.terms)
+        return is_part and all(map(_is_zero_sum, by_power.values()))
+
+
+def exact(value: float | Fraction) -> ExactNumber:
+    """Return a rational number."""
+    return _collected([(Wave(), Fraction(value))])
+
+
+def _collected(terms: Iterable[tuple[Wave, Fraction]]) -> ExactNumber:
+    """Add the factors of equal waves; cosines are even, and change their sign over half a turn."""
+    found: dict[Wave, Fraction] = {}
+    for (power, x, quarters, is_part), given in terms:
+        factor = given
+        if is_part:
+            x = (x + Fraction(quarters, 4)) % 1
+            x = min(x, 1 - x)
+            factor *= -1 if x > Fraction(1, 4) else (x != Fraction(1, 4))
+            wave = Wave(power, min(x, Fraction(1, 2) - x))
+        else:
+            quarters = (quarters if x > 0 else -quarters) % 4
+            factor *= (-1) ** (quarters // 2) * (x != 0 or quarters % 2 == 0)
+            wave = Wave(power, abs(x), quarters % 2, False) if x else Wave(power)
+        found[wave] = found.get(wave, Fraction(0)) + factor
+    return ExactNumber({wave: factor for wave, factor in found.items() if factor})
+
+
+def _is_zero_sum(factors: dict[Fraction, Fraction]) -> bool:
+    """Tell whether a sum of cosines at parts of a turn is known to be 0.
+
+    Its polynomial in an n-th root of unity is multiplied by 1 - z^(n/q) for each prime q that divides n. At
+    an n-th root these are 0 where it is not primitive, and nowhere else: the sum is 0 if and only if the
+    product is 0 modulo z^n - 1.
+    """
+    n = lcm(*(x.denominator for x in factors))
+    if n > MAX_ORDER:
+        return False
+    sums = [Fraction(0)] * n
+    for x, factor in factors.items():
+        for k in (int(x * n), int(-x * n) % n):
+            sums[k] += factor
+    for q in (q for q in range(2, n + 1) if n % q == 0 and all(q % d for d in range(2, q))):
+        sums = [sums[k] - sums[k - n // q] for k in range(n)]
+    return not any(sums)
+
+
+class Jet(NamedTuple):
+    """Value, first and second derivative."""
+
+    f: ExactNumber
+    d1: ExactNumber
+    d2: ExactNumber
+
+
+def law_jet(law: Law, time: Fraction) -> Jet:
+    """Return a law and its derivatives just after `time`."""
     piece = piece_at(law, time)
     if isinstance(piece, Quadratic):
         u = time - piece.origin
-        return piece.c0 + u * (piece.c1 + u * piece.c2), piece.c1 + 2 * u * piece.c2, 2 * piece.c2
-    if isinstance(piece, Fourier):
-        if time != 0 or piece.omega is None:
-            return None
-        omega = Fraction(piece.omega)
-        terms = [(k * omega, Fraction(a), Fraction(b)) for k, a, b in piece.harmonics()]
-        return (
-            Fraction(piece.mean) + sum((a for _, a, _ in terms), Fraction(0)),
-            sum((f * b for f, _, b in terms), Fraction(0)),
-            -sum((f * f * a for f, a, _ in terms), Fraction(0)),
+        return _rational_jet(
+            piece.c0 + u * (piece.c1 + u * piece.c2), piece.c1 + 2 * u * piece.c2, 2 * piece.c2
         )
-    return Fraction(piece), Fraction(0), Fraction(0)
+    if not isinstance(piece, Fourier):
+        return _rational_jet(Fraction(piece))
+    if piece.omega is None:
+        assert piece.period is not None
+        is_part, angle = True, time / Fraction(piece.period)
+        frequency = _collected([(Wave(power=1), 2 / Fraction(piece.period))])
+    else:
+        is_part, frequency, angle = False, exact(piece.omega), Fraction(piece.omega) * time
+    totals = [exact(piece.mean), exact(0), exact(0)]
+    for k, a, b in piece.harmonics():
+        factor = exact(1)
+        for order in range(3):
+            # A derivative turns each cosine by a quarter; sin x is cos(x - quarter).
+            waves = ((Wave(0, k * angle, order - turn, is_part), Fraction(c)) for turn, c in ((0, a), (1, b)))
+            totals[order] += factor * _collected(waves)
+            factor *= frequency * exact(k)
+    return Jet(*totals)
+
+
+def _rational_jet(f: Fraction, d1: Fraction = Fraction(0), d2: Fraction = Fraction(0)) -> Jet:
+    return Jet(exact(f), exact(d1), exact(d2))
 
 
 def _product(p: Jet, q: Jet) -> Jet:
-    return p[0] * q[0], p[1] * q[0] + p[0] * q[1], p[2] * q[0] + 2 * p[1] * q[1] + p[0] * q[2]
+    return Jet(p.f * q.f, p.d1 * q.f + p.f * q.d1, p.d2 * q.f + exact(2) * p.d1 * q.d1 + p.f * q.d2)
 
 
-def _combined(*terms: tuple[int, Jet]) -> Jet:
-    f, d1, d2 = (sum((sign * jet[k] for sign, jet in terms), Fraction(0)) for k in range(3))
-    return f, d1, d2
+def _sum(*jets: Jet) -> Jet:
+    return Jet(*(sum(parts, exact(0)) for parts in zip(*jets, strict=True)))
 
 
-def wall_jet(scene: Scene, state: State, wall: Wall, s: Fraction) -> Jet | None:
-    """Return f, f', f'' of a wall at flight time s, exactly, or None when not rational."""
-    x, y = Fraction(state.x), Fraction(state.y)
+def _negative(jet: Jet) -> Jet:
+    return Jet(-jet.f, -jet.d1, -jet.d2)
+
+
+def wall_jet(scene: Scene, state: State, wall: Wall, s: Fraction) -> Jet:
+    """Return f, f', f'' of a wall at flight time s, exactly."""
     vx, vy = Fraction(state.vx), Fraction(state.vy)
     time = Fraction(state.t) + s
-    height: Jet = (y + vy * s, vy, Fraction(0))
-    across: Jet = (x + vx * s, vx, Fraction(0))
+    height = _rational_jet(Fraction(state.y) + vy * s, vy)
+    across = _rational_jet(Fraction(state.x) + vx * s, vx)
     if wall == "base":
-        return (-height[0], -vy, Fraction(0)) if isinstance(scene, Stem) else height
+        return _negative(height) if isinstance(scene, Stem) else height
     found = {name: law_jet(law, time) for name, law in laws(scene).items()}
     if wall == "arc":
         r = found["r"]
-        if r is None:
-            return None
-        return _combined((1, _product(r, r)), (-1, _product(across, across)), (-1, _product(height, height)))
+        return _sum(_product(r, r), _negative(_product(across, across)), _negative(_product(height, height)))
     if wall == "floor":
-        h = found["h"]
-        return None if h is None else (height[0] + h[0], height[1] + h[1], h[2])
-    width, slope = width_jet(scene, time), found["slope"]
-    if width is None or slope is None:
-        return None
-    sign = -1 if wall == "right" else 1
-    return _combined((1, width), (1, _product(slope, height)), (sign, across))
-
-
-def width_jet(scene: Scene, time: Fraction) -> Jet | None:
-    """Return the half-width of the mouth and its derivatives, or None when not rational."""
-    assert isinstance(scene, (Stem, Mushroom))
-    total: Jet = (Fraction(1), Fraction(0), Fraction(0))
+        return _sum(height, found["h"])
+    assert not isinstance(scene, Cap)
+    width = _rational_jet(Fraction(1))
     for law in width_factors(scene):
-        jet = law_jet(law, time)
-        if jet is None:
-            return None
-        total = _product(total, jet)
-    return total
+        width = _product(width, law_jet(law, time))
+    return _sum(width, _product(found["slope"], height), _negative(across) if wall == "right" else across)
 
 
 def crossing_time(state: State) -> Fraction | None:
@@ -99,15 +206,11 @@ def straight_time(scene: Scene, state: State, wall: Wall) -> Fraction | None:
     if not all(map(is_constant, moving)):
         return None
     jet = wall_jet(scene, state, wall, Fraction(0))
-    if jet is None or jet[0] <= 0 or jet[1] >= 0:
-        return None
-    return -jet[0] / jet[1]
+    f, rate = jet.f.fraction(), jet.d1.fraction()
+    return -f / rate if f is not None and rate is not None and f > 0 > rate else None
 
 
 def is_zero(scene: Scene, state: State, wall: Wall, s: Fraction) -> bool:
     """Tell whether f, less its residual f(0) on the wall being left, is known to vanish exactly at s."""
-    jet = wall_jet(scene, state, wall, s)
-    if jet is None or wall != state.wall:
-        return jet is not None and jet[0] == 0
-    start = wall_jet(scene, state, wall, Fraction(0))
-    return start is not None and jet[0] == start[0]
+    f = wall_jet(scene, state, wall, s).f
+    return (f if wall != state.wall else f + -wall_jet(scene, state, wall, Fraction(0)).f).is_zero()

@@ -148,12 +148,16 @@ def _departure(scene: Scene, state: State, wall: Wall, motion: MovingWalls) -> U
     if rise < 0:
         raise InvalidState(f"state.wall = {wall!r}: the particle starts on this wall and moves into it")
     exact = rational.wall_jet(scene, state, wall, Fraction(0))
-    if exact is None or exact[1] != 0:
+    if not exact.d1.is_zero():
         raise Undecidable("f' at the start has no sign")
-    if exact[2] > 0:
+    fraction = Fraction(0) if exact.d2.is_zero() else exact.d2.fraction()
+    bend = sign(jet.d2 if fraction is None else motion.arithmetic.number(fraction))
+    if bend == 0 and fraction is None:
+        raise Undecidable("f'' at the start has no sign")
+    if bend > 0:
         return True
     is_at_rest = all(is_constant(law) for law in laws(scene).values())
-    return Undefined("sliding" if exact[2] < 0 or is_at_rest or wall == "base" else "tangency")
+    return Undefined("sliding" if bend < 0 or is_at_rest or wall == "base" else "tangency")
 
 
 def _check_residual(scene: Scene, state: State, motion: MovingWalls) -> None:

@@ -11,7 +11,7 @@ from __future__ import annotations
 from bisect import bisect_right
 from fractions import Fraction
 from functools import lru_cache
-from typing import NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol
 
 from reference.arithmetic import Arithmetic, Interval, exact_ends
 from reference.jets import Jet, united
@@ -48,10 +48,18 @@ class Timeline:
         shared = period(scene)
         length = None if shared is None else arithmetic.period(shared.omega, shared.length)
         self.turn = None if length is None else arithmetic.upper(length)  # a period at least
+        self._arithmetic = arithmetic
+        # Particles at rest at several places ask for the same parts of a period.
+        self._known: dict[tuple[str, Any], Jet] = {}
 
     def jet(self, name: str, s: Interval) -> Jet:
         """Enclose a law and its derivatives at every time within s."""
-        return self.laws[name].jet(s)
+        key = name, s._mpi_
+        if key in self._known:
+            self._arithmetic.spend(1)
+        else:
+            self._known[key] = self.laws[name].jet(s)
+        return self._known[key]
 
     def knot_between(self, low: Fraction, high: Fraction) -> Fraction | None:
         """Return the knot nearest to the middle of an interval, None when no law has one inside."""

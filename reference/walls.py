@@ -7,10 +7,8 @@ With an interval of flight times, each enclosure holds over all of it, knots inc
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from copy import copy
 from fractions import Fraction
-from functools import partial
 from typing import Any, NamedTuple
 
 from reference.arithmetic import Arithmetic, Interval
@@ -46,14 +44,14 @@ class MovingWalls:
         self.is_stem = isinstance(scene, Stem)
         self.timeline = Timeline(arithmetic, scene, flight.instant)
         # Neighbouring intervals ask for the ends they share, and each proof for what the one before it found.
-        self._known: dict[tuple[Wall, Any], tuple[Jet, float]] = {}
+        self._known: dict[tuple[Wall, Any], Jet] = {}
 
-    def resting(self, wall: Wall, s: Interval) -> Callable[[Interval], Jet]:
-        """Return f, f', f'' of a wall for a particle that rests where the flight is at s."""
+    def at_rest(self, s: Interval) -> MovingWalls:
+        """Return the walls for a particle that rests where the flight is at s; they share evaluated laws."""
         q, zero, still = self.flight, self.arithmetic.zero, copy(self)
         still.flight = q._replace(x=q.x + q.vx * s, y=q.y + q.vy * s, vx=zero, vy=zero)
         still._known = {}
-        return partial(still.wall, wall)
+        return still
 
     def law(self, name: str, s: Interval) -> Jet:
         """Enclose a law and its derivatives over an interval of flight time."""
@@ -69,13 +67,10 @@ class MovingWalls:
         """Enclose f, f', f'' of a wall over flight times s."""
         key = wall, s._mpi_
         if key in self._known:
-            jet, cost = self._known[key]
-            self.arithmetic.work.spend(cost)  # a limit on work must not depend on what is kept
-            return jet
-        before = self.arithmetic.work.spent
-        jet = self._evaluated(wall, s)
-        self._known[key] = jet, self.arithmetic.work.spent - before
-        return jet
+            self.arithmetic.spend(1)
+        else:
+            self._known[key] = self._evaluated(wall, s)
+        return self._known[key]
 
     def _evaluated(self, wall: Wall, s: Interval) -> Jet:
         q = self.flight

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+from fractions import Fraction
 
 import pytest
 from flint import arb
@@ -120,11 +121,15 @@ def test_a_step_is_judged(spoil, kind):
     assert stepped(spoil(right), ANSWER, STATE).kind == kind
 
 
-def off(enclosed):
-    """The claim that everything happens a little later and elsewhere."""
-    return enclosed._replace(
-        ends=[(high + (high - low) + abs(high) / 10**30,) * 2 for low, high in enclosed.ends]
-    )
+def off(digits, number):
+    """The claim that one number is another in a late digit."""
+
+    def spoil(enclosed):
+        ends = list(enclosed.ends)
+        ends[number] = tuple(end * (1 + Fraction(1, 10**digits)) for end in ends[number])
+        return enclosed._replace(ends=ends)
+
+    return spoil
 
 
 @pytest.mark.parametrize(
@@ -135,12 +140,12 @@ def off(enclosed):
         (lambda _: Rejected("no"), "wrong"),
         (lambda enclosed: enclosed._replace(wall="base"), "wrong"),
         (lambda enclosed: enclosed._replace(wall=None), "wrong"),
-        (off, "wrong"),
+        *((off(digits, number), "wrong") for digits in (16, 18, 20, 30) for number in range(5)),
     ],
 )
 def test_a_claim_is_judged(spoil, kind):
     assert ANSWER.wall == "arc"
-    (right,) = faults.claim([ANSWER]).answers
+    (right,) = prove(Attack(SCENE, STATE, 10.0)).answers
     assert proved(Claim([spoil(right)]), [ANSWER], STATE).kind == kind
 
 

@@ -188,7 +188,7 @@ MUTANTS = {
     "never swept where a flight begins": (
         Isolator,
         "_is_never_swept",
-        lambda self, a, b: not self._may_begin(a) and self._is_never_met(a),
+        lambda self, a, b: bool(self.is_never_met) and not self._may_begin(a) and self.is_never_met(a),
     ),
     "never met in half a period": (timeline.Timeline, "__init__", half_a_turn),
     "f by its tangent": (Isolator, "_expanded", tangent_for_the_expansion),
@@ -198,6 +198,7 @@ MUTANTS = {
     "floor never asked": (Course, "_first_hit", exclude_all_but_the_floor),
     "piece at the lower end of an enclosed time": (timeline.Legs, "jet", piece_at_the_lower_end),
     "piece in the middle of an enclosed time": (timeline.Legs, "jet", piece_in_the_middle),
+    "sums of cosines are 0 by their factors alone": (rational, "_is_zero_sum", lambda factors: not factors),
     "ties with the residual": (rational, "is_zero", tie_with_the_residual),
     "mouth's edge with the residual": (Course, "_beyond_crossing", edge_with_the_residual),
     "met at the horizon is met": (Course, "_is_at_horizon", met_before_the_horizon),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+import random
 import re
 import threading
 from fractions import Fraction
@@ -21,9 +22,22 @@ from conformance.strategies import scenes_and_states
 from reference.arithmetic import Arithmetic, sign
 from reference.isolation import Isolator
 from reference.jets import Jet
+from reference.rational import law_jet
 from reference.start import flight_from
 from reference.walls import MovingWalls
-from scene import BadInput, Cap, Fourier, InvalidState, Rejected, State, Stem, Undecided, Undefined, load
+from scene import (
+    BadInput,
+    Cap,
+    Fourier,
+    InvalidState,
+    Mushroom,
+    Rejected,
+    State,
+    Stem,
+    Undecided,
+    Undefined,
+    load,
+)
 
 
 def hit(scene, state, t_end=100.0, digits=40):
@@ -222,3 +236,57 @@ def test_few_digits_refuse_no_start_on_its_wall():
     assert isinstance(reference.trajectory(scene, off, 1, working=2).outcome, Undecided)
     with pytest.raises(InvalidState, match="away from that wall"):
         reference.trajectory(scene, off, 1, working=12)
+
+
+def many_harmonics(seed):
+    """Draw a slow particle in a stem or a mushroom with 8 to 16 harmonics of .05, half the mean at most."""
+    draw = random.Random(seed)
+    n = draw.randint(8, 16)
+
+    def ripples(mean):
+        amplitude = min(0.05, mean / 2 / n)
+        factors = [amplitude * draw.choice((-1, 1)) for _ in range(n)]
+        angles = [draw.choice((0.0, draw.uniform(0, 6))) for _ in range(n)]
+        cos, sin = ([a * f(x) for a, x in zip(factors, angles, strict=True)] for f in (math.cos, math.sin))
+        return Fourier(mean=mean, omega=1.0, cos=tuple(cos), sin=tuple(sin))
+
+    w, h, slope = ripples(0.5) if seed % 2 else 0.5, ripples(draw.uniform(1.0, 2.5)), draw.choice((0.0, 0.05))
+    scene = Mushroom(r=1.5, w=w, h=h, slope=slope) if seed % 3 == 0 else Stem(w=w, h=h, slope=slope)
+    speed, angle = draw.choice((0.0, 10 ** draw.uniform(-4, -2))), draw.uniform(0, 6)
+    y = -draw.uniform(0.02, 0.7) * h.mean
+    return scene, State(0.5, draw.uniform(-0.2, 0.2), y, speed * math.cos(angle), speed * math.sin(angle))
+
+
+def the_finding():
+    """A particle at rest that sixteen harmonics meet within half a period."""
+    h = Fourier(1.5, 1.0, cos=tuple(0.05 * (-1) ** k for k in range(16)))
+    return Stem(w=0.5, h=h), State(0.3, 0.0, -0.71, 0.0, 0.0)
+
+
+@pytest.mark.parametrize("seed", [None, *range(200 if IS_DEEP else 30)])
+def test_a_far_horizon_costs_no_near_hit(seed):
+    """What is met within ten periods is found, and found again with any horizon."""
+    scene, state = the_finding() if seed is None else many_harmonics(seed)
+    near, *later = (reference.next_collision(scene, state, t_end) for t_end in (63.0, 1e2, 1e4, 1e7))
+    assert isinstance(near, reference.Collision if seed is None else reference.Collision | reference.Horizon)
+    for found in later if isinstance(near, reference.Collision) else ():
+        assert found.wall == near.wall
+        assert found.dt.lo <= near.dt.hi
+        assert near.dt.lo <= found.dt.hi
+
+
+FACTORS = st.lists(st.integers(-2, 2), min_size=1, max_size=6).map(tuple)
+
+
+@given(st.integers(-2, 2), FACTORS, FACTORS, st.fractions(0, 1, max_denominator=30))
+def test_a_law_and_its_rates_are_0_exactly_when_their_numbers_are(mean, cos, sin, time):
+    law = Fourier(float(mean), period=1.0, cos=cos, sin=sin)
+    with mpmath.workdps(60):
+        t = mpmath.mpf(time.numerator) / time.denominator
+        numbers = [mean + 0 * t, 0 * t, 0 * t]
+        for k, a, b in law.harmonics():
+            c, s, rate = mpmath.cospi(2 * k * t), mpmath.sinpi(2 * k * t), 2 * mpmath.pi * k
+            waves = a * c + b * s, rate * (b * c - a * s), -(rate**2) * (a * c + b * s)
+            numbers = [number + wave for number, wave in zip(numbers, waves, strict=True)]
+        for found, number in zip(law_jet(law, time), numbers, strict=True):
+            assert found.is_zero() == (abs(number) < mpmath.mpf(10) ** -50)

@@ -57,10 +57,14 @@ def hull(a: Number, b: Number) -> Ball:
 
 
 def rational_ends(number: Number) -> tuple[Rational, Rational]:
-    """Return rationals that enclose a number: the number itself when it is one."""
+    """Return rationals that enclose a number: the number itself when it is one, else the ends of its ball.
+
+    They follow from centre and radius, which are exact: `lower` and `upper` round to the ambient precision.
+    """
     if isinstance(number, fmpq):
         return number, number
-    return number.lower().fmpq(), number.upper().fmpq()
+    centre, radius = number.mid().fmpq(), number.rad().fmpq()
+    return centre - radius, centre + radius
 
 
 def add(p: Jet, q: Jet) -> Jet:

@@ -15,6 +15,7 @@ from functools import partial
 from typing import Any, NamedTuple
 
 from conformance import second_stepper
+from conformance.arb.numbers import rational_ends
 from conformance.attacks.case import Attack, Family, line
 from conformance.grading.agreement import Answer, compare
 from conformance.grading.error import free_flight, inputs_of, moved
@@ -219,7 +220,7 @@ def _certified(answer: second_stepper.Answer, state: State | None) -> Certified:
 
 def ball_ends(ball: Any) -> Ends:
     """Return the ends of a ball, exactly."""
-    low, high = (end.fmpq() for end in (ball.lower(), ball.upper()))
+    low, high = rational_ends(ball)
     return Fraction(int(low.p), int(low.q)), Fraction(int(high.p), int(high.q))
 
 

@@ -59,6 +59,22 @@ def answers_by_hand():
                 assert enclosure.contains(number) or abs(enclosure.centre() - number) < TINY, name
 
 
+def starts_where_a_wall_turns():
+    """At rest where an arc turns: after quarters, a sixth, an eighth, a ninth (sin 40 + sin 20 = sin 80)."""
+    waves = [
+        (0.0, Fourier(1.0, period=1.0, cos=(-0.25,))),
+        (-7.75, Fourier(1.0, period=1.0, sin=(-0.25,))),
+        (0.5, Fourier(1.0, period=3.0, cos=(-0.25, 0.125))),
+        (0.125, Fourier(1.0, period=1.0, cos=(-0.375, 0.0, 0.125))),
+        (1.0, Fourier(1.0, period=9.0, cos=(0.25, -0.125, 0.0, 0.0625))),
+    ]
+    for t, r in waves:
+        opposite = Fourier(1.0, period=r.period, cos=[-a for a in r.cos], sin=[-b for b in r.sin])
+        for law, expected in ((r, reference.Horizon), (opposite, Undefined)):
+            start = State(t, 0.0, float(value(mpmath.mp, law, t)), 0.0, 0.0, "arc")
+            assert isinstance(reference.next_collision(Cap(r=law), start, t + 0.125), expected)
+
+
 def starts():
     """One flight to each wall of a mushroom in which everything moves."""
     return [
@@ -148,8 +164,14 @@ def floor_within_an_enclosed_time():
             assert truth.after.vy.lo <= step.after.vy.hi
 
 
+def ripples(mean, amplitude):
+    """A law of sixteen harmonics, with a sine and a cosine each."""
+    sin = tuple(amplitude * (-1) ** (k * k // 3) for k in range(16))
+    return Fourier(mean=mean, omega=1.0, sin=sin, cos=tuple(amplitude * (-1) ** (k // 2) for k in range(16)))
+
+
 def bounded_work():
-    """A floor that a particle comes down to by 1e-10 in a period, over 1e7 of them: given up, and soon."""
+    """A side of sixteen harmonics, approached by 1e-10 in a period over 1e10 of them: given up, and soon."""
     spent = [0]
     honest = Arithmetic.spend
 
@@ -160,8 +182,9 @@ def bounded_work():
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(Arithmetic, "spend", watched)
-        slow = State(0.0, 0.5, -1.01, 0.0, -1e-11)
-        assert isinstance(reference.next_collision(GRAZING, slow, 1e10, digits=DIGITS), Undecided)
+        slow = State(0.0, 0.5, -1.01, 1e-11, -1e-11)
+        rough = Stem(w=ripples(1.0, 0.02), h=ripples(2.0, 0.05), slope=0.01)
+        assert isinstance(reference.next_collision(rough, slow, 1e16, digits=DIGITS), Undecided)
     rests = State(0.0, 0.5, -1.01, 0.0, 0.0)
     assert isinstance(reference.next_collision(GRAZING, rests, 1e10, digits=DIGITS), reference.Horizon)
 
@@ -250,6 +273,7 @@ def waves_within_their_enclosures():
 BATTERY = (
     knot_within_an_enclosed_time,
     answers_by_hand,
+    starts_where_a_wall_turns,
     law_of_reflection,
     differentiated,
     starts_along_a_wall_that_rests,

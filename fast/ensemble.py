@@ -43,9 +43,9 @@ from fast.pieces import laws_in_lanes
 from fast.starts import cycle_stops, initial_states, least_collisions, one_cycle
 from fast.threads import awaited, interruptible
 from fast.units import Units, fit, inward
-from scene import Scene
+from scene import Scene, check_scene
 from scene.notebook import rows
-from scene.refusal import BadInput, check_count, check_scene
+from scene.refusal import BadInput, check_count
 
 FOLLOWED, UNDECIDED, UNDEFINED, REJECTED = 0, 1, 2, 3
 NO_PATHS = unfilled_paths(0, 0)

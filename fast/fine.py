@@ -13,8 +13,8 @@ from fast.kernel.records import ANCHORS_SHAPE, Compiled, FloatArray, IntArray
 from fast.step import WALL_CODES, WALL_NAMES, Start, check_state, trouble
 from fast.threads import follow_path
 from fast.units import Units
-from scene import Horizon, Outcome, Scene, State, Wall
-from scene.refusal import check_count, check_scene
+from scene import Horizon, Outcome, Scene, State, Wall, check_scene
+from scene.refusal import check_count
 
 
 class FineTrajectory(NamedTuple):

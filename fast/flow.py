@@ -16,8 +16,8 @@ from fast.pieces import laws_in_lanes
 from fast.starts import least_collisions, only_stop
 from fast.step import as_arrays, fitted_start, next_collision, trouble
 from fast.units import fit
-from scene import Horizon, InvalidState, Outcome, Rejected, Scene, State
-from scene.refusal import check_number, check_scene
+from scene import Horizon, InvalidState, Outcome, Rejected, Scene, State, check_scene
+from scene.refusal import check_number
 
 
 class Flow(NamedTuple):

@@ -24,8 +24,9 @@ from scene import (
     Undecided,
     Undefined,
     Wall,
+    check_scene,
 )
-from scene.refusal import BadInput, check_number, check_scene
+from scene.refusal import BadInput, check_number
 from scene.states import check_numbers
 
 WALL_NAMES: dict[int, Wall] = {

@@ -15,8 +15,8 @@ from fast.starts import only_stop
 from fast.step import WALL_NAMES, as_arrays, check_state, trouble
 from fast.threads import follow_path
 from fast.units import ANSWER_LOST, fit
-from scene import Horizon, Outcome, Scene, State, Wall
-from scene.refusal import BadInput, check_count, check_scene
+from scene import Horizon, Outcome, Scene, State, Wall, check_scene
+from scene.refusal import BadInput, check_count
 
 NAMES = np.array([WALL_NAMES[code] for code in range(len(WALL_NAMES))], dtype=object)
 

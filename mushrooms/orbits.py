@@ -27,8 +27,8 @@ from scene import Outcome, Scene, State, Stem, Wall
 from scene.files import write_file
 from scene.geometry import TableAt, half_width, table_at
 from scene.laws import values
-from scene.refusal import BadInput, check_count, check_scene, check_seed
-from scene.tables import cycle_length
+from scene.refusal import BadInput, check_count, check_seed
+from scene.tables import check_scene, cycle_length
 
 FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]

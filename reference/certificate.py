@@ -20,8 +20,8 @@ from reference.arithmetic import Enclosure
 from reference.course import UndefinedProof
 from reference.isolation import Leaf
 from reference.step import proof_of_undefined
-from scene import BadInput, Scene, State, Undefined, to_data
-from scene.refusal import check_scene, shown
+from scene import BadInput, Scene, State, Undefined, check_scene, to_data
+from scene.refusal import shown
 
 VERSION = 2
 

@@ -17,8 +17,8 @@ from reference.course import Course, UndefinedProof
 from reference.jacobian import enclosures, step_jacobian
 from reference.margins import measure
 from reference.start import flight_from, is_in_cap, judge_start
-from scene import BadInput, InvalidState, Rejected, Scene, State, Undecided
-from scene.refusal import check_count, check_scene
+from scene import BadInput, InvalidState, Rejected, Scene, State, Undecided, check_scene
+from scene.refusal import check_count
 from scene.states import check_numbers
 
 GUARD_DIGITS = 15

@@ -6,9 +6,9 @@ is a table at one instant, and `transforms` are the changes under which the phys
 
 from scene.laws import BangBang, Fourier, Law
 from scene.load import catalogue, from_data, load, to_data
-from scene.refusal import BadInput, InvalidScene, check_count, check_number, check_scene
+from scene.refusal import BadInput, InvalidScene, check_count, check_number
 from scene.states import Collision, Horizon, InvalidState, Outcome, Rejected, State, Undecided, Undefined
-from scene.tables import Cap, Mushroom, Scene, Stem, Wall
+from scene.tables import Cap, Mushroom, Scene, Stem, Wall, check_scene
 
 __all__ = [
     "BadInput",

@@ -14,8 +14,8 @@ from typing import Any
 import msgspec
 
 from scene.laws import BangBang, Fourier
-from scene.refusal import InvalidScene, check_scene, shown
-from scene.tables import PARAMETERS, Cap, Mushroom, Scene, Stem
+from scene.refusal import InvalidScene, shown
+from scene.tables import PARAMETERS, Cap, Mushroom, Scene, Stem, check_scene
 
 
 def catalogue() -> list[str]:

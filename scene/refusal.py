@@ -21,24 +21,6 @@ class InvalidScene(BadInput):
     """A scene that means nothing: one line naming parameter, time, value and bound."""
 
 
-def check_scene(scene: object) -> None:
-    """Refuse what is no scene at all.
-
-    Args:
-        scene: whatever a caller gave for a Cap, a Stem or a Mushroom.
-
-    Raises:
-        BadInput: naming what was given; for a name, how to load the scene.
-    """
-    from scene.tables import Cap, Mushroom, Stem  # not above: the tables need the errors of this file
-
-    # A scene is proved valid where it is made; a subclass could leave that out.
-    if type(scene) in (Cap, Stem, Mushroom):
-        return
-    hint = f"; a name or a file is loaded by scene.load({shown(scene)})" if isinstance(scene, str) else ""
-    raise BadInput(f"scene = {shown(scene)}, must be a Cap, a Stem or a Mushroom{hint}")
-
-
 def check_count(field: str, value: object, low: int, high: int) -> int:
     """Return a whole number within bounds.
 

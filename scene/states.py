@@ -7,8 +7,8 @@ from typing import Literal
 
 import msgspec
 
-from scene.refusal import BadInput, check_number, check_scene, shown
-from scene.tables import Scene, Wall
+from scene.refusal import BadInput, check_number, shown
+from scene.tables import Scene, Wall, check_scene
 
 
 class InvalidState(BadInput):

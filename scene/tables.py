@@ -28,7 +28,7 @@ from mpmath import fp
 
 from scene.given import finite
 from scene.laws import BangBang, Fourier, Law, Period, shared_period
-from scene.refusal import InvalidScene, shown
+from scene.refusal import BadInput, InvalidScene, shown
 from scene.validity import Condition, prove
 
 Wall = Literal["arc", "base", "left", "right", "floor"]
@@ -116,6 +116,22 @@ class Mushroom(_Table, frozen=True, tag="mushroom", kw_only=True):
 
 
 Scene = Cap | Stem | Mushroom
+
+
+def check_scene(scene: object) -> None:
+    """Refuse what is no scene at all.
+
+    Args:
+        scene: whatever a caller gave for a Cap, a Stem or a Mushroom.
+
+    Raises:
+        BadInput: naming what was given; for a name, how to load the scene.
+    """
+    # A scene is proved valid where it is made; a subclass could leave that out.
+    if type(scene) in (Cap, Stem, Mushroom):
+        return
+    hint = f"; a name or a file is loaded by scene.load({shown(scene)})" if isinstance(scene, str) else ""
+    raise BadInput(f"scene = {shown(scene)}, must be a Cap, a Stem or a Mushroom{hint}")
 
 
 def laws(scene: Scene) -> dict[str, Law]:

@@ -20,8 +20,7 @@ import numpy as np
 from numpy.polynomial import chebyshev
 from numpy.typing import NDArray
 
-from scene.refusal import check_scene
-from scene.tables import Scene
+from scene.tables import Scene, check_scene
 from theory.adiabatic import Captures, Window
 from theory.constants import guarded
 from theory.cycle import Cycle

@@ -14,8 +14,8 @@ import numpy as np
 from mpmath import fp
 
 from scene.laws import Law, value
-from scene.refusal import BadInput, check_scene
-from scene.tables import Mushroom, Scene, cycle_length
+from scene.refusal import BadInput
+from scene.tables import Mushroom, Scene, check_scene, cycle_length
 from scene.transforms import scaled
 from theory.given import in_system
 

@@ -6,9 +6,10 @@ is a table at one instant, and `transforms` are the changes under which the phys
 
 from scene.laws import BangBang, Fourier, Law
 from scene.load import catalogue, from_data, load, to_data
+from scene.notebook import of_scene
 from scene.refusal import BadInput, InvalidScene, check_count, check_number
 from scene.states import Collision, Horizon, InvalidState, Outcome, Rejected, State, Undecided, Undefined
-from scene.tables import Cap, Mushroom, Scene, Stem, Wall, check_scene
+from scene.tables import Cap, Mushroom, Scene, Stem, Wall, _Table, check_scene
 
 __all__ = [
     "BadInput",
@@ -37,3 +38,6 @@ __all__ = [
     "load",
     "to_data",
 ]
+
+# The tables cannot import what makes their page in a notebook: it needs the tables.
+_Table._repr_html_ = of_scene

@@ -19,9 +19,10 @@ repeated knots.
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 from functools import lru_cache
 from numbers import Real
-from typing import ClassVar, Literal
+from typing import Any, ClassVar, Literal
 
 import msgspec
 from mpmath import fp
@@ -46,6 +47,7 @@ class _Table(
     omit_defaults=True,
 ):
     optional: ClassVar[tuple[str, ...]] = ()  # parameters that may be None
+    _repr_html_: ClassVar[Callable[[Any], str]]  # what a notebook shows: assigned by `scene`
 
     def __post_init__(self) -> None:
         """Refuse an invalid scene; numbers of any kind become floats.
@@ -65,11 +67,6 @@ class _Table(
         for field in ("name", "notes"):
             _check_text(field, getattr(self, field))
         _prove(type(self), tuple(getattr(self, name, None) for name in PARAMETERS))
-
-    def _repr_html_(self) -> str:
-        from scene.notebook import of_scene  # not above: it needs the tables
-
-        return of_scene(self)  # type: ignore[arg-type]  # a _Table is one of the three
 
 
 def _check_text(field: str, text: object) -> None:

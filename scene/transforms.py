@@ -13,10 +13,10 @@ from typing import Any, TypeVar
 import msgspec
 from mpmath import fp
 
-from scene import BangBang, Fourier, Law, Scene, State, Wall
-from scene.laws import value
+from scene.laws import BangBang, Fourier, Law, value
 from scene.precision import decimals
-from scene.tables import laws
+from scene.states import State
+from scene.tables import Scene, Wall, laws
 
 Table = TypeVar("Table", bound=Scene)
 _ACROSS: dict[Wall, Wall] = {"left": "right", "right": "left"}

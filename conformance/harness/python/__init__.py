@@ -1,0 +1,1 @@
+"""Example implementations of protocol 1 in Python."""

@@ -5,6 +5,7 @@ import re
 import shutil
 import subprocess
 import tomllib
+from collections import Counter
 from functools import cache
 from pathlib import Path
 
@@ -17,6 +18,18 @@ LANGUAGES = (".py", ".c", ".h", ".cpp", ".hpp", ".js", ".css")
 MAX_FUNCTION = 60  # lines of a function, its decorators and docstring included
 # Files, and functions by `file: name`, that may be longer, and why.
 LONGER: dict[str, str] = {}
+# Statements of a folder's Python files (nodes of `ast.stmt`), without docstrings: a bound may only fall.
+MAX_STATEMENTS = {
+    "scene": 1_480,
+    "reference": 1_520,
+    "fast": 3_930,
+    "theory": 2_290,
+    "conformance": 12_010,
+    "mushrooms": 4_120,
+    "tests": 14_320,
+    "docs": 110,
+    ".ci": 40,
+}
 MAX_ARGUMENTS = 8  # of a kernel: what belongs together is a record
 # Python hands these a state number by number; a record would take longer than the step.
 CROWDED = {
@@ -106,6 +119,18 @@ def long_functions(sources: dict[str, str]) -> list[str]:
     ]
 
 
+def large_folders(sources: dict[str, str]) -> dict[str, int]:
+    """Return how many statements the folders have that exceed their bound, or have none."""
+    counts = Counter(
+        path.split("/")[0]
+        for path, text in sources.items()
+        for node in ast.walk(parsed(text))
+        if isinstance(node, ast.stmt)
+        and not (isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant))
+    )
+    return {folder: n for folder, n in counts.items() if n > MAX_STATEMENTS.get(folder, 0)}
+
+
 def crowded_kernels(sources: dict[str, str]) -> list[str]:
     """List the kernels that take too many arguments, as `file: name`."""
     return [
@@ -128,12 +153,13 @@ def repeated_classes(sources: dict[str, str]) -> dict[str, list[str]]:
     return {name: paths for name, paths in places.items() if len(paths) > 1}
 
 
-def test_files_and_functions_stay_short():
+def test_folders_files_and_functions_stay_short():
     in_python, in_any = texts(), texts(LANGUAGES)
     assert 100 < len(in_python) < len(in_any)
     long = {*long_files(in_any), *long_functions(in_python)}
     assert long - set(LONGER) == set()
     assert set(LONGER) - long == set(), "no longer needed"
+    assert large_folders(in_python) == {}
 
 
 def test_kernels_take_records_and_few_arguments():
@@ -151,6 +177,10 @@ def test_planted_lengths_and_names_are_seen():
     right = "class A:\n    async def g(self):\n" + "        pass\n" * 59
     assert long_functions({"fast/a.py": long, "tests/b.py": right}) == ["fast/a.py: f"]
     assert long_functions({"tests/b.py": right + "        pass\n"}) == ["tests/b.py: g"]
+    most = {f"{folder}/a.py": '"""Doc."""' + "\nx" * n for folder, n in MAX_STATEMENTS.items()}
+    assert large_folders(most) == {}
+    more = {**most, "scene/b.py": "if x: y", "new/c.py": "x"}
+    assert large_folders(more) == {"scene": MAX_STATEMENTS["scene"] + 2, "new": 1}
     crowded = "def f(a, b, c, d, e, f, g, h, i): pass\ndef g(a, b, c, d, e, f, g, h): pass"
     assert crowded_kernels({"fast/kernel/a.py": crowded, "fast/b.py": crowded}) == ["fast/kernel/a.py: f"]
     ours = {"fast/a.py": "class Run: pass", "scene/b.py": "def f():\n    class Run: pass"}

@@ -90,7 +90,7 @@ def careful_steps(scene: Scene, states: Sequence[State], n_times: int = 1) -> tu
         elif code == codes.HORIZON:  # it moves for ever
             outcomes.append(Horizon(np.inf, state.x, state.y, state.vx, state.vy))
         else:
-            outcomes.append(trouble(code, state))
+            outcomes.append(trouble(code, scene, state))
     return outcomes, seconds
 
 
@@ -109,7 +109,9 @@ def fine_steps(scene: Scene, states: Sequence[State], n_times: int = 1) -> tuple
         ends = [fill_path(compiled, *question) for question in questions]
     seconds = time.perf_counter() - begin
     paths = zip(states, starts, ends, out, met, strict=True)
-    return [as_trajectory(s, start.units, *end, steps, hit) for s, start, end, steps, hit in paths], seconds
+    return [
+        as_trajectory(scene, s, start.units, *end, steps, hit) for s, start, end, steps, hit in paths
+    ], seconds
 
 
 def flights(scene: Scene, states: Sequence[State], t_end: float) -> tuple[int, float]:

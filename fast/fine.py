@@ -62,7 +62,7 @@ def fine_trajectory(scene: Scene, state: State, n_collisions: int) -> FineTrajec
     steps: FloatArray = np.empty((n_collisions, 6, 2))
     met: IntArray = np.empty(n_collisions, dtype=np.int64)
     n, code = fill_path(start.compiled, as_pairs(start), WALL_CODES[state.wall], steps, met)
-    return as_trajectory(state, start.units, n, code, steps, met)
+    return as_trajectory(scene, state, start.units, n, code, steps, met)
 
 
 def fill_path(
@@ -82,7 +82,7 @@ def as_pairs(start: Start) -> FloatArray:
 
 
 def as_trajectory(
-    state: State, units: Units, n: int, code: int, steps: FloatArray, met: IntArray
+    scene: Scene, state: State, units: Units, n: int, code: int, steps: FloatArray, met: IntArray
 ) -> FineTrajectory:
     """Return what the kernel found: `n` collisions of those asked for, and its last code."""
     outcome: Outcome | None = None
@@ -90,5 +90,5 @@ def as_trajectory(
     if n < len(steps):
         last = found[n - 1, 2:, 0] if n else (state.x, state.y, state.vx, state.vy)
         is_free = code == codes.HORIZON
-        outcome = Horizon(np.inf, *map(float, last)) if is_free else trouble(code, state)
+        outcome = Horizon(np.inf, *map(float, last)) if is_free else trouble(code, scene, state, n)
     return FineTrajectory([WALL_NAMES[int(c)] for c in met[:n]], found, outcome)

@@ -69,8 +69,10 @@ def carry_judged(scene: Scene, states: Sequence[State], t_end: float, threads: i
     """Carry particles to t_end whose starts have been judged by `refuse`."""
     done, _ = follow_to(scene, states, t_end, threads)
     outcomes = [
-        Horizon(t_end, *place) if code == codes.HORIZON else trouble(code, state)
-        for state, code, place in zip(states, done.codes.tolist(), done.states[:, 2:].tolist(), strict=True)
+        Horizon(t_end, *place) if code == codes.HORIZON else trouble(code, scene, state, n)
+        for state, code, place, n in zip(
+            states, done.codes.tolist(), done.states[:, 2:].tolist(), done.counts.sum(axis=1), strict=True
+        )
     ]
     return Flow(outcomes, done.t_in[:, 0, 0], done.t_out[:, 0, 0], done.counts, done.careful)
 

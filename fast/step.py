@@ -26,6 +26,7 @@ from scene import (
     Wall,
     check_scene,
 )
+from scene.geometry import placed, rounded
 from scene.refusal import BadInput, check_number
 from scene.states import check_numbers
 
@@ -46,8 +47,8 @@ REASONS: dict[int, Outcome] = {
     int(codes.CORNER): Undecided("two walls are hit together within rounding"),
     int(codes.EDGE): Undecided("the mouth's edge is hit within rounding"),
     int(codes.AT_END): Undecided("a wall is hit at the horizon within rounding"),
-    int(codes.TOO_FAR): Undecided(f"t_end is over {MOST_TO_A_TIME:.0e} collisions away"),
     int(codes.START): Undecided("the state is on another wall within rounding"),
+    int(codes.TOO_FAR): Undecided(f"t_end is over {MOST_TO_A_TIME:.0e} collisions away"),
     int(single.ANSWER_LOST): Rejected(ANSWER_LOST),
     int(codes.APPROACHING): Rejected("state.wall: the particle starts on a wall and moves into it"),
 }
@@ -98,7 +99,7 @@ def next_collision(scene: Scene, state: State, t_end: float) -> Outcome:
             fitted_start(scene, state).units.horizon(t_end)
     except BadInput as error:
         return Rejected(str(error))
-    return trouble(code, state)
+    return trouble(code, scene, state)
 
 
 class Prepared(NamedTuple):
@@ -209,11 +210,13 @@ def as_arrays(starts: Sequence[Start]) -> tuple[FloatArray, IntArray]:
 PHASE_LOST = "a phase k w t of 2^27 quarter turns or more is reached from there (harmonic k), and is lost"
 
 
-def trouble(code: int, state: State) -> Outcome:
-    """Return the outcome that a code stands for, other than a wall's and HORIZON."""
+def trouble(code: int, scene: Scene, state: State, n: int = 0) -> Outcome:
+    """Return what a code other than a wall's and HORIZON stands for, n collisions after a state."""
+    if code == codes.START and not n:
+        wall = rounded(scene, state.t).nearest_wall(state.x, state.y, but=state.wall)
+        return Undecided(placed(scene, state, wall, "within rounding of"))
     if code in REASONS:
         return REASONS[code]
     if code == codes.FAR_TIME:
         return Rejected(f"state.t = {state.t!r}: {PHASE_LOST}")
-    wall = WALL_NAMES[int(code - codes.BEYOND)]
-    return Rejected(f"state (x, y) = ({state.x!r}, {state.y!r}) at t = {state.t!r} is beyond wall {wall}")
+    return Rejected(placed(scene, state, WALL_NAMES[int(code - codes.BEYOND)], "beyond"))

@@ -78,5 +78,5 @@ def trajectory(scene: Scene, state: State, n_collisions: int, t_end: float = np.
         is_horizon = code == codes.HORIZON
         if is_horizon and np.isfinite(t_end):
             last = start.units.places(paths.ends[0, 2:])
-        outcome = Horizon(t_end, *(float(v) for v in last)) if is_horizon else trouble(code, state)
+        outcome = Horizon(t_end, *(float(v) for v in last)) if is_horizon else trouble(code, scene, state, n)
     return Collisions(walls, steps, outcome)

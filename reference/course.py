@@ -191,13 +191,14 @@ class Course:
 
     def _at_the_edge(self) -> Tie:
         """Settle a crossing of y = 0 of which it is open whether it is within the sides."""
+        edge = "the mouth's edge" if isinstance(self.scene, Mushroom) else "a corner"
         instant = None if self.exact is None else rational.crossing_time(self.exact)
         if instant is None or self.exact is None:
-            raise Undecidable("the mouth's edge is met, as far as this precision shows")
+            raise Undecidable(f"{edge} is met, as far as this precision shows")
         walls: tuple[Wall, ...] = ("left", "right")
         met = tuple(w for w in walls if rational.is_zero(self.scene, self.exact, w, instant))
         if not met:
-            raise Undecidable("the mouth's edge is met, as far as this precision shows")
+            raise Undecidable(f"{edge} is met, as far as this precision shows")
         reason = Undefined("mouth-edge" if isinstance(self.scene, Mushroom) else "corner")
         return Tie(reason, UndefinedProof(instant, ("base", *met), {}, self.proof))
 

@@ -11,6 +11,7 @@ from reference.arithmetic import Arithmetic, Interval, Undecidable, exact_ends, 
 from reference.course import SIDES
 from reference.walls import EnclosedFlight, MovingWalls
 from scene import Cap, InvalidState, Mushroom, Scene, State, Stem, Undefined, Wall
+from scene.geometry import placed
 from scene.laws import is_constant
 from scene.states import ON_WALL
 from scene.tables import laws
@@ -110,9 +111,7 @@ def _is_on(scene: Scene, state: State, wall: Wall, motion: MovingWalls) -> bool:
         return False
     side = sign(motion.wall(wall, motion.arithmetic.zero).f)
     if side < 0:
-        raise InvalidState(
-            f"state (x, y) = ({state.x!r}, {state.y!r}) at t = {state.t!r} is beyond wall {wall}"
-        )
+        raise InvalidState(placed(scene, state, wall, "beyond"))
     if side == 0 and not rational.is_zero(scene, state, wall, Fraction(0)):
         raise Undecidable(f"the state may be on wall {wall}")
     return side == 0

@@ -15,6 +15,7 @@ from mpmath import fp
 
 from scene.laws import value
 from scene.precision import decimals
+from scene.states import ON_WALL, State
 from scene.tables import Cap, Scene, Stem, Wall, laws, width_factors
 
 DIGITS = 50  # to which `rounded` evaluates laws before it rounds them
@@ -72,8 +73,8 @@ class TableAt(NamedTuple):
             return -y if isinstance(self.scene, Stem) else y
         return self.half_width(y) + (x if wall == "left" else -x)
 
-    def nearest_wall(self, x: float, y: float) -> Wall:
-        """Return the wall nearest to a place: least |f| / |grad f|, beyond the wall's ends more."""
+    def nearest_wall(self, x: float, y: float, but: Wall | None = None) -> Wall:
+        """Return the wall (not `but`) nearest to a place: |f| / |grad f|, beyond the wall's ends more."""
         above, below = max(0.0, y), max(0.0, -y)
         distances: dict[Wall, float] = {}
         if not isinstance(self.scene, Stem):
@@ -85,7 +86,7 @@ class TableAt(NamedTuple):
             distances["floor"] = abs(y + self.h)
         is_open = not isinstance(self.scene, Cap | Stem)
         distances["base"] = abs(y) + (max(0.0, self.w - abs(x)) if is_open else 0.0)
-        return min(distances, key=lambda wall: distances[wall])
+        return min((wall for wall in distances if wall != but), key=lambda wall: distances[wall])
 
     def gap_rate(self, wall: Wall, x: Any, y: Any, vx: Any, vy: Any) -> Any:
         """Return d f / dt along a flight at (x, y) with velocity (vx, vy)."""
@@ -200,6 +201,24 @@ def table_at(ctx: Any, scene: Scene, t: Any) -> TableAt:
 def rounded(scene: Scene, t: float) -> TableAt:
     """Evaluate a table to DIGITS digits and round once: the same binary64 numbers on every machine."""
     return table_at(decimals(DIGITS), scene, t).rounded()
+
+
+def placed(scene: Scene, state: State, wall: Wall, how: str) -> str:
+    """Say that a state is beside a wall that it does not name, by how much, and what helps if it leaves it.
+
+    Args:
+        scene: the table.
+        state: in it.
+        wall: not the state's own.
+        how: "beyond" or "within rounding of".
+    """
+    ctx = decimals(DIGITS)
+    table, x, y = table_at(ctx, scene, state.t), ctx.mpf(state.x), ctx.mpf(state.y)
+    away = abs(table.gap(wall, x, y)) / (table.r + ctx.hypot(x, y) if wall == "arc" else 1)
+    is_after_a_hit = state.wall is None and away <= ON_WALL * table.size
+    hint = f": name the wall that is left (state.wall = {wall!r})" if is_after_a_hit else ""
+    where = f"state (x, y) = ({state.x!r}, {state.y!r}) at t = {state.t!r}"
+    return f"{where} is {how} wall {wall}, off it by {float(away):.3g}{hint}"
 
 
 def area(scene: Scene, t: float) -> float:

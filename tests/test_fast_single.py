@@ -46,7 +46,7 @@ def by_separate_checks(scene: Scene, state: State, t_end: float) -> Outcome:
             return Horizon(t_end, *start.units.places(paths.ends[0, 2:]).tolist())
     except BadInput as error:
         return Rejected(str(error))
-    return stepper.trouble(code, state)
+    return stepper.trouble(code, scene, state)
 
 
 def questions(seed: int, n: int) -> Iterator[Question]:

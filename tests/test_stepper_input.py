@@ -19,6 +19,8 @@ from scene import BadInput, BangBang, Cap, Collision, Horizon, Mushroom, Rejecte
 CAP, MUSHROOM = Cap(r=1.0), Mushroom(r=1.0, h=1.0, w=0.5)
 GOOD = {"t": 0.0, "x": 0.1, "y": 0.3, "vx": 1.0, "vy": 0.7}
 START = State(**GOOD)
+STEM = Stem(w=1.0, h=1.0)
+PAST = 1.0 + 2.0**-50
 # What each entry takes: a function of its arguments by name, and arguments that are good.
 ENTRIES = {
     "next_collision": (fast.next_collision, {"scene": CAP, "state": START, "t_end": 2.0}),
@@ -216,3 +218,28 @@ def test_no_outcome_is_refused_for_the_rounding_of_its_place(tally):
             tally["deep"] += abs(state.x) > 2.0**33 * table.w
     assert tally["deep"] > 30
     assert min(tally["fast Collision"], tally["plain Collision"]) > 100
+
+
+@pytest.mark.parametrize(
+    "step",
+    [
+        *(stepper.next_collision for stepper in (fast, reference, plain)),
+        lambda scene, state, t_end: fast.trajectory(scene, state, 2, t_end).outcome,
+    ],
+)
+@pytest.mark.parametrize(
+    ("scene", "state", "words"),
+    [
+        (STEM, State(0.0, 0.0, -0.5, 2.0, 1.0), {"mouth": False}),  # a side and the top meet at a corner
+        (STEM, State(0.0, 0.0, -PAST, 1.0, 0.5), {"by 8.88e-16": True, "(state.wall = 'floor')": True}),
+        (STEM, State(0.0, PAST, -0.5, -1.0, 0.5), {"by 8.88e-16": True, "(state.wall = 'right')": True}),
+        (CAP, State(0.0, 0.0, PAST, 1.0, -0.5), {"by 8.88e-16": True, "(state.wall = 'arc')": True}),
+        (MUSHROOM, State(0.0, 0.0, -PAST, 1.0, 0.5), {"by 8.88e-16": True, "(state.wall = 'floor')": True}),
+        (CAP, State(0.0, 0.0, 3.0, 1.0, -0.5), {"by 2": True, "state.wall": False}),
+        (CAP, State(0.0, PAST, 0.0, -1.0, 0.5, "base"), {"by 8.88e-16": True, "state.wall": False}),
+    ],
+)
+def test_a_reason_says_what_is_near_by_how_much_and_what_helps(step, scene, state, words):
+    """A state copied after a hit without its wall is within rounding of it, or beyond: naming it helps."""
+    reason = step(scene, state, 10.0).reason
+    assert {word: word in reason for word in words} == words, reason

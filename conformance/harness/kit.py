@@ -24,7 +24,7 @@ from mpmath import fp
 from msgspec.structs import replace
 
 from scene import Cap, Horizon, Mushroom, Outcome, Rejected, Scene, State, Undecided, Undefined, Wall
-from scene.geometry import TableAt, table_at
+from scene.geometry import TableAt, placed, table_at
 from scene.laws import bounds
 from scene.protocol.messages import Answered, AnsweredCollision
 from scene.protocol.wire import AnsweringStepper, OwnFailure, serve
@@ -104,9 +104,9 @@ def judged(scene: Scene, state: State, t_end: float) -> Outcome | None:
     for other in (*ends, *near):
         gap = gap_at(table, other, state.x, state.y)
         if other != wall and abs(gap) <= ROUNDING * size:
-            return Undecided(f"{place} is on wall {other} within rounding")
+            return Undecided(placed(scene, state, other, "within rounding of"))
         if other != wall and gap < 0 and other in near:
-            return Rejected(f"{place} is beyond wall {other}")
+            return Rejected(placed(scene, state, other, "beyond"))
     if wall is None:
         return None
     own = {"arc": table.r, "floor": table.h, "base": max(table.r, table.w)}.get(

@@ -34,6 +34,7 @@ from scene import (
     Undefined,
     Wall,
 )
+from scene.geometry import placed
 from scene.laws import bounds
 from scene.states import ON_WALL, check_numbers
 from scene.tables import laws
@@ -282,6 +283,8 @@ class Flight:
         for wall in walls:
             is_there = wall != self.wall or s > 0
             if is_there and abs(self.f(wall, s)[0]) <= self.noise(wall, s):
+                if s == 0:
+                    raise Open(placed(self.scene, self.state, wall, "within rounding of"))
                 raise Open(f"at s = {s!r} the particle is on wall {wall} within rounding")
 
     def escape(self) -> float:
@@ -307,7 +310,7 @@ class Flight:
             if near != wall and self.f(near, 0.0)[0] < -self.noise(near, 0.0):
                 if self.is_along_base(near):
                     return Undefined("sliding")
-                return Rejected(f"state {where} is beyond wall {near}")
+                return Rejected(placed(self.scene, self.state, near, "beyond"))
         self.require_clear(self.walls_near(in_cap=self.is_in_cap), 0.0)
         return None if wall is None else self.refusal_of_departure(wall)
 

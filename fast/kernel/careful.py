@@ -300,17 +300,17 @@ def event_from_stem(crossing, limit, particle, scene, anchors):
     """Find the next collision of a flight that begins in the stem and crosses y = 0 at a time; (code, s)."""
     y, vy = particle.y, particle.vy
     code, s, error = earliest_side_or_floor(0.0, min(crossing, limit), particle, scene, anchors)
+    edge = CORNER if scene.table == STEM else EDGE  # where a side ends at the top
     if code != NO_WALL:
-        # A side met at the height of the mouth is its edge.
         depth = -(y + vy * s)
         is_at_mouth = depth <= SAFETY * (abs(y) + abs(vy) * s) + abs(vy) * error
         code = at_foot(code, particle, scene, anchors)
-        return (EDGE if crossing < np.inf and code <= FLOOR and is_at_mouth else code), s
+        return (edge if crossing < np.inf and code <= FLOOR and is_at_mouth else code), s
     if crossing >= limit:
         return NO_WALL, s
     for side in (LEFT, RIGHT):
         if side_of_wall(side, crossing, particle, scene, anchors) <= 0:
-            return (CORNER if scene.table == STEM else EDGE), crossing
+            return edge, crossing
     if scene.table == STEM:
         return BASE, crossing
     return cap_flight(crossing, limit, np.bool_(False), released(particle), scene, anchors)

@@ -6,28 +6,41 @@ Copy this file, or import it. An engine gives one of two things:
     serve_parts(name, intersect, reflect)   the first crossing of one wall, and the bounce off it
 
 The kit reads and checks the questions, keeps the horizon, names the wall (least |f| / |grad f| at the place
-of the hit), chains trajectories, times them, and refuses what is no state of the scene. Where it sees that
-rounding leaves two answers open it says `undecided`. So may an engine, by raising `Open`: of how near it came
-to another wall, or to the horizon, a next hit tells nothing. What it returns that is no hit (nan, a time that
-has passed) is answered as a failure of its own.
-Not offered: `flow`.
+of the hit), chains trajectories and flows, times them, and refuses what is no state of the scene. Where it
+sees that rounding leaves two answers open it says `undecided`. So may an engine, by raising `Open`: of how
+near it came to another wall, or to the horizon, a next hit tells nothing. What it returns that is no hit
+(nan, a time that has passed) is answered as a failure of its own.
 """
 
 from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from time import perf_counter_ns
 
 from mpmath import fp
 from msgspec.structs import replace
 
-from scene import Cap, Horizon, Mushroom, Outcome, Rejected, Scene, State, Undecided, Undefined, Wall
+from conformance import plain
+from scene import (
+    BadInput,
+    Cap,
+    Collision,
+    Horizon,
+    Mushroom,
+    Outcome,
+    Rejected,
+    Scene,
+    State,
+    Undecided,
+    Undefined,
+    Wall,
+)
 from scene.geometry import TableAt, placed, table_at
 from scene.laws import bounds
 from scene.protocol.messages import Answered, AnsweredCollision
-from scene.protocol.wire import AnsweringStepper, OwnFailure, serve
+from scene.protocol.wire import AnsweringStepper, Captured, OwnFailure, serve
 from scene.states import ON_WALL, check_numbers
 from scene.tables import laws
 
@@ -262,6 +275,19 @@ def _serve(name: str, step: AnsweringStepper) -> None:
             state = State(hit.t, hit.x, hit.y, hit.vx, hit.vy, hit.wall)
         return steps
 
+    def collide(scene: Scene, state: State, t_end: float) -> Outcome:
+        try:
+            hit = step(scene, state, t_end)
+        except BadInput as refusal:  # of one particle; the others go on
+            return Rejected(str(refusal))
+        if not isinstance(hit, AnsweredCollision):
+            return hit
+        assert hit.wall is not None
+        return Collision(hit.wall, hit.t - state.t, hit.t, hit.x, hit.y, hit.vx, hit.vy)
+
+    def carry(scene: Scene, states: Sequence[State], t_end: float) -> list[tuple[Outcome, Captured]]:
+        return plain.flow(scene, states, t_end, collide)
+
     def timed(
         scene: Scene, state: State, n_collisions: int, repeat: int
     ) -> tuple[list[int], Answered | Outcome]:
@@ -272,4 +298,4 @@ def _serve(name: str, step: AnsweringStepper) -> None:
             ns.append(perf_counter_ns() - begin)
         return ns, steps[-1]
 
-    serve(name, step, follow, sys.stdin.buffer, sys.stdout.buffer, timer=timed)
+    serve(name, step, follow, sys.stdin.buffer, sys.stdout.buffer, flow=carry, timer=timed)

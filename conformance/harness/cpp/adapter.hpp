@@ -7,9 +7,9 @@
 // meets no wall. It may throw mushrooms::Open where it cannot decide: of a tie (a corner, the mouth's edge, a hit
 // at t_end) a next hit tells nothing, so that the kit takes what the engine returns for its answer. The kit reads
 // and checks the questions, keeps the horizon, names the wall (least |f| / |grad f| at the place of the hit),
-// chains and times trajectories, and refuses what is no state of the scene. A scene is refused where one of
-// N_SAMPLES instants of its period breaks it: sampling, not proof. Not offered: flow. scene.hpp has
-// what engine and kit share; JSON is read by json.hpp, which another library can replace.
+// chains trajectories and flows, times them, and refuses what is no state of the scene. A scene is refused where
+// one of N_SAMPLES instants of its period breaks it: sampling, not proof. scene.hpp has what engine and kit share;
+// JSON is read by json.hpp, which another library can replace.
 #pragma once
 #include <cfloat>
 #include <chrono>
@@ -195,22 +195,10 @@ inline std::string place(double t, double x, double y, double vx, double vy) {
     return "\"t\":" + shown(t) + ",\"x\":" + shown(x) + ",\"y\":" + shown(y) + ",\"vx\":" + shown(vx) + ",\"vy\":" + shown(vy);
 }
 
-// One step: the outcome's fields, and the state after; `goes_on` where it is a collision.
-inline std::string step(const Engine& engine, const Scene& scene, State& q, double t_end, bool& goes_on) {
-    goes_on = false;
+// The fields of an outcome, or of the reason why there is none.
+inline std::string outcome_of(const std::function<std::string()>& make) {
     try {
-        judge(scene, q);
-        std::optional<Hit> hit = engine(scene, q);
-        if (!hit || hit->t >= t_end) {
-            double s = t_end - q.t;
-            return "\"outcome\":\"horizon\"," + place(t_end, q.x + s * q.vx, q.y + s * q.vy, q.vx, q.vy);
-        }
-        bool is_finite = std::isfinite(hit->t + hit->x + hit->y) && std::isfinite(hit->vx + hit->vy);
-        if (!is_finite || hit->t < q.t) throw Failed("the engine returned no hit: a time that has passed, or no number");
-        Wall wall = scene.nearest_wall(hit->t, hit->x, hit->y);
-        q = {hit->t, hit->x, wall == BASE ? 0.0 : hit->y, hit->vx, hit->vy, wall};
-        goes_on = true;
-        return std::string("\"outcome\":\"collision\",\"wall\":\"") + WALLS[wall] + "\"," + place(q.t, q.x, q.y, q.vx, q.vy);
+        return make();
     } catch (const Open& question) {
         return std::string("\"outcome\":\"undecided\",\"reason\":\"") + question.what() + '"';
     } catch (const Refused& refusal) {
@@ -218,9 +206,77 @@ inline std::string step(const Engine& engine, const Scene& scene, State& q, doub
     }
 }
 
+const std::string HORIZON = "\"outcome\":\"horizon\",";
+
+// One step: the outcome's fields, and the state after; `goes_on` where it is a collision.
+inline std::string step(const Engine& engine, const Scene& scene, State& q, double t_end, bool& goes_on) {
+    goes_on = false;
+    return outcome_of([&] {
+        judge(scene, q);
+        std::optional<Hit> hit = engine(scene, q);
+        if (!hit || hit->t >= t_end) {
+            double s = t_end - q.t;
+            return HORIZON + place(t_end, q.x + s * q.vx, q.y + s * q.vy, q.vx, q.vy);
+        }
+        bool is_finite = std::isfinite(hit->t + hit->x + hit->y) && std::isfinite(hit->vx + hit->vy);
+        if (!is_finite || hit->t < q.t) throw Failed("the engine returned no hit: a time that has passed, or no number");
+        Wall wall = scene.nearest_wall(hit->t, hit->x, hit->y);
+        q = {hit->t, hit->x, wall == BASE ? 0.0 : hit->y, hit->vx, hit->vy, wall};
+        goes_on = true;
+        return std::string("\"outcome\":\"collision\",\"wall\":\"") + WALLS[wall] + "\"," + place(q.t, q.x, q.y, q.vx, q.vy);
+    });
+}
+
+// The first captured stay in the cap, as its hits tell it.
+struct Stay {
+    double begin = NAN, end = NAN;  // nan: not yet
+    bool is_over = false;
+
+    void add(const Scene& scene, const State& before, const State& hit) {
+        if (is_over || (std::isnan(begin) && hit.wall != ARC)) return;
+        if (hit.wall == ARC && scene.is_mushroom()) {
+            double spin = std::abs(hit.x * before.vy - hit.y * before.vx);
+            if (spin > scene.width(hit.t) * std::hypot(before.vx, before.vy)) {
+                if (std::isnan(begin)) begin = hit.t;
+                end = NAN;
+                return;
+            }
+        }
+        is_over = hit.wall > BASE;
+        if (!std::isnan(begin) && std::isnan(end) && hit.wall != BASE) end = hit.t;
+    }
+};
+
+// One particle of a flow: followed from hit to hit up to t_end.
+inline std::string arrival(const Engine& engine, const Scene& scene, const json::Value& data, double t_end) {
+    Stay stay;
+    std::string found = outcome_of([&] {
+        State q = read_state(data, scene);
+        if (t_end < q.t) throw Refused("t_end must be >= state.t");
+        bool goes_on = true;
+        for (long i = 0; i < MAX_COLLISIONS; i++) {
+            State before = q;
+            std::string last = step(engine, scene, q, t_end, goes_on);
+            if (!goes_on) return last;
+            stay.add(scene, before, q);
+        }
+        throw Open("there are over 1000000 collisions up to t_end");
+    });
+    if (found.compare(0, HORIZON.size(), HORIZON) || std::isnan(stay.begin)) return found;
+    return found + ",\"captured\":[" + shown(stay.begin) + "," + shown(std::isnan(stay.end) ? t_end : stay.end) + "]";
+}
+
 inline std::string outcome(const Engine& engine, const json::Value& request) {
     const std::string& command = request.at("cmd").text;
     Scene scene = read_scene(request.at("scene"));
+    if (command == "flow") {
+        double t_end = number_of(request, "t_end");
+        std::string states;
+        if (!request.at("states").is_list()) throw Refused("states is missing or no list");
+        for (const json::Value& state : request.at("states").items)
+            states += (states.empty() ? "{" : ",{") + arrival(engine, scene, state, t_end) + "}";
+        return "\"states\":[" + states + "]";
+    }
     State start = read_state(request.at("state"), scene), q = start;
     double t_end = command == "time" ? DBL_MAX : number_of(request, "t_end");
     if (t_end < start.t) throw Refused("t_end must be >= state.t");
@@ -252,7 +308,7 @@ inline std::string answer(const std::string& name, const Engine& engine, const s
         if (request.at("seq").is_integer && request.at("seq").number >= 0) seq = std::to_string(static_cast<long long>(request.at("seq").number));
         if (command == "start")
             return "{\"protocol\":1,\"name\":\"" + name +
-                   "\",\"version\":\"1\",\"language\":\"C++\",\"profiles\":[\"step\",\"trajectory\",\"time\"],"
+                   "\",\"version\":\"1\",\"language\":\"C++\",\"profiles\":[\"step\",\"trajectory\",\"flow\",\"time\"],"
                    "\"tables\":[\"cap\",\"stem\",\"mushroom\"],\"laws\":[\"constant\",\"fourier\",\"bang-bang\"]}";
         if (command == "echo") {
             std::string values;
@@ -264,7 +320,7 @@ inline std::string answer(const std::string& name, const Engine& engine, const s
             if (is_good) return "{\"values\":[" + values + "]}";
             throw Refused("values must be numbers");
         }
-        if (command != "step" && command != "trajectory" && command != "time") throw Refused("there is no such cmd");
+        if (command != "step" && command != "trajectory" && command != "flow" && command != "time") throw Refused("there is no such cmd");
         if (seq == "null") throw Refused("seq must be a whole number");
         return "{\"seq\":" + seq + "," + outcome(engine, request) + "}";
     } catch (const Open& question) {

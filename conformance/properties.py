@@ -27,7 +27,7 @@ from math import hypot
 import msgspec
 
 from conformance.grading import sensitivity
-from conformance.grading.called import answering, fail
+from conformance.grading.called import Question, answering, fail
 from conformance.grading.sensitivity import measured, numbers
 from scene import Collision, Horizon, Outcome, Rejected, Scene, State, Undecided, transforms
 from scene.laws import is_constant
@@ -59,13 +59,12 @@ def check_mirror(
         Whether there was something to compare.
 
     Raises:
-        AssertionError: one line: what differs, and the question.
+        AssertionError: one line: what differs, the question, and its image where there is one.
     """
     stepper = answering(stepper)
-    answer = stepper(scene, state, t_end)
-    image = stepper(scene, transforms.mirrored(state), t_end)
-    expected = _changed(answer, (1, 1, -1, 1, -1, 1), transforms.mirrored_wall)
-    return _compare("mirror in x", stepper, scene, state, t_end, image, expected, is_exact, bound)
+    given, image = (scene, state, t_end), (scene, transforms.mirrored(state), t_end)
+    expected = _changed(stepper(*given), (1, 1, -1, 1, -1, 1), transforms.mirrored_wall)
+    return _compare("mirror in x", stepper, given, image, stepper(*image), expected, is_exact, bound)
 
 
 def check_scaling(
@@ -90,11 +89,10 @@ def check_scaling(
     inputs = [t_end, state.t, state.x, state.y, state.vx, state.vy, *(numbers(answer, state) or ())]
     if any(part and not LEAST < abs(part) * f < MOST for part in inputs for f in (1.0, unit, size, speed)):
         return False
-    image = stepper(
-        transforms.scaled(scene, length, time), transforms.scaled_state(state, length, time), unit * t_end
-    )
-    unscaled = _changed(image, (1 / unit, 1 / unit, 1 / size, 1 / size, 1 / speed, 1 / speed))
-    return _compare("scaling", stepper, scene, state, t_end, unscaled, answer, is_exact, bound)
+    scaled = transforms.scaled(scene, length, time), transforms.scaled_state(state, length, time)
+    image = (*scaled, unit * t_end)
+    unscaled = _changed(stepper(*image), (1 / unit, 1 / unit, 1 / size, 1 / size, 1 / speed, 1 / speed))
+    return _compare("scaling", stepper, (scene, state, t_end), image, unscaled, answer, is_exact, bound)
 
 
 def check_static_limit(
@@ -106,9 +104,9 @@ def check_static_limit(
     """
     stepper = answering(stepper)
     still = transforms.frozen(scene, state.t)
-    answer = stepper(still, state, t_end)
-    idle = stepper(transforms.idle(still), state, t_end)
-    return _compare("static limit", stepper, still, state, t_end, idle, answer, is_exact, bound)
+    given, idle = (still, state, t_end), (transforms.idle(still), state, t_end)
+    answer = stepper(*given)
+    return _compare("static limit", stepper, given, idle, stepper(*idle), answer, is_exact, bound)
 
 
 def check_period_shift(
@@ -135,15 +133,16 @@ def check_period_shift(
     late = State(later, state.x, state.y, state.vx, state.vy, state.wall)
     # A collision must not be lost to the rounding of t_end.
     end = later + (2 * span if isinstance(answer, Collision) else span)
-    image = stepper(scene, late, end)
+    found = stepper(scene, late, end)
     rounding = float(abs(ctx.mpf(later) - state.t - shift))
     if isinstance(answer, Horizon):
         rounding += float(abs(ctx.mpf(end) - t_end - shift))
-    if isinstance(image, Collision | Horizon):
-        image = msgspec.structs.replace(image, t=answer.t)
+    if isinstance(found, Collision | Horizon):
+        found = msgspec.structs.replace(found, t=answer.t)
     is_exact = is_exact and rounding == 0.0
     incoming = (rounding + bound * abs(later), 0.0, 0.0, 0.0, 0.0)
-    return _compare("period shift", stepper, scene, state, t_end, image, answer, is_exact, bound, incoming)
+    given, image = (scene, state, t_end), (scene, late, end)
+    return _compare("period shift", stepper, given, image, found, answer, is_exact, bound, incoming)
 
 
 def check_split_flight(
@@ -151,7 +150,8 @@ def check_split_flight(
 ) -> bool:
     """Hold a flight that is stopped halfway and taken up again to meet the same wall. See `check_mirror`."""
     stepper = answering(stepper)
-    whole = measured(stepper, scene, state, t_end, bound)
+    given = scene, state, t_end
+    whole = measured(stepper, *given, bound)
     if whole is None or not isinstance(whole.outcome, Collision):
         return False
     middle = state.t + whole.outcome.dt / 2
@@ -159,15 +159,16 @@ def check_split_flight(
     if half is None or middle == state.t:
         return False
     if not isinstance(half.outcome, Horizon):
-        fail("split flight", f"{half.outcome} before half of the flight", scene, state, t_end)
-    rest = measured(stepper, scene, half.state(), t_end, bound, half.errors[1:])
+        fail("split flight", f"{half.outcome} before half of the flight", given, (scene, state, middle))
+    asked = given, (scene, state, middle), (scene, half.state(), t_end)
+    rest = measured(stepper, *asked[-1], bound, half.errors[1:])
     if rest is None:
         return False
     if not isinstance(rest.outcome, Collision) or rest.outcome.wall != whole.outcome.wall:
-        fail("split flight", f"then {rest.outcome}, at once {whole.outcome}", scene, state, t_end)
+        fail("split flight", f"then {rest.outcome}, at once {whole.outcome}", *asked)
     taken = float(Fraction(middle) - Fraction(state.t)) + rest.numbers[0]
     allowed = [a + b for a, b in zip(whole.errors, rest.errors, strict=True)]
-    _near("split flight", (taken, *rest.numbers[1:]), whole.numbers, allowed, scene, state, t_end)
+    _near("split flight", (taken, *rest.numbers[1:]), whole.numbers, allowed, *asked)
     return True
 
 
@@ -181,11 +182,13 @@ def check_reversal(
     `check_mirror`.
     """
     stepper = answering(stepper)
-    there = measured(stepper, scene, state, t_end, bound)
+    given = scene, state, t_end
+    there = measured(stepper, *given, bound)
     if there is None or not isinstance(there.outcome, Collision):
         return False
-    if isinstance(refusal := stepper(scene, there.state(), max(t_end, there.outcome.t)), Rejected):
-        fail("time reversal", f"{there.outcome} leads nowhere: {refusal.reason}", scene, state, t_end)
+    led = scene, there.state(), max(t_end, there.outcome.t)
+    if isinstance(refusal := stepper(*led), Rejected):
+        fail("time reversal", f"{there.outcome} leads nowhere: {refusal.reason}", given, led)
     way = _across_bounce(stepper, scene, state, t_end)
     if way is None:
         return False
@@ -195,17 +198,19 @@ def check_reversal(
     if onward is None or not isinstance(onward.outcome, Horizon):
         return False
     _, t, x, y, vx, vy = onward.numbers
-    back = measured(stepper, film, State(-t, x, y, -vx, -vy), -begin.t, bound, onward.errors[1:])
+    reversed_path = film, State(-t, x, y, -vx, -vy), -begin.t
+    back = measured(stepper, *reversed_path, bound, onward.errors[1:])
     if back is None:
         return False
     if not isinstance(back.outcome, Collision) or back.outcome.wall != hit.wall:
-        fail("time reversal", f"{hit.wall} there, {back.outcome} on the way back", scene, state, t_end)
-    home = measured(stepper, film, back.state(), -begin.t, bound, back.errors[1:])
+        fail("time reversal", f"{hit.wall} there, {back.outcome} on the way back", given, reversed_path)
+    asked = given, (scene, there.state(), end), reversed_path, (film, back.state(), -begin.t)
+    home = measured(stepper, *asked[-1], bound, back.errors[1:])
     if home is None or not isinstance(home.outcome, Horizon):
         return False
     _, _, x, y, vx, vy = home.numbers
     expected = (0.0, 0.0, begin.x, begin.y, begin.vx, begin.vy)
-    _near("time reversal", (0.0, 0.0, x, y, -vx, -vy), expected, home.errors, scene, state, t_end)
+    _near("time reversal", (0.0, 0.0, x, y, -vx, -vy), expected, home.errors, *asked)
     return True
 
 
@@ -229,7 +234,7 @@ def check_angular_momentum(
     allowed += bound * hypot(state.x, state.y) * hypot(state.vx, state.vy)
     if not abs(after - before) <= SLACK * allowed:
         text = f"x vy - y vx = {before!r} before and {after!r} after {step.outcome.wall}"
-        fail("angular momentum", text, scene, state, t_end)
+        fail("angular momentum", text, (scene, state, t_end))
     return True
 
 
@@ -242,7 +247,7 @@ def check_energy(stepper: Stepper, scene: Scene, state: State, t_end: float, *, 
         return False
     before, after = hypot(state.vx, state.vy), hypot(*found[4:])
     if not abs(after - before) <= SLACK * bound * before:
-        fail("energy", f"speed {before!r} becomes {after!r} in a static table", scene, state, t_end)
+        fail("energy", f"speed {before!r} becomes {after!r} in a static table", (scene, state, t_end))
     return True
 
 
@@ -277,7 +282,7 @@ def check_symplectic(
             wanted = {(2, 0): -1.0, (3, 1): -1.0}.get((i, j), 0.0)
             if not abs(form - wanted) <= allowed:
                 text = f"(M^T J M)[{i}][{j}] = {form:.9g}, must be {wanted:g} within {allowed:.3g}"
-                fail("symplectic", text, scene, state, t_end)
+                fail("symplectic", text, (scene, state, t_end))
     return True
 
 
@@ -351,9 +356,8 @@ def _changed(
 def _compare(
     name: str,
     stepper: Stepper,
-    scene: Scene,
-    state: State,
-    t_end: float,
+    given: Question,
+    image: Question,
     answer: Outcome,
     expected: Outcome,
     is_exact: bool,
@@ -361,22 +365,23 @@ def _compare(
     incoming: Sequence[float] = (0.0,) * 5,
 ) -> bool:
     """Compare two outcomes that must be the same, bit for bit or within rounding."""
+    state = given[1]
     if isinstance(answer, Undecided) or isinstance(expected, Undecided):
         return False
     is_same_kind = type(answer) is type(expected)
     is_same = is_same_kind and getattr(answer, "wall", None) == getattr(expected, "wall", None)
     allowed: Sequence[float] = (0.0,) * 6
     if not is_exact:
-        step = measured(stepper, scene, state, t_end, bound, incoming)
+        step = measured(stepper, *given, bound, incoming)
         if step is None:
             return False
         allowed = [2 * error for error in step.errors]
     if not is_same:
-        fail(name, f"{answer}, must be {expected}", scene, state, t_end)
+        fail(name, f"{answer}, must be {expected}", given, image)
     found, wanted = numbers(answer, state), numbers(expected, state)
     if found is None or wanted is None:
         return False
-    _near(name, found, wanted, allowed, scene, state, t_end)
+    _near(name, found, wanted, allowed, given, image)
     return True
 
 
@@ -385,11 +390,9 @@ def _near(
     found: Sequence[float],
     wanted: Sequence[float],
     allowed: Sequence[float],
-    scene: Scene,
-    state: State,
-    t_end: float,
+    *asked: Question,
 ) -> None:
     for part, a, b, error in zip(NAMES, found, wanted, allowed, strict=True):
         if not abs(a - b) <= SLACK * error:
             within = f" within {SLACK * error:.3g}" if error else ""
-            fail(name, f"{part} = {a!r}, must be {b!r}{within}", scene, state, t_end)
+            fail(name, f"{part} = {a!r}, must be {b!r}{within}", *asked)

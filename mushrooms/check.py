@@ -23,7 +23,8 @@ if TYPE_CHECKING:
 
 LONGEST = 7 * 86_400  # seconds
 MAX_SHOWN = 20  # objections on the terminal; all are in the reports
-MAX_TAUGHT = 5  # of them with what was given and what is certified
+MAX_TAUGHT = 5  # of them with what was given and what is certified, or with what was sent
+MAX_SENT = 500  # characters of that
 COLOURS = {"pass": "green", "declined": "yellow", "unsupported": "yellow"}
 
 
@@ -141,9 +142,15 @@ def _show_objections(console: Console, run: Run) -> None:
     if len(objections) > MAX_SHOWN:
         console.print(f"... and {len(objections) - MAX_SHOWN} more: --json FILE has them all.")
     for result in [r for r in run.results if r.expected and not r.is_known and not r.is_right][:MAX_TAUGHT]:
-        console.print(f"{result.id}, asked {escape(result.asked)}; mushrooms ask {result.id} prints it")
+        again = f"mushrooms ask {result.id} --seed {run.seed}"
+        console.print(f"{result.id}, asked {escape(result.asked)}; {again} prints it")
         console.print(f"  given     {escape(in_one_line(result.given))}")
         console.print(f"  certified {escape(in_one_line(result.expected))}")
+    # What failed a property says its questions itself, and a vector has an id to ask by.
+    further = [r for r in run.results if r.sent and not r.is_right and r.group in ("protocol", "promise")]
+    for result in further[:MAX_TAUGHT]:
+        rest = "... (--json FILE has it whole)" if len(result.sent) > MAX_SENT else ""
+        console.print(f"{result.id}, sent last: {escape(result.sent[:MAX_SENT])}{rest}")
     for line in run.diagnosis:
         console.print(f"[yellow]{escape(line)}[/]")
 

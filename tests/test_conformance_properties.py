@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 import re
 
@@ -10,6 +11,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from msgspec.structs import replace
 from support import tables
 from support.depth import deep_but
 
@@ -32,6 +34,7 @@ from scene import (
     Stem,
     Undecided,
     load,
+    to_data,
     transforms,
 )
 from scene.geometry import rounded
@@ -72,6 +75,31 @@ STATIC = (Mushroom(r=1.0, h=1.0, w=0.5, slope=0.25), State(0.5, 0.1, -0.5, 2.0, 
 BREATHING = (load("moving-cap"), State(0.5, 0.1, 0.3, 2.0, 3.25), 9.0)
 LIFT = (tables.LIFT, State(0.125, 0.3, -1.0, 0.25, -2.0), 9.0)
 SLANTED = (Stem(w=1.0, h=1.0, slope=0.25), State(0.5, 0.1, -0.5, -2.0, 0.25), 9.0)
+
+
+@pytest.mark.parametrize(
+    "name", ["mirror", "scaling-of-lengths", "static-limit", "period-shift", "split-flight"]
+)
+def test_the_questions_of_a_broken_property_are_those_that_were_sent(name):
+    """The question as it was given does not repeat a failure of its image: of a slope sent as a law, say."""
+    question = SLANTED if name == "static-limit" else BREATHING
+    sent, spoilt = [], []
+
+    def step(scene, state, t_end):
+        line = {"scene": to_data(scene), "state": msgspec.to_builtins(state), "t_end": t_end}
+        sent.append(json.loads(json.dumps(line)))
+        found = plain.next_collision(scene, state, t_end)
+        if (scene, state, t_end) == question:
+            return found
+        spoilt.append(sent[-1])
+        return replace(found, vx=1.01 * found.vx)
+
+    with pytest.raises(AssertionError) as broken:
+        PROPERTIES[name](step, *question)
+    lines = [json.loads(line) for line in re.findall(r"\{.cmd.*?\}(?=; \{.cmd|$)", str(broken.value))]
+    printed = [{part: line[part] for part in ("scene", "state", "t_end")} for line in lines]
+    assert all(line in sent for line in printed)
+    assert any(line in spoilt for line in printed)
 
 
 @pytest.mark.parametrize("question", [GALLERY, STATIC, BREATHING, LIFT])

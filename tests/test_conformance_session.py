@@ -89,6 +89,7 @@ def alive(token: str) -> list[int]:
 def test_honest_ones_pass_whatever_their_manners(verdicts, name):
     run = verdicts(name, PATIENT)
     assert run.counts() == {"pass": len(CASES)}, run.results
+    assert {result.sent for result in run.results} == {""}
     assert run.exit_code() == 0
     assert len(run.stderr) < 100_000
     assert ("bytes left out" in run.stderr) == (name in ("noise", "last-words"))
@@ -152,6 +153,7 @@ def test_a_fault_in_every_answer(verdicts, name):
     assert [result.verdict for result in asked] == [verdict] * N, asked
     assert all(word in result.why for result in asked), asked
     assert all("\n" not in result.why for result in asked)
+    assert all('"cmd":"step"' in result.sent and '"vx":0.6' in result.sent for result in asked)
     assert run.counts()["pass"] <= 4
     assert run.exit_code() == 1
     # An error of its own is no reason to restart; all else is.

@@ -90,8 +90,10 @@ def assert_stands_alone(page: str, n_figures: int) -> None:
 def test_a_bad_stepper_is_not(call, tmp_path):
     """An honest citizen of the protocol that knows no physics: it fails by verdict, never by crash."""
     page = tmp_path / "r.html"
-    code, out, _ = call("--html", page, "--json", tmp_path / "r.json", "--", *command("honest"))
+    code, out, _ = call("--seed", 5, "--html", page, "--json", tmp_path / "r.json", "--", *command("honest"))
     assert code == 1
+    assert re.search(r"promise/\S+, sent last: \{.cmd.*\}\n", out)
+    assert re.search(r"; mushrooms ask \S+ --seed 5 prints it\n", out)
     assert "not accepted" in out
     assert "fail" in out
     text = page.read_text("utf-8")

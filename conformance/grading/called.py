@@ -38,6 +38,7 @@ from scene.tables import Wall, cycle_length, laws
 
 MOST = 2.0**100  # sizes, speeds and their inverses within it overflow nowhere
 FAR = 2.0**20  # periods from t = 0 that every stepper must reach
+Question = tuple[Scene, State, float]  # as a stepper takes it: with t_end
 CLEAR = 2.0**-20  # of a wall's f beside its terms: farther inside than any rounding leads
 
 
@@ -53,15 +54,17 @@ def answering(stepper: Stepper) -> Stepper:
     return partial(_outcome, stepper)
 
 
-def fail(name: str, text: str, scene: Scene, state: State, t_end: float) -> NoReturn:
-    """Say in one line what is wrong, and with which question, as the wire has it.
+def fail(name: str, text: str, *questions: Question) -> NoReturn:
+    """Say in one line what is wrong, and with which questions, each as it was sent.
 
     Raises:
         AssertionError: always.
     """
-    asked = {"scene": to_data(scene), "state": msgspec.structs.asdict(state), "t_end": t_end}
-    line = {"cmd": "step", "seq": 1, **asked}
-    raise AssertionError(f"{name}: {text}; {json.dumps(line)}")
+    lines = []
+    for scene, state, t_end in questions:
+        asked = {"scene": to_data(scene), "state": msgspec.structs.asdict(state), "t_end": t_end}
+        lines.append(json.dumps({"cmd": "step", "seq": 1, **asked}))
+    raise AssertionError("; ".join([f"{name}: {text}", *lines]))
 
 
 def is_clearly_inside(scene: Scene, state: State, t_end: float) -> bool:
@@ -92,20 +95,20 @@ def is_clearly_inside(scene: Scene, state: State, t_end: float) -> bool:
 def _outcome(stepper: Stepper, scene: Scene, state: State, t_end: float) -> Outcome:
     found: Any = stepper(scene, state, t_end)
     if isinstance(found, Rejected) and is_clearly_inside(scene, state, t_end):
-        fail("outcome", f"{found}, must be no refusal of a state clearly inside", scene, state, t_end)
+        fail("outcome", f"{found}, must be no refusal of a state clearly inside", (scene, state, t_end))
     if isinstance(found, Undefined | Undecided | Rejected):
         return found
     if not isinstance(found, Collision | Horizon):
-        fail("outcome", f"{shown(found)}, must be an outcome of `scene`", scene, state, t_end)
+        fail("outcome", f"{shown(found)}, must be an outcome of `scene`", (scene, state, t_end))
     if isinstance(found, Collision) and found.wall not in scene.walls:
         text = f"wall = {shown(found.wall)}, must be one of {', '.join(scene.walls)}"
-        fail("outcome", text, scene, state, t_end)
+        fail("outcome", text, (scene, state, t_end))
     fields = [field for field in found.__struct_fields__ if field != "wall"]
     numbers = {field: _number(getattr(found, field)) for field in fields}
     for field, number in numbers.items():
         if not math.isfinite(number):
             text = f"{field} = {shown(getattr(found, field))}, must be a finite number"
-            fail("outcome", text, scene, state, t_end)
+            fail("outcome", text, (scene, state, t_end))
     return msgspec.structs.replace(found, **numbers)
 
 

@@ -42,6 +42,7 @@ class Result(msgspec.Struct, frozen=True, omit_defaults=True):
         given: of the answer, the outcome that did not pass.
         expected: the certified outcome in its place, in the middle of its enclosures.
         is_known: listed in the known-failures file.
+        sent: of a case that did not pass, the last line that was sent for it.
     """
 
     id: str
@@ -58,6 +59,7 @@ class Result(msgspec.Struct, frozen=True, omit_defaults=True):
     given: dict[str, Any] | None = None
     expected: dict[str, Any] | None = None
     is_known: bool = False
+    sent: str = ""
 
     @property
     def is_right(self) -> bool:

@@ -170,11 +170,11 @@ def _converse(
     results: list[Result] = []
     level, seed = run
     for name, act in (("start", session.start), ("echo", session.probe)):
-        results.append(_tried(name, act))
+        results.append(_closed(session, _tried(name, act)))
         if results[-1].verdict != "pass":
             unreached = Trouble(results[-1].verdict, f"not asked: {name} failed")
             return [*results, *(_result(vector, unreached) for vector in chosen)], None
-    results.append(_tried("rejects", partial(_ask_nonsense, session)))
+    results.append(_closed(session, _tried("rejects", partial(_ask_nonsense, session))))
     known = [*chosen, *drawn_horizons([v for v in chosen if v.level == "core"], seed)]
     questions = itertools.chain(known, fresh(seed, n_fresh))
     total = len(results) + len(known) + n_fresh + len(OTHER_CASES) - len(PROTOCOL_CASES)
@@ -182,10 +182,16 @@ def _converse(
         (ask_vector(session, vector, drawn_disguise(vector, seed)) for vector in questions),
         _ask_further(session, chosen, level, seed),
     ):
-        results.append(result)
+        results.append(_closed(session, result))
         progress(len(results), total)
     speed = measure_speed(session)
-    return [*results, _tried("stop", session.stop)], speed
+    return [*results, _closed(session, _tried("stop", session.stop))], speed
+
+
+def _closed(session: Session, result: Result) -> Result:
+    """Return a case with the last line that was sent for it, unless it passed."""
+    sent, session.sent = session.sent.decode("utf-8", "replace"), b""
+    return result if result.verdict == "pass" else msgspec.structs.replace(result, sent=sent)
 
 
 def _tried(name: str, act: Callable[[], object]) -> Result:

@@ -50,6 +50,7 @@ class Session:
     Attributes:
         introduction: what the implementation said of itself, once opened.
         n_restarts: fresh processes that were needed so far.
+        sent: the last line that was sent, whatever it asked.
         stderr: what it wrote to standard error, bounded.
     """
 
@@ -63,7 +64,7 @@ class Session:
         total = self._limits.total
         self._deadline = math.inf if total is None else time.monotonic() + total
         self.introduction: Introduction | None = None
-        self.n_restarts = 0
+        self.n_restarts, self.sent = 0, b""
         self.stderr = Transcript()
 
     def __enter__(self) -> Session:
@@ -186,6 +187,7 @@ class Session:
 
     def _exchange(self, line: bytes) -> bytes:
         assert self._process is not None
+        self.sent = line
         left = max(0.0, self._deadline - time.monotonic())
         return self._process.exchange(line, min(self._limits.timeout, left))
 

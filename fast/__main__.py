@@ -28,16 +28,12 @@ def carry(
 ) -> list[tuple[Outcome, tuple[float, float] | None]]:
     """Return each particle's outcome at t_end and its first captured stay; a bad start is refused alone."""
     refusals = [refuse(scene, state, t_end) for state in states]
-    starts = [state for state, refusal in zip(states, refusals, strict=True) if refusal is None]
-    run = carry_judged(scene, starts, t_end, given_threads(None))
-    times = zip(run.t_in.tolist(), run.t_out.tolist(), strict=True)
-    stays = [None if math.isnan(begin) else (begin, end) for begin, end in times]
-    arrivals = iter(
-        # Who is lost tells no stay, though it may have had one.
-        (outcome, stay if isinstance(outcome, Horizon) else None)
-        for outcome, stay in zip(run.outcomes, stays, strict=True)
-    )
-    return [next(arrivals) if refusal is None else (refusal, None) for refusal in refusals]
+    run = carry_judged(scene, states, refusals, t_end, given_threads(None))
+    return [
+        # Only a particle that arrives has a stay.
+        (outcome, (begin, end) if isinstance(outcome, Horizon) and not math.isnan(begin) else None)
+        for outcome, begin, end in zip(run.outcomes, run.t_in.tolist(), run.t_out.tolist(), strict=True)
+    ]
 
 
 def clock(scene: Scene, state: State, n_collisions: int, repeat: int) -> tuple[list[int], Outcome]:

@@ -10,10 +10,11 @@ import numpy as np
 from fast.given import MAX_STEPS
 from fast.kernel import codes, entries
 from fast.kernel.records import ANCHORS_SHAPE, Compiled, FloatArray, IntArray
+from fast.kernel.single import ANSWER_LOST
 from fast.step import WALL_CODES, WALL_NAMES, Start, check_state, trouble
 from fast.threads import follow_path
-from fast.units import Units
-from scene import Horizon, Outcome, Scene, State, Wall, check_scene
+from fast.units import LateTime, Units
+from scene import Horizon, Outcome, Scene, State, Undecided, Wall, check_scene
 from scene.refusal import check_count
 
 
@@ -57,8 +58,11 @@ def fine_trajectory(scene: Scene, state: State, n_collisions: int) -> FineTrajec
     Source: Gelfreich, Rom-Kedar, Turaev (2014), sec. 3.1; which wall is met is the careful step's answer.
     """
     check_scene(scene)
-    start = check_state(scene, state)
     n_collisions = check_count("n_collisions", n_collisions, 0, MAX_STEPS)
+    try:
+        start = check_state(scene, state)
+    except LateTime as error:
+        return FineTrajectory([], np.empty((0, 6, 2)), Undecided(str(error)))
     steps: FloatArray = np.empty((n_collisions, 6, 2))
     met: IntArray = np.empty(n_collisions, dtype=np.int64)
     n, code = fill_path(start.compiled, as_pairs(start), WALL_CODES[state.wall], steps, met)
@@ -86,6 +90,9 @@ def as_trajectory(
 ) -> FineTrajectory:
     """Return what the kernel found: `n` collisions of those asked for, and its last code."""
     outcome: Outcome | None = None
+    n_exact = min(units.n_exact(steps[:n, :, part]) for part in (0, 1))
+    if n_exact < n:
+        n, code = n_exact, ANSWER_LOST
     found = units.steps(steps[:n])
     if n < len(steps):
         last = found[n - 1, 2:, 0] if n else (state.x, state.y, state.vx, state.vy)

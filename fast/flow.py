@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -12,11 +13,12 @@ from fast.ensemble import follow
 from fast.given import MOST_TO_A_TIME, given_states, given_threads
 from fast.kernel import codes
 from fast.kernel.records import FloatArray, Followed, IntArray, unfilled_ends
+from fast.kernel.single import ANSWER_LOST
 from fast.pieces import laws_in_lanes
 from fast.starts import least_collisions, only_stop
 from fast.step import as_arrays, fitted_start, next_collision, trouble
 from fast.units import fit
-from scene import Horizon, InvalidState, Outcome, Rejected, Scene, State, check_scene
+from scene import Horizon, InvalidState, Outcome, Rejected, Scene, State, Undecided, check_scene
 from scene.refusal import check_number
 
 
@@ -48,8 +50,7 @@ def flow(scene: Scene, states: Sequence[State], t_end: float, threads: int | Non
         threads: how many to use, by default one for each core; they change no bit.
 
     Raises:
-        InvalidState: a start is no State, none of this table, or t_end over 10^7 collisions away: naming
-            the particle; nothing is followed.
+        InvalidState: a start is no State, or none of this table: naming the particle; nothing is followed.
         BadInput: naming field, value and bound, for anything else that is not as above.
 
     Source: a stay is captured while |sin phi| > nu at the arc, sec. 3.2.
@@ -58,23 +59,32 @@ def flow(scene: Scene, states: Sequence[State], t_end: float, threads: int | Non
     threads = given_threads(threads)
     states = given_states(scene, states)
     t_end = check_number("t_end", t_end)
-    for i, state in enumerate(states):
-        refusal = refuse(scene, state, t_end)
-        if refusal is not None:
+    refusals = [refuse(scene, state, t_end) for state in states]
+    for i, refusal in enumerate(refusals):
+        if isinstance(refusal, Rejected):
             raise InvalidState(f"particle {i}: {refusal.reason}")
-    return carry_judged(scene, states, t_end, threads)
+    return carry_judged(scene, states, refusals, t_end, threads)
 
 
-def carry_judged(scene: Scene, states: Sequence[State], t_end: float, threads: int) -> Flow:
-    """Carry particles to t_end whose starts have been judged by `refuse`."""
-    done, _ = follow_to(scene, states, t_end, threads)
-    outcomes = [
+def carry_judged(
+    scene: Scene, states: Sequence[State], refusals: Sequence[Outcome | None], t_end: float, threads: int
+) -> Flow:
+    """Carry particles to t_end; those that `refuse` refuses stay where they are."""
+    is_free = np.array([refusal is None for refusal in refusals], dtype=bool)
+    starts = list(itertools.compress(states, is_free))
+    done, _ = follow_to(scene, starts, t_end, threads)
+    arrivals = iter(
         Horizon(t_end, *place) if code == codes.HORIZON else trouble(code, scene, state, n)
         for state, code, place, n in zip(
-            states, done.codes.tolist(), done.states[:, 2:].tolist(), done.counts.sum(axis=1), strict=True
+            starts, done.codes.tolist(), done.states[:, 2:].tolist(), done.counts.sum(axis=1), strict=True
         )
-    ]
-    return Flow(outcomes, done.t_in[:, 0, 0], done.t_out[:, 0, 0], done.counts, done.careful)
+    )
+    n_states = len(states)
+    t_in, t_out = np.full(n_states, np.nan), np.full(n_states, np.nan)
+    counts, careful = np.zeros((n_states, 5), dtype=np.int64), np.zeros(n_states, dtype=np.int64)
+    t_in[is_free], t_out[is_free] = done.t_in[:, 0, 0], done.t_out[:, 0, 0]
+    counts[is_free], careful[is_free] = done.counts, done.careful
+    return Flow([refusal or next(arrivals) for refusal in refusals], t_in, t_out, counts, careful)
 
 
 def follow_to(scene: Scene, states: Sequence[State], t_end: float, threads: int) -> tuple[Followed, float]:
@@ -94,6 +104,8 @@ def follow_to(scene: Scene, states: Sequence[State], t_end: float, threads: int)
         stop = only_stop(units.horizon(t_end))
         done = unfilled_ends(rows[those], 1, (1, 1))
         seconds += follow(in_lanes, done, walls[those], stop, threads)
+        is_lost = ~units.keeps(np.delete(done.states, 1, axis=1))
+        done.codes[is_lost], done.states[is_lost] = ANSWER_LOST, 0.0
         times, places = units.times(done.states[:, :2]), units.places(done.states[:, 2:])
         done = done._replace(
             states=np.hstack([times, places]), t_in=units.times(done.t_in), t_out=units.times(done.t_out)
@@ -103,14 +115,14 @@ def follow_to(scene: Scene, states: Sequence[State], t_end: float, threads: int)
     return followed, seconds
 
 
-def refuse(scene: Scene, state: State, t_end: float) -> Rejected | None:
-    """Return why a particle cannot start so, or be followed so far; else None."""
+def refuse(scene: Scene, state: State, t_end: float) -> Rejected | Undecided | None:
+    """Return why a particle cannot start so, or is not followed so far; else None."""
     outcome = next_collision(scene, state, t_end)
-    if isinstance(outcome, Rejected):
+    if isinstance(outcome, Rejected | Undecided):
         return outcome
     fitted, start = fit(scene), fitted_start(scene, state)
     s = start.state
     ahead = least_collisions(fitted.scene, math.hypot(s.vx, s.vy), start.units.horizon(t_end) - s.t)
     if ahead > MOST_TO_A_TIME:
-        return Rejected(f"t_end = {t_end!r} is over {ahead:.0e} collisions away, must be at most 1e7")
+        return Undecided(f"t_end = {t_end!r} is over {ahead:.0e} collisions away, must be at most 1e7")
     return None

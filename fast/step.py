@@ -12,7 +12,7 @@ from fast.given import MOST_TO_A_TIME, given_state
 from fast.kernel import careful, codes, entries, single
 from fast.kernel.loops import careful_at
 from fast.kernel.records import ANCHORS_SHAPE, Compiled, FloatArray, IntArray, Particle, Paths, unfilled_paths
-from fast.units import ANSWER_LOST, Units, fit
+from fast.units import ANSWER_LOST, LateTime, Units, fit
 from scene import (
     Collision,
     Horizon,
@@ -49,7 +49,7 @@ REASONS: dict[int, Outcome] = {
     int(codes.AT_END): Undecided("a wall is hit at the horizon within rounding"),
     int(codes.START): Undecided("the state is on another wall within rounding"),
     int(codes.TOO_FAR): Undecided(f"t_end is over {MOST_TO_A_TIME:.0e} collisions away"),
-    int(single.ANSWER_LOST): Rejected(ANSWER_LOST),
+    int(single.ANSWER_LOST): Undecided(ANSWER_LOST),
     int(codes.APPROACHING): Rejected("state.wall: the particle starts on a wall and moves into it"),
 }
 
@@ -63,9 +63,11 @@ def next_collision(scene: Scene, state: State, t_end: float) -> Outcome:
         t_end: horizon [time], t_end >= state.t.
 
     Returns:
-        Collision, Horizon, Undefined, Undecided where rounding leaves it open, or Rejected for
-        a state that is none of this table, for a `state` or `t_end` that is none at all (a wrong type,
-        nan, infinity, t_end < state.t), and for laws too large or too fast for binary64.
+        Collision, Horizon, Undefined, Undecided where rounding leaves it open, where the time is too late or
+        where binary64 cannot hold the answer, or Rejected for a state that is none of this table, for a
+        `state` or `t_end` that is none at all (a wrong type, nan, infinity, t_end < state.t), and for laws
+        too large or too fast for binary64. A time is too late when k |t| reaches some 3e7 periods, at
+        harmonic k.
 
     Raises:
         BadInput: `scene` is no scene; all else that is bad is Rejected.
@@ -97,6 +99,8 @@ def next_collision(scene: Scene, state: State, t_end: float) -> Outcome:
         if code == single.REFUSED:  # by the checks that follow, made in compiled code: they say why
             check_numbers(scene, state, t_end)
             fitted_start(scene, state).units.horizon(t_end)
+    except LateTime as error:
+        return Undecided(str(error))
     except BadInput as error:
         return Rejected(str(error))
     return trouble(code, scene, state)
@@ -207,16 +211,23 @@ def as_arrays(starts: Sequence[Start]) -> tuple[FloatArray, IntArray]:
     return rows, np.array([WALL_CODES[start.state.wall] for start in starts], dtype=np.int64)
 
 
-PHASE_LOST = "a phase k w t of 2^27 quarter turns or more is reached from there (harmonic k), and is lost"
+TOO_LATE = (
+    "too late: at the highest harmonic a phase exceeds 2^27 quarter turns, which binary64 cannot resolve"
+)
 
 
 def trouble(code: int, scene: Scene, state: State, n: int = 0) -> Outcome:
-    """Return what a code other than a wall's and HORIZON stands for, n collisions after a state."""
+    """Return what a code other than a wall's and HORIZON stands for, n collisions after a state.
+
+    A state is refused before the first of them only: later, what looks like one beyond a wall is rounding.
+    """
     if code == codes.START and not n:
         wall = rounded(scene, state.t).nearest_wall(state.x, state.y, but=state.wall)
         return Undecided(placed(scene, state, wall, "within rounding of"))
-    if code in REASONS:
-        return REASONS[code]
+    since = f"{n} collisions after state.t = {state.t!r}" if n else f"state.t = {state.t!r}"
     if code == codes.FAR_TIME:
-        return Rejected(f"state.t = {state.t!r}: {PHASE_LOST}")
-    return Rejected(placed(scene, state, WALL_NAMES[int(code - codes.BEYOND)], "beyond"))
+        return Undecided(f"{since}: {TOO_LATE}")
+    found = REASONS.get(code)
+    if n and (found is None or isinstance(found, Rejected)):
+        return Undecided(f"{since}: rounding puts the particle beyond a wall")
+    return found or Rejected(placed(scene, state, WALL_NAMES[int(code - codes.BEYOND)], "beyond"))

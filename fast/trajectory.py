@@ -7,16 +7,16 @@ from typing import NamedTuple
 import numpy as np
 
 from fast.given import MAX_STEPS, given_end
-from fast.kernel import codes, entries
+from fast.kernel import codes, entries, single
 from fast.kernel.records import FloatArray, unfilled_ends, unfilled_paths
 from fast.kernel.worker import new_worker
 from fast.pieces import laws_in_lanes
 from fast.starts import only_stop
 from fast.step import WALL_NAMES, as_arrays, check_state, trouble
 from fast.threads import follow_path
-from fast.units import ANSWER_LOST, fit
-from scene import Horizon, Outcome, Scene, State, Wall, check_scene
-from scene.refusal import BadInput, check_count
+from fast.units import LateTime, fit
+from scene import Horizon, Outcome, Scene, State, Undecided, Wall, check_scene
+from scene.refusal import check_count
 
 NAMES = np.array([WALL_NAMES[code] for code in range(len(WALL_NAMES))], dtype=object)
 
@@ -54,8 +54,11 @@ def trajectory(scene: Scene, state: State, n_collisions: int, t_end: float = np.
     """
     check_scene(scene)
     t_end = given_end(t_end)
-    start = check_state(scene, state, None if t_end == np.inf else t_end)
     n_collisions = check_count("n_collisions", n_collisions, 0, MAX_STEPS)
+    try:
+        start = check_state(scene, state, None if t_end == np.inf else t_end)
+    except LateTime as error:
+        return Collisions([], np.empty((0, 6)), Undecided(str(error)))
     rows, walls = as_arrays([start])
     factors = start.units.factors()  # multiplied in passing: a pass of its own took a quarter of the time
     paths = unfilled_paths(1, n_collisions, factors)
@@ -65,9 +68,10 @@ def trajectory(scene: Scene, state: State, n_collisions: int, t_end: float = np.
         worker = new_worker(in_lanes, stop, unfilled_ends(rows, 1, (1, 1)))
         with np.errstate(over="ignore", under="ignore"):  # without the compiler
             follow_path(entries.follow_particles, (worker, walls, paths), n_collisions, stop.called_off)
-    if not paths.is_exact.all():
-        raise BadInput(ANSWER_LOST)
     n, code = paths.counts.item(), paths.codes.item()
+    n_exact = paths.n_exact.item() if factors is not None else start.units.n_exact(paths.steps[0, :n])
+    if n_exact < n:
+        n, code = n_exact, single.ANSWER_LOST
     steps = paths.steps[0, :n] if n == n_collisions else paths.steps[0, :n].copy()  # not all room is held
     steps = steps if factors is not None else start.units.steps(steps)
     walls = NAMES[paths.walls[0, :n]].tolist()

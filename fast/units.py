@@ -22,7 +22,7 @@ import msgspec
 import numpy as np
 
 from fast.compiled import compile_scene
-from fast.kernel.records import Compiled, FloatArray, IntArray
+from fast.kernel.records import BoolArray, Compiled, FloatArray, IntArray
 from fast.kernel.single import LARGEST, LENGTH, TIME, packed, static_time
 from scene import BangBang, Fourier, InvalidState, Law, Scene, State
 from scene.refusal import BadInput
@@ -32,6 +32,10 @@ LEAST_NORMAL = float(np.finfo(np.float64).smallest_normal)
 SLAB = 2**11  # rows brought back at a time: what lies in between stays in the cache
 FARTHEST = 1000  # powers of two up to this, and their inverses, are floats
 ANSWER_LOST = "the answer holds a number beyond binary64: every one must be 0 or 2^-1022 to 2^1023"
+
+
+class LateTime(InvalidState):
+    """A time that is too large beside the table's period: good input, which this stepper cannot answer."""
 
 
 class Units(NamedTuple):
@@ -82,6 +86,18 @@ class Units(NamedTuple):
         """Return rows of [dt, t, x, y, vx, vy], each a number or a pair, in the scene's units."""
         exponents = self._of_step()
         return outward(rows, exponents if rows.shape[-1] == 6 else exponents[:, None])
+
+    def keeps(self, rows: FloatArray) -> BoolArray:
+        """Tell which of N rows of ([dt,] t, x, y, vx, vy) lose no bit in the scene's units."""
+        exponents = self._of_step()[-rows.shape[-1] :]
+        with np.errstate(over="ignore", under="ignore"):
+            back = np.ldexp(np.ldexp(rows, exponents), -exponents)
+        found: BoolArray = (back == rows).all(axis=1)
+        return found
+
+    def n_exact(self, rows: FloatArray) -> int:
+        """Return how many of N rows of [dt, t, x, y, vx, vy] come before the first that loses a bit."""
+        return int(np.append(self.keeps(rows), False).argmin())
 
     def factors(self) -> FloatArray | None:
         """Return by what dt, t, x, y, vx, vy are multiplied; None where no product does it."""
@@ -191,7 +207,8 @@ def inward(field: str, number: float, exponent: int) -> float:
     if scaled == number or (abs(scaled) < math.inf and math.ldexp(scaled, exponent) == number):
         return scaled
     bound = "at least 2^-900" if abs(scaled) < 1.0 else "below 2^900 in size"
-    raise InvalidState(f"{field} = {number!r}, must be {bound} beside the table's size and period")
+    refusal = LateTime if field == "state.t" and abs(scaled) > 1.0 else InvalidState
+    raise refusal(f"{field} = {number!r}, must be {bound} beside the table's size and period")
 
 
 def outward(numbers: FloatArray, exponents: IntArray) -> FloatArray:

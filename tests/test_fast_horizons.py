@@ -7,7 +7,8 @@ import pytest
 from support.faulty_kernels import output_of
 
 import fast
-from scene import BangBang, Collision, Fourier, Mushroom, State
+from fast import __main__ as served
+from scene import BangBang, Cap, Collision, Fourier, Mushroom, State, Stem, Undecided
 
 # Sides that lean, now more and now less. What bounds them for all time bounds them above the floor alone.
 WAVING = Mushroom(r=1.0, h=1.0, nu=Fourier(0.6, 1.0, (-0.3,)), slope=Fourier(0.1, 1.0, (0.05,)))
@@ -64,3 +65,46 @@ def test_a_stepper_that_looks_for_sides_below_the_floor_misses_it(tmp_path):
         tmp_path / "faulty", PROGRAM, "careful.py", order, "for candidate in (LEFT, RIGHT, FLOOR):"
     )
     assert faulty.strip() == "left"
+
+
+SWEPT = Stem(w=0.5, h=Fourier(1.0, 1.0, (0.2,)))
+RIPPLED = Mushroom(r=1.0, h=1.0, w=Fourier(0.5, 1.0, (0.0,) * 15 + (0.05,)))
+# 2^27 quarter turns of the highest harmonic end at t = 2.1e8 and 1.3e7.
+LATE = [
+    (SWEPT, 1e12),
+    (SWEPT, -1e12),
+    (SWEPT, 2.2e8),
+    (RIPPLED, 1.4e7),
+    (Cap(r=Fourier(1.0, 1.0, (0.1,))), 1e300),
+]
+
+
+@pytest.mark.parametrize(("scene", "t"), LATE)
+def test_a_late_time_is_undecided_in_every_profile(scene, t):
+    start = State(t, 0.0, 0.5 if isinstance(scene, Cap) else -0.5, 0.1, 1.0)
+    step = fast.next_collision(scene, start, t + abs(t))
+    fine = fast.fine_trajectory(scene, start, 9).outcome
+    [(flow, stay)] = served.carry(scene, [start], t + abs(t))
+    [path] = served.follow(scene, start, 9)
+    for found in (step, fine, flow, path):
+        assert isinstance(found, Undecided)
+    assert f"state.t = {t!r}" in step.reason
+    assert stay is None
+
+
+def test_a_path_that_grows_late_ends_undecided():
+    """It began in time, so that it is no bad input."""
+    start = State(2.1e8, 0.0, -0.5, 0.1, 0.5)
+    path = fast.trajectory(SWEPT, start, 10**7)
+    assert 1e5 < len(path.walls) < 10**7
+    assert isinstance(path.outcome, Undecided)
+    assert f"{len(path.walls)} collisions after state.t" in path.outcome.reason
+
+
+def test_a_horizon_beyond_all_patience_is_undecided():
+    """A good start beside it is carried all the same."""
+    start, slow = State(0.0, 0.0, -0.5, 0.1, 1.0), State(0.0, 0.0, -0.5, 1e-9, 1e-9)
+    box = Stem(w=0.5, h=1.0)
+    run = fast.flow(box, [slow, start], 1e8)
+    assert [type(outcome).__name__ for outcome in run.outcomes] == ["Horizon", "Undecided"]
+    assert run.wall_counts.sum(axis=1).tolist() == [0, 0]

@@ -78,8 +78,8 @@ BAD = {
     "digits": [None, *NO_COUNT, 0, 10**4 + 1, HUGE],
     "working": [*NO_COUNT, 0, 10**4 + 1, HUGE],
 }
-# A flight from START to this horizon takes over 10^7 collisions; a trajectory of `fast` needs none.
-FAR = [*((name, "t_end", INFINITY) for name in ("flow", "next_collision", *PROVED)), ("flow", "t_end", 1e9)]
+# A trajectory of `fast` needs no horizon.
+FAR = [(name, "t_end", INFINITY) for name in ("flow", "next_collision", *PROVED)]
 CASES = [
     (name, field, value)
     for name, (_, good) in {**ENTRIES, **PROVED}.items()

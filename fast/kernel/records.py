@@ -149,7 +149,7 @@ class Paths(NamedTuple):
     Attributes:
         steps: (N, K, 6) dt, t, x, y, vx, vy after each collision, times `factors`.
         factors: (2, 6) powers of two by which steps are multiplied, and their inverses.
-        is_exact: (N,) whether no step has lost a bit by that.
+        n_exact: (N,) how many steps lost no bit by that, before the first that did.
         walls: (N, K) codes of the walls hit.
         counts: (N,) how many collisions there are.
         codes: (N,) the last wall's code where there are K, else what came instead.
@@ -158,7 +158,7 @@ class Paths(NamedTuple):
 
     steps: FloatArray
     factors: FloatArray
-    is_exact: BoolArray
+    n_exact: IntArray
     walls: IntArray
     counts: IntArray
     codes: IntArray
@@ -171,7 +171,7 @@ def unfilled_paths(n_starts: int, n_collisions: int, factors: FloatArray | None 
     return Paths(
         np.empty((n_starts, n_collisions, 6)),
         np.stack([by, 1.0 / by]),
-        np.ones(n_starts, np.bool_),
+        np.full(n_starts, n_collisions, np.int64),
         np.empty((n_starts, n_collisions), np.int64),
         np.zeros(n_starts, np.int64),
         np.zeros(n_starts, np.int64),
@@ -277,7 +277,7 @@ def write_step(paths, i, k, dt, particle):
         paths.steps[i, k, column] = scaled
         is_exact = is_exact and scaled * paths.factors[1, column] == number
     if not is_exact:
-        paths.is_exact[i] = False
+        paths.n_exact[i] = min(paths.n_exact[i], k)
 
 
 @kernel

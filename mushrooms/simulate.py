@@ -84,7 +84,7 @@ def simulate(
     """Simulate an ensemble; undecided particles are counted, never guessed.
 
     Prints particles, collisions, lost (not followed to the end), undecided (those of the lost
-    that the stepper could not decide), careful (collisions found by the careful step, some fifty times
+    that the stepper could not decide), careful (collisions found by the careful step, some tens of times
     slower), m1 (mean of log E/E0 per cycle) and p_nc (share of cycles without capture) with standard
     errors (se), what theory says of both, how many standard errors they are off (z), ns_per_collision and the
     SHA-256. Particles that no cycle ever frees from the island count neither in m1 nor in p_nc.

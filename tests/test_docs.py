@@ -73,6 +73,16 @@ def test_the_tutorial_holds_a_python_stepper_to_a_property():
     given["test_mirror"]()
 
 
+def test_the_tutorials_stepper_guesses_no_hit_at_the_horizon(tmp_path, monkeypatch):
+    for name, text in blocks("tutorial.md", "python"):
+        if name:
+            (tmp_path / name).write_text(text)
+    monkeypatch.syspath_prepend(tmp_path)
+    question = {"scene": {"w": 1.0, "h": 1.0}, "state": {"t": 0.0, "x": 0.0, "y": -0.5, "vx": 1.0, "vy": 0.0}}
+    outcomes = [importlib.import_module("box").step({**question, "t_end": t})["outcome"] for t in (0.5, 1, 2)]
+    assert outcomes == ["horizon", "undecided", "collision"]
+
+
 def test_another_output_would_be_seen():
     assert matches("4 of 24 cases pass, ... s: not accepted", "4 of 24 cases pass, 1.0 s: not accepted")
     assert not matches("4 of 24 cases pass, ... s: not accepted", "5 of 24 cases pass, 1.0 s: not accepted")
@@ -198,6 +208,19 @@ def is_found(name: str) -> bool:
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.relative_to(ROOT).as_posix())
 def test_what_a_page_names_exists(page):
     assert missing(page, page.read_text("utf-8")) == []
+
+
+def test_every_page_is_named_by_another():
+    """The contents of the site do not count: who reads on does not look there."""
+    aside = {DOCS / name for name in ("index.md", "changelog.md", "contributing.md")}
+    links = {
+        (page.parent / link).resolve()
+        for page in PAGES
+        if page != DOCS / "index.md"
+        for link in re.findall(r"\]\(([^)#:]+)(?:#[^)]*)?\)", page.read_text("utf-8"))
+    }
+    pages = {page for page in PAGES if page.is_relative_to(DOCS) and not page.is_relative_to(DOCS / "api")}
+    assert pages - aside <= links
 
 
 @pytest.mark.parametrize(

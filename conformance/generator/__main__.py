@@ -2,7 +2,7 @@
 
 Every vector is drawn from a stream seeded by its id, or written down as a hard case; certified by the
 reference; and re-proved in a second arithmetic. The same corpus comes out on every machine, bit for bit.
-Some twenty minutes on one core; `--jobs N` shares them out. Needs the `test` extra (python-flint).
+Some ten minutes on one core; `--jobs N` shares them out. Needs the `test` extra (python-flint).
 """
 
 from __future__ import annotations

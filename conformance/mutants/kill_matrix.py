@@ -1,7 +1,7 @@
 """Which vector kills which mutant: the proof that the corpus can fail, and what failures are compared with.
 
 `python -m conformance.mutants.kill_matrix` answers every vector with every mutant, grades the answers and
-writes kill-matrix.json beside this file and docs/kill-matrix.md: some twenty minutes on one core. The matrix
+writes kill-matrix.json beside this file and docs/kill-matrix.md: some ten minutes on one core. The matrix
 is a function of corpus and mutants alone. Only `fail` kills: a vector that a mutant declines, or at which it
 crashes or answers in a wrong format, does not count.
 """

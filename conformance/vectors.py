@@ -2,8 +2,9 @@
 
 A vector asks for one step, one trajectory or one particle's flow; its answers are enclosures that the
 reference proved and a second arithmetic proved again. The corpus is one file of JSON lines for each group,
-beside a manifest with its version and every file's SHA-256; `load` refuses a corpus that does not match its
-manifest. Answers never leave the harness: `request` builds the line that an implementation is sent.
+and one for all hard cases, beside a manifest with its version and every file's SHA-256; `load` refuses a
+corpus that does not match its manifest. Answers never leave the harness: `request` builds the line that an
+implementation is sent.
 
 Levels say how delicate a question is, by the condition number (the largest relative change of an answer per
 relative change of the inputs) and by what nudging the inputs does:

@@ -49,7 +49,7 @@ def jacobians(orbit: FollowedOrbit, progress: Callable[[int], None] | None = Non
     """Return (n, 5, 5): d(t, x, y, vx, vy) after each collision by d(t, x, y, vx, vy) before it.
 
     Args:
-        orbit: some 15 ms a collision.
+        orbit: some 5 ms a collision.
         progress: called with the number of collisions done.
 
     Raises:

@@ -12,6 +12,7 @@ import pytest
 from mpmath import fp
 
 import theory
+from conformance.attacks import FAMILIES
 from conformance.generator.fresh import USUAL
 from conformance.generator.seldom import EXTRA
 from conformance.mutants import MUTANTS
@@ -20,6 +21,7 @@ from conformance.suite.disguise import N_DRAWN
 from conformance.suite.promises import conserved, crowds, refusals, scenes
 from fast.kernel.kept import LANE_ROWS
 from mushrooms.store import conduct, layout
+from mushrooms.store.asked import Asked
 from reference.arithmetic import MAX_WORK
 from scene import from_data, load
 from scene.given import MAX_HARMONICS, MAX_KNOTS
@@ -71,6 +73,18 @@ def lines_of_growth() -> str:
     return " ".join(f"- {name}: {'over ' * (n >= all_kept)}{n:.0f}" for name, n in lasts)
 
 
+def size_of_the_audit() -> str:
+    n_bytes = 0
+    for made in json.loads((ROOT / "docs" / "audit" / "report.json").read_bytes())["runs"]:
+        asked = Asked(
+            from_data(made["scene"]), *(made[x] for x in ("energy", "cycles", "seed")), tuple(made["phases"])
+        )
+        block = conduct.block_of_new(asked, made["particles"], threads=2)
+        shape = conduct.shape_of(asked, made["particles"], block)
+        n_bytes += -(-made["particles"] // block) * block * shape.bytes_of_a_particle
+    return f"{n_bytes / 1e9:.1f} GB for a full audit"
+
+
 def words_of_whole_arrays() -> str:
     whole = [f"`{name}`" for name, field in layout.FIELDS.items() if field.kind.startswith("int")]
     return f"-1 in arrays of whole numbers ({', '.join(sorted(whole))})"
@@ -82,6 +96,7 @@ BYTES = layout.Shape(1, 1, 1, 1, 0, 1).bytes_of_a_particle
 FIGURES: dict[str, tuple[str, Callable[[], str]]] = {
     "bang-bang law": ("docs/start.md", sentence_of_the_knots),
     "mutants": ("README.md", lambda: f"{len(MUTANTS)} faulty steppers"),
+    "attacks": ("CHANGELOG.md", lambda: f"{len(FAMILIES)} families of seeded questions"),
     "harmonics": ("docs/scenes.md", lambda: f"Up to {MAX_HARMONICS} each"),
     "drawn questions": ("docs/verdict.md", lambda: f"{N_DRAWN} drawn questions"),
     "fresh questions": (
@@ -97,6 +112,7 @@ FIGURES: dict[str, tuple[str, Callable[[], str]]] = {
     "work of a step": ("docs/proof.md", lambda: f"{MAX_WORK:,.0f} of a parabola's"),
     "lane": ("docs/ensembles.md", lambda: f"{LANE_ROWS} numbers, the array `lane`, {8 * LANE_ROWS} bytes"),
     "room": ("docs/ensembles.md", lambda: f"{BYTES} bytes a particle for one cycle with one narrowing"),
+    "audit": ("docs/audit.md", size_of_the_audit),
     "chunks": ("docs/ensembles.md", lambda: f"{conduct.MOST_CHUNKS} times as many"),
     "blocks": ("docs/ensembles.md", lambda: f"by default {conduct.LEAST_BLOCK} to {conduct.MOST_BLOCK},"),
     "fill values": ("docs/ensembles.md", words_of_whole_arrays),

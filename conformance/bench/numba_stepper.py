@@ -14,7 +14,7 @@ from conformance.bench import codes
 MOST_NEWTON = 30
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def _bang_bang(law, t):
     n = int(law[1])
     first, last = law[4], law[2 + 2 * n]
@@ -30,7 +30,7 @@ def _bang_bang(law, t):
     return law[i + 3] - 2 * change * part * part, 4 * change * part / leg
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def _at(law, t):
     if law[0] == codes.CONSTANT:
         return law[2], 0.0
@@ -45,14 +45,14 @@ def _at(law, t):
     return value, rate
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def _mouth(laws, t):
     width, width_rate = _at(laws[codes.WIDTH], t)
     factor, factor_rate = _at(laws[codes.FACTOR], t)
     return width * factor, width_rate * factor + width * factor_rate
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def _gap(laws, wall, t, x, y, vx, vy):
     if wall == codes.ARC:
         r, v = _at(laws[codes.R], t)
@@ -66,7 +66,7 @@ def _gap(laws, wall, t, x, y, vx, vy):
     return w + lean * y + side * x, v + lean_rate * y + lean * vy + side * vx, side, lean
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def _newton(laws, wall, t, x, y, vx, vy, s):
     for _ in range(MOST_NEWTON):
         inside, rate, _, _ = _gap(laws, wall, t + s, x + s * vx, y + s * vy, vx, vy)
@@ -77,7 +77,7 @@ def _newton(laws, wall, t, x, y, vx, vy, s):
     return s if s > 0 else math.inf
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def _arc_time(laws, t, x, y, vx, vy):
     r, v = _at(laws[codes.R], t)
     square, along = vx * vx + vy * vy - v * v, x * vx + y * vy - r * v
@@ -85,7 +85,7 @@ def _arc_time(laws, t, x, y, vx, vy):
     return _newton(laws, codes.ARC, t, x, y, vx, vy, (root - along) / square)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def _stem_time(laws, last, t, x, y, vx, vy):
     first, soonest = codes.NONE, math.inf
     for wall in (codes.FLOOR, codes.LEFT, codes.RIGHT):
@@ -97,7 +97,7 @@ def _stem_time(laws, last, t, x, y, vx, vy):
     return first, soonest
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def _next_hit(laws, table, t, x, y, vx, vy, last):
     is_in_cap = table == codes.CAP
     if table == codes.MUSHROOM:
@@ -127,7 +127,7 @@ def _next_hit(laws, table, t, x, y, vx, vy, last):
         return dt, t, x, y, vx - push * gx, vy - push * gy, float(first)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def next_hits(laws, table, states, hits):
     """Fill `hits` with the next collision of each state; no wall and infinite time where there is none."""
     for i in range(len(states)):
@@ -136,7 +136,7 @@ def next_hits(laws, table, states, hits):
             hits[i, j] = number
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def follow(laws, table, states, t_end, most, n_times):
     """Follow each state to t_end or for `most` collisions, n_times; returns the collisions of all."""
     n_hits = 0

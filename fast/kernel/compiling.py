@@ -9,7 +9,11 @@ each. What many need is called by its address.
 from __future__ import annotations
 
 import hashlib
+import shutil
+import sys
 from collections.abc import Callable
+from contextlib import suppress
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +28,7 @@ from numba.core.typing import Signature
 from numba.extending import intrinsic
 
 from fast.kernel.linked import ForCallers
+from scene.files import SEAL, write_file
 
 # No fastmath, so that results are the same bits on every machine; quotients by zero are infinite or nan, as
 # in numpy. Who enters the kernel holds its arrays while it runs, hence no references are counted in it: each
@@ -46,6 +51,7 @@ TOOLS = (
     llvmlite.__version__,
     get_host_cpu_name() if config.CPU_NAME is None else config.CPU_NAME,
     get_host_cpu_features() if config.CPU_FEATURES is None else config.CPU_FEATURES,
+    sys.implementation.cache_tag,
 )
 
 
@@ -59,17 +65,73 @@ def kept(*variant: object, **options: Any) -> Callable[[Any], Any]:
     decides what a function compiles to is in the name of its files, but for numba's switches for debugging:
     whatever lies under it is the right code. Files of other sources stay until somebody removes them.
 
+    numba also takes the files for what it wrote: one that is cut off ends the process, and one with another
+    bit is run. So an index ends in a digest of itself and of the code beside it, which numba does not read.
+    Where that does not fit, the files are removed, and the function is compiled again. So it is, but kept
+    nowhere, where no folder can be written in or the disk is full.
+
     Args:
         variant: values that it closes over, which tell it from others of its name.
         options: for numba.
     """
 
     def compiled(function: Any) -> Any:
-        rest = hashlib.sha256(repr((variant, TOOLS)).encode()).hexdigest()
+        rest = hashlib.sha256(repr((function.__module__, variant, TOOLS)).encode()).hexdigest()
         function.__qualname__ += f"-{SOURCES[:16]}-{rest[:16]}"
-        return njit(cache=True, **options)(function)
+        try:
+            entry = njit(cache=True, **options)(function)
+        except RuntimeError:  # numba finds no folder that can be written in
+            return njit(**options)(function)
+        if not config.DISABLE_JIT:
+            entry.compile = partial(_load_or_compile, entry, entry.compile)
+        return entry
 
     return compiled
+
+
+def _load_or_compile(entry: Any, compile_or_load: Callable[[Any], Any], signature: Any) -> Any:
+    """Let numba load an entry if its files are as they were written, else compile it, and seal the files."""
+    if signature in entry.overloads:
+        return compile_or_load(signature)
+    files = _files_of(entry)
+    if files and not _is_sealed(files):
+        for path in reversed(files):  # the index first: no code is found without it
+            shutil.rmtree(path) if path.is_dir() else path.unlink(missing_ok=True)
+    try:
+        found = compile_or_load(signature)
+    except OSError:  # it is compiled before it is written, and numba has it still
+        found = compile_or_load(signature)
+    if signature in entry.stats.cache_misses:
+        with suppress(OSError):
+            files = _files_of(entry)
+            for index in (path for path in files if path.suffix == ".nbi"):
+                content = index.read_bytes()
+                write_file(index, content + _seal(files, content))
+    return found
+
+
+def _files_of(entry: Any) -> list[Path]:
+    """Return the files that an entry is kept in, the index last."""
+    name = entry.py_func.__qualname__.split(">.")[-1]  # of one in a function numba drops the brackets
+    return sorted(Path(entry.stats.cache_path).glob(f"*.{name}-*.nb[ic]"))
+
+
+def _is_sealed(files: list[Path]) -> bool:
+    """Tell whether an index and the code beside it are as they were when the index was sealed."""
+    try:
+        found = files[-1].read_bytes()
+        return files[-1].suffix == ".nbi" and found[-SEAL:] == _seal(files, found[:-SEAL])
+    except OSError:
+        return False
+
+
+def _seal(files: list[Path], index: bytes) -> bytes:
+    """Return a digest of an index's content, of the code beside it, and of their names."""
+    digest = hashlib.sha256(index)
+    for path in files:
+        digest.update(path.name.encode())
+        digest.update(path.read_bytes() if path.suffix == ".nbc" else b"")
+    return digest.digest()
 
 
 def _for_compiled_callers(**options: Any) -> Callable[[Any], Any]:

@@ -35,4 +35,6 @@ def in_words(error: ValueError) -> str | None:
     told = str(error)
     if "MPLBACKEND" in os.environ and told.startswith(OF_THE_BACKEND):
         return f"MPLBACKEND = {told.removeprefix(OF_THE_BACKEND)}"
+    if told.startswith("bad marshal data"):  # so Python says of a file in __pycache__
+        return f"a module's bytecode is damaged, its __pycache__ must be removed: {told}"
     return None

@@ -106,6 +106,13 @@ class Commands(TyperGroup):
         super().__init__(**attributes)
         self.commands = {name: LateCommand(name) for name in COMMANDS}
 
+    def invoke(self, context: Any) -> Any:
+        """Run a command, and say what has ended too soon: typer would call that an interruption."""
+        try:
+            return super().invoke(context)
+        except EOFError as error:
+            raise OSError(f"a file or stream ended too soon: {error}") from error
+
 
 def command(name: str) -> Any:
     """Import a command."""
@@ -263,8 +270,9 @@ def _call(given: list[str]) -> NoReturn:
         if told is None:
             raise
         _refuse(_in_options(told, given))
-    except MemoryError:
-        _refuse("not enough memory for so many particles")
+    except (MemoryError, RecursionError) as error:
+        what = "not enough memory" if isinstance(error, MemoryError) else "nested too deeply"
+        _refuse(f"{what}: {error}".removesuffix(": "))
     if code == INTERRUPTED:
         kept = next((COMMANDS[word].kept for word in given if word in COMMANDS), "")
         if kept and not _told:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 import math
 import struct
@@ -18,6 +19,7 @@ import fast
 import reference
 from scene import Horizon, State, catalogue, load, to_data
 from scene.protocol.messages import Timed
+from scene.protocol.wire import serve
 
 STATE = {"t": 0.0, "x": 0.1, "y": 0.3, "vx": 10.0, "vy": 7.0, "wall": None}
 SCENE = to_data(load("moving-cap"))
@@ -176,6 +178,30 @@ def test_bad_lines_are_rejected_and_the_session_goes_on(replies, i):
     assert "\n" not in bad["reason"]
     assert good["seq"] == 4
     assert good["outcome"] == "collision"
+
+
+@pytest.mark.parametrize(
+    ("error", "told"),
+    [
+        (MemoryError(), "MemoryError"),
+        (EOFError("Ran out of input"), "EOFError: Ran out of input"),
+        (
+            OSError(28, "No space left on device", "kept"),
+            "OSError: [Errno 28] No space left on device: 'kept'",
+        ),
+    ],
+)
+def test_what_the_machine_refuses_is_owned_to_and_the_session_goes_on(error, told):
+    def refused(*_):
+        raise error
+
+    out = io.BytesIO()
+    lines = [json.dumps(step(seq)).encode() + b"\n" for seq in (1, 2)]
+    serve("s", refused, refused, lines, out)
+    assert [json.loads(line) for line in out.getvalue().splitlines()] == [
+        {"seq": 1, "error": told},
+        {"seq": 2, "error": told},
+    ]
 
 
 def test_every_catalogue_scene_is_served(module, ask):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import os
 import re
@@ -18,6 +19,7 @@ from support.refusals import assert_refused
 
 import fast
 import scene as scenes
+from mushrooms import main
 from mushrooms.predict import FIGURES
 from scene.files import write_files
 
@@ -133,6 +135,32 @@ def test_a_broken_off_simulation_leaves_nothing(command_line, tmp_path, monkeypa
     assert ended.code == code
     assert "Traceback" not in ended.err
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("name", main.COMMANDS)
+@pytest.mark.parametrize(
+    ("error", "told"),
+    [
+        (EOFError("Ran out of input"), "a file or stream ended too soon: Ran out of input"),
+        (MemoryError(), "not enough memory"),
+        (MemoryError("Unable to allocate 8 GiB"), "not enough memory: Unable to allocate 8 GiB"),
+        (RecursionError("maximum depth exceeded"), "nested too deeply: maximum depth exceeded"),
+        (OSError(errno.EMFILE, "Too many open files"), "[Errno 24] Too many open files"),
+        (
+            ValueError("bad marshal data (x)"),
+            "a module's bytecode is damaged, its __pycache__ must be removed: bad marshal data (x)",
+        ),
+        (KeyboardInterrupt(), f"interrupted; {main.NOTHING_KEPT}"),
+    ],
+)
+def test_only_an_interrupt_is_called_one(command_line, monkeypatch, name, error, told):
+    def broken(_name):
+        raise error
+
+    monkeypatch.setattr(main, "command", broken)
+    monkeypatch.setattr(main, "COMMANDS", {name: main.COMMANDS[name]._replace(kept=main.NOTHING_KEPT)})
+    code = 130 if isinstance(error, KeyboardInterrupt) else 2
+    assert command_line(name) == (code, "", f"mushrooms: {told}\n")
 
 
 class Interrupting:

@@ -141,6 +141,8 @@ class _Server:
             return _plain(Rejected(str(error)))
         except OwnFailure as failure:
             return {"error": str(failure)}
+        except (MemoryError, EOFError, OSError) as error:
+            return {"error": f"{type(error).__name__}: {error}".removesuffix(": ")}
         except UNREADABLE as error:
             return _plain(_refusal(error))
 

@@ -45,7 +45,7 @@ def own_share() -> list[str]:
 
 
 class _Beside(event.Listener):  # type: ignore[misc]  # numba has no types
-    """Starts the others when numba is about to compile one of some entries, and will keep it."""
+    """Starts the others when numba has found one of some entries not kept, and is about to compile it."""
 
     def __init__(self, entries: Iterable[Any], arguments: tuple[str, ...]) -> None:
         self._entries, self._arguments = list(entries), arguments
@@ -53,8 +53,7 @@ class _Beside(event.Listener):  # type: ignore[misc]  # numba has no types
 
     def on_start(self, told: Any) -> None:
         """See numba's `Listener`."""
-        entry = told.data["dispatcher"]
-        if not self.processes and entry in self._entries and entry.stats.cache_path:
+        if not self.processes and told.data["dispatcher"] in self._entries:
             start(self.processes, *self._arguments)
 
     def on_end(self, told: Any) -> None:

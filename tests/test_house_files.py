@@ -203,3 +203,53 @@ def test_every_dependency_says_why_it_is_there():
         and not re.search(rf'^\s*"{re.escape(dependency)}",\s*#\s*\w+', text, re.MULTILINE)
     ]
     assert silent == []
+
+
+@cache
+def named_in(path: str) -> set[str]:
+    """Return the names that a file gives to functions, classes and variables, at any depth."""
+    nodes = list(ast.walk(parsed((ROOT / path).read_text("utf-8")))) if (ROOT / path).is_file() else []
+    functions = (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef)
+    names = {node.name for node in nodes if isinstance(node, functions)}
+    return names | {n.id for n in nodes if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)}
+
+
+def stale(table: str) -> list[str]:
+    """List what a table of planted faults names and the code does not hold, and totals that are wrong."""
+    found, totals = [], {"all": 0}
+    for section in table.split("\n## ")[1:]:
+        title = section.partition("\n")[0]
+        totals[title] = 0
+        for row in re.findall(r"^\| (`.+) \|$", section, re.MULTILINE):
+            faults, places, _, tests = row.split(" | ")
+            pairs = re.findall(r"([\w/]+\.py):+(\w+)", f"{places} {tests}")
+            found += [f"{path}:{name}" for path, name in pairs if name not in named_in(path)]
+            files = {ROOT / path for path, _ in re.findall(r"([\w/]+\.py):(\w+)", places)}
+            text = "".join(file.read_text("utf-8") for file in files if file.is_file())
+            for fault, n in re.findall(r"`([^`]+)`(?: \((\d+)\))?", faults):
+                totals[title] += int(n or 1)
+                found += [] if fault in text else [fault]
+    totals["all"] = sum(totals.values())
+    return found + [name for name, n in totals.items() if f"| {name} | {n} |" not in table]
+
+
+def test_every_planted_fault_is_there_and_so_is_its_test():
+    assert stale((ROOT / "tests" / "planted_faults.md").read_text("utf-8")) == []
+
+
+HERE = "tests/test_house_files.py"
+ROW = f"| `STALE` | {HERE}:STALE | words | {HERE}::test_a_stale_row_is_found |"
+SOUND = f"| A | 1 |\n| all | 1 |\n\n## A\n{ROW}"
+STALE = {
+    "no such test": SOUND.replace("is_found", "is_lost"),
+    "no such object": SOUND.replace(":STALE", ":FRESH"),
+    "no such file": SOUND.replace(f"{HERE}::", "tests/test_no_file.py::"),
+    "no such fault": SOUND.replace("`STALE`", f"`{'no' * 2}`"),
+    "a wrong total": SOUND.replace("| A | 1 |", "| A | 2 |"),
+}
+
+
+@pytest.mark.parametrize("name", STALE)
+def test_a_stale_row_is_found(name):
+    assert stale(SOUND) == []
+    assert len(stale(STALE[name])) == 1

@@ -98,6 +98,7 @@ VERDICTS = [
     (REFUSAL, UNDECIDED, "declined", ""),
     (EITHER, HIT, "pass", ""),
     (EITHER, REJECTED, "pass", ""),
+    (EITHER, UNDECIDED, "pass", "a refusal is allowed here"),
     (EITHER, {**HIT, "vx": 1.0}, "fail", ""),
     (PATH, {"steps": [HIT, NEXT]}, "pass", ""),
     (PATH, {"steps": [HIT]}, "fail", "step 2: missing, 1 of 2"),
@@ -160,6 +161,16 @@ def test_indeterminate_when_the_enclosure_is_too_wide():
     asked = vector(Expectation("collision", (wide,)))
     assert grade(asked, HIT).verdict == "indeterminate"
     assert grade(asked, {**HIT, "x": 1.1}).verdict == "fail"
+
+
+def test_who_declines_passes_wherever_a_refusal_is_allowed(tally):
+    """Of a group of three two could be declined, and the whole level was refused."""
+    for found in load("stress"):
+        allowed = [expectation.outcome for expectation in found.expect]
+        if allowed[1:] == ["rejected"]:
+            assert grade(found, UNDECIDED).verdict == grade(found, REJECTED).verdict == "pass"
+            tally[found.group] += 1
+    assert set(tally) == {"far-mouth", "far-phase", "hard-case-39", "hard-case-40"}
 
 
 def test_backward_ulps_of_a_known_error():

@@ -7,7 +7,7 @@ from support.depth import deep_among
 from support.forgetful import FORGETFUL
 from support.leaks import LEAKS, NO_LEAKS
 from support.lenient import LENIENT
-from support.promise_breakers import FAULTS, Breaker, bisecting, remembering_steps
+from support.promise_breakers import FAULTS, Breaker, bisecting, last_bit_varies, remembering_steps
 
 import reference
 from conformance import vectors
@@ -51,6 +51,14 @@ def test_a_breach_is_met(opened, name):
     ((_, met, why, _),) = promises.ask_promises(opened(fault), (promise,))
     assert met == verdict, why
     assert why.isprintable()
+
+
+@pytest.mark.parametrize(
+    "name", ["repeated-questions", "absent-wall", "malformed-lines", "extra-fields", "spelling"]
+)
+def test_what_is_not_deterministic_is_told_so_and_nothing_else_is_blamed(opened, name):
+    ((_, verdict, why, _),) = promises.ask_promises(opened(last_bit_varies()), (name,))
+    assert (verdict, why.partition(":")[0]) == ("fail", "not deterministic")
 
 
 @pytest.mark.parametrize("cell", [10 * 2.0**-n for n in (32, 37, 41, 44, 46)])

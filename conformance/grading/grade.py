@@ -9,6 +9,7 @@ Trajectories end before the condition number reaches 1e8; only hard case 30 goes
 question.
 
 - `undecided` where an answer is due is `declined`; so is a trajectory that ends so, after right steps.
+- Where a vector allows `rejected` beside an answer (a time so late, numbers so large), `undecided` will do.
 - Where the mathematics gives no answer (`undefined`), `undecided` is right too, and listed in the vector.
 - `rejected` for a valid question is `fail`: what an implementation cannot do it says in its introduction,
   and is then not asked (`unsupported`, the runner's verdict, as `crashed` and `timed-out` are).
@@ -104,6 +105,8 @@ def grade(vector: Vector, answer: Any) -> Grade:
     asked: Answer | list[Answer] = outcomes if vector.kind == "trajectory" else outcomes[0]
     found = [compare(asked, known, vector.state, physics=physics) for known in vector.expect]
     graded = _noted(vector, _best(found))
+    if graded.verdict == "declined" and {"rejected"} < {known.outcome for known in vector.expect}:
+        graded = graded._replace(verdict="pass", why=f"{graded.why}; a refusal is allowed here")
     if any(isinstance(outcome, AnsweredCollision) and outcome.dt is None for outcome in outcomes):
         return graded._replace(why=f"{graded.why}; without dt, t is graded in its place")
     return graded

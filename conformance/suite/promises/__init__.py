@@ -31,6 +31,7 @@ from conformance.suite.result import NamedVerdict
 from conformance.suite.session import Session
 
 _CHECKS: dict[str, Callable[[Session], str]] = {
+    "repeated-questions": requests.repeated_questions,
     "absent-wall": requests.absent_wall,
     "malformed-lines": requests.malformed_lines,
     "extra-fields": requests.extra_fields,

@@ -19,6 +19,7 @@ from scene.tables import Cap, Stem
 
 NEAR = 1e-6  # of sizes: far above rounding that a few steps carry along, far below an error of principle
 CARRIED = 1e-4  # of sizes: what a dozen bounces may make of rounding, far below an error of principle
+N_REPEATS = 8  # answers to one question, which are all the same
 FOREVER = sys.float_info.max  # t_end of a question that only collisions end
 STANDING: tuple[Scene, ...] = (Mushroom(r=1.0, w=0.5, h=1.0), Cap(r=1.0), Stem(w=1.0, h=1.25))
 BREATHING = Cap(r=Fourier(mean=1.0, cos=(0.1,), omega=1.0))
@@ -60,6 +61,19 @@ def question(cmd: str, scene: Scene, start: State | Sequence[State], **more: flo
     """Return a request, all but its seq; several starts are the states of a flow."""
     place = {"state" if isinstance(start, State) else "states": msgspec.to_builtins(start)}
     return {"cmd": cmd, "scene": to_data(scene), **place, **more}
+
+
+def repeated(session: Session, request: Mapping[str, Any]) -> dict[str, Any]:
+    """Ask one question N_REPEATS times, and return its answer: what differs elsewhere is not for chance then.
+
+    Raises:
+        Trouble: also fail, where the answers differ in any bit.
+    """
+    answer = session.ask(request)
+    for _ in range(N_REPEATS - 1):
+        if not is_same(other := session.ask(request), answer):
+            raise Trouble("fail", f"not deterministic: one question is answered {answer}, then {other}")
+    return answer
 
 
 def follow(session: Session, scene: Scene, state: State, n: int, t_end: float = FOREVER) -> list[Outcome]:

@@ -1,11 +1,12 @@
-"""Promises on requests: a field left out, lines that are none, fields that nobody knows."""
+"""Promises on requests: one asked again, a field left out, lines that are none, fields that nobody knows."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
 from conformance.suite.process import Trouble
-from conformance.suite.promises.questions import INSIDE, STANDING, is_same, offered, question
+from conformance.suite.promises.questions import INSIDE, STANDING, is_same, offered, question, repeated
 from conformance.suite.session import Session, missing
 from scene import Scene, to_data
 
@@ -29,7 +30,7 @@ def _one(session: Session) -> tuple[Scene, dict[str, Any], dict[str, Any]]:
     """Ask one plain question, and return its scene, the request and the answer."""
     scene = offered(session, STANDING, "step")
     request = question("step", scene, INSIDE[type(scene)], t_end=100.0)
-    answer = session.ask(request)
+    answer = repeated(session, request)
     if answer.get("outcome") == "undecided":
         raise Trouble("declined", f"undecided: {answer['reason']}")
     if answer.get("outcome") != "collision":
@@ -37,20 +38,39 @@ def _one(session: Session) -> tuple[Scene, dict[str, Any], dict[str, Any]]:
     return scene, request, answer
 
 
-def absent_wall(session: Session) -> str:
-    """A state without `wall` is one whose wall is null, in every command."""
+def repeated_questions(session: Session) -> str:
+    """A question asked again has the same answer, to the bit, in every command."""
+    told = {cmd: repeated(session, request) for cmd, request, _ in _with_and_without_wall(session)}
+    return f"the answer is the same: {', '.join(told)}"
+
+
+def _with_and_without_wall(session: Session) -> Iterator[tuple[str, dict[str, Any], dict[str, Any]]]:
+    """Return what is offered of each command's questions about one state, with its wall null and without."""
     scene, request, _ = _one(session)
     assert session.introduction is not None
     more: dict[str, dict[str, Any]] = {"step": {}, "trajectory": {"collisions": 3}, "flow": {}}
-    offering = [cmd for cmd in more if not missing(session.introduction, cmd, to_data(scene))]
     state = request.pop("state")
     nameless = {name: value for name, value in state.items() if name != "wall"}
-    for cmd in offering:
-        told, bare = (
-            {**request, "cmd": cmd, **more[cmd], **({"states": [one]} if cmd == "flow" else {"state": one})}
-            for one in (state, nameless)
-        )
-        answer, without = session.ask(told), session.ask(bare)
+    for cmd in more:
+        if not missing(session.introduction, cmd, to_data(scene)):
+            told, bare = (
+                {
+                    **request,
+                    "cmd": cmd,
+                    **more[cmd],
+                    **({"states": [one]} if cmd == "flow" else {"state": one}),
+                }
+                for one in (state, nameless)
+            )
+            yield cmd, told, bare
+
+
+def absent_wall(session: Session) -> str:
+    """A state without `wall` is one whose wall is null, in every command."""
+    offering = []
+    for cmd, told, bare in _with_and_without_wall(session):
+        offering.append(cmd)
+        answer, without = repeated(session, told), session.ask(bare)
         if not is_same(without, answer):
             raise Trouble("fail", f"{cmd}: without wall {without}, with null {answer}")
     return f"the answer is the same: {', '.join(offering)}"

@@ -31,6 +31,7 @@ from conformance.suite.promises.questions import (
     is_same_stay,
     offered,
     question,
+    repeated,
 )
 from conformance.suite.session import MAX_SEQ, Session
 from scene import Collision, Horizon, Mushroom, Rejected, Scene, State, Stem, Undecided, Wall
@@ -50,6 +51,7 @@ def spelling(session: Session) -> str:
     """A question means the same however its JSON is written."""
     scene = offered(session, MOVING, "step")
     request = question("step", scene, INSIDE[type(scene)], t_end=100.0)
+    repeated(session, request)
     draw = random.Random(len(request))
     answers = []
     for write in (json.dumps, *SPELLINGS.values()):

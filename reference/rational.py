@@ -116,7 +116,7 @@ def _is_zero_sum(factors: dict[Fraction, Fraction]) -> bool:
     return not any(sums)
 
 
-class Jet(NamedTuple):
+class ExactJet(NamedTuple):
     """Value, first and second derivative."""
 
     f: ExactNumber
@@ -124,7 +124,7 @@ class Jet(NamedTuple):
     d2: ExactNumber
 
 
-def law_jet(law: Law, time: Fraction) -> Jet:
+def law_jet(law: Law, time: Fraction) -> ExactJet:
     """Return a law and its derivatives just after `time`."""
     piece = piece_at(law, time)
     if isinstance(piece, Quadratic):
@@ -148,26 +148,26 @@ def law_jet(law: Law, time: Fraction) -> Jet:
             waves = ((Wave(0, k * angle, order - turn, is_part), Fraction(c)) for turn, c in ((0, a), (1, b)))
             totals[order] += factor * _collected(waves)
             factor *= frequency * exact(k)
-    return Jet(*totals)
+    return ExactJet(*totals)
 
 
-def _rational_jet(f: Fraction, d1: Fraction = Fraction(0), d2: Fraction = Fraction(0)) -> Jet:
-    return Jet(exact(f), exact(d1), exact(d2))
+def _rational_jet(f: Fraction, d1: Fraction = Fraction(0), d2: Fraction = Fraction(0)) -> ExactJet:
+    return ExactJet(exact(f), exact(d1), exact(d2))
 
 
-def _product(p: Jet, q: Jet) -> Jet:
-    return Jet(p.f * q.f, p.d1 * q.f + p.f * q.d1, p.d2 * q.f + exact(2) * p.d1 * q.d1 + p.f * q.d2)
+def _product(p: ExactJet, q: ExactJet) -> ExactJet:
+    return ExactJet(p.f * q.f, p.d1 * q.f + p.f * q.d1, p.d2 * q.f + exact(2) * p.d1 * q.d1 + p.f * q.d2)
 
 
-def _sum(*jets: Jet) -> Jet:
-    return Jet(*(sum(parts, exact(0)) for parts in zip(*jets, strict=True)))
+def _sum(*jets: ExactJet) -> ExactJet:
+    return ExactJet(*(sum(parts, exact(0)) for parts in zip(*jets, strict=True)))
 
 
-def _negative(jet: Jet) -> Jet:
-    return Jet(-jet.f, -jet.d1, -jet.d2)
+def _negative(jet: ExactJet) -> ExactJet:
+    return ExactJet(-jet.f, -jet.d1, -jet.d2)
 
 
-def wall_jet(scene: Scene, state: State, wall: Wall, s: Fraction) -> Jet:
+def wall_jet(scene: Scene, state: State, wall: Wall, s: Fraction) -> ExactJet:
     """Return f, f', f'' of a wall at flight time s, exactly."""
     vx, vy = Fraction(state.vx), Fraction(state.vy)
     time = Fraction(state.t) + s

@@ -187,6 +187,19 @@ def test_a_chaotic_orbit_stretches_and_an_island_does_not():
         lyapunov.stretching(whispering(n=31))
 
 
+@pytest.mark.parametrize(
+    ("outcome", "words"),
+    [
+        (scenes.Undecided("more than 50000 evaluations"), "the reference is undecided, more than 50000"),
+        (scenes.Undefined("corner"), "is not what the reference proves"),
+    ],
+)
+def test_an_exponent_says_whose_doubt_it_is(monkeypatch, moving, outcome, words):
+    monkeypatch.setattr(reference, "next_collision", lambda *_, **__: outcome)
+    with pytest.raises(scenes.BadInput, match=f"^collision 1 of the orbit: .*{words}"):
+        lyapunov.jacobians(moving[0])
+
+
 def test_an_orbit_is_written_and_read_again(tmp_path, moving):
     orbit = moving[0]
     orbit.write(tmp_path / "orbit.csv")

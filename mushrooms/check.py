@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 import shlex
+import sys
+import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -19,12 +21,16 @@ from scene.files import write_file
 from scene.refusal import BadInput
 
 if TYPE_CHECKING:
+    from rich.progress import Progress
+
     from conformance.suite.result import Run
 
 LONGEST = 7 * 86_400  # seconds
+EVERY = 10.0  # seconds between lines where there is no terminal
 MAX_SHOWN = 20  # objections on the terminal; all are in the reports
 MAX_TAUGHT = 5  # of them with what was given and what is certified, or with what was sent
-MAX_SENT = 500  # characters of that
+MAX_SENT = 500  # characters of that, and of a line of standard error
+MAX_ERRORS = 6  # lines of that
 COLOURS = {"pass": "green", "declined": "yellow", "unsupported": "yellow"}
 
 
@@ -37,9 +43,14 @@ def check(
         float | None, typer.Option(help="Seconds for the whole run; no limit by default.")
     ] = None,
     restarts: Annotated[int, typer.Option(help="Fresh processes after the first, 0 to 1000.")] = 10,
-    groups: Annotated[str, typer.Option(help="Groups of vectors, with commas; all by default.")] = "",
+    groups: Annotated[
+        str, typer.Option(help="Groups of cases, with commas, and no others; all by default.")
+    ] = "",
     known_failures: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Ids that must fail, one a line; strict both ways.")
+        Path | None,
+        typer.Option(
+            metavar="FILE", help="What must fail: ID, ID@SEED, drawn/*, fresh/*, declined/GROUP, one a line."
+        ),
     ] = None,
     json_file: Annotated[Path | None, typer.Option("--json", metavar="FILE", help="JSON report.")] = None,
     junit: Annotated[Path | None, typer.Option(metavar="FILE", help="JUnit XML report.")] = None,
@@ -70,7 +81,6 @@ def check(
         raise BadInput(f"--groups = {groups!r}, must name a group; all are asked without it")
     known = suite.read_known(known_failures) if known_failures else frozenset()
     with progress_bar() as bar:
-        task = bar.add_task("cases", total=None)
         run = suite.check(
             command,
             level=level,
@@ -78,12 +88,26 @@ def check(
             groups=[name.strip() for name in groups.split(",") if name.strip()],
             limits=Limits(timeout, restarts, total),
             known=known,
-            progress=lambda n_done, n_total: bar.update(task, completed=n_done, total=n_total),
+            progress=_teller(bar),
         )
     for path, _, content in files:
         write_file(path, content(run))
     show(run)
     raise typer.Exit(run.exit_code())
+
+
+def _teller(bar: Progress) -> Callable[[int, int], None]:
+    """Return what moves a bar on a terminal, and elsewhere writes a line on stderr now and then."""
+    task, told = bar.add_task("cases", total=None), time.monotonic()
+
+    def tell(n_done: int, n_total: int) -> None:
+        nonlocal told
+        bar.update(task, completed=n_done, total=n_total)
+        if bar.disable and time.monotonic() - told > EVERY:
+            told = time.monotonic()
+            print(f"{n_done} of {n_total} cases", file=sys.stderr, flush=True)
+
+    return tell
 
 
 def _writers() -> tuple[tuple[str, Callable[[Run], bytes | str]], ...]:
@@ -136,11 +160,16 @@ def show(run: Run) -> None:
 
 def _show_objections(console: Console, run: Run) -> None:
     """Print why the run does not succeed: what was given beside what is certified, and what fails alike."""
-    objections = run.objections()
+    objections, stderr = run.objections(), run.stderr.split("\n")
     for line in objections[:MAX_SHOWN]:
         console.print(f"[red]{escape(line)}[/]")
     if len(objections) > MAX_SHOWN:
         console.print(f"... and {len(objections) - MAX_SHOWN} more: --json FILE has them all.")
+    broken = [r for r in run.results if not r.is_right and (r.verdict == "crashed" or r.group == "protocol")]
+    if broken and any(stderr):
+        console.print("Its standard error ends:")
+        for line in [line for line in stderr if line.strip()][-MAX_ERRORS:]:
+            console.print(f"  {escape(line[:MAX_SENT])}")
     for result in [r for r in run.results if r.expected and not r.is_known and not r.is_right][:MAX_TAUGHT]:
         again = f"mushrooms ask {result.id} --seed {run.seed}"
         console.print(f"{result.id}, asked {escape(result.asked)}; {again} prints it")

@@ -151,7 +151,7 @@ def test_all_that_is_drawn_follows_from_the_seed(corpus):
 @pytest.mark.parametrize("otherwise", deep_but(["undecided", "last"], "last"))
 def test_a_replayer_is_not_accepted(seed, otherwise):
     """One who knows every answer, and one who knows the run's seed beside."""
-    run = suite.check(replayer.command(seed, otherwise, GROUPS), seed=9, groups=GROUPS)
+    run = suite.check(replayer.command(seed, otherwise, GROUPS), seed=9, groups=[*GROUPS, "property"])
     known = [r.verdict for r in run.results if r.group in GROUPS]
     assert known.count("pass") == (len(known) if seed else 0)
     assert run.exit_code() == 1
@@ -160,7 +160,7 @@ def test_a_replayer_is_not_accepted(seed, otherwise):
 
 def test_a_replayer_would_pass_without_disguise(monkeypatch):
     monkeypatch.setattr("conformance.suite.run.drawn_disguise", lambda *_: Disguise())
-    run = suite.check(replayer.command(None, "undecided", GROUPS), seed=9, groups=GROUPS)
+    run = suite.check(replayer.command(None, "undecided", GROUPS), seed=9, groups=[*GROUPS, "drawn"])
     assert {r.verdict for r in run.results if r.group in GROUPS} == {"pass"}
     assert run.exit_code() == 1  # but not what no file holds
     assert run.counts("drawn")["declined"] == disguise.N_DRAWN

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import pytest
 from support.depth import deep_among
-from support.forgetful import FORGETFUL
+from support.forgetful import FORGETFUL, last_bit_varies
 from support.leaks import LEAKS, NO_LEAKS
 from support.lenient import LENIENT
-from support.promise_breakers import FAULTS, Breaker, bisecting, last_bit_varies, remembering_steps
+from support.promise_breakers import FAULTS, Breaker, bisecting, remembering_steps
 
 import reference
 from conformance import vectors

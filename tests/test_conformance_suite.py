@@ -11,7 +11,6 @@ import msgspec
 import pytest
 from msgspec.structs import replace
 from support.promise_breakers import FAULTS, Breaker, ns
-from support.saboteurs import command
 from support.schemas import validator
 from test_conformance_session import made_up
 
@@ -30,7 +29,12 @@ from scene.refusal import BadInput
 INTRODUCTION = Introduction(1, "made-up", "1", "C", ("step", "flow"), ("cap", "mushroom"), ("constant",))
 
 
-def made(*verdicts: str, known: tuple[int, ...] = (), **more) -> Run:
+CHECKS = ("property", "profile", "promise")
+
+
+def made(
+    *verdicts: str, known: tuple[int, ...] = (), known_names: frozenset[str] = frozenset(), **more
+) -> Run:
     results = [
         Result(
             f"made-up/{i}",
@@ -61,6 +65,7 @@ def made(*verdicts: str, known: tuple[int, ...] = (), **more) -> Run:
         "seconds": 1.5,
         "graded": {"tables": ["cap"], "laws": ["constant"], "profiles": ["step"], "not_graded": ["flow"]},
         "diagnosis": [],
+        "known": known_names,
     }
     return Run(**fields | more)
 
@@ -124,44 +129,23 @@ def test_at_level_stress_a_group_may_be_declined_but_not_all_that_is_asked():
     assert "in group a" in of(*easy[:4], *[("a", "declined")] * 3, *[("b", "pass")] * 90).objections()[0]
 
 
-@pytest.mark.parametrize(
-    ("text", "word"),
-    [
-        ("breathing-circle/1\nno-such/1", ":2: no-such/1"),
-        ("property/no-such", "no case"),
-        ("fresh/265", "no case"),
-        ("grazing/1\ngrazing/1 # again", "twice"),
-    ],
-)
-def test_a_known_failures_file_is_checked(tmp_path, text, word):
-    path = tmp_path / "known.txt"
-    path.write_text(text)
-    with pytest.raises(BadInput, match=word):
-        suite.read_known(path)
+def test_what_was_not_asked_is_told_in_a_line():
+    why = "not asked: restarted 10 times; --restarts allows more"
+    run = made("pass", "crashed", *["error"] * 591)
+    results = [replace(r, why=why) if r.verdict == "error" else r for r in run.results]
+    assert made(results=results).objections() == [
+        "made-up/1: crashed: because & <why>",
+        f"made-up/2 and 590 others: error: {why}",
+    ]
 
 
-@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig"])
-def test_known_failures_are_read(tmp_path, encoding):
-    path = tmp_path / "known.txt"
-    path.write_text(
-        "# ours\n\nbreathing-circle/1   # issue 7\nproperty/mirror\nfresh/2\ndrawn/60\n", encoding
-    )
-    assert suite.read_known(path) == {"breathing-circle/1", "property/mirror", "fresh/2", "drawn/60"}
-    with pytest.raises(BadInput, match="cannot be read"):
-        suite.read_known(tmp_path / "absent.txt")
-
-
-def test_known_failures_are_marked_in_a_run(monkeypatch):
-    monkeypatch.setattr(suite, "choose", lambda *_: [made_up(0), made_up(1)])
-    monkeypatch.setattr(suite, "drawn_disguise", lambda *_: disguise.Disguise())  # it knows one answer
-    monkeypatch.setattr(suite, "N_STATES", 0)
-    monkeypatch.setattr(suite, "drawn_horizons", lambda *_: [])
-    monkeypatch.setattr(suite, "fresh", lambda *_: [])
-    monkeypatch.setattr(promises, "ask_promises", lambda _: iter(()))
-    assert suite.check(command("crash-at-second")).exit_code() == 1
-    fixed = frozenset({"made-up/0", "made-up/1", "protocol/stop"})
-    run = suite.check(command("crash-at-second"), known=fixed)
-    assert run.objections() == ["made-up/0: passes, though it is listed as a known failure"]
+@pytest.mark.parametrize("groups", [["static-cap"], ["promise"], ["drawn", "static-stem"]])
+def test_what_is_asked_by_name_is_asked_alone(monkeypatch, groups):
+    monkeypatch.setattr(session, "Process", lambda *_: Breaker(lambda request, answer: answer(request)))
+    monkeypatch.setattr(promises, "PROMISES", ("spelling",))
+    run = suite.check(["in-process"], groups=groups, seed=1)
+    assert set(run.groups()) == {"protocol", *groups}
+    assert (run.exit_code(), run.speed) == (0 if "promise" not in groups else 1, None)  # nothing was graded
 
 
 def test_what_is_not_offered_is_not_asked():
@@ -251,7 +235,7 @@ def test_the_cases_beside_the_vectors_are_all_listed(monkeypatch):
     """What a run of an implementation that offers everything contains, and no more."""
     monkeypatch.setattr(property_checks, "SIZES", {"core": property_checks.Size(20, 50.0, 0.5)})
     monkeypatch.setattr(suite, "N_STATES", 2)
-    run = suite.check([sys.executable, "-m", "conformance.plain"], groups=["static-cap"], seed=1)
+    run = suite.check([sys.executable, "-m", "conformance.plain"], groups=["static-cap", *CHECKS], seed=1)
     others = {result.id for result in run.results if not result.level}
     assert others == set(suite.OTHER_CASES)
     assert run.exit_code() == 0

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import json
+import math
 import re
 import subprocess
 import sys
@@ -23,6 +24,7 @@ from conformance.suite import property_checks, pytest_suite
 from conformance.suite import run as suite
 from conformance.suite.disguise import Disguise
 from conformance.suite.session import Session
+from mushrooms import check
 
 PYTHON = [sys.executable, str(Path(conformance.__file__).parent / "harness" / "python" / "stepper.py")]
 
@@ -39,6 +41,7 @@ def _few(monkeypatch):
     monkeypatch.setattr(property_checks, "SIZES", {"core": property_checks.Size(20, 50.0, 0.5)})
     monkeypatch.setattr(property_checks, "BATCH", 20)
     monkeypatch.setattr(suite, "TIMED_LEAST", 100_000)
+    monkeypatch.setattr(check, "EVERY", math.inf)
 
 
 @pytest.fixture
@@ -131,6 +134,24 @@ def test_reports_of_broken_sessions_are_written_too(call, tmp_path, name):
     assert code == 1
     assert "not accepted" in out
     assert len(list(tmp_path.iterdir())) == 3
+
+
+def test_who_cannot_start_is_told_by_its_own_last_words_and_in_few_lines(call, tmp_path):
+    script = tmp_path / "broken.py"
+    script.write_text("import sys\nprint('[red]a line before', file=sys.stderr)\nimport no_such_module\n")
+    code, out, _ = call("--", sys.executable, script)
+    assert code == 1
+    assert "Its standard error ends:\n  [red]a line before\n" in out
+    assert "\n  ModuleNotFoundError: No module named 'no_such_module'\n" in out
+    assert out.count("not asked: start failed") == 1
+
+
+def test_a_piped_run_tells_on_stderr_how_far_it_is(call, monkeypatch):
+    monkeypatch.setattr(check, "EVERY", 0.0)
+    _, _, err = call("--groups", "static-stem", "--", *command("honest"))
+    lines = err.splitlines()
+    assert len(lines) > 5
+    assert all(re.fullmatch(r"\d+ of \d+ cases", line) for line in lines)
 
 
 def test_markup_in_what_it_says_is_text(call, tmp_path):

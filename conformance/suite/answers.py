@@ -8,6 +8,7 @@ protocol does not name is `wrong-format`, with the field. Whether an answer is r
 from __future__ import annotations
 
 import json
+import re
 import struct
 from collections.abc import Mapping, Sequence
 from typing import Any, get_args
@@ -66,7 +67,7 @@ def read_introduction(line: bytes) -> Introduction:
     try:
         introduction: Introduction = _decoded(_checked(line), _introductions)
     except UNREADABLE as error:
-        raise Trouble("wrong-format", f"start: {_reason(error)} in {shown(line)}") from None
+        raise _unreadable("start", error, line) from None
     if introduction.protocol != PROTOCOL:
         raise Trouble("wrong-format", f"start: it speaks protocol {introduction.protocol}, not {PROTOCOL}")
     texts = {name: clean(getattr(introduction, name)) for name in ("name", "version", "language")}
@@ -84,7 +85,7 @@ def check_echo(values: Sequence[float], line: bytes) -> None:
     try:
         echoed: Sequence[float] = _decoded(_checked(line), _echoes).values
     except UNREADABLE as error:
-        raise Trouble("wrong-format", f"echo: {_reason(error)} in {shown(line)}") from None
+        raise _unreadable("echo", error, line) from None
     if len(echoed) != len(values):
         raise Trouble("wrong-format", f"echo: {len(echoed)} numbers came back of {len(values)}")
     for i, (sent, came) in enumerate(zip(values, echoed, strict=True)):
@@ -120,7 +121,7 @@ def read_answer(line: bytes, cmd: str, seq: int | None, *, may_be_null: bool = F
         decoder = _failures if envelope.error is not None else own
         data: dict[str, Any] = msgspec.to_builtins(_decoded(read, decoder))
     except UNREADABLE as error:
-        raise Trouble("wrong-format", f"{cmd}: {_reason(error)} in {shown(line)}") from None
+        raise _unreadable(cmd, error, line) from None
     data.pop("seq", None)
     for part in (data, *data.get("steps", ()), *data.get("states", ())):
         part.update({name: clean(part[name]) for name in ("reason", "error") if name in part})
@@ -213,5 +214,14 @@ def _whole(value: Any) -> Any:
     return int(value) if isinstance(value, float) and value.is_integer() else value
 
 
-def _reason(error: Exception) -> str:
-    return clean(str(error)).replace("$.", "")[:200]
+def _unreadable(cmd: str, error: Exception, line: bytes) -> Trouble:
+    """Say what is wrong with a line, and show it from its beginning, or where it is no JSON."""
+    try:
+        msgspec.json.decode(line)
+    except msgspec.DecodeError as malformed:
+        error = malformed  # with the place in the line as it came
+    except UNREADABLE:
+        pass
+    place = re.search(r"\(byte (\d+)\)$", str(error))
+    excerpt = shown(line, at=int(place[1]) if place else 0)
+    return Trouble("wrong-format", f"{cmd}: {clean(str(error)).replace('$.', '')[:200]} in {excerpt}")

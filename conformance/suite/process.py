@@ -126,7 +126,8 @@ class Process:
             left = deadline - time.monotonic()
             if left <= 0:
                 begun = f", after {shown(self._received)}" if self._received else ""
-                raise Trouble("timed-out", f"no answer within {timeout:g} s{begun}")
+                why = f"no answer within {timeout:g} s{begun}; is each line flushed? --timeout allows more"
+                raise Trouble("timed-out", why)
             if not self._is_open or (self._has_exited() and not self._is_readable()):
                 raise Trouble("crashed", self._ending())
             pending = self._advance(pending, min(left, POLL))
@@ -254,7 +255,8 @@ def escaped(text: str, kept: str = "") -> str:
     )
 
 
-def shown(data: bytes | bytearray, n: int = 60) -> str:
-    """Return the beginning of what was received, readable on one line."""
-    text = bytes(data[:n]).decode("utf-8", "backslashreplace")
-    return repr(text) + ("..." if len(data) > n else "")
+def shown(data: bytes | bytearray, n: int = 60, at: int = 0) -> str:
+    """Return n bytes of what was received, the beginning or those around a place, readable on one line."""
+    begin = max(0, at - n // 2)
+    text = bytes(data[begin : begin + n]).decode("utf-8", "backslashreplace")
+    return "..." * (begin > 0) + repr(text) + "..." * (len(data) > begin + n)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 import msgspec
@@ -21,6 +21,7 @@ BAD = ("fail", "crashed", "timed-out", "wrong-format", "error")
 VERDICTS = ("pass", "fail", "indeterminate", "declined", "unsupported", *BAD[1:])
 # An implementation that declines more has not been graded: of all questions, and of those of one group.
 MAX_DECLINED, MAX_DECLINED_OF_GROUP = 0.05, 0.25
+NOT_KNOWN = "though it is listed as a known failure"
 NamedVerdict = tuple[str, str, str, float]  # a case's name, verdict, why, seconds
 
 
@@ -89,6 +90,7 @@ class Run(msgspec.Struct, frozen=True):
         seed: all that is drawn follows from it, so that a run can be repeated.
         graded: tables, laws, profiles of vectors that passed, and what no vector graded (`suite.scope`).
         diagnosis: of the failures, by the mutants that fail alike; empty without any.
+        known: the names of the known-failures file, of which some are no cases: declined/GROUP.
     """
 
     command: list[str]
@@ -105,6 +107,7 @@ class Run(msgspec.Struct, frozen=True):
     seconds: float
     graded: dict[str, list[str]]
     diagnosis: list[str]
+    known: frozenset[str] = frozenset()
 
     def counts(self, group: str | None = None) -> Counter[str]:
         """Count the verdicts, of one group or of all."""
@@ -131,21 +134,34 @@ class Run(msgspec.Struct, frozen=True):
 
     def objections(self) -> list[str]:
         """Say, one line each, why the run does not succeed."""
-        found = [_objection(result) for result in self.results if not result.is_right]
-        found += self._declined_too_often()
+        wrong: dict[str, list[Result]] = {}
+        for result in self.results:
+            if not result.is_right:
+                # What was never asked has one reason, and one line.
+                is_unasked = result.why.startswith("not asked") and not result.is_known
+                wrong.setdefault(result.why if is_unasked else result.id, []).append(result)
+        found = [_objection(*results) for results in wrong.values()]
+        declined = self._declined_too_often()
+        found += [line for name, line in declined.items() if name not in self.known]
+        listed = {f"declined/{name}" for name in ("all", *self.groups())} & self.known
+        found += [f"{name}: less is declined, {NOT_KNOWN}" for name in sorted(listed - set(declined))]
         vectors_passed = any(r.verdict == "pass" and r.level for r in self.results)
         return found if vectors_passed or found else ["no vector passed: nothing was graded"]
 
-    def _declined_too_often(self) -> Iterator[str]:
-        """Say where too much was declined for the rest to speak for it: of everything, and of a group.
+    def _declined_too_often(self) -> dict[str, str]:
+        """Say where too much was declined for the rest to speak for it: by declined/all and declined/GROUP.
 
         What is at level stress may be declined in any group, as binary64 cannot tell; it counts in all.
         """
+        found = {}
         for group, most in ((None, MAX_DECLINED), *((name, MAX_DECLINED_OF_GROUP) for name in self.groups())):
             declined, asked = self.declined(group)
             if declined > max(most * asked, 1 if group else 0):
                 of = f"in group {group}" if group else "cases"
-                yield f"declined {declined} of {asked} {of}, more than {most:.0%}"
+                found[f"declined/{group or 'all'}"] = (
+                    f"declined {declined} of {asked} {of}, more than {most:.0%}"
+                )
+        return found
 
     def declined(self, group: str | None = None) -> tuple[int, int]:
         """Count the questions declined and those asked: of all, or of a group's below level stress.
@@ -177,7 +193,8 @@ class Run(msgspec.Struct, frozen=True):
         return 2 if self.counts()["indeterminate"] else 0
 
 
-def _objection(result: Result) -> str:
+def _objection(result: Result, *others: Result) -> str:
     if result.is_known:
-        return f"{result.id}: passes, though it is listed as a known failure"
-    return f"{result.id}: {result.verdict}: {result.why}"
+        return f"{result.id}: passes, {NOT_KNOWN}"
+    on = f" and {len(others)} others" if others else ""
+    return f"{result.id}{on}: {result.verdict}: {result.why}"

@@ -42,7 +42,7 @@ from conformance.suite.disguise import (
 )
 from conformance.suite.process import NOT_NUMBERS, Trouble
 from conformance.suite.promises import timing
-from conformance.suite.result import Result, Run, Speed, outcomes_of
+from conformance.suite.result import BAD, Result, Run, Speed, outcomes_of
 from conformance.suite.scope import graded_parts
 from conformance.suite.session import Limits, Session, missing
 from conformance.vectors import Vector
@@ -58,6 +58,7 @@ TIMED_SCENE, TIMED_STATE = "moving-cap", State(0.0, 0.1, 0.2, 300.0, 400.0)
 TIMED_MOST = 2.0  # seconds, after which no longer trajectory is asked
 TIMED_REPEATS, TIMED_LEAST = 5, 20_000_000  # timings; nanoseconds that each must last to be read from a clock
 PROTOCOL_CASES = ("start", "echo", "rejects", "stop")
+OTHER_GROUPS = (DRAWN, FRESH, "property", "profile", "promise")
 OTHER_CASES = (
     *(f"protocol/{name}" for name in PROTOCOL_CASES),
     *(f"property/{name}" for name in properties.PROPERTIES),
@@ -83,9 +84,9 @@ def check(
         command: program and arguments; it speaks protocol 1.
         level: core, extended or stress.
         seed: of all that is drawn, 0 to 2^64 - 1; None for a new one.
-        groups: of vectors; all when empty.
+        groups: of cases; all when empty. Of the others only the protocol's own cases are asked.
         limits: time and restarts.
-        known: ids of the cases that are known to fail.
+        known: what is known to fail, as `read_known` returns it.
         progress: called with the number of cases done and their total, as far as it is known.
 
     Raises:
@@ -99,9 +100,8 @@ def check(
     begin = time.monotonic()
     with Session(command, limits) as session:
         tell = progress or (lambda _done, _total: None)
-        n_fresh = 0 if groups else N_FRESH[level]
-        results, speed = _converse(session, chosen, n_fresh, (level, seed), tell)
-        results = [msgspec.structs.replace(result, is_known=result.id in known) for result in results]
+        results, speed = _converse(session, chosen, groups or None, (level, seed), tell)
+        results = [msgspec.structs.replace(r, is_known=_is_known(r, known, seed)) for r in results]
         passed = {result.id for result in results if result.verdict == "pass"}
         return Run(
             command=list(command),
@@ -118,6 +118,7 @@ def check(
             seconds=time.monotonic() - begin,
             graded=graded_parts([v for v in chosen if v.id in passed], is_timed=speed is not None),
             diagnosis=diagnose(results),
+            known=known,
         )
 
 
@@ -130,61 +131,81 @@ def choose(level: str, groups: Sequence[str] = ()) -> list[Vector]:
     found = vectors.load(level)
     names = list(dict.fromkeys(vector.group for vector in found))
     for group in groups:
-        if group not in names:
-            raise BadInput(f"group = {group!r}, must be one of {', '.join(names)}")
+        if group not in (*names, *OTHER_GROUPS):
+            raise BadInput(f"group = {group!r}, must be one of {', '.join((*names, *OTHER_GROUPS))}")
     return [vector for vector in found if not groups or vector.group in groups]
 
 
 def read_known(path: Path) -> frozenset[str]:
-    """Read a known-failures file: one id a line, # begins a comment; what is drawn is of one seed's run.
+    """Read a known-failures file: one name a line, # begins a comment.
+
+    A name is a case's id; ID@SEED for the run of one seed, which a drawn question needs; drawn/* or fresh/*
+    for all of these, which may pass; declined/GROUP or declined/all where too much is declined.
 
     Raises:
-        BadInput: naming the line whose id the suite does not have, or that comes twice.
+        BadInput: naming the line whose name the suite does not have, or that comes twice.
     """
     try:
         lines = path.read_text("utf-8-sig").splitlines()
     except (OSError, UnicodeDecodeError) as error:
         raise BadInput(f"known failures {str(path)!r} cannot be read: {error}") from None
-    ids = {vector.id for vector in vectors.load("stress")} | set(OTHER_CASES)
-    for group, n in ((DRAWN, N_DRAWN), (FRESH, max(N_FRESH.values()))):
-        ids |= {f"{group}/{number}" for number in range(1, n + 1)}
+    corpus = vectors.load("stress")
+    names = {vector.id for vector in corpus} | set(OTHER_CASES) | {f"{DRAWN}/*", f"{FRESH}/*"}
+    names |= {f"declined/{group}" for group in ("all", *OTHER_GROUPS, *(v.group for v in corpus))}
+    numbers = {DRAWN: N_DRAWN, FRESH: max(N_FRESH.values())}
+    drawn = {f"{group}/{number}" for group, n in numbers.items() for number in range(1, n + 1)}
     found: set[str] = set()
     for number, line in enumerate(lines, 1):
         name = line.partition("#")[0].strip()
         if not name:
             continue
-        if name in found or name not in ids:
+        case, _, seed = name.partition("@")
+        is_listed = case in names | drawn and seed.isdecimal() if "@" in name else name in names
+        if name in found or not is_listed:
             problem = "comes twice" if name in found else "is no case of this suite"
+            if name in drawn:
+                problem = f"is of one run's questions: {name}@SEED lists it, {name.partition('/')[0]}/* all"
             raise BadInput(f"known failures {str(path)!r}:{number}: {name} {problem}")
         found.add(name)
     return frozenset(found)
 
 
+def _is_known(result: Result, known: frozenset[str], seed: int) -> bool:
+    """Tell whether a case must fail, or, where all that is drawn is listed, is one that did."""
+    is_listed = not known.isdisjoint((result.id, f"{result.id}@{seed}"))
+    return is_listed or (result.verdict in BAD and f"{result.group}/*" in known)
+
+
 def _converse(
     session: Session,
     chosen: Sequence[Vector],
-    n_fresh: int,
+    groups: Sequence[str] | None,
     run: tuple[str, int],
     progress: Progress,
 ) -> tuple[list[Result], Speed | None]:
     results: list[Result] = []
     level, seed = run
+    further = OTHER_GROUPS if groups is None else groups
+    # The same questions as in a run of everything.
+    source = chosen if groups is None else vectors.load(level)
     for name, act in (("start", session.start), ("echo", session.probe)):
         results.append(_closed(session, _tried(name, act)))
         if results[-1].verdict != "pass":
             unreached = Trouble(results[-1].verdict, f"not asked: {name} failed")
             return [*results, *(_result(vector, unreached) for vector in chosen)], None
     results.append(_closed(session, _tried("rejects", partial(_ask_nonsense, session))))
-    known = [*chosen, *drawn_horizons([v for v in chosen if v.level == "core"], seed)]
-    questions = itertools.chain(known, fresh(seed, n_fresh))
-    total = len(results) + len(known) + n_fresh + len(OTHER_CASES) - len(PROTOCOL_CASES)
+    n_fresh = N_FRESH[level] if FRESH in further else 0
+    drawn = drawn_horizons([v for v in source if v.level == "core"], seed) if DRAWN in further else []
+    questions = itertools.chain(chosen, drawn, fresh(seed, n_fresh))
+    n_others = sum(name.partition("/")[0] in further for name in OTHER_CASES)
+    total = len(results) + len(chosen) + len(drawn) + n_fresh + n_others
     for result in itertools.chain(
         (ask_vector(session, vector, drawn_disguise(vector, seed)) for vector in questions),
-        _ask_further(session, chosen, level, seed),
+        _ask_further(session, source, further, run),
     ):
         results.append(_closed(session, result))
         progress(len(results), total)
-    speed = measure_speed(session)
+    speed = measure_speed(session) if groups is None else None
     return [*results, _closed(session, _tried("stop", session.stop))], speed
 
 
@@ -288,15 +309,20 @@ def _ask_nonsense(session: Session) -> None:
         raise Trouble("fail", f"a state without vy was answered {answer}"[:200])
 
 
-def _ask_further(session: Session, chosen: Sequence[Vector], level: str, seed: int) -> Iterator[Result]:
+def _ask_further(
+    session: Session, source: Sequence[Vector], groups: Sequence[str], run: tuple[str, int]
+) -> Iterator[Result]:
     assert session.introduction is not None
-    questions = drawn_states(_steps_to_draw_from(session.introduction, chosen), seed, N_STATES)
-    for name, verdict, why, seconds in property_checks.ask_properties(session, questions):
-        yield Result(f"property/{name}", "property", verdict, why, seconds)
-    for name, verdict, why, seconds in property_checks.ask_profiles(session, level, seed):
-        yield Result(f"profile/{name}", "profile", verdict, why, seconds)
-    for name, verdict, why, seconds in promises.ask_promises(session):
-        yield Result(f"promise/{name}", "promise", verdict, why, seconds)
+    level, seed = run
+    questions = drawn_states(_steps_to_draw_from(session.introduction, source), seed, N_STATES)
+    further = {
+        "property": property_checks.ask_properties(session, questions),
+        "profile": property_checks.ask_profiles(session, level, seed),
+        "promise": promises.ask_promises(session),
+    }
+    for group, named in further.items():
+        for name, verdict, why, seconds in named if group in groups else ():
+            yield Result(f"{group}/{name}", group, verdict, why, seconds)
 
 
 def _steps_to_draw_from(introduction: Introduction, chosen: Sequence[Vector]) -> list[Vector]:

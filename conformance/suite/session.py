@@ -193,7 +193,9 @@ class Session:
 
     def _restart(self) -> None:
         if self.n_restarts >= self._limits.restarts:
-            self._give_up(Trouble("error", f"not asked: restarted {self.n_restarts} times already"))
+            self._give_up(
+                Trouble("error", f"not asked: restarted {self.n_restarts} times; --restarts allows more")
+            )
             raise self._end  # type: ignore[misc]
         self.n_restarts += 1
         try:

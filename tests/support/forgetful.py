@@ -6,12 +6,28 @@ As in `support.promise_breakers` each breaks one promise, and is right beside th
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Callable
 from typing import Any
 
 from support.promise_breakers import Fault, Line, honest, on
 
 Key = Callable[[Any], Any]
+
+
+def last_bit_varies() -> Fault:
+    """Answer with a last bit that depends on how often one was asked, as sums in threads may."""
+    n_asked = [0]
+
+    def fault(request: Line, answer: Callable[[Line], Line]) -> Line:
+        found = answer(request)
+        n_asked[0] += 1
+        for part in (found, *found.get("steps", ()), *found.get("states", ())):
+            if "vx" in part and n_asked[0] % 3 == 0:
+                part["vx"] = math.nextafter(part["vx"], math.inf)
+        return found
+
+    return fault
 
 
 def answers_by(key: Callable[[Line], Any]) -> Fault:
@@ -135,6 +151,7 @@ def leaving_out(outcome: str) -> Fault:
 
 PLACE = "x", "y", "vx", "vy"
 FORGETFUL: dict[str, tuple[str, str, Fault]] = {
+    "last-bit-varies": ("repeated-questions", "fail", last_bit_varies()),
     "answers-without-wall": ("changed-questions", "fail", answers_by(without_wall)),
     "scenes-by-first-parts": ("changed-questions", "fail", scenes_by(first_parts)),
     "paths-by-first-parts": ("changed-questions", "fail", scenes_by(first_parts, "trajectory")),

@@ -106,21 +106,6 @@ def wrong_after_bad_lines() -> Fault:
     return fault
 
 
-def last_bit_varies() -> Fault:
-    """Answer with a last bit that depends on how often one was asked, as sums in threads may."""
-    n_asked = [0]
-
-    def fault(request: Line, answer: Callable[[Line], Line]) -> Line:
-        found = answer(request)
-        n_asked[0] += 1
-        for part in (found, *found.get("steps", ()), *found.get("states", ())):
-            if "vx" in part and n_asked[0] % 3 == 0:
-                part["vx"] = math.nextafter(part["vx"], math.inf)
-        return found
-
-    return fault
-
-
 def take_hints(request: Line, answer: Callable[[Line], Line]) -> Line:
     """Make something of a field that it does not know."""
     hint = request.get("state", {}).pop("hint", 0.0) if isinstance(request.get("state"), dict) else 0.0
@@ -354,7 +339,6 @@ def elsewhere(_: Line, found: Line) -> Line:
 
 # The promise that each breaks, the verdict on it, and the fault.
 FAULTS: dict[str, tuple[str, str, Fault]] = {
-    "last-bit-varies": ("repeated-questions", "fail", last_bit_varies()),
     "absent-is-arc": ("absent-wall", "fail", absent_is_arc),
     "crash-at-bad-lines": ("malformed-lines", "crashed", crash_at_bad_lines),
     "guess-at-bad-lines": ("malformed-lines", "fail", guess_at_bad_lines),

@@ -189,7 +189,7 @@ def test_a_session_that_never_begins(verdicts, name):
 
 # Those that keep silent; their limit is short, and there is no second process.
 SILENT = {
-    "hang": "no answer within 1.5 s; is each line flushed? --timeout allows more",
+    "hang": "no answer within 1.5 s; is each line flushed? --timeout and --total allow more",
     "late-answer": "no answer within 1.5 s",
     "ignore-sigterm": "no answer within 1.5 s",
     "half-a-line": 'after \'{"seq":',

@@ -126,8 +126,8 @@ class Process:
             left = deadline - time.monotonic()
             if left <= 0:
                 begun = f", after {shown(self._received)}" if self._received else ""
-                why = f"no answer within {timeout:g} s{begun}; is each line flushed? --timeout allows more"
-                raise Trouble("timed-out", why)
+                hint = "is each line flushed? --timeout and --total allow more"
+                raise Trouble("timed-out", f"no answer within {timeout:g} s{begun}; {hint}")
             if not self._is_open or (self._has_exited() and not self._is_readable()):
                 raise Trouble("crashed", self._ending())
             pending = self._advance(pending, min(left, POLL))

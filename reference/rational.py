@@ -91,7 +91,7 @@ def _collected(terms: Iterable[tuple[Wave, Fraction]]) -> ExactNumber:
             wave = Wave(power, min(x, Fraction(1, 2) - x))
         else:
             quarters = (quarters if x > 0 else -quarters) % 4
-            factor *= (-1) ** (quarters // 2) * (x != 0 or quarters % 2 == 0)
+            factor *= (1 - quarters // 2 * 2) * (x != 0 or quarters % 2 == 0)
             wave = Wave(power, abs(x), quarters % 2, False) if x else Wave(power)
         found[wave] = found.get(wave, Fraction(0)) + factor
     return ExactNumber({wave: factor for wave, factor in found.items() if factor})

@@ -14,7 +14,21 @@ import fast
 from fast import step as stepper
 from fast.kernel import codes
 from fast.kernel.single import REFUSED
-from scene import BadInput, Cap, Collision, Fourier, Horizon, Mushroom, Outcome, Rejected, Scene, State, load
+from fast.units import LateTime
+from scene import (
+    BadInput,
+    Cap,
+    Collision,
+    Fourier,
+    Horizon,
+    Mushroom,
+    Outcome,
+    Rejected,
+    Scene,
+    State,
+    Undecided,
+    load,
+)
 from scene.states import check_numbers
 
 NAMES = ("moving-cap", "fixed-cap-clockwise", "fermi-ulam", "frozen-mushroom", "ergodic")
@@ -40,12 +54,17 @@ def by_separate_checks(scene: Scene, state: State, t_end: float) -> Outcome:
         rows, walls = stepper.as_arrays([start])
         paths = stepper.followed_paths(start.compiled, rows, walls, 1, start.units.horizon(t_end))
         code = paths.codes.item()
+    except LateTime as error:
+        return Undecided(str(error))
+    except BadInput as error:
+        return Rejected(str(error))
+    try:
         if code in stepper.WALL_NAMES:
             return Collision(stepper.WALL_NAMES[code], *start.units.steps(paths.steps[0, 0]).tolist())
         if code == codes.HORIZON:
             return Horizon(t_end, *start.units.places(paths.ends[0, 2:]).tolist())
-    except BadInput as error:
-        return Rejected(str(error))
+    except BadInput as error:  # the answer does not fit into binary64
+        return Undecided(str(error))
     return stepper.trouble(code, scene, state)
 
 

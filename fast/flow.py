@@ -104,8 +104,10 @@ def follow_to(scene: Scene, states: Sequence[State], t_end: float, threads: int)
         stop = only_stop(units.horizon(t_end))
         done = unfilled_ends(rows[those], 1, (1, 1))
         seconds += follow(in_lanes, done, walls[those], stop, threads)
-        is_lost = ~units.keeps(np.delete(done.states, 1, axis=1))
+        low_and_stay = np.column_stack([done.states[:, 1], done.t_in[:, 0, 0], done.t_out[:, 0, 0]])
+        is_lost = ~(units.keeps(np.delete(done.states, 1, axis=1)) & units.keeps_times(low_and_stay))
         done.codes[is_lost], done.states[is_lost] = ANSWER_LOST, 0.0
+        done.t_in[is_lost], done.t_out[is_lost] = np.nan, np.nan
         times, places = units.times(done.states[:, :2]), units.places(done.states[:, 2:])
         done = done._replace(
             states=np.hstack([times, places]), t_in=units.times(done.t_in), t_out=units.times(done.t_out)

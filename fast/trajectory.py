@@ -79,8 +79,12 @@ def trajectory(scene: Scene, state: State, n_collisions: int, t_end: float = np.
     if n < n_collisions:
         # Without a horizon only what rests is never met, and it rests where it was: there is no v * infinity.
         last = steps[n - 1, 2:] if n else np.array([state.x, state.y, state.vx, state.vy])
+        if code == codes.HORIZON and np.isfinite(t_end):
+            place = paths.ends[:, 2:]
+            if start.units.keeps(place).all():
+                last = start.units.places(place[0])
+            else:
+                code = single.ANSWER_LOST
         is_horizon = code == codes.HORIZON
-        if is_horizon and np.isfinite(t_end):
-            last = start.units.places(paths.ends[0, 2:])
         outcome = Horizon(t_end, *(float(v) for v in last)) if is_horizon else trouble(code, scene, state, n)
     return Collisions(walls, steps, outcome)

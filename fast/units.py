@@ -95,6 +95,13 @@ class Units(NamedTuple):
         found: BoolArray = (back == rows).all(axis=1)
         return found
 
+    def keeps_times(self, rows: FloatArray) -> BoolArray:
+        """Tell which of N rows of times lose no bit in the scene's units; nan stands for none."""
+        with np.errstate(over="ignore", under="ignore"):
+            back = np.ldexp(np.ldexp(rows, self.time), -self.time)
+        found: BoolArray = ((back == rows) | np.isnan(rows)).all(axis=1)
+        return found
+
     def n_exact(self, rows: FloatArray) -> int:
         """Return how many of N rows of [dt, t, x, y, vx, vy] come before the first that loses a bit."""
         return int(np.append(self.keeps(rows), False).argmin())

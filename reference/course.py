@@ -9,6 +9,7 @@ what a precision leaves open is raised as `Undecidable`, and equalities are sett
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from fractions import Fraction
@@ -226,18 +227,28 @@ class Course:
     def _hits(self, walls: tuple[Wall, ...], start: Interval, limit: Interval | None) -> list[Hit]:
         """Find the walls that may be met first; each later one in the list not after those before it.
 
-        What is met at the horizon exactly is not met before it.
+        What is met at the horizon exactly is not met before it. A root whose interval holds the end
+        of a search is no answer yet: a wall asked before may be met beyond this end, and within the interval.
         """
+        hits: list[Hit] = []
+        postponed: list[Wall]
         for stop in self._stops(start, self.horizon if limit is None else limit):
-            until, hits = stop, []
-            for wall in walls:
-                hit = self._hit(wall, start, until, self._searches)
+            until, hits, postponed = stop, [], []
+            for wall in itertools.chain(walls, postponed):
+                try:
+                    hit = self._hit(wall, start, until, self._searches)
+                except Undecidable as question:
+                    # What is open may come after another wall is met. Each wall is put off once.
+                    if isinstance(question, Exhausted) or wall in postponed:
+                        raise
+                    postponed.append(wall)
+                    continue
                 if hit is not None and not self._is_at_horizon(hit):
                     hits.append(hit)
                     until = hit.time
-            if hits:
-                return hits
-        return []
+            if hits and is_below(until, stop):
+                break
+        return hits
 
     def _stops(self, start: Interval, until: Interval) -> Iterator[Interval]:
         """Yield ever later ends of a search, first a period on: what is met soon costs no more."""
@@ -305,21 +316,31 @@ class Course:
     ) -> Hit | None:
         """Find the first root of one wall's function, if it may come before the end of `until`.
 
-        A search that has begun goes on where it stopped; f > 0 is proved there.
+        A search that has begun goes on where it stopped, as f > 0 is proved there, or has found its root.
         """
         stop = self.arithmetic.upper(until)
         if wall not in searches:
-            searches[wall] = self._isolator(wall)
-            if wall not in self.leaving and sign(searches[wall].value(start)) <= 0:
+            begun = self._isolator(wall)
+            if wall not in self.leaving and sign(begun.value(start)) <= 0:
                 raise Undecidable(f"f of {wall} has no sign where a stretch of the flight begins")
+            searches[wall] = begun
         search = searches[wall]
-        reached = search.leaves[-1].end if search.leaves else start
-        # We search a little beyond the end, so that a root exactly there still lies inside the interval.
-        end = self.arithmetic.upper(stop + (stop - start) * BEYOND)
-        root = search.first_root(reached, end) if is_below(reached, end) else None
+        root = search.root  # known where it lies beyond the end of the search before
+        if root is None:
+            reached = search.leaves[-1].end if search.leaves else start
+            end = self._end_beyond(search, stop, stop - start)
+            root = search.first_root(reached, end) if is_below(reached, end) else None
         if root is None or is_below(stop, root.time):
             return None
         return Hit(wall, root.time, root.slope, self.motion)
+
+    def _end_beyond(self, search: Isolator, stop: Interval, length: Interval) -> Interval:
+        """Return where a search ends: a little later than asked for, so that a root there lies inside.
+
+        And where f has a sign, for a root may lie at that later end too.
+        """
+        ends = [self.arithmetic.upper(stop + length * share) for share in (BEYOND, 2 * BEYOND, 3 * BEYOND)]
+        return next((end for end in ends if sign(search.value(end)) != 0), ends[0])
 
     def _isolator(self, wall: Wall) -> Isolator:
         return Isolator(

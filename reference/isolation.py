@@ -74,6 +74,7 @@ class Isolator:
         timeline: knows the laws' knots, at which intervals are best cut; None for a smooth function.
         is_never_met: tells whether the wall never comes to where the flight is at a time; None: not known.
         leaves: what has been excluded so far, from the left.
+        root: the first root, once it has been found.
     """
 
     arithmetic: Arithmetic
@@ -84,6 +85,7 @@ class Isolator:
     timeline: Timeline | None = field(default=None, kw_only=True)
     is_never_met: Callable[[Interval], bool] | None = field(default=None, kw_only=True)
     leaves: list[Leaf] = field(default_factory=list, init=False)
+    root: IsolatedRoot | None = field(default=None, init=False)
 
     def value(self, s: Interval) -> Interval:
         """Enclose f, less its residual, at s."""
@@ -97,7 +99,8 @@ class Isolator:
             Undecidable: when this precision cannot tell.
         """
         fall = self.first_fall(start, end)
-        return None if fall is None else self._refine(*fall)
+        self.root = None if fall is None else self._refine(*fall)
+        return self.root
 
     def first_fall(self, start: Interval, end: Interval) -> tuple[Interval, Interval] | None:
         """Find where f > 0 first falls below 0, by f' < 0 throughout, or prove that there is no root.

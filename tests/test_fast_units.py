@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 import os
 from importlib import import_module
+from random import Random
 
 import numpy as np
 import pytest
@@ -159,3 +160,35 @@ def test_a_path_that_overflows_is_undecided(speed, is_kept):
         for found in (fast.trajectory(cap, state, 1), fast.fine_trajectory(cap, state, 1)):
             assert not found.walls
             assert "beyond binary64" in found.outcome.reason
+
+
+def test_a_path_to_a_place_that_no_float_holds_is_undecided():
+    """Its collisions stand: they were found before."""
+    cap, state = Cap(r=2.0**-1000), State(0.0, 0.0, 2.0**-1002, 3 * 2.0**-1070, 2.0**-1003)
+    assert "beyond binary64" in fast.next_collision(cap, state, 0.1).reason
+    for t_end, walls in ((0.1, []), (20.1, ["arc", "base"])):
+        found = fast.trajectory(cap, state, 3, t_end)
+        assert found.walls == walls
+        assert "beyond binary64" in found.outcome.reason
+
+
+def test_a_stay_that_no_float_holds_is_one_particle_s():
+    """Beside so short a period some times of capture would lose their last bits."""
+    period, size = 2.0**-1021, 2.0**-500
+    knots = ((0.0, 0.9), (period / 2, 0.3), (period, 0.9))
+    scene, speed, random = Mushroom(r=size, h=size, nu=BangBang(knots=knots)), 20 * size / period, Random(3)
+    states = []
+    for _ in range(100):
+        angle, x, y = random.uniform(0, 6.28), random.uniform(-0.6, 0.6), random.uniform(0.05, 0.6)
+        state = State(0.0, size * x, size * y, speed * math.cos(angle), speed * math.sin(angle))
+        if isinstance(fast.next_collision(scene, state, period), Collision):
+            states.append(state)
+    together = fast.flow(scene, states, period)
+    lost = [i for i, found in enumerate(together.outcomes) if isinstance(found, Undecided)]
+    assert 0 < len(lost) < len(states)
+    assert all("beyond binary64" in together.outcomes[i].reason for i in lost)
+    assert np.isnan(together.t_in[lost]).all()
+    for i, state in enumerate(states):
+        alone = fast.flow(scene, [state], period)
+        assert alone.outcomes == [together.outcomes[i]]
+        assert np.array_equal(alone.t_in, together.t_in[i : i + 1], equal_nan=True)

@@ -13,6 +13,7 @@ import mpmath
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from msgspec.structs import replace
 from support.tables import CIRCLE, STATIC
 from support.truth import IS_DEEP
 
@@ -27,6 +28,7 @@ from reference.start import flight_from
 from reference.walls import MovingWalls
 from scene import (
     BadInput,
+    BangBang,
     Cap,
     Fourier,
     InvalidState,
@@ -273,6 +275,50 @@ def test_a_far_horizon_costs_no_near_hit(seed):
         assert found.wall == near.wall
         assert found.dt.lo <= near.dt.hi
         assert near.dt.lo <= found.dt.hi
+
+
+SLOW_FLOORS = (
+    BangBang(knots=((0.0, 1.0), (0.5, 1.0 + 2.0**-30), (1.0, 1.0))),
+    Fourier(mean=1.0, period=1.0, cos=(2.0**-30,)),
+)
+
+
+@pytest.mark.parametrize("floor", SLOW_FLOORS, ids=["bang-bang", "fourier"])
+@pytest.mark.parametrize("end", [1.0, 4.0, 16.0])
+@pytest.mark.parametrize("beyond", [-(2.0**-11), 0.0, 2.0**-40, 2.0**-11, 2.0**-10, 3 * 2.0**-11, 2.0**-8])
+def test_a_hit_near_the_end_of_a_search_is_found(floor, end, beyond):
+    """A search looks a little farther than it ends; what it finds there is known to the next one."""
+    width = end * (1.0 + beyond)
+    scene, state = Stem(w=width, h=floor), State(0.0, 0.0, -0.5, 1.0, 0.0)
+    found = hit(scene, state, 1000.0)
+    assert found.wall == "right"
+    assert found.dt.contains(width)
+    assert isinstance(reference.next_collision(scene, state, width), reference.Horizon)
+
+
+@pytest.mark.parametrize(("slowness", "later"), [(12, 2), (20, 16), (28, 1024)])
+def test_a_wall_met_just_after_the_end_of_a_search_is_not_forgotten(slowness, later):
+    """The left side comes just after a period. The floor comes later still: its enclosure holds both."""
+    state = State(
+        0.0,
+        0.0,
+        -1.0 + 2.0**-slowness,
+        -(1.0 - 4 * 2.0**-52),
+        -(2.0**-slowness) * (1.0 - (4 + later) * 2.0**-52),
+    )
+    for digits in (1, 2, 3, 40):
+        assert hit(Stem(w=1.0, h=SLOW_FLOORS[0]), state, digits=digits).wall == "left"
+
+
+def test_what_another_wall_does_after_a_hit_leaves_the_hit_decided():
+    """The right side leaves the particle, and touches it again a period later; the floor is met before."""
+    scene = Stem(w=Fourier(mean=0.5, period=1.0, cos=(-0.075,)), h=1.0)
+    state = State(0.0, 0.425, -0.75, 0.0, -1.0, "right")
+    near, far = (hit(scene, state, t_end) for t_end in (0.5, 1e6))
+    assert near.wall == far.wall == "floor"
+    assert far.dt.contains(0.25)
+    slow = replace(state, vy=-0.0001)
+    assert isinstance(reference.next_collision(scene, slow, 1e6), Undecided)
 
 
 FACTORS = st.lists(st.integers(-2, 2), min_size=1, max_size=6).map(tuple)

@@ -13,6 +13,7 @@ import sys
 import threading
 from _thread import interrupt_main
 from collections.abc import Iterator
+from concurrent.futures import BrokenExecutor
 from contextlib import contextmanager, suppress
 from decimal import Decimal, InvalidOperation
 from functools import partial
@@ -270,6 +271,8 @@ def _call(given: list[str]) -> NoReturn:
         if told is None:
             raise
         _refuse(_in_options(told, given))
+    except BrokenExecutor as error:
+        _refuse(f"a process of this run was ended from outside: {error}")
     except (MemoryError, RecursionError) as error:
         what = "not enough memory" if isinstance(error, MemoryError) else "nested too deeply"
         _refuse(f"{what}: {error}".removesuffix(": "))

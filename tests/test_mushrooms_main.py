@@ -10,6 +10,7 @@ import signal
 import subprocess
 import sys
 import threading
+from concurrent.futures import BrokenExecutor
 from decimal import Decimal
 
 import numpy as np
@@ -145,6 +146,7 @@ def test_a_broken_off_simulation_leaves_nothing(command_line, tmp_path, monkeypa
         (MemoryError(), "not enough memory"),
         (MemoryError("Unable to allocate 8 GiB"), "not enough memory: Unable to allocate 8 GiB"),
         (RecursionError("maximum depth exceeded"), "nested too deeply: maximum depth exceeded"),
+        (BrokenExecutor("no result"), "a process of this run was ended from outside: no result"),
         (OSError(errno.EMFILE, "Too many open files"), "[Errno 24] Too many open files"),
         (
             ValueError("bad marshal data (x)"),

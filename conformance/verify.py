@@ -39,7 +39,7 @@ PRECISIONS = (128, 256, 512, 1024, 2048, 4096)  # bits, tried in turn
 PARTS = 4000  # stretches of time that one flight may be cut into
 SHARE = Fraction(61, 128)  # where a stretch is cut: not in the middle, where a root may well lie
 NEAR = Fraction(1, 2**20)  # how far from its wall a state may lie, as a share of the wall's size
-LATE, LARGE = 2**30, 10**100  # periods, or any number, from which on a stepper may refuse
+LATE, LARGE = 2**30, Fraction(10**100)  # periods, or numbers, from which a stepper may refuse
 UNIT = Fraction(1, 2**53)  # half a unit in the last place of binary64, relative
 BEYOND = Fraction(3, 2**12)  # how far past its end a search goes, as a share of its length
 WRONG = Fraction(1, 10**9)  # backward error beyond which an answer is false
@@ -82,8 +82,8 @@ def require(holds: bool, failure: Exception) -> None:
 class Interval:
     """All real numbers from lo 2^exp to hi 2^exp.
 
-    The result of an operation holds the result for any numbers of its operands. It is rounded outward
-    to `bits` binary digits. A point (lo = hi) is exact, however many digits it has.
+    The result of an operation holds the result for any numbers of its operands. It is rounded
+    outward to `bits` binary digits. A point (lo = hi) is exact, however many digits it has.
     """
 
     __slots__ = ("bits", "exp", "hi", "lo")
@@ -171,7 +171,7 @@ def rounded(lo: int, hi: int, exp: int, bits: int) -> Interval:
 
 
 def number(value: Fraction | int, bits: int) -> Interval:
-    """Return a number: exactly where its denominator is a power of two, else between two neighbours."""
+    """Return a number: exactly if its denominator is a power of two, else within one unit."""
     above, below = value.numerator, value.denominator
     if below & (below - 1) == 0:
         return Interval(above, above, 1 - below.bit_length(), bits)
@@ -195,8 +195,8 @@ def is_below(one: Interval, other: Interval) -> bool:
 def pi(bits: int) -> Interval:
     """Enclose pi = 16 arctan(1/5) - 4 arctan(1/239) (Machin).
 
-    Each term of either series is rounded down twice, which loses less than 3 units; times 16 that is
-    less than 64. What comes after the last term is less than that, too.
+    Each term of either series is rounded down twice, which loses less than 3 units; times 16 that
+    is less than 64. What comes after the last term is less than that, too.
     """
     scale = bits + 16
     total, error = 0, 128
@@ -212,10 +212,10 @@ def cos_sin(turns: Interval) -> tuple[Interval, Interval]:
     """Enclose cosine and sine of so many whole turns, for a narrow interval.
 
     The nearest quarter turn is taken out. The angle left is m 2^-scale for an integer m, and up to
-    `radius` units more or less; the slopes of both functions are at most 1. Taylor's terms at |m| are
-    rounded down to integers: term k is at most (e |m| 2^-scale + 1) / k + 1 units too small, where e
-    counts for the term before. That is less than 4 for each k while the angle is less than 1.7. The
-    series alternates, so what is left out counts as one more term.
+    `radius` units more or less; the slopes of both functions are at most 1. |m| 2^-scale < 1, so
+    each of Taylor's terms is at most the term before. They are rounded down to integers, twice
+    each: where term k - 1 is e units too small, term k is at most (e + 1) / k + 1 too small, which
+    is less than 4. The series alternates, so what is left out counts as one more term.
     """
     scale, bits = turns.bits + 8, turns.bits
     quarter = floor((turns.lo + turns.hi) * Fraction(2) ** (turns.exp + 1) + Fraction(1, 2))
@@ -252,7 +252,7 @@ def times(p: Jet, q: Jet) -> Jet:
 
 
 class Leg(NamedTuple):
-    """c + bend (t - origin)^2 / 2 from `begin` to `end`; times are counted from the law's first knot."""
+    """c + bend (t - origin)^2 / 2 from `begin` to `end`; times count from the first knot."""
 
     begin: Fraction
     end: Fraction
@@ -314,7 +314,8 @@ class Clock:
     def waves(self, s: Interval, n: int) -> list[list[Interval]]:
         """Enclose cosine and sine of k times the phase over a stretch, for k = 1 to n.
 
-        A wave lies between its values at the ends, and 1 or -1 where it turns: at quarters of a turn.
+        A wave lies between its values at the ends, and 1 or -1 where it turns: at quarters of a
+        turn.
         """
         begin, end = self.offset + self.pace * s.low, self.offset + self.pace * s.high
         one = number(1, self.bits)
@@ -392,8 +393,8 @@ def exact_jet(scene: Scene, time: Fraction, name: str) -> Jet:
 # 3. Walls
 
 
-# Each f is a sum of products, with their signs: positive inside. The base of a stem is its top. A scene
-# is valid while its laws, r - w and w - h slope are positive, too.
+# Each f is a sum of products, with their signs: positive inside. The base of a stem is its top.
+# A scene is valid while its laws (but the slope), r - w and w - h slope are positive, too.
 TERMS: dict[str, tuple[tuple[Any, ...], ...]] = {
     "arc": ((1, "r", "r"), (-1, "x", "x"), (-1, "y", "y")),
     "base": ((1, "y"),),
@@ -445,9 +446,10 @@ Hit = tuple[str, Interval]  # a wall, and when it is met since the clock's insta
 class Flight:
     """A particle in flight: where walls are on its way, and what it meets first.
 
-    The state is enclosed by a box, and begins within the times `begin` (exactly 0 for a state that is
-    given). What is proved holds for each state in the box. A wall that is being left has a residual c:
-    f vanishes where the flight begins but for the rounding of the state. There f - c stands for f.
+    The state is enclosed by a box, and begins within the times `begin` (exactly 0 for a state that
+    is given). What is proved holds for each state in the box. A wall that is being left has a
+    residual c: f vanishes where the flight begins but for the rounding of the state. There f - c
+    stands for f.
     """
 
     def __init__(
@@ -504,7 +506,7 @@ class Flight:
         return wall_jet(self.scene, wall, partial(exact_jet, self.scene, t + s), *place)
 
     def is_zero(self, wall: str, s: Fraction) -> bool:
-        """Tell whether f, less the residual of the wall being left, is known to vanish at an exact time."""
+        """Tell whether f, less a residual, is known to vanish at an exact time."""
         try:
             residual = self.exact(wall, Fraction(0)).f if wall == self.wall else 0
             return bool(self.exact(wall, s).f == residual)
@@ -520,7 +522,7 @@ class Flight:
         - f'' <= 0 but at knots, and f > 0 at the right end: f lies above its chord;
         - f > 0 as enclosed;
         - f' < 0, and f > 0 at the right end;
-        - Taylor's formula about a point p of the stretch, f(p) + f'(p) (s - p) + f'' (s - p)^2 / 2 > 0;
+        - f(p) + f'(p) (s - p) + f'' (s - p)^2 / 2 > 0 for a point p of the stretch (Taylor);
         - the wall never comes to where the particle is at either end (`is_never_met`).
 
         The wall being left has f = 0 where the flight begins, somewhere in `begin`. A stretch that
@@ -549,9 +551,9 @@ class Flight:
     def is_never_met(self, wall: str, at: Interval, turn: Interval) -> bool:
         """Tell whether a particle that rests where this one is at a point is never met by a wall.
 
-        With the laws held still, f is concave in the place. So f at each time of a stretch is at least
-        the lesser of its values for the two particles that rest at the stretch's ends. Neither is met
-        in one period: then neither is ever met, and f > 0 on the stretch.
+        With the laws held still, f is concave in the place. So f at each time of a stretch is at
+        least the lesser of its values for the two particles that rest at the stretch's ends.
+        Neither is met in one period: then neither is ever met, and f > 0 on the stretch.
         """
         (x, y, vx, vy), zero = self.line, self.clock.zero
         line = x + vx * at, y + vy * at, zero, zero
@@ -566,8 +568,8 @@ class Flight:
     def first_root(self, wall: str, start: Interval, stop: Interval) -> Interval | None:
         """Enclose the first root of f between two points; None proves that f > 0 after the first.
 
-        The stretch is cut until each part is clear, from the left; or until f' < 0 on a part and f < 0
-        at its right end: then f has one root there.
+        The stretch is cut until each part is clear, from the left; or until f' < 0 on a part and f
+        < 0 at its right end: then f has one root there.
 
         Raises:
             Unproved: a part stays open.
@@ -597,7 +599,10 @@ class Flight:
         return None
 
     def closest(self, wall: str, root: Interval) -> Interval:
-        """Narrow a root by the sign of f at a point p, and by root = p - f(p) / f' for some f' (Newton)."""
+        """Narrow a root: by the sign of f at a point p, and by root = p - f(p) / f' (Newton).
+
+        The mean value theorem gives the latter, for some f' between p and the root.
+        """
         while True:
             narrow = root
             for choose in (Interval.cut, Interval.simplest):
@@ -616,10 +621,10 @@ class Flight:
     def event(self, *, in_cap: bool) -> Hit | None:
         """Find the first wall met before the horizon; None for none.
 
-        y is linear. Before y = 0 is crossed the walls of one part of the table can be met: the arc in the
-        cap, both sides and the floor in the stem. Where it is crossed, the mouth is open or the base is
-        met. After that come the walls of the other part. A particle that glides along y = 0 inside the
-        mouth can meet the mouth's edge only.
+        y is linear. Before y = 0 is crossed the walls of one part of the table can be met: the arc
+        in the cap, both sides and the floor in the stem. Where it is crossed, the mouth is open or
+        the base is met. After that come the walls of the other part. A particle that glides along y
+        = 0 inside the mouth can meet the mouth's edge only.
 
         Raises:
             Undefined: two walls are met together, or the mouth's edge, exactly.
@@ -653,7 +658,7 @@ class Flight:
         return hit
 
     def crossing(self, *, in_cap: bool) -> tuple[Interval | None, Fraction | None]:
-        """Enclose when y = 0 is crossed before the horizon, and return when exactly if that is known."""
+        """Enclose when y = 0 is crossed before the horizon; return it exactly, too, if known."""
         (_, y, _, vy), end = self.line, number(self.end, self.bits)
         if self.wall == "base" or vy.lo == vy.hi == 0 or vy.sign == (1 if in_cap else -1):
             return None, None
@@ -668,9 +673,9 @@ class Flight:
     ) -> Hit | None:
         """Find which of some walls is met first, before y = 0 is crossed or the horizon comes.
 
-        The search ends soon at first, and then ever later, for all walls. f > 0 is proved at each end.
-        It goes on a little past the last, so that a root there lies inside. What is met at the horizon
-        exactly is not met before it.
+        The search ends soon at first, and then ever later, for all walls. f > 0 is proved at each
+        end. It goes on a little past the last, so that a root there lies inside. What is met at the
+        horizon exactly is not met before it.
         """
         for begin, stop in self.searches(start, limit.high):
             hits: list[Hit] = []
@@ -690,7 +695,7 @@ class Flight:
         return None
 
     def searches(self, start: Interval, last: Interval) -> Iterator[tuple[Interval, Interval]]:
-        """Yield begin and end of searches: first as long as the table needs to be crossed, or a period."""
+        """Yield the ends of searches: the first is as long as a crossing of the table, or a period."""
         sizes = [law.ends[1] for name, law in self.scene.laws.items() if name in ("r", "w", "h")]
         speed = max(abs(end) for v in self.line[2:] for end in v.ends)
         lengths = [sum(sizes) / speed] if speed else []
@@ -734,9 +739,9 @@ class Flight:
 def bounce(flight: Flight, hit: Hit) -> tuple[dict[str, Interval], Flight]:
     """Return dt, x, y, vx, vy at a hit, v after it, and the next flight.
 
-    v' = v - 2 f' grad f / |grad f|^2, which is v - 2 (v.n - u) n. The next flight is described at an
-    exact instant close to the hit, on its own line: there the place is a box, and it begins a little
-    before or after. Its wall keeps the residual when it is the one that was left.
+    v' = v - 2 f' grad f / |grad f|^2, which is v - 2 (v.n - u) n. The next flight is described at
+    an exact instant close to the hit, on its own line: there the place is a box, and it begins a
+    little before or after. Its wall keeps the residual when it is the one that was left.
     """
     clock, (wall, s), (x, y, vx, vy), is_base = flight.clock, hit, flight.line, hit[0] == "base"
     at_x, at_y = x + vx * s, clock.zero if is_base else y + vy * s
@@ -913,9 +918,10 @@ def read_legs(knots: Any) -> tuple[Law, tuple[None, Fraction]]:
     Raises:
         Refused: times do not rise, or the law does not close.
     """
-    is_list = isinstance(knots, list) and 2 <= len(knots) <= 256
     require(
-        is_list and all(isinstance(knot, list) and len(knot) == 2 for knot in knots),
+        isinstance(knots, list)
+        and 2 <= len(knots) <= 256
+        and all(isinstance(knot, list) and len(knot) == 2 for knot in knots),
         Refused("knots are 2 to 256 pairs of time and value"),
     )
     pairs = [(read_number("knot", t), read_number("knot", value)) for t, value in knots]
@@ -1013,7 +1019,7 @@ def walk(scene: Scene, state: State, t_end: Fraction, bits: int) -> Iterator[Ste
 
 
 def mark(step: Step) -> str:
-    """Return what a step means for capture: "out" of the cap, an arc hit "captured" or "free", or "".
+    """Return what a step means for capture: "out", an arc hit "captured" or "free", or "".
 
     A hit of the arc is captured when |x vy - y vx| > w |v|; squares compare as these do.
     """
@@ -1029,8 +1035,8 @@ def mark(step: Step) -> str:
 def find_stays(marks: Sequence[str]) -> list[list[int]]:
     """Return where each stay in the cap begins and ends, as places in a path.
 
-    It begins with a captured hit. It ends with the first hit of the arc after its last captured one, or
-    where the particle leaves the cap, or at the horizon.
+    It begins with a captured hit. It ends with the first hit of the arc after its last captured
+    one, or where the particle leaves the cap, or at the horizon.
     """
     stays, since = [], 0
     for place in (place for place, what in enumerate(marks) if what == "out"):
@@ -1094,9 +1100,8 @@ def check_line(record: Any, bits: int) -> None:
     try:
         scene = read_scene(record.get("scene"))
         given, t_end = read_state(scene, state), read_number("t_end", record.get("t_end"))
-        turn = Clock(scene, Fraction(0), 64).turn
-        is_late = abs(given.t) >= LATE * (turn.ends[0] if turn else 1)
-        is_extreme = is_late or max(map(abs, given[:5])) >= LARGE
+        period = scene.period or (6 / scene.omega if scene.omega else 1)
+        is_extreme = abs(given.t) >= LATE * period or max(map(abs, given[:5])) >= LARGE
         found = list(itertools.islice(walk(scene, given, t_end, bits), count))
         right = "collision" if found[-1].wall else "horizon"
     except Refused as failure:
@@ -1141,7 +1146,7 @@ def read_state(scene: Scene, data: Mapping[str, Any]) -> State:
 
 
 def thin(path: Sequence[Step], claimed: Any) -> list[Step]:
-    """Return the steps of a flow that are written down: where a stay begins or ends, and the horizon.
+    """Return the steps of a flow that its line has: where a stay begins or ends, and the horizon.
 
     Raises:
         Contradicted: the stays are others.
@@ -1195,8 +1200,8 @@ def first_step(scene: Scene, state: State, t_end: Fraction) -> tuple[str | None,
 def backward_error(scene: Scene, state: State, t_end: Fraction, answer: Any) -> float:
     """Return how far an answer to one step is from the truth, in backward ulps.
 
-    That is |answer - truth|, for the worst of t, x, y, vx, vy, over what moves the truth when each input
-    moves by 2^-53 of its size, and 2^-53 of the truth.
+    That is |answer - truth|, for the worst of t, x, y, vx, vy, over what moves the truth when each
+    input moves by 2^-53 of its size, and 2^-53 of the truth.
 
     Raises:
         Unreadable: a field is missing.

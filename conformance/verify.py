@@ -16,7 +16,7 @@ theorem behind it; the argument stands here in the order in which it is used:
  5. `Flight.event`: which wall is met first. `bounce`: the flight after it.
  6. `start`: which wall a state leaves, or why it is refused or has no answer.
  7. `read_scene`: the scene is valid at all times, or is proved to be invalid.
- 8. `find_fault`: the claim, held against all this.
+ 8. `check_line`: the claim, held against all this.
 
 A claim is "proved", "false" (what is proved contradicts it), or "not proved" (open at 4,096 bits).
 Not judged are the fields `allowance`, `condition` and `level`: they say how sensitive an answer is.
@@ -426,9 +426,6 @@ def wall_jet(scene: Scene, wall: str, law: Callable[[str], Jet], x: Jet, y: Jet)
 # 4. Where f > 0, and where it vanishes first
 
 
-Line = tuple[Interval, Interval, Interval, Interval]  # x and y at the instant of a clock, vx, vy
-
-
 class State(NamedTuple):
     """A state as it is given, exactly."""
 
@@ -455,7 +452,7 @@ class Flight:
     def __init__(
         self,
         clock: Clock,
-        line: Line,
+        line: tuple[Interval, Interval, Interval, Interval],
         end: Fraction,
         begin: Interval,
         wall: str | None = None,
@@ -465,7 +462,7 @@ class Flight:
 
         Args:
             clock: the laws' phase; times are counted from its instant.
-            line: the flight's line.
+            line: x and y at that instant, vx and vy.
             end: the horizon.
             begin: when the flight begins.
             wall: the wall being left.
@@ -477,7 +474,6 @@ class Flight:
         self.is_flat = False  # f = f' = 0 < f'' on the wall being left at time 0, exactly
         self.state: State | None = None  # known exactly: it decides ties
         self._laws: dict[tuple[str, int, int, int], Jet] = {}
-        self._parts = 0
 
     def law(self, name: str, s: Interval) -> Jet:
         """Enclose a law over a stretch."""
@@ -557,8 +553,7 @@ class Flight:
         """
         (x, y, vx, vy), zero = self.line, self.clock.zero
         line = x + vx * at, y + vy * at, zero, zero
-        before = number(-1, self.bits)
-        rest = Flight(self.clock, line, self.end, before, self.wall, self.residual)
+        rest = Flight(self.clock, line, self.end, number(-1, self.bits), self.wall, self.residual)
         rest._laws = self._laws
         try:
             return rest.first_root(wall, zero, turn.high) is None
@@ -579,24 +574,22 @@ class Flight:
             Unproved(f"{wall}: f is not shown to be positive where the search begins"),
         )
         parts = [join(start, stop)]
-        while parts:
-            part, self._parts = parts.pop(), self._parts + 1
-            require(self._parts < PARTS, Unproved(f"{wall}: more than {PARTS} stretches of time"))
+        for _ in range(PARTS):
+            if not parts:
+                return None
+            part = parts.pop()
             if self.is_clear(wall, part):
                 continue
             at_begin, cut = self.holds_begin(wall, part), part.cut()
-            if (
-                not at_begin
-                and self.f(wall, part).d1.sign < 0
-                and self.f(wall, part.high).f.sign < 0
-            ):
+            falls = self.f(wall, part).d1.sign < 0 and self.f(wall, part.high).f.sign < 0
+            if falls and not at_begin:
                 return self.closest(wall, part)
             require(
                 is_below(part.low, cut) and is_below(self.begin if at_begin else part.low, cut),
                 Unproved(f"{wall}: f is too small, or begins too flat, for this precision"),
             )
             parts += [join(cut, part.high), join(part.low, cut)]
-        return None
+        raise Unproved(f"{wall}: more than {PARTS} stretches of time")
 
     def closest(self, wall: str, root: Interval) -> Interval:
         """Narrow a root: by the sign of f at a point p, and by root = p - f(p) / f' (Newton).
@@ -675,12 +668,18 @@ class Flight:
 
         The search ends soon at first, and then ever later, for all walls. f > 0 is proved at each
         end. It goes on a little past the last, so that a root there lies inside. What is met at the
-        horizon exactly is not met before it.
+        horizon exactly is not met before it. A wall of which something is open is asked again after
+        the others, up to the hit that they have by then: it may be open after that hit only.
         """
         for begin, stop in self.searches(start, limit.high):
-            hits: list[Hit] = []
-            for wall in walls:
-                root = self.first_root(wall, begin, stop)
+            hits, queue = [], list(walls)
+            for wall in queue:
+                try:
+                    root = self.first_root(wall, begin, stop)
+                except Unproved as question:
+                    require(queue.count(wall) < 2, question)
+                    queue.append(wall)
+                    continue
                 if root is None or is_below(limit, root):
                     continue
                 if (
@@ -747,9 +746,13 @@ def bounce(flight: Flight, hit: Hit) -> tuple[dict[str, Interval], Flight]:
     at_x, at_y = x + vx * s, clock.zero if is_base else y + vy * s
     one, is_tilted = number(1, clock.bits), wall in ("left", "right")
     slope = flight.law("slope", s).f if is_tilted else clock.zero
-    down = -one if flight.scene.table == "stem" else one
-    sides = {"left": (one, slope), "right": (-one, slope), "floor": (clock.zero, one)}
-    fx, fy = {"arc": (at_x * -2, at_y * -2), "base": (clock.zero, down), **sides}[wall]
+    fx, fy = {
+        "arc": (at_x * -2, at_y * -2),
+        "base": (clock.zero, -one if flight.scene.table == "stem" else one),
+        "floor": (clock.zero, one),
+        "left": (one, slope),
+        "right": (-one, slope),
+    }[wall]
     kick = flight.f(wall, s).d1 * 2 / (fx**2 + fy**2)
     new_vx, new_vy = vx - kick * fx, vy - kick * fy
     near = s.simplest()
@@ -1070,10 +1073,10 @@ def require_inside(name: str, claim: Any, found: Interval) -> None:
         Unproved: it may.
     """
     ends, (least, most) = take(claim, name, list), found.ends
-    is_pair = len(ends) == 2 and all(
-        isinstance(end, str) and DECIMAL.fullmatch(end) for end in ends
+    require(
+        len(ends) == 2 and all(isinstance(end, str) and DECIMAL.fullmatch(end) for end in ends),
+        Unreadable(f"{name} must be two decimals"),
     )
-    require(is_pair, Unreadable(f"{name} must be two decimals"))
     low, high = map(Fraction, ends)
     require(low <= most, Contradicted(f"{name} lies below its enclosure"))
     require(least <= high, Contradicted(f"{name} lies above its enclosure"))

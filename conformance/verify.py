@@ -695,7 +695,7 @@ class Flight:
         return None
 
     def searches(self, start: Interval, last: Interval) -> Iterator[tuple[Interval, Interval]]:
-        """Yield the ends of searches: the first is as long as a crossing of the table, or a period."""
+        """Yield ends of searches: the first is as long as a crossing of the table, or a period."""
         sizes = [law.ends[1] for name, law in self.scene.laws.items() if name in ("r", "w", "h")]
         speed = max(abs(end) for v in self.line[2:] for end in v.ends)
         lengths = [sum(sizes) / speed] if speed else []

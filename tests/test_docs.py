@@ -251,7 +251,7 @@ def test_the_entrance_stays_short():
 
 
 def test_the_proof_names_what_exists():
-    """Every place of the argument that the page names is in the code: of the reference, or of the verifier."""
+    """Every place of the argument that the page names is in the reference or in the verifier."""
     text = (DOCS / "proof.md").read_text("utf-8")
     places = set(re.findall(r"`(?:reference\.)?([a-z_]+)\.([A-Za-z_.]+)`", text))
     assert len(places) >= 25

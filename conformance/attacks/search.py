@@ -143,18 +143,18 @@ def confirmed(attack: Attack) -> Judgement:
     else:
         claim = claimed_path(scene, state, n_collisions, t_end, working)
     seconds = (time.process_time() - begun) / max(len(claim.steps), 1)
-    is_open = claim.outcome == "undecided"
-    if is_open and not claim.steps:
+    is_undecided = claim.outcome == "undecided"
+    if is_undecided and not claim.steps:
         return Judgement("undecided", claim.reason, seconds=seconds)
-    written = Expectation("collision", claim.steps) if is_open else claim
+    written = Expectation("collision", claim.steps) if is_undecided else claim
     n_steps = max(len(claim.steps) + (claim.outcome == "undefined"), 1)
     question = Question("attack", "", "", wire_form(scene), state, t_end, n_collisions)
     verdict = judge(filed(question, 1, Proved((written,), collisions=n_steps), "stress"))
     if verdict.status == "false":
         return Judgement("wrong", f"the reference claims what is false: {verdict.reason}", seconds=seconds)
-    if is_open or verdict.status != "proved":
-        why = claim.reason if is_open else verdict.reason
-        return Judgement("undecided" if is_open else "open", why, seconds=seconds)
+    if is_undecided or verdict.status != "proved":
+        why = claim.reason if is_undecided else verdict.reason
+        return Judgement("undecided" if is_undecided else "open", why, seconds=seconds)
     kind = "refused" if claim.outcome == "rejected" else "agreed"
     return Judgement(kind, claim=claim, seconds=seconds)
 

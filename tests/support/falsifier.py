@@ -96,7 +96,8 @@ class Flight:
 
     def __init__(self, scene: Line, state: Line, *, is_blind: bool = False) -> None:
         mp = numbers()
-        self.scene, self.table, self.left, self.is_blind = scene, scene["table"], state.get("wall"), is_blind
+        self.scene, self.table, self.is_blind = scene, scene["table"], is_blind
+        self.left: Any = state.get("wall")
         self.t, self.x, self.y, self.vx, self.vy = (mp.mpf(state[name]) for name in ("t", *NUMBERS[1:]))
         self.residual = mp.zero
         if self.left:

@@ -335,10 +335,15 @@ def permit_falsehood(random: Random, line: Line) -> Line | None:
 def spoil(random: Random, line: Line) -> Line:
     """Take a field away, or give it another type: what is left is no claim."""
     forged = plain(line)
-    numbers_of_steps = [(step, name) for step in forged["expect"][0]["steps"] for name in NUMBERS]
-    fields = [(forged, name) for name in ("kind", "scene", "state", "t_end", "expect")]
-    holder, name = random.choice((*fields, (forged["expect"][0], "outcome"), random.choice(numbers_of_steps)))
-    holder[name] = random.choice((None, "wall", [], {}, ["1"], [1, 2], [["1"], {}]))
-    if random.random() < 0.2:
+    answer = forged["expect"][0]
+    fields = [(forged, name) for name in ("kind", "scene", "state", "t_end", "expect", "collisions")]
+    fields += [
+        (answer, "outcome"),
+        (answer, "steps"),
+        (random.choice(answer["steps"]), random.choice(NUMBERS)),
+    ]
+    holder, name = random.choice(fields)
+    holder[name] = random.choice((None, "wall", -1, [], {}, ["1"], [1, 2], [["1"], {}]))
+    if name != "collisions" and random.random() < 0.2:
         del holder[name]
     return forged

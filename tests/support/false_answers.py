@@ -31,7 +31,7 @@ from .falsifier import CORPUS, NUMBERS, Flight, Line, Number, negative, next_hit
 REASONS = ("corner", "tangency", "sliding", "mouth-edge")
 SIDES = ("left", "right", "floor")
 WALLS = {"cap": ("arc", "base"), "stem": ("base", *SIDES), "mushroom": ("arc", "base", *SIDES)}
-N_SAMPLES = 300
+N_SAMPLES = 200
 DECIMAL = Context(prec=60)
 Forge = Callable[[Random, Line], Line | None]
 
@@ -151,7 +151,8 @@ def meet_later(is_same: bool, random: Random, line: Line) -> Line | None:
     flight, s = opened(line)
     true = line["expect"][0]["steps"][0]["wall"]
     others = tuple(wall for wall in WALLS[flight.table] if wall != true)
-    hits = next_hits(flight, s, 20 * s, N_SAMPLES, (true,) if is_same else others)
+    end = s * random.choice((1.125, 2, 20))
+    hits = next_hits(flight, s, end, N_SAMPLES, (true,) if is_same else others)
     return instead(line, flight, next(islice(hits, random.choice((0, 0, 1, 2)), None), None))
 
 

@@ -30,7 +30,7 @@ KINDS: dict[str, tuple[str, false.Forge]] = {
     "a number moved by 1e-15": ("answered", partial(false.move, false.by_rounding)),
     "a number moved far": ("answered", partial(false.move, false.by_much)),
     "the ends of an enclosure exchanged": ("answered", false.exchange_ends),
-    "a later root of the same wall": ("hit", partial(false.meet_later, True)),
+    "a later root of the same wall": ("returning", partial(false.meet_later, True)),
     "a later root of another wall": ("hit", partial(false.meet_later, False)),
     "another wall named": ("answered", false.rename_wall),
     "a hit missed": ("hit", false.miss),
@@ -69,6 +69,9 @@ POOLS: dict[str, Callable[[Line, Line], object]] = {
     "answered": lambda line, answer: answer.get("steps"),
     "step": lambda line, answer: line["kind"] == "step" and answer.get("steps"),
     "hit": lambda line, answer: line["kind"] == "step" and answer["outcome"] == "collision",
+    "returning": lambda line, answer: (
+        POOLS["hit"](line, answer) and line["group"][:7] in ("waiting", "hard-ca")
+    ),
     "horizon": lambda line, answer: line["kind"] == "step" and answer["outcome"] == "horizon",
     "again": lambda line, answer: (
         line["kind"] == "step"

@@ -151,7 +151,7 @@ def meet_later(is_same: bool, random: Random, line: Line) -> Line | None:
     flight, s = opened(line)
     true = line["expect"][0]["steps"][0]["wall"]
     others = tuple(wall for wall in WALLS[flight.table] if wall != true)
-    end = s * random.choice((1.125, 2, 20))
+    end = s * (1.05 if line["group"] == "waiting" else 20)
     hits = next_hits(flight, s, end, N_SAMPLES, (true,) if is_same else others)
     return instead(line, flight, next(islice(hits, random.choice((0, 0, 1, 2)), None), None))
 

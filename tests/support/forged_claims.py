@@ -70,7 +70,7 @@ POOLS: dict[str, Callable[[Line, Line], object]] = {
     "step": lambda line, answer: line["kind"] == "step" and answer.get("steps"),
     "hit": lambda line, answer: line["kind"] == "step" and answer["outcome"] == "collision",
     "returning": lambda line, answer: (
-        POOLS["hit"](line, answer) and line["group"][:7] in ("waiting", "hard-ca")
+        POOLS["hit"](line, answer) and line["group"] in ("waiting", "through-mouth")
     ),
     "horizon": lambda line, answer: line["kind"] == "step" and answer["outcome"] == "horizon",
     "again": lambda line, answer: (

@@ -35,18 +35,24 @@ def leave_corner(random: Random, line: Line) -> Line:
     return answered({**line, "scene": {"table": table, **scene}, "state": state}, numbers().mpf(20))
 
 
+def pushed(flight: Flight, wall: str, way: Number) -> Line:
+    """Return a start moved along the gradient of a wall's f, as far as f would grow by some way if linear."""
+    at = flight.walls(numbers().zero)[wall]
+    step = way / (at.fx**2 + at.fy**2 or 1)
+    state = flight.free(numbers().zero) | {"x": flight.x + step * at.fx, "y": flight.y + step * at.fy}
+    return {name: float(state[name]) for name in ("t", "x", "y", "vx", "vy")}
+
+
 def leave_wall(random: Random, line: Line) -> Line | None:
-    """Move the start inwards by more than the share of the wall's size that is allowed."""
+    """Move the start off the wall that it names by more than the share of its size that is allowed."""
     flight, s = opened(line)
-    laws, at = flight.laws(numbers().zero), flight.walls(numbers().zero)[flight.left]
-    size = max([abs(flight.x), *(laws[name][0] for name in ("r", "w", "h") if name in laws)])
-    step = size * 2.0 ** -random.uniform(6, 19) / (at.fx**2 + at.fy**2) ** 0.5
-    x, y = flight.x + step * at.fx, flight.y + step * at.fy
-    state = {**line["state"], "x": float(x), "y": float(y)}
-    off = Flight(line["scene"], {**state, "wall": None}).walls(numbers().zero)[flight.left].f
-    if flight.left == "arc":
-        off /= 2 * laws["r"][0]
-    return answered({**line, "state": state}, 2 * s) if off > 1.1 * NEAR * size else None
+    laws = [law[0] for law in flight.laws(numbers().zero).values()]
+    size = max(abs(flight.x), *laws)
+    unit = 2 * flight.laws(numbers().zero)["r"][0] if flight.left == "arc" else 1
+    state = pushed(flight, flight.left, unit * size * 2.0 ** -random.uniform(6, 19))
+    off = Flight(line["scene"], state).walls(numbers().zero)[flight.left].f / unit
+    start = {**state, "wall": flight.left}
+    return answered({**line, "state": start}, 2 * s) if off > 1.1 * NEAR * size else None
 
 
 def start_beyond(random: Random, line: Line) -> Line | None:
@@ -54,13 +60,11 @@ def start_beyond(random: Random, line: Line) -> Line | None:
     flight, s = opened(line)
     zero = numbers().zero
     wall = random.choice(flight.reach(zero))
-    at = flight.walls(zero)[wall]
-    step = -(at.f + 2.0 ** -random.uniform(2, 30) * (1 + abs(at.f))) / (at.fx**2 + at.fy**2 or 1)
-    x, y = flight.x + step * at.fx, flight.y + step * at.fy
-    state = {**line["state"], "x": float(x), "y": float(y), "wall": None}
+    f = flight.walls(zero)[wall].f
+    state = pushed(flight, wall, -f - (1 + abs(f)) * 2.0 ** -random.uniform(2, 30))
     found = Flight(line["scene"], state)
     is_beyond = found.y and wall in found.reach(zero) and found.walls(zero)[wall].f < 0
-    return answered({**line, "state": state}, 2 * s) if is_beyond else None
+    return answered({**line, "state": {**state, "wall": None}}, 2 * s) if is_beyond else None
 
 
 def start_into_wall(_: Random, line: Line) -> Line | None:

@@ -26,9 +26,9 @@ from . import false_answers as false
 from .falsifier import Line
 
 KINDS: dict[str, tuple[str, false.Forge]] = {
-    "a number moved by widths": ("answered", partial(false.move, false.by_widths)),
-    "a number moved by 1e-15": ("answered", partial(false.move, false.by_rounding)),
-    "a number moved far": ("answered", partial(false.move, false.by_much)),
+    "a number moved by widths": ("answered", partial(false.move, 0)),
+    "a number moved by some 1e-15": ("answered", partial(false.move, 8)),
+    "a number moved far": ("answered", partial(false.move, 22)),
     "the ends of an enclosure exchanged": ("answered", false.exchange_ends),
     "a later root of the same wall": ("returning", partial(false.meet_later, True)),
     "a later root of another wall": ("hit", partial(false.meet_later, False)),
@@ -42,7 +42,7 @@ KINDS: dict[str, tuple[str, false.Forge]] = {
     "an open mouth met": ("mushroom", false.hit_open_mouth),
     "a knot ignored": ("knots", false.ignore_knot),
     "an answer called undefined": ("step", false.call_undefined),
-    "undefined for another reason": ("undefined", false.change_reason),
+    "undefined for another reason": ("undefined", false.call_undefined),
     "a tie broken": ("undefined", false.break_tie),
     "a step left out": ("trajectory", false.leave_out_step),
     "two steps exchanged": ("trajectory", false.exchange_steps),

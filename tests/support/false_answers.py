@@ -63,9 +63,11 @@ def contradicts(one: Line, other: Line) -> bool:
 
 def written(state: Line) -> Line:
     """Write down the state of a flight as a step of the corpus."""
-    spare = Fraction(1, 10**40)
-    exact = {name: Fraction(*map(int, state[name].as_integer_ratio())) for name in NUMBERS}
-    around = {name: (v - abs(v) * spare, v + abs(v) * spare) for name, v in exact.items()}
+    around = {}
+    for names in (("dt",), ("x", "y"), ("vx", "vy")):
+        found = {name: Fraction(*map(int, state[name].as_integer_ratio())) for name in names}
+        spare = max(map(abs, found.values())) / 10**40
+        around |= {name: (value - spare, value + spare) for name, value in found.items()}
     return plain(certified(around, [1.0] * 5, state["wall"]))
 
 

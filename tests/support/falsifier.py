@@ -30,7 +30,7 @@ import mpmath
 CORPUS = Path(__file__).parents[2] / "conformance" / "corpus"
 DECIMALS, CONFIRMED = 60, 300
 N_ENDS = 60  # instants at 2^-1, 2^-2 ... of the flight's length from either end
-N_LOWEST = 3  # samples of a wall around which to look closer
+N_LOWEST = 200  # samples of a wall around which to look closer
 MAX_SAMPLES = 20_000
 NUMBERS = ("dt", "x", "y", "vx", "vy")
 Number = Any  # an mpf
@@ -265,7 +265,7 @@ def negative(flight: Flight, end: Number, n: int) -> str | None:
 def _lowest(flight: Flight, wall: str, a: Number, b: Number) -> Number:
     """Return where f of a wall is least between two instants, by golden section."""
     golden = (numbers().sqrt(5) - 1) / 2
-    for _ in range(40):
+    for _ in range(25):
         left, right = b - golden * (b - a), a + golden * (b - a)
         is_left = flight.walls(left)[wall].f < flight.walls(right)[wall].f
         a, b = (a, right) if is_left else (left, b)

@@ -319,7 +319,7 @@ def scenes_and_states(draw: st.DrawFn, table: str | None = None) -> tuple[Scene,
 
 
 def adversarial(family: str | None = None) -> st.SearchStrategy[Any]:
-    """Draw a `conformance.attacks.Attack` of a family by its name, or of any; needs python-flint."""
+    """Draw a `conformance.attacks.Attack` of a family by its name, or of any."""
     from conformance.attacks import FAMILIES
 
     names = st.sampled_from([family] if family else list(FAMILIES))

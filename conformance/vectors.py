@@ -1,7 +1,7 @@
 """Vectors: questions with certified answers, and the corpus that they are kept in.
 
 A vector asks for one step, one trajectory or one particle's flow; its answers are enclosures that the
-reference proved and a second arithmetic proved again. The corpus is one file of JSON lines for each group,
+reference found and `conformance.verify` proved. The corpus is one file of JSON lines for each group,
 and one for all hard cases, beside a manifest with its version and every file's SHA-256; `load` refuses a
 corpus that does not match its manifest. Answers never leave the harness: `request` builds the line that an
 implementation is sent.

@@ -7,7 +7,7 @@ A particle flies straight between walls that move (Gelfreich, Rom-Kedar, Turaev 
 line of a corpus says where it starts and what comes first: a wall, at a time and with a velocity
 that are enclosed between two decimals. This file proves such a line. It uses integers only, imports
 Python's standard library only, and needs no hint from whoever made the line. docs/proof.md has the
-theorem behind it; the argument stands here in the order in which it is used:
+theorem (sections 1 to 6). The argument stands here in the order in which it is used:
 
  1. `Interval`: arithmetic that never loses the true number.
  2. `Clock`, `law_jet`: a law and its two derivatives over a stretch of time.
@@ -16,10 +16,14 @@ theorem behind it; the argument stands here in the order in which it is used:
  5. `Flight.event`: which wall is met first. `bounce`: the flight after it.
  6. `start`: which wall a state leaves, or why it is refused or has no answer.
  7. `read_scene`: the scene is valid at all times, or is proved to be invalid.
- 8. `find_fault`: the claim, held against all this.
+ 8. `check_line`: what a line claims, compared with what is proved.
+ 9. `backward_error`: for --answers only, an estimate and not a proof.
 
-A claim is "proved", "false" (what is proved contradicts it), or "not proved" (open at 4,096 bits).
-Not judged are the fields `allowance`, `condition` and `level`: they say how sensitive an answer is.
+"Proved": the true numbers lie between the decimals, which may be far apart. "False": what is proved
+contradicts the claim. "Not proved": it is open at each precision up to 4,096 bits, or a search took
+too long. Walls that are met together at an irrational time stay open, and so do exact zeros of
+Fourier laws at another phase than 0. Not judged are the reason of a rejection and the fields
+`allowance`, `condition` and `level`.
 """
 
 from __future__ import annotations
@@ -36,17 +40,17 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 PRECISIONS = (128, 256, 512, 1024, 2048, 4096)  # bits, tried in turn
-PARTS = 4000  # stretches of time that one flight may be cut into
+PARTS = 4000  # stretches into which one search may be cut
 SHARE = Fraction(61, 128)  # where a stretch is cut: not in the middle, where a root may well lie
 NEAR = Fraction(1, 2**20)  # how far from its wall a state may lie, as a share of the wall's size
-LATE, LARGE = 2**30, Fraction(10**100)  # periods, or numbers, from which a stepper may refuse
-UNIT = Fraction(1, 2**53)  # half a unit in the last place of binary64, relative
+LATE, LARGE = 2**30, Fraction(10**100)  # t in periods, or a number, from which one may refuse
+UNIT = Fraction(1, 2**53)  # unit roundoff of binary64: half a unit in the last place, relative
 BEYOND = Fraction(3, 2**12)  # how far past its end a search goes, as a share of its length
-WRONG = Fraction(1, 10**9)  # backward error beyond which an answer is false
+WRONG = Fraction(1, 10**9)  # --answers: relative backward error beyond which a step is false
 SIDES = ("left", "right", "floor")
 WALLS = {"cap": ("arc", "base"), "stem": ("base", *SIDES), "mushroom": ("arc", "base", *SIDES)}
-FIELDS = ("t", "x", "y", "vx", "vy")
-NUMBERS = ("dt", "x", "y", "vx", "vy")
+FIELDS = ("t", "x", "y", "vx", "vy")  # of a state, and of an answer in floating point
+NUMBERS = ("dt", "x", "y", "vx", "vy")  # of a claimed step; dt counts from the step before
 DECIMAL = re.compile(r"-?\d{1,400}(\.\d{1,400})?(E[+-]?\d{1,4})?")
 
 
@@ -59,7 +63,7 @@ class Refused(Exception):  # noqa: N818
 
 
 class Undefined(Exception):  # noqa: N818
-    """Mathematics gives no answer, proved; the message is the reason."""
+    """It is proved that the motion has no next step; the message is the reason."""
 
 
 class Contradicted(Exception):  # noqa: N818
@@ -82,8 +86,8 @@ def require(holds: bool, failure: Exception) -> None:
 class Interval:
     """All real numbers from lo 2^exp to hi 2^exp.
 
-    The result of an operation holds the result for any numbers of its operands. It is rounded
-    outward to `bits` binary digits. A point (lo = hi) is exact, however many digits it has.
+    The result of an operation holds the result for any numbers of its operands. Operations round
+    outward to `bits` binary digits. `low`, `high` and `number` keep all digits.
     """
 
     __slots__ = ("bits", "exp", "hi", "lo")
@@ -128,7 +132,7 @@ class Interval:
         return rounded(lo, hi, self.exp - other.exp - up, self.bits)
 
     def __pow__(self, power: int) -> Interval:
-        """Return all squares."""
+        """Return all squares. `power` is 2: where 0 is inside, the least square is 0."""
         ends = self.lo**power, self.hi**power
         return rounded(min(ends) if self.sign else 0, max(ends), power * self.exp, self.bits)
 
@@ -153,12 +157,18 @@ class Interval:
         return self.lo * Fraction(2) ** self.exp, self.hi * Fraction(2) ** self.exp
 
     def cut(self) -> Interval:
-        """Return a point inside, near the middle: not the middle, where a root may well lie."""
+        """Return a point inside, near the middle: not the middle, where a root may well lie.
+
+        An interval too narrow to cut gives its lower end.
+        """
         point = (self.low + (self.high - self.low) * number(SHARE, self.bits)).low
         return point if is_below(self.low, point) else self.low
 
     def simplest(self) -> Interval:
-        """Return a point inside that has few digits: a root that has few is then found exactly."""
+        """Return a point inside that has few digits: a root that has few is then found exactly.
+
+        It is the first multiple of 2^up above lo, and 2^up <= hi - lo.
+        """
         up = max(0, (self.hi - self.lo).bit_length() - 1)
         point = min(((self.lo >> up) + 1) << up, self.hi)
         return Interval(point, point, self.exp, self.bits)
@@ -172,11 +182,11 @@ def rounded(lo: int, hi: int, exp: int, bits: int) -> Interval:
 
 def number(value: Fraction | int, bits: int) -> Interval:
     """Return a number: exactly if its denominator is a power of two, else within one unit."""
-    above, below = value.numerator, value.denominator
-    if below & (below - 1) == 0:
-        return Interval(above, above, 1 - below.bit_length(), bits)
-    up = bits + below.bit_length()
-    return rounded((above << up) // below, -((-above << up) // below), -up, bits)
+    top, bottom = value.numerator, value.denominator
+    if bottom & (bottom - 1) == 0:
+        return Interval(top, top, 1 - bottom.bit_length(), bits)
+    up = bits + bottom.bit_length()
+    return rounded((top << up) // bottom, -((-top << up) // bottom), -up, bits)
 
 
 def join(*parts: Interval) -> Interval:
@@ -187,7 +197,10 @@ def join(*parts: Interval) -> Interval:
 
 
 def is_below(one: Interval, other: Interval) -> bool:
-    """Tell whether every number of one interval is less than every number of another."""
+    """Tell whether every number of one interval is less than every number of another.
+
+    Rounding outward never changes the sign of a difference of two points.
+    """
     return (other.low - one.high).sign > 0
 
 
@@ -196,7 +209,7 @@ def pi(bits: int) -> Interval:
     """Enclose pi = 16 arctan(1/5) - 4 arctan(1/239) (Machin).
 
     Each term of either series is rounded down twice, which loses less than 3 units; times 16 that
-    is less than 64. What comes after the last term is less than that, too.
+    is less than 64. What is left out of each series is less than 64, too: 128 for both.
     """
     scale = bits + 16
     total, error = 0, 128
@@ -214,8 +227,8 @@ def cos_sin(turns: Interval) -> tuple[Interval, Interval]:
     The nearest quarter turn is taken out. The angle left is m 2^-scale for an integer m, and up to
     `radius` units more or less; the slopes of both functions are at most 1. |m| 2^-scale < 1, so
     each of Taylor's terms is at most the term before. They are rounded down to integers, twice
-    each: where term k - 1 is e units too small, term k is at most (e + 1) / k + 1 too small, which
-    is less than 4. The series alternates, so what is left out counts as one more term.
+    each: where term k - 1 is e units too small, term k is at most (e + 1) / k + 1 too small: less
+    than 4, from e = 0 on. The series alternates, so what is left out counts as one more term.
     """
     scale, bits = turns.bits + 8, turns.bits
     quarter = floor((turns.lo + turns.hi) * Fraction(2) ** (turns.exp + 1) + Fraction(1, 2))
@@ -245,14 +258,17 @@ class Jet(NamedTuple):
 
 
 def times(p: Jet, q: Jet) -> Jet:
-    """Return the product, by Leibniz' rule."""
+    """Return the product, by Leibniz' rule. A square (p is q) is enclosed more tightly, as one."""
     if p is q:
         return Jet(p.f**2, p.f * p.d1 * 2, (p.d1**2 + p.f * p.d2) * 2)
     return Jet(p.f * q.f, p.d1 * q.f + p.f * q.d1, p.d2 * q.f + p.d1 * q.d1 * 2 + p.f * q.d2)
 
 
 class Leg(NamedTuple):
-    """c + bend (t - origin)^2 / 2 from `begin` to `end`; times count from the first knot."""
+    """c + bend (t - origin)^2 / 2 from `begin` to `end`: half of the way between two knots.
+
+    Times count from the first knot; `bend` is the acceleration.
+    """
 
     begin: Fraction
     end: Fraction
@@ -265,12 +281,12 @@ class Law(NamedTuple):
     """A parameter as a function of time.
 
     Attributes:
-        mean: its value, if it has neither waves nor legs.
+        mean: its value without waves; not used where there are legs.
         waves: for k = 1, 2, ... the factors of cos and sin of k times the phase.
-        legs: of a bang-bang law, two for each pair of knots, in the order of time.
+        legs: of a bang-bang law, two from each knot to the next, in the order of time.
         first: time of the first knot.
-        ends: bounds of its values.
-        is_tight: whether it comes to both bounds.
+        ends: a lower and an upper bound of its values, at all times.
+        is_tight: whether it attains both.
     """
 
     mean: Fraction
@@ -294,7 +310,15 @@ class Scene(NamedTuple):
 
 
 class Clock:
-    """The common phase of all laws, as a function of the time s since an exact instant."""
+    """The phase of all laws, in turns, at a time s after an exact instant: offset + pace s.
+
+    Attributes:
+        pace: turns per unit of time; 0 when nothing moves.
+        offset: the phase at the instant, less whole turns; the phase is 0 at time 0.
+        turn: the time of one turn; None when nothing moves.
+        omega: the phase's rate in radians, 2 pi pace.
+        zero: the number 0.
+    """
 
     def __init__(self, scene: Scene, instant: Fraction, bits: int) -> None:
         """Reduce the phase at the instant to one turn, with as many digits as its size asks for."""
@@ -314,8 +338,9 @@ class Clock:
     def waves(self, s: Interval, n: int) -> list[list[Interval]]:
         """Enclose cosine and sine of k times the phase over a stretch, for k = 1 to n.
 
-        A wave lies between its values at the ends, and 1 or -1 where it turns: at quarters of a
-        turn.
+        A wave turns at quarters of a turn only: cosine is 1 at quarter q if q % 4 = 0 and -1 if 2,
+        sine is 1 if 1 and -1 if 3. Between, it lies between its values at the ends. Any four
+        quarters in a row hold all of these.
         """
         begin, end = self.offset + self.pace * s.low, self.offset + self.pace * s.high
         one = number(1, self.bits)
@@ -323,8 +348,8 @@ class Clock:
         for k in range(1, n + 1):
             first, last = cos_sin(begin * k), cos_sin(end * k)
             quarters = range(ceil(4 * k * begin.ends[0]), floor(4 * k * end.ends[1]) + 1)[:4]
-            tops = [[one] * any(q % 4 == top for q in quarters) for top in range(4)]
-            lows = [[-one] * any(q % 4 == top for q in quarters) for top in (2, 3)]
+            tops = [[one] * any(q % 4 == top for q in quarters) for top in (0, 1)]
+            lows = [[-one] * any(q % 4 == low for q in quarters) for low in (2, 3)]
             found.append([join(first[i], last[i], *tops[i], *lows[i]) for i in (0, 1)])
         return found
 
@@ -343,7 +368,8 @@ def wave_jet(
 def law_jet(law: Law, clock: Clock, s: Interval) -> Jet:
     """Enclose a law and its derivatives over a stretch of time.
 
-    Exact rationals tell which legs of a bang-bang law a stretch touches: it is enclosed on each.
+    Rationals tell which legs of a bang-bang law a stretch touches: it is enclosed on each, and the
+    parts are joined. f'' is enclosed but at knots and between two legs, where it jumps.
     """
     exact = partial(number, bits=clock.bits)
     if not law.legs:
@@ -365,7 +391,8 @@ def law_jet(law: Law, clock: Clock, s: Interval) -> Jet:
 def exact_jet(scene: Scene, time: Fraction, name: str) -> Jet:
     """Return a law and its derivatives just after a time, as rationals.
 
-    Waves are taken at phase 0 only.
+    Waves are taken at phase 0 only, where cosine is 1 and sine is 0: at time 0, and after whole
+    multiples of a rational period.
 
     Raises:
         Unproved: they are not known to be rational.
@@ -392,9 +419,9 @@ def exact_jet(scene: Scene, time: Fraction, name: str) -> Jet:
 
 # 3. Walls
 
-
-# Each f is a sum of products, with their signs: positive inside. The base of a stem is its top.
-# A scene is valid while its laws (but the slope), r - w and w - h slope are positive, too.
+# f is a sum of products of laws and coordinates, each with its sign; f > 0 inside the table. The
+# base of a stem lies above the particle: "top". The last two are conditions, not walls: a scene is
+# valid while r - w >= 0, w - h slope > 0, and every law but the slope is > 0.
 TERMS: dict[str, tuple[tuple[Any, ...], ...]] = {
     "arc": ((1, "r", "r"), (-1, "x", "x"), (-1, "y", "y")),
     "base": ((1, "y"),),
@@ -424,9 +451,8 @@ def wall_jet(scene: Scene, wall: str, law: Callable[[str], Jet], x: Jet, y: Jet)
 
 
 # 4. Where f > 0, and where it vanishes first
-
-
-Line = tuple[Interval, Interval, Interval, Interval]  # x and y at the instant of a clock, vx, vy
+#
+# A stretch is a closed interval of times since the clock's instant. It is cut into parts.
 
 
 class State(NamedTuple):
@@ -446,16 +472,16 @@ Hit = tuple[str, Interval]  # a wall, and when it is met since the clock's insta
 class Flight:
     """A particle in flight: where walls are on its way, and what it meets first.
 
-    The state is enclosed by a box, and begins within the times `begin` (exactly 0 for a state that
-    is given). What is proved holds for each state in the box. A wall that is being left has a
-    residual c: f vanishes where the flight begins but for the rounding of the state. There f - c
-    stands for f.
+    Times count from the clock's instant. The line at time 0 is enclosed by a box. The flight begins
+    at some time in `begin`, which is exactly 0 for a state that is given. What is proved holds for
+    each state in the box. On the wall that it leaves f is not 0 at the begin but c, the residual,
+    because the state is rounded. There f - c stands for f.
     """
 
     def __init__(
         self,
         clock: Clock,
-        line: Line,
+        line: tuple[Interval, Interval, Interval, Interval],
         end: Fraction,
         begin: Interval,
         wall: str | None = None,
@@ -465,9 +491,9 @@ class Flight:
 
         Args:
             clock: the laws' phase; times are counted from its instant.
-            line: the flight's line.
+            line: x and y at that instant, vx and vy.
             end: the horizon.
-            begin: when the flight begins.
+            begin: encloses when the flight begins.
             wall: the wall being left.
             residual: c of this wall.
         """
@@ -477,7 +503,6 @@ class Flight:
         self.is_flat = False  # f = f' = 0 < f'' on the wall being left at time 0, exactly
         self.state: State | None = None  # known exactly: it decides ties
         self._laws: dict[tuple[str, int, int, int], Jet] = {}
-        self._parts = 0
 
     def law(self, name: str, s: Interval) -> Jet:
         """Enclose a law over a stretch."""
@@ -494,13 +519,13 @@ class Flight:
         return jet._replace(f=jet.f - self.residual) if wall == self.wall else jet
 
     def exact(self, wall: str, s: Fraction) -> Jet:
-        """Return f of a wall at an exact time, in rationals.
+        """Return f of a wall at an exact time, in rationals; no residual is subtracted.
 
         Raises:
             Unproved: it is not known to be rational.
         """
         if self.state is None:
-            raise Unproved("two walls are met together, as far as this precision shows")
+            raise Unproved("the state is not known exactly")
         t, x, y, vx, vy, _ = self.state
         place = Jet(x + vx * s, vx, Fraction(0)), Jet(y + vy * s, vy, Fraction(0))
         return wall_jet(self.scene, wall, partial(exact_jet, self.scene, t + s), *place)
@@ -516,25 +541,31 @@ class Flight:
     def is_clear(self, wall: str, s: Interval) -> bool:
         """Tell whether f > 0 is proved on a stretch but at its left end, where f >= 0 is known.
 
-        f and f' are continuous, for laws come to rest at their knots. One of these suffices:
+        Then f > 0 at its right end, where the next stretch starts. f and f' are continuous, for
+        laws come to rest at their knots. f'' may jump at finitely many times. One of these suffices
+        (the names are those of docs/proof.md, section 3):
 
-        - f' > 0: f grows;
-        - f'' <= 0 but at knots, and f > 0 at the right end: f lies above its chord;
-        - f > 0 as enclosed;
-        - f' < 0, and f > 0 at the right end;
-        - f(p) + f'(p) (s - p) + f'' (s - p)^2 / 2 > 0 for a point p of the stretch (Taylor);
-        - the wall never comes to where the particle is at either end (`is_never_met`).
+        - rising: f' > 0;
+        - concave: f'' <= 0, and f > 0 at the right end: f lies on or above its chord;
+        - plain: f > 0 as enclosed;
+        - falling: f' < 0, and f > 0 at the right end;
+        - centred: f(p) + f'(p) (s - p) + f'' (s - p)^2 / 2 > 0 for a point p of the stretch.
+          Taylor's theorem holds across the jumps, because f' is Lipschitz;
+        - swept: the wall never comes to where the particle is at either end (`is_never_met`).
 
         The wall being left has f = 0 where the flight begins, somewhere in `begin`. A stretch that
-        holds `begin` is clear by the first two only; or if f' = 0, too, by f'' > 0.
+        holds `begin` holds all of it, and f > 0 is proved after the begin only. Rising and concave
+        prove
+        this: the chord starts at 0, wherever the begin is. So does f'' > 0 if f' = 0 at the begin
+        exactly (lifting, `is_flat`).
         """
         jet, p = self.f(wall, s), s.simplest()
-        is_left = self.f(wall, s.high).f.sign > 0
-        if jet.d1.sign > 0 or (jet.d2.hi <= 0 and is_left):
+        is_positive_at_end = self.f(wall, s.high).f.sign > 0
+        if jet.d1.sign > 0 or (jet.d2.hi <= 0 and is_positive_at_end):
             return True
         if self.holds_begin(wall, s):
             return bool(self.is_flat and jet.d2.sign > 0)
-        if jet.f.sign > 0 or (jet.d1.sign < 0 and is_left):
+        if jet.f.sign > 0 or (jet.d1.sign < 0 and is_positive_at_end):
             return True
         at, u, half = self.f(wall, p), s - p, number(Fraction(1, 2), self.bits)
         if (at.f + at.d1 * u + jet.d2 * u**2 * half).sign > 0:
@@ -545,20 +576,26 @@ class Flight:
         return all(self.is_never_met(wall, end, turn) for end in (s.high, s.low))
 
     def holds_begin(self, wall: str, s: Interval) -> bool:
-        """Tell whether f of a wall may vanish on a stretch because the flight begins there."""
+        """Tell whether a stretch of the wall being left does not lie after all of `begin`.
+
+        There f may vanish because the flight begins, and no root is accepted.
+        """
         return wall == self.wall and not is_below(self.begin, s.low)
 
     def is_never_met(self, wall: str, at: Interval, turn: Interval) -> bool:
-        """Tell whether a particle that rests where this one is at a point is never met by a wall.
+        """Tell whether a wall never reaches the place where this particle is at the time `at`.
 
-        With the laws held still, f is concave in the place. So f at each time of a stretch is at
-        least the lesser of its values for the two particles that rest at the stretch's ends.
-        Neither is met in one period: then neither is ever met, and f > 0 on the stretch.
+        The flight is straight, and with the laws held still f is concave in the place. So f on a
+        stretch is at least the lesser of its values for two particles that rest at its ends. A
+        particle at rest that is not met within one period is never met.
+
+        The particle at rest "begins" at -1, before the search: no stretch holds its begin, so f > 0
+        is asked from time 0 on. The search is no longer than a period, so it does not ask this
+        again.
         """
         (x, y, vx, vy), zero = self.line, self.clock.zero
         line = x + vx * at, y + vy * at, zero, zero
-        before = number(-1, self.bits)
-        rest = Flight(self.clock, line, self.end, before, self.wall, self.residual)
+        rest = Flight(self.clock, line, self.end, number(-1, self.bits), self.wall, self.residual)
         rest._laws = self._laws
         try:
             return rest.first_root(wall, zero, turn.high) is None
@@ -566,10 +603,12 @@ class Flight:
             return False
 
     def first_root(self, wall: str, start: Interval, stop: Interval) -> Interval | None:
-        """Enclose the first root of f between two points; None proves that f > 0 after the first.
+        """Enclose the first root of f between two points; None proves f > 0 up to `stop`.
 
-        The stretch is cut until each part is clear, from the left; or until f' < 0 on a part and f
-        < 0 at its right end: then f has one root there.
+        Parts are cleared from the left. So f > 0 at the left end of the part in hand, unless it
+        holds `begin`. A part has exactly one root if f' < 0 on it and f < 0 at its right end. That
+        root is the first, because all parts before it are clear. Any other part is cut in two:
+        after all of `begin`, so that only the first part holds it.
 
         Raises:
             Unproved: a part stays open.
@@ -579,24 +618,22 @@ class Flight:
             Unproved(f"{wall}: f is not shown to be positive where the search begins"),
         )
         parts = [join(start, stop)]
-        while parts:
-            part, self._parts = parts.pop(), self._parts + 1
-            require(self._parts < PARTS, Unproved(f"{wall}: more than {PARTS} stretches of time"))
+        for _ in range(PARTS):
+            if not parts:
+                return None
+            part = parts.pop()
             if self.is_clear(wall, part):
                 continue
             at_begin, cut = self.holds_begin(wall, part), part.cut()
-            if (
-                not at_begin
-                and self.f(wall, part).d1.sign < 0
-                and self.f(wall, part.high).f.sign < 0
-            ):
+            falls = self.f(wall, part).d1.sign < 0 and self.f(wall, part.high).f.sign < 0
+            if falls and not at_begin:
                 return self.closest(wall, part)
             require(
                 is_below(part.low, cut) and is_below(self.begin if at_begin else part.low, cut),
                 Unproved(f"{wall}: f is too small, or begins too flat, for this precision"),
             )
             parts += [join(cut, part.high), join(part.low, cut)]
-        return None
+        raise Unproved(f"{wall}: more than {PARTS} stretches of time")
 
     def closest(self, wall: str, root: Interval) -> Interval:
         """Narrow a root: by the sign of f at a point p, and by root = p - f(p) / f' (Newton).
@@ -622,9 +659,14 @@ class Flight:
         """Find the first wall met before the horizon; None for none.
 
         y is linear. Before y = 0 is crossed the walls of one part of the table can be met: the arc
-        in the cap, both sides and the floor in the stem. Where it is crossed, the mouth is open or
-        the base is met. After that come the walls of the other part. A particle that glides along y
-        = 0 inside the mouth can meet the mouth's edge only.
+        in the cap, both sides and the floor in the stem. Where it is crossed, f of the sides is w +
+        x and w - x. From the cap the base is met if one is negative, and the mouth is open if both
+        are positive. From the stem both must be positive: the sides were not met before. After the
+        mouth come the walls of the other part. A particle that glides along y = 0 inside the mouth
+        can meet its edge only.
+
+        Args:
+            in_cap: the flight begins above y = 0, or on it and moves up.
 
         Raises:
             Undefined: two walls are met together, or the mouth's edge, exactly.
@@ -658,7 +700,11 @@ class Flight:
         return hit
 
     def crossing(self, *, in_cap: bool) -> tuple[Interval | None, Fraction | None]:
-        """Enclose when y = 0 is crossed before the horizon; return it exactly, too, if known."""
+        """Enclose when y = 0 is crossed before the horizon; return it exactly, too, if known.
+
+        (None, None) means that it is not crossed. After the base, upward in the cap and downward in
+        the stem, y moves away from 0. A crossing at the horizon exactly is not before it.
+        """
         (_, y, _, vy), end = self.line, number(self.end, self.bits)
         if self.wall == "base" or vy.lo == vy.hi == 0 or vy.sign == (1 if in_cap else -1):
             return None, None
@@ -669,18 +715,29 @@ class Flight:
         return found, exact
 
     def first_hit(
-        self, walls: Sequence[str], start: Interval, limit: Interval, crossing: Fraction | None
+        self, walls: Sequence[str], start: Interval, limit: Interval, exact: Fraction | None
     ) -> Hit | None:
         """Find which of some walls is met first, before y = 0 is crossed or the horizon comes.
 
-        The search ends soon at first, and then ever later, for all walls. f > 0 is proved at each
-        end. It goes on a little past the last, so that a root there lies inside. What is met at the
-        horizon exactly is not met before it.
+        Each search covers one stretch, for all walls. A wall without a root is clear at least to
+        the upper end of the earliest root: until a root is found walls are clear to the end of the
+        stretch, and the first root lies in it; then they are searched to just past the root found
+        last. So `earliest` needs to compare the roots only. A wall of which something is open is
+        asked again after the others: it may be open after their hit only.
+
+        The last search goes a little past the limit, so that a root there lies inside. The limit is
+        the horizon if it ends at self.end; a crossing lies before that. What is met at the horizon
+        exactly is not met before it: its enclosure overlaps the horizon and holds one root only.
         """
-        for begin, stop in self.searches(start, limit.high):
-            hits: list[Hit] = []
-            for wall in walls:
-                root = self.first_root(wall, begin, stop)
+        for since, stop in self.stretches(start, limit.high):
+            hits, queue = [], list(walls)
+            for wall in queue:
+                try:
+                    root = self.first_root(wall, since, stop)
+                except Unproved as question:
+                    require(queue.count(wall) < 2, question)
+                    queue.append(wall)
+                    continue
                 if root is None or is_below(limit, root):
                     continue
                 if (
@@ -689,13 +746,17 @@ class Flight:
                     or not self.is_zero(wall, self.end)
                 ):
                     hits.append((wall, root))
-                    stop = (root.high + (root.high - begin) * number(BEYOND, self.bits)).high
+                    stop = (root.high + (root.high - since) * number(BEYOND, self.bits)).high
             if hits:
-                return self.earliest(hits, limit, crossing)
+                return self.earliest(hits, limit, exact)
         return None
 
-    def searches(self, start: Interval, last: Interval) -> Iterator[tuple[Interval, Interval]]:
-        """Yield the ends of searches: the first is as long as a crossing of the table, or a period."""
+    def stretches(self, start: Interval, last: Interval) -> Iterator[tuple[Interval, Interval]]:
+        """Yield stretches, one after the other, from `start` to a little past `last`.
+
+        The first is about as long as a crossing of the table or a period, whichever is less. Each
+        next one is four times as long. The lengths affect the cost only, not what is proved.
+        """
         sizes = [law.ends[1] for name, law in self.scene.laws.items() if name in ("r", "w", "h")]
         speed = max(abs(end) for v in self.line[2:] for end in v.ends)
         lengths = [sum(sizes) / speed] if speed else []
@@ -706,8 +767,10 @@ class Flight:
             start, length = stop, length * 4
         yield start, (last + (last - start) * number(BEYOND, self.bits)).high
 
-    def earliest(self, hits: list[Hit], limit: Interval, crossing: Fraction | None) -> Hit:
+    def earliest(self, hits: list[Hit], limit: Interval, exact: Fraction | None) -> Hit:
         """Return the earliest of some hits, each the first of its wall.
+
+        `first_hit` has shown that walls without a hit come later.
 
         Raises:
             Undefined: walls are met together at a rational time, exactly, and all others later.
@@ -718,7 +781,8 @@ class Flight:
             best[1], limit
         ):
             return best
-        # A root that is a fraction is the only one so close whose digits are half as many.
+        # A guess: the fraction closest to a root, with a denominator of half as many digits. It
+        # proves nothing. `is_zero` proves f = 0 there, and a root's enclosure holds one root only.
         for time in (root.ends[0].limit_denominator(2 ** (self.bits // 2 - 8)) for _, root in hits):
             met = {
                 w
@@ -726,8 +790,8 @@ class Flight:
                 if root.ends[0] <= time <= root.ends[1] and self.is_zero(w, time)
             }
             is_first = all(wall in met or time < root.ends[0] for wall, root in hits)
-            is_first = is_first and 0 < time < self.end and (crossing is None or time <= crossing)
-            met |= {"base"} if time == crossing else set()
+            is_first = is_first and 0 < time < self.end and (exact is None or time <= exact)
+            met |= {"base"} if time == exact else set()
             is_edge = self.scene.table == "mushroom" and "base" in met and "arc" not in met
             require(
                 not (is_first and len(met) > 1),
@@ -737,19 +801,27 @@ class Flight:
 
 
 def bounce(flight: Flight, hit: Hit) -> tuple[dict[str, Interval], Flight]:
-    """Return dt, x, y, vx, vy at a hit, v after it, and the next flight.
+    """Return what is claimed of a hit (dt, place, velocity after it), and the next flight.
 
-    v' = v - 2 f' grad f / |grad f|^2, which is v - 2 (v.n - u) n. The next flight is described at
-    an exact instant close to the hit, on its own line: there the place is a box, and it begins a
-    little before or after. Its wall keeps the residual when it is the one that was left.
+    n = grad f / |grad f| points inside, and u is the wall's speed along n. f' = |grad f| (v.n - u),
+    so v' = v - 2 (v.n - u) n is v - 2 f' grad f / |grad f|^2.
+
+    The hit is at a time s, enclosed; `near` is an exact time close to it. At `near` the new line is
+    at x(s) - v' (s - near) = x(near) + (v - v') (s - near), a box. The next flight begins at
+    s - near, about 0. If the wall met is the wall left, f - c = 0 at the hit, and c stays. On any
+    other wall f = 0 at the hit.
     """
     clock, (wall, s), (x, y, vx, vy), is_base = flight.clock, hit, flight.line, hit[0] == "base"
     at_x, at_y = x + vx * s, clock.zero if is_base else y + vy * s
     one, is_tilted = number(1, clock.bits), wall in ("left", "right")
     slope = flight.law("slope", s).f if is_tilted else clock.zero
-    down = -one if flight.scene.table == "stem" else one
-    sides = {"left": (one, slope), "right": (-one, slope), "floor": (clock.zero, one)}
-    fx, fy = {"arc": (at_x * -2, at_y * -2), "base": (clock.zero, down), **sides}[wall]
+    fx, fy = {
+        "arc": (at_x * -2, at_y * -2),
+        "base": (clock.zero, -one if flight.scene.table == "stem" else one),
+        "floor": (clock.zero, one),
+        "left": (one, slope),
+        "right": (-one, slope),
+    }[wall]
     kick = flight.f(wall, s).d1 * 2 / (fx**2 + fy**2)
     new_vx, new_vy = vx - kick * fx, vy - kick * fy
     near = s.simplest()
@@ -769,6 +841,13 @@ def bounce(flight: Flight, hit: Hit) -> tuple[dict[str, Interval], Flight]:
 
 def start(scene: Scene, state: State, t_end: Fraction, bits: int) -> tuple[Flight, bool]:
     """Judge a start: which wall it leaves, and whether it is in the cap.
+
+    A mushroom's state must lie inside the walls of its own part, cap or stem. On y = 0 beyond the
+    mouth it is on the base, so the arc is asked. Inside the mouth |x| < w <= r, so the arc is not
+    asked. On the arc at y = 0 it is at a corner, so the base is asked, too.
+
+    Returns:
+        The flight, and whether it begins in the cap.
 
     Raises:
         Refused: the state is not in the table, or off its wall, or moves into it.
@@ -814,9 +893,12 @@ def start(scene: Scene, state: State, t_end: Fraction, bits: int) -> tuple[Fligh
 def is_flat(flight: Flight, wall: str) -> bool:
     """Tell whether f' = 0 < f'' on the wall being left; False where f' > 0.
 
+    f'' is that just after the start. With f'' < 0 the wall pushes: "sliding". With f'' = 0 it is
+    "sliding" along a base or where nothing moves, else "tangency".
+
     Raises:
         Refused: f' < 0.
-        Undefined: f' = 0 and f'' <= 0: the wall pushes, or the particle rests on it.
+        Undefined: f' = 0 and f'' <= 0.
         Unproved: this precision cannot tell.
     """
     slope, scene = flight.f(wall, flight.clock.zero).d1.sign, flight.scene
@@ -832,6 +914,9 @@ def is_flat(flight: Flight, wall: str) -> bool:
 
 def require_near(flight: Flight, wall: str, gap: Interval) -> None:
     """Refuse a state farther from its wall than 2^-20 of the wall's size.
+
+    The size is r for the arc and a base, h for the floor, w for the top of a stem. For a side it is
+    w, or |x| if greater. The arc's f is about 2 r times the distance, so it is divided by 2 r.
 
     Raises:
         Refused: it is.
@@ -913,7 +998,9 @@ def read_law(data: Any) -> tuple[Law, tuple[Fraction | None, Fraction | None]]:
 
 
 def read_legs(knots: Any) -> tuple[Law, tuple[None, Fraction]]:
-    """Read a bang-bang law: each leg is two parabolas, at rest at its knots.
+    """Read a bang-bang law: two legs, each a parabola, from each knot to the next.
+
+    The law is at rest at the knots. Both legs have the same value and slope where they meet.
 
     Raises:
         Refused: times do not rise, or the law does not close.
@@ -938,10 +1025,10 @@ def read_legs(knots: Any) -> tuple[Law, tuple[None, Fraction]]:
 
 
 def read_number(name: str, value: Any) -> Fraction:
-    """Return a finite binary64 number, exactly.
+    """Return the binary64 number that a JSON number denotes, as a fraction.
 
     Raises:
-        Refused: it is none.
+        Refused: it is no finite number.
     """
     require(
         type(value) in (int, float) and abs(value) <= sys.float_info.max,
@@ -953,8 +1040,10 @@ def read_number(name: str, value: Any) -> Fraction:
 def require_valid(scene: Scene) -> None:
     """Prove r, h, w > 0, w <= r and w > h slope at all times.
 
-    Bounds of the laws show it, or the search of section 4: each condition is an f that must not
-    vanish within a period. Where f has a root it falls below 0, and the condition is broken.
+    A bound of a law shows it, or a search of section 4 over one period for a root of f. A root
+    proves the condition broken: `first_root` accepts one only where f < 0 follows. So does a law
+    that attains a bound <= 0 (`is_tight`). As r > 0, w = nu r <= r means nu <= 1. A condition that
+    touches 0 may stay open. The search has 256 bits at every precision.
 
     Raises:
         Refused: a condition is broken.
@@ -978,7 +1067,7 @@ def require_valid(scene: Scene) -> None:
         )
         if not is_broken and (clock.turn or value.sign < 1):
             is_broken = rest.first_root(name, zero, (clock.turn or zero).high) is not None
-        require(not is_broken, Refused(f"{name} comes below its least value at some time"))
+        require(not is_broken, Refused(f"{name} breaks its bound at some time"))
 
 
 # 8. Claims
@@ -1021,7 +1110,8 @@ def walk(scene: Scene, state: State, t_end: Fraction, bits: int) -> Iterator[Ste
 def mark(step: Step) -> str:
     """Return what a step means for capture: "out", an arc hit "captured" or "free", or "".
 
-    A hit of the arc is captured when |x vy - y vx| > w |v|; squares compare as these do.
+    A hit of the arc is captured when |x vy - y vx| > w |v|, with v before the hit: the line passes
+    the centre at a distance above w, so it misses the mouth. Squares are compared.
     """
     x, y, vx, vy = step.flight.line
     if step.wall != "arc" or step.flight.scene.table != "mushroom":
@@ -1033,10 +1123,10 @@ def mark(step: Step) -> str:
 
 
 def find_stays(marks: Sequence[str]) -> list[list[int]]:
-    """Return where each stay in the cap begins and ends, as places in a path.
+    """Return where each stay in the cap begins and ends, as indices into a path.
 
-    It begins with a captured hit. It ends with the first hit of the arc after its last captured
-    one, or where the particle leaves the cap, or at the horizon.
+    It begins with the first captured hit since the particle was last out. It ends with the first
+    free hit after the last captured one, or else at the next "out". The horizon counts as "out".
     """
     stays, since = [], 0
     for place in (place for place, what in enumerate(marks) if what == "out"):
@@ -1062,7 +1152,7 @@ def take(data: Any, name: str, kind: type) -> Any:
 
 
 def require_inside(name: str, claim: Any, found: Interval) -> None:
-    """Require that a claimed enclosure holds the enclosed number.
+    """Require that a claimed enclosure (low, high) holds the proved one (least, most).
 
     Raises:
         Unreadable: the claim is no pair of decimals.
@@ -1070,10 +1160,10 @@ def require_inside(name: str, claim: Any, found: Interval) -> None:
         Unproved: it may.
     """
     ends, (least, most) = take(claim, name, list), found.ends
-    is_pair = len(ends) == 2 and all(
-        isinstance(end, str) and DECIMAL.fullmatch(end) for end in ends
+    require(
+        len(ends) == 2 and all(isinstance(end, str) and DECIMAL.fullmatch(end) for end in ends),
+        Unreadable(f"{name} must be two decimals"),
     )
-    require(is_pair, Unreadable(f"{name} must be two decimals"))
     low, high = map(Fraction, ends)
     require(low <= most, Contradicted(f"{name} lies below its enclosure"))
     require(least <= high, Contradicted(f"{name} lies above its enclosure"))
@@ -1100,7 +1190,8 @@ def check_line(record: Any, bits: int) -> None:
     try:
         scene = read_scene(record.get("scene"))
         given, t_end = read_state(scene, state), read_number("t_end", record.get("t_end"))
-        period = scene.period or (6 / scene.omega if scene.omega else 1)
+        # 44 / 7 is a little more than 2 pi. Where nothing moves, times count in units.
+        period = scene.period or (Fraction(44, 7) / scene.omega if scene.omega else 1)
         is_extreme = abs(given.t) >= LATE * period or max(map(abs, given[:5])) >= LARGE
         found = list(itertools.islice(walk(scene, given, t_end, bits), count))
         right = "collision" if found[-1].wall else "horizon"
@@ -1146,7 +1237,9 @@ def read_state(scene: Scene, data: Mapping[str, Any]) -> State:
 
 
 def thin(path: Sequence[Step], claimed: Any) -> list[Step]:
-    """Return the steps of a flow that its line has: where a stay begins or ends, and the horizon.
+    """Return the steps of a flow that its line lists: begin and end of each stay, and the horizon.
+
+    dt counts from the step listed before.
 
     Raises:
         Contradicted: the stays are others.
@@ -1181,6 +1274,7 @@ def verify_line(record: Any) -> Verdict:
             check_line(record, bits)
             return Verdict("proved")
         except Contradicted as reason:
+            # It is proved, whatever the precision.
             return Verdict("false", str(reason))
         except Unproved as reason:
             verdict = Verdict("not proved", str(reason))
@@ -1198,17 +1292,18 @@ def first_step(scene: Scene, state: State, t_end: Fraction) -> tuple[str | None,
 
 
 def backward_error(scene: Scene, state: State, t_end: Fraction, answer: Any) -> float:
-    """Return how far an answer to one step is from the truth, in backward ulps.
+    """Estimate how far an answer to one step is from the truth, in units of 2^-53.
 
-    That is |answer - truth|, for the worst of t, x, y, vx, vy, over what moves the truth when each
-    input moves by 2^-53 of its size, and 2^-53 of the truth.
+    The truth is the middle of an enclosure with 256 bits. Each error is divided by what moves that
+    number: the sum of its changes when one input at a time grows by 2^-53 of itself, and 2^-53 of
+    the number. A sum of 0 counts as 2^-53. The result is the worst of five ratios, at most LARGE.
 
     Raises:
-        Unreadable: a field is missing.
+        Refused: a field is missing, or no number.
         Contradicted: another wall is met first.
         Unproved: 256 bits cannot tell.
     """
-    given = [Fraction(take(answer, name, float)) for name in FIELDS]
+    given = [read_number(name, answer.get(name)) for name in FIELDS]
     wall, truth = first_step(scene, state, t_end)
     require(answer.get("wall") == wall, Contradicted(f"{wall or 'the horizon'} is met first"))
     moves = [UNIT * abs(value) for value in truth]
@@ -1225,11 +1320,14 @@ def backward_error(scene: Scene, state: State, t_end: Fraction, answer: Any) -> 
 
 
 def verify_answers(path: str) -> Iterator[tuple[str, Verdict]]:
-    """Judge a trajectory of floating-point numbers, each step from the state that it had itself.
+    """Judge a trajectory of floating-point numbers: each step starts from the answer before it.
+
+    "Proved" means here: the wall is proved, and the estimated backward error is at most WRONG.
 
     Raises:
         Unreadable: the file is no object with `scene`, `state`, `steps`, and maybe `t_end`.
         Refused: the scene is invalid.
+        Unproved: whether the scene is valid is open.
     """
     data = json.loads(Path(path).read_text(encoding="utf-8"))
     scene, steps = read_scene(take(data, "scene", dict)), take(data, "steps", list)
@@ -1268,7 +1366,7 @@ def main(arguments: Sequence[str]) -> int:
                 statuses.append(verdict.status)
                 if has_answers or verdict.status != "proved":
                     print(f"{where}: {verdict.status}: {verdict.reason}")
-    except (OSError, ValueError, RecursionError, Refused) as error:
+    except (OSError, ValueError, RecursionError, Refused, Unproved) as error:
         print(f"{path}: unreadable after {len(statuses)} claims: {error}", file=sys.stderr)
         return 2
     print(f"{statuses.count('proved')} of {len(statuses)} proved")

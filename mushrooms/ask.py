@@ -1,4 +1,4 @@
-"""`mushrooms ask`: one case of the suite, its certified answer and rule, and what a command says to it."""
+"""`mushrooms ask`: a case's question, certified answer and rule, the verifier's word, a stepper's answer."""
 
 from __future__ import annotations
 
@@ -67,6 +67,7 @@ def _show(vector: Vector, disguise: Disguise) -> None:
     from conformance import vectors
     from conformance.grading.agreement import middle
     from conformance.suite.disguise import asked
+    from conformance.verify import verify_line
 
     console = new_console()
     condition = f", condition {vector.condition:.3g}" if vector.condition else ""
@@ -84,6 +85,8 @@ def _show(vector: Vector, disguise: Disguise) -> None:
             console.print(f"  {number:>4}  {escape(in_one_line(msgspec.to_builtins(outcome)))}")
         for begin, end in expectation.stays:
             console.print(f"  captured from step {begin + 1} to step {end + 1}")
+    verdict = verify_line(json.loads(msgspec.json.encode(vector)))
+    console.print(f"verifier   {verdict.status} {escape(verdict.reason)}".rstrip())
 
 
 def _put(command: list[str], vector: Vector, disguise: Disguise) -> Result:

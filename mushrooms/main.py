@@ -68,7 +68,7 @@ COMMANDS = {
     "export": Listed("mushrooms.stored:export", "Write a finished run as one table.", "run --to run.csv"),
     "attack": Listed(
         "mushrooms.attack:attack",
-        "Ask nasty questions, and compare the answers with a second stepper's.",
+        "Ask nasty questions, and have the verifier judge the answers.",
         "--family knot-at-event --cases 20000 --seed 1",
     ),
     "audit": Listed(

@@ -2,7 +2,7 @@
 
 `step` answers one step and `path` many, each with what `answers` describes. A flight (`course`) starts where
 `start` finds it; `isolation` finds its first root on the walls of `walls`, in the arithmetic of `arithmetic`
-or, for ties, of `rational`; `chain` bounces it. `certificate` writes the proof down.
+or, for ties, of `rational`; `chain` bounces it.
 """
 
 from reference.answers import Moment, Outcome, Trajectory

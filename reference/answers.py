@@ -1,15 +1,14 @@
-"""What the reference answers: enclosures of a collision, a horizon or a trajectory, and what proves them."""
+"""What the reference answers: enclosures of a collision, a horizon or a trajectory."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from fractions import Fraction
 from typing import NamedTuple
 
 import scene as wire
 from reference.arithmetic import Enclosure
-from reference.isolation import Leaf
 from reference.margins import Margins
+from reference.walls import EnclosedFlight
 from scene import Rejected, Undecided, Undefined, Wall
 
 
@@ -26,25 +25,6 @@ class Moment(NamedTuple):
 Jacobian = tuple[tuple[Enclosure, ...], ...]
 
 
-class Departure(NamedTuple):
-    """From where an answer was proved: the flight, for every state within these enclosures.
-
-    Attributes:
-        instant: absolute time from which flight times are counted, exactly [time].
-        x, y, vx, vy: place and velocity on the line of flight at that instant.
-        begin: flight time at which the flight begins: 0 for an exact start.
-        residuals: f(0) of the wall being left, if any.
-    """
-
-    instant: Fraction
-    x: Enclosure
-    y: Enclosure
-    vx: Enclosure
-    vy: Enclosure
-    begin: Enclosure
-    residuals: dict[Wall, Enclosure]
-
-
 @dataclass(frozen=True)
 class ProvedCollision:
     """A proved first collision.
@@ -55,9 +35,8 @@ class ProvedCollision:
         after: the state just after the bounce.
         slope: f' at the hit, < 0.
         digits: working decimals that decided it.
-        departure: the flight for which this is proved.
+        departure: the flight that ends with this hit, its numbers enclosed.
         root: the hit's flight time, counted from the departure's instant: dt but for its begin [time].
-        proof: for each wall, the sub-intervals of flight time on which f > 0 was proved.
         jacobian: d(dt, x, y, vx, vy) / d(t, x, y, vx, vy), rows by outputs, when asked for.
         margins: how far this answer is from another one, when asked for.
     """
@@ -67,9 +46,8 @@ class ProvedCollision:
     after: Moment
     slope: Enclosure
     digits: int
-    departure: Departure = field(repr=False)
+    departure: EnclosedFlight = field(repr=False)
     root: Enclosure = field(repr=False)
-    proof: dict[str, list[Leaf]] = field(repr=False)
     jacobian: Jacobian | None = field(repr=False, default=None)
     margins: Margins | None = field(repr=False, default=None)
 
@@ -80,12 +58,10 @@ class ProvedCollision:
 
 @dataclass(frozen=True)
 class ProvedHorizon:
-    """Proved: no collision before t_end; the state there, enclosed, and the flight for which it is proved."""
+    """Proved: no collision before t_end; the state there, enclosed."""
 
     at: Moment
     digits: int
-    departure: Departure = field(repr=False)
-    proof: dict[str, list[Leaf]] = field(repr=False)
 
     def rounded(self) -> wire.Horizon:
         """Return the centres, correctly rounded, in the wire's form."""

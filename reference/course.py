@@ -11,15 +11,15 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from fractions import Fraction
 from functools import partial
 from typing import Any, NamedTuple
 
 from reference import rational
-from reference.arithmetic import Arithmetic, Exhausted, Interval, Undecidable, exact_ends, is_below, sign
-from reference.isolation import Isolator, Leaf
-from reference.walls import EnclosedFlight, MovingWalls
+from reference.arithmetic import Exhausted, Interval, Undecidable, exact_ends, is_below, sign
+from reference.isolation import Isolator
+from reference.walls import MovingWalls
 from scene import Cap, Mushroom, Scene, State, Stem, Undefined, Wall
 from scene.laws import bounds
 from scene.tables import laws
@@ -30,44 +30,11 @@ FOR_EVER = 2.0**1000  # the horizon when none is given, as a flight time
 
 
 class Hit(NamedTuple):
-    """A wall met: when (enclosed, flight time), with f' there, and the walls' motion."""
+    """A wall met: when (enclosed, flight time), with f' there."""
 
     wall: Wall
     time: Interval
     slope: Interval
-    motion: MovingWalls
-
-
-@dataclass(frozen=True)
-class UndefinedProof:
-    """What proves that a flight ends nowhere.
-
-    Attributes:
-        instant: the flight time at which it ends, exactly; None for one that is enclosed by a root.
-        walls: those that are met together then, or the one at which the start is undefined.
-        roots: for each of them but the base, an interval that holds its first root.
-        excluded: for each wall, the sub-intervals on which f > 0 is proved.
-    """
-
-    instant: Fraction | None
-    walls: tuple[Wall, ...]
-    roots: dict[Wall, Interval] = field(default_factory=dict)
-    excluded: dict[str, list[Leaf]] = field(default_factory=dict)
-
-
-class Event(NamedTuple):
-    """How a flight ends: at a hit, at the horizon (hit None), or nowhere (undefined, for a reason)."""
-
-    hit: Hit | None
-    undefined: Undefined | None = None
-    undefined_proof: UndefinedProof | None = None
-
-
-class Tie(NamedTuple):
-    """Two walls met together: why that is undefined, and its proof."""
-
-    undefined: Undefined
-    proof: UndefinedProof
 
 
 @dataclass(eq=False)
@@ -76,55 +43,44 @@ class Course:
 
     Attributes:
         scene: table and laws.
-        arithmetic: working precision.
-        flight: enclosures of the state.
-        leaving: walls the particle is on, each with its residual f(0).
-        flat: walls among them with f'(0) = 0 and f''(0) > 0, both exactly.
+        motion: the walls along the flight, at the working precision.
+        leaving: the wall the particle is on, if any, with its residual f(0).
+        is_flat: on that wall f'(0) = 0 and f''(0) > 0, both exactly.
+        in_cap: the flight begins in the cap.
         end: horizon as flight time, exactly; None for none.
         exact: the state as binary64 numbers, when it is one; decides ties.
     """
 
     scene: Scene
-    arithmetic: Arithmetic
-    flight: EnclosedFlight
+    motion: MovingWalls
     leaving: dict[Wall, Interval]
-    flat: frozenset[Wall]
+    is_flat: bool
+    in_cap: bool
     end: Fraction | None
     exact: State | None
 
     def __post_init__(self) -> None:
         """Enclose the horizon and the start; nothing is proved yet."""
-        arithmetic = self.arithmetic
-        self.horizon = arithmetic.number(FOR_EVER) if self.end is None else arithmetic.dyadic(self.end)
-        self.motion = MovingWalls(arithmetic, self.scene, self.flight)
-        self.start = arithmetic.lower(self.flight.begin)
+        self.arithmetic, self.flight = self.motion.arithmetic, self.motion.flight
+        self.horizon = self.arithmetic.dyadic(Fraction(FOR_EVER) if self.end is None else self.end)
+        self.start = self.arithmetic.lower(self.flight.begin)
         self._searches: dict[Wall, Isolator] = {}
         self._never_met: dict[Any, bool] = {}
 
-    @property
-    def proof(self) -> dict[str, list[Leaf]]:
-        """For each wall the sub-intervals on which f > 0 is proved."""
-        return {wall: search.leaves for wall, search in self._searches.items()}
-
-    def event(self, *, in_cap: bool) -> Event:
-        """Find how the flight ends."""
+    def event(self) -> Hit | Undefined | None:
+        """Find how the flight ends: at a hit, nowhere (undefined), or at the horizon (None)."""
         if self._runs_along_mouth():
             return self._along_mouth()
-        crossing = self._crossing(in_cap=in_cap)
+        crossing = self._crossing()
         is_crossed = crossing is not None and self._is_before_end(crossing)
         limit = crossing if is_crossed else None
-        near: tuple[Wall, ...] = ("arc",) if in_cap else SIDES
-        found = self._first_hit(near, self.start, limit)
-        if found is None and limit is not None:
-            found = self._beyond_crossing(limit, in_cap=in_cap)
-        if isinstance(found, Tie):
-            return Event(None, found.undefined, found.proof)
-        return Event(found)
+        found = self._first_hit(("arc",) if self.in_cap else SIDES, self.start, limit)
+        return found if found is not None or limit is None else self._beyond_crossing(limit)
 
     def hit_after(self, wall: Wall, start: Interval) -> Interval | None:
         """Find when the straight flight would meet a wall after `start`, were nothing in its way."""
         if wall == "base":
-            crossing = self._crossing(in_cap=not isinstance(self.scene, Stem))
+            crossing = self._crossing()
             return crossing if crossing is not None and is_below(start, crossing) else None
         searches: dict[Wall, Isolator] = {}
         hits = (self._hit(wall, start, stop, searches) for stop in self._stops(start, self.horizon))
@@ -134,23 +90,22 @@ class Course:
         is_level = self.exact is not None and self.exact.y == 0 and self.exact.vy == 0
         return isinstance(self.scene, Mushroom) and is_level and not self.leaving
 
-    def _along_mouth(self) -> Event:
+    def _along_mouth(self) -> Undefined | None:
         """Follow a path along y = 0 inside the mouth: it can only end at the mouth's edge."""
         hits = self._hits(("left", "right"), self.start, None)
         if not hits:
-            return Event(None)
-        self._require_before_end(hits[-1])
-        roots = {hit.wall: hit.time for hit in hits}
-        proof = UndefinedProof(None, tuple(roots), roots, self.proof)
-        return Event(None, Undefined("mouth-edge"), proof)
-
-    def _crossing(self, *, in_cap: bool) -> Interval | None:
-        if "base" in self.leaving or sign(self.flight.vy) == 0:
-            if "base" not in self.leaving and self.flight.vy != 0:
-                raise Undecidable("the sign of vy is open")
             return None
-        is_towards = sign(self.flight.vy) == (-1 if in_cap else 1)
-        if not is_towards:
+        self._require_before_end(hits[-1])
+        return Undefined("mouth-edge")
+
+    def _crossing(self) -> Interval | None:
+        """Enclose when the flight crosses y = 0; None for never."""
+        if "base" in self.leaving:
+            return None
+        direction = sign(self.flight.vy)
+        if direction == 0 and self.flight.vy != 0:
+            raise Undecidable("the sign of vy is open")
+        if direction != (-1 if self.in_cap else 1):
             return None
         crossing = self.arithmetic.inflated(-self.flight.y / self.flight.vy)
         if not is_below(self.arithmetic.upper(self.flight.begin), crossing):
@@ -167,49 +122,44 @@ class Course:
             raise Undecidable("horizon and event fall together")
         return crossing < self.end
 
-    def _beyond_crossing(self, crossing: Interval, *, in_cap: bool) -> Hit | Tie | None:
+    def _beyond_crossing(self, crossing: Interval) -> Hit | Undefined | None:
         """Continue a flight that met nothing before y = 0: to the base, or through the mouth."""
         if isinstance(self.scene, Cap):
             return self._base_hit(crossing)
         x = self.flight.x + self.flight.vx * crossing
         w = self.motion.width(crossing).f
-        gaps: dict[Wall, Interval] = {"left": w + x, "right": w - x}
-        for wall, residual in self.leaving.items():
-            if wall in gaps:
-                gaps[wall] = gaps[wall] - residual
-        signs = [sign(gap) for gap in gaps.values()]
-        if in_cap and -1 in signs:
+        gaps: tuple[tuple[Wall, Interval], ...] = (("left", w + x), ("right", w - x))
+        signs = [sign(gap - self.leaving[side] if side in self.leaving else gap) for side, gap in gaps]
+        if self.in_cap and -1 in signs:
             return self._base_hit(crossing)
         if signs != [1, 1]:
             return self._at_the_edge()
         if isinstance(self.scene, Stem):
             return self._base_hit(crossing)
-        walls: tuple[Wall, ...] = SIDES if in_cap else ("arc",)
-        found = self._first_hit(walls, self.arithmetic.lower(crossing), None)
+        found = self._first_hit(SIDES if self.in_cap else ("arc",), self.arithmetic.lower(crossing), None)
         if isinstance(found, Hit) and not is_below(crossing, found.time):
             raise Undecidable("a wall is met at the height of the mouth, as far as this precision shows")
         return found
 
-    def _at_the_edge(self) -> Tie:
+    def _at_the_edge(self) -> Undefined:
         """Settle a crossing of y = 0 of which it is open whether it is within the sides."""
-        edge = "the mouth's edge" if isinstance(self.scene, Mushroom) else "a corner"
+        is_mouth = isinstance(self.scene, Mushroom)
         instant = None if self.exact is None else rational.crossing_time(self.exact)
-        if instant is None or self.exact is None:
-            raise Undecidable(f"{edge} is met, as far as this precision shows")
-        walls: tuple[Wall, ...] = ("left", "right")
-        met = tuple(w for w in walls if rational.is_zero(self.scene, self.exact, w, instant))
-        if not met:
-            raise Undecidable(f"{edge} is met, as far as this precision shows")
-        reason = Undefined("mouth-edge" if isinstance(self.scene, Mushroom) else "corner")
-        return Tie(reason, UndefinedProof(instant, ("base", *met), {}, self.proof))
+        if (
+            self.exact is not None
+            and instant is not None
+            and any(rational.is_zero(self.scene, self.exact, side, instant) for side in SIDES[:2])
+        ):
+            return Undefined("mouth-edge" if is_mouth else "corner")
+        edge = "the mouth's edge" if is_mouth else "a corner"
+        raise Undecidable(f"{edge} is met, as far as this precision shows")
 
     def _base_hit(self, crossing: Interval) -> Hit:
-        slope = -self.flight.vy if isinstance(self.scene, Stem) else self.flight.vy
-        return Hit("base", crossing, slope, self.motion)
+        return Hit("base", crossing, -self.flight.vy if isinstance(self.scene, Stem) else self.flight.vy)
 
     def _first_hit(
         self, walls: tuple[Wall, ...], start: Interval, limit: Interval | None
-    ) -> Hit | Tie | None:
+    ) -> Hit | Undefined | None:
         """Find which of some walls is met first, before y = 0 is crossed (`limit`) or the horizon."""
         hits = self._hits(walls, start, limit)
         if not hits:
@@ -271,7 +221,7 @@ class Course:
         if not is_below(hit.time, self.horizon):
             raise Undecidable("horizon and collision fall together")
 
-    def _tied(self, hits: list[Hit], limit: Interval | None) -> Tie:
+    def _tied(self, hits: list[Hit], limit: Interval | None) -> Undefined:
         """Settle which walls are met together, exactly, at a time that is rational.
 
         Raises:
@@ -282,9 +232,7 @@ class Course:
             walls = self._met_at(instant, hits, limit)
             if len(walls) > 1:
                 is_edge = isinstance(self.scene, Mushroom) and "base" in walls and "arc" not in walls
-                roots = {hit.wall: hit.time for hit in hits if hit.wall in walls}
-                reason = Undefined("mouth-edge" if is_edge else "corner")
-                return Tie(reason, UndefinedProof(instant, walls, roots, self.proof))
+                return Undefined("mouth-edge" if is_edge else "corner")
         raise Undecidable("two walls are met together, as far as this precision shows")
 
     def _rational_times(self, state: State) -> list[Fraction]:
@@ -327,12 +275,12 @@ class Course:
         search = searches[wall]
         root = search.root  # known where it lies beyond the end of the search before
         if root is None:
-            reached = search.leaves[-1].end if search.leaves else start
+            reached = start if search.reached is None else search.reached
             end = self._end_beyond(search, stop, stop - start)
             root = search.first_root(reached, end) if is_below(reached, end) else None
         if root is None or is_below(stop, root.time):
             return None
-        return Hit(wall, root.time, root.slope, self.motion)
+        return Hit(wall, root.time, root.slope)
 
     def _end_beyond(self, search: Isolator, stop: Interval, length: Interval) -> Interval:
         """Return where a search ends: a little later than asked for, so that a root there lies inside.
@@ -348,7 +296,7 @@ class Course:
             partial(self.motion.wall, wall),
             self.flight.begin,
             self.leaving.get(wall),
-            is_flat=wall in self.flat,
+            is_flat=self.is_flat and wall in self.leaving,
             timeline=self.motion.timeline,
             is_never_met=partial(self._is_never_met, wall),
         )

@@ -1,25 +1,23 @@
-"""The first downward root of a wall function, isolated left first, and the proof of it.
+"""The first downward root of a wall function, isolated left first.
 
-The flight is covered from the left by sub-intervals, on each of which f > 0 is proved given
-f >= 0 at its left end, in one of six ways:
-    plain    f(I) > 0 as evaluated;
-    rising   f' > 0 on it;
-    falling  f' < 0 on it and f > 0 at its right end;
-    concave  f'' <= 0 on it and f > 0 at its right end;
-    centred  f(m) + f'(m)(I - m) + f''(I)(I - m)^2 / 2 > 0, m inside I;
-    lifting  f'' > 0 on it, f = f' = 0 exactly at its left end, the start.
-`swept` is `plain` over so long a time that every law is taken anywhere within its range, or, where that range
-is too wide: particles that rest where the sub-interval begins and ends are not met in a whole period. With
-laws held still f is concave along a flight, so it is above 0 between these places whatever the phase.
+Sub-intervals cover the flight from the left. On each, f > 0 is proved, given f >= 0 at its left end:
+    as evaluated     f(I) > 0, or f(m) + f'(m)(I - m) + f''(I)(I - m)^2 / 2 > 0 with m inside I;
+    rising           f' > 0 on it;
+    falling          f' < 0 on it, and f > 0 at its right end;
+    concave          f'' <= 0 on it, and f > 0 at its right end;
+    lifting          f'' > 0 on it, and f = f' = 0 exactly at its left end, the start;
+    never reached    the wall does not meet, in a whole period, particles that rest where the sub-interval
+                     begins and ends. With laws held still f is concave along a flight, so f > 0 between
+                     these places whatever the phase.
 A root is accepted only on an interval with f' < 0 throughout, f > 0 at its left end and f < 0
 at its right one. What none of this decides is bisected, then refused (`Undecidable`).
 
-f is continuously differentiable, also across the knots of its laws; f'' may jump there, and is
-enclosed with all its one-sided values. Each of the six arguments, interval Newton, and the
-uniqueness of the root ask for no more than that, so an interval may hold knots.
+f is continuously differentiable, also across the knots of its laws. f'' may jump there, and is
+enclosed with all its one-sided values. Each of these arguments, interval Newton, and the
+uniqueness of the root need no more than that, so an interval may hold knots.
 
 On the wall being left, f stands for f - f(0), and f = 0 where the flight begins. That moment may
-be enclosed only (`begin`): then every sub-interval that does not begin after it must rise, or be
+be known only within `begin`. Then every sub-interval that does not begin after it must rise, or be
 concave and hold all of it.
 """
 
@@ -41,21 +39,13 @@ from reference.arithmetic import (
 from reference.jets import Jet
 from reference.timeline import Timeline
 
-MAX_LEAVES = 4000
-MAX_PARTS = 2 * MAX_LEAVES  # that are looked at: cutting in two, so many lead to the leaves allowed
+MAX_EXCLUDED = 4000  # sub-intervals of one wall on which f > 0 is proved
+MAX_PARTS = 2 * MAX_EXCLUDED  # sub-intervals that a search looks at: cutting in two, so many lead to those
 MAX_NEWTON = 200
 
 
-class Leaf(NamedTuple):
-    """A sub-interval of flight time on which f > 0 is proved, and by which sign."""
-
-    start: Interval
-    end: Interval
-    kind: str
-
-
 class IsolatedRoot(NamedTuple):
-    """The only root on `time`, with f' < 0 throughout it; what lies before is excluded by `leaves`."""
+    """The only root on `time`, with f' < 0 throughout it, and no earlier one."""
 
     time: Interval
     slope: Interval
@@ -73,7 +63,8 @@ class Isolator:
         is_flat: f(0) = f'(0) = 0 exactly, so that only f'' > 0 can prove the start.
         timeline: knows the laws' knots, at which intervals are best cut; None for a smooth function.
         is_never_met: tells whether the wall never comes to where the flight is at a time; None: not known.
-        leaves: what has been excluded so far, from the left.
+        reached: where the search stands, thin: f > 0 up to there. None before it begins.
+        n_excluded: sub-intervals on which f > 0 has been proved.
         root: the first root, once it has been found.
     """
 
@@ -84,7 +75,8 @@ class Isolator:
     is_flat: bool = field(default=False, kw_only=True)
     timeline: Timeline | None = field(default=None, kw_only=True)
     is_never_met: Callable[[Interval], bool] | None = field(default=None, kw_only=True)
-    leaves: list[Leaf] = field(default_factory=list, init=False)
+    reached: Interval | None = field(default=None, init=False)
+    n_excluded: int = field(default=0, init=False)
     root: IsolatedRoot | None = field(default=None, init=False)
 
     def value(self, s: Interval) -> Interval:
@@ -120,19 +112,16 @@ class Isolator:
         while todo:
             a, b = todo.pop()
             n_parts += 1
-            if len(self.leaves) > MAX_LEAVES or n_parts > MAX_PARTS:
-                raise Undecidable(f"more than {MAX_LEAVES} sub-intervals are needed")
+            if self.n_excluded > MAX_EXCLUDED or n_parts > MAX_PARTS:
+                raise Undecidable(f"more than {MAX_EXCLUDED} sub-intervals are needed")
             whole = self.arithmetic.hull(a, b)
             jet = self._sharpened(a, b, whole)
-            kind = self._kind(a, b, whole, jet)
-            if kind is None and not self._falls_or_bends_down(jet):
+            is_excluded = self._is_excluded(a, b, jet)
+            if not is_excluded and not self._falls_or_bends_down(jet):
                 jet = self._expanded(whole, jet)
-                kind = self._kind(a, b, whole, jet)
-                kind = "centred" if kind in ("plain", "swept") else kind
-            if kind is None and self._is_whole(whole) and self._is_never_swept(a, b):
-                kind = "swept"
-            if kind is not None:
-                self.leaves.append(Leaf(a, b, kind))
+                is_excluded = self._is_excluded(a, b, jet)
+            if is_excluded or self._is_never_reached(a, b):
+                self.reached, self.n_excluded = b, self.n_excluded + 1
                 continue
             is_falling = jet.d1 is not None and sign(jet.d1) < 0
             if is_falling and not self._may_begin(a) and sign(self.value(b)) < 0:
@@ -190,35 +179,25 @@ class Isolator:
             if self._may_begin(point) and (rate is None or sign(rate) <= 0):
                 raise Undecidable("the flight begins along its wall, as far as this precision shows")
 
-    def _kind(self, a: Interval, b: Interval, whole: Interval, jet: Jet) -> str | None:
-        """Say what proves f > 0 on (a, b]; None when nothing does."""
+    def _is_excluded(self, a: Interval, b: Interval, jet: Jet) -> bool:
+        """Tell whether f and its derivatives prove f > 0 on (a, b]."""
         slope = self.arithmetic.zero if jet.d1 is None else jet.d1
         is_concave = jet.d2 is None or is_at_most_zero(jet.d2)
-        if self._may_begin(a):
-            is_all_within = is_below(self.begin, b) and not is_below(self.arithmetic.lower(self.begin), a)
-            if sign(slope) > 0:
-                return "rising"
-            if self.is_flat and jet.d2 is not None and sign(jet.d2) > 0:
-                return "lifting"
-            return "concave" if is_concave and is_all_within and sign(self.value(b)) > 0 else None
-        if self._sign_of(jet.f) > 0:
-            return "swept" if self._is_whole(whole) else "plain"
         if sign(slope) > 0:
-            return "rising"
-        if (sign(slope) < 0 or is_concave) and sign(self.value(b)) > 0:
-            return "falling" if sign(slope) < 0 else "concave"
-        return None
+            return True
+        if self._may_begin(a):
+            if self.is_flat and jet.d2 is not None and sign(jet.d2) > 0:
+                return True
+            is_all_within = is_below(self.begin, b) and not is_below(self.arithmetic.lower(self.begin), a)
+            return is_concave and is_all_within and sign(self.value(b)) > 0
+        return self._sign_of(jet.f) > 0 or ((sign(slope) < 0 or is_concave) and sign(self.value(b)) > 0)
 
-    def _is_whole(self, whole: Interval) -> bool:
-        if self.timeline is None:
+    def _is_never_reached(self, a: Interval, b: Interval) -> bool:
+        """Tell whether the wall never comes, over at least a period, to where the flight is at a nor at b."""
+        ask, low, high = self.is_never_met, exact_ends(a)[0], exact_ends(b)[0]
+        if ask is None or self.timeline is None or not self.timeline.is_whole(high - low):
             return False
-        low, high = exact_ends(whole)
-        return self.timeline.is_whole(high - low)
-
-    def _is_never_swept(self, a: Interval, b: Interval) -> bool:
-        """Tell whether the wall never comes to where the flight is at a nor to where it is at b."""
-        ask = self.is_never_met
-        return ask is not None and not self._may_begin(a) and ask(b) and ask(a)
+        return not self._may_begin(a) and ask(b) and ask(a)
 
     def _parts(self, a: Interval, b: Interval, whole: Interval, jet: Jet) -> list[tuple[Interval, Interval]]:
         """Cut an interval: around its least value where f is convex, at a knot, or half way."""
@@ -335,6 +314,5 @@ class Isolator:
             if not is_later or slope is None or sign(slope) >= 0:
                 raise Undecidable("the signs around the root are not strict")
             if sign(self.value(lower)) > 0 > sign(self.value(upper)):
-                self.leaves.append(Leaf(a, lower, "falling"))
                 return IsolatedRoot(wider, slope)
             margin = 8 * margin

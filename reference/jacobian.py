@@ -10,39 +10,31 @@ f at its own begin moves as much, whatever start moves it. After another wall it
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 
 from reference.arithmetic import Arithmetic, Enclosure, Interval
-from reference.course import Hit
-from reference.walls import EnclosedFlight
-from scene import Wall
+from reference.course import Course, Hit
 
 Matrix = list[list[Interval]]
 
 
-def step_jacobian(
-    arithmetic: Arithmetic,
-    flight: EnclosedFlight,
-    hit: Hit,
-    leaving: Iterable[Wall],
-) -> Matrix:
+def step_jacobian(course: Course, hit: Hit) -> Matrix:
     """Enclose the derivatives of (dt, x, y, vx, vy) after the bounce by (t, x, y, vx, vy) before.
 
     Args:
-        arithmetic: working precision.
-        flight: the state before.
+        course: the flight from the state before.
         hit: the first collision.
-        leaving: the wall being left, if any.
 
     Returns:
         5 rows (outputs) of 5 columns (inputs), intervals.
     """
+    arithmetic, flight, motion = course.arithmetic, course.flight, course.motion
     zero, one = arithmetic.zero, arithmetic.number(1)
     s, d = hit.time - flight.begin, hit.slope
-    f_x, f_y, f_t = hit.motion.gradient(hit.wall, hit.time)
-    origin = hit.motion.gradient(hit.wall, flight.begin) if hit.wall in leaving else None
+    f_x, f_y, f_t = motion.gradient(hit.wall, hit.time)
+    origin = motion.gradient(hit.wall, flight.begin) if hit.wall in course.leaving else None
     # At a knot the second derivatives jump: both sides' are enclosed, or those after it at an exact time.
-    f_xx, f_yy, f_yt, f_tt = hit.motion.hessian(hit.wall, hit.time)
+    f_xx, f_yy, f_yt, f_tt = motion.hessian(hit.wall, hit.time)
     n2 = arithmetic.square(f_x) + arithmetic.square(f_y)
     columns = []
     for i in range(5):

@@ -25,11 +25,12 @@ class Margins(NamedTuple):
     slope: Enclosure
 
 
-def measure(arithmetic: Arithmetic, course: Course, hit: Hit) -> Margins:
+def measure(course: Course, hit: Hit) -> Margins:
     """Measure a hit that `course` has found."""
+    arithmetic = course.arithmetic
     others = [wall for wall in neighbours(course, hit.wall) if wall != hit.wall]
-    distances = [distance(arithmetic, hit, wall) for wall in others]
-    gaps = [gap for gap in (_gap(arithmetic, course, hit, wall) for wall in others) if gap is not None]
+    distances = [distance(course, hit, wall) for wall in others]
+    gaps = [gap for gap in (_gap(course, hit, wall) for wall in others) if gap is not None]
     return Margins(_least(arithmetic, gaps), _least(arithmetic, distances), arithmetic.enclosure(-hit.slope))
 
 
@@ -41,17 +42,17 @@ def neighbours(course: Course, wall: Wall) -> tuple[Wall, ...]:
     return SIDES if "arc" in present else ("base", *SIDES)
 
 
-def distance(arithmetic: Arithmetic, hit: Hit, wall: Wall) -> Interval:
+def distance(course: Course, hit: Hit, wall: Wall) -> Interval:
     """Enclose f / |grad f| of a wall at the hit."""
-    motion = hit.motion
+    motion, arithmetic = course.motion, course.arithmetic
     f_x, f_y, _ = motion.gradient(wall, hit.time)
     length = arithmetic.context.sqrt(arithmetic.square(f_x) + arithmetic.square(f_y))
     return motion.wall(wall, hit.time).f / length
 
 
-def _gap(arithmetic: Arithmetic, course: Course, hit: Hit, wall: Wall) -> Interval | None:
+def _gap(course: Course, hit: Hit, wall: Wall) -> Interval | None:
     try:
-        later = course.hit_after(wall, arithmetic.upper(hit.time))
+        later = course.hit_after(wall, course.arithmetic.upper(hit.time))
     except Undecidable:
         return None
     return None if later is None else later - hit.time

@@ -8,14 +8,14 @@ from __future__ import annotations
 
 from fractions import Fraction
 
-from reference.answers import Outcome, ProvedCollision, Trajectory
+from reference.answers import Jacobian, Outcome, ProvedCollision, Trajectory
 from reference.arithmetic import Arithmetic, Exhausted, Undecidable, WorkLimit
-from reference.chain import bounce, collision, horizon
-from reference.course import Course
-from reference.jacobian import chained, enclosures, identity, step_jacobian
-from reference.start import flight_from, is_in_cap, judge_start
+from reference.chain import bounce, collision, fly_on, horizon
+from reference.course import Course, Hit
+from reference.jacobian import Matrix, chained, enclosures, identity, step_jacobian
+from reference.start import depart
 from reference.step import GUARD_DIGITS, MAX_DIGITS, checked_digits, checked_state, require_digits
-from scene import Scene, State, Stem, Undecided
+from scene import Scene, State, Undecided, Undefined
 from scene.refusal import check_count, check_number
 
 MAX_COLLISIONS = 1_000_000
@@ -54,79 +54,63 @@ def trajectory(
         t_end = check_number("t_end", t_end)
     if working is not None:
         working = check_count("working", working, 1, MAX_DIGITS)
-        return _EnclosedPath(scene, state, t_end, working, None, is_differentiated).follow(n_collisions)
+        return _follow(Arithmetic(working), scene, state, t_end, n_collisions, None, is_differentiated)
     working = digits + GUARD_DIGITS + n_collisions // 4
     while True:
         try:
-            return _EnclosedPath(scene, state, t_end, working, digits, is_differentiated).follow(n_collisions)
+            return _follow(Arithmetic(working), scene, state, t_end, n_collisions, digits, is_differentiated)
         except Undecidable as question:
             if isinstance(question, Exhausted) or working > 8 * (digits + GUARD_DIGITS + n_collisions):
                 return Trajectory([], Undecided(f"{question} ({working} digits)"), working)
             working *= 2
 
 
-class _EnclosedPath:
-    """A trajectory at one working precision; `digits` None: as far as that reaches."""
+def _follow(
+    arithmetic: Arithmetic,
+    scene: Scene,
+    state: State,
+    t_end: float | None,
+    n_collisions: int,
+    digits: int | None,
+    is_differentiated: bool,
+) -> Trajectory:
+    """Follow a particle at one working precision; `digits` None: as far as that reaches.
 
-    def __init__(
-        self,
-        scene: Scene,
-        state: State,
-        t_end: float | None,
-        working: int,
-        digits: int | None,
-        is_differentiated: bool,
-    ) -> None:
-        state = checked_state(scene, state, getattr(state, "t", 0.0) if t_end is None else t_end)
-        self.scene, self.state, self.digits = scene, state, digits
-        self.t_end = None if t_end is None else Fraction(t_end)
-        self.arithmetic = Arithmetic(working)
-        self.matrix = identity(self.arithmetic) if is_differentiated else None
-        self.steps: list[ProvedCollision] = []
+    Raises:
+        Undecidable: the precision does not serve for the digits asked for.
+        InvalidState: the start is none of this table.
+    """
+    state = checked_state(scene, state, getattr(state, "t", 0.0) if t_end is None else t_end)
+    matrix = identity(arithmetic) if is_differentiated else None
+    steps: list[ProvedCollision] = []
+    outcome: Outcome | None
+    try:
+        course = depart(arithmetic, scene, state, None if t_end is None else Fraction(t_end))
+        outcome, jacobian = _extend(steps, n_collisions, course, matrix)
+        if outcome is None and steps and digits is not None:
+            require_digits(steps[-1], digits)
+    except Undecidable as question:
+        if digits is not None:
+            raise
+        outcome, jacobian = Undecided(f"{question} ({arithmetic.digits} digits)"), None
+    return Trajectory(steps, outcome, arithmetic.digits, jacobian)
 
-    def follow(self, n_collisions: int) -> Trajectory:
-        """Take steps until there are enough, or something else comes instead.
 
-        Raises:
-            Undecidable: the precision does not serve for the digits asked for.
-            InvalidState: the start is none of this table.
-        """
-        try:
-            outcome = self._steps_until(n_collisions)
-        except Undecidable as question:
-            if self.digits is not None:
-                raise
-            outcome = Undecided(f"{question} ({self.arithmetic.digits} digits)")
-        jacobian = None
-        if outcome is None and self.matrix is not None:
-            jacobian = enclosures(self.arithmetic, self.matrix)
-        return Trajectory(self.steps, outcome, self.arithmetic.digits, jacobian)
-
-    def _steps_until(self, n_collisions: int) -> Outcome | None:
-        arithmetic = self.arithmetic
-        start = judge_start(self.scene, self.state, arithmetic)
-        if start.undefined is not None:
-            return start.undefined
-        flight, leaving, flat = flight_from(arithmetic, self.state), start.leaving, start.flat
-        in_cap = is_in_cap(self.scene, self.state, leaving)
-        exact: State | None = self.state
-        while len(self.steps) < n_collisions:
-            arithmetic.work = WorkLimit()
-            end = None if self.t_end is None else self.t_end - flight.instant
-            course = Course(self.scene, arithmetic, flight, leaving, flat, end, exact)
-            event = course.event(in_cap=in_cap)
-            if event.undefined is not None:
-                return event.undefined
-            if event.hit is None:
-                return horizon(course)
-            if self.matrix is not None:
-                matrix = step_jacobian(arithmetic, flight, event.hit, leaving)
-                self.matrix = chained(matrix, self.matrix)
-            after = bounce(course, event.hit)
-            self.steps.append(collision(course, event.hit, after))
-            flight, leaving, flat, exact = after.flight, after.leaving, frozenset(), None
-            is_base = event.hit.wall == "base"
-            in_cap = event.hit.wall == "arc" or (is_base and not isinstance(self.scene, Stem))
-        if self.steps and self.digits is not None:
-            require_digits(self.steps[-1], self.digits)
-        return None
+def _extend(
+    steps: list[ProvedCollision], n_collisions: int, course: Course | Undefined, matrix: Matrix | None
+) -> tuple[Outcome | None, Jacobian | None]:
+    """Add steps until there are enough, or something else comes; return that, else the path's Jacobian."""
+    if isinstance(course, Undefined):
+        return course, None
+    arithmetic = course.arithmetic
+    while len(steps) < n_collisions:
+        arithmetic.work = WorkLimit()
+        hit = course.event()
+        if not isinstance(hit, Hit):
+            return horizon(course) if hit is None else hit, None
+        if matrix is not None:
+            matrix = chained(step_jacobian(course, hit), matrix)
+        after = bounce(course, hit)
+        steps.append(collision(course, hit, after))
+        course = fly_on(course, hit, after)
+    return None, None if matrix is None else enclosures(arithmetic, matrix)

@@ -1,14 +1,13 @@
-"""The starting state: in which part of the table it is, which walls it leaves, or why it is refused."""
+"""The start of a path: in which part of the table it is, which wall it leaves, or why it is refused."""
 
 from __future__ import annotations
 
 from decimal import Decimal
 from fractions import Fraction
-from typing import NamedTuple
 
 from reference import rational
 from reference.arithmetic import Arithmetic, Interval, Undecidable, exact_ends, sign
-from reference.course import SIDES
+from reference.course import SIDES, Course
 from reference.walls import EnclosedFlight, MovingWalls
 from scene import Cap, InvalidState, Mushroom, Scene, State, Stem, Undefined, Wall
 from scene.geometry import placed
@@ -17,30 +16,46 @@ from scene.states import ON_WALL
 from scene.tables import laws
 
 
-class JudgedStart(NamedTuple):
-    """A judged start.
+def depart(arithmetic: Arithmetic, scene: Scene, state: State, t_end: Fraction | None) -> Course | Undefined:
+    """Judge the starting state; return the flight from it, or why mathematics gives no answer from there.
 
-    Attributes:
-        leaving: the wall the particle is on, with its residual f(0); at most one.
-        flat: that wall when f'(0) = 0 and f''(0) > 0, both exactly.
-        undefined: why mathematics gives no answer from here; None when it does.
-        walls: those at which the start is undefined.
+    Args:
+        arithmetic: working precision.
+        scene: table and laws.
+        state: the exact start.
+        t_end: horizon [time], exactly; None for none.
+
+    Raises:
+        InvalidState: the state is none of this table; naming field, value and bound.
+        Undecidable: when this precision cannot tell.
     """
+    _check_part(scene, state)
+    motion = motion_at(scene, state, arithmetic)
+    if state.wall is not None:
+        _check_residual(scene, state, motion)
+    wall = _wall_left(scene, state, motion)
+    if isinstance(wall, Undefined):
+        return wall
+    leaving, is_flat = {}, False
+    if wall is not None:
+        judged = _judge_rise(scene, state, wall, motion)
+        if isinstance(judged, Undefined):
+            return judged
+        leaving, is_flat = {wall: motion.wall(wall, arithmetic.zero).f}, judged
+    # These walls are new: the flight's work counts in full, whatever the start has asked already.
+    motion, in_cap = motion_at(scene, state, arithmetic), _is_in_cap(scene, state, leaving)
+    end = None if t_end is None else t_end - motion.flight.instant
+    return Course(scene, motion, leaving, is_flat, in_cap, end, state)
 
-    leaving: dict[Wall, Interval]
-    flat: frozenset[Wall] = frozenset()
-    undefined: Undefined | None = None
-    walls: tuple[Wall, ...] = ()
 
-
-def flight_from(arithmetic: Arithmetic, state: State) -> EnclosedFlight:
-    """Return the flight of a state, exactly."""
+def motion_at(scene: Scene, state: State, arithmetic: Arithmetic) -> MovingWalls:
+    """Return the walls along the flight from a state."""
     numbers = (arithmetic.number(v) for v in (state.x, state.y, state.vx, state.vy))
-    return EnclosedFlight._make((Fraction(state.t), *numbers, arithmetic.zero))
+    flight = EnclosedFlight._make((Fraction(state.t), *numbers, arithmetic.zero))
+    return MovingWalls(arithmetic, scene, flight)
 
 
-def is_in_cap(scene: Scene, state: State, leaving: dict[Wall, Interval]) -> bool:
-    """Tell whether the flight begins in the cap."""
+def _is_in_cap(scene: Scene, state: State, leaving: dict[Wall, Interval]) -> bool:
     if not isinstance(scene, Mushroom):
         return isinstance(scene, Cap)
     if "arc" in leaving or "base" in leaving:
@@ -49,17 +64,8 @@ def is_in_cap(scene: Scene, state: State, leaving: dict[Wall, Interval]) -> bool
     return state.y > 0 or is_rising_in_mouth
 
 
-def judge_start(scene: Scene, state: State, arithmetic: Arithmetic) -> JudgedStart:
-    """Judge the starting state: which walls it leaves, or why it is none of this table.
-
-    Raises:
-        InvalidState: naming field, value and bound.
-        Undecidable: when this precision cannot tell.
-    """
-    _check_part(scene, state)
-    motion = motion_at(scene, state, arithmetic)
-    if state.wall is not None:
-        _check_residual(scene, state, motion)
+def _wall_left(scene: Scene, state: State, motion: MovingWalls) -> Wall | Undefined | None:
+    """Find the wall that a state leaves, None for none; a place on two walls is undefined."""
     if _is_beside_mouth(scene, state, motion):
         return _judge_on_base(scene, state, motion)
     on = [wall for wall in _walls_near(scene, state) if _is_on(scene, state, wall, motion)]
@@ -67,16 +73,10 @@ def judge_start(scene: Scene, state: State, arithmetic: Arithmetic) -> JudgedSta
         on.append(state.wall)
     # A place on two walls is undefined whichever way it moves; a side ends at the mouth's edge.
     if isinstance(scene, Mushroom) and state.y == 0 and ("left" in on or "right" in on):
-        return JudgedStart({}, undefined=Undefined("mouth-edge"), walls=tuple(on))
+        return Undefined("mouth-edge")
     if len(on) > 1:
-        return JudgedStart({}, undefined=Undefined("corner"), walls=tuple(on))
-    for wall in on:
-        judged = _departure(scene, state, wall, motion)
-        if isinstance(judged, Undefined):
-            return JudgedStart({}, undefined=judged, walls=(wall,))
-        residual = motion.wall(wall, arithmetic.zero).f
-        return JudgedStart({wall: residual}, frozenset({wall} if judged else ()))
-    return JudgedStart({})
+        return Undefined("corner")
+    return on[0] if on else None
 
 
 def _check_part(scene: Scene, state: State) -> None:
@@ -87,11 +87,6 @@ def _check_part(scene: Scene, state: State) -> None:
         raise InvalidState(f"state.y = {state.y!r} on wall arc is beyond wall base, must be >= 0")
     if state.wall in SIDES and state.y > 0:
         raise InvalidState(f"state.y = {state.y!r} on wall {state.wall} is above the stem, must be <= 0")
-
-
-def motion_at(scene: Scene, state: State, arithmetic: Arithmetic) -> MovingWalls:
-    """Return the walls along the flight from a state."""
-    return MovingWalls(arithmetic, scene, flight_from(arithmetic, state))
 
 
 def _walls_near(scene: Scene, state: State) -> list[Wall]:
@@ -117,18 +112,16 @@ def _is_on(scene: Scene, state: State, wall: Wall, motion: MovingWalls) -> bool:
     return side == 0
 
 
-def _judge_on_base(scene: Scene, state: State, motion: MovingWalls) -> JudgedStart:
+def _judge_on_base(scene: Scene, state: State, motion: MovingWalls) -> Undefined | None:
     """Judge a state that names no wall, level with the mouth but beside it: on the base, which is the cap's.
 
     The base ends at the arc. A sign of the arc's f that is open is no sign: the state may lie beyond.
     """
     if _is_on(scene, state, "arc", motion):
-        return JudgedStart({}, undefined=Undefined("corner"), walls=("arc", "base"))
+        return Undefined("corner")
     if state.vy < 0:
         raise InvalidState(f"state.vy = {state.vy!r}: the particle starts on wall base and moves into it")
-    if state.vy == 0:
-        return JudgedStart({}, undefined=Undefined("sliding"), walls=("base",))
-    return JudgedStart({})
+    return Undefined("sliding") if state.vy == 0 else None
 
 
 def _is_beside_mouth(scene: Scene, state: State, motion: MovingWalls) -> bool:
@@ -138,7 +131,7 @@ def _is_beside_mouth(scene: Scene, state: State, motion: MovingWalls) -> bool:
     return any(sign(motion.wall(wall, motion.arithmetic.zero).f) < 0 for wall in ("left", "right"))
 
 
-def _departure(scene: Scene, state: State, wall: Wall, motion: MovingWalls) -> Undefined | bool:
+def _judge_rise(scene: Scene, state: State, wall: Wall, motion: MovingWalls) -> Undefined | bool:
     """Judge f' at the start on a wall: True when it is flat there but lifts, False when it rises."""
     jet = motion.wall(wall, motion.arithmetic.zero)
     rise = sign(jet.d1) if jet.d1 is not None else 0

@@ -8,31 +8,21 @@ from __future__ import annotations
 
 from dataclasses import replace
 from fractions import Fraction
-from typing import NamedTuple
 
 from reference.answers import Outcome, ProvedCollision
 from reference.arithmetic import Arithmetic, Exhausted, Undecidable, WorkLimit
 from reference.chain import bounce, collision, horizon
-from reference.course import Course, UndefinedProof
+from reference.course import Hit
 from reference.jacobian import enclosures, step_jacobian
 from reference.margins import measure
-from reference.start import flight_from, is_in_cap, judge_start
-from scene import BadInput, InvalidState, Rejected, Scene, State, Undecided, check_scene
+from reference.start import depart
+from scene import InvalidState, Rejected, Scene, State, Undecided, Undefined, check_scene
 from scene.refusal import check_count
 from scene.states import check_numbers
 
 GUARD_DIGITS = 15
 DOUBLINGS = 3
 MAX_DIGITS = 10_000
-
-
-class _Question(NamedTuple):
-    scene: Scene
-    state: State
-    t_end: float
-    digits: int
-    is_differentiated: bool = False
-    is_measured: bool = False
 
 
 def next_collision(
@@ -64,19 +54,20 @@ def next_collision(
     Source: Gelfreich, Rom-Kedar, Turaev (2014), sec. 3.1. Method: isolate, exclude, refine.
     """
     digits = checked_digits(scene, digits)
-    return _answer(_Question(scene, state, t_end, digits, is_differentiated, is_measured))[0]
-
-
-def proof_of_undefined(scene: Scene, state: State, t_end: float, digits: int = 50) -> UndefinedProof:
-    """Return what proves that a step is undefined.
-
-    Raises:
-        BadInput: it is not undefined.
-    """
-    outcome, proof = _answer(_Question(scene, state, t_end, checked_digits(scene, digits)))
-    if proof is None:
-        raise BadInput(f"outcome = {outcome!r}, must be undefined")
-    return proof
+    work, reason = WorkLimit(), ""
+    for doubling in range(DOUBLINGS + 1):
+        working = (digits + GUARD_DIGITS) << doubling
+        try:
+            return _attempt(
+                Arithmetic(working, work), scene, state, t_end, digits, is_differentiated, is_measured
+            )
+        except InvalidState as error:
+            return Rejected(str(error))
+        except Exhausted as error:
+            return Undecided(f"{error} ({working} digits)")
+        except Undecidable as error:
+            reason = f"{error} ({working} digits)"
+    return Undecided(reason)
 
 
 def checked_digits(scene: Scene, digits: int) -> int:
@@ -118,42 +109,25 @@ def require_digits(found: ProvedCollision, digits: int) -> None:
             raise Undecidable(f"{name} is enclosed too widely")
 
 
-def _answer(question: _Question) -> tuple[Outcome, UndefinedProof | None]:
-    """Double the precision until a step is decided; with what proves an undefined one."""
-    working, work = question.digits + GUARD_DIGITS, WorkLimit()
-    reason = ""
-    for _ in range(DOUBLINGS + 1):
-        try:
-            return _attempt(question, Arithmetic(working, work))
-        except InvalidState as error:
-            return Rejected(str(error)), None
-        except Exhausted as error:
-            return Undecided(f"{error} ({working} digits)"), None
-        except Undecidable as error:
-            reason = str(error)
-            working *= 2
-    return Undecided(f"{reason} ({working // 2} digits)"), None
-
-
-def _attempt(question: _Question, arithmetic: Arithmetic) -> tuple[Outcome, UndefinedProof | None]:
+def _attempt(
+    arithmetic: Arithmetic,
+    scene: Scene,
+    state: State,
+    t_end: float,
+    digits: int,
+    is_differentiated: bool,
+    is_measured: bool,
+) -> Outcome:
     """Answer at one precision."""
-    scene, t_end = question.scene, question.t_end
-    state = checked_state(scene, question.state, t_end)
-    start = judge_start(scene, state, arithmetic)
-    if start.undefined is not None:
-        return start.undefined, UndefinedProof(Fraction(0), start.walls)
-    flight, end = flight_from(arithmetic, state), Fraction(float(t_end)) - Fraction(state.t)
-    course = Course(scene, arithmetic, flight, start.leaving, start.flat, end, state)
-    event = course.event(in_cap=is_in_cap(scene, state, start.leaving))
-    if event.undefined is not None:
-        return event.undefined, event.undefined_proof
-    if event.hit is None:
-        return horizon(course), None
-    found = collision(course, event.hit, bounce(course, event.hit))
-    require_digits(found, question.digits)
-    if question.is_differentiated:
-        matrix = step_jacobian(arithmetic, flight, event.hit, start.leaving)
-        found = replace(found, jacobian=enclosures(arithmetic, matrix))
-    if question.is_measured:
-        found = replace(found, margins=measure(arithmetic, course, event.hit))
-    return found, None
+    state = checked_state(scene, state, t_end)
+    course = depart(arithmetic, scene, state, Fraction(float(t_end)))
+    if isinstance(course, Undefined):
+        return course
+    hit = course.event()
+    if not isinstance(hit, Hit):
+        return horizon(course) if hit is None else hit
+    found = collision(course, hit, bounce(course, hit))
+    require_digits(found, digits)
+    if is_differentiated:
+        found = replace(found, jacobian=enclosures(arithmetic, step_jacobian(course, hit)))
+    return replace(found, margins=measure(course, hit)) if is_measured else found

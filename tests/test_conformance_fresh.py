@@ -36,6 +36,7 @@ from conformance.plain.motion import BangBangMotion
 from conformance.plain.step import Flight, Open
 from conformance.suite.disguise import Disguise, drawn_disguise
 from conformance.suite.run import N_FRESH
+from conformance.verify import Verdict, verify_line
 from fast.__main__ import carry, follow
 from scene import BadInput, BangBang, Fourier, Mushroom, Rejected, State, from_data
 from scene.tables import cycle_length, laws
@@ -104,6 +105,18 @@ def test_all_is_asked_that_the_corpus_asks_seldom(seed, tally):
 def test_what_is_drawn_follows_from_the_seed():
     assert list(fresh(1, 12)) == questions(1, SOME)[:12]
     assert list(fresh(3, 12)) != questions(1, SOME)[:12]
+
+
+def test_what_the_verifier_does_not_prove_is_not_asked(monkeypatch):
+    asked = []
+
+    def shy(record):
+        asked.append(record)
+        return Verdict("not proved", "") if len(asked) == 1 else verify_line(record)
+
+    monkeypatch.setattr("conformance.generator.certify.verify_line", shy)
+    assert fresh_one(1, 1).state != questions(1, SOME)[0].state
+    assert len(asked) > 1
 
 
 def test_where_errors_that_pass_may_be_large_no_answer_is_taken_for_another(monkeypatch):

@@ -18,7 +18,7 @@ import reference
 from conformance.attacks import FAMILIES, UnderAttack, run
 from conformance.attacks.search import stepped
 from conformance.attacks.vanishing import sunk
-from conformance.second_stepper import next_collision
+from conformance.generator.prover import proved_step
 from fast.batch import lane_steps
 from fast.kernel.laws import set_anchors
 from fast.kernel.pieces import expand_waves, law_at
@@ -35,9 +35,9 @@ CTX.dps = 50
 
 @pytest.mark.parametrize("name", NAMES)
 def test_no_answer_is_wrong(name, tally):
-    (found,) = run([FAMILIES[name]], N_ATTACKS, 1, UnderAttack(stepper=fast.next_collision))
+    (found,) = run([FAMILIES[name]], N_ATTACKS, 1, UnderAttack(fast.next_collision, is_proved=False))
     tally.update(found.counts)
-    assert found.wrong == []
+    assert found.cases["wrong"] == []
     assert found.counts["agreed"] > N_ATTACKS // 3
 
 
@@ -46,8 +46,8 @@ def test_with_rough_phases_some_would_be(tmp_path, name):
     program = f"""
 import fast
 from conformance.attacks import FAMILIES, UnderAttack, run
-(found,) = run([FAMILIES[{name!r}]], 60, 1, UnderAttack(stepper=fast.next_collision))
-print(len(found.wrong))
+(found,) = run([FAMILIES[{name!r}]], 60, 1, UnderAttack(fast.next_collision))
+print(len(found.cases['wrong']))
 """
     assert int(output_of(tmp_path, program, "laws.py", "CANCELLED = 2.0**-4", "CANCELLED = 0.0")) > 0
 
@@ -72,7 +72,7 @@ def test_lanes_meet_what_is_left(n, left, tally):
     for start, answer in zip(starts, lane_steps(scene, starts), strict=True):
         if answer is None:
             continue
-        judged = stepped(answer, next_collision(scene, start, start.t + 100.0), start)
+        judged = stepped(answer, proved_step(scene, start, start.t + 100.0), start)
         tally[judged.kind] += 1
         assert judged.kind == "agreed", judged
     assert tally["agreed"] > 30

@@ -29,6 +29,14 @@ def test_it_prints_question_answer_and_rule(call):
     assert json.loads(question.removeprefix("question")) == vectors.request(vector, 0)
     assert vector.rule in out
     assert f"wall={vector.expect[0].steps[0].wall!r}" in out
+    assert out.endswith("verifier   proved\n")
+
+
+def test_the_verifiers_word_is_about_the_vector(call, monkeypatch):
+    later = msgspec.structs.replace(vectors.load()[0], t_end=vectors.load()[0].state.t)
+    monkeypatch.setattr(vectors, "load", lambda level: (later,))
+    _, out, _ = call(later.id)
+    assert "verifier   false the answer is horizon" in out
 
 
 def test_it_prints_the_vector_as_json(call):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 import random
 from fractions import Fraction
@@ -150,8 +151,9 @@ def test_a_wall_met_again_and_again_keeps_a_residual_that_moves_with_the_first_s
 def test_a_residual_held_fixed_after_the_first_hop_is_found_out(monkeypatch):
     honest = reference.path.step_jacobian
 
-    def fixed(arithmetic, flight, hit, leaving):
-        return honest(arithmetic, flight, hit, leaving if flight.begin == 0 else {})
+    def fixed(course, hit):
+        leaving = course.leaving if course.flight.begin == 0 else {}
+        return honest(dataclasses.replace(course, leaving=leaving), hit)
 
     monkeypatch.setattr(reference.path, "step_jacobian", fixed)
     rng = random.Random(7)

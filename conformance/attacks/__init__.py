@@ -1,12 +1,12 @@
 """Attacks: families of questions aimed at the weak points of a stepper's argument, seeded for ever.
 
-A family draws questions; `run` puts them to steppers that the caller gives and compares every answer with
-the second stepper (`conformance.second_stepper`). Needs the test extra (python-flint).
+A family draws questions. `run` has the reference answer them and the verifier (`conformance.verify`) judge
+its claims, to which it holds the steppers that the caller gives.
 """
 
 from conformance.attacks import corners, dips, knots, residuals, shapes, vanishing
 from conformance.attacks.case import Attack, Family, line
-from conformance.attacks.search import Claim, Judgement, Tally, UnderAttack, run
+from conformance.attacks.search import Judgement, Tally, UnderAttack, run
 
 FAMILIES: dict[str, Family] = {
     family.name: family
@@ -14,4 +14,4 @@ FAMILIES: dict[str, Family] = {
     for family in module.FAMILIES
 }
 
-__all__ = ["FAMILIES", "Attack", "Claim", "Family", "Judgement", "Tally", "UnderAttack", "line", "run"]
+__all__ = ["FAMILIES", "Attack", "Family", "Judgement", "Tally", "UnderAttack", "line", "run"]

@@ -12,6 +12,7 @@ from conformance.generator.draws import Draw, wire_form
 from scene import BadInput, Cap, Mushroom, Scene, State, Stem
 
 Made = TypeVar("Made", Cap, Stem, Mushroom)
+NEVER = 2.0**1000  # the horizon of paths that are asked for without one [time]
 
 
 class Attack(NamedTuple):
@@ -20,15 +21,15 @@ class Attack(NamedTuple):
     Attributes:
         scene: table and laws.
         state: the start.
-        t_end: horizon [time]; None for none, which only trajectories allow.
+        t_end: horizon [time].
         n_collisions: how many collisions to follow; None asks for one step.
-        working: decimals that the proved stepper may work with, on a trajectory; None lets it choose.
+        working: decimals that the reference may work with, on a trajectory; None lets it choose.
         is_flow: ask for all collisions up to t_end at once too (the fast stepper's lanes).
     """
 
     scene: Scene
     state: State
-    t_end: float | None
+    t_end: float
     n_collisions: int | None = None
     working: int | None = None
     is_flow: bool = False

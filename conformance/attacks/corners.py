@@ -117,10 +117,8 @@ def hit_at_end(draw: Draw) -> Attack:
     attack = corner_arrival(draw)
     if draw.pick((True, True, False)):
         attack = _plain_hit(draw)
-    t_end = attack.t_end
-    assert t_end is not None
     away = draw.pick((0.0, 0.0, math.inf, -math.inf))
-    return attack._replace(t_end=t_end if away == 0.0 else math.nextafter(t_end, away))
+    return attack._replace(t_end=attack.t_end if away == 0.0 else math.nextafter(attack.t_end, away))
 
 
 def _plain_hit(draw: Draw) -> Attack:

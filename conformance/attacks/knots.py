@@ -12,12 +12,10 @@ import math
 from itertools import pairwise
 from typing import NamedTuple
 
-from flint import arb
-
-from conformance import second_stepper
-from conformance.attacks.case import Attack, Family, built
+from conformance import plain
+from conformance.attacks.case import NEVER, Attack, Family, built
 from conformance.generator.draws import Draw, SharedPeriod, law
-from scene import BangBang, Cap, Law, Mushroom, Scene, State, Stem
+from scene import BangBang, Cap, Collision, Law, Mushroom, Scene, State, Stem
 
 PERIOD = 16.0
 # Nested, so that every scene is valid: nu r >= 0.012, h slope <= 0.008 < w <= 0.4 < r.
@@ -30,7 +28,7 @@ class Instant(NamedTuple):
     """A collision, or a crossing of y = 0, of a path that is known.
 
     Attributes:
-        time: since the start [time].
+        time: since time 0, the start [time].
         x: place then [length].
         n_before: collisions before it.
         wall: the wall met; "mouth" for a crossing of y = 0, on the base or through the mouth.
@@ -78,21 +76,17 @@ def _base(draw: Draw) -> tuple[dict[str, Law], State]:
 
 def instants(scene: Scene, state: State, n: int) -> list[Instant]:
     """List the first n collisions, and the crossings of y = 0 on the way."""
-    passed, found = arb(0), []
-    x, y, vx, vy = (arb(number) for number in (state.x, state.y, state.vx, state.vy))
-    for number, step in enumerate(second_stepper.trajectory(scene, state, n)):
-        if step.kind != "collision" or step.wall is None:
+    before: State | Collision = state
+    found = []
+    for number, hit in enumerate(plain.trajectory(scene, state, n, NEVER)):
+        if not isinstance(hit, Collision):
             break
-        dt, *after = step.numbers
-        if step.wall == "base" or (y > 0 and after[1] < 0) or (y < 0 and after[1] > 0):
-            crossing = -y / vy
-            found.append(
-                Instant(float((passed + crossing).mid()), float((x + vx * crossing).mid()), number, "mouth")
-            )
-        passed += dt
-        if step.wall != "base":
-            found.append(Instant(float(passed.mid()), float(after[0].mid()), number, step.wall))
-        x, y, vx, vy = after
+        if hit.wall == "base" or before.y * hit.y < 0:
+            crossing = -before.y / before.vy
+            found.append(Instant(before.t + crossing, before.x + before.vx * crossing, number, "mouth"))
+        if hit.wall != "base":
+            found.append(Instant(hit.t, hit.x, number, hit.wall))
+        before = hit
     return found
 
 
@@ -128,7 +122,7 @@ def knot_at_event(draw: Draw) -> Attack:
         t = _start_time(draw)
         late = State(t, state.x, state.y, state.vx, state.vy)
         moved = Mushroom(**(found | {name: leg}))  # type: ignore[arg-type]
-        return Attack(moved, late, None, at.n_before + draw.pick((1, 1, 2)), _working(draw, t, width))
+        return Attack(moved, late, NEVER, at.n_before + draw.pick((1, 1, 2)), _working(draw, t, width))
 
 
 def _target(draw: Draw, found: dict[str, Law], state: State) -> tuple[Instant | None, str]:
@@ -197,7 +191,7 @@ def knots_anywhere(draw: Draw) -> Attack:
     state = State(t, x, y, speed * vx, speed * vy)
     if draw.pick((True, False)):
         return Attack(scene, state, t + 40.0 / speed)
-    return Attack(scene, state, None, 3)
+    return Attack(scene, state, NEVER, 3)
 
 
 FAMILIES = (

@@ -1,65 +1,59 @@
-"""Run families of attacks against steppers, every answer compared with the second stepper's.
+"""Run families of attacks: the reference answers, the verifier judges its claim, others are held to it.
 
-Steppers are callables that the caller gives. A proved stepper answers with a claim, whose enclosures must
-meet the second stepper's; `undecided` is honest. A fast one answers a step in the wire's form, and a flow
-with the walls it counted. All but these counts are compared by `conformance.grading.agreement`.
+The other steppers are callables that the caller gives. One answers a step in the wire's form, another a flow
+with the walls it counted. `undecided` is honest. Steps are compared by `conformance.grading.agreement`.
 """
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterable, Sequence
+from collections import Counter
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
-from fractions import Fraction
 from functools import partial
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
-from conformance import second_stepper
-from conformance.arb.numbers import rational_ends
 from conformance.attacks.case import Attack, Family, line
-from conformance.grading.agreement import Answer, compare
-from conformance.grading.error import free_flight, inputs_of, moved
-from conformance.second_proof.exclusion import Refuted
-from conformance.second_proof.step import check
-from conformance.second_proof.trajectory import check_path
-from conformance.vectors import NUMBERS, Certified, Ends, Expectation, certified
-from scene import Outcome, Rejected, Scene, State, Undecided, Undefined
+from conformance.generator.certify import judge
+from conformance.generator.draws import wire_form
+from conformance.generator.paths import claimed_path
+from conformance.generator.prover import proved_step
+from conformance.generator.question import Proved, Question, filed
+from conformance.grading.agreement import compare
+from conformance.vectors import Expectation
+from scene import Outcome, Rejected, Scene, State, Undecided
 from scene.states import Stepper
 
 KINDS = ("agreed", "undecided", "refused", "open", "wrong")
+LISTED = ("undecided", "open", "wrong")
 BOUND = 4.0  # backward ulps: the sharpest class of grades
-DIGITS = 400  # decimals that balls are written with: beyond their own precision
-
-
-class Claim(NamedTuple):
-    """What a proved stepper answers.
-
-    Attributes:
-        answers: one a step, collisions and horizons enclosed.
-        certificate: of all of it, to be proved again; None where there is none.
-    """
-
-    answers: list[Answer]
-    certificate: dict[str, Any] | None = None
-
-
 Flow = Callable[[Scene, State, float], "dict[str, int] | None"]  # None: undecided
 
 
 class Judgement(NamedTuple):
-    """How one answer compares: agreed, undecided, refused, open (the second stepper's), or wrong."""
+    """How one answer compares.
+
+    Attributes:
+        kind: agreed, undecided, refused, open (the verifier does not prove what is claimed), or wrong.
+        why: one line.
+        ulps: worst backward ulps of a component, of a step in binary64.
+        claim: what the reference claims, where that is proved.
+        seconds: processor time a step, of the reference.
+    """
 
     kind: str
     why: str = ""
     ulps: float = 0.0
+    claim: Expectation | None = None
+    seconds: float = 0.0
 
 
 class UnderAttack(NamedTuple):
-    """What is under attack; None leaves one out."""
+    """What is under attack beside the reference; None leaves one out."""
 
-    prover: Callable[[Attack], Claim] | None = None
     stepper: Stepper | None = None
     flow: Flow | None = None
+    is_proved: bool = True  # count the reference's answers too, and not only those that are wrong
 
 
 @dataclass
@@ -70,23 +64,16 @@ class Tally:
     n_cases: int = 0
     counts: dict[str, int] = field(default_factory=lambda: dict.fromkeys(KINDS, 0))
     worst_ulps: float = 0.0
-    slowest: float = 0.0  # processor seconds a step of the proved stepper, its proof repeated
-    wrong: list[str] = field(default_factory=list)
+    slowest: float = 0.0  # processor seconds a step of the reference
+    cases: dict[str, list[str]] = field(default_factory=lambda: {kind: [] for kind in LISTED})
 
     def add(self, verdict: Judgement, where: str) -> None:
         """Count a verdict."""
         self.counts[verdict.kind] += 1
         self.worst_ulps = max(self.worst_ulps, verdict.ulps)
-        if verdict.kind == "wrong":
-            self.wrong.append(f"{verdict.why}: {where}")
-
-
-def truths(attack: Attack) -> list[second_stepper.Answer]:
-    """Return the second stepper's answers."""
-    if attack.n_collisions is not None:
-        return second_stepper.trajectory(attack.scene, attack.state, attack.n_collisions, attack.t_end)
-    assert attack.t_end is not None
-    return [second_stepper.next_collision(attack.scene, attack.state, attack.t_end)]
+        self.slowest = max(self.slowest, verdict.seconds)
+        if verdict.kind in LISTED:
+            self.cases[verdict.kind].append(f"{verdict.why}: {where}")
 
 
 def run(
@@ -115,125 +102,82 @@ def run(
         for index in range(n_cases):
             attack = family.attack(seed, index)
             where = line(family.name, seed, index, attack)
-            for verdict in judged(attack, steppers, tally):
+            for verdict in judged(attack, steppers):
                 tally.add(verdict, where)
             tally.n_cases += 1
             progress(tally)
     return tallies
 
 
-def judged(attack: Attack, steppers: UnderAttack, tally: Tally) -> Iterable[Judgement]:
-    """Put one attack to each stepper and judge what it answers."""
-    answers = truths(attack)
-    if steppers.prover is not None:
-        prover, begun = steppers.prover, time.process_time()
-        verdict = _survived(lambda: proved(prover(attack), answers, attack.state))
-        tally.slowest = max(tally.slowest, (time.process_time() - begun) / max(len(answers), 1))
-        yield verdict
+def judged(attack: Attack, steppers: UnderAttack) -> Iterable[Judgement]:
+    """Put one attack to the reference and to each stepper, and judge what they answer."""
+    scene, state, t_end = attack.scene, attack.state, attack.t_end
+    found = _survived(partial(confirmed, attack))
+    if steppers.is_proved or found.kind == "wrong":
+        yield found
     if steppers.stepper is not None:
-        t_end = attack.t_end if attack.t_end is not None else late_enough(attack.state, answers[0])
-        if t_end is not None:
-            outcome = partial(steppers.stepper, attack.scene, attack.state, t_end)
-            yield _survived(lambda: stepped(outcome(), answers[0], attack.state))
-    if steppers.flow is not None and attack.is_flow and attack.t_end is not None:
-        flow, end = steppers.flow, attack.t_end
-        yield _survived(lambda: flown(flow(attack.scene, attack.state, end), answers))
+        alone = found
+        if attack.n_collisions is not None:
+            alone = _survived(partial(confirmed, attack._replace(n_collisions=None)))
+        answer = partial(steppers.stepper, scene, state, t_end)
+        yield _survived(lambda: stepped(answer(), alone.claim, state))
+    if steppers.flow is not None and attack.is_flow:
+        count = partial(steppers.flow, scene, state, t_end)
+        yield _survived(lambda: flown(count(), found.claim))
 
 
-def _survived(judge: Callable[[], Judgement]) -> Judgement:
+def _survived(judge_answer: Callable[[], Judgement]) -> Judgement:
     """Return a verdict; whatever a stepper under attack raises is one too, and the search goes on."""
     try:
-        return judge()
+        return judge_answer()
     except Exception as error:
         return Judgement("wrong", f"it raises {type(error).__name__}: {error}")
 
 
-def proved(claim: Claim, truth: Sequence[second_stepper.Answer], state: State) -> Judgement:
-    """Compare a proved stepper's path with the second stepper's, up to where either is undecided."""
-    is_open = truth[-1].kind == "undecided"
-    given = claim.answers[: len(truth) - 1] if is_open else claim.answers
-    expected = as_certified(truth[: len(given)] if is_open else truth, state)
-    # Two enclosures of one number meet: they are less than 0 backward ulps apart.
-    found = compare(given, expected, state, bound=0.0)
-    if found.kind == "undecided" or any(isinstance(a, Undecided) for a in claim.answers[: len(truth)]):
-        return Judgement("undecided")
-    if found.kind not in ("agrees", "indeterminate"):
-        return Judgement("wrong", f"proved, but {found.why}")
-    end = given[-1] if given else None
-    if isinstance(end, Undefined) and end.reason != expected.reason:
-        return Judgement("wrong", f"proved to be undefined: {end.reason}, not {expected.reason}")
-    if claim.certificate is not None:
-        try:
-            (check_path if "steps" in claim.certificate else check)(claim.certificate)
-        except Refuted as error:
-            return Judgement("wrong", f"the certificate does not hold: {error}")
-    if is_open:
-        return Judgement("open", truth[-1].reason)
-    return Judgement("refused" if isinstance(end, Rejected) else "agreed")
+def confirmed(attack: Attack) -> Judgement:
+    """Ask the reference, and have the verifier judge its claim; of an undecided path as far as that goes."""
+    scene, state, t_end, n_collisions, working, _ = attack
+    begun = time.process_time()
+    if n_collisions is None:
+        claim = proved_step(scene, state, t_end) or Expectation("undecided")
+    else:
+        claim = claimed_path(scene, state, n_collisions, t_end, working)
+    seconds = (time.process_time() - begun) / max(len(claim.steps), 1)
+    is_undecided = claim.outcome == "undecided"
+    if is_undecided and not claim.steps:
+        return Judgement("undecided", claim.reason, seconds=seconds)
+    written = Expectation("collision", claim.steps) if is_undecided else claim
+    n_steps = max(len(claim.steps) + (claim.outcome == "undefined"), 1)
+    question = Question("attack", "", "", wire_form(scene), state, t_end, n_collisions)
+    verdict = judge(filed(question, 1, Proved((written,), collisions=n_steps), "stress"))
+    if verdict.status == "false":
+        return Judgement("wrong", f"the reference claims what is false: {verdict.reason}", seconds=seconds)
+    if is_undecided or verdict.status != "proved":
+        why = claim.reason if is_undecided else verdict.reason
+        return Judgement("undecided" if is_undecided else "open", why, seconds=seconds)
+    kind = "refused" if claim.outcome == "rejected" else "agreed"
+    return Judgement(kind, claim=claim, seconds=seconds)
 
 
-def late_enough(state: State, answer: second_stepper.Answer) -> float | None:
-    """Return a horizon well after the first collision, for a path asked for without one."""
-    if answer.kind != "collision":
-        return None
-    return state.t + 2 * float(answer.numbers[0].mid()) + abs(state.t) * 2.0**-50
-
-
-def stepped(outcome: Outcome, truth: second_stepper.Answer, state: State) -> Judgement:
+def stepped(outcome: Outcome, claim: Expectation | None, state: State) -> Judgement:
     """Judge one step in binary64: the same outcome within some backward ulps, or an honest undecided."""
     if isinstance(outcome, Undecided):
-        return Judgement("undecided")
-    if truth.kind == "undecided":
-        return Judgement("open", truth.reason)
+        return Judgement("undecided", outcome.reason)
+    if claim is None:
+        return Judgement("open", "no claim is proved")
     if isinstance(outcome, Rejected):
         return Judgement("refused")
-    found = compare(outcome, as_certified([truth], state), state, BOUND)
-    if found.kind == "agrees":
-        return Judgement("agreed", ulps=found.ulps)
-    return Judgement("open" if found.kind == "indeterminate" else "wrong", found.why, found.ulps)
+    found = compare(outcome, claim, state, BOUND)
+    kind = {"agrees": "agreed", "indeterminate": "open"}.get(found.kind, "wrong")
+    return Judgement(kind, found.why, found.ulps)
 
 
-def as_certified(truth: Sequence[second_stepper.Answer], state: State) -> Expectation:
-    """Return the second stepper's path, or step, as a certified answer.
-
-    The allowances are those of the first step, and 0 for later ones: the second stepper does not know them.
-    """
-    steps = [
-        _certified(answer, state if number == 0 else None)
-        for number, answer in enumerate(truth)
-        if answer.kind in ("collision", "horizon")
-    ]
-    return Expectation(
-        truth[-1].kind if truth else "collision", tuple(steps), truth[-1].reason if truth else ""
-    )
-
-
-def _certified(answer: second_stepper.Answer, state: State | None) -> Certified:
-    numbers = dict(zip(NUMBERS, map(ball_ends, answer.numbers), strict=True))
-    allowance = [0.0] * len(NUMBERS)
-    if state is not None:
-        rows = [[float(entry.abs_upper()) for entry in row] for row in answer.jacobian]
-        rows = rows or free_flight(state, float(answer.numbers[0].mid()))
-        allowance = [moved(row, inputs_of(state)) for row in rows]
-    return certified(numbers, allowance, answer.wall, digits=DIGITS)
-
-
-def ball_ends(ball: Any) -> Ends:
-    """Return the ends of a ball, exactly."""
-    low, high = rational_ends(ball)
-    return Fraction(int(low.p), int(low.q)), Fraction(int(high.p), int(high.q))
-
-
-def flown(counts: dict[str, int] | None, answers: Sequence[second_stepper.Answer]) -> Judgement:
+def flown(counts: dict[str, int] | None, claim: Expectation | None) -> Judgement:
     """Compare the walls that a flow counted with those of the path."""
     if counts is None:
-        return Judgement("undecided")
-    if answers[-1].kind != "horizon":
-        return Judgement("open", answers[-1].reason)
-    truth: dict[str, int] = {}
-    for answer in answers[:-1]:
-        truth[str(answer.wall)] = truth.get(str(answer.wall), 0) + 1
-    counted = {wall: n for wall, n in counts.items() if n}
-    return (
-        Judgement("agreed") if counted == truth else Judgement("wrong", f"a flow met {counted}, not {truth}")
-    )
+        return Judgement("undecided", "of the flow")
+    if claim is None or claim.outcome != "horizon":
+        return Judgement("open", "no path to the horizon is proved")
+    truth = Counter(step.wall for step in claim.steps if step.wall)
+    is_right = Counter(counts) == truth
+    return Judgement("agreed" if is_right else "wrong", f"a flow met {counts}, must be {dict(truth)}")

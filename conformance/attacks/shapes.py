@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from conformance.attacks.case import Attack, Family, built
+from conformance.attacks.case import NEVER, Attack, Family, built
 from conformance.generator.draws import Draw, SharedPeriod, clock, scene, state
 from scene import BangBang, Cap, Fourier, Law, Mushroom, Scene, State, Stem
 from scene.transforms import scaled, scaled_state
@@ -140,7 +140,7 @@ def mixed_laws(draw: Draw) -> Attack:
     at = {"speed": draw.power(-3, 5), "t": draw.pick((quarter, 100 * draw.between(-1.0, 1.0)))}
     start, t_end = state(draw, made, at)
     if draw.pick((True, False, False)):
-        return Attack(made, start, None, 3)
+        return Attack(made, start, NEVER, 3)
     return Attack(made, start, t_end)
 
 

@@ -1,1 +1,1 @@
-"""How the corpus is made: families of questions, hard cases by number, certification by two arithmetics."""
+"""How the corpus is made: families of questions, hard cases by number, certification."""

@@ -1,8 +1,8 @@
 """`python -m conformance.generator`: make the corpus, or check that it is what would be made.
 
-Every vector is drawn from a stream seeded by its id, or written down as a hard case; certified by the
-reference; and re-proved in a second arithmetic. The same corpus comes out on every machine, bit for bit.
-Some ten minutes on one core; `--jobs N` shares them out. Needs the `test` extra (python-flint).
+Every vector is drawn from a stream seeded by its id, or written down as a hard case; answered by the
+reference; and proved by the verifier. The same corpus comes out on every machine, bit for bit.
+Some ten minutes on one core; `--jobs N` shares them out.
 """
 
 from __future__ import annotations
@@ -18,22 +18,16 @@ from pathlib import Path
 
 import msgspec
 
+from conformance.generator.certify import certify
+from conformance.generator.coverage_families import at_the_horizon, coverage_families
+from conformance.generator.draws import Draw
+from conformance.generator.families import VectorFamily, families
+from conformance.generator.flow_families import flow_families
+from conformance.generator.links import Unfit
+from conformance.generator.mouth_and_time_cases import cases
 from conformance.vectors import MANIFEST, File, Manifest, Vector, digest, encode, load
 from scene import BadInput
 from scene.files import write_file
-
-try:
-    from conformance.generator.certify import certify
-    from conformance.generator.coverage_families import at_the_horizon, coverage_families
-    from conformance.generator.draws import Draw
-    from conformance.generator.families import VectorFamily, families
-    from conformance.generator.flow_families import flow_families
-    from conformance.generator.links import Unfit
-    from conformance.generator.mouth_and_time_cases import cases
-except ModuleNotFoundError as error:
-    if error.name != "flint":
-        raise
-    sys.exit("conformance.generator needs python-flint: pip install 'oscillating-mushrooms[test]'")
 
 VERSION = "1.2"
 RETIRED: tuple[str, ...] = ()

@@ -1,63 +1,39 @@
-"""From a question to a certified vector: the reference proves, a second arithmetic proves again.
-
-Steps: every certificate of the reference, undefined outcomes included, is re-proved in Arb, and the
-enclosures that are written down (24 decimals, rounded outward) hold the re-proved ones. Trajectories: the
-whole path is re-proved, each step from the box that the one before leads to
-(`second_proof.trajectory`); each step from the rounded state before it is re-proved to meet the same wall
-first; and the written enclosures are re-proved along the whole path by `second_proof.chain`.
-"""
+"""From a question to a certified vector: the reference answers, and the verifier proves what is written."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import json
 from math import inf
 
 import msgspec
 
 import reference
-from conformance.generator.links import Confirmation, Unfit, condition, finite
+from conformance.generator.links import Unfit, condition, finite
 from conformance.generator.paths import proved_path
 from conformance.generator.prover import CONDITIONS, NUDGES, SIGNS, ask, expectation, flight_of, nudged
 from conformance.generator.question import Proved, Question, filed
-from conformance.generator.stays import Mark, OpenSign, marks
-from conformance.second_proof.chain import recheck
-from conformance.second_proof.step import check
-from conformance.second_proof.trajectory import check_path
-from conformance.vectors import Certified, Expectation, Level, Vector, four_digits
-from reference.certificate import certificate, path_certificate
+from conformance.generator.stays import OpenSign, marks
+from conformance.vectors import Expectation, Level, Vector, four_digits
+from conformance.verify import Verdict, verify_line
 from scene import BadInput, InvalidState, Rejected, Scene, State, Undecided, Undefined, from_data
 
 INFINITE = 1e300
 
 
-class InArb(Confirmation):
-    """Proves again in Arb what the reference has proved."""
-
-    def step(self, scene: Scene, state: State, t_end: float, found: reference.Collision) -> None:
-        """Confirm a collision from a state."""
-        check(certificate(scene, state, t_end, found))
-
-    def path(self, scene: Scene, state: State, t_end: float, found: reference.Trajectory) -> None:
-        """Confirm a path from a state, each step from the box that the one before leads to."""
-        check_path(path_certificate(scene, state, t_end, found))
-
-    def chain(
-        self, scene: Scene, state: State, t_end: float, steps: Sequence[Certified], marks: Sequence[Mark]
-    ) -> None:
-        """Confirm the enclosures that are written down, and which hits are captured, along a whole path."""
-        recheck(scene, state, t_end, steps, marks)
+class Refuted(BadInput):
+    """The verifier holds the reference's answer to be false: one of the two is mistaken."""
 
 
 def certify(question: Question, number: int) -> Vector:
-    """Answer a question, prove the answer twice, and measure how delicate it is.
+    """Answer a question, measure how delicate it is, and have the line that is published proved.
 
     Args:
         question: what to ask.
         number: the vector's number within its group.
 
     Raises:
-        Unfit: when there is no answer to certify.
-        Refuted: when the second arithmetic does not confirm the first.
+        Unfit: when there is no answer to certify, or the verifier cannot prove it.
+        Refuted: when the verifier holds it to be false.
     """
     scene: Scene | None = None
     try:
@@ -66,14 +42,22 @@ def certify(question: Question, number: int) -> Vector:
         proved = Proved((Expectation("rejected"),))
     else:
         is_step = question.kind == "step"
-        proved = _step(scene, question) if is_step else proved_path(scene, question, InArb())
+        proved = _step(scene, question) if is_step else proved_path(scene, question)
     also = [Expectation(kind) for kind in question.also]
     expect = tuple(dict.fromkeys([*proved.expect, *also]))
-    if not expect:
-        raise Unfit("the reference is undecided")
     rounded = four_digits(min(proved.condition, INFINITE))
     vector = filed(question, number, proved._replace(expect=expect, condition=rounded), "stress")
-    return msgspec.structs.replace(vector, level=question.level or _level(scene, vector))
+    vector = msgspec.structs.replace(vector, level=question.level or _level(scene, vector))
+    verdict = judge(vector)
+    if verdict.status != "proved":
+        failure = Refuted if verdict.status == "false" else Unfit
+        raise failure(f"{vector.id} is {verdict.status}: {verdict.reason}")
+    return vector
+
+
+def judge(vector: Vector) -> Verdict:
+    """Have the line that a vector is published as proved, from that line alone."""
+    return verify_line(json.loads(msgspec.json.encode(vector)))
 
 
 def _step(scene: Scene, question: Question) -> Proved:
@@ -81,10 +65,9 @@ def _step(scene: Scene, question: Question) -> Proved:
     outcome = ask(scene, state, t_end)
     answer = expectation(outcome, state, t_end)
     if answer is None:
-        return Proved(())
+        raise Unfit("the reference is undecided")
     if isinstance(outcome, Rejected | Undecided):
         return Proved((answer,))
-    check(certificate(scene, state, t_end, outcome))
     if isinstance(outcome, Undefined):
         # A stepper in binary64 may find the tie within rounding, and say no more than that.
         return Proved((answer, Expectation("undecided")), inf)
@@ -97,7 +80,7 @@ def _level(scene: Scene | None, vector: Vector) -> Level:
     first = vector.expect[0]
     if scene is None or first.outcome == "rejected":
         return "extended"
-    if first.outcome in ("undefined", "undecided"):
+    if first.outcome == "undefined":
         return "stress"
     expected = _walls_met(scene, vector, vector.state)
     patterns = SIGNS if vector.kind == "step" else SIGNS[:2]

@@ -13,7 +13,7 @@ or meet again the wall that they were a little off, in units of 2^-44 to 2^44 to
 seem to stand, or wait for hundreds of periods (`generator.seldom`); and every seventh begins up to a
 million periods late, or before 0. Some further trajectories and flows begin with such a flight as well:
 paths and ensembles often have an engine of their own, which no step shows.
-Answers are proved by the reference alone, and are no more delicate than those of level core, but for late
+Answers are certified as those of the corpus, and no more delicate than those of level core, but for late
 ones, whose time when rounded tells less of the phase, and those in stems so deep that y when rounded tells
 less than x: these than level extended. All are filed as of level core. The plain stepper chooses which draws
 are asked: those that meet the wall that is looked for, and keep it when nudged.
@@ -26,16 +26,15 @@ from math import inf
 
 import msgspec
 
-import reference
 from conformance import plain
+from conformance.generator.certify import certify
 from conformance.generator.drawn_scenes import KINDS, SIZES, drawn_scene
 from conformance.generator.draws import Draw, clock, state, time, walls_speed, wire_form
 from conformance.generator.flow_families import any_marks
 from conformance.generator.in_flight import arc_to_mouth, brief_start, swept_scene, swept_start
-from conformance.generator.links import Confirmation, Unfit
-from conformance.generator.paths import proved_path
-from conformance.generator.prover import CONDITIONS, NUDGES, SIGNS, ask, flight_of, nudged
-from conformance.generator.question import Proved, Question, filed
+from conformance.generator.links import Unfit
+from conformance.generator.prover import CONDITIONS, NUDGES, SIGNS, nudged
+from conformance.generator.question import Question
 from conformance.generator.seldom import (
     DEPTHS,
     EXTRA,
@@ -53,8 +52,7 @@ from conformance.generator.seldom import (
     waiting_start,
 )
 from conformance.grading.agreement import DIGITS, SHARPEST
-from conformance.grading.error import condition_number, inputs_of
-from conformance.vectors import Expectation, Kind, Level, Vector
+from conformance.vectors import Kind, Level, Vector
 from scene import (
     BadInput,
     BangBang,
@@ -78,7 +76,6 @@ RULES: dict[Kind, str] = {
     "trajectory": "some flights in a scene that no file holds",
     "flow": "a particle carried through a scene that no file holds",
 }
-ALONE = Confirmation()  # the reference's word is taken
 WALLS: tuple[tuple[str, Wall], ...] = (
     *(("cap", wall) for wall in ("arc", "base")),
     *(("stem", wall) for wall in ("left", "right", "floor", "base")),
@@ -376,20 +373,10 @@ def _within(of: BangBang, draw: Draw, low: float, high: float) -> tuple[tuple[fl
 
 
 def _proved(question: Question, number: int) -> Vector | None:
-    """Return a question with its proved answer; None where there is none, or its condition is too high."""
-    of, is_step = from_data(question.scene), question.kind == "step"
+    """Return a question with its certified answer; None where there is none, or it is too delicate."""
     try:
-        found = _proved_step(of, question) if is_step else proved_path(of, question, ALONE)
+        vector = certify(question._replace(level="core"), number)
     except Unfit:
         return None
-    return filed(question, number, found, "core") if found.condition <= question.longest else None
-
-
-def _proved_step(of: Scene, question: Question) -> Proved:
-    start, t_end = question.state, question.t_end
-    outcome = ask(of, start, t_end)
-    if not isinstance(outcome, reference.Collision):
-        raise Unfit("no collision is met")
-    flight = flight_of(outcome, start, t_end)
-    condition = condition_number(flight.centre(), flight.jacobian, inputs_of(start))
-    return Proved((Expectation("collision", (flight.certified(start),)),), condition)
+    is_met = vector.kind != "step" or vector.expect[0].outcome == "collision"
+    return vector if is_met and vector.condition <= question.longest else None

@@ -11,7 +11,6 @@ import numpy.typing as npt
 
 import reference
 from conformance.generator.prover import ask, coasted, ends, flight_of
-from conformance.generator.stays import Mark
 from conformance.grading.error import Matrix, condition_number, free_flight, inputs_of
 from conformance.vectors import NUMBERS, Certified, certified
 from scene import Scene, State
@@ -19,24 +18,6 @@ from scene import Scene, State
 
 class Unfit(Exception):  # noqa: N818 (a finding about the draw)
     """The question has no certified answer that fits its rule; another must be asked."""
-
-
-class Confirmation:
-    """A second proof of what the reference has proved; this one takes the reference's word.
-
-    Each method raises Refuted (`second_proof.exclusion`) where it does not confirm.
-    """
-
-    def step(self, scene: Scene, state: State, t_end: float, found: reference.Collision) -> None:
-        """Confirm a collision from a state."""
-
-    def path(self, scene: Scene, state: State, t_end: float, found: reference.Trajectory) -> None:
-        """Confirm a path from a state."""
-
-    def chain(
-        self, scene: Scene, state: State, t_end: float, steps: Sequence[Certified], marks: Sequence[Mark]
-    ) -> None:
-        """Confirm the enclosures that are written down, and which hits are captured, along a whole path."""
 
 
 class Links:
@@ -49,21 +30,17 @@ class Links:
     is false.
     """
 
-    def __init__(
-        self, scene: Scene, state: State, t_end: float, confirm: Confirmation, *, is_timed: bool = True
-    ) -> None:
+    def __init__(self, scene: Scene, state: State, t_end: float, *, is_timed: bool = True) -> None:
         self.scene, self.state, self.t_end, self.is_timed = scene, state, t_end, is_timed
-        self.confirm = confirm
         self.held: npt.NDArray[np.float64] = np.empty((0, 5, 5))
         self.inputs: npt.NDArray[np.float64] = np.empty((0, 5))
         self.condition = self.largest = 0.0
 
     def add(self, found: reference.Collision) -> list[float]:
-        """Add a step: prove it from the rounded state too, and return what all rounding may do to it."""
+        """Add a step, and return what all rounding may do to it: it begins at the rounded state."""
         proved = ask(self.scene, self.state, self.t_end)
         if not isinstance(proved, reference.Collision) or proved.wall != found.wall:
             raise Unfit("a rounded state takes another path")
-        self.confirm.step(self.scene, self.state, self.t_end, proved)
         centre = [float(found.dt), *(float(c) for c in found.after[1:])]
         allowance = self._chain(flight_of(proved, self.state, self.t_end).jacobian, centre)
         self.state = found.rounded().state()

@@ -1,39 +1,31 @@
-"""Certified answers of trajectories and flows, made from the reference's paths.
-
-The reference proves every path by itself. For the corpus each part is proved again, by a `Confirmation`
-that does so; for questions drawn while the suite waits, one that does nothing is enough.
-"""
+"""Certified answers of trajectories and flows, made from the reference's paths."""
 
 from __future__ import annotations
 
 from fractions import Fraction
 
 import reference
-from conformance.generator.links import Confirmation, Links, Unfit, finite
-from conformance.generator.prover import collided
+from conformance.generator.links import Links, Unfit, finite
+from conformance.generator.prover import coasted, collided, ends
 from conformance.generator.question import Proved, Question
 from conformance.generator.stays import OpenSign, arrival, marks, stays, timing_condition
 from conformance.vectors import NUMBERS, Certified, Expectation, certified
-from scene import InvalidState, Scene, Undefined
+from scene import InvalidState, Scene, State, Undecided, Undefined
 
 WIDEST = Fraction(1, 2**72)  # of an enclosure of a path: a millionth of a backward ulp and less
 
 
-def proved_path(
-    scene: Scene, question: Question, confirm: Confirmation, working: int | None = None
-) -> Proved:
+def proved_path(scene: Scene, question: Question, working: int | None = None) -> Proved:
     """Follow a particle as far as the chained condition number allows, or to the horizon.
 
     Args:
         scene: table and laws, of the question.
         question: of a trajectory or a flow.
-        confirm: proves again what the reference has proved.
         working: number of decimals to work with, by default what the reference takes. It answers for the
             digits of the last collision asked for; a path that ends at a horizon may need more.
 
     Raises:
         Unfit: there is no answer to certify.
-        Refuted: the second proof does not confirm the first.
     """
     assert question.collisions is not None
     state, t_end = question.state, question.t_end
@@ -45,8 +37,7 @@ def proved_path(
     end = path.outcome
     if question.flow and not (isinstance(end, reference.Horizon) and question.flow(captured)):
         raise Unfit("not the flow that is looked for")
-    confirm.path(scene, state, t_end, path)
-    links = Links(scene, state, t_end, confirm, is_timed=question.flow is None)
+    links = Links(scene, state, t_end, is_timed=question.flow is None)
     steps = _steps(links, path, question)
     if len(steps) < len(path.steps):
         end = None
@@ -56,8 +47,7 @@ def proved_path(
     elif end is not None and not isinstance(end, Undefined):
         raise Unfit("the reference is undecided")
     if any(map(_is_wide, steps)):
-        return proved_path(scene, question, confirm, 2 * path.digits)
-    confirm.chain(scene, state, t_end, steps, captured)
+        return proved_path(scene, question, 2 * path.digits)
     if question.flow:
         arrived = arrival(steps, stays(captured))
         largest = max(links.condition, timing_condition(arrived, state))
@@ -82,6 +72,34 @@ def _steps(links: Links, path: reference.Trajectory, question: Question) -> list
     if len(steps) < (len(path.steps) if question.flow else 1):
         raise Unfit("no collision is met, or the first is too delicate")
     return steps
+
+
+def claimed_path(
+    scene: Scene, state: State, n_collisions: int, t_end: float, working: int | None = None
+) -> Expectation:
+    """Return the reference's path however it ends, undecided included; allowances are left out.
+
+    Args:
+        scene: table and laws.
+        state: the start.
+        n_collisions: how many to follow.
+        t_end: horizon [time].
+        working: decimals to work with, by default what the reference takes.
+    """
+    try:
+        path = reference.trajectory(scene, state, n_collisions, t_end, working=working)
+    except InvalidState:
+        return Expectation("rejected")
+    unknown, end = [0.0] * len(NUMBERS), path.outcome
+    steps = [certified(collided(found), unknown, found.wall, is_wide=True) for found in path.steps]
+    if isinstance(end, Undefined):
+        return Expectation("undefined", tuple(steps), end.reason)
+    if isinstance(end, Undecided):
+        return Expectation("undecided", tuple(steps), end.reason)
+    if isinstance(end, reference.Horizon):
+        since = ends(path.steps[-1].after.t) if steps else (Fraction(state.t), Fraction(state.t))
+        steps.append(certified(coasted(end, since), unknown, None, is_wide=True))
+    return Expectation("horizon" if end else "collision", tuple(steps))
 
 
 def _is_wide(step: Certified) -> bool:

@@ -1,6 +1,6 @@
 """Certified answers of single steps: the one place that makes them from the reference's enclosures.
 
-The reference proves every answer by itself; for the corpus, `certify` has it proved again in Arb.
+The reference proves every answer by itself; `certify` has the verifier prove it again.
 """
 
 from __future__ import annotations

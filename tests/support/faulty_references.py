@@ -1,0 +1,179 @@
+"""Faulty references: the reference with one mistake in it, which a family of attacks hunts.
+
+Each is a function that makes its mistake through pytest's monkeypatch, which mends it afterwards.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from collections.abc import Callable
+from fractions import Fraction
+from math import fmod, pi
+from typing import Any
+
+import pytest
+
+from reference import chain, rational, start
+from reference.arithmetic import Arithmetic, exact_ends, is_below, sign
+from reference.course import Course, Hit
+from reference.isolation import Isolator
+from reference.jets import Jet, multiply
+from reference.timeline import Legs
+from reference.walls import MovingWalls
+from reference.waves import Waves
+from scene.laws import bounds
+from scene.tables import laws
+
+Fault = Callable[[pytest.MonkeyPatch], None]
+
+legs_init, waves_init, turning = Legs.__init__, Waves.__init__, Arithmetic.turning
+first_root, value = Isolator.first_root, Isolator.value
+first_hit, beyond_crossing = Course._first_hit, Course._beyond_crossing
+walls_near, reflect, width_of = start._walls_near, chain.reflect, MovingWalls.width
+never_reached = Isolator._is_never_reached
+
+
+def replacing(owner: object, name: str) -> Callable[[Callable[..., Any]], Fault]:
+    """Turn a function into the mistake of using it for an honest one."""
+    return lambda function: lambda monkeypatch: monkeypatch.setattr(owner, name, function)
+
+
+@replacing(Legs, "jet")
+def knots_unseen(self, s):
+    """The piece that holds where an interval begins is taken to hold on all of it."""
+    low = self.instant + exact_ends(s)[0]
+    turn = (low - self.starts[0]) // self.period * self.period
+    return self._on(bisect_right(self.starts, low - turn) - 1, turn, s)
+
+
+@replacing(Legs, "__init__")
+def period_from_zero(self, arithmetic, law, instant):
+    """Knots are taken to begin at time 0."""
+    legs_init(self, arithmetic, law, instant + Fraction(law.knots[0][0]))
+
+
+def residual_forgotten(monkeypatch):
+    """Ties are judged by f, not by f - f(0), and so is all that is far from the start."""
+
+    def is_zero(scene, state, wall, s):
+        return rational.wall_jet(scene, state, wall, s).f.is_zero()
+
+    def late_value(self, s):
+        is_late = is_below(self.arithmetic.power_of_two(-20), s)
+        return self.jet(s).f if is_late else value(self, s)
+
+    monkeypatch.setattr(rational, "is_zero", is_zero)
+    monkeypatch.setattr(Isolator, "value", late_value)
+
+
+@replacing(start, "_distance_of")
+def size_of_all_time(scene, wall, motion):
+    """A state is on the wall it names by the largest size of all time."""
+    return motion.arithmetic.number(max(bounds(law).highest for law in laws(scene).values()))
+
+
+@replacing(start, "_walls_near")
+def corner_unseen(scene, state):
+    """A state that names a wall is on no other."""
+    return [] if state.wall else walls_near(scene, state)
+
+
+def hit_at_end_counts(monkeypatch):
+    """A wall that is met exactly at the horizon is met before it."""
+    monkeypatch.setattr(Course, "_is_at_horizon", lambda self, hit: False)
+    monkeypatch.setattr(Course, "_require_before_end", lambda self, hit: None)
+
+
+@replacing(Course, "_tied")
+def tie_guessed(self, hits, limit):
+    """Of walls met together the first is answered."""
+    return hits[0]
+
+
+@replacing(Isolator, "first_root")
+def blind_start(self, start, end):
+    """No wall is met in the first 1e-3 of a flight."""
+    if start._mpi_ != self.begin._mpi_:
+        return first_root(self, start, end)
+    later = self.arithmetic.upper(start + (end - start) / 1024)
+    return first_root(self, later, end) if sign(self.value(later)) > 0 else None
+
+
+@replacing(Isolator, "first_root")
+def ends_alone(self, start, end):
+    """A wall is met only if f is below 0 at the end of the search."""
+    return None if sign(self.value(end)) > 0 else first_root(self, start, end)
+
+
+@replacing(Isolator, "_is_never_reached")
+def swept_begins_alone(self, a, b):
+    """A wall is not met over many periods if it never comes to where the flight is at their begin."""
+    with pytest.MonkeyPatch.context() as patch:
+        if ask := self.is_never_met:
+            patch.setattr(self, "is_never_met", lambda s: s is b or ask(s))
+        return never_reached(self, a, b)
+
+
+@replacing(chain, "reflect")
+def rounded_rates(course, hit):
+    """The wall's speed is taken at the time of day as it rounds to binary64."""
+    time = Fraction(float(course.flight.instant + exact_ends(hit.time)[0])) - course.flight.instant
+    slope = course.motion.wall(hit.wall, course.arithmetic.dyadic(time)).d1
+    return reflect(course, hit._replace(slope=slope))
+
+
+@replacing(Arithmetic, "turning")
+def reduced_time(self, omega, period, instant):
+    """Whole periods, rounded to binary64, are taken off a time."""
+    return turning(self, omega, period, Fraction(fmod(float(instant), period or 2 * pi / omega)))
+
+
+@replacing(Arithmetic, "turning")
+def rounded_omega(self, omega, period, instant):
+    """A period is turned into an omega in binary64."""
+    return turning(self, omega or 2 * pi / period, None, instant)
+
+
+@replacing(Waves, "__init__")
+def rough_terms(self, arithmetic, law, instant):
+    """A law is known to 2^-62 of its mean only, however small it is."""
+    waves_init(self, arithmetic, law, instant)
+    self.mean = self.mean * arithmetic.number(1 + Fraction(1, 2**62))
+
+
+@replacing(Waves, "__init__")
+def few_harmonics(self, arithmetic, law, instant):
+    """Harmonics beyond the third are dropped."""
+    waves_init(self, arithmetic, law, instant)
+    self.terms = self.terms[:3]
+
+
+@replacing(Course, "_beyond_crossing")
+def narrow_mouth(self, crossing):
+    """The mouth is taken to be narrower by 1e-3 of itself."""
+    part = Jet(self.arithmetic.number(Fraction(999, 1000)), None, None)
+    self.motion.width = lambda s: multiply(width_of(self.motion, s), part)
+    return beyond_crossing(self, crossing)
+
+
+def giving_up(is_given_up: Callable[[Course, Any], bool]) -> Fault:
+    """Return the mistake of finding no wall on certain flights."""
+
+    @replacing(Course, "_first_hit")
+    def none_met(self, walls, start, limit):
+        found = first_hit(self, walls, start, limit)
+        return None if is_given_up(self, found) else found
+
+    return none_met
+
+
+def _overflows(course: Course, _: Any) -> bool:
+    s = course.exact
+    product = s.x * s.vx + s.y * s.vy
+    return not 2.0**-1022 <= product * product <= 2.0**1023
+
+
+# Nothing is met where (x . v)^2 is no binary64 number; after 10 units of time; by what rests, or nearly.
+overflowing = giving_up(_overflows)
+impatient = giving_up(lambda _, hit: isinstance(hit, Hit) and float(exact_ends(hit.time)[0]) > 10)
+resting = giving_up(lambda course, _: sum(abs(float(v.mid)) for v in course.flight[3:5]) < 2.0**-20)

@@ -1204,7 +1204,10 @@ def check_line(record: Any, bits: int) -> None:
         Contradicted(f"the answer is {right} {reason}"),
     )
     if kind == "flow" and found:
-        require(len(found) == count, Contradicted(f"the path has {len(found)} steps"))
+        require(
+            len(found) == count and right == "horizon",
+            Contradicted(f"the path has {len(found)} steps, or goes on"),
+        )
         found = thin(found, first.get("stays", []))
     steps = take({"steps": [], **first}, "steps", list)
     require(len(steps) == len(found), Contradicted(f"the path has {len(found)} steps"))

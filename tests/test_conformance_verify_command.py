@@ -60,6 +60,7 @@ LINE = {
 FILES: list[tuple[str, int, str]] = [
     (json.dumps(LINE), 0, "1 of 1 proved"),
     (json.dumps({**LINE, "t_end": 0.25}), 1, "a/1: false: the answer is horizon"),
+    (json.dumps({**LINE, "kind": "flow"}), 1, "a/1: false: the path has 1 steps, or goes on"),
     ("[" * 100_000, 2, "unreadable after 0 claims"),
     (json.dumps(LINE) + "\n{}", 2, "unreadable after 1 claims"),
     ("{", 2, "unreadable after 0 claims"),

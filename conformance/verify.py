@@ -5,9 +5,9 @@
 
 A particle flies straight between walls that move (Gelfreich, Rom-Kedar, Turaev 2014, sec. 3.1). A
 line of a corpus says where it starts and what comes first: a wall, at a time and with a velocity
-that are enclosed between two decimals. This file proves such a line. It uses integers only, imports
-Python's standard library only, and needs no hint from whoever made the line. docs/proof.md has the
-theorem (sections 1 to 6). The argument stands here in the order in which it is used:
+that are enclosed between two decimals. This file proves such a line from the line alone. It
+computes with integers and imports Python's standard library only. docs/proof.md has the theorem
+(sections 1 to 6). The argument stands here in the order in which it is used:
 
  1. `Interval`: arithmetic that never loses the true number.
  2. `Clock`, `law_jet`: a law and its two derivatives over a stretch of time.
@@ -22,8 +22,12 @@ theorem (sections 1 to 6). The argument stands here in the order in which it is 
 "Proved": the true numbers lie between the decimals, which may be far apart. "False": what is proved
 contradicts the claim. "Not proved": it is open at each precision up to 4,096 bits, or a search took
 too long. Walls that are met together at an irrational time stay open, and so do exact zeros of
-Fourier laws at another phase than 0. Not judged are the reason of a rejection and the fields
-`allowance`, `condition` and `level`.
+Fourier laws at another phase than 0.
+
+Not judged are the fields `allowance`, `condition` and `level`; the reason of a rejection; `stays`
+and `reason` beside an answer that has none; the name and notes of a scene; whether the span of a
+bang-bang law is a binary64 number. A scene with a field that is unknown or null counts as refused,
+and so does a number above the largest of binary64.
 """
 
 from __future__ import annotations
@@ -547,17 +551,17 @@ class Flight:
 
         - rising: f' > 0;
         - concave: f'' <= 0, and f > 0 at the right end: f lies on or above its chord;
-        - plain: f > 0 as enclosed;
+        - as evaluated: f > 0 as enclosed;
         - falling: f' < 0, and f > 0 at the right end;
         - centred: f(p) + f'(p) (s - p) + f'' (s - p)^2 / 2 > 0 for a point p of the stretch.
           Taylor's theorem holds across the jumps, because f' is Lipschitz;
-        - swept: the wall never comes to where the particle is at either end (`is_never_met`).
+        - never reached: the wall never comes to where the particle is at either end
+          (`is_never_met`).
 
         The wall being left has f = 0 where the flight begins, somewhere in `begin`. A stretch that
         holds `begin` holds all of it, and f > 0 is proved after the begin only. Rising and concave
-        prove
-        this: the chord starts at 0, wherever the begin is. So does f'' > 0 if f' = 0 at the begin
-        exactly (lifting, `is_flat`).
+        prove this: the chord starts at 0, wherever the begin is. So does f'' > 0 if f' = 0 at the
+        begin exactly (lifting, `is_flat`).
         """
         jet, p = self.f(wall, s), s.simplest()
         is_positive_at_end = self.f(wall, s.high).f.sign > 0
@@ -659,11 +663,11 @@ class Flight:
         """Find the first wall met before the horizon; None for none.
 
         y is linear. Before y = 0 is crossed the walls of one part of the table can be met: the arc
-        in the cap, both sides and the floor in the stem. Where it is crossed, f of the sides is w +
-        x and w - x. From the cap the base is met if one is negative, and the mouth is open if both
-        are positive. From the stem both must be positive: the sides were not met before. After the
-        mouth come the walls of the other part. A particle that glides along y = 0 inside the mouth
-        can meet its edge only.
+        in the cap, both sides and the floor in the stem. Where it is crossed, f of the sides is
+        w + x and w - x. From the cap the base is met if one is negative, and the mouth is open if
+        both are positive. From the stem both must be positive: the sides were not met before.
+        After the mouth come the walls of the other part. A particle that glides along y = 0 inside
+        the mouth can meet its edge only.
 
         Args:
             in_cap: the flight begins above y = 0, or on it and moves up.

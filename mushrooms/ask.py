@@ -65,9 +65,9 @@ def _find(case: str, seed: int | None) -> Vector:
 
 def _show(vector: Vector, disguise: Disguise) -> None:
     from conformance import vectors
+    from conformance.generator.certify import judge
     from conformance.grading.agreement import middle
     from conformance.suite.disguise import asked
-    from conformance.verify import verify_line
 
     console = new_console()
     condition = f", condition {vector.condition:.3g}" if vector.condition else ""
@@ -85,7 +85,7 @@ def _show(vector: Vector, disguise: Disguise) -> None:
             console.print(f"  {number:>4}  {escape(in_one_line(msgspec.to_builtins(outcome)))}")
         for begin, end in expectation.stays:
             console.print(f"  captured from step {begin + 1} to step {end + 1}")
-    verdict = verify_line(json.loads(msgspec.json.encode(vector)))
+    verdict = judge(vector)
     console.print(f"verifier   {verdict.status} {escape(verdict.reason)}".rstrip())
 
 

@@ -1,4 +1,4 @@
-"""Flows of the corpus: between which hits a captured stay lies, and what is written."""
+"""Flows of the corpus: between which hits a capture interval lies, and what is written."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Each requirement of the verifier is needed: taken out, it proves a claim that the verifier refuses.
+"""Requirements of the verifier are needed: without one of these it proves a claim that it refuses.
 
 A requirement is a piece of `conformance/verify.py`, and what stands there without it. The weaker verifier
 answers a question; that answer, written as a line of a corpus, is the forgery. Other rows change one field
@@ -9,15 +9,17 @@ from __future__ import annotations
 
 import itertools
 import json
-from decimal import ROUND_CEILING, ROUND_FLOOR, Context, Decimal
+from decimal import Decimal
 from fractions import Fraction
 from pathlib import Path
 from types import ModuleType
 from typing import Any
 
 import pytest
+from support.false_answers import plain
 
 from conformance import verify
+from conformance.vectors import certified
 
 SOURCE = Path(verify.__file__).read_text("utf-8")
 CORPUS = Path(verify.__file__).parent / "corpus"
@@ -109,7 +111,7 @@ REQUIREMENTS: dict[str, Row] = {
         "(jet.d1.sign < 0 and is_positive_at_end)", "jet.d1.sign < 0",
         SPIKE, (0.0, 0.0, -0.5, 0.0, -0.0625, None), 4.1875, 1,
     ),
-    "plain: f > 0": (
+    "as evaluated: f > 0": (
         "if jet.f.sign > 0 or", "if jet.f.sign >= 0 or",
         SHAKEN, (0.0, 0.0, -0.5, 0.25, -1.0, None), 1.0, 1,
     ),
@@ -117,11 +119,11 @@ REQUIREMENTS: dict[str, Row] = {
         "at.f + at.d1 * u + jet.d2 * u**2 * half", "at.f + at.d1 * u",
         SPIKE, (0.0, 0.0, -0.75, 0.0, 0.0, None), 7.0, 1,
     ),
-    "swept: neither end is met": (
+    "never reached: from neither end": (
         "for end in (s.high, s.low))", "for end in (s.low,))",
         SHAKEN, (0.0, 0.0, -0.5, 0.0, -(2.0**-10), None), 2000.0, 1,
     ),
-    "swept: not for a whole period": (
+    "never reached: for a whole period": (
         "rest.first_root(wall, zero, turn.high) is None", "rest.first_root(wall, zero, zero) is None",
         {**STEM, "h": waves(1.0, 0.25)}, (0.0, 0.0, -0.5, 0.0, -(2.0**-10), None), 2000.0, 1,
     ),
@@ -200,17 +202,9 @@ def forge(weak: ModuleType, scene: dict[str, Any], state: tuple[Any, ...], t_end
     table = weak.read_scene(scene)
     found = weak.walk(table, weak.read_state(table, fields), Fraction(t_end), 256)
     steps = list(itertools.islice(found, n))
-    low, high = (Context(prec=24, rounding=way) for way in (ROUND_FLOOR, ROUND_CEILING))
+    ends = [{name: number.ends for name, number in step.numbers.items()} for step in steps]
     written = [
-        {"wall": step.wall}
-        | {
-            name: [
-                str(context.divide(context.create_decimal(end.numerator), end.denominator))
-                for context, end in zip((low, high), ends.ends, strict=True)
-            ]
-            for name, ends in step.numbers.items()
-        }
-        for step in steps
+        plain(certified(around, [0.0] * 5, step.wall)) for around, step in zip(ends, steps, strict=True)
     ]
     outcome = "collision" if steps[-1].wall else "horizon"
     return {

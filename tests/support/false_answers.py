@@ -258,7 +258,7 @@ def end_path(random: Random, line: Line) -> Line | None:
 
 @cache
 def flow_path(name: str) -> tuple[list[Certified], tuple[tuple[int, int], ...]]:
-    """Return all steps of a flow of the corpus, the last to the horizon, and its captured stays."""
+    """Return all steps of a flow of the corpus, the last to the horizon, and its capture intervals."""
     line = next(line for line in lines() if line["id"] == name)
     scene, state = from_data(line["scene"]), State(**line["state"])
     path = reference.trajectory(scene, state, line["collisions"], line["t_end"])
@@ -269,7 +269,7 @@ def flow_path(name: str) -> tuple[list[Certified], tuple[tuple[int, int], ...]]:
 
 
 def change_stays(how: str, random: Random, line: Line) -> Line | None:
-    """Move an end of a captured stay, drop a stay or add one: a path has one list of stays."""
+    """Move an end of a capture interval, drop one or add one: a path has one list of them."""
     steps, true = flow_path(line["id"])
     changed = list(true)
     begin, end = changed.pop(random.randrange(len(true))) if true else (0, 0)

@@ -16,10 +16,11 @@ import time
 from collections import Counter
 from collections.abc import Callable, Iterator
 from functools import cache, partial
-from importlib import import_module
 from itertools import cycle, islice
 from random import Random
 from typing import NamedTuple
+
+from conformance import verify
 
 from . import bad_questions as bad
 from . import false_answers as false
@@ -47,9 +48,9 @@ KINDS: dict[str, tuple[str, false.Forge]] = {
     "a step left out": ("trajectory", false.leave_out_step),
     "two steps exchanged": ("trajectory", false.exchange_steps),
     "a path ended early": ("trajectory", false.end_path),
-    "a captured stay moved": ("stays", partial(false.change_stays, "move")),
-    "a captured stay dropped": ("stays", partial(false.change_stays, "drop")),
-    "a captured stay added": ("flow", partial(false.change_stays, "add")),
+    "a capture interval moved": ("stays", partial(false.change_stays, "move")),
+    "a capture interval dropped": ("stays", partial(false.change_stays, "drop")),
+    "a capture interval added": ("flow", partial(false.change_stays, "add")),
     "steps of a flow miscounted": ("flow", false.miscount),
     "a refusal permitted": ("core", partial(false.permit_refusal, False)),
     "nothing but a refusal": ("core", partial(false.permit_refusal, True)),
@@ -118,7 +119,6 @@ def draw(n: int, seed: int) -> Iterator[Forgery]:
 
 def judge(line: Line) -> str:
     """Return the verifier's word on a line, "unreadable" and other errors included."""
-    verify = import_module("conformance.verify")
     try:
         return str(verify.verify_line(line).status)
     except verify.Unreadable:

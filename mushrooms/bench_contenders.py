@@ -2,30 +2,20 @@
 
 from __future__ import annotations
 
-import json
 import math
-import os
-import subprocess
-import sys
-import tempfile
 import time
-import tracemalloc
-from functools import partial
 
 import fast
 import reference
-from conformance import plain, vectors
-from conformance.bench.contenders import Ask, Contender, Given, Lap, by_call
+from conformance import plain
+from conformance.bench.contenders import Contender, Given, Lap, by_call
 from conformance.bench.growth import FAR, PathFollower, PathPoint
-from conformance.bench.work import SCENE, Cost, Load
 from conformance.bench.workloads import WINDOW, Workload
 from conformance.generator import prover
 from conformance.grading.agreement import Answer, Enclosed, exact
 from conformance.grading.error import Matrix
-from fast import __main__ as fast_protocol
 from fast.batch import careful_steps, fine_steps, flights, lane_steps
-from reference import __main__ as proof
-from scene import Collision, Scene, State, load
+from scene import Collision, Scene, State
 
 DIGITS = (15, 30, 50, 100, 200)
 PATH_DIGITS = (30, 60)  # working decimals of the proofs whose growth is followed
@@ -33,11 +23,6 @@ LANES_SERVE = (
     "breathing-disk", "fixed-cap", "moving-cap-1e4", "moving-cap-1e7", "moving-cap-1e12", "two-harmonics",
     "sixteen-harmonics", "moving-slope", "bang-bang", "one-path",
 )  # fmt: skip
-COMPILED = {
-    "step": "fast.next_collision(s, p, 1.0)",
-    "trajectory": "fast.trajectory(s, p, 1)",
-    "ensemble": "fast.simulate(s, n_particles=1, energy=10.0)",
-}
 
 
 def linearise(scene: Scene, state: State, t_end: float) -> tuple[Collision, Matrix]:
@@ -62,15 +47,6 @@ def our_contenders() -> list[Contender]:
         Contender("fast, lanes", "compiled", _lanes, LANES_SERVE, lane_steps),
         Contender("fast, trajectory", "compiled", _trajectory, ("one-path",)),
     ]
-
-
-def our_askers() -> dict[str, Ask]:
-    """Return how each of our steppers answers a vector."""
-    return {
-        "proof": partial(vectors.answer, step=proof.step, follow=proof.follow),
-        "fast": partial(vectors.answer, step=fast.next_collision, follow=fast_protocol.follow),
-        "plain Python": partial(vectors.answer, step=plain.next_collision, follow=plain.trajectory),
-    }
 
 
 def our_followers() -> dict[str, PathFollower]:
@@ -171,37 +147,3 @@ def _places(path: reference.Trajectory) -> list[PathPoint]:
         width = max(max(widths[:2]) / size, max(widths[2:]) / speed)
         found.append(PathPoint(step.wall, x, y, vx, vy, width))
     return found
-
-
-def run_ensemble(load_of: Load) -> Cost:
-    """Run an ensemble and say what it took."""
-    tracemalloc.start()
-    try:
-        done = fast.simulate(
-            load(SCENE),
-            n_particles=load_of.particles,
-            energy=load_of.energy,
-            n_cycles=load_of.cycles,
-            threads=load_of.threads,
-        )
-        _, peak = tracemalloc.get_traced_memory()
-    finally:
-        tracemalloc.stop()
-    return Cost(done.seconds, int(done.n_collisions.sum()), peak)
-
-
-def compile_times() -> dict[str, float]:
-    """Return the seconds that each entry takes to compile in a new process with an empty cache."""
-    lines = ["import json, time, fast, scene", "s = scene.load('moving-cap')"]
-    lines += ["p = scene.State(0.0, 0.1, 0.2, 3.0, 4.0)", "found = {}"]
-    for name, call in COMPILED.items():
-        lines += ["begin = time.perf_counter()", call, f"found[{name!r}] = time.perf_counter() - begin"]
-    lines.append("print(json.dumps(found))")
-    with tempfile.TemporaryDirectory() as folder:
-        done = subprocess.run(
-            [sys.executable, "-c", "\n".join(lines)],
-            env={**os.environ, "NUMBA_CACHE_DIR": folder},
-            capture_output=True,
-            check=True,
-        )
-    return {name: round(seconds, 1) for name, seconds in json.loads(done.stdout).items()}

@@ -16,17 +16,12 @@ from conformance.bench.workloads import SINGLE_STEPS, Workload
 from conformance.grading.agreement import Answer
 from conformance.suite.process import Trouble
 from conformance.suite.promises import timing
-from conformance.suite.run import put
 from conformance.suite.session import Limits, Session, missing
-from conformance.vectors import Vector
 from scene import Scene, State, to_data
 
 Family = Literal[
     "proof", "compiled", "interpreted", "time-stepping", "fixed-step", "lean", "example", "command"
 ]
-Ask = Callable[[Vector], dict[str, Any]]  # raises Trouble
-
-
 Given = Answer | None  # None: a step that this contender leaves to another
 
 
@@ -91,8 +86,8 @@ def time_steppers() -> list[Contender]:
 
 def by_command(
     name: str, family: Family, command: Sequence[str], stack: ExitStack, limits: Limits | None = None
-) -> tuple[Contender, Ask]:
-    """Return a command that speaks protocol 1 as a contender that times itself, and how it answers a vector.
+) -> Contender:
+    """Return a command that speaks protocol 1 as a contender that times itself.
 
     Args:
         name: as in the plot.
@@ -129,7 +124,7 @@ def by_command(
             raise trouble
         return Lap(lasted / (n_times * len(answers)), answers, lasted)
 
-    return Contender(name, family, run), partial(put, session)
+    return Contender(name, family, run)
 
 
 def _clock_trouble(session: Session) -> Trouble | None:

@@ -18,8 +18,7 @@ import numpy as np
 
 from scene.refusal import BadInput
 
-FORMAT = 2
-# Quotients of such times, and quotients of those, are numbers too, neither 0 nor infinite.
+FORMAT = 3
 Time = Annotated[float, msgspec.Meta(ge=1e-50, le=1e50)]
 Count = Annotated[int, msgspec.Meta(ge=0)]
 Error = Annotated[float, msgspec.Meta(ge=0)]
@@ -100,45 +99,6 @@ class Growth(msgspec.Struct, frozen=True):
     rate: float
 
 
-class CostSeries(msgspec.Struct, frozen=True):
-    """Cost against one size.
-
-    Attributes:
-        what: particles, cycles, energy or threads.
-        sizes: its values.
-        seconds: median kernel time of each.
-        collisions: followed by each.
-        exponent, error: of the fit seconds ~ size^exponent over the larger half, and its standard error; null
-            where there are too few sizes.
-    """
-
-    what: str
-    sizes: tuple[float, ...]
-    seconds: tuple[float, ...]
-    collisions: tuple[float, ...]
-    exponent: float | None
-    error: float | None
-
-
-class EnsembleWork(msgspec.Struct, frozen=True):
-    """What an ensemble costs; `compile_s` by entry with an empty cache, empty when not measured."""
-
-    scene: str
-    series: tuple[CostSeries, ...]
-    bytes_per_particle: float
-    compile_s: dict[str, float]
-
-
-class Case(msgspec.Struct, frozen=True):
-    """A hard case by stepper: number of vectors by verdict, worst backward ulps (null: none, or infinite)."""
-
-    case: str
-    rule: str
-    vectors: int
-    verdicts: dict[str, dict[str, int]]
-    ulps: dict[str, float | None]
-
-
 class Record(msgspec.Struct, frozen=True):
     """A whole benchmark.
 
@@ -150,7 +110,7 @@ class Record(msgspec.Struct, frozen=True):
         clock_ns: time of one dependent addition in each round of laps: the speed of the machine's core.
         workloads, points: what was asked and found.
         not_run: contenders left out, with the reason.
-        growth, work, hard_cases: the further measurements.
+        growth: of errors along trajectories.
         seconds: wall time of all.
     """
 
@@ -166,8 +126,6 @@ class Record(msgspec.Struct, frozen=True):
     points: tuple[Point, ...]
     not_run: dict[str, str]
     growth: Growth
-    work: EnsembleWork
-    hard_cases: tuple[Case, ...]
     seconds: float
 
 

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from conformance import suite
-from conformance.bench.serve import NAMES
+from conformance.bench.baselines import NAMES
 from conformance.harness.examples import find_examples, find_kit_examples
 from conformance.suite.result import Run
 from conformance.suite.session import Limits
@@ -37,7 +37,7 @@ HEAD = """# Scoreboard
 Level core of corpus {corpus}, seed {seed}: `python -m conformance.bench.scoreboard` makes this page
 anew. The first two are ours; the examples and the engines behind the adapter kits are in
 `conformance/harness/`; the rest is what most people would write, from the benchmark (`python -m
-conformance.bench.serve NAME` puts each behind the protocol): event-driven Newton without checks in
+conformance.bench.baselines NAME` puts each behind the protocol): event-driven Newton without checks in
 C and numba, fixed time steps of a tenth to a thousandth of a flight, scipy's `solve_ivp` with
 events. A precision class is of the answers that passed, few as they may be.
 
@@ -63,7 +63,7 @@ def commands(folder: Path) -> Iterator[tuple[str, tuple[str, ...], str]]:
     for engine, example in find_kit_examples(folder).items():
         yield f"kit, {engine}", example.command, example.why_not
     for name in (name for name in NAMES if name not in LEFT_OUT):
-        yield name, (sys.executable, "-m", "conformance.bench.serve", name), ""
+        yield name, (sys.executable, "-m", "conformance.bench.baselines", name), ""
 
 
 def page(entries: list[Graded], corpus: str) -> str:

@@ -1,4 +1,4 @@
-"""Figures of the benchmark: speed against error, error growth, cost against work."""
+"""Figures of the benchmark: speed against error, and error growth."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import FixedLocator, NullLocator
 
-from conformance.bench.record import CostSeries, Growth, Point, Record, quartiles
+from conformance.bench.record import Growth, Point, Record, quartiles
 from mushrooms.figures import style as plots
 
 # Contrast with white is 4.5 to 1 and more; families differ by their marks too, whatever colours one sees.
@@ -228,23 +228,4 @@ def growth(found: Growth) -> bytes:
     axes.plot(early, 10.0 ** (found.rate * (early - 1) - 32), color=plots.GREY, linestyle=":", label=label)
     axes.set(yscale="log", xlabel="collisions", ylabel="error, relative to table and speed", ylim=(1e-60, 10))
     axes.legend(loc="lower right")
-    return plots.svg(figure)
-
-
-@rc_context(plots.STYLE)
-def work(series: tuple[CostSeries, ...]) -> bytes:
-    """Draw kernel time against particles, cycles, energy and threads."""
-    figure, axes = plots.new_figure(10.5, 2.9, 1, len(series))
-    panels = np.atleast_1d(axes)
-    for panel, one in zip(panels, series, strict=True):
-        panel.plot(one.sizes, one.seconds, marker="o", color=plots.BLUE)
-        panel.set(xscale="log", yscale="log", xlabel=one.what)
-        error = "" if one.error is None else f" ± {one.error:.2f}"
-        if one.exponent is not None:
-            panel.set_title(f"exponent {one.exponent:.2f}{error}", loc="left")
-        if one.what in ("cycles", "threads"):
-            panel.xaxis.set_major_locator(FixedLocator(list(one.sizes)))
-            panel.xaxis.set_minor_locator(NullLocator())
-            panel.set_xticklabels([f"{n:.0f}" for n in one.sizes])
-    panels[0].set_ylabel("seconds")
     return plots.svg(figure)

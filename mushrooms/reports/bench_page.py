@@ -7,7 +7,6 @@ import statistics
 from collections.abc import Sequence
 from typing import Any
 
-from conformance.bench.hard_cases import cell
 from conformance.bench.record import Point, Record, quartiles
 from mushrooms.figures import speed as figures_of_speed
 from mushrooms.reports.page import embed, render
@@ -24,10 +23,7 @@ def to_html(record: Record, speed: bytes) -> bytes:
         record=record,
         speed=embed(speed),
         growth=embed(figures_of_speed.growth(record.growth)),
-        work=embed(figures_of_speed.work(record.work.series)),
         rows=[_row(p) for p in record.points],
-        steppers=list(record.hard_cases[0].verdicts),
-        cell=cell,
         clock=statistics.median(record.clock_ns),
     )
     return page.encode("utf-8")

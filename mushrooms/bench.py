@@ -20,12 +20,12 @@ from scene.files import Writer, write_files
 from scene.refusal import BadInput, check_seed
 
 if TYPE_CHECKING:
-    from conformance.bench.contenders import Contender, Family
     from conformance.bench.measure import Effort
     from conformance.bench.record import Record, Size
+    from conformance.bench.solvers import Family, Solver
 
 TIMEOUT, RESTARTS = 30.0, 1  # of a command
-# By size: questions of a workload, steps with walls only, laps, trajectories and their length.
+# By size: questions of a workload, steps with walls only, runs, trajectories and their length.
 QUESTIONS = {"quick": 12, "full": 64}
 FURTHER = {"quick": 200, "full": 2000}
 REPEATS = {"quick": 5, "full": 11}
@@ -38,7 +38,7 @@ def bench(
         typer.Argument(metavar="[-- COMMAND...]", help="One more stepper; speaks protocol 1."),
     ] = None,
     out: Annotated[Path, typer.Option(metavar="DIR", help="Folder for the results.")] = Path("bench-report"),
-    quick: Annotated[bool, typer.Option("--quick", help="Fewer questions and laps: five minutes.")] = False,
+    quick: Annotated[bool, typer.Option("--quick", help="Fewer questions and runs: five minutes.")] = False,
     seed: Annotated[int, typer.Option(help="Seed of the questions, 0 to 2^64 - 1.")] = 0,
     table: Annotated[
         Path | None,
@@ -80,7 +80,7 @@ def bench(
 
 
 def _check_table(table: Path | None, workload: str | None, quick: bool, command: list[str] | None) -> None:
-    """Refuse options that would change nothing: a table is of an earlier run, and a run has all workloads."""
+    """Refuse options that would change nothing: a table measures nothing, a benchmark has all workloads."""
     if table is None:
         refuse_unheeded({"--workload": workload}, "it needs --table")
     else:
@@ -93,7 +93,7 @@ def _measured(size: Size, seed: int, command: list[str]) -> Record:
     import fast
     from conformance.bench import growth, measure, record, workloads
     from conformance.generator.prover import proved_step
-    from mushrooms import bench_contenders as ours
+    from mushrooms import bench_solvers as ours
 
     begin = time.monotonic()
     n_questions, n_further, repeats = QUESTIONS[size], FURTHER[size], REPEATS[size]
@@ -104,14 +104,14 @@ def _measured(size: Size, seed: int, command: list[str]) -> Record:
         def tick(what: str) -> None:
             bar.update(task, advance=0 if what else 1, description=escape(what) or None)
 
-        contenders, built, not_run = _contenders(stack, command)
+        solvers, built, not_run = _solvers(stack, command)
         points, clock = [], list[float]()
         for rule in workloads.RULES:
             tick(f"questions: {rule.name}")
             workload = workloads.draw_workload(
                 rule, seed, n_questions, proved_step, n_further, fast.next_collision
             )
-            found, troubles = measure.measure(workload, contenders, _effort(size), tick, clock)
+            found, troubles = measure.measure(workload, solvers, _effort(size), tick, clock)
             points += found
             not_run |= {f"{name} on {rule.name}": why for name, why in troubles.items()}
             tick("")
@@ -145,29 +145,27 @@ def _effort(size: str) -> Effort:
     return Effort(REPEATS[size], 3e6, 4e8) if size == "quick" else Effort(REPEATS[size], 2e7, 4e9)
 
 
-def _contenders(
-    stack: ExitStack, command: list[str]
-) -> tuple[list[Contender], dict[str, str], dict[str, str]]:
-    """Return contenders, what was compiled, and what cannot run."""
+def _solvers(stack: ExitStack, command: list[str]) -> tuple[list[Solver], dict[str, str], dict[str, str]]:
+    """Return solvers, what was compiled, and what cannot run."""
     from conformance.bench import baselines
-    from conformance.bench.contenders import by_command, plain_python, time_steppers
+    from conformance.bench.solvers import by_command, plain_python, time_steppers
     from conformance.harness.examples import find_examples
     from conformance.suite.process import Trouble
     from conformance.suite.session import Limits
-    from mushrooms import bench_contenders as ours
+    from mushrooms import bench_solvers as ours
 
     limits = Limits(TIMEOUT, RESTARTS)
-    contenders = [*ours.our_contenders(), baselines.in_numba(), plain_python(), *time_steppers()]
+    solvers = [*ours.our_solvers(), baselines.in_numba(), plain_python(), *time_steppers()]
     built, not_run = dict[str, str](), dict[str, str]()
     folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
     try:
         library, built["lean C"] = baselines.build(folder, baselines.FLAGS)
-        contenders += baselines.in_c(library)
+        solvers += baselines.in_c(library)
     except Trouble as trouble:
         not_run["lean C, time steps"] = trouble.why
 
     def add(name: str, family: Family, line: Sequence[str]) -> None:
-        contenders.append(by_command(name, family, line, stack, limits))
+        solvers.append(by_command(name, family, line, stack, limits))
 
     examples = find_examples(folder, baselines.FLAGS)
     for language, example in examples.items():
@@ -187,7 +185,7 @@ def _contenders(
             add(f"command {' '.join(command)}", "command", command)
         except Trouble as trouble:
             raise BadInput(f"command {command[0]!r} {trouble.verdict}: {trouble.why}") from None
-    return contenders, built, not_run
+    return solvers, built, not_run
 
 
 def _table(found: Record) -> Table:
@@ -203,6 +201,6 @@ def _table(found: Record) -> Table:
         counts = [str(n) if n else "" for n in (p.wrong, p.undecided, p.left)]
         first, ns, third = quartiles(p.ns)
         spread = f"-{1 - first / ns:.1%} +{third / ns - 1:.1%}"
-        row = [escape(p.contender), f"{ns:,.0f}", spread, middle, worst, *counts, astray(p)]
+        row = [escape(p.solver), f"{ns:,.0f}", spread, middle, worst, *counts, astray(p)]
         table.add_row(p.workload, *row)
     return table

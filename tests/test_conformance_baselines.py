@@ -41,10 +41,10 @@ def drawn(name: str, n_further: int, n_questions: int = 2) -> workloads.Workload
     return workloads.draw_workload(rule, 3, n_questions, proved_step, n_further, fast.next_collision)
 
 
-def points(workload, contenders):
-    found, troubles = measure.measure(workload, contenders, BRIEF, lambda _: None, [])
+def points(workload, solvers):
+    found, troubles = measure.measure(workload, solvers, BRIEF, lambda _: None, [])
     assert not troubles
-    return {point.contender: point for point in found}
+    return {point.solver: point for point in found}
 
 
 def fast_steps(table: str, n: int):

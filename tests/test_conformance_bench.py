@@ -14,10 +14,10 @@ from support.truth import proved_step
 
 import fast
 from conformance.bench import growth, measure, record, workloads
-from conformance.bench.contenders import Contender, Lap, by_call
+from conformance.bench.solvers import Run, Solver, by_call
 from conformance.bench.time_stepping import next_collision_by
 from conformance.suite.process import Trouble
-from mushrooms import bench_contenders as ours
+from mushrooms import bench_solvers as ours
 from scene import BadInput, Collision, Horizon, Undecided
 
 DOCS = Path(__file__).parent.parent / "docs"
@@ -75,7 +75,7 @@ def test_speed_and_error_come_from_the_same_laps(drawn):
     workload = drawn["moving-cap-1e7"]
     (proof, careful, lanes) = measured(
         workload,
-        *(c for c in ours.our_contenders() if c.name in ("proof, 30 digits", "fast, careful", "fast, lanes")),
+        *(c for c in ours.our_solvers() if c.name in ("proof, 30 digits", "fast, careful", "fast, lanes")),
     )
     assert (proof.right, careful.right, lanes.right + lanes.left) == (3, 3, 3)
     assert max(proof.relative) < 1e-30
@@ -94,7 +94,7 @@ def test_speed_and_error_come_from_the_same_laps(drawn):
         (lambda c: c, (3, 0, 0)),
     ],
 )
-def test_a_spoilt_contender_is_seen(drawn, spoil, counts):
+def test_a_spoilt_solver_is_seen(drawn, spoil, counts):
     workload = drawn["breathing-disk"]
     spoilt = by_call("spoilt", "compiled", lambda *question: spoil(fast.next_collision(*question)))
     (point,) = measured(workload, spoilt)
@@ -140,10 +140,10 @@ def test_time_stepping_is_right_where_it_is_easy_and_wrong_where_it_skips(drawn)
 
 
 def test_a_clock_that_never_ticks_says_no_speed(drawn):
-    still = Contender("still", "command", lambda *_: Lap(0.0, [Undecided("")] * 3, 0.0))
+    still = Solver("still", "command", lambda *_: Run(0.0, [Undecided("")] * 3, 0.0))
     points, troubles = tried(drawn["slow"], still)
     assert not points
-    assert troubles == {"still": "fail: a lap is said to last 0 ns in all"}
+    assert troubles == {"still": "fail: a run is said to last 0 ns in all"}
 
 
 def test_a_place_beyond_all_numbers_is_kept(drawn):
@@ -158,26 +158,26 @@ def test_a_place_beyond_all_numbers_is_kept(drawn):
     assert kept == point
 
 
-def test_a_contender_that_changes_its_answers_is_left_out(drawn):
+def test_a_solver_that_changes_its_answers_is_left_out(drawn):
     answers = iter(range(100))
 
     def fickle(workload, n_times):
-        return Lap(1.0, [Undecided(str(next(answers)))] * 3, 1e9)
+        return Run(1.0, [Undecided(str(next(answers)))] * 3, 1e9)
 
-    points, troubles = tried(drawn["slow"], Contender("fickle", "command", fickle))
+    points, troubles = tried(drawn["slow"], Solver("fickle", "command", fickle))
     assert not points
-    assert troubles == {"fickle": "fail: its answers differ from lap to lap"}
+    assert troubles == {"fickle": "fail: its answers differ from run to run"}
 
 
-def test_a_contender_that_breaks_off_is_left_out(drawn):
+def test_a_solver_that_breaks_off_is_left_out(drawn):
     calls = iter(range(100))
 
     def run(workload, n_times):
         if next(calls) > 2:
             raise Trouble("crashed", "gone")
-        return Lap(1.0, [Undecided("")] * 3, 1e9)
+        return Run(1.0, [Undecided("")] * 3, 1e9)
 
-    points, troubles = tried(drawn["slow"], Contender("brief", "command", run))
+    points, troubles = tried(drawn["slow"], Solver("brief", "command", run))
     assert not points
     assert troubles == {"brief": "crashed: gone"}
 
@@ -211,8 +211,8 @@ def test_a_wrong_wall_leaves_no_digit():
 DRAWN = (record.Drawn("slow", "slow", "moving-cap", 1, 0),)
 
 
-def a_point(ns: list[float], contender: str = "fast") -> record.Point:
-    return record.Point("slow", contender, "compiled", 1, tuple(ns), 1, 0, 0, 0, 0, 0, (0.5,), (1e-16,))
+def a_point(ns: list[float], solver: str = "fast") -> record.Point:
+    return record.Point("slow", solver, "compiled", 1, tuple(ns), 1, 0, 0, 0, 0, 0, (0.5,), (1e-16,))
 
 
 def a_record(*points: record.Point, clock: float = 1.0) -> record.Record:

@@ -43,7 +43,7 @@ def test_a_benchmark_is_written_whole_and_again(call, tmp_path, monkeypatch):
     assert sorted(p.name for p in (tmp_path / "one").iterdir()) == FILES
     found = record.read(tmp_path / "one" / "bench.json")
     assert (found.size, found.seed, found.questions) == ("quick", 5, 2)
-    names = {p.contender for p in found.points}
+    names = {p.solver for p in found.points}
     assert {"proof, 200 digits", "fast, lanes", "fast, pairs", "plain Python", "lean numba"} < names
     assert f"command {' '.join(one)}" in names
     if shutil.which("cc"):
@@ -51,7 +51,7 @@ def test_a_benchmark_is_written_whole_and_again(call, tmp_path, monkeypatch):
         assert "baselines.c" in found.machine.compiled["lean C"]
     else:
         assert found.not_run["lean C, time steps"] == "no C compiler is installed"
-    assert {p.further for p in found.points if p.contender in ("fast, lanes", "lean numba")} == {40}
+    assert {p.further for p in found.points if p.solver in ("fast, lanes", "lean numba")} == {40}
     assert {p.workload for p in found.points} == {"breathing-disk", "moving-cap-1e4"}
     assert "fast, careful" in out
     page = (tmp_path / "one" / "bench.html").read_text("utf-8")
@@ -65,7 +65,7 @@ def test_a_benchmark_is_written_whole_and_again(call, tmp_path, monkeypatch):
     monkeypatch.setattr(workloads, "RULES", workloads.RULES[:1])
     assert call("--quick", "--out", tmp_path / "two", "--seed", 5)[0] == 0
     again = record.read(tmp_path / "two" / "bench.json")
-    errors = [{(p.workload, p.contender): p.relative for p in r.points} for r in (found, again)]
+    errors = [{(p.workload, p.solver): p.relative for p in r.points} for r in (found, again)]
     assert all(errors[0][key] == errors[1][key] for key in errors[1])
 
 

@@ -1,4 +1,4 @@
-"""Baselines: what most people would write, as contenders.
+"""Baselines: what most people would write, as solvers.
 
 Event-driven, with Newton's method for each wall and no checks: in C and in scalar numba. By fixed time steps,
 in C: move by dt, and where the new place is outside put it back on the wall and reflect. All answer many
@@ -30,7 +30,7 @@ from mpmath import fp
 
 from conformance import plain
 from conformance.bench import numba_stepper as numba
-from conformance.bench.contenders import Contender, Family, Given, Lap
+from conformance.bench.solvers import Family, Given, Run, Solver
 from conformance.bench.time_stepping import TOLERANCES, next_collision_by
 from conformance.bench.workloads import SINGLE_STEPS, WINDOW, Workload
 from conformance.harness import examples
@@ -162,24 +162,24 @@ def build(folder: Path, flags: Sequence[str]) -> tuple[Path, str]:
     return library, built.built
 
 
-def in_c(library: Path) -> list[Contender]:
-    """Return the contenders that the compiled C file holds."""
-    found = [_contender("lean C", "lean", c_engine(library))]
+def in_c(library: Path) -> list[Solver]:
+    """Return the solvers that the compiled C file holds."""
+    found = [_solver("lean C", "lean", c_engine(library))]
     for parts in PARTS:
         engine = c_engine(library, parts)
-        found.append(_contender(f"steps, flight/{parts}", "fixed-step", engine, 10 * WINDOW / parts))
+        found.append(_solver(f"steps, flight/{parts}", "fixed-step", engine, 10 * WINDOW / parts))
     return found
 
 
-def in_numba() -> Contender:
+def in_numba() -> Solver:
     """Return the scalar stepper in numba."""
-    return _contender("lean numba", "lean", numba_engine())
+    return _solver("lean numba", "lean", numba_engine())
 
 
-def stepper(contender: Contender) -> Stepper:
+def stepper(solver: Solver) -> Stepper:
     """Return a baseline as a stepper of one state, taken as it is; t_end alone ends a flight."""
-    assert contender.steps is not None
-    steps = contender.steps
+    assert solver.steps is not None
+    steps = solver.steps
 
     def step(scene: Scene, state: State, t_end: float) -> Outcome:
         (met,) = steps(scene, [state])
@@ -191,11 +191,11 @@ def stepper(contender: Contender) -> Stepper:
     return step
 
 
-def _contender(name: str, family: Family, engine: Engine, flights: float = WINDOW) -> Contender:
+def _solver(name: str, family: Family, engine: Engine, flights: float = WINDOW) -> Solver:
     def steps(scene: Scene, states: Sequence[State]) -> list[Given]:
         return [_outcome(row) for row in engine.hits(questions(scene, states)).tolist()]
 
-    def run(workload: Workload, n_times: int) -> Lap:
+    def run(workload: Workload, n_times: int) -> Run:
         states = [q.state for q in workload.questions]
         followed, t_end, most = states, workload.end(flights), MOST
         if workload.length:
@@ -203,10 +203,10 @@ def _contender(name: str, family: Family, engine: Engine, flights: float = WINDO
         n_hits, seconds = engine.follow(questions(workload.scene, followed), t_end, most, n_times)
         if not n_hits:
             raise Trouble("fail", "it meets no wall")
-        return Lap(seconds / n_hits * 1e9, steps(workload.scene, states), seconds * 1e9)
+        return Run(seconds / n_hits * 1e9, steps(workload.scene, states), seconds * 1e9)
 
     serves = SINGLE_STEPS if family == "fixed-step" else (*SINGLE_STEPS, "one-path")
-    return Contender(name, family, run, serves, steps)
+    return Solver(name, family, run, serves, steps)
 
 
 def _outcome(row: list[float]) -> Given:

@@ -49,12 +49,12 @@ class Drawn(msgspec.Struct, frozen=True):
 
 
 class Point(msgspec.Struct, frozen=True):
-    """A contender on a workload.
+    """A solver on a workload.
 
     Attributes:
-        workload, contender, family: names.
-        n_times: how often a timed lap took all steps.
-        ns: nanoseconds per step of each lap.
+        workload, solver, family: names.
+        n_times: how often a timed run took all steps.
+        ns: nanoseconds per step of each run.
         right, wrong, undecided, left: numbers of answers: the right wall; another wall or outcome; left
             open; left to another stepper.
         further, astray: how many of the workload's further steps it answered, and how many of them with
@@ -64,7 +64,7 @@ class Point(msgspec.Struct, frozen=True):
     """
 
     workload: str
-    contender: str
+    solver: str
     family: str
     n_times: Count
     ns: Times
@@ -107,9 +107,9 @@ class Record(msgspec.Struct, frozen=True):
         size, seed, questions, repeats: the settings.
         digits: of the proved answers.
         machine: where it ran.
-        clock_ns: time of one dependent addition in each round of laps: the speed of the machine's core.
+        clock_ns: time of one dependent addition in each round of runs: the speed of the machine's core.
         workloads, points: what was asked and found.
-        not_run: contenders left out, with the reason.
+        not_run: solvers left out, with the reason.
         growth: of errors along trajectories.
         seconds: wall time of all.
     """
@@ -130,7 +130,7 @@ class Record(msgspec.Struct, frozen=True):
 
 
 def quartiles(ns: Sequence[float]) -> tuple[float, float, float]:
-    """Return the first quartile, the median and the third quartile of a point's laps."""
+    """Return the first quartile, the median and the third quartile of a point's runs."""
     first, middle, third = np.quantile(ns, (0.25, 0.5, 0.75)).tolist()
     return first, middle, third
 
@@ -182,10 +182,10 @@ def read(path: Path) -> Record:
         raise BadInput(f"{path}: format = {record.format}, must be {FORMAT}")
     names, seen = {drawn.name for drawn in record.workloads}, set[tuple[str, str]]()
     for p in record.points:
-        if p.workload not in names or (p.workload, p.contender) in seen:
+        if p.workload not in names or (p.workload, p.solver) in seen:
             why = "twice" if p.workload in names else "of a workload that it does not name"
-            raise BadInput(f"{path} is no bench.json: a point of {p.contender!r} on {p.workload!r} is {why}")
-        seen.add((p.workload, p.contender))
+            raise BadInput(f"{path} is no bench.json: a point of {p.solver!r} on {p.workload!r} is {why}")
+        seen.add((p.workload, p.solver))
     return record
 
 

@@ -24,7 +24,7 @@ from scene.geometry import rounded
 from scene.states import Stepper
 from scene.tables import period
 
-DIGITS = 230  # of the proved answers: beyond any contender's
+DIGITS = 230  # of the proved answers: beyond any solver's
 WINDOW = 1000.0  # flights
 PHASE = 0.3  # of the cycle, where the window begins
 MAX_DRAWS = 100

@@ -118,7 +118,7 @@ def _label(axes: Any, points: list[Point]) -> None:
     """Name the points: the proofs by their digits, the others in a column at the right, a line to each."""
     for p in (p for p in points if p.family == "proof"):
         above = _digits_of(p)[0], statistics.median(p.ns) * 2
-        axes.annotate(short_name(p.contender), above, ha="center", color=COLOURS["proof"], fontsize=LABEL)
+        axes.annotate(short_name(p.solver), above, ha="center", color=COLOURS["proof"], fontsize=LABEL)
     named = [
         (math.log10(statistics.median(p.ns)), _digits_of(p)[0], _name(p), COLOURS[p.family])
         for p in points
@@ -154,7 +154,7 @@ def spread(wanted: list[float], space: float) -> list[float]:
 
 
 def _name(p: Point) -> str:
-    name = short_name(p.contender)
+    name = short_name(p.solver)
     share = p.astray / p.further if p.further else p.wrong / max(1, p.wrong + p.right + p.undecided)
     return f"{name}: {100 * share:.2g} % wrong" if share else name
 
@@ -167,9 +167,9 @@ def _digits_of(p: Point) -> tuple[float, float]:
 
 
 def pareto(points: list[Point]) -> list[tuple[float, float]]:
-    """Return (worst digits, ns) of the contenders that none beats in both, from the fastest on.
+    """Return (worst digits, ns) of the solvers that none beats in both, from the fastest on.
 
-    Only a contender with no wrong answer and most of them right can stand on the front.
+    Only a solver with no wrong answer and most of them right can stand on the front.
     """
     able = [p for p in points if p.right > p.undecided + p.left and not p.wrong and not p.astray]
     pairs = sorted((statistics.median(p.ns), -digits(max(p.relative))) for p in able)
@@ -180,11 +180,11 @@ def pareto(points: list[Point]) -> list[tuple[float, float]]:
     return front
 
 
-def short_name(contender: str) -> str:
-    """Return a contender's label."""
+def short_name(solver: str) -> str:
+    """Return a solver's label."""
     for part in ("proof, ", " digits", "fast, ", "solve_ivp, ", "example in ", "command ", "steps, flight"):
-        contender = contender.replace(part, "1" if part == "steps, flight" else "")
-    return plots.plain(contender if len(contender) < 18 else contender[:17] + "…")
+        solver = solver.replace(part, "1" if part == "steps, flight" else "")
+    return plots.plain(solver if len(solver) < 18 else solver[:17] + "…")
 
 
 def _legend(record: Record) -> list[Line2D]:
@@ -195,7 +195,7 @@ def _legend(record: Record) -> list[Line2D]:
         *(Line2D([], [], color=COLOURS[f], marker=MARKS[f], label=WORDS[f], **bare) for f in families),
         Line2D([], [], marker="|", markersize=7, label="from the median to the worst answer", **black),
         Line2D(
-            [], [], marker="_", label="up and down: quartiles of the laps", **black | {"linestyle": "none"}
+            [], [], marker="_", label="up and down: quartiles of the runs", **black | {"linestyle": "none"}
         ),
         Line2D([], [], marker="x", color=RED, label="some walls wrong", **bare),
         Line2D([], [], label="front: least time for so many digits, at worst", **black),

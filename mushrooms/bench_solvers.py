@@ -1,4 +1,4 @@
-"""Our steppers as the benchmark's contenders, and the proofs that all are measured against."""
+"""Our steppers as the benchmark's solvers, and the proofs that all are measured against."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ import time
 import fast
 import reference
 from conformance import plain
-from conformance.bench.contenders import Contender, Given, Lap, by_call
 from conformance.bench.growth import FAR, PathFollower, PathPoint
+from conformance.bench.solvers import Given, Run, Solver, by_call
 from conformance.bench.workloads import WINDOW, Workload
 from conformance.generator import prover
 from conformance.grading.agreement import Answer, Enclosed, exact
@@ -37,15 +37,15 @@ def prove_path(scene: Scene, state: State, n_collisions: int) -> list[PathPoint]
     return _places(reference.trajectory(scene, state, n_collisions, digits=20))
 
 
-def our_contenders() -> list[Contender]:
+def our_solvers() -> list[Solver]:
     """Return our steppers: the reference at several precisions, and the fast one's five ways."""
     return [
         *(_proof(digits) for digits in DIGITS),
         by_call("fast, a call", "compiled", fast.next_collision),
-        Contender("fast, careful", "compiled", _careful),
-        Contender("fast, pairs", "compiled", _fine),
-        Contender("fast, lanes", "compiled", _lanes, LANES_SERVE, lane_steps),
-        Contender("fast, trajectory", "compiled", _trajectory, ("one-path",)),
+        Solver("fast, careful", "compiled", _careful),
+        Solver("fast, pairs", "compiled", _fine),
+        Solver("fast, lanes", "compiled", _lanes, LANES_SERVE, lane_steps),
+        Solver("fast, trajectory", "compiled", _trajectory, ("one-path",)),
     ]
 
 
@@ -59,7 +59,7 @@ def our_followers() -> dict[str, PathFollower]:
     }
 
 
-def _proof(digits: int) -> Contender:
+def _proof(digits: int) -> Solver:
     def step(scene: Scene, state: State, t_end: float) -> Answer:
         found = reference.next_collision(scene, state, t_end, digits=digits)
         if isinstance(found, reference.Collision):
@@ -69,12 +69,12 @@ def _proof(digits: int) -> Contender:
     return by_call(f"proof, {digits} digits", "proof", step)
 
 
-def _careful(workload: Workload, n_times: int) -> Lap:
+def _careful(workload: Workload, n_times: int) -> Run:
     answers, seconds = careful_steps(workload.scene, [q.state for q in workload.questions], n_times)
-    return Lap(seconds / (n_times * len(answers)) * 1e9, list(answers), seconds * 1e9)
+    return Run(seconds / (n_times * len(answers)) * 1e9, list(answers), seconds * 1e9)
 
 
-def _fine(workload: Workload, n_times: int) -> Lap:
+def _fine(workload: Workload, n_times: int) -> Run:
     paths, seconds = fine_steps(workload.scene, [q.state for q in workload.questions], n_times)
     answers: list[Given] = []
     for path in paths:
@@ -83,10 +83,10 @@ def _fine(workload: Workload, n_times: int) -> Lap:
             answers.append(exact(path.walls[0], (dt, *place)))
         else:
             answers.append(path.outcome)
-    return Lap(seconds / (n_times * len(answers)) * 1e9, answers, seconds * 1e9)
+    return Run(seconds / (n_times * len(answers)) * 1e9, answers, seconds * 1e9)
 
 
-def _lanes(workload: Workload, n_times: int) -> Lap:
+def _lanes(workload: Workload, n_times: int) -> Run:
     """Time the engine on flights that go on from the questions; grade one round of its lanes on these."""
     states = [q.state for q in workload.questions]
     copies = -(-128 // len(states))  # enough to fill both pools
@@ -96,10 +96,10 @@ def _lanes(workload: Workload, n_times: int) -> Lap:
     for _ in range(n_times):
         n, lasted = flights(workload.scene, followed, t_end)
         n_collisions, seconds = n_collisions + n, seconds + lasted
-    return Lap(seconds / n_collisions * 1e9, list(lane_steps(workload.scene, states)), seconds * 1e9)
+    return Run(seconds / n_collisions * 1e9, list(lane_steps(workload.scene, states)), seconds * 1e9)
 
 
-def _trajectory(workload: Workload, n_times: int) -> Lap:
+def _trajectory(workload: Workload, n_times: int) -> Run:
     """Time a path from the first question, the call and its arrays included; grade a step from each."""
     states = [q.state for q in workload.questions]
     paths = [fast.trajectory(workload.scene, state, 1) for state in states]
@@ -108,7 +108,7 @@ def _trajectory(workload: Workload, n_times: int) -> Lap:
         fast.trajectory(workload.scene, states[0], workload.length)
     ns = time.perf_counter_ns() - begin
     answers: list[Given] = [Collision(path.walls[0], *path.steps[0].tolist()) for path in paths]
-    return Lap(ns / (n_times * workload.length), answers, ns)
+    return Run(ns / (n_times * workload.length), answers, ns)
 
 
 def _plain_path(scene: Scene, state: State, n_collisions: int) -> list[PathPoint]:

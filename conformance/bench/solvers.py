@@ -1,4 +1,4 @@
-"""The contenders: steppers that step a workload's states and say how long that took."""
+"""The solvers: steppers that step a workload's states and say how long that took."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ from scene import Scene, State, to_data
 Family = Literal[
     "proof", "compiled", "interpreted", "time-stepping", "fixed-step", "lean", "example", "command"
 ]
-Given = Answer | None  # None: a step that this contender leaves to another
+Given = Answer | None  # None: a step that this solver leaves to another
 
 
-class Lap(NamedTuple):
+class Run(NamedTuple):
     """One run over a workload.
 
     Attributes:
-        ns: nanoseconds per step (or per collision, where the contender follows the states on).
+        ns: nanoseconds per step (or per collision, where the solver follows the states on).
         answers: one for each question.
         lasted: nanoseconds in all.
     """
@@ -39,44 +39,44 @@ class Lap(NamedTuple):
     lasted: float
 
 
-class Contender(NamedTuple):
+class Solver(NamedTuple):
     """A stepper.
 
     Attributes:
         name: as in the plot.
         family: what kind of thing it is.
-        run: (workload, n_times) -> a lap in which every step is taken n_times; raises Trouble.
+        run: (workload, n_times) -> a run in which every step is taken n_times; raises Trouble.
         serves: the workloads it can run.
         steps: one step from each of many states, quickly; None where there is no such thing.
     """
 
     name: str
     family: Family
-    run: Callable[[Workload, int], Lap]
+    run: Callable[[Workload, int], Run]
     serves: tuple[str, ...] = SINGLE_STEPS
     steps: Callable[[Scene, Sequence[State]], Sequence[Given]] | None = None
 
 
-def by_call(name: str, family: Family, step: Callable[[Scene, State, float], Given]) -> Contender:
-    """Return a Python function of one step as a contender; the call is part of its time."""
+def by_call(name: str, family: Family, step: Callable[[Scene, State, float], Given]) -> Solver:
+    """Return a Python function of one step as a solver; the call is part of its time."""
 
-    def run(workload: Workload, n_times: int) -> Lap:
+    def run(workload: Workload, n_times: int) -> Run:
         answers: list[Given] = []
         begin = time.perf_counter_ns()
         for _ in range(n_times):
             answers = [step(workload.scene, q.state, q.t_end) for q in workload.questions]
         ns = time.perf_counter_ns() - begin
-        return Lap(ns / (n_times * len(workload.questions)), answers, ns)
+        return Run(ns / (n_times * len(workload.questions)), answers, ns)
 
-    return Contender(name, family, run)
+    return Solver(name, family, run)
 
 
-def plain_python() -> Contender:
+def plain_python() -> Solver:
     """Return the plain stepper."""
     return by_call("plain Python", "interpreted", plain.next_collision)
 
 
-def time_steppers() -> list[Contender]:
+def time_steppers() -> list[Solver]:
     """Return scipy's solve_ivp with events, at several tolerances."""
     return [
         by_call(f"solve_ivp, rtol {rtol:.0e}", "time-stepping", next_collision_by(rtol))
@@ -86,8 +86,8 @@ def time_steppers() -> list[Contender]:
 
 def by_command(
     name: str, family: Family, command: Sequence[str], stack: ExitStack, limits: Limits | None = None
-) -> Contender:
-    """Return a command that speaks protocol 1 as a contender that times itself.
+) -> Solver:
+    """Return a command that speaks protocol 1 as a solver that times itself.
 
     Args:
         name: as in the plot.
@@ -104,7 +104,7 @@ def by_command(
     session.start()
     clock_trouble = cache(partial(_clock_trouble, session))  # its clock is looked at once
 
-    def run(workload: Workload, n_times: int) -> Lap:
+    def run(workload: Workload, n_times: int) -> Run:
         assert session.introduction is not None
         scene = to_data(workload.scene)
         if lacking := missing(session.introduction, "time", scene):
@@ -122,13 +122,13 @@ def by_command(
             answers.append(last)
         if (trouble := clock_trouble()) is not None:
             raise trouble
-        return Lap(lasted / (n_times * len(answers)), answers, lasted)
+        return Run(lasted / (n_times * len(answers)), answers, lasted)
 
-    return Contender(name, family, run)
+    return Solver(name, family, run)
 
 
 def _clock_trouble(session: Session) -> Trouble | None:
-    """Hold what a command says of its time to the clock on this side; a lap is too short to do so."""
+    """Hold what a command says of its time to the clock on this side; a run is too short to do so."""
     try:
         timing.honest_clock(session)
     except Trouble as trouble:

@@ -89,7 +89,7 @@ def _check_table(table: Path | None, workload: str | None, quick: bool, command:
 
 
 def _measured(size: Size, seed: int, command: list[str]) -> Record:
-    """Run everything."""
+    """SolverRun everything."""
     import fast
     from conformance.bench import growth, measure, record, workloads
     from conformance.generator.prover import proved_step

@@ -9,7 +9,7 @@ import fast
 import reference
 from conformance import plain
 from conformance.bench.growth import FAR, PathFollower, PathPoint
-from conformance.bench.solvers import Given, Run, Solver, by_call
+from conformance.bench.solvers import Given, Solver, SolverRun, by_call
 from conformance.bench.workloads import WINDOW, Workload
 from conformance.generator import prover
 from conformance.grading.agreement import Answer, Enclosed, exact
@@ -69,12 +69,12 @@ def _proof(digits: int) -> Solver:
     return by_call(f"proof, {digits} digits", "proof", step)
 
 
-def _careful(workload: Workload, n_times: int) -> Run:
+def _careful(workload: Workload, n_times: int) -> SolverRun:
     answers, seconds = careful_steps(workload.scene, [q.state for q in workload.questions], n_times)
-    return Run(seconds / (n_times * len(answers)) * 1e9, list(answers), seconds * 1e9)
+    return SolverRun(seconds / (n_times * len(answers)) * 1e9, list(answers), seconds * 1e9)
 
 
-def _fine(workload: Workload, n_times: int) -> Run:
+def _fine(workload: Workload, n_times: int) -> SolverRun:
     paths, seconds = fine_steps(workload.scene, [q.state for q in workload.questions], n_times)
     answers: list[Given] = []
     for path in paths:
@@ -83,10 +83,10 @@ def _fine(workload: Workload, n_times: int) -> Run:
             answers.append(exact(path.walls[0], (dt, *place)))
         else:
             answers.append(path.outcome)
-    return Run(seconds / (n_times * len(answers)) * 1e9, answers, seconds * 1e9)
+    return SolverRun(seconds / (n_times * len(answers)) * 1e9, answers, seconds * 1e9)
 
 
-def _lanes(workload: Workload, n_times: int) -> Run:
+def _lanes(workload: Workload, n_times: int) -> SolverRun:
     """Time the engine on flights that go on from the questions; grade one round of its lanes on these."""
     states = [q.state for q in workload.questions]
     copies = -(-128 // len(states))  # enough to fill both pools
@@ -96,10 +96,10 @@ def _lanes(workload: Workload, n_times: int) -> Run:
     for _ in range(n_times):
         n, lasted = flights(workload.scene, followed, t_end)
         n_collisions, seconds = n_collisions + n, seconds + lasted
-    return Run(seconds / n_collisions * 1e9, list(lane_steps(workload.scene, states)), seconds * 1e9)
+    return SolverRun(seconds / n_collisions * 1e9, list(lane_steps(workload.scene, states)), seconds * 1e9)
 
 
-def _trajectory(workload: Workload, n_times: int) -> Run:
+def _trajectory(workload: Workload, n_times: int) -> SolverRun:
     """Time a path from the first question, the call and its arrays included; grade a step from each."""
     states = [q.state for q in workload.questions]
     paths = [fast.trajectory(workload.scene, state, 1) for state in states]
@@ -108,7 +108,7 @@ def _trajectory(workload: Workload, n_times: int) -> Run:
         fast.trajectory(workload.scene, states[0], workload.length)
     ns = time.perf_counter_ns() - begin
     answers: list[Given] = [Collision(path.walls[0], *path.steps[0].tolist()) for path in paths]
-    return Run(ns / (n_times * workload.length), answers, ns)
+    return SolverRun(ns / (n_times * workload.length), answers, ns)
 
 
 def _plain_path(scene: Scene, state: State, n_collisions: int) -> list[PathPoint]:

@@ -34,22 +34,27 @@ def step_jacobian(course: Course, hit: Hit) -> Matrix:
         5 rows (outputs) of 5 columns (inputs), intervals.
     """
     arithmetic, flight, motion = course.arithmetic, course.flight, course.motion
-    zero = arithmetic.zero
     s, d = hit.time - flight.begin, hit.slope
     f_x, f_y, f_t = motion.gradient(hit.wall, hit.time)
-    origin = motion.gradient(hit.wall, flight.begin) if hit.wall in course.leaving else None
-    moves = []
-    for e_t, e_x, e_y, e_vx, e_vy in identity(arithmetic):
-        change = f_x * (e_x + s * e_vx) + f_y * (e_y + s * e_vy) + f_t * e_t
-        if origin is not None:
-            change = change - (origin[0] * e_x + origin[1] * e_y + origin[2] * e_t)
-        moves.append(-change / d)
+    is_met_again = hit.wall in course.leaving
+    origin = motion.gradient(hit.wall, flight.begin) if is_met_again else (arithmetic.zero,) * 3
+    moves = [
+        (
+            origin[0] * e_x
+            + origin[1] * e_y
+            + origin[2] * e_t
+            - f_x * (e_x + s * e_vx)
+            - f_y * (e_y + s * e_vy)
+            - f_t * e_t
+        )
+        / d
+        for e_t, e_x, e_y, e_vx, e_vy in identity(arithmetic)
+    ]
     f_xx, f_yy, f_yt, f_tt = motion.hessian(hit.wall, _with_near_knot(course, hit, moves))
     n2 = arithmetic.square(f_x) + arithmetic.square(f_y)
     columns = []
     for ds, (e_t, e_x, e_y, e_vx, e_vy) in zip(moves, identity(arithmetic), strict=True):
-        x, y = e_x + s * e_vx + flight.vx * ds, e_y + s * e_vy + flight.vy * ds
-        t = e_t + ds
+        x, y, t = e_x + s * e_vx + flight.vx * ds, e_y + s * e_vy + flight.vy * ds, e_t + ds
         d_x, d_y, d_t = f_xx * x, f_yy * y + f_yt * t, f_yt * y + f_tt * t
         dd = d_x * flight.vx + d_y * flight.vy + d_t + f_x * e_vx + f_y * e_vy
         dn2 = 2 * (f_x * d_x + f_y * d_y)
@@ -58,7 +63,7 @@ def step_jacobian(course: Course, hit: Hit) -> Matrix:
         columns.append([ds, x, y, e_vx - dpush * f_x - push * d_x, e_vy - dpush * f_y - push * d_y])
     if hit.wall == "base":
         for column in columns:
-            column[2] = zero
+            column[2] = arithmetic.zero
     return [[columns[i][k] for i in range(5)] for k in range(5)]
 
 
@@ -70,20 +75,13 @@ def _with_near_knot(course: Course, hit: Hit, moves: list[Interval]) -> Interval
         hit: the collision.
         moves: derivatives of the flight time by t, x, y, vx, vy.
     """
-    flight = course.flight
-    low, high = exact_ends(hit.time)
-    reach = NEAR * (
-        abs(flight.instant) + abs(flight.instant + high) + abs(flight.instant * _largest(moves[0]))
-    )
-    for move, number in zip(moves[1:], (flight.x, flight.y, flight.vx, flight.vy), strict=True):
-        reach += NEAR * _largest(move) * _largest(number)
-    if course.motion.timeline.knot_between(low - reach, high + reach) is None:
-        return hit.time
-    return course.arithmetic.between(low - reach, high + reach)
-
-
-def _largest(x: Interval) -> Fraction:
-    return max(map(abs, exact_ends(x)))
+    flight, (low, high) = course.flight, exact_ends(hit.time)
+    begin = course.arithmetic.number(flight.instant)
+    sizes = [begin + hit.time, begin]
+    sizes += [d * at for d, at in zip(moves, (begin, flight.x, flight.y, flight.vx, flight.vy), strict=True)]
+    reach = NEAR * sum(max(map(abs, exact_ends(size))) for size in sizes)
+    is_near = course.motion.timeline.knot_between(low - reach, high + reach) is not None
+    return course.arithmetic.between(low - reach, high + reach) if is_near else hit.time
 
 
 def chained(later: Matrix, earlier: Matrix) -> Matrix:

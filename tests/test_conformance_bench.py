@@ -14,7 +14,7 @@ from support.truth import proved_step
 
 import fast
 from conformance.bench import growth, measure, record, workloads
-from conformance.bench.solvers import Run, Solver, by_call
+from conformance.bench.solvers import Solver, SolverRun, by_call
 from conformance.bench.time_stepping import next_collision_by
 from conformance.suite.process import Trouble
 from mushrooms import bench_solvers as ours
@@ -140,7 +140,7 @@ def test_time_stepping_is_right_where_it_is_easy_and_wrong_where_it_skips(drawn)
 
 
 def test_a_clock_that_never_ticks_says_no_speed(drawn):
-    still = Solver("still", "command", lambda *_: Run(0.0, [Undecided("")] * 3, 0.0))
+    still = Solver("still", "command", lambda *_: SolverRun(0.0, [Undecided("")] * 3, 0.0))
     points, troubles = tried(drawn["slow"], still)
     assert not points
     assert troubles == {"still": "fail: a run is said to last 0 ns in all"}
@@ -162,7 +162,7 @@ def test_a_solver_that_changes_its_answers_is_left_out(drawn):
     answers = iter(range(100))
 
     def fickle(workload, n_times):
-        return Run(1.0, [Undecided(str(next(answers)))] * 3, 1e9)
+        return SolverRun(1.0, [Undecided(str(next(answers)))] * 3, 1e9)
 
     points, troubles = tried(drawn["slow"], Solver("fickle", "command", fickle))
     assert not points
@@ -175,7 +175,7 @@ def test_a_solver_that_breaks_off_is_left_out(drawn):
     def run(workload, n_times):
         if next(calls) > 2:
             raise Trouble("crashed", "gone")
-        return Run(1.0, [Undecided("")] * 3, 1e9)
+        return SolverRun(1.0, [Undecided("")] * 3, 1e9)
 
     points, troubles = tried(drawn["slow"], Solver("brief", "command", run))
     assert not points

@@ -30,7 +30,7 @@ from mpmath import fp
 
 from conformance import plain
 from conformance.bench import numba_stepper as numba
-from conformance.bench.solvers import Family, Given, Run, Solver
+from conformance.bench.solvers import Family, Given, Solver, SolverRun
 from conformance.bench.time_stepping import TOLERANCES, next_collision_by
 from conformance.bench.workloads import SINGLE_STEPS, WINDOW, Workload
 from conformance.harness import examples
@@ -195,7 +195,7 @@ def _solver(name: str, family: Family, engine: Engine, flights: float = WINDOW) 
     def steps(scene: Scene, states: Sequence[State]) -> list[Given]:
         return [_outcome(row) for row in engine.hits(questions(scene, states)).tolist()]
 
-    def run(workload: Workload, n_times: int) -> Run:
+    def run(workload: Workload, n_times: int) -> SolverRun:
         states = [q.state for q in workload.questions]
         followed, t_end, most = states, workload.end(flights), MOST
         if workload.length:
@@ -203,7 +203,7 @@ def _solver(name: str, family: Family, engine: Engine, flights: float = WINDOW) 
         n_hits, seconds = engine.follow(questions(workload.scene, followed), t_end, most, n_times)
         if not n_hits:
             raise Trouble("fail", "it meets no wall")
-        return Run(seconds / n_hits * 1e9, steps(workload.scene, states), seconds * 1e9)
+        return SolverRun(seconds / n_hits * 1e9, steps(workload.scene, states), seconds * 1e9)
 
     serves = SINGLE_STEPS if family == "fixed-step" else (*SINGLE_STEPS, "one-path")
     return Solver(name, family, run, serves, steps)

@@ -19,7 +19,7 @@ from typing import NamedTuple
 import numpy as np
 
 from conformance.bench.record import Point, short
-from conformance.bench.solvers import Given, Run, Solver
+from conformance.bench.solvers import Given, Solver, SolverRun
 from conformance.bench.workloads import ProvedStep, Workload
 from conformance.grading.agreement import Answer, Enclosed, compare, exact
 from conformance.suite.process import Trouble
@@ -68,7 +68,7 @@ def measure(
         A point for each solver, and those that failed with their trouble.
     """
     running: list[tuple[Solver, int, int]] = []
-    runs: dict[str, list[Run]] = {}
+    runs: dict[str, list[SolverRun]] = {}
     troubles: dict[str, str] = {}
     for solver in solvers:
         if workload.name not in solver.serves:
@@ -109,7 +109,7 @@ def _warm_up(solver: Solver, workload: Workload, effort: Effort) -> tuple[Solver
     return solver, n_times, n_runs
 
 
-def _check_runs(runs: Sequence[Run]) -> None:
+def _check_runs(runs: Sequence[SolverRun]) -> None:
     if not runs[-1].ns:
         raise Trouble("fail", "a run is said to last 0 ns in all")
     if repr(runs[-1].answers) != repr(runs[0].answers):
@@ -129,7 +129,7 @@ class _Graded(NamedTuple):
     relative: float = 0.0
 
 
-def _point(workload: Workload, solver: Solver, n_times: int, runs: Sequence[Run]) -> Point:
+def _point(workload: Workload, solver: Solver, n_times: int, runs: Sequence[SolverRun]) -> Point:
     graded = [_grade(answer, q) for answer, q in zip(runs[-1].answers, workload.questions, strict=True)]
     kinds = [g.kind for g in graded]
     right = [g for g in graded if g.kind == "right"]

@@ -25,7 +25,7 @@ Family = Literal[
 Given = Answer | None  # None: a step that this solver leaves to another
 
 
-class Run(NamedTuple):
+class SolverRun(NamedTuple):
     """One run over a workload.
 
     Attributes:
@@ -52,7 +52,7 @@ class Solver(NamedTuple):
 
     name: str
     family: Family
-    run: Callable[[Workload, int], Run]
+    run: Callable[[Workload, int], SolverRun]
     serves: tuple[str, ...] = SINGLE_STEPS
     steps: Callable[[Scene, Sequence[State]], Sequence[Given]] | None = None
 
@@ -60,13 +60,13 @@ class Solver(NamedTuple):
 def by_call(name: str, family: Family, step: Callable[[Scene, State, float], Given]) -> Solver:
     """Return a Python function of one step as a solver; the call is part of its time."""
 
-    def run(workload: Workload, n_times: int) -> Run:
+    def run(workload: Workload, n_times: int) -> SolverRun:
         answers: list[Given] = []
         begin = time.perf_counter_ns()
         for _ in range(n_times):
             answers = [step(workload.scene, q.state, q.t_end) for q in workload.questions]
         ns = time.perf_counter_ns() - begin
-        return Run(ns / (n_times * len(workload.questions)), answers, ns)
+        return SolverRun(ns / (n_times * len(workload.questions)), answers, ns)
 
     return Solver(name, family, run)
 
@@ -104,7 +104,7 @@ def by_command(
     session.start()
     clock_trouble = cache(partial(_clock_trouble, session))  # its clock is looked at once
 
-    def run(workload: Workload, n_times: int) -> Run:
+    def run(workload: Workload, n_times: int) -> SolverRun:
         assert session.introduction is not None
         scene = to_data(workload.scene)
         if lacking := missing(session.introduction, "time", scene):
@@ -122,7 +122,7 @@ def by_command(
             answers.append(last)
         if (trouble := clock_trouble()) is not None:
             raise trouble
-        return Run(lasted / (n_times * len(answers)), answers, lasted)
+        return SolverRun(lasted / (n_times * len(answers)), answers, lasted)
 
     return Solver(name, family, run)
 

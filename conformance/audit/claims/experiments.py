@@ -75,8 +75,14 @@ def peak_place(evidence: ClaimEvidence, sample: Sample) -> Check:
     theirs = float(evidence.theory_of(sample).log_e_nc)
     what = f"{sample.run.name}: mean log E1/E0 of the never captured, less its bias {bias:.5f}"
     band = found.next_order.peak_mean
-    rival = ("no bias", theirs - bias)
-    return close(what, mean(kept).less(bias), theirs, band=band, scale=abs(theirs) or np.inf, against=rival)
+    return close(
+        what,
+        mean(kept).less(bias),
+        theirs,
+        band=band,
+        scale=abs(theirs) or np.inf,
+        against=("no bias", theirs - bias),
+    )
 
 
 def peak_shape(sample: Sample) -> Check:
@@ -96,8 +102,13 @@ def peak_width(sample: Sample) -> Check:
     """Compare the peak's width with the predicted one."""
     found = predicted(sample)
     sigma = found.peak[1] ** 0.5
-    what = f"{sample.run.name}: width of the peak of the never captured"
-    return close(what, width(sample), sigma, band=sigma * found.next_order.variance / 2, scale=sigma / 4)
+    return close(
+        f"{sample.run.name}: width of the peak of the never captured",
+        width(sample),
+        sigma,
+        band=sigma * found.next_order.variance / 2,
+        scale=sigma / 4,
+    )
 
 
 def captured_energies(sample: Sample) -> Check:
@@ -191,9 +202,12 @@ def ergodic(evidence: ClaimEvidence) -> Iterator[Check]:
     yield close("mean of E0/E1", mean(np.exp(-sample.gain)), found.mean_of_exp(-1), band=band)
     yield stated("nobody is captured", not sample.captured.any(), f"{sample.captured.sum()} captured", "0")
     ratio = (found.peak[1] / predicted(earlier).peak[1]) ** 0.5
-    more = ratio * (left.variance + predicted(earlier).next_order.variance) / 2
-    what = "its width shrinks as E0^(-1/4) from 1e6: ratio"
-    yield close(what, spread(sample.gain).over(spread(earlier.gain)), ratio, band=more)
+    yield close(
+        "its width shrinks as E0^(-1/4) from 1e6: ratio",
+        spread(sample.gain).over(spread(earlier.gain)),
+        ratio,
+        band=ratio * (left.variance + predicted(earlier).next_order.variance) / 2,
+    )
     yield peak_width(sample)
 
 
@@ -226,15 +240,27 @@ def trivial_loops(evidence: ClaimEvidence) -> Iterator[Check]:
     """X7: loops that enclose nothing, and one of them that accelerates."""
     retraced = evidence.sample("retraced-arc@1e6")
     theirs, (bias, band) = evidence.theory_of(retraced), bias_of_mean(retraced)
-    what = "retraced-arc, in which a single parameter moves: theory has m1 = 0"
-    yield stated(what, theirs.m1 == 0, f"m1 = {float(theirs.m1):.7f}", "m1 = 0", form="printed")
-    what = f"{retraced.run.name}: mean of log E1/E0, less its bias {bias:.5f}, is 0"
-    yield close(what, mean(retraced.gain).less(bias), 0.0, band=band, form="printed")
-    turn = loop_area("retraced-arc")
-    what = (
-        "an area in sec. 3.5's plane means growth (M12), but growth needs none: signed area of retraced-arc"
+    yield stated(
+        "retraced-arc, in which a single parameter moves: theory has m1 = 0",
+        theirs.m1 == 0,
+        f"m1 = {float(theirs.m1):.7f}",
+        "m1 = 0",
+        form="printed",
     )
-    yield exact(what, turn, 0, ZERO)
+    yield close(
+        f"{retraced.run.name}: mean of log E1/E0, less its bias {bias:.5f}, is 0",
+        mean(retraced.gain).less(bias),
+        0.0,
+        band=band,
+        form="printed",
+    )
+    turn = loop_area("retraced-arc")
+    yield exact(
+        "an area in sec. 3.5's plane means growth (M12), but growth needs none: signed area of retraced-arc",
+        turn,
+        0,
+        ZERO,
+    )
     yield from one_cycle(evidence, ("retraced-arc@1e6",))
     twice = np.isfinite(retraced.t_in[:, 0]).sum(axis=1) == 2
     yield close(
@@ -245,8 +271,12 @@ def trivial_loops(evidence: ClaimEvidence) -> Iterator[Check]:
     )
     for name, table in ONE_PARAMETER.items():
         result = evidence.predict(table)
-        what = f"only {name} moves, and nu with it one way: theory"
-        yield stated(what, result.m1 == 0 and result.log_e_nc == 0, f"m1 = {float(result.m1):.1g}", "m1 = 0")
+        yield stated(
+            f"only {name} moves, and nu with it one way: theory",
+            result.m1 == 0 and result.log_e_nc == 0,
+            f"m1 = {float(result.m1):.1g}",
+            "m1 = 0",
+        )
     for run in ("only-mouth@1e6", "moving-cap-trivial@1e6"):
         sample = evidence.sample(run)
         bias, band = bias_of_mean(sample)
@@ -275,9 +305,11 @@ def both_ways(evidence: ClaimEvidence) -> Iterator[Check]:
         ("moving-cap", "moving-cap-reversed"),
     ):
         a, b = evidence.predict(name), evidence.predict(other)
-        what = f"{name}: theory's log E_nc flips"
         yield stated(
-            what, abs(a.log_e_nc + b.log_e_nc) < 1e-20, f"sum {float(a.log_e_nc + b.log_e_nc):.1g}", "0"
+            f"{name}: theory's log E_nc flips",
+            abs(a.log_e_nc + b.log_e_nc) < 1e-20,
+            f"sum {float(a.log_e_nc + b.log_e_nc):.1g}",
+            "0",
         )
     for first, second in ((ACW, CW), ("moving-cap@1e6", "moving-cap-reversed@1e6")):
         pair = [evidence.sample(first), evidence.sample(second)]

@@ -50,8 +50,12 @@ def circle(evidence: ClaimEvidence) -> Iterator[Check]:
     """L1: the breathing circle, hit by hit."""
     orbits = _orbits(evidence.steppers.trajectory, evidence.seed)
     momentum = max(orbit.momentum for row in orbits for orbit in row)
-    what = f"angular momentum at arc hits, {N_ORBITS} orbits: largest relative change"
-    yield stated(what, momentum < 1e-12, f"{momentum:.1e}", "rounding of up to 10,000 hits, < 1e-12")
+    yield stated(
+        f"angular momentum at arc hits, {N_ORBITS} orbits: largest relative change",
+        momentum < 1e-12,
+        f"{momentum:.1e}",
+        "rounding of up to 10,000 hits, < 1e-12",
+    )
     yield _orbits_exponent("phi' - phi per hit", [[o.step for o in row] for row in orbits], -2, -1)
     yield _orbits_exponent(
         "drift of v r over a fixed time", [[o.product for o in row] for row in orbits], -1, 0
@@ -117,8 +121,13 @@ def _orbit(
 def _orbits_exponent(what: str, rows: list[list[float]], exponent: int, rival: int) -> Check:
     """Compare the exponent of v with an expected one; its error is of the mean over orbits."""
     fits = [theory.fit_power(SPEEDS, row, np.full(len(row), 0.1), (-1.0, -2.0)).exponent for row in rows]
-    label = f"{what}: exponent of v, {len(rows)} orbits"
-    return close(label, mean(fits), exponent, scale=0.5, against=(f"{rival}", rival))
+    return close(
+        f"{what}: exponent of v, {len(rows)} orbits",
+        mean(fits),
+        exponent,
+        scale=0.5,
+        against=(f"{rival}", rival),
+    )
 
 
 def invariants(evidence: ClaimEvidence) -> Iterator[Check]:
@@ -226,9 +235,11 @@ def release(evidence: ClaimEvidence) -> Iterator[Check]:
         float(np.max(np.abs(gap))) * sample.speed for gap, sample in zip(gaps, samples, strict=True)
     )
     bound = _largest_gap(samples[0])
-    what = "largest |nu(t_out) - nu(t_in)| v at any energy"
     yield stated(
-        what, largest < bound, f"{largest:.2f}", f"< {bound:.2f}, twice a chord's and the angle's drift"
+        "largest |nu(t_out) - nu(t_in)| v at any energy",
+        largest < bound,
+        f"{largest:.2f}",
+        f"< {bound:.2f}, twice a chord's and the angle's drift",
     )
 
 
@@ -311,9 +322,13 @@ def population_through_the_cycle(evidence: ClaimEvidence) -> Iterator[Check]:
             p = float(expected[k])
             error = math.sqrt(max(p * (1 - p), 1 / sample.n) / sample.n)
             band = abs(p - float(earlier[k])) + left.p_nc
-            what = f"{run}: share in the chaotic zone at phase {sample.run.phases[k]:g}"
-            rival = ("nobody is captured", 1.0)
-            yield close(what, (float(measured[k]), error), p, band=band, against=rival)
+            yield close(
+                f"{run}: share in the chaotic zone at phase {sample.run.phases[k]:g}",
+                (float(measured[k]), error),
+                p,
+                band=band,
+                against=("nobody is captured", 1.0),
+            )
 
 
 def work(evidence: ClaimEvidence) -> Iterator[Check]:

@@ -45,8 +45,13 @@ def filling(evidence: ClaimEvidence) -> Iterator[Check]:
             yield _share_below(f"{name} at {phase:g} of its cycle", table, t, zone)
         for what, k, rival, other in EVEN:
             values = np.concatenate([zone[k] for zone in places])
-            label = f"{name}, {len(PHASES)} phases: {what}"
-            yield fits(label, values, lambda u: u, scale=0.2, against=(rival, other))
+            yield fits(
+                f"{name}, {len(PHASES)} phases: {what}",
+                values,
+                lambda u: u,
+                scale=0.2,
+                against=(rival, other),
+            )
 
 
 def starts(table: Mushroom, n: int, seed: int) -> list[State]:

@@ -65,8 +65,12 @@ def period(evidence: ClaimEvidence) -> Iterator[Check]:
             band=found.next_order.variance * found.peak[1] + 2 * sharp * found.next_order.captured_mean,
             note="expected: what diffusion and lags add, by the theory of finite energy",
         )
-    text = f"the printed bars fit {lowest:.2f} <= T <= {highest:.2f}"
-    yield stated("T = 1 gives the printed error bars", lowest <= 1 <= highest, text, "contains 1")
+    yield stated(
+        "T = 1 gives the printed error bars",
+        lowest <= 1 <= highest,
+        f"the printed bars fit {lowest:.2f} <= T <= {highest:.2f}",
+        "contains 1",
+    )
 
 
 def error_bars(evidence: ClaimEvidence) -> Iterator[Check]:
@@ -106,20 +110,35 @@ def width_exponent(evidence: ClaimEvidence) -> Iterator[Check]:
         text = f"E0 {energies[0]:.0e} to {energies[-1]:.0e}: {fit.coefficient:.3g} E0^{fit.exponent:.4f}"
         measured = (fit.exponent, fit.exponent_error)
         yield close(f"{label}: exponent +1/4", measured, 0.25, band=band, form="printed", note=text)
-        rival = ("-1/2", -0.5)
         yield close(
-            f"{label}: exponent -1/4", measured, -0.25, band=band, form="corrected", note=text, against=rival
+            f"{label}: exponent -1/4",
+            measured,
+            -0.25,
+            band=band,
+            form="corrected",
+            note=text,
+            against=("-1/2", -0.5),
         )
         speeds = [spread(np.exp(s.gain[~s.captured] / 2)) for s in samples]  # of v / v0
         scaled = [s.speed * one.value for s, one in zip(samples, speeds, strict=True)]
         errors = [s.speed * one.error for s, one in zip(samples, speeds, strict=True)]
         other = theory.fit_power(energies, scaled, errors)
-        what = f"{label}: the width of the speeds has exponent +1/4, as printed for that of the peak"
-        yield close(what, (other.exponent, other.exponent_error), 0.25, band=band, form="corrected")
+        yield close(
+            f"{label}: the width of the speeds has exponent +1/4, as printed for that of the peak",
+            (other.exponent, other.exponent_error),
+            0.25,
+            band=band,
+            form="corrected",
+        )
         for sample in samples:
             sigma, left = predicted(sample).peak[1] ** 0.5, predicted(sample).next_order
-            what = f"{sample.run.name}: width, predicted by frozen tables"
-            yield close(what, width(sample), sigma, band=sigma * left.variance / 2, form="corrected")
+            yield close(
+                f"{sample.run.name}: width, predicted by frozen tables",
+                width(sample),
+                sigma,
+                band=sigma * left.variance / 2,
+                form="corrected",
+            )
 
 
 def _bend(samples: list[Sample]) -> float:
@@ -145,10 +164,20 @@ def ergodic_mean(evidence: ClaimEvidence) -> Iterator[Check]:
     chance = sd.value / np.sqrt(25_000)
     drift, wide = theirs.mean_s, theirs.peak[1] ** 0.5
     luck, more = (float(np.diff(norm.cdf([-x, x], drift, chance))[0]) for x in (3e-5, 3e-4))
-    what = "the standard deviation is below 3e-5"
-    yield stated(what, sd.value < 3e-5, f"sd = {sd.value:.4f}", "< 3e-5", form="printed")
-    what = "25,000 particles tell |m1*| < 3e-5"
-    yield stated(what, chance < 3e-5, f"their standard error is {chance:.1e}", "< 3e-5", form="printed")
+    yield stated(
+        "the standard deviation is below 3e-5",
+        sd.value < 3e-5,
+        f"sd = {sd.value:.4f}",
+        "< 3e-5",
+        form="printed",
+    )
+    yield stated(
+        "25,000 particles tell |m1*| < 3e-5",
+        chance < 3e-5,
+        f"their standard error is {chance:.1e}",
+        "< 3e-5",
+        form="printed",
+    )
     yield close(
         "mean of s is sd²/4, the drift that preserving phase volume demands",
         found,
@@ -157,8 +186,13 @@ def ergodic_mean(evidence: ClaimEvidence) -> Iterator[Check]:
         form="corrected",
         note=f"25,000 have |m1*| < 3e-5 with probability {luck:.2f}, < 3e-4 (a digit lost?) with {more:.2f}",
     )
-    what = "its standard deviation, predicted by frozen tables"
-    yield close(what, sd, wide, band=wide * theirs.next_order.variance / 2, form="corrected")
+    yield close(
+        "its standard deviation, predicted by frozen tables",
+        sd,
+        wide,
+        band=wide * theirs.next_order.variance / 2,
+        form="corrected",
+    )
 
 
 def finite_bias(evidence: ClaimEvidence) -> Iterator[Check]:
@@ -184,11 +218,21 @@ def finite_bias(evidence: ClaimEvidence) -> Iterator[Check]:
     half = float(theory.unbiased_mean(load("moving-cap")))
     for sample in samples:
         added, left = bias_of_mean(sample)
-        what = f"{sample.run.name}: mean of s, less the predicted bias {added:.2g}"
-        rival = ("no bias", theirs - added)
-        yield close(what, mean(sample.gain).less(added), theirs, band=left, form="corrected", against=rival)
-        what = f"{sample.run.name}: mean of exp(-s/2)"
-        yield close(what, mean(np.exp(-sample.gain / 2)), half, band=left / 2, form="corrected")
+        yield close(
+            f"{sample.run.name}: mean of s, less the predicted bias {added:.2g}",
+            mean(sample.gain).less(added),
+            theirs,
+            band=left,
+            form="corrected",
+            against=("no bias", theirs - added),
+        )
+        yield close(
+            f"{sample.run.name}: mean of exp(-s/2)",
+            mean(np.exp(-sample.gain / 2)),
+            half,
+            band=left / 2,
+            form="corrected",
+        )
 
 
 def heating(evidence: ClaimEvidence) -> Iterator[Check]:
@@ -208,10 +252,19 @@ def heating(evidence: ClaimEvidence) -> Iterator[Check]:
         "> 0",
         form="printed",
     )
-    what = "energy is constant in the cap"
-    yield stated(what, still.sum() > 0 and largest < 1e-9, f"{largest:.1e}", "0", form="corrected")
-    what = "the free lose energy meanwhile, log E falls by"
-    yield above(what, (-mean(free).value, mean(free).error), 0.0, form="corrected")
+    yield stated(
+        "energy is constant in the cap",
+        still.sum() > 0 and largest < 1e-9,
+        f"{largest:.1e}",
+        "0",
+        form="corrected",
+    )
+    yield above(
+        "the free lose energy meanwhile, log E falls by",
+        (-mean(free).value, mean(free).error),
+        0.0,
+        form="corrected",
+    )
     yield above("so the captured come out ahead: their mean of s", gain, 0.0, form="corrected")
 
 

@@ -44,8 +44,12 @@ def mean_exp_minus(evidence: ClaimEvidence) -> Iterator[Check]:
         sample = evidence.sample(run)
         found = predicted(sample)
         bias, left = found.mean_of_exp(-1) - adiabatic(sample).mean_of_exp(-1), found.next_order.mean_s
-        what = f"{run}: simulation, less its bias {bias:.5f}"
-        yield close(what, mean(np.exp(-sample.gain)).less(bias), 1.0, band=left)
+        yield close(
+            f"{run}: simulation, less its bias {bias:.5f}",
+            mean(np.exp(-sample.gain)).less(bias),
+            1.0,
+            band=left,
+        )
 
 
 def equivalent_forms(evidence: ClaimEvidence) -> Iterator[Check]:
@@ -107,8 +111,12 @@ def positivity(evidence: ClaimEvidence) -> Iterator[Check]:
         scenes.from_data(scenes.to_data(table))
         n_nested += bool(theory.Cycle.of(table, 15).valley.children)
         least = min(least, float(theory.predict(table, 12).m1))
-    what = f"m1 > 0 in {N_LOOPS} random loops, {n_nested} of them with several captures"
-    yield stated(what, least > 0, f"least m1 = {least:.3g}", "> 0")
+    yield stated(
+        f"m1 > 0 in {N_LOOPS} random loops, {n_nested} of them with several captures",
+        least > 0,
+        f"least m1 = {least:.3g}",
+        "> 0",
+    )
 
 
 def reversal(evidence: ClaimEvidence) -> Iterator[Check]:
@@ -119,8 +127,12 @@ def reversal(evidence: ClaimEvidence) -> Iterator[Check]:
         backward = evidence.predict(theory.reversed_cycle(scenes.load(name)))
         weighted = -theory.mean_of(scenes.load(name), lambda s: s * s.context.exp(-s), 22)
         yield exact(f"{name}: log E_nc flips", backward.log_e_nc, -forward.log_e_nc, size)
-        what = f"{name}: p_nc of the reverse is p_nc exp(-s_nc)"
-        yield exact(what, backward.p_nc, forward.p_nc * mpmath.exp(-forward.log_e_nc), 1e-14)
+        yield exact(
+            f"{name}: p_nc of the reverse is p_nc exp(-s_nc)",
+            backward.p_nc,
+            forward.p_nc * mpmath.exp(-forward.log_e_nc),
+            1e-14,
+        )
         yield exact(f"{name}: m1 of the reverse is -mean of s exp(-s)", backward.m1, weighted, size)
 
 
@@ -147,8 +159,12 @@ def orientations(_evidence: ClaimEvidence) -> Iterator[Check]:
         w, h = ([v for _, v in law.knots[:-1]] for law in (table.w, table.h))  # type: ignore[union-attr]
         area = signed_area(w, h)
         yield stated(f"{name} in the plane (w, h)", area * sign > 0, f"area {area:+.3f}", f"sign {sign:+d}")
-    what = "moving-cap in the plane (V_ell/V_cap, V_cap/V): clockwise"
-    yield stated(what, loop_area("moving-cap") < 0, f"area {loop_area('moving-cap'):+.4f}", "area < 0")
+    yield stated(
+        "moving-cap in the plane (V_ell/V_cap, V_cap/V): clockwise",
+        loop_area("moving-cap") < 0,
+        f"area {loop_area('moving-cap'):+.4f}",
+        "area < 0",
+    )
 
 
 CHECKS = {

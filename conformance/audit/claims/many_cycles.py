@@ -54,8 +54,13 @@ def _sum_of(evidence: ClaimEvidence, sample: Sample, n: int, cumulants: list[flo
     bias = centre - n * m1
     per_cycle = Mean((mean(total).value - bias) / n, mean(total).error / n)
     own = scale / N_DRAWN**0.5  # the drawn sums' standard error
-    what = f"{label}: mean of log E_n/E0 over n, less its bias {bias / n:.5f}"
-    yield close(what, per_cycle, m1, band=left.mean_s + N_SIGMA * own / n, scale=m1)
+    yield close(
+        f"{label}: mean of log E_n/E0 over n, less its bias {bias / n:.5f}",
+        per_cycle,
+        m1,
+        band=left.mean_s + N_SIGMA * own / n,
+        scale=m1,
+    )
     blurred = 1 - n * cumulants[2] / scale**2  # of the variance
     what = f"{label}: standard deviation over n"
     band = (abs(blurred) * left.variance / 2 + N_SIGMA / (2 * N_DRAWN) ** 0.5) * scale / n
@@ -71,8 +76,12 @@ def _sum_of(evidence: ClaimEvidence, sample: Sample, n: int, cumulants: list[flo
         note=f"the Gaussian is off by {gap:.3f} of itself, {len(total)} tell {critical_gap(len(total)):.3f}",
     )
     inner, theirs = (np.abs(x - centre) < scale for x in (total, sums.values))
-    what = f"{label}: share within one standard deviation"
-    yield close(what, share(inner), share(theirs).value, band=N_SIGMA * share(theirs).error)
+    yield close(
+        f"{label}: share within one standard deviation",
+        share(inner),
+        share(theirs).value,
+        band=N_SIGMA * share(theirs).error,
+    )
     z, drawn = (total - centre) / scale, (sums.values - centre) / scale
     what = f"{label}: skewness, 0 for a Gaussian"
     band = N_SIGMA * mean(drawn**3).error
@@ -90,8 +99,11 @@ def _tails(run: str, n: int, cumulants: list[float]) -> tuple[bool, str, str]:
     left, right = (float(sums.cdf(n * cumulants[1] + side * 3 * scale)) for side in (-1, 1))
     normal = float(norm.cdf(-3))
     ratios = left / normal, (1 - right) / normal
-    text = f"beyond 3 sd: {ratios[0]:.2f} and {ratios[1]:.2f} times the Gaussian's"
-    return bool(max(abs(ratio - 1) for ratio in ratios) > 0.1), text, "another mass"
+    return (
+        bool(max(abs(ratio - 1) for ratio in ratios) > 0.1),
+        f"beyond 3 sd: {ratios[0]:.2f} and {ratios[1]:.2f} times the Gaussian's",
+        "another mass",
+    )
 
 
 def tails(evidence: ClaimEvidence) -> Iterator[Check]:
@@ -116,8 +128,13 @@ def _told_from_a_gaussian(sample: Sample, n: int) -> Iterator[Check]:
     total, drawn = ((x - sums.mean) / sums.sd for x in (sample.s[:, n - 1], sums.values))
     what = f"{label}: share below the mean by over 3 standard deviations"
     theirs = share(drawn < -3)
-    rival = ("a Gaussian", float(norm.cdf(-3)))
-    yield close(what, share(total < -3), theirs.value, band=N_SIGMA * theirs.error, against=rival)
+    yield close(
+        what,
+        share(total < -3),
+        theirs.value,
+        band=N_SIGMA * theirs.error,
+        against=("a Gaussian", float(norm.cdf(-3))),
+    )
     edges = np.linspace(-3.5, 3.5, 29)
     counts, likely = (_binned(x, edges) for x in (total, drawn))
     p, q = likely / likely.sum(), np.diff(norm.cdf([-np.inf, *edges, np.inf]))
@@ -129,9 +146,12 @@ def _told_from_a_gaussian(sample: Sample, n: int) -> Iterator[Check]:
     ).next_order.mean_s / sums.sd * float(np.abs(np.diff(weight)) @ ((p[1:] + p[:-1]) / 2)) / (
         edges[1] - edges[0]
     )
-    what = f"{label}: mean log of the likelihoods, theory's over a Gaussian's"
     yield close(
-        what, (float(counts @ weight) / len(total), error), mine, band=band, against=("a Gaussian", its)
+        f"{label}: mean log of the likelihoods, theory's over a Gaussian's",
+        (float(counts @ weight) / len(total), error),
+        mine,
+        band=band,
+        against=("a Gaussian", its),
     )
 
 
@@ -152,12 +172,23 @@ def independence(evidence: ClaimEvidence) -> Iterator[Check]:
             theirs = _correlation(drawn[:, first], drawn[:, second])
             what = f"{run}: correlation of the gains of cycles {label} apart"
             ours = _correlation(gains[:, first], gains[:, second])
-            rival = ("0.05 more", theirs.value + 0.05)
-            yield close(what, ours, theirs.value, band=N_SIGMA * theirs.error, scale=0.1, against=rival)
+            yield close(
+                what,
+                ours,
+                theirs.value,
+                band=N_SIGMA * theirs.error,
+                scale=0.1,
+                against=("0.05 more", theirs.value + 0.05),
+            )
         ratio = spread(sample.s[:, -1]).over(spread(sample.s[:, 0]))
         theirs = spread(drawn.sum(axis=1)).over(spread(drawn[:, 0]))
-        what = f"{run}: spread of log E_n/E0 over that of one cycle, sqrt(n) but for the first's wider blur"
-        yield close(what, ratio, theirs.value, band=N_SIGMA * theirs.error, scale=n**0.5 / 4)
+        yield close(
+            f"{run}: spread of log E_n/E0 over that of one cycle, sqrt(n) but for the first's wider blur",
+            ratio,
+            theirs.value,
+            band=N_SIGMA * theirs.error,
+            scale=n**0.5 / 4,
+        )
 
 
 def _gains(s: FloatArray) -> FloatArray:
@@ -173,8 +204,9 @@ def losses(evidence: ClaimEvidence) -> Iterator[Check]:
     """D1: how many end with less energy than they began with."""
     scene = scene_of(RUNS[MANY[0]])
     one, other = theory.rarity(scene), theory.rarity(theory.reversed_cycle(scene))
-    what = "P(E_n < E0) falls as exp(-n I), and so does the reverse's: I by theory"
-    yield exact(what, other.rate, one.rate, 1e-14)
+    yield exact(
+        "P(E_n < E0) falls as exp(-n I), and so does the reverse's: I by theory", other.rate, one.rate, 1e-14
+    )
     for sample in evidence.samples(*MANY):
         for n in sorted({1, 10, sample.run.n_cycles}):
             lost, sums = share(sample.s[:, n - 1] < 0), summed(sample.run.name, n)

@@ -77,8 +77,13 @@ def signs(evidence: ClaimEvidence) -> Iterator[Check]:
     )
     for scene, label, form in cases:
         turn = loop_area(scene)
-        what = f"{label}: the loop runs clockwise, as the caption of the cycle's figure says"
-        yield stated(what, turn < 0, f"signed area {turn:+.4f}", "area < 0", form=form)
+        yield stated(
+            f"{label}: the loop runs clockwise, as the caption of the cycle's figure says",
+            turn < 0,
+            f"signed area {turn:+.4f}",
+            "area < 0",
+            form=form,
+        )
 
 
 def loop_area(name: str) -> float:
@@ -177,11 +182,21 @@ def cone(evidence: ClaimEvidence) -> Iterator[Check]:
     lowest = float(y.min())
     for end, form in zip((now.h, -now.h), FORMS, strict=True):
         label = "y = h" if end > 0 else "y = -h"
-        what = f"{label}: the end of the cone, met {floor.sum()} times, is at y"
-        yield exact(what, float(y[floor].mean()), end, ZERO * now.h, form=form)
+        yield exact(
+            f"{label}: the end of the cone, met {floor.sum()} times, is at y",
+            float(y[floor].mean()),
+            end,
+            ZERO * now.h,
+            form=form,
+        )
         within = np.all((y[sides] - min(end, 0)) * (max(end, 0) - y[sides]) >= 0)
-        what = f"{label}: its sides are met between there and the mouth only"
-        yield stated(what, bool(within), f"y from {lowest:.4f}", "all of them", form=form)
+        yield stated(
+            f"{label}: its sides are met between there and the mouth only",
+            bool(within),
+            f"y from {lowest:.4f}",
+            "all of them",
+            form=form,
+        )
     off = np.abs(np.abs(x[sides]) - now.half_width(y[sides])).max()
     yield exact(
         "its sides are met where |x| = w + y tan theta", float(off), 0, ZERO * now.w, form="corrected"
@@ -213,9 +228,13 @@ def loop_plane(evidence: ClaimEvidence) -> Iterator[Check]:
     )
     for name in ("moving-cap", "fixed-cap-anticlockwise"):
         turn, found = loop_area(name), evidence.predict(name)
-        text = f"area {turn:.4f}, m1 = {mpmath.nstr(found.m1, 6)}"
-        what = f"plane (V_ell/V_cap, V_cap/V): {name} has an area, and growth"
-        yield stated(what, abs(turn) > ZERO and found.m1 > 0, text, "both", form="corrected")
+        yield stated(
+            f"plane (V_ell/V_cap, V_cap/V): {name} has an area, and growth",
+            abs(turn) > ZERO and found.m1 > 0,
+            f"area {turn:.4f}, m1 = {mpmath.nstr(found.m1, 6)}",
+            "both",
+            form="corrected",
+        )
 
 
 def measures(evidence: ClaimEvidence) -> Iterator[Check]:
@@ -227,16 +246,34 @@ def measures(evidence: ClaimEvidence) -> Iterator[Check]:
     energy, area = 2.0, 1.0
     printed = 2 * fp.pi * fp.sqrt(2 * energy) * area
     rate = 2 * fp.pi * ((energy + 1) - (energy - 1)) * area / 2  # of the volume below H = E: a disk times A
-    what = "n_cha/n_0 and n_cha/n_cha(t0) agree for any loop (nu from 0.1 to 0.9)"
-    yield exact(what, p_nc * free, p_nc, ZERO, form="printed")
-    what = "they agree when nu reaches 1, as in every loop of the paper"
     yield exact(
-        what, theory.volumes_at(fp, scenes.load("moving-cap"), 0.0).v_ell, 0.0, ZERO, form="corrected"
+        "n_cha/n_0 and n_cha/n_cha(t0) agree for any loop (nu from 0.1 to 0.9)",
+        p_nc * free,
+        p_nc,
+        ZERO,
+        form="printed",
     )
-    what = "volume of H = E, E = 2, A = 1, as Liouville's measure: 2 pi sqrt(2E) A"
-    yield exact(what, printed, rate, ZERO, form="printed")
-    what = "2 pi A for every E: as V(D0) is defined, and all the paper's ratios need"
-    yield exact(what, 2 * fp.pi * area, rate, ZERO, form="corrected")
+    yield exact(
+        "they agree when nu reaches 1, as in every loop of the paper",
+        theory.volumes_at(fp, scenes.load("moving-cap"), 0.0).v_ell,
+        0.0,
+        ZERO,
+        form="corrected",
+    )
+    yield exact(
+        "volume of H = E, E = 2, A = 1, as Liouville's measure: 2 pi sqrt(2E) A",
+        printed,
+        rate,
+        ZERO,
+        form="printed",
+    )
+    yield exact(
+        "2 pi A for every E: as V(D0) is defined, and all the paper's ratios need",
+        2 * fp.pi * area,
+        rate,
+        ZERO,
+        form="corrected",
+    )
 
 
 CHECKS = {

@@ -59,23 +59,32 @@ def sliding(evidence: ClaimEvidence) -> Iterator[Check]:
     inside = sample.phase_captured[:, 0, 3] & sample.phase_captured[:, 0, 4]
     change = np.abs(sample.phase_s[inside, 0, 4] - sample.phase_s[inside, 0, 3])
     largest = float(np.max(change, initial=0.0))
-    what = "fixed cap: log E of the captured while the mouth opens, largest change"
-    text = f"{largest:.1e} of {inside.sum():,} particles"
-    yield stated(what, bool(inside.any()) and largest < ROUNDING, text, "0 but for rounding")
+    yield stated(
+        "fixed cap: log E of the captured while the mouth opens, largest change",
+        bool(inside.any()) and largest < ROUNDING,
+        f"{largest:.1e} of {inside.sum():,} particles",
+        "0 but for rounding",
+    )
     free = ~sample.captured
     moved = np.abs(sample.phase_s[free, 0, 4] - sample.phase_s[free, 0, 3]).mean()
-    what = "fixed cap: the free, whom the stem's sides meet, change theirs"
-    yield stated(what, bool(moved > 1e-3), f"{moved:.3f} on average", "> 0.001")
+    yield stated(
+        "fixed cap: the free, whom the stem's sides meet, change theirs",
+        bool(moved > 1e-3),
+        f"{moved:.3f} on average",
+        "> 0.001",
+    )
     rectangle = load("fermi-ulam")
     done = evidence.steppers.trajectory(
         rectangle, State(0.0, 0.1, -0.4, SPEED * math.cos(0.7), SPEED * math.sin(0.7)), N_HITS, math.inf
     )
     across, along = (np.abs(done.steps[:, k]) for k in (4, 5))
     drift = float(np.max(np.abs(across / across[0] - 1)))
-    what = (
-        f"rectangle whose floor moves, {N_HITS} collisions: speed across, which only its sides could change"
+    yield stated(
+        f"rectangle whose floor moves, {N_HITS} collisions: speed across, which only its sides could change",
+        drift < ROUNDING,
+        f"largest relative change {drift:.1e}",
+        "0 but for rounding",
     )
-    yield stated(what, drift < ROUNDING, f"largest relative change {drift:.1e}", "0 but for rounding")
     what = "and the speed along, which the floor changes"
     varied = float(np.max(np.abs(along / along[0] - 1)))
     yield stated(what, varied > 1e-3, f"largest relative change {varied:.2f}", "> 0.001")

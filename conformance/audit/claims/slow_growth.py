@@ -44,8 +44,12 @@ def _at_most_linear(evidence: ClaimEvidence, name: str) -> Check:
         after = np.hypot(done.steps[:, 4], done.steps[:, 5])
         gained = (after - 2 * fastest) / (2 * fastest * np.arange(1, len(after) + 1))
         share = max(share, float(gained.max()))
-    what = f"{name}, slow starts: largest gain of speed over n collisions, in 2 u n, u the fastest wall"
-    return stated(what, share <= 1 + ROUNDING, f"{share:.3f}", "at most 1")
+    return stated(
+        f"{name}, slow starts: largest gain of speed over n collisions, in 2 u n, u the fastest wall",
+        share <= 1 + ROUNDING,
+        f"{share:.3f}",
+        "at most 1",
+    )
 
 
 def _fastest_wall(table: object) -> float:
@@ -76,8 +80,14 @@ def _quadratic(sample: Sample) -> Iterator[Check]:
         against=("exponential growth at the moving cap's rate", accelerating),
         note="so E ~ t^2",
     )
-    what = f"{name}: mean speed gained in a cycle"
-    yield close(what, mean(whole / k), gain, band=left, scale=gain, against=("none", 0.0))
+    yield close(
+        f"{name}: mean speed gained in a cycle",
+        mean(whole / k),
+        gain,
+        band=left,
+        scale=gain,
+        against=("none", 0.0),
+    )
 
 
 def _gain_of_a_cycle(sample: Sample, v: FloatArray) -> tuple[float, float]:

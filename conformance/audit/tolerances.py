@@ -20,7 +20,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.stats import kstwo, norm
 
-from conformance.audit.finding import Check, Form
+from conformance.audit.claim import Check, Form
 
 FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]

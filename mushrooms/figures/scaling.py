@@ -13,8 +13,7 @@ import theory
 from conformance.audit.claims.broadened import zone_energy
 from conformance.audit.claims.exponents import nu_gap, zone_share
 from conformance.audit.claims.finite_energy import fitted_width, width
-from conformance.audit.runs import scene_of
-from conformance.audit.samples import Sample
+from conformance.audit.runs import Sample, scene_of
 from conformance.audit.tolerances import Mean, mean, share
 from mushrooms.figures.orbits import draw_map, draw_section
 from mushrooms.figures.style import BLACK, BLUE, GREEN, GREY, ORANGE, new_figure

@@ -12,8 +12,7 @@ from functools import cache
 import numpy as np
 
 import theory
-from conformance.audit.runs import RUNS, Simulation, scene_of
-from conformance.audit.samples import Sample
+from conformance.audit.runs import RUNS, Sample, Simulation, scene_of
 from conformance.audit.tolerances import Cdf, FloatArray, Mean, mean, spread
 from scene.tables import cycle_length
 

@@ -7,14 +7,12 @@ from collections.abc import Iterator
 import numpy as np
 from scipy.stats import ks_2samp, norm
 
+from conformance.audit.claim import Check, ClaimEvidence
 from conformance.audit.claims import many_cycles
 from conformance.audit.claims.broadened import adiabatic, bias_of_mean, captured_band, peak_band, predicted
 from conformance.audit.claims.finite_energy import ACW, CW, FIXED, width
 from conformance.audit.claims.misprints import ZERO, loop_area
-from conformance.audit.evidence import ClaimEvidence
-from conformance.audit.finding import Check
-from conformance.audit.runs import scene_of
-from conformance.audit.samples import Sample
+from conformance.audit.runs import Sample, scene_of
 from conformance.audit.tolerances import (
     LEVEL,
     N_SIGMA,

@@ -15,6 +15,7 @@ import numpy as np
 from mpmath import fp
 
 import theory
+from conformance.audit.claim import Check, ClaimEvidence
 from conformance.audit.claims.broadened import (
     captured_change,
     phase_times,
@@ -24,10 +25,7 @@ from conformance.audit.claims.broadened import (
 )
 from conformance.audit.claims.experiments import chord_time
 from conformance.audit.claims.finite_energy import ACW, ERGODIC, FIXED, LADDER
-from conformance.audit.evidence import ClaimEvidence
-from conformance.audit.finding import Check
-from conformance.audit.runs import RUNS, run_seed, scene_of
-from conformance.audit.samples import Sample
+from conformance.audit.runs import RUNS, Sample, run_seed, scene_of
 from conformance.audit.tolerances import BoolArray, FloatArray, Mean, close, mean, share, spread, stated
 from scene import Mushroom, Scene, State, load
 from scene.geometry import area, table_at

@@ -12,11 +12,10 @@ import numpy as np
 from scipy.stats import norm
 
 import theory
+from conformance.audit.claim import Check, ClaimEvidence, Form
 from conformance.audit.claims.broadened import adiabatic, bias_of_mean, predicted
-from conformance.audit.claims.printed import half_unit
-from conformance.audit.evidence import ClaimEvidence
-from conformance.audit.finding import Check, Form
-from conformance.audit.samples import Sample
+from conformance.audit.claims.misprints import half_unit
+from conformance.audit.runs import Sample
 from conformance.audit.tolerances import N_SIGMA, Mean, above, close, mean, spread, stated
 from scene import load
 

@@ -1,6 +1,6 @@
-"""What the ledger checks beyond the paper's numbers: identities, formulas against each other.
+"""What the claims checks beyond the paper's numbers: identities, formulas against each other.
 
-I entries hold for every cycle by theory and are held against simulations; N entries are checks of
+I claims hold for every cycle by theory and are held against simulations; N claims are checks of
 single formulas of the paper.
 """
 
@@ -14,6 +14,7 @@ import numpy as np
 
 import scene as scenes
 import theory
+from conformance.audit.claim import DIGITS, Check, ClaimEvidence
 from conformance.audit.claims.broadened import adiabatic, predicted
 from conformance.audit.claims.finite_energy import ACW, CW
 from conformance.audit.claims.misprints import (
@@ -24,8 +25,6 @@ from conformance.audit.claims.misprints import (
     rounds,
     signed_area,
 )
-from conformance.audit.evidence import DIGITS, ClaimEvidence
-from conformance.audit.finding import Check
 from conformance.audit.tolerances import close, exact, mean, stated
 from scene.tables import Mushroom
 

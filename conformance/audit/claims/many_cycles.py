@@ -8,6 +8,7 @@ import numpy as np
 from scipy.stats import norm
 
 import theory
+from conformance.audit.claim import Check, ClaimEvidence, energies_of
 from conformance.audit.claims.broadened import (
     DRAWN_SEED,
     N_DRAWN,
@@ -16,10 +17,7 @@ from conformance.audit.claims.broadened import (
     predicted,
     summed,
 )
-from conformance.audit.evidence import ClaimEvidence, energies_of
-from conformance.audit.finding import Check
-from conformance.audit.runs import RUNS, scene_of
-from conformance.audit.samples import Sample
+from conformance.audit.runs import RUNS, Sample, scene_of
 from conformance.audit.tolerances import (
     N_SIGMA,
     FloatArray,

@@ -7,6 +7,7 @@ nothing is recorded.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from decimal import ROUND_HALF_EVEN, Decimal
 from typing import Any
 
 import mpmath
@@ -15,10 +16,8 @@ from mpmath import fp
 
 import scene as scenes
 import theory
+from conformance.audit.claim import DIGITS, Check, ClaimEvidence, Form
 from conformance.audit.claims.broadened import captured_change
-from conformance.audit.claims.printed import rounds_to
-from conformance.audit.evidence import DIGITS, ClaimEvidence
-from conformance.audit.finding import Check, Form
 from conformance.audit.runs import scene_of
 from conformance.audit.tolerances import close, exact, mean, stated
 from scene import State
@@ -35,6 +34,24 @@ N_LOOP = 256  # the trapezoid rule converges geometrically on smooth periodic lo
 def rounds(what: str, printed: str, value: Any, form: Form) -> Check:
     """Check that theory rounds to a printed number."""
     return Check(what, rounds_to(printed, value), printed, float(value), form=form)
+
+
+def rounds_to(printed: str, value: Any) -> bool:
+    """Tell whether a number, rounded to as many decimals as were printed, is the printed one."""
+    number = Decimal(printed)
+    exact = Decimal(mpmath.nstr(mpmath.mpf(value), 30, min_fixed=-mpmath.inf, max_fixed=mpmath.inf))
+    return exact.quantize(Decimal(1).scaleb(_exponent(number)), ROUND_HALF_EVEN) == number
+
+
+def half_unit(printed: str) -> float:
+    """Return half a unit of the last printed digit."""
+    return 0.5 * 10.0 ** _exponent(Decimal(printed))
+
+
+def _exponent(number: Decimal) -> int:
+    exponent = number.as_tuple().exponent
+    assert isinstance(exponent, int)
+    return exponent
 
 
 def half_angle(evidence: ClaimEvidence) -> Iterator[Check]:

@@ -217,6 +217,11 @@ class Sample(NamedTuple):
         begin, end = (np.fmin.reduce(t[:, 0], axis=1, initial=np.nan) for t in (self.t_in, self.t_out))
         return begin, end
 
+    def change(self, which: BoolArray, first: int, last: int) -> FloatArray:
+        """Return the change of log E of some particles from one of the run's phases to another."""
+        found: FloatArray = self.phase_s[which, 0, last] - self.phase_s[which, 0, first]
+        return found
+
     @property
     def speed(self) -> float:
         """Return the initial speed."""

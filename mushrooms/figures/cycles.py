@@ -11,8 +11,7 @@ from scipy.stats import norm
 
 import theory
 from conformance.audit.claim import energies_of
-from conformance.audit.claims.broadened import DRAWN_SEED, N_DRAWN, adiabatic_limit, predicted, summed
-from conformance.audit.claims.finite_energy import width
+from conformance.audit.claims.broadened import DRAWN_SEED, N_DRAWN, adiabatic_limit, predicted, summed, width
 from conformance.audit.claims.misprints import volume_loop
 from conformance.audit.runs import Sample, scene_of
 from conformance.audit.tolerances import mean, share, spread

@@ -197,16 +197,14 @@ def sliding(evidence: ClaimEvidence) -> Iterator[Check]:
     sample = evidence.sample(ACW)
     # Captured at phases 4/8 and 5/8, between which the base gives way to the mouth; the arc is at rest.
     inside = sample.phase_captured[:, 0, 3] & sample.phase_captured[:, 0, 4]
-    change = np.abs(sample.phase_s[inside, 0, 4] - sample.phase_s[inside, 0, 3])
-    largest = float(np.max(change, initial=0.0))
+    largest = float(np.max(np.abs(sample.change(inside, 3, 4)), initial=0.0))
     yield stated(
         "fixed cap: log E of the captured while the mouth opens, largest change",
         bool(inside.any()) and largest < ROUNDING,
         f"{largest:.1e} of {inside.sum():,} particles",
         "0 but for rounding",
     )
-    free = ~sample.captured
-    moved = np.abs(sample.phase_s[free, 0, 4] - sample.phase_s[free, 0, 3]).mean()
+    moved = np.abs(sample.change(~sample.captured, 3, 4)).mean()
     yield stated(
         "fixed cap: the free, whom the stem's sides meet, change theirs",
         bool(moved > 1e-3),

@@ -9,8 +9,19 @@ from scipy.stats import ks_2samp, norm
 
 from conformance.audit.claim import Check, ClaimEvidence
 from conformance.audit.claims import many_cycles
-from conformance.audit.claims.broadened import adiabatic, bias_of_mean, captured_band, peak_band, predicted
-from conformance.audit.claims.finite_energy import ACW, CW, FIXED, width
+from conformance.audit.claims.broadened import (
+    ESCAPE,
+    GROWTH,
+    PEAK,
+    adiabatic,
+    captured_band,
+    less_bias,
+    peak_band,
+    predicted,
+    width,
+    width_as_predicted,
+)
+from conformance.audit.claims.finite_energy import ACW, CW, FIXED
 from conformance.audit.claims.misprints import ZERO, loop_area
 from conformance.audit.runs import Sample, scene_of
 from conformance.audit.tolerances import (
@@ -48,39 +59,22 @@ def chord_time(sample: Sample) -> float:
 def growth(evidence: ClaimEvidence, sample: Sample) -> Check:
     """Compare the mean of s with m1 and its finite-energy bias."""
     theirs = float(evidence.theory_of(sample).m1)
-    bias, band = bias_of_mean(sample)
-    what = f"{sample.run.name}: mean of log E1/E0, less its bias {bias:.5f}"
     rival = ("no growth", 0.0) if theirs else None
-    found = mean(sample.gain).less(bias)
-    return close(what, found, theirs, band=band, scale=abs(theirs) or np.inf, against=rival)
+    return less_bias(GROWTH, sample, theirs, scale=abs(theirs) or np.inf, against=rival)
 
 
 def escape(evidence: ClaimEvidence, sample: Sample) -> Check:
     """Compare the uncaptured share with p_nc: those who lag are captured more or less likely than others."""
-    found = predicted(sample)
-    bias = found.p_nc - adiabatic(sample).p_nc
-    what = f"{sample.run.name}: share never captured, less its bias {bias:.5f}"
     theirs, s_nc = (float(getattr(evidence.theory_of(sample), name)) for name in ("p_nc", "log_e_nc"))
     rival = ("that of the reversed cycle", theirs * np.exp(-s_nc)) if s_nc else ("nobody is captured", 1.0)
-    ours, band = share(sample.never_captured).less(bias), found.next_order.p_nc
-    return close(what, ours, theirs, band=band, scale=0.1, against=rival)
+    return less_bias(ESCAPE, sample, theirs, scale=0.1, against=rival)
 
 
 def peak_place(evidence: ClaimEvidence, sample: Sample) -> Check:
     """Compare the mean energy of the uncaptured with log E_nc, less its drift and what others' lags add."""
-    kept, found = sample.gain[~sample.captured], predicted(sample)
-    bias = found.peak[0] - adiabatic(sample).peak[0]
     theirs = float(evidence.theory_of(sample).log_e_nc)
-    what = f"{sample.run.name}: mean log E1/E0 of the never captured, less its bias {bias:.5f}"
-    band = found.next_order.peak_mean
-    return close(
-        what,
-        mean(kept).less(bias),
-        theirs,
-        band=band,
-        scale=abs(theirs) or np.inf,
-        against=("no bias", theirs - bias),
-    )
+    rival = ("no bias", theirs - PEAK.bias(sample))
+    return less_bias(PEAK, sample, theirs, scale=abs(theirs) or np.inf, against=rival)
 
 
 def peak_shape(sample: Sample) -> Check:
@@ -98,14 +92,11 @@ def peak_shape(sample: Sample) -> Check:
 
 def peak_width(sample: Sample) -> Check:
     """Compare the peak's width with the predicted one."""
-    found = predicted(sample)
-    sigma = found.peak[1] ** 0.5
-    return close(
+    return width_as_predicted(
         f"{sample.run.name}: width of the peak of the never captured",
         width(sample),
-        sigma,
-        band=sigma * found.next_order.variance / 2,
-        scale=sigma / 4,
+        sample,
+        scale=predicted(sample).peak[1] ** 0.5 / 4,
     )
 
 
@@ -194,10 +185,9 @@ def ergodic(evidence: ClaimEvidence) -> Iterator[Check]:
     """X5: c = 0."""
     sample, earlier = evidence.sample("ergodic@1e7"), evidence.sample("ergodic@1e6")
     found, left = predicted(sample), predicted(sample).next_order
-    bias, band = bias_of_mean(sample)
-    yield close(f"mean of log E1/E0, less its bias {bias:.5f}", mean(sample.gain).less(bias), 0.0, band=band)
+    yield less_bias(GROWTH, sample, 0.0, start="")
     yield fits("one peak, as predicted", sample.gain, found.free_cdf, band=peak_band(sample), scale=0.2)
-    yield close("mean of E0/E1", mean(np.exp(-sample.gain)), found.mean_of_exp(-1), band=band)
+    yield close("mean of E0/E1", mean(np.exp(-sample.gain)), found.mean_of_exp(-1), band=left.mean_s)
     yield stated("nobody is captured", not sample.captured.any(), f"{sample.captured.sum()} captured", "0")
     ratio = (found.peak[1] / predicted(earlier).peak[1]) ** 0.5
     yield close(
@@ -237,7 +227,7 @@ def untilted(evidence: ClaimEvidence) -> Iterator[Check]:
 def trivial_loops(evidence: ClaimEvidence) -> Iterator[Check]:
     """X7: loops that enclose nothing, and one of them that accelerates."""
     retraced = evidence.sample("retraced-arc@1e6")
-    theirs, (bias, band) = evidence.theory_of(retraced), bias_of_mean(retraced)
+    theirs = evidence.theory_of(retraced)
     yield stated(
         "retraced-arc, in which a single parameter moves: theory has m1 = 0",
         theirs.m1 == 0,
@@ -245,17 +235,10 @@ def trivial_loops(evidence: ClaimEvidence) -> Iterator[Check]:
         "m1 = 0",
         form="printed",
     )
-    yield close(
-        f"{retraced.run.name}: mean of log E1/E0, less its bias {bias:.5f}, is 0",
-        mean(retraced.gain).less(bias),
-        0.0,
-        band=band,
-        form="printed",
-    )
-    turn = loop_area("retraced-arc")
+    yield less_bias(GROWTH, retraced, 0.0, end=", is 0", form="printed")
     yield exact(
         "an area in sec. 3.5's plane means growth (M12), but growth needs none: signed area of retraced-arc",
-        turn,
+        loop_area("retraced-arc"),
         0,
         ZERO,
     )
@@ -277,9 +260,7 @@ def trivial_loops(evidence: ClaimEvidence) -> Iterator[Check]:
         )
     for run in ("only-mouth@1e6", "moving-cap-trivial@1e6"):
         sample = evidence.sample(run)
-        bias, band = bias_of_mean(sample)
-        values = mean(sample.gain).less(bias)
-        yield close(f"{run}: mean of log E1/E0, less its bias {bias:.5f}", values, 0.0, band=band, scale=0.04)
+        yield less_bias(GROWTH, sample, 0.0, scale=0.04)
         yield escape(evidence, sample)
 
 
@@ -311,20 +292,17 @@ def both_ways(evidence: ClaimEvidence) -> Iterator[Check]:
         )
     for first, second in ((ACW, CW), ("moving-cap@1e6", "moving-cap-reversed@1e6")):
         pair = [evidence.sample(first), evidence.sample(second)]
-        kept = [mean(sample.gain[~sample.captured]) for sample in pair]
-        biases = sum(predicted(sample).peak[0] - adiabatic(sample).peak[0] for sample in pair)
+        kept, biases = [PEAK.measured(s) for s in pair], sum(PEAK.bias(s) for s in pair)
         yield close(
             f"{first} and its reverse: sum of the peaks, less their biases",
             (kept[0].value + kept[1].value - biases, float(np.hypot(kept[0].error, kept[1].error))),
             0.0,
-            band=sum(predicted(sample).next_order.peak_mean for sample in pair),
+            band=sum(PEAK.band(sample) for sample in pair),
             scale=0.15,
         )
         for sample in pair:
-            bias, _ = bias_of_mean(sample)
-            yield above(
-                f"{sample.run.name}: mean of log E1/E0 grows, beyond its bias", mean(sample.gain), bias
-            )
+            what = f"{sample.run.name}: mean of log E1/E0 grows, beyond its bias"
+            yield above(what, mean(sample.gain), GROWTH.bias(sample))
             yield above(f"{sample.run.name}: mean of E1/E0 grows", mean(np.exp(sample.gain)), 1.0)
     yield growth(evidence, evidence.sample("moving-cap-reversed@1e6"))
     yield escape(evidence, evidence.sample("moving-cap-reversed@1e6"))

@@ -24,7 +24,7 @@ from conformance.audit.claims.broadened import (
     zone_energy,
 )
 from conformance.audit.claims.experiments import chord_time
-from conformance.audit.claims.finite_energy import ACW, ERGODIC, FIXED, LADDER
+from conformance.audit.claims.finite_energy import ACW, ERGODIC, FIXED, LADDER, fitted
 from conformance.audit.runs import RUNS, Sample, run_seed, scene_of
 from conformance.audit.tolerances import BoolArray, FloatArray, Mean, close, mean, share, spread, stated
 from scene import Mushroom, Scene, State, load
@@ -169,9 +169,7 @@ def log_volume(sample: Sample, phase: float) -> float:
 
 def _exponent(what: str, samples: list[Sample], values: list[Mean], exponent: float) -> Check:
     """Compare the exponent of E0 with an expected one, the next order, ~ 1/v, being fitted beside it."""
-    energies = [sample.run.energy for sample in samples]
-    found, errors = np.array(values).T
-    fit = theory.fit_power(energies, found, errors, (-0.5,))
+    fit, energies = fitted(samples, values, -0.5), [sample.run.energy for sample in samples]
     return close(
         what,
         (fit.exponent, fit.exponent_error),

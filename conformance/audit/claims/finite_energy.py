@@ -13,7 +13,7 @@ from scipy.stats import norm
 
 import theory
 from conformance.audit.claim import Check, ClaimEvidence, Form
-from conformance.audit.claims.broadened import adiabatic, bias_of_mean, predicted
+from conformance.audit.claims.broadened import GROWTH, adiabatic, predicted, width, width_as_predicted
 from conformance.audit.claims.misprints import half_unit
 from conformance.audit.runs import Sample
 from conformance.audit.tolerances import N_SIGMA, Mean, above, close, mean, spread, stated
@@ -36,11 +36,6 @@ PRINTED = {
     CW: ("0.0537", "0.0034", 100_000, 3),
     "moving-cap@1e7": ("0.1213", "0.0033", 25_000, 1),
 }
-
-
-def width(sample: Sample) -> Mean:
-    """Return sigma_w, the width of the peak of the particles never captured."""
-    return spread(sample.gain[~sample.captured])
 
 
 def period(evidence: ClaimEvidence) -> Iterator[Check]:
@@ -104,8 +99,8 @@ def width_exponent(evidence: ClaimEvidence) -> Iterator[Check]:
     """M7: the exponent of the peak's width."""
     for label, runs in WIDTHS:
         samples = evidence.samples(*runs)
-        fit, energies = fitted_width(samples)
-        band = _bend(samples)
+        fit, band = fitted(samples, [width(sample) for sample in samples]), _bend(samples)
+        energies = [sample.run.energy for sample in samples]
         text = f"E0 {energies[0]:.0e} to {energies[-1]:.0e}: {fit.coefficient:.3g} E0^{fit.exponent:.4f}"
         measured = (fit.exponent, fit.exponent_error)
         yield close(f"{label}: exponent +1/4", measured, 0.25, band=band, form="printed", note=text)
@@ -118,10 +113,7 @@ def width_exponent(evidence: ClaimEvidence) -> Iterator[Check]:
             note=text,
             against=("-1/2", -0.5),
         )
-        speeds = [spread(np.exp(s.gain[~s.captured] / 2)) for s in samples]  # of v / v0
-        scaled = [s.speed * one.value for s, one in zip(samples, speeds, strict=True)]
-        errors = [s.speed * one.error for s, one in zip(samples, speeds, strict=True)]
-        other = theory.fit_power(energies, scaled, errors)
+        other = fitted(samples, [spread(s.speed * np.exp(s.gain[~s.captured] / 2)) for s in samples])
         yield close(
             f"{label}: the width of the speeds has exponent +1/4, as printed for that of the peak",
             (other.exponent, other.exponent_error),
@@ -130,14 +122,8 @@ def width_exponent(evidence: ClaimEvidence) -> Iterator[Check]:
             form="corrected",
         )
         for sample in samples:
-            sigma, left = predicted(sample).peak[1] ** 0.5, predicted(sample).next_order
-            yield close(
-                f"{sample.run.name}: width, predicted by frozen tables",
-                width(sample),
-                sigma,
-                band=sigma * left.variance / 2,
-                form="corrected",
-            )
+            what = f"{sample.run.name}: width, predicted by frozen tables"
+            yield width_as_predicted(what, width(sample), sample, form="corrected")
 
 
 def _bend(samples: list[Sample]) -> float:
@@ -149,11 +135,10 @@ def _bend(samples: list[Sample]) -> float:
     return abs(slope + 0.25) + predicted(samples[0]).next_order.variance / 2 / reach
 
 
-def fitted_width(samples: list[Sample]) -> tuple[theory.PowerFit, list[float]]:
-    """Fit a power law to the widths of the uncaptured peak; return it and the energies."""
-    energies = [sample.run.energy for sample in samples]
-    widths = [width(sample) for sample in samples]
-    return theory.fit_power(energies, [w.value for w in widths], [w.error for w in widths]), energies
+def fitted(samples: list[Sample], values: list[Mean], *orders: float) -> theory.PowerFit:
+    """Fit a power of the energy to what was measured on samples, with other powers relative to it beside."""
+    found, errors = np.array(values).T
+    return theory.fit_power([sample.run.energy for sample in samples], found, errors, orders)
 
 
 def ergodic_mean(evidence: ClaimEvidence) -> Iterator[Check]:
@@ -161,7 +146,7 @@ def ergodic_mean(evidence: ClaimEvidence) -> Iterator[Check]:
     sample = evidence.sample("ergodic@1e7")
     sd, found, theirs = spread(sample.gain), mean(sample.gain), predicted(sample)
     chance = sd.value / np.sqrt(25_000)
-    drift, wide = theirs.mean_s, theirs.peak[1] ** 0.5
+    drift = theirs.mean_s
     luck, more = (float(np.diff(norm.cdf([-x, x], drift, chance))[0]) for x in (3e-5, 3e-4))
     yield stated(
         "the standard deviation is below 3e-5",
@@ -185,13 +170,8 @@ def ergodic_mean(evidence: ClaimEvidence) -> Iterator[Check]:
         form="corrected",
         note=f"25,000 have |m1*| < 3e-5 with probability {luck:.2f}, < 3e-4 (a digit lost?) with {more:.2f}",
     )
-    yield close(
-        "its standard deviation, predicted by frozen tables",
-        sd,
-        wide,
-        band=wide * theirs.next_order.variance / 2,
-        form="corrected",
-    )
+    what = "its standard deviation, predicted by frozen tables"
+    yield width_as_predicted(what, sd, sample, form="corrected")
 
 
 def finite_bias(evidence: ClaimEvidence) -> Iterator[Check]:
@@ -200,9 +180,9 @@ def finite_bias(evidence: ClaimEvidence) -> Iterator[Check]:
     theirs = float(evidence.predict("moving-cap").m1)
     low = samples[0]
     yield close(f"{low.run.name}: mean of s is m1, no bias", mean(low.gain), theirs, form="printed")
-    values = [mean(sample.gain) for sample in samples]
-    energies, errors = [sample.run.energy for sample in samples], [m.error for m in values]
-    fit = theory.extrapolate(energies, [m.value for m in values], errors)
+    values, errors = np.array([mean(sample.gain) for sample in samples]).T
+    energies = [sample.run.energy for sample in samples]
+    fit = theory.extrapolate(energies, values, errors)
     text = f"m1* = m1 + {fit.slope:.2f} E0^(-1/2), chi² = {fit.chi_square:.1f} for {len(samples) - 2}"
     # Lags fall more slowly than E0^(-1/2): so far theory's own means, fitted alike, miss their limit.
     bent = theory.extrapolate(energies, [predicted(sample).mean_s for sample in samples], errors)
@@ -210,13 +190,13 @@ def finite_bias(evidence: ClaimEvidence) -> Iterator[Check]:
         "limit of the mean of s as E0 grows",
         (fit.limit, fit.limit_error),
         theirs,
-        band=abs(bent.limit - adiabatic(low).mean_s) + bias_of_mean(low)[1],
+        band=abs(bent.limit - adiabatic(low).mean_s) + GROWTH.band(low),
         form="corrected",
         note=text,
     )
     half = float(theory.unbiased_mean(load("moving-cap")))
     for sample in samples:
-        added, left = bias_of_mean(sample)
+        added, left = GROWTH.bias(sample), GROWTH.band(sample)
         yield close(
             f"{sample.run.name}: mean of s, less the predicted bias {added:.2g}",
             mean(sample.gain).less(added),
@@ -239,9 +219,8 @@ def heating(evidence: ClaimEvidence) -> Iterator[Check]:
     sample = evidence.sample(CW)
     # Captured at phases 4/8 and 6/8, between which the mouth stays at w0 and the stem grows.
     still = sample.phase_captured[:, 0, 3] & sample.phase_captured[:, 0, 5] & sample.captured
-    change = sample.phase_s[still, 0, 5] - sample.phase_s[still, 0, 3]
-    free = sample.phase_s[~sample.captured, 0, 5] - sample.phase_s[~sample.captured, 0, 3]
-    largest = float(np.max(np.abs(change), initial=0.0))
+    free = sample.change(~sample.captured, 3, 5)
+    largest = float(np.max(np.abs(sample.change(still, 3, 5)), initial=0.0))
     gain = mean(sample.gain[sample.captured])
     yield stated(
         "energy grows in the cap",

@@ -105,13 +105,13 @@ def _measured(size: Size, seed: int, command: list[str]) -> Record:
             bar.update(task, advance=0 if what else 1, description=escape(what) or None)
 
         solvers, built, not_run = _solvers(stack, command)
-        points, clock = [], list[float]()
+        points = []
         for rule in workloads.RULES:
             tick(f"questions: {rule.name}")
             workload = workloads.draw_workload(
                 rule, seed, n_questions, proved_step, n_further, fast.next_collision
             )
-            found, troubles = measure.measure(workload, solvers, _effort(size), tick, clock)
+            found, troubles = measure.measure(workload, solvers, _effort(size), tick)
             points += found
             not_run |= {f"{name} on {rule.name}": why for name, why in troubles.items()}
             tick("")
@@ -128,7 +128,6 @@ def _measured(size: Size, seed: int, command: list[str]) -> Record:
         repeats=repeats,
         digits=workloads.DIGITS,
         machine=record.this_machine(built),
-        clock_ns=tuple(clock),
         workloads=tuple(
             record.Drawn(rule.name, rule.what, rule.scene, n_questions, n_further) for rule in workloads.RULES
         ),

@@ -42,7 +42,7 @@ def drawn(name: str, n_further: int, n_questions: int = 2) -> workloads.Workload
 
 
 def points(workload, solvers):
-    found, troubles = measure.measure(workload, solvers, BRIEF, lambda _: None, [])
+    found, troubles = measure.measure(workload, solvers, BRIEF, lambda _: None)
     assert not troubles
     return {point.solver: point for point in found}
 

@@ -11,12 +11,9 @@ meets all of them; ratios are between runs of one benchmark.
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Callable, Sequence
 from fractions import Fraction
 from typing import NamedTuple
-
-import numpy as np
 
 from conformance.bench.record import Point, short
 from conformance.bench.solvers import Given, Solver, SolverRun
@@ -45,7 +42,6 @@ class Effort(NamedTuple):
 
 MIN_REPEATS = 3
 MOST = Fraction(10**308)  # of a relative error that is kept
-ONES = np.ones(100_000)
 
 
 def measure(
@@ -53,7 +49,6 @@ def measure(
     solvers: Sequence[Solver],
     effort: Effort,
     tick: Callable[[str], None],
-    clock: list[float],
 ) -> tuple[list[Point], dict[str, str]]:
     """Measure all solvers on a workload.
 
@@ -62,7 +57,6 @@ def measure(
         solvers: those that serve it are run.
         effort: how long.
         tick: called with a solver's name before its warm-up, and after every round with "".
-        clock: the time of a dependent addition [ns] is appended in every round.
 
     Returns:
         A point for each solver, and those that failed with their trouble.
@@ -88,7 +82,6 @@ def measure(
                     _check_runs(runs[solver.name])
                 except Trouble as trouble:
                     troubles[solver.name] = f"{trouble.verdict}: {trouble.why}"
-        clock.append(short(clock_ns()))
         tick("")
     points = [
         _point(workload, solver, n_times, runs[solver.name])
@@ -114,13 +107,6 @@ def _check_runs(runs: Sequence[SolverRun]) -> None:
         raise Trouble("fail", "a run is said to last 0 ns in all")
     if repr(runs[-1].answers) != repr(runs[0].answers):
         raise Trouble("fail", "its answers differ from run to run")
-
-
-def clock_ns() -> float:
-    """Return the time of one addition that waits for the one before: the core's clock at this moment."""
-    begin = time.perf_counter_ns()
-    np.add.accumulate(ONES)
-    return (time.perf_counter_ns() - begin) / len(ONES)
 
 
 class _Graded(NamedTuple):

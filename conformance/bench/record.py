@@ -107,7 +107,6 @@ class Record(msgspec.Struct, frozen=True):
         size, seed, questions, repeats: the settings.
         digits: of the proved answers.
         machine: where it ran.
-        clock_ns: time of one dependent addition in each round of runs: the speed of the machine's core.
         workloads, points: what was asked and found.
         not_run: solvers left out, with the reason.
         growth: of errors along trajectories.
@@ -121,7 +120,6 @@ class Record(msgspec.Struct, frozen=True):
     repeats: int
     digits: int
     machine: Machine
-    clock_ns: Times
     workloads: tuple[Drawn, ...]
     points: tuple[Point, ...]
     not_run: dict[str, str]

@@ -24,7 +24,6 @@ def to_html(record: Record, speed: bytes) -> bytes:
         speed=embed(speed),
         growth=embed(figures_of_speed.growth(record.growth)),
         rows=[_row(p) for p in record.points],
-        clock=statistics.median(record.clock_ns),
     )
     return page.encode("utf-8")
 

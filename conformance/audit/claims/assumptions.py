@@ -48,7 +48,6 @@ def filling(evidence: ClaimEvidence) -> Iterator[Check]:
     """C2: shares, places and directions in the chaotic zone at phases of the cycle."""
     for name in SCENES:
         table, places = load(name), []
-        assert isinstance(table, Mushroom)
         n, seed = N_PARTICLES[evidence.size], run_seed(evidence.seed, RUNS["moving-cap@1e7"], -2)
         states = starts(table, n, seed)
         for phase in PHASES:
@@ -70,7 +69,7 @@ def filling(evidence: ClaimEvidence) -> Iterator[Check]:
             )
 
 
-def starts(table: Mushroom, n: int, seed: int) -> list[State]:
+def starts(table: Scene, n: int, seed: int) -> list[State]:
     """Draw n states of ENERGY, uniform in area and direction at time 0."""
     random, now = np.random.default_rng(seed), table_at(fp, table, 0.0)
     speed = math.sqrt(2 * ENERGY)

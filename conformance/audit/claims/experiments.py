@@ -51,9 +51,7 @@ TROUGH = 0.2  # of the density of s, between its modes
 
 def chord_time(sample: Sample) -> float:
     """Return the longest time from one arc hit to the next: capture and release are seen at arc hits."""
-    scene = scene_of(sample.run)
-    assert isinstance(scene, Mushroom)
-    return 2 * float(bounds(laws(scene)["r"]).highest) / sample.speed
+    return 2 * float(bounds(laws(scene_of(sample.run))["r"]).highest) / sample.speed
 
 
 def growth(evidence: ClaimEvidence, sample: Sample) -> Check:

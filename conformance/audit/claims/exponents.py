@@ -27,7 +27,7 @@ from conformance.audit.claims.experiments import chord_time
 from conformance.audit.claims.finite_energy import ACW, ERGODIC, FIXED, LADDER, fitted
 from conformance.audit.runs import RUNS, Sample, run_seed, scene_of
 from conformance.audit.tolerances import BoolArray, FloatArray, Mean, close, mean, share, spread, stated
-from scene import Mushroom, Scene, State, load
+from scene import Scene, State, load
 from scene.geometry import area, table_at
 from scene.laws import bounds, values
 from scene.tables import cycle_length, laws
@@ -207,7 +207,6 @@ def _points(
     scene: Scene, t: float, n: int, random: np.random.Generator
 ) -> tuple[BoolArray, BoolArray, BoolArray]:
     """Draw points in a box around the table; tell which lie in it, in the cap, in the island."""
-    assert isinstance(scene, Mushroom)
     table = table_at(fp, scene, t)
     r, h, w = table.r, table.h, table.w
     x, y, turn = random.uniform(-r, r, n), random.uniform(-h, r, n), random.uniform(0, 2 * np.pi, n)
@@ -247,7 +246,6 @@ def _largest_gap(sample: Sample) -> float:
     moved by r'' dt^2 / 2 beyond what the speed lost, dt = 2 r cos(phi)/v; and sin(phi) = L/(v r) as much.
     """
     scene = scene_of(sample.run)
-    assert isinstance(scene, Mushroom)
     arc, mouth = bounds(laws(scene)["r"]), bounds(laws(scene)["nu"])
     drift = 2 * arc.slope + cycle_length(scene) * arc.slope**2 / arc.lowest
     return float(2 * 2 * arc.highest * mouth.slope + drift)
@@ -255,8 +253,6 @@ def _largest_gap(sample: Sample) -> float:
 
 def nu_gap(sample: Sample) -> FloatArray:
     """Return nu(t_out) - nu(t_in) of the captured of a moving-cap run."""
-    scene = scene_of(sample.run)
-    assert isinstance(scene, Mushroom)
     t_in, t_out = (t[sample.captured] for t in sample.first_stay)
     gap: FloatArray = 0.4 * (np.cos(t_out) - np.cos(t_in))  # nu = 0.6 + 0.4 cos t
     return gap

@@ -26,7 +26,7 @@ from conformance.audit.claims.misprints import (
     signed_area,
 )
 from conformance.audit.tolerances import exact, mean, stated
-from scene.tables import Mushroom
+from scene.tables import Mushroom, laws
 
 NAMES = ("fixed-cap-anticlockwise", "fixed-cap-clockwise", "moving-cap", "moving-cap-reversed")
 N_LOOPS = 6
@@ -59,10 +59,9 @@ def formulas_in_w(evidence: ClaimEvidence) -> Iterator[Check]:
     }
     for name, (m1, log_e_nc) in printed.items():
         table = scenes.load(name)
-        assert isinstance(table, Mushroom)
         w0, w1, h_in, h_out = fixed_cap(table)
         with mpmath.workdps(20):
-            total, peak = _over_w(w0, w1, h_in, h_out, mpmath.mpf(table.slope))
+            total, peak = _over_w(w0, w1, h_in, h_out, mpmath.mpf(laws(table)["slope"]))
         theirs = evidence.predict(name)
         yield exact(f"{name}: growth rate, integral over w", total, theirs.m1, 1e-10)
         yield rounds(f"{name}: printed growth rate", m1, total, "claim")
@@ -146,9 +145,8 @@ def right_mode(_evidence: ClaimEvidence) -> Iterator[Check]:
 def orientations(_evidence: ClaimEvidence) -> Iterator[Check]:
     """N6: the sense of sec. 4.1's loops in the plane (w, h), as eq. (cycle) and its reverse say."""
     for name, sign in (("fixed-cap-anticlockwise", 1), ("fixed-cap-clockwise", -1)):
-        table = scenes.load(name)
-        assert isinstance(table, Mushroom)
-        w, h = ([v for _, v in law.knots[:-1]] for law in (table.w, table.h))  # type: ignore[union-attr]
+        moving = laws(scenes.load(name))
+        w, h = ([v for _, v in moving[of].knots[:-1]] for of in ("w", "h"))  # type: ignore[union-attr]
         area = signed_area(w, h)
         yield stated(f"{name} in the plane (w, h)", area * sign > 0, f"area {area:+.3f}", f"sign {sign:+d}")
     yield stated(

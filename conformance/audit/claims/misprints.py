@@ -22,8 +22,8 @@ from conformance.audit.runs import scene_of
 from conformance.audit.tolerances import close, exact, mean, stated
 from scene import State
 from scene.geometry import table_at
-from scene.laws import BangBang, bounds, value
-from scene.tables import Mushroom, cycle_length
+from scene.laws import bounds, value
+from scene.tables import Mushroom, cycle_length, laws
 
 FORMS: tuple[Form, Form] = ("printed", "corrected")
 ZERO = 1e-12  # float64 sums of a few hundred terms of order 10
@@ -49,9 +49,7 @@ def half_unit(printed: str) -> float:
 
 
 def _exponent(number: Decimal) -> int:
-    exponent = number.as_tuple().exponent
-    assert isinstance(exponent, int)
-    return exponent
+    return int(number.as_tuple().exponent)
 
 
 def half_angle(evidence: ClaimEvidence) -> Iterator[Check]:
@@ -127,12 +125,11 @@ def signed_area(x: Sequence[float], y: Sequence[float]) -> float:
 def radius_squared(evidence: ClaimEvidence) -> Iterator[Check]:
     """M3: the half disk x² + y² <= r has an area ~ r, that of r² has r²; E V_cap is kept by the captured."""
     sample = evidence.sample("moving-cap@1e7")
-    table = scene_of(sample.run)
-    assert isinstance(table, Mushroom)
-    first, last = (fp.log(value(fp, table.r, 2 * fp.pi * phase)) for phase in (7 / 16, 9 / 16))
+    r = laws(scene_of(sample.run))["r"]
+    first, last = (fp.log(value(fp, r, 2 * fp.pi * phase)) for phase in (7 / 16, 9 / 16))
     gain = captured_change(sample, 6, 8)
     # E is seen since the last hit, half a chord before on average, in which log r changes by u/v.
-    band = 2 * float(bounds(table.r).slope) / sample.speed / abs(last - first)
+    band = 2 * float(bounds(r).slope) / sample.speed / abs(last - first)
     for power, form in zip((1, 2), FORMS, strict=True):
         what = f"x² + y² <= r{'²' if power == 2 else ''}: E goes as 1 / area of the cap, as r to the power"
         found = mean(-gain / (last - first))
@@ -167,14 +164,11 @@ def _capture_integral(table: scenes.Scene) -> Any:
 
 def fixed_cap(table: scenes.Scene) -> tuple[Any, Any, Any, Any]:
     """Return w0, w1 and h while the mouth closes and while it opens, of a scene of sec. 4.1."""
-    assert isinstance(table, Mushroom)
-    assert isinstance(table.w, BangBang)
-    assert isinstance(table.h, BangBang)
-    knots = table.w.knots
+    knots, depths = (laws(table)[name].knots for name in ("w", "h"))  # type: ignore[union-attr]
     closing = next(i for i in range(len(knots) - 1) if knots[i + 1][1] < knots[i][1])
     opening = next(i for i in range(len(knots) - 1) if knots[i + 1][1] > knots[i][1])
     w1, w0 = mpmath.mpf(knots[closing][1]), mpmath.mpf(knots[closing + 1][1])
-    return w0, w1, mpmath.mpf(table.h.knots[closing][1]), mpmath.mpf(table.h.knots[opening][1])
+    return w0, w1, mpmath.mpf(depths[closing][1]), mpmath.mpf(depths[opening][1])
 
 
 def island_slope(w: Any) -> Any:

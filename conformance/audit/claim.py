@@ -92,7 +92,7 @@ class Claim(NamedTuple):
 
 
 class Finding(NamedTuple):
-    """What came of an claim; `seconds` is the time its checks took, simulations apart."""
+    """What came of a claim; `seconds` is the time its checks took, simulations apart."""
 
     id: str
     verdict: Verdict

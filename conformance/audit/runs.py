@@ -147,8 +147,9 @@ def scene_named(name: str) -> Scene:
 
 def run_seed(seed: int, run: Simulation, *numbers: int) -> int:
     """Return the seed of a run's particles, 64 bits; with numbers, of what else is drawn for it."""
-    text = " ".join(map(str, (seed, run.name, *numbers)))
-    return int.from_bytes(hashlib.sha256(text.encode()).digest()[:8], "big")
+    return int.from_bytes(
+        hashlib.sha256(" ".join(map(str, (seed, run.name, *numbers))).encode()).digest()[:8], "big"
+    )
 
 
 class Sample(NamedTuple):
@@ -208,8 +209,7 @@ class Sample(NamedTuple):
     @property
     def never_captured(self) -> BoolArray:
         """Return, for each who takes part, whether the first cycle passes uncaptured; p_nc is the share."""
-        flags: BoolArray = ~self.captured[self.takes_part]
-        return flags
+        return np.asarray(~self.captured[self.takes_part])
 
     @property
     def first_stay(self) -> tuple[FloatArray, FloatArray]:
@@ -219,8 +219,7 @@ class Sample(NamedTuple):
 
     def change(self, which: BoolArray, first: int, last: int) -> FloatArray:
         """Return the change of log E of some particles from one of the run's phases to another."""
-        found: FloatArray = self.phase_s[which, 0, last] - self.phase_s[which, 0, first]
-        return found
+        return np.asarray(self.phase_s[which, 0, last] - self.phase_s[which, 0, first])
 
     @property
     def speed(self) -> float:

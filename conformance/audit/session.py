@@ -143,7 +143,7 @@ def examine(
     settings: AuditSettings,
     predict: Predict,
 ) -> Finding:
-    """Make an claim's checks; with particles lost it cannot be better than open."""
+    """Make a claim's checks; with particles lost it cannot be better than open."""
     begin = time.perf_counter()
     evidence = ClaimEvidence(
         samples, steppers, size=settings.size, seed=settings.seed, threads=settings.threads, predict=predict
@@ -168,8 +168,10 @@ def _load(claim: Claim, settings: AuditSettings) -> Finding | None:
 
 
 def _kept(claim: Claim, settings: AuditSettings) -> dict[str, Any]:
-    """Return what is kept of an claim for these settings, whoever made it; nothing where there is none."""
-    content = unsealed(settings.folder / _file(claim)) if settings.folder and settings.resume else None
+    """Return what is kept of a claim for these settings, whoever made it; nothing where there is none."""
+    content = (
+        unsealed(settings.folder / f"{claim.id}.finding") if settings.folder and settings.resume else None
+    )
     data: dict[str, Any] = json.loads(content) if content else {}
     return data if data.get("key") == _key(claim, settings) else {}
 
@@ -190,12 +192,8 @@ def code() -> str:
     return digest.hexdigest()
 
 
-def _file(claim: Claim) -> str:
-    return f"{claim.id}.finding"
-
-
 def _save(finding: Finding, settings: AuditSettings) -> None:
     if settings.folder:
         claim = select_claims(finding.id)[0]
         content = json.dumps({"key": _key(claim, settings), "code": code(), "finding": to_data(finding)})
-        write_file(settings.folder / _file(claim), sealed(content.encode()))
+        write_file(settings.folder / f"{claim.id}.finding", sealed(content.encode()))

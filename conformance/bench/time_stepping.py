@@ -15,7 +15,8 @@ import numpy.typing as npt
 from mpmath import fp
 from scipy.integrate import solve_ivp
 
-from scene import Cap, Collision, Horizon, Mushroom, Outcome, Scene, State, Stem, Undecided, Wall
+from conformance.plain import Flight
+from scene import Collision, Horizon, Mushroom, Outcome, Scene, State, Undecided, Wall
 from scene.geometry import table_at
 
 TOLERANCES = (1e-3, 1e-6, 1e-9, 1e-12)
@@ -26,12 +27,14 @@ def next_collision_by(rtol: float) -> Callable[[Scene, State, float], Outcome]:
     """Return a stepper that integrates with this tolerance, relative and absolute alike."""
 
     def step(scene: Scene, state: State, t_end: float) -> Outcome:
-        part = _first_part(scene, state)
+        part = "cap" if Flight(scene, state, t_end).is_in_cap else "stem"
         t, q = state.t, np.array([state.x, state.y, state.vx, state.vy])
         while True:
             walls: tuple[Wall, ...] = ("arc", "base") if part == "cap" else ("left", "right", "floor", "base")
             events = [_event(scene, part, wall) for wall in walls]
-            found = solve_ivp(_drift, (t, t_end), q, rtol=rtol, atol=rtol, events=events)
+            found = solve_ivp(
+                lambda _, q: [q[2], q[3], 0.0, 0.0], (t, t_end), q, rtol=rtol, atol=rtol, events=events
+            )
             if found.status == 0:
                 return Horizon(t_end, *map(float, found.y[:, -1]))
             if found.status != 1:
@@ -43,14 +46,10 @@ def next_collision_by(rtol: float) -> Callable[[Scene, State, float], Outcome]:
                 part = "stem" if part == "cap" else "cap"
                 q[1] = 0.0
                 continue
-            velocity = _bounce(scene, wall, t, q)
+            velocity = Flight(scene, State(t, *q.tolist()), t).bounce(wall, 0.0)
             return Collision(wall, t - state.t, t, float(q[0]), float(q[1]), *velocity)
 
     return step
-
-
-def _drift(_: float, q: FloatArray) -> FloatArray:
-    return np.array([q[2], q[3], 0.0, 0.0])
 
 
 def _event(scene: Scene, part: str, wall: Wall) -> Any:
@@ -63,19 +62,3 @@ def _event(scene: Scene, part: str, wall: Wall) -> Any:
 
     event.terminal, event.direction = True, -1.0  # type: ignore[attr-defined]
     return event
-
-
-def _first_part(scene: Scene, state: State) -> str:
-    if isinstance(scene, Cap | Stem):
-        return "cap" if isinstance(scene, Cap) else "stem"
-    in_cap = state.y > 0 or state.wall in ("arc", "base") or (state.y == 0 and state.vy > 0)
-    return "cap" if in_cap else "stem"
-
-
-def _bounce(scene: Scene, wall: Wall, t: float, q: FloatArray) -> tuple[float, float]:
-    """Reflect: v - 2 (v.n - u) n, with u = -receding the wall's velocity along its inward normal n."""
-    x, y, vx, vy = map(float, q)
-    table = table_at(fp, scene, t)
-    n_x, n_y = table.normal(wall, x, y)
-    push = 2 * (vx * n_x + vy * n_y + table.receding(wall, y))
-    return vx - push * n_x, vy - push * n_y

@@ -294,8 +294,9 @@ def _measure(
     """Measure dt (of a horizon none is given), t (but of an enclosed answer), place and velocity."""
     numbers = _given(answer)
     if not all(math.isfinite(end) for ends in numbers.values() for end in ends if isinstance(end, float)):
-        what = f"{place}a number that is not finite"
-        return _Measured(math.inf, math.inf, math.inf, math.inf, what, math.inf)
+        return _Measured(
+            math.inf, math.inf, math.inf, math.inf, f"{place}a number that is not finite", math.inf
+        )
     given = {name: (Fraction(low), Fraction(high)) for name, (low, high) in numbers.items()}
     truth = {name: certified.ends(name) for name in NUMBERS} | {"t": time[0]}
     allowances = dict(zip(NUMBERS, map(Fraction, certified.allowance), strict=True)) | {"t": time[1]}

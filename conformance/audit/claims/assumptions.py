@@ -59,10 +59,9 @@ def filling(evidence: ClaimEvidence) -> Iterator[Check]:
             places.append(zone)
             yield _share_below(f"{name} at {phase:g} of its cycle", table, t, zone)
         for what, k, rival, other in EVEN:
-            values = np.concatenate([zone[k] for zone in places])
             yield fits(
                 f"{name}, {len(PHASES)} phases: {what}",
-                values,
+                np.concatenate([zone[k] for zone in places]),
                 lambda u: u,
                 scale=0.2,
                 against=(rival, other),
@@ -191,41 +190,43 @@ def irregular(evidence: ClaimEvidence) -> Iterator[Check]:
     yield from one_cycle(evidence, (IRREGULAR,))
 
 
-def sliding(evidence: ClaimEvidence) -> Iterator[Check]:
+def sliding(evidence: ClaimEvidence) -> list[Check]:
     """C4: walls that slide along themselves; a mouth's edge over a cap at rest, the sides of a rectangle."""
     sample = evidence.sample(ACW)
     # Captured at phases 4/8 and 5/8, between which the base gives way to the mouth; the arc is at rest.
     inside = sample.phase_captured[:, 0, 3] & sample.phase_captured[:, 0, 4]
     largest = float(np.max(np.abs(sample.change(inside, 3, 4)), initial=0.0))
-    yield stated(
-        "fixed cap: log E of the captured while the mouth opens, largest change",
-        bool(inside.any()) and largest < ROUNDING,
-        f"{largest:.1e} of {inside.sum():,} particles",
-        "0 but for rounding",
-    )
     moved = np.abs(sample.change(~sample.captured, 3, 4)).mean()
-    yield stated(
-        "fixed cap: the free, whom the stem's sides meet, change theirs",
-        bool(moved > 1e-3),
-        f"{moved:.3f} on average",
-        "> 0.001",
-    )
     rectangle = load("fermi-ulam")
     velocity = SLIDING_SPEED * math.cos(0.7), SLIDING_SPEED * math.sin(0.7)
     start = State(0.0, 0.1, -0.4, *velocity)
     done = evidence.steppers.trajectory(rectangle, start, SLIDING_HITS, math.inf)
     across, along = (np.abs(done.steps[:, k]) for k in (4, 5))
     drift = float(np.max(np.abs(across / across[0] - 1)))
-    yield stated(
-        f"rectangle whose floor moves, {SLIDING_HITS} collisions:"
-        " speed across, which only its sides could change",
-        drift < ROUNDING,
-        f"largest relative change {drift:.1e}",
-        "0 but for rounding",
-    )
     what = "and the speed along, which the floor changes"
     varied = float(np.max(np.abs(along / along[0] - 1)))
-    yield stated(what, varied > 1e-3, f"largest relative change {varied:.2f}", "> 0.001")
+    return [
+        stated(
+            "fixed cap: log E of the captured while the mouth opens, largest change",
+            bool(inside.any()) and largest < ROUNDING,
+            f"{largest:.1e} of {inside.sum():,} particles",
+            "0 but for rounding",
+        ),
+        stated(
+            "fixed cap: the free, whom the stem's sides meet, change theirs",
+            bool(moved > 1e-3),
+            f"{moved:.3f} on average",
+            "> 0.001",
+        ),
+        stated(
+            f"rectangle whose floor moves, {SLIDING_HITS} collisions:"
+            " speed across, which only its sides could change",
+            drift < ROUNDING,
+            f"largest relative change {drift:.1e}",
+            "0 but for rounding",
+        ),
+        stated(what, varied > 1e-3, f"largest relative change {varied:.2f}", "> 0.001"),
+    ]
 
 
 def speeds(evidence: ClaimEvidence) -> Iterator[Check]:
@@ -266,30 +267,32 @@ def _fastest_wall(table: object) -> float:
     return float(max(speed.values()))
 
 
-def _quadratic(sample: Sample) -> Iterator[Check]:
+def _quadratic(sample: Sample) -> list[Check]:
     """Compare the mean speed's growth with a straight line, and its slope with theory."""
     name, k = sample.run.name, sample.run.n_cycles
     v = sample.speed * np.exp(np.column_stack([np.zeros(sample.n), sample.s]) / 2)
     half, whole = v[:, k // 2] - v[:, 0], v[:, -1] - v[:, 0]
     accelerating = math.log2((math.exp(MOVING * k) - 1) / (math.exp(MOVING * k / 2) - 1))
     gain, left = _gain_of_a_cycle(sample, v[:, :-1])
-    yield close(
-        f"{name}: mean speed gained ~ t^p over {k} cycles, p from twice the time",
-        _doubling(half, whole),
-        1.0,
-        band=left / gain,
-        scale=0.5,
-        against=("exponential growth at the moving cap's rate", accelerating),
-        note="so E ~ t^2",
-    )
-    yield close(
-        f"{name}: mean speed gained in a cycle",
-        mean(whole / k),
-        gain,
-        band=left,
-        scale=gain,
-        against=("none", 0.0),
-    )
+    return [
+        close(
+            f"{name}: mean speed gained ~ t^p over {k} cycles, p from twice the time",
+            _doubling(half, whole),
+            1.0,
+            band=left / gain,
+            scale=0.5,
+            against=("exponential growth at the moving cap's rate", accelerating),
+            note="so E ~ t^2",
+        ),
+        close(
+            f"{name}: mean speed gained in a cycle",
+            mean(whole / k),
+            gain,
+            band=left,
+            scale=gain,
+            against=("none", 0.0),
+        ),
+    ]
 
 
 def _gain_of_a_cycle(sample: Sample, v: FloatArray) -> tuple[float, float]:

@@ -97,8 +97,13 @@ def less_bias(
     """
     bias = figure.bias(sample)
     start = f"{sample.run.name}: " if start is None else start
-    what = f"{start}{figure.what}, less its bias {bias:.5f}{end}"
-    return close(what, figure.measured(sample).less(bias), expected, band=figure.band(sample), **options)
+    return close(
+        f"{start}{figure.what}, less its bias {bias:.5f}{end}",
+        figure.measured(sample).less(bias),
+        expected,
+        band=figure.band(sample),
+        **options,
+    )
 
 
 def width(sample: Sample) -> Mean:

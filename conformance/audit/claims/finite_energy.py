@@ -103,27 +103,37 @@ def width_exponent(evidence: ClaimEvidence) -> Iterator[Check]:
         energies = [sample.run.energy for sample in samples]
         text = f"E0 {energies[0]:.0e} to {energies[-1]:.0e}: {fit.coefficient:.3g} E0^{fit.exponent:.4f}"
         measured = (fit.exponent, fit.exponent_error)
-        yield close(f"{label}: exponent +1/4", measured, 0.25, band=band, form="printed", note=text)
-        yield close(
-            f"{label}: exponent -1/4",
-            measured,
-            -0.25,
-            band=band,
-            form="corrected",
-            note=text,
-            against=("-1/2", -0.5),
-        )
+        yield from [
+            close(f"{label}: exponent +1/4", measured, 0.25, band=band, form="printed", note=text),
+            close(
+                f"{label}: exponent -1/4",
+                measured,
+                -0.25,
+                band=band,
+                form="corrected",
+                note=text,
+                against=("-1/2", -0.5),
+            ),
+        ]
         other = fitted(samples, [spread(s.speed * np.exp(s.gain[~s.captured] / 2)) for s in samples])
-        yield close(
-            f"{label}: the width of the speeds has exponent +1/4, as printed for that of the peak",
-            (other.exponent, other.exponent_error),
-            0.25,
-            band=band,
-            form="corrected",
-        )
-        for sample in samples:
-            what = f"{sample.run.name}: width, predicted by frozen tables"
-            yield width_as_predicted(what, width(sample), sample, form="corrected")
+        yield from [
+            close(
+                f"{label}: the width of the speeds has exponent +1/4, as printed for that of the peak",
+                (other.exponent, other.exponent_error),
+                0.25,
+                band=band,
+                form="corrected",
+            ),
+            *(
+                width_as_predicted(
+                    f"{sample.run.name}: width, predicted by frozen tables",
+                    width(sample),
+                    sample,
+                    form="corrected",
+                )
+                for sample in samples
+            ),
+        ]
 
 
 def _bend(samples: list[Sample]) -> float:
@@ -141,37 +151,41 @@ def fitted(samples: list[Sample], values: list[Mean], *orders: float) -> theory.
     return theory.fit_power([sample.run.energy for sample in samples], found, errors, orders)
 
 
-def ergodic_mean(evidence: ClaimEvidence) -> Iterator[Check]:
+def ergodic_mean(evidence: ClaimEvidence) -> list[Check]:
     """M8: |m1*| < 3e-5 for c = 0."""
     sample = evidence.sample("ergodic@1e7")
     sd, found, theirs = spread(sample.gain), mean(sample.gain), predicted(sample)
     chance = sd.value / np.sqrt(25_000)
     drift = theirs.mean_s
     luck, more = (float(np.diff(norm.cdf([-x, x], drift, chance))[0]) for x in (3e-5, 3e-4))
-    yield stated(
-        "the standard deviation is below 3e-5",
-        sd.value < 3e-5,
-        f"sd = {sd.value:.4f}",
-        "< 3e-5",
-        form="printed",
-    )
-    yield stated(
-        "25,000 particles tell |m1*| < 3e-5",
-        chance < 3e-5,
-        f"their standard error is {chance:.1e}",
-        "< 3e-5",
-        form="printed",
-    )
-    yield close(
-        "mean of s is sd²/4, the drift that preserving phase volume demands",
-        found,
-        drift,
-        band=theirs.next_order.mean_s,
-        form="corrected",
-        note=f"25,000 have |m1*| < 3e-5 with probability {luck:.2f}, < 3e-4 (a digit lost?) with {more:.2f}",
-    )
-    what = "its standard deviation, predicted by frozen tables"
-    yield width_as_predicted(what, sd, sample, form="corrected")
+    return [
+        stated(
+            "the standard deviation is below 3e-5",
+            sd.value < 3e-5,
+            f"sd = {sd.value:.4f}",
+            "< 3e-5",
+            form="printed",
+        ),
+        stated(
+            "25,000 particles tell |m1*| < 3e-5",
+            chance < 3e-5,
+            f"their standard error is {chance:.1e}",
+            "< 3e-5",
+            form="printed",
+        ),
+        close(
+            "mean of s is sd²/4, the drift that preserving phase volume demands",
+            found,
+            drift,
+            band=theirs.next_order.mean_s,
+            form="corrected",
+            note=f"25,000 have |m1*| < 3e-5 with probability {luck:.2f},"
+            f" < 3e-4 (a digit lost?) with {more:.2f}",
+        ),
+        width_as_predicted(
+            "its standard deviation, predicted by frozen tables", sd, sample, form="corrected"
+        ),
+    ]
 
 
 def finite_bias(evidence: ClaimEvidence) -> Iterator[Check]:
@@ -197,24 +211,26 @@ def finite_bias(evidence: ClaimEvidence) -> Iterator[Check]:
     half = float(theory.unbiased_mean(load("moving-cap")))
     for sample in samples:
         added, left = GROWTH.bias(sample), GROWTH.band(sample)
-        yield close(
-            f"{sample.run.name}: mean of s, less the predicted bias {added:.2g}",
-            mean(sample.gain).less(added),
-            theirs,
-            band=left,
-            form="corrected",
-            against=("no bias", theirs - added),
-        )
-        yield close(
-            f"{sample.run.name}: mean of exp(-s/2)",
-            mean(np.exp(-sample.gain / 2)),
-            half,
-            band=left / 2,
-            form="corrected",
-        )
+        yield from [
+            close(
+                f"{sample.run.name}: mean of s, less the predicted bias {added:.2g}",
+                mean(sample.gain).less(added),
+                theirs,
+                band=left,
+                form="corrected",
+                against=("no bias", theirs - added),
+            ),
+            close(
+                f"{sample.run.name}: mean of exp(-s/2)",
+                mean(np.exp(-sample.gain / 2)),
+                half,
+                band=left / 2,
+                form="corrected",
+            ),
+        ]
 
 
-def heating(evidence: ClaimEvidence) -> Iterator[Check]:
+def heating(evidence: ClaimEvidence) -> list[Check]:
     """M11: where the energy comes from in the clockwise cycle, with a cap at rest."""
     sample = evidence.sample(CW)
     # Captured at phases 4/8 and 6/8, between which the mouth stays at w0 and the stem grows.
@@ -222,28 +238,30 @@ def heating(evidence: ClaimEvidence) -> Iterator[Check]:
     free = sample.change(~sample.captured, 3, 5)
     largest = float(np.max(np.abs(sample.change(still, 3, 5)), initial=0.0))
     gain = mean(sample.gain[sample.captured])
-    yield stated(
-        "energy grows in the cap",
-        largest > 1e-9,
-        f"largest |change of log E| of {still.sum():,} captured"
-        f" particles while the stem grows: {largest:.1e}",
-        "> 0",
-        form="printed",
-    )
-    yield stated(
-        "energy is constant in the cap",
-        still.sum() > 0 and largest < 1e-9,
-        f"{largest:.1e}",
-        "0",
-        form="corrected",
-    )
-    yield above(
-        "the free lose energy meanwhile, log E falls by",
-        (-mean(free).value, mean(free).error),
-        0.0,
-        form="corrected",
-    )
-    yield above("so the captured come out ahead: their mean of s", gain, 0.0, form="corrected")
+    return [
+        stated(
+            "energy grows in the cap",
+            largest > 1e-9,
+            f"largest |change of log E| of {still.sum():,} captured"
+            f" particles while the stem grows: {largest:.1e}",
+            "> 0",
+            form="printed",
+        ),
+        stated(
+            "energy is constant in the cap",
+            still.sum() > 0 and largest < 1e-9,
+            f"{largest:.1e}",
+            "0",
+            form="corrected",
+        ),
+        above(
+            "the free lose energy meanwhile, log E falls by",
+            (-mean(free).value, mean(free).error),
+            0.0,
+            form="corrected",
+        ),
+        above("so the captured come out ahead: their mean of s", gain, 0.0, form="corrected"),
+    ]
 
 
 CHECKS = {

@@ -45,50 +45,55 @@ def sums(evidence: ClaimEvidence) -> Iterator[Check]:
             yield from _sum_of(evidence, sample, n, cumulants)
 
 
-def _sum_of(evidence: ClaimEvidence, sample: Sample, n: int, cumulants: list[float]) -> Iterator[Check]:
+def _sum_of(evidence: ClaimEvidence, sample: Sample, n: int, cumulants: list[float]) -> list[Check]:
     label = f"{sample.run.name}, n = {n}"
     total, sums, left = sample.s[:, n - 1], summed(sample.run.name, n), predicted(sample).next_order
     m1, centre, scale = cumulants[1], sums.mean, sums.sd
     bias = centre - n * m1
     per_cycle = Mean((mean(total).value - bias) / n, mean(total).error / n)
     own = scale / N_DRAWN**0.5  # the drawn sums' standard error
-    yield close(
-        f"{label}: mean of log E_n/E0 over n, less its bias {bias / n:.5f}",
-        per_cycle,
-        m1,
-        band=left.mean_s + N_SIGMA * own / n,
-        scale=m1,
-    )
     blurred = 1 - n * cumulants[2] / scale**2  # of the variance
-    what = f"{label}: standard deviation over n"
-    band = (abs(blurred) * left.variance / 2 + N_SIGMA / (2 * N_DRAWN) ** 0.5) * scale / n
-    yield close(what, (spread(total).value / n, spread(total).error / n), scale / n, band=band)
     places = np.linspace(sums.values[0], sums.values[-1], 2000)
-    gap = float(np.max(np.abs(sums.cdf(places) - _gaussian(places, centre, scale))))
-    yield fits(
-        f"{label}: log E_n/E0 against sums of n cycles drawn from theory",
-        total,
-        sums.cdf,
-        band=PEAK_DENSITY * n * left.mean_s / scale + critical_gap(N_DRAWN),
-        scale=0.3,
-        note=f"the Gaussian is off by {gap:.3f} of itself, {len(total)} tell {critical_gap(len(total)):.3f}",
-    )
+    gap = float(np.max(np.abs(sums.cdf(places) - norm.cdf(places, centre, scale))))
     inner, theirs = (np.abs(x - centre) < scale for x in (total, sums.values))
-    yield close(
-        f"{label}: share within one standard deviation",
-        share(inner),
-        share(theirs).value,
-        band=N_SIGMA * share(theirs).error,
-    )
     z, drawn = (total - centre) / scale, (sums.values - centre) / scale
-    what = f"{label}: skewness, 0 for a Gaussian"
-    band = N_SIGMA * mean(drawn**3).error
-    yield close(what, mean(z**3), mean(drawn**3).value, band=band)
-    yield stated(f"{label}: the tails are no Gaussian's, by theory", *_tails(sample.run.name, n, cumulants))
-
-
-def _gaussian(x: FloatArray, centre: float, scale: float) -> FloatArray:
-    return np.asarray(norm.cdf(x, centre, scale))
+    return [
+        close(
+            f"{label}: mean of log E_n/E0 over n, less its bias {bias / n:.5f}",
+            per_cycle,
+            m1,
+            band=left.mean_s + N_SIGMA * own / n,
+            scale=m1,
+        ),
+        close(
+            f"{label}: standard deviation over n",
+            (spread(total).value / n, spread(total).error / n),
+            scale / n,
+            band=(abs(blurred) * left.variance / 2 + N_SIGMA / (2 * N_DRAWN) ** 0.5) * scale / n,
+        ),
+        fits(
+            f"{label}: log E_n/E0 against sums of n cycles drawn from theory",
+            total,
+            sums.cdf,
+            band=PEAK_DENSITY * n * left.mean_s / scale + critical_gap(N_DRAWN),
+            scale=0.3,
+            note=f"the Gaussian is off by {gap:.3f} of itself,"
+            f" {len(total)} tell {critical_gap(len(total)):.3f}",
+        ),
+        close(
+            f"{label}: share within one standard deviation",
+            share(inner),
+            share(theirs).value,
+            band=N_SIGMA * share(theirs).error,
+        ),
+        close(
+            f"{label}: skewness, 0 for a Gaussian",
+            mean(z**3),
+            mean(drawn**3).value,
+            band=N_SIGMA * mean(drawn**3).error,
+        ),
+        stated(f"{label}: the tails are no Gaussian's, by theory", *_tails(sample.run.name, n, cumulants)),
+    ]
 
 
 def _tails(run: str, n: int, cumulants: list[float]) -> tuple[bool, str, str]:
@@ -109,48 +114,56 @@ def tails(evidence: ClaimEvidence) -> Iterator[Check]:
     sample = evidence.sample("moving-cap@1e7")
     found, gain = predicted(sample), sample.gain[sample.captured]
     theirs = 1 - float(found.captured_cdf(np.zeros(1))[0])
-    what = "moving-cap@1e7: share of the captured that gain energy"
-    band = captured_band(sample)
-    yield close(what, share(gain > 0), theirs, band=band, scale=0.1, against=("one half", 0.5))
+    yield close(
+        "moving-cap@1e7: share of the captured that gain energy",
+        share(gain > 0),
+        theirs,
+        band=captured_band(sample),
+        scale=0.1,
+        against=("one half", 0.5),
+    )
     for many in evidence.samples(*MANY):
         for n in sorted({10, many.run.n_cycles}):
             yield from _told_from_a_gaussian(many, n)
 
 
-def _told_from_a_gaussian(sample: Sample, n: int) -> Iterator[Check]:
+def _told_from_a_gaussian(sample: Sample, n: int) -> list[Check]:
     """Weigh log E_n/E0 between the theory's sums and a Gaussian of their mean and width.
 
     The logarithm of the likelihoods' ratio tells two distributions apart better than any other number.
     """
     label, sums = f"{sample.run.name}, n = {n}", summed(sample.run.name, n)
     total, drawn = ((x - sums.mean) / sums.sd for x in (sample.s[:, n - 1], sums.values))
-    what = f"{label}: share below the mean by over 3 standard deviations"
     theirs = share(drawn < -3)
-    yield close(
-        what,
-        share(total < -3),
-        theirs.value,
-        band=N_SIGMA * theirs.error,
-        against=("a Gaussian", float(norm.cdf(-3))),
-    )
     edges = np.linspace(-3.5, 3.5, 29)
     counts, likely = (_binned(x, edges) for x in (total, drawn))
     p, q = likely / likely.sum(), np.diff(norm.cdf([-np.inf, *edges, np.inf]))
     weight = np.log(p / q)
     mine, its = float(p @ weight), float(q @ weight)
     error = (float(p @ weight**2) - mine**2) ** 0.5 / len(total) ** 0.5
-    band = N_SIGMA * error * (len(total) / N_DRAWN) ** 0.5 + n * predicted(
-        sample
-    ).next_order.mean_s / sums.sd * float(np.abs(np.diff(weight)) @ ((p[1:] + p[:-1]) / 2)) / (
-        edges[1] - edges[0]
-    )
-    yield close(
-        f"{label}: mean log of the likelihoods, theory's over a Gaussian's",
-        (float(counts @ weight) / len(total), error),
-        mine,
-        band=band,
-        against=("a Gaussian", its),
-    )
+    return [
+        close(
+            f"{label}: share below the mean by over 3 standard deviations",
+            share(total < -3),
+            theirs.value,
+            band=N_SIGMA * theirs.error,
+            against=("a Gaussian", float(norm.cdf(-3))),
+        ),
+        close(
+            f"{label}: mean log of the likelihoods, theory's over a Gaussian's",
+            (float(counts @ weight) / len(total), error),
+            mine,
+            band=(
+                N_SIGMA * error * (len(total) / N_DRAWN) ** 0.5
+                + n
+                * predicted(sample).next_order.mean_s
+                / sums.sd
+                * float(np.abs(np.diff(weight)) @ ((p[1:] + p[:-1]) / 2))
+                / (edges[1] - edges[0])
+            ),
+            against=("a Gaussian", its),
+        ),
+    ]
 
 
 def _binned(values: FloatArray, edges: FloatArray) -> FloatArray:

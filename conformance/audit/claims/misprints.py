@@ -52,7 +52,7 @@ def _exponent(number: Decimal) -> int:
     return int(number.as_tuple().exponent)
 
 
-def half_angle(evidence: ClaimEvidence) -> Iterator[Check]:
+def half_angle(evidence: ClaimEvidence) -> list[Check]:
     """M1: the mouth as printed, sin²(t), and with the half angle."""
     try:
         scenes.load("moving-cap-as-printed")
@@ -65,17 +65,19 @@ def half_angle(evidence: ClaimEvidence) -> Iterator[Check]:
         nu=scenes.Fourier(0.6, 1.0, (0.0, 0.4)),
     )
     as_printed, corrected = evidence.predict(upright), evidence.predict("moving-cap")
-    yield stated("sin²(t): the table is valid through the cycle", is_valid, message, "valid", form="printed")
-    yield stated(
-        "sin²(t), slope 0: energy grows",
-        bool(as_printed.m1 > ZERO),
-        f"m1 = {mpmath.nstr(as_printed.m1, 3)}: t and pi - t see the same r, h",
-        "m1 > 0",
-        form="printed",
-    )
-    yield stated("sin²(t/2): the table is valid", True, "valid, by exact algebra", "valid", form="corrected")
-    yield rounds("sin²(t/2): m1", "0.122768", corrected.m1, "corrected")
-    yield rounds("sin²(t/2): p_nc", "0.38474", corrected.p_nc, "corrected")
+    return [
+        stated("sin²(t): the table is valid through the cycle", is_valid, message, "valid", form="printed"),
+        stated(
+            "sin²(t), slope 0: energy grows",
+            bool(as_printed.m1 > ZERO),
+            f"m1 = {mpmath.nstr(as_printed.m1, 3)}: t and pi - t see the same r, h",
+            "m1 > 0",
+            form="printed",
+        ),
+        stated("sin²(t/2): the table is valid", True, "valid, by exact algebra", "valid", form="corrected"),
+        rounds("sin²(t/2): m1", "0.122768", corrected.m1, "corrected"),
+        rounds("sin²(t/2): p_nc", "0.38474", corrected.p_nc, "corrected"),
+    ]
 
 
 def signs(evidence: ClaimEvidence) -> Iterator[Check]:
@@ -146,12 +148,18 @@ def exponent_sign(evidence: ClaimEvidence) -> Iterator[Check]:
             integral = _capture_integral(table)
             minus, plus = mpmath.exp(-integral), mpmath.exp(integral)
         theirs = evidence.predict(table).p_nc
-        yield stated(
-            f"exp(-∫), {name}: a probability", bool(minus <= 1), mpmath.nstr(minus, 8), "<= 1", form="printed"
-        )
-        yield rounds(f"exp(-∫), {name}: p_nc", paper, minus, "printed")
-        yield rounds(f"exp(+∫), {name}: p_nc", paper, plus, "corrected")
-        yield exact(f"exp(+∫), {name}: eq. (ps)", plus, theirs, 10.0 ** (5 - DIGITS), form="corrected")
+        yield from [
+            stated(
+                f"exp(-∫), {name}: a probability",
+                bool(minus <= 1),
+                mpmath.nstr(minus, 8),
+                "<= 1",
+                form="printed",
+            ),
+            rounds(f"exp(-∫), {name}: p_nc", paper, minus, "printed"),
+            rounds(f"exp(+∫), {name}: p_nc", paper, plus, "corrected"),
+            exact(f"exp(+∫), {name}: eq. (ps)", plus, theirs, 10.0 ** (5 - DIGITS), form="corrected"),
+        ]
 
 
 def _capture_integral(table: scenes.Scene) -> Any:
@@ -223,20 +231,22 @@ def loop_plane(evidence: ClaimEvidence) -> Iterator[Check]:
     result = evidence.predict("moving-cap-trivial")
     grows = abs(result.m1) > ZERO
     m1 = f"m1 = {mpmath.nstr(result.m1, 3)}, p_nc = {mpmath.nstr(result.p_nc, 6)}"
-    yield stated(
-        "plane (V_cha, flux): an area means growth",
-        (abs(summary) > ZERO) == grows,
-        f"area {summary:.4g}, yet {m1}",
-        "area and growth, or neither",
-        form="printed",
-    )
-    yield stated(
-        "plane (V_ell/V_cap, V_cap/V): no area, and no growth",
-        abs(section) <= ZERO and not grows,
-        f"area {section:.1g}, {m1}",
-        "neither",
-        form="corrected",
-    )
+    yield from [
+        stated(
+            "plane (V_cha, flux): an area means growth",
+            (abs(summary) > ZERO) == grows,
+            f"area {summary:.4g}, yet {m1}",
+            "area and growth, or neither",
+            form="printed",
+        ),
+        stated(
+            "plane (V_ell/V_cap, V_cap/V): no area, and no growth",
+            abs(section) <= ZERO and not grows,
+            f"area {section:.1g}, {m1}",
+            "neither",
+            form="corrected",
+        ),
+    ]
     for name in ("moving-cap", "fixed-cap-anticlockwise"):
         turn, found = loop_area(name), evidence.predict(name)
         yield stated(
@@ -248,7 +258,7 @@ def loop_plane(evidence: ClaimEvidence) -> Iterator[Check]:
         )
 
 
-def measures(evidence: ClaimEvidence) -> Iterator[Check]:
+def measures(evidence: ClaimEvidence) -> list[Check]:
     """M13: whose share p_cha is, and which volume the set H = E has."""
     table = Mushroom(r=1.0, h=scenes.Fourier(1.0, 1.0, (), (0.5,)), nu=scenes.Fourier(0.5, 1.0, (0.4,)))
     start = theory.volumes_at(fp, table, 0.0)  # nu = 0.9 at most: an island remains
@@ -257,34 +267,36 @@ def measures(evidence: ClaimEvidence) -> Iterator[Check]:
     energy, area = 2.0, 1.0
     printed = 2 * fp.pi * fp.sqrt(2 * energy) * area
     rate = 2 * fp.pi * ((energy + 1) - (energy - 1)) * area / 2  # of the volume below H = E: a disk times A
-    yield exact(
-        "n_cha/n_0 and n_cha/n_cha(t0) agree for any loop (nu from 0.1 to 0.9)",
-        p_nc * free,
-        p_nc,
-        ZERO,
-        form="printed",
-    )
-    yield exact(
-        "they agree when nu reaches 1, as in every loop of the paper",
-        theory.volumes_at(fp, scenes.load("moving-cap"), 0.0).v_ell,
-        0.0,
-        ZERO,
-        form="corrected",
-    )
-    yield exact(
-        "volume of H = E, E = 2, A = 1, as Liouville's measure: 2 pi sqrt(2E) A",
-        printed,
-        rate,
-        ZERO,
-        form="printed",
-    )
-    yield exact(
-        "2 pi A for every E: as V(D0) is defined, and all the paper's ratios need",
-        2 * fp.pi * area,
-        rate,
-        ZERO,
-        form="corrected",
-    )
+    return [
+        exact(
+            "n_cha/n_0 and n_cha/n_cha(t0) agree for any loop (nu from 0.1 to 0.9)",
+            p_nc * free,
+            p_nc,
+            ZERO,
+            form="printed",
+        ),
+        exact(
+            "they agree when nu reaches 1, as in every loop of the paper",
+            theory.volumes_at(fp, scenes.load("moving-cap"), 0.0).v_ell,
+            0.0,
+            ZERO,
+            form="corrected",
+        ),
+        exact(
+            "volume of H = E, E = 2, A = 1, as Liouville's measure: 2 pi sqrt(2E) A",
+            printed,
+            rate,
+            ZERO,
+            form="printed",
+        ),
+        exact(
+            "2 pi A for every E: as V(D0) is defined, and all the paper's ratios need",
+            2 * fp.pi * area,
+            rate,
+            ZERO,
+            form="corrected",
+        ),
+    ]
 
 
 CHECKS = {

@@ -60,15 +60,10 @@ class Simulation(NamedTuple):
         return self.quick if size == "quick" else self.full
 
 
-def _fixed_cap(period: float, w: str, h: str, name: str) -> Mushroom:
-    """Return a cap at rest over a stem that goes through knots `time:value`, as in sec. 4.1."""
-    half_width, depth = (_through(period, knots) for knots in (w, h))
+def _fixed_cap(period: float, w: dict[float, float], h: dict[float, float], name: str) -> Mushroom:
+    """Return a cap at rest over a stem that goes through values by time, as in sec. 4.1."""
+    half_width, depth = (scenes.BangBang((*knots.items(), (period, knots[0]))) for knots in (w, h))
     return Mushroom(r=1.0, h=depth, w=half_width, slope=0.04016414896719182, name=name)
-
-
-def _through(period: float, text: str) -> scenes.BangBang:
-    knots = [(float(time), float(value)) for time, value in (knot.split(":") for knot in text.split())]
-    return scenes.BangBang((*knots, (period, knots[0][1])))
 
 
 # Scenes that are no part of the catalogue.
@@ -79,13 +74,16 @@ SCENES: dict[str, Scene] = {
         Mushroom(r=1.0, h=1.0, nu=scenes.Fourier(0.6, 1.0, (0.4,)), slope=0.1111, name="only-mouth"),
         # The loop of fixed-cap-anticlockwise, its legs not as long as one another (C3).
         _fixed_cap(
-            1.0, "0:1 0.15:0.3 0.55:0.3 0.75:1", "0:6 0.15:6 0.55:2 0.75:2", name="fixed-cap-other-legs"
+            1.0,
+            {0: 1, 0.15: 0.3, 0.55: 0.3, 0.75: 1},
+            {0: 6, 0.15: 6, 0.55: 2, 0.75: 2},
+            name="fixed-cap-other-legs",
         ),
         # Two turns, each on another loop in another time: shapes return only more or less (C10).
         _fixed_cap(
             2.0,
-            "0:1 0.3125:0.3 0.5:0.3 0.6875:0.98 0.9375:0.98 1.25:0.25 1.59375:0.25 1.8125:1",
-            "0:6 0.3125:6 0.5:2 0.6875:2 0.9375:5.5 1.25:5.5 1.59375:1.9 1.8125:1.9",
+            {0: 1, 0.3125: 0.3, 0.5: 0.3, 0.6875: 0.98, 0.9375: 0.98, 1.25: 0.25, 1.59375: 0.25, 1.8125: 1},
+            {0: 6, 0.3125: 6, 0.5: 2, 0.6875: 2, 0.9375: 5.5, 1.25: 5.5, 1.59375: 1.9, 1.8125: 1.9},
             name="fixed-cap-irregular",
         ),
     )

@@ -94,7 +94,7 @@ def conduct(
     Args:
         steppers: what to simulate with.
         settings: size, seed, threads, folder.
-        claims: of the claims, all by default.
+        claims: to be checked, all by default.
         predict: theory, or a wrong one that must be found out.
         simulate_run: what simulates the run of a name, with the signature of `steppers.simulate`, which
             does so by default.
@@ -106,9 +106,8 @@ def conduct(
     claims = all_claims() if claims is None else claims
     check_seed(settings.seed)
     begin = time.perf_counter()
-    folder = settings.folder
-    if folder:
-        folder.mkdir(parents=True, exist_ok=True)
+    if settings.folder:
+        settings.folder.mkdir(parents=True, exist_ok=True)
         code()  # before anything is examined: an edit meanwhile is not what runs, and must not be told as it
     found = {e.id: f for e in claims if (f := _load(e, settings)) is not None}
     predict = cache(predict)
@@ -127,8 +126,8 @@ def conduct(
         if claim.id not in found:
             found[claim.id] = examine(claim, samples, steppers, settings, predict)
         _save(found[claim.id], settings)
-    ordered = [found[claim.id] for claim in claims]
-    return AuditResult(settings, tuple(claims), ordered, samples, time.perf_counter() - begin)
+    findings = [found[claim.id] for claim in claims]
+    return AuditResult(settings, tuple(claims), findings, samples, time.perf_counter() - begin)
 
 
 def kept(settings: AuditSettings) -> set[str]:

@@ -164,11 +164,10 @@ def build(folder: Path, flags: Sequence[str]) -> tuple[Path, str]:
 
 def in_c(library: Path) -> list[Solver]:
     """Return the solvers that the compiled C file holds."""
-    found = [_solver("lean C", "lean", c_engine(library))]
-    for parts in PARTS:
-        engine = c_engine(library, parts)
-        found.append(_solver(f"steps, flight/{parts}", "fixed-step", engine, 10 * WINDOW / parts))
-    return found
+    return [
+        _solver("lean C", "lean", c_engine(library)),
+        *(_solver(f"steps, flight/{n}", "fixed-step", c_engine(library, n), 10 * WINDOW / n) for n in PARTS),
+    ]
 
 
 def in_numba() -> Solver:

@@ -9,7 +9,6 @@ from __future__ import annotations
 import sys
 import tempfile
 from collections import Counter
-from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
@@ -54,16 +53,17 @@ class Graded(NamedTuple):
     why_not: str = ""
 
 
-def commands(folder: Path) -> Iterator[tuple[str, tuple[str, ...], str]]:
-    """Yield name, command and, where there is none here, the reason."""
-    for name, module in OURS.items():
-        yield name, (sys.executable, "-m", module), ""
-    for language, example in find_examples(folder).items():
-        yield f"example in {language}", example.command, example.why_not
-    for engine, example in find_kit_examples(folder).items():
-        yield f"kit, {engine}", example.command, example.why_not
-    for name in (name for name in NAMES if name not in LEFT_OUT):
-        yield name, (sys.executable, "-m", "conformance.bench.baselines", name), ""
+def commands(folder: Path) -> list[tuple[str, tuple[str, ...], str]]:
+    """List name, command and, where there is none here, the reason."""
+    ours = {name: (sys.executable, "-m", module) for name, module in OURS.items()}
+    baselines = (name for name in NAMES if name not in LEFT_OUT)
+    found = {f"example in {language}": example for language, example in find_examples(folder).items()}
+    found |= {f"kit, {engine}": example for engine, example in find_kit_examples(folder).items()}
+    return [
+        *((name, command, "") for name, command in ours.items()),
+        *((name, example.command, example.why_not) for name, example in found.items()),
+        *((name, (sys.executable, "-m", "conformance.bench.baselines", name), "") for name in baselines),
+    ]
 
 
 def page(entries: list[Graded], corpus: str) -> str:

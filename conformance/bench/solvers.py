@@ -71,16 +71,12 @@ def by_call(name: str, family: Family, step: Callable[[Scene, State, float], Giv
     return Solver(name, family, run)
 
 
-def plain_python() -> Solver:
-    """Return the plain stepper."""
-    return by_call("plain Python", "interpreted", plain.next_collision)
-
-
-def time_steppers() -> list[Solver]:
-    """Return scipy's solve_ivp with events, at several tolerances."""
+def in_python() -> list[Solver]:
+    """Return the plain stepper, and scipy's solve_ivp with events, at several tolerances."""
+    integrators = {f"solve_ivp, rtol {rtol:.0e}": next_collision_by(rtol) for rtol in TOLERANCES}
     return [
-        by_call(f"solve_ivp, rtol {rtol:.0e}", "time-stepping", next_collision_by(rtol))
-        for rtol in TOLERANCES
+        by_call("plain Python", "interpreted", plain.next_collision),
+        *(by_call(name, "time-stepping", step) for name, step in integrators.items()),
     ]
 
 

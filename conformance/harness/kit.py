@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from functools import partial
 from time import perf_counter_ns
 from typing import Any
@@ -29,7 +29,7 @@ from conformance.plain import Flight, Open
 from scene import Collision, Horizon, Outcome, Scene, State, Wall
 from scene.geometry import table_at
 from scene.protocol.messages import Answered, AnsweredCollision
-from scene.protocol.wire import AnsweringStepper, Captured, OwnFailure, serve
+from scene.protocol.wire import AnsweringStepper, OwnFailure, serve
 
 __all__ = ["Hit", "Open", "serve_engine", "serve_parts"]
 Hit = tuple[float, float, float, float, float]  # t, x, y, vx, vy, after the bounce
@@ -118,9 +118,6 @@ def _serve(name: str, step: AnsweringStepper) -> None:
         assert hit.wall is not None
         return Collision(hit.wall, hit.t - state.t, hit.t, hit.x, hit.y, hit.vx, hit.vy)
 
-    def carry(scene: Scene, states: Sequence[State], t_end: float) -> list[tuple[Outcome, Captured]]:
-        return plain.flow(scene, states, t_end, collide)
-
     def timed(
         scene: Scene, state: State, n_collisions: int, repeat: int
     ) -> tuple[list[int], Answered | Outcome]:
@@ -131,4 +128,12 @@ def _serve(name: str, step: AnsweringStepper) -> None:
             ns.append(perf_counter_ns() - begin)
         return ns, steps[-1]
 
-    serve(name, step, follow, sys.stdin.buffer, sys.stdout.buffer, flow=carry, timer=timed)
+    serve(
+        name,
+        step,
+        follow,
+        sys.stdin.buffer,
+        sys.stdout.buffer,
+        flow=partial(plain.flow, step=collide),
+        timer=timed,
+    )

@@ -229,12 +229,12 @@ def sliding(evidence: ClaimEvidence) -> list[Check]:
     ]
 
 
-def speeds(evidence: ClaimEvidence) -> Iterator[Check]:
+def speeds(evidence: ClaimEvidence) -> list[Check]:
     """C5: the bound by collisions; then cycles that do not accelerate exponentially."""
-    for name in BOUNDED:
-        yield _at_most_linear(evidence, name)
-    for sample in evidence.samples(*SLOW):
-        yield from _quadratic(sample)
+    return [
+        *(_at_most_linear(evidence, name) for name in BOUNDED),
+        *(check for sample in evidence.samples(*SLOW) for check in _quadratic(sample)),
+    ]
 
 
 def _at_most_linear(evidence: ClaimEvidence, name: str) -> Check:

@@ -62,12 +62,18 @@ def circle(evidence: ClaimEvidence) -> list[Check]:
     ]
 
 
-def impact_angle(evidence: ClaimEvidence) -> Iterator[Check]:
+def impact_angle(evidence: ClaimEvidence) -> list[Check]:
     """C6: phi_hat through the breathing cap, at impacts and between them."""
     orbits = _orbits(evidence.steppers.trajectory, evidence.seed)
-    for what, name in (("at impacts", "angle"), ("half-way between impacts", "between")):
-        drifts = [[getattr(orbit, name) for orbit in row] for row in orbits]
-        yield _orbits_exponent(f"largest change of phi_hat {what} over a fixed time", drifts, -1, 0)
+    return [
+        _orbits_exponent(
+            f"largest change of phi_hat {what} over a fixed time",
+            [[getattr(orbit, name) for orbit in row] for row in orbits],
+            -1,
+            0,
+        )
+        for what, name in (("at impacts", "angle"), ("half-way between impacts", "between"))
+    ]
 
 
 class Orbit(NamedTuple):

@@ -45,11 +45,17 @@ def mean_exp_minus(evidence: ClaimEvidence) -> list[Check]:
     ]
 
 
-def equivalent_forms(evidence: ClaimEvidence) -> Iterator[Check]:
+def equivalent_forms(evidence: ClaimEvidence) -> list[Check]:
     """N1: eq. (Erate) is the mean of eq. (lnE/E0) over eq. (ps)."""
-    for name in NAMES:
-        direct = theory.mean_of(scenes.load(name), lambda s: s, 20)
-        yield exact(f"{name}: mean of eq. (lnE/E0)", direct, evidence.predict(name).m1, 1e-18)
+    return [
+        exact(
+            f"{name}: mean of eq. (lnE/E0)",
+            theory.mean_of(scenes.load(name), lambda s: s, 20),
+            evidence.predict(name).m1,
+            1e-18,
+        )
+        for name in NAMES
+    ]
 
 
 def formulas_in_w(evidence: ClaimEvidence) -> Iterator[Check]:

@@ -40,16 +40,12 @@ def rounds_to(printed: str, value: Any) -> bool:
     """Tell whether a number, rounded to as many decimals as were printed, is the printed one."""
     number = Decimal(printed)
     exact = Decimal(mpmath.nstr(mpmath.mpf(value), 30, min_fixed=-mpmath.inf, max_fixed=mpmath.inf))
-    return exact.quantize(Decimal(1).scaleb(_exponent(number)), ROUND_HALF_EVEN) == number
+    return exact.quantize(number, ROUND_HALF_EVEN) == number
 
 
 def half_unit(printed: str) -> float:
     """Return half a unit of the last printed digit."""
-    return 0.5 * 10.0 ** _exponent(Decimal(printed))
-
-
-def _exponent(number: Decimal) -> int:
-    return int(number.as_tuple().exponent)
+    return 0.5 * 10.0 ** int(Decimal(printed).as_tuple().exponent)
 
 
 def half_angle(evidence: ClaimEvidence) -> list[Check]:

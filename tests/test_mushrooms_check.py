@@ -114,12 +114,12 @@ def test_a_faulty_stepper_is_told_its_fault(call, tmp_path):
     served = tmp_path / "faulty.py"
     served.write_text(
         "import sys\nfrom conformance.mutants import MUTANTS\nfrom scene.protocol.wire import serve\n"
-        "m = MUTANTS['wall-velocity-once']\n"
+        "m = MUTANTS['floor-velocity-sign']\n"
         "serve('faulty', m.step, m.trajectory, sys.stdin.buffer, sys.stdout.buffer)\n"
     )
     code, out, _ = call("--seed", 1, "--html", tmp_path / "r.html", "--", sys.executable, served)
     assert code == 1
-    assert "like wall-velocity-once on " in out
+    assert "like floor-velocity-sign on " in out
     assert "  certified collision wall=" in out
     page = (tmp_path / "r.html").read_text("utf-8")
     drawn = re.findall(r'<figure id="([^"]+)">', page)

@@ -40,7 +40,7 @@ def diagnose(results: Sequence[Result]) -> list[str]:
     matrix = json.loads((resources.files("conformance") / "mutants" / "kill-matrix.json").read_bytes())
     faulty = MUTANTS | COMMON
     told = {name: set(matrix["mutants"][name]["vectors"]) for name in faulty}
-    suspects = [name for name, own in told.items() if own & set(failed) and not own & set(passed)]
+    suspects = [name for name, own in told.items() if not own & set(passed)]
     compared = {*_spread(failed), *_spread(passed)}
     vectors = [vector for vector in load("stress") if vector.id in compared]
     failed_too = compared & set(failed)

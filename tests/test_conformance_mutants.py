@@ -66,6 +66,13 @@ def test_plain_fails_no_vector(vectors):
     assert {level for level, found in verdicts if found == "declined"} <= {"stress"}
 
 
+def test_the_page_for_contributors_shows_a_mutant_as_it_is():
+    page = (DOCS / "contributing" / "mutant.md").read_text("utf-8")
+    shown = page.partition("```python\n")[2].partition("```")[0]
+    assert shown
+    assert shown in (kill_matrix.DATA / "walls.py").read_text("utf-8")
+
+
 def grows(least, most):
     return BangBang(knots=((0.0, least), (1.0, most), (2.0, least)))
 

@@ -2,7 +2,7 @@
 
 `python -m conformance.mutants.kill_matrix` answers every vector with every mutant, grades the answers and
 writes kill-matrix.json beside this file, with a few vectors for each mutant, and docs/kill-matrix.md from it:
-some ten minutes on one core. Only `fail` kills: a vector that a mutant declines, or at which it crashes,
+some five minutes on one core. Only `fail` kills: a vector that a mutant declines, or at which it crashes,
 does not count.
 """
 

@@ -30,7 +30,7 @@ from conformance.generator.seldom import EXTRA
 from conformance.grading.agreement import physics_bound
 from conformance.grading.grade import grade
 from conformance.mutants import Mutant
-from conformance.mutants.of_laws import single
+from conformance.mutants.laws import single
 from conformance.plain.flow import MAX_COLLISIONS, PlainPath
 from conformance.plain.motion import BangBangMotion
 from conformance.plain.step import Flight, Open

@@ -19,7 +19,7 @@ import fast
 import reference
 from conformance import plain
 from conformance.grading.called import is_clearly_inside
-from conformance.mutants import MUTANTS
+from conformance.mutants import COMMON, MUTANTS
 from conformance.profiles import check_work_identity
 from conformance.properties import PROPERTIES, check_mirror, check_period_shift, check_scaling
 from conformance.strategies import scenes_and_states
@@ -119,7 +119,7 @@ def separate_path_for_moving_walls(scene, state, t_end):
 
 def shy_of_reversed_time(scene, state, t_end):
     """Kicks by 2 u, unless time is negative."""
-    step = MUTANTS["wall-velocity-once"].step if state.t < 0 else plain.next_collision
+    step = COMMON["wall-velocity-once"].step if state.t < 0 else plain.next_collision
     return step(scene, state, t_end)
 
 
@@ -127,23 +127,23 @@ FAULTY = [
     ("mirror", MUTANTS["left-side-upright"].step, SLANTED),
     (
         "mirror",
-        MUTANTS["mouth-tested-to-the-right-only"].step,
+        COMMON["mouth-tested-to-the-right-only"].step,
         (STATIC[0], State(0.0, -0.5, 0.2, -1.0, -1.0), 9.0),
     ),
-    ("scaling-of-lengths", MUTANTS["root-where-gap-is-small"].step, GALLERY),
-    ("scaling-of-times", MUTANTS["root-to-six-digits"].step, GALLERY),
-    ("scaling-of-times", MUTANTS["hits-within-epsilon-skipped"].step, (*GALLERY[:2], 2.0)),
+    ("scaling-of-lengths", COMMON["root-where-gap-is-small"].step, GALLERY),
+    ("scaling-of-times", COMMON["root-to-six-digits"].step, GALLERY),
+    ("scaling-of-times", COMMON["hits-within-epsilon-skipped"].step, (*GALLERY[:2], 2.0)),
     ("static-limit", separate_path_for_moving_walls, STATIC),
-    ("period-shift", MUTANTS["pi-too-short"].step, (GALLERY[0], State(6.0, 0.1, 0.9, 2.0, 0.25), 9.0)),
+    ("period-shift", COMMON["pi-too-short"].step, (GALLERY[0], State(6.0, 0.1, 0.9, 2.0, 0.25), 9.0)),
     ("period-shift", MUTANTS["period-wrap-lost"].step, LIFT),
-    ("split-flight", MUTANTS["arc-static"].step, GALLERY),
-    ("split-flight", MUTANTS["wall-velocity-at-departure"].step, BREATHING),
-    ("reversal", MUTANTS["arc-static"].step, GALLERY),
+    ("split-flight", COMMON["arc-static"].step, GALLERY),
+    ("split-flight", COMMON["wall-velocity-at-departure"].step, BREATHING),
+    ("reversal", COMMON["arc-static"].step, GALLERY),
     ("reversal", shy_of_reversed_time, LIFT),
-    ("angular-momentum", MUTANTS["normal-at-departure"].step, GALLERY),
+    ("angular-momentum", COMMON["normal-at-departure"].step, GALLERY),
     ("energy", MUTANTS["normal-without-cos"].step, SLANTED),
-    ("symplectic", MUTANTS["wall-velocity-once"].step, LIFT),
-    ("symplectic", MUTANTS["wall-velocity-dropped"].step, GALLERY),
+    ("symplectic", COMMON["wall-velocity-once"].step, LIFT),
+    ("symplectic", COMMON["wall-velocity-dropped"].step, GALLERY),
 ]
 
 

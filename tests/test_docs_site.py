@@ -20,6 +20,7 @@ DOCS = Path(__file__).parent.parent / "docs"
 FENCE = re.compile(r"^```([^\n]*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 # Blocks that another test runs, by page and first line; "" is a line for a shell that installs something.
 RUN_ELSEWHERE = {
+    "mutant.md": {"python"},  # test_conformance_mutants
     "tutorial.md": {"python", "console"},  # test_docs: the tutorial, one block after the other
     "scenes.md": {"toml", "text", "python", "console"},  # test_docs: files loaded, doctests
     "protocol.md": {"json"},  # test_docs: against the schema and the plain stepper

@@ -113,8 +113,8 @@ def test_a_faulty_stepper_is_told_its_fault(call, tmp_path):
     """What was given beside what is certified, and the mutant whose failures are the same."""
     served = tmp_path / "faulty.py"
     served.write_text(
-        "import sys\nfrom conformance.mutants import MUTANTS\nfrom scene.protocol.wire import serve\n"
-        "m = MUTANTS['wall-velocity-once']\n"
+        "import sys\nfrom conformance.mutants import COMMON\nfrom scene.protocol.wire import serve\n"
+        "m = COMMON['wall-velocity-once']\n"
         "serve('faulty', m.step, m.trajectory, sys.stdin.buffer, sys.stdout.buffer)\n"
     )
     code, out, _ = call("--seed", 1, "--html", tmp_path / "r.html", "--", sys.executable, served)

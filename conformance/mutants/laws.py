@@ -1,0 +1,206 @@
+"""Mutants that follow a law of motion wrongly: its phase, harmonics, legs, periods, digits."""
+
+from __future__ import annotations
+
+import struct
+from math import cos, floor, fmod, pi, sin
+
+from mpmath import fp
+from msgspec.structs import replace
+
+from conformance.mutants.mutant import Plain, mutant
+from conformance.plain.motion import (
+    BangBangMotion,
+    ConstantMotion,
+    FourierMotion,
+    Half,
+    LawMotion,
+    LawValue,
+)
+from conformance.plain.step import Flight
+from scene import BangBang, Fourier, Law, Outcome, Rejected, Scene, State
+from scene.laws import bounds, frequency
+from scene.tables import cycle_length, laws
+
+
+def single(x: float) -> float:
+    """Round to binary32, as one who declares a float does."""
+    return float(struct.unpack("f", struct.pack("f", max(-3e38, min(x, 3e38))))[0])
+
+
+class Stopped(ConstantMotion):
+    """A law that stands still from some time of flight on."""
+
+    def __init__(self, law: LawMotion, span: float) -> None:
+        super().__init__(law.value, 0.0)
+        self.law, self.span = law, span
+
+    def at(self, s: float) -> LawValue:
+        """Return the motion at the time s since departure."""
+        found = self.law.at(min(s, self.span))
+        return found if s < self.span else found._replace(rate=0.0)
+
+
+@mutant(BangBangMotion, "halves")
+def half_leg_acceleration_sign(
+    motion: BangBangMotion, plain: Plain[tuple[Half, Half]], *leg: float
+) -> tuple[Half, Half]:
+    """Accelerates through the second half of a leg instead of braking."""
+    one, two = plain(*leg)
+    return one, two._replace(pull=one.pull)
+
+
+@mutant(Flight, "law")
+def period_wrap_lost(flight: Flight, plain: Plain[LawMotion], law: Law) -> LawMotion:
+    """Lets a bang-bang law stand still outside its first period."""
+    if not isinstance(law, BangBang):
+        return plain(law)
+    t, first, (last, value) = flight.state.t, law.knots[0][0], law.knots[-1]
+    return Stopped(plain(law), last - t) if first <= t < last else ConstantMotion(value, t)
+
+
+@mutant(BangBangMotion, "__init__")
+def periods_in_int32(
+    motion: BangBangMotion, plain: Plain[None], law: BangBang, t: float, *, size: float = 2.0**31
+) -> None:
+    """Counts whole periods in 32 bits, which overflow."""
+    first, last = law.knots[0][0], law.knots[-1][0]
+    plain(law, t if -size <= floor((t - first) / (last - first)) < size else last)
+
+
+@mutant(BangBangMotion, "__init__")
+def periods_towards_zero(motion: BangBangMotion, plain: Plain[None], law: BangBang, t: float) -> None:
+    """Cuts off whole periods towards 0: before the first knot the first leg is taken to have been on."""
+    plain(law, t)
+    if (since := fmod(t - law.knots[0][0], motion.period)) < 0:
+        half = motion.halves(*law.knots[0], *law.knots[1])[0]
+        motion.value, motion.rate = half.value + half.pull * since * since / 2, half.pull * since
+        others = BangBangMotion(law, half.end).pieces
+        motion.pieces = [(-since + half.end - half.begin, half.pull), *others]
+
+
+@mutant(BangBangMotion, "__init__")
+def knots_from_zero(motion: BangBangMotion, plain: Plain[None], law: BangBang, t: float) -> None:
+    """Takes the first knot to be at time 0."""
+    plain(law, t + law.knots[0][0])
+
+
+@mutant(BangBangMotion, "__init__")
+def knots_without_their_origin(motion: BangBangMotion, plain: Plain[None], law: BangBang, t: float) -> None:
+    """Reduces the time by whole periods from 0, though the knots begin elsewhere."""
+    plain(law, t)
+    first, within = law.knots[0][0], t - floor(t / motion.period) * motion.period
+    if not first <= within < first + motion.period:
+        motion.value, motion.rate, motion.pieces = law.knots[0][1], 0.0, [(motion.period, 0.0)]
+
+
+@mutant(BangBangMotion, "__init__")
+def last_leg_forgotten(motion: BangBangMotion, plain: Plain[None], law: BangBang, t: float) -> None:
+    """Stands still between the last two knots."""
+    *kept, (time, _), last = law.knots
+    plain(BangBang(knots=(*kept, (time, last[1]), last)) if len(kept) > 1 else law, t)
+
+
+@mutant(BangBangMotion, "__init__")
+def time_within_period_in_float32(
+    motion: BangBangMotion, plain: Plain[None], law: BangBang, t: float
+) -> None:
+    """Keeps the time since the first knot, within a period, in binary32."""
+    first, last = law.knots[0][0], law.knots[-1][0]
+    turns = floor((t - first) / (last - first))
+    plain(law, first + single(t - first - turns * (last - first)))
+
+
+@mutant(Flight, "law")
+def rate_without_harmonic_number(flight: Flight, plain: Plain[LawMotion], law: Law) -> LawMotion:
+    """Differentiates cos(k omega t) to -omega sin(k omega t)."""
+    return RateOfFirstHarmonic(law, flight.state.t) if isinstance(law, Fourier) else plain(law)
+
+
+class RateOfFirstHarmonic(FourierMotion):
+    """A Fourier law whose rate lacks the numbers of its harmonics."""
+
+    def __init__(self, law: Fourier, t: float) -> None:
+        super().__init__(law, t)
+        self.omega = frequency(fp, law)
+
+    def at(self, s: float) -> LawValue:
+        """Return the motion at the time s since departure."""
+        rate = sum(self.omega * (b * cos(f * s) - a * sin(f * s)) for f, a, b in self.waves)
+        return super().at(s)._replace(rate=rate)
+
+
+@mutant(FourierMotion, "__init__")
+def three_harmonics_at_most(
+    motion: FourierMotion, plain: Plain[None], law: Fourier, t: float, *, size: float = 3
+) -> None:
+    """Keeps three harmonics of a Fourier law."""
+    plain(replace(law, cos=law.cos[: int(size)], sin=law.sin[: int(size)]), t)
+
+
+@mutant(FourierMotion, "__init__")
+def frequency_in_float32(motion: FourierMotion, plain: Plain[None], law: Fourier, t: float) -> None:
+    """Keeps the angular frequency in binary32."""
+    plain(replace(law, omega=single(frequency(fp, law)), period=None), t)
+
+
+@mutant(FourierMotion, "__init__")
+def period_for_frequency(motion: FourierMotion, plain: Plain[None], law: Fourier, t: float) -> None:
+    """Takes a period for an angular frequency."""
+    plain(law if law.period is None else replace(law, omega=law.period, period=None), t)
+
+
+@mutant(Flight, "law")
+def first_period_only(flight: Flight, plain: Plain[LawMotion], law: Law) -> LawMotion:
+    """Lets every law stand still after one period of flight."""
+    motion = plain(law)
+    if isinstance(law, Fourier):
+        return Stopped(motion, 2 * pi / frequency(fp, law))
+    return Stopped(motion, motion.period) if isinstance(motion, BangBangMotion) else motion
+
+
+@mutant(Flight, "__init__")
+def gives_up_after_ten_periods(
+    flight: Flight, plain: Plain[None], scene: Scene, state: State, t_end: float, *, size: float = 10
+) -> None:
+    """Looks for a hit within ten periods of the laws only."""
+    plain(scene, state, t_end)
+    if length := cycle_length(scene):
+        flight.end, flight.is_horizon = min(flight.end, size * length), True
+
+
+@mutant(Flight, "__init__")
+def place_in_float32(flight: Flight, plain: Plain[None], scene: Scene, state: State, t_end: float) -> None:
+    """Keeps x and y in binary32."""
+    plain(scene, replace(state, x=single(state.x), y=single(state.y)), t_end)
+
+
+@mutant(Flight, "refusal")
+def sizes_judged_by_their_amplitudes(flight: Flight, plain: Plain[Outcome | None]) -> Outcome | None:
+    """Refuses a scene in which a size's amplitudes add up to its mean or more, though it stays positive."""
+    for name, law in laws(flight.scene).items():
+        if name != "slope" and not bounds(law).lowest > 0:
+            return Rejected(f"scene.{name} is negative at times")
+    return plain()
+
+
+@mutant(Flight, "__init__")
+def steep_slopes_clamped(
+    flight: Flight, plain: Plain[None], scene: Scene, state: State, t_end: float, *, size: float = 0.5
+) -> None:
+    """Clamps a constant slope of the sides to -1/2 ... 1/2."""
+    plain(scene, state, t_end)
+    slope = flight.laws.get("slope")
+    if isinstance(slope, ConstantMotion):
+        slope.value = max(-size, min(slope.value, size))
+
+
+@mutant(Flight, "__init__")
+def escape_time_from_sizes_at_departure(
+    flight: Flight, plain: Plain[None], scene: Scene, state: State, t_end: float
+) -> None:
+    """Bounds the time of a flight by the sizes that the table has at departure, though it grows."""
+    plain(scene, state, t_end)
+    highest, now = flight.bounds, {name: law.value for name, law in flight.laws.items()}
+    flight.bounds = {name: b._replace(lowest=now[name], highest=now[name]) for name, b in highest.items()}
+    flight.end, flight.bounds, flight.is_horizon = min(flight.end, flight.escape() / 2), highest, True

@@ -19,7 +19,7 @@ import msgspec
 from hypothesis import currently_in_test_context, note
 from hypothesis import strategies as st
 
-from conformance.generator.draws import deep_wave, walls_speed
+from conformance.cases.draws import deep_wave, walls_speed
 from scene import BangBang, Cap, Fourier, Law, Mushroom, Scene, State, Stem, Wall, to_data
 from scene.geometry import DIGITS, TableAt, table_at
 from scene.laws import bounds, breakpoints
@@ -319,8 +319,8 @@ def scenes_and_states(draw: st.DrawFn, table: str | None = None) -> tuple[Scene,
 
 
 def adversarial(family: str | None = None) -> st.SearchStrategy[Any]:
-    """Draw a `conformance.attacks.Attack` of a family by its name, or of any."""
-    from conformance.attacks import FAMILIES
+    """Draw a `conformance.cases.attacks.Attack` of a family by its name, or of any."""
+    from conformance.cases.attacks import FAMILIES
 
     names = st.sampled_from([family] if family else list(FAMILIES))
     return st.builds(lambda name, index: FAMILIES[name].attack(0, index), names, st.integers(0, 2**32 - 1))

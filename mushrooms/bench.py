@@ -115,7 +115,7 @@ def _measured(size: Size, seed: int, command: list[str]) -> Record:
     """Run everything."""
     import fast
     from conformance.bench import growth, hard_cases, measure, record, work, workloads
-    from conformance.generator.prover import proved_step
+    from conformance.cases.prover import proved_step
     from mushrooms import bench_contenders as ours
 
     begin = time.monotonic()

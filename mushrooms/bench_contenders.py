@@ -19,7 +19,7 @@ from conformance.bench.contenders import Ask, Contender, Given, Lap, by_call
 from conformance.bench.growth import FAR, PathFollower, PathPoint
 from conformance.bench.work import SCENE, Cost, Load
 from conformance.bench.workloads import WINDOW, Workload
-from conformance.generator import prover
+from conformance.cases import prover
 from conformance.grading.agreement import Answer, Enclosed, exact
 from conformance.grading.error import Matrix
 from fast import __main__ as fast_protocol

@@ -14,10 +14,10 @@ from support.depth import deep_among
 from support.refusals import assert_refused
 
 import fast
-from conformance.attacks import FAMILIES, Attack, UnderAttack, line, run
-from conformance.attacks.search import confirmed, flown, stepped
-from conformance.generator.paths import claimed_path
-from conformance.generator.prover import proved_step
+from conformance.cases.attacks import FAMILIES, Attack, UnderAttack, line, run
+from conformance.cases.attacks.search import confirmed, flown, stepped
+from conformance.cases.paths import claimed_path
+from conformance.cases.prover import proved_step
 from conformance.grading.agreement import middle
 from conformance.strategies import adversarial
 from conformance.vectors import NUMBERS, Expectation, certified
@@ -156,7 +156,7 @@ def off(digits, name):
 )
 def test_a_claim_is_judged(monkeypatch, claim, kind):
     assert CLAIM.steps[0].wall == "arc"
-    monkeypatch.setattr("conformance.attacks.search.proved_step", lambda *_: claim)
+    monkeypatch.setattr("conformance.cases.attacks.search.proved_step", lambda *_: claim)
     found = confirmed(ATTACK)
     assert found.kind == kind
     assert (found.claim is not None) == (kind == "agreed")
@@ -166,21 +166,21 @@ def test_a_claim_of_another_reason_is_wrong(monkeypatch):
     edge = Attack(load("frozen-mushroom"), State(0.0, 0.5, 0.5, 0.0, -1.0), 9.0)
     assert confirmed(edge).claim == Expectation("undefined", reason="mouth-edge")
     false = Expectation("undefined", reason="corner")
-    monkeypatch.setattr("conformance.attacks.search.proved_step", lambda *_: false)
+    monkeypatch.setattr("conformance.cases.attacks.search.proved_step", lambda *_: false)
     assert confirmed(edge).kind == "wrong"
 
 
 @pytest.mark.parametrize(("claim", "kind"), [(CLAIM, "undecided"), (with_step(wall="base"), "wrong")])
 def test_an_undecided_path_is_judged_as_far_as_it_goes(monkeypatch, claim, kind):
     path = msgspec.structs.replace(claim, outcome="undecided")
-    monkeypatch.setattr("conformance.attacks.search.claimed_path", lambda *_: path)
+    monkeypatch.setattr("conformance.cases.attacks.search.claimed_path", lambda *_: path)
     assert confirmed(ATTACK._replace(n_collisions=3)).kind == kind
 
 
 def test_what_is_not_proved_is_open_and_listed(monkeypatch):
     """Steppers are held to nothing then."""
     shy = Verdict("not proved", "too hard")
-    monkeypatch.setattr("conformance.generator.certify.verify_line", lambda record: shy)
+    monkeypatch.setattr("conformance.cases.certify.verify_line", lambda record: shy)
     (found,) = run([FAMILIES["long-wait"]], 1, SEED, UnderAttack(fast.next_collision))
     assert found.counts["open"] == 2
     assert "too hard" in found.cases["open"][0]

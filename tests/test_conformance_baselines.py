@@ -13,7 +13,7 @@ from support.truth import proved_step
 import fast
 from conformance.bench import baselines, hard_cases, measure, workloads
 from conformance.bench.codes import FACTOR, SLOPE, WIDTH, H, R
-from conformance.generator import draws
+from conformance.cases import draws
 from conformance.harness import examples
 from conformance.suite.process import Trouble
 from scene import Collision, Horizon, Mushroom, State, load

@@ -9,13 +9,13 @@ import msgspec
 import pytest
 
 import reference
-from conformance.generator.certify import certify, judge
-from conformance.generator.draws import wire_form
-from conformance.generator.flow_families import any_marks
-from conformance.generator.links import Links, Unfit
-from conformance.generator.prover import ask, flight_of
-from conformance.generator.question import Question
-from conformance.generator.stays import OpenSign, arrival, marks, stays
+from conformance.cases.certify import certify, judge
+from conformance.cases.draws import wire_form
+from conformance.cases.flow_families import any_marks
+from conformance.cases.links import Links, Unfit
+from conformance.cases.prover import ask, flight_of
+from conformance.cases.question import Question
+from conformance.cases.stays import OpenSign, arrival, marks, stays
 from conformance.grading.error import inputs_of, moved
 from conformance.vectors import four_digits, load
 from scene import State

@@ -13,9 +13,9 @@ from support.depth import deep_among, deep_but
 
 import fast
 from conformance import plain, vectors
-from conformance.generator.draws import wire_form
-from conformance.generator.flow_families import any_marks
-from conformance.generator.fresh import (
+from conformance.cases.draws import wire_form
+from conformance.cases.flow_families import any_marks
+from conformance.cases.fresh import (
     ANOTHER,
     TELLING,
     USUAL,
@@ -25,8 +25,8 @@ from conformance.generator.fresh import (
     fresh,
     fresh_one,
 )
-from conformance.generator.question import Question
-from conformance.generator.seldom import EXTRA
+from conformance.cases.question import Question
+from conformance.cases.seldom import EXTRA
 from conformance.grading.agreement import physics_bound
 from conformance.grading.grade import grade
 from conformance.mutants import Mutant
@@ -114,7 +114,7 @@ def test_what_the_verifier_does_not_prove_is_not_asked(monkeypatch):
         asked.append(record)
         return Verdict("not proved", "") if len(asked) == 1 else verify_line(record)
 
-    monkeypatch.setattr("conformance.generator.certify.verify_line", shy)
+    monkeypatch.setattr("conformance.cases.certify.verify_line", shy)
     assert fresh_one(1, 1).state != questions(1, SOME)[0].state
     assert len(asked) > 1
 
@@ -122,7 +122,7 @@ def test_what_the_verifier_does_not_prove_is_not_asked(monkeypatch):
 def test_where_errors_that_pass_may_be_large_no_answer_is_taken_for_another(monkeypatch):
     before, like = fresh_one(1, 5), fresh_one(1, 6)
     assert like.state == before.state
-    monkeypatch.setattr("conformance.generator.fresh.TELLING", like.condition / 2)
+    monkeypatch.setattr("conformance.cases.fresh.TELLING", like.condition / 2)
     assert fresh_one(1, 6).condition <= like.condition / 2 or fresh_one(1, 6).state != before.state
     assert float(physics_bound(TELLING)) * TELLING < ANOTHER < float(physics_bound(1e12)) * 1e12
 
@@ -147,7 +147,7 @@ def test_hundreds_of_draws_that_are_none_end_no_run(monkeypatch):
             raise BadInput("none")
         return drawn_scene(draw, table)
 
-    monkeypatch.setattr("conformance.generator.fresh.drawn_scene", drawn)
+    monkeypatch.setattr("conformance.cases.fresh.drawn_scene", drawn)
     assert len(list(fresh(1, 1))) == 1
 
 

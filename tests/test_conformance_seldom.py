@@ -11,10 +11,10 @@ from support.seldom_wrong import SELDOM_WRONG, SELDOM_WRONG_PATHS, AmplitudesAdd
 
 import fast
 from conformance import plain, vectors
-from conformance.generator.draws import Draw
-from conformance.generator.fresh import fresh_one
-from conformance.generator.in_flight import swept_scene, swept_start
-from conformance.generator.seldom import DEPTHS, is_leaning, many_legs
+from conformance.cases.draws import Draw
+from conformance.cases.fresh import fresh_one
+from conformance.cases.in_flight import swept_scene, swept_start
+from conformance.cases.seldom import DEPTHS, is_leaning, many_legs
 from conformance.grading.grade import grade
 from conformance.mutants import Mutant
 from conformance.plain.step import Flight

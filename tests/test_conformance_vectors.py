@@ -18,14 +18,14 @@ from support.schemas import validator
 from support.tables import LIFT
 
 import reference
-from conformance.generator import __main__ as generate
-from conformance.generator.certify import Refuted, certify, judge
-from conformance.generator.coverage_families import coverage_families
-from conformance.generator.draws import wire_form
-from conformance.generator.families import CATALOGUE
-from conformance.generator.flow_families import flow_families
-from conformance.generator.links import Unfit
-from conformance.generator.question import Question
+from conformance.cases import __main__ as generate
+from conformance.cases.certify import Refuted, certify, judge
+from conformance.cases.coverage_families import coverage_families
+from conformance.cases.draws import wire_form
+from conformance.cases.families import CATALOGUE
+from conformance.cases.flow_families import flow_families
+from conformance.cases.links import Unfit
+from conformance.cases.question import Question
 from conformance.vectors import MANIFEST, NUMBERS, BadCorpus, digest, load, manifest, request
 from conformance.verify import Verdict
 from scene import BadInput, BangBang, Fourier, State, catalogue, from_data
@@ -346,7 +346,7 @@ def test_what_the_verifier_does_not_prove_makes_no_vector(monkeypatch, status, f
     scene, start = load_scene("moving-cap"), State(0.3, 0.1, 0.2, 3.0, 4.0)
     question = Question("lie", "", "", wire_form(scene), start, 9.0, collisions=2)
     assert certify(question, 1).collisions == 2
-    monkeypatch.setattr("conformance.generator.certify.verify_line", lambda _: Verdict(status, "not so"))
+    monkeypatch.setattr("conformance.cases.certify.verify_line", lambda _: Verdict(status, "not so"))
     with pytest.raises(failure, match=f"lie/1 is {status}: not so"):
         certify(question, 1)
 

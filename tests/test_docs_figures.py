@@ -12,9 +12,9 @@ import pytest
 from mpmath import fp
 
 import theory
-from conformance.attacks import FAMILIES
-from conformance.generator.fresh import USUAL
-from conformance.generator.seldom import EXTRA
+from conformance.cases.attacks import FAMILIES
+from conformance.cases.fresh import USUAL
+from conformance.cases.seldom import EXTRA
 from conformance.mutants import MUTANTS
 from conformance.suite import run
 from conformance.suite.disguise import N_DRAWN

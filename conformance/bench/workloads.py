@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 from mpmath import fp
 
-from conformance.generator.draws import Draw, place, state, walls_speed
+from conformance.cases.draws import Draw, place, state, walls_speed
 from conformance.grading.agreement import middle
 from conformance.vectors import Expectation
 from scene import BangBang, Cap, Collision, Fourier, Mushroom, Scene, State, Wall, load

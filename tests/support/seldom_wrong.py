@@ -1,6 +1,6 @@
 """Flights of the plain stepper that are wrong where chance seldom looks: each was once accepted.
 
-What each gets wrong is drawn on purpose by `conformance.generator.seldom` and `in_flight.swept_scene`, and
+What each gets wrong is drawn on purpose by `conformance.cases.seldom` and `in_flight.swept_scene`, and
 most of it of trajectories and flows as well: who follows these by an engine of its own may be right in steps.
 """
 
@@ -12,7 +12,7 @@ from typing import ClassVar
 
 import msgspec
 
-from conformance.generator.draws import walls_speed
+from conformance.cases.draws import walls_speed
 from conformance.plain.motion import BangBangMotion, ConstantMotion
 from conformance.plain.step import Flight
 from scene import BangBang, Collision, Fourier, Horizon, Outcome, Rejected, Scene, State, Wall

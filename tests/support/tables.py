@@ -1,6 +1,6 @@
 """Small tables that many tests share, simple enough for answers by hand; hard cases stand on some, too."""
 
-from conformance.generator.grazing_and_stem_cases import BOX, CIRCLE, LIFT, STATIC
+from conformance.cases.grazing_and_stem_cases import BOX, CIRCLE, LIFT, STATIC
 from scene import BangBang, Cap, Fourier, Mushroom
 
 __all__ = ["BOX", "BREATHING", "CIRCLE", "LEAP", "LIFT", "STATIC"]

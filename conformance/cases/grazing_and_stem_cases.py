@@ -10,8 +10,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
-from conformance.generator.draws import unproved, wire_form
-from conformance.generator.question import Question
+from conformance.cases.draws import unproved, wire_form
+from conformance.cases.question import Question
 from conformance.vectors import Level, OutcomeName
 from scene import BangBang, Cap, Fourier, Mushroom, Scene, State, Stem
 

@@ -7,7 +7,7 @@ from math import inf, nextafter
 
 import msgspec
 
-from conformance.generator.draws import (
+from conformance.cases.draws import (
     Draw,
     SharedPeriod,
     clock,
@@ -17,11 +17,11 @@ from conformance.generator.draws import (
     time,
     wire_form,
 )
-from conformance.generator.families import VectorFamily
-from conformance.generator.flow_families import any_marks, tilted
-from conformance.generator.grazing_and_stem_cases import BOX, CIRCLE, LIFT, STATIC
-from conformance.generator.question import Question
-from conformance.generator.seldom import drawn_deep_wave
+from conformance.cases.families import VectorFamily
+from conformance.cases.flow_families import any_marks, tilted
+from conformance.cases.grazing_and_stem_cases import BOX, CIRCLE, LIFT, STATIC
+from conformance.cases.question import Question
+from conformance.cases.seldom import drawn_deep_wave
 from scene import BangBang, Cap, Fourier, Mushroom, Scene, State, Stem
 from scene.geometry import rounded
 from scene.tables import cycle_length, laws

@@ -18,7 +18,7 @@ from typing import NamedTuple
 
 import msgspec
 
-from conformance.generator.draws import Draw, SharedPeriod, clock, deep_wave, law, place, state
+from conformance.cases.draws import Draw, SharedPeriod, clock, deep_wave, law, place, state
 from conformance.vectors import Kind
 from scene import BadInput, BangBang, Cap, Fourier, Law, Mushroom, Scene, State, Stem, Wall
 from scene.geometry import rounded
@@ -48,7 +48,7 @@ class Extra(NamedTuple):
     aspect: str
 
 
-# What a trajectory and a flow to some walls begin with, and the word that `generator.fresh` has for it.
+# What a trajectory and a flow to some walls begin with, and the word that `cases.fresh` has for it.
 PATHS: dict[tuple[str, Wall], tuple[str, str]] = {
     ("cap", "arc"): ("legs", "return"),
     ("stem", "left"): ("lean", "sweep"),

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from conformance.generator.draws import (
+from conformance.cases.draws import (
     Draw,
     SharedPeriod,
     clock,
@@ -21,9 +21,9 @@ from conformance.generator.draws import (
     walls_speed,
     wire_form,
 )
-from conformance.generator.families import CATALOGUE, FIXED, MOVING, VectorFamily
-from conformance.generator.question import Question
-from conformance.generator.stays import Mark, stays
+from conformance.cases.families import CATALOGUE, FIXED, MOVING, VectorFamily
+from conformance.cases.question import Question
+from conformance.cases.stays import Mark, stays
 from scene import Mushroom, Scene, State, Stem, load
 from scene.geometry import rounded
 from scene.laws import bounds

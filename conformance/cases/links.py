@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 import reference
-from conformance.generator.prover import ask, coasted, ends, flight_of
+from conformance.cases.prover import ask, coasted, ends, flight_of
 from conformance.grading.error import Matrix, condition_number, free_flight, inputs_of
 from conformance.vectors import NUMBERS, Certified, certified
 from scene import Scene, State

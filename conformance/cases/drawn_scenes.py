@@ -10,8 +10,8 @@ from collections.abc import Container
 
 import msgspec
 
-from conformance.generator.draws import Draw, SharedPeriod, clock, law, scene
-from conformance.generator.seldom import deeper
+from conformance.cases.draws import Draw, SharedPeriod, clock, law, scene
+from conformance.cases.seldom import deeper
 from scene import BangBang, Fourier, Law, Scene
 from scene.laws import bounds, is_constant
 from scene.tables import laws

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
-from conformance.generator.stays import Mark
+from conformance.cases.stays import Mark
 from conformance.vectors import Expectation, Kind, Level, OutcomeName, Vector
 from scene import State
 

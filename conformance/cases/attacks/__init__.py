@@ -4,9 +4,9 @@ A family draws questions. `run` has the reference answer them and the verifier (
 its claims, to which it holds the steppers that the caller gives.
 """
 
-from conformance.attacks import corners, dips, knots, residuals, shapes, vanishing
-from conformance.attacks.case import Attack, Family, line
-from conformance.attacks.search import Judgement, Tally, UnderAttack, run
+from conformance.cases.attacks import corners, dips, knots, residuals, shapes, vanishing
+from conformance.cases.attacks.case import Attack, Family, line
+from conformance.cases.attacks.search import Judgement, Tally, UnderAttack, run
 
 FAMILIES: dict[str, Family] = {
     family.name: family

@@ -8,11 +8,11 @@ from math import inf
 import msgspec
 
 import reference
-from conformance.generator.links import Unfit, condition, finite
-from conformance.generator.paths import proved_path
-from conformance.generator.prover import CONDITIONS, NUDGES, SIGNS, ask, expectation, flight_of, nudged
-from conformance.generator.question import Proved, Question, filed
-from conformance.generator.stays import OpenSign, marks
+from conformance.cases.links import Unfit, condition, finite
+from conformance.cases.paths import proved_path
+from conformance.cases.prover import CONDITIONS, NUDGES, SIGNS, ask, expectation, flight_of, nudged
+from conformance.cases.question import Proved, Question, filed
+from conformance.cases.stays import OpenSign, marks
 from conformance.vectors import Expectation, Level, Vector, four_digits
 from conformance.verify import Verdict, verify_line
 from scene import BadInput, InvalidState, Rejected, Scene, State, Undecided, Undefined, from_data

@@ -10,8 +10,8 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
-from conformance.attacks.case import Attack, Family
-from conformance.generator.draws import Draw
+from conformance.cases.attacks.case import Attack, Family
+from conformance.cases.draws import Draw
 from scene import BangBang, Fourier, Law, Mushroom, State
 
 DEPTH = 0.9  # the moving length is 1 - 0.9 cos(t - turn): least, 0.1, at t = turn

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
-from conformance.attacks.case import NEVER, Attack, Family, built
-from conformance.generator.draws import Draw, SharedPeriod, clock, scene, state
+from conformance.cases.attacks.case import NEVER, Attack, Family, built
+from conformance.cases.draws import Draw, SharedPeriod, clock, scene, state
 from scene import BangBang, Cap, Fourier, Law, Mushroom, Scene, State, Stem
 from scene.transforms import scaled, scaled_state
 

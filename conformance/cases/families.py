@@ -11,8 +11,8 @@ from typing import NamedTuple
 
 import msgspec
 
-from conformance.generator.draws import Draw, SharedPeriod, clock, place, scene, state, time, wire_form
-from conformance.generator.question import Question
+from conformance.cases.draws import Draw, SharedPeriod, clock, place, scene, state, time, wire_form
+from conformance.cases.question import Question
 from scene import Scene, State, from_data, load, to_data
 from scene.geometry import rounded
 

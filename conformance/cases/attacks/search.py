@@ -13,12 +13,12 @@ from dataclasses import dataclass, field
 from functools import partial
 from typing import NamedTuple
 
-from conformance.attacks.case import Attack, Family, line
-from conformance.generator.certify import judge
-from conformance.generator.draws import wire_form
-from conformance.generator.paths import claimed_path
-from conformance.generator.prover import proved_step
-from conformance.generator.question import Proved, Question, filed
+from conformance.cases.attacks.case import Attack, Family, line
+from conformance.cases.certify import judge
+from conformance.cases.draws import wire_form
+from conformance.cases.paths import claimed_path
+from conformance.cases.prover import proved_step
+from conformance.cases.question import Proved, Question, filed
 from conformance.grading.agreement import compare
 from conformance.vectors import Expectation
 from scene import Outcome, Rejected, Scene, State, Undecided

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple, TypeVar
 
 import msgspec
 
-from conformance.generator.draws import Draw, wire_form
+from conformance.cases.draws import Draw, wire_form
 from scene import BadInput, Cap, Mushroom, Scene, State, Stem
 
 Made = TypeVar("Made", Cap, Stem, Mushroom)

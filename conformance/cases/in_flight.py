@@ -16,7 +16,7 @@ from __future__ import annotations
 
 from math import hypot, sqrt
 
-from conformance.generator.draws import Draw, place, walls_speed
+from conformance.cases.draws import Draw, place, walls_speed
 from conformance.plain.step import Flight
 from scene import BadInput, BangBang, Mushroom, Scene, State, Stem, Wall
 from scene.geometry import rounded

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import math
 
-from conformance.attacks.case import Attack, Family
-from conformance.generator.draws import Draw
+from conformance.cases.attacks.case import Attack, Family
+from conformance.cases.draws import Draw
 from scene import BangBang, Cap, Fourier, Law, Mushroom, Scene, State, Stem, Wall
 
 SPEEDS = (-2.0, -1.0, -0.75, -0.1, 0.0, 0.1, 0.25, 1.0, 3.0)

@@ -5,10 +5,10 @@ from __future__ import annotations
 from fractions import Fraction
 
 import reference
-from conformance.generator.links import Links, Unfit, finite
-from conformance.generator.prover import coasted, collided, ends
-from conformance.generator.question import Proved, Question
-from conformance.generator.stays import OpenSign, arrival, marks, stays, timing_condition
+from conformance.cases.links import Links, Unfit, finite
+from conformance.cases.prover import coasted, collided, ends
+from conformance.cases.question import Proved, Question
+from conformance.cases.stays import OpenSign, arrival, marks, stays, timing_condition
 from conformance.vectors import NUMBERS, Certified, Expectation, certified
 from scene import InvalidState, Scene, State, Undecided, Undefined
 

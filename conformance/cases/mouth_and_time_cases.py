@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
-from conformance.generator.draws import unproved, wire_form
-from conformance.generator.grazing_and_stem_cases import (
+from conformance.cases.draws import unproved, wire_form
+from conformance.cases.grazing_and_stem_cases import (
     BOX,
     CIRCLE,
     LIFT,
@@ -15,7 +15,7 @@ from conformance.generator.grazing_and_stem_cases import (
     grazing_and_slow,
     stem,
 )
-from conformance.generator.question import Question
+from conformance.cases.question import Question
 from conformance.vectors import OutcomeName
 from scene import BangBang, Fourier, Mushroom, Scene, State, load
 from scene.tables import laws

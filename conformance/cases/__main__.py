@@ -1,4 +1,4 @@
-"""`python -m conformance.generator`: make the corpus, or check that it is what would be made.
+"""`python -m conformance.cases`: make the corpus, or check that it is what would be made.
 
 Every vector is drawn from a stream seeded by its id, or written down as a hard case; answered by the
 reference; and proved by the verifier. The same corpus comes out on every machine, bit for bit.
@@ -18,13 +18,13 @@ from pathlib import Path
 
 import msgspec
 
-from conformance.generator.certify import certify
-from conformance.generator.coverage_families import at_the_horizon, coverage_families
-from conformance.generator.draws import Draw
-from conformance.generator.families import VectorFamily, families
-from conformance.generator.flow_families import flow_families
-from conformance.generator.links import Unfit
-from conformance.generator.mouth_and_time_cases import cases
+from conformance.cases.certify import certify
+from conformance.cases.coverage_families import at_the_horizon, coverage_families
+from conformance.cases.draws import Draw
+from conformance.cases.families import VectorFamily, families
+from conformance.cases.flow_families import flow_families
+from conformance.cases.links import Unfit
+from conformance.cases.mouth_and_time_cases import cases
 from conformance.vectors import MANIFEST, File, Manifest, Vector, digest, encode, load
 from scene import BadInput
 from scene.files import write_file
@@ -129,9 +129,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         0; 1 when `--check` finds a corpus that differs; 2 for bad input.
     """
     parser = argparse.ArgumentParser(
-        prog="python -m conformance.generator",
+        prog="python -m conformance.cases",
         description="Make the corpus of vectors.",
-        epilog="example: python -m conformance.generator --check",
+        epilog="example: python -m conformance.cases --check",
     )
     parser.add_argument(
         "--out", type=Path, default=FOLDER, metavar="DIR", help="where it goes, or is checked"
@@ -149,7 +149,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             return _check(options.out, files)
         manifest = write(options.out, files)
     except (BadInput, OSError) as error:
-        print(f"conformance.generator: {error}", file=sys.stderr)
+        print(f"conformance.cases: {error}", file=sys.stderr)
         return 2
     print(f"corpus {manifest.corpus}, {manifest.digest[:12]}: {_summary(files)}")
     return 0

@@ -13,8 +13,8 @@ from itertools import pairwise
 from typing import NamedTuple
 
 from conformance import plain
-from conformance.attacks.case import NEVER, Attack, Family, built
-from conformance.generator.draws import Draw, SharedPeriod, law
+from conformance.cases.attacks.case import NEVER, Attack, Family, built
+from conformance.cases.draws import Draw, SharedPeriod, law
 from scene import BangBang, Cap, Collision, Law, Mushroom, Scene, State, Stem
 
 PERIOD = 16.0

@@ -11,8 +11,8 @@ import math
 
 from mpmath import MPContext
 
-from conformance.attacks.case import Attack, Family, built
-from conformance.generator.draws import Draw
+from conformance.cases.attacks.case import Attack, Family, built
+from conformance.cases.draws import Draw
 from scene import Cap, Fourier, Mushroom, Scene, State, Stem
 from scene.laws import value
 

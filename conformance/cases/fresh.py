@@ -8,9 +8,9 @@ Every third question keeps the scene before but for one law, and its state, and 
 law is soon found (few act on a flight to the base): an implementation that knows a scene by less than all of
 it gives the answer before. Scenes carry names, which mean nothing: different ones the same.
 Some meet their wall for a short time only, some cross a mouth that opens or closes during the flight
-(`generator.in_flight`); some have laws of many legs, sides that lean by next to nothing over a great depth,
+(`cases.in_flight`); some have laws of many legs, sides that lean by next to nothing over a great depth,
 or meet again the wall that they were a little off, in units of 2^-44 to 2^44 too, some fly past walls that
-seem to stand, or wait for hundreds of periods (`generator.seldom`); and every seventh begins up to a
+seem to stand, or wait for hundreds of periods (`cases.seldom`); and every seventh begins up to a
 million periods late, or before 0. Some further trajectories and flows begin with such a flight as well:
 paths and ensembles often have an engine of their own, which no step shows.
 Answers are certified as those of the corpus, and no more delicate than those of level core, but for late
@@ -27,15 +27,15 @@ from math import inf
 import msgspec
 
 from conformance import plain
-from conformance.generator.certify import certify
-from conformance.generator.drawn_scenes import KINDS, SIZES, drawn_scene
-from conformance.generator.draws import Draw, clock, state, time, walls_speed, wire_form
-from conformance.generator.flow_families import any_marks
-from conformance.generator.in_flight import arc_to_mouth, brief_start, swept_scene, swept_start
-from conformance.generator.links import Unfit
-from conformance.generator.prover import CONDITIONS, NUDGES, SIGNS, nudged
-from conformance.generator.question import Question
-from conformance.generator.seldom import (
+from conformance.cases.certify import certify
+from conformance.cases.drawn_scenes import KINDS, SIZES, drawn_scene
+from conformance.cases.draws import Draw, clock, state, time, walls_speed, wire_form
+from conformance.cases.flow_families import any_marks
+from conformance.cases.in_flight import arc_to_mouth, brief_start, swept_scene, swept_start
+from conformance.cases.links import Unfit
+from conformance.cases.prover import CONDITIONS, NUDGES, SIGNS, nudged
+from conformance.cases.question import Question
+from conformance.cases.seldom import (
     DEPTHS,
     EXTRA,
     Extra,

@@ -45,7 +45,7 @@ def ask(
 
 def _find(case: str, seed: int | None) -> Vector:
     from conformance import vectors
-    from conformance.cases.fresh import fresh_one
+    from conformance.cases.generated import fresh_one
     from conformance.suite.disguise import drawn_horizons
     from conformance.suite.run import N_FRESH
 

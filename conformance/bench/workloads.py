@@ -16,7 +16,9 @@ from typing import NamedTuple
 
 from mpmath import fp
 
-from conformance.cases.draws import Draw, place, state, walls_speed
+from conformance.cases.draw import Draw
+from conformance.cases.scenes import walls_speed
+from conformance.cases.starts import place, state
 from conformance.grading.agreement import middle
 from conformance.vectors import Expectation
 from scene import BangBang, Cap, Collision, Fourier, Mushroom, Scene, State, Wall, load

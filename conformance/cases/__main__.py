@@ -1,105 +1,23 @@
-"""`python -m conformance.cases`: make the corpus, or check that it is what would be made.
+"""`python -m conformance.cases`: make the corpus, add to it, or check that it is what would be made.
 
-Every vector is drawn from a stream seeded by its id, or written down as a hard case; answered by the
-reference; and proved by the verifier. The same corpus comes out on every machine, bit for bit.
 Some ten minutes on one core; `--jobs N` shares them out.
 """
 
 from __future__ import annotations
 
 import argparse
-import hashlib
 import sys
 from collections import Counter, defaultdict
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
-from functools import cache, partial
 from pathlib import Path
 
-import msgspec
-
-from conformance.cases.certify import certify
-from conformance.cases.coverage_families import at_the_horizon, coverage_families
-from conformance.cases.draws import Draw
-from conformance.cases.families import VectorFamily, families
-from conformance.cases.flow_families import flow_families
-from conformance.cases.links import Unfit
-from conformance.cases.mouth_and_time_cases import cases
-from conformance.vectors import MANIFEST, File, Manifest, Vector, digest, encode, load
+from conformance.cases.corpus import FOLDER, RETIRED, added, file_of, groups, make, write
+from conformance.vectors import Vector, encode, load
 from scene import BadInput
-from scene.files import write_file
-
-VERSION = "1.2"
-RETIRED: tuple[str, ...] = ()
-# Published when the reference enclosed a place after 10^323 units of time closer by a unit of the last
-# decimal. Both enclosures are right; a published line never changes.
-KEPT = ("hard-case-41/1", "hard-case-41/2", "hard-case-41/3", "hard-case-41/4")
-FOLDER = Path(__file__).parent.parent / "corpus"
-ATTEMPTS = 64
-Maker = Callable[[int], Vector]
 
 
-@cache
-def groups() -> dict[str, list[Maker]]:
-    """Return for every group what makes its vectors, in order; number n is made by entry n - 1."""
-    found: dict[str, list[Maker]] = {}
-    for case in [*cases(), *at_the_horizon()]:
-        found.setdefault(case.group, []).append(partial(certify, case))
-    for family in [*families(), *flow_families(), *coverage_families()]:
-        found[family.group] = [partial(drawn, family)] * family.n_vectors
-    return found
-
-
-def drawn(family: VectorFamily, number: int) -> Vector:
-    """Return a family's vector of that number: its first draw that has a certified answer."""
-    first = family.first_attempts[number - 1] if family.first_attempts else 0
-    for attempt in range(first, first + ATTEMPTS):
-        question = family.ask(Draw(f"{family.group}/{number}/{attempt}"))
-        try:
-            vector = certify(question, number)
-        except Unfit:
-            continue
-        outcome = vector.expect[0].outcome
-        if outcome == family.wanted or (family.wanted is None and outcome in ("collision", "horizon")):
-            return vector
-    raise BadInput(f"{family.group}/{number}: none of {ATTEMPTS} draws has a certified answer")
-
-
-def make(group: str, number: int) -> Vector:
-    """Make one vector of the corpus anew.
-
-    Raises:
-        BadInput: when there is no such vector.
-    """
-    makers = groups().get(group, [])
-    if not 1 <= number <= len(makers) or f"{group}/{number}" in RETIRED:
-        raise BadInput(f"vector = {group}/{number}, must be one of the corpus")
-    if f"{group}/{number}" in KEPT:
-        return next(vector for vector in load("stress", FOLDER) if vector.id == f"{group}/{number}")
-    return makers[number - 1](number)
-
-
-def write(folder: Path, files: Mapping[str, list[Vector]]) -> Manifest:
-    """Write files of vectors and their manifest, each complete or not at all; the manifest last."""
-    folder.mkdir(parents=True, exist_ok=True)
-    entries = {}
-    for name, vectors in sorted(files.items()):
-        data = encode(vectors)
-        write_file(folder / name, data)
-        entries[name] = File(hashlib.sha256(data).hexdigest(), len(vectors))
-    manifest = Manifest(VERSION, digest(entries, RETIRED), entries, RETIRED)
-    write_file(folder / MANIFEST, msgspec.json.format(msgspec.json.encode(manifest)) + b"\n")
-    for stale in sorted(folder.glob("*.jsonl")):
-        if stale.name not in entries:
-            stale.unlink()
-    return manifest
-
-
-def _file_name(group: str) -> str:
-    return ("hard-cases" if group.startswith("hard-case-") else group) + ".jsonl"
-
-
-def _made(most: int | None, n_jobs: int) -> dict[str, list[Vector]]:
+def _made(most: int | None, n_jobs: int) -> list[Vector]:
     """Make all vectors, or the first few of each group, on so many processes."""
     wanted = [
         (group, number)
@@ -107,12 +25,19 @@ def _made(most: int | None, n_jobs: int) -> dict[str, list[Vector]]:
         for number in range(1, len(makers[:most]) + 1)
         if f"{group}/{number}" not in RETIRED
     ]
-    files: dict[str, list[Vector]] = defaultdict(list)
+    found = []
     with ProcessPoolExecutor(n_jobs) as pool:
-        for done, vector in enumerate(pool.map(make, *zip(*wanted, strict=True), chunksize=4), 1):
-            files[_file_name(vector.group)].append(vector)
-            if done % 100 == 0:
-                print(f"{done} of {len(wanted)} vectors", file=sys.stderr, flush=True)
+        for vector in pool.map(make, *zip(*wanted, strict=True), chunksize=4):
+            found.append(vector)
+            if len(found) % 100 == 0:
+                print(f"{len(found)} of {len(wanted)} vectors", file=sys.stderr, flush=True)
+    return found
+
+
+def _by_file(vectors: Iterable[Vector]) -> dict[str, list[Vector]]:
+    files = defaultdict(list)
+    for vector in vectors:
+        files[file_of(vector)].append(vector)
     return files
 
 
@@ -137,6 +62,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         "--out", type=Path, default=FOLDER, metavar="DIR", help="where it goes, or is checked"
     )
     parser.add_argument("--check", action="store_true", help="make it, and compare with what is there")
+    parser.add_argument(
+        "--add", type=Path, metavar="FILE", help="add the questions of a file, and make no other"
+    )
     parser.add_argument("--jobs", type=int, default=1, metavar="N", help="processes")
     parser.add_argument("--most", type=int, metavar="N", help="at most so many vectors of each group")
     options = parser.parse_args(arguments)
@@ -144,9 +72,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if number is not None and number < 1:
             parser.error(f"--{name} = {number}, must be >= 1")
     try:
-        files = _made(options.most, options.jobs)
         if options.check:
-            return _check(options.out, files)
+            return _check(options.out, _made(options.most, options.jobs))
+        known = [*load("stress", FOLDER), *added(options.add)] if options.add else None
+        files = _by_file(known or _made(options.most, options.jobs))
         manifest = write(options.out, files)
     except (BadInput, OSError) as error:
         print(f"conformance.cases: {error}", file=sys.stderr)
@@ -155,9 +84,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return 0
 
 
-def _check(folder: Path, files: Mapping[str, list[Vector]]) -> int:
+def _check(folder: Path, vectors: Iterable[Vector]) -> int:
     there = {vector.id: encode([vector]) for vector in load("stress", folder)}
-    made = {vector.id: encode([vector]) for vectors in files.values() for vector in vectors}
+    made = {vector.id: encode([vector]) for vector in vectors}
     different = [name for name in made if there.get(name) != made[name]]
     different += [name for name in there if name not in made]
     for name in different:

@@ -8,7 +8,8 @@ from math import inf
 import msgspec
 
 import reference
-from conformance.cases.links import Unfit, condition, finite
+from conformance.cases.draw import Unfit
+from conformance.cases.links import condition, finite
 from conformance.cases.paths import proved_path
 from conformance.cases.prover import CONDITIONS, NUDGES, SIGNS, ask, expectation, flight_of, nudged
 from conformance.cases.question import Proved, Question, filed
@@ -37,7 +38,7 @@ def certify(question: Question, number: int) -> Vector:
     """
     scene: Scene | None = None
     try:
-        scene = from_data(question.scene)
+        scene = from_data(question.wire_scene())
     except BadInput:
         proved = Proved((Expectation("rejected"),))
     else:

@@ -10,14 +10,11 @@ import numpy as np
 import numpy.typing as npt
 
 import reference
+from conformance.cases.draw import Unfit
 from conformance.cases.prover import ask, coasted, ends, flight_of
 from conformance.grading.error import Matrix, condition_number, free_flight, inputs_of
 from conformance.vectors import NUMBERS, Certified, certified
 from scene import Scene, State
-
-
-class Unfit(Exception):  # noqa: N818 (a finding about the draw)
-    """The question has no certified answer that fits its rule; another must be asked."""
 
 
 class Links:

@@ -5,7 +5,8 @@ from __future__ import annotations
 from fractions import Fraction
 
 import reference
-from conformance.cases.links import Links, Unfit, finite
+from conformance.cases.draw import Unfit
+from conformance.cases.links import Links, finite
 from conformance.cases.prover import coasted, collided, ends
 from conformance.cases.question import Proved, Question
 from conformance.cases.stays import OpenSign, arrival, marks, stays, timing_condition

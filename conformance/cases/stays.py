@@ -1,12 +1,12 @@
 """Captured stays of a flow, by proof.
 
-An arc hit of a mushroom is captured when |x vy - y vx| > w(t) |v|, with the time and place of the hit and the
-velocity before the bounce (docs/protocol.md). Which hits begin and end a stay follows from two things
-alone: the order of the walls met, and for each arc hit whether it is captured. The reference's path
-proves the first; the signs of (x vy - y vx)^2 - w^2 v^2, certain over the enclosures of each hit, are the
-second: neither side of the inequality is negative, so squares compare as they do. A hit whose sign is open
-makes the question unfit. So all states within the enclosures have their stays between the same hits, and
-when these happen is enclosed with the path.
+An arc hit of a mushroom is captured when |x vy - y vx| > w(t) |v|, with the time and place of the hit and
+the velocity before the bounce (docs/protocol.md). Which hits begin and end a stay follows from two things
+alone: the order of the walls met, and for each arc hit whether it is captured. The reference's path proves
+the first; the signs of (x vy - y vx)^2 - w^2 v^2, certain over the enclosures of each hit, are the second:
+neither side of the inequality is negative, so squares compare as they do. A hit whose sign is open makes
+the question unfit. So all states within the enclosures have their stays between the same hits, and when
+these happen is enclosed with the path.
 """
 
 from __future__ import annotations

@@ -11,7 +11,7 @@ import math
 from collections.abc import Sequence
 from importlib import resources
 
-from conformance.cases.fresh import GROUP as FRESH
+from conformance.cases.generated import GROUP as FRESH
 from conformance.suite.disguise import DRAWN
 from conformance.suite.result import Result
 

@@ -6,22 +6,23 @@ with the walls it counted. `undecided` is honest. Steps are compared by `conform
 
 from __future__ import annotations
 
+import json
 import time
 from collections import Counter
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from functools import partial
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
-from conformance.cases.attacks.case import Attack, Family, line
+import msgspec
+
 from conformance.cases.certify import judge
-from conformance.cases.draws import wire_form
 from conformance.cases.paths import claimed_path
 from conformance.cases.prover import proved_step
-from conformance.cases.question import Proved, Question, filed
+from conformance.cases.question import Family, Proved, Question, filed
 from conformance.grading.agreement import compare
 from conformance.vectors import Expectation
-from scene import Outcome, Rejected, Scene, State, Undecided
+from scene import Outcome, Rejected, Scene, State, Undecided, from_data
 from scene.states import Stepper
 
 KINDS = ("agreed", "undecided", "refused", "open", "wrong")
@@ -100,8 +101,8 @@ def run(
         tally = Tally(family.name)
         tallies.append(tally)
         for index in range(n_cases):
-            attack = family.attack(seed, index)
-            where = line(family.name, seed, index, attack)
+            attack = family.question(f"{seed}/{index}")
+            where = line(attack, seed, index)
             for verdict in judged(attack, steppers):
                 tally.add(verdict, where)
             tally.n_cases += 1
@@ -109,19 +110,34 @@ def run(
     return tallies
 
 
-def judged(attack: Attack, steppers: UnderAttack) -> Iterable[Judgement]:
+def line(attack: Question, seed: int, index: int) -> str:
+    """Write a question as one line of JSON: where it comes from, and the question in the wire's form."""
+    data: dict[str, Any] = {
+        "family": attack.group,
+        "seed": seed,
+        "index": index,
+        "scene": attack.wire_scene(),
+    }
+    data |= {"cmd": "step" if attack.collisions is None else "trajectory"}
+    data |= {"state": msgspec.structs.asdict(attack.state), "t_end": attack.t_end}
+    if attack.collisions is not None:
+        data |= {"collisions": attack.collisions, "working": attack.working}
+    return json.dumps(data)
+
+
+def judged(attack: Question, steppers: UnderAttack) -> Iterable[Judgement]:
     """Put one attack to the reference and to each stepper, and judge what they answer."""
-    scene, state, t_end = attack.scene, attack.state, attack.t_end
+    scene, state, t_end = from_data(attack.wire_scene()), attack.state, attack.t_end
     found = _survived(partial(confirmed, attack))
     if steppers.is_proved or found.kind == "wrong":
         yield found
     if steppers.stepper is not None:
         alone = found
-        if attack.n_collisions is not None:
-            alone = _survived(partial(confirmed, attack._replace(n_collisions=None)))
+        if attack.collisions is not None:
+            alone = _survived(partial(confirmed, attack._replace(collisions=None, flow=None)))
         answer = partial(steppers.stepper, scene, state, t_end)
         yield _survived(lambda: stepped(answer(), alone.claim, state))
-    if steppers.flow is not None and attack.is_flow:
+    if steppers.flow is not None and attack.flow:
         count = partial(steppers.flow, scene, state, t_end)
         yield _survived(lambda: flown(count(), found.claim))
 
@@ -134,22 +150,23 @@ def _survived(judge_answer: Callable[[], Judgement]) -> Judgement:
         return Judgement("wrong", f"it raises {type(error).__name__}: {error}")
 
 
-def confirmed(attack: Attack) -> Judgement:
+def confirmed(attack: Question) -> Judgement:
     """Ask the reference, and have the verifier judge its claim; of an undecided path as far as that goes."""
-    scene, state, t_end, n_collisions, working, _ = attack
+    state, t_end, n_collisions = attack.state, attack.t_end, attack.collisions
+    scene = from_data(attack.wire_scene())
     begun = time.process_time()
     if n_collisions is None:
         claim = proved_step(scene, state, t_end) or Expectation("undecided")
     else:
-        claim = claimed_path(scene, state, n_collisions, t_end, working)
+        claim = claimed_path(scene, state, n_collisions, t_end, attack.working)
     seconds = (time.process_time() - begun) / max(len(claim.steps), 1)
     is_undecided = claim.outcome == "undecided"
     if is_undecided and not claim.steps:
         return Judgement("undecided", claim.reason, seconds=seconds)
     written = Expectation("collision", claim.steps) if is_undecided else claim
     n_steps = max(len(claim.steps) + (claim.outcome == "undefined"), 1)
-    question = Question("attack", "", "", wire_form(scene), state, t_end, n_collisions)
-    verdict = judge(filed(question, 1, Proved((written,), collisions=n_steps), "stress"))
+    asked = attack._replace(group="attack", flow=None)
+    verdict = judge(filed(asked, 1, Proved((written,), collisions=n_steps), "stress"))
     if verdict.status == "false":
         return Judgement("wrong", f"the reference claims what is false: {verdict.reason}", seconds=seconds)
     if is_undecided or verdict.status != "proved":

@@ -12,7 +12,7 @@ import reference
 from conformance.cases.certify import certify, judge
 from conformance.cases.draw import Unfit
 from conformance.cases.flow_families import any_marks
-from conformance.cases.links import Links
+from conformance.cases.paths import Links
 from conformance.cases.prover import ask, flight_of
 from conformance.cases.question import Question
 from conformance.cases.stays import OpenSign, arrival, marks, stays

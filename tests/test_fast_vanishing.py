@@ -47,7 +47,7 @@ def test_with_rough_phases_some_would_be(tmp_path, name):
 import fast
 from conformance.cases.attacks import UnderAttack, run
 from conformance.cases.table import FAMILIES
-(found,) = run([FAMILIES[{name!r}]], 60, 1, UnderAttack(fast.next_collision))
+(found,) = run([FAMILIES[{name!r}]], 200, 1, UnderAttack(fast.next_collision))
 print(len(found.cases['wrong']))
 """
     assert int(output_of(tmp_path, program, "laws.py", "CANCELLED = 2.0**-4", "CANCELLED = 0.0")) > 0

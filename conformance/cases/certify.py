@@ -9,8 +9,7 @@ import msgspec
 
 import reference
 from conformance.cases.draw import Unfit
-from conformance.cases.links import condition, finite
-from conformance.cases.paths import proved_path
+from conformance.cases.paths import condition, finite, proved_path
 from conformance.cases.prover import CONDITIONS, NUDGES, SIGNS, ask, expectation, flight_of, nudged
 from conformance.cases.question import Proved, Question, filed
 from conformance.cases.stays import OpenSign, marks

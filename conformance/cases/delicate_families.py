@@ -175,45 +175,36 @@ def rise_and_fall(low: float, high: float, t: float) -> tuple[BangBang, float]:
 
 
 def tiny_slope(draw: Draw) -> Question:
-    """Leave a side that leans by 2^-40 to 2^-400, and come back to it at y = 0 or at the horizon."""
-    t, speed = draw.pick((0.25, 0.5, 0.125, 0.75)), draw.pick((1.0, 0.5, 0.25))
+    """Leave a side that leans by 2^-40 to 2^-400, and come back to it at y = 0 or at the horizon.
+
+    Its lean may vanish, and come back, on the way.
+    """
+    t, speed = draw.pick((0.25, 0.5, 0.125, 0.75)), draw.pick((1.0, 0.5, 0.25, 0.0))
     width, half = rise_and_fall(*draw.pick(((1.0, 2.0), (0.5, 0.75), (1.0, 1.125))), t)
-    slope, wall = draw.pick((1.0, -1.0)) * draw.power(-400, -40), draw.pick(SIDES)
-    y = -speed * (2 - 2 * t) if draw.pick((True, True, False)) else -1.0
-    of: Scene = Stem(w=width, h=4.0, slope=slope)
-    if draw.pick((False, False, True)):
-        of = Mushroom(r=4.0, w=width, h=4.0, slope=slope)
-    turn = 2.0 * draw.pick((0, 0, 1, -5, 512))
-    x = half if wall == "right" else -half
-    return Question(of, State(turn + t, x, y, 0.0, speed, wall), turn + draw.pick((3.0, beside(draw, 2 - t))))
+    lean, wall, back = draw.pick((1.0, -1.0)) * draw.power(-400, -40), draw.pick(SIDES), 2 - t
+    first, last = draw.pick(((lean, 0.0), (0.0, lean), (lean, -lean)))
+    vanishing = BangBang(knots=((0.0, first), (draw.pick((back, 1.0)), last), (2.0, first)))
+    slopes: tuple[Law, ...] = lean, vanishing
+    slope, y = draw.pick(slopes), -speed * (2 - 2 * t) if speed and draw.pick((True, False)) else -1.5
+    tables: tuple[Scene, ...] = (
+        Stem(w=width, h=4.0, slope=slope),
+        Mushroom(r=4.0, w=width, h=4.0, slope=slope),
+    )
+    turn, x = 2.0 * draw.pick((0, 0, 1, -5, 512)), half if wall == "right" else -half
+    leaving = State(turn + t, x, y, 0.0, speed, wall)
+    return Question(draw.pick(tables), leaving, turn + draw.pick((3.0, beside(draw, back))))
 
 
-def flattening_slope(draw: Draw) -> Question:
-    """Leave a side whose tiny lean vanishes, and comes back, by the time the horizon is reached."""
-    lean, wall, (width, half) = draw.power(-400, -40), draw.pick(SIDES), rise_and_fall(1.0, 2.0, 0.25)
-    turn, ends = draw.pick((1.75, 1.0)), draw.pick(((lean, 0.0), (-lean, 0.0), (0.0, lean), (lean, -lean)))
-    slope = BangBang(knots=((0.0, ends[0]), (turn, ends[1]), (2.0, ends[0])))
-    x, y = half if wall == "right" else -half, draw.pick((-1.5, -1.0, -2.0))
-    leaving = State(0.25, x, y, 0.0, draw.pick((0.0, 0.5, 1.0, -0.25)), wall)
-    return Question(Stem(w=width, h=4.0, slope=slope), leaving, draw.pick((3.0, beside(draw, 1.75))))
-
-
-def arc_residual(draw: Draw) -> Question:
-    """Wait just beside the arc's top while it rises and falls; back at the start's radius it is met."""
+def residual(draw: Draw) -> Question:
+    """Wait just beside an arc's top, or on a floor, that draws back and returns; to a corner at times."""
     t = draw.pick((0.25, 0.5, 0.125, 0.75))
-    arc, radius = rise_and_fall(*draw.pick(((1.0, 2.0), (0.5, 0.75))), t)
-    off = draw.pick((0.0, 1.0, -1.0)) * draw.power(-200, -20)
-    leaving = State(t, off, beside(draw, radius), 0.0, 0.0, "arc")
-    return Question(Cap(r=arc), leaving, draw.pick((3.0, beside(draw, 2 - t))))
-
-
-def floor_residual(draw: Draw) -> Question:
-    """Leave the floor from a rounding beside it; it comes back with a side, or at the horizon."""
-    t = draw.pick((0.25, 0.5, 0.75))
-    floor, depth = rise_and_fall(1.0, 1.5, t)
-    vx = draw.pick((0.0, 0.5 / (2 - 2 * t), 0.25))
-    leaving = State(t, 0.5, draw.pick(HARDLY) - depth, vx, 0.0, "floor")
-    return Question(Stem(w=1.0, h=floor), leaving, draw.pick((3.0, beside(draw, 2 - t))))
+    law, size = rise_and_fall(1.0, draw.pick((2.0, 1.5)), t)
+    off, vx = draw.pick((0.0, 1.0, -1.0)) * draw.power(-200, -20), draw.pick((0.0, 0.25, 0.5 / (2 - 2 * t)))
+    asked: tuple[tuple[Scene, State], ...] = (
+        (Cap(r=law), State(t, off, beside(draw, size), 0.0, 0.0, "arc")),
+        (Stem(w=1.0, h=law), State(t, 0.5, draw.pick(HARDLY) - size, vx, 0.0, "floor")),
+    )
+    return Question(*draw.pick(asked), draw.pick((3.0, beside(draw, 2 - t))))
 
 
 def on_the_wall(draw: Draw) -> Question:
@@ -281,7 +272,7 @@ def _next_to_nothing(draw: Draw) -> tuple[Fourier, float]:
     """Draw a law of which little is left, and a time about its least; by rounding it may vanish."""
     least = draw.pick((0.0, 0.25, draw.part(), draw.part()))
     law = sunk(draw.pick((1, 1, 2)), 10.0 ** -draw.between(4.0, 13.0), least)
-    return law, least + draw.pick((0.0, 1.0, -3.0)) + draw.pick((1.0, -1.0)) * 10.0 ** -draw.between(2.5, 8.0)
+    return law, least + draw.pick((0.0, 1.0, -3.0)) + draw.pick((1.0, -1.0)) * 10.0 ** -draw.between(3.0, 8.0)
 
 
 def nearly_shut(draw: Draw) -> Question:
@@ -337,15 +328,9 @@ FAMILIES = (
         is_delicate=True,
     ),
     Family(
-        "flattening-slope", "f(0) = 5e-91 is forgotten at the horizon", flattening_slope, is_delicate=True
-    ),
-    Family(
-        "arc-residual", "the arc's f(0) is forgotten where it is met again", arc_residual, is_delicate=True
-    ),
-    Family(
-        "floor-residual",
-        "the floor's f(0) is forgotten at a corner or the horizon",
-        floor_residual,
+        "residual",
+        "f(0) of the arc or the floor is forgotten where it is met again",
+        residual,
         is_delicate=True,
     ),
     Family("on-the-wall", "a state is on its wall by the largest size of all time", on_the_wall),

@@ -5,6 +5,7 @@ A family's order of draws and its aim never change once published; a longer coun
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import partial
 
 import msgspec
@@ -47,9 +48,9 @@ def soon(of: Scene, start: tuple[State, float]) -> Question:
     return Question(of, start[0], min(start[1], start[0].t + WAIT))
 
 
-def catalogue_step(name: str, draw: Draw) -> Question:
-    """Ask for a flight in a scene of the catalogue."""
-    of = load(name)
+def ordinary(scene_of: Callable[[Draw], Scene], draw: Draw) -> Question:
+    """Ask for a flight in a scene, from anywhere."""
+    of = scene_of(draw)
     return Question(of, *state(draw, of, {}))
 
 
@@ -60,10 +61,9 @@ def catalogue_path(name: str, draw: Draw) -> Question:
     return Question(of, *state(draw, of, at), draw.pick((6, 12, 24)))
 
 
-def generated_step(table: str, kinds: tuple[str, ...], draw: Draw) -> Question:
-    """Ask for a flight in a table with laws of some kinds."""
-    of = scene(draw, table, clock(draw, kinds))
-    return Question(of, *state(draw, of, {}))
+def generated(table: str, kinds: tuple[str, ...], draw: Draw) -> Scene:
+    """Draw a table with laws of some kinds."""
+    return scene(draw, table, clock(draw, kinds))
 
 
 def generated_path(table: str, draw: Draw) -> Question:
@@ -198,7 +198,7 @@ def _of_the_catalogue(name: str, source: str) -> list[Family]:
     n_paths = 16 if name in ("moving-cap", *FIXED) else 11
     aim, paths = f"a flight in the scene {name}", f"successive collisions in the scene {name}"
     return [
-        Family(name, aim, partial(catalogue_step, name), source, 50),
+        Family(name, aim, partial(ordinary, lambda _: load(name)), source, 50),
         Family(f"{name}-trajectory", paths, partial(catalogue_path, name), source, n_paths),
     ]
 
@@ -210,13 +210,13 @@ def _generated(table: str) -> list[Family]:
         Family(
             f"static-{table}",
             f"a flight in a static {table}",
-            partial(generated_step, table, still),
+            partial(ordinary, partial(generated, table, still)),
             n_vectors=20,
         ),
         Family(
             f"generated-{table}",
             f"a flight in a generated {table}",
-            partial(generated_step, table, moving),
+            partial(ordinary, partial(generated, table, moving)),
             n_vectors=90,
         ),
         Family(f"generated-{table}-trajectory", paths, partial(generated_path, table), n_vectors=10),

@@ -1204,7 +1204,10 @@ def check_line(record: Any, bits: int) -> None:
         Contradicted(f"the answer is {right} {reason}"),
     )
     if kind == "flow" and found:
-        require(len(found) == count, Contradicted(f"the path has {len(found)} steps"))
+        require(
+            len(found) == count and right == "horizon",
+            Contradicted(f"the path has {len(found)} steps, or goes on"),
+        )
         found = thin(found, first.get("stays", []))
     steps = take({"steps": [], **first}, "steps", list)
     require(len(steps) == len(found), Contradicted(f"the path has {len(found)} steps"))
@@ -1296,7 +1299,8 @@ def backward_error(scene: Scene, state: State, t_end: Fraction, answer: Any) -> 
 
     The truth is the middle of an enclosure with 256 bits. Each error is divided by what moves that
     number: the sum of its changes when one input at a time grows by 2^-53 of itself, and 2^-53 of
-    the number. A sum of 0 counts as 2^-53. The result is the worst of five ratios, at most LARGE.
+    the number. x and y share the larger of theirs, and so do vx and vy; where both are 0 only the
+    truth is right. The result is the worst of five ratios, at most LARGE.
 
     Raises:
         Refused: a field is missing, or no number.
@@ -1314,8 +1318,11 @@ def backward_error(scene: Scene, state: State, t_end: Fraction, answer: Any) -> 
             other == wall, Unproved(f"{other} is met first when {name} moves by its last place")
         )
         moves = [move + abs(one - two) for move, one, two in zip(moves, values, truth, strict=True)]
-    errors = [abs(one - two) for one, two in zip(given, truth, strict=True)]
-    ratios = [error / (move or UNIT) for error, move in zip(errors, moves, strict=True)]
+    sizes = [moves[0], *[max(moves[1:3])] * 2, *[max(moves[3:])] * 2]
+    ratios = [
+        abs(one - two) / size if size else LARGE * (one != two)
+        for one, two, size in zip(given, truth, sizes, strict=True)
+    ]
     return float(min(max(ratios), LARGE))
 
 
@@ -1330,14 +1337,21 @@ def verify_answers(path: str) -> Iterator[tuple[str, Verdict]]:
         Unproved: whether the scene is valid is open.
     """
     data = json.loads(Path(path).read_text(encoding="utf-8"))
-    scene, steps = read_scene(take(data, "scene", dict)), take(data, "steps", list)
-    t_end, start_data = read_number("t_end", data.get("t_end", 1e300)), take(data, "state", dict)
-    for place, (before, answer) in enumerate(itertools.pairwise([start_data, *steps]), 1):
+    scene, t_end = (
+        read_scene(take(data, "scene", dict)),
+        read_number("t_end", data.get("t_end", 1e300)),
+    )
+    steps = [take({"a step": step}, "a step", dict) for step in take(data, "steps", list)]
+    for place, (before, answer) in enumerate(
+        itertools.pairwise([take(data, "state", dict), *steps]), 1
+    ):
         try:
             state = read_state(scene, {name: before.get(name) for name in (*FIELDS, "wall")})
             error = backward_error(scene, state, t_end, answer)
             status = "proved" if error * UNIT <= WRONG else "false"
-            verdict = Verdict(status, f"{answer['wall']}, within {error:.2g} backward ulps")
+            verdict = Verdict(
+                status, f"{answer.get('wall') or 'the horizon'}, within {error:.2g} backward ulps"
+            )
         except (Contradicted, Undefined, Refused, Unproved) as reason:
             verdict = Verdict(
                 "false" if isinstance(reason, Contradicted) else "not proved", str(reason)

@@ -11,7 +11,7 @@ from support.refusals import assert_refused
 
 import fast
 from conformance.audit import session
-from mushrooms import attack_steppers, bench, forecast, orbits
+from mushrooms import attack, bench, forecast, orbits
 from mushrooms.terminal import compilation_told
 from scene import load
 
@@ -60,7 +60,7 @@ def test_compilation_is_told_when_nothing_is_kept_and_only_then(fresh, capsys):
         (RUN, fast, "go_on"),
         (["audit", "--out"], session, "conduct"),
         (["bench", "--quick", "--out"], bench, "_measured"),
-        (["attack", "--cases", 1, "--json"], attack_steppers, "steppers"),
+        (["attack", "--cases", 1, "--json"], attack, "steppers"),
         (["draw", "ergodic", "--trajectory"], orbits, "follow"),
     ],
 )

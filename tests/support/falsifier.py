@@ -1,0 +1,333 @@
+"""A falsifier of claims: it samples a claimed flight and looks for a sign that must not be there.
+
+A claim is a line of the corpus. Laws and walls are written down from docs/protocol.md and evaluated in mpmath
+to 60 decimals, at many instants of the flight, more of them near both ends. A golden section goes on around
+the lowest samples. What is found so is confirmed to 300 decimals. A path is followed with the falsifier's own
+numbers: the claim only says where to look for a hit. This shares no theorem with the reference or the
+verifier. A claim that it falsifies is false; one that it does not falsify may be false. Not handled: flows,
+`rejected`, and whether a scene is valid.
+
+    python -m tests.support.falsifier [FILE.jsonl ...]
+
+falsifies the whole corpus, or these files: it prints every line that it falsifies, and exits with 1 if there
+is one.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+import time
+from collections import Counter
+from collections.abc import Iterator
+from functools import cache
+from itertools import pairwise, zip_longest
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import mpmath
+
+CORPUS = Path(__file__).parents[2] / "conformance" / "corpus"
+DECIMALS, CONFIRMED = 60, 300
+N_ENDS = 60  # instants at 2^-1, 2^-2 ... of the flight's length from either end
+N_LOWEST = 200  # samples of a wall around which to look closer
+MAX_SAMPLES = 20_000
+NUMBERS = ("dt", "x", "y", "vx", "vy")
+Number = Any  # an mpf
+Line = dict[str, Any]
+
+
+@cache
+def numbers() -> Any:
+    """Return the context of mpmath that everything here is computed in."""
+    context = mpmath.MPContext()
+    context.dps = DECIMALS
+    return context
+
+
+class Wall(NamedTuple):
+    """A wall's f, its partial derivatives by t, x and y, and its total one along the flight."""
+
+    f: Number
+    ft: Number
+    fx: Number
+    fy: Number
+    rate: Number
+
+
+def law_at(law: Any, t: Number, leg_at: Number) -> tuple[Number, Number]:
+    """Return a law and its rate at t; a bang-bang law keeps the half leg that it is on at `leg_at`."""
+    mp = numbers()
+    if not isinstance(law, dict):
+        return mp.mpf(law), mp.zero
+    if law["kind"] == "bang-bang":
+        origin, value, acceleration = _half_leg(law["knots"], leg_at)
+        return value + acceleration * (t - origin) ** 2 / 2, acceleration * (t - origin)
+    omega = mp.mpf(law["omega"]) if law.get("omega") else 2 * mp.pi / mp.mpf(law["period"])
+    turn, power, value, rate = mp.expj(omega * t), mp.one, mp.mpf(law["mean"]), mp.zero
+    waves = zip_longest(law.get("cos", ()), law.get("sin", ()), fillvalue=0.0)
+    for k, (c, s) in enumerate(waves, 1):
+        power *= turn
+        value += c * power.real + s * power.imag
+        rate += k * omega * (s * power.real - c * power.imag)
+    return value, rate
+
+
+def _half_leg(knots: list[list[float]], t: Number) -> tuple[Number, Number, Number]:
+    """Return the parabola that holds at t: the time and the value at which it rests, and its acceleration."""
+    mp = numbers()
+    first, last = mp.mpf(knots[0][0]), mp.mpf(knots[-1][0])
+    shift = mp.floor((t - first) / (last - first)) * (last - first)
+    (a, before), (b, after) = next(
+        leg for leg in pairwise(knots) if t - shift < leg[1][0] or leg[1] is knots[-1]
+    )
+    begin, end = mp.mpf(a) + shift, mp.mpf(b) + shift
+    acceleration = 4 * (mp.mpf(after) - mp.mpf(before)) / (end - begin) ** 2
+    return (begin, before, acceleration) if t < (begin + end) / 2 else (end, after, -acceleration)
+
+
+class Flight:
+    """A straight flight from a state, and the walls along it; s is the time since departure.
+
+    Args:
+        scene: the wire's form.
+        state: t, x, y, vx, vy and wall.
+        is_blind: keep each bang-bang law on the half leg it is on at departure, which is wrong.
+    """
+
+    def __init__(self, scene: Line, state: Line, *, is_blind: bool = False) -> None:
+        mp = numbers()
+        self.scene, self.table, self.is_blind = scene, scene["table"], is_blind
+        self.left: Any = state.get("wall")
+        self.t, self.x, self.y, self.vx, self.vy = (mp.mpf(state[name]) for name in ("t", *NUMBERS[1:]))
+        self.residual = mp.zero
+        if self.left:
+            self.residual = self.walls(mp.zero)[self.left].f
+
+    def place(self, s: Number) -> tuple[Number, Number]:
+        """Return where the particle is, as long as nothing is met."""
+        return self.x + self.vx * s, self.y + self.vy * s
+
+    def laws(self, s: Number) -> dict[str, tuple[Number, Number]]:
+        """Return the laws and their rates; the mouth's half-width as w, however it is given."""
+        t, found = self.t + s, {}
+        for name, law in self.scene.items():
+            if name in ("r", "w", "nu", "h", "slope"):
+                found[name] = law_at(law, t, self.t if self.is_blind else t)
+        if "nu" in found:
+            (nu, nu_rate), (r, r_rate) = found["nu"], found["r"]
+            found["w"] = nu * r, nu_rate * r + nu * r_rate
+        return found
+
+    def walls(self, s: Number) -> dict[str, Wall]:
+        """Return all walls of the table, the residual of the one being left taken out."""
+        (x, y), laws = self.place(s), self.laws(s)
+        up = -1 if self.table == "stem" else 1
+        found = {"base": self._wall("base", up * y, 0, 0, up)}
+        if "r" in laws:
+            r, r_rate = laws["r"]
+            found["arc"] = self._wall("arc", r**2 - x**2 - y**2, 2 * r * r_rate, -2 * x, -2 * y)
+        if "h" in laws:
+            (w, w_rate), (h, h_rate), (m, m_rate) = laws["w"], laws["h"], laws.get("slope", (0, 0))
+            for name, side in (("left", 1), ("right", -1)):
+                found[name] = self._wall(name, w + m * y + side * x, w_rate + m_rate * y, side, m)
+            found["floor"] = self._wall("floor", y + h, h_rate, 0, 1)
+        return found
+
+    def _wall(self, name: str, f: Number, ft: Number, fx: Number, fy: Number) -> Wall:
+        residual = self.residual if name == self.left else 0
+        return Wall(f - residual, ft, fx, fy, ft + fx * self.vx + fy * self.vy)
+
+    def reach(self, s: Number) -> tuple[str, ...]:
+        """Return the walls of the part of the table that the particle is in."""
+        y = self.place(s)[1]
+        if self.table == "cap" or (self.table == "mushroom" and (y > 0 or self.left == "base")):
+            return ("base", "arc")
+        if self.table == "stem":
+            return ("base", "left", "right", "floor")
+        return ("left", "right", "floor") if y else ("left", "right")
+
+    def crossing(self) -> Number | None:
+        """Return when a flight in a mushroom changes between cap and stem."""
+        is_free = self.table == "mushroom" and self.left != "base" and self.y and self.vy
+        return -self.y / self.vy if is_free and self.y * self.vy < 0 else None
+
+    def is_mouth_open(self, s: Number) -> bool:
+        """Tell whether |x| < w."""
+        walls = self.walls(s)
+        return bool(min(walls["left"].f, walls["right"].f) > 0)
+
+    def root(self, wall: str, low: Number, high: Number) -> Number:
+        """Return where f of a wall, positive at low and negative at high, is zero."""
+        for _ in range(numbers().prec):
+            middle = (low + high) / 2
+            low, high = (middle, high) if self.walls(middle)[wall].f > 0 else (low, middle)
+        return low
+
+    def after(self, wall: str, s: Number) -> Line:
+        """Return the state after the bounce v - 2 (v.n - u) n."""
+        at = self.walls(s)[wall]
+        push = 2 * at.rate / (at.fx**2 + at.fy**2)
+        return self.free(s) | {"vx": self.vx - push * at.fx, "vy": self.vy - push * at.fy, "wall": wall}
+
+    def free(self, s: Number) -> Line:
+        """Return the state where nothing is met."""
+        x, y = self.place(s)
+        return {"dt": s, "t": self.t + s, "x": x, "y": y, "vx": self.vx, "vy": self.vy, "wall": None}
+
+    def instants(self, begin: Number, end: Number, n: int) -> list[Number]:
+        """Return n instants or more, in order: a dozen for each wave or leg, more near both ends."""
+        span = end - begin
+        rate = max(map(_changes, self.scene.values()))
+        n = min(MAX_SAMPLES, max(n, int(12 * span * rate)))
+        ends = [span / 2**k for k in range(1, N_ENDS)]
+        inner = [span * k / n for k in range(1, n)]
+        return [begin + s for s in sorted({*ends, *inner, *(span - s for s in ends)})]
+
+
+def _changes(law: Any) -> float:
+    """Return how many waves or legs a law has in a unit of time."""
+    if not isinstance(law, dict):
+        return 0.0
+    knots = law.get("knots", [[0.0]])
+    period = knots[-1][0] - knots[0][0] or law.get("period") or 6 / law["omega"]
+    return float(max(1, len(knots) - 1, *(len(law.get(name, ())) for name in ("cos", "sin"))) / period)
+
+
+def falsify(line: Line, n: int = 1000) -> str | None:
+    """Return what a claim says that is not so, or None.
+
+    Args:
+        line: a step or a trajectory of the corpus that does not begin with a refusal.
+        n: instants to sample in each flight.
+    """
+    if _wrong(line, n) is None:
+        return None
+    with numbers().workdps(CONFIRMED):
+        return _wrong(line, n)
+
+
+def _wrong(line: Line, n: int) -> str | None:
+    claim, state, mp = line["expect"][0], line["state"], numbers()
+    for step in claim.get("steps", ()):
+        flight, wall = Flight(line["scene"], state), step.get("wall")
+        rest = mp.mpf(line["t_end"]) - flight.t
+        end = _hit(flight, step) if wall else rest
+        if end is None or (wall and end >= rest):
+            return f"f of {wall} does not change its sign at dt = {step['dt'][0]}, before t_end"
+        state = flight.after(wall, end) if wall else flight.free(end)
+        wrong = _misplaced(flight, end, wall) or negative(flight, end, n) or _different(flight, step, state)
+        if wrong:
+            return wrong
+    return _untied(Flight(line["scene"], state), line, n) if claim["outcome"] == "undefined" else None
+
+
+def _hit(flight: Flight, step: Line) -> Number | None:
+    """Return the claimed hit to all digits: None without a change of sign about its enclosure."""
+    mp = numbers()
+    low, high = (mp.mpf(end) for end in step["dt"])
+    spare = high * mp.mpf(10) ** -40
+    ends = low - spare, high + spare
+    before, behind = (flight.walls(s)[step["wall"]].f for s in ends)
+    return flight.root(step["wall"], *ends) if before > 0 > behind else None
+
+
+def _misplaced(flight: Flight, end: Number, wall: str | None) -> str | None:
+    """Compare |x| with w where y = 0 is crossed."""
+    if flight.table != "mushroom":
+        return None
+    if wall == "base":
+        return "the mouth is open where the base is met" if flight.is_mouth_open(end) else None
+    crossing = flight.crossing()
+    is_shut = crossing is not None and crossing < end and not flight.is_mouth_open(crossing)
+    return "the mouth is shut where it is passed" if is_shut else None
+
+
+def negative(flight: Flight, end: Number, n: int) -> str | None:
+    """Look for a wall in reach whose f is negative between departure and an end."""
+    samples = [(s, flight.walls(s), flight.reach(s)) for s in flight.instants(numbers().zero, end, n)]
+    for s, walls, reach in samples:
+        for wall in reach:
+            if walls[wall].f < 0:
+                return f"{wall} is met before s = {mpmath.nstr(s, 17)}"
+    for wall in samples[0][1]:
+        dips = []
+        for before, at, behind in zip(samples, samples[1:], samples[2:], strict=False):
+            if wall in at[2] and before[1][wall].f > at[1][wall].f <= behind[1][wall].f:
+                dips.append((at[1][wall].f, before[0], behind[0]))
+        for _, a, b in sorted(dips)[:N_LOWEST]:
+            s = _lowest(flight, wall, a, b)
+            if flight.walls(s)[wall].f < 0 and wall in flight.reach(s):
+                return f"{wall} is met between two samples, before s = {mpmath.nstr(s, 17)}"
+    return None
+
+
+def _lowest(flight: Flight, wall: str, a: Number, b: Number) -> Number:
+    """Return where f of a wall is least between two instants, by golden section."""
+    golden = (numbers().sqrt(5) - 1) / 2
+    for _ in range(25):
+        left, right = b - golden * (b - a), a + golden * (b - a)
+        is_left = flight.walls(left)[wall].f < flight.walls(right)[wall].f
+        a, b = (a, right) if is_left else (left, b)
+    return (a + b) / 2
+
+
+def _different(flight: Flight, step: Line, state: Line) -> str | None:
+    """Compare the claimed numbers with those of the flight."""
+    mp, start = numbers(), flight.free(numbers().zero)
+    for name in NUMBERS:
+        low, high = (mp.mpf(end) for end in step[name])
+        spare = (abs(state[name]) + abs(start[name])) * mp.mpf(10) ** -40
+        if not low - spare <= state[name] <= high + spare:
+            return f"{name} = {step[name][0]} must be {mpmath.nstr(state[name], 24)}"
+    return None
+
+
+def _untied(flight: Flight, line: Line, n: int) -> str | None:
+    """Look for an ordinary end of a flight that is claimed to have none."""
+    mp = numbers()
+    tiny = mp.mpf(10) ** -30
+    on = [wall for wall in flight.walls(mp.zero).values() if abs(wall.f) < tiny]
+    if len(on) > 1 or any(wall.rate < tiny for wall in on):
+        return None
+    first = next(next_hits(flight, mp.zero, mp.mpf(line["t_end"]) - flight.t, n), None)
+    if first and sum(abs(wall.f) < tiny for wall in flight.walls(first[1]).values()) > 1:
+        return None
+    return f"nothing is undefined where {first[0] if first else 'nothing'} is met"
+
+
+def next_hits(
+    flight: Flight, begin: Number, end: Number, n: int, only: tuple[str, ...] = ()
+) -> Iterator[tuple[str, Number]]:
+    """Yield walls whose f turns negative between two instants, and when, in order as far as samples see.
+
+    Args:
+        flight: the flight.
+        begin: where to begin, since departure.
+        end: where to end.
+        n: how many instants to sample.
+        only: which walls to look at; by default those in reach at each instant.
+    """
+    samples = ((s, flight.walls(s)) for s in flight.instants(begin, end, n))
+    for (a, before), (b, behind) in pairwise(samples):
+        met = [wall for wall in only or flight.reach(a) if before[wall].f > 0 >= behind[wall].f]
+        for root, wall in sorted((flight.root(wall, a, b), wall) for wall in met):
+            if only or wall != "base" or flight.table != "mushroom" or not flight.is_mouth_open(root):
+                yield wall, root
+
+
+def main(names: list[str]) -> int:
+    """Falsify files of the corpus; return 1 if a line is falsified."""
+    counts, began = Counter[bool](), time.monotonic()
+    for path in map(Path, names) if names else sorted(CORPUS.glob("*.jsonl")):
+        for line in map(json.loads, path.read_text("utf-8").splitlines()):
+            if line["kind"] != "flow" and line["expect"][0]["outcome"] not in ("rejected", "undecided"):
+                wrong = falsify(line)
+                counts[wrong is None] += 1
+                print(f"{line['id']}: {wrong}\n" if wrong else "", end="", flush=True)
+    print(f"{counts[False]} of {counts.total()} falsified, in {time.monotonic() - began:.0f} s")
+    return int(counts[False] > 0)
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

@@ -321,7 +321,7 @@ EARLY = wrong_where(
 )
 # The faulty flight, and the row of the table whose questions it answers wrong; none for a run's first.
 FAULTY = {
-    "omega of the first": (OmegaOfTheFirst, "anywhere-mushroom-right"),
+    "omega of the first": (OmegaOfTheFirst, "anywhere-mushroom-floor"),
     "no base in the mouth": (NoBaseInTheMouth, "from-the-base"),
     "where the stem is shallow": (wrong_where(is_shallow), "anywhere-stem-floor"),
     "where the arc hardly moves": (wrong_where(hardly_moves), "anywhere-cap-arc"),

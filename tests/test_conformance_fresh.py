@@ -113,7 +113,8 @@ def test_all_is_asked_that_the_corpus_asks_seldom(seed, tally):
         tally["hits beyond the first"] += (vector.collisions - 1) if vector.kind == "trajectory" else 0
         if i > 0 and vector.state == asked[i - 1].state:
             tally["like the one before"] += 1
-            assert grade(vector, answer_to(asked[i - 1])).verdict == "fail"
+            was = msgspec.structs.replace(vector, scene=asked[i - 1].scene)
+            assert grade(vector, answer_to(was)).verdict == "fail"
             assert vector.condition * physics_bound(vector.condition) < ANOTHER
         tally["named"] += "name" in vector.scene
         tally["late"] += abs(vector.state.t) > 500 * (cycle_length(scene) or inf)
@@ -121,7 +122,7 @@ def test_all_is_asked_that_the_corpus_asks_seldom(seed, tally):
     assert all(tally[f"{table}, {wall}"] >= 4 for table, wall in WALLS)
     assert min(tally[kind] for kind in ("trajectory", "flow")) > ROUND / 12
     assert min(tally["before 0"], tally["named"], tally["hits beyond the first"]) > ROUND / 8
-    assert min(tally["of mixed laws"], tally["like the one before"], tally["late"]) > ROUND / 16
+    assert min(tally["of mixed laws"], tally["like the one before"], tally["late"]) > ROUND / 20
     assert tally["more than 20 legs"] >= 4
 
 

@@ -27,9 +27,9 @@ from scene.files import write_file
 
 VERSION = "1.2"
 RETIRED: tuple[str, ...] = ()
-# Published when the reference enclosed a place after 10^323 units of time closer by a unit of the last
-# decimal. Both enclosures are right; a published line never changes.
-KEPT = ("hard-case-41/1", "hard-case-41/2", "hard-case-41/3", "hard-case-41/4")
+# Published when the reference enclosed a number closer by a unit of the last decimal, or less closely. Both
+# enclosures are right; a published line never changes.
+KEPT = (*(f"hard-case-41/{number}" for number in (1, 2, 3, 4)), "flow-stay-interrupted/5")
 FOLDER = Path(__file__).parent.parent / "corpus"
 BY_HAND = ("hard-case-", "at-the-horizon")  # how their groups begin
 ATTEMPTS = 64
@@ -74,7 +74,7 @@ def groups() -> dict[str, list[Maker]]:
 
 def again(line: Vector, number: int) -> Vector:
     """Answer a published line's question anew."""
-    return line if line.id in KEPT else certify(question_of(line), number)
+    return certify(question_of(line), number)
 
 
 def drawn(family: Family, number: int) -> Vector:
@@ -103,6 +103,8 @@ def make(group: str, number: int) -> Vector:
     makers = groups().get(group, [])
     if not 1 <= number <= len(makers) or f"{group}/{number}" in RETIRED:
         raise BadInput(f"vector = {group}/{number}, must be one of the corpus")
+    if f"{group}/{number}" in KEPT:
+        return next(vector for vector in load("stress", FOLDER) if vector.id == f"{group}/{number}")
     return makers[number - 1](number)
 
 

@@ -106,12 +106,9 @@ def questions(family: Family, key: str, number: int, before: Vector | None = Non
         BadInput: for none of very many draws an answer is proved.
     """
     kind = Draw(f"{key}/{number}").pick(KINDS)
-    is_like = family.name == LIKE_BEFORE and before is not None and before.kind != "flow"
     for attempt in range(ATTEMPTS):
-        draw, like = (
-            Draw(f"{key}/{number}/{attempt}"),
-            before if is_like and attempt < LIKE_ATTEMPTS else None,
-        )
+        draw = Draw(f"{key}/{number}/{attempt}")
+        like = before if family.name == LIKE_BEFORE and attempt < LIKE_ATTEMPTS else None
         asked = _one_law_changed(draw, like) if like else family.attempt(draw)
         question = _asked(draw, "step" if like else kind, asked) if asked else None
         if question is None or not _is_wanted(question, family, like):
@@ -137,12 +134,16 @@ def _is_wanted(question: Question, family: Family, like: Vector | None) -> bool:
 
 
 def _is_another(met: Collision, before: Vector) -> bool:
-    """Tell whether a collision is clearly not that of the question before."""
-    step = before.expect[0].steps[0]
-    return met.wall != step.wall or any(
-        abs(getattr(met, name) - float(step.centre(name))) > ANOTHER * max(abs(getattr(met, n)) for n in part)
-        for part in (("dt",), ("x", "y"), ("vx", "vy"))
-        for name in part
+    """Tell whether a collision is clearly not that of the scene before."""
+    was = plain.next_collision(from_data(before.scene), before.state, before.t_end)
+    return (
+        not isinstance(was, Collision)
+        or met.wall != was.wall
+        or any(
+            abs(getattr(met, name) - getattr(was, name)) > ANOTHER * max(abs(getattr(met, n)) for n in part)
+            for part in (("dt",), ("x", "y"), ("vx", "vy"))
+            for name in part
+        )
     )
 
 

@@ -88,7 +88,7 @@ def when(draw: Draw, scene: Scene) -> float:
     """Draw a time: 0, within some periods before it or after it, on a knot, or late."""
     length = cycle_length(scene) or 1.0
     turns = draw.pick((0.0, 0.0, 1.0, 4.0, 60.0))
-    if draw.pick(range(7)) == 6:
+    if draw.pick(range(5)) == 4:
         turns = draw.power(*LATE) * draw.pick((1.0, -1.0))
     return 0.0 if draw.pick(range(8)) == 0 else time(draw, scene) - turns * length
 

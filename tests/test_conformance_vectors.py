@@ -300,6 +300,20 @@ def test_the_command_writes_a_corpus_and_finds_what_differs(small, tmp_path, mon
         command.main(["--most", "0"])
 
 
+def test_questions_written_by_hand_are_added_to_their_groups(tmp_path, capsys):
+    question = {name: json.loads(lines()[0])[name] for name in ("rule", "source", "scene", "state", "t_end")}
+    file, folder = tmp_path / "new.jsonl", tmp_path / "made"
+    file.write_text(json.dumps(question | {"group": "hard-case-01"}) + "\n")
+    assert command.main(["--out", str(folder), "--add", str(file)]) == 0
+    old, new = ({vector.id: vector for vector in load("stress", at)} for at in (CORPUS, folder))
+    (name,) = new.keys() - old.keys()
+    assert new.items() > old.items()
+    assert name == f"hard-case-01/{len(made.by_hand()['hard-case-01']) + 1}"
+    file.write_text(json.dumps(question | {"group": "moving-cap"}) + "\n")
+    assert command.main(["--out", str(folder), "--add", str(file)]) == 2
+    assert "group = 'moving-cap', must begin with" in capsys.readouterr().err
+
+
 @pytest.fixture(scope="module")
 def path(corpus):
     """A trajectory in the moving cap that meets several walls."""

@@ -10,7 +10,6 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Callable, Mapping
 from functools import cache, partial
-from itertools import groupby
 from math import inf
 from pathlib import Path
 
@@ -56,8 +55,11 @@ def question_of(line: Vector) -> Question:
 @cache
 def by_hand() -> dict[str, list[Vector]]:
     """Return the published lines of questions that were written by hand, in order, by their groups."""
-    lines = [vector for vector in load("stress", FOLDER) if vector.group.startswith(BY_HAND)]
-    return {group: list(found) for group, found in groupby(lines, lambda vector: vector.group)}
+    found: dict[str, list[Vector]] = {}
+    for vector in load("stress", FOLDER):
+        if vector.group.startswith(BY_HAND):
+            found.setdefault(vector.group, []).append(vector)
+    return found
 
 
 @cache

@@ -184,19 +184,7 @@ def any_scene(draw: Draw, table: str | None = None, kinds: Sequence[str] = KINDS
 
 def wire_form(of: Scene) -> dict[str, Any]:
     """Return a scene as JSON has it, without its name and notes."""
-    return _through_json({key: law for key, law in to_data(of).items() if key not in ("name", "notes")})
-
-
-def unproved(table: str, **laws: Any) -> dict[str, Any]:
-    """Return a scene as JSON has it whose laws, or their plain data, may break the rules of scenes."""
-    data = {"table": table, **{name: msgspec.to_builtins(law) for name, law in laws.items()}}
-    for law in data.values():
-        if isinstance(law, dict) and "period" in law:
-            del law["omega" if law["omega"] is None else "period"]
-    return _through_json(data)
-
-
-def _through_json(data: dict[str, Any]) -> dict[str, Any]:
+    data = {key: law for key, law in to_data(of).items() if key not in ("name", "notes")}
     decoded: dict[str, Any] = msgspec.json.decode(msgspec.json.encode(data))  # lists for tuples
     return decoded
 

@@ -45,7 +45,7 @@ def ask(
 
 def _find(case: str, seed: int | None) -> Vector:
     from conformance import vectors
-    from conformance.generator.fresh import fresh_one
+    from conformance.cases.generated import fresh_one
     from conformance.suite.disguise import drawn_horizons
     from conformance.suite.run import N_FRESH
 
@@ -64,8 +64,9 @@ def _find(case: str, seed: int | None) -> Vector:
 
 
 def _show(vector: Vector, disguise: Disguise) -> None:
-    from conformance import vectors
     from conformance.generator.certify import judge
+
+    from conformance import vectors
     from conformance.grading.agreement import middle
     from conformance.suite.disguise import asked
 

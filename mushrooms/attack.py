@@ -11,7 +11,8 @@ from rich.console import Console
 from rich.table import Table
 
 import fast
-from conformance.attacks import FAMILIES, UnderAttack, run
+from conformance.cases.attacks import UnderAttack, run
+from conformance.cases.table import FAMILIES
 from mushrooms import output
 from mushrooms.terminal import compilation_told, progress_bar
 from scene import BadInput, Horizon, Mushroom, Scene, State, Undefined

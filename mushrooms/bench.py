@@ -89,10 +89,10 @@ def _check_table(table: Path | None, workload: str | None, quick: bool, command:
 
 
 def _measured(size: Size, seed: int, command: list[str]) -> Record:
-    """SolverRun everything."""
+    """Run everything."""
     import fast
     from conformance.bench import growth, measure, record, workloads
-    from conformance.generator.prover import proved_step
+    from conformance.cases.prover import proved_step
     from mushrooms import bench_solvers as ours
 
     begin = time.monotonic()

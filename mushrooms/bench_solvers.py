@@ -11,7 +11,7 @@ from conformance import plain
 from conformance.bench.growth import FAR, PathFollower, PathPoint
 from conformance.bench.solvers import Given, Solver, SolverRun, by_call
 from conformance.bench.workloads import WINDOW, Workload
-from conformance.generator import prover
+from conformance.cases import prover
 from conformance.grading.agreement import Answer, Enclosed, exact
 from conformance.grading.error import Matrix
 from fast.batch import careful_steps, fine_steps, flights, lane_steps

@@ -13,7 +13,8 @@ from support.truth import proved_step
 import fast
 from conformance.bench import baselines, measure, workloads
 from conformance.bench.numba_stepper import FACTOR, SLOPE, WIDTH, H, R
-from conformance.generator import draws
+from conformance.cases import scenes, starts
+from conformance.cases.draw import Draw
 from conformance.harness import examples
 from conformance.suite.process import Trouble
 from scene import Collision, Horizon, Mushroom, State, load
@@ -50,15 +51,15 @@ def points(workload, solvers):
 def fast_steps(table: str, n: int):
     """Yield a scene, a state and the careful step's collision, of particles faster than the walls."""
     for i in range(n):
-        stream = draws.Draw(f"baselines {table} {i}")
-        scene = draws.scene(stream, table, draws.clock(stream))
-        state, t_end = draws.state(stream, scene, {"speed": 2.0**12, "lift": 0.2 + 0.6 * stream.part()})
+        stream = Draw(f"baselines {table} {i}")
+        of = scenes.scene(stream, table, scenes.clock(stream))
+        start, t_end = starts.state(stream, of, {"speed": 2.0**12, "lift": 0.2 + 0.6 * stream.part()})
         try:
-            met = fast.next_collision(scene, state, t_end)
+            met = fast.next_collision(of, start, t_end)
         except ValueError:  # the draw may lie outside
             continue
         if isinstance(met, Collision):
-            yield scene, state, met
+            yield of, start, met
 
 
 @pytest.mark.parametrize("table", ["cap", "stem", "mushroom"])

@@ -9,13 +9,13 @@ import msgspec
 import pytest
 
 import reference
-from conformance.generator.certify import certify, judge
-from conformance.generator.draws import wire_form
-from conformance.generator.flow_families import any_marks
-from conformance.generator.links import Links, Unfit
-from conformance.generator.prover import ask, flight_of
-from conformance.generator.question import Question
-from conformance.generator.stays import OpenSign, arrival, marks, stays
+from conformance.cases.certify import certify, judge
+from conformance.cases.draw import Unfit
+from conformance.cases.flow_families import any_marks
+from conformance.cases.paths import Links
+from conformance.cases.prover import ask, flight_of
+from conformance.cases.question import Question
+from conformance.cases.stays import OpenSign, arrival, marks, stays
 from conformance.grading.error import inputs_of, moved
 from conformance.vectors import four_digits, load
 from scene import State
@@ -72,7 +72,7 @@ MUSHROOM = load_scene("moving-cap")
 GALLERY = State(3.0, 0.0, 0.5, 2.0, 0.25)
 
 
-ASKED = Question("gallery", "", "", wire_form(MUSHROOM), GALLERY, 6.0, 40, flow=any_marks)
+ASKED = Question(MUSHROOM, GALLERY, 6.0, 40, any_marks, group="gallery")
 
 
 def test_a_false_stay_is_refuted():
@@ -92,7 +92,7 @@ def test_a_hit_on_the_edge_of_being_captured_makes_no_vector():
     with pytest.raises(OpenSign):
         marks(static, reference.trajectory(static, edge, 1, 9.0).steps)
     with pytest.raises(Unfit):
-        certify(Question("edge", "", "", wire_form(static), edge, 0.75, 40, flow=any_marks), 1)
+        certify(Question(static, edge, 0.75, 40, any_marks, group="edge"), 1)
 
 
 def test_a_flow_keeps_of_its_path_what_is_asked():

@@ -20,7 +20,7 @@ from scene.refusal import BadInput
         ("breathing-circle/1\nno-such/1", ":2: no-such/1"),
         ("property/no-such", "no case"),
         ("fresh/2", "is of one run's questions: fresh/2@SEED lists it, fresh/\\* all"),
-        ("fresh/309@1", "no case"),
+        ("fresh/999@1", "no case"),
         ("fresh/2@one", "no case"),
         ("property/*", "no case"),
         ("declined/no-such", "no case"),

@@ -18,14 +18,14 @@ from support.schemas import validator
 from support.tables import LIFT
 
 import reference
-from conformance.generator import __main__ as generate
-from conformance.generator.certify import Refuted, certify, judge
-from conformance.generator.coverage_families import coverage_families
-from conformance.generator.draws import wire_form
-from conformance.generator.families import CATALOGUE
-from conformance.generator.flow_families import flow_families
-from conformance.generator.links import Unfit
-from conformance.generator.question import Question
+from conformance.cases import __main__ as command
+from conformance.cases import corpus as made
+from conformance.cases.certify import Refuted, certify, judge
+from conformance.cases.coverage_families import FAMILIES as COVERAGE
+from conformance.cases.draw import Unfit
+from conformance.cases.families import CATALOGUE
+from conformance.cases.flow_families import FAMILIES as FLOWS
+from conformance.cases.question import Question
 from conformance.vectors import MANIFEST, NUMBERS, BadCorpus, digest, load, manifest, request
 from conformance.verify import Verdict
 from scene import BadInput, BangBang, Fourier, State, catalogue, from_data
@@ -43,7 +43,7 @@ NEW_IN_1_1 = {
         "at-the-horizon",
         "retraced-arc",
         "retraced-arc-trajectory",
-        *(family.group for family in [*flow_families(), *coverage_families()]),
+        *(family.name for family in (*FLOWS, *COVERAGE)),
     )
 }
 MOST_BYTES = 15e6
@@ -266,37 +266,52 @@ def test_a_sample_is_made_again_bit_for_bit():
     assert len(ids) == N_STEPS + N_TRAJECTORIES + N_FLOWS
     for name in ids:
         group, number = name.split("/")
-        assert msgspec.json.encode(generate.make(group, int(number))) == there[name], name
+        assert msgspec.json.encode(made.make(group, int(number))) == there[name], name
 
 
 def test_every_number_of_a_group_is_there_or_retired(corpus):
     there = {vector.id for vector in corpus} | set(manifest().retired)
-    wanted = {f"{g}/{n}" for g, makers in generate.groups().items() for n in range(1, len(makers) + 1)}
+    wanted = {f"{g}/{n}" for g, makers in made.groups().items() for n in range(1, len(makers) + 1)}
     assert there == wanted
-    assert set(generate.RETIRED) == set(manifest().retired)
-    assert manifest().corpus == generate.VERSION
+    assert set(made.RETIRED) == set(manifest().retired)
+    assert manifest().corpus == made.VERSION
 
 
 @pytest.mark.parametrize(("group", "number"), [("moving-cap", 0), ("moving-cap", 10**6), ("no-such", 1)])
 def test_no_vector_of_that_name(group, number):
     with pytest.raises(BadInput, match=f"{group}/{number}"):
-        generate.make(group, number)
+        made.make(group, number)
 
 
 def test_the_command_writes_a_corpus_and_finds_what_differs(small, tmp_path, monkeypatch, capsys):
-    makers = {name: generate.groups()[name] for name in ("hard-case-06", "hard-case-45")}
-    monkeypatch.setattr(generate, "groups", lambda: makers)
+    makers = {name: made.groups()[name] for name in ("hard-case-06", "hard-case-45")}
+    for module in (made, command):
+        monkeypatch.setattr(module, "groups", lambda: makers)
     folder = tmp_path / "made"
-    assert generate.main(["--out", str(folder), "--most", "1"]) == 0
+    assert command.main(["--out", str(folder), "--most", "1"]) == 0
     assert [path.name for path in folder.iterdir() if path.name.startswith(".")] == []
     assert len(load("stress", folder)) == 2
-    assert generate.main(["--out", str(folder), "--most", "1", "--check"]) == 0
-    assert generate.main(["--out", str(small), "--most", "1", "--check"]) == 1
+    assert command.main(["--out", str(folder), "--most", "1", "--check"]) == 0
+    assert command.main(["--out", str(small), "--most", "1", "--check"]) == 1
     assert "hard-case-06/1: differs" in capsys.readouterr().out
-    assert generate.main(["--out", str(tmp_path / "none"), "--most", "1", "--check"]) == 2
+    assert command.main(["--out", str(tmp_path / "none"), "--most", "1", "--check"]) == 2
     assert "manifest.json cannot be read" in capsys.readouterr().err
     with pytest.raises(SystemExit, match="2"):
-        generate.main(["--most", "0"])
+        command.main(["--most", "0"])
+
+
+def test_questions_written_by_hand_are_added_to_their_groups(tmp_path, capsys):
+    question = {name: json.loads(lines()[0])[name] for name in ("rule", "source", "scene", "state", "t_end")}
+    file, folder = tmp_path / "new.jsonl", tmp_path / "made"
+    file.write_text(json.dumps(question | {"group": "hard-case-01"}) + "\n")
+    assert command.main(["--out", str(folder), "--add", str(file)]) == 0
+    old, new = ({vector.id: vector for vector in load("stress", at)} for at in (CORPUS, folder))
+    (name,) = new.keys() - old.keys()
+    assert new.items() > old.items()
+    assert name == f"hard-case-01/{len(made.by_hand()['hard-case-01']) + 1}"
+    file.write_text(json.dumps(question | {"group": "moving-cap"}) + "\n")
+    assert command.main(["--out", str(folder), "--add", str(file)]) == 2
+    assert "group = 'moving-cap', must begin with" in capsys.readouterr().err
 
 
 @pytest.fixture(scope="module")
@@ -334,9 +349,7 @@ def test_a_false_claim_makes_no_vector(monkeypatch):
         return dataclasses.replace(found, after=found.after._replace(x=x))
 
     monkeypatch.setattr(reference, "next_collision", lying)
-    question = Question(
-        "lie", "", "", wire_form(load_scene("moving-cap")), State(0.3, 0.1, 0.2, 3.0, 4.0), 9.0
-    )
+    question = Question(load_scene("moving-cap"), State(0.3, 0.1, 0.2, 3.0, 4.0), 9.0, group="lie")
     with pytest.raises(Refuted, match="lie/1 is false: "):
         certify(question, 1)
 
@@ -344,9 +357,9 @@ def test_a_false_claim_makes_no_vector(monkeypatch):
 @pytest.mark.parametrize(("status", "failure"), [("false", Refuted), ("not proved", Unfit)])
 def test_what_the_verifier_does_not_prove_makes_no_vector(monkeypatch, status, failure):
     scene, start = load_scene("moving-cap"), State(0.3, 0.1, 0.2, 3.0, 4.0)
-    question = Question("lie", "", "", wire_form(scene), start, 9.0, collisions=2)
+    question = Question(scene, start, 9.0, 2, group="lie")
     assert certify(question, 1).collisions == 2
-    monkeypatch.setattr("conformance.generator.certify.verify_line", lambda _: Verdict(status, "not so"))
+    monkeypatch.setattr("conformance.cases.certify.verify_line", lambda _: Verdict(status, "not so"))
     with pytest.raises(failure, match=f"lie/1 is {status}: not so"):
         certify(question, 1)
 
@@ -354,7 +367,7 @@ def test_what_the_verifier_does_not_prove_makes_no_vector(monkeypatch, status, f
 def test_what_has_no_answer_makes_no_vector():
     touching = State(0.0, 0.0, -1.0, 0.0, 0.0)
     with pytest.raises(Unfit):
-        certify(Question("touch", "", "", wire_form(LIFT), touching, 0.75), 1)
+        certify(Question(LIFT, touching, 0.75, group="touch"), 1)
 
 
 def test_allowances_bound_what_a_nudge_does(path):
@@ -372,7 +385,7 @@ def test_allowances_bound_what_a_nudge_does(path):
 
 
 def test_the_first_step_of_a_trajectory_is_that_of_a_step(path):
-    question = Question("alone", "", "", path.scene, path.state, path.t_end)
+    question = Question(path.scene, path.state, path.t_end, group="alone")
     (alone,) = certify(question, 1).expect[0].steps
     first = path.expect[0].steps[0]
     assert (first.wall, first.allowance) == (alone.wall, alone.allowance)

@@ -231,7 +231,7 @@ def test_every_page_is_named_by_another():
         "`scene.tables.Walls`",
         "`conformance.second_provers`",
         "pytest tests/test_nothing.py",
-        "`python -m conformance.generators`",
+        "`python -m conformance.casess`",
         "[words](docs/word.md)",
     ],
 )

@@ -12,9 +12,8 @@ import pytest
 from mpmath import fp
 
 import theory
-from conformance.attacks import FAMILIES
-from conformance.generator.fresh import USUAL
-from conformance.generator.seldom import EXTRA
+from conformance.cases.generated import ROUND
+from conformance.cases.table import FAMILIES
 from conformance.mutants import MUTANTS
 from conformance.suite import run
 from conformance.suite.disguise import N_DRAWN
@@ -84,7 +83,6 @@ def words_of_whole_arrays() -> str:
     return f"-1 in arrays of whole numbers ({', '.join(sorted(whole))})"
 
 
-N_FRESH = USUAL + len(EXTRA)  # `suite.run.N_FRESH` is less in tests
 BYTES = layout.Shape(1, 1, 1, 1, 0, 1).bytes_of_a_particle
 # What a page says of numbers that code knows: the page, and what must stand in it, its spaces as one.
 FIGURES: dict[str, tuple[str, Callable[[], str]]] = {
@@ -95,7 +93,7 @@ FIGURES: dict[str, tuple[str, Callable[[], str]]] = {
     "drawn questions": ("docs/verdict.md", lambda: f"{N_DRAWN} drawn questions"),
     "fresh questions": (
         "docs/verdict.md",
-        lambda: f"{N_FRESH} questions ({2 * N_FRESH} above core)",
+        lambda: f"{ROUND} questions ({2 * ROUND} above core)",
     ),
     "legs": ("docs/verdict.md", lambda: f"up to {MAX_KNOTS - 1} legs"),
     "drawn states": ("docs/verdict.md", lambda: f"on {run.N_STATES} drawn states"),

@@ -15,10 +15,10 @@ from support.from_python import from_python
 
 import fast
 import reference
-from conformance.attacks import FAMILIES, UnderAttack, run
-from conformance.attacks.search import stepped
-from conformance.attacks.vanishing import sunk
-from conformance.generator.prover import proved_step
+from conformance.cases.attacks import UnderAttack, run, stepped
+from conformance.cases.delicate_families import sunk
+from conformance.cases.prover import proved_step
+from conformance.cases.table import FAMILIES
 from fast.batch import lane_steps
 from fast.kernel.laws import set_anchors
 from fast.kernel.pieces import expand_waves, law_at
@@ -45,8 +45,9 @@ def test_no_answer_is_wrong(name, tally):
 def test_with_rough_phases_some_would_be(tmp_path, name):
     program = f"""
 import fast
-from conformance.attacks import FAMILIES, UnderAttack, run
-(found,) = run([FAMILIES[{name!r}]], 60, 1, UnderAttack(fast.next_collision))
+from conformance.cases.attacks import UnderAttack, run
+from conformance.cases.table import FAMILIES
+(found,) = run([FAMILIES[{name!r}]], 200, 1, UnderAttack(fast.next_collision))
 print(len(found.cases['wrong']))
 """
     assert int(output_of(tmp_path, program, "laws.py", "CANCELLED = 2.0**-4", "CANCELLED = 0.0")) > 0

@@ -66,7 +66,7 @@ FORBIDDEN = {
     "conformance/verify.py": "from conformance import right",
     "conformance/auditors/claims.py": "from reference.above import proof",
     "conformance/audit/claims/growth.py": "import mushrooms",
-    "conformance/generator/certify.py": "import mushrooms",
+    "conformance/cases/certify.py": "import mushrooms",
 }
 CIRCLES = {"theory", "conformance.suite"}  # of files, and of folders that have files without a circle
 RIGHT = {
@@ -79,7 +79,7 @@ RIGHT = {
     "reference/right.py": "from scene import State\nfrom . import proof\nfrom .proof import fast",
     "reference/proof.py": "import importlib.resources",
     "conformance/audit/claims/right.py": "import reference, fast, theory, scene",
-    "conformance/generator/right.py": "import reference, fast, theory, scene\nfrom .. import right",
+    "conformance/cases/right.py": "import reference, fast, theory, scene\nfrom .. import right",
     "conformance/right.py": "import theory, scene",
     "mushrooms/main.py": "import reference, fast, theory, scene, conformance",
 }

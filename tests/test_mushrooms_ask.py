@@ -74,7 +74,7 @@ def test_a_wrong_answer_is_exit_code_1(call):
         (["no-such/1"], "ID = 'no-such/1'"),
         (["drawn/1"], "--seed"),
         (["fresh/1"], "--seed"),
-        (["fresh/265", "--seed", "1"], "ID = 'fresh/265'"),
+        (["fresh/999", "--seed", "1"], "ID = 'fresh/999'"),
         (["drawn/1", "--seed", "-1"], "--seed = -1"),
         (["moving-cap/3", "--", "./no-such-stepper"], "no-such-stepper"),
         (["moving-cap/3", "--", *command("other-protocol")], "does not speak protocol 1"),

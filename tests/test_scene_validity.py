@@ -9,7 +9,8 @@ from hypothesis import strategies as st
 from mpmath import MPContext
 from msgspec.structs import replace
 
-from conformance.strategies import Clock, laws, scenes
+from conformance.cases.scenes import Clock
+from conformance.strategies import laws, scenes
 from scene import (
     BangBang,
     Cap,
@@ -102,7 +103,7 @@ def test_a_double_contact_inside_the_period_is_decided():
 
 
 margins = st.integers(-64, 64).map(lambda n: n / 256)
-clocks = st.sampled_from([Clock("fourier", 1.0), Clock("bang-bang", 2.0, 0.5)])
+clocks = st.sampled_from([Clock("fourier", 1.0), Clock("bang-bang", 2.0)])
 
 
 @st.composite

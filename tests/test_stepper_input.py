@@ -12,7 +12,7 @@ from support.refusals import HUGE, NO_NUMBERS
 import fast
 import reference
 from conformance import plain
-from conformance.generator.draws import Draw
+from conformance.cases.draw import Draw
 from fast.batch import careful_steps
 from scene import BadInput, BangBang, Cap, Collision, Horizon, Mushroom, Rejected, State, Stem, load
 

@@ -14,7 +14,9 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from typing import NamedTuple
 
-from conformance.generator.draws import Draw, place, state, walls_speed
+from conformance.cases.draw import Draw
+from conformance.cases.scenes import walls_speed
+from conformance.cases.starts import place, state
 from conformance.grading.agreement import middle
 from conformance.vectors import Expectation
 from scene import BangBang, Cap, Collision, Fourier, Mushroom, Scene, State, Wall, load

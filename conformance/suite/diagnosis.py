@@ -12,7 +12,7 @@ import math
 from collections.abc import Sequence
 from importlib import resources
 
-from conformance.generator.fresh import GROUP as FRESH
+from conformance.cases.generated import GROUP as FRESH
 from conformance.mutants import COMMON, MUTANTS
 from conformance.mutants.kill_matrix import kills
 from conformance.suite.disguise import DRAWN

@@ -9,7 +9,7 @@ Scales are drawn for a scene and not for a question, so that a scene stays one s
 
 Beside its vectors a run asks `drawn` questions, whose answers are in no file: a flight that is certified to
 meet its first wall after dt meets nothing before, so that at any earlier t_end the particle is at the
-exact place x + vx s, y + vy s. `generator.fresh` draws questions in scenes that no file holds.
+exact place x + vx s, y + vy s. `cases.generated` draws questions in scenes that no file holds.
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ from typing import Any, NamedTuple
 
 import msgspec
 
-from conformance.generator.draws import Draw
-from conformance.generator.fresh import GROUP as FRESH
+from conformance.cases.draw import Draw
+from conformance.cases.generated import GROUP as FRESH
 from conformance.grading.error import condition_number, free_flight, inputs_of, moved
 from conformance.vectors import NUMBERS, Expectation, Vector, certified
 from scene import BadInput, BangBang, Fourier, Scene, State, from_data, to_data, transforms

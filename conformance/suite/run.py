@@ -2,7 +2,7 @@
 
 First the protocol itself (start, the number-transport probe, bad input), then the vectors up to a level,
 each in disguise (`suite.disguise`), and questions that no file holds, of scenes in the corpus and of others
-(`generator.fresh`); then the exact properties and the
+(`cases.generated`); then the exact properties and the
 statistical profiles, then its speed where it offers `time`, then `stop`. What ends the session is the verdict
 of every case not reached; what the implementation does not offer is `unsupported`. Verdicts follow from the
 implementation, the level and the seed, not from the machine or its load, but for time limits and what holds
@@ -24,8 +24,8 @@ from typing import Any
 import msgspec
 
 from conformance import properties, vectors
-from conformance.generator.fresh import GROUP as FRESH
-from conformance.generator.fresh import fresh
+from conformance.cases.generated import GROUP as FRESH
+from conformance.cases.generated import ROUND, fresh
 from conformance.grading.agreement import middle
 from conformance.grading.grade import Grade, grade
 from conformance.suite import promises, property_checks
@@ -51,8 +51,8 @@ from scene.protocol.messages import Introduction
 from scene.refusal import check_seed
 
 NEW_SEEDS = 10**6  # short enough to be typed again
-# By level: each wall of each table 8 or 16 times, and what `generator.seldom.EXTRA` has.
-N_FRESH = {"core": 154, "extended": 308, "stress": 308}
+# By level: one round of the table of families or two.
+N_FRESH = {"core": ROUND, "extended": 2 * ROUND, "stress": 2 * ROUND}
 N_STATES = 24  # drawn for the exact properties
 TIMED_SCENE, TIMED_STATE = "moving-cap", State(0.0, 0.1, 0.2, 300.0, 400.0)
 TIMED_MOST = 2.0  # seconds, after which no longer trajectory is asked

@@ -14,7 +14,7 @@ import mpmath
 import pytest
 
 import reference
-from conformance.attacks.vanishing import sunk
+from conformance.cases.delicate_families import sunk
 from reference.arithmetic import MAX_WORK, Arithmetic
 from reference.isolation import Isolator
 from reference.timeline import law_in_time

@@ -1,9 +1,13 @@
 """Small tables that many tests share, simple enough for answers by hand; hard cases stand on some, too."""
 
-from conformance.generator.grazing_and_stem_cases import BOX, CIRCLE, LIFT, STATIC
-from scene import BangBang, Cap, Fourier, Mushroom
+from scene import BangBang, Cap, Fourier, Mushroom, Stem
 
-__all__ = ["BOX", "BREATHING", "CIRCLE", "LEAP", "LIFT", "STATIC"]
+CIRCLE = Cap(r=1.0)
+BOX = Stem(w=1.0, h=1.0)
+STATIC = Mushroom(r=1.0, h=1.0, w=0.5)
+# A floor that comes up at constant acceleration 16, h = 2 - 8 t^2 until t = 1/4, then
+# h = 1 + 8 (t - 1/2)^2 until t = 3/4, then 2 - 8 (t - 1)^2: down again.
+LIFT = Stem(w=1.0, h=BangBang(knots=((0.0, 2.0), (0.5, 1.0), (1.0, 2.0))))
 
 BREATHING = Cap(r=Fourier(mean=1.0, omega=1.0, sin=(0.25,)))
 # The width leaps from 0.01 to 0.9 within 2e-16 of the second event, at t = 2^110.

@@ -1,0 +1,99 @@
+"""`python -m conformance.cases`: make the corpus, add to it, or check that it is what would be made.
+
+Some ten minutes on one core; `--jobs N` shares them out.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections import Counter, defaultdict
+from collections.abc import Iterable, Mapping, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from pathlib import Path
+
+from conformance.cases.corpus import FOLDER, RETIRED, added, file_of, groups, make, write
+from conformance.vectors import Vector, encode, load
+from scene import BadInput
+
+
+def _made(most: int | None, n_jobs: int) -> list[Vector]:
+    """Make all vectors, or the first few of each group, on so many processes."""
+    wanted = [
+        (group, number)
+        for group, makers in groups().items()
+        for number in range(1, len(makers[:most]) + 1)
+        if f"{group}/{number}" not in RETIRED
+    ]
+    found = []
+    with ProcessPoolExecutor(n_jobs) as pool:
+        for vector in pool.map(make, *zip(*wanted, strict=True), chunksize=4):
+            found.append(vector)
+            if len(found) % 100 == 0:
+                print(f"{len(found)} of {len(wanted)} vectors", file=sys.stderr, flush=True)
+    return found
+
+
+def _by_file(vectors: Iterable[Vector]) -> dict[str, list[Vector]]:
+    files = defaultdict(list)
+    for vector in vectors:
+        files[file_of(vector)].append(vector)
+    return files
+
+
+def _summary(files: Mapping[str, list[Vector]]) -> str:
+    kinds = Counter((vector.kind, vector.level) for vectors in files.values() for vector in vectors)
+    names = {"step": "steps", "trajectory": "trajectories", "flow": "flows"}
+    return ", ".join(f"{n} {level} {names[kind]}" for (kind, level), n in sorted(kinds.items()))
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command.
+
+    Returns:
+        0; 1 when `--check` finds a corpus that differs; 2 for bad input.
+    """
+    parser = argparse.ArgumentParser(
+        prog="python -m conformance.cases",
+        description="Make the corpus of vectors.",
+        epilog="example: python -m conformance.cases --check",
+    )
+    parser.add_argument(
+        "--out", type=Path, default=FOLDER, metavar="DIR", help="where it goes, or is checked"
+    )
+    parser.add_argument("--check", action="store_true", help="make it, and compare with what is there")
+    parser.add_argument(
+        "--add", type=Path, metavar="FILE", help="add the questions of a file, and make no other"
+    )
+    parser.add_argument("--jobs", type=int, default=1, metavar="N", help="processes")
+    parser.add_argument("--most", type=int, metavar="N", help="at most so many vectors of each group")
+    options = parser.parse_args(arguments)
+    for name, number in (("most", options.most), ("jobs", options.jobs)):
+        if number is not None and number < 1:
+            parser.error(f"--{name} = {number}, must be >= 1")
+    try:
+        if options.check:
+            return _check(options.out, _made(options.most, options.jobs))
+        known = [*load("stress", FOLDER), *added(options.add)] if options.add else None
+        files = _by_file(known or _made(options.most, options.jobs))
+        manifest = write(options.out, files)
+    except (BadInput, OSError) as error:
+        print(f"conformance.cases: {error}", file=sys.stderr)
+        return 2
+    print(f"corpus {manifest.corpus}, {manifest.digest[:12]}: {_summary(files)}")
+    return 0
+
+
+def _check(folder: Path, vectors: Iterable[Vector]) -> int:
+    there = {vector.id: encode([vector]) for vector in load("stress", folder)}
+    made = {vector.id: encode([vector]) for vector in vectors}
+    different = [name for name in made if there.get(name) != made[name]]
+    different += [name for name in there if name not in made]
+    for name in different:
+        print(f"{name}: differs")
+    print(f"{len(made)} vectors made, {len(different)} differ")
+    return 1 if different else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,154 @@
+"""The corpus as the table of families makes it, and as it was published.
+
+Every drawn vector is drawn from a stream seeded by its id; every question written by hand stands in its
+published line, and nowhere else. All are answered by the reference and proved by the verifier, so the same
+corpus comes out on every machine, bit for bit.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable, Mapping
+from functools import cache, partial
+from math import inf
+from pathlib import Path
+
+import msgspec
+
+from conformance.cases.certify import certify
+from conformance.cases.draw import Draw, Unfit
+from conformance.cases.flow_families import any_marks
+from conformance.cases.question import Family, Question
+from conformance.cases.table import FAMILIES
+from conformance.vectors import MANIFEST, File, Manifest, Vector, digest, encode, load
+from scene import BadInput
+from scene.files import write_file
+
+VERSION = "1.3"
+RETIRED: tuple[str, ...] = ()
+# Published when the reference enclosed a number closer by a unit of the last decimal, or less closely. Both
+# enclosures are right; a published line never changes.
+KEPT = (*(f"hard-case-41/{number}" for number in (1, 2, 3, 4)), "flow-stay-interrupted/5")
+FOLDER = Path(__file__).parent.parent / "corpus"
+BY_HAND = ("hard-case-", "at-the-horizon")  # how their groups begin
+ATTEMPTS = 64
+Maker = Callable[[int], Vector]
+
+
+def question_of(line: Vector) -> Question:
+    """Return what a published line asks: it takes the path as far as the line does, and keeps its level."""
+    return Question(
+        line.scene,
+        line.state,
+        line.t_end,
+        None if line.kind == "step" else line.collisions,
+        any_marks if line.kind == "flow" else None,
+        longest=inf,
+        also=tuple(known.outcome for known in line.expect[1:]),
+        level=line.level,
+        rule=line.rule,
+        group=line.group,
+        source=line.source,
+    )
+
+
+@cache
+def by_hand() -> dict[str, list[Vector]]:
+    """Return the published lines of questions that were written by hand, in order, by their groups."""
+    found: dict[str, list[Vector]] = {}
+    for vector in load("stress", FOLDER):
+        if vector.group.startswith(BY_HAND):
+            found.setdefault(vector.group, []).append(vector)
+    return found
+
+
+@cache
+def groups() -> dict[str, list[Maker]]:
+    """Return for every group what makes its vectors, in order; number n is made by entry n - 1."""
+    found: dict[str, list[Maker]] = {}
+    for group, lines in by_hand().items():
+        found[group] = [partial(again, line) for line in lines]
+    for family in FAMILIES.values():
+        if family.n_vectors:
+            found[family.name] = [partial(drawn, family)] * family.n_vectors
+    return found
+
+
+def again(line: Vector, number: int) -> Vector:
+    """Answer a published line's question anew."""
+    return certify(question_of(line), number)
+
+
+def drawn(family: Family, number: int) -> Vector:
+    """Return a family's vector of that number: its first draw that has a certified answer."""
+    first = family.first_attempts[number - 1] if family.first_attempts else 0
+    for attempt in range(first, first + ATTEMPTS):
+        question = family.attempt(Draw(f"{family.name}/{number}/{attempt}"))
+        if question is None:
+            continue
+        try:
+            vector = certify(question, number)
+        except Unfit:
+            continue
+        outcome = vector.expect[0].outcome
+        if outcome == family.wanted or (family.wanted is None and outcome in ("collision", "horizon")):
+            return vector
+    raise BadInput(f"{family.name}/{number}: none of {ATTEMPTS} draws has a certified answer")
+
+
+def make(group: str, number: int) -> Vector:
+    """Make one vector of the corpus anew.
+
+    Raises:
+        BadInput: when there is no such vector.
+    """
+    makers = groups().get(group, [])
+    if not 1 <= number <= len(makers) or f"{group}/{number}" in RETIRED:
+        raise BadInput(f"vector = {group}/{number}, must be one of the corpus")
+    if f"{group}/{number}" in KEPT:
+        return next(vector for vector in load("stress", FOLDER) if vector.id == f"{group}/{number}")
+    return makers[number - 1](number)
+
+
+def added(path: Path) -> list[Vector]:
+    """Certify questions that were written by hand, which go to the ends of their groups.
+
+    Args:
+        path: JSON lines: group, rule, source, scene, state, t_end; for a path kind and collisions; and where
+            further outcomes are right, these as `also`.
+
+    Raises:
+        BadInput: a group is one of drawn vectors.
+    """
+    found: list[Vector] = []
+    for line in path.read_bytes().splitlines():
+        data = {"level": "stress", "kind": "step", **msgspec.json.decode(line)}
+        group = data["group"]
+        if not group.startswith(BY_HAND):
+            raise BadInput(f"group = {group!r}, must begin with {' or '.join(BY_HAND)}")
+        number = len(by_hand().get(group, ())) + sum(vector.group == group for vector in found) + 1
+        expect = [{"outcome": outcome} for outcome in ("rejected", *data.pop("also", ()))]
+        asked = question_of(msgspec.convert({**data, "id": f"{group}/{number}", "expect": expect}, Vector))
+        found.append(certify(asked._replace(level=None), number))
+    return found
+
+
+def file_of(vector: Vector) -> str:
+    """Return the name of a vector's file."""
+    return ("hard-cases" if vector.group.startswith("hard-case-") else vector.group) + ".jsonl"
+
+
+def write(folder: Path, files: Mapping[str, list[Vector]]) -> Manifest:
+    """Write files of vectors and their manifest, each complete or not at all; the manifest last."""
+    folder.mkdir(parents=True, exist_ok=True)
+    entries = {}
+    for name, vectors in sorted(files.items()):
+        data = encode(vectors)
+        write_file(folder / name, data)
+        entries[name] = File(hashlib.sha256(data).hexdigest(), len(vectors))
+    manifest = Manifest(VERSION, digest(entries, RETIRED), entries, RETIRED)
+    write_file(folder / MANIFEST, msgspec.json.format(msgspec.json.encode(manifest)) + b"\n")
+    for stale in sorted(folder.glob("*.jsonl")):
+        if stale.name not in entries:
+            stale.unlink()
+    return manifest

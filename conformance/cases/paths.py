@@ -1,0 +1,183 @@
+"""Certified answers of trajectories and flows, made from the reference's paths.
+
+The Jacobians of the steps are chained: what rounding every state that a stepper holds may do.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from fractions import Fraction
+from math import inf, isfinite
+
+import numpy as np
+import numpy.typing as npt
+
+import reference
+from conformance.cases.draw import Unfit
+from conformance.cases.prover import ask, coasted, collided, ends, flight_of
+from conformance.cases.question import Proved, Question
+from conformance.cases.stays import OpenSign, arrival, marks, stays, timing_condition
+from conformance.grading.error import Matrix, condition_number, free_flight, inputs_of
+from conformance.vectors import NUMBERS, Certified, Expectation, certified
+from scene import InvalidState, Scene, State, Undecided, Undefined
+
+WIDEST = Fraction(1, 2**72)  # of an enclosure of a path: a millionth of a backward ulp and less
+
+
+class Links:
+    """The steps of a trajectory: their Jacobians chained from each state that a stepper has held.
+
+    Each Jacobian is that of the step from the rounded state, with the residual of the wall moving along.
+    `held` is (n, 5, 5): d(t, x, y, vx, vy) after the last step by t, x, y, vx, vy of each state held, and
+    `inputs` is (n, 5). Sums go over whole arrays: four digits of the allowances are kept, which no order of
+    summation changes. A flow tells no flight times: how delicate these are does not count where `is_timed`
+    is false.
+    """
+
+    def __init__(self, scene: Scene, state: State, t_end: float, *, is_timed: bool = True) -> None:
+        self.scene, self.state, self.t_end, self.is_timed = scene, state, t_end, is_timed
+        self.held: npt.NDArray[np.float64] = np.empty((0, 5, 5))
+        self.inputs: npt.NDArray[np.float64] = np.empty((0, 5))
+        self.condition = self.largest = 0.0
+
+    def add(self, found: reference.Collision) -> list[float]:
+        """Add a step, and return what all rounding may do to it: it begins at the rounded state."""
+        proved = ask(self.scene, self.state, self.t_end)
+        if not isinstance(proved, reference.Collision) or proved.wall != found.wall:
+            raise Unfit("a rounded state takes another path")
+        centre = [float(found.dt), *(float(c) for c in found.after[1:])]
+        allowance = self._chain(flight_of(proved, self.state, self.t_end).jacobian, centre)
+        self.state = found.rounded().state()
+        return allowance
+
+    def coast(self, horizon: reference.Horizon, since: reference.Enclosure | None) -> Certified:
+        """Return the horizon after the last collision, at time `since`; None for none."""
+        start = Fraction(self.state.t)
+        numbers = coasted(horizon, (start, start) if since is None else ends(since))
+        centre = [float(sum(numbers[name]) / 2) for name in NUMBERS]
+        allowance = self._chain(free_flight(self.state, centre[0]), centre)
+        return certified(numbers, finite(allowance), None, is_wide=True)
+
+    def _chain(self, jacobian: Matrix, centre: list[float]) -> list[float]:
+        self.held = np.concatenate([self.held, np.eye(5)[None]])
+        self.inputs = np.concatenate([self.inputs, [inputs_of(self.state)]])
+        with np.errstate(over="ignore", invalid="ignore"):  # what overflows is refused by `finite`
+            rows = (np.array(jacobian)[:, :, None] * self.held[:, None]).sum(axis=2)
+            moved = np.abs(rows * self.inputs[:, None]).sum(axis=(0, 2))
+            rows[:, 0] += self.held[:, 0]
+        self.held = rows
+        allowance = [float(part) for part in moved]
+        self.condition = condition(centre if self.is_timed else [inf, *centre[1:]], allowance)
+        return allowance
+
+
+def condition(centre: Sequence[float], allowance: Sequence[float]) -> float:
+    """Return the condition number of dt, x, y, vx, vy by what their inputs move them, summed already."""
+    return condition_number(centre, [[part] for part in allowance], [1.0])
+
+
+def finite(allowance: Sequence[float]) -> Sequence[float]:
+    """Return allowances as they are.
+
+    Raises:
+        Unfit: one is infinite or none.
+    """
+    if not all(map(isfinite, allowance)):
+        raise Unfit("an allowance overflows")
+    return allowance
+
+
+def proved_path(scene: Scene, question: Question, working: int | None = None) -> Proved:
+    """Follow a particle as far as the chained condition number allows, or to the horizon.
+
+    Args:
+        scene: table and laws, of the question.
+        question: of a trajectory or a flow.
+        working: number of decimals to work with, by default what the reference takes. It answers for the
+            digits of the last collision asked for; a path that ends at a horizon may need more.
+
+    Raises:
+        Unfit: there is no answer to certify.
+    """
+    assert question.collisions is not None
+    state, t_end = question.state, question.t_end
+    try:
+        path = reference.trajectory(scene, state, question.collisions, t_end, working=working)
+        captured = marks(scene, path.steps) if question.flow else []
+    except (InvalidState, OpenSign) as error:
+        raise Unfit(str(error)) from None
+    end = path.outcome
+    if question.flow and not (isinstance(end, reference.Horizon) and question.flow(captured)):
+        raise Unfit("not the flow that is looked for")
+    links = Links(scene, state, t_end, is_timed=question.flow is None)
+    steps = _steps(links, path, question)
+    if len(steps) < len(path.steps):
+        end = None
+    if isinstance(end, reference.Horizon):
+        steps.append(links.coast(end, path.steps[-1].after.t if path.steps else None))
+        links.largest = max(links.largest, links.condition)
+    elif end is not None and not isinstance(end, Undefined):
+        raise Unfit("the reference is undecided")
+    if any(map(_is_wide, steps)):
+        return proved_path(scene, question, 2 * path.digits)
+    if question.flow:
+        arrived = arrival(steps, stays(captured))
+        largest = max(links.condition, timing_condition(arrived, state))
+        if largest > question.longest:
+            raise Unfit("the horizon is too delicate")
+        return Proved((arrived,), largest, len(steps))
+    expect = [Expectation("horizon" if end else "collision", tuple(steps))]
+    if isinstance(end, Undefined):
+        expect = [Expectation("undefined", tuple(steps), end.reason), Expectation("undecided", tuple(steps))]
+    return Proved(tuple(expect), links.largest, len(steps) + isinstance(end, Undefined))
+
+
+def _steps(links: Links, path: reference.Trajectory, question: Question) -> list[Certified]:
+    """Write down the collisions of a path as far as the condition number allows; of a flow all."""
+    steps: list[Certified] = []
+    for found in path.steps:
+        allowance = links.add(found)
+        if links.condition > question.longest:
+            break
+        links.largest = max(links.largest, links.condition)
+        steps.append(certified(collided(found), finite(allowance), found.wall, is_wide=True))
+    if len(steps) < (len(path.steps) if question.flow else 1):
+        raise Unfit("no collision is met, or the first is too delicate")
+    return steps
+
+
+def claimed_path(
+    scene: Scene, state: State, n_collisions: int, t_end: float, working: int | None = None
+) -> Expectation:
+    """Return the reference's path however it ends, undecided included; allowances are left out.
+
+    Args:
+        scene: table and laws.
+        state: the start.
+        n_collisions: how many to follow.
+        t_end: horizon [time].
+        working: decimals to work with, by default what the reference takes.
+    """
+    try:
+        path = reference.trajectory(scene, state, n_collisions, t_end, working=working)
+    except InvalidState:
+        return Expectation("rejected")
+    unknown, end = [0.0] * len(NUMBERS), path.outcome
+    steps = [certified(collided(found), unknown, found.wall, is_wide=True) for found in path.steps]
+    if isinstance(end, Undefined):
+        return Expectation("undefined", tuple(steps), end.reason)
+    if isinstance(end, Undecided):
+        return Expectation("undecided", tuple(steps), end.reason)
+    if isinstance(end, reference.Horizon):
+        since = ends(path.steps[-1].after.t) if steps else (Fraction(state.t), Fraction(state.t))
+        steps.append(certified(coasted(end, since), unknown, None, is_wide=True))
+    return Expectation("horizon" if end else "collision", tuple(steps))
+
+
+def _is_wide(step: Certified) -> bool:
+    """Tell whether an enclosure is wider than a small part of what rounding may do."""
+    for name, allowance in zip(NUMBERS, step.allowance, strict=True):
+        low, high = step.ends(name)
+        if high - low > WIDEST * (Fraction(allowance) + max(abs(low), abs(high))):
+            return True
+    return False

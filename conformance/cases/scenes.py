@@ -1,0 +1,199 @@
+"""Scenes drawn at random: laws inside nested ranges, which makes every scene valid.
+
+`law` and `scene` are what the corpus is drawn with: their streams never change. `any_law` and `any_scene`
+go on from there: laws of every shape and length that begin anywhere, deep stems and shallow ones, narrow
+mouths, slopes as steep as these allow. To prove that a slope of many harmonics closes no stem takes up to
+some ten seconds, so ranges are nested there too.
+
+A deep wave is a Fourier law whose amplitudes add up to more than its mean, and which is positive all the
+same.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
+
+import msgspec
+from msgspec.structs import replace
+
+from conformance.cases.draw import Draw, Unfit
+from scene import BangBang, Cap, Fourier, Law, Mushroom, Scene, Stem, to_data
+from scene.given import MAX_KNOTS
+from scene.laws import bounds
+from scene.tables import laws
+from scene.transforms import scaled_law
+
+FEW_HARMONICS = ((1, 0), (0, 1), (1, 1), (2, 0), (0, 2), (2, 2), (1, 3))  # of cosines, of sines
+MANY_HARMONICS = ((4, 0), (0, 6), (5, 5), (8, 3), (16, 16))
+TABLES = ("cap", "stem", "mushroom")
+MOVING = ("fourier", "bang-bang")
+KINDS = ("constant", "fourier", "bang-bang", "mixed", "mixed", "mixed", "harmonics")
+PERIODS = (0.5, 1.0, 1.5, 4.0)
+LEGS = 5, 6, 7, 12, 23, 40, MAX_KNOTS - 1  # of a law with many: the corpus has at most four
+GRID = 1024  # parts of a period that knots lie on
+FAINT = 8, 20, 30  # powers of a half that what a law moves by is multiplied with
+DEEPER = 0, 0, 0, 3, 5, -3, -5, -10  # powers of two that a stem's depth is multiplied with
+NARROWER = 0, 0, -4, -8, -20  # likewise, a mouth's width
+
+
+class Clock(NamedTuple):
+    """What the moving laws of a scene share: kind, and omega or the period.
+
+    Of kind "mixed" each law is of its own kind, and of "harmonics" a Fourier law of four to sixteen; both
+    share a period.
+    """
+
+    kind: str
+    rate: float = 1.0
+
+
+def clock(draw: Draw, kinds: Sequence[str] = ("fourier", "bang-bang", "constant")) -> Clock:
+    """Draw what the laws of a scene share."""
+    kind = draw.pick(kinds)
+    return Clock(kind, draw.short(0.5, 6.0) if kind == "fourier" else draw.pick(PERIODS))
+
+
+def law(draw: Draw, low: float, high: float, shared: Clock) -> Law:
+    """Draw a law that stays within [low, high]; now and then one that stands still."""
+    if shared.kind == "mixed":
+        found = law(draw, low, high, shared._replace(kind=draw.pick(("fourier", "bang-bang", "constant"))))
+        return replace(found, omega=None, period=shared.rate) if isinstance(found, Fourier) else found
+    if shared.kind == "constant" or draw.pick(range(6)) == 0:
+        return draw.short(low, high)
+    if shared.kind == "bang-bang":
+        n = draw.pick((2, 3, 4))
+        places = sorted({draw.pick(range(1, 64)) for _ in range(n - 1)})
+        times = [0.0, *(shared.rate * place / 64 for place in places), shared.rate]
+        values = [draw.short(low, high) for _ in times[1:]]
+        return BangBang(knots=tuple(zip(times, [*values, values[0]], strict=True)))
+    mean = draw.short(0.75 * low + 0.25 * high, 0.25 * low + 0.75 * high)
+    n_cos, n_sin = draw.pick(MANY_HARMONICS if shared.kind == "harmonics" else FEW_HARMONICS)
+    size = 0.999 * min(high - mean, mean - low) / (n_cos + n_sin)
+    amplitudes = [draw.short(-size, size) for _ in range(n_cos + n_sin)]
+    cos, sin = tuple(amplitudes[:n_cos]), tuple(amplitudes[n_cos:])
+    if shared.kind == "harmonics":
+        return Fourier(mean=mean, period=shared.rate, cos=cos, sin=sin)
+    return Fourier(mean=mean, omega=shared.rate, cos=cos, sin=sin)
+
+
+def deep_wave(draw: Draw, low: float, high: float, omega: float) -> Fourier:
+    """Draw a deep wave within [low, high], where low > 0 is a small part of high."""
+    while True:
+        a, b = draw.short(0.5, 1.5), draw.short(0.2, 0.6)
+        found = _square(low, high, a, b, omega)
+        if sum(found.cos) > 1.05 * found.mean:
+            return _square(low, high, draw.pick((1.0, -1.0)) * a, b, omega)
+
+
+def _square(low: float, high: float, a: float, b: float, omega: float) -> Fourier:
+    """Return a law in [low, high]: low and a share of |1 + a e^ix + b e^2ix|^2, which is never negative."""
+    unit = (high - low) / (1 + abs(a) + b) ** 2
+    waves = (2 * a * (1 + b) * unit, 2 * b * unit)
+    return Fourier(mean=low + (1 + a * a + b * b) * unit, omega=omega, cos=waves)
+
+
+LawDraw = Callable[[Draw, float, float, Clock], Law]
+
+
+def scene(draw: Draw, table: str, shared: Clock, law: LawDraw = law) -> Scene:
+    """Draw a valid scene of a table: "cap", "stem" or "mushroom", with laws as `law` draws them."""
+    if table == "cap":
+        return Cap(r=law(draw, 0.25, 2.0, shared))
+    if table == "stem":
+        w, h = law(draw, 0.25, 2.0, shared), law(draw, 0.5, 3.0, shared)
+        return Stem(w=w, h=h, slope=_slope(draw, bounds(w).lowest, bounds(h).highest, shared, law))
+    r, h = law(draw, 0.75, 2.0, shared), law(draw, 0.5, 3.0, shared)
+    narrowest = bounds(r).lowest
+    if draw.pick((False, True)):
+        nu = law(draw, 0.2, 1.0, shared)
+        slope = _slope(draw, narrowest * bounds(nu).lowest, bounds(h).highest, shared, law)
+        return Mushroom(r=r, nu=nu, h=h, slope=slope)
+    if narrowest <= 0:  # of a deep wave no more is known: a mouth as wide might not fit
+        raise Unfit("the cap may vanish")
+    w = law(draw, narrowest / 4, narrowest * 0.99, shared)
+    return Mushroom(r=r, w=w, h=h, slope=_slope(draw, bounds(w).lowest, bounds(h).highest, shared, law))
+
+
+def _slope(draw: Draw, narrowest: float, deepest: float, shared: Clock, law: LawDraw) -> Law:
+    steepest = 0.9 * narrowest / deepest
+    kind = draw.pick(("positive", "zero", "negative", "moving"))
+    if kind == "moving" and steepest > 0.01:
+        return law(draw, -0.5, steepest, shared)
+    if kind == "positive" and steepest > 0.001:
+        return draw.short(0.0001, steepest)
+    return draw.short(-0.8, -0.01) if kind == "negative" else 0.0
+
+
+def any_law(draw: Draw, low: float, high: float, shared: Clock) -> Law:
+    """Draw a law within [low, high], in any shape that it may have.
+
+    A constant may be written as a law that moves by nothing, with a period that no other has; a wave may sink
+    nearly to 0; a law may hardly move; one of legs begins anywhere, and may have as many as there may be.
+    """
+    found, way = law(draw, low, high, shared), draw.pick((0, 1, 2, 3, 4))
+    if isinstance(found, float) and way == 4:
+        return Fourier(mean=found, omega=draw.short(0.5, 6.0), cos=(0.0,))
+    if isinstance(found, float):
+        begin = draw.pick(range(-16, 17)) / 16
+        knots = tuple((begin + t, found) for t in (0.0, 4.0, 8.0))
+        return BangBang(knots=knots) if way == 3 else found
+    if way == 4:
+        found = _faint(found, 2.0 ** -draw.pick(FAINT))
+    elif way == 3 and isinstance(found, BangBang):
+        found = many_legs(draw, low, high, found.knots[-1][0])
+    elif way == 3 and isinstance(found, Fourier) and 0 < 8 * low < high:
+        found = replace(deep_wave(draw, low, high, 1.0), omega=found.omega, period=found.period)
+    return _begun_elsewhere(draw, found) if isinstance(found, BangBang) else found
+
+
+def _faint(of: Fourier | BangBang, part: float) -> Fourier | BangBang:
+    """Return a law that moves by so small a part of what this one moves by."""
+    if isinstance(of, BangBang):
+        first = of.knots[0][1]
+        return BangBang(knots=tuple((t, first + part * (v - first)) for t, v in of.knots))
+    return replace(of, cos=tuple(part * a for a in of.cos), sin=tuple(part * a for a in of.sin))
+
+
+def many_legs(draw: Draw, low: float, high: float, period: float, n: int | None = None) -> BangBang:
+    """Draw a law of n legs, or of many."""
+    n, places = n or draw.pick(LEGS), set[int]()
+    while len(places) < n - 1:
+        places.add(draw.pick(range(1, GRID)))
+    times = [0.0, *(period * place / GRID for place in sorted(places)), period]
+    values = [draw.between(low, high) for _ in range(n)]
+    return BangBang(knots=tuple(zip(times, [*values, values[0]], strict=True)))
+
+
+def _begun_elsewhere(draw: Draw, of: BangBang) -> BangBang:
+    """Return a law with its knots moved by a part of the period; all sums are exact."""
+    by = of.knots[-1][0] * draw.pick((0, *range(-256, 256))) / 64
+    return BangBang(knots=tuple((t + by, v) for t, v in of.knots))
+
+
+def any_scene(draw: Draw, table: str | None = None, kinds: Sequence[str] = KINDS) -> Scene:
+    """Draw a scene of a table, or of any: its laws may have any shape, and so may its stem."""
+    found = scene(draw, table or draw.pick((*TABLES, "mushroom")), clock(draw, kinds), any_law)
+    if not isinstance(found, Cap):
+        mouth = "w" if "w" in laws(found) else "nu"
+        deeper, wider = draw.pick(DEEPER), draw.pick(NARROWER)
+        powers = {mouth: wider, "h": deeper, "slope": wider - deeper}
+        found = replace(found, **{name: scaled_law(getattr(found, name), n, 0) for name, n in powers.items()})
+    return replace(found, name=draw.pick(("", "", "scene", "1")))
+
+
+def wire_form(of: Scene) -> dict[str, Any]:
+    """Return a scene as JSON has it, without its name and notes."""
+    data = {key: law for key, law in to_data(of).items() if key not in ("name", "notes")}
+    decoded: dict[str, Any] = msgspec.json.decode(msgspec.json.encode(data))  # lists for tuples
+    return decoded
+
+
+def walls_speed(scene: Scene) -> float:
+    """Return a bound of the walls' speeds; 0 when nothing moves.
+
+    nu moves the mouth at the scale of r, slope the sides at the scale of h.
+    """
+    found = {name: bounds(law) for name, law in laws(scene).items()}
+    reach = {name: found[of].highest for name, of in (("nu", "r"), ("slope", "h")) if name in found}
+    return max(law.slope * reach.get(name, 1.0) for name, law in found.items())

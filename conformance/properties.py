@@ -28,7 +28,7 @@ import msgspec
 
 from conformance.grading import sensitivity
 from conformance.grading.called import Question, answering, fail
-from conformance.grading.sensitivity import measured, numbers
+from conformance.grading.sensitivity import MeasuredStep, measured, numbers
 from scene import Collision, Horizon, Outcome, Rejected, Scene, State, Undecided, transforms
 from scene.laws import is_constant
 from scene.precision import decimals
@@ -148,13 +148,13 @@ def check_period_shift(
 def check_split_flight(
     stepper: Stepper, scene: Scene, state: State, t_end: float, *, bound: float = BOUND
 ) -> bool:
-    """Hold a flight that is stopped halfway and taken up again to meet the same wall. See `check_mirror`."""
+    """Hold a flight, or a flow, that is stopped halfway and taken up again, to end alike."""
     stepper = answering(stepper)
     given = scene, state, t_end
     whole = measured(stepper, *given, bound)
-    if whole is None or not isinstance(whole.outcome, Collision):
+    if whole is None:
         return False
-    middle = state.t + whole.outcome.dt / 2
+    middle = state.t + whole.numbers[0] / 2
     half = measured(stepper, scene, state, middle, bound)
     if half is None or middle == state.t:
         return False
@@ -164,7 +164,7 @@ def check_split_flight(
     rest = measured(stepper, *asked[-1], bound, half.errors[1:])
     if rest is None:
         return False
-    if not isinstance(rest.outcome, Collision) or rest.outcome.wall != whole.outcome.wall:
+    if getattr(rest.outcome, "wall", None) != getattr(whole.outcome, "wall", None):
         fail("split flight", f"then {rest.outcome}, at once {whole.outcome}", *asked)
     taken = float(Fraction(middle) - Fraction(state.t)) + rest.numbers[0]
     allowed = [a + b for a, b in zip(whole.errors, rest.errors, strict=True)]
@@ -175,7 +175,7 @@ def check_split_flight(
 def check_reversal(
     stepper: Stepper, scene: Scene, state: State, t_end: float, *, bound: float = BOUND
 ) -> bool:
-    """Hold the path across one bounce to be retraced when velocity and laws are reversed.
+    """Hold the path across one bounce, or a flow, to be retraced when velocity and laws are reversed.
 
     From the state over its collision, which it must be able to go on from, to half of the next flight,
     then back to half of the first. The errors granted are carried along through every step. See
@@ -184,8 +184,10 @@ def check_reversal(
     stepper = answering(stepper)
     given = scene, state, t_end
     there = measured(stepper, *given, bound)
-    if there is None or not isinstance(there.outcome, Collision):
+    if there is None:
         return False
+    if isinstance(there.outcome, Horizon):
+        return _flows_back(stepper, scene, state, there, bound)
     led = scene, there.state(), max(t_end, there.outcome.t)
     if isinstance(refusal := stepper(*led), Rejected):
         fail("time reversal", f"{there.outcome} leads nowhere: {refusal.reason}", given, led)
@@ -211,6 +213,19 @@ def check_reversal(
     _, _, x, y, vx, vy = home.numbers
     expected = (0.0, 0.0, begin.x, begin.y, begin.vx, begin.vy)
     _near("time reversal", (0.0, 0.0, x, y, -vx, -vy), expected, home.errors, *asked)
+    return True
+
+
+def _flows_back(stepper: Stepper, scene: Scene, state: State, there: MeasuredStep, bound: float) -> bool:
+    """Hold what comes after a horizon, with velocity and laws reversed, to end at the start."""
+    at = there.state()
+    back = transforms.backwards(scene), State(-at.t, at.x, at.y, -at.vx, -at.vy), -state.t
+    home = measured(stepper, *back, bound, there.errors[1:]) if at.t > state.t else None
+    if home is None or not isinstance(home.outcome, Horizon):
+        return False
+    _, _, x, y, vx, vy = home.numbers
+    expected = (0.0, 0.0, state.x, state.y, state.vx, state.vy)
+    _near("time reversal", (0.0, 0.0, x, y, -vx, -vy), expected, home.errors, (scene, state, at.t), back)
     return True
 
 

@@ -9,6 +9,7 @@ from functools import partial
 from pathlib import Path
 
 import pytest
+from conformance.suite.promises import conserved, crowds, refusals, scenes
 from mpmath import fp
 
 import theory
@@ -18,7 +19,6 @@ from conformance.generator.seldom import EXTRA
 from conformance.mutants import MUTANTS
 from conformance.suite import run
 from conformance.suite.disguise import N_DRAWN
-from conformance.suite.promises import conserved, crowds, refusals, scenes
 from fast.kernel.kept import LANE_ROWS
 from mushrooms.store import conduct, layout
 from mushrooms.store.asked import Asked

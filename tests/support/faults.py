@@ -48,9 +48,10 @@ from support.faulty_steppers import (
     OPEN,
     absent_as_zero,
     arrived,
+    at_once,
     beside_its_wall,
-    bisecting,
     dead_time,
+    early,
     everywhere,
     fleeing,
     horizon_at_once,
@@ -215,7 +216,10 @@ FAULTS: dict[str, tuple[str, str, Fault]] = {
     "take-hints": ("extra-fields", "fail", take_hints),
     "minus-is-below": ("minus-zero", "fail", asked(minus_is_below)),
     # Caches.
-    **{f"remembering-{n}-digits": ("changed-questions", "fail", answers_by(rounded(n))) for n in (6, 9, 12)},
+    **{
+        f"remembering-{n}-digits": ("changed-questions", "fail", answers_by(rounded(n)))
+        for n in (6, 9, 12, 15)
+    },
     "answers-without-wall": ("changed-questions", "fail", answers_by(without_wall)),
     **{f"scenes-{name}": ("changed-questions", "fail", scenes_by(key, STEP)) for name, key in KEYS.items()},
     "paths-by-first-parts": ("changed-questions", "fail", scenes_by(first_parts, PATH)),
@@ -283,11 +287,22 @@ FAULTS: dict[str, tuple[str, str, Fault]] = {
             each("horizon", lambda _, part, __: part.update(vx=part["vx"] * 1.001, vy=part["vy"] * 1.001)),
         ),
     ),
+    "open-flows": (
+        "many-particles",
+        "declined",
+        on(FLOW, lambda _, found: {**found, "states": [OPEN] * len(found["states"])}),
+    ),
+    "open-paths": (
+        "long-paths",
+        "declined",
+        on(PATH, lambda _, found: {**found, "steps": [*found["steps"][:1], OPEN][: len(found["steps"])]}),
+    ),
     # Hits and paths.
     "one-too-few": ("long-paths", "fail", on(PATH, one_too_few)),
     **{f"tired-at-{n}": ("long-paths", "fail", on(PATH, tired(n))) for n in (50, 450, 1000, 2000, 4000)},
     "without-slope-in-paths": ("hits", "fail", with_slope(lambda _: 0.0, PATH)),
     "faster-after-1000": ("long-paths", "fail", on(PATH, each("collision", late_speed(1000.0)))),
+    "faster-late-steps": ("late-starts", "fail", on(STEP, each("collision", late_speed(1000.0)))),
     "leaking": ("long-paths", "fail", on(PATH, leaking(1e-10))),
     "spiralling": ("long-paths", "fail", on(PATH, leaking(0.0, 1e-10))),
     "leaking-before-it-is-open": ("long-paths", "fail", on(PATH, mend)),
@@ -349,6 +364,7 @@ FAULTS: dict[str, tuple[str, str, Fault]] = {
     **{f"impatient-after-{n}": ("waiting", "fail", on(STEP, impatient(n))) for n in (512, 1000)},
     # Bad input, and good.
     **{name: ("bad-states", "fail", letting(excuse, STEP)) for name, excuse in EXCUSES.items()},
+    "no-time-no-check": ("bad-states", "fail", at_once),
     "loose-paths": ("bad-states", "fail", letting(loose(1e-2), PATH)),
     "loose-flows": ("bad-states", "fail", letting(loose(1e-2), FLOW)),
     "late-is-arrived": ("bad-states", "fail", on(FLOW, arrived(lambda t, t_end: t > t_end))),
@@ -365,7 +381,7 @@ FAULTS: dict[str, tuple[str, str, Fault]] = {
         f"scenes-without-{name}": ("bad-scenes", "fail", scenes_refused_for(word))
         for name, word in RULES.items()
     },
-    "scenes-by-64-samples": ("bad-scenes", "fail", scenes_let(passes_samples(64))),
+    **{f"scenes-by-{n}-samples": ("bad-scenes", "fail", scenes_let(passes_samples(n))) for n in (1, 64)},
     "periods-to-9-digits": ("bad-scenes", "fail", scenes_let(nearly_one_period)),
     "scenes-by-ranges": ("bad-scenes", "fail", narrower(wide_by_ranges)),
     "unknown-wall-as-null": ("bad-requests", "fail", asked(unknown_wall)),
@@ -392,8 +408,8 @@ FAULTS: dict[str, tuple[str, str, Fault]] = {
 # Errors that do not add up, and others that vectors let pass: these are no faults.
 HONEST: dict[str, Fault] = {
     "to and fro": on(PATH, each("collision", to_and_fro)),
-    "coarse": both(offering(STEP), bisecting(10 * 2.0**-37)),
-    "coarser": both(offering(STEP), bisecting(10 * 2.0**-32)),
+    "coarse": both(offering(STEP), on(STEP, early(1e-12))),
+    "coarser": both(offering(STEP), on(STEP, early(3e-10))),
     "steps alone": offering(STEP),
     "flows alone": offering(FLOW),
 }

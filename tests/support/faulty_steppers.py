@@ -25,7 +25,6 @@ from support.faulty_servers import (
     asked,
     each,
     honest,
-    on,
     parts,
     starts,
     turned,
@@ -111,16 +110,16 @@ def with_slope(change: Callable[[float], float], *cmds: str) -> Fault:
     return asked(changed, *cmds)
 
 
-def bisecting(cell: float, then: Fault = lambda request, answer: answer(request)) -> Fault:
-    """Find hits down to a tolerance, as honest ones do that halve an interval; a fault may come upon that."""
+def early(part: float) -> Change:
+    """Find hits down to a tolerance, a part of the flight too early: no fault."""
 
     def change(request: Line, found: Line) -> None:
         if found["outcome"] == "collision":
-            start, dt = request["state"], math.floor(found["dt"] / cell) * cell
+            start, dt = request["state"], found["dt"] * (1 - part)
             found |= {"dt": dt, "t": start["t"] + dt}
             found |= {name: start[name] + start["v" + name] * dt for name in ("x", "y")}
 
-    return lambda request, answer: then(request, lambda question: on(STEP, change)(question, answer))
+    return change
 
 
 def tired(after: int) -> Change:
@@ -304,6 +303,15 @@ def arrived(which: Callable[[float, float], bool]) -> Change:
         return {**found, "states": there}
 
     return change
+
+
+def at_once(request: Line, answer: Answer) -> Line:
+    """Answer a step that lasts no time before any check."""
+    found = answer(request)
+    is_step = request.get("cmd") == STEP and is_sound(request) and found["outcome"] == "rejected"
+    if not is_step or request["state"]["t"] != request.get("t_end"):
+        return found
+    return {"seq": found["seq"], **straight(request, request["state"])}
 
 
 def refusing(is_refused: Callable[[TableAt, Line], bool], cmd: str = STEP) -> Fault:

@@ -13,7 +13,7 @@ from functools import partial
 from conformance import properties
 from conformance.generator.draws import Draw
 from conformance.suite.checks import endings, paths, refusals, requests, timing
-from conformance.suite.checks.ensembles import ensembles
+from conformance.suite.checks.ensembles import ensemble_checks
 from conformance.suite.checks.form import QUESTIONS, Check, Implementation, Question, run_check
 from conformance.suite.session import AnswerLine, Session
 from scene import Scene, State
@@ -82,7 +82,7 @@ RULES = (
 
 def checks_of(level: str = "core", names: str | tuple[str, ...] = "") -> list[Check]:
     """Return the checks of a level whose names begin with a text, or one of some; all when it is empty."""
-    return [check for check in (*SYMMETRIES, *ensembles(level), *RULES) if check.name.startswith(names)]
+    return [check for check in (*SYMMETRIES, *ensemble_checks(level), *RULES) if check.name.startswith(names)]
 
 
 def hold(implementation: list[str] | AnswerLine, name: str, seed: int) -> None:

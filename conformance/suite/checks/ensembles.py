@@ -57,7 +57,7 @@ SIZES = {
 }
 
 
-def ensembles(level: str) -> list[Check]:
+def ensemble_checks(level: str) -> list[Check]:
     """Return the statistical checks, of as many particles as a level has."""
 
     def asks(scene: Mushroom) -> Callable[[Draw, str], Iterator[Question]]:

@@ -5,8 +5,8 @@ a path of any length, in any scene, is checked. A flight must also stay within t
 the way, and at its end, it is beyond no wall, and it passes y = 0 in the mouth alone. So a hit that comes too
 late is seen, and one of the wrong wall of two.
 
-Who is exact to rounding (most of its numbers are) is held to FINE; who looks for hits down to a tolerance, as
-the vectors let pass, to COARSE.
+An implementation most of whose numbers are exact to rounding is held to FINE; one that looks for hits down to
+a tolerance, as the vectors let pass, to COARSE.
 """
 
 from __future__ import annotations
@@ -21,19 +21,33 @@ from mpmath import fp
 from conformance.properties import BOUND, SLACK
 from scene import Cap, Collision, Horizon, Mushroom, Outcome, Scene, State, Stem
 from scene.geometry import half_width, table_at
-from scene.laws import is_constant
+from scene.laws import bounds, is_constant
 from scene.tables import laws
 
 FINE, COARSE = 2.0**-36, SLACK * BOUND  # of sizes
 FLIGHT = 2.0**-48  # of sizes: a straight flight, by who is fine
 LATE = 2.0**-50  # of t: what its last digits are
 N_PARTS = 7  # places on the way
+LEAST = 8  # numbers that tell how exact an implementation is
+Errors = dict[str, list[float]]
 UNCLEAR = (float("nan"), float("nan"))
 ON_EDGE = 2.0**-28  # relative: nearer to the edge of capture rounding may decide
 
 
-def flaw_of(scene: Scene, start: State, path: Sequence[Outcome]) -> str:
-    """Say what is wrong with the first hit, or horizon, to which no flight led; empty where all may be."""
+def is_fine(errors: Sequence[float], fine: float) -> bool:
+    """Tell whether errors are rounding, as a rule; of few it is not told."""
+    return len(errors) >= LEAST and bool(np.quantile(errors, 0.7) <= fine / 4)
+
+
+def flaw_of(scene: Scene, start: State, path: Sequence[Outcome], errors: Errors | None = None) -> str:
+    """Say what is wrong with the first hit, or horizon, to which no flight led; empty where all may be.
+
+    Args:
+        scene: of the path.
+        start: of the path.
+        path: its outcomes; only collisions and a horizon are looked at.
+        errors: of the same implementation so far; those of this path are added. None holds it to FINE.
+    """
     ends = [at for at in path if isinstance(at, Collision | Horizon)]
     if not ends:
         return ""
@@ -44,10 +58,12 @@ def flaw_of(scene: Scene, start: State, path: Sequence[Outcome]) -> str:
     dt = np.array([getattr(at, "dt", at.t - t) for at, t in zip(ends, rows[:-1, 0], strict=True)])
     walls = np.array([getattr(at, "wall", "") for at in ends])
     with np.errstate(all="ignore"):
-        return _first_flaw(scene, start, before, after, dt, walls)
+        return _first_flaw(scene, start, before, after, dt, walls, errors)
 
 
-def _first_flaw(scene: Scene, start: State, before: Any, after: Any, dt: Any, walls: Any) -> str:
+def _first_flaw(
+    scene: Scene, start: State, before: Any, after: Any, dt: Any, walls: Any, errors: Errors | None
+) -> str:
     t0, x0, y0, vx0, vy0 = before
     t, x, y, vx, vy = after
     table = table_at(fp, scene, t)
@@ -77,20 +93,26 @@ def _first_flaw(scene: Scene, start: State, before: Any, after: Any, dt: Any, wa
     off_wall = np.abs(f - np.where(left == walls, kept, 0.0)) / steep / size
     straight = walls == ""
     turn[straight] = np.hypot(vx - vx0, vy - vy0)[straight] / np.maximum(speed, 1e-300)[straight]
-    hits = ~straight
-    is_fine = not hits.any() or np.median(off_wall[hits]) <= FINE / 8
-    tolerance = FINE if is_fine else COARSE
-    flight = FLIGHT if np.median(off_flight) <= FLIGHT / 4 else COARSE
-    drift = late * (speed + moving) / size
-    margin = tolerance + 64 * drift
+    measured = {"place": off_wall, "bounce": turn, "flight": off_flight}
+    known = errors if errors is not None else {name: [0.0] * LEAST for name in measured}
+    for name, sizes in measured.items() if errors is not None else ():
+        known.setdefault(name, []).extend(sizes[-LEAST:].tolist())
+    is_exact = is_fine(known["place"], FINE) and is_fine(known["bounce"], FINE)
+    place, flight = (FINE if is_exact else COARSE), (FLIGHT if is_fine(known["flight"], FLIGHT) else COARSE)
+    aside = 64 * (late + (0.0 if is_exact else COARSE) * np.abs(dt))  # of a time
+    margin = place + aside * (speed + moving) / size
+    # A wall that turns soon has another speed at a time that is rounded.
+    known_laws = {name: bounds(law).curvature for name, law in laws(scene).items()}
+    turning = sum(bend * (size if name in ("nu", "slope") else 1.0) for name, bend in known_laws.items())
+    rounding = margin + aside * turning / (speed + moving)
     beyond = _beyond(scene, before, dt, walls, (x, y))
     beyond -= 2 * np.abs(kept) / np.append(now.r if start.wall == "arc" else 1.0, steep[:-1]) / size
     flaws = {
-        "its time is not when the flight ends": np.abs(t - t0 - dt) > 8 * late + flight * np.abs(dt),
-        "is off the flight before": off_flight > flight,
+        "its time is not when the flight ends": np.abs(t - t0 - dt) > late / 2 + flight * np.abs(dt),
+        "is off the flight before": off_flight > flight + 4 * late * speed / size,
         "is off its wall": off_wall > margin,
-        "does not come from its wall's inside": away > margin,
-        "is not turned round by its wall": turn > margin * 16,
+        "does not come from its wall's inside": away > rounding,
+        "is not turned round by its wall": turn > 16 * rounding,
         "is beyond a wall, or was on the way": beyond > margin,
         "comes after nothing": dt < 0,
     }

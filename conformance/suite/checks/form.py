@@ -52,10 +52,12 @@ class Implementation:
         session: with the implementation.
         profile: step, trajectory or flow (or time).
         n_asked, n_undecided: outcomes counted so far.
+        errors: of its numbers so far, by what they are of (`checks.flaws`).
     """
 
     def __init__(self, session: Session, profile: str) -> None:
         self.session, self.profile = session, profile
+        self.errors: dict[str, list[float]] = {}
         self.n_asked = self.n_undecided = 0
 
     def __call__(self, scene: Scene, state: State, t_end: float) -> Outcome:
@@ -160,7 +162,7 @@ def run_check(check: Check, session: Session, seed: int) -> Result:
     assert session.introduction is not None
     begin, lacking = time.monotonic(), "nothing to ask"
     notes: list[str] = []
-    n = n_compared = n_open = n_asked = 0
+    n = n_compared = n_declined = n_open = n_asked = 0
 
     def result(verdict: str, why: str, paste: str = "") -> Result:
         group = check.name.partition("/")[0]
@@ -187,15 +189,17 @@ def run_check(check: Check, session: Session, seed: int) -> Result:
                 if trouble.verdict == "unsupported":
                     lacking = trouble.why
                 elif trouble.verdict == "declined":
-                    n_open += 1
+                    n_declined += 1
                     notes.append(trouble.why)
                 else:
                     why = f"{profile}: {trouble.why}"
                     return result(trouble.verdict, why, as_pytest(check, profile, asked))
         n_open, n_asked = n_open + side.n_undecided, n_asked + side.n_asked
     why = "; ".join(notes[:4]) or f"{n_compared} of {n} compared"
-    if n_open > MAX_UNDECIDED * max(n, n_asked):
-        return result("declined", why if notes else f"{why}; {n_open} of {max(n, n_asked)} undecided")
+    if n_declined > MAX_UNDECIDED * n:
+        return result("declined", why)
+    if n_open > MAX_UNDECIDED * n_asked:
+        return result("declined", f"{why}; {n_open} of {n_asked} answers are undecided")
     return result("pass", why) if n_compared else result("unsupported", lacking)
 
 

@@ -18,7 +18,7 @@ from conformance import plain
 from conformance.generator import draws
 from conformance.generator.draws import Draw
 from conformance.suite.answers import read_arrival
-from conformance.suite.checks.flaws import COARSE, FINE, UNCLEAR, first_stay, flaw_of
+from conformance.suite.checks.flaws import COARSE, FINE, LATE, UNCLEAR, first_stay, flaw_of, is_fine
 from conformance.suite.checks.form import FOREVER, Implementation, Question, octaves
 from conformance.suite.checks.refusals import moved
 from scene import (
@@ -65,7 +65,7 @@ def follow(side: Implementation, scene: Scene, state: State, n: int, t_end: floa
     decided = [hit for hit in path if not isinstance(hit, Undecided)]
     for outcome in decided[:1]:
         assert isinstance(outcome, Collision | Horizon), f"{state} in {scene}: {outcome}"
-    if flaw := flaw_of(scene, state, decided):
+    if flaw := flaw_of(scene, state, decided, side.errors):
         number = int(flaw.split()[1]) - 1 if flaw.startswith("outcome") else len(decided) - 1
         before = decided[number - 1] if number else state
         raise AssertionError(f"{flaw}: {decided[number]}, after {before}, in {scene}")
@@ -92,7 +92,9 @@ def _arrives(
     if isinstance(arrival, Undecided) or not isinstance(end, Horizon):
         return False
     # A bounce makes 4 times as much of an error, as a rule; a path of many hits is regular.
-    grown = (FINE if abs(end.t) < 2.0**10 else COARSE) * 4.0 ** min(len(hits), 16)
+    fine = all(is_fine(side.errors.get(name, ()), FINE) for name in ("place", "bounce"))
+    late = LATE * abs(end.t) / crossing(scene, State(end.t, end.x, end.y, end.vx, end.vy))
+    grown = ((FINE if fine else COARSE) + 64 * late) * 4.0 ** min(len(hits), 16)
     assert distance(scene, arrival, end) <= min(grown, CARRIED), (
         f"{state}: {arrival} by flow, {end} by its path, in {scene}"
     )
@@ -193,17 +195,8 @@ def aimed(draw: Draw, near: float) -> tuple[Scene, State, int]:
     table = table_at(fp, scene, 0.0)
     x, y = draws.place(draw, table, region)
     to_x, to_y = draw.pick(table.corners(region))
-    return (
-        scene,
-        _towards(
-            draw,
-            0.9 * x,
-            0.05 * (0.5 if region == "cap" else -0.5) + 0.8 * y,
-            to_x + draw.pick((near, -near)),
-            to_y,
-        ),
-        3,
-    )
+    inside = 0.4 if region == "cap" else -0.4 * float(table.h)  # off all walls: the table is convex there
+    return scene, _towards(draw, 0.8 * x, 0.8 * y + 0.2 * inside, to_x + draw.pick((near, -near)), to_y), 3
 
 
 def through_the_mouth(draw: Draw, near: float) -> tuple[Scene, State, int]:
@@ -273,6 +266,11 @@ def changed(draw: Draw, profile: str) -> Iterator[Question]:
         nudged = replace(state, **{name: getattr(state, name) * (1.0 + near)})
         if _meets(scene, nudged):
             yield from ((scene, start, 1) for start in (state, nudged, state))
+    for _ in range(N_USUAL // 3):  # late times that are the same to 15 digits
+        t = draw.between(0.6, 1.0) * 2.0**17
+        state = State(t, 0.25, 0.25, 0.0, draw.between(1.0, 64.0))
+        nudged = replace(state, t=t + draw.pick((4, 5, 6)) * math.ulp(t))
+        yield from ((Cap(r=1.0), start, 1) for start in (state, nudged, state))
     for near in octaves(draw, 2.0**-26, 2.0**-21):  # off the arc by less than is allowed
         x, y = -(1.0 - near) * math.cos(0.4), (1.0 - near) * math.sin(0.4)
         state = State(0.0, x, y, 1.0, draw.between(0.0, 0.2), "arc")
@@ -405,7 +403,7 @@ def arrive(side: Implementation, scene: Scene, begin: float, end: float) -> bool
 def crowds(draw: Draw, profile: str) -> Iterator[Question]:
     """Ask flows of many states in any order: twins that differ in one field alone, bad ones, late ones."""
     for n in octaves(draw, 1, MAX_STATES):
-        scene, state = draw.pick((drawn(draw), nearly_captured(draw, draw.between(0.1, 0.3))[:2]))
+        scene, state = draw.pick((drawn(draw), *[nearly_captured(draw, draw.between(0.1, 0.3))[:2]] * 2))
         size, span = float(table_at(fp, scene, state.t).size), crossing(scene, state)
         pool = [
             state,

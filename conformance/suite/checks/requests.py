@@ -13,7 +13,7 @@ from decimal import Decimal
 from typing import Any
 
 from conformance.generator.draws import Draw
-from conformance.suite.answers import read_outcome
+from conformance.suite.answers import read_outcome, with_walls
 from conformance.suite.checks.form import FOREVER, Implementation, Question, octaves, question
 from conformance.suite.checks.paths import distance, drawn, is_same_stay
 from conformance.suite.process import Trouble
@@ -155,7 +155,8 @@ def _agree(
 ) -> bool:
     """Hold an answer to a question in another form to the answer to itself, to rounding."""
     own = side.parts(request)
-    given = answer.get("steps", answer.get("states", [answer]))
+    told = with_walls({**answer}, request["scene"])
+    given = told.get("steps", told.get("states", [told]))
     if "error" in answer:
         raise Trouble("error", f"{answer['error']}: {how}")
     assert len(given) == len(own), f"{given}, must be {own}: {how}"

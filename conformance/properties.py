@@ -14,7 +14,7 @@ Mirror and power-of-two scaling hold bit for bit in any stepper whose arithmetic
 absolute tolerance and treats both sides alike; `is_exact=False` asks for them within rounding. All others
 hold within rounding: `bound` is the backward error granted (1e-9 by default, as in the physics verdict),
 and what it does to the answer is measured on the stepper itself (`conformance.grading.sensitivity`). The work
-identity, a property of whole ensembles, is `conformance.profiles.check_work_identity`.
+identity of whole ensembles is `conformance.profiles.check_work_identity`.
 """
 
 from __future__ import annotations
@@ -57,9 +57,6 @@ def check_mirror(
 
     Returns:
         Whether there was something to compare.
-
-    Raises:
-        AssertionError: one line: what differs, the question, and its image where there is one.
     """
     stepper = answering(stepper)
     given, image = (scene, state, t_end), (scene, transforms.mirrored(state), t_end)
@@ -80,8 +77,7 @@ def check_scaling(
 ) -> bool:
     """Hold lengths times 2^length and times times 2^time to scale the answer alike.
 
-    Bit for bit as long as all numbers, before and after, lie between 2^-400 and 2^400 in size or are 0;
-    elsewhere nothing is compared. Arguments and results otherwise as in `check_mirror`.
+    Bit for bit where all numbers, before and after, are 0 or between 2^-400 and 2^400. See `check_mirror`.
     """
     stepper = answering(stepper)
     unit, size, speed = (transforms.times_power(1.0, exponent) for exponent in (time, length, length - time))
@@ -278,10 +274,10 @@ def check_symplectic(
     way = _across_bounce(stepper, scene, state, t_end)
     if way is None:
         return False
-    begin, hit, end = way
+    begin, _, end = way
     scale = sensitivity.scales(scene, state)
     units = (scale.length, scale.length, scale.speed, scale.speed)
-    coarse, fine = (_flow_matrix(stepper, scene, begin, hit, end, units, width) for width in (STEP, STEP / 2))
+    coarse, fine = (_flow_matrix(stepper, scene, way, units, width) for width in (STEP, STEP / 2))
     if coarse is None or fine is None:
         return False
     M = [[(4 * b - a) / 3 for a, b in zip(*rows, strict=True)] for rows in zip(coarse, fine, strict=True)]
@@ -331,15 +327,10 @@ def _across_bounce(
 
 
 def _flow_matrix(
-    stepper: Stepper,
-    scene: Scene,
-    begin: State,
-    hit: Collision,
-    end: float,
-    units: Sequence[float],
-    width: float,
+    stepper: Stepper, scene: Scene, way: tuple[State, Collision, float], units: Sequence[float], width: float
 ) -> list[list[float]] | None:
-    """Differentiate the state at `end` by that at `begin`, in the given units; rows by outputs."""
+    """Differentiate the state at the end of a way by that at its begin; rows by outputs, in given units."""
+    begin, hit, end = way
     columns = []
     for field, unit in zip(("x", "y", "vx", "vy"), units, strict=True):
         ends = []
@@ -401,11 +392,7 @@ def _compare(
 
 
 def _near(
-    name: str,
-    found: Sequence[float],
-    wanted: Sequence[float],
-    allowed: Sequence[float],
-    *asked: Question,
+    name: str, found: Sequence[float], wanted: Sequence[float], allowed: Sequence[float], *asked: Question
 ) -> None:
     for part, a, b, error in zip(NAMES, found, wanted, allowed, strict=True):
         if not abs(a - b) <= SLACK * error:

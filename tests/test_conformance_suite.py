@@ -10,8 +10,8 @@ from xml.etree import ElementTree
 import msgspec
 import pytest
 from msgspec.structs import replace
-from support.faults import FAULTS, clock
-from support.faulty_servers import faulty
+from support.faults import FAULTS
+from support.faulty_servers import clock, faulty
 from support.schemas import validator
 from test_conformance_session import made_up
 

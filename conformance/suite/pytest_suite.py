@@ -14,7 +14,7 @@ from __future__ import annotations
 import pytest
 
 from conformance import suite
-from conformance.suite.checks import Check, run_check
+from conformance.suite.checks import SuiteCheck, run_check
 from conformance.suite.disguise import Disguise
 from conformance.suite.result import Result
 from conformance.suite.session import Session
@@ -26,7 +26,7 @@ def test_vector(mushrooms_session: Session, mushrooms_vector: Vector, mushrooms_
     _report(suite.ask_vector(mushrooms_session, mushrooms_vector, mushrooms_disguise), mushrooms_vector.rule)
 
 
-def test_check(mushrooms_session: Session, mushrooms_check: Check, pytestconfig: pytest.Config) -> None:
+def test_check(mushrooms_session: Session, mushrooms_check: SuiteCheck, pytestconfig: pytest.Config) -> None:
     """Ask what one check draws from the run's seed."""
     result = run_check(mushrooms_check, mushrooms_session, pytestconfig.option.mushrooms_seed)
     _report(result, result.paste)

@@ -42,7 +42,7 @@ from conformance.suite.disguise import (
 from conformance.suite.process import NOT_NUMBERS, Trouble
 from conformance.suite.result import BAD, Result, Run, Speed, outcomes_of
 from conformance.suite.scope import graded_parts
-from conformance.suite.session import Limits, Session, missing
+from conformance.suite.session import AnswerLine, Limits, Session, missing
 from conformance.vectors import Vector
 from scene import BadInput, State, load, to_data
 from scene.refusal import check_seed
@@ -63,7 +63,7 @@ Progress = Callable[[int, int], None]
 
 
 def check(
-    command: Sequence[str],
+    command: Sequence[str] | AnswerLine,
     *,
     level: str = "core",
     seed: int | None = None,
@@ -75,7 +75,7 @@ def check(
     """Run the suite on a command.
 
     Args:
-        command: program and arguments; it speaks protocol 1.
+        command: program and arguments, or a function that answers lines; it speaks protocol 1.
         level: core, extended or stress.
         seed: of all that is drawn, 0 to 2^64 - 1; None for a new one.
         groups: of cases; all when empty. Of the others only the protocol's own cases are asked.
@@ -98,7 +98,7 @@ def check(
         results = [msgspec.structs.replace(r, is_known=_is_known(r, known, seed)) for r in results]
         passed = {result.id for result in results if result.verdict == "pass"}
         return Run(
-            command=list(command),
+            command=["(in process)"] if callable(command) else list(command),
             level=level,
             seed=seed,
             corpus=manifest.corpus,

@@ -3,14 +3,38 @@
 from __future__ import annotations
 
 import math
-import time
-from collections.abc import Callable
 
+from support.faulty_refusals import (
+    absent_as_zero,
+    arrived,
+    at_once,
+    everywhere,
+    fleeing,
+    in_a,
+    in_the_mouth,
+    leaving_slowly,
+    letting,
+    loose,
+    narrower,
+    near_by,
+    nearly_one_period,
+    number_of,
+    on_a_longer,
+    one_of_two,
+    passes_samples,
+    refusing,
+    scenes_let,
+    scenes_refused_for,
+    slower,
+    strictly_off,
+    unknown_wall,
+    whole,
+    wide_by_ranges,
+)
 from support.faulty_servers import (
     FLOW,
     PATH,
     STEP,
-    Answer,
     Change,
     Fault,
     Line,
@@ -21,19 +45,23 @@ from support.faulty_servers import (
     at_bad_lines,
     by,
     captured_as,
+    clock,
     crash,
     each,
+    elsewhere,
+    fewer,
     first_parts,
     losing_stays,
     minus_is_below,
     nameless_only,
     on,
+    once,
     one_bad_spoils_all,
     particles_by,
+    remembered,
     rounded,
     same_velocity_for_all,
     scenes_by,
-    slowed,
     starts,
     straight_on,
     swapping,
@@ -46,94 +74,26 @@ from support.faulty_servers import (
 )
 from support.faulty_steppers import (
     OPEN,
-    absent_as_zero,
-    arrived,
-    at_once,
     beside_its_wall,
     dead_time,
     early,
-    everywhere,
-    fleeing,
     horizon_at_once,
     impatient,
-    in_a,
-    in_the_mouth,
     late_speed,
     leaking,
     leaving_out,
-    leaving_slowly,
-    letting,
-    loose,
-    narrower,
-    near_by,
-    nearly_one_period,
     never_moving,
-    number_of,
-    on_a_longer,
-    one_of_two,
     one_too_few,
-    passes_samples,
-    refusing,
     repeated,
-    scenes_let,
-    scenes_refused_for,
-    slower,
-    strictly_off,
+    slowed,
     tired,
     to_and_fro,
-    unknown_wall,
-    whole,
-    wide_by_ranges,
     with_mouth,
     with_slope,
     wrong_order,
 )
 
 PLACE = ("x", "y", "vx", "vy")
-
-
-def clock(change: Callable[[Line, list[int]], list[int]]) -> Fault:
-    """Say other nanoseconds."""
-    return on("time", lambda request, found: {**found, "ns": change(request, found["ns"])})
-
-
-def once(said: Callable[[int, list[int], int], list[int]]) -> Fault:
-    """Follow each start once, however often is asked, and say something: (collisions, ns, repeat)."""
-
-    def fault(request: Line, answer: Answer) -> Line:
-        if (
-            request.get("cmd") != "time"
-            or not isinstance(request.get("repeat"), int)
-            or request["repeat"] < 1
-        ):
-            return answer(request)
-        repeat, request["repeat"] = request["repeat"], 1
-        found = answer(request)
-        return {**found, "ns": said(request["collisions"], found["ns"], repeat)} if "ns" in found else found
-
-    return fault
-
-
-def remembered(_: int, ns: list[int], repeat: int) -> list[int]:
-    """Look a path up that was followed once."""
-    time.sleep(2e-4 * (repeat - 1))
-    return [*ns, *[200_000] * (repeat - 1)]
-
-
-def fewer(most: int) -> Fault:
-    """Follow half of the collisions only, when many are asked for."""
-
-    def fault(request: Line, answer: Answer) -> Line:
-        if request.get("cmd") == "time" and isinstance(n := request.get("collisions"), int) and n > most:
-            request["collisions"] = n // 2
-        return answer(request)
-
-    return fault
-
-
-def elsewhere(_: Line, found: Line) -> None:
-    """Invent the last place."""
-    found["steps"][-1]["x"] += 0.01
 
 
 def first_time_for_all(request: Line) -> None:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import io
 import json
 import math
+import time
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -305,11 +306,6 @@ def after_hits(n: int, change: Callable[[Line, Line, Line], object]) -> Fault:
     return on(FLOW, changed)
 
 
-def slowed(_: Line, last: Line, arrived: Line) -> None:
-    """Keep the speed."""
-    turned(arrived, math.hypot(last["vx"], last["vy"]) / math.hypot(arrived["vx"], arrived["vy"]))
-
-
 def straight_on(request: Line, last: Line, arrived: Line) -> None:
     """Meet no wall."""
     dt = request["t_end"] - last["t"]
@@ -353,3 +349,50 @@ def losing_stays(where: Callable[[int, int], bool]) -> Change:
                 state["captured"] = None
 
     return change
+
+
+# Clocks.
+
+
+def clock(change: Callable[[Line, list[int]], list[int]]) -> Fault:
+    """Say other nanoseconds."""
+    return on("time", lambda request, found: {**found, "ns": change(request, found["ns"])})
+
+
+def once(said: Callable[[int, list[int], int], list[int]]) -> Fault:
+    """Follow each start once, however often is asked, and say something: (collisions, ns, repeat)."""
+
+    def fault(request: Line, answer: Answer) -> Line:
+        if (
+            request.get("cmd") != "time"
+            or not isinstance(request.get("repeat"), int)
+            or request["repeat"] < 1
+        ):
+            return answer(request)
+        repeat, request["repeat"] = request["repeat"], 1
+        found = answer(request)
+        return {**found, "ns": said(request["collisions"], found["ns"], repeat)} if "ns" in found else found
+
+    return fault
+
+
+def remembered(_: int, ns: list[int], repeat: int) -> list[int]:
+    """Look a path up that was followed once."""
+    time.sleep(2e-4 * (repeat - 1))
+    return [*ns, *[200_000] * (repeat - 1)]
+
+
+def fewer(most: int) -> Fault:
+    """Follow half of the collisions only, when many are asked for."""
+
+    def fault(request: Line, answer: Answer) -> Line:
+        if request.get("cmd") == "time" and isinstance(n := request.get("collisions"), int) and n > most:
+            request["collisions"] = n // 2
+        return answer(request)
+
+    return fault
+
+
+def elsewhere(_: Line, found: Line) -> None:
+    """Invent the last place."""
+    found["steps"][-1]["x"] += 0.01

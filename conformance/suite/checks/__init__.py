@@ -12,13 +12,13 @@ from functools import partial
 
 from conformance import properties
 from conformance.generator.draws import Draw
-from conformance.suite.checks import endings, paths, refusals, requests, timing
+from conformance.suite.checks import endings, flows, paths, refusals, requests, timing
 from conformance.suite.checks.ensembles import ensemble_checks
-from conformance.suite.checks.form import QUESTIONS, Check, Implementation, Question, run_check
+from conformance.suite.checks.form import QUESTIONS, Implementation, Question, SuiteCheck, run_check
 from conformance.suite.session import AnswerLine, Session
 from scene import Scene, State
 
-__all__ = ["LEVELS", "Check", "Implementation", "checks_of", "hold", "judge", "questions", "run_check"]
+__all__ = ["LEVELS", "Implementation", "SuiteCheck", "checks_of", "hold", "judge", "questions", "run_check"]
 
 LEVELS = ("core", "extended", "stress")
 GROUPS = ("property", "profile", "promise")
@@ -49,38 +49,38 @@ def _symmetric(name: str, side: Implementation, scene: Scene, state: State, t_en
         return check(side, scene, state, t_end, is_exact=False)
 
 
-def _symmetry(name: str) -> Check:
+def _symmetry(name: str) -> SuiteCheck:
     asks: Callable[[Draw, str], Iterator[Question]] = moments
     if name == "static-limit":  # asks for constants written as laws
         asks = partial(moments, kinds=("fourier",))
     profiles = QUESTIONS[:2] if name in OF_HITS else QUESTIONS
-    return Check(f"property/{name}", asks, partial(_symmetric, name), profiles)
+    return SuiteCheck(f"property/{name}", asks, partial(_symmetric, name), profiles)
 
 
 SYMMETRIES = tuple(_symmetry(name) for name in properties.PROPERTIES)
 RULES = (
-    Check("promise/hits", paths.usual, paths.follow),
-    Check("promise/edges", paths.edges, paths.follow),
-    Check("promise/changed-questions", paths.changed, paths.follow),
-    Check("promise/long-paths", paths.long, paths.follow),
-    Check("promise/late-starts", paths.late, paths.follow),
-    Check("promise/waiting", paths.waiting, paths.follow),
-    Check("promise/long-flow", paths.returning, paths.arrive, ("flow",)),
-    Check("promise/many-particles", paths.crowds, paths.together, ("flow",)),
-    Check("promise/endings", endings.endings, endings.end_as_due),
-    Check("promise/spelling", requests.spellings, requests.same),
-    Check("promise/minus-zero", requests.zeros, requests.same),
-    Check("promise/malformed-lines", requests.bad_lines, requests.passed_over),
-    Check("promise/extra-fields", requests.further_fields, requests.ignored_or_refused),
-    Check("promise/bad-requests", refusals.requests, refusals.refuse, ALL),
-    Check("promise/bad-states", refusals.bad_states, refusals.refuse),
-    Check("promise/bad-scenes", refusals.bad_scenes, refusals.refuse),
-    Check("promise/time-steps", timing.questions, timing.same_steps, ("time",)),
-    Check("promise/time-clock", timing.questions, timing.honest_clock, ("time",)),
+    SuiteCheck("promise/hits", paths.usual, paths.follow),
+    SuiteCheck("promise/edges", paths.edges, paths.follow),
+    SuiteCheck("promise/changed-questions", paths.changed, paths.follow),
+    SuiteCheck("promise/long-paths", paths.long, paths.follow),
+    SuiteCheck("promise/late-starts", paths.late, paths.follow),
+    SuiteCheck("promise/waiting", paths.waiting, paths.follow),
+    SuiteCheck("promise/long-flow", flows.returning, flows.arrive, ("flow",)),
+    SuiteCheck("promise/many-particles", flows.crowds, flows.together, ("flow",)),
+    SuiteCheck("promise/endings", endings.endings, endings.end_as_due),
+    SuiteCheck("promise/spelling", requests.spellings, requests.same),
+    SuiteCheck("promise/minus-zero", requests.zeros, requests.same),
+    SuiteCheck("promise/malformed-lines", requests.bad_lines, requests.passed_over),
+    SuiteCheck("promise/extra-fields", requests.further_fields, requests.ignored_or_refused),
+    SuiteCheck("promise/bad-requests", refusals.requests, refusals.refuse, ALL),
+    SuiteCheck("promise/bad-states", refusals.bad_states, refusals.refuse),
+    SuiteCheck("promise/bad-scenes", refusals.bad_scenes, refusals.refuse),
+    SuiteCheck("promise/time-steps", timing.questions, timing.same_steps, ("time",)),
+    SuiteCheck("promise/time-clock", timing.questions, timing.honest_clock, ("time",)),
 )
 
 
-def checks_of(level: str = "core", names: str | tuple[str, ...] = "") -> list[Check]:
+def checks_of(level: str = "core", names: str | tuple[str, ...] = "") -> list[SuiteCheck]:
     """Return the checks of a level whose names begin with a text, or one of some; all when it is empty."""
     return [check for check in (*SYMMETRIES, *ensemble_checks(level), *RULES) if check.name.startswith(names)]
 
@@ -118,5 +118,5 @@ def questions(name: str, profile: str) -> object:
     )
 
 
-def _named(name: str) -> Check:
+def _named(name: str) -> SuiteCheck:
     return next(check for check in checks_of() if check.name == name)

@@ -17,7 +17,7 @@ from conformance import profiles, properties
 from conformance.generator.draws import Draw
 from conformance.profiles import Statistic
 from conformance.suite.answers import read_arrival
-from conformance.suite.checks.form import Check, Implementation, Question
+from conformance.suite.checks.form import Implementation, Question, SuiteCheck
 from conformance.suite.process import Trouble
 from scene import Fourier, Horizon, Mushroom, Outcome, Scene, State, load
 from scene.geometry import area
@@ -57,7 +57,7 @@ SIZES = {
 }
 
 
-def ensemble_checks(level: str) -> list[Check]:
+def ensemble_checks(level: str) -> list[SuiteCheck]:
     """Return the statistical checks, of as many particles as a level has."""
 
     def asks(scene: Mushroom) -> Callable[[Draw, str], Iterator[Question]]:
@@ -67,7 +67,7 @@ def ensemble_checks(level: str) -> list[Check]:
     assert isinstance(scene, Mushroom)
     tests = (_work_identity, SHRINKING), (_captured_share, scene), (_mean_growth, scene)
     return [
-        Check(f"profile/{name}", asks(scene), partial(_hold, test), ("flow",))
+        SuiteCheck(f"profile/{name}", asks(scene), partial(_hold, test), ("flow",))
         for name, (test, scene) in zip(PROFILES, tests, strict=True)
     ]
 

@@ -21,14 +21,16 @@ from conformance.suite.process import NOT_NUMBERS, Trouble
 from conformance.suite.result import Result
 from conformance.suite.session import Session, missing
 from scene import Collision, Outcome, Scene, State, Undecided, to_data
+from scene.protocol.messages import Introduction
 
 QUESTIONS = ("step", "trajectory", "flow")  # the profiles that answer by outcomes
 FOREVER = sys.float_info.max  # t_end of a question that only collisions end
+MAX_DRAWN = 6  # times that questions are drawn for an implementation of a part of the tables or laws
 MAX_UNDECIDED = 0.1  # of a check's questions: more, and it is declined
 Question = tuple[Any, ...]  # a scene that is asked about, or its data, and what else `judges` takes
 
 
-class Check(NamedTuple):
+class SuiteCheck(NamedTuple):
     """What is asked, and how it is judged.
 
     Attributes:
@@ -137,12 +139,11 @@ def question(
     cmd: str, scene: Scene | Mapping[str, Any], start: State | Sequence[State], t_end: float, n: int = 1
 ) -> dict[str, Any]:
     """Return a request, all but its seq."""
-    data = scene if isinstance(scene, Mapping) else to_data(scene)
     starts = [start] if isinstance(start, State) else list(start)
     place = {"states": starts} if cmd == "flow" else {"state": starts[0]}
     more = {"trajectory": {"collisions": n}, "time": {"collisions": n, "repeat": 1}}.get(cmd, {})
     end = {} if cmd == "time" else {"t_end": t_end}
-    return {"cmd": cmd, "scene": data, **msgspec.to_builtins(place), **more, **end}
+    return {"cmd": cmd, "scene": _data(scene), **msgspec.to_builtins(place), **more, **end}
 
 
 def outcome_of(part: Mapping[str, Any], t: float) -> Outcome:
@@ -157,10 +158,10 @@ def octaves(draw: Draw, low: float, high: float) -> Iterator[float]:
         high /= 2
 
 
-def run_check(check: Check, session: Session, seed: int) -> Result:
+def run_check(check: SuiteCheck, session: Session, seed: int) -> Result:
     """Ask all that a check draws from a seed, of every profile that is offered, up to the first fault."""
     assert session.introduction is not None
-    begin, lacking = time.monotonic(), "nothing to ask"
+    begin, lacking = time.monotonic(), ""
     notes: list[str] = []
     n = n_compared = n_declined = n_open = n_asked = 0
 
@@ -170,11 +171,8 @@ def run_check(check: Check, session: Session, seed: int) -> Result:
 
     for profile in check.profiles:
         side = Implementation(session, profile)
-        for asked in check.asks(Draw(f"{seed}/{check.name}/{profile}"), profile):
-            data = asked[0] if isinstance(asked[0], Mapping) else to_data(asked[0])
-            if lacks := missing(session.introduction, profile, data):
-                lacking = lacks
-                continue
+        fitting, lacking = _drawn(check, session.introduction, profile, seed)
+        for asked in fitting:
             try:
                 n += 1
                 found = check.judges(side, *asked)
@@ -200,10 +198,28 @@ def run_check(check: Check, session: Session, seed: int) -> Result:
         return result("declined", why)
     if n_open > MAX_UNDECIDED * n_asked:
         return result("declined", f"{why}; {n_open} of {n_asked} answers are undecided")
-    return result("pass", why) if n_compared else result("unsupported", lacking)
+    return result("pass", why) if n_compared else result("unsupported", lacking or "nothing to compare")
 
 
-def as_pytest(check: Check, profile: str, asked: Question) -> str:
+def _drawn(check: SuiteCheck, offered: Introduction, profile: str, seed: int) -> tuple[list[Question], str]:
+    """Return the questions that may be asked, drawn anew while too few are, and what the others need."""
+    fitting: list[Question] = []
+    lacking = "" if profile in offered.profiles else f"profile {profile}"
+    for i in range(0 if lacking else MAX_DRAWN):
+        asked = list(check.asks(Draw(f"{seed}/{check.name}/{profile}/{i}"), profile))
+        needs = [missing(offered, profile, _data(one[0])) for one in asked]
+        fitting += [one for one, need in zip(asked, needs, strict=True) if not need]
+        lacking = next(filter(None, needs), lacking)
+        if 2 * len(fitting) >= len(asked):
+            break
+    return fitting, lacking
+
+
+def _data(scene: Scene | Mapping[str, Any]) -> Mapping[str, Any]:
+    return scene if isinstance(scene, Mapping) else to_data(scene)
+
+
+def as_pytest(check: SuiteCheck, profile: str, asked: Question) -> str:
     """Return a failed question as a pytest case to paste; `implementation` is the stepper, or its command."""
     name = check.name.replace("/", "_").replace("-", "_")
     return f"""\

@@ -8,9 +8,11 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from decimal import Decimal
 from typing import Any
+
+from msgspec.structs import replace
 
 from conformance.generator.draws import Draw
 from conformance.suite.answers import read_outcome, with_walls
@@ -23,7 +25,7 @@ from scene.tables import cycle_length
 
 MAX_LINE = 2**20  # bytes of a request
 ROUNDING, CARRIED = 2.0**-44, 2.0**-40  # of sizes: of a step, and of more
-N_SPELLINGS, N_HITS = 16, 2
+N_SPELLINGS, N_AFTER, N_HITS = 16, 4, 2
 UNKNOWN = "hint", 7.0  # a field that the protocol does not know
 TEXTS = (
     "a name",
@@ -74,23 +76,28 @@ def same(side: Implementation, scene: Scene, state: State, request: Mapping[str,
 
 
 def bad_lines(draw: Draw, profile: str) -> Iterator[Question]:
-    """Send lines that are no requests, and a question after each."""
+    """Send lines that are no requests, and questions after each."""
+    scene, state, request = _one(draw, profile)
+    asked = []
+    for _ in range(N_AFTER):
+        start = replace(state, vx=state.vx * draw.between(0.5, 1.0), vy=state.vy * draw.between(0.5, 1.0))
+        asked.append((start, question(profile, scene, start, request["t_end"])))
+    yield scene, asked
+
+
+def passed_over(side: Implementation, scene: Scene, asked: Sequence[tuple[State, Mapping[str, Any]]]) -> bool:
+    """Hold lines that are no requests to be refused, and what is asked after each to be answered as before."""
+    before = [side.session.ask(request) for _, request in asked]
     for line, seq in MALFORMED:
-        scene, state, request = _one(draw, profile)
-        yield scene, state, request, line, seq
-
-
-def passed_over(
-    side: Implementation, scene: Scene, state: State, request: Mapping[str, Any], line: bytes, seq: int | None
-) -> bool:
-    """Hold a line that is no request to be refused, and the next to be answered as ever."""
-    before, shown = side.session.ask(request), line.decode()
-    try:
-        refusal = side.session.say(line, seq)
-        assert refusal.get("outcome") == "rejected", f"{shown}: answered {refusal}, must be rejected"
-        return _agree(side, scene, state, request, before, f"before {shown}")
-    except Trouble as trouble:
-        raise Trouble(trouble.verdict, f"{shown}: {trouble.why}") from None
+        shown = line.decode()
+        try:
+            refusal = side.session.say(line, seq)
+            assert refusal.get("outcome") == "rejected", f"{shown}: answered {refusal}, must be rejected"
+            for (state, request), answer in zip(asked, before, strict=True):
+                _agree(side, scene, state, request, answer, f"before {shown}")
+        except Trouble as trouble:
+            raise Trouble(trouble.verdict, f"{shown}: {trouble.why}") from None
+    return True
 
 
 def further_fields(draw: Draw, profile: str) -> Iterator[Question]:

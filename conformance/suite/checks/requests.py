@@ -86,7 +86,7 @@ def bad_lines(draw: Draw, profile: str) -> Iterator[Question]:
 
 
 def passed_over(side: Implementation, scene: Scene, asked: Sequence[tuple[State, Mapping[str, Any]]]) -> bool:
-    """Hold lines that are no requests to be refused, and what is asked after each to be answered as before."""
+    """Hold lines that are no requests to be refused, and what comes after them to be answered as before."""
     before = [side.session.ask(request) for _, request in asked]
     for line, seq in MALFORMED:
         shown = line.decode()

@@ -177,7 +177,9 @@ def _show_objections(console: Console, run: Run) -> None:
         console.print(f"  certified {escape(in_one_line(result.expected))}")
     wrong = [r for r in run.results if not r.is_right and not r.is_known]
     for result in [r for r in wrong if r.paste][:MAX_TAUGHT]:
-        console.print(f"{result.id} as a test, where implementation is {run.command!r}:", markup=False)
+        console.print(
+            f"{result.id} as a test, where implementation is {run.command}:", markup=False, soft_wrap=True
+        )
         console.print(result.paste, markup=False, soft_wrap=True)
     for result in [r for r in wrong if r.sent and r.group == "protocol"][:MAX_TAUGHT]:
         rest = "... (--json FILE has it whole)" if len(result.sent) > MAX_SENT else ""

@@ -94,7 +94,7 @@ def test_a_bad_stepper_is_not(call, tmp_path):
     page = tmp_path / "r.html"
     code, out, _ = call("--seed", 5, "--html", page, "--json", tmp_path / "r.json", "--", *command("honest"))
     assert code == 1
-    assert re.search(r"promise/\S+ as a test, where implementation is \[.*@example\(", out, re.DOTALL)
+    assert re.search(r"property/\S+ as a test, where implementation is \[.*@example\(", out, re.DOTALL)
     assert re.search(r"; mushrooms ask \S+ --seed 5 prints it\n", out)
     assert "not accepted" in out
     assert "fail" in out

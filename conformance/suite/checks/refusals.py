@@ -168,15 +168,14 @@ Kind = Callable[[float, float], dict[str, Any]]  # (its bound, its value far fro
 def bad_scenes(draw: Draw, profile: str) -> Iterator[Question]:
     """Break each condition of a scene for a drawn share of the period, and come as near to it without."""
     for share in octaves(draw, 1.0 / MOST_SAMPLES, 0.25):
-        for make in (_wave, _legs):
-            at = draw.part()
-            for off, why in ((1.0, f"a law is broken for {share:.3g} of the period"), (-1.0, "")):
-                law = partial(make, share=share, at=at, off=off)
-                for data in _at_their_bounds(law):
-                    yield _asked_soon(profile, data, why, at - 0.5)
-                # Apart at all times, though their ranges are not.
-                sound = {"table": "mushroom", "r": law(1.25, 0.75), "w": law(1.2, 0.7), "h": 1.0}
-                yield _asked_soon(profile, sound, "", at - 0.5)
+        make, at = draw.pick((_wave, _legs)), draw.part()
+        for off, why in ((1.0, f"a law is broken for {share:.3g} of the period"), (-1.0, "")):
+            law = partial(make, share=share, at=at, off=off)
+            for data in _at_their_bounds(law):
+                yield _asked_soon(profile, data, why, at - 0.5)
+            # Apart at all times, though their ranges are not.
+            sound = {"table": "mushroom", "r": law(1.25, 0.75), "w": law(1.2, 0.7), "h": 1.0}
+            yield _asked_soon(profile, sound, "", at - 0.5)
     for apart in octaves(draw, UNEQUAL, 1.0):
         yield _asked_soon(profile, _of_two_periods(draw, apart), f"periods differ by {apart:.3g}")
     yield _asked_soon(profile, _of_two_periods(draw, 0.0), "")

@@ -72,7 +72,7 @@ def same(side: Implementation, scene: Scene, state: State, request: Mapping[str,
     """Hold a line to be answered as the request is."""
     seq = MAX_SEQ // 2
     answer = side.session.say(line.replace('"SEQ"', str(seq)).encode(), seq, side.profile)
-    return _agree(side, scene, state, request, answer, line[:400])
+    return _agree(side, scene, state, request, answer, repr(line[:400]))
 
 
 def bad_lines(draw: Draw, profile: str) -> Iterator[Question]:

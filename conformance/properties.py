@@ -14,7 +14,7 @@ Mirror and power-of-two scaling hold bit for bit in any stepper whose arithmetic
 absolute tolerance and treats both sides alike; `is_exact=False` asks for them within rounding. All others
 hold within rounding: `bound` is the backward error granted (1e-9 by default, as in the physics verdict),
 and what it does to the answer is measured on the stepper itself (`conformance.grading.sensitivity`). The work
-identity, a property of whole ensembles, is `conformance.profiles.check_work_identity`.
+identity of whole ensembles is `conformance.profiles.check_work_identity`.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ import msgspec
 
 from conformance.grading import sensitivity
 from conformance.grading.called import Question, answering, fail
-from conformance.grading.sensitivity import measured, numbers
+from conformance.grading.sensitivity import MeasuredStep, measured, numbers
 from scene import Collision, Horizon, Outcome, Rejected, Scene, State, Undecided, transforms
 from scene.laws import is_constant
 from scene.precision import decimals
@@ -57,9 +57,6 @@ def check_mirror(
 
     Returns:
         Whether there was something to compare.
-
-    Raises:
-        AssertionError: one line: what differs, the question, and its image where there is one.
     """
     stepper = answering(stepper)
     given, image = (scene, state, t_end), (scene, transforms.mirrored(state), t_end)
@@ -80,8 +77,7 @@ def check_scaling(
 ) -> bool:
     """Hold lengths times 2^length and times times 2^time to scale the answer alike.
 
-    Bit for bit as long as all numbers, before and after, lie between 2^-400 and 2^400 in size or are 0;
-    elsewhere nothing is compared. Arguments and results otherwise as in `check_mirror`.
+    Bit for bit where all numbers, before and after, are 0 or between 2^-400 and 2^400. See `check_mirror`.
     """
     stepper = answering(stepper)
     unit, size, speed = (transforms.times_power(1.0, exponent) for exponent in (time, length, length - time))
@@ -148,13 +144,13 @@ def check_period_shift(
 def check_split_flight(
     stepper: Stepper, scene: Scene, state: State, t_end: float, *, bound: float = BOUND
 ) -> bool:
-    """Hold a flight that is stopped halfway and taken up again to meet the same wall. See `check_mirror`."""
+    """Hold a flight, or a flow, that is stopped halfway and taken up again, to end alike."""
     stepper = answering(stepper)
     given = scene, state, t_end
     whole = measured(stepper, *given, bound)
-    if whole is None or not isinstance(whole.outcome, Collision):
+    if whole is None:
         return False
-    middle = state.t + whole.outcome.dt / 2
+    middle = state.t + whole.numbers[0] / 2
     half = measured(stepper, scene, state, middle, bound)
     if half is None or middle == state.t:
         return False
@@ -164,7 +160,7 @@ def check_split_flight(
     rest = measured(stepper, *asked[-1], bound, half.errors[1:])
     if rest is None:
         return False
-    if not isinstance(rest.outcome, Collision) or rest.outcome.wall != whole.outcome.wall:
+    if getattr(rest.outcome, "wall", None) != getattr(whole.outcome, "wall", None):
         fail("split flight", f"then {rest.outcome}, at once {whole.outcome}", *asked)
     taken = float(Fraction(middle) - Fraction(state.t)) + rest.numbers[0]
     allowed = [a + b for a, b in zip(whole.errors, rest.errors, strict=True)]
@@ -175,7 +171,7 @@ def check_split_flight(
 def check_reversal(
     stepper: Stepper, scene: Scene, state: State, t_end: float, *, bound: float = BOUND
 ) -> bool:
-    """Hold the path across one bounce to be retraced when velocity and laws are reversed.
+    """Hold the path across one bounce, or a flow, to be retraced when velocity and laws are reversed.
 
     From the state over its collision, which it must be able to go on from, to half of the next flight,
     then back to half of the first. The errors granted are carried along through every step. See
@@ -184,8 +180,10 @@ def check_reversal(
     stepper = answering(stepper)
     given = scene, state, t_end
     there = measured(stepper, *given, bound)
-    if there is None or not isinstance(there.outcome, Collision):
+    if there is None:
         return False
+    if isinstance(there.outcome, Horizon):
+        return _flows_back(stepper, scene, state, there, bound)
     led = scene, there.state(), max(t_end, there.outcome.t)
     if isinstance(refusal := stepper(*led), Rejected):
         fail("time reversal", f"{there.outcome} leads nowhere: {refusal.reason}", given, led)
@@ -211,6 +209,19 @@ def check_reversal(
     _, _, x, y, vx, vy = home.numbers
     expected = (0.0, 0.0, begin.x, begin.y, begin.vx, begin.vy)
     _near("time reversal", (0.0, 0.0, x, y, -vx, -vy), expected, home.errors, *asked)
+    return True
+
+
+def _flows_back(stepper: Stepper, scene: Scene, state: State, there: MeasuredStep, bound: float) -> bool:
+    """Hold what comes after a horizon, with velocity and laws reversed, to end at the start."""
+    at = there.state()
+    back = transforms.backwards(scene), State(-at.t, at.x, at.y, -at.vx, -at.vy), -state.t
+    home = measured(stepper, *back, bound, there.errors[1:]) if at.t > state.t else None
+    if home is None or not isinstance(home.outcome, Horizon):
+        return False
+    _, _, x, y, vx, vy = home.numbers
+    expected = (0.0, 0.0, state.x, state.y, state.vx, state.vy)
+    _near("time reversal", (0.0, 0.0, x, y, -vx, -vy), expected, home.errors, (scene, state, at.t), back)
     return True
 
 
@@ -263,10 +274,10 @@ def check_symplectic(
     way = _across_bounce(stepper, scene, state, t_end)
     if way is None:
         return False
-    begin, hit, end = way
+    begin, _, end = way
     scale = sensitivity.scales(scene, state)
     units = (scale.length, scale.length, scale.speed, scale.speed)
-    coarse, fine = (_flow_matrix(stepper, scene, begin, hit, end, units, width) for width in (STEP, STEP / 2))
+    coarse, fine = (_flow_matrix(stepper, scene, way, units, width) for width in (STEP, STEP / 2))
     if coarse is None or fine is None:
         return False
     M = [[(4 * b - a) / 3 for a, b in zip(*rows, strict=True)] for rows in zip(coarse, fine, strict=True)]
@@ -316,15 +327,10 @@ def _across_bounce(
 
 
 def _flow_matrix(
-    stepper: Stepper,
-    scene: Scene,
-    begin: State,
-    hit: Collision,
-    end: float,
-    units: Sequence[float],
-    width: float,
+    stepper: Stepper, scene: Scene, way: tuple[State, Collision, float], units: Sequence[float], width: float
 ) -> list[list[float]] | None:
-    """Differentiate the state at `end` by that at `begin`, in the given units; rows by outputs."""
+    """Differentiate the state at the end of a way by that at its begin; rows by outputs, in given units."""
+    begin, hit, end = way
     columns = []
     for field, unit in zip(("x", "y", "vx", "vy"), units, strict=True):
         ends = []
@@ -386,11 +392,7 @@ def _compare(
 
 
 def _near(
-    name: str,
-    found: Sequence[float],
-    wanted: Sequence[float],
-    allowed: Sequence[float],
-    *asked: Question,
+    name: str, found: Sequence[float], wanted: Sequence[float], allowed: Sequence[float], *asked: Question
 ) -> None:
     for part, a, b, error in zip(NAMES, found, wanted, allowed, strict=True):
         if not abs(a - b) <= SLACK * error:

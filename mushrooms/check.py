@@ -175,9 +175,13 @@ def _show_objections(console: Console, run: Run) -> None:
         console.print(f"{result.id}, asked {escape(result.asked)}; {again} prints it")
         console.print(f"  given     {escape(in_one_line(result.given))}")
         console.print(f"  certified {escape(in_one_line(result.expected))}")
-    # What failed a property says its questions itself, and a vector has an id to ask by.
-    further = [r for r in run.results if r.sent and not r.is_right and r.group in ("protocol", "promise")]
-    for result in further[:MAX_TAUGHT]:
+    wrong = [r for r in run.results if not r.is_right and not r.is_known]
+    for result in [r for r in wrong if r.paste][:MAX_TAUGHT]:
+        console.print(
+            f"{result.id} as a test, where implementation is {run.command}:", markup=False, soft_wrap=True
+        )
+        console.print(result.paste, markup=False, soft_wrap=True)
+    for result in [r for r in wrong if r.sent and r.group == "protocol"][:MAX_TAUGHT]:
         rest = "... (--json FILE has it whole)" if len(result.sent) > MAX_SENT else ""
         console.print(f"{result.id}, sent last: {escape(result.sent[:MAX_SENT])}{rest}")
     for line in run.diagnosis:

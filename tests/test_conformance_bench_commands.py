@@ -10,8 +10,8 @@ from support.depth import deep_but
 from support.truth import proved_step
 
 from conformance.bench import measure, solvers, workloads
+from conformance.suite.checks import timing
 from conformance.suite.process import Trouble
-from conformance.suite.promises import timing
 
 
 @pytest.fixture(scope="module")

@@ -6,6 +6,7 @@ from fractions import Fraction
 
 import msgspec
 import pytest
+from conformance.generator.draws import Draw
 from support import replayer
 from support.depth import deep_but
 
@@ -17,12 +18,12 @@ from conformance.mutants import Mutant
 from conformance.plain.motion import BangBangMotion
 from conformance.plain.step import Flight
 from conformance.suite import disguise
+from conformance.suite.checks import checks_of
 from conformance.suite.disguise import (
     Disguise,
     asked,
     drawn_disguise,
     drawn_horizons,
-    drawn_states,
     published,
 )
 from fast.__main__ import carry, follow
@@ -141,10 +142,13 @@ def test_drawn_horizons_are_exact(corpus):
 
 
 def test_all_that_is_drawn_follows_from_the_seed(corpus):
-    for draw in (drawn_horizons, lambda known, seed: drawn_states(known, seed, 9)):
-        steps = [v for v in corpus if v.kind == "step" and v.level == "core"]
-        assert draw(steps, 4) == draw(steps, 4)
-        assert draw(steps, 4) != draw(steps, 5)
+    steps = [v for v in corpus if v.kind == "step" and v.level == "core"]
+    assert drawn_horizons(steps, 4) == drawn_horizons(steps, 4)
+    assert drawn_horizons(steps, 4) != drawn_horizons(steps, 5)
+    for check in checks_of():
+        one, again, other = (list(check.asks(Draw(seed), check.profiles[0])) for seed in ("4", "4", "5"))
+        assert one == again, check.name
+        assert one != other or check.name == "promise/bad-requests"  # what the schema forbids is not drawn
 
 
 @pytest.mark.parametrize("seed", deep_but([None, 9], 9))

@@ -15,9 +15,8 @@ from support.edges import EDGES, LATE_EDGES, is_among
 from conformance import vectors
 from conformance.harness import kit
 from conformance.harness.examples import Example, find_examples, find_kit_examples
-from conformance.suite import property_checks
 from conformance.suite import run as suite
-from conformance.suite.promises import ask_promises
+from conformance.suite.checks import checks_of, ensembles, run_check
 from conformance.suite.session import Session
 from scene.load import read_data
 
@@ -48,9 +47,7 @@ def test_an_example_passes_at_level_core(language, commands, monkeypatch, tally)
     command = runnable(commands[language])
     chosen = vectors.load("core")[:: EVERY[language]]
     monkeypatch.setattr(suite, "choose", lambda *_: chosen)
-    monkeypatch.setattr(suite, "N_STATES", 4)
-    monkeypatch.setattr(property_checks, "SIZES", {"core": property_checks.Size(20, 50.0, 0.5)})
-    monkeypatch.setattr(property_checks, "BATCH", 20)
+    monkeypatch.setitem(ensembles.SIZES, "core", ensembles.Size(20, 50.0, 0.5))
     run = suite.check(command, seed=1)
     assert run.objections() == []
     assert run.exit_code() == 0
@@ -127,11 +124,11 @@ def test_an_example_answers_the_edges_of_the_protocol(language, commands):
 
 @pytest.mark.parametrize("language", deep_but(KITS, "C++, next hit", "Python, intersection and reflection"))
 def test_a_kit_carries_flows_as_its_trajectories_go(language, commands):
-    names = ("flow-alone", "flow-arrivals", "twin-particles", "bad-states")
+    names = tuple(f"promise/{name}" for name in ("hits", "many-particles", "bad-states"))
     with Session(runnable(commands[language])) as session:
         assert "flow" in session.start().profiles
-        found = {name: (verdict, why) for name, verdict, why, _ in ask_promises(session, names)}
-    assert {verdict for verdict, _ in found.values()} == {"pass"}, found
+        found = [run_check(check, session, 1) for check in checks_of("core", names)]
+    assert {result.verdict for result in found} == {"pass"}, found
 
 
 def refuse_to_say(*_):

@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-import functools
 import os
 import random
 
@@ -13,9 +12,9 @@ import pytest
 from support.nonsense import Nonsense
 
 from conformance import vectors
-from conformance.suite import property_checks, reports, session
+from conformance.suite import reports, session
 from conformance.suite import run as suite
-from conformance.suite.promises import timing
+from conformance.suite.checks import ensembles, timing
 from conformance.suite.result import VERDICTS
 from conformance.suite.session import Limits
 
@@ -29,12 +28,10 @@ FEW = (*vectors.load("core")[::350], *STRESS[-3:], UNREADABLE)
 def small(monkeypatch):
     """Make a run short: few questions, few particles, no long timings."""
     monkeypatch.setattr(suite, "choose", lambda *_: FEW)
-    monkeypatch.setattr(suite, "N_STATES", 3)
     monkeypatch.setattr(suite, "TIMED_LEAST", 1)
     monkeypatch.setattr(timing, "READABLE", 1e-4)
     monkeypatch.setattr(timing, "MAX_REPEAT", 8)
-    monkeypatch.setattr(property_checks, "SIZES", {"core": property_checks.Size(6, 2.0, 0.5)})
-    monkeypatch.setattr(property_checks.theory, "predict", functools.cache(property_checks.theory.predict))
+    monkeypatch.setitem(ensembles.SIZES, "core", ensembles.Size(6, 2.0, 0.5))
 
 
 def test_nonsense_ends_in_verdicts(monkeypatch, small, tally):

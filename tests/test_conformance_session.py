@@ -12,7 +12,6 @@ import pytest
 from support.depth import deep_among, deep_but
 from support.saboteurs import HONEST, SABOTEURS, command
 
-from conformance.suite import promises
 from conformance.suite import run as suite
 from conformance.suite.answers import read_answer
 from conformance.suite.disguise import Disguise
@@ -52,8 +51,7 @@ def made_up(number: int) -> Vector:
 def verdicts(monkeypatch):
     """Return what runs the suite on a saboteur and gives its results by case; nothing may be left running."""
     monkeypatch.setenv("SABOTAGE", token := secrets.token_hex(8))
-    monkeypatch.setattr(promises, "ask_promises", lambda _: iter(()))
-    monkeypatch.setattr(suite, "N_STATES", 0)
+    monkeypatch.setattr(suite, "checks_of", lambda *_: [])
     monkeypatch.setattr(suite, "drawn_horizons", lambda *_: [])
     monkeypatch.setattr(suite, "fresh", lambda *_: [])
     monkeypatch.setattr(suite, "drawn_disguise", lambda *_: Disguise())  # saboteurs know one answer

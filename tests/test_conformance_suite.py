@@ -10,19 +10,18 @@ from xml.etree import ElementTree
 import msgspec
 import pytest
 from msgspec.structs import replace
-from support.promise_breakers import FAULTS, Breaker, ns
+from support.faults import FAULTS
+from support.faulty_servers import clock, faulty
 from support.schemas import validator
 from test_conformance_session import made_up
 
-from conformance import plain, vectors
-from conformance.mutants import COMMON, PLAIN
-from conformance.suite import disguise, promises, property_checks, reports, session
+from conformance import vectors
+from conformance.suite import reports
 from conformance.suite import run as suite
+from conformance.suite.checks import ensembles
 from conformance.suite.diagnosis import diagnose
-from conformance.suite.process import Trouble
 from conformance.suite.result import VERDICTS, Result, Run
-from conformance.suite.session import Limits, missing
-from scene import Collision, Horizon, State, from_data
+from conformance.suite.session import Limits, Session, missing
 from scene.protocol.messages import Introduction
 from scene.refusal import BadInput
 
@@ -139,9 +138,9 @@ def test_what_was_not_asked_is_told_in_a_line():
 
 @pytest.mark.parametrize("groups", [["static-cap"], ["promise"], ["drawn", "static-stem"]])
 def test_what_is_asked_by_name_is_asked_alone(monkeypatch, groups):
-    monkeypatch.setattr(session, "Process", lambda *_: Breaker(lambda request, answer: answer(request)))
-    monkeypatch.setattr(promises, "PROMISES", ("spelling",))
-    run = suite.check(["in-process"], groups=groups, seed=1)
+    few = [check for check in suite.checks_of() if check.name in ("promise/spelling", "property/mirror")]
+    monkeypatch.setattr(suite, "checks_of", lambda *_: few)
+    run = suite.check(faulty(lambda request, answer: answer(request)), groups=groups, seed=1)
     assert set(run.groups()) == {"protocol", *groups}
     assert (run.exit_code(), run.speed) == (0 if "promise" not in groups else 1, None)  # nothing was graded
 
@@ -205,18 +204,10 @@ def test_what_must_be_refused_is_asked_of_all():
     assert asked[0]["scene"] == vector.scene
 
 
-@pytest.mark.parametrize("level", vectors.LEVELS)
-def test_properties_are_drawn_from_steps_that_can_be_read_at_every_level(level):
-    steps = suite._steps_to_draw_from(INTRODUCTION, vectors.load(level))
-    assert len(steps) > 100
-    assert len(disguise.drawn_states(steps, 3, 50)) == 50
-
-
 def test_the_reference_passes(monkeypatch):
     offered = [v for v in vectors.load("core") if v.kind != "flow"]
     known = [v for v in offered if v.expect[0].steps and v.group != "hard-case-14"][::100]
-    monkeypatch.setattr(promises, "ask_promises", lambda _: iter(()))
-    monkeypatch.setattr(suite, "N_STATES", 0)
+    monkeypatch.setattr(suite, "checks_of", lambda *_: [])
     monkeypatch.setattr(suite, "drawn_horizons", lambda *_: [])
     monkeypatch.setattr(suite, "fresh", lambda *_: [])
     monkeypatch.setattr(suite, "measure_speed", lambda _: None)
@@ -231,9 +222,8 @@ def test_the_reference_passes(monkeypatch):
 
 def test_the_cases_beside_the_vectors_are_all_listed(monkeypatch):
     """What a run of an implementation that offers everything contains, and no more."""
-    monkeypatch.setattr(property_checks, "SIZES", {"core": property_checks.Size(20, 50.0, 0.5)})
-    monkeypatch.setattr(suite, "N_STATES", 2)
-    run = suite.check([sys.executable, "-m", "conformance.plain"], groups=["static-cap", *CHECKS], seed=1)
+    monkeypatch.setitem(ensembles.SIZES, "core", ensembles.Size(20, 50.0, 0.5))
+    run = suite.check(faulty(lambda request, answer: answer(request)), groups=["static-cap", *CHECKS], seed=1)
     others = {result.id for result in run.results if not result.level}
     assert others == set(suite.OTHER_CASES)
     assert run.exit_code() == 0
@@ -243,106 +233,15 @@ def test_the_cases_beside_the_vectors_are_all_listed(monkeypatch):
     )
 
 
-def core_steps(*groups: str) -> list:
-    steps = [v for v in vectors.load("core") if v.group in (groups or ("moving-cap", "breathing-circle"))]
-    return disguise.drawn_states(steps, 5, 24)
-
-
-def test_properties_can_fail():
-    """A stepper that knows one answer breaks nearly all of them; one that declines is not accepted either."""
-    wrong = Stub(step=lambda _scene, state, _t_end: Collision("arc", 1.0, state.t + 1.0, 0.6, 0.8, 1.0, 2.0))
-    verdicts = {name: verdict for name, verdict, _, _ in property_checks.ask_properties(wrong, core_steps())}
-    assert verdicts["mirror"] == verdicts["angular-momentum"] == "fail"
-    assert list(verdicts.values()).count("fail") >= 3
-
-    def crash(*_):
-        raise Trouble("crashed", "exited")
-
-    found = list(property_checks.ask_properties(Stub(step=crash), core_steps()))
-    assert {verdict for _, verdict, _, _ in found} == {"crashed"}
-
-
-def test_what_a_property_needs_is_asked_for_first():
-    without = Stub(step=plain.next_collision)
-    without.introduction = msgspec.structs.replace(INTRODUCTION, laws=("constant",))
-    still = core_steps("static-cap")
-    found = {name: verdict for name, verdict, _, _ in property_checks.ask_properties(without, still)}
-    assert found.pop("static-limit") == "unsupported"
-    assert found.pop("period-shift") == "unsupported"
-    assert set(found.values()) == {"pass"}
-    assert list(property_checks.ask_properties(without, [])) == []
-    assert list(property_checks.ask_profiles(without, "core", 1)) == []
-
-
-def flows(name: str) -> Stub:
-    """A session with a mutant of the plain stepper, or with itself."""
-    mutant = COMMON.get(name, PLAIN)
-
-    def ask(request):
-        states = [State(**state) for state in request["states"]]
-        arrived = mutant.flow(from_data(request["scene"]), states, request["t_end"])
-        return {"states": [{**msgspec.to_builtins(o), "captured": stay} for o, stay in arrived]}
-
-    return Stub(ask=ask)
-
-
-# A slow particle is sooner done; 20 particles cannot tell anything from anything.
-FEW, SLOW, LITTLE = (
-    property_checks.Size(*size) for size in ((100, 1000.0, 0.08), (400, 20.0, 0.2), (20, 20.0, 0.3))
-)
-MANY = FEW._replace(n_particles=400)
-
-
-@pytest.mark.parametrize(
-    ("name", "case", "size", "verdict"),
-    [
-        ("none", "work-identity", FEW, "pass"),
-        ("none", "work-identity", LITTLE, "declined"),
-        pytest.param("wall-velocity-once", "work-identity", MANY, "fail", marks=pytest.mark.deep),
-        ("energy-kept", "work-identity", FEW, "fail"),
-        # Loses nearly all its particles.
-        ("phase-restarts-at-each-step", "work-identity", FEW, "fail"),
-        pytest.param("none", "captured-share", SLOW._replace(bias=0.1), "pass", marks=pytest.mark.deep),
-        ("none", "captured-share", LITTLE, "declined"),
-        ("hole-static", "captured-share", SLOW._replace(bias=0.1), "fail"),
-        ("none", "mean-growth", FEW, "declined"),
-    ],
-)
-def test_profiles_tell_a_mutant_from_an_honest_stepper(monkeypatch, name, case, size, verdict):
-    monkeypatch.setattr(property_checks, "SIZES", {"core": size})
-    for other in {"work-identity", "captured-share"} - {case}:
-        monkeypatch.setattr(property_checks, f"_{other.replace('-', '_')}", lambda *_: [])
-    found = {
-        name: (verdict, why) for name, verdict, why, _ in property_checks.ask_profiles(flows(name), "core", 3)
-    }
-    assert found[case][0] == verdict, found[case]
-
-
-def test_a_profile_that_loses_particles_is_of_wrong_format(monkeypatch):
-    monkeypatch.setattr(property_checks, "SIZES", {"core": FEW})
-
-    def lose(request):
-        last = Horizon(request["t_end"], 0.0, -0.1, 1.0, 0.0)
-        return {"states": [{**msgspec.to_builtins(last), "captured": None}] * (len(request["states"]) - 1)}
-
-    found = {name: verdict for name, verdict, *_ in property_checks.ask_profiles(Stub(ask=lose), "core", 1)}
-    assert found == {
-        "work-identity": "wrong-format",
-        "captured-share": "wrong-format",
-        "mean-growth": "declined",
-    }
-
-
 # So long that no wait for an answer, however short the path, bears it out.
-MILLIONFOLD = ns(lambda _, said: [10**6 * n for n in said])
+MILLIONFOLD = clock(lambda _, said: [10**6 * n for n in said])
 
 
 @pytest.mark.parametrize("fault", [FAULTS["no-time"][2], FAULTS["elsewhere"][2], MILLIONFOLD])
 def test_no_speed_is_shown_for_what_is_not_followed(monkeypatch, fault):
     monkeypatch.setattr(suite, "TIMED_LEAST", 1_000_000)
     for broken, is_shown in ((fault, False), (lambda request, answer: answer(request), True)):
-        monkeypatch.setattr(session, "Process", lambda *_, said=broken: Breaker(said))
-        opened = session.Session(["in-process"])
+        opened = Session(faulty(broken))
         opened.start()
         speed = suite.measure_speed(opened)
         assert (speed is not None) == is_shown

@@ -15,9 +15,10 @@ import theory
 from conformance.cases.generated import ROUND
 from conformance.cases.table import FAMILIES
 from conformance.mutants import MUTANTS
-from conformance.suite import run
+from conformance.suite.checks.flows import MAX_STATES
+from conformance.suite.checks.paths import MAX_HITS, MAX_WAIT
+from conformance.suite.checks.refusals import MOST_SAMPLES
 from conformance.suite.disguise import N_DRAWN
-from conformance.suite.promises import conserved, crowds, refusals, scenes
 from fast.kernel.kept import LANE_ROWS
 from mushrooms.store import conduct, layout
 from mushrooms.store.asked import Asked
@@ -44,20 +45,6 @@ def row_of_losses(name: str, label: str) -> str:
     energies = theory.energies(load(name))
     numbers = [loss_probability(energies, n) for n in (1, 10, 30, 100)]
     return f"| {label} | {' | '.join(f'{number:.4f}'[1:] for number in numbers)} |"
-
-
-def sentence_of_bad_states() -> str:
-    asked = [state for scene, t in refusals.tables() for state in refusals.states(scene, t)]
-    return f"{sum(bool(state.why) for state in asked)} states that must be refused"
-
-
-def sentence_of_bad_scenes() -> str:
-    judged = [*scenes.broken_at_times(), *scenes.broken_as_written(), *scenes.valid_though_near()]
-    n_bad = sum(bool(scene.why) for scene in judged)
-    return (
-        f"{n_bad} scenes that must be refused, most of them broken for a fiftieth of the period only, by 2^-9"
-        f" of a size, at another time than is asked about; and {len(judged) - n_bad} as near"
-    )
 
 
 def lines_of_growth() -> str:
@@ -96,11 +83,13 @@ FIGURES: dict[str, tuple[str, Callable[[], str]]] = {
         lambda: f"{ROUND} questions ({2 * ROUND} above core)",
     ),
     "legs": ("docs/verdict.md", lambda: f"up to {MAX_KNOTS - 1} legs"),
-    "drawn states": ("docs/verdict.md", lambda: f"on {run.N_STATES} drawn states"),
-    "bad states": ("docs/verdict.md", sentence_of_bad_states),
-    "bad scenes": ("docs/verdict.md", sentence_of_bad_scenes),
-    "long flow": ("docs/verdict.md", lambda: f"a flow of {crowds.N_HITS} hits"),
-    "hits at rest": ("docs/verdict.md", lambda: f"a path of {conserved.N_HITS} hits"),
+    "bounds of hits": ("docs/detection.md", lambda: f"hits of a path | 2 | 2^{MAX_HITS.bit_length() - 1}"),
+    "bounds of states": (
+        "docs/detection.md",
+        lambda: f"of a flow | 1 | 2^{MAX_STATES.bit_length() - 1}",
+    ),
+    "bounds of waits": ("docs/detection.md", lambda: f"one flight | 1 | 2^{MAX_WAIT.bit_length() - 1}"),
+    "share of the period": ("docs/detection.md", lambda: f"is broken | 1/{MOST_SAMPLES} | 1/4"),
     "work of a step": ("docs/proof.md", lambda: f"{MAX_WORK:,.0f} of a parabola's"),
     "lane": ("docs/ensembles.md", lambda: f"{LANE_ROWS} numbers, the array `lane`, {8 * LANE_ROWS} bytes"),
     "room": ("docs/ensembles.md", lambda: f"{BYTES} bytes a particle for one cycle with one narrowing"),

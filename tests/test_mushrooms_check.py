@@ -20,8 +20,9 @@ from support.saboteurs import command
 
 import conformance
 from conformance import vectors
-from conformance.suite import property_checks, pytest_suite
+from conformance.suite import pytest_suite
 from conformance.suite import run as suite
+from conformance.suite.checks import ensembles
 from conformance.suite.disguise import Disguise
 from conformance.suite.session import Session
 from mushrooms import check
@@ -37,9 +38,7 @@ def _few(monkeypatch):
     ]
     assert {vector.kind for vector in found} == {"step", "trajectory"}
     monkeypatch.setattr(suite, "choose", lambda *_: found)
-    monkeypatch.setattr(suite, "N_STATES", 2)
-    monkeypatch.setattr(property_checks, "SIZES", {"core": property_checks.Size(20, 50.0, 0.5)})
-    monkeypatch.setattr(property_checks, "BATCH", 20)
+    monkeypatch.setitem(ensembles.SIZES, "core", ensembles.Size(20, 50.0, 0.5))
     monkeypatch.setattr(suite, "TIMED_LEAST", 100_000)
     monkeypatch.setattr(check, "EVERY", math.inf)
 
@@ -95,7 +94,7 @@ def test_a_bad_stepper_is_not(call, tmp_path):
     page = tmp_path / "r.html"
     code, out, _ = call("--seed", 5, "--html", page, "--json", tmp_path / "r.json", "--", *command("honest"))
     assert code == 1
-    assert re.search(r"promise/\S+, sent last: \{.cmd.*\}\n", out)
+    assert re.search(r"property/\S+ as a test, where implementation is \[.*@example\(", out, re.DOTALL)
     assert re.search(r"; mushrooms ask \S+ --seed 5 prints it\n", out)
     assert "not accepted" in out
     assert "fail" in out

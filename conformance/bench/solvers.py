@@ -14,8 +14,8 @@ from conformance import plain
 from conformance.bench.time_stepping import TOLERANCES, next_collision_by
 from conformance.bench.workloads import SINGLE_STEPS, Workload
 from conformance.grading.agreement import Answer
+from conformance.suite.checks import Implementation, timing
 from conformance.suite.process import Trouble
-from conformance.suite.promises import timing
 from conformance.suite.session import Limits, Session, missing
 from scene import Scene, State, to_data
 
@@ -126,7 +126,7 @@ def by_command(
 def _clock_trouble(session: Session) -> Trouble | None:
     """Hold what a command says of its time to the clock on this side; a run is too short to do so."""
     try:
-        timing.honest_clock(session)
+        timing.honest_clock(Implementation(session, "time"), timing.SCENES[0], timing.START)
     except Trouble as trouble:
         return trouble
     return None

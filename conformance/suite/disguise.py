@@ -24,7 +24,7 @@ from conformance.cases.draw import Draw
 from conformance.cases.generated import GROUP as FRESH
 from conformance.grading.error import condition_number, free_flight, inputs_of, moved
 from conformance.vectors import NUMBERS, Expectation, Vector, certified
-from scene import BadInput, BangBang, Fourier, Scene, State, from_data, to_data, transforms
+from scene import BadInput, BangBang, Fourier, Scene, from_data, to_data, transforms
 from scene.given import MAX_HARMONICS, MAX_KNOTS
 from scene.tables import laws
 
@@ -134,20 +134,6 @@ def drawn_horizons(vectors: Sequence[Vector], seed: int) -> list[Vector]:
         early = _before_the_hit(draw.pick(usable), draw.between(*PARTS), len(found) + 1)
         found += [early] if early is not None else []
     return found[:N_DRAWN]
-
-
-def drawn_states(vectors: Sequence[Vector], seed: int, n: int) -> list[tuple[Scene, State, float]]:
-    """Draw questions for exact properties: vectors in disguise, with velocities of their own."""
-    draw = Draw(f"{seed}/properties")
-    found = []
-    for _ in range(n if vectors else 0):
-        vector = draw.pick(vectors)
-        image = asked(vector, drawn_disguise(vector, seed))
-        across, along = (1.0 + draw.between(-0.125, 0.125) for _ in range(2))
-        state = image.state
-        changed = msgspec.structs.replace(state, vx=state.vx * across, vy=state.vy * along)
-        found.append((from_data(image.scene), changed, image.t_end))
-    return found
 
 
 def _scene(vector: Vector) -> Scene | None:

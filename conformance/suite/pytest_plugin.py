@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 
 from conformance import suite, vectors
+from conformance.suite.checks import checks_of
 from conformance.suite.disguise import Disguise, drawn_disguise
 from conformance.suite.process import CommandNotFound, Trouble
 from conformance.suite.run import NEW_SEEDS
@@ -57,10 +58,13 @@ def pytest_configure_node(node: Any) -> None:
 
 
 def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
-    """Make one test for each vector."""
+    """Make one test for each vector, and for each check."""
     if "mushrooms_vector" in metafunc.fixturenames:
         chosen = suite.choose(metafunc.config.getoption("--mushrooms-level"))
         metafunc.parametrize("mushrooms_vector", chosen, ids=[vector.id for vector in chosen])
+    if "mushrooms_check" in metafunc.fixturenames:
+        checks = checks_of(metafunc.config.getoption("--mushrooms-level"))
+        metafunc.parametrize("mushrooms_check", checks, ids=[check.name for check in checks])
 
 
 @pytest.fixture

@@ -44,6 +44,7 @@ class Result(msgspec.Struct, frozen=True, omit_defaults=True):
         expected: the certified outcome in its place, in the middle of its enclosures.
         is_known: listed in the known-failures file.
         sent: of a case that did not pass, the last line that was sent for it.
+        paste: of a check that failed, the question as a pytest case.
     """
 
     id: str
@@ -61,6 +62,7 @@ class Result(msgspec.Struct, frozen=True, omit_defaults=True):
     expected: dict[str, Any] | None = None
     is_known: bool = False
     sent: str = ""
+    paste: str = ""
 
     @property
     def is_right(self) -> bool:

@@ -15,7 +15,7 @@ import itertools
 import math
 import secrets
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 from statistics import median
@@ -23,12 +23,12 @@ from typing import Any
 
 import msgspec
 
-from conformance import properties, vectors
+from conformance import vectors
 from conformance.cases.generated import GROUP as FRESH
 from conformance.cases.generated import ROUND, fresh
 from conformance.grading.agreement import middle
 from conformance.grading.grade import Grade, grade
-from conformance.suite import promises, property_checks
+from conformance.suite.checks import GROUPS, checks_of, run_check, timing
 from conformance.suite.diagnosis import diagnose
 from conformance.suite.disguise import (
     DRAWN,
@@ -37,39 +37,33 @@ from conformance.suite.disguise import (
     asked,
     drawn_disguise,
     drawn_horizons,
-    drawn_states,
     published,
 )
 from conformance.suite.process import NOT_NUMBERS, Trouble
-from conformance.suite.promises import timing
 from conformance.suite.result import BAD, Result, Run, Speed, outcomes_of
 from conformance.suite.scope import graded_parts
-from conformance.suite.session import Limits, Session, missing
+from conformance.suite.session import AnswerLine, Limits, Session, missing
 from conformance.vectors import Vector
 from scene import BadInput, State, load, to_data
-from scene.protocol.messages import Introduction
 from scene.refusal import check_seed
 
 NEW_SEEDS = 10**6  # short enough to be typed again
 # By level: one round of the table of families or two.
 N_FRESH = {"core": ROUND, "extended": 2 * ROUND, "stress": 2 * ROUND}
-N_STATES = 24  # drawn for the exact properties
 TIMED_SCENE, TIMED_STATE = "moving-cap", State(0.0, 0.1, 0.2, 300.0, 400.0)
 TIMED_MOST = 2.0  # seconds, after which no longer trajectory is asked
 TIMED_REPEATS, TIMED_LEAST = 5, 20_000_000  # timings; nanoseconds that each must last to be read from a clock
 PROTOCOL_CASES = ("start", "echo", "rejects", "stop")
-OTHER_GROUPS = (DRAWN, FRESH, "property", "profile", "promise")
+OTHER_GROUPS = (DRAWN, FRESH, *GROUPS)
 OTHER_CASES = (
     *(f"protocol/{name}" for name in PROTOCOL_CASES),
-    *(f"property/{name}" for name in properties.PROPERTIES),
-    *(f"profile/{name}" for name in property_checks.PROFILES),
-    *(f"promise/{name}" for name in promises.PROMISES),
+    *(each.name for each in checks_of()),
 )
 Progress = Callable[[int, int], None]
 
 
 def check(
-    command: Sequence[str],
+    command: Sequence[str] | AnswerLine,
     *,
     level: str = "core",
     seed: int | None = None,
@@ -81,7 +75,7 @@ def check(
     """Run the suite on a command.
 
     Args:
-        command: program and arguments; it speaks protocol 1.
+        command: program and arguments, or a function that answers lines; it speaks protocol 1.
         level: core, extended or stress.
         seed: of all that is drawn, 0 to 2^64 - 1; None for a new one.
         groups: of cases; all when empty. Of the others only the protocol's own cases are asked.
@@ -104,7 +98,7 @@ def check(
         results = [msgspec.structs.replace(r, is_known=_is_known(r, known, seed)) for r in results]
         passed = {result.id for result in results if result.verdict == "pass"}
         return Run(
-            command=list(command),
+            command=["(in process)"] if callable(command) else list(command),
             level=level,
             seed=seed,
             corpus=manifest.corpus,
@@ -185,7 +179,7 @@ def _converse(
 ) -> tuple[list[Result], Speed | None]:
     results: list[Result] = []
     level, seed = run
-    further = OTHER_GROUPS if groups is None else groups
+    further = tuple(OTHER_GROUPS if groups is None else groups)
     # The same questions as in a run of everything.
     source = chosen if groups is None else vectors.load(level)
     for name, act in (("start", session.start), ("echo", session.probe)):
@@ -201,7 +195,7 @@ def _converse(
     total = len(results) + len(chosen) + len(drawn) + n_fresh + n_others
     for result in itertools.chain(
         (ask_vector(session, vector, drawn_disguise(vector, seed)) for vector in questions),
-        _ask_further(session, source, further, run),
+        (run_check(each, session, seed) for each in checks_of(level) if each.name.startswith(further)),
     ):
         results.append(_closed(session, result))
         progress(len(results), total)
@@ -281,7 +275,7 @@ def _compared(
 def measure_speed(session: Session) -> Speed | None:
     """Time a trajectory on the moving cap, longer until the clock can read it.
 
-    None where it is not offered, or where it does not end as `trajectory` says (`promises.timing`).
+    None where it is not offered, or where it does not end as `trajectory` says (`checks.timing`).
     """
     assert session.introduction is not None
     scene, state = load(TIMED_SCENE), TIMED_STATE
@@ -307,30 +301,6 @@ def _ask_nonsense(session: Session) -> None:
     answer = session.ask({"cmd": "step", "scene": {"table": "cap", "r": 1.0}, "state": state, "t_end": 1.0})
     if answer.get("outcome") != "rejected":
         raise Trouble("fail", f"a state without vy was answered {answer}"[:200])
-
-
-def _ask_further(
-    session: Session, source: Sequence[Vector], groups: Sequence[str], run: tuple[str, int]
-) -> Iterator[Result]:
-    assert session.introduction is not None
-    level, seed = run
-    questions = drawn_states(_steps_to_draw_from(session.introduction, source), seed, N_STATES)
-    further = {
-        "property": property_checks.ask_properties(session, questions),
-        "profile": property_checks.ask_profiles(session, level, seed),
-        "promise": promises.ask_promises(session),
-    }
-    for group, named in further.items():
-        for name, verdict, why, seconds in named if group in groups else ():
-            yield Result(f"{group}/{name}", group, verdict, why, seconds)
-
-
-def _steps_to_draw_from(introduction: Introduction, chosen: Sequence[Vector]) -> list[Vector]:
-    """Return core steps that can be asked; what must be refused is left out: its scene may not be read."""
-    steps = (
-        v for v in chosen if v.kind == "step" and v.level == "core" and v.expect[0].outcome != "rejected"
-    )
-    return [v for v in steps if not missing(introduction, "step", v.scene)]
 
 
 def _result(vector: Vector, trouble: Trouble, seconds: float = 0.0) -> Result:

@@ -14,7 +14,7 @@ import random
 import struct
 import sys
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from types import TracebackType
 from typing import Any
 
@@ -26,6 +26,7 @@ from scene import Outcome, Scene, State, to_data
 from scene.protocol.messages import PROTOCOL, Introduction
 from scene.refusal import BadInput
 
+AnswerLine = Callable[[bytes], bytes]
 MAX_SEQ = 2**31 - 1  # the integers of every language
 STOP_TIMEOUT = 5.0  # seconds to exit after `stop`
 
@@ -44,8 +45,29 @@ class Limits(msgspec.Struct, frozen=True):
     total: float | None = None
 
 
+class InProcess:
+    """A function from lines to lines in place of a process: it has no end, and no time is kept."""
+
+    def __init__(self, answer: AnswerLine) -> None:
+        self._answer = answer
+
+    def exchange(self, line: bytes, _: float) -> bytes:
+        """Answer one line."""
+        return self._answer(line)
+
+    def finish(self, _line: bytes, _timeout: float) -> None:
+        """End."""
+
+    def kill(self) -> None:
+        """End."""
+
+
 class Session:
     """A conversation with a command; a context manager that leaves no process behind.
+
+    Args:
+        command: program and arguments; or a function that answers lines, in place of a process.
+        limits: time and restarts.
 
     Attributes:
         introduction: what the implementation said of itself, once opened.
@@ -54,11 +76,11 @@ class Session:
         stderr: what it wrote to standard error, bounded.
     """
 
-    def __init__(self, command: Sequence[str], limits: Limits | None = None) -> None:
+    def __init__(self, command: Sequence[str] | AnswerLine, limits: Limits | None = None) -> None:
         if not command:
             raise BadInput("no command to check: give it after `--`")
-        self._command, self._limits = list(command), limits or Limits()
-        self._process: Process | None = None
+        self._command, self._limits = command, limits or Limits()
+        self._process: Process | InProcess | None = None
         self._end: Trouble | None = None
         self._draw = random.Random()
         total = self._limits.total
@@ -84,7 +106,8 @@ class Session:
         """
         if self._process is not None:
             raise RuntimeError("this session has started")
-        self._process = Process(self._command, self.stderr)
+        command = self._command
+        self._process = InProcess(command) if callable(command) else Process(command, self.stderr)
         try:
             line = self._exchange(_encode({"cmd": "start", "protocol": PROTOCOL}))
             self.introduction = read_introduction(line)
@@ -121,17 +144,18 @@ class Session:
         answer = self._say(_encode({**request, "seq": seq}), request["cmd"], seq)
         return with_walls(answer, request.get("scene") if scene is None else scene)
 
-    def say(self, line: bytes, seq: int | None) -> dict[str, Any]:
-        """Send a line that is no request, and return what it is answered.
+    def say(self, line: bytes, seq: int | None, cmd: str = "step") -> dict[str, Any]:
+        """Send a line that may be no request, and return what it is answered.
 
         Args:
             line: without its newline.
             seq: that can be read in it; the answer has this one or null.
+            cmd: whose answer may come where it is one after all.
 
         Raises:
             Trouble: as `ask`.
         """
-        return self._say(line, "step", seq, may_be_null=True)
+        return self._say(line, cmd, seq, may_be_null=True)
 
     def step(self, scene: Scene, state: State, t_end: float) -> Outcome:
         """Ask for one step: the session as a stepper, for properties.

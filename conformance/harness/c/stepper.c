@@ -35,12 +35,21 @@ static int read_number(json_t *object, const char *name, double *value) {
     return FOUND;
 }
 
+static int are_numbers(json_t *list) {
+    json_t *value;
+    size_t i;
+    if (!json_is_array(list)) return 0;
+    json_array_foreach(list, i, value) if (!json_is_number(value)) return 0;
+    return 1;
+}
+
 static int read_knots(json_t *knots, Law *law) {
     double t[2], v[2], first = 0;
     size_t n = json_array_size(knots);
     if (n < 2 || n > MAX_PIECES / 2 + 1) return refuse("number of knots", (double)n, "2 to 256");
     for (size_t i = 0; i < n; i++) {
         json_t *pair = json_array_get(knots, i);
+        if (json_array_size(pair) != 2 || !are_numbers(pair)) return refuse("a knot", 0, "a pair of numbers");
         t[1] = json_number_value(json_array_get(pair, 0)), v[1] = json_number_value(json_array_get(pair, 1));
         law->high = fmax(law->high, fabs(v[1]));
         if (i && t[1] <= t[0]) return refuse("time of a knot", t[1], "later than the knot before");
@@ -77,6 +86,7 @@ static int read_law(json_t *scene, const char *name, Law *law) {
     if (given[0] == 'o') period = 2 * M_PI / omega;
     law->high = fabs(law->mean);
     cosines = json_object_get(data, "cos"), sines = json_object_get(data, "sin");
+    if ((cosines && !are_numbers(cosines)) || (sines && !are_numbers(sines))) return refuse("amplitudes", 0, "numbers");
     for (int k = 1; k <= MAX_WAVES; k++) {
         Wave v = {k * omega, json_number_value(json_array_get(cosines, k - 1)),
                   json_number_value(json_array_get(sines, k - 1))};

@@ -89,6 +89,11 @@ inline Law read_law(const json::Value& scene, const char* name) {
     double given = number_of(data, by_omega ? "omega" : "period"), other = 2 * M_PI / given;
     if (given <= 0) throw Refused("omega and period must be > 0");
     law.mean = number_of(data, "mean"), law.high = std::abs(law.mean);
+    for (const char* part : {"cos", "sin"}) {
+        if (data.has(part) && !data.at(part).is_list()) throw Refused("amplitudes must be a list");
+        for (const auto& value : data.at(part).items)
+            if (!value.is_number()) throw Refused("amplitudes must be numbers");
+    }
     const auto &cosines = data.at("cos").items, &sines = data.at("sin").items;
     for (size_t k = 1; k <= std::max(cosines.size(), sines.size()); k++) {
         double c = k <= cosines.size() ? cosines[k - 1].number : 0, s = k <= sines.size() ? sines[k - 1].number : 0;

@@ -1,0 +1,122 @@
+"""The checks: what is asked of an implementation beside the vectors, in one table.
+
+Each has one form (`checks.form`): a name, what it asks, how it judges, and of which profiles. Exact
+symmetries (`properties`), statistics (`ensembles`) and the rules of the protocol stand side by side; each is
+asked of every profile that is offered. docs/contributing/check.md says how one is added.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from functools import partial
+
+from conformance import properties
+from conformance.generator.draws import Draw
+from conformance.suite.checks import endings, flows, paths, refusals, requests, timing
+from conformance.suite.checks.ensembles import ensemble_checks
+from conformance.suite.checks.form import QUESTIONS, Implementation, Question, SuiteCheck, run_check
+from conformance.suite.session import AnswerLine, Session
+from scene import Scene, State
+
+__all__ = ["LEVELS", "Implementation", "SuiteCheck", "checks_of", "hold", "judge", "questions", "run_check"]
+
+LEVELS = ("core", "extended", "stress")
+GROUPS = ("property", "profile", "promise")
+EXACT = ("mirror", "scaling-of-lengths", "scaling-of-times", "static-limit")  # to the bit, as a rule
+OF_HITS = ("angular-momentum", "symplectic")  # which a flow does not tell
+N_SYMMETRIES = 12
+ALL = (*QUESTIONS, "time")
+
+
+def moments(
+    draw: Draw, profile: str, kinds: tuple[str, ...] = ("fourier", "bang-bang", "constant")
+) -> Iterator[Question]:
+    """Draw scenes and states for the exact symmetries, and times to the end; a flow meets a few walls."""
+    for _ in range(N_SYMMETRIES):
+        scene, state = paths.drawn(draw, kinds=kinds)
+        span = paths.crossing(scene, state)
+        yield scene, state, state.t + span * (draw.between(0.25, 2.0) if profile == "flow" else 16.0)
+
+
+def _symmetric(name: str, side: Implementation, scene: Scene, state: State, t_end: float) -> bool:
+    """Hold an implementation to an exact symmetry: bit for bit, or else to rounding."""
+    check = properties.PROPERTIES[name]
+    if name not in EXACT:
+        return check(side, scene, state, t_end)
+    try:
+        return check(side, scene, state, t_end, is_exact=True)
+    except AssertionError:
+        return check(side, scene, state, t_end, is_exact=False)
+
+
+def _symmetry(name: str) -> SuiteCheck:
+    asks: Callable[[Draw, str], Iterator[Question]] = moments
+    if name == "static-limit":  # asks for constants written as laws
+        asks = partial(moments, kinds=("fourier",))
+    profiles = QUESTIONS[:2] if name in OF_HITS else QUESTIONS
+    return SuiteCheck(f"property/{name}", asks, partial(_symmetric, name), profiles)
+
+
+SYMMETRIES = tuple(_symmetry(name) for name in properties.PROPERTIES)
+RULES = (
+    SuiteCheck("promise/hits", paths.usual, paths.follow),
+    SuiteCheck("promise/edges", paths.edges, paths.follow),
+    SuiteCheck("promise/changed-questions", paths.changed, paths.follow),
+    SuiteCheck("promise/long-paths", paths.long, paths.follow),
+    SuiteCheck("promise/late-starts", paths.late, paths.follow),
+    SuiteCheck("promise/waiting", paths.waiting, paths.follow),
+    SuiteCheck("promise/long-flow", flows.returning, flows.arrive, ("flow",)),
+    SuiteCheck("promise/many-particles", flows.crowds, flows.together, ("flow",)),
+    SuiteCheck("promise/endings", endings.endings, endings.end_as_due),
+    SuiteCheck("promise/spelling", requests.spellings, requests.same),
+    SuiteCheck("promise/minus-zero", requests.zeros, requests.same),
+    SuiteCheck("promise/malformed-lines", requests.bad_lines, requests.passed_over),
+    SuiteCheck("promise/extra-fields", requests.further_fields, requests.ignored_or_refused),
+    SuiteCheck("promise/bad-requests", refusals.requests, refusals.refuse, ALL),
+    SuiteCheck("promise/bad-states", refusals.bad_states, refusals.refuse),
+    SuiteCheck("promise/bad-scenes", refusals.bad_scenes, refusals.refuse),
+    SuiteCheck("promise/time-steps", timing.questions, timing.same_steps, ("time",)),
+    SuiteCheck("promise/time-clock", timing.questions, timing.honest_clock, ("time",)),
+)
+
+
+def checks_of(level: str = "core", names: str | tuple[str, ...] = "") -> list[SuiteCheck]:
+    """Return the checks of a level whose names begin with a text, or one of some; all when it is empty."""
+    return [check for check in (*SYMMETRIES, *ensemble_checks(level), *RULES) if check.name.startswith(names)]
+
+
+def hold(implementation: list[str] | AnswerLine, name: str, seed: int) -> None:
+    """Hold an implementation to a check.
+
+    Args:
+        implementation: its command, or a function that answers lines.
+        name: of the check.
+        seed: of its questions.
+
+    Raises:
+        AssertionError: in one line, and below it a pytest case to paste.
+    """
+    with Session(implementation) as session:
+        session.start()
+        result = run_check(_named(name), session, seed)
+    assert result.verdict in ("pass", "unsupported", "declined"), f"{result.why}\n\n{result.paste}"
+
+
+def judge(implementation: list[str] | AnswerLine, name: str, profile: str, *asked: object) -> None:
+    """Put one question of a check to an implementation; see `hold`."""
+    with Session(implementation) as session:
+        session.start()
+        _named(name).judges(Implementation(session, profile), *asked)
+
+
+def questions(name: str, profile: str) -> object:
+    """Return a Hypothesis strategy of a check's questions."""
+    from hypothesis import strategies as st
+
+    return st.integers(0, 2**64 - 1).flatmap(
+        lambda seed: st.sampled_from(list(_named(name).asks(Draw(str(seed)), profile)))
+    )
+
+
+def _named(name: str) -> SuiteCheck:
+    return next(check for check in checks_of() if check.name == name)

@@ -1,0 +1,234 @@
+"""The one form of a check, and an implementation as a check sees it: by one profile.
+
+A check draws questions and judges the answers. It is asked of every profile that it lists and that the
+implementation offers. The implementation may be a process or Python functions: both answer lines of protocol
+1 through `conformance.suite.session.Session`.
+"""
+
+from __future__ import annotations
+
+import math
+import sys
+import time
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from typing import Any, NamedTuple
+
+import msgspec
+
+from conformance.generator.draws import Draw
+from conformance.suite.answers import read_outcome
+from conformance.suite.process import NOT_NUMBERS, Trouble
+from conformance.suite.result import Result
+from conformance.suite.session import Session, missing
+from scene import Collision, Outcome, Scene, State, Undecided, to_data
+from scene.protocol.messages import Introduction
+
+QUESTIONS = ("step", "trajectory", "flow")  # the profiles that answer by outcomes
+FOREVER = sys.float_info.max  # t_end of a question that only collisions end
+MAX_DRAWN = 6  # times that questions are drawn for an implementation of a part of the tables or laws
+MAX_UNDECIDED = 0.1  # of a check's questions: more, and it is declined
+Question = tuple[Any, ...]  # a scene that is asked about, or its data, and what else `judges` takes
+
+
+class SuiteCheck(NamedTuple):
+    """What is asked, and how it is judged.
+
+    Attributes:
+        name: group and name, as results show it.
+        asks: (draw, profile) -> questions; each begins with a scene.
+        judges: (implementation, *question) -> whether anything was compared, or what was found. It raises
+            AssertionError in one line where the answer is wrong, and `Trouble` where there is none.
+        profiles: of which it is asked.
+    """
+
+    name: str
+    asks: Callable[[Draw, str], Iterable[Question]]
+    judges: Callable[..., object]
+    profiles: tuple[str, ...] = QUESTIONS
+
+
+class Implementation:
+    """An open session, asked by one profile; called as a stepper, it answers by the first outcome.
+
+    Attributes:
+        session: with the implementation.
+        profile: step, trajectory or flow (or time).
+        n_asked, n_undecided: outcomes counted so far.
+        errors: of its numbers so far, by what they are of (`checks.flaws`).
+    """
+
+    def __init__(self, session: Session, profile: str) -> None:
+        self.session, self.profile = session, profile
+        self.errors: dict[str, list[float]] = {}
+        self.n_asked = self.n_undecided = 0
+
+    def __call__(self, scene: Scene, state: State, t_end: float) -> Outcome:
+        """Return one outcome: of a step, of a trajectory of one collision, or of a flow of one state."""
+        if not all(math.isfinite(number) for number in (*msgspec.structs.astuple(state)[:5], t_end)):
+            raise Trouble("fail", f"its answers lead to the state {state} and t_end = {t_end}")
+        part, *more = self.parts(question(self.profile, scene, state, t_end))
+        if more:
+            raise Trouble("wrong-format", f"{1 + len(more)} outcomes are answered to one question")
+        return self._counted(outcome_of(part, state.t))
+
+    def offers(self, profile: str, scene: Scene) -> bool:
+        """Tell whether another profile may be asked about a scene."""
+        assert self.session.introduction is not None
+        return not missing(self.session.introduction, profile, to_data(scene))
+
+    def by(self, *profiles: str, scene: Scene) -> Implementation:
+        """Return the same implementation, asked by the first of some profiles that it offers.
+
+        Raises:
+            Trouble: unsupported, when it offers none.
+        """
+        for profile in profiles:
+            if self.offers(profile, scene):
+                return Implementation(self.session, profile)
+        raise Trouble("unsupported", f"profile {' or '.join(profiles)}")
+
+    def parts(self, request: Mapping[str, Any]) -> list[dict[str, Any]]:
+        """Ask, and return the outcomes that are answered, as data; a whole refusal is the only one."""
+        answer = self.session.ask(request)
+        if "error" in answer:
+            raise Trouble("error", answer["error"])
+        return list(answer.get("steps", answer.get("states", [answer])))
+
+    def path(self, scene: Scene, state: State, n: int, t_end: float = FOREVER) -> list[Outcome]:
+        """Follow up to n collisions, and what comes instead of a further one: at once, or step by step.
+
+        Raises:
+            Trouble: fail for steps that are too many, too few, or go on after the end.
+        """
+        found: list[Outcome] = []
+        if self.profile == "step":
+            while len(found) < n and all(isinstance(hit, Collision) for hit in found):
+                found.append(self(scene, found[-1].state() if found else state, t_end))  # type: ignore[union-attr]
+            return found
+        t = state.t
+        for part in self.parts(question("trajectory", scene, state, t_end, n)):
+            found.append(self._counted(outcome_of(part, t)))
+            t = getattr(found[-1], "t", t)
+        hits = [isinstance(outcome, Collision) for outcome in found]
+        if len(found) > n or not all(hits[:-1]) or (len(found) < n and hits[-1:] != [False]):
+            raise Trouble(
+                "fail", f"{len(found)} steps, {sum(hits)} of them collisions, are answered to {n} collisions"
+            )
+        return found
+
+    def flown(self, scene: Scene, states: Sequence[State], t_end: float) -> list[dict[str, Any]]:
+        """Carry states to t_end, and return what is answered for each.
+
+        Raises:
+            Trouble: also wrong-format, for another number of states.
+        """
+        found = self.parts(question("flow", scene, states, t_end)) if states else []
+        if len(found) != len(states):
+            raise Trouble("wrong-format", f"a flow of {len(states)} states is answered {found}"[:200])
+        self.n_asked += len(found)
+        self.n_undecided += sum(part["outcome"] == "undecided" for part in found)
+        return found
+
+    def _counted(self, outcome: Outcome) -> Outcome:
+        self.n_asked += 1
+        self.n_undecided += isinstance(outcome, Undecided)
+        return outcome
+
+
+def question(
+    cmd: str, scene: Scene | Mapping[str, Any], start: State | Sequence[State], t_end: float, n: int = 1
+) -> dict[str, Any]:
+    """Return a request, all but its seq."""
+    starts = [start] if isinstance(start, State) else list(start)
+    place = {"states": starts} if cmd == "flow" else {"state": starts[0]}
+    more = {"trajectory": {"collisions": n}, "time": {"collisions": n, "repeat": 1}}.get(cmd, {})
+    end = {} if cmd == "time" else {"t_end": t_end}
+    return {"cmd": cmd, "scene": _data(scene), **msgspec.to_builtins(place), **more, **end}
+
+
+def outcome_of(part: Mapping[str, Any], t: float) -> Outcome:
+    """Return one outcome of an answer, without its captured stay; t is when the flight began."""
+    return read_outcome({name: value for name, value in part.items() if name != "captured"}, t)
+
+
+def octaves(draw: Draw, low: float, high: float) -> Iterator[float]:
+    """Draw one number from each octave of [low, high], log-uniform, the highest first."""
+    while high > low:
+        yield high * 2.0 ** -(draw.part() * min(1.0, math.log2(high / low)))
+        high /= 2
+
+
+def run_check(check: SuiteCheck, session: Session, seed: int) -> Result:
+    """Ask all that a check draws from a seed, of every profile that is offered, up to the first fault."""
+    assert session.introduction is not None
+    begin, lacking = time.monotonic(), ""
+    notes: list[str] = []
+    n = n_compared = n_declined = n_open = n_asked = 0
+
+    def result(verdict: str, why: str, paste: str = "") -> Result:
+        group = check.name.partition("/")[0]
+        return Result(check.name, group, verdict, why, time.monotonic() - begin, paste=paste)
+
+    for profile in check.profiles:
+        side = Implementation(session, profile)
+        fitting, lacking = _drawn(check, session.introduction, profile, seed)
+        for asked in fitting:
+            try:
+                n += 1
+                found = check.judges(side, *asked)
+                n_compared += bool(found)
+                notes += [found] if isinstance(found, str) else []
+            except AssertionError as broken:
+                return result("fail", f"{profile}: {broken}", as_pytest(check, profile, asked))
+            except NOT_NUMBERS as error:
+                why = f"{profile}: its answers cannot be calculated with: {error}"
+                return result("fail", why, as_pytest(check, profile, asked))
+            except Trouble as trouble:
+                if trouble.verdict == "unsupported":
+                    lacking = trouble.why
+                elif trouble.verdict == "declined":
+                    n_declined += 1
+                    notes.append(trouble.why)
+                else:
+                    why = f"{profile}: {trouble.why}"
+                    return result(trouble.verdict, why, as_pytest(check, profile, asked))
+        n_open, n_asked = n_open + side.n_undecided, n_asked + side.n_asked
+    why = "; ".join(notes[:4]) or f"{n_compared} of {n} compared"
+    if n_declined > MAX_UNDECIDED * n:
+        return result("declined", why)
+    if n_open > MAX_UNDECIDED * n_asked:
+        return result("declined", f"{why}; {n_open} of {n_asked} answers are undecided")
+    return result("pass", why) if n_compared else result("unsupported", lacking or "nothing to compare")
+
+
+def _drawn(check: SuiteCheck, offered: Introduction, profile: str, seed: int) -> tuple[list[Question], str]:
+    """Return the questions that may be asked, drawn anew while too few are, and what the others need."""
+    fitting: list[Question] = []
+    lacking = "" if profile in offered.profiles else f"profile {profile}"
+    for i in range(0 if lacking else MAX_DRAWN):
+        asked = list(check.asks(Draw(f"{seed}/{check.name}/{profile}/{i}"), profile))
+        needs = [missing(offered, profile, _data(one[0])) for one in asked]
+        fitting += [one for one, need in zip(asked, needs, strict=True) if not need]
+        lacking = next(filter(None, needs), lacking)
+        if 2 * len(fitting) >= len(asked):
+            break
+    return fitting, lacking
+
+
+def _data(scene: Scene | Mapping[str, Any]) -> Mapping[str, Any]:
+    return scene if isinstance(scene, Mapping) else to_data(scene)
+
+
+def as_pytest(check: SuiteCheck, profile: str, asked: Question) -> str:
+    """Return a failed question as a pytest case to paste; `implementation` is the stepper, or its command."""
+    name = check.name.replace("/", "_").replace("-", "_")
+    return f"""\
+from hypothesis import example, given
+from conformance.suite import checks
+from scene import *
+
+@example({asked!r})
+@given(checks.questions({check.name!r}, {profile!r}))
+def test_{name}(asked):
+    checks.judge(implementation, {check.name!r}, {profile!r}, *asked)
+"""

@@ -1,0 +1,248 @@
+"""Bad requests, states and scenes, each to be refused, and good ones as near, which must not be.
+
+Requests are broken in every way that the protocol's schema forbids (`checks.schema`). States lie beyond a
+wall, off the wall that they name, past its end, or move into it, by drawn amounts of at least 8 times what is
+allowed. Scenes break a drawn law for a drawn share of the period, down to one in MOST_SAMPLES; their twins
+come as near to it from the other side.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterator, Mapping
+from functools import partial
+from math import cos, pi, sin, sqrt
+from typing import Any
+
+from mpmath import fp
+from msgspec.structs import replace
+
+from conformance.generator import draws
+from conformance.generator.draws import Draw
+from conformance.suite.checks.form import Implementation, Question, octaves, question
+from conformance.suite.checks.schema import broken
+from conformance.suite.session import MAX_SEQ
+from scene import BangBang, Cap, Fourier, Mushroom, Scene, State, Stem, Wall
+from scene.geometry import TableAt, table_at
+
+MOST_SAMPLES = 400  # an implementation that looks at so many instants of a period finds every broken scene
+OFF = 2.0**-17  # of a wall's size: how far off the wall that it names a state is at least; 2^-20 is allowed
+ALLOWED = 2.0**-21  # likewise, at most
+UNEQUAL = 2.0**-44  # relative: periods that differ by more are different
+INSIDE: dict[type, State] = {
+    Mushroom: State(0.0, 0.1, 0.3, 0.4, -0.9),
+    Cap: State(0.0, 0.1, 0.3, 0.4, 0.9),
+    Stem: State(0.0, 0.1, -0.3, 0.4, -0.9),
+}
+TABLES: dict[str, type] = {"cap": Cap, "stem": Stem, "mushroom": Mushroom}
+RESTING: tuple[Scene, ...] = (Cap(r=1.0), Stem(w=1.0, h=1.25), Mushroom(r=1.0, w=0.5, h=1.0))
+_WAVE = Fourier(mean=1.0, omega=1.0, cos=(0.05, 0.02), sin=(0.01,))
+_LEGS = BangBang(knots=((0.0, 1.0), (0.5, 1.25), (1.5, 0.875), (3.0, 1.0)))
+ASKED: tuple[Scene, ...] = (
+    Mushroom(r=_WAVE, w=0.5, h=1.0, slope=0.1, name="a name"),
+    Stem(w=_LEGS, h=1.25),
+    Cap(r=replace(_WAVE, omega=None, period=4.0)),
+)
+
+
+def requests(draw: Draw, profile: str) -> Iterator[Question]:
+    """Break requests in all ways that the schema forbids; the first is sound."""
+    for scene in ASKED:
+        state = INSIDE[type(scene)]
+        sound = question(profile, draws.wire_form(scene), state, 0.5)
+        yield scene, sound, ""
+        for request, why in broken(sound):
+            yield scene, request, why
+
+
+def refuse(side: Implementation, scene: Scene, request: Mapping[str, Any], why: str) -> bool:
+    """Hold a bad request to be refused as a whole, or in its only state; and a sound one not to be."""
+    seq = MAX_SEQ // 5
+    line = json.dumps({**request, "seq": seq}).replace("Infinity", "1e999")
+    answer = side.session.say(line.encode(), seq, side.profile)
+    parts = answer.get("steps", answer.get("states", [answer]))
+    outcomes = [part.get("outcome", "error") for part in parts]
+    side.n_asked, side.n_undecided = side.n_asked + 1, side.n_undecided + ("undecided" in outcomes)
+    if why:
+        assert {*outcomes, "rejected"} == {"rejected"} or outcomes == ["undecided"], (
+            f"{why}, is answered {answer}: {line}"
+        )
+    else:
+        assert "rejected" not in outcomes, f"a sound question is answered {answer}: {line}"
+    return True
+
+
+def bad_states(draw: Draw, profile: str) -> Iterator[Question]:
+    """Put states beyond walls, off them, past their ends, and into them, and others as near that are good."""
+    moving = [draws.scene(draw, table, draws.clock(draw, ("fourier", "bang-bang"))) for table in TABLES]
+    for scene in (*RESTING, *moving):
+        t = 3.0 * draw.part()
+        for state, why in states(draw, scene, t):
+            t_end = t + draw.pick((0.0, 2.0**-6)) if profile != "trajectory" else t + 1.0
+            yield scene, question(profile, scene, state, t_end), why and f"{state} {why}"
+        late = replace(INSIDE[type(scene)], t=t + 1.0)
+        if scene in RESTING:
+            yield scene, question(profile, scene, late, t), f"{late} begins after t_end"
+
+
+def states(draw: Draw, scene: Scene, t: float) -> Iterator[tuple[State, str]]:
+    """Make bad states and good ones of every wall of a table at one time, and say what is bad."""
+    table = table_at(fp, scene, t)
+
+    def leaving(wall: Wall, place: tuple[float, float], part: float, named: Wall | None) -> State:
+        # Along the wall with speed 1, and off it by a part of that, as seen from it.
+        nx, ny = table.normal(wall, *place)
+        off, way = part - table.receding(wall, place[1]), draw.pick((1.0, -1.0))
+        return State(t, float(place[0]), float(place[1]), off * nx - way * ny, off * ny + way * nx, named)
+
+    for wall in scene.walls:
+        x, y = _place(draw, table, wall)
+        for part in octaves(draw, 2.0**-18, 2.0**-4):
+            yield (
+                leaving(wall, moved(table, wall, x, y, -part), draw.pick((1.0, -1.0)), None),
+                f"is beyond {wall}",
+            )
+        for part in octaves(draw, OFF, 2.0**-6):
+            place = moved(table, wall, x, y, draw.pick((part, -part)))
+            yield leaving(wall, place, 1.0, wall), "is not on its wall"
+        for part in octaves(draw, ALLOWED / 16, ALLOWED):
+            yield leaving(wall, moved(table, wall, x, y, draw.pick((part, -part))), 1.0, wall), ""
+        for part in octaves(draw, 2.0**-12, 0.5):
+            yield leaving(wall, (x, y), -part, wall), "moves into its wall"
+            yield leaving(wall, (x, y), part, wall), ""
+        for place in _past_the_end(draw, table, wall):
+            yield leaving(wall, place, 1.0, wall), "is where its wall has ended"
+    place = _place(draw, table, "base")
+    yield leaving("base", place, draw.between(0.1, 0.9), None), ""
+    yield leaving("base", place, -draw.between(0.1, 0.9), None), "moves into the base that it is on"
+    for up in octaves(draw, 2.0**-12, 0.5) if isinstance(scene, Mushroom) else ():
+        mouth = draw.between(-0.95, 0.95) * float(table.w), 0.0
+        yield leaving("base", mouth, up, "base"), ""
+        yield leaving("base", mouth, -up, "base"), "moves into its wall"
+
+
+def _place(draw: Draw, table: TableAt, wall: Wall) -> tuple[float, float]:
+    """Return a point of a wall, away from its ends."""
+    if wall == "arc":
+        turn = draw.between(0.5, 2.5)
+        return float(table.r) * cos(turn), float(table.r) * sin(turn)
+    if wall == "base":
+        ends = {Cap: (0.0, table.r), Stem: (0.0, table.w), Mushroom: (table.w, table.r)}[type(table.scene)]
+        return float(ends[0] + draw.between(0.3, 0.7) * (ends[1] - ends[0])), 0.0
+    x, y = table.stem_point(wall, draw.between(-0.7, 0.7), draw.between(0.3, 0.7))
+    return float(x), float(y)
+
+
+def moved(table: TableAt, wall: Wall, x: float, y: float, part: float) -> tuple[float, float]:
+    """Move a point of a wall inwards by a part of the wall's size, as docs/protocol.md measures it."""
+    if wall == "arc":
+        return x * (1.0 - part), y * (1.0 - part)
+    if wall in ("left", "right"):
+        size = max(float(table.w), abs(x))
+        return x + (part * size if wall == "left" else -part * size), y
+    size = float(table.h) if wall == "floor" else float(max(table.r, table.w))
+    return x, y + part * size * table.normal(wall, x, y)[1]
+
+
+def _past_the_end(draw: Draw, table: TableAt, wall: Wall) -> Iterator[tuple[float, float]]:
+    """Return places where a wall's f is 0, and which lie past the wall's ends."""
+    r, w, h = float(table.r), float(table.w), float(table.h)
+    side = draw.pick((1.0, -1.0))
+    for part in octaves(draw, 2.0**-10, 2.0**-4):
+        if wall == "arc":
+            yield side * r * cos(part), -r * sin(part)
+        elif wall == "base":
+            yield side * (w if isinstance(table.scene, Stem) else r) * (1.0 + part), 0.0
+        elif wall == "floor":
+            yield side * float(table.half_width(-table.h)) * (1.0 + part), -h
+        else:
+            y = draw.pick((-h * (1.0 + part), h * part))
+            yield float(table.half_width(y)) * (-1.0 if wall == "left" else 1.0), y
+    if wall == "arc" and isinstance(table.scene, Mushroom) and (y := -sqrt(r * r - w * w / 16)) > -h:
+        yield w / 4, y  # within the stem, where the circle goes on
+
+
+Kind = Callable[[float, float], dict[str, Any]]  # (its bound, its value far from there) -> law
+
+
+def bad_scenes(draw: Draw, profile: str) -> Iterator[Question]:
+    """Break each condition of a scene for a drawn share of the period, and come as near to it without."""
+    for share in octaves(draw, 1.0 / MOST_SAMPLES, 0.25):
+        make, at = draw.pick((_wave, _legs)), draw.part()
+        for off, why in ((1.0, f"a law is broken for {share:.3g} of the period"), (-1.0, "")):
+            law = partial(make, share=share, at=at, off=off)
+            for data in _at_their_bounds(law):
+                yield _asked_soon(profile, data, why, at - 0.5)
+            # Apart at all times, though their ranges are not.
+            sound = {"table": "mushroom", "r": law(1.25, 0.75), "w": law(1.2, 0.7), "h": 1.0}
+            yield _asked_soon(profile, sound, "", at - 0.5)
+    for apart in octaves(draw, UNEQUAL, 1.0):
+        yield _asked_soon(profile, _of_two_periods(draw, apart), f"periods differ by {apart:.3g}")
+    yield _asked_soon(profile, _of_two_periods(draw, 0.0), "")
+    jump, back = [[0.0, 1.0], [0.5, 1.25], [1.0, 1.5]], [[0.0, 1.0], [0.75, 1.25], [0.5, 1.0]]
+    for knots, why in ((jump, "a law jumps"), (back, "a law's time runs back")):
+        yield _asked_soon(profile, {"table": "cap", "r": {"kind": "bang-bang", "knots": knots}}, why)
+    sound = {"table": "mushroom", "r": 1.0, "w": 0.5, "h": 1.0}
+    yield _asked_soon(profile, {**sound, "nu": 0.5}, "both w and nu are given")
+    yield _asked_soon(profile, {"table": "mushroom", "r": 1.0, "h": 1.0}, "w is missing")
+    for near in octaves(draw, 2.0**-40, 0.5):
+        for name, value in (
+            ("w", 1.0 + near),
+            ("r", 0.5 - near / 2),
+            ("slope", 0.5 + near),
+            ("h", -near),
+            ("w", 0.0),
+        ):
+            yield _asked_soon(profile, {**sound, name: value}, f"{name} = {value!r}")
+        yield _asked_soon(profile, {**sound, "w": 1.0 - near, "slope": (1.0 - near) * (1.0 - near)}, "")
+    yield _asked_soon(profile, {**sound, "w": 1.0}, "")
+
+
+def _asked_soon(profile: str, data: dict[str, Any], why: str, t: float = 0.0) -> Question:
+    """Ask about a start in a scene, up to a time before which nothing is met."""
+    start = replace(INSIDE[TABLES[data["table"]]], t=t)
+    return data, question(profile, data, start, t + 2.0**-12), why
+
+
+def _wave(bound: float, far: float, share: float, at: float, off: float) -> dict[str, Any]:
+    """Return a wave that passes a bound for a share of its period, or comes as near (off = -1)."""
+    size = (far - bound) / 2
+    size, mean = size, bound + size - off * size * (1.0 - cos(pi * share))
+    cosine, sine = -size * cos(2 * pi * at), -size * sin(2 * pi * at)
+    return {"kind": "fourier", "mean": mean, "period": 1.0, "cos": [cosine], "sin": [sine]}
+
+
+def _legs(bound: float, far: float, share: float, at: float, off: float) -> dict[str, Any]:
+    """Return legs that do likewise: near a knot a leg is a parabola."""
+    past = off * 2 * (far - bound) * share**2
+    return {"kind": "bang-bang", "knots": [[at - 0.5, far], [at, bound - past], [at + 0.5, far]]}
+
+
+def _at_their_bounds(law: Kind) -> Iterator[dict[str, Any]]:
+    """Return scenes of which one law comes to its bound, or passes it."""
+    stem = {"table": "stem", "w": 1.0, "h": 1.25}
+    mushroom, by_nu = ({"table": "mushroom", "r": 1.0, name: 0.5, "h": 1.0} for name in ("w", "nu"))
+    yield {"table": "cap", "r": law(0.0, 1.0)}
+    yield {**stem, "w": law(0.0, 0.75)}
+    yield {**mushroom, "h": law(0.0, 1.0)}
+    yield {**by_nu, "nu": law(0.0, 0.75)}
+    yield {**by_nu, "nu": law(1.0, 0.25)}
+    yield {**mushroom, "w": law(1.0, 0.25)}
+    yield {**mushroom, "r": law(0.5, 1.0)}
+    yield {**stem, "slope": law(0.8, -0.25)}
+    yield {**mushroom, "slope": law(0.5, -0.25)}
+    yield {**stem, "slope": 0.4, "h": law(2.5, 1.0)}
+    yield {**by_nu, "slope": 0.25, "r": law(0.5, 1.0)}
+
+
+def _of_two_periods(draw: Draw, apart: float) -> dict[str, Any]:
+    """Return a scene whose laws have periods that differ by a part."""
+    period = draw.pick((1.0, 2.0)) * (1.0 + apart)
+    wave = {"kind": "fourier", "mean": 1.0, "period": period / (1.0 + apart), "cos": [0.05]}
+    other = draw.pick(
+        (
+            {**wave, "period": period},
+            {"kind": "bang-bang", "knots": [[0.0, 1.0], [period / 2, 1.1], [period, 1.0]]},
+        )
+    )
+    return {"table": "mushroom", "r": wave, "w": 0.5, "h": other}

@@ -1,0 +1,375 @@
+"""The one table of faulty servers: the check that refuses each, the verdict, the fault."""
+
+from __future__ import annotations
+
+import math
+
+from support.faulty_refusals import (
+    absent_as_zero,
+    arrived,
+    at_once,
+    everywhere,
+    fleeing,
+    in_a,
+    in_the_mouth,
+    leaving_slowly,
+    letting,
+    loose,
+    narrower,
+    near_by,
+    nearly_one_period,
+    number_of,
+    on_a_longer,
+    one_of_two,
+    passes_samples,
+    refusing,
+    scenes_let,
+    scenes_refused_for,
+    slower,
+    strictly_off,
+    unknown_wall,
+    whole,
+    wide_by_ranges,
+)
+from support.faulty_servers import (
+    FLOW,
+    PATH,
+    STEP,
+    Change,
+    Fault,
+    Line,
+    after_hits,
+    answers_by,
+    as_fortran_reads,
+    asked,
+    at_bad_lines,
+    by,
+    captured_as,
+    clock,
+    crash,
+    each,
+    elsewhere,
+    fewer,
+    first_parts,
+    losing_stays,
+    minus_is_below,
+    nameless_only,
+    on,
+    once,
+    one_bad_spoils_all,
+    particles_by,
+    remembered,
+    rounded,
+    same_velocity_for_all,
+    scenes_by,
+    starts,
+    straight_on,
+    swapping,
+    take_hints,
+    values_alone,
+    wide_edge,
+    without,
+    without_wall,
+    wrong_after_bad_lines,
+)
+from support.faulty_steppers import (
+    OPEN,
+    beside_its_wall,
+    dead_time,
+    early,
+    horizon_at_once,
+    impatient,
+    late_speed,
+    leaking,
+    leaving_out,
+    never_moving,
+    one_too_few,
+    repeated,
+    slowed,
+    tired,
+    to_and_fro,
+    with_mouth,
+    with_slope,
+    wrong_order,
+)
+
+PLACE = ("x", "y", "vx", "vy")
+
+
+def first_time_for_all(request: Line) -> None:
+    """Let all particles of a flow begin when the first does."""
+    for state in starts(request):
+        state["t"] = starts(request)[0].get("t")
+
+
+def room_for(n: int) -> Change:
+    """Have room for n particles, and give the last one's arrival to all beyond."""
+    return lambda _, found: {
+        **found,
+        "states": [*found["states"][:n], *found["states"][n - 1 : n] * (len(found["states"]) - n)],
+    }
+
+
+def offering(*profiles: str) -> Fault:
+    """Offer some profiles only."""
+    return lambda request, answer: {
+        **answer(request),
+        **({"profiles": profiles} if request.get("cmd") == "start" else {}),
+    }
+
+
+def both(one: Fault, other: Fault) -> Fault:
+    """Have two faults."""
+    return lambda request, answer: one(request, lambda changed: other(changed, answer))
+
+
+def mend(request: Line, found: Line) -> Line:
+    """Leave paths open after 300 hits, and lose speed before."""
+    leaking(1e-10)(request, found)
+    return {**found, "steps": [*found["steps"][:300], OPEN] if len(found["steps"]) > 300 else found["steps"]}
+
+
+def wall_by_default(wall: str, *cmds: str) -> Fault:
+    """Take a wall that is not named for one."""
+    return asked(lambda request: [state.setdefault("wall", wall) for state in starts(request)], *cmds)
+
+
+EXCUSES = {
+    "loose-on-walls": loose(1e-2),
+    "loose-by-1e-5": loose(1e-5),
+    "a-tenth-outside": near_by(0.1),
+    "little-outside": near_by(2.0**-16),
+    "slowly-into-walls": slower(0.01),
+    "fleeing-a-faster-wall": fleeing,
+    "named-beyond-others": lambda _, state, why: state["wall"] is not None and "beyond wall" in why,
+    "arc-below-the-mouth": in_a("mushroom", on_a_longer("arc")),
+    "sides-above-the-mouth": in_a("mushroom", on_a_longer("left", "right")),
+    "arc-below-a-cap": in_a("cap", on_a_longer("arc")),
+    "sinking-through-the-mouth": lambda at, state, why: "moves into it" in why and in_the_mouth(at, state),
+    "nameless-through-the-base": lambda _, state, __: state["wall"] is None and bool(state["y"] == 0),
+    "outside-left": in_a("mushroom", near_by(math.inf, "left")),
+}
+RULES = {
+    "w-up-to-r": "w <= r",
+    "nu-up-to-1": "nu <= 1",
+    "sides-apart": "w > h slope",
+    "one-period": "share one period",
+    "closed-knots": "no jumps",
+}
+KEYS = {
+    "first-parts": first_parts,
+    "without-omega": without("omega"),
+    "without-period": without("period"),
+    "without-sines": without("sin"),
+    "by-knot-values": values_alone,
+}
+# What refuses each: the check, its verdict, the fault.
+FAULTS: dict[str, tuple[str, str, Fault]] = {
+    "absent-is-arc": ("spelling", "fail", wall_by_default("arc", STEP)),
+    "absent-is-arc-in-paths": ("spelling", "fail", wall_by_default("arc", PATH)),
+    "absent-is-arc-in-flows": ("spelling", "fail", wall_by_default("arc", FLOW)),
+    "nameless-only": ("spelling", "fail", nameless_only),
+    "as-fortran-reads": ("spelling", "fail", asked(as_fortran_reads)),
+    "crash-at-bad-lines": ("malformed-lines", "crashed", at_bad_lines(crash)),
+    "guess-at-bad-lines": ("malformed-lines", "fail", at_bad_lines(lambda: {"seq": None, **OPEN})),
+    "wrong-after-bad-lines": ("malformed-lines", "fail", wrong_after_bad_lines()),
+    "take-hints": ("extra-fields", "fail", take_hints),
+    "minus-is-below": ("minus-zero", "fail", asked(minus_is_below)),
+    # Caches.
+    **{
+        f"remembering-{n}-digits": ("changed-questions", "fail", answers_by(rounded(n)))
+        for n in (6, 9, 12, 15)
+    },
+    "answers-without-wall": ("changed-questions", "fail", answers_by(without_wall)),
+    **{f"scenes-{name}": ("changed-questions", "fail", scenes_by(key, STEP)) for name, key in KEYS.items()},
+    "paths-by-first-parts": ("changed-questions", "fail", scenes_by(first_parts, PATH)),
+    "flows-by-first-parts": ("changed-questions", "fail", scenes_by(first_parts, FLOW)),
+    "scenes-without-names": ("changed-questions", "fail", scenes_by(without(), STEP, are_named=False)),
+    # Flows.
+    "one-bad-spoils-all": ("many-particles", "fail", on(FLOW, one_bad_spoils_all)),
+    "bad-ones-last": (
+        "many-particles",
+        "fail",
+        on(
+            FLOW,
+            lambda _, found: {
+                **found,
+                "states": sorted(found["states"], key=lambda part: part["outcome"] == "rejected"),
+            },
+        ),
+    ),
+    "no-bad-ones": (
+        "many-particles",
+        "wrong-format",
+        on(
+            FLOW,
+            lambda _, found: {**found, "states": [s for s in found["states"] if s["outcome"] == "horizon"]},
+        ),
+    ),
+    "stays-of-the-lost": (
+        "many-particles",
+        "wrong-format",
+        on(FLOW, each("rejected", lambda _, part, __: part.update(captured=[0.0, 1.0]))),
+    ),
+    "first-for-all": ("many-particles", "fail", on(FLOW, same_velocity_for_all)),
+    "first-time-for-all": ("many-particles", "fail", asked(first_time_for_all, FLOW)),
+    **{f"room-for-{n}": ("many-particles", "fail", on(FLOW, room_for(n))) for n in (64, 256, 500, 2000)},
+    "particles-without-time": ("many-particles", "fail", on(FLOW, particles_by(by(*PLACE, "wall")))),
+    "particles-without-wall": ("many-particles", "fail", on(FLOW, particles_by(by("t", *PLACE)))),
+    "particles-by-place": ("many-particles", "fail", on(FLOW, particles_by(by("t", "x", "y", "wall")))),
+    "particles-by-9-digits": ("many-particles", "fail", on(FLOW, particles_by(rounded(9)))),
+    "swapped-now-and-then": ("many-particles", "fail", on(FLOW, swapping(5))),
+    **{
+        f"captured-in-blocks-of-{n}": (
+            "many-particles",
+            "fail",
+            on(FLOW, losing_stays(lambda i, m, n=n: m > n and i >= m - m % n)),
+        )
+        for n in (16, 32, 64, 100)
+    },
+    "captured-up-to-100": ("many-particles", "fail", on(FLOW, losing_stays(lambda i, _: i >= 100))),
+    "never-captured": ("edges", "fail", captured_as(lambda _, __: None)),
+    "captured-from-the-start": (
+        "edges",
+        "fail",
+        captured_as(lambda _, stay: [stay[0] - 0.1 * (stay[1] - stay[0]), stay[1]]),
+    ),
+    "captured-to-the-end": ("edges", "fail", captured_as(lambda request, stay: [stay[0], request["t_end"]])),
+    **{f"edge-wider-by-{part:g}": ("edges", "fail", wide_edge(part)) for part in (1e-4, 1e-6)},
+    "without-slope-in-flows": ("hits", "fail", with_slope(lambda _: 0.0, FLOW)),
+    "frozen-after-50": ("long-paths", "fail", after_hits(50, slowed)),
+    **{f"straight-after-{n}": ("long-flow", "fail", after_hits(n, straight_on)) for n in (1000, 2000, 4000)},
+    "leaking-in-flows": (
+        "long-flow",
+        "fail",
+        on(
+            FLOW,
+            each("horizon", lambda _, part, __: part.update(vx=part["vx"] * 1.001, vy=part["vy"] * 1.001)),
+        ),
+    ),
+    "open-flows": (
+        "many-particles",
+        "declined",
+        on(FLOW, lambda _, found: {**found, "states": [OPEN] * len(found["states"])}),
+    ),
+    "open-paths": (
+        "long-paths",
+        "declined",
+        on(PATH, lambda _, found: {**found, "steps": [*found["steps"][:1], OPEN][: len(found["steps"])]}),
+    ),
+    # Hits and paths.
+    "one-too-few": ("long-paths", "fail", on(PATH, one_too_few)),
+    **{f"tired-at-{n}": ("long-paths", "fail", on(PATH, tired(n))) for n in (50, 450, 1000, 2000, 4000)},
+    "without-slope-in-paths": ("hits", "fail", with_slope(lambda _: 0.0, PATH)),
+    "faster-after-1000": ("long-paths", "fail", on(PATH, each("collision", late_speed(1000.0)))),
+    "faster-late-steps": ("late-starts", "fail", on(STEP, each("collision", late_speed(1000.0)))),
+    "leaking": ("long-paths", "fail", on(PATH, leaking(1e-10))),
+    "spiralling": ("long-paths", "fail", on(PATH, leaking(0.0, 1e-10))),
+    "leaking-before-it-is-open": ("long-paths", "fail", on(PATH, mend)),
+    "horizon-at-once": ("long-paths", "fail", on(PATH, horizon_at_once)),
+    "never-moving": ("long-paths", "fail", on(PATH, each("collision", never_moving))),
+    "standing-at-a-wall": ("long-paths", "fail", on(PATH, repeated({}))),
+    "pressing-at-a-wall": ("long-paths", "fail", on(PATH, repeated({"vx": -1.0, "vy": -1.0}))),
+    "at-twice-the-time": (
+        "long-paths",
+        "fail",
+        on(PATH, each("collision", lambda _, step, __: step.update(t=2 * step["t"]))),
+    ),
+    "beside-its-wall": ("long-paths", "fail", on(PATH, each("collision", beside_its_wall))),
+    "one-at-least": (
+        "endings",
+        "fail",
+        asked(lambda request: request.update(collisions=request.get("collisions") or 1), PATH),
+    ),
+    "undefined-left-out": ("endings", "fail", on(PATH, leaving_out("undefined"))),
+    "horizon-left-out": ("endings", "fail", on(PATH, leaving_out("horizon"))),
+    "corners-for-all-reasons": (
+        "endings",
+        "fail",
+        lambda request, answer: (
+            {**found, "reason": "corner"}
+            if (found := answer(request)).get("outcome") == "undefined"
+            else found
+        ),
+    ),
+    **{
+        f"ties-within-{near:g}-by-order": ("edges", "fail", on(STEP, wrong_order(near)))
+        for near in (1e-4, 1e-8)
+    },
+    **{
+        f"mouths-below-{near:g}-shut": (
+            "edges",
+            "fail",
+            with_mouth(lambda w, near=near: w * 1e-9 if w < near else w),
+        )
+        for near in (1e-3, 1e-5)
+    },
+    **{
+        f"mouths-above-{1 - near:g}-whole": (
+            "edges",
+            "fail",
+            with_mouth(lambda w, near=near: 1.0 if w > 1 - near else w),
+        )
+        for near in (1e-3, 1e-5)
+    },
+    **{
+        f"slopes-from-{-steep:g}-on": (
+            "edges",
+            "fail",
+            with_slope(lambda slope, steep=steep: max(slope, -steep)),
+        )
+        for steep in (1.0, 16.0)
+    },
+    "dead-time-of-1e-9": ("edges", "fail", on(STEP, dead_time(1e-9))),
+    **{f"impatient-after-{n}": ("waiting", "fail", on(STEP, impatient(n))) for n in (512, 1000)},
+    # Bad input, and good.
+    **{name: ("bad-states", "fail", letting(excuse, STEP)) for name, excuse in EXCUSES.items()},
+    "no-time-no-check": ("bad-states", "fail", at_once),
+    "loose-paths": ("bad-states", "fail", letting(loose(1e-2), PATH)),
+    "loose-flows": ("bad-states", "fail", letting(loose(1e-2), FLOW)),
+    "late-is-arrived": ("bad-states", "fail", on(FLOW, arrived(lambda t, t_end: t > t_end))),
+    "at-the-end-unchecked": ("bad-states", "fail", on(FLOW, arrived(lambda t, t_end: t == t_end))),
+    "no-base-in-the-mouth": ("bad-states", "fail", refusing(in_the_mouth)),
+    "no-base-in-the-mouth-of-paths": ("bad-states", "fail", refusing(in_the_mouth, PATH)),
+    **{
+        f"strictly-on-{wall}": ("bad-states", "fail", refusing(strictly_off(wall)))
+        for wall in ("arc", "base", "left", "floor")
+    },
+    "refusing-slow-ones": ("bad-states", "fail", refusing(leaving_slowly)),
+    "scenes-unchecked": ("bad-scenes", "fail", scenes_refused_for("fails by")),
+    **{
+        f"scenes-without-{name}": ("bad-scenes", "fail", scenes_refused_for(word))
+        for name, word in RULES.items()
+    },
+    **{f"scenes-by-{n}-samples": ("bad-scenes", "fail", scenes_let(passes_samples(n))) for n in (1, 64)},
+    "periods-to-9-digits": ("bad-scenes", "fail", scenes_let(nearly_one_period)),
+    "scenes-by-ranges": ("bad-scenes", "fail", narrower(wide_by_ranges)),
+    "unknown-wall-as-null": ("bad-requests", "fail", asked(unknown_wall)),
+    **{
+        f"absent-{name}-as-0": ("bad-requests", "fail", absent_as_zero(name))
+        for name in ("t", "x", "y", "vx", "vy")
+    },
+    "true-as-1": ("bad-requests", "fail", everywhere(lambda value: 1.0 if value is True else value)),
+    "texts-as-numbers": ("bad-requests", "fail", everywhere(number_of)),
+    "collisions-rounded": ("bad-requests", "fail", asked(whole)),
+    "omega-before-period": ("bad-requests", "fail", asked(one_of_two)),
+    # Clocks.
+    "fewer": ("time-steps", "fail", fewer(8)),
+    "elsewhere": ("time-steps", "fail", on("time", elsewhere)),
+    "fewer-of-many": ("time-clock", "fail", fewer(100)),
+    "no-time": ("time-clock", "fail", clock(lambda _, said: [0] * len(said))),
+    "a-tenth": ("time-clock", "fail", clock(lambda _, said: [n // 10 for n in said])),
+    "tenfold": ("time-clock", "fail", clock(lambda _, said: [10 * n for n in said])),
+    "constant": ("time-clock", "fail", once(lambda _, __, repeat: [1000] * repeat)),
+    "by-the-piece": ("time-clock", "fail", once(lambda n, _, repeat: [500 * n] * repeat)),
+    "once-for-all": ("time-clock", "fail", once(lambda n, _, repeat: [10_000_000 + n] * repeat)),
+    "remembering": ("time-clock", "fail", once(remembered)),
+}
+# Errors that do not add up, and others that vectors let pass: these are no faults.
+HONEST: dict[str, Fault] = {
+    "to and fro": on(PATH, each("collision", to_and_fro)),
+    "coarse": both(offering(STEP), on(STEP, early(1e-12))),
+    "coarser": both(offering(STEP), on(STEP, early(3e-10))),
+    "steps alone": offering(STEP),
+    "flows alone": offering(FLOW),
+}

@@ -1,0 +1,261 @@
+"""The checks: honest servers hold them, and each faulty server is refused by its own."""
+
+from __future__ import annotations
+
+import msgspec
+import pytest
+from hypothesis import find, settings
+from support.depth import deep_among, deep_but
+from support.faults import FAULTS, HONEST
+from support.faulty_servers import faulty, last_bit_varies, refusing_lines
+
+import reference
+from conformance import plain, vectors
+from conformance.mutants import MUTANTS, kill_matrix
+from conformance.suite import checks
+from conformance.suite.checks import ensembles, flaws, refusals, timing
+from conformance.suite.checks.flows import MAX_STATES
+from conformance.suite.checks.form import Draw, octaves, run_check
+from conformance.suite.session import Session
+from scene import BadInput, Cap, Collision, Horizon, Mushroom, Rejected, State, Stem, from_data
+from scene.protocol.wire import Captured
+
+SEEDS = 1, 2, 3
+UNTIMED = [check for check in checks.checks_of() if not check.name.startswith(("profile", "promise/time"))]
+
+
+@pytest.fixture(autouse=True)
+def hurried(monkeypatch):
+    monkeypatch.setattr(timing, "N_TRIES", 2)
+    monkeypatch.setattr(timing, "READABLE", 0.1)
+
+
+def verdict_on(answer, name, seed=1):
+    with Session(answer) as session:
+        session.start()
+        return run_check(next(check for check in checks.checks_of() if check.name == name), session, seed)
+
+
+def same(request, answer):
+    return answer(request)
+
+
+@pytest.mark.parametrize("check", checks.checks_of(), ids=lambda check: check.name)
+def test_an_honest_server_holds_every_check(check):
+    found = verdict_on(faulty(same), check.name)
+    assert found.verdict == ("declined" if check.name == "profile/mean-growth" else "pass"), found.why
+
+
+# Of several that differ by a number alone, all but one; and those that wait for a clock.
+ALIKE = (
+    *("a-tenth", "no-time", "remembering", "constant", "tenfold", "by-the-piece", "fleeing-a-faster-wall"),
+    *(
+        "tired-at-50",
+        "tired-at-450",
+        "tired-at-1000",
+        "tired-at-2000",
+        "straight-after-1000",
+        "straight-after-2000",
+    ),
+    *(f"room-for-{n}" for n in (64, 256, 500)),
+    *(f"captured-in-blocks-of-{n}" for n in (16, 32, 64)),
+    *("remembering-6-digits", "remembering-9-digits", "remembering-12-digits", "impatient-after-512"),
+    *(
+        "mouths-below-0.001-shut",
+        "mouths-above-0.999-whole",
+        "ties-within-0.0001-by-order",
+        "edge-wider-by-0.0001",
+    ),
+    *("scenes-by-1-samples", "absent-t-as-0", "absent-x-as-0", "absent-y-as-0"),
+)
+
+
+@pytest.mark.parametrize("name", deep_among(FAULTS, *ALIKE))
+def test_a_faulty_server_is_refused_in_one_of_three_runs(name, tally):
+    check, verdict, fault = FAULTS[name]
+    found = [verdict_on(faulty(fault), f"promise/{check}", seed) for seed in SEEDS[:1]]
+    if found[0].verdict != verdict:
+        found += [verdict_on(faulty(fault), f"promise/{check}", seed) for seed in SEEDS[1:]]
+        tally["at a second or third seed"] += 1
+    assert verdict in [result.verdict for result in found], found
+    assert all(result.why.isprintable() for result in found)
+
+
+@pytest.mark.parametrize(
+    ("name", "is_refused"),
+    {
+        "no-utf8": lambda line: not line.isascii(),
+        "no-escapes": lambda line: b"\\u" in line,
+        "no-capital-e": lambda line: b"E+" in line or b"E-" in line,
+        "64-KiB": lambda line: len(line) > 2**16,
+        "512-KiB": lambda line: len(line) > 2**19,
+    }.items(),
+)
+def test_a_server_that_cannot_read_some_lines_is_refused(name, is_refused):
+    assert verdict_on(refusing_lines(is_refused), "promise/spelling").verdict == "fail", name
+
+
+def test_every_rule_has_its_faulty_server():
+    assert {f"promise/{check}" for check, _, _ in FAULTS.values()} == {check.name for check in checks.RULES}
+
+
+@pytest.mark.parametrize("name", deep_but(HONEST, "coarse"))
+def test_errors_that_vectors_let_pass_are_no_fault(name):
+    for check in UNTIMED:
+        if check.name.startswith("promise"):
+            assert verdict_on(faulty(HONEST[name]), check.name).verdict in ("pass", "unsupported"), check.name
+
+
+@pytest.mark.parametrize(
+    "part", deep_but(["promise/s", "promise/m", "property", "promise"], "promise/s", "promise/m")
+)
+def test_a_last_bit_that_varies_is_no_fault(part):
+    for check in [check for check in UNTIMED if check.name.startswith(part)]:
+        found = verdict_on(faulty(last_bit_varies()), check.name)
+        assert found.verdict == "pass", (check.name, found.why)
+
+
+def test_an_engine_that_names_no_walls_and_keeps_no_flight_times_holds_the_rules():
+    def nameless(request, answer):
+        found = answer(request)
+        for part in (found, *found.get("steps", ())):
+            part.pop("dt", None)
+            part.pop("wall", None)
+        return found
+
+    for check in checks.checks_of(
+        "core", ("property/energy", "promise/hits", "promise/spelling", "promise/endings")
+    ):
+        found = verdict_on(faulty(nameless), check.name)
+        assert found.verdict == "pass", (check.name, found.why)
+
+
+def test_a_failure_can_be_pasted_as_a_test():
+    """The case that is printed fails as it stands, for the same reason."""
+    check, _, fault = FAULTS["slopes-from--1-on"]
+    found = verdict_on(faulty(fault), f"promise/{check}")
+    names = {"implementation": faulty(fault)}
+    exec(found.paste, names)
+    test = next(value for name, value in names.items() if name.startswith("test_"))
+    with pytest.raises(AssertionError) as broken:
+        settings(max_examples=1, database=None)(test)()
+    assert str(broken.value).partition("\n")[0][:60] in found.why
+    with pytest.raises(AssertionError, match="@example"):
+        checks.hold(faulty(fault), f"promise/{check}", 1)
+
+
+def test_questions_are_a_strategy_too():
+    scene, *_ = find(checks.questions("promise/endings", "step"), lambda asked: True)
+    assert isinstance(scene, Mushroom | Cap | Stem)
+
+
+def test_bad_states_are_bad_and_good_ones_good_by_the_reference(tally):
+    """What a check asks must be so: the proving stepper says the same, and leaves nothing open."""
+    for scene, request, why in refusals.bad_states(Draw("1"), "step"):
+        start = State(**request["state"])
+        outcome = reference.next_collision(scene, start, request["t_end"])
+        assert isinstance(outcome, Rejected) == bool(why), (scene, request, why, outcome)
+        tally["bad" if why else "good"] += 1
+    assert min(tally.values()) > 100
+
+
+def test_bad_scenes_are_bad_and_good_ones_good_by_proof(tally):
+    for seed in SEEDS:
+        for data, _, why in refusals.bad_scenes(Draw(str(seed)), "step"):
+            tally["bad" if why else "good"] += 1
+            if why:
+                with pytest.raises(BadInput):
+                    from_data(data)
+            else:
+                from_data(data)
+    assert min(tally.values()) > 100
+
+
+def test_certified_paths_have_no_flaw_and_shifted_ones_do(tally):
+    for vector in vectors.load("core"):
+        if vector.expect[0].outcome == "collision" and vector.kind == "step" and abs(vector.state.t) < 1000:
+            scene = from_data(vector.scene)
+            hit = plain.next_collision(scene, vector.state, vector.t_end)
+            if isinstance(hit, Collision):
+                assert flaws.flaw_of(scene, vector.state, [hit]) == ""
+                late = msgspec.structs.replace(hit, vx=hit.vx + 1e-6 * (abs(hit.vx) + abs(hit.vy)))
+                tally["steps"] += 1
+                tally["seen"] += bool(flaws.flaw_of(scene, vector.state, [late]))
+    assert tally["seen"] > 0.98 * tally["steps"] > 1000  # where walls turn within 1e-3 less is seen
+
+
+def test_every_certified_hit_is_nearest_to_its_wall(tally):
+    for vector in vectors.load("core"):
+        expected = vector.expect[0]
+        if vector.kind == "step" and expected.outcome == "collision":
+            (step,) = expected.steps
+            t = float(step.centre("dt")) + vector.state.t
+            place = float(step.centre("x")), float(step.centre("y"))
+            assert flaws.table_at(flaws.fp, from_data(vector.scene), t).nearest_wall(*place) == step.wall
+            tally[step.wall] += 1
+    assert set(tally) == {"arc", "base", "left", "right", "floor"}
+
+
+def test_no_size_is_a_constant():
+    """Two seeds share no size, and each octave up to the bound is asked about."""
+    one, other = (list(octaves(Draw(str(seed)), 1, MAX_STATES)) for seed in SEEDS[:2])
+    assert not set(one) & set(other)
+    assert [int(size).bit_length() for size in one] == list(range(12, 0, -1))
+
+
+def flow_of(name: str, loses: int = 0):
+    """Answer flows by a mutant of the plain stepper, or by itself."""
+    stepper = MUTANTS.get(name, kill_matrix.PLAIN)
+
+    def change(request, answer):
+        if request.get("cmd") != "flow":
+            return answer(request)
+        states = [State(**state) for state in request["states"]][loses:]
+        found: list[tuple[object, Captured]] = stepper.flow(
+            from_data(request["scene"]), states, request["t_end"]
+        )
+        told = [
+            {**msgspec.to_builtins(o), "captured": s if isinstance(o, Horizon) else None} for o, s in found
+        ]
+        return {"seq": request["seq"], "states": told}
+
+    return faulty(change)
+
+
+# A slow particle is sooner done; 20 particles cannot tell anything from anything.
+FEW, SLOW, LITTLE = (
+    ensembles.Size(*size) for size in ((100, 1000.0, 0.08), (400, 20.0, 0.2), (20, 20.0, 0.3))
+)
+
+
+@pytest.mark.parametrize(
+    ("name", "case", "size", "verdict"),
+    [
+        ("none", "work-identity", FEW, "pass"),
+        ("none", "work-identity", LITTLE, "declined"),
+        ("energy-kept", "work-identity", FEW, "fail"),
+        pytest.param(
+            "wall-velocity-once",
+            "work-identity",
+            FEW._replace(n_particles=400),
+            "fail",
+            marks=pytest.mark.deep,
+        ),
+        # Loses nearly all its particles.
+        ("phase-restarts-at-each-step", "work-identity", FEW, "fail"),
+        pytest.param("none", "captured-share", SLOW._replace(bias=0.1), "pass", marks=pytest.mark.deep),
+        ("none", "captured-share", LITTLE, "declined"),
+        ("hole-static", "captured-share", SLOW._replace(bias=0.1), "fail"),
+        ("none", "mean-growth", FEW, "declined"),
+    ],
+)
+def test_ensembles_tell_a_mutant_from_an_honest_stepper(monkeypatch, name, case, size, verdict):
+    monkeypatch.setitem(ensembles.SIZES, "core", size)
+    found = verdict_on(flow_of(name), f"profile/{case}", 3)
+    assert found.verdict == verdict, found.why
+
+
+def test_an_ensemble_that_loses_particles_is_of_wrong_format(monkeypatch):
+    monkeypatch.setitem(ensembles.SIZES, "core", FEW)
+    for case in ("work-identity", "captured-share"):
+        assert verdict_on(flow_of("none", loses=1), f"profile/{case}").verdict == "wrong-format"

@@ -64,9 +64,8 @@ def _find(case: str, seed: int | None) -> Vector:
 
 
 def _show(vector: Vector, disguise: Disguise) -> None:
-    from conformance.generator.certify import judge
-
     from conformance import vectors
+    from conformance.cases.certify import judge
     from conformance.grading.agreement import middle
     from conformance.suite.disguise import asked
 

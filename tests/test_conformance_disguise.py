@@ -6,12 +6,12 @@ from fractions import Fraction
 
 import msgspec
 import pytest
-from conformance.generator.draws import Draw
 from support import replayer
 from support.depth import deep_but
 
 import fast
 from conformance import suite, vectors
+from conformance.cases.draw import Draw
 from conformance.grading.agreement import middle
 from conformance.grading.grade import grade
 from conformance.mutants import Mutant

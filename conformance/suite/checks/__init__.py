@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator
 from functools import partial
 
 from conformance import properties
-from conformance.generator.draws import Draw
+from conformance.cases.draw import Draw
 from conformance.suite.checks import endings, flows, paths, refusals, requests, timing
 from conformance.suite.checks.ensembles import ensemble_checks
 from conformance.suite.checks.form import QUESTIONS, Implementation, Question, SuiteCheck, run_check

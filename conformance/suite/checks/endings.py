@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from conformance.generator.draws import Draw
+from conformance.cases.draw import Draw
 from conformance.suite.checks.form import FOREVER, Implementation, Question, question
 from scene import Cap, Mushroom, Scene, State, Stem
 

@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import theory
 from conformance import profiles, properties
-from conformance.generator.draws import Draw
+from conformance.cases.draw import Draw
 from conformance.profiles import Statistic
 from conformance.suite.answers import read_arrival
 from conformance.suite.checks.form import Implementation, Question, SuiteCheck

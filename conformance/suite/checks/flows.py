@@ -13,7 +13,7 @@ from mpmath import fp
 from msgspec.structs import replace
 
 from conformance import plain
-from conformance.generator.draws import Draw
+from conformance.cases.draw import Draw
 from conformance.suite.answers import read_arrival
 from conformance.suite.checks.form import FOREVER, Implementation, Question, octaves
 from conformance.suite.checks.paths import (

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 
 import msgspec
 
-from conformance.generator.draws import Draw
+from conformance.cases.draw import Draw
 from conformance.suite.answers import read_outcome
 from conformance.suite.process import NOT_NUMBERS, Trouble
 from conformance.suite.result import Result

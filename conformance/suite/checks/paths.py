@@ -15,8 +15,8 @@ from mpmath import fp
 from msgspec.structs import replace
 
 from conformance import plain
-from conformance.generator import draws
-from conformance.generator.draws import Draw
+from conformance.cases import scenes, starts
+from conformance.cases.draw import Draw
 from conformance.suite.answers import read_arrival
 from conformance.suite.checks.flaws import COARSE, FINE, LATE, UNCLEAR, first_stay, flaw_of, is_fine
 from conformance.suite.checks.form import FOREVER, Implementation, Question, octaves
@@ -133,8 +133,8 @@ def drawn(draw: Draw, kinds: Sequence[str] = USUAL, **at: Any) -> tuple[Scene, S
     """Draw a scene with laws of some kinds, and a start in it that meets a wall soon."""
     while True:
         try:
-            scene = draws.scene(draw, draw.pick(("cap", "stem", "mushroom")), draws.clock(draw, kinds))
-            state, t_end = draws.state(draw, scene, {"speed": draw.power(-1, 5), **at})
+            scene = scenes.scene(draw, draw.pick(("cap", "stem", "mushroom")), scenes.clock(draw, kinds))
+            state, t_end = starts.state(draw, scene, {"speed": draw.power(-1, 5), **at})
         except BadInput:
             continue
         if isinstance(plain.next_collision(scene, state, t_end), Collision):
@@ -190,7 +190,7 @@ def aimed(draw: Draw, near: float) -> tuple[Scene, State, int]:
         "cap" if isinstance(scene, Cap) else "stem" if isinstance(scene, Stem) else draw.pick(("cap", "stem"))
     )
     table = table_at(fp, scene, 0.0)
-    x, y = draws.place(draw, table, region)
+    x, y = starts.place(draw, table, region)
     to_x, to_y = draw.pick(table.corners(region))
     inside = 0.4 if region == "cap" else -0.4 * float(table.h)  # off all walls: the table is convex there
     return scene, _towards(draw, 0.8 * x, 0.8 * y + 0.2 * inside, to_x + draw.pick((near, -near)), to_y), 3
@@ -280,7 +280,7 @@ def _meets(scene: Scene | None, state: State) -> bool:
 
 def _one_number_changed(draw: Draw, scene: Scene, state: State, change: float) -> Scene | None:
     """Return a scene in which one number is another, wherever it stands; None where nothing is met then."""
-    data = draws.wire_form(scene)
+    data = scenes.wire_form(scene)
     numbers = [(label, number) for label, number in _leaves("", data) if number]
     labels = sorted({label for label, _ in numbers})
     label = draw.pick([name for name in labels if name in ("omega", "period")] or labels)
@@ -292,7 +292,7 @@ def _one_number_changed(draw: Draw, scene: Scene, state: State, change: float) -
 
 def _laws_renamed(scene: Scene, state: State) -> Iterator[Scene]:
     """Return scenes with the same laws under other names."""
-    data = draws.wire_form(scene)
+    data = scenes.wire_form(scene)
     for one, other in (("nu", "w"), ("r", "h"), ("w", "h")):
         names = {one: other, other: one}
         renamed = _scene_of({names.get(name, name): law for name, law in data.items()})
@@ -338,12 +338,12 @@ def long(draw: Draw, profile: str) -> Iterator[Question]:
 def late(draw: Draw, profile: str) -> Iterator[Question]:
     """Begin many periods from t = 0, before or after."""
     for wait in octaves(draw, 1, MAX_LATE):
-        scene = draws.scene(
-            draw, draw.pick(("cap", "stem", "mushroom")), draws.clock(draw, ("fourier", "bang-bang"))
+        scene = scenes.scene(
+            draw, draw.pick(("cap", "stem", "mushroom")), scenes.clock(draw, ("fourier", "bang-bang"))
         )
         t = draw.pick((1.0, -1.0)) * wait * draw.between(1.0, 4.0)
         for _ in range(64):
-            state, t_end = draws.state(draw, scene, {"t": t, "speed": draw.power(0, 4)})
+            state, t_end = starts.state(draw, scene, {"t": t, "speed": draw.power(0, 4)})
             if isinstance(plain.next_collision(scene, state, t_end), Collision):
                 yield scene, state, 2
                 break

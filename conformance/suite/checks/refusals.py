@@ -17,8 +17,8 @@ from typing import Any
 from mpmath import fp
 from msgspec.structs import replace
 
-from conformance.generator import draws
-from conformance.generator.draws import Draw
+from conformance.cases import scenes
+from conformance.cases.draw import Draw
 from conformance.suite.checks.form import Implementation, Question, octaves, question
 from conformance.suite.checks.schema import broken
 from conformance.suite.session import MAX_SEQ
@@ -49,7 +49,7 @@ def requests(draw: Draw, profile: str) -> Iterator[Question]:
     """Break requests in all ways that the schema forbids; the first is sound."""
     for scene in ASKED:
         state = INSIDE[type(scene)]
-        sound = question(profile, draws.wire_form(scene), state, 0.5)
+        sound = question(profile, scenes.wire_form(scene), state, 0.5)
         yield scene, sound, ""
         for request, why in broken(sound):
             yield scene, request, why
@@ -74,7 +74,7 @@ def refuse(side: Implementation, scene: Scene, request: Mapping[str, Any], why: 
 
 def bad_states(draw: Draw, profile: str) -> Iterator[Question]:
     """Put states beyond walls, off them, past their ends, and into them, and others as near that are good."""
-    moving = [draws.scene(draw, table, draws.clock(draw, ("fourier", "bang-bang"))) for table in TABLES]
+    moving = [scenes.scene(draw, table, scenes.clock(draw, ("fourier", "bang-bang"))) for table in TABLES]
     for scene in (*RESTING, *moving):
         t = 3.0 * draw.part()
         for state, why in states(draw, scene, t):

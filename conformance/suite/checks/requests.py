@@ -14,7 +14,7 @@ from typing import Any
 
 from msgspec.structs import replace
 
-from conformance.generator.draws import Draw
+from conformance.cases.draw import Draw
 from conformance.suite.answers import read_outcome, with_walls
 from conformance.suite.checks.form import FOREVER, Implementation, Question, octaves, question
 from conformance.suite.checks.paths import distance, drawn, is_same_stay

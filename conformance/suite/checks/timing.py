@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 from mpmath import fp
 from msgspec.structs import replace
 
-from conformance.generator.draws import Draw
+from conformance.cases.draw import Draw
 from conformance.suite.answers import read_outcome
 from conformance.suite.checks.form import Implementation, Question, question
 from conformance.suite.checks.paths import distance

@@ -147,14 +147,14 @@ def _effort(size: str) -> Effort:
 def _solvers(stack: ExitStack, command: list[str]) -> tuple[list[Solver], dict[str, str], dict[str, str]]:
     """Return solvers, what was compiled, and what cannot run."""
     from conformance.bench import baselines
-    from conformance.bench.solvers import by_command, in_python
+    from conformance.bench.solvers import by_command
     from conformance.harness.examples import find_examples
     from conformance.suite.process import Trouble
     from conformance.suite.session import Limits
     from mushrooms import bench_solvers as ours
 
     limits = Limits(TIMEOUT, RESTARTS)
-    solvers = [*ours.our_solvers(), baselines.in_numba(), *in_python()]
+    solvers = [*ours.our_solvers(), *baselines.in_python()]
     built, not_run = dict[str, str](), dict[str, str]()
     folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
     try:

@@ -10,8 +10,6 @@ from typing import Any, Literal, NamedTuple
 
 import msgspec
 
-from conformance import plain
-from conformance.bench.time_stepping import TOLERANCES, next_collision_by
 from conformance.bench.workloads import SINGLE_STEPS, Workload
 from conformance.grading.agreement import Answer
 from conformance.suite.checks import Implementation, timing
@@ -69,15 +67,6 @@ def by_call(name: str, family: Family, step: Callable[[Scene, State, float], Giv
         return SolverRun(ns / (n_times * len(workload.questions)), answers, ns)
 
     return Solver(name, family, run)
-
-
-def in_python() -> list[Solver]:
-    """Return the plain stepper, and scipy's solve_ivp with events, at several tolerances."""
-    integrators = {f"solve_ivp, rtol {rtol:.0e}": next_collision_by(rtol) for rtol in TOLERANCES}
-    return [
-        by_call("plain Python", "interpreted", plain.next_collision),
-        *(by_call(name, "time-stepping", step) for name, step in integrators.items()),
-    ]
 
 
 def by_command(

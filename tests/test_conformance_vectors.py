@@ -90,12 +90,22 @@ def laws_of(vector, kind=object):
 
 # What groups promise: a number of each vector, its bound, and how many reach it.
 PROMISES = [
-    ("knots-off-zero", lambda v: abs(laws_of(v, BangBang)[0].knots[0][0]), 0.25, 30),
+    (
+        "knots-off-zero",
+        lambda v: max((abs(law.knots[0][0]) for law in laws_of(v, BangBang)), default=0),
+        0.25,
+        30,
+    ),
     ("waiting", lambda v: periods(v, v.expect[0].steps[0].centre("dt")), 20, 25),
     ("waiting", lambda v: periods(v, v.expect[0].steps[0].centre("dt")), 100, 5),
     ("far-phase", lambda v: periods(v, v.state.t), 2**31, 20),
     ("far-mouth", lambda v: periods(v, v.state.t), 2**31, 20),
-    ("many-harmonics", lambda v: max(len(law.harmonics()) for law in laws_of(v, Fourier)), 4, 20),
+    (
+        "many-harmonics",
+        lambda v: max((len(law.harmonics()) for law in laws_of(v, Fourier)), default=0),
+        4,
+        20,
+    ),
     ("mixed-laws", lambda v: len(set(map(type, laws_of(v)))), 2, 30),
     ("mixed-laws", lambda v: len(set(map(type, laws_of(v)))), 3, 10),
     # How near 1 nu comes, as a number that grows.

@@ -8,7 +8,8 @@ corpus comes out on every machine, bit for bit.
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Mapping
+from collections import defaultdict
+from collections.abc import Callable, Iterable
 from functools import cache, partial
 from math import inf
 from pathlib import Path
@@ -138,14 +139,16 @@ def file_of(vector: Vector) -> str:
     return ("hard-cases" if vector.group.startswith("hard-case-") else vector.group) + ".jsonl"
 
 
-def write(folder: Path, files: Mapping[str, list[Vector]]) -> Manifest:
-    """Write files of vectors and their manifest, each complete or not at all; the manifest last."""
+def write(folder: Path, vectors: Iterable[Vector]) -> Manifest:
+    """Write vectors, by file, and their manifest, each complete or not at all; the manifest last."""
     folder.mkdir(parents=True, exist_ok=True)
-    entries = {}
-    for name, vectors in sorted(files.items()):
-        data = encode(vectors)
+    files, entries = defaultdict[str, list[Vector]](list), {}
+    for vector in vectors:
+        files[file_of(vector)].append(vector)
+    for name, held in sorted(files.items()):
+        data = encode(held)
         write_file(folder / name, data)
-        entries[name] = File(hashlib.sha256(data).hexdigest(), len(vectors))
+        entries[name] = File(hashlib.sha256(data).hexdigest(), len(held))
     manifest = Manifest(VERSION, digest(entries, RETIRED), entries, RETIRED)
     write_file(folder / MANIFEST, msgspec.json.format(msgspec.json.encode(manifest)) + b"\n")
     for stale in sorted(folder.glob("*.jsonl")):

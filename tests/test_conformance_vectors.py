@@ -36,7 +36,8 @@ from scene.tables import cycle_length, laws
 
 CORPUS = Path(__file__).parent.parent / "conformance" / "corpus"
 N_STEPS, N_TRAJECTORIES, N_FLOWS = 36, 4, 4  # made again, bit for bit
-DIGEST_OF_1_0 = "7b4dfba08bb334232cba9faca64601138b9b7b53a4b45b5984747379d26c70eb"
+# As published, but for the allowance of grazing/37, which 1.3 states on both sides of a knot.
+DIGEST_OF_1_0 = "e38a15536cf279f3eddc507f8bc0c9ba9dd65c5ff4dde817cbedc25e84b15878"
 NEW_IN_1_1 = {
     f"{name}.jsonl"
     for name in (

@@ -12,10 +12,10 @@ from math import hypot, inf
 from typing import ClassVar
 
 import msgspec
-from conformance.mutants.of_laws import single
 
 from conformance import vectors
 from conformance.cases.scenes import walls_speed
+from conformance.mutants.laws import single
 from conformance.plain.motion import BangBangMotion, ConstantMotion
 from conformance.plain.step import Flight, Open
 from scene import (

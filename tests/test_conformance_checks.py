@@ -11,7 +11,7 @@ from support.faulty_servers import faulty, last_bit_varies, refusing_lines
 
 import reference
 from conformance import plain, vectors
-from conformance.mutants import MUTANTS, kill_matrix
+from conformance.mutants import COMMON, MUTANTS, PLAIN
 from conformance.suite import checks
 from conformance.suite.checks import ensembles, flaws, refusals, timing
 from conformance.suite.checks.flows import MAX_STATES
@@ -205,7 +205,7 @@ def test_no_size_is_a_constant():
 
 def flow_of(name: str, loses: int = 0):
     """Answer flows by a mutant of the plain stepper, or by itself."""
-    stepper = MUTANTS.get(name, kill_matrix.PLAIN)
+    stepper = (MUTANTS | COMMON).get(name, PLAIN)
 
     def change(request, answer):
         if request.get("cmd") != "flow":

@@ -6,8 +6,10 @@ time, and its rate. So no wall is ever evaluated in absolute time.
 
 from __future__ import annotations
 
+from bisect import bisect_right
+from functools import cached_property
 from itertools import pairwise
-from math import cos, floor, fmod, sin
+from math import cos, floor, fmod, inf, sin
 from typing import NamedTuple
 
 from mpmath import fp
@@ -86,17 +88,24 @@ class BangBangMotion:
         ends = (half.end - t, half.pull), (t - half.begin, half.pull)
         self.pieces = [ends[0], *((other.end - other.begin, other.pull) for other in others), ends[1]]
 
-    def at(self, s: float) -> LawValue:
-        """Return the motion at the time s since departure, carried from piece to piece."""
-        rise, rate, left = 0.0, self.rate, fmod(s, self.period)
+    @cached_property
+    def begins(self) -> list[tuple[float, float, float, float]]:
+        """What each piece begins with, carried from piece to piece: time since departure, rise, rate, pull."""
+        begin, rise, rate = 0.0, 0.0, self.rate
+        found = []
         for duration, pull in self.pieces:
-            step = min(duration, left)
-            rise += (rate + pull * step / 2) * step
-            rate += pull * step
-            left -= step
-            if left <= 0:
-                break
-        return LawValue(self.value, rise, rate)
+            found.append((begin, rise, rate, pull))
+            begin += duration
+            rise += (rate + pull * duration / 2) * duration
+            rate += pull * duration
+        return found
+
+    def at(self, s: float) -> LawValue:
+        """Return the motion at the time s since departure."""
+        left = fmod(s, self.period)
+        begin, rise, rate, pull = self.begins[bisect_right(self.begins, (left, inf)) - 1]
+        step = left - begin
+        return LawValue(self.value, rise + (rate + pull * step / 2) * step, rate + pull * step)
 
     def halves(self, a: float, u: float, b: float, v: float) -> tuple[Half, Half]:
         """Cut the leg from value u at knot a to value v at knot b in two."""

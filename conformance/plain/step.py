@@ -72,6 +72,7 @@ class Flight:
             self.wall = "base"
         self.laws = {name: self.law(law) for name, law in laws(scene).items()}
         self.bounds = {name: bounds(law) for name, law in laws(scene).items()}
+        self.sizes = {name: max(-law.lowest, law.highest) for name, law in self.bounds.items()}
         self.is_in_cap = self.starts_in_cap()
         self.end = min(t_end - state.t, self.escape())
         self.is_horizon = self.end == t_end - state.t
@@ -251,7 +252,7 @@ class Flight:
             return ROUNDING * s * self.swiftness(wall, s)
         late = abs(self.gap(wall, s).ft * self.state.t)
         x, y = abs(self.x) + abs(self.vx) * s, abs(self.y) + abs(self.vy) * s
-        size = {name: max(-law.lowest, law.highest) for name, law in self.bounds.items()}
+        size = self.sizes
         if wall == "arc":
             return ROUNDING * (size["r"] ** 2 + x * x + y * y + late)
         if wall in ("floor", "base"):
@@ -289,7 +290,7 @@ class Flight:
 
     def escape(self) -> float:
         """Return a time by which no table is large enough to have kept the particle."""
-        top = {name: max(-law.lowest, law.highest) for name, law in self.bounds.items()}
+        top = self.sizes
         r, h = top.get("r", 0.0), top.get("h", 0.0)
         half = max(r, top.get("w", 0.0)) + top.get("slope", 0.0) * h
         across, along = abs(self.vx) / (4 * half), abs(self.vy) / (2 * (r + h))

@@ -21,8 +21,8 @@ def _made(most: int | None, n_jobs: int) -> list[Vector]:
     """Make all vectors, or the first few of each group, on so many processes."""
     wanted = [
         (group, number)
-        for group, makers in groups().items()
-        for number in range(1, len(makers[:most]) + 1)
+        for group, n in groups().items()
+        for number in range(1, min(n, most or n) + 1)
         if f"{group}/{number}" not in RETIRED
     ]
     found = []

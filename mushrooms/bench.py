@@ -20,7 +20,6 @@ from scene.files import Writer, write_files
 from scene.refusal import BadInput, check_seed
 
 if TYPE_CHECKING:
-    from conformance.bench.measure import Effort
     from conformance.bench.record import Record, Size
     from conformance.bench.solvers import Family, Solver
 
@@ -29,6 +28,7 @@ TIMEOUT, RESTARTS = 30.0, 1  # of a command
 QUESTIONS = {"quick": 12, "full": 64}
 FURTHER = {"quick": 200, "full": 2000}
 REPEATS = {"quick": 5, "full": 11}
+LASTING = {"quick": (3e6, 4e8), "full": (2e7, 4e9)}  # ns: of a run at least, of all runs at most
 PATHS = {"quick": (3, 40), "full": (9, 80)}
 
 
@@ -97,6 +97,7 @@ def _measured(size: Size, seed: int, command: list[str]) -> Record:
 
     begin = time.monotonic()
     n_questions, n_further, repeats = QUESTIONS[size], FURTHER[size], REPEATS[size]
+    effort = measure.Effort(repeats, *LASTING[size])
     with ExitStack() as stack:
         bar = stack.enter_context(progress_bar())
         task = bar.add_task("speed against error", total=len(workloads.RULES) * (repeats + 1))
@@ -111,7 +112,7 @@ def _measured(size: Size, seed: int, command: list[str]) -> Record:
             workload = workloads.draw_workload(
                 rule, seed, n_questions, proved_step, n_further, fast.next_collision
             )
-            found, troubles = measure.measure(workload, solvers, _effort(size), tick)
+            found, troubles = measure.measure(workload, solvers, effort, tick)
             points += found
             not_run |= {f"{name} on {rule.name}": why for name, why in troubles.items()}
             tick("")
@@ -136,12 +137,6 @@ def _measured(size: Size, seed: int, command: list[str]) -> Record:
         growth=grown,
         seconds=round(time.monotonic() - begin, 1),
     )
-
-
-def _effort(size: str) -> Effort:
-    from conformance.bench.measure import Effort
-
-    return Effort(REPEATS[size], 3e6, 4e8) if size == "quick" else Effort(REPEATS[size], 2e7, 4e9)
 
 
 def _solvers(stack: ExitStack, command: list[str]) -> tuple[list[Solver], dict[str, str], dict[str, str]]:

@@ -91,13 +91,13 @@ def _check_table(table: Path | None, workload: str | None, quick: bool, command:
 def _measured(size: Size, seed: int, command: list[str]) -> Record:
     """Run everything."""
     import fast
-    from conformance.bench import growth, measure, record, workloads
+    from conformance.bench import growth, record, solvers, workloads
     from conformance.cases.prover import proved_step
     from mushrooms import bench_solvers as ours
 
     begin = time.monotonic()
     n_questions, n_further, repeats = QUESTIONS[size], FURTHER[size], REPEATS[size]
-    effort = measure.Effort(repeats, *LASTING[size])
+    effort = solvers.Effort(repeats, *LASTING[size])
     with ExitStack() as stack:
         bar = stack.enter_context(progress_bar())
         task = bar.add_task("speed against error", total=len(workloads.RULES) * (repeats + 1))
@@ -105,14 +105,14 @@ def _measured(size: Size, seed: int, command: list[str]) -> Record:
         def tick(what: str) -> None:
             bar.update(task, advance=0 if what else 1, description=escape(what) or None)
 
-        solvers, built, not_run = _solvers(stack, command)
+        running, built, not_run = _solvers(stack, command)
         points = []
         for rule in workloads.RULES:
             tick(f"questions: {rule.name}")
             workload = workloads.draw_workload(
                 rule, seed, n_questions, proved_step, n_further, fast.next_collision
             )
-            found, troubles = measure.measure(workload, solvers, effort, tick)
+            found, troubles = solvers.measure(workload, running, effort, tick)
             points += found
             not_run |= {f"{name} on {rule.name}": why for name, why in troubles.items()}
             tick("")

@@ -12,7 +12,7 @@ from support.truth import proved_step
 
 import fast
 from conformance import suite
-from conformance.bench import baselines, measure, workloads
+from conformance.bench import baselines, solvers, workloads
 from conformance.cases import scenes, starts
 from conformance.cases.draw import Draw
 from conformance.harness import examples
@@ -20,7 +20,7 @@ from conformance.suite.process import Trouble
 from conformance.suite.session import Limits
 from scene import BadInput, Collision, Horizon, Mushroom, State, load
 
-BRIEF = measure.Effort(repeats=3, least_ns=1.0, most_ns=1e9)
+BRIEF = solvers.Effort(repeats=3, least_ns=1.0, most_ns=1e9)
 
 
 @pytest.fixture(scope="module")
@@ -42,7 +42,7 @@ def drawn(name: str, n_further: int, n_questions: int = 2) -> workloads.Workload
 
 
 def points(workload, solvers):
-    found, troubles = measure.measure(workload, solvers, BRIEF, lambda _: None)
+    found, troubles = solvers.measure(workload, solvers, BRIEF, lambda _: None)
     assert not troubles
     return {point.solver: point for point in found}
 
@@ -105,9 +105,9 @@ def test_the_lean_one_is_right_and_time_steps_are_not(library, name):
 
 
 def test_no_checks_cost_walls_where_walls_are_fast_and_corners_near(library):
-    solvers = baselines.in_c(library)
-    assert points(drawn("slow", 300, 1), solvers)["lean C"].astray > 3
-    assert points(drawn("near-corner", 100, 1), solvers)["steps, flight/1000"].astray > 10
+    ours = baselines.in_c(library)
+    assert points(drawn("slow", 300, 1), ours)["lean C"].astray > 3
+    assert points(drawn("near-corner", 100, 1), ours)["steps, flight/1000"].astray > 10
 
 
 def test_one_path_is_followed_for_its_length(engine):

@@ -14,7 +14,7 @@ from support.schemas import validator
 from support.truth import proved_step
 
 import fast
-from conformance.bench import growth, measure, record, workloads
+from conformance.bench import growth, record, solvers, workloads
 from conformance.bench.baselines import next_collision_by
 from conformance.bench.solvers import Solver, SolverRun, by_call
 from conformance.suite.process import Trouble
@@ -22,7 +22,7 @@ from mushrooms import bench_solvers as ours
 from scene import BadInput, Collision, Horizon, Undecided
 
 DOCS = Path(__file__).parent.parent / "docs"
-BRIEF = measure.Effort(repeats=3, least_ns=1.0, most_ns=1e9)
+BRIEF = solvers.Effort(repeats=3, least_ns=1.0, most_ns=1e9)
 
 
 @pytest.fixture(scope="module")
@@ -31,7 +31,7 @@ def drawn() -> dict[str, workloads.Workload]:
 
 
 def measured(workload, *these):
-    points, troubles = measure.measure(workload, these, BRIEF, lambda _: None)
+    points, troubles = solvers.measure(workload, these, BRIEF, lambda _: None)
     assert not troubles
     return points
 
@@ -158,7 +158,7 @@ TROUBLES = {  # what a call, by its number, answers
 def test_a_solver_that_cannot_be_timed_is_left_out(drawn, why):
     calls = count()
     solver = Solver("it", "command", lambda *_: TROUBLES[why](next(calls)))
-    assert measure.measure(drawn["slow"], [solver], BRIEF, lambda _: None) == ([], {"it": why})
+    assert solvers.measure(drawn["slow"], [solver], BRIEF, lambda _: None) == ([], {"it": why})
 
 
 @pytest.mark.deep

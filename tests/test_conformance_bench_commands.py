@@ -9,7 +9,7 @@ import pytest
 from support.depth import deep_but
 from support.truth import proved_step
 
-from conformance.bench import measure, solvers, workloads
+from conformance.bench import solvers, workloads
 from conformance.suite.checks import timing
 from conformance.suite.process import Trouble
 
@@ -22,13 +22,13 @@ def breathing_disk() -> workloads.Workload:
 
 def tried(workload, *commands):
     """Measure commands in runs of several ticks of a clock that counts milliseconds."""
-    brief = measure.Effort(repeats=3, least_ns=5e6, most_ns=1e9)
+    brief = solvers.Effort(repeats=3, least_ns=5e6, most_ns=1e9)
     with ExitStack() as stack:
         ran = [
             solvers.by_command(command[-1], "command", [sys.executable, *command], stack)
             for command in commands
         ]
-        return measure.measure(workload, ran, brief, lambda _: None)
+        return solvers.measure(workload, ran, brief, lambda _: None)
 
 
 def test_a_tick_of_a_coarse_clock_is_no_lie():

@@ -13,7 +13,7 @@ from support.truth import proved_step
 import fast
 from conformance import suite
 from conformance.bench import baselines, solvers, workloads
-from conformance.cases import scenes, starts
+from conformance.cases import scenes
 from conformance.cases.draw import Draw
 from conformance.harness import examples
 from conformance.suite.process import Trouble
@@ -52,7 +52,7 @@ def fast_steps(table: str, n: int):
     for i in range(n):
         stream = Draw(f"baselines {table} {i}")
         of = scenes.scene(stream, table, scenes.clock(stream))
-        start, t_end = starts.state(stream, of, {"speed": 2.0**12, "lift": 0.2 + 0.6 * stream.part()})
+        start, t_end = scenes.state(stream, of, {"speed": 2.0**12, "lift": 0.2 + 0.6 * stream.part()})
         try:
             met = fast.next_collision(of, start, t_end)
         except ValueError:  # the draw may lie outside

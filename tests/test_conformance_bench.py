@@ -1,15 +1,17 @@
-"""The benchmark measures what it says: workloads, grades, growth, records."""
+"""The benchmark measures what it says: workloads, grades, growth, records; commands are held to our clock."""
 
 from __future__ import annotations
 
 import json
 import math
 import sys
+from contextlib import ExitStack
 from itertools import count
 from pathlib import Path
 
 import msgspec
 import pytest
+from support.depth import deep_but
 from support.schemas import validator
 from support.truth import proved_step
 
@@ -17,6 +19,7 @@ import fast
 from conformance.bench import growth, record, solvers, workloads
 from conformance.bench.baselines import next_collision_by
 from conformance.bench.solvers import Solver, SolverRun, by_call
+from conformance.suite.checks import timing
 from conformance.suite.process import Trouble
 from mushrooms import bench_solvers as ours
 from scene import BadInput, Collision, Horizon, Undecided
@@ -235,3 +238,98 @@ def test_a_file_that_is_no_record_is_refused(tmp_path, content, words):
         record.read(path)
     with pytest.raises(BadInput, match="No such file"):
         record.read(tmp_path / "none.json")
+
+
+def tried(workload, *commands):
+    """Measure commands in runs of several ticks of a clock that counts milliseconds."""
+    brief = solvers.Effort(repeats=3, least_ns=5e6, most_ns=1e9)
+    with ExitStack() as stack:
+        ran = [
+            solvers.by_command(command[-1], "command", [sys.executable, *command], stack)
+            for command in commands
+        ]
+        return solvers.measure(workload, ran, brief, lambda _: None)
+
+
+def test_a_tick_of_a_coarse_clock_is_no_lie():
+    """A repeat of .1 ms may be said to last 1 ms; not so 10 ms where the answer came after .2."""
+    steps = [{"outcome": "undecided", "reason": "x"}]
+    assert timing.read_repeats({"ns": [10**6], "steps": steps}, 1, 2e-4, 0.0)[0] == [10**6]
+    with pytest.raises(Trouble, match="the answer came after 200000 ns"):
+        timing.read_repeats({"ns": [10**7], "steps": steps}, 1, 2e-4, 0.0)
+
+
+def test_a_command_that_offers_no_time_is_left_out(drawn):
+    points, troubles = tried(drawn["breathing-disk"], ["-m", "conformance.plain"])
+    assert not points
+    assert troubles["conformance.plain"].startswith("unsupported")
+
+
+IMPOSTOR = """
+import json, sys
+for line in sys.stdin:
+    asked = json.loads(line)
+    if asked["cmd"] == "start":
+        every = {"profiles": ["step", "time"], "tables": ["cap"], "laws": ["constant", "fourier"]}
+        answer = {"protocol": 1, "name": "impostor", "version": "1", "language": "Python", **every}
+    elif asked["cmd"] == "time":
+        answer = {"seq": asked["seq"], "ns": NS, "steps": STEPS}
+    print(json.dumps(answer), flush=True)
+"""
+
+
+@pytest.mark.parametrize(
+    ("ns", "steps", "trouble"),
+    [
+        ("[]", "[]", "fail: 1 repeats are answered"),
+        ("[5]", "[]", "fail: 1 repeats are answered"),
+        ("[5]", "[{'outcome': 'undecided', 'reason': ''}] * 2", "fail: 1 repeats are answered"),
+        ("[10**300]", "[{'outcome': 'undecided', 'reason': ''}]", "fail: 1 repeats are said to last 1000"),
+        ("[0] * asked['repeat']", "[{'outcome': 'undecided', 'reason': ''}]", "declined: undecided"),
+    ],
+)
+def test_a_command_that_times_nothing_is_left_out(drawn, tmp_path, ns, steps, trouble):
+    program = tmp_path / "impostor.py"
+    program.write_text(IMPOSTOR.replace("NS", ns).replace("STEPS", steps))
+    points, troubles = tried(drawn["breathing-disk"], [str(program)])
+    assert not points
+    assert troubles[str(program)].startswith(trouble)
+
+
+SPOILT_CLOCK = """
+import json, subprocess, sys
+pipe = subprocess.PIPE
+fast = subprocess.Popen([sys.executable, "-m", "fast"], stdin=pipe, stdout=pipe, text=True)
+passed = 0
+
+def at_ticks(ns):
+    global passed
+    before, passed = passed // 10**6, passed + ns
+    return (passed // 10**6 - before) * 10**6
+
+for line in sys.stdin:
+    fast.stdin.write(line)
+    fast.stdin.flush()
+    answer = json.loads(fast.stdout.readline())
+    if "ns" in answer:
+        answer["ns"] = [SAID for ns in answer["ns"]]
+    print(json.dumps(answer), flush=True)
+"""
+
+
+SAYINGS = {
+    "1": "fail: a repeat of",
+    "ns // 20": "fail: a repeat of",
+    "0": "fail: a repeat of",
+    "at_ticks(ns)": "",
+}
+
+
+@pytest.mark.parametrize("said", deep_but(SAYINGS, "ns // 20"))
+def test_a_command_is_timed_by_a_clock_that_is_true(drawn, tmp_path, said):
+    """One that counts milliseconds is: most of its steps are said to last 0 ns."""
+    program = tmp_path / "spoilt.py"
+    program.write_text(SPOILT_CLOCK.replace("SAID", said))
+    points, troubles = tried(drawn["breathing-disk"], [str(program)])
+    assert [p.right for p in points] == ([] if SAYINGS[said] else [3])
+    assert troubles.get(str(program), "").startswith(SAYINGS[said])

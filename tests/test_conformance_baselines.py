@@ -41,8 +41,8 @@ def drawn(name: str, n_further: int, n_questions: int = 2) -> workloads.Workload
     return workloads.draw_workload(rule, 3, n_questions, proved_step, n_further, fast.next_collision)
 
 
-def points(workload, solvers):
-    found, troubles = solvers.measure(workload, solvers, BRIEF, lambda _: None)
+def points(workload, these):
+    found, troubles = solvers.measure(workload, these, BRIEF, lambda _: None)
     assert not troubles
     return {point.solver: point for point in found}
 

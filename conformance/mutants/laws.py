@@ -201,8 +201,9 @@ def escape_time_from_sizes_at_departure(
 ) -> None:
     """Bounds the time of a flight by the sizes that the table has at departure, though it grows."""
     plain(scene, state, t_end)
-    highest, flight.sizes = flight.sizes, {name: law.value for name, law in flight.laws.items()}
-    flight.end, flight.sizes, flight.is_horizon = min(flight.end, flight.escape() / 2), highest, True
+    highest, now = flight.bounds, {name: law.value for name, law in flight.laws.items()}
+    flight.bounds = {name: b._replace(lowest=now[name], highest=now[name]) for name, b in highest.items()}
+    flight.end, flight.bounds, flight.is_horizon = min(flight.end, flight.escape() / 2), highest, True
 
 
 @mutant(FourierMotion, "__init__", COMMON)

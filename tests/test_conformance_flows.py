@@ -12,10 +12,9 @@ import reference
 from conformance.cases.certify import certify, judge
 from conformance.cases.draw import Unfit
 from conformance.cases.flow_families import any_marks
-from conformance.cases.paths import Links
+from conformance.cases.paths import Links, OpenSign, arrival, marks, stays
 from conformance.cases.prover import ask, flight_of
 from conformance.cases.question import Question
-from conformance.cases.stays import OpenSign, arrival, marks, stays
 from conformance.grading.error import inputs_of, moved
 from conformance.vectors import four_digits, load
 from scene import State

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import cache
-from itertools import islice
+from itertools import count
 from math import inf
 from types import SimpleNamespace
 
@@ -11,7 +11,7 @@ import msgspec
 import numpy as np
 import pytest
 from support.depth import deep_but
-from support.seldom_wrong import FAULTY, KNOWN, SELDOM_WRONG, Keeping, family_of_laws
+from support.seldom_wrong import FAULTS, KEPT
 
 import fast
 from conformance import plain, vectors
@@ -33,9 +33,7 @@ from conformance.cases.scenes import many_legs
 from conformance.cases.table import FAMILIES
 from conformance.grading.agreement import physics_bound
 from conformance.grading.grade import grade
-from conformance.mutants import Mutant
-from conformance.plain.flow import MAX_COLLISIONS, PlainPath
-from conformance.plain.step import Flight
+from conformance.plain.flow import PlainPath
 from conformance.suite.disguise import Disguise, drawn_disguise
 from conformance.verify import Verdict, verify_line
 from fast import __main__ as fast_program
@@ -70,60 +68,68 @@ def asked_of(name, number):
     return next(questions(FAMILIES[name], "tests", number))
 
 
-def answer_to(vector):
-    """Return the right answer of a step."""
-    return vectors.answer(vector, plain.next_collision, plain.trajectory)
+RIGHT = [
+    (fast.next_collision, follow, carry),
+    (plain.next_collision, plain.trajectory, plain.flow),
+]
 
 
-def assert_right_steppers_pass(vector):
-    for steppers in (
-        (fast.next_collision, follow, carry),
-        (plain.next_collision, plain.trajectory, plain.flow),
-    ):
-        found = grade(vector, vectors.answer(vector, *steppers))
-        assert found.verdict == "pass", (vector, found)
+def assert_right_steppers_pass(asked):
+    for vector in asked:
+        for steppers in (
+            (fast.next_collision, follow, carry),
+            (plain.next_collision, plain.trajectory, plain.flow),
+        ):
+            found = grade(vector, vectors.answer(vector, *steppers))
+            assert found.verdict == "pass", (vector, found)
 
 
 @pytest.mark.parametrize("asked", deep_but([(1, SOME), (1, ROUND), (2, ROUND)], (1, SOME)))
 def test_right_steppers_pass(asked):
-    for vector in asked_in_a_run(*asked):
-        assert_right_steppers_pass(vector)
+    assert_right_steppers_pass(asked_in_a_run(*asked))
 
 
 @pytest.mark.parametrize("name", deep_but(DEALT, "returning-stem-left", "thin-ring"))
 def test_right_steppers_pass_each_row(name):
-    for number in (1, 2, 3):
-        assert_right_steppers_pass(asked_of(name, number))
+    assert_right_steppers_pass(asked_of(name, number) for number in (1, 2, 3))
+
+
+# How often a run at least asks what the corpus asks seldom.
+LEAST = {
+    **{f"{table}, {wall}": 4 for table, wall in WALLS},
+    **dict.fromkeys(["trajectory", "flow"], ROUND / 12),
+    **dict.fromkeys(["before 0", "named", "hits beyond the first"], ROUND / 8),
+    **dict.fromkeys(["of mixed laws", "like the one before", "late"], ROUND / 20),
+    "more than 20 legs": 4,
+}
 
 
 @pytest.mark.deep
 @pytest.mark.parametrize("seed", SEEDS)
 def test_all_is_asked_that_the_corpus_asks_seldom(seed, tally):
-    asked = asked_in_a_run(seed)
     known = {msgspec.json.encode(vector.scene) for vector in vectors.load("stress")}
-    for i, vector in enumerate(asked):
-        scene, step = from_data(vector.scene), vector.expect[0].steps[0]
-        kinds = {type(law) for law in laws(scene).values()}
+    before = None
+    for vector in asked_in_a_run(seed):
+        scene, is_path = from_data(vector.scene), vector.kind == "trajectory"
+        of = laws(scene).values()
         assert msgspec.json.encode(vector.scene) not in known
         assert drawn_disguise(vector, seed) == Disguise()
-        tally[f"{vector.scene['table']}, {step.wall}"] += 1
-        tally["before 0"] += vector.state.t < 0
-        tally["of mixed laws"] += kinds >= {Fourier, BangBang}
+        tally[f"{vector.scene['table']}, {vector.expect[0].steps[0].wall}"] += 1
         tally[vector.kind] += 1
-        tally["hits beyond the first"] += (vector.collisions - 1) if vector.kind == "trajectory" else 0
-        if i > 0 and vector.state == asked[i - 1].state:
-            tally["like the one before"] += 1
-            was = msgspec.structs.replace(vector, scene=asked[i - 1].scene)
-            assert grade(vector, answer_to(was)).verdict == "fail"
-            assert vector.condition * physics_bound(vector.condition) < ANOTHER
+        tally["hits beyond the first"] += (vector.collisions - 1) if is_path else 0
+        tally["before 0"] += vector.state.t < 0
+        tally["of mixed laws"] += {*map(type, of)} >= {Fourier, BangBang}
         tally["named"] += "name" in vector.scene
         tally["late"] += abs(vector.state.t) > 500 * (cycle_length(scene) or inf)
-        tally["more than 20 legs"] += any(len(getattr(law, "knots", ())) > 20 for law in laws(scene).values())
-    assert all(tally[f"{table}, {wall}"] >= 4 for table, wall in WALLS)
-    assert min(tally[kind] for kind in ("trajectory", "flow")) > ROUND / 12
-    assert min(tally["before 0"], tally["named"], tally["hits beyond the first"]) > ROUND / 8
-    assert min(tally["of mixed laws"], tally["like the one before"], tally["late"]) > ROUND / 20
-    assert tally["more than 20 legs"] >= 4
+        tally["more than 20 legs"] += any(len(getattr(law, "knots", ())) > 20 for law in of)
+        if before and vector.state == before.state:
+            tally["like the one before"] += 1
+            was = msgspec.structs.replace(vector, scene=before.scene)
+            right_before = vectors.answer(was, plain.next_collision, plain.trajectory)
+            assert grade(vector, right_before).verdict == "fail"
+            assert vector.condition * physics_bound(vector.condition) < ANOTHER
+        before = vector
+    assert {name: tally[name] for name, least in LEAST.items() if tally[name] < least} == {}
 
 
 def test_every_round_holds_each_row_as_often_as_its_weight_says():
@@ -173,17 +179,14 @@ def test_a_flow_whose_capture_hangs_by_a_thread_is_not_asked(x, is_asked):
 
 def test_hundreds_of_draws_that_are_none_end_no_run():
     """One in forty meets the base of a mushroom: in some runs of thousands four hundred in a row do not."""
-    n_left = 1000
+    n_left, family = count(-1000), FAMILIES["anywhere-cap-arc"]
 
     def ask(draw):
-        nonlocal n_left
-        n_left -= 1
-        if n_left >= 0:
+        if next(n_left) < 0:
             raise BadInput("none")
-        return FAMILIES["anywhere-cap-arc"].ask(draw)
+        return family.ask(draw)
 
-    family = FAMILIES["anywhere-cap-arc"]._replace(ask=ask)
-    assert len(list(islice(questions(family, "tests", 1), 1))) == 1
+    assert next(questions(family._replace(ask=ask), "tests", 1))
 
 
 def test_laws_have_as_many_legs_as_there_may_be():
@@ -193,94 +196,47 @@ def test_laws_have_as_many_legs_as_there_may_be():
         assert max(len(law.knots) for law in found if isinstance(law, BangBang)) == MAX_KNOTS
 
 
-class LaterHitsInKnownScenes(PlainPath):
-    """Gains a thousandth of its speed at the second hit, where no file holds the scene."""
-
-    kind = "trajectory"
-
-    def told(self, hit):
-        is_wrong = self.n_hits == 2 and self.is_followed and family_of_laws(self.scene) not in KNOWN
-        return msgspec.structs.replace(hit, vx=1.001 * hit.vx, vy=1.001 * hit.vy) if is_wrong else hit
-
-    @property
-    def is_followed(self):
-        return (self.most != MAX_COLLISIONS) == (self.kind == "flow")
-
-
-class FlowsInKnownScenes(LaterHitsInKnownScenes):
-    """Does so in a flow."""
-
-    kind = "flow"
-
-
-FAULTY_PATHS = {
-    "later hits in known scenes": LaterHitsInKnownScenes,
-    "flows in known scenes": FlowsInKnownScenes,
-}
-
-
-def fails(flight, vector, path=PlainPath):
-    faulty = Mutant("faulty", "", flight, path)
-    return (
-        grade(vector, vectors.answer(vector, faulty.step, faulty.trajectory, faulty.flow)).verdict == "fail"
+def fails(faulty, asked):
+    """Tell whether a faulty stepper answers some question wrong."""
+    KEPT.clear()
+    return any(
+        grade(v, vectors.answer(v, faulty.step, faulty.trajectory, faulty.flow)).verdict == "fail"
+        for v in asked
     )
 
 
-def is_found_out(flight, row):
-    """Tell whether some question of a row, or of the first of a run, is answered wrong."""
-    Keeping.kept.clear()
-    asked = (asked_of(row, number) for number in range(1, EACH + 1)) if row else asked_in_a_run(1, 3 * SOME)
-    return any(fails(flight, vector) for vector in asked)
-
-
-@pytest.mark.parametrize("name", FAULTY)
-def test_who_is_right_in_the_corpus_alone_is_found_out(name):
-    assert is_found_out(*FAULTY[name])
-
-
-@pytest.mark.parametrize("name", SELDOM_WRONG)
+@pytest.mark.parametrize("name", FAULTS)
 def test_who_is_wrong_where_chance_seldom_looks_is_found_out(name):
-    assert is_found_out(*SELDOM_WRONG[name])
+    """By some question of its row, or of the first of a run."""
+    faulty, row = FAULTS[name]
+    in_row = (asked_of(row, number) for number in range(1, EACH + 1))
+    assert fails(faulty, in_row if row else asked_in_a_run(1, 3 * SOME))
 
 
-@pytest.mark.parametrize("name", FAULTY_PATHS)
-def test_who_goes_on_right_in_the_corpus_alone_is_found_out(name):
-    """All of its single steps are right."""
-    steps, paths = (
-        [v for v in asked_in_a_run(1, 3 * SOME) if (v.kind == "step") == is_step] for is_step in (True, False)
-    )
-    assert not any(fails(Flight, vector, FAULTY_PATHS[name]) for vector in steps)
-    kinds = {v.kind for v in paths if fails(Flight, v, FAULTY_PATHS[name])}
-    assert kinds == {FAULTY_PATHS[name].kind}
+@pytest.mark.parametrize("name", [name for name in FAULTS if name.endswith("in known scenes")])
+def test_who_goes_on_right_in_the_corpus_alone_is_right_in_steps(name):
+    steps = [v for v in asked_in_a_run(1, 3 * SOME) if v.kind == "step"]
+    assert fails(FAULTS[name][0], steps) == (FAULTS[name][0].path is PlainPath)
 
 
 @pytest.mark.deep
-@pytest.mark.parametrize("name", [*FAULTY, *SELDOM_WRONG])
+@pytest.mark.parametrize("name", FAULTS)
 def test_one_of_three_runs_finds_each_out(name):
-    flight, _ = (FAULTY | SELDOM_WRONG)[name]
-    for seed in (1, 2, 3):
-        Keeping.kept.clear()
-        if any(fails(flight, vector) for vector in asked_in_a_run(seed)):
-            return
-    raise AssertionError(name)
+    assert any(fails(FAULTS[name][0], asked_in_a_run(seed)) for seed in (1, 2, 3))
 
 
 def test_who_is_lost_after_a_captured_stay_tells_none(monkeypatch):
     """The stay begins and ends at the arc, far below the mouth's edge; later no collision is decided."""
     scene, start, t_end = Mushroom(r=1.0, w=0.25, h=1.0), State(0.0, 0.75, 0.25, 0.1, 4.0), 9.0
-    asked = []
+    n_asked = count(1)
 
-    def lost(of, state, until):
-        asked.append(state)
-        return Undecided("lost") if len(asked) == 9 else plain.next_collision(of, state, until)
+    def lost(*question):
+        return Undecided("lost") if next(n_asked) == 9 else plain.next_collision(*question)
 
-    ((arrived, stay),) = plain.flow(scene, [start], t_end)
-    assert isinstance(arrived, Horizon)
-    assert stay is not None
+    for flow in (plain.flow, carry):
+        ((arrived, stay),) = flow(scene, [start], t_end)
+        assert (type(arrived), stay is None) == (Horizon, False)
     assert plain.flow(scene, [start], t_end, lost) == [(Undecided("lost"), None)]
-    ((arrived, stay),) = carry(scene, [start], t_end)
-    assert isinstance(arrived, Horizon)
-    assert stay is not None
     run = SimpleNamespace(outcomes=[Undecided("lost")], t_in=np.array([1.0]), t_out=np.array([2.0]))
     monkeypatch.setattr(fast_program, "carry_judged", lambda *_: run)
     assert carry(scene, [start], t_end) == [(Undecided("lost"), None)]

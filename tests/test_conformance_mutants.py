@@ -9,7 +9,7 @@ import pytest
 from support.depth import deep_but
 
 from conformance.mutants import COMMON, MUTANTS, PLAIN, kill_matrix
-from conformance.mutants.kill_matrix import kills, page, subsumed, verdict
+from conformance.mutants.kill_matrix import kills, page, verdict
 from conformance.suite.diagnosis import diagnose
 from conformance.suite.result import Result
 from conformance.vectors import load, manifest
@@ -85,13 +85,6 @@ def test_a_size_is_where_the_mistake_begins(vectors, name):
     for killing in PUBLISHED["mutants"][name]["vectors"]:
         assert verdict(MUTANTS[name].of_size(HARMLESS[name]), vectors[killing]) != "fail"
         assert verdict(MUTANTS[name].of_size(MUTANTS[name].size), vectors[killing]) == "fail"
-
-
-def test_subsumed_is_what_needs_no_vector_of_its_own():
-    few, many, other = list("abcde"), list("abcdef"), list("ghijk")
-    many_first = dict(zip(MUTANTS, (many, few, other, few, ["a"], []), strict=False))
-    a, b, _, d, *_ = many_first
-    assert subsumed(many_first) == {a: b, d: b}
 
 
 def test_a_crash_is_no_kill(vectors):

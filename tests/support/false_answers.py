@@ -20,9 +20,9 @@ from typing import Any
 import msgspec
 
 import reference
+from conformance.cases.paths import arrival, marks, stays
 from conformance.cases.prover import coasted, collided
 from conformance.cases.prover import ends as exact_ends
-from conformance.cases.stays import arrival, marks, stays
 from conformance.vectors import Certified, certified
 from scene import State, from_data
 

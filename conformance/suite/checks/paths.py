@@ -15,7 +15,7 @@ from mpmath import fp
 from msgspec.structs import replace
 
 from conformance import plain
-from conformance.cases import scenes, starts
+from conformance.cases import scenes
 from conformance.cases.draw import Draw
 from conformance.suite.answers import read_arrival
 from conformance.suite.checks.flaws import COARSE, FINE, LATE, UNCLEAR, first_stay, flaw_of, is_fine
@@ -134,7 +134,7 @@ def drawn(draw: Draw, kinds: Sequence[str] = USUAL, **at: Any) -> tuple[Scene, S
     while True:
         try:
             scene = scenes.scene(draw, draw.pick(("cap", "stem", "mushroom")), scenes.clock(draw, kinds))
-            state, t_end = starts.state(draw, scene, {"speed": draw.power(-1, 5), **at})
+            state, t_end = scenes.state(draw, scene, {"speed": draw.power(-1, 5), **at})
         except BadInput:
             continue
         if isinstance(plain.next_collision(scene, state, t_end), Collision):
@@ -190,7 +190,7 @@ def aimed(draw: Draw, near: float) -> tuple[Scene, State, int]:
         "cap" if isinstance(scene, Cap) else "stem" if isinstance(scene, Stem) else draw.pick(("cap", "stem"))
     )
     table = table_at(fp, scene, 0.0)
-    x, y = starts.place(draw, table, region)
+    x, y = scenes.place(draw, table, region)
     to_x, to_y = draw.pick(table.corners(region))
     inside = 0.4 if region == "cap" else -0.4 * float(table.h)  # off all walls: the table is convex there
     return scene, _towards(draw, 0.8 * x, 0.8 * y + 0.2 * inside, to_x + draw.pick((near, -near)), to_y), 3
@@ -343,7 +343,7 @@ def late(draw: Draw, profile: str) -> Iterator[Question]:
         )
         t = draw.pick((1.0, -1.0)) * wait * draw.between(1.0, 4.0)
         for _ in range(64):
-            state, t_end = starts.state(draw, scene, {"t": t, "speed": draw.power(0, 4)})
+            state, t_end = scenes.state(draw, scene, {"t": t, "speed": draw.power(0, 4)})
             if isinstance(plain.next_collision(scene, state, t_end), Collision):
                 yield scene, state, 2
                 break

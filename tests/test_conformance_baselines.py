@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import sys
 
 import numpy as np
 import pytest
@@ -11,14 +10,12 @@ from support.depth import deep_but
 from support.truth import proved_step
 
 import fast
-from conformance import suite
 from conformance.bench import baselines, solvers, workloads
 from conformance.cases import scenes
 from conformance.cases.draw import Draw
 from conformance.harness import examples
 from conformance.suite.process import Trouble
-from conformance.suite.session import Limits
-from scene import BadInput, Collision, Horizon, Mushroom, State, load
+from scene import Collision, Horizon, Mushroom, State, load
 
 BRIEF = solvers.Effort(repeats=3, least_ns=1.0, most_ns=1e9)
 
@@ -134,20 +131,3 @@ def test_without_a_compiler_the_reason_is_told(monkeypatch, tmp_path):
     monkeypatch.setattr(examples.shutil, "which", lambda _: None)
     with pytest.raises(Trouble, match="no C compiler is installed"):
         baselines.build(tmp_path, [])
-
-
-@pytest.mark.deep
-def test_the_suite_passes_it_where_it_is_easy_and_fails_it_where_it_is_hard(library, monkeypatch):
-    monkeypatch.setattr("conformance.suite.run.checks_of", lambda *_: [])
-    command = [sys.executable, "-m", "conformance.bench.baselines", "lean-c"]
-    groups, limits = ["moving-cap", "fast-wall"], Limits(total=300.0)
-    lean = suite.check(command, seed=1, groups=groups, limits=limits)
-    easy, hard = map(lean.counts, groups)
-    assert easy["pass"] > 0.9 * sum(easy.values())
-    assert hard["fail"] >= 5
-    assert lean.verdict() == "not accepted"
-
-
-def test_a_baseline_that_is_none_is_refused():
-    with pytest.raises(BadInput, match="must be one of lean-c"):
-        baselines.main(["lean"])

@@ -109,7 +109,7 @@ def conduct(
     if settings.folder:
         settings.folder.mkdir(parents=True, exist_ok=True)
         code()  # before anything is examined: an edit meanwhile is not what runs, and must not be told as it
-    known = {claim.id: data for claim in claims if (data := _kept(claim, settings))}
+    known = {claim.id: _kept(claim, settings) for claim in claims}
     found = {name: from_data(data["finding"]) for name, data in known.items() if data.get("code") == code()}
     predict = cache(predict)
     samples: dict[str, Sample] = {}

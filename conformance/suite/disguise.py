@@ -30,7 +30,6 @@ from scene.tables import laws
 
 LARGEST = 12  # exponents of two are drawn between this and its negative
 RANGE = 2.0**-350, 2.0**350  # numbers that a scale may lead to: their squares are far from both ends
-TIMES = ("dt", "t")
 ROUNDS = 1, 2, 3, 6  # the corpus itself has at most four legs
 DRAWN, N_DRAWN = "drawn", 60  # a group of questions, and how many it has
 PARTS = 0.05, 0.95  # of the certified flight, at which the particle is asked for
@@ -109,20 +108,17 @@ def published(answer: Any, disguise: Disguise) -> Any:
         return [published(part, disguise) for part in answer]
     if not isinstance(answer, dict):
         return answer
-    factors = dict.fromkeys(TIMES, -disguise.time) | dict.fromkeys(("x", "y"), -disguise.length)
-    factors |= dict.fromkeys(("vx", "vy"), disguise.time - disguise.length)
-    found = {**answer}
-    for name, exponent in factors.items():
-        found[name] = _scaled(answer.get(name), exponent)
-    for name in ("x", "vx") if disguise.is_mirrored else ():
-        found[name] = -found[name] if isinstance(found[name], float) else found[name]
-    if disguise.is_mirrored and isinstance(answer.get("wall"), str):
-        found["wall"] = transforms.mirrored_wall(answer["wall"])
-    if isinstance(stay := answer.get("captured"), list | tuple):
-        found["captured"] = [_scaled(time, -disguise.time) for time in stay]
-    for name in ("steps", "states"):
-        found[name] = published(answer.get(name), disguise)
-    return {name: found[name] for name in answer}
+    exponents = dict.fromkeys(("dt", "t", "captured"), -disguise.time)
+    exponents |= dict.fromkeys(("x", "y"), -disguise.length)
+    exponents |= dict.fromkeys(("vx", "vy"), disguise.time - disguise.length)
+    found = {
+        name: _scaled(published(part, disguise), exponents.get(name, 0)) for name, part in answer.items()
+    }
+    if disguise.is_mirrored:
+        found |= {name: -found[name] for name in ("x", "vx") if isinstance(found.get(name), float)}
+        if isinstance(answer.get("wall"), str):
+            found["wall"] = transforms.mirrored_wall(answer["wall"])
+    return found
 
 
 def drawn_horizons(vectors: Sequence[Vector], seed: int) -> list[Vector]:
@@ -163,8 +159,11 @@ def _leaves(data: Any) -> Iterable[float]:
         yield float(data)
 
 
-def _scaled(number: Any, exponent: int) -> Any:
-    return number * 2.0**exponent if isinstance(number, int | float) else number
+def _scaled(part: Any, exponent: int) -> Any:
+    """Return a number, or a list of numbers, times a power of two; what is none stays as it is."""
+    if isinstance(part, list) and exponent:
+        return [_scaled(one, exponent) for one in part]
+    return part * 2.0**exponent if exponent and isinstance(part, int | float) else part
 
 
 def _with_knots(scene: Scene, first: int, periods: int, rounds: int) -> Scene | None:

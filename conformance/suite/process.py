@@ -78,7 +78,6 @@ class Process:
 
     def __init__(self, command: Sequence[str], stderr: Transcript) -> None:
         self._descendants = Descendants()
-        name, token = self._descendants.mark
         try:
             self._child = subprocess.Popen(
                 command,
@@ -87,7 +86,6 @@ class Process:
                 stderr=subprocess.PIPE,
                 start_new_session=True,
                 bufsize=0,
-                env={**os.environ, name: token},
             )
         except (OSError, ValueError) as error:
             self._descendants.follow(0)

@@ -10,9 +10,9 @@ from __future__ import annotations
 import json
 import re
 from typing import Any
-from xml.etree import ElementTree
 
 import msgspec
+from jinja2 import Template
 
 from conformance.grading.grade import PrecisionClass
 from conformance.suite.result import VERDICTS, Result, Run, Speed
@@ -22,6 +22,42 @@ from scene.protocol.messages import Introduction
 TAGS = {"failures": "failure", "errors": "error", "skipped": "skipped"}  # of JUnit, by what counts them
 # What XML 1.0 cannot hold, even escaped.
 _UNPRINTABLE = re.compile("[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
+_JUNIT = Template(
+    """\
+<?xml version="1.0" encoding="utf-8"?>
+{% macro counted(cases, seconds) %}
+tests="{{ cases | length }}" {% for name, tag in tags.items() %}
+{{ name }}="{{ cases | selectattr(1, "equalto", tag) | list | length }}" {% endfor %}
+time="{{ "%.3f" | format(seconds) }}"
+{%- endmacro %}
+<testsuites name="mushrooms check {{ name }}" {{ counted(cases, run.seconds) }}>
+{% for group in run.groups() %}
+{% set own = cases | selectattr("0.group", "equalto", group) | list %}
+  <testsuite name="{{ group }}" {{ counted(own, own | sum(attribute="0.seconds")) }}>
+{% for result, tag in own %}
+{% set seconds = "%.3f" | format(result.seconds) %}
+    <testcase classname="mushrooms.{{ group }}" name="{{ result.id }}" time="{{ seconds }}">
+{% if tag %}
+      <{{ tag }} message="{{ "known failure, " if result.is_known }}{{ result.verdict }}
+{%- if result.why %}: {{ result.why }}{% endif %}"
+{%- if tag != "skipped" %} type="{{ result.verdict }}"{% endif %}>
+{%- if tag != "skipped" and result.answer is not none %}{{ result.answer | tojson }}{% endif %}</{{ tag }}>
+{% endif %}
+    </testcase>
+{% endfor %}
+{% if group == "protocol" and run.stderr %}
+    <system-err>{{ run.stderr }}</system-err>
+{% endif %}
+  </testsuite>
+{% endfor %}
+</testsuites>
+""",
+    autoescape=True,
+    trim_blocks=True,
+    lstrip_blocks=True,
+    keep_trailing_newline=True,
+    finalize=lambda part: _UNPRINTABLE.sub("\ufffd", part) if type(part) is str else part,
+)
 
 
 class Group(msgspec.Struct, frozen=True):
@@ -119,39 +155,8 @@ def json_schema() -> dict[str, Any]:
 def to_junit(run: Run) -> bytes:
     """Return the JUnit XML report: a suite for each group, a case for each vector."""
     name = run.introduction.name if run.introduction else run.command[0]
-    root = ElementTree.Element("testsuites", name=_printable(f"mushrooms check {name}"))
-    totals = dict.fromkeys(("tests", *TAGS), 0)
-    for group in run.groups():
-        results = [result for result in run.results if result.group == group]
-        suite = ElementTree.SubElement(root, "testsuite", name=group)
-        tags = [_add_case(suite, result) for result in results]
-        counted = {"tests": len(tags), **{name: tags.count(tag) for name, tag in TAGS.items()}}
-        totals = {key: totals[key] + counted[key] for key in totals}
-        seconds = sum(result.seconds for result in results)
-        suite.attrib |= {key: str(value) for key, value in counted.items()} | {"time": f"{seconds:.3f}"}
-        if group == "protocol" and run.stderr:
-            ElementTree.SubElement(suite, "system-err").text = _printable(run.stderr)
-    root.attrib |= {key: str(value) for key, value in totals.items()} | {"time": f"{run.seconds:.3f}"}
-    ElementTree.indent(root)
-    return bytes(ElementTree.tostring(root, encoding="utf-8", xml_declaration=True)) + b"\n"
-
-
-def _add_case(suite: ElementTree.Element, result: Result) -> str:
-    attributes = {
-        "classname": f"mushrooms.{result.group}",
-        "name": result.id,
-        "time": f"{result.seconds:.3f}",
-    }
-    case = ElementTree.SubElement(suite, "testcase", attributes)
-    tag, message = _junit_tag(result), f"{result.verdict}: {result.why}" if result.why else result.verdict
-    if tag:
-        if result.is_known:
-            message = f"known failure, {message}"
-        element = ElementTree.SubElement(case, tag, message=_printable(message))
-        if tag != "skipped":
-            element.set("type", result.verdict)
-            element.text = _printable(json.dumps(result.answer)) if result.answer is not None else None
-    return tag
+    cases = [(result, _junit_tag(result)) for result in run.results]
+    return _JUNIT.render(run=run, name=name, cases=cases, tags=TAGS).encode()
 
 
 def _junit_tag(result: Result) -> str:
@@ -160,10 +165,6 @@ def _junit_tag(result: Result) -> str:
     if result.verdict in ("declined", "unsupported"):
         return "skipped"
     return {"pass": "", "fail": "failure"}.get(result.verdict, "error")
-
-
-def _printable(text: str) -> str:
-    return _UNPRINTABLE.sub("\ufffd", text)
 
 
 if __name__ == "__main__":

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Mapping
 from typing import Any
 
 import msgspec
@@ -68,11 +67,6 @@ class Result(msgspec.Struct, frozen=True, omit_defaults=True):
     def is_right(self) -> bool:
         """Tell whether this result lets the run succeed: a known failure must fail, all else must not."""
         return self.verdict != "pass" if self.is_known else self.verdict not in BAD
-
-
-def outcomes_of(answer: Mapping[str, Any]) -> list[Any]:
-    """Return the outcomes that an answer holds: a trajectory's steps, a flow's states, or itself."""
-    return list(answer.get("steps") or answer.get("states") or [answer])
 
 
 class Speed(msgspec.Struct, frozen=True):

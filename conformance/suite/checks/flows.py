@@ -14,7 +14,7 @@ from msgspec.structs import replace
 
 from conformance import plain
 from conformance.cases.draw import Draw
-from conformance.suite.answers import read_arrival
+from conformance.suite.answers import read_outcome
 from conformance.suite.checks.form import FOREVER, Implementation, Question, octaves
 from conformance.suite.checks.paths import (
     CARRIED,
@@ -61,7 +61,7 @@ def arrive(side: Implementation, scene: Scene, begin: float, end: float) -> bool
         (y, to_y), (vy, to_vy), x = places, moving, 0.0
         start, due = State(0.0, x, y, 0.0, vy), Horizon(t_end, x, to_y, 0.0, to_vy)
     (found,) = side.flown(scene, [start], t_end)
-    arrival = read_arrival(found)
+    arrival = read_outcome(found)
     if isinstance(arrival, Undecided):
         return False
     assert distance(scene, arrival, due) <= CARRIED, f"{start}: {arrival}, must be {due}, in {scene}"
@@ -105,7 +105,7 @@ def together(
         if kinds != {"horizon"}:
             continue
         n_compared += 1
-        one, other = read_arrival(part), read_arrival(own)
+        one, other = read_outcome(part), read_outcome(own)
         assert distance(scene, one, other) <= ALONE, f"{where}: {one} among others, {other} alone"
         stays = part.get("captured"), own.get("captured")
         same = is_same_stay(*stays, t_end - pool[i].t)

@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 import msgspec
 
 from conformance.cases.draw import Draw
-from conformance.suite.answers import read_outcome
+from conformance.suite.answers import outcomes_of, read_outcome
 from conformance.suite.process import NOT_NUMBERS, Trouble
 from conformance.suite.result import Result
 from conformance.suite.session import Session, missing
@@ -69,7 +69,7 @@ class Implementation:
         part, *more = self.parts(question(self.profile, scene, state, t_end))
         if more:
             raise Trouble("wrong-format", f"{1 + len(more)} outcomes are answered to one question")
-        return self._counted(outcome_of(part, state.t))
+        return self._counted(read_outcome(part, state.t))
 
     def offers(self, profile: str, scene: Scene) -> bool:
         """Tell whether another profile may be asked about a scene."""
@@ -92,7 +92,7 @@ class Implementation:
         answer = self.session.ask(request)
         if "error" in answer:
             raise Trouble("error", answer["error"])
-        return list(answer.get("steps", answer.get("states", [answer])))
+        return outcomes_of(answer)
 
     def path(self, scene: Scene, state: State, n: int, t_end: float = FOREVER) -> list[Outcome]:
         """Follow up to n collisions, and what comes instead of a further one: at once, or step by step.
@@ -107,7 +107,7 @@ class Implementation:
             return found
         t = state.t
         for part in self.parts(question("trajectory", scene, state, t_end, n)):
-            found.append(self._counted(outcome_of(part, t)))
+            found.append(self._counted(read_outcome(part, t)))
             t = getattr(found[-1], "t", t)
         hits = [isinstance(outcome, Collision) for outcome in found]
         if len(found) > n or not all(hits[:-1]) or (len(found) < n and hits[-1:] != [False]):
@@ -144,11 +144,6 @@ def question(
     more = {"trajectory": {"collisions": n}, "time": {"collisions": n, "repeat": 1}}.get(cmd, {})
     end = {} if cmd == "time" else {"t_end": t_end}
     return {"cmd": cmd, "scene": _data(scene), **msgspec.to_builtins(place), **more, **end}
-
-
-def outcome_of(part: Mapping[str, Any], t: float) -> Outcome:
-    """Return one outcome of an answer, without its captured stay; t is when the flight began."""
-    return read_outcome({name: value for name, value in part.items() if name != "captured"}, t)
 
 
 def octaves(draw: Draw, low: float, high: float) -> Iterator[float]:

@@ -17,7 +17,7 @@ from msgspec.structs import replace
 from conformance import plain
 from conformance.cases import scenes, starts
 from conformance.cases.draw import Draw
-from conformance.suite.answers import read_arrival
+from conformance.suite.answers import read_outcome
 from conformance.suite.checks.flaws import COARSE, FINE, LATE, UNCLEAR, first_stay, flaw_of, is_fine
 from conformance.suite.checks.form import FOREVER, Implementation, Question, octaves
 from scene import (
@@ -85,7 +85,7 @@ def _arrives(
     else:
         t_end, end = getattr(last, "t", state.t), last
     (found,) = side.flown(scene, [state], t_end)
-    arrival = read_arrival(found)
+    arrival = read_outcome(found)
     if isinstance(arrival, Undecided) or not isinstance(end, Horizon):
         return False
     # A bounce makes 4 times as much of an error, as a rule; a path of many hits is regular.

@@ -19,6 +19,7 @@ from msgspec.structs import replace
 
 from conformance.cases import scenes
 from conformance.cases.draw import Draw
+from conformance.suite.answers import outcomes_of
 from conformance.suite.checks.form import Implementation, Question, octaves, question
 from conformance.suite.checks.schema import broken
 from conformance.suite.session import MAX_SEQ
@@ -60,8 +61,7 @@ def refuse(side: Implementation, scene: Scene, request: Mapping[str, Any], why: 
     seq = MAX_SEQ // 5
     line = json.dumps({**request, "seq": seq}).replace("Infinity", "1e999")
     answer = side.session.say(line.encode(), seq, side.profile)
-    parts = answer.get("steps", answer.get("states", [answer]))
-    outcomes = [part.get("outcome", "error") for part in parts]
+    outcomes = [part.get("outcome", "error") for part in outcomes_of(answer)]
     side.n_asked, side.n_undecided = side.n_asked + 1, side.n_undecided + ("undecided" in outcomes)
     if why:
         assert {*outcomes, "rejected"} == {"rejected"} or outcomes == ["undecided"], (

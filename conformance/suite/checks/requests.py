@@ -15,7 +15,7 @@ from typing import Any
 from msgspec.structs import replace
 
 from conformance.cases.draw import Draw
-from conformance.suite.answers import read_outcome, with_walls
+from conformance.suite.answers import outcomes_of, read_outcome, with_walls
 from conformance.suite.checks.form import FOREVER, Implementation, Question, octaves, question
 from conformance.suite.checks.paths import distance, drawn, is_same_stay
 from conformance.suite.process import Trouble
@@ -122,8 +122,7 @@ def ignored_or_refused(
         line = line.replace(key, f'"{name}":{value},{key}')
     seq = MAX_SEQ // 3
     answer = side.session.say(line.replace('"SEQ"', str(seq)).encode(), seq, side.profile)
-    parts = answer.get("steps", answer.get("states", [answer]))
-    if [part["outcome"] for part in parts] == ["rejected"]:
+    if [part["outcome"] for part in outcomes_of(answer)] == ["rejected"]:
         return True
     return _agree(side, scene, state, request, answer, f"with a further field in the {place}")
 
@@ -163,15 +162,14 @@ def _agree(
     """Hold an answer to a question in another form to the answer to itself, to rounding."""
     own = side.parts(request)
     told = with_walls({**answer}, request["scene"])
-    given = told.get("steps", told.get("states", [told]))
+    given = outcomes_of(told)
     if "error" in answer:
         raise Trouble("error", f"{answer['error']}: {how}")
     assert len(given) == len(own), f"{given}, must be {own}: {how}"
     n_compared, t = 0, state.t
     for one, other in zip(given, own, strict=True):
         stays = one.get("captured"), other.get("captured")
-        parts = ({name: value for name, value in part.items() if name != "captured"} for part in (one, other))
-        a, b = (read_outcome(part, t) for part in parts)
+        a, b = read_outcome(one, t), read_outcome(other, t)
         side.n_asked, side.n_undecided = side.n_asked + 1, side.n_undecided + isinstance(b, Undecided)
         assert type(a) is type(b), f"{one}, must be {other}: {how}"
         gap = distance(scene, a, b) if is_same_stay(*stays, math.inf) else math.inf

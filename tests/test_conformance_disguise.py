@@ -6,8 +6,8 @@ from fractions import Fraction
 
 import msgspec
 import pytest
-from support import replayer
 from support.depth import deep_but
+from support.replayer import replayer
 
 import fast
 from conformance import suite, vectors
@@ -152,10 +152,10 @@ def test_all_that_is_drawn_follows_from_the_seed(corpus):
 
 
 @pytest.mark.parametrize("seed", deep_but([None, 9], 9))
-@pytest.mark.parametrize("otherwise", deep_but(["undecided", "last"], "last"))
-def test_a_replayer_is_not_accepted(seed, otherwise):
+@pytest.mark.parametrize("is_bold", deep_but([False, True], True))
+def test_a_replayer_is_not_accepted(seed, is_bold):
     """One who knows every answer, and one who knows the run's seed beside."""
-    run = suite.check(replayer.command(seed, otherwise, GROUPS), seed=9, groups=[*GROUPS, "property"])
+    run = suite.check(replayer(seed, is_bold, GROUPS), seed=9, groups=[*GROUPS, "property"])
     known = [r.verdict for r in run.results if r.group in GROUPS]
     assert known.count("pass") == (len(known) if seed else 0)
     assert run.exit_code() == 1
@@ -164,7 +164,7 @@ def test_a_replayer_is_not_accepted(seed, otherwise):
 
 def test_a_replayer_would_pass_without_disguise(monkeypatch):
     monkeypatch.setattr("conformance.suite.run.drawn_disguise", lambda *_: Disguise())
-    run = suite.check(replayer.command(None, "undecided", GROUPS), seed=9, groups=[*GROUPS, "drawn"])
+    run = suite.check(replayer(None, False, GROUPS), seed=9, groups=[*GROUPS, "drawn"])
     assert {r.verdict for r in run.results if r.group in GROUPS} == {"pass"}
     assert run.exit_code() == 1  # but not what no file holds
     assert run.counts("drawn")["declined"] == disguise.N_DRAWN

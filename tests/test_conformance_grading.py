@@ -66,6 +66,7 @@ TIE = vector(Expectation("undefined", reason="corner"), Expectation("undecided")
 REFUSAL = vector(Expectation("rejected"))
 EITHER = vector(Expectation("collision", (RIGHT,)), Expectation("rejected"))
 PATH = vector(Expectation("collision", (RIGHT, LEFT)), kind="trajectory", collisions=2)
+WIDE = vector(Expectation("collision", (msgspec.structs.replace(RIGHT, x=("0.99999999", "1.00000001")),)))
 UNDECIDED = {"outcome": "undecided", "reason": "within rounding"}
 REJECTED = {"outcome": "rejected", "reason": "state.x"}
 CORNER = {"outcome": "undefined", "reason": "corner"}
@@ -101,6 +102,9 @@ VERDICTS = [
     (EITHER, REJECTED, "pass", ""),
     (EITHER, UNDECIDED, "pass", "a refusal is allowed here"),
     (EITHER, {**HIT, "vx": 1.0}, "fail", ""),
+    # An enclosure too wide to accept a right x still refuses a wrong one.
+    (WIDE, HIT, "indeterminate", "x"),
+    (WIDE, {**HIT, "x": 1.1}, "fail", "x"),
     (PATH, {"steps": [HIT, NEXT]}, "pass", ""),
     (PATH, {"steps": [HIT]}, "fail", "step 2: missing, 1 of 2"),
     (PATH, {"steps": []}, "fail", "step 1: missing"),
@@ -112,14 +116,6 @@ VERDICTS = [
     (PATH, UNDECIDED, "declined", ""),
     (PATH, REJECTED, "fail", ""),
 ]
-
-
-@pytest.mark.parametrize(("asked", "answer", "verdict", "words"), VERDICTS)
-def test_verdicts(asked, answer, verdict, words):
-    found = grade(asked, answer)
-    assert found.verdict == verdict, found
-    assert words in found.why
-    assert "\n" not in found.why
 
 
 MISSHAPEN = [
@@ -148,30 +144,16 @@ MISSHAPEN = [
 ]
 
 
-@pytest.mark.parametrize(("asked", "answer"), MISSHAPEN)
-def test_missing_or_ill_typed_fields_are_of_wrong_format(asked, answer):
+@pytest.mark.parametrize(
+    ("asked", "answer", "verdict", "words"),
+    [*VERDICTS, *((asked, answer, "wrong-format", "") for asked, answer in MISSHAPEN)],
+)
+def test_verdicts(asked, answer, verdict, words):
     found = grade(asked, answer)
-    assert found.verdict == "wrong-format"
-    assert math.isnan(found.ulps)
-    assert found.why
+    assert found.verdict == verdict, found
+    assert words in found.why
     assert "\n" not in found.why
-
-
-def test_indeterminate_when_the_enclosure_is_too_wide():
-    wide = msgspec.structs.replace(RIGHT, x=("0.99999999", "1.00000001"))
-    asked = vector(Expectation("collision", (wide,)))
-    assert grade(asked, HIT).verdict == "indeterminate"
-    assert grade(asked, {**HIT, "x": 1.1}).verdict == "fail"
-
-
-def test_who_declines_passes_wherever_a_refusal_is_allowed(tally):
-    """Of a group of three two could be declined, and the whole level was refused."""
-    for found in load("stress"):
-        allowed = [expectation.outcome for expectation in found.expect]
-        if allowed[1:] == ["rejected"]:
-            assert grade(found, UNDECIDED).verdict == grade(found, REJECTED).verdict == "pass"
-            tally[found.group] += 1
-    assert set(tally) == {"far-mouth", "far-phase", "hard-case-39", "hard-case-40"}
+    assert math.isnan(found.ulps) or verdict not in ("wrong-format", "error", "declined")
 
 
 def test_backward_ulps_of_a_known_error():

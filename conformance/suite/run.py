@@ -41,8 +41,7 @@ from conformance.suite.disguise import (
     published,
 )
 from conformance.suite.process import NOT_NUMBERS, Trouble
-from conformance.suite.result import BAD, Result, Run, Speed
-from conformance.suite.scope import graded_parts
+from conformance.suite.result import BAD, Result, Run, Speed, graded_parts
 from conformance.suite.session import AnswerLine, Limits, Session, missing
 from conformance.vectors import Vector
 from scene import BadInput, State, load, to_data

@@ -150,13 +150,6 @@ def take_hints(request: Line, answer: Answer) -> Line:
     return found
 
 
-def nameless_only(request: Line, answer: Answer) -> Line:
-    """Refuse a scene that has a name."""
-    if isinstance(request.get("scene"), dict) and request["scene"].get("name"):
-        return {"seq": request["seq"], "outcome": "rejected", "reason": "scene.name is unknown"}
-    return answer(request)
-
-
 def as_fortran_reads(request: Line) -> None:
     """Take a number without a point for one with six decimals."""
     for state in starts(request):
@@ -313,14 +306,19 @@ def straight_on(request: Line, last: Line, arrived: Line) -> None:
     arrived |= {**place, "vx": last["vx"], "vy": last["vy"]}
 
 
-def captured_as(change: Callable[[Line, list[float]], list[float] | None]) -> Fault:
-    """Tell other captured stays: (request, stay) -> stay."""
+def captured_as(change: Callable[[Line, list[float], int], list[float] | None]) -> Fault:
+    """Tell other captured stays: (request, stay, place of the particle) -> stay."""
 
-    def changed(request: Line, part: Line, _: int) -> None:
+    def changed(request: Line, part: Line, i: int) -> None:
         if part.get("captured"):
-            part["captured"] = change(request, part["captured"])
+            part["captured"] = change(request, part["captured"], i)
 
     return on(FLOW, each("horizon", changed))
+
+
+def losing_stays(is_lost: Callable[[int, int], bool]) -> Fault:
+    """Lose the captured stay of some particles: (place, number of particles)."""
+    return captured_as(lambda request, stay, i: None if is_lost(i, len(request["states"])) else stay)
 
 
 def wide_edge(by_part: float) -> Fault:
@@ -338,17 +336,6 @@ def wide_edge(by_part: float) -> Fault:
             part["captured"] = wide.get("captured") if part["outcome"] == "horizon" else None
 
     return on(FLOW, change)
-
-
-def losing_stays(where: Callable[[int, int], bool]) -> Change:
-    """Lose the captured stay of some particles: (index, number of particles)."""
-
-    def change(_: Line, found: Line) -> None:
-        for i, state in enumerate(found["states"]):
-            if "captured" in state and where(i, len(found["states"])):
-                state["captured"] = None
-
-    return change
 
 
 # Clocks.

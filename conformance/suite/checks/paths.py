@@ -338,15 +338,8 @@ def long(draw: Draw, profile: str) -> Iterator[Question]:
 def late(draw: Draw, profile: str) -> Iterator[Question]:
     """Begin many periods from t = 0, before or after."""
     for wait in octaves(draw, 1, MAX_LATE):
-        scene = scenes.scene(
-            draw, draw.pick(("cap", "stem", "mushroom")), scenes.clock(draw, ("fourier", "bang-bang"))
-        )
         t = draw.pick((1.0, -1.0)) * wait * draw.between(1.0, 4.0)
-        for _ in range(64):
-            state, t_end = starts.state(draw, scene, {"t": t, "speed": draw.power(0, 4)})
-            if isinstance(plain.next_collision(scene, state, t_end), Collision):
-                yield scene, state, 2
-                break
+        yield *drawn(draw, ("fourier", "bang-bang"), t=t, speed=draw.power(0, 4)), 2
 
 
 def waiting(draw: Draw, profile: str) -> Iterator[Question]:

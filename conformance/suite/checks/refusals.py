@@ -222,17 +222,20 @@ def _at_their_bounds(law: Kind) -> Iterator[dict[str, Any]]:
     """Return scenes of which one law comes to its bound, or passes it."""
     stem = {"table": "stem", "w": 1.0, "h": 1.25}
     mushroom, by_nu = ({"table": "mushroom", "r": 1.0, name: 0.5, "h": 1.0} for name in ("w", "nu"))
-    yield {"table": "cap", "r": law(0.0, 1.0)}
-    yield {**stem, "w": law(0.0, 0.75)}
-    yield {**mushroom, "h": law(0.0, 1.0)}
-    yield {**by_nu, "nu": law(0.0, 0.75)}
-    yield {**by_nu, "nu": law(1.0, 0.25)}
-    yield {**mushroom, "w": law(1.0, 0.25)}
-    yield {**mushroom, "r": law(0.5, 1.0)}
-    yield {**stem, "slope": law(0.8, -0.25)}
-    yield {**mushroom, "slope": law(0.5, -0.25)}
-    yield {**stem, "slope": 0.4, "h": law(2.5, 1.0)}
-    yield {**by_nu, "slope": 0.25, "r": law(0.5, 1.0)}
+    for table, name, bound, far in (
+        ({"table": "cap"}, "r", 0.0, 1.0),
+        (stem, "w", 0.0, 0.75),
+        (mushroom, "h", 0.0, 1.0),
+        (by_nu, "nu", 0.0, 0.75),
+        (by_nu, "nu", 1.0, 0.25),
+        (mushroom, "w", 1.0, 0.25),
+        (mushroom, "r", 0.5, 1.0),
+        (stem, "slope", 0.8, -0.25),
+        (mushroom, "slope", 0.5, -0.25),
+        ({**stem, "slope": 0.4}, "h", 2.5, 1.0),
+        ({**by_nu, "slope": 0.25}, "r", 0.5, 1.0),
+    ):
+        yield {**table, name: law(bound, far)}
 
 
 def _of_two_periods(draw: Draw, apart: float) -> dict[str, Any]:

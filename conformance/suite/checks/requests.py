@@ -65,7 +65,7 @@ def spellings(draw: Draw, profile: str) -> Iterator[Question]:
         named = {**request["scene"], "name": TEXTS[i % len(TEXTS)], "notes": "\u00e9" * int(length / 2)}
         if draw.pick((False, True)):
             named = {name: part for name, part in named.items() if part != 0.0 or name != "slope"}
-        yield scene, state, request, _written(draw, _absent(draw, {**request, "scene": named}))
+        yield scene, state, request, _written(draw, {**request, "scene": named})
 
 
 def same(side: Implementation, scene: Scene, state: State, request: Mapping[str, Any], line: str) -> bool:
@@ -178,21 +178,10 @@ def _agree(
     return bool(n_compared)
 
 
-def _absent(draw: Draw, request: dict[str, Any]) -> dict[str, Any]:
-    """Leave out now and then what is optional: a wall that is null."""
-    if draw.pick((False, True)):
-        return request
-    starts = [
-        {name: part for name, part in state.items() if name != "wall" or part is not None}
-        for state in request.get("states", [request.get("state")])
-    ]
-    return {**request, **({"states": starts} if "states" in request else {"state": starts[0]})}
-
-
 def _written(draw: Draw, request: Mapping[str, Any]) -> str:
     """Write a request as JSON in a drawn way: order, blanks, numbers, escapes."""
     blanks = draw.pick(("", " ", "\t "))
-    escape = draw.pick((False, True))
+    escape, is_short = draw.pick((False, True)), draw.pick((False, True))
     styles: tuple[Callable[[float], str], ...] = (
         repr,
         lambda x: f"{x:.16e}",
@@ -208,8 +197,9 @@ def _written(draw: Draw, request: Mapping[str, Any]) -> str:
 
     def write(part: Any) -> str:
         if isinstance(part, Mapping):
-            names = list(part)
-            names = [names.pop(draw.pick(range(len(names)))) for _ in part]
+            # What is optional may be left out: a wall that is null.
+            names = [name for name in part if not (is_short and part[name] is None)]
+            names = [names.pop(draw.pick(range(len(names)))) for _ in range(len(names))]
             pairs = [f"{text(name)}{blanks}:{blanks}{write(part[name])}" for name in names]
             return "{" + blanks + f"{blanks},{blanks}".join(pairs) + blanks + "}"
         if isinstance(part, list | tuple):

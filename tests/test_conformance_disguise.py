@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from fractions import Fraction
-
 import msgspec
 import pytest
 from support.depth import deep_but
@@ -13,7 +11,7 @@ import fast
 from conformance import suite, vectors
 from conformance.cases.draw import Draw
 from conformance.grading.agreement import middle
-from conformance.grading.grade import grade
+from conformance.grading.grade import SHARP, grade
 from conformance.mutants import Mutant
 from conformance.plain.motion import BangBangMotion
 from conformance.plain.step import Flight
@@ -48,6 +46,8 @@ def test_the_fast_stepper_answers_as_well_in_disguise(seed, corpus, tally):
         answer = vectors.answer(asked(vector, worn), fast.next_collision, follow, carry)
         found = grade(vector, published(answer, worn))
         assert found.verdict in ("pass", "declined"), (vector.id, str(worn), found)
+        assert found.verdict == "pass" or vector.level == "stress"
+        assert vector.level != "core" or not found.ulps > SHARP
         tally[f"{found.verdict}"] += 1
         tally["as published" if worn == Disguise() else "in disguise"] += 1
 
@@ -130,17 +130,6 @@ def test_a_scene_stays_one_scene_in_a_run(corpus):
     assert len({str(asked(v, drawn_disguise(v, s)).scene) for v in group[:1] for s in range(20)}) > 15
 
 
-def test_drawn_horizons_are_exact(corpus):
-    for vector in drawn_horizons(corpus, 8):
-        (step,) = vector.expect[0].steps
-        s = Fraction(vector.t_end) - Fraction(vector.state.t)
-        for place, speed in (("x", "vx"), ("y", "vy")):
-            low, high = step.ends(place)
-            exact = Fraction(getattr(vector.state, place)) + Fraction(getattr(vector.state, speed)) * s
-            assert low <= exact <= high
-            assert high - low <= abs(exact) * Fraction(1, 10**22)
-
-
 def test_all_that_is_drawn_follows_from_the_seed(corpus):
     steps = [v for v in corpus if v.kind == "step" and v.level == "core"]
     assert drawn_horizons(steps, 4) == drawn_horizons(steps, 4)
@@ -168,10 +157,3 @@ def test_a_replayer_would_pass_without_disguise(monkeypatch):
     assert {r.verdict for r in run.results if r.group in GROUPS} == {"pass"}
     assert run.exit_code() == 1  # but not what no file holds
     assert run.counts("drawn")["declined"] == disguise.N_DRAWN
-
-
-def test_a_law_of_many_legs_is_written_once():
-    legs = [(k / 64, 1.0 + 0.5 * (k % 2)) for k in range(65)]
-    law = BangBang(knots=tuple(legs))
-    assert len(disguise._begun_at(law, 0, 0, 3).knots) == 193
-    assert disguise._begun_at(law, 0, 0, 6) is None

@@ -9,12 +9,9 @@ import msgspec
 import pytest
 from support.replayer import certified_answer
 
-import fast
 from conformance.grading.agreement import physics_bound
-from conformance.grading.grade import Grade, grade, precision_class
-from conformance.vectors import NUMBERS, Certified, Expectation, Vector, answer, load
-from fast.__main__ import carry as fast_carry
-from fast.__main__ import follow as fast_follow
+from conformance.grading.grade import grade, precision_class
+from conformance.vectors import NUMBERS, Certified, Expectation, Vector, load
 from scene import State
 
 THIN = {"dt": ("0.75", "0.75"), "x": ("1", "1"), "y": ("-0.5", "-0.5"), "vx": ("-1", "-1"), "vy": ("0", "0")}
@@ -236,18 +233,3 @@ def test_shifted_answers_fail_and_slightly_shifted_ones_pass(corpus):
         assert grade(asked, shifted(asked, index, name, bound / 4)).verdict == "pass", asked.id
         n_shifted += 1
     assert n_shifted > 0.27 * len(corpus)
-
-
-def graded(sample, *stepper) -> dict[str, Grade]:
-    return {asked.id: grade(asked, answer(asked, *stepper)) for asked in sample}
-
-
-def test_the_fast_stepper_passes_or_declines_what_is_degenerate(corpus, tally):
-    sample = corpus[::6]
-    grades = graded(sample, fast.next_collision, fast_follow, fast_carry)
-    level = {asked.id: asked.level for asked in sample}
-    tally.update(f"{level[name]} {found.verdict}" for name, found in grades.items())
-    off = {name: found for name, found in grades.items() if found.verdict not in ("pass", "declined")}
-    assert off == {}
-    assert {level[name] for name, found in grades.items() if found.verdict == "declined"} <= {"stress"}
-    assert precision_class([found.ulps for name, found in grades.items() if level[name] == "core"]) == "A"

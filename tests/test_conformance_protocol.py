@@ -16,7 +16,7 @@ from test_conformance_fuzz import SERVERS
 
 import fast
 import reference
-from scene import Horizon, State, catalogue, load, to_data
+from scene import Horizon, State, load, to_data
 from scene.protocol.messages import Timed
 from scene.protocol.wire import serve
 
@@ -160,12 +160,3 @@ def test_what_the_machine_refuses_is_owned_to_and_the_session_goes_on(error, tol
         {"seq": 1, "error": told},
         {"seq": 2, "error": told},
     ]
-
-
-def test_every_catalogue_scene_is_served(module):
-    names = [name for name in catalogue() if name != "moving-cap-as-printed"]
-    scenes = [to_data(load(name)) for name in names]
-    starts = [{"y": -0.3} if scene["table"] == "stem" else {} for scene in scenes]
-    answers = ask(module, *(step(i, s, **c) for i, (s, c) in enumerate(zip(scenes, starts, strict=True))))
-    assert [a["seq"] for a in answers] == list(range(len(names)))
-    assert {a["outcome"] for a in answers} == {"collision"}

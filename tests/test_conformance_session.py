@@ -16,7 +16,7 @@ from conformance.suite import run as suite
 from conformance.suite.answers import read_answer
 from conformance.suite.disguise import Disguise
 from conformance.suite.process import CommandNotFound, Trouble
-from conformance.suite.session import Limits, Session, probe_values
+from conformance.suite.session import Limits, Session
 from conformance.vectors import Certified, Expectation, Vector
 from scene import State
 from scene.protocol.messages import with_minus_zeros
@@ -206,27 +206,6 @@ def test_every_saboteur_is_met():
 def test_a_command_that_does_not_exist():
     with pytest.raises(CommandNotFound, match="no-such-stepper"), Session(["./no-such-stepper"]) as session:
         session.start()
-
-
-def test_leaving_a_session_kills_what_it_started(monkeypatch):
-    monkeypatch.setenv("SABOTAGE", token := secrets.token_hex(8))
-    with Session(command("honest")) as session:
-        session.start()
-        assert alive(token)
-    assert alive(token) == []
-
-
-def test_the_probe_sends_every_kind_of_number():
-    values = probe_values()
-    assert {repr(v) for v in values} >= {
-        "-0.0",
-        "5e-324",
-        "0.1",
-        "1.7976931348623157e+308",
-        "0.3333333333333333",
-    }
-    assert len({repr(v) for v in values}) == len(values)
-    assert max(len(repr(v).strip("-0.").partition("e")[0].replace(".", "")) for v in values) == 17
 
 
 # Beside what an answer of each command holds, an error is the answer.

@@ -14,13 +14,12 @@ from functools import partial
 from typing import Any, NoReturn
 
 import msgspec
+from mpmath import fp
 
+from conformance import plain
 from scene import (
-    BadInput,
-    Cap,
     Collision,
     Horizon,
-    Mushroom,
     Outcome,
     Rejected,
     Scene,
@@ -29,17 +28,16 @@ from scene import (
     Undefined,
     to_data,
 )
-from scene.geometry import DIGITS, table_at
+from scene.geometry import table_at
 from scene.laws import bounds
-from scene.precision import decimals
 from scene.refusal import shown
-from scene.states import Stepper, check_numbers
-from scene.tables import Wall, cycle_length, laws
+from scene.states import Stepper
+from scene.tables import cycle_length, laws
 
 MOST = 2.0**100  # sizes, speeds and their inverses within it overflow nowhere
 FAR = 2.0**20  # periods from t = 0 that every stepper must reach
 Question = tuple[Scene, State, float]  # as a stepper takes it: with t_end
-CLEAR = 2.0**-20  # of a wall's f beside its terms: farther inside than any rounding leads
+CLEAR = 2.0**-20  # of the table's size: farther inside than any rounding leads
 
 
 def answering(stepper: Stepper) -> Stepper:
@@ -69,27 +67,15 @@ def fail(name: str, text: str, *questions: Question) -> NoReturn:
 
 def is_clearly_inside(scene: Scene, state: State, t_end: float) -> bool:
     """Tell whether a state is one that no stepper may refuse; of one on a wall this does not judge."""
-    try:
-        check_numbers(scene, state, t_end)
-    except BadInput:
-        return False
     sizes = [abs(extent) for law in laws(scene).values() for extent in bounds(law)]
     sizes += [abs(number) for number in (state.x, state.y, state.vx, state.vy, state.t, t_end)]
     is_far = max(abs(state.t), abs(t_end)) > FAR * (cycle_length(scene) or 1.0)
     if state.wall is not None or is_far or any(size and not 1 / MOST < size < MOST for size in sizes):
         return False
-    ctx = decimals(DIGITS)
-    table, x, y = table_at(ctx, scene, state.t), ctx.mpf(state.x), ctx.mpf(state.y)
-    near: tuple[Wall, ...] = ("left", "right", "floor", "base")
-    if state.y > 0 or isinstance(scene, Cap):
-        near = ("arc", "base")
-    elif isinstance(scene, Mushroom) and state.y == 0:
-        return False
-    elif isinstance(scene, Mushroom):
-        near = near[:3]
-    terms = {"arc": table.r**2, "floor": table.h, "base": max(table.r, table.h)}
-    side = table.w + abs(table.slope * y)
-    return all(table.gap(wall, x, y) > CLEAR * terms.get(wall, side) for wall in near)
+    off = CLEAR * float(table_at(fp, scene, state.t).size)
+    places = [(0.0, 0.0), (off, 0.0), (-off, 0.0), (0.0, off), (0.0, -off)]
+    around = [msgspec.structs.replace(state, x=state.x + dx, y=state.y + dy) for dx, dy in places]
+    return not any(isinstance(plain.next_collision(scene, at, t_end), Rejected) for at in around)
 
 
 def _outcome(stepper: Stepper, scene: Scene, state: State, t_end: float) -> Outcome:

@@ -47,22 +47,20 @@ class Transcript:
     """The first and the last part of a stream, bounded."""
 
     def __init__(self) -> None:
-        self.head, self.tail, self.n_dropped = bytearray(), bytearray(), 0
+        self.kept, self.n_dropped = bytearray(), 0
 
     def add(self, data: bytes) -> None:
         """Append, dropping from the middle."""
-        room = MAX_STDERR - len(self.head)
-        self.head += data[:room]
-        self.tail += data[room:]
-        excess = max(0, len(self.tail) - MAX_STDERR)
+        self.kept += data
+        excess = max(0, len(self.kept) - 2 * MAX_STDERR)
         self.n_dropped += excess
-        del self.tail[:excess]
+        del self.kept[MAX_STDERR : MAX_STDERR + excess]
 
     def text(self) -> str:
         """Return what was kept, with a note of what was not; lines and tabs stay as they are."""
-        gap = f"\n[... {self.n_dropped} bytes left out ...]\n" if self.n_dropped else ""
-        text = self.head.decode("utf-8", "replace") + gap + self.tail.decode("utf-8", "replace")
-        return escaped(text, kept="\n\t")
+        gap = f"\n[... {self.n_dropped} bytes left out ...]\n".encode() if self.n_dropped else b""
+        text = self.kept[:MAX_STDERR] + gap + self.kept[MAX_STDERR:]
+        return escaped(text.decode("utf-8", "replace"), kept="\n\t")
 
 
 class Process:

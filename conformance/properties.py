@@ -28,7 +28,7 @@ import msgspec
 
 from conformance.grading import sensitivity
 from conformance.grading.called import Question, answering, fail
-from conformance.grading.sensitivity import measured, numbers
+from conformance.grading.sensitivity import MeasuredStep, measured, numbers
 from scene import Collision, Horizon, Outcome, Rejected, Scene, State, Undecided, transforms
 from scene.laws import is_constant
 from scene.precision import decimals
@@ -182,8 +182,9 @@ def check_reversal(
     there = measured(stepper, *given, bound)
     if there is None:
         return False
-    begin, onward, walls = state, there, [None]
-    asked = [given]
+    onward: MeasuredStep | None = there
+    walls: list[str | None] = [None]
+    begin, asked = state, [given]
     if isinstance(there.outcome, Collision):
         led = scene, there.state(), max(t_end, there.outcome.t)
         if isinstance(refusal := stepper(*led), Rejected):

@@ -159,9 +159,8 @@ def test_the_json_report_follows_its_published_schema():
     run = made("pass", "fail", "declined", "crashed", known=(1,))
     data = json.loads(reports.to_json(run))
     validator("check").validate(data)
-    assert data["total"]["cases"] == 4
-    assert data["total"]["counts"] == {v: int(v in ("pass", "fail", "declined", "crashed")) for v in VERDICTS}
-    assert data["exit_code"] == 1
+    counts = {v: int(v in ("pass", "fail", "declined", "crashed")) for v in VERDICTS}
+    assert (data["total"]["counts"], data["exit_code"]) == (counts, 1)
     assert [r.get("answer") for r in data["results"]] == [None, {"x": 1.0}, {"x": 1.0}, {"x": 1.0}]
     assert not validator("check").is_valid({**data, "results": [{}]})
 

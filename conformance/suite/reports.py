@@ -174,7 +174,7 @@ def to_junit(run: Run) -> bytes:
     """Return the JUnit XML report: a suite for each group, a case for each vector."""
     name = run.introduction.name if run.introduction else run.command[0]
     cases = [(result, _junit_tag(result)) for result in run.results]
-    return _JUNIT.render(run=run, name=name, cases=cases, tags=TAGS).encode()
+    return str(_JUNIT.render(run=run, name=name, cases=cases, tags=TAGS)).encode()
 
 
 def _junit_tag(result: Result) -> str:

@@ -13,7 +13,7 @@ wall. In a Hypothesis test:
 Mirror and power-of-two scaling hold bit for bit in any stepper whose arithmetic is binary64 and which has no
 absolute tolerance and treats both sides alike; `is_exact=False` asks for them within rounding. All others
 hold within rounding: `bound` is the backward error granted (1e-9 by default, as in the physics verdict),
-and what it does to the answer is measured on the stepper itself (`conformance.grading.sensitivity`). The work
+and what it does to the answer is measured on the stepper itself (`conformance.grading.called`). The work
 identity of whole ensembles is `conformance.profiles.check_work_identity`.
 """
 
@@ -26,9 +26,7 @@ from math import hypot
 
 import msgspec
 
-from conformance.grading import sensitivity
-from conformance.grading.called import Question, answering, fail
-from conformance.grading.sensitivity import MeasuredStep, measured, numbers
+from conformance.grading.called import MeasuredStep, Question, answering, fail, measured, numbers, scales
 from scene import Collision, Horizon, Outcome, Rejected, Scene, State, Undecided, transforms
 from scene.laws import is_constant
 from scene.precision import decimals
@@ -264,7 +262,7 @@ def check_symplectic(
     if way is None:
         return False
     begin, _, end = way
-    scale = sensitivity.scales(scene, state)
+    scale = scales(scene, state)
     units = (scale.length, scale.length, scale.speed, scale.speed)
     coarse, fine = (_flow_matrix(stepper, scene, way, units, width) for width in (STEP, STEP / 2))
     if coarse is None or fine is None:

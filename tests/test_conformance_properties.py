@@ -84,8 +84,8 @@ def test_the_questions_of_a_broken_property_are_those_that_were_sent(name):
     sent, spoilt = [], []
 
     def step(scene, state, t_end):
-        line = {"scene": to_data(scene), "state": msgspec.to_builtins(state), "t_end": t_end}
-        sent.append(json.loads(json.dumps(line)))
+        line = {"scene": to_data(scene), "state": msgspec.structs.asdict(state), "t_end": t_end}
+        sent.append(json.dumps({"cmd": "step", "seq": 1, **line}))
         found = plain.next_collision(scene, state, t_end)
         if (scene, state, t_end) == question:
             return found
@@ -94,10 +94,9 @@ def test_the_questions_of_a_broken_property_are_those_that_were_sent(name):
 
     with pytest.raises(AssertionError) as broken:
         PROPERTIES[name](step, *question)
-    lines = [json.loads(line) for line in re.findall(r"\{.cmd.*?\}(?=; \{.cmd|$)", str(broken.value))]
-    printed = [{part: line[part] for part in ("scene", "state", "t_end")} for line in lines]
-    assert all(line in sent for line in printed)
-    assert any(line in spoilt for line in printed)
+    printed = re.findall(r"\{.cmd.*?\}(?=; \{.cmd|$)", str(broken.value))
+    assert set(printed) <= set(sent)
+    assert set(printed) & set(spoilt)
 
 
 @pytest.mark.parametrize("question", [GALLERY, STATIC, BREATHING, LIFT])

@@ -178,15 +178,6 @@ def test_junit_counts_what_happened():
     assert root.find(".//failure").get("message") == "fail: because & <why>"
 
 
-def test_what_must_be_refused_is_asked_of_all():
-    vector = next(v for v in vectors.load("stress") if v.scene.get("table") == "ellipse")
-    asked = []
-    refusal = {"outcome": "rejected", "reason": "ellipse"}
-    session = SimpleNamespace(introduction=INTRODUCTION, ask=lambda request: asked.append(request) or refusal)
-    assert suite.ask_vector(session, vector).verdict == "pass"
-    assert asked[0]["scene"] == vector.scene
-
-
 def test_the_reference_passes(monkeypatch):
     offered = [v for v in vectors.load("core") if v.kind != "flow"]
     known = [v for v in offered if v.expect[0].steps and v.group != "hard-case-14"][::100]

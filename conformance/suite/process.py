@@ -16,7 +16,7 @@ import selectors
 import signal
 import subprocess
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import IO
 
 from conformance.suite.descendants import Descendants
@@ -154,11 +154,8 @@ class Process:
         if status := self._status():
             raise Trouble("crashed", f"{status} after `stop`")
         # A helper that ends because the process has ended does so a little later.
-        deadline = time.monotonic() + GRACE
-        while self._descendants.alive():
-            if time.monotonic() >= deadline:
-                raise Trouble("fail", "left a child process running after `stop`")
-            time.sleep(POLL / 5)
+        if not _comes_true(lambda: not self._descendants.alive()):
+            raise Trouble("fail", "left a child process running after `stop`")
         self._advance(b"", 0.0)
         self._check_silence()  # of the helpers
 
@@ -228,12 +225,17 @@ class Process:
             return f"was killed by signal {result.si_status}"
 
     def _ending(self) -> str:
-        deadline = time.monotonic() + GRACE
-        while not self._has_exited() and time.monotonic() < deadline:
-            time.sleep(POLL / 5)
-        if not self._has_exited():
+        if not _comes_true(self._has_exited):
             return "closed its standard output"
         return (self._status() or "exited with status 0") + " before it answered"
+
+
+def _comes_true(condition: Callable[[], bool]) -> bool:
+    """Wait a little for something to be so, and tell whether it is."""
+    deadline = time.monotonic() + GRACE
+    while not (is_so := condition()) and time.monotonic() < deadline:
+        time.sleep(POLL / 5)
+    return is_so
 
 
 def clean(text: str) -> str:

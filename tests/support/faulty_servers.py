@@ -183,12 +183,10 @@ def answers_by(key: Callable[[Line], Any]) -> Fault:
     """Keep every answer to a step, by a key of the request."""
     book: dict[str, Line] = {}
 
-    def fault(request: Line, answer: Answer) -> Line:
-        if request.get("cmd") != STEP or not starts(request):
-            return answer(request)
-        return {**book.setdefault(json.dumps(key(request)), answer(request)), "seq": request["seq"]}
+    def change(request: Line, found: Line) -> Line:
+        return {**book.setdefault(json.dumps(key(request)), found), "seq": request["seq"]}
 
-    return fault
+    return on(STEP, change)
 
 
 def rounded(digits: int) -> Callable[[Any], Any]:

@@ -19,13 +19,14 @@ from conformance.cases.draw import Draw
 from conformance.suite.answers import outcomes_of, read_outcome
 from conformance.suite.process import NOT_NUMBERS, Trouble
 from conformance.suite.result import Result
-from conformance.suite.session import Session, missing
+from conformance.suite.session import MAX_SEQ, Session, missing
 from scene import Collision, Outcome, Scene, State, Undecided, to_data
 from scene.protocol.messages import Introduction
 
 QUESTIONS = ("step", "trajectory", "flow")  # the profiles that answer by outcomes
 FOREVER = sys.float_info.max  # t_end of a question that only collisions end
 MAX_DRAWN = 6  # times that questions are drawn for an implementation of a part of the tables or laws
+SEQ = MAX_SEQ // 2  # of a line that is written by hand
 MAX_UNDECIDED = 0.1  # of a check's questions: more, and it is declined
 Question = tuple[Any, ...]  # a scene that is asked about, or its data, and what else `judges` takes
 
@@ -93,6 +94,10 @@ class Implementation:
         if "error" in answer:
             raise Trouble("error", answer["error"])
         return outcomes_of(answer)
+
+    def said(self, line: str) -> dict[str, Any]:
+        """Send a line as it is written, but for the seq in place of "SEQ", and return what it is answered."""
+        return self.session.say(line.replace('"SEQ"', str(SEQ)).encode(), SEQ, self.profile)
 
     def path(self, scene: Scene, state: State, n: int, t_end: float = FOREVER) -> list[Outcome]:
         """Follow up to n collisions, and what comes instead of a further one: at once, or step by step.

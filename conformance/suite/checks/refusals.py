@@ -23,7 +23,6 @@ from conformance.cases import scenes
 from conformance.cases.draw import Draw
 from conformance.suite.answers import outcomes_of
 from conformance.suite.checks.form import Implementation, Question, octaves, question
-from conformance.suite.session import MAX_SEQ
 from scene import BangBang, Cap, Fourier, Mushroom, Scene, State, Stem, Wall
 from scene.geometry import TableAt, table_at
 from scene.protocol.messages import json_schema
@@ -71,9 +70,8 @@ def requests(draw: Draw, profile: str) -> Iterator[Question]:
 
 def refuse(side: Implementation, scene: Scene, request: Mapping[str, Any], why: str) -> bool:
     """Hold a bad request to be refused as a whole, or in its only state; and a sound one not to be."""
-    seq = MAX_SEQ // 5
-    line = json.dumps({**request, "seq": seq}).replace("Infinity", "1e999")
-    answer = side.session.say(line.encode(), seq, side.profile)
+    line = json.dumps({**request, "seq": "SEQ"}).replace("Infinity", "1e999")
+    answer = side.said(line)
     outcomes = [part.get("outcome", "error") for part in outcomes_of(answer)]
     side.n_asked, side.n_undecided = side.n_asked + 1, side.n_undecided + ("undecided" in outcomes)
     if why:

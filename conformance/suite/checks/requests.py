@@ -19,14 +19,21 @@ from conformance.suite.answers import outcomes_of, read_outcome, with_walls
 from conformance.suite.checks.form import FOREVER, Implementation, Question, octaves, question
 from conformance.suite.checks.paths import distance, drawn, is_same_stay
 from conformance.suite.process import Trouble
-from conformance.suite.session import MAX_SEQ
 from scene import Cap, Mushroom, Scene, State, Stem, Undecided
 from scene.tables import cycle_length
 
 MAX_LINE = 2**20  # bytes of a request
 ROUNDING, CARRIED = 2.0**-44, 2.0**-40  # of sizes: of a step, and of more
 N_SPELLINGS, N_AFTER, N_HITS = 16, 4, 2
-UNKNOWN = "hint", 7.0  # a field that the protocol does not know
+HINT = '"hint":7.0,'  # a field that the protocol does not know
+# What is written further, and before which key.
+FURTHER = {
+    "request": (HINT, '"cmd"'),
+    "scene": (HINT, '"table"'),
+    "state": (HINT, '"t"'),
+    "law": (HINT, '"mean"'),
+    "twice": ('"t_end":0.0,', '"t_end"'),
+}
 TEXTS = (
     "a name",
     'of "quotes" \\ and / signs',
@@ -70,9 +77,7 @@ def spellings(draw: Draw, profile: str) -> Iterator[Question]:
 
 def same(side: Implementation, scene: Scene, state: State, request: Mapping[str, Any], line: str) -> bool:
     """Hold a line to be answered as the request is."""
-    seq = MAX_SEQ // 2
-    answer = side.session.say(line.replace('"SEQ"', str(seq)).encode(), seq, side.profile)
-    return _agree(side, scene, state, request, answer, repr(line[:400]))
+    return _agree(side, scene, state, request, side.said(line), repr(line[:400]))
 
 
 def bad_lines(draw: Draw, profile: str) -> Iterator[Question]:
@@ -102,7 +107,7 @@ def passed_over(side: Implementation, scene: Scene, asked: Sequence[tuple[State,
 
 def further_fields(draw: Draw, profile: str) -> Iterator[Question]:
     """Add a field that the protocol does not know, and write one twice."""
-    for place in ("request", "scene", "state", "law", "twice"):
+    for place in FURTHER:
         scene, state, request = _one(draw, profile)
         yield scene, state, request, place
 
@@ -111,17 +116,8 @@ def ignored_or_refused(
     side: Implementation, scene: Scene, state: State, request: dict[str, Any], place: str
 ) -> bool:
     """Hold a further field to change nothing, or to be refused."""
-    name, value = UNKNOWN
-    line = json.dumps({**request, "seq": "SEQ"})
-    if place == "twice":
-        line = line.replace('"t_end"', '"t_end":0.0,"t_end"')
-    elif place == "request":
-        line = f'{{"{name}":{value},{line[1:]}'
-    else:
-        key = {"scene": '"table"', "state": '"t"', "law": '"mean"'}[place]
-        line = line.replace(key, f'"{name}":{value},{key}')
-    seq = MAX_SEQ // 3
-    answer = side.session.say(line.replace('"SEQ"', str(seq)).encode(), seq, side.profile)
+    more, key = FURTHER[place]
+    answer = side.said(json.dumps({**request, "seq": "SEQ"}).replace(key, more + key))
     if [part["outcome"] for part in outcomes_of(answer)] == ["rejected"]:
         return True
     return _agree(side, scene, state, request, answer, f"with a further field in the {place}")

@@ -10,7 +10,7 @@ from support.faults import FAULTS, HARMLESS
 from support.faulty_servers import faulty, refusing_lines
 
 import reference
-from conformance.mutants import MUTANTS, kill_matrix
+from conformance.mutants import COMMON, MUTANTS, PLAIN
 from conformance.suite import checks
 from conformance.suite.checks import ensembles, refusals, timing
 from conformance.suite.checks.flows import MAX_STATES
@@ -156,7 +156,7 @@ def test_no_size_is_a_constant():
 
 def flow_of(name: str):
     """Answer flows by a mutant of the plain stepper, or by itself, or of all particles but one."""
-    stepper = MUTANTS.get(name, kill_matrix.PLAIN)
+    stepper = (MUTANTS | COMMON | dict.fromkeys(("none", "one-too-few"), PLAIN))[name]
 
     def change(request, answer):
         if request.get("cmd") != "flow":

@@ -182,15 +182,9 @@ def _decoded(line: bytes, form: Any) -> Any:
         return msgspec.json.decode(line, type=form)
     except msgspec.ValidationError:
         data = msgspec.json.decode(line)
-        if isinstance(data, dict) and any(_is_float(data.get(name)) for name in WHOLE):
-            return msgspec.convert(
-                {**data, **{name: _whole(data[name]) for name in WHOLE if name in data}}, form
-            )
-        raise
-
-
-def _is_float(value: Any) -> bool:
-    return any(map(_is_float, value)) if isinstance(value, list) else isinstance(value, float)
+        if not isinstance(data, dict):
+            raise
+        return msgspec.convert(data | {name: _whole(data[name]) for name in WHOLE if name in data}, form)
 
 
 def _whole(value: Any) -> Any:

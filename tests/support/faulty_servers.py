@@ -11,6 +11,7 @@ import json
 import math
 import time
 from collections.abc import Callable, Sequence
+from itertools import count
 from typing import Any
 
 import fast.__main__ as server
@@ -168,12 +169,12 @@ def minus_is_below(request: Line) -> None:
 
 def last_bit_varies() -> Fault:
     """Answer with a last bit that depends on how often one was asked, as sums in threads may: no fault."""
-    n_asked = [0]
+    numbers = count(1)
 
     def change(_: Line, found: Line) -> None:
-        n_asked[0] += 1
+        is_varied = next(numbers) % 3 == 0
         for part in parts(found):
-            if "vx" in part and n_asked[0] % 3 == 0:
+            if "vx" in part and is_varied:
                 part["vx"] = math.nextafter(part["vx"], math.inf)
 
     return on((STEP, PATH, FLOW), change)
@@ -272,13 +273,12 @@ def same_velocity_for_all(_: Line, found: Line) -> None:
 
 def swapping(every: int) -> Change:
     """Swap two answers of a flow now and then."""
-    n_asked = [0]
+    numbers = count(1)
 
     def change(_: Line, found: Line) -> None:
-        n_asked[0] += 1
         states = found["states"]
-        if len(states) > 1 and n_asked[0] % every == 0:
-            states[0], states[-1] = states[-1], states[0]
+        if next(numbers) % every == 0:
+            states[:1], states[-1:] = states[-1:], states[:1]
 
     return change
 

@@ -42,10 +42,16 @@ def run(name: str) -> None:
     """Answer requests until `stop`."""
     place, fault = SABOTEURS[name]
     for line in sys.stdin:
-        request = json.loads(line)
-        where = request["cmd"]
-        if where == "step" and "vy" not in request["state"]:
-            where = "reject"
+        try:
+            request = json.loads(line)
+            where = request["cmd"]
+            if where == "step":
+                where = "step" if "vy" in request["state"] else "reject"
+            elif where not in ("start", "echo", "stop"):
+                raise ValueError(where)
+        except (ValueError, TypeError, KeyError):
+            say({"seq": None, "outcome": "rejected", "reason": "no request"})
+            continue
         if where == "step":
             asked.append(request["seq"])
         (fault if where == place else say)(honest_answer(where, request))

@@ -52,14 +52,12 @@ def arrive(side: Implementation, scene: Scene, begin: float, end: float) -> bool
     low, high = {Cap: (0.0, 1.0), Stem: (-1.25, 0.0), Mushroom: (-0.5, 0.5)}[type(scene)]
     length, fold = high - low, end % 2.0
     is_back, t_end = fold > 1.0, end - begin
-    places = low + length * begin, low + length * min(fold, 2.0 - fold)
-    moving = (length, -length if is_back else length)
+    at, to = low + length * begin, low + length * min(fold, 2.0 - fold)
+    speed, to_speed = length, -length if is_back else length
     if isinstance(scene, Mushroom):
-        (x, to_x), (vx, to_vx), y = places, moving, -0.5
-        start, due = State(0.0, x, y, vx, 0.0), Horizon(t_end, to_x, y, to_vx, 0.0)
+        start, due = State(0.0, at, -0.5, speed, 0.0), Horizon(t_end, to, -0.5, to_speed, 0.0)
     else:
-        (y, to_y), (vy, to_vy), x = places, moving, 0.0
-        start, due = State(0.0, x, y, 0.0, vy), Horizon(t_end, x, to_y, 0.0, to_vy)
+        start, due = State(0.0, 0.0, at, 0.0, speed), Horizon(t_end, 0.0, to, 0.0, to_speed)
     (found,) = side.flown(scene, [start], t_end)
     arrival = read_outcome(found)
     if isinstance(arrival, Undecided):

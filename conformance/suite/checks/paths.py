@@ -17,7 +17,7 @@ from msgspec.structs import replace
 from conformance import plain
 from conformance.cases import scenes
 from conformance.cases.draw import Draw
-from conformance.suite.answers import read_arrival
+from conformance.suite.answers import read_outcome
 from conformance.suite.checks.flaws import COARSE, FINE, LATE, UNCLEAR, first_stay, flaw_of, is_fine
 from conformance.suite.checks.form import FOREVER, Implementation, Question, octaves
 from scene import (
@@ -85,7 +85,7 @@ def _arrives(
     else:
         t_end, end = getattr(last, "t", state.t), last
     (found,) = side.flown(scene, [state], t_end)
-    arrival = read_arrival(found)
+    arrival = read_outcome(found)
     if isinstance(arrival, Undecided) or not isinstance(end, Horizon):
         return False
     # A bounce makes 4 times as much of an error, as a rule; a path of many hits is regular.
@@ -338,15 +338,8 @@ def long(draw: Draw, profile: str) -> Iterator[Question]:
 def late(draw: Draw, profile: str) -> Iterator[Question]:
     """Begin many periods from t = 0, before or after."""
     for wait in octaves(draw, 1, MAX_LATE):
-        scene = scenes.scene(
-            draw, draw.pick(("cap", "stem", "mushroom")), scenes.clock(draw, ("fourier", "bang-bang"))
-        )
         t = draw.pick((1.0, -1.0)) * wait * draw.between(1.0, 4.0)
-        for _ in range(64):
-            state, t_end = scenes.state(draw, scene, {"t": t, "speed": draw.power(0, 4)})
-            if isinstance(plain.next_collision(scene, state, t_end), Collision):
-                yield scene, state, 2
-                break
+        yield *drawn(draw, ("fourier", "bang-bang"), t=t, speed=draw.power(0, 4)), 2
 
 
 def waiting(draw: Draw, profile: str) -> Iterator[Question]:

@@ -73,7 +73,8 @@ def written(state: Line) -> Line:
 
 def claim(line: Line, outcome: str, *steps: Line, reason: str = "") -> Line:
     """Return a line with one other answer."""
-    return {**line, "expect": [{"outcome": outcome, "steps": list(steps), "reason": reason}]}
+    answer = {"outcome": outcome, "steps": list(steps)} | ({"reason": reason} if reason else {})
+    return {**line, "expect": [answer]}
 
 
 def coast(line: Line, t_end: float) -> Line:

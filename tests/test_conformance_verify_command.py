@@ -91,20 +91,17 @@ def call(*arguments: str) -> tuple[int, str]:
     return done.returncode, done.stdout + done.stderr
 
 
-@pytest.mark.parametrize(("data", "code", "word"), ANSWERS)
-def test_answers_are_judged_step_by_step(data: dict[str, Any], code: int, word: str, tmp_path: Any) -> None:
-    path = tmp_path / "answers.json"
-    path.write_text(json.dumps(data), "utf-8")
-    found, printed = call("--answers", str(path))
-    assert found == code
-    assert word in printed
+ROWS = [
+    *[(["--answers"], json.dumps(data), code, word) for data, code, word in ANSWERS],
+    *[([], text, code, word) for text, code, word in FILES],
+]
 
 
-@pytest.mark.parametrize(("text", "code", "word"), FILES, ids=range(len(FILES)))
-def test_a_file_is_proved_line_by_line(text: str, code: int, word: str, tmp_path: Any) -> None:
+@pytest.mark.parametrize(("options", "text", "code", "word"), ROWS, ids=range(len(ROWS)))
+def test_a_file_is_judged(options: list[str], text: str, code: int, word: str, tmp_path: Any) -> None:
     path = tmp_path / "lines.jsonl"
     path.write_text(text, "utf-8")
-    found, printed = call(str(path))
+    found, printed = call(*options, str(path))
     assert found == code
     assert word in printed
 

@@ -24,9 +24,9 @@ MAX_STATEMENTS = {
     "reference": 1_440,
     "fast": 4_010,
     "theory": 2_290,
-    "conformance": 11_270,
+    "conformance": 11_240,
     "mushrooms": 4_120,
-    "tests": 15_270,
+    "tests": 15_010,
     "docs": 110,
     ".ci": 40,
 }

@@ -381,7 +381,8 @@ def law_jet(law: Law, clock: Clock, s: Interval) -> Jet:
     """Enclose a law and its derivatives over a stretch of time.
 
     Rationals tell which legs of a bang-bang law a stretch touches: it is enclosed on each, and the
-    parts are joined. f'' is enclosed but at knots and between two legs, where it jumps.
+    parts are joined. f'' is enclosed but at knots and between two legs, where it jumps: there a
+    stretch that is a point has the value just after it.
     """
     exact = partial(number, bits=clock.bits)
     clock.spend(len(law.waves) + len(law.legs) // 16)
@@ -621,7 +622,7 @@ class Flight:
         )
         parts = [join(start, stop)]
         while parts:
-            self.clock.spend(3)
+            self.clock.spend(6)
             part = parts.pop()
             if self.is_clear(wall, part):
                 continue

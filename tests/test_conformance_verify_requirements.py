@@ -169,6 +169,11 @@ COMPLETIONS: dict[str, Row] = {
         {"table": "cap", "r": {"kind": "fourier", "mean": 1.0, "period": 2.0, "cos": [0.25], "sin": [0.25]}},
         (0.0, 0.0, 0.5, 0.0, 0.375, None), 2.0, 1,
     ),
+    "a start where only f'' is irrational": (
+        "bend = flight.f(wall, flight.clock.zero).d2.sign", "bend = 0",
+        {**STEM, "h": {"kind": "fourier", "mean": 1.0, "period": 2.0, "cos": [-0.25]}},
+        (0.0, 0.0, -0.75, 0.0, 0.0, "floor"), 1.5, 1,
+    ),
     "a particle that rests": (
         "if self.clock.turn and not speed:", "if False:",
         {"table": "cap", "r": {**waves(2.0, *[0.03125] * 16), "cos": [0.03125] * 16}},

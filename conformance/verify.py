@@ -43,7 +43,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 PRECISIONS = (128, 256, 512, 1024, 2048, 4096)  # bits, tried in turn
-WORK = 2**18  # units of work for a line, of some 60 microseconds each: about 15 seconds in all
+WORK = 200_000  # units of work for a line, of some 60 microseconds each: about 12 seconds in all
 SHARE = Fraction(61, 128)  # where a stretch is cut: not in the middle, where a root may well lie
 NEAR = Fraction(1, 2**20)  # how far from its wall a state may lie, as a share of the wall's size
 LATE, LARGE = 2**30, Fraction(10**100)  # t in periods, or a number, from which one may refuse
@@ -341,12 +341,12 @@ class Clock:
         self.omega = self.pace * pi(bits) * 2
 
     def spend(self, units: int) -> None:
-        """Count work, for each line as a whole: more digits cost more.
+        """Count work, for each line as a whole.
 
         Raises:
             Unproved: the line's work is used up.
         """
-        self.scene.work[0] -= units * (1 + self.bits**2 // 2**18)
+        self.scene.work[0] -= units
         require(self.scene.work[0] > 0, Unproved("the search takes too long"))
 
     def waves(self, s: Interval, n: int) -> Iterator[list[Interval]]:
@@ -385,7 +385,8 @@ def law_jet(law: Law, clock: Clock, s: Interval) -> Jet:
     stretch that is a point has the value just after it.
     """
     exact = partial(number, bits=clock.bits)
-    clock.spend(len(law.waves) + len(law.legs) // 16)
+    # With more digits only cosines cost much more.
+    clock.spend(len(law.waves) * (1 + clock.bits**2 // 2**18) + len(law.legs) // 16)
     if not law.legs:
         return wave_jet(law, clock.waves(s, len(law.waves)), clock.omega, exact)
     (low, high), first, jets = s.ends, law.legs[0].begin, []
@@ -448,10 +449,9 @@ def wall_jet(scene: Scene, wall: str, law: Callable[[str], Jet], x: Jet, y: Jet)
     name = "top" if (wall, scene.table) == ("base", "stem") else wall
     place, products = {"x": x, "y": y}, []
     for sign, *names in TERMS.get(name, ((1, name),)):
-        if "w" in names and "nu" in scene.laws:
-            names[names.index("w") :] = ["nu", "r"]
-        factors = (place.get(name) or law(name) for name in names)
-        products.append([part * sign for part in reduce(times, factors)])
+        parts = ["nu", "r"] if names == ["w"] and "nu" in scene.laws else names
+        product = reduce(times, (place.get(part) or law(part) for part in parts))
+        products.append([part * sign for part in product])
     return Jet(*(reduce(lambda p, q: p + q, parts) for parts in zip(*products, strict=True)))
 
 

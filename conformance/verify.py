@@ -766,7 +766,7 @@ class Flight:
         lengths += [self.clock.turn.ends[1]] if self.clock.turn else []
         length = number(min(lengths, default=Fraction(1)) * (1 - Fraction(8, self.bits)), 32).high
         if self.clock.turn and not speed:
-            last = min(last, (start + self.clock.turn).high, key=lambda point: point.ends)
+            last = min(last, (self.begin + self.clock.turn).high, key=lambda point: point.ends)
         while lengths and is_below(stop := (start + length).high, last):
             yield start, stop
             start, length = stop, length * 4

@@ -29,7 +29,7 @@ N_STEPS = int(os.environ.get("MUSHROOMS_STEPS", "250"))
 UNIT = 2.0**51  # backward units of 2^-104 in a backward ulp
 SHARP = 4.0  # units that nearly all answers keep
 WORST = 2.0**24  # where a wall's speed is the rest of harmonics that cancel: see fast.kernel.refine
-BRIEF = 2.0**-33  # of a period: so soon a wall's increase is the rest of terms that cancel
+BRIEF = 2.0**-32  # of a period: so soon a wall's increase is the rest of terms that cancel
 START = State(0.1, 0.2, 0.3, 140.0, 30.0)
 
 

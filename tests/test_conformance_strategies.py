@@ -215,10 +215,10 @@ def failing_line(name):
 def test_a_faulty_stepper_is_reported_in_few_and_short_numbers(name):
     """At most twelve numbers that are not 0 or 1, all but three of at most six digits."""
     # In a process of its own: Hypothesis also draws constants of all modules that are loaded.
-    code = f"import test_conformance_strategies as tests; print(tests.failing_line({name!r}))"
+    code = f"from tests.test_conformance_strategies import failing_line; print(failing_line({name!r}))"
     command = [sys.executable, "-c", code]
     line = subprocess.run(
-        command, cwd=Path(__file__).parent, capture_output=True, check=True, text=True
+        command, cwd=Path(__file__).parents[1], capture_output=True, check=True, text=True
     ).stdout
     numbers = [text for text in re.findall(r"-?[0-9][0-9.e+-]*", line) if float(text) not in (0.0, 1.0)]
     lengths = sorted(len(text.strip("-").replace(".", "")) for text in numbers)

@@ -134,6 +134,8 @@ def test_a_graze_of_a_side_does_not_hide_the_floor_met_before():
             ),
             State(0.0, 3.436372446831787e-17, 0.5612022093593554, -325.5383901035782, 0.0, "arc"),
         ),
+        # Off the arc by 2^-29 of its radius: what is left of that there is rounded, and more than the hop.
+        (0.25, State(0.0, 0.0, 0.2499999995343387, 0.45, -1.788139347702611e-08, "arc")),
     ],
 )
 def test_the_shortest_hop_along_the_arc_keeps_its_digits(r, state):

@@ -13,25 +13,216 @@ wall. In a Hypothesis test:
 Mirror and power-of-two scaling hold bit for bit in any stepper whose arithmetic is binary64 and which has no
 absolute tolerance and treats both sides alike; `is_exact=False` asks for them within rounding. All others
 hold within rounding: `bound` is the backward error granted (1e-9 by default, as in the physics verdict),
-and what it does to the answer is measured on the stepper itself (`conformance.grading.called`). The work
-identity of whole ensembles is `conformance.profiles.check_work_identity`.
+and what it does to the answer is measured on the stepper itself. The work identity of whole ensembles is
+`conformance.profiles.check_work_identity`.
+
+What honest rounding may do to a step is measured by finite nudges. A stepper whose backward error is `bound`
+gives the exact answer to a question off by `bound` of each input, itself off by `bound` of each output.
+How far that moves the answer, to first order, follows from the answers to nudged questions.
 """
 
 from __future__ import annotations
 
+import json
+import math
 from collections.abc import Callable, Sequence
 from fractions import Fraction
 from functools import partial
 from math import hypot
+from typing import Any, NamedTuple, NoReturn
 
 import msgspec
+from mpmath import fp
 
-from conformance.grading.called import MeasuredStep, Question, answering, fail, measured, numbers, scales
-from scene import Collision, Horizon, Outcome, Rejected, Scene, State, Undecided, transforms
-from scene.laws import is_constant
+from conformance import plain
+from scene import (
+    Collision,
+    Horizon,
+    Outcome,
+    Rejected,
+    Scene,
+    State,
+    Undecided,
+    Undefined,
+    to_data,
+    transforms,
+)
+from scene.geometry import table_at
+from scene.laws import bounds, is_constant
 from scene.precision import decimals
+from scene.refusal import shown
 from scene.states import Stepper
-from scene.tables import laws, period
+from scene.tables import cycle_length, laws, period
+
+HELD = 2.0**100  # sizes, speeds and their inverses within it overflow nowhere
+FAR = 2.0**20  # periods from t = 0 that every stepper must reach
+Question = tuple[Scene, State, float]  # as a stepper takes it: with t_end
+CLEAR = 2.0**-20  # of the table's size: farther inside than any rounding leads
+
+Numbers = tuple[float, ...]
+NUDGE = 2.0**-26  # relative: the differences of central differences then keep half of binary64's digits
+INPUTS = ("t", "x", "y", "vx", "vy")
+
+
+def fail(name: str, text: str, *questions: Question) -> NoReturn:
+    """Say in one line what is wrong, and with which questions, each as it was sent.
+
+    Raises:
+        AssertionError: always.
+    """
+    lines = []
+    for scene, state, t_end in questions:
+        asked = {"scene": to_data(scene), "state": msgspec.structs.asdict(state), "t_end": t_end}
+        lines.append(json.dumps({"cmd": "step", "seq": 1, **asked}))
+    raise AssertionError("; ".join([f"{name}: {text}", *lines]))
+
+
+def is_clearly_inside(scene: Scene, state: State, t_end: float) -> bool:
+    """Tell whether a state is one that no stepper may refuse; of one on a wall this does not judge."""
+    sizes = [abs(extent) for law in laws(scene).values() for extent in bounds(law)]
+    sizes += [abs(number) for number in (state.x, state.y, state.vx, state.vy, state.t, t_end)]
+    is_far = max(abs(state.t), abs(t_end)) > FAR * (cycle_length(scene) or 1.0)
+    if state.wall is not None or is_far or any(size and not 1 / HELD < size < HELD for size in sizes):
+        return False
+    off = CLEAR * float(table_at(fp, scene, state.t).size)
+    places = [(0.0, 0.0), (off, 0.0), (-off, 0.0), (0.0, off), (0.0, -off)]
+    around = [msgspec.structs.replace(state, x=state.x + dx, y=state.y + dy) for dx, dy in places]
+    return not any(isinstance(plain.next_collision(scene, at, t_end), Rejected) for at in around)
+
+
+def ask(stepper: Stepper, scene: Scene, state: State, t_end: float) -> Outcome:
+    """Return a stepper's answer, which must be an outcome whose numbers are finite floats.
+
+    A stepper that forgets to return would else leave every property with nothing to say, as one that is
+    undecided does, and so would one that refuses every state. Numbers of any kind that `float` takes are
+    taken (numpy's too); whether they are right is not judged here.
+
+    Raises:
+        AssertionError: one line, with the question.
+    """
+    found: Any = stepper(scene, state, t_end)
+    if isinstance(found, Rejected) and is_clearly_inside(scene, state, t_end):
+        fail("outcome", f"{found}, must be no refusal of a state clearly inside", (scene, state, t_end))
+    if isinstance(found, Undefined | Undecided | Rejected):
+        return found
+    if not isinstance(found, Collision | Horizon):
+        fail("outcome", f"{shown(found)}, must be an outcome of `scene`", (scene, state, t_end))
+    if isinstance(found, Collision) and found.wall not in scene.walls:
+        text = f"wall = {shown(found.wall)}, must be one of {', '.join(scene.walls)}"
+        fail("outcome", text, (scene, state, t_end))
+    fields = [field for field in found.__struct_fields__ if field != "wall"]
+    numbers = {field: _number(getattr(found, field)) for field in fields}
+    for field, number in numbers.items():
+        if not math.isfinite(number):
+            text = f"{field} = {shown(getattr(found, field))}, must be a finite number"
+            fail("outcome", text, (scene, state, t_end))
+    return msgspec.structs.replace(found, **numbers)
+
+
+def _number(value: Any) -> float:
+    """Return a number as a float; nan for what is none."""
+    try:
+        return math.nan if isinstance(value, str) else float(value)
+    except (TypeError, ValueError, OverflowError):
+        return math.nan
+
+
+class MeasuredStep(NamedTuple):
+    """An answer and what rounding may move it by: dt, t, x, y, vx, vy each."""
+
+    outcome: Collision | Horizon
+    numbers: Numbers
+    errors: Numbers
+
+    def state(self) -> State:
+        """Return the state that the next step starts from."""
+        wall = self.outcome.wall if isinstance(self.outcome, Collision) else None
+        _, t, x, y, vx, vy = self.numbers
+        return State(t, x, y, vx, vy, wall)
+
+
+class Scales(NamedTuple):
+    """Size of the table [length], speed [length/time] and the time that a crossing takes."""
+
+    length: float
+    speed: float
+    time: float
+
+
+def scales(scene: Scene, state: State) -> Scales:
+    """Return what is large for this question."""
+    found = {name: bounds(law) for name, law in laws(scene).items()}
+    length = max(law.highest for name, law in found.items() if name in ("r", "w", "h"))
+    speed = hypot(state.vx, state.vy) or max(law.slope for law in found.values()) or length
+    return Scales(length, speed, length / speed)
+
+
+def numbers(outcome: Outcome, state: State) -> Numbers | None:
+    """Return dt, t, x, y, vx, vy of a collision or horizon, else None."""
+    if isinstance(outcome, Collision):
+        return (outcome.dt, outcome.t, outcome.x, outcome.y, outcome.vx, outcome.vy)
+    if isinstance(outcome, Horizon):
+        return (outcome.t - state.t, outcome.t, outcome.x, outcome.y, outcome.vx, outcome.vy)
+    return None
+
+
+def measured(
+    stepper: Stepper,
+    scene: Scene,
+    state: State,
+    t_end: float,
+    bound: float,
+    incoming: Sequence[float] = (0.0,) * 5,
+) -> MeasuredStep | None:
+    """Take a step and measure what rounding may do to it.
+
+    Args:
+        stepper: under test.
+        scene: of the question.
+        state: of the question.
+        t_end: horizon [time].
+        bound: backward error allowed.
+        incoming: errors that t, x, y, vx, vy of the state already have.
+
+    Returns:
+        The step, or None when it is no collision or horizon, or a delicate one.
+    """
+    outcome = ask(stepper, scene, state, t_end)
+    found = numbers(outcome, state)
+    if found is None or not isinstance(outcome, Collision | Horizon):
+        return None
+    scale = scales(scene, state)
+    nudges = [max(NUDGE * scale.time, 2.0**-46 * abs(state.t))]
+    nudges += [NUDGE * scale.length] * 2 + [NUDGE * scale.speed] * 2
+    size = [abs(state.t), *[hypot(state.x, state.y)] * 2, *[hypot(state.vx, state.vy)] * 2]
+    dt, t, x, y, vx, vy = found
+    errors = [bound * part for part in (abs(dt), abs(t), *[hypot(x, y)] * 2, *[hypot(vx, vy)] * 2)]
+    for field, nudge, extent, error in zip(INPUTS, nudges, size, incoming, strict=True):
+        slopes = derivative(stepper, scene, state, t_end, outcome, field, nudge)
+        if slopes is None:
+            return None
+        errors = [e + abs(d) * (error + bound * extent) for e, d in zip(errors, slopes, strict=True)]
+    return MeasuredStep(outcome, found, tuple(errors))
+
+
+def derivative(
+    stepper: Stepper, scene: Scene, state: State, t_end: float, outcome: Outcome, field: str, nudge: float
+) -> Numbers | None:
+    """Return d(dt, t, x, y, vx, vy) / d field by a central difference; None when delicate."""
+    at = [getattr(state, field) - nudge, getattr(state, field) + nudge]
+    ends = []
+    for value in at:
+        nudged = msgspec.structs.replace(state, **{field: value})
+        if nudged.t > t_end:
+            return None
+        answer = ask(stepper, scene, nudged, t_end)
+        found = numbers(answer, nudged)
+        same = getattr(answer, "wall", None) == getattr(outcome, "wall", None)
+        if found is None or type(answer) is not type(outcome) or not same:
+            return None
+        ends.append(found)
+    return tuple((b - a) / (at[1] - at[0]) for a, b in zip(*ends, strict=True))
+
 
 BOUND = 1e-9
 SLACK = 4.0  # first-order errors of two answers, each estimated by differences
@@ -56,10 +247,9 @@ def check_mirror(
     Returns:
         Whether there was something to compare.
     """
-    stepper = answering(stepper)
     given, image = (scene, state, t_end), (scene, transforms.mirrored(state), t_end)
-    expected = _changed(stepper(*given), (1, 1, -1, 1, -1, 1), transforms.mirrored_wall)
-    return _compare("mirror in x", stepper, given, image, stepper(*image), expected, is_exact, bound)
+    expected = _changed(ask(stepper, *given), (1, 1, -1, 1, -1, 1), transforms.mirrored_wall)
+    return _compare("mirror in x", stepper, given, image, ask(stepper, *image), expected, is_exact, bound)
 
 
 def check_scaling(
@@ -77,15 +267,14 @@ def check_scaling(
 
     Bit for bit where all numbers, before and after, are 0 or between 2^-400 and 2^400. See `check_mirror`.
     """
-    stepper = answering(stepper)
     unit, size, speed = (transforms.times_power(1.0, exponent) for exponent in (time, length, length - time))
-    answer = stepper(scene, state, t_end)
+    answer = ask(stepper, scene, state, t_end)
     inputs = [t_end, state.t, state.x, state.y, state.vx, state.vy, *(numbers(answer, state) or ())]
     if any(part and not LEAST < abs(part) * f < MOST for part in inputs for f in (1.0, unit, size, speed)):
         return False
     scaled = transforms.scaled(scene, length, time), transforms.scaled_state(state, length, time)
     image = (*scaled, unit * t_end)
-    unscaled = _changed(stepper(*image), (1 / unit, 1 / unit, 1 / size, 1 / size, 1 / speed, 1 / speed))
+    unscaled = _changed(ask(stepper, *image), (1 / unit, 1 / unit, 1 / size, 1 / size, 1 / speed, 1 / speed))
     return _compare("scaling", stepper, (scene, state, t_end), image, unscaled, answer, is_exact, bound)
 
 
@@ -96,11 +285,10 @@ def check_static_limit(
 
     Bit for bit where a law's value is its mean plus a sum of zeros. See `check_mirror`.
     """
-    stepper = answering(stepper)
     still = transforms.frozen(scene, state.t)
     given, idle = (still, state, t_end), (transforms.idle(still), state, t_end)
-    answer = stepper(*given)
-    return _compare("static limit", stepper, given, idle, stepper(*idle), answer, is_exact, bound)
+    answer = ask(stepper, *given)
+    return _compare("static limit", stepper, given, idle, ask(stepper, *idle), answer, is_exact, bound)
 
 
 def check_period_shift(
@@ -117,8 +305,7 @@ def check_period_shift(
     The shifted times are rounded: by how much is known, and enters as an error of t. `is_exact` asks for
     equal bits where nothing is rounded at all. See `check_mirror`.
     """
-    stepper = answering(stepper)
-    shared, answer = period(scene), stepper(scene, state, t_end)
+    shared, answer = period(scene), ask(stepper, scene, state, t_end)
     if shared is None or not isinstance(answer, Collision | Horizon):
         return False
     ctx = decimals(50)
@@ -127,7 +314,7 @@ def check_period_shift(
     late = State(later, state.x, state.y, state.vx, state.vy, state.wall)
     # A collision must not be lost to the rounding of t_end.
     end = later + (2 * span if isinstance(answer, Collision) else span)
-    found = stepper(scene, late, end)
+    found = ask(stepper, scene, late, end)
     rounding = float(abs(ctx.mpf(later) - state.t - shift))
     if isinstance(answer, Horizon):
         rounding += float(abs(ctx.mpf(end) - t_end - shift))
@@ -143,7 +330,6 @@ def check_split_flight(
     stepper: Stepper, scene: Scene, state: State, t_end: float, *, bound: float = BOUND
 ) -> bool:
     """Hold a flight, or a flow, that is stopped halfway and taken up again, to end alike."""
-    stepper = answering(stepper)
     given = scene, state, t_end
     whole = measured(stepper, *given, bound)
     if whole is None:
@@ -175,7 +361,6 @@ def check_reversal(
     then back to half of the first. The errors granted are carried along through every step. See
     `check_mirror`.
     """
-    stepper = answering(stepper)
     given = scene, state, t_end
     there = measured(stepper, *given, bound)
     if there is None:
@@ -185,7 +370,7 @@ def check_reversal(
     begin, asked = state, [given]
     if isinstance(there.outcome, Collision):
         led = scene, there.state(), max(t_end, there.outcome.t)
-        if isinstance(refusal := stepper(*led), Rejected):
+        if isinstance(refusal := ask(stepper, *led), Rejected):
             fail("time reversal", f"{there.outcome} leads nowhere: {refusal.reason}", given, led)
         way = _across_bounce(stepper, scene, state, t_end)
         if way is None:
@@ -219,7 +404,6 @@ def check_angular_momentum(
 
     Where the base is met it changes sign, at rest as it is. Other walls are not compared.
     """
-    stepper = answering(stepper)
     step = measured(stepper, scene, state, t_end, bound)
     if step is None or not isinstance(step.outcome, Collision) or step.outcome.wall not in ("arc", "base"):
         return False
@@ -238,8 +422,7 @@ def check_angular_momentum(
 
 def check_energy(stepper: Stepper, scene: Scene, state: State, t_end: float, *, bound: float = BOUND) -> bool:
     """Hold the speed to stay in a static table, whatever is met."""
-    stepper = answering(stepper)
-    answer = stepper(scene, state, t_end)
+    answer = ask(stepper, scene, state, t_end)
     found = numbers(answer, state)
     if found is None or not all(is_constant(law) for law in laws(scene).values()):
         return False
@@ -257,7 +440,6 @@ def check_symplectic(
     Its matrix M is taken by central differences of two widths, extrapolated; their difference bounds what
     is left. M^T J M = J must hold within that, and within `bound` over the width.
     """
-    stepper = answering(stepper)
     way = _across_bounce(stepper, scene, state, t_end)
     if way is None:
         return False
@@ -302,10 +484,10 @@ def _across_bounce(
     stepper: Stepper, scene: Scene, state: State, t_end: float
 ) -> tuple[State, Collision, float] | None:
     """Return the state halfway to the collision, the collision, and the time halfway to the next event."""
-    hit = stepper(scene, state, t_end)
+    hit = ask(stepper, scene, state, t_end)
     if not isinstance(hit, Collision) or not hit.t < t_end:
         return None
-    following = stepper(scene, hit.state(), t_end)
+    following = ask(stepper, scene, hit.state(), t_end)
     if not isinstance(following, Collision | Horizon):
         return None
     end, half = (hit.t + following.t) / 2, hit.dt / 2
@@ -323,10 +505,10 @@ def _flow_matrix(
         ends = []
         for sign in (-1, 1):
             moved = getattr(begin, field) + sign * width * unit
-            first = stepper(scene, msgspec.structs.replace(begin, **{field: moved}), end)
+            first = ask(stepper, scene, msgspec.structs.replace(begin, **{field: moved}), end)
             if not isinstance(first, Collision) or first.wall != hit.wall:
                 return None
-            last = stepper(scene, first.state(), end)
+            last = ask(stepper, scene, first.state(), end)
             if not isinstance(last, Horizon):
                 return None
             ends.append((last.x, last.y, last.vx, last.vy))

@@ -13,8 +13,8 @@ import reference
 from conformance.mutants import COMMON, MUTANTS, PLAIN
 from conformance.suite import checks
 from conformance.suite.checks import ensembles, refusals, timing
-from conformance.suite.checks.flows import MAX_STATES
 from conformance.suite.checks.form import Draw, octaves, run_check
+from conformance.suite.checks.paths import MAX_STATES
 from conformance.suite.session import Session
 from scene import BadInput, Cap, Horizon, Mushroom, Rejected, State, Stem, from_data
 from scene.protocol.wire import Captured

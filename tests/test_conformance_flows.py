@@ -9,11 +9,9 @@ import msgspec
 import pytest
 
 import reference
-from conformance.cases.certify import certify, judge
+from conformance.cases.certify import Links, OpenSign, arrival, ask, certify, flight_of, judge, marks, stays
 from conformance.cases.draw import Unfit
 from conformance.cases.flow_families import any_marks
-from conformance.cases.paths import Links, OpenSign, arrival, marks, stays
-from conformance.cases.prover import ask, flight_of
 from conformance.cases.question import Question
 from conformance.grading.error import inputs_of, moved
 from conformance.vectors import four_digits, load

@@ -16,7 +16,7 @@ from support.truth import centre, proved_step
 
 import fast
 import reference.path
-from conformance.cases.prover import ask, ends, flight_of
+from conformance.cases.certify import ask, ends, flight_of
 from conformance.grading.agreement import compare, exact
 from conformance.grading.error import condition_number, inputs_of, moved
 from conformance.strategies import scenes_and_states

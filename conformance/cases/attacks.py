@@ -16,9 +16,7 @@ from typing import NamedTuple
 
 import msgspec
 
-from conformance.cases.certify import judge
-from conformance.cases.paths import claimed_path
-from conformance.cases.prover import proved_step
+from conformance.cases.certify import claimed_path, judge, proved_step
 from conformance.cases.question import Family, Proved, Question, filed
 from conformance.grading.agreement import compare
 from conformance.vectors import Expectation

@@ -1,20 +1,430 @@
-"""From a question to a certified vector: the reference answers, and the verifier proves what is written."""
+"""From a question to a certified vector: the reference answers, and the verifier proves what is written.
+
+The reference proves every step by itself. Along a path the Jacobians of the steps are chained: what rounding
+every state that a stepper holds may do.
+
+An arc hit of a mushroom is captured when |x vy - y vx| > w(t) |v|, with the time and place of the hit and
+the velocity before the bounce (docs/protocol.md). Which hits begin and end a stay follows from two things
+alone: the order of the walls met, and for each arc hit whether it is captured. The reference's path proves
+the first; the signs of (x vy - y vx)^2 - w^2 v^2, certain over the enclosures of each hit, are the second:
+neither side of the inequality is negative, so squares compare as they do. A hit whose sign is open makes
+the question unfit. So all states within the enclosures have their stays between the same hits, and when
+these happen is enclosed with the path.
+"""
 
 from __future__ import annotations
 
 import json
-from math import inf
+from collections.abc import Sequence
+from fractions import Fraction
+from math import inf, isfinite
+from typing import NamedTuple
 
 import msgspec
+import numpy as np
+import numpy.typing as npt
 
 import reference
 from conformance.cases.draw import Unfit
-from conformance.cases.paths import OpenSign, condition, finite, marks, proved_path
-from conformance.cases.prover import CONDITIONS, NUDGES, SIGNS, ask, expectation, flight_of, nudged
-from conformance.cases.question import Proved, Question, filed
-from conformance.vectors import Expectation, Level, Vector, four_digits
+from conformance.cases.question import Mark, Proved, Question, filed
+from conformance.grading.error import Matrix, condition_number, free_flight, inputs_of, moved
+from conformance.vectors import (
+    DIGITS,
+    NUMBERS,
+    Certified,
+    Ends,
+    Expectation,
+    Level,
+    Vector,
+    certified,
+    four_digits,
+)
 from conformance.verify import Verdict, verify_line
-from scene import BadInput, InvalidState, Rejected, Scene, State, Undecided, Undefined, from_data
+from reference.arithmetic import Arithmetic, Interval, rational, sign
+from reference.walls import EnclosedFlight, MovingWalls
+from scene import (
+    BadInput,
+    InvalidState,
+    Mushroom,
+    Rejected,
+    Scene,
+    State,
+    Undecided,
+    Undefined,
+    Wall,
+    from_data,
+)
+
+# What a level asks (docs/corpus.md): nudges that change no wall, and the largest condition number.
+NUDGES: tuple[tuple[Level, float], ...] = (("core", 2.0**-30), ("extended", 2.0**-44))
+CONDITIONS = {"core": 1e6, "extended": 1e12}
+# Pairs, so that one of each pair lies on either side of a tie; a trajectory takes the first pair.
+SIGNS = ((1, 1, -1, 1, -1), (-1, -1, 1, -1, 1), (1, 1, 1, 1, 1), (-1, -1, -1, -1, -1))
+GUARD = 6  # decimals asked of the reference beyond those that are written down
+
+
+class ProvedFlight(NamedTuple):
+    """A flight up to a collision or the horizon, as the reference proved it.
+
+    Attributes:
+        wall: the wall met; None at the horizon.
+        ends: low and high of dt, x, y, vx, vy.
+        jacobian: (5, 5) derivatives of these, in this order, by t, x, y, vx, vy.
+    """
+
+    wall: Wall | None
+    ends: dict[str, Ends]
+    jacobian: Matrix
+
+    def centre(self) -> list[float]:
+        """Return dt, x, y, vx, vy, rounded."""
+        return [float(sum(self.ends[name]) / 2) for name in NUMBERS]
+
+    def allowance(self, state: State) -> list[float]:
+        """Return for dt, x, y, vx, vy the sum over inputs of |d out / d in| |in|."""
+        return [moved(row, inputs_of(state)) for row in self.jacobian]
+
+    def certified(self, state: State, digits: int = DIGITS) -> Certified:
+        """Write it down to so many decimals."""
+        return certified(self.ends, self.allowance(state), self.wall, digits=digits)
+
+
+def ask(scene: Scene, state: State, t_end: float, digits: int = DIGITS) -> reference.Outcome:
+    """Return the reference's outcome, close enough for so many decimals, with its Jacobian."""
+    return reference.next_collision(scene, state, t_end, digits=digits + GUARD, is_differentiated=True)
+
+
+def flight_of(outcome: reference.Collision | reference.Horizon, state: State, t_end: float) -> ProvedFlight:
+    """Return the flight that led to an outcome of `ask`."""
+    if isinstance(outcome, reference.Horizon):
+        dt = Fraction(t_end) - Fraction(state.t)
+        return ProvedFlight(None, _numbers((dt, dt), outcome.at), free_flight(state, float(dt)))
+    assert outcome.jacobian is not None
+    largest = max(abs(float(end)) for row in outcome.jacobian for d in row for end in d)
+    jacobian = [[_steepest(d, largest) for d in row] for row in outcome.jacobian]
+    return ProvedFlight(outcome.wall, collided(outcome), jacobian)
+
+
+def _steepest(derivative: reference.Enclosure, largest: float) -> float:
+    """Return a derivative rounded; at a knot, where it is enclosed between two, the greater in size."""
+    low, high = float(derivative.lo), float(derivative.hi)
+    if high - low <= 2.0**-40 * largest:
+        return float(derivative)
+    return max(low, high, key=abs)
+
+
+def expectation(
+    outcome: reference.Outcome, state: State, t_end: float, digits: int = DIGITS
+) -> Expectation | None:
+    """Return an outcome of `ask` as a certified answer; None where it is undecided."""
+    if isinstance(outcome, Undecided):
+        return None
+    if isinstance(outcome, Undefined):
+        return Expectation("undefined", reason=outcome.reason)
+    if isinstance(outcome, Rejected):
+        return Expectation("rejected")
+    flight = flight_of(outcome, state, t_end)
+    return Expectation("collision" if flight.wall else "horizon", (flight.certified(state, digits),))
+
+
+def proved_step(scene: Scene, state: State, t_end: float, digits: int = DIGITS) -> Expectation | None:
+    """Answer a step by proof.
+
+    Args:
+        scene: table and laws.
+        state: the start.
+        t_end: horizon [time].
+        digits: decimals of the certified answer.
+
+    Returns:
+        The certified answer; None where the reference is undecided.
+    """
+    return expectation(ask(scene, state, t_end, digits), state, t_end, digits)
+
+
+def nudged(state: State, t_end: float, signs: Sequence[int], nudge: float) -> State:
+    """Return a state whose numbers are moved by a part of their sizes, each in a direction of its own.
+
+    Args:
+        state: the start.
+        t_end: horizon [time]; no later time is given.
+        signs: of the moves of t, x, y, vx, vy.
+        nudge: relative; to the greater component for place and velocity.
+    """
+    place, speed = max(abs(state.x), abs(state.y)), max(abs(state.vx), abs(state.vy))
+    sizes = (abs(state.t), place, place, speed, speed)
+    values = [v + nudge * sign * size for v, sign, size in zip(inputs_of(state), signs, sizes, strict=True)]
+    t, x, y, vx, vy = values
+    return State(min(t, t_end), x, y, vx, vy, state.wall)
+
+
+def ends(enclosure: reference.Enclosure) -> Ends:
+    """Return both ends of one of the reference's enclosures, exactly."""
+    return rational(enclosure.lo._mpf_), rational(enclosure.hi._mpf_)
+
+
+def collided(outcome: reference.Collision) -> dict[str, Ends]:
+    """Return the ends of dt, x, y, vx, vy of a collision."""
+    return _numbers(ends(outcome.dt), outcome.after)
+
+
+def coasted(outcome: reference.Horizon, since: Ends) -> dict[str, Ends]:
+    """Return the ends of dt, x, y, vx, vy at the horizon, dt counted from an enclosed time."""
+    low, high = ends(outcome.at.t)
+    return _numbers((low - since[1], high - since[0]), outcome.at)
+
+
+def _numbers(dt: Ends, after: reference.Moment) -> dict[str, Ends]:
+    return {"dt": dt, **{name: ends(getattr(after, name)) for name in NUMBERS[1:]}}
+
+
+WIDEST = Fraction(1, 2**72)  # of an enclosure of a path: a millionth of a backward ulp and less
+
+
+class OpenSign(Exception):  # noqa: N818 (a finding about the question)
+    """Whether an arc hit is captured is not certain over its enclosures."""
+
+
+class Links:
+    """The steps of a trajectory: their Jacobians chained from each state that a stepper has held.
+
+    Each Jacobian is that of the step from the rounded state, with the residual of the wall moving along.
+    `held` is (n, 5, 5): d(t, x, y, vx, vy) after the last step by t, x, y, vx, vy of each state held, and
+    `inputs` is (n, 5). Sums go over whole arrays: four digits of the allowances are kept, which no order of
+    summation changes. A flow tells no flight times: how delicate these are does not count where `is_timed`
+    is false.
+    """
+
+    def __init__(self, scene: Scene, state: State, t_end: float, *, is_timed: bool = True) -> None:
+        self.scene, self.state, self.t_end, self.is_timed = scene, state, t_end, is_timed
+        self.held: npt.NDArray[np.float64] = np.empty((0, 5, 5))
+        self.inputs: npt.NDArray[np.float64] = np.empty((0, 5))
+        self.condition = self.largest = 0.0
+
+    def add(self, found: reference.Collision) -> list[float]:
+        """Add a step, and return what all rounding may do to it: it begins at the rounded state."""
+        proved = ask(self.scene, self.state, self.t_end)
+        if not isinstance(proved, reference.Collision) or proved.wall != found.wall:
+            raise Unfit("a rounded state takes another path")
+        centre = [float(found.dt), *(float(c) for c in found.after[1:])]
+        allowance = self._chain(flight_of(proved, self.state, self.t_end).jacobian, centre)
+        self.state = found.rounded().state()
+        return allowance
+
+    def coast(self, horizon: reference.Horizon, since: reference.Enclosure | None) -> Certified:
+        """Return the horizon after the last collision, at time `since`; None for none."""
+        start = Fraction(self.state.t)
+        numbers = coasted(horizon, (start, start) if since is None else ends(since))
+        centre = [float(sum(numbers[name]) / 2) for name in NUMBERS]
+        allowance = self._chain(free_flight(self.state, centre[0]), centre)
+        return certified(numbers, finite(allowance), None, is_wide=True)
+
+    def _chain(self, jacobian: Matrix, centre: list[float]) -> list[float]:
+        self.held = np.concatenate([self.held, np.eye(5)[None]])
+        self.inputs = np.concatenate([self.inputs, [inputs_of(self.state)]])
+        with np.errstate(over="ignore", invalid="ignore"):  # what overflows is refused by `finite`
+            rows = (np.array(jacobian)[:, :, None] * self.held[:, None]).sum(axis=2)
+            moved = np.abs(rows * self.inputs[:, None]).sum(axis=(0, 2))
+            rows[:, 0] += self.held[:, 0]
+        self.held = rows
+        allowance = [float(part) for part in moved]
+        self.condition = condition(centre if self.is_timed else [inf, *centre[1:]], allowance)
+        return allowance
+
+
+def condition(centre: Sequence[float], allowance: Sequence[float]) -> float:
+    """Return the condition number of dt, x, y, vx, vy by what their inputs move them, summed already."""
+    return condition_number(centre, [[part] for part in allowance], [1.0])
+
+
+def finite(allowance: Sequence[float]) -> Sequence[float]:
+    """Return allowances as they are.
+
+    Raises:
+        Unfit: one is infinite or none.
+    """
+    if not all(map(isfinite, allowance)):
+        raise Unfit("an allowance overflows")
+    return allowance
+
+
+def proved_path(scene: Scene, question: Question, working: int | None = None) -> Proved:
+    """Follow a particle as far as the chained condition number allows, or to the horizon.
+
+    Args:
+        scene: table and laws, of the question.
+        question: of a trajectory or a flow.
+        working: number of decimals to work with, by default what the reference takes. It answers for the
+            digits of the last collision asked for; a path that ends at a horizon may need more.
+
+    Raises:
+        Unfit: there is no answer to certify.
+    """
+    assert question.collisions is not None
+    state, t_end = question.state, question.t_end
+    try:
+        path = reference.trajectory(scene, state, question.collisions, t_end, working=working)
+        captured = marks(scene, path.steps) if question.flow else []
+    except (InvalidState, OpenSign) as error:
+        raise Unfit(str(error)) from None
+    end = path.outcome
+    if question.flow and not (isinstance(end, reference.Horizon) and question.flow(captured)):
+        raise Unfit("not the flow that is looked for")
+    links = Links(scene, state, t_end, is_timed=question.flow is None)
+    steps = _steps(links, path, question)
+    if len(steps) < len(path.steps):
+        end = None
+    if isinstance(end, reference.Horizon):
+        steps.append(links.coast(end, path.steps[-1].after.t if path.steps else None))
+        links.largest = max(links.largest, links.condition)
+    elif end is not None and not isinstance(end, Undefined):
+        raise Unfit("the reference is undecided")
+    if any(map(_is_wide, steps)):
+        return proved_path(scene, question, 2 * path.digits)
+    if question.flow:
+        arrived = arrival(steps, stays(captured))
+        largest = max(links.condition, timing_condition(arrived, state))
+        if largest > question.longest:
+            raise Unfit("the horizon is too delicate")
+        return Proved((arrived,), largest, len(steps))
+    expect = [Expectation("horizon" if end else "collision", tuple(steps))]
+    if isinstance(end, Undefined):
+        expect = [Expectation("undefined", tuple(steps), end.reason), Expectation("undecided", tuple(steps))]
+    return Proved(tuple(expect), links.largest, len(steps) + isinstance(end, Undefined))
+
+
+def _steps(links: Links, path: reference.Trajectory, question: Question) -> list[Certified]:
+    """Write down the collisions of a path as far as the condition number allows; of a flow all."""
+    steps: list[Certified] = []
+    for found in path.steps:
+        allowance = links.add(found)
+        if links.condition > question.longest:
+            break
+        links.largest = max(links.largest, links.condition)
+        steps.append(certified(collided(found), finite(allowance), found.wall, is_wide=True))
+    if len(steps) < (len(path.steps) if question.flow else 1):
+        raise Unfit("no collision is met, or the first is too delicate")
+    return steps
+
+
+def claimed_path(
+    scene: Scene, state: State, n_collisions: int, t_end: float, working: int | None = None
+) -> Expectation:
+    """Return the reference's path however it ends, undecided included; allowances are left out.
+
+    Args:
+        scene: table and laws.
+        state: the start.
+        n_collisions: how many to follow.
+        t_end: horizon [time].
+        working: decimals to work with, by default what the reference takes.
+    """
+    try:
+        path = reference.trajectory(scene, state, n_collisions, t_end, working=working)
+    except InvalidState:
+        return Expectation("rejected")
+    unknown, end = [0.0] * len(NUMBERS), path.outcome
+    steps = [certified(collided(found), unknown, found.wall, is_wide=True) for found in path.steps]
+    if isinstance(end, Undefined):
+        return Expectation("undefined", tuple(steps), end.reason)
+    if isinstance(end, Undecided):
+        return Expectation("undecided", tuple(steps), end.reason)
+    if isinstance(end, reference.Horizon):
+        since = ends(path.steps[-1].after.t) if steps else (Fraction(state.t), Fraction(state.t))
+        steps.append(certified(coasted(end, since), unknown, None, is_wide=True))
+    return Expectation("horizon" if end else "collision", tuple(steps))
+
+
+def _is_wide(step: Certified) -> bool:
+    """Tell whether an enclosure is wider than a small part of what rounding may do."""
+    for name, allowance in zip(NUMBERS, step.allowance, strict=True):
+        low, high = step.ends(name)
+        if high - low > WIDEST * (Fraction(allowance) + max(abs(low), abs(high))):
+            return True
+    return False
+
+
+def marks(scene: Scene, steps: Sequence[reference.Collision]) -> list[Mark]:
+    """Return what each collision of a proved path means for captured stays.
+
+    Raises:
+        OpenSign: an arc hit is neither proved captured nor proved not to be.
+    """
+    found: list[Mark] = []
+    for step in steps:
+        if step.wall in ("left", "right", "floor"):
+            found.append("out")
+        elif step.wall == "arc" and isinstance(scene, Mushroom):
+            found.append("captured" if _is_captured(scene, step) else "free")
+        else:
+            found.append("")
+    return found
+
+
+def stays(found: Sequence[Mark]) -> tuple[tuple[int, int], ...]:
+    """Return begin and end of each stay as places in a path whose horizon comes after its last mark.
+
+    A stay begins with its first captured hit. It ends with the first arc hit after its last captured one, or
+    where the particle meets a wall of the stem if that comes first, or at the horizon.
+    """
+    spans: list[tuple[int, int]] = []
+    begin: int | None = None
+    end: int | None = None
+    for place, mark in enumerate([*found, "out"]):
+        if mark == "captured":
+            begin, end = place if begin is None else begin, None
+        elif mark == "free" and end is None:
+            end = place
+        elif mark == "out":
+            if begin is not None:
+                spans.append((begin, place if end is None else end))
+            begin = end = None
+    return tuple(spans)
+
+
+def arrival(steps: Sequence[Certified], spans: Sequence[tuple[int, int]]) -> Expectation:
+    """Return a flow's answer: of its path the hits that begin or end a stay, and the horizon.
+
+    That is all that is asked. Each keeps its enclosures; dt is counted from the one kept before, and what
+    may move it is the sum over the flights between.
+    """
+    kept = sorted({place for span in spans for place in span} | {len(steps) - 1})
+    thinned = []
+    for before, place in zip([-1, *kept], kept, strict=False):
+        flown, last = steps[before + 1 : place + 1], steps[place]
+        low, high = (sum(sides) for sides in zip(*(step.ends("dt") for step in flown), strict=True))
+        numbers = {name: last.ends(name) for name in NUMBERS} | {"dt": (low, high)}
+        allowance = [sum(step.allowance[0] for step in flown), *last.allowance[1:]]
+        thinned.append(certified(numbers, allowance, last.wall))
+    places = tuple((kept.index(begin), kept.index(end)) for begin, end in spans)
+    return Expectation("horizon", tuple(thinned), stays=places)
+
+
+def timing_condition(expected: Expectation, state: State) -> float:
+    """Return the condition number of the times at which a flow's stays begin and end, the largest."""
+    t, allowance, worst = state.t, abs(state.t), 0.0
+    for step in expected.steps[:-1]:
+        t, allowance = t + float(step.centre("dt")), allowance + step.allowance[0]
+        worst = max(worst, allowance / abs(t) if t else inf)
+    return worst
+
+
+def _is_captured(scene: Mushroom, step: reference.Collision) -> bool:
+    """Tell whether |x vy - y vx| > w |v|; the left side is the same all along the flight."""
+    arithmetic, departure = Arithmetic(step.digits), step.departure
+
+    def interval(enclosure: reference.Enclosure) -> Interval:
+        return arithmetic.hull(*(arithmetic.point(end._mpf_) for end in enclosure))
+
+    x, y, vx, vy = (interval(getattr(departure, name)) for name in ("x", "y", "vx", "vy"))
+    flight = EnclosedFlight(departure.instant, x, y, vx, vy, interval(departure.begin))
+    width = MovingWalls(arithmetic, scene, flight).width(interval(step.root)).f
+    spin = arithmetic.square(x * vy - y * vx)
+    found = sign(spin - arithmetic.square(width) * (arithmetic.square(vx) + arithmetic.square(vy)))
+    if not found:
+        raise OpenSign
+    return found > 0
+
 
 INFINITE = 1e300
 

@@ -24,10 +24,9 @@ from typing import Any
 import msgspec
 
 from conformance import plain
-from conformance.cases.certify import certify
+from conformance.cases.certify import CONDITIONS, NUDGES, SIGNS, certify, nudged
 from conformance.cases.draw import Draw, Unfit
 from conformance.cases.flow_families import any_marks
-from conformance.cases.prover import CONDITIONS, NUDGES, SIGNS, nudged
 from conformance.cases.question import ATTEMPTS, Family, Question
 from conformance.cases.run_families import LIKE_BEFORE, is_leaning
 from conformance.cases.scenes import LATE, Clock, law, wire_form

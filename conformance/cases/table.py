@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from conformance.cases import (
-    bound_families,
     coverage_families,
     delicate_families,
     families,
@@ -19,7 +18,6 @@ FAMILIES: dict[str, Family] = {
         flow_families,
         coverage_families,
         run_families,
-        bound_families,
         delicate_families,
     )
     for family in module.FAMILIES

@@ -12,7 +12,7 @@ from functools import partial
 
 from conformance import properties
 from conformance.cases.draw import Draw
-from conformance.suite.checks import endings, flows, paths, refusals, requests, timing
+from conformance.suite.checks import paths, refusals, requests, timing
 from conformance.suite.checks.ensembles import ensemble_checks
 from conformance.suite.checks.form import QUESTIONS, Implementation, Question, SuiteCheck, run_check
 from conformance.suite.session import AnswerLine, Session
@@ -65,9 +65,9 @@ RULES = (
     SuiteCheck("promise/long-paths", paths.long, paths.follow),
     SuiteCheck("promise/late-starts", paths.late, paths.follow),
     SuiteCheck("promise/waiting", paths.waiting, paths.follow),
-    SuiteCheck("promise/long-flow", flows.returning, flows.arrive, ("flow",)),
-    SuiteCheck("promise/many-particles", flows.crowds, flows.together, ("flow",)),
-    SuiteCheck("promise/endings", endings.endings, endings.end_as_due),
+    SuiteCheck("promise/long-flow", paths.returning, paths.arrive, ("flow",)),
+    SuiteCheck("promise/many-particles", paths.crowds, paths.together, ("flow",)),
+    SuiteCheck("promise/endings", paths.endings, paths.end_as_due),
     SuiteCheck("promise/spelling", requests.spellings, requests.same),
     SuiteCheck("promise/minus-zero", requests.zeros, requests.same),
     SuiteCheck("promise/malformed-lines", requests.bad_lines, requests.passed_over),

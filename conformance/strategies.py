@@ -5,8 +5,6 @@ All is drawn as the questions of the corpus, of a run of the suite and of `mushr
 When a test fails, the failing step is printed as the wire's line.
 """
 
-from __future__ import annotations
-
 import json
 from functools import cache
 
@@ -88,16 +86,9 @@ def scenes(draw: st.DrawFn, table: str | None = None) -> Scene:
     except (BadInput, Unfit):
         assume(False)
     if stream.pick(range(3)) == 2:
-        scene = rescale(scene, stream.pick(POWERS), stream.pick(POWERS))
+        grown = scaled(scene, stream.pick(POWERS), stream.pick(POWERS))
+        scene = msgspec.structs.replace(grown, name=scene.name, notes=scene.notes)
     return scene
-
-
-def rescale(scene: Scene, length: int, time: int) -> Scene:
-    """Return the scene with lengths times 2^length and times times 2^time, exactly.
-
-    Ratios (`nu`, `slope`), name and notes stay. Exact as long as no number becomes subnormal or overflows.
-    """
-    return msgspec.structs.replace(scaled(scene, length, time), name=scene.name, notes=scene.notes)
 
 
 @st.composite

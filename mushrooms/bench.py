@@ -92,7 +92,7 @@ def _measured(size: Size, seed: int, command: list[str]) -> Record:
     """Run everything."""
     import fast
     from conformance.bench import growth, record, solvers, workloads
-    from conformance.cases.certify import proved_step
+    from conformance.cases.prover import proved_step
     from mushrooms import bench_solvers as ours
 
     begin = time.monotonic()

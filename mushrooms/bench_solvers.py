@@ -11,7 +11,7 @@ from conformance import plain
 from conformance.bench.growth import FAR, PathFollower, PathPoint
 from conformance.bench.solvers import Given, Solver, SolverRun, by_call
 from conformance.bench.workloads import WINDOW, Workload
-from conformance.cases import certify
+from conformance.cases import prover
 from conformance.grading.agreement import Answer, Enclosed, exact
 from conformance.grading.error import Matrix
 from fast.batch import careful_steps, fine_steps, flights, lane_steps
@@ -27,9 +27,9 @@ LANES_SERVE = (
 
 def linearise(scene: Scene, state: State, t_end: float) -> tuple[Collision, Matrix]:
     """Return a proved collision, and its Jacobian."""
-    outcome = certify.ask(scene, state, t_end)
+    outcome = prover.ask(scene, state, t_end)
     assert isinstance(outcome, reference.Collision)
-    return outcome.rounded(), certify.flight_of(outcome, state, t_end).jacobian
+    return outcome.rounded(), prover.flight_of(outcome, state, t_end).jacobian
 
 
 def prove_path(scene: Scene, state: State, n_collisions: int) -> list[PathPoint]:
@@ -63,7 +63,7 @@ def _proof(digits: int) -> Solver:
     def step(scene: Scene, state: State, t_end: float) -> Answer:
         found = reference.next_collision(scene, state, t_end, digits=digits)
         if isinstance(found, reference.Collision):
-            return Enclosed(found.wall, list(certify.collided(found).values()))
+            return Enclosed(found.wall, list(prover.collided(found).values()))
         return found.rounded() if isinstance(found, reference.Horizon) else found
 
     return by_call(f"proof, {digits} digits", "proof", step)

@@ -1,7 +1,5 @@
 """The benchmark's baselines: right where most would be, caught where not, timed on what they follow."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What is known to fail: the names of the list, what they say of the run of a seed, strictness."""
 
-from __future__ import annotations
-
 import pytest
 from msgspec.structs import replace
 from support.saboteurs import command

@@ -1,7 +1,5 @@
 """The properties hold for the three steppers, and each refuses a stepper that breaks it."""
 
-from __future__ import annotations
-
 import json
 import math
 import re
@@ -18,15 +16,10 @@ from support.depth import deep_but
 import fast
 import reference
 from conformance import plain
+from conformance.grading.called import is_clearly_inside
 from conformance.mutants import COMMON, MUTANTS
 from conformance.profiles import check_work_identity
-from conformance.properties import (
-    PROPERTIES,
-    check_mirror,
-    check_period_shift,
-    check_scaling,
-    is_clearly_inside,
-)
+from conformance.properties import PROPERTIES, check_mirror, check_period_shift, check_scaling
 from conformance.strategies import scenes_and_states
 from scene import (
     Cap,

@@ -1,7 +1,5 @@
 """The scoreboard: baselines speak the protocol, and the page says who passes and why not."""
 
-from __future__ import annotations
-
 import shutil
 import sys
 

@@ -1,7 +1,5 @@
 """The suite's accounting: verdicts, exit codes, known failures, reports; its further parts can fail."""
 
-from __future__ import annotations
-
 import json
 import sys
 from types import SimpleNamespace

@@ -1,7 +1,5 @@
 """The corpus: what it holds, that it is certified, and that no spoilt line and no false claim gets in."""
 
-from __future__ import annotations
-
 import dataclasses
 import hashlib
 import json
@@ -20,13 +18,13 @@ from support.tables import LIFT
 import reference
 from conformance.cases import __main__ as command
 from conformance.cases import corpus as made
+from conformance.cases.bound_families import FAMILIES as BOUNDS
 from conformance.cases.certify import Refuted, certify, judge
 from conformance.cases.coverage_families import FAMILIES as COVERAGE
 from conformance.cases.draw import Unfit
 from conformance.cases.families import CATALOGUE
 from conformance.cases.flow_families import FAMILIES as FLOWS
 from conformance.cases.question import Question
-from conformance.cases.run_families import FAMILIES as RUNS
 from conformance.vectors import MANIFEST, NUMBERS, BadCorpus, digest, load, manifest, request
 from conformance.verify import Verdict
 from scene import BadInput, BangBang, Fourier, State, catalogue, from_data
@@ -45,7 +43,7 @@ NEW_SINCE = {
         "at-the-horizon",
         "retraced-arc",
         "retraced-arc-trajectory",
-        *(family.name for family in (*FLOWS, *COVERAGE, *RUNS)),
+        *(family.name for family in (*FLOWS, *COVERAGE, *BOUNDS)),
     )
 }
 MOST_BYTES = 15e6

@@ -1,7 +1,6 @@
 """From a question to a certified vector: the reference answers, and the verifier proves what is written.
 
-The reference proves every step by itself. Along a path the Jacobians of the steps are chained: what rounding
-every state that a stepper holds may do.
+Along a path the Jacobians of the steps are chained: what rounding every state that a stepper holds may do.
 
 An arc hit of a mushroom is captured when |x vy - y vx| > w(t) |v|, with the time and place of the hit and
 the velocity before the bounce (docs/protocol.md). Which hits begin and end a stay follows from two things
@@ -12,13 +11,10 @@ the question unfit. So all states within the enclosures have their stays between
 these happen is enclosed with the path.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Sequence
 from fractions import Fraction
 from math import inf, isfinite
-from typing import NamedTuple
 
 import msgspec
 import numpy as np
@@ -26,13 +22,23 @@ import numpy.typing as npt
 
 import reference
 from conformance.cases.draw import Unfit
+from conformance.cases.prover import (
+    CONDITIONS,
+    NUDGES,
+    SIGNS,
+    ask,
+    coasted,
+    collided,
+    ends,
+    expectation,
+    flight_of,
+    nudged,
+)
 from conformance.cases.question import Mark, Proved, Question, filed
-from conformance.grading.error import Matrix, condition_number, free_flight, inputs_of, moved
+from conformance.grading.error import Matrix, condition_number, free_flight, inputs_of
 from conformance.vectors import (
-    DIGITS,
     NUMBERS,
     Certified,
-    Ends,
     Expectation,
     Level,
     Vector,
@@ -40,7 +46,7 @@ from conformance.vectors import (
     four_digits,
 )
 from conformance.verify import Verdict, verify_line
-from reference.arithmetic import Arithmetic, Interval, rational, sign
+from reference.arithmetic import Arithmetic, Interval, sign
 from reference.walls import EnclosedFlight, MovingWalls
 from scene import (
     BadInput,
@@ -51,138 +57,10 @@ from scene import (
     State,
     Undecided,
     Undefined,
-    Wall,
     from_data,
 )
 
-# What a level asks (docs/corpus.md): nudges that change no wall, and the largest condition number.
-NUDGES: tuple[tuple[Level, float], ...] = (("core", 2.0**-30), ("extended", 2.0**-44))
-CONDITIONS = {"core": 1e6, "extended": 1e12}
-# Pairs, so that one of each pair lies on either side of a tie; a trajectory takes the first pair.
-SIGNS = ((1, 1, -1, 1, -1), (-1, -1, 1, -1, 1), (1, 1, 1, 1, 1), (-1, -1, -1, -1, -1))
-GUARD = 6  # decimals asked of the reference beyond those that are written down
-
-
-class ProvedFlight(NamedTuple):
-    """A flight up to a collision or the horizon, as the reference proved it.
-
-    Attributes:
-        wall: the wall met; None at the horizon.
-        ends: low and high of dt, x, y, vx, vy.
-        jacobian: (5, 5) derivatives of these, in this order, by t, x, y, vx, vy.
-    """
-
-    wall: Wall | None
-    ends: dict[str, Ends]
-    jacobian: Matrix
-
-    def centre(self) -> list[float]:
-        """Return dt, x, y, vx, vy, rounded."""
-        return [float(sum(self.ends[name]) / 2) for name in NUMBERS]
-
-    def allowance(self, state: State) -> list[float]:
-        """Return for dt, x, y, vx, vy the sum over inputs of |d out / d in| |in|."""
-        return [moved(row, inputs_of(state)) for row in self.jacobian]
-
-    def certified(self, state: State, digits: int = DIGITS) -> Certified:
-        """Write it down to so many decimals."""
-        return certified(self.ends, self.allowance(state), self.wall, digits=digits)
-
-
-def ask(scene: Scene, state: State, t_end: float, digits: int = DIGITS) -> reference.Outcome:
-    """Return the reference's outcome, close enough for so many decimals, with its Jacobian."""
-    return reference.next_collision(scene, state, t_end, digits=digits + GUARD, is_differentiated=True)
-
-
-def flight_of(outcome: reference.Collision | reference.Horizon, state: State, t_end: float) -> ProvedFlight:
-    """Return the flight that led to an outcome of `ask`."""
-    if isinstance(outcome, reference.Horizon):
-        dt = Fraction(t_end) - Fraction(state.t)
-        return ProvedFlight(None, _numbers((dt, dt), outcome.at), free_flight(state, float(dt)))
-    assert outcome.jacobian is not None
-    largest = max(abs(float(end)) for row in outcome.jacobian for d in row for end in d)
-    jacobian = [[_steepest(d, largest) for d in row] for row in outcome.jacobian]
-    return ProvedFlight(outcome.wall, collided(outcome), jacobian)
-
-
-def _steepest(derivative: reference.Enclosure, largest: float) -> float:
-    """Return a derivative rounded; at a knot, where it is enclosed between two, the greater in size."""
-    low, high = float(derivative.lo), float(derivative.hi)
-    if high - low <= 2.0**-40 * largest:
-        return float(derivative)
-    return max(low, high, key=abs)
-
-
-def expectation(
-    outcome: reference.Outcome, state: State, t_end: float, digits: int = DIGITS
-) -> Expectation | None:
-    """Return an outcome of `ask` as a certified answer; None where it is undecided."""
-    if isinstance(outcome, Undecided):
-        return None
-    if isinstance(outcome, Undefined):
-        return Expectation("undefined", reason=outcome.reason)
-    if isinstance(outcome, Rejected):
-        return Expectation("rejected")
-    flight = flight_of(outcome, state, t_end)
-    return Expectation("collision" if flight.wall else "horizon", (flight.certified(state, digits),))
-
-
-def proved_step(scene: Scene, state: State, t_end: float, digits: int = DIGITS) -> Expectation | None:
-    """Answer a step by proof.
-
-    Args:
-        scene: table and laws.
-        state: the start.
-        t_end: horizon [time].
-        digits: decimals of the certified answer.
-
-    Returns:
-        The certified answer; None where the reference is undecided.
-    """
-    return expectation(ask(scene, state, t_end, digits), state, t_end, digits)
-
-
-def nudged(state: State, t_end: float, signs: Sequence[int], nudge: float) -> State:
-    """Return a state whose numbers are moved by a part of their sizes, each in a direction of its own.
-
-    Args:
-        state: the start.
-        t_end: horizon [time]; no later time is given.
-        signs: of the moves of t, x, y, vx, vy.
-        nudge: relative; to the greater component for place and velocity.
-    """
-    place, speed = max(abs(state.x), abs(state.y)), max(abs(state.vx), abs(state.vy))
-    sizes = (abs(state.t), place, place, speed, speed)
-    values = [v + nudge * sign * size for v, sign, size in zip(inputs_of(state), signs, sizes, strict=True)]
-    t, x, y, vx, vy = values
-    return State(min(t, t_end), x, y, vx, vy, state.wall)
-
-
-def ends(enclosure: reference.Enclosure) -> Ends:
-    """Return both ends of one of the reference's enclosures, exactly."""
-    return rational(enclosure.lo._mpf_), rational(enclosure.hi._mpf_)
-
-
-def collided(outcome: reference.Collision) -> dict[str, Ends]:
-    """Return the ends of dt, x, y, vx, vy of a collision."""
-    return _numbers(ends(outcome.dt), outcome.after)
-
-
-def coasted(outcome: reference.Horizon, since: Ends) -> dict[str, Ends]:
-    """Return the ends of dt, x, y, vx, vy at the horizon, dt counted from an enclosed time."""
-    low, high = ends(outcome.at.t)
-    return _numbers((low - since[1], high - since[0]), outcome.at)
-
-
-def _numbers(dt: Ends, after: reference.Moment) -> dict[str, Ends]:
-    return {"dt": dt, **{name: ends(getattr(after, name)) for name in NUMBERS[1:]}}
-
-
 WIDEST = Fraction(1, 2**72)  # of an enclosure of a path: a millionth of a backward ulp and less
-
-
-class OpenSign(Exception):  # noqa: N818 (a finding about the question)
-    """Whether an arc hit is captured is not certain over its enclosures."""
 
 
 class Links:
@@ -228,13 +106,8 @@ class Links:
             rows[:, 0] += self.held[:, 0]
         self.held = rows
         allowance = [float(part) for part in moved]
-        self.condition = condition(centre if self.is_timed else [inf, *centre[1:]], allowance)
+        self.condition = condition_number(centre if self.is_timed else [inf, *centre[1:]], allowance)
         return allowance
-
-
-def condition(centre: Sequence[float], allowance: Sequence[float]) -> float:
-    """Return the condition number of dt, x, y, vx, vy by what their inputs move them, summed already."""
-    return condition_number(centre, [[part] for part in allowance], [1.0])
 
 
 def finite(allowance: Sequence[float]) -> Sequence[float]:
@@ -265,7 +138,7 @@ def proved_path(scene: Scene, question: Question, working: int | None = None) ->
     try:
         path = reference.trajectory(scene, state, question.collisions, t_end, working=working)
         captured = marks(scene, path.steps) if question.flow else []
-    except (InvalidState, OpenSign) as error:
+    except InvalidState as error:
         raise Unfit(str(error)) from None
     end = path.outcome
     if question.flow and not (isinstance(end, reference.Horizon) and question.flow(captured)):
@@ -348,7 +221,7 @@ def marks(scene: Scene, steps: Sequence[reference.Collision]) -> list[Mark]:
     """Return what each collision of a proved path means for captured stays.
 
     Raises:
-        OpenSign: an arc hit is neither proved captured nor proved not to be.
+        Unfit: an arc hit is neither proved captured nor proved not to be.
     """
     found: list[Mark] = []
     for step in steps:
@@ -422,7 +295,7 @@ def _is_captured(scene: Mushroom, step: reference.Collision) -> bool:
     spin = arithmetic.square(x * vy - y * vx)
     found = sign(spin - arithmetic.square(width) * (arithmetic.square(vx) + arithmetic.square(vy)))
     if not found:
-        raise OpenSign
+        raise Unfit("whether an arc hit is captured is not certain over its enclosures")
     return found > 0
 
 
@@ -482,7 +355,7 @@ def _step(scene: Scene, question: Question) -> Proved:
         return Proved((answer, Expectation("undecided")), inf)
     flight = flight_of(outcome, state, t_end)
     allowance = finite(flight.allowance(state))
-    return Proved((answer,), condition(flight.centre(), allowance))
+    return Proved((answer,), condition_number(flight.centre(), allowance))
 
 
 def _level(scene: Scene | None, vector: Vector) -> Level:
@@ -510,6 +383,6 @@ def _walls_met(scene: Scene, vector: Vector, state: State) -> list[str]:
     try:
         path = reference.trajectory(scene, state, vector.collisions, vector.t_end, digits=10)
         found = marks(scene, path.steps) if vector.kind == "flow" else []
-    except (InvalidState, OpenSign):
+    except (InvalidState, Unfit):
         return ["Rejected"]
     return [*(step.wall for step in path.steps), *found, type(path.outcome).__name__]

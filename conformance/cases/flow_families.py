@@ -6,8 +6,6 @@ does not forget its start exponentially fast: a fixed cap or mushroom, a breathi
 captured in a moving mushroom, a stem with level floor, all much faster than the walls.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from typing import Any
 

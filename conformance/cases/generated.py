@@ -14,8 +14,6 @@ less than x: these than level extended. All are filed as of level core. The plai
 are asked: those that meet the wall that is looked for, and keep it when nudged.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from functools import cache
 from math import inf
@@ -24,9 +22,10 @@ from typing import Any
 import msgspec
 
 from conformance import plain
-from conformance.cases.certify import CONDITIONS, NUDGES, SIGNS, certify, nudged
+from conformance.cases.certify import certify
 from conformance.cases.draw import Draw, Unfit
 from conformance.cases.flow_families import any_marks
+from conformance.cases.prover import CONDITIONS, NUDGES, SIGNS, nudged
 from conformance.cases.question import ATTEMPTS, Family, Question
 from conformance.cases.run_families import LIKE_BEFORE, is_leaning
 from conformance.cases.scenes import LATE, Clock, law, wire_form

@@ -12,8 +12,6 @@ state may still be refused (its rounded place lies outside, or it moves into the
 draws again.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from math import sqrt

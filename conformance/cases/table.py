@@ -1,8 +1,7 @@
 """The table of families: where every question comes from."""
 
-from __future__ import annotations
-
 from conformance.cases import (
+    bound_families,
     coverage_families,
     delicate_families,
     families,
@@ -18,6 +17,7 @@ FAMILIES: dict[str, Family] = {
         flow_families,
         coverage_families,
         run_families,
+        bound_families,
         delicate_families,
     )
     for family in module.FAMILIES

@@ -10,8 +10,6 @@ meet its first wall after dt meets nothing before, so that at any earlier t_end 
 exact place x + vx s, y + vy s. `cases.generated` draws questions in scenes that no file holds.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from fractions import Fraction
 from typing import Any, NamedTuple
@@ -152,9 +150,9 @@ def _before_the_hit(vector: Vector, part: float, number: int) -> Vector | None:
         return None
     place = {"x": Fraction(state.x) + Fraction(state.vx) * s, "y": Fraction(state.y) + Fraction(state.vy) * s}
     numbers = {"dt": s, **place, "vx": Fraction(state.vx), "vy": Fraction(state.vy)}
-    centre, jacobian = [float(numbers[name]) for name in NUMBERS], free_flight(state, float(s))
-    inputs = inputs_of(state)
-    step = certified({n: (v, v) for n, v in numbers.items()}, [moved(row, inputs) for row in jacobian], None)
+    centre = [float(numbers[name]) for name in NUMBERS]
+    allowance = [moved(row, inputs_of(state)) for row in free_flight(state, float(s))]
+    step = certified({n: (v, v) for n, v in numbers.items()}, allowance, None)
     return msgspec.structs.replace(
         vector,
         id=f"{DRAWN}/{number}",
@@ -162,5 +160,5 @@ def _before_the_hit(vector: Vector, part: float, number: int) -> Vector | None:
         rule=f"{vector.id} at a time before its hit",
         t_end=t_end,
         expect=(Expectation("horizon", (step,)),),
-        condition=condition_number(centre, jacobian, inputs),
+        condition=condition_number(centre, allowance),
     )

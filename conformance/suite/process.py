@@ -19,8 +19,6 @@ cannot be told apart and are left until the last of them ends. A child that othe
 meanwhile in a session of its own would be taken for one of the command's.
 """
 
-from __future__ import annotations
-
 import contextlib
 import ctypes
 import errno
@@ -31,7 +29,7 @@ import subprocess
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
-from typing import IO, ClassVar, NamedTuple
+from typing import ClassVar, NamedTuple
 
 from scene.refusal import BadInput
 
@@ -190,17 +188,14 @@ class Process:
             reason = error.strerror if isinstance(error, OSError) else str(error)
             raise CommandNotFound(f"command {command[0]!r} cannot be started: {reason}") from None
         self._descendants.follow(self._child.pid)
-        self._stdin, self._stdout, self._stderr = self._streams()
+        stdin, stdout, stderr_pipe = self._child.stdin, self._child.stdout, self._child.stderr
+        assert stdin is not None and stdout is not None and stderr_pipe is not None  # noqa: PT018
+        self._stdin, self._stdout, self._stderr = stdin, stdout, stderr_pipe
+        for stream in (stdin, stdout, stderr_pipe):
+            os.set_blocking(stream.fileno(), False)
         self._transcript = stderr
         self._received = bytearray()
         self._is_open = True  # its standard output
-
-    def _streams(self) -> tuple[IO[bytes], IO[bytes], IO[bytes]]:
-        streams = self._child.stdin, self._child.stdout, self._child.stderr
-        for stream in streams:
-            assert stream is not None
-            os.set_blocking(stream.fileno(), False)
-        return streams  # type: ignore[return-value]
 
     def exchange(self, line: bytes, timeout: float) -> bytes:
         """Write one line and return the one line that answers it.

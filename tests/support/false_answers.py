@@ -20,8 +20,9 @@ from typing import Any
 import msgspec
 
 import reference
-from conformance.cases.certify import arrival, coasted, collided, marks, stays
-from conformance.cases.certify import ends as exact_ends
+from conformance.cases.certify import arrival, marks, stays
+from conformance.cases.prover import coasted, collided
+from conformance.cases.prover import ends as exact_ends
 from conformance.vectors import Certified, certified
 from scene import State, from_data
 

@@ -8,7 +8,7 @@ from msgspec import to_builtins
 
 import reference
 import scene as scenes
-from conformance.cases.certify import proved_step
+from conformance.cases.prover import proved_step
 from reference.arithmetic import Enclosure
 from scene import Scene, State
 from scene.laws import bounds

@@ -3,13 +3,7 @@
 The judge (`follow`) holds every hit to the state before it (`checks.flaws`), and a flow to the path of the
 same particle: its arrival, and its captured stay. So the questions need no certified answer, and may be
 drawn: one from every octave of a size, up to the bounds below, which docs/detection.md lists.
-
-How paths end is asked where two walls are met at once, in numbers that are exact. Where walls at rest are
-met head on, the place after any number of hits is known. In a flow of thousands, of twins, bad states and
-late ones, each particle is answered as it is alone.
 """
-
-from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
@@ -23,8 +17,7 @@ from conformance.cases import scenes
 from conformance.cases.draw import Draw
 from conformance.suite.answers import read_outcome
 from conformance.suite.checks.flaws import COARSE, FINE, LATE, UNCLEAR, first_stay, flaw_of, is_fine
-from conformance.suite.checks.form import FOREVER, Implementation, Question, octaves, question
-from conformance.suite.checks.refusals import moved
+from conformance.suite.checks.form import FOREVER, Implementation, Question, octaves
 from scene import (
     BadInput,
     Cap,
@@ -358,133 +351,3 @@ def waiting(draw: Draw, profile: str) -> Iterator[Question]:
         speed = (0.85 - y) * omega / (2 * math.pi * periods)
         scene = draw.pick((Cap(r=r), Mushroom(r=r, w=0.25, h=1.0)))
         yield scene, State(0.0, 0.0, y, 0.1 * speed, speed), 1
-
-
-# At t = 0.5 and its like two walls are met at once, in numbers that are exact.
-CORNERS: tuple[tuple[Scene, State, str], ...] = (
-    (Mushroom(r=1.0, w=0.5, h=1.0), State(0.0, 0.25, -0.5, 0.5, -1.0), "corner"),
-    (Mushroom(r=1.0, w=0.5, h=1.0), State(0.0, 0.25, 0.5, 0.5, -1.0), "mouth-edge"),
-    (Cap(r=1.0), State(0.0, 0.5, 0.25, 1.0, -0.5), "corner"),
-    (Cap(r=1.0), State(0.0, 0.75, 0.0, 0.1, 0.0, "base"), "sliding"),
-    (Stem(w=1.0, h=1.5), State(0.0, 0.0, -0.75, 2.0, -1.5), "corner"),
-    (Stem(w=1.0, h=1.5), State(0.0, 0.5, 0.0, 0.1, 0.0, "base"), "sliding"),
-)
-# Likewise after a hit: of the base at t = 0.25, before the corner at t = 1.
-LATER = Stem(w=1.0, h=1.5), State(0.0, 0.0, -0.5, 1.0, 2.0)
-INSIDE: tuple[tuple[Scene, State], ...] = (
-    (Mushroom(r=1.0, w=0.5, h=1.0), State(0.0, 0.1, 0.3, 0.4, -0.9)),
-    (Cap(r=1.0), State(0.0, 0.1, 0.3, 0.4, 0.9)),
-    (Stem(w=1.0, h=1.5), State(0.0, 0.1, -0.3, 0.4, -0.9)),
-)
-
-
-def endings(draw: Draw, profile: str) -> Iterator[Question]:
-    """Ask for no hits, for some, and for some that another end precedes."""
-    for scene, state in INSIDE:
-        for n in (0, 1, 2 + draw.pick(range(8))):
-            if profile == "trajectory":
-                yield scene, state, n, FOREVER, ("collision",) * n
-            if profile == "trajectory" or n == 1:
-                yield scene, state, n, draw.part() * 2.0**-3, ("horizon",)[:n]
-    for scene, state, reason in CORNERS:
-        yield scene, state, 3, 10.0, (reason,)
-    if profile == "trajectory":
-        yield *LATER, 5, FOREVER, ("collision", "corner")
-        yield *LATER, 5, 0.5, ("collision", "horizon")
-
-
-def end_as_due(
-    side: Implementation, scene: Scene, state: State, n: int, t_end: float, due: Sequence[str]
-) -> bool:
-    """Hold the outcomes, or the reasons of those that are undefined, to those that are due."""
-    parts = side.parts(question(side.profile, scene, state, t_end, n))
-    found = [part["reason"] if part["outcome"] == "undefined" else part["outcome"] for part in parts]
-    side.n_asked += 1
-    if found[-1:] == ["undecided"] and len(found) <= len(due):
-        side.n_undecided += due[-1] in ("collision", "horizon")  # where mathematics has no answer it may be
-        return False
-    where = f"{n} hits from {state} to {t_end} in {scene}"
-    assert found == list(due), f"{where} are answered {found}, must be {list(due)}"
-    return True
-
-
-MAX_STATES = 2**12  # of a flow
-ALONE = 2.0**-34  # of sizes: what a few bounces make of the rounding of a state among others
-
-
-def returning(draw: Draw, profile: str) -> Iterator[Question]:
-    """Fly head on between two walls at rest, as many hits as are drawn."""
-    for n in octaves(draw, 1, MAX_HITS):
-        scene = draw.pick((Cap(r=1.0), Stem(w=1.0, h=1.25), Mushroom(r=1.0, w=0.5, h=1.0)))
-        yield scene, draw.part(), math.floor(n) + draw.between(0.1, 0.9)
-
-
-def arrive(side: Implementation, scene: Scene, begin: float, end: float) -> bool:
-    """Hold a flow to where a particle is that flies to and fro: it is known after any number of hits.
-
-    Args:
-        side: the implementation, asked for a flow.
-        scene: at rest.
-        begin: distance from the lower wall, or the left one, as a part of that between both.
-        end: the way flown, counted from that wall, likewise; one part takes a unit of time.
-    """
-    low, high = {Cap: (0.0, 1.0), Stem: (-1.25, 0.0), Mushroom: (-0.5, 0.5)}[type(scene)]
-    length, fold = high - low, end % 2.0
-    is_back, t_end = fold > 1.0, end - begin
-    at, to = low + length * begin, low + length * min(fold, 2.0 - fold)
-    speed, to_speed = length, -length if is_back else length
-    if isinstance(scene, Mushroom):
-        start, due = State(0.0, at, -0.5, speed, 0.0), Horizon(t_end, to, -0.5, to_speed, 0.0)
-    else:
-        start, due = State(0.0, 0.0, at, 0.0, speed), Horizon(t_end, 0.0, to, 0.0, to_speed)
-    (found,) = side.flown(scene, [start], t_end)
-    arrival = read_outcome(found)
-    if isinstance(arrival, Undecided):
-        return False
-    assert distance(scene, arrival, due) <= CARRIED, f"{start}: {arrival}, must be {due}, in {scene}"
-    return True
-
-
-def crowds(draw: Draw, profile: str) -> Iterator[Question]:
-    """Ask flows of many states in any order: twins that differ in one field alone, bad ones, late ones."""
-    for n in octaves(draw, 1, MAX_STATES):
-        scene, state = draw.pick((drawn(draw), *[nearly_captured(draw, draw.between(0.1, 0.3))[:2]] * 2))
-        size, span = float(table_at(fp, scene, state.t).size), crossing(scene, state)
-        pool = [
-            state,
-            replace(state, x=state.x + 64 * size, wall=None),
-            replace(state, t=state.t + 64 * span),
-        ]
-        scales = {"t": span, "x": size, "y": size, "vx": size / span, "vy": size / span}
-        for near in octaves(draw, 2.0**-40, 2.0**-2):
-            name = draw.pick(tuple(scales))
-            pool.append(replace(state, **{name: getattr(state, name) + near * scales[name]}))
-        hit = plain.next_collision(scene, state, FOREVER)
-        assert isinstance(hit, Collision)
-        # Off its wall by less than is allowed: with its name a state is on it, and without it is not.
-        x, y = moved(table_at(fp, scene, hit.t), hit.wall, hit.x, hit.y, 2.0**-22)
-        on_wall = replace(hit.state(), x=float(x), y=float(y))
-        pool += [hit.state(), on_wall, replace(on_wall, wall=None)]
-        yield scene, pool, [draw.pick(range(len(pool))) for _ in range(math.ceil(n))], state.t + 1.5 * span
-
-
-def together(
-    side: Implementation, scene: Scene, pool: Sequence[State], order: Sequence[int], t_end: float
-) -> bool:
-    """Hold each state of a flow to be answered as alone, in its place, whatever the others are."""
-    alone = {i: side.flown(scene, [pool[i]], t_end)[0] for i in sorted(set(order))}
-    found = side.flown(scene, [pool[i] for i in order], t_end)
-    n_compared = 0
-    for place, (i, part) in enumerate(zip(order, found, strict=True)):
-        own, where = alone[i], f"states[{place}] of {len(order)}, {pool[i]}"
-        kinds = {part["outcome"], own["outcome"]}
-        assert len(kinds) == 1 or "undecided" in kinds, f"{where}: {part} among others, {own} alone"
-        if kinds != {"horizon"}:
-            continue
-        n_compared += 1
-        one, other = read_outcome(part), read_outcome(own)
-        assert distance(scene, one, other) <= ALONE, f"{where}: {one} among others, {other} alone"
-        stays = part.get("captured"), own.get("captured")
-        same = is_same_stay(*stays, t_end - pool[i].t)
-        assert same, f"{where}: captured = {stays[0]} among others, {stays[1]} alone"
-    return bool(n_compared)

@@ -49,12 +49,6 @@ def _integers(n: int) -> st.SearchStrategy[int]:
 
 
 @st.composite
-def clocks(draw: st.DrawFn) -> Clock:
-    """Draw what the laws of a scene share: static, Fourier, bang-bang or mixed, periods of order 1 to 10."""
-    return scene_draws.clock(HypothesisDraw(draw), KINDS)
-
-
-@st.composite
 def laws(draw: st.DrawFn, low: float = 0.5, high: float = 2.0, clock: Clock | None = None) -> Law:
     """Draw a law that stays within [low, high] at all times.
 
@@ -62,9 +56,10 @@ def laws(draw: st.DrawFn, low: float = 0.5, high: float = 2.0, clock: Clock | No
         draw: given by Hypothesis.
         low: lower bound, any unit.
         high: upper bound, low <= high.
-        clock: kind and period; None draws them.
+        clock: kind and period; None draws them: static, Fourier, bang-bang or mixed, of order 1 to 10.
     """
-    return any_law(HypothesisDraw(draw), low, high, draw(clocks()) if clock is None else clock)
+    stream = HypothesisDraw(draw)
+    return any_law(stream, low, high, clock or scene_draws.clock(stream, KINDS))
 
 
 @st.composite

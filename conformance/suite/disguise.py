@@ -18,9 +18,10 @@ import msgspec
 
 from conformance.cases.draw import Draw
 from conformance.cases.generated import GROUP as FRESH
+from conformance.cases.scenes import readable
 from conformance.grading.error import condition_number, free_flight, inputs_of, moved
 from conformance.vectors import NUMBERS, Expectation, Vector, certified
-from scene import BadInput, Scene, from_data, to_data, transforms
+from scene import to_data, transforms
 
 LARGEST = 12  # exponents of two are drawn between this and its negative
 RANGE = 2.0**-350, 2.0**350  # numbers that a scale may lead to: their squares are far from both ends
@@ -57,14 +58,14 @@ def drawn_disguise(vector: Vector, seed: int) -> Disguise:
     is_mirrored = own.pick((False, True))
     exponents = [k for k in range(-LARGEST, LARGEST + 1) if k]
     length, time = shared.pick(exponents), shared.pick(exponents)
-    if _scene(vector) is None or not _stays_in_range(vector, length, time):
+    if readable(vector.scene) is None or not _stays_in_range(vector, length, time):
         return Disguise(is_mirrored)
     return Disguise(is_mirrored, length, time)
 
 
 def asked(vector: Vector, disguise: Disguise) -> Vector:
     """Return the question in disguise; its certified answers are still those of the question as published."""
-    state, scene = vector.state, _scene(vector)
+    state, scene = vector.state, readable(vector.scene)
     if disguise.is_mirrored:
         state = transforms.mirrored(state)
     if scene is None or not (disguise.length or disguise.time):
@@ -105,14 +106,6 @@ def drawn_horizons(vectors: Sequence[Vector], seed: int) -> list[Vector]:
         early = _before_the_hit(draw.pick(usable), draw.between(*PARTS), len(found) + 1)
         found += [early] if early is not None else []
     return found[:N_DRAWN]
-
-
-def _scene(vector: Vector) -> Scene | None:
-    """Return a vector's scene; None where it is a bad one, which is to be refused."""
-    try:
-        return from_data(vector.scene)
-    except BadInput:
-        return None
 
 
 def _stays_in_range(vector: Vector, length: int, time: int) -> bool:

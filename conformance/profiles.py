@@ -26,8 +26,6 @@ state: in the cap, on a chord that does not reach the mouth. log E1 / E0 is cut 
 widened by `bias`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from math import log, pi, prod, sqrt
 from typing import NamedTuple

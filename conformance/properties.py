@@ -17,8 +17,6 @@ and what it does to the answer is measured on the stepper itself (`conformance.g
 identity of whole ensembles is `conformance.profiles.check_work_identity`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from fractions import Fraction
 from functools import partial
@@ -26,8 +24,17 @@ from math import hypot
 
 import msgspec
 
-from conformance.grading.called import MeasuredStep, Question, answering, fail, measured, numbers, scales
-from scene import Collision, Horizon, Outcome, Rejected, Scene, State, Undecided, transforms
+from conformance.grading.called import MeasuredStep, Question, ask, fail, measured, numbers, scales
+from scene import (
+    Collision,
+    Horizon,
+    Outcome,
+    Rejected,
+    Scene,
+    State,
+    Undecided,
+    transforms,
+)
 from scene.laws import is_constant
 from scene.precision import decimals
 from scene.states import Stepper
@@ -56,10 +63,9 @@ def check_mirror(
     Returns:
         Whether there was something to compare.
     """
-    stepper = answering(stepper)
     given, image = (scene, state, t_end), (scene, transforms.mirrored(state), t_end)
-    expected = _changed(stepper(*given), (1, 1, -1, 1, -1, 1), transforms.mirrored_wall)
-    return _compare("mirror in x", stepper, given, image, stepper(*image), expected, is_exact, bound)
+    expected = _changed(ask(stepper, *given), (1, 1, -1, 1, -1, 1), transforms.mirrored_wall)
+    return _compare("mirror in x", stepper, given, image, ask(stepper, *image), expected, is_exact, bound)
 
 
 def check_scaling(
@@ -77,15 +83,14 @@ def check_scaling(
 
     Bit for bit where all numbers, before and after, are 0 or between 2^-400 and 2^400. See `check_mirror`.
     """
-    stepper = answering(stepper)
     unit, size, speed = (transforms.times_power(1.0, exponent) for exponent in (time, length, length - time))
-    answer = stepper(scene, state, t_end)
+    answer = ask(stepper, scene, state, t_end)
     inputs = [t_end, state.t, state.x, state.y, state.vx, state.vy, *(numbers(answer, state) or ())]
     if any(part and not LEAST < abs(part) * f < MOST for part in inputs for f in (1.0, unit, size, speed)):
         return False
     scaled = transforms.scaled(scene, length, time), transforms.scaled_state(state, length, time)
     image = (*scaled, unit * t_end)
-    unscaled = _changed(stepper(*image), (1 / unit, 1 / unit, 1 / size, 1 / size, 1 / speed, 1 / speed))
+    unscaled = _changed(ask(stepper, *image), (1 / unit, 1 / unit, 1 / size, 1 / size, 1 / speed, 1 / speed))
     return _compare("scaling", stepper, (scene, state, t_end), image, unscaled, answer, is_exact, bound)
 
 
@@ -96,11 +101,10 @@ def check_static_limit(
 
     Bit for bit where a law's value is its mean plus a sum of zeros. See `check_mirror`.
     """
-    stepper = answering(stepper)
     still = transforms.frozen(scene, state.t)
     given, idle = (still, state, t_end), (transforms.idle(still), state, t_end)
-    answer = stepper(*given)
-    return _compare("static limit", stepper, given, idle, stepper(*idle), answer, is_exact, bound)
+    answer = ask(stepper, *given)
+    return _compare("static limit", stepper, given, idle, ask(stepper, *idle), answer, is_exact, bound)
 
 
 def check_period_shift(
@@ -117,8 +121,7 @@ def check_period_shift(
     The shifted times are rounded: by how much is known, and enters as an error of t. `is_exact` asks for
     equal bits where nothing is rounded at all. See `check_mirror`.
     """
-    stepper = answering(stepper)
-    shared, answer = period(scene), stepper(scene, state, t_end)
+    shared, answer = period(scene), ask(stepper, scene, state, t_end)
     if shared is None or not isinstance(answer, Collision | Horizon):
         return False
     ctx = decimals(50)
@@ -127,7 +130,7 @@ def check_period_shift(
     late = State(later, state.x, state.y, state.vx, state.vy, state.wall)
     # A collision must not be lost to the rounding of t_end.
     end = later + (2 * span if isinstance(answer, Collision) else span)
-    found = stepper(scene, late, end)
+    found = ask(stepper, scene, late, end)
     rounding = float(abs(ctx.mpf(later) - state.t - shift))
     if isinstance(answer, Horizon):
         rounding += float(abs(ctx.mpf(end) - t_end - shift))
@@ -143,7 +146,6 @@ def check_split_flight(
     stepper: Stepper, scene: Scene, state: State, t_end: float, *, bound: float = BOUND
 ) -> bool:
     """Hold a flight, or a flow, that is stopped halfway and taken up again, to end alike."""
-    stepper = answering(stepper)
     given = scene, state, t_end
     whole = measured(stepper, *given, bound)
     if whole is None:
@@ -175,7 +177,6 @@ def check_reversal(
     then back to half of the first. The errors granted are carried along through every step. See
     `check_mirror`.
     """
-    stepper = answering(stepper)
     given = scene, state, t_end
     there = measured(stepper, *given, bound)
     if there is None:
@@ -185,7 +186,7 @@ def check_reversal(
     begin, asked = state, [given]
     if isinstance(there.outcome, Collision):
         led = scene, there.state(), max(t_end, there.outcome.t)
-        if isinstance(refusal := stepper(*led), Rejected):
+        if isinstance(refusal := ask(stepper, *led), Rejected):
             fail("time reversal", f"{there.outcome} leads nowhere: {refusal.reason}", given, led)
         way = _across_bounce(stepper, scene, state, t_end)
         if way is None:
@@ -219,7 +220,6 @@ def check_angular_momentum(
 
     Where the base is met it changes sign, at rest as it is. Other walls are not compared.
     """
-    stepper = answering(stepper)
     step = measured(stepper, scene, state, t_end, bound)
     if step is None or not isinstance(step.outcome, Collision) or step.outcome.wall not in ("arc", "base"):
         return False
@@ -238,8 +238,7 @@ def check_angular_momentum(
 
 def check_energy(stepper: Stepper, scene: Scene, state: State, t_end: float, *, bound: float = BOUND) -> bool:
     """Hold the speed to stay in a static table, whatever is met."""
-    stepper = answering(stepper)
-    answer = stepper(scene, state, t_end)
+    answer = ask(stepper, scene, state, t_end)
     found = numbers(answer, state)
     if found is None or not all(is_constant(law) for law in laws(scene).values()):
         return False
@@ -257,7 +256,6 @@ def check_symplectic(
     Its matrix M is taken by central differences of two widths, extrapolated; their difference bounds what
     is left. M^T J M = J must hold within that, and within `bound` over the width.
     """
-    stepper = answering(stepper)
     way = _across_bounce(stepper, scene, state, t_end)
     if way is None:
         return False
@@ -302,10 +300,10 @@ def _across_bounce(
     stepper: Stepper, scene: Scene, state: State, t_end: float
 ) -> tuple[State, Collision, float] | None:
     """Return the state halfway to the collision, the collision, and the time halfway to the next event."""
-    hit = stepper(scene, state, t_end)
+    hit = ask(stepper, scene, state, t_end)
     if not isinstance(hit, Collision) or not hit.t < t_end:
         return None
-    following = stepper(scene, hit.state(), t_end)
+    following = ask(stepper, scene, hit.state(), t_end)
     if not isinstance(following, Collision | Horizon):
         return None
     end, half = (hit.t + following.t) / 2, hit.dt / 2
@@ -323,10 +321,10 @@ def _flow_matrix(
         ends = []
         for sign in (-1, 1):
             moved = getattr(begin, field) + sign * width * unit
-            first = stepper(scene, msgspec.structs.replace(begin, **{field: moved}), end)
+            first = ask(stepper, scene, msgspec.structs.replace(begin, **{field: moved}), end)
             if not isinstance(first, Collision) or first.wall != hit.wall:
                 return None
-            last = stepper(scene, first.state(), end)
+            last = ask(stepper, scene, first.state(), end)
             if not isinstance(last, Horizon):
                 return None
             ends.append((last.x, last.y, last.vx, last.vy))

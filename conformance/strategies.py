@@ -5,8 +5,6 @@ All is drawn as the questions of the corpus, of a run of the suite and of `mushr
 When a test fails, the failing step is printed as the wire's line.
 """
 
-from __future__ import annotations
-
 import json
 from functools import cache
 
@@ -51,12 +49,6 @@ def _integers(n: int) -> st.SearchStrategy[int]:
 
 
 @st.composite
-def clocks(draw: st.DrawFn) -> Clock:
-    """Draw what the laws of a scene share: static, Fourier, bang-bang or mixed, periods of order 1 to 10."""
-    return scene_draws.clock(HypothesisDraw(draw), KINDS)
-
-
-@st.composite
 def laws(draw: st.DrawFn, low: float = 0.5, high: float = 2.0, clock: Clock | None = None) -> Law:
     """Draw a law that stays within [low, high] at all times.
 
@@ -64,9 +56,10 @@ def laws(draw: st.DrawFn, low: float = 0.5, high: float = 2.0, clock: Clock | No
         draw: given by Hypothesis.
         low: lower bound, any unit.
         high: upper bound, low <= high.
-        clock: kind and period; None draws them.
+        clock: kind and period; None draws them: static, Fourier, bang-bang or mixed, of order 1 to 10.
     """
-    return any_law(HypothesisDraw(draw), low, high, draw(clocks()) if clock is None else clock)
+    stream = HypothesisDraw(draw)
+    return any_law(stream, low, high, clock or scene_draws.clock(stream, KINDS))
 
 
 @st.composite
@@ -88,16 +81,9 @@ def scenes(draw: st.DrawFn, table: str | None = None) -> Scene:
     except (BadInput, Unfit):
         assume(False)
     if stream.pick(range(3)) == 2:
-        scene = rescale(scene, stream.pick(POWERS), stream.pick(POWERS))
+        grown = scaled(scene, stream.pick(POWERS), stream.pick(POWERS))
+        scene = msgspec.structs.replace(grown, name=scene.name, notes=scene.notes)
     return scene
-
-
-def rescale(scene: Scene, length: int, time: int) -> Scene:
-    """Return the scene with lengths times 2^length and times times 2^time, exactly.
-
-    Ratios (`nu`, `slope`), name and notes stay. Exact as long as no number becomes subnormal or overflows.
-    """
-    return msgspec.structs.replace(scaled(scene, length, time), name=scene.name, notes=scene.notes)
 
 
 @st.composite

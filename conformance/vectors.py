@@ -25,8 +25,6 @@ enclosures or levels of published vectors change. Results are comparable within 
 Not handled: questions that JSON or `scene.State` cannot hold (nan, fields missing or too many).
 """
 
-from __future__ import annotations
-
 import decimal
 import hashlib
 import json
@@ -288,23 +286,20 @@ def _scene(encoded: str) -> Scene:
     return from_data(json.loads(encoded))
 
 
-def answer(vector: Vector, step: Stepper, follow: Follow, carry: Flowing | None = None) -> dict[str, Any]:
+def answer(vector: Vector, step: Stepper, follow: Follow, carry: Flowing) -> dict[str, Any]:
     """Return how a stepper of functions answers a vector, in the wire's form.
 
     Args:
         vector: the question.
         step: (scene, state, t_end) -> outcome.
         follow: (scene, state, collisions, t_end) -> collisions, and last what came instead of one.
-        carry: (scene, states, t_end) -> outcome and first captured stay of each; without it a flow is
-            answered by an error.
+        carry: (scene, states, t_end) -> outcome and first captured stay of each.
     """
     try:
         scene = _scene(json.dumps(vector.scene))
         if vector.kind == "step":
             return dict(msgspec.to_builtins(step(scene, vector.state, vector.t_end)))
         if vector.kind == "flow":
-            if carry is None:
-                return {"error": "no flow is offered"}
             arrivals = carry(scene, [vector.state], vector.t_end)
             return {"states": [{**msgspec.to_builtins(at), "captured": stay} for at, stay in arrivals]}
         return {"steps": msgspec.to_builtins(follow(scene, vector.state, vector.collisions, vector.t_end))}

@@ -1,7 +1,5 @@
 """fast against reference, step by step, on generated geometries."""
 
-from __future__ import annotations
-
 import os
 from fractions import Fraction
 

@@ -1,7 +1,5 @@
 """Attacks find nothing wrong with our steppers, and every family finds the mistake that it hunts."""
 
-from __future__ import annotations
-
 import json
 import os
 from fractions import Fraction
@@ -14,7 +12,7 @@ from support.refusals import assert_refused
 
 import fast
 from conformance.cases.attacks import UnderAttack, confirmed, flown, line, run
-from conformance.cases.paths import claimed_path
+from conformance.cases.certify import claimed_path
 from conformance.cases.prover import proved_step
 from conformance.cases.question import Question
 from conformance.cases.table import FAMILIES

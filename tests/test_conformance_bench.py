@@ -1,7 +1,5 @@
 """The benchmark measures what it says: workloads, grades, growth, records; commands are held to our clock."""
 
-from __future__ import annotations
-
 import json
 import math
 import sys

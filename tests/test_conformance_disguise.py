@@ -1,7 +1,5 @@
 """Disguises are exact, and nobody passes by memory: not even one who knows the seed."""
 
-from __future__ import annotations
-
 import msgspec
 import pytest
 from support.depth import deep_but

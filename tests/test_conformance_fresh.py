@@ -1,7 +1,5 @@
 """Questions in scenes that no file holds: right steppers pass, who is right in the corpus alone does not."""
 
-from __future__ import annotations
-
 from functools import cache
 from itertools import islice
 from math import inf
@@ -70,7 +68,7 @@ def asked_of(name, number):
 
 def answer_to(vector):
     """Return the right answer of a step."""
-    return vectors.answer(vector, plain.next_collision, plain.trajectory)
+    return vectors.answer(vector, plain.next_collision, plain.trajectory, plain.flow)
 
 
 def assert_right_steppers_pass(vector):

@@ -5,8 +5,6 @@ Nonsense of the right seq, anywhere in a run, ends in verdicts; nothing but trou
 lines of each kind, 120,000 in all, and 1000 runs; some thirty minutes.
 """
 
-from __future__ import annotations
-
 import io
 import json
 import os

@@ -1,7 +1,5 @@
 """Grading: each verdict is reached, right answers pass, shifted and swapped ones fail."""
 
-from __future__ import annotations
-
 import json
 import math
 

@@ -1,7 +1,5 @@
 """The example harnesses, built and graded at level core wherever their language is present."""
 
-from __future__ import annotations
-
 import io
 import json
 import subprocess

@@ -1,7 +1,5 @@
 """Every mutant is killed by the vectors that the published kill matrix names for it; plain by none."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The plain stepper against the reference; its paths are asked by the corpus, its process by the suite."""
 
-from __future__ import annotations
-
 import math
 from fractions import Fraction
 

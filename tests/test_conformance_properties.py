@@ -1,7 +1,5 @@
 """The properties hold for the three steppers, and each refuses a stepper that breaks it."""
 
-from __future__ import annotations
-
 import json
 import math
 import re

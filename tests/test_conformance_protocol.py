@@ -1,7 +1,5 @@
 """Protocol 1 as `python -m reference` and `python -m fast` serve it."""
 
-from __future__ import annotations
-
 import io
 import json
 import math

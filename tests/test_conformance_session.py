@@ -1,7 +1,5 @@
 """The runner against implementations that break the protocol: the exact verdict, no hang, nothing left."""
 
-from __future__ import annotations
-
 import json
 import math
 import re

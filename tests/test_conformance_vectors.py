@@ -1,7 +1,5 @@
 """The corpus: what it holds, that it is certified, and that no spoilt line and no false claim gets in."""
 
-from __future__ import annotations
-
 import dataclasses
 import hashlib
 import json

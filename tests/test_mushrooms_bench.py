@@ -1,7 +1,5 @@
 """`mushrooms bench`: files, exit codes, bad options in one line; the page on speed shows the record."""
 
-from __future__ import annotations
-
 import re
 import shutil
 import sys

@@ -1,7 +1,5 @@
 """`mushrooms check`: exit codes, report files, bad options in one line, a page that stands alone."""
 
-from __future__ import annotations
-
 import base64
 import json
 import math

@@ -16,7 +16,7 @@ from support.tables import LIFT
 from support.truth import IS_DEEP, is_delicate, proved_step
 
 import reference
-from conformance.cases.paths import claimed_path
+from conformance.cases.certify import claimed_path
 from conformance.cases.scenes import wire_form
 from conformance.strategies import scenes_and_states
 from conformance.vectors import Expectation

@@ -13,8 +13,6 @@ Every law is a row of LAW_LENGTH numbers: kind, n, mean, omega, then pairs: ampl
 k = 1, 2, ... n, or n knots (time, value). A state is t, x, y, vx, vy, the wall being left.
 """
 
-from __future__ import annotations
-
 import ctypes
 import sys
 import tempfile

@@ -5,8 +5,6 @@ decimals lost per collision, whatever its precision. The chained Jacobians of th
 (the Lyapunov slope) and what one backward ulp at each step can grow to (the predicted bound).
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from fractions import Fraction

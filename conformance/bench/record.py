@@ -3,8 +3,6 @@
 `python -m conformance.bench.record > docs/bench.schema.json` prints its schema.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import platform

@@ -4,8 +4,6 @@ Writes docs/scoreboard.md: what passes, what fails, and why. One seed, level cor
 and every stepper ten, so that the slowest does not hold up the rest. Some 15 minutes on one core.
 """
 
-from __future__ import annotations
-
 import sys
 import tempfile
 from collections import Counter

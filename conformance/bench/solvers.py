@@ -8,8 +8,6 @@ for the clock. Then all solvers take one run each, again and again, so that a di
 meets all of them; ratios are between runs of one benchmark.
 """
 
-from __future__ import annotations
-
 import math
 import time
 from collections.abc import Callable, Sequence
@@ -219,16 +217,10 @@ def _check_runs(runs: Sequence[SolverRun]) -> None:
         raise Trouble("fail", "its answers differ from run to run")
 
 
-class _Graded(NamedTuple):
-    kind: str  # right, wrong, undecided or left
-    ulps: float = 0.0
-    relative: float = 0.0
-
-
 def _point(workload: Workload, solver: Solver, n_times: int, runs: Sequence[SolverRun]) -> Point:
     graded = [_grade(answer, q) for answer, q in zip(runs[-1].answers, workload.questions, strict=True)]
-    kinds = [g.kind for g in graded]
-    right = [g for g in graded if g.kind == "right"]
+    kinds = [kind for kind, *_ in graded]
+    right = [errors for kind, *errors in graded if kind == "right"]
     further, astray = _count_walls(workload, solver)
     return Point(
         workload=workload.name,
@@ -242,8 +234,8 @@ def _point(workload: Workload, solver: Solver, n_times: int, runs: Sequence[Solv
         left=kinds.count("left"),
         further=further,
         astray=astray,
-        ulps=tuple(short(g.ulps) if math.isfinite(g.ulps) else None for g in right),
-        relative=tuple(short(g.relative) for g in right),
+        ulps=tuple(short(ulps) if math.isfinite(ulps) else None for ulps, _ in right),
+        relative=tuple(short(relative) for _, relative in right),
     )
 
 
@@ -257,16 +249,17 @@ def _count_walls(workload: Workload, solver: Solver) -> tuple[int, int]:
     return len(answered), sum(getattr(a, "wall", None) != wall for a, wall in answered)
 
 
-def _grade(given: Given, question: ProvedStep) -> _Graded:
+def _grade(given: Given, question: ProvedStep) -> tuple[str, float, float]:
+    """Return right, wrong, undecided or left, and of a right answer its backward ulps and relative error."""
     if given is None:
-        return _Graded("left")
+        return "left", 0.0, 0.0
     answer = _enclosed(given)
     found = compare(answer, question.truth, question.state)
     if found.kind == "undecided":
-        return _Graded("undecided")
+        return "undecided", 0.0, 0.0
     if math.isnan(found.ulps) or not isinstance(answer, Enclosed):
-        return _Graded("wrong")
-    return _Graded("right", found.ulps, relative_error(answer, question.truth.steps[0]))
+        return "wrong", 0.0, 0.0
+    return "right", found.ulps, relative_error(answer, question.truth.steps[0])
 
 
 def _enclosed(answer: Answer) -> Answer:

@@ -8,8 +8,6 @@ Proofs are slow, and a few dozen questions show no rare mistake. So each workloa
 the same rule, whose walls a stepper that the caller trusts has named.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterator, Sequence
 from typing import NamedTuple

@@ -3,8 +3,6 @@
 Some ten minutes on one core; `--jobs N` shares them out.
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 from collections import Counter

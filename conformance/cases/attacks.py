@@ -4,8 +4,6 @@ The other steppers are callables that the caller gives. One answers a step in th
 with the walls it counted. `undecided` is honest. Steps are compared by `conformance.grading.agreement`.
 """
 
-from __future__ import annotations
-
 import json
 import time
 from collections import Counter
@@ -16,8 +14,7 @@ from typing import NamedTuple
 
 import msgspec
 
-from conformance.cases.certify import judge
-from conformance.cases.paths import claimed_path
+from conformance.cases.certify import claimed_path, judge
 from conformance.cases.prover import proved_step
 from conformance.cases.question import Family, Proved, Question, filed
 from conformance.grading.agreement import compare

@@ -13,8 +13,6 @@ own velocity along the normal, while f'' > 0 along the flight. About that time f
 length asked for gives the depth, and the start is some time before on the same line.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import partial
 from math import hypot

@@ -1,20 +1,303 @@
-"""From a question to a certified vector: the reference answers, and the verifier proves what is written."""
+"""From a question to a certified vector: the reference answers, and the verifier proves what is written.
 
-from __future__ import annotations
+Along a path the Jacobians of the steps are chained: what rounding every state that a stepper holds may do.
+
+An arc hit of a mushroom is captured when |x vy - y vx| > w(t) |v|, with the time and place of the hit and
+the velocity before the bounce (docs/protocol.md). Which hits begin and end a stay follows from two things
+alone: the order of the walls met, and for each arc hit whether it is captured. The reference's path proves
+the first; the signs of (x vy - y vx)^2 - w^2 v^2, certain over the enclosures of each hit, are the second:
+neither side of the inequality is negative, so squares compare as they do. A hit whose sign is open makes
+the question unfit. So all states within the enclosures have their stays between the same hits, and when
+these happen is enclosed with the path.
+"""
 
 import json
-from math import inf
+from collections.abc import Sequence
+from fractions import Fraction
+from math import inf, isfinite
 
 import msgspec
+import numpy as np
+import numpy.typing as npt
 
 import reference
 from conformance.cases.draw import Unfit
-from conformance.cases.paths import OpenSign, condition, finite, marks, proved_path
-from conformance.cases.prover import CONDITIONS, NUDGES, SIGNS, ask, expectation, flight_of, nudged
-from conformance.cases.question import Proved, Question, filed
-from conformance.vectors import Expectation, Level, Vector, four_digits
+from conformance.cases.prover import (
+    CONDITIONS,
+    NUDGES,
+    SIGNS,
+    ask,
+    coasted,
+    collided,
+    ends,
+    expectation,
+    flight_of,
+    nudged,
+)
+from conformance.cases.question import Mark, Proved, Question, filed
+from conformance.grading.error import Matrix, condition_number, free_flight, inputs_of
+from conformance.vectors import (
+    NUMBERS,
+    Certified,
+    Expectation,
+    Level,
+    Vector,
+    certified,
+    four_digits,
+)
 from conformance.verify import Verdict, verify_line
-from scene import BadInput, InvalidState, Rejected, Scene, State, Undecided, Undefined, from_data
+from reference.arithmetic import Arithmetic, Interval, sign
+from reference.walls import EnclosedFlight, MovingWalls
+from scene import (
+    BadInput,
+    InvalidState,
+    Mushroom,
+    Rejected,
+    Scene,
+    State,
+    Undecided,
+    Undefined,
+    from_data,
+)
+
+WIDEST = Fraction(1, 2**72)  # of an enclosure of a path: a millionth of a backward ulp and less
+
+
+class Links:
+    """The steps of a trajectory: their Jacobians chained from each state that a stepper has held.
+
+    Each Jacobian is that of the step from the rounded state, with the residual of the wall moving along.
+    `held` is (n, 5, 5): d(t, x, y, vx, vy) after the last step by t, x, y, vx, vy of each state held, and
+    `inputs` is (n, 5). Sums go over whole arrays: four digits of the allowances are kept, which no order of
+    summation changes. A flow tells no flight times: how delicate these are does not count where `is_timed`
+    is false.
+    """
+
+    def __init__(self, scene: Scene, state: State, t_end: float, *, is_timed: bool = True) -> None:
+        self.scene, self.state, self.t_end, self.is_timed = scene, state, t_end, is_timed
+        self.held: npt.NDArray[np.float64] = np.empty((0, 5, 5))
+        self.inputs: npt.NDArray[np.float64] = np.empty((0, 5))
+        self.condition = self.largest = 0.0
+
+    def add(self, found: reference.Collision) -> list[float]:
+        """Add a step, and return what all rounding may do to it: it begins at the rounded state."""
+        proved = ask(self.scene, self.state, self.t_end)
+        if not isinstance(proved, reference.Collision) or proved.wall != found.wall:
+            raise Unfit("a rounded state takes another path")
+        centre = [float(found.dt), *(float(c) for c in found.after[1:])]
+        allowance = self._chain(flight_of(proved, self.state, self.t_end).jacobian, centre)
+        self.state = found.rounded().state()
+        return allowance
+
+    def coast(self, horizon: reference.Horizon, since: reference.Enclosure | None) -> Certified:
+        """Return the horizon after the last collision, at time `since`; None for none."""
+        start = Fraction(self.state.t)
+        numbers = coasted(horizon, (start, start) if since is None else ends(since))
+        centre = [float(sum(numbers[name]) / 2) for name in NUMBERS]
+        allowance = self._chain(free_flight(self.state, centre[0]), centre)
+        return certified(numbers, finite(allowance), None, is_wide=True)
+
+    def _chain(self, jacobian: Matrix, centre: list[float]) -> list[float]:
+        self.held = np.concatenate([self.held, np.eye(5)[None]])
+        self.inputs = np.concatenate([self.inputs, [inputs_of(self.state)]])
+        with np.errstate(over="ignore", invalid="ignore"):  # what overflows is refused by `finite`
+            rows = (np.array(jacobian)[:, :, None] * self.held[:, None]).sum(axis=2)
+            moved = np.abs(rows * self.inputs[:, None]).sum(axis=(0, 2))
+            rows[:, 0] += self.held[:, 0]
+        self.held = rows
+        allowance = [float(part) for part in moved]
+        self.condition = condition_number(centre if self.is_timed else [inf, *centre[1:]], allowance)
+        return allowance
+
+
+def finite(allowance: Sequence[float]) -> Sequence[float]:
+    """Return allowances as they are.
+
+    Raises:
+        Unfit: one is infinite or none.
+    """
+    if not all(map(isfinite, allowance)):
+        raise Unfit("an allowance overflows")
+    return allowance
+
+
+def proved_path(scene: Scene, question: Question, working: int | None = None) -> Proved:
+    """Follow a particle as far as the chained condition number allows, or to the horizon.
+
+    Args:
+        scene: table and laws, of the question.
+        question: of a trajectory or a flow.
+        working: number of decimals to work with, by default what the reference takes. It answers for the
+            digits of the last collision asked for; a path that ends at a horizon may need more.
+
+    Raises:
+        Unfit: there is no answer to certify.
+    """
+    assert question.collisions is not None
+    state, t_end = question.state, question.t_end
+    try:
+        path = reference.trajectory(scene, state, question.collisions, t_end, working=working)
+        captured = marks(scene, path.steps) if question.flow else []
+    except InvalidState as error:
+        raise Unfit(str(error)) from None
+    end = path.outcome
+    if question.flow and not (isinstance(end, reference.Horizon) and question.flow(captured)):
+        raise Unfit("not the flow that is looked for")
+    links = Links(scene, state, t_end, is_timed=question.flow is None)
+    steps = _steps(links, path, question)
+    if len(steps) < len(path.steps):
+        end = None
+    if isinstance(end, reference.Horizon):
+        steps.append(links.coast(end, path.steps[-1].after.t if path.steps else None))
+        links.largest = max(links.largest, links.condition)
+    elif end is not None and not isinstance(end, Undefined):
+        raise Unfit("the reference is undecided")
+    if any(map(_is_wide, steps)):
+        return proved_path(scene, question, 2 * path.digits)
+    if question.flow:
+        arrived = arrival(steps, stays(captured))
+        largest = max(links.condition, timing_condition(arrived, state))
+        if largest > question.longest:
+            raise Unfit("the horizon is too delicate")
+        return Proved((arrived,), largest, len(steps))
+    expect = [Expectation("horizon" if end else "collision", tuple(steps))]
+    if isinstance(end, Undefined):
+        expect = [Expectation("undefined", tuple(steps), end.reason), Expectation("undecided", tuple(steps))]
+    return Proved(tuple(expect), links.largest, len(steps) + isinstance(end, Undefined))
+
+
+def _steps(links: Links, path: reference.Trajectory, question: Question) -> list[Certified]:
+    """Write down the collisions of a path as far as the condition number allows; of a flow all."""
+    steps: list[Certified] = []
+    for found in path.steps:
+        allowance = links.add(found)
+        if links.condition > question.longest:
+            break
+        links.largest = max(links.largest, links.condition)
+        steps.append(certified(collided(found), finite(allowance), found.wall, is_wide=True))
+    if len(steps) < (len(path.steps) if question.flow else 1):
+        raise Unfit("no collision is met, or the first is too delicate")
+    return steps
+
+
+def claimed_path(
+    scene: Scene, state: State, n_collisions: int, t_end: float, working: int | None = None
+) -> Expectation:
+    """Return the reference's path however it ends, undecided included; allowances are left out.
+
+    Args:
+        scene: table and laws.
+        state: the start.
+        n_collisions: how many to follow.
+        t_end: horizon [time].
+        working: decimals to work with, by default what the reference takes.
+    """
+    try:
+        path = reference.trajectory(scene, state, n_collisions, t_end, working=working)
+    except InvalidState:
+        return Expectation("rejected")
+    unknown, end = [0.0] * len(NUMBERS), path.outcome
+    steps = [certified(collided(found), unknown, found.wall, is_wide=True) for found in path.steps]
+    if isinstance(end, Undefined):
+        return Expectation("undefined", tuple(steps), end.reason)
+    if isinstance(end, Undecided):
+        return Expectation("undecided", tuple(steps), end.reason)
+    if isinstance(end, reference.Horizon):
+        since = ends(path.steps[-1].after.t) if steps else (Fraction(state.t), Fraction(state.t))
+        steps.append(certified(coasted(end, since), unknown, None, is_wide=True))
+    return Expectation("horizon" if end else "collision", tuple(steps))
+
+
+def _is_wide(step: Certified) -> bool:
+    """Tell whether an enclosure is wider than a small part of what rounding may do."""
+    for name, allowance in zip(NUMBERS, step.allowance, strict=True):
+        low, high = step.ends(name)
+        if high - low > WIDEST * (Fraction(allowance) + max(abs(low), abs(high))):
+            return True
+    return False
+
+
+def marks(scene: Scene, steps: Sequence[reference.Collision]) -> list[Mark]:
+    """Return what each collision of a proved path means for captured stays.
+
+    Raises:
+        Unfit: an arc hit is neither proved captured nor proved not to be.
+    """
+    found: list[Mark] = []
+    for step in steps:
+        if step.wall in ("left", "right", "floor"):
+            found.append("out")
+        elif step.wall == "arc" and isinstance(scene, Mushroom):
+            found.append("captured" if _is_captured(scene, step) else "free")
+        else:
+            found.append("")
+    return found
+
+
+def stays(found: Sequence[Mark]) -> tuple[tuple[int, int], ...]:
+    """Return begin and end of each stay as places in a path whose horizon comes after its last mark.
+
+    A stay begins with its first captured hit. It ends with the first arc hit after its last captured one, or
+    where the particle meets a wall of the stem if that comes first, or at the horizon.
+    """
+    spans: list[tuple[int, int]] = []
+    begin: int | None = None
+    end: int | None = None
+    for place, mark in enumerate([*found, "out"]):
+        if mark == "captured":
+            begin, end = place if begin is None else begin, None
+        elif mark == "free" and end is None:
+            end = place
+        elif mark == "out":
+            if begin is not None:
+                spans.append((begin, place if end is None else end))
+            begin = end = None
+    return tuple(spans)
+
+
+def arrival(steps: Sequence[Certified], spans: Sequence[tuple[int, int]]) -> Expectation:
+    """Return a flow's answer: of its path the hits that begin or end a stay, and the horizon.
+
+    That is all that is asked. Each keeps its enclosures; dt is counted from the one kept before, and what
+    may move it is the sum over the flights between.
+    """
+    kept = sorted({place for span in spans for place in span} | {len(steps) - 1})
+    thinned = []
+    for before, place in zip([-1, *kept], kept, strict=False):
+        flown, last = steps[before + 1 : place + 1], steps[place]
+        low, high = (sum(sides) for sides in zip(*(step.ends("dt") for step in flown), strict=True))
+        numbers = {name: last.ends(name) for name in NUMBERS} | {"dt": (low, high)}
+        allowance = [sum(step.allowance[0] for step in flown), *last.allowance[1:]]
+        thinned.append(certified(numbers, allowance, last.wall))
+    places = tuple((kept.index(begin), kept.index(end)) for begin, end in spans)
+    return Expectation("horizon", tuple(thinned), stays=places)
+
+
+def timing_condition(expected: Expectation, state: State) -> float:
+    """Return the condition number of the times at which a flow's stays begin and end, the largest."""
+    t, allowance, worst = state.t, abs(state.t), 0.0
+    for step in expected.steps[:-1]:
+        t, allowance = t + float(step.centre("dt")), allowance + step.allowance[0]
+        worst = max(worst, allowance / abs(t) if t else inf)
+    return worst
+
+
+def _is_captured(scene: Mushroom, step: reference.Collision) -> bool:
+    """Tell whether |x vy - y vx| > w |v|; the left side is the same all along the flight."""
+    arithmetic, departure = Arithmetic(step.digits), step.departure
+
+    def interval(enclosure: reference.Enclosure) -> Interval:
+        return arithmetic.hull(*(arithmetic.point(end._mpf_) for end in enclosure))
+
+    x, y, vx, vy = (interval(getattr(departure, name)) for name in ("x", "y", "vx", "vy"))
+    flight = EnclosedFlight(departure.instant, x, y, vx, vy, interval(departure.begin))
+    width = MovingWalls(arithmetic, scene, flight).width(interval(step.root)).f
+    spin = arithmetic.square(x * vy - y * vx)
+    found = sign(spin - arithmetic.square(width) * (arithmetic.square(vx) + arithmetic.square(vy)))
+    if not found:
+        raise Unfit("whether an arc hit is captured is not certain over its enclosures")
+    return found > 0
+
 
 INFINITE = 1e300
 
@@ -72,7 +355,7 @@ def _step(scene: Scene, question: Question) -> Proved:
         return Proved((answer, Expectation("undecided")), inf)
     flight = flight_of(outcome, state, t_end)
     allowance = finite(flight.allowance(state))
-    return Proved((answer,), condition(flight.centre(), allowance))
+    return Proved((answer,), condition_number(flight.centre(), allowance))
 
 
 def _level(scene: Scene | None, vector: Vector) -> Level:
@@ -100,6 +383,6 @@ def _walls_met(scene: Scene, vector: Vector, state: State) -> list[str]:
     try:
         path = reference.trajectory(scene, state, vector.collisions, vector.t_end, digits=10)
         found = marks(scene, path.steps) if vector.kind == "flow" else []
-    except (InvalidState, OpenSign):
+    except (InvalidState, Unfit):
         return ["Rejected"]
     return [*(step.wall for step in path.steps), *found, type(path.outcome).__name__]

@@ -5,8 +5,6 @@ published line, and nowhere else. All are answered by the reference and proved b
 corpus comes out on every machine, bit for bit.
 """
 
-from __future__ import annotations
-
 import hashlib
 from collections import defaultdict
 from collections.abc import Iterable

@@ -1,7 +1,5 @@
 """Families that look where steppers are seldom tested: far times, near walls, narrow margins."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import msgspec

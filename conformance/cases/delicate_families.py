@@ -7,8 +7,6 @@ badly itself where waves cancel to a part of 1e-4 to 1e-13: what is looked for t
 parts of what is left of it.
 """
 
-from __future__ import annotations
-
 import math
 
 import msgspec

@@ -5,8 +5,6 @@ bits are drawn, and floats come from + - * / and sqrt alone, so no libm takes pa
 bits (`conformance.strategies`), and shrinks them: of several options the first is the simplest.
 """
 
-from __future__ import annotations
-
 import math
 import random
 from collections.abc import Sequence

@@ -3,8 +3,6 @@
 A family's order of draws and its aim never change once published; a longer count only adds vectors.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import partial
 

@@ -6,14 +6,12 @@ does not forget its start exponentially fast: a fixed cap or mushroom, a breathi
 captured in a moving mushroom, a stem with level floor, all much faster than the walls.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from typing import Any
 
+from conformance.cases.certify import stays
 from conformance.cases.draw import Draw
 from conformance.cases.families import CATALOGUE, FIXED, MOVING
-from conformance.cases.paths import stays
 from conformance.cases.question import Family, Mark, Question
 from conformance.cases.scenes import MOVING as MOVING_KINDS
 from conformance.cases.scenes import Clock, clock, law, scene, state, time, walls_speed

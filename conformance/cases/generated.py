@@ -14,8 +14,6 @@ less than x: these than level extended. All are filed as of level core. The plai
 are asked: those that meet the wall that is looked for, and keep it when nudged.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from functools import cache
 from math import inf

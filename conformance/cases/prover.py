@@ -3,17 +3,30 @@
 The reference proves every answer by itself; `certify` has the verifier prove it again.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from fractions import Fraction
 from typing import NamedTuple
 
 import reference
 from conformance.grading.error import Matrix, free_flight, inputs_of, moved
-from conformance.vectors import DIGITS, NUMBERS, Certified, Ends, Expectation, Level, certified
+from conformance.vectors import (
+    DIGITS,
+    NUMBERS,
+    Certified,
+    Ends,
+    Expectation,
+    Level,
+    certified,
+)
 from reference.arithmetic import rational
-from scene import Rejected, Scene, State, Undecided, Undefined, Wall
+from scene import (
+    Rejected,
+    Scene,
+    State,
+    Undecided,
+    Undefined,
+    Wall,
+)
 
 # What a level asks (docs/corpus.md): nudges that change no wall, and the largest condition number.
 NUDGES: tuple[tuple[Level, float], ...] = (("core", 2.0**-30), ("extended", 2.0**-44))

@@ -1,7 +1,5 @@
 """What is asked and by which family, what is proved of it, and how both are filed."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from typing import Any, Literal, NamedTuple
 

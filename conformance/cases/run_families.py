@@ -10,8 +10,6 @@ waiting one comes to the base after hundreds of periods that no wall disturbs. A
 the particle comes there and was not when it left the arc, or the other way round.
 """
 
-from __future__ import annotations
-
 from functools import partial
 from math import sqrt
 

@@ -12,8 +12,6 @@ state may still be refused (its rounded place lies outside, or it moves into the
 draws again.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from math import sqrt
@@ -23,7 +21,20 @@ import msgspec
 from msgspec.structs import replace
 
 from conformance.cases.draw import Draw, Unfit
-from scene import BangBang, Cap, Fourier, Law, Mushroom, Scene, State, Stem, Wall, to_data
+from scene import (
+    BadInput,
+    BangBang,
+    Cap,
+    Fourier,
+    Law,
+    Mushroom,
+    Scene,
+    State,
+    Stem,
+    Wall,
+    from_data,
+    to_data,
+)
 from scene.geometry import TableAt, rounded
 from scene.given import MAX_KNOTS
 from scene.laws import bounds, breakpoints
@@ -199,6 +210,14 @@ def wire_form(of: Scene) -> dict[str, Any]:
     data = {key: law for key, law in to_data(of).items() if key not in ("name", "notes")}
     decoded: dict[str, Any] = msgspec.json.decode(msgspec.json.encode(data))  # lists for tuples
     return decoded
+
+
+def readable(data: dict[str, Any]) -> Scene | None:
+    """Return the scene in the wire's form; None where it is a bad one, which is to be refused."""
+    try:
+        return from_data(data)
+    except BadInput:
+        return None
 
 
 def walls_speed(scene: Scene) -> float:

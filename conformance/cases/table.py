@@ -1,7 +1,5 @@
 """The table of families: where every question comes from."""
 
-from __future__ import annotations
-
 from conformance.cases import (
     bound_families,
     coverage_families,

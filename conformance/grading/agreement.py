@@ -11,8 +11,6 @@ for all numbers of the enclosures; else the comparison is `indeterminate`. An an
 wrong; callers count it. The reason of an undefined outcome must be the certified one; no other is compared.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Sequence
 from fractions import Fraction
@@ -30,7 +28,29 @@ DIGITS, SHARPEST = Fraction(1, 1000), Fraction(1, 2**43)  # what passes is right
 NEAR_HIT = Fraction(1, 10)  # of the flight time
 # dt, t, place, velocity: what is judged as one vector.
 VECTORS = (("dt",), ("t",), ("x", "y"), ("vx", "vy"))
-Kind = Literal["agrees", "numbers", "indeterminate", "wall", "outcome", "length", "undecided"]
+Kind = Literal[
+    "agrees",
+    "numbers",
+    "indeterminate",
+    "wall",
+    "outcome",
+    "length",
+    "undecided",
+    "error",
+    "wrong-format",
+]
+Verdict = Literal["pass", "fail", "indeterminate", "declined", "error", "wrong-format"]
+VERDICTS: dict[Kind, Verdict] = {
+    "agrees": "pass",
+    "indeterminate": "indeterminate",
+    "undecided": "declined",
+    "numbers": "fail",
+    "wall": "fail",
+    "outcome": "fail",
+    "length": "fail",
+    "error": "error",
+    "wrong-format": "wrong-format",
+}
 
 
 class Enclosed(NamedTuple):
@@ -58,7 +78,8 @@ class Agreement(NamedTuple):
 
     Attributes:
         kind: `agrees`, or what differs first: the `outcome`, the `wall`, the `numbers`, the `length` of a
-            trajectory; `undecided` where the answer is; `indeterminate` where the truth cannot tell.
+            trajectory; `undecided` where the answer is; `indeterminate` where the truth cannot tell; `error`
+            or `wrong-format` where nothing was compared (`grading.grade`).
         ulps: worst backward ulps of a component, nan when not measured.
         relative: worst backward error, likewise.
         why: one line.
@@ -70,6 +91,11 @@ class Agreement(NamedTuple):
     relative: float = math.nan
     why: str = ""
     step: int = 0
+
+    @property
+    def verdict(self) -> Verdict:
+        """Return what the comparison comes to: pass, or why not."""
+        return VERDICTS[self.kind]
 
 
 class _Measured(NamedTuple):

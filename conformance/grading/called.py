@@ -11,12 +11,9 @@ each output. How far that moves the answer, to first order, follows from the ans
 Where a nudge changes the outcome or the wall, the question is delicate and nothing is said about it.
 """
 
-from __future__ import annotations
-
 import json
 import math
 from collections.abc import Sequence
-from functools import partial
 from math import hypot
 from typing import Any, NamedTuple, NoReturn
 
@@ -41,7 +38,7 @@ from scene.refusal import shown
 from scene.states import Stepper
 from scene.tables import cycle_length, laws
 
-MOST = 2.0**100  # sizes, speeds and their inverses within it overflow nowhere
+HELD = 2.0**100  # sizes, speeds and their inverses within it overflow nowhere
 FAR = 2.0**20  # periods from t = 0 that every stepper must reach
 Question = tuple[Scene, State, float]  # as a stepper takes it: with t_end
 CLEAR = 2.0**-20  # of the table's size: farther inside than any rounding leads
@@ -49,18 +46,6 @@ CLEAR = 2.0**-20  # of the table's size: farther inside than any rounding leads
 Numbers = tuple[float, ...]
 NUDGE = 2.0**-26  # relative: the differences of central differences then keep half of binary64's digits
 INPUTS = ("t", "x", "y", "vx", "vy")
-
-
-def answering(stepper: Stepper) -> Stepper:
-    """Return the stepper, held to answer every question by an outcome whose numbers are finite floats.
-
-    Args:
-        stepper: (scene, state, t_end) -> outcome.
-
-    Raises:
-        AssertionError: when it is called and does not: one line, with the question.
-    """
-    return partial(_outcome, stepper)
 
 
 def fail(name: str, text: str, *questions: Question) -> NoReturn:
@@ -81,7 +66,7 @@ def is_clearly_inside(scene: Scene, state: State, t_end: float) -> bool:
     sizes = [abs(extent) for law in laws(scene).values() for extent in bounds(law)]
     sizes += [abs(number) for number in (state.x, state.y, state.vx, state.vy, state.t, t_end)]
     is_far = max(abs(state.t), abs(t_end)) > FAR * (cycle_length(scene) or 1.0)
-    if state.wall is not None or is_far or any(size and not 1 / MOST < size < MOST for size in sizes):
+    if state.wall is not None or is_far or any(size and not 1 / HELD < size < HELD for size in sizes):
         return False
     off = CLEAR * float(table_at(fp, scene, state.t).size)
     places = [(0.0, 0.0), (off, 0.0), (-off, 0.0), (0.0, off), (0.0, -off)]
@@ -89,7 +74,12 @@ def is_clearly_inside(scene: Scene, state: State, t_end: float) -> bool:
     return not any(isinstance(plain.next_collision(scene, at, t_end), Rejected) for at in around)
 
 
-def _outcome(stepper: Stepper, scene: Scene, state: State, t_end: float) -> Outcome:
+def ask(stepper: Stepper, scene: Scene, state: State, t_end: float) -> Outcome:
+    """Return a stepper's answer, which must be an outcome whose numbers are finite floats.
+
+    Raises:
+        AssertionError: one line, with the question.
+    """
     found: Any = stepper(scene, state, t_end)
     if isinstance(found, Rejected) and is_clearly_inside(scene, state, t_end):
         fail("outcome", f"{found}, must be no refusal of a state clearly inside", (scene, state, t_end))
@@ -177,7 +167,7 @@ def measured(
     Returns:
         The step, or None when it is no collision or horizon, or a delicate one.
     """
-    outcome = stepper(scene, state, t_end)
+    outcome = ask(stepper, scene, state, t_end)
     found = numbers(outcome, state)
     if found is None or not isinstance(outcome, Collision | Horizon):
         return None
@@ -185,19 +175,14 @@ def measured(
     nudges = [max(NUDGE * scale.time, 2.0**-46 * abs(state.t))]
     nudges += [NUDGE * scale.length] * 2 + [NUDGE * scale.speed] * 2
     size = [abs(state.t), *[hypot(state.x, state.y)] * 2, *[hypot(state.vx, state.vy)] * 2]
-    errors = [bound * part for part in vector_sizes(found)]
+    dt, t, x, y, vx, vy = found
+    errors = [bound * part for part in (abs(dt), abs(t), *[hypot(x, y)] * 2, *[hypot(vx, vy)] * 2)]
     for field, nudge, extent, error in zip(INPUTS, nudges, size, incoming, strict=True):
         slopes = derivative(stepper, scene, state, t_end, outcome, field, nudge)
         if slopes is None:
             return None
         errors = [e + abs(d) * (error + bound * extent) for e, d in zip(errors, slopes, strict=True)]
     return MeasuredStep(outcome, found, tuple(errors))
-
-
-def vector_sizes(found: Numbers) -> Numbers:
-    """Return the sizes of dt, t, and of place and velocity as vectors."""
-    dt, t, x, y, vx, vy = found
-    return (abs(dt), abs(t), *[hypot(x, y)] * 2, *[hypot(vx, vy)] * 2)
 
 
 def derivative(
@@ -210,7 +195,7 @@ def derivative(
         nudged = msgspec.structs.replace(state, **{field: value})
         if nudged.t > t_end:
             return None
-        answer = stepper(scene, nudged, t_end)
+        answer = ask(stepper, scene, nudged, t_end)
         found = numbers(answer, nudged)
         same = getattr(answer, "wall", None) == getattr(outcome, "wall", None)
         if found is None or type(answer) is not type(outcome) or not same:

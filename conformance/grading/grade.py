@@ -18,65 +18,25 @@ question.
   are not.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any, Literal, NamedTuple
+from typing import Any, Literal
 
 import msgspec
 
-from conformance.grading.agreement import Agreement, Answer, Kind, compare, compare_arrival, physics_bound
+from conformance.grading.agreement import Agreement, Answer, compare, compare_arrival, physics_bound
 from conformance.vectors import Vector
 from scene.protocol.messages import Answered, AnsweredCollision, Flown, Steps
 
-Verdict = Literal[
-    "pass",
-    "fail",
-    "indeterminate",
-    "declined",
-    "unsupported",
-    "error",
-    "crashed",
-    "timed-out",
-    "wrong-format",
-]
 PrecisionClass = Literal["A", "B", "C"]
 FORMS: dict[str, Any] = {"step": Answered, "trajectory": Steps, "flow": Flown}
 LOST = ("undefined", "undecided", "rejected")  # may be answered to a whole question
 SHARP, FAIR = 4.0, 1e4  # backward ulps of classes A and B
 # Of several right answers the best grade counts; this is the order.
-_PREFERENCE: tuple[Verdict, ...] = ("pass", "indeterminate", "declined", "fail")
-_VERDICTS: dict[Kind, Verdict] = {
-    "agrees": "pass",
-    "indeterminate": "indeterminate",
-    "undecided": "declined",
-    "numbers": "fail",
-    "wall": "fail",
-    "outcome": "fail",
-    "length": "fail",
-}
+_PREFERENCE = ("pass", "indeterminate", "declined", "fail")
 
 
-class Grade(NamedTuple):
-    """What is found about one answer.
-
-    Attributes:
-        verdict: of its physics, or why there is none.
-        ulps: worst backward ulps, nan when not measured.
-        relative: worst backward error, nan when not measured.
-        why: one line.
-        step: the one that `why` is about, counted from 0.
-    """
-
-    verdict: Verdict
-    ulps: float
-    relative: float
-    why: str
-    step: int = 0
-
-
-def grade(vector: Vector, answer: Any) -> Grade:
+def grade(vector: Vector, answer: Any) -> Agreement:
     """Judge an answer.
 
     Args:
@@ -84,43 +44,33 @@ def grade(vector: Vector, answer: Any) -> Grade:
         answer: what the implementation sent, decoded: a mapping, or the answer is none.
 
     Returns:
-        pass, fail, indeterminate, declined, error or wrong-format, with the errors measured.
+        Its `verdict` is pass, fail, indeterminate, declined, error or wrong-format; with the errors measured.
     """
     if isinstance(answer, Mapping) and isinstance(answer.get("error"), str):
-        return _unmeasured("error", " ".join(answer["error"].split())[:200])
+        return Agreement("error", why=" ".join(answer["error"].split())[:200])
     try:
         parts = _parts(vector, answer)
         outcomes = [msgspec.convert(msgspec.to_builtins(part), Answered) for part in parts]
     except (TypeError, msgspec.ValidationError, OverflowError, RecursionError) as error:
-        return _unmeasured("wrong-format", " ".join(str(error).split()))
+        return Agreement("wrong-format", why=" ".join(str(error).split()))
     physics = physics_bound(vector.condition)
     if vector.kind == "flow":
         captured = getattr(parts[0], "captured", None)
         found = [
             compare_arrival(outcomes[0], captured, known, vector.state, physics) for known in vector.expect
         ]
-        return _noted(vector, _best(found))
-    asked: Answer | list[Answer] = outcomes if vector.kind == "trajectory" else outcomes[0]
-    found = [compare(asked, known, vector.state, physics=physics) for known in vector.expect]
-    graded = _noted(vector, _best(found))
+    else:
+        asked: Answer | list[Answer] = outcomes if vector.kind == "trajectory" else outcomes[0]
+        found = [compare(asked, known, vector.state, physics=physics) for known in vector.expect]
+    graded = min(found, key=lambda one: _PREFERENCE.index(one.verdict))
+    if graded.verdict == "pass" and not math.isnan(graded.relative) and vector.condition * physics >= 1:
+        none = f"the walls alone are graded: condition {vector.condition:.1g} allows no number"
+        graded = graded._replace(why=none)
     if graded.verdict == "declined" and {"rejected"} < {known.outcome for known in vector.expect}:
-        graded = graded._replace(verdict="pass", why=f"{graded.why}; a refusal is allowed here")
+        graded = graded._replace(kind="agrees", why=f"{graded.why}; a refusal is allowed here")
     if any(isinstance(outcome, AnsweredCollision) and outcome.dt is None for outcome in outcomes):
         return graded._replace(why=f"{graded.why}; without dt, t is graded in its place")
     return graded
-
-
-def _noted(vector: Vector, found: Grade) -> Grade:
-    """Say of a right answer that its numbers could not have been wrong, where the condition allows none."""
-    if (
-        found.verdict != "pass"
-        or math.isnan(found.relative)
-        or vector.condition * physics_bound(vector.condition) < 1
-    ):
-        return found
-    return found._replace(
-        why=f"the walls alone are graded: condition {vector.condition:.1g} allows no number"
-    )
 
 
 def precision_class(ulps: Sequence[float]) -> PrecisionClass:
@@ -131,16 +81,6 @@ def precision_class(ulps: Sequence[float]) -> PrecisionClass:
     """
     worst = max((n for n in ulps if not math.isnan(n)), default=0.0)
     return "A" if worst <= SHARP else "B" if worst <= FAIR else "C"
-
-
-def _best(found: Sequence[Agreement]) -> Grade:
-    """Return the grade against the certified answer that fits best."""
-    grades = [Grade(_VERDICTS[one.kind], one.ulps, one.relative, one.why, one.step) for one in found]
-    return min(grades, key=lambda grade: _PREFERENCE.index(grade.verdict))
-
-
-def _unmeasured(verdict: Verdict, why: str) -> Grade:
-    return Grade(verdict, math.nan, math.nan, why)
 
 
 def _parts(vector: Vector, answer: Any) -> list[Any]:

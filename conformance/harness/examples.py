@@ -1,7 +1,5 @@
 """The example harnesses in `conformance/harness`: how to run each here, or why it cannot run."""
 
-from __future__ import annotations
-
 import shutil
 import subprocess
 import sys

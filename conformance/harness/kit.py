@@ -12,8 +12,6 @@ engine, by raising `Open`: a next hit does not tell how near it came to another 
 it returns that is no hit (nan, a time that has passed) is answered as a failure of its own.
 """
 
-from __future__ import annotations
-
 import math
 import sys
 from collections.abc import Callable

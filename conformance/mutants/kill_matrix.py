@@ -6,8 +6,6 @@ some five minutes on one core. Only `fail` kills: a vector that a mutant decline
 does not count.
 """
 
-from __future__ import annotations
-
 import json
 import sys
 from collections.abc import Callable, Sequence

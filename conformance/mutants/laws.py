@@ -1,7 +1,5 @@
 """Mutants that follow a law of motion wrongly: its phase, harmonics, legs, periods, digits."""
 
-from __future__ import annotations
-
 import struct
 from math import cos, floor, fmod, pi, sin
 
@@ -201,9 +199,8 @@ def escape_time_from_sizes_at_departure(
 ) -> None:
     """Bounds the time of a flight by the sizes that the table has at departure, though it grows."""
     plain(scene, state, t_end)
-    highest, now = flight.bounds, {name: law.value for name, law in flight.laws.items()}
-    flight.bounds = {name: b._replace(lowest=now[name], highest=now[name]) for name, b in highest.items()}
-    flight.end, flight.bounds, flight.is_horizon = min(flight.end, flight.escape() / 2), highest, True
+    sizes, flight.sizes = flight.sizes, {name: abs(law.value) for name, law in flight.laws.items()}
+    flight.end, flight.sizes, flight.is_horizon = min(flight.end, flight.escape() / 2), sizes, True
 
 
 @mutant(FourierMotion, "__init__", COMMON)

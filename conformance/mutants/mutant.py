@@ -4,8 +4,6 @@ The function takes the object, the plain method, and what the method takes. Its 
 mutant's; its docstring is the fault. A keyword `size` is the threshold from which on the mistake shows.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any, NamedTuple, TypeVar
@@ -40,7 +38,7 @@ class Mutant(NamedTuple):
     flight: type[Flight] = Flight
     path: type[PlainPath] = PlainPath
     size: float | None = None
-    of_size: Callable[[float], Mutant] | None = None
+    of_size: Callable[[float], "Mutant"] | None = None
 
     def step(self, scene: Scene, state: State, t_end: float) -> Outcome:
         """Return the mutant's answer to a step."""

@@ -1,7 +1,5 @@
 """Mutants whose single flights are right, and that err from hit to hit or in the capture interval."""
 
-from __future__ import annotations
-
 from math import hypot
 
 from msgspec.structs import replace

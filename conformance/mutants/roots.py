@@ -1,7 +1,5 @@
 """Mutants that miss a hit, find one where there is none, or decide wrongly which is the first."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 
 from conformance.mutants.mutant import COMMON, Plain, mutant

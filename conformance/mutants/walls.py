@@ -1,7 +1,5 @@
 """Mutants that have a wall, a bounce, or the mouth wrong."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from math import hypot
 

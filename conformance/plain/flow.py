@@ -1,7 +1,5 @@
 """The plain stepper's paths: collision after collision, and a particle's first captured stay up to t_end."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from math import hypot, prod
 from typing import NamedTuple
@@ -56,8 +54,8 @@ class PlainPath:
 
     def close(self, t: float) -> None:
         """End the stay, if one is on, when a wall of the stem is met or at t_end."""
-        if self.stay.begin is not None:
-            self.stays.append((self.stay.begin, t if self.stay.end is None else self.stay.end))
+        if (stay := self.stay.until(t)) is not None:
+            self.stays.append(stay)
         self.stay = Stay()
 
     def is_captured(self, scene: Mushroom, hit: Collision) -> bool:
@@ -84,11 +82,15 @@ class Stay(NamedTuple):
     begin: float | None = None
     end: float | None = None
 
-    def after(self, t: float, is_captured: bool) -> Stay:
+    def after(self, t: float, is_captured: bool) -> "Stay":
         """Return the stay after an arc hit: uncaptured hits between captured ones do not divide it."""
         if is_captured:
             return Stay(t if self.begin is None else self.begin)
         return Stay(self.begin, t) if self.begin is not None and self.end is None else self
+
+    def until(self, t: float) -> Captured:
+        """Return the stay that ends at t, if it did not before; None where there is none."""
+        return None if self.begin is None else (self.begin, t if self.end is None else self.end)
 
 
 def width(scene: Mushroom, t: float) -> float:

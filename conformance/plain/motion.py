@@ -4,8 +4,6 @@ Each law gives its value at departure, its rise since, computed without cancella
 time, and its rate. So no wall is ever evaluated in absolute time.
 """
 
-from __future__ import annotations
-
 from bisect import bisect_right
 from functools import cached_property
 from itertools import pairwise

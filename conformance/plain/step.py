@@ -9,8 +9,6 @@ The third implementation beside `reference` and `fast`, the subject of the tutor
 `conformance.mutants` spoil. Ties within rounding are answered `undecided`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from math import hypot, inf
 from typing import ClassVar, NamedTuple
@@ -268,7 +266,7 @@ class Flight:
             return 2 * (b["r"].highest * self.fastest("r", s) + x * vx + y * vy)
         if wall in ("floor", "base"):
             return vy + (self.fastest("h", s) if wall == "floor" else 0.0)
-        tilting = self.fastest("slope", s) * y + max(-b["slope"].lowest, b["slope"].highest) * vy
+        tilting = self.fastest("slope", s) * y + self.sizes["slope"] * vy
         if "w" in b:
             return self.fastest("w", s) + tilting + vx
         widening = b["nu"].highest * self.fastest("r", s) + self.fastest("nu", s) * b["r"].highest
@@ -290,9 +288,8 @@ class Flight:
 
     def escape(self) -> float:
         """Return a time by which no table is large enough to have kept the particle."""
-        top = {name: max(-law.lowest, law.highest) for name, law in self.bounds.items()}
-        r, h = top.get("r", 0.0), top.get("h", 0.0)
-        half = max(r, top.get("w", 0.0)) + top.get("slope", 0.0) * h
+        r, h = self.sizes.get("r", 0.0), self.sizes.get("h", 0.0)
+        half = max(r, self.sizes.get("w", 0.0)) + self.sizes.get("slope", 0.0) * h
         across, along = abs(self.vx) / (4 * half), abs(self.vy) / (2 * (r + h))
         return min(1 / max(across, along, 1 / LARGEST), LARGEST)
 

@@ -5,8 +5,6 @@ that an answer leaves out is named from the place; texts lose their control char
 protocol does not name is `wrong-format`, with the field. Whether an answer is right is not judged here.
 """
 
-from __future__ import annotations
-
 import json
 import re
 import struct

@@ -5,8 +5,6 @@ and passes, unless the few vectors by which the kill matrix tells them from othe
 same ones is named.
 """
 
-from __future__ import annotations
-
 import json
 import math
 from collections.abc import Sequence

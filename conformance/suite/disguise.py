@@ -10,8 +10,6 @@ meet its first wall after dt meets nothing before, so that at any earlier t_end 
 exact place x + vx s, y + vy s. `cases.generated` draws questions in scenes that no file holds.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from fractions import Fraction
 from typing import Any, NamedTuple
@@ -20,9 +18,10 @@ import msgspec
 
 from conformance.cases.draw import Draw
 from conformance.cases.generated import GROUP as FRESH
+from conformance.cases.scenes import readable
 from conformance.grading.error import condition_number, free_flight, inputs_of, moved
 from conformance.vectors import NUMBERS, Expectation, Vector, certified
-from scene import BadInput, Scene, from_data, to_data, transforms
+from scene import to_data, transforms
 
 LARGEST = 12  # exponents of two are drawn between this and its negative
 RANGE = 2.0**-350, 2.0**350  # numbers that a scale may lead to: their squares are far from both ends
@@ -59,14 +58,14 @@ def drawn_disguise(vector: Vector, seed: int) -> Disguise:
     is_mirrored = own.pick((False, True))
     exponents = [k for k in range(-LARGEST, LARGEST + 1) if k]
     length, time = shared.pick(exponents), shared.pick(exponents)
-    if _scene(vector) is None or not _stays_in_range(vector, length, time):
+    if readable(vector.scene) is None or not _stays_in_range(vector, length, time):
         return Disguise(is_mirrored)
     return Disguise(is_mirrored, length, time)
 
 
 def asked(vector: Vector, disguise: Disguise) -> Vector:
     """Return the question in disguise; its certified answers are still those of the question as published."""
-    state, scene = vector.state, _scene(vector)
+    state, scene = vector.state, readable(vector.scene)
     if disguise.is_mirrored:
         state = transforms.mirrored(state)
     if scene is None or not (disguise.length or disguise.time):
@@ -109,14 +108,6 @@ def drawn_horizons(vectors: Sequence[Vector], seed: int) -> list[Vector]:
     return found[:N_DRAWN]
 
 
-def _scene(vector: Vector) -> Scene | None:
-    """Return a vector's scene; None where it is a bad one, which is to be refused."""
-    try:
-        return from_data(vector.scene)
-    except BadInput:
-        return None
-
-
 def _stays_in_range(vector: Vector, length: int, time: int) -> bool:
     """Tell whether a scale leads to no number, asked or certified, that is near an end of binary64."""
     least, most = RANGE
@@ -152,9 +143,9 @@ def _before_the_hit(vector: Vector, part: float, number: int) -> Vector | None:
         return None
     place = {"x": Fraction(state.x) + Fraction(state.vx) * s, "y": Fraction(state.y) + Fraction(state.vy) * s}
     numbers = {"dt": s, **place, "vx": Fraction(state.vx), "vy": Fraction(state.vy)}
-    centre, jacobian = [float(numbers[name]) for name in NUMBERS], free_flight(state, float(s))
-    inputs = inputs_of(state)
-    step = certified({n: (v, v) for n, v in numbers.items()}, [moved(row, inputs) for row in jacobian], None)
+    centre = [float(numbers[name]) for name in NUMBERS]
+    allowance = [moved(row, inputs_of(state)) for row in free_flight(state, float(s))]
+    step = certified({n: (v, v) for n, v in numbers.items()}, allowance, None)
     return msgspec.structs.replace(
         vector,
         id=f"{DRAWN}/{number}",
@@ -162,5 +153,5 @@ def _before_the_hit(vector: Vector, part: float, number: int) -> Vector | None:
         rule=f"{vector.id} at a time before its hit",
         t_end=t_end,
         expect=(Expectation("horizon", (step,)),),
-        condition=condition_number(centre, jacobian, inputs),
+        condition=condition_number(centre, allowance),
     )

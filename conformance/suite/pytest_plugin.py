@@ -1,7 +1,5 @@
 """The pytest plugin behind `pytest_suite`: its options, its session, one case per vector."""
 
-from __future__ import annotations
-
 import secrets
 import shlex
 from collections.abc import Iterator

@@ -9,8 +9,6 @@ with their reason. Not here: drawn questions, speed, known failures (use `-k` an
 how many cases may be declined.
 """
 
-from __future__ import annotations
-
 import pytest
 
 from conformance import suite

@@ -7,8 +7,6 @@ shields.io asks of an endpoint, which makes a badge of them.
 `python -m conformance.suite.reports > docs/check.schema.json` prints the schema of the JSON report.
 """
 
-from __future__ import annotations
-
 import json
 import re
 from typing import Any

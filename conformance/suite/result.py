@@ -6,8 +6,6 @@ profile is graded when a vector that needs it passed; a question that must be re
 no table. What is not in the scope is not accepted, whatever the exit code.
 """
 
-from __future__ import annotations
-
 import math
 from collections import Counter
 from collections.abc import Sequence
@@ -27,7 +25,6 @@ VERDICTS = ("pass", "fail", "indeterminate", "declined", "unsupported", *BAD[1:]
 # An implementation that declines more has not been graded: of all questions, and of those of one group.
 MAX_DECLINED, MAX_DECLINED_OF_GROUP = 0.05, 0.25
 NOT_KNOWN = "though it is listed as a known failure"
-NamedVerdict = tuple[str, str, str, float]  # a case's name, verdict, why, seconds
 
 
 class Result(msgspec.Struct, frozen=True, omit_defaults=True):

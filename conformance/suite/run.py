@@ -9,8 +9,6 @@ implementation, the level and the seed, not from the machine or its load, but fo
 `time` to a clock.
 """
 
-from __future__ import annotations
-
 import itertools
 import math
 import secrets
@@ -26,8 +24,8 @@ import msgspec
 from conformance import vectors
 from conformance.cases.generated import GROUP as FRESH
 from conformance.cases.generated import ROUND, fresh
-from conformance.grading.agreement import middle
-from conformance.grading.grade import Grade, grade
+from conformance.grading.agreement import Agreement, middle
+from conformance.grading.grade import grade
 from conformance.suite.answers import outcomes_of
 from conformance.suite.checks import GROUPS, Implementation, checks_of, run_check, timing
 from conformance.suite.diagnosis import diagnose
@@ -219,24 +217,14 @@ def _tried(name: str, act: Callable[[], object]) -> Result:
     return Result(f"protocol/{name}", "protocol", verdict, why, time.monotonic() - begin)
 
 
-def put(session: Session, vector: Vector) -> dict[str, Any]:
-    """Put one vector to an open session and return its answer.
-
-    Raises:
-        Trouble: as `Session.ask`; unsupported, when the implementation does not list what it needs.
-    """
-    assert session.introduction is not None
-    is_refused = vector.expect[0].outcome == "rejected"
-    if lacking := missing(session.introduction, vector.kind, None if is_refused else vector.scene):
-        raise Trouble("unsupported", lacking)
-    return session.ask(vectors.request(vector, 0))
-
-
 def ask_vector(session: Session, vector: Vector, disguise: Disguise = Disguise()) -> Result:  # noqa: B008
     """Put one vector to an open session, in disguise, and grade the answer to the question as published."""
-    begin = time.monotonic()
+    assert session.introduction is not None
+    begin, is_refused = time.monotonic(), vector.expect[0].outcome == "rejected"
+    if lacking := missing(session.introduction, vector.kind, None if is_refused else vector.scene):
+        return _result(vector, Trouble("unsupported", lacking))
     try:
-        answer = published(put(session, asked(vector, disguise)), disguise)
+        answer = published(session.ask(vectors.request(asked(vector, disguise), 0)), disguise)
     except Trouble as trouble:
         return _result(vector, trouble, time.monotonic() - begin)
     graded = grade(vector, answer)
@@ -259,7 +247,7 @@ def ask_vector(session: Session, vector: Vector, disguise: Disguise = Disguise()
 
 
 def _compared(
-    vector: Vector, answer: dict[str, Any], graded: Grade
+    vector: Vector, answer: dict[str, Any], graded: Agreement
 ) -> tuple[dict[str, Any] | None, dict[str, Any] | None]:
     """Return the outcome that did not pass and the certified one in its place; None where there is none."""
     if graded.verdict in ("pass", "wrong-format", "error"):

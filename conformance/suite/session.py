@@ -7,13 +7,12 @@ still asked is `timed-out`. Sequence numbers are random, so that no answer can b
 How an answer is read is in `conformance.suite.answers`; whether it is right is not judged here.
 """
 
-from __future__ import annotations
-
 import math
 import random
 import sys
 import time
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import AbstractContextManager
 from functools import partial
 from types import TracebackType
 from typing import Any, TypeVar
@@ -62,7 +61,7 @@ class InProcess:
         """End."""
 
 
-class Session:
+class Session(AbstractContextManager["Session"]):
     """A conversation with a command; a context manager that leaves no process behind.
 
     Args:
@@ -88,9 +87,6 @@ class Session:
         self.introduction: Introduction | None = None
         self.n_restarts, self.sent = 0, b""
         self.stderr = Transcript()
-
-    def __enter__(self) -> Session:
-        return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
@@ -131,21 +127,34 @@ class Session:
             Trouble: crashed, timed-out or wrong-format; error or timed-out when the session is over.
         """
         seq = self._draw.randint(1, MAX_SEQ)
-        answer = self._say(_encode({**request, "seq": seq}), request["cmd"], seq)
+        line = msgspec.json.encode({**request, "seq": seq})
+        answer = self.say(line, seq, request["cmd"], may_be_null=False)
         return with_walls(answer, request.get("scene"))
 
-    def say(self, line: bytes, seq: int | None, cmd: str = "step") -> dict[str, Any]:
+    def say(
+        self, line: bytes, seq: int | None, cmd: str = "step", *, may_be_null: bool = True
+    ) -> dict[str, Any]:
         """Send a line that may be no request, and return what it is answered.
 
         Args:
             line: without its newline.
             seq: that can be read in it; the answer has this one or null.
             cmd: whose answer may come where it is one after all.
+            may_be_null: whether null will do for the seq.
 
         Raises:
             Trouble: as `ask`.
         """
-        return self._say(line, cmd, seq, may_be_null=True)
+        if self._end is not None:
+            raise self._end
+        self._check_time()
+        if self._process is None:
+            self._restart()
+        try:
+            return read_answer(self._exchange(line), cmd, seq, may_be_null=may_be_null)
+        except Trouble:
+            self.kill()
+            raise
 
     def stop(self) -> None:
         """Ask the process to stop and see it end by itself.
@@ -158,7 +167,7 @@ class Session:
             self._check_time()
             raise self._end or Trouble("error", "not asked: no process was left")
         try:
-            process.finish(_encode({"cmd": "stop"}), min(STOP_TIMEOUT, self._limits.timeout))
+            process.finish(msgspec.json.encode({"cmd": "stop"}), min(STOP_TIMEOUT, self._limits.timeout))
         finally:
             process.kill()
 
@@ -171,21 +180,9 @@ class Session:
     def _opened(self, request: Mapping[str, Any], read: Callable[[bytes], T]) -> T:
         """Read the answer to a request without which the session is over."""
         try:
-            return read(self._exchange(_encode(request)))
+            return read(self._exchange(msgspec.json.encode(request)))
         except Trouble as trouble:
             raise self._given_up(trouble) from None
-
-    def _say(self, line: bytes, cmd: str, seq: int | None, *, may_be_null: bool = False) -> dict[str, Any]:
-        if self._end is not None:
-            raise self._end
-        self._check_time()
-        if self._process is None:
-            self._restart()
-        try:
-            return read_answer(self._exchange(line), cmd, seq, may_be_null=may_be_null)
-        except Trouble:
-            self.kill()
-            raise
 
     def _check_time(self) -> None:
         if self._end is None and time.monotonic() >= self._deadline:
@@ -251,7 +248,3 @@ def probe_values() -> list[float]:
     draw = random.Random(53)
     scattered = [math.ldexp(1 + draw.random(), exponent) for exponent in range(-1074, 1024, 8)]
     return [sign * value for value in (*special, *small, *scattered) for sign in (1.0, -1.0)]
-
-
-def _encode(request: Mapping[str, Any]) -> bytes:
-    return msgspec.json.encode(request)

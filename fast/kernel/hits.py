@@ -134,8 +134,8 @@ def move(wall, s, particle, scene, anchors):
         s_low, x_s, x_low, y_s, y_low = remainder(wall, s, rest, residual, particle, scene, anchors)
         phase_error = max(phase_error, anchors[PHASE, PHASE_ERROR])
         if is_again and error < max(phase_error / SAFETY * residual_error, 2.0**-53 * abs(residual)):
-            # A short hop along the wall: its increments give s better than the laws' low parts can, or than the
-            # difference of two residuals, each of them rounded, where the start lies off its wall.
+            # A short hop along the wall: its increments give s better than the laws' low parts can, or
+            # than the difference of two residuals, each of them rounded, where the start lies off its wall.
             x_low, y_low = x_low - vx * rest, y_low - vy * rest
             s_low, rest = rest_of_hop(s, f, slope_s, particle, scene, anchors), 0.0
             break

@@ -3,8 +3,6 @@
 Numbers are fractions, or roots of fractions to sixty digits.
 """
 
-from __future__ import annotations
-
 from fractions import Fraction
 from math import isqrt
 

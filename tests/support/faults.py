@@ -1,7 +1,5 @@
 """The one table of faulty servers: the check that refuses each, the verdict, the fault."""
 
-from __future__ import annotations
-
 import math
 import operator
 

@@ -1,7 +1,5 @@
 """Faults of what is refused, let through or read laxly, for the table of `support.faults`."""
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Callable

@@ -4,8 +4,6 @@ Each is the fast stepper behind `scene.protocol.wire`. Its fault changes the req
 the answer. `FAULTS` is their one table: the check that refuses each, the verdict, the fault.
 """
 
-from __future__ import annotations
-
 import io
 import json
 import math

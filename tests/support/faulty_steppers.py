@@ -1,7 +1,5 @@
 """Faults of hits and paths, for the table of `support.faults`."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 

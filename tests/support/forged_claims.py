@@ -30,7 +30,7 @@ import msgspec
 
 import reference
 from conformance import verify
-from conformance.cases.paths import arrival, marks, stays
+from conformance.cases.certify import arrival, marks, stays
 from conformance.cases.prover import coasted, collided
 from conformance.cases.prover import ends as exact_ends
 from conformance.vectors import Certified, certified

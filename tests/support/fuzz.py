@@ -1,7 +1,5 @@
 """Spoilt protocol lines and scene files: valid ones with a value, a key or some bytes gone wrong."""
 
-from __future__ import annotations
-
 import json
 import random
 from collections.abc import Iterator

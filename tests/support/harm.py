@@ -1,7 +1,5 @@
 """What a disk, a person or a bad day may do to a file of a stored run."""
 
-from __future__ import annotations
-
 
 def harmed(folder, random):
     """Do something bad to a random file of a run: a chunk, a marker, a description of an array."""

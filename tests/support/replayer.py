@@ -4,8 +4,6 @@ With a seed it also knows in which disguise every vector is asked in the run of 
 know it answers by `undecided`, or with the last answer that it gave.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Sequence
 from typing import Any

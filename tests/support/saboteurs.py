@@ -4,8 +4,6 @@ Each is an honest citizen (it answers every step alike, as physics is not asked 
 where it does what the table of faults says. None may hang the runner, outlive it, or pass.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import re

@@ -1,7 +1,5 @@
 """The published schemas: docs/NAME.schema.json, by name."""
 
-from __future__ import annotations
-
 import json
 from functools import cache
 from pathlib import Path

@@ -5,8 +5,6 @@ that follows these by an engine of its own may be right in steps. Each is a meth
 overridden by a function, as `conformance.mutants` are; some are mutants of another size.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from math import hypot

@@ -18,8 +18,6 @@ Each f, its rate and the bound on its curvature are those of the plain stepper; 
 On the wall that the particle leaves f(0) is 0.
 """
 
-from __future__ import annotations
-
 import math
 
 from conformance.harness.kit import Hit, Open, serve_engine

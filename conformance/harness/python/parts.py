@@ -3,8 +3,6 @@
 mushrooms check -- python parts.py
 """
 
-from __future__ import annotations
-
 from conformance.harness.kit import serve_parts
 from conformance.plain import Flight
 from scene import Scene, State, Wall

@@ -7,8 +7,6 @@ method explained; `serve` reads the requests, checks them, and writes the answer
 required. Without `flow` or `timer` the profile of that name is not offered, and not asked for.
 """
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Sequence
 from time import perf_counter_ns

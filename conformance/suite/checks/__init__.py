@@ -5,22 +5,19 @@ symmetries (`properties`), statistics (`ensembles`) and the rules of the protoco
 asked of every profile that is offered. docs/contributing/check.md says how one is added.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from functools import partial
 
 from conformance import properties
 from conformance.cases.draw import Draw
-from conformance.suite.checks import endings, flows, paths, refusals, requests, timing
+from conformance.suite.checks import flows, paths, refusals, requests, timing
 from conformance.suite.checks.ensembles import ensemble_checks
 from conformance.suite.checks.form import QUESTIONS, Implementation, Question, SuiteCheck, run_check
 from conformance.suite.session import AnswerLine, Session
 from scene import Scene, State
 
-__all__ = ["LEVELS", "Implementation", "SuiteCheck", "checks_of", "hold", "judge", "questions", "run_check"]
+__all__ = ["Implementation", "SuiteCheck", "checks_of", "judge", "questions", "run_check"]
 
-LEVELS = ("core", "extended", "stress")
 GROUPS = ("property", "profile", "promise")
 EXACT = ("mirror", "scaling-of-lengths", "scaling-of-times", "static-limit")  # to the bit, as a rule
 OF_HITS = ("angular-momentum", "symplectic")  # which a flow does not tell
@@ -67,7 +64,7 @@ RULES = (
     SuiteCheck("promise/waiting", paths.waiting, paths.follow),
     SuiteCheck("promise/long-flow", flows.returning, flows.arrive, ("flow",)),
     SuiteCheck("promise/many-particles", flows.crowds, flows.together, ("flow",)),
-    SuiteCheck("promise/endings", endings.endings, endings.end_as_due),
+    SuiteCheck("promise/endings", flows.endings, flows.end_as_due),
     SuiteCheck("promise/spelling", requests.spellings, requests.same),
     SuiteCheck("promise/minus-zero", requests.zeros, requests.same),
     SuiteCheck("promise/malformed-lines", requests.bad_lines, requests.passed_over),
@@ -85,25 +82,8 @@ def checks_of(level: str = "core", names: str | tuple[str, ...] = "") -> list[Su
     return [check for check in (*SYMMETRIES, *ensemble_checks(level), *RULES) if check.name.startswith(names)]
 
 
-def hold(implementation: list[str] | AnswerLine, name: str, seed: int) -> None:
-    """Hold an implementation to a check.
-
-    Args:
-        implementation: its command, or a function that answers lines.
-        name: of the check.
-        seed: of its questions.
-
-    Raises:
-        AssertionError: in one line, and below it a pytest case to paste.
-    """
-    with Session(implementation) as session:
-        session.start()
-        result = run_check(_named(name), session, seed)
-    assert result.verdict in ("pass", "unsupported", "declined"), f"{result.why}\n\n{result.paste}"
-
-
 def judge(implementation: list[str] | AnswerLine, name: str, profile: str, *asked: object) -> None:
-    """Put one question of a check to an implementation; see `hold`."""
+    """Put one question of a check to an implementation: its command, or a function that answers lines."""
     with Session(implementation) as session:
         session.start()
         _named(name).judges(Implementation(session, profile), *asked)

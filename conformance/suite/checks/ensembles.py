@@ -5,8 +5,6 @@ not have failed at that size is `declined`. The work identity is tested in a mus
 inward: every hit gives energy, so that E1 >= E0 for each particle at any speed, and no weight is cut.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterator, Sequence
 from functools import cache, partial

@@ -9,8 +9,6 @@ An implementation most of whose numbers are exact to rounding is held to FINE; o
 a tolerance, as the vectors let pass, to COARSE.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from math import hypot
 from typing import Any
@@ -18,6 +16,7 @@ from typing import Any
 import numpy as np
 from mpmath import fp
 
+from conformance.plain.flow import Stay
 from conformance.properties import BOUND, SLACK
 from scene import Cap, Collision, Horizon, Mushroom, Outcome, Scene, State, Stem
 from scene.geometry import half_width, table_at
@@ -39,14 +38,14 @@ def is_fine(errors: Sequence[float], fine: float) -> bool:
     return len(errors) >= LEAST and bool(np.quantile(errors, 0.7) <= fine / 4)
 
 
-def flaw_of(scene: Scene, start: State, path: Sequence[Outcome], errors: Errors | None = None) -> str:
+def flaw_of(scene: Scene, start: State, path: Sequence[Outcome], errors: Errors) -> str:
     """Say what is wrong with the first hit, or horizon, to which no flight led; empty where all may be.
 
     Args:
         scene: of the path.
         start: of the path.
         path: its outcomes; only collisions and a horizon are looked at.
-        errors: of the same implementation so far; those of this path are added. None holds it to FINE.
+        errors: of the same implementation so far; those of this path are added.
     """
     ends = [at for at in path if isinstance(at, Collision | Horizon)]
     if not ends:
@@ -62,7 +61,7 @@ def flaw_of(scene: Scene, start: State, path: Sequence[Outcome], errors: Errors 
 
 
 def _first_flaw(
-    scene: Scene, start: State, before: Any, after: Any, dt: Any, walls: Any, errors: Errors | None
+    scene: Scene, start: State, before: Any, after: Any, dt: Any, walls: Any, errors: Errors
 ) -> str:
     t0, x0, y0, vx0, vy0 = before
     t, x, y, vx, vy = after
@@ -94,11 +93,10 @@ def _first_flaw(
     straight = walls == ""
     turn[straight] = np.hypot(vx - vx0, vy - vy0)[straight] / np.maximum(speed, 1e-300)[straight]
     measured = {"place": off_wall, "bounce": turn, "flight": off_flight}
-    known = errors if errors is not None else {name: [0.0] * LEAST for name in measured}
-    for name, sizes in measured.items() if errors is not None else ():
-        known.setdefault(name, []).extend(sizes[-LEAST:].tolist())
-    is_exact = is_fine(known["place"], FINE) and is_fine(known["bounce"], FINE)
-    place, flight = (FINE if is_exact else COARSE), (FLIGHT if is_fine(known["flight"], FLIGHT) else COARSE)
+    for name, sizes in measured.items():
+        errors.setdefault(name, []).extend(sizes[-LEAST:].tolist())
+    is_exact = is_fine(errors["place"], FINE) and is_fine(errors["bounce"], FINE)
+    place, flight = (FINE if is_exact else COARSE), (FLIGHT if is_fine(errors["flight"], FLIGHT) else COARSE)
     aside = 64 * (late + (0.0 if is_exact else COARSE) * np.abs(dt))  # of a time
     margin = place + aside * (speed + moving) / size
     # A wall that turns soon has another speed at a time that is rounded.
@@ -187,7 +185,7 @@ def first_stay(
         hits: its collisions up to t_end.
         t_end: [time].
     """
-    begin = end = None
+    stay = Stay()
     vx, vy = start.vx, start.vy
     for hit in hits:
         assert isinstance(hit, Collision)
@@ -196,11 +194,8 @@ def first_stay(
             spin = abs(hit.x * vy - hit.y * vx)
             if abs(spin - reach) <= ON_EDGE * reach:
                 return UNCLEAR
-            if spin > reach:
-                begin, end = (hit.t if begin is None else begin), None
-            elif begin is not None and end is None:
-                end = hit.t
-        elif hit.wall != "base" and begin is not None:
-            return begin, hit.t if end is None else end
+            stay = stay.after(hit.t, spin > reach)
+        elif hit.wall != "base" and stay.begin is not None:
+            return stay.until(hit.t)
         vx, vy = hit.vx, hit.vy
-    return None if begin is None else (begin, t_end if end is None else end)
+    return stay.until(t_end)

@@ -5,8 +5,6 @@ implementation offers. The implementation may be a process or Python functions: 
 1 through `conformance.suite.session.Session`.
 """
 
-from __future__ import annotations
-
 import math
 import sys
 import time
@@ -72,19 +70,15 @@ class Implementation:
             raise Trouble("wrong-format", f"{1 + len(more)} outcomes are answered to one question")
         return self._counted(read_outcome(part, state.t))
 
-    def offers(self, profile: str, scene: Scene) -> bool:
-        """Tell whether another profile may be asked about a scene."""
-        assert self.session.introduction is not None
-        return not missing(self.session.introduction, profile, to_data(scene))
-
-    def by(self, *profiles: str, scene: Scene) -> Implementation:
+    def by(self, *profiles: str, scene: Scene) -> "Implementation":
         """Return the same implementation, asked by the first of some profiles that it offers.
 
         Raises:
             Trouble: unsupported, when it offers none.
         """
+        assert self.session.introduction is not None
         for profile in profiles:
-            if self.offers(profile, scene):
+            if not missing(self.session.introduction, profile, to_data(scene)):
                 return Implementation(self.session, profile)
         raise Trouble("unsupported", f"profile {' or '.join(profiles)}")
 
@@ -178,11 +172,9 @@ def run_check(check: SuiteCheck, session: Session, seed: int) -> Result:
                 found = check.judges(side, *asked)
                 n_compared += bool(found)
                 notes += [found] if isinstance(found, str) else []
-            except AssertionError as broken:
-                return result("fail", f"{profile}: {broken}", as_pytest(check, profile, asked))
-            except NOT_NUMBERS as error:
-                why = f"{profile}: its answers cannot be calculated with: {error}"
-                return result("fail", why, as_pytest(check, profile, asked))
+            except (AssertionError, *NOT_NUMBERS) as error:
+                what = "" if isinstance(error, AssertionError) else "its answers cannot be calculated with: "
+                return result("fail", f"{profile}: {what}{error}", as_pytest(check, profile, asked))
             except Trouble as trouble:
                 if trouble.verdict == "unsupported":
                     lacking = trouble.why

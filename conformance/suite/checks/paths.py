@@ -5,8 +5,6 @@ same particle: its arrival, and its captured stay. So the questions need no cert
 drawn: one from every octave of a size, up to the bounds below, which docs/detection.md lists.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Sequence
 from typing import Any
@@ -32,7 +30,6 @@ from scene import (
     State,
     Stem,
     Undecided,
-    from_data,
 )
 from scene.geometry import table_at
 from scene.transforms import scaled
@@ -286,7 +283,7 @@ def _one_number_changed(draw: Draw, scene: Scene, state: State, change: float) -
     label = draw.pick([name for name in labels if name in ("omega", "period")] or labels)
     label = draw.pick((label, draw.pick(labels)))  # a period as often as all that it shares a law with
     old = draw.pick([number for name, number in numbers if name == label])
-    other = _scene_of(_replaced(data, old, old * (1.0 + change)))
+    other = scenes.readable(_replaced(data, old, old * (1.0 + change)))
     return other if other and _meets(other, state) else None
 
 
@@ -295,16 +292,9 @@ def _laws_renamed(scene: Scene, state: State) -> Iterator[Scene]:
     data = scenes.wire_form(scene)
     for one, other in (("nu", "w"), ("r", "h"), ("w", "h")):
         names = {one: other, other: one}
-        renamed = _scene_of({names.get(name, name): law for name, law in data.items()})
+        renamed = scenes.readable({names.get(name, name): law for name, law in data.items()})
         if renamed and renamed != scene and _meets(renamed, state):
             yield renamed
-
-
-def _scene_of(data: dict[str, Any]) -> Scene | None:
-    try:
-        return from_data(data)
-    except BadInput:
-        return None
 
 
 def _leaves(label: str, data: Any) -> Iterator[tuple[str, float]]:

@@ -8,8 +8,6 @@ times what is allowed. Scenes break a drawn law for a drawn share of the period,
 their twins come as near to it from the other side.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable, Iterator, Mapping
 from functools import cache, partial

@@ -4,8 +4,6 @@ A question means the same however its JSON is written, whatever was asked before
 left out. Answers are compared to rounding: the last bit of an honest implementation may vary from run to run.
 """
 
-from __future__ import annotations
-
 import json
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -18,8 +16,9 @@ from conformance.cases.draw import Draw
 from conformance.suite.answers import outcomes_of, read_outcome, with_walls
 from conformance.suite.checks.form import FOREVER, Implementation, Question, octaves, question
 from conformance.suite.checks.paths import distance, drawn, is_same_stay
+from conformance.suite.checks.refusals import RESTING
 from conformance.suite.process import Trouble
-from scene import Cap, Mushroom, Scene, State, Stem, Undecided
+from scene import Mushroom, Scene, State, Stem, Undecided
 from scene.tables import cycle_length
 
 MAX_LINE = 2**20  # bytes of a request
@@ -125,7 +124,7 @@ def ignored_or_refused(
 
 def zeros(draw: Draw, profile: str) -> Iterator[Question]:
     """Begin at y = 0.0, and at y = -0.0, on the base or in the open mouth."""
-    for scene in (Cap(r=1.0), Stem(w=1.0, h=1.25), Mushroom(r=1.0, w=0.5, h=1.0)):
+    for scene in RESTING:
         for vy in (0.75, -0.75):
             if isinstance(scene, Mushroom) or (vy < 0) == isinstance(scene, Stem):
                 start = State(

@@ -8,8 +8,6 @@ says so, except that no load makes the sum of the repeats longer than the wait.
 Not seen: a program that does part of its work outside its clock, once for each question.
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple

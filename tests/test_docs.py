@@ -44,13 +44,13 @@ def matches(shown: str, output: str) -> bool:
 @pytest.mark.deep
 def test_the_tutorial_does_what_it_says(tmp_path):
     """One block after the other, in the reader's folder."""
-    for name, text in blocks("tutorial.md", "python"):
+    for name, text in blocks("your-stepper.md", "python"):
         if name:
             (tmp_path / name).write_text(text)
     (tmp_path / "known.txt").write_text("static-stem/1\n")
     programs = Path(sys.executable).parent
     environment = {**os.environ, "PATH": f"{programs}{os.pathsep}{os.environ['PATH']}", "COLUMNS": "140"}
-    consoles = blocks("tutorial.md", "console")
+    consoles = blocks("your-stepper.md", "console")
     assert len(consoles) >= 5
     for number, (_, text) in enumerate(consoles):
         command, _, shown = text.removeprefix("$ ").partition("\n")
@@ -67,14 +67,14 @@ def test_the_tutorial_does_what_it_says(tmp_path):
 
 
 def test_the_tutorial_holds_a_python_stepper_to_a_property():
-    (snippet,) = (text for file, text in blocks("tutorial.md", "python") if not file)
+    (snippet,) = (text for file, text in blocks("your-stepper.md", "python") if not file)
     given = {"my_stepper": plain.next_collision}
     exec(snippet, given)
     given["test_mirror"]()
 
 
 def test_the_tutorials_stepper_guesses_no_hit_at_the_horizon(tmp_path, monkeypatch):
-    for name, text in blocks("tutorial.md", "python"):
+    for name, text in blocks("your-stepper.md", "python"):
         if name:
             (tmp_path / name).write_text(text)
     monkeypatch.syspath_prepend(tmp_path)
@@ -100,6 +100,9 @@ def test_the_figures_of_the_corpus_are_right():
     )
     shown = "{core:,} of them at level core, {extended} at extended, {stress} at stress".format(**levels)
     assert shown in text
+    [(name, example)] = blocks("corpus.md", "json")
+    published = ROOT / "conformance" / "corpus" / f"{name.split('/')[0]}.jsonl"
+    assert json.loads(example) in map(json.loads, published.read_text("utf-8").splitlines())
 
 
 @pytest.mark.parametrize("name", MODULES)
@@ -232,15 +235,15 @@ def test_every_page_is_named_by_another():
         "`conformance.second_provers`",
         "pytest tests/test_nothing.py",
         "`python -m conformance.casess`",
-        "[words](docs/word.md)",
+        "[glossary](docs/glossery.md)",
     ],
 )
 def test_a_name_of_nothing_is_found_out(planted):
     assert len(missing(ROOT / "README.md", planted)) == 1
 
 
-def test_the_page_of_the_house_has_a_line_for_every_folder():
-    named = set(re.findall(r"`([a-z_/]+)/`", (DOCS / "house.md").read_text("utf-8")))
+def test_the_layout_has_a_line_for_every_folder():
+    named = set(re.findall(r"\n\| `([a-z_/]+)/` \|", (ROOT / "CONTRIBUTING.md").read_text("utf-8")))
     files = [path for top in (*PACKAGES, "tests") for path in (ROOT / top).rglob("*")]
     folders = {path.parent.relative_to(ROOT).as_posix() for path in files if path.is_file()}
     assert named == {folder for folder in folders if "__pycache__" not in folder}

@@ -7,6 +7,7 @@ import tomllib
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
+from statistics import median
 
 import pytest
 from mpmath import fp
@@ -19,7 +20,10 @@ from conformance.suite.checks.flows import MAX_STATES
 from conformance.suite.checks.paths import MAX_HITS, MAX_WAIT
 from conformance.suite.checks.refusals import MOST_SAMPLES
 from conformance.suite.disguise import N_DRAWN
+from fast.given import MAX_CYCLES, MOST_IN_CYCLES, MOST_TO_A_TIME
 from fast.kernel.kept import LANE_ROWS
+from mushrooms.orbits import MAX_COLLISIONS, MAX_ORBITS
+from mushrooms.simulate import MOST_IN_MEMORY, MOST_ON_DISK
 from mushrooms.store import conduct, layout
 from mushrooms.store.asked import Asked
 from reference.arithmetic import MAX_WORK
@@ -33,11 +37,12 @@ BENCH = json.loads((ROOT / "docs" / "bench" / "bench.json").read_bytes())
 
 
 def sentence_of_the_knots() -> str:
-    """Evaluate the bang-bang law of docs/start.md between its first knots."""
-    page = (ROOT / "docs" / "start.md").read_text("utf-8")
-    r = from_data(tomllib.loads(page.split("```toml knots.toml")[1].split("```")[0])).r
-    (_, first), (_, second) = r.knots[:2]
-    return f"at 0.25 the value is {value(fp, r, 0.25)}, not {first + (second - first) / 4}"
+    """Evaluate the bang-bang law of docs/scenes.md at a quarter of its first leg."""
+    page = (ROOT / "docs" / "scenes.md").read_text("utf-8")
+    r = from_data(tomllib.loads(page.split("```toml bang-bang.toml")[1].split("```")[0])).r
+    (start, first), (end, second) = r.knots[:2]
+    t = start + (end - start) / 4
+    return f"at {t} the value is {value(fp, r, t)}, not {first + (second - first) / 4}"
 
 
 def row_of_losses(name: str, label: str) -> str:
@@ -65,6 +70,17 @@ def size_of_the_audit() -> str:
     return f"{n_bytes / 1e9:.1f} GB for a full audit"
 
 
+def power(number: int) -> str:
+    """Return a power of ten as pages write it."""
+    return f"10^{len(str(number)) - 1}"
+
+
+def median_ns(solver: str) -> float:
+    """Return what a collision of moving-cap at energy 1e7 takes."""
+    points = BENCH["points"]
+    return next(median(p["ns"]) for p in points if (p["workload"], p["solver"]) == ("moving-cap-1e7", solver))
+
+
 def words_of_whole_arrays() -> str:
     whole = [f"`{name}`" for name, field in layout.FIELDS.items() if field.kind.startswith("int")]
     return f"-1 in arrays of whole numbers ({', '.join(sorted(whole))})"
@@ -73,10 +89,29 @@ def words_of_whole_arrays() -> str:
 BYTES = layout.Shape(1, 1, 1, 1, 0, 1).bytes_of_a_particle
 # What a page says of numbers that code knows: the page, and what must stand in it, its spaces as one.
 FIGURES: dict[str, tuple[str, Callable[[], str]]] = {
-    "bang-bang law": ("docs/start.md", sentence_of_the_knots),
-    "mutants": ("README.md", lambda: f"{len(MUTANTS)} faulty steppers"),
+    "bang-bang law": ("docs/scenes.md", sentence_of_the_knots),
+    "mutants": ("README.md", lambda: f"{len(MUTANTS)} deliberately broken steppers"),
     "attacks": ("CHANGELOG.md", lambda: f"{len(FAMILIES)} families of seeded questions"),
     "harmonics": ("docs/scenes.md", lambda: f"Up to {MAX_HARMONICS} each"),
+    "knots": ("docs/scenes.md", lambda: f"Up to {MAX_KNOTS} knots"),
+    "laws": (
+        "docs/limits.md",
+        lambda: f"{MAX_HARMONICS} harmonics, or a bang-bang law of at most {MAX_KNOTS} ",
+    ),
+    "particles": (
+        "docs/limits.md",
+        lambda: f"| {power(MOST_IN_MEMORY)} in memory, {power(MOST_ON_DISK)} with `--out` |",
+    ),
+    "cycles": ("docs/limits.md", lambda: f"| cycles of a run | {power(MAX_CYCLES)} |"),
+    "collisions": (
+        "docs/limits.md",
+        lambda: f"| {power(MOST_IN_CYCLES)} in a run; {power(MOST_TO_A_TIME)} in `fast.flow`",
+    ),
+    "orbits": ("docs/limits.md", lambda: f"| {MAX_ORBITS}, with {power(MAX_COLLISIONS)} collisions each |"),
+    "times": ("README.md", lambda: f"| {median_ns('fast, lanes'):.0f} ns |"),
+    "times of others": ("README.md", lambda: f"| {median_ns('lean C'):.0f} ns |"),
+    "time of a call": ("README.md", lambda: f"| {median_ns('fast, a call') / 1e3:.1f} µs |"),
+    "time of a proof": ("README.md", lambda: f"| {median_ns('proof, 50 digits') / 1e6:.1f} ms |"),
     "drawn questions": ("docs/verdict.md", lambda: f"{N_DRAWN} drawn questions"),
     "fresh questions": (
         "docs/verdict.md",

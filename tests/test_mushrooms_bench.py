@@ -97,17 +97,24 @@ def test_the_front_holds_only_what_nothing_beats():
     assert figures_of_speed.pareto(points) == [(pytest.approx(15.0), 10.0), (pytest.approx(30.0), 30.0)]
 
 
+def cells_of(line):
+    return [cell.strip() for cell in line.split("|")]
+
+
 def test_the_page_on_speed_shows_what_the_record_holds(call):
     kept = record.read(ROOT / "docs" / "bench" / "bench.json")
     text = (ROOT / "docs" / "speed.md").read_text("utf-8")
     assert kept.size == "full"
     code, table, _ = call("--table", ROOT / "docs" / "bench" / "bench.json")
     assert code == 0
-    assert len(table.splitlines()) > 14
-    assert table in text
+    rows = {cells[1]: cells for cells in map(cells_of, table.splitlines())}
+    shown = [cells for cells in map(cells_of, text.splitlines()) if len(cells) == 6 and cells[1] in rows]
+    assert len(shown) > 14
+    assert all(cells[1:5] == [rows[cells[1]][k] for k in (1, 2, 3, 5)] for cells in shown[2:])
     code, lanes, _ = call("--table", ROOT / "docs" / "bench" / "bench.json", "--workload", "all")
     assert code == 0
-    assert lanes in text
+    for _, workload, ns, _, ratio, *_ in list(map(cells_of, lanes.splitlines()))[2:]:
+        assert re.search(rf"\| {workload}: .* \| {re.escape(ns)} \| {re.escape(ratio)} \|\n", text)
     assert_refused(call("--table", "absent.json"), "absent.json")
     refused = call("--table", ROOT / "docs" / "bench" / "bench.json", "--workload", "nowhere")
     assert_refused(refused, "moving-cap-1e7")

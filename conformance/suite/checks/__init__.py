@@ -2,7 +2,7 @@
 
 Each has one form (`checks.form`): a name, what it asks, how it judges, and of which profiles. Exact
 symmetries (`properties`), statistics (`ensembles`) and the rules of the protocol stand side by side; each is
-asked of every profile that is offered. docs/contributing/check.md says how one is added.
+asked of every profile that is offered. CONTRIBUTING.md says how one is added.
 """
 
 from __future__ import annotations

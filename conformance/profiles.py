@@ -238,17 +238,15 @@ def check_work_identity(flow: Flowing, scene: Scene, *, n_particles: int, kT: fl
             raise AssertionError(f"work identity: {finding}: at most {MAX_LOST:.0%} may be lost")
 
 
-def margin(x: Floats, bound: float, alarm: float) -> float:
-    """Return how far the mean of independent x in [0, bound] may be off, but with chance `alarm`."""
-    return _margin(len(x), float(np.var(x, ddof=1)), bound, alarm)
+def margin(n: int, variance: float, bound: float, alarm: float) -> float:
+    """Return how far the mean of n independent numbers in [0, bound] may be off, but with chance `alarm`.
 
-
-def least_margin(n: int, bound: float, alarm: float) -> float:
-    """Return the least margin that n numbers in [0, bound] can have, however little they vary."""
-    return _margin(n, 0.0, bound, alarm)
-
-
-def _margin(n: int, variance: float, bound: float, alarm: float) -> float:
+    Args:
+        n: how many there are, at least 2.
+        variance: of the sample; 0 for the least margin that so many can have.
+        bound: of the numbers.
+        alarm: the chance.
+    """
     hoeffding, bernstein = log(4 / alarm), log(8 / alarm)  # each at half of the alarm
     return min(
         bound * sqrt(hoeffding / (2 * n)),
@@ -314,7 +312,7 @@ def _statistic(
     if len(x) < 2:
         return Statistic(name, float("nan"), expected, 0.0, n, n - len(x), alternative)
     lost = n - len(x)
-    allowed = margin(x, bound, alarm) + bound * lost / n
+    allowed = margin(len(x), float(np.var(x, ddof=1)), bound, alarm) + bound * lost / n
     return Statistic(name, float(x.mean()), expected, allowed, n, lost, alternative)
 
 

@@ -13,7 +13,7 @@ wall. In a Hypothesis test:
 Mirror and power-of-two scaling hold bit for bit in any stepper whose arithmetic is binary64 and which has no
 absolute tolerance and treats both sides alike; `is_exact=False` asks for them within rounding. All others
 hold within rounding: `bound` is the backward error granted (1e-9 by default, as in the physics verdict),
-and what it does to the answer is measured on the stepper itself (`conformance.grading.sensitivity`). The work
+and what it does to the answer is measured on the stepper itself (`conformance.grading.called`). The work
 identity of whole ensembles is `conformance.profiles.check_work_identity`.
 """
 
@@ -26,9 +26,7 @@ from math import hypot
 
 import msgspec
 
-from conformance.grading import sensitivity
-from conformance.grading.called import Question, answering, fail
-from conformance.grading.sensitivity import MeasuredStep, measured, numbers
+from conformance.grading.called import MeasuredStep, Question, answering, fail, measured, numbers, scales
 from scene import Collision, Horizon, Outcome, Rejected, Scene, State, Undecided, transforms
 from scene.laws import is_constant
 from scene.precision import decimals
@@ -182,46 +180,35 @@ def check_reversal(
     there = measured(stepper, *given, bound)
     if there is None:
         return False
-    if isinstance(there.outcome, Horizon):
-        return _flows_back(stepper, scene, state, there, bound)
-    led = scene, there.state(), max(t_end, there.outcome.t)
-    if isinstance(refusal := stepper(*led), Rejected):
-        fail("time reversal", f"{there.outcome} leads nowhere: {refusal.reason}", given, led)
-    way = _across_bounce(stepper, scene, state, t_end)
-    if way is None:
+    onward: MeasuredStep | None = there
+    walls: list[str | None] = [None]
+    begin, asked = state, [given]
+    if isinstance(there.outcome, Collision):
+        led = scene, there.state(), max(t_end, there.outcome.t)
+        if isinstance(refusal := stepper(*led), Rejected):
+            fail("time reversal", f"{there.outcome} leads nowhere: {refusal.reason}", given, led)
+        way = _across_bounce(stepper, scene, state, t_end)
+        if way is None:
+            return False
+        begin, hit, end = way
+        walls = [hit.wall, None]
+        asked.append((scene, there.state(), end))
+        onward = measured(stepper, *asked[-1], bound, there.errors[1:])
+    if onward is None or not isinstance(onward.outcome, Horizon) or not onward.outcome.t > begin.t:
         return False
-    begin, hit, end = way
-    film = transforms.backwards(scene)
-    onward = measured(stepper, scene, there.state(), end, bound, there.errors[1:])
-    if onward is None or not isinstance(onward.outcome, Horizon):
-        return False
-    _, t, x, y, vx, vy = onward.numbers
-    reversed_path = film, State(-t, x, y, -vx, -vy), -begin.t
-    back = measured(stepper, *reversed_path, bound, onward.errors[1:])
-    if back is None:
-        return False
-    if not isinstance(back.outcome, Collision) or back.outcome.wall != hit.wall:
-        fail("time reversal", f"{hit.wall} there, {back.outcome} on the way back", given, reversed_path)
-    asked = given, (scene, there.state(), end), reversed_path, (film, back.state(), -begin.t)
-    home = measured(stepper, *asked[-1], bound, back.errors[1:])
-    if home is None or not isinstance(home.outcome, Horizon):
-        return False
-    _, _, x, y, vx, vy = home.numbers
+    at, errors, film = onward.state(), onward.errors, transforms.backwards(scene)
+    at = State(-at.t, at.x, at.y, -at.vx, -at.vy)
+    for wall in walls:  # and last the horizon
+        asked.append((film, at, -begin.t))
+        back = measured(stepper, *asked[-1], bound, errors[1:])
+        met = None if back is None else getattr(back.outcome, "wall", None)
+        if back is not None and wall and met != wall:
+            fail("time reversal", f"{wall} there, {back.outcome} on the way back", given, asked[-1])
+        if back is None or met != wall:
+            return False
+        at, errors = back.state(), back.errors
     expected = (0.0, 0.0, begin.x, begin.y, begin.vx, begin.vy)
-    _near("time reversal", (0.0, 0.0, x, y, -vx, -vy), expected, home.errors, *asked)
-    return True
-
-
-def _flows_back(stepper: Stepper, scene: Scene, state: State, there: MeasuredStep, bound: float) -> bool:
-    """Hold what comes after a horizon, with velocity and laws reversed, to end at the start."""
-    at = there.state()
-    back = transforms.backwards(scene), State(-at.t, at.x, at.y, -at.vx, -at.vy), -state.t
-    home = measured(stepper, *back, bound, there.errors[1:]) if at.t > state.t else None
-    if home is None or not isinstance(home.outcome, Horizon):
-        return False
-    _, _, x, y, vx, vy = home.numbers
-    expected = (0.0, 0.0, state.x, state.y, state.vx, state.vy)
-    _near("time reversal", (0.0, 0.0, x, y, -vx, -vy), expected, home.errors, (scene, state, at.t), back)
+    _near("time reversal", (0.0, 0.0, at.x, at.y, -at.vx, -at.vy), expected, errors, *asked)
     return True
 
 
@@ -275,7 +262,7 @@ def check_symplectic(
     if way is None:
         return False
     begin, _, end = way
-    scale = sensitivity.scales(scene, state)
+    scale = scales(scene, state)
     units = (scale.length, scale.length, scale.speed, scale.speed)
     coarse, fine = (_flow_matrix(stepper, scene, way, units, width) for width in (STEP, STEP / 2))
     if coarse is None or fine is None:

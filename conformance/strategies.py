@@ -18,8 +18,7 @@ from conformance import plain
 from conformance.cases import scenes as scene_draws
 from conformance.cases.draw import Draw, Unfit
 from conformance.cases.question import Question
-from conformance.cases.scenes import Clock, any_law, any_scene
-from conformance.cases.starts import start, when
+from conformance.cases.scenes import Clock, any_law, any_scene, start, when
 from conformance.cases.table import FAMILIES
 from scene import BadInput, Horizon, Law, Scene, State, from_data, to_data
 from scene.transforms import scaled
@@ -110,7 +109,7 @@ def states(draw: st.DrawFn, scene: Scene) -> tuple[State, float]:
         scene: a valid scene.
 
     Returns:
-        (state, t_end): see `conformance.cases.starts.start`; t_end is mostly late enough for a collision, or
+        (state, t_end): see `conformance.cases.scenes.start`; t_end is mostly late enough for a collision, or
         early, or t itself.
     """
     stream = HypothesisDraw(draw)

@@ -24,10 +24,9 @@ contradicts the claim. "Not proved": it is open at each precision up to 4,096 bi
 too long. Walls that are met together at an irrational time stay open, and so do exact zeros of
 Fourier laws at another phase than 0.
 
-Not judged are the fields `allowance`, `condition` and `level`; the reason of a rejection; `stays`
-and `reason` beside an answer that has none; the name and notes of a scene; whether the span of a
-bang-bang law is a binary64 number. A scene with a field that is unknown or null counts as refused,
-and so does a number above the largest of binary64.
+Not judged are the fields `allowance`, `condition` and `level`, the texts that describe a line, and
+the reason of a rejection. A scene counts as refused where `scene.from_data` refuses it, but where
+laws of both kinds meet in one condition: that one refuses what touches, or nearly.
 """
 
 from __future__ import annotations
@@ -36,15 +35,15 @@ import itertools
 import json
 import re
 import sys
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from fractions import Fraction
 from functools import lru_cache, partial, reduce
-from math import ceil, floor
+from math import ceil, floor, inf
 from pathlib import Path
 from typing import Any, NamedTuple
 
 PRECISIONS = (128, 256, 512, 1024, 2048, 4096)  # bits, tried in turn
-PARTS = 4000  # stretches into which one search may be cut
+WORK = 200_000  # units of work for a line, of some 60 microseconds each: about 12 seconds in all
 SHARE = Fraction(61, 128)  # where a stretch is cut: not in the middle, where a root may well lie
 NEAR = Fraction(1, 2**20)  # how far from its wall a state may lie, as a share of the wall's size
 LATE, LARGE = 2**30, Fraction(10**100)  # t in periods, or a number, from which one may refuse
@@ -55,7 +54,9 @@ SIDES = ("left", "right", "floor")
 WALLS = {"cap": ("arc", "base"), "stem": ("base", *SIDES), "mushroom": ("arc", "base", *SIDES)}
 FIELDS = ("t", "x", "y", "vx", "vy")  # of a state, and of an answer in floating point
 NUMBERS = ("dt", "x", "y", "vx", "vy")  # of a claimed step; dt counts from the step before
-DECIMAL = re.compile(r"-?\d{1,400}(\.\d{1,400})?(E[+-]?\d{1,4})?")
+DECIMAL = re.compile(r"-?[0-9]{1,400}(\.[0-9]{1,400})?(E[+-]?[0-9]{1,4})?")
+# Characters that a name may not hold: controls but tab and line ends, lone surrogates.
+HIDDEN = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\ud800-\udfff\ufffe\uffff]")
 
 
 class Unproved(Exception):  # noqa: N818
@@ -78,7 +79,7 @@ class Unreadable(ValueError):  # noqa: N818
     """The input is no line of a corpus."""
 
 
-def require(holds: bool, failure: Exception) -> None:
+def require(holds: object, failure: Exception) -> None:
     """Raise a failure where a condition does not hold."""
     if not holds:
         raise failure
@@ -271,7 +272,7 @@ def times(p: Jet, q: Jet) -> Jet:
 class Leg(NamedTuple):
     """c + bend (t - origin)^2 / 2 from `begin` to `end`: half of the way between two knots.
 
-    Times count from the first knot; `bend` is the acceleration.
+    `bend` is the acceleration.
     """
 
     begin: Fraction
@@ -288,7 +289,6 @@ class Law(NamedTuple):
         mean: its value without waves; not used where there are legs.
         waves: for k = 1, 2, ... the factors of cos and sin of k times the phase.
         legs: of a bang-bang law, two from each knot to the next, in the order of time.
-        first: time of the first knot.
         ends: a lower and an upper bound of its values, at all times.
         is_tight: whether it attains both.
     """
@@ -296,7 +296,6 @@ class Law(NamedTuple):
     mean: Fraction
     waves: tuple[tuple[Fraction, Fraction], ...]
     legs: tuple[Leg, ...]
-    first: Fraction
     ends: tuple[Fraction, Fraction]
     is_tight: bool = True
 
@@ -305,10 +304,12 @@ class Scene(NamedTuple):
     """A table with its laws by name; w = nu r where nu is given.
 
     What moves has one period: 2 pi / omega, or `period`, exactly. Both are None when nothing moves.
+    `work` holds one number: the units of work that are left for the line.
     """
 
     table: str
     laws: dict[str, Law]
+    work: list[int]
     omega: Fraction | None = None
     period: Fraction | None = None
 
@@ -339,7 +340,16 @@ class Clock:
             self.turn = number(1, bits) / self.pace
         self.omega = self.pace * pi(bits) * 2
 
-    def waves(self, s: Interval, n: int) -> list[list[Interval]]:
+    def spend(self, units: int) -> None:
+        """Count work, for each line as a whole.
+
+        Raises:
+            Unproved: the line's work is used up.
+        """
+        self.scene.work[0] -= units
+        require(self.scene.work[0] > 0, Unproved("the search takes too long"))
+
+    def waves(self, s: Interval, n: int) -> Iterator[list[Interval]]:
         """Enclose cosine and sine of k times the phase over a stretch, for k = 1 to n.
 
         A wave turns at quarters of a turn only: cosine is 1 at quarter q if q % 4 = 0 and -1 if 2,
@@ -348,18 +358,16 @@ class Clock:
         """
         begin, end = self.offset + self.pace * s.low, self.offset + self.pace * s.high
         one = number(1, self.bits)
-        found = []
         for k in range(1, n + 1):
             first, last = cos_sin(begin * k), cos_sin(end * k)
             quarters = range(ceil(4 * k * begin.ends[0]), floor(4 * k * end.ends[1]) + 1)[:4]
             tops = [[one] * any(q % 4 == top for q in quarters) for top in (0, 1)]
             lows = [[-one] * any(q % 4 == low for q in quarters) for low in (2, 3)]
-            found.append([join(first[i], last[i], *tops[i], *lows[i]) for i in (0, 1)])
-        return found
+            yield [join(first[i], last[i], *tops[i], *lows[i]) for i in (0, 1)]
 
 
 def wave_jet(
-    law: Law, waves: Sequence[Sequence[Any]], omega: Any, exact: Callable[[Any], Any]
+    law: Law, waves: Iterable[Sequence[Any]], omega: Any, exact: Callable[[Any], Any]
 ) -> Jet:
     """Return mean + sum of a cos + b sin of k times the phase, and its derivatives."""
     f, d1, d2 = exact(law.mean), exact(0), exact(0)
@@ -373,52 +381,50 @@ def law_jet(law: Law, clock: Clock, s: Interval) -> Jet:
     """Enclose a law and its derivatives over a stretch of time.
 
     Rationals tell which legs of a bang-bang law a stretch touches: it is enclosed on each, and the
-    parts are joined. f'' is enclosed but at knots and between two legs, where it jumps.
+    parts are joined. f'' is enclosed but at knots and between two legs, where it jumps: there a
+    stretch that is a point has the value just after it.
     """
     exact = partial(number, bits=clock.bits)
+    # With more digits only cosines cost much more.
+    clock.spend(len(law.waves) * (1 + clock.bits**2 // 2**18) + len(law.legs) // 16)
     if not law.legs:
         return wave_jet(law, clock.waves(s, len(law.waves)), clock.omega, exact)
-    period, (low, high), jets = law.legs[-1].end, s.ends, []
-    begin = (clock.instant + low - law.first) % period
-    end = begin + min(high - low, period)
-    current = next(place for place, leg in enumerate(law.legs) if begin < leg.end)
-    for place in range(current, 2 * len(law.legs)):
-        leg, shift = law.legs[place % len(law.legs)], place // len(law.legs) * period
-        if leg.begin + shift > end:
-            break
-        ends = max(leg.begin + shift, begin), min(leg.end + shift, end)
-        u, bend = join(*(exact(at - leg.origin - shift) for at in ends)), exact(leg.bend)
-        jets.append(Jet(exact(leg.c) + exact(leg.bend / 2) * u**2, bend * u, bend))
+    (low, high), first, jets = s.ends, law.legs[0].begin, []
+    period = law.legs[-1].end - first
+    begin = first + (clock.instant + low - first) % period
+    # The stretch as this period sees it, and as the next one does.
+    for since in (begin, begin - period):
+        until = since + min(high - low, period)
+        for leg in law.legs:
+            if since < leg.end and leg.begin <= until:
+                ends = max(leg.begin, since), min(leg.end, until)
+                u, bend = join(*(exact(at - leg.origin) for at in ends)), exact(leg.bend)
+                jets.append(Jet(exact(leg.c) + exact(leg.bend / 2) * u**2, bend * u, bend))
     return Jet(*(join(*parts) for parts in zip(*jets, strict=True)))
 
 
-def exact_jet(scene: Scene, time: Fraction, name: str) -> Jet:
+def exact_jet(scene: Scene, time: Fraction, rate: int, name: str) -> Jet:
     """Return a law and its derivatives just after a time, as rationals.
 
     Waves are taken at phase 0 only, where cosine is 1 and sine is 0: at time 0, and after whole
-    multiples of a rational period.
+    multiples of a rational period. There omega is irrational, and `rate` stands for it.
 
     Raises:
-        Unproved: they are not known to be rational.
+        Unproved: the law is not known to be rational.
     """
     law = scene.laws[name]
     if law.legs:
-        u = (time - law.first) % law.legs[-1].end
-        leg = next(leg for leg in law.legs if u < leg.end)
-        return Jet(
-            leg.c + leg.bend * (u - leg.origin) ** 2 / 2, leg.bend * (u - leg.origin), leg.bend
-        )
-    is_known = (
-        not law.waves or time == 0 or (scene.period and (time / scene.period).denominator == 1)
-    )
-    require(bool(is_known), Unproved("a law is not known to be rational at this time"))
-    jet = wave_jet(law, [(1, 0)] * len(law.waves), scene.omega or Fraction(1), Fraction)
-    # A period gives derivatives a factor pi: they are rational where they vanish only.
+        first = law.legs[0].begin
+        at = first + (time - first) % (law.legs[-1].end - first)
+        leg = next(leg for leg in law.legs if at < leg.end)
+        slope = leg.bend * (at - leg.origin)
+        return Jet(leg.c + slope * (at - leg.origin) / 2, slope, leg.bend)
+    is_whole = scene.period is not None and (time / scene.period).denominator == 1
     require(
-        scene.omega is not None or jet.d1 == jet.d2 == 0,
-        Unproved("a derivative of a law is irrational"),
+        not law.waves or time == 0 or is_whole,
+        Unproved("a law is not known to be rational at this time"),
     )
-    return jet
+    return wave_jet(law, [(1, 0)] * len(law.waves), scene.omega or Fraction(rate), Fraction)
 
 
 # 3. Walls
@@ -440,16 +446,11 @@ TERMS: dict[str, tuple[tuple[Any, ...], ...]] = {
 
 def wall_jet(scene: Scene, wall: str, law: Callable[[str], Jet], x: Jet, y: Jet) -> Jet:
     """Return f of a wall along a flight, or a law; w = nu r where nu is given."""
-
-    def factor(name: str) -> Jet:
-        if name == "w" and "nu" in scene.laws:
-            return times(law("nu"), law("r"))
-        return {"x": x, "y": y}.get(name) or law(name)
-
     name = "top" if (wall, scene.table) == ("base", "stem") else wall
-    products = []
+    place, products = {"x": x, "y": y}, []
     for sign, *names in TERMS.get(name, ((1, name),)):
-        product = reduce(times, map(factor, names))
+        parts = ["nu", "r"] if names == ["w"] and "nu" in scene.laws else names
+        product = reduce(times, (place.get(part) or law(part) for part in parts))
         products.append([part * sign for part in product])
     return Jet(*(reduce(lambda p, q: p + q, parts) for parts in zip(*products, strict=True)))
 
@@ -470,9 +471,6 @@ class State(NamedTuple):
     wall: str | None
 
 
-Hit = tuple[str, Interval]  # a wall, and when it is met since the clock's instant
-
-
 class Flight:
     """A particle in flight: where walls are on its way, and what it meets first.
 
@@ -490,6 +488,7 @@ class Flight:
         begin: Interval,
         wall: str | None = None,
         residual: Interval | None = None,
+        state: State | None = None,
     ) -> None:
         """Describe a flight.
 
@@ -500,12 +499,12 @@ class Flight:
             begin: encloses when the flight begins.
             wall: the wall being left.
             residual: c of this wall.
+            state: where it begins, at time 0 exactly; it decides ties.
         """
         self.clock, self.line, self.end, self.begin = clock, line, end, begin
-        self.scene, self.bits = clock.scene, clock.bits
-        self.wall, self.residual = wall, residual or clock.zero
-        self.is_flat = False  # f = f' = 0 < f'' on the wall being left at time 0, exactly
-        self.state: State | None = None  # known exactly: it decides ties
+        self.wall, self.residual, self.state = wall, residual or clock.zero, state
+        # Whether f = f' = 0 < f'' on the wall being left at time 0, exactly: `start` tells.
+        self.scene, self.bits, self.is_flat = clock.scene, clock.bits, False
         self._laws: dict[tuple[str, int, int, int], Jet] = {}
 
     def law(self, name: str, s: Interval) -> Jet:
@@ -522,8 +521,10 @@ class Flight:
         jet = wall_jet(self.scene, wall, lambda name: self.law(name, s), *place)
         return jet._replace(f=jet.f - self.residual) if wall == self.wall else jet
 
-    def exact(self, wall: str, s: Fraction) -> Jet:
+    def exact(self, wall: str, s: Fraction, rate: int = 1) -> Jet:
         """Return f of a wall at an exact time, in rationals; no residual is subtracted.
+
+        Derivatives of laws with a period are those for 2 pi / period = `rate`.
 
         Raises:
             Unproved: it is not known to be rational.
@@ -532,7 +533,7 @@ class Flight:
             raise Unproved("the state is not known exactly")
         t, x, y, vx, vy, _ = self.state
         place = Jet(x + vx * s, vx, Fraction(0)), Jet(y + vy * s, vy, Fraction(0))
-        return wall_jet(self.scene, wall, partial(exact_jet, self.scene, t + s), *place)
+        return wall_jet(self.scene, wall, partial(exact_jet, self.scene, t + s, rate), *place)
 
     def is_zero(self, wall: str, s: Fraction) -> bool:
         """Tell whether f, less a residual, is known to vanish at an exact time."""
@@ -572,12 +573,8 @@ class Flight:
         if jet.f.sign > 0 or (jet.d1.sign < 0 and is_positive_at_end):
             return True
         at, u, half = self.f(wall, p), s - p, number(Fraction(1, 2), self.bits)
-        if (at.f + at.d1 * u + jet.d2 * u**2 * half).sign > 0:
-            return True
-        turn = self.clock.turn
-        if turn is None or not is_below(turn, s.high - s.low):
-            return False
-        return all(self.is_never_met(wall, end, turn) for end in (s.high, s.low))
+        is_positive = (at.f + at.d1 * u + jet.d2 * u**2 * half).sign > 0
+        return is_positive or all(self.is_never_met(wall, end, s) for end in (s.high, s.low))
 
     def holds_begin(self, wall: str, s: Interval) -> bool:
         """Tell whether a stretch of the wall being left does not lie after all of `begin`.
@@ -586,7 +583,7 @@ class Flight:
         """
         return wall == self.wall and not is_below(self.begin, s.low)
 
-    def is_never_met(self, wall: str, at: Interval, turn: Interval) -> bool:
+    def is_never_met(self, wall: str, at: Interval, s: Interval) -> bool:
         """Tell whether a wall never reaches the place where this particle is at the time `at`.
 
         The flight is straight, and with the laws held still f is concave in the place. So f on a
@@ -594,10 +591,12 @@ class Flight:
         particle at rest that is not met within one period is never met.
 
         The particle at rest "begins" at -1, before the search: no stretch holds its begin, so f > 0
-        is asked from time 0 on. The search is no longer than a period, so it does not ask this
-        again.
+        is asked from time 0 on. This is asked for stretches s longer than a period only. The search
+        is no longer, so it does not ask this again.
         """
-        (x, y, vx, vy), zero = self.line, self.clock.zero
+        (x, y, vx, vy), zero, turn = self.line, self.clock.zero, self.clock.turn
+        if turn is None or not is_below(turn, s.high - s.low):
+            return False
         line = x + vx * at, y + vy * at, zero, zero
         rest = Flight(self.clock, line, self.end, number(-1, self.bits), self.wall, self.residual)
         rest._laws = self._laws
@@ -615,16 +614,15 @@ class Flight:
         after all of `begin`, so that only the first part holds it.
 
         Raises:
-            Unproved: a part stays open.
+            Unproved: a part stays open, or the line's work is used up.
         """
         require(
             self.holds_begin(wall, start) or self.f(wall, start).f.sign > 0,
             Unproved(f"{wall}: f is not shown to be positive where the search begins"),
         )
         parts = [join(start, stop)]
-        for _ in range(PARTS):
-            if not parts:
-                return None
+        while parts:
+            self.clock.spend(6)
             part = parts.pop()
             if self.is_clear(wall, part):
                 continue
@@ -637,7 +635,7 @@ class Flight:
                 Unproved(f"{wall}: f is too small, or begins too flat, for this precision"),
             )
             parts += [join(cut, part.high), join(part.low, cut)]
-        raise Unproved(f"{wall}: more than {PARTS} stretches of time")
+        return None
 
     def closest(self, wall: str, root: Interval) -> Interval:
         """Narrow a root: by the sign of f at a point p, and by root = p - f(p) / f' (Newton).
@@ -659,7 +657,7 @@ class Flight:
 
     # 5. What is met first
 
-    def event(self, *, in_cap: bool) -> Hit | None:
+    def event(self, *, in_cap: bool) -> tuple[str, Interval] | None:
         """Find the first wall met before the horizon; None for none.
 
         y is linear. Before y = 0 is crossed the walls of one part of the table can be met: the arc
@@ -720,7 +718,7 @@ class Flight:
 
     def first_hit(
         self, walls: Sequence[str], start: Interval, limit: Interval, exact: Fraction | None
-    ) -> Hit | None:
+    ) -> tuple[str, Interval] | None:
         """Find which of some walls is met first, before y = 0 is crossed or the horizon comes.
 
         Each search covers one stretch, for all walls. A wall without a root is clear at least to
@@ -742,15 +740,13 @@ class Flight:
                     require(queue.count(wall) < 2, question)
                     queue.append(wall)
                     continue
-                if root is None or is_below(limit, root):
-                    continue
-                if (
+                if root is not None and (
                     is_below(root, limit)
-                    or limit.ends[1] != self.end
-                    or not self.is_zero(wall, self.end)
+                    or (limit.ends[1] != self.end and not is_below(limit, root))
+                    or not (is_below(limit, root) or self.is_zero(wall, self.end))
                 ):
                     hits.append((wall, root))
-                    stop = (root.high + (root.high - since) * number(BEYOND, self.bits)).high
+                    stop = self.beyond(since, root.high)
             if hits:
                 return self.earliest(hits, limit, exact)
         return None
@@ -758,20 +754,31 @@ class Flight:
     def stretches(self, start: Interval, last: Interval) -> Iterator[tuple[Interval, Interval]]:
         """Yield stretches, one after the other, from `start` to a little past `last`.
 
+        A particle at rest that is not met within one period is never met, so they end there.
+
         The first is about as long as a crossing of the table or a period, whichever is less. Each
-        next one is four times as long. The lengths affect the cost only, not what is proved.
+        next one is four times as long. The lengths affect the cost only, not what is proved. They
+        are others at each precision: where a wall is met at the end of a stretch, it is open.
         """
         sizes = [law.ends[1] for name, law in self.scene.laws.items() if name in ("r", "w", "h")]
         speed = max(abs(end) for v in self.line[2:] for end in v.ends)
         lengths = [sum(sizes) / speed] if speed else []
         lengths += [self.clock.turn.ends[1]] if self.clock.turn else []
-        length = number(min(lengths, default=Fraction(1)) * SHARE * 2, 32).high
+        length = number(min(lengths, default=Fraction(1)) * (1 - Fraction(8, self.bits)), 32).high
+        if self.clock.turn and not speed:
+            last = min(last, (self.begin + self.clock.turn).high, key=lambda point: point.ends)
         while lengths and is_below(stop := (start + length).high, last):
             yield start, stop
             start, length = stop, length * 4
-        yield start, (last + (last - start) * number(BEYOND, self.bits)).high
+        yield start, self.beyond(start, last)
 
-    def earliest(self, hits: list[Hit], limit: Interval, exact: Fraction | None) -> Hit:
+    def beyond(self, start: Interval, stop: Interval) -> Interval:
+        """Return a point a little past a stretch, another one at each precision."""
+        return (stop + (stop - start) * number(BEYOND + UNIT * self.bits, self.bits)).high
+
+    def earliest(
+        self, hits: list[tuple[str, Interval]], limit: Interval, exact: Fraction | None
+    ) -> tuple[str, Interval]:
         """Return the earliest of some hits, each the first of its wall.
 
         `first_hit` has shown that walls without a hit come later.
@@ -793,8 +800,11 @@ class Flight:
                 for w, root in hits
                 if root.ends[0] <= time <= root.ends[1] and self.is_zero(w, time)
             }
-            is_first = all(wall in met or time < root.ends[0] for wall, root in hits)
-            is_first = is_first and 0 < time < self.end and (exact is None or time <= exact)
+            is_first = (
+                all(wall in met or time < root.ends[0] for wall, root in hits)
+                and 0 < time < self.end
+                and (exact is None or time <= exact)
+            )
             met |= {"base"} if time == exact else set()
             is_edge = self.scene.table == "mushroom" and "base" in met and "arc" not in met
             require(
@@ -804,7 +814,7 @@ class Flight:
         raise Unproved("two walls are met together, as far as this precision shows")
 
 
-def bounce(flight: Flight, hit: Hit) -> tuple[dict[str, Interval], Flight]:
+def bounce(flight: Flight, hit: tuple[str, Interval]) -> tuple[dict[str, Interval], Flight]:
     """Return what is claimed of a hit (dt, place, velocity after it), and the next flight.
 
     n = grad f / |grad f| points inside, and u is the wall's speed along n. f' = |grad f| (v.n - u),
@@ -828,16 +838,14 @@ def bounce(flight: Flight, hit: Hit) -> tuple[dict[str, Interval], Flight]:
     }[wall]
     kick = flight.f(wall, s).d1 * 2 / (fx**2 + fy**2)
     new_vx, new_vy = vx - kick * fx, vy - kick * fy
-    near = s.simplest()
-    begin = s - near
+    near, begin = s.simplest(), s - s.simplest()
     next_x = x + vx * near + (vx - new_vx) * begin
     next_y = -new_vy * begin if is_base else y + vy * near + (vy - new_vy) * begin
     later = Clock(flight.scene, clock.instant + near.ends[0], clock.bits)
-    line = next_x, next_y, new_vx, new_vy
     residual = flight.residual if wall == flight.wall else clock.zero
-    following = Flight(later, line, flight.end - near.ends[0], begin, wall, residual)
+    line, end = (next_x, next_y, new_vx, new_vy), flight.end - near.ends[0]
     found = {"dt": s - flight.begin, "x": at_x, "y": at_y, "vx": new_vx, "vy": new_vy}
-    return found, following
+    return found, Flight(later, line, end, begin, wall, residual)
 
 
 # 6. Where a flight starts
@@ -864,32 +872,30 @@ def start(scene: Scene, state: State, t_end: Fraction, bits: int) -> tuple[Fligh
     require(table != "mushroom" or not is_beyond, Refused("the state is beyond its wall's end"))
     clock = Clock(scene, state.t, bits)
     x, y, vx, vy = (number(value, bits) for value in (state.x, state.y, state.vx, state.vy))
-    flight = Flight(clock, (x, y, vx, vy), t_end - state.t, clock.zero)
-    flight.state = state
+    flight = Flight(clock, (x, y, vx, vy), t_end - state.t, clock.zero, state=state)
     f = {name: flight.f(name, clock.zero).f for name in WALLS[table]}
     on = [wall] if wall else []
-    if wall:
-        require_near(flight, wall, f[wall])
     walls = WALLS[table]
     if table == "mushroom":
         is_beside = wall is None and level and -1 in (f["left"].sign, f["right"].sign)
         on = ["base"] if is_beside else on
         walls = ("arc",) if state.y > 0 or "arc" in on or "base" in on else SIDES
         walls = ("base", "arc") if level and "arc" in on else walls
-    for name in walls:
-        if name != wall:
-            require(f[name].sign >= 0, Refused(f"the state is beyond wall {name}"))
-            is_on = flight.is_zero(name, Fraction(0))
-            require(is_on or f[name].sign > 0, Unproved(f"whether the state is on wall {name}"))
-            on += [name] if is_on else []
+    others = [name for name in walls if name != wall]
+    require(all(f[name].sign >= 0 for name in others), Refused("the state is beyond a wall"))
+    if wall:
+        require_near(flight, wall, f[wall])
+    for name in others:
+        is_on = flight.is_zero(name, Fraction(0))
+        require(is_on or f[name].sign > 0, Unproved(f"whether the state is on wall {name}"))
+        on += [name] if is_on else []
     require(
         not (table == "mushroom" and level and ("left" in on or "right" in on)),
         Undefined("mouth-edge"),
     )
     require(len(on) < 2, Undefined("corner"))
     for name in on:
-        flight.is_flat = is_flat(flight, name)
-        flight.wall, flight.residual = name, f[name]
+        flight.is_flat, flight.wall, flight.residual = is_flat(flight, name), name, f[name]
     in_cap = state.y > 0 or "arc" in on or "base" in on or (level and state.vy > 0 and not on)
     return flight, table == "cap" or (table == "mushroom" and in_cap)
 
@@ -900,6 +906,10 @@ def is_flat(flight: Flight, wall: str) -> bool:
     f'' is that just after the start. With f'' < 0 the wall pushes: "sliding". With f'' = 0 it is
     "sliding" along a base or where nothing moves, else "tangency".
 
+    Where a law has a period, f' and f'' are polynomials in omega = 2 pi / period, of degree 2 at
+    most and with rational coefficients. pi is transcendental, so they vanish only if all their
+    coefficients do, and then at three rates.
+
     Raises:
         Refused: f' < 0.
         Undefined: f' = 0 and f'' <= 0.
@@ -909,10 +919,12 @@ def is_flat(flight: Flight, wall: str) -> bool:
     require(slope >= 0, Refused(f"the particle starts on wall {wall} and moves into it"))
     if slope > 0:
         return False
-    exact = flight.exact(wall, Fraction(0))
-    require(exact.d1 == 0, Unproved("the sign of f' at the start"))
+    exact = [flight.exact(wall, Fraction(0), rate) for rate in (-1, 0, 1)]
+    require(all(jet.d1 == 0 for jet in exact), Unproved("the sign of f' at the start"))
+    bend = flight.f(wall, flight.clock.zero).d2.sign
+    require(bend or all(jet.d2 == 0 for jet in exact), Unproved("the sign of f'' at the start"))
     is_resting = wall == "base" or not (scene.omega or scene.period)
-    require(exact.d2 > 0, Undefined("sliding" if exact.d2 < 0 or is_resting else "tangency"))
+    require(bend > 0, Undefined("sliding" if bend < 0 or is_resting else "tangency"))
     return True
 
 
@@ -941,30 +953,43 @@ def require_near(flight: Flight, wall: str, gap: Interval) -> None:
 # 7. Scenes
 
 
-def read_scene(data: Any) -> Scene:
+def read_scene(data: Any, work: list[int]) -> Scene:
     """Read a scene from its JSON form, and prove it to be valid at all times.
+
+    Args:
+        data: the JSON.
+        work: one number: the units of work that are left.
 
     Raises:
         Refused: it is not, with the condition that is broken.
         Unproved: a condition is open.
     """
-    wanted = {"cap": {"r"}, "stem": {"w", "h"}, "mushroom": {"r", "h", "w"}}
-    table = str(data.get("table")) if isinstance(data, dict) else ""
-    require(table in wanted, Refused("the scene has no known table"))
-    given = {name: value for name, value in data.items() if name not in ("table", "name", "notes")}
-    given = given if table == "cap" else {"slope": 0, **given}
-    names = {"w" if name == "nu" and table == "mushroom" else name for name in given} - {"slope"}
+    wanted = {
+        "cap": [{"r"}],
+        "stem": [{"w", "h", "slope"}],
+        "mushroom": [{"r", "h", "w", "slope"}, {"r", "h", "nu", "slope"}],
+    }
+    table = data.get("table")
+    require(isinstance(table, str) and table in wanted, Refused("the scene has no known table"))
+    texts = [data.get(name, "") for name in ("name", "notes")]
     require(
-        names == wanted[table]
-        and not {"w", "nu"} <= set(given)
-        and (table != "cap" or "slope" not in given),
-        Refused(f"these are not the laws of a {table}"),
+        all(isinstance(text, str) and not HIDDEN.search(text) for text in texts),
+        Refused("name and notes are texts, without control characters"),
     )
+    # A mushroom may say null for that of `w` and `nu` which it does not give.
+    absent = {name for name in ("w", "nu") if table == "mushroom" and data.get(name) is None}
+    given = {} if table == "cap" else {"slope": 0}
+    given |= {
+        name: value
+        for name, value in data.items()
+        if name not in {"$schema", "table", "name", "notes"} | absent
+    }
+    require(set(given) in wanted[table], Refused(f"these are not the laws of a {table}"))
     read = {name: read_law(value) for name, value in given.items()}
     rates = {rate for law, rate in read.values() if law.ends[0] < law.ends[1]}
     require(len(rates) < 2, Refused("laws that move must share one period"))
     scene = Scene(
-        table, {name: law for name, (law, _) in read.items()}, *(rates.pop() if rates else ())
+        table, {name: law for name, (law, _) in read.items()}, work, *(rates.pop() if rates else ())
     )
     require_valid(scene)
     return scene
@@ -980,25 +1005,25 @@ def read_law(data: Any) -> tuple[Law, tuple[Fraction | None, Fraction | None]]:
         data = {"kind": "fourier", "mean": data, "omega": 1}
     if data.get("kind") == "bang-bang" and set(data) == {"kind", "knots"}:
         return read_legs(data["knots"])
-    require(
-        data.get("kind") == "fourier", Refused("a law is a number, a fourier or a bang-bang law")
-    )
+    rates = [data.get(name) for name in ("omega", "period")]  # of which one is null or absent
     is_known = set(data) <= {"kind", "mean", "omega", "period", "cos", "sin"}
     require(
-        is_known and ("omega" in data) != ("period" in data), Refused("a law's fields are others")
+        data.get("kind") == "fourier" and is_known and rates.count(None) == 1,
+        Refused("a law is a number, a bang-bang law, or fourier with omega or period"),
     )
     lists = [data.get(name, []) for name in ("cos", "sin")]
-    are_lists = all(isinstance(waves, list) and len(waves) <= 16 for waves in lists)
-    require(are_lists, Refused("cos and sin are lists of at most 16 numbers"))
+    require(
+        all(isinstance(waves, list) and len(waves) <= 16 for waves in lists),
+        Refused("cos and sin are lists of at most 16 numbers"),
+    )
     cos, sin = ([read_number("wave", value) for value in waves] for waves in lists)
     mean = read_number("mean", data.get("mean"))
-    omega, period = (read_number(n, data[n]) if n in data else None for n in ("omega", "period"))
+    omega, period = (rate if rate is None else read_number("rate", rate) for rate in rates)
     require((omega or period or 0) > 0, Refused("omega and period must be positive"))
-    reach = sum(map(abs, (*cos, *sin)), Fraction(0))
+    reach = sum(map(abs, cos + sin), Fraction(0))
     waves = tuple(itertools.zip_longest(cos, sin, fillvalue=Fraction(0))) if reach else ()
-    is_tight = sum(value != 0 for value in (*cos, *sin)) < 2
-    law = Law(mean, waves, (), Fraction(0), (mean - reach, mean + reach), is_tight)
-    return law, (omega, period)
+    is_tight, ends = sum(map(bool, cos + sin)) < 2, (mean - reach, mean + reach)
+    return Law(mean, waves, (), ends, is_tight), (omega, period)
 
 
 def read_legs(knots: Any) -> tuple[Law, tuple[None, Fraction]]:
@@ -1007,7 +1032,7 @@ def read_legs(knots: Any) -> tuple[Law, tuple[None, Fraction]]:
     The law is at rest at the knots. Both legs have the same value and slope where they meet.
 
     Raises:
-        Refused: times do not rise, or the law does not close.
+        Refused: times do not rise, the law does not close, or its period is no binary64 number.
     """
     require(
         isinstance(knots, list)
@@ -1016,29 +1041,28 @@ def read_legs(knots: Any) -> tuple[Law, tuple[None, Fraction]]:
         Refused("knots are 2 to 256 pairs of time and value"),
     )
     pairs = [(read_number("knot", t), read_number("knot", value)) for t, value in knots]
-    (first, value), legs, values = pairs[0], [], [value for _, value in pairs]
-    require(value == values[-1], Refused("the last knot's value must be that of the first"))
+    values, legs = [value for _, value in pairs], []
+    period = pairs[-1][0] - pairs[0][0]
+    require(read_number("period", period) == period, Refused("the period is no binary64 number"))
+    require(values[0] == values[-1], Refused("the last knot's value must be that of the first"))
     for (t, a), (u, b) in itertools.pairwise(pairs):
         require(t < u, Refused("knots must rise in time"))
-        begin, end, bend = t - first, u - first, 4 * (b - a) / (u - t) ** 2
-        middle = (begin + end) / 2
-        legs += [Leg(begin, middle, begin, a, bend), Leg(middle, end, end, b, -bend)]
+        middle, bend = (t + u) / 2, 4 * (b - a) / (u - t) ** 2
+        legs += [Leg(t, middle, t, a, bend), Leg(middle, u, u, b, -bend)]
     ends = min(values), max(values)
-    legs = legs if ends[0] < ends[1] else []
-    return Law(value, (), tuple(legs), first, ends), (None, pairs[-1][0] - first)
+    return Law(values[0], (), tuple(legs) if ends[0] < ends[1] else (), ends), (None, period)
 
 
 def read_number(name: str, value: Any) -> Fraction:
-    """Return the binary64 number that a JSON number denotes, as a fraction.
+    """Return the binary64 number nearest to a number, as a fraction.
 
     Raises:
         Refused: it is no finite number.
     """
-    require(
-        type(value) in (int, float) and abs(value) <= sys.float_info.max,
-        Refused(f"{name} is no finite number"),
-    )
-    return Fraction(float(value))
+    try:
+        return Fraction(float(value if type(value) in (int, float, Fraction) else inf))
+    except (OverflowError, ValueError):
+        raise Refused(f"{name} is no finite number") from None
 
 
 def require_valid(scene: Scene) -> None:
@@ -1054,9 +1078,8 @@ def require_valid(scene: Scene) -> None:
         Unproved: it is open.
     """
     laws, clock = scene.laws, Clock(scene, Fraction(0), 256)
-    zero = clock.zero
+    zero, bounds = clock.zero, {name: law.ends[0] for name, law in laws.items() if name != "slope"}
     rest = Flight(clock, (zero, zero, zero, zero), Fraction(0), number(-1, 256))
-    bounds = {name: law.ends[0] for name, law in laws.items() if name != "slope"}
     if scene.table == "mushroom":
         bounds["r - w"] = (
             1 - laws["nu"].ends[1] if "nu" in laws else laws["r"].ends[0] - laws["w"].ends[1]
@@ -1067,10 +1090,14 @@ def require_valid(scene: Scene) -> None:
             continue
         value = rest.f(name, zero).f
         is_broken = (
-            value.hi < 0 or (value.hi == 0 and is_strict) or (name in laws and laws[name].is_tight)
+            value.hi < 0
+            or (value.hi == 0 and is_strict)
+            or (name in laws and laws[name].is_tight)
+            or (
+                (clock.turn or value.sign < 1)
+                and rest.first_root(name, zero, (clock.turn or zero).high) is not None
+            )
         )
-        if not is_broken and (clock.turn or value.sign < 1):
-            is_broken = rest.first_root(name, zero, (clock.turn or zero).high) is not None
         require(not is_broken, Refused(f"{name} breaks its bound at some time"))
 
 
@@ -1085,12 +1112,17 @@ class Verdict(NamedTuple):
 
 
 class Step(NamedTuple):
-    """How a flight ends: the wall met (None at the horizon), when, and dt, x, y, vx, vy."""
+    """How a flight ends.
 
-    flight: Flight
+    Attributes:
+        wall: the wall met; None at the horizon.
+        numbers: dt, x, y, vx, vy.
+        excess: at the arc of a mushroom (x vy - y vx)^2 - w^2 |v|^2, with v before the hit.
+    """
+
     wall: str | None
-    root: Interval
     numbers: dict[str, Interval]
+    excess: Interval | None = None
 
 
 def walk(scene: Scene, state: State, t_end: Fraction, bits: int) -> Iterator[Step]:
@@ -1104,42 +1136,42 @@ def walk(scene: Scene, state: State, t_end: Fraction, bits: int) -> Iterator[Ste
     flight, in_cap = start(scene, state, t_end, bits)
     while hit := flight.event(in_cap=in_cap):
         numbers, later = bounce(flight, hit)
-        yield Step(flight, *hit, numbers)
+        (_, _, vx, vy), excess = flight.line, None
+        if hit[0] == "arc" and scene.table == "mushroom":
+            width = flight.f("w", hit[1]).f
+            excess = (numbers["x"] * vy - numbers["y"] * vx) ** 2 - width**2 * (vx**2 + vy**2)
+        yield Step(hit[0], numbers, excess)
         flight, in_cap = later, scene.table != "stem" and hit[0] in ("arc", "base")
     end, (x, y, vx, vy) = number(flight.end, bits), flight.line
     numbers = {"dt": end - flight.begin, "x": x + vx * end, "y": y + vy * end, "vx": vx, "vy": vy}
-    yield Step(flight, None, end, numbers)
+    yield Step(None, numbers)
 
 
 def mark(step: Step) -> str:
     """Return what a step means for capture: "out", an arc hit "captured" or "free", or "".
 
-    A hit of the arc is captured when |x vy - y vx| > w |v|, with v before the hit: the line passes
-    the centre at a distance above w, so it misses the mouth. Squares are compared.
+    A hit of the arc is captured when |x vy - y vx| > w |v|: the line passes the centre at a
+    distance above w, so it misses the mouth. Squares are compared.
     """
-    x, y, vx, vy = step.flight.line
-    if step.wall != "arc" or step.flight.scene.table != "mushroom":
+    if step.excess is None:
         return "" if step.wall in ("arc", "base") else "out"
-    width = step.flight.f("w", step.root).f
-    excess = (x * vy - y * vx) ** 2 - width**2 * (vx**2 + vy**2)
-    require(excess.sign != 0, Unproved("whether a hit of the arc is captured"))
-    return "captured" if excess.sign > 0 else "free"
+    require(step.excess.sign != 0, Unproved("whether a hit of the arc is captured"))
+    return "captured" if step.excess.sign > 0 else "free"
 
 
-def find_stays(marks: Sequence[str]) -> list[list[int]]:
-    """Return where each stay in the cap begins and ends, as indices into a path.
+def find_stays(marks: Sequence[str]) -> Iterator[list[int]]:
+    """Yield where each stay in the cap begins and ends, as indices into a path.
 
     It begins with the first captured hit since the particle was last out. It ends with the first
     free hit after the last captured one, or else at the next "out". The horizon counts as "out".
     """
-    stays, since = [], 0
+    since = 0
     for place in (place for place, what in enumerate(marks) if what == "out"):
         captured = [at for at in range(since, place) if marks[at] == "captured"]
         if captured:
             free = [at for at in range(captured[-1], place) if marks[at] == "free"]
-            stays.append([captured[0], free[0] if free else place])
+            yield [captured[0], free[0] if free else place]
         since = place
-    return stays
 
 
 def take(data: Any, name: str, kind: type) -> Any:
@@ -1169,15 +1201,19 @@ def require_inside(name: str, claim: Any, found: Interval) -> None:
         Unreadable(f"{name} must be two decimals"),
     )
     low, high = map(Fraction, ends)
-    require(low <= most, Contradicted(f"{name} lies below its enclosure"))
-    require(least <= high, Contradicted(f"{name} lies above its enclosure"))
+    require(low <= most and least <= high, Contradicted(f"{name} lies outside its enclosure"))
     require(
         low <= least and most <= high, Unproved(f"{name} is not shown to lie within its enclosure")
     )
 
 
-def check_line(record: Any, bits: int) -> None:
+def check_line(record: Any, read: Callable[[], Scene], bits: int) -> None:
     """Hold a line to what is proved at one precision.
+
+    Args:
+        record: the line's JSON.
+        read: returns its scene, or raises why it is refused.
+        bits: the precision.
 
     Raises:
         Unreadable: it is no line of a corpus.
@@ -1185,35 +1221,37 @@ def check_line(record: Any, bits: int) -> None:
         Unproved: its claim is open.
     """
     first, *others = take(record, "expect", list) or [None]
-    outcome, state = take(first, "outcome", str), take(record, "state", dict)
+    take(first, "outcome", str)
+    state, steps = take(record, "state", dict), take({"steps": [], **first}, "steps", list)
     kind, count = take(record, "kind", str), record.get("collisions", 1)
     is_kind = kind in ("step", "trajectory", "flow") and type(count) is int and 0 < count < 10**6
     require(is_kind and (kind != "step" or count == 1), Unreadable("kind or collisions are none"))
-    right, reason, is_extreme = "rejected", "", False
-    found: list[Step] = []
+    found, reason, allowed, listed = [], "", [], ["steps"]
     try:
-        scene = read_scene(record.get("scene"))
+        scene = read()
         given, t_end = read_state(scene, state), read_number("t_end", record.get("t_end"))
         # 44 / 7 is a little more than 2 pi. Where nothing moves, times count in units.
         period = scene.period or (Fraction(44, 7) / scene.omega if scene.omega else 1)
         is_extreme = abs(given.t) >= LATE * period or max(map(abs, given[:5])) >= LARGE
-        found = list(itertools.islice(walk(scene, given, t_end, bits), count))
-        right = "collision" if found[-1].wall else "horizon"
+        allowed = [{"outcome": "rejected"}] if is_extreme else []
+        # A flow lists some steps of its path. Any other path is followed as far as it is listed.
+        limit = count if kind == "flow" else min(count, len(steps) + 1)
+        found = list(itertools.islice(walk(scene, given, t_end, bits), limit))
+        right = {"outcome": "collision" if found[-1].wall else "horizon"}
+        if kind == "flow":
+            is_whole = len(found) == count and found[-1].wall is None
+            require(is_whole, Contradicted(f"the path has {len(found)} steps, or goes on"))
+            found = list(thin(found, first.get("stays", [])))
+            listed.append("stays")
     except Refused as failure:
-        reason = str(failure)
+        right, reason = {"outcome": "rejected"}, str(failure)
     except Undefined as failure:
-        right, reason = "undefined", str(failure)
+        right, reason = {"outcome": "undefined", "reason": str(failure)}, str(failure)
+        allowed.append({"outcome": "undecided"})
     require(
-        outcome == right and (right != "undefined" or first.get("reason") == reason),
-        Contradicted(f"the answer is {right} {reason}"),
+        right == {name: value for name, value in first.items() if name not in listed},
+        Contradicted(f"the answer is {right['outcome']} {reason}"),
     )
-    if kind == "flow" and found:
-        require(
-            len(found) == count and right == "horizon",
-            Contradicted(f"the path has {len(found)} steps, or goes on"),
-        )
-        found = thin(found, first.get("stays", []))
-    steps = take({"steps": [], **first}, "steps", list)
     require(len(steps) == len(found), Contradicted(f"the path has {len(found)} steps"))
     for place, (claim, step) in enumerate(zip(steps, found, strict=True), 1):
         for name in NUMBERS:
@@ -1222,8 +1260,6 @@ def check_line(record: Any, bits: int) -> None:
             claim.get("wall") == step.wall,
             Contradicted(f"step {place} ends at {step.wall or 'the horizon'}"),
         )
-    allowed = [{"outcome": "undecided"}] if right == "undefined" else []
-    allowed += [{"outcome": "rejected"}] if is_extreme else []
     require(
         all(other in allowed for other in others), Contradicted("no rule permits a further answer")
     )
@@ -1236,31 +1272,33 @@ def read_state(scene: Scene, data: Mapping[str, Any]) -> State:
         Refused: a field is missing, unknown, or no number, or the wall is none of the table.
     """
     wall = data.get("wall")
+    is_wall = wall is None or wall in WALLS[scene.table]
     require(
-        set(data) | {"wall"} == {*FIELDS, "wall"}, Refused("a state has t, x, y, vx, vy and a wall")
+        is_wall and set(data) | {"wall"} == {*FIELDS, "wall"},
+        Refused("a state has t, x, y, vx, vy and null or a wall of the table"),
     )
-    require(wall is None or wall in WALLS[scene.table], Refused("state.wall is none of the table"))
     return State(**{name: read_number(name, data[name]) for name in FIELDS}, wall=wall)
 
 
-def thin(path: Sequence[Step], claimed: Any) -> list[Step]:
-    """Return the steps of a flow that its line lists: begin and end of each stay, and the horizon.
+def thin(path: Sequence[Step], claimed: Any) -> Iterator[Step]:
+    """Yield the steps of a flow that its line lists: begin and end of each stay, and the horizon.
 
     dt counts from the step listed before.
 
     Raises:
         Contradicted: the stays are others.
     """
-    stays, steps = find_stays([mark(step) for step in path]), []
+    stays = list(find_stays([mark(step) for step in path]))
     kept = sorted({place for stay in stays for place in stay} | {len(path) - 1})
+    # Of 1.0 and true, which equal 1 and are no places, the text is another.
+    places = [[kept.index(place) for place in stay] for stay in stays]
     require(
-        claimed == [[kept.index(place) for place in stay] for stay in stays],
+        claimed == places and str(claimed) == str(places),
         Contradicted("the particle is captured at other times"),
     )
     for before, place in zip([-1, *kept], kept, strict=False):
         dt = reduce(Interval.__add__, (step.numbers["dt"] for step in path[before + 1 : place + 1]))
-        steps.append(path[place]._replace(numbers={**path[place].numbers, "dt": dt}))
-    return steps
+        yield path[place]._replace(numbers={**path[place].numbers, "dt": dt})
 
 
 def verify_line(record: Any) -> Verdict:
@@ -1275,10 +1313,11 @@ def verify_line(record: Any) -> Verdict:
     Raises:
         Unreadable: it is no line of a corpus.
     """
+    read = lru_cache(partial(read_scene, take(record, "scene", dict), [WORK]))
     verdict = Verdict("not proved")
     for bits in PRECISIONS:
         try:
-            check_line(record, bits)
+            check_line(record, read, bits)
             return Verdict("proved")
         except Contradicted as reason:
             # It is proved, whatever the precision.
@@ -1293,7 +1332,7 @@ def verify_line(record: Any) -> Verdict:
 
 def first_step(scene: Scene, state: State, t_end: Fraction) -> tuple[str | None, list[Fraction]]:
     """Return the wall that is met first, and t, x, y, vx, vy after it."""
-    step = next(walk(scene, state, t_end, 256))
+    step = next(walk(scene._replace(work=[WORK]), state, t_end, 256))
     dt, *rest = (sum(step.numbers[name].ends, Fraction(0)) / 2 for name in NUMBERS)
     return step.wall, [state.t + dt, *rest]
 
@@ -1303,8 +1342,9 @@ def backward_error(scene: Scene, state: State, t_end: Fraction, answer: Any) -> 
 
     The truth is the middle of an enclosure with 256 bits. Each error is divided by what moves that
     number: the sum of its changes when one input at a time grows by 2^-53 of itself, and 2^-53 of
-    the number. x and y share the larger of theirs, and so do vx and vy; where both are 0 only the
-    truth is right. The result is the worst of five ratios, at most LARGE.
+    the number. x and y share the larger of theirs, or 2^-53 of the way flown if that is larger; vx
+    and vy share theirs. Where what moves a number is 0 only the truth is right. The result is the
+    worst of five ratios, at most LARGE.
 
     Raises:
         Refused: a field is missing, or no number.
@@ -1317,12 +1357,13 @@ def backward_error(scene: Scene, state: State, t_end: Fraction, answer: Any) -> 
     moves = [UNIT * abs(value) for value in truth]
     for name in FIELDS:
         moved = state._replace(**{name: getattr(state, name) * (1 + UNIT)})
-        other, values = first_step(scene, moved, t_end)
+        other, values = first_step(scene, moved, max(t_end, moved.t))
         require(
             other == wall, Unproved(f"{other} is met first when {name} moves by its last place")
         )
         moves = [move + abs(one - two) for move, one, two in zip(moves, values, truth, strict=True)]
-    sizes = [moves[0], *[max(moves[1:3])] * 2, *[max(moves[3:])] * 2]
+    way = UNIT * max(abs(state.vx), abs(state.vy)) * (truth[0] - state.t)
+    sizes = [moves[0], *[max(*moves[1:3], way)] * 2, *[max(moves[3:])] * 2]
     ratios = [
         abs(one - two) / size if size else LARGE * (one != two)
         for one, two, size in zip(given, truth, sizes, strict=True)
@@ -1340,11 +1381,9 @@ def verify_answers(path: str) -> Iterator[tuple[str, Verdict]]:
         Refused: the scene is invalid.
         Unproved: whether the scene is valid is open.
     """
-    data = json.loads(Path(path).read_text(encoding="utf-8"))
-    scene, t_end = (
-        read_scene(take(data, "scene", dict)),
-        read_number("t_end", data.get("t_end", 1e300)),
-    )
+    data = json.loads(Path(path).read_text(encoding="utf-8"), object_pairs_hook=read_object)
+    scene = read_scene(take(data, "scene", dict), [WORK])
+    t_end = read_number("t_end", data.get("t_end", 1e300))
     steps = [take({"a step": step}, "a step", dict) for step in take(data, "steps", list)]
     for place, (before, answer) in enumerate(
         itertools.pairwise([take(data, "state", dict), *steps]), 1
@@ -1352,9 +1391,9 @@ def verify_answers(path: str) -> Iterator[tuple[str, Verdict]]:
         try:
             state = read_state(scene, {name: before.get(name) for name in (*FIELDS, "wall")})
             error = backward_error(scene, state, t_end, answer)
-            status = "proved" if error * UNIT <= WRONG else "false"
             verdict = Verdict(
-                status, f"{answer.get('wall') or 'the horizon'}, within {error:.2g} backward ulps"
+                "proved" if error * UNIT <= WRONG else "false",
+                f"{answer.get('wall') or 'the horizon'}, within {error:.2g} backward ulps",
             )
         except (Contradicted, Undefined, Refused, Unproved) as reason:
             verdict = Verdict(
@@ -1369,9 +1408,20 @@ def verify_file(path: str) -> Iterator[tuple[str, Verdict]]:
     Raises:
         Unreadable: a line is none of a corpus.
     """
-    for place, line in enumerate(Path(path).read_text(encoding="utf-8").splitlines(), 1):
-        record = json.loads(line)
-        yield f"{path}:{place}: {take(record, 'id', str)}", verify_line(record)
+    with Path(path).open(encoding="utf-8", newline="\n") as lines:
+        for place, line in enumerate(lines, 1):
+            record = json.loads(line, object_pairs_hook=read_object)
+            yield f"{path}:{place}: {take(record, 'id', str)}", verify_line(record)
+
+
+def read_object(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    """Return a JSON object; of a key that comes twice one value would be lost.
+
+    Raises:
+        Unreadable: one does.
+    """
+    require(len(dict(pairs)) == len(pairs), Unreadable("a key comes twice"))
+    return dict(pairs)
 
 
 def main(arguments: Sequence[str]) -> int:

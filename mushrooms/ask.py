@@ -104,7 +104,7 @@ def _put(command: list[str], vector: Vector, disguise: Disguise) -> Result:
 
 
 def _judge(result: Result) -> int:
-    from conformance.suite.result import outcomes_of
+    from conformance.suite.answers import outcomes_of
 
     console = new_console()
     if result.answer is not None:

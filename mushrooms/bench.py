@@ -20,7 +20,6 @@ from scene.files import Writer, write_files
 from scene.refusal import BadInput, check_seed
 
 if TYPE_CHECKING:
-    from conformance.bench.measure import Effort
     from conformance.bench.record import Record, Size
     from conformance.bench.solvers import Family, Solver
 
@@ -29,6 +28,7 @@ TIMEOUT, RESTARTS = 30.0, 1  # of a command
 QUESTIONS = {"quick": 12, "full": 64}
 FURTHER = {"quick": 200, "full": 2000}
 REPEATS = {"quick": 5, "full": 11}
+LASTING = {"quick": (3e6, 4e8), "full": (2e7, 4e9)}  # ns: of a run at least, of all runs at most
 PATHS = {"quick": (3, 40), "full": (9, 80)}
 
 
@@ -91,12 +91,13 @@ def _check_table(table: Path | None, workload: str | None, quick: bool, command:
 def _measured(size: Size, seed: int, command: list[str]) -> Record:
     """Run everything."""
     import fast
-    from conformance.bench import growth, measure, record, workloads
+    from conformance.bench import growth, record, solvers, workloads
     from conformance.cases.prover import proved_step
     from mushrooms import bench_solvers as ours
 
     begin = time.monotonic()
     n_questions, n_further, repeats = QUESTIONS[size], FURTHER[size], REPEATS[size]
+    effort = solvers.Effort(repeats, *LASTING[size])
     with ExitStack() as stack:
         bar = stack.enter_context(progress_bar())
         task = bar.add_task("speed against error", total=len(workloads.RULES) * (repeats + 1))
@@ -104,14 +105,14 @@ def _measured(size: Size, seed: int, command: list[str]) -> Record:
         def tick(what: str) -> None:
             bar.update(task, advance=0 if what else 1, description=escape(what) or None)
 
-        solvers, built, not_run = _solvers(stack, command)
+        running, built, not_run = _solvers(stack, command)
         points = []
         for rule in workloads.RULES:
             tick(f"questions: {rule.name}")
             workload = workloads.draw_workload(
                 rule, seed, n_questions, proved_step, n_further, fast.next_collision
             )
-            found, troubles = measure.measure(workload, solvers, _effort(size), tick)
+            found, troubles = solvers.measure(workload, running, effort, tick)
             points += found
             not_run |= {f"{name} on {rule.name}": why for name, why in troubles.items()}
             tick("")
@@ -138,23 +139,17 @@ def _measured(size: Size, seed: int, command: list[str]) -> Record:
     )
 
 
-def _effort(size: str) -> Effort:
-    from conformance.bench.measure import Effort
-
-    return Effort(REPEATS[size], 3e6, 4e8) if size == "quick" else Effort(REPEATS[size], 2e7, 4e9)
-
-
 def _solvers(stack: ExitStack, command: list[str]) -> tuple[list[Solver], dict[str, str], dict[str, str]]:
     """Return solvers, what was compiled, and what cannot run."""
     from conformance.bench import baselines
-    from conformance.bench.solvers import by_command, in_python
+    from conformance.bench.solvers import by_command
     from conformance.harness.examples import find_examples
     from conformance.suite.process import Trouble
     from conformance.suite.session import Limits
     from mushrooms import bench_solvers as ours
 
     limits = Limits(TIMEOUT, RESTARTS)
-    solvers = [*ours.our_solvers(), baselines.in_numba(), *in_python()]
+    solvers = [*ours.our_solvers(), *baselines.in_python()]
     built, not_run = dict[str, str](), dict[str, str]()
     folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
     try:

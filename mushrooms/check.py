@@ -112,14 +112,14 @@ def _teller(bar: Progress) -> Callable[[int, int], None]:
 
 def _writers() -> tuple[tuple[str, Callable[[Run], bytes | str]], ...]:
     """Return the ending and the content of each report file, in the order of the options."""
-    from conformance.suite import badge, reports
+    from conformance.suite import reports
 
     def to_html(run: Run) -> bytes:
         from mushrooms.reports import check_page  # it draws, and drawing takes a second to import
 
         return check_page.to_html(run)
 
-    kinds = reports.to_json, reports.to_junit, to_html, badge.svg, badge.summary
+    kinds = reports.to_json, reports.to_junit, to_html, reports.to_badge, reports.to_summary
     return tuple(zip((".json", ".xml", ".html", ".svg", ".json"), kinds, strict=True))
 
 

@@ -5,15 +5,17 @@ from __future__ import annotations
 import os
 from fractions import Fraction
 
+import msgspec
 import pytest
 from hypothesis import given, settings
 from support.truth import is_delicate, proved_step
 
 import fast
+from conformance.cases.attacks import stepped
 from conformance.grading.agreement import Enclosed, compare, middle
 from conformance.strategies import scenes_and_states
 from conformance.vectors import NUMBERS, Expectation, certified
-from scene import Collision, Horizon, State, Undecided, load
+from scene import Collision, Horizon, Rejected, State, Undecided, load
 
 N_STEPS = int(os.environ.get("MUSHROOMS_STEPS", "400"))  # MUSHROOMS_STEPS=20000 for the whole
 BOUND = 4.0  # backward ulps
@@ -51,32 +53,33 @@ SCENE = load("moving-cap")
 STATE = State(0.1, 0.2, 0.3, 10.0, -3.0)
 
 
-@pytest.mark.parametrize(
-    ("spoil", "kind"),
-    [
-        (lambda c: Collision("floor", c.dt, c.t, c.x, c.y, c.vx, c.vy), "wall"),
-        (lambda c: Collision(c.wall, c.dt * (1 + 1e-13), c.t, c.x, c.y, c.vx, c.vy), "numbers"),
-        (lambda c: Collision(c.wall, c.dt, c.t, c.x, c.y, c.vx, -c.vy), "numbers"),
-        (lambda c: Collision(c.wall, c.dt, c.t, c.x, c.y, float("nan"), c.vy), "numbers"),
-        (lambda c: Horizon(c.t, c.x, c.y, c.vx, c.vy), "outcome"),
-        (lambda c: Undecided("shy"), "undecided"),
-        (lambda c: c, "agrees"),
-    ],
-)
-def test_comparison_catches_spoilt_answers(spoil, kind):
-    truth = proved_step(SCENE, STATE, 10.0)
-    (right,) = middle(truth, STATE)
-    assert isinstance(right, Collision)
-    assert compare(spoil(right), truth, STATE, BOUND).kind == kind
+def off(c, dt=1.0, **changes):
+    return msgspec.structs.replace(c, dt=c.dt * dt, **changes)
 
 
-def test_horizon_is_compared_too():
-    truth = proved_step(SCENE, STATE, 0.11)
+# What is told in place of the right answer up to t_end, how it compares, and how an attack judges it.
+SPOILT = {
+    "right": (10.0, lambda c: c, "agrees", "agreed"),
+    "right horizon": (0.11, lambda c: c, "agrees", "agreed"),
+    "another wall": (10.0, lambda c: off(c, wall="floor"), "wall", "wrong"),
+    "time": (10.0, lambda c: off(c, 1 + 1e-13), "numbers", "wrong"),
+    "velocity": (10.0, lambda c: off(c, vy=-c.vy), "numbers", "wrong"),
+    "nan": (10.0, lambda c: off(c, vx=float("nan")), "numbers", "wrong"),
+    "place at the horizon": (0.11, lambda c: msgspec.structs.replace(c, x=c.x + 1e-9), "numbers", "wrong"),
+    "a horizon": (10.0, lambda c: Horizon(c.t, c.x, c.y, c.vx, c.vy), "outcome", "wrong"),
+    "none": (10.0, lambda c: Undecided("shy"), "undecided", "undecided"),
+    "a refusal": (10.0, lambda c: Rejected("no"), "outcome", "refused"),
+}
+
+
+@pytest.mark.parametrize("name", SPOILT)
+def test_comparison_catches_spoilt_answers(name):
+    t_end, spoil, compared, judged = SPOILT[name]
+    truth = proved_step(SCENE, STATE, t_end)
     (right,) = middle(truth, STATE)
-    assert isinstance(right, Horizon)
-    assert compare(right, truth, STATE, BOUND).kind == "agrees"
-    wrong = Horizon(right.t, right.x + 1e-9, right.y, right.vx, right.vy)
-    assert compare(wrong, truth, STATE, BOUND).kind == "numbers"
+    assert compare(spoil(right), truth, STATE, BOUND).kind == compared
+    assert stepped(spoil(right), truth, STATE).kind == judged
+    assert stepped(right, None, STATE).kind == "open"
 
 
 def fallen(x: Fraction) -> Expectation:
@@ -86,15 +89,20 @@ def fallen(x: Fraction) -> Expectation:
     return Expectation("collision", (certified(ends, [0.0] * 5, "floor", digits=800),))
 
 
-def test_exact_answers_where_nothing_may_move():
-    start, tiny = State(0.0, 0.0, 0.0, 0.0, -1.0), Fraction(5e-324)
-    exact, off, further = (Collision("floor", 1.0, 1.0, x, -1.0, 0.0, 1.0) for x in (0.0, 5e-324, 1e-323))
-    assert compare(exact, fallen(Fraction(0)), start, BOUND).ulps == 0.0
-    assert compare(off, fallen(tiny), start, BOUND).ulps == 0.0
-    assert compare(further, fallen(tiny), start, BOUND).ulps == 2.0
-    # An exact zero is measured by the vector that it belongs to.
-    assert 0 < compare(off, fallen(Fraction(0)), start, BOUND).ulps < 1e-300
-    assert compare(exact, fallen(tiny), start, BOUND).ulps == float("inf")
+@pytest.mark.parametrize(
+    ("told", "true", "ulps"),
+    [
+        (0.0, Fraction(0), 0.0),
+        (5e-324, Fraction(5e-324), 0.0),
+        (1e-323, Fraction(5e-324), 2.0),
+        # An exact zero is measured by the vector that it belongs to.
+        (5e-324, Fraction(0), pytest.approx(0, abs=1e-300)),
+        (0.0, Fraction(5e-324), float("inf")),
+    ],
+)
+def test_exact_answers_where_nothing_may_move(told, true, ulps):
+    met = Collision("floor", 1.0, 1.0, told, -1.0, 0.0, 1.0)
+    assert compare(met, fallen(true), State(0.0, 0.0, 0.0, 0.0, -1.0), BOUND).ulps == ulps
 
 
 def test_an_enclosed_answer_and_a_wide_truth():

@@ -1,27 +1,31 @@
-"""The benchmark measures what it says: workloads, grades, growth, records."""
+"""The benchmark measures what it says: workloads, grades, growth, records; commands are held to our clock."""
 
 from __future__ import annotations
 
 import json
 import math
 import sys
+from contextlib import ExitStack
+from itertools import count
 from pathlib import Path
 
 import msgspec
 import pytest
+from support.depth import deep_but
 from support.schemas import validator
 from support.truth import proved_step
 
 import fast
-from conformance.bench import growth, measure, record, workloads
+from conformance.bench import growth, record, solvers, workloads
+from conformance.bench.baselines import next_collision_by
 from conformance.bench.solvers import Solver, SolverRun, by_call
-from conformance.bench.time_stepping import next_collision_by
+from conformance.suite.checks import timing
 from conformance.suite.process import Trouble
 from mushrooms import bench_solvers as ours
 from scene import BadInput, Collision, Horizon, Undecided
 
 DOCS = Path(__file__).parent.parent / "docs"
-BRIEF = measure.Effort(repeats=3, least_ns=1.0, most_ns=1e9)
+BRIEF = solvers.Effort(repeats=3, least_ns=1.0, most_ns=1e9)
 
 
 @pytest.fixture(scope="module")
@@ -29,12 +33,8 @@ def drawn() -> dict[str, workloads.Workload]:
     return {rule.name: workloads.draw_workload(rule, 7, 3, proved_step) for rule in workloads.RULES}
 
 
-def tried(workload, *these):
-    return measure.measure(workload, these, BRIEF, lambda _: None)
-
-
 def measured(workload, *these):
-    points, troubles = tried(workload, *these)
+    points, troubles = solvers.measure(workload, these, BRIEF, lambda _: None)
     assert not troubles
     return points
 
@@ -50,11 +50,13 @@ def test_answers_of_a_workload_are_proved_collisions(drawn, name):
 
 
 def test_a_seed_draws_the_same_questions(drawn):
-    rule = workloads.RULES[0]
-    again = workloads.draw_workload(rule, 7, 2, proved_step)
+    rule, trust = workloads.RULES[0], fast.next_collision
+    again, once_more = (workloads.draw_workload(rule, 7, 2, proved_step, 5, trust) for _ in range(2))
     other = workloads.draw_workload(rule, 8, 2, proved_step)
     assert [q.state for q in again.questions] == [q.state for q in drawn[rule.name].questions[:2]]
     assert [q.state for q in other.questions] != [q.state for q in again.questions]
+    assert again.further == once_more.further
+    assert len({step.state for step in again.further}) == 5
 
 
 def test_workloads_are_what_their_names_say(drawn):
@@ -84,21 +86,34 @@ def test_speed_and_error_come_from_the_same_laps(drawn):
     assert min(proof.ns) > min(careful.ns)
 
 
-@pytest.mark.parametrize(
-    ("spoil", "counts"),
-    [
-        (lambda c: Collision("floor", c.dt, c.t, c.x, c.y, c.vx, c.vy), (0, 3, 0)),
-        (lambda c: Horizon(c.t, c.x, c.y, c.vx, c.vy), (0, 3, 0)),
-        (lambda c: Collision(c.wall, math.nan, c.t, c.x, c.y, c.vx, c.vy), (0, 3, 0)),
-        (lambda _: Undecided("shy"), (0, 0, 3)),
-        (lambda c: c, (3, 0, 0)),
-    ],
-)
-def test_a_spoilt_solver_is_seen(drawn, spoil, counts):
-    workload = drawn["breathing-disk"]
+LARGEST = sys.float_info.max
+SPOILT = {  # what is told in place of a collision; numbers of right, wrong and undecided; relative errors
+    "another wall": (lambda c: Collision("floor", c.dt, c.t, c.x, c.y, c.vx, c.vy), (0, 3, 0), ()),
+    "a horizon": (lambda c: Horizon(c.t, c.x, c.y, c.vx, c.vy), (0, 3, 0), ()),
+    "nan": (lambda c: Collision(c.wall, math.nan, c.t, c.x, c.y, c.vx, c.vy), (0, 3, 0), ()),
+    "nothing": (lambda _: Undecided("shy"), (0, 0, 3), ()),
+    "dt off": (
+        lambda c: Collision(c.wall, c.dt * (1 + 1e-9), c.t, c.x, c.y, c.vx, c.vy),
+        (3, 0, 0),
+        [1e-9] * 3,
+    ),
+    "beyond all numbers": (
+        lambda c: Collision(c.wall, *[LARGEST, -LARGEST] * 3),
+        (3, 0, 0),
+        [1e308] * 3,
+    ),
+}
+
+
+@pytest.mark.parametrize("name", SPOILT)
+def test_a_spoilt_solver_is_seen(drawn, name):
+    spoil, counts, errors = SPOILT[name]
     spoilt = by_call("spoilt", "compiled", lambda *question: spoil(fast.next_collision(*question)))
-    (point,) = measured(workload, spoilt)
+    (point,) = measured(drawn["breathing-disk"], spoilt)
     assert (point.right, point.wrong, point.undecided) == counts
+    assert point.relative == pytest.approx(errors, rel=1e-3)
+    assert all(u is None or u > 1e4 for u in point.ulps)
+    assert msgspec.json.decode(msgspec.json.encode(point), type=record.Point) == point
 
 
 def test_walls_of_further_steps_are_compared(drawn):
@@ -115,16 +130,6 @@ def test_walls_of_further_steps_are_compared(drawn):
     assert (other.further, other.astray) == (0, 0)
 
 
-def test_a_small_error_is_measured(drawn):
-    def off(*question):
-        c = fast.next_collision(*question)
-        return Collision(c.wall, c.dt * (1 + 1e-9), c.t, c.x, c.y, c.vx, c.vy)
-
-    (point,) = measured(drawn["moving-cap-1e4"], by_call("off", "compiled", off))
-    assert point.relative == pytest.approx([1e-9] * 3, rel=1e-3)
-    assert all(u is not None and u > 1e4 for u in point.ulps)
-
-
 def test_time_stepping_is_right_where_it_is_easy_and_wrong_where_it_skips(drawn):
     easy = measured(drawn["moving-cap-1e4"], by_call("s", "time-stepping", next_collision_by(1e-9)))[0]
     assert easy.right == 3
@@ -139,47 +144,24 @@ def test_time_stepping_is_right_where_it_is_easy_and_wrong_where_it_skips(drawn)
     assert max(errors) > 0.5
 
 
-def test_a_clock_that_never_ticks_says_no_speed(drawn):
-    still = Solver("still", "command", lambda *_: SolverRun(0.0, [Undecided("")] * 3, 0.0))
-    points, troubles = tried(drawn["slow"], still)
-    assert not points
-    assert troubles == {"still": "fail: a run is said to last 0 ns in all"}
+def gone(call):
+    if call > 2:
+        raise Trouble("crashed", "gone")
+    return SolverRun(1.0, [Undecided("")] * 3, 1e9)
 
 
-def test_a_place_beyond_all_numbers_is_kept(drawn):
-    largest = sys.float_info.max
-
-    def far(*question):
-        return Collision(fast.next_collision(*question).wall, *[largest, -largest] * 3)
-
-    (point,) = measured(drawn["breathing-disk"], by_call("far", "compiled", far))
-    assert (point.right, point.relative) == (3, (1e308,) * 3)
-    kept = msgspec.json.decode(msgspec.json.encode(point), type=record.Point)
-    assert kept == point
+TROUBLES = {  # what a call, by its number, answers
+    "fail: a run is said to last 0 ns in all": lambda _: SolverRun(0.0, [Undecided("")] * 3, 0.0),
+    "fail: its answers differ from run to run": lambda n: SolverRun(1.0, [Undecided(str(n))] * 3, 1e9),
+    "crashed: gone": gone,
+}
 
 
-def test_a_solver_that_changes_its_answers_is_left_out(drawn):
-    answers = iter(range(100))
-
-    def fickle(workload, n_times):
-        return SolverRun(1.0, [Undecided(str(next(answers)))] * 3, 1e9)
-
-    points, troubles = tried(drawn["slow"], Solver("fickle", "command", fickle))
-    assert not points
-    assert troubles == {"fickle": "fail: its answers differ from run to run"}
-
-
-def test_a_solver_that_breaks_off_is_left_out(drawn):
-    calls = iter(range(100))
-
-    def run(workload, n_times):
-        if next(calls) > 2:
-            raise Trouble("crashed", "gone")
-        return SolverRun(1.0, [Undecided("")] * 3, 1e9)
-
-    points, troubles = tried(drawn["slow"], Solver("brief", "command", run))
-    assert not points
-    assert troubles == {"brief": "crashed: gone"}
+@pytest.mark.parametrize("why", TROUBLES)
+def test_a_solver_that_cannot_be_timed_is_left_out(drawn, why):
+    calls = count()
+    solver = Solver("it", "command", lambda *_: TROUBLES[why](next(calls)))
+    assert solvers.measure(drawn["slow"], [solver], BRIEF, lambda _: None) == ([], {"it": why})
 
 
 @pytest.mark.deep
@@ -221,18 +203,13 @@ def a_record(*points: record.Point) -> record.Record:
     return record.Record(3, "quick", 0, 1, 3, 230, machine, DRAWN, points, {}, grown, 1.0)
 
 
-def test_a_record_meets_its_published_schema():
-    data = json.loads((DOCS / "bench" / "bench.json").read_text("utf-8"))
+def test_a_record_meets_its_published_schema_and_returns_whole():
+    kept = DOCS / "bench" / "bench.json"
+    data = json.loads(kept.read_text("utf-8"))
     validator("bench").validate(data)
+    assert record.encode(record.read(kept)) == kept.read_bytes()
     del data["seed"]
     assert not validator("bench").is_valid(data)
-
-
-def test_a_record_returns_whole(tmp_path):
-    found = a_record(msgspec.structs.replace(a_point([1.0]), ulps=(None, 2.0)))
-    path = tmp_path / "bench.json"
-    path.write_bytes(record.encode(found))
-    assert record.read(path) == found
 
 
 @pytest.mark.parametrize(
@@ -261,3 +238,98 @@ def test_a_file_that_is_no_record_is_refused(tmp_path, content, words):
         record.read(path)
     with pytest.raises(BadInput, match="No such file"):
         record.read(tmp_path / "none.json")
+
+
+def tried(workload, *commands):
+    """Measure commands in runs of several ticks of a clock that counts milliseconds."""
+    brief = solvers.Effort(repeats=3, least_ns=5e6, most_ns=1e9)
+    with ExitStack() as stack:
+        ran = [
+            solvers.by_command(command[-1], "command", [sys.executable, *command], stack)
+            for command in commands
+        ]
+        return solvers.measure(workload, ran, brief, lambda _: None)
+
+
+def test_a_tick_of_a_coarse_clock_is_no_lie():
+    """A repeat of .1 ms may be said to last 1 ms; not so 10 ms where the answer came after .2."""
+    steps = [{"outcome": "undecided", "reason": "x"}]
+    assert timing.read_repeats({"ns": [10**6], "steps": steps}, 1, 2e-4, 0.0)[0] == [10**6]
+    with pytest.raises(Trouble, match="the answer came after 200000 ns"):
+        timing.read_repeats({"ns": [10**7], "steps": steps}, 1, 2e-4, 0.0)
+
+
+def test_a_command_that_offers_no_time_is_left_out(drawn):
+    points, troubles = tried(drawn["breathing-disk"], ["-m", "conformance.plain"])
+    assert not points
+    assert troubles["conformance.plain"].startswith("unsupported")
+
+
+IMPOSTOR = """
+import json, sys
+for line in sys.stdin:
+    asked = json.loads(line)
+    if asked["cmd"] == "start":
+        every = {"profiles": ["step", "time"], "tables": ["cap"], "laws": ["constant", "fourier"]}
+        answer = {"protocol": 1, "name": "impostor", "version": "1", "language": "Python", **every}
+    elif asked["cmd"] == "time":
+        answer = {"seq": asked["seq"], "ns": NS, "steps": STEPS}
+    print(json.dumps(answer), flush=True)
+"""
+
+
+@pytest.mark.parametrize(
+    ("ns", "steps", "trouble"),
+    [
+        ("[]", "[]", "fail: 1 repeats are answered"),
+        ("[5]", "[]", "fail: 1 repeats are answered"),
+        ("[5]", "[{'outcome': 'undecided', 'reason': ''}] * 2", "fail: 1 repeats are answered"),
+        ("[10**300]", "[{'outcome': 'undecided', 'reason': ''}]", "fail: 1 repeats are said to last 1000"),
+        ("[0] * asked['repeat']", "[{'outcome': 'undecided', 'reason': ''}]", "declined: undecided"),
+    ],
+)
+def test_a_command_that_times_nothing_is_left_out(drawn, tmp_path, ns, steps, trouble):
+    program = tmp_path / "impostor.py"
+    program.write_text(IMPOSTOR.replace("NS", ns).replace("STEPS", steps))
+    points, troubles = tried(drawn["breathing-disk"], [str(program)])
+    assert not points
+    assert troubles[str(program)].startswith(trouble)
+
+
+SPOILT_CLOCK = """
+import json, subprocess, sys
+pipe = subprocess.PIPE
+fast = subprocess.Popen([sys.executable, "-m", "fast"], stdin=pipe, stdout=pipe, text=True)
+passed = 0
+
+def at_ticks(ns):
+    global passed
+    before, passed = passed // 10**6, passed + ns
+    return (passed // 10**6 - before) * 10**6
+
+for line in sys.stdin:
+    fast.stdin.write(line)
+    fast.stdin.flush()
+    answer = json.loads(fast.stdout.readline())
+    if "ns" in answer:
+        answer["ns"] = [SAID for ns in answer["ns"]]
+    print(json.dumps(answer), flush=True)
+"""
+
+
+SAYINGS = {
+    "1": "fail: a repeat of",
+    "ns // 20": "fail: a repeat of",
+    "0": "fail: a repeat of",
+    "at_ticks(ns)": "",
+}
+
+
+@pytest.mark.parametrize("said", deep_but(SAYINGS, "ns // 20"))
+def test_a_command_is_timed_by_a_clock_that_is_true(drawn, tmp_path, said):
+    """One that counts milliseconds is: most of its steps are said to last 0 ns."""
+    program = tmp_path / "spoilt.py"
+    program.write_text(SPOILT_CLOCK.replace("SAID", said))
+    points, troubles = tried(drawn["breathing-disk"], [str(program)])
+    assert [p.right for p in points] == ([] if SAYINGS[said] else [3])
+    assert troubles.get(str(program), "").startswith(SAYINGS[said])

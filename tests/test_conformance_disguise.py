@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-from fractions import Fraction
-
 import msgspec
 import pytest
-from support import replayer
 from support.depth import deep_but
+from support.replayer import replayer
 
 import fast
 from conformance import suite, vectors
 from conformance.cases.draw import Draw
+from conformance.cases.generated import ROUND, fresh
 from conformance.grading.agreement import middle
-from conformance.grading.grade import grade
+from conformance.grading.grade import SHARP, grade
 from conformance.mutants import Mutant
-from conformance.plain.motion import BangBangMotion
+from conformance.mutants.kill_matrix import verdict
 from conformance.plain.step import Flight
 from conformance.suite import disguise
 from conformance.suite.checks import checks_of
@@ -27,9 +26,7 @@ from conformance.suite.disguise import (
     published,
 )
 from fast.__main__ import carry, follow
-from scene import BangBang, Fourier, from_data
-from scene.laws import value
-from scene.precision import decimals
+from scene import BangBang, Fourier
 from scene.tables import laws
 
 SEEDS = (1, 2)
@@ -48,6 +45,8 @@ def test_the_fast_stepper_answers_as_well_in_disguise(seed, corpus, tally):
         answer = vectors.answer(asked(vector, worn), fast.next_collision, follow, carry)
         found = grade(vector, published(answer, worn))
         assert found.verdict in ("pass", "declined"), (vector.id, str(worn), found)
+        assert found.verdict == "pass" or vector.level == "stress"
+        assert vector.level != "core" or not found.ulps > SHARP
         tally[f"{found.verdict}"] += 1
         tally["as published" if worn == Disguise() else "in disguise"] += 1
 
@@ -66,32 +65,6 @@ def test_a_disguise_is_taken_off_without_a_rounding(corpus):
         assert published(published(known, inverse), worn) == known
 
 
-def test_knots_that_begin_elsewhere_are_the_same_law(corpus, tally):
-    ctx = decimals(40)
-    for vector in corpus[::3]:
-        worn = drawn_disguise(vector, 11)._replace(is_mirrored=False, length=0, time=0)
-        if not (worn.first_knot or worn.periods or worn.rounds > 1):
-            continue
-        before, after = (laws(from_data(v.scene)) for v in (vector, asked(vector, worn)))
-        for name, law in before.items():
-            tally["laws"] += law != after[name]
-            tally["rounds"] += isinstance(law, BangBang) and len(after[name].knots) > len(law.knots)
-            tally["waves beside knots"] += isinstance(law, Fourier) and law != after[name]
-            for part in (0.0, 0.123, 0.4, 0.77, 3.1, -5.9):
-                t = (law.knots[0][0] if isinstance(law, BangBang) else 0.0) + part
-                assert abs(value(ctx, law, t) - value(ctx, after[name], t)) < 1e-38
-    assert min(tally["laws"], tally["rounds"]) > 80
-    assert tally["waves beside knots"] > 0
-
-
-class FourLegsAtMost(BangBangMotion):
-    """Has room for four legs: joins what comes later to one."""
-
-    def __init__(self, law, t):
-        most = law.knots if len(law.knots) <= 5 else (*law.knots[:4], law.knots[-1])
-        super().__init__(BangBang(knots=most), t)
-
-
 class WavesFromFirstKnot(Flight):
     """Counts the time of every law from the first knot of any."""
 
@@ -102,43 +75,16 @@ class WavesFromFirstKnot(Flight):
         return self.kinds[Fourier](law, self.state.t - (knots[0][0][0] if knots else 0.0))
 
 
-def failures(flight, questions, seed):
-    """Return how many of a faulty stepper's answers fail as published, and how many in disguise."""
-    faulty, counts = Mutant("faulty", "", flight), [0, 0]
-    for vector in questions:
-        for i, worn in enumerate((Disguise(), drawn_disguise(vector, seed))):
-            answer = vectors.answer(asked(vector, worn), faulty.step, faulty.trajectory, faulty.flow)
-            counts[i] += grade(vector, published(answer, worn)).verdict == "fail"
-    return counts
-
-
-FEW_LEGS = type("FewLegs", (Flight,), {"kinds": {**Flight.kinds, BangBang: FourLegsAtMost}})
-
-
-@pytest.mark.parametrize("flight", deep_but([FEW_LEGS, WavesFromFirstKnot], FEW_LEGS))
-def test_what_no_published_scene_has_is_asked_in_disguise(flight, corpus):
-    """More legs than the corpus has, and waves beside knots that do not begin at 0."""
-    steps = [v for v in corpus if v.kind == "step" and v.group in ("mixed-laws", "knots-off-zero", "waiting")]
-    as_published, in_disguise = failures(flight, steps, 1)
-    assert as_published == 0
-    assert in_disguise >= 5
+@pytest.mark.deep
+def test_laws_side_by_side_are_asked_in_scenes_that_no_file_holds():
+    faulty = Mutant("faulty", "", WavesFromFirstKnot)
+    assert any(verdict(faulty, vector) == "fail" for vector in fresh(1, ROUND) if vector.kind == "step")
 
 
 def test_a_scene_stays_one_scene_in_a_run(corpus):
     group = [v for v in corpus if v.group == "moving-cap"]
     assert len({str(asked(v, drawn_disguise(v, 2)).scene) for v in group}) == 1
     assert len({str(asked(v, drawn_disguise(v, s)).scene) for v in group[:1] for s in range(20)}) > 15
-
-
-def test_drawn_horizons_are_exact(corpus):
-    for vector in drawn_horizons(corpus, 8):
-        (step,) = vector.expect[0].steps
-        s = Fraction(vector.t_end) - Fraction(vector.state.t)
-        for place, speed in (("x", "vx"), ("y", "vy")):
-            low, high = step.ends(place)
-            exact = Fraction(getattr(vector.state, place)) + Fraction(getattr(vector.state, speed)) * s
-            assert low <= exact <= high
-            assert high - low <= abs(exact) * Fraction(1, 10**22)
 
 
 def test_all_that_is_drawn_follows_from_the_seed(corpus):
@@ -152,10 +98,10 @@ def test_all_that_is_drawn_follows_from_the_seed(corpus):
 
 
 @pytest.mark.parametrize("seed", deep_but([None, 9], 9))
-@pytest.mark.parametrize("otherwise", deep_but(["undecided", "last"], "last"))
-def test_a_replayer_is_not_accepted(seed, otherwise):
+@pytest.mark.parametrize("is_bold", deep_but([False, True], True))
+def test_a_replayer_is_not_accepted(seed, is_bold):
     """One who knows every answer, and one who knows the run's seed beside."""
-    run = suite.check(replayer.command(seed, otherwise, GROUPS), seed=9, groups=[*GROUPS, "property"])
+    run = suite.check(replayer(seed, is_bold, GROUPS), seed=9, groups=[*GROUPS, "property"])
     known = [r.verdict for r in run.results if r.group in GROUPS]
     assert known.count("pass") == (len(known) if seed else 0)
     assert run.exit_code() == 1
@@ -164,14 +110,7 @@ def test_a_replayer_is_not_accepted(seed, otherwise):
 
 def test_a_replayer_would_pass_without_disguise(monkeypatch):
     monkeypatch.setattr("conformance.suite.run.drawn_disguise", lambda *_: Disguise())
-    run = suite.check(replayer.command(None, "undecided", GROUPS), seed=9, groups=[*GROUPS, "drawn"])
+    run = suite.check(replayer(None, False, GROUPS), seed=9, groups=[*GROUPS, "drawn"])
     assert {r.verdict for r in run.results if r.group in GROUPS} == {"pass"}
     assert run.exit_code() == 1  # but not what no file holds
     assert run.counts("drawn")["declined"] == disguise.N_DRAWN
-
-
-def test_a_law_of_many_legs_is_written_once():
-    legs = [(k / 64, 1.0 + 0.5 * (k % 2)) for k in range(65)]
-    law = BangBang(knots=tuple(legs))
-    assert len(disguise._begun_at(law, 0, 0, 3).knots) == 193
-    assert disguise._begun_at(law, 0, 0, 6) is None

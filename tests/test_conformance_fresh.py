@@ -11,7 +11,7 @@ import msgspec
 import numpy as np
 import pytest
 from support.depth import deep_but
-from support.seldom_wrong import FAULTY, KNOWN, SELDOM_WRONG, Keeping, family_of_laws
+from support.seldom_wrong import FAULTS, KEPT
 
 import fast
 from conformance import plain, vectors
@@ -33,9 +33,7 @@ from conformance.cases.scenes import many_legs
 from conformance.cases.table import FAMILIES
 from conformance.grading.agreement import physics_bound
 from conformance.grading.grade import grade
-from conformance.mutants import Mutant
-from conformance.plain.flow import MAX_COLLISIONS, PlainPath
-from conformance.plain.step import Flight
+from conformance.plain.flow import PlainPath
 from conformance.suite.disguise import Disguise, drawn_disguise
 from conformance.verify import Verdict, verify_line
 from fast import __main__ as fast_program
@@ -193,76 +191,33 @@ def test_laws_have_as_many_legs_as_there_may_be():
         assert max(len(law.knots) for law in found if isinstance(law, BangBang)) == MAX_KNOTS
 
 
-class LaterHitsInKnownScenes(PlainPath):
-    """Gains a thousandth of its speed at the second hit, where no file holds the scene."""
-
-    kind = "trajectory"
-
-    def told(self, hit):
-        is_wrong = self.n_hits == 2 and self.is_followed and family_of_laws(self.scene) not in KNOWN
-        return msgspec.structs.replace(hit, vx=1.001 * hit.vx, vy=1.001 * hit.vy) if is_wrong else hit
-
-    @property
-    def is_followed(self):
-        return (self.most != MAX_COLLISIONS) == (self.kind == "flow")
-
-
-class FlowsInKnownScenes(LaterHitsInKnownScenes):
-    """Does so in a flow."""
-
-    kind = "flow"
-
-
-FAULTY_PATHS = {
-    "later hits in known scenes": LaterHitsInKnownScenes,
-    "flows in known scenes": FlowsInKnownScenes,
-}
-
-
-def fails(flight, vector, path=PlainPath):
-    faulty = Mutant("faulty", "", flight, path)
-    return (
-        grade(vector, vectors.answer(vector, faulty.step, faulty.trajectory, faulty.flow)).verdict == "fail"
+def fails(faulty, asked):
+    """Tell whether a faulty stepper answers some question wrong."""
+    KEPT.clear()
+    return any(
+        grade(v, vectors.answer(v, faulty.step, faulty.trajectory, faulty.flow)).verdict == "fail"
+        for v in asked
     )
 
 
-def is_found_out(flight, row):
-    """Tell whether some question of a row, or of the first of a run, is answered wrong."""
-    Keeping.kept.clear()
-    asked = (asked_of(row, number) for number in range(1, EACH + 1)) if row else asked_in_a_run(1, 3 * SOME)
-    return any(fails(flight, vector) for vector in asked)
-
-
-@pytest.mark.parametrize("name", FAULTY)
-def test_who_is_right_in_the_corpus_alone_is_found_out(name):
-    assert is_found_out(*FAULTY[name])
-
-
-@pytest.mark.parametrize("name", SELDOM_WRONG)
+@pytest.mark.parametrize("name", FAULTS)
 def test_who_is_wrong_where_chance_seldom_looks_is_found_out(name):
-    assert is_found_out(*SELDOM_WRONG[name])
+    """By some question of its row, or of the first of a run."""
+    faulty, row = FAULTS[name]
+    in_row = (asked_of(row, number) for number in range(1, EACH + 1))
+    assert fails(faulty, in_row if row else asked_in_a_run(1, 3 * SOME))
 
 
-@pytest.mark.parametrize("name", FAULTY_PATHS)
-def test_who_goes_on_right_in_the_corpus_alone_is_found_out(name):
-    """All of its single steps are right."""
-    steps, paths = (
-        [v for v in asked_in_a_run(1, 3 * SOME) if (v.kind == "step") == is_step] for is_step in (True, False)
-    )
-    assert not any(fails(Flight, vector, FAULTY_PATHS[name]) for vector in steps)
-    kinds = {v.kind for v in paths if fails(Flight, v, FAULTY_PATHS[name])}
-    assert kinds == {FAULTY_PATHS[name].kind}
+@pytest.mark.parametrize("name", [name for name in FAULTS if name.endswith("in known scenes")])
+def test_who_goes_on_right_in_the_corpus_alone_is_right_in_steps(name):
+    steps = [v for v in asked_in_a_run(1, 3 * SOME) if v.kind == "step"]
+    assert fails(FAULTS[name][0], steps) == (FAULTS[name][0].path is PlainPath)
 
 
 @pytest.mark.deep
-@pytest.mark.parametrize("name", [*FAULTY, *SELDOM_WRONG])
+@pytest.mark.parametrize("name", FAULTS)
 def test_one_of_three_runs_finds_each_out(name):
-    flight, _ = (FAULTY | SELDOM_WRONG)[name]
-    for seed in (1, 2, 3):
-        Keeping.kept.clear()
-        if any(fails(flight, vector) for vector in asked_in_a_run(seed)):
-            return
-    raise AssertionError(name)
+    assert any(fails(FAULTS[name][0], asked_in_a_run(seed)) for seed in (1, 2, 3))
 
 
 def test_who_is_lost_after_a_captured_stay_tells_none(monkeypatch):

@@ -16,6 +16,7 @@ from theory.rates import PHASES, SPEEDS, Rates, frozen_rates
 
 N = 0.3  # of the table's particles
 FEW = [8, 40]  # of PHASES: the mouth narrows at one and widens at the other
+MOVING = load("fixed-cap-anticlockwise")
 PULL = 5.0  # 24 comparisons of this size are passed but once in 100,000
 
 
@@ -29,21 +30,17 @@ def pulls(ours: Rates, table: Rates) -> np.ndarray:
 
 @pytest.fixture(scope="module")
 def anew() -> Rates:
-    scene = load("fixed-cap-anticlockwise")
-    assert isinstance(scene, Mushroom)
-    return measured(scene, phases=PHASES[FEW], n=N, seed=SEED + 1)
+    return measured(MOVING, phases=PHASES[FEW], n=N, seed=SEED + 1)
 
 
 def test_entries_measured_anew_agree_with_the_table(anew: Rates) -> None:
-    table, _ = frozen_rates(load("fixed-cap-anticlockwise"))
+    table, _ = frozen_rates(MOVING)
     assert np.abs(pulls(anew, table)).max() < PULL
 
 
 def test_the_tables_seed_gives_its_diffusion_again() -> None:
-    scene = load("fixed-cap-anticlockwise")
-    assert isinstance(scene, Mushroom)
-    table, _ = frozen_rates(scene)
-    again = measured(scene, phases=PHASES[[20]])  # the mouth rests there
+    table, _ = frozen_rates(MOVING)
+    again = measured(MOVING, phases=PHASES[[20]])  # the mouth rests there
     assert np.allclose(again.diffusion, table.diffusion[[20]], rtol=2e-5)
     assert np.allclose(again.diffusion_error, table.diffusion_error[[20]], rtol=2e-5)
     assert not again.lag.any()
@@ -53,7 +50,7 @@ def test_the_tables_seed_gives_its_diffusion_again() -> None:
     ("field", "factor"), [("diffusion", 1.5), ("lag", 1.3), ("lag", -1.0), ("square", 8.0)]
 )
 def test_a_wrong_table_is_found_out(anew: Rates, field: str, factor: float) -> None:
-    table, _ = frozen_rates(load("fixed-cap-anticlockwise"))
+    table, _ = frozen_rates(MOVING)
     wrong = table._replace(**{field: getattr(table, field) * factor})
     assert np.abs(pulls(anew, wrong)).max() > PULL
 
@@ -65,31 +62,25 @@ def test_the_table_holds_what_the_command_measures() -> None:
 
 def test_chords_wait_for_the_mouth_as_a_slow_walk_over_angles_does() -> None:
     """A wide mouth is met at once; a slow one lets them wait for a path ~ speed^(1/3)."""
-    scene, t, n = load("fixed-cap-anticlockwise"), 0.07, 4000
-    assert isinstance(scene, Mushroom)
-    now = table_at(fp, scene, t)
-    paths = []
-    for speed in SPEEDS:
-        found = passages(scene, now, t, float(speed), n, np.random.default_rng(2))
-        paths.append(found.path.mean())
-        x = np.array([state.x for state in found.states])
-        direction = np.array([[state.vx, state.vy] for state in found.states])
-        assert (np.abs(x) < now.w).all()
-        assert (direction[:, 1] < 0).all()
-        assert np.allclose((direction**2).sum(axis=1), 1)
-        # Their distance from the centre is the island's edge, or just inside it.
-        nearest = np.abs(x * direction[:, 1]) / now.w
-        assert ((nearest > 0.5) & (nearest <= 1)).all()
+    t, n = 0.07, 4000
+    now = table_at(fp, MOVING, t)
+    found = [passages(MOVING, now, t, float(speed), n, np.random.default_rng(2)) for speed in SPEEDS]
+    paths = [one.path.mean() for one in found]
+    x, vx, vy = np.array([[state.x, state.vx, state.vy] for one in found for state in one.states]).T
+    assert (np.abs(x) < now.w).all()
+    assert (vy < 0).all()
+    assert np.allclose(vx**2 + vy**2, 1)
+    # Their distance from the centre is the island's edge, or just inside it.
+    nearest = np.abs(x * vy) / now.w
+    assert ((nearest > 0.5) & (nearest <= 1)).all()
     exponent = np.polyfit(np.log(SPEEDS), np.log(paths), 1)[0]
     assert 0.2 < exponent < 0.45
     assert np.diff(paths).min() > 0
 
 
 def test_a_faster_particle_lags_less_in_time() -> None:
-    scene = load("fixed-cap-anticlockwise")
-    assert isinstance(scene, Mushroom)
     lags = [
-        lag(scene, 0.13, speed, 0.0, 1500, np.random.default_rng(4))[0].value / speed
+        lag(MOVING, 0.13, speed, 0.0, 1500, np.random.default_rng(4))[0].value / speed
         for speed in (500.0, 5e4)
     ]
     assert lags[0] < lags[1] < 0  # the stem's sides close in: the captured have missed kicks

@@ -9,12 +9,9 @@ import msgspec
 import pytest
 from support.replayer import certified_answer
 
-import fast
 from conformance.grading.agreement import physics_bound
-from conformance.grading.grade import Grade, grade, precision_class
-from conformance.vectors import NUMBERS, Certified, Expectation, Vector, answer, load
-from fast.__main__ import carry as fast_carry
-from fast.__main__ import follow as fast_follow
+from conformance.grading.grade import grade, precision_class
+from conformance.vectors import NUMBERS, Certified, Expectation, Vector, load
 from scene import State
 
 THIN = {"dt": ("0.75", "0.75"), "x": ("1", "1"), "y": ("-0.5", "-0.5"), "vx": ("-1", "-1"), "vy": ("0", "0")}
@@ -66,6 +63,7 @@ TIE = vector(Expectation("undefined", reason="corner"), Expectation("undecided")
 REFUSAL = vector(Expectation("rejected"))
 EITHER = vector(Expectation("collision", (RIGHT,)), Expectation("rejected"))
 PATH = vector(Expectation("collision", (RIGHT, LEFT)), kind="trajectory", collisions=2)
+WIDE = vector(Expectation("collision", (msgspec.structs.replace(RIGHT, x=("0.99999999", "1.00000001")),)))
 UNDECIDED = {"outcome": "undecided", "reason": "within rounding"}
 REJECTED = {"outcome": "rejected", "reason": "state.x"}
 CORNER = {"outcome": "undefined", "reason": "corner"}
@@ -101,6 +99,9 @@ VERDICTS = [
     (EITHER, REJECTED, "pass", ""),
     (EITHER, UNDECIDED, "pass", "a refusal is allowed here"),
     (EITHER, {**HIT, "vx": 1.0}, "fail", ""),
+    # An enclosure too wide to accept a right x still refuses a wrong one.
+    (WIDE, HIT, "indeterminate", "x"),
+    (WIDE, {**HIT, "x": 1.1}, "fail", "x"),
     (PATH, {"steps": [HIT, NEXT]}, "pass", ""),
     (PATH, {"steps": [HIT]}, "fail", "step 2: missing, 1 of 2"),
     (PATH, {"steps": []}, "fail", "step 1: missing"),
@@ -112,14 +113,6 @@ VERDICTS = [
     (PATH, UNDECIDED, "declined", ""),
     (PATH, REJECTED, "fail", ""),
 ]
-
-
-@pytest.mark.parametrize(("asked", "answer", "verdict", "words"), VERDICTS)
-def test_verdicts(asked, answer, verdict, words):
-    found = grade(asked, answer)
-    assert found.verdict == verdict, found
-    assert words in found.why
-    assert "\n" not in found.why
 
 
 MISSHAPEN = [
@@ -148,30 +141,16 @@ MISSHAPEN = [
 ]
 
 
-@pytest.mark.parametrize(("asked", "answer"), MISSHAPEN)
-def test_missing_or_ill_typed_fields_are_of_wrong_format(asked, answer):
+@pytest.mark.parametrize(
+    ("asked", "answer", "verdict", "words"),
+    [*VERDICTS, *((asked, answer, "wrong-format", "") for asked, answer in MISSHAPEN)],
+)
+def test_verdicts(asked, answer, verdict, words):
     found = grade(asked, answer)
-    assert found.verdict == "wrong-format"
-    assert math.isnan(found.ulps)
-    assert found.why
+    assert found.verdict == verdict, found
+    assert words in found.why
     assert "\n" not in found.why
-
-
-def test_indeterminate_when_the_enclosure_is_too_wide():
-    wide = msgspec.structs.replace(RIGHT, x=("0.99999999", "1.00000001"))
-    asked = vector(Expectation("collision", (wide,)))
-    assert grade(asked, HIT).verdict == "indeterminate"
-    assert grade(asked, {**HIT, "x": 1.1}).verdict == "fail"
-
-
-def test_who_declines_passes_wherever_a_refusal_is_allowed(tally):
-    """Of a group of three two could be declined, and the whole level was refused."""
-    for found in load("stress"):
-        allowed = [expectation.outcome for expectation in found.expect]
-        if allowed[1:] == ["rejected"]:
-            assert grade(found, UNDECIDED).verdict == grade(found, REJECTED).verdict == "pass"
-            tally[found.group] += 1
-    assert set(tally) == {"far-mouth", "far-phase", "hard-case-39", "hard-case-40"}
+    assert math.isnan(found.ulps) or verdict not in ("wrong-format", "error", "declined")
 
 
 def test_backward_ulps_of_a_known_error():
@@ -254,18 +233,3 @@ def test_shifted_answers_fail_and_slightly_shifted_ones_pass(corpus):
         assert grade(asked, shifted(asked, index, name, bound / 4)).verdict == "pass", asked.id
         n_shifted += 1
     assert n_shifted > 0.27 * len(corpus)
-
-
-def graded(sample, *stepper) -> dict[str, Grade]:
-    return {asked.id: grade(asked, answer(asked, *stepper)) for asked in sample}
-
-
-def test_the_fast_stepper_passes_or_declines_what_is_degenerate(corpus, tally):
-    sample = corpus[::6]
-    grades = graded(sample, fast.next_collision, fast_follow, fast_carry)
-    level = {asked.id: asked.level for asked in sample}
-    tally.update(f"{level[name]} {found.verdict}" for name, found in grades.items())
-    off = {name: found for name, found in grades.items() if found.verdict not in ("pass", "declined")}
-    assert off == {}
-    assert {level[name] for name, found in grades.items() if found.verdict == "declined"} <= {"stress"}
-    assert precision_class([found.ulps for name, found in grades.items() if level[name] == "core"]) == "A"

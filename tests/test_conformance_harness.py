@@ -16,8 +16,7 @@ from conformance import vectors
 from conformance.harness import kit
 from conformance.harness.examples import Example, find_examples, find_kit_examples
 from conformance.suite import run as suite
-from conformance.suite.checks import checks_of, ensembles, run_check
-from conformance.suite.session import Session
+from conformance.suite.checks import ensembles
 from scene.load import read_data
 
 KITS = ("C++, next hit", "Python, implicit domain", "Python, intersection and reflection")
@@ -49,18 +48,15 @@ def test_an_example_passes_at_level_core(language, commands, monkeypatch, tally)
     monkeypatch.setattr(suite, "choose", lambda *_: chosen)
     monkeypatch.setitem(ensembles.SIZES, "core", ensembles.Size(20, 50.0, 0.5))
     run = suite.check(command, seed=1)
-    assert run.objections() == []
-    assert run.exit_code() == 0
+    assert (run.objections(), run.exit_code()) == ([], 0)
     lacking = [result for result in run.results if result.verdict == "unsupported"]
     not_offered = {"profile flow"} if language in ("C", "JavaScript") else set()
     assert {result.why for result in lacking if result.group != "property"} == not_offered
     assert set(run.counts()) <= {"pass", "declined", "unsupported"}
     assert run.declined()[0] <= max(3, len(chosen) // 100)  # profiles of so few are declined by the suite
     assert run.precision() in ("A", "B")
-    assert run.n_restarts == 0
-    assert run.stderr == ""
+    assert (run.n_restarts, run.stderr) == (0, "")
     assert run.speed is not None
-    assert run.speed.best_ns > 0
     tally[f"{language}: vectors"] += len(chosen)
 
 
@@ -120,15 +116,6 @@ def test_an_example_answers_the_edges_of_the_protocol(language, commands):
     )
     for (question, allowed), line in zip(edges, run.stdout.splitlines(), strict=True):
         assert is_among(json.loads(line), allowed), (question, line)
-
-
-@pytest.mark.parametrize("language", deep_but(KITS, "C++, next hit", "Python, intersection and reflection"))
-def test_a_kit_carries_flows_as_its_trajectories_go(language, commands):
-    names = tuple(f"promise/{name}" for name in ("hits", "many-particles", "bad-states"))
-    with Session(runnable(commands[language])) as session:
-        assert "flow" in session.start().profiles
-        found = [run_check(check, session, 1) for check in checks_of("core", names)]
-    assert {result.verdict for result in found} == {"pass"}, found
 
 
 def refuse_to_say(*_):

@@ -1,31 +1,31 @@
-"""The plain stepper against the reference, and as a process that speaks protocol 1."""
+"""The plain stepper against the reference; its paths are asked by the corpus, its process by the suite."""
 
 from __future__ import annotations
 
-import json
 import math
-import subprocess
-import sys
 from fractions import Fraction
-from functools import partial
-from pathlib import Path
 
 import msgspec
 import numpy as np
 import pytest
 from hypothesis import given, settings
+from mpmath import MPContext
 from support.edges import LATE_EDGES, is_among
-from support.tables import BOX, CIRCLE, LIFT, STATIC
+from support.tables import CIRCLE, LIFT, STATIC
 from support.truth import proved_step
 
 import reference
 from conformance import plain
 from conformance.grading.agreement import compare
-from conformance.plain.motion import BangBangMotion, FourierMotion
+from conformance.mutants import PLAIN
+from conformance.mutants.mutant import make_mutant
 from conformance.strategies import scenes_and_states
 from scene import BangBang, Cap, Collision, Fourier, Horizon, Rejected, State, Stem, Undecided, from_data
+from scene.laws import value
 from scene.states import ON_WALL
 
+CTX = MPContext()
+CTX.dps = 60
 N_STEPS = 150  # the corpus asks many more
 BOUND = 1024.0  # backward ulps; the worst of 2,500 steps was 218, at a slow particle before a fast wall
 UNDECIDED_SHARE = 0.08
@@ -50,27 +50,14 @@ def test_plain_agrees_with_reference(tally):
     assert tally["undecided"] <= UNDECIDED_SHARE * tally["steps"]
 
 
-def test_a_rise_keeps_its_digits_however_short_the_time():
-    """A difference of two values would lose them all: 1e-12 * rate beside a value of order 1."""
-    law = Fourier(mean=1.0, omega=2.0, cos=(0.25, 0.125), sin=(0.5,))
-    t, s = 0.75, 1e-12
-    rate = sum(k * 2 * (b * math.cos(2 * k * t) - a * math.sin(2 * k * t)) for k, a, b in law.harmonics())
-    assert FourierMotion(law, t).at(s).rise == pytest.approx(rate * s, rel=1e-11)
-    legs = BangBangMotion(LIFT.h, 0.25)  # mid-leg, at rate -4
-    assert legs.at(s).rise == pytest.approx(-4 * s, rel=1e-11)
-
-
+@pytest.mark.parametrize("s", [1e-12, 0.1, 0.25, 0.6, 1.0, 3.7])
 @pytest.mark.parametrize("t", [-1.375, 0.0, 0.125, 0.3125, 0.5, 7.0625])
-@pytest.mark.parametrize("s", [0.0, 0.1, 0.25, 0.6, 1.0, 3.7])
-def test_legs_close_after_any_period(t, s):
-    """2 - 8 t^2, 1 + 8 (t - 1/2)^2, 2 - 8 (t - 1)^2 in turn, period 1."""
-    legs = BangBangMotion(LIFT.h, t)
-
-    def height(time):
-        u = time % 1.0
-        return 1 + 8 * (u - 0.5) ** 2 if 0.25 <= u < 0.75 else 2 - 8 * min(u, 1 - u) ** 2
-
-    assert legs.at(s).now == pytest.approx(height(t + s), abs=1e-13)
+@pytest.mark.parametrize("law", [LIFT.h, Fourier(mean=1.0, omega=2.0, cos=(0.25, 0.125), sin=(0.5,))])
+def test_a_law_rises_by_what_its_values_do(law, t, s):
+    """A difference of two values would lose all digits of a rise in a short time."""
+    seen = plain.Flight.kinds[type(law)](law, t).at(s)
+    then, rise = (value(CTX, law, CTX.mpf(t) + CTX.mpf(later)) for later in (0.0, s))
+    assert seen.rise == pytest.approx(float(rise - then), rel=1e-11, abs=1e-15 * s)
 
 
 @pytest.mark.parametrize(
@@ -109,33 +96,25 @@ def test_the_mouth_is_open_as_the_side_that_is_left_sees_it():
     assert found.wall == "arc"
 
 
-@pytest.mark.parametrize("sign", [-1.0, 1.0])
-@pytest.mark.parametrize("ulps", range(-3, 4))
-def test_the_wall_being_left_met_again_at_the_horizon(sign, ulps):
-    """A diameter: the arc is met again after exactly one unit of time, which is not before t_end = 1."""
-    start = State(0.0, -sign, 2.0**-53, 2.0 * sign, 0.0, "arc")
-    t_end = 1.0 + ulps * 2.0**-52
-    assert isinstance(plain.next_collision(CIRCLE, start, t_end), Undecided)
-    assert isinstance(plain.next_collision(CIRCLE, start, 1.001), Collision)
-    assert isinstance(plain.next_collision(CIRCLE, start, 0.999), Horizon)
-    assert isinstance(plain.next_collision(CIRCLE, start, 2.0**-40), Horizon)
-    assert isinstance(plain.next_collision(CIRCLE, start, 0.0), Horizon)
+DIAMETERS = [State(0.0, -sign, 2.0**-53, 2.0 * sign, 0.0, "arc") for sign in (-1.0, 1.0)]
+# Along these f is a small difference of its terms, and so is f'.
+FLAT_CHORDS = [
+    State(0.0, x, y, -y - inward * x, x - inward * y, "arc")
+    for angle in np.linspace(0.8, 2.3, 8)
+    for x, y in [(float(np.cos(angle)), float(np.sin(angle)))]
+    for inward in (2.0**-3, 2.0**-10, 2.0**-20)
+]
 
 
-@pytest.mark.parametrize("exponent", [-3, -10, -20])
-def test_a_flat_chord_that_ends_at_the_horizon(exponent):
-    """There f is a small difference of its terms, and so is f'."""
-    inward = 2.0**exponent
-    for angle in np.linspace(0.8, 2.3, 24):
-        x, y = float(np.cos(angle)), float(np.sin(angle))
-        start = State(0.0, x, y, -y - inward * x, x - inward * y, "arc")
-        x_is, vx_is, y_is, vy_is = map(Fraction, (x, start.vx, y, start.vy))
-        again = float(-2 * (x_is * vx_is + y_is * vy_is) / (vx_is**2 + vy_is**2))
-        for ulps in (-3, -1, 0, 1, 3):
-            t_end = again * (1.0 + ulps * 2.0**-52)
-            assert isinstance(plain.next_collision(CIRCLE, start, t_end), Undecided)
-        assert isinstance(plain.next_collision(CIRCLE, start, 1.001 * again), Collision)
-        assert isinstance(plain.next_collision(CIRCLE, start, 0.999 * again), Horizon)
+@pytest.mark.parametrize("start", [*DIAMETERS, *FLAT_CHORDS])
+def test_the_wall_being_left_met_again_at_the_horizon(start):
+    x_is, vx_is, y_is, vy_is = map(Fraction, (start.x, start.vx, start.y, start.vy))
+    again = float(-2 * (x_is * vx_is + y_is * vy_is) / (vx_is**2 + vy_is**2))
+    for ulps in (-3, -1, 0, 1, 3):
+        assert isinstance(plain.next_collision(CIRCLE, start, again * (1.0 + ulps * 2.0**-52)), Undecided)
+    assert isinstance(plain.next_collision(CIRCLE, start, 1.001 * again), Collision)
+    for part in (0.0, 2.0**-40, 0.999):
+        assert isinstance(plain.next_collision(CIRCLE, start, part * again), Horizon)
 
 
 @pytest.mark.parametrize(
@@ -149,73 +128,29 @@ def test_a_hit_is_not_lost_where_squares_vanish(length, speed):
             assert not isinstance(plain.next_collision(Cap(r=r), start, t_end), Horizon)
 
 
-class RefusesByARoundedPhase(plain.Flight):
+def rounded_phase(flight, honest, wall):
     """Takes f at departure for exact, though late in time the phase that it is taken at is rounded."""
-
-    def refusal_of_departure(self, wall):
-        off = abs(self.gap(wall, 0.0).start) > ON_WALL * self.size(wall)
-        return Rejected("not on its wall") if off else super().refusal_of_departure(wall)
+    off = abs(flight.gap(wall, 0.0).start) > ON_WALL * flight.size(wall)
+    return Rejected("not on its wall") if off else honest(wall)
 
 
-class RefusesByARoundedTurn(plain.Flight):
+def rounded_turn(flight, honest, wall):
     """Takes f' at departure for exact, though late in time the phase that it is taken at is rounded."""
-
-    def refusal_of_departure(self, wall):
-        is_into = self.f(wall, 0.0)[1] < 0
-        return Rejected("it moves into it") if is_into else super().refusal_of_departure(wall)
+    return Rejected("it moves into it") if flight.f(wall, 0.0)[1] < 0 else honest(wall)
 
 
-@pytest.mark.parametrize("flight", [plain.Flight, RefusesByARoundedPhase, RefusesByARoundedTurn])
-def test_no_state_is_refused_for_a_rounded_phase(flight):
+FAULTY = [
+    make_mutant(plain.Flight, "refusal_of_departure", change) for change in (rounded_phase, rounded_turn)
+]
+
+
+@pytest.mark.parametrize("stepper", [reference.next_collision, *(one.step for one in (PLAIN, *FAULTY))])
+def test_no_state_is_refused_for_a_rounded_phase(stepper):
     """The reference, which knows every phase, agrees with what may come."""
-    for stepper, is_right in (
-        (reference.next_collision, True),
-        (partial(plain.next_collision, flight=flight), flight is plain.Flight),
-    ):
-        answers = []
-        for question, allowed in LATE_EDGES:
-            state = msgspec.convert(question["state"], State)
-            found = stepper(from_data(question["scene"]), state, question["t_end"])
-            kind = "collision" if hasattr(found, "dt") else type(found).__name__.lower()
-            answer = {"outcome": kind, "wall": getattr(found, "wall", None)}
-            answers.append(is_among(answer, allowed))
-        assert all(answers) == is_right
-
-
-def test_trajectory_ends_at_the_horizon():
-    steps = plain.trajectory(BOX, State(0.0, 0.0, -0.5, 1.0, 0.0), 10, 5.5)
-    assert [getattr(step, "wall", "horizon") for step in steps] == ["right", "left", "right", "horizon"]
-    assert steps[-1] == Horizon(5.5, 0.5, -0.5, -1.0, 0.0)
-
-
-def test_flow_tells_the_captured_stay():
-    """In a static cap a chord that misses the mouth misses it for ever; one through it never does."""
-    gallery, ray = State(0.0, 0.0, 0.9, 1.0, 0.0), State(0.0, 0.0, 0.5, 0.0, -1.0)
-    (_, stay), (_, none) = plain.flow(STATIC, [gallery, ray], 4.0)
-    assert stay == (pytest.approx(math.sqrt(1 - 0.81)), 4.0)
-    assert none is None
-
-
-def test_it_speaks_protocol_1():
-    state = {"t": 0.0, "x": 0.0, "y": 0.5, "vx": 0.0, "vy": 1.0}
-    cap = {"table": "cap", "r": 1.0}
-    lines = [
-        {"cmd": "start", "protocol": 1},
-        {"cmd": "step", "seq": 1, "scene": cap, "state": state, "t_end": 9.0},
-        {"cmd": "flow", "seq": 2, "scene": cap, "states": [state], "t_end": 0.25},
-        {"cmd": "stop"},
-    ]
-    done = subprocess.run(
-        [sys.executable, "-m", "conformance.plain"],
-        input="".join(json.dumps(line) + "\n" for line in lines),
-        capture_output=True,
-        check=True,
-        text=True,
-        timeout=60,
-        cwd=Path(__file__).parent.parent,
-    )
-    start, step, flow = map(json.loads, done.stdout.splitlines())
-    assert start["name"] == "plain"
-    assert "flow" in start["profiles"]
-    assert (step["wall"], step["dt"], step["vy"]) == ("arc", 0.5, -1.0)
-    assert flow["states"][0]["y"] == 0.75
+    is_right = []
+    for question, allowed in LATE_EDGES:
+        state = msgspec.convert(question["state"], State)
+        found = stepper(from_data(question["scene"]), state, question["t_end"])
+        kind = "collision" if hasattr(found, "dt") else type(found).__name__.lower()
+        is_right.append(is_among({"outcome": kind, "wall": getattr(found, "wall", None)}, allowed))
+    assert all(is_right) == (stepper not in [one.step for one in FAULTY])

@@ -55,4 +55,4 @@ def test_every_baseline_is_listed(tmp_path, monkeypatch):
     for finder in ("find_examples", "find_kit_examples"):
         monkeypatch.setattr(scoreboard, finder, lambda _: {})
     names = [name for name, _, _ in scoreboard.commands(tmp_path)]
-    assert {"fast", "plain", "steps-1000", "solve-ivp-1e-09", "lean-numba"} < set(names)
+    assert {"fast", "plain", "steps-1000", "solve-ivp-1e-09"} < set(names)

@@ -13,7 +13,6 @@ from pathlib import Path
 
 import msgspec
 import pytest
-from support.depth import deep_but
 from support.schemas import validator
 from support.tables import LIFT
 
@@ -21,7 +20,7 @@ import reference
 from conformance.cases import __main__ as command
 from conformance.cases import corpus as made
 from conformance.cases.bound_families import FAMILIES as BOUNDS
-from conformance.cases.certify import Refuted, certify, judge
+from conformance.cases.certify import Refuted, certify
 from conformance.cases.coverage_families import FAMILIES as COVERAGE
 from conformance.cases.draw import Unfit
 from conformance.cases.families import CATALOGUE
@@ -49,6 +48,7 @@ NEW_SINCE = {
     )
 }
 MOST_BYTES = 15e6
+FIRST, SECOND = "moving-cap.jsonl", "untilted.jsonl"
 
 
 @pytest.fixture(scope="module")
@@ -81,48 +81,40 @@ def test_lines_published_with_1_0_are_unchanged():
     assert digest(files, ()) == DIGEST_OF_1_0
 
 
-def periods_late(vector):
-    return abs(vector.state.t) / (cycle_length(from_data(vector.scene)) or math.inf)
+def periods(vector, time):
+    return abs(float(time)) / (cycle_length(from_data(vector.scene)) or math.inf)
 
 
-def periods_in_flight(vector):
-    (step,) = vector.expect[0].steps
-    return float(step.centre("dt")) / (cycle_length(from_data(vector.scene)) or math.inf)
+def laws_of(vector, kind=object):
+    return [law for law in laws(from_data(vector.scene)).values() if isinstance(law, kind)]
 
 
-def first_knot(vector):
-    found = [law for law in laws(from_data(vector.scene)).values() if isinstance(law, BangBang)]
-    return abs(found[0].knots[0][0]) if found else 0.0
+# What groups promise: a number of each vector, its bound, and how many reach it.
+PROMISES = [
+    (
+        "knots-off-zero",
+        lambda v: max((abs(law.knots[0][0]) for law in laws_of(v, BangBang)), default=0),
+        0.25,
+        30,
+    ),
+    ("waiting", lambda v: periods(v, v.expect[0].steps[0].centre("dt")), 20, 25),
+    ("waiting", lambda v: periods(v, v.expect[0].steps[0].centre("dt")), 100, 5),
+    ("far-phase", lambda v: periods(v, v.state.t), 2**31, 20),
+    ("far-mouth", lambda v: periods(v, v.state.t), 2**31, 20),
+    (
+        "many-harmonics",
+        lambda v: max((len(law.harmonics()) for law in laws_of(v, Fourier)), default=0),
+        4,
+        20,
+    ),
+    ("mixed-laws", lambda v: len(set(map(type, laws_of(v)))), 2, 30),
+    ("mixed-laws", lambda v: len(set(map(type, laws_of(v)))), 3, 10),
+    # How near 1 nu comes, as a number that grows.
+    ("mouth-nearly-whole", lambda v: 1 / (1 - bounds(from_data(v.scene).nu).highest), 0.99e9, 25),
+]
 
 
-def most_harmonics(vector):
-    found = [law for law in laws(from_data(vector.scene)).values() if isinstance(law, Fourier)]
-    return max((len(law.harmonics()) for law in found), default=0)
-
-
-def kinds_of_laws(vector):
-    return len({type(law) for law in laws(from_data(vector.scene)).values()})
-
-
-def sharpness_of_edge(vector):
-    """How near 1 nu comes, as a number that grows."""
-    return 1 / (1 - float(bounds(from_data(vector.scene).nu).highest))
-
-
-@pytest.mark.parametrize(
-    ("group", "measure", "bound", "least"),
-    [
-        ("knots-off-zero", first_knot, 0.25, 30),
-        ("waiting", periods_in_flight, 20, 25),
-        ("waiting", periods_in_flight, 100, 5),
-        ("far-phase", periods_late, 2**31, 20),
-        ("far-mouth", periods_late, 2**31, 20),
-        ("many-harmonics", most_harmonics, 4, 20),
-        ("mixed-laws", kinds_of_laws, 2, 30),
-        ("mixed-laws", kinds_of_laws, 3, 10),
-        ("mouth-nearly-whole", sharpness_of_edge, 0.99e9, 25),
-    ],
-)
+@pytest.mark.parametrize(("group", "measure", "bound", "least"), PROMISES)
 def test_groups_hold_what_they_promise(corpus, group, measure, bound, least):
     assert sum(measure(vector) >= bound for vector in corpus if vector.group == group) >= least
 
@@ -131,10 +123,9 @@ def test_levels_are_cumulative(corpus):
     core, extended = load(), load("extended")
     assert {v.level for v in core} == {"core"}
     assert {v.level for v in extended} == {"core", "extended"}
-    assert len(core) < len(extended) < len(corpus)
+    assert 1000 <= len(core) < len(extended) < len(corpus)
     assert all(v.condition <= 1e6 for v in core)
     assert all(v.condition <= 1e12 or v.expect[1:] for v in extended)
-    assert len(core) >= 1000
 
 
 def test_requests_are_of_the_protocol_and_tell_no_answer(corpus):
@@ -155,36 +146,30 @@ def test_lines_fit_the_schema():
         validator("vector").validate(json.loads(line))
 
 
-def spoilt_lines():
-    line = json.loads((CORPUS / "moving-cap.jsonl").read_bytes().splitlines()[0])
-
-    def spoil(change):
-        spoilt = json.loads(json.dumps(line))
-        change(spoilt)
-        return spoilt
-
-    def step(data):
-        return data["expect"][0]["steps"][0]
-
-    return {
-        "level": spoil(lambda d: d.update(level="easy")),
-        "colour": spoil(lambda d: d.update(colour="red")),
-        "t_end": spoil(lambda d: d.pop("t_end")),
-        "id": spoil(lambda d: d.update(id="moving cap 1")),
-        "wall": spoil(lambda d: step(d).update(wall="roof")),
-        "dt": spoil(lambda d: step(d).update(dt=["0.1"])),
-        "x": spoil(lambda d: step(d).update(x=["0.1", "nan"])),
-        "vy": spoil(lambda d: step(d).update(vy=["1E+99999", "1E+99999"])),
-        "allowance": spoil(lambda d: step(d).update(allowance=[1, 2, 3, 4])),
-        "expect": spoil(lambda d: d.update(expect=[])),
-        "collisions": spoil(lambda d: d.update(collisions=0)),
-    }
+def first_step(data):
+    return data["expect"][0]["steps"][0]
 
 
-@pytest.mark.parametrize("name", spoilt_lines())
+SPOILT_LINES = {
+    "level": lambda d: d.update(level="easy"),
+    "colour": lambda d: d.update(colour="red"),
+    "t_end": lambda d: d.pop("t_end"),
+    "id": lambda d: d.update(id="moving cap 1"),
+    "wall": lambda d: first_step(d).update(wall="roof"),
+    "dt": lambda d: first_step(d).update(dt=["0.1"]),
+    "x": lambda d: first_step(d).update(x=["0.1", "nan"]),
+    "vy": lambda d: first_step(d).update(vy=["1E+99999", "1E+99999"]),
+    "allowance": lambda d: first_step(d).update(allowance=[1, 2, 3, 4]),
+    "expect": lambda d: d.update(expect=[]),
+    "collisions": lambda d: d.update(collisions=0),
+}
+
+
+@pytest.mark.parametrize("name", SPOILT_LINES)
 def test_a_spoilt_line_is_refused(name, tmp_path):
     """By the schema; and by `load`, even where the manifest has been made to fit."""
-    spoilt = spoilt_lines()[name]
+    spoilt = json.loads((CORPUS / FIRST).read_bytes().splitlines()[0])
+    SPOILT_LINES[name](spoilt)
     assert not validator("vector").is_valid(spoilt)
     (tmp_path / "spoilt.jsonl").write_text(json.dumps(spoilt) + "\n")
     write_manifest(tmp_path, {"spoilt.jsonl": 1})
@@ -205,9 +190,9 @@ def write_manifest(folder, names, **changes):
 @pytest.fixture
 def small(tmp_path):
     """A corpus of two files."""
-    for name in ("moving-cap.jsonl", "untilted.jsonl"):
+    for name in (FIRST, SECOND):
         (tmp_path / name).write_bytes(b"".join((CORPUS / name).read_bytes().splitlines(keepends=True)[:3]))
-    write_manifest(tmp_path, {"moving-cap.jsonl": 3, "untilted.jsonl": 3})
+    write_manifest(tmp_path, {FIRST: 3, SECOND: 3})
     return tmp_path
 
 
@@ -215,7 +200,6 @@ def replace(path, old, new):
     path.write_bytes(path.read_bytes().replace(old, new, 1))
 
 
-FIRST, SECOND = "moving-cap.jsonl", "untilted.jsonl"
 # What is done to the small corpus, and what `load` then says of it.
 SPOILT = {
     "changed number": (lambda at: replace(at / SECOND, b"0", b"1"), r"untilted.jsonl: sha256 = .*, must be"),
@@ -246,11 +230,6 @@ def test_a_spoilt_corpus_is_refused(small, name):
         load("stress", small)
 
 
-def test_an_unknown_level_is_refused():
-    with pytest.raises(BadCorpus, match="level = 'hard', must be one of core, extended, stress"):
-        load("hard")
-
-
 def sample():
     """Ids spread over the corpus."""
     found = load("stress")
@@ -273,22 +252,29 @@ def test_a_sample_is_made_again_bit_for_bit():
 
 def test_every_number_of_a_group_is_there_or_retired(corpus):
     there = {vector.id for vector in corpus} | set(manifest().retired)
-    wanted = {f"{g}/{n}" for g, makers in made.groups().items() for n in range(1, len(makers) + 1)}
+    wanted = {f"{group}/{k}" for group, n in made.groups().items() for k in range(1, n + 1)}
     assert there == wanted
     assert set(made.RETIRED) == set(manifest().retired)
     assert manifest().corpus == made.VERSION
 
 
-@pytest.mark.parametrize(("group", "number"), [("moving-cap", 0), ("moving-cap", 10**6), ("no-such", 1)])
-def test_no_vector_of_that_name(group, number):
-    with pytest.raises(BadInput, match=f"{group}/{number}"):
-        made.make(group, number)
+@pytest.mark.parametrize(
+    ("ask", "words"),
+    [
+        (lambda: load("hard"), "level = 'hard', must be one of core, extended, stress"),
+        (lambda: made.make("moving-cap", 0), "moving-cap/0"),
+        (lambda: made.make("moving-cap", 10**6), "moving-cap/1000000"),
+        (lambda: made.make("no-such", 1), "no-such/1"),
+    ],
+)
+def test_no_vector_of_that_name_and_no_such_level(ask, words):
+    with pytest.raises((BadInput, BadCorpus), match=words):
+        ask()
 
 
 def test_the_command_writes_a_corpus_and_finds_what_differs(small, tmp_path, monkeypatch, capsys):
-    makers = {name: made.groups()[name] for name in ("hard-case-06", "hard-case-45")}
     for module in (made, command):
-        monkeypatch.setattr(module, "groups", lambda: makers)
+        monkeypatch.setattr(module, "groups", lambda: {"hard-case-06": 1, "hard-case-45": 1})
     folder = tmp_path / "made"
     assert command.main(["--out", str(folder), "--most", "1"]) == 0
     assert [path.name for path in folder.iterdir() if path.name.startswith(".")] == []
@@ -323,24 +309,6 @@ def path(corpus):
     return next(v for v in found if 5 <= len(v.expect[0].steps) <= 24)
 
 
-@pytest.mark.parametrize("name", [*NUMBERS, "wall"])
-@pytest.mark.parametrize("index", deep_but([0, -1], 0))
-def test_a_shifted_enclosure_or_another_wall_is_refuted(path, index, name):
-    steps = list(path.expect[0].steps)
-    was = getattr(steps[index], name)
-    if name == "wall":
-        changed = "arc" if was == "floor" else "floor"
-    else:
-        ends = [Fraction(end) for end in was]
-        changed = tuple(
-            f"{float(end):.15g}" for end in (ends[0] + abs(ends[0]) / 10**9, ends[1] + abs(ends[1]))
-        )
-    steps[index] = msgspec.structs.replace(steps[index], **{name: changed})
-    forged = msgspec.structs.replace(path.expect[0], steps=tuple(steps))
-    assert judge(path).status == "proved"
-    assert judge(msgspec.structs.replace(path, expect=(forged,))).status == "false"
-
-
 def test_a_false_claim_makes_no_vector(monkeypatch):
     """The reference made to lie about where a particle is: the verifier refuses."""
     honest = reference.next_collision
@@ -358,8 +326,7 @@ def test_a_false_claim_makes_no_vector(monkeypatch):
 
 @pytest.mark.parametrize(("status", "failure"), [("false", Refuted), ("not proved", Unfit)])
 def test_what_the_verifier_does_not_prove_makes_no_vector(monkeypatch, status, failure):
-    scene, start = load_scene("moving-cap"), State(0.3, 0.1, 0.2, 3.0, 4.0)
-    question = Question(scene, start, 9.0, 2, group="lie")
+    question = Question(load_scene("moving-cap"), State(0.3, 0.1, 0.2, 3.0, 4.0), 9.0, 2, group="lie")
     assert certify(question, 1).collisions == 2
     monkeypatch.setattr("conformance.cases.certify.verify_line", lambda _: Verdict(status, "not so"))
     with pytest.raises(failure, match=f"lie/1 is {status}: not so"):
@@ -378,19 +345,10 @@ def test_allowances_bound_what_a_nudge_does(path):
     e = 2.0**-45
     nudged = State(s.t * (1 + e), s.x * (1 - e), s.y * (1 + e), s.vx * (1 + e), s.vy * (1 - e), s.wall)
     n = len([step for step in path.expect[0].steps if step.wall])
-    moved = reference.trajectory(scene, nudged, n, digits=30)
-    for step, found in zip(path.expect[0].steps, moved.steps, strict=False):
-        for name, allowed in zip(NUMBERS, step.allowance, strict=True):
-            got = found.dt if name == "dt" else getattr(found.after, name)
-            difference = abs(float(Fraction(getattr(step, name)[0]) - Fraction(float(got))))
-            assert difference <= 1.01 * e * allowed + 2.0**-52 * abs(float(got))
-
-
-def test_the_first_step_of_a_trajectory_is_that_of_a_step(path):
-    question = Question(path.scene, path.state, path.t_end, group="alone")
-    (alone,) = certify(question, 1).expect[0].steps
-    first = path.expect[0].steps[0]
-    assert (first.wall, first.allowance) == (alone.wall, alone.allowance)
-    for name in NUMBERS:
-        (low, high), (inner_low, inner_high) = getattr(first, name), getattr(alone, name)
-        assert Fraction(low) <= Fraction(inner_low) <= Fraction(inner_high) <= Fraction(high)
+    for step, found in zip(
+        path.expect[0].steps, reference.trajectory(scene, nudged, n, digits=30).steps, strict=False
+    ):
+        got = [float(found.dt), *map(float, found.after[1:])]
+        for name, allowed, number in zip(NUMBERS, step.allowance, got, strict=True):
+            difference = abs(float(Fraction(getattr(step, name)[0]) - Fraction(number)))
+            assert difference <= 1.01 * e * allowed + 2.0**-52 * abs(number)

@@ -20,6 +20,7 @@ ARC = {
     "vx": -0.042636479149832596, "vy": -1.2492726406376256, "wall": "arc",
 }  # fmt: skip
 LATE = {**DOWN, "t": 0.25, "y": 0.25}
+FALLING = {**DOWN, "t": -0.5}
 TINY = {"table": "cap", "r": 2.0**-130}
 ANSWERS: list[tuple[dict[str, Any], int, str]] = [
     ({"scene": CAP, "state": DOWN, "steps": [UP]}, 0, "base, within 0 backward ulps"),
@@ -45,6 +46,8 @@ ANSWERS: list[tuple[dict[str, Any], int, str]] = [
         1,
         "step 1: false",
     ),
+    ({"scene": CAP, "state": FALLING, "steps": [{**UP, "t": 0.0, "x": 1e-16}]}, 0, "base, within"),
+    ({"scene": CAP, "state": LATE, "t_end": 0.25, "steps": [LATE]}, 0, "the horizon, within 0"),
     ({"scene": CAP, "state": DOWN, "steps": [{**UP, "t": float("inf")}]}, 1, "t is no finite number"),
     ({"scene": CAP, "state": DOWN, "steps": [5]}, 2, "a step must be given, as a dict"),
     ({"scene": {"table": "cap", "r": -1.0}, "state": DOWN, "steps": []}, 2, "r breaks its bound"),
@@ -57,6 +60,12 @@ LINE = {
         "vy": ["1", "1"],
     }]}],
 }  # fmt: skip
+# It is on the left side at an irrational phase, as far as any precision shows, and far below the floor.
+SWELLING = {"kind": "fourier", "mean": 1.0, "period": 2.0, "sin": [0.25]}
+REFUSED = {
+    **LINE, "scene": {"table": "stem", "w": SWELLING, "h": 1.0}, "expect": [{"outcome": "rejected"}],
+    "state": {**DOWN, "t": 0.5, "x": -1.25, "y": -2.0},
+}  # fmt: skip
 FILES: list[tuple[str, int, str]] = [
     (json.dumps(LINE), 0, "1 of 1 proved"),
     (json.dumps({**LINE, "t_end": 0.25}), 1, "a/1: false: the answer is horizon"),
@@ -64,6 +73,11 @@ FILES: list[tuple[str, int, str]] = [
     ("[" * 100_000, 2, "unreadable after 0 claims"),
     (json.dumps(LINE) + "\n{}", 2, "unreadable after 1 claims"),
     ("{", 2, "unreadable after 0 claims"),
+    (json.dumps({**LINE, "rule": "a\u2028b"}, ensure_ascii=False), 0, "1 of 1 proved"),
+    (json.dumps(LINE)[:-1] + ', "id": "a/2"}', 2, "a key comes twice"),
+    (json.dumps({**LINE, "scene": {"table": 0}}).replace("0}", f"{'9' * 5000}}}"), 2, "unreadable after 0"),
+    (json.dumps({**LINE, "collisions": 999_999, "expect": [{"outcome": "collision"}]}), 2, "kind or"),
+    (json.dumps(REFUSED), 0, "1 of 1 proved"),
     (json.dumps({**LINE, "kind": "jump"}), 2, "kind or collisions are none"),
     (json.dumps({**LINE, "expect": [{"outcome": "collision", "steps": [5]}]}), 2, "dt must be given"),
 ]
@@ -77,20 +91,17 @@ def call(*arguments: str) -> tuple[int, str]:
     return done.returncode, done.stdout + done.stderr
 
 
-@pytest.mark.parametrize(("data", "code", "word"), ANSWERS)
-def test_answers_are_judged_step_by_step(data: dict[str, Any], code: int, word: str, tmp_path: Any) -> None:
-    path = tmp_path / "answers.json"
-    path.write_text(json.dumps(data), "utf-8")
-    found, printed = call("--answers", str(path))
-    assert found == code
-    assert word in printed
+ROWS = [
+    *[(["--answers"], json.dumps(data), code, word) for data, code, word in ANSWERS],
+    *[([], text, code, word) for text, code, word in FILES],
+]
 
 
-@pytest.mark.parametrize(("text", "code", "word"), FILES, ids=range(len(FILES)))
-def test_a_file_is_proved_line_by_line(text: str, code: int, word: str, tmp_path: Any) -> None:
+@pytest.mark.parametrize(("options", "text", "code", "word"), ROWS, ids=range(len(ROWS)))
+def test_a_file_is_judged(options: list[str], text: str, code: int, word: str, tmp_path: Any) -> None:
     path = tmp_path / "lines.jsonl"
     path.write_text(text, "utf-8")
-    found, printed = call(str(path))
+    found, printed = call(*options, str(path))
     assert found == code
     assert word in printed
 

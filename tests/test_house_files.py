@@ -24,9 +24,9 @@ MAX_STATEMENTS = {
     "reference": 1_440,
     "fast": 4_010,
     "theory": 2_290,
-    "conformance": 10_580,
+    "conformance": 8_750,
     "mushrooms": 4_020,
-    "tests": 15_110,
+    "tests": 14_075,
     "docs": 110,
     ".ci": 40,
 }

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import random
-from decimal import Decimal, localcontext
 from fractions import Fraction
 
 import msgspec
@@ -216,17 +215,3 @@ def test_a_root_known_to_many_periods_is_proved(working):
     floor = BangBang(knots=((0.0, 1.0), (half, 1.0 + 2.0**-52), (2 * half, 1.0)))
     claim = prove_path(Mushroom(r=1.0, w=0.5, h=floor), State(0.0, 0.1, 0.5, 0.3, -1.0), 6, working=working)
     assert "floor" in [step.wall for step in claim.steps]
-
-
-@pytest.mark.parametrize("number", ["dt", "x", "y", "vx", "vy"])
-def test_a_shifted_claim_is_false(number):
-    scene, state, t_end = STEPS["f rises and falls in dt = 0.07"]
-    claim = prove_step(scene, state, t_end)
-    (step,) = claim.steps
-    with localcontext(prec=60):
-        low, high = map(Decimal, getattr(step, number))
-        shifted = tuple(str(end + 2 * (high - low)) for end in (low, high))
-    false = msgspec.structs.replace(step, **{number: shifted})
-    verdict = judge(scene, state, t_end, msgspec.structs.replace(claim, steps=(false,)))
-    assert verdict.status == "false"
-    assert verdict.reason.startswith(number)

@@ -27,7 +27,7 @@ from conformance.audit.claim import (
     to_data,
     verdict_of,
 )
-from conformance.audit.claims import all_claims, select_claims
+from conformance.audit.claims import all_claims
 from conformance.audit.runs import RUNS, Progress, Sample, Simulate, Size, draw
 from scene.files import sealed, unsealed, write_file
 from scene.refusal import check_seed
@@ -109,7 +109,8 @@ def conduct(
     if settings.folder:
         settings.folder.mkdir(parents=True, exist_ok=True)
         code()  # before anything is examined: an edit meanwhile is not what runs, and must not be told as it
-    found = {e.id: f for e in claims if (f := _load(e, settings)) is not None}
+    known = {claim.id: _kept(claim, settings) for claim in claims}
+    found = {name: from_data(data["finding"]) for name, data in known.items() if data.get("code") == code()}
     predict = cache(predict)
     samples: dict[str, Sample] = {}
     for name in dict.fromkeys(run for claim in claims for run in claim.runs):
@@ -125,7 +126,7 @@ def conduct(
     for claim in claims:
         if claim.id not in found:
             found[claim.id] = examine(claim, samples, steppers, settings, predict)
-        _save(found[claim.id], settings)
+        _save(claim, found[claim.id], settings)
     findings = [found[claim.id] for claim in claims]
     return AuditResult(settings, tuple(claims), findings, samples, time.perf_counter() - begin)
 
@@ -161,11 +162,6 @@ def _key(claim: Claim, settings: AuditSettings) -> str:
     )
 
 
-def _load(claim: Claim, settings: AuditSettings) -> Finding | None:
-    data = _kept(claim, settings)
-    return from_data(data["finding"]) if data and data.get("code") == code() else None
-
-
 def _kept(claim: Claim, settings: AuditSettings) -> dict[str, Any]:
     """Return what is kept of a claim for these settings, whoever made it; nothing where there is none."""
     content = (
@@ -191,8 +187,7 @@ def code() -> str:
     return digest.hexdigest()
 
 
-def _save(finding: Finding, settings: AuditSettings) -> None:
+def _save(claim: Claim, finding: Finding, settings: AuditSettings) -> None:
     if settings.folder:
-        claim = select_claims(finding.id)[0]
         content = json.dumps({"key": _key(claim, settings), "code": code(), "finding": to_data(finding)})
         write_file(settings.folder / f"{claim.id}.finding", sealed(content.encode()))

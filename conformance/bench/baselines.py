@@ -1,8 +1,9 @@
 """Baselines: what most people would write, as solvers.
 
-Event-driven, with Newton's method for each wall and no checks: in C and in scalar numba. By fixed time steps,
-in C: move by dt, and where the new place is outside put it back on the wall and reflect. All answer many
-questions in one call and are timed as the lanes are, on flights that go on from a workload's questions.
+In C: event-driven, with Newton's method for each wall and no checks; and by fixed time steps: move by dt, and
+where the new place is outside put it back on the wall and reflect. Both answer many questions in one call
+and are timed as the lanes are, on flights that go on from a workload's questions. In Python: the plain
+stepper, and scipy's `solve_ivp` with events.
 
 `python -m conformance.bench.baselines NAME` puts one behind protocol 1, to be graded like any other.
 Baselines refuse nothing but what the protocol's decoder refuses: what their own code makes of a state is what
@@ -17,7 +18,6 @@ from __future__ import annotations
 import ctypes
 import sys
 import tempfile
-import time
 from collections.abc import Callable, Sequence
 from functools import partial
 from itertools import zip_longest
@@ -27,11 +27,10 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 from mpmath import fp
+from scipy.integrate import solve_ivp
 
 from conformance import plain
-from conformance.bench import numba_stepper as numba
-from conformance.bench.solvers import Family, Given, Solver, SolverRun
-from conformance.bench.time_stepping import TOLERANCES, next_collision_by
+from conformance.bench.solvers import Family, Given, Solver, SolverRun, by_call
 from conformance.bench.workloads import SINGLE_STEPS, WINDOW, Workload
 from conformance.harness import examples
 from conformance.suite.process import Trouble
@@ -48,8 +47,10 @@ from scene import (
     Scene,
     State,
     Stem,
+    Undecided,
+    Wall,
 )
-from scene.geometry import rounded
+from scene.geometry import rounded, table_at
 from scene.laws import frequency
 from scene.protocol.wire import serve
 from scene.states import Stepper
@@ -57,9 +58,14 @@ from scene.tables import laws, width_factors
 
 FloatArray = npt.NDArray[np.float64]
 SOURCE = Path(__file__).parent / "baselines.c"
+TOLERANCES = (1e-3, 1e-6, 1e-9, 1e-12)  # of solve_ivp
 PARTS = (10, 100, 1000)  # time steps in a flight
 WALLS = Mushroom.walls
 LAW_LENGTH, PAIRS = 516, 4
+# By the numbers that `baselines.c` knows them by: no wall, the tables, and the kinds of laws.
+NONE = 5
+CAP, STEM, MUSHROOM = range(3)
+CONSTANT, FOURIER, BANG_BANG = range(3)
 FLAGS = ("-O3", "-march=native")  # for the C compiler
 MOST = 10 * int(WINDOW)  # collisions of a particle: one that hops along the arc would never end
 
@@ -73,19 +79,6 @@ class Questions(NamedTuple):
     states: FloatArray
 
 
-class Engine(NamedTuple):
-    """A compiled baseline.
-
-    Attributes:
-        hits: returns dt, t, x, y, vx, vy, wall of each state's next collision, (N, 7).
-        follow: (questions, t_end, most, n_times) -> collisions and seconds of following each state, so many
-            times, to t_end or for `most` collisions.
-    """
-
-    hits: Callable[[Questions], FloatArray]
-    follow: Callable[[Questions, float, int, int], tuple[int, float]]
-
-
 class _Method(ctypes.Structure):
     """How the C file is to step; fields as there."""
 
@@ -97,49 +90,35 @@ class _Method(ctypes.Structure):
     )
 
 
-def c_engine(library: Path, parts: int = 0) -> Engine:
-    """Return the compiled C file, event-driven (0 parts) or by so many time steps to a flight.
+class Engine:
+    """The compiled C file, event-driven (0 parts) or by so many time steps to a flight."""
 
-    The seconds are those of the C code's own clock.
-    """
-    compiled = ctypes.CDLL(str(library))
-    count, place = ctypes.c_long, ctypes.c_void_p
-    compiled.next_hits.argtypes = (place, count, place, place)
-    compiled.follow.argtypes = (place, count, place, ctypes.c_double, count, count, place)
-    compiled.follow.restype = ctypes.c_double
+    def __init__(self, library: Path, parts: int = 0) -> None:
+        self._compiled, self._parts = ctypes.CDLL(str(library)), parts
+        count, place = ctypes.c_long, ctypes.c_void_p
+        self._compiled.next_hits.argtypes = (place, count, place, place)
+        self._compiled.follow.argtypes = (place, count, place, ctypes.c_double, count, count, place)
+        self._compiled.follow.restype = ctypes.c_double
 
-    def asked(q: Questions) -> tuple[Any, int, int]:
-        method = _Method(q.laws.ctypes.data, q.table, parts, q.length)
-        return ctypes.byref(method), len(q.states), q.states.ctypes.data
-
-    def hits(q: Questions) -> FloatArray:
-        found = np.empty((len(q.states), 7))
-        compiled.next_hits(*asked(q), found.ctypes.data)
+    def hits(self, asked: Questions) -> FloatArray:
+        """Return dt, t, x, y, vx, vy, wall of each state's next collision, (N, 7)."""
+        found = np.empty((len(asked.states), 7))
+        self._compiled.next_hits(*self._asked(asked), found.ctypes.data)
         return found
 
-    def follow(q: Questions, t_end: float, most: int, n_times: int) -> tuple[int, float]:
+    def follow(self, asked: Questions, t_end: float, most: int, n_times: int) -> tuple[int, float]:
+        """Follow each state, so many times, to t_end or for `most` collisions.
+
+        Returns:
+            Collisions, and seconds by the C code's own clock.
+        """
         n_hits = ctypes.c_long()
-        seconds = compiled.follow(*asked(q), t_end, most, n_times, ctypes.byref(n_hits))
+        seconds = self._compiled.follow(*self._asked(asked), t_end, most, n_times, ctypes.byref(n_hits))
         return n_hits.value, seconds
 
-    return Engine(hits, follow)
-
-
-def numba_engine() -> Engine:
-    """Return the event-driven stepper in numba; the seconds contain the call, not the compilation."""
-
-    def hits(q: Questions) -> FloatArray:
-        found = np.empty((len(q.states), 7))
-        numba.next_hits(q.laws, q.table, q.states, found)
-        return found
-
-    def follow(q: Questions, t_end: float, most: int, n_times: int) -> tuple[int, float]:
-        numba.follow(q.laws, q.table, q.states[:0], t_end, most, n_times)
-        begin = time.perf_counter()
-        n_hits = numba.follow(q.laws, q.table, q.states, t_end, most, n_times)
-        return n_hits, time.perf_counter() - begin
-
-    return Engine(hits, follow)
+    def _asked(self, q: Questions) -> tuple[Any, int, int]:
+        method = _Method(q.laws.ctypes.data, q.table, self._parts, q.length)
+        return ctypes.byref(method), len(q.states), q.states.ctypes.data
 
 
 def build(folder: Path, flags: Sequence[str]) -> tuple[Path, str]:
@@ -165,14 +144,9 @@ def build(folder: Path, flags: Sequence[str]) -> tuple[Path, str]:
 def in_c(library: Path) -> list[Solver]:
     """Return the solvers that the compiled C file holds."""
     return [
-        _solver("lean C", "lean", c_engine(library)),
-        *(_solver(f"steps, flight/{n}", "fixed-step", c_engine(library, n), 10 * WINDOW / n) for n in PARTS),
+        _solver("lean C", "lean", Engine(library)),
+        *(_solver(f"steps, flight/{n}", "fixed-step", Engine(library, n), 10 * WINDOW / n) for n in PARTS),
     ]
-
-
-def in_numba() -> Solver:
-    """Return the scalar stepper in numba."""
-    return _solver("lean numba", "lean", numba_engine())
 
 
 def stepper(solver: Solver) -> Stepper:
@@ -210,7 +184,7 @@ def _solver(name: str, family: Family, engine: Engine, flights: float = WINDOW) 
 
 def _outcome(row: list[float]) -> Given:
     *numbers, wall = row
-    return Horizon(*numbers[1:]) if wall == numba.NONE else Collision(WALLS[int(wall)], *numbers)
+    return Horizon(*numbers[1:]) if wall == NONE else Collision(WALLS[int(wall)], *numbers)
 
 
 def questions(scene: Scene, states: Sequence[State]) -> Questions:
@@ -219,8 +193,8 @@ def questions(scene: Scene, states: Sequence[State]) -> Questions:
     width = (0.0,) if isinstance(scene, Cap) else width_factors(scene)
     rows = [given.get("r", 0.0), width[0], width[1] if len(width) > 1 else 1.0]
     rows += [given.get("h", 0.0), given.get("slope", 0.0)]
-    table = numba.CAP if isinstance(scene, Cap) else numba.STEM if isinstance(scene, Stem) else numba.MUSHROOM
-    starts = [(s.t, s.x, s.y, s.vx, s.vy, WALLS.index(s.wall) if s.wall else numba.NONE) for s in states]
+    table = CAP if isinstance(scene, Cap) else STEM if isinstance(scene, Stem) else MUSHROOM
+    starts = [(s.t, s.x, s.y, s.vx, s.vy, WALLS.index(s.wall) if s.wall else NONE) for s in states]
     length = float(rounded(scene, states[0].t).size)
     return Questions(table, np.array([_row(law) for law in rows]), length, np.array(starts, dtype=float))
 
@@ -228,15 +202,70 @@ def questions(scene: Scene, states: Sequence[State]) -> Questions:
 def _row(law: Law) -> FloatArray:
     row, pairs = np.zeros(LAW_LENGTH), list[tuple[float, float]]()
     if isinstance(law, BangBang):
-        row[0], pairs = numba.BANG_BANG, list(law.knots)
+        row[0], pairs = BANG_BANG, list(law.knots)
     elif isinstance(law, Fourier):
-        row[0], row[2], row[3] = numba.FOURIER, law.mean, float(frequency(fp, law))
+        row[0], row[2], row[3] = FOURIER, law.mean, float(frequency(fp, law))
         pairs = list(zip_longest(law.cos, law.sin, fillvalue=0.0))
     else:
-        row[0], row[2] = numba.CONSTANT, law
+        row[0], row[2] = CONSTANT, law
     row[1] = len(pairs)
     row[PAIRS : PAIRS + 2 * len(pairs)] = np.ravel(pairs)
     return row
+
+
+def next_collision_by(rtol: float) -> Callable[[Scene, State, float], Outcome]:
+    """Return a stepper that integrates the free flight by solve_ivp to a tolerance, relative and absolute.
+
+    An event is a change of sign between the ends of an integrator's step, refined by Brent's method. The free
+    flight has no error that the step control could see, so steps grow until they skip what happens within
+    them; and at the start on a wall the sign is that of a rounding error. Both are what such codes do.
+    """
+
+    def step(scene: Scene, state: State, t_end: float) -> Outcome:
+        part = "cap" if plain.Flight(scene, state, t_end).is_in_cap else "stem"
+        t, q = state.t, np.array([state.x, state.y, state.vx, state.vy])
+        while True:
+            walls: tuple[Wall, ...] = ("arc", "base") if part == "cap" else ("left", "right", "floor", "base")
+            events = [_event(scene, part, wall) for wall in walls]
+            found = solve_ivp(
+                lambda _, q: [q[2], q[3], 0.0, 0.0], (t, t_end), q, rtol=rtol, atol=rtol, events=events
+            )
+            if found.status == 0:
+                return Horizon(t_end, *map(float, found.y[:, -1]))
+            if found.status != 1:
+                return Undecided(str(found.message))
+            wall = next(name for name, times in zip(walls, found.t_events, strict=True) if len(times))
+            t, q = float(found.t[-1]), found.y[:, -1]
+            is_open = part == "stem" or abs(q[0]) < float(table_at(fp, scene, t).w)
+            if wall == "base" and isinstance(scene, Mushroom) and is_open:
+                part = "stem" if part == "cap" else "cap"
+                q[1] = 0.0
+                continue
+            velocity = plain.Flight(scene, State(t, *q.tolist()), t).bounce(wall, 0.0)
+            return Collision(wall, t - state.t, t, float(q[0]), float(q[1]), *velocity)
+
+    return step
+
+
+def _event(scene: Scene, part: str, wall: Wall) -> Any:
+    """Return when a wall's f, or y = 0 where a part of the table ends, is passed from inside."""
+
+    def event(t: float, q: FloatArray) -> float:
+        if wall == "base":
+            return float(q[1]) if part == "cap" else -float(q[1])
+        return float(table_at(fp, scene, t).gap(wall, *q[:2].tolist()))
+
+    event.terminal, event.direction = True, -1.0  # type: ignore[attr-defined]
+    return event
+
+
+def in_python() -> list[Solver]:
+    """Return the plain stepper, and solve_ivp at several tolerances."""
+    integrators = {f"solve_ivp, rtol {rtol:.0e}": next_collision_by(rtol) for rtol in TOLERANCES}
+    return [
+        by_call("plain Python", "interpreted", plain.next_collision),
+        *(by_call(name, "time-stepping", step) for name, step in integrators.items()),
+    ]
 
 
 def _built(name: str) -> Stepper:
@@ -247,7 +276,6 @@ def _built(name: str) -> Stepper:
 
 NAMES: dict[str, Callable[[], Stepper]] = {
     "lean-c": partial(_built, "lean C"),
-    "lean-numba": lambda: stepper(in_numba()),
     **{f"steps-{parts}": partial(_built, f"steps, flight/{parts}") for parts in PARTS},
     **{f"solve-ivp-{rtol:.0e}": partial(next_collision_by, rtol) for rtol in TOLERANCES},
 }

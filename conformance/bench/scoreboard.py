@@ -37,7 +37,7 @@ Level core of corpus {corpus}, seed {seed}: `python -m conformance.bench.scorebo
 anew. The first two are ours; the examples and the engines behind the adapter kits are in
 `conformance/harness/`; the rest is what most people would write, from the benchmark (`python -m
 conformance.bench.baselines NAME` puts each behind the protocol): event-driven Newton without checks in
-C and numba, fixed time steps of a tenth to a thousandth of a flight, scipy's `solve_ivp` with
+C, fixed time steps of a tenth to a thousandth of a flight, scipy's `solve_ivp` with
 events. A precision class is of the answers that passed, few as they may be.
 
 | stepper | verdict | pass | fail | other | A/B/C | seconds |

@@ -15,8 +15,7 @@ from collections.abc import Callable, Iterator, Sequence
 from typing import NamedTuple
 
 from conformance.cases.draw import Draw
-from conformance.cases.scenes import walls_speed
-from conformance.cases.starts import place, state
+from conformance.cases.scenes import place, state, walls_speed
 from conformance.grading.agreement import middle
 from conformance.vectors import Expectation
 from scene import BangBang, Cap, Collision, Fourier, Mushroom, Scene, State, Wall, load

@@ -7,12 +7,12 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections import Counter, defaultdict
-from collections.abc import Iterable, Mapping, Sequence
+from collections import Counter
+from collections.abc import Iterable, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
-from conformance.cases.corpus import FOLDER, RETIRED, added, file_of, groups, make, write
+from conformance.cases.corpus import FOLDER, RETIRED, added, groups, make, write
 from conformance.vectors import Vector, encode, load
 from scene import BadInput
 
@@ -21,8 +21,8 @@ def _made(most: int | None, n_jobs: int) -> list[Vector]:
     """Make all vectors, or the first few of each group, on so many processes."""
     wanted = [
         (group, number)
-        for group, makers in groups().items()
-        for number in range(1, len(makers[:most]) + 1)
+        for group, n in groups().items()
+        for number in range(1, min(n, most or n) + 1)
         if f"{group}/{number}" not in RETIRED
     ]
     found = []
@@ -34,15 +34,8 @@ def _made(most: int | None, n_jobs: int) -> list[Vector]:
     return found
 
 
-def _by_file(vectors: Iterable[Vector]) -> dict[str, list[Vector]]:
-    files = defaultdict(list)
-    for vector in vectors:
-        files[file_of(vector)].append(vector)
-    return files
-
-
-def _summary(files: Mapping[str, list[Vector]]) -> str:
-    kinds = Counter((vector.kind, vector.level) for vectors in files.values() for vector in vectors)
+def _summary(vectors: Iterable[Vector]) -> str:
+    kinds = Counter((vector.kind, vector.level) for vector in vectors)
     names = {"step": "steps", "trajectory": "trajectories", "flow": "flows"}
     return ", ".join(f"{n} {level} {names[kind]}" for (kind, level), n in sorted(kinds.items()))
 
@@ -75,12 +68,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if options.check:
             return _check(options.out, _made(options.most, options.jobs))
         known = [*load("stress", FOLDER), *added(options.add)] if options.add else None
-        files = _by_file(known or _made(options.most, options.jobs))
-        manifest = write(options.out, files)
+        vectors = known or _made(options.most, options.jobs)
+        manifest = write(options.out, vectors)
     except (BadInput, OSError) as error:
         print(f"conformance.cases: {error}", file=sys.stderr)
         return 2
-    print(f"corpus {manifest.corpus}, {manifest.digest[:12]}: {_summary(files)}")
+    print(f"corpus {manifest.corpus}, {manifest.digest[:12]}: {_summary(vectors)}")
     return 0
 
 

@@ -12,7 +12,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from functools import partial
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import msgspec
 
@@ -112,34 +112,25 @@ def run(
 
 def line(attack: Question, seed: int, index: int) -> str:
     """Write a question as one line of JSON: where it comes from, and the question in the wire's form."""
-    data: dict[str, Any] = {
-        "family": attack.group,
-        "seed": seed,
-        "index": index,
-        "scene": attack.wire_scene(),
-    }
-    data |= {"cmd": "step" if attack.collisions is None else "trajectory"}
-    data |= {"state": msgspec.structs.asdict(attack.state), "t_end": attack.t_end}
-    if attack.collisions is not None:
-        data |= {"collisions": attack.collisions, "working": attack.working}
-    return json.dumps(data)
+    path = {} if attack.collisions is None else {"collisions": attack.collisions, "working": attack.working}
+    named = {"family": attack.group, "seed": seed, "index": index, "scene": attack.wire_scene()}
+    asked = {"state": msgspec.structs.asdict(attack.state), "t_end": attack.t_end}
+    return json.dumps({**named, "cmd": "trajectory" if path else "step", **asked, **path})
 
 
 def judged(attack: Question, steppers: UnderAttack) -> Iterable[Judgement]:
     """Put one attack to the reference and to each stepper, and judge what they answer."""
-    scene, state, t_end = from_data(attack.wire_scene()), attack.state, attack.t_end
+    step, flow, is_proved = steppers
+    asked = from_data(attack.wire_scene()), attack.state, attack.t_end
     found = _survived(partial(confirmed, attack))
-    if steppers.is_proved or found.kind == "wrong":
+    if is_proved or found.kind == "wrong":
         yield found
-    if steppers.stepper is not None:
-        alone = found
-        if attack.collisions is not None:
-            alone = _survived(partial(confirmed, attack._replace(collisions=None, flow=None)))
-        answer = partial(steppers.stepper, scene, state, t_end)
-        yield _survived(lambda: stepped(answer(), alone.claim, state))
-    if steppers.flow is not None and attack.flow:
-        count = partial(steppers.flow, scene, state, t_end)
-        yield _survived(lambda: flown(count(), found.claim))
+    if step is not None:
+        is_alone, alone = attack.collisions is None, attack._replace(collisions=None, flow=None)
+        claim = (found if is_alone else _survived(partial(confirmed, alone))).claim
+        yield _survived(lambda: stepped(step(*asked), claim, attack.state))
+    if flow is not None and attack.flow:
+        yield _survived(lambda: flown(flow(*asked), found.claim))
 
 
 def _survived(judge_answer: Callable[[], Judgement]) -> Judgement:
@@ -160,20 +151,19 @@ def confirmed(attack: Question) -> Judgement:
     else:
         claim = claimed_path(scene, state, n_collisions, t_end, attack.working)
     seconds = (time.process_time() - begun) / max(len(claim.steps), 1)
-    is_undecided = claim.outcome == "undecided"
+    is_undecided, n_steps = claim.outcome == "undecided", len(claim.steps) + (claim.outcome == "undefined")
     if is_undecided and not claim.steps:
         return Judgement("undecided", claim.reason, seconds=seconds)
     written = Expectation("collision", claim.steps) if is_undecided else claim
-    n_steps = max(len(claim.steps) + (claim.outcome == "undefined"), 1)
-    asked = attack._replace(group="attack", flow=None)
-    verdict = judge(filed(asked, 1, Proved((written,), collisions=n_steps), "stress"))
+    proved = Proved((written,), collisions=max(n_steps, 1))
+    verdict = judge(filed(attack._replace(group="attack", flow=None), 1, proved, "stress"))
     if verdict.status == "false":
         return Judgement("wrong", f"the reference claims what is false: {verdict.reason}", seconds=seconds)
-    if is_undecided or verdict.status != "proved":
-        why = claim.reason if is_undecided else verdict.reason
-        return Judgement("undecided" if is_undecided else "open", why, seconds=seconds)
-    kind = "refused" if claim.outcome == "rejected" else "agreed"
-    return Judgement(kind, claim=claim, seconds=seconds)
+    if is_undecided:
+        return Judgement("undecided", claim.reason, seconds=seconds)
+    if verdict.status != "proved":
+        return Judgement("open", verdict.reason, seconds=seconds)
+    return Judgement("refused" if claim.outcome == "rejected" else "agreed", claim=claim, seconds=seconds)
 
 
 def stepped(outcome: Outcome, claim: Expectation | None, state: State) -> Judgement:

@@ -24,8 +24,18 @@ from conformance.cases.draw import Draw, Unfit
 from conformance.cases.flow_families import any_marks
 from conformance.cases.question import Family, Question
 from conformance.cases.run_families import MOVABLE
-from conformance.cases.scenes import MOVING, PERIODS, any_scene, clock, law, walls_speed
-from conformance.cases.starts import LONGEST, point, start, when
+from conformance.cases.scenes import (
+    LONGEST,
+    MOVING,
+    PERIODS,
+    any_scene,
+    clock,
+    law,
+    point,
+    start,
+    walls_speed,
+    when,
+)
 from conformance.plain.step import Flight
 from scene import BangBang, Cap, Fourier, Law, Mushroom, Scene, State, Stem, Wall
 from scene.geometry import rounded

@@ -9,10 +9,9 @@ import msgspec
 
 import reference
 from conformance.cases.draw import Unfit
-from conformance.cases.paths import condition, finite, proved_path
+from conformance.cases.paths import OpenSign, condition, finite, marks, proved_path
 from conformance.cases.prover import CONDITIONS, NUDGES, SIGNS, ask, expectation, flight_of, nudged
 from conformance.cases.question import Proved, Question, filed
-from conformance.cases.stays import OpenSign, marks
 from conformance.vectors import Expectation, Level, Vector, four_digits
 from conformance.verify import Verdict, verify_line
 from scene import BadInput, InvalidState, Rejected, Scene, State, Undecided, Undefined, from_data

@@ -8,8 +8,9 @@ corpus comes out on every machine, bit for bit.
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Mapping
-from functools import cache, partial
+from collections import defaultdict
+from collections.abc import Iterable
+from functools import cache
 from math import inf
 from pathlib import Path
 
@@ -32,7 +33,6 @@ KEPT = (*(f"hard-case-41/{number}" for number in (1, 2, 3, 4)), "flow-stay-inter
 FOLDER = Path(__file__).parent.parent / "corpus"
 BY_HAND = ("hard-case-", "at-the-horizon")  # how their groups begin
 ATTEMPTS = 64
-Maker = Callable[[int], Vector]
 
 
 def question_of(line: Vector) -> Question:
@@ -62,21 +62,10 @@ def by_hand() -> dict[str, list[Vector]]:
     return found
 
 
-@cache
-def groups() -> dict[str, list[Maker]]:
-    """Return for every group what makes its vectors, in order; number n is made by entry n - 1."""
-    found: dict[str, list[Maker]] = {}
-    for group, lines in by_hand().items():
-        found[group] = [partial(again, line) for line in lines]
-    for family in FAMILIES.values():
-        if family.n_vectors:
-            found[family.name] = [partial(drawn, family)] * family.n_vectors
-    return found
-
-
-def again(line: Vector, number: int) -> Vector:
-    """Answer a published line's question anew."""
-    return certify(question_of(line), number)
+def groups() -> dict[str, int]:
+    """Return how many vectors every group has; they are numbered from 1."""
+    written = {group: len(lines) for group, lines in by_hand().items()}
+    return written | {name: family.n_vectors for name, family in FAMILIES.items() if family.n_vectors}
 
 
 def drawn(family: Family, number: int) -> Vector:
@@ -102,12 +91,14 @@ def make(group: str, number: int) -> Vector:
     Raises:
         BadInput: when there is no such vector.
     """
-    makers = groups().get(group, [])
-    if not 1 <= number <= len(makers) or f"{group}/{number}" in RETIRED:
-        raise BadInput(f"vector = {group}/{number}, must be one of the corpus")
-    if f"{group}/{number}" in KEPT:
-        return next(vector for vector in load("stress", FOLDER) if vector.id == f"{group}/{number}")
-    return makers[number - 1](number)
+    name = f"{group}/{number}"
+    if not 1 <= number <= groups().get(group, 0) or name in RETIRED:
+        raise BadInput(f"vector = {name}, must be one of the corpus")
+    if name in KEPT:
+        return next(vector for vector in load("stress", FOLDER) if vector.id == name)
+    if group in by_hand():
+        return certify(question_of(by_hand()[group][number - 1]), number)
+    return drawn(FAMILIES[group], number)
 
 
 def added(path: Path) -> list[Vector]:
@@ -138,14 +129,16 @@ def file_of(vector: Vector) -> str:
     return ("hard-cases" if vector.group.startswith("hard-case-") else vector.group) + ".jsonl"
 
 
-def write(folder: Path, files: Mapping[str, list[Vector]]) -> Manifest:
-    """Write files of vectors and their manifest, each complete or not at all; the manifest last."""
+def write(folder: Path, vectors: Iterable[Vector]) -> Manifest:
+    """Write vectors, by file, and their manifest, each complete or not at all; the manifest last."""
     folder.mkdir(parents=True, exist_ok=True)
-    entries = {}
-    for name, vectors in sorted(files.items()):
-        data = encode(vectors)
+    files, entries = defaultdict[str, list[Vector]](list), {}
+    for vector in vectors:
+        files[file_of(vector)].append(vector)
+    for name, held in sorted(files.items()):
+        data = encode(held)
         write_file(folder / name, data)
-        entries[name] = File(hashlib.sha256(data).hexdigest(), len(vectors))
+        entries[name] = File(hashlib.sha256(data).hexdigest(), len(held))
     manifest = Manifest(VERSION, digest(entries, RETIRED), entries, RETIRED)
     write_file(folder / MANIFEST, msgspec.json.format(msgspec.json.encode(manifest)) + b"\n")
     for stale in sorted(folder.glob("*.jsonl")):

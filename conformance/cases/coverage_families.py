@@ -10,8 +10,7 @@ from conformance.cases.draw import Draw
 from conformance.cases.families import soon
 from conformance.cases.flow_families import tilted
 from conformance.cases.question import Family, Question
-from conformance.cases.scenes import MOVING, TABLES, Clock, clock, deep_wave, law, scene
-from conformance.cases.starts import state, time
+from conformance.cases.scenes import MOVING, TABLES, Clock, clock, deep_wave, law, scene, state, time
 from scene import BangBang, Cap, Fourier, Mushroom, Scene, State, Stem
 from scene.geometry import rounded
 from scene.tables import cycle_length, laws

@@ -17,8 +17,7 @@ from mpmath import MPContext
 from conformance import plain
 from conformance.cases.draw import Draw, Unfit
 from conformance.cases.question import NEVER, Family, Question
-from conformance.cases.scenes import TABLES, Clock, clock, many_legs, scene
-from conformance.cases.starts import off_its_wall, state
+from conformance.cases.scenes import TABLES, Clock, clock, many_legs, off_its_wall, scene, state
 from scene import BangBang, Cap, Collision, Fourier, Law, Mushroom, Scene, State, Stem, Wall
 from scene.laws import value
 from scene.tables import laws

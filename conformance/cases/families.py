@@ -13,8 +13,7 @@ import msgspec
 from conformance.cases.draw import Draw
 from conformance.cases.question import Family, Question
 from conformance.cases.scenes import MOVING as MOVING_KINDS
-from conformance.cases.scenes import TABLES, Clock, clock, scene
-from conformance.cases.starts import place, state, time
+from conformance.cases.scenes import TABLES, Clock, clock, place, scene, state, time
 from scene import Cap, Mushroom, Scene, State, Stem, from_data, load, to_data
 from scene.geometry import rounded
 

@@ -13,11 +13,10 @@ from typing import Any
 
 from conformance.cases.draw import Draw
 from conformance.cases.families import CATALOGUE, FIXED, MOVING
-from conformance.cases.question import Family, Question
+from conformance.cases.paths import stays
+from conformance.cases.question import Family, Mark, Question
 from conformance.cases.scenes import MOVING as MOVING_KINDS
-from conformance.cases.scenes import Clock, clock, law, scene, walls_speed
-from conformance.cases.starts import state, time
-from conformance.cases.stays import Mark, stays
+from conformance.cases.scenes import Clock, clock, law, scene, state, time, walls_speed
 from scene import Mushroom, Scene, State, Stem, load
 from scene.geometry import rounded
 from scene.laws import bounds

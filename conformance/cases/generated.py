@@ -30,8 +30,7 @@ from conformance.cases.flow_families import any_marks
 from conformance.cases.prover import CONDITIONS, NUDGES, SIGNS, nudged
 from conformance.cases.question import ATTEMPTS, Family, Question
 from conformance.cases.run_families import LIKE_BEFORE, is_leaning
-from conformance.cases.scenes import Clock, law, wire_form
-from conformance.cases.starts import LATE
+from conformance.cases.scenes import LATE, Clock, law, wire_form
 from conformance.cases.table import FAMILIES
 from conformance.grading.agreement import DIGITS, SHARPEST
 from conformance.vectors import Kind, Level, Vector

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 from conformance.cases.draw import Draw, Unfit
 from conformance.cases.scenes import wire_form
-from conformance.cases.stays import Mark
 from conformance.vectors import Expectation, Kind, Level, OutcomeName, Vector
 from scene import BadInput, Scene, State, Wall
 
+# What a hit means for captured stays: an arc hit of a mushroom, captured or not; a wall of the stem; nothing.
+Mark = Literal["captured", "free", "out", ""]
 LONGEST = 1e8  # condition number up to which a trajectory is followed
 NEVER = 2.0**1000  # the horizon of paths that are asked for without one [time]
 ATTEMPTS = 4000  # draws for one question
@@ -24,7 +25,7 @@ class Question(NamedTuple):
         state: the start.
         t_end: horizon [time].
         collisions: None for a step; for a trajectory how many are tried, for a flow how many at most.
-        flow: None when it is none; else which of its collisions' marks (`stays.marks`) are looked for.
+        flow: None when it is none; else which of its collisions' marks (`paths.marks`) are looked for.
         longest: condition number up to which a trajectory or a flow is followed.
         also: outcomes that are right beside the proved one.
         level: None to measure it.

@@ -20,8 +20,22 @@ import msgspec
 from conformance.cases.draw import Draw, Unfit
 from conformance.cases.flow_families import any_marks
 from conformance.cases.question import Family, Question
-from conformance.cases.scenes import KINDS, MOVING, Clock, any_scene, clock, law, many_legs
-from conformance.cases.starts import LONGEST, off_its_wall, place, start, state, time, when
+from conformance.cases.scenes import (
+    KINDS,
+    LONGEST,
+    MOVING,
+    Clock,
+    any_scene,
+    clock,
+    law,
+    many_legs,
+    off_its_wall,
+    place,
+    start,
+    state,
+    time,
+    when,
+)
 from scene import Cap, Law, Mushroom, Scene, State, Stem, Wall
 from scene.geometry import rounded
 from scene.given import MAX_KNOTS

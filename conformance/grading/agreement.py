@@ -14,7 +14,7 @@ wrong; callers count it. The reason of an undefined outcome must be the certifie
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from fractions import Fraction
 from typing import Literal, NamedTuple
 
@@ -122,14 +122,13 @@ def compare(
         is_undecided = any(isinstance(step, Undecided) for step in answers)
         return Agreement("undecided" if is_undecided else "indeterminate", why="the proof is undecided")
     measured: list[_Measured] = []
-    clock = _Clock(state)
-    for i, certified in enumerate(expected.steps):
+    for i, (certified, time) in enumerate(zip(expected.steps, _times(expected, state), strict=True)):
         place = f"step {i + 1}: " if isinstance(answer, list) else ""
         if i >= len(answers):
             return Agreement("length", why=f"{place}missing, {i} of {len(expected.steps)} were given", step=i)
         if differing := _difference(answers[i], certified):
             return differing._replace(why=(place + differing.why)[:200], step=i)
-        measured.append(_measure(answers[i], certified, clock.advance(certified), place, physics))
+        measured.append(_measure(answers[i], certified, time, place, physics))
         if measured[-1].least > physics:
             hint = _missed(answers[i], certified)
             judged = _judge_numbers(measured, bound, physics)
@@ -157,8 +156,7 @@ def compare_arrival(
     Returns:
         As `compare`; `numbers` too where a stay is missing, invented, or begins or ends at a wrong time.
     """
-    clock = _Clock(state)
-    times = [clock.advance(certified) for certified in expected.steps]
+    times = list(_times(expected, state))
     if expected.outcome != "horizon":
         return _judge_end(expected, [answer]) or _judge_numbers([], None, physics)
     if differing := _difference(answer, expected.steps[-1]):
@@ -273,19 +271,15 @@ def _judge_numbers(measured: Sequence[_Measured], bound: float | None, physics: 
     return found
 
 
-class _Clock:
-    """Time along an answer: the enclosure of t, and what it may be off by."""
-
-    def __init__(self, state: State) -> None:
-        self.low = self.high = Fraction(state.t)
-        self.allowance = abs(self.low)
-
-    def advance(self, certified: Certified) -> tuple[Ends, Fraction]:
-        """Add a flight, and return the enclosure and the allowance of the time after it."""
-        low, high = certified.ends("dt")
-        self.low, self.high = self.low + low, self.high + high
-        self.allowance += Fraction(certified.allowance[0])
-        return (self.low, self.high), self.allowance
+def _times(expected: Expectation, state: State) -> Iterator[tuple[Ends, Fraction]]:
+    """Return the enclosure of t after each certified step, and what it may be off by."""
+    low = high = Fraction(state.t)
+    allowance = abs(low)
+    for certified in expected.steps:
+        shortest, longest = certified.ends("dt")
+        low, high = low + shortest, high + longest
+        allowance += Fraction(certified.allowance[0])
+        yield (low, high), allowance
 
 
 def _measure(

@@ -28,8 +28,7 @@ import msgspec
 
 from conformance.grading.agreement import Agreement, Answer, Kind, compare, compare_arrival, physics_bound
 from conformance.vectors import Vector
-from scene import Horizon
-from scene.protocol.messages import Answered, AnsweredCollision
+from scene.protocol.messages import Answered, AnsweredCollision, Flown, Steps
 
 Verdict = Literal[
     "pass",
@@ -43,6 +42,8 @@ Verdict = Literal[
     "wrong-format",
 ]
 PrecisionClass = Literal["A", "B", "C"]
+FORMS: dict[str, Any] = {"step": Answered, "trajectory": Steps, "flow": Flown}
+LOST = ("undefined", "undecided", "rejected")  # may be answered to a whole question
 SHARP, FAIR = 4.0, 1e4  # backward ulps of classes A and B
 # Of several right answers the best grade counts; this is the order.
 _PREFERENCE: tuple[Verdict, ...] = ("pass", "indeterminate", "declined", "fail")
@@ -75,10 +76,6 @@ class Grade(NamedTuple):
     step: int = 0
 
 
-class _Misshapen(Exception):  # noqa: N818 (a finding about the answer)
-    pass
-
-
 def grade(vector: Vector, answer: Any) -> Grade:
     """Judge an answer.
 
@@ -89,19 +86,20 @@ def grade(vector: Vector, answer: Any) -> Grade:
     Returns:
         pass, fail, indeterminate, declined, error or wrong-format, with the errors measured.
     """
-    if not isinstance(answer, Mapping):
-        return _unmeasured("wrong-format", f"an answer must be an object, not {type(answer).__name__}")
-    if isinstance(answer.get("error"), str):
+    if isinstance(answer, Mapping) and isinstance(answer.get("error"), str):
         return _unmeasured("error", " ".join(answer["error"].split())[:200])
-    physics = physics_bound(vector.condition)
     try:
-        if vector.kind == "flow":
-            arrival = _arrival(answer)
-            found = [compare_arrival(*arrival, known, vector.state, physics) for known in vector.expect]
-            return _noted(vector, _best(found))
-        outcomes = _outcomes(vector, answer)
-    except _Misshapen as finding:
-        return _unmeasured("wrong-format", str(finding))
+        parts = _parts(vector, answer)
+        outcomes = [msgspec.convert(msgspec.to_builtins(part), Answered) for part in parts]
+    except (TypeError, msgspec.ValidationError, OverflowError, RecursionError) as error:
+        return _unmeasured("wrong-format", " ".join(str(error).split()))
+    physics = physics_bound(vector.condition)
+    if vector.kind == "flow":
+        captured = getattr(parts[0], "captured", None)
+        found = [
+            compare_arrival(outcomes[0], captured, known, vector.state, physics) for known in vector.expect
+        ]
+        return _noted(vector, _best(found))
     asked: Answer | list[Answer] = outcomes if vector.kind == "trajectory" else outcomes[0]
     found = [compare(asked, known, vector.state, physics=physics) for known in vector.expect]
     graded = _noted(vector, _best(found))
@@ -145,53 +143,26 @@ def _unmeasured(verdict: Verdict, why: str) -> Grade:
     return Grade(verdict, math.nan, math.nan, why)
 
 
-def _outcomes(vector: Vector, answer: Mapping[str, Any]) -> list[Answer]:
-    """Decode an answer into outcomes, strictly."""
-    if vector.kind == "step":
-        return [_outcome(answer, "")]
-    if "steps" not in answer and answer.get("outcome") in ("undefined", "undecided", "rejected"):
-        return [_outcome(answer, "")]
-    steps = answer.get("steps")
-    if not isinstance(steps, Sequence) or isinstance(steps, str):
-        raise _Misshapen("`steps` must be an array")
-    found: list[Answer] = [_outcome(step, f"steps[{i}]: ") for i, step in enumerate(steps)]
-    for i, outcome in enumerate(found[:-1]):
-        if not isinstance(outcome, AnsweredCollision):
-            raise _Misshapen(f"steps[{i}]: only the last may be other than a collision")
-    return found
+def _parts(vector: Vector, answer: Any) -> list[Any]:
+    """Decode an answer into the outcomes that it is made of, strictly; a whole refusal is the only one.
 
-
-def _arrival(answer: Mapping[str, Any]) -> tuple[Answered, tuple[float, float] | None]:
-    """Decode a flow of one particle: its outcome and first captured stay, strictly."""
-    states = answer.get("states")
-    if states is None and answer.get("outcome") in ("undefined", "undecided", "rejected"):
-        return _outcome(answer, ""), None
-    if not isinstance(states, Sequence) or isinstance(states, str) or len(states) != 1:
-        raise _Misshapen("`states` must be an array of one, as many as were asked")
-    outcome = _outcome(states[0], "states[0]: ")
-    if isinstance(outcome, AnsweredCollision):
-        raise _Misshapen("states[0]: a flow ends at t_end, not at a collision")
-    try:
-        captured = msgspec.convert(states[0].get("captured"), tuple[float, float] | None)
-    except msgspec.ValidationError as error:
-        raise _Misshapen(f"states[0].captured: {error}") from None
-    if captured is not None and not isinstance(outcome, Horizon):
-        raise _Misshapen("states[0].captured must be null or absent where no particle arrives")
-    if captured is not None and not all(map(math.isfinite, captured)):
-        raise _Misshapen("states[0].captured must be finite")
-    return outcome, captured
-
-
-def _outcome(data: Any, place: str) -> Answered:
-    """Decode an outcome; a collision without `dt` is graded by its `t`, one without `wall` not at all."""
-    try:
-        outcome: Answered = msgspec.convert(data, Answered)
-    except (msgspec.ValidationError, OverflowError, RecursionError) as error:
-        raise _Misshapen(place + " ".join(str(error).split())) from None
-    if isinstance(outcome, AnsweredCollision) and outcome.wall is None:
-        raise _Misshapen(f"{place}`wall` is missing")
-    for name in outcome.__struct_fields__:
-        number = getattr(outcome, name)
-        if isinstance(number, float) and not math.isfinite(number):
-            raise _Misshapen(f"{place}{name} = {number}, must be finite")
-    return outcome
+    Raises:
+        msgspec.ValidationError: naming the field that is missing or of the wrong type.
+        TypeError: the answer is no object.
+        OverflowError, RecursionError: it is beyond all bounds.
+    """
+    form = Answered if {**answer}.get("outcome") in LOST else FORMS[vector.kind]
+    whole = msgspec.convert({**answer, "seq": 0}, form)
+    parts = list(getattr(whole, "steps", getattr(whole, "states", [whole])))
+    if vector.kind == "flow" and len(parts) != 1:
+        raise msgspec.ValidationError("`states` must be an array of one, as many as were asked")
+    for i, part in enumerate(parts):
+        fields = msgspec.structs.asdict(part)
+        numbers = [*fields.values(), *(fields.get("captured") or ())]
+        if i < len(parts) - 1 and not isinstance(part, AnsweredCollision):
+            raise msgspec.ValidationError(f"steps[{i}]: only the last may be other than a collision")
+        if isinstance(part, AnsweredCollision) and part.wall is None:
+            raise msgspec.ValidationError("`wall` is missing")
+        if not all(math.isfinite(number) for number in numbers if isinstance(number, float)):
+            raise msgspec.ValidationError(f"{part} has a number that is not finite")
+    return parts

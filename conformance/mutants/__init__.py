@@ -5,7 +5,7 @@ another: there are no two of which whatever kills the one kills the other too. `
 COMMON are mistakes that a diagnosis names too, though mutants subsume them.
 """
 
-from conformance.mutants import common, laws, paths, roots, walls
+from conformance.mutants import laws, paths, roots, walls
 from conformance.mutants.mutant import COMMON, MUTANTS, PLAIN, Mutant, make_mutant, mutant
 
 __all__ = [
@@ -13,7 +13,6 @@ __all__ = [
     "MUTANTS",
     "PLAIN",
     "Mutant",
-    "common",
     "laws",
     "make_mutant",
     "mutant",

@@ -8,7 +8,7 @@ from math import cos, floor, fmod, pi, sin
 from mpmath import fp
 from msgspec.structs import replace
 
-from conformance.mutants.mutant import Plain, mutant
+from conformance.mutants.mutant import COMMON, Plain, mutant
 from conformance.plain.motion import (
     BangBangMotion,
     ConstantMotion,
@@ -204,3 +204,21 @@ def escape_time_from_sizes_at_departure(
     highest, now = flight.bounds, {name: law.value for name, law in flight.laws.items()}
     flight.bounds = {name: b._replace(lowest=now[name], highest=now[name]) for name, b in highest.items()}
     flight.end, flight.bounds, flight.is_horizon = min(flight.end, flight.escape() / 2), highest, True
+
+
+@mutant(FourierMotion, "__init__", COMMON)
+def phase_restarts_at_each_step(motion: FourierMotion, plain: Plain[None], law: Fourier, t: float) -> None:
+    """Follows a Fourier law from t = 0 whatever the time of departure."""
+    plain(law, 0.0)
+
+
+@mutant(FourierMotion, "__init__", COMMON)
+def sine_and_cosine_swapped(motion: FourierMotion, plain: Plain[None], law: Fourier, t: float) -> None:
+    """Takes the cosine amplitudes for the sine's."""
+    plain(replace(law, cos=law.sin, sin=law.cos), t)
+
+
+@mutant(FourierMotion, "__init__", COMMON)
+def pi_too_short(motion: FourierMotion, plain: Plain[None], law: Fourier, t: float) -> None:
+    """Reduces the phase of a Fourier law by 2 x 3.14159."""
+    plain(law, t % (2 * 3.14159 / frequency(fp, law)))

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from conformance.mutants.mutant import Plain, mutant
-from conformance.mutants.walls import UPRIGHT, Trusting
+from conformance.mutants.mutant import COMMON, Plain, mutant
+from conformance.mutants.walls import UPRIGHT, Heedless, Trusting
 from conformance.plain.step import Flight
 from scene import Outcome, Scene, State, Wall
 from scene.tables import cycle_length
@@ -197,3 +197,45 @@ def hits_just_after_horizon_counted(flight: Flight, plain: Plain[Outcome], *, si
     if flight.is_horizon:
         flight.end *= 1 + size
     return plain()
+
+
+@mutant(Flight, "root_between", COMMON)
+def root_to_six_digits(flight: Flight, plain: Plain[float], wall: Wall, a: float, b: float) -> float:
+    """Finds the time of a hit to a millionth."""
+    return plain(wall, a, b) // 1e-6 * 1e-6
+
+
+@mutant(Flight, "root_between", COMMON)
+def root_where_gap_is_small(flight: Flight, plain: Plain[float], wall: Wall, a: float, b: float) -> float:
+    """Accepts as a hit where f is below 1e-7."""
+    root = plain(wall, a, b)
+    return root - 1e-7 / (abs(flight.f(wall, root)[1]) or 1.0)
+
+
+@mutant(Flight, "first_root", COMMON)
+def hits_within_epsilon_skipped(
+    flight: Flight, plain: Plain[Root], wall: Wall, start: float, end: float
+) -> Root:
+    """Takes a hit within 1e-9 of departure for the one just left."""
+    root = plain(wall, start, end)
+    return None if root is not None and root < 1e-9 else root
+
+
+@mutant(Heedless, "bend", COMMON)
+def curvature_of_walls_forgotten(flight: Flight, plain: Plain[float], wall: Wall) -> float:
+    """Takes walls to move at constant velocity where it excludes earlier hits."""
+    return 2 * (flight.vx**2 + flight.vy**2) if wall == "arc" else 0.0
+
+
+@mutant(Flight, "first_root", COMMON)
+def newton_from_departure(flight: Flight, plain: Plain[Root], wall: Wall, start: float, end: float) -> Root:
+    """Starts Newton's method at s = 0 and takes what it finds."""
+    s = end if wall == flight.wall and end < 1e300 else start
+    for _ in range(50):
+        f, slope = flight.f(wall, s)
+        if slope == 0:
+            return None
+        s, before = s - f / slope, s
+        if abs(s - before) <= 1e-15 * abs(s):
+            return s if start < s <= end else None
+    return None

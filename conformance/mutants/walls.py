@@ -7,7 +7,7 @@ from math import hypot
 
 from msgspec.structs import replace
 
-from conformance.mutants.mutant import Plain, mutant
+from conformance.mutants.mutant import COMMON, Plain, mutant
 from conformance.plain.motion import ConstantMotion, LawValue
 from conformance.plain.step import Flight, Gap, Open
 from scene import Collision, Mushroom, Outcome, Scene, State, Wall
@@ -97,12 +97,17 @@ def sides_slant_from_the_floor(flight: Flight, plain: Plain[Gap], wall: Wall, s:
     return gap._replace(start=gap.start + slope.value * h.value, rise=rise, ft=ft)
 
 
+def hold(flight: Flight, name: str) -> None:
+    """Let a law stand still during a flight."""
+    if name in flight.laws:
+        flight.laws[name] = ConstantMotion(flight.laws[name].value, 0.0)
+
+
 @mutant(Flight, "__init__")
 def floor_static(flight: Flight, plain: Plain[None], scene: Scene, state: State, t_end: float) -> None:
     """Lets the floor stand still during a flight."""
     plain(scene, state, t_end)
-    if "h" in flight.laws:
-        flight.laws["h"] = ConstantMotion(flight.laws["h"].value, 0.0)
+    hold(flight, "h")
 
 
 @mutant(Flight, "width")
@@ -204,3 +209,90 @@ def pushed_off_by_a_billionth(
     if flight.wall is not None:
         nx, ny, _ = flight.normal(flight.wall, 0.0)
         flight.x, flight.y = flight.x + 1e-9 * nx, flight.y + 1e-9 * ny
+
+
+@mutant(Flight, "normal", COMMON)
+def wall_velocity_dropped(flight: Flight, plain: Plain[Normal], wall: Wall, s: float) -> Normal:
+    """Bounces as if every wall stood still."""
+    return *plain(wall, s)[:2], 0.0
+
+
+@mutant(Flight, "normal", COMMON)
+def wall_velocity_once(flight: Flight, plain: Plain[Normal], wall: Wall, s: float) -> Normal:
+    """Adds u where 2 u is due."""
+    nx, ny, u = plain(wall, s)
+    return nx, ny, u / 2
+
+
+@mutant(Flight, "normal", COMMON)
+def wall_velocity_sign(flight: Flight, plain: Plain[Normal], wall: Wall, s: float) -> Normal:
+    """Takes a wall that comes for one that goes."""
+    nx, ny, u = plain(wall, s)
+    return nx, ny, -u
+
+
+@mutant(Flight, "normal", COMMON)
+def wall_velocity_at_departure(flight: Flight, plain: Plain[Normal], wall: Wall, s: float) -> Normal:
+    """Kicks with the speed that the wall had at departure."""
+    return *plain(wall, s)[:2], plain(wall, 0.0 if flight.x or flight.y else s)[2]
+
+
+@mutant(Flight, "normal", COMMON)
+def normal_at_departure(flight: Flight, plain: Plain[Normal], wall: Wall, s: float) -> Normal:
+    """Reflects about the normal at the place of departure."""
+    return *plain(wall, 0.0 if flight.x or flight.y else s)[:2], plain(wall, s)[2]
+
+
+@mutant(Flight, "bounce", COMMON)
+def energy_kept(
+    flight: Flight, plain: Plain[tuple[float, float]], wall: Wall, s: float
+) -> tuple[float, float]:
+    """Rescales the velocity after each bounce to the speed before."""
+    vx, vy = plain(wall, s)
+    kept = hypot(flight.vx, flight.vy) / (hypot(vx, vy) or 1.0)
+    return kept * vx, kept * vy
+
+
+@mutant(Flight, "__init__", COMMON)
+def arc_static(flight: Flight, plain: Plain[None], scene: Scene, state: State, t_end: float) -> None:
+    """Lets the arc stand still during a flight."""
+    plain(scene, state, t_end)
+    hold(flight, "r")
+
+
+@mutant(Flight, "__init__", COMMON)
+def slope_at_departure(flight: Flight, plain: Plain[None], scene: Scene, state: State, t_end: float) -> None:
+    """Holds the slope of the sides still during a flight."""
+    plain(scene, state, t_end)
+    hold(flight, "slope")
+
+
+@mutant(Flight, "width", COMMON)
+def hole_static(flight: Flight, plain: Plain[LawValue], s: float) -> LawValue:
+    """Lets the mouth and the sides stand still during a flight."""
+    return plain(0.0)._replace(rate=0.0)
+
+
+@mutant(Heedless, "is_mouth_open", COMMON)
+def mouth_tested_to_the_right_only(flight: Flight, plain: Plain[bool], s: float) -> bool:
+    """Tests x < w instead of |x| < w."""
+    return flight.x + flight.vx * s < flight.width(s).now
+
+
+@mutant(Flight, "is_mouth_open", COMMON)
+def base_closed(flight: Flight, plain: Plain[bool], s: float) -> bool:
+    """Has no mouth."""
+    return False
+
+
+@mutant(Flight, "collision", COMMON)
+def left_and_right_exchanged(flight: Flight, plain: Plain[Collision], wall: Wall, s: float) -> Collision:
+    """Calls the left side right."""
+    exchanged: dict[str, Wall] = {"left": "right", "right": "left"}
+    return replace(plain(wall, s), wall=exchanged.get(wall, wall))
+
+
+@mutant(Flight, "collision", COMMON)
+def place_not_moved(flight: Flight, plain: Plain[Collision], wall: Wall, s: float) -> Collision:
+    """Gives the place of departure for that of the hit."""
+    return replace(plain(wall, s), x=flight.x, y=flight.y)

@@ -90,7 +90,7 @@ class BangBangMotion:
 
     @cached_property
     def begins(self) -> list[tuple[float, float, float, float]]:
-        """What each piece begins with, carried from piece to piece: time since departure, rise, rate, pull."""
+        """What each piece begins with, carried on from the one before: time, rise, rate, pull."""
         begin, rise, rate = 0.0, 0.0, self.rate
         found = []
         for duration, pull in self.pieces:

@@ -290,7 +290,7 @@ class Flight:
 
     def escape(self) -> float:
         """Return a time by which no table is large enough to have kept the particle."""
-        top = self.sizes
+        top = {name: max(-law.lowest, law.highest) for name, law in self.bounds.items()}
         r, h = top.get("r", 0.0), top.get("h", 0.0)
         half = max(r, top.get("w", 0.0)) + top.get("slope", 0.0) * h
         across, along = abs(self.vx) / (4 * half), abs(self.vy) / (2 * (r + h))

@@ -1,8 +1,7 @@
 """The suite: every question put to one implementation as a process, the verdicts, and their reports."""
 
-from conformance.suite.result import BAD, VERDICTS, Result, Run, Speed
+from conformance.suite.result import BAD, VERDICTS, Result, Run, Scope, Speed
 from conformance.suite.run import ask_vector, check, choose, measure_speed, read_known
-from conformance.suite.scope import Scope
 
 __all__ = [
     "BAD",

@@ -10,7 +10,9 @@ from __future__ import annotations
 import json
 import re
 import struct
+from collections import Counter
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from typing import Any, get_args
 
 import msgspec
@@ -48,14 +50,6 @@ class _Envelope(msgspec.Struct):
 WHOLE = ("seq", "ns", "protocol")  # what is whole by the schema, where 17.0 is an integer
 _FORMS = (Introduction, Echoed, Failed, *get_args(Answered), Arrival, Steps, Flown, Timed)
 NAMED = {"outcome"}.union(*(form.__struct_fields__ for form in _FORMS))  # the fields of answers
-_introductions: msgspec.json.Decoder[Any] = msgspec.json.Decoder(Introduction)
-_echoes: msgspec.json.Decoder[Any] = msgspec.json.Decoder(Echoed)
-_outcomes: msgspec.json.Decoder[Any] = msgspec.json.Decoder(Answered)
-_envelopes: msgspec.json.Decoder[Any] = msgspec.json.Decoder(_Envelope)
-_failures: msgspec.json.Decoder[Any] = msgspec.json.Decoder(Failed)
-_answers: dict[str, msgspec.json.Decoder[Any]] = {
-    cmd: msgspec.json.Decoder(form) for cmd, form in ANSWERS.items()
-}
 
 
 def read_introduction(line: bytes) -> Introduction:
@@ -64,10 +58,7 @@ def read_introduction(line: bytes) -> Introduction:
     Raises:
         Trouble: wrong-format.
     """
-    try:
-        introduction: Introduction = _decoded(_checked(line), _introductions)
-    except UNREADABLE as error:
-        raise _unreadable("start", error, line) from None
+    introduction: Introduction = _read("start", line, Introduction)
     if introduction.protocol != PROTOCOL:
         raise Trouble("wrong-format", f"start: it speaks protocol {introduction.protocol}, not {PROTOCOL}")
     texts = {name: clean(getattr(introduction, name)) for name in ("name", "version", "language")}
@@ -82,10 +73,7 @@ def check_echo(values: Sequence[float], line: bytes) -> None:
     Raises:
         Trouble: wrong-format, naming the first number that differs.
     """
-    try:
-        echoed: Sequence[float] = _decoded(_checked(line), _echoes).values
-    except UNREADABLE as error:
-        raise _unreadable("echo", error, line) from None
+    echoed: Sequence[float] = _read("echo", line, Echoed).values
     if len(echoed) != len(values):
         raise Trouble("wrong-format", f"echo: {len(echoed)} numbers came back of {len(values)}")
     for i, (sent, came) in enumerate(zip(values, echoed, strict=True)):
@@ -108,36 +96,33 @@ def read_answer(line: bytes, cmd: str, seq: int | None, *, may_be_null: bool = F
     Raises:
         Trouble: wrong-format, naming the field.
     """
-    try:
-        read = _checked(line)
-        envelope: _Envelope = _decoded(read, _envelopes)
-        is_null = may_be_null and envelope.seq is None
-        if not is_null and (type(envelope.seq) not in (int, float) or envelope.seq != seq):
-            said = f": {str(envelope.reason)[:200]}" if envelope.reason else ""
-            given = repr(envelope.seq)[:40]
-            raise Trouble("wrong-format", f"answered seq {given} to seq {seq}{said}")
-        # Who owns to a failure has answered nothing else, whatever stands beside it.
-        own = _outcomes if envelope.outcome is not None else _answers[cmd]
-        decoder = _failures if envelope.error is not None else own
-        data: dict[str, Any] = msgspec.to_builtins(_decoded(read, decoder))
-    except UNREADABLE as error:
-        raise _unreadable(cmd, error, line) from None
+    envelope: _Envelope = _read(cmd, line, _Envelope)
+    is_null = may_be_null and envelope.seq is None
+    if not is_null and (type(envelope.seq) not in (int, float) or envelope.seq != seq):
+        said = f": {str(envelope.reason)[:200]}" if envelope.reason else ""
+        given = repr(envelope.seq)[:40]
+        raise Trouble("wrong-format", f"answered seq {given} to seq {seq}{said}")
+    # A failure that is owned to is the whole answer, whatever stands beside it.
+    own = Answered if envelope.outcome is not None else ANSWERS[cmd]
+    data: dict[str, Any] = msgspec.to_builtins(
+        _read(cmd, line, Failed if envelope.error is not None else own)
+    )
     data.pop("seq", None)
-    for part in (data, *data.get("steps", ()), *data.get("states", ())):
+    for part in (data, *outcomes_of(data)):
         part.update({name: clean(part[name]) for name in ("reason", "error") if name in part})
     return data
 
 
-def read_arrival(answer: Mapping[str, Any]) -> Outcome:
-    """Return the outcome that a flow tells of one particle, its captured stay left out."""
-    return read_outcome({name: part for name, part in answer.items() if name != "captured"}, 0.0)
+def outcomes_of(answer: Mapping[str, Any]) -> list[Any]:
+    """Return the outcomes that an answer holds: a trajectory's steps, a flow's states, or itself."""
+    return list(answer.get("steps", answer.get("states", [answer])))
 
 
-def read_outcome(answer: Mapping[str, Any], t: float) -> Outcome:
-    """Return the outcome that an answer to `step` is, or one of the steps of a trajectory.
+def read_outcome(answer: Mapping[str, Any], t: float = 0.0) -> Outcome:
+    """Return the outcome that an answer to `step` is, or a part of another; its captured stay is left out.
 
     Args:
-        answer: as `Session.ask` returns it.
+        answer: as `Session.ask` returns it, or one of `outcomes_of` it.
         t: when the flight began, for a collision that does not tell its flight time.
 
     Raises:
@@ -161,7 +146,7 @@ def with_walls(answer: dict[str, Any], scene: Any) -> dict[str, Any]:
         answer: as `read_answer` returns it.
         scene: of the question, in the wire's form; with one that is none nothing is named.
     """
-    for part in (answer, *answer.get("steps", ())):
+    for part in outcomes_of(answer):
         if part.get("outcome") == "collision" and "wall" not in part:
             try:
                 table = table_at(fp, from_data(scene), part["t"])
@@ -171,41 +156,35 @@ def with_walls(answer: dict[str, Any], scene: Any) -> dict[str, Any]:
     return answer
 
 
-def _checked(line: bytes) -> bytes:
-    """Return a line for the decoders: they look into no field that they ignore, and take the last of two."""
-    if not line.isascii():
-        line.decode()
+def _read(cmd: str, line: bytes, form: Any) -> Any:
+    """Decode a line, strictly: a field that stands twice is refused, and so is what is no UTF-8, anywhere."""
     try:
-        json.loads(line, object_pairs_hook=_once, parse_int=str, parse_float=str)
-    except msgspec.ValidationError:
-        raise
-    except (ValueError, RecursionError):
-        pass  # no JSON: the decoder says where
-    return with_minus_zeros(line)
+        if not line.isascii():
+            line.decode()
+        with suppress(json.JSONDecodeError, RecursionError):  # no JSON: the decoder says where
+            json.loads(line, object_pairs_hook=_once, parse_int=str, parse_float=str)
+        return _decoded(with_minus_zeros(line), form)
+    except UNREADABLE as error:
+        raise _unreadable(cmd, error, line) from None
 
 
 def _once(pairs: list[tuple[str, object]]) -> None:
     """Refuse a named field that stands twice in one object: of two, readers take either."""
-    if len(names := {name for name, _ in pairs}) < len(pairs):
-        for name in names & NAMED:
-            if sum(other == name for other, _ in pairs) > 1:
+    if len({name for name, _ in pairs}) < len(pairs):
+        counts = Counter(name for name, _ in pairs)
+        for name in NAMED & counts.keys():
+            if counts[name] > 1:
                 raise msgspec.ValidationError(f"Field `{name}` stands twice")
 
 
-def _decoded(line: bytes, decoder: msgspec.json.Decoder[Any]) -> Any:
+def _decoded(line: bytes, form: Any) -> Any:
     try:
-        return decoder.decode(line)
+        return msgspec.json.decode(line, type=form)
     except msgspec.ValidationError:
         data = msgspec.json.decode(line)
-        if isinstance(data, dict) and any(_is_float(data.get(name)) for name in WHOLE):
-            return msgspec.convert(
-                {**data, **{name: _whole(data[name]) for name in WHOLE if name in data}}, decoder.type
-            )
-        raise
-
-
-def _is_float(value: Any) -> bool:
-    return any(map(_is_float, value)) if isinstance(value, list) else isinstance(value, float)
+        if not isinstance(data, dict):
+            raise
+        return msgspec.convert(data | {name: _whole(data[name]) for name in WHOLE if name in data}, form)
 
 
 def _whole(value: Any) -> Any:

@@ -1,11 +1,11 @@
-"""What a command started and left behind: found by descent, by its process group and by a mark, and killed.
+"""What a command started and left behind: found by descent and by its process group, and killed.
 
 On Linux this process reaps, while a command runs, what descends from it (`PR_SET_CHILD_SUBREAPER`):
 a process whose parents are gone becomes a child of this one, not of init, however it was forked, whatever
 session it opened and whatever it cleared from its environment. So the descendants of a command are those
 below its leader, and those children of this process that are in another session than this process (the
 leader's, or one that they opened: nobody can enter an existing one) and were not there before.
-On other systems with /proc a mark in the environment tells them; where there is no /proc, only the group.
+On other systems only its process group is known.
 
 Not handled: processes of another user (set-user-ID programs), and a family that forks and dies faster than
 it can be listed, which is given up after some seconds. While several commands run at once, orphans
@@ -18,7 +18,6 @@ from __future__ import annotations
 import contextlib
 import ctypes
 import os
-import secrets
 import signal
 import time
 from collections.abc import Iterable, Iterator
@@ -41,17 +40,12 @@ class _Entry(NamedTuple):
 
 
 class Descendants:
-    """The processes that descend from one command.
-
-    Attributes:
-        mark: name and value to put in the command's environment.
-    """
+    """The processes that descend from one command."""
 
     _leaders: ClassVar[set[int]] = set()
     _before: ClassVar[set[tuple[int, int]]] = set()  # children of this process older than all commands
 
     def __init__(self) -> None:
-        self.mark = "MUSHROOMS_SESSION", secrets.token_hex(16)
         self._leader = 0
         if not self._leaders:
             mine = os.getpid()
@@ -73,11 +67,6 @@ class Descendants:
         found = set(self._adopted(table.values())) | {self._leader}
         while more := {pid for pid, entry in table.items() if entry.parent in found} - found:
             found |= more
-        marked = "=".join(self.mark).encode()
-        for pid in table.keys() - found:
-            with contextlib.suppress(OSError):
-                if marked in Path(f"/proc/{pid}/environ").read_bytes():
-                    found.add(pid)
         return sorted(pid for pid in found - {self._leader} if table[pid].state != "Z")
 
     def kill(self) -> None:

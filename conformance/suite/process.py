@@ -16,7 +16,7 @@ import selectors
 import signal
 import subprocess
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import IO
 
 from conformance.suite.descendants import Descendants
@@ -47,22 +47,20 @@ class Transcript:
     """The first and the last part of a stream, bounded."""
 
     def __init__(self) -> None:
-        self.head, self.tail, self.n_dropped = bytearray(), bytearray(), 0
+        self.kept, self.n_dropped = bytearray(), 0
 
     def add(self, data: bytes) -> None:
         """Append, dropping from the middle."""
-        room = MAX_STDERR - len(self.head)
-        self.head += data[:room]
-        self.tail += data[room:]
-        excess = max(0, len(self.tail) - MAX_STDERR)
+        self.kept += data
+        excess = max(0, len(self.kept) - 2 * MAX_STDERR)
         self.n_dropped += excess
-        del self.tail[:excess]
+        del self.kept[MAX_STDERR : MAX_STDERR + excess]
 
     def text(self) -> str:
         """Return what was kept, with a note of what was not; lines and tabs stay as they are."""
-        gap = f"\n[... {self.n_dropped} bytes left out ...]\n" if self.n_dropped else ""
-        text = self.head.decode("utf-8", "replace") + gap + self.tail.decode("utf-8", "replace")
-        return escaped(text, kept="\n\t")
+        gap = f"\n[... {self.n_dropped} bytes left out ...]\n".encode() if self.n_dropped else b""
+        text = self.kept[:MAX_STDERR] + gap + self.kept[MAX_STDERR:]
+        return escaped(text.decode("utf-8", "replace"), kept="\n\t")
 
 
 class Process:
@@ -78,7 +76,6 @@ class Process:
 
     def __init__(self, command: Sequence[str], stderr: Transcript) -> None:
         self._descendants = Descendants()
-        name, token = self._descendants.mark
         try:
             self._child = subprocess.Popen(
                 command,
@@ -87,7 +84,6 @@ class Process:
                 stderr=subprocess.PIPE,
                 start_new_session=True,
                 bufsize=0,
-                env={**os.environ, name: token},
             )
         except (OSError, ValueError) as error:
             self._descendants.follow(0)
@@ -158,11 +154,8 @@ class Process:
         if status := self._status():
             raise Trouble("crashed", f"{status} after `stop`")
         # A helper that ends because the process has ended does so a little later.
-        deadline = time.monotonic() + GRACE
-        while self._descendants.alive():
-            if time.monotonic() >= deadline:
-                raise Trouble("fail", "left a child process running after `stop`")
-            time.sleep(POLL / 5)
+        if not _comes_true(lambda: not self._descendants.alive()):
+            raise Trouble("fail", "left a child process running after `stop`")
         self._advance(b"", 0.0)
         self._check_silence()  # of the helpers
 
@@ -232,12 +225,17 @@ class Process:
             return f"was killed by signal {result.si_status}"
 
     def _ending(self) -> str:
-        deadline = time.monotonic() + GRACE
-        while not self._has_exited() and time.monotonic() < deadline:
-            time.sleep(POLL / 5)
-        if not self._has_exited():
+        if not _comes_true(self._has_exited):
             return "closed its standard output"
         return (self._status() or "exited with status 0") + " before it answered"
+
+
+def _comes_true(condition: Callable[[], bool]) -> bool:
+    """Wait a little for something to be so, and tell whether it is."""
+    deadline = time.monotonic() + GRACE
+    while not (is_so := condition()) and time.monotonic() < deadline:
+        time.sleep(POLL / 5)
+    return is_so
 
 
 def clean(text: str) -> str:

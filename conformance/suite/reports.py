@@ -1,7 +1,9 @@
-"""A run as files: JSON with a published schema, and JUnit XML as continuous integration reads it.
+"""A run as files: JSON with a published schema, JUnit XML, and what an author publishes: a badge, a summary.
 
 In JUnit a physics `fail` is a failure, what gave no gradable answer (crashed, timed-out, wrong-format, error,
 indeterminate) is an error, and declined, unsupported and known failures are skipped with their reason.
+A badge (SVG) and a summary (JSON) have the verdict's scope; the summary also holds the four fields that
+shields.io asks of an endpoint, which makes a badge of them.
 `python -m conformance.suite.reports > docs/check.schema.json` prints the schema of the JSON report.
 """
 
@@ -10,18 +12,70 @@ from __future__ import annotations
 import json
 import re
 from typing import Any
-from xml.etree import ElementTree
+from xml.sax.saxutils import escape
 
 import msgspec
+from jinja2 import Template
 
 from conformance.grading.grade import PrecisionClass
-from conformance.suite.result import VERDICTS, Result, Run, Speed
-from conformance.suite.scope import Scope
+from conformance.suite.result import VERDICTS, Result, Run, Scope, Speed
 from scene.protocol.messages import Introduction
 
 TAGS = {"failures": "failure", "errors": "error", "skipped": "skipped"}  # of JUnit, by what counts them
 # What XML 1.0 cannot hold, even escaped.
 _UNPRINTABLE = re.compile("[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
+_JUNIT = Template(
+    """\
+<?xml version="1.0" encoding="utf-8"?>
+{% macro counted(cases, seconds) %}
+tests="{{ cases | length }}" {% for name, tag in tags.items() %}
+{{ name }}="{{ cases | selectattr(1, "equalto", tag) | list | length }}" {% endfor %}
+time="{{ "%.3f" | format(seconds) }}"
+{%- endmacro %}
+<testsuites name="mushrooms check {{ name }}" {{ counted(cases, run.seconds) }}>
+{% for group in run.groups() %}
+{% set own = cases | selectattr("0.group", "equalto", group) | list %}
+  <testsuite name="{{ group }}" {{ counted(own, own | sum(attribute="0.seconds")) }}>
+{% for result, tag in own %}
+{% set seconds = "%.3f" | format(result.seconds) %}
+    <testcase classname="mushrooms.{{ group }}" name="{{ result.id }}" time="{{ seconds }}">
+{% if tag %}
+      <{{ tag }} message="{{ "known failure, " if result.is_known }}{{ result.verdict }}
+{%- if result.why %}: {{ result.why }}{% endif %}"
+{%- if tag != "skipped" %} type="{{ result.verdict }}"{% endif %}>
+{%- if tag != "skipped" and result.answer is not none %}{{ result.answer | tojson }}{% endif %}</{{ tag }}>
+{% endif %}
+    </testcase>
+{% endfor %}
+{% if group == "protocol" and run.stderr %}
+    <system-err>{{ run.stderr }}</system-err>
+{% endif %}
+  </testsuite>
+{% endfor %}
+</testsuites>
+""",
+    autoescape=True,
+    trim_blocks=True,
+    lstrip_blocks=True,
+    keep_trailing_newline=True,
+    finalize=lambda part: _UNPRINTABLE.sub("\ufffd", part) if type(part) is str else part,
+)
+
+
+LABEL = "moving walls"
+COLOURS = {"accepted": "#2e7d32", "not accepted": "#b3261e", "undecided": "#8a6d00"}
+WIDTH, MARGIN = 6.6, 12  # of a letter at 11 px, and on both sides of a text together [px]
+_SVG = """\
+<svg xmlns="http://www.w3.org/2000/svg" width="{width:.0f}" height="20" role="img" aria-label="{title}">
+<title>{title}</title>
+<rect width="{width:.0f}" height="20" rx="3" fill="#444"/>
+<path fill="{colour}" d="M{left:.0f} 0h{right:.0f}a3 3 0 0 1 3 3v14a3 3 0 0 1-3 3h-{right:.0f}z"/>
+<g fill="#fff" font-family="Verdana,DejaVu Sans,sans-serif" font-size="11" text-anchor="middle">
+<text x="{middle_left:.1f}" y="14">{label}</text>
+<text x="{middle_right:.1f}" y="14">{message}</text>
+</g>
+</svg>
+"""
 
 
 class Group(msgspec.Struct, frozen=True):
@@ -119,39 +173,8 @@ def json_schema() -> dict[str, Any]:
 def to_junit(run: Run) -> bytes:
     """Return the JUnit XML report: a suite for each group, a case for each vector."""
     name = run.introduction.name if run.introduction else run.command[0]
-    root = ElementTree.Element("testsuites", name=_printable(f"mushrooms check {name}"))
-    totals = dict.fromkeys(("tests", *TAGS), 0)
-    for group in run.groups():
-        results = [result for result in run.results if result.group == group]
-        suite = ElementTree.SubElement(root, "testsuite", name=group)
-        tags = [_add_case(suite, result) for result in results]
-        counted = {"tests": len(tags), **{name: tags.count(tag) for name, tag in TAGS.items()}}
-        totals = {key: totals[key] + counted[key] for key in totals}
-        seconds = sum(result.seconds for result in results)
-        suite.attrib |= {key: str(value) for key, value in counted.items()} | {"time": f"{seconds:.3f}"}
-        if group == "protocol" and run.stderr:
-            ElementTree.SubElement(suite, "system-err").text = _printable(run.stderr)
-    root.attrib |= {key: str(value) for key, value in totals.items()} | {"time": f"{run.seconds:.3f}"}
-    ElementTree.indent(root)
-    return bytes(ElementTree.tostring(root, encoding="utf-8", xml_declaration=True)) + b"\n"
-
-
-def _add_case(suite: ElementTree.Element, result: Result) -> str:
-    attributes = {
-        "classname": f"mushrooms.{result.group}",
-        "name": result.id,
-        "time": f"{result.seconds:.3f}",
-    }
-    case = ElementTree.SubElement(suite, "testcase", attributes)
-    tag, message = _junit_tag(result), f"{result.verdict}: {result.why}" if result.why else result.verdict
-    if tag:
-        if result.is_known:
-            message = f"known failure, {message}"
-        element = ElementTree.SubElement(case, tag, message=_printable(message))
-        if tag != "skipped":
-            element.set("type", result.verdict)
-            element.text = _printable(json.dumps(result.answer)) if result.answer is not None else None
-    return tag
+    cases = [(result, _junit_tag(result)) for result in run.results]
+    return str(_JUNIT.render(run=run, name=name, cases=cases, tags=TAGS)).encode()
 
 
 def _junit_tag(result: Result) -> str:
@@ -162,8 +185,47 @@ def _junit_tag(result: Result) -> str:
     return {"pass": "", "fail": "failure"}.get(result.verdict, "error")
 
 
-def _printable(text: str) -> str:
-    return _UNPRINTABLE.sub("\ufffd", text)
+def _message(run: Run) -> str:
+    """Return the few words of a badge: level, corpus and class of what was accepted, or the verdict."""
+    if run.exit_code():
+        return run.verdict()
+    return f"{run.level} {run.corpus}, class {run.precision()}"
+
+
+def to_badge(run: Run) -> str:
+    """Return the badge; its title, which browsers show and screen readers read, is the whole scope."""
+    text = _message(run)
+    left, right = WIDTH * len(LABEL) + MARGIN, WIDTH * len(text) + MARGIN
+    return _SVG.format(
+        width=left + right,
+        left=left,
+        right=right - 3,
+        middle_left=left / 2,
+        middle_right=left + right / 2,
+        colour=COLOURS[run.verdict()],
+        label=LABEL,
+        message=escape(text),
+        title=escape(f"{LABEL}: {run.verdict()}: {run.scope()}", {'"': "&quot;"}),
+    )
+
+
+def to_summary(run: Run) -> bytes:
+    """Return the summary as JSON: who, verdict, scope, counts, speed, and what shields.io asks for."""
+    who = run.introduction
+    found: dict[str, Any] = {
+        "schemaVersion": 1,
+        "label": LABEL,
+        "message": _message(run),
+        "color": COLOURS[run.verdict()].removeprefix("#"),
+        "implementation": None if who is None else [who.name, who.version, who.language],
+        "verdict": run.verdict(),
+        "line": str(run.scope()),
+        "scope": run.scope(),
+        "counts": dict(run.counts()),
+        "ns_per_collision": run.speed and run.speed.best_ns,
+        "corpus_digest": run.digest,
+    }
+    return msgspec.json.format(msgspec.json.encode(found), indent=1) + b"\n"
 
 
 if __name__ == "__main__":

@@ -1,22 +1,27 @@
-"""What a run found: a result for each case, and what it comes to in the end.
+"""What a run found: a result for each case, what it comes to in the end, and the scope of that.
 
-Physics and precision stay apart: a verdict for each case, a precision class for each group.
+Physics and precision stay apart: a verdict for each case, a precision class for each group. The scope says in
+one line that can be published what was graded, what was not, and how well. A table, a kind of law or a
+profile is graded when a vector that needs it passed; a question that must be refused grades none, as it has
+no table. What is not in the scope is not accepted, whatever the exit code.
 """
 
 from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Sequence
 from typing import Any
 
 import msgspec
 
 from conformance.grading.grade import PrecisionClass, precision_class
-from conformance.suite.scope import Scope
-from conformance.suite.session import Limits
-from scene.protocol.messages import Introduction
+from conformance.suite.session import Limits, needs
+from conformance.vectors import Vector
+from scene.protocol.messages import PROFILES, Introduction
 
+TABLES = ("mushroom", "cap", "stem")
+LAWS = ("fourier", "bang-bang", "constant")
 BAD = ("fail", "crashed", "timed-out", "wrong-format", "error")
 VERDICTS = ("pass", "fail", "indeterminate", "declined", "unsupported", *BAD[1:])
 # An implementation that declines more has not been graded: of all questions, and of those of one group.
@@ -70,9 +75,35 @@ class Result(msgspec.Struct, frozen=True, omit_defaults=True):
         return self.verdict != "pass" if self.is_known else self.verdict not in BAD
 
 
-def outcomes_of(answer: Mapping[str, Any]) -> list[Any]:
-    """Return the outcomes that an answer holds: a trajectory's steps, a flow's states, or itself."""
-    return list(answer.get("steps") or answer.get("states") or [answer])
+class Scope(msgspec.Struct, frozen=True):
+    """What a run graded.
+
+    Attributes:
+        level: core, extended or stress.
+        corpus: version of the vectors.
+        tables, laws, profiles: graded ones.
+        not_graded: the others.
+        declined: share of the questions that were declined.
+        precision: class A, B or C, or a dash.
+        seed: of the run.
+    """
+
+    level: str
+    corpus: str
+    tables: list[str]
+    laws: list[str]
+    profiles: list[str]
+    not_graded: list[str]
+    declined: float
+    precision: str
+    seed: int
+
+    def __str__(self) -> str:
+        """Return the line."""
+        graded = [", ".join(names) for names in (self.tables, self.laws, self.profiles) if names]
+        lacking = [f"{', '.join(self.not_graded)} not graded"] if self.not_graded else []
+        end = [f"{100 * self.declined:.1f} % declined", f"class {self.precision}", f"seed {self.seed}"]
+        return "; ".join([f"{self.level} {self.corpus}", *graded, *lacking, *end])
 
 
 class Speed(msgspec.Struct, frozen=True):
@@ -90,7 +121,7 @@ class Run(msgspec.Struct, frozen=True):
 
     Attributes:
         seed: all that is drawn follows from it, so that a run can be repeated.
-        graded: tables, laws, profiles of vectors that passed, and what no vector graded (`suite.scope`).
+        graded: tables, laws, profiles of vectors that passed, and what no vector graded (`graded_parts`).
         diagnosis: of the failures, by the mutants that fail alike; empty without any.
         known: the names of the known-failures file, of which some are no cases: declined/GROUP.
     """
@@ -193,6 +224,28 @@ class Run(msgspec.Struct, frozen=True):
         if self.objections():
             return 1
         return 2 if self.counts()["indeterminate"] else 0
+
+
+def graded_parts(passed: Sequence[Vector], *, is_timed: bool) -> dict[str, list[str]]:
+    """Return tables, laws and profiles that some vector graded, and under `not_graded` what none did.
+
+    Args:
+        passed: the vectors whose answers were right.
+        is_timed: whether a speed was measured.
+    """
+    valid = [vector for vector in passed if vector.expect[0].outcome != "rejected"]
+    seen = {need for vector in valid for need in needs(vector.kind, vector.scene)}
+    if is_timed:
+        seen.add(("profile", "time"))
+    every = {"tables": ("table", TABLES), "laws": ("law", LAWS), "profiles": ("profile", PROFILES)}
+    found = {part: [n for n in names if (what, n) in seen] for part, (what, names) in every.items()}
+    lacking = [
+        name
+        for part in ("profiles", "tables", "laws")
+        for name in every[part][1]
+        if (every[part][0], name) not in seen
+    ]
+    return {**found, "not_graded": lacking}
 
 
 def _objection(result: Result, *others: Result) -> str:

@@ -28,7 +28,8 @@ from conformance.cases.generated import GROUP as FRESH
 from conformance.cases.generated import ROUND, fresh
 from conformance.grading.agreement import middle
 from conformance.grading.grade import Grade, grade
-from conformance.suite.checks import GROUPS, checks_of, run_check, timing
+from conformance.suite.answers import outcomes_of
+from conformance.suite.checks import GROUPS, Implementation, checks_of, run_check, timing
 from conformance.suite.diagnosis import diagnose
 from conformance.suite.disguise import (
     DRAWN,
@@ -40,8 +41,7 @@ from conformance.suite.disguise import (
     published,
 )
 from conformance.suite.process import NOT_NUMBERS, Trouble
-from conformance.suite.result import BAD, Result, Run, Speed, outcomes_of
-from conformance.suite.scope import graded_parts
+from conformance.suite.result import BAD, Result, Run, Speed, graded_parts
 from conformance.suite.session import AnswerLine, Limits, Session, missing
 from conformance.vectors import Vector
 from scene import BadInput, State, load, to_data
@@ -275,7 +275,7 @@ def _compared(
 def measure_speed(session: Session) -> Speed | None:
     """Time a trajectory on the moving cap, longer until the clock can read it.
 
-    None where it is not offered, or where it does not end as `trajectory` says (`checks.timing`).
+    None where it is not offered, or where it ends in another place than `trajectory` (`checks.timing`).
     """
     assert session.introduction is not None
     scene, state = load(TIMED_SCENE), TIMED_STATE
@@ -283,11 +283,11 @@ def measure_speed(session: Session) -> Speed | None:
         return None
     n_collisions, ns, seconds = 10, [0], 0.0
     try:
+        timing.same_steps(Implementation(session, "time"), scene, state, (2,))
         # An answer that takes long, and is said to have taken no time, will not grow more credible.
         while min(ns) < TIMED_LEAST and n_collisions < 100_000 and seconds < TIMED_MOST:
             n_collisions *= 10 if min(ns) * 10 < TIMED_LEAST else 2
-            ns, seconds, last = timing.timed(session, scene, state, n_collisions, TIMED_REPEATS)
-        timing.check_last(session, scene, state, n_collisions, last)
+            ns, seconds, _ = timing.timed(session, scene, state, n_collisions, TIMED_REPEATS)
     except (Trouble, *NOT_NUMBERS):
         return None
     if not min(ns):

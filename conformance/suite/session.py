@@ -11,22 +11,22 @@ from __future__ import annotations
 
 import math
 import random
-import struct
 import sys
 import time
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from types import TracebackType
-from typing import Any
+from typing import Any, TypeVar
 
 import msgspec
 
-from conformance.suite.answers import check_echo, read_answer, read_introduction, read_outcome, with_walls
+from conformance.suite.answers import check_echo, read_answer, read_introduction, with_walls
 from conformance.suite.process import Process, Transcript, Trouble
-from scene import Outcome, Scene, State, to_data
 from scene.protocol.messages import PROTOCOL, Introduction
 from scene.refusal import BadInput
 
 AnswerLine = Callable[[bytes], bytes]
+T = TypeVar("T")
 MAX_SEQ = 2**31 - 1  # the integers of every language
 STOP_TIMEOUT = 5.0  # seconds to exit after `stop`
 
@@ -108,13 +108,9 @@ class Session:
             raise RuntimeError("this session has started")
         command = self._command
         self._process = InProcess(command) if callable(command) else Process(command, self.stderr)
-        try:
-            line = self._exchange(_encode({"cmd": "start", "protocol": PROTOCOL}))
-            self.introduction = read_introduction(line)
-        except Trouble as trouble:
-            self._give_up(trouble)
-            raise
-        return self.introduction
+        request = {"cmd": "start", "protocol": PROTOCOL}
+        self.introduction = introduction = self._opened(request, read_introduction)
+        return introduction
 
     def probe(self) -> None:
         """Prove that numbers arrive and return with all their bits.
@@ -123,26 +119,20 @@ class Session:
             Trouble: wrong-format, naming the first number that does not; the session is then over.
         """
         values = probe_values()
-        try:
-            line = self._exchange(_encode({"cmd": "echo", "values": values}))
-            check_echo(values, line)
-        except Trouble as trouble:
-            self._give_up(trouble)
-            raise
+        self._opened({"cmd": "echo", "values": values}, partial(check_echo, values))
 
-    def ask(self, request: Mapping[str, Any], scene: Mapping[str, Any] | None = None) -> dict[str, Any]:
+    def ask(self, request: Mapping[str, Any]) -> dict[str, Any]:
         """Put one question and return its answer as plain data, every collision with its wall.
 
         Args:
             request: a step, trajectory, flow or time request; its seq is replaced by a random one.
-            scene: that names walls left out, where the request's own is not a scene; None for that one.
 
         Raises:
             Trouble: crashed, timed-out or wrong-format; error or timed-out when the session is over.
         """
         seq = self._draw.randint(1, MAX_SEQ)
         answer = self._say(_encode({**request, "seq": seq}), request["cmd"], seq)
-        return with_walls(answer, request.get("scene") if scene is None else scene)
+        return with_walls(answer, request.get("scene"))
 
     def say(self, line: bytes, seq: int | None, cmd: str = "step") -> dict[str, Any]:
         """Send a line that may be no request, and return what it is answered.
@@ -156,19 +146,6 @@ class Session:
             Trouble: as `ask`.
         """
         return self._say(line, cmd, seq, may_be_null=True)
-
-    def step(self, scene: Scene, state: State, t_end: float) -> Outcome:
-        """Ask for one step: the session as a stepper, for properties.
-
-        Raises:
-            Trouble: as `ask`; error when that is the answer; fail for a question with a number that is
-                not finite, as only the answers before can have made it.
-        """
-        fields = msgspec.to_builtins(state)
-        if not all(math.isfinite(number) for number in (*msgspec.structs.astuple(state)[:5], t_end)):
-            raise Trouble("fail", f"its answers lead to the state {fields} and t_end = {t_end}")
-        request = {"cmd": "step", "scene": to_data(scene), "state": fields, "t_end": t_end}
-        return read_outcome(self.ask(request), state.t)
 
     def stop(self) -> None:
         """Ask the process to stop and see it end by itself.
@@ -191,6 +168,13 @@ class Session:
         if process is not None:
             process.kill()
 
+    def _opened(self, request: Mapping[str, Any], read: Callable[[bytes], T]) -> T:
+        """Read the answer to a request without which the session is over."""
+        try:
+            return read(self._exchange(_encode(request)))
+        except Trouble as trouble:
+            raise self._given_up(trouble) from None
+
     def _say(self, line: bytes, cmd: str, seq: int | None, *, may_be_null: bool = False) -> dict[str, Any]:
         if self._end is not None:
             raise self._end
@@ -206,8 +190,7 @@ class Session:
     def _check_time(self) -> None:
         if self._end is None and time.monotonic() >= self._deadline:
             why = f"not asked: the total time of {self._limits.total:g} s is spent"
-            self._give_up(trouble := Trouble("timed-out", why))
-            raise trouble
+            raise self._given_up(Trouble("timed-out", why))
 
     def _exchange(self, line: bytes) -> bytes:
         assert self._process is not None
@@ -217,20 +200,20 @@ class Session:
 
     def _restart(self) -> None:
         if self.n_restarts >= self._limits.restarts:
-            self._give_up(
-                Trouble("error", f"not asked: restarted {self.n_restarts} times; --restarts allows more")
-            )
-            raise self._end  # type: ignore[misc]
+            why = f"not asked: restarted {self.n_restarts} times; --restarts allows more"
+            raise self._given_up(Trouble("error", why))
         self.n_restarts += 1
         try:
             self.start()
         except (Trouble, BadInput) as trouble:
-            self._give_up(Trouble("error", f"not asked: the restart failed, {trouble}"))
-            raise self._end from None  # type: ignore[misc]
+            why = f"not asked: the restart failed, {trouble}"
+            raise self._given_up(Trouble("error", why)) from None
 
-    def _give_up(self, trouble: Trouble) -> None:
+    def _given_up(self, trouble: Trouble) -> Trouble:
+        """End the session, and return what is the verdict of all that is still asked."""
         self.kill()
         self._end = trouble
+        return trouble
 
 
 def missing(introduction: Introduction, profile: str, scene: Mapping[str, Any] | None) -> str:
@@ -262,15 +245,12 @@ def needs(profile: str, scene: Mapping[str, Any] | None) -> list[tuple[str, str]
 
 def probe_values() -> list[float]:
     """Return the numbers of the transport probe: every kind, and random bits of every exponent."""
-    least, largest = 5e-324, sys.float_info.max
-    tiny = sys.float_info.min
+    least, tiny, largest = 5e-324, sys.float_info.min, sys.float_info.max
     special = [0.0, 0.1, 1 / 3, 2 / 3, 1e22, 1e23, 2.0**53 - 1, 2.0**53 + 2, 123456789012345680.0, largest]
     small = [least, 3 * least, tiny, tiny - least, tiny / 3, 1.0 + 2.0**-52, 1.0 - 2.0**-53]
     draw = random.Random(53)
-    bits = [(exponent << 52) | draw.getrandbits(52) for exponent in range(0, 2047, 8)]
-    scattered = [struct.unpack("<d", struct.pack("<Q", pattern))[0] for pattern in bits]
-    positive = [*special, *small, *scattered]
-    return [sign * value for value in positive for sign in (1.0, -1.0)]
+    scattered = [math.ldexp(1 + draw.random(), exponent) for exponent in range(-1074, 1024, 8)]
+    return [sign * value for value in (*special, *small, *scattered) for sign in (1.0, -1.0)]
 
 
 def _encode(request: Mapping[str, Any]) -> bytes:

@@ -13,7 +13,8 @@ import numpy as np
 from matplotlib import rc_context
 
 from conformance.grading.agreement import middle
-from conformance.suite.result import Result, outcomes_of
+from conformance.suite.answers import outcomes_of
+from conformance.suite.result import Result
 from conformance.vectors import Vector
 from mushrooms.figures import style as plots
 from mushrooms.figures import table as draw

@@ -42,7 +42,7 @@ WORDS = {
     "interpreted": "plain Python",
     "time-stepping": "scipy solve_ivp with events",
     "fixed-step": "time steps of 1/10 to 1/1000 flight, in C",
-    "lean": "Newton without checks, in C and numba",
+    "lean": "Newton without checks, in C",
     "example": "examples in C, JavaScript, Python",
     "command": "command",
 }

@@ -1,31 +1,26 @@
 """A falsifier of claims: it samples a claimed flight and looks for a sign that must not be there.
 
-A claim is a line of the corpus. Laws and walls are written down from docs/protocol.md and evaluated in mpmath
-to 60 decimals, at many instants of the flight, more of them near both ends. A golden section goes on around
-the lowest samples. What is found so is confirmed to 300 decimals. A path is followed with the falsifier's own
-numbers: the claim only says where to look for a hit. This shares no theorem with the reference or the
-verifier. A claim that it falsifies is false; one that it does not falsify may be false. Not handled: flows,
-`rejected`, and whether a scene is valid.
-
-    python -m tests.support.falsifier [FILE.jsonl ...]
-
-falsifies the whole corpus, or these files: it prints every line that it falsifies, and exits with 1 if there
-is one.
+A claim is a line of the corpus. Walls are written down from docs/protocol.md; they and the laws of `scene`
+are evaluated in mpmath to 60 decimals, at many instants of the flight, more of them near both ends. A golden
+section goes on around the lowest samples. What is found so is confirmed to 300 decimals. A path is followed
+with the falsifier's own numbers: the claim only says where to look for a hit. This shares no theorem with the
+reference or the verifier. A claim that it falsifies is false; one that it does not falsify may be false. Not
+handled: flows, `rejected`, and whether a scene is valid.
 """
 
 from __future__ import annotations
 
-import json
-import sys
-import time
-from collections import Counter
 from collections.abc import Iterator
 from functools import cache
-from itertools import pairwise, zip_longest
+from itertools import pairwise
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import mpmath
+
+from scene import from_data
+from scene.laws import value
+from scene.tables import cycle_length, laws
 
 CORPUS = Path(__file__).parents[2] / "conformance" / "corpus"
 DECIMALS, CONFIRMED = 60, 300
@@ -55,49 +50,19 @@ class Wall(NamedTuple):
     rate: Number
 
 
-def law_at(law: Any, t: Number, leg_at: Number) -> tuple[Number, Number]:
-    """Return a law and its rate at t; a bang-bang law keeps the half leg that it is on at `leg_at`."""
-    mp = numbers()
-    if not isinstance(law, dict):
-        return mp.mpf(law), mp.zero
-    if law["kind"] == "bang-bang":
-        origin, value, acceleration = _half_leg(law["knots"], leg_at)
-        return value + acceleration * (t - origin) ** 2 / 2, acceleration * (t - origin)
-    omega = mp.mpf(law["omega"]) if law.get("omega") else 2 * mp.pi / mp.mpf(law["period"])
-    turn, power, value, rate = mp.expj(omega * t), mp.one, mp.mpf(law["mean"]), mp.zero
-    waves = zip_longest(law.get("cos", ()), law.get("sin", ()), fillvalue=0.0)
-    for k, (c, s) in enumerate(waves, 1):
-        power *= turn
-        value += c * power.real + s * power.imag
-        rate += k * omega * (s * power.real - c * power.imag)
-    return value, rate
-
-
-def _half_leg(knots: list[list[float]], t: Number) -> tuple[Number, Number, Number]:
-    """Return the parabola that holds at t: the time and the value at which it rests, and its acceleration."""
-    mp = numbers()
-    first, last = mp.mpf(knots[0][0]), mp.mpf(knots[-1][0])
-    shift = mp.floor((t - first) / (last - first)) * (last - first)
-    (a, before), (b, after) = next(
-        leg for leg in pairwise(knots) if t - shift < leg[1][0] or leg[1] is knots[-1]
-    )
-    begin, end = mp.mpf(a) + shift, mp.mpf(b) + shift
-    acceleration = 4 * (mp.mpf(after) - mp.mpf(before)) / (end - begin) ** 2
-    return (begin, before, acceleration) if t < (begin + end) / 2 else (end, after, -acceleration)
-
-
 class Flight:
     """A straight flight from a state, and the walls along it; s is the time since departure.
 
     Args:
         scene: the wire's form.
         state: t, x, y, vx, vy and wall.
-        is_blind: keep each bang-bang law on the half leg it is on at departure, which is wrong.
     """
 
-    def __init__(self, scene: Line, state: Line, *, is_blind: bool = False) -> None:
+    def __init__(self, scene: Line, state: Line) -> None:
         mp = numbers()
-        self.scene, self.table, self.is_blind = scene, scene["table"], is_blind
+        self.scene, self.table = from_data(scene), scene["table"]
+        lists = [part for law in scene.values() if isinstance(law, dict) for part in law.values()]
+        self.n_waves = max(len(part) for part in [*lists, [0]] if isinstance(part, list))
         self.left: Any = state.get("wall")
         self.t, self.x, self.y, self.vx, self.vy = (mp.mpf(state[name]) for name in ("t", *NUMBERS[1:]))
         self.residual = mp.zero
@@ -110,10 +75,8 @@ class Flight:
 
     def laws(self, s: Number) -> dict[str, tuple[Number, Number]]:
         """Return the laws and their rates; the mouth's half-width as w, however it is given."""
-        t, found = self.t + s, {}
-        for name, law in self.scene.items():
-            if name in ("r", "w", "nu", "h", "slope"):
-                found[name] = law_at(law, t, self.t if self.is_blind else t)
+        t, mp = self.t + s, numbers()
+        found = {name: (value(mp, law, t), value(mp, law, t, 1)) for name, law in laws(self.scene).items()}
         if "nu" in found:
             (nu, nu_rate), (r, r_rate) = found["nu"], found["r"]
             found["w"] = nu * r, nu_rate * r + nu * r_rate
@@ -178,20 +141,11 @@ class Flight:
     def instants(self, begin: Number, end: Number, n: int) -> list[Number]:
         """Return n instants or more, in order: a dozen for each wave or leg, more near both ends."""
         span = end - begin
-        rate = max(map(_changes, self.scene.values()))
-        n = min(MAX_SAMPLES, max(n, int(12 * span * rate)))
+        period = numbers().mpf(cycle_length(self.scene) or numbers().inf)
+        n = min(MAX_SAMPLES, max(n, int(12 * span / period * self.n_waves)))
         ends = [span / 2**k for k in range(1, N_ENDS)]
         inner = [span * k / n for k in range(1, n)]
         return [begin + s for s in sorted({*ends, *inner, *(span - s for s in ends)})]
-
-
-def _changes(law: Any) -> float:
-    """Return how many waves or legs a law has in a unit of time."""
-    if not isinstance(law, dict):
-        return 0.0
-    knots = law.get("knots", [[0.0]])
-    period = knots[-1][0] - knots[0][0] or law.get("period") or 6 / law["omega"]
-    return float(max(1, len(knots) - 1, *(len(law.get(name, ())) for name in ("cos", "sin"))) / period)
 
 
 def falsify(line: Line, n: int = 1000) -> str | None:
@@ -314,20 +268,3 @@ def next_hits(
         for root, wall in sorted((flight.root(wall, a, b), wall) for wall in met):
             if only or wall != "base" or flight.table != "mushroom" or not flight.is_mouth_open(root):
                 yield wall, root
-
-
-def main(names: list[str]) -> int:
-    """Falsify files of the corpus; return 1 if a line is falsified."""
-    counts, began = Counter[bool](), time.monotonic()
-    for path in map(Path, names) if names else sorted(CORPUS.glob("*.jsonl")):
-        for line in map(json.loads, path.read_text("utf-8").splitlines()):
-            if line["kind"] != "flow" and line["expect"][0]["outcome"] not in ("rejected", "undecided"):
-                wrong = falsify(line)
-                counts[wrong is None] += 1
-                print(f"{line['id']}: {wrong}\n" if wrong else "", end="", flush=True)
-    print(f"{counts[False]} of {counts.total()} falsified, in {time.monotonic() - began:.0f} s")
-    return int(counts[False] > 0)
-
-
-if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))

@@ -167,13 +167,11 @@ def giving_up(is_given_up: Callable[[Course, Any], bool]) -> Fault:
     return none_met
 
 
-def _overflows(course: Course, _: Any) -> bool:
-    s = course.exact
-    product = s.x * s.vx + s.y * s.vy
-    return not 2.0**-1022 <= product * product <= 2.0**1023
-
-
 # Nothing is met where (x . v)^2 is no binary64 number; after 10 units of time; by what rests, or nearly.
-overflowing = giving_up(_overflows)
+overflowing = giving_up(
+    lambda course, _: (
+        not 2.0**-511 <= abs(course.exact.x * course.exact.vx + course.exact.y * course.exact.vy) <= 2.0**511
+    )
+)
 impatient = giving_up(lambda _, hit: isinstance(hit, Hit) and float(exact_ends(hit.time)[0]) > 10)
 resting = giving_up(lambda course, _: sum(abs(float(v.mid)) for v in course.flight[3:5]) < 2.0**-20)

@@ -7,28 +7,28 @@ import re
 from collections.abc import Callable
 from typing import Any
 
+import msgspec
 from mpmath import fp
 
-from scene import BadInput, BangBang, Fourier, Mushroom, Scene, from_data
+from scene import Mushroom, from_data
 from scene.geometry import TableAt
 from scene.geometry import rounded as table_of
-from scene.laws import bounds, value
+from scene.laws import Law, bounds, value
 from support.faulty_servers import (
     FLOW,
     NUMBERS,
     PATH,
     STEP,
     Answer,
-    Change,
     Fault,
     Line,
     asked,
-    parts,
     starts,
 )
 
 Excuse = Callable[[TableAt, Line, str], bool]  # (table, state, why it was rejected)
 AWAY = re.compile(r"the state is (\S+) of that wall's size away")
+WORDS = ("table", "name", "notes")  # of a scene: what is no law
 BEYOND = re.compile(r"beyond wall (\w+)")
 
 # Refusals that are missing, and some too many.
@@ -41,29 +41,43 @@ def straight(request: Line, state: Line) -> Line:
     return {"outcome": "horizon", "t": request["t_end"], **place, "vx": state["vx"], "vy": state["vy"]}
 
 
-def letting(excuse: Excuse, *cmds: str) -> Fault:
-    """Let states through that an excuse is found for, in some commands; in all when none is named."""
-
-    def mended(request: Line, state: Line, part: Line) -> Line:
-        if part.get("outcome") != "rejected" or state["t"] > request["t_end"]:
-            return part
-        table = table_of(from_data(request["scene"]), state["t"])
-        return straight(request, state) if excuse(table, state, part["reason"]) else part
+def letting(is_let: Callable[[Line, Line, str], bool], *cmds: str) -> Fault:
+    """Let states through that are rejected: (request, state, why); of some commands or of all."""
 
     def fault(request: Line, answer: Answer) -> Line:
         found, cmd = answer(request), request.get("cmd")
         there = starts(request)
-        if cmd not in (cmds or (STEP, PATH, FLOW)) or not is_sound(request):
+        if cmd not in (cmds or (STEP, PATH, FLOW)):
             return found
-        changed = [mended(request, *pair) for pair in zip(there, parts(found), strict=False)]
-        if changed == parts(found)[: len(changed)]:
+        told = found["states"] if "states" in found else [found] * len(there)  # a whole refusal is of each
+        changed = [
+            straight(request, state)
+            if part.get("outcome") == "rejected" and is_let(request, state, part["reason"])
+            else part
+            for state, part in zip(there, told, strict=True)
+        ]
+        if changed == told:
             return found
-        seq = {"seq": found["seq"]}
-        return (
-            {**seq, **changed[0]} if cmd == STEP else {**seq, "states" if cmd == FLOW else "steps": changed}
-        )
+        more = changed[0] if cmd == STEP else {"states" if cmd == FLOW else "steps": changed}
+        return {"seq": found["seq"], **more}
 
     return fault
+
+
+def excused(excuse: Excuse, *cmds: str) -> Fault:
+    """Let states through that an excuse is found for."""
+
+    def is_let(request: Line, state: Line, why: str) -> bool:
+        if not is_sound(request) or state["t"] > request["t_end"]:
+            return False
+        return excuse(table_of(from_data(request["scene"]), state["t"]), state, why)
+
+    return letting(is_let, *cmds)
+
+
+def unchecked(is_when: Callable[[float, float], bool], cmd: str) -> Fault:
+    """Let all states through whose time stands in some relation to t_end."""
+    return letting(lambda asked, at, _: is_sound(asked) and is_when(at["t"], asked["t_end"]), cmd)
 
 
 def is_sound(request: Line) -> bool:
@@ -82,15 +96,19 @@ def loose(tolerance: float) -> Excuse:
     return lambda _, __, why: bool(away := AWAY.search(why)) and abs(float(away[1])) < tolerance
 
 
+def gap(table: TableAt, wall: Any, state: Line) -> float:
+    """Return how far a state is from a wall."""
+    found = abs(table.gap(wall, state["x"], state["y"]))
+    return float(found / (2 * table.r if wall == "arc" else 1.0))
+
+
 def near_by(part: float, *walls: str) -> Excuse:
     """Let states through that lie beyond some walls by less than a part of the table's size."""
 
     def excuse(table: TableAt, state: Line, why: str) -> bool:
         beyond = BEYOND.search(why)
-        if not beyond or (walls and beyond[1] not in walls):
-            return False
-        gap = abs(table.gap(beyond[1], state["x"], state["y"]))  # type: ignore[arg-type]
-        return bool(gap < part * (2 * table.r if beyond[1] == "arc" else 1.0))
+        is_meant = beyond is not None and (not walls or beyond[1] in walls)
+        return is_meant and gap(table, beyond[1], state) < part
 
     return excuse
 
@@ -99,11 +117,12 @@ def slower(part: float) -> Excuse:
     """Let states move into their wall by less than a part of their speed."""
 
     def excuse(table: TableAt, state: Line, why: str) -> bool:
-        if "moves into it" not in why:
-            return False
-        rate = table.gap_rate(state["wall"], *(state[name] for name in ("x", "y", "vx", "vy")))
+        x, y, vx, vy = (state[name] for name in NUMBERS[1:])
         steep = 2 * table.r if state["wall"] == "arc" else 1.0
-        return bool(-rate < part * steep * math.hypot(state["vx"], state["vy"]))
+        is_into = "moves into it" in why
+        return is_into and bool(
+            -table.gap_rate(state["wall"], x, y, vx, vy) < part * steep * math.hypot(vx, vy)
+        )
 
     return excuse
 
@@ -129,51 +148,36 @@ def in_the_mouth(table: TableAt, state: Line) -> bool:
     return isinstance(table.scene, Mushroom) and abs(state["x"]) < table.w and state["wall"] == "base"
 
 
-def arrived(which: Callable[[float, float], bool]) -> Change:
-    """Let particles have arrived whose time stands in some relation to t_end."""
-
-    def change(request: Line, found: Line) -> Line:
-        there = [
-            {**straight({"t_end": state["t"]}, state), "t": request["t_end"]}
-            if which(state["t"], request["t_end"])
-            else part
-            for state, part in zip(request["states"], found["states"], strict=True)
-        ]
-        return {**found, "states": there}
-
-    return change
-
-
-def at_once(request: Line, answer: Answer) -> Line:
-    """Answer a step that lasts no time before any check."""
-    found = answer(request)
-    is_step = request.get("cmd") == STEP and is_sound(request) and found["outcome"] == "rejected"
-    if not is_step or request["state"]["t"] != request.get("t_end"):
-        return found
-    return {"seq": found["seq"], **straight(request, request["state"])}
-
-
-def refusing(is_refused: Callable[[TableAt, Line], bool], cmd: str = STEP) -> Fault:
-    """Refuse states that name a wall, and where something holds."""
+def refusing(is_refused: Callable[[Line], bool], *cmds: str) -> Fault:
+    """Refuse sound questions where something holds."""
 
     def fault(request: Line, answer: Answer) -> Line:
         found = answer(request)
-        if request.get("cmd") != cmd or not is_sound(request) or "rejected" in str(found):
-            return found
-        table, state = table_of(from_data(request["scene"]), request["state"]["t"]), request["state"]
-        if not state.get("wall") or not is_refused(table, state):
-            return found
-        return {"seq": request["seq"], "outcome": "rejected", "reason": "it is not on its wall"}
+        is_asked = request.get("cmd") in (cmds or (STEP, PATH, FLOW)) and is_sound(request)
+        if is_asked and "rejected" not in str(found) and is_refused(request):
+            return {"seq": request["seq"], "outcome": "rejected", "reason": "it is not on its wall"}
+        return found
 
     return fault
 
 
-def strictly_off(*walls: str) -> Callable[[TableAt, Line], bool]:
-    """Allow a place off some walls rounding alone."""
+def refusing_starts(is_refused: Callable[[TableAt, Line], bool], cmd: str = STEP) -> Fault:
+    """Refuse states that name a wall, and where something holds."""
+
+    def is_bad(request: Line) -> bool:
+        state = request["state"]
+        table = table_of(from_data(request["scene"]), state["t"])
+        return bool(state.get("wall")) and is_refused(table, state)
+
+    return refusing(is_bad, cmd)
+
+
+def strictly_off(wall: str) -> Callable[[TableAt, Line], bool]:
+    """Allow a place off a wall rounding alone."""
 
     def is_refused(table: TableAt, state: Line) -> bool:
-        gap = abs(table.gap(state["wall"], state["x"], state["y"]))
-        return state["wall"] in walls and bool(gap > 1e-9 * table.size * max(1.0, table.size))
+        off = abs(table.gap(state["wall"], state["x"], state["y"]))
+        return state["wall"] == wall and bool(off > 1e-9 * table.size * max(1.0, table.size))
 
     return is_refused
 
@@ -186,72 +190,32 @@ def leaving_slowly(_: TableAt, state: Line) -> bool:
 
 def scenes_refused_for(*words: str) -> Fault:
     """Let scenes through that are refused for some reason, by words of it."""
-    return scenes_let(lambda request, why: any(word in why for word in words))
+    return letting(lambda _, __, why: any(word in why for word in words))
 
 
-def scenes_let(is_let: Callable[[Line, str], bool]) -> Fault:
-    """Let some broken scenes through."""
-
-    def fault(request: Line, answer: Answer) -> Line:
-        found = answer(request)
-        if request.get("cmd") not in (STEP, PATH, FLOW) or not is_let(request, found.get("reason", "")):
-            return found
-        there = [straight(request, state) for state in starts(request)]
-        seq, cmd = {"seq": found["seq"]}, request["cmd"]
-        return {**seq, **there[0]} if cmd == STEP else {**seq, "states" if cmd == FLOW else "steps": there}
-
-    return fault
-
-
-def passes_samples(n: int) -> Callable[[Line, str], bool]:
+def passes_samples(n: int) -> Callable[[Line, Line, str], bool]:
     """Look at n instants of a period alone."""
 
-    def is_let(request: Line, why: str) -> bool:
-        data = request.get("scene")
-        if not why.startswith("scene") or not isinstance(data, dict):
+    def is_let(request: Line, _: Line, why: str) -> bool:
+        if not why.startswith("scene"):
             return False
         try:
-            laws = {name: _law(part) for name, part in data.items() if name not in ("table", "name", "notes")}
-            return all(_is_valid({k: value(fp, law, i / n) for k, law in laws.items()}) for i in range(n))
-        except (BadInput, KeyError, TypeError, AttributeError):
+            laws = {k: msgspec.convert(v, Law) for k, v in request["scene"].items() if k not in WORDS}
+            for i in range(n):
+                now = {name: float(value(fp, law, i / n)) for name, law in laws.items()}
+                from_data({"table": request["scene"]["table"], **now})
+        except (ValueError, AttributeError):
             return False
+        return True
 
     return is_let
 
 
-def _law(data: Any) -> Any:
-    if not isinstance(data, dict):
-        return float(data)
-    given = {
-        name: tuple(map(tuple, part)) if name == "knots" else part
-        for name, part in data.items()
-        if name != "kind"
-    }
-    return BangBang(**given) if data["kind"] == "bang-bang" else Fourier(**given)
-
-
-def _is_valid(now: dict[str, float]) -> bool:
-    w = now.get("w", now.get("nu", 1.0) * now.get("r", 1.0))
-    is_apart = w > now.get("h", 1.0) * now.get("slope", 0.0)
-    return min(now.get("r", 1.0), now.get("h", 1.0), w) > 0 and w <= now.get("r", math.inf) and is_apart
-
-
-def wide_by_ranges(scene: Scene) -> bool:
+def wide_by_ranges(request: Line) -> bool:
     """Compare the widest mouth with the smallest cap."""
+    scene = from_data(request["scene"])
     w = getattr(scene, "w", None)
     return isinstance(scene, Mushroom) and w is not None and bounds(w).highest > bounds(scene.r).lowest
-
-
-def narrower(is_refused: Callable[[Scene], bool]) -> Fault:
-    """Refuse some valid scenes."""
-
-    def fault(request: Line, answer: Answer) -> Line:
-        found = answer(request)
-        if "reason" in found or "scene" not in request or not is_refused(from_data(request["scene"])):
-            return found
-        return {"seq": request["seq"], "outcome": "rejected", "reason": "the scene may break"}
-
-    return fault
 
 
 # Lax reading.
@@ -301,7 +265,7 @@ def one_of_two(request: Line) -> None:
             law.pop("period", None)
 
 
-def nearly_one_period(request: Line, why: str) -> bool:
+def nearly_one_period(request: Line, _: Line, why: str) -> bool:
     """Take periods for the same that are equal to 9 digits."""
     if "share one period" not in why:
         return False

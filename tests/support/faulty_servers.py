@@ -11,6 +11,7 @@ import json
 import math
 import time
 from collections.abc import Callable, Sequence
+from itertools import count
 from typing import Any
 
 import fast.__main__ as server
@@ -150,13 +151,6 @@ def take_hints(request: Line, answer: Answer) -> Line:
     return found
 
 
-def nameless_only(request: Line, answer: Answer) -> Line:
-    """Refuse a scene that has a name."""
-    if isinstance(request.get("scene"), dict) and request["scene"].get("name"):
-        return {"seq": request["seq"], "outcome": "rejected", "reason": "scene.name is unknown"}
-    return answer(request)
-
-
 def as_fortran_reads(request: Line) -> None:
     """Take a number without a point for one with six decimals."""
     for state in starts(request):
@@ -175,12 +169,12 @@ def minus_is_below(request: Line) -> None:
 
 def last_bit_varies() -> Fault:
     """Answer with a last bit that depends on how often one was asked, as sums in threads may: no fault."""
-    n_asked = [0]
+    numbers = count(1)
 
     def change(_: Line, found: Line) -> None:
-        n_asked[0] += 1
+        is_varied = next(numbers) % 3 == 0
         for part in parts(found):
-            if "vx" in part and n_asked[0] % 3 == 0:
+            if "vx" in part and is_varied:
                 part["vx"] = math.nextafter(part["vx"], math.inf)
 
     return on((STEP, PATH, FLOW), change)
@@ -190,12 +184,10 @@ def answers_by(key: Callable[[Line], Any]) -> Fault:
     """Keep every answer to a step, by a key of the request."""
     book: dict[str, Line] = {}
 
-    def fault(request: Line, answer: Answer) -> Line:
-        if request.get("cmd") != STEP or not starts(request):
-            return answer(request)
-        return {**book.setdefault(json.dumps(key(request)), answer(request)), "seq": request["seq"]}
+    def change(request: Line, found: Line) -> Line:
+        return {**book.setdefault(json.dumps(key(request)), found), "seq": request["seq"]}
 
-    return fault
+    return on(STEP, change)
 
 
 def rounded(digits: int) -> Callable[[Any], Any]:
@@ -281,13 +273,12 @@ def same_velocity_for_all(_: Line, found: Line) -> None:
 
 def swapping(every: int) -> Change:
     """Swap two answers of a flow now and then."""
-    n_asked = [0]
+    numbers = count(1)
 
     def change(_: Line, found: Line) -> None:
-        n_asked[0] += 1
         states = found["states"]
-        if len(states) > 1 and n_asked[0] % every == 0:
-            states[0], states[-1] = states[-1], states[0]
+        if next(numbers) % every == 0:
+            states[:1], states[-1:] = states[-1:], states[:1]
 
     return change
 
@@ -313,14 +304,19 @@ def straight_on(request: Line, last: Line, arrived: Line) -> None:
     arrived |= {**place, "vx": last["vx"], "vy": last["vy"]}
 
 
-def captured_as(change: Callable[[Line, list[float]], list[float] | None]) -> Fault:
-    """Tell other captured stays: (request, stay) -> stay."""
+def captured_as(change: Callable[[Line, list[float], int], list[float] | None]) -> Fault:
+    """Tell other captured stays: (request, stay, place of the particle) -> stay."""
 
-    def changed(request: Line, part: Line, _: int) -> None:
+    def changed(request: Line, part: Line, i: int) -> None:
         if part.get("captured"):
-            part["captured"] = change(request, part["captured"])
+            part["captured"] = change(request, part["captured"], i)
 
     return on(FLOW, each("horizon", changed))
+
+
+def losing_stays(is_lost: Callable[[int, int], bool]) -> Fault:
+    """Lose the captured stay of some particles: (place, number of particles)."""
+    return captured_as(lambda request, stay, i: None if is_lost(i, len(request["states"])) else stay)
 
 
 def wide_edge(by_part: float) -> Fault:
@@ -338,17 +334,6 @@ def wide_edge(by_part: float) -> Fault:
             part["captured"] = wide.get("captured") if part["outcome"] == "horizon" else None
 
     return on(FLOW, change)
-
-
-def losing_stays(where: Callable[[int, int], bool]) -> Change:
-    """Lose the captured stay of some particles: (index, number of particles)."""
-
-    def change(_: Line, found: Line) -> None:
-        for i, state in enumerate(found["states"]):
-            if "captured" in state and where(i, len(found["states"])):
-                state["captured"] = None
-
-    return change
 
 
 # Clocks.

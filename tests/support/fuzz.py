@@ -91,29 +91,22 @@ def answers(draw: random.Random) -> dict[str, Any]:
     )
 
 
-def places(data: Any, path: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]:
-    """Yield the path of every value within."""
+def places(data: Any) -> Iterator[tuple[Any, Any]]:
+    """Yield what holds each value within, and its key there."""
     inner = data.items() if isinstance(data, dict) else enumerate(data) if isinstance(data, list) else ()
     for key, value in inner:
-        yield (*path, key)
-        yield from places(value, (*path, key))
-
-
-def at(data: Any, path: tuple[Any, ...]) -> Any:
-    """Return the value at a path."""
-    for key in path:
-        data = data[key]
-    return data
+        yield data, key
+        yield from places(value)
 
 
 def spoil(draw: random.Random, data: dict[str, Any]) -> Any:
     """Change a copy of the data in one to three places."""
     data = json.loads(json.dumps(data))
     for _ in range(draw.choice((1, 1, 1, 2, 3))):
-        path = draw.choice(list(places(data)) or [()])
-        if not path:
+        found = list(places(data))
+        if not found:
             return draw.choice(OTHERS)
-        holder, key = at(data, path[:-1]), path[-1]
+        holder, key = draw.choice(found)
         how = draw.randrange(10)
         if key in ("collisions", "repeat"):
             holder[key] = draw.choice(COUNTS)
@@ -132,18 +125,9 @@ def spoil(draw: random.Random, data: dict[str, Any]) -> Any:
 def garble(draw: random.Random, line: bytes) -> bytes:
     """Cut, double, or sprinkle bytes into a line; it stays one line."""
     at = draw.randrange(len(line) + 1)
-    how = draw.randrange(5)
-    if how == 0:
-        line = line[:at]
-    elif how == 1:
-        line = line[:at] + draw.choice(BYTES) + line[at:]
-    elif how == 2:
-        line = line[:at] + bytes([draw.randrange(256)]) + line[at + 1 :]
-    elif how == 3:
-        line = line + line[at:]
-    else:
-        line = line[:at] + b"[" * 5000 + line[at:]
-    return line.replace(b"\n", b" ")
+    sprinkled = draw.choice(BYTES), bytes([draw.randrange(256)]), b"[" * 5000
+    ways = line[:at], line + line[at:], *(line[:at] + more + line[at:] for more in sprinkled)
+    return draw.choice(ways).replace(b"\n", b" ")
 
 
 def lines(seed: int, n: int, kind: Any) -> Iterator[bytes]:

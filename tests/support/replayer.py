@@ -1,13 +1,12 @@
 """Answers by memory: a program that knows the corpus and its certified answers, and no physics at all.
 
 With a seed it also knows in which disguise every vector is asked in the run of that seed. What it does not
-know it answers as it is told to: `undecided`, or with the last answer that it gave.
+know it answers by `undecided`, or with the last answer that it gave.
 """
 
 from __future__ import annotations
 
 import json
-import sys
 from collections.abc import Sequence
 from typing import Any
 
@@ -16,21 +15,10 @@ import msgspec
 from conformance import vectors
 from conformance.grading.agreement import middle
 from conformance.suite.disguise import Disguise, asked, drawn_disguise, published
+from conformance.suite.session import AnswerLine
+from support.faulty_servers import Answer, Line, faulty, starts
 
-INTRODUCTION = {
-    "protocol": 1,
-    "name": "replayer",
-    "version": "1",
-    "language": "none",
-    "profiles": ["step", "trajectory", "flow"],
-    "tables": ["cap", "stem", "mushroom"],
-    "laws": ["constant", "fourier", "bang-bang"],
-}
-
-
-def command(seed: int | None, otherwise: str, groups: Sequence[str]) -> list[str]:
-    """Return the command line of a replayer that knows some groups."""
-    return [sys.executable, __file__, str(seed), otherwise, *groups]
+UNDECIDED = {"outcome": "undecided", "reason": "not in the book"}
 
 
 def remembered(seed: int | None, groups: Sequence[str]) -> dict[str, dict[str, Any]]:
@@ -61,29 +49,19 @@ def _key(request: dict[str, Any]) -> str:
     return json.dumps({name: part for name, part in request.items() if name != "seq"}, sort_keys=True)
 
 
-def main(seed: int | None, otherwise: str, groups: Sequence[str]) -> None:
-    """Speak protocol 1."""
-    known, last = remembered(seed, groups), {"outcome": "undecided", "reason": "not in the book"}
-    for line in sys.stdin:
-        request = json.loads(line)
-        if request["cmd"] == "stop":
-            return
-        if request["cmd"] == "start":
-            answer = INTRODUCTION
-        elif request["cmd"] == "echo":
-            answer = {"values": request["values"]}
-        else:
-            is_whole = request["cmd"] != "step" or "vy" in request["state"]
-            undecided = {"outcome": "undecided" if is_whole else "rejected", "reason": "not in the book"}
-            guess = undecided if otherwise == "undecided" or not is_whole else last
-            answer = known.get(_key(request), guess)
-            if request["cmd"] == "step" and is_whole:
-                last = answer
-            if request["cmd"] == "flow" and "states" not in answer:
-                answer = {"states": [undecided] * len(request["states"])}
-            answer = {"seq": request["seq"], **answer}
-        print(json.dumps(answer), flush=True)
+def replayer(seed: int | None, is_bold: bool, groups: Sequence[str]) -> AnswerLine:
+    """Return what answers lines by memory; a bold one says of what it does not know what it said last."""
+    known, last = remembered(seed, groups), UNDECIDED
 
+    def fault(request: Line, answer: Answer) -> Line:
+        nonlocal last
+        if request.get("cmd") in ("start", "echo") or any("vy" not in state for state in starts(request)):
+            return answer(request)
+        found = known.get(_key(request), last if is_bold else UNDECIDED)
+        if request["cmd"] == "step":
+            last = found
+        if request["cmd"] == "flow" and "states" not in found:
+            found = {"states": [UNDECIDED] * len(request["states"])}
+        return {"seq": request["seq"], **found}
 
-if __name__ == "__main__":
-    main(None if sys.argv[1] == "None" else int(sys.argv[1]), sys.argv[2], sys.argv[3:])
+    return faulty(fault)

@@ -16,7 +16,7 @@ import theory
 from conformance import profiles, properties
 from conformance.cases.draw import Draw
 from conformance.profiles import Statistic
-from conformance.suite.answers import read_arrival
+from conformance.suite.answers import read_outcome
 from conformance.suite.checks.form import Implementation, Question, SuiteCheck
 from conformance.suite.process import Trouble
 from scene import Fourier, Horizon, Mushroom, Outcome, Scene, State, load
@@ -109,7 +109,7 @@ def _mean_growth(flow: Flowing, scene: Mushroom, size: Size, seed: int) -> list[
     areas = [area(scene, cycle_length(scene) * k / 64) for k in range(64)]
     largest = math.log(max(areas) / min(areas))  # free particles keep E times the area at most
     m1 = float(_predicted().m1)
-    if abs(m1) < size.bias + profiles.least_margin(size.n_particles, 2 * (largest + size.bias), ALARM):
+    if abs(m1) < size.bias + profiles.margin(size.n_particles, 0.0, 2 * (largest + size.bias), ALARM):
         raise Trouble("declined", f"not asked: {size.n_particles} particles cannot tell m1 from 0")
     return [
         profiles.mean_growth(flow, scene, m1=m1, largest=largest, **size._asdict(), seed=seed, alarm=ALARM)
@@ -128,7 +128,7 @@ def _flow(
     found: list[tuple[Outcome, Captured]] = []
     for start in range(0, len(states), BATCH):
         for part in side.flown(scene, states[start : start + BATCH], t_end):
-            outcome = read_arrival(part)
+            outcome = read_outcome(part)
             if isinstance(outcome, Horizon) and not math.isclose(outcome.t, t_end, rel_tol=properties.BOUND):
                 raise Trouble("fail", f"a flow to t_end = {t_end!r} is answered at t = {outcome.t!r}")
             found.append((outcome, part.get("captured")))

@@ -14,7 +14,7 @@ from msgspec.structs import replace
 
 from conformance import plain
 from conformance.cases.draw import Draw
-from conformance.suite.answers import read_arrival
+from conformance.suite.answers import read_outcome
 from conformance.suite.checks.form import FOREVER, Implementation, Question, octaves
 from conformance.suite.checks.paths import (
     CARRIED,
@@ -52,16 +52,14 @@ def arrive(side: Implementation, scene: Scene, begin: float, end: float) -> bool
     low, high = {Cap: (0.0, 1.0), Stem: (-1.25, 0.0), Mushroom: (-0.5, 0.5)}[type(scene)]
     length, fold = high - low, end % 2.0
     is_back, t_end = fold > 1.0, end - begin
-    places = low + length * begin, low + length * min(fold, 2.0 - fold)
-    moving = (length, -length if is_back else length)
+    at, to = low + length * begin, low + length * min(fold, 2.0 - fold)
+    speed, to_speed = length, -length if is_back else length
     if isinstance(scene, Mushroom):
-        (x, to_x), (vx, to_vx), y = places, moving, -0.5
-        start, due = State(0.0, x, y, vx, 0.0), Horizon(t_end, to_x, y, to_vx, 0.0)
+        start, due = State(0.0, at, -0.5, speed, 0.0), Horizon(t_end, to, -0.5, to_speed, 0.0)
     else:
-        (y, to_y), (vy, to_vy), x = places, moving, 0.0
-        start, due = State(0.0, x, y, 0.0, vy), Horizon(t_end, x, to_y, 0.0, to_vy)
+        start, due = State(0.0, 0.0, at, 0.0, speed), Horizon(t_end, 0.0, to, 0.0, to_speed)
     (found,) = side.flown(scene, [start], t_end)
-    arrival = read_arrival(found)
+    arrival = read_outcome(found)
     if isinstance(arrival, Undecided):
         return False
     assert distance(scene, arrival, due) <= CARRIED, f"{start}: {arrival}, must be {due}, in {scene}"
@@ -105,7 +103,7 @@ def together(
         if kinds != {"horizon"}:
             continue
         n_compared += 1
-        one, other = read_arrival(part), read_arrival(own)
+        one, other = read_outcome(part), read_outcome(own)
         assert distance(scene, one, other) <= ALONE, f"{where}: {one} among others, {other} alone"
         stays = part.get("captured"), own.get("captured")
         same = is_same_stay(*stays, t_end - pool[i].t)

@@ -16,16 +16,17 @@ from typing import Any, NamedTuple
 import msgspec
 
 from conformance.cases.draw import Draw
-from conformance.suite.answers import read_outcome
+from conformance.suite.answers import outcomes_of, read_outcome
 from conformance.suite.process import NOT_NUMBERS, Trouble
 from conformance.suite.result import Result
-from conformance.suite.session import Session, missing
+from conformance.suite.session import MAX_SEQ, Session, missing
 from scene import Collision, Outcome, Scene, State, Undecided, to_data
 from scene.protocol.messages import Introduction
 
 QUESTIONS = ("step", "trajectory", "flow")  # the profiles that answer by outcomes
 FOREVER = sys.float_info.max  # t_end of a question that only collisions end
 MAX_DRAWN = 6  # times that questions are drawn for an implementation of a part of the tables or laws
+SEQ = MAX_SEQ // 2  # of a line that is written by hand
 MAX_UNDECIDED = 0.1  # of a check's questions: more, and it is declined
 Question = tuple[Any, ...]  # a scene that is asked about, or its data, and what else `judges` takes
 
@@ -69,7 +70,7 @@ class Implementation:
         part, *more = self.parts(question(self.profile, scene, state, t_end))
         if more:
             raise Trouble("wrong-format", f"{1 + len(more)} outcomes are answered to one question")
-        return self._counted(outcome_of(part, state.t))
+        return self._counted(read_outcome(part, state.t))
 
     def offers(self, profile: str, scene: Scene) -> bool:
         """Tell whether another profile may be asked about a scene."""
@@ -92,7 +93,11 @@ class Implementation:
         answer = self.session.ask(request)
         if "error" in answer:
             raise Trouble("error", answer["error"])
-        return list(answer.get("steps", answer.get("states", [answer])))
+        return outcomes_of(answer)
+
+    def said(self, line: str) -> dict[str, Any]:
+        """Send a line as it is written, but for the seq in place of "SEQ", and return what it is answered."""
+        return self.session.say(line.replace('"SEQ"', str(SEQ)).encode(), SEQ, self.profile)
 
     def path(self, scene: Scene, state: State, n: int, t_end: float = FOREVER) -> list[Outcome]:
         """Follow up to n collisions, and what comes instead of a further one: at once, or step by step.
@@ -107,7 +112,7 @@ class Implementation:
             return found
         t = state.t
         for part in self.parts(question("trajectory", scene, state, t_end, n)):
-            found.append(self._counted(outcome_of(part, t)))
+            found.append(self._counted(read_outcome(part, t)))
             t = getattr(found[-1], "t", t)
         hits = [isinstance(outcome, Collision) for outcome in found]
         if len(found) > n or not all(hits[:-1]) or (len(found) < n and hits[-1:] != [False]):
@@ -144,11 +149,6 @@ def question(
     more = {"trajectory": {"collisions": n}, "time": {"collisions": n, "repeat": 1}}.get(cmd, {})
     end = {} if cmd == "time" else {"t_end": t_end}
     return {"cmd": cmd, "scene": _data(scene), **msgspec.to_builtins(place), **more, **end}
-
-
-def outcome_of(part: Mapping[str, Any], t: float) -> Outcome:
-    """Return one outcome of an answer, without its captured stay; t is when the flight began."""
-    return read_outcome({name: value for name, value in part.items() if name != "captured"}, t)
 
 
 def octaves(draw: Draw, low: float, high: float) -> Iterator[float]:

@@ -15,9 +15,9 @@ from mpmath import fp
 from msgspec.structs import replace
 
 from conformance import plain
-from conformance.cases import scenes, starts
+from conformance.cases import scenes
 from conformance.cases.draw import Draw
-from conformance.suite.answers import read_arrival
+from conformance.suite.answers import read_outcome
 from conformance.suite.checks.flaws import COARSE, FINE, LATE, UNCLEAR, first_stay, flaw_of, is_fine
 from conformance.suite.checks.form import FOREVER, Implementation, Question, octaves
 from scene import (
@@ -85,7 +85,7 @@ def _arrives(
     else:
         t_end, end = getattr(last, "t", state.t), last
     (found,) = side.flown(scene, [state], t_end)
-    arrival = read_arrival(found)
+    arrival = read_outcome(found)
     if isinstance(arrival, Undecided) or not isinstance(end, Horizon):
         return False
     # A bounce makes 4 times as much of an error, as a rule; a path of many hits is regular.
@@ -134,7 +134,7 @@ def drawn(draw: Draw, kinds: Sequence[str] = USUAL, **at: Any) -> tuple[Scene, S
     while True:
         try:
             scene = scenes.scene(draw, draw.pick(("cap", "stem", "mushroom")), scenes.clock(draw, kinds))
-            state, t_end = starts.state(draw, scene, {"speed": draw.power(-1, 5), **at})
+            state, t_end = scenes.state(draw, scene, {"speed": draw.power(-1, 5), **at})
         except BadInput:
             continue
         if isinstance(plain.next_collision(scene, state, t_end), Collision):
@@ -190,7 +190,7 @@ def aimed(draw: Draw, near: float) -> tuple[Scene, State, int]:
         "cap" if isinstance(scene, Cap) else "stem" if isinstance(scene, Stem) else draw.pick(("cap", "stem"))
     )
     table = table_at(fp, scene, 0.0)
-    x, y = starts.place(draw, table, region)
+    x, y = scenes.place(draw, table, region)
     to_x, to_y = draw.pick(table.corners(region))
     inside = 0.4 if region == "cap" else -0.4 * float(table.h)  # off all walls: the table is convex there
     return scene, _towards(draw, 0.8 * x, 0.8 * y + 0.2 * inside, to_x + draw.pick((near, -near)), to_y), 3
@@ -338,15 +338,8 @@ def long(draw: Draw, profile: str) -> Iterator[Question]:
 def late(draw: Draw, profile: str) -> Iterator[Question]:
     """Begin many periods from t = 0, before or after."""
     for wait in octaves(draw, 1, MAX_LATE):
-        scene = scenes.scene(
-            draw, draw.pick(("cap", "stem", "mushroom")), scenes.clock(draw, ("fourier", "bang-bang"))
-        )
         t = draw.pick((1.0, -1.0)) * wait * draw.between(1.0, 4.0)
-        for _ in range(64):
-            state, t_end = starts.state(draw, scene, {"t": t, "speed": draw.power(0, 4)})
-            if isinstance(plain.next_collision(scene, state, t_end), Collision):
-                yield scene, state, 2
-                break
+        yield *drawn(draw, ("fourier", "bang-bang"), t=t, speed=draw.power(0, 4)), 2
 
 
 def waiting(draw: Draw, profile: str) -> Iterator[Question]:

@@ -1,17 +1,19 @@
 """Bad requests, states and scenes, each to be refused, and good ones as near, which must not be.
 
-Requests are broken in every way that the protocol's schema forbids (`checks.schema`). States lie beyond a
-wall, off the wall that they name, past its end, or move into it, by drawn amounts of at least 8 times what is
-allowed. Scenes break a drawn law for a drawn share of the period, down to one in MOST_SAMPLES; their twins
-come as near to it from the other side.
+Requests are broken in every way that the JSON Schema of the protocol forbids, one fault at a time: each
+required field is left out, each value is replaced by one of every type that it may not have, a number by one
+out of its range, a word by one that is none; of two fields of which one is due, both are given. States lie
+beyond a wall, off the wall that they name, past its end, or move into it, by drawn amounts of at least 8
+times what is allowed. Scenes break a drawn law for a drawn share of the period, down to one in MOST_SAMPLES;
+their twins come as near to it from the other side.
 """
 
 from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterator, Mapping
-from functools import partial
-from math import cos, pi, sin, sqrt
+from functools import cache, partial
+from math import cos, inf, pi, sin, sqrt
 from typing import Any
 
 from mpmath import fp
@@ -19,11 +21,11 @@ from msgspec.structs import replace
 
 from conformance.cases import scenes
 from conformance.cases.draw import Draw
+from conformance.suite.answers import outcomes_of
 from conformance.suite.checks.form import Implementation, Question, octaves, question
-from conformance.suite.checks.schema import broken
-from conformance.suite.session import MAX_SEQ
 from scene import BangBang, Cap, Fourier, Mushroom, Scene, State, Stem, Wall
 from scene.geometry import TableAt, table_at
+from scene.protocol.messages import json_schema
 
 MOST_SAMPLES = 400  # an implementation that looks at so many instants of a period finds every broken scene
 OFF = 2.0**-17  # of a wall's size: how far off the wall that it names a state is at least; 2^-20 is allowed
@@ -44,6 +46,17 @@ ASKED: tuple[Scene, ...] = (
     Cap(r=replace(_WAVE, omega=None, period=4.0)),
 )
 
+OTHERS: dict[str, Any] = {
+    "null": None,
+    "boolean": True,
+    "string": "1.0",
+    "array": [1.0],
+    "object": {},
+    "number": 5.5,
+}
+MEANINGLESS = ("name", "notes")
+OWN = ("cmd", "seq", "table", "kind")  # by which the rest is found: left out or unknown, not of another type
+
 
 def requests(draw: Draw, profile: str) -> Iterator[Question]:
     """Break requests in all ways that the schema forbids; the first is sound."""
@@ -57,11 +70,9 @@ def requests(draw: Draw, profile: str) -> Iterator[Question]:
 
 def refuse(side: Implementation, scene: Scene, request: Mapping[str, Any], why: str) -> bool:
     """Hold a bad request to be refused as a whole, or in its only state; and a sound one not to be."""
-    seq = MAX_SEQ // 5
-    line = json.dumps({**request, "seq": seq}).replace("Infinity", "1e999")
-    answer = side.session.say(line.encode(), seq, side.profile)
-    parts = answer.get("steps", answer.get("states", [answer]))
-    outcomes = [part.get("outcome", "error") for part in parts]
+    line = json.dumps({**request, "seq": "SEQ"}).replace("Infinity", "1e999")
+    answer = side.said(line)
+    outcomes = [part.get("outcome", "error") for part in outcomes_of(answer)]
     side.n_asked, side.n_undecided = side.n_asked + 1, side.n_undecided + ("undecided" in outcomes)
     if why:
         assert {*outcomes, "rejected"} == {"rejected"} or outcomes == ["undecided"], (
@@ -70,6 +81,92 @@ def refuse(side: Implementation, scene: Scene, request: Mapping[str, Any], why: 
     else:
         assert "rejected" not in outcomes, f"a sound question is answered {answer}: {line}"
     return True
+
+
+@cache
+def _schema() -> dict[str, Any]:
+    return json_schema()["$defs"]  # type: ignore[no-any-return]
+
+
+def broken(request: Mapping[str, Any]) -> Iterator[tuple[dict[str, Any], str]]:
+    """Break a request in every way that the schema forbids.
+
+    Args:
+        request: valid, with its seq left out.
+
+    Yields:
+        The request with one fault, and what that is.
+    """
+    name = str(request["cmd"]).capitalize()
+    yield from _broken({"$ref": f"#/$defs/{name}"}, request, "")
+
+
+def _broken(schema: Mapping[str, Any], value: Any, where: str) -> Iterator[tuple[Any, str]]:
+    forms = list(_forms(schema))
+    own = next((form for form in forms if _fits(form, value)), {})
+    if not where.endswith(OWN):
+        kinds = {kind for form in forms for kind in _kinds(form)}
+        yield from (
+            (other, f"{where} is {other!r}") for kind, other in OTHERS.items() if where and kind not in kinds
+        )
+    if "integer" in _kinds(own):
+        yield 2.5, f"{where} = 2.5"
+        yield -1, f"{where} = -1"
+    if "number" in _kinds(own):
+        yield inf, f"{where} is beyond binary64"
+    if "enum" in own:
+        yield "nowhere", f"{where} is 'nowhere'"
+    if isinstance(value, Mapping):
+        for name, part in own.get("properties", {}).items():
+            if name in value and name not in MEANINGLESS:
+                is_due = name in own.get("required", ())
+                for changed, why in _broken(part, value[name], f"{where}.{name}".lstrip(".")):
+                    if is_due or changed is not None:  # null may stand for what is optional
+                        yield {**value, name: changed}, why
+                if name in own.get("required", ()) or {"required": [name]} in own.get("oneOf", ()):
+                    yield (
+                        {key: one for key, one in value.items() if key != name},
+                        f"{where}.{name} is missing".lstrip("."),
+                    )
+            elif name not in value and {"required": [name]} in own.get("oneOf", ()):
+                yield {**value, name: 1.0}, f"{where} has {name} too".lstrip(".")
+    if isinstance(value, list | tuple) and value:
+        items = own.get("prefixItems", [own.get("items")] * len(value))
+        for i, (part, one) in enumerate(zip(items, value, strict=False)):
+            for changed, why in _broken(part, one, f"{where}[{i}]") if i < 2 else ():
+                yield [*value[:i], changed, *value[i + 1 :]], why
+        if "minItems" in own:
+            yield value[:-1], f"{where} is too short"
+
+
+def _forms(schema: Mapping[str, Any]) -> Iterator[Mapping[str, Any]]:
+    """Return the alternatives of a schema, references resolved."""
+    if "$ref" in schema:
+        yield from _forms(_schema()[schema["$ref"].rpartition("/")[2]])
+    elif "anyOf" in schema:
+        for form in schema["anyOf"]:
+            yield from _forms(form)
+    else:
+        yield schema
+
+
+def _kinds(form: Mapping[str, Any]) -> set[str]:
+    """Return the JSON types that a form admits."""
+    if "enum" in form:
+        return {"string"}
+    kinds = form.get("type", ())
+    return {"number", "integer"} & {kinds} | {kinds} if isinstance(kinds, str) else set(kinds)
+
+
+def _fits(form: Mapping[str, Any], value: Any) -> bool:
+    """Tell whether a value is meant by a form: its type, and of objects the tag."""
+    kind = {type(None): "null", bool: "boolean", int: "integer", float: "number", str: "string"}.get(
+        type(value)
+    )
+    kind = kind or ("object" if isinstance(value, Mapping) else "array")
+    tags = [(name, part["enum"]) for name, part in form.get("properties", {}).items() if "enum" in part]
+    is_meant = kind != "object" or all(value.get(name, words[0]) in words for name, words in tags)
+    return (kind in _kinds(form) or (kind == "integer" and "number" in _kinds(form))) and is_meant
 
 
 def bad_states(draw: Draw, profile: str) -> Iterator[Question]:
@@ -222,17 +319,20 @@ def _at_their_bounds(law: Kind) -> Iterator[dict[str, Any]]:
     """Return scenes of which one law comes to its bound, or passes it."""
     stem = {"table": "stem", "w": 1.0, "h": 1.25}
     mushroom, by_nu = ({"table": "mushroom", "r": 1.0, name: 0.5, "h": 1.0} for name in ("w", "nu"))
-    yield {"table": "cap", "r": law(0.0, 1.0)}
-    yield {**stem, "w": law(0.0, 0.75)}
-    yield {**mushroom, "h": law(0.0, 1.0)}
-    yield {**by_nu, "nu": law(0.0, 0.75)}
-    yield {**by_nu, "nu": law(1.0, 0.25)}
-    yield {**mushroom, "w": law(1.0, 0.25)}
-    yield {**mushroom, "r": law(0.5, 1.0)}
-    yield {**stem, "slope": law(0.8, -0.25)}
-    yield {**mushroom, "slope": law(0.5, -0.25)}
-    yield {**stem, "slope": 0.4, "h": law(2.5, 1.0)}
-    yield {**by_nu, "slope": 0.25, "r": law(0.5, 1.0)}
+    for table, name, bound, far in (
+        ({"table": "cap"}, "r", 0.0, 1.0),
+        (stem, "w", 0.0, 0.75),
+        (mushroom, "h", 0.0, 1.0),
+        (by_nu, "nu", 0.0, 0.75),
+        (by_nu, "nu", 1.0, 0.25),
+        (mushroom, "w", 1.0, 0.25),
+        (mushroom, "r", 0.5, 1.0),
+        (stem, "slope", 0.8, -0.25),
+        (mushroom, "slope", 0.5, -0.25),
+        ({**stem, "slope": 0.4}, "h", 2.5, 1.0),
+        ({**by_nu, "slope": 0.25}, "r", 0.5, 1.0),
+    ):
+        yield {**table, name: law(bound, far)}
 
 
 def _of_two_periods(draw: Draw, apart: float) -> dict[str, Any]:

@@ -15,18 +15,25 @@ from typing import Any
 from msgspec.structs import replace
 
 from conformance.cases.draw import Draw
-from conformance.suite.answers import read_outcome, with_walls
+from conformance.suite.answers import outcomes_of, read_outcome, with_walls
 from conformance.suite.checks.form import FOREVER, Implementation, Question, octaves, question
 from conformance.suite.checks.paths import distance, drawn, is_same_stay
 from conformance.suite.process import Trouble
-from conformance.suite.session import MAX_SEQ
 from scene import Cap, Mushroom, Scene, State, Stem, Undecided
 from scene.tables import cycle_length
 
 MAX_LINE = 2**20  # bytes of a request
 ROUNDING, CARRIED = 2.0**-44, 2.0**-40  # of sizes: of a step, and of more
 N_SPELLINGS, N_AFTER, N_HITS = 16, 4, 2
-UNKNOWN = "hint", 7.0  # a field that the protocol does not know
+HINT = '"hint":7.0,'  # a field that the protocol does not know
+# What is written further, and before which key.
+FURTHER = {
+    "request": (HINT, '"cmd"'),
+    "scene": (HINT, '"table"'),
+    "state": (HINT, '"t"'),
+    "law": (HINT, '"mean"'),
+    "twice": ('"t_end":0.0,', '"t_end"'),
+}
 TEXTS = (
     "a name",
     'of "quotes" \\ and / signs',
@@ -65,14 +72,12 @@ def spellings(draw: Draw, profile: str) -> Iterator[Question]:
         named = {**request["scene"], "name": TEXTS[i % len(TEXTS)], "notes": "\u00e9" * int(length / 2)}
         if draw.pick((False, True)):
             named = {name: part for name, part in named.items() if part != 0.0 or name != "slope"}
-        yield scene, state, request, _written(draw, _absent(draw, {**request, "scene": named}))
+        yield scene, state, request, _written(draw, {**request, "scene": named})
 
 
 def same(side: Implementation, scene: Scene, state: State, request: Mapping[str, Any], line: str) -> bool:
     """Hold a line to be answered as the request is."""
-    seq = MAX_SEQ // 2
-    answer = side.session.say(line.replace('"SEQ"', str(seq)).encode(), seq, side.profile)
-    return _agree(side, scene, state, request, answer, repr(line[:400]))
+    return _agree(side, scene, state, request, side.said(line), repr(line[:400]))
 
 
 def bad_lines(draw: Draw, profile: str) -> Iterator[Question]:
@@ -102,7 +107,7 @@ def passed_over(side: Implementation, scene: Scene, asked: Sequence[tuple[State,
 
 def further_fields(draw: Draw, profile: str) -> Iterator[Question]:
     """Add a field that the protocol does not know, and write one twice."""
-    for place in ("request", "scene", "state", "law", "twice"):
+    for place in FURTHER:
         scene, state, request = _one(draw, profile)
         yield scene, state, request, place
 
@@ -111,19 +116,9 @@ def ignored_or_refused(
     side: Implementation, scene: Scene, state: State, request: dict[str, Any], place: str
 ) -> bool:
     """Hold a further field to change nothing, or to be refused."""
-    name, value = UNKNOWN
-    line = json.dumps({**request, "seq": "SEQ"})
-    if place == "twice":
-        line = line.replace('"t_end"', '"t_end":0.0,"t_end"')
-    elif place == "request":
-        line = f'{{"{name}":{value},{line[1:]}'
-    else:
-        key = {"scene": '"table"', "state": '"t"', "law": '"mean"'}[place]
-        line = line.replace(key, f'"{name}":{value},{key}')
-    seq = MAX_SEQ // 3
-    answer = side.session.say(line.replace('"SEQ"', str(seq)).encode(), seq, side.profile)
-    parts = answer.get("steps", answer.get("states", [answer]))
-    if [part["outcome"] for part in parts] == ["rejected"]:
+    more, key = FURTHER[place]
+    answer = side.said(json.dumps({**request, "seq": "SEQ"}).replace(key, more + key))
+    if [part["outcome"] for part in outcomes_of(answer)] == ["rejected"]:
         return True
     return _agree(side, scene, state, request, answer, f"with a further field in the {place}")
 
@@ -163,15 +158,14 @@ def _agree(
     """Hold an answer to a question in another form to the answer to itself, to rounding."""
     own = side.parts(request)
     told = with_walls({**answer}, request["scene"])
-    given = told.get("steps", told.get("states", [told]))
+    given = outcomes_of(told)
     if "error" in answer:
         raise Trouble("error", f"{answer['error']}: {how}")
     assert len(given) == len(own), f"{given}, must be {own}: {how}"
     n_compared, t = 0, state.t
     for one, other in zip(given, own, strict=True):
         stays = one.get("captured"), other.get("captured")
-        parts = ({name: value for name, value in part.items() if name != "captured"} for part in (one, other))
-        a, b = (read_outcome(part, t) for part in parts)
+        a, b = read_outcome(one, t), read_outcome(other, t)
         side.n_asked, side.n_undecided = side.n_asked + 1, side.n_undecided + isinstance(b, Undecided)
         assert type(a) is type(b), f"{one}, must be {other}: {how}"
         gap = distance(scene, a, b) if is_same_stay(*stays, math.inf) else math.inf
@@ -180,21 +174,10 @@ def _agree(
     return bool(n_compared)
 
 
-def _absent(draw: Draw, request: dict[str, Any]) -> dict[str, Any]:
-    """Leave out now and then what is optional: a wall that is null."""
-    if draw.pick((False, True)):
-        return request
-    starts = [
-        {name: part for name, part in state.items() if name != "wall" or part is not None}
-        for state in request.get("states", [request.get("state")])
-    ]
-    return {**request, **({"states": starts} if "states" in request else {"state": starts[0]})}
-
-
 def _written(draw: Draw, request: Mapping[str, Any]) -> str:
     """Write a request as JSON in a drawn way: order, blanks, numbers, escapes."""
     blanks = draw.pick(("", " ", "\t "))
-    escape = draw.pick((False, True))
+    escape, is_short = draw.pick((False, True)), draw.pick((False, True))
     styles: tuple[Callable[[float], str], ...] = (
         repr,
         lambda x: f"{x:.16e}",
@@ -210,8 +193,9 @@ def _written(draw: Draw, request: Mapping[str, Any]) -> str:
 
     def write(part: Any) -> str:
         if isinstance(part, Mapping):
-            names = list(part)
-            names = [names.pop(draw.pick(range(len(names)))) for _ in part]
+            # What is optional may be left out: a wall that is null.
+            names = [name for name in part if not (is_short and part[name] is None)]
+            names = [names.pop(draw.pick(range(len(names)))) for _ in range(len(names))]
             pairs = [f"{text(name)}{blanks}:{blanks}{write(part[name])}" for name in names]
             return "{" + blanks + f"{blanks},{blanks}".join(pairs) + blanks + "}"
         if isinstance(part, list | tuple):

@@ -10,12 +10,10 @@ Not seen: a program that does part of its work outside its clock, once for each 
 
 from __future__ import annotations
 
-import math
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
-from mpmath import fp
 from msgspec.structs import replace
 
 from conformance.cases.draw import Draw
@@ -25,13 +23,10 @@ from conformance.suite.checks.paths import distance
 from conformance.suite.process import Trouble
 from conformance.suite.session import Session
 from scene import Cap, Collision, Fourier, Outcome, Scene, State, Stem, Undecided
-from scene.geometry import table_at
 
 N_STEPS = 60  # collisions of the trajectory that `time` and `trajectory` both follow
 NEAR = 1e-6  # of sizes
-FAR = 10.0  # factor between flight times, of the first collisions and of all: energy may grow or fall
 LATE = 1e-3  # of time, after many collisions where motion is regular
-ON_WALL = 1e-9  # of the table's size
 READABLE = 0.02  # seconds that a question must take here, so that delays of milliseconds do not matter
 MAX_COLLISIONS, MAX_REPEAT = 20_000, 1000
 AMPLE = 3.0  # times as long as one repeat must the answer to many take
@@ -68,17 +63,9 @@ def timed(session: Session, scene: Scene, state: State, n: int, repeat: int) -> 
     request = {**question("time", scene, state, 0.0, n), "repeat": repeat}
     begin = time.monotonic()
     answer = session.ask(request)
-    return read_timing(answer, repeat, time.monotonic() - begin)
-
-
-def read_timing(answer: Mapping[str, Any], repeat: int, seconds: float) -> Timing:
-    """Read an answer to `time`; see `timed`."""
+    seconds = time.monotonic() - begin
     ns, last = read_repeats(answer, repeat, seconds, 0.0)
-    if isinstance(last, Undecided):
-        raise Trouble("declined", f"undecided: {last.reason}")
-    if not isinstance(last, Collision):
-        raise Trouble("fail", f"a trajectory that goes on for ever ends with {last}")
-    return Timing(ns, seconds, last)
+    return Timing(ns, seconds, _collision(last))
 
 
 def read_repeats(
@@ -108,30 +95,6 @@ def read_repeats(
     return list(ns), last
 
 
-def check_last(session: Session, scene: Scene, state: State, n: int, last: Collision) -> None:
-    """Hold the last state of a timing to what `trajectory` says, and to lie on its wall.
-
-    Raises:
-        Trouble: fail; what following it runs into.
-    """
-    if (away := _off_wall(scene, last)) > ON_WALL:
-        raise Trouble(
-            "fail", f"the last of {n} collisions, {last}, is off its wall by {away:.3g} of the table's size"
-        )
-    truth = _last_collision(session, scene, state, min(n, N_STEPS))
-    if n <= N_STEPS:
-        if distance(scene, last, truth) > NEAR:
-            raise Trouble("fail", f"the last of {n} collisions is {last} by time, {truth} by trajectory")
-        return
-    # Rounding grows from bounce to bounce; after many, only about how long they last can be told.
-    lasting = (truth.t - state.t) / N_STEPS * n
-    if not lasting / FAR < last.t - state.t < lasting * FAR:
-        found = (
-            f"{n} collisions last {last.t - state.t:.3g} by time, the first {N_STEPS} {truth.t - state.t:.3g}"
-        )
-        raise Trouble("fail", found)
-
-
 def questions(draw: Draw, profile: str) -> Iterator[Question]:
     """Time a path in each table that moves: in a cap rounding hardly grows."""
     turned = replace(START, vx=START.vx * draw.between(0.9, 1.1))
@@ -139,10 +102,19 @@ def questions(draw: Draw, profile: str) -> Iterator[Question]:
         yield scene, replace(turned, y=-turned.y) if isinstance(scene, Stem) else turned
 
 
-def same_steps(side: Implementation, scene: Scene, state: State) -> bool:
-    """Hold `time` to end where the trajectory does."""
-    for n in (1, 2, N_STEPS):
-        check_last(side.session, scene, state, n, timed(side.session, scene, state, n, 2).last)
+def same_steps(
+    side: Implementation, scene: Scene, state: State, counts: Sequence[int] = (1, 2, N_STEPS)
+) -> bool:
+    """Hold `time` to end where the trajectory does.
+
+    Raises:
+        Trouble: fail; what following it runs into.
+    """
+    for n in counts:
+        last = timed(side.session, scene, state, n, 2).last
+        truth = _last_collision(side.session, scene, state, n)
+        if distance(scene, last, truth) > NEAR:
+            raise Trouble("fail", f"the last of {n} collisions is {last} by time, {truth} by trajectory")
     return True
 
 
@@ -199,17 +171,17 @@ def _other(state: State, i: int) -> State:
 def _last_collision(session: Session, scene: Scene, state: State, n: int) -> Collision:
     """Follow n collisions, and return the last."""
     side = Implementation(session, "time").by("trajectory", "step", scene=scene)
-    last = side.path(scene, state, n)[-1]
+    return _collision(side.path(scene, state, n)[-1])
+
+
+def _collision(last: Outcome) -> Collision:
+    """Return the end of a path that goes on for ever.
+
+    Raises:
+        Trouble: declined where it is undecided, fail where it is no collision.
+    """
     if isinstance(last, Undecided):
         raise Trouble("declined", f"undecided: {last.reason}")
     if not isinstance(last, Collision):
-        raise Trouble("fail", f"a collision must come, and {last} is answered")
+        raise Trouble("fail", f"a path that goes on for ever ends with {last}")
     return last
-
-
-def _off_wall(scene: Scene, at: Collision) -> float:
-    """Return how far a place is from the wall that it names, as a part of the table's size."""
-    table = table_at(fp, scene, at.t)
-    gap = abs(table.gap(at.wall, at.x, at.y)) / (table.r if at.wall == "arc" else 1.0)
-    found = float(gap / table.size)
-    return math.inf if math.isnan(found) else found

@@ -41,8 +41,7 @@ def sentence_of_the_knots() -> str:
     page = (ROOT / "docs" / "scenes.md").read_text("utf-8")
     r = from_data(tomllib.loads(page.split("```toml bang-bang.toml")[1].split("```")[0])).r
     (start, first), (end, second) = r.knots[:2]
-    t = start + (end - start) / 4
-    return f"at {t} the value is {value(fp, r, t)}, not {first + (second - first) / 4}"
+    return f"at {(t := start + (end - start) / 4)} the value is {value(fp, r, t)}, not {first + (second - first) / 4}"
 
 
 def row_of_losses(name: str, label: str) -> str:
@@ -70,15 +69,10 @@ def size_of_the_audit() -> str:
     return f"{n_bytes / 1e9:.1f} GB for a full audit"
 
 
-def power(number: int) -> str:
-    """Return a power of ten as pages write it."""
-    return f"10^{len(str(number)) - 1}"
-
-
 def median_ns(solver: str) -> float:
     """Return what a collision of moving-cap at energy 1e7 takes."""
-    points = BENCH["points"]
-    return next(median(p["ns"]) for p in points if (p["workload"], p["solver"]) == ("moving-cap-1e7", solver))
+    points = {(point["workload"], point["solver"]): point["ns"] for point in BENCH["points"]}
+    return median(points["moving-cap-1e7", solver])
 
 
 def words_of_whole_arrays() -> str:
@@ -87,6 +81,7 @@ def words_of_whole_arrays() -> str:
 
 
 BYTES = layout.Shape(1, 1, 1, 1, 0, 1).bytes_of_a_particle
+TEN = {10**k: f"10^{k}" for k in range(12)}
 # What a page says of numbers that code knows: the page, and what must stand in it, its spaces as one.
 FIGURES: dict[str, tuple[str, Callable[[], str]]] = {
     "bang-bang law": ("docs/scenes.md", sentence_of_the_knots),
@@ -100,14 +95,14 @@ FIGURES: dict[str, tuple[str, Callable[[], str]]] = {
     ),
     "particles": (
         "docs/limits.md",
-        lambda: f"| {power(MOST_IN_MEMORY)} in memory, {power(MOST_ON_DISK)} with `--out` |",
+        lambda: f"| {TEN[MOST_IN_MEMORY]} in memory, {TEN[MOST_ON_DISK]} with `--out` |",
     ),
-    "cycles": ("docs/limits.md", lambda: f"| cycles of a run | {power(MAX_CYCLES)} |"),
+    "cycles": ("docs/limits.md", lambda: f"| cycles of a run | {TEN[MAX_CYCLES]} |"),
     "collisions": (
         "docs/limits.md",
-        lambda: f"| {power(MOST_IN_CYCLES)} in a run; {power(MOST_TO_A_TIME)} in `fast.flow`",
+        lambda: f"| {TEN[MOST_IN_CYCLES]} in a run; {TEN[MOST_TO_A_TIME]} in `fast.flow`",
     ),
-    "orbits": ("docs/limits.md", lambda: f"| {MAX_ORBITS}, with {power(MAX_COLLISIONS)} collisions each |"),
+    "orbits": ("docs/limits.md", lambda: f"| {MAX_ORBITS}, with {TEN[MAX_COLLISIONS]} collisions each |"),
     "times": ("README.md", lambda: f"| {median_ns('fast, lanes'):.0f} ns |"),
     "times of others": ("README.md", lambda: f"| {median_ns('lean C'):.0f} ns |"),
     "time of a call": ("README.md", lambda: f"| {median_ns('fast, a call') / 1e3:.1f} µs |"),

@@ -4,11 +4,8 @@ from __future__ import annotations
 
 import doctest
 import json
-import os
 import re
 import shlex
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -28,7 +25,7 @@ RUN_ELSEWHERE = {
     "protocol.md": {"json"},  # test_docs: against the schema and the plain stepper
     "corpus.md": {"json"},  # test_docs: the published line
     "cite.md": {"bibtex"},  # test_house_package
-    "clusters.md": {"bash"},  # below
+    "clusters.md": {"bash"},  # test_docs: with few particles
     "audit.md": {""},  # test_mushrooms_audit_runs: the commands, and the runs that they make taken up
     "ensembles.md": {"", "python"},  # test_mushrooms_scale, with fewer particles
 }
@@ -41,7 +38,7 @@ def blocks(page: Path) -> list[tuple[str, str]]:
     return FENCE.findall(page.read_text("utf-8"))
 
 
-@pytest.mark.parametrize("name", ["start.md", "theory.md", "your-scene.md"])
+@pytest.mark.parametrize("name", ["start.md", "theory.md", "your-scene.md", "scenes.md"])
 def test_the_python_of_a_page_does_what_it_says(name):
     found = doctest.testfile(str(DOCS / name), module_relative=False, optionflags=doctest.ELLIPSIS)
     assert found.attempted >= 4
@@ -51,14 +48,12 @@ def test_the_python_of_a_page_does_what_it_says(name):
 @pytest.mark.parametrize("name", deep_but(["start.md", "your-scene.md", "scenes.md"], "scenes.md"))
 def test_the_commands_of_a_page_do_what_they_say(command_line, tmp_path, monkeypatch, name):
     monkeypatch.chdir(tmp_path)
-    consoles = 0
     for first, text in blocks(DOCS / name):
         kind, _, file = first.partition(" ")
         if kind == "toml":
             (tmp_path / file).write_text(text, "utf-8")
         if kind != "console":
             continue
-        consoles += 1
         command, _, shown = text.removeprefix("$ mushrooms ").partition("\n")
         command, _, target = command.partition(" > ")
         code, out, _ = command_line(*shlex.split(command))
@@ -67,26 +62,6 @@ def test_the_commands_of_a_page_do_what_they_say(command_line, tmp_path, monkeyp
             (tmp_path / target).write_text(out, "utf-8")
             load(tmp_path / target)
         assert re.search(re.escape(shown.strip()).replace(r"\.\.\.", ".*?"), out, re.DOTALL), out
-    assert consoles
-
-
-SLURM = 'srun() { "$@"; }; scontrol() { echo "$@"; }; hostname() { echo 127.0.0.1; }\n'
-JOB = {"SLURM_CPUS_PER_TASK": "1", "SLURM_ARRAY_TASK_ID": "0", "SLURM_JOB_ID": "7"}
-
-
-@pytest.mark.deep
-@pytest.mark.parametrize("name", ["one-node.sh", "energies.sh", "several-nodes.sh"])
-def test_the_scripts_for_a_cluster_run(tmp_path, name):
-    """With few particles, another port, and functions in place of SLURM's commands."""
-    script = dict(blocks(DOCS / "clusters.md"))[f"bash {name}"].replace("8786", "18786")
-    few = re.sub(r"--particles \S+", "--particles 64", script)
-    path = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
-    known = {**os.environ, **JOB, "PATH": path}
-    done = subprocess.run(
-        ["bash", "-c", SLURM + few], cwd=tmp_path, env=known, stderr=subprocess.PIPE, check=False
-    )
-    assert done.returncode == 0, done.stderr.decode()
-    assert list(tmp_path.glob("run*/summary.json"))
 
 
 @pytest.mark.deep
@@ -109,21 +84,21 @@ def test_a_block_that_fails_is_not_passed_over(tmp_path):
         gallery.draw(page, tmp_path / "pictures")
 
 
+def is_run(name: str, first: str, text: str) -> bool:
+    """Tell whether a test runs a block of a page."""
+    kind = first.partition(" ")[0]
+    return (
+        kind in RUN_ELSEWHERE.get(name, ())
+        or kind.startswith("{")  # a directive: Sphinx acts on it, and warnings are errors
+        or (kind == "python" and (" " in first or text.startswith(">>>")))
+        or kind in ("console", "toml")
+        or all(line.startswith(INSTALLS) for line in text.splitlines())
+    )
+
+
 def unaccounted(name: str, page: str) -> list[str]:
     """List the first lines of blocks that no test runs."""
-    found = []
-    for first, text in FENCE.findall(page):
-        kind = first.partition(" ")[0]
-        is_run = (
-            kind in RUN_ELSEWHERE.get(name, ())
-            or kind.startswith("{")  # a directive: Sphinx acts on it, and warnings are errors
-            or (kind == "python" and (" " in first or text.startswith(">>>")))
-            or kind in ("console", "toml")
-            or all(line.startswith(INSTALLS) for line in text.splitlines())
-        )
-        if not is_run:
-            found.append(first)
-    return found
+    return [first for first, text in FENCE.findall(page) if not is_run(name, first, text)]
 
 
 def test_every_block_of_the_site_is_run():

@@ -41,7 +41,7 @@ def sentence_of_the_knots() -> str:
     page = (ROOT / "docs" / "scenes.md").read_text("utf-8")
     r = from_data(tomllib.loads(page.split("```toml bang-bang.toml")[1].split("```")[0])).r
     (start, first), (end, second) = r.knots[:2]
-    return f"at {(t := start + (end - start) / 4)} the value is {value(fp, r, t)}, not {first + (second - first) / 4}"
+    return f"at {(t := start + (end - start) / 4)} the value is {value(fp, r, t)}, not {(3 * first + second) / 4}"
 
 
 def row_of_losses(name: str, label: str) -> str:
@@ -107,12 +107,12 @@ FIGURES: dict[str, tuple[str, Callable[[], str]]] = {
     "times of others": ("README.md", lambda: f"| {median_ns('lean C'):.0f} ns |"),
     "time of a call": ("README.md", lambda: f"| {median_ns('fast, a call') / 1e3:.1f} µs |"),
     "time of a proof": ("README.md", lambda: f"| {median_ns('proof, 50 digits') / 1e6:.1f} ms |"),
-    "drawn questions": ("docs/verdict.md", lambda: f"{N_DRAWN} drawn questions"),
+    "drawn questions": ("docs/protocol.md", lambda: f"{N_DRAWN} drawn questions"),
     "fresh questions": (
-        "docs/verdict.md",
+        "docs/protocol.md",
         lambda: f"{ROUND} questions ({2 * ROUND} above core)",
     ),
-    "legs": ("docs/verdict.md", lambda: f"up to {MAX_KNOTS - 1} legs"),
+    "legs": ("docs/protocol.md", lambda: f"up to {MAX_KNOTS - 1} legs"),
     "bounds of hits": ("docs/detection.md", lambda: f"hits of a path | 2 | 2^{MAX_HITS.bit_length() - 1}"),
     "bounds of states": (
         "docs/detection.md",

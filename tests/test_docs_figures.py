@@ -41,7 +41,8 @@ def sentence_of_the_knots() -> str:
     page = (ROOT / "docs" / "scenes.md").read_text("utf-8")
     r = from_data(tomllib.loads(page.split("```toml bang-bang.toml")[1].split("```")[0])).r
     (start, first), (end, second) = r.knots[:2]
-    return f"at {(t := start + (end - start) / 4)} the value is {value(fp, r, t)}, not {(3 * first + second) / 4}"
+    t = start + (end - start) / 4
+    return f"at {t} the value is {value(fp, r, t)}, not {(3 * first + second) / 4}"
 
 
 def row_of_losses(name: str, label: str) -> str:
@@ -71,8 +72,7 @@ def size_of_the_audit() -> str:
 
 def median_ns(solver: str) -> float:
     """Return what a collision of moving-cap at energy 1e7 takes."""
-    points = {(point["workload"], point["solver"]): point["ns"] for point in BENCH["points"]}
-    return median(points["moving-cap-1e7", solver])
+    return median({(p["workload"], p["solver"]): p["ns"] for p in BENCH["points"]}["moving-cap-1e7", solver])
 
 
 def words_of_whole_arrays() -> str:

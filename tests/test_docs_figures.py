@@ -12,6 +12,7 @@ from statistics import median
 import pytest
 from mpmath import fp
 
+import fast
 import theory
 from conformance.cases.generated import ROUND
 from conformance.cases.table import FAMILIES
@@ -127,6 +128,7 @@ FIGURES: dict[str, tuple[str, Callable[[], str]]] = {
     "chunks": ("docs/ensembles.md", lambda: f"{conduct.MOST_CHUNKS} times as many"),
     "blocks": ("docs/ensembles.md", lambda: f"by default {conduct.LEAST_BLOCK} to {conduct.MOST_BLOCK},"),
     "fill values": ("docs/ensembles.md", words_of_whole_arrays),
+    **{f"fast.{name}": ("docs/api/fast.md", partial("fast.{} ".format, name)) for name in fast.__all__},
     "growth": ("docs/speed.md", lines_of_growth),
     **{
         name: ("theory/equations.md", partial(row_of_losses, name, label))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from fractions import Fraction
+from math import hypot
 
 import numpy as np
 import pytest
@@ -23,13 +24,15 @@ from fast.kernel import codes
 from fast.kernel import double_double as dd
 from fast.step import WALL_CODES
 from scene import Collision, Mushroom, State, Stem, Undecided, load
+from scene.geometry import table_at
 from scene.tables import period
 
 N_STEPS = int(os.environ.get("MUSHROOMS_STEPS", "250"))
 UNIT = 2.0**51  # backward units of 2^-104 in a backward ulp
 SHARP = 4.0  # units that nearly all answers keep
 WORST = 2.0**24  # where a wall's speed is the rest of harmonics that cancel: see fast.kernel.refine
-BRIEF = 2.0**-33  # of a period: so soon a wall's increase is the rest of terms that cancel
+# So soon, in periods, or leaving its wall so slowly, in parts of the speed, that terms cancel.
+BRIEF, GRAZING = 2.0**-33, 2.0**-36
 START = State(0.1, 0.2, 0.3, 140.0, 30.0)
 
 
@@ -65,6 +68,13 @@ def test_sine_and_cosine_to_32_decimals(angle):
             )
 
 
+def leaves_slowly(scene, state):
+    table, speed = table_at(fp, scene, state.t), hypot(state.vx, state.vy)
+    nx, ny = table.normal(state.wall, state.x, state.y)
+    leaving = nx * state.vx + ny * state.vy + table.receding(state.wall, state.y)
+    return abs(leaving) < GRAZING * speed
+
+
 def test_generated_steps_are_right_to_31_decimals(tally):
     units = []
 
@@ -81,7 +91,8 @@ def test_generated_steps_are_right_to_31_decimals(tally):
             # Not more shy than the careful step, whose answer it refines, but at once after a bounce.
             assert isinstance(path.outcome, Undecided)
             careful = fast.next_collision(scene, state, t_end)
-            assert isinstance(careful, Undecided) or careful.dt < BRIEF * period(scene).value(fp)
+            is_soon = isinstance(careful, Collision) and careful.dt < BRIEF * period(scene).value(fp)
+            assert isinstance(careful, Undecided) or is_soon or leaves_slowly(scene, state)
             tally["undecided"] += 1
             return
         dt, _, *place = path.numbers(0)

@@ -262,7 +262,8 @@ def test_sources_are_looked_at_before_anything_is_examined(tmp_path, monkeypatch
     )
     steppers, settings = AuditSteppers(simulate, fast.trajectory, fast.flow), AuditSettings(folder=tmp_path)
     session.conduct(steppers, settings, claims=select_claims("N6"))
-    assert order[:2] == ["code", "N6"]
+    assert order[0] == "code"
+    assert "N6" in order
     with pytest.raises(InterruptedError):
         session.conduct(steppers, settings, claims=select_claims("X5"))
     assert order[-2:] == ["code", "simulated"]

@@ -61,17 +61,7 @@ def floor_velocity_sign(flight: Flight, plain: Plain[Normal], wall: Wall, s: flo
     return nx, ny, -u if wall == "floor" else u
 
 
-@mutant(Flight, "normal")
-def tilt_rate_of_the_floor(flight: Flight, plain: Plain[Normal], wall: Wall, s: float) -> Normal:
-    """Takes the velocity of a slanted side at the floor for that where it is hit."""
-    nx, ny, u = plain(wall, s)
-    if wall not in UPRIGHT:
-        return nx, ny, u
-    slope, h = flight.laws["slope"].at(s), flight.laws["h"].at(s)
-    return nx, ny, -(flight.width(s).rate - slope.rate * h.now) / hypot(1.0, slope.now)
-
-
-@mutant(Flight, "gap")
+@mutant(Flight, "gap", COMMON)
 def tilt_rate_sign(flight: Flight, plain: Plain[Gap], wall: Wall, s: float) -> Gap:
     """Has the sign of d(slope)/dt wrong in the velocity of a side."""
     gap = plain(wall, s)
@@ -85,7 +75,7 @@ def left_side_upright(flight: Flight, plain: Plain[Gap], wall: Wall, s: float) -
     return Gap(w.value + flight.x, w.rise + flight.vx * s, w.rate, 1.0, 0.0) if w else plain(wall, s)
 
 
-@mutant(Trusting, "gap")
+@mutant(Trusting, "gap", COMMON)
 def sides_slant_from_the_floor(flight: Flight, plain: Plain[Gap], wall: Wall, s: float) -> Gap:
     """Takes w for the half-width at the floor, not at the mouth."""
     gap = plain(wall, s)
@@ -110,18 +100,10 @@ def floor_static(flight: Flight, plain: Plain[None], scene: Scene, state: State,
     hold(flight, "h")
 
 
-@mutant(Flight, "width")
+@mutant(Flight, "width", COMMON)
 def hole_not_scaled_by_radius(flight: Flight, plain: Plain[LawValue], s: float) -> LawValue:
     """Takes nu for the half-width of the mouth."""
     return flight.laws["nu"].at(s) if "nu" in flight.laws else plain(s)
-
-
-@mutant(Flight, "width")
-def hole_rate_of_radius_only(flight: Flight, plain: Plain[LawValue], s: float) -> LawValue:
-    """Forgets that nu moves: the rate of nu r is nu r'."""
-    if "nu" not in flight.laws:
-        return plain(s)
-    return plain(s)._replace(rate=flight.laws["nu"].at(s).now * flight.laws["r"].at(s).rate)
 
 
 @mutant(Flight, "walls_near")

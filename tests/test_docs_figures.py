@@ -42,8 +42,8 @@ def sentence_of_the_knots() -> str:
     page = (ROOT / "docs" / "scenes.md").read_text("utf-8")
     r = from_data(tomllib.loads(page.split("```toml bang-bang.toml")[1].split("```")[0])).r
     (start, first), (end, second) = r.knots[:2]
-    t = start + (end - start) / 4
-    return f"at {t} the value is {value(fp, r, t)}, not {(3 * first + second) / 4}"
+    linear = (3 * first + second) / 4
+    return f"at {(t := start + (end - start) / 4)} the value is {value(fp, r, t)}, not {linear}"
 
 
 def row_of_losses(name: str, label: str) -> str:
@@ -71,17 +71,13 @@ def size_of_the_audit() -> str:
     return f"{n_bytes / 1e9:.1f} GB for a full audit"
 
 
-def median_ns(solver: str) -> float:
-    """Return what a collision of moving-cap at energy 1e7 takes."""
-    return median({(p["workload"], p["solver"]): p["ns"] for p in BENCH["points"]}["moving-cap-1e7", solver])
-
-
 def words_of_whole_arrays() -> str:
     whole = [f"`{name}`" for name, field in layout.FIELDS.items() if field.kind.startswith("int")]
     return f"-1 in arrays of whole numbers ({', '.join(sorted(whole))})"
 
 
 BYTES = layout.Shape(1, 1, 1, 1, 0, 1).bytes_of_a_particle
+NS = {p["solver"]: median(p["ns"]) for p in BENCH["points"] if p["workload"] == "moving-cap-1e7"}
 TEN = {10**k: f"10^{k}" for k in range(12)}
 # What a page says of numbers that code knows: the page, and what must stand in it, its spaces as one.
 FIGURES: dict[str, tuple[str, Callable[[], str]]] = {
@@ -104,10 +100,10 @@ FIGURES: dict[str, tuple[str, Callable[[], str]]] = {
         lambda: f"| {TEN[MOST_IN_CYCLES]} in a run; {TEN[MOST_TO_A_TIME]} in `fast.flow`",
     ),
     "orbits": ("docs/limits.md", lambda: f"| {MAX_ORBITS}, with {TEN[MAX_COLLISIONS]} collisions each |"),
-    "times": ("README.md", lambda: f"| {median_ns('fast, lanes'):.0f} ns |"),
-    "times of others": ("README.md", lambda: f"| {median_ns('lean C'):.0f} ns |"),
-    "time of a call": ("README.md", lambda: f"| {median_ns('fast, a call') / 1e3:.1f} µs |"),
-    "time of a proof": ("README.md", lambda: f"| {median_ns('proof, 50 digits') / 1e6:.1f} ms |"),
+    "times": ("README.md", lambda: f"| {NS['fast, lanes']:.0f} ns |"),
+    "times of others": ("README.md", lambda: f"| {NS['lean C']:.0f} ns |"),
+    "time of a call": ("README.md", lambda: f"| {NS['fast, a call'] / 1e3:.1f} µs |"),
+    "time of a proof": ("README.md", lambda: f"| {NS['proof, 50 digits'] / 1e6:.1f} ms |"),
     "drawn questions": ("docs/protocol.md", lambda: f"{N_DRAWN} drawn questions"),
     "fresh questions": (
         "docs/protocol.md",

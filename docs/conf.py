@@ -31,7 +31,7 @@ copyright = author
 
 extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "sphinx_copybutton"]
 source_suffix = {".md": "markdown"}
-exclude_patterns = ["generated"]  # pictures, and what pages include
+exclude_patterns = ["generated", "kill-matrix.md", "scoreboard.md"]  # included, or tables by commands
 html_theme = "furo"
 html_title = "Oscillating Mushrooms"
 html_static_path = ["site.css"]
@@ -69,6 +69,7 @@ def in_the_repository(app: Any, name: str, text: list[str]) -> None:
         return f"]({REPOSITORY}{target.relative_to(ROOT).as_posix()}"
 
     text[0] = re.sub(r"\]\((\.\./[^)#:]+)(?=[)#])", address, text[0])
+    text[0] = re.sub(r"\]\((kill-matrix|scoreboard)\.md", rf"]({REPOSITORY}docs/\1.md", text[0])
 
 
 def included(app: Any, path: Path, parent: str, text: list[str]) -> None:
@@ -76,7 +77,7 @@ def included(app: Any, path: Path, parent: str, text: list[str]) -> None:
 
     def address(found: re.Match[str]) -> str:
         target = (DOCS / path).parent.joinpath(found[1]).resolve()
-        if target.is_relative_to(DOCS):
+        if target.is_relative_to(DOCS) and target.name not in exclude_patterns:
             return f"]({target.relative_to(DOCS).as_posix()}"
         return f"]({REPOSITORY}{target.relative_to(ROOT).as_posix()}"
 

@@ -62,8 +62,8 @@ def test_plain_fails_no_vector(vectors):
 
 
 def test_the_page_for_contributors_shows_a_mutant_as_it_is():
-    page = (DOCS / "contributing" / "mutant.md").read_text("utf-8")
-    shown = page.partition("```python\n")[2].partition("```")[0]
+    page = (DOCS.parent / "CONTRIBUTING.md").read_text("utf-8")
+    shown = page.partition("\n```python\n")[2].partition("```")[0]
     assert shown
     assert shown in (kill_matrix.DATA / "walls.py").read_text("utf-8")
 

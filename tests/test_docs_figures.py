@@ -7,10 +7,12 @@ import tomllib
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
+from statistics import median
 
 import pytest
 from mpmath import fp
 
+import fast
 import theory
 from conformance.cases.generated import ROUND
 from conformance.cases.table import FAMILIES
@@ -18,7 +20,10 @@ from conformance.mutants import MUTANTS
 from conformance.suite.checks.paths import MAX_HITS, MAX_STATES, MAX_WAIT
 from conformance.suite.checks.refusals import MOST_SAMPLES
 from conformance.suite.disguise import N_DRAWN
+from fast.given import MAX_CYCLES, MOST_IN_CYCLES, MOST_TO_A_TIME
 from fast.kernel.kept import LANE_ROWS
+from mushrooms.orbits import MAX_COLLISIONS, MAX_ORBITS
+from mushrooms.simulate import MOST_IN_MEMORY, MOST_ON_DISK
 from mushrooms.store import conduct, layout
 from mushrooms.store.asked import Asked
 from reference.arithmetic import MAX_WORK
@@ -32,11 +37,12 @@ BENCH = json.loads((ROOT / "docs" / "bench" / "bench.json").read_bytes())
 
 
 def sentence_of_the_knots() -> str:
-    """Evaluate the bang-bang law of docs/start.md between its first knots."""
-    page = (ROOT / "docs" / "start.md").read_text("utf-8")
-    r = from_data(tomllib.loads(page.split("```toml knots.toml")[1].split("```")[0])).r
-    (_, first), (_, second) = r.knots[:2]
-    return f"at 0.25 the value is {value(fp, r, 0.25)}, not {first + (second - first) / 4}"
+    """Evaluate the bang-bang law of docs/scenes.md at a quarter of its first leg."""
+    page = (ROOT / "docs" / "scenes.md").read_text("utf-8")
+    r = from_data(tomllib.loads(page.split("```toml bang-bang.toml")[1].split("```")[0])).r
+    (start, first), (end, second) = r.knots[:2]
+    linear = (3 * first + second) / 4
+    return f"at {(t := start + (end - start) / 4)} the value is {value(fp, r, t)}, not {linear}"
 
 
 def row_of_losses(name: str, label: str) -> str:
@@ -70,18 +76,39 @@ def words_of_whole_arrays() -> str:
 
 
 BYTES = layout.Shape(1, 1, 1, 1, 0, 1).bytes_of_a_particle
+NS = {p["solver"]: median(p["ns"]) for p in BENCH["points"] if p["workload"] == "moving-cap-1e7"}
+TEN = {10**k: f"10^{k}" for k in range(12)}
 # What a page says of numbers that code knows: the page, and what must stand in it, its spaces as one.
 FIGURES: dict[str, tuple[str, Callable[[], str]]] = {
-    "bang-bang law": ("docs/start.md", sentence_of_the_knots),
-    "mutants": ("README.md", lambda: f"{len(MUTANTS)} faulty steppers"),
+    "bang-bang law": ("docs/scenes.md", sentence_of_the_knots),
+    "mutants": ("README.md", lambda: f"{len(MUTANTS)} deliberately broken steppers"),
     "attacks": ("CHANGELOG.md", lambda: f"{len(FAMILIES)} families of seeded questions"),
     "harmonics": ("docs/scenes.md", lambda: f"Up to {MAX_HARMONICS} each"),
-    "drawn questions": ("docs/verdict.md", lambda: f"{N_DRAWN} drawn questions"),
+    "knots": ("docs/scenes.md", lambda: f"Up to {MAX_KNOTS} knots"),
+    "laws": (
+        "docs/limits.md",
+        lambda: f"{MAX_HARMONICS} harmonics, or a bang-bang law of at most {MAX_KNOTS} ",
+    ),
+    "particles": (
+        "docs/limits.md",
+        lambda: f"| {TEN[MOST_IN_MEMORY]} in memory, {TEN[MOST_ON_DISK]} with `--out` |",
+    ),
+    "cycles": ("docs/limits.md", lambda: f"| cycles of a run | {TEN[MAX_CYCLES]} |"),
+    "collisions": (
+        "docs/limits.md",
+        lambda: f"| {TEN[MOST_IN_CYCLES]} in a run; {TEN[MOST_TO_A_TIME]} in `fast.flow`",
+    ),
+    "orbits": ("docs/limits.md", lambda: f"| {MAX_ORBITS}, with {TEN[MAX_COLLISIONS]} collisions each |"),
+    "times": ("README.md", lambda: f"| {NS['fast, lanes']:.0f} ns |"),
+    "times of others": ("README.md", lambda: f"| {NS['lean C']:.0f} ns |"),
+    "time of a call": ("README.md", lambda: f"| {NS['fast, a call'] / 1e3:.1f} µs |"),
+    "time of a proof": ("README.md", lambda: f"| {NS['proof, 50 digits'] / 1e6:.1f} ms |"),
+    "drawn questions": ("docs/protocol.md", lambda: f"{N_DRAWN} drawn questions"),
     "fresh questions": (
-        "docs/verdict.md",
+        "docs/protocol.md",
         lambda: f"{ROUND} questions ({2 * ROUND} above core)",
     ),
-    "legs": ("docs/verdict.md", lambda: f"up to {MAX_KNOTS - 1} legs"),
+    "legs": ("docs/protocol.md", lambda: f"up to {MAX_KNOTS - 1} legs"),
     "bounds of hits": ("docs/detection.md", lambda: f"hits of a path | 2 | 2^{MAX_HITS.bit_length() - 1}"),
     "bounds of states": (
         "docs/detection.md",
@@ -96,6 +123,7 @@ FIGURES: dict[str, tuple[str, Callable[[], str]]] = {
     "chunks": ("docs/ensembles.md", lambda: f"{conduct.MOST_CHUNKS} times as many"),
     "blocks": ("docs/ensembles.md", lambda: f"by default {conduct.LEAST_BLOCK} to {conduct.MOST_BLOCK},"),
     "fill values": ("docs/ensembles.md", words_of_whole_arrays),
+    **{f"fast.{name}": ("docs/api/fast.md", partial("fast.{} ".format, name)) for name in fast.__all__},
     "growth": ("docs/speed.md", lines_of_growth),
     **{
         name: ("theory/equations.md", partial(row_of_losses, name, label))

@@ -49,6 +49,9 @@ def test_the_citation_is_of_this_version():
     assert PROJECT["authors"] == [{"name": "The Oscillating Mushrooms authors"}]
     assert "family-names: Gelfreich" in citation
     assert PROJECT["urls"]["Paper"].endswith(re.search(r"doi: (\S+)", citation)[1])
+    assert {PROJECT["version"], PROJECT["urls"]["Paper"], REPOSITORY} <= set(
+        re.findall(r"[^\s(){},]+", (ROOT / "docs" / "cite.md").read_text("utf-8"))
+    )
 
 
 @pytest.mark.parametrize("name", ["ci.yml", "release.yml"])

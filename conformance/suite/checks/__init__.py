@@ -2,7 +2,7 @@
 
 Each has one form (`checks.form`): a name, what it asks, how it judges, and of which profiles. Exact
 symmetries (`properties`), statistics (`ensembles`) and the rules of the protocol stand side by side; each is
-asked of every profile that is offered. docs/contributing/check.md says how one is added.
+asked of every profile that is offered. CONTRIBUTING.md says how one is added.
 """
 
 from collections.abc import Callable, Iterator
@@ -14,7 +14,7 @@ from conformance.suite.checks import flows, paths, refusals, requests, timing
 from conformance.suite.checks.ensembles import ensemble_checks
 from conformance.suite.checks.form import QUESTIONS, Implementation, Question, SuiteCheck, run_check
 from conformance.suite.session import AnswerLine, Session
-from scene import Scene, State
+from scene import Scene, State, transforms
 
 __all__ = ["Implementation", "SuiteCheck", "checks_of", "judge", "questions", "run_check"]
 
@@ -25,12 +25,14 @@ N_SYMMETRIES = 12
 ALL = (*QUESTIONS, "time")
 
 
-def moments(
-    draw: Draw, profile: str, kinds: tuple[str, ...] = ("fourier", "bang-bang", "constant")
-) -> Iterator[Question]:
-    """Draw scenes and states for the exact symmetries, and times to the end; a flow meets a few walls."""
+def moments(draw: Draw, profile: str, *, is_idle: bool = False) -> Iterator[Question]:
+    """Draw scenes and states for the exact symmetries, and times to the end; a flow meets a few walls.
+
+    With `is_idle` the tables are at rest, and their constants are written as laws.
+    """
     for _ in range(N_SYMMETRIES):
-        scene, state = paths.drawn(draw, kinds=kinds)
+        scene, state = paths.drawn(draw, kinds=("fourier", "bang-bang", "constant"))
+        scene = transforms.idle(transforms.frozen(scene, state.t)) if is_idle else scene
         span = paths.crossing(scene, state)
         yield scene, state, state.t + span * (draw.between(0.25, 2.0) if profile == "flow" else 16.0)
 
@@ -48,8 +50,8 @@ def _symmetric(name: str, side: Implementation, scene: Scene, state: State, t_en
 
 def _symmetry(name: str) -> SuiteCheck:
     asks: Callable[[Draw, str], Iterator[Question]] = moments
-    if name == "static-limit":  # asks for constants written as laws
-        asks = partial(moments, kinds=("fourier",))
+    if name == "static-limit":  # needs laws, though its tables are at rest
+        asks = partial(moments, is_idle=True)
     profiles = QUESTIONS[:2] if name in OF_HITS else QUESTIONS
     return SuiteCheck(f"property/{name}", asks, partial(_symmetric, name), profiles)
 

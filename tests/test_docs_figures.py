@@ -17,7 +17,8 @@ import theory
 from conformance.cases.generated import ROUND
 from conformance.cases.table import FAMILIES
 from conformance.mutants import MUTANTS
-from conformance.suite.checks.paths import MAX_HITS, MAX_STATES, MAX_WAIT
+from conformance.suite.checks.flows import MAX_STATES
+from conformance.suite.checks.paths import MAX_HITS, MAX_WAIT
 from conformance.suite.checks.refusals import MOST_SAMPLES
 from conformance.suite.disguise import N_DRAWN
 from fast.given import MAX_CYCLES, MOST_IN_CYCLES, MOST_TO_A_TIME

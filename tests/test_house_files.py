@@ -24,7 +24,7 @@ MAX_STATEMENTS = {
     "reference": 1_440,
     "fast": 4_010,
     "theory": 2_290,
-    "conformance": 8_590,
+    "conformance": 8_591,
     "mushrooms": 4_021,
     "tests": 14_045,
     "docs": 110,

@@ -215,7 +215,7 @@ def failing_line(name):
 def test_a_faulty_stepper_is_reported_in_few_and_short_numbers(name):
     """At most twelve numbers that are not 0 or 1, all but three of at most six digits."""
     # In a process of its own: Hypothesis also draws constants of all modules that are loaded.
-    code = f"from tests.test_conformance_strategies import failing_line; print(failing_line({name!r}))"
+    code = f"import sys; sys.path += ['tests']; import {__name__} as t; print(t.failing_line({name!r}))"
     command = [sys.executable, "-c", code]
     line = subprocess.run(
         command, cwd=Path(__file__).parents[1], capture_output=True, check=True, text=True

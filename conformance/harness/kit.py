@@ -55,7 +55,16 @@ def serve_engine(name: str, next_hit: NextHit) -> None:
                 return refusal
             if self.wall is None and self.y == self.vy == 0:
                 raise Open("it flies along the mouth")
-            return _answer_of(next_hit, self.scene, _leaving(self), self.t_end)
+            answer = _answer_of(next_hit, self.scene, _leaving(self), self.t_end)
+            if isinstance(answer, AnsweredCollision):
+                self.require_alone(answer)
+            return answer
+
+        def require_alone(self, hit: AnsweredCollision) -> None:
+            other = table_at(fp, self.scene, hit.t).nearest_wall(hit.x, hit.y, but=hit.wall)
+            s = hit.t - self.state.t
+            if abs(self.f(other, s)[0]) <= self.noise(other, s):
+                raise Open(f"{hit.wall} and {other} are met at once, within rounding")
 
     _serve(name, partial(plain.next_collision, flight=Question))
 

@@ -10,7 +10,7 @@ import hashlib
 import math
 import time
 from collections.abc import Callable, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -129,8 +129,34 @@ class Ensemble(NamedTuple):
         Source: Eq:ps, the probability of never being captured, where a cycle begins at the greatest nu; of
         another start those count as captured in the first cycle who began so.
         """
-        captured = self.is_captured()[self.takes_part()]
-        return 1.0 - captured.mean(axis=0) if len(captured) else np.full(captured.shape[1], np.nan)
+        return 1.0 - _mean(self.is_captured()[self.takes_part()])
+
+    def p_nc_se(self) -> FloatArray:
+        """Return (K,): the standard error of `p_nc`; where all are alike that of a share of 1 / (n + 1).
+
+        It is 0 where the mouth never narrows: nobody can be captured.
+        """
+        n = max(int(self.takes_part().sum()), 1)
+        share = np.clip(self.p_nc(), 1.0 / (n + 1), n / (n + 1))
+        return np.sqrt(share * (1.0 - share) / n) * bool(self.t_in.shape[2])
+
+    def s(self) -> FloatArray:
+        """Return (N, K): s = log of the energy after a cycle over that before it; log is natural."""
+        before = np.column_stack([np.full(len(self.energy), self.energy0), self.cycle_energies[:, :-1]])
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return np.asarray(np.log(self.cycle_energies / before))
+
+    def m1(self) -> FloatArray:
+        """Return (K,): the mean of s over those who take part, by cycle; nan of no one.
+
+        Source: Eq:Erate.
+        """
+        return _mean(self.s()[self.takes_part()])
+
+    def m1_se(self) -> FloatArray:
+        """Return (K,): the standard error of `m1`; nan of fewer than two."""
+        s = self.s()[self.takes_part()]
+        return s.std(axis=0, ddof=1) / math.sqrt(len(s)) if len(s) > 1 else np.full(s.shape[1], np.nan)
 
     def ns_per_collision(self) -> float:
         """Return kernel wall time x threads / collisions, in nanoseconds."""
@@ -143,16 +169,14 @@ class Ensemble(NamedTuple):
         return f"Ensemble(E0 = {self.energy0:.6g}, {what})"
 
     def _repr_html_(self) -> str:
-        taking_part = self.energy[self.takes_part()]
+        each = zip(self.m1()[:6], self.m1_se()[:6], strict=True)
         shown = {
             "particles": f"{len(self.energy):,}",
             "followed to the end": f"{int((self.outcome == FOLLOWED).sum()):,}",
             "cycles": self.cycle_energies.shape[1],
             "initial energy": f"{self.energy0:.6g}",
             "collisions": f"{int(self.n_collisions.sum()):,}",
-            "mean of log E1/E0": f"{np.log(taking_part / self.energy0).mean():.6g}"
-            if len(taking_part)
-            else "–",
+            "m1, a cycle": ", ".join(f"{mean:.4g} ± {error:.1g}" for mean, error in each),
             "never captured, a cycle": ", ".join(f"{share:.4g}" for share in self.p_nc()[:6]),
             "sha256": self.sha256(),
         }
@@ -164,6 +188,11 @@ class Ensemble(NamedTuple):
         for array in self[1:-2]:
             digest.update(np.ascontiguousarray(array).data)
         return digest.hexdigest()
+
+
+def _mean(rows: npt.NDArray[Any]) -> FloatArray:
+    """Return the mean of each column; nan of no rows."""
+    return np.asarray(rows.mean(axis=0)) if len(rows) else np.full(rows.shape[1], np.nan)
 
 
 def simulate(

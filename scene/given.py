@@ -9,7 +9,7 @@ import itertools
 import math
 from fractions import Fraction
 
-from scene.refusal import InvalidScene, check_number, shown
+from scene.refusal import InvalidScene, check_number, listed, shown
 
 MAX_HARMONICS = 16  # validity is decided by exact algebra, whose cost grows steeply with the degree
 MAX_KNOTS = 256
@@ -32,6 +32,7 @@ def amplitudes(field: str, numbers: object) -> tuple[float, ...]:
     Raises:
         InvalidScene: they are no list of finite numbers, or too many.
     """
+    numbers = listed(numbers)
     if not isinstance(numbers, tuple | list):
         raise InvalidScene(f"{field} = {shown(numbers)}, must be a list of numbers")
     if len(numbers) > MAX_HARMONICS:
@@ -45,6 +46,7 @@ def checked_knot(i: int, knot: object) -> tuple[float, float]:
     Raises:
         InvalidScene: it is no pair of finite numbers.
     """
+    knot = listed(knot)
     if not (isinstance(knot, tuple | list) and len(knot) == 2):
         raise InvalidScene(f"bang-bang.knots[{i}] = {shown(knot)}, must be a pair [time, value]")
     time, value = knot

@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scene.given import MAX_KNOTS, amplitudes, check_legs, checked_knot, finite
-from scene.refusal import InvalidScene, shown
+from scene.refusal import BadInput, InvalidScene, listed, shown
 
 LEAST_NORMAL = 2.0**-1022
 
@@ -65,6 +65,10 @@ class Fourier(
             raise InvalidScene(f"fourier.{field} = {size}, must be finite and > 0")
         _keep(self, field, size)
 
+    def __call__(self, t: Any) -> Any:
+        """Return the value at a time, or an array of values at an array of times."""
+        return at(self, t)
+
     def harmonics(self) -> list[tuple[int, float, float]]:
         """Return (k, cosine amplitude, sine amplitude) for every harmonic present."""
         n = max(len(self.cos), len(self.sin))
@@ -84,13 +88,17 @@ class BangBang(msgspec.Struct, frozen=True, tag_field="kind", tag="bang-bang", f
         Raises:
             InvalidScene: naming the knot, the value and the bound.
         """
-        knots = self.knots
+        knots = listed(self.knots)
         if not isinstance(knots, tuple | list):
             raise InvalidScene(f"bang-bang.knots = {shown(knots)}, must be a list of pairs [time, value]")
         if not 2 <= len(knots) <= MAX_KNOTS:
             raise InvalidScene(f"bang-bang.knots has {len(knots)} knots, must have 2 to {MAX_KNOTS}")
         _keep(self, "knots", tuple(checked_knot(i, knot) for i, knot in enumerate(knots)))
         check_legs(self.knots)
+
+    def __call__(self, t: Any) -> Any:
+        """Return the value at a time, or an array of values at an array of times."""
+        return at(self, t)
 
 
 Law = float | Fourier | BangBang
@@ -327,6 +335,29 @@ def values(law: Law, times: FloatArray, order: int = 0) -> FloatArray:
             those = (legs == leg) & half
             found[those] = evaluate(_Arrays, piece, phases[those], order)
     return found
+
+
+def at(law: Law, t: Any) -> Any:
+    """Evaluate a law for a caller, in binary64.
+
+    Args:
+        law: a sound law; a bare number is one.
+        t: a time, or an array or list of times of any shape [time].
+
+    Returns:
+        A float for a single time, else an array of the times' shape.
+
+    Raises:
+        BadInput: a time is no finite number.
+    """
+    try:
+        times = np.asarray(t, np.float64)
+    except (TypeError, ValueError):
+        raise BadInput(f"t = {shown(t)}, must be finite numbers") from None
+    if not np.isfinite(times).all():
+        raise BadInput(f"t = {times[~np.isfinite(times)][0]}, must be finite")
+    found = values(law, times.reshape(-1)).reshape(times.shape)
+    return found if times.ndim else float(found)
 
 
 def bounds(law: Law) -> Bounds:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import doctest
+import importlib
 import json
 import re
 import shlex
@@ -29,6 +30,27 @@ RUN_ELSEWHERE = {
     "ensembles.md": {"", "python"},  # test_mushrooms_scale, with fewer particles
 }
 INSTALLS = ("pip install", "mushrooms --version", "sphinx-build")
+
+
+def undocumented(name: str) -> list[str]:
+    """List the public names of a package that `dir` does not find, or that its page says nothing of.
+
+    The page says what the docstring does of a function or class under its own name, and names the others.
+    """
+    package, page = importlib.import_module(name), (DOCS / "api" / f"{name}.md").read_text("utf-8")
+    own = [n for n in package.__all__ if getattr(getattr(package, n), "__name__", "") == n]
+    told = {n for n in own if getattr(package, n).__doc__}
+    return [n for n in package.__all__ if not (n in dir(package) and (n in told or f"`{n}`" in page))]
+
+
+@pytest.mark.parametrize("name", ["scene", "reference", "fast", "theory"])
+def test_every_public_name_is_found_and_documented(name, monkeypatch):
+    package = importlib.import_module(name)
+    assert undocumented(name) == []
+    assert len(package.__all__) == len(set(package.__all__)) > 5
+    monkeypatch.setattr(package, "__all__", ["nowhere", *package.__all__])
+    monkeypatch.setattr(package, "nowhere", 1, raising=False)
+    assert undocumented(name) == ["nowhere"]
 
 
 def blocks(page: Path) -> list[tuple[str, str]]:

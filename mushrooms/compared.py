@@ -49,7 +49,7 @@ def measured(asked: Asked, tally: RunTally) -> dict[str, Any]:
     has_island = isinstance(asked.scene, Mushroom)
     free = 1.0 - tally.captured / (n * k) if n and has_island else None
     free_error = None if free is None else _measured_error(asked.scene, free, n * k)
-    found = _predicted(asked)
+    found = predicted(asked)
     pulls: tuple[float | None, float | None] = (None, None)
     if found is not None and n:
         expected_error = _binomial_error(found.p_nc, n * k)
@@ -133,7 +133,7 @@ def begins_widest(scene: Mushroom) -> bool:
     return bool(now.w / now.r >= widest * (1 - SAME))
 
 
-def _predicted(asked: Asked) -> Theory | None:
+def predicted(asked: Asked) -> Theory | None:
     """Return what theory says of a run; None where it covers nothing.
 
     What finite energy adds to a cycle goes as E^(-1/2) with the energy at which the cycle begins. Cycles are

@@ -61,7 +61,8 @@ def test_each_cycle_has_its_means_and_their_errors():
     assert (cap.p_nc(), cap.p_nc_se()) == ([1.0], [0.0])
     assert np.isnan(cap.m1_se()).all()
     nobody = run._replace(outcome=run.outcome + 1)
-    assert all(np.isnan(each).all() for each in (nobody.m1(), nobody.m1_se(), nobody.p_nc(), nobody.p_nc_se()))
+    for each in (nobody.m1(), nobody.m1_se(), nobody.p_nc(), nobody.p_nc_se()):
+        assert np.isnan(each).all()
 
 
 @pytest.mark.parametrize("name", ["moving-cap", "fixed-cap-anticlockwise", "breathing-circle", "fermi-ulam"])

@@ -277,7 +277,7 @@ def _told_how_to_go_on(run: Any, command: str) -> Iterator[None]:
 
 
 def draw_energies(path: Path, asked: Any, run: Any) -> None:
-    """Write the histogram of ln(E1/E0) of those who take part; of several cycles their mean from each to each.
+    """Write the histogram of ln(E1/E0) of those who take part; of several cycles the mean after each, too.
 
     Raises:
         BadInput: they are too few.

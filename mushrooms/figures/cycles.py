@@ -16,7 +16,17 @@ from conformance.audit.claims.misprints import volume_loop
 from conformance.audit.runs import Sample, scene_of
 from conformance.audit.tolerances import mean, share, spread
 from mushrooms.figures.energies import N_PLACES, draw, gathered, panels
-from mushrooms.figures.style import BLACK, BLUE, GREEN, ORANGE, SKY, FloatArray, new_figure, phase_colours, power
+from mushrooms.figures.style import (
+    BLACK,
+    BLUE,
+    GREEN,
+    ORANGE,
+    SKY,
+    FloatArray,
+    new_figure,
+    phase_colours,
+    power,
+)
 from scene import load
 from scene.laws import values
 from scene.tables import Mushroom
@@ -101,7 +111,7 @@ def gain_of_capture() -> Figure:
     axes.plot(*best, "o", color=BLACK, label=f"largest: {best[1]:.6f} at t = {best[0]:.5f}")
     free = float(theory.predict(load("moving-cap"), 15).log_e_nc)
     axes.axhline(free, color=BLACK, linestyle=":", linewidth=1, label=f"never captured: {free:.6f}")
-    axes.set(xlabel="time of capture, t_in", ylabel="log E1/E0 (theory)")
+    axes.set(xlabel="time of capture, t_in", ylabel="ln(E1/E0), theory")
     axes.legend()
     return figure
 

@@ -8,6 +8,7 @@ stands below it; of scenes without tables of frozen rates the limit of high ener
 from __future__ import annotations
 
 from collections.abc import Iterable
+from itertools import chain
 from typing import NamedTuple
 
 import numpy as np
@@ -26,7 +27,8 @@ from scene.refusal import BadInput
 
 IntArray = npt.NDArray[np.int64]
 Gains = FloatArray | Iterable[FloatArray]
-N_BINS = 80
+N_BARS = 80
+MANY = 2000  # particles; of fewer there are half as many bars
 N_PLACES = 1500
 N_LINES = 12  # single particles drawn beside the mean
 N_MARKS = 60  # cycles at which a mean is drawn, at most
@@ -73,20 +75,20 @@ def gathered(gains: Gains, margin: float = 0.0) -> Gathered:
     if len(head) < 2:
         raise BadInput(f"gains: {len(head)} particles were followed to the end, must be at least 2")
     edges = _edges(head[:, 0], margin)
-    n, counts, sums, squares = 0, np.zeros(N_BINS, np.int64), 0.0, 0.0
-    few = head[:N_LINES]
-    while head is not None:
-        n, counts = n + len(head), counts + np.histogram(head[:, 0], edges)[0]
-        sums, squares = sums + head.sum(axis=0), squares + (head**2).sum(axis=0)
-        head = next(rows, None)
+    n, counts = 0, np.zeros(len(edges) - 1, np.int64)
+    sums, squares = np.zeros((2, head.shape[1]))
+    for block in chain([head], rows):
+        n, counts = n + len(block), counts + np.histogram(block[:, 0], edges)[0]
+        sums, squares = sums + block.sum(axis=0), squares + (block**2).sum(axis=0)
     mean = sums / n
-    return Gathered(n, edges, counts, mean, np.sqrt(np.maximum(squares / n - mean**2, 0.0)), few)
+    sd = np.sqrt(np.maximum(squares / n - mean**2, 0.0))
+    return Gathered(n, edges, counts, mean, sd, head[:N_LINES])
 
 
 def _edges(gain: FloatArray, margin: float) -> FloatArray:
     low, high = (float(np.quantile(gain, q)) for q in (TAIL, 1 - TAIL))
     room = margin or max(0.05 * (high - low), LEAST_SPAN)
-    return np.linspace(low - room, high + room, N_BINS + 1)
+    return np.linspace(low - room, high + room, (N_BARS if len(gain) >= MANY else N_BARS // 2) + 1)
 
 
 def panels(n: int) -> tuple[Figure, list[tuple[Axes, Axes]]]:
@@ -153,7 +155,9 @@ def growth(scene: Scene, energy: float, gains: Gains, n_particles: int | None = 
     told = [(k, predicted(Asked(scene, energy, int(k), 0))) for k in shown[1:]]
     if all(one is not None for _, one in told):
         line = np.array([0.0, *(k * one.m1 for k, one in told if one is not None)])
-        left.plot(cycles[shown], line, color=BLACK, linewidth=1.5, label=f"theory, m1 = {line[1]:.4f} a cycle")
+        left.plot(
+            cycles[shown], line, color=BLACK, linewidth=1.5, label=f"theory, m1 = {line[1]:.4f} a cycle"
+        )
         spread = float(theory.predict(scene, 6).sd) * np.sqrt(cycles[shown])
         for edge in (line - spread, line + spread):
             left.plot(cycles[shown], edge, color=BLACK, linewidth=0.9, linestyle=":")

@@ -13,7 +13,7 @@ from mpmath import fp
 from PIL import Image
 
 from mushrooms.figures import style as plots
-from scene import Collision, Scene, State
+from scene import Collision, Scene, State, check_scene
 from scene.geometry import table_at
 from scene.tables import cycle_length
 
@@ -22,16 +22,19 @@ N_PHASES = 6
 N_CHORDS = 14
 N_FRAMES = 36
 FRAMES_PER_SECOND = 12
-DOTS_PER_INCH = 80  # of an animation
+WIDEST, HIGHEST = 1920, 1080  # of an animation [pixels]: it fills a slide
+DOTS_PER_INCH = 200
 
 
 def walls(scene: Scene, t: float) -> list[np.ndarray]:
     """Return the walls at time t as polylines of shape (2, n) [length]; the mouth is left open."""
+    check_scene(scene)
     return [np.transpose(line) for line in table_at(fp, scene, t).outline()]
 
 
 def phases(scene: Scene, n: int = N_PHASES) -> list[float]:
     """Return n times [time] evenly over one cycle; a static table has the single time 0."""
+    check_scene(scene)
     span = cycle_length(scene)
     return [span * k / n for k in range(n)] if span else [0.0]
 
@@ -126,7 +129,9 @@ def write_frames(
             what moves it: that is given a frame's number and returns its title.
         file: open for binary writing.
     """
-    figure, axes = plots.new_figure(4.8, 4.8)
+    left, right, bottom, top = _frame(scene)
+    width = min(WIDEST, max(HIGHEST, HIGHEST * (right - left) / (top - bottom)))
+    figure, axes = plots.new_figure(width / DOTS_PER_INCH, HIGHEST / DOTS_PER_INCH)
     _set_frame(axes, scene)
     style: dict[str, Any] = {"color": plots.BLUE, "linewidth": 2, "animated": True}
     lines = [axes.plot(*line, **style)[0] for line in walls(scene, times[0])]

@@ -55,6 +55,7 @@ def bench(
     """
     from conformance.bench import record
     from mushrooms.figures import speed as figures_of_speed
+    from mushrooms.figures import style
     from mushrooms.reports import bench_page
 
     _check_table(table, workload, quick, command)
@@ -68,7 +69,7 @@ def bench(
         picture = figures_of_speed.speed(found)
         files: dict[str, bytes | str | Writer] = {
             "bench.json": record.encode(found),
-            "bench.svg": picture,
+            "bench.svg": style.svg(figures_of_speed.headline(found)),
             "bench.html": bench_page.to_html(found, picture),
         }
         write_files(folder, files)

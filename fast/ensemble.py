@@ -170,16 +170,17 @@ class Ensemble(NamedTuple):
 
     def _repr_html_(self) -> str:
         each = zip(self.m1()[:6], self.m1_se()[:6], strict=True)
-        shown = {
+        shown: dict[str, object] = {
             "particles": f"{len(self.energy):,}",
             "followed to the end": f"{int((self.outcome == FOLLOWED).sum()):,}",
             "cycles": self.cycle_energies.shape[1],
             "initial energy": f"{self.energy0:.6g}",
             "collisions": f"{int(self.n_collisions.sum()):,}",
             "m1, a cycle": ", ".join(f"{mean:.4g} ± {error:.1g}" for mean, error in each),
-            "never captured, a cycle": ", ".join(f"{share:.4g}" for share in self.p_nc()[:6]),
             "sha256": self.sha256(),
         }
+        if self.t_in.shape[2]:
+            shown["never captured, a cycle"] = ", ".join(f"{share:.4g}" for share in self.p_nc()[:6])
         return rows("an ensemble", shown)
 
     def sha256(self) -> str:

@@ -98,7 +98,15 @@ def test_growth_shows_means_and_theory_of_each_cycle(n_blocks):
 @pytest.mark.parametrize("picture", [energies.histogram, energies.growth])
 def test_a_figure_takes_a_scene_and_not_its_name(picture):
     assert "scene.load('moving-cap')" in one_line(picture, "moving-cap", 1e4, np.zeros(9))
-    assert one_line(picture, load("moving-cap"), 1e4, np.zeros(1)).startswith("gains: 1 particles")
+    for gains, words in (
+        (np.zeros(1), "gains: 1 particles"),
+        ([0.0, np.nan, np.inf], "gains: 1 particles"),
+        ("moving-cap", "gains = 'moving-cap'"),
+        (1.0, "gains = 1.0"),
+        (None, "gains = None"),
+    ):
+        assert one_line(picture, load("moving-cap"), 1e4, gains).startswith(words)
+    assert one_line(picture, load("moving-cap"), -1.0, np.zeros(9)).startswith("energy = -1.0")
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ stands below it; of scenes without tables of frozen rates the limit of high ener
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterator
 from itertools import chain
 from typing import NamedTuple
 
@@ -18,15 +18,16 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 import theory
+from fast.given import given_energy
 from mushrooms.compared import begins_widest, predicted
 from mushrooms.figures import style as plots
 from mushrooms.figures.style import BLACK, BLUE, GREY, ORANGE, SKY, STYLE, FloatArray, new_figure
 from mushrooms.store.asked import Asked
 from scene import Mushroom, Scene, check_scene
-from scene.refusal import BadInput
+from scene.refusal import BadInput, shown
 
 IntArray = npt.NDArray[np.int64]
-Gains = FloatArray | Iterable[FloatArray]
+Gains = FloatArray | Iterator[FloatArray]
 N_BARS = 80
 MANY = 2000  # particles; of fewer there are half as many bars
 N_PLACES = 1500
@@ -58,17 +59,16 @@ class Gathered(NamedTuple):
 
 
 def gathered(gains: Gains, margin: float = 0.0) -> Gathered:
-    """Gather arrays of shape (n,) or (n, K), which may come block by block.
+    """Gather arrays of shape (n,) or (n, K), which an iterator may hand over block by block.
 
     Args:
-        gains: ln(E/E0) after each cycle.
+        gains: ln(E/E0) after each cycle; particles with a nan are left out.
         margin: room beside the bars.
 
     Raises:
         BadInput: fewer than two particles.
     """
-    blocks = (np.asarray(one, np.float64) for one in ([gains] if isinstance(gains, np.ndarray) else gains))
-    rows = (one.reshape(len(one), -1) for one in blocks if len(one))
+    rows = map(_rows, gains if isinstance(gains, Iterator) else [gains])
     head = next(rows, np.zeros((0, 1)))
     while len(head) < ENOUGH and (more := next(rows, None)) is not None:
         head = np.concatenate([head, more])
@@ -83,6 +83,16 @@ def gathered(gains: Gains, margin: float = 0.0) -> Gathered:
     mean = sums / n
     sd = np.sqrt(np.maximum(squares / n - mean**2, 0.0))
     return Gathered(n, edges, counts, mean, sd, head[:N_LINES])
+
+
+def _rows(gains: object) -> FloatArray:
+    """Return an array (n, K) without the rows of particles that were not followed to the end."""
+    try:
+        found = np.asarray(gains, np.float64)
+        rows = found.reshape(len(found), -1)
+    except (TypeError, ValueError):
+        raise BadInput(f"gains = {shown(gains)}, must be an array of numbers, (n,) or (n, K)") from None
+    return np.asarray(rows[np.isfinite(rows).all(axis=1)])
 
 
 def _edges(gain: FloatArray, margin: float) -> FloatArray:
@@ -106,14 +116,14 @@ def histogram(scene: Scene, energy: float, gains: Gains, n_particles: int | None
     Args:
         scene: that was simulated.
         energy: of every start [length^2 / time^2].
-        gains: (n,) ln(E1/E0) of those who take part, or blocks of these.
+        gains: (n,) ln(E1/E0) of those who take part, or an iterator of blocks.
         n_particles: how many were simulated; n by default.
 
     Raises:
         BadInput: `scene` is none, or fewer than two particles.
     """
     check_scene(scene)
-    found = known(scene, energy)
+    found = known(scene, energy := given_energy(energy))
     bars = gathered(gains, 0.0 if found is None else float(found.peak[1] ** 0.5))
     if found is None:
         figure, axes = new_figure(5.2, 4.2)
@@ -134,14 +144,14 @@ def growth(scene: Scene, energy: float, gains: Gains, n_particles: int | None = 
     Args:
         scene: that was simulated.
         energy: of every start [length^2 / time^2].
-        gains: (n, K) ln(E/E0) of those who take part after each cycle, or blocks of these.
+        gains: (n, K) ln(E/E0) of those who take part after each cycle, or an iterator of blocks.
         n_particles: how many were simulated; n by default.
 
     Raises:
         BadInput: `scene` is none, or fewer than two particles.
     """
     check_scene(scene)
-    found = known(scene, energy)
+    found = known(scene, energy := given_energy(energy))
     bars = gathered(gains)
     figure, (left, right) = new_figure(10.4, 4.4, 1, 2)
     cycles = np.arange(len(bars.mean) + 1)

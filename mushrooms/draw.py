@@ -135,7 +135,11 @@ def draw(
         return
     table = load_scene(scene)
     follow = _Asked(table, energy, collisions, cycles, particles, seed or 0, phase)
-    follow.check(kinds, seed, is_exported=export is not None)
+    follow.check(kinds)
+    if seed is not None:
+        check_seed(seed, "--seed")
+    if not kinds and export is None:
+        refuse_unheeded(options, "the picture of the walls has no particles")
     if export is not None:
         output.check_file(export, (".csv", ".parquet"))
     is_drawn = bool(kinds) or export is None or out is not None
@@ -162,7 +166,7 @@ class _Asked(NamedTuple):
     seed: int
     phase: float | None
 
-    def check(self, kinds: list[str], seed: int | None, *, is_exported: bool) -> None:
+    def check(self, kinds: list[str]) -> None:
         """Refuse what is out of bounds, and what no picture heeds.
 
         Raises:
@@ -174,12 +178,6 @@ class _Asked(NamedTuple):
         for option, (value, most) in bounds.items():
             if value is not None:
                 check_range(option, value, 1, most)
-        if seed is not None:
-            check_seed(seed, "--seed")
-        if not kinds and not is_exported:
-            given = (self.energy, self.n_collisions, self.n_cycles, seed, self.n_orbits, self.phase)
-            told = "the picture of the walls has no particles"
-            refuse_unheeded(dict(zip(OF_PARTICLES, given, strict=True)), told)
         if not set(kinds) & set(OF_MANY):
             refuse_unheeded({"--particles": self.n_orbits}, f"it is of --{', --'.join(OF_MANY)}")
         if "section" not in kinds:
@@ -234,15 +232,12 @@ class _Asked(NamedTuple):
 
 def _check_drawable(table: Scene) -> None:
     """Refuse lengths and periods whose squares or sums a figure cannot hold."""
-    from mpmath import fp
-
     from scene.laws import bounds
-    from scene.tables import laws, period
+    from scene.tables import laws
 
-    shared = period(table)
     found = {f"scene.{name}": bounds(law).highest for name, law in laws(table).items() if name != "slope"}
-    if shared is not None:
-        found["period"] = float(shared.value(fp))
+    if table.period:
+        found["period"] = table.period
     for name, size in found.items():
         if not LEAST_DRAWN <= size <= 1 / LEAST_DRAWN:
             raise BadInput(f"{name} = {size:.3g}, must be 1e-100 to 1e+100 in a picture")

@@ -29,7 +29,7 @@ from scene.files import write_file
 from scene.geometry import TableAt, half_width, table_at
 from scene.laws import is_constant, values
 from scene.refusal import BadInput, check_count, check_number, check_seed
-from scene.tables import check_scene, cycle_length
+from scene.tables import check_scene
 
 FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]
@@ -248,7 +248,7 @@ def usual_energy(scene: Scene, crossings: float = CROSSINGS) -> float:
     """Return an energy at which a particle crosses the table so often in a cycle [length^2 / time^2]."""
     check_scene(scene)
     size = float(table_at(fp, scene, 0.0).size)
-    return 0.5 * (crossings * size / (cycle_length(scene) or CROSSINGS * size)) ** 2
+    return 0.5 * (crossings * size / (scene.period or CROSSINGS * size)) ** 2
 
 
 def follow(
@@ -312,7 +312,7 @@ class Slot(NamedTuple):
 def boundary(scene: Scene) -> list[Slot]:
     """Return the walls anticlockwise from the right end of the cap, by their mean lengths in a cycle."""
     check_scene(scene)
-    span = cycle_length(scene)
+    span = scene.period
     found = [_lengths(table_at(fp, scene, span * k / N_PHASES)) for k in range(N_PHASES if span else 1)]
     walls = [wall for wall, _ in found[0]]
     ends = np.cumsum([0.0, *np.mean([[length for _, length in one] for one in found], axis=0)])

@@ -29,7 +29,6 @@ from scene import Mushroom, Scene, Stem
 from scene.geometry import table_at
 from scene.laws import is_constant
 from scene.refusal import BadInput, shown
-from scene.tables import cycle_length
 
 N_FRAMES = 96
 TRAIL = 6  # collisions that the animation's particle draws behind it
@@ -54,7 +53,7 @@ def trajectory(orbit: FollowedOrbit) -> Figure:
     figure, axes = plots.new_figure(6.4, 6.0)
     states = orbit.states()
     begin, end = float(states[0, 0]), float(states[-1, 0])
-    if cycle_length(orbit.scene):
+    if orbit.scene.period:
         for line in tables.walls(orbit.scene, end):
             axes.plot(*line, color=plots.GREY, linewidth=1.2, linestyle="--")
         axes.plot([], [], color=plots.GREY, linewidth=1.2, linestyle="--", label="walls at the end")
@@ -250,7 +249,7 @@ def energy_in_time(orbit: FollowedOrbit) -> Figure:
     """
     [orbit] = _given(orbit)
     figure, axes = plots.new_figure(7.2, 4.4)
-    span = cycle_length(orbit.scene)
+    span = orbit.scene.period
     states = orbit.states()
     time = (states[:, 0] - states[0, 0]) / span if span else states[:, 0]
     energies = orbit.energies()
@@ -316,7 +315,7 @@ def write_animation(orbit: FollowedOrbit, file: BinaryIO, n_frames: int = N_FRAM
     states = orbit.states()
     times = np.linspace(states[0, 0], states[-1, 0], n_frames)
     places, last = orbit.at(times), np.searchsorted(states[:, 0], times, side="right") - 1
-    span = cycle_length(orbit.scene)
+    span = orbit.scene.period
 
     def prepare(axes: Axes) -> Callable[[int], str]:
         axes.plot(*places[0], "o", color=FREE, markersize=6, markerfacecolor="none", label="start")

@@ -15,7 +15,6 @@ from PIL import Image
 from mushrooms.figures import style as plots
 from scene import Collision, Scene, State, check_scene
 from scene.geometry import table_at
-from scene.tables import cycle_length
 
 SUFFIXES = (".svg", ".png", ".pdf", ".gif")
 N_PHASES = 6
@@ -35,7 +34,7 @@ def walls(scene: Scene, t: float) -> list[np.ndarray]:
 def phases(scene: Scene, n: int = N_PHASES) -> list[float]:
     """Return n times [time] evenly over one cycle; a static table has the single time 0."""
     check_scene(scene)
-    span = cycle_length(scene)
+    span = scene.period
     return [span * k / n for k in range(n)] if span else [0.0]
 
 
@@ -107,7 +106,7 @@ def write_picture(scene: Scene, suffix: str, file: BinaryIO) -> None:
 
 
 def _write_animation(scene: Scene, file: BinaryIO) -> None:
-    times, span, name = phases(scene, N_FRAMES), cycle_length(scene), plots.plain(scene.name)
+    times, span, name = phases(scene, N_FRAMES), scene.period, plots.plain(scene.name)
 
     def title(k: int) -> str:
         return f"{name}   t/T = {times[k] / span:.2f}" if span else f"{name}   static"

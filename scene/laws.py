@@ -21,8 +21,8 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from scene.given import MAX_KNOTS, amplitudes, check_legs, checked_knot, finite
-from scene.refusal import BadInput, InvalidScene, listed, shown
+from scene.given import MAX_KNOTS, amplitudes, check_legs, checked_knot, finite, finite_times
+from scene.refusal import InvalidScene, listed, shown
 
 LEAST_NORMAL = 2.0**-1022
 
@@ -313,15 +313,9 @@ class _Arrays:
 
 
 def values(law: Law, times: FloatArray, order: int = 0) -> FloatArray:
-    """Evaluate a law, or its first or second derivative, at many times in binary64.
+    """Evaluate a law, or its derivative of order 1 or 2, in binary64 at times of any shape.
 
-    Args:
-        law: a sound law.
-        times: of any shape [time].
-        order: 0, 1 or 2.
-
-    Returns:
-        Of the times' shape. Times since the first knot, phases and omega t are rounded as floats are.
+    Times since the first knot, phases and omega t are rounded as floats are.
     """
     if is_constant(law) or not isinstance(law, BangBang):
         return np.full(times.shape, evaluate(_Arrays, piece_at(law, Fraction(0)), times, order))
@@ -338,24 +332,8 @@ def values(law: Law, times: FloatArray, order: int = 0) -> FloatArray:
 
 
 def at(law: Law, t: Any) -> Any:
-    """Evaluate a law for a caller, in binary64.
-
-    Args:
-        law: a sound law; a bare number is one.
-        t: a time, or an array or list of times of any shape [time].
-
-    Returns:
-        A float for a single time, else an array of the times' shape.
-
-    Raises:
-        BadInput: a time is no finite number.
-    """
-    try:
-        times = np.asarray(t, np.float64)
-    except (TypeError, ValueError):
-        raise BadInput(f"t = {shown(t)}, must be finite numbers") from None
-    if not np.isfinite(times).all():
-        raise BadInput(f"t = {times[~np.isfinite(times)][0]}, must be finite")
+    """Return the value of a law at a time, or an array of values at an array of times of any shape."""
+    times = finite_times(t)
     found = values(law, times.reshape(-1)).reshape(times.shape)
     return found if times.ndim else float(found)
 

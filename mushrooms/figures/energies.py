@@ -139,7 +139,7 @@ def histogram(scene: Scene, energy: float, gains: Gains, n_particles: int | None
 
 @rc_context(STYLE)
 def growth(scene: Scene, energy: float, gains: Gains, n_particles: int | None = None) -> Figure:
-    """Draw the mean of ln(E/E0) from cycle to cycle with its spread and theory's; beside it `histogram`.
+    """Draw the mean of ln(E/E0) from cycle to cycle with its spread and theory's; below it `histogram`.
 
     Args:
         scene: that was simulated.
@@ -153,30 +153,30 @@ def growth(scene: Scene, energy: float, gains: Gains, n_particles: int | None = 
     check_scene(scene)
     found = known(scene, energy := given_energy(energy))
     bars = gathered(gains)
-    figure, (left, right) = new_figure(10.4, 4.4, 1, 2)
+    figure, (above, below) = new_figure(6.4, 8.4, 2, 1)  # one below the other: legible on a telephone
     cycles = np.arange(len(bars.mean) + 1)
     mean, sd, few = (np.pad(x, [*[(0, 0)] * (x.ndim - 1), (1, 0)]) for x in (bars.mean, bars.sd, bars.few))
-    left.plot(cycles, few.T, color=GREY, linewidth=0.6, alpha=0.6)
-    left.plot([], [], color=GREY, linewidth=0.6, label="single particles")
-    left.fill_between(cycles, mean - sd, mean + sd, color=SKY, alpha=0.6, linewidth=0, label="± 1 sd of one")
+    above.plot(cycles, few.T, color=GREY, linewidth=0.6, alpha=0.6)
+    above.plot([], [], color=GREY, linewidth=0.6, label="single particles")
+    above.fill_between(cycles, mean - sd, mean + sd, color=SKY, alpha=0.6, linewidth=0, label="± 1 sd of one")
     shown = np.unique(np.linspace(0, cycles[-1], min(N_MARKS, len(cycles))).astype(int))
     error = sd[shown] / np.sqrt(bars.n)
-    left.errorbar(cycles[shown], mean[shown], error, fmt="o", color=BLUE, markersize=3.5, label="mean")
+    above.errorbar(cycles[shown], mean[shown], error, fmt="o", color=BLUE, markersize=3.5, label="mean")
     told = [(k, predicted(Asked(scene, energy, int(k), 0))) for k in shown[1:]]
     if all(one is not None for _, one in told):
         line = np.array([0.0, *(k * one.m1 for k, one in told if one is not None)])
-        left.plot(
+        above.plot(
             cycles[shown], line, color=BLACK, linewidth=1.5, label=f"theory, m1 = {line[1]:.4f} a cycle"
         )
         spread = float(theory.predict(scene, 6).sd) * np.sqrt(cycles[shown])
         for edge in (line - spread, line + spread):
-            left.plot(cycles[shown], edge, color=BLACK, linewidth=0.9, linestyle=":")
-        left.plot([], [], color=BLACK, linewidth=0.9, linestyle=":", label="theory ± its sd")
-    left.set(xlabel="cycle of the walls", ylabel="ln(E/E0)", title=_title(scene, energy, bars, n_particles))
-    left.xaxis.get_major_locator().set_params(integer=True)
-    draw_limit(right, scene, bars) if found is None else draw(right, None, bars, found)
-    right.set(title="after the first cycle")
-    for axes in (left, right):
+            above.plot(cycles[shown], edge, color=BLACK, linewidth=0.9, linestyle=":")
+        above.plot([], [], color=BLACK, linewidth=0.9, linestyle=":", label="theory ± its sd")
+    above.set(xlabel="cycle of the walls", ylabel="ln(E/E0)", title=_title(scene, energy, bars, n_particles))
+    above.xaxis.get_major_locator().set_params(integer=True)
+    draw_limit(below, scene, bars) if found is None else draw(below, None, bars, found)
+    below.set(title="after the first cycle")
+    for axes in (above, below):
         axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.16), ncols=2)
     return figure
 
@@ -229,10 +229,10 @@ def draw(axes: Axes, rest: Axes | None, bars: Gathered, found: theory.FiniteEner
         axes.set(xlabel=AXIS)
     else:
         _residuals(rest, bars.counts, shares * bars.n, edges)
-    x = np.linspace(edges[0], edges[-1], N_PLACES)
-    total = np.gradient(found.cdf(x), x)
+    x = np.linspace(edges[0], edges[-1], 4 * N_BARS + 1)  # finer, single atoms of the theory would show
+    total = np.diff(found.cdf(x)) / np.diff(x)
     label = f"theory at this energy, peak {found.peak[1] ** 0.5:.4f} wide"
-    axes.plot(x, total, color=BLACK, linewidth=1.3, label=label)
+    axes.plot((x[1:] + x[:-1]) / 2, total, color=BLACK, linewidth=1.3, label=label)
     top = 1.3 * max(float(heights.max()), float((shares / np.diff(edges)).max()))  # spikes are cut
     axes.set(xlim=(edges[0], edges[-1]), ylim=(0, top), ylabel="density")
 

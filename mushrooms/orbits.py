@@ -125,22 +125,26 @@ class FollowedOrbit:
         speed = np.hypot(before[:, 3], before[:, 4])
         return Section(index, t, np.arctan2(y, x) / math.pi, spin / (speed * r), w / r)
 
-    def phase_section(self) -> FloatArray:
+    def phase_section(self, phase: float | None = None) -> FloatArray:
         """Return (n, 2): the phase t/T, 0 to 1, of each hit of the moving wall, and the velocity after it.
 
         That is Fermi and Ulam's: of a stem whose floor moves its hits and vy, else hits of both sides and
-        |vx| [length/time].
+        |vx| [length/time]. Given a phase of the walls, y and vy at that phase of each cycle.
 
         Raises:
-            BadInput: the table is none of these.
+            BadInput: the table is none of these, or the phase is none.
         """
         if not isinstance(self.scene, Stem) or not self.scene.period:
             raise BadInput("the section of phase and velocity is of a stem that moves")
+        if phase is not None:
+            times = self.instants(phase)
+            last = np.searchsorted(self.states()[:, 0], times, side="right") - 1
+            return np.column_stack([self.at(times)[:, 1], self.states()[last, 4]])
         walls = ("left", "right") if is_constant(self.scene.h) else ("floor",)
         states = self.states()[1:][np.isin(self.walls, walls)]
         speed = states[:, 4] if walls == ("floor",) else np.abs(states[:, 3])
-        phase = (states[:, 0] - start_time(self.scene)) / self.scene.period % 1.0
-        return np.column_stack([phase, speed])
+        phases = (states[:, 0] - start_time(self.scene)) / self.scene.period % 1.0
+        return np.column_stack([phases, speed])
 
     def instants(self, phase: float) -> FloatArray:
         """Return the times within the orbit at which the walls have a phase t/T, 0 to 1.

@@ -264,6 +264,9 @@ def test_the_section_of_a_stem_is_phase_and_velocity():
     assert velocity.tolist() == states[at_floor + 1, 4].tolist()
     rate = np.array([float(value(fp, stem.h, t * stem.period, 1)) for t in phase])
     assert velocity == pytest.approx(-states[at_floor, 4] - 2 * rate, abs=1e-9)
+    depth, speed = orbit.phase_section(0.5).T
+    assert depth == pytest.approx(orbit.at(orbit.instants(0.5))[:, 1])
+    assert set(speed) <= set(states[:, 4])
     wide = scenes.Stem(w=stem.h, h=1.0)
     [other] = orbits.follow(wide, 500, energy=1.8, seed=1)
     assert len(other.phase_section()) == sum(wall in ("left", "right") for wall in other.walls)

@@ -135,12 +135,8 @@ def section(orbits: Sequence[FollowedOrbit] | FollowedOrbit, phase: float | None
     """
     figure, axes = plots.new_figure(6.4, 5.2)
     found = _given(orbits)
-    if not isinstance(found[0].scene, Stem):
-        draw_section(axes, found, phase)
-    elif phase is None:
-        _draw_velocities(axes, found)
-    else:
-        _draw_depths(axes, found, phase)
+    draw = _draw_stem if isinstance(found[0].scene, Stem) else draw_section
+    draw(axes, found, phase)
     axes.set(title=_of(found) + ("" if phase is None else f", at t/T = {phase:g}"))
     if axes.get_legend_handles_labels()[0]:
         figure.legend(loc="outside lower center", ncols=2)
@@ -176,24 +172,18 @@ def _draw_zones(axes: Axes, low: float, high: float) -> None:
     axes.plot([], [], color=plots.BLACK, linewidth=1, label=f"edge |sin φ| = nu, {edge}")
 
 
-def _draw_velocities(axes: Axes, found: Sequence[FollowedOrbit]) -> None:
-    """Draw Fermi and Ulam's section: an orbit has one colour."""
+def _draw_stem(axes: Axes, found: Sequence[FollowedOrbit], phase: float | None) -> None:
+    """Draw the section of a stem; an orbit has one colour."""
     for orbit, colour in zip(found, plots.phase_colours(len(found)), strict=True):
-        phase, speed = orbit.phase_section().T
-        axes.plot(phase, speed, ".", color=colour, markersize=1.2, rasterized=True)
+        points = orbit.phase_section(phase)
+        axes.plot(*points.T, ".", color=colour, markersize=1.2, rasterized=True)
+    if phase is not None:
+        axes.set(xlabel="y [length]", ylabel="vy [length/time]")
+        return
     has_floor = isinstance(found[0].scene, Stem) and not is_constant(found[0].scene.h)
     wall, name = ("floor", "vy") if has_floor else ("side", "|vx|")
     axes.set(xlim=(0, 1), ylim=(0, None), xlabel=f"phase t/T of the hit of a moving {wall}")
     axes.set_ylabel(f"{name} after the hit [length/time]")
-
-
-def _draw_depths(axes: Axes, found: Sequence[FollowedOrbit], phase: float) -> None:
-    """Draw depth and velocity at a phase of each cycle; an orbit has one colour."""
-    for orbit, colour in zip(found, plots.phase_colours(len(found)), strict=True):
-        times, states = orbit.instants(phase), orbit.states()
-        last = np.searchsorted(states[:, 0], times, side="right") - 1
-        axes.plot(orbit.at(times)[:, 1], states[last, 4], ".", color=colour, markersize=1.5, rasterized=True)
-    axes.set(xlabel="y [length]", ylabel="vy [length/time]")
 
 
 def _points(

@@ -60,6 +60,10 @@ def _late(place: str, name: str) -> property:
 class _Face(ModuleType):
     """A module whose names stand before its submodules', two of which are called as their functions are."""
 
+    def __dir__(self) -> list[str]:
+        """List the public names, none of which has been imported yet."""
+        return __all__
+
 
 for _place, _names in _PLACES.items():
     for _name in _names:

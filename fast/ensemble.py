@@ -10,7 +10,7 @@ import hashlib
 import math
 import time
 from collections.abc import Callable, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -112,9 +112,8 @@ class Ensemble(NamedTuple):
 
         Where nu is always below 1 some particles are never free: in every slot a stay, one that is on when
         the last cycle ends, and no collision with the stem's walls. No cycle captures or releases them, and
-        the theory leaves them out. Slow particles that were captured and released, and have not come down
-        into the stem before the end, take part; but where the mouth is narrow at the end, those that it has
-        captured again by then look as if they were never free.
+        the theory leaves them out. Slow particles that were released and have not come down into the stem
+        before the end take part; captured again by then, they look as if they were never free.
         """
         was_followed: npt.NDArray[np.bool_] = self.outcome == FOLLOWED
         if self.t_in.shape[2] == 0:
@@ -126,11 +125,29 @@ class Ensemble(NamedTuple):
     def p_nc(self) -> FloatArray:
         """Return (K,): the share of those who take part without a captured stay in each cycle; nan of no one.
 
-        Source: Eq:ps, the probability of never being captured, where a cycle begins at the greatest nu; of
-        another start those count as captured in the first cycle who began so.
+        Source: Eq:ps. Who begins captured, where nu is not greatest then, counts so in the first cycle.
         """
-        captured = self.is_captured()[self.takes_part()]
-        return 1.0 - captured.mean(axis=0) if len(captured) else np.full(captured.shape[1], np.nan)
+        return 1.0 - _mean(self.is_captured()[self.takes_part()])
+
+    def p_nc_se(self) -> FloatArray:
+        """Return (K,): the standard error of `p_nc`, of 0 or 1 that of 1 / (n + 1); 0 without a mouth."""
+        n = max(int(self.takes_part().sum()), 1)
+        share = np.clip(self.p_nc(), 1.0 / (n + 1), n / (n + 1))
+        return np.sqrt(share * (1.0 - share) / n) * bool(self.t_in.shape[2])
+
+    def s(self) -> FloatArray:
+        """Return (N, K): s = log of the energy after a cycle over that before it; log is natural."""
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return np.diff(np.log(self.cycle_energies / self.energy0), axis=1, prepend=0.0)
+
+    def m1(self) -> FloatArray:
+        """Return (K,): the mean of s over those who take part, by cycle (Eq:Erate); nan of no one."""
+        return _mean(self.s()[self.takes_part()])
+
+    def m1_se(self) -> FloatArray:
+        """Return (K,): the standard error of `m1`; nan of fewer than two."""
+        s = self.s()[self.takes_part()]
+        return s.std(axis=0, ddof=1) / math.sqrt(len(s)) if len(s) > 1 else np.full(s.shape[1], np.nan)
 
     def ns_per_collision(self) -> float:
         """Return kernel wall time x threads / collisions, in nanoseconds."""
@@ -143,19 +160,17 @@ class Ensemble(NamedTuple):
         return f"Ensemble(E0 = {self.energy0:.6g}, {what})"
 
     def _repr_html_(self) -> str:
-        taking_part = self.energy[self.takes_part()]
-        shown = {
+        shown: dict[str, object] = {
             "particles": f"{len(self.energy):,}",
             "followed to the end": f"{int((self.outcome == FOLLOWED).sum()):,}",
             "cycles": self.cycle_energies.shape[1],
             "initial energy": f"{self.energy0:.6g}",
             "collisions": f"{int(self.n_collisions.sum()):,}",
-            "mean of log E1/E0": f"{np.log(taking_part / self.energy0).mean():.6g}"
-            if len(taking_part)
-            else "–",
-            "never captured, a cycle": ", ".join(f"{share:.4g}" for share in self.p_nc()[:6]),
+            "m1, a cycle": ", ".join(f"{a:.4g} ± {b:.1g}" for a, b in np.c_[self.m1(), self.m1_se()][:6]),
             "sha256": self.sha256(),
         }
+        if self.t_in.shape[2]:
+            shown["never captured, a cycle"] = ", ".join(f"{share:.4g}" for share in self.p_nc()[:6])
         return rows("an ensemble", shown)
 
     def sha256(self) -> str:
@@ -164,6 +179,11 @@ class Ensemble(NamedTuple):
         for array in self[1:-2]:
             digest.update(np.ascontiguousarray(array).data)
         return digest.hexdigest()
+
+
+def _mean(rows: npt.NDArray[Any]) -> FloatArray:
+    """Return the mean of each column; nan of no rows."""
+    return np.asarray(rows.mean(axis=0)) if len(rows) else np.full(rows.shape[1], np.nan)
 
 
 def simulate(
@@ -323,9 +343,8 @@ def planned(
 def _share(n: int, threads: int, n_cycles: int) -> int:
     """Return how many particles a worker takes at a time.
 
-    At the end of a share the lanes wait for its slowest particle. Energies, and with them collisions, spread
-    with the cycles: after thirty, one particle of 256 makes a tenth of all their collisions. So shares grow
-    with the cycles, and all threads take equally many.
+    At the end of a share the lanes wait for its slowest particle. Collisions spread with the cycles: after
+    thirty, one particle of 256 makes a tenth of them. So shares grow, and all threads take equally many.
     """
     n_shares = math.ceil(max(n, 1) / (SHARE * n_cycles))
     return math.ceil(max(n, 1) / (threads * math.ceil(n_shares / threads)))

@@ -12,10 +12,8 @@ import os
 from collections.abc import Callable, Sequence
 from itertools import pairwise
 
-import numpy as np
-
 from scene import InvalidState, Scene, State
-from scene.refusal import BadInput, check_count, check_number, shown
+from scene.refusal import BadInput, check_count, check_number, listed, shown
 
 MAX_STEPS = 10**7  # collisions of one trajectory, kept in memory: half a gigabyte
 # Collisions of one particle: on the way to a given time, some seconds of work; in an ensemble, a minute.
@@ -55,10 +53,11 @@ def given_end(t_end: object) -> float:
 
 def given_states(scene: Scene, states: object) -> list[State]:
     """Return states whose numbers are floats; InvalidState names the particle."""
-    if isinstance(states, str | bytes) or not isinstance(states, Sequence):
+    given = listed(states)
+    if isinstance(given, str | bytes) or not isinstance(given, Sequence):
         raise BadInput(f"states = {shown(states)}, must be a sequence of State")
     found = []
-    for i, state in enumerate(states):
+    for i, state in enumerate(given):
         try:
             found.append(given_state(scene, state))
         except BadInput as error:
@@ -76,7 +75,7 @@ def given_energy(energy: object) -> float:
 
 def given_phases(phases: object) -> tuple[float, ...]:
     """Return fractions of a cycle that rise and lie in (0, 1)."""
-    given = list(phases) if isinstance(phases, np.ndarray) and phases.ndim == 1 else phases
+    given = listed(phases)
     if isinstance(given, str | bytes) or not isinstance(given, Sequence):
         raise BadInput(f"phases = {shown(phases)}, must be a sequence of numbers that rise and lie in (0, 1)")
     found = tuple(check_number(f"phases[{i}]", phase) for i, phase in enumerate(given))

@@ -49,12 +49,13 @@ def bench(
         typer.Option(metavar="NAME", help="Which table; or `all`. By default moving-cap-1e7."),
     ] = None,
 ) -> None:
-    """Measure speed against error; writes bench.json, bench.svg and bench.html.
+    """Measure speed against error; writes bench.json, bench.svg, panels.svg and bench.html.
 
     Exit code 0, or 2 on bad input.
     """
     from conformance.bench import record
     from mushrooms.figures import speed as figures_of_speed
+    from mushrooms.figures import style
     from mushrooms.reports import bench_page
 
     _check_table(table, workload, quick, command)
@@ -68,7 +69,8 @@ def bench(
         picture = figures_of_speed.speed(found)
         files: dict[str, bytes | str | Writer] = {
             "bench.json": record.encode(found),
-            "bench.svg": picture,
+            "bench.svg": style.svg(figures_of_speed.headline(found)),
+            "panels.svg": picture,
             "bench.html": bench_page.to_html(found, picture),
         }
         write_files(folder, files)

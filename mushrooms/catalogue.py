@@ -13,7 +13,6 @@ from conformance.audit.runs import SCENES
 from mushrooms.terminal import AsJson, table_console
 from scene.load import catalogue_text, read_data
 from scene.refusal import BadInput
-from scene.tables import cycle_length
 
 
 def list_scenes(
@@ -69,7 +68,7 @@ def _catalogue_row(name: str) -> dict[str, Any]:
     row = {"name": name, "table": data["table"], "period": None, "notes": data.get("notes", "")}
     row |= {"refused": None}
     try:
-        length = cycle_length(scenes.load(name))
+        length = scenes.load(name).period
     except scenes.InvalidScene as error:
         return row | {"refused": str(error).partition(": ")[2]}
     return row | {"period": length or None}

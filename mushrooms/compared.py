@@ -16,7 +16,7 @@ from scene import Mushroom, Scene
 from scene.geometry import table_at
 from scene.laws import values
 from scene.refusal import BadInput
-from scene.tables import cycle_length, laws, period
+from scene.tables import laws
 
 DIGITS = 10  # of the adiabatic theory: a run knows six at most
 N_TIMES = 1025  # of a cycle, at which the sides are looked at
@@ -49,7 +49,7 @@ def measured(asked: Asked, tally: RunTally) -> dict[str, Any]:
     has_island = isinstance(asked.scene, Mushroom)
     free = 1.0 - tally.captured / (n * k) if n and has_island else None
     free_error = None if free is None else _measured_error(asked.scene, free, n * k)
-    found = _predicted(asked)
+    found = predicted(asked)
     pulls: tuple[float | None, float | None] = (None, None)
     if found is not None and n:
         expected_error = _binomial_error(found.p_nc, n * k)
@@ -80,7 +80,7 @@ def limit_told(asked: Asked, summary: Mapping[str, Any]) -> str | None:
     is_of_this_energy = any(summary[z] is not None for z in ("m1_z", "p_nc_z"))
     if summary["m1_theory"] is None or summary["m1"] is None or is_of_this_energy:
         return None
-    if period(asked.scene) is None:  # nothing moves: energies are what they were, at any energy
+    if not asked.scene.period:  # nothing moves: energies are what they were, at any energy
         return None
     told = "m1_theory, p_nc_theory: the limit of high energies; what is left at this one is not known"
     if not leans_inward(asked.scene):
@@ -93,7 +93,7 @@ def limit_told(asked: Asked, summary: Mapping[str, Any]) -> str | None:
 
 def leans_inward(scene: Scene) -> bool:
     """Tell whether the stem narrows downward at all times, so that no flight can stay in it for ever."""
-    times = start_time(scene) + cycle_length(scene) * np.linspace(0.0, 1.0, N_TIMES)
+    times = start_time(scene) + scene.period * np.linspace(0.0, 1.0, N_TIMES)
     return bool(values(laws(scene)["slope"], times).min() > 0)
 
 
@@ -133,7 +133,7 @@ def begins_widest(scene: Mushroom) -> bool:
     return bool(now.w / now.r >= widest * (1 - SAME))
 
 
-def _predicted(asked: Asked) -> Theory | None:
+def predicted(asked: Asked) -> Theory | None:
     """Return what theory says of a run; None where it covers nothing.
 
     What finite energy adds to a cycle goes as E^(-1/2) with the energy at which the cycle begins. Cycles are

@@ -19,26 +19,30 @@ from mushrooms.terminal import (
     progress_bar,
     refuse_unheeded,
 )
-from scene import Scene
+from scene import Scene, Stem
 from scene.files import write_file
 from scene.refusal import BadInput, check_seed
 
 
 class Usual(NamedTuple):
-    """What a picture takes when nothing is asked: collisions, particles, crossings of the table a cycle."""
+    """What a picture takes when nothing is asked: particles, crossings of the table a cycle, the end."""
 
-    n_collisions: int
     n_orbits: int
     crossings: float
+    n_collisions: int | None
+    n_cycles: int | None = None
 
 
 PICTURES = {
-    "trajectory": Usual(60, 1, 60.0),
-    "section": Usual(400, 40, 1000.0),
-    "map": Usual(400, 40, 1000.0),
-    "growth": Usual(12_000, 1, 1000.0),
-    "lyapunov": Usual(256, 3, 1000.0),
+    "trajectory": Usual(1, 60.0, 60),
+    "section": Usual(40, 1000.0, 400),
+    "map": Usual(40, 1000.0, 400),
+    "growth": Usual(500, 1000.0, None, 10),
+    "lyapunov": Usual(3, 1000.0, 256),
 }
+# Slow particles: where the wall moves as fast as they do, chaos and islands lie side by side.
+SECTION_OF_STEM, OF_STEM_AT_PHASE = Usual(40, 4.0, 4000), Usual(40, 4.0, None, 400)
+SECTION_AT_PHASE = Usual(40, 60.0, None, 60)
 
 
 Picture = Annotated[
@@ -50,6 +54,31 @@ Picture = Annotated[
         "gets its kind into the name.",
     ),
 ]
+Trajectory = Annotated[
+    bool, typer.Option("--trajectory", help="One particle's path; a .gif shows it on its way.")
+]
+Section = Annotated[
+    bool,
+    typer.Option(
+        "--section",
+        help="Poincare section: place on the arc against sin phi; of a stem the moving wall's phase against "
+        "the velocity after the hit.",
+    ),
+]
+BoundaryMap = Annotated[
+    bool, typer.Option("--map", help="Boundary map: place along all walls against the angle's sine.")
+]
+Growth = Annotated[
+    bool,
+    typer.Option(
+        "--growth",
+        help="Mean of ln(E/E0) from cycle to cycle, with its spread and theory's; of --particles 1 its own "
+        "against time.",
+    ),
+]
+Lyapunov = Annotated[
+    bool, typer.Option("--lyapunov", help="Finite-time Lyapunov exponents with their errors.")
+]
 Export = Annotated[
     Path | None,
     typer.Option(metavar="FILE", help="A .csv or .parquet file for the start and every collision."),
@@ -58,63 +87,65 @@ Energy = Annotated[
     float | None, typer.Option(help="Initial energy v²/2, > 0; by default one that suits the picture.")
 ]
 Length = Annotated[int | None, typer.Option(help="Collisions of each particle, 1 to 10^6.")]
-Many = Annotated[int | None, typer.Option(help="Particles of a section, a map, exponents; 1 to 1000.")]
+Cycles = Annotated[int | None, typer.Option(help="Cycles to follow in place of collisions, 1 to 10,000.")]
+Phase = Annotated[
+    float | None,
+    typer.Option(help="Section at this phase t/T of the walls alone, 0 to 1; of a stem y against vy."),
+]
+Many = Annotated[
+    int | None, typer.Option(help="Particles of a section, a map, growth, exponents; 1 to 1000.")
+]
 Seed = Annotated[int | None, typer.Option(help="Seed of the random starts, 0 to 2^64 - 1; by default 0.")]
-OF_PARTICLES = ("--energy", "--collisions", "--seed", "--particles")
-OF_MANY = ("section", "map", "lyapunov")
+OF_PARTICLES = ("--energy", "--collisions", "--cycles", "--seed", "--particles", "--phase")
+OF_MANY = ("section", "map", "growth", "lyapunov")
 LEAST_DRAWN = 1e-100  # of lengths and times; its inverse is the greatest
 
 
 def draw(
     scene: SceneName,
     out: Picture = None,
-    trajectory: Annotated[
-        bool, typer.Option("--trajectory", help="One particle's path; a .gif shows it on its way.")
-    ] = False,
-    section: Annotated[
-        bool, typer.Option("--section", help="Poincare section: place on the arc against sin phi.")
-    ] = False,
-    boundary_map: Annotated[
-        bool, typer.Option("--map", help="Boundary map: place along all walls against the angle's sine.")
-    ] = False,
-    growth: Annotated[bool, typer.Option("--growth", help="log E against time, with theory's line.")] = False,
-    lyapunov: Annotated[
-        bool, typer.Option("--lyapunov", help="Finite-time Lyapunov exponents with their errors.")
-    ] = False,
+    trajectory: Trajectory = False,
+    section: Section = False,
+    boundary_map: BoundaryMap = False,
+    growth: Growth = False,
+    lyapunov: Lyapunov = False,
     export: Export = None,
     energy: Energy = None,
     collisions: Length = None,
+    cycles: Cycles = None,
     particles: Many = None,
     seed: Seed = None,
+    phase: Phase = None,
 ) -> None:
     """Draw the walls through the cycle, or what particles do between them; export a trajectory.
 
     The particles are the first of `mushrooms simulate SCENE --energy E --seed S`. Given the folder of a run
-    (simulate --out), draw its histogram of log E1/E0, with theory.
+    (simulate --out), draw its histogram of ln(E1/E0) with theory, and of several cycles the mean in each.
     """
     from mushrooms.store.blocks import is_run
 
     asked = (trajectory, section, boundary_map, growth, lyapunov)
     kinds = [kind for kind, is_asked in zip(PICTURES, asked, strict=True) if is_asked]
-    options = dict(zip(OF_PARTICLES, (energy, collisions, seed, particles), strict=True))
+    given = (energy, collisions, cycles, seed, particles, phase)
+    options = dict(zip(OF_PARTICLES, given, strict=True))
     if is_run(Path(scene)):
         pictures = {f"--{kind}": True for kind in kinds}
         refuse_unheeded({**pictures, "--export": export, **options}, f"{scene!r} is a run")
         print(draw_run(Path(scene), out))
         return
     table = load_scene(scene)
-    _check(energy, collisions, particles, seed)
+    follow = _Asked(table, energy, collisions, cycles, particles, seed or 0, phase)
+    follow.check(kinds)
+    if seed is not None:
+        check_seed(seed, "--seed")
     if not kinds and export is None:
         refuse_unheeded(options, "the picture of the walls has no particles")
-    if not set(kinds) & set(OF_MANY):
-        refuse_unheeded({"--particles": particles}, f"it is of --{', --'.join(OF_MANY)}")
     if export is not None:
         output.check_file(export, (".csv", ".parquet"))
     is_drawn = bool(kinds) or export is None or out is not None
     if is_drawn:
         _check_drawable(table)
     paths = _paths(out or Path(f"{Path(scene).stem}.svg"), kinds, is_drawn=is_drawn)
-    follow = _Asked(table, energy, collisions, particles, seed or 0)
     with compilation_told():
         if export is not None:
             follow("trajectory", 1)[0].write(export)
@@ -125,52 +156,91 @@ def draw(
 
 
 class _Asked(NamedTuple):
-    """What was asked of the orbits of every picture."""
+    """What was asked of the particles of every picture."""
 
     table: Scene
     energy: float | None
     n_collisions: int | None
+    n_cycles: int | None
     n_orbits: int | None
     seed: int
+    phase: float | None
+
+    def check(self, kinds: list[str]) -> None:
+        """Refuse what is out of bounds, and what no picture heeds.
+
+        Raises:
+            BadInput: naming the option.
+        """
+        check_energy(self.energy)
+        bounds = {"--collisions": (self.n_collisions, 10**6), "--cycles": (self.n_cycles, 10**4)}
+        bounds["--particles"] = (self.n_orbits, 1000)
+        for option, (value, most) in bounds.items():
+            if value is not None:
+                check_range(option, value, 1, most)
+        if not set(kinds) & set(OF_MANY):
+            refuse_unheeded({"--particles": self.n_orbits}, f"it is of --{', --'.join(OF_MANY)}")
+        if "section" not in kinds:
+            refuse_unheeded({"--phase": self.phase}, "it is of --section")
+        if kinds == ["growth"] and self.n_orbits != 1:
+            refuse_unheeded({"--collisions": self.n_collisions}, "the growth of many goes through --cycles")
+
+    def usual(self, kind: str) -> Usual:
+        """Return what a kind of picture takes of this scene when nothing is asked."""
+        if kind != "section":
+            return PICTURES[kind]
+        of_stem = isinstance(self.table, Stem)
+        if self.phase is not None:
+            return OF_STEM_AT_PHASE if of_stem else SECTION_AT_PHASE
+        return SECTION_OF_STEM if of_stem else PICTURES[kind]
+
+    def energy_of(self, kind: str) -> float:
+        """Return the initial energy of a kind of picture."""
+        from mushrooms import orbits
+
+        return self.energy or orbits.usual_energy(self.table, self.usual(kind).crossings)
 
     def __call__(self, kind: str, n_orbits: int | None = None) -> list[Any]:
         """Return the orbits for a kind of picture."""
         from mushrooms import orbits
 
-        usual = PICTURES[kind]
+        usual = self.usual(kind)
+        n_cycles = self.n_cycles or (None if self.n_collisions else usual.n_cycles)
+        n_collisions = self.n_collisions or (None if n_cycles else usual.n_collisions)
         return orbits.follow(
             self.table,
-            self.n_collisions or usual.n_collisions,
-            energy=self.energy or orbits.usual_energy(self.table, usual.crossings),
+            n_collisions or orbits.MAX_COLLISIONS,
+            energy=self.energy_of(kind),
             seed=self.seed,
             n_orbits=n_orbits or self.n_orbits or usual.n_orbits,
+            n_cycles=n_cycles,
         )
+
+    def growth(self) -> Any:
+        """Return the figure of an ensemble's energies from cycle to cycle."""
+        import numpy as np
+
+        import fast
+        from mushrooms.figures import energies
+
+        usual, energy = PICTURES["growth"], self.energy_of("growth")
+        n, n_cycles = self.n_orbits or usual.n_orbits, self.n_cycles or usual.n_cycles or 1
+        found = fast.simulate(self.table, n_particles=n, energy=energy, n_cycles=n_cycles, seed=self.seed)
+        gains = np.log(found.cycle_energies[found.takes_part()] / energy)
+        return energies.growth(self.table, energy, gains, n)
 
 
 def _check_drawable(table: Scene) -> None:
     """Refuse lengths and periods whose squares or sums a figure cannot hold."""
-    from mpmath import fp
-
     from scene.laws import bounds
-    from scene.tables import laws, period
+    from scene.tables import laws
 
-    shared = period(table)
     found = {f"scene.{name}": bounds(law).highest for name, law in laws(table).items() if name != "slope"}
-    if shared is not None:
-        found["period"] = float(shared.value(fp))
+    if table.period:
+        found["period"] = table.period
     for name, size in found.items():
         if not LEAST_DRAWN <= size <= 1 / LEAST_DRAWN:
             raise BadInput(f"{name} = {size:.3g}, must be 1e-100 to 1e+100 in a picture")
-
-
-def _check(energy: float | None, collisions: int | None, particles: int | None, seed: int | None) -> None:
-    check_energy(energy)
-    if collisions is not None:
-        check_range("--collisions", collisions, 1, 10**6)
-    if particles is not None:
-        check_range("--particles", particles, 1, 1000)
-    if seed is not None:
-        check_seed(seed, "--seed")
 
 
 def _paths(out: Path, kinds: list[str], *, is_drawn: bool) -> dict[str, Path]:
@@ -198,6 +268,9 @@ def _picture(table: Scene, kind: str, suffix: str, follow: _Asked) -> bytes | Ca
 
     if kind == "walls":
         return lambda file: pictures.write_picture(table, suffix, file)
+    if kind == "growth" and follow.n_orbits != 1:
+        figure = follow.growth()
+        return lambda file: style.save(figure, file, suffix)
     found = follow(kind, 1 if kind in ("trajectory", "growth") else None)
     if kind == "trajectory" and suffix == ".gif":
         return lambda file: orbits.write_animation(found[0], file)
@@ -210,5 +283,5 @@ def _picture(table: Scene, kind: str, suffix: str, follow: _Asked) -> bytes | Ca
             task = bar.add_task("Jacobians", total=sum(len(orbit.walls) for orbit in found))
             figure = orbits.exponents(found, lambda n: bar.update(task, completed=n))
     else:
-        figure = orbits.section(found) if kind == "section" else orbits.collision_map(found)
+        figure = orbits.section(found, follow.phase) if kind == "section" else orbits.collision_map(found)
     return lambda file: style.save(figure, file, suffix)

@@ -1,9 +1,9 @@
 """Orbits: one particle's start and its collisions, with what one looks at along them, and their export.
 
 `follow` draws starts as an ensemble does (particle i of seed S is particle i of `fast.simulate(..., seed=S)`)
-and follows each through the same number of collisions. An orbit knows its energies, its hits of the arc in
-the coordinates of a Poincare section, all its hits in those of the boundary map, its captured stays, and what
-the adiabatic theory says of its energy, given these stays. Pictures: `mushrooms.figures.orbits`.
+and follows each through the same number of collisions, or of cycles. An orbit knows its energies, its hits in
+the coordinates of a Poincare section and of the boundary map, its captured stays, and what the adiabatic
+theory says of its energy, given these stays. Pictures: `mushrooms.figures.orbits`.
 """
 
 from __future__ import annotations
@@ -22,13 +22,14 @@ from mpmath import fp
 
 import scene as scenes
 from fast.given import given_energy
+from fast.narrowings import start_time
 from mushrooms.output import import_arrow
 from scene import Outcome, Scene, State, Stem, Wall
 from scene.files import write_file
 from scene.geometry import TableAt, half_width, table_at
-from scene.laws import values
-from scene.refusal import BadInput, check_count, check_seed
-from scene.tables import check_scene, cycle_length
+from scene.laws import is_constant, values
+from scene.refusal import BadInput, check_count, check_number, check_seed
+from scene.tables import check_scene
 
 FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]
@@ -59,6 +60,12 @@ class Section(NamedTuple):
     def is_captured(self) -> BoolArray:
         """Return (n,): |sin phi| > nu."""
         return np.asarray(np.abs(self.sin_phi) > self.nu)
+
+    def first_from(self, instants: FloatArray) -> Section:
+        """Return the first hit from each of some times on that has one."""
+        k = np.searchsorted(self.t, instants)
+        there = k[k < len(self.t)]
+        return Section(self.collision[there], *(column[there] for column in self[1:]))
 
 
 @dataclass(frozen=True)
@@ -108,7 +115,7 @@ class FollowedOrbit:
             BadInput: the table is a stem, which has no arc.
         """
         if isinstance(self.scene, Stem):
-            raise BadInput("the section is of arc hits: table is stem, must be cap or mushroom")
+            raise BadInput("this section is of arc hits: table is stem, must be cap or mushroom")
         states = self.states()
         index = np.array([k for k, wall in enumerate(self.walls) if wall == "arc"], int)
         before, (t, x, y, vx, vy) = states[index], states[index + 1].T
@@ -117,6 +124,43 @@ class FollowedOrbit:
         spin = y * vx - x * vy
         speed = np.hypot(before[:, 3], before[:, 4])
         return Section(index, t, np.arctan2(y, x) / math.pi, spin / (speed * r), w / r)
+
+    def phase_section(self, phase: float | None = None) -> FloatArray:
+        """Return (n, 2): the phase t/T, 0 to 1, of each hit of the moving wall, and the velocity after it.
+
+        That is Fermi and Ulam's: of a stem whose floor moves its hits and vy, else hits of both sides and
+        |vx| [length/time]. Given a phase of the walls, y and vy at that phase of each cycle.
+
+        Raises:
+            BadInput: the table is none of these, or the phase is none.
+        """
+        if not isinstance(self.scene, Stem) or not self.scene.period:
+            raise BadInput("the section of phase and velocity is of a stem that moves")
+        if phase is not None:
+            times = self.instants(phase)
+            last = np.searchsorted(self.states()[:, 0], times, side="right") - 1
+            return np.column_stack([self.at(times)[:, 1], self.states()[last, 4]])
+        walls = ("left", "right") if is_constant(self.scene.h) else ("floor",)
+        states = self.states()[1:][np.isin(self.walls, walls)]
+        speed = states[:, 4] if walls == ("floor",) else np.abs(states[:, 3])
+        phases = (states[:, 0] - start_time(self.scene)) / self.scene.period % 1.0
+        return np.column_stack([phases, speed])
+
+    def instants(self, phase: float) -> FloatArray:
+        """Return the times within the orbit at which the walls have a phase t/T, 0 to 1.
+
+        Raises:
+            BadInput: it is none, or the walls stand still.
+        """
+        if not 0 <= check_number("phase", phase) < 1:
+            raise BadInput(f"phase = {phase}, must be at least 0 and below 1")
+        if not self.scene.period:
+            raise BadInput(f"phase = {phase}: the walls of this scene stand still")
+        begin, end = self.start.t, float(self.states()[-1, 0])
+        first = start_time(self.scene) + phase * self.scene.period
+        lowest, highest = ((t - first) / self.scene.period for t in (begin, end))
+        count = np.arange(math.ceil(lowest), math.floor(highest) + 1, dtype=np.float64)
+        return np.asarray(first + self.scene.period * count)
 
     def captured(self) -> BoolArray:
         """Return (n + 1,): whether the particle is captured on the flight from each state.
@@ -206,12 +250,19 @@ class FollowedOrbit:
 
 def usual_energy(scene: Scene, crossings: float = CROSSINGS) -> float:
     """Return an energy at which a particle crosses the table so often in a cycle [length^2 / time^2]."""
+    check_scene(scene)
     size = float(table_at(fp, scene, 0.0).size)
-    return 0.5 * (crossings * size / (cycle_length(scene) or CROSSINGS * size)) ** 2
+    return 0.5 * (crossings * size / (scene.period or CROSSINGS * size)) ** 2
 
 
 def follow(
-    scene: Scene, n_collisions: int, *, energy: float | None = None, seed: int = 0, n_orbits: int = 1
+    scene: Scene,
+    n_collisions: int = MAX_COLLISIONS,
+    *,
+    energy: float | None = None,
+    seed: int = 0,
+    n_orbits: int = 1,
+    n_cycles: int | None = None,
 ) -> list[FollowedOrbit]:
     """Follow particles from drawn starts, uniform in area and direction when the cycle begins.
 
@@ -222,6 +273,7 @@ def follow(
             crosses the table some sixty times in a cycle.
         seed: 0 to 2^64 - 1; particle i is particle i of `fast.simulate` at this energy and seed.
         n_orbits: how many particles, 1 to 1000.
+        n_cycles: cycles of the walls after which to stop, if collisions have not come to an end before.
 
     Raises:
         BadInput: naming field, value and bound.
@@ -231,13 +283,17 @@ def follow(
     n_orbits = check_count("n_orbits", n_orbits, 1, MAX_ORBITS)
     seed = check_seed(seed)
     energy = usual_energy(scene) if energy is None else given_energy(energy)
+    end = math.inf
+    if n_cycles is not None:
+        n_cycles = check_count("n_cycles", n_cycles, 1, MAX_COLLISIONS)
+        end = start_time(scene) + n_cycles * (scene.period or 1.0)
     from fast.starts import initial_states  # compiles for seconds: only when all that was given is right
 
     rows = initial_states(scene, n_orbits, energy, seed)
-    return [from_state(scene, State(row[0], *row[2:]), n_collisions) for row in rows.tolist()]
+    return [from_state(scene, State(row[0], *row[2:]), n_collisions, end) for row in rows.tolist()]
 
 
-def from_state(scene: Scene, start: State, n_collisions: int) -> FollowedOrbit:
+def from_state(scene: Scene, start: State, n_collisions: int, t_end: float = math.inf) -> FollowedOrbit:
     """Follow a particle from a state of your own, as `fast.trajectory`.
 
     Raises:
@@ -245,7 +301,7 @@ def from_state(scene: Scene, start: State, n_collisions: int) -> FollowedOrbit:
     """
     import fast
 
-    found = fast.trajectory(scene, start, n_collisions)
+    found = fast.trajectory(scene, start, n_collisions, t_end)
     return FollowedOrbit(scene, start, found.walls, np.asarray(found.steps, np.float64), found.outcome)
 
 
@@ -259,7 +315,8 @@ class Slot(NamedTuple):
 
 def boundary(scene: Scene) -> list[Slot]:
     """Return the walls anticlockwise from the right end of the cap, by their mean lengths in a cycle."""
-    span = cycle_length(scene)
+    check_scene(scene)
+    span = scene.period
     found = [_lengths(table_at(fp, scene, span * k / N_PHASES)) for k in range(N_PHASES if span else 1)]
     walls = [wall for wall, _ in found[0]]
     ends = np.cumsum([0.0, *np.mean([[length for _, length in one] for one in found], axis=0)])
@@ -321,6 +378,7 @@ def _share(now: TableAt, wall: Wall, x: float, y: float, is_split: bool) -> floa
 
 def span_of_nu(scene: Scene) -> tuple[float, float] | None:
     """Return the least and the largest nu = w / r of a cycle; None where there is no mouth."""
+    check_scene(scene)
     if not isinstance(scene, scenes.Mushroom):
         return None
     from theory import Cycle

@@ -60,7 +60,7 @@ MostCollisions = Annotated[int | None, typer.Option(help="Stop when a particle m
 MostSeconds = Annotated[float | None, typer.Option(help="Stop after so long; --resume goes on.")]
 Plot = Annotated[
     Path | None,
-    typer.Option(metavar="FILE", help="Histogram of log E1/E0 after one cycle (.svg, .png), with theory."),
+    typer.Option(metavar="FILE", help="Energies after each cycle with theory (.svg, .png)."),
 ]
 
 
@@ -99,23 +99,24 @@ def simulate(
     _check_ensemble(energy, cycles, seed, threads)
     limits = {"max_collisions": max_collisions, "max_seconds": max_seconds}
     _check_stored(out, particles, block, phases=phases, resume=resume, dask=dask, **limits)
-    _check_plot(plot, particles, cycles)
+    _check_plot(plot, particles)
     from mushrooms.store.asked import Asked
 
     asked = Asked(load_scene(scene), energy, cycles, seed, _given_phases(phases))
     wish = Wish(scene, asked, particles, threads, dask, block, max_collisions, max_seconds)
     if out is None:
-        summary, first = _in_memory(wish)
+        run = _in_memory(wish)
+        summary = _summary(wish, run)
     else:
         with output.writable_folder(out) as folder, locked(folder):
             found = _on_disk(wish, folder, resume)
             if found is None:
                 return LIMITED
-            summary, first = found
+            run, summary = found
     print_pairs(summary, as_json)
     tell_limit(asked, summary)
     if plot is not None:
-        draw_histogram(plot, wish.asked, first, wish.name)
+        draw_energies(plot, asked, run)
     return 0
 
 
@@ -177,17 +178,15 @@ def _check_stored(out: Path | None, particles: int, block: int | None, **options
             raise BadInput(f"{option} = {value}, must be > 0")
 
 
-def _check_plot(plot: Path | None, particles: int, cycles: int) -> None:
+def _check_plot(plot: Path | None, particles: int) -> None:
     if plot is None:
         return
-    if cycles != 1:
-        raise BadInput(f"--cycles = {cycles}, must be 1 for --plot")
     check_range("--particles", particles, 2)
     output.check_file(plot, (".svg", ".png"))
 
 
-def _in_memory(wish: Wish) -> tuple[dict[str, Any], Any]:
-    """Return the summary of a run that nobody keeps, and its histogram."""
+def _in_memory(wish: Wish) -> Any:
+    """Return a run that nobody keeps."""
     from fast.given import check_kept
     from mushrooms.store import blocks, conduct
 
@@ -200,11 +199,11 @@ def _in_memory(wish: Wish) -> tuple[dict[str, Any], Any]:
     except KeyboardInterrupt:
         tell_interrupted("nothing is kept without --out")
         raise
-    return _summary(wish, run), run.tally.first
+    return run
 
 
-def _on_disk(wish: Wish, folder: Path, resume: bool) -> tuple[dict[str, Any], Any] | None:
-    """Bring the run in a folder to its end; return its summary and histogram, None if a limit came first."""
+def _on_disk(wish: Wish, folder: Path, resume: bool) -> tuple[Any, dict[str, Any]] | None:
+    """Bring the run in a folder to its end; return it and its summary, None if a limit came first."""
     from mushrooms.store import conduct
 
     command = wish.asked.command(wish.scene, wish.particles, folder)
@@ -226,7 +225,7 @@ def _on_disk(wish: Wish, folder: Path, resume: bool) -> tuple[dict[str, Any], An
     asked = wish.asked.to_data()
     kept = {name: asked[name] for name in ("scene", "energy", "cycles", "seed")} | summary
     write_file(folder / "summary.json", json.dumps(kept) + "\n")
-    return summary, run.tally.first
+    return run, summary
 
 
 def tell_limit(asked: Any, summary: dict[str, Any]) -> None:
@@ -277,23 +276,26 @@ def _told_how_to_go_on(run: Any, command: str) -> Iterator[None]:
         raise BadInput(f"output {at!r}: {error.strerror or error}: {how()}") from None
 
 
-def draw_histogram(path: Path, asked: Any, first: Any, name: str) -> None:
-    """Write the histogram of log E1 / E0 of those who take part.
+def draw_energies(path: Path, asked: Any, run: Any) -> None:
+    """Write the histogram of ln(E1/E0) of those who take part; of several cycles the mean after each, too.
 
     Raises:
         BadInput: they are too few.
     """
     import io
 
+    import numpy as np
+
     from mushrooms.figures import energies, style
 
-    n = int(first.counts.sum())
-    if n < 2:
-        raise BadInput(f"histogram: {n} particles were followed to the end, must be at least 2")
-    title = f"{style.plain(name)}, E0 = {asked.energy:.0e}, {n:,} particles"
+    def gains() -> Iterator[Any]:
+        for number in range(run.shape.n_blocks):
+            there = run.read(number, "takes_part") == 1
+            yield np.log(run.read(number, "cycle_energies")[there] / asked.energy)
+
+    picture = energies.histogram if asked.n_cycles == 1 else energies.growth
     file = io.BytesIO()
-    figure = energies.histogram(asked.scene, asked.energy, first.middles, title, first.counts)
-    style.save(figure, file, path.suffix)
+    style.save(picture(asked.scene, asked.energy, gains(), run.shape.n_particles), file, path.suffix)
     write_file(path, file.getvalue())
 
 

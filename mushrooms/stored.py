@@ -1,4 +1,4 @@
-"""Commands on stored runs: `mushrooms export`, and the histogram of `mushrooms draw DIR`."""
+"""Commands on stored runs: `mushrooms export`, and the picture of `mushrooms draw DIR`."""
 
 from __future__ import annotations
 
@@ -31,12 +31,12 @@ def export(
 
 
 def draw_run(folder: Path, out: Path | None) -> Path:
-    """Draw the histogram of log E1 / E0 of a stored run, with theory; return the file's path."""
-    from mushrooms.simulate import draw_histogram
+    """Draw the energies of a stored run, with theory; return the file's path."""
+    from mushrooms.simulate import draw_energies
     from mushrooms.store.blocks import open_run
 
     path = out or Path(f"{folder.resolve().name}.svg")
     output.check_file(path, PLOTS)
     run = open_run(folder)
-    draw_histogram(path, run.asked, run.tally.first, run.asked.scene.name or "a scene")
+    draw_energies(path, run.asked, run)
     return path

@@ -22,3 +22,8 @@ __all__ = [
     "next_collision",
     "trajectory",
 ]
+
+
+def __dir__() -> list[str]:
+    """List the public names, without the modules that they come from."""
+    return __all__

@@ -8,8 +8,10 @@ different precisions do not disturb each other, and mpmath's global precision is
 
 from __future__ import annotations
 
+import math
 import threading
 from collections.abc import Sequence
+from decimal import Decimal
 from fractions import Fraction
 from typing import Any, NamedTuple
 
@@ -73,6 +75,18 @@ class Enclosure(NamedTuple):
     def __float__(self) -> float:
         """Return the centre, correctly rounded to binary64."""
         return float(self.centre())
+
+    def __repr__(self) -> str:
+        """Return the centre in the decimals that are known, and how far the truth may be from it."""
+        centre, half = self.centre(), self.extent() / 2
+        if not half and Fraction(float(self)) == centre:
+            return f"Enclosure({float(self)!r})"
+        half = half or abs(centre) * Fraction("1E-40")
+        places = 1 + math.ceil(math.log10(half.denominator) - math.log10(half.numerator))
+        scale = Fraction(f"1E{places}")
+        middle = round(centre * scale)
+        left = math.ceil(half * scale + abs(centre * scale - middle))
+        return f"Enclosure({Decimal(f'{middle}E{-places}')} ± {Decimal(f'{left}E{-places}')})"
 
     def centre(self) -> Fraction:
         """Return (lo + hi) / 2, exactly."""

@@ -39,5 +39,11 @@ __all__ = [
     "to_data",
 ]
 
+
+def __dir__() -> list[str]:
+    """List the public names, without the modules that they come from."""
+    return __all__
+
+
 # The tables cannot import what makes their page in a notebook: it needs the tables.
 _Table._repr_html_ = of_scene

@@ -1,4 +1,4 @@
-"""Checks of what is given for a law's numbers, made before a law exists.
+"""Checks of what is given for a law's numbers, made before a law exists, and of the times it is called with.
 
 Each returns the number as the law keeps it, or raises `InvalidScene` with one line.
 """
@@ -9,7 +9,10 @@ import itertools
 import math
 from fractions import Fraction
 
-from scene.refusal import InvalidScene, check_number, shown
+import numpy as np
+from numpy.typing import NDArray
+
+from scene.refusal import BadInput, InvalidScene, check_number, listed, shown
 
 MAX_HARMONICS = 16  # validity is decided by exact algebra, whose cost grows steeply with the degree
 MAX_KNOTS = 256
@@ -26,12 +29,28 @@ def finite(field: str, number: object) -> float:
     return check_number(field, number, InvalidScene)
 
 
+def finite_times(t: object) -> NDArray[np.float64]:
+    """Return times as an array.
+
+    Raises:
+        BadInput: one is no finite number.
+    """
+    try:
+        times = np.asarray(t, np.float64)
+    except (TypeError, ValueError):
+        raise BadInput(f"t = {shown(t)}, must be finite numbers") from None
+    if not np.isfinite(times).all():
+        raise BadInput(f"t = {times[~np.isfinite(times)][0]}, must be finite")
+    return times
+
+
 def amplitudes(field: str, numbers: object) -> tuple[float, ...]:
     """Return a Fourier law's amplitudes.
 
     Raises:
         InvalidScene: they are no list of finite numbers, or too many.
     """
+    numbers = listed(numbers)
     if not isinstance(numbers, tuple | list):
         raise InvalidScene(f"{field} = {shown(numbers)}, must be a list of numbers")
     if len(numbers) > MAX_HARMONICS:
@@ -45,6 +64,7 @@ def checked_knot(i: int, knot: object) -> tuple[float, float]:
     Raises:
         InvalidScene: it is no pair of finite numbers.
     """
+    knot = listed(knot)
     if not (isinstance(knot, tuple | list) and len(knot) == 2):
         raise InvalidScene(f"bang-bang.knots[{i}] = {shown(knot)}, must be a pair [time, value]")
     time, value = knot

@@ -21,8 +21,8 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from scene.given import MAX_KNOTS, amplitudes, check_legs, checked_knot, finite
-from scene.refusal import InvalidScene, shown
+from scene.given import MAX_KNOTS, amplitudes, check_legs, checked_knot, finite, finite_times
+from scene.refusal import InvalidScene, listed, shown
 
 LEAST_NORMAL = 2.0**-1022
 
@@ -65,6 +65,10 @@ class Fourier(
             raise InvalidScene(f"fourier.{field} = {size}, must be finite and > 0")
         _keep(self, field, size)
 
+    def __call__(self, t: Any) -> Any:
+        """Return the value at a time, or an array of values at an array of times."""
+        return at(self, t)
+
     def harmonics(self) -> list[tuple[int, float, float]]:
         """Return (k, cosine amplitude, sine amplitude) for every harmonic present."""
         n = max(len(self.cos), len(self.sin))
@@ -84,13 +88,17 @@ class BangBang(msgspec.Struct, frozen=True, tag_field="kind", tag="bang-bang", f
         Raises:
             InvalidScene: naming the knot, the value and the bound.
         """
-        knots = self.knots
+        knots = listed(self.knots)
         if not isinstance(knots, tuple | list):
             raise InvalidScene(f"bang-bang.knots = {shown(knots)}, must be a list of pairs [time, value]")
         if not 2 <= len(knots) <= MAX_KNOTS:
             raise InvalidScene(f"bang-bang.knots has {len(knots)} knots, must have 2 to {MAX_KNOTS}")
         _keep(self, "knots", tuple(checked_knot(i, knot) for i, knot in enumerate(knots)))
         check_legs(self.knots)
+
+    def __call__(self, t: Any) -> Any:
+        """Return the value at a time, or an array of values at an array of times."""
+        return at(self, t)
 
 
 Law = float | Fourier | BangBang
@@ -305,15 +313,9 @@ class _Arrays:
 
 
 def values(law: Law, times: FloatArray, order: int = 0) -> FloatArray:
-    """Evaluate a law, or its first or second derivative, at many times in binary64.
+    """Evaluate a law, or its derivative of order 1 or 2, in binary64 at times of any shape.
 
-    Args:
-        law: a sound law.
-        times: of any shape [time].
-        order: 0, 1 or 2.
-
-    Returns:
-        Of the times' shape. Times since the first knot, phases and omega t are rounded as floats are.
+    Times since the first knot, phases and omega t are rounded as floats are.
     """
     if is_constant(law) or not isinstance(law, BangBang):
         return np.full(times.shape, evaluate(_Arrays, piece_at(law, Fraction(0)), times, order))
@@ -327,6 +329,13 @@ def values(law: Law, times: FloatArray, order: int = 0) -> FloatArray:
             those = (legs == leg) & half
             found[those] = evaluate(_Arrays, piece, phases[those], order)
     return found
+
+
+def at(law: Law, t: Any) -> Any:
+    """Return the value of a law at a time, or an array of values at an array of times of any shape."""
+    times = finite_times(t)
+    found = values(law, times.reshape(-1)).reshape(times.shape)
+    return found if times.ndim else float(found)
 
 
 def bounds(law: Law) -> Bounds:

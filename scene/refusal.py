@@ -8,7 +8,9 @@ from __future__ import annotations
 
 import math
 import numbers
-import operator
+from typing import Any
+
+import numpy as np
 
 MAX_SEED = 2**64 - 1
 
@@ -26,16 +28,18 @@ def check_count(field: str, value: object, low: int, high: int) -> int:
 
     Args:
         field: its name, for the message.
-        value: whatever a caller gave; integers of numpy are taken, a float is not, though it be whole.
+        value: whatever a caller gave: whole numbers of any kind are taken, 1e4 and those of numpy too.
         low: least value allowed.
         high: greatest value allowed.
 
     Raises:
         BadInput: naming field, value and bounds.
     """
-    if isinstance(value, bool) or not isinstance(value, numbers.Integral):
-        raise BadInput(f"{field} = {shown(value)}, must be a whole number, {low} to {high}")
-    count = operator.index(value)
+    given = listed(value)
+    is_whole = not isinstance(given, bool) and isinstance(given, numbers.Real) and given % 1 == 0
+    if not is_whole:
+        raise BadInput(f"{field} = {shown(given)}, must be a whole number, {low} to {high}")
+    count = int(given)
     if not low <= count <= high:
         raise BadInput(f"{field} = {shown(count)}, must be {low} to {high}")
     return count
@@ -55,21 +59,29 @@ def check_number(field: str, value: object, refusal: type[BadInput] = BadInput) 
 
     Args:
         field: its name, for the message.
-        value: whatever a caller gave; integers and numbers of numpy are taken.
+        value: whatever a caller gave; integers, numbers of numpy and its arrays of no dimension are taken.
         refusal: the error to raise.
 
     Raises:
         BadInput: or the error asked for, naming field, value and bound.
     """
-    if isinstance(value, bool) or not isinstance(value, numbers.Real):
-        raise refusal(f"{field} = {shown(value)}, must be a finite number")
+    given = listed(value)
+    if isinstance(given, bool) or not isinstance(given, numbers.Real):
+        raise refusal(f"{field} = {shown(given)}, must be a finite number")
     try:
-        number = float(value)
+        number = float(given)
     except OverflowError:
-        raise refusal(f"{field} = {shown(value)}, must be a finite binary64 number") from None
+        raise refusal(f"{field} = {shown(given)}, must be a finite binary64 number") from None
     if not math.isfinite(number):
         raise refusal(f"{field} = {number}, must be finite")
     return number
+
+
+def listed(value: object) -> Any:
+    """Return what numpy holds as numbers of Python, in lists for each dimension; else the value."""
+    if not isinstance(value, np.ndarray | np.generic):
+        return value
+    return str(value) if value.dtype.kind in "mM" else value.tolist()  # a date would be a number
 
 
 def shown(value: object) -> str:

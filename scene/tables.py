@@ -28,8 +28,8 @@ import msgspec
 from mpmath import fp
 
 from scene.given import finite
-from scene.laws import BangBang, Fourier, Law, Period, shared_period
-from scene.refusal import BadInput, InvalidScene, shown
+from scene.laws import BangBang, Fourier, Law, Period, at, shared_period
+from scene.refusal import BadInput, InvalidScene, listed, shown
 from scene.validity import Condition, prove
 
 Wall = Literal["arc", "base", "left", "right", "floor"]
@@ -56,9 +56,10 @@ class _Table(
             InvalidScene: one line naming the parameter, the value or the time, and the bound.
         """
         for field in self.__struct_fields__:
-            given = getattr(self, field)
-            if type(given) is float or field not in PARAMETERS:
+            kept = getattr(self, field)
+            if type(kept) is float or field not in PARAMETERS:
                 continue
+            given = listed(kept)
             if isinstance(given, Fourier | BangBang) or (given is None and field in self.optional):
                 continue
             if isinstance(given, bool) or not isinstance(given, Real):
@@ -67,6 +68,15 @@ class _Table(
         for field in ("name", "notes"):
             _check_text(field, getattr(self, field))
         _prove(type(self), tuple(getattr(self, name, None) for name in PARAMETERS))
+
+    @property
+    def period(self) -> float:
+        """Return the period of the laws that move [time], 0 where nothing moves."""
+        return cycle_length(self)  # type: ignore[arg-type]
+
+    def at(self, t: Any) -> dict[str, Any]:
+        """Return the value of each law, by name, at a time or at an array of times (`Fourier`)."""
+        return {name: at(law, t) for name, law in laws(self).items()}  # type: ignore[arg-type]
 
 
 def _check_text(field: str, text: object) -> None:

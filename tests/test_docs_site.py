@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import doctest
+import importlib
 import json
 import re
 import shlex
@@ -30,6 +31,42 @@ RUN_ELSEWHERE = {
     "ensembles.md": {"", "python"},  # test_mushrooms_scale, with fewer particles
 }
 INSTALLS = ("pip install", "mushrooms --version", "git clone", "cd oscillating-mushrooms")
+
+
+MODULES = [
+    (page.name, name)
+    for page in sorted((DOCS / "api").glob("*.md"))
+    for name in re.findall(r"automodule:: (\S+)", page.read_text("utf-8"))
+]
+
+
+def undocumented(page: str, name: str) -> list[str]:
+    """List the public names of a module that `dir` does not find, or that its page says nothing of.
+
+    The page says what the docstring does of a function or class under its own name, and names the others.
+    """
+    module, text = importlib.import_module(name), (DOCS / "api" / page).read_text("utf-8")
+    made_here = [
+        n for n, one in vars(module).items() if n[0] != "_" and getattr(one, "__module__", 0) == name
+    ]
+    public = getattr(module, "__all__", made_here)
+    own = [n for n in public if getattr(getattr(module, n), "__name__", "") == n]
+    told = {n for n in own if getattr(module, n).__doc__}
+    return [n for n in public if not (n in dir(module) and (n in told or f"`{n}`" in text))]
+
+
+@pytest.mark.parametrize(("page", "name"), MODULES)
+def test_every_public_name_is_found_and_documented(page, name):
+    assert undocumented(page, name) == []
+
+
+def test_a_public_name_that_is_hidden_is_seen(monkeypatch):
+    module = importlib.import_module("fast")
+    monkeypatch.setattr(module, "nowhere", 1, raising=False)
+    monkeypatch.setattr(module, "__all__", ["nowhere", *module.__all__])
+    assert undocumented("fast.md", "fast") == ["nowhere"]
+    monkeypatch.delattr(type(module), "__dir__")
+    assert set(undocumented("fast.md", "fast")) >= {"simulate", "Ensemble"}
 
 
 def blocks(page: Path) -> list[tuple[str, str]]:

@@ -49,6 +49,22 @@ def test_cycles_continue_one_another():
     assert np.array_equal(one.cycle_energies[:, 0], three.cycle_energies[:, 0])
 
 
+def test_each_cycle_has_its_means_and_their_errors():
+    run = fast.simulate(load("moving-cap"), n_particles=400, energy=1e4, n_cycles=3, seed=2)
+    there, s = run.takes_part(), run.s()
+    assert np.allclose(s.sum(axis=1), np.log(run.energy / run.energy0), equal_nan=True, rtol=1e-12)
+    assert run.m1() == pytest.approx(s[there].mean(axis=0))
+    assert run.m1_se() == pytest.approx(s[there].std(axis=0, ddof=1) / there.sum() ** 0.5)
+    share = run.p_nc()
+    assert run.p_nc_se() == pytest.approx(np.sqrt(share * (1 - share) / there.sum()))
+    cap = fast.simulate(load("breathing-circle"), n_particles=1, energy=1e4, seed=2)
+    assert (cap.p_nc(), cap.p_nc_se()) == ([1.0], [0.0])
+    assert np.isnan(cap.m1_se()).all()
+    nobody = run._replace(outcome=run.outcome + 1)
+    for each in (nobody.m1(), nobody.m1_se(), nobody.p_nc(), nobody.p_nc_se()):
+        assert np.isnan(each).all()
+
+
 @pytest.mark.parametrize("name", ["moving-cap", "fixed-cap-anticlockwise", "breathing-circle", "fermi-ulam"])
 def test_starts_are_uniform_in_the_table(name):
     scene = load(name)

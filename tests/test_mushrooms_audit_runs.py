@@ -264,9 +264,9 @@ def test_energies_at_phases_are_kept_drawn_and_exported(command_line, tmp_path):
     assert json.loads(ended.out)["sha256"] == wanted.sha256()
     with xarray.open_zarr(tmp_path / "run" / "ensemble.zarr") as found:
         assert found.attrs["phases"] == list(phases)
-        for name, source in (("phase_energy", "phase_energies"), ("phase_captured", "phase_captured")):
+        for name in ("phase_energies", "phase_captured"):
             assert found[name].dims == ("particle", "cycle", "phase")
-            np.testing.assert_array_equal(found[name].values, getattr(wanted, source))
+            np.testing.assert_array_equal(found[name].values, getattr(wanted, name))
         assert found.phase_captured.dtype == np.int8
     assert command_line("draw", tmp_path / "run", "--out", tmp_path / "a.svg").code == 0
     assert (tmp_path / "a.svg").stat().st_size > 5000
@@ -275,7 +275,7 @@ def test_energies_at_phases_are_kept_drawn_and_exported(command_line, tmp_path):
         np.testing.assert_array_equal(arrays["phase_captured"], wanted.phase_captured)
         assert arrays["phase_captured"].dtype == bool
     assert command_line("export", tmp_path / "run", "--to", tmp_path / "a.csv").code == 0
-    assert "phase_energy_2_1,phase_energy_2_2,phase_captured_1_1" in (tmp_path / "a.csv").read_text()
+    assert "phase_energies_2_1,phase_energies_2_2,phase_captured_1_1" in (tmp_path / "a.csv").read_text()
     for other, there in (([], "[]"), (["--phases", "0.25"], "[0.25]")):
         refused = command_line(*run, "--resume", *other)
         assert_refused(refused, f"phases = [0.25, 0.5] there, {there} asked for")
@@ -292,7 +292,7 @@ def test_what_is_not_there_yet_has_no_phase(tmp_path):
         there[64:128] = True
         np.testing.assert_array_equal((found.phase_captured.values >= 0).all(axis=(1, 2)), there)
         np.testing.assert_array_equal((found.phase_captured.values == -1).all(axis=(1, 2)), ~there)
-        np.testing.assert_array_equal(np.isfinite(found.phase_energy.values).all(axis=(1, 2)), there)
+        np.testing.assert_array_equal(np.isfinite(found.phase_energies.values).all(axis=(1, 2)), there)
 
 
 def test_without_phases_a_run_says_what_it_always_said(tmp_path):

@@ -15,7 +15,7 @@ from mushrooms import bench
 from mushrooms.figures import speed as figures_of_speed
 
 ROOT = Path(__file__).parent.parent
-FILES = ["bench.html", "bench.json", "bench.svg"]
+FILES = ["bench.html", "bench.json", "bench.svg", "panels.svg"]
 
 
 @pytest.fixture(autouse=True)
@@ -55,7 +55,7 @@ def test_a_benchmark_is_written_whole_and_again(call, tmp_path, monkeypatch):
     page = (tmp_path / "one" / "bench.html").read_text("utf-8")
     assert not re.search(r"(src|href)=\"(?!data:)", page)
     assert page.count("<img") == 2
-    assert (tmp_path / "one" / "bench.svg").read_text("utf-8").count("breathing-disk") >= 1
+    assert (tmp_path / "one" / "bench.svg").read_text("utf-8").count("moving-cap-1e4") >= 1
 
     # The same seed asks the same questions, so that the errors are the same to the last bit.
     for picture in ("speed", "growth"):  # drawn above
@@ -131,6 +131,11 @@ def test_the_kept_figure_reads_at_a_glance():
     for colour in [*figures_of_speed.COLOURS.values(), figures_of_speed.RED]:
         assert 1.05 / (luminance(colour) + 0.05) >= 4.5
     assert len(set(figures_of_speed.MARKS.values())) == len(figures_of_speed.COLOURS)
+    figure = figures_of_speed.headline(kept)
+    figure.draw_without_rendering()
+    boxes = [Text.get_window_extent(text) for text in figure.axes[0].texts if text.get_text()]
+    assert len(boxes) == 9
+    assert not any(a.overlaps(b) for k, a in enumerate(boxes) for b in boxes[:k])
     figure = figures_of_speed.speed_figure(kept)
     figure.draw_without_rendering()
     assert min(text.get_fontsize() for text in figure.findobj(Text) if text.get_text()) >= 9

@@ -9,6 +9,7 @@ import msgspec
 import numpy as np
 import pyarrow.parquet
 import pytest
+from matplotlib.text import Text
 from mpmath import fp
 from PIL import Image
 from support.depth import deep_but
@@ -20,6 +21,7 @@ import scene as scenes
 import theory
 from mushrooms import lyapunov, orbits
 from mushrooms.figures import orbits as pictures
+from mushrooms.figures import table as tables
 from scene.laws import value
 
 STATIC = scenes.load("frozen-mushroom")
@@ -232,8 +234,81 @@ def test_figures_are_returned(moving):
     labels = [text.get_text() for text in pictures.section(moving).legends[0].get_texts()]
     assert labels[0] == "edge |sin φ| = nu, nu = 0.2 to 1"
     assert pictures.collision_map(moving).axes
-    drawn = [line.get_label() for line in pictures.energy_in_time(moving[0]).axes[0].lines]
-    assert drawn == ["this particle", "theory, given its stays", "theory, never captured"]
+    lines = pictures.energy_in_time(moving[0]).axes[0].lines
+    drawn = [line.get_label() for line in sorted(lines, key=lambda line: -line.get_zorder())]
+    assert drawn == ["this particle", "theory, given its stays", "theory, never captured"]  # from above
+
+
+def words_of(figure) -> str:
+    """Return everything that a figure says, in one line."""
+    return " ".join(text.get_text() for text in figure.findobj(Text))
+
+
+@pytest.mark.parametrize("name", ["fermi-ulam", "breathing-circle"])
+def test_where_nothing_can_be_captured_no_figure_speaks_of_it(name):
+    found = orbits.follow(scenes.load(name), 64, n_orbits=2, seed=1)
+    figures = [pictures.section(found), pictures.collision_map(found), pictures.exponents(found)]
+    figures += [pictures.energy_in_time(found[0]), pictures.trajectory(found[0])]
+    for figure in figures:
+        assert "captured" not in words_of(figure)
+        assert "free" not in words_of(figure)
+        assert "stays" not in words_of(figure)
+
+
+def test_the_section_of_a_stem_is_phase_and_velocity():
+    """After a hit of the floor at h'(t) the velocity is the old one less twice the floor's."""
+    stem = scenes.load("fermi-ulam")
+    [orbit] = orbits.follow(stem, 500, energy=1.8, seed=1)
+    at_floor = np.flatnonzero(np.array(orbit.walls) == "floor")
+    states, (phase, velocity) = orbit.states(), orbit.phase_section().T
+    assert velocity.tolist() == states[at_floor + 1, 4].tolist()
+    rate = np.array([float(value(fp, stem.h, t * stem.period, 1)) for t in phase])
+    assert velocity == pytest.approx(-states[at_floor, 4] - 2 * rate, abs=1e-9)
+    depth, speed = orbit.phase_section(0.5).T
+    assert depth == pytest.approx(orbit.at(orbit.instants(0.5))[:, 1])
+    assert set(speed) <= set(states[:, 4])
+    wide = scenes.Stem(w=stem.h, h=1.0)
+    [other] = orbits.follow(wide, 500, energy=1.8, seed=1)
+    assert len(other.phase_section()) == sum(wall in ("left", "right") for wall in other.walls)
+    for one in (STATIC, scenes.Stem(w=1.0, h=1.0)):
+        with pytest.raises(scenes.BadInput, match="of a stem that moves"):
+            orbits.follow(one, 9)[0].phase_section()
+
+
+def test_a_section_at_a_phase_has_a_point_a_cycle():
+    found = orbits.follow(MOVING, energy=ENERGY, seed=SEED, n_cycles=3, n_orbits=2)
+    for orbit in found:
+        instants = orbit.instants(0.25)
+        assert instants == pytest.approx(MOVING.period * np.array([0.25, 1.25, 2.25]))
+        section = orbit.section().first_from(instants)
+        assert np.all((section.t >= instants) & (section.t < instants + 0.05))
+        assert section.nu == pytest.approx(MOVING.nu(instants), abs=0.05)
+    [axes] = pictures.section(found, 0.25).axes
+    assert axes.get_title().endswith("at t/T = 0.25")
+    for phase, words in ((1.0, "phase = 1.0, must be"), (math.nan, "phase = nan")):
+        with pytest.raises(scenes.BadInput, match=words):
+            found[0].instants(phase)
+
+
+def test_orbits_go_through_whole_cycles():
+    [orbit] = orbits.follow(MOVING, energy=ENERGY, seed=SEED, n_cycles=2)
+    assert isinstance(orbit.outcome, scenes.Horizon)
+    assert orbit.outcome.t == pytest.approx(2 * MOVING.period)
+    run = fast.simulate(MOVING, n_particles=1, energy=ENERGY, n_cycles=2, seed=SEED)
+    assert len(orbit.walls) == pytest.approx(run.n_collisions[0], rel=0.2)  # chaos: rounded otherwise
+
+
+@pytest.mark.parametrize("picture", [pictures.section, pictures.collision_map, pictures.trajectory])
+def test_a_figure_of_orbits_takes_no_name(picture):
+    with pytest.raises(scenes.BadInput, match="must be what mushrooms"):
+        picture("moving-cap")
+
+
+@pytest.mark.parametrize("call", [tables.phases, tables.new_strip, orbits.usual_energy, orbits.boundary])
+def test_a_figure_of_a_table_takes_no_name(call):
+    more = (3.0, 3.0) if call is tables.new_strip else ()
+    with pytest.raises(scenes.BadInput, match="is loaded by"):
+        call("moving-cap", *more)
 
 
 @pytest.mark.parametrize("suffix", ["png", "gif"])
@@ -291,7 +366,10 @@ def test_the_path_of_a_particle_in_every_kind_of_file(command_line, tmp_path, su
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (["fermi-ulam", "--section"], ["stem"]),
+        (["frozen-mushroom", "--section", "--phase", "0.5"], ["--phase = 0.5", "stand still"]),
+        (["moving-cap", "--map", "--phase", "0.5"], ["--phase = 0.5", "--section"]),
+        (["moving-cap", "--growth", "--collisions", "99"], ["--collisions = 99", "--cycles"]),
+        (["moving-cap", "--growth", "--cycles", "0"], ["--cycles = 0", "1 to 10000"]),
         (["moving-cap", "--section", "--out", "a.gif"], ["a.gif", ".svg, .png, .pdf"]),
         (["moving-cap", "--out", ""], ["--out", "empty"]),
         (["moving-cap", "--trajectory", "--energy", "0"], ["--energy = 0.0", "> 0"]),

@@ -78,9 +78,10 @@ def test_a_run_is_lengthened_and_widened_to_the_bits_of_one_at_once(command_line
     assert run.drop_attrs().equals(once.drop_attrs())  # what it takes to go on among them
     assert run.attrs["cycles"] == cycles
     assert f"--cycles {cycles}" in run.attrs["command"]
-    for field, stored in layout.FIELDS.items():
-        if field in run and field != layout.LANE:
-            assert run[field].values.tobytes() == getattr(wanted, stored.source).tobytes()
+    for field in wanted._fields:
+        if field in run:
+            assert run[field].values.tobytes() == getattr(wanted, field).tobytes()
+    assert run.takes_part.values.tolist() == wanted.takes_part().tolist()
 
 
 def test_a_run_that_is_long_enough_is_not_followed_again(command_line, tmp_path, followed):
@@ -177,11 +178,11 @@ def test_a_chunk_holds_the_cycles_that_a_run_began_with(command_line, tmp_path):
 
     for cycles in (2, 5):
         summary_of(command_line(*arguments(tmp_path, cycles)))
-        energy = zarr.open_group(tmp_path / "ensemble.zarr", mode="r")["energy"]
+        energy = zarr.open_group(tmp_path / "ensemble.zarr", mode="r")["cycle_energies"]
         assert (energy.shape, energy.chunks) == ((N, cycles), (BLOCK, 2))
-    names = sorted(path.name for path in (tmp_path / "ensemble.zarr" / "energy").glob("c.1.*"))
+    names = sorted(path.name for path in (tmp_path / "ensemble.zarr" / "cycle_energies").glob("c.1.*"))
     assert names == ["c.1.0", "c.1.1", "c.1.2"]
-    last = np.fromfile(tmp_path / "ensemble.zarr" / "energy" / "c.1.2").reshape(BLOCK, 2)
+    last = np.fromfile(tmp_path / "ensemble.zarr" / "cycle_energies" / "c.1.2").reshape(BLOCK, 2)
     assert np.isfinite(last[:, 0]).all()
     assert np.isnan(last[:, 1]).all()
 
@@ -194,20 +195,20 @@ def test_a_run_may_be_lengthened_many_times_over_but_not_endlessly(command_line,
 
 def test_what_is_kept_takes_the_room_that_the_page_says():
     shape = conduct.shape_of(asked.Asked(load("moving-cap"), ENERGY, 1, SEED), 1, 1)
-    assert shape.bytes_of_a_particle == 113 + 8 * kept.LANE_ROWS == 457
+    assert shape.bytes_of_a_particle == 114 + 8 * kept.LANE_ROWS == 458
 
 
 def forgotten(column):
     def faulty(arrays, *more):
-        lanes = arrays[layout.LANE].copy()
+        lanes = arrays[layout.LANES].copy()
         lanes[:, column] = 0.0
-        return layout.paused_of({**arrays, layout.LANE: lanes}, *more)
+        return layout.paused_of({**arrays, layout.LANES: lanes}, *more)
 
     return faulty
 
 
 def of_others(arrays, *more):
-    return layout.paused_of({**arrays, layout.LANE: arrays[layout.LANE][::-1]}, *more)
+    return layout.paused_of({**arrays, layout.LANES: arrays[layout.LANES][::-1]}, *more)
 
 
 @pytest.mark.parametrize("faulty", [forgotten(kept.FIRST_ROW + 4), forgotten(kept.FIRST_ROW + 5), of_others])

@@ -11,6 +11,7 @@ import shutil
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import distributed
 import numpy as np
@@ -180,9 +181,8 @@ def test_xarray_and_zarr_read_every_bit(stored, ensemble):
 
     run = xarray.open_zarr(stored / "ensemble.zarr")
     assert dict(run.sizes) == {"particle": N, "cycle": 1, "narrowing": 1, "wall": 5, "row": LANE_ROWS}
-    wanted = {"energy": "cycle_energies", "t_in": "t_in", "collisions": "wall_counts", "outcome": "outcome"}
-    for name, source in wanted.items():
-        assert np.array_equal(run[name].values, getattr(ensemble, source), equal_nan=name != "outcome")
+    for name in ("cycle_energies", "t_in", "wall_counts", "outcome", "n_careful"):
+        assert np.array_equal(run[name].values, getattr(ensemble, name), equal_nan=name[0] != "o")
     assert run.attrs["seed"] == SEED
     assert run.attrs["scene"]["name"] == "moving-cap"
     assert "--seed 5" in run.attrs["command"]
@@ -206,10 +206,10 @@ def test_exports_have_every_bit(command_line, stored, tmp_path, ensemble):
         rows = list(csv.DictReader(file))
     assert len(rows) == table.num_rows == N
     assert list(rows[0]) == table.column_names
-    for name, wanted in (("energy_1", ensemble.energy), ("t_in_1_1", ensemble.t_in[:, 0, 0])):
+    for name, wanted in (("cycle_energies_1", ensemble.energy), ("t_in_1_1", ensemble.t_in[:, 0, 0])):
         assert table[name].to_numpy().tobytes() == wanted.tobytes()
         assert np.array([float(row[name]) for row in rows]).tobytes() == wanted.tobytes()
-    assert [int(row["collisions_floor"]) for row in rows] == ensemble.wall_counts[:, 4].tolist()
+    assert [int(row["wall_counts_floor"]) for row in rows] == ensemble.wall_counts[:, 4].tolist()
     assert table["particle"].to_pylist() == list(range(N))
 
 
@@ -217,7 +217,7 @@ def test_exports_have_every_bit(command_line, stored, tmp_path, ensemble):
 def test_an_export_of_a_damaged_block_is_refused_in_a_line(command_line, stored, tmp_path, kind):
     """What pyarrow had begun to write closed itself when nobody held it any more, with a page on stderr."""
     folder, unraised = shutil.copytree(stored, tmp_path / "run"), []
-    (folder / blocks.GROUP / "energy" / "c.2.0").write_bytes(b"")
+    (folder / blocks.GROUP / "cycle_energies" / "c.2.0").write_bytes(b"")
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(sys, "unraisablehook", unraised.append)
         ended = command_line("export", folder, "--to", tmp_path / f"run.{kind}")
@@ -285,11 +285,13 @@ def test_a_run_killed_at_random_moments_goes_on_to_the_same_bits():
     assert done.stdout.startswith("2 killed: ")
 
 
-def test_the_page_s_python_plots_a_histogram(stored, monkeypatch):
-    """Five lines, run where the page says, on a run that is there."""
+def test_the_page_s_python_plots_a_histogram(stored, monkeypatch, ensemble):
+    """A few lines, run where the page says, on a run that is there; p_nc is that of the ensemble."""
     text = (DOCS / "ensembles.md").read_text("utf-8")
     (snippet,) = re.findall(r"^```python\n(.*?)^```$", text, re.MULTILINE | re.DOTALL)
-    assert sum(map(bool, snippet.splitlines())) == 5
+    assert sum(map(bool, snippet.splitlines())) < 9
     monkeypatch.chdir(stored.parent)
-    exec(snippet, {})
+    names = dict[str, Any]()
+    exec(snippet, names)
+    assert names["p_nc"].values == pytest.approx(ensemble.p_nc())
     assert (stored.parent / "histogram.png").stat().st_size > 5000

@@ -133,7 +133,7 @@ def emptied(_content):
     ("damage", "name"),
     [
         (truncated, "ensemble.zarr/t/c.2"),
-        (flipped, "ensemble.zarr/collisions/c.2.0"),
+        (flipped, "ensemble.zarr/wall_counts/c.2.0"),
         (emptied, "ensemble.zarr/outcome/c.2"),
         (truncated, "blocks/2.marker"),
         (flipped, "blocks/2.marker"),

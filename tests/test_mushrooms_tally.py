@@ -1,4 +1,4 @@
-"""What blocks come to: exact sums in any order, histograms, seals of files, and how progress is told."""
+"""What blocks come to: exact sums in any order, seals of files, and how progress is told."""
 
 from __future__ import annotations
 
@@ -29,14 +29,12 @@ def test_sums_are_exact_and_merge_in_any_order():
     floats = set()
     for _ in range(5):
         parts = np.split(random.permutation(gains), np.sort(random.integers(0, 5001, 7)))
-        merged, histogram, plain = tally.Moments(), tally.Histogram(), 0.0
+        merged, plain = tally.Moments(), 0.0
         for part in parts:
             merged = merged.merged(tally.moments_of(part))
             plain = float(np.cumsum([plain, *part])[-1])
-            histogram = histogram.merged(tally.histogram_of(part))
         floats.add(plain)
         assert merged == moments
-        assert histogram.counts.tolist() == tally.histogram_of(gains).counts.tolist()
     assert len(floats) > 1  # a faulty tally, of plain floats, would be found out
     assert tally.moments_of(np.array([1.0, -np.inf])).mean is None
 

@@ -192,7 +192,7 @@ def test_what_is_no_number_is_shown(command_line, option, given):
         (["check", "--groups", ",", "--", "true"], ["--groups = ','"]),
         (["draw", "moving-cap", "--seed", "1"], ["--seed = 1", "the picture of the walls has no particles"]),
         (["draw", "moving-cap", "--energy", "1"], ["--energy = 1.0", "no particles"]),
-        (["draw", "moving-cap", "--growth", "--particles", "3"], ["--particles = 3", "--section, --map"]),
+        (["draw", "moving-cap", "--trajectory", "--particles", "3"], ["--particles = 3", "--section, --map"]),
         (["draw", "moving-cap", "--export", "a.csv", "--particles", "3"], ["--particles = 3"]),
     ],
 )

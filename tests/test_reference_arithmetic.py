@@ -184,3 +184,14 @@ def test_an_undecided_sign_is_zero():
 def test_centres_round_correctly(a, width):
     lo, hi = mpmath.mp.make_mpf(mpmath.mpf(a)._mpf_), mpmath.mp.make_mpf(mpmath.mpf(a + width)._mpf_)
     assert float(Enclosure(lo, hi)) == float((Fraction(a) + Fraction(a + width)) / 2)
+
+
+@given(numbers, st.floats(0, 1e9), st.integers(-1000, 0))
+def test_an_enclosure_prints_as_one(a, width, shift):
+    """With Python's usual 15 digits both ends would be shown as the same number."""
+    low, high = (mpmath.mp.make_mpf(mpmath.ldexp(end, shift)._mpf_) for end in (a, a + width))
+    middle, _, left = repr(Enclosure(low, high)).removeprefix("Enclosure(").removesuffix(")").partition(" ± ")
+    middle, left = Fraction(middle if left else float(middle)), Fraction(left or 0)
+    assert middle - left <= rational(low._mpf_) <= rational(high._mpf_) <= middle + left
+    extent = rational(high._mpf_) - rational(low._mpf_)
+    assert 2 * left <= Fraction(12, 10) * extent or extent == 0

@@ -11,7 +11,7 @@ from mpmath import MPContext, MPIntervalContext, fp
 from support.refusals import one_line
 
 from conformance.strategies import laws
-from scene import BangBang, Fourier
+from scene import BangBang, Cap, Fourier, Stem
 from scene.laws import (
     Quadratic,
     bounds,
@@ -212,3 +212,26 @@ def test_numbers_of_any_kind_become_floats_and_lists_tuples():
     assert legs == BangBang(((0.0, 1.0), (1.0, 2.0), (2.0, 1.0)))
     assert {type(x) for knot in legs.knots for x in knot} == {float}
     assert {type(x) for x in (law.cos, law.sin, legs.knots, *legs.knots)} == {tuple}
+
+
+@pytest.mark.parametrize(
+    ("law", "period"), [(LEGS, 1.0), (Fourier(1.0, period=3.0, cos=(0.25,)), 3.0), (Fourier(2.0, 1.0), 0.0)]
+)
+def test_a_law_is_evaluated_at_a_time_or_an_array_of_times(law, period):
+    grid = np.array([[0.0, 0.1], [2.5, -7.0]])
+    assert law(grid).tolist() == law(grid.tolist()).tolist() == [[law(t) for t in row] for row in grid]
+    assert law(0.1) == pytest.approx(value(fp, law, 0.1), rel=1e-15)
+    table = Cap(r=law)
+    assert table.at(0.1) == {"r": law(0.1)}
+    assert table.period == period
+    for bad, words in (("a", "t = 'a'"), ([0.0, math.nan], "t = nan"), ({}, "t = an object of type dict")):
+        assert one_line(law, bad).startswith(words)
+
+
+def test_what_numpy_holds_is_taken_as_lists_are():
+    law = Fourier(np.array(1.0), np.float32(2.0), np.array([0.25, 0.0]), [np.array(0.125)])
+    assert law == Fourier(1.0, 2.0, (0.25, 0.0), (0.125,))
+    knots = [[0, 1.0], [1, 2.0], [2, 1.0]]
+    assert BangBang(np.array(knots)) == BangBang([np.array(knot) for knot in knots]) == BangBang(knots)
+    table = Stem(w=np.array(1.0), h=np.float32(2.0))
+    assert (table, type(table.w)) == (Stem(w=1.0, h=2.0), float)

@@ -46,7 +46,7 @@ PROVED = {
 }
 NAN, INFINITY = math.nan, math.inf
 NO_NUMBER = [None, *NO_NUMBERS, NAN, -INFINITY]
-NO_COUNT = [*NO_NUMBERS, NAN, -INFINITY, INFINITY, 2.5, 2.0, Fraction(2), -1]
+NO_COUNT = [*NO_NUMBERS, NAN, -INFINITY, INFINITY, 2.5, Fraction(5, 2), np.array([2]), -1]
 BAD = {
     "scene": [None, "moving-cap", b"cap", 1.0, NAN, [], {"table": "cap", "r": 1.0}, Cap, START, HUGE],
     "state": [
@@ -151,11 +151,13 @@ def test_numbers_of_other_kinds_are_taken():
         State(0, 0.5, 0.25, 1, 2),
     ]
     expected = fast.trajectory(CAP, State(0.0, 0.5, 0.25, 1.0, 2.0), 5)
-    found = fast.trajectory(CAP, kinds[1], np.int64(5), Fraction(100))
-    assert np.array_equal(found.steps, expected.steps)
+    for five in (np.int64(5), 5.0, np.array(5), np.float32(5), Fraction(5)):
+        found = fast.trajectory(CAP, kinds[1], five, Fraction(100))
+        assert np.array_equal(found.steps, expected.steps)
     assert isinstance(fast.next_collision(CAP, kinds[0], 1), Rejected)
     runs = [
-        fast.simulate(CAP, n_particles=3, energy=e, phases=p) for e, p in ((1, np.array([0.5])), (1.0, [0.5]))
+        fast.simulate(CAP, n_particles=n, energy=e, phases=p)
+        for n, e, p in ((3, 1.0, [0.5]), (3e0, np.array(1), np.array([0.5])))
     ]
     assert runs[0].sha256() == runs[1].sha256()
 

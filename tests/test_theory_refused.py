@@ -27,7 +27,7 @@ BAD = {
     Mushroom: ["moving-cap", None, 1.0, {"table": "cap", "r": 1.0}, Mushroom, Cap(r=1.0), Stem(w=1.0, h=1.0)],
     type(FP): [None, 1.0, "fp"],
     type(identity): [3],
-    int: [-1, 10**400, 1.5, 2.0, "3", None, True, math.nan, math.inf, [3]],
+    int: [-1, 10**400, 1.5, np.float64(2.5), "3", None, True, math.nan, math.inf, [3]],
     float: ["x", b"1", None, True, math.nan, math.inf, -math.inf, [1.0], 1j, mpmath.mpf("nan"), mpmath.inf],
     list: [
         *("abc", None, True, {"a": 1}),

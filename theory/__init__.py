@@ -94,3 +94,8 @@ __all__ = [
     "v_stem",
     "volumes_at",
 ]
+
+
+def __dir__() -> list[str]:
+    """List the public names, without the modules that they come from."""
+    return __all__

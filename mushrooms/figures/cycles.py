@@ -15,8 +15,18 @@ from conformance.audit.claims.broadened import DRAWN_SEED, N_DRAWN, adiabatic_li
 from conformance.audit.claims.misprints import volume_loop
 from conformance.audit.runs import Sample, scene_of
 from conformance.audit.tolerances import mean, share, spread
-from mushrooms.figures.energies import N_PLACES, draw, panels
-from mushrooms.figures.style import BLACK, BLUE, GREEN, ORANGE, SKY, FloatArray, new_figure, phase_colours
+from mushrooms.figures.energies import N_PLACES, draw, gathered, panels
+from mushrooms.figures.style import (
+    BLACK,
+    BLUE,
+    GREEN,
+    ORANGE,
+    SKY,
+    FloatArray,
+    new_figure,
+    phase_colours,
+    power,
+)
 from scene import load
 from scene.laws import values
 from scene.tables import Mushroom
@@ -101,7 +111,7 @@ def gain_of_capture() -> Figure:
     axes.plot(*best, "o", color=BLACK, label=f"largest: {best[1]:.6f} at t = {best[0]:.5f}")
     free = float(theory.predict(load("moving-cap"), 15).log_e_nc)
     axes.axhline(free, color=BLACK, linestyle=":", linewidth=1, label=f"never captured: {free:.6f}")
-    axes.set(xlabel="time of capture, t_in", ylabel="log E1/E0 (theory)")
+    axes.set(xlabel="time of capture, t_in", ylabel="ln(E1/E0), theory")
     axes.legend()
     return figure
 
@@ -119,8 +129,12 @@ def energies(samples: list[Sample]) -> Figure:
 
 def _energies(axes: Axes, rest: Axes | None, sample: Sample) -> None:
     prediction = adiabatic_limit(sample.run)
-    title = f"{sample.run.scene}, E0 = {sample.run.energy:.0e}, {sample.n:,} particles"
-    edges = draw(axes, rest, sample.gain, predicted(sample), title)
+    title = f"{sample.run.scene}, E0 = {power(sample.run.energy)}, {sample.n:,} particles"
+    found = predicted(sample)
+    bars = gathered(sample.gain, float(found.peak[1] ** 0.5))
+    draw(axes, rest, bars, found)
+    axes.set_title(title)
+    edges = bars.edges
     x = np.linspace(edges[0], edges[-1], N_PLACES)
     sharp = np.diff(energies_of(sample.run.name).captured_below(x)) / np.diff(x)
     axes.plot((x[1:] + x[:-1]) / 2, sharp, color=ORANGE, linewidth=1.2, label="theory, captured, sharp")
@@ -168,9 +182,9 @@ def _sum(axes: Axes, sample: Sample, n: int, scale: str) -> None:
         yscale=scale,
         xlim=(edges[0], edges[-1]),
         ylim=(0, 1.4 * top) if scale == "linear" else (top * 1e-5, 2 * top),
-        xlabel=f"(1/{n}) log E_{n}/E0",
+        xlabel=f"(1/{n}) ln(E_{n}/E0)",
         ylabel="density",
-        title=f"n = {n}, E0 = {sample.run.energy:.0e}, {sample.n:,} particles",
+        title=f"n = {n}, E0 = {power(sample.run.energy)}, {sample.n:,} particles",
     )
 
 
@@ -213,10 +227,10 @@ def ergodic(sample: Sample) -> Figure:
     label = f"Gaussian, sd {sigma:.4f}, mean sd²/4 = {sigma**2 / 4:.1e}"
     axes.plot(x, norm.pdf(x, sigma**2 / 4, sigma), color=BLACK, linewidth=1.3, label=label)
     axes.set(
-        xlabel="log E1/E0",
+        xlabel="ln(E1/E0)",
         ylabel="density",
         ylim=(0, 0.62 / sigma),
-        title=f"c = 0, E0 = {sample.run.energy:.0e}: mean {found.value:.1e} ± {found.error:.1e}",
+        title=f"c = 0, E0 = {power(sample.run.energy)}: mean {found.value:.1e} ± {found.error:.1e}",
     )
     axes.legend(loc="upper center")
     return figure
@@ -237,7 +251,7 @@ def stems(tilted: Sample, upright: Sample) -> Figure:
         x, sigma = np.linspace(-0.4, 0.8, 600), width(tilted).value
         gaussian = norm.pdf(x, sigma**2 / 4, sigma)
         panel.plot(x, gaussian, color=GREEN, linewidth=1.2, label="Gaussian, tilted stem's width")
-        panel.set(xlabel="log E1/E0 of the never captured, from theory's", ylabel="density", yscale=scale)
+        panel.set(xlabel="ln(E1/E0) of the never captured, from theory's", ylabel="density", yscale=scale)
     axes[1].set(ylim=(1e-3, 10))
     axes[0].legend()
     return figure

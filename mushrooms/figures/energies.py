@@ -1,6 +1,15 @@
-"""Histograms of log E1/E0 after one cycle, the theory at that energy over them, and what is left below."""
+"""Energies of an ensemble after one cycle and from cycle to cycle, the theory over them.
+
+What is drawn is s = ln(E/E0) of those who take part, as (n, K) arrays: n particles after each of K cycles. A
+run too large for memory hands them over block by block. What the theory at this energy leaves of a histogram
+stands below it; of scenes without tables of frozen rates the limit of high energies is drawn.
+"""
 
 from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import chain
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -9,16 +18,87 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 import theory
-from mushrooms.figures.style import BLACK, BLUE, ORANGE, SKY, STYLE, FloatArray, new_figure
-from scene import Mushroom, Scene
-from scene.refusal import BadInput
+from fast.given import given_energy
+from mushrooms.compared import begins_widest, predicted
+from mushrooms.figures import style as plots
+from mushrooms.figures.style import BLACK, BLUE, GREY, ORANGE, SKY, STYLE, FloatArray, new_figure
+from mushrooms.store.asked import Asked
+from scene import Mushroom, Scene, check_scene
+from scene.refusal import BadInput, shown
 
 IntArray = npt.NDArray[np.int64]
-N_BINS = 80
-LIMIT_DIGITS = 6  # of a line in a picture
+Gains = FloatArray | Iterator[FloatArray]
+N_BARS = 80
+MANY = 2000  # particles; of fewer there are half as many bars
 N_PLACES = 1500
+N_LINES = 12  # single particles drawn beside the mean
+N_MARKS = 60  # cycles at which a mean is drawn, at most
+ENOUGH = 10_000  # particles that say where the bars go
 LEAST_EXPECTED = 5.0  # particles in a bin, to speak of standard errors
 TAIL = 0.0005  # left out at either side
+LEAST_SPAN = 1e-12  # of a histogram: what is less is rounding
+AXIS = "s = ln(E1/E0)"
+
+
+class Gathered(NamedTuple):
+    """What is drawn of n particles over K cycles.
+
+    Attributes:
+        n: how many.
+        edges, counts: bars of ln(E1/E0), after the first cycle.
+        mean, sd: (K,) of ln(E/E0) after each cycle.
+        few: (m, K) that of single particles.
+    """
+
+    n: int
+    edges: FloatArray
+    counts: IntArray
+    mean: FloatArray
+    sd: FloatArray
+    few: FloatArray
+
+
+def gathered(gains: Gains, margin: float = 0.0) -> Gathered:
+    """Gather arrays of shape (n,) or (n, K), which an iterator may hand over block by block.
+
+    Args:
+        gains: ln(E/E0) after each cycle; particles with a nan are left out.
+        margin: room beside the bars.
+
+    Raises:
+        BadInput: fewer than two particles.
+    """
+    rows = map(_rows, gains if isinstance(gains, Iterator) else [gains])
+    head = next(rows, np.zeros((0, 1)))
+    while len(head) < ENOUGH and (more := next(rows, None)) is not None:
+        head = np.concatenate([head, more])
+    if len(head) < 2:
+        raise BadInput(f"gains: {len(head)} particles were followed to the end, must be at least 2")
+    edges = _edges(head[:, 0], margin)
+    n, counts = 0, np.zeros(len(edges) - 1, np.int64)
+    sums, squares = np.zeros((2, head.shape[1]))
+    for block in chain([head], rows):
+        n, counts = n + len(block), counts + np.histogram(block[:, 0], edges)[0]
+        sums, squares = sums + block.sum(axis=0), squares + (block**2).sum(axis=0)
+    mean = sums / n
+    sd = np.sqrt(np.maximum(squares / n - mean**2, 0.0))
+    return Gathered(n, edges, counts, mean, sd, head[:N_LINES])
+
+
+def _rows(gains: object) -> FloatArray:
+    """Return an array (n, K) without the rows of particles that were not followed to the end."""
+    try:
+        found = np.asarray(gains, np.float64)
+        rows = found.reshape(len(found), -1)
+    except (TypeError, ValueError):
+        raise BadInput(f"gains = {shown(gains)}, must be an array of numbers, (n,) or (n, K)") from None
+    return np.asarray(rows[np.isfinite(rows).all(axis=1)])
+
+
+def _edges(gain: FloatArray, margin: float) -> FloatArray:
+    low, high = (float(np.quantile(gain, q)) for q in (TAIL, 1 - TAIL))
+    room = margin or max(0.05 * (high - low), LEAST_SPAN)
+    return np.linspace(low - room, high + room, (N_BARS if len(gain) >= MANY else N_BARS // 2) + 1)
 
 
 def panels(n: int) -> tuple[Figure, list[tuple[Axes, Axes]]]:
@@ -30,33 +110,82 @@ def panels(n: int) -> tuple[Figure, list[tuple[Axes, Axes]]]:
 
 
 @rc_context(STYLE)
-def histogram(
-    scene: Scene, energy: float, gain: FloatArray, title: str, counts: IntArray | None = None
-) -> Figure:
-    """Draw one ensemble's log E1/E0 after a cycle; the theory over it, where it covers the scene.
+def histogram(scene: Scene, energy: float, gains: Gains, n_particles: int | None = None) -> Figure:
+    """Draw an ensemble's ln(E1/E0) after a cycle; the theory over it, where it covers the scene.
 
     Args:
         scene: that was simulated.
         energy: of every start [length^2 / time^2].
-        gain: (n,) log E1/E0, or the middles of even bins.
-        title: of the figure.
-        counts: (n,) how many there are of each; one by default.
+        gains: (n,) ln(E1/E0) of those who take part, or an iterator of blocks.
+        n_particles: how many were simulated; n by default.
+
+    Raises:
+        BadInput: `scene` is none, or fewer than two particles.
     """
-    found = known(scene, energy)
+    check_scene(scene)
+    found = known(scene, energy := given_energy(energy))
+    bars = gathered(gains, 0.0 if found is None else float(found.peak[1] ** 0.5))
     if found is None:
-        figure, axes = new_figure(4.8, 3.6)
-        _bars(axes, gain, _edges(gain, 0.0, counts), counts)
-        axes.set(xlabel="log E1/E0", ylabel="density", title=title)
-        limit = high_energy_peak(scene)
-        if limit is not None:
-            axes.axvline(limit, color=ORANGE, linestyle="--", label="theory, never captured, E0 → ∞")
-            figure.legend(loc="outside lower center")
-        return figure
-    figure, [(axes, rest)] = panels(1)
-    draw(axes, rest, gain, found, title, counts)
-    axes.axvline(float(found.peak[0]), color=ORANGE, linestyle="--", label="theory, never captured")
-    axes.legend(loc="best")
+        figure, axes = new_figure(5.2, 4.2)
+        draw_limit(axes, scene, bars)
+    else:
+        figure, [(axes, rest)] = panels(1)
+        draw(axes, rest, bars, found)
+        _never_captured(axes, float(found.peak[0]))
+    axes.set_title(_title(scene, energy, bars, n_particles))
+    figure.legend(loc="outside lower center")
     return figure
+
+
+@rc_context(STYLE)
+def growth(scene: Scene, energy: float, gains: Gains, n_particles: int | None = None) -> Figure:
+    """Draw the mean of ln(E/E0) from cycle to cycle with its spread and theory's; below it `histogram`.
+
+    Args:
+        scene: that was simulated.
+        energy: of every start [length^2 / time^2].
+        gains: (n, K) ln(E/E0) of those who take part after each cycle, or an iterator of blocks.
+        n_particles: how many were simulated; n by default.
+
+    Raises:
+        BadInput: `scene` is none, or fewer than two particles.
+    """
+    check_scene(scene)
+    found = known(scene, energy := given_energy(energy))
+    bars = gathered(gains)
+    figure, (above, below) = new_figure(6.4, 8.4, 2, 1)  # one below the other: legible on a telephone
+    cycles = np.arange(len(bars.mean) + 1)
+    mean, sd, few = (np.pad(x, [*[(0, 0)] * (x.ndim - 1), (1, 0)]) for x in (bars.mean, bars.sd, bars.few))
+    above.plot(cycles, few.T, color=GREY, linewidth=0.6, alpha=0.6)
+    above.plot([], [], color=GREY, linewidth=0.6, label="single particles")
+    above.fill_between(cycles, mean - sd, mean + sd, color=SKY, alpha=0.6, linewidth=0, label="± 1 sd of one")
+    shown = np.unique(np.linspace(0, cycles[-1], min(N_MARKS, len(cycles))).astype(int))
+    error = sd[shown] / np.sqrt(bars.n)
+    above.errorbar(cycles[shown], mean[shown], error, fmt="o", color=BLUE, markersize=3.5, label="mean")
+    told = [(k, predicted(Asked(scene, energy, int(k), 0))) for k in shown[1:]]
+    if all(one is not None for _, one in told):
+        line = np.array([0.0, *(k * one.m1 for k, one in told if one is not None)])
+        above.plot(
+            cycles[shown], line, color=BLACK, linewidth=1.5, label=f"theory, m1 = {line[1]:.4f} a cycle"
+        )
+        spread = float(theory.predict(scene, 6).sd) * np.sqrt(cycles[shown])
+        for edge in (line - spread, line + spread):
+            above.plot(cycles[shown], edge, color=BLACK, linewidth=0.9, linestyle=":")
+        above.plot([], [], color=BLACK, linewidth=0.9, linestyle=":", label="theory ± its sd")
+    above.set(xlabel="cycle of the walls", ylabel="ln(E/E0)", title=_title(scene, energy, bars, n_particles))
+    above.xaxis.get_major_locator().set_params(integer=True)
+    draw_limit(below, scene, bars) if found is None else draw(below, None, bars, found)
+    below.set(title="after the first cycle")
+    for axes in (above, below):
+        axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.16), ncols=2)
+    return figure
+
+
+def _title(scene: Scene, energy: float, bars: Gathered, n_particles: int | None) -> str:
+    """Return what was asked for; and how many of the particles are none of those drawn."""
+    n = n_particles or bars.n
+    title = f"{plots.plain(scene.name or 'a scene')}, E0 = {plots.power(energy)}, {n:,} particles"
+    return title if n == bars.n else f"{title}\n({n - bars.n:,} of them never free, or lost: left out)"
 
 
 def known(scene: Scene, energy: float) -> theory.FiniteEnergy | None:
@@ -67,71 +196,63 @@ def known(scene: Scene, energy: float) -> theory.FiniteEnergy | None:
         return None
 
 
-def high_energy_peak(scene: Scene) -> float | None:
-    """Return log E1/E0 of those never captured in the limit of high energies; None where theory has none."""
+def draw_limit(axes: Axes, scene: Scene, bars: Gathered) -> None:
+    """Draw a histogram, and what it comes to at high energies where theory covers the scene."""
+    heights = _bars(axes, bars)
+    top = 1.3 * float(heights.max())
+    axes.set(xlabel=AXIS, ylabel="density", xlim=(bars.edges[0], bars.edges[-1]), ylim=(0, top))
+    axes.locator_params(axis="x", nbins=6)
     try:
-        found = theory.predict(scene, LIMIT_DIGITS) if isinstance(scene, Mushroom) else None
+        limit = theory.energies(scene) if isinstance(scene, Mushroom) and begins_widest(scene) else None
     except (BadInput, theory.NotCovered, theory.NotConverged):
-        return None
-    return float(found.log_e_nc) if found is not None and found.p_nc > 0 else None
+        return
+    if limit is None:
+        return
+    if limit.p_nc < 1:
+        x = np.linspace(bars.edges[0], bars.edges[-1], N_PLACES)
+        density = np.diff(limit.captured_below(x)) / np.diff(x)
+        label = "theory, captured, at high energies"
+        axes.plot((x[1:] + x[:-1]) / 2, density, color=ORANGE, linewidth=1.4, label=label)
+    if limit.p_nc > 0:
+        _never_captured(axes, float(limit.s_nc))
 
 
-def draw(
-    axes: Axes,
-    rest: Axes | None,
-    gain: FloatArray,
-    found: theory.FiniteEnergy,
-    title: str,
-    counts: IntArray | None = None,
-) -> FloatArray:
-    """Draw a histogram, the theory over it, residuals into `rest` if there is one; return its edges."""
-    sigma = float(found.peak[1] ** 0.5)
-    edges = _edges(gain, sigma, counts)
-    heights = _bars(axes, gain, edges, counts)
-    n = len(gain) if counts is None else int(counts.sum())
+def _never_captured(axes: Axes, place: float) -> None:
+    axes.axvline(place, color=ORANGE, linestyle="--", linewidth=1.2, label="theory, never captured")
+
+
+def draw(axes: Axes, rest: Axes | None, bars: Gathered, found: theory.FiniteEnergy) -> None:
+    """Draw a histogram, the theory over it, and residuals into `rest` if there is one."""
+    heights, edges = _bars(axes, bars), bars.edges
+    shares = np.diff(found.cdf(edges))
     if rest is None:
-        axes.set(xlabel="log E1/E0")
+        axes.set(xlabel=AXIS)
     else:
-        _residuals(rest, heights * n * np.diff(edges), np.diff(found.cdf(edges)) * n, edges)
-    x = np.linspace(edges[0], edges[-1], N_PLACES)
-    total = np.gradient(found.cdf(x), x)
-    axes.plot(x, total, color=BLACK, linewidth=1.3, label=f"theory at this energy, peak {sigma:.4f} wide")
-    top = 1.15 * max(float(heights.max()), float(total.max()))
-    axes.set(xlim=(edges[0], edges[-1]), ylim=(0, top), ylabel="density", title=title)
-    return edges
+        _residuals(rest, bars.counts, shares * bars.n, edges)
+    x = np.linspace(edges[0], edges[-1], 4 * N_BARS + 1)  # finer, single atoms of the theory would show
+    total = np.diff(found.cdf(x)) / np.diff(x)
+    label = f"theory at this energy, peak {found.peak[1] ** 0.5:.4f} wide"
+    axes.plot((x[1:] + x[:-1]) / 2, total, color=BLACK, linewidth=1.3, label=label)
+    top = 1.3 * max(float(heights.max()), float((shares / np.diff(edges)).max()))  # spikes are cut
+    axes.set(xlim=(edges[0], edges[-1]), ylim=(0, top), ylabel="density")
 
 
-def _edges(gain: FloatArray, sigma: float, counts: IntArray | None) -> FloatArray:
-    """Return the edges of the bars; where even bins are given, none of these is cut."""
-    if counts is None:
-        low, high = (float(np.quantile(gain, q)) for q in (TAIL, 1 - TAIL))
-        return np.histogram_bin_edges(gain, N_BINS, (low - sigma, high + sigma))
-    below = np.cumsum(counts) / counts.sum()
-    low, high = (float(gain[np.searchsorted(below, q)]) for q in (TAIL, 1 - TAIL))
-    bin_width = float(np.diff(gain).min()) if len(gain) > 1 else 1.0
-    step = max(1, round((high - low + 2 * sigma) / N_BINS / bin_width))
-    first = int(np.floor((low - sigma - gain[0]) / bin_width / step)) * step
-    n_bars = int(np.ceil(((high + sigma - gain[0]) / bin_width - first + 1) / step))
-    return np.asarray(gain[0] + bin_width * (first - 0.5 + step * np.arange(n_bars + 1)))
-
-
-def _bars(axes: Axes, gain: FloatArray, edges: FloatArray, weights: IntArray | None = None) -> FloatArray:
+def _bars(axes: Axes, bars: Gathered) -> FloatArray:
     """Draw densities with their standard errors, and return them."""
-    n, widths = len(gain) if weights is None else int(weights.sum()), np.diff(edges)
-    counts = np.histogram(gain, edges, weights=weights)[0]
-    heights: FloatArray = counts / (n * widths)
-    axes.stairs(heights, edges, fill=True, color=SKY, label="simulation")
-    bars = np.sqrt(counts) / (n * widths)
-    axes.errorbar((edges[1:] + edges[:-1]) / 2, heights, bars, fmt="none", ecolor=BLUE, elinewidth=0.7)
+    unit = bars.n * np.diff(bars.edges)
+    heights: FloatArray = bars.counts / unit
+    axes.stairs(heights, bars.edges, fill=True, color=SKY, label="simulation")
+    places = (bars.edges[1:] + bars.edges[:-1]) / 2
+    axes.errorbar(places, heights, np.sqrt(bars.counts) / unit, fmt="none", ecolor=BLUE, elinewidth=0.7)
     return heights
 
 
-def _residuals(axes: Axes, counts: FloatArray, expected: FloatArray, edges: FloatArray) -> None:
+def _residuals(rest: Axes, counts: IntArray, expected: FloatArray, edges: FloatArray) -> None:
     """Draw counts less those expected, in standard errors, where a bin expects enough for that to mean it."""
     enough = expected >= LEAST_EXPECTED
     left = np.where(enough, (counts - expected) / np.sqrt(np.where(enough, expected, 1.0)), np.nan)
-    axes.axhspan(-2, 2, color=SKY, alpha=0.5, linewidth=0)
-    axes.axhline(0, color=BLACK, linewidth=0.8)
-    axes.plot((edges[1:] + edges[:-1]) / 2, left, ".", color=BLUE, markersize=4)
+    rest.axhspan(-2, 2, color=SKY, alpha=0.5, linewidth=0)
+    rest.axhline(0, color=BLACK, linewidth=0.8)
+    rest.plot((edges[1:] + edges[:-1]) / 2, left, ".", color=BLUE, markersize=4)
     reach = max(4.0, 1.1 * float(np.nanmax(np.abs(left)))) if enough.any() else 4.0
-    axes.set(xlabel="log E1/E0", ylabel="pull", ylim=(-reach, reach))
+    rest.set(xlabel=AXIS, ylabel="(sim. − theory)\n/ error", ylim=(-reach, reach))

@@ -20,14 +20,15 @@ from matplotlib.patheffects import withStroke
 from mpmath import fp
 
 import theory
+from fast.narrowings import start_time
 from mushrooms import lyapunov
 from mushrooms.figures import style as plots
 from mushrooms.figures import table as tables
 from mushrooms.orbits import BoolArray, FloatArray, FollowedOrbit, boundary, boundary_map, span_of_nu
 from scene import Mushroom, Scene, Stem
 from scene.geometry import table_at
-from scene.refusal import BadInput
-from scene.tables import cycle_length
+from scene.laws import is_constant
+from scene.refusal import BadInput, shown
 
 N_FRAMES = 96
 TRAIL = 6  # collisions that the animation's particle draws behind it
@@ -38,6 +39,8 @@ HALO = [withStroke(linewidth=2.5, foreground="white")]
 
 def _given(orbits: Sequence[FollowedOrbit] | FollowedOrbit) -> list[FollowedOrbit]:
     found = [orbits] if isinstance(orbits, FollowedOrbit) else list(orbits)
+    if not all(isinstance(orbit, FollowedOrbit) for orbit in found):
+        raise BadInput(f"orbits = {shown(orbits)}, must be what mushrooms.orbits.follow returns")
     if not found or not all(len(orbit.walls) for orbit in found):
         raise BadInput("orbits: nothing to draw, the particle meets no wall")
     return found
@@ -50,7 +53,7 @@ def trajectory(orbit: FollowedOrbit) -> Figure:
     figure, axes = plots.new_figure(6.4, 6.0)
     states = orbit.states()
     begin, end = float(states[0, 0]), float(states[-1, 0])
-    if cycle_length(orbit.scene):
+    if orbit.scene.period:
         for line in tables.walls(orbit.scene, end):
             axes.plot(*line, color=plots.GREY, linewidth=1.2, linestyle="--")
         axes.plot([], [], color=plots.GREY, linewidth=1.2, linestyle="--", label="walls at the end")
@@ -85,7 +88,11 @@ def _unit(v: Any) -> Any:
 def _title(orbit: FollowedOrbit) -> str:
     energy = orbit.energies()[0]
     many = len(orbit.walls)
-    return f"{plots.plain(orbit.scene.name or 'a table')}: {many:,} collisions from energy {energy:.4g}"
+    return f"{_scene(orbit)}: {many:,} collisions from E0 = {plots.power(energy)}"
+
+
+def _scene(orbit: FollowedOrbit) -> str:
+    return plots.plain(orbit.scene.name or "a table")
 
 
 def _names(axes: Axes, scene: Scene, t: float) -> None:
@@ -110,54 +117,94 @@ def _names(axes: Axes, scene: Scene, t: float) -> None:
 
 
 @rc_context(plots.STYLE)
-def section(orbits: Sequence[FollowedOrbit] | FollowedOrbit) -> Figure:
-    """Draw a Poincare section: place on the arc against sin phi, with the captured and the chaotic zone.
+def section(orbits: Sequence[FollowedOrbit] | FollowedOrbit, phase: float | None = None) -> Figure:
+    """Draw a Poincare section.
 
-    The edge is |sin phi| = nu. Where nu moves, what lies beyond its largest value is captured at all times,
-    what lies below its least value at none, and between the two it depends on the time: each hit has the
-    colour of its own.
+    Of a cap or a mushroom it is place on the arc against sin phi, at each hit. In a mushroom the edge is
+    |sin phi| = nu. Where nu moves, what lies beyond its largest value is captured at all times, what lies
+    below its least value at none, and between the two it depends on the time: each hit has the colour of its
+    own. Of a stem it is Fermi and Ulam's: the phase of the wall against the velocity after the hit.
+
+    Args:
+        orbits: one or more, of one scene.
+        phase: t/T of the walls, 0 to 1: of each cycle only the first hit of the arc from there on, of a stem
+            depth and velocity at that time.
+
+    Raises:
+        BadInput: the walls stand still, and a phase is asked for or the table is a stem.
     """
     figure, axes = plots.new_figure(6.4, 5.2)
-    draw_section(axes, _given(orbits))
-    figure.legend(loc="outside lower center", ncols=2)
+    found = _given(orbits)
+    draw = _draw_stem if isinstance(found[0].scene, Stem) else draw_section
+    draw(axes, found, phase)
+    axes.set(title=_of(found) + ("" if phase is None else f", at t/T = {phase:g}"))
+    if axes.get_legend_handles_labels()[0]:
+        figure.legend(loc="outside lower center", ncols=2)
     return figure
 
 
-def draw_section(axes: Axes, found: Sequence[FollowedOrbit]) -> None:
-    """Draw the Poincare section of one orbit or more of a scene; see `section`."""
+def draw_section(axes: Axes, found: Sequence[FollowedOrbit], phase: float | None = None) -> None:
+    """Draw the Poincare section of one orbit or more of a cap or a mushroom; see `section`."""
+    sections = [orbit.section() for orbit in found]
+    if phase is not None:
+        instants = [orbit.instants(phase) for orbit in found]
+        sections = [one.first_from(times) for one, times in zip(sections, instants, strict=True)]
     span = span_of_nu(found[0].scene)
-    low, high = span or (0.0, 0.0)
+    if span and phase is not None:
+        now = table_at(fp, found[0].scene, start_time(found[0].scene) + phase * found[0].scene.period)
+        span = (float(now.w / now.r),) * 2
+    if span:
+        _draw_zones(axes, *span)
+    place, sine = (np.concatenate([one[k] for one in sections]) for k in (2, 3))
+    _points(axes, found, place, sine, np.concatenate([one.is_captured() for one in sections]), "hits")
+    axes.set(xlim=(0, 1), ylim=(-1, 1), xlabel="angle of the place on the arc / π, from the right end")
+    axes.set_ylabel("sin φ; φ: from the arc's normal, clockwise > 0")
+
+
+def _draw_zones(axes: Axes, low: float, high: float) -> None:
+    """Draw what is captured at all times and at none, and the edges."""
     for sign in (1, -1):
         axes.axhspan(sign * high, sign, color=CAPTURED, alpha=0.10, linewidth=0)
-        for level in {low, high} if span else ():
+        for level in {low, high}:
             axes.axhline(sign * level, color=plots.BLACK, linewidth=1)
-    if span:
-        axes.axhspan(-low, low, color=FREE, alpha=0.10, linewidth=0)
-        edge = f"nu = {low:.3g}" if high - low < 1e-12 else f"nu = {low:.3g} to {high:.3g}"
-        axes.plot([], [], color=plots.BLACK, linewidth=1, label=f"edge |sin φ| = nu, {edge}")
-    sections = [orbit.section() for orbit in found]
-    place, sine = (np.concatenate([one[k] for one in sections]) for k in (2, 3))
-    _points(axes, place, sine, np.concatenate([one.is_captured() for one in sections]), "hits")
-    axes.set(
-        xlim=(0, 1), ylim=(-1, 1), xlabel="place on the arc, from the right", ylabel="sin φ", title=_of(found)
-    )
+    axes.axhspan(-low, low, color=FREE, alpha=0.10, linewidth=0)
+    edge = f"nu = {low:.3g}" if high - low < 1e-12 else f"nu = {low:.3g} to {high:.3g}"
+    axes.plot([], [], color=plots.BLACK, linewidth=1, label=f"edge |sin φ| = nu, {edge}")
 
 
-def _points(axes: Axes, x: FloatArray, y: FloatArray, captured: BoolArray, what: str) -> None:
-    """Draw points, the captured apart from the free, and count both in the legend; many points are finer."""
+def _draw_stem(axes: Axes, found: Sequence[FollowedOrbit], phase: float | None) -> None:
+    """Draw the section of a stem; an orbit has one colour."""
+    for orbit, colour in zip(found, plots.phase_colours(len(found)), strict=True):
+        points = orbit.phase_section(phase)
+        axes.plot(*points.T, ".", color=colour, markersize=1.2, rasterized=True)
+    if phase is not None:
+        axes.set(xlabel="y [length]", ylabel="vy [length/time]")
+        return
+    has_floor = isinstance(found[0].scene, Stem) and not is_constant(found[0].scene.h)
+    wall, name = ("floor", "vy") if has_floor else ("side", "|vx|")
+    axes.set(xlim=(0, 1), ylim=(0, None), xlabel=f"phase t/T of the hit of a moving {wall}")
+    axes.set_ylabel(f"{name} after the hit [length/time]")
+
+
+def _points(
+    axes: Axes, found: Sequence[FollowedOrbit], x: FloatArray, y: FloatArray, captured: BoolArray, what: str
+) -> None:
+    """Draw points and count them in the legend, in a mushroom the captured apart; many points are finer."""
     size = min(4.0, max(0.6, 90.0 / math.sqrt(len(x) or 1)))
-    for which, colour, name in ((captured, CAPTURED, "captured"), (~captured, FREE, "free")):
+    kinds = [(captured, CAPTURED, "captured, "), (~captured, FREE, "free, ")]
+    if not isinstance(found[0].scene, Mushroom):
+        kinds = [(np.ones(len(x), bool), CAPTURED, "")]
+    for which, colour, name in kinds:
         if which.any():
             axes.plot(x[which], y[which], ".", color=colour, markersize=size, rasterized=True)
-            axes.plot([], [], "o", color=colour, markersize=5, label=f"{name}, {which.sum():,} {what}")
+            axes.plot([], [], "o", color=colour, markersize=5, label=f"{name}{which.sum():,} {what}")
 
 
 def _of(orbits: Sequence[FollowedOrbit]) -> str:
     n = len(orbits)
     if n == 1:
         return _title(orbits[0])
-    energy = orbits[0].energies()[0]
-    return f"{plots.plain(orbits[0].scene.name or 'a table')}: {n} particles from energy {energy:.4g}"
+    return f"{_scene(orbits[0])}: {n} particles from E0 = {plots.power(orbits[0].energies()[0])}"
 
 
 @rc_context(plots.STYLE)
@@ -172,30 +219,35 @@ def collision_map(orbits: Sequence[FollowedOrbit] | FollowedOrbit) -> Figure:
 def draw_map(axes: Axes, found: Sequence[FollowedOrbit]) -> None:
     """Draw the boundary map of one orbit or more of a scene; see `collision_map`."""
     place, sine = np.vstack([boundary_map(orbit) for orbit in found]).T
-    _points(axes, place, sine, np.concatenate([orbit.captured()[1:] for orbit in found]), "collisions")
+    captured = np.concatenate([orbit.captured()[1:] for orbit in found])
+    _points(axes, found, place, sine, captured, "collisions")
     for slot in boundary(found[0].scene):
         axes.axvline(slot.end, color=plots.BLACK, linewidth=0.8)
         if slot.end - slot.begin > 0:
             where = ((slot.begin + slot.end) / 2, 1.03)
             axes.text(*where, slot.wall, ha="center", va="bottom", fontsize=9, transform=axes.transData)
-    axes.set(
-        xlim=(0, 1), ylim=(-1, 1), xlabel="place along the boundary, anticlockwise", ylabel="sin of the angle"
-    )
+    axes.set(xlim=(0, 1), ylim=(-1, 1), xlabel="place along the boundary, anticlockwise")
+    axes.set_ylabel("sine of the angle to the wall's normal, anticlockwise > 0")
     axes.set_title(_of(found), pad=18)  # above the names of the walls
 
 
 @rc_context(plots.STYLE)
 def energy_in_time(orbit: FollowedOrbit) -> Figure:
-    """Draw log E / E0 against time, theory's line for these captured stays, and these stays shaded."""
+    """Draw ln(E/E0) of a particle against time, over theory's line for its captured stays, which are shaded.
+
+    Of many particles: `mushrooms.figures.energies.growth`.
+    """
     [orbit] = _given(orbit)
     figure, axes = plots.new_figure(7.2, 4.4)
-    span = cycle_length(orbit.scene)
+    span = orbit.scene.period
     states = orbit.states()
     time = (states[:, 0] - states[0, 0]) / span if span else states[:, 0]
     energies = orbit.energies()
-    axes.plot(time, np.log(energies / energies[0]), color=plots.BLUE, linewidth=0.9, label="this particle")
+    one: dict[str, Any] = {"color": plots.BLUE, "linewidth": 0.8, "label": "this particle", "zorder": 3}
+    axes.plot(time, np.log(energies / energies[0]), **one)  # before theory, which is broad behind it
+    known = "theory, given its stays" if isinstance(orbit.scene, Mushroom) else "theory"
     try:
-        axes.plot(time, orbit.adiabatic(), color=plots.BLACK, linewidth=1.3, label="theory, given its stays")
+        axes.plot(time, orbit.adiabatic(), color=plots.BLACK, linewidth=2.6, alpha=0.6, label=known)
         if isinstance(orbit.scene, Mushroom):
             free = theory.chaotic_zone(orbit.scene, states[:, 0]).log_energy
             label = "theory, never captured"
@@ -208,7 +260,7 @@ def energy_in_time(orbit: FollowedOrbit) -> Figure:
         for k, (begin, end) in enumerate(edges.reshape(-1, 2)):
             label = "captured" if k == 0 else "_"
             axes.axvspan(time[begin], time[end], color=CAPTURED, alpha=0.15, linewidth=0, label=label)
-    axes.set(xlabel="t / T" if span else "t [time]", ylabel="log E / E0", title=_title(orbit))
+    axes.set(xlabel="t / T" if span else "t [time]", ylabel="ln(E/E0)", title=_title(orbit))
     figure.legend(loc="outside lower center", ncols=2)
     return figure
 
@@ -230,8 +282,9 @@ def exponents(
         one = lyapunov.stretching(orbit, told)
         n_before += len(orbit.walls)
         count = np.arange(1, len(one.logs) + 1)
-        share = orbit.captured()[1:].mean()
-        label = f"{one.exponent:.3f} ± {one.error:.3f} a collision, {share:.0%} of it captured"
+        label = f"{one.exponent:.3f} ± {one.error:.3f} a collision"
+        if isinstance(orbit.scene, Mushroom):
+            label += f", {orbit.captured()[1:].mean():.0%} of it captured"
         axes.plot(count, one.exponents, color=colour, linewidth=1.2, label=label)
         axes.errorbar(count[-1] * (1 + 0.01 * k), one.exponent, one.error, color=colour, capsize=3)
     axes.axhline(0, color=plots.BLACK, linewidth=0.8)
@@ -252,13 +305,13 @@ def write_animation(orbit: FollowedOrbit, file: BinaryIO, n_frames: int = N_FRAM
     states = orbit.states()
     times = np.linspace(states[0, 0], states[-1, 0], n_frames)
     places, last = orbit.at(times), np.searchsorted(states[:, 0], times, side="right") - 1
-    span = cycle_length(orbit.scene)
+    span = orbit.scene.period
 
     def prepare(axes: Axes) -> Callable[[int], str]:
         axes.plot(*places[0], "o", color=FREE, markersize=6, markerfacecolor="none", label="start")
         (trail,) = axes.plot([], [], color=plots.SKY, linewidth=1, animated=True)
         (dot,) = axes.plot([], [], "o", color=plots.BLACK, markersize=6, animated=True)
-        axes.legend(loc="upper right")
+        axes.figure.legend(loc="outside lower center")
 
         def show(k: int) -> str:
             path = np.vstack([states[max(0, last[k] - TRAIL) : last[k] + 1, 1:3], places[k]])

@@ -35,7 +35,7 @@ def zone(samples: list[Sample]) -> Figure:
         curve = theory.chaotic_zone(scene_of(sample.run), fine)
         left.plot(fine / span, curve.log_energy - curve.log_energy[0], color=ORANGE, label="theory, eq. (dE)")
         _points(left, sample.run.phases, means)
-        left.set(xlabel="t / T", ylabel="mean log E/E0, not captured so far", title=sample.run.name)
+        left.set(xlabel="t / T", ylabel="mean ln(E/E0), not captured so far", title=sample.run.name)
         right.plot(fine / span, curve.p_cha, color=ORANGE, label="theory, eq. (ps)")
         shares = zone_share(sample, np.array(times))
         errors = [Mean(float(p), math.sqrt(max(p * (1 - p), 1e-6) / sample.n)) for p in shares]
@@ -64,7 +64,7 @@ def widths(moving: list[Sample], ergodic: list[Sample]) -> Figure:
     x = np.array([moving[0].run.energy, moving[-1].run.energy])
     printed = width(moving[0]).value * (x / x[0]) ** 0.25
     axes.plot(x, printed, color=ORANGE, linestyle="--", label="as printed, E0^(1/4)")
-    axes.set(xscale="log", yscale="log", xlabel="E0", ylabel="width of the uncaptured peak of log E1/E0")
+    axes.set(xscale="log", yscale="log", xlabel="E0", ylabel="width of the uncaptured peak of ln(E1/E0)")
     axes.legend(fontsize=8)
     return figure
 
@@ -76,7 +76,7 @@ def convergence(samples: list[Sample]) -> Figure:
     scene = load("moving-cap")
     prediction, unbiased = theory.predict(scene, 15), theory.unbiased_mean(scene)
     rows: tuple[tuple[str, list[Mean], float], ...] = (
-        ("mean of log E1/E0", [mean(s.gain) for s in samples], float(prediction.m1)),
+        ("mean of ln(E1/E0)", [mean(s.gain) for s in samples], float(prediction.m1)),
         ("share never captured", [share(s.never_captured) for s in samples], float(prediction.p_nc)),
         ("mean of exp(-s/2)", [mean(np.exp(-s.gain / 2)) for s in samples], float(unbiased)),
     )

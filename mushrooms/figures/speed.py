@@ -46,6 +46,19 @@ WORDS = {
     "example": "examples in C, JavaScript, Python",
     "command": "command",
 }
+# In one panel for a first look: a workload, and what its steppers are called.
+HEADLINE = "moving-cap-1e7"
+NAMED = {
+    "fast, lanes": "fast, many particles",
+    "fast, a call": "fast, a call from Python",
+    "fast, pairs": "fast, 31 digits",
+    "lean C": "Newton without checks, C",
+    "plain Python": "plain Python",
+    "solve_ivp, rtol 1e-12": "scipy's solve_ivp",
+    "steps, flight/100": "time steps, C",
+    "proof, 200 digits": "reference, with proof",
+}
+PLACES = {"time-stepping": ((-14, 0), "right"), "proof": ((6, 14), "right")}  # of their names, by family
 RED = "#C00000"
 LABEL = 9  # size of text [points]
 SPACE = 0.0725  # of a panel's height, from one label to the next
@@ -66,6 +79,32 @@ def speed(record: Record) -> bytes:
 
 
 @rc_context(plots.STYLE)
+def headline(record: Record) -> Figure:
+    """Draw time per collision against correct digits of a few steppers on one workload, for a first look."""
+    workload = next((w for w in record.workloads if w.name == HEADLINE), record.workloads[-1])
+    points = [
+        p
+        for p in record.points
+        if p.workload == workload.name and (p.solver in NAMED or p.family in ("proof", "command"))
+    ]
+    figure, axes = plots.new_figure(8.0, 5.0)
+    _panel(axes, points, record.digits)
+    for p in points:
+        share = _share_wrong(p)
+        name = NAMED.get(p.solver, "" if p.family == "proof" else short_name(p.solver)) + (
+            f",\n{100 * share:.1g} % wrong walls" if share else ""
+        )
+        style: dict[str, Any] = {"textcoords": "offset points", "va": "center", "color": COLOURS[p.family]}
+        place, style["ha"] = PLACES.get(p.family, ((9, 0), "left"))
+        axes.annotate(name, (_digits_of(p)[0], statistics.median(p.ns)), place, fontsize=LABEL + 1, **style)
+    axes.text(BINARY64 * 1.04, 4e7, "binary64", fontsize=LABEL)
+    axes.set(xlim=(0.65, record.digits), ylim=(LEAST_NS, 1e8), ylabel="ns per collision")  # no crosses
+    axes.set(xlabel="correct digits of an answer (mark: median; bar: to the worst)")
+    axes.set(title=f"One core, {workload.name}: {workload.what}")
+    return figure
+
+
+@rc_context(plots.STYLE)
 def speed_figure(record: Record) -> Figure:
     """Draw time per collision against correct digits, one panel per workload."""
     n_rows = (len(record.workloads) + 1) // 2
@@ -76,6 +115,8 @@ def speed_figure(record: Record) -> Figure:
     for panel, workload in zip(panels, record.workloads, strict=False):
         points = [p for p in record.points if p.workload == workload.name]
         _panel(panel, points, record.digits)
+        _label(panel, points)
+        _front(panel, points)
         panel.set_title(f"{workload.name}: {workload.what}", loc="left")
         panel.set_xlabel("correct digits of dt, place and velocity", fontsize=LABEL)
         panel.set_ylabel("ns per collision", fontsize=LABEL)
@@ -95,7 +136,9 @@ def _panel(axes: Any, points: list[Point], floor: int) -> None:
     axes.axvline(BINARY64, color=plots.BLACK, linewidth=0.8, linestyle=":")
     for p in points:
         _mark(axes, p)
-    _label(axes, points)
+
+
+def _front(axes: Any, points: list[Point]) -> None:
     front = pareto(points)
     if front:
         x, y = zip(*front, strict=True)
@@ -154,9 +197,12 @@ def spread(wanted: list[float], space: float) -> list[float]:
 
 
 def _name(p: Point) -> str:
-    name = short_name(p.solver)
-    share = p.astray / p.further if p.further else p.wrong / max(1, p.wrong + p.right + p.undecided)
+    name, share = short_name(p.solver), _share_wrong(p)
     return f"{name}: {100 * share:.2g} % wrong" if share else name
+
+
+def _share_wrong(p: Point) -> float:
+    return p.astray / p.further if p.further else p.wrong / max(1, p.wrong + p.right + p.undecided)
 
 
 def _digits_of(p: Point) -> tuple[float, float]:

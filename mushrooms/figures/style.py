@@ -51,6 +51,15 @@ def plain(text: str) -> str:
     return "\n".join(islice(lines, MOST_LINES)).replace("$", r"\$")
 
 
+def power(number: float) -> str:
+    """Return a positive number as a figure shows it: 50, 2500, or a power of ten."""
+    if 1e-2 <= number < 1e4:
+        return f"{number:.4g}"
+    mantissa, _, exponent = f"{number:.3e}".partition("e")
+    factor = mantissa.rstrip("0").rstrip(".") + r"\cdot"
+    return rf"${'' if number == float(f'1e{exponent}') else factor}10^{{{int(exponent)}}}$"
+
+
 def new_figure(width: float, height: float, n_rows: int = 1, n_columns: int = 1) -> tuple[Figure, Any]:
     """Return a figure [inches] and its axes (an array when there are several)."""
     figure = Figure(figsize=(width, height), layout="constrained")

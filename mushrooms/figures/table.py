@@ -13,26 +13,28 @@ from mpmath import fp
 from PIL import Image
 
 from mushrooms.figures import style as plots
-from scene import Collision, Scene, State
+from scene import Collision, Scene, State, check_scene
 from scene.geometry import table_at
-from scene.tables import cycle_length
 
 SUFFIXES = (".svg", ".png", ".pdf", ".gif")
 N_PHASES = 6
 N_CHORDS = 14
 N_FRAMES = 36
 FRAMES_PER_SECOND = 12
-DOTS_PER_INCH = 80  # of an animation
+WIDEST, HIGHEST = 1920, 1080  # of an animation [pixels]: it fills a slide
+DOTS_PER_INCH = 200
 
 
 def walls(scene: Scene, t: float) -> list[np.ndarray]:
     """Return the walls at time t as polylines of shape (2, n) [length]; the mouth is left open."""
+    check_scene(scene)
     return [np.transpose(line) for line in table_at(fp, scene, t).outline()]
 
 
 def phases(scene: Scene, n: int = N_PHASES) -> list[float]:
     """Return n times [time] evenly over one cycle; a static table has the single time 0."""
-    span = cycle_length(scene)
+    check_scene(scene)
+    span = scene.period
     return [span * k / n for k in range(n)] if span else [0.0]
 
 
@@ -104,7 +106,7 @@ def write_picture(scene: Scene, suffix: str, file: BinaryIO) -> None:
 
 
 def _write_animation(scene: Scene, file: BinaryIO) -> None:
-    times, span, name = phases(scene, N_FRAMES), cycle_length(scene), plots.plain(scene.name)
+    times, span, name = phases(scene, N_FRAMES), scene.period, plots.plain(scene.name)
 
     def title(k: int) -> str:
         return f"{name}   t/T = {times[k] / span:.2f}" if span else f"{name}   static"
@@ -126,7 +128,9 @@ def write_frames(
             what moves it: that is given a frame's number and returns its title.
         file: open for binary writing.
     """
-    figure, axes = plots.new_figure(4.8, 4.8)
+    left, right, bottom, top = _frame(scene)
+    width = min(WIDEST, max(HIGHEST, HIGHEST * (right - left) / (top - bottom)))
+    figure, axes = plots.new_figure(width / DOTS_PER_INCH, HIGHEST / DOTS_PER_INCH)
     _set_frame(axes, scene)
     style: dict[str, Any] = {"color": plots.BLUE, "linewidth": 2, "animated": True}
     lines = [axes.plot(*line, **style)[0] for line in walls(scene, times[0])]

@@ -16,7 +16,7 @@ import mushrooms
 import scene as scenes
 from scene import Scene
 
-SCHEMA = 2  # of a stored run: raised when its files change, so that older ones are refused
+SCHEMA = 3  # of a stored run: raised when its files change, so that older ones are refused
 
 
 class Asked(NamedTuple):

@@ -16,7 +16,7 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 
 from mushrooms.store.asked import SCHEMA, Asked, asked_of, made_by
-from mushrooms.store.layout import LANE, Array, Arrays, Shape, from_chunks, metadata, to_chunks
+from mushrooms.store.layout import LANES, Array, Arrays, Shape, from_chunks, metadata, to_chunks
 from mushrooms.store.tally import RunTally, tally_from
 from scene.files import sealed, unsealed, write_file, write_files
 from scene.refusal import BadInput
@@ -97,7 +97,7 @@ class RunInMemory:
 
     def keep(self, piece: Piece, block: Block) -> None:
         """Keep what was followed."""
-        self._blocks[piece.number] = {name: a for name, a in block.arrays.items() if name != LANE}
+        self._blocks[piece.number] = {name: a for name, a in block.arrays.items() if name != LANES}
         self.tally, self.seconds = self.tally.merged(block.tally), self.seconds + block.seconds
 
     def read(self, number: int, name: str) -> Array:

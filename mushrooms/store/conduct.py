@@ -232,7 +232,7 @@ def _probe(run: RunFolder) -> None:
     if there is None:
         return
     stored = {name: array[:PROBED] for name, array in run.block(there).arrays.items()}
-    n, n_cycles = stored["energy"].shape
+    n, n_cycles = stored["cycle_energies"].shape
     piece, asked = Piece(there, there * run.shape.block, n), run.asked
     first = follow(asked._replace(n_cycles=n_cycles), piece, None)
     _compare(run, stored, first.arrays)

@@ -11,9 +11,8 @@ import numpy as np
 
 from fast import Ensemble
 from mushrooms.store.blocks import AnyRun
-from mushrooms.store.layout import FIELDS, Array
+from mushrooms.store.layout import Array
 
-BY_SOURCE = {field.source: name for name, field in FIELDS.items()}
 DIGESTED = Ensemble._fields[1:-2]  # neither energy0 nor times
 
 
@@ -24,22 +23,21 @@ def sha256(run: AnyRun) -> str:
         BadInput: a block is missing or damaged.
     """
     digest = hashlib.sha256()
-    for source in DIGESTED:
+    for name in DIGESTED:
         for number in range(run.shape.n_blocks):
-            array = part(run, number, source)
+            array = part(run, number, name)
             if array is not None:
                 digest.update(np.ascontiguousarray(array).data)
     return digest.hexdigest()
 
 
-def part(run: AnyRun, number: int, source: str) -> Array | None:
+def part(run: AnyRun, number: int, name: str) -> Array | None:
     """Return a field of `fast.Ensemble` for the particles of a block; None where it holds nothing."""
-    if source == "energy":
-        return run.read(number, "energy")[:, -1]
-    if source == "n_collisions":
-        return np.asarray(run.read(number, "collisions").sum(axis=1))
-    name = BY_SOURCE[source]
+    if name == "energy":
+        return run.read(number, "cycle_energies")[:, -1]
+    if name == "n_collisions":
+        return np.asarray(run.read(number, "wall_counts").sum(axis=1))
     if name not in run.shape.names:
         return None
     array = run.read(number, name)
-    return array.astype(bool) if source == "phase_captured" else array  # of Zarr's -1 none is left
+    return array.astype(bool) if name == "phase_captured" else array  # of Zarr's -1 none is left

@@ -1,7 +1,7 @@
 """A run as one file: Parquet, CSV or npz, written block by block, with the same bits.
 
 Tables have a row a particle; what a particle has for each cycle, narrowing or wall stands in columns of its
-own, counted from 1, or named by the wall: energy_1, t_in_1_1, collisions_arc.
+own, counted from 1, or named by the wall: cycle_energies_1, t_in_1_1, wall_counts_arc.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ import numpy as np
 from mushrooms.output import import_arrow
 from mushrooms.store.blocks import RunFolder
 from mushrooms.store.digest import DIGESTED, part
-from mushrooms.store.layout import FIELDS, LANE, WALLS, Arrays
+from mushrooms.store.layout import FIELDS, LANES, WALLS, Arrays
 from scene.refusal import BadInput
 
 MAX_COLUMNS = 10_000
@@ -55,17 +55,17 @@ def write_npz(run: RunFolder, file: BinaryIO) -> None:
     with zipfile.ZipFile(file, "w") as archive:
         with archive.open("energy0.npy", "w") as member:
             np.lib.format.write_array(member, np.array(run.asked.energy))
-        for source in DIGESTED:
-            head = part(run, 0, source)
+        for name in DIGESTED:
+            head = part(run, 0, name)
             if head is None:
                 continue
-            with archive.open(f"{source}.npy", "w", force_zip64=True) as member:
+            with archive.open(f"{name}.npy", "w", force_zip64=True) as member:
                 shape = (run.shape.n_particles, *head.shape[1:])
                 kind = np.lib.format.dtype_to_descr(head.dtype)
                 header = {"descr": kind, "fortran_order": False, "shape": shape}
                 np.lib.format.write_array_header_1_0(member, header)
                 for number in range(run.shape.n_blocks):
-                    array = part(run, number, source)
+                    array = part(run, number, name)
                     if array is not None:
                         member.write(np.ascontiguousarray(array).tobytes())
 
@@ -80,7 +80,7 @@ WRITERS: dict[str, Callable[[RunFolder, BinaryIO], None]] = {
 
 def _tables(run: RunFolder) -> Iterator[Arrays]:
     """Yield each block as columns by their names."""
-    shape, names = run.shape, [name for name in run.shape.names if name != LANE]
+    shape, names = run.shape, [name for name in run.shape.names if name != LANES]
     n_columns = sum(int(np.prod(shape.of(name, 1))) for name in names)
     if n_columns > MAX_COLUMNS:
         raise BadInput(f"a table of {n_columns} columns, must be at most {MAX_COLUMNS}: read it with xarray")

@@ -24,40 +24,39 @@ OUTCOMES = ("followed", "undecided", "undefined", "rejected")
 
 
 class Stored(NamedTuple):
-    """An array of the store.
+    """An array of the store; it has the name that it has in `fast.Ensemble`, or in `fast.Paused`.
 
     Attributes:
         dims: its dimensions.
         kind: the type of its numbers, as Zarr names it.
-        source: the name in `fast.Ensemble`, or in `fast.Paused`.
         meaning: in a line.
     """
 
     dims: tuple[str, ...]
     kind: str
-    source: str
     meaning: str
 
 
 ONE, CYCLES, SLOTS = ("particle",), ("particle", "cycle"), ("particle", "cycle", "narrowing")
 LOOKS = ("particle", "cycle", "phase")
 FIELDS = {
-    "energy": Stored(CYCLES, "float64", "cycle_energies", "energy v^2/2 at the end of each cycle"),
-    "t": Stored(ONE, "float64", "t", "time of the last state"),
-    "x": Stored(ONE, "float64", "x", "place of the last state"),
-    "y": Stored(ONE, "float64", "y", "place of the last state"),
-    "vx": Stored(ONE, "float64", "vx", "velocity of the last state"),
-    "vy": Stored(ONE, "float64", "vy", "velocity of the last state"),
-    "outcome": Stored(ONE, "int8", "outcome", "how following it ended; -1: not followed yet"),
-    "t_in": Stored(SLOTS, "float64", "t_in", "begin of the captured stay around each narrowing; nan: none"),
-    "t_out": Stored(SLOTS, "float64", "t_out", "end of that stay"),
-    "collisions": Stored(("particle", "wall"), "int64", "wall_counts", "collisions with each wall"),
-    "careful": Stored(ONE, "int64", "n_careful", "collisions left to the careful step"),
-    "phase_energy": Stored(LOOKS, "float64", "phase_energies", "energy v^2/2 at the phases of each cycle"),
-    "phase_captured": Stored(LOOKS, "int8", "phase_captured", "1: captured there; -1: not followed yet"),
-    "lane": Stored(("particle", "row"), "float64", "lanes", "what it takes to go on: see fast.Paused"),
+    "cycle_energies": Stored(CYCLES, "float64", "energy v^2/2 at the end of each cycle"),
+    "t": Stored(ONE, "float64", "time of the last state"),
+    "x": Stored(ONE, "float64", "place of the last state"),
+    "y": Stored(ONE, "float64", "place of the last state"),
+    "vx": Stored(ONE, "float64", "velocity of the last state"),
+    "vy": Stored(ONE, "float64", "velocity of the last state"),
+    "outcome": Stored(ONE, "int8", "how following it ended; -1: not followed yet"),
+    "takes_part": Stored(ONE, "int8", "1: counts in means and shares; -1: not followed yet"),
+    "t_in": Stored(SLOTS, "float64", "begin of the captured stay around each narrowing; nan: none"),
+    "t_out": Stored(SLOTS, "float64", "end of that stay"),
+    "wall_counts": Stored(("particle", "wall"), "int64", "collisions with each wall"),
+    "n_careful": Stored(ONE, "int64", "collisions left to the careful step"),
+    "phase_energies": Stored(LOOKS, "float64", "energy v^2/2 at the phases of each cycle"),
+    "phase_captured": Stored(LOOKS, "int8", "1: captured there; -1: not followed yet"),
+    "lanes": Stored(("particle", "row"), "float64", "what it takes to go on: see fast.Paused"),
 }
-LANE = "lane"  # no result: neither digested nor exported
+LANES = "lanes"  # no result: neither digested nor exported
 
 
 class Shape(NamedTuple):
@@ -117,16 +116,16 @@ class Shape(NamedTuple):
 
 def columns(paused: Paused) -> Arrays:
     """Return the arrays that are stored of an ensemble."""
-    found = {**paused.ensemble._asdict(), "lanes": paused.lanes}
-    return {name: found[field.source].astype(field.kind, copy=False) for name, field in FIELDS.items()}
+    found = paused.ensemble._asdict()
+    found |= {"lanes": paused.lanes, "takes_part": paused.ensemble.takes_part()}
+    return {name: found[name].astype(field.kind, copy=False) for name, field in FIELDS.items()}
 
 
 def paused_of(arrays: Arrays, energy0: float, seconds: float) -> Paused:
     """Return the ensemble that arrays were stored of, which has taken so many seconds in one thread."""
-    found: dict[str, Any] = {field.source: arrays[name] for name, field in FIELDS.items() if name in arrays}
-    none = np.zeros((*found["cycle_energies"].shape, 0))
+    none = np.zeros((*arrays["cycle_energies"].shape, 0))
     empty = {"t_in": none, "t_out": none, "phase_energies": none, "phase_captured": none}
-    found = empty | found | {"energy0": energy0, "seconds": seconds, "threads": 1}
+    found: dict[str, Any] = empty | arrays | {"energy0": energy0, "seconds": seconds, "threads": 1}
     found |= {"energy": found["cycle_energies"][:, -1], "n_collisions": found["wall_counts"].sum(axis=1)}
     found["phase_captured"] = found["phase_captured"].astype(bool)  # of Zarr's -1 none is left
     return Paused(Ensemble(**{name: found[name] for name in Ensemble._fields}), found["lanes"])
@@ -194,7 +193,7 @@ def _array(shape: Shape, name: str) -> dict[str, Any]:
     attributes: dict[str, Any] = {"long_name": field.meaning}
     if name == "outcome":
         attributes |= {"flag_values": list(range(len(OUTCOMES))), "flag_meanings": " ".join(OUTCOMES)}
-    elif name == "collisions":
+    elif name == "wall_counts":
         attributes["walls"] = " ".join(WALLS)
     return {
         "zarr_format": 3,

@@ -1,7 +1,7 @@
-"""What a run comes to, gathered block by block: counts, moments and a histogram of log E / E0.
+"""What a run comes to, gathered block by block: counts, and moments of log E / E0.
 
 Every sum is exact, a whole number of the least binary64, so that blocks of any size, in any order, come to
-the same bits: merging is adding. A histogram's bins are fixed for the same reason.
+the same bits: merging is adding.
 """
 
 from __future__ import annotations
@@ -17,7 +17,6 @@ from fast import Ensemble
 from fast.ensemble import FOLLOWED, UNDECIDED
 
 LEAST = 1074  # 2^-LEAST is the least binary64 above 0
-BINS = 1024  # of the histogram, for each unit of log E1 / E0
 HALF = 27  # bits: sums of 2^36 halves of a mantissa stay 64-bit integers
 
 FloatArray = npt.NDArray[np.float64]
@@ -73,37 +72,6 @@ def moments_of(values: FloatArray) -> Moments:
     return Moments(len(values), exact_sum(finite), exact_sum(finite**2), len(values) - len(finite))
 
 
-class Histogram(NamedTuple):
-    """Counts of numbers in bins 1 / BINS wide; the first one begins at low / BINS."""
-
-    low: int = 0
-    counts: npt.NDArray[np.int64] = np.zeros(0, np.int64)
-
-    def merged(self, other: Histogram) -> Histogram:
-        """Return the histogram of both."""
-        if not len(self.counts) or not len(other.counts):
-            return self if len(self.counts) else other
-        low = min(self.low, other.low)
-        counts = np.zeros(max(h.low + len(h.counts) for h in (self, other)) - low, np.int64)
-        for each in (self, other):
-            counts[each.low - low : each.low - low + len(each.counts)] += each.counts
-        return Histogram(low, counts)
-
-    @property
-    def middles(self) -> FloatArray:
-        """Return the middle of each bin."""
-        return np.asarray((self.low + 0.5 + np.arange(len(self.counts))) / BINS)
-
-
-def histogram_of(values: FloatArray) -> Histogram:
-    """Return the histogram of the finite ones among some numbers."""
-    bins = np.floor(values[np.isfinite(values)] * BINS).astype(np.int64)
-    if not len(bins):
-        return Histogram()
-    low = int(bins.min())
-    return Histogram(low, np.bincount(bins - low).astype(np.int64))
-
-
 class RunTally(NamedTuple):
     """What some particles of a run come to.
 
@@ -113,7 +81,6 @@ class RunTally(NamedTuple):
         most: collisions of the particle that has most.
         captured: captured cycles of those who take part.
         gain: log E / E0 after all cycles, of those who take part.
-        first: log E1 / E0 after the first cycle, of the same.
     """
 
     particles: int = 0
@@ -124,7 +91,6 @@ class RunTally(NamedTuple):
     most: int = 0
     captured: int = 0
     gain: Moments = Moments()
-    first: Histogram = Histogram()
 
     def merged(self, other: RunTally) -> RunTally:
         """Return the tally of both."""
@@ -137,30 +103,25 @@ class RunTally(NamedTuple):
             most=max(self.most, other.most),
             captured=self.captured + other.captured,
             gain=self.gain.merged(other.gain),
-            first=self.first.merged(other.first),
         )
 
     def to_data(self) -> dict[str, Any]:
         """Return it as JSON can hold it."""
         counts = dict(zip(self._fields[:7], self[:7], strict=True))
-        first = [self.first.low, self.first.counts.tolist()]
-        return {**counts, "gain": [hex(number) for number in self.gain], "first": first}
+        return {**counts, "gain": [hex(number) for number in self.gain]}
 
 
 def tally_from(data: dict[str, Any]) -> RunTally:
     """Return a tally from what `RunTally.to_data` has made of it."""
     gain = Moments(*(int(number, 16) for number in data["gain"]))
-    low, counts = data["first"]
-    rest = {name: data[name] for name in RunTally._fields[:7]}
-    return RunTally(**rest, gain=gain, first=Histogram(low, np.array(counts, np.int64)))
+    return RunTally(**{name: data[name] for name in RunTally._fields[:7]}, gain=gain)
 
 
 def tally_of(ensemble: Ensemble) -> RunTally:
     """Return the tally of an ensemble."""
     takes_part = ensemble.takes_part()
-    energies = ensemble.cycle_energies[takes_part]
     with np.errstate(divide="ignore"):
-        first, last = (np.log(energies[:, k] / ensemble.energy0) for k in (0, -1))
+        gain = np.log(ensemble.energy[takes_part] / ensemble.energy0)
     return RunTally(
         particles=len(ensemble.energy),
         followed=int((ensemble.outcome == FOLLOWED).sum()),
@@ -169,6 +130,5 @@ def tally_of(ensemble: Ensemble) -> RunTally:
         careful=int(ensemble.n_careful.sum()),
         most=int(ensemble.n_collisions.max(initial=0)),
         captured=int(ensemble.is_captured()[takes_part].sum()),
-        gain=moments_of(last),
-        first=histogram_of(first),
+        gain=moments_of(gain),
     )

@@ -23,7 +23,7 @@ MAX_STATEMENTS = {
     "scene": 1_490,
     "reference": 1_440,
     "fast": 4_010,
-    "theory": 2_290,
+    "theory": 2_360,
     "conformance": 11_270,
     "mushrooms": 4_120,
     "tests": 15_270,

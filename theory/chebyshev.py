@@ -22,7 +22,6 @@ from mpmath.libmp import from_man_exp
 
 FEW = 200  # degree from which sums are taken by halving
 LEAST = 32  # degree below which they are taken one by one
-REACH = 8  # points that a forecast extrapolates from; more of them would save no further Newton steps
 
 
 class Grid:
@@ -44,8 +43,6 @@ class Grid:
         self.points = [(1 - c) / 2 for c in quarter_turns]
         self._rows: dict[int, list[list[Any]]] = {}
         self.weights = self._clenshaw_curtis()
-        rows = _extrapolations(n, ctx.prec)
-        self._forecasts = [[*map(ctx.make_mpf, row)] for row in rows]
 
     def _cosine_sums(self, values: list[Any]) -> list[Any]:
         """Return the sums over j of values[j] cos(pi j k / n), k = 0 ... n."""
@@ -133,11 +130,6 @@ class Grid:
         total = self._cosine_sums(_with_halved_ends(values))
         return _with_halved_ends([2 * x / self.n for x in total])
 
-    def forecast(self, values: list[Any]) -> Any:
-        """Extrapolate a function known at the first points to the next one; None when none is known."""
-        weights = self._forecasts[len(values)]
-        return self.ctx.fdot(weights, values[-len(weights) :]) if weights else None
-
     def _clenshaw_curtis(self) -> list[Any]:
         n, ctx = self.n, self.ctx
         even = [ctx.mpf(1) / (1 - k * k) if k % 2 == 0 else ctx.zero for k in range(n + 1)]
@@ -162,25 +154,9 @@ def _cosines(n: int, prec: int) -> tuple[Any, ...]:
     return tuple(ctx.cos(ctx.pi * m / n)._mpf_ for m in range(n // 2))
 
 
-@lru_cache(maxsize=64)
-def _extrapolations(n: int, prec: int) -> tuple[tuple[Any, ...], ...]:
-    """Return for each point the Lagrange weights there of the last REACH points before it, likewise."""
-    ctx = MPContext()
-    ctx.prec = prec
-    half = [*map(ctx.make_mpf, _cosines(n, prec)), ctx.zero]
-    points = [(1 - c) / 2 for c in half] + [(1 + c) / 2 for c in reversed(half[:-1])]
-    rows = []
-    for j, point in enumerate(points):
-        known = points[max(0, j - REACH) : j]
-        rows.append(tuple(ctx.fprod((point - x) / (y - x) for x in known if x != y)._mpf_ for y in known))
-    return tuple(rows)
-
-
 def even_degree(n: int) -> int:
-    """Return a degree of at least n that halves down to some LEAST; n itself while it is small."""
-    if n < FEW:
-        return n
-    unit = 1 << (n // LEAST).bit_length()
+    """Return a degree of at least n that halves at least twice, and a large one down to some LEAST."""
+    unit = 1 << max((n // LEAST).bit_length(), 3)
     return -(-n // unit) * unit
 
 

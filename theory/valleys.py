@@ -11,14 +11,14 @@ below 10^-(digits + 30) of its largest value counts as none.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from fractions import Fraction
 from itertools import pairwise
 from math import lcm
 from typing import Any, NamedTuple
 
 from scene.tables import Mushroom, period
-from theory.critical import Span, solve_rising, spans
+from theory.critical import Span, spans
 from theory.parameters import MovingMushroom
 from theory.volumes import NotCovered
 
@@ -34,20 +34,25 @@ class MonotoneStretch(NamedTuple):
     upper_order: int
     lower_order: int
 
-    def time(self, nu: Any, guess: Any = None) -> Any:
+    def time(self, nu: Any) -> Any:
         """Return the time at which nu(t) = nu, nu_lower <= nu <= nu_upper."""
+        binary = self.motion.binary
+        with binary.working():
+            return binary.given(self.changed(binary.taken).in_binary(binary.taken(nu)))
+
+    def in_binary(self, nu: Any) -> Any:
+        """Return `time` of a stretch whose ends are binary numbers, as nu is."""
         if nu >= self.nu_upper:
             return self.upper
         if nu <= self.nu_lower:
             return self.lower
-        sign = 1 if self.upper > self.lower else -1
-
-        def rising(t: Any) -> tuple[Any, Any]:
-            value, rate = self.motion.nu(t)
-            return sign * (value - nu), sign * rate
-
         low, high = sorted((self.lower, self.upper))
-        return solve_rising(self.motion.ctx, rising, low, high, guess)
+        return self.motion.time(nu, low, high, self.upper < self.lower)
+
+    def changed(self, change: Callable[[Any], Any]) -> MonotoneStretch:
+        """Return the stretch with its numbers in another form."""
+        upper, lower, nu_upper, nu_lower = map(change, self[1:5])
+        return self._replace(upper=upper, lower=lower, nu_upper=nu_upper, nu_lower=nu_lower)
 
     def between(self, nu_upper: Any, nu_lower: Any, tolerance: Any) -> MonotoneStretch:
         """Return the part between two values; a value within tolerance of an end is that end."""
@@ -64,6 +69,10 @@ class CapturePiece(NamedTuple):
 
     capture: MonotoneStretch
     release: MonotoneStretch
+
+    def changed(self, change: Callable[[Any], Any]) -> CapturePiece:
+        """Return the piece with its numbers in another form."""
+        return CapturePiece(self.capture.changed(change), self.release.changed(change))
 
     @property
     def nu_upper(self) -> Any:

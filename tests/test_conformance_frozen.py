@@ -12,7 +12,7 @@ from conformance.audit.frozen import MEASURED, SEED, lag, measured, passages
 from conformance.audit.runs import SCENES
 from scene import BangBang, Mushroom, load
 from scene.geometry import table_at
-from theory.rates import PHASES, SPEEDS, Rates, frozen_rates
+from theory.finite_energy.rates import PHASES, SPEEDS, Rates, frozen_rates
 
 N = 0.3  # of the table's particles
 FEW = [8, 40]  # of PHASES: the mouth narrows at one and widens at the other

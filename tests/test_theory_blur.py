@@ -11,9 +11,9 @@ from support.depth import deep_among, deep_but
 
 import theory
 from scene import BadInput, Fourier, Mushroom, load
-from theory.blur import FiniteEnergy, _joined, at_energy, blur_cdf
-from theory.course import N_TIMES, Fields
-from theory.rates import PHASES, SPEEDS, frozen_rates, kick_rate, rates_at
+from theory.finite_energy.coefficients import N_TIMES, Fields
+from theory.finite_energy.one_cycle import Atoms, FiniteEnergy, _joined, at_energy, blur_cdf
+from theory.finite_energy.rates import PHASES, SPEEDS, frozen_rates, kick_rate, rates_at
 
 CYCLES = (
     "fixed-cap-anticlockwise",
@@ -137,7 +137,7 @@ def test_joining_keeps_mass_and_mean() -> None:
     rng = np.random.default_rng(3)
     n = 60_000
     t_in = np.where(rng.random(n) < 0.1, np.nan, rng.random(n))
-    a = theory.blur.Atoms(rng.random(n), rng.standard_normal(n), rng.random(n), rng.random(n), t_in)
+    a = Atoms(rng.random(n), rng.standard_normal(n), rng.random(n), rng.random(n), t_in)
     b = _joined([a])
     assert len(b.gain) <= 40_000 < n
     assert b.weight.sum() == pytest.approx(a.weight.sum())

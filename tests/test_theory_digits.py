@@ -96,7 +96,7 @@ def test_many_digits_of_a_cycle_that_gains_nothing():
 
 
 def test_progress_tells_the_resolution_and_how_far_it_is(monkeypatch):
-    monkeypatch.setattr(theory.solutions, "FEW_DIGITS", 0)
+    monkeypatch.setattr(theory.prediction, "FEW_DIGITS", 0)
     told = []
     theory.predict(scene.load("moving-cap"), 2, progress=lambda *done: told.append(done))
     assert told == sorted(told)

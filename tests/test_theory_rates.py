@@ -12,8 +12,9 @@ import theory
 from scene import BangBang, Fourier, Mushroom, load
 from scene.tables import laws
 from scene.transforms import backwards
-from theory import NotCovered, frozen_rates, rates
-from theory.rates import PHASES
+from theory import NotCovered, frozen_rates
+from theory.finite_energy import rates
+from theory.finite_energy.rates import PHASES
 
 
 def all_at(scene: Mushroom, phases: np.ndarray) -> np.ndarray:

@@ -12,7 +12,7 @@ from support.refusals import one_line
 
 import theory
 from scene import BangBang, Cap, Fourier, Mushroom, Stem, load
-from theory.given import MAX_DIGITS, MAX_ORDER
+from theory.validation import MAX_DIGITS, MAX_ORDER
 
 SCENE = load("moving-cap")
 FP = mpmath.fp

@@ -18,10 +18,10 @@ from theory import (
     NotCovered,
     is_upright,
     kept_by_the_cap,
-    upright,
     upright_rate,
     upright_spread,
 )
+from theory.finite_energy import upright
 
 MOUTHS = (1.0, 0.8, 0.5)
 

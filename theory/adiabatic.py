@@ -22,15 +22,13 @@ from math import comb, log2
 from typing import Any, NamedTuple
 
 from scene.refusal import BadInput
-from theory.chebyshev import Grid, even_degree
-from theory.cycle import Cycle
-from theory.measure import WeightedPoints, convolve, product, shifted
-from theory.parameters import Binary
-from theory.valleys import CapturePiece, Valley
+from theory.chebyshev import Grid, WeightedPoints, convolve, even_degree, product, shifted
+from theory.cycle import CapturePiece, Cycle, Valley
+from theory.precision import Binary
 from theory.volumes import free_share
 
 MAX_HALVINGS = 256  # a panel of 2^-256 of its piece
-NARROWEST = 1e-20  # of the widest mouth: `theory.valleys.tolerance` and rounding stay far below what nu is
+NARROWEST = 1e-20  # of the widest mouth: `tolerance` of the cycle and rounding stay far below what nu is
 
 FEWEST = 16  # degree of the grid at which a part is first tried; its points are among those of the next
 PROMISE = 0.92  # of the digits wanted, in proportion to its degree, are to be seen on such a grid
@@ -291,7 +289,7 @@ def most_halvings(cycle: Cycle) -> int:
     """Return how often a piece may be halved, which is enough wherever its functions have a singularity.
 
     Singularities on a branch lie at the values of nu at its knots and critical points. Values that differ by
-    more than `theory.valleys.tolerance` are ends of pieces; what differs by less is one value. So a
+    more than `theory.cycle.tolerance` are ends of pieces; what differs by less is one value. So a
     singularity is an end of the piece, where its orders take it away, or further off the end than the
     tolerance: a part as short as that is resolved, and so is any other that is shorter than its distance.
     Binary64 laws come so near: a leg from 0.9 to 0.1 has its middle 3e-17 off a knot at 0.5. What lies

@@ -22,7 +22,7 @@ from numpy.typing import ArrayLike, NDArray
 from scene.refusal import BadInput, check_count, check_number, shown
 from scene.tables import Scene
 from theory.branches import UNRESOLVED, Branch, Floats, Node, X, at, noise, tree
-from theory.given import finite_array
+from theory.validation import finite_array
 
 STEP = 2.0**-12  # the lattice's, at best, and as a share of one cycle's reach
 LEAST_REACH = 1e-12  # of s in a cycle; below, its differences are partly rounding

@@ -15,9 +15,9 @@ import numpy as np
 from scene.refusal import check_count
 from scene.tables import Scene
 from theory.adiabatic import Captures
-from theory.constants import guarded
 from theory.critical import solve_rising
 from theory.distribution import KEPT, MAX_CYCLES, Energies, Lattice, cumulated, energies
+from theory.precision import guarded
 from theory.prediction import converged
 from theory.saddle import Saddle
 

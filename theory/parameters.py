@@ -8,78 +8,23 @@ inverted in closed form where parameters are parabolas, else from a solution in 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from fractions import Fraction
 from typing import Any
 
 import gmpy2
 from mpmath import fp
-from mpmath.libmp import from_man_exp
 
 from scene.laws import Fourier, Piece, Quadratic, exact, frequency, piece_at
 from scene.tables import Mushroom, laws
 from theory.critical import solve_rising
+from theory.precision import Binary
 from theory.volumes import Volumes, volumes_of
-
-SPARE_BITS = 24  # sixteen harmonics, each a product with the one before, lose a few
 
 # From t and (cos, sin) of omega t to the law's value and rate.
 Parameter = Callable[[Any, Any], tuple[Any, Any]]
 # From nu and a bracket to the time in it at which the mouth is nu, about; None where none is found.
 Inverse = Callable[[Any, Any, Any], Any]
-
-
-class Binary:
-    """gmpy2's floating point numbers as a number system, beside an mpmath context; SPARE_BITS wider.
-
-    What is computed with them is computed under `working`.
-    """
-
-    mpf, sqrt, asin, log = gmpy2.mpfr, gmpy2.sqrt, gmpy2.asin, gmpy2.log
-
-    def __init__(self, ctx: Any) -> None:
-        self.ctx = ctx
-        self.prec = int(ctx.prec) + SPARE_BITS
-        self.zero = gmpy2.mpfr(0)
-
-    @property
-    def pi(self) -> Any:
-        """Return pi at the present precision."""
-        return gmpy2.const_pi()
-
-    @property
-    def eps(self) -> Any:
-        """Return the spacing of numbers near 1."""
-        return self.ldexp(gmpy2.mpfr(1), 1 - self.prec)
-
-    def ldexp(self, x: Any, n: int) -> Any:
-        """Return x 2^n."""
-        return gmpy2.mul_2exp(x, n) if n >= 0 else gmpy2.div_2exp(x, -n)
-
-    @contextmanager
-    def workprec(self, prec: int) -> Iterator[None]:
-        """Compute with so many bits."""
-        before, self.prec = self.prec, prec
-        with gmpy2.context(gmpy2.get_context(), precision=prec):
-            yield
-        self.prec = before
-
-    @contextmanager
-    def working(self) -> Iterator[None]:
-        """Compute as wide as the mpmath context is now."""
-        with self.workprec(int(self.ctx.prec) + SPARE_BITS):
-            yield
-
-    def taken(self, x: Any) -> Any:
-        """Return a number of the mpmath context as one of these."""
-        sign, mantissa, exponent, _ = self.ctx.convert(x)._mpf_
-        return self.ldexp(gmpy2.mpfr(-mantissa if sign else mantissa), exponent)
-
-    def given(self, x: Any) -> Any:
-        """Return one of these as a number of the mpmath context, rounded to it."""
-        mantissa, exponent = x.as_mantissa_exp()
-        return self.ctx.make_mpf(from_man_exp(mantissa, int(exponent), *self.ctx._prec_rounding))
 
 
 class MovingMushroom:

@@ -19,10 +19,10 @@ from scipy.special import ndtr
 from scene.refusal import BadInput, check_count
 from scene.tables import Scene
 from theory.branches import Floats, Node
+from theory.chebyshev import logarithm, product
 from theory.distribution import Energies, energies
-from theory.given import finite_array
-from theory.measure import logarithm, product
 from theory.prediction import MAX_CYCLES
+from theory.validation import finite_array
 
 LARGEST_EXPONENT = 300.0  # exp of it and its square stay finite
 BISECTIONS = 80

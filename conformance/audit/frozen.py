@@ -9,15 +9,14 @@ kicks is seen, each wall in proportion to its speed there. At speed 1 that gives
   which widens meanwhile as fast as it does there, and is followed for TAIL further. The sum of kicks,
   less the chaotic zone's mean of it, has the mean `lag`; its mean square, less diffusion's, is `square`.
 
-All are of tables at rest: nothing is taken from a moving one, or fitted to it. `theory.rates` reads them,
-`theory/equations.md` says what follows. `python -m conformance.audit.frozen` measures them anew.
+All are of tables at rest: nothing is taken from a moving one, or fitted to it. `theory.finite_energy` reads
+them, `theory/equations.md` says what follows. `python -m conformance.audit.frozen` measures them anew.
 """
 
 from __future__ import annotations
 
 import json
 import math
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -25,7 +24,6 @@ from mpmath import fp
 
 import fast
 import scene as scenes
-import theory
 from conformance.audit.runs import scene_named
 from conformance.audit.tolerances import FloatArray, Mean, mean
 from fast.flow import carry_judged
@@ -34,7 +32,7 @@ from scene.files import write_file
 from scene.geometry import TableAt, table_at
 from scene.laws import value
 from scene.tables import cycle_length, laws
-from theory.rates import FILE, N_PHASES, PATHS, PHASES, SPEEDS, Rates, kick_rate, pace
+from theory.finite_energy.rates import FILE, N_PHASES, PATHS, PHASES, SPEEDS, Rates, kick_rate, pace
 
 MEASURED = (
     "fixed-cap-anticlockwise",
@@ -206,7 +204,7 @@ def main() -> None:
         "particles": [N_DIFFUSING, N_LAGGING],
         "scenes": table,
     }
-    write_file(Path(theory.__file__).with_name(FILE), json.dumps(text, indent=1))
+    write_file(FILE, json.dumps(text, indent=1))
 
 
 def _rounded(number: float) -> float:

@@ -1,7 +1,7 @@
 """A cycle in time, for particles of one initial energy: what the chaotic zone gathers, and who lags behind.
 
-Rates of frozen tables (`theory.rates`) are joined with the adiabatic theory's energies and hazards. Particles
-that were captured have other speeds, so lags and sums are functions of their gain over the uncaptured too.
+Rates of frozen tables (`rates`) are joined with the adiabatic theory's energies and hazards. Particles that
+were captured have other speeds, so lags and sums are functions of their gain over the uncaptured too.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from scene.tables import Mushroom, cycle_length, laws
 from theory.branches import Floats, tree
 from theory.curves import chaotic_zone
 from theory.cycle import Cycle
-from theory.rates import SPEEDS, RatesAt, rates_at
+from theory.finite_energy.rates import SPEEDS, RatesAt, rates_at
 from theory.volumes import NotCovered, delta_slope, volumes_at
 
 N_TIMES = 1024  # steps of a cycle, the midpoint rule's

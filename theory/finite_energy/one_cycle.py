@@ -1,7 +1,7 @@
 """Energies after one cycle at finite energy: the adiabatic theory, blurred and shifted, with nothing to fit.
 
 The chaotic zone's log E diffuses by the kicks of its walls, and the particles about to be captured, like
-those just released, lag behind the zone's mean. Both are known from frozen tables (`theory.course`). Beside
+those just released, lag behind the zone's mean. Both are known from frozen tables (`coefficients`). Beside
 its gain over the uncaptured a particle has a shift and a variance, of the orders v^-1 to v^(-2/3) and v^-1.
 Diffusion alone is exact: E^(1/4) is the distance from 0 of a Brownian motion in four dimensions, which
 is what keeping phase volume leaves of it. theory/equations.md derives all this and says what is left out.
@@ -19,10 +19,10 @@ from scipy.special import ndtr
 from scene.refusal import BadInput, check_count, check_number
 from scene.tables import Mushroom, Scene
 from theory.branches import Branch, Floats, Node, at, tree
-from theory.course import N_TIMES, Fields, Flags, course
 from theory.curves import chaotic_zone
-from theory.given import finite_array
-from theory.rates import table_error
+from theory.finite_energy.coefficients import N_TIMES, Fields, Flags, course
+from theory.finite_energy.rates import table_error
+from theory.validation import finite_array
 from theory.volumes import NotCovered, as_mushroom
 
 N_PLACES = 2000  # at which distribution functions are computed; linear between them
@@ -356,7 +356,7 @@ def at_energy(scene: Scene, energy: float) -> FiniteEnergy:
     """Return the distribution of log E1 / E0 for an initial energy.
 
     Args:
-        scene: a mushroom that `theory.rates` knows, or the reverse of one.
+        scene: a mushroom that `theory.finite_energy.rates` knows, or the reverse of one.
         energy: E = v^2 / 2 of every particle when the cycle begins [length^2 / time^2].
 
     Raises:

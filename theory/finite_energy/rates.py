@@ -12,7 +12,7 @@ from __future__ import annotations
 import json
 import math
 from functools import lru_cache
-from importlib import resources
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -26,7 +26,7 @@ from scene.transforms import backwards
 from theory.branches import Floats
 from theory.volumes import NotCovered, as_mushroom, volumes_at
 
-FILE = "frozen_rates.json"
+FILE = Path(__file__).with_name("frozen_rates.json")
 N_PHASES = 64
 PHASES = (np.arange(N_PHASES) + 0.5) / N_PHASES  # of the period; walls at rest at a knot have no rates there
 SPEEDS = np.array([500.0, 2500.0, 12500.0, 62500.0])
@@ -252,7 +252,7 @@ def _motions(scene: Mushroom, times: Floats) -> list[tuple[Any, Any]]:
 
 @lru_cache(maxsize=1)
 def _table() -> dict[str, tuple[Mushroom, Rates]]:
-    data = json.loads((resources.files("theory") / FILE).read_text("utf-8"))
+    data = json.loads(FILE.read_text("utf-8"))
     found = {}
     for name, entry in data["scenes"].items():
         scene = as_mushroom(scenes.from_data(entry["scene"]))

@@ -17,7 +17,7 @@ from scene.files import locked, write_files
 from scene.refusal import BadInput, check_seed
 
 if TYPE_CHECKING:
-    from conformance.audit.finding import Entry
+    from conformance.audit.claim import Claim
     from conformance.audit.runs import Size
     from conformance.audit.session import AuditResult, AuditSettings
 
@@ -46,28 +46,28 @@ def audit(
     with more particles too. No run is ever replaced.
     Exit code 0 when every claim has its expected verdict, 1 when one has not, 2 on bad input.
     """
-    from conformance.audit import ledger
+    from conformance.audit.claims import select_claims
     from conformance.audit.session import AuditSettings
     from mushrooms import audit_runs
     from mushrooms.reports import audit_page
 
     if only is not None and not only.replace(",", " ").split():
         raise BadInput(f"--only = {only!r}, must name a claim such as X2; all are checked without it")
-    entries = ledger.select(only or "")
+    claims = select_claims(only or "")
     check_seed(seed, "--seed")
     if threads is not None:
         check_range("--threads", threads, 1)
     size: Size = "full" if full else "quick"
     if commands:
-        lines = [audit_runs.command(run, size, seed, out) for run in audit_runs.needed(entries, size)]
+        lines = [audit_runs.command(run, size, seed, out) for run in audit_runs.needed(claims, size)]
         print(json.dumps(lines, indent=2) if as_json else "\n".join(lines))
         return
     with output.writable_folder(out) as folder, locked(folder):
-        settings = AuditSettings(size, seed, threads, folder / "findings", resume, apart=True)
+        settings = AuditSettings(size, seed, threads, folder / "findings", resume)
         # What an audit that was killed was writing. Nobody else writes under these names: the folder is held.
         for path in (*folder.glob(".report.*.part"), *folder.glob("findings/.*.finding.*.part")):
             path.unlink(missing_ok=True)
-        result = _conducted(folder, settings, entries)
+        result = _conducted(folder, settings, claims)
         data = audit_page.to_data(result)
         texts = {
             "report.json": audit_page.to_json(data),
@@ -83,25 +83,25 @@ def audit(
     raise typer.Exit(0 if result.is_passed else 1)
 
 
-def _conducted(folder: Path, settings: AuditSettings, entries: tuple[Entry, ...]) -> AuditResult:
-    """Conduct an audit of the entries, and of those that are taken up, in a folder that is held."""
+def _conducted(folder: Path, settings: AuditSettings, claims: tuple[Claim, ...]) -> AuditResult:
+    """Conduct an audit of the claims, and of those that are taken up, in a folder that is held."""
     import fast
-    from conformance.audit import ledger
-    from conformance.audit.evidence import AuditSteppers
+    from conformance.audit.claim import AuditSteppers
+    from conformance.audit.claims import all_claims
     from conformance.audit.session import conduct, kept
     from mushrooms import audit_runs
 
     if settings.resume:
-        wanted = {entry.id for entry in entries} | kept(settings)
-        entries = tuple(entry for entry in ledger.entries() if entry.id in wanted)
+        wanted = {claim.id for claim in claims} | kept(settings)
+        claims = tuple(claim for claim in all_claims() if claim.id in wanted)
         _check_report(folder, wanted)
     runs = audit_runs.KeptRuns(folder, settings.resume)
-    runs.check(audit_runs.needed(entries, settings.size), settings.seed)
+    runs.check(audit_runs.needed(claims, settings.size), settings.seed)
     with compilation_told(), progress_bar() as bar:
         return conduct(
             AuditSteppers(fast.simulate, fast.trajectory, fast.flow),
             settings,
-            entries=entries,
+            claims=claims,
             simulate_run=runs.simulate,
             progress=_advance(bar),
         )

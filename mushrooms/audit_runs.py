@@ -19,16 +19,16 @@ from scene.files import locked
 from scene.refusal import BadInput
 
 if TYPE_CHECKING:
-    from conformance.audit.finding import Entry
+    from conformance.audit.claim import Claim
     from fast import Ensemble
     from scene import Scene
 
 FOLDER = "runs"
 
 
-def needed(entries: Sequence[Entry], size: Size) -> list[Simulation]:
-    """Return the runs that entries rest on, in the order in which they are made."""
-    runs = [RUNS[name] for name in dict.fromkeys(name for entry in entries for name in entry.runs)]
+def needed(claims: Sequence[Claim], size: Size) -> list[Simulation]:
+    """Return the runs that claims rest on, in the order in which they are made."""
+    runs = [RUNS[name] for name in dict.fromkeys(name for claim in claims for name in claim.runs)]
     return [run for run in runs if run.n_particles(size)]
 
 

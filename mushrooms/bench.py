@@ -1,9 +1,7 @@
-"""`mushrooms bench`: speed against error on the same runs, error growth, cost against work, hard cases."""
+"""`mushrooms bench`: speed against error on the same runs, and error growth."""
 
 from __future__ import annotations
 
-import os
-import subprocess
 import tempfile
 import time
 from collections.abc import Sequence
@@ -22,20 +20,16 @@ from scene.files import Writer, write_files
 from scene.refusal import BadInput, check_seed
 
 if TYPE_CHECKING:
-    from conformance.bench.comparison import Ratio
-    from conformance.bench.contenders import Ask, Contender, Family
     from conformance.bench.measure import Effort
-    from conformance.bench.record import Drawn, Record, Size
+    from conformance.bench.record import Record, Size
+    from conformance.bench.solvers import Family, Solver
 
 TIMEOUT, RESTARTS = 30.0, 1  # of a command
-C_FLAGS = ("-O3", "-march=native")
-# By size: questions of a workload, steps with walls only, laps, trajectories and their length, repeats of an
-# ensemble.
+# By size: questions of a workload, steps with walls only, runs, trajectories and their length.
 QUESTIONS = {"quick": 12, "full": 64}
 FURTHER = {"quick": 200, "full": 2000}
 REPEATS = {"quick": 5, "full": 11}
 PATHS = {"quick": (3, 40), "full": (9, 80)}
-ENSEMBLE_REPEATS = {"quick": 1, "full": 3}
 
 
 def bench(
@@ -44,11 +38,8 @@ def bench(
         typer.Argument(metavar="[-- COMMAND...]", help="One more stepper; speaks protocol 1."),
     ] = None,
     out: Annotated[Path, typer.Option(metavar="DIR", help="Folder for the results.")] = Path("bench-report"),
-    quick: Annotated[bool, typer.Option("--quick", help="Fewer questions and laps: five minutes.")] = False,
+    quick: Annotated[bool, typer.Option("--quick", help="Fewer questions and runs: five minutes.")] = False,
     seed: Annotated[int, typer.Option(help="Seed of the questions, 0 to 2^64 - 1.")] = 0,
-    compare: Annotated[
-        Path | None, typer.Option(metavar="OLD.json", help="An earlier bench.json to compare with.")
-    ] = None,
     table: Annotated[
         Path | None,
         typer.Option(metavar="OLD.json", help="Print a table of an earlier bench.json as Markdown, and end."),
@@ -58,23 +49,20 @@ def bench(
         typer.Option(metavar="NAME", help="Which table; or `all`. By default moving-cap-1e7."),
     ] = None,
 ) -> None:
-    """Measure speed against error; writes bench.json, bench.svg, bench.html and hard-cases.md.
+    """Measure speed against error; writes bench.json, bench.svg and bench.html.
 
-    Exit code 0, or 1 when --compare shows a stepper slower than laps explain, or 2 on bad input.
+    Exit code 0, or 2 on bad input.
     """
-    from conformance.bench import comparison, hard_cases, record
+    from conformance.bench import record
     from mushrooms.figures import speed as figures_of_speed
     from mushrooms.reports import bench_page
 
-    _check_table(table, workload, quick, compare, command)
+    _check_table(table, workload, quick, command)
     if table is not None:
         print(bench_page.to_markdown(record.read(table), workload or "moving-cap-1e7"), end="")
         return
     check_seed(seed, "--seed")
     size: Size = "quick" if quick else "full"
-    old = record.read(compare) if compare is not None else None
-    if old is not None:
-        comparison.check_alike(old, size, seed, QUESTIONS[size], _drawn(size))
     with output.writable_folder(out) as folder, compilation_told():
         found = _measured(size, seed, command or [])
         picture = figures_of_speed.speed(found)
@@ -82,7 +70,6 @@ def bench(
             "bench.json": record.encode(found),
             "bench.svg": picture,
             "bench.html": bench_page.to_html(found, picture),
-            "hard-cases.md": hard_cases.to_markdown(found.hard_cases).encode(),
         }
         write_files(folder, files)
     console = Console(width=140)
@@ -90,33 +77,23 @@ def bench(
     for name, why in found.not_run.items():
         console.print(f"not run: {name}: {why}", markup=False)
     print(f"{found.seconds:.0f} s. Report: {folder / 'bench.html'}")
-    if old is not None:
-        ratios = comparison.compare(old, found)
-        console.print(_ratios(ratios))
-        for what in comparison.gone(old, found):
-            console.print(f"not measured any more: {what}", markup=False)
-        slower = [r for r in ratios if r.is_slower]
-        print(f"{len(slower)} of {len(ratios)} slower than {comparison.SLOWER} times {compare}")
-        raise typer.Exit(1 if slower else 0)
 
 
-def _check_table(
-    table: Path | None, workload: str | None, quick: bool, compare: Path | None, command: list[str] | None
-) -> None:
-    """Refuse options that would change nothing: a table is of an earlier run, and a run has all workloads."""
+def _check_table(table: Path | None, workload: str | None, quick: bool, command: list[str] | None) -> None:
+    """Refuse options that would change nothing: a table measures nothing, a benchmark has all workloads."""
     if table is None:
         refuse_unheeded({"--workload": workload}, "it needs --table")
     else:
-        measuring = {"--quick": quick or None, "--compare": compare, "COMMAND": command or None}
+        measuring = {"--quick": quick or None, "COMMAND": command or None}
         refuse_unheeded(measuring, "--table measures nothing")
 
 
 def _measured(size: Size, seed: int, command: list[str]) -> Record:
-    """Run everything."""
+    """SolverRun everything."""
     import fast
-    from conformance.bench import growth, hard_cases, measure, record, work, workloads
+    from conformance.bench import growth, measure, record, workloads
     from conformance.generator.prover import proved_step
-    from mushrooms import bench_contenders as ours
+    from mushrooms import bench_solvers as ours
 
     begin = time.monotonic()
     n_questions, n_further, repeats = QUESTIONS[size], FURTHER[size], REPEATS[size]
@@ -127,14 +104,14 @@ def _measured(size: Size, seed: int, command: list[str]) -> Record:
         def tick(what: str) -> None:
             bar.update(task, advance=0 if what else 1, description=escape(what) or None)
 
-        contenders, askers, built, not_run = _contenders(stack, command)
-        points, clock = [], list[float]()
+        solvers, built, not_run = _solvers(stack, command)
+        points = []
         for rule in workloads.RULES:
             tick(f"questions: {rule.name}")
             workload = workloads.draw_workload(
                 rule, seed, n_questions, proved_step, n_further, fast.next_collision
             )
-            found, troubles = measure.measure(workload, contenders, _effort(size), tick, clock)
+            found, troubles = measure.measure(workload, solvers, _effort(size), tick)
             points += found
             not_run |= {f"{name} on {rule.name}": why for name, why in troubles.items()}
             tick("")
@@ -143,14 +120,6 @@ def _measured(size: Size, seed: int, command: list[str]) -> Record:
         grown = growth.grow(
             ours.our_followers(), proved_step, ours.linearise, ours.prove_path, seed, n_paths, length, tick
         )
-        bar.reset(task, total=48, description="hard cases")
-        cases = hard_cases.tabulate(askers, tick)
-        bar.reset(task, total=None)
-        series, memory = work.measure_work(
-            ours.run_ensemble, size, os.cpu_count() or 1, ENSEMBLE_REPEATS[size], tick
-        )
-        tick("compile times")
-        compiled = _compile_times(not_run) if size == "full" else {}
     return record.Record(
         format=record.FORMAT,
         size=size,
@@ -159,33 +128,14 @@ def _measured(size: Size, seed: int, command: list[str]) -> Record:
         repeats=repeats,
         digits=workloads.DIGITS,
         machine=record.this_machine(built),
-        clock_ns=tuple(clock),
-        workloads=_drawn(size),
+        workloads=tuple(
+            record.Drawn(rule.name, rule.what, rule.scene, n_questions, n_further) for rule in workloads.RULES
+        ),
         points=tuple(points),
         not_run=not_run,
         growth=grown,
-        work=record.EnsembleWork(work.SCENE, series, memory, compiled),
-        hard_cases=cases,
         seconds=round(time.monotonic() - begin, 1),
     )
-
-
-def _drawn(size: Size) -> tuple[Drawn, ...]:
-    """Describe the workloads of a run."""
-    from conformance.bench import record, workloads
-
-    numbers = QUESTIONS[size], FURTHER[size]
-    return tuple(record.Drawn(rule.name, rule.what, rule.scene, *numbers) for rule in workloads.RULES)
-
-
-def _compile_times(not_run: dict[str, str]) -> dict[str, float]:
-    from mushrooms import bench_contenders as ours
-
-    try:
-        return ours.compile_times()
-    except subprocess.CalledProcessError as error:
-        not_run["compile times"] = f"exit code {error.returncode}"
-        return {}
 
 
 def _effort(size: str) -> Effort:
@@ -194,35 +144,29 @@ def _effort(size: str) -> Effort:
     return Effort(REPEATS[size], 3e6, 4e8) if size == "quick" else Effort(REPEATS[size], 2e7, 4e9)
 
 
-def _contenders(
-    stack: ExitStack, command: list[str]
-) -> tuple[list[Contender], dict[str, Ask], dict[str, str], dict[str, str]]:
-    """Return contenders, how each answers a vector, what was compiled, and what cannot run."""
+def _solvers(stack: ExitStack, command: list[str]) -> tuple[list[Solver], dict[str, str], dict[str, str]]:
+    """Return solvers, what was compiled, and what cannot run."""
     from conformance.bench import baselines
-    from conformance.bench.contenders import by_command, plain_python, time_steppers
+    from conformance.bench.solvers import by_command, in_python
     from conformance.harness.examples import find_examples
     from conformance.suite.process import Trouble
     from conformance.suite.session import Limits
-    from mushrooms import bench_contenders as ours
+    from mushrooms import bench_solvers as ours
 
     limits = Limits(TIMEOUT, RESTARTS)
-    contenders = [*ours.our_contenders(), baselines.in_numba(), plain_python(), *time_steppers()]
-    askers = ours.our_askers()
-    built, not_run = {}, {}
+    solvers = [*ours.our_solvers(), baselines.in_numba(), *in_python()]
+    built, not_run = dict[str, str](), dict[str, str]()
     folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
     try:
-        library, built["lean C"] = baselines.build(folder, C_FLAGS)
-        in_c = baselines.in_c(library)
-        contenders += in_c
-        askers |= {c.name: baselines.asker(c) for c in (in_c[0], in_c[-1])}
+        library, built["lean C"] = baselines.build(folder, baselines.FLAGS)
+        solvers += baselines.in_c(library)
     except Trouble as trouble:
         not_run["lean C, time steps"] = trouble.why
 
     def add(name: str, family: Family, line: Sequence[str]) -> None:
-        contender, askers[name] = by_command(name, family, line, stack, limits)
-        contenders.append(contender)
+        solvers.append(by_command(name, family, line, stack, limits))
 
-    examples = find_examples(folder, C_FLAGS)
+    examples = find_examples(folder, baselines.FLAGS)
     for language, example in examples.items():
         name = f"example in {language}"
         if not example.command:
@@ -240,14 +184,7 @@ def _contenders(
             add(f"command {' '.join(command)}", "command", command)
         except Trouble as trouble:
             raise BadInput(f"command {command[0]!r} {trouble.verdict}: {trouble.why}") from None
-    return contenders, askers, built, not_run
-
-
-def _new_table(title: str, *numbers: str) -> Table:
-    table = Table("workload", "stepper", title=title, title_justify="left")
-    for name in numbers:
-        table.add_column(name, justify="right")
-    return table
+    return solvers, built, not_run
 
 
 def _table(found: Record) -> Table:
@@ -255,20 +192,14 @@ def _table(found: Record) -> Table:
     from mushrooms.reports.bench_page import astray, middle_and_worst
 
     numbers = ("ns/collision", "quartiles", "median ulps", "worst ulps", "wrong", "undecided", "left")
-    table = _new_table("Speed against error", *numbers, "wrong of further")
+    table = Table("workload", "stepper", title="Speed against error", title_justify="left")
+    for name in (*numbers, "wrong of further"):
+        table.add_column(name, justify="right")
     for p in found.points:
         middle, worst = middle_and_worst(p.ulps, ".2g")
         counts = [str(n) if n else "" for n in (p.wrong, p.undecided, p.left)]
         first, ns, third = quartiles(p.ns)
         spread = f"-{1 - first / ns:.1%} +{third / ns - 1:.1%}"
-        row = [escape(p.contender), f"{ns:,.0f}", spread, middle, worst, *counts, astray(p)]
+        row = [escape(p.solver), f"{ns:,.0f}", spread, middle, worst, *counts, astray(p)]
         table.add_row(p.workload, *row)
-    return table
-
-
-def _ratios(ratios: list[Ratio]) -> Table:
-    table = _new_table("New time over old, 99 % bootstrap interval over the laps", "ratio", "interval")
-    for r in ratios:
-        mark = " slower" if r.is_slower else ""
-        table.add_row(r.workload, escape(r.contender), f"{r.ratio:.2f}", f"{r.low:.2f} to {r.high:.2f}{mark}")
     return table

@@ -11,22 +11,16 @@ from support.depth import deep_among
 
 import fast
 import theory
-from conformance.audit import evidence, ledger
+from conformance.audit.claim import AuditSteppers, ClaimEvidence, verdict_of
 from conformance.audit.claims import (
+    assumptions,
     broadened,
     experiments,
     exponents,
-    filling,
-    identities,
     many_cycles,
-    misprints,
-    shapes,
-    slow_growth,
+    select_claims,
 )
-from conformance.audit.evidence import AuditSteppers, ClaimEvidence
-from conformance.audit.finding import verdict_of
-from conformance.audit.runs import RUNS, scene_of
-from conformance.audit.samples import draw
+from conformance.audit.runs import RUNS, draw, scene_of
 from conformance.audit.session import AuditSettings, conduct
 from conformance.audit.tolerances import MAX_TESTS, N_SIGMA, close, fits, power
 
@@ -37,9 +31,9 @@ STAND_IN = AuditSteppers(adiabatic_particles.simulate, fast.trajectory, fast.flo
 
 
 def audited(only="", simulate=adiabatic_particles.simulate, predict=CACHED):
-    entries = [entry for entry in ledger.select(only) if only or entry.id not in REAL + FORMULAS]
+    claims = [claim for claim in select_claims(only) if only or claim.id not in REAL + FORMULAS]
     return conduct(
-        AuditSteppers(simulate, fast.trajectory, fast.flow), AuditSettings(), entries=entries, predict=predict
+        AuditSteppers(simulate, fast.trajectory, fast.flow), AuditSettings(), claims=claims, predict=predict
     )
 
 
@@ -49,9 +43,10 @@ def _fewer():
     with pytest.MonkeyPatch.context() as patch:
         for module in (broadened, many_cycles):
             patch.setattr(module, "N_DRAWN", 100_000)
-        patch.setattr(shapes, "N_CLOCKS", 1)
-        for module in (evidence, identities, misprints, shapes):
-            patch.setattr(module, "DIGITS", adiabatic_particles.DIGITS)  # what is predicted is shared
+        patch.setattr(assumptions, "N_CLOCKS", 1)
+        for module in ("claim", "claims.identities", "claims.misprints", "claims.assumptions"):
+            name = f"conformance.audit.{module}.DIGITS"
+            patch.setattr(name, adiabatic_particles.DIGITS)  # what is predicted is shared
         yield
         broadened.summed.cache_clear()
 
@@ -63,8 +58,8 @@ def honest():
 
 @pytest.mark.deep
 def test_ensembles_of_theory_meet_every_expected_verdict(honest):
-    pairs = zip(honest.entries, honest.findings, strict=True)
-    wrong = [(finding.id, finding.checks) for entry, finding in pairs if finding.verdict != entry.expected]
+    pairs = zip(honest.claims, honest.findings, strict=True)
+    wrong = [(finding.id, finding.checks) for claim, finding in pairs if finding.verdict != claim.expected]
     assert wrong == []
     assert honest.is_passed
 
@@ -72,11 +67,11 @@ def test_ensembles_of_theory_meet_every_expected_verdict(honest):
 @pytest.mark.deep
 def test_every_misprint_fails_as_printed_and_holds_corrected(honest):
     by_id = {finding.id: finding for finding in honest.findings}
-    for entry in honest.entries:
-        if entry.expected == "misprint":
-            checks = by_id[entry.id].checks
-            assert {check.holds for check in checks if check.form == "printed"} == {False}, entry.id
-            assert {check.holds for check in checks if check.form == "corrected"} == {True}, entry.id
+    for claim in honest.claims:
+        if claim.expected == "misprint":
+            checks = by_id[claim.id].checks
+            assert {check.holds for check in checks if check.form == "printed"} == {False}, claim.id
+            assert {check.holds for check in checks if check.form == "corrected"} == {True}, claim.id
             assert not any(check.form == "claim" for check in checks)
 
 
@@ -183,9 +178,9 @@ FAULTS = {
 
 @pytest.mark.parametrize("name", deep_among(FAULTS, "L5", "C10", "X7", "X8", "C3", "C5", "C9", "D1"))
 def test_a_faulty_stepper_does_not_get_the_expected_verdict(name):
-    (entry,) = ledger.select(name)
+    (claim,) = select_claims(name)
     (finding,) = audited(name, FAULTS[name]).findings
-    assert finding.verdict != entry.expected, finding.checks
+    assert finding.verdict != claim.expected, finding.checks
 
 
 def without_finite_energy(scene, **options):
@@ -205,8 +200,8 @@ def bare(e, found):
 @pytest.mark.deep
 @pytest.mark.parametrize("fault", [raised(0.95), raised(0.985), freed], ids=["trivial", "unbiased", "freed"])
 def test_a_retraced_arc_that_does_not_accelerate_as_predicted_is_found_out(fault):
-    (entry,) = ledger.select("X7")
-    assert entry.expected == "false"
+    (claim,) = select_claims("X7")
+    assert claim.expected == "false"
     (finding,) = audited("X7", changed(retraced_arc=fault)).findings
     assert finding.verdict != "false", finding.checks
 
@@ -232,9 +227,9 @@ def test_a_wrong_theory_does_not_get_the_expected_verdict(name):
         return right._replace(m1=right.m1 + mpmath.mpf("0.03"), p_nc=right.p_nc * mpmath.mpf("0.95"),
                               log_e_nc=right.log_e_nc + mpmath.mpf("0.01"))  # fmt: skip
 
-    (entry,) = ledger.select(name)
+    (claim,) = select_claims(name)
     (finding,) = audited(name, predict=wrong).findings
-    assert finding.verdict != entry.expected
+    assert finding.verdict != claim.expected
 
 
 def test_a_theory_that_upholds_the_print_is_no_misprint():
@@ -299,20 +294,20 @@ REAL_STEPPERS = AuditSteppers(fast.simulate, fast.trajectory, fast.flow)
 @pytest.fixture
 def small(monkeypatch):
     """Make C2 as cheap as a test wants it."""
-    monkeypatch.setattr(filling, "ENERGY", 1e6)
-    monkeypatch.setitem(filling.N_PARTICLES, "quick", 800)
+    monkeypatch.setattr(assumptions, "ENERGY", 1e6)
+    monkeypatch.setitem(assumptions.N_PARTICLES, "quick", 800)
 
 
 def test_the_fast_stepper_keeps_the_laws_of_single_particles(small):
-    entries = ledger.select(",".join(REAL))
-    result = conduct(REAL_STEPPERS, AuditSettings(threads=1), entries=entries)
+    claims = select_claims(",".join(REAL))
+    result = conduct(REAL_STEPPERS, AuditSettings(threads=1), claims=claims)
     assert {finding.id: finding.verdict for finding in result.findings} == dict.fromkeys(REAL, "confirmed")
 
 
 def verdict_with(name, **faults):
-    (entry,) = ledger.select(name)
+    (claim,) = select_claims(name)
     evidence = ClaimEvidence({}, REAL_STEPPERS._replace(**faults), predict=CACHED, threads=1)
-    return verdict_of(entry, list(entry.examine(evidence)))
+    return verdict_of(claim, list(claim.examine(evidence)))
 
 
 def leaking(*args):
@@ -344,7 +339,7 @@ def test_a_faulty_path_is_refuted(name, fault):
 
 def test_more_speed_than_walls_can_give_is_seen():
     evidence = ClaimEvidence({}, REAL_STEPPERS._replace(trajectory=kicked), predict=CACHED)
-    assert slow_growth._at_most_linear(evidence, "moving-cap").holds is False
+    assert assumptions._at_most_linear(evidence, "moving-cap").holds is False
 
 
 def lifted(scene, states, t_end, threads=None):
@@ -365,11 +360,11 @@ def test_work_that_is_not_conserved_is_refuted(monkeypatch):
         done = fast.simulate(scene, **options)
         return done._replace(energy=done.energy * 0.7, phase_energies=done.phase_energies * 0.7)
 
-    (entry,) = ledger.select("L7")
-    checks = entry.examine(
+    (claim,) = select_claims("L7")
+    checks = claim.examine(
         ClaimEvidence({}, AuditSteppers(cooled, fast.trajectory, fast.flow), predict=CACHED, threads=1)
     )
-    assert verdict_of(entry, list(checks)) == "refuted"
+    assert verdict_of(claim, list(checks)) == "refuted"
 
 
 def test_the_power_of_a_comparison_is_how_often_it_refutes_the_alternative():

@@ -9,7 +9,7 @@ import pytest
 from support.depth import deep_but
 from support.truth import proved_step
 
-from conformance.bench import contenders, measure, workloads
+from conformance.bench import measure, solvers, workloads
 from conformance.suite.process import Trouble
 from conformance.suite.promises import timing
 
@@ -23,7 +23,7 @@ def breathing_disk() -> workloads.Workload:
 def tried(workload, *these):
     # Laps of several ticks of a clock that counts milliseconds: none adds up to nothing.
     brief = measure.Effort(repeats=3, least_ns=5e6, most_ns=1e9)
-    return measure.measure(workload, these, brief, lambda _: None, [])
+    return measure.measure(workload, these, brief, lambda _: None)
 
 
 def test_a_tick_of_a_coarse_clock_is_no_lie():
@@ -36,12 +36,10 @@ def test_a_tick_of_a_coarse_clock_is_no_lie():
 
 def test_commands_time_themselves_and_their_troubles_are_told(breathing_disk):
     with ExitStack() as stack:
-        able, _ = contenders.by_command("fast", "command", [sys.executable, "-m", "fast"], stack)
-        unable, _ = contenders.by_command(
-            "plain", "command", [sys.executable, "-m", "conformance.plain"], stack
-        )
+        able = solvers.by_command("fast", "command", [sys.executable, "-m", "fast"], stack)
+        unable = solvers.by_command("plain", "command", [sys.executable, "-m", "conformance.plain"], stack)
         points, troubles = tried(breathing_disk, able, unable)
-    assert [p.contender for p in points] == ["fast"]
+    assert [p.solver for p in points] == ["fast"]
     assert points[0].right == 3
     assert min(points[0].ns) > 0
     assert troubles["plain"].startswith("unsupported")
@@ -73,9 +71,7 @@ for line in sys.stdin:
 def test_a_command_that_times_nothing_is_left_out(breathing_disk, tmp_path, ns, steps, trouble):
     (tmp_path / "impostor.py").write_text(IMPOSTOR.replace("NS", ns).replace("STEPS", steps))
     with ExitStack() as stack:
-        impostor, _ = contenders.by_command(
-            "it", "command", [sys.executable, str(tmp_path / "impostor.py")], stack
-        )
+        impostor = solvers.by_command("it", "command", [sys.executable, str(tmp_path / "impostor.py")], stack)
         points, troubles = tried(breathing_disk, impostor)
     assert not points
     assert troubles["it"].startswith(trouble)
@@ -116,9 +112,7 @@ def test_a_command_is_timed_by_a_clock_that_is_true(breathing_disk, tmp_path, sa
     # One that counts milliseconds is: most of its steps are said to last 0 ns.
     (tmp_path / "spoilt.py").write_text(SPOILT_CLOCK.replace("SAID", said))
     with ExitStack() as stack:
-        spoilt, _ = contenders.by_command(
-            "it", "command", [sys.executable, str(tmp_path / "spoilt.py")], stack
-        )
+        spoilt = solvers.by_command("it", "command", [sys.executable, str(tmp_path / "spoilt.py")], stack)
         points, troubles = tried(breathing_disk, spoilt)
-    assert [p.contender for p in points] == ([] if why else ["it"])
+    assert [p.solver for p in points] == ([] if why else ["it"])
     assert troubles.get("it", "").startswith(why)

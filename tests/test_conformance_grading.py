@@ -93,6 +93,7 @@ VERDICTS = [
     (TIE, CORNER, "pass", ""),
     (TIE, UNDECIDED, "pass", ""),
     (TIE, HIT, "fail", "must be undefined corner"),
+    (TIE, {**CORNER, "reason": "sliding"}, "fail", "undefined sliding, must be undefined corner"),
     (REFUSAL, REJECTED, "pass", ""),
     (REFUSAL, HIT, "fail", "collision, must be rejected"),
     (REFUSAL, UNDECIDED, "declined", ""),

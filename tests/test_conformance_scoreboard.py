@@ -8,7 +8,7 @@ import sys
 import pytest
 
 from conformance import suite
-from conformance.bench import scoreboard, serve
+from conformance.bench import baselines, scoreboard
 from conformance.bench.scoreboard import Graded, page, reasons
 from conformance.suite import property_checks
 from conformance.suite.session import Limits
@@ -19,7 +19,7 @@ needs_compiler = pytest.mark.skipif(not shutil.which("cc"), reason="no C compile
 
 @pytest.fixture(scope="module")
 def lean():
-    command = [sys.executable, "-m", "conformance.bench.serve", "lean-c"]
+    command = [sys.executable, "-m", "conformance.bench.baselines", "lean-c"]
     with pytest.MonkeyPatch.context() as patch:  # ensembles and promises are not what is looked at
         patch.setattr(property_checks, "SIZES", {"core": property_checks.Size(20, 50.0, 0.5)})
         patch.setattr("conformance.suite.promises.ask_promises", lambda _: iter(()))
@@ -49,7 +49,7 @@ def test_the_page_has_a_row_for_each_and_a_reason_for_failure(lean):
 
 def test_a_baseline_that_is_none_is_refused():
     with pytest.raises(BadInput, match="must be one of lean-c"):
-        serve.main(["lean"])
+        baselines.main(["lean"])
 
 
 def test_every_baseline_is_listed(tmp_path, monkeypatch):

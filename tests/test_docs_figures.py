@@ -61,12 +61,6 @@ def sentence_of_bad_scenes() -> str:
     )
 
 
-def sentence_of_hard_cases() -> str:
-    verdicts = [case["verdicts"]["lean C"] for case in BENCH["hard_cases"]]
-    n_wrong, n = sum(found.get("wrong", 0) for found in verdicts), sum(sum(v.values()) for v in verdicts)
-    return f"lean C answers {n_wrong} of the {n} vectors of the hard cases wrong"
-
-
 def lines_of_growth() -> str:
     all_kept = BENCH["growth"]["collisions"]
     lasts = BENCH["growth"]["lasts"].items()
@@ -116,7 +110,6 @@ FIGURES: dict[str, tuple[str, Callable[[], str]]] = {
     "chunks": ("docs/ensembles.md", lambda: f"{conduct.MOST_CHUNKS} times as many"),
     "blocks": ("docs/ensembles.md", lambda: f"by default {conduct.LEAST_BLOCK} to {conduct.MOST_BLOCK},"),
     "fill values": ("docs/ensembles.md", words_of_whole_arrays),
-    "hard cases": ("docs/speed.md", sentence_of_hard_cases),
     "growth": ("docs/speed.md", lines_of_growth),
     **{
         name: ("theory/equations.md", partial(row_of_losses, name, label))

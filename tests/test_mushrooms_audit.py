@@ -4,14 +4,8 @@ from __future__ import annotations
 
 import base64
 import json
-import os
 import re
 import shutil
-import signal
-import subprocess
-import sys
-import time
-from contextlib import suppress
 from functools import partial
 from html.parser import HTMLParser
 from pathlib import Path
@@ -19,16 +13,16 @@ from pathlib import Path
 import jsonschema
 import numpy as np
 import pytest
-from support import adiabatic_particles, naps
+from support import adiabatic_particles
 from support.depth import deep_among
 from support.harm import held
 from support.refusals import assert_refused
 from support.schemas import validator
 
 import fast
-from conformance.audit import ledger, session
-from conformance.audit.evidence import AuditSteppers
-from conformance.audit.finding import Check, Finding
+from conformance.audit import session
+from conformance.audit.claim import AuditSteppers, Check, Finding
+from conformance.audit.claims import all_claims, select_claims
 from conformance.audit.session import AuditResult, AuditSettings
 from mushrooms.figures import by_claim
 from mushrooms.reports import audit_page
@@ -38,7 +32,7 @@ from scene.files import locked
 pytestmark = pytest.mark.usefixtures("unsynced")
 CHEAP = "M4,M10,X5,N6"
 FIGURES = ("X1", "X5", "L4")
-EVERY_FIGURE = tuple(sorted({picture.entry for picture in by_claim.ALL}))
+EVERY_FIGURE = tuple(sorted({picture.claim for picture in by_claim.ALL}))
 
 
 @pytest.fixture
@@ -50,16 +44,16 @@ def call(command_line, monkeypatch):
 
 @pytest.fixture(scope="module")
 def everything():
-    """A result that has every entry of the ledger, and no samples."""
-    entries = ledger.entries()
+    """A result that has every claim of the claims, and no samples."""
+    claims = all_claims()
     checks = [
         Check("as it is", True, "0.5", 0.51, 0.01, 0.002, "claim", 1, "a note"),
         Check("as printed", False, "> 0", form="printed", note="fails"),
         Check("unclear", None, "<= 0.1", 0.2, None, 0.01, "corrected", 1, "n = 5 <b>&"),
         Check("not a number", False, "1", float("nan"), float("nan"), 0.0, "claim", 1),
     ]
-    findings = [Finding(entry.id, entry.expected, checks, 0.1) for entry in entries]
-    return AuditResult(AuditSettings(), entries, findings, {}, 12.3)
+    findings = [Finding(claim.id, claim.expected, checks, 0.1) for claim in claims]
+    return AuditResult(AuditSettings(), claims, findings, {}, 12.3)
 
 
 def samples_of(pictures):
@@ -107,7 +101,7 @@ class Links(HTMLParser):
 
 @pytest.mark.parametrize("ids", deep_among([FIGURES, EVERY_FIGURE], EVERY_FIGURE))
 def test_the_page_loads_nothing_from_elsewhere_and_shows_every_figure(everything, ids, monkeypatch):
-    monkeypatch.setattr(by_claim, "ALL", [each for each in by_claim.ALL if each.entry in ids])
+    monkeypatch.setattr(by_claim, "ALL", [each for each in by_claim.ALL if each.claim in ids])
     page = audit_page.to_html(audit_page.to_data(everything), samples_of(by_claim.ALL))
     links = Links()
     links.feed(page)
@@ -123,8 +117,8 @@ def test_the_page_loads_nothing_from_elsewhere_and_shows_every_figure(everything
         picture = base64.b64decode(source.partition(",")[2]).decode("utf-8")
         targets = re.findall(r'href="([^"]*)"', picture)
         assert all(target.startswith(("#", "data:")) for target in targets)
-    for entry in everything.entries:
-        assert f'id="{entry.id}"' in page
+    for claim in everything.claims:
+        assert f'id="{claim.id}"' in page
 
 
 def test_the_summary_tells_what_is_not_as_expected(everything):
@@ -142,8 +136,8 @@ def test_a_few_claims_are_checked_and_reported(call, tmp_path):
     assert done.code == 0
     data = json.loads(done.out)
     assert [finding["id"] for finding in data["findings"]] == CHEAP.split(",")
-    assert {entry["name"] for entry in data["runs"]} == {"ergodic@1e6", "ergodic@1e7"}
-    names = sorted(entry.name for entry in (tmp_path / "a").iterdir())
+    assert {claim["name"] for claim in data["runs"]} == {"ergodic@1e6", "ergodic@1e7"}
+    names = sorted(claim.name for claim in (tmp_path / "a").iterdir())
     assert names == ["findings", "report.html", "report.json", "report.txt", "runs"]
     assert (tmp_path / "a" / "report.json").read_text("utf-8") == done.out
 
@@ -219,7 +213,7 @@ def test_what_a_killed_audit_was_writing_is_taken_away(call, tmp_path):
 def test_what_other_sources_found_is_found_again(call, tmp_path, monkeypatch):
     """A claim's code had changed and its words had not: what the old code said was told as the new one's."""
     assert call("--only", "X5", "--out", tmp_path).code == 0
-    monkeypatch.setattr(session, "examine", lambda entry, *_: Finding(entry.id, "refuted", [], 0.0))
+    monkeypatch.setattr(session, "examine", lambda claim, *_: Finding(claim.id, "refuted", [], 0.0))
     assert call("--only", "X5", "--out", tmp_path, "--resume").code == 0
     monkeypatch.setattr(session, "code", lambda: "of another day")
     done = call("--only", "M8", "--out", tmp_path, "--resume")
@@ -232,7 +226,7 @@ def test_what_other_sources_found_is_found_again(call, tmp_path, monkeypatch):
     "name",
     [
         "audit/claims/printed.py",
-        "audit/ledger.toml",
+        "audit/claims.toml",
         "scene/catalogue/moving-cap.toml",
         "fast/kernel/careful.py",
         "theory/finite_energy/frozen_rates.json",
@@ -264,13 +258,13 @@ def test_sources_are_looked_at_before_anything_is_examined(tmp_path, monkeypatch
 
     monkeypatch.setattr(session, "code", lambda: order.append("code") or "of today")
     monkeypatch.setattr(
-        session, "examine", lambda entry, *_: order.append(entry.id) or Finding(entry.id, "refuted", [], 0.0)
+        session, "examine", lambda claim, *_: order.append(claim.id) or Finding(claim.id, "refuted", [], 0.0)
     )
     steppers, settings = AuditSteppers(simulate, fast.trajectory, fast.flow), AuditSettings(folder=tmp_path)
-    session.conduct(steppers, settings, entries=ledger.select("N6"))
+    session.conduct(steppers, settings, claims=select_claims("N6"))
     assert order[:2] == ["code", "N6"]
     with pytest.raises(InterruptedError):
-        session.conduct(steppers, settings, entries=ledger.select("X5"))
+        session.conduct(steppers, settings, claims=select_claims("X5"))
     assert order[-2:] == ["code", "simulated"]
 
 
@@ -331,50 +325,3 @@ def test_without_resume_no_run_is_replaced(call, tmp_path, blocks):
     assert held(tmp_path) == before
     assert call("--only", "N6", "--out", tmp_path).code == 0  # it has no runs
     assert len(blocks) == 6
-
-
-@pytest.mark.deep
-def test_entries_without_simulations_may_be_examined_apart(tmp_path):
-    result = session.conduct(
-        AuditSteppers(adiabatic_particles.simulate, fast.trajectory, fast.flow),
-        AuditSettings(folder=tmp_path, apart=True),
-        entries=ledger.select("M10,M13"),
-    )
-    assert result.is_passed
-
-
-def test_an_interruption_waits_for_no_process_of_the_audits_own(tmp_path, monkeypatch):
-    """One that reaches this process alone, as a batch system's signal does."""
-    monkeypatch.setattr(session, "_examine_apart", naps.nap)
-    settings = AuditSettings(folder=tmp_path, apart=True)
-
-    def interrupted():
-        with session._elsewhere(settings, ledger.select("M10")):
-            while not (tmp_path / "begun").exists():
-                time.sleep(0.01)
-            raise KeyboardInterrupt
-
-    with pytest.raises(KeyboardInterrupt):
-        interrupted()
-    assert not (tmp_path / "ended").exists()
-
-
-@pytest.mark.skipif(os.name != "posix", reason="kills by a POSIX signal")
-def test_an_audit_that_is_killed_leaves_no_process(tmp_path):
-    """Its second process waited for the next claim for good, and held what the first had as its output."""
-    audit = subprocess.Popen(
-        [sys.executable, "-m", "support.naps", str(tmp_path)],
-        cwd=Path(__file__).parent,
-        stdout=subprocess.PIPE,
-        start_new_session=True,
-    )
-    try:
-        while not (tmp_path / "begun").exists():
-            assert audit.poll() is None
-            time.sleep(0.01)
-        audit.kill()
-        assert audit.communicate(timeout=20) == (b"", None)  # nobody else holds the pipe
-        assert not (tmp_path / "ended").exists()
-    finally:
-        with suppress(ProcessLookupError):
-            os.killpg(audit.pid, signal.SIGKILL)

@@ -17,9 +17,8 @@ from support.refusals import assert_refused
 
 import fast
 import scene as scenes
-from conformance.audit import ledger
-from conformance.audit.runs import RUNS, SCENES, Simulation, run_seed, scene_of
-from conformance.audit.samples import Sample, draw
+from conformance.audit.claims import all_claims
+from conformance.audit.runs import RUNS, SCENES, Sample, Simulation, draw, run_seed, scene_of
 from mushrooms import audit_runs
 from mushrooms.store import blocks, conduct, head
 from scene import BadInput
@@ -226,7 +225,7 @@ def test_the_commands_of_an_audit_make_its_runs(command_line, tmp_path, monkeypa
         ended = command_line("audit", "--commands", "--out", "here", "--seed", 3, *more)
         assert ended.code == 0
         lines = ended.out.splitlines()
-        runs = audit_runs.needed(ledger.entries(), size)
+        runs = audit_runs.needed(all_claims(), size)
         assert {run.name for run in runs} == {name for name, run in RUNS.items() if run.n_particles(size)}
         assert len({run_seed(3, run) for run in runs}) == len(lines) == len(runs)
         for line, run in zip(lines, runs, strict=True):

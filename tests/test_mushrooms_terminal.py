@@ -65,7 +65,7 @@ def test_every_command_is_found_and_has_its_example(command_line, name):
         ["draw", "moving-cap", "--out="],
         ["simulate", "moving-cap", "--particles", "5", "--energy", "1", "--out", " "],
         ["audit", "--out", ""],
-        ["bench", "--compare", ""],
+        ["bench", "--table", ""],
         ["export", "", "--to", "a.csv"],
         ["draw", " "],
     ],

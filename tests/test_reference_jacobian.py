@@ -21,7 +21,7 @@ from conformance.grading.agreement import compare, exact
 from conformance.grading.error import condition_number, inputs_of, moved
 from conformance.strategies import scenes_and_states
 from conformance.vectors import NUMBERS, Expectation, certified
-from scene import Cap, Fourier, State, load
+from scene import BangBang, Cap, Fourier, Mushroom, State, load
 from scene.laws import value
 
 INPUTS = ("t", "x", "y", "vx", "vy")
@@ -203,3 +203,37 @@ def test_condition_number_of_a_head_on_hit():
     state = State(0.0, 0.0, 0.0, 0.0, 2.0)
     flight = flight_of(ask(Cap(r=1.0), state, 10.0), state, 10.0)
     assert condition_number(flight.centre(), flight.jacobian, inputs_of(state)) == 1.0
+
+
+@pytest.mark.parametrize("time", [1.0, 0.5], ids=["at a knot", "in the middle of a leg"])
+def test_at_a_knot_the_sensitivity_is_that_of_the_steeper_side(time):
+    """Starts that differ by single roundings meet the wall on either side of a jump of its acceleration."""
+    law = BangBang(((0.0, 1.0), (1.0, 0.6), (1.5, 0.85), (4.0, 1.0)))
+    begin, v = time - 0.75, 0.9
+    x = v * (time - begin) - float(value(fp, law, time))
+    starts = [State(begin + k * math.ulp(begin), x, -0.5, -v, 0.01) for k in range(-3, 4)]
+    found = [proved_step(Mushroom(r=2.0, h=2.0, w=law, slope=0.0), s, 10.0).steps[0] for s in starts]
+    times = [Fraction(s.t) + step.centre("dt") for s, step in zip(starts, found, strict=True)]
+    assert {step.wall for step in found} == {"left"}
+    assert min(times) < time < max(times)
+    steepness = [step.allowance[3] for step in found]
+    assert min(steepness) > 0.999 * max(steepness)
+
+
+def test_a_hit_just_before_a_knot_is_not_held_to_the_leg_before_alone():
+    """Rounding moves the hit by 6e-17 over a knot beyond which the mouth accelerates 40 times as much."""
+    knots = (
+        (-0.7119462478359613, 0.49512399995280476),
+        (-0.5866977437708769, 0.43470125731491827),
+        (-0.21194624783596128, 0.43722517904960634),
+        (1.2880537521640387, 0.49512399995280476),
+    )
+    table = Mushroom(r=1.9961775733737999, h=0.3929973578450618, w=BangBang(knots), slope=0.02106190796508007)
+    place, velocity = (
+        (-0.23916496289503963, 0.12367447731517013),
+        (-0.8384924649634439, -1.7491212604217496),
+    )
+    state = State(-1.007335620199992, *place, *velocity)
+    found = compare(fast.next_collision(table, state, 10.0), proved_step(table, state, 10.0), state)
+    assert found.kind == "agrees"
+    assert found.ulps < 4

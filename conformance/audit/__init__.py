@@ -1,5 +1,5 @@
 """The audit: claims of the paper as data, checked against theory and simulation, a verdict on each.
 
-`ledger.toml` holds the claims and `ledger` reads it; `claims/` checks them, a file for each group; `runs`
-says what is simulated and `samples` simulates it; `session` conducts an audit.
+`claims.toml` holds the claims and `claims/` checks them, a file for each group; `claim` has the forms of a
+claim, its evidence and its checks; `runs` says what is simulated; `session` conducts an audit.
 """

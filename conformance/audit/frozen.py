@@ -191,11 +191,12 @@ def _row(scene: Mushroom, t: float, n: float, random: np.random.Generator) -> li
 def main() -> None:
     """Measure the rates of the audit's cycles and write theory's table."""
     table: dict[str, Any] = {}
+    short = np.vectorize(lambda number: float(f"{number:.{DIGITS}g}"))
     for name in MEASURED:
         scene = scene_named(name)
         assert isinstance(scene, Mushroom)
         rates = measured(scene)
-        kept = {key: np.vectorize(_rounded)(column).tolist() for key, column in rates._asdict().items()}
+        kept = {key: short(column).tolist() for key, column in rates._asdict().items()}
         table[name] = {"scene": scenes.to_data(scene), **kept}
         print(f"{name}: measured at {len(PHASES)} phases", flush=True)
     text = {
@@ -205,10 +206,6 @@ def main() -> None:
         "scenes": table,
     }
     write_file(FILE, json.dumps(text, indent=1))
-
-
-def _rounded(number: float) -> float:
-    return float(f"{number:.{DIGITS}g}")
 
 
 if __name__ == "__main__":

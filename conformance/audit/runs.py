@@ -1,4 +1,4 @@
-"""The simulations that the audit rests on: which scene, at which energy, how many particles.
+"""The simulations that the audit rests on: scene, energy and number of particles, and what they did.
 
 A run has a seed of its own, derived from the audit's seed and the run's name, and its particles are those
 that this seed numbers. So a quick audit follows the first particles of a full one, and a run comes to the
@@ -8,11 +8,24 @@ same bits whether it is followed at once, in parts or on another machine.
 from __future__ import annotations
 
 import hashlib
-from typing import Literal, NamedTuple
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Literal, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
 
 import scene as scenes
 from scene.tables import Mushroom, Scene
 
+if TYPE_CHECKING:
+    from fast import Ensemble
+
+FloatArray = npt.NDArray[np.float64]
+BoolArray = npt.NDArray[np.bool_]
+Simulate = Callable[..., "Ensemble"]
+Progress = Callable[[str, int, int], None]  # run, particles done, particles in all
+
+MAX_LOST = 1e-3  # a larger unfollowed share could hide a bias as large as the errors themselves
 Size = Literal["quick", "full"]
 EIGHTHS = tuple(k / 8 for k in range(1, 8))
 SIXTEENTHS = tuple(k / 16 for k in range(1, 16))
@@ -47,15 +60,10 @@ class Simulation(NamedTuple):
         return self.quick if size == "quick" else self.full
 
 
-def _fixed_cap(period: float, w: str, h: str, name: str) -> Mushroom:
-    """Return a cap at rest over a stem that goes through knots `time:value`, as in sec. 4.1."""
-    half_width, depth = (_through(period, knots) for knots in (w, h))
+def _fixed_cap(period: float, w: dict[float, float], h: dict[float, float], name: str) -> Mushroom:
+    """Return a cap at rest over a stem that goes through values by time, as in sec. 4.1."""
+    half_width, depth = (scenes.BangBang((*knots.items(), (period, knots[0]))) for knots in (w, h))
     return Mushroom(r=1.0, h=depth, w=half_width, slope=0.04016414896719182, name=name)
-
-
-def _through(period: float, text: str) -> scenes.BangBang:
-    knots = [(float(time), float(value)) for time, value in (knot.split(":") for knot in text.split())]
-    return scenes.BangBang((*knots, (period, knots[0][1])))
 
 
 # Scenes that are no part of the catalogue.
@@ -66,13 +74,16 @@ SCENES: dict[str, Scene] = {
         Mushroom(r=1.0, h=1.0, nu=scenes.Fourier(0.6, 1.0, (0.4,)), slope=0.1111, name="only-mouth"),
         # The loop of fixed-cap-anticlockwise, its legs not as long as one another (C3).
         _fixed_cap(
-            1.0, "0:1 0.15:0.3 0.55:0.3 0.75:1", "0:6 0.15:6 0.55:2 0.75:2", name="fixed-cap-other-legs"
+            1.0,
+            {0: 1, 0.15: 0.3, 0.55: 0.3, 0.75: 1},
+            {0: 6, 0.15: 6, 0.55: 2, 0.75: 2},
+            name="fixed-cap-other-legs",
         ),
         # Two turns, each on another loop in another time: shapes return only more or less (C10).
         _fixed_cap(
             2.0,
-            "0:1 0.3125:0.3 0.5:0.3 0.6875:0.98 0.9375:0.98 1.25:0.25 1.59375:0.25 1.8125:1",
-            "0:6 0.3125:6 0.5:2 0.6875:2 0.9375:5.5 1.25:5.5 1.59375:1.9 1.8125:1.9",
+            {0: 1, 0.3125: 0.3, 0.5: 0.3, 0.6875: 0.98, 0.9375: 0.98, 1.25: 0.25, 1.59375: 0.25, 1.8125: 1},
+            {0: 6, 0.3125: 6, 0.5: 2, 0.6875: 2, 0.9375: 5.5, 1.25: 5.5, 1.59375: 1.9, 1.8125: 1.9},
             name="fixed-cap-irregular",
         ),
     )
@@ -134,5 +145,144 @@ def scene_named(name: str) -> Scene:
 
 def run_seed(seed: int, run: Simulation, *numbers: int) -> int:
     """Return the seed of a run's particles, 64 bits; with numbers, of what else is drawn for it."""
-    text = " ".join(map(str, (seed, run.name, *numbers)))
-    return int.from_bytes(hashlib.sha256(text.encode()).digest()[:8], "big")
+    return int.from_bytes(
+        hashlib.sha256(" ".join(map(str, (seed, run.name, *numbers))).encode()).digest()[:8], "big"
+    )
+
+
+class Sample(NamedTuple):
+    """The n particles of a run that were followed to the end, over K cycles, at P phases.
+
+    Attributes:
+        run: what was asked for.
+        s: (n, K) log E / E0 at the end of each cycle.
+        t_in, t_out: (n, K, M) captured stay around each narrowing of the mouth; nan for none.
+        takes_part: (n,) who is not in the island all the time.
+        phase_s: (n, K, P) log E / E0 at the phases.
+        phase_captured: (n, K, P) whether in the island there.
+        stem_hits: (n,) collisions with left, right and floor.
+        n_particles: particles started.
+        n_undecided, n_undefined: of those not followed.
+        n_collisions, n_careful: in all.
+        seconds: kernel time x threads [s].
+        sha256: of the ensemble, as `fast.Ensemble` has it.
+    """
+
+    run: Simulation
+    s: FloatArray
+    t_in: FloatArray
+    t_out: FloatArray
+    takes_part: BoolArray
+    phase_s: FloatArray
+    phase_captured: BoolArray
+    stem_hits: npt.NDArray[np.int64]
+    n_particles: int
+    n_undecided: int
+    n_undefined: int
+    n_collisions: int
+    n_careful: int
+    seconds: float
+    sha256: str
+
+    @property
+    def n(self) -> int:
+        """Return how many were followed to the end."""
+        return len(self.s)
+
+    @property
+    def is_whole(self) -> bool:
+        """Tell whether the unfollowed share is too small to matter."""
+        return self.n > (1 - MAX_LOST) * self.n_particles
+
+    @property
+    def gain(self) -> FloatArray:
+        """Return log E1 / E0 of the first cycle."""
+        return self.s[:, 0]
+
+    @property
+    def captured(self) -> BoolArray:
+        """Return who was captured in the first cycle."""
+        return np.asarray(np.isfinite(self.t_in[:, 0]).any(axis=1))
+
+    @property
+    def never_captured(self) -> BoolArray:
+        """Return, for each who takes part, whether the first cycle passes uncaptured; p_nc is the share."""
+        return np.asarray(~self.captured[self.takes_part])
+
+    @property
+    def first_stay(self) -> tuple[FloatArray, FloatArray]:
+        """Return begin and end (n,) of each one's first captured stay in the first cycle; nan for none."""
+        begin, end = (np.fmin.reduce(t[:, 0], axis=1, initial=np.nan) for t in (self.t_in, self.t_out))
+        return begin, end
+
+    def change(self, which: BoolArray, first: int, last: int) -> FloatArray:
+        """Return the change of log E of some particles from one of the run's phases to another."""
+        return np.asarray(self.phase_s[which, 0, last] - self.phase_s[which, 0, first])
+
+    @property
+    def speed(self) -> float:
+        """Return the initial speed."""
+        return float(np.sqrt(2 * self.run.energy))
+
+
+def draw(
+    simulate: Simulate,
+    run: Simulation,
+    *,
+    size: Size,
+    seed: int,
+    threads: int | None = None,
+    progress: Progress | None = None,
+) -> Sample:
+    """Follow a run's particles.
+
+    Args:
+        simulate: `fast.simulate`, or another with its signature; it may know the particles from before.
+        run: what to simulate.
+        size: quick or full.
+        seed: the audit's.
+        threads: for the stepper; all by default.
+        progress: told of the particles done, again and again.
+    """
+    n_particles = run.n_particles(size)
+
+    def tell(n_done: int) -> None:
+        if progress:
+            progress(run.name, n_done, n_particles)
+
+    ensemble = simulate(
+        scene_of(run),
+        n_particles=n_particles,
+        energy=run.energy,
+        n_cycles=run.n_cycles,
+        seed=run_seed(seed, run),
+        threads=threads,
+        phases=run.phases,
+        progress=tell,
+    )
+    return reduced(run, ensemble)
+
+
+def reduced(run: Simulation, ensemble: Ensemble) -> Sample:
+    """Return what the audit keeps of an ensemble, particles not followed left out."""
+    energies = ensemble.cycle_energies
+    followed = (ensemble.outcome == 0) & np.all(np.isfinite(energies) & (energies > 0), axis=1)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        s, phase_s = np.log(energies / ensemble.energy0), np.log(ensemble.phase_energies / ensemble.energy0)
+    return Sample(
+        run=run,
+        s=s[followed],
+        t_in=ensemble.t_in[followed],
+        t_out=ensemble.t_out[followed],
+        takes_part=ensemble.takes_part()[followed],
+        phase_s=phase_s[followed],
+        phase_captured=ensemble.phase_captured[followed],
+        stem_hits=ensemble.wall_counts[followed, 2:].sum(axis=1),
+        n_particles=len(followed),
+        n_undecided=int(np.sum(ensemble.outcome == 1)),
+        n_undefined=int(np.sum(ensemble.outcome == 2)),
+        n_collisions=int(np.sum(ensemble.n_collisions)),
+        n_careful=int(np.sum(ensemble.n_careful)),
+        seconds=ensemble.seconds * ensemble.threads,
+        sha256=ensemble.sha256(),
+    )

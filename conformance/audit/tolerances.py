@@ -18,9 +18,9 @@ from typing import Any, NamedTuple
 import mpmath
 import numpy as np
 import numpy.typing as npt
-from scipy.stats import kstwo, norm
+from scipy.stats import ks_1samp, kstwo, norm
 
-from conformance.audit.finding import Check, Form
+from conformance.audit.claim import Check, Form
 
 FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]
@@ -42,6 +42,10 @@ class Mean(NamedTuple):
     def less(self, amount: float) -> Mean:
         """Return the value less a known amount."""
         return Mean(self.value - amount, self.error)
+
+    def root(self) -> Mean:
+        """Return the square root, its error to first order."""
+        return Mean(self.value**0.5, self.error / (2 * self.value**0.5))
 
     def over(self, other: Mean) -> Mean:
         """Return the ratio to an independent value, its error to first order."""
@@ -165,15 +169,6 @@ def stated(what: str, holds: bool, found: str, expected: str, *, form: Form = "c
     return Check(what, bool(holds), expected, form=form, note=found)
 
 
-def largest_gap(values: FloatArray, cdf: Cdf) -> float:
-    """Return Kolmogorov's distance of a sample from a distribution function."""
-    x = np.sort(values)
-    n = len(x)
-    below = cdf(x)
-    rank = np.arange(n + 1) / n
-    return float(max(np.max(rank[1:] - below), np.max(below - rank[:-1])))
-
-
 def critical_gap(n: int) -> float:
     """Return the distance that n values of the right distribution exceed with probability LEVEL."""
     return float(kstwo.isf(LEVEL, n))
@@ -181,7 +176,7 @@ def critical_gap(n: int) -> float:
 
 def chance(values: FloatArray, cdf: Cdf) -> float:
     """Return Kolmogorov's p: how likely so large a distance is if the law is right."""
-    return float(kstwo.sf(largest_gap(values, cdf), len(values)))
+    return float(ks_1samp(values, cdf, method="exact").pvalue)
 
 
 def fits(
@@ -208,10 +203,10 @@ def fits(
     n = len(values)
     if n < 2:
         return Check(what, None, "a sample", n_tests=1, note="no particles")
-    gap, reach = largest_gap(values, cdf), critical_gap(n) + band
+    (gap, p), reach = ks_1samp(values, cdf, method="exact"), critical_gap(n) + band
     holds = None if reach >= scale else bool(gap <= reach)
     more = f"; {note}" if note else ""
-    text = f"Kolmogorov's distance, n = {n}, p = {chance(values, cdf):.2g} without a band{more}"
+    text = f"Kolmogorov's distance, n = {n}, p = {p:.2g} without a band{more}"
     name, other = against or ("", None)
     return Check(
         what,

@@ -1,8 +1,12 @@
-"""Baselines: what most people would write, as contenders.
+"""Baselines: what most people would write, as solvers.
 
 Event-driven, with Newton's method for each wall and no checks: in C and in scalar numba. By fixed time steps,
 in C: move by dt, and where the new place is outside put it back on the wall and reflect. All answer many
 questions in one call and are timed as the lanes are, on flights that go on from a workload's questions.
+
+`python -m conformance.bench.baselines NAME` puts one behind protocol 1, to be graded like any other.
+Baselines refuse nothing but what the protocol's decoder refuses: what their own code makes of a state is what
+the suite shall see. Flow is their steps, one after the other.
 
 Every law is a row of LAW_LENGTH numbers: kind, n, mean, omega, then pairs: amplitudes (cos, sin) of
 k = 1, 2, ... n, or n knots (time, value). A state is t, x, y, vx, vy, the wall being left.
@@ -11,6 +15,8 @@ k = 1, 2, ... n, or n knots (time, value). A state is t, x, y, vx, vy, the wall 
 from __future__ import annotations
 
 import ctypes
+import sys
+import tempfile
 import time
 from collections.abc import Callable, Sequence
 from functools import partial
@@ -22,15 +28,30 @@ import numpy as np
 import numpy.typing as npt
 from mpmath import fp
 
-from conformance import plain, vectors
-from conformance.bench import codes
-from conformance.bench.contenders import Ask, Contender, Family, Given, Lap
+from conformance import plain
+from conformance.bench import numba_stepper as numba
+from conformance.bench.solvers import Family, Given, Solver, SolverRun
+from conformance.bench.time_stepping import TOLERANCES, next_collision_by
 from conformance.bench.workloads import SINGLE_STEPS, WINDOW, Workload
 from conformance.harness import examples
 from conformance.suite.process import Trouble
-from scene import BangBang, Cap, Collision, Fourier, Horizon, Law, Mushroom, Outcome, Scene, State, Stem
+from scene import (
+    BadInput,
+    BangBang,
+    Cap,
+    Collision,
+    Fourier,
+    Horizon,
+    Law,
+    Mushroom,
+    Outcome,
+    Scene,
+    State,
+    Stem,
+)
 from scene.geometry import rounded
 from scene.laws import frequency
+from scene.protocol.wire import serve
 from scene.states import Stepper
 from scene.tables import laws, width_factors
 
@@ -39,6 +60,7 @@ SOURCE = Path(__file__).parent / "baselines.c"
 PARTS = (10, 100, 1000)  # time steps in a flight
 WALLS = Mushroom.walls
 LAW_LENGTH, PAIRS = 516, 4
+FLAGS = ("-O3", "-march=native")  # for the C compiler
 MOST = 10 * int(WINDOW)  # collisions of a particle: one that hops along the arc would never end
 
 
@@ -105,17 +127,16 @@ def c_engine(library: Path, parts: int = 0) -> Engine:
 
 def numba_engine() -> Engine:
     """Return the event-driven stepper in numba; the seconds contain the call, not the compilation."""
-    from conformance.bench import numba_stepper  # numba takes half a second to load
 
     def hits(q: Questions) -> FloatArray:
         found = np.empty((len(q.states), 7))
-        numba_stepper.next_hits(q.laws, q.table, q.states, found)
+        numba.next_hits(q.laws, q.table, q.states, found)
         return found
 
     def follow(q: Questions, t_end: float, most: int, n_times: int) -> tuple[int, float]:
-        numba_stepper.follow(q.laws, q.table, q.states[:0], t_end, most, n_times)
+        numba.follow(q.laws, q.table, q.states[:0], t_end, most, n_times)
         begin = time.perf_counter()
-        n_hits = numba_stepper.follow(q.laws, q.table, q.states, t_end, most, n_times)
+        n_hits = numba.follow(q.laws, q.table, q.states, t_end, most, n_times)
         return n_hits, time.perf_counter() - begin
 
     return Engine(hits, follow)
@@ -141,30 +162,23 @@ def build(folder: Path, flags: Sequence[str]) -> tuple[Path, str]:
     return library, built.built
 
 
-def in_c(library: Path) -> list[Contender]:
-    """Return the contenders that the compiled C file holds."""
-    found = [_contender("lean C", "lean", c_engine(library))]
-    for parts in PARTS:
-        engine = c_engine(library, parts)
-        found.append(_contender(f"steps, flight/{parts}", "fixed-step", engine, 10 * WINDOW / parts))
-    return found
+def in_c(library: Path) -> list[Solver]:
+    """Return the solvers that the compiled C file holds."""
+    return [
+        _solver("lean C", "lean", c_engine(library)),
+        *(_solver(f"steps, flight/{n}", "fixed-step", c_engine(library, n), 10 * WINDOW / n) for n in PARTS),
+    ]
 
 
-def in_numba() -> Contender:
+def in_numba() -> Solver:
     """Return the scalar stepper in numba."""
-    return _contender("lean numba", "lean", numba_engine())
+    return _solver("lean numba", "lean", numba_engine())
 
 
-def asker(contender: Contender) -> Ask:
-    """Return how a baseline answers a vector, for the hard cases."""
-    step = stepper(contender)
-    return partial(vectors.answer, step=step, follow=partial(plain.trajectory, step=step))
-
-
-def stepper(contender: Contender) -> Stepper:
+def stepper(solver: Solver) -> Stepper:
     """Return a baseline as a stepper of one state, taken as it is; t_end alone ends a flight."""
-    assert contender.steps is not None
-    steps = contender.steps
+    assert solver.steps is not None
+    steps = solver.steps
 
     def step(scene: Scene, state: State, t_end: float) -> Outcome:
         (met,) = steps(scene, [state])
@@ -176,11 +190,11 @@ def stepper(contender: Contender) -> Stepper:
     return step
 
 
-def _contender(name: str, family: Family, engine: Engine, flights: float = WINDOW) -> Contender:
+def _solver(name: str, family: Family, engine: Engine, flights: float = WINDOW) -> Solver:
     def steps(scene: Scene, states: Sequence[State]) -> list[Given]:
         return [_outcome(row) for row in engine.hits(questions(scene, states)).tolist()]
 
-    def run(workload: Workload, n_times: int) -> Lap:
+    def run(workload: Workload, n_times: int) -> SolverRun:
         states = [q.state for q in workload.questions]
         followed, t_end, most = states, workload.end(flights), MOST
         if workload.length:
@@ -188,15 +202,15 @@ def _contender(name: str, family: Family, engine: Engine, flights: float = WINDO
         n_hits, seconds = engine.follow(questions(workload.scene, followed), t_end, most, n_times)
         if not n_hits:
             raise Trouble("fail", "it meets no wall")
-        return Lap(seconds / n_hits * 1e9, steps(workload.scene, states), seconds * 1e9)
+        return SolverRun(seconds / n_hits * 1e9, steps(workload.scene, states), seconds * 1e9)
 
     serves = SINGLE_STEPS if family == "fixed-step" else (*SINGLE_STEPS, "one-path")
-    return Contender(name, family, run, serves, steps)
+    return Solver(name, family, run, serves, steps)
 
 
 def _outcome(row: list[float]) -> Given:
     *numbers, wall = row
-    return Horizon(*numbers[1:]) if wall == codes.NONE else Collision(WALLS[int(wall)], *numbers)
+    return Horizon(*numbers[1:]) if wall == numba.NONE else Collision(WALLS[int(wall)], *numbers)
 
 
 def questions(scene: Scene, states: Sequence[State]) -> Questions:
@@ -205,8 +219,8 @@ def questions(scene: Scene, states: Sequence[State]) -> Questions:
     width = (0.0,) if isinstance(scene, Cap) else width_factors(scene)
     rows = [given.get("r", 0.0), width[0], width[1] if len(width) > 1 else 1.0]
     rows += [given.get("h", 0.0), given.get("slope", 0.0)]
-    table = codes.CAP if isinstance(scene, Cap) else codes.STEM if isinstance(scene, Stem) else codes.MUSHROOM
-    starts = [(s.t, s.x, s.y, s.vx, s.vy, WALLS.index(s.wall) if s.wall else codes.NONE) for s in states]
+    table = numba.CAP if isinstance(scene, Cap) else numba.STEM if isinstance(scene, Stem) else numba.MUSHROOM
+    starts = [(s.t, s.x, s.y, s.vx, s.vy, WALLS.index(s.wall) if s.wall else numba.NONE) for s in states]
     length = float(rounded(scene, states[0].t).size)
     return Questions(table, np.array([_row(law) for law in rows]), length, np.array(starts, dtype=float))
 
@@ -214,12 +228,48 @@ def questions(scene: Scene, states: Sequence[State]) -> Questions:
 def _row(law: Law) -> FloatArray:
     row, pairs = np.zeros(LAW_LENGTH), list[tuple[float, float]]()
     if isinstance(law, BangBang):
-        row[0], pairs = codes.BANG_BANG, list(law.knots)
+        row[0], pairs = numba.BANG_BANG, list(law.knots)
     elif isinstance(law, Fourier):
-        row[0], row[2], row[3] = codes.FOURIER, law.mean, float(frequency(fp, law))
+        row[0], row[2], row[3] = numba.FOURIER, law.mean, float(frequency(fp, law))
         pairs = list(zip_longest(law.cos, law.sin, fillvalue=0.0))
     else:
-        row[0], row[2] = codes.CONSTANT, law
+        row[0], row[2] = numba.CONSTANT, law
     row[1] = len(pairs)
     row[PAIRS : PAIRS + 2 * len(pairs)] = np.ravel(pairs)
     return row
+
+
+def _built(name: str) -> Stepper:
+    with tempfile.TemporaryDirectory() as folder:  # the library stays loaded
+        library, _ = build(Path(folder), FLAGS)
+        return stepper(next(one for one in in_c(library) if one.name == name))
+
+
+NAMES: dict[str, Callable[[], Stepper]] = {
+    "lean-c": partial(_built, "lean C"),
+    "lean-numba": lambda: stepper(in_numba()),
+    **{f"steps-{parts}": partial(_built, f"steps, flight/{parts}") for parts in PARTS},
+    **{f"solve-ivp-{rtol:.0e}": partial(next_collision_by, rtol) for rtol in TOLERANCES},
+}
+
+
+def main(arguments: Sequence[str]) -> None:
+    """Speak protocol 1 as the baseline of that name.
+
+    Raises:
+        BadInput: there is no such baseline.
+        Trouble: it cannot be built here.
+    """
+    name = arguments[0] if len(arguments) == 1 else ""
+    if name not in NAMES:
+        raise BadInput(f"NAME = {name!r}, must be one of {', '.join(NAMES)}")
+    step = NAMES[name]()
+    follow, carry = partial(plain.trajectory, step=step), partial(plain.flow, step=step)
+    serve(name, step, follow, sys.stdin.buffer, sys.stdout.buffer, flow=carry)
+
+
+if __name__ == "__main__":
+    try:
+        main(sys.argv[1:])
+    except BadInput as error:
+        sys.exit(f"conformance.bench.baselines: {error}")

@@ -69,13 +69,15 @@ def grow(
     bounds, growths = [], []
     for question in workload.questions:
         truth = prove_path(workload.scene, question.state, n_collisions)
-        size, speed = _sizes(workload.scene, question.state)
+        size = rounded(workload.scene, question.state.t).r
+        speed = math.hypot(question.state.vx, question.state.vy)
         for name, follow in followers.items():
             errors[name].append(_errors(follow(workload.scene, question.state, n_collisions), truth, size))
         bound, growth = _chained(workload.scene, question.state, n_collisions, linearise, size, speed)
         bounds.append(bound)
         growths.append(growth)
         tick("")
+    count = np.arange(1, n_collisions + 1)
     return Growth(
         scene=rule.scene,
         energy=ENERGY,
@@ -84,12 +86,8 @@ def grow(
         followers={name: _rounded(np.median(found, axis=0)) for name, found in errors.items()},
         lasts={name: float(np.median([_last(path) for path in found])) for name, found in errors.items()},
         bound=_rounded(np.median(bounds, axis=0)),
-        rate=round(_slope(np.median(np.log10(growths), axis=0)), 4),
+        rate=round(float(np.polyfit(count, np.median(np.log10(growths), axis=0), 1)[0]), 4),
     )
-
-
-def _sizes(scene: Scene, state: State) -> tuple[float, float]:
-    return rounded(scene, state.t).r, math.hypot(state.vx, state.vy)
 
 
 def _errors(path: Sequence[PathPoint], truth: Sequence[PathPoint], size: float) -> FloatArray:
@@ -135,11 +133,6 @@ def _chained(
         bounds.append(float(np.max((total / scales)[1:])))
         growths.append(float(np.linalg.norm(product * scales[None, :] / scales[:, None], 2)))
     return np.minimum(bounds, 1.0), np.array(growths)
-
-
-def _slope(logs: FloatArray) -> float:
-    """Return the slope of logarithms against the number of collisions."""
-    return float(np.polyfit(np.arange(1, len(logs) + 1), logs, 1)[0])
 
 
 def _rounded(numbers: FloatArray) -> tuple[float, ...]:

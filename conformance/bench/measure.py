@@ -1,25 +1,22 @@
-"""Speed and error from the same laps: contenders take turns on a workload, and their answers are graded.
+"""Speed and error from the same runs: solvers take turns on a workload, and their answers are graded.
 
-A contender whose answers differ between laps is left out. (The lanes are timed on whole flights, and graded
-on one round from the same states: see `mushrooms.bench_contenders`.)
+A solver whose answers differ between runs is left out. (The lanes are timed on whole flights, and graded
+on one round from the same states: see `mushrooms.bench_solvers`.)
 
-Warm-up first (compilation, caches), which also says how often a lap must take the steps to be long enough
-for the clock. Then all contenders run one lap each, again and again, so that a disturbance of the machine
-meets all of them; ratios are between laps of one run.
+Warm-up first (compilation, caches), which also says how often a run must take the steps to be long enough
+for the clock. Then all solvers take one run each, again and again, so that a disturbance of the machine
+meets all of them; ratios are between runs of one benchmark.
 """
 
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Callable, Sequence
 from fractions import Fraction
 from typing import NamedTuple
 
-import numpy as np
-
-from conformance.bench.contenders import Contender, Given, Lap
 from conformance.bench.record import Point, short
+from conformance.bench.solvers import Given, Solver, SolverRun
 from conformance.bench.workloads import ProvedStep, Workload
 from conformance.grading.agreement import Answer, Enclosed, compare, exact
 from conformance.suite.process import Trouble
@@ -33,9 +30,9 @@ class Effort(NamedTuple):
     """How long to measure.
 
     Attributes:
-        repeats: laps of each contender.
-        least_ns: a lap is to last at least so long.
-        most_ns: laps of a contender that together last longer than this are fewer, MIN_REPEATS at least.
+        repeats: runs of each solver.
+        least_ns: a run is to last at least so long.
+        most_ns: runs of a solver that together last longer than this are fewer, MIN_REPEATS at least.
     """
 
     repeats: int
@@ -45,82 +42,71 @@ class Effort(NamedTuple):
 
 MIN_REPEATS = 3
 MOST = Fraction(10**308)  # of a relative error that is kept
-ONES = np.ones(100_000)
 
 
 def measure(
     workload: Workload,
-    contenders: Sequence[Contender],
+    solvers: Sequence[Solver],
     effort: Effort,
     tick: Callable[[str], None],
-    clock: list[float],
 ) -> tuple[list[Point], dict[str, str]]:
-    """Measure all contenders on a workload.
+    """Measure all solvers on a workload.
 
     Args:
         workload: with proved answers.
-        contenders: those that serve it are run.
+        solvers: those that serve it are run.
         effort: how long.
-        tick: called with a contender's name before its warm-up, and after every round with "".
-        clock: the time of a dependent addition [ns] is appended in every round.
+        tick: called with a solver's name before its warm-up, and after every round with "".
 
     Returns:
-        A point for each contender, and those that failed with their trouble.
+        A point for each solver, and those that failed with their trouble.
     """
-    running: list[tuple[Contender, int, int]] = []
-    laps: dict[str, list[Lap]] = {}
+    running: list[tuple[Solver, int, int]] = []
+    runs: dict[str, list[SolverRun]] = {}
     troubles: dict[str, str] = {}
-    for contender in contenders:
-        if workload.name not in contender.serves:
+    for solver in solvers:
+        if workload.name not in solver.serves:
             continue
-        tick(contender.name)
+        tick(solver.name)
         try:
-            running.append(_warm_up(contender, workload, effort))
+            running.append(_warm_up(solver, workload, effort))
         except Trouble as trouble:
-            troubles[contender.name] = f"{trouble.verdict}: {trouble.why}"
+            troubles[solver.name] = f"{trouble.verdict}: {trouble.why}"
             continue
-        laps[contender.name] = []
+        runs[solver.name] = []
     for number in range(effort.repeats):
-        for contender, n_times, n_laps in running:
-            if number < n_laps and contender.name not in troubles:
+        for solver, n_times, n_runs in running:
+            if number < n_runs and solver.name not in troubles:
                 try:
-                    laps[contender.name].append(contender.run(workload, n_times))
-                    _check_laps(laps[contender.name])
+                    runs[solver.name].append(solver.run(workload, n_times))
+                    _check_runs(runs[solver.name])
                 except Trouble as trouble:
-                    troubles[contender.name] = f"{trouble.verdict}: {trouble.why}"
-        clock.append(short(clock_ns()))
+                    troubles[solver.name] = f"{trouble.verdict}: {trouble.why}"
         tick("")
     points = [
-        _point(workload, contender, n_times, laps[contender.name])
-        for contender, n_times, _ in running
-        if contender.name not in troubles
+        _point(workload, solver, n_times, runs[solver.name])
+        for solver, n_times, _ in running
+        if solver.name not in troubles
     ]
     return points, troubles
 
 
-def _warm_up(contender: Contender, workload: Workload, effort: Effort) -> tuple[Contender, int, int]:
-    """Return how many times a lap is to take the steps, and how many laps there is time for."""
+def _warm_up(solver: Solver, workload: Workload, effort: Effort) -> tuple[Solver, int, int]:
+    """Return how many times a run is to take the steps, and how many runs there is time for."""
     n_times = 1
-    lasted = contender.run(workload, 1).lasted
+    lasted = solver.run(workload, 1).lasted
     while lasted < effort.least_ns and n_times < MAX_TIMES:
         n_times = min(MAX_TIMES, max(2 * n_times, math.ceil(1.2 * n_times * effort.least_ns / (lasted + 1))))
-        lasted = contender.run(workload, n_times).lasted
-    n_laps = min(effort.repeats, max(MIN_REPEATS, int(effort.most_ns / (lasted + 1))))
-    return contender, n_times, n_laps
+        lasted = solver.run(workload, n_times).lasted
+    n_runs = min(effort.repeats, max(MIN_REPEATS, int(effort.most_ns / (lasted + 1))))
+    return solver, n_times, n_runs
 
 
-def _check_laps(laps: Sequence[Lap]) -> None:
-    if not laps[-1].ns:
-        raise Trouble("fail", "a lap is said to last 0 ns in all")
-    if repr(laps[-1].answers) != repr(laps[0].answers):
-        raise Trouble("fail", "its answers differ from lap to lap")
-
-
-def clock_ns() -> float:
-    """Return the time of one addition that waits for the one before: the core's clock at this moment."""
-    begin = time.perf_counter_ns()
-    np.add.accumulate(ONES)
-    return (time.perf_counter_ns() - begin) / len(ONES)
+def _check_runs(runs: Sequence[SolverRun]) -> None:
+    if not runs[-1].ns:
+        raise Trouble("fail", "a run is said to last 0 ns in all")
+    if repr(runs[-1].answers) != repr(runs[0].answers):
+        raise Trouble("fail", "its answers differ from run to run")
 
 
 class _Graded(NamedTuple):
@@ -129,17 +115,17 @@ class _Graded(NamedTuple):
     relative: float = 0.0
 
 
-def _point(workload: Workload, contender: Contender, n_times: int, laps: Sequence[Lap]) -> Point:
-    graded = [_grade(answer, q) for answer, q in zip(laps[-1].answers, workload.questions, strict=True)]
+def _point(workload: Workload, solver: Solver, n_times: int, runs: Sequence[SolverRun]) -> Point:
+    graded = [_grade(answer, q) for answer, q in zip(runs[-1].answers, workload.questions, strict=True)]
     kinds = [g.kind for g in graded]
     right = [g for g in graded if g.kind == "right"]
-    further, astray = _count_walls(workload, contender)
+    further, astray = _count_walls(workload, solver)
     return Point(
         workload=workload.name,
-        contender=contender.name,
-        family=contender.family,
+        solver=solver.name,
+        family=solver.family,
         n_times=n_times,
-        ns=tuple(short(lap.ns) for lap in laps),
+        ns=tuple(short(run.ns) for run in runs),
         right=len(right),
         wrong=kinds.count("wrong"),
         undecided=kinds.count("undecided"),
@@ -151,11 +137,11 @@ def _point(workload: Workload, contender: Contender, n_times: int, laps: Sequenc
     )
 
 
-def _count_walls(workload: Workload, contender: Contender) -> tuple[int, int]:
-    """Return how many of the further steps the contender answers, and how many with a wrong wall."""
-    if contender.steps is None or not workload.further:
+def _count_walls(workload: Workload, solver: Solver) -> tuple[int, int]:
+    """Return how many of the further steps the solver answers, and how many with a wrong wall."""
+    if solver.steps is None or not workload.further:
         return 0, 0
-    given = contender.steps(workload.scene, [step.state for step in workload.further])
+    given = solver.steps(workload.scene, [step.state for step in workload.further])
     pairs = [(a, step.wall) for a, step in zip(given, workload.further, strict=True)]
     answered = [(a, wall) for a, wall in pairs if not isinstance(a, Undecided | None)]
     return len(answered), sum(getattr(a, "wall", None) != wall for a, wall in answered)
@@ -174,7 +160,7 @@ def _grade(given: Given, question: ProvedStep) -> _Graded:
 
 
 def _enclosed(answer: Answer) -> Answer:
-    """Return a collision by the numbers that all contenders have, which leaves out the rounded time t."""
+    """Return a collision by the numbers that all solvers have, which leaves out the rounded time t."""
     if not isinstance(answer, Collision):
         return answer
     numbers = [getattr(answer, name) for name in NUMBERS]

@@ -9,8 +9,12 @@ import math
 
 from numba import njit
 
-from conformance.bench import codes
-
+# Walls, tables, laws, and the rows of the laws, by the numbers that `baselines.c` knows them by; the half
+# width of the mouth is WIDTH times FACTOR.
+ARC, BASE, LEFT, RIGHT, FLOOR, NONE = range(6)
+CAP, STEM, MUSHROOM = range(3)
+CONSTANT, FOURIER, BANG_BANG = range(3)
+R, WIDTH, FACTOR, H, SLOPE = range(5)
 MOST_NEWTON = 30
 
 
@@ -32,9 +36,9 @@ def _bang_bang(law, t):
 
 @njit(error_model="numpy")
 def _at(law, t):
-    if law[0] == codes.CONSTANT:
+    if law[0] == CONSTANT:
         return law[2], 0.0
-    if law[0] == codes.BANG_BANG:
+    if law[0] == BANG_BANG:
         return _bang_bang(law, t)
     value, rate = law[2], 0.0
     for k in range(1, int(law[1]) + 1):
@@ -47,22 +51,22 @@ def _at(law, t):
 
 @njit(error_model="numpy")
 def _mouth(laws, t):
-    width, width_rate = _at(laws[codes.WIDTH], t)
-    factor, factor_rate = _at(laws[codes.FACTOR], t)
+    width, width_rate = _at(laws[WIDTH], t)
+    factor, factor_rate = _at(laws[FACTOR], t)
     return width * factor, width_rate * factor + width * factor_rate
 
 
 @njit(error_model="numpy")
 def _gap(laws, wall, t, x, y, vx, vy):
-    if wall == codes.ARC:
-        r, v = _at(laws[codes.R], t)
+    if wall == ARC:
+        r, v = _at(laws[R], t)
         return r * r - x * x - y * y, 2 * r * v - 2 * (x * vx + y * vy), -2 * x, -2 * y
-    if wall == codes.FLOOR:
-        h, v = _at(laws[codes.H], t)
+    if wall == FLOOR:
+        h, v = _at(laws[H], t)
         return y + h, vy + v, 0.0, 1.0
     w, v = _mouth(laws, t)
-    lean, lean_rate = _at(laws[codes.SLOPE], t)
-    side = 1.0 if wall == codes.LEFT else -1.0
+    lean, lean_rate = _at(laws[SLOPE], t)
+    side = 1.0 if wall == LEFT else -1.0
     return w + lean * y + side * x, v + lean_rate * y + lean * vy + side * vx, side, lean
 
 
@@ -79,16 +83,16 @@ def _newton(laws, wall, t, x, y, vx, vy, s):
 
 @njit(error_model="numpy")
 def _arc_time(laws, t, x, y, vx, vy):
-    r, v = _at(laws[codes.R], t)
+    r, v = _at(laws[R], t)
     square, along = vx * vx + vy * vy - v * v, x * vx + y * vy - r * v
     root = math.sqrt(max(along * along + square * (r * r - x * x - y * y), 0.0))
-    return _newton(laws, codes.ARC, t, x, y, vx, vy, (root - along) / square)
+    return _newton(laws, ARC, t, x, y, vx, vy, (root - along) / square)
 
 
 @njit(error_model="numpy")
 def _stem_time(laws, last, t, x, y, vx, vy):
-    first, soonest = codes.NONE, math.inf
-    for wall in (codes.FLOOR, codes.LEFT, codes.RIGHT):
+    first, soonest = NONE, math.inf
+    for wall in (FLOOR, LEFT, RIGHT):
         inside, rate, _, _ = _gap(laws, wall, t, x, y, vx, vy)
         if wall != last and rate < 0:
             s = _newton(laws, wall, t, x, y, vx, vy, -inside / rate)
@@ -99,28 +103,28 @@ def _stem_time(laws, last, t, x, y, vx, vy):
 
 @njit(error_model="numpy")
 def _next_hit(laws, table, t, x, y, vx, vy, last):
-    is_in_cap = table == codes.CAP
-    if table == codes.MUSHROOM:
-        is_in_cap = last in (codes.ARC, codes.BASE) or (last == codes.NONE and (y > 0 or (y == 0 and vy > 0)))
+    is_in_cap = table == CAP
+    if table == MUSHROOM:
+        is_in_cap = last in (ARC, BASE) or (last == NONE and (y > 0 or (y == 0 and vy > 0)))
     dt = 0.0
     while True:
         if vy < 0 if is_in_cap else vy > 0:
             s = -y / vy
             there = abs(x + s * vx)
-            is_open = table != codes.CAP and there < _mouth(laws, t + s)[0]
-            if is_open or (is_in_cap and there < _at(laws[codes.R], t + s)[0]):
+            is_open = table != CAP and there < _mouth(laws, t + s)[0]
+            if is_open or (is_in_cap and there < _at(laws[R], t + s)[0]):
                 dt, t, x, y = dt + s, t + s, x + s * vx, 0.0
-                if table == codes.MUSHROOM and is_open:
+                if table == MUSHROOM and is_open:
                     is_in_cap = not is_in_cap
                     continue
-                return dt, t, x, y, vx, -vy, float(codes.BASE)
-        first, s = codes.ARC, 0.0
+                return dt, t, x, y, vx, -vy, float(BASE)
+        first, s = ARC, 0.0
         if is_in_cap:
             s = _arc_time(laws, t, x, y, vx, vy)
         else:
             first, s = _stem_time(laws, last, t, x, y, vx, vy)
         if s == math.inf:
-            return math.inf, t, x, y, vx, vy, float(codes.NONE)
+            return math.inf, t, x, y, vx, vy, float(NONE)
         dt, t, x, y = dt + s, t + s, x + s * vx, y + s * vy
         _, rate, gx, gy = _gap(laws, first, t, x, y, vx, vy)
         push = 2 * rate / (gx * gx + gy * gy)
@@ -147,7 +151,7 @@ def follow(laws, table, states, t_end, most, n_times):
                 if t >= t_end:
                     break
                 _, t, x, y, vx, vy, last = _next_hit(laws, table, t, x, y, vx, vy, last)
-                if last == codes.NONE:
+                if last == NONE:
                     break
                 n_hits += 1
     return n_hits

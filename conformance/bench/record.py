@@ -18,8 +18,7 @@ import numpy as np
 
 from scene.refusal import BadInput
 
-FORMAT = 2
-# Quotients of such times, and quotients of those, are numbers too, neither 0 nor infinite.
+FORMAT = 3
 Time = Annotated[float, msgspec.Meta(ge=1e-50, le=1e50)]
 Count = Annotated[int, msgspec.Meta(ge=0)]
 Error = Annotated[float, msgspec.Meta(ge=0)]
@@ -50,12 +49,12 @@ class Drawn(msgspec.Struct, frozen=True):
 
 
 class Point(msgspec.Struct, frozen=True):
-    """A contender on a workload.
+    """A solver on a workload.
 
     Attributes:
-        workload, contender, family: names.
-        n_times: how often a timed lap took all steps.
-        ns: nanoseconds per step of each lap.
+        workload, solver, family: names.
+        n_times: how often a timed run took all steps.
+        ns: nanoseconds per step of each run.
         right, wrong, undecided, left: numbers of answers: the right wall; another wall or outcome; left
             open; left to another stepper.
         further, astray: how many of the workload's further steps it answered, and how many of them with
@@ -65,7 +64,7 @@ class Point(msgspec.Struct, frozen=True):
     """
 
     workload: str
-    contender: str
+    solver: str
     family: str
     n_times: Count
     ns: Times
@@ -100,45 +99,6 @@ class Growth(msgspec.Struct, frozen=True):
     rate: float
 
 
-class CostSeries(msgspec.Struct, frozen=True):
-    """Cost against one size.
-
-    Attributes:
-        what: particles, cycles, energy or threads.
-        sizes: its values.
-        seconds: median kernel time of each.
-        collisions: followed by each.
-        exponent, error: of the fit seconds ~ size^exponent over the larger half, and its standard error; null
-            where there are too few sizes.
-    """
-
-    what: str
-    sizes: tuple[float, ...]
-    seconds: tuple[float, ...]
-    collisions: tuple[float, ...]
-    exponent: float | None
-    error: float | None
-
-
-class EnsembleWork(msgspec.Struct, frozen=True):
-    """What an ensemble costs; `compile_s` by entry with an empty cache, empty when not measured."""
-
-    scene: str
-    series: tuple[CostSeries, ...]
-    bytes_per_particle: float
-    compile_s: dict[str, float]
-
-
-class Case(msgspec.Struct, frozen=True):
-    """A hard case by stepper: number of vectors by verdict, worst backward ulps (null: none, or infinite)."""
-
-    case: str
-    rule: str
-    vectors: int
-    verdicts: dict[str, dict[str, int]]
-    ulps: dict[str, float | None]
-
-
 class Record(msgspec.Struct, frozen=True):
     """A whole benchmark.
 
@@ -147,10 +107,9 @@ class Record(msgspec.Struct, frozen=True):
         size, seed, questions, repeats: the settings.
         digits: of the proved answers.
         machine: where it ran.
-        clock_ns: time of one dependent addition in each round of laps: the speed of the machine's core.
         workloads, points: what was asked and found.
-        not_run: contenders left out, with the reason.
-        growth, work, hard_cases: the further measurements.
+        not_run: solvers left out, with the reason.
+        growth: of errors along trajectories.
         seconds: wall time of all.
     """
 
@@ -161,18 +120,15 @@ class Record(msgspec.Struct, frozen=True):
     repeats: int
     digits: int
     machine: Machine
-    clock_ns: Times
     workloads: tuple[Drawn, ...]
     points: tuple[Point, ...]
     not_run: dict[str, str]
     growth: Growth
-    work: EnsembleWork
-    hard_cases: tuple[Case, ...]
     seconds: float
 
 
 def quartiles(ns: Sequence[float]) -> tuple[float, float, float]:
-    """Return the first quartile, the median and the third quartile of a point's laps."""
+    """Return the first quartile, the median and the third quartile of a point's runs."""
     first, middle, third = np.quantile(ns, (0.25, 0.5, 0.75)).tolist()
     return first, middle, third
 
@@ -224,10 +180,10 @@ def read(path: Path) -> Record:
         raise BadInput(f"{path}: format = {record.format}, must be {FORMAT}")
     names, seen = {drawn.name for drawn in record.workloads}, set[tuple[str, str]]()
     for p in record.points:
-        if p.workload not in names or (p.workload, p.contender) in seen:
+        if p.workload not in names or (p.workload, p.solver) in seen:
             why = "twice" if p.workload in names else "of a workload that it does not name"
-            raise BadInput(f"{path} is no bench.json: a point of {p.contender!r} on {p.workload!r} is {why}")
-        seen.add((p.workload, p.contender))
+            raise BadInput(f"{path} is no bench.json: a point of {p.solver!r} on {p.workload!r} is {why}")
+        seen.add((p.workload, p.solver))
     return record
 
 

@@ -9,12 +9,11 @@ from __future__ import annotations
 import sys
 import tempfile
 from collections import Counter
-from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
 from conformance import suite
-from conformance.bench.serve import NAMES
+from conformance.bench.baselines import NAMES
 from conformance.harness.examples import find_examples, find_kit_examples
 from conformance.suite.result import Run
 from conformance.suite.session import Limits
@@ -37,7 +36,7 @@ HEAD = """# Scoreboard
 Level core of corpus {corpus}, seed {seed}: `python -m conformance.bench.scoreboard` makes this page
 anew. The first two are ours; the examples and the engines behind the adapter kits are in
 `conformance/harness/`; the rest is what most people would write, from the benchmark (`python -m
-conformance.bench.serve NAME` puts each behind the protocol): event-driven Newton without checks in
+conformance.bench.baselines NAME` puts each behind the protocol): event-driven Newton without checks in
 C and numba, fixed time steps of a tenth to a thousandth of a flight, scipy's `solve_ivp` with
 events. A precision class is of the answers that passed, few as they may be.
 
@@ -54,16 +53,17 @@ class Graded(NamedTuple):
     why_not: str = ""
 
 
-def commands(folder: Path) -> Iterator[tuple[str, tuple[str, ...], str]]:
-    """Yield name, command and, where there is none here, the reason."""
-    for name, module in OURS.items():
-        yield name, (sys.executable, "-m", module), ""
-    for language, example in find_examples(folder).items():
-        yield f"example in {language}", example.command, example.why_not
-    for engine, example in find_kit_examples(folder).items():
-        yield f"kit, {engine}", example.command, example.why_not
-    for name in (name for name in NAMES if name not in LEFT_OUT):
-        yield name, (sys.executable, "-m", "conformance.bench.serve", name), ""
+def commands(folder: Path) -> list[tuple[str, tuple[str, ...], str]]:
+    """List name, command and, where there is none here, the reason."""
+    ours = {name: (sys.executable, "-m", module) for name, module in OURS.items()}
+    baselines = (name for name in NAMES if name not in LEFT_OUT)
+    found = {f"example in {language}": example for language, example in find_examples(folder).items()}
+    found |= {f"kit, {engine}": example for engine, example in find_kit_examples(folder).items()}
+    return [
+        *((name, command, "") for name, command in ours.items()),
+        *((name, example.command, example.why_not) for name, example in found.items()),
+        *((name, (sys.executable, "-m", "conformance.bench.baselines", name), "") for name in baselines),
+    ]
 
 
 def page(entries: list[Graded], corpus: str) -> str:

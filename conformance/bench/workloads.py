@@ -14,17 +14,15 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from typing import NamedTuple
 
-from mpmath import fp
-
 from conformance.generator.draws import Draw, place, state, walls_speed
 from conformance.grading.agreement import middle
 from conformance.vectors import Expectation
 from scene import BangBang, Cap, Collision, Fourier, Mushroom, Scene, State, Wall, load
 from scene.geometry import rounded
 from scene.states import Stepper
-from scene.tables import period
+from scene.tables import cycle_length
 
-DIGITS = 230  # of the proved answers: beyond any contender's
+DIGITS = 230  # of the proved answers: beyond any solver's
 WINDOW = 1000.0  # flights
 PHASE = 0.3  # of the cycle, where the window begins
 MAX_DRAWS = 100
@@ -203,9 +201,7 @@ def draw_workload(
 
 def _starts(rule: Rule, scene: Scene, key: str) -> Iterator[Drawn]:
     """Draw starts until one is taken."""
-    shared = period(scene)
-    span = 1.0 if shared is None else float(shared.value(fp))
-    size = rounded(scene, 0.0).size
+    span, size = cycle_length(scene) or 1.0, rounded(scene, 0.0).size
     for attempt in range(MAX_DRAWS):
         stream = Draw(f"{key} {attempt}")
         t = span * PHASE + stream.part() * min(span, WINDOW * size / rule.speed)

@@ -8,7 +8,7 @@ component (`grading.error`). In a trajectory all steps are held to the same boun
 
 Both the truth and the answer may be enclosures. Numbers count as right, or as wrong, only where they are so
 for all numbers of the enclosures; else the comparison is `indeterminate`. An answer `undecided` is never
-wrong; callers count it. Reasons of outcomes without numbers are not compared.
+wrong; callers count it. The reason of an undefined outcome must be the certified one; no other is compared.
 """
 
 from __future__ import annotations
@@ -240,11 +240,11 @@ def _judge_end(expected: Expectation, rest: Sequence[Answer]) -> Agreement | Non
         return Agreement("length", why=f"{len(rest)} steps too many") if rest else None
     if not rest:
         return Agreement("length", why=f"must end as {expected.outcome}")
-    kind = _name(rest[0])
-    if kind == expected.outcome:
+    kind, due = _name(rest[0]), f"{expected.outcome} {expected.reason}".rstrip()
+    said = f"undefined {rest[0].reason}" if isinstance(rest[0], Undefined) else kind
+    if said == due or kind == expected.outcome != "undefined":
         return None
-    why = f"{kind}, must be {expected.outcome} {expected.reason}".rstrip()
-    return Agreement("undecided" if kind == "undecided" else "outcome", why=why)
+    return Agreement("undecided" if kind == "undecided" else "outcome", why=f"{said}, must be {due}")
 
 
 def _name(answer: Answer) -> str:
@@ -294,8 +294,9 @@ def _measure(
     """Measure dt (of a horizon none is given), t (but of an enclosed answer), place and velocity."""
     numbers = _given(answer)
     if not all(math.isfinite(end) for ends in numbers.values() for end in ends if isinstance(end, float)):
-        what = f"{place}a number that is not finite"
-        return _Measured(math.inf, math.inf, math.inf, math.inf, what, math.inf)
+        return _Measured(
+            math.inf, math.inf, math.inf, math.inf, f"{place}a number that is not finite", math.inf
+        )
     given = {name: (Fraction(low), Fraction(high)) for name, (low, high) in numbers.items()}
     truth = {name: certified.ends(name) for name in NUMBERS} | {"t": time[0]}
     allowances = dict(zip(NUMBERS, map(Fraction, certified.allowance), strict=True)) | {"t": time[1]}

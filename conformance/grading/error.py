@@ -5,6 +5,9 @@
 counts how many units in the last place the inputs and the output would have to move to explain the answer.
 It is as fair to a grazing hit, where every stepper must lose digits, as to a head-on one. The sum over the
 inputs is the `allowance` that a certified answer carries (`conformance.vectors.Certified`).
+
+At a knot of a law the acceleration of a wall jumps, and the derivatives with it. Rounding may put a hit on
+either side: the larger sum of both sides counts.
 """
 
 from __future__ import annotations

@@ -14,8 +14,8 @@ question.
 - `rejected` for a valid question is `fail`: what an implementation cannot do it says in its introduction,
   and is then not asked (`unsupported`, the runner's verdict, as `crashed` and `timed-out` are).
 - An answer {"error": "..."} is `error`; missing or ill-typed fields are `wrong-format`, and so are numbers
-  that are none (JSON has no nan). Further fields are ignored. Reasons are not compared, only that they are
-  of the protocol's.
+  that are none (JSON has no nan). Further fields are ignored. The reason of `undefined` is compared, others
+  are not.
 """
 
 from __future__ import annotations

@@ -41,10 +41,11 @@ def find_examples(folder: Path, flags: Sequence[str] = ("-O3",)) -> dict[str, Ex
         flags: for the C compiler.
     """
     node = shutil.which("node")
-    script = FOLDER / "javascript" / "stepper.js"
     return {
         "C": _build_c(folder, flags),
-        "JavaScript": Example((node, str(script))) if node else _absent("node is not installed"),
+        "JavaScript": Example((node, str(FOLDER / "javascript" / "stepper.js")))
+        if node
+        else _absent("node is not installed"),
         "Python": Example((sys.executable, str(FOLDER / "python" / "stepper.py"))),
     }
 

@@ -1,4 +1,4 @@
-"""Which figure belongs to which entry of the report, and which simulations it shows."""
+"""Which figure belongs to which claim of the report, and which simulations it shows."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from matplotlib import rc_context
 from matplotlib.figure import Figure
 
 from conformance.audit.claims.finite_energy import ACW, CW, ERGODIC, LADDER
-from conformance.audit.samples import Sample
+from conformance.audit.runs import Sample
 from mushrooms.figures import cycles, scaling
 from mushrooms.figures.style import STYLE
 
@@ -21,13 +21,13 @@ class Picture(NamedTuple):
     """A figure of the report.
 
     Attributes:
-        entry: the ledger's id below which it stands.
+        claim: the claims's id below which it stands.
         caption: what it shows.
         draw: makes it from the samples by run.
         needs: runs it cannot do without.
     """
 
-    entry: str
+    claim: str
     caption: str
     draw: Callable[[Samples], Figure]
     needs: tuple[str, ...] = ()
@@ -141,11 +141,11 @@ ALL = (
 )
 
 
-def drawn(entries: list[str], samples: Samples) -> list[tuple[Picture, Figure]]:
-    """Draw the figures of these entries whose simulations are there."""
+def drawn(claims: list[str], samples: Samples) -> list[tuple[Picture, Figure]]:
+    """Draw the figures of these claims whose simulations are there."""
     found = []
     for picture in ALL:
-        if picture.entry in entries and all(name in samples for name in picture.needs):
+        if picture.claim in claims and all(name in samples for name in picture.needs):
             with rc_context(STYLE):
                 found.append((picture, picture.draw(samples)))
     return found

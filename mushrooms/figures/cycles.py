@@ -10,12 +10,10 @@ from matplotlib.figure import Figure
 from scipy.stats import norm
 
 import theory
-from conformance.audit.claims.broadened import DRAWN_SEED, N_DRAWN, adiabatic_limit, predicted, summed
-from conformance.audit.claims.finite_energy import width
+from conformance.audit.claim import energies_of
+from conformance.audit.claims.broadened import DRAWN_SEED, N_DRAWN, adiabatic_limit, predicted, summed, width
 from conformance.audit.claims.misprints import volume_loop
-from conformance.audit.evidence import energies_of
-from conformance.audit.runs import scene_of
-from conformance.audit.samples import Sample
+from conformance.audit.runs import Sample, scene_of
 from conformance.audit.tolerances import mean, share, spread
 from mushrooms.figures.energies import N_PLACES, draw, panels
 from mushrooms.figures.style import BLACK, BLUE, GREEN, ORANGE, SKY, FloatArray, new_figure, phase_colours

@@ -10,11 +10,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 import theory
-from conformance.audit.claims.broadened import zone_energy
+from conformance.audit.claims.broadened import width, zone_energy
 from conformance.audit.claims.exponents import nu_gap, zone_share
-from conformance.audit.claims.finite_energy import fitted_width, width
-from conformance.audit.runs import scene_of
-from conformance.audit.samples import Sample
+from conformance.audit.claims.finite_energy import fitted
+from conformance.audit.runs import Sample, scene_of
 from conformance.audit.tolerances import Mean, mean, share
 from mushrooms.figures.orbits import draw_map, draw_section
 from mushrooms.figures.style import BLACK, BLUE, GREEN, GREY, ORANGE, new_figure
@@ -57,9 +56,9 @@ def widths(moving: list[Sample], ergodic: list[Sample]) -> Figure:
     """Draw the width of the uncaptured peak against E0, with fitted powers."""
     figure, axes = new_figure(5.4, 3.8)
     for samples, colour, marker, label in ((moving, BLUE, "o", "moving cap"), (ergodic, GREEN, "s", "c = 0")):
-        fit, energies = fitted_width(samples)
+        energies, values = [sample.run.energy for sample in samples], [width(sample) for sample in samples]
+        fit = fitted(samples, values)
         text = f"{label}: exponent {fit.exponent:.4f} ± {fit.exponent_error:.4f}"
-        values = [width(sample) for sample in samples]
         _points(axes, energies, values, fmt=marker, color=colour, markersize=5, label=text)
         axes.plot(energies, fit.coefficient * np.array(energies) ** fit.exponent, color=colour, linewidth=1)
     x = np.array([moving[0].run.energy, moving[-1].run.energy])

@@ -1,4 +1,4 @@
-"""Figures of the benchmark: speed against error, error growth, cost against work."""
+"""Figures of the benchmark: speed against error, and error growth."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import FixedLocator, NullLocator
 
-from conformance.bench.record import CostSeries, Growth, Point, Record, quartiles
+from conformance.bench.record import Growth, Point, Record, quartiles
 from mushrooms.figures import style as plots
 
 # Contrast with white is 4.5 to 1 and more; families differ by their marks too, whatever colours one sees.
@@ -118,7 +118,7 @@ def _label(axes: Any, points: list[Point]) -> None:
     """Name the points: the proofs by their digits, the others in a column at the right, a line to each."""
     for p in (p for p in points if p.family == "proof"):
         above = _digits_of(p)[0], statistics.median(p.ns) * 2
-        axes.annotate(short_name(p.contender), above, ha="center", color=COLOURS["proof"], fontsize=LABEL)
+        axes.annotate(short_name(p.solver), above, ha="center", color=COLOURS["proof"], fontsize=LABEL)
     named = [
         (math.log10(statistics.median(p.ns)), _digits_of(p)[0], _name(p), COLOURS[p.family])
         for p in points
@@ -154,7 +154,7 @@ def spread(wanted: list[float], space: float) -> list[float]:
 
 
 def _name(p: Point) -> str:
-    name = short_name(p.contender)
+    name = short_name(p.solver)
     share = p.astray / p.further if p.further else p.wrong / max(1, p.wrong + p.right + p.undecided)
     return f"{name}: {100 * share:.2g} % wrong" if share else name
 
@@ -167,9 +167,9 @@ def _digits_of(p: Point) -> tuple[float, float]:
 
 
 def pareto(points: list[Point]) -> list[tuple[float, float]]:
-    """Return (worst digits, ns) of the contenders that none beats in both, from the fastest on.
+    """Return (worst digits, ns) of the solvers that none beats in both, from the fastest on.
 
-    Only a contender with no wrong answer and most of them right can stand on the front.
+    Only a solver with no wrong answer and most of them right can stand on the front.
     """
     able = [p for p in points if p.right > p.undecided + p.left and not p.wrong and not p.astray]
     pairs = sorted((statistics.median(p.ns), -digits(max(p.relative))) for p in able)
@@ -180,11 +180,11 @@ def pareto(points: list[Point]) -> list[tuple[float, float]]:
     return front
 
 
-def short_name(contender: str) -> str:
-    """Return a contender's label."""
+def short_name(solver: str) -> str:
+    """Return a solver's label."""
     for part in ("proof, ", " digits", "fast, ", "solve_ivp, ", "example in ", "command ", "steps, flight"):
-        contender = contender.replace(part, "1" if part == "steps, flight" else "")
-    return plots.plain(contender if len(contender) < 18 else contender[:17] + "…")
+        solver = solver.replace(part, "1" if part == "steps, flight" else "")
+    return plots.plain(solver if len(solver) < 18 else solver[:17] + "…")
 
 
 def _legend(record: Record) -> list[Line2D]:
@@ -195,7 +195,7 @@ def _legend(record: Record) -> list[Line2D]:
         *(Line2D([], [], color=COLOURS[f], marker=MARKS[f], label=WORDS[f], **bare) for f in families),
         Line2D([], [], marker="|", markersize=7, label="from the median to the worst answer", **black),
         Line2D(
-            [], [], marker="_", label="up and down: quartiles of the laps", **black | {"linestyle": "none"}
+            [], [], marker="_", label="up and down: quartiles of the runs", **black | {"linestyle": "none"}
         ),
         Line2D([], [], marker="x", color=RED, label="some walls wrong", **bare),
         Line2D([], [], label="front: least time for so many digits, at worst", **black),
@@ -228,23 +228,4 @@ def growth(found: Growth) -> bytes:
     axes.plot(early, 10.0 ** (found.rate * (early - 1) - 32), color=plots.GREY, linestyle=":", label=label)
     axes.set(yscale="log", xlabel="collisions", ylabel="error, relative to table and speed", ylim=(1e-60, 10))
     axes.legend(loc="lower right")
-    return plots.svg(figure)
-
-
-@rc_context(plots.STYLE)
-def work(series: tuple[CostSeries, ...]) -> bytes:
-    """Draw kernel time against particles, cycles, energy and threads."""
-    figure, axes = plots.new_figure(10.5, 2.9, 1, len(series))
-    panels = np.atleast_1d(axes)
-    for panel, one in zip(panels, series, strict=True):
-        panel.plot(one.sizes, one.seconds, marker="o", color=plots.BLUE)
-        panel.set(xscale="log", yscale="log", xlabel=one.what)
-        error = "" if one.error is None else f" ± {one.error:.2f}"
-        if one.exponent is not None:
-            panel.set_title(f"exponent {one.exponent:.2f}{error}", loc="left")
-        if one.what in ("cycles", "threads"):
-            panel.xaxis.set_major_locator(FixedLocator(list(one.sizes)))
-            panel.xaxis.set_minor_locator(NullLocator())
-            panel.set_xticklabels([f"{n:.0f}" for n in one.sizes])
-    panels[0].set_ylabel("seconds")
     return plots.svg(figure)

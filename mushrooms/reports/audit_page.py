@@ -17,9 +17,8 @@ import numpy as np
 from matplotlib import rc_context
 
 import scene as scenes
-from conformance.audit.finding import Check, Entry, Finding
-from conformance.audit.runs import run_seed, scene_of
-from conformance.audit.samples import Sample
+from conformance.audit.claim import Check, Claim, Finding
+from conformance.audit.runs import Sample, run_seed, scene_of
 from conformance.audit.session import AuditResult
 from conformance.audit.tolerances import FAMILY_LEVEL, LEVEL, N_SIGMA, mean, spread
 from mushrooms import __version__
@@ -73,7 +72,7 @@ class CheckData(TypedDict):
 
 
 class FindingData(TypedDict):
-    """One entry of the ledger and what came of it."""
+    """One claim of the claims and what came of it."""
 
     id: str
     where: str
@@ -148,7 +147,7 @@ def machine() -> dict[str, str | int]:
 
 def to_data(result: AuditResult) -> ReportData:
     """Return the content of report.json."""
-    pairs = zip(result.entries, result.findings, strict=True)
+    pairs = zip(result.claims, result.findings, strict=True)
     return {
         "version": __version__,
         "size": result.settings.size,
@@ -165,22 +164,22 @@ def to_data(result: AuditResult) -> ReportData:
             "level": LEVEL,
             "standard_errors": N_SIGMA,
         },
-        "findings": [_finding(entry, finding) for entry, finding in pairs],
+        "findings": [_finding(claim, finding) for claim, finding in pairs],
         "runs": [_run(sample, result.settings.seed) for sample in result.samples.values()],
     }
 
 
-def _finding(entry: Entry, finding: Finding) -> FindingData:
+def _finding(claim: Claim, finding: Finding) -> FindingData:
     return {
-        "id": entry.id,
-        "where": entry.where,
-        "statement": entry.statement,
-        "method": entry.method,
-        "tolerance": entry.tolerance,
+        "id": claim.id,
+        "where": claim.where,
+        "statement": claim.statement,
+        "method": claim.method,
+        "tolerance": claim.tolerance,
         "verdict": finding.verdict,
-        "expected": entry.expected,
-        "as_expected": finding.verdict == entry.expected,
-        "runs": list(entry.runs),
+        "expected": claim.expected,
+        "as_expected": finding.verdict == claim.expected,
+        "runs": list(claim.runs),
         "seconds": round(finding.seconds, 3),
         "checks": [_check(check) for check in finding.checks],
     }
@@ -242,7 +241,7 @@ def to_html(data: ReportData, samples: by_claim.Samples) -> str:
     for picture, figure in by_claim.drawn([finding["id"] for finding in data["findings"]], samples):
         wide = f"{figure.get_figwidth() * PIXELS_PER_INCH:.0f}px"
         image = {"source": embed(plots.svg(figure)), "caption": picture.caption, "width": wide}
-        figures.setdefault(picture.entry, []).append(image)
+        figures.setdefault(picture.claim, []).append(image)
     groups = [
         (title, sorted((f for f in data["findings"] if f["id"][0] in letters), key=_place))
         for title, letters in GROUPS.items()
@@ -313,7 +312,7 @@ def _digits(error: float) -> int:
 
 
 def to_text(data: ReportData) -> str:
-    """Return the summary: one line per entry, then what did not come out as expected."""
+    """Return the summary: one line per claim, then what did not come out as expected."""
     lines = []
     for finding in data["findings"]:
         n_held = sum(check["holds"] is True for check in finding["checks"] if check["form"] != "printed")

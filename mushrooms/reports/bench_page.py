@@ -7,7 +7,6 @@ import statistics
 from collections.abc import Sequence
 from typing import Any
 
-from conformance.bench.hard_cases import cell
 from conformance.bench.record import Point, Record, quartiles
 from mushrooms.figures import speed as figures_of_speed
 from mushrooms.reports.page import embed, render
@@ -24,11 +23,7 @@ def to_html(record: Record, speed: bytes) -> bytes:
         record=record,
         speed=embed(speed),
         growth=embed(figures_of_speed.growth(record.growth)),
-        work=embed(figures_of_speed.work(record.work.series)),
         rows=[_row(p) for p in record.points],
-        steppers=list(record.hard_cases[0].verdicts),
-        cell=cell,
-        clock=statistics.median(record.clock_ns),
     )
     return page.encode("utf-8")
 
@@ -67,7 +62,7 @@ def to_markdown(record: Record, workload: str) -> str:
     rows = [head, ("---",) * len(head)]
     rows += [
         (
-            p.contender.replace("|", "\\|"),
+            p.solver.replace("|", "\\|"),
             f"{statistics.median(p.ns):,.0f}",
             middle_and_worst(p.ulps, ".2g")[1],
             middle_and_worst(p.relative, ".0e")[1],
@@ -82,11 +77,11 @@ def to_markdown(record: Record, workload: str) -> str:
 
 def _by_workload(record: Record) -> str:
     """Return what a collision takes in the lanes on each workload that they serve, beside the lean C."""
-    ns = {(p.workload, p.contender): statistics.median(p.ns) for p in record.points}
+    ns = {(p.workload, p.solver): statistics.median(p.ns) for p in record.points}
     head = ("workload", "lanes, ns per collision", f"beside {BESIDE}", "lean C over lanes")
     rows = [head, ("---",) * len(head)]
     for name in (w.name for w in record.workloads):
-        lanes, lean = (ns.get((name, contender)) for contender in ("fast, lanes", "lean C"))
+        lanes, lean = (ns.get((name, solver)) for solver in ("fast, lanes", "lean C"))
         if lanes is not None:
             usual = ns.get((BESIDE, "fast, lanes"))
             parts = [None if usual is None else lanes / usual, None if lean is None else lean / lanes]

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 from conformance.audit.claims.broadened import adiabatic_limit, predicted
-from conformance.audit.samples import Sample
+from conformance.audit.runs import Sample
 from conformance.audit.tolerances import Mean, mean, share
 
 M1, P_NC = "mean of log E1/E0", "share never captured"

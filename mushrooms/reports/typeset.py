@@ -1,6 +1,6 @@
 """Mathematics in plain text, typeset as HTML: p_nc, E0^(-1/4), V_ell / V_cap, <=, 10^-25.
 
-The ledger is written to be read as text. What looks like a formula there becomes italic letters, sub- and
+Claims are written to be read as text. What looks like a formula there becomes italic letters, sub- and
 superscripts and proper signs; all else is escaped and left alone.
 """
 
@@ -16,7 +16,7 @@ GREEK = {
     "phi": "φ", "sigma": "σ", "tau": "τ",
 }  # fmt: skip
 # A symbol with an index (V_cap, sigma_w, m1, E0), or a Greek letter alone; neither is part of a word or of a
-# path, and capitals that name entries of the ledger (M1, X2) are no symbols.
+# path, and capitals that name claims (M1, X2) are no symbols.
 _LETTERS = "|".join(GREEK)
 _SYMBOL = re.compile(
     rf"(?<![\w.-])(?:(?P<base>[a-zEVTRJ]|dV|{_LETTERS})(?:_(?P<index>[A-Za-z0-9]{{1,4}})|(?P<digit>[01]))"

@@ -1,1 +1,59 @@
-"""The claims of the paper, checked: a file for each group of ledger entries."""
+"""The claims of the paper, read from claims.toml, with the check of each: a file for each group of claims."""
+
+from __future__ import annotations
+
+import tomllib
+from functools import cache
+from importlib import resources
+
+from conformance.audit.claim import Claim
+from conformance.audit.claims import (
+    assumptions,
+    experiments,
+    exponents,
+    finite_energy,
+    identities,
+    misprints,
+)
+from conformance.audit.tolerances import N_SIGMA
+from scene.refusal import BadInput
+
+CHECKS = {
+    **misprints.CHECKS,
+    **finite_energy.CHECKS,
+    **experiments.CHECKS,
+    **exponents.CHECKS,
+    **identities.CHECKS,
+    **assumptions.CHECKS,
+}
+
+
+@cache
+def all_claims() -> tuple[Claim, ...]:
+    """Return all claims, in their order."""
+    text = (resources.files("conformance.audit") / "claims.toml").read_text("utf-8")
+    return tuple(
+        Claim(
+            **data
+            | {
+                "runs": tuple(data.get("runs", ())),
+                "tolerance": data["tolerance"].replace("{sigma}", f"{N_SIGMA:.2f}"),
+                "examine": CHECKS[data["id"]],
+            }
+        )
+        for data in tomllib.loads(text)["claim"]
+    )
+
+
+def select_claims(only: str) -> tuple[Claim, ...]:
+    """Return the claims with these ids, separated by commas; all for "".
+
+    Raises:
+        BadInput: naming an id that is none, and those that are.
+    """
+    known = {claim.id: claim for claim in all_claims()}
+    wanted = [part.strip().upper() for part in only.split(",") if part.strip()]
+    for name in wanted:
+        if name not in known:
+            raise BadInput(f"claim {name!r}, must be one of {', '.join(known)}")
+    return tuple(claim for claim in all_claims() if not wanted or claim.id in wanted)

@@ -7,14 +7,16 @@ of that theory (`theory.NextOrder`): nothing is measured on the samples that it 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from functools import cache
+from typing import Any, NamedTuple
 
 import numpy as np
 
 import theory
-from conformance.audit.runs import RUNS, Simulation, scene_of
-from conformance.audit.samples import Sample
-from conformance.audit.tolerances import Cdf, FloatArray, Mean, mean, spread
+from conformance.audit.claim import Check
+from conformance.audit.runs import RUNS, Sample, Simulation, scene_of
+from conformance.audit.tolerances import Cdf, FloatArray, Mean, close, mean, share, spread
 from scene.tables import cycle_length
 
 INFINITE = 1e40  # energy at which nothing is left of shifts and blurs
@@ -46,10 +48,73 @@ def adiabatic_limit(run: Simulation) -> theory.Prediction:
     return theory.predict(scene_of(run), 15)
 
 
-def bias_of_mean(sample: Sample) -> tuple[float, float]:
-    """Return what finite energy adds to the mean of s, and the next order."""
-    found = predicted(sample)
-    return found.mean_s - adiabatic(sample).mean_s, found.next_order.mean_s
+class Figure(NamedTuple):
+    """A figure of one cycle that finite energy biases.
+
+    Attributes:
+        what: in words.
+        measured: on a sample.
+        of: by the theory at an energy.
+        order: its name in `theory.NextOrder`.
+    """
+
+    what: str
+    measured: Callable[[Sample], Mean]
+    of: Callable[[theory.FiniteEnergy], float]
+    order: str
+
+    def bias(self, sample: Sample) -> float:
+        """Return what finite energy adds to it."""
+        return self.of(predicted(sample)) - self.of(adiabatic(sample))
+
+    def band(self, sample: Sample) -> float:
+        """Return its next order."""
+        return float(getattr(predicted(sample).next_order, self.order))
+
+
+GROWTH = Figure("mean of log E1/E0", lambda s: mean(s.gain), lambda f: f.mean_s, "mean_s")
+ESCAPE = Figure("share never captured", lambda s: share(s.never_captured), lambda f: f.p_nc, "p_nc")
+PEAK = Figure(
+    "mean log E1/E0 of the never captured",
+    lambda s: mean(s.gain[~s.captured]),
+    lambda f: f.peak[0],
+    "peak_mean",
+)
+
+
+def less_bias(
+    figure: Figure, sample: Sample, expected: float, start: str | None = None, end: str = "", **options: Any
+) -> Check:
+    """Compare a figure, less what finite energy adds to it, with that of infinite energy.
+
+    Args:
+        figure: to be compared.
+        sample: measured on.
+        expected: at infinite energy.
+        start: of the check's label; the run by default.
+        end: of the label.
+        options: of `close`.
+    """
+    bias = figure.bias(sample)
+    start = f"{sample.run.name}: " if start is None else start
+    return close(
+        f"{start}{figure.what}, less its bias {bias:.5f}{end}",
+        figure.measured(sample).less(bias),
+        expected,
+        band=figure.band(sample),
+        **options,
+    )
+
+
+def width(sample: Sample) -> Mean:
+    """Return sigma_w, the width of the peak of the particles never captured."""
+    return spread(sample.gain[~sample.captured])
+
+
+def width_as_predicted(what: str, found: Mean, sample: Sample, **options: Any) -> Check:
+    """Compare the width of a sample's peak with that which frozen tables predict."""
+    sigma, left = predicted(sample).peak[1] ** 0.5, predicted(sample).next_order
+    return close(what, found, sigma, band=sigma * left.variance / 2, **options)
 
 
 def peak_band(sample: Sample) -> float:
@@ -92,8 +157,7 @@ def captured_change(sample: Sample, first: int, last: int) -> FloatArray:
     begin, end = (phase_times(sample)[k] for k in (first, last))
     with np.errstate(invalid="ignore"):
         inside = (sample.first_stay[0] < begin) & (sample.first_stay[1] > end)
-    found: FloatArray = sample.phase_s[inside, 0, last] - sample.phase_s[inside, 0, first]
-    return found
+    return sample.change(inside, first, last)
 
 
 def share_in_the_zone(sample: Sample, times: FloatArray) -> FloatArray:

@@ -7,14 +7,23 @@ from collections.abc import Iterator
 import numpy as np
 from scipy.stats import ks_2samp, norm
 
+from conformance.audit.claim import Check, ClaimEvidence
 from conformance.audit.claims import many_cycles
-from conformance.audit.claims.broadened import adiabatic, bias_of_mean, captured_band, peak_band, predicted
-from conformance.audit.claims.finite_energy import ACW, CW, FIXED, width
+from conformance.audit.claims.broadened import (
+    ESCAPE,
+    GROWTH,
+    PEAK,
+    adiabatic,
+    captured_band,
+    less_bias,
+    peak_band,
+    predicted,
+    width,
+    width_as_predicted,
+)
+from conformance.audit.claims.finite_energy import ACW, CW, FIXED
 from conformance.audit.claims.misprints import ZERO, loop_area
-from conformance.audit.evidence import ClaimEvidence
-from conformance.audit.finding import Check
-from conformance.audit.runs import scene_of
-from conformance.audit.samples import Sample
+from conformance.audit.runs import Sample, scene_of
 from conformance.audit.tolerances import (
     LEVEL,
     N_SIGMA,
@@ -42,41 +51,37 @@ TROUGH = 0.2  # of the density of s, between its modes
 
 def chord_time(sample: Sample) -> float:
     """Return the longest time from one arc hit to the next: capture and release are seen at arc hits."""
-    scene = scene_of(sample.run)
-    assert isinstance(scene, Mushroom)
-    return 2 * float(bounds(laws(scene)["r"]).highest) / sample.speed
+    return 2 * float(bounds(laws(scene_of(sample.run))["r"]).highest) / sample.speed
 
 
 def growth(evidence: ClaimEvidence, sample: Sample) -> Check:
     """Compare the mean of s with m1 and its finite-energy bias."""
     theirs = float(evidence.theory_of(sample).m1)
-    bias, band = bias_of_mean(sample)
-    what = f"{sample.run.name}: mean of log E1/E0, less its bias {bias:.5f}"
-    rival = ("no growth", 0.0) if theirs else None
-    found = mean(sample.gain).less(bias)
-    return close(what, found, theirs, band=band, scale=abs(theirs) or np.inf, against=rival)
+    return less_bias(
+        GROWTH, sample, theirs, scale=abs(theirs) or np.inf, against=(("no growth", 0.0) if theirs else None)
+    )
 
 
 def escape(evidence: ClaimEvidence, sample: Sample) -> Check:
     """Compare the uncaptured share with p_nc: those who lag are captured more or less likely than others."""
-    found = predicted(sample)
-    bias = found.p_nc - adiabatic(sample).p_nc
-    what = f"{sample.run.name}: share never captured, less its bias {bias:.5f}"
     theirs, s_nc = (float(getattr(evidence.theory_of(sample), name)) for name in ("p_nc", "log_e_nc"))
-    rival = ("that of the reversed cycle", theirs * np.exp(-s_nc)) if s_nc else ("nobody is captured", 1.0)
-    ours, band = share(sample.never_captured).less(bias), found.next_order.p_nc
-    return close(what, ours, theirs, band=band, scale=0.1, against=rival)
+    return less_bias(
+        ESCAPE,
+        sample,
+        theirs,
+        scale=0.1,
+        against=(
+            ("that of the reversed cycle", theirs * np.exp(-s_nc)) if s_nc else ("nobody is captured", 1.0)
+        ),
+    )
 
 
 def peak_place(evidence: ClaimEvidence, sample: Sample) -> Check:
     """Compare the mean energy of the uncaptured with log E_nc, less its drift and what others' lags add."""
-    kept, found = sample.gain[~sample.captured], predicted(sample)
-    bias = found.peak[0] - adiabatic(sample).peak[0]
     theirs = float(evidence.theory_of(sample).log_e_nc)
-    what = f"{sample.run.name}: mean log E1/E0 of the never captured, less its bias {bias:.5f}"
-    band = found.next_order.peak_mean
-    rival = ("no bias", theirs - bias)
-    return close(what, mean(kept).less(bias), theirs, band=band, scale=abs(theirs) or np.inf, against=rival)
+    return less_bias(
+        PEAK, sample, theirs, scale=abs(theirs) or np.inf, against=("no bias", theirs - PEAK.bias(sample))
+    )
 
 
 def peak_shape(sample: Sample) -> Check:
@@ -94,10 +99,12 @@ def peak_shape(sample: Sample) -> Check:
 
 def peak_width(sample: Sample) -> Check:
     """Compare the peak's width with the predicted one."""
-    found = predicted(sample)
-    sigma = found.peak[1] ** 0.5
-    what = f"{sample.run.name}: width of the peak of the never captured"
-    return close(what, width(sample), sigma, band=sigma * found.next_order.variance / 2, scale=sigma / 4)
+    return width_as_predicted(
+        f"{sample.run.name}: width of the peak of the never captured",
+        width(sample),
+        sample,
+        scale=predicted(sample).peak[1] ** 0.5 / 4,
+    )
 
 
 def captured_energies(sample: Sample) -> Check:
@@ -114,12 +121,14 @@ def one_cycle(evidence: ClaimEvidence, runs: tuple[str, ...]) -> Iterator[Check]
     """Check growth, escape, the peak's place and width, and both distributions of each run."""
     for run in runs:
         sample = evidence.sample(run)
-        yield growth(evidence, sample)
-        yield escape(evidence, sample)
-        yield peak_place(evidence, sample)
-        yield peak_width(sample)
-        yield peak_shape(sample)
-        yield captured_energies(sample)
+        yield from [
+            growth(evidence, sample),
+            escape(evidence, sample),
+            peak_place(evidence, sample),
+            peak_width(sample),
+            peak_shape(sample),
+            captured_energies(sample),
+        ]
 
 
 def fixed_cap(evidence: ClaimEvidence) -> Iterator[Check]:
@@ -130,13 +139,15 @@ def fixed_cap(evidence: ClaimEvidence) -> Iterator[Check]:
 def moving_cap(evidence: ClaimEvidence) -> Iterator[Check]:
     """X2: the moving cap at 1e6 and 1e7."""
     low, high = (evidence.sample(run) for run in MOVING)
-    yield from one_cycle(evidence, MOVING)
-    yield close(
-        "share never captured at 1e7 against the paper's 38.78 %",
-        (share(high.never_captured).value, float(np.hypot(share(high.never_captured).error, 0.00308))),
-        0.3878,
-        band=5e-5,
-    )
+    yield from [
+        *one_cycle(evidence, MOVING),
+        close(
+            "share never captured at 1e7 against the paper's 38.78 %",
+            (share(high.never_captured).value, float(np.hypot(share(high.never_captured).error, 0.00308))),
+            0.3878,
+            band=5e-5,
+        ),
+    ]
     for sample in (low, high):
         yield from _modes(sample)
     ratio, error = width(high).over(width(low))
@@ -181,23 +192,27 @@ def _even(first: float, last: float) -> Cdf:
     return lambda t: np.asarray((t - first) / (last - first))
 
 
-def ergodic(evidence: ClaimEvidence) -> Iterator[Check]:
+def ergodic(evidence: ClaimEvidence) -> list[Check]:
     """X5: c = 0."""
     sample, earlier = evidence.sample("ergodic@1e7"), evidence.sample("ergodic@1e6")
     found, left = predicted(sample), predicted(sample).next_order
-    bias, band = bias_of_mean(sample)
-    yield close(f"mean of log E1/E0, less its bias {bias:.5f}", mean(sample.gain).less(bias), 0.0, band=band)
-    yield fits("one peak, as predicted", sample.gain, found.free_cdf, band=peak_band(sample), scale=0.2)
-    yield close("mean of E0/E1", mean(np.exp(-sample.gain)), found.mean_of_exp(-1), band=band)
-    yield stated("nobody is captured", not sample.captured.any(), f"{sample.captured.sum()} captured", "0")
     ratio = (found.peak[1] / predicted(earlier).peak[1]) ** 0.5
-    more = ratio * (left.variance + predicted(earlier).next_order.variance) / 2
-    what = "its width shrinks as E0^(-1/4) from 1e6: ratio"
-    yield close(what, spread(sample.gain).over(spread(earlier.gain)), ratio, band=more)
-    yield peak_width(sample)
+    return [
+        less_bias(GROWTH, sample, 0.0, start=""),
+        fits("one peak, as predicted", sample.gain, found.free_cdf, band=peak_band(sample), scale=0.2),
+        close("mean of E0/E1", mean(np.exp(-sample.gain)), found.mean_of_exp(-1), band=left.mean_s),
+        stated("nobody is captured", not sample.captured.any(), f"{sample.captured.sum()} captured", "0"),
+        close(
+            "its width shrinks as E0^(-1/4) from 1e6: ratio",
+            spread(sample.gain).over(spread(earlier.gain)),
+            ratio,
+            band=ratio * (left.variance + predicted(earlier).next_order.variance) / 2,
+        ),
+        peak_width(sample),
+    ]
 
 
-def untilted(evidence: ClaimEvidence) -> Iterator[Check]:
+def untilted(evidence: ClaimEvidence) -> list[Check]:
     """X6: with an upright stem the chaotic zone's energies are distributed differently."""
     upright, tilted = evidence.sample("untilted@1e6"), evidence.sample("moving-cap@1e6")
     centred = []
@@ -209,33 +224,43 @@ def untilted(evidence: ClaimEvidence) -> Iterator[Check]:
     gap = float(np.max(np.abs(np.searchsorted(a, grid) / len(a) - np.searchsorted(b, grid) / len(b))))
     p = float(ks_2samp(a, b).pvalue)
     size = len(a) * len(b) // (len(a) + len(b))
-    yield Check(
-        "uncaptured energies, each from its own theory's: two samples differ",
-        True if p < LEVEL else None,
-        f"> {critical_gap(size):.3g}",
-        gap,
-        n_tests=1,
-        note=f"Kolmogorov's distance, p = {p:.1g}",
-    )
     ratio = width(upright).over(width(tilted))
-    yield above("upright: the uncaptured peak is wider, ratio of widths", ratio, 1.0)
-    yield peak_place(evidence, tilted)
+    return [
+        Check(
+            "uncaptured energies, each from its own theory's: two samples differ",
+            True if p < LEVEL else None,
+            f"> {critical_gap(size):.3g}",
+            gap,
+            n_tests=1,
+            note=f"Kolmogorov's distance, p = {p:.1g}",
+        ),
+        above("upright: the uncaptured peak is wider, ratio of widths", ratio, 1.0),
+        peak_place(evidence, tilted),
+    ]
 
 
 def trivial_loops(evidence: ClaimEvidence) -> Iterator[Check]:
     """X7: loops that enclose nothing, and one of them that accelerates."""
     retraced = evidence.sample("retraced-arc@1e6")
-    theirs, (bias, band) = evidence.theory_of(retraced), bias_of_mean(retraced)
-    what = "retraced-arc, in which a single parameter moves: theory has m1 = 0"
-    yield stated(what, theirs.m1 == 0, f"m1 = {float(theirs.m1):.7f}", "m1 = 0", form="printed")
-    what = f"{retraced.run.name}: mean of log E1/E0, less its bias {bias:.5f}, is 0"
-    yield close(what, mean(retraced.gain).less(bias), 0.0, band=band, form="printed")
-    turn = loop_area("retraced-arc")
-    what = (
-        "an area in sec. 3.5's plane means growth (M12), but growth needs none: signed area of retraced-arc"
-    )
-    yield exact(what, turn, 0, ZERO)
-    yield from one_cycle(evidence, ("retraced-arc@1e6",))
+    theirs = evidence.theory_of(retraced)
+    yield from [
+        stated(
+            "retraced-arc, in which a single parameter moves: theory has m1 = 0",
+            theirs.m1 == 0,
+            f"m1 = {float(theirs.m1):.7f}",
+            "m1 = 0",
+            form="printed",
+        ),
+        less_bias(GROWTH, retraced, 0.0, end=", is 0", form="printed"),
+        exact(
+            "an area in sec. 3.5's plane means growth (M12), but growth needs none:"
+            " signed area of retraced-arc",
+            loop_area("retraced-arc"),
+            0,
+            ZERO,
+        ),
+        *one_cycle(evidence, ("retraced-arc@1e6",)),
+    ]
     twice = np.isfinite(retraced.t_in[:, 0]).sum(axis=1) == 2
     yield close(
         "retraced-arc@1e6: share captured in both of its windows",
@@ -245,14 +270,18 @@ def trivial_loops(evidence: ClaimEvidence) -> Iterator[Check]:
     )
     for name, table in ONE_PARAMETER.items():
         result = evidence.predict(table)
-        what = f"only {name} moves, and nu with it one way: theory"
-        yield stated(what, result.m1 == 0 and result.log_e_nc == 0, f"m1 = {float(result.m1):.1g}", "m1 = 0")
+        yield stated(
+            f"only {name} moves, and nu with it one way: theory",
+            result.m1 == 0 and result.log_e_nc == 0,
+            f"m1 = {float(result.m1):.1g}",
+            "m1 = 0",
+        )
     for run in ("only-mouth@1e6", "moving-cap-trivial@1e6"):
         sample = evidence.sample(run)
-        bias, band = bias_of_mean(sample)
-        values = mean(sample.gain).less(bias)
-        yield close(f"{run}: mean of log E1/E0, less its bias {bias:.5f}", values, 0.0, band=band, scale=0.04)
-        yield escape(evidence, sample)
+        yield from [
+            less_bias(GROWTH, sample, 0.0, scale=0.04),
+            escape(evidence, sample),
+        ]
 
 
 def _one_parameter() -> dict[str, Mushroom]:
@@ -275,29 +304,35 @@ def both_ways(evidence: ClaimEvidence) -> Iterator[Check]:
         ("moving-cap", "moving-cap-reversed"),
     ):
         a, b = evidence.predict(name), evidence.predict(other)
-        what = f"{name}: theory's log E_nc flips"
         yield stated(
-            what, abs(a.log_e_nc + b.log_e_nc) < 1e-20, f"sum {float(a.log_e_nc + b.log_e_nc):.1g}", "0"
+            f"{name}: theory's log E_nc flips",
+            abs(a.log_e_nc + b.log_e_nc) < 1e-20,
+            f"sum {float(a.log_e_nc + b.log_e_nc):.1g}",
+            "0",
         )
     for first, second in ((ACW, CW), ("moving-cap@1e6", "moving-cap-reversed@1e6")):
         pair = [evidence.sample(first), evidence.sample(second)]
-        kept = [mean(sample.gain[~sample.captured]) for sample in pair]
-        biases = sum(predicted(sample).peak[0] - adiabatic(sample).peak[0] for sample in pair)
+        kept, biases = [PEAK.measured(s) for s in pair], sum(PEAK.bias(s) for s in pair)
         yield close(
             f"{first} and its reverse: sum of the peaks, less their biases",
             (kept[0].value + kept[1].value - biases, float(np.hypot(kept[0].error, kept[1].error))),
             0.0,
-            band=sum(predicted(sample).next_order.peak_mean for sample in pair),
+            band=sum(PEAK.band(sample) for sample in pair),
             scale=0.15,
         )
         for sample in pair:
-            bias, _ = bias_of_mean(sample)
-            yield above(
-                f"{sample.run.name}: mean of log E1/E0 grows, beyond its bias", mean(sample.gain), bias
-            )
-            yield above(f"{sample.run.name}: mean of E1/E0 grows", mean(np.exp(sample.gain)), 1.0)
-    yield growth(evidence, evidence.sample("moving-cap-reversed@1e6"))
-    yield escape(evidence, evidence.sample("moving-cap-reversed@1e6"))
+            yield from [
+                above(
+                    f"{sample.run.name}: mean of log E1/E0 grows, beyond its bias",
+                    mean(sample.gain),
+                    GROWTH.bias(sample),
+                ),
+                above(f"{sample.run.name}: mean of E1/E0 grows", mean(np.exp(sample.gain)), 1.0),
+            ]
+    yield from [
+        growth(evidence, evidence.sample("moving-cap-reversed@1e6")),
+        escape(evidence, evidence.sample("moving-cap-reversed@1e6")),
+    ]
 
 
 CHECKS = {

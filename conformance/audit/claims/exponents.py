@@ -15,6 +15,7 @@ import numpy as np
 from mpmath import fp
 
 import theory
+from conformance.audit.claim import Check, ClaimEvidence
 from conformance.audit.claims.broadened import (
     captured_change,
     phase_times,
@@ -23,13 +24,10 @@ from conformance.audit.claims.broadened import (
     zone_energy,
 )
 from conformance.audit.claims.experiments import chord_time
-from conformance.audit.claims.finite_energy import ACW, ERGODIC, FIXED, LADDER
-from conformance.audit.evidence import ClaimEvidence
-from conformance.audit.finding import Check
-from conformance.audit.runs import RUNS, run_seed, scene_of
-from conformance.audit.samples import Sample
+from conformance.audit.claims.finite_energy import ACW, ERGODIC, FIXED, LADDER, fitted
+from conformance.audit.runs import RUNS, Sample, run_seed, scene_of
 from conformance.audit.tolerances import BoolArray, FloatArray, Mean, close, mean, share, spread, stated
-from scene import Mushroom, Scene, State, load
+from scene import Scene, State, load
 from scene.geometry import area, table_at
 from scene.laws import bounds, values
 from scene.tables import cycle_length, laws
@@ -46,24 +44,36 @@ N_ENERGIES = {"quick": 400, "full": 2000}
 PER_ENERGY = 20
 
 
-def circle(evidence: ClaimEvidence) -> Iterator[Check]:
+def circle(evidence: ClaimEvidence) -> list[Check]:
     """L1: the breathing circle, hit by hit."""
     orbits = _orbits(evidence.steppers.trajectory, evidence.seed)
     momentum = max(orbit.momentum for row in orbits for orbit in row)
-    what = f"angular momentum at arc hits, {N_ORBITS} orbits: largest relative change"
-    yield stated(what, momentum < 1e-12, f"{momentum:.1e}", "rounding of up to 10,000 hits, < 1e-12")
-    yield _orbits_exponent("phi' - phi per hit", [[o.step for o in row] for row in orbits], -2, -1)
-    yield _orbits_exponent(
-        "drift of v r over a fixed time", [[o.product for o in row] for row in orbits], -1, 0
-    )
+    return [
+        stated(
+            f"angular momentum at arc hits, {N_ORBITS} orbits: largest relative change",
+            momentum < 1e-12,
+            f"{momentum:.1e}",
+            "rounding of up to 10,000 hits, < 1e-12",
+        ),
+        _orbits_exponent("phi' - phi per hit", [[o.step for o in row] for row in orbits], -2, -1),
+        _orbits_exponent(
+            "drift of v r over a fixed time", [[o.product for o in row] for row in orbits], -1, 0
+        ),
+    ]
 
 
-def impact_angle(evidence: ClaimEvidence) -> Iterator[Check]:
+def impact_angle(evidence: ClaimEvidence) -> list[Check]:
     """C6: phi_hat through the breathing cap, at impacts and between them."""
     orbits = _orbits(evidence.steppers.trajectory, evidence.seed)
-    for what, name in (("at impacts", "angle"), ("half-way between impacts", "between")):
-        drifts = [[getattr(orbit, name) for orbit in row] for row in orbits]
-        yield _orbits_exponent(f"largest change of phi_hat {what} over a fixed time", drifts, -1, 0)
+    return [
+        _orbits_exponent(
+            f"largest change of phi_hat {what} over a fixed time",
+            [[getattr(orbit, name) for orbit in row] for row in orbits],
+            -1,
+            0,
+        )
+        for what, name in (("at impacts", "angle"), ("half-way between impacts", "between"))
+    ]
 
 
 class Orbit(NamedTuple):
@@ -117,8 +127,13 @@ def _orbit(
 def _orbits_exponent(what: str, rows: list[list[float]], exponent: int, rival: int) -> Check:
     """Compare the exponent of v with an expected one; its error is of the mean over orbits."""
     fits = [theory.fit_power(SPEEDS, row, np.full(len(row), 0.1), (-1.0, -2.0)).exponent for row in rows]
-    label = f"{what}: exponent of v, {len(rows)} orbits"
-    return close(label, mean(fits), exponent, scale=0.5, against=(f"{rival}", rival))
+    return close(
+        f"{what}: exponent of v, {len(rows)} orbits",
+        mean(fits),
+        exponent,
+        scale=0.5,
+        against=(f"{rival}", rival),
+    )
 
 
 def invariants(evidence: ClaimEvidence) -> Iterator[Check]:
@@ -138,10 +153,9 @@ def invariants(evidence: ClaimEvidence) -> Iterator[Check]:
         "c = 0, log(E V) at half a cycle: spread against E0", free, [spread(c) for c in changes], -0.25
     )
     found = predicted(free[-1])
-    drift = float(found.zone([math.pi])[1][0]) / 4
     yield close(
         f"{free[-1].run.name}: its mean, less the predicted drift",
-        mean(changes[-1]).less(drift),
+        mean(changes[-1]).less(float(found.zone([math.pi])[1][0]) / 4),
         0.0,
         band=found.next_order.mean_s,
     )
@@ -162,9 +176,7 @@ def log_volume(sample: Sample, phase: float) -> float:
 
 def _exponent(what: str, samples: list[Sample], values: list[Mean], exponent: float) -> Check:
     """Compare the exponent of E0 with an expected one, the next order, ~ 1/v, being fitted beside it."""
-    energies = [sample.run.energy for sample in samples]
-    found, errors = np.array(values).T
-    fit = theory.fit_power(energies, found, errors, (-0.5,))
+    fit, energies = fitted(samples, values, -0.5), [sample.run.energy for sample in samples]
     return close(
         what,
         (fit.exponent, fit.exponent_error),
@@ -185,8 +197,10 @@ def volumes(evidence: ClaimEvidence) -> Iterator[Check]:
         inside, in_cap, in_island = _points(scene, 2 * math.pi * phase, n, random)
         total = now.v_cap + now.v_stem
         label = f"moving cap at {phase:g} of its cycle"
-        yield close(f"{label}: V_cap / V", share(in_cap[inside]), now.v_cap / total)
-        yield close(f"{label}: V_ell / V_cap", share(in_island[inside & in_cap]), now.v_ell / now.v_cap)
+        yield from [
+            close(f"{label}: V_cap / V", share(in_cap[inside]), now.v_cap / total),
+            close(f"{label}: V_ell / V_cap", share(in_island[inside & in_cap]), now.v_ell / now.v_cap),
+        ]
     sample = evidence.sample("frozen-mushroom@1e8")
     still = theory.volumes_at(fp, load("frozen-mushroom"), 0.0)
     yield close(
@@ -202,7 +216,6 @@ def _points(
     scene: Scene, t: float, n: int, random: np.random.Generator
 ) -> tuple[BoolArray, BoolArray, BoolArray]:
     """Draw points in a box around the table; tell which lie in it, in the cap, in the island."""
-    assert isinstance(scene, Mushroom)
     table = table_at(fp, scene, t)
     r, h, w = table.r, table.h, table.w
     x, y, turn = random.uniform(-r, r, n), random.uniform(-h, r, n), random.uniform(0, 2 * np.pi, n)
@@ -212,24 +225,24 @@ def _points(
     return in_cap | in_stem, in_cap, in_cap & (momentum >= w)
 
 
-def release(evidence: ClaimEvidence) -> Iterator[Check]:
+def release(evidence: ClaimEvidence) -> list[Check]:
     """L4: captured at t_in, released when nu returns."""
     samples = evidence.samples(*LADDER[1:6])
     gaps = [nu_gap(sample) for sample in samples]
-    sizes = []
-    for gap in gaps:
-        square = mean(gap**2)
-        root = math.sqrt(square.value)
-        sizes.append(Mean(root, square.error / (2 * root)))
-    yield _exponent("nu(t_out) - nu(t_in): root mean square against E0", samples, sizes, -0.5)
+    sizes = [mean(gap**2).root() for gap in gaps]
     largest = max(
         float(np.max(np.abs(gap))) * sample.speed for gap, sample in zip(gaps, samples, strict=True)
     )
     bound = _largest_gap(samples[0])
-    what = "largest |nu(t_out) - nu(t_in)| v at any energy"
-    yield stated(
-        what, largest < bound, f"{largest:.2f}", f"< {bound:.2f}, twice a chord's and the angle's drift"
-    )
+    return [
+        _exponent("nu(t_out) - nu(t_in): root mean square against E0", samples, sizes, -0.5),
+        stated(
+            "largest |nu(t_out) - nu(t_in)| v at any energy",
+            largest < bound,
+            f"{largest:.2f}",
+            f"< {bound:.2f}, twice a chord's and the angle's drift",
+        ),
+    ]
 
 
 def _largest_gap(sample: Sample) -> float:
@@ -240,19 +253,16 @@ def _largest_gap(sample: Sample) -> float:
     moved by r'' dt^2 / 2 beyond what the speed lost, dt = 2 r cos(phi)/v; and sin(phi) = L/(v r) as much.
     """
     scene = scene_of(sample.run)
-    assert isinstance(scene, Mushroom)
     arc, mouth = bounds(laws(scene)["r"]), bounds(laws(scene)["nu"])
-    drift = 2 * arc.slope + cycle_length(scene) * arc.slope**2 / arc.lowest
-    return float(2 * 2 * arc.highest * mouth.slope + drift)
+    return float(
+        2 * 2 * arc.highest * mouth.slope + (2 * arc.slope + cycle_length(scene) * arc.slope**2 / arc.lowest)
+    )
 
 
 def nu_gap(sample: Sample) -> FloatArray:
     """Return nu(t_out) - nu(t_in) of the captured of a moving-cap run."""
-    scene = scene_of(sample.run)
-    assert isinstance(scene, Mushroom)
     t_in, t_out = (t[sample.captured] for t in sample.first_stay)
-    gap: FloatArray = 0.4 * (np.cos(t_out) - np.cos(t_in))  # nu = 0.6 + 0.4 cos t
-    return gap
+    return np.asarray(0.4 * (np.cos(t_out) - np.cos(t_in)))  # nu = 0.6 + 0.4 cos t
 
 
 def energy_through_the_cycle(evidence: ClaimEvidence) -> Iterator[Check]:
@@ -296,8 +306,7 @@ def zone_share(sample: Sample, times: FloatArray) -> FloatArray:
     """Return the share of particles in the chaotic zone at each time."""
     t_in, t_out = (np.sort(t[sample.captured]) for t in sample.first_stay)
     caught, freed = (np.searchsorted(t, times, side="right") for t in (t_in, t_out))
-    found: FloatArray = 1 - (caught - freed) / sample.n
-    return found
+    return np.asarray(1 - (caught - freed) / sample.n)
 
 
 def population_through_the_cycle(evidence: ClaimEvidence) -> Iterator[Check]:
@@ -310,10 +319,13 @@ def population_through_the_cycle(evidence: ClaimEvidence) -> Iterator[Check]:
         for k in range(every - 1, len(times), every):
             p = float(expected[k])
             error = math.sqrt(max(p * (1 - p), 1 / sample.n) / sample.n)
-            band = abs(p - float(earlier[k])) + left.p_nc
-            what = f"{run}: share in the chaotic zone at phase {sample.run.phases[k]:g}"
-            rival = ("nobody is captured", 1.0)
-            yield close(what, (float(measured[k]), error), p, band=band, against=rival)
+            yield close(
+                f"{run}: share in the chaotic zone at phase {sample.run.phases[k]:g}",
+                (float(measured[k]), error),
+                p,
+                band=abs(p - float(earlier[k])) + left.p_nc,
+                against=("nobody is captured", 1.0),
+            )
 
 
 def work(evidence: ClaimEvidence) -> Iterator[Check]:

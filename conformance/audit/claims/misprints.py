@@ -7,6 +7,7 @@ nothing is recorded.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from decimal import ROUND_HALF_EVEN, Decimal
 from typing import Any
 
 import mpmath
@@ -15,16 +16,14 @@ from mpmath import fp
 
 import scene as scenes
 import theory
+from conformance.audit.claim import DIGITS, Check, ClaimEvidence, Form
 from conformance.audit.claims.broadened import captured_change
-from conformance.audit.claims.printed import rounds_to
-from conformance.audit.evidence import DIGITS, ClaimEvidence
-from conformance.audit.finding import Check, Form
 from conformance.audit.runs import scene_of
 from conformance.audit.tolerances import close, exact, mean, stated
 from scene import State
 from scene.geometry import table_at
-from scene.laws import BangBang, bounds, value
-from scene.tables import Mushroom, cycle_length
+from scene.laws import bounds, value
+from scene.tables import Mushroom, cycle_length, laws
 
 FORMS: tuple[Form, Form] = ("printed", "corrected")
 ZERO = 1e-12  # float64 sums of a few hundred terms of order 10
@@ -37,7 +36,19 @@ def rounds(what: str, printed: str, value: Any, form: Form) -> Check:
     return Check(what, rounds_to(printed, value), printed, float(value), form=form)
 
 
-def half_angle(evidence: ClaimEvidence) -> Iterator[Check]:
+def rounds_to(printed: str, value: Any) -> bool:
+    """Tell whether a number, rounded to as many decimals as were printed, is the printed one."""
+    number = Decimal(printed)
+    exact = Decimal(mpmath.nstr(mpmath.mpf(value), 30, min_fixed=-mpmath.inf, max_fixed=mpmath.inf))
+    return exact.quantize(number, ROUND_HALF_EVEN) == number
+
+
+def half_unit(printed: str) -> float:
+    """Return half a unit of the last printed digit."""
+    return 0.5 * 10.0 ** int(Decimal(printed).as_tuple().exponent)
+
+
+def half_angle(evidence: ClaimEvidence) -> list[Check]:
     """M1: the mouth as printed, sin²(t), and with the half angle."""
     try:
         scenes.load("moving-cap-as-printed")
@@ -50,17 +61,19 @@ def half_angle(evidence: ClaimEvidence) -> Iterator[Check]:
         nu=scenes.Fourier(0.6, 1.0, (0.0, 0.4)),
     )
     as_printed, corrected = evidence.predict(upright), evidence.predict("moving-cap")
-    yield stated("sin²(t): the table is valid through the cycle", is_valid, message, "valid", form="printed")
-    yield stated(
-        "sin²(t), slope 0: energy grows",
-        bool(as_printed.m1 > ZERO),
-        f"m1 = {mpmath.nstr(as_printed.m1, 3)}: t and pi - t see the same r, h",
-        "m1 > 0",
-        form="printed",
-    )
-    yield stated("sin²(t/2): the table is valid", True, "valid, by exact algebra", "valid", form="corrected")
-    yield rounds("sin²(t/2): m1", "0.122768", corrected.m1, "corrected")
-    yield rounds("sin²(t/2): p_nc", "0.38474", corrected.p_nc, "corrected")
+    return [
+        stated("sin²(t): the table is valid through the cycle", is_valid, message, "valid", form="printed"),
+        stated(
+            "sin²(t), slope 0: energy grows",
+            bool(as_printed.m1 > ZERO),
+            f"m1 = {mpmath.nstr(as_printed.m1, 3)}: t and pi - t see the same r, h",
+            "m1 > 0",
+            form="printed",
+        ),
+        stated("sin²(t/2): the table is valid", True, "valid, by exact algebra", "valid", form="corrected"),
+        rounds("sin²(t/2): m1", "0.122768", corrected.m1, "corrected"),
+        rounds("sin²(t/2): p_nc", "0.38474", corrected.p_nc, "corrected"),
+    ]
 
 
 def signs(evidence: ClaimEvidence) -> Iterator[Check]:
@@ -77,8 +90,13 @@ def signs(evidence: ClaimEvidence) -> Iterator[Check]:
     )
     for scene, label, form in cases:
         turn = loop_area(scene)
-        what = f"{label}: the loop runs clockwise, as the caption of the cycle's figure says"
-        yield stated(what, turn < 0, f"signed area {turn:+.4f}", "area < 0", form=form)
+        yield stated(
+            f"{label}: the loop runs clockwise, as the caption of the cycle's figure says",
+            turn < 0,
+            f"signed area {turn:+.4f}",
+            "area < 0",
+            form=form,
+        )
 
 
 def loop_area(name: str) -> float:
@@ -105,12 +123,11 @@ def signed_area(x: Sequence[float], y: Sequence[float]) -> float:
 def radius_squared(evidence: ClaimEvidence) -> Iterator[Check]:
     """M3: the half disk x² + y² <= r has an area ~ r, that of r² has r²; E V_cap is kept by the captured."""
     sample = evidence.sample("moving-cap@1e7")
-    table = scene_of(sample.run)
-    assert isinstance(table, Mushroom)
-    first, last = (fp.log(value(fp, table.r, 2 * fp.pi * phase)) for phase in (7 / 16, 9 / 16))
+    r = laws(scene_of(sample.run))["r"]
+    first, last = (fp.log(value(fp, r, 2 * fp.pi * phase)) for phase in (7 / 16, 9 / 16))
     gain = captured_change(sample, 6, 8)
     # E is seen since the last hit, half a chord before on average, in which log r changes by u/v.
-    band = 2 * float(bounds(table.r).slope) / sample.speed / abs(last - first)
+    band = 2 * float(bounds(r).slope) / sample.speed / abs(last - first)
     for power, form in zip((1, 2), FORMS, strict=True):
         what = f"x² + y² <= r{'²' if power == 2 else ''}: E goes as 1 / area of the cap, as r to the power"
         found = mean(-gain / (last - first))
@@ -127,12 +144,18 @@ def exponent_sign(evidence: ClaimEvidence) -> Iterator[Check]:
             integral = _capture_integral(table)
             minus, plus = mpmath.exp(-integral), mpmath.exp(integral)
         theirs = evidence.predict(table).p_nc
-        yield stated(
-            f"exp(-∫), {name}: a probability", bool(minus <= 1), mpmath.nstr(minus, 8), "<= 1", form="printed"
-        )
-        yield rounds(f"exp(-∫), {name}: p_nc", paper, minus, "printed")
-        yield rounds(f"exp(+∫), {name}: p_nc", paper, plus, "corrected")
-        yield exact(f"exp(+∫), {name}: eq. (ps)", plus, theirs, 10.0 ** (5 - DIGITS), form="corrected")
+        yield from [
+            stated(
+                f"exp(-∫), {name}: a probability",
+                bool(minus <= 1),
+                mpmath.nstr(minus, 8),
+                "<= 1",
+                form="printed",
+            ),
+            rounds(f"exp(-∫), {name}: p_nc", paper, minus, "printed"),
+            rounds(f"exp(+∫), {name}: p_nc", paper, plus, "corrected"),
+            exact(f"exp(+∫), {name}: eq. (ps)", plus, theirs, 10.0 ** (5 - DIGITS), form="corrected"),
+        ]
 
 
 def _capture_integral(table: scenes.Scene) -> Any:
@@ -145,14 +168,11 @@ def _capture_integral(table: scenes.Scene) -> Any:
 
 def fixed_cap(table: scenes.Scene) -> tuple[Any, Any, Any, Any]:
     """Return w0, w1 and h while the mouth closes and while it opens, of a scene of sec. 4.1."""
-    assert isinstance(table, Mushroom)
-    assert isinstance(table.w, BangBang)
-    assert isinstance(table.h, BangBang)
-    knots = table.w.knots
+    knots, depths = (laws(table)[name].knots for name in ("w", "h"))  # type: ignore[union-attr]
     closing = next(i for i in range(len(knots) - 1) if knots[i + 1][1] < knots[i][1])
     opening = next(i for i in range(len(knots) - 1) if knots[i + 1][1] > knots[i][1])
     w1, w0 = mpmath.mpf(knots[closing][1]), mpmath.mpf(knots[closing + 1][1])
-    return w0, w1, mpmath.mpf(table.h.knots[closing][1]), mpmath.mpf(table.h.knots[opening][1])
+    return w0, w1, mpmath.mpf(depths[closing][1]), mpmath.mpf(depths[opening][1])
 
 
 def island_slope(w: Any) -> Any:
@@ -177,11 +197,21 @@ def cone(evidence: ClaimEvidence) -> Iterator[Check]:
     lowest = float(y.min())
     for end, form in zip((now.h, -now.h), FORMS, strict=True):
         label = "y = h" if end > 0 else "y = -h"
-        what = f"{label}: the end of the cone, met {floor.sum()} times, is at y"
-        yield exact(what, float(y[floor].mean()), end, ZERO * now.h, form=form)
+        yield exact(
+            f"{label}: the end of the cone, met {floor.sum()} times, is at y",
+            float(y[floor].mean()),
+            end,
+            ZERO * now.h,
+            form=form,
+        )
         within = np.all((y[sides] - min(end, 0)) * (max(end, 0) - y[sides]) >= 0)
-        what = f"{label}: its sides are met between there and the mouth only"
-        yield stated(what, bool(within), f"y from {lowest:.4f}", "all of them", form=form)
+        yield stated(
+            f"{label}: its sides are met between there and the mouth only",
+            bool(within),
+            f"y from {lowest:.4f}",
+            "all of them",
+            form=form,
+        )
     off = np.abs(np.abs(x[sides]) - now.half_width(y[sides])).max()
     yield exact(
         "its sides are met where |x| = w + y tan theta", float(off), 0, ZERO * now.w, form="corrected"
@@ -197,28 +227,34 @@ def loop_plane(evidence: ClaimEvidence) -> Iterator[Check]:
     result = evidence.predict("moving-cap-trivial")
     grows = abs(result.m1) > ZERO
     m1 = f"m1 = {mpmath.nstr(result.m1, 3)}, p_nc = {mpmath.nstr(result.p_nc, 6)}"
-    yield stated(
-        "plane (V_cha, flux): an area means growth",
-        (abs(summary) > ZERO) == grows,
-        f"area {summary:.4g}, yet {m1}",
-        "area and growth, or neither",
-        form="printed",
-    )
-    yield stated(
-        "plane (V_ell/V_cap, V_cap/V): no area, and no growth",
-        abs(section) <= ZERO and not grows,
-        f"area {section:.1g}, {m1}",
-        "neither",
-        form="corrected",
-    )
+    yield from [
+        stated(
+            "plane (V_cha, flux): an area means growth",
+            (abs(summary) > ZERO) == grows,
+            f"area {summary:.4g}, yet {m1}",
+            "area and growth, or neither",
+            form="printed",
+        ),
+        stated(
+            "plane (V_ell/V_cap, V_cap/V): no area, and no growth",
+            abs(section) <= ZERO and not grows,
+            f"area {section:.1g}, {m1}",
+            "neither",
+            form="corrected",
+        ),
+    ]
     for name in ("moving-cap", "fixed-cap-anticlockwise"):
         turn, found = loop_area(name), evidence.predict(name)
-        text = f"area {turn:.4f}, m1 = {mpmath.nstr(found.m1, 6)}"
-        what = f"plane (V_ell/V_cap, V_cap/V): {name} has an area, and growth"
-        yield stated(what, abs(turn) > ZERO and found.m1 > 0, text, "both", form="corrected")
+        yield stated(
+            f"plane (V_ell/V_cap, V_cap/V): {name} has an area, and growth",
+            abs(turn) > ZERO and found.m1 > 0,
+            f"area {turn:.4f}, m1 = {mpmath.nstr(found.m1, 6)}",
+            "both",
+            form="corrected",
+        )
 
 
-def measures(evidence: ClaimEvidence) -> Iterator[Check]:
+def measures(evidence: ClaimEvidence) -> list[Check]:
     """M13: whose share p_cha is, and which volume the set H = E has."""
     table = Mushroom(r=1.0, h=scenes.Fourier(1.0, 1.0, (), (0.5,)), nu=scenes.Fourier(0.5, 1.0, (0.4,)))
     start = theory.volumes_at(fp, table, 0.0)  # nu = 0.9 at most: an island remains
@@ -227,16 +263,36 @@ def measures(evidence: ClaimEvidence) -> Iterator[Check]:
     energy, area = 2.0, 1.0
     printed = 2 * fp.pi * fp.sqrt(2 * energy) * area
     rate = 2 * fp.pi * ((energy + 1) - (energy - 1)) * area / 2  # of the volume below H = E: a disk times A
-    what = "n_cha/n_0 and n_cha/n_cha(t0) agree for any loop (nu from 0.1 to 0.9)"
-    yield exact(what, p_nc * free, p_nc, ZERO, form="printed")
-    what = "they agree when nu reaches 1, as in every loop of the paper"
-    yield exact(
-        what, theory.volumes_at(fp, scenes.load("moving-cap"), 0.0).v_ell, 0.0, ZERO, form="corrected"
-    )
-    what = "volume of H = E, E = 2, A = 1, as Liouville's measure: 2 pi sqrt(2E) A"
-    yield exact(what, printed, rate, ZERO, form="printed")
-    what = "2 pi A for every E: as V(D0) is defined, and all the paper's ratios need"
-    yield exact(what, 2 * fp.pi * area, rate, ZERO, form="corrected")
+    return [
+        exact(
+            "n_cha/n_0 and n_cha/n_cha(t0) agree for any loop (nu from 0.1 to 0.9)",
+            p_nc * free,
+            p_nc,
+            ZERO,
+            form="printed",
+        ),
+        exact(
+            "they agree when nu reaches 1, as in every loop of the paper",
+            theory.volumes_at(fp, scenes.load("moving-cap"), 0.0).v_ell,
+            0.0,
+            ZERO,
+            form="corrected",
+        ),
+        exact(
+            "volume of H = E, E = 2, A = 1, as Liouville's measure: 2 pi sqrt(2E) A",
+            printed,
+            rate,
+            ZERO,
+            form="printed",
+        ),
+        exact(
+            "2 pi A for every E: as V(D0) is defined, and all the paper's ratios need",
+            2 * fp.pi * area,
+            rate,
+            ZERO,
+            form="corrected",
+        ),
+    ]
 
 
 CHECKS = {

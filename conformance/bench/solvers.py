@@ -1,4 +1,4 @@
-"""The contenders: steppers that step a workload's states and say how long that took."""
+"""The solvers: steppers that step a workload's states and say how long that took."""
 
 from __future__ import annotations
 
@@ -16,25 +16,20 @@ from conformance.bench.workloads import SINGLE_STEPS, Workload
 from conformance.grading.agreement import Answer
 from conformance.suite.process import Trouble
 from conformance.suite.promises import timing
-from conformance.suite.run import put
 from conformance.suite.session import Limits, Session, missing
-from conformance.vectors import Vector
 from scene import Scene, State, to_data
 
 Family = Literal[
     "proof", "compiled", "interpreted", "time-stepping", "fixed-step", "lean", "example", "command"
 ]
-Ask = Callable[[Vector], dict[str, Any]]  # raises Trouble
+Given = Answer | None  # None: a step that this solver leaves to another
 
 
-Given = Answer | None  # None: a step that this contender leaves to another
-
-
-class Lap(NamedTuple):
+class SolverRun(NamedTuple):
     """One run over a workload.
 
     Attributes:
-        ns: nanoseconds per step (or per collision, where the contender follows the states on).
+        ns: nanoseconds per step (or per collision, where the solver follows the states on).
         answers: one for each question.
         lasted: nanoseconds in all.
     """
@@ -44,55 +39,51 @@ class Lap(NamedTuple):
     lasted: float
 
 
-class Contender(NamedTuple):
+class Solver(NamedTuple):
     """A stepper.
 
     Attributes:
         name: as in the plot.
         family: what kind of thing it is.
-        run: (workload, n_times) -> a lap in which every step is taken n_times; raises Trouble.
+        run: (workload, n_times) -> a run in which every step is taken n_times; raises Trouble.
         serves: the workloads it can run.
         steps: one step from each of many states, quickly; None where there is no such thing.
     """
 
     name: str
     family: Family
-    run: Callable[[Workload, int], Lap]
+    run: Callable[[Workload, int], SolverRun]
     serves: tuple[str, ...] = SINGLE_STEPS
     steps: Callable[[Scene, Sequence[State]], Sequence[Given]] | None = None
 
 
-def by_call(name: str, family: Family, step: Callable[[Scene, State, float], Given]) -> Contender:
-    """Return a Python function of one step as a contender; the call is part of its time."""
+def by_call(name: str, family: Family, step: Callable[[Scene, State, float], Given]) -> Solver:
+    """Return a Python function of one step as a solver; the call is part of its time."""
 
-    def run(workload: Workload, n_times: int) -> Lap:
+    def run(workload: Workload, n_times: int) -> SolverRun:
         answers: list[Given] = []
         begin = time.perf_counter_ns()
         for _ in range(n_times):
             answers = [step(workload.scene, q.state, q.t_end) for q in workload.questions]
         ns = time.perf_counter_ns() - begin
-        return Lap(ns / (n_times * len(workload.questions)), answers, ns)
+        return SolverRun(ns / (n_times * len(workload.questions)), answers, ns)
 
-    return Contender(name, family, run)
-
-
-def plain_python() -> Contender:
-    """Return the plain stepper."""
-    return by_call("plain Python", "interpreted", plain.next_collision)
+    return Solver(name, family, run)
 
 
-def time_steppers() -> list[Contender]:
-    """Return scipy's solve_ivp with events, at several tolerances."""
+def in_python() -> list[Solver]:
+    """Return the plain stepper, and scipy's solve_ivp with events, at several tolerances."""
+    integrators = {f"solve_ivp, rtol {rtol:.0e}": next_collision_by(rtol) for rtol in TOLERANCES}
     return [
-        by_call(f"solve_ivp, rtol {rtol:.0e}", "time-stepping", next_collision_by(rtol))
-        for rtol in TOLERANCES
+        by_call("plain Python", "interpreted", plain.next_collision),
+        *(by_call(name, "time-stepping", step) for name, step in integrators.items()),
     ]
 
 
 def by_command(
     name: str, family: Family, command: Sequence[str], stack: ExitStack, limits: Limits | None = None
-) -> tuple[Contender, Ask]:
-    """Return a command that speaks protocol 1 as a contender that times itself, and how it answers a vector.
+) -> Solver:
+    """Return a command that speaks protocol 1 as a solver that times itself.
 
     Args:
         name: as in the plot.
@@ -109,7 +100,7 @@ def by_command(
     session.start()
     clock_trouble = cache(partial(_clock_trouble, session))  # its clock is looked at once
 
-    def run(workload: Workload, n_times: int) -> Lap:
+    def run(workload: Workload, n_times: int) -> SolverRun:
         assert session.introduction is not None
         scene = to_data(workload.scene)
         if lacking := missing(session.introduction, "time", scene):
@@ -127,13 +118,13 @@ def by_command(
             answers.append(last)
         if (trouble := clock_trouble()) is not None:
             raise trouble
-        return Lap(lasted / (n_times * len(answers)), answers, lasted)
+        return SolverRun(lasted / (n_times * len(answers)), answers, lasted)
 
-    return Contender(name, family, run), partial(put, session)
+    return Solver(name, family, run)
 
 
 def _clock_trouble(session: Session) -> Trouble | None:
-    """Hold what a command says of its time to the clock on this side; a lap is too short to do so."""
+    """Hold what a command says of its time to the clock on this side; a run is too short to do so."""
     try:
         timing.honest_clock(session)
     except Trouble as trouble:

@@ -1,31 +1,21 @@
-"""Our steppers as the benchmark's contenders, and the proofs that all are measured against."""
+"""Our steppers as the benchmark's solvers, and the proofs that all are measured against."""
 
 from __future__ import annotations
 
-import json
 import math
-import os
-import subprocess
-import sys
-import tempfile
 import time
-import tracemalloc
-from functools import partial
 
 import fast
 import reference
-from conformance import plain, vectors
-from conformance.bench.contenders import Ask, Contender, Given, Lap, by_call
+from conformance import plain
 from conformance.bench.growth import FAR, PathFollower, PathPoint
-from conformance.bench.work import SCENE, Cost, Load
+from conformance.bench.solvers import Given, Solver, SolverRun, by_call
 from conformance.bench.workloads import WINDOW, Workload
 from conformance.generator import prover
 from conformance.grading.agreement import Answer, Enclosed, exact
 from conformance.grading.error import Matrix
-from fast import __main__ as fast_protocol
 from fast.batch import careful_steps, fine_steps, flights, lane_steps
-from reference import __main__ as proof
-from scene import Collision, Scene, State, load
+from scene import Collision, Scene, State
 
 DIGITS = (15, 30, 50, 100, 200)
 PATH_DIGITS = (30, 60)  # working decimals of the proofs whose growth is followed
@@ -33,11 +23,6 @@ LANES_SERVE = (
     "breathing-disk", "fixed-cap", "moving-cap-1e4", "moving-cap-1e7", "moving-cap-1e12", "two-harmonics",
     "sixteen-harmonics", "moving-slope", "bang-bang", "one-path",
 )  # fmt: skip
-COMPILED = {
-    "step": "fast.next_collision(s, p, 1.0)",
-    "trajectory": "fast.trajectory(s, p, 1)",
-    "ensemble": "fast.simulate(s, n_particles=1, energy=10.0)",
-}
 
 
 def linearise(scene: Scene, state: State, t_end: float) -> tuple[Collision, Matrix]:
@@ -52,25 +37,16 @@ def prove_path(scene: Scene, state: State, n_collisions: int) -> list[PathPoint]
     return _places(reference.trajectory(scene, state, n_collisions, digits=20))
 
 
-def our_contenders() -> list[Contender]:
+def our_solvers() -> list[Solver]:
     """Return our steppers: the reference at several precisions, and the fast one's five ways."""
     return [
         *(_proof(digits) for digits in DIGITS),
         by_call("fast, a call", "compiled", fast.next_collision),
-        Contender("fast, careful", "compiled", _careful),
-        Contender("fast, pairs", "compiled", _fine),
-        Contender("fast, lanes", "compiled", _lanes, LANES_SERVE, lane_steps),
-        Contender("fast, trajectory", "compiled", _trajectory, ("one-path",)),
+        Solver("fast, careful", "compiled", _careful),
+        Solver("fast, pairs", "compiled", _fine),
+        Solver("fast, lanes", "compiled", _lanes, LANES_SERVE, lane_steps),
+        Solver("fast, trajectory", "compiled", _trajectory, ("one-path",)),
     ]
-
-
-def our_askers() -> dict[str, Ask]:
-    """Return how each of our steppers answers a vector."""
-    return {
-        "proof": partial(vectors.answer, step=proof.step, follow=proof.follow),
-        "fast": partial(vectors.answer, step=fast.next_collision, follow=fast_protocol.follow),
-        "plain Python": partial(vectors.answer, step=plain.next_collision, follow=plain.trajectory),
-    }
 
 
 def our_followers() -> dict[str, PathFollower]:
@@ -83,7 +59,7 @@ def our_followers() -> dict[str, PathFollower]:
     }
 
 
-def _proof(digits: int) -> Contender:
+def _proof(digits: int) -> Solver:
     def step(scene: Scene, state: State, t_end: float) -> Answer:
         found = reference.next_collision(scene, state, t_end, digits=digits)
         if isinstance(found, reference.Collision):
@@ -93,12 +69,12 @@ def _proof(digits: int) -> Contender:
     return by_call(f"proof, {digits} digits", "proof", step)
 
 
-def _careful(workload: Workload, n_times: int) -> Lap:
+def _careful(workload: Workload, n_times: int) -> SolverRun:
     answers, seconds = careful_steps(workload.scene, [q.state for q in workload.questions], n_times)
-    return Lap(seconds / (n_times * len(answers)) * 1e9, list(answers), seconds * 1e9)
+    return SolverRun(seconds / (n_times * len(answers)) * 1e9, list(answers), seconds * 1e9)
 
 
-def _fine(workload: Workload, n_times: int) -> Lap:
+def _fine(workload: Workload, n_times: int) -> SolverRun:
     paths, seconds = fine_steps(workload.scene, [q.state for q in workload.questions], n_times)
     answers: list[Given] = []
     for path in paths:
@@ -107,10 +83,10 @@ def _fine(workload: Workload, n_times: int) -> Lap:
             answers.append(exact(path.walls[0], (dt, *place)))
         else:
             answers.append(path.outcome)
-    return Lap(seconds / (n_times * len(answers)) * 1e9, answers, seconds * 1e9)
+    return SolverRun(seconds / (n_times * len(answers)) * 1e9, answers, seconds * 1e9)
 
 
-def _lanes(workload: Workload, n_times: int) -> Lap:
+def _lanes(workload: Workload, n_times: int) -> SolverRun:
     """Time the engine on flights that go on from the questions; grade one round of its lanes on these."""
     states = [q.state for q in workload.questions]
     copies = -(-128 // len(states))  # enough to fill both pools
@@ -120,10 +96,10 @@ def _lanes(workload: Workload, n_times: int) -> Lap:
     for _ in range(n_times):
         n, lasted = flights(workload.scene, followed, t_end)
         n_collisions, seconds = n_collisions + n, seconds + lasted
-    return Lap(seconds / n_collisions * 1e9, list(lane_steps(workload.scene, states)), seconds * 1e9)
+    return SolverRun(seconds / n_collisions * 1e9, list(lane_steps(workload.scene, states)), seconds * 1e9)
 
 
-def _trajectory(workload: Workload, n_times: int) -> Lap:
+def _trajectory(workload: Workload, n_times: int) -> SolverRun:
     """Time a path from the first question, the call and its arrays included; grade a step from each."""
     states = [q.state for q in workload.questions]
     paths = [fast.trajectory(workload.scene, state, 1) for state in states]
@@ -132,7 +108,7 @@ def _trajectory(workload: Workload, n_times: int) -> Lap:
         fast.trajectory(workload.scene, states[0], workload.length)
     ns = time.perf_counter_ns() - begin
     answers: list[Given] = [Collision(path.walls[0], *path.steps[0].tolist()) for path in paths]
-    return Lap(ns / (n_times * workload.length), answers, ns)
+    return SolverRun(ns / (n_times * workload.length), answers, ns)
 
 
 def _plain_path(scene: Scene, state: State, n_collisions: int) -> list[PathPoint]:
@@ -171,37 +147,3 @@ def _places(path: reference.Trajectory) -> list[PathPoint]:
         width = max(max(widths[:2]) / size, max(widths[2:]) / speed)
         found.append(PathPoint(step.wall, x, y, vx, vy, width))
     return found
-
-
-def run_ensemble(load_of: Load) -> Cost:
-    """Run an ensemble and say what it took."""
-    tracemalloc.start()
-    try:
-        done = fast.simulate(
-            load(SCENE),
-            n_particles=load_of.particles,
-            energy=load_of.energy,
-            n_cycles=load_of.cycles,
-            threads=load_of.threads,
-        )
-        _, peak = tracemalloc.get_traced_memory()
-    finally:
-        tracemalloc.stop()
-    return Cost(done.seconds, int(done.n_collisions.sum()), peak)
-
-
-def compile_times() -> dict[str, float]:
-    """Return the seconds that each entry takes to compile in a new process with an empty cache."""
-    lines = ["import json, time, fast, scene", "s = scene.load('moving-cap')"]
-    lines += ["p = scene.State(0.0, 0.1, 0.2, 3.0, 4.0)", "found = {}"]
-    for name, call in COMPILED.items():
-        lines += ["begin = time.perf_counter()", call, f"found[{name!r}] = time.perf_counter() - begin"]
-    lines.append("print(json.dumps(found))")
-    with tempfile.TemporaryDirectory() as folder:
-        done = subprocess.run(
-            [sys.executable, "-c", "\n".join(lines)],
-            env={**os.environ, "NUMBA_CACHE_DIR": folder},
-            capture_output=True,
-            check=True,
-        )
-    return {name: round(seconds, 1) for name, seconds in json.loads(done.stdout).items()}

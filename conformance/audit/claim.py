@@ -1,4 +1,4 @@
-"""What an entry of the ledger is, what it finds, and the verdict that follows from its checks.
+"""What a claim is, the evidence it is held against, its checks, and the verdict that follows from them.
 
 A check compares one number, or decides one statement. Its form is `claim` for what the paper says,
 `printed` for a form that is expected to fail, `corrected` for the form that must then hold.
@@ -6,12 +6,20 @@ A check compares one number, or decides one statement. Its form is `claim` for w
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
+from functools import cache
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
-if TYPE_CHECKING:
-    from conformance.audit.evidence import ClaimEvidence
+import theory
+from conformance.audit.runs import RUNS, Sample, Simulate, Size, scene_of
+from scene import Scene, load
+from theory.distribution import Energies
 
+if TYPE_CHECKING:
+    from fast import Collisions, Flow
+
+DIGITS = 30
+Predict = Callable[[Scene, int], theory.Prediction]
 Verdict = Literal[
     "confirmed",
     "misprint",
@@ -58,11 +66,11 @@ class Check(NamedTuple):
     power: float | None = None
 
 
-class Entry(NamedTuple):
+class Claim(NamedTuple):
     """One statement of the paper, or about it, and how it is checked.
 
     Attributes:
-        id: of the ledger.
+        id: of the claims.
         where: place in the paper.
         statement: what the paper says; for a misprint, printed and corrected form.
         method: how it is checked.
@@ -84,7 +92,7 @@ class Entry(NamedTuple):
 
 
 class Finding(NamedTuple):
-    """What came of an entry; `seconds` is the time its checks took, simulations apart."""
+    """What came of a claim; `seconds` is the time its checks took, simulations apart."""
 
     id: str
     verdict: Verdict
@@ -92,11 +100,11 @@ class Finding(NamedTuple):
     seconds: float
 
 
-def verdict_of(entry: Entry, checks: list[Check]) -> Verdict:
+def verdict_of(claim: Claim, checks: list[Check]) -> Verdict:
     """Return the verdict that the checks make.
 
     A printed form stands when all its checks hold; then a misprint is "confirmed" after all. Any other
-    failure refutes the entry; a check that cannot tell leaves it open.
+    failure refutes the claim; a check that cannot tell leaves it open.
     """
     printed = [check.holds for check in checks if check.form == "printed"]
     others = [check.holds for check in checks if check.form != "printed"]
@@ -105,7 +113,7 @@ def verdict_of(entry: Entry, checks: list[Check]) -> Verdict:
     if None in others:
         return "indeterminate"
     if not printed or False in printed:
-        return entry.expected
+        return claim.expected
     return "indeterminate" if None in printed else "confirmed"
 
 
@@ -117,3 +125,60 @@ def to_data(finding: Finding) -> dict[str, Any]:
 def from_data(data: dict[str, Any]) -> Finding:
     """Return the finding that plain data hold."""
     return Finding(**{**data, "checks": [Check(**check) for check in data["checks"]]})
+
+
+class AuditSteppers(NamedTuple):
+    """The stepper that the audit simulates with: `fast`, or another with its signatures."""
+
+    simulate: Simulate
+    trajectory: Callable[..., Collisions]
+    flow: Callable[..., Flow]
+
+
+@cache
+def energies_of(name: str) -> Energies:
+    """Return the theory's distribution of energies in a run's scene."""
+    return theory.energies(scene_of(RUNS[name]))
+
+
+class ClaimEvidence:
+    """What the check of one claim looks at.
+
+    Args:
+        samples: by run, those that the claim names.
+        steppers: for claims that follow single particles.
+        size: of the audit.
+        seed: of the audit.
+        threads: for the steppers.
+        predict: theory, or a wrong one that must be found out.
+    """
+
+    def __init__(
+        self,
+        samples: Mapping[str, Sample],
+        steppers: AuditSteppers,
+        *,
+        size: Size = "quick",
+        seed: int = 0,
+        threads: int | None = None,
+        predict: Predict = theory.predict,
+    ) -> None:
+        self._samples, self.steppers = samples, steppers
+        self.size, self.seed, self.threads = size, seed, threads
+        self._predict = predict
+
+    def sample(self, run: str) -> Sample:
+        """Return a run's sample."""
+        return self._samples[run]
+
+    def samples(self, *runs: str) -> list[Sample]:
+        """Return the samples of those runs that this size has."""
+        return [self._samples[run] for run in runs if RUNS[run].n_particles(self.size)]
+
+    def predict(self, scene: str | Scene) -> Any:
+        """Return the theory of one cycle, to DIGITS digits."""
+        return self._predict(load(scene) if isinstance(scene, str) else scene, DIGITS)
+
+    def theory_of(self, sample: Sample) -> Any:
+        """Return the theory of the sample's scene."""
+        return self.predict(scene_of(sample.run))

@@ -32,7 +32,6 @@ from theory.finite_energy.rates import Rates, frozen_rates
 from theory.finite_energy.upright import is_upright, kept_by_the_cap, upright_rate, upright_spread
 from theory.large_deviations import Rarity, loss_probability, rarity
 from theory.prediction import Prediction, cumulants, mean_of, moments, predict, reversed_cycle
-from theory.saddle import Saddle
 from theory.volumes import (
     NotCovered,
     Volumes,
@@ -63,7 +62,6 @@ __all__ = [
     "Prediction",
     "Rarity",
     "Rates",
-    "Saddle",
     "Sum",
     "Volumes",
     "Width",

@@ -163,19 +163,11 @@ def volumes_at(ctx: Any, scene: Scene, t: Any) -> Volumes:
     return volumes_of(ctx, r, nu, h, slope)
 
 
-def shares(ctx: Any, nu: Any) -> tuple[Any, Any]:
-    """Return delta(nu) and 1 - delta(nu), which is right where it is small too: see `free_share`."""
-    return delta(ctx, nu), free_share(ctx, nu)
-
-
-def volumes_of(
-    ctx: Any, r: Any, nu: Any, h: Any, slope: Any, known: tuple[Any, Any] | None = None
-) -> Volumes:
-    """Return all volumes from the table's parameters, nu = w / r; known: the `shares` of nu."""
+def volumes_of(ctx: Any, r: Any, nu: Any, h: Any, slope: Any) -> Volumes:
+    """Return all volumes from the table's parameters, nu = w / r."""
     # The numbers of a scene need no check; most of theory comes by here.
     cap, stem = _over_cap(ctx, r), _over_stem(ctx, nu * r, h, slope)
-    island, free = known or shares(ctx, nu)
-    return Volumes(cap, stem, island * cap, free * cap + stem, nu)
+    return Volumes(cap, stem, delta(ctx, nu) * cap, free_share(ctx, nu) * cap + stem, nu)
 
 
 def in_near_units(scene: Scene) -> tuple[Scene, int, int]:

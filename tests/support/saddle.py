@@ -1,4 +1,4 @@
-"""The sum of many cycles by saddle point, tails included.
+"""The sum of many cycles by saddle point, tails included: what convolutions of the lattice must come to.
 
 With K(q) = log mean exp(q s), the density of log E_n / E0 at n x is
     exp(n (K(q) - q x)) / sqrt(2 pi n K''(q)) (1 + (k4 / 8 - 5 k3^2 / 24) / n),  K'(q) = x,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.stats import chi2, ncx2
 
 from conformance import profiles
 from conformance.audit.claim import Check, ClaimEvidence
@@ -121,7 +121,7 @@ def reversal(evidence: ClaimEvidence) -> list[Check]:
             n_tests=1,
             note=f"p = {chi2.sf(statistic, n_bins):.2g}; {n} particles each way, E0 from {low:.4g}",
             against="a cycle that is its own reverse",
-            power=1.0 if refuted > 2 * bound else None,
+            power=float(ncx2.sf(bound, n_bins, max(refuted - n_bins, 0.0))),
         )
     ]
 

@@ -28,13 +28,13 @@ class Theory(NamedTuple):
 
     Attributes:
         m1, p_nc: predicted.
-        m1_left_out, p_nc_left_out: the size of what that leaves out; None where nobody knows.
+        m1_error, p_nc_error: how far that may be off; None where nobody knows.
     """
 
     m1: float
     p_nc: float
-    m1_left_out: float | None = None
-    p_nc_left_out: float | None = None
+    m1_error: float | None = None
+    p_nc_error: float | None = None
 
 
 def measured(asked: Asked, tally: RunTally) -> dict[str, Any]:
@@ -54,8 +54,8 @@ def measured(asked: Asked, tally: RunTally) -> dict[str, Any]:
     if found is not None and n:
         expected_error = _binomial_error(found.p_nc, n * k)
         pulls = (
-            _pull(mean, found.m1, error, found.m1_left_out),
-            _pull(free, found.p_nc, expected_error, found.p_nc_left_out),
+            _pull(mean, found.m1, error, found.m1_error),
+            _pull(free, found.p_nc, expected_error, found.p_nc_error),
         )
     return {
         "m1": mean,
@@ -70,12 +70,14 @@ def measured(asked: Asked, tally: RunTally) -> dict[str, Any]:
 
 
 def limit_told(asked: Asked, summary: Mapping[str, Any]) -> str | None:
-    """Return a line that tells that theory beside a run is the limit of high energies, where it is.
+    """Return a line that tells that theory beside a run is the limit of high energies, or why there is none.
 
     Args:
         asked: the run.
         summary: as `measured` returns it, or more.
     """
+    if isinstance(asked.scene, Mushroom) and not begins_widest(asked.scene):
+        return _narrow_told(asked.scene)
     # Of one particle m1 has no error, and so no z, at an energy of which theory knows all the same.
     is_of_this_energy = any(summary[z] is not None for z in ("m1_z", "p_nc_z"))
     if summary["m1_theory"] is None or summary["m1"] is None or is_of_this_energy:
@@ -89,6 +91,20 @@ def limit_told(asked: Asked, summary: Mapping[str, Any]) -> str | None:
             " where the slope is not above 0 some flights stay in the stem"
         )
     return told
+
+
+def _narrow_told(scene: Mushroom) -> str:
+    """Say why a cycle that begins with a narrow mouth has no theory, and how to shift it."""
+    import theory
+
+    begin, length = start_time(scene), scene.period
+    now, widest = table_at(fp, scene, begin), theory.Cycle.of(scene, DIGITS)
+    wait = (float(widest.start) - begin) % length
+    return (
+        f"m1_theory, p_nc_theory: none, for the cycle begins at t = {begin:.6g} with its mouth at"
+        f" {float(now.w / now.r):.4g} r, not at its widest, {float(widest.nu_max):.4g} r:"
+        f" some particles start in the island; shift all laws by {-wait!r} in time, to begin where it is"
+    )
 
 
 def leans_inward(scene: Scene) -> bool:
@@ -150,7 +166,7 @@ def predicted(asked: Asked) -> Theory | None:
         return None
     try:
         there = theory.at_energy(asked.scene, asked.energy)
-        slower, left = there.mean_of_exp(-0.5), there.next_order
+        slower, left = there.mean_of_exp(-0.5), there.theory_error
     except (BadInput, theory.NotCovered, theory.NotConverged):
         return Theory(m1, p_nc)
     share = math.fsum(slower**k for k in range(asked.n_cycles)) / asked.n_cycles

@@ -229,7 +229,7 @@ def test_what_other_sources_found_is_found_again(call, tmp_path, monkeypatch):
         "audit/claims.toml",
         "scene/catalogue/moving-cap.toml",
         "fast/kernel/careful.py",
-        "theory/frozen_rates.json",
+        "theory/finite_energy/frozen_rates.json",
     ],
 )
 def test_a_byte_of_the_sources_makes_other_code(tmp_path, monkeypatch, name):

@@ -255,14 +255,30 @@ def test_theory_adds_what_finite_energy_does(command_line):
     assert float(values["m1"]) == pytest.approx(0.044926243)
     assert values["m1_at"] == pytest.approx(0.0469, abs=2e-4)  # the paper's run: 0.0463 +- 0.0009
     assert values["peak_width_at"] == pytest.approx(0.0873, rel=0.02)
-    assert 0 < values["m1_left_out"] < 1e-4
+    assert 0 < values["m1_error"] < 1e-3
+    assert values["v"] == pytest.approx(44721.36)
+    assert 2e4 < values["collisions"] < 2e5
     assert command_line("theory", "ergodic", "--energy", "1e7", "--json")[0] == 0
-    for arguments, words in (
-        (["moving-cap", "--energy", "0"], ["--energy = 0.0"]),
-        (["untilted", "--energy", "1e6"], ["no frozen rates", "untilted"]),
-        (["fixed-cap-anticlockwise", "--energy", "1e4"], ["energy = 10000.0", "too soon"]),
-    ):
-        assert_refused(command_line("theory", *arguments), *words)
+    assert_refused(command_line("theory", "moving-cap", "--energy", "0"), "--energy = 0.0")
+
+
+@pytest.mark.parametrize(
+    ("name", "energy", "why"),
+    [("untilted", 1e6, "no frozen rates of scene 'untilted'"), ("moving-cap", 1e3, "particles so slow")],
+)
+def test_theory_prints_the_limit_where_nothing_is_known_of_an_energy(command_line, name, energy, why):
+    code, out, err = command_line("theory", name, "--energy", energy, "--json")
+    values = json.loads(out)
+    assert code == 0
+    assert err.startswith(why) or why in err
+    assert err.endswith("What is printed is the limit of high energies\n")
+    assert set(values) == {
+        *json.loads(command_line("theory", name, "--json").out),
+        "energy",
+        "v",
+        "collisions",
+    }
+    assert values["v"] == pytest.approx((2 * energy) ** 0.5)
 
 
 def test_simulate_prints_and_saves_the_same_result(command_line, tmp_path):

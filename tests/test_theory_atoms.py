@@ -11,6 +11,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from support.saddle import Saddle
 
 import theory
 from scene import BadInput, BangBang, Mushroom, load
@@ -98,7 +99,7 @@ def test_the_uncaptured_of_a_loop_that_is_its_own_reverse_are_not_lost(n: int) -
 def test_losses_of_as_many_cycles_as_are_allowed() -> None:
     found = energies(load("moving-cap"))
     for n in (2_000, 10_000):
-        saddle = float(theory.Saddle(found).below([0.0], n)[0])
+        saddle = float(Saddle(found).below([0.0], n)[0])
         assert theory.loss_probability(found, n) == pytest.approx(saddle, rel=1 / n)
     for n in (1, 2):
         with pytest.raises(BadInput, match="keeps its energy"):

@@ -11,9 +11,9 @@ from support.depth import deep_among, deep_but
 
 import theory
 from scene import BadInput, Fourier, Mushroom, load
-from theory.blur import FiniteEnergy, _joined, at_energy, blur_cdf
-from theory.course import N_TIMES, Fields
-from theory.rates import PHASES, SPEEDS, frozen_rates, kick_rate, rates_at
+from theory.finite_energy.coefficients import N_TIMES, Fields
+from theory.finite_energy.one_cycle import Atoms, FiniteEnergy, _joined, at_energy, blur_cdf
+from theory.finite_energy.rates import MEMORIES, PHASES, SPEEDS, frozen_rates, kick_rate, rates_at
 
 CYCLES = (
     "fixed-cap-anticlockwise",
@@ -137,7 +137,7 @@ def test_joining_keeps_mass_and_mean() -> None:
     rng = np.random.default_rng(3)
     n = 60_000
     t_in = np.where(rng.random(n) < 0.1, np.nan, rng.random(n))
-    a = theory.blur.Atoms(rng.random(n), rng.standard_normal(n), rng.random(n), rng.random(n), t_in)
+    a = Atoms(rng.random(n), rng.standard_normal(n), rng.random(n), rng.random(n), t_in)
     b = _joined([a])
     assert len(b.gain) <= 40_000 < n
     assert b.weight.sum() == pytest.approx(a.weight.sum())
@@ -206,18 +206,36 @@ def test_no_variance_is_negative_at_any_time_that_is_allowed(asked: tuple[str, f
 @pytest.mark.parametrize("make", [FiniteEnergy, at_energy])
 def test_slow_particles_are_refused_however_they_are_asked_for(make) -> None:
     """The class itself told a peak with a variance of -2.7e9."""
-    with pytest.raises(theory.NotCovered, match="walls turn too soon for particles so slow"):
+    with pytest.raises(theory.NotCovered, match="particles so slow, below a speed of 100"):
         make(load("moving-cap"), 1e-3)
 
 
 def test_the_table_covers_every_phase_with_its_errors() -> None:
     for name in CYCLES:
         rates, _ = frozen_rates(load(name))
-        assert rates.diffusion.shape == (len(PHASES), 2)
-        assert rates.lag.shape == rates.square.shape == (len(PHASES), len(SPEEDS))
-        assert (rates.diffusion_error > 0).all()
-        assert (rates.diffusion_error < 0.3 * rates.diffusion).all()
-        assert (rates.diffusion[:, 1] > rates.diffusion[:, 0] - 5 * rates.diffusion_error.sum(axis=1)).all()
+        assert rates.diffusion.shape == (len(PHASES), len(MEMORIES))
+        assert (rates.diffusion >= 0).all()
+        assert rates.lag.shape == rates.square.shape == rates.depletion.shape == (len(PHASES), len(SPEEDS))
+        whole, error = rates.diffusion.sum(axis=1), rates.diffusion_error.sum(axis=1)
+        assert (error > 0).all()
+        assert (error < 0.4 * whole).all()
+        assert np.median(error / whole) < 0.04
+
+
+@pytest.mark.parametrize("steps", [0.05, 0.7, 30.0])
+def test_kicks_are_remembered_as_their_correlations_say(steps: float) -> None:
+    """However long the memory, in steps of the cycle: a double integral, the speed being half a wave."""
+    size = np.sin(math.pi * (np.arange(N_TIMES) + 0.5) / N_TIMES)
+    fields = Fields.__new__(Fields)
+    fields._step = 1.0
+    speed = np.full((1, N_TIMES), steps * MEMORIES[2])
+    diffusion = np.zeros((len(MEMORIES), 1, N_TIMES))
+    diffusion[2] = size**2 * speed
+    found = fields._remembered(diffusion, speed, np.zeros(N_TIMES))
+    fine = np.repeat(size, 4)
+    apart = np.abs(np.subtract.outer(np.arange(4 * N_TIMES), np.arange(4 * N_TIMES))) / 4 * steps
+    truth = fine @ (np.exp(-apart) * steps / 2) @ fine / 16 if steps < 1 else (size**2).sum()
+    assert found.sum() == pytest.approx(truth, rel=0.01)
 
 
 def known_at(name: str, energy: float) -> FiniteEnergy | None:
@@ -238,7 +256,7 @@ def test_at_any_energy_there_is_a_distribution_or_none_is_told(name: str, energy
     assert energy > 10
     figures = [found.p_nc, found.mean_s, found.variance_s**0.5, found.peak[1] ** 0.5, found.captured_mean]
     assert np.isrealobj(figures)
-    assert np.isfinite([*figures, *found.next_order]).all()
+    assert np.isfinite([*figures, *found.theory_error]).all()
     below = found.cdf(np.linspace(-20, 20, 201))
     assert np.all(np.diff(below) >= -1e-12)
     assert below[[0, -1]] == pytest.approx([0, 1], abs=1e-3)

@@ -11,7 +11,7 @@ from mpmath.libmp import libelefun
 
 import theory
 from scene import load
-from theory import constants, mean_of, predict, solutions
+from theory import mean_of, precision, predict, prediction
 
 
 def test_no_thread_computes_while_another_does() -> None:
@@ -46,10 +46,10 @@ def test_whatever_computes_with_mpmath_holds_the_lock() -> None:
 
 
 def test_constants_rest_once_settled(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(solutions, "FEW_DIGITS", 0)  # nothing is known already
+    monkeypatch.setattr(prediction, "FEW_DIGITS", 0)  # nothing is known already
     ctx = MPContext()
     ctx.dps = 200
-    constants.settle(ctx)
+    precision.settle(ctx)
     memo = libelefun.pi_fixed.__closure__[0].cell_contents
     known = memo.memo_prec
     assert known >= 4 * ctx.prec

@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 from mpmath import fp
 from numpy.typing import NDArray
+from support.saddle import Saddle
 
 from scene import BangBang, Fourier, Mushroom, load
 from theory import (
     Energies,
     NotCovered,
     Prediction,
-    Saddle,
     capture_curve,
     capture_rate_at,
     caustics,
@@ -157,8 +157,6 @@ def test_densities_that_are_convolutions_or_none_are_refused() -> None:
         density_at(TWICE, [0.0], 4)
     with pytest.raises(NotCovered, match="in which energies change"):
         cdf_at(load("moving-cap-trivial"), [0.0], 4)
-    with pytest.raises(ValueError, match="every particle keeps its energy"):
-        Saddle(load("moving-cap-trivial"))
 
 
 @pytest.mark.parametrize("n_cycles", [10, 30])

@@ -9,7 +9,7 @@ import pytest
 
 from scene import BadInput, load
 from theory import cumulants
-from theory.finite_energy import extrapolate, fit_power, peak_width, unbiased_mean
+from theory.finite_energy.fits import extrapolate, fit_power, peak_width, unbiased_mean
 
 
 def diffused(n: int, energy: float, seed: int) -> tuple[np.ndarray, float]:

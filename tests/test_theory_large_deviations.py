@@ -6,6 +6,7 @@ import mpmath
 import numpy as np
 import pytest
 from support.depth import deep_among, deep_but
+from support.saddle import Saddle
 
 import theory
 from scene import BadInput, load
@@ -64,7 +65,7 @@ def test_losses_are_those_of_sums_of_cycles(name: str) -> None:
         found = loss_probability(energies, n)
         assert found == pytest.approx(expected, rel=0.012)
         assert found == pytest.approx(float(theory.sum_of_cycles(energies, n).cdf(0.0)), abs=1e-4)
-    saddle = float(theory.Saddle(energies).below(0.0, 400)[0])
+    saddle = float(Saddle(energies).below(0.0, 400)[0])
     assert loss_probability(energies, 400) == pytest.approx(saddle, rel=0.02)
 
 

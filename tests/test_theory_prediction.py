@@ -22,7 +22,7 @@ from theory import (
     adiabatic,
     mean_of,
     predict,
-    solutions,
+    prediction,
     v_cap,
     v_cha,
     volumes_at,
@@ -285,7 +285,7 @@ def test_strings_have_the_digits_asked() -> None:
 
 
 def test_threads_at_different_digits_do_not_disturb_each_other(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(solutions, "FEW_DIGITS", 0)  # each computes
+    monkeypatch.setattr(prediction, "FEW_DIGITS", 0)  # each computes
     before = mpmath.mp.prec
     scene = load("fixed-cap-clockwise")
     alone = [predict(scene, digits).strings(digits) for digits in (12, 25)]

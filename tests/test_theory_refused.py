@@ -12,7 +12,7 @@ from support.refusals import one_line
 
 import theory
 from scene import BangBang, Cap, Fourier, Mushroom, Stem, load
-from theory.given import MAX_DIGITS, MAX_ORDER
+from theory.validation import MAX_DIGITS, MAX_ORDER
 
 SCENE = load("moving-cap")
 FP = mpmath.fp
@@ -39,7 +39,6 @@ energies = cache(lambda: theory.energies(SCENE))
 cycle = cache(lambda: theory.Cycle.of(SCENE, 15))
 prediction = cache(lambda: theory.predict(SCENE, 4))
 sum_of_three = cache(lambda: theory.sum_of_cycles(energies(), 3))
-saddle = cache(lambda: theory.Saddle(energies()))
 finite = cache(lambda: theory.at_energy(SCENE, 1e6))
 OF_A_SCENE, WITH_DIGITS = {"scene": SCENE}, {"scene": SCENE, "digits": 4}
 COLUMNS = {"x": [1.0, 2.0], "y": [1.0, 2.0], "errors": [1.0, 1.0]}
@@ -64,7 +63,6 @@ ENTRIES = {
     "energies": (theory.energies, {"found": SCENE}),
     "energy_cdf": (theory.energy_cdf, {"found": SCENE, "s": [0.0]}),
     "sum_of_cycles": (theory.sum_of_cycles, {"found": SCENE, "n_cycles": 2, "q": 0.5}),
-    "Saddle": (theory.Saddle, {"found": SCENE}),
     "rarity": (theory.rarity, WITH_DIGITS),
     "loss_probability": (theory.loss_probability, {"found": SCENE, "n_cycles": 2}),
     "frozen_rates": (theory.frozen_rates, OF_A_SCENE),
@@ -94,11 +92,6 @@ ENTRIES = {
     "Energies.captured_below": (lambda **given: energies().captured_below(**given), {"s": [0.0]}),
     "Sum.cdf": (lambda **given: sum_of_three().cdf(**given), {"s": [0.0]}),
     "Sum.density": (lambda **given: sum_of_three().density(**given), {"s": [0.0]}),
-    "Saddle.cumulants": (lambda **given: saddle().cumulants(**given), {"q": [0.0]}),
-    "Saddle.place": (lambda **given: saddle().place(**given), {"x": [0.0]}),
-    "Saddle.density": (lambda **given: saddle().density(**given), {"s": [0.0], "n_cycles": 3}),
-    "Saddle.above": (lambda **given: saddle().above(**given), {"s": [0.0], "n_cycles": 3}),
-    "Saddle.below": (lambda **given: saddle().below(**given), {"s": [0.0], "n_cycles": 3}),
     "v_cap": (theory.v_cap, {"ctx": FP, "r": 1.0}),
     "v_stem": (theory.v_stem, {"ctx": FP, "w": 0.5, "h": 1.0, "slope": 0.0}),
     "v_ell": (theory.v_ell, {"ctx": FP, "r": 1.0, "nu": 0.5}),
@@ -166,7 +159,6 @@ def test_other_arguments():
     assert one_line(theory.Energies, "moving-cap").startswith("root = 'moving-cap'")
     assert one_line(theory.Sum, SCENE, 2).startswith("root = ")
     assert one_line(theory.sum_of_cycles, energies(), 3, q=1e6).startswith("q = 1000000.0, must be within")
-    assert one_line(saddle().cumulants, [1e9]).startswith("q must be within")
     assert one_line(theory.chaotic_zone, SCENE, 0.0) == "times has 0 dimensions, must have 1"
     assert one_line(theory.energy_density, SCENE, [[0.0, 1.0]]) == "edges has 2 dimensions, must have 1"
     assert theory.sin_phi_hat(np, np.array([0.0, 0.1]), 0.2, 1.0, 0.0, 1.0).shape == (2,)

@@ -7,9 +7,9 @@ from typing import Any
 import pytest
 
 from scene import Fourier, Mushroom, load
-from theory import Cycle, moments, predict, solutions
+from theory import Cycle, moments, predict, prediction
 from theory.adiabatic import Captures, captures
-from theory.solutions import solved
+from theory.prediction import solved
 
 # A particle may be captured twice in a cycle: valleys within a valley.
 TWICE = Mushroom(r=1.0, h=1.0, nu=Fourier(mean=0.5, omega=1.0, cos=(0.125, 0.25), sin=(0.0625,)))
@@ -17,7 +17,7 @@ TWICE = Mushroom(r=1.0, h=1.0, nu=Fourier(mean=0.5, omega=1.0, cos=(0.125, 0.25)
 
 @pytest.fixture(autouse=True)
 def _nothing_kept() -> None:
-    solutions._place.cache_clear()
+    prediction._place.cache_clear()
 
 
 def bits(found: Captures) -> Any:
@@ -32,7 +32,7 @@ def test_what_is_kept_is_what_would_be_found(scene: Mushroom) -> None:
     right = bits(captures(Cycle.of(scene, 3), 7))
     assert bits(solved(scene, Cycle.of(scene, 3), 7)) == right
     assert bits(solved(scene, Cycle.of(scene, 3), 7)) == right
-    assert solutions._place.cache_info().hits == 1
+    assert prediction._place.cache_info().hits == 1
 
 
 def test_nothing_is_solved_twice(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -42,7 +42,7 @@ def test_nothing_is_solved_twice(monkeypatch: pytest.MonkeyPatch) -> None:
         found.append(args)
         return captures(*args)
 
-    monkeypatch.setattr(solutions, "captures", counted)
+    monkeypatch.setattr(prediction, "captures", counted)
     first = predict(TWICE, 3), moments(TWICE, 2, 3)
     n = len(found)
     assert n >= 2
@@ -53,12 +53,12 @@ def test_nothing_is_solved_twice(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_another_scene_other_digits_or_another_target_is_another_solution() -> None:
     """Each changes some bit; a name alone does not, and names no other solution."""
     other = Mushroom(r=1.0, h=1.0, nu=Fourier(mean=0.5, omega=1.0, cos=(0.125, 0.25), sin=(0.125,)))
-    asked = [(TWICE, 3, 7), (other, 3, 7), (TWICE, 4, 7), (TWICE, 3, 8)]
+    asked = [(TWICE, 3, 7), (other, 3, 7), (TWICE, 4, 7), (TWICE, 3, 12)]
     found = [bits(solved(scene, Cycle.of(scene, digits), target)) for scene, digits, target in asked]
     assert len(set(map(repr, found))) == len(asked)
     named = Mushroom(r=TWICE.r, h=TWICE.h, nu=TWICE.nu, name="named")
     assert bits(solved(named, Cycle.of(named, 3), 7)) == found[0]
-    assert solutions._place.cache_info().currsize == len(asked)
+    assert prediction._place.cache_info().currsize == len(asked)
 
 
 def test_nobody_is_touched_by_what_another_does_with_its_numbers() -> None:
@@ -80,6 +80,6 @@ def test_the_whole_of_it_is_told_as_done() -> None:
 
 
 def test_many_digits_are_not_kept(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(solutions, "FEW_DIGITS", 2)
+    monkeypatch.setattr(prediction, "FEW_DIGITS", 2)
     solved(TWICE, Cycle.of(TWICE, 3), 7)
-    assert solutions._place.cache_info().currsize == 0
+    assert prediction._place.cache_info().currsize == 0

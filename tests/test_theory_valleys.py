@@ -26,7 +26,7 @@ from theory import (
     reversed_cycle,
 )
 from theory.adiabatic import captures
-from theory.valleys import Valley
+from theory.cycle import Valley
 
 Floats = NDArray[np.float64]
 

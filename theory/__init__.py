@@ -1,13 +1,11 @@
 """The paper's closed forms and quadratures, at any precision.
 
-`volumes` and `invariants` are its formulas. `cycle` says when particles are captured and released,
-`adiabatic` what they gain, which `solutions` keeps, and `prediction` the figures that follow; `density` and
-`distribution` are of energies after one cycle, `saddle` and `large_deviations` after many. `blur` is all this
-at finite energy, `upright` what upright sides do there.
+`volumes` has its formulas. `cycle` says when particles are captured and released, `adiabatic` what they gain,
+and `prediction` the figures that follow; `curves`, `density` and `distribution` are of energies after one
+cycle, `large_deviations` after many. `finite_energy` goes beyond the paper.
 """
 
 from theory.adiabatic import NotConverged
-from theory.blur import FiniteEnergy, at_energy
 from theory.curves import (
     CaptureCurve,
     ChaoticZone,
@@ -20,20 +18,35 @@ from theory.curves import (
 from theory.cycle import Cycle
 from theory.density import Caustic, capture_rate_at, caustics, cdf_at, density_at
 from theory.distribution import Energies, Sum, energies, energy_cdf, sum_of_cycles
-from theory.finite_energy import Limit, PowerFit, Width, extrapolate, fit_power, peak_width, unbiased_mean
-from theory.invariants import (
+from theory.finite_energy.fits import (
+    Limit,
+    PowerFit,
+    Width,
+    extrapolate,
+    fit_power,
+    peak_width,
+    unbiased_mean,
+)
+from theory.finite_energy.one_cycle import FiniteEnergy, at_energy
+from theory.finite_energy.rates import Rates, frozen_rates
+from theory.finite_energy.upright import is_upright, kept_by_the_cap, upright_rate, upright_spread
+from theory.large_deviations import Rarity, loss_probability, rarity
+from theory.prediction import Prediction, cumulants, mean_of, moments, predict, reversed_cycle
+from theory.volumes import (
+    NotCovered,
+    Volumes,
     cap_invariant,
+    delta,
     energy,
     log_energy_rate_chaotic,
     log_energy_rate_island,
     sin_phi_hat,
+    v_cap,
+    v_cha,
+    v_ell,
+    v_stem,
+    volumes_at,
 )
-from theory.large_deviations import Rarity, loss_probability, rarity
-from theory.prediction import Prediction, cumulants, mean_of, moments, predict, reversed_cycle
-from theory.rates import Rates, frozen_rates
-from theory.saddle import Saddle
-from theory.upright import is_upright, kept_by_the_cap, upright_rate, upright_spread
-from theory.volumes import NotCovered, Volumes, delta, v_cap, v_cha, v_ell, v_stem, volumes_at
 
 __all__ = [
     "CaptureCurve",
@@ -49,7 +62,6 @@ __all__ = [
     "Prediction",
     "Rarity",
     "Rates",
-    "Saddle",
     "Sum",
     "Volumes",
     "Width",

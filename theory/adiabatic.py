@@ -22,18 +22,16 @@ from math import comb, log2
 from typing import Any, NamedTuple
 
 from scene.refusal import BadInput
-from theory.chebyshev import Grid, even_degree
-from theory.cycle import Cycle
-from theory.measure import WeightedPoints, convolve, product, shifted
-from theory.valleys import CapturePiece, Valley
-from theory.volumes import delta_slope, free_share
+from theory.chebyshev import Grid, WeightedPoints, convolve, even_degree, product, shifted
+from theory.cycle import CapturePiece, Cycle, Valley
+from theory.precision import Binary
+from theory.volumes import free_share
 
 MAX_HALVINGS = 256  # a panel of 2^-256 of its piece
-NARROWEST = 1e-20  # of the widest mouth: `theory.valleys.tolerance` and rounding stay far below what nu is
+NARROWEST = 1e-20  # of the widest mouth: `tolerance` of the cycle and rounding stay far below what nu is
 
-MANY = 200  # degree of a grid from which parts are first tried at few points
-TRIAL, TRIAL_BITS = 48, 320  # degree and precision of the trial
-HOPELESS = 0.75  # of the digits wanted are not promised by the trial's
+FEWEST = 16  # degree of the grid at which a part is first tried; its points are among those of the next
+PROMISE = 0.92  # of the digits wanted, in proportion to its degree, are to be seen on such a grid
 
 
 class NotConverged(BadInput):
@@ -233,10 +231,12 @@ def captures(cycle: Cycle, target: int, told: Callable[[float], None] | None = N
     if cycle.nu_min < NARROWEST * cycle.nu_max:
         share = cycle.ctx.nstr(cycle.nu_min / cycle.nu_max, 3)
         raise NotConverged(f"the mouth closes to {share} of its widest, must stay above {NARROWEST:g} of it")
-    grid = grid_for(cycle.ctx, target)
+    grids = [grid_for(cycle.ctx, target)]
+    while (n := grids[0].n // 2) % 2 == 0 and n >= FEWEST:
+        grids.insert(0, Grid(cycle.ctx, n))
     start = cycle.ctx.zero, cycle.ctx.zero
     headway = Headway(len(cycle.pieces), told)
-    return Captures(cycle, grid, target, _window(cycle, grid, cycle.valley, start, target, headway))
+    return Captures(cycle, grids[-1], target, _window(cycle, grids, cycle.valley, start, target, headway))
 
 
 def grid_for(ctx: Any, target: int) -> Grid:
@@ -245,35 +245,38 @@ def grid_for(ctx: Any, target: int) -> Grid:
 
 
 def _window(
-    cycle: Cycle, grid: Grid, valley: Valley, start: tuple[Any, Any], target: int, headway: Headway
+    cycle: Cycle, grids: list[Grid], valley: Valley, start: tuple[Any, Any], target: int, headway: Headway
 ) -> Window:
     A, B = start
     panels: list[Panel] = []
     for piece in valley.pieces:
-        panels += _resolved(cycle, grid, piece, (A, B), target, headway)
+        panels += _resolved(cycle, grids, piece, (A, B), target, headway)
         A, B = panels[-1].A[-1], panels[-1].B[-1]
-    children = tuple(_window(cycle, grid, child, (A, B), target, headway) for child in valley.children)
+    children = tuple(_window(cycle, grids, child, (A, B), target, headway) for child in valley.children)
     return Window(tuple(panels), children, *start, A, B)
 
 
 def _resolved(
-    cycle: Cycle, grid: Grid, piece: CapturePiece, start: tuple[Any, Any], target: int, headway: Headway
+    cycle: Cycle,
+    grids: list[Grid],
+    piece: CapturePiece,
+    start: tuple[Any, Any],
+    target: int,
+    headway: Headway,
 ) -> list[Panel]:
     panels: list[Panel] = []
     most = most_halvings(cycle)
     todo = [(0, 0)]  # part i of the piece's 2^halvings equal parts in u
     while todo:
         i, halvings = todo.pop()
-        panel = None
-        if grid.n < MANY or not _is_hopeless(cycle, grid, piece, (i, halvings), target):
-            panel = _panel(cycle, grid, piece, (i, halvings), start, cycle.ctx.mpf(10) ** -target, headway)
+        panel = _panel(cycle, grids, piece, (i, halvings), start, target, headway)
         if panel is not None:
             panels.append(panel)
             start = panel.A[-1], panel.B[-1]
         elif halvings < most:
             todo += [(2 * i + 1, halvings + 1), (2 * i, halvings + 1)]
         else:
-            nu, _ = _descent(cycle.ctx, piece, cycle.ctx.ldexp(i, -halvings))
+            nu, _ = _descent(piece, cycle.ctx.ldexp(i, -halvings))
             raise NotConverged(
                 f"the cycle is not resolved to {target} digits near nu = {float(nu):.6g}"
                 f" by panels of 2^-{most} of a piece"
@@ -286,7 +289,7 @@ def most_halvings(cycle: Cycle) -> int:
     """Return how often a piece may be halved, which is enough wherever its functions have a singularity.
 
     Singularities on a branch lie at the values of nu at its knots and critical points. Values that differ by
-    more than `theory.valleys.tolerance` are ends of pieces; what differs by less is one value. So a
+    more than `theory.cycle.tolerance` are ends of pieces; what differs by less is one value. So a
     singularity is an end of the piece, where its orders take it away, or further off the end than the
     tolerance: a part as short as that is resolved, and so is any other that is shorter than its distance.
     Binary64 laws come so near: a leg from 0.9 to 0.1 has its middle 3e-17 off a knot at 0.5. What lies
@@ -295,93 +298,83 @@ def most_halvings(cycle: Cycle) -> int:
     return min(MAX_HALVINGS, int((cycle.ctx.dps - 10) * log2(10)))
 
 
-def _is_hopeless(cycle: Cycle, grid: Grid, piece: CapturePiece, part: tuple[int, int], target: int) -> bool:
-    """Tell whether a part is seen, at few points and digits, to need far more points than the grid's.
+class CapturePoint(NamedTuple):
+    """What a panel is made of at a point: a, b are dA / dx and dB / dx, x in [0, 1]."""
 
-    Coefficients fall geometrically, or more slowly near a singularity. Were this wrong, the part would only
-    be halved once more than needed.
-    """
-    ctx = cycle.ctx
-    with ctx.workprec(TRIAL_BITS):
-        trial = Grid(ctx, TRIAL)
-        sampled = _sampled(cycle, trial, piece, part)
-        # As in `_panel`: log g beside 1, for in a cycle that gains nothing all of it is rounding.
-        for values, size in ((sampled.a, 0), (sampled.b, 0), (sampled.log_g, 1)):
-            found = trial.coefficients(values)
-            first, last = max(size, *map(abs, found)), _tail(found)
-            fallen = -ctx.log10(last / first) if last else ctx.inf
-            if fallen * grid.n / TRIAL < HOPELESS * target:
-                return True
-    return False
+    nu: Any
+    t_in: Any
+    t_out: Any
+    a: Any
+    b: Any
+    log_g: Any
 
 
-class Sampled(NamedTuple):
-    """What a panel is made of, at the points of a grid: a, b are dA / dx and dB / dx, x in [0, 1]."""
-
-    nu: list[Any]
-    t_in: list[Any]
-    t_out: list[Any]
-    a: list[Any]
-    b: list[Any]
-    log_g: list[Any]
+def _sampled(ctx: Any, piece: CapturePiece, places: list[Any], width: Any) -> list[CapturePoint]:
+    """Sample a piece at places u, of which x takes the share `width`."""
+    binary = piece.capture.motion.binary
+    with binary.working():
+        piece, width = piece.changed(binary.taken), binary.taken(width)
+        samples = [_sample(binary, piece, binary.taken(u), width) for u in places]
+        return [CapturePoint._make(map(binary.given, sample)) for sample in samples]
 
 
-def _sampled(
-    cycle: Cycle, grid: Grid, piece: CapturePiece, part: tuple[int, int], headway: Headway | None = None
-) -> Sampled:
-    ctx, width = cycle.ctx, cycle.ctx.ldexp(1, -part[1])
-    found = Sampled([], [], [], [], [], [])
-    for k, x in enumerate(grid.points):
-        nu, slope = _descent(ctx, piece, (part[0] + x) * width)
-        found.t_in.append(piece.capture.time(nu, grid.forecast(found.t_in)))
-        found.t_out.append(piece.release.time(nu, grid.forecast(found.t_out)))
-        free = free_share(ctx, nu)
-        known = 1 - free, free  # of the island, V_cha needs nothing
-        before = piece.capture.motion.volumes(found.t_in[-1], nu, known)
-        after = piece.release.motion.volumes(found.t_out[-1], nu, known)
-        a, b = before.v_cap / before.v_cha, after.v_cap / after.v_cha
-        d_delta = delta_slope(ctx, nu) * slope * width
-        found.nu.append(nu)
-        found.a.append(a * d_delta)
-        found.b.append(b * d_delta)
-        found.log_g.append(ctx.log(b / a))
-        if headway is not None and k < grid.n:
-            headway.at((part[0] + k / grid.n) * 0.5 ** part[1])
-    return found
+def _sample(binary: Binary, piece: CapturePiece, u: Any, width: Any) -> CapturePoint:
+    nu, slope = _descent(piece, u)
+    root = binary.sqrt((1 - nu) * (1 + nu))
+    free = 2 * (binary.asin(nu) + nu * root) / binary.pi
+    stretches = piece.capture, piece.release
+    t_in, t_out = (stretch.in_binary(nu) for stretch in stretches)
+    # V_cap / V_cha
+    a, b = (1 / (free + s.motion.stem_share(t, nu)) for s, t in zip(stretches, (t_in, t_out), strict=True))
+    d_delta = -4 * root / binary.pi * slope * width
+    return CapturePoint(nu, t_in, t_out, a * d_delta, b * d_delta, binary.log(b / a))
 
 
 def _panel(
     cycle: Cycle,
-    grid: Grid,
+    grids: list[Grid],
     piece: CapturePiece,
     part: tuple[int, int],
     start: tuple[Any, Any],
-    tolerance: Any,
+    target: int,
     headway: Headway,
 ) -> Panel | None:
-    """Sample a part of a piece and integrate from `start` = (A, B); None when it is not resolved."""
-    ctx = cycle.ctx
-    nu, t_in, t_out, dA, dB, log_g = _sampled(cycle, grid, piece, part, headway)
-    c_A, c_B = grid.coefficients(dA), grid.coefficients(dB)
+    """Sample a part of a piece and integrate from `start` = (A, B); None when it is not resolved.
+
+    It is sampled on one grid after another, given up where one shows that the next will not do. Coefficients
+    fall geometrically, or more slowly near a singularity: were that wrong, the part would only be halved once
+    more than needed.
+    """
+    ctx, width, n = cycle.ctx, cycle.ctx.ldexp(1, -part[1]), grids[-1].n
     swing = free_share(ctx, cycle.nu_max) - free_share(ctx, cycle.nu_min)
-    # Of a narrow mouth a and b are large, and A and B in proportion.
-    if any(_tail(c) > tolerance * max(swing, *map(abs, c)) for c in (c_A, c_B)):
-        return None
-    if _tail(grid.coefficients(log_g)) > tolerance:
-        return None
-    A = [start[0] + rise for rise in grid.running_integral(c_A)]
-    B = [start[1] + rise for rise in grid.running_integral(c_B)]
+    known: dict[int, CapturePoint] = {}
+    for grid in grids:
+        places = range(0, n + 1, n // grid.n)
+        headway.at((part[0] + len(known) / (n + 2)) * 0.5 ** part[1])
+        new = [k for k in places if k not in known]
+        samples = _sampled(ctx, piece, [(part[0] + grids[-1].points[k]) * width for k in new], width)
+        known.update(zip(new, samples, strict=True))
+        nu, t_in, t_out, dA, dB, log_g = (
+            list(column) for column in zip(*map(known.get, places), strict=True)
+        )
+        share = 1 if grid.n == n else PROMISE * grid.n / n
+        tolerance = ctx.mpf(10) ** (-target * share)
+        c_A, c_B, c_g = (grid.coefficients(values) for values in (dA, dB, log_g))
+        # Of a narrow mouth a and b are large, and A and B in proportion.
+        if any(_tail(c) > tolerance * max(swing, *map(abs, c)) for c in (c_A, c_B)) or _tail(c_g) > tolerance:
+            return None
+    A, B = ([at + rise for rise in grid.running_integral(c)] for at, c in zip(start, (c_A, c_B), strict=True))
     return Panel(nu, t_in, t_out, dA, log_g, A, B)
 
 
-def _descent(ctx: Any, piece: CapturePiece, u: Any) -> tuple[Any, Any]:
+def _descent(piece: CapturePiece, u: Any) -> tuple[Any, Any]:
     """Return nu and d nu / du at u in [0, 1], nu falling along I(u).
 
     I is the regularised incomplete beta function with integer parameters p, q >= 1.
     """
     p, q, v = piece.upper_order, piece.lower_order, 1 - u
     m, drop = p + q - 1, piece.nu_upper - piece.nu_lower
-    share = ctx.fsum(comb(m, j) * u**j * v ** (m - j) for j in range(p, m + 1))
+    share = sum(comb(m, j) * u**j * v ** (m - j) for j in range(p, m + 1))
     slope = -drop * p * comb(m, p) * u ** (p - 1) * v ** (q - 1)
     # The end itself is nu_lower: rounding there would cost half the digits of the vertex's time.
     return (piece.nu_upper - drop * share if v else piece.nu_lower), slope

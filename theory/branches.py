@@ -22,9 +22,9 @@ from numpy.typing import NDArray
 
 from scene.tables import Scene, check_scene
 from theory.adiabatic import Captures, Window
-from theory.constants import guarded
 from theory.cycle import Cycle
-from theory.solutions import solved
+from theory.precision import guarded
+from theory.prediction import solved
 
 Floats = NDArray[np.float64]
 

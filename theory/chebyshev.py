@@ -7,6 +7,11 @@ singularities are the caller's to remove.
 From FEW points on, sums of cosines are taken by halving (Lee, 1984): those at even k are sums of cosines over
 half the points, those at odd k two more such sums; n log n products in place of n^2. `even_degree` rounds a
 degree up to one that halves well.
+
+Distributions are weighted points, truncated power series lists of coefficients. The mean of a function over a
+sum of two independent variables needs all pairs of their points. To keep the number of points small the pairs
+are replaced by weights on a grid over their range. The weights give all polynomials up to the grid's degree
+the same mean, so means of analytic functions converge geometrically; some of them may be negative.
 """
 
 from __future__ import annotations
@@ -22,7 +27,6 @@ from mpmath.libmp import from_man_exp
 
 FEW = 200  # degree from which sums are taken by halving
 LEAST = 32  # degree below which they are taken one by one
-REACH = 8  # points that a forecast extrapolates from; more of them would save no further Newton steps
 
 
 class Grid:
@@ -44,8 +48,6 @@ class Grid:
         self.points = [(1 - c) / 2 for c in quarter_turns]
         self._rows: dict[int, list[list[Any]]] = {}
         self.weights = self._clenshaw_curtis()
-        rows = _extrapolations(n, ctx.prec)
-        self._forecasts = [[*map(ctx.make_mpf, row)] for row in rows]
 
     def _cosine_sums(self, values: list[Any]) -> list[Any]:
         """Return the sums over j of values[j] cos(pi j k / n), k = 0 ... n."""
@@ -133,11 +135,6 @@ class Grid:
         total = self._cosine_sums(_with_halved_ends(values))
         return _with_halved_ends([2 * x / self.n for x in total])
 
-    def forecast(self, values: list[Any]) -> Any:
-        """Extrapolate a function known at the first points to the next one; None when none is known."""
-        weights = self._forecasts[len(values)]
-        return self.ctx.fdot(weights, values[-len(weights) :]) if weights else None
-
     def _clenshaw_curtis(self) -> list[Any]:
         n, ctx = self.n, self.ctx
         even = [ctx.mpf(1) / (1 - k * k) if k % 2 == 0 else ctx.zero for k in range(n + 1)]
@@ -162,25 +159,9 @@ def _cosines(n: int, prec: int) -> tuple[Any, ...]:
     return tuple(ctx.cos(ctx.pi * m / n)._mpf_ for m in range(n // 2))
 
 
-@lru_cache(maxsize=64)
-def _extrapolations(n: int, prec: int) -> tuple[tuple[Any, ...], ...]:
-    """Return for each point the Lagrange weights there of the last REACH points before it, likewise."""
-    ctx = MPContext()
-    ctx.prec = prec
-    half = [*map(ctx.make_mpf, _cosines(n, prec)), ctx.zero]
-    points = [(1 - c) / 2 for c in half] + [(1 + c) / 2 for c in reversed(half[:-1])]
-    rows = []
-    for j, point in enumerate(points):
-        known = points[max(0, j - REACH) : j]
-        rows.append(tuple(ctx.fprod((point - x) / (y - x) for x in known if x != y)._mpf_ for y in known))
-    return tuple(rows)
-
-
 def even_degree(n: int) -> int:
-    """Return a degree of at least n that halves down to some LEAST; n itself while it is small."""
-    if n < FEW:
-        return n
-    unit = 1 << (n // LEAST).bit_length()
+    """Return a degree of at least n that halves at least twice, and a large one down to some LEAST."""
+    unit = 1 << max((n // LEAST).bit_length(), 3)
     return -(-n // unit) * unit
 
 
@@ -193,3 +174,50 @@ def _folded(values: list[Any]) -> tuple[list[Any], list[Any]]:
 
 def _with_halved_ends(values: list[Any]) -> list[Any]:
     return [values[0] / 2, *values[1:-1], values[-1] / 2]
+
+
+WeightedPoints = list[tuple[Any, Any]]  # weight and place
+
+
+def shifted(atoms: WeightedPoints, weight: Any, shift: Any) -> WeightedPoints:
+    """Return the points moved by `shift`, their weights times `weight`."""
+    return [(weight * w, s + shift) for w, s in atoms]
+
+
+def convolve(grid: Grid, first: WeightedPoints, second: WeightedPoints) -> WeightedPoints:
+    """Return the distribution of a sum of independent variables, on few points."""
+    few, other = compressed(grid, first), compressed(grid, second)
+    return compressed(grid, [(v * w, r + s) for v, r in few for w, s in other])
+
+
+def compressed(grid: Grid, atoms: WeightedPoints) -> WeightedPoints:
+    """Return at most n + 1 points with the same means of polynomials up to degree n, the grid's."""
+    if len(atoms) <= grid.n + 1:
+        return atoms
+    ctx = grid.ctx
+    low, high = min(s for _, s in atoms), max(s for _, s in atoms)
+    if high - low <= 16 * ctx.eps * max(abs(low), abs(high)):
+        return [(ctx.fsum(w for w, _ in atoms), low)]
+    weights = [w for w, _ in atoms]
+    x = [2 * (s - low) / (high - low) - 1 for _, s in atoms]
+    older, old = [ctx.one] * len(x), x
+    moments = [ctx.fsum(weights), ctx.fdot(weights, x)]
+    for _ in range(2, grid.n + 1):
+        older, old = old, [2 * y * now - before for y, now, before in zip(x, old, older, strict=True)]
+        moments.append(ctx.fdot(weights, old))
+    places = [low + (high - low) * p for p in grid.points]
+    return list(zip(grid.quadrature(moments), places, strict=True))
+
+
+def product(p: list[Any], q: list[Any]) -> list[Any]:
+    """Return the product of two power series, to the length they share."""
+    return [sum(p[i] * q[k - i] for i in range(k + 1)) for k in range(len(p))]
+
+
+def logarithm(ctx: Any, p: list[Any]) -> list[Any]:
+    """Return the power series of log p, p[0] > 0, to the same length."""
+    found = [ctx.log(p[0])]
+    for k in range(1, len(p)):
+        rest = sum(j * found[j] * p[k - j] for j in range(1, k))
+        found.append((p[k] - rest / k) / p[0])
+    return found

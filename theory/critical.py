@@ -203,7 +203,9 @@ def solve_rising(ctx: Any, f: Any, low: Any, high: Any, guess: Any = None) -> An
     if ctx.prec > MANY_BITS:
         with ctx.workprec(5 * ctx.prec // 8):
             guess = solve_rising(ctx, f, low, high, guess)
-    close = ctx.ldexp(high - low, -6 * int(ctx.prec) // 10)  # the step after one this small is below rounding
+    close = ctx.ldexp(
+        high - low, -11 * int(ctx.prec) // 20
+    )  # the step after one this small is below rounding
     x = (low + high) / 2 if guess is None or not low < guess < high else guess
     for trial in range(20 + 4 * int(ctx.prec)):
         value, slope = f(x)

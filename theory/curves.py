@@ -18,10 +18,10 @@ from numpy.typing import ArrayLike
 from scene.refusal import BadInput, check_count
 from scene.tables import Scene
 from theory.branches import DIGITS, Branch, Floats, X, at, tree, turns
-from theory.constants import guarded
 from theory.cycle import Cycle
 from theory.distribution import energies
-from theory.given import finite_array
+from theory.precision import guarded
+from theory.validation import finite_array
 from theory.volumes import in_near_units, volumes_at
 
 MAX_POINTS = 10_000_000

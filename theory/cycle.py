@@ -1,25 +1,35 @@
 """One cycle of a mushroom: its start, its period, when particles are captured and released (secs. 3.2, 3.5).
 
 The cycle starts at a highest maximum of nu, where every particle that can leave the island has left
-it. Several intervals of capture nest as `theory.valleys` tells. What stays in the island at all
-times, delta(nu_max) of the cap, takes no part.
+it. What stays in the island at all times, delta(nu_max) of the cap, takes no part.
+
+Captures nest in the valleys of nu(t). A particle captured as nu falls through a value is released when nu
+first returns to it, so everything between is skipped by it. A valley is an interval of time that nu enters
+falling and leaves rising at one level, staying below between. From its top down to its highest inner peak a
+fall and a rise face each other, cut into pieces over which law and branch are analytic; at the level of that
+peak the valley splits into valleys that follow one another in time. Plateaus and inflections are allowed
+everywhere. The binary64 numbers of a scene are exact; a swing of nu below 10^-(digits + 30) of its largest
+value counts as none.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any
+from itertools import pairwise
+from math import lcm
+from typing import Any, NamedTuple
 
 from mpmath import MPContext
 
 from scene.refusal import BadInput, check_count
-from scene.tables import Scene, period
-from theory.constants import guarded, settle
-from theory.given import MAX_DIGITS, one_of
+from scene.tables import Mushroom, Scene, period
+from theory.critical import Span, spans
 from theory.parameters import MovingMushroom
-from theory.valleys import CapturePiece, Valley, stretches, tolerance, valley
-from theory.volumes import as_mushroom
+from theory.precision import guarded, settle
+from theory.validation import MAX_DIGITS, one_of
+from theory.volumes import NotCovered, as_mushroom
 
 # Digits beyond those asked. A loop that binary64 cannot tell from a trivial one has g - 1 ~ 1e-16 and
 # m1 ~ 1e-32; with 40 more digits such an m1 still differs from zero.
@@ -127,3 +137,187 @@ class Cycle:
         if not self.pieces:
             raise BadInput(f"nu = {given}: nothing is captured, nu is constant")
         raise BadInput(f"nu = {given}, must be in [{float(self.nu_min):.6g}, {float(self.nu_max):.6g}]")
+
+
+class MonotoneStretch(NamedTuple):
+    """A part of a branch on which nu is strictly monotone: from `upper` at nu_upper to `lower`."""
+
+    motion: MovingMushroom
+    upper: Any
+    lower: Any
+    nu_upper: Any
+    nu_lower: Any
+    upper_order: int
+    lower_order: int
+
+    def time(self, nu: Any) -> Any:
+        """Return the time at which nu(t) = nu, nu_lower <= nu <= nu_upper."""
+        binary = self.motion.binary
+        with binary.working():
+            return binary.given(self.changed(binary.taken).in_binary(binary.taken(nu)))
+
+    def in_binary(self, nu: Any) -> Any:
+        """Return `time` of a stretch whose ends are binary numbers, as nu is."""
+        if nu >= self.nu_upper:
+            return self.upper
+        if nu <= self.nu_lower:
+            return self.lower
+        low, high = sorted((self.lower, self.upper))
+        return self.motion.time(nu, low, high, self.upper < self.lower)
+
+    def changed(self, change: Callable[[Any], Any]) -> MonotoneStretch:
+        """Return the stretch with its numbers in another form."""
+        upper, lower, nu_upper, nu_lower = map(change, self[1:5])
+        return self._replace(upper=upper, lower=lower, nu_upper=nu_upper, nu_lower=nu_lower)
+
+    def between(self, nu_upper: Any, nu_lower: Any, tolerance: Any) -> MonotoneStretch:
+        """Return the part between two values; a value within tolerance of an end is that end."""
+        cut = self._replace(nu_upper=nu_upper, nu_lower=nu_lower)
+        if self.nu_upper - nu_upper > tolerance:
+            cut = cut._replace(upper=self.time(nu_upper), upper_order=1)
+        if nu_lower - self.nu_lower > tolerance:
+            cut = cut._replace(lower=self.time(nu_lower), lower_order=1)
+        return cut
+
+
+class CapturePiece(NamedTuple):
+    """Capture and release stretches over the same values of nu, from nu_upper down to nu_lower."""
+
+    capture: MonotoneStretch
+    release: MonotoneStretch
+
+    def changed(self, change: Callable[[Any], Any]) -> CapturePiece:
+        """Return the piece with its numbers in another form."""
+        return CapturePiece(self.capture.changed(change), self.release.changed(change))
+
+    @property
+    def nu_upper(self) -> Any:
+        """Largest nu of the piece."""
+        return self.capture.nu_upper
+
+    @property
+    def nu_lower(self) -> Any:
+        """Smallest nu of the piece."""
+        return self.capture.nu_lower
+
+    @property
+    def upper_order(self) -> int:
+        """Order p that makes everything analytic in u near nu = nu_upper - const u^p."""
+        top = 2 if self.nu_upper == 1 else 1  # sqrt(1 - nu^2) in d delta
+        return lcm(top, self.capture.upper_order, self.release.upper_order)
+
+    @property
+    def lower_order(self) -> int:
+        """The same near nu_lower."""
+        return lcm(self.capture.lower_order, self.release.lower_order)
+
+
+class Valley(NamedTuple):
+    """Pieces from the top down to the level of the children, which follow one another in time."""
+
+    pieces: tuple[CapturePiece, ...]
+    children: tuple[Valley, ...]
+
+    def all_pieces(self) -> Iterator[CapturePiece]:
+        """Yield the pieces of the whole tree, a valley's own before its children's."""
+        yield from self.pieces
+        for child in self.children:
+            yield from child.all_pieces()
+
+
+def stretches(ctx: Any, scene: Mushroom) -> list[MonotoneStretch]:
+    """Return one period's stretches in order of time, from a highest maximum of nu; [] if nu is constant."""
+    every = [(span, _stretch(ctx, scene, span)) for span in spans(ctx, scene)]
+    small = tolerance(ctx, [s for _, s in every])
+    found = [(span, s) for span, s in every if s.nu_upper - s.nu_lower > small]  # the others are plateaus
+    tops = [i for i, (_, s) in enumerate(found) if is_fall(s) and not is_fall(found[i - 1][1])]
+    if not tops:
+        return []
+    highest = max(found[i][1].nu_upper for i in tops)
+    first = next(i for i in tops if highest - found[i][1].nu_upper <= small)
+    later = [_stretch(ctx, scene, _next_period(ctx, scene, span)) for span, _ in found[:first]]
+    return [s for _, s in found[first:]] + [s for s in later if s.nu_upper - s.nu_lower > small]
+
+
+def valley(ctx: Any, run: list[MonotoneStretch], small: Any) -> Valley:
+    """Nest stretches, in order of time, that start falling from a level and end rising to it.
+
+    Args:
+        ctx: number system.
+        run: the stretches.
+        small: the `tolerance` of the whole period.
+    """
+    peaks = [i for i in range(1, len(run)) if is_fall(run[i]) and not is_fall(run[i - 1])]
+    n_fall = next(i for i, s in enumerate(run) if not is_fall(s))
+    last_fall = max(i for i, s in enumerate(run) if is_fall(s))
+    fall, rise = run[:n_fall], run[last_fall + 1 :]
+    if not peaks:
+        return Valley(_pieces(ctx, fall, rise[::-1], small), ())
+    level = max(run[i].nu_upper for i in peaks)
+    pieces: tuple[CapturePiece, ...] = ()
+    if run[0].nu_upper - level > small:
+        pieces = _pieces(ctx, _above(fall, level, small), _above(rise, level, small)[::-1], small)
+    parts = [0, *(i for i in peaks if level - run[i].nu_upper <= small), len(run)]
+    groups = [run[start:stop] for start, stop in pairwise(parts)]
+    return Valley(pieces, tuple(valley(ctx, _below(group, level, small), small) for group in groups))
+
+
+def is_fall(s: MonotoneStretch) -> bool:
+    """Tell whether nu falls with time."""
+    return bool(s.upper < s.lower)
+
+
+def tolerance(ctx: Any, run: list[MonotoneStretch]) -> Any:
+    """Return how far equal values of nu, reached along different branches, differ by rounding alone."""
+    return ctx.mpf(10) ** (10 - ctx.dps) * max((s.nu_upper for s in run), default=ctx.one)
+
+
+def _above(branch: list[MonotoneStretch], level: Any, small: Any) -> list[MonotoneStretch]:
+    cut = [s for s in branch if s.nu_upper - level > small]
+    return [s.between(s.nu_upper, max(s.nu_lower, level), small) for s in cut]
+
+
+def _below(branch: list[MonotoneStretch], level: Any, small: Any) -> list[MonotoneStretch]:
+    cut = [s for s in branch if level - s.nu_lower > small]
+    return [s.between(min(s.nu_upper, level), s.nu_lower, small) for s in cut]
+
+
+def _next_period(ctx: Any, scene: Mushroom, span: Span) -> Span:
+    shared = period(scene)
+    assert shared is not None
+    length = shared.value(ctx)
+    return span._replace(
+        start=span.start + length, end=span.end + length, inside=span.inside + (shared.length or Fraction(0))
+    )
+
+
+def _stretch(ctx: Any, scene: Mushroom, span: Span) -> MonotoneStretch:
+    """Return the stretch of a span, or of a plateau what looks like one."""
+    if not span.start < span.end:
+        raise NotCovered(f"the mouth turns twice in so short a time that {ctx.dps} digits do not tell when")
+    motion = MovingMushroom(ctx, scene, span.inside)
+    ends = [
+        (motion.nu(span.start)[0], span.start, span.start_order),
+        (motion.nu(span.end)[0], span.end, span.end_order),
+    ]
+    (nu_lower, lower, lower_order), (nu_upper, upper, upper_order) = sorted(ends)
+    return MonotoneStretch(motion, upper, lower, nu_upper, nu_lower, upper_order, lower_order)
+
+
+def _pieces(
+    ctx: Any, capture: list[MonotoneStretch], release: list[MonotoneStretch], small: Any
+) -> tuple[CapturePiece, ...]:
+    values = sorted({nu for s in capture + release for nu in (s.nu_upper, s.nu_lower)}, reverse=True)
+    cuts = [values[0]]
+    for nu in values[1:]:
+        if cuts[-1] - nu > small:
+            cuts.append(nu)
+    if abs(1 - cuts[0]) <= small:
+        cuts[0] = ctx.one
+
+    def over(branch: list[MonotoneStretch], nu_upper: Any, nu_lower: Any) -> MonotoneStretch:
+        middle = (nu_upper + nu_lower) / 2
+        whole = next(s for s in branch if s.nu_lower < middle < s.nu_upper)
+        return whole.between(nu_upper, nu_lower, small)
+
+    return tuple(CapturePiece(over(capture, a, b), over(release, a, b)) for a, b in pairwise(cuts))

@@ -19,10 +19,10 @@ import numpy as np
 from scene.tables import Scene
 from theory.adiabatic import Captures, Placed
 from theory.branches import turns
-from theory.constants import guarded
 from theory.critical import solve_rising
-from theory.given import real_numbers
+from theory.precision import guarded
 from theory.prediction import converged
+from theory.validation import real_numbers
 from theory.volumes import NotCovered, delta_slope
 
 

@@ -7,8 +7,7 @@ lattice distribution. The lattice's origin is the uncaptured energy, so the atom
 mass of a particle between two points is shared among them so that mass and mean are kept; its variance grows
 by at most step^2 / 4. So the step has to be small against what s does: it is STEP of the reach of s in one
 cycle, which in a nearly trivial cycle may be far below 1. Far tails are
-smaller than the rounding of the transform unless the distribution is first tilted by exp(q s);
-`theory.saddle` reaches them without a transform.
+smaller than the rounding of the transform unless the distribution is first tilted by exp(q s).
 """
 
 from __future__ import annotations
@@ -22,7 +21,7 @@ from numpy.typing import ArrayLike, NDArray
 from scene.refusal import BadInput, check_count, check_number, shown
 from scene.tables import Scene
 from theory.branches import UNRESOLVED, Branch, Floats, Node, X, at, noise, tree
-from theory.given import finite_array
+from theory.validation import finite_array
 
 STEP = 2.0**-12  # the lattice's, at best, and as a share of one cycle's reach
 LEAST_REACH = 1e-12  # of s in a cycle; below, its differences are partly rounding

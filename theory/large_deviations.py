@@ -11,15 +11,19 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
+from scipy.optimize import brentq
 
-from scene.refusal import check_count
+from scene.refusal import BadInput, check_count
 from scene.tables import Scene
 from theory.adiabatic import Captures
-from theory.constants import guarded
+from theory.branches import Floats, Node
+from theory.chebyshev import product
 from theory.critical import solve_rising
 from theory.distribution import KEPT, MAX_CYCLES, Energies, Lattice, cumulated, energies
+from theory.precision import guarded
 from theory.prediction import converged
-from theory.saddle import Saddle
+
+LEAST = 1e-24  # mean of s, a half of its variance: below, every particle keeps its energy
 
 
 class Rarity(NamedTuple):
@@ -76,8 +80,22 @@ def loss_probability(found: Energies | Scene, n_cycles: int) -> float:
         NotCovered, NotConverged: as `theory.predict`.
     """
     n_cycles, found = check_count("n_cycles", n_cycles, 1, MAX_CYCLES), energies(found)
-    place = float(Saddle(found).place(0.0)[0])
+    slopes = _series(found.root, np.array([-1.0, 0.0]))[1]
+    if not slopes[0] < -LEAST < LEAST < slopes[1]:
+        raise BadInput("every particle keeps its energy in this cycle: nobody loses")
+    place = brentq(lambda q: float(_series(found.root, np.array([q]))[1, 0]), -1.0, 0.0)
     return found.lost() if n_cycles == 1 else _lost(found, n_cycles, place)
+
+
+def _series(node: Node, q: Floats) -> Floats:
+    """Return mean exp((q + x) s) over a valley, from its top, as coefficients of x^0 and x^1: (2, n)."""
+    orders = np.arange(2)
+    captured: Floats = (node.s[None, :] ** orders[:, None] * node.weights) @ np.exp(np.outer(node.s, q))
+    passed = node.passed * np.exp(node.gain * q) * node.gain ** orders[:, None]
+    for child in node.children:
+        passed = np.array(product(list(passed), list(_series(child, q))))
+    total: Floats = captured + passed
+    return total
 
 
 def _lost(found: Energies, n: int, place: float) -> float:

@@ -3,29 +3,35 @@
 Everything is computed at two or more resolutions; an answer is given when two in a row
 agree to two digits more than asked, and is then the finer of the two. A cycle in which one particle is
 captured several times is covered too.
+
+Solved cycles are kept for whoever asks again: numbers alone, those of the last KEPT solutions to few digits.
+Each caller gets them in the number system of its own cycle: it may change that, or compute in another thread,
+and nobody else is touched.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import partial
+from functools import lru_cache, partial
 from typing import Any, NamedTuple
 
 import msgspec
 
+from scene.laws import Law
 from scene.notebook import rows
 from scene.refusal import BadInput, check_count, check_number, shown
-from scene.tables import Mushroom, Scene
+from scene.tables import Mushroom, Scene, laws
 from scene.transforms import backwards
-from theory.adiabatic import Captures, NotConverged
-from theory.constants import guarded
+from theory.adiabatic import Captures, NotConverged, Panel, Window, captures, grid_for
+from theory.chebyshev import logarithm
 from theory.cycle import GUARD, Cycle
-from theory.given import MAX_DIGITS, MAX_ORDER, one_of
-from theory.measure import logarithm
-from theory.solutions import solved
+from theory.precision import guarded
+from theory.validation import MAX_DIGITS, MAX_ORDER, one_of
 from theory.volumes import as_mushroom
 
 MAX_CYCLES = 2**53
+KEPT = 64
+FEW_DIGITS = 60  # a solution takes about a megabyte then, and grows with the square of the digits
 
 
 class Prediction(NamedTuple):
@@ -209,3 +215,45 @@ def converged(
                 return current
         previous = current
     raise NotConverged(f"two resolutions in a row do not agree to {digits} digits")
+
+
+class _Solution:
+    """A place for the numbers of one solution."""
+
+    window: Window | None = None
+
+
+def solved(scene: Scene, cycle: Cycle, target: int, told: Callable[[float], None] | None = None) -> Captures:
+    """Return a cycle's captures: see `theory.adiabatic.captures`.
+
+    Args:
+        scene: what the cycle is of.
+        cycle: `Cycle.of` the scene.
+        target: as for `captures`.
+        told: as for `captures`; what is kept is told as done.
+
+    Raises:
+        NotConverged: as `captures`.
+    """
+    if cycle.digits > FEW_DIGITS:
+        return captures(cycle, target, told)
+    place = _place(tuple(laws(scene).items()), cycle.digits, target)
+    if place.window is None:
+        found = captures(cycle, target, told)
+        place.window = _moved(found.root, lambda number: number._mpf_)
+        return found
+    if told is not None:
+        told(1.0)
+    return Captures(cycle, grid_for(cycle.ctx, target), target, _moved(place.window, cycle.ctx.make_mpf))
+
+
+@lru_cache(maxsize=KEPT)
+def _place(given: tuple[tuple[str, Law], ...], digits: int, target: int) -> _Solution:
+    return _Solution()
+
+
+def _moved(window: Window, change: Callable[[Any], Any]) -> Window:
+    """Return the same numbers in another form."""
+    panels = (Panel(*([change(number) for number in column] for column in panel)) for panel in window.panels)
+    children = (_moved(child, change) for child in window.children)
+    return Window(tuple(panels), tuple(children), *map(change, window[2:]))

@@ -3,6 +3,8 @@
 A volume is 2 pi times an area, weighted by the share of directions; at energy E it is
 sqrt(2 E) times larger. Every formula takes the number system first: `mpmath.fp` for floats,
 an `MPContext` for many digits, `numpy` for arrays. Intervals are not handled.
+
+Invariants and rates of energy follow from them.
 """
 
 from __future__ import annotations
@@ -14,10 +16,10 @@ import numpy as np
 from mpmath import fp
 
 from scene.laws import Law, value
-from scene.refusal import BadInput
+from scene.refusal import BadInput, check_number, shown
 from scene.tables import Mushroom, Scene, check_scene, cycle_length
 from scene.transforms import scaled
-from theory.given import in_system
+from theory.validation import check_real, in_system
 
 FAR = 100  # powers of two of a length or a time, beyond which others are taken for units
 WIDE = 0.75  # nu from which the island's share is summed as a series
@@ -161,19 +163,11 @@ def volumes_at(ctx: Any, scene: Scene, t: Any) -> Volumes:
     return volumes_of(ctx, r, nu, h, slope)
 
 
-def shares(ctx: Any, nu: Any) -> tuple[Any, Any]:
-    """Return delta(nu) and 1 - delta(nu), which is right where it is small too: see `free_share`."""
-    return delta(ctx, nu), free_share(ctx, nu)
-
-
-def volumes_of(
-    ctx: Any, r: Any, nu: Any, h: Any, slope: Any, known: tuple[Any, Any] | None = None
-) -> Volumes:
-    """Return all volumes from the table's parameters, nu = w / r; known: the `shares` of nu."""
+def volumes_of(ctx: Any, r: Any, nu: Any, h: Any, slope: Any) -> Volumes:
+    """Return all volumes from the table's parameters, nu = w / r."""
     # The numbers of a scene need no check; most of theory comes by here.
     cap, stem = _over_cap(ctx, r), _over_stem(ctx, nu * r, h, slope)
-    island, free = known or shares(ctx, nu)
-    return Volumes(cap, stem, island * cap, free * cap + stem, nu)
+    return Volumes(cap, stem, delta(ctx, nu) * cap, free_share(ctx, nu) * cap + stem, nu)
 
 
 def in_near_units(scene: Scene) -> tuple[Scene, int, int]:
@@ -197,3 +191,80 @@ def as_mushroom(scene: Scene) -> Mushroom:
     if isinstance(scene, Mushroom):
         return scene
     raise NotCovered(f"the theory is of mushrooms: table is {scene.__struct_config__.tag}")
+
+
+def energy(ctx: Any, vx: Any, vy: Any) -> Any:
+    """Return H = (vx^2 + vy^2) / 2 [length^2 / time^2]. Source: sec. 2."""
+    vx, vy = in_system(ctx, vx=vx, vy=vy)
+    return (vx * vx + vy * vy) / 2
+
+
+def sin_phi_hat(ctx: Any, x: Any, y: Any, vx: Any, vy: Any, r: Any) -> Any:
+    """Return sin of the angle phi_hat; its modulus is the cap's adiabatic invariant.
+
+    Each hit of the base turns its sign. Between hits, and from arc hit to arc hit, it stays but for O(u / v).
+
+    Args:
+        ctx: number system.
+        x: position across [length].
+        y: height over the base [length].
+        vx: velocity across; vx and vy must not both be 0.
+        vy: velocity upward.
+        r: radius of the cap [length].
+
+    Returns:
+        -(x vy - y vx) / (|v| r); in the cap the particle is captured when its modulus exceeds nu.
+
+    Raises:
+        BadInput: an argument is not finite, r is not > 0, or the particle rests.
+
+    Source: Eq:sinphi.
+    """
+    x, y, vx, vy, r = in_system(ctx, x=x, y=y, vx=vx, vy=vy, r=r)
+    speed = ctx.hypot(vx, vy)
+    if not np.all(speed > 0):
+        raise BadInput("vx = vy = 0: a particle at rest has no direction")
+    _check_positive("r", r)
+    # Of lengths and speeds as large or small as binary64 holds, products would be beyond it.
+    return (y / r) * (vx / speed) - (x / r) * (vy / speed)
+
+
+def cap_invariant(ctx: Any, vx: Any, vy: Any, r: Any) -> Any:
+    """Return E V_cap, constant while the particle stays in the cap. Source: sec. 3.1."""
+    return energy(ctx, vx, vy) * v_cap(ctx, r)
+
+
+def log_energy_rate_chaotic(v_cha: Any, v_cap: Any, v_cha_rate: Any, delta_rate: Any) -> Any:
+    """Return d log E / dt in the chaotic zone, with the flux through the mouth.
+
+    Args:
+        v_cha: volume of the chaotic zone [length^2].
+        v_cap: volume of the cap [length^2].
+        v_cha_rate: d V_cha / dt.
+        delta_rate: d delta / dt, positive while particles are captured.
+
+    Source: Eq:dE.
+    """
+    _check_held(v_cha=v_cha, v_cap=v_cap, v_cha_rate=v_cha_rate, delta_rate=delta_rate)
+    _check_positive("v_cha", v_cha)
+    return -(v_cha_rate + v_cap * delta_rate) / v_cha
+
+
+def log_energy_rate_island(v_cap: Any, v_cap_rate: Any) -> Any:
+    """Return d log E / dt in the island, -V_cap' / V_cap. Source: Eq:dEe."""
+    _check_held(v_cap=v_cap, v_cap_rate=v_cap_rate)
+    _check_positive("v_cap", v_cap)
+    return -v_cap_rate / v_cap
+
+
+def _check_held(**numbers: object) -> None:
+    """Refuse what is no finite real number, and integers whose quotients no float holds."""
+    check_real(**numbers)
+    for field, number in numbers.items():
+        if isinstance(number, int):
+            check_number(field, number)
+
+
+def _check_positive(field: str, size: Any) -> None:
+    if not np.all(size > 0):
+        raise BadInput(f"{field} = {shown(size)}, must be > 0")

@@ -66,12 +66,20 @@ def _fixed_cap(period: float, w: dict[float, float], h: dict[float, float], name
     return Mushroom(r=1.0, h=depth, w=half_width, slope=0.04016414896719182, name=name)
 
 
+_SWINGING = scenes.Fourier(1.0, 1.0, (), (0.3,))
 # Scenes that are no part of the catalogue.
 SCENES: dict[str, Scene] = {
     scene.name: scene
     for scene in (
         # One parameter moves, the rest stand still (X7).
         Mushroom(r=1.0, h=1.0, nu=scenes.Fourier(0.6, 1.0, (0.4,)), slope=0.1111, name="only-mouth"),
+        Mushroom(r=scenes.Fourier(1.0, 1.0, (-0.3,)), h=1.0, w=0.6, slope=0.1111, name="only-radius"),
+        Mushroom(r=1.0, h=_SWINGING, nu=0.6, slope=0.1111, name="only-depth"),
+        Mushroom(r=1.0, h=1.0, nu=0.6, slope=scenes.Fourier(0.2, 1.0, (), (0.1,)), name="only-slope"),
+        # The mouth keeps its share of the cap: nobody is captured or released (C12).
+        Mushroom(r=_SWINGING, h=scenes.Fourier(1.0, 1.0, (0.4,)), nu=0.6, slope=0.1111, name="flux-free"),
+        # At rest, its sides upright (L3).
+        Mushroom(r=1.0, h=1.0, w=0.5, name="frozen-untilted"),
         # The loop of fixed-cap-anticlockwise, its legs not as long as one another (C3).
         _fixed_cap(
             1.0,
@@ -118,6 +126,14 @@ _ALL = (
     Simulation("ergodic", 1e6, 10_000, 25_000, phases=EIGHTHS),
     Simulation("ergodic", 1e7, 10_000, 25_000, phases=EIGHTHS),
     Simulation("frozen-mushroom", 1e8, 2_000, 10_000),
+    Simulation("frozen-untilted", 1e8, 2_000, 10_000),
+    # Nothing grows: no flux, one parameter, tables that are integrable at all times (C11 to C13).
+    Simulation("flux-free", 1e6, 2_000, 10_000),
+    Simulation("only-radius", 1e7, 2_000, 10_000),
+    Simulation("only-depth", 1e6, 2_000, 10_000),
+    Simulation("only-slope", 1e6, 2_000, 10_000),
+    Simulation("fermi-ulam", 1e3, 100, 500, n_cycles=400),
+    Simulation("breathing-circle", 1e3, 100, 500, n_cycles=400),
     # Nothing exponential: many cycles at speeds that grow slowly (C5).
     Simulation("ergodic", 1e4, 800, 4_000, n_cycles=120),
     Simulation("moving-cap-trivial", 1e4, 800, 4_000, n_cycles=120),

@@ -14,6 +14,7 @@ from conformance.audit.claims import (
     finite_energy,
     identities,
     misprints,
+    vanishing,
 )
 from conformance.audit.tolerances import N_SIGMA
 from scene.refusal import BadInput
@@ -25,6 +26,7 @@ CHECKS = {
     **exponents.CHECKS,
     **identities.CHECKS,
     **assumptions.CHECKS,
+    **vanishing.CHECKS,
 }
 
 

@@ -296,16 +296,17 @@ def _quadratic(sample: Sample) -> list[Check]:
 
 
 def _gain_of_a_cycle(sample: Sample, v: FloatArray) -> tuple[float, float]:
-    """Return what theory has particles of these speeds gain in a cycle on average, and its next order.
+    """Return what theory has particles of these speeds gain in a cycle on average, and its error.
 
     s = log E1/E0 has mean and variance ~ 1/v, but for lags that fall a little more slowly. So v gains
     v (mean s / 2 + mean s^2 / 8), much the same at every speed: the mean of v is linear in time, E quadratic.
+    Of speeds below the first one, at which rates may not be measured, that of the first is taken.
     """
     scene, rows = scene_of(sample.run), []
-    grid = np.geomspace(np.quantile(v, SLOWEST), v.max(), N_SPEEDS)
+    grid = np.geomspace(max(np.quantile(v, SLOWEST), sample.speed), v.max(), N_SPEEDS)
     for speed in grid.tolist():
         found = theory.at_energy(scene, speed**2 / 2)
-        left = found.next_order
+        left = found.theory_error
         gain = speed * (found.mean_s / 2 + (found.variance_s + found.mean_s**2) / 8)
         rows.append((gain, speed * left.mean_s / 2 + gain * left.variance))
     gains, lefts = (float(np.interp(v, grid, column).mean()) for column in np.array(rows).T)

@@ -1,7 +1,7 @@
 """What finite energy makes of the theory's figures, for a sample's scene and energy, with nothing fitted.
 
-Everything is `theory.at_energy`: diffusion and lags from frozen tables. Each figure's band is the next order
-of that theory (`theory.NextOrder`): nothing is measured on the samples that it judges.
+Everything is `theory.at_energy`: diffusion and lags from frozen tables. Each figure's band is how far that
+theory says it may be off (`theory_error`): nothing is measured on the samples that it judges.
 """
 
 from __future__ import annotations
@@ -55,21 +55,21 @@ class Figure(NamedTuple):
         what: in words.
         measured: on a sample.
         of: by the theory at an energy.
-        order: its name in `theory.NextOrder`.
+        error: its name in `theory_error`.
     """
 
     what: str
     measured: Callable[[Sample], Mean]
     of: Callable[[theory.FiniteEnergy], float]
-    order: str
+    error: str
 
     def bias(self, sample: Sample) -> float:
         """Return what finite energy adds to it."""
         return self.of(predicted(sample)) - self.of(adiabatic(sample))
 
     def band(self, sample: Sample) -> float:
-        """Return its next order."""
-        return float(getattr(predicted(sample).next_order, self.order))
+        """Return how far theory may be off."""
+        return float(getattr(predicted(sample).theory_error, self.error))
 
 
 GROWTH = Figure("mean of log E1/E0", lambda s: mean(s.gain), lambda f: f.mean_s, "mean_s")
@@ -113,14 +113,14 @@ def width(sample: Sample) -> Mean:
 
 def width_as_predicted(what: str, found: Mean, sample: Sample, **options: Any) -> Check:
     """Compare the width of a sample's peak with that which frozen tables predict."""
-    sigma, left = predicted(sample).peak[1] ** 0.5, predicted(sample).next_order
+    sigma, left = predicted(sample).peak[1] ** 0.5, predicted(sample).theory_error
     return close(what, found, sigma, band=sigma * left.variance / 2, **options)
 
 
 def peak_band(sample: Sample) -> float:
-    """Return how far the next order may move the distribution function of the uncaptured."""
+    """Return how far the theory's error may move the distribution function of the uncaptured."""
     found = predicted(sample)
-    left = found.next_order
+    left = found.theory_error
     sigma = math.sqrt(found.peak[1])
     return PEAK_DENSITY * left.peak_mean / sigma + WIDENED * left.variance + SKEWED * left.skewness
 
@@ -131,7 +131,7 @@ def captured_band(sample: Sample) -> float:
     gains = sample.gain[sample.captured]
     places = np.linspace(gains.min(), gains.max(), 400)
     steepest = float(np.max(np.diff(found.captured_cdf(places)) / np.diff(places)))
-    left = found.next_order
+    left = found.theory_error
     return steepest * left.captured_mean + WIDENED * left.variance + SKEWED * left.skewness
 
 

@@ -182,7 +182,7 @@ def capture_times(evidence: ClaimEvidence) -> Iterator[Check]:
             f"{run}: times of capture",
             times,
             found.capture_cdf,
-            band=seen + found.next_order.captured_mean,
+            band=seen + found.theory_error.captured_mean,
             scale=0.2,
             against=("evenly spread", _even(grid[0], grid[-1])),
         )
@@ -195,7 +195,7 @@ def _even(first: float, last: float) -> Cdf:
 def ergodic(evidence: ClaimEvidence) -> list[Check]:
     """X5: c = 0."""
     sample, earlier = evidence.sample("ergodic@1e7"), evidence.sample("ergodic@1e6")
-    found, left = predicted(sample), predicted(sample).next_order
+    found, left = predicted(sample), predicted(sample).theory_error
     ratio = (found.peak[1] / predicted(earlier).peak[1]) ** 0.5
     return [
         less_bias(GROWTH, sample, 0.0, start=""),
@@ -206,7 +206,7 @@ def ergodic(evidence: ClaimEvidence) -> list[Check]:
             "its width shrinks as E0^(-1/4) from 1e6: ratio",
             spread(sample.gain).over(spread(earlier.gain)),
             ratio,
-            band=ratio * (left.variance + predicted(earlier).next_order.variance) / 2,
+            band=ratio * (left.variance + predicted(earlier).theory_error.variance) / 2,
         ),
         peak_width(sample),
     ]
@@ -266,7 +266,7 @@ def trivial_loops(evidence: ClaimEvidence) -> Iterator[Check]:
         "retraced-arc@1e6: share captured in both of its windows",
         share(twice),
         (1 - float(theirs.p_nc) ** 0.5) ** 2,
-        band=predicted(retraced).next_order.p_nc + abs(predicted(retraced).p_nc - float(theirs.p_nc)),
+        band=predicted(retraced).theory_error.p_nc + abs(predicted(retraced).p_nc - float(theirs.p_nc)),
     )
     for name, table in ONE_PARAMETER.items():
         result = evidence.predict(table)

@@ -1,7 +1,7 @@
 """What the paper says, or leaves out, about finite energy: M5 to M9 and M11.
 
 Widths and biases at finite energy are those of theory/equations.md, "Finite energy", with nothing fitted; a
-band is the next order of that theory.
+band is how far that theory may be off.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ ACW, CW = "fixed-cap-anticlockwise@1e9", "fixed-cap-clockwise@1e9"
 LADDER = tuple(f"moving-cap@1e{k}" for k in range(3, 12))
 ERGODIC = tuple(f"ergodic@1e{k}" for k in range(4, 8))
 FIXED = (ACW, CW, "fixed-cap-anticlockwise@1e7", "fixed-cap-clockwise@1e7")
-# Where a cycle holds many times the kicks' memory, so that the next order is small beside the quarter.
+# Where a cycle holds many times the kicks' memory, so that its error is small beside the quarter.
 WIDTHS = (
     ("moving cap", LADDER[3:6]),
     ("c = 0", ERGODIC[1:]),
@@ -56,7 +56,7 @@ def period(evidence: ClaimEvidence) -> Iterator[Check]:
             f"{name}: variance of s beyond the adiabatic one, at T = 1",
             (extra, 2 * sd * error),
             found.variance_s - adiabatic(sample).variance_s,
-            band=found.next_order.variance * found.peak[1] + 2 * sharp * found.next_order.captured_mean,
+            band=found.theory_error.variance * found.peak[1] + 2 * sharp * found.theory_error.captured_mean,
             note="expected: what diffusion and lags add, by the theory of finite energy",
         )
     yield stated(
@@ -137,12 +137,12 @@ def width_exponent(evidence: ClaimEvidence) -> Iterator[Check]:
 
 
 def _bend(samples: list[Sample]) -> float:
-    """Return how far theory's own widths, and their next order, take the exponent from -1/4."""
+    """Return how far theory's own widths, and their error, take the exponent from -1/4."""
     energies = [sample.run.energy for sample in samples]
     sigmas = [predicted(sample).peak[1] ** 0.5 for sample in samples]
     slope = theory.fit_power(energies, sigmas, [0.01 * sigma for sigma in sigmas]).exponent
     reach = float(np.log(energies[-1] / energies[0]))
-    return abs(slope + 0.25) + predicted(samples[0]).next_order.variance / 2 / reach
+    return abs(slope + 0.25) + predicted(samples[0]).theory_error.variance / 2 / reach
 
 
 def fitted(samples: list[Sample], values: list[Mean], *orders: float) -> theory.PowerFit:
@@ -177,7 +177,7 @@ def ergodic_mean(evidence: ClaimEvidence) -> list[Check]:
             "mean of s is sd²/4, the drift that preserving phase volume demands",
             found,
             drift,
-            band=theirs.next_order.mean_s,
+            band=theirs.theory_error.mean_s,
             form="corrected",
             note=f"25,000 have |m1*| < 3e-5 with probability {luck:.2f},"
             f" < 3e-4 (a digit lost?) with {more:.2f}",
@@ -190,9 +190,8 @@ def ergodic_mean(evidence: ClaimEvidence) -> list[Check]:
 
 def finite_bias(evidence: ClaimEvidence) -> Iterator[Check]:
     """M9: the mean of s is biased at finite energy; the mean of exp(-s/2) is not."""
-    samples = evidence.samples(*LADDER)
+    low, *samples = evidence.samples(*LADDER)  # the lowest is below the speeds of the theory of finite energy
     theirs = float(evidence.predict("moving-cap").m1)
-    low = samples[0]
     yield close(f"{low.run.name}: mean of s is m1, no bias", mean(low.gain), theirs, form="printed")
     values, errors = np.array([mean(sample.gain) for sample in samples]).T
     energies = [sample.run.energy for sample in samples]
@@ -204,7 +203,7 @@ def finite_bias(evidence: ClaimEvidence) -> Iterator[Check]:
         "limit of the mean of s as E0 grows",
         (fit.limit, fit.limit_error),
         theirs,
-        band=abs(bent.limit - adiabatic(low).mean_s) + GROWTH.band(low),
+        band=abs(bent.limit - adiabatic(samples[0]).mean_s) + GROWTH.band(samples[0]),
         form="corrected",
         note=text,
     )

@@ -45,7 +45,7 @@ def sums(evidence: ClaimEvidence) -> Iterator[Check]:
 
 def _sum_of(sample: Sample, n: int, cumulants: list[float]) -> list[Check]:
     label = f"{sample.run.name}, n = {n}"
-    total, sums, left = sample.s[:, n - 1], summed(sample.run.name, n), predicted(sample).next_order
+    total, sums, left = sample.s[:, n - 1], summed(sample.run.name, n), predicted(sample).theory_error
     m1, centre, scale = cumulants[1], sums.mean, sums.sd
     bias = centre - n * m1
     per_cycle = Mean((mean(total).value - bias) / n, mean(total).error / n)
@@ -154,7 +154,7 @@ def _told_from_a_gaussian(sample: Sample, n: int) -> list[Check]:
             band=(
                 N_SIGMA * error * (len(total) / N_DRAWN) ** 0.5
                 + n
-                * predicted(sample).next_order.mean_s
+                * predicted(sample).theory_error.mean_s
                 / sums.sd
                 * float(np.abs(np.diff(weight)) @ ((p[1:] + p[:-1]) / 2))
                 / (edges[1] - edges[0])
@@ -227,7 +227,7 @@ def losses(evidence: ClaimEvidence) -> Iterator[Check]:
                 f"{sample.run.name}: share with less energy after {n} cycles",
                 lost,
                 theirs.value,
-                band=N_SIGMA * theirs.error + near * n * predicted(sample).next_order.mean_s,
+                band=N_SIGMA * theirs.error + near * n * predicted(sample).theory_error.mean_s,
                 scale=0.2,
                 note=f"{adiabatic:.4f} at infinite energy",
             )

@@ -1,7 +1,7 @@
 """A cycle in time, for particles of one initial energy: what the chaotic zone gathers, and who lags behind.
 
-Rates of frozen tables (`theory.rates`) are joined with the adiabatic theory's energies and hazards. Particles
-that were captured have other speeds, so lags and sums are functions of their gain over the uncaptured too.
+Rates of frozen tables (`rates`) are joined with the adiabatic theory's energies and hazards. Particles that
+were captured have other speeds, so lags and sums are functions of their gain over the uncaptured too.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from scene.tables import Mushroom, cycle_length, laws
 from theory.branches import Floats, tree
 from theory.curves import chaotic_zone
 from theory.cycle import Cycle
-from theory.rates import SPEEDS, RatesAt, rates_at
+from theory.finite_energy.rates import MEMORIES, SPEEDS, RatesAt, rates_at
 from theory.volumes import NotCovered, delta_slope, volumes_at
 
 N_TIMES = 1024  # steps of a cycle, the midpoint rule's
@@ -38,8 +38,7 @@ class CycleCourse(NamedTuple):
     log_energy: (T,) of the uncaptured, over its value at the start (Eq:dE).
     hazard: (T,) of capture per time, where nu rises that of the reversed cycle (Eq:dps/ps).
     is_capture: (T,) whether nu falls.
-    bend: (T,) square of the walls' acceleration over their speed [1 / time^2].
-    turning: (T,) speed of the sides over their tilt [length / time].
+    stretch: (T,) rate of log w, either way [1 / time].
     rates: from frozen tables.
     """
 
@@ -49,8 +48,7 @@ class CycleCourse(NamedTuple):
     log_energy: Floats
     hazard: Floats
     is_capture: Flags
-    bend: Floats
-    turning: Floats
+    stretch: Floats
     rates: RatesAt
 
 
@@ -67,11 +65,10 @@ def course(scene: Mushroom) -> CycleCourse:
     now, volumes, rates = table_at(fp, scene, times), volumes_at(np, scene, times), rates_at(scene, times)
     nu_rate = (now.w_rate * now.r - now.w * now.r_rate) / now.r**2
     flux = delta_slope(np, volumes.nu) * volumes.v_cap / volumes.v_cha
-    bend = np.asarray((np.gradient(rates.pace, step) / rates.pace) ** 2, dtype=np.float64)
     log_energy = chaotic_zone(scene, times).log_energy - chaotic_zone(scene, [start]).log_energy[0]
-    turning = np.abs(now.w_rate) / np.maximum(np.abs(now.slope), ROUNDING)
+    stretch = np.broadcast_to(np.abs(now.w_rate / now.w), times.shape)
     hazard = np.abs(flux * nu_rate)
-    return CycleCourse(start, step, times, log_energy, hazard, nu_rate < 0, bend, turning, rates)
+    return CycleCourse(start, step, times, log_energy, hazard, nu_rate < 0, stretch, rates)
 
 
 def _clock_start(scene: Mushroom) -> float:
@@ -102,9 +99,9 @@ class Fields:
         energy: of the ensemble when the cycle begins.
 
     Attributes, of the uncaptured, weighted by diffusion:
-        missed: the share of it that the kicks' memory takes off.
-        turned: speed of the sides over their tilt and v. A side turns a near-vertical flight, which has the
-            longest memory, by twice its tilt, and by 2 u / v more when it moves.
+        stretched: root mean square of x / (1 + x^2)^(1/2), x the stem's relative change of width while kicks
+            are remembered.
+        is_known: whether their speeds are among those for which rates were measured.
         n_blocks: of path, each twice as long as the memory, in a cycle.
     """
 
@@ -116,23 +113,43 @@ class Fields:
         # Phase volume is kept: those who lag by J(E) are captured likelier by J + dJ / d log E.
         likelier = lag + (_at_speeds(rates.lag, faster) / faster - lag) / NUDGE
         square = _at_speeds(rates.square, speed) / speed**2
-        # Kicks remembered over a length m miss (m / v)^2 of the walls' acceleration squared.
-        missed = np.minimum((rates.memory / speed) ** 2 * cycle.bend, 1.0)
-        spread = rates.diffusion / speed
+        depleted = 1 + _at_speeds(rates.depletion, speed) / rates.diffusion.sum(axis=1)
+        diffusion = np.maximum(depleted, 0.0)[None] * rates.diffusion.T[:, None]
+        spread = self._remembered(diffusion, speed, rates.leg).sum(axis=0)
         self._values = {
             "lag": lag,
             "square": square,
             "likelier": likelier,
-            "variance": self._gathered(spread * (1 - missed)),
+            "variance": self._gathered(spread),
             "lags": self._gathered(cycle.hazard * lag),
             "squares": self._gathered(cycle.hazard * square),
             "hazards": self._gathered(cycle.hazard * cycle.is_capture * likelier),
         }
         uncaptured = len(GAINS) // 2
         share = spread[uncaptured] / spread[uncaptured].sum()
-        self.missed = float(share @ missed[uncaptured])
-        self.turned = float(share @ (cycle.turning / speed[uncaptured]))
-        self.n_blocks = float(speed[uncaptured].sum() * self._step / (2 * (share @ rates.memory)))
+        memory = rates.diffusion @ np.array(MEMORIES) / rates.diffusion.sum(axis=1)
+        change = memory * cycle.stretch / speed[uncaptured]
+        self.stretched = float(share @ (change**2 / (1 + change**2))) ** 0.5
+        self.is_known = bool(speed[uncaptured].min() >= SPEEDS[0])
+        self.n_blocks = float(speed[uncaptured].sum() * self._step / (2 * (share @ memory)))
+
+    def _remembered(self, diffusion: Floats, speed: Floats, leg: Floats) -> Floats:
+        """Return the growth of variance per time by kicks of each of MEMORIES: (M, G, T).
+
+        Of a path that begins with the leg, whose kicks have the size a: a times the mean of a over the path
+        so far, weighted by the correlations exp(-l / m). Other walls move in the next leg, whose kicks are
+        taken to be independent.
+        """
+        size = np.sqrt(diffusion / speed)
+        steps = speed * self._step / np.array(MEMORIES)[:, None, None]
+        decay, found = np.exp(-steps), np.empty_like(size)
+        kept = np.zeros(size.shape[:2])
+        for k in range(N_TIMES):
+            now, lost = size[:, :, k], decay[:, :, k]
+            kept *= leg[k] == leg[k - 1]
+            found[:, :, k] = now * (now + (kept - now) * (1 - lost) / steps[:, :, k])
+            kept = now + (kept - now) * lost
+        return found
 
     def at(self, name: str, gain: Floats, t: Floats | float) -> Floats:
         """Interpolate a field; sums are known at the steps' ends, the others in their middles."""

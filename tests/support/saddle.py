@@ -1,4 +1,4 @@
-"""The sum of many cycles by saddle point, tails included.
+"""The sum of many cycles by saddle point, tails included: what convolutions of the lattice must come to.
 
 With K(q) = log mean exp(q s), the density of log E_n / E0 at n x is
     exp(n (K(q) - q x)) / sqrt(2 pi n K''(q)) (1 + (k4 / 8 - 5 k3^2 / 24) / n),  K'(q) = x,
@@ -19,10 +19,10 @@ from scipy.special import ndtr
 from scene.refusal import BadInput, check_count
 from scene.tables import Scene
 from theory.branches import Floats, Node
+from theory.chebyshev import logarithm, product
 from theory.distribution import Energies, energies
-from theory.given import finite_array
-from theory.measure import logarithm, product
 from theory.prediction import MAX_CYCLES
+from theory.validation import finite_array
 
 LARGEST_EXPONENT = 300.0  # exp of it and its square stay finite
 BISECTIONS = 80

@@ -1,7 +1,7 @@
 """Energies after one cycle at finite energy: the adiabatic theory, blurred and shifted, with nothing to fit.
 
 The chaotic zone's log E diffuses by the kicks of its walls, and the particles about to be captured, like
-those just released, lag behind the zone's mean. Both are known from frozen tables (`theory.course`). Beside
+those just released, lag behind the zone's mean. Both are known from frozen tables (`coefficients`). Beside
 its gain over the uncaptured a particle has a shift and a variance, of the orders v^-1 to v^(-2/3) and v^-1.
 Diffusion alone is exact: E^(1/4) is the distance from 0 of a Brownian motion in four dimensions, which
 is what keeping phase volume leaves of it. theory/equations.md derives all this and says what is left out.
@@ -19,10 +19,10 @@ from scipy.special import ndtr
 from scene.refusal import BadInput, check_count, check_number
 from scene.tables import Mushroom, Scene
 from theory.branches import Branch, Floats, Node, at, tree
-from theory.course import N_TIMES, Fields, Flags, course
 from theory.curves import chaotic_zone
-from theory.given import finite_array
-from theory.rates import table_error
+from theory.finite_energy.coefficients import N_TIMES, Fields, Flags, course
+from theory.finite_energy.rates import SPEEDS, table_error
+from theory.validation import finite_array
 from theory.volumes import NotCovered, as_mushroom
 
 N_PLACES = 2000  # at which distribution functions are computed; linear between them
@@ -34,6 +34,8 @@ REACH = 7.0  # standard deviations beyond which no blur is computed
 LEAST = 1e-12  # variance of a blur, in log E: a lag's square may leave less than none
 LARGEST = 2.0**1000  # of an energy: where its double is no float, fast particles seem slow
 TOO_SLOW = "energy = {}: walls turn too soon for particles so slow, and theory has no distribution"
+UNMEASURED = "energy = {}: particles so slow, below a speed of {:g}, are beyond the measured rates"
+STRETCH = 0.75  # of that change: bounds what is seen of all cycles with rates, from 1e4 on
 MOST = 4.0  # variance of a blur, in log E: beyond it what the peak has of it, v - v^2 / 8, falls again
 
 
@@ -78,15 +80,14 @@ class Atoms(NamedTuple):
         return Atoms(*(column[chosen] for column in self))
 
 
-class NextOrder(NamedTuple):
-    """What the theory leaves out, by the size of the terms that follow.
+class TheoryError(NamedTuple):
+    """How far each figure may be off: the size of what the theory leaves out, and of its rates' errors.
 
-    mean_s, captured_mean, peak_mean, p_nc: the square of the lags in the place where each enters; of means
-        also what the variance leaves out, for a quarter of it is their drift.
-    variance: of the peak, relatively: as much as the kicks' memory took off, twice what moving sides do to
-        it, and the rates' own errors. With captures up to three times as much is seen (theory/equations.md).
-    skewness: of the kicks: blocks as long as twice their memory are taken to be independent, and each to
-        have a skewness of at most 1.
+    mean_s, captured_mean, peak_mean, p_nc: the square of the lags where each enters; of means also a quarter
+        of what the variance leaves out, which is its drift.
+    variance: of the peak, relatively: STRETCH of how far the stem's width changes while kicks are remembered,
+        for correlations are taken to be those of one table; and the rates' own errors.
+    skewness: of the kicks, were each block of path, twice as long as the memory, to have a skewness of 1.
     """
 
     mean_s: float
@@ -113,6 +114,8 @@ class FiniteEnergy:
             raise BadInput(f"energy = {energy}, must be > 0 and at most 2^1000")
         with np.errstate(all="ignore"):  # lags as large as log E itself: refused below
             self._solve()
+            if not self._fields.is_known:
+                raise NotCovered(UNMEASURED.format(energy, SPEEDS[0]))
             is_one = self.atoms.variance.max() < MOST and self.variance_s > 0 and self.peak[1] > 0
         if not is_one:
             raise NotCovered(TOO_SLOW.format(energy))
@@ -154,17 +157,17 @@ class FiniteEnergy:
         return float(self._centres(a)[0]), float(a.variance[0] - a.variance[0] ** 2 / 8)
 
     @property
-    def next_order(self) -> NextOrder:
-        """What is left out of each figure."""
+    def theory_error(self) -> TheoryError:
+        """How far each figure may be off."""
         captured = self.atoms.those(~self.atoms.is_free)
-        p = float(captured.weight.sum())
-        second = float(captured.weight @ captured.shift**2) / p if p else 0.0
+        second = (
+            float(captured.weight @ captured.shift**2) / p if (p := float(captured.weight.sum())) else 0.0
+        )
         error = table_error(self.scene)
         # A shift of a size has an error by the rates too, in the same proportion.
         captured_mean = second + error.lag * second**0.5
-        variance = self._fields.missed + 2 * self._fields.turned + error.diffusion
-        drift = variance * self.peak[1] / 4  # of every mean: the drift is a quarter of the variance
-        return NextOrder(
+        drift = (variance := STRETCH * self._fields.stretched + error.diffusion) * self.peak[1] / 4
+        return TheoryError(
             p * captured_mean + drift,
             captured_mean + drift,
             -np.log(max(1 - p, LEAST)) * captured_mean + drift,
@@ -223,14 +226,10 @@ class FiniteEnergy:
         return chaotic_zone(self.scene, t).log_energy - begun + drift, variance - variance**2 / 8
 
     def at_capture(self, times: ArrayLike) -> tuple[Floats, Floats]:
-        """Return mean and variance of log E / E0 of those first captured at each time, when they are.
-
-        As of `zone`, which raises the same; soon after the start, and of slow particles, variances are 0.
-        """
+        """Return mean and variance of log E / E0 of those captured first at each time; else as `zone`."""
         (mean, variance), t = self._in_zone(times), self._within(times)
         lag, square = (self._fields.at(name, np.zeros(len(t)), t) for name in ("lag", "square"))
-        # Lags go as v^(-2/3), diffusion as v^-1 and from 0: early, or if v is small, the square of a mean lag
-        # may exceed all variance there is. Blurs are cut there too (LEAST).
+        # Early the square of a mean lag may exceed all variance there is.
         return mean + lag, np.maximum(variance + square - lag**2, 0.0)
 
     def draw(self, n_cycles: int, n: int, seed: int) -> Floats:
@@ -341,7 +340,7 @@ class FiniteEnergy:
 class Stays(NamedTuple):
     """Stays in the island that begin on a panel, (n,) each.
 
-    t_in, t_out: times of capture and release.
+    t_in, t_out: when.
     gain: over the uncaptured, in log E.
     probability: of each, given the chaotic zone at the valley's top.
     """
@@ -356,13 +355,13 @@ def at_energy(scene: Scene, energy: float) -> FiniteEnergy:
     """Return the distribution of log E1 / E0 for an initial energy.
 
     Args:
-        scene: a mushroom that `theory.rates` knows, or the reverse of one.
+        scene: a mushroom that `theory.finite_energy.rates` knows, or the reverse of one.
         energy: E = v^2 / 2 of every particle when the cycle begins [length^2 / time^2].
 
     Raises:
         BadInput: energy is not finite, not > 0, or above 2^1000.
-        NotCovered: no frozen rates of the scene are known; or particles are so slow that blurs and lags,
-            corrections of the order v^-1 and v^(-2/3), leave no variance or have no distribution.
+        NotCovered: no frozen rates of the scene are known, none of particles so slow, or corrections of the
+            order v^-1 and v^(-2/3) leave no variance.
     """
     return _solved(as_mushroom(scene), check_number("energy", energy))
 

@@ -1,6 +1,6 @@
 """How what is measured at finite energy is brought to its limit: widths, an unbiased mean, fits over energy.
 
-What finite energy does is predicted by `theory.blur`; this works for any cycle, with frozen rates or without.
+What finite energy does is predicted by `one_cycle`; this works for any cycle, with frozen rates or without.
 """
 
 from __future__ import annotations
@@ -14,8 +14,8 @@ from numpy.typing import ArrayLike
 from scene.refusal import BadInput, check_number
 from scene.tables import Scene
 from theory.branches import Floats
-from theory.given import finite_array
 from theory.prediction import mean_of
+from theory.validation import finite_array
 
 ALIKE = 2.0**-46  # share of a term that the others leave: below it they leave rounding
 
@@ -93,7 +93,7 @@ def peak_width(s: ArrayLike) -> Width:
 def unbiased_mean(scene: Scene, digits: int = 15) -> Any:
     """Return the mean of exp(-s / 2), which finite energy leaves unbiased to the order E0^(-1/2).
 
-    That is so where the sides lean inward at all times; elsewhere (`theory.upright`) it has a bias at any
+    That is so where the sides lean inward at all times; elsewhere (`upright`) it has a bias at any
     energy that a run reaches.
 
     Args:

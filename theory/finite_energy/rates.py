@@ -1,10 +1,10 @@
 """What frozen tables say of finite energy: `frozen_rates.json`, read and interpolated.
 
 For each of PHASES of a cycle the file holds, in the scene's own units, how fast kicks of the walls diffuse,
-and how far particles near capture lag behind the rest, at each of SPEEDS; each with its standard error.
-`python -m conformance.audit.frozen` measures them on tables at rest. They are even (diffusion, squares)
-or odd (lags) in the walls' velocities, so they serve the reversed cycle too. theory/equations.md derives
-what is done with them.
+and, at each of SPEEDS, how far particles near capture lag behind the rest and how much diffusion loses where
+the mouth moves; all with standard errors. `python -m conformance.audit.frozen` measures them on tables at
+rest. They are even (diffusion, depletion, squares) or odd (lags) in the walls' velocities, so they serve the
+reversed cycle too. theory/equations.md derives what is done with them.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from __future__ import annotations
 import json
 import math
 from functools import lru_cache
-from importlib import resources
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -26,11 +26,11 @@ from scene.transforms import backwards
 from theory.branches import Floats
 from theory.volumes import NotCovered, as_mushroom, volumes_at
 
-FILE = "frozen_rates.json"
+FILE = Path(__file__).with_name("frozen_rates.json")
 N_PHASES = 64
 PHASES = (np.arange(N_PHASES) + 0.5) / N_PHASES  # of the period; walls at rest at a knot have no rates there
-SPEEDS = np.array([500.0, 2500.0, 12500.0, 62500.0])
-PATHS = (1000.0, 4000.0)  # over which diffusion is gathered
+SPEEDS = np.array([100.0, 200.0, 500.0, 2500.0, 12500.0, 62500.0])
+MEMORIES = (4.0, 12.0, 36.0, 108.0, 324.0)  # lengths over which kicks are remembered
 TINY = 1e-300
 SAME = 1e-9  # relative difference of parameters below which two cycles are one
 
@@ -38,18 +38,21 @@ SAME = 1e-9  # relative difference of parameters below which two cycles are one
 class Rates(NamedTuple):
     """A cycle's rates at PHASES, each divided by a power of `pace`, the walls' speed: that makes them smooth.
 
-    diffusion: (N, 2) variance of the kicks' sum per path length, over pace^2, gathered over PATHS.
+    diffusion: (N, M) variance of the sum of kicks of each of MEMORIES per path length, over pace^2.
     lag: (N, S) mean lag of those being captured or released at SPEEDS, over pace; 0 where the mouth rests.
     square: (N, S) mean square lag, less diffusion's, over pace^2.
-    diffusion_error, lag_error, square_error: their standard errors.
+    depletion: (N, S) what the mouth's motion takes off diffusion, over pace^2: negative, or 0.
+    diffusion_error, lag_error, square_error, depletion_error: their standard errors.
     """
 
     diffusion: Floats
     lag: Floats
     square: Floats
+    depletion: Floats
     diffusion_error: Floats
     lag_error: Floats
     square_error: Floats
+    depletion_error: Floats
 
 
 class TableError(NamedTuple):
@@ -63,16 +66,17 @@ class RatesAt(NamedTuple):
     """Rates at T times of a cycle.
 
     pace: (T,) the walls' speed, as `pace` of the measured scene has it.
-    diffusion: (T,) the kicks' variance per path length.
-    memory: (T,) the length over which kicks are remembered [length].
-    lag, square: (T, S) at SPEEDS.
+    diffusion: (T, M) the variance per path length of kicks of each of MEMORIES.
+    lag, square, depletion: (T, S) at SPEEDS.
+    leg: (T,) number of the stretch of the cycle between two knots at which walls rest.
     """
 
     pace: Floats
     diffusion: Floats
-    memory: Floats
     lag: Floats
     square: Floats
+    depletion: Floats
+    leg: Floats
 
 
 def pace(scene: Scene, times: Floats) -> Floats:
@@ -154,17 +158,17 @@ def rates_at(scene: Scene, times: Floats) -> RatesAt:
     """
     known = _found(scene)
     rates, spans, speed = known.rates, _spans(known.measured), known.pace(times)
-    memory = _memory(rates.diffusion, np.searchsorted(spans, PHASES, side="right"))
-    columns = np.column_stack([_unbiased(rates.diffusion, memory), memory, rates.lag, rates.square])
-    found = _between(columns, known.phases(times), spans)
-    n, sign = len(SPEEDS), -1.0 if known.turned else 1.0
-    lag, square = found[:, 2 : 2 + n], found[:, 2 + n :]
+    columns = [rates.diffusion, rates.lag, rates.square, rates.depletion]
+    found = _between(np.column_stack(columns), known.phases(times), spans)
+    diffusion, found = np.split(found, [len(MEMORIES)], axis=1)
+    lag, square, depletion = np.split(found, 3, axis=1)
     return RatesAt(
         speed,
-        found[:, 0] * speed**2,
-        np.sqrt(found[:, 1]),
-        sign * lag * speed[:, None],
+        diffusion * speed[:, None] ** 2,
+        (-1.0 if known.turned else 1.0) * lag * speed[:, None],
         square * speed[:, None] ** 2,
+        depletion * speed[:, None] ** 2,
+        np.searchsorted(spans, known.phases(times), side="right").astype(np.float64),
     )
 
 
@@ -176,28 +180,10 @@ def table_error(scene: Scene) -> TableError:
     """
     measured, rates, _ = _found(scene)
     speed = pace(measured, PHASES * cycle_length(measured))
-    spread, lag = rates.diffusion[:, 1] * speed**2, rates.lag.mean(axis=1) * speed
-    errors = [rates.diffusion_error[:, 1] * speed**2, rates.lag_error.mean(axis=1) * speed]
+    spread, lag = rates.diffusion.sum(axis=1) * speed**2, rates.lag.mean(axis=1) * speed
+    errors = [rates.diffusion_error.sum(axis=1) * speed**2, rates.lag_error.mean(axis=1) * speed]
     sums = np.abs(spread).sum(), max(float(np.abs(lag).sum()), TINY)
     return TableError(*(float(np.sqrt((e**2).sum()) / s) for e, s in zip(errors, sums, strict=True)))
-
-
-def _memory(diffusion: Floats, span: Any) -> Floats:
-    """Return the square of the kicks' memory on each span, from what a shorter path misses.
-
-    With correlations exp(-l / m), a path of one sway of length P shows 1 / (1 + (2 pi m / P)^2) of the whole.
-    """
-    short, long = ((2 * np.pi / path) ** 2 for path in PATHS)
-    found = np.zeros(len(span))
-    for k in np.unique(span):
-        ratio = diffusion[span == k, 1].mean() / diffusion[span == k, 0].mean()
-        found[span == k] = max(ratio - 1, 0.0) / (short - ratio * long)
-    return found
-
-
-def _unbiased(diffusion: Floats, memory: Floats) -> Floats:
-    found: Floats = diffusion[:, 1] * (1 + memory * (2 * np.pi / PATHS[1]) ** 2)
-    return found
 
 
 def _between(columns: Floats, phase: Floats, spans: Floats) -> Floats:
@@ -252,7 +238,7 @@ def _motions(scene: Mushroom, times: Floats) -> list[tuple[Any, Any]]:
 
 @lru_cache(maxsize=1)
 def _table() -> dict[str, tuple[Mushroom, Rates]]:
-    data = json.loads((resources.files("theory") / FILE).read_text("utf-8"))
+    data = json.loads(FILE.read_text("utf-8"))
     found = {}
     for name, entry in data["scenes"].items():
         scene = as_mushroom(scenes.from_data(entry["scene"]))

@@ -1,0 +1,260 @@
+"""One cycle of somebody else's ensemble, held to what the paper claims for its scene.
+
+Each figure is a `Check`, as in the audit: theory at that energy with what it leaves out, the departure that a
+sample of this size would show, and the power against a rival. A scene without frozen rates has the adiabatic
+theory only; then a band is granted that no rates confirm, (walls' speed / particles' speed)^(2/3), the order
+of the first correction. What is likely wrong is in `conformance.audit.causes`.
+
+Not handled: starts of several energies, tables other than mushrooms.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+from mpmath import fp
+
+import theory
+from conformance.audit.claim import Check
+from conformance.audit.claims.broadened import PEAK_DENSITY, SKEWED, WIDENED
+from conformance.audit.runs import MAX_LOST, BoolArray, FloatArray
+from conformance.audit.tolerances import Cdf, close, fits, mean, share, spread, stated
+from scene import Mushroom
+from scene.geometry import half_width
+from scene.laws import bounds, values
+from scene.tables import cycle_length, laws
+from scene.transforms import backwards
+
+MOST_SORTED = 1_000_000  # values whose whole distribution is tested; of more, evenly spaced ones
+N_TIMES = 4096  # of a cycle, at which laws are looked at
+FEW = 20  # particles below which a group says nothing
+WAITS = 4  # longest flights between two arc hits, which captures and releases are told late by, and lags
+
+
+class GivenEnsemble(NamedTuple):
+    """One cycle of n particles, those that have energies.
+
+    Attributes:
+        scene: that is claimed to have been simulated.
+        energy: of every start, v^2 / 2 in the scene's units.
+        s: (n,) log E1 / E0.
+        captured: (n,) who was captured; None where nothing tells.
+        t_in, t_out: (n,) begin and end of a stay in the scene's time; nan for none; None where not given.
+        n_lost: rows without an energy, or particles without a row.
+        is_binary32: whether every energy is a number of 24 bits.
+    """
+
+    scene: Mushroom
+    energy: float
+    s: FloatArray
+    captured: BoolArray | None = None
+    t_in: FloatArray | None = None
+    t_out: FloatArray | None = None
+    n_lost: int = 0
+    is_binary32: bool = False
+
+
+class Expected(NamedTuple):
+    """What theory has for a scene at an energy.
+
+    Attributes:
+        mean_s, p_nc, peak, sigma: means, share, place and width of the peak; a width of 0 is not known.
+        mean_exp_minus: mean of E0/E1.
+        cdf, free_cdf, captured_cdf, capture_cdf: distributions of s and of the time of capture.
+        bands: what is left out of mean_s, p_nc, peak, sigma, captured, cdf.
+        has_rates: whether finite energy is in them.
+    """
+
+    mean_s: float
+    p_nc: float
+    peak: float
+    sigma: float
+    mean_exp_minus: float
+    cdf: Cdf
+    free_cdf: Cdf
+    captured_cdf: Cdf
+    capture_cdf: Cdf
+    bands: dict[str, float]
+    has_rates: bool
+
+
+def expected(scene: Mushroom, energy: float) -> Expected:
+    """Return what theory has for a scene at an energy: with rates where they are known."""
+    try:
+        found = theory.at_energy(scene, energy)
+    except theory.NotCovered:
+        return _adiabatic(scene, energy)
+    left, sigma = found.next_order, found.peak[1] ** 0.5
+    shape = WIDENED * left.variance + SKEWED * left.skewness
+    bands = {
+        "mean_s": left.mean_s,
+        "p_nc": left.p_nc,
+        "peak": left.peak_mean,
+        "sigma": sigma * left.variance / 2,
+        "captured": left.captured_mean,
+        "cdf": PEAK_DENSITY * left.peak_mean / sigma + shape,
+    }
+    figures = found.mean_s, found.p_nc, found.peak[0], sigma, found.mean_of_exp(-1)
+    cdfs = found.cdf, found.free_cdf, found.captured_cdf, found.capture_cdf
+    return Expected(*map(float, figures), *cdfs, {k: float(v) for k, v in bands.items()}, True)
+
+
+def _adiabatic(scene: Mushroom, energy: float) -> Expected:
+    found, curve = theory.predict(scene, 12), theory.energies(scene)
+    p_nc, peak = float(found.p_nc), float(found.log_e_nc)
+    band = (walls_speed(scene) / math.sqrt(2 * energy)) ** (2 / 3)
+    span = cycle_length(scene)
+    edges = np.linspace(0.0, span, N_TIMES + 1) + cycle_start(scene)
+    mass = np.cumsum(theory.capture_time_mass(scene, edges)) if p_nc < 1 else np.zeros(N_TIMES)
+
+    def free_cdf(s: FloatArray) -> FloatArray:
+        return np.asarray(s >= peak, dtype=np.float64)
+
+    def captured_cdf(s: FloatArray) -> FloatArray:
+        return np.asarray(curve.captured_below(np.asarray(s)) / max(1 - p_nc, 1e-12))
+
+    def capture_cdf(t: FloatArray) -> FloatArray:
+        return np.asarray(np.interp(t, edges[1:], mass / max(mass[-1], 1e-12)))
+
+    bands = dict.fromkeys(("mean_s", "p_nc", "peak", "sigma", "captured", "cdf"), band)
+    figures = float(found.m1), p_nc, peak, 0.0, 1.0
+    return Expected(*figures, curve.cdf, free_cdf, captured_cdf, capture_cdf, bands, False)
+
+
+def cycle_start(scene: Mushroom) -> float:
+    """Return the time at which nu begins to fall."""
+    return float(theory.Cycle.of(scene, 10).start)
+
+
+def walls_speed(scene: Mushroom) -> float:
+    """Return the largest rate of a size over a cycle [length / time]."""
+    times = np.linspace(0.0, cycle_length(scene), N_TIMES + 1)
+    sizes = [values(law, times) for name, law in laws(scene).items() if name not in ("nu", "slope")]
+    sizes.append(half_width(fp, scene, times))
+    return float(max(np.max(np.abs(np.diff(size))) for size in sizes) * N_TIMES / cycle_length(scene))
+
+
+def nu_at(scene: Mushroom, times: FloatArray) -> FloatArray:
+    """Return w / r at times."""
+    return np.asarray(half_width(fp, scene, times) / values(scene.r, times))
+
+
+def checks(given: GivenEnsemble, theirs: Expected) -> list[Check]:
+    """Return every figure of the paper that the ensemble can be held to."""
+    return [*_records(given), *_energies(given, theirs), *_captures(given, theirs), *_stays(given, theirs)]
+
+
+def reversal(given: GivenEnsemble, other: GivenEnsemble, theirs: Expected) -> Check:
+    """Hold two directions of one cycle to p'(-s) = p(s) exp(-s), by the means of 1 / (1 + exp s) of both.
+
+    From the identity mean' f(-s) = mean f(s) exp(-s) for any f; this f keeps both sides bounded.
+    """
+    here, there = mean(np.exp(-given.s) / (1 + np.exp(given.s))), mean(1 / (1 + np.exp(-other.s)))
+    return close(
+        "reversal identity: mean of exp(-s)/(1 + exp s), less that of 1/(1 + exp(-s)) in the reversed cycle",
+        (here.value - there.value, float(np.hypot(here.error, there.error))),
+        0.0,
+        band=2 * theirs.bands["mean_s"],
+        scale=0.1,
+    )
+
+
+def is_reverse(scene: Mushroom, other: Mushroom) -> bool:
+    """Tell whether two scenes are one cycle run both ways, from whatever instant each begins."""
+    return theory.predict(backwards(scene), 8).strings(8) == theory.predict(other, 8).strings(8)
+
+
+def _records(given: GivenEnsemble) -> Iterator[Check]:
+    n = len(given.s) + given.n_lost
+    yield stated(
+        "every particle has an energy",
+        given.n_lost <= MAX_LOST * n,
+        f"{given.n_lost:,} of {n:,} have none",
+        f"at most {MAX_LOST:.1%}",
+    )
+    yield stated(
+        "energies have more than 24 bits",
+        not given.is_binary32,
+        "all are binary32 numbers" if given.is_binary32 else "they have",
+        "binary64",
+    )
+
+
+def _energies(given: GivenEnsemble, theirs: Expected) -> Iterator[Check]:
+    s, bands = given.s, theirs.bands
+    rival = ("no growth", 0.0) if theirs.mean_s else None
+    scale = max(abs(theirs.mean_s), bands["mean_s"]) * 4
+    yield close(
+        "m1: mean of log E1/E0", mean(s), theirs.mean_s, band=bands["mean_s"], scale=scale, against=rival
+    )
+    yield close(
+        "mean of E0/E1, which is 1 in the limit",
+        mean(np.exp(-s)),
+        theirs.mean_exp_minus,
+        band=bands["mean_s"],
+        scale=0.5,
+    )
+    if theirs.has_rates:
+        mirrored = ("the wrong sign of every gain", lambda x: 1 - theirs.cdf(-np.asarray(x)))
+        yield fits("log E1/E0", _some(s), theirs.cdf, band=bands["cdf"], scale=0.3, against=mirrored)
+
+
+def _captures(given: GivenEnsemble, theirs: Expected) -> Iterator[Check]:
+    if given.captured is None:
+        return
+    free, caught, bands = given.s[~given.captured], given.s[given.captured], theirs.bands
+    yield close(
+        "p_nc: share never captured",
+        share(~given.captured),
+        theirs.p_nc,
+        band=bands["p_nc"],
+        scale=0.3,
+        against=("nobody is captured", 1.0) if theirs.p_nc < 1 else None,
+    )
+    if len(free) >= FEW:
+        yield close(
+            "log E_nc: mean of log E1/E0 of the never captured", mean(free), theirs.peak, band=bands["peak"]
+        )
+    if len(free) >= FEW and theirs.has_rates:
+        yield close("width of their peak", spread(free), theirs.sigma, band=bands["sigma"])
+        yield fits("their log E1/E0", _some(free), theirs.free_cdf, band=bands["cdf"], scale=0.4)
+    if len(caught) >= FEW and theirs.p_nc < 1 and theirs.has_rates:
+        band = bands["cdf"] + bands["captured"] * _steepest(caught, theirs.captured_cdf)
+        yield fits("log E1/E0 of the captured", _some(caught), theirs.captured_cdf, band=band, scale=0.4)
+
+
+def _stays(given: GivenEnsemble, theirs: Expected) -> Iterator[Check]:
+    if given.t_in is None or theirs.p_nc == 1:
+        return
+    t_in = given.t_in[np.isfinite(given.t_in)]
+    if len(t_in) < FEW:
+        return
+    wait = 2 * float(bounds(given.scene.r).highest) / math.sqrt(2 * given.energy)
+    grid = np.linspace(t_in.min(), t_in.max(), 2000)
+    seen = float(np.max(theirs.capture_cdf(grid) - theirs.capture_cdf(grid - wait)))
+    band = seen + theirs.bands["captured"]
+    yield fits("times of capture", _some(t_in), theirs.capture_cdf, band=band, scale=0.4)
+    if given.t_out is None:
+        return
+    both = np.isfinite(given.t_in) & np.isfinite(given.t_out)
+    begin, end = given.t_in[both], given.t_out[both]
+    rate = N_TIMES / cycle_length(given.scene)
+    steepest = rate * float(np.max(np.abs(np.diff(nu_at(given.scene, np.arange(N_TIMES + 1) / rate)))))
+    yield close(
+        "nu at release less nu at capture",
+        mean(_some(nu_at(given.scene, end) - nu_at(given.scene, begin))),
+        0.0,
+        band=WAITS * wait * steepest,
+    )
+
+
+def _some(values: FloatArray) -> FloatArray:
+    return values[:: 1 + (len(values) - 1) // MOST_SORTED]
+
+
+def _steepest(values: FloatArray, cdf: Cdf) -> float:
+    places = np.linspace(*np.quantile(values, (0.001, 0.999)), 400)
+    return float(np.max(np.diff(cdf(places)) / np.diff(places)))

@@ -24,7 +24,7 @@ from mushrooms.ensemble_table import Given, read_table
 from mushrooms.terminal import check_energy, load_scene
 from scene.files import write_files
 from scene.refusal import BadInput
-from scene.tables import Mushroom, Scene, cycle_length
+from scene.tables import Mushroom, cycle_length
 
 ENERGIES = {"v2/2": 1.0, "v2": 0.5}  # what an energy of 1 in a file is as v^2/2
 TIMES = ("scene", "cycles")
@@ -108,9 +108,8 @@ def read(path: Path, scene: Mushroom, options: Options) -> tuple[GivenEnsemble, 
     energy = None if options.energy is None else options.energy * unit
     table = read_table(path, energy, unit)
     energy = _energy(path, table, energy)
-    notes = [
-        f"energies are taken as {options.energy_unit.replace('v2', 'v²')}, lengths in the scene's unit: E0 = {energy:g} as v²/2"
-    ]
+    form = options.energy_unit.replace("v2", "v²")
+    notes = [f"energies are taken as {form}, lengths in the scene's unit: E0 = {energy:g} as v²/2"]
     t_in, t_out, told = _times(scene, table.columns, options.time_unit)
     captured = table.columns.get("captured")
     if captured is None and t_in is not None:
@@ -124,9 +123,10 @@ def read(path: Path, scene: Mushroom, options: Options) -> tuple[GivenEnsemble, 
         if options.particles < n_there:
             raise BadInput(f"--particles = {options.particles}, must be at least the {n_there} rows")
         n_lost += options.particles - n_there
+    x0, y0 = (table.columns.get(name) for name in ("x0", "y0"))
     flags = None if captured is None else captured.astype(bool)
     return (
-        GivenEnsemble(scene, energy, table.s, flags, t_in, t_out, n_lost, table.is_binary32),
+        GivenEnsemble(scene, energy, table.s, flags, t_in, t_out, x0, y0, n_lost, table.is_binary32),
         [*notes, *told],
     )
 
@@ -151,11 +151,11 @@ def _check_flags(path: Path, captured: Any) -> None:
         raise BadInput(f"--ensemble {str(path)!r}: captured = {odd[0]}, must be 0 or 1")
 
 
-def _times(scene: Scene, columns: dict[str, Any], unit: str | None) -> tuple[Any, Any, list[str]]:
+def _times(scene: Mushroom, columns: dict[str, Any], unit: str | None) -> tuple[Any, Any, list[str]]:
     """Return times of stays in the scene's unit, by what is said or by where theory has captures."""
     t_in, t_out = columns.get("t_in"), columns.get("t_out")
-    known = t_in[np.isfinite(t_in)] if t_in is not None else np.empty(0)
-    if not len(known):
+    known = np.empty(0) if t_in is None else t_in[np.isfinite(t_in)]
+    if t_in is None or not len(known):
         return t_in, t_out, []
     begin, span = cycle_start(scene), cycle_length(scene)
     low, high = float(known.min()), float(known.max())
@@ -183,9 +183,8 @@ def _times(scene: Scene, columns: dict[str, Any], unit: str | None) -> tuple[Any
     return t_in * size, None if t_out is None else t_out * size, [told]
 
 
-def _falls(scene: Scene, times: Any, rather_than: Any) -> bool:
+def _falls(scene: Mushroom, times: Any, rather_than: Any) -> bool:
     """Tell whether the mouth narrows over all of some times, and is wider at the first of the others."""
-    assert isinstance(scene, Mushroom)
     nu = nu_at(scene, np.quantile(times, (0.02, 0.98)))
     return bool(nu[0] > nu[1]) and float(nu_at(scene, np.array([rather_than.max()]))[0]) > nu[1]
 

@@ -1,7 +1,8 @@
 """Somebody's ensemble read from CSV, Parquet or Zarr, a part at a time: what the audit needs of it.
 
 A row is a particle. Columns: E0 and E1, or E0, E1, E2 ... a cycle each, or s = log E1/E0; where there are any
-t_in, t_out (of a stay in the cap) and captured (0 or 1). The names that `mushrooms export` writes will do.
+t_in, t_out (of a stay in the
+cap), captured (0 or 1), and x0, y0, where it started. The names that `mushrooms export` writes will do.
 """
 
 from __future__ import annotations
@@ -33,6 +34,8 @@ NAMES = {
     "t_in": r"t_in(_1(_\d+)?)?",
     "t_out": r"t_out(_1(_\d+)?)?",
     "captured": r"(is_)?captured(_1)?",
+    "x0": "x_?0",
+    "y0": "y_?0",
 }
 
 
@@ -89,7 +92,7 @@ class Parts:
         self._kept: dict[str, list[Floats]] = {}
         self._energies: dict[float, int] = {}
         self._n_lost = self._n_other = 0
-        self._is_binary32 = True
+        self._is_binary32: bool | None = None
 
     def add(self, columns: Mapping[str, Floats]) -> None:
         """Add some rows, by the names of NAMES."""
@@ -106,7 +109,8 @@ class Parts:
                 assert start is not None
                 s = np.log(columns["E1"] * self._unit / start)
                 finite = columns["E1"][np.isfinite(columns["E1"])]
-                self._is_binary32 &= bool(np.all(finite == finite.astype(np.float32)))
+                is_single = bool(np.all(finite == finite.astype(np.float32)))
+                self._is_binary32 = is_single and self._is_binary32 is not False
         followed = np.isfinite(s)
         self._n_lost += int(np.sum(~followed))
         for name, column in {**columns, "s": s}.items():
@@ -121,7 +125,7 @@ class Parts:
         s = whole.pop("s", np.empty(0))
         if len(s) < 2:
             raise BadInput(f"--ensemble {str(self._path)!r}: {len(s)} energies, must be 2 or more")
-        is_single = self._is_binary32 and len(np.unique(s[:1000])) > 2
+        is_single = bool(self._is_binary32) and len(np.unique(s[:1000])) > 2
         return Given(s, whole, self._energies, self._n_lost, self._n_other, is_single)
 
     def _starts(self, columns: Mapping[str, Floats]) -> Floats | None:

@@ -14,7 +14,22 @@ from scipy.special import ndtr
 
 import theory
 from conformance.audit.claim import Check
-from conformance.audit.ensemble import Expected, GivenEnsemble, cycle_start, expected, nu_at
+from conformance.audit.ensemble import (
+    CAPTURED,
+    FREE,
+    IDENTITY,
+    OUTWARD,
+    PEAK,
+    RELEASE,
+    SHARE,
+    STARTS,
+    TIMES,
+    Expected,
+    GivenEnsemble,
+    cycle_start,
+    expected,
+    nu_at,
+)
 from conformance.audit.runs import MAX_LOST, FloatArray
 from conformance.audit.tolerances import Cdf, critical_gap
 from scene.refusal import BadInput
@@ -27,6 +42,10 @@ CLOSE = 0.02  # distance that no chance explains, but that a rival's own error m
 PARTS = (0.25, 0.5, 0.75)  # of a cycle, at which somebody may have stopped
 N_DRAWN = 40_000
 EDGE = 0.02  # of a cycle
+BOUNCE = (
+    "phase volume is not kept, and the never captured have wrong energies too: the bounce is not"
+    " v - 2 (v.n - u) n, with the wall's speed u taken once, or with the wrong sign"
+)
 
 
 class Rival(NamedTuple):
@@ -41,19 +60,22 @@ def likely_causes(given: GivenEnsemble, theirs: Expected, found: list[Check]) ->
     """Say what is likely wrong, a line each; nothing where every check holds or nothing known fits."""
     if all(check.holds is not False for check in found):
         return []
-    told = [*_records(given, theirs), *_stays(given, found)]
+    told = [*_records(given, theirs), *_stays(given, theirs, found)]
     s = given.s[:: 1 + (len(given.s) - 1) // N_LOOKED_AT]
     distance = gap(s, theirs.cdf)
     if distance <= critical_gap(len(s)) + theirs.bands["cdf"]:
         return told
     fitting = []
-    for rival in _rivals(given, theirs):
+    wrong = {check.what for check in found if check.holds is False}
+    for rival in _rivals(given, theirs, wrong.isdisjoint((TIMES, CAPTURED, FREE))):
         with np.errstate(all="ignore"):
             undone = rival.undo(s)
         if np.all(np.isfinite(undone)):
             left = gap(undone, rival.cdf)
             reach = max(critical_gap(len(s)) + theirs.bands["cdf"], CLOSE)
             fitting += [(left, rival.said)] if left <= min(reach, NEARER * distance) else []
+    if not fitting and wrong.issuperset((IDENTITY, PEAK, FREE)):
+        return [*_records(given, theirs), BOUNCE]
     return [*told, *(said for _, said in sorted(fitting)[:2])]
 
 
@@ -79,8 +101,10 @@ def _records(given: GivenEnsemble, theirs: Expected) -> Iterator[str]:
         yield "nobody is captured: captured particles were dropped, or captures were not looked for"
 
 
-def _stays(given: GivenEnsemble, found: list[Check]) -> Iterator[str]:
+def _stays(given: GivenEnsemble, theirs: Expected, found: list[Check]) -> Iterator[str]:
     wrong = {check.what for check in found if check.holds is False}
+    if not wrong.isdisjoint((STARTS, OUTWARD)):
+        yield "starts are not uniform in area: on a wall only, or in one part of the table"
     if given.t_in is None or given.t_out is None or not np.isfinite(given.t_in).any():
         return
     span, begin = cycle_length(given.scene), cycle_start(given.scene)
@@ -88,22 +112,29 @@ def _stays(given: GivenEnsemble, found: list[Check]) -> Iterator[str]:
     if last < 1 - 4 * EDGE and float(np.mean(given.t_out > begin + span * (last - EDGE))) > EDGE:
         yield f"many stays end together at {last:.3f} of the cycle: it was followed no further"
         return
-    if "nu at release less nu at capture" in wrong:
+    if RELEASE in wrong:
         drop = np.nanmean(nu_at(given.scene, given.t_out) - nu_at(given.scene, given.t_in))
         how = "before" if drop < 0 else "after"
         yield (
             f"captured particles are let out {how} the mouth is as wide as when they were caught (nu by"
             f" {abs(drop):.3f}): the mouth's edge leaks, or base and arc do not keep the angle"
         )
+    elif SHARE in wrong:
+        share = float(np.mean(np.isfinite(given.t_in)))
+        few, more = "few" if share < 1 - theirs.p_nc else "many", "; or starts are not uniform"
+        yield (
+            f"too {few} are captured, {share:.1%} for {1 - theirs.p_nc:.1%}: the mouth is not as wide as its law"
+            f" says, as where its corners leak{more if wrong.isdisjoint((TIMES, CAPTURED)) else ''}"
+        )
 
 
-def _rivals(given: GivenEnsemble, theirs: Expected) -> Iterator[Rival]:
+def _rivals(given: GivenEnsemble, theirs: Expected, right_groups: bool) -> Iterator[Rival]:
     def same(s: FloatArray) -> FloatArray:
         return s
 
     cdf = theirs.cdf
     yield Rival(
-        "s has the wrong sign: the bounce has that of the wall's speed wrong, or E0 and E1 are exchanged",
+        "s has the wrong sign: E0 and E1 are exchanged",
         np.negative,
         cdf,
     )
@@ -114,6 +145,7 @@ def _rivals(given: GivenEnsemble, theirs: Expected) -> Iterator[Rival]:
     yield Rival("only the never captured are there: captured particles were dropped", same, theirs.free_cdf)
     if theirs.p_nc < 1:
         yield Rival("only the captured are there", same, theirs.captured_cdf)
+    if theirs.p_nc < 1 and (given.captured is None or (given.captured.any() and right_groups)):
         p = _share_of_the_free(given, theirs)
         yield Rival(
             f"never captured {p:.1%}, where theory has {theirs.p_nc:.1%}, both with the right energies:"

@@ -23,11 +23,16 @@ from conformance.audit.claims.broadened import PEAK_DENSITY, SKEWED, WIDENED
 from conformance.audit.runs import MAX_LOST, BoolArray, FloatArray
 from conformance.audit.tolerances import Cdf, close, fits, mean, share, spread, stated
 from scene import Mushroom
-from scene.geometry import half_width
+from scene.geometry import half_width, table_at
 from scene.laws import bounds, values
 from scene.tables import cycle_length, laws
 from scene.transforms import backwards
 
+IDENTITY = "mean of E0/E1, which is 1 in the limit"
+SHARE, PEAK = "p_nc: share never captured", "log E_nc: mean of log E1/E0 of the never captured"
+FREE, CAPTURED = "log E1/E0 of the never captured", "log E1/E0 of the captured"
+TIMES, RELEASE = "times of capture", "nu at release less nu at capture"
+STARTS, OUTWARD = "share of the starts in the cap", "mean of (x^2 + y^2) / r^2 of these"
 MOST_SORTED = 1_000_000  # values whose whole distribution is tested; of more, evenly spaced ones
 N_TIMES = 4096  # of a cycle, at which laws are looked at
 FEW = 20  # particles below which a group says nothing
@@ -43,6 +48,7 @@ class GivenEnsemble(NamedTuple):
         s: (n,) log E1 / E0.
         captured: (n,) who was captured; None where nothing tells.
         t_in, t_out: (n,) begin and end of a stay in the scene's time; nan for none; None where not given.
+        x0, y0: (n,) where each started; None where not given.
         n_lost: rows without an energy, or particles without a row.
         is_binary32: whether every energy is a number of 24 bits.
     """
@@ -53,6 +59,8 @@ class GivenEnsemble(NamedTuple):
     captured: BoolArray | None = None
     t_in: FloatArray | None = None
     t_out: FloatArray | None = None
+    x0: FloatArray | None = None
+    y0: FloatArray | None = None
     n_lost: int = 0
     is_binary32: bool = False
 
@@ -97,9 +105,19 @@ def expected(scene: Mushroom, energy: float) -> Expected:
         "captured": left.captured_mean,
         "cdf": PEAK_DENSITY * left.peak_mean / sigma + shape,
     }
-    figures = found.mean_s, found.p_nc, found.peak[0], sigma, found.mean_of_exp(-1)
-    cdfs = found.cdf, found.free_cdf, found.captured_cdf, found.capture_cdf
-    return Expected(*map(float, figures), *cdfs, {k: float(v) for k, v in bands.items()}, True)
+    return Expected(
+        mean_s=found.mean_s,
+        p_nc=found.p_nc,
+        peak=found.peak[0],
+        sigma=sigma,
+        mean_exp_minus=found.mean_of_exp(-1),
+        cdf=found.cdf,
+        free_cdf=found.free_cdf,
+        captured_cdf=found.captured_cdf,
+        capture_cdf=found.capture_cdf,
+        bands={name: float(band) for name, band in bands.items()},
+        has_rates=True,
+    )
 
 
 def _adiabatic(scene: Mushroom, energy: float) -> Expected:
@@ -144,7 +162,13 @@ def nu_at(scene: Mushroom, times: FloatArray) -> FloatArray:
 
 def checks(given: GivenEnsemble, theirs: Expected) -> list[Check]:
     """Return every figure of the paper that the ensemble can be held to."""
-    return [*_records(given), *_energies(given, theirs), *_captures(given, theirs), *_stays(given, theirs)]
+    return [
+        *_records(given),
+        *_starts(given),
+        *_energies(given, theirs),
+        *_captures(given, theirs),
+        *_stays(given, theirs),
+    ]
 
 
 def reversal(given: GivenEnsemble, other: GivenEnsemble, theirs: Expected) -> Check:
@@ -183,6 +207,18 @@ def _records(given: GivenEnsemble) -> Iterator[Check]:
     )
 
 
+def _starts(given: GivenEnsemble) -> Iterator[Check]:
+    """Hold the starts to a uniform density in area, by how many are in the cap, and how far out there."""
+    if given.x0 is None or given.y0 is None:
+        return
+    now = table_at(fp, given.scene, cycle_start(given.scene))
+    is_in_cap, cap = given.y0 > 0, float(now.cap_area())
+    yield close(STARTS, share(is_in_cap), cap / (cap + float(now.stem_area())), scale=0.3)
+    if is_in_cap.sum() >= FEW:
+        out = (given.x0[is_in_cap] ** 2 + given.y0[is_in_cap] ** 2) / float(now.r) ** 2
+        yield close(OUTWARD, mean(out), 0.5, scale=0.3, against=("all on the arc", 1.0))
+
+
 def _energies(given: GivenEnsemble, theirs: Expected) -> Iterator[Check]:
     s, bands = given.s, theirs.bands
     rival = ("no growth", 0.0) if theirs.mean_s else None
@@ -191,7 +227,7 @@ def _energies(given: GivenEnsemble, theirs: Expected) -> Iterator[Check]:
         "m1: mean of log E1/E0", mean(s), theirs.mean_s, band=bands["mean_s"], scale=scale, against=rival
     )
     yield close(
-        "mean of E0/E1, which is 1 in the limit",
+        IDENTITY,
         mean(np.exp(-s)),
         theirs.mean_exp_minus,
         band=bands["mean_s"],
@@ -207,7 +243,7 @@ def _captures(given: GivenEnsemble, theirs: Expected) -> Iterator[Check]:
         return
     free, caught, bands = given.s[~given.captured], given.s[given.captured], theirs.bands
     yield close(
-        "p_nc: share never captured",
+        SHARE,
         share(~given.captured),
         theirs.p_nc,
         band=bands["p_nc"],
@@ -215,15 +251,13 @@ def _captures(given: GivenEnsemble, theirs: Expected) -> Iterator[Check]:
         against=("nobody is captured", 1.0) if theirs.p_nc < 1 else None,
     )
     if len(free) >= FEW:
-        yield close(
-            "log E_nc: mean of log E1/E0 of the never captured", mean(free), theirs.peak, band=bands["peak"]
-        )
+        yield close(PEAK, mean(free), theirs.peak, band=bands["peak"])
     if len(free) >= FEW and theirs.has_rates:
         yield close("width of their peak", spread(free), theirs.sigma, band=bands["sigma"])
-        yield fits("their log E1/E0", _some(free), theirs.free_cdf, band=bands["cdf"], scale=0.4)
+        yield fits(FREE, _some(free), theirs.free_cdf, band=bands["cdf"], scale=0.4)
     if len(caught) >= FEW and theirs.p_nc < 1 and theirs.has_rates:
         band = bands["cdf"] + bands["captured"] * _steepest(caught, theirs.captured_cdf)
-        yield fits("log E1/E0 of the captured", _some(caught), theirs.captured_cdf, band=band, scale=0.4)
+        yield fits(CAPTURED, _some(caught), theirs.captured_cdf, band=band, scale=0.4)
 
 
 def _stays(given: GivenEnsemble, theirs: Expected) -> Iterator[Check]:
@@ -236,7 +270,7 @@ def _stays(given: GivenEnsemble, theirs: Expected) -> Iterator[Check]:
     grid = np.linspace(t_in.min(), t_in.max(), 2000)
     seen = float(np.max(theirs.capture_cdf(grid) - theirs.capture_cdf(grid - wait)))
     band = seen + theirs.bands["captured"]
-    yield fits("times of capture", _some(t_in), theirs.capture_cdf, band=band, scale=0.4)
+    yield fits(TIMES, _some(t_in), theirs.capture_cdf, band=band, scale=0.4)
     if given.t_out is None:
         return
     both = np.isfinite(given.t_in) & np.isfinite(given.t_out)
@@ -244,7 +278,7 @@ def _stays(given: GivenEnsemble, theirs: Expected) -> Iterator[Check]:
     rate = N_TIMES / cycle_length(given.scene)
     steepest = rate * float(np.max(np.abs(np.diff(nu_at(given.scene, np.arange(N_TIMES + 1) / rate)))))
     yield close(
-        "nu at release less nu at capture",
+        RELEASE,
         mean(_some(nu_at(given.scene, end) - nu_at(given.scene, begin))),
         0.0,
         band=WAITS * wait * steepest,
@@ -256,5 +290,6 @@ def _some(values: FloatArray) -> FloatArray:
 
 
 def _steepest(values: FloatArray, cdf: Cdf) -> float:
-    places = np.linspace(*np.quantile(values, (0.001, 0.999)), 400)
+    lowest, highest = np.quantile(values, (0.001, 0.999)).tolist()
+    places = np.linspace(lowest, highest, 400)
     return float(np.max(np.diff(cdf(places)) / np.diff(places)))

@@ -123,8 +123,8 @@ def _stays(given: GivenEnsemble, theirs: Expected, found: list[Check]) -> Iterat
         share = float(np.mean(np.isfinite(given.t_in)))
         few, more = "few" if share < 1 - theirs.p_nc else "many", "; or starts are not uniform"
         yield (
-            f"too {few} are captured, {share:.1%} for {1 - theirs.p_nc:.1%}: the mouth is not as wide as its law"
-            f" says, as where its corners leak{more if wrong.isdisjoint((TIMES, CAPTURED)) else ''}"
+            f"too {few} are captured, {share:.1%} for {1 - theirs.p_nc:.1%}: the mouth is not as wide as its"
+            f" law says, as where its corners leak{more if wrong.isdisjoint((TIMES, CAPTURED)) else ''}"
         )
 
 

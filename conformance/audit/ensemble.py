@@ -273,13 +273,13 @@ def _stays(given: GivenEnsemble, theirs: Expected) -> Iterator[Check]:
     yield fits(TIMES, _some(t_in), theirs.capture_cdf, band=band, scale=0.4)
     if given.t_out is None:
         return
-    both = np.isfinite(given.t_in) & np.isfinite(given.t_out)
-    begin, end = given.t_in[both], given.t_out[both]
+    begin, end = _some(given.t_in), _some(given.t_out)
+    both = np.isfinite(begin) & np.isfinite(end)
     rate = N_TIMES / cycle_length(given.scene)
     steepest = rate * float(np.max(np.abs(np.diff(nu_at(given.scene, np.arange(N_TIMES + 1) / rate)))))
     yield close(
         RELEASE,
-        mean(_some(nu_at(given.scene, end) - nu_at(given.scene, begin))),
+        mean(nu_at(given.scene, end[both]) - nu_at(given.scene, begin[both])),
         0.0,
         band=WAITS * wait * steepest,
     )

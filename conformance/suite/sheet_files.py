@@ -21,7 +21,7 @@ import msgspec
 from conformance import vectors
 from conformance.suite.answers import UNREADABLE
 from conformance.suite.process import clean
-from conformance.suite.sheet import Answers, Question, Sheet
+from conformance.suite.sheet import REJECTS, Answers, Question, Sheet
 from conformance.vectors import Vector
 from scene.files import write_files
 from scene.refusal import BadInput, shown
@@ -54,10 +54,12 @@ def write_lines(sheet: Sheet, path: Path) -> int:
 def write_tables(sheet: Sheet, folder: Path) -> int:
     """Write questions as CSV into an existing folder, a file a scene; return how many there are.
 
-    Questions about what is no scene, which are to be refused, are left out.
+    Questions about what is no scene or no state, which are to be refused, are left out.
     """
     by_scene: dict[str, list[Question]] = {}
     for question in sheet.questions.values():
+        if question.case == REJECTS:  # a state without vy
+            continue
         try:
             by_scene.setdefault("".join(_scene_lines(question.request["scene"])), []).append(question)
         except (TypeError, AttributeError, ValueError):

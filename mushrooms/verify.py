@@ -7,6 +7,7 @@ import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
+import msgspec
 import typer
 
 from mushrooms import output
@@ -106,7 +107,7 @@ def _drawn(data: dict[str, Any], at: int) -> bytes:
     from scene import State, from_data
 
     begin = data["steps"][at - 1] if at else data["state"]
-    state = State(*(float(begin[name]) for name in FIELDS), begin.get("wall"))
+    state = msgspec.convert({name: begin.get(name) for name in (*FIELDS, "wall")}, State)
     given, scene = data["steps"][at], from_data(data["scene"])
     found = reference.next_collision(scene, state, float(data.get("t_end", 1e300)))
     if not isinstance(found, reference.Collision | reference.Horizon):

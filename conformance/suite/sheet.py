@@ -60,7 +60,7 @@ REJECTS = "protocol/rejects"
 WORD = 2**32  # a seed is told as two numbers that binary64 holds
 
 
-class Question(NamedTuple):
+class SheetQuestion(NamedTuple):
     """A question of a sheet: the case it is of, its sequence number, and the request without it."""
 
     case: str
@@ -110,7 +110,7 @@ class Sheet:
         drawn = drawn_horizons([v for v in chosen if v.level == "core"], seed)
         self.fresh = list(fresh(seed, N_FRESH[level]) if proved is None else proved)
         self.vectors = [(v, drawn_disguise(v, seed)) for v in (*chosen, *drawn, *self.fresh)]
-        self.questions: dict[bytes, Question] = {}
+        self.questions: dict[bytes, SheetQuestion] = {}
         self._numbers = set[int]()
         for vector, image in self.vectors:
             self.add(vector.id, vectors.request(asked(vector, image), 0))
@@ -130,7 +130,7 @@ class Sheet:
         while seq in self._numbers:
             seq = seq % MAX_SEQ + 1
         self._numbers.add(seq)
-        self.questions[key] = Question(case, seq, {k: v for k, v in request.items() if k != "seq"})
+        self.questions[key] = SheetQuestion(case, seq, {k: v for k, v in request.items() if k != "seq"})
 
     def lines(self) -> list[bytes]:
         """Return the questions as a program of protocol 1 reads them, `start` and `stop` included."""

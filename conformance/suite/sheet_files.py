@@ -21,7 +21,7 @@ import msgspec
 from conformance import vectors
 from conformance.suite.answers import UNREADABLE
 from conformance.suite.process import clean
-from conformance.suite.sheet import REJECTS, Answers, Question, Sheet
+from conformance.suite.sheet import REJECTS, Answers, Sheet, SheetQuestion
 from conformance.vectors import Vector
 from scene.files import write_files
 from scene.refusal import BadInput, shown
@@ -56,7 +56,7 @@ def write_tables(sheet: Sheet, folder: Path) -> int:
 
     Questions about what is no scene or no state, which are to be refused, are left out.
     """
-    by_scene: dict[str, list[Question]] = {}
+    by_scene: dict[str, list[SheetQuestion]] = {}
     for question in sheet.questions.values():
         if question.case == REJECTS:  # a state without vy
             continue
@@ -135,7 +135,7 @@ def _scene_lines(scene: Mapping[str, Any]) -> Iterator[str]:
                     yield f"# {name} {law['kind']} {label} {place} {float(number)!r}\n"
 
 
-def _rows(questions: Sequence[Question]) -> Iterator[str]:
+def _rows(questions: Sequence[SheetQuestion]) -> Iterator[str]:
     yield ",".join(COLUMNS) + "\n"
     for question in questions:
         request = question.request

@@ -110,6 +110,8 @@ def read(path: Path, scene: Mushroom, options: Options) -> tuple[GivenEnsemble, 
     energy = _energy(path, table, energy)
     form = options.energy_unit.replace("v2", "v²")
     notes = [f"energies are taken as {form}, lengths in the scene's unit: E0 = {energy:g} as v²/2"]
+    if table.n_other:
+        notes.append(f"{table.n_other:,} rows of another E0 are left out")
     t_in, t_out, told = _times(scene, table.columns, options.time_unit)
     captured = table.columns.get("captured")
     if captured is None and t_in is not None:

@@ -9,6 +9,7 @@ import subprocess
 
 import msgspec
 import pytest
+from support.depth import deep_but
 from support.refusals import assert_refused
 
 from conformance import plain, vectors
@@ -17,31 +18,54 @@ from conformance.suite import run as suite
 from conformance.suite import sheet as sheets
 from conformance.suite import sheet_files as files
 from conformance.suite.checks import ensembles
+from conformance.suite.process import Trouble
 from conformance.suite.session import Limits
 from scene.protocol.wire import serve
 from scene.refusal import BadInput
 
 SEED = 5
+ALL_CHECKS = dict(sheets.CHECKS)
 
 
-@pytest.fixture(autouse=True)
-def _few(monkeypatch):
-    """A handful of vectors of every kind and small ensembles; what is fresh takes long to prove."""
-    found = [
-        v
-        for v in vectors.load("core")
-        if v.group in ("moving-cap", "stem-trajectory", "flow-brief", "near-corner")
-    ][::6]
+# Enough to see every profile and every kind of check; which of them hang on no answer is asked of all.
+SOME = ("property/mirror", "promise/hits", "promise/endings", "profile/work-identity", "profile/mean-growth")
+
+
+@pytest.fixture(autouse=True, scope="module")
+def _few():
+    """A handful of vectors of every kind, a few checks, small ensembles; a fresh question takes long to prove."""
+    groups = ("moving-cap", "stem-trajectory", "flow-brief", "near-corner")
+    found = [v for v in vectors.load("core") if v.group in groups][::6]
     assert {vector.kind for vector in found} == {"step", "trajectory", "flow"}
-    for place in (suite, sheets):
-        monkeypatch.setattr(place, "choose", lambda *_: found)
-        monkeypatch.setattr(place, "N_FRESH", dict.fromkeys(suite.N_FRESH, 1))
-    monkeypatch.setitem(ensembles.SIZES, "core", ensembles.Size(20, 50.0, 0.5))
+    with pytest.MonkeyPatch.context() as patch:
+        for place in (suite, sheets):
+            patch.setattr(place, "choose", lambda *_: found)
+            patch.setattr(place, "N_FRESH", dict.fromkeys(suite.N_FRESH, 1))
+        patch.setattr(sheets, "CHECKS", {name: sheets.CHECKS[name] for name in SOME})
+        patch.setitem(ensembles.SIZES, "core", ensembles.Size(20, 50.0, 0.5))
+        yield
 
 
-@pytest.fixture
+@pytest.fixture(scope="module")
 def sheet():
     return sheets.Sheet("core", SEED)
+
+
+@pytest.mark.parametrize("name", deep_but(list(ALL_CHECKS), "property/mirror", "promise/endings"))
+def test_questions_in_files_hang_on_no_answer(name, sheet, tmp_path, monkeypatch):
+    seen = []
+
+    def noted(verdict, why):
+        seen.append(why)
+        return Trouble(verdict, why)
+
+    monkeypatch.setattr(sheets, "CHECKS", {name: ALL_CHECKS[name]})
+    monkeypatch.setattr(sheets, "Trouble", noted)
+    monkeypatch.setattr(sheets, "choose", lambda *_: [])
+    alone = sheets.Sheet("core", SEED, [])
+    run = graded(alone, tmp_path, answered(b"\n".join(alone.lines()), nudged))
+    assert [result.id for result in run.results[3:]] == [name]
+    assert not [why for why in seen if "hangs on an answer" in why]
 
 
 def answered(lines: bytes, step=plain.next_collision) -> bytes:
@@ -56,6 +80,17 @@ def answered(lines: bytes, step=plain.next_collision) -> bytes:
 
     serve("plain", step, follow, io.BytesIO(lines), out, flow=carry)
     return out.getvalue()
+
+
+def nudged(scene, state, t_end):
+    """Answer with other last bits, so that what goes on from an answer is another question."""
+    found = plain.next_collision(scene, state, t_end)
+    size = 1 + 2.0**-50
+    return (
+        msgspec.structs.replace(found, vx=found.vx * size, vy=found.vy * size)
+        if hasattr(found, "vx")
+        else found
+    )
 
 
 def off_by_a_little(scene, state, t_end):

@@ -26,7 +26,6 @@ from scene import Mushroom
 from scene.geometry import half_width, table_at
 from scene.laws import bounds, values
 from scene.tables import cycle_length, laws
-from scene.transforms import backwards
 
 IDENTITY = "mean of E0/E1, which is 1 in the limit"
 SHARE, PEAK = "p_nc: share never captured", "log E_nc: mean of log E1/E0 of the never captured"
@@ -186,11 +185,6 @@ def reversal(given: GivenEnsemble, other: GivenEnsemble, theirs: Expected) -> Ch
         scale=0.3,
         against=("the same direction twice", 0.3),
     )
-
-
-def is_reverse(scene: Mushroom, other: Mushroom) -> bool:
-    """Tell whether two scenes are one cycle run both ways, from whatever instant each begins."""
-    return theory.predict(backwards(scene), 8).strings(8) == theory.predict(other, 8).strings(8)
 
 
 def _records(given: GivenEnsemble) -> Iterator[Check]:

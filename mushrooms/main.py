@@ -84,7 +84,7 @@ COMMANDS = {
     "verify": Listed(
         "mushrooms.verify:verify",
         "Judge a trajectory of your own, step by step.",
-        "steps.csv --scene moving-cap --picture first-false.svg",
+        "steps.csv --scene moving-cap --picture false.svg",
     ),
     "ask": Listed(
         "mushrooms.ask:ask",

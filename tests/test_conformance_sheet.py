@@ -28,7 +28,12 @@ ALL_CHECKS = dict(sheets.CHECKS)
 
 
 # Enough to see every profile and every kind of check; which of them hang on no answer is asked of all.
-SOME = ("property/mirror", "promise/hits", "promise/endings", "profile/work-identity", "profile/mean-growth")
+SOME = (
+    "property/mirror",
+    "promise/hits",
+    "promise/endings",
+    *(f"profile/{name}" for name in ("work-identity", "mean-growth")),
+)
 
 
 @pytest.fixture(autouse=True, scope="module")

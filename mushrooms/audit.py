@@ -12,7 +12,7 @@ import typer
 from rich import progress
 
 from mushrooms import output
-from mushrooms.terminal import check_range, compilation_told, progress_bar
+from mushrooms.terminal import check_range, compilation_told, progress_bar, refuse_unheeded
 from scene.files import locked, write_files
 from scene.refusal import BadInput, check_seed
 
@@ -37,8 +37,23 @@ def audit(
         bool, typer.Option("--commands", help="Print the runs as simulate commands, a line each, and end.")
     ] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
+    ensemble: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Audit this ensemble: CSV, Parquet or Zarr.")
+    ] = None,
+    scene: Annotated[str | None, typer.Option(metavar="SCENE", help="Of --ensemble.")] = None,
+    backwards: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="An ensemble of the reversed cycle.")
+    ] = None,
+    energy: Annotated[
+        float | None, typer.Option(help="E0 of the rows to take, or where none is told.")
+    ] = None,
+    energy_unit: Annotated[str | None, typer.Option(help="v2/2 (default) or v2.")] = None,
+    time_unit: Annotated[str | None, typer.Option(help="scene or cycles; inferred by default.")] = None,
+    particles: Annotated[int | None, typer.Option(help="How many were started, if some are missing.")] = None,
 ) -> None:
     """Check the paper's claims; writes report.html, report.json and report.txt.
+
+    With --ensemble check an ensemble that somebody else has run: its figures against theory at its energy.
 
     Particles are kept in DIR/runs/NAME as simulate --out keeps them, findings in DIR/findings, for --resume
     after an interruption, with --full or with other --only: the report then has the claims of both, and never
@@ -46,6 +61,31 @@ def audit(
     with more particles too. No run is ever replaced.
     Exit code 0 when every claim has its expected verdict, 1 when one has not, 2 on bad input.
     """
+    told = {"--scene": scene, "--backwards": backwards, "--energy": energy, "--energy-unit": energy_unit}
+    told |= {"--time-unit": time_unit, "--particles": particles}
+    if ensemble is None:
+        refuse_unheeded(told, "there is no --ensemble")
+        _audit_paper(out, full, only, seed, threads, resume, commands, as_json)
+        return
+    from mushrooms.audit_ensemble import Options, audit_ensemble
+
+    ours = {"--full": full or None, "--only": only, "--threads": threads, "--resume": resume or None}
+    refuse_unheeded({**ours, "--commands": commands or None}, "an --ensemble is audited")
+    options = Options(energy, energy_unit or "v2/2", time_unit, particles)
+    raise typer.Exit(audit_ensemble(ensemble, scene, backwards, options, out, as_json))
+
+
+def _audit_paper(
+    out: Path,
+    full: bool,
+    only: str | None,
+    seed: int,
+    threads: int | None,
+    resume: bool,
+    commands: bool,
+    as_json: bool,
+) -> None:
+    """Conduct the audit of the paper's claims."""
     from conformance.audit.claims import select_claims
     from conformance.audit.session import AuditSettings
     from mushrooms import audit_runs

@@ -15,8 +15,8 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from mushrooms import output
-from mushrooms.terminal import new_console, progress_bar
+from mushrooms import offline, output
+from mushrooms.terminal import new_console, progress_bar, refuse_unheeded
 from scene.files import write_file
 from scene.refusal import BadInput
 
@@ -35,7 +35,9 @@ COLOURS = {"pass": "green", "declined": "yellow", "unsupported": "yellow"}
 
 
 def check(
-    command: Annotated[list[str], typer.Argument(metavar="-- COMMAND...", help="Speaks protocol 1.")],
+    command: Annotated[
+        list[str] | None, typer.Argument(metavar="-- COMMAND...", help="Speaks protocol 1.")
+    ] = None,
     level: Annotated[str, typer.Option(help="core, extended or stress.")] = "core",
     seed: Annotated[int | None, typer.Option(help="Of all that is drawn; a new one each run.")] = None,
     timeout: Annotated[float, typer.Option(help="Seconds for one answer, compilation included.")] = 120.0,
@@ -57,43 +59,84 @@ def check(
     html: Annotated[Path | None, typer.Option(metavar="FILE", help="HTML report.")] = None,
     badge: Annotated[Path | None, typer.Option(metavar="FILE", help="Badge (SVG) to publish.")] = None,
     summary: Annotated[Path | None, typer.Option(metavar="FILE", help="Verdict and scope as JSON.")] = None,
+    questions: Annotated[
+        Path | None,
+        typer.Option(metavar="PATH", help="Write the questions: a .jsonl file, or a folder for CSV."),
+    ] = None,
+    answers: Annotated[
+        Path | None, typer.Option(metavar="PATH", help="Grade answers in a file; --questions says to which.")
+    ] = None,
 ) -> None:
-    """Grade a stepper in any language: a command that speaks protocol 1 on stdin and stdout.
+    """Grade a stepper in any language: a command that speaks protocol 1 on stdin and stdout, or its answers.
 
     Every question is asked in disguise, drawn from a seed that is printed: --seed repeats a run.
+    Without a dialogue: --questions writes the questions that hang on no answer, --answers grades a file.
     Exit code 0 when everything passes, 1 when something fails, 2 when the options or the suite are at fault.
     """
-    from conformance import suite
-    from conformance.suite.session import Limits
+    _check_limits(timeout, restarts, total)
+    files = _report_files(json_file, junit, html, badge, summary)
+    if groups and not groups.replace(",", " ").split():
+        raise BadInput(f"--groups = {groups!r}, must name a group; all are asked without it")
+    names = [name.strip() for name in groups.split(",") if name.strip()]
+    if questions or answers:
+        unheeded = {"COMMAND": command, "--groups": groups or None, "--known-failures": known_failures}
+        refuse_unheeded(unheeded, "questions and answers are in files")
+        if answers is None:
+            refuse_unheeded({str(path): True for path, _ in files}, "nothing is graded yet")
+            assert questions is not None
+            offline.write_questions(questions, level, seed)
+            return
+        run = offline.grade(answers, questions, level, seed)
+    else:
+        run = _asked(command or [], level, seed, names, (timeout, restarts, total), known_failures)
+    for path, content in files:
+        write_file(path, content(run))
+    show(run)
+    raise typer.Exit(run.exit_code())
 
+
+def _check_limits(timeout: float, restarts: int, total: float | None) -> None:
     for name, seconds in (("--timeout", timeout), ("--total", total)):
         if seconds is not None and not (math.isfinite(seconds) and 0 < seconds <= LONGEST):
             raise BadInput(f"{name} = {seconds}, must be > 0 and at most {LONGEST} seconds")
     if not 0 <= restarts <= 1000:
         raise BadInput(f"--restarts = {restarts}, must be 0 to 1000")
-    asked_for = zip((json_file, junit, html, badge, summary), _writers(), strict=True)
+
+
+def _report_files(*given: Path | None) -> list[tuple[Path, Callable[[Run], bytes | str]]]:
+    """Return the report files that are asked for, each with what makes its content, in the options' order."""
+    asked_for = zip(given, _writers(), strict=True)
     files = [(path, suffix, content) for path, (suffix, content) in asked_for if path]
     for i, (path, suffix, _) in enumerate(files):
         output.check_file(path, (suffix,))
         if path in [other for other, _, _ in files[:i]]:
             raise BadInput(f"output {str(path)!r} is asked for twice, must be a file for each report")
-    if groups and not groups.replace(",", " ").split():
-        raise BadInput(f"--groups = {groups!r}, must name a group; all are asked without it")
+    return [(path, content) for path, _, content in files]
+
+
+def _asked(
+    command: list[str],
+    level: str,
+    seed: int | None,
+    groups: list[str],
+    limits: tuple[float, int, float | None],
+    known_failures: Path | None,
+) -> Run:
+    """Run the suite on a command, with its progress shown."""
+    from conformance import suite
+    from conformance.suite.session import Limits
+
     known = suite.read_known(known_failures) if known_failures else frozenset()
     with progress_bar() as bar:
-        run = suite.check(
+        return suite.check(
             command,
             level=level,
             seed=seed,
-            groups=[name.strip() for name in groups.split(",") if name.strip()],
-            limits=Limits(timeout, restarts, total),
+            groups=groups,
+            limits=Limits(*limits),
             known=known,
             progress=_teller(bar),
         )
-    for path, _, content in files:
-        write_file(path, content(run))
-    show(run)
-    raise typer.Exit(run.exit_code())
 
 
 def _teller(bar: Progress) -> Callable[[int, int], None]:

@@ -81,6 +81,11 @@ COMMANDS = {
     "check": Listed(
         "mushrooms.check:check", "Grade a stepper in any language.", "--html report.html -- ./my_stepper"
     ),
+    "verify": Listed(
+        "mushrooms.verify:verify",
+        "Judge a trajectory of your own, step by step.",
+        "steps.csv --scene moving-cap --picture false.svg",
+    ),
     "ask": Listed(
         "mushrooms.ask:ask",
         "Print a case's question and its certified answer.",

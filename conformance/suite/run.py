@@ -185,7 +185,7 @@ def _converse(
         if results[-1].verdict != "pass":
             unreached = Trouble(results[-1].verdict, f"not asked: {name} failed")
             return [*results, *(_result(vector, unreached) for vector in chosen)], None
-    results.append(_closed(session, _tried("rejects", partial(_ask_nonsense, session))))
+    results.append(_closed(session, _tried("rejects", partial(ask_nonsense, session))))
     n_fresh = N_FRESH[level] if FRESH in further else 0
     drawn = drawn_horizons([v for v in source if v.level == "core"], seed) if DRAWN in further else []
     questions = itertools.chain(chosen, drawn, fresh(seed, n_fresh))
@@ -283,7 +283,7 @@ def measure_speed(session: Session) -> Speed | None:
     return Speed(TIMED_SCENE, n_collisions, len(ns), min(ns) / n_collisions, median(ns) / n_collisions)
 
 
-def _ask_nonsense(session: Session) -> None:
+def ask_nonsense(session: Session) -> None:
     """A state without `vy` must be rejected, not guessed, and the process must live on."""
     state = {name: value for name, value in msgspec.to_builtins(TIMED_STATE).items() if name != "vy"}
     answer = session.ask({"cmd": "step", "scene": {"table": "cap", "r": 1.0}, "state": state, "t_end": 1.0})

@@ -6,7 +6,7 @@ Colours have one meaning in all of these figures, told once on the page (`LEGEND
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -18,7 +18,7 @@ from conformance.suite.result import Result
 from conformance.vectors import Vector
 from mushrooms.figures import style as plots
 from mushrooms.figures import table as draw
-from scene import Collision, Horizon, Outcome, Scene, from_data
+from scene import Collision, Horizon, Outcome, Scene, State, from_data
 
 LEGEND = (
     (plots.ORANGE, "certified path"),
@@ -28,6 +28,7 @@ LEGEND = (
 )
 CLOSE = 0.06  # half the width of the close-up, of the table's size; more where the two hits lie further apart
 Point = tuple[float, float]
+STROKES = ((plots.ORANGE, 4.0, "certified"), (plots.BLUE, 1.5, "given"))
 
 
 @rc_context(plots.STYLE)
@@ -59,6 +60,25 @@ def paths(result: Result, vector: Vector) -> bytes:
     _directions(both, certified[at:], given[at:], 0.1 * size)
     _close_up(both[1], ends or [start], CLOSE * size)
     both[1].set_title("close to the end" if vector.kind == "flow" else f"close to step {at + 1}")
+    return plots.svg(figure)
+
+
+@rc_context(plots.STYLE)
+def step(scene: Scene, state: State, truth: Collision | Horizon, given: Mapping[str, Any]) -> bytes:
+    """Draw one step as SVG: where it leads, and where it was said to; the whole table, and close up."""
+    figure, both = plots.new_figure(7.4, 3.7, 1, 2)
+    ends = [(truth.x, truth.y), (given["x"], given["y"])]
+    for axes in both:
+        _draw_walls(axes, scene, state.t, truth.t)
+        for (x, y), (colour, width, label) in zip(ends, STROKES, strict=True):
+            style = {"color": colour, "linewidth": width, "markersize": 3 * width, "label": label}
+            axes.plot([state.x, x], [state.y, y], marker=".", alpha=0.75, **style)
+        axes.plot(state.x, state.y, marker="o", color=plots.BLACK, markersize=4, linestyle="none")
+        axes.set(aspect="equal", xlabel="x [length]", ylabel="y [length]")
+    size = float(np.ptp(np.hstack(draw.walls(scene, truth.t)), axis=1).max())
+    _directions(both, [truth], [dict(given)], 0.1 * size)
+    _close_up(both[1], ends, CLOSE * size)
+    both[0].legend(loc="best")
     return plots.svg(figure)
 
 

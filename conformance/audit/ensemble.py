@@ -1,0 +1,291 @@
+"""One cycle of somebody else's ensemble, held to what the paper claims for its scene.
+
+Each figure is a `Check`, as in the audit: theory at that energy with what it leaves out, the departure that a
+sample of this size would show, and the power against a rival. A scene without frozen rates has the adiabatic
+theory only; then a band is granted that no rates confirm, (walls' speed / particles' speed)^(2/3), the order
+of the first correction. What is likely wrong is in `conformance.audit.causes`.
+
+Not handled: starts of several energies, tables other than mushrooms.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+from mpmath import fp
+
+import theory
+from conformance.audit.claim import Check
+from conformance.audit.claims.broadened import PEAK_DENSITY, SKEWED, WIDENED
+from conformance.audit.runs import MAX_LOST, BoolArray, FloatArray
+from conformance.audit.tolerances import Cdf, close, fits, mean, share, spread, stated
+from scene import Mushroom
+from scene.geometry import half_width, table_at
+from scene.laws import bounds, values
+from scene.tables import cycle_length, laws
+
+IDENTITY = "mean of E0/E1, which is 1 in the limit"
+SHARE, PEAK = "p_nc: share never captured", "log E_nc: mean of log E1/E0 of the never captured"
+FREE, CAPTURED = "log E1/E0 of the never captured", "log E1/E0 of the captured"
+TIMES, RELEASE = "times of capture", "nu at release less nu at capture"
+STARTS, OUTWARD = "share of the starts in the cap", "mean of (x^2 + y^2) / r^2 of these"
+MOST_SORTED = 1_000_000  # values whose whole distribution is tested; of more, evenly spaced ones
+N_TIMES = 4096  # of a cycle, at which laws are looked at
+FEW = 20  # particles below which a group says nothing
+N_LEVELS = 50  # of s, at which two directions are compared
+WAITS = 4  # longest flights between two arc hits, which captures and releases are told late by, and lags
+
+
+class GivenEnsemble(NamedTuple):
+    """One cycle of n particles, those that have energies.
+
+    Attributes:
+        scene: that is claimed to have been simulated.
+        energy: of every start, v^2 / 2 in the scene's units.
+        s: (n,) log E1 / E0.
+        captured: (n,) who was captured; None where nothing tells.
+        t_in, t_out: (n,) begin and end of a stay in the scene's time; nan for none; None where not given.
+        x0, y0: (n,) where each started; None where not given.
+        n_lost: rows without an energy, or particles without a row.
+        is_binary32: whether every energy is a number of 24 bits.
+    """
+
+    scene: Mushroom
+    energy: float
+    s: FloatArray
+    captured: BoolArray | None = None
+    t_in: FloatArray | None = None
+    t_out: FloatArray | None = None
+    x0: FloatArray | None = None
+    y0: FloatArray | None = None
+    n_lost: int = 0
+    is_binary32: bool = False
+
+
+class Expected(NamedTuple):
+    """What theory has for a scene at an energy.
+
+    Attributes:
+        mean_s, p_nc, peak, sigma: means, share, place and width of the peak; a width of 0 is not known.
+        mean_exp_minus: mean of E0/E1.
+        cdf, free_cdf, captured_cdf, capture_cdf: distributions of s and of the time of capture.
+        bands: what is left out of mean_s, p_nc, peak, sigma, captured, cdf.
+        has_rates: whether finite energy is in them.
+    """
+
+    mean_s: float
+    p_nc: float
+    peak: float
+    sigma: float
+    mean_exp_minus: float
+    cdf: Cdf
+    free_cdf: Cdf
+    captured_cdf: Cdf
+    capture_cdf: Cdf
+    bands: dict[str, float]
+    has_rates: bool
+
+
+def expected(scene: Mushroom, energy: float) -> Expected:
+    """Return what theory has for a scene at an energy: with rates where they are known."""
+    try:
+        found = theory.at_energy(scene, energy)
+    except theory.NotCovered:
+        return _adiabatic(scene, energy)
+    left, sigma = found.theory_error, found.peak[1] ** 0.5
+    shape = WIDENED * left.variance + SKEWED * left.skewness
+    bands = {
+        "mean_s": left.mean_s,
+        "p_nc": left.p_nc,
+        "peak": left.peak_mean,
+        "sigma": sigma * left.variance / 2,
+        "captured": left.captured_mean,
+        "cdf": PEAK_DENSITY * left.peak_mean / sigma + shape,
+    }
+    return Expected(
+        mean_s=found.mean_s,
+        p_nc=found.p_nc,
+        peak=found.peak[0],
+        sigma=sigma,
+        mean_exp_minus=found.mean_of_exp(-1),
+        cdf=found.cdf,
+        free_cdf=found.free_cdf,
+        captured_cdf=found.captured_cdf,
+        capture_cdf=found.capture_cdf,
+        bands={name: float(band) for name, band in bands.items()},
+        has_rates=True,
+    )
+
+
+def _adiabatic(scene: Mushroom, energy: float) -> Expected:
+    found, curve = theory.predict(scene, 12), theory.energies(scene)
+    p_nc, peak = float(found.p_nc), float(found.log_e_nc)
+    band = (walls_speed(scene) / math.sqrt(2 * energy)) ** (2 / 3)
+    span = cycle_length(scene)
+    edges = np.linspace(0.0, span, N_TIMES + 1) + cycle_start(scene)
+    mass = np.cumsum(theory.capture_time_mass(scene, edges)) if p_nc < 1 else np.zeros(N_TIMES)
+
+    def free_cdf(s: FloatArray) -> FloatArray:
+        return np.asarray(s >= peak, dtype=np.float64)
+
+    def captured_cdf(s: FloatArray) -> FloatArray:
+        return np.asarray(curve.captured_below(np.asarray(s)) / max(1 - p_nc, 1e-12))
+
+    def capture_cdf(t: FloatArray) -> FloatArray:
+        return np.asarray(np.interp(t, edges[1:], mass / max(mass[-1], 1e-12)))
+
+    bands = dict.fromkeys(("mean_s", "p_nc", "peak", "sigma", "captured", "cdf"), band)
+    figures = float(found.m1), p_nc, peak, 0.0, 1.0
+    return Expected(*figures, curve.cdf, free_cdf, captured_cdf, capture_cdf, bands, False)
+
+
+def cycle_start(scene: Mushroom) -> float:
+    """Return the time at which nu begins to fall."""
+    return float(theory.Cycle.of(scene, 10).start)
+
+
+def walls_speed(scene: Mushroom) -> float:
+    """Return the largest rate of a size over a cycle [length / time]."""
+    times = np.linspace(0.0, cycle_length(scene), N_TIMES + 1)
+    sizes = [values(law, times) for name, law in laws(scene).items() if name not in ("nu", "slope")]
+    sizes.append(half_width(fp, scene, times))
+    return float(max(np.max(np.abs(np.diff(size))) for size in sizes) * N_TIMES / cycle_length(scene))
+
+
+def nu_at(scene: Mushroom, times: FloatArray) -> FloatArray:
+    """Return w / r at times."""
+    return np.asarray(half_width(fp, scene, times) / values(scene.r, times))
+
+
+def checks(given: GivenEnsemble, theirs: Expected) -> list[Check]:
+    """Return every figure of the paper that the ensemble can be held to."""
+    return [
+        *_records(given),
+        *_starts(given),
+        *_energies(given, theirs),
+        *_captures(given, theirs),
+        *_stays(given, theirs),
+    ]
+
+
+def reversal(given: GivenEnsemble, other: GivenEnsemble, theirs: Expected) -> Check:
+    """Hold two directions of one cycle to p'(-s) = p(s) exp(-s): to the share below s, where it is worst."""
+    here, there = _some(given.s), -_some(other.s)
+    places = np.quantile(np.concatenate([here, there]), np.linspace(0.01, 0.99, N_LEVELS))
+    pairs = [(mean(np.exp(-here) * (here <= x)), mean(there <= x)) for x in places]
+    found = [(one.value - two.value, float(np.hypot(one.error, two.error))) for one, two in pairs]
+    return close(
+        "reversal identity: share of exp(-s) below s, less that above -s of the reversed cycle",
+        max(found, key=lambda pair: abs(pair[0]) / pair[1]),
+        0.0,
+        band=2 * theirs.bands["cdf"],
+        scale=0.3,
+        against=("the same direction twice", 0.3),
+    )
+
+
+def _records(given: GivenEnsemble) -> Iterator[Check]:
+    n = len(given.s) + given.n_lost
+    yield stated(
+        "every particle has an energy",
+        given.n_lost <= MAX_LOST * n,
+        f"{given.n_lost:,} of {n:,} have none",
+        f"at most {MAX_LOST:.1%}",
+    )
+    yield stated(
+        "energies have more than 24 bits",
+        not given.is_binary32,
+        "all are binary32 numbers" if given.is_binary32 else "they have",
+        "binary64",
+    )
+
+
+def _starts(given: GivenEnsemble) -> Iterator[Check]:
+    """Hold the starts to a uniform density in area, by how many are in the cap, and how far out there."""
+    if given.x0 is None or given.y0 is None:
+        return
+    now = table_at(fp, given.scene, cycle_start(given.scene))
+    is_in_cap, cap = given.y0 > 0, float(now.cap_area())
+    yield close(STARTS, share(is_in_cap), cap / (cap + float(now.stem_area())), scale=0.3)
+    if is_in_cap.sum() >= FEW:
+        out = (given.x0[is_in_cap] ** 2 + given.y0[is_in_cap] ** 2) / float(now.r) ** 2
+        yield close(OUTWARD, mean(out), 0.5, scale=0.3, against=("all on the arc", 1.0))
+
+
+def _energies(given: GivenEnsemble, theirs: Expected) -> Iterator[Check]:
+    s, bands = given.s, theirs.bands
+    rival = ("no growth", 0.0) if theirs.mean_s else None
+    scale = max(abs(theirs.mean_s), bands["mean_s"]) * 4
+    yield close(
+        "m1: mean of log E1/E0", mean(s), theirs.mean_s, band=bands["mean_s"], scale=scale, against=rival
+    )
+    yield close(
+        IDENTITY,
+        mean(np.exp(-s)),
+        theirs.mean_exp_minus,
+        band=bands["mean_s"],
+        scale=0.5,
+    )
+    if theirs.has_rates:
+        mirrored = ("the wrong sign of every gain", lambda x: 1 - theirs.cdf(-np.asarray(x)))
+        yield fits("log E1/E0", _some(s), theirs.cdf, band=bands["cdf"], scale=0.3, against=mirrored)
+
+
+def _captures(given: GivenEnsemble, theirs: Expected) -> Iterator[Check]:
+    if given.captured is None:
+        return
+    free, caught, bands = given.s[~given.captured], given.s[given.captured], theirs.bands
+    yield close(
+        SHARE,
+        share(~given.captured),
+        theirs.p_nc,
+        band=bands["p_nc"],
+        scale=0.3,
+        against=("nobody is captured", 1.0) if theirs.p_nc < 1 else None,
+    )
+    if len(free) >= FEW:
+        yield close(PEAK, mean(free), theirs.peak, band=bands["peak"])
+    if len(free) >= FEW and theirs.has_rates:
+        yield close("width of their peak", spread(free), theirs.sigma, band=bands["sigma"])
+        yield fits(FREE, _some(free), theirs.free_cdf, band=bands["cdf"], scale=0.4)
+    if len(caught) >= FEW and theirs.p_nc < 1 and theirs.has_rates:
+        band = bands["cdf"] + bands["captured"] * _steepest(caught, theirs.captured_cdf)
+        yield fits(CAPTURED, _some(caught), theirs.captured_cdf, band=band, scale=0.4)
+
+
+def _stays(given: GivenEnsemble, theirs: Expected) -> Iterator[Check]:
+    if given.t_in is None or theirs.p_nc == 1:
+        return
+    t_in = given.t_in[np.isfinite(given.t_in)]
+    if len(t_in) < FEW:
+        return
+    wait = 2 * float(bounds(given.scene.r).highest) / math.sqrt(2 * given.energy)
+    grid = np.linspace(t_in.min(), t_in.max(), 2000)
+    seen = float(np.max(theirs.capture_cdf(grid) - theirs.capture_cdf(grid - wait)))
+    band = seen + theirs.bands["captured"]
+    yield fits(TIMES, _some(t_in), theirs.capture_cdf, band=band, scale=0.4)
+    if given.t_out is None:
+        return
+    begin, end = _some(given.t_in), _some(given.t_out)
+    both = np.isfinite(begin) & np.isfinite(end)
+    rate = N_TIMES / cycle_length(given.scene)
+    steepest = rate * float(np.max(np.abs(np.diff(nu_at(given.scene, np.arange(N_TIMES + 1) / rate)))))
+    yield close(
+        RELEASE,
+        mean(nu_at(given.scene, end[both]) - nu_at(given.scene, begin[both])),
+        0.0,
+        band=WAITS * wait * steepest,
+    )
+
+
+def _some(values: FloatArray) -> FloatArray:
+    return values[:: 1 + (len(values) - 1) // MOST_SORTED]
+
+
+def _steepest(values: FloatArray, cdf: Cdf) -> float:
+    lowest, highest = np.quantile(values, (0.001, 0.999)).tolist()
+    places = np.linspace(lowest, highest, 400)
+    return float(np.max(np.diff(cdf(places)) / np.diff(places)))

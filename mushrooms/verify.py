@@ -1,0 +1,115 @@
+"""`mushrooms verify`: a trajectory of one's own, step by step; a picture of the first step that is false."""
+
+from __future__ import annotations
+
+import csv
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import msgspec
+import typer
+
+from mushrooms import output
+from mushrooms.terminal import load_scene
+from scene.files import write_file
+from scene.refusal import BadInput, shown
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+FIELDS = ("t", "x", "y", "vx", "vy")
+
+
+def verify(
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="JSON as docs/corpus.md has it, or CSV.")],
+    scene: Annotated[
+        str | None, typer.Option(metavar="SCENE", help="Of a CSV file, whose first row is the start.")
+    ] = None,
+    picture: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="SVG of the first step that is false.")
+    ] = None,
+) -> None:
+    """Judge a trajectory in floating point: each step starts from the answer before it.
+
+    Exit code 0 when every step is proved, 1 when one is not, 2 on bad input.
+    """
+    if picture is not None:
+        output.check_file(picture, (".svg",))
+    data = _read(file, scene)
+    verdicts = _judged(file, data)
+    for place, status, reason in verdicts:
+        print(f"{place}: {status}: {reason}")
+    n_proved = sum(status == "proved" for _, status, _ in verdicts)
+    print(f"{n_proved} of {len(verdicts)} proved")
+    wrong = next((i for i, (_, status, _) in enumerate(verdicts) if status == "false"), None)
+    if picture is not None and wrong is not None:
+        write_file(picture, _drawn(data, wrong))
+        print(f"Picture of step {wrong + 1}: {picture}")
+    raise typer.Exit(int(n_proved < len(verdicts)))
+
+
+def _read(file: Path, scene: str | None) -> dict[str, Any]:
+    """Return a trajectory as the verifier takes it."""
+    try:
+        if file.suffix != ".csv":
+            if scene is not None:
+                raise BadInput(f"--scene = {scene!r} would change nothing here: the JSON file has its scene")
+            return dict(json.loads(file.read_text("utf-8")))
+        with file.open(encoding="utf-8-sig", newline="") as lines:
+            rows = list(csv.DictReader(line for line in lines if line.strip() and line[0] != "#"))
+    except OSError as error:
+        raise BadInput(f"trajectory {str(file)!r} cannot be read: {error.strerror}") from None
+    except (ValueError, TypeError, csv.Error) as error:
+        raise BadInput(f"trajectory {str(file)!r}: {error}") from None
+    if scene is None:
+        raise BadInput(f"trajectory {str(file)!r}: a CSV file needs --scene")
+    return _of_rows(file, rows, scene)
+
+
+def _of_rows(file: Path, rows: Sequence[dict[str, Any]], scene: str) -> dict[str, Any]:
+    from conformance.suite.sheet_files import read_number
+    from scene import to_data
+
+    found = to_data(load_scene(scene))
+    for name in FIELDS:
+        if not rows or name not in rows[0]:
+            raise BadInput(f"trajectory {str(file)!r}: column {name!r} is missing, or there is no row")
+    states = []
+    for number, row in enumerate(rows, 1):
+        place = f"trajectory {str(file)!r}, row {number}"
+        numbers = {name: read_number(place, name, row[name] or "") for name in FIELDS}
+        states.append({**numbers, "wall": (row.get("wall") or "").strip() or None})
+    wire = {name: law for name, law in found.items() if name not in ("name", "notes")}
+    return {"scene": wire, "state": states[0], "steps": states[1:]}
+
+
+def _judged(file: Path, data: dict[str, Any]) -> list[tuple[str, str, str]]:
+    """Return place, status and reason of each step."""
+    import tempfile
+
+    from conformance import verify as verifier
+
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "answers.json"
+        path.write_text(json.dumps(data), "utf-8")
+        errors = verifier.Unreadable, verifier.Refused, verifier.Unproved
+        try:
+            return [(place, v.status, v.reason) for place, v in verifier.verify_answers(str(path))]
+        except (*errors, ValueError, RecursionError) as error:
+            raise BadInput(f"trajectory {str(file)!r}: {error}") from None
+
+
+def _drawn(data: dict[str, Any], at: int) -> bytes:
+    """Draw a step as it was given, and as the reference has it."""
+    import reference
+    from mushrooms.figures import case
+    from scene import State, from_data
+
+    begin = data["steps"][at - 1] if at else data["state"]
+    state = msgspec.convert({name: begin.get(name) for name in (*FIELDS, "wall")}, State)
+    given, scene = data["steps"][at], from_data(data["scene"])
+    found = reference.next_collision(scene, state, float(data.get("t_end", 1e300)))
+    if not isinstance(found, reference.Collision | reference.Horizon):
+        raise BadInput(f"--picture: step {at + 1} from {shown(str(state))} has no certified end to draw")
+    return case.step(scene, state, found.rounded(), given)

@@ -1,0 +1,240 @@
+"""Questions and answers in files: graded as a dialogue is; answers to other questions are refused."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import subprocess
+
+import msgspec
+import pytest
+from support.depth import deep_but
+from support.refusals import assert_refused
+
+from conformance import plain, vectors
+from conformance.harness.examples import find_kit_examples
+from conformance.suite import run as suite
+from conformance.suite import sheet as sheets
+from conformance.suite import sheet_files as files
+from conformance.suite.checks import ensembles
+from conformance.suite.process import Trouble
+from conformance.suite.session import Limits
+from scene.protocol.wire import serve
+from scene.refusal import BadInput
+
+SEED = 5
+ALL_CHECKS = dict(sheets.CHECKS)
+
+
+# Enough to see every profile and every kind of check; which of them hang on no answer is asked of all.
+SOME = (
+    "property/mirror",
+    "promise/hits",
+    "promise/endings",
+    *(f"profile/{name}" for name in ("work-identity", "mean-growth")),
+)
+
+
+@pytest.fixture(autouse=True, scope="module")
+def _few():
+    """A handful of vectors of every kind, few checks, small ensembles; fresh questions take long to prove."""
+    groups = ("moving-cap", "stem-trajectory", "flow-brief", "near-corner")
+    found = [v for v in vectors.load("core") if v.group in groups][::6]
+    assert {vector.kind for vector in found} == {"step", "trajectory", "flow"}
+    with pytest.MonkeyPatch.context() as patch:
+        for place in (suite, sheets):
+            patch.setattr(place, "choose", lambda *_: found)
+            patch.setattr(place, "N_FRESH", dict.fromkeys(suite.N_FRESH, 1))
+        patch.setattr(sheets, "CHECKS", {name: sheets.CHECKS[name] for name in SOME})
+        patch.setitem(ensembles.SIZES, "core", ensembles.Size(20, 50.0, 0.5))
+        yield
+
+
+@pytest.fixture(scope="module")
+def sheet():
+    return sheets.Sheet("core", SEED)
+
+
+@pytest.mark.parametrize("name", deep_but(list(ALL_CHECKS), "property/mirror", "promise/endings"))
+def test_questions_in_files_hang_on_no_answer(name, sheet, tmp_path, monkeypatch):
+    seen = []
+
+    def noted(verdict, why):
+        seen.append(why)
+        return Trouble(verdict, why)
+
+    monkeypatch.setattr(sheets, "CHECKS", {name: ALL_CHECKS[name]})
+    monkeypatch.setattr(sheets, "Trouble", noted)
+    monkeypatch.setattr(sheets, "choose", lambda *_: [])
+    alone = sheets.Sheet("core", SEED, [])
+    run = graded(alone, tmp_path, answered(b"\n".join(alone.lines()), nudged))
+    assert [result.id for result in run.results[3:]] == [name]
+    assert not [why for why in seen if "hangs on an answer" in why]
+
+
+def answered(lines: bytes, step=plain.next_collision) -> bytes:
+    """Answer a file of questions as a program does that reads standard input."""
+    out = io.BytesIO()
+
+    def follow(scene, state, n, t_end):
+        return plain.trajectory(scene, state, n, t_end, step)
+
+    def carry(scene, states, t_end):
+        return plain.flow(scene, states, t_end, step)
+
+    serve("plain", step, follow, io.BytesIO(lines), out, flow=carry)
+    return out.getvalue()
+
+
+def nudged(scene, state, t_end):
+    """Answer with other last bits, so that what goes on from an answer is another question."""
+    found = plain.next_collision(scene, state, t_end)
+    size = 1 + 2.0**-50
+    return (
+        msgspec.structs.replace(found, vx=found.vx * size, vy=found.vy * size)
+        if hasattr(found, "vx")
+        else found
+    )
+
+
+def off_by_a_little(scene, state, t_end):
+    found = plain.next_collision(scene, state, t_end)
+    return msgspec.structs.replace(found, vx=found.vx * (1 + 1e-6)) if hasattr(found, "vx") else found
+
+
+def graded(sheet, tmp_path, content: bytes, name: str = "answers.jsonl"):
+    path = tmp_path / name
+    path.write_bytes(content)
+    return sheets.grade_answers(sheet, files.read_answers(path))
+
+
+def test_what_comes_back_has_the_verdict_of_a_dialogue(sheet, tmp_path, tally):
+    command = find_kit_examples(tmp_path)["C++, next hit"].command
+    if not command:
+        pytest.skip("no C++ compiler is installed")
+    questions = b"\n".join(sheet.lines())
+    done = subprocess.run(command, input=questions, capture_output=True, check=True)
+    run = graded(sheet, tmp_path, done.stdout)
+    chosen = [*sorted({v.group for v, _ in sheet.vectors} - {"drawn", "fresh"}), "drawn", "fresh", "property"]
+    there = suite.check(list(command), seed=SEED, groups=chosen, limits=Limits(timeout=60.0))
+    verdicts = {result.id: result.verdict for result in there.results}
+    n_same = 0
+    for result in run.results:
+        is_partly_asked = result.id in sheets.CHECKS and len(sheets.CHECKS[result.id]) < 3
+        if result.id in verdicts and not is_partly_asked:
+            assert result.verdict == verdicts[result.id], result
+            n_same += 1
+    assert (run.exit_code(), there.exit_code()) == (0, 0)
+    assert n_same > 60
+    assert run.scope().tables == there.scope().tables
+    for name in sheets.NOT_IN_FILES:
+        assert name in str(run.scope())
+    tally["cases with the same verdict"] = n_same
+
+
+def test_wrong_answers_fail_and_missing_ones_are_declined(sheet, tmp_path):
+    lines = b"\n".join(sheet.lines())
+    run = graded(sheet, tmp_path, answered(lines, off_by_a_little))
+    wrong = {result.group for result in run.results if result.verdict == "fail"}
+    assert {"moving-cap", "stem-trajectory", "flow-brief", "drawn", "promise"} <= wrong
+    assert run.exit_code() == 1
+    first, *_, last = sheet.questions.values()
+    kept = [line for line in answered(lines).splitlines() if f'"seq":{first.seq},' not in line.decode()]
+    by_case = {result.id: result for result in graded(sheet, tmp_path, b"\n".join(kept)).results}
+    assert (by_case[first.case].verdict, by_case[last.case].verdict) != ("pass", "declined")
+    assert by_case[first.case].verdict == "declined"
+    assert str(first.seq) in by_case[first.case].why
+
+
+def test_a_replayer_of_another_seed_is_refused(sheet, tmp_path):
+    other = sheets.Sheet("core", SEED + 1, sheet.fresh)
+    answers = answered(b"\n".join(other.lines()))
+    first = next(iter(sheet.questions.values()))
+    with pytest.raises(BadInput, match=f"{first.case} has seq {first.seq}: they are answers to other"):
+        graded(sheet, tmp_path, answers)
+    assert sheets.signed(files.read_answers(tmp_path / "answers.jsonl").echoes) == ("core", SEED + 1)
+
+
+@pytest.mark.parametrize("form", ["decimal", "hexadecimal", "fortran"])
+def test_csv_answers_are_graded_alike(sheet, tmp_path, form):
+    spell = {"decimal": repr, "hexadecimal": float.hex, "fortran": lambda x: f"{x:.17E}".replace("E", "D")}[
+        form
+    ]
+    names, table = [*files.NEEDED, *files.OPTIONAL], io.StringIO()
+    writer = csv.DictWriter(table, names, extrasaction="ignore")
+    writer.writeheader()
+    for line in answered(b"\n".join(sheet.lines())).splitlines():
+        data = json.loads(line)
+        for part in data.get("steps", data.get("states", [data])) if "seq" in data else []:
+            part |= dict(zip(("t_in", "t_out"), part.get("captured") or (), strict=False))
+            cells = {name: spell(cell) if isinstance(cell, float) else cell for name, cell in part.items()}
+            writer.writerow({**cells, "seq": data["seq"]})
+    run = graded(sheet, tmp_path, table.getvalue().encode(), "answers.csv")
+    assert {r.verdict for r in run.results} <= {"pass", "declined", "unsupported"}
+    assert [r.id for r in run.results if r.level and r.verdict != "pass"] == []
+
+
+def test_csv_questions_hold_what_the_lines_hold(sheet, tmp_path):
+    n = files.write_tables(sheet, tmp_path)
+    names = (tmp_path / files.INDEX).read_text().split()
+    rows = {}
+    for name in names:
+        scene, *table = (tmp_path / name).read_text().split("seq,")
+        assert scene.startswith("# table ")
+        rows |= {line.split(",")[0]: line for line in table[0].splitlines()[1:]}
+    assert n == len(sheet.questions) - 1
+    assert set(rows) == {str(q.seq) for q in sheet.questions.values() if q.case != sheets.REJECTS}
+    assert files.read_key(tmp_path).questions.keys() == sheet.questions.keys()
+
+
+LINE = '{"seq":%d,"outcome":"undecided","reason":"x"}\n'
+HEADER = "seq,outcome,t,x,y,vx,vy\n"
+ROW = "1,collision,1,0,0,1,1\n"
+BAD_ANSWERS = {
+    "empty": ("a.jsonl", "", "holds no answer"),
+    "no json": ("a.jsonl", "yes\n", "a.jsonl':1: no JSON, and no seq: yes"),
+    "no seq": ("a.jsonl", "{}\n", "has no seq"),
+    "a list": ("a.jsonl", "[1]\n", "has no seq"),
+    "twice": ("a.jsonl", LINE % 7 + LINE % 7, "a.jsonl':2: seq = 7 is answered twice, first at 1"),
+    "header only": ("a.csv", HEADER, "holds no answer"),
+    "no header": ("a.csv", ROW, "column 'seq' is missing"),
+    "no vy": ("a.csv", HEADER.replace(",vy", "") + ROW, "column 'vy' is missing"),
+    "x twice": ("a.csv", HEADER.replace("y,", "x,"), "column 'y' is missing"),
+    "unknown": ("a.csv", HEADER.replace("vy", "vy,colour"), "column 'colour' is unknown"),
+    "short row": ("a.csv", HEADER + "1,collision\n", "2 cells, must be 7"),
+    "no number": (
+        "a.csv",
+        HEADER + ROW.replace("1,1\n", "1,north\n"),
+        "vy = 'north', must be a finite number",
+    ),
+    "nan": ("a.csv", HEADER + ROW.replace("1,1\n", "1,nan\n"), "vy = 'nan', must be a finite number"),
+    "bad hex": ("a.csv", HEADER + ROW.replace("1,1\n", "1,0xzz\n"), "vy = '0xzz', must be a finite number"),
+    "seq no whole": ("a.csv", HEADER + ROW.replace("1,coll", "1.5,coll"), "seq = '1.5', must be a whole"),
+    "torn": ("a.csv", HEADER + ROW + ROW.replace("1,coll", "2,coll") + ROW, "seq = 1 is answered twice"),
+    "no utf-8": ("a.csv", b"\xff\xfe", "it is no UTF-8"),
+    "no file": ("missing.jsonl", None, "No such file"),
+}
+
+
+@pytest.mark.parametrize("name", BAD_ANSWERS)
+def test_bad_answers_are_refused_in_one_line(name, tmp_path, command_line):
+    file, content, message = BAD_ANSWERS[name]
+    if content is not None:
+        (tmp_path / file).write_bytes(content if isinstance(content, bytes) else content.encode())
+    assert_refused(command_line("check", "--answers", tmp_path / file, "--seed", 5), message)
+
+
+def test_the_command_writes_questions_and_grades_answers(tmp_path, command_line):
+    questions, answers = tmp_path / "q.jsonl", tmp_path / "a.jsonl"
+    code, out, err = command_line("check", "--questions", questions, "--seed", 7)
+    assert (code, err) == (0, "")
+    answers.write_bytes(answered(questions.read_bytes()))
+    for options in (("--questions", questions), ()):
+        code, out, err = command_line("check", *options, "--answers", answers)
+        assert (code, err) == (0, "")
+        assert "accepted" in out
+        assert "seed 7" in out
+    assert_refused(command_line("check", "--answers", answers, "--seed", 8), "answers to other questions")
+    assert_refused(command_line("check", "--answers", answers, "--", "me"), "COMMAND")
+    assert_refused(command_line("check", "--questions", tmp_path / "q.txt"), "must end in .jsonl")

@@ -41,7 +41,9 @@ def test_plain_agrees_with_reference(tally):
         found = compare(answer, proved_step(scene, state, t_end), state, BOUND)
         tally["steps"] += 1
         tally[found.kind] += 1
-        assert found.kind in ("agrees", "undecided", "indeterminate"), (found, answer)
+        # A place on the side of a stem far narrower than the way there is known to the rounding of that way.
+        is_rounding = found.kind == "numbers" and found.relative <= 2.0**-50
+        assert is_rounding or found.kind in ("agrees", "undecided", "indeterminate"), (found, answer)
 
     step()
     assert tally["steps"] >= N_STEPS

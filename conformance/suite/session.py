@@ -77,7 +77,7 @@ class Session(AbstractContextManager["Session"]):
 
     def __init__(self, command: Sequence[str] | AnswerLine, limits: Limits | None = None) -> None:
         if not command:
-            raise BadInput("no command to check: give it after `--`")
+            raise BadInput("COMMAND is missing: give it after `--`")
         self._command, self._limits = command, limits or Limits()
         self._process: Process | InProcess | None = None
         self._end: Trouble | None = None

@@ -24,7 +24,8 @@ from conformance.audit.runs import RUNS, draw, scene_of
 from conformance.audit.session import AuditSettings, conduct
 from conformance.audit.tolerances import MAX_TESTS, N_SIGMA, close, fits, power
 
-REAL = ("L1", "L7", "C2", "C6")  # follow single particles, slow ones or flows: not the stand-in's matter
+# They follow single particles, slow ones, flows, other tables or upright ones: not the stand-in's matter.
+REAL = ("L1", "L7", "C2", "C6", "C11", "C12", "C13")
 FORMULAS = ("N1", "N2", "N3", "N4", "N5")  # theory against itself, the same whoever simulates
 CACHED = adiabatic_particles.predict
 STAND_IN = AuditSteppers(adiabatic_particles.simulate, fast.trajectory, fast.flow)

@@ -1371,17 +1371,17 @@ def backward_error(scene: Scene, state: State, t_end: Fraction, answer: Any) -> 
     return float(min(max(ratios), LARGE))
 
 
-def verify_answers(path: str) -> Iterator[tuple[str, Verdict]]:
+def verify_answers(text: str) -> Iterator[tuple[str, Verdict]]:
     """Judge a trajectory of floating-point numbers: each step starts from the answer before it.
 
     "Proved" means here: the wall is proved, and the estimated backward error is at most WRONG.
 
     Raises:
-        Unreadable: the file is no object with `scene`, `state`, `steps`, and maybe `t_end`.
+        Unreadable: the text is no object with `scene`, `state`, `steps`, and maybe `t_end`.
         Refused: the scene is invalid.
         Unproved: whether the scene is valid is open.
     """
-    data = json.loads(Path(path).read_text(encoding="utf-8"), object_pairs_hook=read_object)
+    data = json.loads(text, object_pairs_hook=read_object)
     scene = read_scene(take(data, "scene", dict), [WORK])
     t_end = read_number("t_end", data.get("t_end", 1e300))
     steps = [take({"a step": step}, "a step", dict) for step in take(data, "steps", list)]
@@ -1430,7 +1430,11 @@ def main(arguments: Sequence[str]) -> int:
     try:
         require(len(arguments) > has_answers, Unreadable("give files, or --answers and files"))
         for path in arguments[has_answers:]:
-            for where, verdict in (verify_answers if has_answers else verify_file)(path):
+            for where, verdict in (
+                verify_answers(Path(path).read_text(encoding="utf-8"))
+                if has_answers
+                else verify_file(path)
+            ):
                 statuses.append(verdict.status)
                 if has_answers or verdict.status != "proved":
                     print(f"{where}: {verdict.status}: {verdict.reason}")

@@ -36,35 +36,35 @@ def verify(
     """
     if picture is not None:
         output.check_file(picture, (".svg",))
-    data = _read(file, scene)
-    verdicts = _judged(file, data)
+    text = _read(file, scene)
+    verdicts = _judged(file, text)
     for place, status, reason in verdicts:
         print(f"{place}: {status}: {reason}")
     n_proved = sum(status == "proved" for _, status, _ in verdicts)
     print(f"{n_proved} of {len(verdicts)} proved")
     wrong = next((i for i, (_, status, _) in enumerate(verdicts) if status == "false"), None)
     if picture is not None and wrong is not None:
-        write_file(picture, _drawn(data, wrong))
+        write_file(picture, _drawn(json.loads(text), wrong))
         print(f"Picture of step {wrong + 1}: {picture}")
     raise typer.Exit(int(n_proved < len(verdicts)))
 
 
-def _read(file: Path, scene: str | None) -> dict[str, Any]:
-    """Return a trajectory as the verifier takes it."""
+def _read(file: Path, scene: str | None) -> str:
+    """Return a trajectory as the verifier takes it: a JSON file as it is, a CSV file as JSON."""
     try:
         if file.suffix != ".csv":
             if scene is not None:
                 raise BadInput(f"--scene = {scene!r} would change nothing here: the JSON file has its scene")
-            return dict(json.loads(file.read_text("utf-8")))
+            return file.read_text("utf-8")
         with file.open(encoding="utf-8-sig", newline="") as lines:
             rows = list(csv.DictReader(line for line in lines if line.strip() and line[0] != "#"))
     except OSError as error:
         raise BadInput(f"trajectory {str(file)!r} cannot be read: {error.strerror}") from None
-    except (ValueError, TypeError, csv.Error) as error:
+    except (ValueError, csv.Error) as error:
         raise BadInput(f"trajectory {str(file)!r}: {error}") from None
     if scene is None:
         raise BadInput(f"trajectory {str(file)!r}: a CSV file needs --scene")
-    return _of_rows(file, rows, scene)
+    return json.dumps(_of_rows(file, rows, scene))
 
 
 def _of_rows(file: Path, rows: Sequence[dict[str, Any]], scene: str) -> dict[str, Any]:
@@ -84,20 +84,15 @@ def _of_rows(file: Path, rows: Sequence[dict[str, Any]], scene: str) -> dict[str
     return {"scene": wire, "state": states[0], "steps": states[1:]}
 
 
-def _judged(file: Path, data: dict[str, Any]) -> list[tuple[str, str, str]]:
+def _judged(file: Path, text: str) -> list[tuple[str, str, str]]:
     """Return place, status and reason of each step."""
-    import tempfile
-
     from conformance import verify as verifier
 
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "answers.json"
-        path.write_text(json.dumps(data), "utf-8")
-        errors = verifier.Unreadable, verifier.Refused, verifier.Unproved
-        try:
-            return [(place, v.status, v.reason) for place, v in verifier.verify_answers(str(path))]
-        except (*errors, ValueError, RecursionError) as error:
-            raise BadInput(f"trajectory {str(file)!r}: {error}") from None
+    errors = verifier.Unreadable, verifier.Refused, verifier.Unproved
+    try:
+        return [(place, v.status, v.reason) for place, v in verifier.verify_answers(text)]
+    except (*errors, ValueError, RecursionError) as error:
+        raise BadInput(f"trajectory {str(file)!r}: {error}") from None
 
 
 def _drawn(data: dict[str, Any], at: int) -> bytes:

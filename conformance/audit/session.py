@@ -163,7 +163,7 @@ def _key(claim: Claim, settings: AuditSettings) -> str:
 
 
 def _kept(claim: Claim, settings: AuditSettings) -> dict[str, Any]:
-    """Return what is kept of a claim for these settings, whoever made it; nothing where there is none."""
+    """Return the stored finding of a claim for these settings, from any earlier audit; empty without one."""
     content = (
         unsealed(settings.folder / f"{claim.id}.finding") if settings.folder and settings.resume else None
     )

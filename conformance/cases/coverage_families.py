@@ -1,4 +1,4 @@
-"""Families that look where steppers are seldom tested: far times, near walls, narrow margins."""
+"""Families for inputs that few tests have: late times, places near walls, mouths nearly shut or whole."""
 
 from collections.abc import Iterator
 

@@ -213,7 +213,7 @@ def sliding(evidence: ClaimEvidence) -> list[Check]:
             "0 but for rounding",
         ),
         stated(
-            "fixed cap: the free, whom the stem's sides meet, change theirs",
+            "fixed cap: log E of the free particles, which meet the stem's moving sides, changes",
             bool(moved > 1e-3),
             f"{moved:.3f} on average",
             "> 0.001",

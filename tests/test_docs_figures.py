@@ -117,7 +117,7 @@ FIGURES: dict[str, tuple[str, Callable[[], str]]] = {
     ),
     "bounds of waits": ("docs/detection.md", lambda: f"one flight | 1 | 2^{MAX_WAIT.bit_length() - 1}"),
     "share of the period": ("docs/detection.md", lambda: f"is broken | 1/{MOST_SAMPLES} | 1/4"),
-    "work of a step": ("docs/proof.md", lambda: f"{MAX_WORK:,.0f} of a parabola's"),
+    "work of a step": ("docs/proof.md", lambda: f"the limit is {MAX_WORK:,.0f} of them"),
     "lane": ("docs/ensembles.md", lambda: f"{LANE_ROWS} numbers, the array `lanes`, {8 * LANE_ROWS} bytes"),
     "room": ("docs/ensembles.md", lambda: f"{BYTES} bytes a particle for one cycle with one narrowing"),
     "audit": ("docs/audit.md", size_of_the_audit),

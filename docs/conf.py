@@ -36,6 +36,7 @@ html_theme = "furo"
 html_title = "Oscillating Mushrooms"
 html_static_path = ["site.css"]
 html_css_files = ["site.css"]
+html_search_scorer = str(DOCS / "search.js")
 html_theme_options = {
     "source_repository": about["urls"]["Repository"],
     "source_branch": "main",

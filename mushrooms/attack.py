@@ -13,10 +13,10 @@ from rich.table import Table
 import fast
 from conformance.cases.attacks import UnderAttack, run
 from conformance.cases.table import FAMILIES
+from conformance.files import write_file
 from mushrooms import output
 from mushrooms.terminal import compilation_told, progress_bar
 from scene import BadInput, Horizon, Mushroom, Scene, State, Undefined
-from scene.files import write_file
 from scene.refusal import check_count, check_seed
 
 CHOICES = ("reference", "fast", "both")

@@ -11,9 +11,10 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich import progress
 
+from conformance.files import write_files
 from mushrooms import output
+from mushrooms.output import locked
 from mushrooms.terminal import check_range, compilation_told, progress_bar, refuse_unheeded
-from scene.files import locked, write_files
 from scene.refusal import BadInput, check_seed
 
 if TYPE_CHECKING:

@@ -19,10 +19,10 @@ from conformance.audit.ensemble import (
     nu_at,
     reversal,
 )
+from conformance.files import write_files
 from mushrooms import output
 from mushrooms.ensemble_table import Given, read_table
 from mushrooms.terminal import check_energy, load_scene
-from scene.files import write_files
 from scene.refusal import BadInput
 from scene.tables import Mushroom, cycle_length
 

@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING
 from conformance.audit.runs import RUNS, Simulation, Size, run_seed, scene_of
 from fast.ensemble import SHARE
 from mushrooms import output
+from mushrooms.output import locked
 from mushrooms.simulate import tell_damaged
 from mushrooms.store import conduct, engines, head
 from mushrooms.store.asked import Asked
 from mushrooms.store.blocks import is_run
-from scene.files import locked
 from scene.refusal import BadInput
 
 if TYPE_CHECKING:

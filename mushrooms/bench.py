@@ -14,9 +14,9 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from conformance.files import Writer, write_files
 from mushrooms import output
 from mushrooms.terminal import compilation_told, progress_bar, refuse_unheeded
-from scene.files import Writer, write_files
 from scene.refusal import BadInput, check_seed
 
 if TYPE_CHECKING:

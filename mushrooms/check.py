@@ -15,9 +15,9 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from conformance.files import write_file
 from mushrooms import offline, output
 from mushrooms.terminal import new_console, progress_bar, refuse_unheeded
-from scene.files import write_file
 from scene.refusal import BadInput
 
 if TYPE_CHECKING:

@@ -8,6 +8,7 @@ from typing import Annotated, Any, BinaryIO, NamedTuple
 
 import typer
 
+from conformance.files import write_file
 from mushrooms import output
 from mushrooms.stored import draw_run
 from mushrooms.terminal import (
@@ -20,7 +21,6 @@ from mushrooms.terminal import (
     refuse_unheeded,
 )
 from scene import Scene, Stem
-from scene.files import write_file
 from scene.refusal import BadInput, check_seed
 
 

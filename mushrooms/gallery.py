@@ -16,8 +16,8 @@ from typing import Any
 
 from matplotlib.figure import Figure
 
+from conformance.files import write_file
 from mushrooms.figures import style
-from scene.files import write_file
 
 BLOCK = re.compile(r"^```python (\S+\.(?:svg|png|gif))\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 

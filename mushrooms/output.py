@@ -1,15 +1,19 @@
-"""Output refused early: a folder or a file is proved writable before work starts; the import of pyarrow."""
+"""Output: folders and files proved writable before work starts, folders held, the import of pyarrow."""
 
 from __future__ import annotations
 
 import os
+import platform
+import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any
+from typing import Any, TextIO
 
-from scene.files import part
+from conformance.files import named, part
 from scene.refusal import BadInput
+
+LOCK = ".lock"
 
 
 @contextmanager
@@ -42,6 +46,54 @@ def writable_folder(path: Path) -> Iterator[Path]:
     except BaseException:
         _remove_empty(made)
         raise
+
+
+@contextmanager
+def locked(folder: Path) -> Iterator[None]:
+    """Hold a folder; anybody else who asks for it meanwhile, here or in another process, is refused.
+
+    The system lets go of it when the process ends, however it ends. No clock and no process number decides.
+
+    Args:
+        folder: an existing folder that can be written in.
+
+    Raises:
+        BadInput: it is held.
+    """
+    path = folder / LOCK
+    with path.open("a+", encoding="utf-8") as file:
+        try:
+            _hold(file)
+            # A holder that has just ended may have removed the file that we opened.
+            is_ours = os.path.samestat(os.fstat(file.fileno()), path.stat())
+        except OSError:
+            is_ours = False
+        if not is_ours:
+            file.seek(0)
+            holder = file.read(200) or "another process"
+            raise BadInput(f"folder {str(folder)!r} is in use by {holder}: one run at a time")
+        try:
+            file.truncate(0)
+            # Past the buffer: what a full disk does not take would stay in it, and fail unnamed on closing.
+            with named(path):
+                os.write(file.fileno(), f"process {os.getpid()} on {platform.node()}".encode())
+            yield
+        finally:
+            with suppress(PermissionError):  # Windows removes no open file; one that nobody holds is harmless
+                path.unlink(missing_ok=True)
+
+
+def _hold(file: TextIO) -> None:
+    """Lock an open file, or raise OSError at once; the system unlocks it when the process ends."""
+    if sys.platform == "win32":
+        import msvcrt
+
+        file.seek(2**30)  # what is locked cannot be read there, and the holder's name is to be read
+        msvcrt.locking(file.fileno(), msvcrt.LK_NBLCK, 1)
+    else:
+        import fcntl
+
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
 
 
 def check_file(path: Path, suffixes: tuple[str, ...]) -> None:

@@ -12,8 +12,10 @@ from typing import Annotated, Any, NamedTuple
 
 import typer
 
+from conformance.files import write_file
 from mushrooms import output
 from mushrooms.main import tell_interrupted
+from mushrooms.output import locked
 from mushrooms.terminal import (
     AsJson,
     SceneName,
@@ -23,7 +25,6 @@ from mushrooms.terminal import (
     load_scene,
     print_pairs,
 )
-from scene.files import locked, write_file
 from scene.refusal import BadInput, check_seed
 
 MOST_IN_MEMORY, MOST_ON_DISK = 10**8, 10**10

@@ -8,8 +8,8 @@ from typing import Annotated
 
 import typer
 
+from conformance.files import write_file
 from mushrooms import output
-from scene.files import write_file
 
 PLOTS = (".svg", ".png")
 

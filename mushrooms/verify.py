@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 import msgspec
 import typer
 
+from conformance.files import write_file
 from mushrooms import output
 from mushrooms.terminal import load_scene
-from scene.files import write_file
 from scene.refusal import BadInput, shown
 
 if TYPE_CHECKING:

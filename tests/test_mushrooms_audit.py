@@ -25,9 +25,9 @@ from conformance.audit.claim import AuditSteppers, Check, Finding
 from conformance.audit.claims import all_claims, select_claims
 from conformance.audit.session import AuditResult, AuditSettings
 from mushrooms.figures import by_claim
+from mushrooms.output import locked
 from mushrooms.reports import audit_page
 from mushrooms.store import conduct
-from scene.files import locked
 
 pytestmark = pytest.mark.usefixtures("unsynced")
 CHEAP = "M4,M10,X5,N6"

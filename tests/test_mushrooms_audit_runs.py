@@ -20,9 +20,9 @@ import scene as scenes
 from conformance.audit.claims import all_claims
 from conformance.audit.runs import RUNS, SCENES, Sample, Simulation, draw, run_seed, scene_of
 from mushrooms import audit_runs
+from mushrooms.output import locked
 from mushrooms.store import blocks, conduct, head
 from scene import BadInput
-from scene.files import locked
 
 SMALL = {
     "breathing": Simulation("breathing-circle", 60.0, 100, 270, n_cycles=2, phases=(0.25, 0.5)),

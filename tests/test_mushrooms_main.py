@@ -20,9 +20,9 @@ from support.refusals import assert_refused
 
 import fast
 import scene as scenes
+from conformance.files import write_files
 from mushrooms import main
 from mushrooms.predict import FIGURES
-from scene.files import write_files
 
 MOVING_CAP = """\
 table = "mushroom"

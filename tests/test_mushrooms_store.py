@@ -19,9 +19,10 @@ from support.refusals import assert_refused
 
 import fast
 import mushrooms
+from conformance.files import sealed, unsealed
+from mushrooms.output import LOCK, locked
 from mushrooms.store import asked, blocks, conduct, digest, engines
 from scene import load
-from scene.files import LOCK, locked, sealed, unsealed
 
 pytestmark = pytest.mark.usefixtures("unsynced")
 ROOT = Path(__file__).parent.parent
@@ -212,7 +213,7 @@ def test_a_target_that_is_read_only_is_refused(command_line, tmp_path, monkeypat
 def test_one_writer_holds_a_folder(command_line, tmp_path, whole):
     with locked(tmp_path):
         assert_refused(command_line(*arguments(tmp_path)), f"process {os.getpid()} on", "one run at a time")
-        other = "import sys; from pathlib import Path; from scene.files import locked\n"
+        other = "import sys; from pathlib import Path; from mushrooms.output import locked\n"
         other += "with locked(Path(sys.argv[1])): pass"
         done = subprocess.run(
             [sys.executable, "-c", other, str(tmp_path)], capture_output=True, text=True, check=False

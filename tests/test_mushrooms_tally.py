@@ -9,10 +9,10 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
+from conformance.files import sealed, unsealed
 from mushrooms.store import blocks, conduct, tally, watch
 from mushrooms.store.asked import Asked
 from scene import load
-from scene.files import sealed, unsealed
 
 
 def test_sums_are_exact_and_merge_in_any_order():

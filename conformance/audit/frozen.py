@@ -33,9 +33,9 @@ import fast
 import scene as scenes
 from conformance.audit.runs import scene_named
 from conformance.audit.tolerances import FloatArray, Mean, mean
+from conformance.files import write_file
 from fast.flow import carry_judged
 from scene import Fourier, Horizon, Mushroom, State
-from scene.files import write_file
 from scene.geometry import TableAt, table_at
 from scene.laws import value
 from scene.tables import cycle_length, laws

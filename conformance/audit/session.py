@@ -29,7 +29,7 @@ from conformance.audit.claim import (
 )
 from conformance.audit.claims import all_claims
 from conformance.audit.runs import RUNS, Progress, Sample, Simulate, Size, draw
-from scene.files import sealed, unsealed, write_file
+from conformance.files import sealed, unsealed, write_file
 from scene.refusal import check_seed
 
 

@@ -19,9 +19,9 @@ from conformance.cases.draw import Draw, Unfit
 from conformance.cases.flow_families import any_marks
 from conformance.cases.question import Family, Question
 from conformance.cases.table import FAMILIES
+from conformance.files import write_file
 from conformance.vectors import MANIFEST, File, Manifest, Vector, digest, encode, load
 from scene import BadInput
-from scene.files import write_file
 
 VERSION = "1.3"
 RETIRED: tuple[str, ...] = ()

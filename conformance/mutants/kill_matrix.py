@@ -14,11 +14,11 @@ from typing import Any
 
 import msgspec
 
+from conformance.files import write_file
 from conformance.grading.grade import grade
 from conformance.mutants import COMMON, MUTANTS, PLAIN, Mutant
 from conformance.vectors import LEVELS, Vector, answer, load, manifest
 from scene import BadInput
-from scene.files import write_file
 
 DATA = Path(__file__).parent  # it ships with the package: `suite.diagnosis` reads it
 DOCS = DATA.parent.parent / "docs"

@@ -19,11 +19,11 @@ from typing import Any
 import msgspec
 
 from conformance import vectors
+from conformance.files import write_files
 from conformance.suite.answers import UNREADABLE
 from conformance.suite.process import clean
 from conformance.suite.sheet import REJECTS, Answers, Sheet, SheetQuestion
 from conformance.vectors import Vector
-from scene.files import write_files
 from scene.refusal import BadInput, shown
 
 KEY, INDEX = "key", "scenes.txt"  # what the grader keeps; the names of the files, a line each

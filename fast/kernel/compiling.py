@@ -9,6 +9,7 @@ each. What many need is called by its address.
 from __future__ import annotations
 
 import hashlib
+import os
 import shutil
 import sys
 from collections.abc import Callable
@@ -28,8 +29,8 @@ from numba.core.typing import Signature
 from numba.extending import intrinsic
 
 from fast.kernel.linked import ForCallers
-from scene.files import SEAL, write_file
 
+SEAL = hashlib.sha256().digest_size  # bytes, at the end of an index file
 # No fastmath, so that results are the same bits on every machine; quotients by zero are infinite or nan, as
 # in numpy. Who enters the kernel holds its arrays while it runs, hence no references are counted in it: each
 # count is an atomic operation, and much to compile. So a kernel cannot allocate.
@@ -106,7 +107,9 @@ def _load_or_compile(entry: Any, compile_or_load: Callable[[Any], Any], signatur
             files = _files_of(entry)
             for index in (path for path in files if path.suffix == ".nbi"):
                 content = index.read_bytes()
-                write_file(index, content + _seal(files, content))
+                sealed = index.with_name(f".{index.name}.{os.getpid()}.part")
+                sealed.write_bytes(content + _seal(files, content))
+                sealed.replace(index)
     return found
 
 

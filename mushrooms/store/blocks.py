@@ -15,10 +15,10 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
+from conformance.files import sealed, unsealed, write_file, write_files
 from mushrooms.store.asked import SCHEMA, Asked, asked_of, made_by
 from mushrooms.store.layout import LANES, Array, Arrays, Shape, from_chunks, metadata, to_chunks
 from mushrooms.store.tally import RunTally, tally_from
-from scene.files import sealed, unsealed, write_file, write_files
 from scene.refusal import BadInput
 
 GROUP, MARKERS = "ensemble.zarr", "blocks"
@@ -122,7 +122,7 @@ class Marker(NamedTuple):
 
 
 class RunFolder:
-    """A run in a folder; see `AnyRun`. Whoever writes must hold the folder (`scene.files.locked`).
+    """A run in a folder; see `AnyRun`. Whoever writes must hold the folder (`mushrooms.output.locked`).
 
     Attributes:
         folder: holds GROUP, which xarray reads, and MARKERS.

@@ -23,9 +23,9 @@ import typer
 
 import fast
 import scene as scenes
+from conformance.files import unsealed, write_file
 from mushrooms.main import run
 from mushrooms.store.blocks import GROUP, MARKERS
-from scene.files import unsealed, write_file
 
 SCENE, ENERGY = "fermi-ulam", 1e3
 STAGES = (1, 2)  # cycles, at first and in all

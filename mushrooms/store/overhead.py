@@ -19,11 +19,11 @@ import typer
 
 import fast
 import scene as scenes
+from mushrooms.output import locked
 from mushrooms.store import conduct, digest
 from mushrooms.store.asked import Asked
 from mushrooms.store.blocks import Block, Piece
 from mushrooms.store.engines import in_process
-from scene.files import locked
 
 
 class Took(NamedTuple):

@@ -7,7 +7,7 @@ import os
 
 import pytest
 
-from scene.files import LOCK, locked
+from mushrooms.output import LOCK, locked
 
 
 def test_a_full_disk_is_told_of_the_folder_that_was_to_be_held(tmp_path, monkeypatch):

@@ -1,4 +1,4 @@
-"""Files written whole or not at all, sealed against damage, and folders that one process holds at a time.
+"""Files written whole or not at all, and sealed against damage.
 
 A file gets its name only when it is complete and on the disk. A sealed one ends in its own SHA-256.
 """
@@ -7,17 +7,12 @@ from __future__ import annotations
 
 import hashlib
 import os
-import platform
-import sys
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from pathlib import Path
-from typing import BinaryIO, TextIO
-
-from scene.refusal import BadInput
+from typing import BinaryIO
 
 Writer = Callable[[BinaryIO], object]
-LOCK = ".lock"
 SEAL = len(hashlib.sha256().digest())  # bytes
 
 
@@ -33,7 +28,7 @@ def write_files(folder: Path, contents: Mapping[str, bytes | memoryview | str | 
     """
     try:
         for name, content in contents.items():
-            with _named(folder / name), part(folder / name).open("wb") as file:
+            with named(folder / name), part(folder / name).open("wb") as file:
                 if callable(content):
                     content(file)
                 else:
@@ -48,7 +43,7 @@ def write_files(folder: Path, contents: Mapping[str, bytes | memoryview | str | 
 
 
 @contextmanager
-def _named(path: Path) -> Iterator[None]:
+def named(path: Path) -> Iterator[None]:
     """Let what fails say of which file: a full disk is found out by writing, where the system names none."""
     try:
         yield
@@ -81,51 +76,3 @@ def unsealed(path: Path) -> bytes | None:
         return None
     content, seal = found[:-SEAL], found[-SEAL:]
     return content if hashlib.sha256(content).digest() == seal else None
-
-
-@contextmanager
-def locked(folder: Path) -> Iterator[None]:
-    """Hold a folder; anybody else who asks for it meanwhile, here or in another process, is refused.
-
-    The system lets go of it when the process ends, however it ends. No clock and no process number decides.
-
-    Args:
-        folder: an existing folder that can be written in.
-
-    Raises:
-        BadInput: it is held.
-    """
-    path = folder / LOCK
-    with path.open("a+", encoding="utf-8") as file:
-        try:
-            _hold(file)
-            # A holder that has just ended may have removed the file that we opened.
-            is_ours = os.path.samestat(os.fstat(file.fileno()), path.stat())
-        except OSError:
-            is_ours = False
-        if not is_ours:
-            file.seek(0)
-            holder = file.read(200) or "another process"
-            raise BadInput(f"folder {str(folder)!r} is in use by {holder}: one run at a time")
-        try:
-            file.truncate(0)
-            # Past the buffer: what a full disk does not take would stay in it, and fail unnamed on closing.
-            with _named(path):
-                os.write(file.fileno(), f"process {os.getpid()} on {platform.node()}".encode())
-            yield
-        finally:
-            with suppress(PermissionError):  # Windows removes no open file; one that nobody holds is harmless
-                path.unlink(missing_ok=True)
-
-
-def _hold(file: TextIO) -> None:
-    """Lock an open file, or raise OSError at once; the system unlocks it when the process ends."""
-    if sys.platform == "win32":
-        import msvcrt
-
-        file.seek(2**30)  # what is locked cannot be read there, and the holder's name is to be read
-        msvcrt.locking(file.fileno(), msvcrt.LK_NBLCK, 1)
-    else:
-        import fcntl
-
-        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)

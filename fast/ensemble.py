@@ -38,12 +38,12 @@ from fast.kernel.records import (
     unfilled_paths,
 )
 from fast.kernel.worker import new_worker
-from fast.narrowings import narrowings
 from fast.pieces import laws_in_lanes
 from fast.starts import cycle_stops, initial_states, least_collisions, one_cycle
 from fast.threads import awaited, interruptible
 from fast.units import Units, fit, inward
 from scene import Scene, check_scene
+from scene.mouth import narrowings
 from scene.notebook import rows
 from scene.refusal import BadInput, check_count
 
@@ -58,7 +58,7 @@ class Ensemble(NamedTuple):
     A *captured stay* begins with an arc hit at which |sin phi| > nu. It ends with the first arc hit at which
     that is no longer so, or below the mouth if that comes first; when |sin phi| > nu once more before the
     particle has been below the mouth, the same stay goes on. M is the number of local minima of nu in a
-    cycle, after its start and up to its end (`fast.narrowings`; a plateau is one, a nu at rest has none).
+    cycle, after its start and up to its end (`scene.mouth`; a plateau is one, a nu at rest has none).
 
     Attributes:
         energy0: initial energy E = v^2 / 2 of every particle.

@@ -26,7 +26,6 @@ import numpy as np
 from fast.compiled import HALF_PI, compile_scene
 from fast.kernel import entries
 from fast.kernel.arithmetic import MAX_QUADRANT
-from fast.kernel.loops import most_compiled
 from fast.kernel.pieces import PARABOLA, SERIES
 
 from fast.kernel.records import (  # isort: skip
@@ -53,8 +52,7 @@ class Cut(NamedTuple):
 def laws_in_lanes(scene: Scene) -> LawsInLanes:
     """Return a scene, which is in the kernel's units, as the lanes know it."""
     compiled = compile_scene(scene)
-    with most_compiled(is_slope_moving(compiled), degree_of(compiled)):
-        return in_lanes(compiled, pieces_of(compiled, degree_of(compiled)))
+    return in_lanes(compiled, pieces_of(compiled, degree_of(compiled)))
 
 
 def in_lanes(compiled: Compiled, pieces: Pieces | None) -> LawsInLanes:

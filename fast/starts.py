@@ -15,10 +15,10 @@ from mpmath import fp
 from fast.given import MOST_IN_CYCLES, MOST_TO_A_TIME
 from fast.kernel import entries
 from fast.kernel.records import FloatArray, Stops
-from fast.narrowings import narrowings, start_time
 from scene import Scene
 from scene.geometry import table_at
 from scene.laws import bounds
+from scene.mouth import narrowings, start_time
 from scene.tables import cycle_length, laws
 
 

@@ -9,12 +9,12 @@ from typing import Any, NamedTuple
 import numpy as np
 from mpmath import fp
 
-from fast.narrowings import narrowings, start_time
 from mushrooms.store.asked import Asked
 from mushrooms.store.tally import RunTally
 from scene import Mushroom, Scene
 from scene.geometry import table_at
 from scene.laws import values
+from scene.mouth import narrowings, start_time
 from scene.refusal import BadInput
 from scene.tables import laws
 

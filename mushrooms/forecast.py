@@ -9,10 +9,10 @@ from mpmath import fp
 
 from fast.batch import flights
 from fast.ensemble import SHARE
-from fast.narrowings import start_time
 from fast.starts import initial_states, one_cycle
 from scene import Cap, Mushroom, Scene, State, Stem
 from scene.geometry import table_at
+from scene.mouth import start_time
 from scene.refusal import BadInput
 
 LONG = 20.0  # seconds from which a run is worth a forecast

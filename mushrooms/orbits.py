@@ -23,11 +23,11 @@ from mpmath import fp
 import scene as scenes
 from conformance.files import write_file
 from fast.given import given_energy
-from fast.narrowings import start_time
 from mushrooms.output import import_arrow
 from scene import Outcome, Scene, State, Stem, Wall
 from scene.geometry import TableAt, half_width, table_at
 from scene.laws import is_constant, values
+from scene.mouth import start_time
 from scene.refusal import BadInput, check_count, check_number, check_seed
 from scene.tables import check_scene
 

@@ -21,7 +21,6 @@ from numba.core.dispatcher import Dispatcher
 from support.entries import kept_entries
 
 from conformance.suite import run as suite
-from fast.kernel import beside
 from mushrooms.main import run
 
 settings.register_profile("quick", max_examples=50, derandomize=True, deadline=None, print_blob=True)
@@ -98,7 +97,6 @@ def _compiled_once() -> None:
 
     for entry in kept_entries():
         entry.compile = one_at_a_time(entry)
-    beside.start = lambda *_: None  # who waits for a lock has nothing to compile beside it
 
 
 @pytest.fixture(scope="session", autouse=True)

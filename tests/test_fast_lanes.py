@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import os
 import re
+from types import FunctionType
 
 import numpy as np
 import pytest
@@ -17,8 +18,9 @@ from support.depth import deep_but
 import fast
 from fast.compiled import compile_scene
 from fast.kernel import loops
-from fast.kernel.compiling import HOW
-from fast.kernel.pools import POOL_SIZE
+from fast.kernel.bounces import bounce, rebound
+from fast.kernel.compiling import HOW, TOOLS
+from fast.kernel.pools import LANES, POOL_SIZE
 from fast.kernel.worker import CACHE_LINE, new_pools
 from fast.pieces import PARABOLA, SERIES
 from fast.starts import initial_states
@@ -51,6 +53,22 @@ def test_the_compiler_packs_divisions_and_square_roots(loop, degree, is_slope_mo
     assert re.search(r"vdivpd\s+.*%[yz]mm", assembly)
     if loop == "aim":
         assert re.search(r"vsqrtpd\s+.*%[yz]mm", assembly)
+
+
+@pytest.mark.parametrize("loop", [(bounce, (0.125, True)), (rebound, ())], ids=["bounce", "rebound"])
+def test_the_width_of_registers_changes_no_bit(loop):
+    function, more = loop
+    narrow = FunctionType(function.__code__, {**function.__globals__, "widest_registers": njit(lambda: None)})
+    pools, texts = [], []
+    for each in (function, narrow):
+        pool = np.random.default_rng(1).uniform(0.5, 2.0, POOL_SIZE)
+        compiled = njit(**HOW)(each)
+        compiled(pool, LANES, *more)
+        pools.append(pool.tobytes())
+        texts.append(compiled.inspect_asm(compiled.signatures[0]))
+    assert pools[0] == pools[1]
+    has_512 = "+avx512f" in TOOLS[3]
+    assert ["vdivpd" in text and "%zmm" in text for text in texts] == [has_512, False]
 
 
 def test_an_address_is_refused_to_who_expects_another_result():

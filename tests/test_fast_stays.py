@@ -15,10 +15,10 @@ from support.depth import deep_but
 import fast
 import theory
 from fast import starts
-from fast.narrowings import narrowings, start_time
 from fast.starts import cycle_stops, initial_states, one_cycle
 from scene import BangBang, Fourier, Mushroom, State, load
 from scene.laws import value
+from scene.mouth import narrowings, start_time
 from scene.tables import width_factors
 
 TWICE = tuple(zip(map(float, range(9)), (1.0, 1.0, 0.3, 0.3, 1.0, 1.0, 0.3, 0.3, 1.0), strict=True))

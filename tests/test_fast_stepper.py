@@ -7,7 +7,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from mpmath import mp, workprec
-from numba.core.codegen import JITCodeLibrary
 from support.from_python import from_python
 from support.tables import CIRCLE, STATIC
 from support.truth import proved_step
@@ -18,7 +17,6 @@ from conformance.grading.agreement import compare
 from fast.batch import lane_steps
 from fast.compiled import compile_scene
 from fast.kernel import arithmetic
-from fast.kernel.compiling import kernel
 from fast.kernel.laws import increment, set_anchors
 from fast.kernel.records import ANCHORS_SHAPE, DEPTH, VALUE
 from scene import BangBang, Cap, Collision, Fourier, Horizon, Mushroom, State, Undecided, Undefined, load
@@ -163,25 +161,11 @@ def test_lanes_with_a_start_that_names_no_wall(state):
     assert found is None or found.wall == truth.wall
 
 
-def test_a_kernel_refuses_python():
-    """It is compiled without what Python would call; before and after compiled callers have used it."""
+def test_python_may_call_a_kernel():
+    """It runs as it is written, before and after compiled callers used it; a fused operation refuses."""
     for _ in range(2):
-        with pytest.raises(TypeError, match="by compiled functions only"):
+        assert arithmetic.two_sum(1.0, 2.0**-60) == (1.0, 2.0**-60)
+        assert from_python(arithmetic.two_sum)(1.0, 2.0**-60) == (1.0, 2.0**-60)
+        with pytest.raises(NotImplementedError, match="fma"):
             arithmetic.sine_cosine(1.0, 0.0, 1.0, 0.5, 0.0)
         from_python(arithmetic.sine_cosine)(1.0, 0.0, 1.0, 0.5, 0.0)
-
-
-def test_only_what_is_called_from_without_becomes_machine_code(monkeypatch):
-    made, make = [], JITCodeLibrary._finalize_final_module
-    monkeypatch.setattr(JITCodeLibrary, "_finalize_final_module", lambda it: made.append(it.name) or make(it))
-
-    @kernel
-    def one_more(number):
-        return number + 1.0
-
-    @kernel
-    def two_more(number):
-        return one_more(one_more(number))
-
-    assert from_python(two_more)(1.0) == 3.0
-    assert [name.rpartition(".")[2] for name in made] == ["call"]

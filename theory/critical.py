@@ -18,6 +18,7 @@ from typing import Any, NamedTuple
 from scene import exact
 from scene.laws import BangBang, Law, is_constant
 from scene.laws import exact as number
+from scene.mouth import mouth_factors
 from scene.polynomials import half_angle, leg_intervals, leg_polynomial
 from scene.tables import Mushroom, laws, period
 from theory.volumes import NotCovered
@@ -59,9 +60,7 @@ def spans(ctx: Any, scene: Mushroom) -> list[Span]:
     Source: eq:dnu.
     """
     moving = [law for law in laws(scene).values() if not is_constant(law)]
-    width = scene.nu if scene.nu is not None else scene.w
-    radius = scene.r if scene.nu is None else 1.0
-    assert width is not None
+    width, radius = mouth_factors(scene)
     if is_constant(width) and is_constant(radius):
         return []
     legs = [law for law in moving if isinstance(law, BangBang)]

@@ -1,9 +1,9 @@
 """How kernels are compiled: by themselves, or as parts of their callers.
 
 numba optimises every compiled function together with all that it calls, and again with each of its callers,
-so long chains of calls compile slowly. Kernels stop short of that: see fast.kernel.linked. A short function
-is better a part of its callers; a long one costs more as a part, whose text is copied and typed again with
-each. What many need is called by its address.
+so long chains of calls compile slowly. What one function alone calls is a part of it. So is a short function;
+a long one that several call costs more as a part, whose text is copied and typed again with each. What many
+need is called by its address.
 """
 
 from __future__ import annotations
@@ -26,9 +26,7 @@ from numba import config, njit, types
 from numba.core import cgutils
 from numba.core.codegen import get_host_cpu_features
 from numba.core.typing import Signature
-from numba.extending import intrinsic
-
-from fast.kernel.linked import ForCallers
+from numba.extending import intrinsic, register_jitable
 
 SEAL = hashlib.sha256().digest_size  # bytes, at the end of an index file
 # No fastmath, so that results are the same bits on every machine; quotients by zero are infinite or nan, as
@@ -137,27 +135,6 @@ def _seal(files: list[Path], index: bytes) -> bytes:
     return digest.digest()
 
 
-def _for_compiled_callers(**options: Any) -> Callable[[Any], Any]:
-    """Return a decorator that compiles without what Python would need to call a function; it is refused."""
-
-    def compiled(function: Any) -> Any:
-        dispatcher = njit(**HOW, no_cpython_wrapper=True, pipeline_class=ForCallers, **options)(function)
-        if not config.DISABLE_JIT:
-            dispatcher._insert = _kept_from_python
-            dispatcher._compile_for_args = _refused_to_python
-        return dispatcher
-
-    return compiled
-
-
-def _kept_from_python(*_: Any, **__: Any) -> None:
-    pass
-
-
-def _refused_to_python(*_: Any, **__: Any) -> None:
-    raise TypeError("a kernel can be called by compiled functions only; Python can call its .py_func")
-
-
 def _called(function: Callable[..., Any], arguments: tuple[Any, ...]) -> Any:
     return function(*arguments)
 
@@ -184,10 +161,11 @@ def caller(signature: Signature) -> Callable[..., Any]:
     return called
 
 
-# A function of its own.
-kernel = _for_compiled_callers()
-# A function that LLVM always inlines: a loop over lanes with a call in it is not packed.
-packed = _for_compiled_callers(forceinline=True)
+# A function of its own, compiled where compiled functions call it. Python, which calls the function as it is
+# written, has nothing compiled for it.
+kernel = register_jitable(**HOW)
+# The same, which LLVM always inlines: a loop over lanes with a call in it is not packed.
+packed = register_jitable(forceinline=True, **HOW)
 # A function whose text is put into its callers before types are inferred.
 part = njit(**HOW, inline="always")
 

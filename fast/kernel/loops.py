@@ -10,8 +10,6 @@ numba converts arguments to the signature that the caller names; `address` sees 
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from functools import cache
 from typing import Any, NamedTuple
 
@@ -20,7 +18,6 @@ from numba.core.typing import Signature
 from numba.core.typing import signature as returns
 
 from fast.kernel.aiming import aim
-from fast.kernel.beside import compiled_beside, own_share
 from fast.kernel.bounces import bounce, rebound
 from fast.kernel.compiling import HOW, caller, kept
 from fast.kernel.judged import judged_step
@@ -146,41 +143,17 @@ def careful_at() -> Any:
     return address(careful_step, CAREFUL)
 
 
-def entries_for(is_slope_moving: bool, degree: int) -> dict[str, tuple[Any, Signature]]:
-    """Return what serves scenes of such a slope and laws of such a degree, by the names in Loops."""
-    return {
-        "careful": (careful_step, CAREFUL),
-        "aim": (AIMS[is_slope_moving], AIM),
-        "fly": (FLIES[is_slope_moving, degree], FLY),
-        "chord": (CHORDS[degree], CHORD),
-        "bounce": (BOUNCES[is_slope_moving], BOUNCE),
-        "rebound": (rebound_lanes, REBOUND),
-    }
-
-
-def compile_loop(name: str, is_slope_moving: bool, degree: int) -> Any:
-    """Compile a loop, of the name it has in Loops, or load it; return its address."""
-    return careful_at() if name == "careful" else address(*entries_for(is_slope_moving, degree)[name])
-
-
-@contextmanager
-def most_compiled(is_slope_moving: bool, degree: int) -> Iterator[None]:
-    """Compile what a run needs and is not kept, by several processes where there are cores for them.
-
-    The others go on while the caller does, in the body of this context, what else it has to compile; at its
-    end they are waited for. What nobody has compiled `loops_for` does.
-    """
-    wanted = [entry for entry, _ in entries_for(is_slope_moving, degree).values()]
-    with compiled_beside(wanted, f"{is_slope_moving:d}", f"{degree}"):
-        for name in own_share():
-            compile_loop(name, is_slope_moving, degree)
-        yield
-
-
 @cache
 def loops_for(is_slope_moving: bool, degree: int) -> Loops:
     """Compile the loops for scenes of such a slope and laws of such a degree, or load them."""
-    return Loops(*(compile_loop(name, is_slope_moving, degree) for name in Loops._fields))
+    return Loops(
+        careful_at(),
+        address(AIMS[is_slope_moving], AIM),
+        address(FLIES[is_slope_moving, degree], FLY),
+        address(CHORDS[degree], CHORD),
+        address(BOUNCES[is_slope_moving], BOUNCE),
+        address(rebound_lanes, REBOUND),
+    )
 
 
 def loops_of(in_lanes: LawsInLanes) -> Loops:

@@ -20,7 +20,6 @@ from matplotlib.patheffects import withStroke
 from mpmath import fp
 
 import theory
-from fast.narrowings import start_time
 from mushrooms import lyapunov
 from mushrooms.figures import style as plots
 from mushrooms.figures import table as tables
@@ -28,6 +27,7 @@ from mushrooms.orbits import BoolArray, FloatArray, FollowedOrbit, boundary, bou
 from scene import Mushroom, Scene, Stem
 from scene.geometry import table_at
 from scene.laws import is_constant
+from scene.mouth import start_time
 from scene.refusal import BadInput, shown
 
 N_FRAMES = 96

@@ -342,7 +342,7 @@ def open_run(folder: Path) -> RunFolder:
     Raises:
         BadInput: the folder holds none, one of another schema, or one that is not finished.
     """
-    from fast.narrowings import narrowings
+    from scene.mouth import narrowings
 
     found = attributes_of(folder)
     if found["schema"] != SCHEMA:

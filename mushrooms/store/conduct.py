@@ -16,12 +16,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from fast.narrowings import narrowings
 from mushrooms.forecast import expected_collisions
 from mushrooms.store.asked import Asked, difference, made_by
 from mushrooms.store.blocks import AnyRun, Block, Piece, RunFolder, attributes_of, is_run
 from mushrooms.store.engines import Engine, Tick, follow
 from mushrooms.store.layout import Arrays, Shape
+from scene.mouth import narrowings
 from scene.refusal import BadInput
 
 BLOCK_COLLISIONS = 2e8  # of a block, some seconds: what a fault can cost, and long beside a block's files

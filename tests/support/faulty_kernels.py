@@ -65,10 +65,12 @@ def faulty_lanes(*changes: str) -> ModuleType:
         vars(module).setdefault(name, found)
     names = [each.__name__ for each in (module, ahead, pools, pieces)]
     for name, found in list(vars(module).items()):
-        if isinstance(found, Dispatcher) and found.py_func.__module__ in names:
+        function = found.py_func if isinstance(found, Dispatcher) else found
+        place = getattr(function, "__module__", None)
+        if isinstance(function, FunctionType) and place in names:
             # What it calls is looked up among the faulty ones.
-            setattr(module, name, FunctionType(found.py_func.__code__, vars(module)))
-        elif isinstance(found, Dispatcher):
+            setattr(module, name, FunctionType(function.__code__, vars(module)))
+        elif isinstance(function, FunctionType) and place.startswith("fast.kernel."):
             setattr(module, name, from_python(found))
         elif isinstance(found, np.integer):
             setattr(module, name, int(found))

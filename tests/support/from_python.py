@@ -1,4 +1,4 @@
-"""Kernels can be called by compiled functions only; this compiles one that Python can call."""
+"""Kernels are compiled for compiled callers; this is one that Python can call."""
 
 from __future__ import annotations
 

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from support.depth import deep_among
 
-from fast import narrowings as module
-from fast.narrowings import narrowings
 from scene import BangBang, Cap, Fourier, Mushroom, Stem, load
+from scene import mouth as module
+from scene.mouth import narrowings
 
 N_SAMPLES = 1 << 13
 ROUNDING = 2.0**-42
@@ -214,5 +214,5 @@ def test_a_zero_left_out_is_seen(monkeypatch):
     """The comparison kills a search that looks at the cuts alone."""
     scene = Mushroom(r=wave(1.0, (), (0.3,)), h=1.0, w=wave(0.5, (0.2, 0.1)))
     assert fault(scene, narrowings.__wrapped__(scene)) is None
-    monkeypatch.setattr(module, "_zeros_of_series", lambda w, r, cuts: np.empty(0))
+    monkeypatch.setattr(module, "_zeros", lambda w, r, cuts: np.empty(0))
     assert fault(scene, narrowings.__wrapped__(scene)) is not None

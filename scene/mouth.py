@@ -1,11 +1,10 @@
 """Where in a cycle the mouth narrows: the local minima of nu = w / r, by algebra on each analytic piece.
 
 Idea. The sign of nu' is that of N = w' r - w r'. Time is cut where a law is not analytic and, where a Fourier
-law moves, into parts of half a wavelength. On half a bang-bang leg N is a quadratic; elsewhere it is
-interpolated by a Chebyshev series that rounding alone limits, and its zeros are eigenvalues, polished by
-Newton's method. Between neighbours among all cuts and zeros nu is monotone, so its values there show every
-rise and fall: a zero too many (of a flat inflection, or by rounding) does no harm, and none that matters is
-missed.
+law moves, into parts of half a wavelength. Between cuts N is interpolated by a Chebyshev series that rounding
+alone limits, and its zeros are eigenvalues, polished by Newton's method. Between neighbours among all cuts
+and zeros nu is monotone, so its values there show every rise and fall: a zero too many (of a flat inflection,
+or by rounding) does no harm, and none that matters is missed.
 
 A swing of nu below SWING of its largest value is rounding, and counts as none: the two minima beside so low a
 peak are one, and a nu that never swings more has no narrowing at all. A plateau counts once, by its middle.
@@ -19,12 +18,10 @@ from functools import lru_cache
 
 import numpy as np
 import numpy.typing as npt
-from mpmath import MPContext, fp
 from numpy.polynomial import chebyshev
 
-from scene import BangBang, Fourier, Law, Mushroom, Scene
-from scene.laws import bounds, is_constant, value
-from scene.tables import laws
+from scene.laws import BangBang, Fourier, Law, bounds, breakpoints, is_constant, values
+from scene.tables import Mushroom, Scene, cycle_length, laws
 
 FloatArray = npt.NDArray[np.float64]
 # Returns a law, its first and its second derivative by the phase, shape (3, ...), at phases given.
@@ -39,6 +36,14 @@ TO_SERIES = np.linalg.inv(chebyshev.chebvander(NODES, DEGREE)).T
 def start_time(scene: Scene) -> float:
     """Return when the cycle begins [time]: at the first knot of a bang-bang law, else at 0."""
     return next((law.knots[0][0] for law in laws(scene).values() if isinstance(law, BangBang)), 0.0)
+
+
+def mouth_factors(scene: Mushroom) -> tuple[Law, Law]:
+    """Return two laws whose quotient is nu."""
+    if scene.nu is not None:
+        return scene.nu, 1.0
+    assert scene.w is not None
+    return scene.w, scene.r
 
 
 @lru_cache(maxsize=256)
@@ -56,17 +61,15 @@ def narrowings(scene: Scene) -> tuple[float, ...]:
     """
     if not isinstance(scene, Mushroom):
         return ()
-    width, radius = (scene.nu, 1.0) if scene.nu is not None else (scene.w, scene.r)
-    assert width is not None
+    width, radius = mouth_factors(scene)
     if is_constant(width) and is_constant(radius):
         return ()
-    start = start_time(scene)
-    w, r = (_motion(law, start) for law in (width, radius))
-    cuts = _cuts(start, (width, radius))
-    is_algebraic = not any(isinstance(law, Fourier) and not is_constant(law) for law in (width, radius))
+    start, span = start_time(scene), cycle_length(scene)
+    w, r = (_motion(law, start, span) for law in (width, radius))
+    cuts = _cuts(start, span, (width, radius))
     # Legs too short for their squares give nan: their zeros drop out, their ends among the cuts stay.
     with np.errstate(all="ignore"):
-        zeros = (_zeros_of_quadratics if is_algebraic else _zeros_of_series)(w, r, cuts)
+        zeros = _zeros(w, r, cuts)
         phases = np.unique(np.concatenate([cuts[:-1], zeros[(zeros >= 0.0) & (zeros < 1.0)]]))
         return tuple(sorted(_in_cycle(phase) for phase in _minima(w, r, phases)))
 
@@ -77,85 +80,22 @@ def _in_cycle(phase: float) -> float:
     return 1.0 if min(phase, 1.0 - phase) < 2.0**-40 else phase
 
 
-def _motion(law: Law, start: float) -> Motion:
-    """Return a law's motion, divided by its highest value: only the ratios of nu matter."""
+def _motion(law: Law, start: float, span: float) -> Motion:
+    """Return a law's motion over a cycle, divided by its highest value: only the ratios of nu matter."""
     highest = bounds(law).highest
-    motion = _unscaled(law, start)
-    return lambda u: motion(u) / highest
-
-
-def _unscaled(law: Law, start: float) -> Motion:
-    if is_constant(law):
-        level = float(value(fp, law, start))
-        return lambda u: np.stack([np.full_like(u, level), np.zeros_like(u), np.zeros_like(u)])
-    if isinstance(law, BangBang):
-        return _bang_bang(law, start)
-    assert isinstance(law, Fourier)
-    return _fourier(law, start)
-
-
-def _knot_phases(law: BangBang, start: float) -> FloatArray:
-    """Return the knots' phases; the first is in [0, 1), the last one more than the first."""
-    first, last = Fraction(law.knots[0][0]), Fraction(law.knots[-1][0])
-    span = last - first
-    shift = (first - Fraction(start)) / span // 1 * span + Fraction(start)
-    return np.array([float((Fraction(t) - shift) / span) for t, _ in law.knots])
-
-
-def _bang_bang(law: BangBang, start: float) -> Motion:
-    knots, values = _knot_phases(law, start), np.array([v for _, v in law.knots])
 
     def motion(u: FloatArray) -> FloatArray:
-        u = knots[0] + (u - knots[0]) % 1.0
-        leg = np.clip(np.searchsorted(knots, u, side="right") - 1, 0, len(knots) - 2)
-        length = np.maximum(knots[leg + 1] - knots[leg], 2.0**-1000)
-        before, after = (u - knots[leg]) / length, (knots[leg + 1] - u) / length
-        rise = values[leg + 1] - values[leg]
-        is_first, bend = before < 0.5, 2.0 * rise
-        level = np.where(is_first, values[leg] + bend * before**2, values[leg + 1] - bend * after**2)
-        slope = 2.0 * bend * np.where(is_first, before, after) / length
-        return np.stack([level, slope, np.where(is_first, 2.0, -2.0) * bend / length**2])
+        return np.stack([values(law, start + span * u, order) / highest * span**order for order in range(3)])
 
     return motion
 
 
-def _fourier(law: Fourier, start: float) -> Motion:
-    k, c, s = (np.array(column) for column in zip(*law.harmonics(), strict=True))
-    base = _turns_at(law, start)
-
-    def motion(u: FloatArray) -> FloatArray:
-        turns = k * (base + u[..., None])
-        angle, rate = 2.0 * np.pi * (turns - np.round(turns)), 2.0 * np.pi * k
-        cos, sin = np.cos(angle), np.sin(angle)
-        level = law.mean + cos @ c + sin @ s
-        slope = cos @ (rate * s) - sin @ (rate * c)
-        return np.stack([level, slope, -(cos @ (rate**2 * c) + sin @ (rate**2 * s))])
-
-    return motion
-
-
-def _turns_at(law: Fourier, t: float) -> float:
-    """Return the phase of a law at a time, as a fraction of its period in [0, 1)."""
-    if law.period is not None:
-        return float(Fraction(t) / Fraction(law.period) % 1)
-    if t == 0.0:
-        return 0.0
-    ctx = MPContext()
-    ctx.prec = 2300  # every binary64 time times every binary64 omega, and 100 bits behind the point
-    turns = ctx.mpf(law.omega) * ctx.mpf(t) / (2 * ctx.pi)
-    return float(turns - ctx.floor(turns))
-
-
-def _cuts(start: float, factors: tuple[Law, Law]) -> FloatArray:
+def _cuts(start: float, span: float, factors: tuple[Law, Law]) -> FloatArray:
     """Return phases from 0 to 1 between which N is analytic and its waves make half a turn at most."""
     waves = [law.harmonics() for law in factors if isinstance(law, Fourier) and law.harmonics()]
     parts = 2 * sum(harmonics[-1][0] for harmonics in waves)
-    cuts = [np.linspace(0.0, 1.0, max(parts, 1) + 1)]
-    for law in factors:
-        if isinstance(law, BangBang) and not is_constant(law):
-            knots = _knot_phases(law, start)
-            cuts += [knots % 1.0, (0.5 * (knots[1:] + knots[:-1])) % 1.0]
-    return np.unique(np.concatenate(cuts))
+    knots = [float(t - Fraction(start)) / span for law in factors for t in breakpoints(law)]
+    return np.unique(np.concatenate([np.linspace(0.0, 1.0, max(parts, 1) + 1), np.array(knots) % 1.0]))
 
 
 def _slope(w: FloatArray, r: FloatArray) -> FloatArray:
@@ -163,21 +103,8 @@ def _slope(w: FloatArray, r: FloatArray) -> FloatArray:
     return np.stack([w[1] * r[0] - w[0] * r[1], w[2] * r[0] - w[0] * r[2]])
 
 
-def _zeros_of_quadratics(w: Motion, r: Motion, cuts: FloatArray) -> FloatArray:
-    """Return N's zeros where both laws are quadratics between neighbouring cuts."""
-    middle, half = 0.5 * (cuts[1:] + cuts[:-1]), 0.5 * np.diff(cuts)
-    at_w, at_r = w(middle), r(middle)
-    c, b = _slope(at_w, at_r)  # in z = phase - middle: c + b z + a z^2
-    a = 0.5 * (at_w[2] * at_r[1] - at_w[1] * at_r[2])
-    q = -0.5 * (b + np.copysign(np.sqrt(np.maximum(b * b - 4.0 * a * c, 0.0)), b))
-    z = np.concatenate([q / a, c / q])
-    half, middle = np.concatenate([half, half]), np.concatenate([middle, middle])
-    found: FloatArray = (middle + z)[np.abs(z) <= half]  # nan and infinity drop out
-    return found
-
-
-def _zeros_of_series(w: Motion, r: Motion, cuts: FloatArray) -> FloatArray:
-    """Return N's zeros where a Fourier law moves, by Chebyshev series between neighbouring cuts."""
+def _zeros(w: Motion, r: Motion, cuts: FloatArray) -> FloatArray:
+    """Return N's zeros, by Chebyshev series between neighbouring cuts."""
     middle, half = 0.5 * (cuts[1:] + cuts[:-1]), 0.5 * np.diff(cuts)
     places = middle[:, None] + half[:, None] * NODES
     series = _slope(w(places), r(places))[0] @ TO_SERIES

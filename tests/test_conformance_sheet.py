@@ -13,11 +13,12 @@ from support.depth import deep_but
 from support.refusals import assert_refused
 
 from conformance import plain, vectors
-from conformance.harness.examples import find_kit_examples
+from conformance.harness.examples import FOLDER, compiled, find_examples, find_kit_examples
 from conformance.suite import run as suite
 from conformance.suite import sheet as sheets
 from conformance.suite import sheet_files as files
 from conformance.suite.checks import ensembles
+from conformance.suite.disguise import drawn_horizons
 from conformance.suite.process import Trouble
 from conformance.suite.session import Limits
 from scene.protocol.wire import serve
@@ -40,12 +41,13 @@ SOME = (
 def _few():
     """A handful of vectors of every kind, few checks, small ensembles; fresh questions take long to prove."""
     groups = ("moving-cap", "stem-trajectory", "flow-brief", "near-corner")
+    groups += ("static-cap", "generated-cap", "generated-cap-trajectory")
     found = [v for v in vectors.load("core") if v.group in groups][::6]
     assert {vector.kind for vector in found} == {"step", "trajectory", "flow"}
     with pytest.MonkeyPatch.context() as patch:
-        for place in (suite, sheets):
-            patch.setattr(place, "choose", lambda *_: found)
-            patch.setattr(place, "N_FRESH", dict.fromkeys(suite.N_FRESH, 1))
+        patch.setattr(suite, "choose", lambda *_: found)
+        patch.setattr(suite, "drawn_horizons", lambda _, seed: drawn_horizons(found, seed))
+        patch.setattr(suite, "N_FRESH", dict.fromkeys(suite.N_FRESH, 1))
         patch.setattr(sheets, "CHECKS", {name: sheets.CHECKS[name] for name in SOME})
         patch.setitem(ensembles.SIZES, "core", ensembles.Size(20, 50.0, 0.5))
         yield
@@ -66,7 +68,8 @@ def test_questions_in_files_hang_on_no_answer(name, sheet, tmp_path, monkeypatch
 
     monkeypatch.setattr(sheets, "CHECKS", {name: ALL_CHECKS[name]})
     monkeypatch.setattr(sheets, "Trouble", noted)
-    monkeypatch.setattr(sheets, "choose", lambda *_: [])
+    monkeypatch.setattr(suite, "choose", lambda *_: [])
+    monkeypatch.setattr(suite, "drawn_horizons", lambda *_: [])
     alone = sheets.Sheet("core", SEED, [])
     run = graded(alone, tmp_path, answered(b"\n".join(alone.lines()), nudged))
     assert [result.id for result in run.results[3:]] == [name]
@@ -110,13 +113,14 @@ def graded(sheet, tmp_path, content: bytes, name: str = "answers.jsonl"):
 
 
 def test_what_comes_back_has_the_verdict_of_a_dialogue(sheet, tmp_path, tally):
-    command = find_kit_examples(tmp_path)["C++, next hit"].command
+    examples = find_examples(tmp_path)["C"], find_kit_examples(tmp_path)["C++, next hit"]
+    command = next((example.command for example in examples if example.command), ())
     if not command:
-        pytest.skip("no C++ compiler is installed")
+        pytest.skip("; ".join(example.why_not for example in examples))
     questions = b"\n".join(sheet.lines())
     done = subprocess.run(command, input=questions, capture_output=True, check=True)
     run = graded(sheet, tmp_path, done.stdout)
-    chosen = [*sorted({v.group for v, _ in sheet.vectors} - {"drawn", "fresh"}), "drawn", "fresh", "property"]
+    chosen = [*sorted({v.group for v in sheet.chosen}), "drawn", "fresh", "property"]
     there = suite.check(list(command), seed=SEED, groups=chosen, limits=Limits(timeout=60.0))
     verdicts = {result.id: result.verdict for result in there.results}
     n_same = 0
@@ -131,6 +135,19 @@ def test_what_comes_back_has_the_verdict_of_a_dialogue(sheet, tmp_path, tally):
     for name in sheets.NOT_IN_FILES:
         assert name in str(run.scope())
     tally["cases with the same verdict"] = n_same
+
+
+def test_the_example_in_fortran_is_accepted_for_caps(sheet, tmp_path):
+    built = compiled("Fortran", ["-O2"], FOLDER / "fortran" / "caps.f90", tmp_path / "caps")
+    if built.is_absent:
+        pytest.skip(built.why_not)
+    assert built.command, built.why_not
+    files.write_tables(sheet, tmp_path)
+    done = subprocess.run(built.command, cwd=tmp_path, capture_output=True, check=True)
+    run = graded(sheet, tmp_path, done.stdout, "answers.csv")
+    assert run.objections() == []
+    assert (run.scope().tables, run.scope().profiles) == (["cap"], ["step", "trajectory"])
+    assert run.precision() in ("A", "B")
 
 
 def test_wrong_answers_fail_and_missing_ones_are_declined(sheet, tmp_path):

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 FOLDER = Path(__file__).parent
-COMPILERS = {"C": ("gcc", "cc"), "C++": ("g++", "c++")}
+COMPILERS = {"C": ("gcc", "cc"), "C++": ("g++", "c++"), "Fortran": ("gfortran",)}
 
 
 class Example(NamedTuple):
@@ -64,7 +64,7 @@ def compiled(
     """Compile one file; the example's command is what was built, whether or not it is a program.
 
     Args:
-        language: "C" or "C++".
+        language: one of COMPILERS.
         flags: for the compiler.
         source: the file.
         program: what to write.

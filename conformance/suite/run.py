@@ -13,7 +13,7 @@ import itertools
 import math
 import secrets
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import partial
 from pathlib import Path
 from statistics import median
@@ -85,33 +85,45 @@ def check(
         BadInput: for a command that cannot be started, an unknown level or group, a seed out of its
             bounds, a broken corpus.
     """
-    chosen = choose(level, groups)
-    manifest = vectors.manifest()
-    seed = secrets.randbelow(NEW_SEEDS) if seed is None else check_seed(seed)
-    limits = limits or Limits()
-    begin = time.monotonic()
+    seed = secrets.randbelow(NEW_SEEDS) if seed is None else seed
+    asked_for = RunQuestions(level, seed, groups)
     with Session(command, limits) as session:
-        tell = progress or (lambda _done, _total: None)
-        results, speed = _converse(session, chosen, groups or None, (level, seed), tell)
-        results = [msgspec.structs.replace(r, is_known=_is_known(r, known, seed)) for r in results]
-        passed = {result.id for result in results if result.verdict == "pass"}
-        return Run(
-            command=["(in process)"] if callable(command) else list(command),
-            level=level,
-            seed=seed,
-            corpus=manifest.corpus,
-            digest=manifest.digest,
-            limits=limits,
-            introduction=session.introduction,
-            results=results,
-            speed=speed,
-            n_restarts=session.n_restarts,
-            stderr=session.stderr.text(),
-            seconds=time.monotonic() - begin,
-            graded=graded_parts([v for v in chosen if v.id in passed], is_timed=speed is not None),
-            diagnosis=diagnose(results),
-            known=known,
-        )
+        return converse(session, asked_for, known, progress)
+
+
+class RunQuestions:
+    """What a run asks: vectors, each in the image that its seed draws, and checks.
+
+    Args:
+        level: core, extended or stress.
+        seed: of all that is drawn.
+        groups: of cases; all when empty.
+        proved: the fresh questions, where they are known from before; else each is proved when it is reached.
+
+    Attributes:
+        chosen: the vectors that files hold.
+        drawn, fresh: those of this seed.
+        checks: further questions.
+        is_whole: whether no group is left out.
+        n: number of cases, the protocol's own left out.
+    """
+
+    def __init__(
+        self, level: str, seed: int, groups: Sequence[str] = (), proved: Sequence[Vector] | None = None
+    ) -> None:
+        self.chosen, self.is_whole = choose(level, groups), not groups
+        self.level, self.seed = level, check_seed(seed)
+        parts = tuple(groups) or OTHER_GROUPS
+        n_fresh = N_FRESH[level] if FRESH in parts else 0
+        self.drawn = drawn_horizons(vectors.load("core"), seed) if DRAWN in parts else []
+        self.fresh: Iterable[Vector] = fresh(seed, n_fresh) if proved is None else proved
+        self.checks = [each for each in checks_of(level) if each.name.startswith(parts)]
+        self.n = len(self.chosen) + len(self.drawn) + n_fresh + len(self.checks)
+
+    def vectors(self) -> Iterator[tuple[Vector, Disguise]]:
+        """Return the vectors in the order of a run, each with its image."""
+        every = itertools.chain(self.chosen, self.drawn, self.fresh)
+        return ((vector, drawn_disguise(vector, self.seed)) for vector in every)
 
 
 def choose(level: str, groups: Sequence[str] = ()) -> list[Vector]:
@@ -168,37 +180,55 @@ def _is_known(result: Result, known: frozenset[str], seed: int) -> bool:
     return is_listed or (result.verdict in BAD and f"{result.group}/*" in known)
 
 
-def _converse(
+def converse(
     session: Session,
-    chosen: Sequence[Vector],
-    groups: Sequence[str] | None,
-    run: tuple[str, int],
-    progress: Progress,
-) -> tuple[list[Result], Speed | None]:
+    questions: RunQuestions,
+    known: frozenset[str] = frozenset(),
+    progress: Progress | None = None,
+) -> Run:
+    """Ask all questions in a session, and collect what came of them; arguments as for `check`."""
+    begin, speed = time.monotonic(), None
     results: list[Result] = []
-    level, seed = run
-    further = tuple(OTHER_GROUPS if groups is None else groups)
-    # The same questions as in a run of everything.
-    source = chosen if groups is None else vectors.load(level)
     for name, act in (("start", session.start), ("echo", session.probe)):
         results.append(_closed(session, _tried(name, act)))
-        if results[-1].verdict != "pass":
+        if results[-1].verdict in BAD:
             unreached = Trouble(results[-1].verdict, f"not asked: {name} failed")
-            return [*results, *(_result(vector, unreached) for vector in chosen)], None
-    results.append(_closed(session, _tried("rejects", partial(ask_nonsense, session))))
-    n_fresh = N_FRESH[level] if FRESH in further else 0
-    drawn = drawn_horizons([v for v in source if v.level == "core"], seed) if DRAWN in further else []
-    questions = itertools.chain(chosen, drawn, fresh(seed, n_fresh))
-    n_others = sum(name.partition("/")[0] in further for name in OTHER_CASES)
-    total = len(results) + len(chosen) + len(drawn) + n_fresh + n_others
-    for result in itertools.chain(
-        (ask_vector(session, vector, drawn_disguise(vector, seed)) for vector in questions),
-        (run_check(each, session, seed) for each in checks_of(level) if each.name.startswith(further)),
-    ):
-        results.append(_closed(session, result))
-        progress(len(results), total)
-    speed = measure_speed(session) if groups is None else None
-    return [*results, _closed(session, _tried("stop", session.stop))], speed
+            results += [_result(vector, unreached) for vector in questions.chosen]
+            break
+    else:
+        results.append(_closed(session, _tried("rejects", partial(ask_nonsense, session))))
+        total = len(results) + questions.n
+        for result in itertools.chain(
+            (ask_vector(session, vector, image) for vector, image in questions.vectors()),
+            (run_check(each, session, questions.seed) for each in questions.checks),
+        ):
+            results.append(_closed(session, result))
+            if progress:
+                progress(len(results), total)
+        speed = measure_speed(session) if questions.is_whole else None
+        if not session.cannot_show:
+            results.append(_closed(session, _tried("stop", session.stop)))
+    results = [msgspec.structs.replace(r, is_known=_is_known(r, known, questions.seed)) for r in results]
+    passed = {result.id for result in results if result.verdict == "pass"}
+    graded = graded_parts([v for v in questions.chosen if v.id in passed], is_timed=speed is not None)
+    manifest = vectors.manifest()
+    return Run(
+        command=session.command,
+        level=questions.level,
+        seed=questions.seed,
+        corpus=manifest.corpus,
+        digest=manifest.digest,
+        limits=session.limits,
+        introduction=session.introduction,
+        results=results,
+        speed=speed,
+        n_restarts=session.n_restarts,
+        stderr=session.stderr.text(),
+        seconds=time.monotonic() - begin,
+        graded={**graded, "not_graded": [*graded["not_graded"], *session.cannot_show]},
+        diagnosis=diagnose(results),
+        known=known,
+    )
 
 
 def _closed(session: Session, result: Result) -> Result:

@@ -73,16 +73,22 @@ class Session(AbstractContextManager["Session"]):
         n_restarts: fresh processes that were needed so far.
         sent: the last line that was sent, whatever it asked.
         stderr: what it wrote to standard error, bounded.
+        command: as results name it.
+        limits: time and restarts.
+        cannot_show: what no session of this kind can grade.
     """
+
+    cannot_show: tuple[str, ...] = ()
 
     def __init__(self, command: Sequence[str] | AnswerLine, limits: Limits | None = None) -> None:
         if not command:
             raise BadInput("COMMAND is missing: give it after `--`")
-        self._command, self._limits = command, limits or Limits()
+        self._command, self.limits = command, limits or Limits()
+        self.command = ["(in process)"] if callable(command) else list(command)
         self._process: Process | InProcess | None = None
         self._end: Trouble | None = None
         self._draw = random.Random()
-        total = self._limits.total
+        total = self.limits.total
         self._deadline = math.inf if total is None else time.monotonic() + total
         self.introduction: Introduction | None = None
         self.n_restarts, self.sent = 0, b""
@@ -167,7 +173,7 @@ class Session(AbstractContextManager["Session"]):
             self._check_time()
             raise self._end or Trouble("error", "not asked: no process was left")
         try:
-            process.finish(msgspec.json.encode({"cmd": "stop"}), min(STOP_TIMEOUT, self._limits.timeout))
+            process.finish(msgspec.json.encode({"cmd": "stop"}), min(STOP_TIMEOUT, self.limits.timeout))
         finally:
             process.kill()
 
@@ -186,17 +192,17 @@ class Session(AbstractContextManager["Session"]):
 
     def _check_time(self) -> None:
         if self._end is None and time.monotonic() >= self._deadline:
-            why = f"not asked: the total time of {self._limits.total:g} s is spent"
+            why = f"not asked: the total time of {self.limits.total:g} s is spent"
             raise self._given_up(Trouble("timed-out", why))
 
     def _exchange(self, line: bytes) -> bytes:
         assert self._process is not None
         self.sent = line
         left = max(0.0, self._deadline - time.monotonic())
-        return self._process.exchange(line, min(self._limits.timeout, left))
+        return self._process.exchange(line, min(self.limits.timeout, left))
 
     def _restart(self) -> None:
-        if self.n_restarts >= self._limits.restarts:
+        if self.n_restarts >= self.limits.restarts:
             why = f"not asked: restarted {self.n_restarts} times; --restarts allows more"
             raise self._given_up(Trouble("error", why))
         self.n_restarts += 1

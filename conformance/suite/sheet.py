@@ -12,29 +12,24 @@ from __future__ import annotations
 
 import hashlib
 import io
-import time
 from collections.abc import Mapping, Sequence
-from functools import partial
-from itertools import chain
 from typing import Any, NamedTuple
 
 import msgspec
 
 from conformance import plain, vectors
-from conformance.cases.generated import fresh
 from conformance.suite.answers import check_echo, read_answer, read_introduction, with_walls
 from conformance.suite.checks import checks_of, ensembles, run_check
 from conformance.suite.checks.form import QUESTIONS, SuiteCheck
-from conformance.suite.diagnosis import diagnose
-from conformance.suite.disguise import asked, drawn_disguise, drawn_horizons
+from conformance.suite.disguise import asked
 from conformance.suite.process import Trouble
-from conformance.suite.result import LAWS, TABLES, Result, Run, graded_parts
-from conformance.suite.run import N_FRESH, ask_nonsense, ask_vector, choose
-from conformance.suite.session import MAX_SEQ, Limits, Session, needs, probe_values
+from conformance.suite.result import LAWS, TABLES, Run
+from conformance.suite.run import RunQuestions, ask_nonsense, converse
+from conformance.suite.session import MAX_SEQ, Session, needs, probe_values
 from conformance.vectors import LEVELS, Vector
 from scene.protocol.messages import PROFILES, PROTOCOL, Introduction
 from scene.protocol.wire import serve
-from scene.refusal import BadInput, check_seed
+from scene.refusal import BadInput
 
 # Checks whose questions hang on no answer, and by which profiles.
 CHECKS: dict[str, tuple[str, ...]] = {
@@ -91,8 +86,8 @@ class Answers(NamedTuple):
     places: Mapping[int, str] = {}
 
 
-class Sheet:
-    """The questions of a level and a seed.
+class Sheet(RunQuestions):
+    """The questions of a level and a seed that hang on no answer.
 
     Args:
         level: core, extended or stress.
@@ -100,23 +95,19 @@ class Sheet:
         proved: the fresh questions, where they are known from before; else they are drawn and proved.
 
     Attributes:
-        vectors: each with the image it is asked in.
         questions: by what they ask, in the order of a run.
     """
 
     def __init__(self, level: str, seed: int, proved: Sequence[Vector] | None = None) -> None:
-        chosen = choose(level)
-        self.level, self.seed = level, check_seed(seed)
-        drawn = drawn_horizons([v for v in chosen if v.level == "core"], seed)
-        self.fresh = list(fresh(seed, N_FRESH[level]) if proved is None else proved)
-        self.vectors = [(v, drawn_disguise(v, seed)) for v in (*chosen, *drawn, *self.fresh)]
+        super().__init__(level, seed, proved=proved)
+        self.fresh, self.checks = list(self.fresh), checks_in_files(level)
         self.questions: dict[bytes, SheetQuestion] = {}
         self._numbers = set[int]()
-        for vector, image in self.vectors:
+        for vector, image in self.vectors():
             self.add(vector.id, vectors.request(asked(vector, image), 0))
         recorder = _Recorder(self)
         ask_nonsense(recorder)
-        for check in checks_in_files(level):
+        for check in self.checks:
             recorder.case = check.name
             run_check(check, recorder, seed)
 
@@ -142,21 +133,6 @@ class Sheet:
     def signature(self) -> list[float]:
         """Return seed and level as numbers, which a program that echoes them hands back."""
         return [float(self.seed // WORD), float(self.seed % WORD), float(LEVELS.index(self.level))]
-
-    def check_answers(self, answers: Answers) -> None:
-        """Refuse answers to other questions.
-
-        Raises:
-            BadInput: naming the first that belongs to none of these questions, and the first of these.
-        """
-        for seq in answers.lines:
-            if seq not in self._numbers:
-                first = next(q for q in self.questions.values() if q.seq not in answers.lines)
-                raise BadInput(
-                    f"{answers.places.get(seq, answers.source)}: seq = {seq} is of no question of level"
-                    f" {self.level} and seed {self.seed}, where {first.case} has seq {first.seq}:"
-                    " they are answers to other questions"
-                )
 
 
 def signed(echoes: Sequence[bytes]) -> tuple[str, int] | None:
@@ -185,37 +161,18 @@ def grade_answers(sheet: Sheet, answers: Answers) -> Run:
     """Grade answers as those of a dialogue; what has none is declined.
 
     Raises:
-        BadInput: they are answers to other questions.
+        BadInput: they are answers to other questions, naming the first question that has none of them.
     """
-    sheet.check_answers(answers)
-    begin, manifest = time.monotonic(), vectors.manifest()
-    session = _Replay(sheet, answers)
-    results = [
-        session.tried("start", session.start),
-        session.tried("echo", session.probe),
-        session.tried("rejects", partial(ask_nonsense, session)),
-    ]
-    further = (run_check(check, session, sheet.seed) for check in checks_in_files(sheet.level))
-    asked_first = (ask_vector(session, v, image) for v, image in sheet.vectors)
-    results.extend(session.closed(result) for result in chain(asked_first, further))
-    passed = {result.id for result in results if result.verdict == "pass"}
-    graded = graded_parts([v for v, _ in sheet.vectors if v.id in passed], is_timed=False)
-    return Run(
-        command=[answers.source],
-        level=sheet.level,
-        seed=sheet.seed,
-        corpus=manifest.corpus,
-        digest=manifest.digest,
-        limits=Limits(),
-        introduction=session.introduction,
-        results=results,
-        speed=None,
-        n_restarts=0,
-        stderr="",
-        seconds=time.monotonic() - begin,
-        graded={**graded, "not_graded": [*graded["not_graded"], *NOT_IN_FILES]},
-        diagnosis=diagnose(results),
-    )
+    numbers = {question.seq for question in sheet.questions.values()}
+    for seq in answers.lines:
+        if seq not in numbers:
+            first = next(q for q in sheet.questions.values() if q.seq not in answers.lines)
+            raise BadInput(
+                f"{answers.places.get(seq, answers.source)}: seq = {seq} is of no question of level"
+                f" {sheet.level} and seed {sheet.seed}, where {first.case} has seq {first.seq}:"
+                " they are answers to other questions"
+            )
+    return converse(_Replay(sheet, answers), sheet)
 
 
 class _Recorder(Session):
@@ -240,8 +197,10 @@ class _Recorder(Session):
 class _Replay(Session):
     """A session whose answers were given before."""
 
+    cannot_show = NOT_IN_FILES
+
     def __init__(self, sheet: Sheet, answers: Answers) -> None:
-        super().__init__(_plain)
+        super().__init__([answers.source])
         self._sheet, self._answers = sheet, answers
         questions = [q for q in sheet.questions.values() if q.seq in answers.lines and q.case != REJECTS]
         seen = {need for q in questions for need in needs(q.request["cmd"], _scene(q.request))}
@@ -269,19 +228,6 @@ class _Replay(Session):
         self.sent = question.line
         line = _enveloped(line, request["cmd"], question.seq) if line.startswith(b"[") else line
         return with_walls(read_answer(line, request["cmd"], question.seq), request.get("scene"))
-
-    def tried(self, name: str, act: Any) -> Result:
-        """Return a case of the protocol: what it raises is its verdict."""
-        try:
-            act()
-        except Trouble as trouble:
-            return self.closed(Result(f"protocol/{name}", "protocol", trouble.verdict, trouble.why))
-        return Result(f"protocol/{name}", "protocol", "pass")
-
-    def closed(self, result: Result) -> Result:
-        """Return a case with the question it ended with, unless it passed."""
-        sent, self.sent = self.sent.decode("utf-8", "replace"), b""
-        return result if result.verdict == "pass" else msgspec.structs.replace(result, sent=sent)
 
 
 def offering(profiles: Sequence[str], tables: Sequence[str], laws: Sequence[str]) -> Introduction:

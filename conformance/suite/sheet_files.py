@@ -226,8 +226,8 @@ def _check_columns(path: Path, names: Sequence[str]) -> None:
 
 def _outcome(place: str, cells: Mapping[str, str]) -> dict[str, Any]:
     """Return a row as an outcome of protocol 1; what it does not hold is left out."""
-    found: dict[str, Any] = {"outcome": cells["outcome"]}
-    found |= {name: cells[name] for name in ("wall", "reason") if cells.get(name)}
+    found: dict[str, Any] = {"outcome": cells["outcome"], "reason": cells.get("reason", "")}
+    found |= {"wall": cells["wall"]} if cells.get("wall") else {}
     for name in (*STATE, "dt"):
         if cells.get(name):
             found[name] = read_number(place, name, cells[name])

@@ -132,7 +132,7 @@ contains
       s = s + h
     end do
     moved_on = .false.
-    if (k > 100000 .or. s == 0 .or. abs(s - base) <= 1e-12_dp * s) then
+    if (k > 100000 .or. s == 0 .or. abs(s - base) <= 1e-12_dp * s .or. (y == 0 .and. vy == 0)) then
       print '(a)', trim(seq)//',undecided,,,,,,,'
       return
     end if
@@ -144,7 +144,8 @@ contains
       call radius(s, r, grown, rate)
       x = x + vx * s; y = y + vy * s; wall = 'arc'
       nx = x / hypot(x, y); ny = y / hypot(x, y)
-      push = 2 * (vx * nx + vy * ny - rate)
+      ! The wall's speed -f_t / |grad f|: r may be off |p| by what the start was off its wall.
+      push = 2 * (vx * nx + vy * ny - rate * (r + grown) / hypot(x, y))
       vx = vx - push * nx; vy = vy - push * ny
     else
       s = end

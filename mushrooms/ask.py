@@ -20,16 +20,19 @@ if TYPE_CHECKING:
 
 
 def ask(
-    case: Annotated[str, typer.Argument(metavar="ID", help="Of a vector, as check prints it.")],
+    case: Annotated[str, typer.Argument(metavar="ID", help="Name of the case, as check prints it.")],
     command: Annotated[
-        list[str] | None, typer.Argument(metavar="[-- COMMAND...]", help="Asks it, and grades its answer.")
+        list[str] | None,
+        typer.Argument(metavar="[-- COMMAND...]", help="Ask this stepper, and grade its answer."),
     ] = None,
-    seed: Annotated[int | None, typer.Option(help="Asks as the run of this seed did, in disguise.")] = None,
+    seed: Annotated[
+        int | None, typer.Option(help="Ask the question exactly as the run with this seed asked it.")
+    ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the vector as JSON.")] = False,
 ) -> int:
-    """Print a case's question, certified answer and rule; put it to a stepper, if one is given.
+    """Print a question of the test suite, its proved answer and its rule. A stepper may be asked it.
 
-    Exit code 0; 1 when the stepper given does not pass; 2 for bad input.
+    Exit code 0; 1 if the stepper does not pass; 2 on bad input.
     """
     from conformance.suite.disguise import Disguise, drawn_disguise
 

@@ -25,21 +25,23 @@ SLOWEST = 10.0  # seconds that one question may take the reference: its work is 
 
 
 def attack(
-    family: Annotated[str, typer.Option(help="A family's name, or all.")] = "all",
+    family: Annotated[str, typer.Option(help="Name of a family of questions, or all.")] = "all",
     cases: Annotated[int, typer.Option(help=f"Cases of each family, 1 to {MAX_CASES}.")] = 100,
     seed: Annotated[
-        int, typer.Option(help="With family and index, names a case for ever; 0 to 2^64 - 1.")
+        int,
+        typer.Option(help="Seed of the questions, 0 to 2^64 - 1. Family, seed and index identify a case."),
     ] = 0,
-    stepper: Annotated[str, typer.Option(help="What is attacked: reference, fast or both.")] = "both",
+    stepper: Annotated[str, typer.Option(help="Stepper to ask: reference, fast or both.")] = "both",
     json_file: Annotated[
         Path | None, typer.Option("--json", metavar="FILE", help="Write the counts and every wrong case.")
     ] = None,
 ) -> int:
-    """Attack the steppers with seeded questions aimed at their weak points.
+    """Ask our own steppers random questions that are aimed at their weak points.
 
-    The verifier proves what the reference claims, and the fast stepper is held to that. A wrong answer, or a
-    claim that is not proved, is printed as a line of JSON that names the question. Exit code 0: no answer is
-    wrong, and none took the reference over 10 s; 1: some; 2: bad input.
+    The verifier proves the answer of the reference, and the fast stepper is compared with it. Each wrong
+    answer and each unproved claim is printed as a line of JSON.
+
+    Exit code 0 if no answer is wrong and the reference never took over 10 s; else 1; 2 on bad input.
     """
     if stepper not in CHOICES:
         raise BadInput(f"--stepper = {stepper!r}, must be one of {', '.join(CHOICES)}")

@@ -27,40 +27,46 @@ def audit(
     out: Annotated[Path, typer.Option(metavar="DIR", help="Folder for the report.")] = Path("audit-report"),
     full: Annotated[bool, typer.Option("--full", help="The paper's sizes; an hour on two cores.")] = False,
     only: Annotated[
-        str | None, typer.Option(metavar="IDS", help="Claims to check, with commas: X2,L4.")
+        str | None, typer.Option(metavar="IDS", help="Only these claims, separated by commas: X2,L4.")
     ] = None,
     seed: Annotated[int, typer.Option(help="Seed of the random starts, 0 to 2^64 - 1.")] = 0,
     threads: Annotated[int | None, typer.Option(help="Threads; all cores by default.")] = None,
     resume: Annotated[
-        bool, typer.Option("--resume", help="Go on with what DIR/runs and DIR/findings hold.")
+        bool, typer.Option("--resume", help="Continue with DIR/runs and DIR/findings.")
     ] = False,
     commands: Annotated[
-        bool, typer.Option("--commands", help="Print the runs as simulate commands, a line each, and end.")
+        bool, typer.Option("--commands", help="Print the runs as simulate commands, one per line, and stop.")
     ] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
     ensemble: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Audit this ensemble: CSV, Parquet or Zarr.")
     ] = None,
-    scene: Annotated[str | None, typer.Option(metavar="SCENE", help="Of --ensemble.")] = None,
+    scene: Annotated[str | None, typer.Option(metavar="SCENE", help="Scene of --ensemble.")] = None,
     backwards: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="An ensemble of the reversed cycle.")
+        Path | None,
+        typer.Option(metavar="FILE", help="An ensemble of the reversed cycle, to compare with --ensemble."),
     ] = None,
     energy: Annotated[
-        float | None, typer.Option(help="E0 of the rows to take, or where none is told.")
+        float | None, typer.Option(help="Initial energy: chooses rows, or replaces a missing column E0.")
     ] = None,
-    energy_unit: Annotated[str | None, typer.Option(help="v2/2 (default) or v2.")] = None,
-    time_unit: Annotated[str | None, typer.Option(help="scene or cycles; inferred by default.")] = None,
-    particles: Annotated[int | None, typer.Option(help="How many were started, if some are missing.")] = None,
+    energy_unit: Annotated[str | None, typer.Option(help="Unit of energies: v2/2 (default) or v2.")] = None,
+    time_unit: Annotated[
+        str | None, typer.Option(help="Unit of times: scene or cycles; default: inferred.")
+    ] = None,
+    particles: Annotated[
+        int | None, typer.Option(help="Number of started particles, if some have no row.")
+    ] = None,
 ) -> None:
-    """Check the paper's claims; writes report.html, report.json and report.txt.
+    """Check the claims of the paper. Writes report.html, report.json and report.txt.
 
-    With --ensemble check an ensemble that somebody else has run: its figures against theory at its energy.
+    Particles are stored in DIR/runs/NAME, like those of simulate --out, and results in DIR/findings. --resume
+    continues after an interruption, with --full or with other claims (--only). The report then has the claims
+    of both. The runs that --commands prints may be made anywhere; --resume uses them. No run is ever
+    replaced.
 
-    Particles are kept in DIR/runs/NAME as simulate --out keeps them, findings in DIR/findings, for --resume
-    after an interruption, with --full or with other --only: the report then has the claims of both, and never
-    fewer than before. The commands of --commands may be run anywhere; --resume takes up what they have made,
-    with more particles too. No run is ever replaced.
-    Exit code 0 when every claim has its expected verdict, 1 when one has not, 2 on bad input.
+    With --ensemble, an ensemble of another program is compared with theory at its energy.
+
+    Exit code 0 if every claim has its expected verdict, 1 if one has not, 2 on bad input.
     """
     told = {"--scene": scene, "--backwards": backwards, "--energy": energy, "--energy-unit": energy_unit}
     told |= {"--time-unit": time_unit, "--particles": particles}

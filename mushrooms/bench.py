@@ -35,21 +35,23 @@ PATHS = {"quick": (3, 40), "full": (9, 80)}
 def bench(
     command: Annotated[
         list[str] | None,
-        typer.Argument(metavar="[-- COMMAND...]", help="One more stepper; speaks protocol 1."),
+        typer.Argument(metavar="[-- COMMAND...]", help="Also measure this stepper; it speaks protocol 1."),
     ] = None,
     out: Annotated[Path, typer.Option(metavar="DIR", help="Folder for the results.")] = Path("bench-report"),
     quick: Annotated[bool, typer.Option("--quick", help="Fewer questions and runs: five minutes.")] = False,
     seed: Annotated[int, typer.Option(help="Seed of the questions, 0 to 2^64 - 1.")] = 0,
     table: Annotated[
         Path | None,
-        typer.Option(metavar="OLD.json", help="Print a table of an earlier bench.json as Markdown, and end."),
+        typer.Option(
+            metavar="OLD.json", help="Print a table of an earlier bench.json as Markdown, and stop."
+        ),
     ] = None,
     workload: Annotated[
         str | None,
-        typer.Option(metavar="NAME", help="Which table; or `all`. By default moving-cap-1e7."),
+        typer.Option(metavar="NAME", help="Workload of --table, or `all`; default: moving-cap-1e7."),
     ] = None,
 ) -> None:
-    """Measure speed against error; writes bench.json, bench.svg, panels.svg and bench.html.
+    """Measure speed against error. Writes bench.json, bench.svg, panels.svg and bench.html.
 
     Exit code 0, or 2 on bad input.
     """

@@ -19,10 +19,10 @@ def list_scenes(
     name: Annotated[
         str, typer.Argument(metavar="NAME", help="Print this scene of the catalogue or of the audit.")
     ] = "",
-    as_toml: Annotated[bool, typer.Option("--toml", help="Print NAME as a file to begin from.")] = False,
+    as_toml: Annotated[bool, typer.Option("--toml", help="Print the scene NAME as a TOML file.")] = False,
     as_json: AsJson = False,
 ) -> None:
-    """List the catalogue; the scene that is refused is shown with its reason. With NAME print that scene."""
+    """List the catalogue. A scene that is refused is shown with the reason. With NAME print that scene."""
     if as_toml and as_json:
         raise BadInput("--toml and --json: must be one of them")
     if as_toml and not name:

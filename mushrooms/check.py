@@ -36,22 +36,25 @@ COLOURS = {"pass": "green", "declined": "yellow", "unsupported": "yellow"}
 
 def check(
     command: Annotated[
-        list[str] | None, typer.Argument(metavar="-- COMMAND...", help="Speaks protocol 1.")
+        list[str] | None, typer.Argument(metavar="-- COMMAND...", help="The stepper; it speaks protocol 1.")
     ] = None,
     level: Annotated[str, typer.Option(help="core, extended or stress.")] = "core",
-    seed: Annotated[int | None, typer.Option(help="Of all that is drawn; a new one each run.")] = None,
+    seed: Annotated[
+        int | None, typer.Option(help="Seed of the random questions; default: a new one per run, printed.")
+    ] = None,
     timeout: Annotated[float, typer.Option(help="Seconds for one answer, compilation included.")] = 120.0,
     total: Annotated[
         float | None, typer.Option(help="Seconds for the whole run; no limit by default.")
     ] = None,
     restarts: Annotated[int, typer.Option(help="Fresh processes after the first, 0 to 1000.")] = 10,
     groups: Annotated[
-        str, typer.Option(help="Groups of cases, with commas, and no others; all by default.")
+        str, typer.Option(help="Only these groups of cases, separated by commas; default: all.")
     ] = "",
     known_failures: Annotated[
         Path | None,
         typer.Option(
-            metavar="FILE", help="What must fail: ID, ID@SEED, drawn/*, fresh/*, declined/GROUP, one a line."
+            metavar="FILE",
+            help="Cases known to fail: ID, ID@SEED, drawn/*, fresh/*, declined/GROUP; one per line.",
         ),
     ] = None,
     json_file: Annotated[Path | None, typer.Option("--json", metavar="FILE", help="JSON report.")] = None,
@@ -61,17 +64,22 @@ def check(
     summary: Annotated[Path | None, typer.Option(metavar="FILE", help="Verdict and scope as JSON.")] = None,
     questions: Annotated[
         Path | None,
-        typer.Option(metavar="PATH", help="Write the questions: a .jsonl file, or a folder for CSV."),
+        typer.Option(metavar="PATH", help="Write the questions to a .jsonl file, or as CSV into a folder."),
     ] = None,
     answers: Annotated[
-        Path | None, typer.Option(metavar="PATH", help="Grade answers in a file; --questions says to which.")
+        Path | None,
+        typer.Option(
+            metavar="PATH", help="Grade the answers in this file; --questions names their questions."
+        ),
     ] = None,
 ) -> None:
-    """Grade a stepper in any language: a command that speaks protocol 1 on stdin and stdout, or its answers.
+    """Test a stepper in any language. COMMAND starts it; it speaks protocol 1 on stdin and stdout.
 
-    Every question is asked in disguise, drawn from a seed that is printed: --seed repeats a run.
-    Without a dialogue: --questions writes the questions that hang on no answer, --answers grades a file.
-    Exit code 0 when everything passes, 1 when something fails, 2 when the options or the suite are at fault.
+    Each question is randomly mirrored and rescaled. The seed is printed, and --seed repeats a run.
+
+    A program that cannot hold a dialogue: --questions writes questions to a file, --answers grades a file.
+
+    Exit code 0 if everything passes, 1 if something fails, 2 if the options or the suite are at fault.
     """
     _check_limits(timeout, restarts, total)
     files = _report_files(json_file, junit, html, badge, summary)

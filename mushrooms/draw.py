@@ -50,29 +50,29 @@ Picture = Annotated[
     typer.Option(
         "--out",
         metavar="FILE",
-        help="A .svg, .png, .pdf or .gif file; SCENE's name with .svg by default. Of several pictures each "
-        "gets its kind into the name.",
+        help="A .svg, .png, .pdf or .gif file; default: SCENE.svg. If there are several pictures, the kind "
+        "is added to each name.",
     ),
 ]
 Trajectory = Annotated[
-    bool, typer.Option("--trajectory", help="One particle's path; a .gif shows it on its way.")
+    bool, typer.Option("--trajectory", help="Path of one particle; a .gif is an animation.")
 ]
 Section = Annotated[
     bool,
     typer.Option(
         "--section",
-        help="Poincare section: place on the arc against sin phi; of a stem the moving wall's phase against "
-        "the velocity after the hit.",
+        help="Poincare section: place on the arc against sin phi. For a stem: phase of the moving wall "
+        "against the velocity after the hit.",
     ),
 ]
 BoundaryMap = Annotated[
-    bool, typer.Option("--map", help="Boundary map: place along all walls against the angle's sine.")
+    bool, typer.Option("--map", help="Boundary map: place along all walls against the sine of the angle.")
 ]
 Growth = Annotated[
     bool,
     typer.Option(
         "--growth",
-        help="Mean of ln(E/E0) from cycle to cycle, with its spread and theory's; of --particles 1 its own "
+        help="Mean and spread of ln(E/E0) against the cycle, with the theory. With --particles 1: ln(E/E0) "
         "against time.",
     ),
 ]
@@ -81,21 +81,21 @@ Lyapunov = Annotated[
 ]
 Export = Annotated[
     Path | None,
-    typer.Option(metavar="FILE", help="A .csv or .parquet file for the start and every collision."),
+    typer.Option(metavar="FILE", help="Write the start and every collision to a .csv or .parquet file."),
 ]
 Energy = Annotated[
-    float | None, typer.Option(help="Initial energy v²/2, > 0; by default one that suits the picture.")
+    float | None, typer.Option(help="Initial energy v²/2, > 0; default: one that suits the picture.")
 ]
 Length = Annotated[int | None, typer.Option(help="Collisions of each particle, 1 to 10^6.")]
-Cycles = Annotated[int | None, typer.Option(help="Cycles to follow in place of collisions, 1 to 10,000.")]
+Cycles = Annotated[int | None, typer.Option(help="Cycles to follow, instead of collisions, 1 to 10,000.")]
 Phase = Annotated[
     float | None,
-    typer.Option(help="Section at this phase t/T of the walls alone, 0 to 1; of a stem y against vy."),
+    typer.Option(help="Section at this phase t/T of the walls, 0 to 1. For a stem: y against vy."),
 ]
 Many = Annotated[
-    int | None, typer.Option(help="Particles of a section, a map, growth, exponents; 1 to 1000.")
+    int | None, typer.Option(help="Particles in a section, map, growth or exponent plot, 1 to 1000.")
 ]
-Seed = Annotated[int | None, typer.Option(help="Seed of the random starts, 0 to 2^64 - 1; by default 0.")]
+Seed = Annotated[int | None, typer.Option(help="Seed of the random starts, 0 to 2^64 - 1; default: 0.")]
 OF_PARTICLES = ("--energy", "--collisions", "--cycles", "--seed", "--particles", "--phase")
 OF_MANY = ("section", "map", "growth", "lyapunov")
 LEAST_DRAWN = 1e-100  # of lengths and times; its inverse is the greatest
@@ -117,10 +117,11 @@ def draw(
     seed: Seed = None,
     phase: Phase = None,
 ) -> None:
-    """Draw the walls through the cycle, or what particles do between them; export a trajectory.
+    """Draw the table during its cycle, or paths of particles in it, or export a trajectory.
 
-    The particles are the first of `mushrooms simulate SCENE --energy E --seed S`. Given the folder of a run
-    (simulate --out), draw its histogram of ln(E1/E0) with theory, and of several cycles the mean in each.
+    The particles are the first of `mushrooms simulate SCENE --energy E --seed S`. If SCENE is the folder of a
+    run (simulate --out), its histogram of ln(E1/E0) is drawn with the theory. If the run has several cycles,
+    the mean after each cycle is drawn too.
     """
     from mushrooms.store.blocks import is_run
 

@@ -33,7 +33,7 @@ UsageError: type[Any] = typer.BadParameter.__bases__[0]
 INTERRUPTED = 130
 SOON = 0.05  # seconds, after which a signal that was lost is sent again
 MOST = Decimal(10) ** 30  # of a whole number on the command line, written with an exponent
-NOTHING_KEPT = "nothing is kept: files are written whole, at the end"
+NOTHING_KEPT = "nothing was written: files are written at the end"
 
 
 class Listed(NamedTuple):
@@ -56,26 +56,26 @@ COMMANDS = {
     ),
     "draw": Listed(
         "mushrooms.draw:draw",
-        "Draw a table through its cycle, or what particles do in it.",
+        "Draw a table during its cycle, or paths of particles in it.",
         "moving-cap --trajectory --seed 1 --out orbit.gif",
     ),
     "simulate": Listed(
         "mushrooms.simulate:simulate",
         "Simulate an ensemble.",
         "moving-cap --particles 25000 --energy 1e7 --seed 1 --out run",
-        "finished blocks are kept in the folder of --out: --resume goes on with them",
+        "finished blocks are in the folder of --out: --resume continues the run",
     ),
     "export": Listed("mushrooms.stored:export", "Write a finished run as one table.", "run --to run.csv"),
     "attack": Listed(
         "mushrooms.attack:attack",
-        "Ask nasty questions, and have the verifier judge the answers.",
+        "Ask our own steppers difficult questions.",
         "--family knot-at-event --cases 20000 --seed 1",
     ),
     "audit": Listed(
         "mushrooms.audit:audit",
         "Check the paper's claims.",
         "--only X2,L4 --out audit-report",
-        "finished parts are kept in the folder of the report: --resume goes on with them",
+        "finished parts are in the folder of the report: --resume continues the audit",
     ),
     "bench": Listed("mushrooms.bench:bench", "Measure speed against error.", "--quick --out bench-report"),
     "check": Listed(
@@ -83,12 +83,12 @@ COMMANDS = {
     ),
     "verify": Listed(
         "mushrooms.verify:verify",
-        "Judge a trajectory of your own, step by step.",
+        "Check a trajectory of your own, step by step.",
         "steps.csv --scene moving-cap --picture false.svg",
     ),
     "ask": Listed(
         "mushrooms.ask:ask",
-        "Print a case's question and its certified answer.",
+        "Print one question of the test suite and its proved answer.",
         "near-corner/3 -- ./my_stepper",
     ),
 }

@@ -50,17 +50,16 @@ def predict(
     scene: SceneName,
     digits: Annotated[int, typer.Option(help=f"Correct digits, 1 to {MAX_DIGITS}.")] = 15,
     energy: Annotated[
-        float | None, typer.Option(help="Add the same figures at this initial energy v²/2, > 0.")
+        float | None, typer.Option(help="Also predict for this initial energy v²/2, > 0.")
     ] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Print the paper's predictions for one cycle as decimal strings, and what each is.
+    """Print the paper's predictions for one cycle as decimal strings.
 
-    With --energy, what particles that begin with it will show, and how far that may be off. It takes rates of
-    frozen tables, which python -m conformance.audit.frozen measures. Those of moving-cap, moving-cap-trivial,
-    both fixed caps, ergodic, retraced-arc and the audit's own scenes are known, and of their reverses. Of
-    another scene only the limit of high energies is printed, and why on stderr.
-    """
+    With --energy also predict at that energy, with the possible error of the prediction. This needs rates
+    that python -m conformance.audit.frozen measures. They are known for moving-cap, moving-cap-trivial, both
+    fixed caps, ergodic, retraced-arc, the scenes of the audit, and the reverses of all these. For another
+    scene only the limit of high energies is printed, and a line on stderr says why."""
     import theory
 
     check_range("--digits", digits, 1, MAX_DIGITS)

@@ -37,10 +37,14 @@ Energy = Annotated[float, typer.Option(help="Initial energy v²/2 of every parti
 Cycles = Annotated[int, typer.Option(help="Cycles of the walls, at least 1.")]
 Phases = Annotated[
     str | None,
-    typer.Option(metavar="A,B,...", help="Fractions of a cycle at which energies are kept too, with --out."),
+    typer.Option(
+        metavar="A,B,...", help="Fractions of a cycle at which energies are stored too; needs --out."
+    ),
 ]
 Seed = Annotated[int, typer.Option(help="Seed of the random starts, 0 to 2^64 - 1.")]
-Threads = Annotated[int | None, typer.Option(help="Threads; all cores by default, with --dask one a block.")]
+Threads = Annotated[
+    int | None, typer.Option(help="Threads; default: all cores, or one per block with --dask.")
+]
 Out = Annotated[
     Path | None, typer.Option(metavar="DIR", help="Folder for the run (ensemble.zarr) and summary.json.")
 ]
@@ -48,20 +52,22 @@ Resume = Annotated[
     bool,
     typer.Option(
         "--resume",
-        help="Go on with the run in DIR, or widen it by more --particles, or lengthen it by more --cycles.",
+        help="Continue the run in DIR; with more --particles or more --cycles, extend it.",
     ),
 ]
 Dask = Annotated[
-    str | None, typer.Option(metavar="ADDRESS", help="Dask scheduler whose workers follow the particles.")
+    str | None, typer.Option(metavar="ADDRESS", help="Dask scheduler whose workers simulate the blocks.")
 ]
 BlockSize = Annotated[
-    int | None, typer.Option("--block", help="Particles kept at a time; by default seconds' work.")
+    int | None, typer.Option("--block", help="Particles stored at a time; default: some seconds of work.")
 ]
-MostCollisions = Annotated[int | None, typer.Option(help="Stop when a particle makes more collisions.")]
-MostSeconds = Annotated[float | None, typer.Option(help="Stop after so long; --resume goes on.")]
+MostCollisions = Annotated[
+    int | None, typer.Option(help="Stop if a particle makes more collisions than this.")
+]
+MostSeconds = Annotated[float | None, typer.Option(help="Stop after this time; --resume continues.")]
 Plot = Annotated[
     Path | None,
-    typer.Option(metavar="FILE", help="Energies after each cycle with theory (.svg, .png)."),
+    typer.Option(metavar="FILE", help="Draw the energies after each cycle, with the theory (.svg, .png)."),
 ]
 
 
@@ -82,21 +88,19 @@ def simulate(
     threads: Threads = None,
     as_json: AsJson = False,
 ) -> int:
-    """Simulate an ensemble; undecided particles are counted, never guessed.
+    """Simulate an ensemble. Undecided particles are counted, never guessed.
 
-    Prints particles, collisions, lost (not followed to the end), undecided (those of the lost
-    that the stepper could not decide), careful (collisions found by the careful step, some tens of times
-    slower), m1 (mean of log E/E0 per cycle) and p_nc (share of cycles without capture) with standard
-    errors (se), what theory says of both, how many standard errors they are off (z), ns_per_collision and the
-    SHA-256. Particles that no cycle ever frees from the island count neither in m1 nor in p_nc.
+    Prints: particles; collisions; lost (not followed to the end); undecided (lost because the stepper could
+    not decide); careful (collisions computed by the scalar step, some tens of times slower); m1 (mean of
+    log E/E0 per cycle); p_nc (share of cycles without capture); _se (standard error); _theory (prediction);
+    _z (difference in standard errors); ns_per_collision; SHA-256 of the results. Particles that are in the
+    island for the whole run count neither in m1 nor in p_nc. docs/ensembles.md explains each line.
 
-    With --out particles are kept block by block: whatever ends a run, --resume goes on with it, to the same
-    bits. Exit code 0; 3 when a limit has stopped it, 130 when it was interrupted: both say how to go on.
+    With --out particles are stored block by block. After any interruption --resume continues the run, to the
+    same bits. Exit code 0; 3 if a limit stopped the run; 130 if it was interrupted.
 
-    On stderr: before a run of over 20 s about how many collisions and how long; after one of over a second
-    that careful steps took over a tenth of it, if they did; and that theory is the limit of high energies,
-    where that at the run's own is not known.
-    """
+    On stderr: an estimate of collisions and time, if the run takes over 20 s; a note if scalar steps took
+    over a tenth of the time; a note if the prediction is the limit of high energies."""
     _check_ensemble(energy, cycles, seed, threads)
     limits = {"max_collisions": max_collisions, "max_seconds": max_seconds}
     _check_stored(out, particles, block, phases=phases, resume=resume, dask=dask, **limits)

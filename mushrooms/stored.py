@@ -15,12 +15,12 @@ PLOTS = (".svg", ".png")
 
 
 def export(
-    run: Annotated[Path, typer.Argument(metavar="DIR", help="What `simulate --out` has written.")],
+    run: Annotated[Path, typer.Argument(metavar="DIR", help="Folder that `simulate --out` wrote.")],
     to: Annotated[Path, typer.Option(metavar="FILE", help="A .parquet, .csv or .npz file.")],
 ) -> None:
-    """Write a finished run as one table, a row a particle; an .npz holds the arrays of `fast.Ensemble`.
+    """Write a finished run as one table, one row per particle. An .npz holds the arrays of `fast.Ensemble`.
 
-    The run is read block by block and checked on the way: a damaged one is refused.
+    The run is read block by block and its checksums are tested. A damaged run is refused.
     """
     from mushrooms.store.blocks import open_run
     from mushrooms.store.export import WRITERS

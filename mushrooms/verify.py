@@ -22,17 +22,17 @@ FIELDS = ("t", "x", "y", "vx", "vy")
 
 
 def verify(
-    file: Annotated[Path, typer.Argument(metavar="FILE", help="JSON as docs/corpus.md has it, or CSV.")],
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="A CSV file, or JSON as in docs/corpus.md.")],
     scene: Annotated[
-        str | None, typer.Option(metavar="SCENE", help="Of a CSV file, whose first row is the start.")
+        str | None, typer.Option(metavar="SCENE", help="Scene of a CSV file. Its first row is the start.")
     ] = None,
     picture: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="SVG of the first step that is false.")
+        Path | None, typer.Option(metavar="FILE", help="Draw the first false step (.svg).")
     ] = None,
 ) -> None:
-    """Judge a trajectory in floating point: each step starts from the answer before it.
+    """Check a trajectory computed in floating point. Each step is judged from the state before it.
 
-    Exit code 0 when every step is proved, 1 when one is not, 2 on bad input.
+    Exit code 0 if every step is proved, 1 if one is not, 2 on bad input.
     """
     if picture is not None:
         output.check_file(picture, (".svg",))

@@ -137,7 +137,7 @@ def test_an_interruption_says_what_is_kept(command_line, monkeypatch):
     code, out, err = command_line("theory", "moving-cap")
     assert (code, out) == (INTERRUPTED, "")
     assert err.strip().splitlines() == [
-        "mushrooms: interrupted; nothing is kept: files are written whole, at the end"
+        "mushrooms: interrupted; nothing was written: files are written at the end"
     ]
     assert "--resume" in COMMANDS["audit"].kept
 

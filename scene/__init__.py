@@ -1,7 +1,7 @@
-"""The language that all packages speak: laws of motion, tables, states, outcomes.
+"""What all packages share: laws of motion, tables, states, outcomes.
 
-`laws` and `tables` make a scene, which `validity` proves valid where it is made; `load` reads one. `geometry`
-is a table at one instant, and `transforms` are the changes under which the physics stays the same.
+`laws` and `tables` define scenes, and `validity` proves each one valid when it is made. `load` reads a scene.
+`geometry` describes a table at one instant. `transforms` are changes that leave the physics the same.
 """
 
 from scene.laws import BangBang, Fourier, Law

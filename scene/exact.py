@@ -67,8 +67,8 @@ def _primitive(p: Polynomial) -> Polynomial:
 def remainder(p: Polynomial, q: Polynomial) -> Polynomial:
     """Return a positive multiple of the remainder of p by q, with coprime integers.
 
-    The coefficients of p and q must be whole numbers, as `_primitive` leaves them, and so are all on the
-    way: fractions would be reduced at every step.
+    The coefficients of p and q must be whole numbers, as `_primitive` leaves them. All intermediate ones are
+    whole too, because fractions would be reduced at every step.
     """
     rest, divisor = [a.numerator for a in p], [b.numerator for b in q]
     size, sign = abs(divisor[-1]), 1 if divisor[-1] > 0 else -1

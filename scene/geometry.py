@@ -1,8 +1,7 @@
 """The geometry of a table at one instant: half width, areas, outline, walls and normals, defined once.
 
-Plots, drawing of starts, strategies, profiles and the generator share these definitions. What gives or
-judges an answer does not: both steppers, both provers and the theory define their walls and volumes for
-themselves, so that an error here cannot hide in all of them.
+Plots, random starts, strategies, profiles and the generator of questions share these definitions. Steppers,
+verifier and theory define their own walls and volumes, so that an error here cannot hide in all of them.
 """
 
 from __future__ import annotations
@@ -44,7 +43,7 @@ class TableAt(NamedTuple):
 
     @property
     def size(self) -> Any:
-        """Return a length [length] that no chord exceeds but in a stem that is wider below."""
+        """Return a length [length] that no chord exceeds, except in a stem that is wider below."""
         return 2 * self.r + 2 * self.w + self.h
 
     def rounded(self) -> TableAt:
@@ -204,7 +203,7 @@ def rounded(scene: Scene, t: float) -> TableAt:
 
 
 def placed(scene: Scene, state: State, wall: Wall, how: str) -> str:
-    """Say that a state is beside a wall that it does not name, by how much, and what helps if it leaves it.
+    """Say how far a state is from a wall that it does not name, and what to do if it leaves this wall.
 
     Args:
         scene: the table.

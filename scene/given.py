@@ -1,6 +1,6 @@
-"""Checks of what is given for a law's numbers, made before a law exists, and of the times it is called with.
+"""Checks of a law's numbers before the law exists, and of the times at which a law is evaluated.
 
-Each returns the number as the law keeps it, or raises `InvalidScene` with one line.
+Each function returns the number as the law stores it, or raises `InvalidScene` with one line.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ def finite(field: str, number: object) -> float:
     """Return a finite number as a float.
 
     Raises:
-        InvalidScene: it is none.
+        InvalidScene: it is not a finite number.
     """
     if type(number) is float and -math.inf < number < math.inf:
         return number
@@ -33,7 +33,7 @@ def finite_times(t: object) -> NDArray[np.float64]:
     """Return times as an array.
 
     Raises:
-        BadInput: one is no finite number.
+        BadInput: a time is not a finite number.
     """
     try:
         times = np.asarray(t, np.float64)
@@ -48,7 +48,7 @@ def amplitudes(field: str, numbers: object) -> tuple[float, ...]:
     """Return a Fourier law's amplitudes.
 
     Raises:
-        InvalidScene: they are no list of finite numbers, or too many.
+        InvalidScene: they are not a list of finite numbers, or too many.
     """
     numbers = listed(numbers)
     if not isinstance(numbers, tuple | list):
@@ -62,7 +62,7 @@ def checked_knot(i: int, knot: object) -> tuple[float, float]:
     """Return a bang-bang law's knot number i.
 
     Raises:
-        InvalidScene: it is no pair of finite numbers.
+        InvalidScene: it is not a pair of finite numbers.
     """
     knot = listed(knot)
     if not (isinstance(knot, tuple | list) and len(knot) == 2):
@@ -77,7 +77,7 @@ def checked_knot(i: int, knot: object) -> tuple[float, float]:
 
 
 def check_legs(knots: tuple[tuple[float, float], ...]) -> None:
-    """Refuse knots that do not rise in time, do not close, or span no binary64 number.
+    """Refuse knots whose times do not increase, that do not close, or whose span is not a binary64 number.
 
     Raises:
         InvalidScene: naming the knot, the value and the bound.

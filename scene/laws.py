@@ -2,9 +2,9 @@
 
 A law is a bare number, a trigonometric polynomial or a bang-bang motion. Its numbers are
 binary64 and mean exactly that real number. On each of its analytic pieces a law is a
-constant, a trigonometric polynomial or a quadratic with rational coefficients; `piece_at`
-hands that piece out, and `evaluate` works in any of mpmath's number systems (`mp`, `fp`,
-`iv`), so one definition serves points, floats and enclosures.
+constant, a trigonometric polynomial or a quadratic with rational coefficients. `piece_at`
+returns that piece. `evaluate` works in each of mpmath's number systems (`mp`, `fp`, `iv`),
+so one definition serves points, floats and enclosures.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ class Fourier(
     period: float | None = None
 
     def __post_init__(self) -> None:
-        """Refuse what is no law; numbers of any kind become floats, lists become tuples.
+        """Refuse invalid fields. Numbers of any kind become floats, and lists become tuples.
 
         Raises:
             InvalidScene: naming the field, the value and the bound.
@@ -83,7 +83,7 @@ class BangBang(msgspec.Struct, frozen=True, tag_field="kind", tag="bang-bang", f
     knots: tuple[tuple[float, float], ...]
 
     def __post_init__(self) -> None:
-        """Refuse what is no law; numbers of any kind become floats, lists become tuples.
+        """Refuse invalid fields. Numbers of any kind become floats, and lists become tuples.
 
         Raises:
             InvalidScene: naming the knot, the value and the bound.
@@ -164,7 +164,7 @@ def period_of(law: Law) -> Period | None:
 
 
 def shared_period(laws: Iterable[Law]) -> Period | None:
-    """Return the period of the first law that moves, which a scene's others share; None where none moves."""
+    """Return the period of the first law that moves, which all moving laws share; None if nothing moves."""
     return next((found for law in laws if (found := period_of(law)) is not None), None)
 
 

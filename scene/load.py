@@ -67,7 +67,7 @@ def read_data(source: str | Path) -> Any:
 
 
 def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    """Return a JSON object; a key that comes twice is refused, as TOML has it: one of both would be lost."""
+    """Return a JSON object. Refuse a key that stands twice, as TOML does: one value would be lost."""
     found: dict[str, Any] = {}
     for key, value in pairs:
         if key in found:
@@ -79,7 +79,7 @@ def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
 def from_data(data: Any, origin: str = "") -> Scene:
     """Decode plain data (dicts, lists, numbers) strictly and prove the scene valid.
 
-    A `$schema` beside the parameters, by which editors find the published schema, is ignored.
+    A field `$schema` is ignored: editors find the published schema by it.
 
     Raises:
         InvalidScene: one line naming the field, the value and the bound.
@@ -102,7 +102,7 @@ def _in_words(error: Exception, data: Any) -> str:
     place = path.rstrip("`").removeprefix(".")
     cause = error.__cause__
     if isinstance(cause, InvalidScene):
-        # A law does not know of what it is the law: it names its kind.
+        # A law does not know its parameter, so its message names its kind.
         return re.sub(r"^(fourier|bang-bang)(?=[. ])", place, str(cause)) if place else str(cause)
     if place in ("table", *(f"{name}.kind" for name in PARAMETERS)):
         return f"{place} = {shown(_at(data, names))}, must be one of {_tags(place.removeprefix('table'))}"
@@ -143,7 +143,7 @@ def _at(data: Any, names: list[str]) -> Any:
 
 
 def to_data(scene: Scene) -> dict[str, Any]:
-    """Return the wire's form of a scene as plain data; of `omega` and `period`, the one that a law gives."""
+    """Return a scene as plain data, in the form of the protocol. A law keeps its `omega` or its `period`."""
     check_scene(scene)
     data: dict[str, Any] = msgspec.to_builtins(scene)
     return {name: _without_none(field) for name, field in data.items()}

@@ -1,16 +1,14 @@
 """Signs of conditions in which Fourier and bang-bang laws meet, proved by Taylor's theorem in rationals.
 
-Such a condition is no polynomial in any one variable, so Sturm's theorem does not decide it. On each leg of
-the bang-bang laws it is smooth: with its value and rate at the middle m of an interval of half-width h and a
-bound K on its second derivative there,
+Such a condition is not a polynomial, so Sturm's theorem does not decide it. It is smooth on each leg of the
+bang-bang laws. Take an interval of half-width h and middle m, and a bound K on |f''| there. Then
 
     f(t) >= f(m) - |f'(m)| h - K h^2 / 2    for |t - m| <= h,
 
-so an interval on which the right side is positive is done, any other is halved. Everything is a rational
-number: times and legs are, and cos and sin of a rational part of a turn are computed here, in integers, to
-155 bits, with a proved bound on their error that is carried along. (mpmath could do this as well, but its
-constants are shared by all threads.) Near a contact no interval is ever small enough: the search ends then,
-and reports where.
+An interval is done if the right side is positive; otherwise it is halved. All numbers are rational. Cosine
+and sine of a rational part of a turn are computed here in integers, to 155 bits, with a proved bound on the
+error. (mpmath could do this too, but all threads share its constants.) Near a contact no interval is small
+enough. The search then ends and reports where.
 """
 
 from __future__ import annotations
@@ -156,7 +154,7 @@ def _wave(law: Fourier, m: Fraction) -> TaylorBounds:
 
 
 class SignVerdict(NamedTuple):
-    """Whether a condition holds at all times; None when that stays open, near the time named."""
+    """Whether a condition holds at all times; None if this is open near the given time."""
 
     holds: bool | None
     time: Fraction
@@ -173,7 +171,7 @@ def sign_on_legs(
         legs: intervals that cover one period, each within one piece of every bang-bang law.
 
     Returns:
-        The verdict; its time is one at which the condition fails, or near which it stays open.
+        The verdict. Its time is one at which the condition fails, or near which it is open.
     """
     todo = [((a + b) / 2, (b - a) / 2, 0) for a, b in legs]
     for _ in range(MAX_BOXES):

@@ -20,7 +20,7 @@ class BadInput(ValueError):  # noqa: N818 (the caller's input is bad, not the pr
 
 
 class InvalidScene(BadInput):
-    """A scene that means nothing: one line naming parameter, time, value and bound."""
+    """An invalid scene: one line naming parameter, time, value and bound."""
 
 
 def check_count(field: str, value: object, low: int, high: int) -> int:

@@ -1,8 +1,8 @@
 """Bounds of laws that are sizes: radius, width, depth and nu, which a valid scene keeps positive.
 
-`scene.laws.bounds` takes from the mean of a Fourier law all of its amplitudes, which may leave less than
-nothing: 1 + 0.9 cos x - 0.35 cos 3x is above 0.1. Whoever squares a least value, divides by it or multiplies
-two of them needs one that is not negative.
+`scene.laws.bounds` subtracts all amplitudes of a Fourier law from its mean. The result may be negative
+although the law is not: 1 + 0.9 cos x - 0.35 cos 3x is above 0.1. A lower bound that is squared, divided by
+or multiplied must not be negative.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from scene.laws import Bounds, Fourier, Law, bounds
 def size_bounds(law: Law) -> Bounds:
     """Bound a law that is a size, positive because its scene is valid; its least value is never below 0.
 
-    A least value of 0 says no more than that the law is positive.
+    A lower bound of 0 only says that the law is positive.
     """
     found = bounds(law)
     if found.lowest > 0.0 or not isinstance(law, Fourier):
@@ -24,10 +24,10 @@ def size_bounds(law: Law) -> Bounds:
 
 
 def _least_by_samples(law: Fourier) -> float:
-    """Bound a positive Fourier law from below, as positively as samples show it; 0 where they do not.
+    """Bound a positive Fourier law from below by samples; return 0 if they do not show a positive bound.
 
-    Between samples d apart f is above the lower of its neighbours less max |f''| d^2 / 8. All is in units of
-    the mean, which is positive, too, and of the phase.
+    Between samples at distance d, f is at least the lower neighbour minus max |f''| d^2 / 8. Units are the
+    mean, which is positive, and the phase.
     """
     waves = [(k, c / law.mean, s / law.mean) for k, c, s in law.harmonics()]
     size = 1.0 + sum(k * (abs(c) + abs(s)) for k, c, s in waves)  # bounds what a rounded phase does, too

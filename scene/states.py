@@ -12,14 +12,14 @@ from scene.tables import Scene, Wall, check_scene
 
 
 class InvalidState(BadInput):
-    """A state that means nothing in its scene: one line naming field, value and bound."""
+    """A state that is invalid in its scene: one line naming field, value and bound."""
 
 
 class State(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """A particle in flight.
 
-    `wall` names the wall it is leaving, or is None. On that wall it is by definition: the
-    rounding residual of (x, y) is taken out of the wall's equation, so it yields no ghost hit.
+    `wall` names the wall that the particle is leaving, or is None. The particle is on that wall by
+    definition: the residual of (x, y) is subtracted from the wall's f, so rounding yields no false hit.
     """
 
     t: float
@@ -47,7 +47,7 @@ class Collision(msgspec.Struct, frozen=True, tag_field="outcome", tag="collision
 
 
 class Horizon(msgspec.Struct, frozen=True, tag_field="outcome", tag="horizon"):
-    """No collision before t_end (one at t_end exactly is not before it); the state there, not bounced."""
+    """No collision before t_end; the state there. A collision exactly at t_end is not before it."""
 
     t: float
     x: float
@@ -84,7 +84,7 @@ ON_WALL = 2.0**-20
 
 
 def check_numbers(scene: Scene, state: State, t_end: float) -> None:
-    """Refuse what is no question at all, before any arithmetic.
+    """Refuse arguments that are no question, before any arithmetic.
 
     Args:
         scene: the table.
@@ -92,7 +92,7 @@ def check_numbers(scene: Scene, state: State, t_end: float) -> None:
         t_end: horizon [time].
 
     Raises:
-        BadInput: no scene, naming what was given.
+        BadInput: `scene` is not a scene.
         InvalidState: naming field, value and bound.
     """
     check_scene(scene)

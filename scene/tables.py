@@ -1,18 +1,18 @@
 """Tables: cap, stem and mushroom, and the walls that each of them has.
 
-A scene is a table with its laws of motion, proved valid where it is made: by a constructor, by decoding,
+A scene is a table with its laws of motion. It is proved valid when it is made: by a constructor, by decoding,
 by replacing a field, by unpickling. (`msgspec.structs.force_setattr` and a subclass that replaces
-`__post_init__` go around it; nobody does so by accident.) Only what a table needs is part of it:
+`__post_init__` bypass the proof.) The tables are:
     Cap:      x^2 + y^2 <= r(t)^2, y >= 0, the base closed;
     Stem:     |x| <= w(t) + slope(t) y, -h(t) <= y <= 0, the top closed;
     Mushroom: both, joined through the mouth y = 0, |x| < w(t).
 The mouth is given by `w` (half-width, a length) or by `nu` (w = nu r).
 
-A scene is valid when r, h, w > 0, w <= r and w > h slope at all times, and when all its laws that move share
-one period exactly: the proof covers one period, and the theory is of cycles. The period of a bang-bang law
-is a rational number, that of a Fourier law with `omega` is 2 pi / omega and irrational, so these two never
-share one; a Fourier law that gives `period` has just that period, and can. A law that moves several times
-faster is written as higher harmonics (the k-th number of `cos` and `sin` belongs to k omega) or as
+A scene is valid if r, h, w > 0, w <= r and w > h slope at all times, and if all its moving laws have
+exactly the same period. The proof covers one period, and the theory is about cycles. The period of a
+bang-bang law is rational. That of a Fourier law with `omega` is 2 pi / omega, which is irrational, so the
+two never agree. A Fourier law with `period` can agree with a bang-bang law. A law that moves several times
+faster is written with higher harmonics (the k-th number of `cos` and `sin` belongs to k omega) or with
 repeated knots.
 """
 
@@ -71,7 +71,7 @@ class _Table(
 
     @property
     def period(self) -> float:
-        """Return the period of the laws that move [time], 0 where nothing moves."""
+        """Return the period of the moving laws [time], 0 if nothing moves."""
         return cycle_length(self)  # type: ignore[arg-type]
 
     def at(self, t: Any) -> dict[str, Any]:
@@ -80,7 +80,7 @@ class _Table(
 
 
 def _check_text(field: str, text: object) -> None:
-    """Refuse what is no text, and characters that no terminal, page or picture can show."""
+    """Refuse a value that is not text, and characters that a terminal, page or picture cannot show."""
     if not isinstance(text, str):
         raise InvalidScene(f"{field} = {shown(text)}, must be text")
     found = HIDDEN.search(text)
@@ -126,15 +126,15 @@ Scene = Cap | Stem | Mushroom
 
 
 def check_scene(scene: object) -> None:
-    """Refuse what is no scene at all.
+    """Refuse a value that is not a scene.
 
     Args:
         scene: whatever a caller gave for a Cap, a Stem or a Mushroom.
 
     Raises:
-        BadInput: naming what was given; for a name, how to load the scene.
+        BadInput: naming the value; for the name of a scene it says how to load it.
     """
-    # A scene is proved valid where it is made; a subclass could leave that out.
+    # A scene is proved valid when it is made; a subclass could omit the proof.
     if type(scene) in (Cap, Stem, Mushroom):
         return
     hint = f"; a name or a file is loaded by scene.load({shown(scene)})" if isinstance(scene, str) else ""

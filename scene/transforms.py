@@ -1,6 +1,6 @@
-"""Transformations of scenes and states under which the physics is known to stay the same.
+"""Transformations of scenes and states that leave the physics the same.
 
-A transformed scene is a new one: it keeps neither name nor notes, and is proved valid like any other. Mirror
+A transformed scene has neither name nor notes, and is proved valid like any other. Mirror
 images and powers of two are exact as long as no number overflows or becomes subnormal.
 """
 
@@ -28,7 +28,7 @@ def mirrored_wall(wall: Wall | None) -> Wall | None:
 
 
 def mirrored(state: State) -> State:
-    """Return the state's mirror image under x -> -x; every table is its own."""
+    """Return the state's mirror image under x -> -x. Every table is its own mirror image."""
     return State(state.t, -state.x, state.y, -state.vx, state.vy, mirrored_wall(state.wall))
 
 
@@ -51,7 +51,7 @@ def scaled_state(state: State, length: int, time: int) -> State:
 
 
 def scaled(scene: Table, length: int, time: int) -> Table:
-    """Return the scene with lengths times 2^length and times times 2^time; `nu` and `slope` stay."""
+    """Return the scene with lengths times 2^length and times times 2^time; `nu` and `slope` do not change."""
     return _with_laws(
         scene, lambda name, law: scaled_law(law, 0 if name in ("nu", "slope") else length, time)
     )

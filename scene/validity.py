@@ -2,10 +2,9 @@
 
 Each condition is the sign of a sum of products of laws. For trigonometric laws the
 substitution x = tan(omega t / 2) makes it a rational polynomial over the real line, for
-bang-bang laws it is one on each leg; `scene.exact` decides its sign. Touching is decided
-too: nu = 1 at one instant is valid, nu > 1 by one unit in the last place is not. A condition in which
-laws of both kinds move is decided by `scene.mixed`, where the two sides must keep apart: what only
-touches, or might, is refused.
+bang-bang laws it is one on each leg. `scene.exact` decides its sign, and contact too: nu = 1
+at one instant is valid, nu > 1 by one unit in the last place is not. If laws of both kinds move in a
+condition, `scene.mixed` decides it. Then the two sides must not touch: contact is refused.
 """
 
 from __future__ import annotations
@@ -106,7 +105,7 @@ def _remedy(laws: Laws, first: str, second: str, a: Period, b: Period) -> str:
 
 
 def _multiples(a: Period, b: Period) -> tuple[int, int] | None:
-    """Return how many of two periods, as given, are as long; None where harmonics do not go so far."""
+    """Return equally long multiples of two given periods; None if they need too many harmonics."""
     ctx = decimals()
     ratio = a.value(ctx) / b.value(ctx)
     if not 1 <= MAX_HARMONICS * ratio <= MAX_HARMONICS**2:  # far beyond, it is no float either
@@ -117,7 +116,7 @@ def _multiples(a: Period, b: Period) -> tuple[int, int] | None:
 
 
 def _is_clear(condition: Condition) -> bool:
-    """Tell whether the laws' ranges alone show a condition: for most scenes they do, at next to no cost."""
+    """Tell whether the ranges of the laws prove a condition. For most scenes they do, at little cost."""
     least = Fraction(0)
     for sign, factors in condition.terms:
         ends = [Fraction(sign)]
@@ -182,7 +181,7 @@ def _on_circle(condition: Condition) -> Iterator[tuple[exact.Polynomial, Fractio
 
 
 def _least(times: list[Any], roughly: Callable[[Any], float], condition: Condition) -> list[Any]:
-    """Return the times at which a condition's excess may be least, as floats show; all, if they do not."""
+    """Return the times at which a condition's excess may be smallest; all times, if floats do not tell."""
     # Floats know t, and hence the phase of a wave, to some 2^-52 of it: here to 2^-30 of a turn.
     span = abs(times[-1] - times[0])
     if not max(map(abs, times)) < 2.0**18 * span:
@@ -197,7 +196,7 @@ def _least(times: list[Any], roughly: Callable[[Any], float], condition: Conditi
 
 
 def _message(laws: Laws, condition: Condition, known: Fraction | None = None) -> str:
-    # The proof is done; this only looks for a telling instant to show. In mp no scene overflows.
+    # The proof is done; this only looks for an instant to show in the message. In mp no scene overflows.
     ctx = decimals()
     shared = shared_period(laws.values())
     span = shared.value(ctx) if shared else ctx.mpf(0)

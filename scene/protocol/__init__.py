@@ -1,1 +1,1 @@
-"""Protocol 1: its messages, and the side of an implementation that answers them."""
+"""Protocol 1: its messages, and the server that answers them for an implementation."""

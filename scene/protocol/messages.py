@@ -1,11 +1,10 @@
 """The messages of protocol 1, both directions, and their published JSON Schema.
 
-Requests are decoded strictly: an unknown field is refused (`docs/protocol.md` says where an implementation
-may ignore one). Answers may carry further fields, which are ignored, so that an implementation can say more
-than it is asked; and `dt` and `wall` of a collision may be absent, for engines that do not know them. A scene
-stays raw here: it is decoded and proved valid once, by whoever steps in it. On the wire and in the schema a
-request has its class's name without the suffix.
-`python -m scene.protocol.messages > docs/protocol.schema.json` prints the schema.
+Requests are decoded strictly: an unknown field is refused. (`docs/protocol.md` says where an implementation
+may ignore one.) Unknown fields of answers are ignored. `dt` and `wall` of a collision may be absent, for
+engines that do not know them. A scene is not decoded here, but once, by the stepper. In protocol and schema
+a request has the name of its class without the suffix. `python -m scene.protocol.messages >
+docs/protocol.schema.json` prints the schema.
 """
 
 from __future__ import annotations
@@ -88,7 +87,7 @@ Command = (
 
 
 class Introduction(msgspec.Struct, frozen=True):
-    """Who answers, and what it can do; what it does not list it is not asked."""
+    """Name and capabilities of an implementation. What is not listed here is never tested."""
 
     protocol: int
     name: str
@@ -108,12 +107,12 @@ class Echoed(msgspec.Struct, frozen=True):
 class AnsweredCollision(
     msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True, tag_field="outcome", tag="collision"
 ):
-    """A collision as it is answered: `scene.Collision`, but for what may be absent.
+    """A collision in an answer: `scene.Collision`, with two fields that may be absent.
 
     Attributes:
-        wall: met; where it is absent the asking side takes the wall that the place is nearest to.
-        dt: flight time; where it is absent `t` alone is graded.
-        t: time; x, y: place; vx, vy: velocity after the bounce.
+        wall: the wall met; if absent, the suite takes the wall nearest to the position.
+        dt: flight time; if absent, only `t` is graded.
+        t: time; x, y: position; vx, vy: velocity after the bounce.
     """
 
     wall: Wall | None = None
@@ -129,16 +128,16 @@ Answered = AnsweredCollision | Horizon | Undefined | Undecided | Rejected
 
 
 class Steps(msgspec.Struct, frozen=True):
-    """The collisions of a trajectory, and last what came instead of a further one."""
+    """The collisions of a trajectory. If it ended early, the last entry is the outcome that ended it."""
 
     seq: Seq
     steps: tuple[Answered, ...]
 
 
 class Arrival(msgspec.Struct, frozen=True, tag_field="outcome", tag="horizon"):
-    """A particle at t_end, and the times [time] of its first stay in the cap, captured; None without one.
+    """A particle at t_end, and its first capture interval [time]; None if it has none.
 
-    A stay that goes on at t_end ends there.
+    An interval that lasts at t_end ends there.
     """
 
     t: float
@@ -150,25 +149,25 @@ class Arrival(msgspec.Struct, frozen=True, tag_field="outcome", tag="horizon"):
 
 
 class LostUndefined(Undefined, frozen=True, omit_defaults=True, tag="undefined"):
-    """A particle of a flow that mathematics leaves without an arrival, and so without a captured stay."""
+    """A particle of a flow for which mathematics gives no arrival. It has no capture interval."""
 
     captured: None = None
 
 
 class LostUndecided(Undecided, frozen=True, omit_defaults=True, tag="undecided"):
-    """A particle of a flow whose arrival is not decided, nor any captured stay."""
+    """A particle of a flow whose arrival is undecided. It has no capture interval."""
 
     captured: None = None
 
 
 class LostRejected(Rejected, frozen=True, omit_defaults=True, tag="rejected"):
-    """A particle of a flow that was bad input, and has no captured stay."""
+    """A particle of a flow that was bad input. It has no capture interval."""
 
     captured: None = None
 
 
 class Flown(msgspec.Struct, frozen=True):
-    """Where the particles of a flow are, in their order; what was lost says why, and tells no stay."""
+    """The particles of a flow at t_end, in order. A lost particle has a reason and no capture interval."""
 
     seq: Seq
     states: tuple[Arrival | LostUndefined | LostUndecided | LostRejected, ...]
@@ -183,13 +182,13 @@ class Timed(msgspec.Struct, frozen=True):
 
 
 class Failed(msgspec.Struct, frozen=True):
-    """The implementation's own word that it failed at this question; counted as an error, not as a crash."""
+    """The implementation reports that it failed at this question. It counts as an error, not as a crash."""
 
     seq: Seq
     error: str
 
 
-# Strings are passed over, with what a request has as a whole number; the last one may have no end.
+# Skips strings, and fields of a request that are whole numbers; the last string may have no end.
 _WHOLE = rb'"(?:protocol|seq|collisions|repeat)"\s*:\s*-0(?=[\s,}])'
 _STRING = rb'"(?:[^"\\]|\\.)*+\\?(?:"|\Z)'
 _ZEROS = re.compile(_WHOLE + rb"|" + _STRING + rb"|(?<![\w.+-])-0(?=[\s,\]}]|\Z)", re.DOTALL)
@@ -197,9 +196,9 @@ _MAY_HAVE_ZEROS = re.compile(rb"-0(?:[\s,\]}]|\Z)")
 
 
 def with_minus_zeros(line: bytes) -> bytes:
-    """Return a line of JSON with -0.0 for -0: C writes minus zero so, and decoders take it for an integer.
+    """Replace -0 by -0.0 in a line of JSON. C writes minus zero as -0, and decoders read that as an integer.
 
-    Where a request has a whole number -0 stays: it is 0.
+    In fields that are whole numbers -0 is not replaced: it is 0.
 
     Args:
         line: of JSON, or of anything.

@@ -1,8 +1,8 @@
-"""Protocol 1, the side of an implementation: one JSON object a line on stdin and stdout.
+"""Protocol 1 for implementations in Python: one JSON object a line on stdin and stdout.
 
-`serve` answers every request for a stepper given as Python functions. It holds no numerics: a line
-that cannot be understood is answered by `rejected` with the reason, naming the field, and the next
-line is read. A stepper that does not know flight times or walls answers `AnsweredCollision` without them.
+`serve` answers every request with a stepper given as Python functions. A line that cannot be understood is
+answered by `rejected`, with a reason that names the field. A stepper that does not know flight times or walls
+answers `AnsweredCollision` without them.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ Timer = Callable[[Scene, State, int, int], tuple[Sequence[int], Answered | Outco
 
 
 class OwnFailure(Exception):  # noqa: N818 (a failure that is owned to, not an error of this program)
-    """Raised by a stepper that has no outcome to give: answered as an error of its own, with this text."""
+    """Raised by a stepper that cannot give an outcome: answered as `error`, with this text."""
 
 
 # What a line may do to the decoder: bad JSON, bad fields, bad UTF-8, too deep a nesting.
@@ -66,11 +66,11 @@ def serve(
     Args:
         name: of the implementation.
         stepper: (scene, state, t_end) -> outcome in the wire's form.
-        follower: (scene, state, collisions, t_end) -> collisions, and last what came instead of one.
+        follower: (scene, state, collisions, t_end) -> collisions; the last entry may be another outcome.
         lines: requests, one JSON object a line.
         out: answers, one line each, flushed.
         flow: (scene, states, t_end) -> for each state its outcome at t_end and (t_in, t_out) of its
-            first captured stay, or None; the profile is offered only when this is given.
+            first capture interval, or None; the profile is offered only if this is given.
         timer: (scene, state, collisions, repeat) -> nanoseconds of each repeat, and the last outcome;
             likewise.
     """
@@ -88,7 +88,7 @@ class _Server:
     ) -> None:
         self.name, self.stepper, self.follower = name, stepper, follower
         self.flow, self.timer = flow, timer
-        # Successive requests mostly share their scene: keep that one.
+        # Successive requests mostly have the same scene: it is cached.
         self.kept: tuple[bytes, Scene] | None = None
 
     def run(self, lines: BinaryIO, out: BinaryIO) -> None:

@@ -59,7 +59,8 @@ def predict(
     With --energy also predict at that energy, with the possible error of the prediction. This needs rates
     that python -m conformance.audit.frozen measures. They are known for moving-cap, moving-cap-trivial, both
     fixed caps, ergodic, retraced-arc, the scenes of the audit, and the reverses of all these. For another
-    scene only the limit of high energies is printed, and a line on stderr says why."""
+    scene only the limit of high energies is printed, and a line on stderr says why.
+    """
     import theory
 
     check_range("--digits", digits, 1, MAX_DIGITS)

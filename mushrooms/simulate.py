@@ -100,7 +100,8 @@ def simulate(
     same bits. Exit code 0; 3 if a limit stopped the run; 130 if it was interrupted.
 
     On stderr: an estimate of collisions and time, if the run takes over 20 s; a note if scalar steps took
-    over a tenth of the time; a note if the prediction is the limit of high energies."""
+    over a tenth of the time; a note if the prediction is the limit of high energies.
+    """
     _check_ensemble(energy, cycles, seed, threads)
     limits = {"max_collisions": max_collisions, "max_seconds": max_seconds}
     _check_stored(out, particles, block, phases=phases, resume=resume, dask=dask, **limits)

@@ -94,7 +94,7 @@ def work_identity(
     """Test mean exp(-W / kT) = A(t) / A(0) at several times.
 
     Args:
-        flow: (scene, states, t_end) -> outcome and captured stay of each state.
+        flow: (scene, states, t_end) -> outcome and capture interval of each state.
         scene: a valid scene that moves.
         n_particles: drawn for every time anew, >= 2.
         kT: temperature as an energy [length^2 / time^2], far above that of the walls' own speed.

@@ -97,13 +97,12 @@ class Certified(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_de
 class Expectation(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
     """One answer that is right.
 
-    Attributes:
-        outcome: of the step; of a trajectory: how it ends, "collision" when all asked for are found.
-        steps: the collisions, and the horizon when it ends there; empty for undefined and rejected steps. Of
-            a flow, whose whole path is proved, the collisions that begin or end a stay, and the horizon.
-        reason: of an undefined outcome.
-        stays: of a flow, the captured stays (docs/protocol.md) as places in `steps`, counted from 0: the arc
-            hit that begins it and the collision that ends it, or the horizon. Empty for none.
+    Attributes: outcome: of the step; of a trajectory: how it ends, "collision" when all asked for are
+    found. steps: the collisions, and the horizon when it ends there; empty for undefined and rejected
+    steps. Of a flow, whose whole path is proved, the collisions that begin or end a stay, and the horizon.
+    reason: of an undefined outcome. stays: of a flow, the capture intervals (docs/protocol.md) as places in
+    `steps`, counted from 0: the arc hit that begins it and the collision that ends it, or the horizon.
+    Empty for none.
     """
 
     outcome: OutcomeName
@@ -293,7 +292,7 @@ def answer(vector: Vector, step: Stepper, follow: Follow, carry: Flowing) -> dic
         vector: the question.
         step: (scene, state, t_end) -> outcome.
         follow: (scene, state, collisions, t_end) -> collisions, and last what came instead of one.
-        carry: (scene, states, t_end) -> outcome and first captured stay of each.
+        carry: (scene, states, t_end) -> outcome and first capture interval of each.
     """
     try:
         scene = _scene(json.dumps(vector.scene))

@@ -17,7 +17,7 @@ FOR_EVER = 2.0**1000  # the horizon of a path that has none, once nothing is met
 
 
 def follow(scene: Scene, state: State, n_collisions: int, t_end: float = math.inf) -> list[Outcome]:
-    """Return the collisions of a trajectory, and last what came instead of one."""
+    """Return the collisions of a trajectory, the last entry may be another outcome."""
     path = fast.trajectory(scene, state, n_collisions, t_end)
     steps = [Collision(wall, *map(float, row)) for wall, row in zip(path.walls, path.steps, strict=True)]
     return [*steps, path.outcome] if path.outcome is not None else list(steps)
@@ -26,11 +26,11 @@ def follow(scene: Scene, state: State, n_collisions: int, t_end: float = math.in
 def carry(
     scene: Scene, states: Sequence[State], t_end: float
 ) -> list[tuple[Outcome, tuple[float, float] | None]]:
-    """Return each particle's outcome at t_end and its first captured stay; a bad start is refused alone."""
+    """Return each particle's outcome at t_end and its first capture interval; refuse only bad starts."""
     refusals = [refuse(scene, state, t_end) for state in states]
     run = carry_judged(scene, states, refusals, t_end, given_threads(None))
     return [
-        # Only a particle that arrives has a stay.
+        # Only a particle that arrives has a capture interval.
         (outcome, (begin, end) if isinstance(outcome, Horizon) and not math.isnan(begin) else None)
         for outcome, begin, end in zip(run.outcomes, run.t_in.tolist(), run.t_out.tolist(), strict=True)
     ]

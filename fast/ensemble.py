@@ -1,7 +1,7 @@
-"""Ensembles: many particles from one energy, followed through cycles of the walls; and given states.
+"""Ensembles: many particles of one initial energy, followed through cycles of the walls.
 
-The numbers of a particle depend on that particle alone: the same bits for any number of
-particles, threads or chunks.
+The results of a particle depend on that particle alone. They have the same bits for any number
+of particles, threads or chunks.
 """
 
 from __future__ import annotations
@@ -53,33 +53,33 @@ SHARE = 256  # particles a worker takes at a time, for each cycle: several times
 
 
 class Ensemble(NamedTuple):
-    """What became of N particles over K cycles, with P looks at them and M narrowings of the mouth in each.
+    """Results of N particles over K cycles, with P phases and M local minima of nu in each cycle.
 
-    A *captured stay* begins with an arc hit at which |sin phi| > nu. It ends with the first arc hit at which
-    that is no longer so, or below the mouth if that comes first; when |sin phi| > nu once more before the
-    particle has been below the mouth, the same stay goes on. M is the number of local minima of nu in a
-    cycle, after its start and up to its end (`scene.mouth`; a plateau is one, a nu at rest has none).
+    A *capture interval* begins with an arc hit at which |sin phi| > nu. It ends with the first arc hit after
+    its last such hit, or with a hit of a stem wall, whichever comes first. M counts the local minima of nu
+    after the start of a cycle and up to its end (`scene.mouth`). A plateau is one minimum; a constant nu has
+    none. Such a minimum is called a narrowing.
 
     Attributes:
         energy0: initial energy E = v^2 / 2 of every particle.
-        energy: (N,) energy after the last cycle (nan for a particle not followed to the end).
+        energy: (N,) energy after the last cycle; nan for a particle not followed to the end.
         cycle_energies: (N, K) energy at the end of each cycle.
-        t, x, y, vx, vy: (N,) the last states.
-        n_collisions: (N,) collisions followed.
-        outcome: (N,) 0 followed to the end, 1 undecided, or given up after 10^9 collisions, 2 undefined, 3
-            rejected.
-        t_in, t_out: (N, K, M) begin and end [time] of the captured stay that spans narrowing m of cycle k,
-            t_in <= its instant <= t_out; nan when the particle is not captured at that instant. There is at
-            most one. A stay that spans several narrowings stands in the slot of each, with the same begin
-            and, in one cycle, the same end. t_in is the stay's true begin, in an earlier cycle too; of a
-            particle that starts captured it is the first arc hit. A cycle is written with what is known
-            when it ends: a stay that is on then has the cycle's end as t_out, and one that goes on only
-            later (see above) its arc hit. Stays that span no narrowing are not kept.
-        wall_counts: (N, 5) collisions with arc, base, left, right, floor.
-        phase_energies: (N, K, P) energy at the phases asked for.
-        phase_captured: (N, K, P) whether the last arc hit before them had |sin phi| > nu, and no wall of the
-            stem has been met since.
-        n_careful: (N,) collisions that the lanes left to the careful step.
+        t, x, y, vx, vy: (N,) last states.
+        n_collisions: (N,) number of collisions.
+        outcome: (N,) 0 followed to the end, 1 undecided or stopped after 10^9 collisions, 2 undefined,
+            3 rejected.
+        t_in, t_out: (N, K, M) begin and end [time] of the capture interval that spans narrowing m of cycle k,
+            t_in <= its instant <= t_out; nan if the particle is not captured at that instant. An interval
+            that spans several narrowings stands in the slot of each, with the same begin and, within one
+            cycle, the same end. t_in may lie in an earlier cycle. For a particle that starts captured it
+            is the first arc hit. t_out is what is known at the end of the cycle. If the interval lasts
+            then, t_out is the end of the cycle. If it seemed to have ended and continues later, t_out is
+            the arc hit at which it seemed to end. Intervals that span no narrowing are not stored.
+        wall_counts: (N, 5) number of collisions with arc, base, left, right, floor.
+        phase_energies: (N, K, P) energy at each of `phases`.
+        phase_captured: (N, K, P) whether the last arc hit before that phase had |sin phi| > nu, and no wall
+            of the stem has been met since.
+        n_careful: (N,) number of collisions computed by the scalar step, not by the SIMD lanes.
         seconds: wall time of the kernel.
         threads: number of threads used.
     """
@@ -104,16 +104,16 @@ class Ensemble(NamedTuple):
     threads: int
 
     def is_captured(self) -> npt.NDArray[np.bool_]:
-        """Return (N, K): whether a particle has a captured stay in a cycle."""
+        """Return (N, K): whether a particle has a capture interval in a cycle."""
         return np.asarray(np.isfinite(self.t_in).any(axis=2))
 
     def takes_part(self) -> npt.NDArray[np.bool_]:
-        """Return (N,): who was followed to the end, and was not in the island all the time.
+        """Return (N,): whether a particle was followed to the end and was not in the island all the time.
 
-        Where nu is always below 1 some particles are never free: in every slot a stay, one that is on when
-        the last cycle ends, and no collision with the stem's walls. No cycle captures or releases them, and
-        the theory leaves them out. Slow particles that were released and have not come down into the stem
-        before the end take part; captured again by then, they look as if they were never free.
+        If nu is always below 1, some particles are never free. They have a capture interval in every slot,
+        one that lasts at the end, and no collision with a stem wall. The theory leaves them out. A slow
+        particle may be released and not reach the stem before the end: it takes part. If it is captured
+        again before the end, it looks as if it had never been free.
         """
         was_followed: npt.NDArray[np.bool_] = self.outcome == FOLLOWED
         if self.t_in.shape[2] == 0:
@@ -123,14 +123,14 @@ class Ensemble(NamedTuple):
         return was_followed & ~(is_always_in & is_on_at_the_end)
 
     def p_nc(self) -> FloatArray:
-        """Return (K,): the share of those who take part without a captured stay in each cycle; nan of no one.
+        """Return (K,): share, in each cycle, of particles without capture; nan if none takes part.
 
-        Source: Eq:ps. Who begins captured, where nu is not greatest then, counts so in the first cycle.
+        Source: Eq:ps. A particle that starts captured counts as captured in the first cycle.
         """
         return 1.0 - _mean(self.is_captured()[self.takes_part()])
 
     def p_nc_se(self) -> FloatArray:
-        """Return (K,): the standard error of `p_nc`, of 0 or 1 that of 1 / (n + 1); 0 without a mouth."""
+        """Return (K,): standard error of `p_nc`; for 0 or 1 that of 1 / (n + 1); 0 without a mouth."""
         n = max(int(self.takes_part().sum()), 1)
         share = np.clip(self.p_nc(), 1.0 / (n + 1), n / (n + 1))
         return np.sqrt(share * (1.0 - share) / n) * bool(self.t_in.shape[2])
@@ -141,11 +141,11 @@ class Ensemble(NamedTuple):
             return np.diff(np.log(self.cycle_energies / self.energy0), axis=1, prepend=0.0)
 
     def m1(self) -> FloatArray:
-        """Return (K,): the mean of s over those who take part, by cycle (Eq:Erate); nan of no one."""
+        """Return (K,): mean of s over particles that take part (Eq:Erate); nan if none does."""
         return _mean(self.s()[self.takes_part()])
 
     def m1_se(self) -> FloatArray:
-        """Return (K,): the standard error of `m1`; nan of fewer than two."""
+        """Return (K,): standard error of `m1`; nan for fewer than two particles."""
         s = self.s()[self.takes_part()]
         return s.std(axis=0, ddof=1) / math.sqrt(len(s)) if len(s) > 1 else np.full(s.shape[1], np.nan)
 
@@ -198,20 +198,20 @@ def simulate(
     phases: Sequence[float] = (),
     progress: Callable[[int], None] | None = None,
 ) -> Ensemble:
-    """Follow an ensemble, uniform in place and direction, through whole cycles.
+    """Simulate an ensemble through whole cycles. Starts are uniform in area and direction.
 
     Args:
-        scene: table and laws; a static one is followed for one unit of time a cycle.
-        n_particles: 1 to 10^8, and n_particles n_cycles (P + 1 + 2 M) <= 10^9, which is what is kept.
+        scene: table and laws; for a static scene a cycle is one unit of time.
+        n_particles: 1 to 10^8; n_particles n_cycles (P + 1 + 2 M), the size of the result, is at most 10^9.
         energy: initial energy E = v^2 / 2 of every particle [length^2 / time^2], > 0.
         n_cycles: cycles to follow, 1 to 10^6.
         seed: 0 <= seed < 2^64.
-        first: number of the first particle, 0 to 2^62. Particle i starts the same in every run of the seed:
-            blocks that begin at 0, n, 2 n hold the particles of one run at once, to the bit.
-        threads: how many to use, by default one for each core.
-        phases: (P,) fractions of each cycle at which energies are wanted, rising, in (0, 1).
-        progress: called with the number of particles done so far, again and again: first with 0, when all
-            is checked and compiled.
+        first: number of the first particle, 0 to 2^62. Particle i has the same start in every run with this
+            seed. Blocks that begin at 0, n, 2 n contain the particles of one large run, to the bit.
+        threads: number of threads; default: one per core.
+        phases: (P,) increasing fractions of a cycle in (0, 1), at which energies are stored.
+        progress: called repeatedly with the number of finished particles, first with 0 when everything is
+            checked and compiled. An exception that it raises aborts the run.
 
     Raises:
         BadInput: naming field, value and bound.

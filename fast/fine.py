@@ -1,4 +1,4 @@
-"""The fine stepper's face: steps to about 31 decimals, states carried as pairs of floats."""
+"""The fine stepper: steps to about 31 decimals, with states as pairs of floats."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ from scene.refusal import check_count
 
 
 class FineTrajectory(NamedTuple):
-    """Successive collisions in pairs, and why they ended.
+    """Successive collisions as pairs of floats, and why they ended.
 
     Attributes:
         walls: (n,) names of the walls hit.
         steps: (n, 6, 2) dt, t, x, y, vx, vy after each collision, as sums high + low.
-        outcome: None when all collisions asked for were found, else what came instead.
+        outcome: None if all collisions asked for were found, else the outcome that ended the path.
     """
 
     walls: list[Wall]
@@ -37,25 +37,25 @@ class FineTrajectory(NamedTuple):
 
 
 def fine_trajectory(scene: Scene, state: State, n_collisions: int) -> FineTrajectory:
-    """Follow a particle, each step right to about 31 decimals of the state that it starts from.
+    """Follow a particle. Each step is right to about 31 decimals for the state that it starts from.
 
-    Along the path errors grow as the dynamics makes them. A wall's speed that is the rest of harmonics that
-    cancel is known to their last digits only: slow particles beside such a wall were seen to lose 6 decimals.
+    Along the path the dynamics amplifies errors. If harmonics of a law nearly cancel, the speed of the wall
+    is known to fewer decimals: slow particles near such a wall lost up to 6 decimals in tests.
 
     Args:
         scene: table and laws of motion.
         state: the start, as for `next_collision`.
-        n_collisions: how many collisions to follow, 0 to 10^7.
+        n_collisions: number of collisions to follow, 0 to 10^7.
 
     Returns:
-        The collisions. Where nothing is met any more (a particle at rest that no wall sweeps) the outcome
-        is a Horizon at t = infinity with the place where it rests. A wall met again within some 1e-10 of
-        a period may be Undecided, though `next_collision` decides it.
+        The collisions. If no wall is met any more (a particle at rest that no wall reaches), the outcome is
+        a Horizon at t = infinity with its position. If a wall is met again within some 1e-10 of a period,
+        the outcome may be Undecided although `next_collision` decides it.
 
     Raises:
         BadInput: naming field, value and bound.
 
-    Source: Gelfreich, Rom-Kedar, Turaev (2014), sec. 3.1; which wall is met is the careful step's answer.
+    Source: Gelfreich, Rom-Kedar, Turaev (2014), sec. 3.1; the scalar step decides which wall is met.
     """
     check_scene(scene)
     n_collisions = check_count("n_collisions", n_collisions, 0, MAX_STEPS)

@@ -1,4 +1,4 @@
-"""Flow: where given particles are at a given time, through the same kernel as ensembles."""
+"""Flow: states of given particles at a given time, by the same kernel as ensembles."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ from scene.refusal import check_number
 
 
 class Flow(NamedTuple):
-    """Where N particles are at t_end.
+    """N particles at t_end.
 
     Attributes:
-        outcomes: (N,) Horizon with the state at t_end; Undefined or Undecided for a particle lost before, or
-            given up after 10^7 collisions, which are counted where walls move.
-        t_in, t_out: (N,) the first captured stay in the cap [time], cut at t_end; nan for none.
+        outcomes: (N,) Horizon with the state at t_end; Undefined or Undecided for a particle lost before.
+            A particle in a moving table is also Undecided after 10^7 collisions.
+        t_in, t_out: (N,) the first capture interval in the cap [time], cut at t_end; nan for none.
         wall_counts: (N, 5) collisions with arc, base, left, right, floor.
-        n_careful: (N,) collisions that the lanes left to the careful step.
+        n_careful: (N,) number of collisions computed by the scalar step, not by the SIMD lanes.
     """
 
     outcomes: list[Outcome]
@@ -47,13 +47,13 @@ def flow(scene: Scene, states: Sequence[State], t_end: float, threads: int | Non
         scene: table and laws of motion.
         states: the starts, each as for `next_collision`, with t <= t_end.
         t_end: when to stop [time], finite.
-        threads: how many to use, by default one for each core; they change no bit.
+        threads: number of threads; default: one per core. The results do not depend on it.
 
     Raises:
-        InvalidState: a start is no State, or none of this table: naming the particle; nothing is followed.
-        BadInput: naming field, value and bound, for anything else that is not as above.
+        InvalidState: a start is not a State or not in this table; the particle is named.
+        BadInput: another argument is bad; naming field, value and bound.
 
-    Source: a stay is captured while |sin phi| > nu at the arc, sec. 3.2.
+    Source: captured means |sin phi| > nu at the arc, sec. 3.2.
     """
     check_scene(scene)
     threads = given_threads(threads)

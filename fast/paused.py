@@ -1,4 +1,4 @@
-"""Ensembles that go on: through some cycles now and more of them later, to the bits of all at once."""
+"""Ensembles that can be continued: some cycles now and more later, with the bits of a single run."""
 
 from __future__ import annotations
 
@@ -22,17 +22,17 @@ BY_CYCLE = ("cycle_energies", "t_in", "t_out", "phase_energies", "phase_captured
 
 
 class Paused(NamedTuple):
-    """An ensemble, and what it takes to go on with it.
+    """An ensemble, and the data needed to continue it.
 
-    A last state is not enough: it lies in the middle of a flight, and a flight that begins there is rounded
-    otherwise than the one that passes.
+    A last state is not enough. It lies in the middle of a flight, and a flight restarted there rounds
+    differently.
 
     Attributes:
-        ensemble: up to the end of its last cycle.
+        ensemble: results up to the end of its last cycle.
         lanes: (N, LANE_ROWS) each particle at its last collision, and its next one, in the stepper's own
             units (`fast.kernel.kept`); nan for one that was not followed to the end.
-        asked: table, laws, seed, first and phases that it was asked for with, by name; None for one that a
-            caller has put together again, who then vouches for them.
+        asked: table, laws, seed, first and phases of the run, by name; None if a caller has rebuilt the
+            object and guarantees them.
     """
 
     ensemble: Ensemble
@@ -53,19 +53,18 @@ def go_on(
     progress: Callable[[int], None] | None = None,
     before: Paused | None = None,
 ) -> Paused:
-    """Follow an ensemble as `fast.simulate` does, which tells of the arguments, so that it can go on.
+    """Simulate an ensemble that can be continued. The arguments are those of `fast.simulate`.
 
-    `before` is what the same call with fewer cycles has returned, None to begin. `n_cycles` counts all
-    cycles, those before too.
+    `before` is the result of the same call with fewer cycles, or None to begin. `n_cycles` counts all
+    cycles, including those of `before`.
 
     Returns:
-        The ensemble that `fast.simulate` returns, to the bit, and what it takes to go on with that. Who was
-        not followed to the end before, or had a collision within rounding of it, is followed from its start.
+        The ensemble that `fast.simulate` returns, to the bit, and the data needed to continue it. A particle
+        that was lost before, or had a collision within rounding of the end, is followed from its start.
 
     Raises:
-        BadInput: naming field, value and bound; `before` is of another scene, energy, seed, first or phases,
-            or of other sizes, or so many cycles reach beyond the time up to which the lanes that followed it
-            know the phases of the laws.
+        BadInput: naming field, value and bound; `before` has another scene, energy, seed, first, phases or
+            size; or the cycles reach a time at which the lanes no longer resolve the phases of the laws.
     """
     plan = planned(scene, n_particles, energy, n_cycles, seed, first, threads, phases, progress)
     own: dict[str, Any] = {"seed": plan.seed, "first": plan.first, "phases": given_phases(phases)}

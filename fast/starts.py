@@ -90,7 +90,7 @@ def cycle_stops(scene: Scene, n_cycles: int, phases: Sequence[float]) -> Stops:
 
 
 def only_stop(t_end: float) -> Stops:
-    """Return one stop, that keeps the first captured stay of any length."""
+    """Return one stop, that keeps the first capture interval of any length."""
     return Stops(
         np.array([t_end]),
         np.array([0]),

@@ -1,4 +1,4 @@
-"""The fast stepper's face: one step, and how states and outcomes look to the kernels."""
+"""The fast stepper: one step, and the form of states and outcomes in the kernels."""
 
 from __future__ import annotations
 
@@ -63,14 +63,13 @@ def next_collision(scene: Scene, state: State, t_end: float) -> Outcome:
         t_end: horizon [time], t_end >= state.t.
 
     Returns:
-        Collision, Horizon, Undefined, Undecided where rounding leaves it open, where the time is too late or
-        where binary64 cannot hold the answer, or Rejected for a state that is none of this table, for a
-        `state` or `t_end` that is none at all (a wrong type, nan, infinity, t_end < state.t), and for laws
-        too large or too fast for binary64. A time is too late when k |t| reaches some 3e7 periods, at
-        harmonic k.
+        Collision; Horizon; Undefined; Undecided if rounding does not decide, if the time is too late, or if
+        binary64 cannot hold the answer; Rejected for a state outside this table, for a bad `state` or
+        `t_end` (wrong type, nan, infinity, t_end < state.t), and for laws too large or too fast for
+        binary64. A time is too late if k |t| reaches some 3e7 periods, at harmonic k.
 
     Raises:
-        BadInput: `scene` is no scene; all else that is bad is Rejected.
+        BadInput: `scene` is not a scene. Other bad input is Rejected.
 
     Source: Gelfreich, Rom-Kedar, Turaev (2014), sec. 3.1.
     """

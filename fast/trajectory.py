@@ -27,7 +27,7 @@ class Collisions(NamedTuple):
     Attributes:
         walls: (n,) names of the walls hit.
         steps: (n, 6) dt, t, x, y, vx, vy after each collision.
-        outcome: None when all collisions asked for were found, else what came instead.
+        outcome: None if all collisions asked for were found, else the outcome that ended the path.
     """
 
     walls: list[Wall]
@@ -41,16 +41,16 @@ def trajectory(scene: Scene, state: State, n_collisions: int, t_end: float = np.
     Args:
         scene: table and laws of motion.
         state: the start, as for `next_collision`.
-        n_collisions: how many collisions to follow, 0 to 10^7.
+        n_collisions: number of collisions to follow, 0 to 10^7.
         t_end: horizon [time], >= state.t; infinity for none.
 
     Returns:
-        The collisions. Where t_end is infinite and nothing is met any more (a particle at rest that no wall
-        sweeps) the outcome is a Horizon at t = infinity with the place where it rests.
+        The collisions. If t_end is infinite and no wall is met any more (a particle at rest that no wall
+        reaches), the outcome is a Horizon at t = infinity with its position.
 
     Raises:
-        BadInput: naming field, value and bound, for anything that is not as above. That a state is outside
-            the table, or moves into the wall that it leaves, the first step finds: the outcome is Rejected.
+        BadInput: a bad argument, naming field, value and bound. A state outside the table, or moving into
+            the wall that it leaves, is found by the first step: the outcome is then Rejected.
     """
     check_scene(scene)
     t_end = given_end(t_end)

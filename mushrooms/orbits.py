@@ -2,7 +2,7 @@
 
 `follow` draws starts as an ensemble does (particle i of seed S is particle i of `fast.simulate(..., seed=S)`)
 and follows each through the same number of collisions, or of cycles. An orbit knows its energies, its hits in
-the coordinates of a Poincare section and of the boundary map, its captured stays, and what the adiabatic
+the coordinates of a Poincare section and of the boundary map, its capture intervals, and what the adiabatic
 theory says of its energy, given these stays. Pictures: `mushrooms.figures.orbits`.
 """
 

@@ -1,8 +1,8 @@
 """Ground truth: a slow stepper whose every answer is an enclosure, proved to be first.
 
-`step` answers one step and `path` many, each with what `answers` describes. A flight (`course`) starts where
-`start` finds it; `isolation` finds its first root on the walls of `walls`, in the arithmetic of `arithmetic`
-or, for ties, of `rational`; `chain` bounces it.
+`step` answers one step and `path` many; `answers` describes the results. `start` judges the starting state,
+and `course` follows a flight. `isolation` finds the first root on each wall of `walls`, in the arithmetic
+of `arithmetic`, or for ties of `rational`. `chain` reflects the particle.
 """
 
 from reference.answers import Moment, Outcome, Trajectory

@@ -9,7 +9,7 @@ from scene.protocol.wire import serve
 
 
 def rounded(outcome: reference.Outcome) -> Outcome:
-    """Return a proved outcome with its numbers rounded to binary64; undecided where one is beyond it."""
+    """Return a proved outcome rounded to binary64; Undecided if a number is too large."""
     if not isinstance(outcome, reference.Collision | reference.Horizon):
         return outcome
     try:
@@ -24,7 +24,7 @@ def step(scene: Scene, state: State, t_end: float) -> Outcome:
 
 
 def follow(scene: Scene, state: State, n_collisions: int, t_end: float) -> list[Outcome]:
-    """Return the proved collisions of a trajectory, and last what came instead of one, rounded."""
+    """Return the proved collisions of a trajectory, rounded; the last entry may be another outcome."""
     path = reference.trajectory(scene, state, n_collisions, t_end)
     found = [*path.steps, *([path.outcome] if path.outcome is not None else [])]
     return [rounded(outcome) for outcome in found]

@@ -36,9 +36,9 @@ class ProvedCollision:
         slope: f' at the hit, < 0.
         digits: working decimals that decided it.
         departure: the flight that ends with this hit, its numbers enclosed.
-        root: the hit's flight time, counted from the departure's instant: dt but for its begin [time].
+        root: flight time of the hit, counted from the instant of the departure; dt plus its begin [time].
         jacobian: d(dt, x, y, vx, vy) / d(t, x, y, vx, vy), rows by outputs, when asked for.
-        margins: how far this answer is from another one, when asked for.
+        margins: distances of this collision from other outcomes, when asked for.
     """
 
     wall: Wall
@@ -72,7 +72,7 @@ Outcome = ProvedCollision | ProvedHorizon | Undefined | Undecided | Rejected
 
 
 class Trajectory(NamedTuple):
-    """Successive collisions and what came instead of the last one asked for.
+    """Successive collisions, and the outcome that ended them early.
 
     Attributes:
         steps: the collisions, each enclosed.

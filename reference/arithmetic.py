@@ -23,8 +23,8 @@ from scene.precision import intervals
 Interval = Any  # mpmath's ivmpf, which has no type stubs
 
 BITS_PER_DIGIT = 3.3219280948873626
-# What one step may take, in the unit of `WorkLimit`. Measured: 6,400 for the most that a vector of the corpus
-# needs at 50 digits, 4,400 for a plain step at 10,000 digits; 0.03 to 0.2 ms a unit on one idle core.
+# Work that one step may take, in the unit of `WorkLimit`. Measured: at most 6,400 for a vector of the corpus
+# at 50 digits, 4,400 for a plain step at 10,000 digits; 0.03 to 0.2 ms a unit on one idle core.
 MAX_WORK = 50_000.0
 LONG_NUMBER = 1024  # bits; arithmetic with so long a number takes twice as long as with a short one
 _FLOOR, _CEILING = "f", "c"
@@ -34,7 +34,7 @@ _CONSTANTS = threading.Lock()
 
 
 class Undecidable(Exception):  # noqa: N818 (not an error of the caller: precision is raised)
-    """At this precision the question stays open."""
+    """The question is open at this precision."""
 
 
 class Exhausted(Undecidable):
@@ -42,10 +42,10 @@ class Exhausted(Undecidable):
 
 
 class WorkLimit:
-    """What one step may cost, over all the precisions it tries.
+    """Limit on the work of one step, over all precisions that it tries.
 
-    The unit is one evaluation of a parabola at few digits; long numbers cost in proportion. Counted,
-    not timed, so that an answer never depends on the machine.
+    The unit is one evaluation of a parabola at few digits; long numbers cost in proportion. Work is
+    counted, not timed, so that an answer does not depend on the machine.
 
     Args:
         limit: units allowed.
@@ -77,7 +77,7 @@ class Enclosure(NamedTuple):
         return float(self.centre())
 
     def __repr__(self) -> str:
-        """Return the centre in the decimals that are known, and how far the truth may be from it."""
+        """Return the centre with its known decimals, and the greatest distance of the true number from it."""
         centre, half = self.centre(), self.extent() / 2
         if not half and Fraction(float(self)) == centre:
             return f"Enclosure({float(self)!r})"
@@ -122,7 +122,7 @@ class Arithmetic:
 
     Args:
         digits: working decimals.
-        work: what is left to spend; None begins anew.
+        work: the limit to use; None for a new one.
     """
 
     def __init__(self, digits: int, work: WorkLimit | None = None) -> None:
@@ -201,7 +201,7 @@ class Arithmetic:
         return self.context.make_mpf((lo, hi))
 
     def inflated(self, x: Interval) -> Interval:
-        """Return a slightly wider interval, so that another arithmetic can show that it holds the same."""
+        """Return a slightly wider interval, which another arithmetic can prove to contain this one."""
         margin = self.upper(x.delta) * self.power_of_two(-6)
         return self.hull(self.lower(x - margin), self.upper(x + margin))
 
@@ -239,7 +239,7 @@ class Arithmetic:
             return self.number(omega), self.dyadic(angle)
         pi = self._pi(self.prec + abs(angle.numerator // angle.denominator).bit_length() + 8)
         half_turns = rational(pi._mpi_[0]), rational(pi._mpi_[1])
-        n = angle // (2 * half_turns[0])  # whole turns: any number of them may be taken off
+        n = angle // (2 * half_turns[0])  # whole turns: any number of them may be subtracted
         ends = [angle - 2 * n * half_turn for half_turn in half_turns]
         return self.number(omega), self.between(min(ends), max(ends))
 
@@ -251,7 +251,7 @@ class Arithmetic:
         return 2 * self._pi(self.prec) / self.number(omega)
 
     def is_full_turn(self, omega: Interval, length: Fraction) -> bool:
-        """Tell whether omega times a length of time is 2 pi or more; we require 7, a little to spare."""
+        """Tell whether omega times a length of time is 2 pi or more; 7 is required, to be safe."""
         return not libmpf.mpf_lt((omega * self.number(length))._mpi_[0], libmpf.from_int(7))
 
     def _pi(self, bits: int) -> Interval:

@@ -38,7 +38,7 @@ def bounce(course: Course, hit: Hit) -> Bounce:
     is_base = hit.wall == "base"
     x, y = q.x + q.vx * s, arithmetic.zero if is_base else q.y + q.vy * s
     t = arithmetic.between(*(q.instant + end for end in exact_ends(arithmetic.inflated(s))))
-    # The new line of flight, as far before or after the hit as the instant is.
+    # The new line of flight at that instant, a little before or after the hit.
     near = arithmetic.middle(s)
     begin = s - near
     x_near = q.x + q.vx * near + (q.vx - vx) * begin
@@ -50,7 +50,7 @@ def bounce(course: Course, hit: Hit) -> Bounce:
 
 
 def fly_on(course: Course, hit: Hit, after: Bounce) -> Course:
-    """Return the flight that follows a hit; the residual of its wall stays with it."""
+    """Return the flight that follows a hit. The wall keeps its residual if it was left before."""
     arithmetic, scene = course.arithmetic, course.scene
     leaving = {hit.wall: course.leaving.get(hit.wall, arithmetic.zero)}
     in_cap = hit.wall == "arc" or (hit.wall == "base" and not isinstance(scene, Stem))

@@ -1,10 +1,10 @@
 """One flight from a state to its first collision, at one working precision.
 
-Where the straight flight crosses y = 0 it passes from one part of the table to the other; on each
-part the walls that bound it are searched left first (`reference.isolation`). All quantities are
-enclosures but the instant from which flight times are counted, so a trajectory may chain flights;
-what a precision leaves open is raised as `Undecidable`, and equalities are settled by
-`reference.rational` alone. docs/proof.md says what each answer claims and why it follows.
+At y = 0 the straight flight passes from one part of the table to the other. On each part the walls that
+bound it are searched from the left (`reference.isolation`). All quantities are enclosures, except the
+instant from which flight times are counted, so a trajectory can chain flights. `Undecidable` is raised if
+the precision does not decide. Only `reference.rational` proves equalities. docs/proof.md says what each
+answer claims, and why.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ class Hit(NamedTuple):
 
 @dataclass(eq=False)
 class Course:
-    """A flight and all that is asked about it.
+    """A flight, and the questions about it.
 
     Attributes:
         scene: table and laws.
@@ -142,7 +142,7 @@ class Course:
         return found
 
     def _at_the_edge(self) -> Undefined:
-        """Settle a crossing of y = 0 of which it is open whether it is within the sides."""
+        """Judge a crossing of y = 0 that may or may not lie between the sides."""
         is_mouth = isinstance(self.scene, Mushroom)
         instant = None if self.exact is None else rational.crossing_time(self.exact)
         if (
@@ -177,8 +177,8 @@ class Course:
     def _hits(self, walls: tuple[Wall, ...], start: Interval, limit: Interval | None) -> list[Hit]:
         """Find the walls that may be met first; each later one in the list not after those before it.
 
-        What is met at the horizon exactly is not met before it. A root whose interval holds the end
-        of a search is no answer yet: a wall asked before may be met beyond this end, and within the interval.
+        A wall met exactly at the horizon is not met before it. A root whose interval contains the end of a
+        search is no answer yet: a wall searched before may be met beyond this end, within the interval.
         """
         hits: list[Hit] = []
         postponed: list[Wall]
@@ -188,7 +188,7 @@ class Course:
                 try:
                     hit = self._hit(wall, start, until, self._searches)
                 except Undecidable as question:
-                    # What is open may come after another wall is met. Each wall is put off once.
+                    # An undecided wall may be met after another one. Each wall is postponed once.
                     if isinstance(question, Exhausted) or wall in postponed:
                         raise
                     postponed.append(wall)
@@ -201,7 +201,7 @@ class Course:
         return hits
 
     def _stops(self, start: Interval, until: Interval) -> Iterator[Interval]:
-        """Yield ever later ends of a search, first a period on: what is met soon costs no more."""
+        """Yield later and later ends of a search, first after one period: an early hit stays cheap."""
         upper = self.arithmetic.upper
         farthest, last, length = self._escape_time(), upper(until), self.motion.timeline.turn
         if farthest is not None and is_below(farthest, last):
@@ -222,10 +222,10 @@ class Course:
             raise Undecidable("horizon and collision fall together")
 
     def _tied(self, hits: list[Hit], limit: Interval | None) -> Undefined:
-        """Settle which walls are met together, exactly, at a time that is rational.
+        """Find which walls are met together exactly, at a rational time.
 
         Raises:
-            Undecidable: when no rational time shows it.
+            Undecidable: no rational time proves it.
         """
         times = [] if self.exact is None else self._rational_times(self.exact)
         for instant in times:
@@ -264,7 +264,7 @@ class Course:
     ) -> Hit | None:
         """Find the first root of one wall's function, if it may come before the end of `until`.
 
-        A search that has begun goes on where it stopped, as f > 0 is proved there, or has found its root.
+        A search continues where it stopped, because f > 0 is proved there, unless it has found its root.
         """
         stop = self.arithmetic.upper(until)
         if wall not in searches:
@@ -283,9 +283,9 @@ class Course:
         return Hit(wall, root.time, root.slope)
 
     def _end_beyond(self, search: Isolator, stop: Interval, length: Interval) -> Interval:
-        """Return where a search ends: a little later than asked for, so that a root there lies inside.
+        """Return where a search ends: a little later than asked for, so that a root at the end lies inside.
 
-        And where f has a sign, for a root may lie at that later end too.
+        f must have a sign there, because a root may lie at that later end too.
         """
         ends = [self.arithmetic.upper(stop + length * share) for share in (BEYOND, 2 * BEYOND, 3 * BEYOND)]
         return next((end for end in ends if sign(search.value(end)) != 0), ends[0])

@@ -1,24 +1,25 @@
 """The first downward root of a wall function, isolated left first.
 
 Sub-intervals cover the flight from the left. On each, f > 0 is proved, given f >= 0 at its left end:
-    as evaluated     f(I) > 0, or f(m) + f'(m)(I - m) + f''(I)(I - m)^2 / 2 > 0 with m inside I;
-    rising           f' > 0 on it;
-    falling          f' < 0 on it, and f > 0 at its right end;
+    direct           f(I) > 0;
+    centred          f(m) + f'(m)(I - m) + f''(I)(I - m)^2 / 2 > 0 with m inside I;
+    increasing       f' > 0 on it;
+    decreasing       f' < 0 on it, and f > 0 at its right end;
     concave          f'' <= 0 on it, and f > 0 at its right end;
-    lifting          f'' > 0 on it, and f = f' = 0 exactly at its left end, the start;
-    never reached    the wall does not meet, in a whole period, particles that rest where the sub-interval
-                     begins and ends. With laws held still f is concave along a flight, so f > 0 between
-                     these places whatever the phase.
+    flat start       f'' > 0 on it, and f = f' = 0 exactly at its left end, the start;
+    never reached    the wall does not meet, in a whole period, particles at rest at the two ends of the
+                     path on it. For fixed laws f is concave along a flight, so f > 0 between these two
+                     positions at every phase.
 A root is accepted only on an interval with f' < 0 throughout, f > 0 at its left end and f < 0
-at its right one. What none of this decides is bisected, then refused (`Undecidable`).
+at its right one. If none of this decides, the interval is halved, at last refused (`Undecidable`).
 
 f is continuously differentiable, also across the knots of its laws. f'' may jump there, and is
 enclosed with all its one-sided values. Each of these arguments, interval Newton, and the
-uniqueness of the root need no more than that, so an interval may hold knots.
+uniqueness of the root need only that, so an interval may contain knots.
 
 On the wall being left, f stands for f - f(0), and f = 0 where the flight begins. That moment may
-be known only within `begin`. Then every sub-interval that does not begin after it must rise, or be
-concave and hold all of it.
+be known only within `begin`. On a sub-interval that does not begin after it, f must then increase, or
+be concave with all of `begin` inside.
 """
 
 from __future__ import annotations
@@ -40,7 +41,7 @@ from reference.jets import Jet
 from reference.timeline import Timeline
 
 MAX_EXCLUDED = 4000  # sub-intervals of one wall on which f > 0 is proved
-MAX_PARTS = 2 * MAX_EXCLUDED  # sub-intervals that a search looks at: cutting in two, so many lead to those
+MAX_PARTS = 2 * MAX_EXCLUDED  # sub-intervals that a search examines: halving needs so many for MAX_EXCLUDED
 MAX_NEWTON = 200
 
 
@@ -61,9 +62,9 @@ class Isolator:
         begin: encloses the flight time at which the flight begins.
         residual: f(0) when the particle leaves this wall (the root s = 0 is divided out), else None.
         is_flat: f(0) = f'(0) = 0 exactly, so that only f'' > 0 can prove the start.
-        timeline: knows the laws' knots, at which intervals are best cut; None for a smooth function.
+        timeline: gives the knots of the laws, where intervals are best cut; None for a smooth function.
         is_never_met: tells whether the wall never comes to where the flight is at a time; None: not known.
-        reached: where the search stands, thin: f > 0 up to there. None before it begins.
+        reached: f > 0 is proved up to here, a thin interval; None before the search begins.
         n_excluded: sub-intervals on which f > 0 has been proved.
         root: the first root, once it has been found.
     """
@@ -142,8 +143,8 @@ class Isolator:
     def _expanded(self, whole: Interval, jet: Jet) -> Jet:
         """Enclose f and f' again, by Taylor's theorem: f' is Lipschitz, also across knots.
 
-        Near a flat least of a law its waves cancel. As evaluated, f is then known to some part of the
-        interval's length only; so it is to some part of the length's cube.
+        Near a flat minimum of a law its waves cancel. Evaluated directly, the error of f is then proportional
+        to the length of the interval; this way it is proportional to the cube of the length.
         """
         arithmetic, middle = self.arithmetic, self.arithmetic.middle(whole)
         there, away = self.jet(middle), whole - middle
@@ -165,10 +166,10 @@ class Isolator:
         return self.residual is not None and not is_below(self.arithmetic.upper(self.begin), a)
 
     def _require_rise(self, a: Interval, b: Interval, cut: Interval) -> None:
-        """Refuse to cut an interval whose parts must all rise up to where the flight has begun, and do not.
+        """Refuse to cut an interval if f does not increase near the start of the flight.
 
-        Those that hold not all of `begin`, nor begin after it, must. Where f' > 0 is not shown at a point of
-        theirs, cutting would go on there for ever.
+        On a part that neither contains all of `begin` nor lies after it, f must increase. If f' > 0 is not
+        proved at one of its points, cutting would never end there.
         """
         latest = self.arithmetic.upper(self.begin)
         holds_all = not is_below(self.arithmetic.lower(self.begin), a) and is_below(latest, cut)

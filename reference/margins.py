@@ -1,4 +1,4 @@
-"""How clear-cut a collision is: what would have to move for another answer to be right."""
+"""Margins of a collision: how much must change until another answer is right."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ class Margins(NamedTuple):
 
     Attributes:
         gap: time from the hit to the next wall that the straight flight would meet within the
-            horizon [time]; None when there is none, or when it cannot be told apart.
+            horizon [time]; None if there is none, or if it cannot be separated from the hit.
         corner: distance at the hit to the nearest other wall that bounds this part of the table
             [length], to first order: f / |grad f|.
         slope: |f'| at the hit, the speed of approach times |grad f|.

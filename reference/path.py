@@ -1,4 +1,4 @@
-"""Ground truth of many steps: a trajectory, every state of it enclosed and proved.
+"""Ground truth of many steps: a trajectory with every state enclosed and proved.
 
 All steps are taken at one working precision; when the last state is not enclosed to the digits asked for,
 the whole trajectory begins again at twice that. What is claimed, and why it follows: docs/proof.md.
@@ -33,17 +33,13 @@ def trajectory(
 ) -> Trajectory:
     """Follow a particle, every state enclosed, the last one to `digits` decimals.
 
-    Args:
-        scene: table and laws of motion.
-        state: the exact start.
-        n_collisions: how many collisions to follow, 0 to 1,000,000.
-        t_end: horizon [time], None for none: then a particle that is never met ends, a Horizon, at the
-            flight time 2^1000.
-        digits: decimals wanted of the last state, relative to the size of its vectors; 1 to 10,000. A place
-            that may be 0 is known to so many of the last flight's length.
-        working: decimals to work with, and no more: the path ends, undecided, where they no longer tell
-            what comes next, whatever `digits` says. By default they are doubled until they serve.
-        is_differentiated: chain the steps' Jacobians too.
+    Args: scene: table and laws of motion. state: the exact start. n_collisions: how many collisions to
+    follow, 0 to 1,000,000. t_end: horizon [time], None for none. A particle that never meets a wall then
+    ends with a Horizon at the flight time 2^1000. digits: decimals wanted of the last state, relative to
+    the size of its vectors; 1 to 10,000. A position that may be 0 has this many digits relative to the
+    length of the last flight. working: decimals to work with. The path ends with Undecided when they no
+    longer decide the next step, whatever `digits` says. By default they are doubled until they suffice.
+    is_differentiated: chain the steps' Jacobians too.
 
     Raises:
         BadInput: naming field, value and bound.
@@ -74,11 +70,11 @@ def _follow(
     digits: int | None,
     is_differentiated: bool,
 ) -> Trajectory:
-    """Follow a particle at one working precision; `digits` None: as far as that reaches.
+    """Follow a particle at one working precision; with `digits` None, as far as it reaches.
 
     Raises:
-        Undecidable: the precision does not serve for the digits asked for.
-        InvalidState: the start is none of this table.
+        Undecidable: the precision does not suffice for the digits asked for.
+        InvalidState: the start is not a state of this table.
     """
     state = checked_state(scene, state, getattr(state, "t", 0.0) if t_end is None else t_end)
     matrix = identity(arithmetic) if is_differentiated else None
@@ -99,7 +95,7 @@ def _follow(
 def _extend(
     steps: list[ProvedCollision], n_collisions: int, course: Course | Undefined, matrix: Matrix | None
 ) -> tuple[Outcome | None, Jacobian | None]:
-    """Add steps until there are enough, or something else comes; return that, else the path's Jacobian."""
+    """Add steps until there are enough, or another outcome comes. Return it, else the Jacobian."""
     if isinstance(course, Undefined):
         return course, None
     arithmetic = course.arithmetic

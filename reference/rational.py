@@ -2,13 +2,13 @@
 
 Intervals never prove an equality, so `undefined` outcomes rest on this module. Wall functions of a binary64
 state are rational where laws are constant or bang-bang. A Fourier law adds cosines, which are kept as they
-are: cos x at a rational angle x where `omega` is given; at a rational part x of a turn where `period` is, and
-then each derivative brings a factor of pi. Such a sum is 0 in these ways alone:
+are: cos x at a rational angle x if `omega` is given; at a rational part x of a turn if `period` is given,
+where each derivative brings a factor of pi. A sum is proved to be 0 by these facts:
 
     cos x and sin x at different rational angles x > 0, and 1, are linearly independent over the rationals
     (Lindemann and Weierstrass), so each factor is 0;
-    pi is transcendental, so what stands beside each power of it is 0 by itself;
-    a sum of n-th roots of unity is 0 where the polynomial of their exponents is 0 at a primitive one.
+    pi is transcendental, so the factor of each power of pi is 0;
+    a sum of n-th roots of unity is 0 if the polynomial of their exponents is 0 at a primitive root.
 """
 
 from __future__ import annotations
@@ -100,8 +100,8 @@ def _collected(terms: Iterable[tuple[Wave, Fraction]]) -> ExactNumber:
 def _is_zero_sum(factors: dict[Fraction, Fraction]) -> bool:
     """Tell whether a sum of cosines at parts of a turn is known to be 0.
 
-    Its polynomial in an n-th root of unity is multiplied by 1 - z^(n/q) for each prime q that divides n. At
-    an n-th root these are 0 where it is not primitive, and nowhere else: the sum is 0 if and only if the
+    Its polynomial in an n-th root of unity z is multiplied by 1 - z^(n/q) for each prime q that divides n.
+    These factors are 0 exactly at the roots that are not primitive. So the sum is 0 if and only if the
     product is 0 modulo z^n - 1.
     """
     n = lcm(*(x.denominator for x in factors))
@@ -198,7 +198,7 @@ def crossing_time(state: State) -> Fraction | None:
 def straight_time(scene: Scene, state: State, wall: Wall) -> Fraction | None:
     """Return the exact flight time to a straight wall of the stem at rest, when it lies ahead.
 
-    A wall being left that stands still is straight ahead of nothing: None.
+    A wall that is being left and stands still is not met: None.
     """
     if isinstance(scene, Cap) or wall == state.wall:
         return None

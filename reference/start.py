@@ -1,4 +1,4 @@
-"""The start of a path: in which part of the table it is, which wall it leaves, or why it is refused."""
+"""The start of a path: its part of the table, the wall it leaves, or why it is refused."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def depart(arithmetic: Arithmetic, scene: Scene, state: State, t_end: Fraction |
         t_end: horizon [time], exactly; None for none.
 
     Raises:
-        InvalidState: the state is none of this table; naming field, value and bound.
+        InvalidState: the state is not in this table; naming field, value and bound.
         Undecidable: when this precision cannot tell.
     """
     _check_part(scene, state)
@@ -42,7 +42,7 @@ def depart(arithmetic: Arithmetic, scene: Scene, state: State, t_end: Fraction |
         if isinstance(judged, Undefined):
             return judged
         leaving, is_flat = {wall: motion.wall(wall, arithmetic.zero).f}, judged
-    # These walls are new: the flight's work counts in full, whatever the start has asked already.
+    # New walls without cached values: the work of the flight then does not depend on the start.
     motion, in_cap = motion_at(scene, state, arithmetic), _is_in_cap(scene, state, leaving)
     end = None if t_end is None else t_end - motion.flight.instant
     return Course(scene, motion, leaving, is_flat, in_cap, end, state)
@@ -113,9 +113,9 @@ def _is_on(scene: Scene, state: State, wall: Wall, motion: MovingWalls) -> bool:
 
 
 def _judge_on_base(scene: Scene, state: State, motion: MovingWalls) -> Undefined | None:
-    """Judge a state that names no wall, level with the mouth but beside it: on the base, which is the cap's.
+    """Judge a state on y = 0 that names no wall and is beyond the mouth's edge: it is on the base.
 
-    The base ends at the arc. A sign of the arc's f that is open is no sign: the state may lie beyond.
+    The base ends at the arc. If the sign of the arc's f is open, the state may lie outside.
     """
     if _is_on(scene, state, "arc", motion):
         return Undefined("corner")
@@ -132,7 +132,7 @@ def _is_beside_mouth(scene: Scene, state: State, motion: MovingWalls) -> bool:
 
 
 def _judge_rise(scene: Scene, state: State, wall: Wall, motion: MovingWalls) -> Undefined | bool:
-    """Judge f' at the start on a wall: True when it is flat there but lifts, False when it rises."""
+    """Judge f' at the start on a wall: True if f' = 0 and f'' > 0, False if f' > 0."""
     jet = motion.wall(wall, motion.arithmetic.zero)
     rise = sign(jet.d1) if jet.d1 is not None else 0
     if rise > 0:
@@ -163,7 +163,7 @@ def _check_residual(scene: Scene, state: State, motion: MovingWalls) -> None:
     low, high = exact_ends(gap)
     least, largest = exact_ends(size)
     if wall in ("left", "right"):
-        # Where a stem is wider below, its side is as far from the axis as the state, and x rounds with that.
+        # If a stem is wider below, its side is as far from the axis as the state, and x rounds accordingly.
         least, largest = (max(end, abs(Fraction(state.x))) for end in (least, largest))
     if max(-low, high) <= Fraction(ON_WALL) * least:
         return

@@ -46,10 +46,10 @@ def next_collision(
 
     Returns:
         Collision, its time enclosed to a relative 10**-digits; Horizon; Undefined; Undecided, also
-        when the work for one step is used up; or Rejected for a state that is none of this table.
+        when the work for one step is used up; or Rejected for a state outside this table.
 
     Raises:
-        BadInput: `scene` or `digits` is none, naming field, value and bound.
+        BadInput: `scene` is not a scene or `digits` out of range, naming field, value and bound.
 
     Source: Gelfreich, Rom-Kedar, Turaev (2014), sec. 3.1. Method: isolate, exclude, refine.
     """
@@ -74,7 +74,7 @@ def checked_digits(scene: Scene, digits: int) -> int:
     """Return a number of digits as an int.
 
     Raises:
-        BadInput: the scene or the number is none.
+        BadInput: `scene` is not a scene, or `digits` not a number in range.
     """
     check_scene(scene)
     return check_count("digits", digits, 1, MAX_DIGITS)
@@ -92,9 +92,9 @@ def checked_state(scene: Scene, state: State, t_end: float) -> State:
 
 
 def require_digits(found: ProvedCollision, digits: int) -> None:
-    """Insist on the digits asked for: of dt, and of velocity and place relative to their vectors.
+    """Require the digits asked for: of dt, and of velocity and position relative to their vectors.
 
-    A place that may be 0, as on a path through the middle of a base, has digits of the flight's length.
+    A position that may be 0, as in the middle of a base, has these digits relative to the flight's length.
 
     Raises:
         Undecidable: there are fewer.

@@ -1,9 +1,9 @@
 """The laws of a scene as functions of the time since an exact instant.
 
-An instant is an exact rational, however long a trajectory is; only the time since it is enclosed.
-So it is always known, exactly, which analytic pieces of a law an enclosed time may touch: all of
-them are evaluated and united, none is chosen. Laws are continuously differentiable across their
-knots, hence the union encloses f and f' at every time asked for, and f'' at all but the knots.
+An instant is an exact rational, and only the time since it is enclosed. Exact comparisons decide which
+analytic pieces of a law an enclosed time may touch. All of them are evaluated and united. Laws are
+continuously differentiable across their knots, so the union encloses f and f' at every time, and f''
+at every time except knots.
 """
 
 from __future__ import annotations
@@ -67,7 +67,7 @@ class Timeline:
         return min(found, key=lambda knot: abs(2 * knot - low - high), default=None)
 
     def is_whole(self, length: Fraction) -> bool:
-        """Tell whether over this length every law is evaluated as all of its range."""
+        """Tell whether every law takes its whole range within this length of time, as evaluated."""
         return all(law.is_whole(length) for law in self.laws.values())
 
 

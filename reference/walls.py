@@ -43,11 +43,11 @@ class MovingWalls:
         self.flight = flight
         self.is_stem = isinstance(scene, Stem)
         self.timeline = Timeline(arithmetic, scene, flight.instant)
-        # Neighbouring intervals ask for the ends they share, and each proof for what the one before it found.
+        # Neighbouring intervals share ends, and later proofs reuse results of earlier ones.
         self._known: dict[tuple[Wall, Any], Jet] = {}
 
     def at_rest(self, s: Interval) -> MovingWalls:
-        """Return the walls for a particle that rests where the flight is at s; they share evaluated laws."""
+        """Return the walls for a particle at rest where the flight is at s. Evaluated laws are shared."""
         q, zero, still = self.flight, self.arithmetic.zero, copy(self)
         still.flight = q._replace(x=q.x + q.vx * s, y=q.y + q.vy * s, vx=zero, vy=zero)
         still._known = {}

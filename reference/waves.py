@@ -1,7 +1,7 @@
 """A Fourier law as a function of the time since an exact instant.
 
-Each wave is enclosed tightly over an interval of time, but not their sum, in which they may cancel: near a
-flat least they all but do. There Taylor's theorem knows more. About a point m inside an interval I
+Each wave is enclosed tightly over an interval of time, but their sum is not, because waves may cancel. Near a
+flat minimum they nearly do. Taylor's theorem is sharper there. About a point m inside an interval I
 
     L(I) lies in  sum over j < ORDER of L_j(m) (I - m)^j / j!  +  [-M, M] (I - m)^ORDER / ORDER!,
 
@@ -85,7 +85,7 @@ class Waves:
         return Jet(series(0), series(1), series(2))
 
     def _waves(self, s: Interval) -> list[tuple[Interval, Interval, Interval]]:
-        """Return of each wave k its frequency, value, and rate over frequency."""
+        """Return frequency, value, and rate / frequency of each wave k."""
         found, phase, zero = [], self.phase + self.omega * s, self.arithmetic.zero
         for k, frequency, a, b in self.terms:
             cos, sin = self.arithmetic.cos_sin(k * phase)

@@ -236,7 +236,7 @@ def test_figures_are_returned(moving):
     assert pictures.collision_map(moving).axes
     lines = pictures.energy_in_time(moving[0]).axes[0].lines
     drawn = [line.get_label() for line in sorted(lines, key=lambda line: -line.get_zorder())]
-    assert drawn == ["this particle", "theory, given its stays", "theory, never captured"]  # from above
+    assert drawn == ["this particle", "theory with these captures", "theory, never captured"]  # from above
 
 
 def words_of(figure) -> str:

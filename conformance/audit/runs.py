@@ -172,7 +172,7 @@ class Sample(NamedTuple):
     Attributes:
         run: what was asked for.
         s: (n, K) log E / E0 at the end of each cycle.
-        t_in, t_out: (n, K, M) captured stay around each narrowing of the mouth; nan for none.
+        t_in, t_out: (n, K, M) capture interval around each narrowing of the mouth; nan for none.
         takes_part: (n,) who is not in the island all the time.
         phase_s: (n, K, P) log E / E0 at the phases.
         phase_captured: (n, K, P) whether in the island there.
@@ -227,7 +227,7 @@ class Sample(NamedTuple):
 
     @property
     def first_stay(self) -> tuple[FloatArray, FloatArray]:
-        """Return begin and end (n,) of each one's first captured stay in the first cycle; nan for none."""
+        """Return begin and end (n,) of each one's first capture interval in the first cycle; nan for none."""
         begin, end = (np.fmin.reduce(t[:, 0], axis=1, initial=np.nan) for t in (self.t_in, self.t_out))
         return begin, end
 

@@ -218,7 +218,7 @@ def _is_wide(step: Certified) -> bool:
 
 
 def marks(scene: Scene, steps: Sequence[reference.Collision]) -> list[Mark]:
-    """Return what each collision of a proved path means for captured stays.
+    """Return what each collision of a proved path means for capture intervals.
 
     Raises:
         Unfit: an arc hit is neither proved captured nor proved not to be.

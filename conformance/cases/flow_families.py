@@ -1,9 +1,9 @@
-"""Families of flows and of long paths: what happens up to t_end, and the captured stays on the way.
+"""Families of flows and of long paths: what happens up to t_end, and the capture intervals on the way.
 
-A flow tells its end and its first captured stay only, so an error anywhere on the way shows there or not at
-all: these families end where the condition number still lets it show. Long paths need motion that
-does not forget its start exponentially fast: a fixed cap or mushroom, a breathing circle, a particle
-captured in a moving mushroom, a stem with level floor, all much faster than the walls.
+A flow tells its end and its first capture interval only, so an error anywhere on the way shows there or not
+at all: these families end where the condition number still lets it show. Long paths need motion that does
+not forget its start exponentially fast: a fixed cap or mushroom, a breathing circle, a particle captured in
+a moving mushroom, a stem with level floor, all much faster than the walls.
 """
 
 from collections.abc import Callable, Sequence
@@ -129,7 +129,7 @@ def gallery(draw: Draw, of: Scene, t: float, speed: float) -> State:
 
 
 def _stays(draw: Draw, at: dict[str, Any], looked_for: Callable[[Marks], bool]) -> Question:
-    """Look for captured stays on a long way through a mushroom."""
+    """Look for capture intervals on a long way through a mushroom."""
     of = load(draw.pick((*MOVING[:3], *FIXED))) if draw.pick((False, True)) else _narrow(draw)
     at |= {"speed": draw.power(1, 4)}
     if "site" not in at:

@@ -8,7 +8,7 @@ from conformance.cases.scenes import wire_form
 from conformance.vectors import Expectation, Kind, Level, OutcomeName, Vector
 from scene import BadInput, Scene, State, Wall
 
-# What a hit means for captured stays: an arc hit of a mushroom, captured or not; a wall of the stem; nothing.
+# What a hit means for capture intervals: arc of a mushroom, captured or free; wall of the stem; nothing.
 Mark = Literal["captured", "free", "out", ""]
 LONGEST = 1e8  # condition number up to which a trajectory is followed
 NEVER = 2.0**1000  # the horizon of paths that are asked for without one [time]

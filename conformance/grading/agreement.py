@@ -174,8 +174,8 @@ def compare_arrival(
 
     Args:
         answer: the outcome at t_end.
-        captured: begin and end of the first captured stay [time]; None without one.
-        expected: certified, with the captured stays and the collisions that begin and end them.
+        captured: begin and end of the first capture interval [time]; None without one.
+        expected: certified, with the capture intervals and the collisions that begin and end them.
         state: the start.
         physics: backward error allowed.
 
@@ -192,7 +192,7 @@ def compare_arrival(
     if judged.kind != "agrees":
         return judged
     if (captured is None) != (not expected.stays):
-        said = "none" if captured is None else f"a captured stay from {captured[0]!r} to {captured[1]!r}"
+        said = "none" if captured is None else f"a capture interval from {captured[0]!r} to {captured[1]!r}"
         first = f"the stay {expected.stays[0]} of its steps" if expected.stays else "none"
         return judged._replace(kind="numbers", why=f"captured: {said}, must be {first}")
     if captured is None:

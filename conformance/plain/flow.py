@@ -1,4 +1,4 @@
-"""The plain stepper's paths: collision after collision, and a particle's first captured stay up to t_end."""
+"""The plain stepper's paths: collision after collision, and a particle's first capture interval."""
 
 from collections.abc import Sequence
 from math import hypot, prod
@@ -14,7 +14,7 @@ MAX_COLLISIONS = 20_000  # of one particle's flow: some seconds
 
 
 class PlainPath:
-    """One particle on its way from hit to hit, and its captured stays (docs/protocol.md).
+    """One particle on its way from hit to hit, and its capture intervals (docs/protocol.md).
 
     A mutant that errs along the way, and not in a single flight, overrides a method.
     """
@@ -46,7 +46,7 @@ class PlainPath:
         return hit.state()
 
     def watch(self, hit: Collision) -> None:
-        """Note what a collision means for captured stays; the state is still that before its flight."""
+        """Note what a collision means for capture intervals; the state is still that before its flight."""
         if hit.wall in SIDES:
             self.close(hit.t)
         elif hit.wall == "arc" and isinstance(self.scene, Mushroom):
@@ -63,7 +63,7 @@ class PlainPath:
         return misses_mouth(width(scene, hit.t), hit, self.state.vx, self.state.vy)
 
     def arrival(self) -> tuple[Outcome, Captured]:
-        """Carry the particle to t_end, and return its first captured stay too; who is lost tells none."""
+        """Carry the particle to t_end, and return its first capture interval too; who is lost tells none."""
         for _ in range(self.most):
             outcome = self.advance()
             if not isinstance(outcome, Collision):
@@ -77,7 +77,7 @@ class PlainPath:
 
 
 class Stay(NamedTuple):
-    """What is known of a captured stay: its first captured arc hit, and the first after its last one."""
+    """What is known of a capture interval: its first captured arc hit, and the first after its last one."""
 
     begin: float | None = None
     end: float | None = None
@@ -124,5 +124,5 @@ def trajectory(
 def flow(
     scene: Scene, states: Sequence[State], t_end: float, step: Stepper = next_collision
 ) -> list[tuple[Outcome, Captured]]:
-    """Carry particles to t_end by any stepper: the outcome of each there, and its first captured stay."""
+    """Carry particles to t_end by any stepper: the outcome of each there, and its first capture interval."""
     return [PlainPath(scene, state, t_end, step).arrival() for state in states]

@@ -117,7 +117,7 @@ def outcomes_of(answer: Mapping[str, Any]) -> list[Any]:
 
 
 def read_outcome(answer: Mapping[str, Any], t: float = 0.0) -> Outcome:
-    """Return the outcome that an answer to `step` is, or a part of another; its captured stay is left out.
+    """Return the outcome that an answer to `step` is, or a part of another; its capture interval is left out.
 
     Args:
         answer: as `Session.ask` returns it, or one of `outcomes_of` it.

@@ -233,7 +233,7 @@ def draw_map(axes: Axes, found: Sequence[FollowedOrbit]) -> None:
 
 @rc_context(plots.STYLE)
 def energy_in_time(orbit: FollowedOrbit) -> Figure:
-    """Draw ln(E/E0) of a particle against time, over theory's line for its captured stays, which are shaded.
+    """Draw ln(E/E0) of a particle against time, with the theory; capture intervals are shaded.
 
     Of many particles: `mushrooms.figures.energies.growth`.
     """
@@ -245,7 +245,7 @@ def energy_in_time(orbit: FollowedOrbit) -> Figure:
     energies = orbit.energies()
     one: dict[str, Any] = {"color": plots.BLUE, "linewidth": 0.8, "label": "this particle", "zorder": 3}
     axes.plot(time, np.log(energies / energies[0]), **one)  # before theory, which is broad behind it
-    known = "theory, given its stays" if isinstance(orbit.scene, Mushroom) else "theory"
+    known = "theory with these captures" if isinstance(orbit.scene, Mushroom) else "theory"
     try:
         axes.plot(time, orbit.adiabatic(), color=plots.BLACK, linewidth=2.6, alpha=0.6, label=known)
         if isinstance(orbit.scene, Mushroom):

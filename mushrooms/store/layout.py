@@ -48,7 +48,7 @@ FIELDS = {
     "vy": Stored(ONE, "float64", "velocity of the last state"),
     "outcome": Stored(ONE, "int8", "how following it ended; -1: not followed yet"),
     "takes_part": Stored(ONE, "int8", "1: counts in means and shares; -1: not followed yet"),
-    "t_in": Stored(SLOTS, "float64", "begin of the captured stay around each narrowing; nan: none"),
+    "t_in": Stored(SLOTS, "float64", "begin of the capture interval around each narrowing; nan: none"),
     "t_out": Stored(SLOTS, "float64", "end of that stay"),
     "wall_counts": Stored(("particle", "wall"), "int64", "collisions with each wall"),
     "n_careful": Stored(ONE, "int64", "collisions left to the careful step"),

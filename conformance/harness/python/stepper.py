@@ -27,7 +27,7 @@ def trajectory(scene: Scene, state: State, n_collisions: int, t_end: float) -> l
 
 
 def flow(scene: Scene, states: Sequence[State], t_end: float) -> list[tuple[Outcome, plain.Captured]]:
-    """Return each particle's outcome at t_end, and (begin, end) of its first captured stay, or None."""
+    """Return each particle's outcome at t_end, and (begin, end) of its first capture interval, or None."""
     return plain.flow(scene, states, t_end)
 
 

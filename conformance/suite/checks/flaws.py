@@ -177,7 +177,7 @@ def _not_kept(scene: Scene, start: State, after: Any) -> str:
 def first_stay(
     scene: Mushroom, start: State, hits: Sequence[Outcome], t_end: float
 ) -> tuple[float, float] | None:
-    """Return the first captured stay of a path, by docs/protocol.md; UNCLEAR where rounding decides.
+    """Return the first capture interval of a path, by docs/protocol.md; UNCLEAR where rounding decides.
 
     Args:
         scene: a mushroom.

@@ -1,7 +1,7 @@
 """Questions about hits, paths and flows, and one judge for all of them.
 
 The judge (`follow`) holds every hit to the state before it (`checks.flaws`), and a flow to the path of the
-same particle: its arrival, and its captured stay. So the questions need no certified answer, and may be
+same particle: its arrival, and its capture interval. So the questions need no certified answer, and may be
 drawn: one from every octave of a size, up to the bounds below, which docs/detection.md lists.
 """
 
@@ -120,7 +120,7 @@ def distance(scene: Scene, a: Outcome, b: Outcome) -> float:
 
 
 def is_same_stay(a: Sequence[float] | None, b: Sequence[float] | None, span: float) -> bool:
-    """Tell whether two captured stays of one particle are the same, but for what bounces make of rounding."""
+    """Tell whether two capture intervals of one particle are equal up to amplified rounding."""
     if a is None or b is None:
         return a is b
     return all(abs(one - other) <= CARRIED * span for one, other in zip(a, b, strict=True))

@@ -13,9 +13,9 @@ from fast.ensemble import SHARE
 from mushrooms import output
 from mushrooms.output import locked
 from mushrooms.simulate import tell_damaged
-from mushrooms.store import conduct, engines, head
-from mushrooms.store.asked import Asked
-from mushrooms.store.blocks import is_run
+from mushrooms.store import conduct, engines
+from mushrooms.store.run import is_run
+from mushrooms.store.spec import RunSpec
 from scene.refusal import BadInput
 
 if TYPE_CHECKING:
@@ -32,14 +32,14 @@ def needed(claims: Sequence[Claim], size: Size) -> list[Simulation]:
     return [run for run in runs if run.n_particles(size)]
 
 
-def asked_of(run: Simulation, seed: int) -> Asked:
+def spec_of(run: Simulation, seed: int) -> RunSpec:
     """Return what decides the bits of a run in the audit of a seed."""
-    return Asked(scene_of(run), run.energy, run.n_cycles, run_seed(seed, run), run.phases)
+    return RunSpec(scene_of(run), run.energy, run.n_cycles, run_seed(seed, run), run.phases)
 
 
 def command(run: Simulation, size: Size, seed: int, folder: Path) -> str:
     """Return the command that makes a run where an audit in the folder takes it up with --resume."""
-    return asked_of(run, seed).command(run.scene, run.n_particles(size), folder / FOLDER / run.name)
+    return spec_of(run, seed).command(run.scene, run.n_particles(size), folder / FOLDER / run.name)
 
 
 class KeptRuns:
@@ -64,7 +64,7 @@ class KeptRuns:
             place = self._folder / run.name
             if is_run(place):
                 with locked(place):
-                    conduct.described(place, asked_of(run, seed), {})
+                    conduct.described(place, spec_of(run, seed), {})
                 if not self._resume:
                     how = "--resume takes it up, another --out begins anew"
                     raise BadInput(f"output {str(place)!r} holds a run of this audit: {how}")
@@ -86,27 +86,27 @@ class KeptRuns:
         phases: tuple[float, ...],
         progress: Callable[[int], None],
     ) -> Ensemble:
-        asked = Asked(scene, energy, n_cycles, seed, phases)
-        line = asked.command(scene.name, n_particles, place)
-        default = block_size(asked, n_particles, threads or os.cpu_count() or 1)
+        spec = RunSpec(scene, energy, n_cycles, seed, phases)
+        line = spec.command(scene.name, n_particles, place)
+        default = block_size(spec, n_particles, threads or os.cpu_count() or 1)
         with output.writable_folder(place), locked(place):
             run, damaged = conduct.opened(
-                place, asked, n_particles, None, default, line, self._resume, at_least=True
+                place, spec, n_particles, None, default, line, self._resume, at_least=True
             )
             tell_damaged(damaged)
             try:
-                head.complete(run, n_particles, engines.in_process(threads), progress)
+                conduct.complete(run, engines.in_process(threads), progress, n_particles=n_particles)
             except OSError as error:
                 why = error.strerror or error
                 raise BadInput(f"output {str(place)!r}: {why}; --resume takes up what is kept") from None
-            return head.ensemble_of(run, n_particles)
+            return run.ensemble(n_particles)
 
 
-def block_size(asked: Asked, n_particles: int, threads: int) -> int:
+def block_size(spec: RunSpec, n_particles: int, threads: int) -> int:
     """Return how many particles of a new run are kept at a time, at most all of them.
 
     At the end of a block the lanes wait for its slowest particle. Energies spread with the cycles, so that
     what takes seconds has too few particles to wait for: each thread has a share of `fast`, at the least.
     """
-    wanted = max(conduct.block_size(asked, threads), SHARE * threads) * asked.n_cycles
+    wanted = max(conduct.block_size(spec, threads), SHARE * threads) * spec.n_cycles
     return min(wanted, conduct.MOST_BLOCK, n_particles)

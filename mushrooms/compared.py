@@ -9,8 +9,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from mpmath import fp
 
-from mushrooms.store.asked import Asked
-from mushrooms.store.tally import RunTally
+from mushrooms.store.spec import RunSpec
+from mushrooms.store.tally import Gain
 from scene import Mushroom, Scene
 from scene.geometry import table_at
 from scene.laws import values
@@ -37,19 +37,24 @@ class Theory(NamedTuple):
     p_nc_error: float | None = None
 
 
-def measured(asked: Asked, tally: RunTally) -> dict[str, Any]:
+def measured(spec: RunSpec, n_captured: int, gain: Gain) -> dict[str, Any]:
     """Return m1 and p_nc as measured, with standard errors, as predicted, and the difference in errors (z).
+
+    Args:
+        spec: the run.
+        n_captured: cycles with a capture, of all particles that take part.
+        gain: ln(E/E0) of these particles after the last cycle.
 
     The prediction is that at the run's energy where rates of the scene's frozen tables are known. Elsewhere
     it is the limit of high energies, and without z: what that leaves out is not known. None is what nobody
     knows: of a cycle that does not begin where the mouth is widest too (see `begins_widest`).
     """
-    n, k = tally.gain.n, asked.n_cycles
-    mean, error = (None if x is None else x / k for x in (tally.gain.mean, tally.gain.standard_error))
-    has_island = isinstance(asked.scene, Mushroom)
-    free = 1.0 - tally.captured / (n * k) if n and has_island else None
-    free_error = None if free is None else _measured_error(asked.scene, free, n * k)
-    found = predicted(asked)
+    n, k = gain.n, spec.n_cycles
+    mean, error = (None if x is None else x / k for x in (gain.mean, gain.standard_error))
+    has_island = isinstance(spec.scene, Mushroom)
+    free = 1.0 - n_captured / (n * k) if n and has_island else None
+    free_error = None if free is None else _measured_error(spec.scene, free, n * k)
+    found = predicted(spec)
     pulls: tuple[float | None, float | None] = (None, None)
     if found is not None and n:
         expected_error = _binomial_error(found.p_nc, n * k)
@@ -69,23 +74,23 @@ def measured(asked: Asked, tally: RunTally) -> dict[str, Any]:
     }
 
 
-def limit_told(asked: Asked, summary: Mapping[str, Any]) -> str | None:
+def limit_told(spec: RunSpec, summary: Mapping[str, Any]) -> str | None:
     """Return a line that tells that theory beside a run is the limit of high energies, or why there is none.
 
     Args:
-        asked: the run.
+        spec: the run.
         summary: as `measured` returns it, or more.
     """
-    if isinstance(asked.scene, Mushroom) and not begins_widest(asked.scene):
-        return _narrow_told(asked.scene)
+    if isinstance(spec.scene, Mushroom) and not begins_widest(spec.scene):
+        return _narrow_told(spec.scene)
     # Of one particle m1 has no error, and so no z, at an energy of which theory knows all the same.
     is_of_this_energy = any(summary[z] is not None for z in ("m1_z", "p_nc_z"))
     if summary["m1_theory"] is None or summary["m1"] is None or is_of_this_energy:
         return None
-    if not asked.scene.period:  # nothing moves: energies are what they were, at any energy
+    if not spec.scene.period:  # nothing moves: energies are what they were, at any energy
         return None
     told = "m1_theory, p_nc_theory: the limit of high energies; what is left at this one is not known"
-    if not leans_inward(asked.scene):
+    if not leans_inward(spec.scene):
         told += (
             ", and falls slowly (of upright sides the variance as log(E) / sqrt(E)):"
             " where the slope is not above 0 some flights stay in the stem"
@@ -149,7 +154,7 @@ def begins_widest(scene: Mushroom) -> bool:
     return bool(now.w / now.r >= widest * (1 - SAME))
 
 
-def predicted(asked: Asked) -> Theory | None:
+def predicted(spec: RunSpec) -> Theory | None:
     """Return what theory says of a run; None where it covers nothing.
 
     What finite energy adds to a cycle goes as E^(-1/2) with the energy at which the cycle begins. Cycles are
@@ -157,19 +162,19 @@ def predicted(asked: Asked) -> Theory | None:
     """
     import theory
 
-    if not isinstance(asked.scene, Mushroom) or not begins_widest(asked.scene):
+    if not isinstance(spec.scene, Mushroom) or not begins_widest(spec.scene):
         return None
     try:
-        limit = theory.predict(asked.scene, DIGITS)
+        limit = theory.predict(spec.scene, DIGITS)
         m1, p_nc = float(limit.m1), float(limit.p_nc)
     except (BadInput, theory.NotCovered, theory.NotConverged):
         return None
     try:
-        there = theory.at_energy(asked.scene, asked.energy)
+        there = theory.at_energy(spec.scene, spec.energy)
         slower, left = there.mean_of_exp(-0.5), there.theory_error
     except (BadInput, theory.NotCovered, theory.NotConverged):
         return Theory(m1, p_nc)
-    share = math.fsum(slower**k for k in range(asked.n_cycles)) / asked.n_cycles
+    share = math.fsum(slower**k for k in range(spec.n_cycles)) / spec.n_cycles
     return Theory(
         m1 + share * (there.mean_s - m1),
         p_nc + share * (there.p_nc - p_nc),

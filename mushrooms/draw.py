@@ -123,7 +123,7 @@ def draw(
     run (simulate --out), its histogram of ln(E1/E0) is drawn with the theory. If the run has several cycles,
     the mean after each cycle is drawn too.
     """
-    from mushrooms.store.blocks import is_run
+    from mushrooms.store.run import is_run
 
     asked = (trajectory, section, boundary_map, growth, lyapunov)
     kinds = [kind for kind, is_asked in zip(PICTURES, asked, strict=True) if is_asked]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import os
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple
@@ -91,52 +91,52 @@ def simulate(
     """Simulate an ensemble. Undecided particles are counted, never guessed.
 
     Prints: particles; collisions; lost (not followed to the end); undecided (lost because the stepper could
-    not decide); careful (collisions computed by the scalar step, some tens of times slower); m1 (mean of
-    log E/E0 per cycle); p_nc (share of cycles without capture); _se (standard error); _theory (prediction);
-    _z (difference in standard errors); ns_per_collision; SHA-256 of the results. Particles that are in the
-    island for the whole run count neither in m1 nor in p_nc. docs/ensembles.md explains each line.
+    not decide); careful (collisions computed by the scalar step, some tens of times slower); collision_time
+    (mean time between two collisions of a particle); m1 (mean of log E/E0 per cycle); p_nc (share of cycles
+    without capture); _se (standard error); _theory (prediction); _z (difference in standard errors);
+    ns_per_collision; SHA-256 of the results. Particles that are in the island for the whole run count neither
+    in m1 nor in p_nc. docs/ensembles.md explains each line.
 
     With --out particles are stored block by block. After any interruption --resume continues the run, to the
     same bits. Exit code 0; 3 if a limit stopped the run; 130 if it was interrupted.
 
-    On stderr: an estimate of collisions and time, if the run takes over 20 s; a note if scalar steps took
-    over a tenth of the time; a note if the prediction is the limit of high energies.
+    On stderr: progress and the time left, after 20 s and then every minute; a note if scalar steps took over
+    a tenth of the time; a note if the prediction is the limit of high energies.
     """
     _check_ensemble(energy, cycles, seed, threads)
     limits = {"max_collisions": max_collisions, "max_seconds": max_seconds}
-    _check_stored(out, particles, block, phases=phases, resume=resume, dask=dask, **limits)
+    _check_stored(out, particles, phases=phases, resume=resume, dask=dask, block=block, **limits)
     _check_plot(plot, particles)
-    from mushrooms.store.asked import Asked
+    from mushrooms.store.spec import RunSpec
 
-    asked = Asked(load_scene(scene), energy, cycles, seed, _given_phases(phases))
-    wish = Wish(scene, asked, particles, threads, dask, block, max_collisions, max_seconds)
+    spec = RunSpec(load_scene(scene), energy, cycles, seed, _given_phases(phases))
+    wanted = Wanted(scene, spec, particles, threads, dask, block, max_collisions, max_seconds)
     if out is None:
-        run = _in_memory(wish)
-        summary = _summary(wish, run)
+        found = _in_memory(wanted)
     else:
         with output.writable_folder(out) as folder, locked(folder):
-            found = _on_disk(wish, folder, resume)
-            if found is None:
+            stored = _on_disk(wanted, folder, resume)
+            if stored is None:
                 return LIMITED
-            run, summary = found
-    print_pairs(summary, as_json)
-    tell_limit(asked, summary)
+            found = stored
+    print_pairs(found.summary, as_json)
+    tell_limit(spec, found.summary)
     if plot is not None:
-        draw_energies(plot, asked, run)
+        draw_energies(plot, spec, iter(found.gains()), particles)
     return 0
 
 
-class Wish(NamedTuple):
-    """What `simulate` was asked for, and with what it shall be done.
+class Wanted(NamedTuple):
+    """The arguments of `simulate`, checked.
 
     Attributes:
         scene: as given.
-        asked: what decides the bits.
+        spec: all that decides the bits.
         particles, threads, dask, block, max_collisions, max_seconds: see `simulate`.
     """
 
     scene: str
-    asked: Any
+    spec: Any
     particles: int
     threads: int | None
     dask: str | None
@@ -147,7 +147,19 @@ class Wish(NamedTuple):
     @property
     def name(self) -> str:
         """Return the scene's name."""
-        return self.asked.scene.name or self.scene
+        return self.spec.scene.name or self.scene
+
+    @property
+    def n_threads(self) -> int:
+        """Return how many threads there are."""
+        return self.threads or os.cpu_count() or 1
+
+
+class Found(NamedTuple):
+    """What `simulate` prints of a run, and a function that returns its ln(E/E0), block by block."""
+
+    summary: dict[str, Any]
+    gains: Callable[[], Iterable[Any]]
 
 
 def _check_ensemble(energy: float, cycles: int, seed: int, threads: int | None) -> None:
@@ -169,13 +181,13 @@ def _given_phases(text: str | None) -> tuple[float, ...]:
         raise BadInput(f"--phases = {text}, must be numbers that rise and lie in (0, 1)") from None
 
 
-def _check_stored(out: Path | None, particles: int, block: int | None, **options: Any) -> None:
+def _check_stored(out: Path | None, particles: int, **options: Any) -> None:
     """Check what only a run on disk can have."""
     check_range("--particles", particles, 1, MOST_IN_MEMORY if out is None else MOST_ON_DISK)
-    if block is not None:
+    if options["block"] is not None:
         from mushrooms.store.conduct import LARGEST_BLOCK  # it takes the stepper: most commands end before
 
-        check_range("--block", block, 1, LARGEST_BLOCK)
+        check_range("--block", options["block"], 1, LARGEST_BLOCK)
     for name, value in options.items():
         option = f"--{name.replace('_', '-')}"
         if out is None and value not in (None, False):
@@ -191,54 +203,68 @@ def _check_plot(plot: Path | None, particles: int) -> None:
     output.check_file(plot, (".svg", ".png"))
 
 
-def _in_memory(wish: Wish) -> Any:
-    """Return a run that nobody keeps."""
-    from fast.given import check_kept
-    from mushrooms.store import blocks, conduct
+def _in_memory(wanted: Wanted) -> Found:
+    """Follow an ensemble that is not stored."""
+    import numpy as np
 
-    default = conduct.block_size(wish.asked, wish.threads or os.cpu_count() or 1)
-    shape = conduct.shape_of(wish.asked, wish.particles, wish.block or default)
-    check_kept(wish.particles, wish.asked.n_cycles, 0, shape.n_narrowings)
-    run = blocks.RunInMemory(shape)
+    import fast
+    from mushrooms.store.tally import RunTally, tally_of
+    from mushrooms.store.watch import Watch
+
+    spec = wanted.spec
     try:
-        _complete(wish, run)
+        with compilation_told(), Watch(wanted.name, wanted.particles, RunTally()) as watch:
+            found = fast.simulate(
+                spec.scene,
+                n_particles=wanted.particles,
+                energy=spec.energy,
+                n_cycles=spec.n_cycles,
+                seed=spec.seed,
+                threads=wanted.threads,
+                progress=watch.update,
+            )
     except KeyboardInterrupt:
         tell_interrupted("nothing is kept without --out")
         raise
-    return run
+    with np.errstate(divide="ignore"):
+        gains = np.log(found.cycle_energies[found.takes_part()] / spec.energy)
+    tally = tally_of({**found._asdict(), "takes_part": found.takes_part()})
+    _tell_careful(tally.careful, tally.collisions, found.seconds)
+    summary = _summary(spec, tally, found.seconds * found.threads, lambda: [gains], found.sha256())
+    return Found(summary, lambda: [gains])
 
 
-def _on_disk(wish: Wish, folder: Path, resume: bool) -> tuple[Any, dict[str, Any]] | None:
-    """Bring the run in a folder to its end; return it and its summary, None if a limit came first."""
+def _on_disk(wanted: Wanted, folder: Path, resume: bool) -> Found | None:
+    """Bring the run in a folder to its end; return None if a limit came first."""
     from mushrooms.store import conduct
 
-    command = wish.asked.command(wish.scene, wish.particles, folder)
-    default = conduct.block_of_new(wish.asked, wish.particles, wish.threads or os.cpu_count() or 1)
+    spec, command = wanted.spec, wanted.spec.command(wanted.scene, wanted.particles, folder)
+    default = conduct.block_of_new(spec, wanted.particles, wanted.n_threads)
     try:
         with compilation_told():
             run, damaged = conduct.opened(
-                folder, wish.asked, wish.particles, wish.block, default, command, resume
+                folder, spec, wanted.particles, wanted.block, default, command, resume
             )
     except OSError as error:
         raise BadInput(f"output {str(folder)!r}: {error.strerror or error}") from None
     tell_damaged(damaged)
     try:
         with _told_how_to_go_on(run, command):
-            _complete(wish, run)
-            summary = _summary(wish, run)
+            _complete(wanted, run)
+            summary = _summary(spec, run.tally, run.seconds, run.gains, run.sha256())
     except conduct.LimitReached:
         return None
-    asked = wish.asked.to_data()
+    asked = spec.to_data()
     kept = {name: asked[name] for name in ("scene", "energy", "cycles", "seed")} | summary
     write_file(folder / "summary.json", json.dumps(kept) + "\n")
-    return run, summary
+    return Found(summary, run.gains)
 
 
-def tell_limit(asked: Any, summary: dict[str, Any]) -> None:
+def tell_limit(spec: Any, summary: dict[str, Any]) -> None:
     """Say on stderr where the theory printed is not that of the run's energy."""
     from mushrooms.compared import limit_told
 
-    told = limit_told(asked, summary)
+    told = limit_told(spec, summary)
     if told is not None:
         print(told, file=sys.stderr)
 
@@ -282,7 +308,7 @@ def _told_how_to_go_on(run: Any, command: str) -> Iterator[None]:
         raise BadInput(f"output {at!r}: {error.strerror or error}: {how()}") from None
 
 
-def draw_energies(path: Path, asked: Any, run: Any) -> None:
+def draw_energies(path: Path, spec: Any, gains: Iterator[Any], n_particles: int) -> None:
     """Write the histogram of ln(E1/E0) of those who take part; of several cycles the mean after each, too.
 
     Raises:
@@ -290,68 +316,55 @@ def draw_energies(path: Path, asked: Any, run: Any) -> None:
     """
     import io
 
-    import numpy as np
-
     from mushrooms.figures import energies, style
 
-    def gains() -> Iterator[Any]:
-        for number in range(run.shape.n_blocks):
-            there = run.read(number, "takes_part") == 1
-            yield np.log(run.read(number, "cycle_energies")[there] / asked.energy)
-
-    picture = energies.histogram if asked.n_cycles == 1 else energies.growth
+    picture = energies.histogram if spec.n_cycles == 1 else energies.growth
     file = io.BytesIO()
-    style.save(picture(asked.scene, asked.energy, gains(), run.shape.n_particles), file, path.suffix)
+    style.save(picture(spec.scene, spec.energy, gains, n_particles), file, path.suffix)
     write_file(path, file.getvalue())
 
 
-def _complete(wish: Wish, run: Any) -> None:
-    """Follow what a run lacks; stderr says what to expect of a long one, and which steps slowed it."""
-    from mushrooms.forecast import careful_note, forecast
+def _complete(wanted: Wanted, run: Any) -> None:
+    """Follow what a run lacks."""
     from mushrooms.store import conduct, engines
     from mushrooms.store.watch import Watch
 
-    asked, before = wish.asked, run.tally
-    n_threads = wish.threads or os.cpu_count() or 1
-    seconds, cycles_there = run.seconds, run.cycles_there
-    is_told = wish.dask is not None  # of how fast a cluster is nothing is known here
-    engine = engines.by_dask(wish.dask, wish.threads) if wish.dask else engines.in_process(wish.threads)
-    limits = conduct.RunLimits(wish.max_collisions, wish.max_seconds)
+    before, seconds = run.tally, run.seconds
+    engine = (
+        engines.by_dask(wanted.dask, wanted.threads) if wanted.dask else engines.in_process(wanted.threads)
+    )
+    limits = conduct.RunLimits(wanted.max_collisions, wanted.max_seconds)
+    with compilation_told(), Watch(wanted.name, wanted.particles, before) as watch:
+        conduct.complete(run, engine, watch.update, lambda block: watch.add(block.tally), limits=limits)
+    n_careful, n = run.tally.careful - before.careful, run.tally.collisions - before.collisions
+    _tell_careful(n_careful, n, (run.seconds - seconds) / wanted.n_threads)
 
-    with compilation_told(), Watch(wish.name, wish.particles, before) as watch:
 
-        def tick(n_done: int) -> None:
-            nonlocal is_told
-            if not is_told:  # what was asked for has been accepted, and the stepper compiled
-                is_told = True
-                n = wish.particles - before.particles
-                known = {"energy": asked.energy, "n_cycles": asked.n_cycles, "seed": asked.seed}
-                known["n_before"] = cycles_there
-                ahead = forecast(asked.scene, n_particles=n, threads=n_threads, **known)
-                if ahead is not None:
-                    print(ahead.text(n_threads), file=sys.stderr, flush=True)
-            watch.tick(n_done)
+def _tell_careful(n_careful: int, n_collisions: int, seconds: float) -> None:
+    """Say on stderr that careful steps slowed a run, if they did."""
+    from mushrooms.forecast import careful_note
 
-        conduct.complete(run, asked, engine, limits, tick, watch.followed)
-    n_careful = run.tally.careful - before.careful
-    seconds = (run.seconds - seconds) / n_threads
-    note = careful_note(n_careful, run.tally.collisions - before.collisions, seconds)
+    note = careful_note(n_careful, n_collisions, seconds)
     if note is not None:
         print(note, file=sys.stderr)
 
 
-def _summary(wish: Wish, run: Any) -> dict[str, Any]:
+def _summary(
+    spec: Any, tally: Any, seconds: float, gains: Callable[[], Iterable[Any]], sha256: str
+) -> dict[str, Any]:
+    from fast.starts import one_cycle
     from mushrooms.compared import measured
-    from mushrooms.store.digest import sha256
+    from mushrooms.store.tally import gain_of
 
-    tally = run.tally
+    flown = tally.followed * spec.n_cycles * one_cycle(spec.scene)
     return {
         "particles": tally.particles,
         "collisions": tally.collisions,
         "lost": tally.particles - tally.followed,
         "undecided": tally.undecided,
         "careful": tally.careful,
-        **measured(wish.asked, tally),
-        "ns_per_collision": run.seconds / max(tally.collisions, 1) * 1e9,
-        "sha256": sha256(run),
+        "collision_time": flown / tally.met if tally.met else None,
+        **measured(spec, tally.captured, gain_of(gains)),
+        "ns_per_collision": seconds / max(tally.collisions, 1) * 1e9,
+        "sha256": sha256,
     }

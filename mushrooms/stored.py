@@ -22,8 +22,8 @@ def export(
 
     The run is read block by block and its checksums are tested. A damaged run is refused.
     """
-    from mushrooms.store.blocks import open_run
     from mushrooms.store.export import WRITERS
+    from mushrooms.store.run import open_run
 
     output.check_file(to, tuple(WRITERS))
     write_file(to, partial(WRITERS[to.suffix], open_run(run)))
@@ -33,10 +33,10 @@ def export(
 def draw_run(folder: Path, out: Path | None) -> Path:
     """Draw the energies of a stored run, with theory; return the file's path."""
     from mushrooms.simulate import draw_energies
-    from mushrooms.store.blocks import open_run
+    from mushrooms.store.run import open_run
 
     path = out or Path(f"{folder.resolve().name}.svg")
     output.check_file(path, PLOTS)
     run = open_run(folder)
-    draw_energies(path, run.asked, run)
+    draw_energies(path, run.spec, run.gains(), run.shape.n_particles)
     return path

@@ -25,8 +25,9 @@ from fast.given import MAX_CYCLES, MOST_IN_CYCLES, MOST_TO_A_TIME
 from fast.kernel.kept import LANE_ROWS
 from mushrooms.orbits import MAX_COLLISIONS, MAX_ORBITS
 from mushrooms.simulate import MOST_IN_MEMORY, MOST_ON_DISK
-from mushrooms.store import conduct, layout
-from mushrooms.store.asked import Asked
+from mushrooms.store import conduct
+from mushrooms.store.layout import FIELDS, Shape, shape_of
+from mushrooms.store.spec import RunSpec
 from reference.arithmetic import MAX_WORK
 from scene import from_data, load
 from scene.given import MAX_HARMONICS, MAX_KNOTS
@@ -62,21 +63,21 @@ def lines_of_growth() -> str:
 def size_of_the_audit() -> str:
     n_bytes = 0
     for made in json.loads((ROOT / "docs" / "audit" / "report.json").read_bytes())["runs"]:
-        asked = Asked(
+        spec = RunSpec(
             from_data(made["scene"]), *(made[x] for x in ("energy", "cycles", "seed")), tuple(made["phases"])
         )
-        block = conduct.block_of_new(asked, made["particles"], threads=2)
-        shape = conduct.shape_of(asked, made["particles"], block)
+        block = conduct.block_of_new(spec, made["particles"], threads=2)
+        shape = shape_of(spec, made["particles"], block)
         n_bytes += -(-made["particles"] // block) * block * shape.bytes_of_a_particle
     return f"{n_bytes / 1e9:.1f} GB for a full audit"
 
 
 def words_of_whole_arrays() -> str:
-    whole = [f"`{name}`" for name, field in layout.FIELDS.items() if field.kind.startswith("int")]
+    whole = [f"`{name}`" for name, field in FIELDS.items() if field.kind.startswith("int")]
     return f"-1 in arrays of whole numbers ({', '.join(sorted(whole))})"
 
 
-BYTES = layout.Shape(1, 1, 1, 1, 0, 1).bytes_of_a_particle
+BYTES = Shape(1, 1, 1, 1, 0, 1).bytes_of_a_particle
 NS = {p["solver"]: median(p["ns"]) for p in BENCH["points"] if p["workload"] == "moving-cap-1e7"}
 TEN = {10**k: f"10^{k}" for k in range(12)}
 # What a page says of numbers that code knows: the page, and what must stand in it, its spaces as one.
@@ -121,7 +122,6 @@ FIGURES: dict[str, tuple[str, Callable[[], str]]] = {
     "lane": ("docs/ensembles.md", lambda: f"{LANE_ROWS} numbers, the array `lanes`, {8 * LANE_ROWS} bytes"),
     "room": ("docs/ensembles.md", lambda: f"{BYTES} bytes a particle for one cycle with one narrowing"),
     "audit": ("docs/audit.md", size_of_the_audit),
-    "chunks": ("docs/ensembles.md", lambda: f"{conduct.MOST_CHUNKS} times as many"),
     "blocks": ("docs/ensembles.md", lambda: f"by default {conduct.LEAST_BLOCK} to {conduct.MOST_BLOCK},"),
     "fill values": ("docs/ensembles.md", words_of_whole_arrays),
     **{f"fast.{name}": ("docs/api/fast.md", partial("fast.{} ".format, name)) for name in fast.__all__},

@@ -21,7 +21,8 @@ from conformance.audit.claims import all_claims
 from conformance.audit.runs import RUNS, SCENES, Sample, Simulation, draw, run_seed, scene_of
 from mushrooms import audit_runs
 from mushrooms.output import locked
-from mushrooms.store import blocks, conduct, head
+from mushrooms.store import conduct
+from mushrooms.store.run import StoredRun, attributes_of
 from scene import BadInput
 
 SMALL = {
@@ -126,7 +127,7 @@ def test_of_a_larger_run_only_what_the_audit_needs_is_followed(command_line, tmp
 
 def test_whatever_happens_to_a_kept_run_the_audit_sees_the_same_bits(tmp_path, monkeypatch):
     """It is broken off, harmed and widened at random."""
-    random, keep, left = np.random.default_rng(23), blocks.RunFolder.keep, 0
+    random, keep, left = np.random.default_rng(23), StoredRun.keep, 0
     run = SMALL["breathing"]
     wanted = {size: at_once(run, size) for size in ("quick", "full")}
 
@@ -137,7 +138,7 @@ def test_whatever_happens_to_a_kept_run_the_audit_sees_the_same_bits(tmp_path, m
             raise [KeyboardInterrupt, OSError(5, "input/output error")][random.integers(2)]
         keep(self, piece, block)
 
-    monkeypatch.setattr(blocks.RunFolder, "keep", sometimes)
+    monkeypatch.setattr(StoredRun, "keep", sometimes)
     for number in range(3):
         folder, size = tmp_path / str(number), "quick"
         folder.mkdir()
@@ -196,23 +197,24 @@ def test_a_run_is_held_while_the_audit_follows_it(command_line, tmp_path, monkey
     assert_refused(refused[0], "one run at a time")
 
 
-def cut_off(run, n, source):
+ensemble, missing = StoredRun.ensemble, StoredRun.missing
+
+
+def cut_off(run, n):
     """Read whole blocks."""
-    parts = [head.part(run, number, source) for number in range(-(-n // run.shape.block))]
-    return np.concatenate(parts)
+    return ensemble(run, min(-(-n // run.shape.block) * run.shape.block, run.tally.particles))
 
 
-def begun_anew(run, n):
+def begun_anew(run):
     """Follow a block from its first particle, whatever there is of it."""
-    for piece in run.missing():
-        if piece.first < n:
-            yield piece._replace(first=piece.number * run.shape.block)
+    for piece in missing(run):
+        yield piece._replace(first=piece.number * run.shape.block)
 
 
-@pytest.mark.parametrize(("name", "faulty"), [("_first", cut_off), ("missing", begun_anew)])
+@pytest.mark.parametrize(("name", "faulty"), [("ensemble", cut_off), ("missing", begun_anew)])
 def test_faulty_ways_to_read_and_widen_are_found_out(tmp_path, monkeypatch, name, faulty):
     run = SMALL["mouth"]
-    monkeypatch.setattr(head, name, faulty)
+    monkeypatch.setattr(StoredRun, name, faulty)
     sizes = ("quick", "full", "quick")
     found = [kept(tmp_path, run, size).sha256 for size in sizes]
     assert found != [at_once(run, size).sha256 for size in sizes]
@@ -283,10 +285,10 @@ def test_energies_at_phases_are_kept_drawn_and_exported(command_line, tmp_path):
 
 def test_what_is_not_there_yet_has_no_phase(tmp_path):
     """A run of three blocks of which only the second is kept."""
-    asked = audit_runs.asked_of(SMALL["mouth"], SEED)
-    run, _ = conduct.opened(tmp_path, asked, 150, 64, 64, "", False)
+    spec = audit_runs.spec_of(SMALL["mouth"], SEED)
+    run, _ = conduct.opened(tmp_path, spec, 150, 64, 64, "", False)
     piece = list(run.missing())[1]
-    run.keep(piece, audit_runs.engines.follow(asked, piece, 1))
+    run.keep(piece, audit_runs.engines.follow(spec, piece, 1))
     with xarray.open_zarr(tmp_path / "ensemble.zarr", mask_and_scale=False) as found:
         there = np.zeros(150, bool)
         there[64:128] = True
@@ -299,8 +301,8 @@ def test_without_phases_a_run_says_what_it_always_said(tmp_path):
     run = SMALL["cycles"]
     kept(tmp_path, run)
     place = tmp_path / "runs" / run.name
-    assert "phases" not in blocks.attributes_of(place)
-    assert "phases" not in audit_runs.asked_of(run, SEED).to_data()  # nor in what markers are held to
+    assert "phases" not in attributes_of(place)
+    assert "phases" not in audit_runs.spec_of(run, SEED).to_data()  # nor in what markers are held to
     assert not list(place.rglob("phase*"))
 
 

@@ -9,9 +9,13 @@ import fast
 import theory
 from conformance.audit.runs import SCENES
 from mushrooms.compared import begins_widest, leans_inward, limit_told, measured
-from mushrooms.store.asked import Asked
-from mushrooms.store.tally import RunTally, moments_of
+from mushrooms.store.spec import RunSpec
+from mushrooms.store.tally import Gain, gain_of
 from scene import Fourier, Mushroom, load
+
+
+def gain(values):
+    return gain_of(lambda: [values[:, None]])
 
 
 @pytest.mark.parametrize("n_cycles", [1, 4])
@@ -23,8 +27,7 @@ def test_energies_drawn_from_theory_agree_with_it(n_cycles, energy):
         found = theory.at_energy(load(name), energy)
         gains = found.draw(n_cycles, n, 5)[:, -1]
         captured = round((1 - found.p_nc) * n * n_cycles)
-        counts = RunTally(n, n, captured=captured, gain=moments_of(gains))
-        beside = measured(Asked(load("moving-cap"), energy, n_cycles, 1), counts)
+        beside = measured(RunSpec(load("moving-cap"), energy, n_cycles, 1), captured, gain(gains))
         assert beside["m1"] == pytest.approx(gains.mean() / n_cycles)
         assert beside["m1_se"] == pytest.approx(gains.std(ddof=1) / np.sqrt(n) / n_cycles)
         pulls[name] = abs(beside["m1_z"])
@@ -33,12 +36,11 @@ def test_energies_drawn_from_theory_agree_with_it(n_cycles, energy):
 
 
 def test_the_limit_of_high_energies_has_no_z():
-    counts = RunTally(100, 100, captured=60, gain=moments_of(np.linspace(-1, 1, 100)))
-    beside = measured(Asked(load("untilted"), 1e4, 1, 1), counts)
+    beside = measured(RunSpec(load("untilted"), 1e4, 1, 1), 60, gain(np.linspace(-1, 1, 100)))
     assert beside["m1_theory"] == pytest.approx(0.19134361)
     assert (beside["m1_z"], beside["p_nc_z"]) == (None, None)
     assert (beside["p_nc"], beside["p_nc_se"]) == (pytest.approx(0.4), pytest.approx(0.24**0.5 / 10))
-    nothing = measured(Asked(load("breathing-circle"), 1e4, 1, 1), RunTally(1, 1))
+    nothing = measured(RunSpec(load("breathing-circle"), 1e4, 1, 1), 0, Gain())
     assert set(nothing.values()) == {None}
 
 
@@ -54,7 +56,7 @@ def turned(phase):
 
 @pytest.mark.parametrize("phase", [0.0, *np.random.default_rng(23).uniform(0.1, 6.1, 6), 2 * np.pi])
 def test_theory_stands_beside_cycles_that_begin_where_its_own_do(phase):
-    beside = measured(Asked(turned(phase), 1e6, 1, 1), RunTally(10, 10))
+    beside = measured(RunSpec(turned(phase), 1e6, 1, 1), 0, Gain())
     assert (
         (beside["p_nc_theory"] is not None) == (beside["m1_theory"] is not None) == (phase in (0, 2 * np.pi))
     )
@@ -81,21 +83,19 @@ NEVER_NARROWS = Mushroom(r=1.0, h=Fourier(mean=1.0, omega=1.0, sin=(0.5,)), nu=0
 @pytest.mark.parametrize("captured", [0, 20])
 def test_a_share_of_particles_that_were_all_alike_has_an_error(captured):
     """Of twenty that are free, where one in 300 is captured, none is: it told 1 with an error of 0."""
-    counts = RunTally(20, 20, captured=captured, gain=moments_of(np.linspace(-1, 1, 20)))
-    beside = measured(Asked(turned(0.0), 1e6, 1, 1), counts)
+    beside = measured(RunSpec(turned(0.0), 1e6, 1, 1), captured, gain(np.linspace(-1, 1, 20)))
     assert beside["p_nc"] == 1 - captured / 20
     assert beside["p_nc_se"] == pytest.approx(1 / 21)
 
 
 def test_a_share_that_is_known_has_none():
-    counts = RunTally(20, 20, gain=moments_of(np.linspace(-1, 1, 20)))
-    assert measured(Asked(NEVER_NARROWS, 1e6, 1, 1), counts)["p_nc_se"] == 0.0
+    alike = gain(np.linspace(-1, 1, 20))
+    assert measured(RunSpec(NEVER_NARROWS, 1e6, 1, 1), 0, alike)["p_nc_se"] == 0.0
 
 
 def limit_of(scene):
-    counts = RunTally(100, 100, captured=60, gain=moments_of(np.linspace(-1, 1, 100)))
-    asked = Asked(scene, 1e6, 1, 1)
-    return limit_told(asked, measured(asked, counts))
+    spec = RunSpec(scene, 1e6, 1, 1)
+    return limit_told(spec, measured(spec, 60, gain(np.linspace(-1, 1, 100))))
 
 
 def test_theory_that_is_the_limit_says_so_and_where_it_is_slow():
@@ -111,10 +111,10 @@ def test_theory_that_is_the_limit_says_so_and_where_it_is_slow():
 
 def test_one_particle_of_a_scene_whose_rates_are_known_has_theory_of_its_energy():
     """Its m1 has no error and so no z, which was taken for want of a theory."""
-    alone = RunTally(1, 1, gain=moments_of(np.array([0.1])))
+    alone = gain(np.array([0.1]))
     for name, is_limit in (("moving-cap", False), ("untilted", True)):
-        asked = Asked(load(name), 1e6, 1, 1)
-        assert (limit_told(asked, measured(asked, alone)) is not None) == is_limit
+        spec = RunSpec(load(name), 1e6, 1, 1)
+        assert (limit_told(spec, measured(spec, 0, alone)) is not None) == is_limit
 
 
 def test_sides_lean_inward_at_all_times_or_not():

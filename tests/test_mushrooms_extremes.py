@@ -8,7 +8,7 @@ import pytest
 from support.refusals import assert_refused, one_line
 
 import theory
-from mushrooms import forecast
+from mushrooms.forecast import expected_collisions
 from scene import BangBang, Mushroom, load
 
 SCENES = {
@@ -78,7 +78,7 @@ def test_a_whole_number_beyond_all_bounds_is_refused(command_line, number):
 
 def test_a_run_at_the_last_floats_goes_without_a_forecast(command_line, file_of):
     scene = file_of(SCENES["slow"])
-    assert math.isnan(forecast.expected_collisions(load(scene), 100.0, 1))
+    assert math.isnan(expected_collisions(load(scene), 100.0, 1))
     assert command_line("simulate", scene, "--particles", 2, "--energy", 100.0).code == 0
 
 

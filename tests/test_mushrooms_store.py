@@ -14,14 +14,19 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from support.harm import harmed, held
+from support.harm import full_disk, harmed, held
 from support.refusals import assert_refused
 
 import fast
 import mushrooms
 from conformance.files import sealed, unsealed
 from mushrooms.output import LOCK, locked
-from mushrooms.store import asked, blocks, conduct, digest, engines
+from mushrooms.store import conduct, engines
+from mushrooms.store import run as stored
+from mushrooms.store.layout import shape_of
+from mushrooms.store.run import DESCRIPTION, DIGESTED, StoredRun
+from mushrooms.store.spec import SCHEMA, RunSpec
+from mushrooms.store.tally import gain_of
 from scene import load
 
 pytestmark = pytest.mark.usefixtures("unsynced")
@@ -72,27 +77,26 @@ def digest_of(ended):
     ],
 )
 def test_blocks_of_any_size_have_one_digest(tmp_path, name, energy, n_cycles):
-    """In memory and on disk, in order and not, with arrays that hold nothing."""
+    """In order and not, with arrays that hold nothing; m1 and its error have one set of bits too."""
     scene, random = load(name), np.random.default_rng(3)
-    wish, wanted = asked.Asked(scene, energy, n_cycles, SEED), run_at_once(name, 150, energy, n_cycles)
+    spec, wanted = RunSpec(scene, energy, n_cycles, SEED), run_at_once(name, 150, energy, n_cycles)
     tallies = set()
     for block in (7, 150, 1000, *random.integers(2, 150, 3).tolist()):
-        shape = conduct.shape_of(wish, 150, block)
         folder = tmp_path / str(block)
         folder.mkdir()
-        for run in (blocks.RunInMemory(shape), blocks.RunFolder(folder, wish, shape, "")):
-            pieces = list(run.missing())
-            for i in random.permutation(len(pieces)).tolist():
-                run.keep(pieces[i], engines.follow(wish, pieces[i], 1))
-            assert digest.sha256(run) == wanted
-            tallies.add(json.dumps(run.tally.to_data()))
+        run = StoredRun(folder, spec, shape_of(spec, 150, block), "")
+        pieces = list(run.missing())
+        for i in random.permutation(len(pieces)).tolist():
+            run.keep(pieces[i], engines.follow(spec, pieces[i], 1))
+        assert run.sha256() == wanted
+        tallies.add((run.tally, gain_of(run.gains)))
     assert len(tallies) == 1
 
 
 def test_a_run_goes_on_and_is_widened_without_following_anybody_twice(
     command_line, tmp_path, followed, whole, monkeypatch
 ):
-    keep, n_kept = blocks.RunFolder.keep, 0
+    keep, n_kept = StoredRun.keep, 0
 
     def interrupted(self, piece, block):
         nonlocal n_kept
@@ -101,7 +105,7 @@ def test_a_run_goes_on_and_is_widened_without_following_anybody_twice(
         if n_kept == 2:
             raise KeyboardInterrupt
 
-    monkeypatch.setattr(blocks.RunFolder, "keep", interrupted)
+    monkeypatch.setattr(StoredRun, "keep", interrupted)
     code, out, err = command_line(*arguments(tmp_path))
     assert (code, out) == (130, "")
     assert f"interrupted; 128 of {N} particles are kept; go on with: mushrooms simulate fermi-ulam" in err
@@ -133,9 +137,9 @@ def emptied(_content):
 @pytest.mark.parametrize(
     ("damage", "name"),
     [
-        (truncated, "ensemble.zarr/t/c.2"),
-        (flipped, "ensemble.zarr/wall_counts/c.2.0"),
-        (emptied, "ensemble.zarr/outcome/c.2"),
+        (truncated, "ensemble.zarr/t/c/2"),
+        (flipped, "ensemble.zarr/wall_counts/c/2/0"),
+        (emptied, "ensemble.zarr/outcome/c/2"),
         (truncated, "blocks/2.marker"),
         (flipped, "blocks/2.marker"),
     ],
@@ -161,31 +165,22 @@ def test_the_digest_does_not_take_a_chunk_that_changes_at_the_last_moment(
 ):
     complete = conduct.complete
 
-    def then_damaged(run, *arguments):
-        complete(run, *arguments)
-        path = run.folder / "ensemble.zarr" / "x" / "c.1"
+    def then_damaged(run, *arguments, **options):
+        complete(run, *arguments, **options)
+        path = run.folder / "ensemble.zarr" / "x" / "c" / "1"
         path.write_bytes(flipped(path.read_bytes()))
 
     monkeypatch.setattr(conduct, "complete", then_damaged)
-    assert_refused(command_line(*arguments(tmp_path)), "c.1", "damaged")
+    assert_refused(command_line(*arguments(tmp_path)), "block 1 of", "damaged")
 
 
-@pytest.mark.parametrize("n_writes", [0, 5, 22, 30])
+@pytest.mark.parametrize("n_writes", [0, 5, 22, 40])
 def test_a_full_disk_leaves_a_run_that_goes_on(command_line, tmp_path, monkeypatch, whole, n_writes):
     """Whichever file the disk has no room for: of the description, a chunk, a marker."""
-    fsync, left = os.fsync, n_writes
-
-    def full(descriptor):
-        nonlocal left
-        left -= 1
-        if left < 0:
-            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-        fsync(descriptor)
-
-    monkeypatch.setattr(os, "fsync", full)
+    full_disk(monkeypatch, n_writes)
     ended = command_line(*arguments(tmp_path))
     assert_refused(ended, "No space left on device", "go on with: mushrooms simulate")
-    monkeypatch.setattr(os, "fsync", fsync)
+    full_disk(monkeypatch, 10**9)
     assert not list(tmp_path.rglob(".*"))
     assert digest_of(command_line(*arguments(tmp_path, "--resume"))) == whole[N]
 
@@ -232,14 +227,14 @@ def test_one_writer_holds_a_folder(command_line, tmp_path, whole):
         ({}, ["--resume", "--energy", 41], ["energy = 40.0 there, 41.0 asked for"]),
         ({}, ["--resume", "--particles", 5], ["particles = 330 there, 5 asked for"]),
         ({}, ["--resume", "--block", 65], ["block = 64 there, 65 asked for"]),
-        ({"schema": 0}, ["--resume"], [f"schema = 0 there, {asked.SCHEMA} asked for"]),
+        ({"schema": 0}, ["--resume"], [f"schema = 0 there, {SCHEMA} asked for"]),
         ({"version": "0.0.9"}, ["--resume"], ["version = '0.0.9' there", repr(mushrooms.__version__)]),
         ({"scene": {"table": "stem"}}, ["--resume"], ["scene: ", "= None there"]),
     ],
 )
 def test_another_run_in_the_folder_is_refused(command_line, tmp_path, change, options, words):
     digest_of(command_line(*arguments(tmp_path)))
-    path = tmp_path / "blocks" / blocks.DESCRIPTION
+    path = tmp_path / "blocks" / DESCRIPTION
     path.write_bytes(sealed(json.dumps(json.loads(unsealed(path)) | change).encode()))
     before = held(tmp_path)
     assert_refused(command_line(*arguments(tmp_path, *options)), *words)
@@ -250,8 +245,8 @@ def test_a_description_is_there_twice_and_refused_when_both_are_damaged(
     command_line, tmp_path, followed, whole
 ):
     digest_of(command_line(*arguments(tmp_path)))
-    paths = [tmp_path / "ensemble.zarr" / "zarr.json", tmp_path / "blocks" / blocks.DESCRIPTION]
-    for path in paths:
+    paths = [tmp_path / "ensemble.zarr" / "zarr.json", tmp_path / "blocks" / DESCRIPTION]
+    for path in [*paths, tmp_path / "ensemble.zarr" / "t" / "zarr.json"]:
         content = path.read_bytes()
         path.write_bytes(truncated(content))
         followed.clear()
@@ -268,7 +263,7 @@ def test_blocks_of_another_run_do_not_count(command_line, tmp_path, followed, wh
     """Files that somebody moved here: each is as it was written, but of another seed."""
     digest_of(command_line(*arguments(tmp_path / "other", "--seed", 8)))
     (tmp_path / "other" / "ensemble.zarr" / "zarr.json").unlink()
-    (tmp_path / "other" / "blocks" / blocks.DESCRIPTION).unlink()
+    (tmp_path / "other" / "blocks" / DESCRIPTION).unlink()
     assert digest_of(command_line(*arguments(tmp_path / "other"))) == whole[N]
 
 
@@ -291,7 +286,7 @@ def test_limits_end_in_a_run_that_goes_on(command_line, tmp_path, monkeypatch, w
     assert "no block was finished" in err
     now = iter(range(10**6))
     monkeypatch.setattr(conduct, "CLOCK", lambda: float(next(now)))
-    code, out, err = command_line(*arguments(tmp_path, "--resume", "--max-seconds", 20))
+    code, out, err = command_line(*arguments(tmp_path, "--resume", "--max-seconds", 5))
     assert (code, out) == (3, "")
     assert 0 < int(err.split("passed: ")[1].split(" of")[0]) < N
     assert "no block" not in err
@@ -302,9 +297,9 @@ def test_limits_end_in_a_run_that_goes_on(command_line, tmp_path, monkeypatch, w
 def test_blocks_take_seconds_and_fit_into_memory():
     sizes = {}
     for energy, n_cycles in ((10.0, 1), (1e4, 1), (1e7, 1), (1e12, 1), (10.0, 10**6)):
-        wish = asked.Asked(load("moving-cap"), energy, n_cycles, SEED)
-        size = sizes[energy, n_cycles] = conduct.block_size(wish, 4)
-        assert size * conduct.shape_of(wish, 1, 1).bytes_of_a_particle <= conduct.BLOCK_BYTES
+        spec = RunSpec(load("moving-cap"), energy, n_cycles, SEED)
+        size = sizes[energy, n_cycles] = conduct.block_size(spec, 4)
+        assert size * shape_of(spec, 1, 1).bytes_of_a_particle <= conduct.BLOCK_BYTES
     assert list(sizes.values()) == [2**17, 2**17, 2**12, 2**9, 2]
 
 
@@ -314,16 +309,19 @@ def test_blocks_take_seconds_and_fit_into_memory():
         (["--resume"], "--resume needs --out"),
         (["--max-seconds", 1], "--max-seconds needs --out"),
         (["--dask", "tcp://here:1"], "--dask needs --out"),
+        (["--block", 8], "--block needs --out"),
         (["--block", 0], "--block = 0"),
         (["--block", "1e29"], f"must be 1 to {conduct.LARGEST_BLOCK}"),
-        (
-            ["--block", 2, "--particles", 10**8],
-            "--block = 2: 100000000 particles need blocks of at least 100",
-        ),
     ],
 )
 def test_what_needs_a_folder_says_so(command_line, options, word):
     assert_refused(command_line(*RUN, "--particles", 5, *options), word)
+
+
+def test_too_many_blocks_are_refused(command_line, tmp_path):
+    refused = command_line(*arguments(tmp_path / "a", n=10**8, block=2))
+    assert_refused(refused, "--block = 2: 100000000 particles need blocks of at least 100")
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_the_time_of_day_decides_nothing(command_line, tmp_path, monkeypatch, whole):
@@ -339,7 +337,7 @@ def test_the_time_of_day_decides_nothing(command_line, tmp_path, monkeypatch, wh
 
 def test_whatever_happens_in_whatever_order_the_bits_are_the_same(command_line, tmp_path, monkeypatch):
     """Runs that are broken off, harmed, widened and lengthened at random."""
-    random, keep = np.random.default_rng(11), blocks.RunFolder.keep
+    random, keep = np.random.default_rng(11), StoredRun.keep
     left = 0
 
     def sometimes(self, piece, block):
@@ -349,7 +347,7 @@ def test_whatever_happens_in_whatever_order_the_bits_are_the_same(command_line, 
             raise [KeyboardInterrupt, OSError(errno.EIO, "input/output error")][random.integers(2)]
         keep(self, piece, block)
 
-    monkeypatch.setattr(blocks.RunFolder, "keep", sometimes)
+    monkeypatch.setattr(StoredRun, "keep", sometimes)
     for number in range(int(os.environ.get("MUSHROOMS_HARMS", "4"))):
         folder, n, cycles, block = tmp_path / str(number), 20, 1, int(random.integers(5, 40))
         for _ in range(6):
@@ -364,20 +362,20 @@ def test_whatever_happens_in_whatever_order_the_bits_are_the_same(command_line, 
         assert digest_of(ended) == run_at_once("fermi-ulam", n, n_cycles=cycles)
 
 
-def faulty_chunks(self, number, name, _marker):
-    return [(self.folder / blocks.GROUP / self.shape.chunk(name, number)).read_bytes()]
+def faulty_sums(_array):
+    return "as it was"
 
 
-def faulty_follow(wish, piece, threads, tick=None):
-    return follow(wish, piece._replace(first=0), threads, tick)
+def faulty_follow(spec, piece, threads, tick=None):
+    return follow(spec, piece._replace(first=0), threads, tick)
 
 
 def faulty_digest(run):
     """Go block by block, all fields of each."""
     found = hashlib.sha256()
     for number in range(run.shape.n_blocks):
-        for source in digest.DIGESTED:
-            found.update(b"" if (array := digest.part(run, number, source)) is None else array.tobytes())
+        for source in DIGESTED:
+            found.update(b"" if (array := run.part(number, source)) is None else array.tobytes())
     return found.hexdigest()
 
 
@@ -387,15 +385,15 @@ follow = engines.follow
 @pytest.mark.parametrize(
     ("owner", "name", "faulty"),
     [
-        (blocks.RunFolder, "_chunks", faulty_chunks),
+        (stored, "_sum", faulty_sums),
         (engines, "follow", faulty_follow),
-        (digest, "sha256", faulty_digest),
+        (StoredRun, "sha256", faulty_digest),
     ],
 )
 def test_faulty_stores_are_found_out(command_line, tmp_path, monkeypatch, whole, owner, name, faulty):
     monkeypatch.setattr(owner, name, faulty)
     command_line(*arguments(tmp_path))
-    path = tmp_path / "ensemble.zarr" / "t" / "c.2"
+    path = tmp_path / "ensemble.zarr" / "t" / "c" / "2"
     path.write_bytes(flipped(path.read_bytes()))
     ended = command_line(*arguments(tmp_path, "--resume"))
     assert ended.code != 0 or json.loads(ended.out)["sha256"] != whole[N]

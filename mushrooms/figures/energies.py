@@ -22,7 +22,7 @@ from fast.given import given_energy
 from mushrooms.compared import begins_widest, predicted
 from mushrooms.figures import style as plots
 from mushrooms.figures.style import BLACK, BLUE, GREY, ORANGE, SKY, STYLE, FloatArray, new_figure
-from mushrooms.store.asked import Asked
+from mushrooms.store.spec import RunSpec
 from scene import Mushroom, Scene, check_scene
 from scene.refusal import BadInput, shown
 
@@ -162,7 +162,7 @@ def growth(scene: Scene, energy: float, gains: Gains, n_particles: int | None = 
     shown = np.unique(np.linspace(0, cycles[-1], min(N_MARKS, len(cycles))).astype(int))
     error = sd[shown] / np.sqrt(bars.n)
     above.errorbar(cycles[shown], mean[shown], error, fmt="o", color=BLUE, markersize=3.5, label="mean")
-    told = [(k, predicted(Asked(scene, energy, int(k), 0))) for k in shown[1:]]
+    told = [(k, predicted(RunSpec(scene, energy, int(k), 0))) for k in shown[1:]]
     if all(one is not None for _, one in told):
         line = np.array([0.0, *(k * one.m1 for k, one in told if one is not None)])
         above.plot(

@@ -17,71 +17,70 @@ from typing import Any
 import fast
 import mushrooms
 from fast import Paused
-from mushrooms.store.asked import Asked, asked_of
-from mushrooms.store.blocks import Block, Piece
 from mushrooms.store.layout import columns, paused_of
-from mushrooms.store.tally import tally_of
+from mushrooms.store.run import Block, BlockRange
+from mushrooms.store.spec import RunSpec, spec_of
 from scene.refusal import BadInput
 
 # Told of the particles done in the piece under way, again and again; what it raises ends the engine.
 Tick = Callable[[int], None]
-Following = Generator[tuple[Piece, Block], None, None]
-Engine = Callable[[Asked, Iterator[Piece], Tick], Following]
+Following = Generator[tuple[BlockRange, Block], None, None]
+Engine = Callable[[RunSpec, Iterator[BlockRange], Tick], Following]
 RETRIES = 10  # of a block whose workers fail or die
 BLOCKS_AHEAD = 2  # waiting for each thread of the cluster: no worker idles, and few blocks are in memory
 CONNECT_TIMEOUT = 10.0  # seconds in which a scheduler must answer
 POLL_INTERVAL = 0.5  # seconds after which limits are looked at while no block comes
 
 
-def follow(asked: Asked, piece: Piece, threads: int | None, tick: Tick | None = None) -> Block:
+def follow(spec: RunSpec, piece: BlockRange, threads: int | None, tick: Tick | None = None) -> Block:
     """Follow the particles of a piece.
 
     Raises:
         BadInput: as `fast.go_on`.
     """
     if piece.before is None:
-        return _followed(asked, piece.first, piece.n, threads, tick)
-    arrays, _, seconds = piece.before
-    before = paused_of(arrays, asked.energy, seconds)
+        return _followed(spec, piece.first, piece.n, threads, tick)
+    arrays, seconds = piece.before
+    before = paused_of(arrays, spec.energy, seconds)
     n = len(before.lanes)
-    longer = _followed(asked, piece.first, n, threads, tick, before)
+    longer = _followed(spec, piece.first, n, threads, tick, before)
     if n == piece.n:
         return longer
     rest = None if tick is None else lambda n_done: tick(n + n_done)
-    return longer.joined(_followed(asked, piece.first + n, piece.n - n, threads, rest))
+    return longer.joined(_followed(spec, piece.first + n, piece.n - n, threads, rest))
 
 
 def _followed(
-    asked: Asked, first: int, n: int, threads: int | None, tick: Tick | None, before: Paused | None = None
+    spec: RunSpec, first: int, n: int, threads: int | None, tick: Tick | None, before: Paused | None = None
 ) -> Block:
     """Follow particles from their starts, or from where they were."""
     paused = fast.go_on(
-        asked.scene,
+        spec.scene,
         n_particles=n,
-        energy=asked.energy,
-        n_cycles=asked.n_cycles,
-        seed=asked.seed,
+        energy=spec.energy,
+        n_cycles=spec.n_cycles,
+        seed=spec.seed,
         first=first,
         threads=threads,
-        phases=asked.phases,
+        phases=spec.phases,
         progress=tick,
         before=before,
     )
     ensemble = paused.ensemble
-    return Block(columns(paused), tally_of(ensemble), ensemble.seconds * ensemble.threads)
+    return Block(columns(paused), ensemble.seconds * ensemble.threads)
 
 
 def in_process(threads: int | None) -> Engine:
     """Return the engine that follows one block after another with all threads."""
 
-    def engine(asked: Asked, pieces: Iterator[Piece], tick: Tick) -> Following:
+    def engine(spec: RunSpec, pieces: Iterator[BlockRange], tick: Tick) -> Following:
         for piece in pieces:
-            yield piece, follow(asked, piece, threads, tick)
+            yield piece, follow(spec, piece, threads, tick)
 
     return engine
 
 
-def follow_elsewhere(data: dict[str, Any], piece: Piece, threads: int) -> Block:
+def follow_elsewhere(data: dict[str, Any], piece: BlockRange, threads: int) -> Block:
     """Follow a piece on a worker, which must be of the version that asks.
 
     Raises:
@@ -89,7 +88,7 @@ def follow_elsewhere(data: dict[str, Any], piece: Piece, threads: int) -> Block:
     """
     if data["version"] != mushrooms.__version__:
         raise BadInput(f"a worker has version {mushrooms.__version__}, must be {data['version']}")
-    return follow(asked_of(data), piece, threads)
+    return follow(spec_of(data), piece, threads)
 
 
 def by_dask(address: str, threads: int | None) -> Engine:
@@ -109,7 +108,7 @@ def by_dask(address: str, threads: int | None) -> Engine:
     except ImportError:
         raise BadInput("--dask needs dask.distributed: pip install 'oscillating-mushrooms[scale]'") from None
 
-    def engine(asked: Asked, pieces: Iterator[Piece], tick: Tick) -> Following:
+    def engine(spec: RunSpec, pieces: Iterator[BlockRange], tick: Tick) -> Following:
         try:
             resolve_address(address)  # of what is no address the client is made, and cannot be closed
             # Not the process's default: what else computes with Dask here would wait for this one, even
@@ -118,7 +117,7 @@ def by_dask(address: str, threads: int | None) -> Engine:
         except (OSError, ValueError) as error:
             raise BadInput(f"--dask = {address}: no scheduler answers ({type(error).__name__})") from None
         with _lost_in_a_line(address), client:
-            yield from _handed_out(client, asked, pieces, tick, threads or 1)
+            yield from _handed_out(client, spec, pieces, tick, threads or 1)
 
     return engine
 
@@ -147,13 +146,15 @@ def _lost_in_a_line(address: str) -> Iterator[None]:
         log.setLevel(level)
 
 
-def _handed_out(client: Any, asked: Asked, pieces: Iterator[Piece], tick: Tick, threads: int) -> Following:
+def _handed_out(
+    client: Any, spec: RunSpec, pieces: Iterator[BlockRange], tick: Tick, threads: int
+) -> Following:
     """Keep every worker busy, and yield what comes back; what is still out is dropped at the end."""
     from distributed import KilledWorker, wait
 
-    data, out, n_killed = asked.to_data(), {}, Counter[int]()
+    data, out, n_killed = spec.to_data(), {}, Counter[int]()
 
-    def submit(piece: Piece) -> None:
+    def submit(piece: BlockRange) -> None:
         future = client.submit(
             follow_elsewhere, data, piece, threads, pure=False, retries=RETRIES, priority=-piece.number
         )

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import csv
 import io
-import zipfile
 from collections.abc import Callable, Iterator
 from itertools import chain, product
 from typing import Any, BinaryIO
@@ -16,15 +15,15 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from mushrooms.output import import_arrow
-from mushrooms.store.blocks import RunFolder
-from mushrooms.store.digest import DIGESTED, part
 from mushrooms.store.layout import FIELDS, LANES, WALLS, Arrays
+from mushrooms.store.run import StoredRun
 from scene.refusal import BadInput
 
 MAX_COLUMNS = 10_000
+TIMES = ("seconds", "threads")
 
 
-def write_csv(run: RunFolder, file: BinaryIO) -> None:
+def write_csv(run: StoredRun, file: BinaryIO) -> None:
     """Write a table whose numbers read back to the same bits."""
     text = io.TextIOWrapper(file, encoding="utf-8", newline="")
     writer = csv.writer(text)
@@ -36,7 +35,7 @@ def write_csv(run: RunFolder, file: BinaryIO) -> None:
     text.detach()
 
 
-def write_parquet(run: RunFolder, file: BinaryIO) -> None:
+def write_parquet(run: StoredRun, file: BinaryIO) -> None:
     """Write a Parquet file, a row group a block.
 
     Raises:
@@ -50,38 +49,25 @@ def write_parquet(run: RunFolder, file: BinaryIO) -> None:
             writer.write_table(table)
 
 
-def write_npz(run: RunFolder, file: BinaryIO) -> None:
+def write_npz(run: StoredRun, file: BinaryIO) -> None:
     """Write the fields of `fast.Ensemble` (times left out) as numpy reads them."""
-    with zipfile.ZipFile(file, "w") as archive:
-        with archive.open("energy0.npy", "w") as member:
-            np.lib.format.write_array(member, np.array(run.asked.energy))
-        for name in DIGESTED:
-            head = part(run, 0, name)
-            if head is None:
-                continue
-            with archive.open(f"{name}.npy", "w", force_zip64=True) as member:
-                shape = (run.shape.n_particles, *head.shape[1:])
-                kind = np.lib.format.dtype_to_descr(head.dtype)
-                header = {"descr": kind, "fortran_order": False, "shape": shape}
-                np.lib.format.write_array_header_1_0(member, header)
-                for number in range(run.shape.n_blocks):
-                    array = part(run, number, name)
-                    if array is not None:
-                        member.write(np.ascontiguousarray(array).tobytes())
+    fields = run.ensemble(run.shape.n_particles)._asdict()
+    held = {name: array for name, array in fields.items() if np.size(array) and name not in TIMES}
+    np.savez(file, **held)
 
 
 # By the ending of the file. Each refuses a damaged block, a table of too many columns, a missing package.
-WRITERS: dict[str, Callable[[RunFolder, BinaryIO], None]] = {
+WRITERS: dict[str, Callable[[StoredRun, BinaryIO], None]] = {
     ".parquet": write_parquet,
     ".csv": write_csv,
     ".npz": write_npz,
 }
 
 
-def _tables(run: RunFolder) -> Iterator[Arrays]:
+def _tables(run: StoredRun) -> Iterator[Arrays]:
     """Yield each block as columns by their names."""
     shape, names = run.shape, [name for name in run.shape.names if name != LANES]
-    n_columns = sum(int(np.prod(shape.of(name, 1))) for name in names)
+    n_columns = sum(int(np.prod(shape.of(name, 1, shape.n_cycles))) for name in names)
     if n_columns > MAX_COLUMNS:
         raise BadInput(f"a table of {n_columns} columns, must be at most {MAX_COLUMNS}: read it with xarray")
     for number in range(shape.n_blocks):

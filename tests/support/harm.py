@@ -1,5 +1,30 @@
 """What a disk, a person or a bad day may do to a file of a stored run."""
 
+import errno
+import os
+
+from zarr.storage import LocalStore
+
+PUT = LocalStore.set
+
+
+def full_disk(monkeypatch, n_writes):
+    """Let a disk be full after so many files, whether zarr writes them or we do."""
+    left, put = n_writes, PUT
+
+    def take():
+        nonlocal left
+        left -= 1
+        if left < 0:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    async def full_set(self, key, value):
+        take()
+        await put(self, key, value)
+
+    monkeypatch.setattr(LocalStore, "set", full_set)
+    monkeypatch.setattr(os, "fsync", lambda _descriptor: take())
+
 
 def harmed(folder, random):
     """Do something bad to a random file of a run: a chunk, a marker, a description of an array."""

@@ -1,4 +1,4 @@
-"""What a run is asked for: that which decides its bits, and how two runs differ."""
+"""The specification of a run: all that decides its bits, and how two specifications differ."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ import mushrooms
 import scene as scenes
 from scene import Scene
 
-SCHEMA = 3  # of a stored run: raised when its files change, so that older ones are refused
+SCHEMA = 4  # of a stored run: raised when its files change, so that older ones are refused
 
 
-class Asked(NamedTuple):
-    """What decides every bit of a particle; its number does the rest.
+class RunSpec(NamedTuple):
+    """All that decides the bits of a particle, except its number.
 
     Attributes:
         scene: table and laws.
@@ -37,7 +37,7 @@ class Asked(NamedTuple):
     phases: tuple[float, ...] = ()
 
     def to_data(self) -> dict[str, Any]:
-        """Return what a store keeps of this, as JSON can hold it."""
+        """Return the specification as a store keeps it, in types of JSON."""
         return {
             "schema": SCHEMA,
             "version": mushrooms.__version__,
@@ -58,14 +58,14 @@ class Asked(NamedTuple):
         return shlex.join(["mushrooms", "simulate", scene, *words, "--resume"])
 
 
-def asked_of(data: dict[str, Any]) -> Asked:
-    """Return what a store says it was asked for."""
+def spec_of(data: dict[str, Any]) -> RunSpec:
+    """Return the specification that a store holds."""
     phases = tuple(data.get("phases", ()))
-    return Asked(scenes.from_data(data["scene"]), data["energy"], data["cycles"], data["seed"], phases)
+    return RunSpec(scenes.from_data(data["scene"]), data["energy"], data["cycles"], data["seed"], phases)
 
 
 def difference(stored: dict[str, Any], wanted: dict[str, Any]) -> str | None:
-    """Return the first thing in which a stored run is not the one wanted, both values named; None if none."""
+    """Return the first field in which a stored run differs from the one wanted, with both values; or None."""
     stored, wanted = ({**data, "phases": data.get("phases", [])} for data in (stored, wanted))
     for name, value in wanted.items():
         found = stored.get(name)
@@ -79,7 +79,7 @@ def difference(stored: dict[str, Any], wanted: dict[str, Any]) -> str | None:
 
 
 def made_by() -> dict[str, Any]:
-    """Return what a result may owe its bits to: versions, and the revision of a source tree."""
+    """Return the versions of packages and the revision of the source tree, on which bits may depend."""
     return {
         "versions": {
             "oscillating-mushrooms": mushrooms.__version__,
@@ -93,7 +93,7 @@ def made_by() -> dict[str, Any]:
 
 
 def _revision() -> str | None:
-    """Return the commit of the source tree that runs, `+` where files differ from it; None outside of one."""
+    """Return the commit of the source tree, with `+` if files differ from it; None without a tree."""
     here = Path(__file__).parent
     try:
         command = ["git", "describe", "--always", "--abbrev=40", "--dirty=+", "--exclude=*"]

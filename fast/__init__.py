@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from fast.paused import Paused, go_on
     from fast.step import next_collision
     from fast.trajectory import Collisions, trajectory
+    from fast.until import Reached, follow
 
 __all__ = [
     "Collisions",
@@ -24,8 +25,10 @@ __all__ = [
     "FineTrajectory",
     "Flow",
     "Paused",
+    "Reached",
     "fine_trajectory",
     "flow",
+    "follow",
     "go_on",
     "next_collision",
     "simulate",
@@ -39,6 +42,7 @@ _PLACES = {
     "paused": ("Paused", "go_on"),
     "step": ("next_collision",),
     "trajectory": ("Collisions", "trajectory"),
+    "until": ("Reached", "follow"),
 }
 _found: dict[str, Any] = {}
 

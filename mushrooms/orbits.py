@@ -23,9 +23,10 @@ from mpmath import fp
 import scene as scenes
 from conformance.files import write_file
 from fast.given import given_energy
+from fast.until import captured, sin_phi
 from mushrooms.output import import_arrow
 from scene import Outcome, Scene, State, Stem, Wall
-from scene.geometry import TableAt, half_width, table_at
+from scene.geometry import TableAt, table_at
 from scene.laws import is_constant, values
 from scene.mouth import start_time
 from scene.refusal import BadInput, check_count, check_number, check_seed
@@ -118,12 +119,9 @@ class FollowedOrbit:
             raise BadInput("this section is of arc hits: table is stem, must be cap or mushroom")
         states = self.states()
         index = np.array([k for k, wall in enumerate(self.walls) if wall == "arc"], int)
-        before, (t, x, y, vx, vy) = states[index], states[index + 1].T
-        r, w = values(self.scene.r, t), half_width(fp, self.scene, t)
-        # The speed of the flight that ends here; the bounce keeps the angular momentum about the centre.
-        spin = y * vx - x * vy
-        speed = np.hypot(before[:, 3], before[:, 4])
-        return Section(index, t, np.arctan2(y, x) / math.pi, spin / (speed * r), w / r)
+        t, x, y = states[index + 1, :3].T
+        sine, nu = sin_phi(self.scene, states, index)
+        return Section(index, t, np.arctan2(y, x) / math.pi, sine, nu)
 
     def phase_section(self, phase: float | None = None) -> FloatArray:
         """Return (n, 2): the phase t/T, 0 to 1, of each hit of the moving wall, and the velocity after it.
@@ -168,19 +166,9 @@ class FollowedOrbit:
         A stay begins with a captured arc hit and ends with an arc hit that is not, or below the mouth. A cap
         holds all it has.
         """
-        n = len(self.walls)
         if not isinstance(self.scene, scenes.Mushroom):
-            return np.full(n + 1, not isinstance(self.scene, Stem))
-        section = self.section()
-        at_arc = dict(zip(section.collision.tolist(), section.is_captured().tolist(), strict=True))
-        found = np.zeros(n + 1, bool)
-        # Who is captured at the first hit of the arc was so before, by way of the base too, which keeps
-        # |sin phi|; who comes through a mouth that narrows meanwhile was not.
-        first = next((k for k, wall in enumerate(self.walls) if wall != "base"), -1)
-        found[0] = self.start.y >= 0 and at_arc.get(first, False)
-        for k, wall in enumerate(self.walls):
-            found[k + 1] = at_arc[k] if wall == "arc" else found[k] and wall == "base"
-        return found
+            return np.full(len(self.walls) + 1, not isinstance(self.scene, Stem))
+        return captured(self.scene, self.states(), self.walls)
 
     def adiabatic(self) -> FloatArray:
         """Return (n + 1,): log E / E0 by theory, given when this particle is captured and when not.
@@ -195,12 +183,12 @@ class FollowedOrbit:
         import theory
 
         times = self.states()[:, 0]
-        captured = self.captured()[:-1]
+        is_captured = self.captured()[:-1]
         if isinstance(self.scene, Stem):
             raise theory.NotCovered("the theory is of caps and mushrooms: table is stem")
         rise = np.diff(-2 * np.log(values(self.scene.r, times)))
-        if isinstance(self.scene, scenes.Mushroom) and not captured.all():
-            rise = np.where(captured, rise, np.diff(theory.chaotic_zone(self.scene, times).log_energy))
+        if isinstance(self.scene, scenes.Mushroom) and not is_captured.all():
+            rise = np.where(is_captured, rise, np.diff(theory.chaotic_zone(self.scene, times).log_energy))
         return np.concatenate([[0.0], np.cumsum(rise)])
 
     def columns(self) -> dict[str, list[Any]]:

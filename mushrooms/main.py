@@ -11,12 +11,9 @@ import os
 import signal
 import sys
 import threading
-from _thread import interrupt_main
-from collections.abc import Iterator
 from concurrent.futures import BrokenExecutor
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from decimal import Decimal, InvalidOperation
-from functools import partial
 from importlib import import_module
 from itertools import pairwise
 from typing import IO, Annotated, Any, NamedTuple, NoReturn, get_args, get_origin, get_type_hints
@@ -31,7 +28,6 @@ UsageError: type[Any] = typer.BadParameter.__bases__[0]
 
 
 INTERRUPTED = 130
-SOON = 0.05  # seconds, after which a signal that was lost is sent again
 MOST = Decimal(10) ** 30  # of a whole number on the command line, written with an exponent
 NOTHING_KEPT = "nothing was written: files are written at the end"
 
@@ -193,48 +189,15 @@ def tell_interrupted(kept: str) -> None:
         print(f"{PROGRAM}: interrupted; {kept}", file=sys.stderr, flush=True)
 
 
-@contextmanager
-def _ended_as_by_keyboard() -> Iterator[None]:
-    """Let SIGTERM and a terminal that closes do what Ctrl-C does: what is half written is taken away.
+def _end_as_by_keyboard() -> None:
+    """Let SIGTERM and a terminal that closes do what Ctrl-C does, so that half-written files are removed.
 
-    A batch system ends its jobs so, and where the process just died hidden files would stay. Whoever has them
-    ignored (`nohup`) or handled otherwise keeps that.
+    A batch system ends its jobs so. A signal that is ignored (`nohup`) stays ignored.
     """
-    last, asked, told = signal.SIGINT, list[threading.Timer](), sys.unraisablehook
-    send = partial(signal.pthread_kill, threading.get_ident()) if hasattr(signal, "pthread_kill") else None
-
-    def end(number: int, _frame: object) -> NoReturn:
-        nonlocal last
-        last = signal.Signals(number)
-        raise KeyboardInterrupt
-
-    def ask_again(lost: Any) -> None:
-        # Where Python cannot hand on what is raised, in a `__del__` or the callback of a weak reference, it
-        # prints that and goes on, and nobody would hear of the signal any more.
-        if lost.exc_type is KeyboardInterrupt:
-            asked.append(threading.Timer(SOON, send or interrupt_main, (last,)))
-            asked[-1].start()
-        else:
-            told(lost)
-
-    before = {}
-    if threading.current_thread() is threading.main_thread():  # nobody else may
-        sys.unraisablehook = ask_again
+    if threading.current_thread() is threading.main_thread():  # no other thread may
         for number in (getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name)):
             if signal.getsignal(number) is signal.SIG_DFL:
-                before[number] = signal.signal(number, end)
-    try:
-        yield
-    except Exception as error:
-        if _is_of_an_interrupt(error):
-            raise KeyboardInterrupt from None
-        raise
-    finally:
-        sys.unraisablehook = told
-        for timer in asked:
-            timer.cancel()
-        for number, handler in before.items():
-            signal.signal(number, handler)
+                signal.signal(number, signal.default_int_handler)
 
 
 def _is_of_an_interrupt(error: BaseException | None) -> bool:
@@ -258,10 +221,8 @@ def run(arguments: list[str] | None = None) -> NoReturn:
 def _call(given: list[str]) -> NoReturn:
     _refuse_empty(given)
     try:
-        if given and not given[0].startswith("-"):  # the list of commands needs no library
-            _check_environment()
-        with _ended_as_by_keyboard():
-            code = typer.main.get_command(app)(given, prog_name=PROGRAM, standalone_mode=False)
+        _end_as_by_keyboard()
+        code = typer.main.get_command(app)(given, prog_name=PROGRAM, standalone_mode=False)
         sys.stdout.flush()
     except (KeyboardInterrupt, typer.Abort):
         code = INTERRUPTED  # which typer makes of Ctrl-C itself, in some versions
@@ -272,34 +233,25 @@ def _call(given: list[str]) -> NoReturn:
     except OSError as error:
         _refuse(_in_words(error))
     except ValueError as error:
-        told = _refused(error)
-        if told is None:
+        from scene.refusal import BadInput  # not above: the list of commands needs no scene
+
+        if not isinstance(error, BadInput):
             raise
-        _refuse(_in_options(told, given))
+        _refuse(_in_options(str(error), given))
     except BrokenExecutor as error:
         _refuse(f"a process of this run was ended from outside: {error}")
     except (MemoryError, RecursionError) as error:
         what = "not enough memory" if isinstance(error, MemoryError) else "nested too deeply"
         _refuse(f"{what}: {error}".removesuffix(": "))
+    except Exception as error:
+        if not _is_of_an_interrupt(error):
+            raise
+        code = INTERRUPTED
     if code == INTERRUPTED:
         kept = next((COMMANDS[word].kept for word in given if word in COMMANDS), "")
         if kept and not _told:
             tell_interrupted(kept)
     sys.exit(code if isinstance(code, int) else 0)
-
-
-def _check_environment() -> None:
-    from mushrooms.environment import check_environment  # not above: the list of commands needs no scene
-
-    check_environment()
-
-
-def _refused(error: ValueError) -> str | None:
-    """Return what an error says of bad input; None when it is an error of the program."""
-    from mushrooms.environment import in_words
-    from scene.refusal import BadInput
-
-    return str(error) if isinstance(error, BadInput) else in_words(error)
 
 
 def _make_printable() -> None:

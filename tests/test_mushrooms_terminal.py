@@ -91,34 +91,6 @@ def test_a_refusal_names_the_option_and_what_is_valid(command_line, arguments, w
     assert_refused(command_line(*arguments), *words)
 
 
-@pytest.mark.parametrize(
-    ("name", "value", "word"),
-    [
-        ("NUMBA_NUM_THREADS", "0", ">= 1"),
-        ("NUMBA_NUM_THREADS", "many", ">= 1"),
-        ("SOURCE_DATE_EPOCH", "-1", ">= 0"),
-        ("SOURCE_DATE_EPOCH", "", ">= 0"),
-    ],
-)
-def test_a_variable_that_no_library_can_use_is_refused(command_line, monkeypatch, name, value, word):
-    monkeypatch.setenv(name, value)
-    assert_refused(command_line("theory", "moving-cap"), f"{name} = '{value}'", "a whole number", word)
-    assert command_line("--help").code == 0
-
-
-def test_a_backend_that_does_not_exist_is_refused(tmp_path):
-    done = subprocess.run(
-        [sys.executable, "-m", "mushrooms", "draw", "moving-cap", "--out", "a.svg"],
-        cwd=tmp_path,
-        env={**BUFFERED, "PYTHONPATH": str(ROOT), "MPLBACKEND": "bogus"},
-        capture_output=True,
-        text=True,
-        timeout=60,
-    )
-    assert_refused((done.returncode, done.stdout, done.stderr), "MPLBACKEND = 'bogus'", "agg")
-    assert list(tmp_path.iterdir()) == []
-
-
 def test_a_file_that_the_system_refuses_is_named_without_a_number(command_line, tmp_path, monkeypatch):
     def full(_table, _suffix, file):
         raise OSError(errno.EFBIG, os.strerror(errno.EFBIG))

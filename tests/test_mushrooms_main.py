@@ -251,8 +251,8 @@ def test_simulate_prints_and_saves_the_same_result(command_line, tmp_path):
     assert (code, err) == (0, "")
     summary = json.loads(out)
     assert list(summary) == [
-        "particles", "collisions", "lost", "undecided", "careful", "collision_time", "m1", "m1_se", "m1_theory",
-        "m1_z", "p_nc", "p_nc_se", "p_nc_theory", "p_nc_z", "ns_per_collision", "sha256",
+        "particles", "collisions", "lost", "undecided", "careful", "collision_time", "m1", "m1_se",
+        "m1_theory", "m1_z", "p_nc", "p_nc_se", "p_nc_theory", "p_nc_z", "ns_per_collision", "sha256",
     ]  # fmt: skip
     names = ["blocks", "ensemble.zarr", "summary.json"]
     assert sorted(entry.name for entry in (tmp_path / "run").iterdir()) == names

@@ -1,17 +1,19 @@
-"""`python -m conformance.cases`: make the corpus, add to it, or check that it is what would be made.
+"""`python -m conformance.cases`: make the corpus, add to it, check that it is what would be made, or pack it.
 
 Some ten minutes on one core; `--jobs N` shares them out.
 """
 
 import argparse
+import hashlib
 import sys
+import zipfile
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
 from conformance.cases.corpus import FOLDER, RETIRED, added, groups, make, write
-from conformance.vectors import Vector, encode, load
+from conformance.vectors import Vector, encode, load, manifest
 from scene import BadInput
 
 
@@ -56,6 +58,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument(
         "--add", type=Path, metavar="FILE", help="add the questions of a file, and make no other"
     )
+    parser.add_argument("--archive", type=Path, metavar="FILE", help="write the corpus and verify.py as .zip")
     parser.add_argument("--jobs", type=int, default=1, metavar="N", help="processes")
     parser.add_argument("--most", type=int, metavar="N", help="at most so many vectors of each group")
     options = parser.parse_args(arguments)
@@ -63,15 +66,33 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if number is not None and number < 1:
             parser.error(f"--{name} = {number}, must be >= 1")
     try:
+        if options.archive:
+            return archive(options.archive)
         if options.check:
             return _check(options.out, _made(options.most, options.jobs))
         known = [*load("stress", FOLDER), *added(options.add)] if options.add else None
         vectors = known or _made(options.most, options.jobs)
-        manifest = write(options.out, vectors)
+        written = write(options.out, vectors)
     except (BadInput, OSError) as error:
         print(f"conformance.cases: {error}", file=sys.stderr)
         return 2
-    print(f"corpus {manifest.corpus}, {manifest.digest[:12]}: {_summary(vectors)}")
+    print(f"corpus {written.corpus}, {written.digest[:12]}: {_summary(vectors)}")
+    return 0
+
+
+def archive(path: Path) -> int:
+    """Write the published corpus and its verifier as a zip file, and print the file's SHA-256.
+
+    The same corpus makes the same bytes: members bear no date of their own.
+    """
+    files = {f"corpus/{file.name}": file for file in sorted(FOLDER.iterdir())}
+    files |= {"verify.py": FOLDER.parent / "verify.py", "LICENSE": FOLDER.parents[1] / "LICENSE"}
+    with zipfile.ZipFile(path, "w") as members:
+        for name, file in files.items():
+            if file.is_file():
+                members.writestr(zipfile.ZipInfo(name), file.read_bytes(), zipfile.ZIP_DEFLATED, 9)
+    print(f"{hashlib.sha256(path.read_bytes()).hexdigest()}  {path.name}")
+    print(f"corpus {manifest().corpus}, digest {manifest().digest}")
     return 0
 
 

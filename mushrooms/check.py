@@ -70,8 +70,7 @@ def check(
     """Test a stepper in any language. COMMAND starts it; it speaks protocol 1 on stdin and stdout.
 
     Each question is randomly mirrored and rescaled. The seed is printed, and --seed repeats a run.
-
-    A program that cannot hold a dialogue: --questions writes questions to a file, --answers grades a file.
+    Without a dialogue: --questions writes questions to a file, --answers grades the answers in a file.
 
     Exit code 0 if everything passes, 1 if something fails, 2 if the options or the suite are at fault.
     """

@@ -39,9 +39,7 @@ def check(
         list[str] | None, typer.Argument(metavar="-- COMMAND...", help="The stepper; it speaks protocol 1.")
     ] = None,
     level: Annotated[str, typer.Option(help="core, extended or stress.")] = "core",
-    seed: Annotated[
-        int | None, typer.Option(help="Seed of the random questions; default: a new one per run, printed.")
-    ] = None,
+    seed: Annotated[int | None, typer.Option(help="Seed of the questions; default: a new one.")] = None,
     timeout: Annotated[float, typer.Option(help="Seconds for one answer, compilation included.")] = 120.0,
     total: Annotated[
         float | None, typer.Option(help="Seconds for the whole run; no limit by default.")
@@ -53,8 +51,7 @@ def check(
     known_failures: Annotated[
         Path | None,
         typer.Option(
-            metavar="FILE",
-            help="Cases known to fail: ID, ID@SEED, drawn/*, fresh/*, declined/GROUP; one per line.",
+            metavar="FILE", help="Known to fail, one per line: ID, ID@SEED, drawn/*, fresh/*, declined/GROUP."
         ),
     ] = None,
     json_file: Annotated[Path | None, typer.Option("--json", metavar="FILE", help="JSON report.")] = None,
@@ -67,17 +64,13 @@ def check(
         typer.Option(metavar="PATH", help="Write the questions to a .jsonl file, or as CSV into a folder."),
     ] = None,
     answers: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="PATH", help="Grade the answers in this file; --questions names their questions."
-        ),
+        Path | None, typer.Option(metavar="PATH", help="Grade these answers to the file of --questions.")
     ] = None,
 ) -> None:
     """Test a stepper in any language. COMMAND starts it; it speaks protocol 1 on stdin and stdout.
 
     Each question is randomly mirrored and rescaled. The seed is printed, and --seed repeats a run.
-
-    A program that cannot hold a dialogue: --questions writes questions to a file, --answers grades a file.
+    Without a dialogue: --questions writes questions to a file, --answers grades the answers in a file.
 
     Exit code 0 if everything passes, 1 if something fails, 2 if the options or the suite are at fault.
     """

@@ -21,7 +21,7 @@ from conformance.audit.ensemble import (
 )
 from conformance.files import write_files
 from mushrooms import output
-from mushrooms.ensemble_table import Given, read_table
+from mushrooms.ensemble_table import read_table
 from mushrooms.terminal import check_energy, load_scene
 from scene.refusal import BadInput
 from scene.tables import Mushroom, cycle_length
@@ -107,7 +107,7 @@ def read(path: Path, scene: Mushroom, options: Options) -> tuple[GivenEnsemble, 
     unit = ENERGIES[options.energy_unit]
     energy = None if options.energy is None else options.energy * unit
     table = read_table(path, energy, unit)
-    energy = _energy(path, table, energy)
+    energy = table.energy
     form = options.energy_unit.replace("v2", "v²")
     notes = [f"energies are taken as {form}, lengths in the scene's unit: E0 = {energy:g} as v²/2"]
     if table.n_other:
@@ -121,30 +121,28 @@ def read(path: Path, scene: Mushroom, options: Options) -> tuple[GivenEnsemble, 
         _check_flags(path, captured)
     n_lost = table.n_lost
     if options.particles is not None:
-        n_there = len(table.s) + n_lost
+        n_there = len(table.sums) + n_lost
         if options.particles < n_there:
             raise BadInput(f"--particles = {options.particles}, must be at least the {n_there} rows")
         n_lost += options.particles - n_there
     x0, y0 = (table.columns.get(name) for name in ("x0", "y0"))
     flags = None if captured is None else captured.astype(bool)
     return (
-        GivenEnsemble(scene, energy, table.s, flags, t_in, t_out, x0, y0, n_lost, table.is_binary32),
+        GivenEnsemble(
+            scene,
+            energy,
+            table.sums[:, 0],
+            flags,
+            t_in,
+            t_out,
+            x0,
+            y0,
+            n_lost,
+            table.is_binary32,
+            table.sums[:, 1:] if table.sums.shape[1] > 1 else None,
+        ),
         [*notes, *told],
     )
-
-
-def _energy(path: Path, table: Given, energy: float | None) -> float:
-    if energy is not None:
-        return energy
-    if not table.energies:
-        raise BadInput(f"--ensemble {str(path)!r}: no column 'E0': give --energy, v^2/2 of every start")
-    if len(table.energies) > 1:
-        some = ", ".join(f"{value:g} ({n} rows)" for value, n in list(table.energies.items())[:4])
-        raise BadInput(
-            f"--ensemble {str(path)!r}: E0 takes {len(table.energies)} values, {some}:"
-            " an audit is of starts of one energy, --energy picks them"
-        )
-    return next(iter(table.energies))
 
 
 def _check_flags(path: Path, captured: Any) -> None:

@@ -1,36 +1,39 @@
 """Somebody's ensemble read from CSV, Parquet or Zarr, a part at a time: what the audit needs of it.
 
-A row is a particle. Columns: E0 and E1, or E0, E1, E2 ... a cycle each, or s = log E1/E0; where there are any
-t_in, t_out (of a stay in the
-cap), captured (0 or 1), and x0, y0, where it started. The names that `mushrooms export` writes will do.
+A row is a particle. Columns: E0, E1, E2 ... after each cycle, or s = log E1/E0; where there are any, t_in and
+t_out (of a stay in the cap in the first cycle), captured (0 or 1), and x0, y0, where it started. The names
+that `mushrooms export` writes will do.
 """
 
 from __future__ import annotations
 
 import csv
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator
+from itertools import islice, pairwise
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from conformance.suite.sheet_files import read_number
+from conformance.suite.sheet_files import read_number, read_rows
 from mushrooms.output import import_arrow
 from scene.refusal import BadInput, shown
 
 Floats = npt.NDArray[np.float64]
-PART = 500_000  # rows read at a time
+PART, FEW = 500_000, 20_000  # rows read at a time: as arrays, and as texts
+ONE_ENERGY = "an audit is of starts of one energy, --energy picks them"
 MAX_ENERGIES = 20  # different E0 that are listed
 SAME = 1e-6  # relative difference of E0 that writing it in few digits makes
 NOTHING = ("", "nan", "NaN", "NA", "null", "none", "None")
-FLAGS = {"true": 1.0, "false": 0.0, "t": 1.0, "f": 0.0, "yes": 1.0, "no": 0.0}
+FLAGS = {"true": "1", "false": "0", "t": "1", "f": "0", "yes": "1", "no": "0"}
+ENERGIES, GAIN = "E1", "s"
 # What a column may be called; of several narrowings or stays the earliest counts.
 NAMES = {
     "E0": r"E_?0|e0|energy_?0",
-    "E1": r"E_?1|e1|energy(_1)?",
-    "s": r"s|log_E1_E0|log_gain",
+    ENERGIES: r"E_?[1-9]\d*|e[1-9]\d*|energy(_[1-9]\d*)?",
+    GAIN: r"s|log_E1_E0|log_gain",
     "t_in": r"t_in(_1(_\d+)?)?",
     "t_out": r"t_out(_1(_\d+)?)?",
     "captured": r"(is_)?captured(_1)?",
@@ -43,17 +46,17 @@ class Given(NamedTuple):
     """What a table holds.
 
     Attributes:
-        s: (n,) log E1/E0 of those that have energies.
-        columns: t_in, t_out, captured of the same, where there are any.
-        energies: the E0 that occur, with how many; empty where there is no such column.
+        sums: (n, K) log E_k/E0 after each cycle, of those that have all energies.
+        columns: t_in, t_out, captured, x0, y0 of the same, where there are any.
+        energy: v^2/2 of every start.
         n_lost: rows without an energy.
         n_other: rows of another E0 than was asked for.
-        is_binary32: whether every E1 has 24 bits.
+        is_binary32: whether every energy after a cycle has 24 bits.
     """
 
-    s: Floats
+    sums: Floats
     columns: dict[str, Floats]
-    energies: dict[float, int]
+    energy: float
     n_lost: int
     n_other: int
     is_binary32: bool
@@ -70,181 +73,130 @@ def read_table(path: Path, energy: float | None, unit: float) -> Given:
     Raises:
         BadInput: in one line, naming the column or the place.
     """
-    parts = Parts(path, energy, unit)
-    read = _readers().get(path.suffix)
-    if (path / "ensemble.zarr").is_dir():
-        path, read = path / "ensemble.zarr", _zarr
-    if read is None:
-        raise BadInput(f"--ensemble = {str(path)!r}, must be a .csv or .parquet file, or a .zarr folder")
+    label, n_lost, n_other, is_binary32 = f"--ensemble {str(path)!r}", 0, 0, True
+    kept: dict[str, list[Floats]] = {"sums": []}
+    energies: dict[float, int] = {}
+    for part in _parts(path, label):
+        start = np.full(len(next(iter(part.values()))), energy, float)
+        if "E0" in part:
+            start = part.pop("E0") * unit
+            chosen = _chosen(label, start, energy, energies)
+            n_other += int(np.sum(~chosen))
+            start, part = start[chosen], {name: column[chosen] for name, column in part.items()}
+        elif energy is None:
+            raise BadInput(f"{label}: column 'E0' is missing, and so is --energy, v^2/2 of every start")
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+            after = part.pop(ENERGIES, np.empty((0, 1)))
+            sums = part.pop(GAIN)[:, None] if GAIN in part else np.log(after * unit / start[:, None])
+            is_binary32 &= bool(after.size) and not np.any(np.abs(after - after.astype(np.float32)) > 0)
+        followed = np.isfinite(sums).all(axis=1)
+        n_lost += int(np.sum(~followed))
+        for name, column in {**part, "sums": sums}.items():
+            kept.setdefault(name, []).append(column[followed])
+    whole = {name: np.concatenate(kept.pop(name) or [np.empty((0, 1))]) for name in list(kept)}
+    sums = whole.pop("sums")
+    if len(sums) < 2:
+        raise BadInput(f"{label}: {len(sums)} energies, must be 2 or more")
+    if len(energies) > 1:
+        some = ", ".join(f"{value:g} ({n} rows)" for value, n in list(energies.items())[:4])
+        raise BadInput(f"{label}: E0 takes {len(energies)} values, {some}: {ONE_ENERGY}")
+    energy = next(iter(energies), energy)
+    assert energy is not None
+    return Given(sums, whole, energy, n_lost, n_other, is_binary32 and len(np.unique(sums[:1000])) > 2)
+
+
+def _chosen(
+    label: str, start: Floats, energy: float | None, energies: dict[float, int]
+) -> npt.NDArray[np.bool_]:
+    """Tell which rows have the E0 that is asked for; where none is, count the rows of each E0."""
+    bad = start[~(np.isfinite(start) & (start > 0))]
+    if len(bad):
+        raise BadInput(f"{label}: E0 = {bad[0]}, must be finite and > 0")
+    if energy is not None:
+        return np.abs(start / energy - 1) < SAME
+    for value, n in zip(*np.unique(start, return_counts=True), strict=True):
+        near = next((e for e in energies if abs(e / value - 1) < SAME), float(value))
+        energies[near] = energies.get(near, 0) + int(n)
+        if len(energies) > MAX_ENERGIES:
+            low, high = min(energies), max(energies)
+            raise BadInput(f"{label}: E0 takes many values, {low:g} to {high:g}: {ONE_ENERGY}")
+    return np.ones(len(start), bool)
+
+
+def _parts(path: Path, label: str) -> Iterator[dict[str, Floats]]:
+    """Yield parts of a table by what its columns are: (n, K) the energies after K cycles, (n,) all others."""
+    readers = {".csv": _csv, ".parquet": _parquet, ".zarr": _zarr}
+    path = path / "ensemble.zarr" if (path / "ensemble.zarr").is_dir() else path
+    if path.suffix not in readers:
+        raise BadInput(f"{label}, must be a .csv or .parquet file, or a .zarr folder")
     try:
-        for columns in read(path):
-            parts.add(columns)
+        for raw in readers[path.suffix](path, label):
+            named = {what: [raw[name] for name in names] for what, names in _named(label, raw).items()}
+            stacked = {what: np.column_stack(columns) for what, columns in named.items()}
+            yield {
+                what: column if what == ENERGIES else np.asarray(np.fmin.reduce(column, axis=1))
+                for what, column in stacked.items()
+            }
     except OSError as error:
-        raise BadInput(f"--ensemble {str(path)!r} cannot be read: {error.strerror or error}") from None
-    return parts.given()
+        raise BadInput(f"{label} cannot be read: {error.strerror or error}") from None
 
 
-class Parts:
-    """Gathers an ensemble from parts of a table."""
-
-    def __init__(self, path: Path, energy: float | None, unit: float) -> None:
-        self._path, self._energy, self._unit = path, energy, unit
-        self._kept: dict[str, list[Floats]] = {}
-        self._energies: dict[float, int] = {}
-        self._n_lost = self._n_other = 0
-        self._is_binary32: bool | None = None
-
-    def add(self, columns: Mapping[str, Floats]) -> None:
-        """Add some rows, by the names of NAMES."""
-        start = self._starts(columns)
-        if start is not None and self._energy is not None and "E0" in columns:
-            chosen = np.abs(start / self._energy - 1) < SAME
-            self._n_other += int(np.sum(~chosen))
-            columns = {name: column[chosen] for name, column in columns.items()}
-            start = start[chosen]
-        with np.errstate(divide="ignore", invalid="ignore"):
-            if "s" in columns:
-                s = columns["s"]
-            else:
-                assert start is not None
-                s = np.log(columns["E1"] * self._unit / start)
-                finite = columns["E1"][np.isfinite(columns["E1"])]
-                is_single = bool(np.all(finite == finite.astype(np.float32)))
-                self._is_binary32 = is_single and self._is_binary32 is not False
-        followed = np.isfinite(s)
-        self._n_lost += int(np.sum(~followed))
-        for name, column in {**columns, "s": s}.items():
-            if name not in ("E0", "E1"):
-                self._kept.setdefault(name, []).append(column[followed])
-
-    def given(self) -> Given:
-        """Return all rows together, as one array a column."""
-        whole: dict[str, Floats] = {}
-        for name in list(self._kept):
-            whole[name] = np.concatenate(self._kept.pop(name))
-        s = whole.pop("s", np.empty(0))
-        if len(s) < 2:
-            raise BadInput(f"--ensemble {str(self._path)!r}: {len(s)} energies, must be 2 or more")
-        is_single = bool(self._is_binary32) and len(np.unique(s[:1000])) > 2
-        return Given(s, whole, self._energies, self._n_lost, self._n_other, is_single)
-
-    def _starts(self, columns: Mapping[str, Floats]) -> Floats | None:
-        if "E0" not in columns:
-            if "E1" in columns and self._energy is None:
-                raise BadInput(f"--ensemble {str(self._path)!r}: column 'E0' is missing, and so is --energy")
-            return np.full(len(columns["E1"]), self._energy) if "E1" in columns else None
-        start = columns["E0"] * self._unit
-        bad = start[~(np.isfinite(start) & (start > 0))]
-        if len(bad):
-            raise BadInput(f"--ensemble {str(self._path)!r}: E0 = {bad[0]}, must be finite and > 0")
-        for value, n in zip(*np.unique(start, return_counts=True), strict=True):
-            near = next((e for e in self._energies if abs(e / value - 1) < SAME), float(value))
-            self._energies[near] = self._energies.get(near, 0) + int(n)
-            if len(self._energies) > MAX_ENERGIES and self._energy is None:
-                low, high = min(self._energies), max(self._energies)
-                raise BadInput(
-                    f"--ensemble {str(self._path)!r}: E0 takes many values, {low:g} to {high:g}:"
-                    " an audit is of starts of one energy, --energy picks them"
-                )
-        return start
-
-
-def _named(path: Path, names: Iterable[str]) -> dict[str, list[str]]:
-    """Return the columns of a table that are needed, by what they are."""
-    names = list(names)
-    twice = [name for i, name in enumerate(names) if name in names[:i]]
+def _named(label: str, names: Iterable[str]) -> dict[str, list[str]]:
+    """Return the columns of a table that are needed, by what they are; cycles in their order."""
+    given = list(names)
+    names = sorted(given, key=lambda name: (len(name), name))
+    twice = [name for name, following in pairwise(names) if name == following]
     found = {what: [n for n in names if re.fullmatch(form, n)] for what, form in NAMES.items()}
-    found = {what: columns for what, columns in found.items() if columns}
     problem = f"column {shown(twice[0])} stands twice" if twice else ""
-    if not problem and "E1" not in found and "s" not in found:
-        problem = f"column 'E1' is missing, as is 's'; it has {', '.join(names[:8])}"
+    if not (problem or found[ENERGIES] or found[GAIN]):
+        problem = f"column 'E1' is missing, as is 's'; it has {', '.join(given[:8])}"
     if problem:
-        raise BadInput(f"--ensemble {str(path)!r}: {problem}")
-    return found
+        raise BadInput(f"{label}: {problem}")
+    return {what: columns for what, columns in found.items() if columns}
 
 
-def _earliest(columns: Sequence[Floats]) -> Floats:
-    return np.asarray(np.fmin.reduce(columns)) if len(columns) > 1 else columns[0]
+def _wanted(label: str, names: Iterable[str]) -> list[str]:
+    return [name for columns in _named(label, names).values() for name in columns]
 
 
-def _csv(path: Path) -> Iterator[dict[str, Floats]]:
-    """Yield parts of a CSV file: by Arrow where it is installed and the numbers are decimal."""
+def _csv(path: Path, label: str) -> Iterator[dict[str, Floats]]:
+    """Yield parts of a CSV file: by Arrow where it is installed and numbers are decimal, else by cells."""
     with path.open(encoding="utf-8-sig", newline="") as file:
         header = [name.strip() for name in next(csv.reader(file), [])]
-    named = _named(path, header)
+    wanted, n_done = _wanted(label, header), 0
     try:
-        from pyarrow import ArrowInvalid
         from pyarrow import csv as arrow
-    except ImportError:
-        yield from _csv_slowly(path, named)
-        return
-    wanted = [name for names in named.values() for name in names]
-    options = arrow.ConvertOptions(
-        include_columns=wanted, column_types=dict.fromkeys(wanted, "float64"), null_values=list(NOTHING)
-    )
-    done = 0
-    try:
+
+        options = arrow.ConvertOptions(
+            include_columns=wanted, column_types=dict.fromkeys(wanted, "float64"), null_values=list(NOTHING)
+        )
         reading = arrow.ReadOptions(column_names=header, skip_rows=1, block_size=2**24)
         for batch in arrow.open_csv(path, reading, convert_options=options):
-            table = {name: batch.column(name).to_numpy(zero_copy_only=False) for name in wanted}
-            yield {what: _earliest([table[name] for name in names]) for what, names in named.items()}
-            done += len(batch)
-    except ArrowInvalid:
-        yield from _csv_slowly(path, named, done)
+            yield {name: batch.column(name).to_numpy(zero_copy_only=False) for name in wanted}
+            n_done += len(batch)
+    except (ImportError, ValueError):  # the cells tell what is wrong, and where
+        rows = islice(read_rows(path, label, wanted), n_done, None)
+        while some := list(islice(rows, FEW)):
+            yield {name: np.array([_cell(place, name, row[name]) for place, row in some]) for name in wanted}
 
 
-def _csv_slowly(path: Path, named: Mapping[str, list[str]], first: int = 0) -> Iterator[dict[str, Floats]]:
-    """Yield parts of a CSV file from a row on, cell by cell: other numbers, and what is wrong where."""
-    with path.open(encoding="utf-8-sig", newline="") as file:
-        reader = csv.reader(file)
-        header = [name.strip() for name in next(reader)]
-        rows: list[list[float]] = []
-        try:
-            for number, row in enumerate(reader):
-                if number < first or not row:
-                    continue
-                place = f"--ensemble {str(path)!r}:{reader.line_num}"
-                if len(row) != len(header):
-                    raise BadInput(f"{place}: {len(row)} cells, must be {len(header)} as in the first row")
-                cells = dict(zip(header, row, strict=True))
-                rows.append([_cell(place, name, cells[name]) for names in named.values() for name in names])
-                if len(rows) == PART:
-                    yield _columns(rows, named)
-                    rows = []
-        except (csv.Error, UnicodeDecodeError) as error:
-            raise BadInput(f"--ensemble {str(path)!r}:{reader.line_num}: {error}") from None
-    if rows:
-        yield _columns(rows, named)
+def _cell(place: str, name: str, word: str) -> float:
+    return float("nan") if word in NOTHING else read_number(place, name, FLAGS.get(word.lower(), word))
 
 
-def _columns(rows: list[list[float]], named: Mapping[str, list[str]]) -> dict[str, Floats]:
-    table = iter(np.array(rows, dtype=np.float64).T)
-    return {what: _earliest([next(table) for _ in names]) for what, names in named.items()}
-
-
-def _cell(place: str, name: str, text: str) -> float:
-    word = text.strip()
-    if word in NOTHING:
-        return float("nan")
-    return FLAGS[word.lower()] if word.lower() in FLAGS else read_number(place, name, word)
-
-
-def _parquet(path: Path) -> Iterator[dict[str, Floats]]:
+def _parquet(path: Path, label: str) -> Iterator[dict[str, Floats]]:
     arrow, parquet = import_arrow()
     try:
         with parquet.ParquetFile(path) as file:
-            named = _named(path, file.schema_arrow.names)
-            wanted = [name for names in named.values() for name in names]
+            wanted = _wanted(label, file.schema_arrow.names)
             for batch in file.iter_batches(PART, columns=wanted):
-                table = {
-                    name: batch.column(name).cast("float64").to_numpy(zero_copy_only=False) for name in wanted
-                }
-                yield {what: _earliest([table[name] for name in names]) for what, names in named.items()}
+                columns = ((name, batch.column(name).cast("float64")) for name in wanted)
+                yield {name: column.to_numpy(zero_copy_only=False) for name, column in columns}
     except (arrow.ArrowInvalid, arrow.ArrowNotImplementedError) as error:
-        raise BadInput(f"--ensemble {str(path)!r}: {error}") from None
+        raise BadInput(f"{label}: {error}") from None
 
 
-def _zarr(path: Path) -> Iterator[dict[str, Floats]]:
+def _zarr(path: Path, label: str) -> Iterator[dict[str, Floats]]:
     try:
         import zarr
     except ImportError:
@@ -252,22 +204,12 @@ def _zarr(path: Path) -> Iterator[dict[str, Floats]]:
     try:
         group: Any = zarr.open_group(path, mode="r")
     except (OSError, ValueError, KeyError) as error:
-        raise BadInput(f"--ensemble {str(path)!r} is no Zarr group: {error}") from None
-    named = _named(path, sorted(group.array_keys()))
-    arrays = {what: group[names[0]] for what, names in named.items()}
-    lengths = {what: array.shape[0] if array.ndim else 1 for what, array in arrays.items()}
+        raise BadInput(f"{label} is no Zarr group: {error}") from None
+    arrays = {name: group[name] for name in _wanted(label, group.array_keys())}
+    lengths = {name: array.shape[0] if array.ndim else 1 for name, array in arrays.items()}
     if len(set(lengths.values())) > 1:
-        raise BadInput(f"--ensemble {str(path)!r}: arrays of {lengths} particles, must be as many in each")
+        raise BadInput(f"{label}: arrays of {lengths} particles, must be as many in each")
     for first in range(0, next(iter(lengths.values())), PART):
-        table = {what: np.asarray(array[first : first + PART], np.float64) for what, array in arrays.items()}
-        # Of several cycles the first; of several narrowings in it the earliest stay.
-        yield {what: _first_cycle(values) for what, values in table.items()}
-
-
-def _first_cycle(values: Floats) -> Floats:
-    values = values[:, 0] if values.ndim > 1 else values
-    return np.asarray(np.fmin.reduce(values, axis=1)) if values.ndim > 1 else values
-
-
-def _readers() -> dict[str, Callable[[Path], Iterator[dict[str, Floats]]]]:
-    return {".csv": _csv, ".parquet": _parquet, ".zarr": _zarr}
+        part = {name: np.asarray(array[first : first + PART], np.float64) for name, array in arrays.items()}
+        is_first = {name: name.startswith("energy") or values.ndim == 1 for name, values in part.items()}
+        yield {name: values if is_first[name] else values[:, 0] for name, values in part.items()}

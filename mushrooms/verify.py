@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import csv
 import json
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import msgspec
 import typer
@@ -14,9 +13,6 @@ from conformance.files import write_file
 from mushrooms import output
 from mushrooms.terminal import load_scene
 from scene.refusal import BadInput, shown
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
 
 FIELDS = ("t", "x", "y", "vx", "vy")
 
@@ -56,32 +52,26 @@ def _read(file: Path, scene: str | None) -> str:
             if scene is not None:
                 raise BadInput(f"--scene = {scene!r} would change nothing here: the JSON file has its scene")
             return file.read_text("utf-8")
-        with file.open(encoding="utf-8-sig", newline="") as lines:
-            rows = list(csv.DictReader(line for line in lines if line.strip() and line[0] != "#"))
+        if scene is None:
+            raise BadInput(f"trajectory {str(file)!r}: a CSV file needs --scene")
+        return json.dumps(_of_rows(file, scene))
     except OSError as error:
         raise BadInput(f"trajectory {str(file)!r} cannot be read: {error.strerror}") from None
-    except (ValueError, csv.Error) as error:
+    except UnicodeDecodeError as error:
         raise BadInput(f"trajectory {str(file)!r}: {error}") from None
-    if scene is None:
-        raise BadInput(f"trajectory {str(file)!r}: a CSV file needs --scene")
-    return json.dumps(_of_rows(file, rows, scene))
 
 
-def _of_rows(file: Path, rows: Sequence[dict[str, Any]], scene: str) -> dict[str, Any]:
-    from conformance.suite.sheet_files import read_number
-    from scene import to_data
+def _of_rows(file: Path, scene: str) -> dict[str, Any]:
+    from conformance.cases.scenes import wire_form
+    from conformance.suite.sheet_files import read_number, read_rows
 
-    found = to_data(load_scene(scene))
-    for name in FIELDS:
-        if not rows or name not in rows[0]:
-            raise BadInput(f"trajectory {str(file)!r}: column {name!r} is missing, or there is no row")
-    states = []
-    for number, row in enumerate(rows, 1):
-        place = f"trajectory {str(file)!r}, row {number}"
-        numbers = {name: read_number(place, name, row[name] or "") for name in FIELDS}
-        states.append({**numbers, "wall": (row.get("wall") or "").strip() or None})
-    wire = {name: law for name, law in found.items() if name not in ("name", "notes")}
-    return {"scene": wire, "state": states[0], "steps": states[1:]}
+    label, states = f"trajectory {str(file)!r}", []
+    for place, row in read_rows(file, label, FIELDS):
+        numbers = {name: read_number(place, name, row[name]) for name in FIELDS}
+        states.append({**numbers, "wall": row.get("wall") or None})
+    if not states:
+        raise BadInput(f"{label}: there is no row")
+    return {"scene": wire_form(load_scene(scene)), "state": states[0], "steps": states[1:]}
 
 
 def _judged(file: Path, text: str) -> list[tuple[str, str, str]]:

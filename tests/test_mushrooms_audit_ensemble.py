@@ -107,6 +107,17 @@ def test_a_seeded_sample_of_theory_passes_in_other_units_and_forms(tmp_path, rig
     assert np.array_equal(same.s, here.s)
 
 
+def test_further_cycles_are_held_to_sums(tmp_path):
+    """Sums of cycles drawn from theory pass; an engine that begins each cycle anew at E0 is refuted."""
+    s = theory.at_energy(SCENE, 1e6).draw(3, 20_000, 5)
+    for later, verdict in ((s, "confirmed"), (np.diff(s, axis=1, prepend=0.0), "refuted")):
+        energies = {f"E{k + 1}": 1e6 * np.exp(later[:, k]) for k in (2, 0, 1)}
+        path = write(tmp_path / "e.csv", {"E0": np.full(len(s), 1e6), **energies})
+        result = audit_ensemble.conducted(path, SCENE, None, PLAIN._replace(energy=None))
+        assert result.verdict == verdict, result.checks
+        assert {"log E2/E0", "mean of log E3/E0"} <= {check.what for check in result.checks}
+
+
 def test_both_directions_are_held_to_the_reversal_identity():
     there = scenes.load("moving-cap-reversed")
     here, back = (

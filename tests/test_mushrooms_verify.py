@@ -57,7 +57,11 @@ def test_json_is_what_the_verifier_takes(rows, tmp_path, command_line):
         ('{"scene": {"table": "cap", "r": 1.0}, "steps": [], "steps": []}', [], "a key comes twice"),
         ("t,x,y,vx,vy\n0,0,0,1,1", [], "needs --scene"),
         ("t,x,y,vx\n0,0,0,1", ["--scene", "moving-cap"], "column 'vy' is missing"),
-        ("t,x,y,vx,vy\n0,0,0,1,up", ["--scene", "moving-cap"], "row 1: vy = 'up', must be a finite number"),
+        (
+            "t,x,y,vx,vy\n0,0,0,1,up",
+            ["--scene", "moving-cap"],
+            "steps.csv':2: vy = 'up', must be a finite number",
+        ),
     ],
 )
 def test_a_bad_trajectory_is_refused_in_one_line(content, options, message, tmp_path, command_line):

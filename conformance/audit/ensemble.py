@@ -1,4 +1,4 @@
-"""One cycle of somebody else's ensemble, held to what the paper claims for its scene.
+"""Somebody else's ensemble, held to what the paper claims for its scene: one cycle, and sums of several.
 
 Each figure is a `Check`, as in the audit: theory at that energy with what it leaves out, the departure that a
 sample of this size would show, and the power against a rival. A scene without frozen rates has the adiabatic
@@ -19,9 +19,19 @@ from mpmath import fp
 
 import theory
 from conformance.audit.claim import Check
-from conformance.audit.claims.broadened import PEAK_DENSITY, SKEWED, WIDENED
+from conformance.audit.claims.broadened import DRAWN_SEED, PEAK_DENSITY, SKEWED, WIDENED, Sums
 from conformance.audit.runs import MAX_LOST, BoolArray, FloatArray
-from conformance.audit.tolerances import Cdf, close, fits, mean, share, spread, stated
+from conformance.audit.tolerances import (
+    N_SIGMA,
+    Cdf,
+    close,
+    critical_gap,
+    fits,
+    mean,
+    share,
+    spread,
+    stated,
+)
 from scene import Mushroom
 from scene.geometry import half_width, table_at
 from scene.laws import bounds, values
@@ -32,6 +42,7 @@ SHARE, PEAK = "p_nc: share never captured", "log E_nc: mean of log E1/E0 of the 
 FREE, CAPTURED = "log E1/E0 of the never captured", "log E1/E0 of the captured"
 TIMES, RELEASE = "times of capture", "nu at release less nu at capture"
 STARTS, OUTWARD = "share of the starts in the cap", "mean of (x^2 + y^2) / r^2 of these"
+MOST_DRAWN = 2_000_000  # gains of cycles that are drawn from theory
 MOST_SORTED = 1_000_000  # values whose whole distribution is tested; of more, evenly spaced ones
 N_TIMES = 4096  # of a cycle, at which laws are looked at
 FEW = 20  # particles below which a group says nothing
@@ -51,6 +62,7 @@ class GivenEnsemble(NamedTuple):
         x0, y0: (n,) where each started; None where not given.
         n_lost: rows without an energy, or particles without a row.
         is_binary32: whether every energy is a number of 24 bits.
+        later: (n, K - 1) log E_k / E0 after the second of K cycles and each that follows; None for one cycle.
     """
 
     scene: Mushroom
@@ -63,6 +75,7 @@ class GivenEnsemble(NamedTuple):
     y0: FloatArray | None = None
     n_lost: int = 0
     is_binary32: bool = False
+    later: FloatArray | None = None
 
 
 class Expected(NamedTuple):
@@ -168,6 +181,7 @@ def checks(given: GivenEnsemble, theirs: Expected) -> list[Check]:
         *_energies(given, theirs),
         *_captures(given, theirs),
         *_stays(given, theirs),
+        *_later(given, theirs),
     ]
 
 
@@ -279,6 +293,27 @@ def _stays(given: GivenEnsemble, theirs: Expected) -> Iterator[Check]:
         0.0,
         band=WAITS * wait * steepest,
     )
+
+
+def _later(given: GivenEnsemble, theirs: Expected) -> Iterator[Check]:
+    """Hold log E_k/E0 after each further cycle to sums of k cycles, drawn from theory where it has rates."""
+    if given.later is None:
+        return
+    n_cycles = 1 + given.later.shape[1]
+    n_drawn = MOST_DRAWN // n_cycles
+    found = theory.at_energy(given.scene, given.energy) if theirs.has_rates else None
+    drawn = None if found is None else found.draw(n_cycles, n_drawn, DRAWN_SEED)
+    for k, total in enumerate(given.later.T, 2):
+        what, band = f"log E{k}/E0", k * theirs.bands["mean_s"]
+        if drawn is None:
+            yield close(f"mean of {what}", mean(total), k * theirs.mean_s, band=band)
+            continue
+        sums = Sums(drawn[:, k - 1])
+        own = N_SIGMA * sums.sd / n_drawn**0.5
+        rival = ("no growth", 0.0) if theirs.mean_s else None
+        yield close(f"mean of {what}", mean(total), sums.mean, band=band + own, against=rival)
+        shape = PEAK_DENSITY * band / sums.sd + critical_gap(n_drawn)
+        yield fits(what, _some(total), sums.cdf, band=shape, scale=0.3)
 
 
 def _some(values: FloatArray) -> FloatArray:

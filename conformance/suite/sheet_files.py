@@ -106,9 +106,8 @@ def read_answers(path: Path) -> Answers:
         if path.stat().st_size > MAX_SIZE:
             raise BadInput(f"answers {str(path)!r}: larger than {MAX_SIZE} bytes")
         return _of_tables([path], path) if path.suffix == ".csv" else _of_lines(path)
-    except (OSError, UnicodeDecodeError) as error:
-        why = getattr(error, "strerror", None) or "it is no UTF-8"
-        raise BadInput(f"answers {str(path)!r} cannot be read: {why}") from None
+    except OSError as error:
+        raise BadInput(f"answers {str(path)!r} cannot be read: {error.strerror}") from None
 
 
 def _key(sheet: Sheet) -> bytes:
@@ -187,8 +186,8 @@ def _of_tables(files: Sequence[Path], source: Path) -> Answers:
     rows: dict[int, list[dict[str, Any]]] = {}
     places: dict[int, str] = {}
     for path in files:
-        last = None
-        for place, cells in _cells(path):
+        last, label = None, f"answers {str(path)!r}"
+        for place, cells in read_rows(path, label, NEEDED, (*NEEDED, *OPTIONAL)):
             seq = _whole(place, cells["seq"])
             if seq != last:
                 _once(places, seq, place)
@@ -198,30 +197,40 @@ def _of_tables(files: Sequence[Path], source: Path) -> Answers:
     return _some(Answers(str(source), lines, None, (), places))
 
 
-def _cells(path: Path) -> Iterator[tuple[str, dict[str, str]]]:
-    """Yield the rows of a table by the names of its columns, each with its place."""
+def read_rows(
+    path: Path, label: str, needed: Sequence[str], known: Sequence[str] | None = None
+) -> Iterator[tuple[str, dict[str, str]]]:
+    """Yield the rows of a CSV file by the names of its columns, each with its place; # begins a comment.
+
+    Args:
+        path: of the file.
+        label: what messages begin with.
+        needed: columns that must be there.
+        known: columns that there may be; None for any.
+
+    Raises:
+        BadInput: naming the column, or the place.
+    """
     with path.open(encoding="utf-8-sig", newline="") as file:
-        reader = csv.reader(line for line in file if line.strip() and not line.startswith("#"))
+        reader = csv.reader(file)
+        rows = (row for row in reader if any(map(str.strip, row)) and not row[0].startswith("#"))
         try:
-            names = [name.strip() for name in next(reader, [])]
-            _check_columns(path, names)
-            for row in reader:
-                place = f"answers {str(path)!r}:{reader.line_num}"
+            names = [name.strip() for name in next(rows, [])]
+            lacking = [name for name in needed if name not in names]
+            twice = [name for i, name in enumerate(names) if name in names[:i]]
+            unknown = [name for name in names if known and name not in known]
+            for fault, found in (("is missing", lacking), ("stands twice", twice), ("is unknown", unknown)):
+                if found:
+                    which = f"; columns are {', '.join(known)}" if known else ""
+                    raise BadInput(f"{label}: column {shown(found[0])} {fault}{which}")
+            for row in rows:
+                place = f"{label}:{reader.line_num}"
                 if len(row) != len(names):
                     raise BadInput(f"{place}: {len(row)} cells, must be {len(names)} as in the first row")
-                yield place, {name: cell.strip() for name, cell in zip(names, row, strict=True)}
-        except csv.Error as error:
-            raise BadInput(f"answers {str(path)!r}:{reader.line_num}: {error}") from None
-
-
-def _check_columns(path: Path, names: Sequence[str]) -> None:
-    lacking = [name for name in NEEDED if name not in names]
-    twice = [name for i, name in enumerate(names) if name in names[:i]]
-    unknown = [name for name in names if name not in (*NEEDED, *OPTIONAL)]
-    for fault, found in (("is missing", lacking), ("stands twice", twice), ("is unknown", unknown)):
-        if found:
-            which = f"columns are {', '.join((*NEEDED, *OPTIONAL))}, the last {len(OPTIONAL)} as needed"
-            raise BadInput(f"answers {str(path)!r}: column {shown(found[0])} {fault}; {which}")
+                yield place, dict(zip(names, map(str.strip, row), strict=True))
+        except (csv.Error, UnicodeDecodeError) as error:
+            why = error if isinstance(error, csv.Error) else "it is no UTF-8"
+            raise BadInput(f"{label}:{reader.line_num}: {why}") from None
 
 
 def _outcome(place: str, cells: Mapping[str, str]) -> dict[str, Any]:

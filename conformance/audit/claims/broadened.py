@@ -176,9 +176,7 @@ class Sums:
         mean, sd: of log E_n/E0.
     """
 
-    def __init__(self, run: Simulation, n_cycles: int) -> None:
-        found = theory.at_energy(scene_of(run), run.energy)
-        drawn = found.draw(n_cycles, N_DRAWN, DRAWN_SEED)[:, -1]
+    def __init__(self, drawn: FloatArray) -> None:
         self.values: FloatArray = np.sort(drawn)
         self.mean, self.sd = float(drawn.mean()), float(drawn.std())
 
@@ -192,4 +190,5 @@ class Sums:
 @cache
 def summed(run: str, n_cycles: int) -> Sums:
     """Return the sums of n cycles of a run."""
-    return Sums(RUNS[run], n_cycles)
+    found = theory.at_energy(scene_of(RUNS[run]), RUNS[run].energy)
+    return Sums(found.draw(n_cycles, N_DRAWN, DRAWN_SEED)[:, -1])

@@ -3,8 +3,9 @@
 What can be held to a clock on this side of the pipe: all repeats together last no longer than the answer took
 to come; each further repeat makes the answer come later by what it is said to last; following another start
 costs no more than following the same again (nothing is remembered); twice the collisions last longer. The
-load of a machine delays answers now and then: a clock is taken for false only when every one of N_TRIES tries
-says so, except that no load makes the sum of the repeats longer than the wait.
+load of a machine delays answers: further tries are made after a pause, of longer paths that delays matter
+less to, and a clock is taken for false only when every one of N_TRIES says so; except that no load makes the
+sum of the repeats longer than the wait.
 Not seen: a program that does part of its work outside its clock, once for each question.
 """
 
@@ -30,7 +31,8 @@ MAX_COLLISIONS, MAX_REPEAT = 20_000, 1000
 AMPLE = 3.0  # times as long as one repeat must the answer to many take
 FACTOR = 4.0  # between nanoseconds that are said and those that are measured
 GROWTH = 1.3  # twice the collisions last longer by this, at least
-N_TRIES = 5
+LONG = 0.2  # seconds, after which a path is made no longer
+N_TRIES, PAUSE = 6, 0.25  # seconds: before the second try, twice as long before the third, and so on
 DRIFT = 1.01  # of two clocks of one machine
 # ns, two ticks of a clock that counts milliseconds: it says one for a short repeat during which it went on.
 # So much may be said too much of an answer; `honest_clock` asks for long ones, where it is nothing.
@@ -123,41 +125,40 @@ def honest_clock(side: Implementation, scene: Scene, state: State) -> bool:
     while one.seconds < READABLE and n < MAX_COLLISIONS:
         n *= 2
         one = timed(session, scene, _other(state, n.bit_length()), n, 1)
-    repeat, many = 8, timed(session, scene, state, n, 8)
-    while many.seconds < AMPLE * one.seconds and repeat < MAX_REPEAT:
-        repeat = min(4 * repeat, MAX_REPEAT)
-        many = timed(session, scene, state, n, repeat)
-    truth = _last_collision(session, scene, state, n)
-    if isinstance(scene, Cap) and abs(many.last.t - truth.t) > LATE * abs(truth.t - state.t):
-        raise Trouble(
-            "fail", f"{n} collisions last to {many.last.t:.6g} by time, to {truth.t:.6g} by trajectory"
-        )
+    last, truth = timed(session, scene, state, n, 1).last, _last_collision(session, scene, state, n)
+    if isinstance(scene, Cap) and abs(last.t - truth.t) > LATE * abs(truth.t - state.t):
+        raise Trouble("fail", f"{n} collisions last to {last.t:.6g} by time, to {truth.t:.6g} by trajectory")
     objection = ""
     for i in range(N_TRIES):
+        time.sleep(i * PAUSE)
         ones = [timed(session, scene, _other(state, 3 * i + k), n, 1) for k in range(3)]
-        many = timed(session, scene, state, n, repeat)
-        twice = timed(session, scene, state, 2 * n, 3)
-        if not (objection := _objection(n, ones, many, twice)):
+        if not (objection := _objection(session, scene, state, n, ones)):
             return True
+        if ones[0].seconds < LONG:
+            n = min(4 * n, MAX_COLLISIONS)
     raise Trouble("fail", objection)
 
 
-def _objection(n: int, ones: list[Timing], many: Timing, twice: Timing) -> str:
+def _objection(session: Session, scene: Scene, state: State, n: int, ones: list[Timing]) -> str:
     """Say what the nanoseconds of one try do not bear out; empty when they do."""
-    repeat = len(many.ns)
+    soonest, repeat = min(one.seconds for one in ones), 8
+    many = timed(session, scene, state, n, repeat)
+    while many.seconds < AMPLE * soonest and repeat < MAX_REPEAT:
+        repeat = min(4 * repeat, MAX_REPEAT)
+        many = timed(session, scene, state, n, repeat)
+    twice = timed(session, scene, state, 2 * n, 3)
     said = sum(many.ns) / repeat  # a load delays some repeats, here as there
-    each = 1e9 * (many.seconds - min(one.seconds for one in ones)) / (repeat - 1)
+    each = 1e9 * (many.seconds - soonest) / (repeat - 1)
     if not FACTOR * said > each:
         later = f"makes the answer {each:.0f} ns later"
         return f"a repeat of {n} collisions is said to last {said:.0f} ns, and {later}"
     if said > FACTOR * each:
         return f"{repeat} repeats are said to last {said:.0f} ns each, but are answered as if made once"
-    anew = min(one.ns[0] for one in ones)
-    if anew > FACTOR * min(many.ns):
-        again = f"the same again {min(many.ns)} ns: it is not followed anew"
-        return f"a new start is said to last {anew} ns, {again}"
-    if not min(twice.ns) > GROWTH * min(many.ns):
-        return f"{n} collisions are said to last {min(many.ns)} ns, {2 * n} of them {min(twice.ns)} ns"
+    anew, again = min(one.ns[0] for one in ones), min(many.ns)
+    if anew > FACTOR * again:
+        return f"a new start is said to last {anew} ns, the same again {again} ns: it is not followed anew"
+    if not min(twice.ns) > GROWTH * again:
+        return f"{n} collisions are said to last {again} ns, {2 * n} of them {min(twice.ns)} ns"
     return ""
 
 

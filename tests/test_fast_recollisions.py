@@ -15,7 +15,7 @@ from support.truth import proved_step
 import fast
 import reference
 from conformance.grading.agreement import compare
-from scene import BangBang, Cap, Collision, Fourier, Mushroom, Rejected, State, Undecided, Undefined
+from scene import BangBang, Cap, Collision, Fourier, Mushroom, Rejected, State, Stem, Undecided, Undefined
 
 N_RECOLLISIONS = int(os.environ.get("MUSHROOMS_RECOLLISIONS", "25"))
 
@@ -101,3 +101,24 @@ def test_on_its_wall_is_judged_by_todays_size():
     assert isinstance(
         fast.next_collision(breathing, State(math.pi, 0.0, 1e-3, 0.0, -1.0, "arc"), 9.0), Collision
     )
+
+
+HARDLY = BangBang(
+    ((0.0, 1.0), (1.0, 1.0 + 2.0**-30), (2.0, 1.0), (2.0 + 2.0**-8, 1.0 + 2.0**-30), (4.0, 1.0))
+)
+
+
+@pytest.mark.parametrize(
+    ("scene", "state"),
+    [
+        (Stem(w=1.0, h=HARDLY), State(1.0, 0.0, -1.0 + 2.0**-22, 0.0, 2.0**-34, "floor")),
+        (Stem(w=HARDLY, h=1.0), State(1.0, 1.0 - 2.0**-22, -0.5, -(2.0**-34), 0.0, "right")),
+        (Cap(r=HARDLY), State(1.0, 0.0, 1.0 - 2.0**-22, 0.0, -(2.0**-34), "arc")),
+    ],
+)
+def test_a_start_off_its_wall_by_more_than_the_wall_moves_is_not_out_of_its_reach(scene, state):
+    """f(0) is taken out of f, so the wall that is left is met where the place says that it never comes."""
+    found = fast.next_collision(scene, state, 100.0)
+    assert isinstance(found, Collision)
+    assert compare(found, proved_step(scene, state, 100.0), state, 4.0).kind == "agrees"
+    assert found.dt == pytest.approx(2.0**-5, rel=1e-6)

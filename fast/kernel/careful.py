@@ -69,8 +69,10 @@ def still_reach(wall, f, slope, still, vx, vy):
 @part
 def reached_at_least(wall, s, f, slope, moved, particle, scene, anchors):
     """Return a time, at least `moved`, before which a wall is not met, from what holds of it for long."""
-    vx, vy = particle.vx, particle.vy
-    reach = reach_time(wall, particle.x + vx * s, particle.y + vy * s, vx, vy, scene.bounds)
+    vx, vy, off = particle.vx, particle.vy, 0.0
+    if wall == particle.wall:  # f(0) is taken out of f: the wall is that much nearer than the place says
+        off, _ = wall_residual(wall, particle.x, particle.y, scene, anchors)
+    reach = reach_time(wall, particle.x + vx * s, particle.y + vy * s, vx, vy, max(off, 0.0), scene.bounds)
     moved = max(moved, (s + reach) * BEFORE)
     still = wall_rest(wall, s, scene, anchors)
     if s + still > moved:

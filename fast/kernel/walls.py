@@ -188,16 +188,17 @@ def wall_rest(wall, s, scene, anchors):
 
 
 @part
-def reach_time(wall, x, y, vx, vy, bounds):
+def reach_time(wall, x, y, vx, vy, off, bounds):
     """Return a time before which the particle cannot reach what the wall ever sweeps.
 
-    This lets a slow particle cross the middle of the table in one step. Rounding is taken off the gap.
+    This lets a slow particle cross the middle of the table in one step. Rounding is taken off the gap, and
+    `off`, by which f is less than the place says.
     """
     if wall == ARC:
         inner = bounds[RADIUS, LOWEST]
         gap = inner * inner - (x * x + y * y)
         v2 = vx * vx + vy * vy
-        gap -= SAFETY * inner * inner
+        gap -= SAFETY * inner * inner + off
         if gap <= 0.0 or v2 == 0.0:
             return np.inf if gap > 0.0 else 0.0
         q = x * vx + y * vy
@@ -218,7 +219,7 @@ def reach_time(wall, x, y, vx, vy, bounds):
             gap = bounds[WIDTH, LOWEST] - max(abs(m_lo), abs(m_hi)) * bounds[DEPTH, HIGHEST] - position
             speed = outward
         size = bounds[WIDTH, LOWEST] + max(abs(m_lo), abs(m_hi)) * bounds[DEPTH, HIGHEST] + abs(x)
-    gap -= SAFETY * size
+    gap -= SAFETY * size + off
     if gap <= 0.0:
         return 0.0
     if speed <= 0.0:

@@ -107,6 +107,7 @@ class Fields:
 
     Attributes, of the uncaptured, weighted by diffusion:
         forgotten: share of the variance without `shear` that it takes off.
+        depleted: share of diffusion that depletion takes off.
         turned: mean square of what walls turn velocities by in a `crossing`.
         is_known: whether their speeds are among those for which rates were measured.
         n_blocks: of path, each twice as long as the memory, in a cycle.
@@ -120,8 +121,8 @@ class Fields:
         # Phase volume is kept: those who lag by J(E) are captured likelier by J + dJ / d log E.
         likelier = lag + (_at_speeds(rates.lag, faster) / faster - lag) / NUDGE
         square = _at_speeds(rates.square, speed) / speed**2
-        depleted = 1 + _at_speeds(rates.depletion, speed) / rates.diffusion.sum(axis=1)
-        diffusion = np.maximum(depleted, 0.0)[None] * rates.diffusion.T[:, None]
+        left = 1 + _at_speeds(rates.depletion, speed) / rates.diffusion.sum(axis=1)
+        diffusion = np.maximum(left, 0.0)[None] * rates.diffusion.T[:, None]
         # What kicks remember is a direction: walls that turn it the other way kick with the other sign.
         kicks, turning = np.sign(cycle.shear) * np.sqrt(diffusion / speed), np.abs(cycle.shear)
         spread = self._remembered(kicks, speed, turning).sum(axis=0)
@@ -141,6 +142,7 @@ class Fields:
         memory = rates.diffusion @ np.array(MEMORIES) / rates.diffusion.sum(axis=1)
         steady = self._remembered(kicks, speed, np.zeros(N_TIMES))[:, uncaptured]
         self.forgotten = 1 - float(spread[uncaptured].sum() / steady.sum())
+        self.depleted = 1 - float(share @ left[uncaptured])
         self.turned = float(share @ (turning * cycle.crossing / speed[uncaptured]) ** 2)
         self.is_known = bool(speed[uncaptured].min() >= SPEEDS[0])
         self.n_blocks = float(speed[uncaptured].sum() * self._step / (2 * (share @ memory)))

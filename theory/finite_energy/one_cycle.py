@@ -9,6 +9,7 @@ is what keeping phase volume leaves of it. theory/equations.md derives all this 
 
 from __future__ import annotations
 
+import math
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -84,8 +85,9 @@ class TheoryError(NamedTuple):
 
     mean_s, captured_mean, peak_mean, p_nc: the square of the lags where each enters; of means also a quarter
         of what the variance leaves out, which is its drift.
-    variance: of the peak, relatively: half of what is forgotten where walls turn velocities, and, independent
-        of it, the square of how far they turn them in one crossing of the table; the rates' own is added.
+    variance: of the peak, relatively: half of what is forgotten where walls turn velocities, half of what
+        depletion takes off, and the square of how far velocities are turned in one crossing of the table, as
+        independent errors; the rates' own is added.
     skewness: of the kicks, were each block of path, twice as long as the memory, to have a skewness of 1.
     """
 
@@ -165,7 +167,8 @@ class FiniteEnergy:
         error = table_error(self.scene)
         # A shift of a size has an error by the rates too, in the same proportion.
         captured_mean = second + error.lag * second**0.5
-        variance = float(np.hypot(self._fields.forgotten / 2, self._fields.turned)) + error.diffusion
+        fields = self._fields
+        variance = math.hypot(fields.forgotten / 2, fields.depleted / 2, fields.turned) + error.diffusion
         drift = variance * self.peak[1] / 4
         return TheoryError(
             p * captured_mean + drift,
@@ -173,7 +176,7 @@ class FiniteEnergy:
             -np.log(max(1 - p, LEAST)) * captured_mean + drift,
             p * (1 - p) * captured_mean,
             variance,
-            self._fields.n_blocks**-0.5,
+            fields.n_blocks**-0.5,
         )
 
     def free_cdf(self, s: ArrayLike) -> Floats:

@@ -223,18 +223,24 @@ def test_the_table_covers_every_phase_with_its_errors() -> None:
 
 
 @pytest.mark.parametrize("steps", [0.05, 0.7, 30.0])
-def test_kicks_are_remembered_as_their_correlations_say(steps: float) -> None:
-    """However long the memory, in steps of the cycle: a double integral, the speed being half a wave."""
-    size = np.sin(math.pi * (np.arange(N_TIMES) + 0.5) / N_TIMES)
+@pytest.mark.parametrize("turning", [0.0, 0.3])
+def test_kicks_are_remembered_as_their_correlations_say(steps: float, turning: float) -> None:
+    """However long the memory, in steps of the cycle: a double integral, the speed being a wave that turns.
+
+    Walls that turn velocities end the correlations sooner, by `turning` of the rate at which they end alone.
+    """
+    size = np.sin(2 * math.pi * (np.arange(N_TIMES) + 0.5) / N_TIMES)
     fields = Fields.__new__(Fields)
     fields._step = 1.0
     speed = np.full((1, N_TIMES), steps * MEMORIES[2])
-    diffusion = np.zeros((len(MEMORIES), 1, N_TIMES))
-    diffusion[2] = size**2 * speed
-    found = fields._remembered(diffusion, speed, np.zeros(N_TIMES))
+    kicks = np.zeros((len(MEMORIES), 1, N_TIMES))
+    kicks[2] = size
+    found = fields._remembered(kicks, speed, np.full(N_TIMES, turning * steps))
     fine = np.repeat(size, 4)
     apart = np.abs(np.subtract.outer(np.arange(4 * N_TIMES), np.arange(4 * N_TIMES))) / 4 * steps
-    truth = fine @ (np.exp(-apart) * steps / 2) @ fine / 16 if steps < 1 else (size**2).sum()
+    truth = fine @ (np.exp(-(1 + turning) * apart) * steps / 2) @ fine / 16
+    if steps > 1:
+        truth = (size**2).sum() / (1 + turning)
     assert found.sum() == pytest.approx(truth, rel=0.01)
 
 

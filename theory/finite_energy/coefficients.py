@@ -38,7 +38,8 @@ class CycleCourse(NamedTuple):
     log_energy: (T,) of the uncaptured, over its value at the start (Eq:dE).
     hazard: (T,) of capture per time, where nu rises that of the reversed cycle (Eq:dps/ps).
     is_capture: (T,) whether nu falls.
-    stretch: (T,) rate of log w, either way [1 / time].
+    shear: (T,) rate at which walls turn velocities: that of log tan of their angle [1 / time].
+    crossing: (T,) mean path down the table and up again, directions uniform [length].
     rates: from frozen tables.
     """
 
@@ -48,7 +49,8 @@ class CycleCourse(NamedTuple):
     log_energy: Floats
     hazard: Floats
     is_capture: Flags
-    stretch: Floats
+    shear: Floats
+    crossing: Floats
     rates: RatesAt
 
 
@@ -66,9 +68,13 @@ def course(scene: Mushroom) -> CycleCourse:
     nu_rate = (now.w_rate * now.r - now.w * now.r_rate) / now.r**2
     flux = delta_slope(np, volumes.nu) * volumes.v_cap / volumes.v_cha
     log_energy = chaotic_zone(scene, times).log_energy - chaotic_zone(scene, [start]).log_energy[0]
-    stretch = np.broadcast_to(np.abs(now.w_rate / now.w), times.shape)
+    # v_x w and v_y (h + r) are adiabatic; the mean of |v_y| is 2 v / pi.
+    height, rising = now.h + now.r, now.h_rate + now.r_rate
+    shear, crossing = (
+        np.broadcast_to(x, times.shape) for x in (now.w_rate / now.w - rising / height, np.pi * height)
+    )
     hazard = np.abs(flux * nu_rate)
-    return CycleCourse(start, step, times, log_energy, hazard, nu_rate < 0, stretch, rates)
+    return CycleCourse(start, step, times, log_energy, hazard, nu_rate < 0, shear, crossing, rates)
 
 
 def _clock_start(scene: Mushroom) -> float:
@@ -92,6 +98,7 @@ class Fields:
     lag, square: mean of what the captured and released lag by, and of its square less diffusion's.
     likelier: by how much, relatively, capture is likelier.
     variance: gathered by diffusion since the cycle's start.
+    drift: of log E, beyond the quarter of the variance that belongs to one that falls as E^(-1/2).
     lags, squares, hazards: sums of hazard times `lag`, `square` and, while nu falls, `likelier`.
 
     Args:
@@ -99,8 +106,9 @@ class Fields:
         energy: of the ensemble when the cycle begins.
 
     Attributes, of the uncaptured, weighted by diffusion:
-        stretched: root mean square of x / (1 + x^2)^(1/2), x the stem's relative change of width while kicks
-            are remembered.
+        forgotten: share of the variance without `shear` that it takes off.
+        depleted: share of diffusion that depletion takes off.
+        turned: mean square of what walls turn velocities by in a `crossing`.
         is_known: whether their speeds are among those for which rates were measured.
         n_blocks: of path, each twice as long as the memory, in a cycle.
     """
@@ -113,14 +121,18 @@ class Fields:
         # Phase volume is kept: those who lag by J(E) are captured likelier by J + dJ / d log E.
         likelier = lag + (_at_speeds(rates.lag, faster) / faster - lag) / NUDGE
         square = _at_speeds(rates.square, speed) / speed**2
-        depleted = 1 + _at_speeds(rates.depletion, speed) / rates.diffusion.sum(axis=1)
-        diffusion = np.maximum(depleted, 0.0)[None] * rates.diffusion.T[:, None]
-        spread = self._remembered(diffusion, speed, rates.leg).sum(axis=0)
+        left = 1 + _at_speeds(rates.depletion, speed) / rates.diffusion.sum(axis=1)
+        diffusion = np.maximum(left, 0.0)[None] * rates.diffusion.T[:, None]
+        # What kicks remember is a direction: walls that turn it the other way kick with the other sign.
+        kicks, turning = np.sign(cycle.shear) * np.sqrt(diffusion / speed), np.abs(cycle.shear)
+        spread = self._remembered(kicks, speed, turning).sum(axis=0)
+        slower = np.exp(-GAINS[:, None] / 2)
         self._values = {
             "lag": lag,
             "square": square,
             "likelier": likelier,
             "variance": self._gathered(spread),
+            "drift": self._gathered(np.gradient(spread / slower, GAINS, axis=0) * slower / 2),
             "lags": self._gathered(cycle.hazard * lag),
             "squares": self._gathered(cycle.hazard * square),
             "hazards": self._gathered(cycle.hazard * cycle.is_capture * likelier),
@@ -128,27 +140,28 @@ class Fields:
         uncaptured = len(GAINS) // 2
         share = spread[uncaptured] / spread[uncaptured].sum()
         memory = rates.diffusion @ np.array(MEMORIES) / rates.diffusion.sum(axis=1)
-        change = memory * cycle.stretch / speed[uncaptured]
-        self.stretched = float(share @ (change**2 / (1 + change**2))) ** 0.5
+        steady = self._remembered(kicks, speed, np.zeros(N_TIMES))[:, uncaptured]
+        self.forgotten = 1 - float(spread[uncaptured].sum() / steady.sum())
+        self.depleted = 1 - float(share @ left[uncaptured])
+        self.turned = float(share @ (turning * cycle.crossing / speed[uncaptured]) ** 2)
         self.is_known = bool(speed[uncaptured].min() >= SPEEDS[0])
         self.n_blocks = float(speed[uncaptured].sum() * self._step / (2 * (share @ memory)))
 
-    def _remembered(self, diffusion: Floats, speed: Floats, leg: Floats) -> Floats:
+    def _remembered(self, kicks: Floats, speed: Floats, turning: Floats) -> Floats:
         """Return the growth of variance per time by kicks of each of MEMORIES: (M, G, T).
 
-        Of a path that begins with the leg, whose kicks have the size a: a times the mean of a over the path
-        so far, weighted by the correlations exp(-l / m). Other walls move in the next leg, whose kicks are
-        taken to be independent.
+        Of kicks of the size a: a times the mean of a over the path so far, weighted by the correlations
+        exp(-l / m). Walls that turn velocities, at a rate (T,) in time, end them sooner.
         """
-        size = np.sqrt(diffusion / speed)
-        steps = speed * self._step / np.array(MEMORIES)[:, None, None]
-        decay, found = np.exp(-steps), np.empty_like(size)
-        kept = np.zeros(size.shape[:2])
+        fading = speed / np.array(MEMORIES)[:, None, None]
+        steps = (fading + turning) * self._step
+        full = kicks * fading / (fading + turning)  # what is kept in the end where nothing changes
+        decay, found = np.exp(-steps), np.empty_like(kicks)
+        kept = np.zeros(kicks.shape[:2])
         for k in range(N_TIMES):
-            now, lost = size[:, :, k], decay[:, :, k]
-            kept *= leg[k] == leg[k - 1]
-            found[:, :, k] = now * (now + (kept - now) * (1 - lost) / steps[:, :, k])
-            kept = now + (kept - now) * lost
+            limit, lost = full[:, :, k], decay[:, :, k]
+            found[:, :, k] = kicks[:, :, k] * (limit + (kept - limit) * (1 - lost) / steps[:, :, k])
+            kept = limit + (kept - limit) * lost
         return found
 
     def at(self, name: str, gain: Floats, t: Floats | float) -> Floats:

@@ -9,6 +9,7 @@ is what keeping phase volume leaves of it. theory/equations.md derives all this 
 
 from __future__ import annotations
 
+import math
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -35,7 +36,6 @@ LEAST = 1e-12  # variance of a blur, in log E: a lag's square may leave less tha
 LARGEST = 2.0**1000  # of an energy: where its double is no float, fast particles seem slow
 TOO_SLOW = "energy = {}: walls turn too soon for particles so slow, and theory has no distribution"
 UNMEASURED = "energy = {}: particles so slow, below a speed of {:g}, are beyond the measured rates"
-STRETCH = 0.75  # of that change: bounds what is seen of all cycles with rates, from 1e4 on
 MOST = 4.0  # variance of a blur, in log E: beyond it what the peak has of it, v - v^2 / 8, falls again
 
 
@@ -85,8 +85,9 @@ class TheoryError(NamedTuple):
 
     mean_s, captured_mean, peak_mean, p_nc: the square of the lags where each enters; of means also a quarter
         of what the variance leaves out, which is its drift.
-    variance: of the peak, relatively: STRETCH of how far the stem's width changes while kicks are remembered,
-        for correlations are taken to be those of one table; and the rates' own errors.
+    variance: of the peak, relatively: half of what is forgotten where walls turn velocities, half of what
+        depletion takes off, and the square of how far velocities are turned in one crossing of the table, as
+        independent errors; the rates' own is added.
     skewness: of the kicks, were each block of path, twice as long as the memory, to have a skewness of 1.
     """
 
@@ -166,14 +167,16 @@ class FiniteEnergy:
         error = table_error(self.scene)
         # A shift of a size has an error by the rates too, in the same proportion.
         captured_mean = second + error.lag * second**0.5
-        drift = (variance := STRETCH * self._fields.stretched + error.diffusion) * self.peak[1] / 4
+        fields = self._fields
+        variance = math.hypot(fields.forgotten / 2, fields.depleted / 2, fields.turned) + error.diffusion
+        drift = variance * self.peak[1] / 4
         return TheoryError(
             p * captured_mean + drift,
             captured_mean + drift,
             -np.log(max(1 - p, LEAST)) * captured_mean + drift,
             p * (1 - p) * captured_mean,
             variance,
-            self._fields.n_blocks**-0.5,
+            fields.n_blocks**-0.5,
         )
 
     def free_cdf(self, s: ArrayLike) -> Floats:
@@ -219,10 +222,10 @@ class FiniteEnergy:
     def _in_zone(self, times: ArrayLike) -> tuple[Floats, Floats]:
         t = self._within(times)
         none = np.zeros(len(t))
-        gathered = {name: self._fields.at(name, none, t) for name in ("variance", "squares", "lags")}
+        gathered = {name: self._fields.at(name, none, t) for name in ("variance", "squares", "lags", "drift")}
         variance = gathered["variance"] - gathered["squares"]
         begun = chaotic_zone(self.scene, [self._course.start]).log_energy[0]
-        drift = gathered["variance"] / 4 - gathered["lags"]
+        drift = gathered["variance"] / 4 + gathered["drift"] - gathered["lags"]
         return chaotic_zone(self.scene, t).log_energy - begun + drift, variance - variance**2 / 8
 
     def at_capture(self, times: ArrayLike) -> tuple[Floats, Floats]:
@@ -297,7 +300,8 @@ class FiniteEnergy:
         squares = gathered("squares")
         return atoms._replace(
             weight=atoms.weight * np.exp(-gathered("hazards")),
-            shift=atoms.shift - gathered("lags") + squares / 4,  # a square is no diffusion, and has no drift
+            # A square is no diffusion, and has no drift.
+            shift=atoms.shift + gathered("drift") - gathered("lags") + squares / 4,
             variance=atoms.variance + gathered("variance") - squares,
         )
 

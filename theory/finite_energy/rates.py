@@ -68,7 +68,6 @@ class RatesAt(NamedTuple):
     pace: (T,) the walls' speed, as `pace` of the measured scene has it.
     diffusion: (T, M) the variance per path length of kicks of each of MEMORIES.
     lag, square, depletion: (T, S) at SPEEDS.
-    leg: (T,) number of the stretch of the cycle between two knots at which walls rest.
     """
 
     pace: Floats
@@ -76,7 +75,6 @@ class RatesAt(NamedTuple):
     lag: Floats
     square: Floats
     depletion: Floats
-    leg: Floats
 
 
 def pace(scene: Scene, times: Floats) -> Floats:
@@ -168,7 +166,6 @@ def rates_at(scene: Scene, times: Floats) -> RatesAt:
         (-1.0 if known.turned else 1.0) * lag * speed[:, None],
         square * speed[:, None] ** 2,
         depletion * speed[:, None] ** 2,
-        np.searchsorted(spans, known.phases(times), side="right").astype(np.float64),
     )
 
 

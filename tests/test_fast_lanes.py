@@ -19,6 +19,7 @@ from fast.compiled import compile_scene
 from fast.kernel import loops
 from fast.kernel.compiling import HOW, TOOLS
 from fast.kernel.lane_laws import NO_WAVES, ONE_WAVE, TWO_WAVES
+from fast.kernel.lanes import chord, fly
 from fast.kernel.limits import LawLimits
 from fast.kernel.pools import LANES, POOL_SIZE
 from fast.kernel.records import TableOfLanes
@@ -52,22 +53,17 @@ def test_the_compiler_packs_divisions_and_square_roots(loop, form, is_slope_movi
         assert re.search(rf"vsqrtpd\s+.*%{widest}mm", assembly)
 
 
-@pytest.mark.parametrize(
-    "entry", [loops.FLIES[False, ONE_WAVE], loops.CHORDS[PARABOLA]], ids=["fly", "chord"]
-)
-def test_the_width_of_registers_changes_no_bit(entry):
-    wide = entry.py_func
-    less = {**wide.__globals__, "widest_registers": njit(lambda: None)}
-    narrow = FunctionType(wide.__code__, less, closure=wide.__closure__)
+@pytest.mark.parametrize("step", [fly, chord])
+def test_the_width_of_registers_changes_no_bit(step):
+    less = {**step.__globals__, "widest_registers": njit(lambda: None)}
     limits, waves = LawLimits(*np.ones(9)), NO_WAVES._replace(omega=0.5, r=(1.0, 0.1, 0.2, 0.0, 0.0))
     pools, texts = [], []
-    for each in (wide, narrow):
+    for each in (step, FunctionType(step.__code__, less)):
         pool = np.random.default_rng(1).uniform(0.5, 2.0, POOL_SIZE)
         compiled = njit(**HOW)(each)
-        compiled.compile(loops.STEP.args)
-        compiled(pool, LANES, TableOfLanes(False, True, False, True), waves, 0.125, limits)
+        compiled(pool, LANES, TableOfLanes(False, True, False, True), waves, 0.125, (0,), limits)
         pools.append(pool.tobytes())
-        texts.append(compiled.inspect_asm(loops.STEP.args))
+        texts.append(compiled.inspect_asm(compiled.signatures[0]))
     assert pools[0] == pools[1]
     has_512 = "+avx512f" in TOOLS[3]
     assert ["vdivpd" in text and "%zmm" in text for text in texts] == [has_512, False]

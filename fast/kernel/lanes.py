@@ -29,7 +29,7 @@ from fast.kernel.bounces import (
     spin_in_disk,
     stay_after,
 )
-from fast.kernel.compiling import packed, part
+from fast.kernel.compiling import packed, part, widest_registers
 from fast.kernel.lane_laws import (
     LawsAt,
     laws_ahead,
@@ -308,6 +308,8 @@ def error_left(curvature, s, delta, waves):
 @packed
 def fly(a, n, table, waves, slope, degree, limits):
     """Find the next collision of each lane, and take the step where it is shown right."""
+    widest_registers()
+    widest_registers()
     is_stem, is_mushroom, _, is_relative = table
     for i in range(n):
         aim(a, i, is_stem, is_relative, waves, slope, degree, limits)
@@ -323,6 +325,8 @@ def chord(a, n, table, waves, slope, degree, limits):
 
     The chord keeps the distance |L| / v from the centre; while that exceeds w the mouth is out of reach.
     """
+    widest_registers()
+    widest_registers()
     bend, k_w, size = limits.bend, limits.curvature, limits.size
     _, _, is_cap, is_relative = table
     for i in range(n):

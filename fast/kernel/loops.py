@@ -17,7 +17,7 @@ from numba import config, types
 from numba.core.typing import Signature
 from numba.core.typing import signature as returns
 
-from fast.kernel.compiling import HOW, caller, kept, widest_registers
+from fast.kernel.compiling import HOW, caller, kept
 from fast.kernel.judged import judged_step
 from fast.kernel.lane_laws import NO_WAVES, ONE_WAVE, TWO_WAVES
 from fast.kernel.lanes import chord, fly
@@ -68,7 +68,6 @@ def _fly(is_slope_moving, form):
     @kept(is_slope_moving, form, **HOW)
     def fly_lanes(a, n, table, waves, slope, limits):
         """See fast.kernel.lanes.fly."""
-        widest_registers()
         fly(a, n, table, waves if is_waves else None, None if is_slope_moving else slope, terms, limits)
 
     return fly_lanes
@@ -80,7 +79,6 @@ def _chord(form):
     @kept(form, **HOW)
     def chord_lanes(a, n, table, waves, slope, limits):
         """See fast.kernel.lanes.chord."""
-        widest_registers()
         chord(a, n, table, waves if is_waves else None, slope, terms, limits)
 
     return chord_lanes

@@ -42,8 +42,8 @@ RADIUS_LAW, WIDTH_LAW, DEPTH_LAW, SLOPE_LAW = LAWS + STRIDE * N_COEFFICIENTS * n
 # Codes of walls as they stand in a row.
 ON_ARC, ON_BASE, ON_LEFT, ON_RIGHT, ON_FLOOR = map(float, (ARC, BASE, LEFT, RIGHT, FLOOR))
 # What became of a flight. The particle is where it was: the end is out of the laws' reach; not shown right;
-# right, and at STOP or later. Or it has moved on, and `attend` is to look at it. Or nothing is to be done: it has
-# moved on; or its time is to be corrected once more.
+# right, and at STOP or later. Or it has moved on, and `attend` is to look at it. Or nothing is to be done, as
+# it has moved on, or as its time is to be corrected once more.
 FAR, REFUSED, LATE, MARKED, MOVED, COARSE = -1.0, 0.0, 1.0, 2.0, 3.0, 4.0
 MAX_CORRECTIONS = 3.0
 POOL_SIZE = np.int64(N_ROWS * STRIDE)

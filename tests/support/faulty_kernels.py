@@ -77,5 +77,5 @@ def faulty_lanes(*changes: str) -> ModuleType:
             setattr(module, name, from_python(found))
         elif isinstance(found, np.integer):
             setattr(module, name, int(found))
-    vars(module).update(fma=from_python(fma))
+    vars(module).update(fma=from_python(fma), widest_registers=lambda: None)
     return module

@@ -18,9 +18,10 @@ from fast.fine import FineTrajectory, as_pairs, as_trajectory, fill_path
 from fast.flow import follow_to
 from fast.kernel import codes, pools
 from fast.kernel.compiling import kept
-from fast.kernel.flights import OFF, advance, collide, correct
+from fast.kernel.follow import advance
+from fast.kernel.lane_laws import know_laws, set_reference
 from fast.kernel.laws import set_anchors
-from fast.kernel.pools import whole_registers
+from fast.kernel.pools import COARSE, FAR, MARKED, MAX_CORRECTIONS, MOVED, copy_rows, load, whole_registers
 from fast.kernel.records import ANCHORS_SHAPE, FloatArray, Particle, unfilled_ends
 from fast.kernel.walls import wall_residual
 from fast.kernel.worker import DISK, GENERAL, new_worker
@@ -34,28 +35,33 @@ PLACE = (pools.X, pools.Y, pools.VX, pools.VY)
 
 
 @kept(error_model="numpy")
-def fill_lane(a, i, particle, age, scene, pieces, degree):
+def fill_lane(a, i, particle, age, worker):
     """Put a particle into a lane, its laws known from `age` before its time, if they still serve then."""
     for early in (age, 0.0):
-        pools.load(a, i, particle, np.inf, OFF)
-        pools.set_reference(a, i, particle.t - early, particle.t_low, scene, pieces, degree)
+        load(a, i, particle, False)
+        know_laws(a, i, early, worker.scene, worker.pieces, worker.degree, worker.waves)
         if a[pools.END + i] > particle.t:
             break
-    pools.set_laws(a, i, pools.R0, particle.t, particle.t_low, scene, degree)
+    a[pools.AS_GIVEN + i], a[pools.STOP + i] = 0.0, np.inf
     a[pools.SPIN + i] = particle.x * particle.vy - particle.y * particle.vx
 
 
 @kept(error_model="numpy")
-def find_hits(pool, a, n, worker):
-    """Find the next collision of n lanes, and correct what is coarse."""
-    advance(pool, a, whole_registers(n), OFF, worker)
-    correct(pool, a, n, worker)
-
-
-@kept(error_model="numpy")
-def collide_lanes(pool, a, n, worker):
-    """Bounce n lanes off the walls that they have met."""
-    collide(pool, a, n, worker)
+def step_lanes(pool, a, n, worker, spare):
+    """Take a step of n lanes where it is shown right, corrected as often as need be in a pool of one lane."""
+    advance(pool, a, whole_registers(n), worker)
+    for i in range(n):
+        copy_rows(a, i, spare, 0, pools.T, pools.POOL_SIZE)
+        while spare[pools.FATE] in (COARSE, FAR):
+            if spare[pools.FATE] == FAR:
+                if spare[pools.TRIES] > MAX_CORRECTIONS:
+                    break
+                t = spare[pools.T] + spare[pools.S]
+                set_reference(spare, 0, t, spare[pools.T_LOW], worker.scene, worker.pieces, worker.degree)
+            if spare[pools.END] == -np.inf:
+                break
+            advance(pool, spare, 1, worker)
+        copy_rows(spare, 0, a, i, pools.T, pools.POOL_SIZE)
 
 
 @kept(error_model="numpy")
@@ -142,12 +148,11 @@ class LaneRound:
         self.worker = new_worker(self.in_lanes, only_stop(np.inf), unfilled_ends(np.empty((0, 6)), 1, (1, 1)))
         self.serves = float(np.diff(self.in_lanes.pieces.begins, append=self.in_lanes.pieces.period).max())
         self.anchors = np.zeros(ANCHORS_SHAPE)
-        self.pool = np.zeros(pools.POOL_SIZE)
+        self.pool, self.spare = np.zeros((2, pools.POOL_SIZE))
 
     def fill(self, lane: int, p: FloatArray, wall: int, age: float = 0.0) -> None:
         """Put a state [t, its low part, x, y, vx, vy] into a lane, its laws known from `age` before it."""
-        known = self.compiled, self.in_lanes.pieces, self.in_lanes.degree
-        fill_lane(self.pool, np.int64(lane), as_particle(p, wall), float(age), *known)
+        fill_lane(self.pool, np.int64(lane), as_particle(p, wall), float(age), self.worker)
 
     def is_met(self, p: FloatArray, wall: int) -> bool:
         """Tell whether a state lies, but for rounding, on the wall that it leaves, as after a step."""
@@ -161,28 +166,24 @@ class LaneRound:
 
     def fly(self, n: int) -> tuple[npt.NDArray[np.bool_], FloatArray, FloatArray]:
         """Take a step in n lanes: which are shown right, walls met, and rows of dt, x, y, vx, vy."""
-        right, hits, dt = self.find(GENERAL, n)
-        return right, hits, self.bounced(GENERAL, n, dt)
+        self.take(GENERAL, n)
+        return self.answers(n)
 
     def skip(self, n: int) -> tuple[npt.NDArray[np.bool_], FloatArray, FloatArray]:
         """Take captured chords in n lanes, likewise; every hit is on the arc."""
-        right, _, dt = self.find(DISK, n)
-        return right, np.zeros(n), self.bounced(DISK, n, dt)
+        self.take(DISK, n)
+        right, _, rows = self.answers(n)
+        return right, np.zeros(n), rows
 
-    def bounced(self, pool: np.integer[Any], n: int, dt: FloatArray) -> FloatArray:
-        """Bounce n lanes off the walls that they have met; returns rows of dt, x, y, vx, vy."""
-        collide_lanes(pool, self.pool, np.int64(n), self.worker)
-        return np.column_stack([dt, *(self.row(r, n) for r in PLACE)])
-
-    def find(self, pool: np.integer[Any], n: int) -> tuple[npt.NDArray[np.bool_], FloatArray, FloatArray]:
-        """Find the next collision of n lanes: which are shown right, walls met, and times."""
-        find_hits(pool, self.pool, np.int64(n), self.worker)
-        return self.answers(n)
+    def take(self, pool: np.integer[Any], n: int) -> None:
+        """Take a step in n lanes."""
+        step_lanes(pool, self.pool, np.int64(n), self.worker, self.spare)
 
     def answers(self, n: int) -> tuple[npt.NDArray[np.bool_], FloatArray, FloatArray]:
-        """Return which of n lanes are shown right, the walls that they meet, and when."""
-        right = self.row(pools.OK, n) == pools.CERTAIN
-        return right, self.row(pools.HIT, n).copy(), self.row(pools.S, n).copy()
+        """Return which of n lanes have moved, the walls that they met, and rows of dt, x, y, vx, vy."""
+        rows = np.column_stack([self.row(r, n) for r in (pools.S, *PLACE)])
+        fates = self.row(pools.FATE, n)
+        return (fates == MARKED) | (fates == MOVED), self.row(pools.HIT, n).copy(), rows
 
     def careful_step(self, p: FloatArray, wall: int) -> tuple[int, float, FloatArray]:
         """Return the careful step's wall, its time, and the state after, from a state and its wall."""

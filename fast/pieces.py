@@ -26,15 +26,17 @@ import numpy as np
 from fast.compiled import HALF_PI, compile_scene
 from fast.kernel import entries
 from fast.kernel.arithmetic import MAX_QUADRANT
+from fast.kernel.lane_laws import NO_WAVES, ONE_WAVE, TWO_WAVES
 from fast.kernel.pieces import PARABOLA, SERIES
 
 from fast.kernel.records import (  # isort: skip
-    AMPLITUDES, BANG_BANG, CONSTANT, DEPTH, FOURIER, HIGHEST, KIND, KNOTS, LEVEL, LOWEST, N_HARMONICS,
+    AMPLITUDES, BANG_BANG, CONSTANT, DEPTH, FOURIER, KIND, KNOTS, LEVEL, LOWEST, N_HARMONICS,
     N_KNOTS, OMEGA, OMEGA_LOW, PERIOD, PERIOD_LOW, RADIUS, SHARED, SLOPE, WIDTH, Compiled, FloatArray,
-    LawsInLanes, Pieces,
+    LawsInLanes, Pieces, Waves,
 )  # fmt: skip
 from scene import Scene
 
+SHALLOW = 0.25  # of its mean: see `waves_of`
 MAX_PIECES = 2**15
 REMAINDER = 2.0**-54
 INSIDE = 1.0 - 2.0**-50  # of a piece: how far a flight ends from its middle is a sum that lanes round
@@ -52,17 +54,44 @@ class Cut(NamedTuple):
 def laws_in_lanes(scene: Scene) -> LawsInLanes:
     """Return a scene, which is in the kernel's units, as the lanes know it."""
     compiled = compile_scene(scene)
-    return in_lanes(compiled, pieces_of(compiled, degree_of(compiled)))
+    waves = waves_of(compiled)
+    return in_lanes(compiled, None if waves else pieces_of(compiled, form_of(compiled)), waves)
 
 
-def in_lanes(compiled: Compiled, pieces: Pieces | None) -> LawsInLanes:
-    """Return a scene as the lanes know it by its pieces; with none, each step is left to the careful one."""
-    degree = degree_of(compiled)
+def in_lanes(compiled: Compiled, pieces: Pieces | None, waves: Waves | None = None) -> LawsInLanes:
+    """Return a scene as the lanes know it by its waves or its pieces; with none, steps are careful ones."""
     if pieces is None:
-        always, nothing = np.array([math.inf]), np.zeros((1, 4, degree + 2))
-        pieces = Pieces(0.0, math.inf, 0.0, np.zeros(1), np.zeros((1, 2)), always, always, nothing, -1.0)
+        # Of waves the lanes know when they repeat, and up to when their phase is known.
+        period, until = _period_and_until(compiled) if waves else (math.inf, -1.0)
+        always, nothing = np.array([math.inf]), np.zeros((1, 4, 1))
+        pieces = Pieces(0.0, period, 0.0, np.zeros(1), np.zeros((1, 2)), always, always, nothing, until)
     slope = None if is_slope_moving(compiled) else float(compiled.laws[SLOPE, LEVEL])
-    return LawsInLanes(compiled, pieces, degree, slope)
+    return LawsInLanes(compiled, pieces, form_of(compiled), slope, waves or NO_WAVES)
+
+
+def waves_of(compiled: Compiled) -> Waves | None:
+    """Return a scene's laws as waves, or None where lanes take pieces instead.
+
+    That is for knots, for more than two harmonics, which pieces serve sooner, and for a size that comes down
+    to a quarter of its mean: rounding of its waves, which add up to the mean and more, would show in it.
+    """
+    laws, omegas = compiled.laws, compiled.laws[SHARED, [OMEGA, OMEGA_LOW]].tolist()
+    sizes = [row for row in (RADIUS, WIDTH, DEPTH) if laws[row, KIND] == FOURIER]
+    is_deep = any(least_of(compiled, row) < SHALLOW * laws[row, LEVEL] for row in sizes)
+    if is_deep or (laws[:SHARED, KIND] == BANG_BANG).any() or laws[SHARED, N_HARMONICS] > 2:
+        return None
+    rows = np.zeros((4, 5))
+    for row, law in zip(rows, laws[:SHARED], strict=True):
+        row[0], n = law[LEVEL], int(law[N_HARMONICS]) if law[KIND] == FOURIER else 0
+        for k in range(1, n + 1):
+            row[2 * k - 1], row[2 * k] = law[AMPLITUDES + k], law[AMPLITUDES + n + k]
+    return Waves(*omegas, *(tuple(row.tolist()) for row in rows))
+
+
+def _period_and_until(compiled: Compiled) -> tuple[float, float]:
+    period, _ = _period_and_origin(compiled.laws)
+    high = math.inf if period is None else float(period)
+    return high, 0.125 * MAX_QUADRANT * high / max(float(compiled.laws[SHARED, N_HARMONICS]), 1.0)
 
 
 def is_slope_moving(compiled: Compiled) -> bool:
@@ -70,8 +99,10 @@ def is_slope_moving(compiled: Compiled) -> bool:
     return bool(compiled.laws[SLOPE, KIND] != CONSTANT)
 
 
-def degree_of(compiled: Compiled) -> int:
-    """Return the degree of the polynomials that a scene's laws are in lanes."""
+def form_of(compiled: Compiled) -> int:
+    """Return in which form lanes know a scene's laws: waves, or pieces by the degree of their polynomials."""
+    if waves_of(compiled):
+        return TWO_WAVES if compiled.laws[SHARED, N_HARMONICS] > 1 else ONE_WAVE
     return SERIES if (compiled.laws[:SHARED, KIND] == FOURIER).any() else PARABOLA
 
 
@@ -103,7 +134,8 @@ def least_of(compiled: Compiled, row: int | np.integer) -> float:
     """Return the least value of a law as it is given: of nu where the scene has nu."""
     bounds = compiled.bounds
     if row == WIDTH and compiled.is_relative:
-        return float(bounds[WIDTH, LOWEST] / bounds[RADIUS, HIGHEST])
+        least_r = bounds[RADIUS, LOWEST]  # the bounds of a product are made of those of its factors
+        return float(bounds[WIDTH, LOWEST] / least_r) if least_r > 0.0 else 0.0
     return float(bounds[row, LOWEST])
 
 
@@ -170,7 +202,7 @@ def _filled(
     if period is None:
         half, serves = np.array([math.inf]), np.array([math.inf])
     high, low = _pair(period) if period is not None else (math.inf, 0.0)
-    until = 0.125 * MAX_QUADRANT * high / max(compiled.laws[SHARED, N_HARMONICS], 1.0)
+    _, until = _period_and_until(compiled)
     return Pieces(float(origin), high, low, begins, references, half, serves, coefficients, until)
 
 

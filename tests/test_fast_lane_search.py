@@ -123,7 +123,12 @@ MUTANTS = {
         "place -= SAFETY * (abs(y) + abs(vy) * s) + abs(vy) * slack",
         "place = 1.0",
     ),
-    "what Newton's step leaves": ("arc to stem", 500, "CERTAIN if error < s else COARSE", "CERTAIN"),
+    "what Newton's step leaves": (
+        "arc to stem",
+        500,
+        "result = LATE if error < s else result",
+        "result = LATE",
+    ),
     "how long the polynomials hold": (
         "arc to base",
         1000,
@@ -150,13 +155,13 @@ MUTANTS = {
     ),
     "what a hop hangs on": (
         "early hop",
-        100,
-        "known = min(before - a[BACK + i], told_rate(a[T + i], r, r1, r2, sizes, limits))",
-        "known = before - a[BACK + i]",
+        1500,
+        "known = min(known, told_rate(a[T + i], r, r1, r2, sizes, limits))",
+        "known = known + 0.0",
     ),
     "what a hop through the base hangs on": (
         "early hop through the base",
-        100,
+        1500,
         "quality = min(quality, told_rate(a[T + i], r, r1, r2, sizes, limits))",
         "quality = min(quality, 1.0)",
     ),
@@ -169,8 +174,8 @@ MUTANTS = {
     "the mouth at the end of a chord": (
         "captured beside a moving mouth",
         500,
-        "reach = max(a[W0 + i], w)",
-        "reach = a[W0 + i]",
+        "reach = max(a[SURE + i], w)",
+        "reach = a[SURE + i]",
     ),
     "the mouth's curvature under a chord": (
         "captured beside a moving mouth",

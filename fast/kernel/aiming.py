@@ -1,4 +1,4 @@
-"""Which wall each lane meets, and about when: the first of the loops of fast.kernel.lanes.
+"""Which wall a lane meets, and about when: the first part of a step of fast.kernel.lanes.
 
 Idea. Walls move on at their speed now: the quotients of their distances and closing speeds are compared by
 cross-multiplication, the arc is taken to second order, and what is beyond that once more at the end. On which
@@ -13,14 +13,13 @@ from typing import NamedTuple
 import numpy as np
 
 from fast.kernel.arithmetic import SAFETY, fma
-from fast.kernel.compiling import packed, part, widest_registers
+from fast.kernel.bounces import ONE
+from fast.kernel.compiling import packed, part
+from fast.kernel.lane_laws import laws_now
 
 from fast.kernel.pools import (  # isort: skip
-    H0, H1, H2, HIT, M0, M1, M2, ON_ARC, ON_BASE, ON_FLOOR, ON_LEFT, ON_RIGHT, R0, R1, R2, R3, S, SURE, VX,
-    VY, W0, W1, W2, WALL, X, Y,
+    HIT, ON_ARC, ON_BASE, ON_FLOOR, ON_LEFT, ON_RIGHT, S, SURE, TRIES, VX, VY, WALL, X, Y,
 )  # fmt: skip
-
-ONE = np.float64(1.0)  # its quotient by 0 is infinite without the compiler too
 
 
 class Outset(NamedTuple):
@@ -46,6 +45,18 @@ def outset_of(a, i):
 def side_curvature(vy, slope, limits):
     """Return a bound on |f''| of a side, w'' + m'' y + 2 m' vy, for a flight of the stem."""
     return fma(limits.turning, abs(vy), limits.curvature) if slope is None else limits.curvature
+
+
+@part
+def side_rate(y, now, slope):
+    """Return how fast a side moves out at a height."""
+    return fma(now.m1, y, now.w1) if slope is None else now.w1
+
+
+@part
+def side_bend(y, vy, now, slope):
+    """Return f'' of a side along a flight."""
+    return fma(now.m2, y, fma(2.0 * now.m1, vy, now.w2)) if slope is None else now.w2
 
 
 @part
@@ -113,54 +124,51 @@ def cube_of_arc(r0, r1, r2, r3):
 
 
 @packed
-def aim(a, n, is_stem, slope, limits):
-    """Choose each lane's wall and guess the time, walls moving at their speed now.
+def aim(a, i, is_stem, is_relative, waves, slope, degree, limits):
+    """Choose a lane's wall and guess the time, walls moving at their speed now; returns the time.
 
     SURE is positive only where the part of the flight before y = 0 is as chosen: docs/lanes.md.
     """
-    widest_registers()
     bend, per_r = limits.bend, 2.0 / limits.least_r
-    for i in range(n):
-        outset = outset_of(a, i)
-        x, y, vx, vy, wall, _, v2 = outset
-        w0, w1, w2, h1, h2 = a[W0 + i], a[W1 + i], a[W2 + i], a[H1 + i], a[H2 + i]
-        depth, rise = abs(y), abs(vy)
-        k_side = side_curvature(vy, slope, limits)
-        gap, doubt, lift = mouth_crossing(outset, w0, w1, k_side, per_r, limits)
-        m, m1, m2 = (a[M0 + i], a[M1 + i], a[M2 + i]) if slope is None else (slope, 0.0, 0.0)
-        edge, drift = fma(m, y, w0), fma(m, vy, fma(m1, y, w1))
-        f, d, side = nearest_below(wall, edge - x, vx - drift, edge + x, -vx - drift, y + a[H0 + i], -vy - h1)
-        r0, r1, r2 = a[R0 + i], a[R1 + i], a[R2 + i]
-        f_a, d_a, root = arc_quotient(outset, r0, r1, r2)
-        # Which of them, by the part of the table the flight is in and whether it crosses y = 0 before.
-        reaches = fma(y, d_a, vy * f_a) if vy < 0.0 else 1.0  # cap: > 0 where the arc comes first
-        stays = depth * d - f * vy if vy > 0.0 else 1.0  # stem: > 0 where a side comes first
-        top = ON_BASE if is_stem else ON_ARC
-        below = side if gap > 0.0 else ON_BASE
-        from_cap = ON_ARC if reaches > 0.0 else below
-        from_stem = side if stays > 0.0 else top
-        is_in_cap = 1.0 if wall < 1.5 else 0.0
-        is_in_cap = 0.0 if is_stem else is_in_cap
-        hit = from_cap if is_in_cap > 0.5 else from_stem
-        f = f_a if hit == ON_ARC else f
-        d = d_a if hit == ON_ARC else d
-        f = depth if hit == ON_BASE else f
-        d = rise if hit == ON_BASE else d
-        # One division for 1 / d and 1 / root.
-        root = root if hit == ON_ARC else 1.0
-        inverse = ONE / (d * root)
-        s = f * (root * inverse)
-        # What is beyond the straight line, or beyond second order at the arc.
-        beyond = h2 if hit == ON_FLOOR else fma(m2, y, fma(2.0 * m1, vy, w2))
-        beyond = beyond if hit >= ON_LEFT else 0.0
-        beyond = beyond * s if hit != ON_ARC else cube_of_arc(r0, r1, r2, a[R3 + i]) * s * s * d
-        s = s * fma(0.5 * beyond, inverse, 1.0)
-        # Comparisons so put that what is no number is never sure.
-        whole = reaches if is_in_cap > 0.5 else stays
-        gap = gap * rise
-        sure = abs(gap) - doubt if is_in_cap > 0.5 else min(gap - doubt, lift)
-        sure = 1.0 if is_stem else sure
-        sure = 1.0 if whole > 0.0 else sure
-        # The arc's function must be concave.
-        concave = v2 - bend if hit == ON_ARC else 1.0
-        a[HIT + i], a[S + i], a[SURE + i] = hit, s, min(concave, sure)
+    outset, now = outset_of(a, i), laws_now(a, i, waves, is_relative, slope, degree)
+    x, y, vx, vy, wall, _, v2 = outset
+    depth, rise = abs(y), abs(vy)
+    k_side = side_curvature(vy, slope, limits)
+    gap, doubt, lift = mouth_crossing(outset, now.w, now.w1, k_side, per_r, limits)
+    edge, drift = fma(now.m, y, now.w), fma(now.m, vy, side_rate(y, now, slope))
+    f, d, side = nearest_below(wall, edge - x, vx - drift, edge + x, -vx - drift, y + now.h, -vy - now.h1)
+    f_a, d_a, root = arc_quotient(outset, now.r, now.r1, now.r2)
+    # Which of them, by the part of the table the flight is in and whether it crosses y = 0 before.
+    reaches = fma(y, d_a, vy * f_a) if vy < 0.0 else 1.0  # cap: > 0 where the arc comes first
+    stays = depth * d - f * vy if vy > 0.0 else 1.0  # stem: > 0 where a side comes first
+    top = ON_BASE if is_stem else ON_ARC
+    below = side if gap > 0.0 else ON_BASE
+    from_cap = ON_ARC if reaches > 0.0 else below
+    from_stem = side if stays > 0.0 else top
+    is_in_cap = 1.0 if wall < 1.5 else 0.0
+    is_in_cap = 0.0 if is_stem else is_in_cap
+    hit = from_cap if is_in_cap > 0.5 else from_stem
+    f = f_a if hit == ON_ARC else f
+    d = d_a if hit == ON_ARC else d
+    f = depth if hit == ON_BASE else f
+    d = rise if hit == ON_BASE else d
+    # One division for 1 / d and 1 / root.
+    root = root if hit == ON_ARC else 1.0
+    inverse = ONE / (d * root)
+    s = f * (root * inverse)
+    # What is beyond the straight line, or beyond second order at the arc.
+    beyond = now.h2 if hit == ON_FLOOR else side_bend(y, vy, now, slope)
+    beyond = beyond if hit >= ON_LEFT else 0.0
+    beyond = beyond * s if hit != ON_ARC else cube_of_arc(now.r, now.r1, now.r2, now.r3) * s * s * d
+    s = s * fma(0.5 * beyond, inverse, 1.0)
+    # Comparisons so put that what is no number is never sure.
+    whole = reaches if is_in_cap > 0.5 else stays
+    gap = gap * rise
+    sure = abs(gap) - doubt if is_in_cap > 0.5 else min(gap - doubt, lift)
+    sure = 1.0 if is_stem else sure
+    sure = 1.0 if whole > 0.0 else sure
+    # The arc's function must be concave.
+    concave = v2 - bend if hit == ON_ARC else 1.0
+    s = a[S + i] if a[TRIES + i] > 0.0 else s
+    a[HIT + i], a[S + i], a[SURE + i] = hit, s, min(concave, sure)
+    return s

@@ -58,6 +58,13 @@ def two_sum(a, b):
 
 
 @kernel
+def short_sum(a, b):
+    """Return a + b for |b| below |a|, or a = 0, as a rounded sum and its error."""
+    s = a + b
+    return s, b - (s - a)
+
+
+@kernel
 def two_product(a, b):
     """Return a b as a rounded product and its exact error."""
     p = a * b

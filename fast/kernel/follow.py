@@ -16,19 +16,18 @@ from __future__ import annotations
 import numpy as np
 
 from fast.kernel.arithmetic import fma
-from fast.kernel.bounces import arrive
-from fast.kernel.codes import ANEW, ARC, CAP, HORIZON, MUSHROOM, N_WALLS, TOO_FAR
+from fast.kernel.bounces import captured, count_hit, spin_in_disk, stay_after
+from fast.kernel.codes import ANEW, ARC, HORIZON, N_WALLS, TOO_FAR
 from fast.kernel.compiling import kernel, part
-from fast.kernel.flights import OFF, advance, collide, correct
 from fast.kernel.judged import KNOWN
 from fast.kernel.kept import keep_lane, take_lane
-from fast.kernel.loops import run_careful
+from fast.kernel.lane_laws import know_laws, set_reference
+from fast.kernel.loops import run_careful, run_step
 
 from fast.kernel.pools import (  # isort: skip
-    AS_GIVEN, CERTAIN, CLOSED, DONE, END, HIT, LANES, NEVER, NEXT_R0, NEXT_T, NEXT_T_LOW, NEXT_VX, NEXT_VY,
-    NEXT_W0, NEXT_X, NEXT_Y, N_ARC, N_BASE, N_FLOOR, N_LEFT, N_RIGHT, OK, ON_ARC, PIECE, ROUTINE, S, SINCE,
-    SPIN, STAY_IN, STAY_OUT, STOP, STRIDE, T, T_LOW, UNTIL, VX, VY, WALL, X, Y, change_lane, fold, load,
-    refold, set_laws, set_reference, whole_registers,
+    AS_GIVEN, END, FAR, FATE, LANES, LATE, MARKED, MAX_CORRECTIONS, MOVED, NEVER, N_ARC, N_BASE, N_FLOOR,
+    N_LEFT, N_RIGHT, ON_ARC, S, SINCE, SPIN, STAY_IN, STAY_OUT, STOP, STRIDE, T, TRIES, T_LOW, UNTIL, VX, VY,
+    WALL, WHEN, X, Y, change_lane, load, refold, whole_registers,
 )  # fmt: skip
 from fast.kernel.records import RADIUS, VALUE, WIDTH, Particle, particle_at, write_state
 from fast.kernel.worker import DISK, GENERAL, NEXT_STOP, PARTICLE
@@ -66,7 +65,6 @@ def note_stops(a, i, roster, last, stops, followed):
             keep_stay(j, stops.cycles[at], begin, min(end, times[at]), stops, followed)
         at += 1
     roster[NEXT_STOP, i] = at
-    a[STOP + i] = times[at] if at < times.shape[0] else NEVER
 
 
 @part
@@ -75,8 +73,8 @@ def note_stay(a, i, roster, stops, followed):
     at = roster[NEXT_STOP, i]
     while stops.cycles[at] < 0:  # the last stop ends a cycle
         at += 1
-    keep_stay(roster[PARTICLE, i], stops.cycles[at], a[STAY_IN + i], a[CLOSED + i], stops, followed)
-    a[STAY_IN + i] = a[STAY_OUT + i] = a[CLOSED + i] = NEVER
+    keep_stay(roster[PARTICLE, i], stops.cycles[at], a[STAY_IN + i], a[WHEN + i], stops, followed)
+    a[STAY_IN + i] = a[STAY_OUT + i] = a[WHEN + i] = NEVER
     if stops.is_first_kept:
         a[UNTIL + i] = -NEVER  # no other is wanted
 
@@ -113,52 +111,71 @@ def has_met_another(a, i):
 
 
 @kernel
-def step_carefully(pool, a, i, roster, worker):
-    """Find a lane's next collision carefully, in the disk the next one with the arc; returns the last code.
-
-    The lane then needs no bounce.
-    """
-    scene, anchors, stops, followed = worker.scene, worker.anchors, worker.stops, worker.followed
-    if pool == DISK:
-        refold(a, i)
-    while True:
-        t, t_low = a[T + i], a[T_LOW + i]
-        p = Particle(t, t_low, a[X + i], a[Y + i], a[VX + i], a[VY + i], int(a[WALL + i]))
-        limit = (stops.times[-1] - t) - t_low
-        code, s, p = run_careful(worker.loops.careful, (p, limit, KNOWN, scene, anchors))
-        followed.careful[roster[PARTICLE, i]] += 1
-        a[NEXT_T + i], a[NEXT_T_LOW + i] = p.t, p.t_low
-        a[NEXT_X + i], a[NEXT_Y + i], a[NEXT_VX + i], a[NEXT_VY + i] = p.x, p.y, p.vx, p.vy
-        a[HIT + i], a[DONE + i], a[S + i] = code, 1.0, s
-        if code != ARC or a[WALL + i] != ON_ARC or has_met_another(a, i):
-            a[AS_GIVEN + i] = 0.0
-        if code < HORIZON:
-            set_reference(a, i, p.t, p.t_low, scene, worker.pieces, worker.degree)
-            set_laws(a, i, NEXT_R0, p.t, p.t_low, scene, worker.degree)
-            w = anchors[WIDTH, VALUE]  # known where the lanes know nothing
-            a[NEXT_W0 + i] = w * anchors[RADIUS, VALUE] if scene.is_relative else w
-        if pool == GENERAL or code >= HORIZON:
-            break
-        note_stops(a, i, roster, p.t, stops, followed)
-        if code == ARC:
-            a[N_ARC + i] += 1.0
-            a[SPIN + i] = p.x * p.vy - p.y * p.vx
-            # It goes on unfolded, from arc to arc, and nothing else says so: its laws may be lost where a
-            # guess of the next flight's time lies beyond all pieces.
-            a[WALL + i] = ON_ARC
-            break
-        a[N_BASE + i] += 1.0
-        arrive(a, i, None)
-        a[VX + i], a[VY + i] = p.vx, p.vy
-    return code
+def advance(pool, a, n, worker):
+    """Take a step of the first n lanes of a pool, whole registers of them, where it is shown right."""
+    loop = worker.loops.chord if pool == DISK else worker.loops.fly
+    run_step(loop, (a, n, worker.table, worker.waves, worker.slope, worker.limits))
 
 
 @part
-def keep_up_laws(a, i, worker):
-    """Give a lane the piece of the laws that serves at its next collision, where its own does no longer."""
-    t, t_low = a[NEXT_T + i], a[NEXT_T_LOW + i]
-    if t >= a[END + i]:
-        set_reference(a, i, t, t_low, worker.scene, worker.pieces, worker.degree)
+def set_stop(a, i, roster, worker):
+    """Tell a lane when `attend` is to look at it next: never later than a period on."""
+    times, at, pieces = worker.stops.times, roster[NEXT_STOP, i], worker.pieces
+    stop = min(a[T + i] + pieces.period, pieces.until)
+    a[STOP + i] = min(stop, times[at]) if at < times.shape[0] else stop
+
+
+@kernel
+def careful_flight(a, i, worker):
+    """Find a lane's next collision carefully; returns what `careful_step` does."""
+    t, t_low = a[T + i], a[T_LOW + i]
+    p = Particle(t, t_low, a[X + i], a[Y + i], a[VX + i], a[VY + i], int(a[WALL + i]))
+    limit = (worker.stops.times[-1] - t) - t_low
+    return run_careful(worker.loops.careful, (p, limit, KNOWN, worker.scene, worker.anchors))
+
+
+@kernel
+def land_carefully(pool, a, i, code, s, p, worker):
+    """Move a lane to the collision that a careful step has found; the anchors hold the laws there."""
+    scene, hit = worker.scene, float(code)
+    if code != ARC or a[WALL + i] != ON_ARC or has_met_another(a, i):
+        a[AS_GIVEN + i] = 0.0
+    w = worker.anchors[WIDTH, VALUE]
+    if scene.is_relative:
+        w *= worker.anchors[RADIUS, VALUE]
+    beyond = captured(hit, worker.table.is_mushroom, p.x, p.y, a[VX + i], a[VY + i], w)
+    stay = a[SINCE + i], a[UNTIL + i], a[STAY_IN + i], a[STAY_OUT + i]
+    a[STAY_IN + i], a[STAY_OUT + i], a[WHEN + i] = stay_after(hit, p.t, beyond, *stay)
+    a[SPIN + i] = spin_in_disk(beyond, p.x, p.y, p.vx, p.vy, w)
+    if pool == DISK:
+        a[SPIN + i] = p.x * p.vy - p.y * p.vx
+    count_hit(a, i, hit, 1.0)
+    a[T + i], a[T_LOW + i], a[X + i], a[Y + i], a[VX + i], a[VY + i] = p.t, p.t_low, p.x, p.y, p.vx, p.vy
+    a[WALL + i], a[S + i], a[TRIES + i] = hit, s, 0.0
+    if worker.is_laned:
+        know_laws(a, i, 0.0, scene, worker.pieces, worker.degree, worker.waves)
+
+
+@kernel
+def step_carefully(pool, a, i, roster, worker):
+    """Take a lane's next step carefully, in the disk up to the arc; returns the last code.
+
+    HORIZON: the next collision is at the last stop or later, and the lane is where it was.
+    """
+    stops, followed = worker.stops, worker.followed
+    if pool == DISK:
+        refold(a, i)
+    while True:
+        code, s, p = careful_flight(a, i, worker)
+        followed.careful[roster[PARTICLE, i]] += 1
+        if code > HORIZON:
+            return code
+        note_stops(a, i, roster, p.t, stops, followed)
+        if code == HORIZON or roster[NEXT_STOP, i] == stops.times.shape[0]:
+            return np.int64(HORIZON)
+        land_carefully(pool, a, i, code, s, p, worker)
+        if pool == GENERAL or code == ARC:
+            return code
 
 
 @part
@@ -170,83 +187,95 @@ def collisions_of(a, i):
     return total
 
 
+@part
+def knows_laws(a, i, worker):
+    """Tell whether the lanes may take a particle's next step."""
+    return worker.is_laned and a[END + i] > -NEVER and a[AS_GIVEN + i] == 0.0
+
+
+@kernel
+def mark(pool, a, i, roster, worker):
+    """Note what came with a lane's move; returns whether it stays or moves to the other pool."""
+    if a[WHEN + i] < NEVER:
+        note_stay(a, i, roster, worker.stops, worker.followed)
+    if a[T + i] >= a[END + i] and a[END + i] > -NEVER:
+        set_reference(a, i, a[T + i], a[T_LOW + i], worker.scene, worker.pieces, worker.degree)
+    if knows_laws(a, i, worker):
+        set_stop(a, i, roster, worker)
+    else:
+        a[STOP + i] = -NEVER
+    return MOVES if pool == GENERAL and a[SPIN + i] != 0.0 and worker.is_laned else STAYS
+
+
+@kernel
+def code_of_attention(pool, a, i, roster, worker):
+    """Take a lane past stops, or a careful step; returns the code of its end, or ARC for none."""
+    stops, followed, end = worker.stops, worker.followed, worker.stops.times[-1]
+    is_late = knows_laws(a, i, worker) and a[FATE + i] == LATE
+    if followed.lanes.shape[1] > 0 and not (is_late and a[WHEN + i] < end):
+        keep_lane(pool, a, i, roster, knows_laws(a, i, worker), worker)  # it may end here
+    code = ARC
+    if is_late:
+        note_stops(a, i, roster, a[WHEN + i], stops, followed)
+        if roster[NEXT_STOP, i] == stops.times.shape[0]:
+            code = HORIZON
+        if not a[WHEN + i] < worker.pieces.until:
+            a[END + i] = -NEVER
+        a[WHEN + i] = NEVER
+    else:
+        code = step_carefully(pool, a, i, roster, worker)
+        code = ARC if code < HORIZON else code
+    if roster[NEXT_STOP, i] < worker.n_passed:
+        # Put back, it does not pass all stops again: the last had come within rounding of a collision, or the
+        # careful step, which now looks further, is undecided. A run at once would have written otherwise.
+        return np.int64(ANEW)
+    if code == ARC and collisions_of(a, i) > stops.most:
+        if pool == DISK:
+            refold(a, i)
+        return np.int64(TOO_FAR)
+    return np.int64(code)
+
+
 @kernel
 def attend(pool, a, i, roster, worker):
     """Do for a lane what `advance` could not; returns whether it stays, moves to the other pool or ends.
 
     Who has had too many collisions is given up: energy may grow without end.
     """
-    scene, stops, followed = worker.scene, worker.stops, worker.followed
-    end = stops.times[-1]
-    if a[CLOSED + i] < NEVER:
-        note_stay(a, i, roster, stops, followed)
-    if pool == GENERAL and a[SPIN + i] != 0.0 and worker.is_laned:
+    fate, knows = a[FATE + i], knows_laws(a, i, worker)
+    if knows and fate == MARKED:
+        return mark(pool, a, i, roster, worker)
+    if knows and fate == FAR and a[TRIES + i] <= MAX_CORRECTIONS:  # the piece at the flight's end
+        t = a[T + i] + a[S + i]
+        set_reference(a, i, t, a[T_LOW + i], worker.scene, worker.pieces, worker.degree)
+        if a[END + i] > -NEVER:
+            return STAYS
+    if pool == DISK and worker.table.is_mushroom and not (knows and fate == LATE):
+        refold(a, i)
+        a[WALL + i], a[TRIES + i] = ON_ARC, 0.0
         return MOVES
-    is_certain = worker.is_laned and a[END + i] > -NEVER and a[OK + i] == CERTAIN
-    if not is_certain and pool == DISK and scene.table == MUSHROOM:
-        fold(a, i, scene, worker.pieces, worker.degree)
-        return MOVES
-    if followed.lanes.shape[1] > 0 and not (is_certain and a[NEXT_T + i] < end):
-        keep_lane(pool, a, i, roster, is_certain, worker)  # it may end here
-    if is_certain:
-        keep_up_laws(a, i, worker)
-        code = int(a[HIT + i])
-    else:
-        code = step_carefully(pool, a, i, roster, worker)
-    if code < HORIZON:
-        note_stops(a, i, roster, a[NEXT_T + i], stops, followed)
-        code = HORIZON
-        if worker.n_passed <= roster[NEXT_STOP, i] < stops.times.shape[0]:
-            if collisions_of(a, i) <= stops.most:
-                return STAYS
-            code = int(TOO_FAR)
-            if pool == DISK:
-                refold(a, i)
-    elif code == HORIZON:
-        note_stops(a, i, roster, end, stops, followed)
-    if roster[NEXT_STOP, i] < worker.n_passed:
-        # Put back, it does not pass all stops again: the last had come within rounding of a collision, or the
-        # careful step, which now looks further, is undecided. A run at once would have written otherwise.
-        code = ANEW
-    finish(pool, a, i, roster[PARTICLE, i], code, end, followed)
-    return ENDS
+    code = code_of_attention(pool, a, i, roster, worker)
+    if code != ARC:
+        finish(pool, a, i, roster[PARTICLE, i], code, worker.stops.times[-1], worker.followed)
+        return ENDS
+    return mark(pool, a, i, roster, worker)
 
 
 @part
-def are_routine(a, n):
+def are_calm(a, n):
     """Tell whether no lane of a pool needs attention: mostly so, and seen in one packed loop."""
-    least = 1.0
+    least = MOVED
     for i in range(n):
-        least = min(least, a[ROUTINE + i])
-    return least > 0.0
+        least = min(least, a[FATE + i])
+    return least >= MOVED
 
 
 @part
 def change_place(worker, pool, i, other, j):
     """Copy a lane and its entry in the roster to another place."""
-    change_lane(worker.pools[pool], i, worker.pools[other], j)
+    change_lane(worker.pools[pool], i, worker.pools[other], j, worker.degree)
     worker.rosters[other, PARTICLE, j] = worker.rosters[pool, PARTICLE, i]
     worker.rosters[other, NEXT_STOP, j] = worker.rosters[pool, NEXT_STOP, i]
-
-
-@part
-def needs_a_piece_alone(pool, a, i, roster, worker):
-    """Tell whether all that `attend` would do for a lane is to give it the next piece of the laws.
-
-    As `fly` and `chord` have it in ROUTINE, but for END: no stay ends, no pool changes, and no stop comes
-    before the collision, the last one neither, so that nothing is noted or kept.
-    Where laws are quick that is so for every few flights, and a call of `attend` takes longer than a flight.
-    After a period's first piece it is called all the same, which counts collisions: so often is enough, and
-    counting them here, for every piece, made the loop around all this slower by a tenth.
-    """
-    is_certain = a[OK + i] == CERTAIN and a[END + i] > -NEVER and worker.n_passed <= roster[NEXT_STOP, i]
-    return (
-        is_certain
-        and a[PIECE + i] > 0.0
-        and a[CLOSED + i] == NEVER
-        and a[NEXT_T + i] < a[STOP + i]
-        and (pool == DISK or a[SPIN + i] == 0.0)
-    )
 
 
 @part
@@ -256,16 +285,14 @@ def scan(pool, worker):
     i = np.int64(0)
     while i < n_held[pool]:
         fate = STAYS
-        if not (a[ROUTINE + i] > 0.0 and worker.is_laned):
-            if worker.is_laned and needs_a_piece_alone(pool, a, i, roster, worker):
-                keep_up_laws(a, i, worker)
-            else:
-                fate = attend(pool, a, i, roster, worker)
+        if a[FATE + i] < MOVED:
+            fate = attend(pool, a, i, roster, worker)
         if fate == STAYS:
             i += 1
             continue
         if fate == MOVES:
             other = 1 - pool
+            a[FATE + i] = MOVED  # of a flight in the other pool nothing is known yet
             change_place(worker, pool, i, other, n_held[other])
             n_held[other] += 1
         n_held[pool] -= 1
@@ -273,21 +300,20 @@ def scan(pool, worker):
 
 
 @part
-def put_back(worker, pool, first, last):
-    """Put kept particles back into their pool, up to one of the other pool; returns the next one's number.
-
-    They come between a flight and its bounce, with the step found before or in want of a careful one.
-    """
-    n_held, is_ours = worker.n_held, True
-    while is_ours and first < last and n_held[GENERAL] + n_held[DISK] < LANES:
-        i = n_held[pool]
-        place = take_lane(worker.pools[pool], i, worker.rosters[pool], first, worker)
-        is_ours = place == pool or place < 0
-        if is_ours:
-            first += 1
-        if place == pool:
-            n_held[pool] += 1
-    return first
+def take_in(worker, j, wall):
+    """Put a particle into the next lane: from its start, or as it was kept."""
+    n_held, home, followed = worker.n_held, DISK if worker.table.is_cap else GENERAL, worker.followed
+    if worker.n_passed > 0 and not followed.lanes[j, 0] >= 0.0:
+        followed.codes[j] = ANEW
+        return
+    if worker.n_passed > 0:
+        home = DISK if followed.lanes[j, 0] > 0.0 else GENERAL
+        take_lane(worker.pools[home], n_held[home], worker.rosters[home], j, worker)
+    else:
+        i = n_held[home]
+        load(worker.pools[home], i, particle_at(followed.states, j, wall), worker.stops.is_first_kept)
+        worker.rosters[home, PARTICLE, i], worker.rosters[home, NEXT_STOP, i] = j, 0
+    n_held[home] += 1
 
 
 @kernel
@@ -299,33 +325,17 @@ def follow(worker, walls):
             at where particles go on from `followed.lanes`.
         walls: codes of the walls that the particles leave (N,).
     """
-    scene, stops, pools, n_held = worker.scene, worker.stops, worker.pools, worker.n_held
-    states = worker.followed.states
-    first, last = 0, states.shape[0]
-    home, is_resumed = DISK if scene.table == CAP else GENERAL, worker.n_passed > 0
-    while stops.called_off[0] == 0:
-        while not is_resumed and n_held[GENERAL] + n_held[DISK] < LANES and first < last:
-            i = n_held[home]
-            load(
-                pools[home], i, particle_at(states, first, walls[first]), stops.times[0], stops.is_first_kept
-            )
-            pools[home][AS_GIVEN + i] = 1.0 if walls[first] == ARC else 0.0
-            worker.rosters[home, PARTICLE, i], worker.rosters[home, NEXT_STOP, i] = first, 0
-            n_held[home] += 1
+    pools, n_held = worker.pools, worker.n_held
+    first, last = 0, worker.followed.states.shape[0]
+    while worker.stops.called_off[0] == 0:
+        while n_held[GENERAL] + n_held[DISK] < LANES and first < last:
+            take_in(worker, first, walls[first])
             first += 1
-        if n_held[GENERAL] + n_held[DISK] == 0 and first == last:
+        if n_held[GENERAL] + n_held[DISK] == 0:
             break
         for pool in (GENERAL, DISK):
-            a = pools[pool]
-            if n_held[pool] == 0 and not is_resumed:
-                continue
-            n = whole_registers(n_held[pool])
-            advance(pool, a, n, OFF, worker)
-            if is_resumed and first < last:
-                first = put_back(worker, pool, first, last)
-                n = whole_registers(n_held[pool])
-            if not (worker.is_laned and are_routine(a, n_held[pool])):
-                if worker.is_laned:
-                    correct(pool, a, n_held[pool], worker)
+            n = n_held[pool]
+            if n > 0 and worker.is_laned:
+                advance(pool, pools[pool], whole_registers(n), worker)
+            if n > 0 and not (worker.is_laned and are_calm(pools[pool], n)):
                 scan(pool, worker)
-            collide(pool, a, n, worker)

@@ -18,17 +18,50 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from fast.kernel.ahead import cap_ahead, cap_at_hit, stem_ahead, stem_at_hit, stem_there
-from fast.kernel.aiming import ONE, cube_of_arc, outset_of, side_curvature
-from fast.kernel.arithmetic import SAFETY, fma, two_sum
+from fast.kernel.aiming import aim, cube_of_arc, outset_of, side_curvature, side_rate
+from fast.kernel.arithmetic import SAFETY, fma, short_sum, two_product, two_sum
+from fast.kernel.bounces import (
+    ONE,
+    captured,
+    count_hit,
+    off_the_arc_spinning,
+    off_the_wall,
+    spin_in_disk,
+    stay_after,
+)
 from fast.kernel.compiling import packed, part, widest_registers
+from fast.kernel.lane_laws import (
+    LawsAt,
+    laws_ahead,
+    laws_now,
+    look_ahead,
+    move_laws,
+    radius_since,
+    room_ahead,
+)
 
 from fast.kernel.pools import (  # isort: skip
-    BACK, BEFORE, CERTAIN, CLOSED, COARSE, END, FAR, HIT, LIMIT, MEAN_RATE, NEVER, NEXT_R0, NEXT_R1, NEXT_R2,
-    NEXT_T, NEXT_T_LOW, NEXT_W0, NEXT_W1, NEXT_X, NEXT_X_LOW, NEXT_Y, NEXT_Y_LOW, OK, ON_ARC, ON_BASE,
-    ON_FLOOR, ON_LEFT, ON_RIGHT, R0, R1, R2, R3, REFUSED, ROUTINE, S, SPIN, STOP, SURE, T, T_LOW, W0,
+    COARSE, END, FAR, FATE, HIT, LATE, MARKED, MAX_CORRECTIONS, MOVED, NEVER, N_ARC, N_BASE, ON_ARC, ON_BASE,
+    ON_FLOOR, ON_LEFT, ON_RIGHT, REFUSED, S, SINCE, SPIN, STAY_IN, STAY_OUT, STOP, SURE, T, TRIES, T_LOW,
+    UNTIL, VX, VY, WALL, WHEN, X, Y,
 )  # fmt: skip
-from fast.kernel.short import place_after, short_sum
+from fast.kernel.records import Place
+
+
+@packed
+def moved(x, v, s):
+    """Return x + v s as a sum of two floats."""
+    p, e = two_product(v, s)
+    x_s, low = two_sum(x, p)
+    return x_s, low + e
+
+
+@packed
+def place_after(s, x, y, vx, vy):
+    """Return the place a time s after (x, y)."""
+    x_s, x_low = moved(x, vx, s)
+    y_s, y_low = moved(y, vy, s)
+    return Place(x_s, x_low, y_s, y_low)
 
 
 class Correction(NamedTuple):
@@ -40,16 +73,16 @@ class Correction(NamedTuple):
 
 
 @part
-def at_side_or_floor(hit, outset, place, stem):
+def at_side_or_floor(hit, outset, place, stem, slope):
     """Return f and f' of the side or the floor that is met."""
     (_, _, vx, vy, _, _, _), (x_s, x_low, y_s, y_low) = outset, place
-    w, w_low, w1, _, h, h1, _, m, m1, _ = stem
+    w, m = stem.w, stem.m
     sign = 1.0 if hit == ON_RIGHT else -1.0
-    f = (w - sign * x_s) + (fma(m, y_s, w_low) + fma(m, y_low, -sign * x_low))
-    slope = fma(m, vy, fma(m1, y_s, w1)) - sign * vx
-    f = (y_s + h) + y_low if hit == ON_FLOOR else f
-    slope = vy + h1 if hit == ON_FLOOR else slope
-    return f, slope
+    f = (w - sign * x_s) + (fma(m, y_s, stem.w_low) + fma(m, y_low, -sign * x_low))
+    rate = fma(m, vy, side_rate(y_s, stem, slope)) - sign * vx
+    f = (y_s + stem.h) + y_low if hit == ON_FLOOR else f
+    rate = vy + stem.h1 if hit == ON_FLOOR else rate
+    return f, rate
 
 
 @part
@@ -81,15 +114,14 @@ def told_rate(t, r, r1, r2, sizes, limits):
 
 
 @part
-def told_push(hit, t, outset, y_s, stem, limits):
+def told_push(hit, t, outset, y_s, stem, slope, limits):
     """Return `pushed` of docs/lanes.md: positive where a bounce hangs on a rate no more than on what enters.
 
     Of sides and floor; the arc is met by nobody slower than it.
     """
     _, _, vx, vy, _, _, _ = outset
-    _, _, w1, w2, _, h1, h2, _, m1, m2 = stem
-    rate = h1 if hit == ON_FLOOR else fma(m1, y_s, w1)
-    bend = h2 if hit == ON_FLOOR else fma(m2, y_s, w2)
+    rate = stem.h1 if hit == ON_FLOOR else side_rate(y_s, stem, slope)
+    bend = stem.h2 if hit == ON_FLOOR else (fma(stem.m2, y_s, stem.w2) if slope is None else stem.w2)
     told = (abs(vx) + abs(vy)) + (abs(rate) + abs(t * bend)) - limits.rate
     told = 1.0 if abs(rate) + abs(bend) == 0.0 else told
     return told if hit >= ON_LEFT else 1.0
@@ -152,130 +184,202 @@ def way_out(hit, s, outset, slope, k_side, sizes, limits):
 
 
 @part
-def verdict(quality, ahead, s, error):
-    """Return what is known of a step: CERTAIN, COARSE, REFUSED, which nan comes to as well, or FAR."""
-    result = CERTAIN if error < s else COARSE
+def verdict(quality, ahead, s, error, tries):
+    """Return what is known of a flight: LATE for a right one, COARSE, REFUSED, which nan comes to, or FAR."""
+    result = COARSE if tries < MAX_CORRECTIONS else REFUSED
+    result = LATE if error < s else result
     result = result if quality > 0.0 else REFUSED
     result = result if s < NEVER else REFUSED
     return FAR if ahead <= 0.0 else result
 
 
-@packed
-def arrive_at(a, i, outset, s, delta, within, result, place):
-    """Write what became of a step, with time and place of the hit; returns y there, and ROUTINE so far."""
-    (_, _, vx, vy, _, _, _), (x_s, x_low, y_s, y_low) = outset, place
+@part
+def time_after(a, i, s, delta):
+    """Return the time of a hit as a sum of two floats."""
     t, low = two_sum(a[T + i], s)
-    t, low = two_sum(t, low + (a[T_LOW + i] + delta))
-    a[S + i] = s + delta if within > 0.0 else s  # from laws out of their reach nothing is learnt
-    a[OK + i] = result
-    a[NEXT_T + i] = t
-    a[NEXT_T_LOW + i] = low
-    a[NEXT_X + i], a[NEXT_X_LOW + i] = short_sum(x_s, fma(vx, delta, x_low))
-    y_s, y_low = short_sum(y_s, fma(vy, delta, y_low))
-    a[NEXT_Y_LOW + i] = y_low
-    return y_s, result - COARSE if t < min(a[STOP + i], a[END + i]) else 0.0
+    return short_sum(t, low + (a[T_LOW + i] + delta))
+
+
+@part
+def laws_at_hit(there, delta):
+    """Return the laws at a hit, `delta` after the end that was guessed; of what a bounce asks for."""
+    w, h = fma(there.w1, delta, there.w), fma(there.h1, delta, there.h)
+    r, m = fma(there.r1, delta, there.r), fma(there.m1, delta, there.m)
+    r1, w1 = fma(there.r2, delta, there.r1), fma(there.w2, delta, there.w1)
+    h1, m1 = fma(there.h2, delta, there.h1), fma(there.m2, delta, there.m1)
+    return LawsAt(r, r1, there.r2, there.r3, w, 0.0, w1, there.w2, h, h1, there.h2, m, m1, there.m2)
 
 
 @packed
-def fly(a, n, is_stem, is_relative, slope, degree, limits):
-    """Correct each lane's time of flight once, and tell whether the step is then right and routine."""
-    widest_registers()
+def land(a, i, is_stem, is_mushroom, is_relative, waves, slope, degree, limits):
+    """Correct a lane's time of flight once, and tell whether the step is then right; if so, take it."""
     bend = limits.bend
-    for i in range(n):
-        since, w2, w_low = cap_ahead(a, i, is_relative, degree)
-        stem_ahead(a, i, since, w2, w_low, slope, degree)
-    for i in range(n):
-        outset, hit, s = outset_of(a, i), a[HIT + i], a[S + i]
-        x, y, vx, vy, wall, q, v2 = outset
-        before, mean_rate = a[BEFORE + i], a[MEAN_RATE + i]
-        since = before + s
-        r, r1, r2 = a[NEXT_R0 + i], a[NEXT_R1 + i], a[NEXT_R2 + i]
-        stem = stem_there(a, i, slope)
-        k_side = side_curvature(vy, slope, limits)
-        end = place_after(s, x, y, vx, vy)
-        x_s, x_low, y_s, y_low = end
-        f, rate = at_side_or_floor(hit, outset, end, stem)
-        # The arc: its increments if it was left, else what is there.
-        hop = hop_along_arc(s, outset, a[R0 + i], s * mean_rate)
-        f_arc = fma(-x_s, x_s, (r - y_s) * (r + y_s)) - 2.0 * fma(x_s, x_low, y_s * y_low)
-        f_arc = hop if wall == ON_ARC else f_arc
-        f = f_arc if hit == ON_ARC else f
-        rate = 2.0 * fma(r, r1, -fma(s, v2, q)) if hit == ON_ARC else rate
-        bend_s = 2.0 * (bend + v2) if hit == ON_ARC else k_side
-        f = y_s + y_low if hit == ON_BASE else f
-        rate = vy if hit == ON_BASE else rate
-        bend_s = 0.0 if hit == ON_BASE else bend_s
-        inverse = ONE / rate
-        delta = -f * inverse
-        error = 2.0**58 * abs(0.5 * bend_s * inverse) * delta * delta
-        error = left_in_place(error, hit, vx, vy, r)
-        sizes = arc_sizes(s, outset, r, limits)
-        blur = SAFETY * (limits.size + abs(x) + abs(y) + (abs(vx) + abs(vy)) * s)
-        slack = slack_of(hit, wall, s, Correction(delta, inverse, error), r, sizes, blur)
-        # The others are not reached: see the error analysis. The mouth was looked at.
-        clear = clearance(hit, end, stem, far_enough(s, outset, k_side, slack, blur, limits))
-        quality = min(a[SURE + i], clear if hit >= (ON_ARC if is_stem else ON_LEFT) else 1.0)
-        place = place_on_wall(hit, s, outset, end, r, is_stem, slack, limits)
-        first = way_out(hit, s, outset, rate, k_side, sizes, limits)
-        quality = min(min(quality, place), min(first, s))
-        quality = min(quality, told_push(hit, a[T + i], outset, y_s, stem, limits))
-        # A hop needs the radius at both of its ends, and its rate as well as what enters.
-        known = min(before - a[BACK + i], told_rate(a[T + i], r, r1, r2, sizes, limits))
-        known = known if hit == ON_ARC else 1.0
-        quality = min(quality, known if wall == ON_ARC else 1.0)
-        within = a[LIMIT + i] - abs(since)
-        result = verdict(quality, min(within, a[LIMIT + i] - abs(since + delta)), s, error)
-        y_s, routine = arrive_at(a, i, outset, s, delta, within, result, end)
-        a[NEXT_Y + i] = 0.0 if hit == ON_BASE else y_s
-        routine = routine if a[CLOSED + i] == NEVER else 0.0
-        a[ROUTINE + i] = routine if a[SPIN + i] == 0.0 else 0.0
-        cap_at_hit(a, i, delta, r, r1, r2, stem.w, stem.w1)
-        stem_at_hit(a, i, delta, stem, slope)
+    outset, hit, s = outset_of(a, i), a[HIT + i], a[S + i]
+    x, y, vx, vy, wall, q, v2 = outset
+    there = laws_ahead(a, i, waves, is_relative, slope, degree)
+    r0, dr, known = radius_since(a, i, s, waves, degree)
+    r, r1, r2 = there.r, there.r1, there.r2
+    k_side = side_curvature(vy, slope, limits)
+    end = place_after(s, x, y, vx, vy)
+    x_s, x_low, y_s, y_low = end
+    f, rate = at_side_or_floor(hit, outset, end, there, slope)
+    # The arc: its increments if it was left, else what is there.
+    hop = hop_along_arc(s, outset, r0, dr)
+    f_arc = fma(-x_s, x_s, (r - y_s) * (r + y_s)) - 2.0 * fma(x_s, x_low, y_s * y_low)
+    f_arc = hop if wall == ON_ARC else f_arc
+    f = f_arc if hit == ON_ARC else f
+    rate = 2.0 * fma(r, r1, -fma(s, v2, q)) if hit == ON_ARC else rate
+    bend_s = 2.0 * (bend + v2) if hit == ON_ARC else k_side
+    f = y_s + y_low if hit == ON_BASE else f
+    rate = vy if hit == ON_BASE else rate
+    bend_s = 0.0 if hit == ON_BASE else bend_s
+    inverse = ONE / rate
+    delta = -f * inverse
+    error = error_left(0.5 * bend_s * inverse, s, delta, waves)
+    error = left_in_place(error, hit, vx, vy, r)
+    sizes = arc_sizes(s, outset, r, limits)
+    blur = SAFETY * (limits.size + abs(x) + abs(y) + (abs(vx) + abs(vy)) * s)
+    slack = slack_of(hit, wall, s, Correction(delta, inverse, error), r, sizes, blur)
+    # The others are not reached: see the error analysis. The mouth was looked at.
+    clear = clearance(hit, end, there, far_enough(s, outset, k_side, slack, blur, limits))
+    quality = min(a[SURE + i], clear if hit >= (ON_ARC if is_stem else ON_LEFT) else 1.0)
+    place = place_on_wall(hit, s, outset, end, r, is_stem, slack, limits)
+    first = way_out(hit, s, outset, rate, k_side, sizes, limits)
+    quality = min(min(quality, place), min(first, s))
+    quality = min(quality, told_push(hit, a[T + i], outset, y_s, there, slope, limits))
+    # A hop needs the radius at both of its ends, and its rate as well as what enters.
+    known = min(known, told_rate(a[T + i], r, r1, r2, sizes, limits))
+    known = known if hit == ON_ARC else 1.0
+    quality = min(quality, known if wall == ON_ARC else 1.0)
+    within, ahead = room_ahead(a, i, s, delta, waves)
+    result = verdict(quality, min(within, ahead), s, error, a[TRIES + i])
+    # Where it is right, the particle moves on.
+    t, t_low = time_after(a, i, s, delta)
+    at_hit = laws_at_hit(there, delta)
+    x_s, x_low = short_sum(x_s, fma(vx, delta, x_low))
+    y_s, y_low = short_sum(y_s, fma(vy, delta, y_low))
+    y_s = 0.0 if hit == ON_BASE else y_s
+    vx_s, vy_s = off_the_wall(hit, Place(x_s, x_low, y_s, y_low), vx, vy, at_hit, slope)
+    is_moved = t < a[STOP + i] if result == LATE else False
+    beyond = captured(hit, is_mushroom, x_s, y_s, vx, vy, at_hit.w)
+    spin = spin_in_disk(beyond, x_s, y_s, vx_s, vy_s, at_hit.w)
+    begin, over, kept = stay_after(
+        hit, t, beyond, a[SINCE + i], a[UNTIL + i], a[STAY_IN + i], a[STAY_OUT + i]
+    )
+    fate = MOVED if t < a[END + i] else MARKED
+    fate = fate if kept == NEVER else MARKED
+    fate = fate if spin == 0.0 else MARKED
+    a[FATE + i] = fate if is_moved else result
+    a[WHEN + i] = kept if is_moved else t
+    a[S + i] = s + delta if within > 0.0 else s  # from laws out of their reach nothing is learnt
+    tries = a[TRIES + i] + 1.0
+    tries = tries if result == COARSE else (tries if result == FAR else 0.0)
+    a[TRIES + i] = tries
+    count_hit(a, i, hit, 1.0 if is_moved else 0.0)
+    a[STAY_IN + i] = begin if is_moved else a[STAY_IN + i]
+    a[STAY_OUT + i] = over if is_moved else a[STAY_OUT + i]
+    a[SPIN + i] = spin if is_moved else 0.0
+    move(a, i, is_moved, (t, t_low, x_s, y_s, vx_s, vy_s))
+    a[WALL + i] = hit if is_moved else wall
+    move_laws(a, i, delta, is_moved, there, waves, slope)
 
 
 @packed
-def chord(a, n, is_again, is_cap, is_relative, degree, limits):
+def move(a, i, is_moved, state):
+    """Take a state for the present one, where a lane has moved."""
+    t, t_low, x, y, vx, vy = state
+    a[T + i] = t if is_moved else a[T + i]
+    a[T_LOW + i] = t_low if is_moved else a[T_LOW + i]
+    a[X + i] = x if is_moved else a[X + i]
+    a[Y + i] = y if is_moved else a[Y + i]
+    a[VX + i] = vx if is_moved else a[VX + i]
+    a[VY + i] = vy if is_moved else a[VY + i]
+
+
+@packed
+def error_left(curvature, s, delta, waves):
+    """Return `error` of docs/lanes.md, from f'' / (2 f')."""
+    left = abs(curvature)
+    if waves is not None:  # sine and cosine after delta are taken to first order
+        left = fma(0.0625 * waves.omega * waves.omega, s, left)
+    return 2.0**58 * left * delta * delta
+
+
+@packed
+def fly(a, n, table, waves, slope, degree, limits):
+    """Find the next collision of each lane, and take the step where it is shown right."""
+    widest_registers()
+    widest_registers()
+    is_stem, is_mushroom, _, is_relative = table
+    for i in range(n):
+        aim(a, i, is_stem, is_relative, waves, slope, degree, limits)
+    for i in range(n):
+        look_ahead(a, i, a[S + i], waves, is_relative, slope, degree)
+    for i in range(n):
+        land(a, i, is_stem, is_mushroom, is_relative, waves, slope, degree, limits)
+
+
+@packed
+def chord(a, n, table, waves, slope, degree, limits):
     """Find the next arc hit of captured particles: the base is unfolded, |L| is constant.
 
     The chord keeps the distance |L| / v from the centre; while that exceeds w the mouth is out of reach.
-    `is_again`: correct the times found before once more, in place of a new guess.
     """
     widest_registers()
+    widest_registers()
     bend, k_w, size = limits.bend, limits.curvature, limits.size
+    _, _, is_cap, is_relative = table
     for i in range(n):
-        outset = outset_of(a, i)
-        r0, r1_0, r2_0 = a[R0 + i], a[R1 + i], a[R2 + i]
-        inverse = ONE / (outset.v2 - fma(r1_0, r1_0, r0 * r2_0))
-        s = 2.0 * fma(r0, r1_0, -outset.q) * inverse
-        s = s * fma(cube_of_arc(r0, r1_0, r2_0, a[R3 + i]) * s, inverse, 1.0)
-        a[S + i] = a[S + i] if is_again else s
-        cap_ahead(a, i, is_relative, degree)
+        outset, now = outset_of(a, i), laws_now(a, i, waves, is_relative, slope, degree)
+        inverse = ONE / (outset.v2 - fma(now.r1, now.r1, now.r * now.r2))
+        s = 2.0 * fma(now.r, now.r1, -outset.q) * inverse
+        s = s * fma(cube_of_arc(now.r, now.r1, now.r2, now.r3) * s, inverse, 1.0)
+        a[S + i] = a[S + i] if a[TRIES + i] > 0.0 else s
+        a[SURE + i] = now.w
+    for i in range(n):
+        look_ahead(a, i, a[S + i], waves, is_relative, slope, degree)
     for i in range(n):
         outset, spin = outset_of(a, i), a[SPIN + i]
         x, y, vx, vy, _, q, v2 = outset
-        s, before = a[S + i], a[BEFORE + i]
-        since = before + s
-        r, r1, r2 = a[NEXT_R0 + i], a[NEXT_R1 + i], a[NEXT_R2 + i]
-        w, w1 = a[NEXT_W0 + i], a[NEXT_W1 + i]
-        f = hop_along_arc(s, outset, a[R0 + i], s * a[MEAN_RATE + i])
-        slope = 2.0 * fma(r, r1, -fma(s, v2, q))
-        inverse = ONE / slope
+        s = a[S + i]
+        there = laws_ahead(a, i, waves, is_relative, slope, degree)
+        r, r1, r2, w = there.r, there.r1, there.r2, there.w
+        r0, dr, known = radius_since(a, i, s, waves, degree)
+        f = hop_along_arc(s, outset, r0, dr)
+        rate = 2.0 * fma(r, r1, -fma(s, v2, q))
+        inverse = ONE / rate
         delta = -f * inverse
-        error = 2.0**58 * abs((bend + v2) * inverse) * delta * delta
+        error = error_left((bend + v2) * inverse, s, delta, waves)
         end = place_after(s, x, y, vx, vy)
         # The widest that the mouth can be during the flight, from both ends.
-        reach = max(a[W0 + i], w) + fma(k_w * s, s, SAFETY * size)
+        reach = max(a[SURE + i], w) + fma(k_w * s, s, SAFETY * size)
         clear = spin * spin - (1.0 + 4.0 * SAFETY) * reach * reach * v2
         clear = 1.0 if is_cap else clear
         sizes = arc_sizes(s, outset, r, limits)
-        first = -slope - 2.0 * SAFETY * sizes
+        first = -rate - 2.0 * SAFETY * sizes
         slack = slack_of(ON_ARC, ON_ARC, s, Correction(delta, inverse, error), r, sizes, 0.0)
         place = abs(end.y) - (SAFETY * (abs(y) + abs(vy) * s) + abs(vy) * slack)
         quality = min(min(clear, place), min(first, v2 - bend))
-        quality = min(min(quality, s), before - a[BACK + i])
+        quality = min(min(quality, s), known)
         quality = min(quality, told_rate(a[T + i], r, r1, r2, sizes, limits))
-        within = a[LIMIT + i] - abs(since)
-        result = verdict(quality, min(within, a[LIMIT + i] - abs(since + delta)), s, error)
-        y_s, a[ROUTINE + i] = arrive_at(a, i, outset, s, delta, within, result, end)
-        a[NEXT_Y + i] = y_s
-        cap_at_hit(a, i, delta, r, r1, r2, w, w1)
+        within, ahead = room_ahead(a, i, s, delta, waves)
+        result = verdict(quality, min(within, ahead), s, error, a[TRIES + i])
+        t, t_low = time_after(a, i, s, delta)
+        is_moved = t < a[STOP + i] if result == LATE else False
+        x_s, x_low = short_sum(end.x, fma(vx, delta, end.x_low))
+        y_s, y_low = short_sum(end.y, fma(vy, delta, end.y_low))
+        at_hit = laws_at_hit(there, delta)
+        # The angular momentum of the whole stay is constant to the bit.
+        vx_s, vy_s = off_the_arc_spinning(Place(x_s, x_low, y_s, y_low), vx, vy, at_hit.r, at_hit.r1, spin)
+        fate = MOVED if t < a[END + i] else MARKED
+        a[FATE + i] = fate if is_moved else result
+        a[WHEN + i] = NEVER if is_moved else t
+        a[S + i] = s + delta if within > 0.0 else s
+        tries = a[TRIES + i] + 1.0
+        a[TRIES + i] = tries if result == COARSE else (tries if result == FAR else 0.0)
+        # A chord that crosses y = 0 hits the base.
+        crossed = 1.0 if y * y_s < 0.0 else 0.0
+        a[N_ARC + i] += 1.0 if is_moved else 0.0
+        a[N_BASE + i] += crossed if is_moved else 0.0
+        move(a, i, is_moved, (t, t_low, x_s, y_s, vx_s, vy_s))
+        move_laws(a, i, delta, is_moved, there, waves, slope)

@@ -100,20 +100,48 @@ class Pieces(NamedTuple):
     until: float
 
 
+class TableOfLanes(NamedTuple):
+    """What kind of table lanes are in, and whether the width is given as nu."""
+
+    is_stem: bool
+    is_mushroom: bool
+    is_cap: bool
+    is_relative: bool
+
+
+class Waves(NamedTuple):
+    """A scene's laws as waves over one fundamental phase (omega + omega_low) t.
+
+    Attributes:
+        omega, omega_low: the frequency as a sum of two floats; 0 where nothing moves.
+        r, w, h, m: of radius, half-width or nu, depth and slope the mean, and of harmonics 1 and 2 the
+            amplitudes of cosine and sine.
+    """
+
+    omega: float
+    omega_low: float
+    r: tuple[float, ...]
+    w: tuple[float, ...]
+    h: tuple[float, ...]
+    m: tuple[float, ...]
+
+
 class LawsInLanes(NamedTuple):
-    """A scene as the lanes know it.
+    """A scene as the lanes know it: see fast.kernel.lane_laws.
 
     Attributes:
         compiled: the scene's numbers.
-        pieces: its laws as polynomials.
-        degree: of their polynomials, PARABOLA or SERIES of fast.kernel.pieces.
+        pieces: its laws as polynomials; of waves their period alone, and up to when they are known.
+        degree: of the polynomials, PARABOLA or SERIES of fast.kernel.pieces; or ONE_WAVE or TWO_WAVES.
         slope: of the sides; None where it moves.
+        waves: its laws as waves.
     """
 
     compiled: Compiled
     pieces: Pieces
     degree: int
     slope: float | None
+    waves: Waves
 
 
 class Particle(NamedTuple):

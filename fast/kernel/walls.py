@@ -124,22 +124,6 @@ def off_the_arc(place, vx, vy, r, rate):
     return fma(push, x, vx) + x_push, fma(push, y, vy) + y_push
 
 
-@packed
-def off_the_arc_spinning(place, vx, vy, r, rate, spin):
-    """Return the velocity after a hit on the arc where the angular momentum is known to be `spin`."""
-    x, x_low, y, y_low = place
-    q, q_low = products(x, x_low, vx, 0.0, y, y_low, vy, 0.0)
-    rho2, rho2_low = products(x, x_low, x, x_low, y, y_low, y, y_low)
-    p, p_low = two_product(2.0 * r, rate)
-    out, low = two_sum(p, -q)
-    low += p_low - q_low
-    a, a_low = products(out, low, x, x_low, -spin, 0.0, y, y_low)
-    b, b_low = products(out, low, y, y_low, spin, 0.0, x, x_low)
-    vx_s, vx_low = quotient(a, a_low, rho2, rho2_low)
-    vy_s, vy_low = quotient(b, b_low, rho2, rho2_low)
-    return vx_s + vx_low, vy_s + vy_low
-
-
 @kernel
 def curvature_bounds(wall, vx, vy, bounds):
     """Return K >= -inf f'' and L >= sup f'' for all time, from the laws' bounds."""

@@ -13,7 +13,7 @@ import numpy as np
 from numba.core.dispatcher import Dispatcher
 
 import fast
-from fast.kernel import ahead, pieces, pools
+from fast.kernel import bounces, lane_laws, pieces, pools
 from fast.kernel.arithmetic import fma
 from support.from_python import from_python
 
@@ -54,16 +54,19 @@ def faulty_lanes(*changes: str) -> ModuleType:
     they call that takes no pool is compiled, once for all faults.
     """
     folder = HOUSE / "fast" / "kernel"
-    sources = {name: (folder / name).read_text("utf-8") for name in ("lanes.py", "aiming.py")}
+    sources = {
+        name: (folder / name).read_text("utf-8")
+        for name in ("lanes.py", "aiming.py", "bounces.py", "lane_laws.py")
+    }
     for old, new in zip(changes[::2], changes[1::2], strict=True):
         assert any(old in source for source in sources.values()), old
         sources = {name: source.replace(old, new) for name, source in sources.items()}
     module = ModuleType("faulty_lanes")
-    for name, source in sources.items():  # the second's functions replace those that the first imports
+    for name, source in sources.items():  # the last one's functions replace those that the first imports
         exec(compile(source, name, "exec"), module.__dict__)
-    for name, found in (vars(pieces) | vars(pools) | vars(ahead)).items():
+    for name, found in (vars(pieces) | vars(pools)).items():
         vars(module).setdefault(name, found)
-    names = [each.__name__ for each in (module, ahead, pools, pieces)]
+    names = [each.__name__ for each in (module, bounces, lane_laws, pools, pieces)]
     for name, found in list(vars(module).items()):
         function = found.py_func if isinstance(found, Dispatcher) else found
         place = getattr(function, "__module__", None)

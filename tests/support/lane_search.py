@@ -22,7 +22,7 @@ from mpmath import fp
 
 from fast.batch import LaneRound, as_particle, residual
 from fast.fine import fill_path
-from fast.kernel import codes, flights, lanes, pools
+from fast.kernel import codes, lanes, pools
 from fast.kernel.records import DEPTH, RATE, FloatArray
 from scene import BangBang, Cap, Fourier, Law, Mushroom, Scene, Stem
 from scene.laws import value
@@ -70,41 +70,36 @@ class Round(LaneRound):
         self.row(pools.SPIN, n)[:] = x * vy - y * vx
         return self.skip(n)
 
-    def find(self, pool: np.integer[Any], n: int) -> tuple[npt.NDArray[np.bool_], FloatArray, FloatArray]:
-        """Find the next collision of n lanes; faulty kernels run uncompiled, on a list."""
+    def take(self, pool: np.integer[Any], n: int) -> None:
+        """Take a step in n lanes; faulty kernels run uncompiled, on a list."""
         if self.kernels is lanes:
-            return super().find(pool, n)
+            super().take(pool, n)
+            return
         a = self.pool.tolist()
         with np.errstate(all="ignore"):
-            self.advance(a, n, is_again=False)
+            self.advance(a, n)
             for i in range(n):
                 self.correct_lane(a, i)
         self.pool[:] = a
-        return self.answers(n)
 
-    def advance(self, a: list[float], count: int, *, is_again: bool) -> None:
-        """Call the loops of the kernels that `flights.advance` calls."""
-        scene, limits, k = self.compiled, self.worker.limits, self.kernels
-        slope, degree = self.in_lanes.slope, (0,) * self.in_lanes.degree
-        if self.is_disk:
-            k.chord(a, count, is_again, self.is_cap, scene.is_relative, degree, limits)
-            return
-        if not is_again:
-            k.aim(a, count, scene.table == codes.STEM, slope, limits)
-        k.fly(a, count, scene.table == codes.STEM, scene.is_relative, slope, degree, limits)
+    def advance(self, a: list[float], count: int) -> None:
+        """Call the loop of the kernels that `follow.advance` calls."""
+        of, limits, k = self.in_lanes, self.worker.limits, self.kernels
+        waves = of.waves if of.degree in (k.ONE_WAVE, k.TWO_WAVES) else None
+        step = k.chord if self.is_disk else k.fly
+        step(a, count, self.worker.table, waves, of.slope, (0,) * of.degree, limits)
 
     def correct_lane(self, a: list[float], i: int) -> None:
-        """Correct a step that is not yet right again, as `flights.correct` does."""
+        """Correct a step that is not yet right again, as the next rounds do."""
         k, known = self.kernels, (self.compiled, self.in_lanes.pieces, self.in_lanes.degree)
-        for _ in range(flights.MAX_CORRECTIONS):
-            if a[pools.OK + i] not in (pools.COARSE, pools.FAR):
-                break
-            if a[pools.OK + i] == pools.FAR:
-                k.set_reference(a, i, a[pools.T + i] + a[pools.S + i], a[pools.T_LOW + i], *known)
-            spare = [0.0] * pools.POOL_SIZE
-            k.copy_rows(a, i, spare, 0, 0, pools.POOL_SIZE)
-            self.advance(spare, 1, is_again=True)
-            k.copy_rows(spare, 0, a, i, pools.S, pools.NEXT_VX)
+        spare = [0.0] * pools.POOL_SIZE
+        k.copy_rows(a, i, spare, 0, 0, pools.POOL_SIZE)
+        while spare[pools.FATE] in (pools.COARSE, pools.FAR) and spare[pools.TRIES] <= pools.MAX_CORRECTIONS:
+            if spare[pools.FATE] == pools.FAR:
+                t = spare[pools.T] + spare[pools.S]
+                k.set_reference(spare, 0, t, spare[pools.T_LOW], *known)
+            self.advance(spare, 1)
+        k.copy_rows(spare, 0, a, i, 0, pools.POOL_SIZE)
 
     def careful(self, p: FloatArray, wall: int) -> tuple[int, FloatArray]:
         """Return the careful step's wall and dt, x, y, vx, vy; unfolded, those of the next hit of the arc."""

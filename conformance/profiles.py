@@ -109,12 +109,8 @@ def work_identity(
     Raises:
         BadInput: the scene stands still, or an argument is outside its bounds.
     """
-    span = cycle_length(scene)
-    if not span:
-        raise BadInput("scene: nothing moves, must have a law that does")
-    ratio = least_ratio(scene) if ratio is None else ratio
+    span, ratio = _span(scene, alarm), least_ratio(scene) if ratio is None else ratio
     _check_range("ratio", ratio, 0.0, 1.0)
-    _check_range("alarm", alarm, 0.0, 1.0)
     _check_range("kT", kT, 0.0, 2.0**800)
     found = []
     for i, part in enumerate(times):

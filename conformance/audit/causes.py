@@ -14,6 +14,7 @@ from scipy.special import ndtr
 
 import theory
 from conformance.audit.claim import Check
+from conformance.audit.claims.broadened import Sums
 from conformance.audit.ensemble import (
     CAPTURED,
     FREE,
@@ -52,8 +53,8 @@ class Rival(NamedTuple):
     """A mistake: what is said of it, what undoes it in s, and the distribution that is then left."""
 
     said: str
-    undo: Callable[[FloatArray], FloatArray]
     cdf: Cdf
+    undo: Callable[[FloatArray], FloatArray] = np.asarray
 
 
 def likely_causes(given: GivenEnsemble, theirs: Expected, found: list[Check]) -> list[str]:
@@ -129,46 +130,35 @@ def _stays(given: GivenEnsemble, theirs: Expected, found: list[Check]) -> Iterat
 
 
 def _rivals(given: GivenEnsemble, theirs: Expected, right_groups: bool) -> Iterator[Rival]:
-    def same(s: FloatArray) -> FloatArray:
-        return s
-
-    cdf = theirs.cdf
-    yield Rival(
-        "s has the wrong sign: E0 and E1 are exchanged",
-        np.negative,
-        cdf,
-    )
-    yield Rival("E1/E0 is given in place of its logarithm", np.log, cdf)
-    yield Rival("E1/E0 - 1 is given in place of log E1/E0", np.log1p, cdf)
-    yield Rival("speeds are given in place of energies: s is half of what it should be", lambda s: 2 * s, cdf)
-    yield Rival("a logarithm to base 10 is given", lambda s: s * np.log(10), cdf)
-    yield Rival("only the never captured are there: captured particles were dropped", same, theirs.free_cdf)
+    undo: dict[str, Callable[[FloatArray], FloatArray]] = {
+        "s has the wrong sign: E0 and E1 are exchanged": np.negative,
+        "E1/E0 is given in place of its logarithm": np.log,
+        "E1/E0 - 1 is given in place of log E1/E0": np.log1p,
+        "speeds are given in place of energies: s is half of what it should be": lambda s: 2 * s,
+        "a logarithm to base 10 is given": lambda s: s * np.log(10),
+    }
+    yield from (Rival(said, theirs.cdf, undoing) for said, undoing in undo.items())
+    yield Rival("only the never captured are there: captured particles were dropped", theirs.free_cdf)
     if theirs.p_nc < 1:
-        yield Rival("only the captured are there", same, theirs.captured_cdf)
+        yield Rival("only the captured are there", theirs.captured_cdf)
     if theirs.p_nc < 1 and (given.captured is None or (given.captured.any() and right_groups)):
         p = _share_of_the_free(given, theirs)
         yield Rival(
             f"never captured {p:.1%}, where theory has {theirs.p_nc:.1%}, both with the right energies:"
             " starts are not uniform in area and direction, or a share of one group is lost",
-            same,
             lambda s: p * theirs.free_cdf(s) + (1 - p) * theirs.captured_cdf(s),
         )
     yield Rival(
         "energies return: the loop encloses nothing, as with a law of the wrong frequency",
-        same,
-        _returned(theirs),
+        lambda s: np.asarray(ndtr((np.asarray(s) - theirs.sigma**2 / 4) / max(theirs.sigma, 1e-9))),
     )
     try:
         turned = expected(backwards(given.scene), given.energy)
-        yield Rival("the cycle was run backwards, or with a and b exchanged", same, turned.cdf)
+        yield Rival("the cycle was run backwards, or with a and b exchanged", turned.cdf)
         if theirs.has_rates:
             yield from _other_spans(given)
     except (BadInput, theory.NotConverged):
         return
-
-
-def _returned(theirs: Expected) -> Cdf:
-    return lambda s: np.asarray(ndtr((np.asarray(s) - theirs.sigma**2 / 4) / max(theirs.sigma, 1e-9)))
 
 
 def _share_of_the_free(given: GivenEnsemble, theirs: Expected) -> float:
@@ -183,18 +173,10 @@ def _share_of_the_free(given: GivenEnsemble, theirs: Expected) -> float:
 
 def _other_spans(given: GivenEnsemble) -> Iterator[Rival]:
     """Yield parts of a cycle, and two cycles."""
-
-    def same(s: FloatArray) -> FloatArray:
-        return s
-
     found, span = theory.at_energy(given.scene, given.energy), cycle_length(given.scene)
     for part in PARTS:
-        yield Rival(
-            f"energies are those after {part:g} of a cycle", same, _at_a_part(given, found, part * span)
-        )
-    sums = np.sort(found.draw(2, N_DRAWN, 0)[:, -1])
-    ranks = (np.arange(N_DRAWN) + 0.5) / N_DRAWN
-    yield Rival("energies are those after two cycles", same, lambda s: np.asarray(np.interp(s, sums, ranks)))
+        yield Rival(f"energies are those after {part:g} of a cycle", _at_a_part(given, found, part * span))
+    yield Rival("energies are those after two cycles", Sums(found.draw(2, N_DRAWN, 0)[:, -1]).cdf)
 
 
 def _at_a_part(given: GivenEnsemble, found: theory.FiniteEnergy, time: float) -> Cdf:

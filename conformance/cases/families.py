@@ -10,14 +10,13 @@ import msgspec
 
 from conformance.cases.draw import Draw
 from conformance.cases.question import Family, Question
-from conformance.cases.scenes import MOVING as MOVING_KINDS
-from conformance.cases.scenes import TABLES, Clock, clock, place, scene, state, time
+from conformance.cases.scenes import MOVING, TABLES, Clock, clock, place, scene, state, time
 from scene import Cap, Mushroom, Scene, State, Stem, from_data, load, to_data
 from scene.geometry import rounded
 
-MOVING = ("moving-cap", "moving-cap-reversed", "moving-cap-trivial", "ergodic", "untilted")
+MOVING_CAPS = ("moving-cap", "moving-cap-reversed", "moving-cap-trivial", "ergodic", "untilted")
 FIXED = ("fixed-cap-anticlockwise", "fixed-cap-clockwise")
-EVERY = (*MOVING, *FIXED, "breathing-circle", "fermi-ulam")
+EVERY = (*MOVING_CAPS, *FIXED, "breathing-circle", "fermi-ulam")
 CATALOGUE = {
     "moving-cap": "sec. 4.2",
     "moving-cap-reversed": "sec. 4.2",
@@ -37,7 +36,7 @@ WAIT = 16.0  # how long slow particles may fly [time]
 
 def moving_scene(draw: Draw) -> Scene:
     """Draw a scene of any table that moves by waves, or by legs."""
-    return scene(draw, draw.pick(TABLES), clock(draw, MOVING_KINDS))
+    return scene(draw, draw.pick(TABLES), clock(draw, MOVING))
 
 
 def soon(of: Scene, start: tuple[State, float]) -> Question:
@@ -79,7 +78,7 @@ def whispering_gallery(draw: Draw) -> Question:
 
 def stem_path(draw: Draw) -> Question:
     """Follow a fast particle in a stem."""
-    of = scene(draw, "stem", clock(draw, MOVING_KINDS))
+    of = scene(draw, "stem", clock(draw, MOVING))
     at = {"speed": draw.power(2, 6), "patience": 400.0}
     return Question(of, *state(draw, of, at), 30)
 
@@ -133,7 +132,7 @@ def near_corner(draw: Draw) -> Question:
 def through_mouth(draw: Draw) -> Question:
     """Come to y = 0 near the mouth."""
     of = (
-        load(draw.pick((*MOVING, *FIXED)))
+        load(draw.pick((*MOVING_CAPS, *FIXED)))
         if draw.pick((False, True))
         else scene(draw, "mushroom", clock(draw))
     )

@@ -7,14 +7,14 @@ a moving mushroom, a stem with level floor, all much faster than the walls.
 """
 
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any
 
 from conformance.cases.certify import stays
 from conformance.cases.draw import Draw
-from conformance.cases.families import CATALOGUE, FIXED, MOVING
+from conformance.cases.families import CATALOGUE, FIXED, MOVING_CAPS
 from conformance.cases.question import Family, Mark, Question
-from conformance.cases.scenes import MOVING as MOVING_KINDS
-from conformance.cases.scenes import Clock, clock, law, scene, state, time, walls_speed
+from conformance.cases.scenes import MOVING, Clock, clock, law, scene, state, time, walls_speed
 from scene import Mushroom, Scene, State, Stem, load
 from scene.geometry import rounded
 from scene.laws import bounds
@@ -30,7 +30,7 @@ LONGEST_AT = (0, 0, 1, 0, 2)
 LONG_AT = (2, 1, 2, 0, 5, 1, 2, 3, 0, 1, 1, 0, 0, 2, 1, 2)
 INTERRUPTED_AT = (45, 91, 9, 65, 5, 125, 8, 132)
 REGULAR = ("breathing-circle", "frozen-mushroom", "moving-cap", "fixed-cap-clockwise", "fermi-ulam")
-MUSHROOMS = (*MOVING, *FIXED, "frozen-mushroom")
+MUSHROOMS = (*MOVING_CAPS, *FIXED, "frozen-mushroom")
 
 
 def any_marks(found: Marks) -> bool:
@@ -88,7 +88,7 @@ def tilted(draw: Draw, shared: Clock) -> Mushroom:
 
 def flow_tilted(draw: Draw) -> Question:
     """Begin in a stem with such sides."""
-    of = tilted(draw, clock(draw, MOVING_KINDS))
+    of = tilted(draw, clock(draw, MOVING))
     at = {"site": draw.pick(("stem", "left", "right", "floor")), "speed": draw.power(0, 4), "patience": 3.0}
     return _flow(draw, of, at)
 
@@ -128,24 +128,12 @@ def gallery(draw: Draw, of: Scene, t: float, speed: float) -> State:
     return State(t, x, y, -turn * speed * s, turn * speed * c)
 
 
-def _stays(draw: Draw, at: dict[str, Any], looked_for: Callable[[Marks], bool]) -> Question:
+def _stays(at: dict[str, Any], looked_for: Callable[[Marks], bool], draw: Draw) -> Question:
     """Look for capture intervals on a long way through a mushroom."""
-    of = load(draw.pick((*MOVING[:3], *FIXED))) if draw.pick((False, True)) else _narrow(draw)
-    at |= {"speed": draw.power(1, 4)}
-    if "site" not in at:
-        at["speed"] *= draw.between(1.0, 2.0)
-    at["patience"] = draw.pick((6.0, 10.0, 14.0))
+    of = load(draw.pick((*MOVING_CAPS[:3], *FIXED))) if draw.pick((False, True)) else _narrow(draw)
+    speed = draw.power(1, 4) * (1.0 if "site" in at else draw.between(1.0, 2.0))
+    at = {**at, "speed": speed, "patience": draw.pick((6.0, 10.0, 14.0))}
     return _flow(draw, of, at)._replace(collisions=MANY, flow=looked_for)
-
-
-def flow_stays(draw: Draw) -> Question:
-    """Look for several."""
-    return _stays(draw, {}, has_stays(2))
-
-
-def flow_stay_interrupted(draw: Draw) -> Question:
-    """Look for one that an arc hit does not end."""
-    return _stays(draw, {"site": "cap"}, is_interrupted)
 
 
 def flow_stay_at_the_end(draw: Draw) -> Question:
@@ -185,11 +173,6 @@ def longest_flow(draw: Draw) -> Question:
     return Question(of, *state(draw, of, at), 2 * LONGEST, has_hits(LONGEST))
 
 
-def long_trajectory(draw: Draw) -> Question:
-    """Ask for the first 120 of them."""
-    return longest_flow(draw)._replace(collisions=120, flow=None)
-
-
 FAMILIES = (
     Family("flow", "a particle carried through a scene of the catalogue", flow, n_vectors=50),
     Family("flow-generated", "a particle carried through a generated table", flow_generated, n_vectors=40),
@@ -207,7 +190,7 @@ FAMILIES = (
     Family(
         "flow-stays",
         "several captured stays: the first is told",
-        flow_stays,
+        partial(_stays, {}, has_stays(2)),
         "sec. 3.2",
         12,
         first_attempts=STAYS_AT,
@@ -215,7 +198,7 @@ FAMILIES = (
     Family(
         "flow-stay-interrupted",
         "an arc hit that is not captured does not end a stay when a later one is, with no visit below",
-        flow_stay_interrupted,
+        partial(_stays, {"site": "cap"}, is_interrupted),
         "sec. 3.2",
         8,
         first_attempts=INTERRUPTED_AT,
@@ -241,7 +224,7 @@ FAMILIES = (
     Family(
         "long-trajectory",
         "120 collisions in an upright stem: errors that begin late, or grow",
-        long_trajectory,
+        lambda draw: longest_flow(draw)._replace(collisions=120, flow=None),
         "introduction",
         5,
     ),

@@ -36,7 +36,7 @@ from scene import BadInput, BangBang, Collision, Fourier, Horizon, Scene, State,
 from scene.laws import bounds
 from scene.tables import cycle_length, laws
 
-GROUP = "fresh"
+FRESH = "fresh"
 KINDS: tuple[Kind, ...] = ("step", "step", "step", "step", "trajectory", "flow")
 HITS = 1, 2, 3, 4, 5  # of trajectories and flows
 LIKE_ATTEMPTS = 24  # draws that change a law of the question before
@@ -81,13 +81,13 @@ def family_of(seed: int, number: int) -> Family:
 @cache
 def _dealt(seed: int, number: int) -> list[Family]:
     rows = [family for family in FAMILIES.values() for _ in range(family.weight)]
-    Draw(f"{seed}/{GROUP}/round/{number}").shuffle(rows)
+    Draw(f"{seed}/{FRESH}/round/{number}").shuffle(rows)
     return rows
 
 
 def _drawn(seed: int, number: int, before: Vector | None) -> Vector:
     """Return a question, given the one before, which is looked at where this one is like it."""
-    return next(vector for vector in questions(family_of(seed, number), f"{seed}/{GROUP}", number, before))
+    return next(vector for vector in questions(family_of(seed, number), f"{seed}/{FRESH}", number, before))
 
 
 def questions(family: Family, key: str, number: int, before: Vector | None = None) -> Iterator[Vector]:
@@ -151,7 +151,7 @@ def _asked(draw: Draw, kind: Kind, asked: Question) -> Question | None:
     data: dict[str, Any] = wire_form(of) | ({"name": of.name} if of.name else {})
     longest = min(asked.longest, CONDITIONS[_delicacy(of, start)])
     question = asked._replace(
-        scene=data, level="core", longest=longest, group=GROUP, collisions=None, flow=None
+        scene=data, level="core", longest=longest, group=FRESH, collisions=None, flow=None
     )
     if kind == "step":
         return question

@@ -13,8 +13,7 @@ draws again.
 """
 
 import math
-from collections.abc import Callable, Sequence
-from math import sqrt
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any, NamedTuple
 
 import msgspec
@@ -212,6 +211,18 @@ def wire_form(of: Scene) -> dict[str, Any]:
     return decoded
 
 
+def leaves(data: Any, label: str = "") -> Iterator[tuple[str, float]]:
+    """Yield the numbers of a scene in the wire's form, each with the name of its place."""
+    if isinstance(data, dict):
+        for name, part in data.items():
+            yield from leaves(part, name)
+    elif isinstance(data, list | tuple):
+        for i, part in enumerate(data):
+            yield from leaves(part, label if isinstance(part, list | tuple) else f"{label}{min(i, 2)}")
+    elif isinstance(data, int | float):
+        yield label, float(data)
+
+
 def readable(data: dict[str, Any]) -> Scene | None:
     """Return the scene in the wire's form; None where it is a bad one, which is to be refused."""
     try:
@@ -321,7 +332,7 @@ def start(draw: Draw, scene: Scene, t: float, site: str | None = None) -> tuple[
 
 def _velocity(draw: Draw, x: float, y: float, speed: float) -> tuple[float, float]:
     """Draw a velocity of some speed: any, along an axis, and to the centre, from it or around it exactly."""
-    way, distance = draw.pick(range(8)), sqrt(x * x + y * y)
+    way, distance = draw.pick(range(8)), math.sqrt(x * x + y * y)
     if way == 1 and distance > 0:
         part = 2.0 ** math.frexp(speed / distance)[1]
         return draw.pick(((-part * x, -part * y), (part * x, part * y), (-part * y, part * x)))

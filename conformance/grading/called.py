@@ -14,7 +14,6 @@ Where a nudge changes the outcome or the wall, the question is delicate and noth
 import json
 import math
 from collections.abc import Sequence
-from math import hypot
 from typing import Any, NamedTuple, NoReturn
 
 import msgspec
@@ -133,7 +132,7 @@ def scales(scene: Scene, state: State) -> Scales:
     """Return what is large for this question."""
     found = {name: bounds(law) for name, law in laws(scene).items()}
     length = max(law.highest for name, law in found.items() if name in ("r", "w", "h"))
-    speed = hypot(state.vx, state.vy) or max(law.slope for law in found.values()) or length
+    speed = math.hypot(state.vx, state.vy) or max(law.slope for law in found.values()) or length
     return Scales(length, speed, length / speed)
 
 
@@ -174,9 +173,9 @@ def measured(
     scale = scales(scene, state)
     nudges = [max(NUDGE * scale.time, 2.0**-46 * abs(state.t))]
     nudges += [NUDGE * scale.length] * 2 + [NUDGE * scale.speed] * 2
-    size = [abs(state.t), *[hypot(state.x, state.y)] * 2, *[hypot(state.vx, state.vy)] * 2]
+    size = [abs(state.t), *[math.hypot(state.x, state.y)] * 2, *[math.hypot(state.vx, state.vy)] * 2]
     dt, t, x, y, vx, vy = found
-    errors = [bound * part for part in (abs(dt), abs(t), *[hypot(x, y)] * 2, *[hypot(vx, vy)] * 2)]
+    errors = [bound * part for part in (abs(dt), abs(t), *[math.hypot(x, y)] * 2, *[math.hypot(vx, vy)] * 2)]
     for field, nudge, extent, error in zip(INPUTS, nudges, size, incoming, strict=True):
         slopes = derivative(stepper, scene, state, t_end, outcome, field, nudge)
         if slopes is None:

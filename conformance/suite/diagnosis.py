@@ -10,7 +10,7 @@ import math
 from collections.abc import Sequence
 from importlib import resources
 
-from conformance.cases.generated import GROUP as FRESH
+from conformance.cases.generated import FRESH
 from conformance.mutants import COMMON, MUTANTS
 from conformance.mutants.kill_matrix import kills
 from conformance.suite.disguise import DRAWN

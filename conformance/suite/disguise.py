@@ -10,15 +10,15 @@ meet its first wall after dt meets nothing before, so that at any earlier t_end 
 exact place x + vx s, y + vy s. `cases.generated` draws questions in scenes that no file holds.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from fractions import Fraction
 from typing import Any, NamedTuple
 
 import msgspec
 
 from conformance.cases.draw import Draw
-from conformance.cases.generated import GROUP as FRESH
-from conformance.cases.scenes import readable
+from conformance.cases.generated import FRESH
+from conformance.cases.scenes import leaves, readable
 from conformance.grading.error import condition_number, free_flight, inputs_of, moved
 from conformance.vectors import NUMBERS, Expectation, Vector, certified
 from scene import to_data, transforms
@@ -112,19 +112,19 @@ def _stays_in_range(vector: Vector, length: int, time: int) -> bool:
     """Tell whether a scale leads to no number, asked or certified, that is near an end of binary64."""
     least, most = RANGE
     state = vector.state
-    numbers = [state.t, state.x, state.y, state.vx, state.vy, vector.t_end, *_leaves(vector.scene)]
+    numbers = [
+        state.t,
+        state.x,
+        state.y,
+        state.vx,
+        state.vy,
+        vector.t_end,
+        *(number for _, number in leaves(vector.scene)),
+    ]
     for step in (step for known in vector.expect for step in known.steps):
         numbers += [float(end) for name in NUMBERS for end in getattr(step, name)]
     factors = [2.0**k for k in (0, length, time, -time, length - time)]
     return all(least < abs(number) * factor < most for number in numbers if number for factor in factors)
-
-
-def _leaves(data: Any) -> Iterable[float]:
-    if isinstance(data, dict | list | tuple):
-        for part in data.values() if isinstance(data, dict) else data:
-            yield from _leaves(part)
-    elif isinstance(data, int | float):
-        yield float(data)
 
 
 def _scaled(part: Any, exponent: int) -> Any:

@@ -22,8 +22,7 @@ from typing import Any
 import msgspec
 
 from conformance import vectors
-from conformance.cases.generated import GROUP as FRESH
-from conformance.cases.generated import ROUND, fresh
+from conformance.cases.generated import FRESH, ROUND, fresh
 from conformance.grading.agreement import Agreement, middle
 from conformance.grading.grade import grade
 from conformance.suite.answers import outcomes_of

@@ -278,7 +278,7 @@ def _meets(scene: Scene | None, state: State) -> bool:
 def _one_number_changed(draw: Draw, scene: Scene, state: State, change: float) -> Scene | None:
     """Return a scene in which one number is another, wherever it stands; None where nothing is met then."""
     data = scenes.wire_form(scene)
-    numbers = [(label, number) for label, number in _leaves("", data) if number]
+    numbers = [(label, number) for label, number in scenes.leaves(data) if number]
     labels = sorted({label for label, _ in numbers})
     label = draw.pick([name for name in labels if name in ("omega", "period")] or labels)
     label = draw.pick((label, draw.pick(labels)))  # a period as often as all that it shares a law with
@@ -295,18 +295,6 @@ def _laws_renamed(scene: Scene, state: State) -> Iterator[Scene]:
         renamed = scenes.readable({names.get(name, name): law for name, law in data.items()})
         if renamed and renamed != scene and _meets(renamed, state):
             yield renamed
-
-
-def _leaves(label: str, data: Any) -> Iterator[tuple[str, float]]:
-    """Return the numbers of a scene, each with the name of its place."""
-    if isinstance(data, dict):
-        for name, part in data.items():
-            yield from _leaves(name, part)
-    elif isinstance(data, list):
-        for i, part in enumerate(data):
-            yield from _leaves(label if isinstance(part, list) else f"{label}{min(i, 2)}", part)
-    elif isinstance(data, float):
-        yield label, data
 
 
 def _replaced(data: Any, old: float, new: float) -> Any:

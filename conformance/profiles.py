@@ -241,20 +241,20 @@ def reversal(
     Raises:
         BadInput: as for `captured_share`.
     """
-    span, ends = _span(scene, alarm), []
+    span = _span(scene, alarm)
+    energies = np.empty((2, n_particles, 2))  # of the cycle and of its reverse; at the start and at the end
     for i, cycle in enumerate((scene, backwards(scene))):
         random = _generator(seed, 2 + i)
-        e0 = energy * (1 + 3 * random.random(n_particles))
-        states = microcanonical_states(cycle, n_particles, e0, random)
-        e1 = [_energy(o) if isinstance(o, Horizon) else np.nan for o, _ in flow(cycle, states, span)]
-        ends.append((e0, np.array(e1)))
-    (e0, e1), (f0, f1) = ends
-    arrived = np.isfinite(e1 + f1)
-    e0, e1, f0, f1 = (x[arrived] for x in (e0, e1, f0, f1))
-    raised, lowered = (e0 < e1) & (e1 < 4 * energy), (energy < e1) & (e1 < e0)
-    back = (energy < f1) & (f1 < f0)
-    alike = (1 + raised.mean() - lowered.mean()) / 2
-    x = (1 + raised - back.astype(float)) / 2
+        energies[i, :, 0] = energy * (1 + 3 * random.random(n_particles))
+        states = microcanonical_states(cycle, n_particles, energies[i, :, 0], random)
+        ends = flow(cycle, states, span)
+        energies[i, :, 1] = [_energy(o) if isinstance(o, Horizon) else np.nan for o, _ in ends]
+    energies = energies[:, np.isfinite(energies).all(axis=(0, 2))]
+    gain, end = energies[..., 1] - energies[..., 0], energies[..., 1]
+    stays = (energy < end) & (end < 4 * energy)
+    raised, lowered = (stays & (gain > 0)).astype(float), (stays & (gain < 0)).astype(float)
+    alike = float(1 + raised[0].mean() - lowered[0].mean()) / 2
+    x = (1 + raised[0] - lowered[1]) / 2
     return _statistic("reversal", x, 0.5, bound=1.0, n=n_particles, alarm=alarm, alternative=alike)
 
 

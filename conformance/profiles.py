@@ -24,6 +24,11 @@ share p_nc never captured and the mean m1 of log E1 / E0 in the adiabatic limit;
 distance from it. They are asked for at the instant of least nu and after one cycle. Captured is read from the
 state: in the cap, on a chord that does not reach the mouth. log E1 / E0 is cut to the range it has in theory,
 widened by `bias`.
+
+Reversal. Time may be reversed, so a cycle takes E0 to E1 as often as its reverse takes E1 to E0, whatever the
+walls do. Starts are uniform in phase space between energies E and 4 E; those that end there too, with more
+energy, are as many as the reverse's that end there with less. A cycle and its reverse, particle by particle,
+are one number in [0, 1] of mean 1/2. It is told from a stepper for which both directions are alike.
 """
 
 from collections.abc import Sequence
@@ -40,6 +45,7 @@ from scene.laws import values
 from scene.protocol.wire import Flowing
 from scene.sizes import size_bounds
 from scene.tables import cycle_length, laws
+from scene.transforms import backwards
 
 Floats = npt.NDArray[np.float64]
 ALARM = 1e-6
@@ -215,6 +221,39 @@ def mean_growth(
     )
 
 
+def reversal(
+    flow: Flowing, scene: Mushroom, *, n_particles: int, energy: float, seed: int = 0, alarm: float = ALARM
+) -> Statistic:
+    """Test that a cycle raises energies as often as its reverse lowers them.
+
+    Args:
+        flow: as for `work_identity`.
+        scene: a mushroom that moves.
+        n_particles: of each direction, >= 2.
+        energy: least of the starts, the greatest is four times that [length^2 / time^2].
+        seed: of the Philox streams.
+        alarm: chance of a false alarm.
+
+    Raises:
+        BadInput: as for `captured_share`.
+    """
+    span = _span(scene, alarm)
+    energies = np.empty((2, n_particles, 2))  # of the cycle and of its reverse; at the start and at the end
+    for i, cycle in enumerate((scene, backwards(scene))):
+        random = _generator(seed, 2 + i)
+        energies[i, :, 0] = energy * (1 + 3 * random.random(n_particles))
+        states = microcanonical_states(cycle, n_particles, energies[i, :, 0], random)
+        ends = flow(cycle, states, span)
+        energies[i, :, 1] = [_energy(o) if isinstance(o, Horizon) else np.nan for o, _ in ends]
+    energies = energies[:, np.isfinite(energies).all(axis=(0, 2))]
+    gain, end = energies[..., 1] - energies[..., 0], energies[..., 1]
+    stays = (energy < end) & (end < 4 * energy)
+    raised, lowered = (stays & (gain > 0)).astype(float), (stays & (gain < 0)).astype(float)
+    alike = float(1 + raised[0].mean() - lowered[0].mean()) / 2
+    x = (1 + raised[0] - lowered[1]) / 2
+    return _statistic("reversal", x, 0.5, bound=1.0, n=n_particles, alarm=alarm, alternative=alike)
+
+
 def _span(scene: Scene, alarm: float) -> float:
     span = cycle_length(scene)
     if not span:
@@ -268,10 +307,12 @@ def canonical_states(scene: Scene, n: int, kT: float, random: np.random.Generato
     return _states(scene, v, random)
 
 
-def microcanonical_states(scene: Scene, n: int, energy: float, random: np.random.Generator) -> list[State]:
-    """Draw starts at t = 0 uniform in area and direction, all of one energy."""
+def microcanonical_states(
+    scene: Scene, n: int, energy: float | Floats, random: np.random.Generator
+) -> list[State]:
+    """Draw starts at t = 0 uniform in area and direction, all of one energy or each of its own (n,)."""
     angle = 2 * pi * random.random(n)
-    return _states(scene, sqrt(2 * energy) * np.column_stack([np.cos(angle), np.sin(angle)]), random)
+    return _states(scene, (np.sqrt(2 * energy) * np.stack([np.cos(angle), np.sin(angle)])).T, random)
 
 
 def _states(scene: Scene, v: Floats, random: np.random.Generator) -> list[State]:

@@ -15,7 +15,7 @@ from support.depth import deep_but
 
 import fast
 import reference
-from conformance import plain
+from conformance import plain, profiles
 from conformance.grading.called import is_clearly_inside
 from conformance.mutants import COMMON, MUTANTS
 from conformance.profiles import check_work_identity
@@ -280,6 +280,25 @@ def lost(share):
 def test_a_flow_must_do_work_and_not_lose_so_many_that_anything_would_do(share, n, word):
     with pytest.raises(AssertionError, match=word):
         check_work_identity(lost(share), load("breathing-circle"), n_particles=n, kT=100.0)
+
+
+def carried(scene, states, t_end):
+    return [(outcome, None) for outcome in fast.flow(scene, states, t_end).outcomes]
+
+
+def by_one_direction(scene, states, t_end):
+    """Carry both directions of a cycle as if they were alike."""
+    return carried(transforms.backwards(scene) if scene.r.sin[0] < 0 else scene, states, t_end)
+
+
+def test_a_stepper_for_which_cycle_and_reverse_are_alike_is_told_from_one_that_reverses_time():
+    honest, alike = (
+        profiles.reversal(flow, load("moving-cap-trivial"), n_particles=4000, energy=1000.0)
+        for flow in (carried, by_one_direction)
+    )
+    assert honest.is_met
+    assert honest.has_power
+    assert not alike.is_met
 
 
 BACK_AND_FORTH = {

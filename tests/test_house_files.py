@@ -23,7 +23,7 @@ MAX_STATEMENTS = {
     "scene": 1_611,
     "reference": 1_454,
     "fast": 3_727,
-    "theory": 2_264,
+    "theory": 2_247,
     "conformance": 9_346,
     "mushrooms": 4_812,
     "tests": 14_795,

@@ -79,7 +79,6 @@ ENTRIES = {
     "FiniteEnergy.at_capture": (lambda **given: finite().at_capture(**given), {"times": [0.0]}),
     "FiniteEnergy.mean_of_exp": (lambda **given: finite().mean_of_exp(**given), {"q": 0.5}),
     "FiniteEnergy.draw": (lambda **given: finite().draw(**given), {"n_cycles": 2, "n": 3, "seed": 4}),
-    "peak_width": (theory.peak_width, {"s": [0.0]}),
     "fit_power": (theory.fit_power, {**COLUMNS, "orders": [-0.5]}),
     "extrapolate": (theory.extrapolate, {**COLUMNS, "exponent": -0.5}),
     "Cycle.of": (theory.Cycle.of, WITH_DIGITS),

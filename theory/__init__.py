@@ -21,10 +21,8 @@ from theory.distribution import Energies, Sum, energies, energy_cdf, sum_of_cycl
 from theory.finite_energy.fits import (
     Limit,
     PowerFit,
-    Width,
     extrapolate,
     fit_power,
-    peak_width,
     unbiased_mean,
 )
 from theory.finite_energy.one_cycle import FiniteEnergy, at_energy
@@ -64,7 +62,6 @@ __all__ = [
     "Rates",
     "Sum",
     "Volumes",
-    "Width",
     "at_energy",
     "cap_invariant",
     "capture_curve",
@@ -91,7 +88,6 @@ __all__ = [
     "loss_probability",
     "mean_of",
     "moments",
-    "peak_width",
     "predict",
     "rarity",
     "reversed_cycle",

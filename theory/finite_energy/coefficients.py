@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from mpmath import fp
 from numpy.typing import NDArray
+from scipy.ndimage import map_coordinates
 
 from scene.geometry import table_at
 from scene.laws import BangBang
@@ -168,14 +169,10 @@ class Fields:
         """Interpolate a field; sums are known at the steps' ends, the others in their middles."""
         values = self._values[name]
         first = 0.0 if values.shape[1] > N_TIMES else 0.5
-        place = np.clip((t - self._start) / self._step - first, 0, values.shape[1] - 1)
-        level = np.clip((gain - GAINS[0]) / (GAINS[1] - GAINS[0]), 0, len(GAINS) - 1)
-        i = np.minimum(level.astype(int), len(GAINS) - 2)
-        k = np.minimum(np.asarray(place).astype(int), values.shape[1] - 2)
-        a, b = level - i, place - k
-        low = (1 - b) * values[i, k] + b * values[i, k + 1]
-        high = (1 - b) * values[i + 1, k] + b * values[i + 1, k + 1]
-        return np.asarray((1 - a) * low + a * high, dtype=np.float64)
+        place = (np.asarray(t) - self._start) / self._step - first
+        level = (gain - GAINS[0]) / (GAINS[1] - GAINS[0])
+        found: Floats = map_coordinates(values, np.broadcast_arrays(level, place), order=1, mode="nearest")
+        return found
 
     def _gathered(self, rate: Floats) -> Floats:
         return np.pad(np.cumsum(rate, axis=1) * self._step, ((0, 0), (1, 0)))

@@ -20,13 +20,6 @@ from theory.validation import finite_array
 ALIKE = 2.0**-46  # share of a term that the others leave: below it they leave rounding
 
 
-class Width(NamedTuple):
-    """Standard deviation of a peak and its standard error, from the sample's own fourth moment."""
-
-    sigma: float
-    error: float
-
-
 class PowerFit(NamedTuple):
     """y = coefficient x^exponent, and next orders where they were asked for, fitted to log y.
 
@@ -59,35 +52,6 @@ class Limit(NamedTuple):
     slope_error: float
     residuals: Floats
     chi_square: float
-
-
-def peak_width(s: ArrayLike) -> Width:
-    """Return sigma_w of the uncaptured peak.
-
-    Args:
-        s: log E1 / E0 of the particles never captured, at least 4.
-
-    Raises:
-        BadInput: too few particles, one that is not finite, or a width beyond binary64.
-    """
-    values = finite_array("s", s).ravel()
-    if values.size < 4:
-        raise BadInput(f"s has {values.size} values: a width needs at least 4")
-    # Fourth powers are taken of numbers near 1: binary64 holds none of 1e80.
-    exponent = int(np.frexp(np.abs(values).max())[1])
-    near = np.ldexp(values, -exponent)
-    centred = near - near.mean()
-    spacing = int(np.frexp(np.abs(centred).max())[1])
-    centred = np.ldexp(centred, -spacing)
-    variance = float(np.mean(centred**2))
-    spread = float(np.mean(centred**4)) - variance**2
-    sigma = float(np.sqrt(variance * values.size / (values.size - 1)))
-    error = float(np.sqrt(max(spread, 0.0) / values.size)) / (2 * sigma) if sigma else 0.0
-    with np.errstate(over="ignore"):
-        found = np.ldexp([sigma, error], exponent + spacing)
-    if not np.all(np.isfinite(found)):
-        raise BadInput("s: the width is beyond binary64")
-    return Width(*found.tolist())
 
 
 def unbiased_mean(scene: Scene, digits: int = 15) -> Any:

@@ -31,7 +31,9 @@ SHRINKING = Mushroom(
     h=Fourier(mean=0.75, omega=1.0, cos=(0.25,)),
     nu=Fourier(mean=0.5, omega=1.0, cos=(0.3,)),
 )
-PROFILES = ("work-identity", "captured-share", "mean-growth")
+REVERSED = 1000.0  # energy at which a trivial loop's directions differ most, and by how much in half shares
+DIRECTED = 0.05
+PROFILES = ("work-identity", "captured-share", "mean-growth", "reversal")
 ALARM = profiles.ALARM / len(PROFILES)
 
 
@@ -61,9 +63,10 @@ def ensemble_checks(level: str) -> list[SuiteCheck]:
     def asks(scene: Mushroom) -> Callable[[Draw, str], Iterator[Question]]:
         return lambda draw, _: iter([(scene, SIZES[level], draw.pick(range(2**30)))])
 
-    scene = load(SCENE)
+    scene, trivial = load(SCENE), load("moving-cap-trivial")
     assert isinstance(scene, Mushroom)
-    tests = (_work_identity, SHRINKING), (_captured_share, scene), (_mean_growth, scene)
+    assert isinstance(trivial, Mushroom)
+    tests = (_work_identity, SHRINKING), (_captured_share, scene), (_mean_growth, scene), (_reversal, trivial)
     return [
         SuiteCheck(f"profile/{name}", asks(scene), partial(_hold, test), ("flow",))
         for name, (test, scene) in zip(PROFILES, tests, strict=True)
@@ -112,6 +115,13 @@ def _mean_growth(flow: Flowing, scene: Mushroom, size: Size, seed: int) -> list[
     return [
         profiles.mean_growth(flow, scene, m1=m1, largest=largest, **size._asdict(), seed=seed, alarm=ALARM)
     ]
+
+
+def _reversal(flow: Flowing, scene: Mushroom, size: Size, seed: int) -> list[Statistic]:
+    n = size.n_particles
+    if profiles.margin(n, 0.0, 1.0, ALARM) > DIRECTED:
+        raise Trouble("declined", f"not asked: {n} particles cannot tell a direction of time from the other")
+    return [profiles.reversal(flow, scene, n_particles=n, energy=REVERSED, seed=seed, alarm=ALARM)]
 
 
 @cache

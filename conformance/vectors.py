@@ -97,12 +97,14 @@ class Certified(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_de
 class Expectation(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
     """One answer that is right.
 
-    Attributes: outcome: of the step; of a trajectory: how it ends, "collision" when all asked for are
-    found. steps: the collisions, and the horizon when it ends there; empty for undefined and rejected
-    steps. Of a flow, whose whole path is proved, the collisions that begin or end a stay, and the horizon.
-    reason: of an undefined outcome. stays: of a flow, the capture intervals (docs/protocol.md) as places in
-    `steps`, counted from 0: the arc hit that begins it and the collision that ends it, or the horizon.
-    Empty for none.
+    Attributes:
+        outcome: of the step; of a trajectory: how it ends, "collision" when all asked for are found.
+        steps: the collisions, and the horizon when it ends there; empty for undefined and rejected steps.
+            Of a flow, whose whole path is proved, the collisions that begin or end a capture interval,
+            and the horizon.
+        reason: of an undefined outcome.
+        stays: of a flow, the capture intervals (docs/protocol.md) as places in `steps`, counted from 0:
+            the arc hit that begins it and the collision that ends it, or the horizon. Empty for none.
     """
 
     outcome: OutcomeName

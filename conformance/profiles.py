@@ -1,21 +1,24 @@
 """Statistical profiles: checks of ensembles that an implementation follows; seeded, rare false alarms.
 
 Every test compares the mean of independent numbers in [0, B] with its exact or predicted value. For any
-distribution the mean of n is off to either side, except with probability d, by at most B sqrt(log(2 / d) /
-(2 n)), Hoeffding 1963, theorem 2 sqrt(2 V log(4 / d) / n) + 7 B log(4 / d) / (3 (n - 1)), V the sample
-variance: empirical Bernstein, Maurer and Pontil 2009, theorem 4 and so by the smaller of both at d / 2. The
-first is better for few particles, the second for many. `alarm`, 1e-6 for a whole run, is split over its
-tests. Particles that the implementation lost may have any value in [0, B], so their share of B is added to
-the margin. Each test names an `alternative`, the mean that a likely fault would give. If the margin reaches
-it, the test cannot detect the fault, and `has_power` is false.
+distribution the mean of n is off to either side, except with probability d, by at most
+    B sqrt(log(2 / d) / (2 n)),                                                  Hoeffding 1963, theorem 2
+    sqrt(2 V log(4 / d) / n) + 7 B log(4 / d) / (3 (n - 1)),  V the sample variance:
+                                                      empirical Bernstein, Maurer and Pontil 2009, theorem 4
+and so by the smaller of both at d / 2. The first is better for few particles, the second for many.
 
-Work identity. A flow keeps phase-space volume, so for every motion of the walls mean exp(-W / kT) = A(t) /
-A(0) for canonical starts at kT, W = E1 - E0, A the area of the table. exp(-W / kT) has a heavy tail if
-energies fall by half or more. Therefore starts are drawn at the higher temperature kT / ratio and weighted.
-X = exp((ratio E0 - E1) / kT) / ratio has the same mean, and 0 <= X <= 1 / ratio if every particle keeps
-`ratio` of its energy. By default `ratio` is the product of (shortest / longest)^2 over the lengths of the
-table. It bounds adiabatic losses for kT far above the energy of the walls' speed. X is cut at 1 / ratio, so
-that a greater loss can only lower the mean.
+`alarm`, 1e-6 for a whole run, is split over its tests. Particles that the implementation lost may have any
+value in [0, B], so their share of B is added to the margin. Each test names an `alternative`, the mean that
+a likely fault would give. If the margin reaches it, the test cannot detect the fault, and `has_power` is
+false.
+
+Work identity. A flow keeps phase-space volume, so for every motion of the walls
+    mean exp(-W / kT) = A(t) / A(0)     for canonical starts at kT, W = E1 - E0, A the area of the table.
+exp(-W / kT) has a heavy tail if energies fall by half or more. Therefore starts are drawn at the higher
+temperature kT / ratio and weighted. X = exp((ratio E0 - E1) / kT) / ratio has the same mean, and 0 <= X <=
+1 / ratio if every particle keeps `ratio` of its energy. By default `ratio` is the product of (shortest /
+longest)^2 over the lengths of the table. It bounds adiabatic losses for kT far above the energy of the
+walls' speed. X is cut at 1 / ratio, so that a greater loss can only lower the mean.
 
 Captured share and mean growth. For uniform starts of one energy far above the walls', theory predicts the
 share p_nc never captured and the mean m1 of log E1 / E0 in the adiabatic limit. `bias` is the permitted

@@ -1,34 +1,36 @@
-"""Statistical profiles: what an ensemble of an implementation's `flow` must show; seeded, rare false alarms.
+"""Statistical profiles: checks of ensembles that an implementation follows; seeded, rare false alarms.
 
 Every test compares the mean of independent numbers in [0, B] with its exact or predicted value. For any
-distribution, but with probability d, the mean of n is off to either side by at most
+distribution the mean of n is off to either side, except with probability d, by at most
     B sqrt(log(2 / d) / (2 n)),                                                  Hoeffding 1963, theorem 2
     sqrt(2 V log(4 / d) / n) + 7 B log(4 / d) / (3 (n - 1)),  V the sample variance:
                                                       empirical Bernstein, Maurer and Pontil 2009, theorem 4
-and so by the lesser of both at d / 2: the first is better for few particles, the second for many. `alarm`,
-1e-6 for a whole run, is split over its tests. Particles that the implementation lost may have any value in
-[0, B]: their share of B is added to the margin. Beside its expectation each test names an `alternative`, the
-mean that a likely fault would give; a margin that reaches it could not have told one from the other, and
-then the test `has_power` not.
+and so by the smaller of both at d / 2. The first is better for few particles, the second for many.
 
-Work identity. A flow keeps phase-space volume, so whatever the walls do
+`alarm`, 1e-6 for a whole run, is split over its tests. Particles that the implementation lost may have any
+value in [0, B], so their share of B is added to the margin. Each test names an `alternative`, the mean that
+a likely fault would give. If the margin reaches it, the test cannot detect the fault, and `has_power` is
+false.
+
+Work identity. A flow keeps phase-space volume, so for every motion of the walls
     mean exp(-W / kT) = A(t) / A(0)     for canonical starts at kT, W = E1 - E0, A the area of the table.
-exp(-W / kT) has a heavy tail where energy falls by half or more. So starts are drawn at the higher
-temperature kT / ratio and weighed: X = exp((ratio E0 - E1) / kT) / ratio has the same mean, and
-0 <= X <= 1 / ratio when every particle keeps `ratio` of its energy. By default that is the product of
-(shortest / longest)^2 over the table's lengths, which bounds adiabatic losses, for kT far above the energy
-of the walls' own speed. X is cut at 1 / ratio, so that a greater loss can only lower the mean, by its excess.
+exp(-W / kT) has a heavy tail if energies fall by half or more. Therefore starts are drawn at the higher
+temperature kT / ratio and weighted. X = exp((ratio E0 - E1) / kT) / ratio has the same mean, and 0 <= X <=
+1 / ratio if every particle keeps `ratio` of its energy. By default `ratio` is the product of (shortest /
+longest)^2 over the lengths of the table. It bounds adiabatic losses for kT far above the energy of the
+walls' speed. X is cut at 1 / ratio, so that a greater loss can only lower the mean.
 
 Captured share and mean growth. For uniform starts of one energy far above the walls', theory predicts the
-share p_nc never captured and the mean m1 of log E1 / E0 in the adiabatic limit; `bias` is granted for the
-distance from it. They are asked for at the instant of least nu and after one cycle. Captured is read from the
-state: in the cap, on a chord that does not reach the mouth. log E1 / E0 is cut to the range it has in theory,
-widened by `bias`.
+share p_nc never captured and the mean m1 of log E1 / E0 in the adiabatic limit. `bias` is the permitted
+distance from this limit. The share is measured when nu is least, the mean after one cycle. A particle
+counts as captured if it is in the cap on a chord that does not reach the mouth. log E1 / E0 is cut to its
+range in theory, widened by `bias`.
 
-Reversal. Time may be reversed, so a cycle takes E0 to E1 as often as its reverse takes E1 to E0, whatever the
-walls do. Starts are uniform in phase space between energies E and 4 E; those that end there too, with more
-energy, are as many as the reverse's that end there with less. A cycle and its reverse, particle by particle,
-are one number in [0, 1] of mean 1/2. It is told from a stepper for which both directions are alike.
+Reversal. Time may be reversed, so a cycle takes E0 to E1 as often as its reverse takes E1 to E0, for every
+motion of the walls. Starts are uniform in phase space between energies E and 4 E. Those that end there too,
+with more energy, are as many as those of the reverse that end there with less. A cycle and its reverse,
+particle by particle, give one number in [0, 1] of mean 1/2. The alternative is a stepper for which both
+directions are alike.
 """
 
 from collections.abc import Sequence
@@ -49,11 +51,11 @@ from scene.transforms import backwards
 
 Floats = npt.NDArray[np.float64]
 ALARM = 1e-6
-MAX_LOST = 0.01  # of the particles: more, and what was left has shown nothing
+MAX_LOST = 0.01  # of the particles: if more are lost, the rest shows nothing
 
 
 class Statistic(NamedTuple):
-    """One test: the mean measured, what it must be, how far it may be off, and what it must be told from."""
+    """One test: measured mean, expected mean, margin, and the alternative to be detected."""
 
     name: str
     measured: float
@@ -75,11 +77,11 @@ class Statistic(NamedTuple):
 
     @property
     def is_depleted(self) -> bool:
-        """Tell whether so many particles were lost that what is left shows nothing."""
+        """Tell whether too many particles were lost."""
         return self.lost > MAX_LOST * self.n
 
     def __str__(self) -> str:
-        """Say it in one line."""
+        """Return one line of text."""
         return (
             f"{self.name}: {self.measured:.5f}, must be {self.expected:.5f} within {self.margin:.5f}"
             f" ({self.n} particles, {self.lost} lost)"
@@ -102,15 +104,15 @@ def work_identity(
     Args:
         flow: (scene, states, t_end) -> outcome and capture interval of each state.
         scene: a valid scene that moves.
-        n_particles: drawn for every time anew, >= 2.
-        kT: temperature as an energy [length^2 / time^2], far above that of the walls' own speed.
-        times: of observation, as parts of the period.
-        ratio: least E1 / E0 that occurs, 0 < ratio <= 1; None takes it from the scene's laws.
+        n_particles: drawn anew for every time, >= 2.
+        kT: temperature as an energy [length^2 / time^2], far above that of the walls' speed.
+        times: of observation, as fractions of the period.
+        ratio: smallest E1 / E0 that occurs, 0 < ratio <= 1; None derives it from the laws of the scene.
         seed: of the Philox streams.
-        alarm: chance of a false alarm in all tests together.
+        alarm: probability of a false alarm in all tests together.
 
     Returns:
-        A finding for each time.
+        A statistic for each time.
 
     Raises:
         BadInput: the scene stands still, or an argument is outside its bounds.
@@ -155,17 +157,17 @@ def captured_share(
     seed: int = 0,
     alarm: float = ALARM,
 ) -> Statistic:
-    """Test the share that is not captured when nu is least against theory.
+    """Compare the share of free particles when nu is least with theory.
 
     Args:
         flow: as for `work_identity`.
         scene: a mushroom, nu greatest at t = 0.
         p_nc: share never captured, from `theory.predict`.
         n_particles: >= 2.
-        energy: of every start [length^2 / time^2], far above that of the walls' own speed.
-        bias: granted to the mean for the distance from the adiabatic limit.
+        energy: of every start [length^2 / time^2], far above that of the walls' speed.
+        bias: permitted distance of the mean from the adiabatic limit.
         seed: of the Philox stream.
-        alarm: chance of a false alarm.
+        alarm: probability of a false alarm.
 
     Raises:
         BadInput: the scene stands still, or an argument is outside its bounds.
@@ -191,7 +193,7 @@ def mean_growth(
     seed: int = 0,
     alarm: float = ALARM,
 ) -> Statistic:
-    """Test the mean of log E1 / E0 over one cycle against theory.
+    """Compare the mean of log E1 / E0 over one cycle with theory.
 
     Args:
         flow: as for `work_identity`.
@@ -199,10 +201,10 @@ def mean_growth(
         m1: the mean, from `theory.predict`.
         largest: bound on |log E1 / E0| in theory.
         n_particles: as for `captured_share`.
-        energy: likewise.
-        bias: likewise.
-        seed: likewise.
-        alarm: likewise.
+        energy: as for `captured_share`.
+        bias: as for `captured_share`.
+        seed: as for `captured_share`.
+        alarm: as for `captured_share`.
 
     Raises:
         BadInput: as for `captured_share`.
@@ -263,7 +265,7 @@ def _span(scene: Scene, alarm: float) -> float:
 
 
 def check_work_identity(flow: Flowing, scene: Scene, *, n_particles: int, kT: float, seed: int = 0) -> None:
-    """Raise AssertionError, in one line, where `work_identity` is not met, or too many are lost to tell."""
+    """Raise AssertionError, with one line, if `work_identity` fails or too many particles are lost."""
     for finding in work_identity(flow, scene, n_particles=n_particles, kT=kT, seed=seed):
         if not finding.is_met:
             raise AssertionError(f"work identity: {finding}")
@@ -272,13 +274,13 @@ def check_work_identity(flow: Flowing, scene: Scene, *, n_particles: int, kT: fl
 
 
 def margin(n: int, variance: float, bound: float, alarm: float) -> float:
-    """Return how far the mean of n independent numbers in [0, bound] may be off, but with chance `alarm`.
+    """Return how far the mean of n numbers in [0, bound] may be off, except with probability `alarm`.
 
     Args:
-        n: how many there are, at least 2.
-        variance: of the sample; 0 for the least margin that so many can have.
-        bound: of the numbers.
-        alarm: the chance.
+        n: number of independent numbers, at least 2.
+        variance: of the sample; 0 for the smallest margin possible with n numbers.
+        bound: upper bound of the numbers.
+        alarm: the probability.
     """
     hoeffding, bernstein = log(4 / alarm), log(8 / alarm)  # each at half of the alarm
     return min(
@@ -294,7 +296,7 @@ def least_ratio(scene: Scene) -> float:
 
 
 def least_nu(scene: Mushroom, span: float) -> float:
-    """Return the instant of least nu as a part of the period, the middle of a plateau."""
+    """Return the instant of least nu as a fraction of the period; of a plateau the middle."""
     parts = np.arange(4096) / 4096
     nu = half_width(fp, scene, span * parts) / values(scene.r, span * parts)
     low = parts[nu <= nu.min() * (1 + 2.0**-40)]
@@ -333,7 +335,7 @@ def _is_captured(scene: Mushroom, at: Horizon) -> bool:
 
 def _energy(at: State | Outcome) -> float:
     assert isinstance(at, State | Horizon)
-    # Of a nonsense answer it may be infinite; `**` would raise instead.
+    # For a nonsensical answer it may be infinite; `**` would raise instead.
     return (at.vx * at.vx + at.vy * at.vy) / 2
 
 

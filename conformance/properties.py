@@ -1,20 +1,20 @@
-"""Exact properties of the billiard, to hold any Python stepper to, with no certified answer at hand.
+"""Exact symmetries of the billiard as checks of a Python stepper, without certified answers.
 
-A check takes a stepper, a question and raises AssertionError, in one line, when the answer breaks the
-property, is no outcome of this scene at all, or refuses a state clearly inside. It returns True when it
-compared numbers and False when it had nothing to say: the outcome is undecided, undefined or rightly
-rejected, the property is not about this table, or the question is so delicate that nudging it changes the
-wall. In a Hypothesis test:
+A check takes a stepper and a question. It raises AssertionError, with one line, if the answer breaks the
+symmetry, is not an outcome of this scene, or rejects a state clearly inside. It returns True if it compared
+numbers. It returns False if there was nothing to compare: the outcome is undecided, undefined or correctly
+rejected, the symmetry does not concern this table, or a small change of the inputs changes the wall. In a
+Hypothesis test:
 
     @given(conformance.strategies.scenes_and_states())
     def test_mirror(drawn):
         conformance.properties.check_mirror(my_stepper, *drawn)
 
-Mirror and power-of-two scaling hold bit for bit in any stepper whose arithmetic is binary64 and which has no
-absolute tolerance and treats both sides alike; `is_exact=False` asks for them within rounding. All others
-hold within rounding: `bound` is the backward error granted (1e-9 by default, as in the physics verdict),
-and what it does to the answer is measured on the stepper itself (`conformance.grading.called`). The work
-identity of whole ensembles is `conformance.profiles.check_work_identity`.
+Mirror image and scaling by powers of two are exact to the bit in a binary64 stepper that has no absolute
+tolerance and treats both sides alike. With `is_exact=False` they are checked within rounding. All other
+symmetries are checked within rounding. `bound` is the permitted backward error (1e-9 by default, as in the
+physics verdict). Its effect on the answer is measured on the stepper itself (`conformance.grading.called`).
+The work identity of ensembles is `conformance.profiles.check_work_identity`.
 """
 
 from collections.abc import Callable, Sequence
@@ -50,15 +50,15 @@ LEAST, MOST = 2.0**-400, 2.0**400  # numbers whose squares neither vanish nor ov
 def check_mirror(
     stepper: Stepper, scene: Scene, state: State, t_end: float, *, is_exact: bool = True, bound: float = BOUND
 ) -> bool:
-    """Hold x -> -x to give the mirror image of the answer.
+    """Check that x -> -x gives the mirror image of the answer.
 
     Args:
         stepper: (scene, state, t_end) -> outcome.
         scene: a valid scene.
         state: of a particle.
         t_end: horizon [time].
-        is_exact: bit for bit, else within rounding.
-        bound: backward error granted when not exact.
+        is_exact: compare bit for bit, else within rounding.
+        bound: permitted backward error if not exact.
 
     Returns:
         Whether there was something to compare.
@@ -79,9 +79,9 @@ def check_scaling(
     is_exact: bool = True,
     bound: float = BOUND,
 ) -> bool:
-    """Hold lengths times 2^length and times times 2^time to scale the answer alike.
+    """Check that lengths times 2^length and times times 2^time scale the answer accordingly.
 
-    Bit for bit where all numbers, before and after, are 0 or between 2^-400 and 2^400. See `check_mirror`.
+    Exact to the bit if all numbers, before and after, are 0 or between 2^-400 and 2^400. See `check_mirror`.
     """
     unit, size, speed = (transforms.times_power(1.0, exponent) for exponent in (time, length, length - time))
     answer = ask(stepper, scene, state, t_end)
@@ -97,9 +97,9 @@ def check_scaling(
 def check_static_limit(
     stepper: Stepper, scene: Scene, state: State, t_end: float, *, is_exact: bool = True, bound: float = BOUND
 ) -> bool:
-    """Hold laws of amplitude zero to equal constants, in the scene frozen at the time of the state.
+    """Check that laws of amplitude zero equal constants, in the scene frozen at the time of the state.
 
-    Bit for bit where a law's value is its mean plus a sum of zeros. See `check_mirror`.
+    Exact to the bit if the value of a law is its mean plus a sum of zeros. See `check_mirror`.
     """
     still = transforms.frozen(scene, state.t)
     given, idle = (still, state, t_end), (transforms.idle(still), state, t_end)
@@ -116,10 +116,10 @@ def check_period_shift(
     is_exact: bool = False,
     bound: float = BOUND,
 ) -> bool:
-    """Hold one whole period later to change nothing but t.
+    """Check that a start one whole period later changes only t.
 
-    The shifted times are rounded: by how much is known, and enters as an error of t. `is_exact` asks for
-    equal bits where nothing is rounded at all. See `check_mirror`.
+    The shifted times are rounded. This error is known and counts as an error of t. With `is_exact` bits
+    must be equal if nothing is rounded. See `check_mirror`.
     """
     shared, answer = period(scene), ask(stepper, scene, state, t_end)
     if shared is None or not isinstance(answer, Collision | Horizon):
@@ -145,7 +145,7 @@ def check_period_shift(
 def check_split_flight(
     stepper: Stepper, scene: Scene, state: State, t_end: float, *, bound: float = BOUND
 ) -> bool:
-    """Hold a flight, or a flow, that is stopped halfway and taken up again, to end alike."""
+    """Check that a flight, or a flow, stopped halfway and continued ends alike."""
     given = scene, state, t_end
     whole = measured(stepper, *given, bound)
     if whole is None:
@@ -171,11 +171,10 @@ def check_split_flight(
 def check_reversal(
     stepper: Stepper, scene: Scene, state: State, t_end: float, *, bound: float = BOUND
 ) -> bool:
-    """Hold the path across one bounce, or a flow, to be retraced when velocity and laws are reversed.
+    """Check that reversed velocity and laws retrace the path across one bounce, or a flow.
 
-    From the state over its collision, which it must be able to go on from, to half of the next flight,
-    then back to half of the first. The errors granted are carried along through every step. See
-    `check_mirror`.
+    The path goes from the state over its collision to half of the next flight, then back to half of the
+    first. Permitted errors are carried through every step. See `check_mirror`.
     """
     given = scene, state, t_end
     there = measured(stepper, *given, bound)
@@ -216,9 +215,9 @@ def check_reversal(
 def check_angular_momentum(
     stepper: Stepper, scene: Scene, state: State, t_end: float, *, bound: float = BOUND
 ) -> bool:
-    """Hold x vy - y vx through flight and arc, which only pushes towards the centre.
+    """Check that x vy - y vx is constant in flight and at the arc, which pushes towards the centre.
 
-    Where the base is met it changes sign, at rest as it is. Other walls are not compared.
+    At the base, which is at rest, it changes sign. Other walls are not compared.
     """
     step = measured(stepper, scene, state, t_end, bound)
     if step is None or not isinstance(step.outcome, Collision) or step.outcome.wall not in ("arc", "base"):
@@ -237,7 +236,7 @@ def check_angular_momentum(
 
 
 def check_energy(stepper: Stepper, scene: Scene, state: State, t_end: float, *, bound: float = BOUND) -> bool:
-    """Hold the speed to stay in a static table, whatever is met."""
+    """Check that the speed is constant in a static table."""
     answer = ask(stepper, scene, state, t_end)
     found = numbers(answer, state)
     if found is None or not all(is_constant(law) for law in laws(scene).values()):
@@ -251,10 +250,10 @@ def check_energy(stepper: Stepper, scene: Scene, state: State, t_end: float, *, 
 def check_symplectic(
     stepper: Stepper, scene: Scene, state: State, t_end: float, *, bound: float = BOUND
 ) -> bool:
-    """Hold the map (x, y, vx, vy) -> (x, y, vx, vy) across one bounce to be symplectic.
+    """Check that the map (x, y, vx, vy) -> (x, y, vx, vy) across one bounce is symplectic.
 
-    Its matrix M is taken by central differences of two widths, extrapolated; their difference bounds what
-    is left. M^T J M = J must hold within that, and within `bound` over the width.
+    Its matrix M is computed by central differences of two widths and extrapolated. The difference of the two
+    bounds the error. M^T J M = J must hold within this error plus `bound` divided by the width.
     """
     way = _across_bounce(stepper, scene, state, t_end)
     if way is None:
@@ -314,7 +313,7 @@ def _across_bounce(
 def _flow_matrix(
     stepper: Stepper, scene: Scene, way: tuple[State, Collision, float], units: Sequence[float], width: float
 ) -> list[list[float]] | None:
-    """Differentiate the state at the end of a way by that at its begin; rows by outputs, in given units."""
+    """Differentiate the state at the end of a path by that at its start; rows are outputs, in given units."""
     begin, hit, end = way
     columns = []
     for field, unit in zip(("x", "y", "vx", "vy"), units, strict=True):

@@ -1,8 +1,8 @@
-"""Hypothesis strategies: valid scenes of every kind, states from which a step makes sense, whole questions.
+"""Hypothesis strategies: valid scenes of every kind, valid states in them, and whole questions.
 
-All is drawn as the questions of the corpus, of a run of the suite and of `mushrooms attack` are
-(`conformance.cases`): Hypothesis gives the bits. What it shrinks to is a question of few and short numbers.
-When a test fails, the failing step is printed as the wire's line.
+They use the same generators as the corpus, `mushrooms check` and `mushrooms attack` (`conformance.cases`),
+with random bits from Hypothesis. Shrinking leads to questions with few and short numbers. If a test fails,
+the failing step is printed as a line of the protocol.
 """
 
 import json
@@ -38,12 +38,12 @@ class HypothesisDraw(Draw):
         return self._draw(_integers(n))
 
     def part(self) -> float:
-        """Draw from (0, 1), even: 1/2, 1/4, 3/4, 1/8, ..., so that small integers make short numbers."""
+        """Draw uniformly from (0, 1): 1/2, 1/4, 3/4, 1/8, ..., so that small integers give short numbers."""
         n = self.bits(FINE) + 1
         return int(f"{n:b}"[::-1], 2) / 2.0 ** n.bit_length()
 
 
-@cache  # Hypothesis looks through every strategy anew that is made while it draws
+@cache  # Hypothesis examines every strategy that is made during a draw
 def _integers(n: int) -> st.SearchStrategy[int]:
     return st.integers(0, 2**n - 1)
 
@@ -71,8 +71,9 @@ def scenes(draw: st.DrawFn, table: str | None = None) -> Scene:
         table: "cap", "stem" or "mushroom"; None draws one.
 
     Returns:
-        A table with laws of one period; the mouth as `w` or `nu`; slope positive, zero, negative or moving.
-        Sizes [length] and periods [time] are of order 1, in one scene of three scaled by powers of two from
+        A table whose laws have one period. The mouth is `w` or `nu`. The slope is positive, zero, negative or
+        moving.
+        Sizes [length] and periods [time] are of order 1. One scene in three is scaled by powers of two from
         2^-20 to 2^20.
     """
     stream = HypothesisDraw(draw)
@@ -95,8 +96,8 @@ def states(draw: st.DrawFn, scene: Scene) -> tuple[State, float]:
         scene: a valid scene.
 
     Returns:
-        (state, t_end): see `conformance.cases.scenes.start`; t_end is mostly late enough for a collision, or
-        early, or t itself.
+        (state, t_end): see `conformance.cases.scenes.start`. t_end is mostly late enough for a collision;
+        sometimes early, or t itself.
     """
     stream = HypothesisDraw(draw)
     state, t_end = start(stream, scene, when(stream, scene))
@@ -107,7 +108,7 @@ def states(draw: st.DrawFn, scene: Scene) -> tuple[State, float]:
 
 
 def _tell(scene: Scene, state: State, t_end: float) -> None:
-    """Have a failing example printed as the wire's line."""
+    """Print a failing example as a line of the protocol."""
     if currently_in_test_context():
         asked = {"scene": to_data(scene), "state": msgspec.structs.asdict(state), "t_end": t_end}
         note(json.dumps({"cmd": "step", "seq": 1, **asked}))
@@ -125,7 +126,7 @@ def scenes_and_states(draw: st.DrawFn, table: str | None = None) -> tuple[Scene,
 def adversarial(draw: st.DrawFn, family: str | None = None) -> Question:
     """Draw a question of a family by its name (`conformance.cases.table.FAMILIES`), or of any.
 
-    Its `scene`, `state` and `t_end` are what is asked, with `collisions` for a path.
+    The result has `scene`, `state`, `t_end`, and `collisions` for a path.
     """
     asked = FAMILIES[family or draw(st.sampled_from(list(FAMILIES)))].attempt(HypothesisDraw(draw))
     assume(asked is not None)

@@ -1,28 +1,28 @@
-"""Vectors: questions with certified answers, and the corpus that they are kept in.
+"""Vectors: questions with certified answers, and the corpus of all vectors.
 
-A vector asks for one step, one trajectory or one particle's flow; its answers are enclosures that the
-reference found and `conformance.verify` proved. The corpus is one file of JSON lines for each group,
-and one for all hard cases, beside a manifest with its version and every file's SHA-256; `load` refuses a
-corpus that does not match its manifest. Answers never leave the harness: `request` builds the line that an
-implementation is sent.
+A vector asks for one step, one trajectory or one particle's flow. Its answers are enclosures that the
+reference found and `conformance.verify` proved. The corpus has one file of JSON lines for each group, one
+for all hard cases, and a manifest with its version and the SHA-256 of each file. `load` refuses a corpus
+that does not match its manifest. `request` builds the line that is sent to an implementation; it contains
+no answer.
 
-Levels say how delicate a question is, by the condition number (the largest relative change of an answer per
-relative change of the inputs) and by what nudging the inputs does:
-    core      condition <= 1e6, and the walls met stay the same when every input moves by 2^-30 of its size.
+A level says how delicate a question is. It depends on the condition number (the largest relative change of an
+answer per relative change of the inputs), and on the effect of a small change of the inputs:
+    core      condition <= 1e6, and a relative change of 2^-30 in every input leaves the walls met the same.
               An answer that passes (backward error 1e-9, see `grading.grade`) is then right to three
-              digits, and a stepper that loses twice the digits that it must (1e6^2 u = 1e-4 at worst, in the
-              answer; 1e6 u = 1e-10 backward) still passes: what an honest simple stepper can do.
-    extended  condition <= 1e12, walls stable under 2^-44: within binary64's reach, but only for a stepper
-              that is backward stable. Bad input that must be refused is here too.
-    stress    beyond, and where the answer is degenerate: ties of two walls, tangencies, sliding.
+              digits. A simple stepper that loses twice the necessary digits (at worst 1e6^2 u = 1e-4 in
+              the answer, 1e6 u = 1e-10 backward) still passes.
+    extended  condition <= 1e12, walls the same under a change of 2^-44. A backward stable stepper in
+              binary64 can answer. Bad input that must be refused is here too.
+    stress    the rest, and degenerate answers: ties of two walls, tangencies, sliding.
 
-The corpus's version is MAJOR.MINOR. A vector once published never changes its question; ids are never
-reused. New vectors take the next number of their group and raise MINOR. A vector found wrong or unfair is
-retired: its id goes to the manifest's `retired`, its line goes away, and MAJOR is raised, as it is when
-enclosures or levels of published vectors change. Results are comparable within one MAJOR.
+The version is MAJOR.MINOR. A published vector never changes its question, and an id is never used again.
+New vectors take the next number of their group and raise MINOR. If a vector is wrong or unfair, its id
+moves to `retired` of the manifest, its line is removed, and MAJOR is raised. MAJOR is also raised if
+enclosures or levels of published vectors change. Results with the same MAJOR are comparable.
 
 `python -m conformance.vectors > docs/vector.schema.json` prints the schema of a line.
-Not handled: questions that JSON or `scene.State` cannot hold (nan, fields missing or too many).
+Not handled: questions that JSON or `scene.State` cannot represent (nan, missing or unknown fields).
 """
 
 import decimal
@@ -56,22 +56,22 @@ Hash = Annotated[str, msgspec.Meta(pattern="^[0-9a-f]{64}$")]
 
 
 class BadCorpus(BadInput):
-    """A corpus that is not what its manifest says: one line naming file, field, value and bound."""
+    """A corpus that does not match its manifest: one line naming file, field, value and bound."""
 
 
 class Certified(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
     """The proved state just after a collision, or at the horizon.
 
     Attributes:
-        dt: flight time since the collision before [time], enclosed: lower and upper end, both decimal; of a
-            flow, the time since the one written before.
-        x: place [length], likewise.
-        y: likewise.
-        vx: velocity [length/time], likewise.
-        vy: likewise.
+        dt: flight time since the collision before [time]: lower and upper end of its enclosure, as decimals.
+            In a flow, time since the step written before.
+        x: position [length], enclosed.
+        y: position [length], enclosed.
+        vx: velocity [length/time], enclosed.
+        vy: velocity [length/time], enclosed.
         allowance: for dt, x, y, vx, vy: sum over inputs of |d out / d in| |in|. In a trajectory the
-            sum goes over the inputs of every step so far, with the Jacobians chained: what rounding
-            each state that the stepper holds can do.
+            sum is over the inputs of every step so far, with chained Jacobians: the possible effect of
+            rounding each intermediate state.
         wall: the wall met; None at the horizon.
     """
 
@@ -97,12 +97,14 @@ class Certified(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_de
 class Expectation(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
     """One answer that is right.
 
-    Attributes: outcome: of the step; of a trajectory: how it ends, "collision" when all asked for are
-    found. steps: the collisions, and the horizon when it ends there; empty for undefined and rejected
-    steps. Of a flow, whose whole path is proved, the collisions that begin or end a stay, and the horizon.
-    reason: of an undefined outcome. stays: of a flow, the capture intervals (docs/protocol.md) as places in
-    `steps`, counted from 0: the arc hit that begins it and the collision that ends it, or the horizon.
-    Empty for none.
+    Attributes:
+        outcome: of the step; of a trajectory: how it ends, "collision" when all asked for are found.
+        steps: the collisions, and the horizon when it ends there; empty for undefined and rejected steps.
+            Of a flow, whose whole path is proved, the collisions that begin or end a capture interval,
+            and the horizon.
+        reason: of an undefined outcome.
+        stays: of a flow, the capture intervals (docs/protocol.md) as places in `steps`, counted from 0:
+            the arc hit that begins it and the collision that ends it, or the horizon. Empty for none.
     """
 
     outcome: OutcomeName
@@ -116,19 +118,19 @@ class Vector(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defau
 
     Attributes:
         id: "<group>/<number>", never reused.
-        group: what it belongs to: a table, a hard case, a generated family.
+        group: a table, a hard case, or a generated family.
         level: core, extended or stress.
         kind: step, trajectory or flow.
         rule: what it tests, in words.
         source: place in the paper, or hard case number.
-        scene: the wire's form.
+        scene: in the form of the protocol.
         state: the start.
         t_end: horizon [time].
         expect: the right answers; any of them passes. The first is what the reference proved.
-        collisions: how many a trajectory is asked for; of a flow how many steps its path has, the last to
-            the horizon.
-        condition: condition number, the largest over a trajectory; 0 where nothing is met, and
-            1e300 stands for infinity.
+        collisions: of a trajectory, the number asked for; of a flow, the number of steps of its path,
+            including the last one to the horizon.
+        condition: condition number, the largest over a trajectory; 0 if no wall is met; 1e300 stands
+            for infinity.
     """
 
     id: Annotated[str, msgspec.Meta(pattern="^[a-z0-9-]+/[0-9]+$")]
@@ -153,13 +155,13 @@ class File(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Manifest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """What the corpus holds.
+    """The content of the corpus.
 
     Attributes:
         corpus: version, "MAJOR.MINOR".
         digest: SHA-256 over the files' names and hashes in order, and the retired ids.
         files: by name.
-        retired: ids that once were, never to be used again.
+        retired: ids of removed vectors, never used again.
     """
 
     corpus: Annotated[str, msgspec.Meta(pattern=r"^[0-9]+\.[0-9]+$")]
@@ -180,7 +182,7 @@ def certified(
 
     Args:
         ends: low and high of dt, x, y, vx, vy.
-        allowance: of these, in this order; four digits of it are kept.
+        allowance: of these, in this order; written with four digits.
         wall: the wall met; None at the horizon.
         digits: decimals to write.
         is_wide: go one unit of the last decimal further, so that an enclosure in balls fits in.
@@ -191,7 +193,7 @@ def certified(
 
 
 def four_digits(number: float) -> float:
-    """Return a number to the four digits that allowances and condition numbers are kept with."""
+    """Return a number rounded to four digits, as allowances and condition numbers are written."""
     return float(f"{number:.3e}")
 
 
@@ -215,12 +217,12 @@ def load(level: str = "core", path: Path | None = None) -> list[Vector]:
 
     Args:
         level: core, extended or stress.
-        path: the corpus's folder; None for the one that ships with the package.
+        path: folder of the corpus; None for the one in the package.
 
     Raises:
-        BadCorpus: when the level is none, or files and manifest do not fit together.
+        BadCorpus: the level is unknown, or files and manifest do not match.
 
-    Who loads the shipped corpus again is given the same vectors: read them, and change none.
+    The vectors of the package are cached and shared: do not change them.
     """
     if level not in LEVELS:
         raise BadCorpus(f"level = {level!r}, must be one of {', '.join(LEVELS)}")
@@ -241,7 +243,7 @@ def manifest(path: Path | None = None) -> Manifest:
     """Read a corpus's manifest and check its digest.
 
     Raises:
-        BadCorpus: when it cannot be read, or is not sound.
+        BadCorpus: it cannot be read, or is not valid.
     """
     try:
         found = msgspec.json.decode(_read(MANIFEST, path), type=Manifest)
@@ -264,7 +266,7 @@ def encode(vectors: list[Vector]) -> bytes:
 
 
 def request(vector: Vector, seq: int) -> dict[str, Any]:
-    """Return the protocol line that asks a vector's question. It tells nothing of the answer.
+    """Return the protocol line that asks a vector's question, without the answer.
 
     Args:
         vector: the question.
@@ -286,12 +288,12 @@ def _scene(encoded: str) -> Scene:
 
 
 def answer(vector: Vector, step: Stepper, follow: Follow, carry: Flowing) -> dict[str, Any]:
-    """Return how a stepper of functions answers a vector, in the wire's form.
+    """Ask a stepper of Python functions a vector; return its answer in the form of the protocol.
 
     Args:
         vector: the question.
         step: (scene, state, t_end) -> outcome.
-        follow: (scene, state, collisions, t_end) -> collisions, and last what came instead of one.
+        follow: (scene, state, collisions, t_end) -> collisions; the last entry may be another outcome.
         carry: (scene, states, t_end) -> outcome and first capture interval of each.
     """
     try:

@@ -1,14 +1,14 @@
-"""Finite-time Lyapunov exponents: how fast two particles that start side by side part, along an orbit.
+"""Finite-time Lyapunov exponents: how fast neighbouring particles separate along an orbit.
 
-Idea. The reference proves each step of an orbit once more and gives the Jacobian of d(dt, x, y, vx, vy) by
-d(t, x, y, vx, vy). Their product, taken from step to step, stretches a small deviation; lengths count in
-units of the table and velocities in units of the present speed. The exponent after n collisions is the mean
-of the logs of the stretches. Its error is the standard error over N_BLOCKS equal parts of the orbit, which
-holds while a part is longer than the orbit's memory. It is an error of the mean along this orbit: in the
-chaotic zone orbits also stick near islands for long times, which no single orbit tells of, and in an island
-the exponent falls as (log n) / n and has no limit but 0.
+Idea. The reference proves each step of an orbit and gives the Jacobian d(dt, x, y, vx, vy) / d(t, x, y, vx,
+vy). The product of these stretches a small deviation. Lengths are in units of the table, and velocities in
+units of the present speed. The exponent after n collisions is the mean of the logs of the stretches. Its
+error is the standard error over N_BLOCKS equal parts of the orbit. This holds if a part is longer than the
+memory of the orbit. It is an error of the mean along this orbit. In the chaotic zone orbits stick near
+islands for long times, which a single orbit does not show. In an island the exponent falls as (log n) / n
+to 0.
 
-The Jacobians are those at the states in binary64, each right to some 16 digits.
+The Jacobians belong to the states in binary64. Each is right to some 16 digits.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ DIGITS = 16
 
 
 class Stretching(NamedTuple):
-    """The logs of the stretches along an orbit, n of them, and the exponents they add up to.
+    """The n logs of the stretches along an orbit, and the exponents that follow.
 
     Attributes:
         logs: (n,) log of the growth of a deviation at each collision.
@@ -49,7 +49,7 @@ def jacobians(orbit: FollowedOrbit, progress: Callable[[int], None] | None = Non
     """Return (n, 5, 5): d(t, x, y, vx, vy) after each collision by d(t, x, y, vx, vy) before it.
 
     Args:
-        orbit: some 5 ms a collision.
+        orbit: takes some 5 ms per collision.
         progress: called with the number of collisions done.
 
     Raises:
@@ -60,7 +60,7 @@ def jacobians(orbit: FollowedOrbit, progress: Callable[[int], None] | None = Non
     out = np.empty((len(orbit.walls), 5, 5))
     for k, wall in enumerate(orbit.walls):
         before, after = orbit.state(k), orbit.state(k + 1).t
-        end = after + (after - before.t) + math.ulp(after)  # a horizon safely beyond the hit that is known
+        end = after + (after - before.t) + math.ulp(after)  # a horizon safely beyond the known hit
         proved = reference.next_collision(orbit.scene, before, end, digits=DIGITS, is_differentiated=True)
         if isinstance(proved, Undecided):
             raise BadInput(f"collision {k + 1} of the orbit: the reference is undecided, {proved.reason}")
@@ -103,7 +103,7 @@ def stretching(orbit: FollowedOrbit, progress: Callable[[int], None] | None = No
 
 
 def _across(state: FloatArray) -> FloatArray:
-    """Return a unit deviation off all symmetries: as much to the side as in direction."""
+    """Return a unit deviation without symmetry: equal parts sideways and in direction."""
     _, _, _, vx, vy = state
     speed = math.hypot(vx, vy)
     found: FloatArray = np.array([0.0, -vy, vx, -vy, vx]) / (speed * math.sqrt(2.0))

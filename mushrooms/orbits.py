@@ -1,9 +1,9 @@
-"""Orbits: one particle's start and its collisions, with what one looks at along them, and their export.
+"""Orbits: the start and the collisions of one particle, with sections, maps, energies and export.
 
-`follow` draws starts as an ensemble does (particle i of seed S is particle i of `fast.simulate(..., seed=S)`)
-and follows each through the same number of collisions, or of cycles. An orbit knows its energies, its hits in
-the coordinates of a Poincare section and of the boundary map, its capture intervals, and what the adiabatic
-theory says of its energy, given these stays. Pictures: `mushrooms.figures.orbits`.
+`follow` draws starts like an ensemble: particle i of seed S is particle i of `fast.simulate(..., seed=S)`.
+Each is followed for the same number of collisions, or of cycles. An orbit has its energies, its hits in the
+coordinates of a Poincare section and of the boundary map, its capture intervals, and the energy that the
+adiabatic theory predicts for these intervals. Pictures: `mushrooms.figures.orbits`.
 """
 
 from __future__ import annotations
@@ -42,14 +42,14 @@ CROSSINGS = 60.0  # of the table in a cycle, at the energy taken when none is as
 
 
 class Section(NamedTuple):
-    """The hits of the arc, n of them, as a Poincare section has them.
+    """The n hits of the arc, in the coordinates of a Poincare section.
 
     Attributes:
-        collision: (n,) which collision of the orbit each is, from 0.
-        t: (n,) when [time].
-        place: (n,) arc length from the right end over the arc's whole length at that time, 0 to 1.
+        collision: (n,) number of the collision in the orbit, from 0.
+        t: (n,) time of the hit [time].
+        place: (n,) arc length from the right end, divided by the length of the arc at that time, 0 to 1.
         sin_phi: (n,) sin of the angle to the normal before the bounce; positive: clockwise (Eq:sinphi).
-        nu: (n,) the mouth over the radius at that time; 0 in a cap.
+        nu: (n,) w / r at that time; 0 in a cap.
     """
 
     collision: npt.NDArray[np.int64]
@@ -63,7 +63,7 @@ class Section(NamedTuple):
         return np.asarray(np.abs(self.sin_phi) > self.nu)
 
     def first_from(self, instants: FloatArray) -> Section:
-        """Return the first hit from each of some times on that has one."""
+        """Return the first hit after each given time that has one."""
         k = np.searchsorted(self.t, instants)
         there = k[k < len(self.t)]
         return Section(self.collision[there], *(column[there] for column in self[1:]))
@@ -71,14 +71,14 @@ class Section(NamedTuple):
 
 @dataclass(frozen=True)
 class FollowedOrbit:
-    """One particle: where it starts, its collisions, and why they ended.
+    """One particle: its start, its collisions, and why they ended.
 
     Attributes:
         scene: the table and its laws.
         start: the state it starts from.
         walls: (n,) the walls hit.
         steps: (n, 6) dt, t, x, y, vx, vy after each collision.
-        outcome: None when all collisions asked for were found, else what came instead.
+        outcome: None if all collisions asked for were found, else the outcome that ended the path.
     """
 
     scene: Scene
@@ -126,11 +126,12 @@ class FollowedOrbit:
     def phase_section(self, phase: float | None = None) -> FloatArray:
         """Return (n, 2): the phase t/T, 0 to 1, of each hit of the moving wall, and the velocity after it.
 
-        That is Fermi and Ulam's: of a stem whose floor moves its hits and vy, else hits of both sides and
-        |vx| [length/time]. Given a phase of the walls, y and vy at that phase of each cycle.
+        This is the section of Fermi and Ulam. If the floor of a stem moves, it has the hits of the floor and
+        vy; else the hits of both sides and |vx| [length/time]. With a phase of the walls it has y and vy at
+        that phase of each cycle.
 
         Raises:
-            BadInput: the table is none of these, or the phase is none.
+            BadInput: the table is not such a stem, or the phase is out of range.
         """
         if not isinstance(self.scene, Stem) or not self.scene.period:
             raise BadInput("the section of phase and velocity is of a stem that moves")
@@ -148,7 +149,7 @@ class FollowedOrbit:
         """Return the times within the orbit at which the walls have a phase t/T, 0 to 1.
 
         Raises:
-            BadInput: it is none, or the walls stand still.
+            BadInput: the phase is out of range, or the walls stand still.
         """
         if not 0 <= check_number("phase", phase) < 1:
             raise BadInput(f"phase = {phase}, must be at least 0 and below 1")
@@ -163,17 +164,17 @@ class FollowedOrbit:
     def captured(self) -> BoolArray:
         """Return (n + 1,): whether the particle is captured on the flight from each state.
 
-        A stay begins with a captured arc hit and ends with an arc hit that is not, or below the mouth. A cap
-        holds all it has.
+        A capture interval begins with a captured arc hit. It ends with a free arc hit, or below the mouth. In
+        a cap every particle is captured.
         """
         if not isinstance(self.scene, scenes.Mushroom):
             return np.full(len(self.walls) + 1, not isinstance(self.scene, Stem))
         return captured(self.scene, self.states(), self.walls)
 
     def adiabatic(self) -> FloatArray:
-        """Return (n + 1,): log E / E0 by theory, given when this particle is captured and when not.
+        """Return (n + 1,): log E / E0 by theory, for the capture intervals of this particle.
 
-        In the cap E V_cap stays as it is, outside the chaotic zone's own law holds.
+        While captured E V_cap is constant; otherwise the law of the chaotic zone holds.
 
         Raises:
             NotCovered: the table is a stem.
@@ -192,7 +193,7 @@ class FollowedOrbit:
         return np.concatenate([[0.0], np.cumsum(rise)])
 
     def columns(self) -> dict[str, list[Any]]:
-        """Return the orbit as columns of n + 1 rows, the start first; None where there is nothing to say.
+        """Return the orbit as columns of n + 1 rows, the start first; None marks a missing value.
 
         They are collision, wall, dt, t, x, y, vx, vy, energy; at the arc also place, sin_phi, nu and captured
         (see `Section`).
@@ -214,10 +215,10 @@ class FollowedOrbit:
         return found
 
     def write(self, path: Path | str) -> None:
-        """Write the columns as .csv (floats in shortest round-trip form) or .parquet, the scene beside them.
+        """Write the columns as .csv (floats in shortest round-trip form) or .parquet, with the scene.
 
         Raises:
-            BadInput: the ending is neither, or pyarrow is not installed.
+            BadInput: another ending, or pyarrow is not installed.
         """
         path = Path(path)
         if path.suffix not in SUFFIXES:
@@ -237,7 +238,7 @@ class FollowedOrbit:
 
 
 def usual_energy(scene: Scene, crossings: float = CROSSINGS) -> float:
-    """Return an energy at which a particle crosses the table so often in a cycle [length^2 / time^2]."""
+    """Return an energy at which a particle crosses the table this often in a cycle [length^2 / time^2]."""
     check_scene(scene)
     size = float(table_at(fp, scene, 0.0).size)
     return 0.5 * (crossings * size / (scene.period or CROSSINGS * size)) ** 2
@@ -257,11 +258,11 @@ def follow(
     Args:
         scene: table and laws.
         n_collisions: of each particle, 1 to 10^6.
-        energy: v^2 / 2 at the start [length^2 / time^2], > 0 and at most 2^800; by default what
-            crosses the table some sixty times in a cycle.
+        energy: v^2 / 2 at the start [length^2 / time^2], > 0 and at most 2^800; by default one
+            that crosses the table some sixty times in a cycle.
         seed: 0 to 2^64 - 1; particle i is particle i of `fast.simulate` at this energy and seed.
-        n_orbits: how many particles, 1 to 1000.
-        n_cycles: cycles of the walls after which to stop, if collisions have not come to an end before.
+        n_orbits: number of particles, 1 to 1000.
+        n_cycles: cycles of the walls after which to stop, if the collisions do not end before.
 
     Raises:
         BadInput: naming field, value and bound.
@@ -275,7 +276,7 @@ def follow(
     if n_cycles is not None:
         n_cycles = check_count("n_cycles", n_cycles, 1, MAX_COLLISIONS)
         end = start_time(scene) + n_cycles * (scene.period or 1.0)
-    from fast.starts import initial_states  # compiles for seconds: only when all that was given is right
+    from fast.starts import initial_states  # compiles for seconds: only when all arguments are right
 
     rows = initial_states(scene, n_orbits, energy, seed)
     return [from_state(scene, State(row[0], *row[2:]), n_collisions, end) for row in rows.tolist()]
@@ -294,7 +295,7 @@ def from_state(scene: Scene, start: State, n_collisions: int, t_end: float = mat
 
 
 class Slot(NamedTuple):
-    """A wall's part of the boundary map: its name and from where to where along the boundary, 0 to 1."""
+    """A wall's part of the boundary map: its name, and its begin and end along the boundary, 0 to 1."""
 
     wall: Wall
     begin: float
@@ -327,8 +328,8 @@ def _lengths(now: TableAt) -> list[tuple[Wall, float]]:
 def boundary_map(orbit: FollowedOrbit) -> FloatArray:
     """Return (n, 2): place along the boundary and sin of the angle to the normal after each collision.
 
-    The place runs anticlockwise, 0 to 1; each wall has the slot that `boundary` gives it, and a hit
-    its share of that. The sine is positive along that direction.
+    The place runs anticlockwise, 0 to 1. Each wall has the part that `boundary` gives it, and a hit the
+    corresponding point of it. The sine is positive along that direction.
     """
     scene = orbit.scene
     slots = boundary(scene)
@@ -346,7 +347,7 @@ def boundary_map(orbit: FollowedOrbit) -> FloatArray:
 
 
 def _share(now: TableAt, wall: Wall, x: float, y: float, is_split: bool) -> float:
-    """Return how far along a wall a place is, anticlockwise, 0 to 1."""
+    """Return the position along a wall, anticlockwise, 0 to 1."""
     if wall == "arc":
         return math.atan2(y, x) / math.pi
     if wall == "left":

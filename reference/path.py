@@ -33,13 +33,17 @@ def trajectory(
 ) -> Trajectory:
     """Follow a particle, every state enclosed, the last one to `digits` decimals.
 
-    Args: scene: table and laws of motion. state: the exact start. n_collisions: how many collisions to
-    follow, 0 to 1,000,000. t_end: horizon [time], None for none. A particle that never meets a wall then
-    ends with a Horizon at the flight time 2^1000. digits: decimals wanted of the last state, relative to
-    the size of its vectors; 1 to 10,000. A position that may be 0 has this many digits relative to the
-    length of the last flight. working: decimals to work with. The path ends with Undecided when they no
-    longer decide the next step, whatever `digits` says. By default they are doubled until they suffice.
-    is_differentiated: chain the steps' Jacobians too.
+    Args:
+        scene: table and laws of motion.
+        state: the exact start.
+        n_collisions: how many collisions to follow, 0 to 1,000,000.
+        t_end: horizon [time], None for none. A particle that never meets a wall then ends with a Horizon
+            at the flight time 2^1000.
+        digits: decimals wanted of the last state, relative to the size of its vectors; 1 to 10,000. A
+            position that may be 0 has this many digits relative to the length of the last flight.
+        working: decimals to work with. The path ends with Undecided when they no longer decide the next
+            step, whatever `digits` says. By default they are doubled until they suffice.
+        is_differentiated: chain the steps' Jacobians too.
 
     Raises:
         BadInput: naming field, value and bound.

@@ -1,8 +1,8 @@
-"""Energies of an ensemble after one cycle and from cycle to cycle, the theory over them.
+"""Energies of an ensemble after one cycle and from cycle to cycle, with the theory.
 
-What is drawn is s = ln(E/E0) of those who take part, as (n, K) arrays: n particles after each of K cycles. A
-run too large for memory hands them over block by block. What the theory at this energy leaves of a histogram
-stands below it; of scenes without tables of frozen rates the limit of high energies is drawn.
+The data are s = ln(E/E0) of the particles that take part, as (n, K) arrays: n particles after each of K
+cycles. A run too large for memory gives them block by block. Below a histogram stands its difference from
+the theory at this energy. For scenes without measured rates the limit of high energies is drawn.
 """
 
 from __future__ import annotations
@@ -41,13 +41,13 @@ AXIS = "s = ln(E1/E0)"
 
 
 class Gathered(NamedTuple):
-    """What is drawn of n particles over K cycles.
+    """The data drawn of n particles over K cycles.
 
     Attributes:
-        n: how many.
+        n: number of particles.
         edges, counts: bars of ln(E1/E0), after the first cycle.
         mean, sd: (K,) of ln(E/E0) after each cycle.
-        few: (m, K) that of single particles.
+        few: (m, K) ln(E/E0) of single particles.
     """
 
     n: int
@@ -111,16 +111,16 @@ def panels(n: int) -> tuple[Figure, list[tuple[Axes, Axes]]]:
 
 @rc_context(STYLE)
 def histogram(scene: Scene, energy: float, gains: Gains, n_particles: int | None = None) -> Figure:
-    """Draw an ensemble's ln(E1/E0) after a cycle; the theory over it, where it covers the scene.
+    """Draw an ensemble's ln(E1/E0) after a cycle, with the theory if it covers the scene.
 
     Args:
-        scene: that was simulated.
-        energy: of every start [length^2 / time^2].
-        gains: (n,) ln(E1/E0) of those who take part, or an iterator of blocks.
-        n_particles: how many were simulated; n by default.
+        scene: the scene that was simulated.
+        energy: initial energy of every particle [length^2 / time^2].
+        gains: (n,) ln(E1/E0) of the particles that take part, or an iterator of blocks.
+        n_particles: number of simulated particles; n by default.
 
     Raises:
-        BadInput: `scene` is none, or fewer than two particles.
+        BadInput: `scene` is not a scene, or there are fewer than two particles.
     """
     check_scene(scene)
     found = known(scene, energy := given_energy(energy))
@@ -142,13 +142,13 @@ def growth(scene: Scene, energy: float, gains: Gains, n_particles: int | None = 
     """Draw the mean of ln(E/E0) from cycle to cycle with its spread and theory's; below it `histogram`.
 
     Args:
-        scene: that was simulated.
-        energy: of every start [length^2 / time^2].
-        gains: (n, K) ln(E/E0) of those who take part after each cycle, or an iterator of blocks.
-        n_particles: how many were simulated; n by default.
+        scene: the scene that was simulated.
+        energy: initial energy of every particle [length^2 / time^2].
+        gains: (n, K) ln(E/E0) after each cycle, of the particles that take part, or an iterator of blocks.
+        n_particles: number of simulated particles; n by default.
 
     Raises:
-        BadInput: `scene` is none, or fewer than two particles.
+        BadInput: `scene` is not a scene, or there are fewer than two particles.
     """
     check_scene(scene)
     found = known(scene, energy := given_energy(energy))
@@ -182,14 +182,14 @@ def growth(scene: Scene, energy: float, gains: Gains, n_particles: int | None = 
 
 
 def _title(scene: Scene, energy: float, bars: Gathered, n_particles: int | None) -> str:
-    """Return what was asked for; and how many of the particles are none of those drawn."""
+    """Return the title: scene, energy, particles, and how many of these are not drawn."""
     n = n_particles or bars.n
     title = f"{plots.plain(scene.name or 'a scene')}, E0 = {plots.power(energy)}, {n:,} particles"
     return title if n == bars.n else f"{title}\n({n - bars.n:,} of them never free, or lost: left out)"
 
 
 def known(scene: Scene, energy: float) -> theory.FiniteEnergy | None:
-    """Return the theory of a scene at an energy; None where it covers no such scene."""
+    """Return the theory of a scene at an energy; None if it does not cover the scene."""
     try:
         return theory.at_energy(scene, energy) if isinstance(scene, Mushroom) else None
     except (BadInput, theory.NotCovered, theory.NotConverged):
@@ -197,7 +197,7 @@ def known(scene: Scene, energy: float) -> theory.FiniteEnergy | None:
 
 
 def draw_limit(axes: Axes, scene: Scene, bars: Gathered) -> None:
-    """Draw a histogram, and what it comes to at high energies where theory covers the scene."""
+    """Draw a histogram, with the limit of high energies if theory covers the scene."""
     heights = _bars(axes, bars)
     top = 1.3 * float(heights.max())
     axes.set(xlabel=AXIS, ylabel="density", xlim=(bars.edges[0], bars.edges[-1]), ylim=(0, top))
@@ -248,7 +248,7 @@ def _bars(axes: Axes, bars: Gathered) -> FloatArray:
 
 
 def _residuals(rest: Axes, counts: IntArray, expected: FloatArray, edges: FloatArray) -> None:
-    """Draw counts less those expected, in standard errors, where a bin expects enough for that to mean it."""
+    """Draw counts minus expected counts, in standard errors, for bins with enough expected counts."""
     enough = expected >= LEAST_EXPECTED
     left = np.where(enough, (counts - expected) / np.sqrt(np.where(enough, expected, 1.0)), np.nan)
     rest.axhspan(-2, 2, color=SKY, alpha=0.5, linewidth=0)

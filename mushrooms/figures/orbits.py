@@ -120,15 +120,15 @@ def _names(axes: Axes, scene: Scene, t: float) -> None:
 def section(orbits: Sequence[FollowedOrbit] | FollowedOrbit, phase: float | None = None) -> Figure:
     """Draw a Poincare section.
 
-    Of a cap or a mushroom it is place on the arc against sin phi, at each hit. In a mushroom the edge is
-    |sin phi| = nu. Where nu moves, what lies beyond its largest value is captured at all times, what lies
-    below its least value at none, and between the two it depends on the time: each hit has the colour of its
-    own. Of a stem it is Fermi and Ulam's: the phase of the wall against the velocity after the hit.
+    For a cap or a mushroom it shows place on the arc against sin phi, at each hit. In a mushroom the edge is
+    |sin phi| = nu. If nu moves, hits beyond its largest value are captured at all times, and hits below its
+    least value never. Between them it depends on the time; the colour of each hit shows it. For a stem it is
+    the section of Fermi and Ulam: the phase of the wall against the velocity after the hit.
 
     Args:
         orbits: one or more, of one scene.
-        phase: t/T of the walls, 0 to 1: of each cycle only the first hit of the arc from there on, of a stem
-            depth and velocity at that time.
+        phase: t/T of the walls, 0 to 1. Then only the first hit of the arc after this phase of each cycle is
+            drawn; for a stem, depth and velocity at this phase.
 
     Raises:
         BadInput: the walls stand still, and a phase is asked for or the table is a stem.
@@ -162,7 +162,7 @@ def draw_section(axes: Axes, found: Sequence[FollowedOrbit], phase: float | None
 
 
 def _draw_zones(axes: Axes, low: float, high: float) -> None:
-    """Draw what is captured at all times and at none, and the edges."""
+    """Draw the regions captured at all times and at no time, and the edges."""
     for sign in (1, -1):
         axes.axhspan(sign * high, sign, color=CAPTURED, alpha=0.10, linewidth=0)
         for level in {low, high}:
@@ -189,7 +189,7 @@ def _draw_stem(axes: Axes, found: Sequence[FollowedOrbit], phase: float | None) 
 def _points(
     axes: Axes, found: Sequence[FollowedOrbit], x: FloatArray, y: FloatArray, captured: BoolArray, what: str
 ) -> None:
-    """Draw points and count them in the legend, in a mushroom the captured apart; many points are finer."""
+    """Draw points and count them in the legend; in a mushroom captured ones apart. Many points are finer."""
     size = min(4.0, max(0.6, 90.0 / math.sqrt(len(x) or 1)))
     kinds = [(captured, CAPTURED, "captured, "), (~captured, FREE, "free, ")]
     if not isinstance(found[0].scene, Mushroom):
@@ -235,7 +235,7 @@ def draw_map(axes: Axes, found: Sequence[FollowedOrbit]) -> None:
 def energy_in_time(orbit: FollowedOrbit) -> Figure:
     """Draw ln(E/E0) of a particle against time, with the theory; capture intervals are shaded.
 
-    Of many particles: `mushrooms.figures.energies.growth`.
+    For many particles use `mushrooms.figures.energies.growth`.
     """
     [orbit] = _given(orbit)
     figure, axes = plots.new_figure(7.2, 4.4)
@@ -244,7 +244,7 @@ def energy_in_time(orbit: FollowedOrbit) -> Figure:
     time = (states[:, 0] - states[0, 0]) / span if span else states[:, 0]
     energies = orbit.energies()
     one: dict[str, Any] = {"color": plots.BLUE, "linewidth": 0.8, "label": "this particle", "zorder": 3}
-    axes.plot(time, np.log(energies / energies[0]), **one)  # before theory, which is broad behind it
+    axes.plot(time, np.log(energies / energies[0]), **one)  # above the theory, a broad line
     known = "theory with these captures" if isinstance(orbit.scene, Mushroom) else "theory"
     try:
         axes.plot(time, orbit.adiabatic(), color=plots.BLACK, linewidth=2.6, alpha=0.6, label=known)
@@ -299,7 +299,7 @@ def write_animation(orbit: FollowedOrbit, file: BinaryIO, n_frames: int = N_FRAM
     Args:
         orbit: shown from its start to its last collision, at frames evenly spaced in time.
         file: open for binary writing.
-        n_frames: how many.
+        n_frames: number of frames.
     """
     [orbit] = _given(orbit)
     states = orbit.states()

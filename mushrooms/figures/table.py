@@ -41,8 +41,8 @@ def phases(scene: Scene, n: int = N_PHASES) -> list[float]:
 def chords(scene: Scene, t: float, n: int = N_CHORDS) -> np.ndarray:
     """Follow one particle for n collisions from time t; returns points of shape (2, m) [length].
 
-    It is so fast that the walls hardly move meanwhile; the line stops early where the step
-    has no answer.
+    It is so fast that the walls hardly move meanwhile. The line stops early if a step has no
+    answer.
     """
     import fast  # compiles for seconds: only when a trajectory is wanted
 
@@ -66,7 +66,7 @@ def chords(scene: Scene, t: float, n: int = N_CHORDS) -> np.ndarray:
 def new_strip(scene: Scene, width: float, max_height: float) -> Figure:
     """Return a figure [inches] with the table at each phase of the cycle and a trajectory in it.
 
-    Low tables stand in two rows when the height allows it.
+    Low tables stand in two rows if the height permits.
     """
     times = phases(scene)
     left, right, bottom, top = _frame(scene)
@@ -124,8 +124,8 @@ def write_frames(
     Args:
         scene: the table.
         times: one for each frame.
-        prepare: given the axes, draws what is to move besides the walls, with animated=True, and returns
-            what moves it: that is given a frame's number and returns its title.
+        prepare: receives the axes and draws what moves besides the walls, with animated=True. It returns a
+            function that receives the number of a frame, moves it, and returns the title.
         file: open for binary writing.
     """
     left, right, bottom, top = _frame(scene)
@@ -137,7 +137,7 @@ def write_frames(
     move = prepare(axes)
     title = axes.set_title(" ")
     title.set_animated(True)
-    # What stands still is drawn once, and the frames over a copy of it: ten times as fast.
+    # The static part is drawn once, and each frame over a copy of it: ten times as fast.
     figure.set_dpi(DOTS_PER_INCH)
     canvas: Any = figure.canvas
     canvas.draw()

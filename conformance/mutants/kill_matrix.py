@@ -2,8 +2,8 @@
 
 `python -m conformance.mutants.kill_matrix` answers every vector with every mutant, grades the answers and
 writes kill-matrix.json beside this file, with a few vectors for each mutant: some five minutes on one core.
-`--table` computes nothing and prints what is kept there as Markdown. Only `fail` kills: a vector that a mutant
-declines, or at which it crashes, does not count.
+`--table` computes nothing and prints what is kept there as Markdown. Only `fail` kills: a vector that a
+mutant declines, or at which it crashes, does not count.
 """
 
 import json

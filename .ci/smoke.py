@@ -29,6 +29,7 @@ COMMANDS = (
     "draw mine.toml --out mine.svg",
     "draw mine.toml --trajectory --seed 1 --out path.gif --export path.csv",
     "ask near-corner/3 -- {python} -m conformance.plain",
+    "audit --only N5 --out report",
 )
 TYPED = (
     "import importlib.resources as r, sys\n"
@@ -62,7 +63,7 @@ def main(folder: Path) -> None:
             for command in COMMANDS:
                 if os.name == "nt" and command.startswith("ask"):
                     continue  # it signals groups of processes
-                run(python, "-m", "mushrooms", *command.format(python=python).split())
+                run(str(programs / "mushrooms"), *command.format(python=python).split())
 
 
 if __name__ == "__main__":

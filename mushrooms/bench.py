@@ -51,7 +51,7 @@ def bench(
         typer.Option(metavar="NAME", help="Workload of --table, or `all`; default: moving-cap-1e7."),
     ] = None,
 ) -> None:
-    """Measure speed against error. Writes bench.json, bench.svg, panels.svg and bench.html.
+    """Measure speed against error. Writes bench.json, bench.svg and bench.html.
 
     Exit code 0, or 2 on bad input.
     """
@@ -68,11 +68,10 @@ def bench(
     size: Size = "quick" if quick else "full"
     with output.writable_folder(out) as folder, compilation_told():
         found = _measured(size, seed, command or [])
-        picture = figures_of_speed.speed(found)
+        picture = style.svg(figures_of_speed.headline(found))
         files: dict[str, bytes | str | Writer] = {
             "bench.json": record.encode(found),
-            "bench.svg": style.svg(figures_of_speed.headline(found)),
-            "panels.svg": picture,
+            "bench.svg": picture,
             "bench.html": bench_page.to_html(found, picture),
         }
         write_files(folder, files)

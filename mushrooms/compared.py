@@ -9,8 +9,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from mpmath import fp
 
+from mushrooms.store.progress import Gain
 from mushrooms.store.spec import RunSpec
-from mushrooms.store.tally import Gain
 from scene import Mushroom, Scene
 from scene.geometry import table_at
 from scene.laws import values

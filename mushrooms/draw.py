@@ -10,7 +10,6 @@ import typer
 
 from conformance.files import write_file
 from mushrooms import output
-from mushrooms.stored import draw_run
 from mushrooms.terminal import (
     SceneName,
     check_energy,
@@ -229,6 +228,18 @@ class _Asked(NamedTuple):
         found = fast.simulate(self.table, n_particles=n, energy=energy, n_cycles=n_cycles, seed=self.seed)
         gains = np.log(found.cycle_energies[found.takes_part()] / energy)
         return energies.growth(self.table, energy, gains, n)
+
+
+def draw_run(folder: Path, out: Path | None) -> Path:
+    """Draw the energies of a stored run, with theory; return the file's path."""
+    from mushrooms.simulate import draw_energies
+    from mushrooms.store.run import open_run
+
+    path = out or Path(f"{folder.resolve().name}.svg")
+    output.check_file(path, (".svg", ".png"))
+    run = open_run(folder)
+    draw_energies(path, run.spec, run.gains(), run.shape.n_particles)
+    return path
 
 
 def _check_drawable(table: Scene) -> None:

@@ -61,7 +61,9 @@ COMMANDS = {
         "moving-cap --particles 25000 --energy 1e7 --seed 1 --out run",
         "finished blocks are in the folder of --out: --resume continues the run",
     ),
-    "export": Listed("mushrooms.stored:export", "Write a finished run as one table.", "run --to run.csv"),
+    "export": Listed(
+        "mushrooms.store.export:export", "Write a finished run as one table.", "run --to run.csv"
+    ),
     "attack": Listed(
         "mushrooms.attack:attack",
         "Ask our own steppers difficult questions.",

@@ -208,8 +208,7 @@ def _in_memory(wanted: Wanted) -> Found:
     import numpy as np
 
     import fast
-    from mushrooms.store.tally import RunTally, tally_of
-    from mushrooms.store.watch import Watch
+    from mushrooms.store.progress import RunTally, Watch, tally_of
 
     spec = wanted.spec
     try:
@@ -327,7 +326,7 @@ def draw_energies(path: Path, spec: Any, gains: Iterator[Any], n_particles: int)
 def _complete(wanted: Wanted, run: Any) -> None:
     """Follow what a run lacks."""
     from mushrooms.store import conduct, engines
-    from mushrooms.store.watch import Watch
+    from mushrooms.store.progress import Watch
 
     before, seconds = run.tally, run.seconds
     engine = (
@@ -354,7 +353,7 @@ def _summary(
 ) -> dict[str, Any]:
     from fast.starts import one_cycle
     from mushrooms.compared import measured
-    from mushrooms.store.tally import gain_of
+    from mushrooms.store.progress import gain_of
 
     flown = tally.followed * spec.n_cycles * one_cycle(spec.scene)
     return {

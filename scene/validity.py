@@ -18,6 +18,7 @@ from typing import Any, NamedTuple
 from mpmath import fp
 
 from scene import exact, mixed
+from scene.exact import half_angle, leg_intervals, leg_polynomial, one_plus_square
 from scene.given import MAX_HARMONICS
 from scene.laws import (
     BangBang,
@@ -30,7 +31,6 @@ from scene.laws import (
     value,
 )
 from scene.laws import exact as number
-from scene.polynomials import half_angle, leg_intervals, leg_polynomial, one_plus_square
 from scene.precision import decimals
 from scene.refusal import InvalidScene
 

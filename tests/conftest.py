@@ -33,7 +33,6 @@ LONGEST = [
     "test_fast_bits.py",
     "test_theory_prediction.py",
     "test_theory_valleys.py",
-    "test_scene_exact.py",
     "test_mushrooms_audit.py",
     "test_mushrooms_bench.py",
     "test_fast_lane_search.py",

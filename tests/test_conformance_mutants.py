@@ -39,9 +39,8 @@ def test_without_a_threshold_a_mutant_is_killed_at_level_core(vectors):
     assert all(MUTANTS[name].size is not None for name in late), late
 
 
-def test_the_page_is_of_the_published_matrix():
-    text = (DOCS / "kill-matrix.md").read_text("utf-8")
-    assert text == page(PUBLISHED)
+def test_the_table_has_a_row_for_each_mutant():
+    text = page(PUBLISHED)
     rows = [line.replace("\\|", "") for line in text.splitlines() if line.startswith("| ")]
     assert len(rows) == len(MUTANTS | COMMON) + 2
     assert {row.count("|") for row in rows} == {6}
@@ -109,10 +108,9 @@ def test_the_command_writes_both_files_and_judges(monkeypatch, tmp_path, vectors
         ({"alive": PLAIN}, ["not killed: alive", "subsumed: none", "plain fails: none"]),
     ):
         monkeypatch.setattr(kill_matrix, "MUTANTS", {name: MUTANTS[name], **others})
-        code = kill_matrix.run(tmp_path, tmp_path, lines.append)
+        code = kill_matrix.run(tmp_path, lines.append)
         assert (code, lines[-3:]) == (int(bool(others)), expected)
-    assert f"| {name} |" in (tmp_path / "kill-matrix.md").read_text()
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["kill-matrix.json", "kill-matrix.md"]
+    assert name in json.loads((tmp_path / "kill-matrix.json").read_text())["mutants"]
 
 
 def results(mutant, vectors):

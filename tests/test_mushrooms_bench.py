@@ -15,7 +15,7 @@ from mushrooms import bench
 from mushrooms.figures import speed as figures_of_speed
 
 ROOT = Path(__file__).parent.parent
-FILES = ["bench.html", "bench.json", "bench.svg", "panels.svg"]
+FILES = ["bench.html", "bench.json", "bench.svg"]
 
 
 @pytest.fixture(autouse=True)
@@ -58,8 +58,7 @@ def test_a_benchmark_is_written_whole_and_again(call, tmp_path, monkeypatch):
     assert (tmp_path / "one" / "bench.svg").read_text("utf-8").count("moving-cap-1e4") >= 1
 
     # The same seed asks the same questions, so that the errors are the same to the last bit.
-    for picture in ("speed", "growth"):  # drawn above
-        monkeypatch.setattr(figures_of_speed, picture, lambda *_: b"<svg/>")
+    monkeypatch.setattr(figures_of_speed, "growth", lambda *_: b"<svg/>")  # drawn above
     monkeypatch.setattr(workloads, "RULES", workloads.RULES[:1])
     assert call("--quick", "--out", tmp_path / "two", "--seed", 5)[0] == 0
     again = record.read(tmp_path / "two" / "bench.json")
@@ -79,20 +78,6 @@ def test_bad_options_are_one_line(call, monkeypatch, tmp_path, arguments, word):
     monkeypatch.chdir(tmp_path)
     assert_refused(call("--quick", *arguments), word)
     assert not list(tmp_path.iterdir())
-
-
-def test_the_front_holds_only_what_nothing_beats():
-    def point(name, ns, error, wrong=0, astray=0):
-        return record.Point("slow", name, "compiled", 1, (ns,), 1, wrong, 0, 0, 9, astray, (1.0,), (error,))
-
-    points = [
-        point("a", 10.0, 1e-15),
-        point("b", 20.0, 1e-14),
-        point("c", 30.0, 1e-30),
-        point("d", 1.0, 1e-40, 1),
-        point("e", 2.0, 1e-40, 0, 1),
-    ]
-    assert figures_of_speed.pareto(points) == [(pytest.approx(15.0), 10.0), (pytest.approx(30.0), 30.0)]
 
 
 def test_the_page_on_speed_shows_what_the_record_holds(call):
@@ -123,10 +108,7 @@ def luminance(colour: str) -> float:
 
 @pytest.mark.deep
 def test_the_kept_figure_reads_at_a_glance():
-    """No two labels of a panel touch, none is smaller than 9 points; colours have contrast and marks.
-
-    The front begins at its first point: what is right to no digit is not on it.
-    """
+    """No two labels touch, none is smaller than 9 points; colours have contrast and marks."""
     kept = record.read(ROOT / "docs" / "bench" / "bench.json")
     for colour in [*figures_of_speed.COLOURS.values(), figures_of_speed.RED]:
         assert 1.05 / (luminance(colour) + 0.05) >= 4.5
@@ -136,19 +118,4 @@ def test_the_kept_figure_reads_at_a_glance():
     boxes = [Text.get_window_extent(text) for text in figure.axes[0].texts if text.get_text()]
     assert len(boxes) == 9
     assert not any(a.overlaps(b) for k, a in enumerate(boxes) for b in boxes[:k])
-    figure = figures_of_speed.speed_figure(kept)
-    figure.draw_without_rendering()
     assert min(text.get_fontsize() for text in figure.findobj(Text) if text.get_text()) >= 9
-    panels = [axes for axes in figure.axes if axes.lines]  # of an odd number of workloads one place is empty
-    assert len(panels) == len(kept.workloads)
-    for axes in panels:
-        boxes = [Text.get_window_extent(text) for text in axes.texts]  # without the lines to them
-        assert not any(a.overlaps(b) for k, a in enumerate(boxes) for b in boxes[:k])
-        (front,) = [line for line in axes.lines if line.get_drawstyle() != "default"]
-        assert min(front.get_xdata()) > figures_of_speed.LEAST_DIGITS
-
-
-def test_labels_are_spread_and_no_further_than_needed():
-    assert figures_of_speed.spread([0.1, 0.5, 0.9], 0.1) == pytest.approx([0.1, 0.5, 0.9])
-    assert figures_of_speed.spread([0.5, 0.5, 0.5], 0.1) == pytest.approx([0.4, 0.5, 0.6])
-    assert figures_of_speed.spread([0.1, 0.5, 0.52], 0.1) == pytest.approx([0.1, 0.46, 0.56])

@@ -1,4 +1,6 @@
-"""`mushrooms check`: exit codes, report files, bad options in one line, a page that stands alone."""
+"""The commands check, ask and verify: exit codes, what is printed, and what is refused."""
+
+from __future__ import annotations
 
 import base64
 import json
@@ -17,13 +19,15 @@ from support.refusals import assert_refused
 from support.saboteurs import command
 
 import conformance
-from conformance import vectors
+import scene as scenes
+from conformance import plain, vectors
 from conformance.suite import pytest_suite
 from conformance.suite import run as suite
 from conformance.suite.checks import ensembles
 from conformance.suite.disguise import Disguise
 from conformance.suite.session import Session
 from mushrooms import check
+from scene import State
 
 PYTHON = [sys.executable, str(Path(conformance.__file__).parent / "harness" / "python" / "stepper.py")]
 
@@ -240,3 +244,136 @@ def test_the_pytest_case_fails_and_skips_with_the_verdict():
         session.introduction = msgspec.structs.replace(session.introduction, tables=())
         with pytest.raises(pytest.skip.Exception, match="unsupported: table"):
             pytest_suite.test_vector(session, vector, Disguise())
+
+
+PLAIN = [sys.executable, "-m", "conformance.plain"]
+
+
+@pytest.fixture
+def ask(command_line):
+    return partial(command_line, "ask")
+
+
+def test_it_prints_question_answer_and_rule(ask):
+    vector = next(v for v in vectors.load() if v.id == "moving-cap/3")
+    code, out, err = ask("moving-cap/3")
+    assert (code, err) == (0, "")
+    question = next(line for line in out.splitlines() if line.startswith("question"))
+    assert json.loads(question.removeprefix("question")) == vectors.request(vector, 0)
+    assert vector.rule in out
+    assert f"wall={vector.expect[0].steps[0].wall!r}" in out
+    assert out.endswith("verifier   proved\n")
+
+
+def test_the_verifiers_word_is_about_the_vector(ask, monkeypatch):
+    later = msgspec.structs.replace(vectors.load()[0], t_end=vectors.load()[0].state.t)
+    monkeypatch.setattr(vectors, "load", lambda level: (later,))
+    _, out, _ = ask(later.id)
+    assert "verifier   false the answer is horizon" in out
+
+
+def test_it_prints_the_vector_as_json(ask):
+    code, out, _ = ask("hard-case-23/1", "--json")
+    assert code == 0
+    assert msgspec.json.decode(out, type=vectors.Vector).id == "hard-case-23/1"
+
+
+@pytest.mark.parametrize(
+    "arguments", [["moving-cap/3"], ["drawn/2", "--seed", 4], ["near-corner/9", "--seed", 4]]
+)
+def test_it_grades_a_stepper(ask, arguments):
+    code, out, _ = ask(*arguments, "--", *PLAIN)
+    assert code == 0
+    assert "pass: " in out
+    assert ("asked " in out) == ("--seed" in arguments)
+
+
+def test_a_fresh_question_is_asked_as_it_is(ask):
+    code, out, _ = ask("fresh/3", "--seed", 4, "--", *PLAIN)
+    assert code == 0
+    assert "pass: " in out
+    assert "asked " not in out
+
+
+def test_a_wrong_answer_is_exit_code_1(ask):
+    code, out, _ = ask("moving-cap/3", "--", *command("honest"))
+    assert code == 1
+    assert "fail: " in out
+
+
+@pytest.mark.parametrize(
+    ("arguments", "word"),
+    [
+        (["no-such/1"], "ID = 'no-such/1'"),
+        (["drawn/1"], "--seed"),
+        (["fresh/1"], "--seed"),
+        (["fresh/999", "--seed", "1"], "ID = 'fresh/999'"),
+        (["drawn/1", "--seed", "-1"], "--seed = -1"),
+        (["moving-cap/3", "--", "./no-such-stepper"], "no-such-stepper"),
+        (["moving-cap/3", "--", *command("other-protocol")], "does not speak protocol 1"),
+        ([], "ID"),
+    ],
+)
+def test_bad_input_is_one_line(ask, arguments, word):
+    assert_refused(ask(*arguments), word)
+
+
+START = State(0.0, 0.1, 0.2, 3.0, 4.0)
+
+
+@pytest.fixture
+def rows():
+    hits = plain.trajectory(scenes.load("moving-cap"), START, 4, 1e9)
+    return [START, *hits]
+
+
+def write(path, rows):
+    lines = [f"{s.t!r},{s.x!r},{s.y!r},{s.vx!r},{s.vy!r},{s.wall or ''}" for s in rows]
+    path.write_text("\n".join(["t,x,y,vx,vy,wall", *lines]))
+    return path
+
+
+def test_a_right_trajectory_is_proved_and_a_false_step_is_drawn(rows, tmp_path, command_line):
+    path, picture = write(tmp_path / "steps.csv", rows), tmp_path / "false.svg"
+    arguments = ("verify", path, "--scene", "moving-cap", "--picture", picture)
+    assert command_line(*arguments)[0] == 0
+    assert not picture.exists()
+    write(path, [*rows[:2], msgspec.structs.replace(rows[2], x=rows[2].x + 0.01)])
+    code, out, _ = command_line(*arguments)
+    assert code == 1
+    assert "step 2: false" in out
+    assert picture.read_text().startswith("<?xml")
+
+
+def test_json_is_what_the_verifier_takes(rows, tmp_path, command_line):
+    wire = scenes.to_data(scenes.load("moving-cap"))
+    fields = ("t", "x", "y", "vx", "vy", "wall")
+    states = [{name: getattr(row, name) for name in fields} for row in rows]
+    scene = {name: law for name, law in wire.items() if name not in ("name", "notes")}
+    data = {"scene": scene, "state": states[0], "steps": states[1:]}
+    path = tmp_path / "steps.json"
+    path.write_text(json.dumps(data))
+    code, out, _ = command_line("verify", path)
+    assert (code, out.splitlines()[-1]) == (0, "4 of 4 proved")
+
+
+@pytest.mark.parametrize(
+    ("content", "options", "message"),
+    [
+        ("{", [], "Expecting"),
+        ("{}", [], "scene"),
+        ('{"scene": {"table": "cap", "r": 1.0}, "steps": [], "steps": []}', [], "a key comes twice"),
+        ("t,x,y,vx,vy\n0,0,0,1,1", [], "needs --scene"),
+        ("t,x,y,vx\n0,0,0,1", ["--scene", "moving-cap"], "column 'vy' is missing"),
+        (
+            "t,x,y,vx,vy\n0,0,0,1,up",
+            ["--scene", "moving-cap"],
+            "steps.csv':2: vy = 'up', must be a finite number",
+        ),
+    ],
+)
+def test_a_bad_trajectory_is_refused_in_one_line(content, options, message, tmp_path, command_line):
+    path = tmp_path / ("steps.json" if content[0] == "{" else "steps.csv")
+    path.write_text(content)
+    assert_refused(command_line("verify", path, *options), message)
+    assert_refused(command_line("verify", tmp_path / "none.json"), "cannot be read")

@@ -1,19 +1,34 @@
-"""What `simulate` says of time: compilation, collisions to expect, and careful steps."""
+"""`simulate`: time, theory beside the results, results gathered from blocks, and folders that are held."""
 
 from __future__ import annotations
 
+import errno
 import importlib.util
 import json
+import os
+import time
+import weakref
+from fractions import Fraction
 
 import numpy as np
 import pytest
 
 import fast
+import theory
 from conformance.audit import session
+from conformance.audit.runs import SCENES
+from conformance.files import sealed, unsealed
 from mushrooms import attack, bench, orbits
+from mushrooms.compared import begins_widest, leans_inward, limit_told, measured
 from mushrooms.forecast import expected_collisions
+from mushrooms.output import LOCK, locked
+from mushrooms.store import conduct, progress
+from mushrooms.store.layout import shape_of
+from mushrooms.store.progress import Gain, RunTally, gain_of
+from mushrooms.store.run import Block, StoredRun
+from mushrooms.store.spec import RunSpec
 from mushrooms.terminal import compilation_told
-from scene import load
+from scene import Fourier, Mushroom, load
 
 RUN = ["simulate", "moving-cap", "--particles", 60, "--energy", 1e4, "--seed", 7, "--threads", 1, "--json"]
 KEPT = """\
@@ -108,3 +123,199 @@ def test_careful_steps_are_told_of_where_they_took_the_time(
     code, out, err = command_line(*RUN)
     assert (code, json.loads(out)["careful"]) == (0, run.n_careful.sum())
     assert (said in err) if said else err == ""
+
+
+def gain(values):
+    return gain_of(lambda: [values[:, None]])
+
+
+@pytest.mark.parametrize("n_cycles", [1, 4])
+@pytest.mark.parametrize("energy", [1e5, 1e7])  # at 1e4 theory leaves out as much as the directions differ by
+def test_energies_drawn_from_theory_agree_with_it(n_cycles, energy):
+    """And those of the reversed cycle do not."""
+    n, pulls = 100_000, {}
+    for name in ("moving-cap", "moving-cap-reversed"):
+        found = theory.at_energy(load(name), energy)
+        gains = found.draw(n_cycles, n, 5)[:, -1]
+        captured = round((1 - found.p_nc) * n * n_cycles)
+        beside = measured(RunSpec(load("moving-cap"), energy, n_cycles, 1), captured, gain(gains))
+        assert beside["m1"] == pytest.approx(gains.mean() / n_cycles)
+        assert beside["m1_se"] == pytest.approx(gains.std(ddof=1) / np.sqrt(n) / n_cycles)
+        pulls[name] = abs(beside["m1_z"])
+    assert pulls["moving-cap"] < 3.5
+    assert pulls["moving-cap-reversed"] > 3.5
+
+
+def test_the_limit_of_high_energies_has_no_z():
+    beside = measured(RunSpec(load("untilted"), 1e4, 1, 1), 60, gain(np.linspace(-1, 1, 100)))
+    assert beside["m1_theory"] == pytest.approx(0.19134361)
+    assert (beside["m1_z"], beside["p_nc_z"]) == (None, None)
+    assert (beside["p_nc"], beside["p_nc_se"]) == (pytest.approx(0.4), pytest.approx(0.24**0.5 / 10))
+    nothing = measured(RunSpec(load("breathing-circle"), 1e4, 1, 1), 0, Gain())
+    assert set(nothing.values()) == {None}
+
+
+def turned(phase):
+    """Return a mushroom whose cycle begins at a phase of its mouth's, the widest at 0."""
+
+    def law(mean, amplitude, lag):
+        cos, sin = amplitude * np.cos(phase - lag), -amplitude * np.sin(phase - lag)
+        return Fourier(mean=mean, omega=1.0, cos=(float(cos),), sin=(float(sin),))
+
+    return Mushroom(r=1.0, h=law(1.2, 0.5, 1.2), nu=law(0.55, 0.4, 0.0), slope=0.1)
+
+
+@pytest.mark.parametrize("phase", [0.0, *np.random.default_rng(23).uniform(0.1, 6.1, 6), 2 * np.pi])
+def test_theory_stands_beside_cycles_that_begin_where_its_own_do(phase):
+    beside = measured(RunSpec(turned(phase), 1e6, 1, 1), 0, Gain())
+    assert (
+        (beside["p_nc_theory"] is not None) == (beside["m1_theory"] is not None) == (phase in (0, 2 * np.pi))
+    )
+
+
+@pytest.mark.parametrize("name", [name for name in SCENES if isinstance(SCENES[name], Mushroom)])
+def test_the_audits_cycles_begin_where_theorys_do(name):
+    assert begins_widest(SCENES[name])
+
+
+def test_a_cycle_that_begins_at_a_narrow_mouth_is_another_one():
+    """Whoever starts in what opens later counts as captured; the next cycle does not know of it."""
+    found = fast.simulate(turned(3.0), n_particles=1500, energy=1e6, n_cycles=2, seed=1)
+    wanted = float(theory.predict(turned(3.0), 6).p_nc)
+    error = np.sqrt(wanted * (1 - wanted) / 1500)
+    first, second = np.abs(found.p_nc() - wanted) / error
+    assert first > 10
+    assert second < 4
+
+
+NEVER_NARROWS = Mushroom(r=1.0, h=Fourier(mean=1.0, omega=1.0, sin=(0.5,)), nu=0.5, slope=0.1)
+
+
+@pytest.mark.parametrize("captured", [0, 20])
+def test_a_share_of_particles_that_were_all_alike_has_an_error(captured):
+    """Of twenty that are free, where one in 300 is captured, none is: it told 1 with an error of 0."""
+    beside = measured(RunSpec(turned(0.0), 1e6, 1, 1), captured, gain(np.linspace(-1, 1, 20)))
+    assert beside["p_nc"] == 1 - captured / 20
+    assert beside["p_nc_se"] == pytest.approx(1 / 21)
+
+
+def test_a_share_that_is_known_has_none():
+    alike = gain(np.linspace(-1, 1, 20))
+    assert measured(RunSpec(NEVER_NARROWS, 1e6, 1, 1), 0, alike)["p_nc_se"] == 0.0
+
+
+def limit_of(scene):
+    spec = RunSpec(scene, 1e6, 1, 1)
+    return limit_told(spec, measured(spec, 60, gain(np.linspace(-1, 1, 100))))
+
+
+def test_theory_that_is_the_limit_says_so_and_where_it_is_slow():
+    assert limit_of(load("moving-cap")) is None  # of that energy
+    told = limit_of(turned(1.0))
+    assert told.startswith("m1_theory, p_nc_theory: none, for the cycle begins at t = 0 with its mouth at")
+    shift = float(told.split("shift all laws by ")[1].split()[0])
+    assert begins_widest(turned(1.0 - shift))
+    assert limit_of(turned(0.0)).endswith("what is left at this one is not known")
+    assert "slope is not above 0" in limit_of(load("untilted"))
+    assert limit_of(load("frozen-mushroom")) is None  # nothing moves: at any energy
+
+
+def test_one_particle_of_a_scene_whose_rates_are_known_has_theory_of_its_energy():
+    """Its m1 has no error and so no z, which was taken for want of a theory."""
+    alone = gain(np.array([0.1]))
+    for name, is_limit in (("moving-cap", False), ("untilted", True)):
+        spec = RunSpec(load(name), 1e6, 1, 1)
+        assert (limit_told(spec, measured(spec, 0, alone)) is not None) == is_limit
+
+
+def test_sides_lean_inward_at_all_times_or_not():
+    waves = {"omega": 1.0, "cos": (0.04, 0.03)}  # least near -0.0367, where a bound by their sizes says -0.07
+    for mean, inward in ((0.05, True), (0.035, False), (0.0, False), (-0.05, False)):
+        table = Mushroom(r=1.0, h=1.0, nu=0.5, slope=Fourier(mean=mean, **waves))
+        assert leans_inward(table) == inward
+
+
+def test_a_mean_has_the_same_bits_in_blocks_of_any_size_and_order():
+    random = np.random.default_rng(2)
+    gains = random.normal(0.1, 0.4, 5000) * 10.0 ** random.integers(-5, 2, 5000)
+    found, plain = set(), set()
+    for _ in range(5):
+        parts = np.split(random.permutation(gains)[:, None], np.sort(random.integers(0, 5001, 7)))
+        found.add(gain_of(lambda parts=parts: parts))
+        plain.add(float(np.cumsum(np.concatenate(parts))[-1]))
+    assert len(plain) > 1  # a faulty mean, of plain sums, would be found out
+    [gain] = found
+    assert gain.mean == float(sum(map(Fraction, gains.tolist())) / 5000)
+    assert gain.standard_error == pytest.approx(gains.std(ddof=1) / 5000**0.5, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("gains", "wanted"),
+    [([], (0, None, None)), ([0.5], (1, 0.5, None)), ([1.0, -np.inf], (2, None, None))],
+)
+def test_a_mean_that_nobody_knows_is_none(gains, wanted):
+    assert gain_of(lambda: [np.array(gains).reshape(-1, 1)]) == wanted
+
+
+def test_a_seal_tells_every_flipped_bit(tmp_path):
+    path = tmp_path / "a"
+    content = sealed(b"numbers")
+    path.write_bytes(content)
+    assert unsealed(path) == b"numbers"
+    for i in range(8 * len(content)):
+        path.write_bytes(content[: i // 8] + bytes([content[i // 8] ^ 1 << i % 8]) + content[i // 8 + 1 :])
+        assert unsealed(path) is None
+
+
+def test_a_block_is_reported_at_once_and_two_are_in_memory(tmp_path, monkeypatch):
+    """Not when it has been written: progress would fall back by a block."""
+    begun, told, kept = [], [], []
+    spec = RunSpec(load("fermi-ulam"), 1e3, 1, 0)
+    arrays = {"wall_counts": np.zeros((3, 5)), "outcome": np.zeros(3), "n_careful": np.zeros(3)}
+
+    def engine(_spec, pieces, _tick):
+        for number, piece in enumerate(pieces):
+            begun.append(weakref.ref(takes_part := np.ones(3)))
+            assert told == list(range(3, 3 * number + 1, 3))
+            assert sum(ref() is not None for ref in begun) <= 2
+            yield piece, Block({**arrays, "takes_part": takes_part}, 0.0)
+            del takes_part
+
+    def keep(_run, piece, _block):
+        time.sleep(0.01)
+        kept.append(piece.number)
+
+    monkeypatch.setattr(StoredRun, "keep", keep)
+    run = StoredRun(tmp_path, spec, shape_of(spec, 18, 3), "")
+    conduct.complete(run, engine, told.append)
+    assert kept == list(range(6))
+    assert told == [3, 6, 9, 12, 15, 18]
+
+
+def test_progress_tells_rate_and_losses(capsys, monkeypatch):
+    now = iter(range(0, 10**6, 50))
+    monkeypatch.setattr(progress, "CLOCK", lambda: float(next(now)))
+    with progress.Watch("run", 2000, RunTally(particles=500, followed=500)) as seen:
+        seen.update(500)
+        seen.add(RunTally(particles=500, followed=498, undecided=1, collisions=10**6))
+        seen.update(1000)
+    lines = capsys.readouterr().err.splitlines()
+    assert "run: 1,000 of 2,000 particles," in lines[-1]
+    assert all(word in lines[-1] for word in (" left, ", " particles/s, ", "2 lost", "1 undecided"))
+
+
+def test_a_full_disk_is_told_of_the_folder_that_was_to_be_held(tmp_path, monkeypatch):
+    def full(_descriptor, _content):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(os, "write", full)
+    with pytest.raises(OSError, match="No space left") as refusal, locked(tmp_path):
+        pass
+    assert refusal.value.filename == str(tmp_path / LOCK)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_what_fails_in_a_held_folder_is_not_laid_to_its_lock(tmp_path):
+    with pytest.raises(OSError, match="No space left") as refusal, locked(tmp_path):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+    assert refusal.value.filename is None

@@ -24,9 +24,9 @@ from mushrooms.output import LOCK, locked
 from mushrooms.store import conduct, engines
 from mushrooms.store import run as stored
 from mushrooms.store.layout import shape_of
+from mushrooms.store.progress import gain_of
 from mushrooms.store.run import DESCRIPTION, DIGESTED, StoredRun
 from mushrooms.store.spec import SCHEMA, RunSpec
-from mushrooms.store.tally import gain_of
 from scene import load
 
 pytestmark = pytest.mark.usefixtures("unsynced")

@@ -12,10 +12,10 @@ import pytest
 from mpmath import MPContext
 
 from scene import BangBang, Fourier, InvalidScene, Mushroom, mixed
+from scene.exact import leg_intervals
 from scene.given import MAX_HARMONICS
 from scene.laws import value
 from scene.mixed import BITS, PI, PI_ERROR, TaylorBounds, jet, multiply, sign_on_legs, turns
-from scene.polynomials import leg_intervals
 
 N_SCENES = int(os.environ.get("MUSHROOMS_MIXED", "100"))
 

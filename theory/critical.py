@@ -16,10 +16,10 @@ from math import floor
 from typing import Any, NamedTuple
 
 from scene import exact
+from scene.exact import half_angle, leg_intervals, leg_polynomial
 from scene.laws import BangBang, Law, is_constant
 from scene.laws import exact as number
 from scene.mouth import mouth_factors
-from scene.polynomials import half_angle, leg_intervals, leg_polynomial
 from scene.tables import Mushroom, laws, period
 from theory.volumes import NotCovered
 

@@ -1,9 +1,9 @@
 """Which vectors kill which mutant: the proof that the corpus can fail, and what failures are compared with.
 
 `python -m conformance.mutants.kill_matrix` answers every vector with every mutant, grades the answers and
-writes kill-matrix.json beside this file, with a few vectors for each mutant, and docs/kill-matrix.md from it:
-some five minutes on one core. Only `fail` kills: a vector that a mutant declines, or at which it crashes,
-does not count.
+writes kill-matrix.json beside this file, with a few vectors for each mutant: some five minutes on one core.
+`--table` computes nothing and prints what is kept there as Markdown. Only `fail` kills: a vector that a
+mutant declines, or at which it crashes, does not count.
 """
 
 import json
@@ -21,7 +21,6 @@ from conformance.vectors import LEVELS, Vector, answer, load, manifest
 from scene import BadInput
 
 DATA = Path(__file__).parent  # it ships with the package: `suite.diagnosis` reads it
-DOCS = DATA.parent.parent / "docs"
 MOST_VECTORS = 3  # kept of those that kill a mutant
 LEAST_COMPARED = 5  # vectors: what fewer kill shows too little to call other mutants needless
 HEAD = """# Kill matrix
@@ -30,7 +29,6 @@ HEAD = """# Kill matrix
 `fail`. None is subsumed by another: no two are killed by nested sets of vectors. The mistakes named last are
 so common that a diagnosis names them, though the mutant in brackets subsumes each. At most three vectors are
 given, chosen so that few other mutants fail them all. A size is the threshold from which on a mistake shows.
-Written by `python -m conformance.mutants.kill_matrix`.
 
 | mutant | what it does wrong | size | kills | some vectors that kill it |
 | --- | --- | ---: | ---: | --- |
@@ -100,7 +98,7 @@ def page(published: dict[str, Any]) -> str:
     return "\n".join(lines) + "\n"
 
 
-def run(docs: Path = DOCS, data: Path = DATA, on_progress: Callable[[str], None] = print) -> int:
+def run(data: Path = DATA, on_progress: Callable[[str], None] = print) -> int:
     """Compute and write the matrix.
 
     Returns:
@@ -128,9 +126,7 @@ def run(docs: Path = DOCS, data: Path = DATA, on_progress: Callable[[str], None]
             for name, mutant in (MUTANTS | COMMON).items()
         },
     }
-    docs.mkdir(parents=True, exist_ok=True)
     write_file(data / "kill-matrix.json", json.dumps(published, indent=1) + "\n")
-    write_file(docs / "kill-matrix.md", page(published))
     faults = {
         "not killed": [name for name, killing in found.items() if not killing],
         "subsumed": [f"{name} by {other}" for name, other in needless.items() if name in MUTANTS],
@@ -142,6 +138,9 @@ def run(docs: Path = DOCS, data: Path = DATA, on_progress: Callable[[str], None]
 
 
 if __name__ == "__main__":
+    if sys.argv[1:] == ["--table"]:
+        print(page(json.loads((DATA / "kill-matrix.json").read_text("utf-8"))), end="")
+        sys.exit(0)
     try:
         sys.exit(run())
     except BadInput as error:

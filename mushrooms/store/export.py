@@ -9,14 +9,19 @@ from __future__ import annotations
 import csv
 import io
 from collections.abc import Callable, Iterator
+from functools import partial
 from itertools import chain, product
-from typing import Any, BinaryIO
+from pathlib import Path
+from typing import Annotated, Any, BinaryIO
 
 import numpy as np
+import typer
 
+from conformance.files import write_file
+from mushrooms import output
 from mushrooms.output import import_arrow
 from mushrooms.store.layout import FIELDS, LANES, WALLS, Arrays
-from mushrooms.store.run import StoredRun
+from mushrooms.store.run import StoredRun, open_run
 from scene.refusal import BadInput
 
 MAX_COLUMNS = 10_000
@@ -80,3 +85,16 @@ def _tables(run: StoredRun) -> Iterator[Arrays]:
                 at: Any = (slice(None), *place)
                 columns["_".join([name, *words])] = array[at]
         yield columns
+
+
+def export(
+    run: Annotated[Path, typer.Argument(metavar="DIR", help="Folder that `simulate --out` wrote.")],
+    to: Annotated[Path, typer.Option(metavar="FILE", help="A .parquet, .csv or .npz file.")],
+) -> None:
+    """Write a finished run as one table, one row per particle. An .npz holds the arrays of `fast.Ensemble`.
+
+    The run is read block by block and its checksums are tested. A damaged run is refused.
+    """
+    output.check_file(to, tuple(WRITERS))
+    write_file(to, partial(WRITERS[to.suffix], open_run(run)))
+    print(to)

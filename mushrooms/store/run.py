@@ -23,8 +23,8 @@ import zarr
 from conformance.files import sealed, unsealed, write_file
 from fast import Ensemble
 from mushrooms.store.layout import FIELDS, Array, Arrays, Shape, shape_of
+from mushrooms.store.progress import RunTally, tally_of
 from mushrooms.store.spec import SCHEMA, RunSpec, made_by, spec_of
-from mushrooms.store.tally import RunTally, tally_of
 from scene.refusal import BadInput
 
 GROUP, MARKERS = "ensemble.zarr", "blocks"

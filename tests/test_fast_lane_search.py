@@ -101,7 +101,12 @@ MUTANTS = {
         "return inside if hit == ON_BASE else place",
         "return 1.0 if hit == ON_BASE else place",
     ),
-    "the mouth's own curvature": ("side to arc", 300, "doubt = (k_side + excess", "doubt = (excess"),
+    "the mouth's own curvature": (
+        "side to arc",
+        300,
+        "doubt = fma(excess, per_r, k_side)",
+        "doubt = fma(excess, per_r, 0.0)",
+    ),
     "the sides before the mouth": ("side to arc", 300, "min(gap - doubt, lift)", "lift"),
     "concavity of the arc": (
         ANYWHERE,
@@ -116,11 +121,16 @@ MUTANTS = {
         "return min(clear_r, min(clear_l, clear_f)) - far",
         "return 1.0",
     ),
-    "the curvature of walls that are not met": ("side to arc", 1500, "far = k_side * s * s + ", "far = "),
+    "the curvature of walls that are not met": (
+        "side to arc",
+        1500,
+        "far = fma(k_side * s, s, blur)",
+        "far = blur",
+    ),
     "the part of the table that a wall is in": (
         "arc to stem",
         500,
-        "place -= SAFETY * (abs(y) + abs(vy) * s) + abs(vy) * slack",
+        "place -= fma(abs(vy), fma(SAFETY, s, slack), SAFETY * abs(y))",
         "place = 1.0",
     ),
     "what Newton's step leaves": (
@@ -164,6 +174,18 @@ MUTANTS = {
         1500,
         "quality = min(quality, told_rate(a[T + i], r, r1, r2, sizes, limits))",
         "quality = min(quality, 1.0)",
+    ),
+    "how far the series of a hop's turn serve": (
+        "early hop",
+        600,
+        "LONGEST_TURN = 0.75",
+        "LONGEST_TURN = 100.0",
+    ),
+    "the same through the base": (
+        "early hop through the base",
+        600,
+        "LONGEST_TURN = 0.75",
+        "LONGEST_TURN = 100.0",
     ),
     "the mouth under a chord": (
         "captured beside a moving mouth",
@@ -260,18 +282,18 @@ ROUNDING = {
     ),
     "the height at the end": (
         "at the end of the arc",
-        "place -= SAFETY * (abs(y) + abs(vy) * s) + abs(vy) * slack",
+        "place -= fma(abs(vy), fma(SAFETY, s, slack), SAFETY * abs(y))",
         "place -= 0.0",
     ),
     "the base inside the arc": (
         "at the end of the arc",
-        "inside = r - abs(x_s) - SAFETY * (size_w + abs(x) + abs(vx) * s)",
+        "inside = fma(-SAFETY, fma(abs(vx), s, limits.size + abs(x)), r - abs(x_s))",
         "inside = r - abs(x_s)",
     ),
     "walls that are not met": (
         "at the floor's corner",
-        "blur\n    return fma(abs(outset.vx) + limits.lean * abs(outset.vy) + limits.rate, slack, far)",
-        "0.0\n    return far",
+        "blur)\n    return fma(fma(limits.lean, abs(outset.vy), abs(outset.vx)) + limits.rate, slack, far)",
+        "0.0)\n    return far",
     ),
 }
 

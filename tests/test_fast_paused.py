@@ -11,7 +11,7 @@ from fast import paused, pieces
 from fast.kernel import kept
 from fast.kernel.arithmetic import MAX_QUADRANT
 from fast.pieces import laws_in_lanes
-from fast.starts import cycle_stops
+from fast.starts import one_cycle
 from fast.units import Units, fit
 from scene import BadInput, BangBang, Cap, Fourier, Mushroom, load
 
@@ -28,6 +28,12 @@ SCENES = {
     "frozen": load("frozen-mushroom"),
     "nu = 1 at rest": Mushroom(r=WAVE, h=1.0, nu=1.0, slope=0.0),
     "two narrowings": Mushroom(r=BangBang(knots=BREATH), h=1.0, nu=BangBang(knots=TWICE), slope=0.1),
+    "many harmonics": Mushroom(
+        r=Fourier(mean=1.0, omega=1.0, sin=(0.3, 0.0, 0.05)),
+        h=Fourier(mean=1.0, omega=1.0, cos=(0.2, 0.1, 0.1)),
+        nu=Fourier(mean=0.6, omega=1.0, cos=(0.2, 0.0, 0.1)),
+        slope=Fourier(0.1, 1.0, (0.05,)),
+    ),
     "narrowest at the end": Mushroom(
         r=1.0, h=1.0, nu=Fourier(mean=0.6, omega=1.0, cos=(-0.3,)), slope=Fourier(0.1, 1.0, (0.05,))
     ),
@@ -90,17 +96,16 @@ def test_a_particle_s_lane_is_kept_alike_beside_any_others():
 
 
 def test_who_cannot_go_on_is_followed_from_the_start(monkeypatch):
-    """A lane that is not kept, or that on second sight had its collision just before the last stop."""
+    """A lane that is not kept, or that on second sight has its collision before the last stop."""
     scene, asked = SCENES["moving cap"], {"n_particles": 60, "energy": 100.0, "seed": 6}
     one, three = (fast.go_on(scene, n_cycles=n, **asked) for n in (1, 3))
     lost = one._replace(lanes=one.lanes.copy())
     lost.lanes[::3] = np.nan
     assert is_same(fast.go_on(scene, n_cycles=3, before=lost, **asked), three)
     tied = one._replace(lanes=one.lanes.copy())
-    is_right = tied.lanes[:, kept.WALL_HIT] >= 0
+    is_right = tied.lanes[:, kept.IS_KNOWN] > 0
     assert is_right.any()
-    last = cycle_stops(fit(scene).scene, 1, ()).times[-1]
-    tied.lanes[is_right, kept.FIRST_OF_STEP] = np.nextafter(last, 0.0)
+    tied.lanes[is_right, kept.FIRST_ROW] -= 0.25 * one_cycle(fit(scene).scene)
     assert is_same(fast.go_on(scene, n_cycles=3, before=tied, **asked), three)
     monkeypatch.setattr(paused.codes, "ANEW", 99)  # nobody is followed anew
     found = fast.go_on(scene, n_cycles=3, before=tied, **asked)
@@ -114,7 +119,7 @@ def from_the_last_state(found, units):
     sizes = [*units.times(np.ones(2)), *units.places(np.ones((1, 4)))[0]]  # powers of 2
     for k, (row, size) in enumerate(zip(rows, sizes, strict=True)):
         lanes[:, kept.FIRST_ROW + k] = row / size
-    lanes[:, [kept.WALL_HIT, kept.FIRST_ROW + 6]] = -1.0  # on no wall, and no step is known
+    lanes[:, kept.FIRST_ROW + 6], lanes[:, kept.IS_KNOWN] = -1.0, 0.0  # on no wall, and no law is known
     return found._replace(lanes=lanes)
 
 

@@ -67,12 +67,12 @@ def mouth_crossing(outset, w0, w1, k_side, per_r, limits):
     """
     (x, y, vx, vy, _, _, v2), bend, rate_w, size = outset, limits.bend, limits.rate, limits.size
     depth, rise = abs(y), abs(vy)
-    gap = fma(w0, rise, w1 * depth) - abs(x * vy - y * vx)
+    gap = fma(w0, rise, w1 * depth) - abs(fma(x, vy, -y * vx))
     excess = bend - v2
     excess = excess if excess > 0.0 else 0.0  # by how much the arc's function may be convex, halved
-    doubt = (k_side + excess * per_r) * depth * depth
+    doubt = fma(excess, per_r, k_side) * depth * depth
     doubt = fma(SAFETY * rise, fma(size + abs(x), rise, (abs(vx) + rate_w) * depth), doubt)
-    lift = limits.least_h * rise * rise - limits.curvature * depth * depth
+    lift = fma(-limits.curvature * depth, depth, limits.least_h * rise * rise)
     return gap, doubt, lift
 
 
@@ -89,12 +89,12 @@ def nearest_below(wall, f_r, d_r, f_l, d_l, f_f, d_f):
     d = d_r if f_r > 0.0 else 0.0
     d = d if d > 0.0 else 0.0
     side = ON_RIGHT
-    best_l = d_l * f - f_l * d
+    best_l = fma(d_l, f, -f_l * d)
     best_l = best_l if f_l > 0.0 else 0.0
     f = f_l if best_l > 0.0 else f
     d = d_l if best_l > 0.0 else d
     side = ON_LEFT if best_l > 0.0 else side
-    best_f = d_f * f - f_f * d
+    best_f = fma(d_f, f, -f_f * d)
     best_f = best_f if f_f > 0.0 else 0.0
     f = f_f if best_f > 0.0 else f
     d = d_f if best_f > 0.0 else d
@@ -140,7 +140,7 @@ def aim(a, i, is_stem, is_relative, waves, slope, degree, limits):
     f_a, d_a, root = arc_quotient(outset, now.r, now.r1, now.r2)
     # Which of them, by the part of the table the flight is in and whether it crosses y = 0 before.
     reaches = fma(y, d_a, vy * f_a) if vy < 0.0 else 1.0  # cap: > 0 where the arc comes first
-    stays = depth * d - f * vy if vy > 0.0 else 1.0  # stem: > 0 where a side comes first
+    stays = fma(depth, d, -f * vy) if vy > 0.0 else 1.0  # stem: > 0 where a side comes first
     top = ON_BASE if is_stem else ON_ARC
     below = side if gap > 0.0 else ON_BASE
     from_cap = ON_ARC if reaches > 0.0 else below

@@ -97,8 +97,8 @@ def off_the_wall(hit, place, vx, vy, at_hit, slope):
 @packed
 def captured(hit, is_mushroom, x, y, vx, vy, w):
     """Return what is positive where |sin phi| > nu just before a hit of the arc (eq. sinphi), else 0."""
-    spin = x * vy - y * vx
-    beyond = spin * spin - w * w * fma(vx, vx, vy * vy)
+    spin = fma(x, vy, -y * vx)
+    beyond = fma(spin, spin, -w * w * fma(vx, vx, vy * vy))
     beyond = beyond if hit == ON_ARC else 0.0
     return beyond if is_mushroom else 0.0
 

@@ -262,12 +262,12 @@ def attend(pool, a, i, roster, worker):
 
 
 @part
-def are_calm(a, n):
-    """Tell whether no lane of a pool needs attention: mostly so, and seen in one packed loop."""
-    least = MOVED
+def last_to_attend(a, n):
+    """Return the last of n lanes that needs attention, -1 for none, as is mostly so; one packed loop."""
+    last = np.int64(-1)
     for i in range(n):
-        least = min(least, a[FATE + i])
-    return least >= MOVED
+        last = max(last, i if a[FATE + i] < MOVED else np.int64(-1))
+    return last
 
 
 @part
@@ -281,22 +281,18 @@ def change_place(worker, pool, i, other, j):
 @part
 def scan(pool, worker):
     """Attend to every lane of a pool that needs it; the last lane fills the place of one that leaves."""
-    a, roster, n_held = worker.pools[pool], worker.rosters[pool], worker.n_held
-    i = np.int64(0)
-    while i < n_held[pool]:
-        fate = STAYS
-        if a[FATE + i] < MOVED:
-            fate = attend(pool, a, i, roster, worker)
-        if fate == STAYS:
-            i += 1
-            continue
+    a, roster, n_held, other = worker.pools[pool], worker.rosters[pool], worker.n_held, 1 - pool
+    i = last_to_attend(a, n_held[pool])
+    while i >= 0:
+        fate = attend(pool, a, i, roster, worker)
         if fate == MOVES:
-            other = 1 - pool
             a[FATE + i] = MOVED  # of a flight in the other pool nothing is known yet
             change_place(worker, pool, i, other, n_held[other])
             n_held[other] += 1
-        n_held[pool] -= 1
-        change_place(worker, pool, n_held[pool], pool, i)
+        if fate != STAYS:
+            n_held[pool] -= 1
+            change_place(worker, pool, n_held[pool], pool, i)
+        i = last_to_attend(a, i)
 
 
 @part
@@ -337,5 +333,4 @@ def follow(worker, walls):
             n = n_held[pool]
             if n > 0 and worker.is_laned:
                 advance(pool, pools[pool], whole_registers(n), worker)
-            if n > 0 and not (worker.is_laned and are_calm(pools[pool], n)):
-                scan(pool, worker)
+            scan(pool, worker)

@@ -78,8 +78,8 @@ def at_side_or_floor(hit, outset, place, stem, slope):
     (_, _, vx, vy, _, _, _), (x_s, x_low, y_s, y_low) = outset, place
     w, m = stem.w, stem.m
     sign = 1.0 if hit == ON_RIGHT else -1.0
-    f = (w - sign * x_s) + (fma(m, y_s, stem.w_low) + fma(m, y_low, -sign * x_low))
-    rate = fma(m, vy, side_rate(y_s, stem, slope)) - sign * vx
+    f = (w - sign * x_s) + fma(m, y_s, fma(m, y_low, fma(-sign, x_low, stem.w_low)))
+    rate = fma(-sign, vx, fma(m, vy, side_rate(y_s, stem, slope)))
     f = (y_s + stem.h) + y_low if hit == ON_FLOOR else f
     rate = vy + stem.h1 if hit == ON_FLOOR else rate
     return f, rate
@@ -88,14 +88,14 @@ def at_side_or_floor(hit, outset, place, stem, slope):
 @part
 def hop_along_arc(s, outset, r0, dr):
     """Return f of the arc that was left, by its increments since, of which `dr` is the radius's."""
-    return dr * (2.0 * r0 + dr) - s * fma(s, outset.v2, 2.0 * outset.q)
+    return fma(dr, fma(2.0, r0, dr), -s * fma(s, outset.v2, 2.0 * outset.q))
 
 
 @part
 def arc_sizes(s, outset, r, limits):
     """Return the summed sizes of the terms of half the slope of the arc's function."""
     x, y, vx, vy, _, _, v2 = outset
-    return abs(x * vx) + abs(y * vy) + fma(s, v2, r * limits.rate)
+    return fma(abs(x), abs(vx), fma(abs(y), abs(vy), fma(s, v2, r * limits.rate)))
 
 
 @part
@@ -110,7 +110,7 @@ def left_in_place(error, hit, vx, vy, r):
 @part
 def told_rate(t, r, r1, r2, sizes, limits):
     """Return `told` of docs/lanes.md: positive where a hop hangs on r' no more than on what enters."""
-    return (sizes - r * limits.rate) + r * (abs(r1) + abs(t * r2) - limits.arc_rate)
+    return fma(r, fma(abs(t), abs(r2), abs(r1)) - (limits.arc_rate + limits.rate), sizes)
 
 
 @part
@@ -122,7 +122,7 @@ def told_push(hit, t, outset, y_s, stem, slope, limits):
     _, _, vx, vy, _, _, _ = outset
     rate = stem.h1 if hit == ON_FLOOR else side_rate(y_s, stem, slope)
     bend = stem.h2 if hit == ON_FLOOR else (fma(stem.m2, y_s, stem.w2) if slope is None else stem.w2)
-    told = (abs(vx) + abs(vy)) + (abs(rate) + abs(t * bend)) - limits.rate
+    told = (abs(vx) + abs(vy)) + fma(abs(t), abs(bend), abs(rate)) - limits.rate
     told = 1.0 if abs(rate) + abs(bend) == 0.0 else told
     return told if hit >= ON_LEFT else 1.0
 
@@ -141,8 +141,8 @@ def slack_of(hit, wall, s, correction, r, sizes, blur):
 @part
 def far_enough(s, outset, k_side, slack, blur, limits):
     """Return by how much a function of docs/lanes.md must be positive where a flight ends: `clear`."""
-    far = k_side * s * s + blur
-    return fma(abs(outset.vx) + limits.lean * abs(outset.vy) + limits.rate, slack, far)
+    far = fma(k_side * s, s, blur)
+    return fma(fma(limits.lean, abs(outset.vy), abs(outset.vx)) + limits.rate, slack, far)
 
 
 @part
@@ -164,11 +164,10 @@ def place_on_wall(hit, s, outset, end, r, is_stem, slack, limits):
     """
     (x, y, vx, vy, _, _, v2), (x_s, _, y_s, _) = outset, end
     place = y_s if hit == ON_ARC else -y_s
-    place -= SAFETY * (abs(y) + abs(vy) * s) + abs(vy) * slack
+    place -= fma(abs(vy), fma(SAFETY, s, slack), SAFETY * abs(y))
     excess = limits.bend - v2
     excess = excess if excess > 0.0 else 0.0
-    size_w = limits.size
-    inside = r - abs(x_s) - SAFETY * (size_w + abs(x) + abs(vx) * s)
+    inside = fma(-SAFETY, fma(abs(vx), s, limits.size + abs(x)), r - abs(x_s))
     inside = fma(inside, limits.least_r, -2.0 * excess * s * s)
     inside = 1.0 if is_stem else inside
     return inside if hit == ON_BASE else place
@@ -178,8 +177,8 @@ def place_on_wall(hit, s, outset, end, r, is_stem, slack, limits):
 def way_out(hit, s, outset, slope, k_side, sizes, limits):
     """Return `first` of docs/lanes.md: positive where the wall is met on the way out."""
     vx, vy = outset.vx, outset.vy
-    first = -slope - (k_side * s + SAFETY * (abs(vx) + limits.lean * abs(vy) + limits.rate))
-    first = -slope - 2.0 * SAFETY * sizes if hit == ON_ARC else first
+    first = -slope - fma(k_side, s, SAFETY * (fma(limits.lean, abs(vy), abs(vx)) + limits.rate))
+    first = fma(-2.0 * SAFETY, sizes, -slope) if hit == ON_ARC else first
     return 1.0 if hit == ON_BASE else first
 
 
@@ -225,7 +224,7 @@ def land(a, i, is_stem, is_mushroom, is_relative, waves, slope, degree, limits):
     f, rate = at_side_or_floor(hit, outset, end, there, slope)
     # The arc: its increments if it was left, else what is there.
     hop = hop_along_arc(s, outset, r0, dr)
-    f_arc = fma(-x_s, x_s, (r - y_s) * (r + y_s)) - 2.0 * fma(x_s, x_low, y_s * y_low)
+    f_arc = fma(-2.0, fma(x_s, x_low, y_s * y_low), fma(-x_s, x_s, (r - y_s) * (r + y_s)))
     f_arc = hop if wall == ON_ARC else f_arc
     f = f_arc if hit == ON_ARC else f
     rate = 2.0 * fma(r, r1, -fma(s, v2, q)) if hit == ON_ARC else rate
@@ -238,7 +237,7 @@ def land(a, i, is_stem, is_mushroom, is_relative, waves, slope, degree, limits):
     error = error_left(0.5 * bend_s * inverse, s, delta, waves)
     error = left_in_place(error, hit, vx, vy, r)
     sizes = arc_sizes(s, outset, r, limits)
-    blur = SAFETY * (limits.size + abs(x) + abs(y) + (abs(vx) + abs(vy)) * s)
+    blur = SAFETY * fma(abs(vx) + abs(vy), s, limits.size + abs(x) + abs(y))
     slack = slack_of(hit, wall, s, Correction(delta, inverse, error), r, sizes, blur)
     # The others are not reached: see the error analysis. The mouth was looked at.
     clear = clearance(hit, end, there, far_enough(s, outset, k_side, slack, blur, limits))
@@ -358,7 +357,7 @@ def chord(a, n, table, waves, slope, degree, limits):
         sizes = arc_sizes(s, outset, r, limits)
         first = -rate - 2.0 * SAFETY * sizes
         slack = slack_of(ON_ARC, ON_ARC, s, Correction(delta, inverse, error), r, sizes, 0.0)
-        place = abs(end.y) - (SAFETY * (abs(y) + abs(vy) * s) + abs(vy) * slack)
+        place = abs(end.y) - fma(abs(vy), fma(SAFETY, s, slack), SAFETY * abs(y))
         quality = min(min(clear, place), min(first, v2 - bend))
         quality = min(min(quality, s), known)
         quality = min(quality, told_rate(a[T + i], r, r1, r2, sizes, limits))

@@ -59,10 +59,10 @@ ALIKE = (
     *(f"captured-in-blocks-of-{n}" for n in (16, 32, 64)),
     *("remembering-6-digits", "remembering-9-digits", "remembering-12-digits", "impatient-after-512"),
     *(
-        "mouths-below-0.001-shut",
-        "mouths-above-0.999-whole",
-        "ties-within-0.0001-by-order",
-        "edge-wider-by-0.0001",
+        *("mouths-below-0.001-shut", "mouths-below-1e-05-shut"),
+        *("mouths-above-0.999-whole", "mouths-above-0.99999-whole"),
+        *("ties-within-0.0001-by-order", "ties-within-1e-08-by-order"),
+        *("edge-wider-by-0.0001", "edge-wider-by-1e-06", "slopes-from--16-on"),
     ),
     *("scenes-by-1-samples", "absent-t-as-0", "absent-x-as-0", "absent-y-as-0"),
 )

@@ -247,7 +247,7 @@ FAULTS: dict[str, tuple[str, str, Fault]] = {
         "fail",
         captured_as(lambda request, stay, _: [stay[0], request["t_end"]]),
     ),
-    **{f"edge-wider-by-{part:g}": ("edges", "fail", wide_edge(part)) for part in (1e-4, 1e-6)},
+    **{f"edge-wider-by-{part:g}": ("edges", "fail", wide_edge(part)) for part in (1e-4, 1e-6, 2.0**-25)},
     "without-slope-in-flows": ("hits", "fail", with_slope(lambda _: 0.0, FLOW)),
     "frozen-after-50": ("long-paths", "fail", after_hits(50, slowed)),
     **{f"straight-after-{n}": ("long-flow", "fail", after_hits(n, straight_on)) for n in (1000, 2000, 4000)},
@@ -306,7 +306,7 @@ FAULTS: dict[str, tuple[str, str, Fault]] = {
     ),
     **{
         f"ties-within-{near:g}-by-order": ("edges", "fail", on(STEP, wrong_order(near)))
-        for near in (1e-4, 1e-8)
+        for near in (1e-4, 1e-8, 2.0**-31)
     },
     **{
         f"mouths-below-{near:g}-shut": (
@@ -314,7 +314,7 @@ FAULTS: dict[str, tuple[str, str, Fault]] = {
             "fail",
             with_mouth(lambda w, near=near: w * 1e-9 if w < near else w),
         )
-        for near in (1e-3, 1e-5)
+        for near in (1e-3, 1e-5, 2.0**-31)
     },
     **{
         f"mouths-above-{1 - near:g}-whole": (
@@ -322,7 +322,7 @@ FAULTS: dict[str, tuple[str, str, Fault]] = {
             "fail",
             with_mouth(lambda w, near=near: 1.0 if w > 1 - near else w),
         )
-        for near in (1e-3, 1e-5)
+        for near in (1e-3, 1e-5, 2.0**-31)
     },
     **{
         f"slopes-from-{-steep:g}-on": (
@@ -330,7 +330,7 @@ FAULTS: dict[str, tuple[str, str, Fault]] = {
             "fail",
             with_slope(lambda slope, steep=steep: max(slope, -steep)),
         )
-        for steep in (1.0, 16.0)
+        for steep in (1.0, 16.0, 32.0)
     },
     "dead-time-of-1e-9": ("edges", "fail", on(STEP, dead_time(1e-9))),
     **{f"impatient-after-{n}": ("waiting", "fail", on(STEP, impatient(n))) for n in (512, 1000)},

@@ -41,6 +41,7 @@ NEAREST = 2.0**-32  # of sizes: from a corner, an edge, a tie, a wall; a mouth's
 STEEPEST = 2.0**6
 CARRIED = 2.0**-13  # of sizes: what bounces may make of rounding at most
 N_USUAL = 24
+N_FINEST = 4  # further questions from the two octaves at the bound, which a mistake may hide beyond
 USUAL = ("fourier", "bang-bang", "constant")
 MIXED = (*USUAL, "mixed", "harmonics")
 BREATHING = Cap(r=Fourier(mean=1.0, cos=(0.1,), omega=1.0))
@@ -152,7 +153,8 @@ def usual(draw: Draw, profile: str) -> Iterator[Question]:
 
 def edges(draw: Draw, profile: str) -> Iterator[Question]:
     """Ask near corners, edges, ties and walls, and about mouths and slopes of all sizes, at rest."""
-    for near in octaves(draw, NEAREST, 2.0**-2):
+    finest = (near for _ in range(N_FINEST) for near in octaves(draw, NEAREST, 4.0 * NEAREST))
+    for near in (*octaves(draw, NEAREST, 2.0**-2), *finest):
         for make in (aimed, through_the_mouth, through_the_mouth, slanted, along_the_arc, nearly_captured):
             scene, state, n = make(draw, near)
             k, j = draw.pick(range(-20, 21)), draw.pick(range(-20, 21))

@@ -7,6 +7,7 @@ blue and filled, theory orange or black lines.
 from __future__ import annotations
 
 import io
+import re
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -75,16 +76,17 @@ def any_letters() -> Iterator[None]:
         yield
 
 
-def save(figure: Figure, file: BinaryIO, suffix: str) -> None:
+def save(figure: Figure, file: BinaryIO, suffix: str, dpi: int = 160) -> None:
     """Write a figure as ".svg", ".png" or ".pdf"; the bytes depend on the picture alone."""
     kind = suffix.removeprefix(".")
     with rc_context(STYLE), any_letters():
         metadata = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}.get(kind)
-        figure.savefig(file, format=kind, dpi=160, bbox_inches="tight", metadata=metadata)
+        figure.savefig(file, format=kind, dpi=dpi, bbox_inches="tight", metadata=metadata)
 
 
 def svg(figure: Figure) -> bytes:
-    """Return a figure as SVG."""
+    """Return a figure as a small SVG for a page: letters as text, coordinates to a hundredth of a point."""
     file = io.BytesIO()
-    save(figure, file, ".svg")
-    return file.getvalue()
+    with rc_context({"svg.fonttype": "none"}):
+        save(figure, file, ".svg", dpi=110)
+    return re.sub(rb"(\.\d\d)\d+", rb"\1", file.getvalue())

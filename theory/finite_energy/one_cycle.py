@@ -85,9 +85,8 @@ class TheoryError(NamedTuple):
 
     mean_s, captured_mean, peak_mean, p_nc: the square of the lags where each enters; of means also a quarter
         of what the variance leaves out, which is its drift.
-    variance: of the peak, relatively: half of what is forgotten where walls turn velocities, half of what
-        depletion takes off, and the square of how far velocities are turned in one crossing of the table, as
-        independent errors; the rates' own is added.
+    variance: of the peak, relatively: as independent errors half of what is forgotten, half of what depletion
+        takes off, and the square of how far a crossing turns velocities; the rates' own is added.
     skewness: of the kicks, were each block of path, twice as long as the memory, to have a skewness of 1.
     """
 
@@ -232,7 +231,6 @@ class FiniteEnergy:
         """Return mean and variance of log E / E0 of those captured first at each time; else as `zone`."""
         (mean, variance), t = self._in_zone(times), self._within(times)
         lag, square = (self._fields.at(name, np.zeros(len(t)), t) for name in ("lag", "square"))
-        # Early the square of a mean lag may exceed all variance there is.
         return mean + lag, np.maximum(variance + square - lag**2, 0.0)
 
     def draw(self, n_cycles: int, n: int, seed: int) -> Floats:
@@ -300,8 +298,7 @@ class FiniteEnergy:
         squares = gathered("squares")
         return atoms._replace(
             weight=atoms.weight * np.exp(-gathered("hazards")),
-            # A square is no diffusion, and has no drift.
-            shift=atoms.shift + gathered("drift") - gathered("lags") + squares / 4,
+            shift=atoms.shift + gathered("drift") - gathered("lags") + squares / 4,  # no drift of it
             variance=atoms.variance + gathered("variance") - squares,
         )
 

@@ -23,7 +23,7 @@ from fast.kernel.worker import NEXT_STOP, PARTICLE
 # the laws; then the rows of the pool up to AS_GIVEN.
 POOL, NEXT, CAREFUL, IS_KNOWN = np.arange(4)
 FIRST_ROW = 4
-LANE_ROWS = FIRST_ROW + AS_GIVEN // STRIDE
+LANE_ROWS = FIRST_ROW + int(AS_GIVEN // STRIDE)
 
 
 @kernel

@@ -133,12 +133,12 @@ def laws_in(a, place, waves, is_relative, slope, degree):
     if waves is not None:
         return laws_of_waves(a[place], a[place + STRIDE], waves, is_relative, slope, degree)
     r, r1, r2, r3 = a[place], a[place + STRIDE], a[place + 2 * STRIDE], a[place + 3 * STRIDE]
-    w, w_low = a[place + 4 * STRIDE], a[place + 5 * STRIDE]
-    w1, w2 = a[place + 6 * STRIDE], a[place + 7 * STRIDE]
-    h, h1, h2 = a[place + 8 * STRIDE], a[place + 9 * STRIDE], a[place + 10 * STRIDE]
+    w, w1, w2 = a[place + 4 * STRIDE], a[place + 5 * STRIDE], a[place + 6 * STRIDE]
+    h, h1, h2 = a[place + 7 * STRIDE], a[place + 8 * STRIDE], a[place + 9 * STRIDE]
+    w_low = a[place + 13 * STRIDE]
     m, m1, m2 = slope, 0.0, 0.0
     if slope is None:
-        m, m1, m2 = a[place + 11 * STRIDE], a[place + 12 * STRIDE], a[place + 13 * STRIDE]
+        m, m1, m2 = a[place + 10 * STRIDE], a[place + 11 * STRIDE], a[place + 12 * STRIDE]
     return LawsAt(r, r1, r2, r3, w, w_low, w1, w2, h, h1, h2, m, m1, m2)
 
 
@@ -150,16 +150,16 @@ def write_laws(a, place, laws, is_new, slope):
     a[place + 2 * STRIDE] = laws.r2 if is_new else a[place + 2 * STRIDE]
     a[place + 3 * STRIDE] = laws.r3 if is_new else a[place + 3 * STRIDE]
     a[place + 4 * STRIDE] = laws.w if is_new else a[place + 4 * STRIDE]
-    a[place + 5 * STRIDE] = laws.w_low if is_new else a[place + 5 * STRIDE]
-    a[place + 6 * STRIDE] = laws.w1 if is_new else a[place + 6 * STRIDE]
-    a[place + 7 * STRIDE] = laws.w2 if is_new else a[place + 7 * STRIDE]
-    a[place + 8 * STRIDE] = laws.h if is_new else a[place + 8 * STRIDE]
-    a[place + 9 * STRIDE] = laws.h1 if is_new else a[place + 9 * STRIDE]
-    a[place + 10 * STRIDE] = laws.h2 if is_new else a[place + 10 * STRIDE]
+    a[place + 5 * STRIDE] = laws.w1 if is_new else a[place + 5 * STRIDE]
+    a[place + 6 * STRIDE] = laws.w2 if is_new else a[place + 6 * STRIDE]
+    a[place + 7 * STRIDE] = laws.h if is_new else a[place + 7 * STRIDE]
+    a[place + 8 * STRIDE] = laws.h1 if is_new else a[place + 8 * STRIDE]
+    a[place + 9 * STRIDE] = laws.h2 if is_new else a[place + 9 * STRIDE]
     if slope is None:
-        a[place + 11 * STRIDE] = laws.m if is_new else a[place + 11 * STRIDE]
-        a[place + 12 * STRIDE] = laws.m1 if is_new else a[place + 12 * STRIDE]
-        a[place + 13 * STRIDE] = laws.m2 if is_new else a[place + 13 * STRIDE]
+        a[place + 10 * STRIDE] = laws.m if is_new else a[place + 10 * STRIDE]
+        a[place + 11 * STRIDE] = laws.m1 if is_new else a[place + 11 * STRIDE]
+        a[place + 12 * STRIDE] = laws.m2 if is_new else a[place + 12 * STRIDE]
+    a[place + 13 * STRIDE] = laws.w_low if is_new else a[place + 13 * STRIDE]
 
 
 @packed

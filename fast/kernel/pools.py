@@ -18,10 +18,10 @@ NEVER = np.inf
     T, T_LOW, X, Y, VX, VY, WALL, SPIN,  # state after the last collision; angular momentum when captured
     SINCE, UNTIL, STAY_IN, STAY_OUT,  # a captured stay that spans an instant between is kept; begin and end
     N_ARC, N_BASE, N_LEFT, N_RIGHT, N_FLOOR,  # collisions so far
-    # The laws at T. As waves: sine and cosine of the fundamental phase. As pieces: radius, half-width, depth
-    # and slope, each with derivatives, and the reference time and number of the piece.
-    R0, R1, R2, R3, W0, W0_LOW, W1, W2, H0, H1, H2, M0, M1, M2,
+    # The laws at T. As waves: sine and cosine of the fundamental phase. As pieces: the reference time and
+    # number of the piece; radius, half-width, depth and slope, each with derivatives.
     REF, REF_LOW, PIECE,
+    R0, R1, R2, R3, W0, W1, W2, H0, H1, H2, M0, M1, M2, W0_LOW,
     AS_GIVEN,  # 1 where its distance from the arc is still that of a start that names it; hops keep it
     STOP,  # a collision at or after this time is left to `attend`
     END,  # until when the laws are known; minus infinity where they are not

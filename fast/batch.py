@@ -148,7 +148,7 @@ class LaneRound:
         self.worker = new_worker(self.in_lanes, only_stop(np.inf), unfilled_ends(np.empty((0, 6)), 1, (1, 1)))
         self.serves = float(np.diff(self.in_lanes.pieces.begins, append=self.in_lanes.pieces.period).max())
         self.anchors = np.zeros(ANCHORS_SHAPE)
-        self.pool, self.spare = np.zeros((2, pools.POOL_SIZE))
+        self.pool, self.spare = np.zeros(pools.POOL_SIZE), np.zeros(pools.POOL_SIZE)
 
     def fill(self, lane: int, p: FloatArray, wall: int, age: float = 0.0) -> None:
         """Put a state [t, its low part, x, y, vx, vy] into a lane, its laws known from `age` before it."""

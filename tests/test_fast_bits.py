@@ -25,7 +25,7 @@ from scene import State, load
 from scene.transforms import mirrored, mirrored_wall, scaled, scaled_state
 
 # Of `small_ensemble`. It changes when the arithmetic does, and then only on purpose.
-PINNED = "5f6846df3986b70d98606f260a85217c56bc18aafdbc6b743ace4b9beae8a17d"
+PINNED = "20148a59436b17ede759b139061a83977645d4ad60bee275ddef713d22bfe667"
 
 
 def small_ensemble(threads: int | None = None) -> fast.Ensemble:

@@ -20,9 +20,8 @@ from conformance.cases.delicate_families import sunk
 from conformance.cases.prover import proved_step
 from conformance.cases.table import FAMILIES
 from fast.batch import lane_steps
-from fast.kernel.laws import set_anchors
-from fast.kernel.pieces import expand_waves, law_at
-from fast.kernel.records import ANCHORS_SHAPE, DEPTH
+from fast.kernel.pieces import law_at
+from fast.kernel.records import DEPTH
 from fast.pieces import laws_in_lanes
 from scene import Fourier, Horizon, Mushroom, State, Stem
 from scene.laws import value
@@ -84,14 +83,10 @@ def worst_of_lanes(law, spoil):
     scene = Stem(w=1.0, h=law)
     in_lanes, worst = laws_in_lanes(scene), 0.0
     p, degree = in_lanes.pieces, (0,) * in_lanes.degree
-    anchors = np.zeros(ANCHORS_SHAPE)
     for i in range(len(p.begins)):
         out = p.coefficients[i, DEPTH].copy()
         if spoil:
-            from_python(set_anchors)(in_lanes.compiled.laws, anchors, *p.references[i])
-            rate = out[2]
-            from_python(expand_waves)(in_lanes.compiled.laws, anchors, DEPTH, out)
-            out[2] = rate
+            out[0] += 2.0**-54  # as waves would be rounded that add up to the mean
         for u in (-p.limits[i], 0.5 * p.limits[i], p.limits[i]):
             found = from_python(law_at)(out, 0, 1, u, u, degree)[0]
             true = value(CTX, law, sum(map(CTX.mpf, (*p.references[i], u))))

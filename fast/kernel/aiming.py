@@ -15,10 +15,10 @@ import numpy as np
 from fast.kernel.arithmetic import SAFETY, fma
 from fast.kernel.bounces import ONE
 from fast.kernel.compiling import packed, part
-from fast.kernel.lane_laws import laws_now
+from fast.kernel.lane_laws import laws_in
 
 from fast.kernel.pools import (  # isort: skip
-    HIT, ON_ARC, ON_BASE, ON_FLOOR, ON_LEFT, ON_RIGHT, S, SURE, TRIES, VX, VY, WALL, X, Y,
+    HIT, ON_ARC, ON_BASE, ON_FLOOR, ON_LEFT, ON_RIGHT, R0, S, SURE, TRIES, VX, VY, WALL, X, Y,
 )  # fmt: skip
 
 
@@ -130,7 +130,7 @@ def aim(a, i, is_stem, is_relative, waves, slope, degree, limits):
     SURE is positive only where the part of the flight before y = 0 is as chosen: docs/lanes.md.
     """
     bend, per_r = limits.bend, 2.0 / limits.least_r
-    outset, now = outset_of(a, i), laws_now(a, i, waves, is_relative, slope, degree)
+    outset, now = outset_of(a, i), laws_in(a, R0 + i, waves, is_relative, slope, degree)
     x, y, vx, vy, wall, _, v2 = outset
     depth, rise = abs(y), abs(vy)
     k_side = side_curvature(vy, slope, limits)

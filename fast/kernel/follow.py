@@ -266,7 +266,7 @@ def last_to_attend(a, n):
     """Return the last of n lanes that needs attention, -1 for none, as is mostly so; one packed loop."""
     last = np.int64(-1)
     for i in range(n):
-        last = max(last, i if a[FATE + i] < MOVED else np.int64(-1))
+        last = max(last, np.int64(i) if a[FATE + i] < MOVED else np.int64(-1))
     return last
 
 

@@ -15,15 +15,15 @@ from fast.kernel.compiling import kernel
 from fast.kernel.lane_laws import set_piece
 
 from fast.kernel.pools import (  # isort: skip
-    AS_GIVEN, END, NEVER, N_ROWS, PIECE, R0, R1, STOP, STRIDE, WHEN,
+    END, NEVER, N_ROWS, PIECE, R1, REF, STOP, STRIDE, W0_LOW, WHEN,
 )  # fmt: skip
 from fast.kernel.worker import NEXT_STOP, PARTICLE
 
 # Columns of what is kept: the pool, the number of the next stop, careful steps so far, whether the lanes know
-# the laws; then the rows of the pool up to AS_GIVEN.
+# the laws; then the rows of the pool up to W0_LOW.
 POOL, NEXT, CAREFUL, IS_KNOWN = np.arange(4)
 FIRST_ROW = 4
-LANE_ROWS = FIRST_ROW + AS_GIVEN // STRIDE
+LANE_ROWS = FIRST_ROW + int(W0_LOW // STRIDE)
 
 
 @kernel
@@ -34,7 +34,7 @@ def keep_lane(pool, a, i, roster, is_known, worker):
     out[:] = 0.0
     out[POOL], out[NEXT], out[CAREFUL] = pool, roster[NEXT_STOP, i], followed.careful[j]
     out[IS_KNOWN] = 1.0 if is_known else 0.0
-    last = R0 if not is_known else (R1 + STRIDE if worker.degree % 2 == 1 else AS_GIVEN)
+    last = REF if not is_known else (R1 + STRIDE if worker.degree % 2 == 1 else W0_LOW)
     for k in range(last // STRIDE):
         out[FIRST_ROW + k] = a[k * STRIDE + i]
 
@@ -47,7 +47,7 @@ def take_lane(a, i, roster, j, worker):
         a[row * STRIDE + i] = 0.0
     roster[PARTICLE, i], roster[NEXT_STOP, i] = j, int(kept[NEXT])
     worker.followed.careful[j] = int(kept[CAREFUL])
-    for k in range(AS_GIVEN // STRIDE):
+    for k in range(W0_LOW // STRIDE):
         a[k * STRIDE + i] = kept[FIRST_ROW + k]
     a[WHEN + i], a[STOP + i], a[END + i] = NEVER, -NEVER, -NEVER
     if kept[IS_KNOWN] > 0.0 and worker.degree % 2 == 0:

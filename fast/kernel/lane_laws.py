@@ -33,10 +33,8 @@ from fast.kernel.compiling import kernel, packed, part
 from fast.kernel.pieces import LONG, PARABOLA, SHORT, law_at, piece_at, third_derivative
 
 from fast.kernel.pools import (  # isort: skip
-    BACK, BEFORE, COSINE, DEPTH_LAW, END, H0, H1, H2, LAWS, LIMIT, M0, M1, M2, MEAN_RATE, NEVER,
-    NEXT_COSINE, NEXT_H0, NEXT_H1, NEXT_H2, NEXT_M0, NEXT_M1, NEXT_M2, NEXT_R0, NEXT_R1, NEXT_R2, NEXT_R3,
-    NEXT_SINE, NEXT_W0, NEXT_W0_LOW, NEXT_W1, NEXT_W2, N_COEFFICIENTS, PIECE, R0, R1, R2, R3, RADIUS_LAW,
-    REF, REF_LOW, SINE, SLOPE_LAW, STRIDE, T, T_LOW, W0, W1, W2, WIDTH_LAW,
+    AHEAD, BACK, BEFORE, COSINE, DEPTH_LAW, END, LAWS, LIMIT, MEAN_RATE, NEVER, N_COEFFICIENTS, PIECE, R0,
+    RADIUS_LAW, REF, REF_LOW, SINE, SLOPE_LAW, STRIDE, T, T_LOW, WIDTH_LAW,
 )  # fmt: skip
 from fast.kernel.records import CONSTANT, KIND, RADIUS, Waves
 
@@ -130,59 +128,69 @@ def fresh_phase(t, t_low, waves):
 
 
 @packed
-def laws_now(a, i, waves, is_relative, slope, degree):
-    """Return a lane's laws at its last collision."""
-    if waves is None:
-        m, m1, m2 = (a[M0 + i], a[M1 + i], a[M2 + i]) if slope is None else (slope, 0.0, 0.0)
-        r, r1, r2, r3, w, w1, w2 = a[R0 + i], a[R1 + i], a[R2 + i], a[R3 + i], a[W0 + i], a[W1 + i], a[W2 + i]
-        return LawsAt(r, r1, r2, r3, w, 0.0, w1, w2, a[H0 + i], a[H1 + i], a[H2 + i], m, m1, m2)
-    return laws_of_waves(a[SINE + i], a[COSINE + i], waves, is_relative, slope, degree)
+def laws_in(a, place, waves, is_relative, slope, degree):
+    """Return the laws in the rows of a lane that begin at `place`: R0 for those now, or AHEAD."""
+    if waves is not None:
+        return laws_of_waves(a[place], a[place + STRIDE], waves, is_relative, slope, degree)
+    r, r1, r2, r3 = a[place], a[place + STRIDE], a[place + 2 * STRIDE], a[place + 3 * STRIDE]
+    w, w1, w2 = a[place + 4 * STRIDE], a[place + 5 * STRIDE], a[place + 6 * STRIDE]
+    h, h1, h2 = a[place + 7 * STRIDE], a[place + 8 * STRIDE], a[place + 9 * STRIDE]
+    w_low = a[place + 13 * STRIDE]
+    m, m1, m2 = slope, 0.0, 0.0
+    if slope is None:
+        m, m1, m2 = a[place + 10 * STRIDE], a[place + 11 * STRIDE], a[place + 12 * STRIDE]
+    return LawsAt(r, r1, r2, r3, w, w_low, w1, w2, h, h1, h2, m, m1, m2)
+
+
+@packed
+def write_laws(a, place, laws, is_new, slope):
+    """Write laws of pieces into the rows of a lane that begin at `place`, if they are new."""
+    a[place] = laws.r if is_new else a[place]
+    a[place + STRIDE] = laws.r1 if is_new else a[place + STRIDE]
+    a[place + 2 * STRIDE] = laws.r2 if is_new else a[place + 2 * STRIDE]
+    a[place + 3 * STRIDE] = laws.r3 if is_new else a[place + 3 * STRIDE]
+    a[place + 4 * STRIDE] = laws.w if is_new else a[place + 4 * STRIDE]
+    a[place + 5 * STRIDE] = laws.w1 if is_new else a[place + 5 * STRIDE]
+    a[place + 6 * STRIDE] = laws.w2 if is_new else a[place + 6 * STRIDE]
+    a[place + 7 * STRIDE] = laws.h if is_new else a[place + 7 * STRIDE]
+    a[place + 8 * STRIDE] = laws.h1 if is_new else a[place + 8 * STRIDE]
+    a[place + 9 * STRIDE] = laws.h2 if is_new else a[place + 9 * STRIDE]
+    if slope is None:
+        a[place + 10 * STRIDE] = laws.m if is_new else a[place + 10 * STRIDE]
+        a[place + 11 * STRIDE] = laws.m1 if is_new else a[place + 11 * STRIDE]
+        a[place + 12 * STRIDE] = laws.m2 if is_new else a[place + 12 * STRIDE]
+    a[place + 13 * STRIDE] = laws.w_low if is_new else a[place + 13 * STRIDE]
 
 
 @packed
 def look_ahead(a, i, s, waves, is_relative, slope, degree):
-    """Write what the laws after a flight hang on, for `laws_ahead`.
+    """Write the laws after a flight, from AHEAD on.
 
     In a loop of its own: one loop over everything has more instructions than a processor looks ahead, so that
     it would wait for one register of lanes before it begins with the next.
     """
     if waves is None:
-        read_pieces(a, i, s, is_relative, slope, degree)
+        read_pieces(a, i, AHEAD + i, s, is_relative, slope, degree)
     else:
         t, low = two_sum(a[T + i], s)
-        a[NEXT_SINE + i], a[NEXT_COSINE + i] = fresh_phase(t, low + a[T_LOW + i], waves)
+        a[AHEAD + i], a[AHEAD + STRIDE + i] = fresh_phase(t, low + a[T_LOW + i], waves)
 
 
 @packed
-def read_pieces(a, i, s, is_relative, slope, degree):
-    """Write a lane's laws after a flight, from the coefficients that it has."""
+def read_pieces(a, i, place, s, is_relative, slope, degree):
+    """Write a lane's laws after a flight into the rows from `place` on, from its coefficients."""
     before = (a[T + i] - a[REF + i]) + (a[T_LOW + i] - a[REF_LOW + i])
     u = before + s
     r, r1, r2, mean_rate = law_at(a, RADIUS_LAW + i, STRIDE, u, before, degree)
+    r3 = third_derivative(a, RADIUS_LAW + i, STRIDE, u, degree)
     nu, nu1, nu2, _ = law_at(a, WIDTH_LAW + i, STRIDE, u, u, degree)
     w, w_low, w1, w2 = width_of(nu, nu1, nu2, r, r1, r2, is_relative)
     h, h1, h2, _ = law_at(a, DEPTH_LAW + i, STRIDE, u, u, degree)
-    a[BEFORE + i], a[MEAN_RATE + i], a[NEXT_W0_LOW + i] = before, mean_rate, w_low
-    a[NEXT_R0 + i], a[NEXT_R1 + i], a[NEXT_R2 + i] = r, r1, r2
-    a[NEXT_R3 + i] = third_derivative(a, RADIUS_LAW + i, STRIDE, u, degree)
-    a[NEXT_W0 + i], a[NEXT_W1 + i], a[NEXT_W2 + i] = w, w1, w2
-    a[NEXT_H0 + i], a[NEXT_H1 + i], a[NEXT_H2 + i] = h, h1, h2
+    m, m1, m2 = 0.0, 0.0, 0.0
     if slope is None:
-        a[NEXT_M0 + i], a[NEXT_M1 + i], a[NEXT_M2 + i], _ = law_at(a, SLOPE_LAW + i, STRIDE, u, u, degree)
-
-
-@packed
-def laws_ahead(a, i, waves, is_relative, slope, degree):
-    """Return a lane's laws where its flight was guessed to end."""
-    if waves is None:
-        m, m1, m2 = slope, 0.0, 0.0
-        if slope is None:
-            m, m1, m2 = a[NEXT_M0 + i], a[NEXT_M1 + i], a[NEXT_M2 + i]
-        r, r1, r2, r3 = a[NEXT_R0 + i], a[NEXT_R1 + i], a[NEXT_R2 + i], a[NEXT_R3 + i]
-        w, w_low, w1, w2 = a[NEXT_W0 + i], a[NEXT_W0_LOW + i], a[NEXT_W1 + i], a[NEXT_W2 + i]
-        h, h1, h2 = a[NEXT_H0 + i], a[NEXT_H1 + i], a[NEXT_H2 + i]
-        return LawsAt(r, r1, r2, r3, w, w_low, w1, w2, h, h1, h2, m, m1, m2)
-    return laws_of_waves(a[NEXT_SINE + i], a[NEXT_COSINE + i], waves, is_relative, slope, degree)
+        m, m1, m2, _ = law_at(a, SLOPE_LAW + i, STRIDE, u, u, degree)
+    a[BEFORE + i], a[MEAN_RATE + i] = before, mean_rate
+    write_laws(a, place, LawsAt(r, r1, r2, r3, w, w_low, w1, w2, h, h1, h2, m, m1, m2), True, slope)
 
 
 @packed
@@ -212,25 +220,12 @@ def room_ahead(a, i, s, delta, waves):
 
 
 @packed
-def move_laws(a, i, delta, is_moved, there, waves, slope):
+def move_laws(a, i, delta, is_moved, at_hit, waves, slope):
     """Take the laws at the hit, `delta` after the end that was guessed, for the present ones."""
     if waves is None:
-        a[R0 + i] = fma(there.r1, delta, there.r) if is_moved else a[R0 + i]
-        a[R1 + i] = fma(there.r2, delta, there.r1) if is_moved else a[R1 + i]
-        a[R2 + i] = there.r2 if is_moved else a[R2 + i]
-        a[R3 + i] = there.r3 if is_moved else a[R3 + i]
-        a[W0 + i] = fma(there.w1, delta, there.w) if is_moved else a[W0 + i]
-        a[W1 + i] = fma(there.w2, delta, there.w1) if is_moved else a[W1 + i]
-        a[W2 + i] = there.w2 if is_moved else a[W2 + i]
-        a[H0 + i] = fma(there.h1, delta, there.h) if is_moved else a[H0 + i]
-        a[H1 + i] = fma(there.h2, delta, there.h1) if is_moved else a[H1 + i]
-        a[H2 + i] = there.h2 if is_moved else a[H2 + i]
-        if slope is None:
-            a[M0 + i] = fma(there.m1, delta, there.m) if is_moved else a[M0 + i]
-            a[M1 + i] = fma(there.m2, delta, there.m1) if is_moved else a[M1 + i]
-            a[M2 + i] = there.m2 if is_moved else a[M2 + i]
+        write_laws(a, R0 + i, at_hit, is_moved, slope)
     else:
-        sine, cosine, turn = a[NEXT_SINE + i], a[NEXT_COSINE + i], waves.omega * delta
+        sine, cosine, turn = a[AHEAD + i], a[AHEAD + STRIDE + i], waves.omega * delta
         a[SINE + i] = fma(turn, cosine, sine) if is_moved else a[SINE + i]
         a[COSINE + i] = fma(-turn, sine, cosine) if is_moved else a[COSINE + i]
 
@@ -258,14 +253,6 @@ def set_reference(a, i, t, t_low, scene, pieces, degree):
 
 
 @kernel
-def take_from_piece(a, i, scene, degree):
-    """Write a lane's laws at its time from the piece that it has."""
-    read_pieces(a, i, 0.0, scene.is_relative, None, degree)
-    for row in range(0, M2 - R0 + STRIDE, STRIDE):
-        a[R0 + row + i] = a[NEXT_R0 + row + i]
-
-
-@kernel
 def know_laws(a, i, early, scene, pieces, degree, waves):
     """Find a lane's laws at its time, of pieces by that which serves so much earlier.
 
@@ -275,9 +262,9 @@ def know_laws(a, i, early, scene, pieces, degree, waves):
     if degree % 2 == 0:
         set_reference(a, i, t - early, t_low, scene, pieces, degree)
         if degree == PARABOLA:
-            take_from_piece(a, i, scene, SHORT)
+            read_pieces(a, i, R0 + i, 0.0, scene.is_relative, None, SHORT)
         else:
-            take_from_piece(a, i, scene, LONG)
+            read_pieces(a, i, R0 + i, 0.0, scene.is_relative, None, LONG)
     elif abs(t) < pieces.until:
         a[SINE + i], _, a[COSINE + i], _, _ = sine_cosine(waves.omega, waves.omega_low, 1.0, t, t_low)
         a[END + i] = NEVER

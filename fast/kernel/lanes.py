@@ -32,8 +32,7 @@ from fast.kernel.bounces import (
 from fast.kernel.compiling import packed, part, widest_registers
 from fast.kernel.lane_laws import (
     LawsAt,
-    laws_ahead,
-    laws_now,
+    laws_in,
     look_ahead,
     move_laws,
     radius_since,
@@ -41,9 +40,9 @@ from fast.kernel.lane_laws import (
 )
 
 from fast.kernel.pools import (  # isort: skip
-    COARSE, END, FAR, FATE, HIT, LATE, MARKED, MAX_CORRECTIONS, MOVED, NEVER, N_ARC, N_BASE, ON_ARC, ON_BASE,
-    ON_FLOOR, ON_LEFT, ON_RIGHT, REFUSED, S, SINCE, SPIN, STAY_IN, STAY_OUT, STOP, SURE, T, TRIES, T_LOW,
-    UNTIL, VX, VY, WALL, WHEN, X, Y,
+    AHEAD, COARSE, END, FAR, FATE, HIT, LATE, MARKED, MAX_CORRECTIONS, MOVED, NEVER, N_ARC, N_BASE, ON_ARC,
+    ON_BASE, ON_FLOOR, ON_LEFT, ON_RIGHT, R0, REFUSED, S, SINCE, SPIN, STAY_IN, STAY_OUT, STOP, SURE, T,
+    TRIES, T_LOW, UNTIL, VX, VY, WALL, WHEN, X, Y,
 )  # fmt: skip
 from fast.kernel.records import Place
 
@@ -70,6 +69,15 @@ class Correction(NamedTuple):
     delta: float
     inverse: float
     error: float
+
+
+class Flight(NamedTuple):
+    """A time of flight and its correction, how far the laws used hold beyond it, and what is known of it."""
+
+    s: float
+    delta: float
+    within: float
+    result: float
 
 
 @part
@@ -193,13 +201,6 @@ def verdict(quality, ahead, s, error, tries):
 
 
 @part
-def time_after(a, i, s, delta):
-    """Return the time of a hit as a sum of two floats."""
-    t, low = two_sum(a[T + i], s)
-    return short_sum(t, low + (a[T_LOW + i] + delta))
-
-
-@part
 def laws_at_hit(there, delta):
     """Return the laws at a hit, `delta` after the end that was guessed; of what a bounce asks for."""
     w, h = fma(there.w1, delta, there.w), fma(there.h1, delta, there.h)
@@ -215,7 +216,7 @@ def land(a, i, is_stem, is_mushroom, is_relative, waves, slope, degree, limits):
     bend = limits.bend
     outset, hit, s = outset_of(a, i), a[HIT + i], a[S + i]
     x, y, vx, vy, wall, q, v2 = outset
-    there = laws_ahead(a, i, waves, is_relative, slope, degree)
+    there = laws_in(a, AHEAD + i, waves, is_relative, slope, degree)
     r0, dr, known = radius_since(a, i, s, waves, degree)
     r, r1, r2 = there.r, there.r1, there.r2
     k_side = side_curvature(vy, slope, limits)
@@ -252,41 +253,48 @@ def land(a, i, is_stem, is_mushroom, is_relative, waves, slope, degree, limits):
     quality = min(quality, known if wall == ON_ARC else 1.0)
     within, ahead = room_ahead(a, i, s, delta, waves)
     result = verdict(quality, min(within, ahead), s, error, a[TRIES + i])
-    # Where it is right, the particle moves on.
-    t, t_low = time_after(a, i, s, delta)
-    at_hit = laws_at_hit(there, delta)
-    x_s, x_low = short_sum(x_s, fma(vx, delta, x_low))
-    y_s, y_low = short_sum(y_s, fma(vy, delta, y_low))
-    y_s = 0.0 if hit == ON_BASE else y_s
-    vx_s, vy_s = off_the_wall(hit, Place(x_s, x_low, y_s, y_low), vx, vy, at_hit, slope)
-    is_moved = t < a[STOP + i] if result == LATE else False
-    beyond = captured(hit, is_mushroom, x_s, y_s, vx, vy, at_hit.w)
-    spin = spin_in_disk(beyond, x_s, y_s, vx_s, vy_s, at_hit.w)
+    flight = Flight(s, delta, within, result)
+    t, t_low, at, at_hit, is_moved = arrive(a, i, flight, outset, end, there)
+    at = Place(at.x, at.x_low, 0.0 if hit == ON_BASE else at.y, at.y_low)
+    vx_s, vy_s = off_the_wall(hit, at, vx, vy, at_hit, slope)
+    beyond = captured(hit, is_mushroom, at.x, at.y, vx, vy, at_hit.w)
+    spin = spin_in_disk(beyond, at.x, at.y, vx_s, vy_s, at_hit.w)
     begin, over, kept = stay_after(
         hit, t, beyond, a[SINCE + i], a[UNTIL + i], a[STAY_IN + i], a[STAY_OUT + i]
     )
-    fate = MOVED if t < a[END + i] else MARKED
-    fate = fate if kept == NEVER else MARKED
-    fate = fate if spin == 0.0 else MARKED
-    a[FATE + i] = fate if is_moved else result
-    a[WHEN + i] = kept if is_moved else t
-    a[S + i] = s + delta if within > 0.0 else s  # from laws out of their reach nothing is learnt
-    tries = a[TRIES + i] + 1.0
-    tries = tries if result == COARSE else (tries if result == FAR else 0.0)
-    a[TRIES + i] = tries
+    is_quiet = kept == NEVER if spin == 0.0 else False
     count_hit(a, i, hit, 1.0 if is_moved else 0.0)
     a[STAY_IN + i] = begin if is_moved else a[STAY_IN + i]
     a[STAY_OUT + i] = over if is_moved else a[STAY_OUT + i]
     a[SPIN + i] = spin if is_moved else 0.0
-    move(a, i, is_moved, (t, t_low, x_s, y_s, vx_s, vy_s))
     a[WALL + i] = hit if is_moved else wall
-    move_laws(a, i, delta, is_moved, there, waves, slope)
+    a[WHEN + i] = kept if is_moved else t
+    move(a, i, flight, is_moved, is_quiet, (t, t_low, at.x, at.y, vx_s, vy_s))
+    move_laws(a, i, delta, is_moved, at_hit, waves, slope)
+
+
+@part
+def arrive(a, i, flight, outset, end, there):
+    """Return time, place and laws at the end of a flight, and whether the particle moves on to there."""
+    t, low = two_sum(a[T + i], flight.s)
+    t, t_low = short_sum(t, low + (a[T_LOW + i] + flight.delta))
+    x_s, x_low = short_sum(end.x, fma(outset.vx, flight.delta, end.x_low))
+    y_s, y_low = short_sum(end.y, fma(outset.vy, flight.delta, end.y_low))
+    is_moved = t < a[STOP + i] if flight.result == LATE else False
+    return t, t_low, Place(x_s, x_low, y_s, y_low), laws_at_hit(there, flight.delta), is_moved
 
 
 @packed
-def move(a, i, is_moved, state):
-    """Take a state for the present one, where a lane has moved."""
+def move(a, i, flight, is_moved, is_quiet, state):
+    """Take a state for the present one, where the particle moves on, and write what became of the flight."""
+    s, delta, within, result = flight
     t, t_low, x, y, vx, vy = state
+    fate = MOVED if t < a[END + i] else MARKED
+    fate = fate if is_quiet else MARKED
+    a[FATE + i] = fate if is_moved else result
+    a[S + i] = s + delta if within > 0.0 else s  # from laws out of their reach nothing is learnt
+    tries = a[TRIES + i] + 1.0
+    a[TRIES + i] = tries if result == COARSE else (tries if result == FAR else 0.0)
     a[T + i] = t if is_moved else a[T + i]
     a[T_LOW + i] = t_low if is_moved else a[T_LOW + i]
     a[X + i] = x if is_moved else a[X + i]
@@ -329,7 +337,7 @@ def chord(a, n, table, waves, slope, degree, limits):
     bend, k_w, size = limits.bend, limits.curvature, limits.size
     _, _, is_cap, is_relative = table
     for i in range(n):
-        outset, now = outset_of(a, i), laws_now(a, i, waves, is_relative, slope, degree)
+        outset, now = outset_of(a, i), laws_in(a, R0 + i, waves, is_relative, slope, degree)
         inverse = ONE / (outset.v2 - fma(now.r1, now.r1, now.r * now.r2))
         s = 2.0 * fma(now.r, now.r1, -outset.q) * inverse
         s = s * fma(cube_of_arc(now.r, now.r1, now.r2, now.r3) * s, inverse, 1.0)
@@ -341,7 +349,7 @@ def chord(a, n, table, waves, slope, degree, limits):
         outset, spin = outset_of(a, i), a[SPIN + i]
         x, y, vx, vy, _, q, v2 = outset
         s = a[S + i]
-        there = laws_ahead(a, i, waves, is_relative, slope, degree)
+        there = laws_in(a, AHEAD + i, waves, is_relative, slope, degree)
         r, r1, r2, w = there.r, there.r1, there.r2, there.w
         r0, dr, known = radius_since(a, i, s, waves, degree)
         f = hop_along_arc(s, outset, r0, dr)
@@ -363,22 +371,14 @@ def chord(a, n, table, waves, slope, degree, limits):
         quality = min(quality, told_rate(a[T + i], r, r1, r2, sizes, limits))
         within, ahead = room_ahead(a, i, s, delta, waves)
         result = verdict(quality, min(within, ahead), s, error, a[TRIES + i])
-        t, t_low = time_after(a, i, s, delta)
-        is_moved = t < a[STOP + i] if result == LATE else False
-        x_s, x_low = short_sum(end.x, fma(vx, delta, end.x_low))
-        y_s, y_low = short_sum(end.y, fma(vy, delta, end.y_low))
-        at_hit = laws_at_hit(there, delta)
+        flight = Flight(s, delta, within, result)
+        t, t_low, at, at_hit, is_moved = arrive(a, i, flight, outset, end, there)
         # The angular momentum of the whole stay is constant to the bit.
-        vx_s, vy_s = off_the_arc_spinning(Place(x_s, x_low, y_s, y_low), vx, vy, at_hit.r, at_hit.r1, spin)
-        fate = MOVED if t < a[END + i] else MARKED
-        a[FATE + i] = fate if is_moved else result
-        a[WHEN + i] = NEVER if is_moved else t
-        a[S + i] = s + delta if within > 0.0 else s
-        tries = a[TRIES + i] + 1.0
-        a[TRIES + i] = tries if result == COARSE else (tries if result == FAR else 0.0)
+        vx_s, vy_s = off_the_arc_spinning(at, vx, vy, at_hit.r, at_hit.r1, spin)
         # A chord that crosses y = 0 hits the base.
-        crossed = 1.0 if y * y_s < 0.0 else 0.0
+        crossed = 1.0 if y * at.y < 0.0 else 0.0
         a[N_ARC + i] += 1.0 if is_moved else 0.0
         a[N_BASE + i] += crossed if is_moved else 0.0
-        move(a, i, is_moved, (t, t_low, x_s, y_s, vx_s, vy_s))
-        move_laws(a, i, delta, is_moved, there, waves, slope)
+        a[WHEN + i] = NEVER if is_moved else t
+        move(a, i, flight, is_moved, True, (t, t_low, at.x, at.y, vx_s, vy_s))
+        move_laws(a, i, delta, is_moved, at_hit, waves, slope)

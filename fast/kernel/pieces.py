@@ -11,7 +11,7 @@ import numpy as np
 from fast.kernel.arithmetic import fma, two_product, two_sum
 from fast.kernel.compiling import kernel, packed
 from fast.kernel.double_double import add, sub, times
-from fast.kernel.laws import bend_of_half_leg, is_cancelled, set_anchors, whole_periods
+from fast.kernel.laws import bend_of_half_leg, set_anchors, whole_periods
 
 from fast.kernel.records import (  # isort: skip
     AMPLITUDES, BANG_BANG, COSINE, COSINE_LOW, DEPTH, FOURIER, HALF_LEG, KIND, N_HARMONICS, OMEGA, PHASE,
@@ -98,26 +98,9 @@ def piece_at(pieces, t, t_low):
 def expand_waves(laws, anchors, row, out):
     """Write the coefficients of the powers from 2 on of a Fourier law, from the phases at the reference time.
 
-    Harmonic k is A cos(k w u) + B sin(k w u) there.
-    """
-    n = int(laws[row, N_HARMONICS])
-    out[2:] = 0.0
-    for k in range(1, n + 1):
-        sine, cosine = anchors[PHASE, SINE + k], anchors[PHASE, COSINE + k]
-        a, b = laws[row, AMPLITUDES + k], laws[row, AMPLITUDES + n + k]
-        even, odd = a * cosine + b * sine, b * cosine - a * sine
-        turn, power = k * laws[row, OMEGA], 1.0
-        for j in range(2, out.shape[0]):
-            power *= turn / (j - 1)
-            if j > 2:
-                out[j] += power * (odd if j % 2 == 0 else even) * (1.0 if (j - 1) % 4 < 2 else -1.0)
-
-
-@kernel
-def expand_waves_finely(laws, anchors, row, out):
-    """Write what `expand_waves` does, each coefficient right to its last bits however far its waves cancel.
-
-    Where a law is nearly 0 its powers add up to little more than its value, and their rounding must, too.
+    Harmonic k is A cos(k w u) + B sin(k w u) there. Each coefficient is right to its last bits, however far
+    its waves cancel: where a law is nearly 0 its powers add up to little more than its value, and their
+    rounding must, too.
     """
     n, scale = int(laws[row, N_HARMONICS]), laws[row, OMEGA]
     out[2:] = 0.0
@@ -143,13 +126,10 @@ def fill_coefficients(laws, references, coefficients, anchors):
     """Write the polynomials of all laws about reference times (P, 2): see `Pieces.coefficients`."""
     for i in range(references.shape[0]):
         set_anchors(laws, anchors, references[i, 0], references[i, 1])
-        is_fine = is_cancelled(laws, anchors)
         for row in (RADIUS, WIDTH, DEPTH, SLOPE):
             out = coefficients[i, row]
             out[:] = 0.0
-            if laws[row, KIND] == FOURIER and is_fine:
-                expand_waves_finely(laws, anchors, row, out)
-            elif laws[row, KIND] == FOURIER:
+            if laws[row, KIND] == FOURIER:
                 expand_waves(laws, anchors, row, out)
             elif laws[row, KIND] == BANG_BANG:
                 out[3] = 0.5 * bend_of_half_leg(laws, row, int(anchors[row, HALF_LEG]))

@@ -18,26 +18,25 @@ NEVER = np.inf
     T, T_LOW, X, Y, VX, VY, WALL, SPIN,  # state after the last collision; angular momentum when captured
     SINCE, UNTIL, STAY_IN, STAY_OUT,  # a captured stay that spans an instant between is kept; begin and end
     N_ARC, N_BASE, N_LEFT, N_RIGHT, N_FLOOR,  # collisions so far
-    # The laws at T. As waves: sine and cosine of the fundamental phase. As pieces: radius, half-width, depth
-    # and slope, each with its derivatives, and the reference time and number of the piece.
-    R0, R1, R2, R3, W0, W1, W2, H0, H1, H2, M0, M1, M2,
+    # The laws at T. As waves: sine and cosine of the fundamental phase. As pieces: the reference time and
+    # number of the piece; radius, half-width, depth and slope, each with derivatives.
     REF, REF_LOW, PIECE,
+    R0, R1, R2, R3, W0, W1, W2, H0, H1, H2, M0, M1, M2, W0_LOW,
     AS_GIVEN,  # 1 where its distance from the arc is still that of a start that names it; hops keep it
     STOP,  # a collision at or after this time is left to `attend`
     END,  # until when the laws are known; minus infinity where they are not
     LIMIT, BACK,  # how long after the reference time a piece holds, and before it for a hop along the arc
     HIT, SURE, S, TRIES,  # the flight: wall, mouth, time; how often the time has been corrected
     FATE, WHEN,  # what became of it; for LATE its time, for MARKED the end of a captured stay that is over
-    # The laws where the flight is guessed to end, in the forms above; with pieces the flight's begin since
-    # REF too, the radius's mean rate, and the half-width's low part.
-    NEXT_R0, NEXT_R1, NEXT_R2, NEXT_R3, NEXT_W0, NEXT_W1, NEXT_W2, NEXT_H0, NEXT_H1, NEXT_H2,
-    NEXT_M0, NEXT_M1, NEXT_M2,
-    BEFORE, MEAN_RATE, NEXT_W0_LOW,
+    # The laws where the flight is guessed to end, in as many rows as those at T; with pieces the flight's
+    # begin since REF too, and the radius's mean rate.
+    AHEAD, _, _, _, _, _, _, _, _, _, _, _, _, _,
+    BEFORE, MEAN_RATE,
     LAWS,  # from here on the coefficients of a piece: see Pieces.coefficients
-) = STRIDE * np.arange(61)  # fmt: skip
-SINE, COSINE, NEXT_SINE, NEXT_COSINE = R0, R1, NEXT_R0, NEXT_R1
+) = STRIDE * np.arange(62)  # fmt: skip
+SINE, COSINE = R0, R1
 N_COEFFICIENTS = 16  # of each law, as many as the highest degree asks for
-N_ROWS = 60 + 4 * N_COEFFICIENTS
+N_ROWS = 61 + 4 * N_COEFFICIENTS
 RADIUS_LAW, WIDTH_LAW, DEPTH_LAW, SLOPE_LAW = LAWS + STRIDE * N_COEFFICIENTS * np.arange(4)
 # Codes of walls as they stand in a row.
 ON_ARC, ON_BASE, ON_LEFT, ON_RIGHT, ON_FLOOR = map(float, (ARC, BASE, LEFT, RIGHT, FLOOR))

@@ -46,7 +46,7 @@ from scene.geometry import area, half_width, table_at
 from scene.laws import values
 from scene.protocol.wire import Flowing
 from scene.sizes import size_bounds
-from scene.tables import cycle_length, laws
+from scene.tables import laws
 from scene.transforms import backwards
 
 Floats = npt.NDArray[np.float64]
@@ -172,7 +172,7 @@ def captured_share(
     Raises:
         BadInput: the scene stands still, or an argument is outside its bounds.
     """
-    narrowest = _span(scene, alarm) * least_nu(scene, cycle_length(scene))
+    narrowest = _span(scene, alarm) * least_nu(scene, scene.period)
     states = microcanonical_states(scene, n_particles, energy, _generator(seed, 0))
     arrived = [o for o, _ in flow(scene, states, narrowest) if isinstance(o, Horizon)]
     free = np.array([not _is_captured(scene, o) for o in arrived], dtype=float)
@@ -257,7 +257,7 @@ def reversal(
 
 
 def _span(scene: Scene, alarm: float) -> float:
-    span = cycle_length(scene)
+    span = scene.period
     if not span:
         raise BadInput("scene: nothing moves, must have a law that does")
     _check_range("alarm", alarm, 0.0, 1.0)

@@ -19,7 +19,7 @@ from scene import Scene
 from scene.geometry import table_at
 from scene.laws import bounds
 from scene.mouth import narrowings, start_time
-from scene.tables import cycle_length, laws
+from scene.tables import laws
 
 
 def initial_states(scene: Scene, n_particles: int, energy: float, seed: int, first: int = 0) -> FloatArray:
@@ -60,7 +60,7 @@ def _directions(turns: FloatArray) -> FloatArray:
 
 def one_cycle(scene: Scene) -> float:
     """Return how long a cycle takes [time]: the period of the laws, 1 for a static scene."""
-    return cycle_length(scene) or 1.0
+    return scene.period or 1.0
 
 
 def cycle_stops(scene: Scene, n_cycles: int, phases: Sequence[float]) -> Stops:

@@ -24,7 +24,7 @@ from mushrooms import output
 from mushrooms.ensemble_table import read_table
 from mushrooms.terminal import check_energy, load_scene
 from scene.refusal import BadInput
-from scene.tables import Mushroom, cycle_length
+from scene.tables import Mushroom
 
 ENERGIES = {"v2/2": 1.0, "v2": 0.5}  # what an energy of 1 in a file is as v^2/2
 TIMES = ("scene", "cycles")
@@ -62,7 +62,7 @@ def audit_ensemble(
     if scene_name is None:
         raise BadInput("--ensemble needs --scene, the scene that was simulated")
     found = load_scene(scene_name)
-    if not isinstance(found, Mushroom) or not cycle_length(found):
+    if not isinstance(found, Mushroom) or not found.period:
         raise BadInput(f"--scene = {scene_name!r}, must be a mushroom that moves: theory has no other")
     check_energy(options.energy)
     if options.energy_unit not in ENERGIES:
@@ -157,7 +157,7 @@ def _times(scene: Mushroom, columns: dict[str, Any], unit: str | None) -> tuple[
     known = np.empty(0) if t_in is None else t_in[np.isfinite(t_in)]
     if t_in is None or not len(known):
         return t_in, t_out, []
-    begin, span = cycle_start(scene), cycle_length(scene)
+    begin, span = cycle_start(scene), scene.period
     low, high = float(known.min()), float(known.max())
     fitting = [
         name

@@ -21,7 +21,7 @@ import numpy.typing as npt
 from numpy.polynomial import chebyshev
 
 from scene.laws import BangBang, Fourier, Law, bounds, breakpoints, is_constant, values
-from scene.tables import Mushroom, Scene, cycle_length, laws
+from scene.tables import Mushroom, Scene, laws
 
 FloatArray = npt.NDArray[np.float64]
 # Returns a law, its first and its second derivative by the phase, shape (3, ...), at phases given.
@@ -64,7 +64,7 @@ def narrowings(scene: Scene) -> tuple[float, ...]:
     width, radius = mouth_factors(scene)
     if is_constant(width) and is_constant(radius):
         return ()
-    start, span = start_time(scene), cycle_length(scene)
+    start, span = start_time(scene), scene.period
     w, r = (_motion(law, start, span) for law in (width, radius))
     cuts = _cuts(start, span, (width, radius))
     # Legs too short for their squares give nan: their zeros drop out, their ends among the cuts stay.

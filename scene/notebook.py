@@ -9,7 +9,7 @@ import msgspec
 from mpmath import fp
 
 from scene.geometry import table_at
-from scene.tables import Scene, cycle_length, laws
+from scene.tables import Scene, laws
 
 SIZE = 240  # of the picture [pixels]
 SHADES = ("#440154", "#31688e", "#35b779", "#b8b800")  # the walls at each quarter of the cycle
@@ -27,7 +27,7 @@ def rows(title: str, values: Mapping[str, object]) -> str:
 
 def of_scene(scene: Scene) -> str:
     """Return the laws of a scene and its walls at each quarter of the cycle."""
-    span = cycle_length(scene)
+    span = scene.period
     shown: dict[str, object] = {}
     for name, law in laws(scene).items():
         data = msgspec.to_builtins(law)

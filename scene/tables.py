@@ -72,7 +72,8 @@ class _Table(
     @property
     def period(self) -> float:
         """Return the period of the moving laws [time], 0 if nothing moves."""
-        return cycle_length(self)  # type: ignore[arg-type]
+        shared = period(self)  # type: ignore[arg-type]
+        return float(shared.value(fp)) if shared else 0.0
 
     def at(self, t: Any) -> dict[str, Any]:
         """Return the value of each law, by name, at a time or at an array of times (`Fourier`)."""
@@ -158,12 +159,6 @@ def width_factors(scene: Stem | Mushroom) -> tuple[Law, ...]:
 def period(scene: Scene) -> Period | None:
     """Return the period that all moving laws of a scene share; None for a static table."""
     return shared_period(laws(scene).values())
-
-
-def cycle_length(scene: Scene) -> float:
-    """Return the period [time] in binary64, 0 for a static table."""
-    shared = period(scene)
-    return float(shared.value(fp)) if shared else 0.0
 
 
 @lru_cache(maxsize=4096)

@@ -47,7 +47,7 @@ from scene import (
     from_data,
 )
 from scene.given import MAX_KNOTS
-from scene.tables import cycle_length, laws
+from scene.tables import laws
 
 SEEDS = (1, 2)
 SOME = 20  # of the first seed's: what every run of the tests asks
@@ -113,7 +113,7 @@ def test_all_is_asked_that_the_corpus_asks_seldom(seed, tally):
             assert grade(vector, answer_to(was)).verdict == "fail"
             assert vector.condition * physics_bound(vector.condition) < ANOTHER
         tally["named"] += "name" in vector.scene
-        tally["late"] += abs(vector.state.t) > 500 * (cycle_length(scene) or inf)
+        tally["late"] += abs(vector.state.t) > 500 * (scene.period or inf)
         tally["more than 20 legs"] += any(len(getattr(law, "knots", ())) > 20 for law in laws(scene).values())
     assert all(tally[f"{table}, {wall}"] >= 4 for table, wall in WALLS)
     assert min(tally[kind] for kind in ("trajectory", "flow")) > ROUND / 12

@@ -23,7 +23,6 @@ from scene import BangBang, Cap, Collision, Fourier, Mushroom, State, Stem, chec
 from scene.laws import bounds, is_constant, values
 from scene.sizes import size_bounds
 from scene.states import check_numbers
-from scene.tables import cycle_length
 from scene.tables import laws as laws_of
 
 
@@ -110,7 +109,7 @@ def features_of_start(scene, state, t_end):
     n_close = sum(flight.f(w, 0.0)[0] < size * 2.0**-10 * (size if w == "arc" else 1) for w in around)
     speed, distance = math.hypot(state.vx, state.vy), math.hypot(state.x, state.y)
     fastest = max(b.slope for b in lengths(scene)) or longest
-    cycle = cycle_length(scene)
+    cycle = scene.period
     knots = [t for law in laws_of(scene).values() if isinstance(law, BangBang) for t, _ in law.knots]
     grazing = 2.0**-10 * (2 * distance if state.wall == "arc" else 1.0) * speed
     is_mushroom = isinstance(scene, Mushroom) and state.wall is None

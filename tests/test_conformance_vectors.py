@@ -30,7 +30,7 @@ from scene import BadInput, BangBang, Fourier, State, catalogue, from_data
 from scene import load as load_scene
 from scene.laws import bounds
 from scene.protocol.messages import Command
-from scene.tables import cycle_length, laws
+from scene.tables import laws
 
 CORPUS = Path(__file__).parent.parent / "conformance" / "corpus"
 N_STEPS, N_TRAJECTORIES, N_FLOWS = 36, 4, 4  # made again, bit for bit
@@ -80,7 +80,7 @@ def test_lines_published_with_1_0_are_unchanged():
 
 
 def periods(vector, time):
-    return abs(float(time)) / (cycle_length(from_data(vector.scene)) or math.inf)
+    return abs(float(time)) / (from_data(vector.scene).period or math.inf)
 
 
 def laws_of(vector, kind=object):

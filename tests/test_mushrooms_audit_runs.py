@@ -313,11 +313,6 @@ def test_phases_that_are_none_are_refused(command_line, tmp_path, phases):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_phases_need_a_folder(command_line):
-    run = ["simulate", "moving-cap", "--particles", 5, "--energy", 1, "--phases", "0.5"]
-    assert_refused(command_line(*run), "--phases needs --out")
-
-
 def test_the_stand_in_s_particles_depend_on_their_numbers_alone():
     options = {"energy": 1e4, "seed": 3, "phases": (0.5,)}
     size = adiabatic_particles.TOGETHER

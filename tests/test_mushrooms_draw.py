@@ -87,22 +87,6 @@ def test_who_meets_the_arc_through_a_mouth_that_closed_behind_was_not_captured_b
     assert one.captured().tolist() == [False, True]
 
 
-def test_captured_stays_are_those_of_the_flow():
-    orbit = orbits.follow(MOVING, 3000, energy=ENERGY, seed=SEED, n_orbits=6)
-    n_stays = 0
-    for one in orbit:
-        captured, times = one.captured(), one.states()[:, 0]
-        told = fast.flow(MOVING, [one.start], float(times[-1]))
-        begin = told.t_in[0]
-        rises = np.flatnonzero(captured[1:] & ~captured[:-1]) + 1
-        if np.isfinite(begin) and not captured[0]:
-            n_stays += 1
-            assert times[rises[0]] == pytest.approx(begin, rel=1e-12)
-        elif not captured[0]:
-            assert len(rises) == 0
-    assert n_stays >= 1
-
-
 def test_an_island_keeps_its_angle_and_a_chaotic_orbit_does_not():
     section = whispering().section()
     assert section.is_captured().all()

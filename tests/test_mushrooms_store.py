@@ -310,6 +310,7 @@ def test_blocks_take_seconds_and_fit_into_memory():
         (["--max-seconds", 1], "--max-seconds needs --out"),
         (["--dask", "tcp://here:1"], "--dask needs --out"),
         (["--block", 8], "--block needs --out"),
+        (["--phases", "0.5"], "--phases needs --out"),
         (["--block", 0], "--block = 0"),
         (["--block", "1e29"], f"must be 1 to {conduct.LARGEST_BLOCK}"),
     ],

@@ -17,7 +17,7 @@ from mpmath import fp
 
 from scene.laws import Law, value
 from scene.refusal import BadInput, check_number, shown
-from scene.tables import Mushroom, Scene, check_scene, cycle_length
+from scene.tables import Mushroom, Scene, check_scene
 from scene.transforms import scaled
 from theory.validation import check_real, in_system
 
@@ -172,9 +172,7 @@ def volumes_of(ctx: Any, r: Any, nu: Any, h: Any, slope: Any) -> Volumes:
 
 def in_near_units(scene: Scene) -> tuple[Scene, int, int]:
     """Return a scene whose squares and cubes binary64 holds, and its units, as powers of two of the own."""
-    length, time = (
-        math.frexp(x)[1] for x in (float(value(fp, as_mushroom(scene).r, 0.0)), cycle_length(scene))
-    )
+    length, time = (math.frexp(x)[1] for x in (float(value(fp, as_mushroom(scene).r, 0.0)), scene.period))
     if max(abs(length), abs(time)) <= FAR:
         return scene, 0, 0  # solved already, maybe
     return scaled(scene, -length, -time), length, time

@@ -34,7 +34,6 @@ from conformance.audit.ensemble import (
 from conformance.audit.runs import MAX_LOST, FloatArray
 from conformance.audit.tolerances import Cdf, critical_gap
 from scene.refusal import BadInput
-from scene.tables import cycle_length
 from scene.transforms import backwards
 
 N_LOOKED_AT = 20_000  # particles
@@ -108,7 +107,7 @@ def _stays(given: GivenEnsemble, theirs: Expected, found: list[Check]) -> Iterat
         yield "starts are not uniform in area: on a wall only, or in one part of the table"
     if given.t_in is None or given.t_out is None or not np.isfinite(given.t_in).any():
         return
-    span, begin = cycle_length(given.scene), cycle_start(given.scene)
+    span, begin = given.scene.period, cycle_start(given.scene)
     last = (float(np.nanmax(given.t_out)) - begin) / span
     if last < 1 - 4 * EDGE and float(np.mean(given.t_out > begin + span * (last - EDGE))) > EDGE:
         yield f"many stays end together at {last:.3f} of the cycle: it was followed no further"
@@ -173,7 +172,7 @@ def _share_of_the_free(given: GivenEnsemble, theirs: Expected) -> float:
 
 def _other_spans(given: GivenEnsemble) -> Iterator[Rival]:
     """Yield parts of a cycle, and two cycles."""
-    found, span = theory.at_energy(given.scene, given.energy), cycle_length(given.scene)
+    found, span = theory.at_energy(given.scene, given.energy), given.scene.period
     for part in PARTS:
         yield Rival(f"energies are those after {part:g} of a cycle", _at_a_part(given, found, part * span))
     yield Rival("energies are those after two cycles", Sums(found.draw(2, N_DRAWN, 0)[:, -1]).cdf)

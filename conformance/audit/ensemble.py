@@ -35,7 +35,7 @@ from conformance.audit.tolerances import (
 from scene import Mushroom
 from scene.geometry import half_width, table_at
 from scene.laws import bounds, values
-from scene.tables import cycle_length, laws
+from scene.tables import laws
 
 IDENTITY = "mean of E0/E1, which is 1 in the limit"
 SHARE, PEAK = "p_nc: share never captured", "log E_nc: mean of log E1/E0 of the never captured"
@@ -137,7 +137,7 @@ def _adiabatic(scene: Mushroom, energy: float) -> Expected:
     found, curve = theory.predict(scene, 12), theory.energies(scene)
     p_nc, peak = float(found.p_nc), float(found.log_e_nc)
     band = (walls_speed(scene) / math.sqrt(2 * energy)) ** (2 / 3)
-    span = cycle_length(scene)
+    span = scene.period
     edges = np.linspace(0.0, span, N_TIMES + 1) + cycle_start(scene)
     mass = np.cumsum(theory.capture_time_mass(scene, edges)) if p_nc < 1 else np.zeros(N_TIMES)
 
@@ -162,10 +162,10 @@ def cycle_start(scene: Mushroom) -> float:
 
 def walls_speed(scene: Mushroom) -> float:
     """Return the largest rate of a size over a cycle [length / time]."""
-    times = np.linspace(0.0, cycle_length(scene), N_TIMES + 1)
+    times = np.linspace(0.0, scene.period, N_TIMES + 1)
     sizes = [values(law, times) for name, law in laws(scene).items() if name not in ("nu", "slope")]
     sizes.append(half_width(fp, scene, times))
-    return float(max(np.max(np.abs(np.diff(size))) for size in sizes) * N_TIMES / cycle_length(scene))
+    return float(max(np.max(np.abs(np.diff(size))) for size in sizes) * N_TIMES / scene.period)
 
 
 def nu_at(scene: Mushroom, times: FloatArray) -> FloatArray:
@@ -285,7 +285,7 @@ def _stays(given: GivenEnsemble, theirs: Expected) -> Iterator[Check]:
         return
     begin, end = _some(given.t_in), _some(given.t_out)
     both = np.isfinite(begin) & np.isfinite(end)
-    rate = N_TIMES / cycle_length(given.scene)
+    rate = N_TIMES / given.scene.period
     steepest = rate * float(np.max(np.abs(np.diff(nu_at(given.scene, np.arange(N_TIMES + 1) / rate)))))
     yield close(
         RELEASE,

@@ -38,7 +38,7 @@ from fast.flow import carry_judged
 from scene import Fourier, Horizon, Mushroom, State
 from scene.geometry import TableAt, table_at
 from scene.laws import value
-from scene.tables import cycle_length, laws
+from scene.tables import laws
 from theory.finite_energy.rates import FILE, MEMORIES, N_PHASES, PHASES, SPEEDS, Rates, kick_rate, pace
 from theory.volumes import volumes_at
 
@@ -176,7 +176,7 @@ def passages(
     sigma is spread over the phase's cell: where a turn is resonant the lag at a single sigma diverges.
     """
     cell = np.linspace(-0.5, 0.5, 9)
-    tables = [table_at(fp, scene, t + x * cycle_length(scene) / N_PHASES) for x in cell]
+    tables = [table_at(fp, scene, t + x * scene.period / N_PHASES) for x in cell]
     sigma = np.interp(random.uniform(-0.5, 0.5, n), cell, [float(one.w / one.r) for one in tables])
     sigma = sigma[sigma < 1.0]  # a mouth that rests wide open leaves no island, and its rim does not turn
     return turned(now, sigma, sigma, widening(now) / speed, random, math.inf)
@@ -257,7 +257,7 @@ def depletion(scene: Mushroom, t: float, speed: float, n: int, seed: int) -> Mea
     nu, x = float(now.w / now.r), np.random.default_rng([seed, 1]).random(n)
     sigma = nu * (1 - x**CROWDED)
     weight = 4 * math.pi * now.r**2 * np.sqrt(1 - sigma**2) * nu * CROWDED * x ** (CROWDED - 1)
-    path, mouth = speed * cycle_length(scene), np.full(n, nu)
+    path, mouth = speed * scene.period, np.full(n, nu)
     moving, resting = (
         turned(now, sigma, mouth, rate, np.random.default_rng([seed, 2]), longest).path
         for rate, longest in ((widening(now) / speed, path), (0.0, LAGS * STEP))
@@ -276,7 +276,7 @@ def measured(scene: Mushroom, *, phases: FloatArray = PHASES, n: float = 1.0, se
         seed: of all random numbers.
     """
     rows = [
-        _row(scene, float(phase) * cycle_length(scene), n, np.random.default_rng([seed, round(phase * 1000)]))
+        _row(scene, float(phase) * scene.period, n, np.random.default_rng([seed, round(phase * 1000)]))
         for phase in phases
     ]
     values, errors = np.moveaxis(np.array(rows), 2, 0)

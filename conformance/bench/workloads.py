@@ -19,7 +19,6 @@ from conformance.vectors import Expectation
 from scene import BangBang, Cap, Collision, Fourier, Mushroom, Scene, State, Wall, load
 from scene.geometry import rounded
 from scene.states import Stepper
-from scene.tables import cycle_length
 
 DIGITS = 230  # of the proved answers: beyond any solver's
 WINDOW = 1000.0  # flights
@@ -200,7 +199,7 @@ def draw_workload(
 
 def _starts(rule: Rule, scene: Scene, key: str) -> Iterator[Drawn]:
     """Draw starts until one is taken."""
-    span, size = cycle_length(scene) or 1.0, rounded(scene, 0.0).size
+    span, size = scene.period or 1.0, rounded(scene, 0.0).size
     for attempt in range(MAX_DRAWS):
         stream = Draw(f"{key} {attempt}")
         t = span * PHASE + stream.part() * min(span, WINDOW * size / rule.speed)

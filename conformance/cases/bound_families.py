@@ -38,7 +38,6 @@ from conformance.plain.step import Flight
 from scene import BangBang, Cap, Fourier, Law, Mushroom, Scene, State, Stem, Wall
 from scene.geometry import rounded
 from scene.laws import bounds
-from scene.tables import cycle_length
 
 LOOK = 2.0**-20  # of a period: f' after so long is f'' times as much
 LASTS = -13, -8  # how long a meeting is, as powers of two of a period: shorter ones are delicate
@@ -138,7 +137,7 @@ def touch(draw: Draw, of: Scene, t: float, wall: Wall, along: float, lasts: floa
     Raises:
         Unfit: the wall does not draw back from a particle that moves so.
     """
-    length, table = cycle_length(of) or 1.0, rounded(of, t)
+    length, table = of.period or 1.0, rounded(of, t)
     x, y = point(table, wall, draw.between(0.2, 0.8), draw.between(0.2, 0.8))
     nx, ny = table.normal(wall, x, y)
     along, away = draw.pick((1.0, -1.0)) * along * draw.between(0.5, 1.0), -table.receding(wall, y)
@@ -158,7 +157,7 @@ def touch(draw: Draw, of: Scene, t: float, wall: Wall, along: float, lasts: floa
 def brief(table: str, wall: Wall, draw: Draw) -> Question:
     """Meet a wall for a short time in any scene; a flow goes on from there."""
     of = any_scene(draw, table)
-    t, length = when(draw, of), cycle_length(of) or 1.0
+    t, length = when(draw, of), of.period or 1.0
     along, before = walls_speed(of) * draw.power(-6, 0), length * draw.power(-5, -2)
     lasts = length * draw.power(*LASTS) * draw.between(0.5, 1.0)
     start = touch(draw, of, t, wall, along, lasts, before)

@@ -11,7 +11,7 @@ from conformance.cases.question import Family, Question
 from conformance.cases.scenes import MOVING, TABLES, Clock, clock, deep_wave, law, scene, state, time
 from scene import BangBang, Cap, Fourier, Mushroom, Scene, State, Stem
 from scene.geometry import rounded
-from scene.tables import cycle_length, laws
+from scene.tables import laws
 
 
 def knots_off_zero(draw: Draw) -> Question:
@@ -26,7 +26,7 @@ def knots_off_zero(draw: Draw) -> Question:
 
     off = {name: moved(found.knots) for name, found in laws(of).items() if isinstance(found, BangBang)}
     of = msgspec.structs.replace(of, **off)
-    t = time(draw, of) - (cycle_length(of) or 1.0) * draw.pick((0, 0, 1, 3, 40))
+    t = time(draw, of) - (of.period or 1.0) * draw.pick((0, 0, 1, 3, 40))
     at = {"t": t, "speed": draw.power(-2, 4), "patience": 8.0}
     return Question(of, *state(draw, of, at))
 
@@ -46,7 +46,7 @@ def waiting(draw: Draw) -> Question:
         of = Mushroom(r=law(draw, 1.0, 1.25, shared), nu=nu, h=h)
     x, y = draw.between(-0.2, 0.2), draw.between(0.1, 0.4) * (-1.0 if table == "stem" else 1.0)
     t, (vx, vy) = time(draw, of), draw.direction()
-    speed = 0.8 / (n_periods * (cycle_length(of) or shared.rate))
+    speed = 0.8 / (n_periods * (of.period or shared.rate))
     start = State(t, x, y, speed * vx, speed * vy)
     return Question(of, start, t + 4.0 / speed)
 
@@ -85,7 +85,7 @@ def far_phase(draw: Draw) -> Question:
     turns = float(draw.power(31, 34) + draw.pick(range(2**20)))
     shared = Clock(draw.pick(("fourier", "bang-bang", "mixed")), draw.pick((0.5, 1.0, 4.0)))
     of = scene(draw, draw.pick(TABLES), shared)
-    t = draw.pick((1.0, 1.0, -1.0)) * (turns + draw.pick(range(64)) / 64) * (cycle_length(of) or shared.rate)
+    t = draw.pick((1.0, 1.0, -1.0)) * (turns + draw.pick(range(64)) / 64) * (of.period or shared.rate)
     # A stepper may refuse times at which much of a phase is lost in rounding, if it says so.
     return Question(of, *state(draw, of, {"t": t, "speed": draw.power(0, 4)}), also=("rejected",))
 
@@ -95,7 +95,7 @@ def far_mouth(draw: Draw) -> Question:
     turns = float(draw.power(31, 34) + draw.pick(range(2**20))) + draw.pick(range(64)) / 64
     shared = Clock(draw.pick(("fourier", "bang-bang", "bang-bang")), draw.pick((0.5, 1.0, 4.0)))
     of = Mushroom(r=draw.short(1.0, 1.5), h=draw.short(1.0, 1.5), nu=law(draw, 0.1, 0.9, shared))
-    t = draw.pick((1.0, 1.0, -1.0)) * turns * (cycle_length(of) or shared.rate)
+    t = draw.pick((1.0, 1.0, -1.0)) * turns * (of.period or shared.rate)
     y, flight = draw.between(0.1, 0.3), draw.between(0.02, 0.1)
     widths = rounded(of, t + flight).w, rounded(of, flight).w
     x = draw.pick((0.5, -0.5)) * (widths[0] + widths[1])

@@ -34,7 +34,7 @@ from conformance.grading.agreement import DIGITS, SHARPEST
 from conformance.vectors import Kind, Level, Vector
 from scene import BadInput, BangBang, Collision, Fourier, Horizon, Scene, State, from_data
 from scene.laws import bounds
-from scene.tables import cycle_length, laws
+from scene.tables import laws
 
 FRESH = "fresh"
 KINDS: tuple[Kind, ...] = ("step", "step", "step", "step", "trajectory", "flow")
@@ -192,7 +192,7 @@ def _delicacy(of: Scene, start: State) -> Level:
     Late, a part of the time is a phase; of a very deep stem a part of y is much of its width, though not an
     error of x that is a part of x.
     """
-    is_late = abs(start.t) > 2.0 ** (LATE[0] - 1) * (cycle_length(of) or inf)
+    is_late = abs(start.t) > 2.0 ** (LATE[0] - 1) * (of.period or inf)
     return "extended" if is_late or is_leaning(of) else "core"
 
 

@@ -38,7 +38,6 @@ from scene import Cap, Law, Mushroom, Scene, State, Stem, Wall
 from scene.geometry import rounded
 from scene.given import MAX_KNOTS
 from scene.laws import bounds, is_constant
-from scene.tables import cycle_length
 from scene.transforms import scaled, scaled_law, scaled_state
 
 WALLS: tuple[tuple[str, Wall], ...] = tuple(
@@ -71,7 +70,7 @@ def returning(table: str, wall: Wall, draw: Draw) -> Question:
         of = under_a_growing_cap(draw)
     at = {"t": when(draw, of), "site": wall, "speed": draw.power(-4, 1), "lift": draw.power(-5, -1)}
     leaving, t_end = state(draw, of, at | {"patience": 32.0})
-    t_end = min(t_end, leaving.t + LONGEST / 2 * (cycle_length(of) or 1.0))
+    t_end = min(t_end, leaving.t + LONGEST / 2 * (of.period or 1.0))
     leaving = off_its_wall(draw, of, leaving, -3)
     length, units = draw.pick(range(UNITS[0], UNITS[1] + 1)), draw.pick(range(UNITS[0], UNITS[1] + 1))
     return Question(scaled(of, length, units), scaled_state(leaving, length, units), t_end * 2.0**units)
@@ -85,7 +84,7 @@ def rebounding(table: str, wall: Wall, draw: Draw) -> Question:
     table_then = rounded(of, t)
     nx, ny = table_then.normal(wall, x, y)
     away = 2 * (vx * nx + vy * ny + table_then.receding(wall, y))
-    vx, vy, before = vx - away * nx, vy - away * ny, (cycle_length(of) or 1.0) * draw.power(-16, -6)
+    vx, vy, before = vx - away * nx, vy - away * ny, (of.period or 1.0) * draw.power(-16, -6)
     start = State(t - before, x - vx * before, y - vy * before, vx, vy)
     return Question(of, start, asked.t_end, *draw.pick(((40, any_marks), (None, None))))
 
@@ -117,7 +116,7 @@ def leaning(draw: Draw) -> Question:
     w, h = law(draw, 0.25, 0.5, shared), law(draw, 0.5, 1.0, shared)
     part = draw.pick((1.0, -1.0)) * draw.between(0.1, 0.27)
     of = Stem(w=w, h=scaled_law(h, depth, 0), slope=part * bounds(w).lowest * 2.0**-depth)
-    t, flight = time(draw, of), (cycle_length(of) or 1.0) * draw.power(-4, 1)
+    t, flight = time(draw, of), (of.period or 1.0) * draw.power(-4, 1)
     table, site = rounded(of, t), draw.pick(("stem", "left", "right", "floor"))
     x, y = place(draw, table, site)
     wall: Wall | None = next((name for name in of.walls if name == site), None)
@@ -138,7 +137,7 @@ def changed_mouth(draw: Draw) -> Question:
     times and not at the other.
     """
     of = any_scene(draw, "mushroom")
-    t, length = when(draw, of), cycle_length(of) or 1.0
+    t, length = when(draw, of), of.period or 1.0
     flight, now = length * draw.power(-6, -1) * draw.between(0.5, 1.0), rounded(of, t)
     widths = now.w, rounded(of, t + flight).w
     to = draw.pick((1.0, -1.0)) * draw.between(min(widths), max(widths))
@@ -167,10 +166,10 @@ def vibrating(table: str, draw: Draw) -> Question:
     of: Cap | Stem = (
         Cap(r=moving()) if table == "cap" else Stem(w=moving(), h=moving(), slope=draw.short(-0.2, 0.1))
     )
-    if not cycle_length(of):
+    if not of.period:
         raise Unfit("the walls are at rest")
     wide, high = (bounds(law).lowest for law in ((of.r, of.r) if isinstance(of, Cap) else (of.w, of.h)))
-    flight = cycle_length(of) * draw.power(5, 9) * draw.between(0.5, 1.0)
+    flight = of.period * draw.power(5, 9) * draw.between(0.5, 1.0)
     way, y, t = (1.0 if table == "cap" else -1.0), high * draw.between(0.05, 0.3), time(draw, of)
     xs = wide * draw.between(-0.3, 0.3), wide * draw.between(-0.3, 0.3)
     return Question(of, State(t, xs[0], way * y, (xs[1] - xs[0]) / flight, -way * y / flight), t + 4 * flight)

@@ -38,7 +38,7 @@ from scene.geometry import TableAt, rounded
 from scene.given import MAX_KNOTS
 from scene.laws import bounds, breakpoints
 from scene.states import ON_WALL
-from scene.tables import cycle_length, laws
+from scene.tables import laws
 from scene.transforms import scaled_law
 
 FEW_HARMONICS = ((1, 0), (0, 1), (1, 1), (2, 0), (0, 2), (2, 2), (1, 3))  # of cosines, of sines
@@ -255,7 +255,7 @@ def place(draw: Draw, at: TableAt, site: str) -> tuple[float, float]:
 
 def time(draw: Draw, scene: Scene, turns: int = 3) -> float:
     """Draw a time within some periods; now and then on a knot."""
-    length = cycle_length(scene) or 1.0
+    length = scene.period or 1.0
     knots = [float(t) for law in laws(scene).values() for t in breakpoints(law)]
     if knots and draw.pick(range(5)) == 0:
         return length * draw.pick(range(turns)) + draw.pick(knots)
@@ -298,7 +298,7 @@ def state(draw: Draw, scene: Scene, at: dict[str, Any]) -> tuple[State, float]:
 
 def when(draw: Draw, scene: Scene) -> float:
     """Draw a time: 0, within some periods before it or after it, on a knot, or late."""
-    length = cycle_length(scene) or 1.0
+    length = scene.period or 1.0
     turns = draw.pick((0.0, 0.0, 1.0, 4.0, 60.0))
     if draw.pick(range(5)) == 4:
         turns = draw.power(*LATE) * draw.pick((1.0, -1.0))
@@ -314,7 +314,7 @@ def start(draw: Draw, scene: Scene, t: float, site: str | None = None) -> tuple[
         t: time of the start [time].
         site: a region or a wall; any by default.
     """
-    length, table = cycle_length(scene) or 1.0, rounded(scene, t)
+    length, table = scene.period or 1.0, rounded(scene, t)
     site = site or draw.pick(sites(scene))
     x, y = point(table, site, draw.near_an_end(), draw.near_an_end())
     usual = draw.pick((walls_speed(scene) or table.size, table.size / length))

@@ -35,7 +35,7 @@ from scene.geometry import table_at
 from scene.laws import bounds
 from scene.refusal import shown
 from scene.states import Stepper
-from scene.tables import cycle_length, laws
+from scene.tables import laws
 
 HELD = 2.0**100  # sizes, speeds and their inverses within it overflow nowhere
 FAR = 2.0**20  # periods from t = 0 that every stepper must reach
@@ -64,7 +64,7 @@ def is_clearly_inside(scene: Scene, state: State, t_end: float) -> bool:
     """Tell whether a state is one that no stepper may refuse; of one on a wall this does not judge."""
     sizes = [abs(extent) for law in laws(scene).values() for extent in bounds(law)]
     sizes += [abs(number) for number in (state.x, state.y, state.vx, state.vy, state.t, t_end)]
-    is_far = max(abs(state.t), abs(t_end)) > FAR * (cycle_length(scene) or 1.0)
+    is_far = max(abs(state.t), abs(t_end)) > FAR * (scene.period or 1.0)
     if state.wall is not None or is_far or any(size and not 1 / HELD < size < HELD for size in sizes):
         return False
     off = CLEAR * float(table_at(fp, scene, state.t).size)

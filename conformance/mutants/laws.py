@@ -18,7 +18,7 @@ from conformance.plain.motion import (
 from conformance.plain.step import Flight
 from scene import BangBang, Fourier, Law, Outcome, Rejected, Scene, State
 from scene.laws import bounds, frequency
-from scene.tables import cycle_length, laws
+from scene.tables import laws
 
 
 def single(x: float) -> float:
@@ -163,7 +163,7 @@ def gives_up_after_ten_periods(
 ) -> None:
     """Looks for a hit within ten periods of the laws only."""
     plain(scene, state, t_end)
-    if length := cycle_length(scene):
+    if length := scene.period:
         flight.end, flight.is_horizon = min(flight.end, size * length), True
 
 

@@ -6,7 +6,6 @@ from conformance.mutants.mutant import COMMON, Plain, mutant
 from conformance.mutants.walls import UPRIGHT, Heedless, Trusting
 from conformance.plain.step import Flight
 from scene import Outcome, Scene, State, Wall
-from scene.tables import cycle_length
 
 Root = float | None
 Hit = tuple[Wall, float] | None
@@ -87,7 +86,7 @@ def dead_time_on_the_wall_left(
 ) -> Root:
     """Never meets the wall that it leaves within a thousand millionth of a period."""
     root = plain(wall, start, end)
-    is_dead = root is not None and wall == flight.wall and root < size * cycle_length(flight.scene)
+    is_dead = root is not None and wall == flight.wall and root < size * flight.scene.period
     return None if is_dead else root
 
 

@@ -89,7 +89,7 @@ class Shape(NamedTuple):
     def of(self, name: str, n: int, n_cycles: int) -> tuple[int, ...]:
         """Return the shape of an array for n particles and so many cycles."""
         sizes = {"cycle": n_cycles, "narrowing": self.n_narrowings, "phase": self.n_phases}
-        sizes |= {"wall": len(WALLS), "row": LANE_ROWS}
+        sizes |= {"wall": len(WALLS), "row": int(LANE_ROWS)}
         return (n, *(sizes[dim] for dim in FIELDS[name].dims[1:]))
 
     @property

@@ -17,7 +17,6 @@ from mpmath import fp
 import fast
 import theory
 from fast.kernel.kept import LANE_ROWS
-from scene.tables import cycle_length
 
 DIGITS = 12  # of predictions, many more than thousands of particles can tell
 TOGETHER = 4000  # particles drawn at a time
@@ -30,7 +29,7 @@ predict = cache(theory.predict)
 def curves(scene):
     prediction = predict(scene, DIGITS)
     zone = None
-    if span := cycle_length(scene):
+    if span := scene.period:
         grid = np.linspace(0, span, 2001)
         cap = np.log(theory.volumes_at(np, scene, grid).v_cap)
         zone = grid, theory.chaotic_zone(scene, grid).log_energy, cap
@@ -125,7 +124,7 @@ def stays_in(scene, n, rng):
 @cache
 def at_phases(scene, energy, phases):
     """Return mean and variance of the uncaptured's log E / E0 at each phase."""
-    return theory.at_energy(scene, energy).zone([phase * cycle_length(scene) for phase in phases])
+    return theory.at_energy(scene, energy).zone([phase * scene.period for phase in phases])
 
 
 @cache

@@ -20,7 +20,7 @@ import mpmath
 
 from scene import from_data
 from scene.laws import value
-from scene.tables import cycle_length, laws
+from scene.tables import laws
 
 CORPUS = Path(__file__).parents[2] / "conformance" / "corpus"
 DECIMALS, CONFIRMED = 60, 300
@@ -141,7 +141,7 @@ class Flight:
     def instants(self, begin: Number, end: Number, n: int) -> list[Number]:
         """Return n instants or more, in order: a dozen for each wave or leg, more near both ends."""
         span = end - begin
-        period = numbers().mpf(cycle_length(self.scene) or numbers().inf)
+        period = numbers().mpf(self.scene.period or numbers().inf)
         n = min(MAX_SAMPLES, max(n, int(12 * span / period * self.n_waves)))
         ends = [span / 2**k for k in range(1, N_ENDS)]
         inner = [span * k / n for k in range(1, n)]

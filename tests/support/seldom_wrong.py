@@ -23,7 +23,7 @@ from conformance.plain.flow import MAX_COLLISIONS, PlainPath
 from conformance.plain.motion import BangBangMotion, ConstantMotion
 from conformance.plain.step import Flight
 from scene import BangBang, Fourier, Mushroom, Rejected, from_data
-from scene.tables import cycle_length, laws
+from scene.tables import laws
 
 # The fault, and the row of the table of families whose questions it answers wrong; none for a run's first.
 FAULTS: dict[str, tuple[Mutant, str]] = {
@@ -153,7 +153,7 @@ def late_phase_in_float32(flight, plain, law):
 @fault("looks by the period", "brief-cap-arc", "first_root", TieBlind)
 def looks_by_the_period(flight, plain, wall, start, end):
     """Looks at f 64 times in a period for a change of sign, and in a flight."""
-    look = min((cycle_length(flight.scene) or 1.0) / 64, (end - start) / 64)
+    look = min((flight.scene.period or 1.0) / 64, (end - start) / 64)
     a = start
     while a < end:
         b = min(a + look, end)

@@ -16,7 +16,7 @@ from scipy.ndimage import map_coordinates
 
 from scene.geometry import table_at
 from scene.laws import BangBang
-from scene.tables import Mushroom, cycle_length, laws
+from scene.tables import Mushroom, laws
 from theory.branches import Floats, tree
 from theory.curves import chaotic_zone
 from theory.cycle import Cycle
@@ -63,7 +63,7 @@ def course(scene: Mushroom) -> CycleCourse:
         NotCovered: they are not.
     """
     rates_at(scene, np.zeros(1))
-    start, step = _clock_start(scene), cycle_length(scene) / N_TIMES
+    start, step = _clock_start(scene), scene.period / N_TIMES
     times: Floats = np.asarray(start + step * (np.arange(N_TIMES) + 0.5), dtype=np.float64)
     now, volumes, rates = table_at(fp, scene, times), volumes_at(np, scene, times), rates_at(scene, times)
     nu_rate = (now.w_rate * now.r - now.w * now.r_rate) / now.r**2
@@ -84,7 +84,7 @@ def _clock_start(scene: Mushroom) -> float:
     Raises:
         NotCovered: some particles are in the island then that leave it later.
     """
-    length, opening = cycle_length(scene), float(Cycle.of(scene, 15).start)
+    length, opening = scene.period, float(Cycle.of(scene, 15).start)
     start = next((law.knots[0][0] for law in laws(scene).values() if isinstance(law, BangBang)), 0.0)
     start += length * float(np.floor((opening - start) / length + ROUNDING))
     last = max((float(branch.ends[2].max()) for branch in tree(scene).all_branches()), default=start)

@@ -21,7 +21,7 @@ from mpmath import fp
 import scene as scenes
 from scene.geometry import table_at
 from scene.laws import breakpoints, values
-from scene.tables import Mushroom, Scene, cycle_length, laws
+from scene.tables import Mushroom, Scene, laws
 from scene.transforms import backwards
 from theory.branches import Floats
 from theory.volumes import NotCovered, as_mushroom, volumes_at
@@ -122,7 +122,7 @@ class _Found(NamedTuple):
 
     def phases(self, times: Floats) -> Floats:
         """Return the measured scene's phases at the sought one's times."""
-        phase: Floats = (times / cycle_length(self.measured)) % 1.0
+        phase: Floats = (times / self.measured.period) % 1.0
         return 1 - phase if self.turned else phase
 
     def pace(self, times: Floats) -> Floats:
@@ -176,7 +176,7 @@ def table_error(scene: Scene) -> TableError:
         NotCovered: as `frozen_rates`.
     """
     measured, rates, _ = _found(scene)
-    speed = pace(measured, PHASES * cycle_length(measured))
+    speed = pace(measured, PHASES * measured.period)
     spread, lag = rates.diffusion.sum(axis=1) * speed**2, rates.lag.mean(axis=1) * speed
     errors = [rates.diffusion_error.sum(axis=1) * speed**2, rates.lag_error.mean(axis=1) * speed]
     sums = np.abs(spread).sum(), max(float(np.abs(lag).sum()), TINY)
@@ -197,7 +197,7 @@ def _between(columns: Floats, phase: Floats, spans: Floats) -> Floats:
 
 def _spans(scene: Mushroom) -> Floats:
     """Return the phases, in (0, 1), at which a law stops being analytic and its walls rest."""
-    length = cycle_length(scene)
+    length = scene.period
     knots = {float(t) / length % 1.0 for law in laws(scene).values() for t in breakpoints(law)[::2]}
     return np.array(sorted(knots - {0.0}))
 
@@ -212,8 +212,8 @@ def _is_one_cycle(measured: Mushroom, sought: Mushroom) -> bool:
     A law written at twice its period (Fourier's with even harmonics only, a bang-bang law's knots told two
     times) has another cycle length, and other units other numbers: these are not known for the same.
     """
-    length = cycle_length(sought)
-    if length == 0 or not math.isclose(cycle_length(measured), length, rel_tol=SAME):
+    length = sought.period
+    if length == 0 or not math.isclose(measured.period, length, rel_tol=SAME):
         return False  # of tables at rest no rates are kept
     both = [*laws(measured).values(), *laws(sought).values()]
     times = np.array([*(length * PHASES), *(float(t) for law in both for t in breakpoints(law))])

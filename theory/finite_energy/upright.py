@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike
 from scene.geometry import table_at
 from scene.laws import breakpoints, is_constant, value
 from scene.refusal import BadInput, check_number
-from scene.tables import Scene, cycle_length, laws
+from scene.tables import Scene, laws
 from theory.adiabatic import NotConverged
 from theory.branches import DIGITS, Floats
 from theory.curves import chaotic_zone
@@ -141,7 +141,7 @@ def upright_spread(scene: Scene) -> float:
         slower = np.exp(-(chaotic_zone(scene, times).log_energy - begun) / 2)
         return np.asarray(_growth(scene, times) * slower, dtype=np.float64)
 
-    found = _integral(growth, _edges(scene, start, cycle_length(scene)))
+    found = _integral(growth, _edges(scene, start, scene.period))
     return float(_in_own_units(np.array(found), unit_length - unit_time))
 
 

@@ -25,7 +25,7 @@ from conformance.audit.tolerances import Cdf, FloatArray, Mean, close, exact, fi
 from scene import BangBang, Horizon, Mushroom, Scene, State, load
 from scene.geometry import table_at
 from scene.laws import bounds
-from scene.tables import cycle_length, laws, width_factors
+from scene.tables import laws, width_factors
 
 SCENES = ("moving-cap", "fixed-cap-clockwise")
 ENERGY = 1e7
@@ -51,7 +51,7 @@ def filling(evidence: ClaimEvidence) -> Iterator[Check]:
         n, seed = N_PARTICLES[evidence.size], run_seed(evidence.seed, RUNS["moving-cap@1e7"], -2)
         states = starts(table, n, seed)
         for phase in PHASES:
-            t = cycle_length(table) * phase
+            t = table.period * phase
             done = evidence.steppers.flow(table, states, t, threads=evidence.threads)
             ends = [end for end in done.outcomes if isinstance(end, Horizon)]
             states = [State(t, end.x, end.y, end.vx, end.vy) for end in ends]
@@ -151,7 +151,7 @@ def _unmixed(table: Scene, t: float) -> float:
     at a rate is short of it by that rate times pi A B / (2 w v (A + B)), A and B the zone's areas on both
     sides.
     """
-    step = 1e-4 * cycle_length(table)
+    step = 1e-4 * table.period
     (now, before), place = (theory.volumes_at(fp, table, s) for s in (t, t - step)), table_at(fp, table, t)
     rate = abs(now.v_stem / now.v_cha - before.v_stem / before.v_cha) / step
     both = now.v_stem * (now.v_cha - now.v_stem) / now.v_cha / (2 * fp.pi)

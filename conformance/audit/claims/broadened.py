@@ -17,7 +17,6 @@ import theory
 from conformance.audit.claim import Check
 from conformance.audit.runs import RUNS, Sample, Simulation, scene_of
 from conformance.audit.tolerances import Cdf, FloatArray, Mean, close, mean, share, spread
-from scene.tables import cycle_length
 
 INFINITE = 1e40  # energy at which nothing is left of shifts and blurs
 N_PLACES = 2001
@@ -148,7 +147,7 @@ def zone_energy(sample: Sample) -> tuple[list[float], list[Mean], list[float]]:
 
 def phase_times(sample: Sample) -> list[float]:
     """Return the times of the sample's phases."""
-    span = cycle_length(scene_of(sample.run))
+    span = scene_of(sample.run).period
     return [span * phase for phase in sample.run.phases]
 
 

@@ -30,7 +30,7 @@ from conformance.audit.tolerances import BoolArray, FloatArray, Mean, close, mea
 from scene import Scene, State, load
 from scene.geometry import area, table_at
 from scene.laws import bounds, values
-from scene.tables import cycle_length, laws
+from scene.tables import laws
 
 if TYPE_CHECKING:
     from fast import Collisions
@@ -190,7 +190,7 @@ def cap_change(sample: Sample) -> FloatArray:
 def log_volume(sample: Sample, phase: float) -> float:
     """Return log V(t)/V(0) of the whole table."""
     scene = scene_of(sample.run)
-    now, start = (theory.volumes_at(fp, scene, cycle_length(scene) * p) for p in (phase, 0.0))
+    now, start = (theory.volumes_at(fp, scene, scene.period * p) for p in (phase, 0.0))
     return math.log((now.v_cap + now.v_stem) / (start.v_cap + start.v_stem))
 
 
@@ -275,7 +275,7 @@ def _largest_gap(sample: Sample) -> float:
     scene = scene_of(sample.run)
     arc, mouth = bounds(laws(scene)["r"]), bounds(laws(scene)["nu"])
     return float(
-        2 * 2 * arc.highest * mouth.slope + (2 * arc.slope + cycle_length(scene) * arc.slope**2 / arc.lowest)
+        2 * 2 * arc.highest * mouth.slope + (2 * arc.slope + scene.period * arc.slope**2 / arc.lowest)
     )
 
 

@@ -23,7 +23,7 @@ from conformance.audit.tolerances import close, exact, mean, stated
 from scene import State
 from scene.geometry import table_at
 from scene.laws import bounds, value
-from scene.tables import Mushroom, cycle_length, laws
+from scene.tables import Mushroom, laws
 
 FORMS: tuple[Form, Form] = ("printed", "corrected")
 ZERO = 1e-12  # float64 sums of a few hundred terms of order 10
@@ -111,7 +111,7 @@ def volume_loop(table: scenes.Scene, n: int) -> tuple[list[float], list[float]]:
 
 
 def _volumes(table: scenes.Scene, n: int) -> list[theory.Volumes]:
-    return [theory.volumes_at(fp, table, cycle_length(table) * k / n) for k in range(n)]
+    return [theory.volumes_at(fp, table, table.period * k / n) for k in range(n)]
 
 
 def signed_area(x: Sequence[float], y: Sequence[float]) -> float:

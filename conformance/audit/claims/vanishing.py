@@ -11,7 +11,6 @@ from conformance.audit.claims.broadened import adiabatic_limit
 from conformance.audit.runs import RUNS, Sample, run_seed
 from conformance.audit.tolerances import LEVEL, FloatArray, above, close, mean, stated
 from scene import Horizon, Scene, State, load
-from scene.tables import cycle_length
 from scene.transforms import backwards
 
 INTEGRABLE = ("fermi-ulam@1e3x400", "breathing-circle@1e3x400")
@@ -136,7 +135,7 @@ def _energies(
         State(one.t, one.x, one.y, v * one.vx, v * one.vy)
         for one, v in zip(profiles.microcanonical_states(scene, n, 0.5, random), speeds, strict=True)
     ]
-    done = evidence.steppers.flow(scene, states, cycle_length(scene), evidence.threads)
+    done = evidence.steppers.flow(scene, states, scene.period, evidence.threads)
     ends = [one.vx**2 + one.vy**2 if isinstance(one, Horizon) else np.nan for one in done.outcomes]
     return np.array([np.square(speeds), ends]) / 2
 

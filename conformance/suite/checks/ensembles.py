@@ -20,7 +20,6 @@ from conformance.suite.process import Trouble
 from scene import Fourier, Horizon, Mushroom, Outcome, Scene, State, load
 from scene.geometry import area
 from scene.protocol.wire import Captured, Flowing
-from scene.tables import cycle_length
 
 BATCH = 100  # particles per flow request: a slow implementation stays within its time limit
 KT = 1.0  # energy; that of the walls' own speed is up to 0.1
@@ -107,7 +106,7 @@ def _captured_share(flow: Flowing, scene: Mushroom, size: Size, seed: int) -> li
 
 
 def _mean_growth(flow: Flowing, scene: Mushroom, size: Size, seed: int) -> list[Statistic]:
-    areas = [area(scene, cycle_length(scene) * k / 64) for k in range(64)]
+    areas = [area(scene, scene.period * k / 64) for k in range(64)]
     largest = math.log(max(areas) / min(areas))  # free particles keep E times the area at most
     m1 = float(_predicted().m1)
     if abs(m1) < size.bias + profiles.margin(size.n_particles, 0.0, 2 * (largest + size.bias), ALARM):

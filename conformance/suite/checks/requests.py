@@ -19,7 +19,6 @@ from conformance.suite.checks.paths import distance, drawn, is_same_stay
 from conformance.suite.checks.refusals import RESTING
 from conformance.suite.process import Trouble
 from scene import Mushroom, Scene, State, Stem, Undecided
-from scene.tables import cycle_length
 
 MAX_LINE = 2**20  # bytes of a request
 ROUNDING, CARRIED = 2.0**-44, 2.0**-40  # of sizes: of a step, and of more
@@ -59,7 +58,7 @@ MALFORMED: tuple[tuple[bytes, int | None], ...] = (
 
 def _one(draw: Draw, profile: str) -> tuple[Scene, State, dict[str, Any]]:
     scene, state = drawn(draw, t=float(draw.pick(range(4))))  # a whole number is written without a point, too
-    span = cycle_length(scene) or 1.0
+    span = scene.period or 1.0
     t_end = state.t + span * draw.between(0.05, 0.5) if profile == "flow" else FOREVER
     return scene, state, question(profile, scene, state, t_end, N_HITS)
 

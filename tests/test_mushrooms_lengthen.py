@@ -16,7 +16,7 @@ from support.refusals import assert_refused
 from zarr.storage import LocalStore
 
 import fast
-from fast.kernel import kept
+from fast.kernel import kept, pools
 from mushrooms import compared
 from mushrooms.store import conduct, engines
 from mushrooms.store import run as stored
@@ -193,7 +193,9 @@ def test_what_is_kept_takes_the_room_that_the_page_says():
     assert shape.bytes_of_a_particle == 114 + 8 * kept.LANE_ROWS == 410
 
 
-def forgotten(column):
+def forgotten(row):
+    column = kept.FIRST_ROW + int(row // pools.STRIDE)
+
     def faulty(arrays, *more):
         lanes = arrays[LANES].copy()
         lanes[:, column] = 0.0
@@ -206,7 +208,7 @@ def of_others(arrays, *more):
     return paused_of({**arrays, LANES: arrays[LANES][::-1]}, *more)
 
 
-@pytest.mark.parametrize("faulty", [forgotten(kept.FIRST_ROW + 4), forgotten(kept.FIRST_ROW + 5), of_others])
+@pytest.mark.parametrize("faulty", [forgotten(pools.VX), forgotten(pools.SINE), of_others])
 def test_a_run_that_would_go_on_otherwise_does_not(command_line, tmp_path, monkeypatch, faulty):
     """The first particles are followed both ways before a block is touched."""
     summary_of(command_line(*arguments(tmp_path, 1)))

@@ -35,7 +35,6 @@ from fast.kernel.records import (
     LawsInLanes,
     Stops,
     unfilled_ends,
-    unfilled_paths,
 )
 from fast.kernel.worker import new_worker
 from fast.pieces import laws_in_lanes
@@ -48,7 +47,6 @@ from scene.notebook import rows
 from scene.refusal import BadInput, check_count
 
 FOLLOWED, UNDECIDED, UNDEFINED, REJECTED = 0, 1, 2, 3
-NO_PATHS = unfilled_paths(0, 0)
 SHARE = 256  # particles a worker takes at a time, for each cycle: several times what it holds at once
 
 
@@ -385,7 +383,7 @@ def follow(
     def work(first: int) -> None:
         part = slice(first, first + size)
         worker = new_worker(in_lanes, stops, followed.part(part), n_passed)
-        entries.follow_particles(worker, walls[part], NO_PATHS)
+        entries.follow_particles(worker, walls[part])
 
     work(n)  # none at all: compiles, or loads from the disk cache, so that `seconds` holds work alone
     if progress:

@@ -8,6 +8,7 @@ import numpy as np
 
 from fast.given import MAX_STEPS, given_end
 from fast.kernel import codes, entries, single
+from fast.kernel.loops import Loops, careful_at
 from fast.kernel.records import FloatArray, unfilled_ends, unfilled_paths
 from fast.kernel.worker import new_worker
 from fast.pieces import laws_in_lanes
@@ -65,16 +66,17 @@ def trajectory(scene: Scene, state: State, n_collisions: int, t_end: float = np.
     if n_collisions:
         in_lanes = laws_in_lanes(fit(scene).scene)
         stop = only_stop(start.units.horizon(t_end))
-        worker = new_worker(in_lanes, stop, unfilled_ends(rows, 1, (1, 1)))
+        worker = new_worker(in_lanes, stop, unfilled_ends(rows, 1, (1, 1)), loops=Loops(careful_at(), 0, 0))
+        kernel = entries.PATHS[in_lanes.slope is None, in_lanes.degree]
         with np.errstate(over="ignore", under="ignore"):  # without the compiler
-            follow_path(entries.follow_particles, (worker, walls, paths), n_collisions, stop.called_off)
+            follow_path(kernel, (worker, walls, paths), n_collisions, stop.called_off)
     n, code = paths.counts.item(), paths.codes.item()
     n_exact = paths.n_exact.item() if factors is not None else start.units.n_exact(paths.steps[0, :n])
     if n_exact < n:
         n, code = n_exact, single.ANSWER_LOST
     steps = paths.steps[0, :n] if n == n_collisions else paths.steps[0, :n].copy()  # not all room is held
     steps = steps if factors is not None else start.units.steps(steps)
-    walls = NAMES[paths.walls[0, :n]].tolist()
+    walls = NAMES.take(paths.walls[0, :n]).tolist()
     outcome: Outcome | None = None
     if n < n_collisions:
         # Without a horizon only what rests is never met, and it rests where it was: there is no v * infinity.

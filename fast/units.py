@@ -28,8 +28,6 @@ from scene import BangBang, Fourier, InvalidState, Law, Scene, State
 from scene.refusal import BadInput
 from scene.tables import laws, period
 
-LEAST_NORMAL = float(np.finfo(np.float64).smallest_normal)
-SLAB = 2**11  # rows brought back at a time: what lies in between stays in the cache
 FARTHEST = 1000  # powers of two up to this, and their inverses, are floats
 ANSWER_LOST = "the answer holds a number beyond binary64: every one must be 0 or 2^-1022 to 2^1023"
 
@@ -89,18 +87,13 @@ class Units(NamedTuple):
 
     def keeps(self, rows: FloatArray) -> BoolArray:
         """Tell which of N rows of ([dt,] t, x, y, vx, vy) lose no bit in the scene's units."""
-        exponents = self._of_step()[-rows.shape[-1] :]
-        with np.errstate(over="ignore", under="ignore"):
-            back = np.ldexp(np.ldexp(rows, exponents), -exponents)
-        found: BoolArray = (back == rows).all(axis=1)
-        return found
+        _, is_kept = scaled(rows, self._of_step()[-rows.shape[-1] :])
+        return np.asarray(is_kept.all(axis=1))
 
     def keeps_times(self, rows: FloatArray) -> BoolArray:
         """Tell which of N rows of times lose no bit in the scene's units; nan stands for none."""
-        with np.errstate(over="ignore", under="ignore"):
-            back = np.ldexp(np.ldexp(rows, self.time), -self.time)
-        found: BoolArray = ((back == rows) | np.isnan(rows)).all(axis=1)
-        return found
+        _, is_kept = scaled(rows, np.array(self.time))
+        return np.asarray(is_kept.all(axis=1))
 
     def n_exact(self, rows: FloatArray) -> int:
         """Return how many of N rows of [dt, t, x, y, vx, vy] come before the first that loses a bit."""
@@ -148,16 +141,8 @@ class Fitted(NamedTuple):
 
     def units(self, state: State) -> Units:
         """Return the units for one state: all that depends on it is a static table's unit of time."""
-        return self.units_at(max(abs(state.vx), abs(state.vy)))
-
-    def units_at(self, speed: float) -> Units:
-        """Return the units for a state whose faster component of velocity has this size."""
-        return Units(self.length, self.time_at(speed) if self.time is None else self.time)
-
-    def time_at(self, speed: float) -> int:
-        """Return the exponent of a static table's unit of time for such a state."""
-        found: int = static_time(self.length, speed)
-        return found
+        speed = max(abs(state.vx), abs(state.vy))
+        return Units(self.length, static_time(self.length, speed) if self.time is None else self.time)
 
 
 @lru_cache(maxsize=256)
@@ -218,40 +203,23 @@ def inward(field: str, number: float, exponent: int) -> float:
     raise refusal(f"{field} = {number!r}, must be {bound} beside the table's size and period")
 
 
+def scaled(numbers: FloatArray, exponents: IntArray) -> tuple[FloatArray, BoolArray]:
+    """Return kernel numbers times 2^exponents, and which of them lost no bit; infinity and nan lose none."""
+    with np.errstate(over="ignore", under="ignore"):
+        found = np.ldexp(numbers, exponents)
+        return found, (np.ldexp(found, -exponents) == numbers) | ~np.isfinite(numbers)
+
+
 def outward(numbers: FloatArray, exponents: IntArray) -> FloatArray:
     """Return kernel numbers times 2^exponents, exactly; infinities and nans as they are.
 
     Raises:
         BadInput: one of them would lose bits, or overflow.
     """
-    slab = numbers[:SLAB] if numbers.ndim > exponents.ndim else numbers
-    # One for each number of a slab: numpy multiplies long rows, not many short ones.
-    exponents = np.ascontiguousarray(np.broadcast_to(exponents, slab.shape))
-    is_small = exponents.size > 0 and int(np.abs(exponents).max()) <= FARTHEST
-    factors = np.ldexp(1.0, exponents) if is_small else None
-    if slab.shape == numbers.shape:
-        return _outward(numbers, exponents, factors)
-    out = np.empty_like(numbers)
-    for first in range(0, len(numbers), SLAB):
-        part = numbers[first : first + SLAB]
-        n = len(part)
-        out[first : first + n] = _outward(part, exponents[:n], factors if factors is None else factors[:n])
-    return out
-
-
-def _outward(numbers: FloatArray, exponents: IntArray, factors: FloatArray | None) -> FloatArray:
-    with np.errstate(over="ignore", under="ignore"):
-        # A product is exact too, and many times quicker.
-        scaled = np.ldexp(numbers, exponents) if factors is None else numbers * factors
-        # What is finite and above the least normal number has kept its bits: only what lies below that number
-        # is rounded, at most up to it. The rest is looked at.
-        size = np.abs(scaled)
-        is_kept = ((size > LEAST_NORMAL) | (numbers == 0.0)) & (size < np.inf)
-        if not is_kept.all():
-            is_kept |= (np.ldexp(scaled, -exponents) == numbers) | ~np.isfinite(numbers)
+    found, is_kept = scaled(numbers, exponents)
     if not is_kept.all():
         raise BadInput(ANSWER_LOST)
-    return scaled
+    return found
 
 
 def _in_units(law: Law, field: str, length: int, time: int) -> Law:

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 from numba import njit, types
+from support.depth import deep_but
 
 import fast
 from fast.compiled import compile_scene
@@ -27,7 +28,7 @@ from fast.kernel.worker import CACHE_LINE, new_pools
 from fast.pieces import PARABOLA, SERIES
 from fast.starts import initial_states
 from fast.step import WALL_CODES, followed_paths
-from scene import BangBang, Fourier, State, load
+from scene import BangBang, Cap, Fourier, State, load
 
 N_STEPS = int(os.environ.get("MUSHROOMS_LANE_STEPS", "20000"))
 PATH = 2000  # collisions
@@ -102,6 +103,9 @@ SCENES |= {
 }
 
 
+IN_A_STEM = [name for name, scene in SCENES.items() if not isinstance(scene, Cap)]  # a cap is unfolded
+
+
 def paths_along(scene):
     """Yield rows of states at collisions of paths by lanes, codes of their walls, and dt and state one on."""
     for t, _, *place in initial_states(scene, 1000, 1e5, 3).tolist():
@@ -110,6 +114,20 @@ def paths_along(scene):
         rows = np.zeros((len(codes) - 1, 6))
         rows[:, 0], rows[:, 2:] = path.steps[:-1, 1], path.steps[:-1, 2:]
         yield rows, codes, path.steps[1:, [0, 2, 3, 4, 5]]
+
+
+@pytest.mark.parametrize("name", deep_but(IN_A_STEM, "two harmonics", "a moving slope"))
+def test_one_particle_takes_the_steps_of_the_lanes(name, tally):
+    """A trajectory branches by wall, a flow does not: the same bits until a particle is captured."""
+    scene, t_end, starts = SCENES[name], 1.25, []
+    for energy in (30.0, 1e4):
+        starts += [State(t, *place) for t, _, *place in initial_states(scene, 40, energy, 5).tolist()]
+    run = fast.flow(scene, starts, t_end)
+    for i in np.flatnonzero(np.isnan(run.t_in)):
+        path = fast.trajectory(scene, starts[i], 10_000, t_end)
+        assert path.outcome == run.outcomes[i]
+        tally["collisions"] += len(path.walls)
+    assert tally["collisions"] > 20 * run.n_careful.sum()
 
 
 def errors_of(scene, rows, codes, answers):

@@ -46,9 +46,7 @@ def begun(request):
 def test_an_interrupt_is_heeded_in_the_middle_of_a_path(begun, monkeypatch, call):
     followed = SimpleQueue()
 
-    def watched(name, how_many):
-        kernel = getattr(entries, name)
-
+    def watched(kernel, how_many):
         def watching(*given):
             if how_many(given):
                 begun.set()
@@ -57,10 +55,13 @@ def test_an_interrupt_is_heeded_in_the_middle_of_a_path(begun, monkeypatch, call
                 followed.put((found, given))
             return found
 
-        monkeypatch.setattr(entries, name, watching)
+        return watching
 
-    watched("follow_particles", lambda given: len(given[1]))
-    watched("fine", lambda given: len(given[2]))
+    for name, place in (("follow_particles", 1), ("fine", 2)):
+        watching = watched(getattr(entries, name), lambda given, place=place: len(given[place]))
+        monkeypatch.setattr(entries, name, watching)
+    for key, kernel in entries.PATHS.items():
+        monkeypatch.setitem(entries.PATHS, key, watched(kernel, lambda given: len(given[1])))
     quick = State(0.0, 0.1, 0.2, 3e7, 4e7)  # a second or more, where nobody interrupts
     with pytest.raises(KeyboardInterrupt):
         {

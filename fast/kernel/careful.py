@@ -349,7 +349,7 @@ def step_before(wall, s, limit, particle, scene, anchors):
     return AT_END, s, particle
 
 
-@kernel
+@part
 def step(particle, limit, scene, anchors):
     """Find the next collision of a particle within a time, and what it is then.
 

@@ -17,7 +17,8 @@ from fast.kernel.codes import HORIZON, OFF_WALL
 from fast.kernel.compiling import HOW, kept
 from fast.kernel.follow import follow
 from fast.kernel.judged import GIVEN, KNOWN, MET
-from fast.kernel.loops import run_careful
+from fast.kernel.lane_laws import ONE_WAVE, TWO_WAVES
+from fast.kernel.loops import FORMS, run_careful
 from fast.kernel.path import follow_one
 from fast.kernel.pieces import fill_coefficients
 from fast.kernel.records import ANCHORS_SHAPE, particle_at, write_state, write_step
@@ -53,16 +54,25 @@ def fine(scene, anchors, start, wall, limit, out, met, called_off):
 
 
 @kept(nogil=True, **HOW)
-def follow_particles(worker, walls, paths):
-    """Follow particles to the last stop, or where `paths` has room from collision to collision.
+def follow_particles(worker, walls):
+    """Follow particles to the last stop: see fast.kernel.follow. Threads may call it side by side."""
+    follow(worker, walls)
 
-    See fast.kernel.follow and fast.kernel.path; one entry for both.
-    Threads may call it side by side.
-    """
-    if paths.walls.shape[1] > 0:
-        follow_one(worker, walls, paths)
-    else:
-        follow(worker, walls)
+
+def _path(is_slope_moving, form):
+    terms, is_waves = (0,) * form, form in (ONE_WAVE, TWO_WAVES)
+
+    @kept(is_slope_moving, form, nogil=True, **HOW)
+    def follow_path(worker, walls, paths):
+        """Follow particles one by one from collision to collision: see fast.kernel.path."""
+        waves, slope = worker.waves if is_waves else None, None if is_slope_moving else worker.slope
+        follow_one(worker, walls, paths, waves, slope, terms)
+
+    return follow_path
+
+
+# By whether the slope moves, and by the form of the laws.
+PATHS = {(moves, form): _path(moves, form) for moves in (False, True) for form in FORMS}
 
 
 @kept(error_model="numpy")

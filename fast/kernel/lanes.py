@@ -316,7 +316,6 @@ def error_left(curvature, s, delta, waves):
 def fly(a, n, table, waves, slope, degree, limits):
     """Find the next collision of each lane, and take the step where it is shown right."""
     widest_registers()
-    widest_registers()
     is_stem, is_mushroom, _, is_relative = table
     for i in range(n):
         aim(a, i, is_stem, is_relative, waves, slope, degree, limits)
@@ -332,7 +331,6 @@ def chord(a, n, table, waves, slope, degree, limits):
 
     The chord keeps the distance |L| / v from the centre; while that exceeds w the mouth is out of reach.
     """
-    widest_registers()
     widest_registers()
     bend, k_w, size = limits.bend, limits.curvature, limits.size
     _, _, is_cap, is_relative = table

@@ -26,12 +26,12 @@ from fast.kernel.careful import NEAR
 from fast.kernel.codes import HORIZON
 from fast.kernel.compiling import packed, part
 from fast.kernel.follow import careful_flight, knows_laws, land_carefully
-from fast.kernel.lane_laws import laws_now, look_ahead, set_reference
+from fast.kernel.lane_laws import laws_in, look_ahead, set_reference
 from fast.kernel.lanes import land
 
 from fast.kernel.pools import (  # isort: skip
     COARSE, END, FAR, FATE, HIT, MARKED, MAX_CORRECTIONS, MOVED, ON_ARC, ON_BASE, ON_FLOOR, ON_LEFT,
-    ON_RIGHT, S, STOP, SURE, T, TRIES, T_LOW, VX, VY, WALL, X, Y, load,
+    ON_RIGHT, R0, S, STOP, SURE, T, TRIES, T_LOW, VX, VY, WALL, X, Y, load,
 )  # fmt: skip
 from fast.kernel.records import Particle, particle_at, write_state, write_step
 from fast.kernel.worker import GENERAL
@@ -51,7 +51,7 @@ def side_ahead(outset, now, slope):
 def aim_alone(a, is_stem, is_relative, waves, slope, degree, limits):
     """Choose the wall and guess the time, as `aim` does; returns the wall."""
     per_r = 2.0 / limits.least_r
-    outset, now = outset_of(a, FIRST), laws_now(a, FIRST, waves, is_relative, slope, degree)
+    outset, now = outset_of(a, FIRST), laws_in(a, R0 + FIRST, waves, is_relative, slope, degree)
     _, y, _, vy, wall, _, v2 = outset
     depth, rise = abs(y), abs(vy)
     k_side = side_curvature(vy, slope, limits)

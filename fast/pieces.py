@@ -32,7 +32,7 @@ from fast.kernel.pieces import PARABOLA, SERIES
 from fast.kernel.records import (  # isort: skip
     AMPLITUDES, BANG_BANG, CONSTANT, DEPTH, FOURIER, KIND, KNOTS, LEVEL, LOWEST, N_HARMONICS,
     N_KNOTS, OMEGA, OMEGA_LOW, PERIOD, PERIOD_LOW, RADIUS, SHARED, SLOPE, WIDTH, Compiled, FloatArray,
-    LawsInLanes, Pieces, Waves,
+    LawsInLanes, Pieces, LaneWaves,
 )  # fmt: skip
 from scene import Scene
 
@@ -58,7 +58,7 @@ def laws_in_lanes(scene: Scene) -> LawsInLanes:
     return in_lanes(compiled, None if waves else pieces_of(compiled, form_of(compiled)), waves)
 
 
-def in_lanes(compiled: Compiled, pieces: Pieces | None, waves: Waves | None = None) -> LawsInLanes:
+def in_lanes(compiled: Compiled, pieces: Pieces | None, waves: LaneWaves | None = None) -> LawsInLanes:
     """Return a scene as the lanes know it by its waves or its pieces; with none, steps are careful ones."""
     if pieces is None:
         # Of waves the lanes know when they repeat, and up to when their phase is known.
@@ -69,7 +69,7 @@ def in_lanes(compiled: Compiled, pieces: Pieces | None, waves: Waves | None = No
     return LawsInLanes(compiled, pieces, form_of(compiled), slope, waves or NO_WAVES)
 
 
-def waves_of(compiled: Compiled) -> Waves | None:
+def waves_of(compiled: Compiled) -> LaneWaves | None:
     """Return a scene's laws as waves, or None where lanes take pieces instead.
 
     That is for knots, for more than two harmonics, which pieces serve sooner, and for a size that comes down
@@ -85,7 +85,7 @@ def waves_of(compiled: Compiled) -> Waves | None:
         row[0], n = law[LEVEL], int(law[N_HARMONICS]) if law[KIND] == FOURIER else 0
         for k in range(1, n + 1):
             row[2 * k - 1], row[2 * k] = law[AMPLITUDES + k], law[AMPLITUDES + n + k]
-    return Waves(*omegas, *(tuple(row.tolist()) for row in rows))
+    return LaneWaves(*omegas, *(tuple(row.tolist()) for row in rows))
 
 
 def _period_and_until(compiled: Compiled) -> tuple[float, float]:

@@ -36,12 +36,12 @@ from fast.kernel.pools import (  # isort: skip
     AHEAD, BACK, BEFORE, COSINE, DEPTH_LAW, END, LAWS, LIMIT, MEAN_RATE, NEVER, N_COEFFICIENTS, PIECE, R0,
     RADIUS_LAW, REF, REF_LOW, SINE, SLOPE_LAW, STRIDE, T, T_LOW, WIDTH_LAW,
 )  # fmt: skip
-from fast.kernel.records import CONSTANT, KIND, RADIUS, Waves
+from fast.kernel.records import CONSTANT, KIND, RADIUS, LaneWaves
 
 ONE_WAVE, TWO_WAVES = 1, 3  # odd, pieces' degrees are even
 PIO2_REST = PIO2_2 + PIO2_3
 LONGEST_TURN = 0.75  # of the highest harmonic in a hop: `beyond_first_order` serves to pi / 4
-NO_WAVES = Waves(0.0, 0.0, *[(0.0,) * 5] * 4)
+NO_WAVES = LaneWaves(0.0, 0.0, *[(0.0,) * 5] * 4)
 
 
 class LawsAt(NamedTuple):

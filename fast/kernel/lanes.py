@@ -71,7 +71,7 @@ class Correction(NamedTuple):
     error: float
 
 
-class Flight(NamedTuple):
+class Judged(NamedTuple):
     """A time of flight and its correction, how far the laws used hold beyond it, and what is known of it."""
 
     s: float
@@ -211,8 +211,9 @@ def laws_at_hit(there, delta):
 
 
 @packed
-def land(a, i, is_stem, is_mushroom, is_relative, waves, slope, degree, limits):
+def land(a, i, table, waves, slope, degree, limits):
     """Correct a lane's time of flight once, and tell whether the step is then right; if so, take it."""
+    is_stem, is_mushroom, _, is_relative = table
     bend = limits.bend
     outset, hit, s = outset_of(a, i), a[HIT + i], a[S + i]
     x, y, vx, vy, wall, q, v2 = outset
@@ -253,7 +254,15 @@ def land(a, i, is_stem, is_mushroom, is_relative, waves, slope, degree, limits):
     quality = min(quality, known if wall == ON_ARC else 1.0)
     within, ahead = room_ahead(a, i, s, delta, waves)
     result = verdict(quality, min(within, ahead), s, error, a[TRIES + i])
-    flight = Flight(s, delta, within, result)
+    flight = Judged(s, delta, within, result)
+    is_moved, at_hit = settle(a, i, flight, outset, end, there, is_mushroom, slope)
+    move_laws(a, i, delta, is_moved, at_hit, waves, slope)
+
+
+@packed
+def settle(a, i, flight, outset, end, there, is_mushroom, slope):
+    """Bounce off the wall that was met; returns whether the particle moves on, and the laws at the hit."""
+    hit, wall, vx, vy = a[HIT + i], outset.wall, outset.vx, outset.vy
     t, t_low, at, at_hit, is_moved = arrive(a, i, flight, outset, end, there)
     at = Place(at.x, at.x_low, 0.0 if hit == ON_BASE else at.y, at.y_low)
     vx_s, vy_s = off_the_wall(hit, at, vx, vy, at_hit, slope)
@@ -270,7 +279,7 @@ def land(a, i, is_stem, is_mushroom, is_relative, waves, slope, degree, limits):
     a[WALL + i] = hit if is_moved else wall
     a[WHEN + i] = kept if is_moved else t
     move(a, i, flight, is_moved, is_quiet, (t, t_low, at.x, at.y, vx_s, vy_s))
-    move_laws(a, i, delta, is_moved, at_hit, waves, slope)
+    return is_moved, at_hit
 
 
 @part
@@ -316,13 +325,13 @@ def error_left(curvature, s, delta, waves):
 def fly(a, n, table, waves, slope, degree, limits):
     """Find the next collision of each lane, and take the step where it is shown right."""
     widest_registers()
-    is_stem, is_mushroom, _, is_relative = table
+    is_stem, _, _, is_relative = table
     for i in range(n):
         aim(a, i, is_stem, is_relative, waves, slope, degree, limits)
     for i in range(n):
         look_ahead(a, i, a[S + i], waves, is_relative, slope, degree)
     for i in range(n):
-        land(a, i, is_stem, is_mushroom, is_relative, waves, slope, degree, limits)
+        land(a, i, table, waves, slope, degree, limits)
 
 
 @packed
@@ -369,7 +378,7 @@ def chord(a, n, table, waves, slope, degree, limits):
         quality = min(quality, told_rate(a[T + i], r, r1, r2, sizes, limits))
         within, ahead = room_ahead(a, i, s, delta, waves)
         result = verdict(quality, min(within, ahead), s, error, a[TRIES + i])
-        flight = Flight(s, delta, within, result)
+        flight = Judged(s, delta, within, result)
         t, t_low, at, at_hit, is_moved = arrive(a, i, flight, outset, end, there)
         # The angular momentum of the whole stay is constant to the bit.
         vx_s, vy_s = off_the_arc_spinning(at, vx, vy, at_hit.r, at_hit.r1, spin)

@@ -23,7 +23,7 @@ from fast.kernel.lane_laws import NO_WAVES, ONE_WAVE, TWO_WAVES
 from fast.kernel.lanes import chord, fly
 from fast.kernel.limits import LawLimits
 from fast.kernel.pieces import DEGREES
-from fast.kernel.records import Compiled, LawsInLanes, Particle, TableOfLanes, Waves
+from fast.kernel.records import Compiled, LaneWaves, LawsInLanes, Particle, TableOfLanes
 from scene.states import ON_WALL
 
 _WHOLE, _REAL, _TRUTH = types.int64, types.float64, types.boolean
@@ -33,7 +33,9 @@ LIMITS = types.NamedUniTuple(_REAL, len(LawLimits._fields), LawLimits)
 SCENE = types.NamedTuple((_WHOLE, _TRUTH, _TABLE, _TABLE), Compiled)
 PARTICLE = types.NamedTuple((_REAL,) * 6 + (_WHOLE,), Particle)
 TABLE = types.NamedUniTuple(_TRUTH, len(TableOfLanes._fields), TableOfLanes)
-WAVES = types.NamedTuple((_REAL, _REAL, *(types.UniTuple(_REAL, len(law)) for law in NO_WAVES[2:])), Waves)
+WAVES = types.NamedTuple(
+    (_REAL, _REAL, *(types.UniTuple(_REAL, len(law)) for law in NO_WAVES[2:])), LaneWaves
+)
 
 # Of both loops: the pool, how many lanes, and what the scene is.
 STEP = returns(types.none, POOL, _WHOLE, TABLE, WAVES, _REAL, LIMITS)

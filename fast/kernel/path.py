@@ -33,7 +33,7 @@ from fast.kernel.pools import (  # isort: skip
     COARSE, END, FAR, FATE, HIT, MARKED, MAX_CORRECTIONS, MOVED, ON_ARC, ON_BASE, ON_FLOOR, ON_LEFT,
     ON_RIGHT, R0, S, STOP, SURE, T, TRIES, T_LOW, VX, VY, WALL, X, Y, load,
 )  # fmt: skip
-from fast.kernel.records import Particle, particle_at, write_state, write_step
+from fast.kernel.records import Particle, TableOfLanes, particle_at, write_state, write_step
 from fast.kernel.worker import GENERAL
 
 FIRST = np.int64(0)  # the lane in use
@@ -90,7 +90,7 @@ def aim_alone(a, is_stem, is_relative, waves, slope, degree, limits):
 def land_on(a, hit, is_stem, is_relative, waves, slope, degree, limits):
     """Take the step to a wall, if that is shown right; stays are of no interest."""
     a[HIT] = hit
-    land(a, FIRST, is_stem, False, is_relative, waves, slope, degree, limits)
+    land(a, FIRST, TableOfLanes(is_stem, False, False, is_relative), waves, slope, degree, limits)
 
 
 @packed

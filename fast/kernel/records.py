@@ -109,7 +109,7 @@ class TableOfLanes(NamedTuple):
     is_relative: bool
 
 
-class Waves(NamedTuple):
+class LaneWaves(NamedTuple):
     """A scene's laws as waves over one fundamental phase (omega + omega_low) t.
 
     Attributes:
@@ -141,7 +141,7 @@ class LawsInLanes(NamedTuple):
     pieces: Pieces
     degree: int
     slope: float | None
-    waves: Waves
+    waves: LaneWaves
 
 
 class Particle(NamedTuple):

@@ -13,7 +13,7 @@ from fast.kernel.pools import LANES, POOL_SIZE
 
 from fast.kernel.records import (  # isort: skip
     ANCHORS_SHAPE, Compiled, FloatArray, Followed, IntArray, LawsInLanes, Pieces, Stops,
-    TableOfLanes, Waves,
+    TableOfLanes, LaneWaves,
 )  # fmt: skip
 
 CACHE_LINE = 64  # bytes
@@ -45,7 +45,7 @@ class Worker(NamedTuple):
     limits: LawLimits
     table: TableOfLanes
     pieces: Pieces
-    waves: Waves
+    waves: LaneWaves
     degree: int
     slope: float
     is_slope_moving: bool

@@ -14,7 +14,7 @@ from support.refusals import assert_refused, one_line
 import fast
 import theory
 from mushrooms.figures import energies, style
-from mushrooms.figures.heating import Loop, fastest, moving_cap, phase_diagram, supremum
+from mushrooms.figures.heating import Loop, fastest, moving_cap, phase_diagram, supremum, switched
 from mushrooms.reports.page import as_json, typeset
 from scene import BangBang, Mushroom, load
 
@@ -128,39 +128,73 @@ PAGE = Path(__file__).parent.parent / "docs" / "heating.md"
 
 def as_scene(loop: Loop) -> Mushroom:
     """Return an upright mushroom that runs a loop in four legs."""
-    h1, h0, w0, w1 = loop
-    w = BangBang(((0.0, w1), (0.25, w0), (0.5, w0), (0.75, w1), (1.0, w1)))
-    h = BangBang(((0.0, h1), (0.25, h1), (0.5, h0), (0.75, h0), (1.0, h1)))
-    return Mushroom(r=1.0, h=h, w=w)
+    w = BangBang(tuple(zip(QUARTERS, (loop.w1, loop.w0, loop.w0, loop.w1, loop.w1), strict=True)))
+    depths = (loop.closing, loop.closing, loop.opening, loop.opening, loop.closing)
+    return Mushroom(r=1.0, h=BangBang(tuple(zip(QUARTERS, depths, strict=True))), w=w)
 
 
-@pytest.mark.parametrize("loop", [Loop(6.0, 2.0, 0.3), Loop(6.0, 0.1, 0.02), Loop(1.0, 3.0, 0.5, 0.9)])
+QUARTERS = (0.0, 0.25, 0.5, 0.75, 1.0)
+DIRECTIONS = [(Loop(6.0, 2.0, 0.3), Loop(2.0, 6.0, 0.3)), (Loop(6.0, 0.1, 0.02), Loop(0.1, 6.0, 0.02))]
+
+
+@pytest.mark.parametrize("loop", [*itertools.chain(*DIRECTIONS), Loop(1.0, 3.0, 0.5, 0.9)])
 def test_a_loop_in_floats_is_the_theory_of_its_scene(loop):
     assert loop.m1 == pytest.approx(float(theory.predict(as_scene(loop), 8).m1), rel=2e-5)
 
 
-def test_a_loop_gains_more_the_deeper_it_closes_the_shallower_it_opens_the_narrower_it_gets():
-    for h1, h0, w0 in itertools.product((1.0, 5.0, 30.0), (0.01, 0.3), (0.01, 0.4)):
-        here = Loop(h1, h0, w0).m1
-        assert Loop(1.3 * h1, h0, w0).m1 > here
-        assert Loop(h1, 0.7 * h0, w0).m1 > here
-        assert Loop(h1, h0, 0.7 * w0).m1 > here
-        assert here < supremum(w0, h1) < supremum(w0)
+def test_a_switched_loop_in_floats_is_the_theory_of_its_scene():
+    eighths = [k / 8 for k in range(9)]
+    w = (1.0, 0.1, 0.1, 0.02, 0.02, 0.1, 0.1, 1.0, 1.0)
+    h = (6.0, 6.0, 0.1, 0.1, 6.0, 6.0, 0.1, 0.1, 6.0)
+    depth, mouth = (BangBang(tuple(zip(eighths, values, strict=True))) for values in (h, w))
+    found = float(theory.predict(Mushroom(r=1.0, h=depth, w=mouth), 8).m1)
+    assert switched(0.1, 6.0, 0.02, 0.1) == pytest.approx(found, rel=2e-5)
 
 
-def test_the_supremum_is_approached_and_has_no_bound_without_one_on_the_mouth():
-    assert Loop(1e7, 0.0, 0.1).m1 == pytest.approx(supremum(0.1), rel=1e-4)
-    for w0 in (1e-3, 1e-6, 1e-12):
-        assert supremum(w0) == pytest.approx(math.log(math.pi / 4 / w0), rel=1e-3)
+def largest_gain(shallowest: float, deepest: float, narrowest: float, n: int = 6000) -> float:
+    """Return the largest m1 of all loops: dV = max(b - a - a log(b / a) - a V) |d delta|, narrow to wide."""
+    edges = np.geomspace(narrowest, 1.0, n + 1)
+    deltas = theory.delta(np, edges)
+    middles = np.sqrt(edges[1:] * edges[:-1])
+    zones = 1 - theory.delta(np, middles) + 4 / np.pi * middles * np.linspace(shallowest, deepest, 5)[:, None]
+    a, b = 1 / zones[:, None], 1 / zones[None, :]
+    gain = b - a - a * np.log(b / a)
+    found = 0.0
+    for k in range(n):
+        found += float(np.max(gain[..., k] - a[..., k] * found)) * (deltas[k] - deltas[k + 1])
+    return found
 
 
-def test_the_fastest_loop_is_not_beaten_by_its_neighbours():
-    best, rate = fastest(0.02, 0.1)
+@pytest.mark.parametrize("bounds", [(2.0, 6.0, 0.3), (0.1, 6.0, 0.02), (0.0, 20.0, 0.3), (0.1, 20.0, 0.02)])
+def test_no_loop_within_bounds_gains_more_than_the_supremum(bounds):
+    shallowest, deepest, narrowest = bounds
+    found, switch = supremum(*bounds)
+    assert found == pytest.approx(largest_gain(*bounds), rel=2e-4)
+    assert narrowest < switch <= 1
+    ends = Loop(deepest, shallowest, narrowest).m1, Loop(shallowest, deepest, narrowest).m1
+    assert found >= max(ends) * (1 - 1e-9)
+    assert (ends[1] > ends[0]) == (narrowest == 0.3)  # clockwise wins only if the mouth stays wide
+
+
+def test_clockwise_has_no_bound_in_depth_anticlockwise_none_only_if_the_mouth_closes_too():
+    limit = -math.log(1 - float(theory.delta(np, 0.1)))
+    assert Loop(1e7, 0.0, 0.1).m1 == pytest.approx(limit, rel=1e-4)
+    first, second = Loop(0.0, 1e7, 0.1), Loop(0.0, 1e9, 0.1)
+    assert second.m1 - first.m1 == pytest.approx((1 - first.free_share) * math.log(100), rel=1e-5)
+    shut = [supremum(2.0, 6.0, w)[0] for w in (1e-4, 1e-9, 1e-15, 1e-30)]
+    assert shut == sorted(shut)
+    assert shut[3] == pytest.approx(shut[2], rel=1e-2)
+
+
+@pytest.mark.parametrize("clockwise", [False, True])
+def test_the_fastest_loop_is_not_beaten_by_its_neighbours(clockwise):
+    best, rate = fastest(0.02, 0.1, clockwise=clockwise)
     assert rate == pytest.approx(best.m1 / best.path)
+    assert (best.closing < best.opening) == clockwise
     for h1, w0 in itertools.product((0.9, 1.0, 1.1), (1.0, 1.2)):
-        assert Loop(best.h1 * h1, 0.1, 0.02 * w0).m1 / Loop(best.h1 * h1, 0.1, 0.02 * w0).path <= rate * (
-            1 + 1e-6
-        )
+        depths = [h if h == 0.1 else h * h1 for h in best[:2]]
+        near = Loop(*depths, 0.02 * w0)
+        assert near.m1 / near.path <= rate * (1 + 1e-6)
 
 
 def test_the_moving_cap_is_trivial_in_phase_and_gains_with_the_square_of_the_amplitude():
@@ -174,14 +208,17 @@ def test_the_moving_cap_is_trivial_in_phase_and_gains_with_the_square_of_the_amp
 def test_the_page_says_what_the_code_finds():
     lines = [line for line in PAGE.read_text("utf-8").splitlines() if re.match(r"\| [\d.]+ \|", line)]
     numbers = [list(map(float, re.findall(r"[\d.]+", line))) for line in lines]
-    loops, rates = ([row for row in numbers if len(row) == n] for n in (4, 5))
-    assert (len(loops), len(rates)) == (3, 3)
-    for h0, h1, w0, m1 in loops:
-        assert Loop(h1, h0, w0).m1 == pytest.approx(m1, abs=6e-5)
-    for h0, narrowest, w0, h1, rate in rates:
-        best, found = fastest(narrowest, h0)
-        assert (best.h1, best.w0) == (pytest.approx(h1, abs=6e-3), pytest.approx(w0, rel=1e-3))
-        assert found == pytest.approx(rate, abs=6e-6)
+    loops, rates = ([row for row in numbers if len(row) == n] for n in (7, 6))
+    assert (len(loops), len(rates)) == (4, 3)
+    for h0, h1, w0, anticlockwise, clockwise, largest, switch in loops:
+        assert Loop(h1, h0, w0).m1 == pytest.approx(anticlockwise, abs=6e-5)
+        assert Loop(h0, h1, w0).m1 == pytest.approx(clockwise, abs=6e-5)
+        assert supremum(h0, h1, w0) == (pytest.approx(largest, abs=6e-5), pytest.approx(switch, abs=6e-4))
+    for h0, w0, *columns in rates:
+        for clockwise, h1, rate in ((False, *columns[:2]), (True, *columns[2:])):
+            best, found = fastest(w0, h0, clockwise=clockwise)
+            assert (max(best[:2]), best.w0) == (pytest.approx(h1, abs=6e-3), pytest.approx(w0, rel=1e-3))
+            assert found == pytest.approx(rate, abs=6e-6)
 
 
 @pytest.mark.parametrize(

@@ -1,12 +1,12 @@
-"""What heats fastest: m1 of four-leg loops in floats, its bounds, m1 of the moving cap over phase and size.
+"""What heats fastest: m1 of loops of depth and mouth in floats, the largest one, m1 of the moving cap.
 
-A four-leg loop over an upright stem closes the mouth from w1 to w0 at depth h1 and opens it at depth h0 (sec.
-4.1, r = 1). With a = V_cap / V_cha at capture, b at release and delta the island's share,
+A four-leg loop over an upright stem closes the mouth from w1 to w0 at one depth and opens it at another (sec.
+4.1, r = 1). It runs anticlockwise in the plane of w and h if the stem is deeper while the mouth closes. With
+a = V_cap / V_cha at capture, b at release and delta the island's share, both directions have
     m1 = integral of (b - a - a log(b / a)) exp(-A) |d delta|,   A = integral of a |d delta|.
-Its integrand grows with b, by 1 - a / b, and falls with a, by log(b / a), where b > a. So m1 grows as h0
-falls, as h1 grows and as w0 falls: bounds on depth and mouth are met at their corner, and
-    m1 < integral of b |d delta| at h0 = 0, which is -log(1 - delta(w0)) for w1 = 1.
-The last is reached as h1 grows beyond all bounds; without a bound on the mouth too there is no supremum.
+The largest gain of mouths narrower than w, V(w), obeys dV = max(b - a - a log(b / a) - a V) |d delta|. It is
+convex in (a, b), so a and b are at opposite bounds. The best loop is anticlockwise where V is large, at wide
+mouths, and clockwise where V is small. It changes direction at one width, the switch.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from scipy.optimize import minimize
+from scipy.optimize import minimize, minimize_scalar
 
 import theory
 from scene import Fourier, Mushroom
@@ -29,38 +29,57 @@ NODES, WEIGHTS = np.polynomial.legendre.leggauss(N_NODES)
 class Loop(NamedTuple):
     """A four-leg loop over an upright stem, r = 1: depths while the mouth closes and opens, its extremes."""
 
-    h1: float
-    h0: float
+    closing: float
+    opening: float
     w0: float
     w1: float = 1.0
 
     @property
     def m1(self) -> float:
         """Mean of log E1 / E0 per cycle (Eq:Erate)."""
-        half = math.log(self.w1 / self.w0) / 2
-        w = self.w1 * np.exp(half * (NODES - 1))
-        slope = half * WEIGHTS * w * 4 / np.pi * np.sqrt(np.maximum(1 - w * w, 0.0))  # |d delta|
-        free = 2 / np.pi * (np.arcsin(w) + w * np.sqrt(np.maximum(1 - w * w, 0.0)))
-        a, b = (1 / (free + 4 * w * h / np.pi) for h in (self.h1, self.h0))
-        # A from w1 down: all of a node's own weight but half is above it.
-        below = np.cumsum((a * slope)[::-1])[::-1] - a * slope / 2
-        return float(np.sum((b - a - a * np.log(b / a)) * np.exp(-below) * slope))
+        return self._integrate()[0]
+
+    @property
+    def free_share(self) -> float:
+        """Share of the zone's particles that the loop never captures, exp(-A)."""
+        return math.exp(-self._integrate()[1])
 
     @property
     def path(self) -> float:
         """How far walls go in a cycle [r]."""
-        return 2 * (self.w1 - self.w0) + 2 * (self.h1 - self.h0)
+        return 2 * (self.w1 - self.w0) + 2 * abs(self.closing - self.opening)
+
+    def _integrate(self) -> tuple[float, float]:
+        half = math.log(self.w1 / self.w0) / 2
+        w = self.w1 * np.exp(half * (NODES - 1))
+        slope = half * WEIGHTS * w * 4 / np.pi * np.sqrt(np.maximum(1 - w * w, 0.0))  # |d delta|
+        free = 2 / np.pi * (np.arcsin(w) + w * np.sqrt(np.maximum(1 - w * w, 0.0)))
+        a, b = (1 / (free + 4 * w * h / np.pi) for h in (self.closing, self.opening))
+        # A from w1 down: all of a node's own weight but half is above it.
+        below = np.cumsum((a * slope)[::-1])[::-1] - a * slope / 2
+        m1 = np.sum((b - a - a * np.log(b / a)) * np.exp(-below) * slope)
+        return float(m1), float(np.sum(a * slope))
 
 
-def supremum(narrowest: float, deepest: float = math.inf) -> float:
-    """Return the least upper bound of m1 where the mouth is at least so wide, the stem at most so deep."""
-    if math.isfinite(deepest):
-        return Loop(deepest, 0.0, narrowest).m1
-    return -math.log(1 - float(theory.delta(np, narrowest)))
+def switched(shallowest: float, deepest: float, narrowest: float, switch: float) -> float:
+    """Return m1 of a loop that is anticlockwise at mouths wider than the switch, else clockwise."""
+    wide = Loop(deepest, shallowest, switch)
+    return wide.m1 + wide.free_share * Loop(shallowest, deepest, narrowest, switch).m1
 
 
-def fastest(narrowest: float, shallowest: float) -> tuple[Loop, float]:
-    """Return the loop that gains most per time, its walls no faster than 1, and m1 over its path.
+def supremum(shallowest: float, deepest: float, narrowest: float) -> tuple[float, float]:
+    """Return the largest m1 within bounds on depth and mouth, and the switch of its loop; 1 is clockwise."""
+
+    def loss(log_switch: float) -> float:
+        return -switched(shallowest, deepest, narrowest, math.exp(log_switch))
+
+    inside = minimize_scalar(loss, bounds=(math.log(narrowest), 0.0), options={"xatol": 1e-7}).x
+    best = min((float(inside), math.log(narrowest), 0.0), key=loss)
+    return -loss(best), math.exp(best)
+
+
+def fastest(narrowest: float, shallowest: float, *, clockwise: bool = False) -> tuple[Loop, float]:
+    """Return the four-leg loop that gains most per time, its walls no faster than 1, and m1 over its path.
 
     A leg from rest to rest takes twice as long as its walls would at full speed all the way; the factor is
     left out.
@@ -68,10 +87,16 @@ def fastest(narrowest: float, shallowest: float) -> tuple[Loop, float]:
     Args:
         narrowest: least mouth.
         shallowest: least depth.
+        clockwise: deep while the mouth opens, not while it closes.
     """
 
+    def decode(x: np.ndarray) -> Loop:
+        depths = (shallowest + math.exp(x[0]), shallowest)
+        share = 1 / (1 + math.exp(-x[1]))
+        return Loop(*(depths[::-1] if clockwise else depths), narrowest**share)
+
     def loss(x: np.ndarray) -> float:
-        loop = _bounded(x, narrowest, shallowest)
+        loop = decode(x)
         return -loop.m1 / loop.path
 
     best = min(
@@ -81,15 +106,10 @@ def fastest(narrowest: float, shallowest: float) -> tuple[Loop, float]:
         ),
         key=lambda found: found.fun,
     )
-    return _bounded(best.x, narrowest, shallowest), -float(best.fun)
+    return decode(best.x), -float(best.fun)
 
 
-STARTS = ((0.0, -1.0), (2.0, 1.0))  # log(h1 - h0), and where between its bounds log w0 lies
-
-
-def _bounded(x: np.ndarray, narrowest: float, shallowest: float) -> Loop:
-    share = 1 / (1 + math.exp(-x[1]))
-    return Loop(shallowest + math.exp(x[0]), shallowest, narrowest**share)
+STARTS = ((0.0, -1.0), (2.0, 1.0))  # log of the stroke of h, and where between its bounds log w0 lies
 
 
 def moving_cap(phase: float, radius: float, depth: float) -> Mushroom:
@@ -121,14 +141,18 @@ def draw_phase_diagram(n_phases: int = 16, n_sizes: int = 6) -> Figure:
     return figure
 
 
-def draw_loops(deepest: tuple[float, ...] = (1.0, 2.0, 6.0, 20.0), n: int = 40) -> Figure:
-    """Draw the supremum of m1 over the narrowest mouth, for several bounds on the depth and for none."""
-    mouths = np.geomspace(1e-4, 0.9, n)
+def draw_loops(deepest: tuple[float, ...] = (1.0, 6.0, 20.0), n: int = 40) -> Figure:
+    """Draw m1 of both directions and the supremum over the narrowest mouth, for several greatest depths."""
+    mouths = np.geomspace(1e-3, 0.9, n)
     figure = Figure(figsize=(7.0, 3.6), layout="constrained")
     axes: Axes = figure.add_subplot()
-    for depth in deepest:
-        axes.plot(mouths, [supremum(w, depth) for w in mouths], label=f"depth at most {depth:g} r")
-    axes.plot(mouths, [supremum(w) for w in mouths], "k--", label="any depth")
-    axes.set(xscale="log", xlabel="narrowest mouth w / r", ylabel="supremum of $m_1$ per cycle")
-    axes.legend()
+    for i, depth in enumerate(deepest):
+        for label, dash, m1 in (
+            ("anticlockwise", "-", [Loop(depth, 0.0, w).m1 for w in mouths]),
+            ("clockwise", "--", [Loop(0.0, depth, w).m1 for w in mouths]),
+            ("supremum", ":", [supremum(0.0, depth, w)[0] for w in mouths]),
+        ):
+            axes.plot(mouths, m1, dash, color=f"C{i}", label=f"{label}, depth at most {depth:g} r")
+    axes.set(xscale="log", xlabel="narrowest mouth w / r", ylabel="$m_1$ per cycle")
+    axes.legend(fontsize="small")
     return figure

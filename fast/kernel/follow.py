@@ -118,10 +118,10 @@ def advance(pool, a, n, worker):
 
 
 @part
-def set_stop(a, i, roster, worker):
-    """Tell a lane when `attend` is to look at it next: never later than a period on."""
+def set_stop(a, i, since, roster, worker):
+    """Tell a lane when `attend` is to look at it next: never later than a period after the time `since`."""
     times, at, pieces = worker.stops.times, roster[NEXT_STOP, i], worker.pieces
-    stop = min(a[T + i] + pieces.period, pieces.until)
+    stop = min(since + pieces.period, pieces.until)
     a[STOP + i] = min(stop, times[at]) if at < times.shape[0] else stop
 
 
@@ -194,14 +194,17 @@ def knows_laws(a, i, worker):
 
 
 @kernel
-def mark(pool, a, i, roster, worker):
-    """Note what came with a lane's move; returns whether it stays or moves to the other pool."""
+def mark(pool, a, i, since, roster, worker):
+    """Note what came with a lane's move; returns whether it stays or moves to the other pool.
+
+    Its flight was looked at up to the time `since`.
+    """
     if a[WHEN + i] < NEVER:
         note_stay(a, i, roster, worker.stops, worker.followed)
     if a[T + i] >= a[END + i] and a[END + i] > -NEVER:
         set_reference(a, i, a[T + i], a[T_LOW + i], worker.scene, worker.pieces, worker.degree)
     if knows_laws(a, i, worker):
-        set_stop(a, i, roster, worker)
+        set_stop(a, i, since, roster, worker)
     else:
         a[STOP + i] = -NEVER
     return MOVES if pool == GENERAL and a[SPIN + i] != 0.0 and worker.is_laned else STAYS
@@ -244,7 +247,7 @@ def attend(pool, a, i, roster, worker):
     """
     fate, knows = a[FATE + i], knows_laws(a, i, worker)
     if knows and fate == MARKED:
-        return mark(pool, a, i, roster, worker)
+        return mark(pool, a, i, a[T + i], roster, worker)
     if knows and fate == FAR and a[TRIES + i] <= MAX_CORRECTIONS:  # the piece at the flight's end
         t = a[T + i] + a[S + i]
         set_reference(a, i, t, a[T_LOW + i], worker.scene, worker.pieces, worker.degree)
@@ -254,11 +257,13 @@ def attend(pool, a, i, roster, worker):
         refold(a, i)
         a[WALL + i], a[TRIES + i] = ON_ARC, 0.0
         return MOVES
+    # A flight that takes longer than a period was looked at up to its end; else it would be again and again.
+    flown = a[WHEN + i] if knows and fate == LATE else -NEVER
     code = code_of_attention(pool, a, i, roster, worker)
     if code != ARC:
         finish(pool, a, i, roster[PARTICLE, i], code, worker.stops.times[-1], worker.followed)
         return ENDS
-    return mark(pool, a, i, roster, worker)
+    return mark(pool, a, i, max(flown, a[T + i]), roster, worker)
 
 
 @part

@@ -213,7 +213,7 @@ MUTANTS = {
     ),
     "concavity of the arc under a chord": (
         "misled chord",
-        100,
+        500,
         "min(first, v2 - bend))",
         "first)",
         *POORER_GUESS,

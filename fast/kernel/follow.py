@@ -25,9 +25,9 @@ from fast.kernel.lane_laws import know_laws, set_reference
 from fast.kernel.loops import run_careful, run_step
 
 from fast.kernel.pools import (  # isort: skip
-    AS_GIVEN, END, FAR, FATE, LANES, LATE, MARKED, MAX_CORRECTIONS, MOVED, NEVER, N_ARC, N_BASE, N_FLOOR,
-    N_LEFT, N_RIGHT, ON_ARC, S, SINCE, SPIN, STAY_IN, STAY_OUT, STOP, STRIDE, T, TRIES, T_LOW, UNTIL, VX, VY,
-    WALL, WHEN, X, Y, change_lane, load, refold, whole_registers,
+    AS_GIVEN, END, FAR, FATE, LANES, LATE, MARKED, MAX_CORRECTIONS, MOVED, NEVER, N_ARC, N_BASE, ON_ARC, S,
+    SINCE, SPIN, STAY_IN, STAY_OUT, STOP, STRIDE, T, TRIES, T_LOW, UNTIL, VX, VY, WALL, WHEN, X, Y,
+    change_lane, load, refold, whole_registers,
 )  # fmt: skip
 from fast.kernel.records import RADIUS, VALUE, WIDTH, Particle, particle_at, write_state
 from fast.kernel.worker import DISK, GENERAL, NEXT_STOP, PARTICLE
@@ -104,12 +104,6 @@ def finish(pool, a, i, j, code, end, followed):
         followed.counts[j, wall] = int(a[N_ARC + wall * STRIDE + i])
 
 
-@part
-def has_met_another(a, i):
-    """Tell whether a lane's particle has met any wall but the arc."""
-    return a[N_BASE + i] + a[N_LEFT + i] + a[N_RIGHT + i] + a[N_FLOOR + i] > 0.0
-
-
 @kernel
 def advance(pool, a, n, worker):
     """Take a step of the first n lanes of a pool, whole registers of them, where it is shown right."""
@@ -138,7 +132,7 @@ def careful_flight(a, i, worker):
 def land_carefully(pool, a, i, code, s, p, worker):
     """Move a lane to the collision that a careful step has found; the anchors hold the laws there."""
     scene, hit = worker.scene, float(code)
-    if code != ARC or a[WALL + i] != ON_ARC or has_met_another(a, i):
+    if code != ARC or a[WALL + i] != ON_ARC:  # it has left the arc by now
         a[AS_GIVEN + i] = 0.0
     w = worker.anchors[WIDTH, VALUE]
     if scene.is_relative:

@@ -22,11 +22,11 @@ LONGER = {"conformance/verify.py": "one file that anyone can read and run, witho
 MAX_STATEMENTS = {
     "scene": 1_536,
     "reference": 1_454,
-    "fast": 3_892,
+    "fast": 3_891,
     "theory": 2_247,
     "conformance": 9_392,
     "mushrooms": 4_353,
-    "tests": 14_863,
+    "tests": 14_864,
     "docs": 110,
     ".ci": 40,
 }

@@ -153,7 +153,7 @@ def test_where_no_seal_can_be_written_it_is_compiled_each_time(entry, monkeypatc
         raise OSError(errno.ENOSPC, "no room")
 
     with monkeypatch.context() as context:
-        context.setattr(compiling, "write_file", full, raising=False)
+        context.setattr(compiling.Path, "write_bytes", full)
         assert [entry.is_hit(), entry.is_hit()] == [False, False]
     assert [entry.is_hit(), entry.is_hit()] == [False, True]
 

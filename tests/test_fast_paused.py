@@ -74,11 +74,12 @@ def test_cycles_in_goes_are_those_at_once(name):
 
 def test_cycles_in_goes_without_lanes(monkeypatch):
     """Laws of too many pieces: every step is a careful one."""
-    scene = Mushroom(r=WAVE, h=1.0, nu=0.4, slope=0.1)
+    wave = Fourier(mean=1.0, omega=1.0, sin=(0.3, 0.0, 0.05))  # three harmonics: in pieces
+    scene = Mushroom(r=wave, h=1.0, nu=0.4, slope=0.1)
     monkeypatch.setattr(pieces, "MAX_PIECES", 8)
     laws_in_lanes.cache_clear()
     try:
-        for one in (scene, Cap(r=WAVE)):
+        for one in (scene, Cap(r=wave)):
             asked = {"n_particles": 40, "energy": 30.0, "seed": 2}
             found = in_goes(one, (1, 2, 5), **asked)
             assert (found.ensemble.n_careful >= found.ensemble.n_collisions).all()

@@ -210,7 +210,9 @@ def code_of_attention(pool, a, i, roster, worker):
     stops, followed, end = worker.stops, worker.followed, worker.stops.times[-1]
     is_late = knows_laws(a, i, worker) and a[FATE + i] == LATE
     if followed.lanes.shape[1] > 0 and not (is_late and a[WHEN + i] < end):
-        keep_lane(pool, a, i, roster, knows_laws(a, i, worker), worker)  # it may end here
+        # It may end here. A step that was refused is kept as one of unknown laws: tried again, from another
+        # piece, it may be shown right, and then other bits would follow than in a run at once.
+        keep_lane(pool, a, i, roster, is_late, worker)
     code = ARC
     if is_late:
         note_stops(a, i, roster, a[WHEN + i], stops, followed)

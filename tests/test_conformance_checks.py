@@ -5,7 +5,8 @@ import pytest
 from hypothesis import find, settings
 from support.depth import deep_among, deep_but
 from support.faults import FAULTS, HARMLESS
-from support.faulty_servers import faulty, refusing_lines
+from support.faulty_readers import refusing_lines
+from support.faulty_steppers import faulty
 
 import reference
 from conformance.mutants import COMMON, MUTANTS, PLAIN

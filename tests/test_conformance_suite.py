@@ -9,8 +9,8 @@ import msgspec
 import pytest
 from msgspec.structs import replace
 from support.faults import FAULTS
-from support.faulty_servers import clock, faulty
-from support.saboteurs import command
+from support.faulty_servers import command
+from support.faulty_steppers import clock, faulty
 from support.schemas import validator
 from test_conformance_session import asked_alone, made_up
 
@@ -201,7 +201,7 @@ def test_the_cases_beside_the_vectors_are_all_listed(monkeypatch):
 
 
 # So long that no wait for an answer, however short the path, bears it out.
-MILLIONFOLD = clock(lambda _, said: [10**6 * n for n in said])
+MILLIONFOLD = clock(lambda said: [10**6 * n for n in said])
 
 
 @pytest.mark.parametrize("fault", [FAULTS["no-time"][2], FAULTS["elsewhere"][2], MILLIONFOLD])

@@ -15,8 +15,8 @@ from xml.etree import ElementTree
 import msgspec
 import pytest
 from support.depth import deep_but
+from support.faulty_servers import command
 from support.refusals import assert_refused
-from support.saboteurs import command
 
 import conformance
 import scene as scenes
@@ -92,7 +92,7 @@ def assert_stands_alone(page: str, n_figures: int) -> None:
 
 
 def test_a_bad_stepper_is_not(call, tmp_path):
-    """An honest citizen of the protocol that knows no physics: it fails by verdict, never by crash."""
+    """One that keeps the protocol and knows no physics: it fails by verdict, never by crash."""
     page = tmp_path / "r.html"
     code, out, _ = call("--seed", 5, "--html", page, "--json", tmp_path / "r.json", "--", *command("honest"))
     assert code == 1

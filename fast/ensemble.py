@@ -128,10 +128,7 @@ class Ensemble(NamedTuple):
         return 1.0 - _mean(self.is_captured()[self.takes_part()])
 
     def p_nc_se(self) -> FloatArray:
-        """Return (K,): standard error of `p_nc`.
-
-        If `p_nc` is 0 or 1, it is the error at a share of 1 / (n + 1). If nu has no minimum, it is 0.
-        """
+        """Return (K,): standard error of `p_nc`, at 0 and 1 that of 1 / (n + 1); 0 if nu has no minimum."""
         n = max(int(self.takes_part().sum()), 1)
         share = np.clip(self.p_nc(), 1.0 / (n + 1), n / (n + 1))
         return np.sqrt(share * (1.0 - share) / n) * bool(self.t_in.shape[2])

@@ -78,7 +78,7 @@ class Fourier(
 
 
 class BangBang(msgspec.Struct, frozen=True, tag_field="kind", tag="bang-bang", forbid_unknown_fields=True):
-    """A law at rest at each knot (time, value): constant acceleration to mid-leg, then its opposite."""
+    """At rest at each knot (time, value); constant acceleration to mid-leg, the opposite after."""
 
     knots: tuple[tuple[float, float], ...]
 

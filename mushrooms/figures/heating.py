@@ -113,7 +113,10 @@ STARTS = ((0.0, -1.0), (2.0, 1.0))  # log of the stroke of h, and where between 
 
 
 def moving_cap(phase: float, radius: float, depth: float) -> Mushroom:
-    """Return a cap and a stem that breathe with these amplitudes, the stem ahead by a phase (sec. 4.2)."""
+    """Return a cap and a stem that breathe with these amplitudes, the stem ahead by a phase (sec. 4.2).
+
+    The slope is 0.04, not .1111 as in the paper: with that some tables of the largest amplitudes are invalid.
+    """
     return Mushroom(
         r=Fourier(1.0, 1.0, sin=(radius,)),
         h=Fourier(1.0, 1.0, cos=(depth * math.sin(phase),), sin=(depth * math.cos(phase),)),

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import base64
 import json
 import math
 import re
@@ -10,6 +9,7 @@ import subprocess
 import sys
 from functools import partial
 from pathlib import Path
+from urllib.parse import unquote
 from xml.etree import ElementTree
 
 import msgspec
@@ -86,9 +86,9 @@ def test_a_good_stepper_is_accepted_and_reported(call, tmp_path):
 def assert_stands_alone(page: str, n_figures: int) -> None:
     assert "<script" not in page
     assert not re.search(r'(src|href)="(?!data:|#)', page)
-    images = re.findall(r'src="data:image/svg\+xml;base64,([^"]+)"', page)
+    images = re.findall(r'src="data:image/svg\+xml,([^"]+)"', page)
     assert len(images) == n_figures >= 3
-    assert all(b"<svg" in base64.b64decode(image) for image in images)
+    assert all("<svg" in unquote(image) for image in images)
 
 
 def test_a_bad_stepper_is_not(call, tmp_path):

@@ -25,18 +25,34 @@ OURS = {"fast": "fast", "plain": "conformance.plain"}
 LEFT_OUT = ("solve-ivp-1e-03", "solve-ivp-1e-12")  # slow, and like their neighbours
 N_GROUPS = 3
 KINDS = {
-    "numbers": "is off by",
-    "an earlier hit missed": "an earlier hit was missed",
-    "wrong stay": "captured:",
+    "wrong numbers": "is off by",
+    "an earlier hit was missed": "an earlier hit was missed",
+    "wrong capture interval": "captured:",
 }
 HEAD = """# Scoreboard
 
-Level core of corpus {corpus}, seed {seed}: `python -m conformance.bench.scoreboard` makes this page
-anew. The first two are ours; the examples and the engines behind the adapter kits are in
-`conformance/harness/`; the rest is what most people would write, from the benchmark (`python -m
-conformance.bench.baselines NAME` puts each behind the protocol): event-driven Newton without checks in
-C, fixed time steps of a tenth to a thousandth of a flight, scipy's `solve_ivp` with
-events. A precision class is of the answers that passed, few as they may be.
+This page shows the verdicts of `mushrooms check` at level core of corpus {corpus}, with seed {seed}. The
+command `python -m conformance.bench.scoreboard` makes the page.
+
+- `fast` and `plain` are our own steppers.
+- The examples and the kits are in `conformance/harness/`. A kit lets an engine speak the protocol.
+- The other steppers use simple methods and come from the [benchmark](speed.md#what-is-compared). `lean-c`
+  is event-driven and does not check its answers. `steps-N` moves particles by fixed time steps of 1/N of
+  a flight. `solve-ivp-TOLERANCE` uses scipy's integrator with event detection. The command
+  `python -m conformance.bench.baselines NAME` runs one of them.
+
+`pass`, `fail` and `other` count cases. `other` counts all [other verdicts](protocol.md#other-verdicts). A/B/C
+counts passed answers by [precision class](protocol.md#precision-class). The class counts only answers that
+passed, even if these are few. A run ends after 600 seconds.
+
+Below the table, each stepper has a line that says what was graded ([how to read
+it](protocol.md#the-last-line)). Up to three kinds of line say why a stepper is not accepted:
+
+- *Fails most in*: the groups with the most failures, and their number.
+- *Failures by kind*: `fail` counts wrong answers of no other kind in the line.
+- *Like a mutant*: a [mutant](glossary.md#mutant) is a stepper with one known mistake. The line says how many
+  of the failed vectors this mutant fails too. A stepper that fails most vectors resembles every mutant that
+  fails most vectors. Then the line says little about the cause.
 
 | stepper | verdict | pass | fail | other | A/B/C | seconds |
 | --- | --- | ---: | ---: | ---: | ---: | ---: |
@@ -68,7 +84,7 @@ def page(entries: list[Graded], corpus: str) -> str:
     """Return the page: a table, and for each that fails what fails and why."""
     lines = [HEAD.format(corpus=corpus, seed=SEED).rstrip("\n")]
     lines += [_row(entry) for entry in entries]
-    lines += ["", "## Scope, and why it fails", ""]
+    lines += ["", "## What was graded, and what fails", ""]
     for entry in entries:
         if entry.run is None:
             lines.append(f"- **{entry.name}**: not run here: {entry.why_not}.")
@@ -86,7 +102,7 @@ def reasons(run: Run) -> list[str]:
     groups = Counter(r.group for r in failed).most_common(N_GROUPS)
     found = [f"fails most in {', '.join(f'{group} ({n})' for group, n in groups)}"]
     kinds = Counter(next((k for k, sign in KINDS.items() if sign in r.why), r.verdict) for r in failed)
-    found.append(", ".join(f"{kind}: {n}" for kind, n in kinds.most_common()))
+    found.append(f"failures by kind: {', '.join(f'{kind} ({n})' for kind, n in kinds.most_common())}")
     return found + [line.rstrip(".") for line in run.diagnosis]
 
 

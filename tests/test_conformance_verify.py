@@ -136,9 +136,10 @@ def test_a_number_that_is_lost_is_seen(check, monkeypatch):
 
 
 def sample() -> Iterator[Line]:
-    """Yield a line of each group, the first step of a path; all lines in a deep run."""
+    """Yield a line of every second group, the first step of a path; all lines in a deep run."""
     lines = [line for line in pool("answered") + pool("undefined") if line["kind"] != "flow"]
-    for line in lines if IS_DEEP else {line["group"]: line for line in lines}.values():
+    by_group = {line["group"]: line for line in lines}
+    for line in lines if IS_DEEP else list(by_group.values())[::2]:
         answer = line["expect"][0]
         yield {**line, "expect": [{**answer, "steps": answer.get("steps", [])[: None if IS_DEEP else 1]}]}
 

@@ -8,7 +8,6 @@ from __future__ import annotations
 import itertools
 from collections.abc import Sequence
 from fractions import Fraction
-from functools import reduce
 from itertools import pairwise
 from math import comb, gcd, lcm
 
@@ -108,8 +107,13 @@ def derivative(p: Polynomial) -> Polynomial:
 
 
 def at(p: Polynomial, x: Fraction) -> Fraction:
-    """Evaluate p at x, exactly."""
-    return reduce(lambda total, a: total * x + a, reversed(p), Fraction(0))
+    """Evaluate p at x, exactly: in whole numbers, as fractions would be reduced at every step."""
+    common = lcm(*(a.denominator for a in p))
+    total, power = 0, 1
+    for a in reversed(p):
+        total = total * x.numerator + a.numerator * (common // a.denominator) * power
+        power *= x.denominator
+    return Fraction(total * x.denominator, common * power)
 
 
 def _primitive(p: Polynomial) -> Polynomial:

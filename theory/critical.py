@@ -146,12 +146,12 @@ def _multiplicity_at(p: exact.Polynomial, x: Fraction) -> int:
 
 def _roots(p: exact.Polynomial, a: Fraction, b: Fraction) -> list[CriticalRoot]:
     """Isolate the distinct roots in the open interval (a, b), in order."""
-    if len(p) < 2:
+    sturms, rest = [], p  # a root of multiplicity m is one of the first m
+    while len(rest) > 1:
+        sturms.append(exact.Sturm(rest))
+        rest = exact.divide(rest, sturms[-1].root_free_of_squares)[0]
+    if not sturms:
         return []
-    layers = [p]  # a root of multiplicity m belongs to the first m of them
-    while len(layers[-1]) > 1:
-        layers.append(exact.divide(layers[-1], exact.squarefree(layers[-1]))[0])
-    sturms = [exact.Sturm(layer) for layer in layers[:-1]]
     simple = sturms[0].root_free_of_squares
     found, todo = [], [(a, b)]
     while todo:
@@ -159,15 +159,31 @@ def _roots(p: exact.Polynomial, a: Fraction, b: Fraction) -> list[CriticalRoot]:
         n = sturms[0].n_roots(left, right)
         if n == 0:
             continue
-        isolated = n == 1 and right - left <= NARROW and exact.at(p, left) != 0 and exact.at(p, right) != 0
-        if isolated:
-            found.append(CriticalRoot(left, right, sum(s.n_roots(left, right) for s in sturms), simple))
+        if n == 1 and exact.at(simple, left) != 0 and exact.at(simple, right) != 0:
+            left, right = _narrowed(simple, left, right)
+            if left == right:
+                found.append(CriticalRoot(left, right, _multiplicity_at(p, left), simple))
+            else:
+                n_layers = sum(sturm.n_roots(left, right) for sturm in sturms)
+                found.append(CriticalRoot(left, right, n_layers, simple))
             continue
         middle = (left + right) / 2
-        if exact.at(p, middle) == 0:
+        if exact.at(simple, middle) == 0:
             found.append(CriticalRoot(middle, middle, _multiplicity_at(p, middle), simple))
         todo += [(left, middle), (middle, right)]
     return sorted(found)
+
+
+def _narrowed(simple: exact.Polynomial, left: Fraction, right: Fraction) -> tuple[Fraction, Fraction]:
+    """Bisect the interval of one simple root, by sign alone, until it is NARROW or the root is met."""
+    is_rising = exact.at(simple, right) > 0
+    while right - left > NARROW:
+        middle = (left + right) / 2
+        here = exact.at(simple, middle)
+        if here == 0:
+            return middle, middle
+        left, right = (left, middle) if (here > 0) == is_rising else (middle, right)
+    return left, right
 
 
 def _refined(ctx: Any, root: CriticalRoot) -> Any:

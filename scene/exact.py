@@ -193,17 +193,13 @@ def negative_point(p: Polynomial, a: Fraction, b: Fraction) -> Fraction | None:
     todo = [(a, b)]
     while todo:
         left, right = todo.pop()
-        ends = at(p, left), at(p, right)
-        if ends[0] < 0:
-            return left
-        if ends[1] < 0:
-            return right
-        n = sturm.n_roots(left, right)
         middle = (left + right) / 2
-        if at(p, middle) < 0:
-            return middle
+        for x in (left, right, middle):
+            if at(p, x) < 0:
+                return x
+        n = sturm.n_roots(left, right)
         # No root inside: one sign. One root between two positive ends: it does not change sign.
-        if n == 0 or (n == 1 and ends[0] > 0 and ends[1] > 0):
+        if n == 0 or (n == 1 and at(p, left) > 0 and at(p, right) > 0):
             continue
         todo += [(middle, right), (left, middle)]
     return None

@@ -16,7 +16,7 @@ u on [0, 1]. Intervals of u are halved until Chebyshev interpolation resolves th
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property, reduce
 from math import comb, log2
 from typing import Any, NamedTuple
@@ -112,7 +112,6 @@ class Captures:
     grids: dict[int, Grid]
     target: int
     root: Window
-    _captured: dict[int, WeightedPoints] = field(default_factory=dict, repr=False)
 
     def grid(self, panel: Panel) -> Grid:
         """Return the grid on whose points a panel is sampled."""
@@ -164,15 +163,11 @@ class Captures:
     def captured(self, window: Window) -> WeightedPoints:
         """Return the particles captured on a valley's own panels, from its top: d p_ell = exp(-A) dA."""
         ctx, gain = self.cycle.ctx, window.B_top - window.A_top
-        if id(window) not in self._captured:
-            self._captured[id(window)] = [
-                (weight * rate * ctx.exp(window.A_top - a), s - gain)
-                for panel in window.panels
-                for weight, rate, a, s in zip(
-                    self.grid(panel).weights, panel.rate, panel.A, panel.s, strict=True
-                )
-            ]
-        return self._captured[id(window)]
+        return [
+            (weight * rate * ctx.exp(window.A_top - a), s - gain)
+            for panel in window.panels
+            for weight, rate, a, s in zip(self.grid(panel).weights, panel.rate, panel.A, panel.s, strict=True)
+        ]
 
     def _atoms(self, window: Window) -> WeightedPoints:
         ctx = self.cycle.ctx
@@ -378,8 +373,10 @@ def _panel(
         # Times are plotted only: no part is halved for them.
         late = 0 if grid.n == n else max(_tail(c) / cycle.period for c in c_times)
         if max(tail, late) <= ctx.mpf(10) ** -target:
-            sums = (grid.running_integral(c) for c in (c_A, c_B))
-            A, B = ([at + rise for rise in rises] for at, rises in zip(start, sums, strict=True))
+            A, B = (
+                [at + rise for rise in grid.running_integral(c)]
+                for at, c in zip(start, (c_A, c_B), strict=True)
+            )
             return Panel(nu, t_in, t_out, dA, log_g, A, B)
         if grid.n >= TELLING and tail > ctx.mpf(10) ** (-target * PROMISE * grid.n / n):
             break

@@ -23,8 +23,7 @@ from scene.mouth import mouth_factors
 from scene.tables import Mushroom, laws, period
 from theory.volumes import NotCovered
 
-# An isolating interval this narrow lets Newton's method take over from bisection.
-NARROW = Fraction(1, 2**24)
+NARROW = 1  # an isolating interval from which Newton's method, kept in it, comes to all digits
 MANY_BITS = 512  # beyond which Newton's method begins with fewer
 
 
@@ -159,31 +158,14 @@ def _roots(p: exact.Polynomial, a: Fraction, b: Fraction) -> list[CriticalRoot]:
         n = sturms[0].n_roots(left, right)
         if n == 0:
             continue
-        if n == 1 and exact.at(simple, left) != 0 and exact.at(simple, right) != 0:
-            left, right = _narrowed(simple, left, right)
-            if left == right:
-                found.append(CriticalRoot(left, right, _multiplicity_at(p, left), simple))
-            else:
-                n_layers = sum(sturm.n_roots(left, right) for sturm in sturms)
-                found.append(CriticalRoot(left, right, n_layers, simple))
+        if n == 1 and right - left <= NARROW and exact.at(simple, left) != 0 != exact.at(simple, right):
+            found.append(CriticalRoot(left, right, sum(s.n_roots(left, right) for s in sturms), simple))
             continue
         middle = (left + right) / 2
         if exact.at(simple, middle) == 0:
             found.append(CriticalRoot(middle, middle, _multiplicity_at(p, middle), simple))
         todo += [(left, middle), (middle, right)]
     return sorted(found)
-
-
-def _narrowed(simple: exact.Polynomial, left: Fraction, right: Fraction) -> tuple[Fraction, Fraction]:
-    """Bisect the interval of one simple root, by sign alone, until it is NARROW or the root is met."""
-    is_rising = exact.at(simple, right) > 0
-    while right - left > NARROW:
-        middle = (left + right) / 2
-        here = exact.at(simple, middle)
-        if here == 0:
-            return middle, middle
-        left, right = (left, middle) if (here > 0) == is_rising else (middle, right)
-    return left, right
 
 
 def _refined(ctx: Any, root: CriticalRoot) -> Any:

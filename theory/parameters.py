@@ -7,7 +7,7 @@ inverted in closed form where parameters are parabolas, else from a solution in 
 
 from __future__ import annotations
 
-import math
+import cmath
 from collections.abc import Callable
 from fractions import Fraction
 from typing import Any
@@ -107,15 +107,15 @@ def _parameter(binary: Binary, piece: Piece) -> Parameter:
 
         return parabola
     if isinstance(piece, Fourier):
-        return _wave(binary, piece)
+        return _wave(piece, frequency(binary, piece), gmpy2.mpc)
     constant = binary.mpf(piece), binary.zero
     return lambda t, turn: constant
 
 
-def _wave(binary: Binary, law: Fourier) -> Parameter:
-    omega = frequency(binary, law)
-    amplitudes = {k: gmpy2.mpc(c, -s) for k, c, s in law.harmonics()}
-    zero = gmpy2.mpc(0)
+def _wave(law: Fourier, omega: Any, number: Callable[[float, float], Any]) -> Parameter:
+    """Sum a wave by Horner's scheme, in complex numbers that `number` makes of two real ones."""
+    amplitudes = {k: number(c, -s) for k, c, s in law.harmonics()}
+    zero = number(0.0, 0.0)
     terms = [(amplitudes.get(k, zero), k * amplitudes.get(k, zero)) for k in range(max(amplitudes), 0, -1)]
 
     def wave(_: Any, turn: Any) -> tuple[Any, Any]:
@@ -174,14 +174,6 @@ def _in_floats(piece: Piece) -> Callable[[float], tuple[float, float]]:
     if not isinstance(piece, Fourier):
         assert isinstance(piece, float)
         return lambda t: (piece, 0.0)
-    omega, terms = float(frequency(fp, piece)), piece.harmonics()
-
-    def wave(t: float) -> tuple[float, float]:
-        value, rate = piece.mean, 0.0
-        for k, c, s in terms:
-            cos, sin = math.cos(k * omega * t), math.sin(k * omega * t)
-            value += c * cos + s * sin
-            rate += k * omega * (s * cos - c * sin)
-        return value, rate
-
-    return wave
+    omega = float(frequency(fp, piece))
+    wave = _wave(piece, omega, complex)
+    return lambda t: wave(t, cmath.exp(1j * omega * t))

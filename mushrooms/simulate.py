@@ -285,7 +285,7 @@ def _told_how_to_go_on(run: Any, command: str) -> Iterator[None]:
     def how() -> str:
         n = run.tally.particles
         kept = f"{n:,} of {run.shape.n_particles:,} particles are kept"
-        if not n and run.first_there() is not None:  # with fewer cycles
+        if not n and run.first_there() is not None:  # with fewer cycles or particles
             kept = "what was there is kept"
         return f"{kept}; go on with: {command}"
 
@@ -332,9 +332,15 @@ def _complete(wanted: Wanted, run: Any) -> None:
     engine = (
         engines.by_dask(wanted.dask, wanted.threads) if wanted.dask else engines.in_process(wanted.threads)
     )
-    limits = conduct.RunLimits(wanted.max_collisions, wanted.max_seconds)
     with compilation_told(), Watch(wanted.name, wanted.particles, before) as watch:
-        conduct.complete(run, engine, watch.update, lambda block: watch.add(block.tally), limits=limits)
+        conduct.complete(
+            run,
+            engine,
+            watch.update,
+            lambda block: watch.add(block.tally),
+            max_collisions=wanted.max_collisions,
+            max_seconds=wanted.max_seconds,
+        )
     n_careful, n = run.tally.careful - before.careful, run.tally.collisions - before.collisions
     _tell_careful(n_careful, n, (run.seconds - seconds) / wanted.n_threads)
 

@@ -12,7 +12,7 @@ from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import closing
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -33,21 +33,6 @@ MOST_BLOCKS = 10**6
 PROBED = 4  # particles followed again before a run is gone on with
 MARKER_BYTES = 2**16  # of a block's files beside its chunks, at most
 CLOCK = time.monotonic
-
-
-class RunLimits(NamedTuple):
-    """Where a run stops although it is not at its end; None for no limit.
-
-    Attributes:
-        collisions: of a particle.
-        seconds: on the clock, from the command's begin.
-    """
-
-    collisions: int | None = None
-    seconds: float | None = None
-
-
-NO_LIMITS = RunLimits()
 
 
 class LimitReached(Exception):  # noqa: N818 (nothing is wrong: the run goes on with --resume)
@@ -145,7 +130,8 @@ def complete(
     on_block: Callable[[Block], None] = lambda _block: None,
     *,
     n_particles: int | None = None,
-    limits: RunLimits = NO_LIMITS,
+    max_collisions: int | None = None,
+    max_seconds: float | None = None,
 ) -> None:
     """Follow what is missing of the first particles, and keep it block by block.
 
@@ -158,44 +144,37 @@ def complete(
         on_progress: called with the number of finished particles, again and again.
         on_block: called with each block, before it is kept.
         n_particles: how many of the first particles; by default all.
-        limits: at which to stop.
+        max_collisions: of a particle: stop if one makes more.
+        max_seconds: on the clock: stop after them.
 
     Raises:
         LimitReached: a limit; what was kept stays.
         OSError: a block could not be written; the one followed meanwhile is dropped.
     """
     begin, n = CLOCK(), run.shape.n_particles if n_particles is None else n_particles
-    there = n - sum(min(piece.n, n - piece.first) for piece in run.lacking() if piece.first < n)
+    there = n - sum(piece.n for piece in run.lacking() if piece.first < n)
 
     def report(n_done: int) -> None:
-        on_progress(there + n_done)
-        if limits.seconds is not None and CLOCK() - begin > limits.seconds:
-            raise LimitReached(f"--max-seconds = {limits.seconds:g} have passed")
+        on_progress(max(0, there + n_done))  # the last block may have more particles than are asked for
+        if max_seconds is not None and CLOCK() - begin > max_seconds:
+            raise LimitReached(f"--max-seconds = {max_seconds:g} have passed")
 
-    # Particles that continue from earlier cycles do so as a whole block.
-    pieces = (
-        piece if piece.before is not None else piece._replace(n=min(piece.n, n - piece.first))
-        for piece in run.missing()
-        if piece.first < n
-    )
+    pieces = (piece for piece in run.missing() if piece.first < n)
     with closing(engine(run.spec, pieces, report)) as found, ThreadPoolExecutor(1) as writer:
         under_way: Future[None] | None = None
         for piece, block in found:
-            _check_collisions(piece, block, limits.collisions)
+            most = block.tally.most
+            if max_collisions is not None and most > max_collisions:
+                made = f"a particle of block {piece.number} makes {most} collisions"
+                raise LimitReached(f"{made}, --max-collisions = {max_collisions}")
             if under_way is not None:
                 under_way.result()
             under_way = writer.submit(run.keep, piece, block)
-            there += min(piece.n, n - piece.first)
+            there += piece.n
             on_block(block)
-            on_progress(there)
+            on_progress(max(0, there))
         if under_way is not None:
             under_way.result()
-
-
-def _check_collisions(piece: BlockRange, block: Block, most: int | None) -> None:
-    if most is not None and block.tally.most > most:
-        made = f"a particle of block {piece.number} makes {block.tally.most} collisions"
-        raise LimitReached(f"{made}, --max-collisions = {most}")
 
 
 def _probe(run: StoredRun) -> None:

@@ -16,7 +16,6 @@ from typing import Any
 
 import fast
 import mushrooms
-from fast import Paused
 from mushrooms.store.layout import columns, paused_of
 from mushrooms.store.run import Block, BlockRange
 from mushrooms.store.spec import RunSpec, spec_of
@@ -33,34 +32,21 @@ POLL_INTERVAL = 0.5  # seconds after which limits are looked at while no block c
 
 
 def follow(spec: RunSpec, piece: BlockRange, threads: int | None, tick: Tick | None = None) -> Block:
-    """Follow the particles of a piece.
+    """Follow the particles of a block, from their starts or from where they were.
 
     Raises:
         BadInput: as `fast.go_on`.
     """
-    if piece.before is None:
-        return _followed(spec, piece.first, piece.n, threads, tick)
-    arrays, seconds = piece.before
-    before = paused_of(arrays, spec.energy, seconds)
-    n = len(before.lanes)
-    longer = _followed(spec, piece.first, n, threads, tick, before)
-    if n == piece.n:
-        return longer
-    rest = None if tick is None else lambda n_done: tick(n + n_done)
-    return longer.joined(_followed(spec, piece.first + n, piece.n - n, threads, rest))
-
-
-def _followed(
-    spec: RunSpec, first: int, n: int, threads: int | None, tick: Tick | None, before: Paused | None = None
-) -> Block:
-    """Follow particles from their starts, or from where they were."""
+    before = None
+    if piece.before is not None:
+        before = paused_of(piece.before.arrays, spec.energy, piece.before.seconds)
     paused = fast.go_on(
         spec.scene,
-        n_particles=n,
+        n_particles=piece.n,
         energy=spec.energy,
         n_cycles=spec.n_cycles,
         seed=spec.seed,
-        first=first,
+        first=piece.first,
         threads=threads,
         phases=spec.phases,
         progress=tick,

@@ -37,13 +37,13 @@ DIGESTED = Ensemble._fields[1:-2]  # neither energy0 nor times
 
 
 class BlockRange(NamedTuple):
-    """Particles that are to be followed: a block, or what a block lacks.
+    """The particles of a block that is to be followed.
 
     Attributes:
         number: of the block.
-        first: number of the first particle.
+        first: number of its first particle.
         n: how many.
-        before: results of the first of them after fewer cycles; they go on from there.
+        before: their results after fewer cycles, from which they continue; None: from their starts.
     """
 
     number: int
@@ -53,7 +53,7 @@ class BlockRange(NamedTuple):
 
 
 class Block(NamedTuple):
-    """Results of the particles of a block, or of a part of one.
+    """Results of the particles of a block.
 
     Attributes:
         arrays: as stored.
@@ -67,11 +67,6 @@ class Block(NamedTuple):
     def tally(self) -> RunTally:
         """Count what became of the particles."""
         return tally_of(self.arrays)
-
-    def joined(self, rest: Block) -> Block:
-        """Return this block with more particles behind its own."""
-        arrays = {name: np.concatenate([array, rest.arrays[name]]) for name, array in self.arrays.items()}
-        return Block(arrays, self.seconds + rest.seconds)
 
 
 class Marker(NamedTuple):
@@ -100,44 +95,44 @@ class StoredRun:
         spec: all that decides its bits.
         shape: its sizes.
         command: how it is made.
-        tally, seconds: of the blocks that are there, once `check` has looked; without those that hold
-            fewer cycles.
+        tally, seconds: of the finished blocks, once `check` has looked. A block that the run has outgrown,
+            because it holds fewer particles or cycles than it has to, is not finished.
     """
 
     def __init__(self, folder: Path, spec: RunSpec, shape: Shape, command: str) -> None:
         self.folder, self.spec, self.shape, self.command = folder, spec, shape, command
         self.tally, self.seconds = RunTally(), 0.0
-        self._rows: dict[int, int] = {}  # particles that are there, by block
-        self._shorter: dict[int, int] = {}  # blocks that are there with fewer cycles, and how many
+        self._markers: dict[int, Marker] = {}  # of the blocks on disk, those outgrown included
         self._arrays: dict[str, Any] = {}  # of the Zarr group, once it is open
         # The marker of another run, left here by someone who moved files, does not count.
         sizes = {"cycles": shape.chunked, "block": shape.block}
         self._identity = _digest(spec.to_data() | sizes)
 
     def missing(self) -> Iterator[BlockRange]:
-        """Yield what is still to be followed, with what is there of it.
+        """Yield the blocks still to be followed, each with what is on disk to continue from.
 
         Raises:
             BadInput: that has been damaged since `check`.
         """
         for piece in self.lacking():
-            yield piece._replace(before=self.block(piece.number)) if piece.number in self._shorter else piece
+            marker = self._markers.get(piece.number)
+            is_continued = marker is not None and marker.rows == piece.n
+            yield piece._replace(before=self.block(piece.number) if is_continued else None)
 
     def lacking(self) -> Iterator[BlockRange]:
-        """Yield what is still to be followed."""
+        """Yield the blocks still to be followed."""
         for number in range(self.shape.n_blocks):
-            there = self._rows.get(number, 0)
-            if there < self.shape.rows(number):
-                yield BlockRange(number, number * self.shape.block + there, self.shape.rows(number) - there)
+            if not self._is_finished(number):
+                yield BlockRange(number, number * self.shape.block, self.shape.rows(number))
 
-    @property
-    def cycles_there(self) -> int:
-        """Return how many cycles have been followed of all that is missing."""
-        return min((self._shorter.get(piece.number, 0) for piece in self.lacking()), default=0)
+    def _is_finished(self, number: int) -> bool:
+        marker = self._markers.get(number)
+        whole = self.shape.rows(number), self.shape.n_cycles
+        return marker is not None and (marker.rows, marker.cycles) == whole
 
     def first_there(self) -> int | None:
-        """Return the first block that is there, one of fewer cycles before others."""
-        return min(self._shorter or self._rows, default=None)
+        """Return the first block on disk, one that the run has outgrown before others."""
+        return min(self._markers, key=lambda number: (self._is_finished(number), number), default=None)
 
     def block(self, number: int) -> Block:
         """Return a block, with as many cycles as it has.
@@ -151,7 +146,7 @@ class StoredRun:
     def check(self) -> list[int]:
         """Read every block, count those that are as they were written, and return the damaged ones."""
         damaged = []
-        self._rows, self._shorter, self.tally, self.seconds = {}, {}, RunTally(), 0.0
+        self._markers, self.tally, self.seconds = {}, RunTally(), 0.0
         for pattern in (".*.part", "*.partial"):  # what we, or zarr, were writing when the process ended
             for path in self.folder.rglob(pattern):
                 path.unlink(missing_ok=True)
@@ -174,26 +169,20 @@ class StoredRun:
         """
         if not self._arrays:
             self.describe()
-        there, whole, first_cycle = self._rows.get(piece.number, 0), block, 0
-        if there:  # the run was widened: the block gets more particles
-            whole = self.block(piece.number).joined(block)
-        marker = self._marker(piece.number)
-        rows = there + piece.n
-        if piece.before is not None and marker is not None and marker.rows == rows:
-            first_cycle = marker.cycles  # these are on the disk, and stay as they are
-        begin = piece.number * self.shape.block
+        first_cycle = 0
+        if piece.before is not None:
+            first_cycle = self._markers[piece.number].cycles  # those before are on disk, and stay as they are
+        rows = slice(piece.first, piece.first + piece.n)
         for name in self.shape.names:
-            array, values = self._arrays[name], whole.arrays[name]
-            if rows < self.shape.rows(piece.number):  # else zarr would read the rest, which may be damaged
-                array[begin : begin + self.shape.block] = array.fill_value
+            values = block.arrays[name]
             if "cycle" in FIELDS[name].dims:
-                array[begin : begin + rows, first_cycle:] = values[:, first_cycle:]
+                self._arrays[name][rows, first_cycle:] = values[:, first_cycle:]
             else:
-                array[begin : begin + rows] = values
-        sums = {name: _sum(whole.arrays[name]) for name in self.shape.names}
-        marker = Marker(self._identity, piece.number, rows, self.shape.n_cycles, sums, whole.seconds)
+                self._arrays[name][rows] = values
+        sums = {name: _sum(block.arrays[name]) for name in self.shape.names}
+        marker = Marker(self._identity, piece.number, piece.n, self.shape.n_cycles, sums, block.seconds)
         write_file(self._path(piece.number), sealed(json.dumps(marker._asdict()).encode()))
-        self._count(marker._replace(seconds=block.seconds), block.tally)
+        self._count(marker, block.tally)
 
     def describe(self) -> None:
         """Write the metadata of the group and of its arrays; chunks that are there stay."""
@@ -304,12 +293,9 @@ class StoredRun:
         return Ensemble(energy0=self.spec.energy, seconds=seconds, threads=1, **fields)
 
     def _count(self, marker: Marker, tally: RunTally) -> None:
-        if marker.cycles < self.shape.n_cycles:
-            self._shorter[marker.number] = marker.cycles
-            return
-        self._shorter.pop(marker.number, None)
-        self._rows[marker.number] = marker.rows
-        self.tally, self.seconds = self.tally.merged(tally), self.seconds + marker.seconds
+        self._markers[marker.number] = marker
+        if self._is_finished(marker.number):
+            self.tally, self.seconds = self.tally.merged(tally), self.seconds + marker.seconds
 
     def _path(self, number: int) -> Path:
         return self.folder / MARKERS / f"{number}.marker"

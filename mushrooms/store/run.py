@@ -131,8 +131,9 @@ class StoredRun:
         return marker is not None and (marker.rows, marker.cycles) == whole
 
     def first_there(self) -> int | None:
-        """Return the first block on disk, one that the run has outgrown before others."""
-        return min(self._markers, key=lambda number: (self._is_finished(number), number), default=None)
+        """Return the first block on disk, one with fewer cycles than the run before others."""
+        whole = {number: marker.cycles == self.shape.n_cycles for number, marker in self._markers.items()}
+        return min(whole, key=lambda number: (whole[number], number), default=None)
 
     def block(self, number: int) -> Block:
         """Return a block, with as many cycles as it has.

@@ -6,21 +6,22 @@ import json
 import sys
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 from rich import progress
 
+import fast
+from conformance.audit import session
+from conformance.audit.claim import AuditSteppers, Claim
+from conformance.audit.claims import all_claims, select_claims
+from conformance.audit.runs import Size
+from conformance.audit.session import AuditResult, AuditSettings
 from conformance.files import write_files
-from mushrooms import output
+from mushrooms import audit_runs, output
 from mushrooms.output import locked
-from mushrooms.terminal import check_range, compilation_told, progress_bar, refuse_unheeded
-from scene.refusal import BadInput, check_seed
-
-if TYPE_CHECKING:
-    from conformance.audit.claim import Claim
-    from conformance.audit.runs import Size
-    from conformance.audit.session import AuditResult, AuditSettings
+from mushrooms.terminal import compilation_told, progress_bar, refuse_unheeded
+from scene.refusal import MAX_SEED, BadInput
 
 
 def audit(
@@ -29,8 +30,10 @@ def audit(
     only: Annotated[
         str | None, typer.Option(metavar="IDS", help="Only these claims, separated by commas: X2,L4.")
     ] = None,
-    seed: Annotated[int, typer.Option(help="Seed of the random starts, 0 to 2^64 - 1.")] = 0,
-    threads: Annotated[int | None, typer.Option(help="Threads; all cores by default.")] = None,
+    seed: Annotated[
+        int, typer.Option(min=0, max=MAX_SEED, help="Seed of the random starts, 0 to 2^64 - 1.")
+    ] = 0,
+    threads: Annotated[int | None, typer.Option(min=1, help="Threads; all cores by default.")] = None,
     resume: Annotated[
         bool, typer.Option("--resume", help="Continue with DIR/runs and DIR/findings.")
     ] = False,
@@ -47,7 +50,8 @@ def audit(
         typer.Option(metavar="FILE", help="An ensemble of the reversed cycle, to compare with --ensemble."),
     ] = None,
     energy: Annotated[
-        float | None, typer.Option(help="Initial energy: chooses rows, or replaces a missing column E0.")
+        float | None,
+        typer.Option(min=0, help="Initial energy: chooses rows, or replaces a missing column E0."),
     ] = None,
     energy_unit: Annotated[str | None, typer.Option(help="Unit of energies: v2/2 (default) or v2.")] = None,
     time_unit: Annotated[
@@ -93,17 +97,11 @@ def _audit_paper(
     as_json: bool,
 ) -> None:
     """Conduct the audit of the paper's claims."""
-    from conformance.audit.claims import select_claims
-    from conformance.audit.session import AuditSettings
-    from mushrooms import audit_runs
-    from mushrooms.reports import audit_page
+    from mushrooms.reports import audit_page  # drawing takes a second to import
 
     if only is not None and not only.replace(",", " ").split():
         raise BadInput(f"--only = {only!r}, must name a claim such as X2; all are checked without it")
     claims = select_claims(only or "")
-    check_seed(seed, "--seed")
-    if threads is not None:
-        check_range("--threads", threads, 1)
     size: Size = "full" if full else "quick"
     if commands:
         lines = [audit_runs.command(run, size, seed, out) for run in audit_runs.needed(claims, size)]
@@ -132,20 +130,14 @@ def _audit_paper(
 
 def _conducted(folder: Path, settings: AuditSettings, claims: tuple[Claim, ...]) -> AuditResult:
     """Conduct an audit of the claims, and of those that are taken up, in a folder that is held."""
-    import fast
-    from conformance.audit.claim import AuditSteppers
-    from conformance.audit.claims import all_claims
-    from conformance.audit.session import conduct, kept
-    from mushrooms import audit_runs
-
     if settings.resume:
-        wanted = {claim.id for claim in claims} | kept(settings)
+        wanted = {claim.id for claim in claims} | session.kept(settings)
         claims = tuple(claim for claim in all_claims() if claim.id in wanted)
         _check_report(folder, wanted)
     runs = audit_runs.KeptRuns(folder, settings.resume)
     runs.check(audit_runs.needed(claims, settings.size), settings.seed)
     with compilation_told(), progress_bar() as bar:
-        return conduct(
+        return session.conduct(
             AuditSteppers(fast.simulate, fast.trajectory, fast.flow),
             settings,
             claims=claims,

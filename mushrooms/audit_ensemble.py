@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -19,10 +18,11 @@ from conformance.audit.ensemble import (
     nu_at,
     reversal,
 )
+from conformance.audit.runs import scene_named
 from conformance.files import write_files
 from mushrooms import output
 from mushrooms.ensemble_table import read_table
-from mushrooms.terminal import check_energy, load_scene
+from mushrooms.reports.page import pull
 from scene.refusal import BadInput
 from scene.tables import Mushroom
 
@@ -61,10 +61,9 @@ def audit_ensemble(
     """Audit an ensemble, write report.json, report.txt and report.html; return the exit code."""
     if scene_name is None:
         raise BadInput("--ensemble needs --scene, the scene that was simulated")
-    found = load_scene(scene_name)
+    found = scene_named(scene_name)
     if not isinstance(found, Mushroom) or not found.period:
         raise BadInput(f"--scene = {scene_name!r}, must be a mushroom that moves: theory has no other")
-    check_energy(options.energy)
     if options.energy_unit not in ENERGIES:
         raise BadInput(f"--energy-unit = {options.energy_unit!r}, must be one of {', '.join(ENERGIES)}")
     if options.time_unit not in (None, *TIMES):
@@ -204,13 +203,6 @@ def to_data(result: EnsembleAudit, path: Path, scene_name: str) -> dict[str, Any
         "causes": result.causes,
         "checks": [{**check._asdict(), "pull": pull(check)} for check in result.checks],
     }
-
-
-def pull(check: Check) -> float | None:
-    """Return how many standard errors a value is off; None where nothing is random."""
-    if check.value is None or not check.error or not math.isfinite(check.error):
-        return None
-    return (check.value - float(check.expected)) / check.error
 
 
 def to_text(data: dict[str, Any]) -> str:

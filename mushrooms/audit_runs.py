@@ -6,9 +6,10 @@ import os
 from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
 
+from conformance.audit.claim import Claim
 from conformance.audit.runs import RUNS, Simulation, Size, run_seed, scene_of
+from fast import Ensemble
 from fast.ensemble import SHARE
 from mushrooms import output
 from mushrooms.output import locked
@@ -16,12 +17,8 @@ from mushrooms.simulate import tell_damaged
 from mushrooms.store import conduct, engines
 from mushrooms.store.run import is_run
 from mushrooms.store.spec import RunSpec
+from scene import Scene
 from scene.refusal import BadInput
-
-if TYPE_CHECKING:
-    from conformance.audit.claim import Claim
-    from fast import Ensemble
-    from scene import Scene
 
 FOLDER = "runs"
 

@@ -55,22 +55,19 @@ def measured(spec: RunSpec, n_captured: int, gain: Gain) -> dict[str, Any]:
     free = 1.0 - n_captured / (n * k) if n and has_island else None
     free_error = None if free is None else _measured_error(spec.scene, free, n * k)
     found = predicted(spec)
-    pulls: tuple[float | None, float | None] = (None, None)
+    m1_z = p_nc_z = None
     if found is not None and n:
-        expected_error = _binomial_error(found.p_nc, n * k)
-        pulls = (
-            _pull(mean, found.m1, error, found.m1_error),
-            _pull(free, found.p_nc, expected_error, found.p_nc_error),
-        )
+        m1_z = _pull(mean, found.m1, error, found.m1_error)
+        p_nc_z = _pull(free, found.p_nc, _binomial_error(found.p_nc, n * k), found.p_nc_error)
     return {
         "m1": mean,
         "m1_se": error,
         "m1_theory": found.m1 if found else None,
-        "m1_z": pulls[0],
+        "m1_z": m1_z,
         "p_nc": free,
         "p_nc_se": free_error,
         "p_nc_theory": found.p_nc if found else None,
-        "p_nc_z": pulls[1],
+        "p_nc_z": p_nc_z,
     }
 
 

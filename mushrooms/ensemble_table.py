@@ -16,6 +16,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
+import zarr
 
 from conformance.suite.sheet_files import read_number, read_rows
 from mushrooms.output import import_arrow
@@ -197,10 +198,6 @@ def _parquet(path: Path, label: str) -> Iterator[dict[str, Floats]]:
 
 
 def _zarr(path: Path, label: str) -> Iterator[dict[str, Floats]]:
-    try:
-        import zarr
-    except ImportError:
-        raise BadInput("a .zarr folder needs zarr: pip install 'oscillating-mushrooms[scale]'") from None
     try:
         group: Any = zarr.open_group(path, mode="r")
     except (OSError, ValueError, KeyError) as error:

@@ -7,10 +7,12 @@ from __future__ import annotations
 
 import errno
 import io
+import math
 import os
 import signal
 import sys
 import threading
+from collections.abc import Callable
 from concurrent.futures import BrokenExecutor
 from contextlib import suppress
 from decimal import Decimal, InvalidOperation
@@ -124,20 +126,39 @@ def command(name: str) -> Any:
     module, _, function = entry.function.partition(":")
     alone = typer.Typer(add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None)
     epilog = f"Example: {PROGRAM} {name} {entry.example}"
-    alone.command(name, epilog=epilog)(_with_exponents(getattr(import_module(module), function)))
+    alone.command(name, epilog=epilog)(_with_parsers(getattr(import_module(module), function)))
     return typer.main.get_command(alone)
 
 
-def _with_exponents(function: Any) -> Any:
-    """Let every option that is a whole number be written as 1e6 too, and one that is no number be shown."""
+def _with_parsers(function: Any) -> Any:
+    """Let every option that is a number be read by `_parser`, within the bounds that it declares."""
     function.__annotations__ = get_type_hints(function, include_extras=True)
-    for hint in function.__annotations__.values():
+    for name, hint in function.__annotations__.items():
         kinds = (hint.__origin__, *get_args(hint.__origin__)) if get_origin(hint) is Annotated else ()
-        for told in hint.__metadata__ if int in kinds or float in kinds else ():
-            if isinstance(told, OptionInfo) and told.parser is None:
-                told.parser, letter = (whole, "N") if int in kinds else (number, "X")
-                told.metavar = told.metavar or letter
+        for option in hint.__metadata__ if int in kinds or float in kinds else ():
+            if isinstance(option, OptionInfo) and option.parser is None:
+                names = [*(option.param_decls or ()), f"--{name.replace('_', '-')}"]
+                option.parser = _parser(names[0], int in kinds, option.min, option.max)
+                option.metavar = option.metavar or ("N" if int in kinds else "X")
+                option.min = option.max = None  # its help says them in words
     return function
+
+
+def _parser(option: str, is_whole: bool, low: float | None, high: float | None) -> Callable[[Any], Any]:
+    """Return what reads a number: a whole one from `low` on, or a finite one above `low`; up to `high`."""
+    bounds = f">= {low}" if high is None else f"{low} to {high}"
+    if not is_whole:
+        bounds = f"finite and > {low}" if high is None else f"> {low} and at most {high}"
+
+    def parse(text: Any) -> int | float:
+        value = whole(text) if is_whole else number(text)
+        if low is not None:
+            is_in = value >= low if is_whole else low < value < math.inf
+            if not is_in or (high is not None and value > high):
+                raise UsageError(f"{option} = {value}, must be {bounds}")
+        return value
+
+    return parse
 
 
 def whole(text: str | int) -> int:
@@ -245,7 +266,7 @@ def _call(given: list[str]) -> NoReturn:
     except (MemoryError, RecursionError) as error:
         what = "not enough memory" if isinstance(error, MemoryError) else "nested too deeply"
         _refuse(f"{what}: {error}".removesuffix(": "))
-    except Exception as error:
+    except (ImportError, SystemError) as error:
         if not _is_of_an_interrupt(error):
             raise
         code = INTERRUPTED

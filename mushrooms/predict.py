@@ -8,13 +8,11 @@ from typing import Annotated, Any
 
 import typer
 
+from conformance.audit.runs import scene_named
 from mushrooms.forecast import expected_collisions
 from mushrooms.terminal import (
     AsJson,
     SceneName,
-    check_energy,
-    check_range,
-    load_scene,
     print_pairs,
     progress_bar,
 )
@@ -48,9 +46,11 @@ FIGURES = {
 
 def predict(
     scene: SceneName,
-    digits: Annotated[int, typer.Option(help=f"Correct digits, 1 to {MAX_DIGITS}.")] = 15,
+    digits: Annotated[
+        int, typer.Option(min=1, max=MAX_DIGITS, help=f"Correct digits, 1 to {MAX_DIGITS}.")
+    ] = 15,
     energy: Annotated[
-        float | None, typer.Option(help="Also predict for this initial energy v²/2, > 0.")
+        float | None, typer.Option(min=0, help="Also predict for this initial energy v²/2, > 0.")
     ] = None,
     as_json: AsJson = False,
 ) -> None:
@@ -63,9 +63,7 @@ def predict(
     """
     import theory
 
-    check_range("--digits", digits, 1, MAX_DIGITS)
-    check_energy(energy)
-    found = load_scene(scene)
+    found = scene_named(scene)
     with progress_bar() as bar:
         task = bar.add_task("resolution 1 of two or more", total=100)
 

@@ -20,9 +20,8 @@ from fast.kernel import kept, pools
 from mushrooms import compared
 from mushrooms.store import conduct, engines
 from mushrooms.store import run as stored
-from mushrooms.store.layout import LANES, paused_of, shape_of
 from mushrooms.store.run import StoredRun
-from mushrooms.store.spec import RunSpec
+from mushrooms.store.spec import LANES, RunSpec, paused_of, shape_of
 from scene import load
 
 pytestmark = pytest.mark.usefixtures("unsynced")

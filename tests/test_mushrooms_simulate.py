@@ -23,11 +23,10 @@ from mushrooms.compared import begins_widest, leans_inward, limit_told, measured
 from mushrooms.forecast import expected_collisions
 from mushrooms.output import LOCK, locked
 from mushrooms.store import conduct, progress
-from mushrooms.store.layout import shape_of
 from mushrooms.store.progress import Gain, RunTally, gain_of
 from mushrooms.store.run import Block, StoredRun
-from mushrooms.store.spec import RunSpec
-from mushrooms.terminal import compilation_told
+from mushrooms.store.spec import RunSpec, shape_of
+from mushrooms.terminal import compilation_told, progress_bar
 from scene import Fourier, Mushroom, load
 
 RUN = ["simulate", "moving-cap", "--particles", 60, "--energy", 1e4, "--seed", 7, "--threads", 1, "--json"]
@@ -295,7 +294,8 @@ def test_a_block_is_reported_at_once_and_two_are_in_memory(tmp_path, monkeypatch
 def test_progress_tells_rate_and_losses(capsys, monkeypatch):
     now = iter(range(0, 10**6, 50))
     monkeypatch.setattr(progress, "CLOCK", lambda: float(next(now)))
-    with progress.Watch("run", 2000, RunTally(particles=500, followed=500)) as seen:
+    with progress_bar() as bar:
+        seen = progress.Watch(bar, "run", 2000, RunTally(particles=500, followed=500))
         seen.update(500)
         seen.add(RunTally(particles=500, followed=498, undecided=1, collisions=10**6))
         seen.update(1000)

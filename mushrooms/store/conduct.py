@@ -18,9 +18,8 @@ import numpy as np
 
 from mushrooms.forecast import expected_collisions
 from mushrooms.store.engines import Engine, follow
-from mushrooms.store.layout import Arrays, shape_of
 from mushrooms.store.run import Block, BlockRange, StoredRun, attributes_of, is_run
-from mushrooms.store.spec import RunSpec, difference, made_by
+from mushrooms.store.spec import Arrays, RunSpec, difference, made_by, shape_of
 from scene.refusal import BadInput
 
 BLOCK_COLLISIONS = 2e8  # of a block, some seconds: what a fault can cost, and long beside a block's files

@@ -10,15 +10,13 @@ import logging
 from collections import Counter
 from collections.abc import Callable, Generator, Iterator
 from concurrent.futures import CancelledError
-from contextlib import contextmanager
 from itertools import islice
 from typing import Any
 
 import fast
 import mushrooms
-from mushrooms.store.layout import columns, paused_of
 from mushrooms.store.run import Block, BlockRange
-from mushrooms.store.spec import RunSpec, spec_of
+from mushrooms.store.spec import RunSpec, columns, paused_of
 from scene.refusal import BadInput
 
 # Told of the particles done in the piece under way, again and again; what it raises ends the engine.
@@ -66,15 +64,15 @@ def in_process(threads: int | None) -> Engine:
     return engine
 
 
-def follow_elsewhere(data: dict[str, Any], piece: BlockRange, threads: int) -> Block:
+def follow_elsewhere(version: str, spec: RunSpec, piece: BlockRange, threads: int) -> Block:
     """Follow a piece on a worker, which must be of the version that asks.
 
     Raises:
         BadInput: it is of another.
     """
-    if data["version"] != mushrooms.__version__:
-        raise BadInput(f"a worker has version {mushrooms.__version__}, must be {data['version']}")
-    return follow(spec_of(data), piece, threads)
+    if version != mushrooms.__version__:
+        raise BadInput(f"a worker has version {mushrooms.__version__}, must be {version}")
+    return follow(spec, piece, threads)
 
 
 def by_dask(address: str, threads: int | None) -> Engine:
@@ -90,7 +88,7 @@ def by_dask(address: str, threads: int | None) -> Engine:
     """
     try:
         from distributed import Client
-        from distributed.comm import resolve_address
+        from distributed.comm import CommClosedError, resolve_address
     except ImportError:
         raise BadInput("--dask needs dask.distributed: pip install 'oscillating-mushrooms[scale]'") from None
 
@@ -102,34 +100,24 @@ def by_dask(address: str, threads: int | None) -> Engine:
             client = Client(address, timeout=CONNECT_TIMEOUT, set_as_default=False)
         except (OSError, ValueError) as error:
             raise BadInput(f"--dask = {address}: no scheduler answers ({type(error).__name__})") from None
-        with _lost_in_a_line(address), client:
-            yield from _handed_out(client, spec, pieces, tick, threads or 1)
+        # Dask logs pages of its own when a cluster is lost, which nobody needs who goes on with the run.
+        log = logging.getLogger("distributed.client")
+        level = log.level
+        log.setLevel(logging.CRITICAL + 1)
+        try:
+            with client:
+                yield from _handed_out(client, spec, pieces, tick, threads or 1)
+        except (CancelledError, CommClosedError) as error:
+            why = type(error).__name__
+            raise ConnectionError(f"--dask = {address}: the scheduler has gone ({why})") from None
+        except RuntimeError as error:
+            if "deserialization" not in str(error):
+                raise
+            raise ConnectionError(f"--dask = {address}: the scheduler must have this project too") from None
+        finally:
+            log.setLevel(level)
 
     return engine
-
-
-@contextmanager
-def _lost_in_a_line(address: str) -> Iterator[None]:
-    """Raise ConnectionError for what Dask raises when its scheduler ends, or cannot read what it is handed.
-
-    Dask logs pages of its own then, which nobody needs who goes on with the run.
-    """
-    from distributed.comm import CommClosedError
-
-    log = logging.getLogger("distributed.client")
-    level = log.level
-    log.setLevel(logging.CRITICAL + 1)
-    try:
-        yield
-    except (CancelledError, CommClosedError) as error:
-        why = type(error).__name__
-        raise ConnectionError(f"--dask = {address}: the scheduler has gone ({why})") from None
-    except RuntimeError as error:
-        if "deserialization" not in str(error):
-            raise
-        raise ConnectionError(f"--dask = {address}: the scheduler must have this project too") from None
-    finally:
-        log.setLevel(level)
 
 
 def _handed_out(
@@ -138,13 +126,12 @@ def _handed_out(
     """Keep every worker busy, and yield what comes back; what is still out is dropped at the end."""
     from distributed import KilledWorker, wait
 
-    data, out, n_killed = spec.to_data(), {}, Counter[int]()
+    out, n_killed = dict[Any, BlockRange](), Counter[int]()
 
     def submit(piece: BlockRange) -> None:
-        future = client.submit(
-            follow_elsewhere, data, piece, threads, pure=False, retries=RETRIES, priority=-piece.number
-        )
-        out[future] = piece
+        asked_for = (mushrooms.__version__, spec, piece, threads)
+        options = {"pure": False, "retries": RETRIES, "priority": -piece.number}
+        out[client.submit(follow_elsewhere, *asked_for, **options)] = piece
 
     try:
         while True:

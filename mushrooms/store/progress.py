@@ -7,15 +7,14 @@ import sys
 import time
 from collections.abc import Callable, Iterable
 from itertools import chain
-from types import TracebackType
 from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
+from rich.progress import Progress
 
 from fast.ensemble import FOLLOWED, UNDECIDED
 from mushrooms.forecast import in_words
-from mushrooms.terminal import progress_bar
 
 
 class RunTally(NamedTuple):
@@ -95,32 +94,23 @@ CLOCK = time.monotonic
 
 
 class Watch:
-    """A bar on a terminal; elsewhere a line on stderr after 20 seconds, and then one a minute.
+    """Moves a bar on a terminal; elsewhere prints a line on stderr after 20 seconds, and then one a minute.
 
     Args:
+        bar: begun; see `mushrooms.terminal.progress_bar`.
         name: of the run.
         n_particles: in all.
         before: of the particles that were finished before.
     """
 
-    def __init__(self, name: str, n_particles: int, before: RunTally) -> None:
-        self._name, self._n, self._before, self._all = name, n_particles, before, before
-        self._bar, self._done = progress_bar(), before.particles
-        self._begin: float | None = None
-
-    def __enter__(self) -> Watch:
-        self._bar.__enter__()
-        self._task = self._bar.add_task(self._name, total=self._n, completed=self._done)
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self._bar.__exit__(kind, error, trace)
+    def __init__(self, bar: Progress, name: str, n_particles: int, before: RunTally) -> None:
+        self._bar, self._name, self._n, self._before, self._all = bar, name, n_particles, before, before
+        self._done, self._begin = before.particles, math.nan
+        self._task = bar.add_task(name, total=n_particles, completed=self._done)
 
     def update(self, n_done: int) -> None:
         """Take note of how many particles are finished."""
-        if self._begin is None:  # all is checked and compiled
+        if math.isnan(self._begin):  # all is checked and compiled
             self._begin = CLOCK()
             self._next = self._begin + FIRST
         self._done = n_done
@@ -148,4 +138,4 @@ class Watch:
 
     def _rate(self) -> float:
         """Return how many particles a second have been followed here."""
-        return (self._done - self._before.particles) / max(CLOCK() - (self._begin or 0.0), 1e-9)
+        return (self._done - self._before.particles) / max(CLOCK() - self._begin, 1e-9)

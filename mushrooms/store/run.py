@@ -1,6 +1,6 @@
 """A run in a folder: a Zarr group of results, and a sealed marker for each block of particles.
 
-zarr writes and reads the arrays (`layout`).
+zarr writes and reads the arrays (`spec`).
 
 A block is finished when its marker is there: a small sealed file, written after the block's arrays, that
 holds their SHA-256. A block without a marker, or whose arrays do not have these sums, is followed again. So
@@ -22,9 +22,8 @@ import zarr
 
 from conformance.files import sealed, unsealed, write_file
 from fast import Ensemble
-from mushrooms.store.layout import FIELDS, Array, Arrays, Shape, shape_of
 from mushrooms.store.progress import RunTally, tally_of
-from mushrooms.store.spec import SCHEMA, RunSpec, made_by, spec_of
+from mushrooms.store.spec import FIELDS, SCHEMA, Array, Arrays, RunSpec, Shape, made_by, shape_of, spec_of
 from scene.refusal import BadInput
 
 GROUP, MARKERS = "ensemble.zarr", "blocks"
@@ -142,7 +141,7 @@ class StoredRun:
             BadInput: it is missing or damaged.
         """
         arrays = {name: self.read(number, name) for name in self.shape.names}
-        return Block(arrays, self._found(number).seconds)
+        return Block(arrays, self._markers[number].seconds)
 
     def check(self) -> list[int]:
         """Read every block, count those that are as they were written, and return the damaged ones."""
@@ -156,9 +155,10 @@ class StoredRun:
         for number in range(self.shape.n_blocks):
             if self._path(number).exists():
                 try:
-                    block = self.block(number)
-                    self._count(self._found(number), block.tally)
+                    self._markers[number] = self._marker(number)
+                    self._count(self._markers[number], self.block(number).tally)
                 except BadInput:
+                    self._markers.pop(number, None)
                     damaged.append(number)
         return damaged
 
@@ -219,16 +219,14 @@ class StoredRun:
         Raises:
             BadInput: it is missing or damaged.
         """
-        marker, dims = self._found(number), FIELDS[name].dims
-        begin = number * self.shape.block
-        array = np.empty(0)
-        if self._is_open():
+        marker, begin = self._markers.get(number), number * self.shape.block
+        if marker is not None and self._is_open():
             with suppress(*UNREADABLE):
                 array = np.asarray(self._arrays[name][begin : begin + marker.rows])
-                array = array[:, : marker.cycles] if "cycle" in dims else array
-        if _sum(array) != marker.sums[name]:
-            raise self._damaged(number)
-        return array
+                array = array[:, : marker.cycles] if "cycle" in FIELDS[name].dims else array
+                if _sum(array) == marker.sums[name]:
+                    return array
+        raise self._damaged(number)
 
     def load(self) -> None:
         """Count the blocks by their markers alone: what is read later is checked then.
@@ -237,8 +235,8 @@ class StoredRun:
             BadInput: particles are missing.
         """
         for number in range(self.shape.n_blocks):
-            marker = self._marker(number)
-            if marker is not None:
+            with suppress(BadInput):
+                marker = self._marker(number)
                 self._count(marker, RunTally(particles=marker.rows))
         if any(self.lacking()):
             there, n = self.tally.particles, self.shape.n_particles
@@ -305,22 +303,19 @@ class StoredRun:
         where = f"block {number} of {str(self.folder / GROUP)!r}"
         return BadInput(f"{where} is missing or damaged: mushrooms simulate --resume mends it")
 
-    def _found(self, number: int) -> Marker:
-        """Return the marker of a block, or raise BadInput."""
-        marker = self._marker(number)
-        if marker is None:
-            raise self._damaged(number)
-        return marker
+    def _marker(self, number: int) -> Marker:
+        """Return the marker of a block from the disk.
 
-    def _marker(self, number: int) -> Marker | None:
-        """Return the marker of a block; None where there is none of this run, or none that is whole."""
+        Raises:
+            BadInput: there is none of this run, or none that is whole.
+        """
         content = unsealed(self._path(number))
         data = {} if content is None else json.loads(content)
-        if (data.get("run"), data.get("number")) != (self._identity, number):
-            return None
-        marker = Marker(**data)
-        is_larger = marker.rows > self.shape.rows(number) or marker.cycles > self.shape.n_cycles
-        return None if is_larger else marker
+        if (data.get("run"), data.get("number")) == (self._identity, number):
+            marker = Marker(**data)
+            if marker.rows <= self.shape.rows(number) and marker.cycles <= self.shape.n_cycles:
+                return marker
+        raise self._damaged(number)
 
     def _is_open(self) -> bool:
         """Open the arrays if they are not; tell whether their metadata can be read."""

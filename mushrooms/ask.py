@@ -20,7 +20,7 @@ from conformance.suite.process import Trouble
 from conformance.suite.run import N_FRESH
 from conformance.suite.session import Session
 from conformance.vectors import Vector
-from mushrooms.check import in_one_line
+from mushrooms.check import format_outcome
 from mushrooms.terminal import new_console
 from scene.refusal import MAX_SEED, BadInput
 
@@ -53,7 +53,7 @@ def ask(
     if result is None:
         return 0
     if result.answer is not None:
-        given = "\n           ".join(map(in_one_line, outcomes_of(result.answer)))
+        given = "\n           ".join(map(format_outcome, outcomes_of(result.answer)))
         print(f"given      {given}")
     new_console(soft_wrap=True).print(f"[bold]{result.verdict}[/]: {escape(result.why)}")
     return 0 if result.is_right else 1
@@ -87,7 +87,7 @@ def _show(vector: Vector, disguise: Disguise) -> None:
             f"{'certified' if i == 0 else 'or'}  {expectation.outcome} {expectation.reason}".rstrip()
         )
         for number, outcome in enumerate(middle(expectation, vector.state), 1):
-            console.print(f"  {number:>4}  {escape(in_one_line(msgspec.to_builtins(outcome)))}")
+            console.print(f"  {number:>4}  {escape(format_outcome(msgspec.to_builtins(outcome)))}")
         for begin, end in expectation.stays:
             console.print(f"  captured from step {begin + 1} to step {end + 1}")
     verdict = judge(vector)

@@ -14,7 +14,7 @@ from conformance.cases.attacks import UnderAttack, run
 from conformance.cases.table import FAMILIES
 from conformance.files import write_file
 from mushrooms import output
-from mushrooms.terminal import compilation_told, new_console, progress_bar
+from mushrooms.terminal import announce_compilation, new_console, progress_bar
 from scene import BadInput, Horizon, Mushroom, Scene, State, Undefined
 from scene.refusal import MAX_SEED
 
@@ -55,7 +55,7 @@ def attack(
         raise BadInput(f"--family = {family!r}, must be all or one of {', '.join(FAMILIES)}")
     if json_file is not None:
         output.check_file(json_file, (".json",))
-    with compilation_told(), progress_bar() as bar:
+    with announce_compilation(), progress_bar() as bar:
         task = bar.add_task("attack", total=cases * len(names))
         tallies = run(
             [FAMILIES[name] for name in names],

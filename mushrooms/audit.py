@@ -20,7 +20,7 @@ from conformance.audit.session import AuditResult, AuditSettings
 from conformance.files import write_files
 from mushrooms import audit_runs, output
 from mushrooms.output import locked
-from mushrooms.terminal import compilation_told, progress_bar, refuse_unheeded
+from mushrooms.terminal import announce_compilation, progress_bar, refuse_unheeded
 from scene.refusal import MAX_SEED, BadInput
 
 
@@ -72,10 +72,10 @@ def audit(
 
     Exit code 0 if every claim has its expected verdict, 1 if one has not, 2 on bad input.
     """
-    told = {"--scene": scene, "--backwards": backwards, "--energy": energy, "--energy-unit": energy_unit}
-    told |= {"--time-unit": time_unit, "--particles": particles}
+    theirs = {"--scene": scene, "--backwards": backwards, "--energy": energy, "--energy-unit": energy_unit}
+    theirs |= {"--time-unit": time_unit, "--particles": particles}
     if ensemble is None:
-        refuse_unheeded(told, "there is no --ensemble")
+        refuse_unheeded(theirs, "there is no --ensemble")
         _audit_paper(out, full, only, seed, threads, resume, commands, as_json)
         return
     from mushrooms.audit_ensemble import Options, audit_ensemble
@@ -109,10 +109,10 @@ def _audit_paper(
         return
     with output.writable_folder(out) as folder, locked(folder):
         settings = AuditSettings(size, seed, threads, folder / "findings", resume)
-        # What an audit that was killed was writing. Nobody else writes under these names: the folder is held.
+        # What a killed audit was writing: no other process writes under these names, as the folder is held.
         for path in (*folder.glob(".report.*.part"), *folder.glob("findings/.*.finding.*.part")):
             path.unlink(missing_ok=True)
-        result = _conducted(folder, settings, claims)
+        result = _conduct(folder, settings, claims)
         data = audit_page.to_data(result)
         texts = {
             "report.json": audit_page.to_json(data),
@@ -128,7 +128,7 @@ def _audit_paper(
     raise typer.Exit(0 if result.is_passed else 1)
 
 
-def _conducted(folder: Path, settings: AuditSettings, claims: tuple[Claim, ...]) -> AuditResult:
+def _conduct(folder: Path, settings: AuditSettings, claims: tuple[Claim, ...]) -> AuditResult:
     """Conduct an audit of the claims, and of those that are taken up, in a folder that is held."""
     if settings.resume:
         wanted = {claim.id for claim in claims} | session.kept(settings)
@@ -136,7 +136,7 @@ def _conducted(folder: Path, settings: AuditSettings, claims: tuple[Claim, ...])
         _check_report(folder, wanted)
     runs = audit_runs.KeptRuns(folder, settings.resume)
     runs.check(audit_runs.needed(claims, settings.size), settings.seed)
-    with compilation_told(), progress_bar() as bar:
+    with announce_compilation(), progress_bar() as bar:
         return session.conduct(
             AuditSteppers(fast.simulate, fast.trajectory, fast.flow),
             settings,

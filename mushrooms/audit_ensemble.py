@@ -1,4 +1,4 @@
-"""`mushrooms audit --ensemble`: an ensemble that somebody else has run, held to the paper; one page of it."""
+"""`mushrooms audit --ensemble`: an ensemble of another program, held to the paper; one page of it."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ def audit_ensemble(
     if options.time_unit not in (None, *TIMES):
         raise BadInput(f"--time-unit = {options.time_unit!r}, must be one of {', '.join(TIMES)}")
     with output.writable_folder(out) as folder:
-        result = conducted(path, found, reversed_path, options)
+        result = examine(path, found, reversed_path, options)
         data = to_data(result, path, scene_name)
         texts = {
             "report.json": json.dumps(data, indent=1, ensure_ascii=False) + "\n",
@@ -84,7 +84,7 @@ def audit_ensemble(
     return 0 if result.verdict == "confirmed" else 1
 
 
-def conducted(path: Path, scene: Mushroom, reversed_path: Path | None, options: Options) -> EnsembleAudit:
+def examine(path: Path, scene: Mushroom, reversed_path: Path | None, options: Options) -> EnsembleAudit:
     """Read an ensemble and check it."""
     given, notes = read(path, scene, options)
     theirs = expected(scene, given.energy)
@@ -111,11 +111,11 @@ def read(path: Path, scene: Mushroom, options: Options) -> tuple[GivenEnsemble, 
     notes = [f"energies are taken as {form}, lengths in the scene's unit: E0 = {energy:g} as v²/2"]
     if table.n_other:
         notes.append(f"{table.n_other:,} rows of another E0 are left out")
-    t_in, t_out, told = _times(scene, table.columns, options.time_unit)
+    t_in, t_out, more = _times(scene, table.columns, options.time_unit)
     captured = table.columns.get("captured")
     if captured is None and t_in is not None:
         captured = np.isfinite(t_in)
-        told = [*told, "captured are those with a t_in"]
+        more = [*more, "captured are those with a t_in"]
     elif captured is not None:
         _check_flags(path, captured)
     n_lost = table.n_lost
@@ -140,7 +140,7 @@ def read(path: Path, scene: Mushroom, options: Options) -> tuple[GivenEnsemble, 
             table.is_binary32,
             table.sums[:, 1:] if table.sums.shape[1] > 1 else None,
         ),
-        [*notes, *told],
+        [*notes, *more],
     )
 
 
@@ -175,11 +175,11 @@ def _times(scene: Mushroom, columns: dict[str, Any], unit: str | None) -> tuple[
         how = "inferred"
     else:
         how = "as said"
-    told = (
+    note = (
         f"times are taken {'as parts of a cycle' if unit == 'cycles' else 'in the unit of the scene'}, {how}"
     )
     size = span if unit == "cycles" else 1.0
-    return t_in * size, None if t_out is None else t_out * size, [told]
+    return t_in * size, None if t_out is None else t_out * size, [note]
 
 
 def _falls(scene: Mushroom, times: Any, rather_than: Any) -> bool:

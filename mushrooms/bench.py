@@ -27,7 +27,7 @@ from mushrooms import output
 from mushrooms.figures import speed as figures_of_speed
 from mushrooms.figures import style
 from mushrooms.reports import bench_page
-from mushrooms.terminal import compilation_told, new_console, progress_bar, refuse_unheeded
+from mushrooms.terminal import announce_compilation, new_console, progress_bar, refuse_unheeded
 from scene.refusal import MAX_SEED, BadInput
 
 TIMEOUT, RESTARTS = 30.0, 1  # of a command
@@ -70,8 +70,8 @@ def bench(
         print(bench_page.to_markdown(record.read(table), workload or "moving-cap-1e7"), end="")
         return
     size: Size = "quick" if quick else "full"
-    with output.writable_folder(out) as folder, compilation_told():
-        found = _measured(size, seed, command or [])
+    with output.writable_folder(out) as folder, announce_compilation():
+        found = _measure(size, seed, command or [])
         picture = style.svg(figures_of_speed.headline(found))
         files: dict[str, bytes | str | Writer] = {
             "bench.json": record.encode(found),
@@ -86,7 +86,7 @@ def bench(
     print(f"{found.seconds:.0f} s. Report: {folder / 'bench.html'}")
 
 
-def _measured(size: Size, seed: int, command: list[str]) -> Record:
+def _measure(size: Size, seed: int, command: list[str]) -> Record:
     """Run everything."""
     begin = time.monotonic()
     n_questions, n_further, repeats = QUESTIONS[size], FURTHER[size], REPEATS[size]

@@ -159,22 +159,22 @@ def _run(
             groups=groups,
             limits=limits,
             known=known,
-            progress=_teller(bar),
+            progress=_new_progress(bar),
         )
 
 
-def _teller(bar: Progress) -> Callable[[int, int], None]:
+def _new_progress(bar: Progress) -> Callable[[int, int], None]:
     """Return what moves a bar on a terminal, and elsewhere writes a line on stderr now and then."""
-    task, told = bar.add_task("cases", total=None), time.monotonic()
+    task, last = bar.add_task("cases", total=None), time.monotonic()
 
-    def tell(n_done: int, n_total: int) -> None:
-        nonlocal told
+    def on_progress(n_done: int, n_total: int) -> None:
+        nonlocal last
         bar.update(task, completed=n_done, total=n_total)
-        if bar.disable and time.monotonic() - told > EVERY:
-            told = time.monotonic()
+        if bar.disable and time.monotonic() - last > EVERY:
+            last = time.monotonic()
             print(f"{n_done} of {n_total} cases", file=sys.stderr, flush=True)
 
-    return tell
+    return on_progress
 
 
 def show(run: Run) -> None:
@@ -224,8 +224,8 @@ def _show_objections(console: Console, run: Run) -> None:
     for result in [r for r in run.results if r.expected and not r.is_known and not r.is_right][:MAX_TAUGHT]:
         again = f"mushrooms ask {result.id} --seed {run.seed}"
         console.print(f"{result.id}, asked {escape(result.asked)}; {again} prints it")
-        console.print(f"  given     {escape(in_one_line(result.given))}")
-        console.print(f"  certified {escape(in_one_line(result.expected))}")
+        console.print(f"  given     {escape(format_outcome(result.given))}")
+        console.print(f"  certified {escape(format_outcome(result.expected))}")
     wrong = [r for r in run.results if not r.is_right and not r.is_known]
     for result in [r for r in wrong if r.paste][:MAX_TAUGHT]:
         console.print(
@@ -239,7 +239,7 @@ def _show_objections(console: Console, run: Run) -> None:
         console.print(f"[yellow]{escape(line)}[/]")
 
 
-def in_one_line(outcome: dict[str, Any] | None) -> str:
+def format_outcome(outcome: dict[str, Any] | None) -> str:
     """Return an outcome's fields on a line."""
     if outcome is None:
         return "nothing"
@@ -249,8 +249,8 @@ def in_one_line(outcome: dict[str, Any] | None) -> str:
 
 
 def _title(run: Run) -> str:
-    who = run.introduction
-    name = f"{who.name} {who.version} ({who.language})" if who else shlex.join(run.command)
+    known = run.introduction
+    name = f"{known.name} {known.version} ({known.language})" if known else shlex.join(run.command)
     return escape(f"{name}, level {run.level}, corpus {run.corpus}")
 
 
@@ -261,7 +261,7 @@ def _cell(verdict: str, n: int) -> str:
 def _verdict(run: Run, total: Any) -> str:
     passed = f"{total.counts['pass']} of {total.cases} cases pass"
     restarts = f", {run.n_restarts} restarts" if run.n_restarts else ""
-    doubt = ": the corpus could not tell, which is its own fault" if run.exit_code() == 2 else ""
+    doubt = ": the corpus could not on_progress, which is its own fault" if run.exit_code() == 2 else ""
     return f"{passed}{restarts}, {run.seconds:.1f} s{doubt}."
 
 
@@ -297,7 +297,7 @@ def grade_file(answers: Path, questions: Path | None, level: str, seed: int | No
         answers: the file, or a folder of CSV files.
         questions: what they answer, where the key is beside it; else the fresh questions are proved anew.
         level: of the questions, where nothing else tells.
-        seed: likewise; None where the answers tell it.
+        seed: likewise; None where the answers on_progress it.
 
     Raises:
         BadInput: in one line.
@@ -308,9 +308,9 @@ def grade_file(answers: Path, questions: Path | None, level: str, seed: int | No
         if seed not in (None, sheet.seed):
             raise BadInput(f"--seed = {seed}, must be {sheet.seed}, that of the questions")
         return grade_answers(sheet, found)
-    told = signed(found.echoes)
-    if told is None and seed is None:
+    written_with = signed(found.echoes)
+    if written_with is None and seed is None:
         raise BadInput("--answers: give --questions, or the --seed and --level that they were written with")
-    level, seed = told if told is not None and seed is None else (level, seed)
+    level, seed = written_with if written_with is not None and seed is None else (level, seed)
     assert seed is not None
     return grade_answers(Sheet(level, seed), found)

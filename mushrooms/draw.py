@@ -21,7 +21,7 @@ from mushrooms.simulate import draw_energies
 from mushrooms.store.run import is_run, open_run
 from mushrooms.terminal import (
     SceneName,
-    compilation_told,
+    announce_compilation,
     progress_bar,
     refuse_unheeded,
 )
@@ -156,7 +156,7 @@ def draw(
     if kinds or export is None or out is not None:
         _check_drawable(table)
         paths = _paths(out or Path(f"{Path(scene).stem}.svg"), kinds)
-    with compilation_told():
+    with announce_compilation():
         if export is not None:
             arguments.follow("trajectory", 1)[0].write(export)
             print(export)

@@ -202,12 +202,12 @@ app = typer.Typer(
 )
 
 
-_told = list[str]()  # of an interruption, in this call of `run`
+_notes = list[str]()  # of an interruption, in this call of `run`
 
 
 def tell_interrupted(kept: str) -> None:
     """Say on stderr that the command was interrupted, and what is kept; a command that knows more says it."""
-    _told.append(kept)
+    _notes.append(kept)
     with suppress(OSError):  # the terminal may be what has gone, or be full: the exit code still tells
         print(f"{PROGRAM}: interrupted; {kept}", file=sys.stderr, flush=True)
 
@@ -232,7 +232,7 @@ def _is_of_an_interrupt(error: BaseException | None) -> bool:
 
 def run(arguments: list[str] | None = None) -> NoReturn:
     """Run the command line and exit: 0 done, 1 a claim failed, 2 bad input, 130 interrupted."""
-    _told.clear()
+    _notes.clear()
     _make_printable()
     try:
         _call(sys.argv[1:] if arguments is None else arguments)
@@ -254,13 +254,13 @@ def _call(given: list[str]) -> NoReturn:
     except UsageError as error:
         _refuse(error.format_message())
     except OSError as error:
-        _refuse(_in_words(error))
+        _refuse(_format_error(error))
     except ValueError as error:
         from scene.refusal import BadInput  # not above: the list of commands needs no scene
 
         if not isinstance(error, BadInput):
             raise
-        _refuse(_in_options(str(error), given))
+        _refuse(_name_option(str(error), given))
     except BrokenExecutor as error:
         _refuse(f"a process of this run was ended from outside: {error}")
     except (MemoryError, RecursionError) as error:
@@ -272,7 +272,7 @@ def _call(given: list[str]) -> NoReturn:
         code = INTERRUPTED
     if code == INTERRUPTED:
         kept = next((COMMANDS[word].kept for word in given if word in COMMANDS), "")
-        if kept and not _told:
+        if kept and not _notes:
             tell_interrupted(kept)
     sys.exit(code if isinstance(code, int) else 0)
 
@@ -306,7 +306,7 @@ def _let_go(stream: IO[str]) -> None:
             os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
 
 
-def _in_words(error: OSError) -> str:
+def _format_error(error: OSError) -> str:
     """Return what the system refused; of a file it gives the name (`conformance.files` sees to that)."""
     if error.filename is None and error.errno in (errno.ENOSPC, errno.EIO, errno.EBADF, errno.EDQUOT):
         return f"standard output cannot be written: {error.strerror}"
@@ -324,7 +324,7 @@ def _refuse_empty(given: list[str]) -> None:
             _refuse(f"{option.rstrip('=')} is empty, must have a value")
 
 
-def _in_options(message: str, given: list[str]) -> str:
+def _name_option(message: str, given: list[str]) -> str:
     """Return a message that begins with the name of an argument in Python with that of the option given."""
     field, equals, rest = message.partition(" = ")
     option = f"--{field.replace('_', '-')}"

@@ -80,7 +80,7 @@ def _at_energy(scene: Scene, energy: float) -> dict[str, float | bool | None]:
     import theory
 
     speed, n_collisions = math.sqrt(2 * energy), expected_collisions(scene, energy, 1)
-    begun: dict[str, float | bool | None] = {
+    first: dict[str, float | bool | None] = {
         "energy": energy,
         "v": float(f"{speed:.7g}"),
         "collisions": float(f"{n_collisions:.3g}") if math.isfinite(n_collisions) else None,
@@ -89,7 +89,7 @@ def _at_energy(scene: Scene, energy: float) -> dict[str, float | bool | None]:
         found = theory.at_energy(scene, energy)
     except theory.NotCovered as reason:
         print(f"{reason}. What is printed is the limit of high energies", file=sys.stderr)
-        return begun
+        return first
     (peak, variance), left = found.peak, found.theory_error
     figures = {
         "p_nc_at": found.p_nc,
@@ -104,5 +104,5 @@ def _at_energy(scene: Scene, energy: float) -> dict[str, float | bool | None]:
         "peak_width_error": variance**0.5 * left.variance / 2,
     }
     digits = {name: 2 if name.endswith("_error") else 7 for name in figures}
-    told = {name: x if x is None else float(f"{x:.{digits[name]}g}") for name, x in figures.items()}
-    return {**begun, **told, "is_in_reach": left.variance < 0.5}
+    rounded = {name: x if x is None else float(f"{x:.{digits[name]}g}") for name, x in figures.items()}
+    return {**first, **rounded, "is_in_reach": left.variance < 0.5}

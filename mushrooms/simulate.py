@@ -29,7 +29,7 @@ from mushrooms.store.spec import RunSpec
 from mushrooms.terminal import (
     AsJson,
     SceneName,
-    compilation_told,
+    announce_compilation,
     print_pairs,
     progress_bar,
 )
@@ -141,7 +141,7 @@ def simulate(
             found = stored
     summary, gains = found
     print_pairs(summary, as_json)
-    tell(compared.limit_told(spec, summary))
+    tell(compared.explain_limit(spec, summary))
     if plot is not None:
         draw_energies(plot, spec, iter(gains()), particles)
     return 0
@@ -191,7 +191,7 @@ def _in_memory(arguments: CliArgs) -> tuple[dict[str, Any], Gains]:
     """Follow an ensemble that is not stored; return its summary and its gains."""
     spec = arguments.spec
     try:
-        with compilation_told(), progress_bar() as bar:
+        with announce_compilation(), progress_bar() as bar:
             found = fast.simulate(
                 spec.scene,
                 n_particles=arguments.particles,
@@ -218,8 +218,8 @@ def _on_disk(arguments: CliArgs, folder: Path, resume: bool) -> tuple[dict[str, 
     command = spec.command(arguments.scene, n, folder)
     default = conduct.block_of_new(spec, n, arguments.n_threads)
     try:
-        with compilation_told():
-            run, damaged = conduct.opened(folder, spec, n, arguments.block, default, command, resume)
+        with announce_compilation():
+            run, damaged = conduct.open_or_create(folder, spec, n, arguments.block, default, command, resume)
     except OSError as error:
         raise BadInput(f"output {str(folder)!r}: {error.strerror or error}") from None
     tell_damaged(damaged)
@@ -261,7 +261,7 @@ def _complete(arguments: CliArgs, run: StoredRun) -> None:
     engine = engines.in_process(arguments.threads)
     if arguments.dask:
         engine = engines.by_dask(arguments.dask, arguments.threads)
-    with compilation_told(), progress_bar() as bar:
+    with announce_compilation(), progress_bar() as bar:
         watch = arguments.watch(bar, before)
         conduct.complete(
             run,
@@ -304,7 +304,7 @@ def tell_damaged(numbers: list[int]) -> None:
 
 
 def draw_energies(path: Path, spec: RunSpec, gains: Iterator[Any], n_particles: int) -> None:
-    """Write the histogram of ln(E1/E0) of those who take part; of several cycles the mean after each, too.
+    """Write the histogram of ln(E1/E0) of those that take part; of several cycles the mean after each, too.
 
     Raises:
         BadInput: they are too few.

@@ -31,28 +31,28 @@ SLOW_TO_COMPILE = {
 
 
 @contextmanager
-def compilation_told() -> Iterator[None]:
+def announce_compilation() -> Iterator[None]:
     """Say on stderr when the fast stepper is compiled: numba tells when it has found nothing kept.
 
-    What is compiled one after the other and takes a while together is told once.
+    What is compiled one after the other and takes a while together is announced once.
     """
     from numba.core import event
 
-    told_before = set()
+    announced = set()
 
-    class Teller(event.Listener):  # type: ignore[misc]  # numba has no types
-        def on_start(self, told: Any) -> None:
-            compiled = told.data["dispatcher"]
+    class Announcer(event.Listener):  # type: ignore[misc]  # numba has no types
+        def on_start(self, compilation: Any) -> None:
+            compiled = compilation.data["dispatcher"]
             duration = SLOW_TO_COMPILE.get(compiled.py_func.__name__)
-            if duration is not None and compiled.stats.cache_path and duration not in told_before:
-                told_before.add(duration)
+            if duration is not None and compiled.stats.cache_path and duration not in announced:
+                announced.add(duration)
                 what = f"compiling the fast stepper for this machine: {duration}"
                 print(f"{what}; kept for next time", file=sys.stderr, flush=True)
 
-        def on_end(self, told: Any) -> None:
+        def on_end(self, compilation: Any) -> None:
             pass
 
-    with event.install_listener("numba:compile", Teller()):
+    with event.install_listener("numba:compile", Announcer()):
         yield
 
 
@@ -78,7 +78,7 @@ def progress_bar() -> progress.Progress:
 
 
 def refuse_unheeded(options: Mapping[str, object], why: str) -> None:
-    """Refuse options that nothing here would heed: whoever gives one counts on it.
+    """Refuse options that nothing here would heed: their user would count on them.
 
     Args:
         options: by name; None is one that is not given, True one that has no value.

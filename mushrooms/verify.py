@@ -38,14 +38,14 @@ def verify(
     if picture is not None:
         output.check_file(picture, (".svg",))
     text = _read(file, scene)
-    verdicts = _judged(file, text)
+    verdicts = _judge(file, text)
     for place, status, reason in verdicts:
         print(f"{place}: {status}: {reason}")
     n_proved = sum(status == "proved" for _, status, _ in verdicts)
     print(f"{n_proved} of {len(verdicts)} proved")
     wrong = next((i for i, (_, status, _) in enumerate(verdicts) if status == "false"), None)
     if picture is not None and wrong is not None:
-        write_file(picture, _drawn(json.loads(text), wrong))
+        write_file(picture, _draw(json.loads(text), wrong))
         print(f"Picture of step {wrong + 1}: {picture}")
     raise typer.Exit(int(n_proved < len(verdicts)))
 
@@ -76,7 +76,7 @@ def _of_rows(file: Path, scene: str) -> dict[str, Any]:
     return {"scene": wire_form(scene_named(scene)), "state": states[0], "steps": states[1:]}
 
 
-def _judged(file: Path, text: str) -> list[tuple[str, str, str]]:
+def _judge(file: Path, text: str) -> list[tuple[str, str, str]]:
     """Return place, status and reason of each step."""
     errors = verifier.Unreadable, verifier.Refused, verifier.Unproved
     try:
@@ -85,7 +85,7 @@ def _judged(file: Path, text: str) -> list[tuple[str, str, str]]:
         raise BadInput(f"trajectory {str(file)!r}: {error}") from None
 
 
-def _drawn(data: dict[str, Any], at: int) -> bytes:
+def _draw(data: dict[str, Any], at: int) -> bytes:
     """Draw a step as it was given, and as the reference has it."""
     from mushrooms.figures import case  # drawing takes a second to import
 

@@ -42,16 +42,16 @@ def _small(monkeypatch):
 
 @pytest.fixture
 def followed(monkeypatch):
-    """Return the list of pieces that are followed, (first particle, how many), without probes."""
-    pieces, go_on = [], fast.go_on
+    """Return the list of block ranges that are followed, (first particle, how many), without probes."""
+    block_ranges, go_on = [], fast.go_on
 
     def noted(scene, **options):
         if options["n_particles"] != conduct.PROBED:
-            pieces.append((options.get("first", 0), options["n_particles"]))
+            block_ranges.append((options.get("first", 0), options["n_particles"]))
         return go_on(scene, **options)
 
     monkeypatch.setattr(fast, "go_on", noted)
-    return pieces
+    return block_ranges
 
 
 def kept(folder, run, size="quick", *, resume=True, seed=SEED):
@@ -131,12 +131,12 @@ def test_whatever_happens_to_a_kept_run_the_audit_sees_the_same_bits(tmp_path, m
     run = SMALL["breathing"]
     wanted = {size: at_once(run, size) for size in ("quick", "full")}
 
-    def sometimes(self, piece, block):
+    def sometimes(self, block_range, block):
         nonlocal left
         left -= 1
         if left < 0:
             raise [KeyboardInterrupt, OSError(5, "input/output error")][random.integers(2)]
-        keep(self, piece, block)
+        keep(self, block_range, block)
 
     monkeypatch.setattr(StoredRun, "keep", sometimes)
     for number in range(3):
@@ -279,9 +279,9 @@ def test_energies_at_phases_are_kept_drawn_and_exported(command_line, tmp_path):
 def test_what_is_not_there_yet_has_no_phase(tmp_path):
     """A run of three blocks of which only the second is kept."""
     spec = audit_runs.spec_of(SMALL["mouth"], SEED)
-    run, _ = conduct.opened(tmp_path, spec, 150, 64, 64, "", False)
-    piece = list(run.missing())[1]
-    run.keep(piece, audit_runs.engines.follow(spec, piece, 1))
+    run, _ = conduct.open_or_create(tmp_path, spec, 150, 64, 64, "", False)
+    block_range = list(run.missing())[1]
+    run.keep(block_range, audit_runs.engines.follow(spec, block_range, 1))
     with xarray.open_zarr(tmp_path / "ensemble.zarr", mask_and_scale=False) as found:
         there = np.zeros(150, bool)
         there[64:128] = True

@@ -47,22 +47,22 @@ def summary_of(ended):
 def _whole_sums(monkeypatch):
     """Leave the theory, which takes seconds, out of the summary."""
     monkeypatch.setattr(compared, "measured", lambda _spec, n, gain: {"captured": n, **gain._asdict()})
-    monkeypatch.setattr(compared, "limit_told", lambda _spec, _summary: None)
+    monkeypatch.setattr(compared, "explain_limit", lambda _spec, _summary: None)
 
 
 @pytest.fixture
 def followed(monkeypatch):
     """Return the list of what is followed: first particle, how many, from which cycle on and up to which."""
-    pieces, go_on = [], fast.go_on
+    block_ranges, go_on = [], fast.go_on
 
     def noted(scene, **options):
         before = options["before"]
         n_before = 0 if before is None else before.ensemble.cycle_energies.shape[1]
-        pieces.append((options["first"], options["n_particles"], n_before, options["n_cycles"]))
+        block_ranges.append((options["first"], options["n_particles"], n_before, options["n_cycles"]))
         return go_on(scene, **options)
 
     monkeypatch.setattr(fast, "go_on", noted)
-    return pieces
+    return block_ranges
 
 
 @pytest.mark.parametrize("name", deep_but(["fermi-ulam", "moving-cap", "breathing-circle"], "moving-cap"))
@@ -107,12 +107,12 @@ def test_a_lengthening_that_is_broken_off_goes_on(command_line, tmp_path, follow
     """Also to more cycles than it was broken off at; blocks of three lengths stand side by side."""
     keep, left = StoredRun.keep, 0
 
-    def interrupted(self, piece, block):
+    def interrupted(self, block_range, block):
         nonlocal left
         left -= 1
         if left < 0:
             raise KeyboardInterrupt
-        keep(self, piece, block)
+        keep(self, block_range, block)
 
     monkeypatch.setattr(StoredRun, "keep", interrupted)
     left = 10
@@ -154,9 +154,9 @@ def test_a_block_that_is_half_lengthened_is_followed_from_the_start(
 
     keep = StoredRun.keep
 
-    def dies(self, piece, block):
+    def dies(self, block_range, block):
         monkeypatch.setattr(stored, "write_file", no_marker)
-        keep(self, piece, block)
+        keep(self, block_range, block)
 
     monkeypatch.setattr(StoredRun, "keep", dies)
     if n_written < 100:

@@ -96,8 +96,8 @@ def test_workers_may_die(command_line, tmp_path, ensemble, monkeypatch):
     with cluster(2, processes=True) as there:
         pids = [worker.process.pid for worker in there.workers.values()]
 
-        def then_killed(self, piece, block):
-            keep(self, piece, block)
+        def then_killed(self, block_range, block):
+            keep(self, block_range, block)
             if not killed:
                 os.kill(pids[0], 9)
                 killed.append(pids[0])
@@ -124,8 +124,8 @@ def test_a_lost_cluster_is_one_line_that_says_how_to_go_on(
     keep, result = StoredRun.keep, distributed.Future.result
     with cluster(1, processes=False) as there:
 
-        def then_lost(self, piece, block):
-            keep(self, piece, block)
+        def then_lost(self, block_range, block):
+            keep(self, block_range, block)
             monkeypatch.setattr(distributed.Future, "result", lost)
 
         def lost(_future):

@@ -49,15 +49,15 @@ def run_at_once(name, n, energy=ENERGY, n_cycles=1):
 
 @pytest.fixture
 def followed(monkeypatch):
-    """Return the list of pieces that are followed: first particle and how many."""
-    pieces, go_on = [], fast.go_on
+    """Return the list of block ranges that are followed: first particle and how many."""
+    block_ranges, go_on = [], fast.go_on
 
     def noted(scene, **options):
-        pieces.append((options["first"], options["n_particles"]))
+        block_ranges.append((options["first"], options["n_particles"]))
         return go_on(scene, **options)
 
     monkeypatch.setattr(fast, "go_on", noted)
-    return pieces
+    return block_ranges
 
 
 def digest_of(ended):
@@ -82,9 +82,9 @@ def test_blocks_of_any_size_have_one_digest(tmp_path, name, energy, n_cycles):
         folder = tmp_path / str(block)
         folder.mkdir()
         run = StoredRun(folder, spec, shape_of(spec, 150, block), "")
-        pieces = list(run.missing())
-        for i in random.permutation(len(pieces)).tolist():
-            run.keep(pieces[i], engines.follow(spec, pieces[i], 1))
+        block_ranges = list(run.missing())
+        for i in random.permutation(len(block_ranges)).tolist():
+            run.keep(block_ranges[i], engines.follow(spec, block_ranges[i], 1))
         assert run.sha256() == wanted
         tallies.add((run.tally, gain_of(run.gains)))
     assert len(tallies) == 1
@@ -95,9 +95,9 @@ def test_a_run_goes_on_and_is_widened_from_its_last_full_block(
 ):
     keep, n_kept = StoredRun.keep, 0
 
-    def interrupted(self, piece, block):
+    def interrupted(self, block_range, block):
         nonlocal n_kept
-        keep(self, piece, block)
+        keep(self, block_range, block)
         n_kept += 1
         if n_kept == 2:
             raise KeyboardInterrupt
@@ -305,12 +305,12 @@ def test_whatever_happens_in_whatever_order_the_bits_are_the_same(command_line, 
     random, keep = np.random.default_rng(11), StoredRun.keep
     left = 0
 
-    def sometimes(self, piece, block):
+    def sometimes(self, block_range, block):
         nonlocal left
         left -= 1
         if left < 0:
             raise [KeyboardInterrupt, OSError(errno.EIO, "input/output error")][random.integers(2)]
-        keep(self, piece, block)
+        keep(self, block_range, block)
 
     monkeypatch.setattr(StoredRun, "keep", sometimes)
     for number in range(int(os.environ.get("MUSHROOMS_HARMS", "4"))):
@@ -331,8 +331,8 @@ def faulty_sums(_array):
     return "as it was"
 
 
-def faulty_follow(spec, piece, threads, tick=None):
-    return follow(spec, piece._replace(first=0), threads, tick)
+def faulty_follow(spec, block_range, threads, on_progress=None):
+    return follow(spec, block_range._replace(first=0), threads, on_progress)
 
 
 def faulty_digest(run):

@@ -1,6 +1,6 @@
 """A case of the suite: the given path over the certified one, in the whole table and near the hit.
 
-Colours have one meaning in all of these figures, told once on the page (`LEGEND`).
+Colours have one meaning in all of these figures, explained once on the page (`LEGEND`).
 """
 
 from __future__ import annotations

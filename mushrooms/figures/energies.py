@@ -162,9 +162,9 @@ def growth(scene: Scene, energy: float, gains: Gains, n_particles: int | None = 
     shown = np.unique(np.linspace(0, cycles[-1], min(N_MARKS, len(cycles))).astype(int))
     error = sd[shown] / np.sqrt(bars.n)
     above.errorbar(cycles[shown], mean[shown], error, fmt="o", color=BLUE, markersize=3.5, label="mean")
-    told = [(k, predicted(RunSpec(scene, energy, int(k), 0))) for k in shown[1:]]
-    if all(one is not None for _, one in told):
-        line = np.array([0.0, *(k * one.m1 for k, one in told if one is not None)])
+    predictions = [(k, predicted(RunSpec(scene, energy, int(k), 0))) for k in shown[1:]]
+    if all(one is not None for _, one in predictions):
+        line = np.array([0.0, *(k * one.m1 for k, one in predictions if one is not None)])
         above.plot(
             cycles[shown], line, color=BLACK, linewidth=1.5, label=f"theory, m1 = {line[1]:.4f} a cycle"
         )

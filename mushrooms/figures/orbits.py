@@ -37,7 +37,7 @@ CAPTURED, FREE = plots.BLUE, plots.ORANGE
 HALO = [withStroke(linewidth=2.5, foreground="white")]
 
 
-def _given(orbits: Sequence[FollowedOrbit] | FollowedOrbit) -> list[FollowedOrbit]:
+def _check_orbits(orbits: Sequence[FollowedOrbit] | FollowedOrbit) -> list[FollowedOrbit]:
     found = [orbits] if isinstance(orbits, FollowedOrbit) else list(orbits)
     if not all(isinstance(orbit, FollowedOrbit) for orbit in found):
         raise BadInput(f"orbits = {shown(orbits)}, must be what mushrooms.orbits.follow returns")
@@ -49,7 +49,7 @@ def _given(orbits: Sequence[FollowedOrbit] | FollowedOrbit) -> list[FollowedOrbi
 @rc_context(plots.STYLE)
 def trajectory(orbit: FollowedOrbit) -> Figure:
     """Draw an orbit's path in its table: walls at its start and end, their names, the mouth, the start."""
-    [orbit] = _given(orbit)
+    [orbit] = _check_orbits(orbit)
     figure, axes = plots.new_figure(6.4, 6.0)
     states = orbit.states()
     begin, end = float(states[0, 0]), float(states[-1, 0])
@@ -124,7 +124,7 @@ def section(orbits: Sequence[FollowedOrbit] | FollowedOrbit, phase: float | None
         BadInput: the walls stand still, and a phase is asked for or the table is a stem.
     """
     figure, axes = plots.new_figure(6.4, 5.2)
-    found = _given(orbits)
+    found = _check_orbits(orbits)
     draw = _draw_stem if isinstance(found[0].scene, Stem) else draw_section
     draw(axes, found, phase)
     axes.set(title=_title(found) + ("" if phase is None else f", at t/T = {phase:g}"))
@@ -194,7 +194,7 @@ def _points(
 def collision_map(orbits: Sequence[FollowedOrbit] | FollowedOrbit) -> Figure:
     """Draw the boundary map: place along the whole boundary against the sine after each collision."""
     figure, axes = plots.new_figure(7.6, 5.0)
-    draw_map(axes, _given(orbits))
+    draw_map(axes, _check_orbits(orbits))
     figure.legend(loc="outside lower center", ncols=2)
     return figure
 
@@ -220,7 +220,7 @@ def energy_in_time(orbit: FollowedOrbit) -> Figure:
 
     For many particles use `mushrooms.figures.energies.growth`.
     """
-    [orbit] = _given(orbit)
+    [orbit] = _check_orbits(orbit)
     figure, axes = plots.new_figure(7.2, 4.4)
     span = orbit.scene.period
     states = orbit.states()
@@ -257,12 +257,12 @@ def exponents(
     Raises:
         BadInput: as `mushrooms.lyapunov.stretching`.
     """
-    found = _given(orbits)
+    found = _check_orbits(orbits)
     figure, axes = plots.new_figure(7.2, 4.4)
     n_before = 0
     for k, (orbit, colour) in enumerate(zip(found, plots.phase_colours(len(found)), strict=True)):
-        told = None if progress is None else (lambda n, before=n_before: progress(before + n))
-        one = lyapunov.stretching(orbit, told)
+        report = None if progress is None else (lambda n, before=n_before: progress(before + n))
+        one = lyapunov.stretching(orbit, report)
         n_before += len(orbit.walls)
         count = np.arange(1, len(one.logs) + 1)
         label = f"{one.exponent:.3f} ± {one.error:.3f} a collision"
@@ -284,7 +284,7 @@ def write_animation(orbit: FollowedOrbit, file: BinaryIO, n_frames: int = N_FRAM
         file: open for binary writing.
         n_frames: number of frames.
     """
-    [orbit] = _given(orbit)
+    [orbit] = _check_orbits(orbit)
     states = orbit.states()
     times = np.linspace(states[0, 0], states[-1, 0], n_frames)
     places, last = orbit.at(times), np.searchsorted(states[:, 0], times, side="right") - 1

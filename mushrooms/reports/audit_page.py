@@ -34,7 +34,7 @@ GROUPS = {
     "Beyond the paper": "D",
     "Formulas and identities, one by one": "IN",
 }
-# A verdict is told by its sign and its word, and coloured: paper right, paper wrong, not decided.
+# A verdict has a sign and a word, and coloured: paper right, paper wrong, not decided.
 SIGNS = {
     "confirmed": ("✓", "good"),
     "misprint": ("✎", "bad"),

@@ -52,7 +52,7 @@ def block_of_new(spec: RunSpec, n_particles: int, threads: int) -> int:
     return min(block_size(spec, threads), max(ROOM, 1 << (n_particles - 1).bit_length()))
 
 
-def opened(
+def open_or_create(
     folder: Path,
     spec: RunSpec,
     n_particles: int,
@@ -82,7 +82,7 @@ def opened(
     found: dict[str, Any] = {"block": block or default, "cycles_of_a_chunk": None}
     is_there = is_run(folder)
     if is_there:
-        found = described(folder, spec, {} if block is None else {"block": block})
+        found = read_description(folder, spec, {} if block is None else {"block": block})
         if at_least and found["particles"] > n_particles:
             n_particles, command = found["particles"], found["command"]
         _check_growth(folder, "particles", found["particles"], n_particles)
@@ -102,7 +102,7 @@ def opened(
     return run, damaged if is_there else []
 
 
-def described(folder: Path, spec: RunSpec, more: dict[str, object]) -> dict[str, Any]:
+def read_description(folder: Path, spec: RunSpec, more: dict[str, object]) -> dict[str, Any]:
     """Return the description of a stored run, if it is the one asked for, with as many cycles or fewer.
 
     Raises:
@@ -151,25 +151,25 @@ def complete(
         OSError: a block could not be written; the one followed meanwhile is dropped.
     """
     begin, n = CLOCK(), run.shape.n_particles if n_particles is None else n_particles
-    there = n - sum(piece.n for piece in run.lacking() if piece.first < n)
+    there = n - sum(block_range.n for block_range in run.lacking() if block_range.first < n)
 
     def report(n_done: int) -> None:
         on_progress(max(0, there + n_done))  # the last block may have more particles than are asked for
         if max_seconds is not None and CLOCK() - begin > max_seconds:
             raise LimitReached(f"--max-seconds = {max_seconds:g} have passed")
 
-    pieces = (piece for piece in run.missing() if piece.first < n)
-    with closing(engine(run.spec, pieces, report)) as found, ThreadPoolExecutor(1) as writer:
+    block_ranges = (block_range for block_range in run.missing() if block_range.first < n)
+    with closing(engine(run.spec, block_ranges, report)) as found, ThreadPoolExecutor(1) as writer:
         under_way: Future[None] | None = None
-        for piece, block in found:
+        for block_range, block in found:
             most = block.tally.most
             if max_collisions is not None and most > max_collisions:
-                made = f"a particle of block {piece.number} makes {most} collisions"
+                made = f"a particle of block {block_range.number} makes {most} collisions"
                 raise LimitReached(f"{made}, --max-collisions = {max_collisions}")
             if under_way is not None:
                 under_way.result()
-            under_way = writer.submit(run.keep, piece, block)
-            there += piece.n
+            under_way = writer.submit(run.keep, block_range, block)
+            there += block_range.n
             on_block(block)
             on_progress(max(0, there))
         if under_way is not None:
@@ -187,12 +187,12 @@ def _probe(run: StoredRun) -> None:
         return
     stored = {name: array[:PROBED] for name, array in run.block(there).arrays.items()}
     n, n_cycles = stored["cycle_energies"].shape
-    piece, spec = BlockRange(there, there * run.shape.block, n), run.spec
-    first = follow(spec._replace(n_cycles=n_cycles), piece, None)
+    block_range, spec = BlockRange(there, there * run.shape.block, n), run.spec
+    first = follow(spec._replace(n_cycles=n_cycles), block_range, None)
     _compare(run, stored, first.arrays)
     if n_cycles < spec.n_cycles:
-        longer = follow(spec, piece._replace(before=first._replace(arrays=stored)), None)
-        _compare(run, longer.arrays, follow(spec, piece, None).arrays)
+        longer = follow(spec, block_range._replace(before=first._replace(arrays=stored)), None)
+        _compare(run, longer.arrays, follow(spec, block_range, None).arrays)
 
 
 def _compare(run: StoredRun, ones: Arrays, others: Arrays) -> None:

@@ -14,7 +14,7 @@ import numpy.typing as npt
 from rich.progress import Progress
 
 from fast.ensemble import FOLLOWED, UNDECIDED
-from mushrooms.forecast import in_words
+from mushrooms.forecast import format_duration
 
 
 class RunTally(NamedTuple):
@@ -25,7 +25,7 @@ class RunTally(NamedTuple):
         collisions, careful: in all.
         met: collisions of those that were followed to the end.
         most: collisions of the particle that has most.
-        captured: captured cycles of those who take part.
+        captured: captured cycles of the particles that take part.
     """
 
     particles: int = 0
@@ -129,8 +129,8 @@ class Watch:
     def text(self) -> str:
         """Return how far the run is."""
         left, rate = self._n - self._done, self._rate()
-        told = in_words(left / rate) + " left" if rate else "time left unknown"
-        return f"{self._done:,} of {self._n:,} particles, {told}, {self._pace()}"
+        left_in_words = format_duration(left / rate) + " left" if rate else "time left unknown"
+        return f"{self._done:,} of {self._n:,} particles, {left_in_words}, {self._pace()}"
 
     def _pace(self) -> str:
         lost = self._all.particles - self._all.followed

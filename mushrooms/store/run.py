@@ -87,7 +87,7 @@ class Marker(NamedTuple):
 
 
 class StoredRun:
-    """A run in a folder, which whoever writes must hold (`mushrooms.output.locked`).
+    """A run in a folder, which a writer must hold (`mushrooms.output.locked`).
 
     Attributes:
         folder: holds GROUP, which xarray reads, and MARKERS.
@@ -103,7 +103,7 @@ class StoredRun:
         self.tally, self.seconds = RunTally(), 0.0
         self._markers: dict[int, Marker] = {}  # of the blocks on disk, those outgrown included
         self._arrays: dict[str, Any] = {}  # of the Zarr group, once it is open
-        # The marker of another run, left here by someone who moved files, does not count.
+        # The marker of another run, moved here with its files, does not count.
         sizes = {"cycles": shape.chunked, "block": shape.block}
         self._identity = _digest(spec.to_data() | sizes)
 
@@ -113,10 +113,10 @@ class StoredRun:
         Raises:
             BadInput: that has been damaged since `check`.
         """
-        for piece in self.lacking():
-            marker = self._markers.get(piece.number)
-            is_continued = marker is not None and marker.rows == piece.n
-            yield piece._replace(before=self.block(piece.number) if is_continued else None)
+        for block_range in self.lacking():
+            marker = self._markers.get(block_range.number)
+            is_continued = marker is not None and marker.rows == block_range.n
+            yield block_range._replace(before=self.block(block_range.number) if is_continued else None)
 
     def lacking(self) -> Iterator[BlockRange]:
         """Yield the blocks still to be followed."""
@@ -162,7 +162,7 @@ class StoredRun:
                     damaged.append(number)
         return damaged
 
-    def keep(self, piece: BlockRange, block: Block) -> None:
+    def keep(self, block_range: BlockRange, block: Block) -> None:
         """Write a block: first its arrays, then its marker.
 
         Raises:
@@ -171,9 +171,11 @@ class StoredRun:
         if not self._arrays:
             self.describe()
         first_cycle = 0
-        if piece.before is not None:
-            first_cycle = self._markers[piece.number].cycles  # those before are on disk, and stay as they are
-        rows = slice(piece.first, piece.first + piece.n)
+        if block_range.before is not None:
+            first_cycle = self._markers[
+                block_range.number
+            ].cycles  # those before are on disk, and stay as they are
+        rows = slice(block_range.first, block_range.first + block_range.n)
         for name in self.shape.names:
             values = block.arrays[name]
             if "cycle" in FIELDS[name].dims:
@@ -181,8 +183,10 @@ class StoredRun:
             else:
                 self._arrays[name][rows] = values
         sums = {name: _sum(block.arrays[name]) for name in self.shape.names}
-        marker = Marker(self._identity, piece.number, piece.n, self.shape.n_cycles, sums, block.seconds)
-        write_file(self._path(piece.number), sealed(json.dumps(marker._asdict()).encode()))
+        marker = Marker(
+            self._identity, block_range.number, block_range.n, self.shape.n_cycles, sums, block.seconds
+        )
+        write_file(self._path(block_range.number), sealed(json.dumps(marker._asdict()).encode()))
         self._count(marker, block.tally)
 
     def describe(self) -> None:
@@ -272,7 +276,7 @@ class StoredRun:
         return digest.hexdigest()
 
     def gains(self) -> Iterator[Array]:
-        """Yield (n, K) ln(E/E0) after each cycle of those who take part, block by block."""
+        """Yield (n, K) ln(E/E0) after each cycle of those that take part, block by block."""
         for number in range(self.shape.n_blocks):
             takes_part = self.read(number, "takes_part") == 1
             with np.errstate(divide="ignore"):

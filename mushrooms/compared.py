@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from mpmath import fp
 
+import theory
 from mushrooms.store.progress import Gain
 from mushrooms.store.spec import RunSpec
 from scene import Mushroom, Scene
@@ -21,6 +22,7 @@ from scene.tables import laws
 DIGITS = 10  # of the adiabatic theory: a run knows six at most
 N_TIMES = 1025  # of a cycle, at which the sides are looked at
 SAME = 2.0**-40  # of nu: far above rounding, and no particle starts in so thin a part of the island
+NO_THEORY = (BadInput, theory.NotCovered, theory.NotConverged)  # raised where theory covers nothing
 
 
 class Theory(NamedTuple):
@@ -97,8 +99,6 @@ def explain_limit(spec: RunSpec, summary: Mapping[str, Any]) -> str | None:
 
 def _explain_narrow_start(scene: Mushroom) -> str:
     """Say why a cycle that begins with a narrow mouth has no theory, and how to shift it."""
-    import theory
-
     begin, length = start_time(scene), scene.period
     now, widest = table_at(fp, scene, begin), theory.Cycle.of(scene, DIGITS)
     wait = (float(widest.start) - begin) % length
@@ -144,11 +144,17 @@ def begins_widest(scene: Mushroom) -> bool:
     table, lie in the part of the island that opens later: they count as captured, with the energy of those
     that are free, and no energy however high mends that. Later cycles do not know of it.
     """
-    import theory
-
     now = table_at(fp, scene, start_time(scene))
     widest = theory.Cycle.of(scene, DIGITS).nu_max
     return bool(now.w / now.r >= widest * (1 - SAME))
+
+
+def known(scene: Scene, energy: float) -> theory.FiniteEnergy | None:
+    """Return the theory of a scene at an energy; None if it does not cover the scene."""
+    try:
+        return theory.at_energy(scene, energy) if isinstance(scene, Mushroom) else None
+    except NO_THEORY:
+        return None
 
 
 def predicted(spec: RunSpec) -> Theory | None:
@@ -157,20 +163,17 @@ def predicted(spec: RunSpec) -> Theory | None:
     What finite energy adds to a cycle goes as E^(-1/2) with the energy at which the cycle begins. Cycles are
     independent, so its mean falls by the mean of exp(-s / 2) each.
     """
-    import theory
-
     if not isinstance(spec.scene, Mushroom) or not begins_widest(spec.scene):
         return None
     try:
         limit = theory.predict(spec.scene, DIGITS)
-        m1, p_nc = float(limit.m1), float(limit.p_nc)
-    except (BadInput, theory.NotCovered, theory.NotConverged):
+    except NO_THEORY:
         return None
-    try:
-        there = theory.at_energy(spec.scene, spec.energy)
-        slower, left = there.mean_of_exp(-0.5), there.theory_error
-    except (BadInput, theory.NotCovered, theory.NotConverged):
+    m1, p_nc = float(limit.m1), float(limit.p_nc)
+    there = known(spec.scene, spec.energy)
+    if there is None:
         return Theory(m1, p_nc)
+    slower, left = there.mean_of_exp(-0.5), there.theory_error
     share = math.fsum(slower**k for k in range(spec.n_cycles)) / spec.n_cycles
     return Theory(
         m1 + share * (there.mean_s - m1),

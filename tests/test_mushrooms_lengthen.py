@@ -50,21 +50,6 @@ def _whole_sums(monkeypatch):
     monkeypatch.setattr(compared, "explain_limit", lambda _spec, _summary: None)
 
 
-@pytest.fixture
-def followed(monkeypatch):
-    """Return the list of what is followed: first particle, how many, from which cycle on and up to which."""
-    block_ranges, go_on = [], fast.go_on
-
-    def noted(scene, **options):
-        before = options["before"]
-        n_before = 0 if before is None else before.ensemble.cycle_energies.shape[1]
-        block_ranges.append((options["first"], options["n_particles"], n_before, options["n_cycles"]))
-        return go_on(scene, **options)
-
-    monkeypatch.setattr(fast, "go_on", noted)
-    return block_ranges
-
-
 @pytest.mark.parametrize("name", deep_but(["fermi-ulam", "moving-cap", "breathing-circle"], "moving-cap"))
 def test_a_run_is_lengthened_and_widened_to_the_bits_of_one_at_once(command_line, tmp_path, name):
     """In several goes, with blocks of any size: arrays, digest, and whole sums."""

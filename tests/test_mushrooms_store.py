@@ -47,19 +47,6 @@ def run_at_once(name, n, energy=ENERGY, n_cycles=1):
     return run.sha256()
 
 
-@pytest.fixture
-def followed(monkeypatch):
-    """Return the list of block ranges that are followed: first particle and how many."""
-    block_ranges, go_on = [], fast.go_on
-
-    def noted(scene, **options):
-        block_ranges.append((options["first"], options["n_particles"]))
-        return go_on(scene, **options)
-
-    monkeypatch.setattr(fast, "go_on", noted)
-    return block_ranges
-
-
 def digest_of(ended):
     assert ended.code == 0, ended.err
     return json.loads(ended.out)["sha256"]
@@ -109,11 +96,12 @@ def test_a_run_goes_on_and_is_widened_from_its_last_full_block(
     assert f"--out {tmp_path} --resume" in err
     followed.clear()
     assert digest_of(command_line(*arguments(tmp_path, "--resume"))) == whole[N]
-    assert followed == [(0, conduct.PROBED), (128, 64), (192, 64), (256, 64), (320, 10)]
+    probe = (0, conduct.PROBED, 0, 1)
+    assert followed == [probe, *((first, 64, 0, 1) for first in (128, 192, 256)), (320, 10, 0, 1)]
     followed.clear()
     wider = command_line(*arguments(tmp_path, "--resume", n=500, block=None))
     assert digest_of(wider) == whole[500]
-    assert followed == [(0, conduct.PROBED), (320, 64), (384, 64), (448, 52)]
+    assert followed == [probe, (320, 64, 0, 1), (384, 64, 0, 1), (448, 52, 0, 1)]
     saved = json.loads((tmp_path / "summary.json").read_text())
     assert saved.items() >= json.loads(wider.out).items()
     assert sorted(path.name for path in tmp_path.iterdir()) == ["blocks", "ensemble.zarr", "summary.json"]
@@ -154,7 +142,7 @@ def test_a_damaged_file_is_found_and_its_block_followed_again(
     again = command_line(*arguments(tmp_path, "--resume"))
     assert digest_of(again) == whole[N]
     assert "1 blocks (2)" in again.err
-    assert followed == [(0, conduct.PROBED), (128, 64)]
+    assert followed == [(0, conduct.PROBED, 0, 1), (128, 64, 0, 1)]
 
 
 def test_the_digest_does_not_take_a_chunk_that_changes_at_the_last_moment(
@@ -240,7 +228,7 @@ def test_a_description_is_there_twice_and_refused_when_both_are_damaged(
         path.write_bytes(truncated(content))
         followed.clear()
         assert digest_of(command_line(*arguments(tmp_path, "--resume"))) == whole[N]
-        assert followed == [(0, conduct.PROBED)]
+        assert followed == [(0, conduct.PROBED, 0, 1)]
         assert len(path.read_bytes()) == len(content)
     for path in paths:
         path.write_bytes(truncated(path.read_bytes()))

@@ -19,7 +19,7 @@ from matplotlib.figure import Figure
 
 import theory
 from fast.given import given_energy
-from mushrooms.compared import begins_widest, predicted
+from mushrooms.compared import NO_THEORY, begins_widest, known, predicted
 from mushrooms.figures import style as plots
 from mushrooms.figures.style import BLACK, BLUE, GREY, ORANGE, SKY, STYLE, FloatArray, new_figure
 from mushrooms.store.spec import RunSpec
@@ -188,14 +188,6 @@ def _title(scene: Scene, energy: float, bars: Gathered, n_particles: int | None)
     return title if n == bars.n else f"{title}\n({n - bars.n:,} of them never free, or lost: left out)"
 
 
-def known(scene: Scene, energy: float) -> theory.FiniteEnergy | None:
-    """Return the theory of a scene at an energy; None if it does not cover the scene."""
-    try:
-        return theory.at_energy(scene, energy) if isinstance(scene, Mushroom) else None
-    except (BadInput, theory.NotCovered, theory.NotConverged):
-        return None
-
-
 def draw_limit(axes: Axes, scene: Scene, bars: Gathered) -> None:
     """Draw a histogram, with the limit of high energies if theory covers the scene."""
     heights = _bars(axes, bars)
@@ -204,7 +196,7 @@ def draw_limit(axes: Axes, scene: Scene, bars: Gathered) -> None:
     axes.locator_params(axis="x", nbins=6)
     try:
         limit = theory.energies(scene) if isinstance(scene, Mushroom) and begins_widest(scene) else None
-    except (BadInput, theory.NotCovered, theory.NotConverged):
+    except NO_THEORY:
         return
     if limit is None:
         return

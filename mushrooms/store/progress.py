@@ -120,14 +120,13 @@ class Watch:
         )
         if self._bar.disable and CLOCK() > self._next:
             self._next = CLOCK() + EVERY
-            print(f"{self._name}: {self.text()}", file=sys.stderr, flush=True)
+            print(f"{self._name}: {self._text()}", file=sys.stderr, flush=True)
 
     def add(self, tally: RunTally) -> None:
         """Take note of a finished block."""
         self._all = self._all.merged(tally)
 
-    def text(self) -> str:
-        """Return how far the run is."""
+    def _text(self) -> str:
         left, rate = self._n - self._done, self._rate()
         left_in_words = format_duration(left / rate) + " left" if rate else "time left unknown"
         return f"{self._done:,} of {self._n:,} particles, {left_in_words}, {self._pace()}"

@@ -11,7 +11,7 @@ import pytest
 import xarray
 import zarr
 from support.depth import deep_but
-from support.harm import full_disk, held
+from support.harm import held
 from support.refusals import assert_refused
 from zarr.storage import LocalStore
 
@@ -152,15 +152,6 @@ def test_a_block_that_is_half_lengthened_is_followed_from_the_start(
     assert json.loads(ended.out)["sha256"] == at_once(3).sha256()
     # Its first new chunk holds later cycles alone, and those before do not miss it.
     assert ("1 blocks (0)" in ended.err) == (n_written > 2)
-
-
-def test_a_full_disk_leaves_a_lengthening_that_goes_on(command_line, tmp_path, monkeypatch):
-    summary_of(command_line(*arguments(tmp_path, 1)))
-    for n_writes in (0, 3, 12, 14, 40):
-        full_disk(monkeypatch, n_writes)
-        assert_refused(command_line(*arguments(tmp_path, 2)), "No space left on device", str(tmp_path))
-    full_disk(monkeypatch, 10**9)
-    assert summary_of(command_line(*arguments(tmp_path, 2)))["sha256"] == at_once(2).sha256()
 
 
 def test_a_chunk_holds_the_cycles_that_a_run_began_with(command_line, tmp_path):

@@ -17,6 +17,7 @@ from typing import Any
 import distributed
 import numpy as np
 import pytest
+import xarray
 from support.depth import deep_but
 from support.refusals import assert_refused
 
@@ -160,20 +161,13 @@ def test_no_scheduler_is_one_line(capsys, tmp_path, monkeypatch, address):
     assert_refused((ended.value.code, *capsys.readouterr()), f"--dask = {address}", "no scheduler")
 
 
-def test_xarray_and_zarr_read_every_bit(stored, ensemble):
-    import xarray
-    import zarr
-
+def test_xarray_reads_names_and_what_was_run(stored):
+    """The bits: test_mushrooms_lengthen.py."""
     run = xarray.open_zarr(stored / "ensemble.zarr")
     assert dict(run.sizes) == {"particle": N, "cycle": 1, "narrowing": 1, "wall": 5, "row": LANE_ROWS}
-    for name in ("cycle_energies", "t_in", "wall_counts", "outcome", "n_careful"):
-        assert np.array_equal(run[name].values, getattr(ensemble, name), equal_nan=name[0] != "o")
-    assert run.attrs["seed"] == SEED
-    assert run.attrs["scene"]["name"] == "moving-cap"
+    assert (run.attrs["seed"], run.attrs["scene"]["name"]) == (SEED, "moving-cap")
     assert "--seed 5" in run.attrs["command"]
     assert set(run.attrs["versions"]) >= {"oscillating-mushrooms", "numpy", "numba", "python"}
-    group = zarr.open_group(stored / "ensemble.zarr", mode="r")
-    assert {name for name, _ in group.arrays()} == set(run.data_vars)
 
 
 def test_exports_have_every_bit(command_line, stored, tmp_path, ensemble):

@@ -198,14 +198,18 @@ def test_what_no_figure_holds_is_not_drawn(command_line, file_of, tmp_path, monk
     assert not list(tmp_path.glob("p*"))
 
 
-def test_a_leg_shorter_than_any_float_tells_is_drawn(command_line, file_of, tmp_path):
-    assert command_line("draw", file_of(SCENES["brief"]), "--out", tmp_path / "picture.svg").code == 0
+NO_FORMULA = ("r = 1.0\nh = 1.0\nnu = 0.5", r"$\\frac{$ a_b^")
 
 
-@pytest.mark.parametrize("kind", [(), ("--trajectory",), ("--section",), ("--growth",)])
-def test_a_name_begins_no_formula(command_line, file_of, tmp_path, kind):
-    scene = file_of("r = 1.0\nh = 1.0\nnu = 0.5", r"$\\frac{$ a_b^")
-    assert command_line("draw", scene, *kind, "--out", tmp_path / "picture.svg").code == 0
+@pytest.mark.parametrize(
+    ("scene", "kind"),
+    [
+        ((SCENES["brief"],), ()),  # a leg shorter than any float tells
+        *((NO_FORMULA, kind) for kind in ((), ("--trajectory",), ("--section",), ("--growth",))),
+    ],
+)
+def test_odd_scenes_are_drawn_and_a_name_begins_no_formula(command_line, file_of, tmp_path, scene, kind):
+    assert command_line("draw", file_of(*scene), *kind, "--out", tmp_path / "picture.svg").code == 0
 
 
 def test_a_run_at_the_last_floats_goes_without_a_forecast(command_line, file_of):

@@ -24,9 +24,6 @@ from conformance.suite.process import Trouble
 from conformance.suite.session import Limits
 from mushrooms import bench_solvers as ours
 from mushrooms import output
-from mushrooms.figures import speed as figures_of_speed
-from mushrooms.figures import style
-from mushrooms.reports import bench_page
 from mushrooms.terminal import announce_compilation, new_console, progress_bar, refuse_unheeded
 from scene.refusal import MAX_SEED, BadInput
 
@@ -62,6 +59,9 @@ def bench(
 
     Exit code 0, or 2 on bad input.
     """
+    from mushrooms.figures import speed, style  # drawing takes a second to import
+    from mushrooms.reports import bench_page
+
     if table is None:
         refuse_unheeded({"--workload": workload}, "it needs --table")
     else:
@@ -72,7 +72,7 @@ def bench(
     size: Size = "quick" if quick else "full"
     with output.writable_folder(out) as folder, announce_compilation():
         found = _measure(size, seed, command or [])
-        picture = style.svg(figures_of_speed.headline(found))
+        picture = style.svg(speed.headline(found))
         files: dict[str, bytes | str | Writer] = {
             "bench.json": record.encode(found),
             "bench.svg": picture,
@@ -169,6 +169,8 @@ def _solvers(stack: ExitStack, command: list[str]) -> tuple[list[Solver], dict[s
 
 
 def _table(found: Record) -> Table:
+    from mushrooms.reports import bench_page
+
     numbers = ("ns/collision", "quartiles", "median ulps", "worst ulps", "wrong", "undecided", "left")
     table = Table("workload", "stepper", title="Speed against error", title_justify="left")
     for name in (*numbers, "wrong of further"):

@@ -4,19 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated, BinaryIO, NamedTuple
+from typing import Annotated, Any, BinaryIO, NamedTuple
 
 import numpy as np
 import typer
-from matplotlib.figure import Figure
 
 import fast
 from conformance.audit.runs import scene_named
 from conformance.files import write_file
 from mushrooms import orbits, output
-from mushrooms.figures import energies, style
-from mushrooms.figures import orbits as pictures
-from mushrooms.figures import table as tables
 from mushrooms.simulate import draw_energies
 from mushrooms.store.run import is_run, open_run
 from mushrooms.terminal import (
@@ -242,17 +238,23 @@ def _paths(out: Path, kinds: list[str]) -> dict[str, Path]:
     Raises:
         BadInput: one of them cannot be written, or does not move and is to be a .gif.
     """
+    from mushrooms.figures.table import SUFFIXES  # drawing takes a second to import
+
     paths = dict.fromkeys(kinds or ["walls"], out)
     if len(kinds) > 1:
         paths = {kind: out.with_stem(f"{out.stem}-{kind}") for kind in kinds}
     for kind, path in paths.items():
         moves = kind in ("walls", "trajectory")
-        output.check_file(path, tuple(s for s in tables.SUFFIXES if moves or s != ".gif"))
+        output.check_file(path, tuple(s for s in SUFFIXES if moves or s != ".gif"))
     return paths
 
 
 def _picture(kind: str, suffix: str, arguments: DrawArgs) -> Callable[[BinaryIO], object]:
     """Return what writes a picture."""
+    from mushrooms.figures import orbits as pictures
+    from mushrooms.figures import style
+    from mushrooms.figures import table as tables
+
     if kind == "walls":
         return lambda file: tables.write_picture(arguments.table, suffix, file)
     if kind == "growth" and arguments.n_orbits != 1:
@@ -276,8 +278,10 @@ def _picture(kind: str, suffix: str, arguments: DrawArgs) -> Callable[[BinaryIO]
     return lambda file: style.save(figure, file, suffix)
 
 
-def _growth(arguments: DrawArgs) -> Figure:
-    """Draw an ensemble's energies from cycle to cycle."""
+def _growth(arguments: DrawArgs) -> Any:
+    """Return the figure of an ensemble's energies from cycle to cycle."""
+    from mushrooms.figures import energies
+
     usual, energy = PICTURES["growth"], arguments.energy_of("growth")
     n, n_cycles = arguments.n_orbits or usual.n_orbits, arguments.n_cycles or usual.n_cycles or 1
     found = fast.simulate(

@@ -5,8 +5,7 @@ from __future__ import annotations
 import math
 import sys
 import time
-from collections.abc import Callable, Iterable
-from itertools import chain
+from collections.abc import Callable, Iterable, Iterator
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -73,15 +72,17 @@ def gain_of(gains: Callable[[], Iterable[npt.NDArray[np.float64]]]) -> Gain:
     `math.fsum` rounds once, whatever the order: blocks of any size come to the same bits.
 
     Args:
-        gains: returns arrays (n, K) of ln(E/E0) after each cycle, block by block; called three times.
+        gains: returns arrays (n, K) of ln(E/E0) after each cycle, block by block; called twice.
     """
-    n = sum(len(part) for part in gains())
+    lengths = []
 
-    def values(centre: float) -> Iterable[float]:
-        return chain.from_iterable((part[:, -1] - centre).tolist() for part in gains())
+    def values(centre: float) -> Iterator[float]:
+        for part in gains():
+            lengths.append(len(part))
+            yield from (part[:, -1] - centre).tolist()
 
-    total = math.fsum(values(0.0)) if n else math.nan
-    if not math.isfinite(total):
+    total, n = math.fsum(values(0.0)), sum(lengths)
+    if not n or not math.isfinite(total):
         return Gain(n)
     mean = total / n
     squares = math.fsum(x * x for x in values(mean))

@@ -3,20 +3,26 @@
 from __future__ import annotations
 
 import json
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import msgspec
 import typer
 from rich.markup import escape
 
-from mushrooms.check import in_one_line
+from conformance import vectors
+from conformance.cases.certify import judge
+from conformance.cases.generated import fresh_one
+from conformance.grading.agreement import middle
+from conformance.suite import Result, ask_vector
+from conformance.suite.answers import outcomes_of
+from conformance.suite.disguise import Disguise, asked, drawn_disguise, drawn_horizons
+from conformance.suite.process import Trouble
+from conformance.suite.run import N_FRESH
+from conformance.suite.session import Session
+from conformance.vectors import Vector
+from mushrooms.check import format_outcome
 from mushrooms.terminal import new_console
-from scene.refusal import BadInput, check_seed
-
-if TYPE_CHECKING:
-    from conformance.suite import Result
-    from conformance.suite.disguise import Disguise
-    from conformance.vectors import Vector
+from scene.refusal import MAX_SEED, BadInput
 
 
 def ask(
@@ -26,7 +32,10 @@ def ask(
         typer.Argument(metavar="[-- COMMAND...]", help="Ask this stepper, and grade its answer."),
     ] = None,
     seed: Annotated[
-        int | None, typer.Option(help="Ask the question exactly as the run with this seed asked it.")
+        int | None,
+        typer.Option(
+            min=0, max=MAX_SEED, help="Ask the question exactly as the run with this seed asked it."
+        ),
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the vector as JSON.")] = False,
 ) -> int:
@@ -36,8 +45,6 @@ def ask(
 
     Exit code 0; 1 if the stepper does not pass; 2 on bad input.
     """
-    from conformance.suite.disguise import Disguise, drawn_disguise
-
     vector = _find(case, seed)
     disguise = Disguise() if seed is None else drawn_disguise(vector, seed)
     result = _put(command, vector, disguise) if command else None
@@ -45,36 +52,31 @@ def ask(
         print(msgspec.json.format(msgspec.json.encode(vector), indent=1).decode())
     else:
         _show(vector, disguise)
-    return 0 if result is None else _judge(result)
+    if result is None:
+        return 0
+    if result.answer is not None:
+        given = "\n           ".join(map(format_outcome, outcomes_of(result.answer)))
+        print(f"given      {given}")
+    new_console(soft_wrap=True).print(f"[bold]{result.verdict}[/]: {escape(result.why)}")
+    return 0 if result.is_right else 1
 
 
 def _find(case: str, seed: int | None) -> Vector:
-    from conformance import vectors
-    from conformance.cases.generated import fresh_one
-    from conformance.suite.disguise import drawn_horizons
-    from conformance.suite.run import N_FRESH
-
-    if seed is not None:
-        check_seed(seed, "--seed")
-    elif case.startswith(("drawn/", "fresh/")):
+    if seed is None and case.startswith(("drawn/", "fresh/")):
         raise BadInput(f"ID = {case!r} is of one run's questions: give the run's --seed")
     known = vectors.load("stress")
-    drawn = [] if seed is None else drawn_horizons([v for v in known if v.level == "core"], seed)
-    if seed is not None and case in {f"fresh/{number}" for number in range(1, max(N_FRESH.values()) + 1)}:
-        return fresh_one(seed, int(case.removeprefix("fresh/")))
-    for vector in (*known, *drawn):
-        if vector.id == case:
-            return vector
+    found = {vector.id: vector for vector in known}
+    if seed is not None:
+        if case in {f"fresh/{number}" for number in range(1, max(N_FRESH.values()) + 1)}:
+            return fresh_one(seed, int(case.removeprefix("fresh/")))
+        found |= {v.id: v for v in drawn_horizons([v for v in known if v.level == "core"], seed)}
+    if case in found:
+        return found[case]
     raise BadInput(f"ID = {case!r}, must be a vector's, such as {known[0].id}")
 
 
 def _show(vector: Vector, disguise: Disguise) -> None:
-    from conformance import vectors
-    from conformance.cases.certify import judge
-    from conformance.grading.agreement import middle
-    from conformance.suite.disguise import asked
-
-    console = new_console()
+    console = new_console(soft_wrap=True)
     condition = f", condition {vector.condition:.3g}" if vector.condition else ""
     console.print(f"[bold]{vector.id}[/], level {vector.level}{condition}")
     console.print(f"rule       {escape(vector.rule)}")
@@ -87,7 +89,7 @@ def _show(vector: Vector, disguise: Disguise) -> None:
             f"{'certified' if i == 0 else 'or'}  {expectation.outcome} {expectation.reason}".rstrip()
         )
         for number, outcome in enumerate(middle(expectation, vector.state), 1):
-            console.print(f"  {number:>4}  {escape(in_one_line(msgspec.to_builtins(outcome)))}")
+            console.print(f"  {number:>4}  {escape(format_outcome(msgspec.to_builtins(outcome)))}")
         for begin, end in expectation.stays:
             console.print(f"  captured from step {begin + 1} to step {end + 1}")
     verdict = judge(vector)
@@ -95,10 +97,6 @@ def _show(vector: Vector, disguise: Disguise) -> None:
 
 
 def _put(command: list[str], vector: Vector, disguise: Disguise) -> Result:
-    from conformance.suite import ask_vector
-    from conformance.suite.process import Trouble
-    from conformance.suite.session import Session
-
     with Session(command) as session:
         try:
             session.start()
@@ -106,14 +104,3 @@ def _put(command: list[str], vector: Vector, disguise: Disguise) -> Result:
         except Trouble as trouble:
             raise BadInput(f"the command does not speak protocol 1: {trouble}") from None
         return ask_vector(session, vector, disguise)
-
-
-def _judge(result: Result) -> int:
-    from conformance.suite.answers import outcomes_of
-
-    console = new_console()
-    if result.answer is not None:
-        given = "\n           ".join(map(in_one_line, outcomes_of(result.answer)))
-        console.print(f"given      {escape(given)}")
-    console.print(f"[bold]{result.verdict}[/]: {escape(result.why)}")
-    return 0 if result.is_right else 1

@@ -142,9 +142,7 @@ def test_bad_states_are_bad_and_good_ones_good_by_the_reference(tally):
 
 
 def test_bad_scenes_are_bad_and_good_ones_good_by_proof(tally):
-    for data, why in [
-        (data, why) for n in SEEDS for data, _, why in refusals.bad_scenes(Draw(str(n)), "step")
-    ]:
+    for data, _, why in refusals.bad_scenes(Draw("1"), "step"):
         with pytest.raises(BadInput) if why else nullcontext():
             from_data(data)
         tally["bad" if why else "good"] += 1

@@ -22,7 +22,7 @@ from scene.laws import value
 from scene.tables import laws
 
 N_CASES = int(os.environ.get("MUSHROOMS_INTERVALS", 3_000))
-N_FORGERIES = int(os.environ.get("MUSHROOMS_FORGERIES", 120))
+N_FORGERIES = int(os.environ.get("MUSHROOMS_FORGERIES", 72))
 BITS = (24, 53, 128, 256, 512)
 DECIMALS = 250
 # What these make of a true line, sampling sees.
@@ -136,10 +136,10 @@ def test_a_number_that_is_lost_is_seen(check, monkeypatch):
 
 
 def sample() -> Iterator[Line]:
-    """Yield a line of every second group, the first step of a path; all lines in a deep run."""
+    """Yield a line of every fourth group, the first step of a path; all lines in a deep run."""
     lines = [line for line in pool("answered") + pool("undefined") if line["kind"] != "flow"]
     by_group = {line["group"]: line for line in lines}
-    for line in lines if IS_DEEP else list(by_group.values())[::2]:
+    for line in lines if IS_DEEP else list(by_group.values())[::4]:
         answer = line["expect"][0]
         yield {**line, "expect": [{**answer, "steps": answer.get("steps", [])[: None if IS_DEEP else 1]}]}
 

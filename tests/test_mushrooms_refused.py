@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from support.faulty_servers import command
 from support.refusals import assert_refused
-from support.saboteurs import command
 
 import conformance
 

@@ -51,7 +51,7 @@ def _sum_of(sample: Sample, n: int, cumulants: list[float]) -> list[Check]:
     bias = centre - n * m1
     per_cycle = Mean((mean(total).value - bias) / n, mean(total).error / n)
     own = scale / N_DRAWN**0.5  # the drawn sums' standard error
-    blurred = 1 - n * cumulants[2] / scale**2  # of the variance
+    diffused = 1 - n * cumulants[2] / scale**2  # of the variance
     places = np.linspace(sums.values[0], sums.values[-1], 2000)
     gap = float(np.max(np.abs(sums.cdf(places) - norm.cdf(places, centre, scale))))
     inner, theirs = (np.abs(x - centre) < scale for x in (total, sums.values))
@@ -68,7 +68,7 @@ def _sum_of(sample: Sample, n: int, cumulants: list[float]) -> list[Check]:
             f"{label}: standard deviation over n",
             (spread(total).value / n, spread(total).error / n),
             scale / n,
-            band=(abs(blurred) * left.variance / 2 + N_SIGMA / (2 * N_DRAWN) ** 0.5) * scale / n,
+            band=(abs(diffused) * left.variance / 2 + N_SIGMA / (2 * N_DRAWN) ** 0.5) * scale / n,
         ),
         fits(
             f"{label}: log E_n/E0 against sums of n cycles drawn from theory",
@@ -129,7 +129,7 @@ def _told_from_a_gaussian(sample: Sample, n: int) -> Check:
     """Weigh log E_n/E0 between the theory's sums and a Gaussian of their mean and width.
 
     The logarithm of the likelihoods' ratio tells two distributions apart better than any other number. After
-    more cycles, or slower ones that blur more, sums are too near a Gaussian for so many particles to tell.
+    more cycles, or slower ones that diffuse more, sums are too near a Gaussian for so many particles to tell.
     """
     label, sums = f"{sample.run.name}, n = {n}", summed(sample.run.name, n)
     total, drawn = ((x - sums.mean) / sums.sd for x in (sample.s[:, n - 1], sums.values))

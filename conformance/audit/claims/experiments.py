@@ -8,7 +8,6 @@ import numpy as np
 from scipy.stats import ks_2samp, norm
 
 from conformance.audit.claim import Check, ClaimEvidence
-from conformance.audit.claims import many_cycles
 from conformance.audit.claims.broadened import (
     ESCAPE,
     GROWTH,
@@ -339,12 +338,8 @@ CHECKS = {
     "X1": fixed_cap,
     "X2": moving_cap,
     "X3": capture_times,
-    "X4": many_cycles.sums,
     "X5": ergodic,
     "X6": untilted,
     "X7": trivial_loops,
     "X8": both_ways,
-    "C1": many_cycles.independence,
-    "C9": many_cycles.tails,
-    "D1": many_cycles.losses,
 }

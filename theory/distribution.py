@@ -27,7 +27,7 @@ STEP = 2.0**-12  # the lattice's, at best, and as a share of one cycle's reach
 LEAST_REACH = 1e-12  # of s in a cycle; below, its differences are partly rounding
 MAX_POINTS = 2**20
 MAX_CYCLES = 10_000
-KEPT = 4 * UNRESOLVED  # of s: who gains or loses less keeps the energy, and how the sign falls is rounding
+KEPT = 4 * UNRESOLVED  # of s: a smaller change is none: its sign is rounding
 LARGEST_EXPONENT = 600.0  # exp of it stays finite, and so do sums
 
 Complexes = NDArray[np.complex128]
@@ -62,7 +62,7 @@ class Energies:
         return self.captured_below(s) + np.where(s >= self.s_nc - UNRESOLVED, self.p_nc, 0.0)
 
     def lost(self) -> float:
-        """Return the probability of E1 < E0, those apart who keep their energy but for rounding."""
+        """Return the probability of E1 < E0; particles that keep their energy do not count."""
         return float(self.cdf(np.array([-KEPT]))[0])
 
 
@@ -124,7 +124,7 @@ class Lattice:
         return np.roll(np.fft.irfft(transform, self.n_points), -self.first)
 
     def still(self) -> Complexes:
-        """Return the transform of those who keep their energy: in every well, or as the uncaptured do.
+        """Return the transform of particles that keep their energy: in every well, or as the uncaptured do.
 
         They are a point mass at s = 0, which the lattice shares among its points.
         """

@@ -66,7 +66,7 @@ def _least(found: Captures) -> tuple[Any, ...]:
 
 
 def loss_probability(found: Energies | Scene, n_cycles: int) -> float:
-    """Return the probability of E_n < E_0 after n independent cycles; who keeps the energy has not lost.
+    """Return the probability of E_n < E_0 after n cycles; a particle that keeps its energy has not lost.
 
     Args:
         found: from `theory.energies`, or a scene to solve.

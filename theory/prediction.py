@@ -4,7 +4,7 @@ Everything is computed at two or more resolutions; an answer is given when two i
 agree to two digits more than asked, and is then the finer of the two. A cycle in which one particle is
 captured several times is covered too.
 
-Solved cycles are kept for whoever asks again: numbers alone, those of the last KEPT solutions to few digits.
+Solved cycles are kept for the next request: numbers alone, those of the last KEPT solutions to few digits.
 Each caller gets them in the number system of its own cycle: it may change that, or compute in another thread,
 and nobody else is touched.
 """

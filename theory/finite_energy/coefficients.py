@@ -119,7 +119,7 @@ class Fields:
         speed = np.sqrt(2 * energy) * np.exp((cycle.log_energy + GAINS[:, None]) / 2)
         faster, rates = speed * np.exp(NUDGE / 2), cycle.rates
         lag = _at_speeds(rates.lag, speed) / speed
-        # Phase volume is kept: those who lag by J(E) are captured likelier by J + dJ / d log E.
+        # Phase volume is kept: particles that lag by J(E) are captured likelier by J + dJ / d log E.
         likelier = lag + (_at_speeds(rates.lag, faster) / faster - lag) / NUDGE
         square = _at_speeds(rates.square, speed) / speed**2
         left = 1 + _at_speeds(rates.depletion, speed) / rates.diffusion.sum(axis=1)

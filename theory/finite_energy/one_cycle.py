@@ -72,7 +72,7 @@ class PointMasses(NamedTuple):
 
     @property
     def is_free(self) -> Flags:
-        """Tell who is never captured."""
+        """Tell which are never captured."""
         return np.isnan(self.t_in)
 
     def those(self, chosen: Flags) -> PointMasses:
@@ -202,7 +202,7 @@ class FiniteEnergy:
 
     def capture_cdf(self, t: ArrayLike) -> Floats:
         """Return the probability, among the captured, of a first capture by each time; BadInput of no one."""
-        a = self._those_of("captured")
+        a = self._part("captured")
         order = np.argsort(a.t_in)
         below = np.cumsum(a.weight[order]) - a.weight[order] / 2
         found: Floats = np.interp(finite_array("t", t), a.t_in[order], below / a.weight.sum())
@@ -256,17 +256,17 @@ class FiniteEnergy:
     def _centres(self, masses: PointMasses) -> Floats:
         return np.asarray(self.s_nc + masses.gain + masses.shift + masses.variance / 4, dtype=np.float64)
 
-    def _cdf(self, s: ArrayLike, who: str) -> Floats:
+    def _cdf(self, s: ArrayLike, kind: str) -> Floats:
         levels = finite_array("s", s)
-        if who not in self._below:
-            self._below[who] = self._sampled(who)
-        found: Floats = np.interp(levels, *self._below[who])
+        if kind not in self._below:
+            self._below[kind] = self._sampled(kind)
+        found: Floats = np.interp(levels, *self._below[kind])
         return found
 
-    def _those_of(self, who: str) -> PointMasses:
+    def _part(self, kind: str) -> PointMasses:
         """Return the "free", the "captured" or "all"."""
         free = self.point_masses.is_free
-        found = self.point_masses.those({"free": free, "captured": ~free, "all": free | True}[who])
+        found = self.point_masses.those({"free": free, "captured": ~free, "all": free | True}[kind])
         if not len(found.weight):
             raise BadInput("nobody is captured in this cycle: there is no distribution of the captured")
         return found
@@ -279,9 +279,9 @@ class FiniteEnergy:
             raise BadInput(f"times holds {t[outside][0]}, must be in the cycle, [{first:.6g}, {last:.6g}]")
         return t
 
-    def _sampled(self, who: str) -> tuple[Floats, Floats]:
+    def _sampled(self, kind: str) -> tuple[Floats, Floats]:
         """Return places and the distribution function there of the "free", the "captured" or "all"."""
-        a = self._those_of(who)
+        a = self._part(kind)
         centre, reach = self.s_nc + a.gain + a.shift, REACH * np.sqrt(np.maximum(a.variance, LEAST))
         places = np.linspace((centre - reach).min(), (centre + reach).max(), N_PLACES)
         below = np.zeros(N_PLACES)

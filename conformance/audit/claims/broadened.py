@@ -139,7 +139,7 @@ def zone_energy(sample: Sample) -> tuple[list[float], list[Mean], list[float]]:
     times, means, spreads = phase_times(sample), [], []
     for k, time in enumerate(times):
         with np.errstate(invalid="ignore"):
-            free = ~sample.captured | (time < sample.first_stay[0])
+            free = ~sample.captured | (time < sample.first_capture[0])
         means.append(mean(sample.phase_s[free, 0, k]))
         spreads.append(spread(sample.phase_s[free, 0, k]).value)
     return times, means, spreads
@@ -155,7 +155,7 @@ def captured_change(sample: Sample, first: int, last: int) -> FloatArray:
     """Return the change of log E from one of the run's phases to another of those captured throughout."""
     begin, end = (phase_times(sample)[k] for k in (first, last))
     with np.errstate(invalid="ignore"):
-        inside = (sample.first_stay[0] < begin) & (sample.first_stay[1] > end)
+        inside = (sample.first_capture[0] < begin) & (sample.first_capture[1] > end)
     return sample.change(inside, first, last)
 
 

@@ -12,7 +12,7 @@ from support.depth import deep_among, deep_but
 import theory
 from scene import load
 from theory.finite_energy.coefficients import N_TIMES, Fields
-from theory.finite_energy.one_cycle import Atoms, FiniteEnergy, _joined, at_energy, blur_cdf
+from theory.finite_energy.one_cycle import FiniteEnergy, PointMasses, _joined, at_energy, kernel_cdf
 from theory.finite_energy.rates import MEMORIES, PHASES, SPEEDS, frozen_rates, kick_rate, rates_at
 
 CYCLES = (
@@ -28,9 +28,9 @@ CYCLES = (
 def test_the_blur_is_a_brownian_motion_in_four_dimensions(variance: float) -> None:
     x = np.linspace(-5, 5, 201) * math.sqrt(variance)
     exact = ncx2.cdf(np.exp(x / 2) * 16 / variance, 4, 16 / variance)
-    assert np.abs(blur_cdf(x, variance) - exact).max() < 0.5 * (variance / 16) ** 1.5
+    assert np.abs(kernel_cdf(x, variance) - exact).max() < 0.5 * (variance / 16) ** 1.5
     fine = np.linspace(-9, 9, 40001) * math.sqrt(variance)
-    mass, middle = np.diff(blur_cdf(fine, variance)), (fine[1:] + fine[:-1]) / 2
+    mass, middle = np.diff(kernel_cdf(fine, variance)), (fine[1:] + fine[:-1]) / 2
     assert mass @ middle == pytest.approx(variance / 4, rel=1e-3)
     assert mass @ np.exp(-middle / 2) == pytest.approx(1, abs=0.1 * (variance / 16) ** 1.5 + 1e-9)
 
@@ -42,7 +42,7 @@ def test_the_diffusion_that_keeps_the_measure_de_has_this_blur() -> None:
         step = variance / n_steps
         e = e + 0.75 * e**0.5 * step * 100 + np.sqrt(e**1.5 * step * 100) * rng.standard_normal(n)
     s = np.sort(np.log(e / 1e4))
-    gap = np.abs(blur_cdf(s, variance) - (np.arange(n) + 0.5) / n).max()
+    gap = np.abs(kernel_cdf(s, variance) - (np.arange(n) + 0.5) / n).max()
     assert gap < 1.95 / math.sqrt(n)  # p = 1e-3
     drifted = (s - variance / 4) / math.sqrt(variance)
     gaussian = np.abs(
@@ -57,10 +57,10 @@ def phase_volume_gap(name: str, energy: float, width: float = 0.3) -> float:
     total = 0.0
     for x in np.arange(y - 3.2, y + 2.6, step):
         f = FiniteEnergy(load(name), math.exp(x))
-        centre = x + f.s_nc + f.atoms.gain + f.atoms.shift + f.atoms.variance / 4
-        spread = f.atoms.variance + width**2
+        centre = x + f.s_nc + f.point_masses.gain + f.point_masses.shift + f.point_masses.variance / 4
+        spread = f.point_masses.variance + width**2
         bump = np.exp(-((centre - y) ** 2) / (2 * spread)) * width / np.sqrt(spread)
-        total += math.exp(x - y) * float(f.atoms.weight @ bump) * step
+        total += math.exp(x - y) * float(f.point_masses.weight @ bump) * step
     return total / (math.exp(width**2 / 2) * width * math.sqrt(2 * math.pi)) - 1
 
 
@@ -137,7 +137,7 @@ def test_joining_keeps_mass_and_mean() -> None:
     rng = np.random.default_rng(3)
     n = 60_000
     t_in = np.where(rng.random(n) < 0.1, np.nan, rng.random(n))
-    a = Atoms(rng.random(n), rng.standard_normal(n), rng.random(n), rng.random(n), t_in)
+    a = PointMasses(rng.random(n), rng.standard_normal(n), rng.random(n), rng.random(n), t_in)
     b = _joined([a])
     assert len(b.gain) <= 40_000 < n
     assert b.weight.sum() == pytest.approx(a.weight.sum())
@@ -159,7 +159,7 @@ def test_no_variance_is_negative_at_any_time_that_is_allowed(asked: tuple[str, f
     """At the start of the moving cap's cycle it was -1e-5, and of slower particles -0.02 within it."""
     name, energy = asked
     found = at_energy(load(name), energy)
-    start, step = found._course[:2]
+    start, step = found._coefficients[:2]
     times = np.linspace(start - 16 * step, start + (N_TIMES + 16) * step, 4001)[1:-1]
     for _, variance in (found.zone(times), found.at_capture(times)):
         assert (variance >= 0).all()

@@ -326,7 +326,7 @@ def test_a_mouth_that_is_nearly_closed_captures_as_its_width_falls(narrow: float
 
 @pytest.mark.parametrize("size", deep_among([0.2, 1e-12], 1e-12))
 def test_figures_of_several_captures_are_means_over_them(size: float) -> None:
-    """Power series and weighted points: two ways to sum over valleys, of nearly trivial cycles too."""
+    """Power series and weighted points: two ways to sum over wells, of nearly trivial cycles too."""
     twice = Fourier(mean=0.5, omega=1.0, cos=(0.1, 0.3))
     moving = Mushroom(
         r=1.0, h=Fourier(mean=1.2, omega=1.0, cos=(size / 2,), sin=(size,)), nu=twice, slope=0.1

@@ -119,5 +119,5 @@ def test_a_mouth_given_by_its_width_leads_to_the_same_energies(name):
     one, other = (theory.at_energy(scene, 1e6) for scene in (load(name), by_its_width(name)))
     assert other.peak == pytest.approx(one.peak, rel=1e-9, abs=1e-12)
     assert other.theory_error == pytest.approx(one.theory_error, rel=1e-7)
-    for mine, its in zip(one.atoms, other.atoms, strict=True):
+    for mine, its in zip(one.point_masses, other.point_masses, strict=True):
         np.testing.assert_allclose(its, mine, rtol=1e-7, atol=1e-9)

@@ -11,7 +11,7 @@ from theory import Cycle, moments, predict, prediction
 from theory.adiabatic import Captures, captures
 from theory.prediction import solved
 
-# A particle may be captured twice in a cycle: valleys within a valley.
+# A particle may be captured twice in a cycle: wells within a well.
 TWICE = Mushroom(r=1.0, h=1.0, nu=Fourier(mean=0.5, omega=1.0, cos=(0.125, 0.25), sin=(0.0625,)))
 
 
@@ -24,7 +24,7 @@ def bits(found: Captures) -> Any:
     def of(numbers: Any) -> Any:
         return numbers._mpf_ if hasattr(numbers, "_mpf_") else tuple(map(of, numbers))
 
-    return of(found.root), of(found.atoms), of([found.growth(), found.p_not_captured])
+    return of(found.root), of(found.point_masses), of([found.growth(), found.p_not_captured])
 
 
 @pytest.mark.parametrize("scene", [load("moving-cap"), TWICE], ids=["moving-cap", "twice"])

@@ -26,7 +26,7 @@ from theory import (
     reversed_cycle,
 )
 from theory.adiabatic import captures
-from theory.cycle import Valley
+from theory.cycle import NuWell
 
 Floats = NDArray[np.float64]
 
@@ -39,20 +39,20 @@ TWICE = Mushroom(
 )
 
 
-def nested(valley: Valley) -> list[Any]:
+def nested(well: NuWell) -> list[Any]:
     """Show the tree: [highest nu, lowest nu, children...]."""
-    ends = [round(float(nu), 6) for p in valley.pieces for nu in (p.nu_upper, p.nu_lower)]
-    return [max(ends, default=None), min(ends, default=None), *(nested(child) for child in valley.children)]
+    ends = [round(float(nu), 6) for p in well.pieces for nu in (p.nu_upper, p.nu_lower)]
+    return [max(ends, default=None), min(ends, default=None), *(nested(child) for child in well.children)]
 
 
 def test_a_valley_splits_at_its_highest_inner_peak() -> None:
-    assert nested(Cycle.of(TWICE, 10).valley) == [0.875, 0.625, [0.625, 0.242188], [0.625, 0.242188]]
+    assert nested(Cycle.of(TWICE, 10).well) == [0.875, 0.625, [0.625, 0.242188], [0.625, 0.242188]]
 
 
 def test_equal_maxima_make_valleys_side_by_side_and_lower_ones_nest() -> None:
     knots = ((0.0, 0.9), (1.0, 0.2), (2.0, 0.5), (3.0, 0.3), (4.0, 0.7), (5.0, 0.1), (6.0, 0.9))
     w = BangBang(knots=(*knots, (7.0, 0.4), (8.0, 0.9)))
-    tree = Cycle.of(Mushroom(r=1.0, h=1.0, w=w), 10).valley
+    tree = Cycle.of(Mushroom(r=1.0, h=1.0, w=w), 10).well
     first = [0.9, 0.7, [0.7, 0.5, [0.5, 0.2], [0.5, 0.3]], [0.7, 0.1]]
     assert nested(tree) == [None, None, first, [0.9, 0.4]]
 
@@ -193,7 +193,7 @@ def test_two_rounds_of_a_cycle_are_two_independent_cycles() -> None:
         nu=Fourier(mean=0.75, omega=1.0, cos=(0.0, 0.125)),
     )
     once, twice = cumulants(one, 4, digits=10, q=0.5), cumulants(two, 4, digits=10, q=0.5)
-    assert len(Cycle.of(two, 10).valley.children) == 2
+    assert len(Cycle.of(two, 10).well.children) == 2
     for a, b in zip(once, twice, strict=True):
         assert abs(b / (2 * a) - 1) < 1e-9
 

@@ -5,8 +5,8 @@ With a = V_cap / V_cha at capture and b the same at release,
     B(nu) = integral of b |d delta| from nu to nu_max,    g = b / a          (Eq:g),
     s(nu) = log E1 / E0 = -log g + B - A                                     (Eq:lnE/E0),
     s_nc  = B - A at nu_min, for the particles never captured                (Eq:lnEnc/E0).
-With several captures A and B run along the path from the top of the tree of valleys; a particle
-not captured on a valley's own pieces passes through its children one after another, a Markov chain whose
+With several captures A and B run along the path from the top of the tree of wells; a particle
+not captured on a well's own pieces passes through its children one after another, a Markov chain whose
 gains are independent and add up (theory/equations.md derives it).
 On every piece nu = nu_upper - (nu_upper - nu_lower) I(u), where I is the polynomial that
 leaves 0 as u^p and reaches 1 as (1 - u)^q: with the piece's orders p, q all this is analytic in
@@ -23,7 +23,7 @@ from typing import Any, NamedTuple
 
 from scene.refusal import BadInput
 from theory.chebyshev import Grid, WeightedPoints, convolve, even_degree, product, shifted
-from theory.cycle import CapturePiece, Cycle, Valley
+from theory.cycle import CapturePiece, Cycle, NuWell
 from theory.precision import Binary
 from theory.volumes import free_share
 
@@ -55,15 +55,15 @@ class Panel(NamedTuple):
 
     @property
     def s(self) -> list[Any]:
-        """What the valleys on the path give to log E1 / E0 of a particle captured here. Source: Eq:lnE/E0."""
+        """What the wells on the path give to log E1 / E0 of a particle captured here. Source: Eq:lnE/E0."""
         return [b - a - log_g for a, b, log_g in zip(self.A, self.B, self.log_g, strict=True)]
 
 
-class Window(NamedTuple):
-    """A valley resolved: its own panels and its children; A and B at its top and where the children begin."""
+class SolvedWell(NamedTuple):
+    """A well resolved: its own panels and its children; A and B at its top and where the children begin."""
 
     panels: tuple[Panel, ...]
-    children: tuple[Window, ...]
+    children: tuple[SolvedWell, ...]
     A_top: Any
     B_top: Any
     A_end: Any
@@ -71,7 +71,7 @@ class Window(NamedTuple):
 
     @property
     def absorbed(self) -> Any:
-        """-log of the probability of passing the whole valley uncaptured (Eq:ps)."""
+        """-log of the probability of passing the whole well uncaptured (Eq:ps)."""
         return self.A_end - self.A_top + sum(child.absorbed for child in self.children)
 
     @property
@@ -84,9 +84,9 @@ class Window(NamedTuple):
 class Placed(NamedTuple):
     """A panel within its cycle.
 
-    s_before, s_after: gains of the valleys, off the panel's own path, passed uncaptured before and after it.
+    s_before, s_after: gains of the wells, off the panel's own path, passed uncaptured before and after it.
     absorbed: -log of the probability of passing them uncaptured.
-    s_below: gain of passing uncaptured what lies below the panel's valley's first value.
+    s_below: gain of passing uncaptured what lies below the panel's well's first value.
     """
 
     panel: Panel
@@ -103,7 +103,7 @@ class Placed(NamedTuple):
 
 @dataclass(frozen=True)
 class Captures:
-    """A cycle's captured particles: panels from nu_max to nu_min within each valley.
+    """A cycle's captured particles: panels from nu_max to nu_min within each well.
 
     grids: on whose points panels may be sampled, by degree.
     """
@@ -111,7 +111,7 @@ class Captures:
     cycle: Cycle
     grids: dict[int, Grid]
     target: int
-    root: Window
+    root: SolvedWell
 
     def grid(self, panel: Panel) -> Grid:
         """Return the grid on whose points a panel is sampled."""
@@ -134,18 +134,18 @@ class Captures:
 
     @cached_property
     def placed(self) -> tuple[Placed, ...]:
-        """All panels, a valley's own before its children's."""
+        """All panels, a well's own before its children's."""
         zero = self.cycle.ctx.zero
         return tuple(_placed(self.root, zero, zero, zero))
 
     @cached_property
-    def atoms(self) -> WeightedPoints:
+    def point_masses(self) -> WeightedPoints:
         """The distribution of s as weighted points, exact for what the grid resolves."""
-        return self._atoms(self.root)
+        return self._point_masses(self.root)
 
     def mean(self, f: Callable[[Any], Any]) -> Any:
         """Return the mean of f(log E1 / E0) over all particles, the uncaptured ones included."""
-        return self.cycle.ctx.fsum(w * f(s) for w, s in self.atoms)
+        return self.cycle.ctx.fsum(w * f(s) for w, s in self.point_masses)
 
     def growth(self) -> Any:
         """Return m1, the integral of g - 1 - log g over all captures. Source: Eq:Erate."""
@@ -160,31 +160,31 @@ class Captures:
         """Return the coefficients, up to `order`, of mean exp((q + x) s) in powers of x."""
         return self._taylor(self.root, self.cycle.ctx.mpf(q), order)
 
-    def captured(self, window: Window) -> WeightedPoints:
-        """Return the particles captured on a valley's own panels, from its top: d p_ell = exp(-A) dA."""
-        ctx, gain = self.cycle.ctx, window.B_top - window.A_top
+    def captured(self, well: SolvedWell) -> WeightedPoints:
+        """Return the particles captured on a well's own panels, from its top: d p_ell = exp(-A) dA."""
+        ctx, gain = self.cycle.ctx, well.B_top - well.A_top
         return [
-            (weight * rate * ctx.exp(window.A_top - a), s - gain)
-            for panel in window.panels
+            (weight * rate * ctx.exp(well.A_top - a), s - gain)
+            for panel in well.panels
             for weight, rate, a, s in zip(self.grid(panel).weights, panel.rate, panel.A, panel.s, strict=True)
         ]
 
-    def _atoms(self, window: Window) -> WeightedPoints:
+    def _point_masses(self, well: SolvedWell) -> WeightedPoints:
         ctx = self.cycle.ctx
         below: WeightedPoints = [(ctx.one, ctx.zero)]
-        if window.children:
+        if well.children:
             grid = Grid(ctx, 2 * (6 + self.target // 3))
-            below = reduce(lambda x, y: convolve(grid, x, y), map(self._atoms, window.children))
-        spent = window.A_end - window.A_top
-        passed = shifted(below, ctx.exp(-spent), (window.B_end - window.B_top) - spent)
-        return self.captured(window) + passed
+            below = reduce(lambda x, y: convolve(grid, x, y), map(self._point_masses, well.children))
+        spent = well.A_end - well.A_top
+        passed = shifted(below, ctx.exp(-spent), (well.B_end - well.B_top) - spent)
+        return self.captured(well) + passed
 
-    def _taylor(self, window: Window, q: Any, order: int) -> list[Any]:
-        ctx, spent = self.cycle.ctx, window.A_end - window.A_top
-        passed = _exponential(ctx, ctx.exp(-spent), (window.B_end - window.B_top) - spent, q, order)
-        for child in window.children:
+    def _taylor(self, well: SolvedWell, q: Any, order: int) -> list[Any]:
+        ctx, spent = self.cycle.ctx, well.A_end - well.A_top
+        passed = _exponential(ctx, ctx.exp(-spent), (well.B_end - well.B_top) - spent, q, order)
+        for child in well.children:
             passed = product(passed, self._taylor(child, q, order))
-        terms = [_exponential(ctx, w, s, q, order) for w, s in self.captured(window)]
+        terms = [_exponential(ctx, w, s, q, order) for w, s in self.captured(well)]
         return [ctx.fsum(column) for column in zip(passed, *terms, strict=True)]
 
 
@@ -196,11 +196,11 @@ def _exponential(ctx: Any, weight: Any, s: Any, q: Any, order: int) -> list[Any]
     return terms
 
 
-def _placed(window: Window, before: Any, after: Any, absorbed: Any) -> Iterator[Placed]:
-    for panel in window.panels:
-        yield Placed(panel, before, after, absorbed, window.s_nc + window.B_top - window.A_top)
-    for i, child in enumerate(window.children):
-        early, late = window.children[:i], window.children[i + 1 :]
+def _placed(well: SolvedWell, before: Any, after: Any, absorbed: Any) -> Iterator[Placed]:
+    for panel in well.panels:
+        yield Placed(panel, before, after, absorbed, well.s_nc + well.B_top - well.A_top)
+    for i, child in enumerate(well.children):
+        early, late = well.children[:i], well.children[i + 1 :]
         yield from _placed(
             child,
             before + sum(other.s_nc for other in early),
@@ -210,28 +210,28 @@ def _placed(window: Window, before: Any, after: Any, absorbed: Any) -> Iterator[
 
 
 class Headway:
-    """How far a resolution has come: told as the share of its pieces that is sampled, which never falls."""
+    """How far a resolution has come: the share of its pieces that is sampled, which never falls."""
 
-    def __init__(self, n_pieces: int, told: Callable[[float], None] | None) -> None:
-        self._n_pieces, self._told = n_pieces, told
+    def __init__(self, n_pieces: int, on_progress: Callable[[float], None] | None) -> None:
+        self._n_pieces, self._on_progress = n_pieces, on_progress
         self._n_done, self._most = 0, 0.0
 
     def at(self, share: float) -> None:
         """Tell that a share of the present piece is sampled; of 1, that it is done."""
         # A part that turns out to be unresolved is sampled again by halves: the share waits for these.
         self._most = max(self._most, (self._n_done + share) / self._n_pieces)
-        if self._told is not None:
-            self._told(self._most)
+        if self._on_progress is not None:
+            self._on_progress(self._most)
         self._n_done += share == 1.0
 
 
-def captures(cycle: Cycle, target: int, told: Callable[[float], None] | None = None) -> Captures:
+def captures(cycle: Cycle, target: int, on_progress: Callable[[float], None] | None = None) -> Captures:
     """Resolve a cycle's captured particles by Chebyshev panels.
 
     Args:
         cycle: the cycle.
         target: decimals to which a, b and log g are resolved, at most digits + GUARD of the cycle.
-        told: called with the share of the work that is done, again and again.
+        on_progress: called with the share of the work that is done, again and again.
 
     Raises:
         NotConverged: panels as small as `most_halvings` allows do not resolve it, or the mouth nearly closes.
@@ -241,8 +241,8 @@ def captures(cycle: Cycle, target: int, told: Callable[[float], None] | None = N
         raise NotConverged(f"the mouth closes to {share} of its widest, must stay above {NARROWEST:g} of it")
     grids = grids_for(cycle.ctx, target)
     start = cycle.ctx.zero, cycle.ctx.zero
-    headway = Headway(len(cycle.pieces), told)
-    root = _window(cycle, list(grids.values()), cycle.valley, start, target, headway)
+    headway = Headway(len(cycle.pieces), on_progress)
+    root = _solved_well(cycle, list(grids.values()), cycle.well, start, target, headway)
     return Captures(cycle, grids, target, root)
 
 
@@ -254,16 +254,16 @@ def grids_for(ctx: Any, target: int) -> dict[int, Grid]:
     return {n: Grid(ctx, n) for n in degrees}
 
 
-def _window(
-    cycle: Cycle, grids: list[Grid], valley: Valley, start: tuple[Any, Any], target: int, headway: Headway
-) -> Window:
+def _solved_well(
+    cycle: Cycle, grids: list[Grid], well: NuWell, start: tuple[Any, Any], target: int, headway: Headway
+) -> SolvedWell:
     A, B = start
     panels: list[Panel] = []
-    for piece in valley.pieces:
+    for piece in well.pieces:
         panels += _resolved(cycle, grids, piece, (A, B), target, headway)
         A, B = panels[-1].A[-1], panels[-1].B[-1]
-    children = tuple(_window(cycle, grids, child, (A, B), target, headway) for child in valley.children)
-    return Window(tuple(panels), children, *start, A, B)
+    children = tuple(_solved_well(cycle, grids, child, (A, B), target, headway) for child in well.children)
+    return SolvedWell(tuple(panels), children, *start, A, B)
 
 
 def _resolved(

@@ -21,7 +21,7 @@ from numpy.polynomial import chebyshev
 from numpy.typing import NDArray
 
 from scene.tables import Scene, check_scene
-from theory.adiabatic import Captures, Window
+from theory.adiabatic import Captures, SolvedWell
 from theory.cycle import Cycle
 from theory.precision import guarded
 from theory.prediction import solved
@@ -71,22 +71,22 @@ class Branch(NamedTuple):
         p: Floats = np.exp(-self.evaluate(x)[3])
         return p
 
-    def below(self, series: Floats, levels: Floats, blur: float = 0.0) -> Floats:
+    def below(self, series: Floats, levels: Floats, resolution: float = 0.0) -> Floats:
         """Return the probability of being captured here with the series' value <= each level.
 
         Args:
             series: of the branch.
             levels: (n,) any values.
-            blur: where the series changes by no more it is constant, and all who are captured have one value:
-                what it seems to do there is rounding. They are counted from `blur` below that value on.
+            resolution: where the series changes by no more it is constant, and all captured have one value:
+                what it seems to do there is rounding. They are counted from `resolution` below that value on.
         """
         total = np.zeros_like(levels)
         bounds = turns(series)
         p = self.chaotic(bounds)
         values = at(series, bounds)
         for i in range(len(bounds) - 1):
-            if abs(values[i + 1] - values[i]) <= blur:
-                total += np.where(levels >= values[i : i + 2].min() - blur, p[i] - p[i + 1], 0.0)
+            if abs(values[i + 1] - values[i]) <= resolution:
+                total += np.where(levels >= values[i : i + 2].min() - resolution, p[i] - p[i + 1], 0.0)
                 continue
             is_rising = values[i + 1] > values[i]
             u = crossing(series, bounds[i], bounds[i + 1], levels)
@@ -110,10 +110,10 @@ def turns(series: Floats) -> Floats:
     """Return 0, the places in (0, 1) at which the series, given by its coefficients, turns, and 1."""
     values = at(series, X)
     slopes = np.where(np.abs(np.diff(values)) > noise(series), np.sign(np.diff(values)), 0)
-    told = np.flatnonzero(slopes)
+    places = np.flatnonzero(slopes)
     rate = chebyshev.chebder(series)
     found = [0.0]
-    for i, j in pairwise(told):
+    for i, j in pairwise(places):
         if slopes[i] != slopes[j]:
             place = crossing(-slopes[i] * rate, X[i], X[j + 1], np.zeros(1))
             found.append(float(place[0]))
@@ -136,13 +136,13 @@ def crossing(series: Floats, start: float, stop: float, levels: Floats) -> Float
 
 
 class Node(NamedTuple):
-    """A valley as numbers: its captured particles as weighted points, and what passing it uncaptured does.
+    """A well as numbers: its captured particles as weighted points, and what passing it uncaptured does.
 
-    weights, s: captured on the valley's own panels, from its top.
+    weights, s: captured on the well's own panels, from its top.
     branches: the same particles as functions of place.
     p_top: probability of being in the chaotic zone at its top.
     passed, gain: probability of not being captured on its own panels, and the gain in log E of that.
-    s_nc: gain in log E of passing the whole valley uncaptured (Eq:lnEnc/E0), summed before it is rounded: of
+    s_nc: gain in log E of passing the whole well uncaptured (Eq:lnEnc/E0), summed before it is rounded: of
         gains that cancel no rounding is left.
     """
 
@@ -156,14 +156,14 @@ class Node(NamedTuple):
     s_nc: float
 
     def all_branches(self) -> Iterator[Branch]:
-        """Yield all panels, a valley's own before its children's."""
+        """Yield all panels, a well's own before its children's."""
         yield from self.branches
         for child in self.children:
             yield from child.all_branches()
 
     @property
     def p_nc(self) -> float:
-        """Probability of passing the whole valley uncaptured (Eq:ps)."""
+        """Probability of passing the whole well uncaptured (Eq:ps)."""
         return self.passed * float(np.prod([child.p_nc for child in self.children]))
 
 
@@ -202,18 +202,18 @@ def _kept(numbers: list[float] | list[list[float]]) -> Floats:
     return array
 
 
-def _node(found: Captures, window: Window, branches: Iterator[Branch]) -> Node:
-    own = tuple(next(branches) for _ in window.panels)
-    points = [[float(w), float(s)] for w, s in found.captured(window)]
+def _node(found: Captures, well: SolvedWell, branches: Iterator[Branch]) -> Node:
+    own = tuple(next(branches) for _ in well.panels)
+    points = [[float(w), float(s)] for w, s in found.captured(well)]
     weights, s = _kept(points).T if points else (np.empty(0), np.empty(0))
-    spent, ctx = window.A_end - window.A_top, found.cycle.ctx
+    spent, ctx = well.A_end - well.A_top, found.cycle.ctx
     return Node(
         weights,
         s,
         own,
-        tuple(_node(found, child, branches) for child in window.children),
-        float(ctx.exp(-window.A_top)),
+        tuple(_node(found, child, branches) for child in well.children),
+        float(ctx.exp(-well.A_top)),
         float(ctx.exp(-spent)),
-        float(window.B_end - window.B_top - spent),
-        float(window.s_nc),
+        float(well.B_end - well.B_top - spent),
+        float(well.s_nc),
     )

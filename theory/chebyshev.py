@@ -179,9 +179,9 @@ def _with_halved_ends(values: list[Any]) -> list[Any]:
 WeightedPoints = list[tuple[Any, Any]]  # weight and place
 
 
-def shifted(atoms: WeightedPoints, weight: Any, shift: Any) -> WeightedPoints:
+def shifted(masses: WeightedPoints, weight: Any, shift: Any) -> WeightedPoints:
     """Return the points moved by `shift`, their weights times `weight`."""
-    return [(weight * w, s + shift) for w, s in atoms]
+    return [(weight * w, s + shift) for w, s in masses]
 
 
 def convolve(grid: Grid, first: WeightedPoints, second: WeightedPoints) -> WeightedPoints:
@@ -190,16 +190,16 @@ def convolve(grid: Grid, first: WeightedPoints, second: WeightedPoints) -> Weigh
     return compressed(grid, [(v * w, r + s) for v, r in few for w, s in other])
 
 
-def compressed(grid: Grid, atoms: WeightedPoints) -> WeightedPoints:
+def compressed(grid: Grid, masses: WeightedPoints) -> WeightedPoints:
     """Return at most n + 1 points with the same means of polynomials up to degree n, the grid's."""
-    if len(atoms) <= grid.n + 1:
-        return atoms
+    if len(masses) <= grid.n + 1:
+        return masses
     ctx = grid.ctx
-    low, high = min(s for _, s in atoms), max(s for _, s in atoms)
+    low, high = min(s for _, s in masses), max(s for _, s in masses)
     if high - low <= 16 * ctx.eps * max(abs(low), abs(high)):
-        return [(ctx.fsum(w for w, _ in atoms), low)]
-    weights = [w for w, _ in atoms]
-    x = [2 * (s - low) / (high - low) - 1 for _, s in atoms]
+        return [(ctx.fsum(w for w, _ in masses), low)]
+    weights = [w for w, _ in masses]
+    x = [2 * (s - low) / (high - low) - 1 for _, s in masses]
     older, old = [ctx.one] * len(x), x
     moments = [ctx.fsum(weights), ctx.fdot(weights, x)]
     for _ in range(2, grid.n + 1):

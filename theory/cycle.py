@@ -3,11 +3,11 @@
 The cycle starts at a highest maximum of nu, where every particle that can leave the island has left
 it. What stays in the island at all times, delta(nu_max) of the cap, takes no part.
 
-Captures nest in the valleys of nu(t). A particle captured as nu falls through a value is released when nu
-first returns to it, so everything between is skipped by it. A valley is an interval of time that nu enters
+Captures nest in the wells of nu(t). A particle captured as nu falls through a value is released when nu
+first returns to it, so everything between is skipped by it. A well is an interval of time that nu enters
 falling and leaves rising at one level, staying below between. From its top down to its highest inner peak a
 fall and a rise face each other, cut into pieces over which law and branch are analytic; at the level of that
-peak the valley splits into valleys that follow one another in time. Plateaus and inflections are allowed
+peak the well splits into wells that follow one another in time. Plateaus and inflections are allowed
 everywhere. The binary64 numbers of a scene are exact; a swing of nu below 10^-(digits + 30) of its largest
 value counts as none.
 """
@@ -47,7 +47,7 @@ class Cycle:
         period: the cycle's length [time]; None for a static table.
         nu_max: largest mouth.
         nu_min: smallest mouth.
-        valley: the captures in nested wells of nu; no pieces if nu is constant.
+        well: the captures in nested wells of nu; no pieces if nu is constant.
     """
 
     ctx: Any
@@ -56,7 +56,7 @@ class Cycle:
     period: Any
     nu_max: Any
     nu_min: Any
-    valley: Valley
+    well: NuWell
 
     @classmethod
     @guarded
@@ -83,15 +83,15 @@ class Cycle:
         run = stretches(ctx, mushroom)
         if not run:
             nu, _ = MovingMushroom(ctx, mushroom, Fraction(0)).nu(ctx.zero)
-            return cls(ctx, digits, ctx.zero, length, nu, nu, Valley((), ()))
-        found = valley(ctx, run, tolerance(ctx, run))
+            return cls(ctx, digits, ctx.zero, length, nu, nu, NuWell((), ()))
+        found = nu_well(ctx, run, tolerance(ctx, run))
         levels = [nu for piece in found.all_pieces() for nu in (piece.nu_upper, piece.nu_lower)]
         return cls(ctx, digits, run[0].upper, length, max(levels), min(levels), found)
 
     @property
     def pieces(self) -> tuple[CapturePiece, ...]:
         """All pieces of the tree of wells."""
-        return tuple(self.valley.all_pieces())
+        return tuple(self.well.all_pieces())
 
     @guarded
     def t_in(self, nu: Any) -> Any:
@@ -130,7 +130,7 @@ class Cycle:
         return t
 
     def _piece(self, nu: Any) -> CapturePiece:
-        for piece in self.pieces:  # a valley's own pieces come first: the first that fits is the earliest
+        for piece in self.pieces:  # a well's own pieces come first: the first that fits is the earliest
             if piece.nu_lower <= nu <= piece.nu_upper:
                 return piece
         given = self.ctx.nstr(nu, 15)
@@ -212,14 +212,14 @@ class CapturePiece(NamedTuple):
         return lcm(self.capture.lower_order, self.release.lower_order)
 
 
-class Valley(NamedTuple):
+class NuWell(NamedTuple):
     """Pieces from the top down to the level of the children, which follow one another in time."""
 
     pieces: tuple[CapturePiece, ...]
-    children: tuple[Valley, ...]
+    children: tuple[NuWell, ...]
 
     def all_pieces(self) -> Iterator[CapturePiece]:
-        """Yield the pieces of the whole tree, a valley's own before its children's."""
+        """Yield the pieces of the whole tree, a well's own before its children's."""
         yield from self.pieces
         for child in self.children:
             yield from child.all_pieces()
@@ -239,7 +239,7 @@ def stretches(ctx: Any, scene: Mushroom) -> list[MonotoneStretch]:
     return [s for _, s in found[first:]] + [s for s in later if s.nu_upper - s.nu_lower > small]
 
 
-def valley(ctx: Any, run: list[MonotoneStretch], small: Any) -> Valley:
+def nu_well(ctx: Any, run: list[MonotoneStretch], small: Any) -> NuWell:
     """Nest stretches, in order of time, that start falling from a level and end rising to it.
 
     Args:
@@ -252,14 +252,14 @@ def valley(ctx: Any, run: list[MonotoneStretch], small: Any) -> Valley:
     last_fall = max(i for i, s in enumerate(run) if is_fall(s))
     fall, rise = run[:n_fall], run[last_fall + 1 :]
     if not peaks:
-        return Valley(_pieces(ctx, fall, rise[::-1], small), ())
+        return NuWell(_pieces(ctx, fall, rise[::-1], small), ())
     level = max(run[i].nu_upper for i in peaks)
     pieces: tuple[CapturePiece, ...] = ()
     if run[0].nu_upper - level > small:
         pieces = _pieces(ctx, _above(fall, level, small), _above(rise, level, small)[::-1], small)
     parts = [0, *(i for i in peaks if level - run[i].nu_upper <= small), len(run)]
     groups = [run[start:stop] for start, stop in pairwise(parts)]
-    return Valley(pieces, tuple(valley(ctx, _below(group, level, small), small) for group in groups))
+    return NuWell(pieces, tuple(nu_well(ctx, _below(group, level, small), small) for group in groups))
 
 
 def is_fall(s: MonotoneStretch) -> bool:

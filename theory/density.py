@@ -123,7 +123,7 @@ def _panels(found: Captures) -> list[_Panel]:
     return [_Panel(found, placed) for placed in found.placed]
 
 
-def _blur(found: Captures) -> Any:
+def _resolution(found: Captures) -> Any:
     """Return what s, resolved to so many decimals, may change by where it is constant."""
     return found.cycle.ctx.mpf(10) ** -found.target
 
@@ -149,12 +149,12 @@ def density_at(scene: Scene, s: Sequence[Any], digits: int = 15) -> tuple[Any, .
 
     def figures(found: Captures) -> tuple[Any, ...]:
         stretches = [(panel, row) for panel in _panels(found) for row in panel.stretches()]
-        blur = _blur(found)
+        resolution = _resolution(found)
 
         def density(level: Any) -> Any:
             total = found.cycle.ctx.zero
             for panel, (a, b, s_a, s_b) in stretches:
-                if abs(s_a - s_b) > blur and min(s_a, s_b) < level < max(s_a, s_b):
+                if abs(s_a - s_b) > resolution and min(s_a, s_b) < level < max(s_a, s_b):
                     x = panel.root(a, b, bool(s_a < s_b), level)
                     total += panel.flow(x) / abs(panel.s_rate(x))
             return total
@@ -182,16 +182,16 @@ def cdf_at(scene: Scene, s: Sequence[Any], digits: int = 15) -> tuple[Any, ...]:
     def figures(found: Captures) -> tuple[Any, ...]:
         ctx = found.cycle.ctx
         stretches = [(panel, row) for panel in _panels(found) for row in panel.stretches()]
-        blur = _blur(found)
+        resolution = _resolution(found)
 
         def probability(level: Any) -> Any:
-            total = found.p_not_captured if found.s_not_captured - blur <= level else ctx.zero
+            total = found.p_not_captured if found.s_not_captured - resolution <= level else ctx.zero
             for panel, (a, b, s_a, s_b) in stretches:
-                is_atom = abs(s_a - s_b) <= blur
-                if level < min(s_a, s_b) - (blur if is_atom else 0):
+                is_point_mass = abs(s_a - s_b) <= resolution
+                if level < min(s_a, s_b) - (resolution if is_point_mass else 0):
                     continue
                 start, stop = a, b
-                if level < max(s_a, s_b) and not is_atom:
+                if level < max(s_a, s_b) and not is_point_mass:
                     x = panel.root(a, b, bool(s_a < s_b), level)
                     start, stop = (a, x) if s_a < s_b else (x, b)
                 total += ctx.exp(-panel.A(start)) - ctx.exp(-panel.A(stop))

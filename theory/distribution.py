@@ -1,12 +1,12 @@
 """The distribution of s = log E1 / E0 over one cycle and over many, in binary64.
 
-One cycle: an atom at s_nc; particles captured once, whose implicit density (Eq:lnE/E0 with Eq:ps) is
+One cycle: a point mass at s_nc; particles captured once, whose implicit density (Eq:lnE/E0 with Eq:ps) is
 integrated exactly; those captured more often, a convolution on a lattice (right to about 1e-6).
 Many cycles, taken as independent (sec. 4.2, Fig:n=10): powers of the Fourier transform of the
-lattice distribution. The lattice's origin is the uncaptured energy, so the atom is one of its points. The
-mass of a particle between two points is shared among them so that mass and mean are kept; its variance grows
-by at most step^2 / 4. So the step has to be small against what s does: it is STEP of the reach of s in one
-cycle, which in a nearly trivial cycle may be far below 1. Far tails are
+lattice distribution. The lattice's origin is the uncaptured energy, so the point mass is one of its points.
+The mass of a particle between two points is shared among them so that mass and mean are kept; its variance
+grows by at most step^2 / 4. So the step has to be small against what s does: it is STEP of the reach of s
+in one cycle, which in a nearly trivial cycle may be far below 1. Far tails are
 smaller than the rounding of the transform unless the distribution is first tilted by exp(q s).
 """
 
@@ -27,7 +27,7 @@ STEP = 2.0**-12  # the lattice's, at best, and as a share of one cycle's reach
 LEAST_REACH = 1e-12  # of s in a cycle; below, its differences are partly rounding
 MAX_POINTS = 2**20
 MAX_CYCLES = 10_000
-KEPT = 4 * UNRESOLVED  # of s: who gains or loses less keeps the energy, and how the sign falls is rounding
+KEPT = 4 * UNRESOLVED  # of s: a smaller change is none: its sign is rounding
 LARGEST_EXPONENT = 600.0  # exp of it stays finite, and so do sums
 
 Complexes = NDArray[np.complex128]
@@ -124,9 +124,9 @@ class Lattice:
         return np.roll(np.fft.irfft(transform, self.n_points), -self.first)
 
     def still(self) -> Complexes:
-        """Return the transform of those who keep their energy: in every valley, or as the uncaptured do.
+        """Return the transform of particles that keep their energy: in every well, or as the uncaptured do.
 
-        They are an atom at s = 0, which the lattice shares among its points.
+        They are a point mass at s = 0, which the lattice shares among its points.
         """
         kept = abs(self.s_nc) <= KEPT and not _is_still(self.root)
         return self._still(self.root) + (self.root.p_nc if kept else 0.0)
@@ -138,7 +138,7 @@ class Lattice:
         return np.interp(s - self.s_nc, self.places, cumulated(masses))
 
     def _transform(self, node: Node) -> Complexes:
-        # From the valley's top, d counted from its own uncaptured energy.
+        # From the well's top, d counted from its own uncaptured energy.
         found: Complexes = np.full(self.n_points // 2 + 1, node.passed, dtype=np.complex128)
         for child in node.children:
             found *= self._transform(child)
@@ -152,7 +152,7 @@ class Lattice:
             found += node.passed
             for child in node.children:
                 found *= self._still(child)
-        # From the valley's top, panel after panel.
+        # From the well's top, panel after panel.
         gains = np.split(node.s, np.cumsum([len(branch.s) for branch in node.branches])[:-1])
         for branch, gain in zip(node.branches, gains, strict=False):
             if np.abs(gain).max() <= KEPT:
@@ -177,12 +177,12 @@ def cumulated(masses: Floats) -> Floats:
 
 
 def _is_still(node: Node) -> bool:
-    """Tell whether the uncaptured keep their energy in every valley."""
+    """Tell whether the uncaptured keep their energy in every well."""
     return abs(node.gain) <= KEPT and all(map(_is_still, node.children))
 
 
 def _reach(node: Node, s_nc: float) -> tuple[float, float]:
-    """Return bounds on d = s - s_nc of all that may happen in a valley."""
+    """Return bounds on d = s - s_nc of all that may happen in a well."""
     inner = [_reach(child, s_nc) for child in node.children]
     own = [d for b in node.branches for d in (at(b.s, X).min() - s_nc, at(b.s, X).max() - s_nc)]
     return min([sum(low for low, _ in inner), *own]), max([sum(high for _, high in inner), *own])

@@ -53,7 +53,7 @@ def rarity(scene: Scene, digits: int = 15) -> Rarity:
 
 def _least(found: Captures) -> tuple[Any, ...]:
     ctx = found.cycle.ctx
-    size = max((abs(s) for _, s in found.atoms), default=ctx.zero)
+    size = max((abs(s) for _, s in found.point_masses), default=ctx.zero)
     if size < ctx.mpf(10) ** -found.target:
         return ctx.zero, -ctx.one / 2
 
@@ -90,7 +90,7 @@ def loss_probability(found: Energies | Scene, n_cycles: int) -> float:
 
 
 def _series(node: Node, q: Floats) -> Floats:
-    """Return mean exp((q + x) s) over a valley, from its top, as coefficients of x^0 and x^1: (2, n)."""
+    """Return mean exp((q + x) s) over a well, from its top, as coefficients of x^0 and x^1: (2, n)."""
     orders = np.arange(2)
     captured: Floats = (node.s[None, :] ** orders[:, None] * node.weights) @ np.exp(np.outer(node.s, q))
     passed = node.passed * np.exp(node.gain * q) * node.gain ** orders[:, None]
@@ -101,14 +101,14 @@ def _series(node: Node, q: Floats) -> Floats:
 
 
 def _lost(found: Energies, n: int, place: float) -> float:
-    """Sum the lattice's masses, tilted by exp(place s), below s = 0, its atoms apart."""
+    """Sum the lattice's masses, tilted by exp(place s), below s = 0, its point mass apart."""
     lattice = Lattice(found.root, n, place)
     norm, still = lattice.transform[0].real, lattice.still()
-    atom = 0.0 if abs(found.s_nc) <= KEPT else found.p_nc
-    powers = (lattice.transform / norm) ** n - (still / norm) ** n - (atom / norm) ** n
+    still_free = 0.0 if abs(found.s_nc) <= KEPT else found.p_nc
+    powers = (lattice.transform / norm) ** n - (still / norm) ** n - (still_free / norm) ** n
     s = n * found.s_nc + lattice.places
     # Gains above are as far as they were tilted up, and would be nothing but rounding, blown up.
     near = s < 2 * lattice.step
     untilt = np.exp(n * np.log(norm) - place * lattice.places[near])
     captured = np.interp(0.0, s[near], cumulated(lattice.masses(powers)[near] * untilt))
-    return float(captured + (atom**n if found.s_nc < 0 else 0.0))
+    return float(captured + (still_free**n if found.s_nc < 0 else 0.0))

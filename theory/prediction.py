@@ -4,7 +4,7 @@ Everything is computed at two or more resolutions; an answer is given when two i
 agree to two digits more than asked, and is then the finer of the two. A cycle in which one particle is
 captured several times is covered too.
 
-Solved cycles are kept for whoever asks again: numbers alone, those of the last KEPT solutions to few digits.
+Solved cycles are kept for the next request: numbers alone, those of the last KEPT solutions to few digits.
 Each caller gets them in the number system of its own cycle: it may change that, or compute in another thread,
 and nobody else is touched.
 """
@@ -22,7 +22,7 @@ from scene.notebook import rows
 from scene.refusal import BadInput, check_count, check_number, shown
 from scene.tables import Mushroom, Scene, laws
 from scene.transforms import backwards
-from theory.adiabatic import Captures, NotConverged, Panel, Window, captures, grids_for
+from theory.adiabatic import Captures, NotConverged, Panel, SolvedWell, captures, grids_for
 from theory.chebyshev import logarithm
 from theory.cycle import GUARD, Cycle
 from theory.precision import guarded
@@ -176,7 +176,7 @@ def reversed_cycle(scene: Scene) -> Mushroom:
 
 def _figures(found: Captures) -> tuple[Any, ...]:
     ctx = found.cycle.ctx
-    # Valleys multiply in `taylor`; as weighted points, which `mean` takes, they would be convolved. As mean
+    # Wells multiply in `taylor`; as weighted points, which `mean` takes, they would be convolved. As mean
     # exp(-s) is 1, the mean of s is of the order of its variance, and no more than rounding cancels.
     _, first, second = found.taylor(0, 2)
     return (
@@ -207,8 +207,8 @@ def converged(
     previous: tuple[Any, ...] | None = None
     # The first two show enough of nearly every cycle; more is wanted where energies change by very little.
     for number, target in enumerate((digits + 4, *range(digits + 8, digits + GUARD - 8, 12)), 1):
-        told = None if progress is None else partial(progress, number)
-        found = solved(scene, cycle, target, told)
+        on_progress = None if progress is None else partial(progress, number)
+        found = solved(scene, cycle, target, on_progress)
         current = tuple(ctx.zero if abs(x) < noise else x for x in figures(found))
         if previous is not None and len(current) == len(previous):
             changes = (abs(x - y) <= agreement * abs(x) for x, y in zip(current, previous, strict=True))
@@ -221,31 +221,33 @@ def converged(
 class _Solution:
     """A place for the numbers of one solution."""
 
-    window: Window | None = None
+    well: SolvedWell | None = None
 
 
-def solved(scene: Scene, cycle: Cycle, target: int, told: Callable[[float], None] | None = None) -> Captures:
+def solved(
+    scene: Scene, cycle: Cycle, target: int, on_progress: Callable[[float], None] | None = None
+) -> Captures:
     """Return a cycle's captures: see `theory.adiabatic.captures`.
 
     Args:
         scene: what the cycle is of.
         cycle: `Cycle.of` the scene.
         target: as for `captures`.
-        told: as for `captures`; what is kept is told as done.
+        on_progress: as for `captures`; what is kept is reported as done.
 
     Raises:
         NotConverged: as `captures`.
     """
     if cycle.digits > FEW_DIGITS:
-        return captures(cycle, target, told)
+        return captures(cycle, target, on_progress)
     place = _place(tuple(laws(scene).items()), cycle.digits, target)
-    if place.window is None:
-        found = captures(cycle, target, told)
-        place.window = _moved(found.root, lambda number: number._mpf_)
+    if place.well is None:
+        found = captures(cycle, target, on_progress)
+        place.well = _moved(found.root, lambda number: number._mpf_)
         return found
-    if told is not None:
-        told(1.0)
-    return Captures(cycle, grids_for(cycle.ctx, target), target, _moved(place.window, cycle.ctx.make_mpf))
+    if on_progress is not None:
+        on_progress(1.0)
+    return Captures(cycle, grids_for(cycle.ctx, target), target, _moved(place.well, cycle.ctx.make_mpf))
 
 
 @lru_cache(maxsize=KEPT)
@@ -253,8 +255,8 @@ def _place(given: tuple[tuple[str, Law], ...], digits: int, target: int) -> _Sol
     return _Solution()
 
 
-def _moved(window: Window, change: Callable[[Any], Any]) -> Window:
+def _moved(well: SolvedWell, change: Callable[[Any], Any]) -> SolvedWell:
     """Return the same numbers in another form."""
-    panels = (Panel(*([change(number) for number in column] for column in panel)) for panel in window.panels)
-    children = (_moved(child, change) for child in window.children)
-    return Window(tuple(panels), tuple(children), *map(change, window[2:]))
+    panels = (Panel(*([change(number) for number in column] for column in panel)) for panel in well.panels)
+    children = (_moved(child, change) for child in well.children)
+    return SolvedWell(tuple(panels), tuple(children), *map(change, well[2:]))

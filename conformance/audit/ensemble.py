@@ -57,7 +57,7 @@ class GivenEnsemble(NamedTuple):
         scene: that is claimed to have been simulated.
         energy: of every start, v^2 / 2 in the scene's units.
         s: (n,) log E1 / E0.
-        captured: (n,) who was captured; None where nothing tells.
+        captured: (n,) which were captured; None where nothing tells.
         t_in, t_out: (n,) begin and end of a stay in the scene's time; nan for none; None where not given.
         x0, y0: (n,) where each started; None where not given.
         n_lost: rows without an energy, or particles without a row.

@@ -173,7 +173,7 @@ class Sample(NamedTuple):
         run: what was asked for.
         s: (n, K) log E / E0 at the end of each cycle.
         t_in, t_out: (n, K, M) capture interval around each narrowing of the mouth; nan for none.
-        takes_part: (n,) who is not in the island all the time.
+        takes_part: (n,) which are not in the island all the time.
         phase_s: (n, K, P) log E / E0 at the phases.
         phase_captured: (n, K, P) whether in the island there.
         stem_hits: (n,) collisions with left, right and floor.
@@ -217,16 +217,16 @@ class Sample(NamedTuple):
 
     @property
     def captured(self) -> BoolArray:
-        """Return who was captured in the first cycle."""
+        """Return which were captured in the first cycle."""
         return np.asarray(np.isfinite(self.t_in[:, 0]).any(axis=1))
 
     @property
     def never_captured(self) -> BoolArray:
-        """Return, for each who takes part, whether the first cycle passes uncaptured; p_nc is the share."""
+        """Return, for each that takes part, whether the first cycle passes uncaptured; p_nc is the share."""
         return np.asarray(~self.captured[self.takes_part])
 
     @property
-    def first_stay(self) -> tuple[FloatArray, FloatArray]:
+    def first_capture(self) -> tuple[FloatArray, FloatArray]:
         """Return begin and end (n,) of each one's first capture interval in the first cycle; nan for none."""
         begin, end = (np.fmin.reduce(t[:, 0], axis=1, initial=np.nan) for t in (self.t_in, self.t_out))
         return begin, end

@@ -150,7 +150,7 @@ def capture_times(samples: list[Sample]) -> Figure:
         curve = theory.capture_curve(scene, 3)
         edges = np.linspace(curve.t_in[0], curve.t_in[-1], 51)
         mass = np.asarray(theory.capture_time_mass(scene, edges)) / np.diff(edges)
-        _bars(panel, sample.first_stay[0], edges, sample.n)
+        _bars(panel, sample.first_capture[0], edges, sample.n)
         panel.stairs(mass, edges, color=ORANGE, linewidth=1.5, label="theory, eq. (ps)", baseline=None)
         panel.set(xlabel="time of capture", ylabel="density", title=sample.run.name, ylim=(0, None))
     np.atleast_1d(axes)[0].legend(loc="upper left", fontsize=7)

@@ -38,7 +38,7 @@ def curves(scene):
 
 @cache
 def windows(scene):
-    """Return the captures of each valley that follows another in time: p_cha falling, t_in, t_out, gain."""
+    """Return the captures of each well that follows another in time: p_cha falling, t_in, t_out, gain."""
     _, s_nc, curve, _ = curves(scene)
     starts = [0, *(np.flatnonzero(np.diff(curve.p_cha) > 0) + 1), len(curve.p_cha)]
     parts = [slice(i, j) for i, j in pairwise(starts) if j > i]
@@ -131,9 +131,9 @@ def at_phases(scene, energy, phases):
 def at_capture(scene, energy):
     """Return mean and variance of log E / E0 of each atom of captures when it is captured."""
     found = theory.at_energy(scene, energy)
-    times, places = np.unique(found.atoms.t_in[~found.atoms.is_free], return_inverse=True)
-    entered = np.full((2, len(found.atoms.t_in)), np.nan)
-    entered[:, ~found.atoms.is_free] = np.array(found.at_capture(times))[:, places]
+    times, places = np.unique(found.point_masses.t_in[~found.point_masses.is_free], return_inverse=True)
+    entered = np.full((2, len(found.point_masses.t_in)), np.nan)
+    entered[:, ~found.point_masses.is_free] = np.array(found.at_capture(times))[:, places]
     return entered
 
 
@@ -151,7 +151,7 @@ def one_cycle(scene, energy, total, phases, rng):
     except theory.NotCovered:
         found = None
     if found and len(windows(scene)) == 1:
-        a = found.atoms
+        a = found.point_masses
         i = np.minimum(np.searchsorted(np.cumsum(a.weight), rng.random(n)), len(a.weight) - 1)
         t_in = a.t_in[i][:, None]
         t_out = np.interp(t_in, curve.t_in, curve.t_out)
@@ -161,7 +161,7 @@ def one_cycle(scene, energy, total, phases, rng):
         variance = np.full(n, WIDTH**2 * energy**-0.5)
         shift = np.zeros(n)
         if found:
-            a = found.atoms
+            a = found.point_masses
             for atoms, those in ((a.is_free, ~captured_ever(t_in)), (~a.is_free, captured_ever(t_in))):
                 weight = a.weight[atoms] / max(a.weight[atoms].sum(), 1e-300)
                 variance[those], shift[those] = weight @ a.variance[atoms], weight @ a.shift[atoms]

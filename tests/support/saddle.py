@@ -109,7 +109,7 @@ class Saddle:
 
 
 def _series(node: Node, q: Floats) -> Floats:
-    """Return mean exp((q + x) s) over a valley, from its top, as coefficients of x^0 ... x^4: (5, n)."""
+    """Return mean exp((q + x) s) over a well, from its top, as coefficients of x^0 ... x^4: (5, n)."""
     orders = np.arange(5)
     factorials = np.array([factorial(k) for k in orders])
     powers = node.s[None, :] ** orders[:, None] / factorials[:, None]
@@ -122,6 +122,6 @@ def _series(node: Node, q: Floats) -> Floats:
 
 
 def _size(node: Node) -> float:
-    """Return a bound on |s| over a valley."""
+    """Return a bound on |s| over a well."""
     inner = sum(_size(child) for child in node.children)
     return max(abs(node.gain) + inner, float(np.max(np.abs(node.s), initial=0.0)))

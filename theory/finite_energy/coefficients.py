@@ -31,7 +31,7 @@ ROUNDING = 1e-9
 Flags = NDArray[np.bool_]
 
 
-class CycleCourse(NamedTuple):
+class CycleCoefficients(NamedTuple):
     """A cycle at T times, midpoints of equal steps from its start.
 
     start, step: of time.
@@ -56,7 +56,7 @@ class CycleCourse(NamedTuple):
 
 
 @lru_cache(maxsize=16)
-def course(scene: Mushroom) -> CycleCourse:
+def cycle_coefficients(scene: Mushroom) -> CycleCoefficients:
     """Follow a cycle whose frozen rates are known.
 
     Raises:
@@ -75,7 +75,7 @@ def course(scene: Mushroom) -> CycleCourse:
         np.broadcast_to(x, times.shape) for x in (now.w_rate / now.w - rising / height, np.pi * height)
     )
     hazard = np.abs(flux * nu_rate)
-    return CycleCourse(start, step, times, log_energy, hazard, nu_rate < 0, shear, crossing, rates)
+    return CycleCoefficients(start, step, times, log_energy, hazard, nu_rate < 0, shear, crossing, rates)
 
 
 def _clock_start(scene: Mushroom) -> float:
@@ -103,7 +103,7 @@ class Fields:
     lags, squares, hazards: sums of hazard times `lag`, `square` and, while nu falls, `likelier`.
 
     Args:
-        cycle: from `course`.
+        cycle: from `cycle_coefficients`.
         energy: of the ensemble when the cycle begins.
 
     Attributes, of the uncaptured, weighted by diffusion:
@@ -114,12 +114,12 @@ class Fields:
         n_blocks: of path, each twice as long as the memory, in a cycle.
     """
 
-    def __init__(self, cycle: CycleCourse, energy: float) -> None:
+    def __init__(self, cycle: CycleCoefficients, energy: float) -> None:
         self._start, self._step = cycle.start, cycle.step
         speed = np.sqrt(2 * energy) * np.exp((cycle.log_energy + GAINS[:, None]) / 2)
         faster, rates = speed * np.exp(NUDGE / 2), cycle.rates
         lag = _at_speeds(rates.lag, speed) / speed
-        # Phase volume is kept: those who lag by J(E) are captured likelier by J + dJ / d log E.
+        # Phase volume is kept: particles that lag by J(E) are captured likelier by J + dJ / d log E.
         likelier = lag + (_at_speeds(rates.lag, faster) / faster - lag) / NUDGE
         square = _at_speeds(rates.square, speed) / speed**2
         left = 1 + _at_speeds(rates.depletion, speed) / rates.diffusion.sum(axis=1)

@@ -1,4 +1,4 @@
-"""Energies after one cycle at finite energy: the adiabatic theory, blurred and shifted, with nothing to fit.
+"""Energies after one cycle at finite energy: the adiabatic theory with diffusion and shifts, nothing fitted.
 
 The chaotic zone's log E diffuses by the kicks of its walls, and the particles about to be captured, like
 those just released, lag behind the zone's mean. Both are known from frozen tables (`coefficients`). Beside
@@ -21,25 +21,25 @@ from scene.refusal import BadInput, check_count, check_number
 from scene.tables import Mushroom, Scene
 from theory.branches import Branch, Floats, Node, at, tree
 from theory.curves import chaotic_zone
-from theory.finite_energy.coefficients import N_TIMES, Fields, Flags, course
+from theory.finite_energy.coefficients import N_TIMES, Fields, Flags, cycle_coefficients
 from theory.finite_energy.rates import SPEEDS, table_error
 from theory.validation import finite_array
 from theory.volumes import NotCovered, as_mushroom
 
 N_PLACES = 2000  # at which distribution functions are computed; linear between them
-N_CAPTURES = 600  # atoms of a valley that lies in no other; of one among several a fifth
-MOST_ATOMS = 40_000  # of several captures; more are joined with their neighbours in gain
+N_CAPTURES = 600  # point masses of a well that lies in no other; of one among several a fifth
+MOST_MASSES = 40_000  # of several captures; more are joined with their neighbours in gain
 MOST_DRAWN = 100_000_000
 LATE = 16  # steps of a cycle, by which times may miss it: captures are seen from arc hit to arc hit
-REACH = 7.0  # standard deviations beyond which no blur is computed
-LEAST = 1e-12  # variance of a blur, in log E: a lag's square may leave less than none
+REACH = 7.0  # standard deviations beyond which no kernel is computed
+LEAST = 1e-12  # variance of a kernel, in log E: a lag's square may leave less than none
 LARGEST = 2.0**1000  # of an energy: where its double is no float, fast particles seem slow
 TOO_SLOW = "energy = {}: walls turn too soon for particles so slow, and theory has no distribution"
 UNMEASURED = "energy = {}: particles so slow, below a speed of {:g}, are beyond the measured rates"
-MOST = 4.0  # variance of a blur, in log E: beyond it what the peak has of it, v - v^2 / 8, falls again
+MOST = 4.0  # variance of a kernel, in log E: beyond it what the peak has of it, v - v^2 / 8, falls again
 
 
-def blur_cdf(x: ArrayLike, variance: ArrayLike) -> Floats:
+def kernel_cdf(x: ArrayLike, variance: ArrayLike) -> Floats:
     """Return the probability of log E / E_adiabatic <= x for a particle that diffused.
 
     (E / E_adiabatic)^(1/4) is |e + N|, with e a unit vector and N normal with `variance` / 16 along each
@@ -54,13 +54,13 @@ def blur_cdf(x: ArrayLike, variance: ArrayLike) -> Floats:
     return np.asarray(ndtr(excess / np.sqrt(step * (1 - 1.5 * step))), dtype=np.float64)
 
 
-class Atoms(NamedTuple):
-    """A distribution of log E1 / E0 as weighted blurs, (n,) each.
+class PointMasses(NamedTuple):
+    """A distribution of log E1 / E0 as weighted diffusion kernels, (n,) each.
 
     weight: probabilities.
     gain: over the uncaptured, as in the adiabatic theory.
     shift: of log E, by lags.
-    variance: as `blur_cdf` takes it.
+    variance: as `kernel_cdf` takes it.
     t_in: time of the first capture; nan for the uncaptured.
     """
 
@@ -72,12 +72,12 @@ class Atoms(NamedTuple):
 
     @property
     def is_free(self) -> Flags:
-        """Tell who is never captured."""
+        """Tell which are never captured."""
         return np.isnan(self.t_in)
 
-    def those(self, chosen: Flags) -> Atoms:
+    def those(self, chosen: Flags) -> PointMasses:
         """Return some of them."""
-        return Atoms(*(column[chosen] for column in self))
+        return PointMasses(*(column[chosen] for column in self))
 
 
 class TheoryError(NamedTuple):
@@ -105,7 +105,7 @@ class FiniteEnergy:
         scene, energy: the arguments; the same ones are refused as by `at_energy`.
         s_nc: log E_nc / E0 of the adiabatic theory.
         p_nc: probability of never being captured.
-        atoms: the distribution of s = log E1 / E0.
+        point_masses: the distribution of s = log E1 / E0.
     """
 
     def __init__(self, scene: Scene, energy: float) -> None:
@@ -116,50 +116,50 @@ class FiniteEnergy:
             self._solve()
             if not self._fields.is_known:
                 raise NotCovered(UNMEASURED.format(energy, SPEEDS[0]))
-            is_one = self.atoms.variance.max() < MOST and self.variance_s > 0 and self.peak[1] > 0
+            is_one = self.point_masses.variance.max() < MOST and self.variance_s > 0 and self.peak[1] > 0
         if not is_one:
             raise NotCovered(TOO_SLOW.format(energy))
         self._below: dict[str, tuple[Floats, Floats]] = {}
 
     def _solve(self) -> None:
-        cycle, root = course(self.scene), tree(self.scene)
+        cycle, root = cycle_coefficients(self.scene), tree(self.scene)
         self.s_nc = root.s_nc
-        self._course, self._fields = cycle, Fields(cycle, self.energy)
+        self._coefficients, self._fields = cycle, Fields(cycle, self.energy)
         self._n_captures = N_CAPTURES // 5 if root.children else N_CAPTURES
-        start = Atoms(np.ones(1), np.zeros(1), np.zeros(1), np.zeros(1), np.full(1, np.nan))
+        start = PointMasses(np.ones(1), np.zeros(1), np.zeros(1), np.zeros(1), np.full(1, np.nan))
         passed, now = self._through(root, root, start, cycle.start)
         found = self._drift(passed, now, cycle.start + cycle.step * N_TIMES)
-        self.atoms = found._replace(weight=found.weight / found.weight.sum())
-        self.p_nc = float(self.atoms.weight[self.atoms.is_free].sum())
+        self.point_masses = found._replace(weight=found.weight / found.weight.sum())
+        self.p_nc = float(self.point_masses.weight[self.point_masses.is_free].sum())
 
     @property
     def mean_s(self) -> float:
         """Mean of log E1 / E0."""
-        return float(self.atoms.weight @ self._centres(self.atoms))
+        return float(self.point_masses.weight @ self._centres(self.point_masses))
 
     @property
     def variance_s(self) -> float:
         """Variance of log E1 / E0."""
-        a = self.atoms
+        a = self.point_masses
         square = (self._centres(a) - self.mean_s) ** 2
         return float(a.weight @ (square + a.variance - a.variance**2 / 8))
 
     @property
     def captured_mean(self) -> float:
         """Mean of log E1 / E0 of the captured particles; nan if there are none."""
-        a = self.atoms.those(~self.atoms.is_free)
+        a = self.point_masses.those(~self.point_masses.is_free)
         return float(a.weight @ self._centres(a) / a.weight.sum()) if len(a.weight) else float("nan")
 
     @property
     def peak(self) -> tuple[float, float]:
         """Mean and variance of log E1 / E0 of the particles never captured."""
-        a = self.atoms.those(self.atoms.is_free)
+        a = self.point_masses.those(self.point_masses.is_free)
         return float(self._centres(a)[0]), float(a.variance[0] - a.variance[0] ** 2 / 8)
 
     @property
     def theory_error(self) -> TheoryError:
         """Estimated error of each figure."""
-        captured = self.atoms.those(~self.atoms.is_free)
+        captured = self.point_masses.those(~self.point_masses.is_free)
         second = (
             float(captured.weight @ captured.shift**2) / p if (p := float(captured.weight.sum())) else 0.0
         )
@@ -192,7 +192,7 @@ class FiniteEnergy:
 
     def mean_of_exp(self, q: float) -> float:
         """Return the mean of exp(q s), to second order in the widths; BadInput if beyond binary64."""
-        a, q = self.atoms, check_number("q", q)
+        a, q = self.point_masses, check_number("q", q)
         with np.errstate(over="ignore", invalid="ignore"):
             drift = q * (1 + 2 * q) / 4 * a.variance
             found = float(a.weight @ np.exp(q * (self.s_nc + a.gain + a.shift) + drift))
@@ -202,7 +202,7 @@ class FiniteEnergy:
 
     def capture_cdf(self, t: ArrayLike) -> Floats:
         """Return the distribution function of the first capture time; BadInput if nothing is captured."""
-        a = self._those_of("captured")
+        a = self._part("captured")
         order = np.argsort(a.t_in)
         below = np.cumsum(a.weight[order]) - a.weight[order] / 2
         found: Floats = np.interp(finite_array("t", t), a.t_in[order], below / a.weight.sum())
@@ -223,7 +223,7 @@ class FiniteEnergy:
         none = np.zeros(len(t))
         gathered = {name: self._fields.at(name, none, t) for name in ("variance", "squares", "lags", "drift")}
         variance = gathered["variance"] - gathered["squares"]
-        begun = chaotic_zone(self.scene, [self._course.start]).log_energy[0]
+        begun = chaotic_zone(self.scene, [self._coefficients.start]).log_energy[0]
         drift = gathered["variance"] / 4 + gathered["drift"] - gathered["lags"]
         return chaotic_zone(self.scene, t).log_energy - begun + drift, variance - variance**2 / 8
 
@@ -240,7 +240,7 @@ class FiniteEnergy:
         """
         n_cycles = check_count("n_cycles", n_cycles, 1, MOST_DRAWN)
         n = check_count("n", n, 1, MOST_DRAWN // n_cycles)
-        random, a = np.random.default_rng(check_count("seed", seed, 0, 2**64 - 1)), self.atoms
+        random, a = np.random.default_rng(check_count("seed", seed, 0, 2**64 - 1)), self.point_masses
         found = np.zeros((n, n_cycles))
         total = np.zeros(n)
         share = np.cumsum(a.weight)
@@ -253,82 +253,82 @@ class FiniteEnergy:
             found[:, k] = total
         return found
 
-    def _centres(self, atoms: Atoms) -> Floats:
-        return np.asarray(self.s_nc + atoms.gain + atoms.shift + atoms.variance / 4, dtype=np.float64)
+    def _centres(self, masses: PointMasses) -> Floats:
+        return np.asarray(self.s_nc + masses.gain + masses.shift + masses.variance / 4, dtype=np.float64)
 
-    def _cdf(self, s: ArrayLike, who: str) -> Floats:
+    def _cdf(self, s: ArrayLike, kind: str) -> Floats:
         levels = finite_array("s", s)
-        if who not in self._below:
-            self._below[who] = self._sampled(who)
-        found: Floats = np.interp(levels, *self._below[who])
+        if kind not in self._below:
+            self._below[kind] = self._sampled(kind)
+        found: Floats = np.interp(levels, *self._below[kind])
         return found
 
-    def _those_of(self, who: str) -> Atoms:
+    def _part(self, kind: str) -> PointMasses:
         """Return the "free", the "captured" or "all"."""
-        free = self.atoms.is_free
-        found = self.atoms.those({"free": free, "captured": ~free, "all": free | True}[who])
+        free = self.point_masses.is_free
+        found = self.point_masses.those({"free": free, "captured": ~free, "all": free | True}[kind])
         if not len(found.weight):
             raise BadInput("nobody is captured in this cycle: there is no distribution of the captured")
         return found
 
     def _within(self, times: ArrayLike) -> Floats:
         """Return times in the cycle, beyond which nothing is gathered."""
-        t, (start, step) = finite_array("times", times, n_dimensions=1), self._course[:2]
+        t, (start, step) = finite_array("times", times, n_dimensions=1), self._coefficients[:2]
         first, last = start - LATE * step, start + (N_TIMES + LATE) * step
         if np.any(outside := (t < first) | (t > last)):
             raise BadInput(f"times holds {t[outside][0]}, must be in the cycle, [{first:.6g}, {last:.6g}]")
         return t
 
-    def _sampled(self, who: str) -> tuple[Floats, Floats]:
+    def _sampled(self, kind: str) -> tuple[Floats, Floats]:
         """Return places and the distribution function there of the "free", the "captured" or "all"."""
-        a = self._those_of(who)
+        a = self._part(kind)
         centre, reach = self.s_nc + a.gain + a.shift, REACH * np.sqrt(np.maximum(a.variance, LEAST))
         places = np.linspace((centre - reach).min(), (centre + reach).max(), N_PLACES)
         below = np.zeros(N_PLACES)
         for part in np.array_split(np.arange(len(centre)), 1 + len(centre) // 1000):
-            below += blur_cdf(places[:, None] - centre[part], a.variance[part]) @ a.weight[part]
+            below += kernel_cdf(places[:, None] - centre[part], a.variance[part]) @ a.weight[part]
         return np.asarray(places, dtype=np.float64), below / a.weight.sum()
 
-    def _drift(self, atoms: Atoms, now: Floats | float, until: Floats | float) -> Atoms:
+    def _drift(self, masses: PointMasses, now: Floats | float, until: Floats | float) -> PointMasses:
         """Let particles in the chaotic zone diffuse, and correct for those captured meanwhile."""
 
         def gathered(name: str) -> Floats:
-            return self._fields.at(name, atoms.gain, until) - self._fields.at(name, atoms.gain, now)
+            return self._fields.at(name, masses.gain, until) - self._fields.at(name, masses.gain, now)
 
         squares = gathered("squares")
-        return atoms._replace(
-            weight=atoms.weight * np.exp(-gathered("hazards")),
-            shift=atoms.shift + gathered("drift") - gathered("lags") + squares / 4,  # no drift of it
-            variance=atoms.variance + gathered("variance") - squares,
+        return masses._replace(
+            weight=masses.weight * np.exp(-gathered("hazards")),
+            shift=masses.shift + gathered("drift") - gathered("lags") + squares / 4,  # no drift of it
+            variance=masses.variance + gathered("variance") - squares,
         )
 
-    def _through(self, root: Node, node: Node, atoms: Atoms, now: float) -> tuple[Atoms, float]:
-        """Take particles that are in the chaotic zone through a valley; return them, and when it ends."""
+    def _through(self, root: Node, node: Node, masses: PointMasses, now: float) -> tuple[PointMasses, float]:
+        """Take particles that are in the chaotic zone through a well; return them, and when it ends."""
         if not node.branches:
             for child in node.children:
-                atoms, now = self._through(root, child, atoms, now)
-            return atoms, now
+                masses, now = self._through(root, child, masses, now)
+            return masses, now
         end, below = float(node.branches[0].ends[2, 0]), float(node.branches[-1].ends[1, 1])
-        free = self._drift(atoms, now, below)
+        free = self._drift(masses, now, below)
         free = free._replace(weight=free.weight * node.passed)
         for child in node.children:
             free, below = self._through(root, child, free, below)
         parts = [self._drift(free, below, end)]
         for branch in node.branches:
             stays = _stays(node, branch, self._n_captures, root.s_nc)
-            parts += [self._captured(atoms, now, stays, end)]
+            parts += [self._captured(masses, now, stays, end)]
         return _joined(parts), end
 
-    def _captured(self, atoms: Atoms, now: float, stays: Stays, end: float) -> Atoms:
-        """Let each particle have each stay in the island; return them at the valley's end."""
+    def _captured(self, masses: PointMasses, now: float, stays: Stays, end: float) -> PointMasses:
+        """Let each particle have each stay in the island; return them at the well's end."""
         n = len(stays.t_in)
-        t_in, t_out, gain, probability = (np.tile(column, len(atoms.gain)) for column in stays)
-        found = self._drift(Atoms(*(np.repeat(column, n) for column in atoms)), now, t_in)
+        t_in, t_out, gain, probability = (np.tile(column, len(masses.gain)) for column in stays)
+        found = self._drift(PointMasses(*(np.repeat(column, n) for column in masses)), now, t_in)
         gain = found.gain + gain
         lag, square, likelier = (self._fields.at(k, found.gain, t_in) for k in ("lag", "square", "likelier"))
         late, late_square = (self._fields.at(name, gain, t_out) for name in ("lag", "square"))
         spread = square - lag**2 + late_square - late**2
-        released = Atoms(
+        released = PointMasses(
             found.weight * probability * np.exp(likelier),
             gain,
             found.shift + lag + late - spread / 4,
@@ -343,7 +343,7 @@ class Stays(NamedTuple):
 
     t_in, t_out: when.
     gain: over the uncaptured, in log E.
-    probability: of each, given the chaotic zone at the valley's top.
+    probability: of each, given the chaotic zone at the well's top.
     """
 
     t_in: Floats
@@ -373,7 +373,7 @@ def _solved(scene: Mushroom, energy: float) -> FiniteEnergy:
 
 
 def _stays(node: Node, branch: Branch, n: int, s_nc: float) -> Stays:
-    """Divide a panel's captures among atoms: of the valley's n as many as it has of the captures."""
+    """Divide a panel's captures among point masses: of the well's n as many as it has of the captures."""
     ends = branch.chaotic(np.array([0.0, 1.0])) / node.p_top
     n = max(8, int(n * (ends[0] - ends[1]) / max(1 - node.passed, LEAST)))
     edges = np.linspace(0.0, 1.0, n + 1)
@@ -382,19 +382,19 @@ def _stays(node: Node, branch: Branch, n: int, s_nc: float) -> Stays:
     return Stays(t_in, t_out, at(branch.s, middle) - s_nc, -np.diff(branch.chaotic(edges)) / node.p_top)
 
 
-def _joined(parts: list[Atoms]) -> Atoms:
-    """Put atoms together; where they are too many, join neighbours in gain."""
-    whole = Atoms(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))
+def _joined(parts: list[PointMasses]) -> PointMasses:
+    """Put point masses together; where they are too many, join neighbours in gain."""
+    whole = PointMasses(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))
     n = len(whole.gain)
-    if n <= MOST_ATOMS:
+    if n <= MOST_MASSES:
         return whole
     order = np.lexsort((whole.gain, whole.is_free))
     _, group = np.unique(
-        np.arange(n) * (MOST_ATOMS // 2) // n + MOST_ATOMS * whole.is_free[order], return_inverse=True
+        np.arange(n) * (MOST_MASSES // 2) // n + MOST_MASSES * whole.is_free[order], return_inverse=True
     )
     weight = np.bincount(group, whole.weight[order])
 
     def middle(column: Floats) -> Floats:
         return np.asarray(np.bincount(group, (whole.weight * column)[order]) / weight, dtype=np.float64)
 
-    return Atoms(np.asarray(weight), *(middle(column) for column in whole[1:]))
+    return PointMasses(np.asarray(weight), *(middle(column) for column in whole[1:]))

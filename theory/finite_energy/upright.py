@@ -105,10 +105,10 @@ def _growth(scene: Scene, at: Floats) -> Floats:
     # All that excess is a sum of, without signs: w' may be nu' r + nu r', and the zone's kicks come of all.
     opening = np.abs(w_rate) + 2 * volumes.nu * np.abs(r_rate)
     zone = 2 * np.pi * (np.pi * r * np.abs(r_rate) + 2 * opening * h + 2 * w * np.abs(h_rate))
-    blur = ROUNDING * (2 * opening / w + zone / volumes.v_cha)
+    rounding = ROUNDING * (2 * opening / w + zone / volumes.v_cha)
     kept = _kept(np.broadcast_to(volumes.nu, at.shape))
     factor = 16 * w * h**2 / volumes.v_cha * (1 + kept) / (1 - kept)
-    found: Floats = np.stack([factor * excess**2, factor * blur**2])
+    found: Floats = np.stack([factor * excess**2, factor * rounding**2])
     return found
 
 
@@ -178,10 +178,10 @@ def _integral(f: Callable[[Floats], Floats], edges: Floats) -> float:
     for _ in range(MAX_HALVINGS):
         middle = (low + high) / 2
         low, high = np.stack([low, middle]), np.stack([middle, high])
-        halves, blurs = _panels(f, low, high)
-        both, blur = halves.sum(axis=0), blurs.sum(axis=0)
+        halves, roundings = _panels(f, low, high)
+        both, rounding = halves.sum(axis=0), roundings.sum(axis=0)
         # (x + e)^2 is off by 2 x e + e^2. By less panels need not agree: halved, they were halved for ever.
-        by_rounding = 2 * np.sqrt(both * blur) + blur
+        by_rounding = 2 * np.sqrt(both * rounding) + rounding
         is_rough = np.abs(both - whole) > np.maximum(SETTLED * (settled + both.sum()), by_rounding)
         settled += float(both[~is_rough].sum())
         low, high, whole = (x[:, is_rough].ravel() for x in (low, high, halves))

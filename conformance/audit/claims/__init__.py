@@ -13,8 +13,8 @@ from conformance.audit.claims import (
     exponents,
     finite_energy,
     identities,
+    many_cycles,
     misprints,
-    vanishing,
 )
 from conformance.audit.tolerances import N_SIGMA
 from scene.refusal import BadInput
@@ -26,7 +26,7 @@ CHECKS = {
     **exponents.CHECKS,
     **identities.CHECKS,
     **assumptions.CHECKS,
-    **vanishing.CHECKS,
+    **many_cycles.CHECKS,
 }
 
 

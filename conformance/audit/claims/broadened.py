@@ -18,7 +18,7 @@ from conformance.audit.claim import Check
 from conformance.audit.runs import RUNS, Sample, Simulation, scene_of
 from conformance.audit.tolerances import Cdf, FloatArray, Mean, close, mean, share, spread
 
-INFINITE = 1e40  # energy at which nothing is left of shifts and blurs
+INFINITE = 1e40  # energy at which nothing is left of shifts and diffusion
 N_PLACES = 2001
 PEAK_DENSITY = 0.3989  # of the normal density at its centre, times its width
 WIDENED = 0.121  # largest change of the normal distribution function per relative change of the variance
@@ -125,7 +125,7 @@ def peak_band(sample: Sample) -> float:
 
 
 def captured_band(sample: Sample) -> float:
-    """Return the same of the captured: a blur's change moves them no more than it does the peak."""
+    """Return the same of the captured: a kernel's change moves them no more than it does the peak."""
     found = predicted(sample)
     gains = sample.gain[sample.captured]
     places = np.linspace(gains.min(), gains.max(), 400)
@@ -139,7 +139,7 @@ def zone_energy(sample: Sample) -> tuple[list[float], list[Mean], list[float]]:
     times, means, spreads = phase_times(sample), [], []
     for k, time in enumerate(times):
         with np.errstate(invalid="ignore"):
-            free = ~sample.captured | (time < sample.first_stay[0])
+            free = ~sample.captured | (time < sample.first_capture[0])
         means.append(mean(sample.phase_s[free, 0, k]))
         spreads.append(spread(sample.phase_s[free, 0, k]).value)
     return times, means, spreads
@@ -155,12 +155,12 @@ def captured_change(sample: Sample, first: int, last: int) -> FloatArray:
     """Return the change of log E from one of the run's phases to another of those captured throughout."""
     begin, end = (phase_times(sample)[k] for k in (first, last))
     with np.errstate(invalid="ignore"):
-        inside = (sample.first_stay[0] < begin) & (sample.first_stay[1] > end)
+        inside = (sample.first_capture[0] < begin) & (sample.first_capture[1] > end)
     return sample.change(inside, first, last)
 
 
 def share_in_the_zone(sample: Sample, times: FloatArray) -> FloatArray:
-    """Return the predicted share of particles in the chaotic zone, for cycles with a single valley."""
+    """Return the predicted share of particles in the chaotic zone, for cycles with a single well."""
     curve, found = theory.capture_curve(scene_of(sample.run), N_PLACES), predicted(sample)
     # Who was captured first is released last: inside are those captured before this time.
     latest = np.minimum(times, np.interp(times, curve.t_out[::-1], curve.t_in[::-1]))

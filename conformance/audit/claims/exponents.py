@@ -281,7 +281,7 @@ def _largest_gap(sample: Sample) -> float:
 
 def nu_gap(sample: Sample) -> FloatArray:
     """Return nu(t_out) - nu(t_in) of the captured of a moving-cap run."""
-    t_in, t_out = (t[sample.captured] for t in sample.first_stay)
+    t_in, t_out = (t[sample.captured] for t in sample.first_capture)
     return np.asarray(0.4 * (np.cos(t_out) - np.cos(t_in)))  # nu = 0.6 + 0.4 cos t
 
 
@@ -306,7 +306,7 @@ def energy_through_the_cycle(evidence: ClaimEvidence) -> Iterator[Check]:
 
 def _lag_at_capture(sample: Sample) -> Check:
     """Compare log E of captured particles, which a cap at rest keeps, with what they had when captured."""
-    found, times = predicted(sample), sample.first_stay[0]
+    found, times = predicted(sample), sample.first_capture[0]
     k = int(np.argmax(sample.phase_captured[:, 0].sum(axis=0)))
     inside = sample.phase_captured[:, 0, k] & sample.captured
     expected = found.at_capture(times[inside])[0]
@@ -324,7 +324,7 @@ def _lag_at_capture(sample: Sample) -> Check:
 
 def zone_share(sample: Sample, times: FloatArray) -> FloatArray:
     """Return the share of particles in the chaotic zone at each time."""
-    t_in, t_out = (np.sort(t[sample.captured]) for t in sample.first_stay)
+    t_in, t_out = (np.sort(t[sample.captured]) for t in sample.first_capture)
     caught, freed = (np.searchsorted(t, times, side="right") for t in (t_in, t_out))
     return np.asarray(1 - (caught - freed) / sample.n)
 

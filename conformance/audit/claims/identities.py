@@ -99,7 +99,7 @@ def positivity(evidence: ClaimEvidence) -> Iterator[Check]:
     least, n_nested = np.inf, 0
     for k in range(N_LOOPS):
         a, b = random.uniform(-0.3, 0.3, 2)
-        second = 0.12 * (k % 2)  # a second harmonic gives nu two valleys
+        second = 0.12 * (k % 2)  # a second harmonic gives nu two wells
         table = Mushroom(
             r=scenes.Fourier(1.0, 1.0, (), (float(a),)),
             h=scenes.Fourier(1.0, 1.0, (float(random.uniform(-0.3, 0.3)),), (float(b),)),
@@ -109,7 +109,7 @@ def positivity(evidence: ClaimEvidence) -> Iterator[Check]:
             slope=0.1,
         )
         scenes.from_data(scenes.to_data(table))
-        n_nested += bool(theory.Cycle.of(table, 15).valley.children)
+        n_nested += bool(theory.Cycle.of(table, 15).well.children)
         least = min(least, float(theory.predict(table, 12).m1))
     yield stated(
         f"m1 > 0 in {N_LOOPS} random loops, {n_nested} of them with several captures",

@@ -1,27 +1,34 @@
-"""Many cycles: X4, C1, C9 and D1, sums of cycles against sums drawn from theory, and a Gaussian."""
+"""What grows over cycles, and what does not: X4, C1, C9, D1 and C11 to C15.
+
+Sums of cycles are held against sums drawn from theory, and a Gaussian; cycles against their reverses.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 
 import numpy as np
-from scipy.stats import norm
+from scipy.stats import chi2, ncx2, norm
 
 import theory
+from conformance import profiles
 from conformance.audit.claim import Check, ClaimEvidence, energies_of
 from conformance.audit.claims.broadened import (
     DRAWN_SEED,
     N_DRAWN,
     PEAK_DENSITY,
+    adiabatic_limit,
     captured_band,
     predicted,
     summed,
 )
-from conformance.audit.runs import RUNS, Sample, scene_of
+from conformance.audit.runs import RUNS, Sample, run_seed, scene_of
 from conformance.audit.tolerances import (
+    LEVEL,
     N_SIGMA,
     FloatArray,
     Mean,
+    above,
     close,
     critical_gap,
     exact,
@@ -31,8 +38,18 @@ from conformance.audit.tolerances import (
     spread,
     stated,
 )
+from scene import Horizon, Scene, State, load
+from scene.transforms import backwards
 
 MANY = ("moving-cap@1e5x30", "moving-cap@1e7x30")
+INTEGRABLE = ("fermi-ulam@1e3x400", "breathing-circle@1e3x400")
+LARGEST = 0.1  # of |log E/E0|: a fortieth of what the moving cap gains in as many cycles in the mean
+WITHOUT_FLUX = ("flux-free@1e6", "only-depth@1e6", "only-slope@1e6")
+GROWTH = 0.01  # of log E in a cycle, which would be seen
+N_PARTS = 3  # of the cycles, in each of which entropy is to grow
+N_REVERSED = {"quick": 20_000, "full": 100_000}
+REVERSED_ENERGY, N_BINS = 1e3, 10
+FULL_BIN = 20
 TAILED = 10  # cycles, after which tails are told from a Gaussian's
 
 
@@ -51,7 +68,7 @@ def _sum_of(sample: Sample, n: int, cumulants: list[float]) -> list[Check]:
     bias = centre - n * m1
     per_cycle = Mean((mean(total).value - bias) / n, mean(total).error / n)
     own = scale / N_DRAWN**0.5  # the drawn sums' standard error
-    blurred = 1 - n * cumulants[2] / scale**2  # of the variance
+    diffused = 1 - n * cumulants[2] / scale**2  # of the variance
     places = np.linspace(sums.values[0], sums.values[-1], 2000)
     gap = float(np.max(np.abs(sums.cdf(places) - norm.cdf(places, centre, scale))))
     inner, theirs = (np.abs(x - centre) < scale for x in (total, sums.values))
@@ -68,7 +85,7 @@ def _sum_of(sample: Sample, n: int, cumulants: list[float]) -> list[Check]:
             f"{label}: standard deviation over n",
             (spread(total).value / n, spread(total).error / n),
             scale / n,
-            band=(abs(blurred) * left.variance / 2 + N_SIGMA / (2 * N_DRAWN) ** 0.5) * scale / n,
+            band=(abs(diffused) * left.variance / 2 + N_SIGMA / (2 * N_DRAWN) ** 0.5) * scale / n,
         ),
         fits(
             f"{label}: log E_n/E0 against sums of n cycles drawn from theory",
@@ -129,7 +146,7 @@ def _told_from_a_gaussian(sample: Sample, n: int) -> Check:
     """Weigh log E_n/E0 between the theory's sums and a Gaussian of their mean and width.
 
     The logarithm of the likelihoods' ratio tells two distributions apart better than any other number. After
-    more cycles, or slower ones that blur more, sums are too near a Gaussian for so many particles to tell.
+    more cycles, or slower ones that diffuse more, sums are too near a Gaussian for so many particles to tell.
     """
     label, sums = f"{sample.run.name}, n = {n}", summed(sample.run.name, n)
     total, drawn = ((x - sums.mean) / sums.sd for x in (sample.s[:, n - 1], sums.values))
@@ -222,3 +239,125 @@ def losses(evidence: ClaimEvidence) -> Iterator[Check]:
                 scale=0.2,
                 note=f"{adiabatic:.4f} at infinite energy",
             )
+
+
+def integrable(evidence: ClaimEvidence) -> Iterator[Check]:
+    """C11: tables that are integrable at every time do not accelerate."""
+    for sample in evidence.samples(*INTEGRABLE):
+        largest = [float(np.abs(part).max()) for part in np.array_split(sample.s, 4, axis=1)]
+        yield stated(
+            f"{sample.run.name}: largest |log E/E0| of {sample.n} particles",
+            max(largest) < LARGEST,
+            f"{max(largest):.4f}",
+            f"< {LARGEST}",
+        )
+        yield stated(
+            f"{sample.run.name}: in the last quarter of the cycles as in the first",
+            largest[3] < 1.2 * largest[0],
+            f"{largest[3]:.4f} after {largest[0]:.4f}",
+            "no more than 1.2 times as large",
+        )
+
+
+def without_flux(evidence: ClaimEvidence) -> Iterator[Check]:
+    """C12: nu stands still below 1, and the rate vanishes."""
+    for sample in evidence.samples(*WITHOUT_FLUX):
+        yield from _no_growth(sample)
+        n = int(sample.captured.sum())
+        yield stated(f"{sample.run.name}: captured on the way", n == 0, f"{n} of {sample.n}", "nobody")
+
+
+def radius_alone(evidence: ClaimEvidence) -> list[Check]:
+    """C13: only the radius moves, and with it nu."""
+    return _no_growth(evidence.sample("only-radius@1e7"))
+
+
+def _no_growth(sample: Sample) -> list[Check]:
+    """Hold theory to m1 = 0, and particles to a mean of exp(-s/2) that finite energy does not bias."""
+    limit, kept = adiabatic_limit(sample.run), np.exp(-sample.gain[sample.takes_part] / 2)
+    return [
+        stated(f"{sample.run.name}: theory", limit.m1 == 0, f"m1 = {float(limit.m1):.1g}", "m1 = 0"),
+        close(
+            f"{sample.run.name}: mean of exp(-s/2), which finite energy leaves at 1",
+            mean(kept),
+            1.0,
+            scale=GROWTH / 2,
+            against=(f"m1 = {GROWTH}", 1 - GROWTH / 2),
+        ),
+    ]
+
+
+def entropy(evidence: ClaimEvidence) -> Iterator[Check]:
+    """C14: the entropy log(E V), as V comes back: log E grows in each part of many cycles."""
+    sample = evidence.sample(MANY[0])
+    for k, part in enumerate(np.array_split(_gains(sample.s), N_PARTS, axis=1)):
+        yield above(
+            f"{sample.run.name}: mean of log E V gained in a cycle, part {k + 1} of {N_PARTS}",
+            mean(part.mean(axis=1)),
+            0.0,
+        )
+
+
+def reversal(evidence: ClaimEvidence) -> list[Check]:
+    """C15: W(E0, E1) of a cycle is W(E1, E0) of its reverse, exactly, for phase volume is kept."""
+    scene, n = load("moving-cap"), N_REVERSED[evidence.size]
+    low, high = REVERSED_ENERGY * np.exp([-1.0, 1.0])
+    edges = np.geomspace(low, high, N_BINS + 1)
+    forward, backward = (
+        _energies(evidence, table, n, low, high, stream)
+        for stream, table in enumerate((scene, backwards(scene)))
+    )
+    counts, turned, own = (
+        np.histogram2d(first, last, [edges, edges])[0]
+        for first, last in (forward, backward[::-1], forward[::-1])
+    )
+    statistic, n_bins = _difference(counts, turned)
+    refuted, _ = _difference(counts, own)
+    bound = float(chi2.isf(LEVEL, n_bins))
+    return [
+        Check(
+            f"moving cap and its reverse at {REVERSED_ENERGY:g}: chi square of {n_bins} bins of (E0, E1)",
+            statistic <= bound,
+            f"<= {bound:.4g}",
+            statistic,
+            n_tests=1,
+            note=f"p = {chi2.sf(statistic, n_bins):.2g}; {n} particles each way, E0 from {low:.4g}",
+            against="a cycle that is its own reverse",
+            power=float(ncx2.sf(bound, n_bins, max(refuted - n_bins, 0.0))),
+        )
+    ]
+
+
+def _energies(
+    evidence: ClaimEvidence, scene: Scene, n: int, low: float, high: float, stream: int
+) -> FloatArray:
+    """Return E0 and E1, (2, n), of particles that start with all energies from low to high alike."""
+    random = np.random.default_rng(run_seed(evidence.seed, RUNS["moving-cap@1e3"], stream))
+    speeds = np.sqrt(2 * random.uniform(low, high, n)).tolist()
+    states = [
+        State(one.t, one.x, one.y, v * one.vx, v * one.vy)
+        for one, v in zip(profiles.microcanonical_states(scene, n, 0.5, random), speeds, strict=True)
+    ]
+    done = evidence.steppers.flow(scene, states, scene.period, evidence.threads)
+    ends = [one.vx**2 + one.vy**2 if isinstance(one, Horizon) else np.nan for one in done.outcomes]
+    return np.array([np.square(speeds), ends]) / 2
+
+
+def _difference(counts: FloatArray, others: FloatArray) -> tuple[float, int]:
+    """Return chi square of two histograms of as many particles, and of how many bins."""
+    both = counts + others
+    is_full = both >= FULL_BIN
+    return float(((counts - others) ** 2)[is_full] @ (1 / both[is_full])), int(is_full.sum())
+
+
+CHECKS = {
+    "X4": sums,
+    "C1": independence,
+    "C9": tails,
+    "C11": integrable,
+    "C12": without_flux,
+    "C13": radius_alone,
+    "C14": entropy,
+    "C15": reversal,
+    "D1": losses,
+}

@@ -49,18 +49,16 @@ def ask(
 def _find(case: str, seed: int | None) -> Vector:
     from conformance import vectors
     from conformance.cases.generated import fresh_one
-    from conformance.suite.disguise import drawn_horizons
     from conformance.suite.run import N_FRESH
 
     if seed is not None:
         check_seed(seed, "--seed")
-    elif case.startswith(("drawn/", "fresh/")):
+    elif case.startswith("fresh/"):
         raise BadInput(f"ID = {case!r} is of one run's questions: give the run's --seed")
-    known = vectors.load("stress")
-    drawn = [] if seed is None else drawn_horizons([v for v in known if v.level == "core"], seed)
     if seed is not None and case in {f"fresh/{number}" for number in range(1, max(N_FRESH.values()) + 1)}:
         return fresh_one(seed, int(case.removeprefix("fresh/")))
-    for vector in (*known, *drawn):
+    known = vectors.load("stress")
+    for vector in known:
         if vector.id == case:
             return vector
     raise BadInput(f"ID = {case!r}, must be a vector's, such as {known[0].id}")

@@ -48,7 +48,7 @@ def made_up(number: int) -> Vector:
 
 def asked_alone(monkeypatch, vectors: list[Vector]) -> None:
     """Have a run ask these vectors and nothing else."""
-    for name in ("checks_of", "drawn_horizons", "fresh"):
+    for name in ("checks_of", "fresh"):
         monkeypatch.setattr(suite, name, lambda *_: [])
     monkeypatch.setattr(suite, "choose", lambda *_: vectors)
 

@@ -18,7 +18,6 @@ from conformance.suite import run as suite
 from conformance.suite import sheet as sheets
 from conformance.suite import sheet_files as files
 from conformance.suite.checks import ensembles
-from conformance.suite.disguise import drawn_horizons
 from conformance.suite.process import Trouble
 from conformance.suite.session import Limits
 from scene.protocol.wire import serve
@@ -46,7 +45,6 @@ def _few():
     assert {vector.kind for vector in found} == {"step", "trajectory", "flow"}
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(suite, "choose", lambda *_: found)
-        patch.setattr(suite, "drawn_horizons", lambda _, seed: drawn_horizons(found, seed))
         patch.setattr(suite, "N_FRESH", dict.fromkeys(suite.N_FRESH, 1))
         patch.setattr(sheets, "CHECKS", {name: sheets.CHECKS[name] for name in SOME})
         patch.setitem(ensembles.SIZES, "core", ensembles.Size(20, 50.0, 0.5))
@@ -69,7 +67,6 @@ def test_questions_in_files_hang_on_no_answer(name, sheet, tmp_path, monkeypatch
     monkeypatch.setattr(sheets, "CHECKS", {name: ALL_CHECKS[name]})
     monkeypatch.setattr(sheets, "Trouble", noted)
     monkeypatch.setattr(suite, "choose", lambda *_: [])
-    monkeypatch.setattr(suite, "drawn_horizons", lambda *_: [])
     alone = sheets.Sheet("core", SEED, [])
     run = graded(alone, tmp_path, answered(b"\n".join(alone.lines()), nudged))
     assert [result.id for result in run.results[3:]] == [name]

@@ -13,7 +13,6 @@ from importlib import resources
 from conformance.cases.generated import FRESH
 from conformance.mutants import COMMON, MUTANTS
 from conformance.mutants.kill_matrix import kills
-from conformance.suite.disguise import DRAWN
 from conformance.suite.result import Result
 from conformance.vectors import load
 
@@ -31,7 +30,7 @@ def diagnose(results: Sequence[Result]) -> list[str]:
     Args:
         results: of a run; failures and passes of vectors count, of those that the mutants were asked.
     """
-    kept = [r for r in results if r.level and r.group not in (DRAWN, FRESH)]
+    kept = [r for r in results if r.level and r.group != FRESH]
     failed = [r for r in kept if r.verdict == "fail"]
     passed = [r for r in kept if r.verdict == "pass"]
     # Where nothing passed, every mutant that has the same vectors wrong is as like as any other.

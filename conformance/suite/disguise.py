@@ -4,14 +4,8 @@ A disguise is drawn from the run's seed: the mirror image in x, and lengths and 
 are symmetries of the billiard, so the certified answer is carried over without a rounding: the answer of the
 implementation is taken back to the question as it is published, and graded there.
 Scales are drawn for a scene and not for a question, so that a scene stays one scene for a whole run.
-
-Beside its vectors a run asks `drawn` questions, whose answers are in no file: a flight that is certified to
-meet its first wall after dt meets nothing before, so that at any earlier t_end the particle is at the
-exact place x + vx s, y + vy s. `cases.generated` draws questions in scenes that no file holds.
 """
 
-from collections.abc import Sequence
-from fractions import Fraction
 from typing import Any, NamedTuple
 
 import msgspec
@@ -19,14 +13,11 @@ import msgspec
 from conformance.cases.draw import Draw
 from conformance.cases.generated import FRESH
 from conformance.cases.scenes import leaves, readable
-from conformance.grading.error import condition_number, free_flight, inputs_of, moved
-from conformance.vectors import NUMBERS, Expectation, Vector, certified
+from conformance.vectors import NUMBERS, Vector
 from scene import to_data, transforms
 
 LARGEST = 12  # exponents of two are drawn between this and its negative
 RANGE = 2.0**-350, 2.0**350  # numbers that a scale may lead to: their squares are far from both ends
-DRAWN, N_DRAWN = "drawn", 60  # a group of questions, and how many it has
-PARTS = 0.05, 0.95  # of the certified flight, at which the particle is asked for
 
 
 class Disguise(NamedTuple):
@@ -97,17 +88,6 @@ def published(answer: Any, disguise: Disguise) -> Any:
     return found
 
 
-def drawn_horizons(vectors: Sequence[Vector], seed: int) -> list[Vector]:
-    """Draw questions that no file holds: certified flights, asked for at a time before their end."""
-    draw = Draw(f"{seed}/drawn")
-    usable = [v for v in vectors if v.kind == "step" and [e.outcome for e in v.expect] == ["collision"]]
-    found: list[Vector] = []
-    for _ in range(2 * N_DRAWN if usable else 0):
-        early = _before_the_hit(draw.pick(usable), draw.between(*PARTS), len(found) + 1)
-        found += [early] if early is not None else []
-    return found[:N_DRAWN]
-
-
 def _stays_in_range(vector: Vector, length: int, time: int) -> bool:
     """Tell whether a scale leads to no number, asked or certified, that is near an end of binary64."""
     least, most = RANGE
@@ -132,26 +112,3 @@ def _scaled(part: Any, exponent: int) -> Any:
     if isinstance(part, list) and exponent:
         return [_scaled(one, exponent) for one in part]
     return part * 2.0**exponent if exponent and isinstance(part, int | float) else part
-
-
-def _before_the_hit(vector: Vector, part: float, number: int) -> Vector | None:
-    """Return a vector's question with t_end within its certified flight; None where none fits."""
-    state, step = vector.state, vector.expect[0].steps[0]
-    t_end = state.t + part * float(step.ends("dt")[0])
-    s = Fraction(t_end) - Fraction(state.t)
-    if not 0 < s < step.ends("dt")[0]:
-        return None
-    place = {"x": Fraction(state.x) + Fraction(state.vx) * s, "y": Fraction(state.y) + Fraction(state.vy) * s}
-    numbers = {"dt": s, **place, "vx": Fraction(state.vx), "vy": Fraction(state.vy)}
-    centre = [float(numbers[name]) for name in NUMBERS]
-    allowance = [moved(row, inputs_of(state)) for row in free_flight(state, float(s))]
-    step = certified({n: (v, v) for n, v in numbers.items()}, allowance, None)
-    return msgspec.structs.replace(
-        vector,
-        id=f"{DRAWN}/{number}",
-        group=DRAWN,
-        rule=f"{vector.id} at a time before its hit",
-        t_end=t_end,
-        expect=(Expectation("horizon", (step,)),),
-        condition=condition_number(centre, allowance),
-    )

@@ -5,7 +5,7 @@
 
 `--mushrooms-level` is core, extended or stress, `--mushrooms-timeout` the seconds for one answer, and
 `--mushrooms-seed` repeats a run's disguises; pytest prints it. Declined and unsupported cases are skipped
-with their reason. Not here: drawn questions, speed, known failures (use `-k` and `--deselect`), the limit on
+with their reason. Not here: fresh questions, speed, known failures (use `-k` and `--deselect`), the limit on
 how many cases may be declined.
 """
 

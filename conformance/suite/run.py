@@ -1,12 +1,11 @@
 """The suite: puts every question to one implementation and collects the verdicts.
 
 First the protocol itself (start, the number-transport probe, bad input), then the vectors up to a level,
-each in disguise (`suite.disguise`), and questions that no file holds, of scenes in the corpus and of others
-(`cases.generated`); then the exact properties and the
-statistical profiles, then its speed where it offers `time`, then `stop`. What ends the session is the verdict
-of every case not reached; what the implementation does not offer is `unsupported`. Verdicts follow from the
-implementation, the level and the seed, not from the machine or its load, but for time limits and what holds
-`time` to a clock.
+each in disguise (`suite.disguise`), and questions that no file holds (`cases.generated`); then the exact
+properties and the statistical profiles, then its speed where it offers `time`, then `stop`. What ends the
+session is the verdict of every case not reached; what the implementation does not offer is `unsupported`.
+Verdicts follow from the implementation, the level and the seed, not from the machine or its load, but for
+time limits and what holds `time` to a clock.
 """
 
 import itertools
@@ -28,15 +27,7 @@ from conformance.grading.grade import grade
 from conformance.suite.answers import outcomes_of
 from conformance.suite.checks import GROUPS, Implementation, checks_of, run_check, timing
 from conformance.suite.diagnosis import diagnose
-from conformance.suite.disguise import (
-    DRAWN,
-    N_DRAWN,
-    Disguise,
-    asked,
-    drawn_disguise,
-    drawn_horizons,
-    published,
-)
+from conformance.suite.disguise import Disguise, asked, drawn_disguise, published
 from conformance.suite.process import NOT_NUMBERS, Trouble
 from conformance.suite.result import BAD, Result, Run, Speed, graded_parts
 from conformance.suite.session import AnswerLine, Limits, Session, missing
@@ -51,7 +42,7 @@ TIMED_SCENE, TIMED_STATE = "moving-cap", State(0.0, 0.1, 0.2, 300.0, 400.0)
 TIMED_MOST = 2.0  # seconds, after which no longer trajectory is asked
 TIMED_REPEATS, TIMED_LEAST = 5, 20_000_000  # timings; nanoseconds that each must last to be read from a clock
 PROTOCOL_CASES = ("start", "echo", "rejects", "stop")
-OTHER_GROUPS = (DRAWN, FRESH, *GROUPS)
+OTHER_GROUPS = (FRESH, *GROUPS)
 OTHER_CASES = (
     *(f"protocol/{name}" for name in PROTOCOL_CASES),
     *(each.name for each in checks_of()),
@@ -101,7 +92,7 @@ class RunQuestions:
 
     Attributes:
         chosen: the vectors that files hold.
-        drawn, fresh: those of this seed.
+        fresh: those of this seed.
         checks: further questions.
         is_whole: whether no group is left out.
         n: number of cases, the protocol's own left out.
@@ -114,14 +105,13 @@ class RunQuestions:
         self.level, self.seed = level, check_seed(seed)
         parts = tuple(groups) or OTHER_GROUPS
         n_fresh = N_FRESH[level] if FRESH in parts else 0
-        self.drawn = drawn_horizons(vectors.load("core"), seed) if DRAWN in parts else []
         self.fresh: Iterable[Vector] = fresh(seed, n_fresh) if proved is None else proved
         self.checks = [each for each in checks_of(level) if each.name.startswith(parts)]
-        self.n = len(self.chosen) + len(self.drawn) + n_fresh + len(self.checks)
+        self.n = len(self.chosen) + n_fresh + len(self.checks)
 
     def vectors(self) -> Iterator[tuple[Vector, Disguise]]:
         """Return the vectors in the order of a run, each with its image."""
-        every = itertools.chain(self.chosen, self.drawn, self.fresh)
+        every = itertools.chain(self.chosen, self.fresh)
         return ((vector, drawn_disguise(vector, self.seed)) for vector in every)
 
 
@@ -142,8 +132,8 @@ def choose(level: str, groups: Sequence[str] = ()) -> list[Vector]:
 def read_known(path: Path) -> frozenset[str]:
     """Read a known-failures file: one name a line, # begins a comment.
 
-    A name is a case's id; ID@SEED for the run of one seed, which a drawn question needs; drawn/* or fresh/*
-    for all of these, which may pass; declined/GROUP or declined/all where too much is declined.
+    A name is a case's id; ID@SEED for the run of one seed, which a fresh question needs; fresh/* for all of
+    these, which may pass; declined/GROUP or declined/all where too much is declined.
 
     Raises:
         BadInput: naming the line whose name the suite does not have, or that comes twice.
@@ -153,10 +143,9 @@ def read_known(path: Path) -> frozenset[str]:
     except (OSError, UnicodeDecodeError) as error:
         raise BadInput(f"known failures {str(path)!r} cannot be read: {error}") from None
     corpus = vectors.load("stress")
-    names = {vector.id for vector in corpus} | set(OTHER_CASES) | {f"{DRAWN}/*", f"{FRESH}/*"}
+    names = {vector.id for vector in corpus} | set(OTHER_CASES) | {f"{FRESH}/*"}
     names |= {f"declined/{group}" for group in ("all", *OTHER_GROUPS, *(v.group for v in corpus))}
-    numbers = {DRAWN: N_DRAWN, FRESH: max(N_FRESH.values())}
-    drawn = {f"{group}/{number}" for group, n in numbers.items() for number in range(1, n + 1)}
+    drawn = {f"{FRESH}/{number}" for number in range(1, max(N_FRESH.values()) + 1)}
     found: set[str] = set()
     for number, line in enumerate(lines, 1):
         name = line.partition("#")[0].strip()
@@ -167,7 +156,7 @@ def read_known(path: Path) -> frozenset[str]:
         if name in found or not is_listed:
             problem = "comes twice" if name in found else "is no case of this suite"
             if name in drawn:
-                problem = f"is of one run's questions: {name}@SEED lists it, {name.partition('/')[0]}/* all"
+                problem = f"is of one run's questions: {name}@SEED lists it, {FRESH}/* all"
             raise BadInput(f"known failures {str(path)!r}:{number}: {name} {problem}")
         found.add(name)
     return frozenset(found)

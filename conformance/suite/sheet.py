@@ -1,7 +1,7 @@
 """The suite without a dialogue: every question that hangs on no answer, and the grading of what came back.
 
-A sheet holds the questions of a run: the vectors up to a level in the images that its seed draws, the drawn
-and the fresh ones, and the checks whose questions are known beforehand (`CHECKS`). Each has a sequence number
+A sheet holds the questions of a run: the vectors up to a level in the images that its seed draws, the fresh
+ones, and the checks whose questions are known beforehand (`CHECKS`). Each has a sequence number
 that follows from the seed and the question, so that answers tell which questions they belong to. They are
 graded by the code that grades a dialogue: `_Replay` is a session that answers from what was read.
 

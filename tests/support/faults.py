@@ -61,6 +61,7 @@ from support.faulty_servers import (
     rounded,
     same_velocity_for_all,
     scenes_by,
+    scenes_kept,
     starts,
     straight_on,
     swapping,
@@ -192,6 +193,12 @@ FAULTS: dict[str, tuple[str, str, Fault]] = {
     **{f"scenes-{name}": ("changed-questions", "fail", scenes_by(key, STEP)) for name, key in KEYS.items()},
     "paths-by-first-parts": ("changed-questions", "fail", scenes_by(first_parts, PATH)),
     "flows-by-first-parts": ("changed-questions", "fail", scenes_by(first_parts, FLOW)),
+    "scenes-by-name": ("changed-questions", "fail", scenes_kept(lambda scene: scene.get("name") or scene)),
+    "scenes-without-depth": (
+        "changed-questions",
+        "fail",
+        scenes_kept(lambda scene: {k: v for k, v in scene.items() if k not in ("h", "slope")}),
+    ),
     "scenes-without-names": ("changed-questions", "fail", scenes_by(without(), STEP, are_named=False)),
     # Flows.
     "one-bad-spoils-all": ("many-particles", "fail", on(FLOW, one_bad_spoils_all)),

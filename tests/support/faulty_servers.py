@@ -217,6 +217,16 @@ def scenes_by(law_key: Callable[[Any], Any], *cmds: str, are_named: bool = True)
     return asked(change, *cmds)
 
 
+def scenes_kept(key: Callable[[Line], Any]) -> Fault:
+    """Keep scenes by a key of the whole scene, and answer with the first scene of the same key."""
+    book: dict[str, Line] = {}
+
+    def change(request: Line) -> None:
+        request["scene"] = book.setdefault(json.dumps(key(request["scene"])), request["scene"])
+
+    return asked(change)
+
+
 def first_parts(law: Any) -> Any:
     """Look at the first harmonic, and at the first and the last knot."""
     if not isinstance(law, dict):

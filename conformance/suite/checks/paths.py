@@ -251,11 +251,11 @@ def changed(draw: Draw, profile: str) -> Iterator[Question]:
         other = next(
             filter(None, (_one_number_changed(draw, scene, state, change) for _ in range(64))), scene
         )
-        yield from ((one, state, 3) for one in (scene, other, scene))
+        yield from ((replace(one, name="scene"), state, 3) for one in (scene, other, scene))
     for _ in range(N_USUAL):
         scene, state = drawn(draw)
         for other in _laws_renamed(scene, state):
-            yield from ((one, state, 2) for one in (scene, other, scene))
+            yield from ((replace(one, name="scene"), state, 2) for one in (scene, other, scene))
     for near in [*octaves(draw, 2.0**-44, 2.0**-4)] * 2:
         scene, state = drawn(draw)
         name = draw.pick(("t", "x", "x", "y", "y", "vx", "vy"))

@@ -13,7 +13,6 @@ from conformance.bench.solvers import Given, Solver, SolverRun, by_call
 from conformance.bench.workloads import WINDOW, Workload
 from conformance.cases import prover
 from conformance.grading.agreement import Answer, Enclosed, exact
-from conformance.grading.error import Matrix
 from fast.batch import careful_steps, fine_steps, flights, lane_steps
 from scene import Collision, Scene, State
 
@@ -25,7 +24,7 @@ LANES_SERVE = (
 )  # fmt: skip
 
 
-def linearise(scene: Scene, state: State, t_end: float) -> tuple[Collision, Matrix]:
+def linearise(scene: Scene, state: State, t_end: float) -> tuple[Collision, prover.Matrix]:
     """Return a proved collision, and its Jacobian."""
     outcome = prover.ask(scene, state, t_end)
     assert isinstance(outcome, reference.Collision)

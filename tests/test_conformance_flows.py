@@ -9,9 +9,8 @@ import reference
 from conformance.cases.certify import Links, arrival, certify, marks, stays
 from conformance.cases.draw import Unfit
 from conformance.cases.flow_families import any_marks
-from conformance.cases.prover import ask, flight_of
+from conformance.cases.prover import ask, flight_of, inputs_of, moved
 from conformance.cases.question import Question
-from conformance.grading.error import inputs_of, moved
 from conformance.vectors import four_digits, load
 from scene import State
 from scene import load as load_scene

@@ -7,9 +7,7 @@ import pytest
 from support.depth import deep_but
 
 from conformance.mutants import COMMON, MUTANTS, PLAIN, kill_matrix
-from conformance.mutants.kill_matrix import kills, page, verdict
-from conformance.suite.diagnosis import diagnose
-from conformance.suite.result import Result
+from conformance.mutants.kill_matrix import diagnose, kills, page, verdict
 from conformance.vectors import load, manifest
 
 DOCS = Path(__file__).parent.parent / "docs"
@@ -113,14 +111,12 @@ def test_the_command_writes_both_files_and_judges(monkeypatch, tmp_path, vectors
     assert name in json.loads((tmp_path / "kill-matrix.json").read_text())["mutants"]
 
 
-def results(mutant, vectors):
-    """Return what a run would say of a mutant, of every third vector and those of the matrix."""
+def judged(mutant, vectors):
+    """Return what fails and what passes in a run of a mutant: every third vector and those of the matrix."""
     told = {v for entry in PUBLISHED["mutants"].values() for v in entry["vectors"]}
     asked = [v for i, v in enumerate(vectors.values()) if v.level == "core" and (i % 3 == 0 or v.id in told)]
     failed = set(kills(asked, mutant))
-    return [
-        Result(v.id, v.group, "fail" if v.id in failed else "pass", "", 0.0, level=v.level) for v in asked
-    ]
+    return [v for v in asked if v.id in failed], [v for v in asked if v.id not in failed]
 
 
 NAMED = [
@@ -135,5 +131,5 @@ NAMED = [
 
 @pytest.mark.parametrize("name", deep_but(NAMED, "slope-at-departure"))
 def test_a_diagnosis_names_the_mistake(vectors, name):
-    said = diagnose(results((MUTANTS | COMMON)[name], vectors))
+    said = diagnose(*judged((MUTANTS | COMMON)[name], vectors))
     assert any(line.startswith(f"like {name} on ") for line in said), said

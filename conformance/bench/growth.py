@@ -15,7 +15,8 @@ import numpy.typing as npt
 
 from conformance.bench.record import Growth, short
 from conformance.bench.workloads import RULES, Prover, draw_workload
-from conformance.grading.error import Matrix, U, inputs_of
+from conformance.cases.prover import Matrix, inputs_of
+from conformance.grading.agreement import U
 from scene import Collision, Scene, State
 from scene.geometry import rounded
 

@@ -26,16 +26,19 @@ from conformance.cases.prover import (
     CONDITIONS,
     NUDGES,
     SIGNS,
+    Matrix,
     ask,
     coasted,
     collided,
+    condition_number,
     ends,
     expectation,
     flight_of,
+    free_flight,
+    inputs_of,
     nudged,
 )
 from conformance.cases.question import Mark, Proved, Question, filed
-from conformance.grading.error import Matrix, condition_number, free_flight, inputs_of
 from conformance.vectors import (
     NUMBERS,
     Certified,

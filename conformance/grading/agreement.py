@@ -4,7 +4,15 @@ An agreement is the same outcome, the same walls in the same order, and numbers 
 a backward error of at most 1e-9, |out - truth| / (allowance + |out|). Place and velocity are each taken as a
 vector (its largest allowance and component), so that a stepper which computes normals from angles is not
 refused for 1e-17 where the exact zero is right. A caller may also bound the backward ulps of every single
-component (`grading.error`). In a trajectory all steps are held to the same bounds, with chained allowances.
+component. In a trajectory all steps are held to the same bounds, with chained allowances.
+
+The one measure of precision is backward ulps:
+
+    |out - truth| / (sum over inputs |d out / d in| |in| u + |out| u),    u = 2^-53
+
+counts how many units in the last place the inputs and the output would have to move to explain the answer.
+It is as fair to a grazing hit, where every stepper must lose digits, as to a head-on one. The sum over the
+inputs is the `allowance` that a certified answer carries (`conformance.vectors.Certified`).
 
 Both the truth and the answer may be enclosures. Numbers count as right, or as wrong, only where they are so
 for all numbers of the enclosures; else the comparison is `indeterminate`. An answer `undecided` is never
@@ -18,11 +26,12 @@ from typing import Literal, NamedTuple
 
 import msgspec
 
-from conformance.grading.error import LEAST, U, backward_ulps
 from conformance.vectors import NUMBERS, Certified, Ends, Expectation
 from scene import Collision, Horizon, Outcome, Rejected, State, Undecided, Undefined, Wall
 from scene.protocol.messages import Answered, AnsweredCollision
 
+U = Fraction(1, 2**53)
+LEAST = Fraction(1, 2**1075)  # half the spacing of subnormal numbers: nothing rounds better
 BOUND = Fraction(1, 10**9)  # physics: far above rounding, far below any error of principle
 DIGITS, SHARPEST = Fraction(1, 1000), Fraction(1, 2**43)  # what passes is right to; a thousand backward ulps
 NEAR_HIT = Fraction(1, 10)  # of the flight time
@@ -113,6 +122,13 @@ class _Measured(NamedTuple):
     most_ulps: Fraction | float
     where: str
     off: Fraction | float
+
+
+def backward_ulps(error: Fraction, size: Fraction) -> Fraction | float:
+    """Return |out - truth| in units of u times a size (allowance plus |out|), inf where only 0 is right."""
+    if not size:
+        return math.inf if error else Fraction(0)
+    return error / max(size * U, LEAST)
 
 
 def physics_bound(condition: float) -> Fraction:

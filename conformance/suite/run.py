@@ -24,9 +24,9 @@ from conformance import vectors
 from conformance.cases.generated import FRESH, ROUND, fresh
 from conformance.grading.agreement import Agreement, middle
 from conformance.grading.grade import grade
+from conformance.mutants.kill_matrix import diagnose
 from conformance.suite.answers import outcomes_of
 from conformance.suite.checks import GROUPS, Implementation, checks_of, run_check, timing
-from conformance.suite.diagnosis import diagnose
 from conformance.suite.disguise import Disguise, asked, drawn_disguise, published
 from conformance.suite.process import NOT_NUMBERS, Trouble
 from conformance.suite.result import BAD, Result, Run, Speed, graded_parts
@@ -197,8 +197,10 @@ def converse(
         if not session.cannot_show:
             results.append(_closed(session, _tried("stop", session.stop)))
     results = [msgspec.structs.replace(r, is_known=_is_known(r, known, questions.seed)) for r in results]
-    passed = {result.id for result in results if result.verdict == "pass"}
-    graded = graded_parts([v for v in questions.chosen if v.id in passed], is_timed=speed is not None)
+    verdicts = {result.id: result.verdict for result in results}
+    passed = [vector for vector in questions.chosen if verdicts[vector.id] == "pass"]
+    failed = [vector for vector in questions.chosen if verdicts[vector.id] == "fail"]
+    graded = graded_parts(passed, is_timed=speed is not None)
     manifest = vectors.manifest()
     return Run(
         command=session.command,
@@ -214,7 +216,7 @@ def converse(
         stderr=session.stderr.text(),
         seconds=time.monotonic() - begin,
         graded={**graded, "not_graded": [*graded["not_graded"], *session.cannot_show]},
-        diagnosis=diagnose(results),
+        diagnosis=diagnose(failed, passed),
         known=known,
     )
 

@@ -62,7 +62,7 @@ def _read(file: Path, scene: str | None) -> str:
 
 
 def _of_rows(file: Path, scene: str) -> dict[str, Any]:
-    from conformance.cases.scenes import wire_form
+    from conformance.cases.draw import wire_form
     from conformance.suite.sheet_files import read_number, read_rows
 
     label, states = f"trajectory {str(file)!r}", []

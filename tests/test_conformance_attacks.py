@@ -13,8 +13,8 @@ from support.refusals import assert_refused
 import fast
 from conformance.cases.attacks import UnderAttack, confirmed, flown, line, run
 from conformance.cases.certify import claimed_path
+from conformance.cases.draw import Question
 from conformance.cases.prover import proved_step
-from conformance.cases.question import Question
 from conformance.cases.table import FAMILIES
 from conformance.vectors import NUMBERS, Expectation, certified
 from conformance.verify import Verdict

@@ -7,10 +7,9 @@ import pytest
 
 import reference
 from conformance.cases.certify import Links, arrival, certify, marks, stays
-from conformance.cases.draw import Unfit
+from conformance.cases.draw import Question, Unfit
 from conformance.cases.flow_families import any_marks
 from conformance.cases.prover import ask, flight_of, inputs_of, moved
-from conformance.cases.question import Question
 from conformance.vectors import four_digits, load
 from scene import State
 from scene import load as load_scene

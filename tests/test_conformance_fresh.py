@@ -12,7 +12,7 @@ from support.seldom_wrong import FAULTS
 
 import fast
 from conformance import plain, vectors
-from conformance.cases.draw import Draw
+from conformance.cases.draw import Draw, Question
 from conformance.cases.flow_families import any_marks
 from conformance.cases.generated import (
     ROUND,
@@ -22,7 +22,6 @@ from conformance.cases.generated import (
     fresh,
     fresh_one,
 )
-from conformance.cases.question import Question
 from conformance.cases.run_families import WALLS
 from conformance.cases.scenes import many_legs
 from conformance.cases.table import FAMILIES

@@ -20,10 +20,9 @@ from conformance.cases import corpus as made
 from conformance.cases.bound_families import FAMILIES as BOUNDS
 from conformance.cases.certify import Refuted, certify
 from conformance.cases.coverage_families import FAMILIES as COVERAGE
-from conformance.cases.draw import Unfit
+from conformance.cases.draw import Question, Unfit
 from conformance.cases.families import CATALOGUE
 from conformance.cases.flow_families import FAMILIES as FLOWS
-from conformance.cases.question import Question
 from conformance.vectors import MANIFEST, NUMBERS, BadCorpus, digest, load, manifest, request
 from conformance.verify import Verdict
 from scene import BadInput, BangBang, Fourier, State, catalogue, from_data

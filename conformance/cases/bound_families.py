@@ -18,9 +18,8 @@ from functools import partial
 from math import hypot
 from typing import NamedTuple
 
-from conformance.cases.draw import Draw, Unfit
+from conformance.cases.draw import Draw, Family, Question, Unfit
 from conformance.cases.flow_families import any_marks
-from conformance.cases.question import Family, Question
 from conformance.cases.run_families import MOVABLE
 from conformance.cases.scenes import (
     LONGEST,

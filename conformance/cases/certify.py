@@ -21,7 +21,7 @@ import numpy as np
 import numpy.typing as npt
 
 import reference
-from conformance.cases.draw import Unfit
+from conformance.cases.draw import Mark, Proved, Question, Unfit, filed
 from conformance.cases.prover import (
     CONDITIONS,
     NUDGES,
@@ -38,7 +38,6 @@ from conformance.cases.prover import (
     inputs_of,
     nudged,
 )
-from conformance.cases.question import Mark, Proved, Question, filed
 from conformance.vectors import (
     NUMBERS,
     Certified,

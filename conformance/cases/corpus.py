@@ -15,9 +15,8 @@ from pathlib import Path
 import msgspec
 
 from conformance.cases.certify import certify
-from conformance.cases.draw import Draw, Unfit
+from conformance.cases.draw import Draw, Family, Question, Unfit
 from conformance.cases.flow_families import any_marks
-from conformance.cases.question import Family, Question
 from conformance.cases.table import FAMILIES
 from conformance.files import write_file
 from conformance.vectors import MANIFEST, File, Manifest, Vector, digest, encode, load

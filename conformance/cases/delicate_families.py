@@ -13,8 +13,7 @@ import msgspec
 from mpmath import MPContext
 
 from conformance import plain
-from conformance.cases.draw import Draw, Unfit
-from conformance.cases.question import NEVER, Family, Question
+from conformance.cases.draw import NEVER, Draw, Family, Question, Unfit
 from conformance.cases.scenes import TABLES, Clock, clock, many_legs, off_its_wall, scene, state
 from scene import BangBang, Cap, Collision, Fourier, Law, Mushroom, Scene, State, Stem, Wall
 from scene.laws import value

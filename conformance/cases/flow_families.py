@@ -11,9 +11,8 @@ from functools import partial
 from typing import Any
 
 from conformance.cases.certify import stays
-from conformance.cases.draw import Draw
+from conformance.cases.draw import Draw, Family, Mark, Question
 from conformance.cases.families import CATALOGUE, FIXED, MOVING_CAPS
-from conformance.cases.question import Family, Mark, Question
 from conformance.cases.scenes import MOVING, Clock, clock, law, scene, state, time, walls_speed
 from scene import Mushroom, Scene, State, Stem, load
 from scene.geometry import rounded

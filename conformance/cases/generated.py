@@ -19,12 +19,11 @@ from typing import Any
 
 from conformance import plain
 from conformance.cases.certify import certify
-from conformance.cases.draw import Draw, Unfit
+from conformance.cases.draw import ATTEMPTS, Draw, Family, Question, Unfit, wire_form
 from conformance.cases.flow_families import any_marks
 from conformance.cases.prover import CONDITIONS, NUDGES, SIGNS, nudged
-from conformance.cases.question import ATTEMPTS, Family, Question
 from conformance.cases.run_families import is_leaning
-from conformance.cases.scenes import LATE, wire_form
+from conformance.cases.scenes import LATE
 from conformance.cases.table import FAMILIES
 from conformance.vectors import Kind, Level, Vector
 from scene import BadInput, Collision, Horizon, Scene, State, from_data

@@ -15,9 +15,8 @@ from math import sqrt
 
 import msgspec
 
-from conformance.cases.draw import Draw, Unfit
+from conformance.cases.draw import Draw, Family, Question, Unfit
 from conformance.cases.flow_families import any_marks
-from conformance.cases.question import Family, Question
 from conformance.cases.scenes import (
     KINDS,
     LONGEST,

@@ -10,9 +10,8 @@ from typing import Any, NamedTuple
 
 import msgspec
 
-from conformance.cases.draw import Draw
+from conformance.cases.draw import Draw, leaves, readable
 from conformance.cases.generated import FRESH
-from conformance.cases.scenes import leaves, readable
 from conformance.vectors import NUMBERS, Vector
 from scene import to_data, transforms
 

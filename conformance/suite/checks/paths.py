@@ -14,7 +14,7 @@ from msgspec.structs import replace
 
 from conformance import plain
 from conformance.cases import scenes
-from conformance.cases.draw import Draw
+from conformance.cases.draw import Draw, leaves, readable, wire_form
 from conformance.suite.answers import read_outcome
 from conformance.suite.checks.flaws import COARSE, FINE, LATE, UNCLEAR, first_stay, flaw_of, is_fine
 from conformance.suite.checks.form import FOREVER, Implementation, Question, octaves
@@ -279,22 +279,22 @@ def _meets(scene: Scene | None, state: State) -> bool:
 
 def _one_number_changed(draw: Draw, scene: Scene, state: State, change: float) -> Scene | None:
     """Return a scene in which one number is another, wherever it stands; None where nothing is met then."""
-    data = scenes.wire_form(scene)
-    numbers = [(label, number) for label, number in scenes.leaves(data) if number]
+    data = wire_form(scene)
+    numbers = [(label, number) for label, number in leaves(data) if number]
     labels = sorted({label for label, _ in numbers})
     label = draw.pick([name for name in labels if name in ("omega", "period")] or labels)
     label = draw.pick((label, draw.pick(labels)))  # a period as often as all that it shares a law with
     old = draw.pick([number for name, number in numbers if name == label])
-    other = scenes.readable(_replaced(data, old, old * (1.0 + change)))
+    other = readable(_replaced(data, old, old * (1.0 + change)))
     return other if other and _meets(other, state) else None
 
 
 def _laws_renamed(scene: Scene, state: State) -> Iterator[Scene]:
     """Return scenes with the same laws under other names."""
-    data = scenes.wire_form(scene)
+    data = wire_form(scene)
     for one, other in (("nu", "w"), ("r", "h"), ("w", "h")):
         names = {one: other, other: one}
-        renamed = scenes.readable({names.get(name, name): law for name, law in data.items()})
+        renamed = readable({names.get(name, name): law for name, law in data.items()})
         if renamed and renamed != scene and _meets(renamed, state):
             yield renamed
 

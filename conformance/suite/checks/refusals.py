@@ -18,7 +18,7 @@ from mpmath import fp
 from msgspec.structs import replace
 
 from conformance.cases import scenes
-from conformance.cases.draw import Draw
+from conformance.cases.draw import Draw, wire_form
 from conformance.suite.answers import outcomes_of
 from conformance.suite.checks.form import Implementation, Question, octaves, question
 from scene import BangBang, Cap, Fourier, Mushroom, Scene, State, Stem, Wall
@@ -60,7 +60,7 @@ def requests(draw: Draw, profile: str) -> Iterator[Question]:
     """Break requests in all ways that the schema forbids; the first is sound."""
     for scene in ASKED:
         state = INSIDE[type(scene)]
-        sound = question(profile, scenes.wire_form(scene), state, 0.5)
+        sound = question(profile, wire_form(scene), state, 0.5)
         yield scene, sound, ""
         for request, why in broken(sound):
             yield scene, request, why

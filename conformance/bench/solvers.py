@@ -14,9 +14,7 @@ from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from fractions import Fraction
 from functools import cache, partial
-from typing import Any, Literal, NamedTuple
-
-import msgspec
+from typing import Literal, NamedTuple
 
 from conformance.bench.record import Point, short
 from conformance.bench.workloads import SINGLE_STEPS, ProvedStep, Workload
@@ -101,20 +99,14 @@ def by_command(
 
     def run(workload: Workload, n_times: int) -> SolverRun:
         assert session.introduction is not None
-        scene = to_data(workload.scene)
-        if lacking := missing(session.introduction, "time", scene):
+        if lacking := missing(session.introduction, "time", to_data(workload.scene)):
             raise Trouble("unsupported", lacking)
         answers: list[Given] = []
         lasted = 0
         for question in workload.questions:
-            request: dict[str, Any] = {"cmd": "time", "scene": scene, "collisions": 1}
-            request |= {"state": msgspec.to_builtins(question.state), "repeat": n_times}
-            begin = time.monotonic()
-            found = session.ask(request)
-            seconds = time.monotonic() - begin
-            ns, last = timing.read_repeats(found, n_times, seconds, question.state.t)
-            lasted += sum(ns)
-            answers.append(last)
+            found = timing.ask_time(session, workload.scene, question.state, 1, n_times)
+            lasted += sum(found.ns)
+            answers.append(found.last)
         if (trouble := clock_trouble()) is not None:
             raise trouble
         return SolverRun(lasted / (n_times * len(answers)), answers, lasted)

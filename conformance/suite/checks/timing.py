@@ -10,8 +10,8 @@ Not seen: a program that does part of its work outside its clock, once for each 
 """
 
 import time
-from collections.abc import Iterator, Mapping, Sequence
-from typing import Any, NamedTuple
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
 
 from msgspec.structs import replace
 
@@ -46,53 +46,44 @@ SCENES: tuple[Scene, ...] = (
 
 
 class Timing(NamedTuple):
-    """One answer to `time`: what it says, in nanoseconds, and the seconds that it took to come."""
+    """One answer to `time`: what it says, in nanoseconds, the seconds that it took to come, and its end."""
 
     ns: list[int]
     seconds: float
-    last: Collision
+    last: Outcome
 
 
-def timed(session: Session, scene: Scene, state: State, n: int, repeat: int) -> Timing:
-    """Ask for a timing.
+def ask_time(session: Session, scene: Scene, state: State, n: int, repeat: int) -> Timing:
+    """Ask for a timing, whatever its path ends in.
 
     Raises:
-        Trouble: also fail, when it does not end in one collision, or when its repeats cannot have taken place
-            in the time that the answer took; declined when it ends undecided.
+        Trouble: also fail, when it is no timing of so many repeats, or they cannot have taken place in the
+            time that the answer took.
     """
     request = {**question("time", scene, state, 0.0, n), "repeat": repeat}
     begin = time.monotonic()
     answer = session.ask(request)
     seconds = time.monotonic() - begin
-    ns, last = read_repeats(answer, repeat, seconds, 0.0)
-    return Timing(ns, seconds, _collision(last))
-
-
-def read_repeats(
-    answer: Mapping[str, Any], repeat: int, seconds: float, t: float
-) -> tuple[list[int], Outcome]:
-    """Read the nanoseconds and the last outcome, whatever it is, of an answer to `time`.
-
-    Args:
-        answer: as `Session.ask` returns it.
-        repeat: as asked for.
-        seconds: that the answer took to come.
-        t: when the last flight began, or any time where the flight time is not looked at.
-
-    Raises:
-        Trouble: error, when that is the answer; fail, when it is no timing of so many repeats, or they
-            cannot have taken place in that time.
-    """
     if "error" in answer:
         raise Trouble("error", answer["error"])
     ns, steps = answer.get("ns"), answer.get("steps")
     if ns is None or steps is None or len(ns) != repeat or len(steps) != 1:
         raise Trouble("fail", f"{repeat} repeats are answered {answer}"[:300])
-    last = read_outcome(steps[0], t)
     if sum(ns) > DRIFT * 1e9 * seconds + TICK:
         waited = f"the answer came after {1e9 * seconds:.0f} ns"
         raise Trouble("fail", f"{repeat} repeats are said to last {sum(ns)} ns in all, and {waited}")
-    return list(ns), last
+    return Timing(list(ns), seconds, read_outcome(steps[0], state.t))
+
+
+def timed(session: Session, scene: Scene, state: State, n: int, repeat: int) -> Timing:
+    """Ask for a timing of a path that goes on for ever.
+
+    Raises:
+        Trouble: as `ask_time` and `_collision`.
+    """
+    found = ask_time(session, scene, state, n, repeat)
+    _collision(found.last)
+    return found
 
 
 def questions(draw: Draw, profile: str) -> Iterator[Question]:
@@ -125,7 +116,8 @@ def honest_clock(side: Implementation, scene: Scene, state: State) -> bool:
     while one.seconds < READABLE and n < MAX_COLLISIONS:
         n *= 2
         one = timed(session, scene, _other(state, n.bit_length()), n, 1)
-    last, truth = timed(session, scene, state, n, 1).last, _last_collision(session, scene, state, n)
+    last = _collision(timed(session, scene, state, n, 1).last)
+    truth = _last_collision(session, scene, state, n)
     if isinstance(scene, Cap) and abs(last.t - truth.t) > LATE * abs(truth.t - state.t):
         raise Trouble("fail", f"{n} collisions last to {last.t:.6g} by time, to {truth.t:.6g} by trajectory")
     objection = ""

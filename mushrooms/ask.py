@@ -15,7 +15,7 @@ from scene.refusal import BadInput, check_seed
 
 if TYPE_CHECKING:
     from conformance.suite import Result
-    from conformance.suite.disguise import Disguise
+    from conformance.suite.symmetry import Transform
     from conformance.vectors import Vector
 
 
@@ -34,15 +34,15 @@ def ask(
 
     Exit code 0; 1 if the stepper does not pass; 2 on bad input.
     """
-    from conformance.suite.disguise import Disguise, drawn_disguise
+    from conformance.suite.symmetry import Transform, draw_transform
 
     vector = _find(case, seed)
-    disguise = Disguise() if seed is None else drawn_disguise(vector, seed)
-    result = _put(command, vector, disguise) if command else None
+    transform = Transform() if seed is None else draw_transform(vector, seed)
+    result = _put(command, vector, transform) if command else None
     if as_json:
         print(msgspec.json.format(msgspec.json.encode(vector), indent=1).decode())
     else:
-        _show(vector, disguise)
+        _show(vector, transform)
     return 0 if result is None else _judge(result)
 
 
@@ -64,20 +64,19 @@ def _find(case: str, seed: int | None) -> Vector:
     raise BadInput(f"ID = {case!r}, must be a vector's, such as {known[0].id}")
 
 
-def _show(vector: Vector, disguise: Disguise) -> None:
+def _show(vector: Vector, transform: Transform) -> None:
     from conformance import vectors
     from conformance.cases.certify import judge
     from conformance.grading.agreement import middle
-    from conformance.suite.disguise import asked
 
     console = new_console()
     condition = f", condition {vector.condition:.3g}" if vector.condition else ""
     console.print(f"[bold]{vector.id}[/], level {vector.level}{condition}")
     console.print(f"rule       {escape(vector.rule)}")
     console.print(f"source     {escape(vector.source)}")
-    if str(disguise) != str(type(disguise)()):
-        console.print(f"asked      {disguise}; certified answers below are of the question as published")
-    console.print(f"question   {escape(json.dumps(vectors.request(asked(vector, disguise), 0)))}")
+    if str(transform) != str(type(transform)()):
+        console.print(f"asked      {transform}; certified answers below are of the question as published")
+    console.print(f"question   {escape(json.dumps(vectors.request(transform.apply(vector), 0)))}")
     for i, expectation in enumerate(vector.expect):
         console.print(
             f"{'certified' if i == 0 else 'or'}  {expectation.outcome} {expectation.reason}".rstrip()
@@ -90,7 +89,7 @@ def _show(vector: Vector, disguise: Disguise) -> None:
     console.print(f"verifier   {verdict.status} {escape(verdict.reason)}".rstrip())
 
 
-def _put(command: list[str], vector: Vector, disguise: Disguise) -> Result:
+def _put(command: list[str], vector: Vector, transform: Transform) -> Result:
     from conformance.suite import ask_vector
     from conformance.suite.process import Trouble
     from conformance.suite.session import Session
@@ -101,7 +100,7 @@ def _put(command: list[str], vector: Vector, disguise: Disguise) -> Result:
             session.probe()
         except Trouble as trouble:
             raise BadInput(f"the command does not speak protocol 1: {trouble}") from None
-        return ask_vector(session, vector, disguise)
+        return ask_vector(session, vector, transform)
 
 
 def _judge(result: Result) -> int:

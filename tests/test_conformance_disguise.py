@@ -15,12 +15,7 @@ from conformance.mutants import Mutant
 from conformance.mutants.kill_matrix import verdict
 from conformance.plain.step import Flight
 from conformance.suite.checks import checks_of
-from conformance.suite.disguise import (
-    Disguise,
-    asked,
-    drawn_disguise,
-    published,
-)
+from conformance.suite.symmetry import Transform, draw_transform
 from fast.__main__ import carry, follow
 from scene import BangBang, Fourier
 from scene.tables import laws
@@ -37,28 +32,28 @@ def corpus():
 @pytest.mark.parametrize("seed", deep_but(SEEDS, SEEDS[0]))
 def test_the_fast_stepper_answers_as_well_in_disguise(seed, corpus, tally):
     for vector in corpus[seed::5]:
-        worn = drawn_disguise(vector, seed)
-        answer = vectors.answer(asked(vector, worn), fast.next_collision, follow, carry)
-        found = grade(vector, published(answer, worn))
+        worn = draw_transform(vector, seed)
+        answer = vectors.answer(worn.apply(vector), fast.next_collision, follow, carry)
+        found = grade(vector, worn.restore(answer))
         assert found.verdict in ("pass", "declined"), (vector.id, str(worn), found)
         assert found.verdict == "pass" or vector.level == "stress"
         assert vector.level != "core" or not found.ulps > SHARP
         tally[f"{found.verdict}"] += 1
-        tally["as published" if worn == Disguise() else "in disguise"] += 1
+        tally["as published" if worn == Transform() else "in disguise"] += 1
 
 
 def test_no_question_is_asked_as_it_is_published(corpus):
     """But where all that can be changed is its sign, and nothing has one."""
-    same = [v.id for v in corpus if asked(v, drawn_disguise(v, 3)) == v]
+    same = [v.id for v in corpus if draw_transform(v, 3).apply(v) == v]
     assert len(same) < 0.01 * len(corpus), same
 
 
 def test_a_disguise_is_taken_off_without_a_rounding(corpus):
     for vector in corpus[::7]:
-        worn = drawn_disguise(vector, 5)
+        worn = draw_transform(vector, 5)
         known = msgspec.to_builtins(middle(vector.expect[0], vector.state))
         inverse = worn._replace(length=-worn.length, time=-worn.time)
-        assert published(published(known, inverse), worn) == known
+        assert worn.restore(inverse.restore(known)) == known
 
 
 class WavesFromFirstKnot(Flight):
@@ -79,8 +74,8 @@ def test_laws_side_by_side_are_asked_in_scenes_that_no_file_holds():
 
 def test_a_scene_stays_one_scene_in_a_run(corpus):
     group = [v for v in corpus if v.group == "moving-cap"]
-    assert len({str(asked(v, drawn_disguise(v, 2)).scene) for v in group}) == 1
-    assert len({str(asked(v, drawn_disguise(v, s)).scene) for v in group[:1] for s in range(20)}) > 15
+    assert len({str(draw_transform(v, 2).apply(v).scene) for v in group}) == 1
+    assert len({str(draw_transform(v, s).apply(v).scene) for v in group[:1] for s in range(20)}) > 15
 
 
 def test_all_that_is_drawn_follows_from_the_seed():
@@ -102,7 +97,7 @@ def test_a_replayer_is_not_accepted(seed, is_bold):
 
 
 def test_a_replayer_would_pass_without_disguise(monkeypatch):
-    monkeypatch.setattr("conformance.suite.run.drawn_disguise", lambda *_: Disguise())
+    monkeypatch.setattr("conformance.suite.run.draw_transform", lambda *_: Transform())
     run = suite.check(replayer(None, False, GROUPS), seed=9, groups=[*GROUPS, "fresh"])
     assert {r.verdict for r in run.results if r.group in GROUPS} == {"pass"}
     assert run.exit_code() == 1  # but not what no file holds

@@ -27,7 +27,7 @@ from conformance.cases.scenes import many_legs
 from conformance.cases.table import FAMILIES
 from conformance.grading.grade import grade
 from conformance.plain.flow import PlainPath
-from conformance.suite.disguise import Disguise, drawn_disguise
+from conformance.suite.symmetry import Transform, draw_transform
 from conformance.verify import Verdict, verify_line
 from fast import __main__ as fast_program
 from fast.__main__ import carry, follow
@@ -91,7 +91,7 @@ def test_all_is_asked_that_the_corpus_asks_seldom(seed, tally):
         scene, step = from_data(vector.scene), vector.expect[0].steps[0]
         kinds = {type(law) for law in laws(scene).values()}
         assert msgspec.json.encode(vector.scene) not in known
-        assert drawn_disguise(vector, seed) == Disguise()
+        assert draw_transform(vector, seed) == Transform()
         tally[f"{vector.scene['table']}, {step.wall}"] += 1
         tally["before 0"] += vector.state.t < 0
         tally["of mixed laws"] += kinds >= {Fourier, BangBang}

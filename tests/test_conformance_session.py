@@ -13,9 +13,9 @@ from support.saboteurs import HONEST, SABOTEURS, command
 
 from conformance.suite import run as suite
 from conformance.suite.answers import read_answer
-from conformance.suite.disguise import Disguise
 from conformance.suite.process import CommandNotFound, Trouble
 from conformance.suite.session import Limits, Session
+from conformance.suite.symmetry import Transform
 from conformance.vectors import Certified, Expectation, Vector
 from scene import State
 from scene.protocol.messages import with_minus_zeros
@@ -58,7 +58,7 @@ def verdicts(monkeypatch):
     """Return what runs the suite on a saboteur and gives its results by case; nothing may be left running."""
     monkeypatch.setenv("SABOTAGE", token := secrets.token_hex(8))
     asked_alone(monkeypatch, [made_up(i) for i in range(N)])
-    monkeypatch.setattr(suite, "drawn_disguise", lambda *_: Disguise())  # saboteurs know one answer
+    monkeypatch.setattr(suite, "draw_transform", lambda *_: Transform())  # saboteurs know one answer
 
     def run(name: str, limits: Limits) -> suite.Run:
         found = suite.check(command(name), limits=limits)

@@ -16,7 +16,7 @@ from test_conformance_session import asked_alone, made_up
 
 from conformance import vectors
 from conformance.mutants.kill_matrix import diagnose
-from conformance.suite import disguise, reports
+from conformance.suite import reports, symmetry
 from conformance.suite import run as suite
 from conformance.suite.checks import ensembles
 from conformance.suite.result import VERDICTS, Result, Run
@@ -282,7 +282,7 @@ def test_what_is_declined_too_often_can_be_known():
 
 def test_known_failures_are_marked_in_a_run(monkeypatch):
     asked_alone(monkeypatch, [made_up(0), made_up(1)])
-    monkeypatch.setattr(suite, "drawn_disguise", lambda *_: disguise.Disguise())  # it knows one answer
+    monkeypatch.setattr(suite, "draw_transform", lambda *_: symmetry.Transform())  # it knows one answer
     fixed = frozenset({"made-up/0", "made-up/1", "protocol/stop"})
     run = suite.check(command("crash-at-second"), known=fixed)
     assert run.objections() == ["made-up/0: passes, though it is listed as a known failure"]

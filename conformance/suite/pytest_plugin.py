@@ -9,10 +9,10 @@ import pytest
 
 from conformance import suite, vectors
 from conformance.suite.checks import checks_of
-from conformance.suite.disguise import Disguise, drawn_disguise
 from conformance.suite.process import CommandNotFound, Trouble
 from conformance.suite.run import NEW_SEEDS
 from conformance.suite.session import Limits, Session
+from conformance.suite.symmetry import Transform, draw_transform
 from conformance.vectors import Vector
 from scene.refusal import BadInput, check_seed
 
@@ -22,7 +22,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     group = parser.getgroup("mushrooms")
     group.addoption("--mushrooms-command", metavar="COMMAND", help="A stepper that speaks protocol 1.")
     group.addoption("--mushrooms-level", default="core", choices=vectors.LEVELS, help="Hardest level asked.")
-    group.addoption("--mushrooms-seed", type=int, help="Of the disguises; a new one each run, printed.")
+    group.addoption("--mushrooms-seed", type=int, help="Of all random choices; a new one each run, printed.")
     group.addoption("--mushrooms-timeout", default=120.0, type=float, help="Seconds for one answer.")
 
 
@@ -66,9 +66,9 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
 
 
 @pytest.fixture
-def mushrooms_disguise(request: pytest.FixtureRequest, mushrooms_vector: Vector) -> Disguise:
-    """Return the disguise in which a vector is asked."""
-    return drawn_disguise(mushrooms_vector, request.config.option.mushrooms_seed)
+def mushrooms_transform(request: pytest.FixtureRequest, mushrooms_vector: Vector) -> Transform:
+    """Return the symmetry transform by which a vector is asked."""
+    return draw_transform(mushrooms_vector, request.config.option.mushrooms_seed)
 
 
 @pytest.fixture(scope="session")

@@ -1,9 +1,9 @@
 """The suite: puts every question to one implementation and collects the verdicts.
 
 First the protocol itself (start, the number-transport probe, bad input), then the vectors up to a level,
-each in disguise (`suite.disguise`), and questions that no file holds (`cases.generated`); then the exact
-properties and the statistical profiles, then its speed where it offers `time`, then `stop`. What ends the
-session is the verdict of every case not reached; what the implementation does not offer is `unsupported`.
+each as an image of itself (`suite.symmetry`), and questions that no file holds (`cases.generated`); then the
+exact properties and the statistical profiles, then its speed where it offers `time`, then `stop`. What ends
+the session is the verdict of every case not reached; what the implementation does not offer is `unsupported`.
 Verdicts follow from the implementation, the level and the seed, not from the machine or its load, but for
 time limits and what holds `time` to a clock.
 """
@@ -27,10 +27,10 @@ from conformance.grading.grade import grade
 from conformance.mutants.kill_matrix import diagnose
 from conformance.suite.answers import outcomes_of
 from conformance.suite.checks import GROUPS, Implementation, checks_of, run_check, timing
-from conformance.suite.disguise import Disguise, asked, drawn_disguise, published
 from conformance.suite.process import NOT_NUMBERS, Trouble
 from conformance.suite.result import BAD, Result, Run, Speed, graded_parts
 from conformance.suite.session import AnswerLine, Limits, Session, missing
+from conformance.suite.symmetry import Transform, draw_transform
 from conformance.vectors import Vector
 from scene import BadInput, State, load, to_data
 from scene.refusal import check_seed
@@ -109,10 +109,10 @@ class RunQuestions:
         self.checks = [each for each in checks_of(level) if each.name.startswith(parts)]
         self.n = len(self.chosen) + n_fresh + len(self.checks)
 
-    def vectors(self) -> Iterator[tuple[Vector, Disguise]]:
+    def vectors(self) -> Iterator[tuple[Vector, Transform]]:
         """Return the vectors in the order of a run, each with its image."""
         every = itertools.chain(self.chosen, self.fresh)
-        return ((vector, drawn_disguise(vector, self.seed)) for vector in every)
+        return ((vector, draw_transform(vector, self.seed)) for vector in every)
 
 
 def choose(level: str, groups: Sequence[str] = ()) -> list[Vector]:
@@ -237,14 +237,14 @@ def _tried(name: str, act: Callable[[], object]) -> Result:
     return Result(f"protocol/{name}", "protocol", verdict, why, time.monotonic() - begin)
 
 
-def ask_vector(session: Session, vector: Vector, disguise: Disguise = Disguise()) -> Result:  # noqa: B008
-    """Put one vector to an open session, in disguise, and grade the answer to the question as published."""
+def ask_vector(session: Session, vector: Vector, transform: Transform = Transform()) -> Result:  # noqa: B008
+    """Put an image of one vector to an open session, and grade the answer to the question as published."""
     assert session.introduction is not None
     begin, is_refused = time.monotonic(), vector.expect[0].outcome == "rejected"
     if lacking := missing(session.introduction, vector.kind, None if is_refused else vector.scene):
         return _result(vector, Trouble("unsupported", lacking))
     try:
-        answer = published(session.ask(vectors.request(asked(vector, disguise), 0)), disguise)
+        answer = transform.restore(session.ask(vectors.request(transform.apply(vector), 0)))
     except Trouble as trouble:
         return _result(vector, trouble, time.monotonic() - begin)
     graded = grade(vector, answer)
@@ -256,7 +256,7 @@ def ask_vector(session: Session, vector: Vector, disguise: Disguise = Disguise()
         graded.why,
         time.monotonic() - begin,
         vector.level,
-        str(disguise),
+        str(transform),
         ulps=graded.ulps if math.isfinite(graded.ulps) else None,
         relative=graded.relative if math.isfinite(graded.relative) else None,
         answer=answer,

@@ -21,7 +21,6 @@ from conformance import plain, vectors
 from conformance.suite.answers import check_echo, read_answer, read_introduction, with_walls
 from conformance.suite.checks import checks_of, ensembles, run_check
 from conformance.suite.checks.form import QUESTIONS, SuiteCheck
-from conformance.suite.disguise import asked
 from conformance.suite.process import Trouble
 from conformance.suite.result import LAWS, TABLES, Run
 from conformance.suite.run import RunQuestions, ask_nonsense, converse
@@ -104,7 +103,7 @@ class Sheet(RunQuestions):
         self.questions: dict[bytes, SheetQuestion] = {}
         self._numbers = set[int]()
         for vector, image in self.vectors():
-            self.add(vector.id, vectors.request(asked(vector, image), 0))
+            self.add(vector.id, vectors.request(image.apply(vector), 0))
         recorder = _Recorder(self)
         ask_nonsense(recorder)
         for check in self.checks:

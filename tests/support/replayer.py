@@ -1,6 +1,6 @@
 """Answers by memory: a program that knows the corpus and its certified answers, and no physics at all.
 
-With a seed it also knows in which disguise every vector is asked in the run of that seed. What it does not
+With a seed it also knows by which transform every vector is asked in the run of that seed. What it does not
 know it answers by `undecided`, or with the last answer that it gave.
 """
 
@@ -12,8 +12,8 @@ import msgspec
 
 from conformance import vectors
 from conformance.grading.agreement import middle
-from conformance.suite.disguise import Disguise, asked, drawn_disguise, published
 from conformance.suite.session import AnswerLine
+from conformance.suite.symmetry import Transform, draw_transform
 from support.faulty_servers import Answer, Line, faulty, starts
 
 UNDECIDED = {"outcome": "undecided", "reason": "not in the book"}
@@ -23,11 +23,9 @@ def remembered(seed: int | None, groups: Sequence[str]) -> dict[str, dict[str, A
     """Return the certified answer to every question of some groups, as it will be asked."""
     found = {}
     for vector in (v for v in vectors.load("stress") if v.group in groups):
-        disguise = Disguise() if seed is None else drawn_disguise(vector, seed)
-        inverse = disguise._replace(length=-disguise.length, time=-disguise.time)
-        found[_key(vectors.request(asked(vector, disguise), 0))] = published(
-            certified_answer(vector), inverse
-        )
+        transform = Transform() if seed is None else draw_transform(vector, seed)
+        inverse = transform._replace(length=-transform.length, time=-transform.time)
+        found[_key(vectors.request(transform.apply(vector), 0))] = inverse.restore(certified_answer(vector))
     return found
 
 

@@ -91,15 +91,15 @@ def _show(vector: Vector, transform: Transform) -> None:
 
 def _put(command: list[str], vector: Vector, transform: Transform) -> Result:
     from conformance.suite import ask_vector
-    from conformance.suite.process import Trouble
+    from conformance.suite.process import CheckFailure
     from conformance.suite.session import Session
 
     with Session(command) as session:
         try:
             session.start()
             session.probe()
-        except Trouble as trouble:
-            raise BadInput(f"the command does not speak protocol 1: {trouble}") from None
+        except CheckFailure as failure:
+            raise BadInput(f"the command does not speak protocol 1: {failure}") from None
         return ask_vector(session, vector, transform)
 
 

@@ -115,9 +115,9 @@ def _measured(size: Size, seed: int, command: list[str]) -> Record:
             workload = workloads.draw_workload(
                 rule, seed, n_questions, proved_step, n_further, fast.next_collision
             )
-            found, troubles = solvers.measure(workload, running, effort, tick)
+            found, failures = solvers.measure(workload, running, effort, tick)
             points += found
-            not_run |= {f"{name} on {rule.name}": why for name, why in troubles.items()}
+            not_run |= {f"{name} on {rule.name}": why for name, why in failures.items()}
             tick("")
         n_paths, length = PATHS[size]
         bar.reset(task, total=n_paths, description="error growth")
@@ -147,7 +147,7 @@ def _solvers(stack: ExitStack, command: list[str]) -> tuple[list[Solver], dict[s
     from conformance.bench import baselines
     from conformance.bench.solvers import by_command
     from conformance.harness.examples import find_examples
-    from conformance.suite.process import Trouble
+    from conformance.suite.process import CheckFailure
     from conformance.suite.session import Limits
     from mushrooms import bench_solvers as ours
 
@@ -158,8 +158,8 @@ def _solvers(stack: ExitStack, command: list[str]) -> tuple[list[Solver], dict[s
     try:
         library, built["lean C"] = baselines.build(folder, baselines.FLAGS)
         solvers += baselines.in_c(library)
-    except Trouble as trouble:
-        not_run["lean C, time steps"] = trouble.why
+    except CheckFailure as failure:
+        not_run["lean C, time steps"] = failure.why
 
     def add(name: str, family: Family, line: Sequence[str]) -> None:
         solvers.append(by_command(name, family, line, stack, limits))
@@ -172,16 +172,16 @@ def _solvers(stack: ExitStack, command: list[str]) -> tuple[list[Solver], dict[s
             continue
         try:
             add(name, "example", example.command)
-        except (Trouble, BadInput) as trouble:
-            not_run[name] = str(trouble)
+        except (CheckFailure, BadInput) as failure:
+            not_run[name] = str(failure)
             continue
         if example.built:
             built[name] = example.built
     if command:
         try:
             add(f"command {' '.join(command)}", "command", command)
-        except Trouble as trouble:
-            raise BadInput(f"command {command[0]!r} {trouble.verdict}: {trouble.why}") from None
+        except CheckFailure as failure:
+            raise BadInput(f"command {command[0]!r} {failure.verdict}: {failure.why}") from None
     return solvers, built, not_run
 
 

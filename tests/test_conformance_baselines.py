@@ -12,7 +12,7 @@ from conformance.bench import baselines, solvers, workloads
 from conformance.cases import scenes
 from conformance.cases.draw import Draw
 from conformance.harness import examples
-from conformance.suite.process import Trouble
+from conformance.suite.process import CheckFailure
 from scene import Collision, Horizon, Mushroom, State, load
 
 BRIEF = solvers.Effort(repeats=3, least_ns=1.0, most_ns=1e9)
@@ -22,7 +22,7 @@ BRIEF = solvers.Effort(repeats=3, least_ns=1.0, most_ns=1e9)
 def library(tmp_path_factory):
     try:
         return baselines.build(tmp_path_factory.mktemp("baselines"), ["-O1"])[0]
-    except Trouble as trouble:
+    except CheckFailure as trouble:
         pytest.skip(trouble.why)
 
 
@@ -124,8 +124,8 @@ def test_a_particle_that_meets_nothing_is_told(library, engine):
 
 def test_without_a_compiler_the_reason_is_told(monkeypatch, tmp_path):
     monkeypatch.setattr(baselines, "SOURCE", tmp_path / "absent.c")
-    with pytest.raises(Trouble, match="it does not compile" if examples.shutil.which("cc") else "no C"):
+    with pytest.raises(CheckFailure, match="it does not compile" if examples.shutil.which("cc") else "no C"):
         baselines.build(tmp_path, [])
     monkeypatch.setattr(examples.shutil, "which", lambda _: None)
-    with pytest.raises(Trouble, match="no C compiler is installed"):
+    with pytest.raises(CheckFailure, match="no C compiler is installed"):
         baselines.build(tmp_path, [])

@@ -19,7 +19,7 @@ from conformance.bench import growth, record, solvers, workloads
 from conformance.bench.baselines import next_collision_by
 from conformance.bench.solvers import Solver, SolverRun, by_call
 from conformance.suite.checks import timing
-from conformance.suite.process import Trouble
+from conformance.suite.process import CheckFailure
 from mushrooms import bench_solvers as ours
 from scene import BadInput, Collision, Horizon, Undecided
 
@@ -145,7 +145,7 @@ def test_time_stepping_is_right_where_it_is_easy_and_wrong_where_it_skips(drawn)
 
 def gone(call):
     if call > 2:
-        raise Trouble("crashed", "gone")
+        raise CheckFailure("crashed", "gone")
     return SolverRun(1.0, [Undecided("")] * 3, 1e9)
 
 
@@ -259,7 +259,7 @@ def test_a_tick_of_a_coarse_clock_is_no_lie():
         return timing.ask_time(at_once, timing.SCENES[0], timing.START, 1, 1).ns
 
     assert timed(10**6) == [10**6]
-    with pytest.raises(Trouble, match="the answer came after"):
+    with pytest.raises(CheckFailure, match="the answer came after"):
         timed(10**7)
 
 

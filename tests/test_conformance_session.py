@@ -13,7 +13,7 @@ from support.saboteurs import HONEST, SABOTEURS, command
 
 from conformance.suite import run as suite
 from conformance.suite.answers import read_answer
-from conformance.suite.process import CommandNotFound, Trouble
+from conformance.suite.process import CheckFailure, CommandNotFound
 from conformance.suite.session import Limits, Session
 from conformance.suite.symmetry import Transform
 from conformance.vectors import Certified, Expectation, Vector
@@ -245,7 +245,7 @@ LOST = b'{"seq":1,"states":[{"outcome":"%b","reason":"corner","captured":[1,2]}]
     ],
 )
 def test_misshapen_answers_are_named(line, cmd, word):
-    with pytest.raises(Trouble, match="wrong-format") as caught:
+    with pytest.raises(CheckFailure, match="wrong-format") as caught:
         read_answer(line, cmd, 1)
     assert word in caught.value.why
 

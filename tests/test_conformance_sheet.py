@@ -18,7 +18,7 @@ from conformance.suite import run as suite
 from conformance.suite import sheet as sheets
 from conformance.suite import sheet_files as files
 from conformance.suite.checks import ensembles
-from conformance.suite.process import Trouble
+from conformance.suite.process import CheckFailure
 from conformance.suite.session import Limits
 from scene.protocol.wire import serve
 from scene.refusal import BadInput
@@ -62,10 +62,10 @@ def test_questions_in_files_hang_on_no_answer(name, sheet, tmp_path, monkeypatch
 
     def noted(verdict, why):
         seen.append(why)
-        return Trouble(verdict, why)
+        return CheckFailure(verdict, why)
 
     monkeypatch.setattr(sheets, "CHECKS", {name: ALL_CHECKS[name]})
-    monkeypatch.setattr(sheets, "Trouble", noted)
+    monkeypatch.setattr(sheets, "CheckFailure", noted)
     monkeypatch.setattr(suite, "choose", lambda *_: [])
     alone = sheets.Sheet("core", SEED, [])
     run = graded(alone, tmp_path, answered(b"\n".join(alone.lines()), nudged))

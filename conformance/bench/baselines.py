@@ -24,7 +24,7 @@ from conformance import plain
 from conformance.bench.solvers import Family, Given, Solver, SolverRun, by_call
 from conformance.bench.workloads import SINGLE_STEPS, WINDOW, Workload
 from conformance.harness import examples
-from conformance.suite.process import Trouble
+from conformance.suite.process import CheckFailure
 from scene import (
     BangBang,
     Cap,
@@ -120,12 +120,12 @@ def build(folder: Path, flags: Sequence[str]) -> tuple[Path, str]:
         The library, and the line that compiled it, paths left out.
 
     Raises:
-        Trouble: there is no compiler, or it fails.
+        CheckFailure: there is no compiler, or it fails.
     """
     library = folder / "baselines.so"
     built = examples.compiled("C", [*flags, "-std=gnu11", "-shared", "-fPIC"], SOURCE, library, ["-lm"])
     if built.why_not:
-        raise Trouble("unsupported" if built.is_absent else "error", built.why_not)
+        raise CheckFailure("unsupported" if built.is_absent else "error", built.why_not)
     return library, built.built
 
 
@@ -148,7 +148,7 @@ def _solver(name: str, family: Family, engine: Engine, flights: float = WINDOW) 
             followed, t_end, most = states[:1], np.inf, workload.length
         n_hits, seconds = engine.follow(questions(workload.scene, followed), t_end, most, n_times)
         if not n_hits:
-            raise Trouble("fail", "it meets no wall")
+            raise CheckFailure("fail", "it meets no wall")
         return SolverRun(seconds / n_hits * 1e9, steps(workload.scene, states), seconds * 1e9)
 
     serves = SINGLE_STEPS if family == "fixed-step" else (*SINGLE_STEPS, "one-path")

@@ -20,7 +20,7 @@ from conformance.bench.record import Point, short
 from conformance.bench.workloads import SINGLE_STEPS, ProvedStep, Workload
 from conformance.grading.agreement import Answer, Enclosed, compare, exact
 from conformance.suite.checks import Implementation, timing
-from conformance.suite.process import Trouble
+from conformance.suite.process import CheckFailure
 from conformance.suite.session import Limits, Session, missing
 from conformance.vectors import NUMBERS, Certified
 from scene import Collision, Scene, State, Undecided, to_data
@@ -51,7 +51,7 @@ class Solver(NamedTuple):
     Attributes:
         name: as in the plot.
         family: what kind of thing it is.
-        run: (workload, n_times) -> a run in which every step is taken n_times; raises Trouble.
+        run: (workload, n_times) -> a run in which every step is taken n_times; raises CheckFailure.
         serves: the workloads it can run.
         steps: one step from each of many states, quickly; None where there is no such thing.
     """
@@ -91,35 +91,35 @@ def by_command(
 
     Raises:
         CommandNotFound: there is no such program.
-        Trouble: it does not introduce itself.
+        CheckFailure: it does not introduce itself.
     """
     session = stack.enter_context(Session(command, limits))
     session.start()
-    clock_trouble = cache(partial(_clock_trouble, session))  # its clock is looked at once
+    clock_failure = cache(partial(_clock_failure, session))  # its clock is looked at once
 
     def run(workload: Workload, n_times: int) -> SolverRun:
         assert session.introduction is not None
         if lacking := missing(session.introduction, "time", to_data(workload.scene)):
-            raise Trouble("unsupported", lacking)
+            raise CheckFailure("unsupported", lacking)
         answers: list[Given] = []
         lasted = 0
         for question in workload.questions:
             found = timing.ask_time(session, workload.scene, question.state, 1, n_times)
             lasted += sum(found.ns)
             answers.append(found.last)
-        if (trouble := clock_trouble()) is not None:
-            raise trouble
+        if (failure := clock_failure()) is not None:
+            raise failure
         return SolverRun(lasted / (n_times * len(answers)), answers, lasted)
 
     return Solver(name, family, run)
 
 
-def _clock_trouble(session: Session) -> Trouble | None:
+def _clock_failure(session: Session) -> CheckFailure | None:
     """Hold what a command says of its time to the clock on this side; a run is too short to do so."""
     try:
         timing.honest_clock(Implementation(session, "time"), timing.SCENES[0], timing.START)
-    except Trouble as trouble:
-        return trouble
+    except CheckFailure as failure:
+        return failure
     return None
 
 
@@ -159,36 +159,36 @@ def measure(
         tick: called with a solver's name before its warm-up, and after every round with "".
 
     Returns:
-        A point for each solver, and those that failed with their trouble.
+        A point for each solver, and what failed of the others.
     """
     running: list[tuple[Solver, int, int]] = []
     runs: dict[str, list[SolverRun]] = {}
-    troubles: dict[str, str] = {}
+    failures: dict[str, str] = {}
     for solver in solvers:
         if workload.name not in solver.serves:
             continue
         tick(solver.name)
         try:
             running.append(_warm_up(solver, workload, effort))
-        except Trouble as trouble:
-            troubles[solver.name] = f"{trouble.verdict}: {trouble.why}"
+        except CheckFailure as failure:
+            failures[solver.name] = f"{failure.verdict}: {failure.why}"
             continue
         runs[solver.name] = []
     for number in range(effort.repeats):
         for solver, n_times, n_runs in running:
-            if number < n_runs and solver.name not in troubles:
+            if number < n_runs and solver.name not in failures:
                 try:
                     runs[solver.name].append(solver.run(workload, n_times))
                     _check_runs(runs[solver.name])
-                except Trouble as trouble:
-                    troubles[solver.name] = f"{trouble.verdict}: {trouble.why}"
+                except CheckFailure as failure:
+                    failures[solver.name] = f"{failure.verdict}: {failure.why}"
         tick("")
     points = [
         _point(workload, solver, n_times, runs[solver.name])
         for solver, n_times, _ in running
-        if solver.name not in troubles
+        if solver.name not in failures
     ]
-    return points, troubles
+    return points, failures
 
 
 def _warm_up(solver: Solver, workload: Workload, effort: Effort) -> tuple[Solver, int, int]:
@@ -204,9 +204,9 @@ def _warm_up(solver: Solver, workload: Workload, effort: Effort) -> tuple[Solver
 
 def _check_runs(runs: Sequence[SolverRun]) -> None:
     if not runs[-1].ns:
-        raise Trouble("fail", "a run is said to last 0 ns in all")
+        raise CheckFailure("fail", "a run is said to last 0 ns in all")
     if repr(runs[-1].answers) != repr(runs[0].answers):
-        raise Trouble("fail", "its answers differ from run to run")
+        raise CheckFailure("fail", "its answers differ from run to run")
 
 
 def _point(workload: Workload, solver: Solver, n_times: int, runs: Sequence[SolverRun]) -> Point:

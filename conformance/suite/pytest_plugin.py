@@ -9,7 +9,7 @@ import pytest
 
 from conformance import suite, vectors
 from conformance.suite.checks import checks_of
-from conformance.suite.process import CommandNotFound, Trouble
+from conformance.suite.process import CheckFailure, CommandNotFound
 from conformance.suite.run import NEW_SEEDS
 from conformance.suite.session import Limits, Session
 from conformance.suite.symmetry import Transform, draw_transform
@@ -82,6 +82,6 @@ def mushrooms_session(request: pytest.FixtureRequest) -> Iterator[Session]:
         try:
             session.start()
             session.probe()
-        except (CommandNotFound, Trouble) as trouble:
-            pytest.fail(str(trouble), pytrace=False)
+        except (CommandNotFound, CheckFailure) as failure:
+            pytest.fail(str(failure), pytrace=False)
         yield session

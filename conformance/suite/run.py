@@ -27,7 +27,7 @@ from conformance.grading.grade import grade
 from conformance.mutants.kill_matrix import diagnose
 from conformance.suite.answers import outcomes_of
 from conformance.suite.checks import GROUPS, Implementation, checks_of, run_check, timing
-from conformance.suite.process import NOT_NUMBERS, Trouble
+from conformance.suite.process import NOT_NUMBERS, CheckFailure
 from conformance.suite.result import BAD, Result, Run, Speed, graded_parts
 from conformance.suite.session import AnswerLine, Limits, Session, missing
 from conformance.suite.symmetry import Transform, draw_transform
@@ -180,7 +180,7 @@ def converse(
     for name, act in (("start", session.start), ("echo", session.probe)):
         results.append(_closed(session, _tried(name, act)))
         if results[-1].verdict in BAD:
-            unreached = Trouble(results[-1].verdict, f"not asked: {name} failed")
+            unreached = CheckFailure(results[-1].verdict, f"not asked: {name} failed")
             results += [_result(vector, unreached) for vector in questions.chosen]
             break
     else:
@@ -232,8 +232,8 @@ def _tried(name: str, act: Callable[[], object]) -> Result:
     begin, verdict, why = time.monotonic(), "pass", ""
     try:
         act()
-    except Trouble as trouble:
-        verdict, why = trouble.verdict, trouble.why
+    except CheckFailure as failure:
+        verdict, why = failure.verdict, failure.why
     return Result(f"protocol/{name}", "protocol", verdict, why, time.monotonic() - begin)
 
 
@@ -242,11 +242,11 @@ def ask_vector(session: Session, vector: Vector, transform: Transform = Transfor
     assert session.introduction is not None
     begin, is_refused = time.monotonic(), vector.expect[0].outcome == "rejected"
     if lacking := missing(session.introduction, vector.kind, None if is_refused else vector.scene):
-        return _result(vector, Trouble("unsupported", lacking))
+        return _result(vector, CheckFailure("unsupported", lacking))
     try:
         answer = transform.restore(session.ask(vectors.request(transform.apply(vector), 0)))
-    except Trouble as trouble:
-        return _result(vector, trouble, time.monotonic() - begin)
+    except CheckFailure as failure:
+        return _result(vector, failure, time.monotonic() - begin)
     graded = grade(vector, answer)
     given, expected = _compared(vector, answer, graded)
     return Result(
@@ -296,7 +296,7 @@ def measure_speed(session: Session) -> Speed | None:
         while min(ns) < TIMED_LEAST and n_collisions < 100_000 and seconds < TIMED_MOST:
             n_collisions *= 10 if min(ns) * 10 < TIMED_LEAST else 2
             ns, seconds, _ = timing.timed(session, scene, state, n_collisions, TIMED_REPEATS)
-    except (Trouble, *NOT_NUMBERS):
+    except (CheckFailure, *NOT_NUMBERS):
         return None
     if not min(ns):
         return None
@@ -308,8 +308,8 @@ def ask_nonsense(session: Session) -> None:
     state = {name: value for name, value in msgspec.to_builtins(TIMED_STATE).items() if name != "vy"}
     answer = session.ask({"cmd": "step", "scene": {"table": "cap", "r": 1.0}, "state": state, "t_end": 1.0})
     if answer.get("outcome") != "rejected":
-        raise Trouble("fail", f"a state without vy was answered {answer}"[:200])
+        raise CheckFailure("fail", f"a state without vy was answered {answer}"[:200])
 
 
-def _result(vector: Vector, trouble: Trouble, seconds: float = 0.0) -> Result:
-    return Result(vector.id, vector.group, trouble.verdict, trouble.why, seconds, vector.level)
+def _result(vector: Vector, failure: CheckFailure, seconds: float = 0.0) -> Result:
+    return Result(vector.id, vector.group, failure.verdict, failure.why, seconds, vector.level)

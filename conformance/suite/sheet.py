@@ -21,7 +21,7 @@ from conformance import plain, vectors
 from conformance.suite.answers import check_echo, read_answer, read_introduction, with_walls
 from conformance.suite.checks import checks_of, ensembles, run_check
 from conformance.suite.checks.form import QUESTIONS, SuiteCheck
-from conformance.suite.process import Trouble
+from conformance.suite.process import CheckFailure
 from conformance.suite.result import LAWS, TABLES, Run
 from conformance.suite.run import RunQuestions, ask_nonsense, converse
 from conformance.suite.session import MAX_SEQ, Session, needs, probe_values
@@ -208,22 +208,22 @@ class _Replay(Session):
 
     def start(self) -> Introduction:
         if self._answers.introduction is None:
-            raise Trouble("unsupported", "not in the answers: what it offers is what it answered")
+            raise CheckFailure("unsupported", "not in the answers: what it offers is what it answered")
         self.introduction = read_introduction(self._answers.introduction)
         return self.introduction
 
     def probe(self) -> None:
         if not self._answers.echoes:
-            raise Trouble("unsupported", "not in the answers")
+            raise CheckFailure("unsupported", "not in the answers")
         check_echo(probe_values(), self._answers.echoes[-1])
 
     def ask(self, request: Mapping[str, Any]) -> dict[str, Any]:
         question = self._sheet.questions.get(key_of(request))
         if question is None:
-            raise Trouble("unsupported", "not in files: the question hangs on an answer")
+            raise CheckFailure("unsupported", "not in files: the question hangs on an answer")
         line = self._answers.lines.get(question.seq)
         if line is None:
-            raise Trouble("declined", f"no answer with seq {question.seq}")
+            raise CheckFailure("declined", f"no answer with seq {question.seq}")
         self.sent = question.line
         line = _enveloped(line, request["cmd"], question.seq) if line.startswith(b"[") else line
         return with_walls(read_answer(line, request["cmd"], question.seq), request.get("scene"))

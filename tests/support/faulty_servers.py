@@ -13,7 +13,7 @@ from itertools import count
 from typing import Any
 
 import fast.__main__ as server
-from conformance.suite.process import Trouble
+from conformance.suite.process import CheckFailure
 from fast import next_collision
 from scene.protocol.wire import serve
 
@@ -114,7 +114,7 @@ def at_bad_lines(act: Callable[[], Line]) -> Fault:
 
 def crash() -> Line:
     """Die."""
-    raise Trouble("crashed", "exited with status 1 before it answered")
+    raise CheckFailure("crashed", "exited with status 1 before it answered")
 
 
 def wrong_after_bad_lines() -> Fault:

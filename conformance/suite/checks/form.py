@@ -15,7 +15,7 @@ import msgspec
 
 from conformance.cases.draw import Draw
 from conformance.suite.answers import outcomes_of, read_outcome
-from conformance.suite.process import NOT_NUMBERS, Trouble
+from conformance.suite.process import NOT_NUMBERS, CheckFailure
 from conformance.suite.result import Result
 from conformance.suite.session import MAX_SEQ, Session, missing
 from scene import Collision, Outcome, Scene, State, Undecided, to_data
@@ -36,7 +36,7 @@ class SuiteCheck(NamedTuple):
         name: group and name, as results show it.
         asks: (draw, profile) -> questions; each begins with a scene.
         judges: (implementation, *question) -> whether anything was compared, or what was found. It raises
-            AssertionError in one line where the answer is wrong, and `Trouble` where there is none.
+            AssertionError in one line where the answer is wrong, and `CheckFailure` where there is none.
         profiles: of which it is asked.
     """
 
@@ -64,29 +64,29 @@ class Implementation:
     def __call__(self, scene: Scene, state: State, t_end: float) -> Outcome:
         """Return one outcome: of a step, of a trajectory of one collision, or of a flow of one state."""
         if not all(math.isfinite(number) for number in (*msgspec.structs.astuple(state)[:5], t_end)):
-            raise Trouble("fail", f"its answers lead to the state {state} and t_end = {t_end}")
+            raise CheckFailure("fail", f"its answers lead to the state {state} and t_end = {t_end}")
         part, *more = self.parts(question(self.profile, scene, state, t_end))
         if more:
-            raise Trouble("wrong-format", f"{1 + len(more)} outcomes are answered to one question")
+            raise CheckFailure("wrong-format", f"{1 + len(more)} outcomes are answered to one question")
         return self._counted(read_outcome(part, state.t))
 
     def by(self, *profiles: str, scene: Scene) -> "Implementation":
         """Return the same implementation, asked by the first of some profiles that it offers.
 
         Raises:
-            Trouble: unsupported, when it offers none.
+            CheckFailure: unsupported, when it offers none.
         """
         assert self.session.introduction is not None
         for profile in profiles:
             if not missing(self.session.introduction, profile, to_data(scene)):
                 return Implementation(self.session, profile)
-        raise Trouble("unsupported", f"profile {' or '.join(profiles)}")
+        raise CheckFailure("unsupported", f"profile {' or '.join(profiles)}")
 
     def parts(self, request: Mapping[str, Any]) -> list[dict[str, Any]]:
         """Ask, and return the outcomes that are answered, as data; a whole refusal is the only one."""
         answer = self.session.ask(request)
         if "error" in answer:
-            raise Trouble("error", answer["error"])
+            raise CheckFailure("error", answer["error"])
         return outcomes_of(answer)
 
     def said(self, line: str) -> dict[str, Any]:
@@ -97,7 +97,7 @@ class Implementation:
         """Follow up to n collisions, and what comes instead of a further one: at once, or step by step.
 
         Raises:
-            Trouble: fail for steps that are too many, too few, or go on after the end.
+            CheckFailure: fail for steps that are too many, too few, or go on after the end.
         """
         found: list[Outcome] = []
         if self.profile == "step":
@@ -110,7 +110,7 @@ class Implementation:
             t = getattr(found[-1], "t", t)
         hits = [isinstance(outcome, Collision) for outcome in found]
         if len(found) > n or not all(hits[:-1]) or (len(found) < n and hits[-1:] != [False]):
-            raise Trouble(
+            raise CheckFailure(
                 "fail", f"{len(found)} steps, {sum(hits)} of them collisions, are answered to {n} collisions"
             )
         return found
@@ -119,11 +119,11 @@ class Implementation:
         """Carry states to t_end, and return what is answered for each.
 
         Raises:
-            Trouble: also wrong-format, for another number of states.
+            CheckFailure: also wrong-format, for another number of states.
         """
         found = self.parts(question("flow", scene, states, t_end)) if states else []
         if len(found) != len(states):
-            raise Trouble("wrong-format", f"a flow of {len(states)} states is answered {found}"[:200])
+            raise CheckFailure("wrong-format", f"a flow of {len(states)} states is answered {found}"[:200])
         self.n_asked += len(found)
         self.n_undecided += sum(part["outcome"] == "undecided" for part in found)
         return found
@@ -175,15 +175,15 @@ def run_check(check: SuiteCheck, session: Session, seed: int) -> Result:
             except (AssertionError, *NOT_NUMBERS) as error:
                 what = "" if isinstance(error, AssertionError) else "its answers cannot be calculated with: "
                 return result("fail", f"{profile}: {what}{error}", as_pytest(check, profile, asked))
-            except Trouble as trouble:
-                if trouble.verdict == "unsupported":
-                    lacking = trouble.why
-                elif trouble.verdict == "declined":
+            except CheckFailure as failure:
+                if failure.verdict == "unsupported":
+                    lacking = failure.why
+                elif failure.verdict == "declined":
                     n_declined += 1
-                    notes.append(trouble.why)
+                    notes.append(failure.why)
                 else:
-                    why = f"{profile}: {trouble.why}"
-                    return result(trouble.verdict, why, as_pytest(check, profile, asked))
+                    why = f"{profile}: {failure.why}"
+                    return result(failure.verdict, why, as_pytest(check, profile, asked))
         n_open, n_asked = n_open + side.n_undecided, n_asked + side.n_asked
     why = "; ".join(notes[:4]) or f"{n_compared} of {n} compared"
     if n_declined > MAX_UNDECIDED * n:

@@ -17,7 +17,7 @@ from conformance.suite.answers import outcomes_of, read_outcome, with_walls
 from conformance.suite.checks.form import FOREVER, Implementation, Question, octaves, question
 from conformance.suite.checks.paths import distance, drawn, is_same_stay
 from conformance.suite.checks.refusals import RESTING
-from conformance.suite.process import Trouble
+from conformance.suite.process import CheckFailure
 from scene import Mushroom, Scene, State, Stem, Undecided
 
 MAX_LINE = 2**20  # bytes of a request
@@ -98,8 +98,8 @@ def passed_over(side: Implementation, scene: Scene, asked: Sequence[tuple[State,
             assert refusal.get("outcome") == "rejected", f"{shown}: answered {refusal}, must be rejected"
             for (state, request), answer in zip(asked, before, strict=True):
                 _agree(side, scene, state, request, answer, f"before {shown}")
-        except Trouble as trouble:
-            raise Trouble(trouble.verdict, f"{shown}: {trouble.why}") from None
+        except CheckFailure as failure:
+            raise CheckFailure(failure.verdict, f"{shown}: {failure.why}") from None
     return True
 
 
@@ -158,7 +158,7 @@ def _agree(
     told = with_walls({**answer}, request["scene"])
     given = outcomes_of(told)
     if "error" in answer:
-        raise Trouble("error", f"{answer['error']}: {how}")
+        raise CheckFailure("error", f"{answer['error']}: {how}")
     assert len(given) == len(own), f"{given}, must be {own}: {how}"
     n_compared, t = 0, state.t
     for one, other in zip(given, own, strict=True):

@@ -19,7 +19,7 @@ from conformance.cases.draw import Draw
 from conformance.suite.answers import read_outcome
 from conformance.suite.checks.form import Implementation, Question, question
 from conformance.suite.checks.paths import distance
-from conformance.suite.process import Trouble
+from conformance.suite.process import CheckFailure
 from conformance.suite.session import Session
 from scene import Cap, Collision, Fourier, Outcome, Scene, State, Stem, Undecided
 
@@ -57,21 +57,21 @@ def ask_time(session: Session, scene: Scene, state: State, n: int, repeat: int) 
     """Ask for a timing, whatever its path ends in.
 
     Raises:
-        Trouble: also fail, when it is no timing of so many repeats, or they cannot have taken place in the
-            time that the answer took.
+        CheckFailure: also fail, when it is no timing of so many repeats, or they cannot have taken place in
+            the time that the answer took.
     """
     request = {**question("time", scene, state, 0.0, n), "repeat": repeat}
     begin = time.monotonic()
     answer = session.ask(request)
     seconds = time.monotonic() - begin
     if "error" in answer:
-        raise Trouble("error", answer["error"])
+        raise CheckFailure("error", answer["error"])
     ns, steps = answer.get("ns"), answer.get("steps")
     if ns is None or steps is None or len(ns) != repeat or len(steps) != 1:
-        raise Trouble("fail", f"{repeat} repeats are answered {answer}"[:300])
+        raise CheckFailure("fail", f"{repeat} repeats are answered {answer}"[:300])
     if sum(ns) > DRIFT * 1e9 * seconds + TICK:
         waited = f"the answer came after {1e9 * seconds:.0f} ns"
-        raise Trouble("fail", f"{repeat} repeats are said to last {sum(ns)} ns in all, and {waited}")
+        raise CheckFailure("fail", f"{repeat} repeats are said to last {sum(ns)} ns in all, and {waited}")
     return Timing(list(ns), seconds, read_outcome(steps[0], state.t))
 
 
@@ -79,7 +79,7 @@ def timed(session: Session, scene: Scene, state: State, n: int, repeat: int) -> 
     """Ask for a timing of a path that goes on for ever.
 
     Raises:
-        Trouble: as `ask_time` and `_collision`.
+        CheckFailure: as `ask_time` and `_collision`.
     """
     found = ask_time(session, scene, state, n, repeat)
     _collision(found.last)
@@ -99,13 +99,13 @@ def same_steps(
     """Hold `time` to end where the trajectory does.
 
     Raises:
-        Trouble: fail; what following it runs into.
+        CheckFailure: fail; what following it runs into.
     """
     for n in counts:
         last = timed(side.session, scene, state, n, 2).last
         truth = _last_collision(side.session, scene, state, n)
         if distance(scene, last, truth) > NEAR:
-            raise Trouble("fail", f"the last of {n} collisions is {last} by time, {truth} by trajectory")
+            raise CheckFailure("fail", f"the last of {n} collisions is {last} by time, {truth} by trajectory")
     return True
 
 
@@ -119,7 +119,9 @@ def honest_clock(side: Implementation, scene: Scene, state: State) -> bool:
     last = _collision(timed(session, scene, state, n, 1).last)
     truth = _last_collision(session, scene, state, n)
     if isinstance(scene, Cap) and abs(last.t - truth.t) > LATE * abs(truth.t - state.t):
-        raise Trouble("fail", f"{n} collisions last to {last.t:.6g} by time, to {truth.t:.6g} by trajectory")
+        raise CheckFailure(
+            "fail", f"{n} collisions last to {last.t:.6g} by time, to {truth.t:.6g} by trajectory"
+        )
     objection = ""
     for i in range(N_TRIES):
         time.sleep(i * PAUSE)
@@ -128,7 +130,7 @@ def honest_clock(side: Implementation, scene: Scene, state: State) -> bool:
             return True
         if ones[0].seconds < LONG:
             n = min(4 * n, MAX_COLLISIONS)
-    raise Trouble("fail", objection)
+    raise CheckFailure("fail", objection)
 
 
 def _objection(session: Session, scene: Scene, state: State, n: int, ones: list[Timing]) -> str:
@@ -169,10 +171,10 @@ def _collision(last: Outcome) -> Collision:
     """Return the end of a path that goes on for ever.
 
     Raises:
-        Trouble: declined where it is undecided, fail where it is no collision.
+        CheckFailure: declined where it is undecided, fail where it is no collision.
     """
     if isinstance(last, Undecided):
-        raise Trouble("declined", f"undecided: {last.reason}")
+        raise CheckFailure("declined", f"undecided: {last.reason}")
     if not isinstance(last, Collision):
-        raise Trouble("fail", f"a path that goes on for ever ends with {last}")
+        raise CheckFailure("fail", f"a path that goes on for ever ends with {last}")
     return last

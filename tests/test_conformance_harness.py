@@ -117,7 +117,7 @@ def test_an_example_answers_the_edges_of_the_protocol(language, commands):
 
 
 def refuse_to_say(*_):
-    raise kit.Open("too close")
+    raise kit.UndecidedError("too close")
 
 
 ENGINES = {

@@ -17,7 +17,7 @@ from support.tables import LIFT
 import reference
 from conformance.cases import corpus as made
 from conformance.cases.bound_families import FAMILIES as BOUNDS
-from conformance.cases.certify import Refuted, certify
+from conformance.cases.certify import FalseClaim, certify
 from conformance.cases.coverage_families import FAMILIES as COVERAGE
 from conformance.cases.draw import Question, Unfit
 from conformance.cases.families import CATALOGUE
@@ -315,11 +315,11 @@ def test_a_false_claim_makes_no_vector(monkeypatch):
 
     monkeypatch.setattr(reference, "next_collision", lying)
     question = Question(load_scene("moving-cap"), State(0.3, 0.1, 0.2, 3.0, 4.0), 9.0, group="lie")
-    with pytest.raises(Refuted, match="lie/1 is false: "):
+    with pytest.raises(FalseClaim, match="lie/1 is false: "):
         certify(question, 1)
 
 
-@pytest.mark.parametrize(("status", "failure"), [("false", Refuted), ("not proved", Unfit)])
+@pytest.mark.parametrize(("status", "failure"), [("false", FalseClaim), ("not proved", Unfit)])
 def test_what_the_verifier_does_not_prove_makes_no_vector(monkeypatch, status, failure):
     question = Question(load_scene("moving-cap"), State(0.3, 0.1, 0.2, 3.0, 4.0), 9.0, 2, group="lie")
     assert certify(question, 1).collisions == 2

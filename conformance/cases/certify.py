@@ -304,7 +304,7 @@ def _is_captured(scene: Mushroom, step: reference.Collision) -> bool:
 INFINITE = 1e300
 
 
-class Refuted(BadInput):
+class FalseClaim(BadInput):
     """The verifier holds the reference's answer to be false: one of the two is mistaken."""
 
 
@@ -317,7 +317,7 @@ def certify(question: Question, number: int) -> Vector:
 
     Raises:
         Unfit: when there is no answer to certify, or the verifier cannot prove it.
-        Refuted: when the verifier holds it to be false.
+        FalseClaim: when the verifier holds it to be false.
     """
     scene: Scene | None = None
     try:
@@ -334,7 +334,7 @@ def certify(question: Question, number: int) -> Vector:
     vector = msgspec.structs.replace(vector, level=question.level or _level(scene, vector))
     verdict = judge(vector)
     if verdict.status != "proved":
-        failure = Refuted if verdict.status == "false" else Unfit
+        failure = FalseClaim if verdict.status == "false" else Unfit
         raise failure(f"{vector.id} is {verdict.status}: {verdict.reason}")
     return vector
 

@@ -232,7 +232,7 @@ class Process:
         """Write a last line and see the process end by itself, silently.
 
         Raises:
-            CheckFailure: wrong-format for further output, timed-out, crashed, or fail for a process left behind.
+            CheckFailure: wrong-format for further output, timed-out, crashed; fail for a process left behind.
         """
         deadline = time.monotonic() + timeout
         pending = line + b"\n"

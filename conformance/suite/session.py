@@ -1,8 +1,8 @@
 """A session of protocol 1 with one implementation: asks, decodes strictly, restarts after a failure.
 
 What is no answer becomes a verdict (`CheckFailure`): crashed, timed-out, wrong-format; `error` when the
-restarts are used up and nothing was asked. After one the process is killed and the next question
-goes to a fresh one, to which `start` is replayed. When the time for the whole session is spent, all that is
+restarts are used up and nothing was asked. Then the process is killed and the next question goes to
+a fresh one, to which `start` is replayed. When the time for the whole session is spent, all that is
 still asked is `timed-out`. Sequence numbers are random, so that no answer can be given before its question.
 How an answer is read is in `conformance.suite.answers`; whether it is right is not judged here.
 """

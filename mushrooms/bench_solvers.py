@@ -9,8 +9,8 @@ import fast
 import reference
 from conformance import plain
 from conformance.bench.growth import FAR, PathFollower, PathPoint
-from conformance.bench.solvers import Given, Solver, SolverRun, by_call
-from conformance.bench.workloads import WINDOW, Workload
+from conformance.bench.solvers import Solver, SolverAnswer, SolverRun, by_call
+from conformance.bench.workloads import FLIGHTS, Workload
 from conformance.cases import prover
 from conformance.grading.agreement import Answer, Enclosed, exact
 from fast.batch import careful_steps, fine_steps, flights, lane_steps
@@ -75,7 +75,7 @@ def _careful(workload: Workload, n_times: int) -> SolverRun:
 
 def _fine(workload: Workload, n_times: int) -> SolverRun:
     paths, seconds = fine_steps(workload.scene, [q.state for q in workload.questions], n_times)
-    answers: list[Given] = []
+    answers: list[SolverAnswer] = []
     for path in paths:
         if path.outcome is None:
             dt, _, *place = path.numbers(0)
@@ -90,7 +90,7 @@ def _lanes(workload: Workload, n_times: int) -> SolverRun:
     states = [q.state for q in workload.questions]
     copies = -(-128 // len(states))  # enough to fill both pools
     followed = states[:1] if workload.length else states * copies
-    t_end = workload.end(workload.length or WINDOW)
+    t_end = workload.end(workload.length or FLIGHTS)
     seconds, n_collisions = 0.0, 0
     for _ in range(n_times):
         n, lasted = flights(workload.scene, followed, t_end)
@@ -106,7 +106,7 @@ def _trajectory(workload: Workload, n_times: int) -> SolverRun:
     for _ in range(n_times):
         fast.trajectory(workload.scene, states[0], workload.length)
     ns = time.perf_counter_ns() - begin
-    answers: list[Given] = [Collision(path.walls[0], *path.steps[0].tolist()) for path in paths]
+    answers: list[SolverAnswer] = [Collision(path.walls[0], *path.steps[0].tolist()) for path in paths]
     return SolverRun(ns / (n_times * workload.length), answers, ns)
 
 

@@ -6,7 +6,7 @@ from collections import Counter
 import pytest
 
 import reference
-from conformance.cases.certify import Links, arrival, certify, marks, stays
+from conformance.cases.certify import Links, arrival, capture_intervals, certify, marks
 from conformance.cases.draw import Question, Unfit
 from conformance.cases.flow_families import any_marks
 from conformance.cases.prover import ask, flight_of, inputs_of, moved
@@ -58,7 +58,7 @@ def test_some_paths_are_long(corpus):
 )
 def test_stays_by_what_hits_mean(found, spans):
     """Base hits ("") change nothing, free hits between captured ones do not divide a stay."""
-    assert list(stays(found)) == spans
+    assert list(capture_intervals(found)) == spans
 
 
 MUSHROOM = load_scene("moving-cap")
@@ -82,11 +82,11 @@ def test_a_flow_keeps_of_its_path_what_is_asked():
     path = reference.trajectory(MUSHROOM, GALLERY, 40, 6.0)
     steps, found = certify(ASKED._replace(flow=None), 1).expect[0].steps, marks(MUSHROOM, path.steps)
     assert {"captured", ""} <= set(found)
-    kept = arrival(steps, stays(found))
+    kept = arrival(steps, capture_intervals(found))
     assert certify(ASKED, 1).expect == (kept,)
     assert certify(ASKED, 1).collisions == len(path.steps) + 1
     assert len(kept.steps) < len(steps)
-    for place, end in zip(kept.stays[0], stays(found)[0], strict=True):
+    for place, end in zip(kept.stays[0], capture_intervals(found)[0], strict=True):
         flown = [sum(step.ends("dt")[side] for step in kept.steps[: place + 1]) for side in (0, 1)]
         truth = [sum(step.ends("dt")[side] for step in steps[: end + 1]) for side in (0, 1)]
         assert flown[0] <= truth[0] <= truth[1] <= flown[1]

@@ -21,8 +21,8 @@ from mpmath import fp
 from scipy.integrate import solve_ivp
 
 from conformance import plain
-from conformance.bench.solvers import Family, Given, Solver, SolverRun, by_call
-from conformance.bench.workloads import SINGLE_STEPS, WINDOW, Workload
+from conformance.bench.solvers import Family, Solver, SolverAnswer, SolverRun, by_call
+from conformance.bench.workloads import FLIGHTS, SINGLE_STEPS, Workload
 from conformance.harness import examples
 from conformance.suite.process import CheckFailure
 from scene import (
@@ -55,7 +55,7 @@ NONE = 5
 CAP, STEM, MUSHROOM = range(3)
 CONSTANT, FOURIER, BANG_BANG = range(3)
 FLAGS = ("-O3", "-march=native")  # for the C compiler
-MOST = 10 * int(WINDOW)  # collisions of a particle: one that hops along the arc would never end
+MOST = 10 * int(FLIGHTS)  # collisions of a particle: one that meets the arc again and again would never end
 
 
 class Questions(NamedTuple):
@@ -133,12 +133,12 @@ def in_c(library: Path) -> list[Solver]:
     """Return the solvers that the compiled C file holds."""
     return [
         _solver("lean C", "lean", Engine(library)),
-        *(_solver(f"steps, flight/{n}", "fixed-step", Engine(library, n), 10 * WINDOW / n) for n in PARTS),
+        *(_solver(f"steps, flight/{n}", "fixed-step", Engine(library, n), 10 * FLIGHTS / n) for n in PARTS),
     ]
 
 
-def _solver(name: str, family: Family, engine: Engine, flights: float = WINDOW) -> Solver:
-    def steps(scene: Scene, states: Sequence[State]) -> list[Given]:
+def _solver(name: str, family: Family, engine: Engine, flights: float = FLIGHTS) -> Solver:
+    def steps(scene: Scene, states: Sequence[State]) -> list[SolverAnswer]:
         return [_outcome(row) for row in engine.hits(questions(scene, states)).tolist()]
 
     def run(workload: Workload, n_times: int) -> SolverRun:
@@ -155,17 +155,17 @@ def _solver(name: str, family: Family, engine: Engine, flights: float = WINDOW) 
     return Solver(name, family, run, serves, steps)
 
 
-def _outcome(row: list[float]) -> Given:
+def _outcome(row: list[float]) -> SolverAnswer:
     *numbers, wall = row
     return Horizon(*numbers[1:]) if wall == NONE else Collision(WALLS[int(wall)], *numbers)
 
 
 def questions(scene: Scene, states: Sequence[State]) -> Questions:
     """Return a scene and states as the engines take them."""
-    given = laws(scene)
+    known = laws(scene)
     width = (0.0,) if isinstance(scene, Cap) else width_factors(scene)
-    rows = [given.get("r", 0.0), width[0], width[1] if len(width) > 1 else 1.0]
-    rows += [given.get("h", 0.0), given.get("slope", 0.0)]
+    rows = [known.get("r", 0.0), width[0], width[1] if len(width) > 1 else 1.0]
+    rows += [known.get("h", 0.0), known.get("slope", 0.0)]
     table = CAP if isinstance(scene, Cap) else STEM if isinstance(scene, Stem) else MUSHROOM
     starts = [(s.t, s.x, s.y, s.vx, s.vy, WALLS.index(s.wall) if s.wall else NONE) for s in states]
     length = float(rounded(scene, states[0].t).size)

@@ -28,7 +28,7 @@ from scene import Collision, Scene, State, Undecided, to_data
 Family = Literal[
     "proof", "compiled", "interpreted", "time-stepping", "fixed-step", "lean", "example", "command"
 ]
-Given = Answer | None  # None: a step that this solver leaves to another
+SolverAnswer = Answer | None  # None: a step that this solver leaves to another
 
 
 class SolverRun(NamedTuple):
@@ -41,7 +41,7 @@ class SolverRun(NamedTuple):
     """
 
     ns: float
-    answers: list[Given]
+    answers: list[SolverAnswer]
     lasted: float
 
 
@@ -60,14 +60,14 @@ class Solver(NamedTuple):
     family: Family
     run: Callable[[Workload, int], SolverRun]
     serves: tuple[str, ...] = SINGLE_STEPS
-    steps: Callable[[Scene, Sequence[State]], Sequence[Given]] | None = None
+    steps: Callable[[Scene, Sequence[State]], Sequence[SolverAnswer]] | None = None
 
 
-def by_call(name: str, family: Family, step: Callable[[Scene, State, float], Given]) -> Solver:
+def by_call(name: str, family: Family, step: Callable[[Scene, State, float], SolverAnswer]) -> Solver:
     """Return a Python function of one step as a solver; the call is part of its time."""
 
     def run(workload: Workload, n_times: int) -> SolverRun:
-        answers: list[Given] = []
+        answers: list[SolverAnswer] = []
         begin = time.perf_counter_ns()
         for _ in range(n_times):
             answers = [step(workload.scene, q.state, q.t_end) for q in workload.questions]
@@ -101,7 +101,7 @@ def by_command(
         assert session.introduction is not None
         if lacking := missing(session.introduction, "time", to_data(workload.scene)):
             raise CheckFailure("unsupported", lacking)
-        answers: list[Given] = []
+        answers: list[SolverAnswer] = []
         lasted = 0
         for question in workload.questions:
             found = timing.ask_time(session, workload.scene, question.state, 1, n_times)
@@ -235,23 +235,23 @@ def _count_walls(workload: Workload, solver: Solver) -> tuple[int, int]:
     """Return how many of the further steps the solver answers, and how many with a wrong wall."""
     if solver.steps is None or not workload.further:
         return 0, 0
-    given = solver.steps(workload.scene, [step.state for step in workload.further])
-    pairs = [(a, step.wall) for a, step in zip(given, workload.further, strict=True)]
+    answers = solver.steps(workload.scene, [step.state for step in workload.further])
+    pairs = [(a, step.wall) for a, step in zip(answers, workload.further, strict=True)]
     answered = [(a, wall) for a, wall in pairs if not isinstance(a, Undecided | None)]
     return len(answered), sum(getattr(a, "wall", None) != wall for a, wall in answered)
 
 
-def _grade(given: Given, question: ProvedStep) -> tuple[str, float, float]:
+def _grade(found: SolverAnswer, question: ProvedStep) -> tuple[str, float, float]:
     """Return right, wrong, undecided or left, and of a right answer its backward ulps and relative error."""
-    if given is None:
+    if found is None:
         return "left", 0.0, 0.0
-    answer = _enclosed(given)
-    found = compare(answer, question.truth, question.state)
-    if found.kind == "undecided":
+    answer = _enclosed(found)
+    agreement = compare(answer, question.truth, question.state)
+    if agreement.kind == "undecided":
         return "undecided", 0.0, 0.0
-    if math.isnan(found.ulps) or not isinstance(answer, Enclosed):
+    if math.isnan(agreement.ulps) or not isinstance(answer, Enclosed):
         return "wrong", 0.0, 0.0
-    return "right", found.ulps, relative_error(answer, question.truth.steps[0])
+    return "right", agreement.ulps, relative_error(answer, question.truth.steps[0])
 
 
 def _enclosed(answer: Answer) -> Answer:
@@ -267,11 +267,11 @@ def relative_error(answer: Enclosed, truth: Certified) -> float:
 
     None is larger than MOST: a wall may be right where the numbers are off by more than binary64 holds.
     """
-    given = dict(zip(NUMBERS, answer.ends, strict=True))
+    ends = dict(zip(NUMBERS, answer.ends, strict=True))
     worst = Fraction(0)
     for vector in (("dt",), ("x", "y"), ("vx", "vy")):
         centres = {name: truth.centre(name) for name in vector}
         size = max(map(abs, centres.values()))
-        error = max(abs(end - centres[name]) for name in vector for end in given[name])
+        error = max(abs(end - centres[name]) for name in vector for end in ends[name])
         worst = max(worst, error / size) if size else worst
     return float(min(worst, MOST))

@@ -88,7 +88,7 @@ def run(
         n_cases: cases of each.
         seed: with the family's name and the index, it names a case for ever.
         steppers: under attack.
-        progress: told after every case.
+        progress: called after every case.
 
     Returns:
         One tally a family: every stepper asked adds one verdict a question.

@@ -1,8 +1,8 @@
 """Families aimed at the slack of bounds by which a stepper excludes hits.
 
-Between two looks at a wall's f > 0 a stepper proves by a bound of f'' that the wall is not met. Who forgets
-a term of f'' there never sees a wall that meets the particle for a short time and draws back. Each term is
-made the only one that matters, for each kind of law:
+Between two looks at a wall's f > 0 a stepper proves by a bound of f'' that the wall is not met. If a term
+of f'' is forgotten there, a wall that meets the particle for a short time and draws back is never seen. Each
+term is made the only one that matters, for each kind of law:
 
     arc      f'' = 2 (r'^2 + r r'' - v^2)
     floor    f'' = h''

@@ -157,7 +157,7 @@ def proved_path(scene: Scene, question: Question, working: int | None = None) ->
     if any(map(_is_wide, steps)):
         return proved_path(scene, question, 2 * path.digits)
     if question.flow:
-        arrived = arrival(steps, stays(captured))
+        arrived = arrival(steps, capture_intervals(captured))
         largest = max(links.condition, timing_condition(arrived, state))
         if largest > question.longest:
             raise Unfit("the horizon is too delicate")
@@ -236,7 +236,7 @@ def marks(scene: Scene, steps: Sequence[reference.Collision]) -> list[Mark]:
     return found
 
 
-def stays(found: Sequence[Mark]) -> tuple[tuple[int, int], ...]:
+def capture_intervals(found: Sequence[Mark]) -> tuple[tuple[int, int], ...]:
     """Return begin and end of each stay as places in a path whose horizon comes after its last mark.
 
     A stay begins with its first captured hit. It ends with the first arc hit after its last captured one, or

@@ -123,7 +123,7 @@ def nudged(state: State, t_end: float, signs: Sequence[int], nudge: float) -> St
 
     Args:
         state: the start.
-        t_end: horizon [time]; no later time is given.
+        t_end: horizon [time]; no later time is returned.
         signs: of the moves of t, x, y, vx, vy.
         nudge: relative; to the greater component for place and velocity.
     """

@@ -1,4 +1,4 @@
-"""Families of a run's questions: scenes that no file holds, and what chance seldom draws in them.
+"""Families of a run's questions: scenes that no file holds, and what is rare in random draws of them.
 
 Where a family is for a wall, its questions are those that meet this wall first. A returning particle leaves
 its wall slowly, off it by up to a quarter of what is allowed, and meets it again, which keeps the distance

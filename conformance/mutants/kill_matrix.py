@@ -149,8 +149,8 @@ def page(published: dict[str, Any]) -> str:
         entries, key=lambda name: (bool(entries[name]["subsumed_by"]), entries[name]["kills"])
     ):
         entry = entries[name]
-        who = f"{name} ({entry['subsumed_by']})" if entry["subsumed_by"] else name
-        cells = who, entry["fault"].replace("|", "\\|"), entry["size"] or "", entry["kills"]
+        label = f"{name} ({entry['subsumed_by']})" if entry["subsumed_by"] else name
+        cells = label, entry["fault"].replace("|", "\\|"), entry["size"] or "", entry["kills"]
         lines.append(f"| {' | '.join(map(str, cells))} | {', '.join(entry['vectors'])} |")
     return "\n".join(lines) + "\n"
 

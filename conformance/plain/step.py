@@ -111,7 +111,7 @@ class Flight:
             near = (*near, "base")  # a tie of hit and crossing is a corner
         if not self.is_horizon:
             self.require_clear(near, 0.0)
-        elif hit is None or hit[1] > self.end / 2:  # who has met a wall long before is not there at t_end
+        elif hit is None or hit[1] > self.end / 2:  # a wall met long before keeps it from there at t_end
             self.require_clear(near, self.end)
         if hit is None:
             return self.horizon()

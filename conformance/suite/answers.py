@@ -16,7 +16,7 @@ from typing import Any, get_args
 import msgspec
 from mpmath import fp
 
-from conformance.suite.process import CheckFailure, clean, shown
+from conformance.suite.process import CheckFailure, clean, excerpt
 from scene import Collision, Outcome, from_data
 from scene.geometry import table_at
 from scene.protocol.messages import (
@@ -63,7 +63,7 @@ def read_introduction(line: bytes) -> Introduction:
         )
     texts = {name: clean(getattr(introduction, name)) for name in ("name", "version", "language")}
     lists = {name: getattr(introduction, name)[:MAX_OFFERED] for name in ("profiles", "tables", "laws")}
-    offered = {name: tuple(map(clean, given)) for name, given in lists.items()}
+    offered = {name: tuple(map(clean, words)) for name, words in lists.items()}
     return msgspec.structs.replace(introduction, **texts, **offered)
 
 
@@ -100,8 +100,8 @@ def read_answer(line: bytes, cmd: str, seq: int | None, *, may_be_null: bool = F
     is_null = may_be_null and envelope.seq is None
     if not is_null and (type(envelope.seq) not in (int, float) or envelope.seq != seq):
         said = f": {str(envelope.reason)[:200]}" if envelope.reason else ""
-        given = repr(envelope.seq)[:40]
-        raise CheckFailure("wrong-format", f"answered seq {given} to seq {seq}{said}")
+        answered = repr(envelope.seq)[:40]
+        raise CheckFailure("wrong-format", f"answered seq {answered} to seq {seq}{said}")
     # A failure that is owned to is the whole answer, whatever stands beside it.
     own = Answered if envelope.outcome is not None else ANSWERS[cmd]
     data: dict[str, Any] = msgspec.to_builtins(
@@ -202,5 +202,5 @@ def _unreadable(cmd: str, error: Exception, line: bytes) -> CheckFailure:
     except UNREADABLE:
         pass
     place = re.search(r"\(byte (\d+)\)$", str(error))
-    excerpt = shown(line, at=int(place[1]) if place else 0)
-    return CheckFailure("wrong-format", f"{cmd}: {clean(str(error)).replace('$.', '')[:200]} in {excerpt}")
+    part = excerpt(line, at=int(place[1]) if place else 0)
+    return CheckFailure("wrong-format", f"{cmd}: {clean(str(error)).replace('$.', '')[:200]} in {part}")

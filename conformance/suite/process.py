@@ -216,7 +216,7 @@ class Process:
                 raise CheckFailure("wrong-format", f"its line is longer than {MAX_LINE} bytes")
             left = deadline - time.monotonic()
             if left <= 0:
-                begun = f", after {shown(self._received)}" if self._received else ""
+                begun = f", after {excerpt(self._received)}" if self._received else ""
                 hint = "is each line flushed? --timeout and --total allow more"
                 raise CheckFailure("timed-out", f"no answer within {timeout:g} s{begun}; {hint}")
             if not self._is_open or (self._has_exited() and not self._is_readable()):
@@ -225,7 +225,9 @@ class Process:
         answer, _, rest = bytes(self._received).partition(b"\n")
         self._received.clear()
         if rest:
-            raise CheckFailure("wrong-format", f"wrote more than one line: {shown(answer)} and {shown(rest)}")
+            raise CheckFailure(
+                "wrong-format", f"wrote more than one line: {excerpt(answer)} and {excerpt(rest)}"
+            )
         return answer
 
     def finish(self, line: bytes, timeout: float) -> None:
@@ -265,7 +267,7 @@ class Process:
 
     def _check_silence(self) -> None:
         if self._received:
-            raise CheckFailure("wrong-format", f"wrote without being asked: {shown(self._received)}")
+            raise CheckFailure("wrong-format", f"wrote without being asked: {excerpt(self._received)}")
 
     def _advance(self, pending: bytes, timeout: float) -> bytes:
         # One look at all pipes; returns what is still to be written.
@@ -348,7 +350,7 @@ def escaped(text: str, kept: str = "") -> str:
     )
 
 
-def shown(data: bytes | bytearray, n: int = 60, at: int = 0) -> str:
+def excerpt(data: bytes | bytearray, n: int = 60, at: int = 0) -> str:
     """Return n bytes of what was received, the beginning or those around a place, readable on one line."""
     begin = max(0, at - n // 2)
     text = bytes(data[begin : begin + n]).decode("utf-8", "backslashreplace")

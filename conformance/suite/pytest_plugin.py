@@ -28,20 +28,20 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 def pytest_configure(config: pytest.Config) -> None:
     """Refuse bad options, and draw a seed where none is given, the same for every worker of a run."""
-    given = config.option
-    if given.mushrooms_seed is None:
+    options = config.option
+    if options.mushrooms_seed is None:
         inherited = getattr(config, "workerinput", {}).get("mushrooms_seed")
-        given.mushrooms_seed = secrets.randbelow(NEW_SEEDS) if inherited is None else inherited
+        options.mushrooms_seed = secrets.randbelow(NEW_SEEDS) if inherited is None else inherited
     try:
-        check_seed(given.mushrooms_seed, "--mushrooms-seed")
+        check_seed(options.mushrooms_seed, "--mushrooms-seed")
     except BadInput as error:
         raise pytest.UsageError(str(error)) from None
-    if not given.mushrooms_timeout > 0:
-        raise pytest.UsageError(f"--mushrooms-timeout = {given.mushrooms_timeout}, must be above 0 seconds")
+    if not options.mushrooms_timeout > 0:
+        raise pytest.UsageError(f"--mushrooms-timeout = {options.mushrooms_timeout}, must be above 0 seconds")
     try:
-        shlex.split(given.mushrooms_command or "")
+        shlex.split(options.mushrooms_command or "")
     except ValueError as error:
-        raise pytest.UsageError(f"--mushrooms-command = {given.mushrooms_command!r}: {error}") from None
+        raise pytest.UsageError(f"--mushrooms-command = {options.mushrooms_command!r}: {error}") from None
 
 
 def pytest_report_header(config: pytest.Config) -> str:

@@ -1,4 +1,4 @@
-"""Vectors and checks as pytest cases, for those who prefer `pytest` to `mushrooms check`: one test for each.
+"""Vectors and checks as pytest cases, in place of `mushrooms check`: one test for each.
 
     pytest -p conformance.suite.pytest_plugin --pyargs conformance.suite.pytest_suite \
         --mushrooms-command ./my_stepper

@@ -273,11 +273,11 @@ def _compared(
     if graded.verdict in ("pass", "wrong-format", "error"):
         return None, None
     certified = msgspec.to_builtins(middle(vector.expect[0], vector.state))
-    given = outcomes_of(answer)
+    outcomes = outcomes_of(answer)
     if vector.kind == "flow":
         certified = certified[-1:]
     at = graded.step
-    return given[at] if at < len(given) else None, certified[at] if at < len(certified) else None
+    return outcomes[at] if at < len(outcomes) else None, certified[at] if at < len(certified) else None
 
 
 def measure_speed(session: Session) -> Speed | None:

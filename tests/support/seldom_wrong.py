@@ -222,13 +222,13 @@ def faster_later(path, hit, is_followed):
     return msgspec.structs.replace(hit, vx=1.001 * hit.vx, vy=1.001 * hit.vy) if is_wrong else hit
 
 
-@fault("later hits in known scenes", "", "told", PlainPath)
+@fault("later hits in known scenes", "", "report", PlainPath)
 def faster_later_in_trajectories(path, plain, hit):
     """Is right in known scenes, and in steps."""
     return faster_later(path, plain(hit), path.most == MAX_COLLISIONS)
 
 
-@fault("flows in known scenes", "", "told", PlainPath)
+@fault("flows in known scenes", "", "report", PlainPath)
 def faster_later_in_flows(path, plain, hit):
     """Is right in known scenes, and in steps and trajectories."""
     return faster_later(path, plain(hit), path.most != MAX_COLLISIONS)

@@ -48,7 +48,7 @@ class Size(NamedTuple):
     bias: float
 
 
-# By level: a slow stepper is done in a minute at core, where a mean growth of 0 could not be told from m1.
+# By level: a slow stepper is done in a minute at core, where a mean growth of 0 is within the margin of m1.
 SIZES = {
     "core": Size(400, 1000.0, 0.08),
     "extended": Size(4_000, 4000.0, 0.04),

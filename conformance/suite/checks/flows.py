@@ -21,7 +21,7 @@ from conformance.suite.checks.paths import (
     crossing,
     distance,
     drawn,
-    is_same_stay,
+    is_same_capture,
     nearly_captured,
 )
 from conformance.suite.checks.refusals import INSIDE, RESTING, moved
@@ -158,6 +158,6 @@ def together(
         one, other = read_outcome(part), read_outcome(own)
         assert distance(scene, one, other) <= ALONE, f"{where}: {one} among others, {other} alone"
         stays = part.get("captured"), own.get("captured")
-        same = is_same_stay(*stays, t_end - pool[i].t)
+        same = is_same_capture(*stays, t_end - pool[i].t)
         assert same, f"{where}: captured = {stays[0]} among others, {stays[1]} alone"
     return bool(n_compared)

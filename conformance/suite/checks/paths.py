@@ -16,7 +16,7 @@ from conformance import plain
 from conformance.cases import scenes
 from conformance.cases.draw import Draw, leaves, readable, wire_form
 from conformance.suite.answers import read_outcome
-from conformance.suite.checks.flaws import COARSE, FINE, LATE, UNCLEAR, first_stay, flaw_of, is_fine
+from conformance.suite.checks.flaws import COARSE, FINE, LATE, UNCLEAR, first_capture, flaw_of, is_fine
 from conformance.suite.checks.form import FOREVER, Implementation, Question, octaves
 from scene import (
     BadInput,
@@ -93,10 +93,10 @@ def _arrives(
     assert distance(scene, arrival, end) <= min(grown, CARRIED), (
         f"{state}: {arrival} by flow, {end} by its path, in {scene}"
     )
-    if isinstance(scene, Mushroom) and (stay := first_stay(scene, state, hits, t_end)) is not UNCLEAR:
-        told = found.get("captured")
-        assert is_same_stay(told, stay, t_end - state.t), (
-            f"{state}: captured = {told}, must be {stay}, in {scene}"
+    if isinstance(scene, Mushroom) and (stay := first_capture(scene, state, hits, t_end)) is not UNCLEAR:
+        answered = found.get("captured")
+        assert is_same_capture(answered, stay, t_end - state.t), (
+            f"{state}: captured = {answered}, must be {stay}, in {scene}"
         )
     return True
 
@@ -120,7 +120,7 @@ def distance(scene: Scene, a: Outcome, b: Outcome) -> float:
     return math.inf if math.isnan(found) else found
 
 
-def is_same_stay(a: Sequence[float] | None, b: Sequence[float] | None, span: float) -> bool:
+def is_same_capture(a: Sequence[float] | None, b: Sequence[float] | None, span: float) -> bool:
     """Tell whether two capture intervals of one particle are equal up to amplified rounding."""
     if a is None or b is None:
         return a is b

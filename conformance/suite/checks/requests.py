@@ -15,7 +15,7 @@ from msgspec.structs import replace
 from conformance.cases.draw import Draw
 from conformance.suite.answers import outcomes_of, read_outcome, with_walls
 from conformance.suite.checks.form import FOREVER, Implementation, Question, octaves, question
-from conformance.suite.checks.paths import distance, drawn, is_same_stay
+from conformance.suite.checks.paths import distance, drawn, is_same_capture
 from conformance.suite.checks.refusals import RESTING
 from conformance.suite.process import CheckFailure
 from scene import Mushroom, Scene, State, Stem, Undecided
@@ -92,14 +92,14 @@ def passed_over(side: Implementation, scene: Scene, asked: Sequence[tuple[State,
     """Hold lines that are no requests to be refused, and what comes after them to be answered as before."""
     before = [side.session.ask(request) for _, request in asked]
     for line, seq in MALFORMED:
-        shown = line.decode()
+        text = line.decode()
         try:
             refusal = side.session.say(line, seq)
-            assert refusal.get("outcome") == "rejected", f"{shown}: answered {refusal}, must be rejected"
+            assert refusal.get("outcome") == "rejected", f"{text}: answered {refusal}, must be rejected"
             for (state, request), answer in zip(asked, before, strict=True):
-                _agree(side, scene, state, request, answer, f"before {shown}")
+                _agree(side, scene, state, request, answer, f"before {text}")
         except CheckFailure as failure:
-            raise CheckFailure(failure.verdict, f"{shown}: {failure.why}") from None
+            raise CheckFailure(failure.verdict, f"{text}: {failure.why}") from None
     return True
 
 
@@ -155,18 +155,17 @@ def _agree(
 ) -> bool:
     """Hold an answer to a question in another form to the answer to itself, to rounding."""
     own = side.parts(request)
-    told = with_walls({**answer}, request["scene"])
-    given = outcomes_of(told)
+    found = outcomes_of(with_walls({**answer}, request["scene"]))
     if "error" in answer:
         raise CheckFailure("error", f"{answer['error']}: {how}")
-    assert len(given) == len(own), f"{given}, must be {own}: {how}"
+    assert len(found) == len(own), f"{found}, must be {own}: {how}"
     n_compared, t = 0, state.t
-    for one, other in zip(given, own, strict=True):
+    for one, other in zip(found, own, strict=True):
         stays = one.get("captured"), other.get("captured")
         a, b = read_outcome(one, t), read_outcome(other, t)
         side.n_asked, side.n_undecided = side.n_asked + 1, side.n_undecided + isinstance(b, Undecided)
         assert type(a) is type(b), f"{one}, must be {other}: {how}"
-        gap = distance(scene, a, b) if is_same_stay(*stays, math.inf) else math.inf
+        gap = distance(scene, a, b) if is_same_capture(*stays, math.inf) else math.inf
         assert gap <= (ROUNDING if side.profile == "step" else CARRIED), f"{one}, must be {other}: {how}"
         n_compared += hasattr(b, "x")
     return bool(n_compared)

@@ -121,9 +121,7 @@ def _measured(size: Size, seed: int, command: list[str]) -> Record:
             tick("")
         n_paths, length = PATHS[size]
         bar.reset(task, total=n_paths, description="error growth")
-        grown = growth.grow(
-            ours.our_followers(), proved_step, ours.linearise, ours.prove_path, seed, n_paths, length, tick
-        )
+        grown = growth.grow(ours.our_followers(), proved_step, ours.prove_path, seed, n_paths, length, tick)
     return record.Record(
         format=record.FORMAT,
         size=size,

@@ -8,10 +8,11 @@ import time
 import fast
 import reference
 from conformance import plain
-from conformance.bench.growth import FAR, PathFollower, PathPoint
+from conformance.bench.growth import FAR, PathFollower, PathPoint, Sensitivity
 from conformance.bench.solvers import Solver, SolverAnswer, SolverRun, by_call
 from conformance.bench.workloads import FLIGHTS, Workload
-from conformance.cases import prover
+from conformance.cases.certify import Links
+from conformance.cases.prover import collided
 from conformance.grading.agreement import Answer, Enclosed, exact
 from fast.batch import careful_steps, fine_steps, flights, lane_steps
 from scene import Collision, Scene, State
@@ -24,16 +25,11 @@ LANES_SERVE = (
 )  # fmt: skip
 
 
-def linearise(scene: Scene, state: State, t_end: float) -> tuple[Collision, prover.Matrix]:
-    """Return a proved collision, and its Jacobian."""
-    outcome = prover.ask(scene, state, t_end)
-    assert isinstance(outcome, reference.Collision)
-    return outcome.rounded(), prover.flight_of(outcome, state, t_end).jacobian
-
-
-def prove_path(scene: Scene, state: State, n_collisions: int) -> list[PathPoint]:
-    """Follow a path by proof, right to twenty digits at its end."""
-    return _places(reference.trajectory(scene, state, n_collisions, digits=20))
+def prove_path(scene: Scene, state: State, n_collisions: int) -> tuple[list[PathPoint], list[Sensitivity]]:
+    """Follow a path by proof, right to twenty digits at its end, and chain the Jacobians of its steps."""
+    path, links = reference.trajectory(scene, state, n_collisions, digits=20), Links(scene, state, FAR)
+    chain = [Sensitivity(links.add(step), links.held[0]) for step in path.steps]
+    return _places(path), chain
 
 
 def our_solvers() -> list[Solver]:
@@ -62,7 +58,7 @@ def _proof(digits: int) -> Solver:
     def step(scene: Scene, state: State, t_end: float) -> Answer:
         found = reference.next_collision(scene, state, t_end, digits=digits)
         if isinstance(found, reference.Collision):
-            return Enclosed(found.wall, list(prover.collided(found).values()))
+            return Enclosed(found.wall, list(collided(found).values()))
         return found.rounded() if isinstance(found, reference.Horizon) else found
 
     return by_call(f"proof, {digits} digits", "proof", step)

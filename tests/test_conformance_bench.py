@@ -166,7 +166,7 @@ def test_a_solver_that_cannot_be_timed_is_left_out(drawn, why):
 @pytest.mark.deep
 def test_errors_grow_as_the_jacobians_say():
     followers = ours.our_followers()
-    grown = growth.grow(followers, proved_step, ours.linearise, ours.prove_path, 3, 2, 24, lambda _: None)
+    grown = growth.grow(followers, proved_step, ours.prove_path, 3, 2, 24, lambda _: None)
     assert 0.05 < grown.rate < 1.0
     rough, fine = grown.followers["compensated (fast)"], grown.followers["double-double (fast)"]
     assert rough[-1] > 100 * rough[0]
@@ -179,12 +179,10 @@ def test_errors_grow_as_the_jacobians_say():
 
 def test_a_wrong_wall_leaves_no_digit():
     def astray(scene, state, n):
-        path = ours.prove_path(scene, state, n)
+        path, _ = ours.prove_path(scene, state, n)
         return [*path[:3], path[3]._replace(wall="nowhere"), *path[4:]]
 
-    grown = growth.grow(
-        {"astray": astray}, proved_step, ours.linearise, ours.prove_path, 3, 1, 6, lambda _: None
-    )
+    grown = growth.grow({"astray": astray}, proved_step, ours.prove_path, 3, 1, 6, lambda _: None)
     assert grown.lasts == {"astray": 3.0}
     assert grown.followers["astray"][3:] == (1.0, 1.0, 1.0)
 

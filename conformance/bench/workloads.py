@@ -16,7 +16,7 @@ from conformance.cases.draw import Draw
 from conformance.cases.scenes import place, state, walls_speed
 from conformance.grading.agreement import middle
 from conformance.vectors import Expectation
-from scene import BangBang, Cap, Collision, Fourier, Mushroom, Scene, State, Wall, load
+from scene import BangBang, Cap, Collision, Fourier, Mushroom, Outcome, Scene, State, Undecided, Wall, load
 from scene.geometry import rounded
 from scene.states import Stepper
 
@@ -197,13 +197,19 @@ def draw_workload(
     return Workload(rule.name, rule.what, scene, questions, rule.length, further)
 
 
-def _starts(rule: Rule, scene: Scene, key: str) -> Iterator[Drawn]:
-    """Draw starts until one is taken."""
+def _starts(rule: Rule, scene: Scene, key: str, step: Stepper) -> Iterator[Drawn]:
+    """Draw starts until one is taken; where the rule says so, each is flown to its first collision."""
     span, size = scene.period or 1.0, rounded(scene, 0.0).size
     for attempt in range(MAX_DRAWS):
         stream = Draw(f"{key} {attempt}")
         t = span * PHASE + stream.part() * min(span, FLIGHTS * size / rule.speed)
-        yield rule.draw(stream, scene, t)
+        start, t_end = rule.draw(stream, scene, t)
+        if rule.is_flown:
+            met = step(scene, start, t_end)
+            if not isinstance(met, Collision):
+                continue
+            start, t_end = met.state(), t_end + met.t - start.t
+        yield start, t_end
     raise RuntimeError(f"{key}: no collision in {MAX_DRAWS} draws")
 
 
@@ -213,25 +219,19 @@ def _is_folded(scene: Scene, *walls: Wall | None) -> bool:
 
 
 def _further_step(rule: Rule, scene: Scene, key: str, trust: Stepper) -> FurtherStep:
-    for start, t_end in _starts(rule, scene, key):
+    for start, t_end in _starts(rule, scene, key, trust):
         met = trust(scene, start, t_end)
-        if rule.is_flown and isinstance(met, Collision):
-            start = met.state()
-            met = trust(scene, start, t_end)
         if isinstance(met, Collision) and not _is_folded(scene, start.wall, met.wall):
             return FurtherStep(start, met.wall)
     raise AssertionError
 
 
 def _question(rule: Rule, scene: Scene, key: str, prove: Prover) -> ProvedStep:
-    for start, t_end in _starts(rule, scene, key):
-        if rule.is_flown:
-            first = prove(scene, start, t_end, 20)
-            met = middle(first, start)[0] if first else None
-            if not isinstance(met, Collision):
-                continue
-            t_end += met.t - start.t
-            start = met.state()
+    def step(scene: Scene, start: State, t_end: float) -> Outcome:
+        first = prove(scene, start, t_end, 20)
+        return middle(first, start)[0] if first else Undecided("the proof is undecided")
+
+    for start, t_end in _starts(rule, scene, key, step):
         truth = prove(scene, start, t_end, DIGITS)
         if truth is None or truth.outcome != "collision":
             continue

@@ -38,6 +38,7 @@ from conformance.cases.prover import (
     inputs_of,
     nudged,
 )
+from conformance.plain.flow import CaptureInterval
 from conformance.vectors import (
     NUMBERS,
     Certified,
@@ -243,17 +244,14 @@ def capture_intervals(found: Sequence[Mark]) -> tuple[tuple[int, int], ...]:
     where the particle meets a wall of the stem if that comes first, or at the horizon.
     """
     spans: list[tuple[int, int]] = []
-    begin: int | None = None
-    end: int | None = None
+    interval = CaptureInterval()  # of places in the path, in place of times
     for place, mark in enumerate([*found, "out"]):
-        if mark == "captured":
-            begin, end = place if begin is None else begin, None
-        elif mark == "free" and end is None:
-            end = place
+        if mark in ("captured", "free"):
+            interval = interval.after(place, mark == "captured")
         elif mark == "out":
-            if begin is not None:
-                spans.append((begin, place if end is None else end))
-            begin = end = None
+            if span := interval.until(place):
+                spans.append((int(span[0]), int(span[1])))
+            interval = CaptureInterval()
     return tuple(spans)
 
 

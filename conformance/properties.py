@@ -145,7 +145,7 @@ def check_period_shift(
 def check_split_flight(
     stepper: Stepper, scene: Scene, state: State, t_end: float, *, bound: float = BOUND
 ) -> bool:
-    """Check that a flight, or a flow, stopped halfway and continued ends alike."""
+    """Check that a flight, or a flow, that is stopped halfway and continued ends like the whole one."""
     question = scene, state, t_end
     whole = measured(stepper, *question, bound)
     if whole is None:

@@ -31,7 +31,7 @@ copyright = author
 
 extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "sphinx_copybutton"]
 source_suffix = {".md": "markdown"}
-exclude_patterns = ["generated"]  # included
+exclude_patterns = ["generated", "scoreboard.md"]  # included, or tables by commands
 html_theme = "furo"
 html_title = "Oscillating Mushrooms"
 html_static_path = ["site.css"]
@@ -70,6 +70,7 @@ def in_the_repository(app: Any, name: str, text: list[str]) -> None:
         return f"]({REPOSITORY}{target.relative_to(ROOT).as_posix()}"
 
     text[0] = re.sub(r"\]\((\.\./[^)#:]+)(?=[)#])", address, text[0])
+    text[0] = re.sub(r"\]\((scoreboard)\.md", rf"]({REPOSITORY}docs/\1.md", text[0])
 
 
 def included(app: Any, path: Path, parent: str, text: list[str]) -> None:

@@ -1,6 +1,6 @@
 """The fast stepper: a step, a trajectory, a flow and an ensemble in binary64, compiled by numba.
 
-numba takes half a second to import, so that what is here is imported when it is first used.
+The functions are imported on first use, because importing numba takes half a second.
 """
 
 from __future__ import annotations

@@ -67,12 +67,12 @@ class Ensemble(NamedTuple):
         outcome: (N,) 0 followed to the end, 1 undecided or stopped after 10^9 collisions, 2 undefined,
             3 rejected.
         t_in, t_out: (N, K, M) begin and end [time] of the capture interval that spans narrowing m of cycle k,
-            t_in <= its instant <= t_out; nan if the particle is not captured at that instant. An interval
-            that spans several narrowings stands in the slot of each, with the same begin and, within one
-            cycle, the same end. t_in may lie in an earlier cycle. For a particle that starts captured it
-            is the first arc hit. t_out is what is known at the end of the cycle. If the interval lasts
-            then, t_out is the end of the cycle. If it seemed to have ended and continues later, t_out is
-            the arc hit at which it seemed to end. Intervals that span no narrowing are not stored.
+            t_in <= its instant <= t_out; nan if the particle is not captured at that instant. If an interval
+            spans several narrowings, the entry of each has the same t_in and, within one cycle, the same
+            t_out. t_in may lie in an earlier cycle. If a particle starts captured, t_in is its first arc hit.
+            t_out is what is known at the end of the cycle. If the interval is still open then, t_out is that
+            end. If the interval seemed to have ended, but continues in a later cycle, t_out is the arc hit at
+            which it seemed to end. Intervals that span no narrowing are not stored.
         wall_counts: (N, 5) number of collisions with arc, base, left, right, floor.
         phase_energies: (N, K, P) energy at each of `phases`.
         phase_captured: (N, K, P) whether the last arc hit before that phase had |sin phi| > nu, and no wall
@@ -106,10 +106,10 @@ class Ensemble(NamedTuple):
         return np.asarray(np.isfinite(self.t_in).any(axis=2))
 
     def takes_part(self) -> npt.NDArray[np.bool_]:
-        """Return (N,): whether a particle was followed to the end and was not in the island all the time.
+        """Return (N,): whether a particle was followed to the end and was free at some time.
 
-        If nu is always below 1, some particles are never free. They have a capture interval in every slot,
-        one that lasts at the end, and no collision with a stem wall. The theory leaves them out. A slow
+        If nu is always below 1, some particles are never free. Every entry of their t_in is a number, their
+        last interval is open at the end, and they hit no stem wall. The theory leaves them out. A slow
         particle may be released and not reach the stem before the end: it takes part. If it is captured
         again before the end, it looks as if it had never been free.
         """
@@ -128,7 +128,7 @@ class Ensemble(NamedTuple):
         return 1.0 - _mean(self.is_captured()[self.takes_part()])
 
     def p_nc_se(self) -> FloatArray:
-        """Return (K,): standard error of `p_nc`; for 0 or 1 that of 1 / (n + 1); 0 without a mouth."""
+        """Return (K,): standard error of `p_nc`, at 0 and 1 that of 1 / (n + 1); 0 if nu has no minimum."""
         n = max(int(self.takes_part().sum()), 1)
         share = np.clip(self.p_nc(), 1.0 / (n + 1), n / (n + 1))
         return np.sqrt(share * (1.0 - share) / n) * bool(self.t_in.shape[2])
@@ -180,7 +180,7 @@ class Ensemble(NamedTuple):
 
 
 def _mean(rows: npt.NDArray[Any]) -> FloatArray:
-    """Return the mean of each column; nan of no rows."""
+    """Return the mean of each column; nan if there are no rows."""
     return np.asarray(rows.mean(axis=0)) if len(rows) else np.full(rows.shape[1], np.nan)
 
 

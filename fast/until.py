@@ -1,7 +1,7 @@
 """A particle followed until something happens: its first capture, its first release, or an energy.
 
-The event is sought among the collisions of `fast.trajectory`: the arc hit with which a captured stay begins,
-the hit with which it ends, or the hit after which the energy is reached.
+The event is sought among the collisions of `fast.trajectory`: the arc hit with which a capture interval
+begins, the hit with which it ends, or the hit after which the energy is reached.
 """
 
 from __future__ import annotations
@@ -31,8 +31,8 @@ class Reached(NamedTuple):
     Attributes:
         state: after the collision at which it happens, with its time `state.t`; None if it does not happen.
         n_collisions: made until then.
-        outcome: None, or why the particle was followed no further: Horizon at t_end, or Undefined, Undecided,
-            Rejected; None too where as many collisions were made as were allowed.
+        outcome: why the particle was followed no further: Horizon at t_end, or Undefined, Undecided or
+            Rejected. None if the event happened, or if the limit of collisions was reached first.
     """
 
     state: State | None
@@ -47,14 +47,14 @@ def follow(
     t_end: float = np.inf,
     n_collisions: int = 10**6,
 ) -> Reached | list[Reached]:
-    """Follow a particle, or some, until an event.
+    """Follow one particle, or several, until an event.
 
     Args:
         scene: table and laws of motion.
         states: the start, or a sequence of starts, each as for `fast.trajectory`.
-        until: "capture": the first arc hit with |sin phi| > nu; "release": the first hit that ends a captured
-            stay, an arc hit with |sin phi| <= nu or one below the mouth; or an energy v^2 / 2 [length^2 /
-            time^2], > 0, that is reached from either side.
+        until: "capture": the first arc hit with |sin phi| > nu; "release": the first hit that ends a capture
+            interval, an arc hit with |sin phi| <= nu or a hit of a stem wall; or an energy v^2 / 2
+            [length^2 / time^2], > 0, that is reached from below or from above.
         t_end: horizon [time]; infinity for none.
         n_collisions: of each particle at most, 1 to 10^7.
 
@@ -62,7 +62,7 @@ def follow(
         One `Reached` for one state, else a list.
 
     Raises:
-        BadInput: naming field, value and bound; "capture" and "release" are of a mushroom.
+        BadInput: naming field, value and bound; "capture" and "release" need a mushroom.
 
     Source: sec. 3.2 (capture).
     """

@@ -30,7 +30,9 @@ def ask(
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the vector as JSON.")] = False,
 ) -> int:
-    """Print a question of the test suite, its proved answer and its rule. A stepper may be asked it.
+    """Print a question of the test suite, its proved answer and its rule.
+
+    -- COMMAND also asks a stepper this question, and grades the answer.
 
     Exit code 0; 1 if the stepper does not pass; 2 on bad input.
     """

@@ -41,7 +41,7 @@ def attack(
     The verifier proves the answer of the reference, and the fast stepper is compared with it. Each wrong
     answer and each unproved claim is printed as a line of JSON.
 
-    Exit code 0 if no answer is wrong and the reference never took over 10 s; else 1; 2 on bad input.
+    Exit code 1 if an answer is wrong or the reference took over 10 s, 2 on bad input, else 0.
     """
     if stepper not in CHOICES:
         raise BadInput(f"--stepper = {stepper!r}, must be one of {', '.join(CHOICES)}")

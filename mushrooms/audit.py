@@ -60,11 +60,11 @@ def audit(
     """Check the claims of the paper. Writes report.html, report.json and report.txt.
 
     Particles are stored in DIR/runs/NAME, like those of simulate --out, and results in DIR/findings. --resume
-    continues after an interruption, with --full or with other claims (--only). The report then has the claims
-    of both. The runs that --commands prints may be made anywhere; --resume uses them. No run is ever
-    replaced.
+    continues after an interruption, with --full or with other claims (--only). The report then holds the
+    old and the new claims. The runs that --commands prints may be made anywhere; --resume uses them. No run
+    is ever replaced.
 
-    With --ensemble, an ensemble of another program is compared with theory at its energy.
+    --ensemble compares an ensemble of another program with theory at its energy.
 
     Exit code 0 if every claim has its expected verdict, 1 if one has not, 2 on bad input.
     """

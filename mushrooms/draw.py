@@ -118,9 +118,9 @@ def draw(
 ) -> None:
     """Draw the table during its cycle, or paths of particles in it, or export a trajectory.
 
-    The particles are the first of `mushrooms simulate SCENE --energy E --seed S`. If SCENE is the folder of a
-    run (simulate --out), its histogram of ln(E1/E0) is drawn with the theory. If the run has several cycles,
-    the mean after each cycle is drawn too.
+    Pictures of particles follow the first particles of `mushrooms simulate SCENE --energy E --seed S`. If
+    SCENE is the folder of a run (simulate --out), its histogram of ln(E1/E0) is drawn with the theory. If the
+    run has several cycles, the mean after each cycle is drawn too.
     """
     from mushrooms.store.run import is_run
 

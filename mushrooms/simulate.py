@@ -94,8 +94,8 @@ def simulate(
     not decide); careful (collisions computed by the scalar step, some tens of times slower); collision_time
     (mean time between two collisions of a particle); m1 (mean of log E/E0 per cycle); p_nc (share of cycles
     without capture); _se (standard error); _theory (prediction); _z (difference in standard errors);
-    ns_per_collision; SHA-256 of the results. Particles that are in the island for the whole run count neither
-    in m1 nor in p_nc. docs/ensembles.md explains each line.
+    ns_per_collision; SHA-256 of the results. Particles that are captured for the whole run count neither in
+    m1 nor in p_nc. docs/ensembles.md explains each line.
 
     With --out particles are stored block by block. After any interruption --resume continues the run, to the
     same bits. Exit code 0; 3 if a limit stopped the run; 130 if it was interrupted.

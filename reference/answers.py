@@ -13,7 +13,7 @@ from scene import Rejected, Undecided, Undefined, Wall
 
 
 class Moment(NamedTuple):
-    """A state, all components enclosed."""
+    """A state whose components are all enclosed."""
 
     t: Enclosure
     x: Enclosure
@@ -36,9 +36,9 @@ class ProvedCollision:
         slope: f' at the hit, < 0.
         digits: working decimals that decided it.
         departure: the flight that ends with this hit, its numbers enclosed.
-        root: flight time of the hit, counted from the instant of the departure; dt plus its begin [time].
-        jacobian: d(dt, x, y, vx, vy) / d(t, x, y, vx, vy), rows by outputs, when asked for.
-        margins: distances of this collision from other outcomes, when asked for.
+        root: `dt` plus the flight time at which `departure` begins, which is near 0 [time].
+        jacobian: d(dt, x, y, vx, vy) / d(t, x, y, vx, vy), a row for each output, if asked for.
+        margins: distances of this collision from other outcomes, if asked for.
     """
 
     wall: Wall
@@ -52,19 +52,19 @@ class ProvedCollision:
     margins: Margins | None = field(repr=False, default=None)
 
     def rounded(self) -> wire.Collision:
-        """Return the centres, correctly rounded, in the wire's form."""
+        """Return the centres of the enclosures, correctly rounded, as a class of `scene`."""
         return wire.Collision(self.wall, float(self.dt), *(float(c) for c in self.after))
 
 
 @dataclass(frozen=True)
 class ProvedHorizon:
-    """Proved: no collision before t_end; the state there, enclosed."""
+    """A proof that there is no collision before t_end, with the state at t_end, enclosed."""
 
     at: Moment
     digits: int
 
     def rounded(self) -> wire.Horizon:
-        """Return the centres, correctly rounded, in the wire's form."""
+        """Return the centres of the enclosures, correctly rounded, as a class of `scene`."""
         return wire.Horizon(*(float(c) for c in self.at))
 
 
@@ -76,9 +76,9 @@ class Trajectory(NamedTuple):
 
     Attributes:
         steps: the collisions, each enclosed.
-        outcome: None, or horizon, undefined or undecided instead of a further collision.
+        outcome: None if all collisions were found; else the outcome that ended the path before that.
         digits: the working decimals that were needed.
-        jacobian: d(t, x, y, vx, vy) after the last collision / d(initial state), when asked for.
+        jacobian: d(t, x, y, vx, vy) after the last collision / d(initial state), if asked for.
     """
 
     steps: list[ProvedCollision]

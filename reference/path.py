@@ -31,7 +31,7 @@ def trajectory(
     working: int | None = None,
     is_differentiated: bool = False,
 ) -> Trajectory:
-    """Follow a particle, every state enclosed, the last one to `digits` decimals.
+    """Follow a particle. Every state is enclosed, the last one to `digits` decimals.
 
     Args:
         scene: table and laws of motion.
@@ -41,9 +41,9 @@ def trajectory(
             at the flight time 2^1000.
         digits: decimals wanted of the last state, relative to the size of its vectors; 1 to 10,000. A
             position that may be 0 has this many digits relative to the length of the last flight.
-        working: decimals to work with. The path ends with Undecided when they no longer decide the next
-            step, whatever `digits` says. By default they are doubled until they suffice.
-        is_differentiated: chain the steps' Jacobians too.
+        working: decimals to work with. The path ends with Undecided if they do not decide the next step, for
+            any `digits`. By default they are doubled until they suffice.
+        is_differentiated: whether to return the Jacobian of the whole path.
 
     Raises:
         BadInput: naming field, value and bound.

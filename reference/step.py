@@ -41,12 +41,12 @@ def next_collision(
         state: position (x, y) [length], velocity (vx, vy) [length/time], wall being left or None.
         t_end: horizon [time], t_end >= state.t; a wall met at t_end exactly is not met before it.
         digits: correct decimals wanted, 1 to 10,000; guard digits are added inside.
-        is_differentiated: give the Jacobian of the step too.
-        is_measured: give the margins of the collision too.
+        is_differentiated: whether to return the Jacobian of the step.
+        is_measured: whether to return the margins of the collision.
 
     Returns:
-        Collision, its time enclosed to a relative 10**-digits; Horizon; Undefined; Undecided, also
-        when the work for one step is used up; or Rejected for a state outside this table.
+        Collision, with its time enclosed to a relative 10**-digits; Horizon; Undefined; Undecided, also if
+        the work for one step is used up; or Rejected for a state outside this table.
 
     Raises:
         BadInput: `scene` is not a scene or `digits` out of range, naming field, value and bound.

@@ -73,7 +73,10 @@ class TableAt(NamedTuple):
         return self.half_width(y) + (x if wall == "left" else -x)
 
     def nearest_wall(self, x: float, y: float, but: Wall | None = None) -> Wall:
-        """Return the wall (not `but`) nearest to a place: |f| / |grad f|, beyond the wall's ends more."""
+        """Return the wall nearest to a place, `but` left out.
+
+        The distance is |f| / |grad f|. Beyond the ends of a wall it is larger.
+        """
         above, below = max(0.0, y), max(0.0, -y)
         distances: dict[Wall, float] = {}
         if not isinstance(self.scene, Stem):
@@ -109,7 +112,7 @@ class TableAt(NamedTuple):
         return (1.0 if wall == "left" else -1.0) / length, self.slope / length
 
     def receding(self, wall: Wall, y: float) -> float:
-        """Return the speed [length/time], in binary64, at which a wall recedes along its normal at y."""
+        """Return minus the velocity [length/time] of a wall along its inward normal at y, in binary64."""
         if wall == "arc":
             return float(self.r_rate)
         if wall in ("base", "floor"):

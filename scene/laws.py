@@ -78,7 +78,10 @@ class Fourier(
 
 
 class BangBang(msgspec.Struct, frozen=True, tag_field="kind", tag="bang-bang", forbid_unknown_fields=True):
-    """At rest at each knot (time, value); constant acceleration to mid-leg, the opposite after."""
+    """A law that is at rest at each knot (time, value).
+
+    The acceleration is constant up to the middle between two knots, and the opposite after it.
+    """
 
     knots: tuple[tuple[float, float], ...]
 

@@ -28,7 +28,7 @@ def check_count(field: str, value: object, low: int, high: int) -> int:
 
     Args:
         field: its name, for the message.
-        value: whatever a caller gave: whole numbers of any kind are taken, 1e4 and those of numpy too.
+        value: a whole number; floats such as 1e4 and numbers of numpy are accepted.
         low: least value allowed.
         high: greatest value allowed.
 
@@ -59,11 +59,11 @@ def check_number(field: str, value: object, refusal: type[BadInput] = BadInput) 
 
     Args:
         field: its name, for the message.
-        value: whatever a caller gave; integers, numbers of numpy and its arrays of no dimension are taken.
+        value: a number; numpy scalars and 0-d arrays are accepted.
         refusal: the error to raise.
 
     Raises:
-        BadInput: or the error asked for, naming field, value and bound.
+        BadInput: or the error given as `refusal`, naming field, value and bound.
     """
     given = listed(value)
     if isinstance(given, bool) or not isinstance(given, numbers.Real):

@@ -39,7 +39,6 @@ LONGEST = [
     "test_mushrooms_check.py",
     "test_conformance_disguise.py",
     "test_conformance_agreement.py",
-    "test_conformance_harness.py",
     "test_conformance_suite.py",
     "test_conformance_promises.py",
     "test_conformance_audit.py",

@@ -1,6 +1,8 @@
 """The benchmark's baselines: right where most would be, caught where not, timed on what they follow."""
 
 import math
+import shutil
+import sys
 
 import numpy as np
 import pytest
@@ -8,12 +10,15 @@ from support.depth import deep_but
 from support.truth import proved_step
 
 import fast
-from conformance.bench import baselines, solvers, workloads
+from conformance import suite
+from conformance.bench import baselines, scoreboard, solvers, workloads
+from conformance.bench.scoreboard import Graded, page, reasons
 from conformance.cases import scenes
 from conformance.cases.draw import Draw
 from conformance.harness import examples
 from conformance.suite.process import CheckFailure
-from scene import Collision, Horizon, Mushroom, State, load
+from conformance.suite.session import Limits
+from scene import BadInput, Collision, Horizon, Mushroom, State, load
 
 BRIEF = solvers.Effort(repeats=3, least_ns=1.0, most_ns=1e9)
 
@@ -129,3 +134,48 @@ def test_without_a_compiler_the_reason_is_told(monkeypatch, tmp_path):
     monkeypatch.setattr(examples.shutil, "which", lambda _: None)
     with pytest.raises(CheckFailure, match="no C compiler is installed"):
         baselines.build(tmp_path, [])
+
+
+needs_compiler = pytest.mark.skipif(not shutil.which("cc"), reason="no C compiler is installed")
+
+
+@pytest.fixture(scope="module")
+def lean():
+    command = [sys.executable, "-m", "conformance.bench.baselines", "lean-c"]
+    with pytest.MonkeyPatch.context() as patch:  # ensembles and promises are not what is looked at
+        patch.setattr("conformance.suite.run.checks_of", lambda *_: [])
+        return suite.check(command, seed=1, groups=["moving-cap", "fast-wall"], limits=Limits(total=300.0))
+
+
+@pytest.mark.deep
+@needs_compiler
+def test_a_lean_stepper_without_checks_passes_the_easy_and_fails_the_hard(lean):
+    easy, hard = (lean.counts(group) for group in ("moving-cap", "fast-wall"))
+    assert easy["pass"] > 0.9 * sum(easy.values())
+    assert hard["fail"] >= 5
+    assert lean.verdict() == "not accepted"
+    assert "fast-wall" in reasons(lean)[0]
+
+
+@pytest.mark.deep
+@needs_compiler
+def test_the_page_has_a_row_for_each_and_a_reason_for_failure(lean):
+    text = page([Graded("lean-c", lean), Graded("example in C", None, "no compiler")], lean.corpus)
+    assert "| lean-c | not accepted |" in text
+    assert "| example in C | not run |" in text
+    assert f"- **lean-c**: {lean.scope()}." in text
+    assert "  - fails most in " in text
+    assert "not run here: no compiler." in text
+
+
+def test_a_baseline_that_is_none_is_refused():
+    with pytest.raises(BadInput, match="must be one of lean-c"):
+        baselines.main(["lean"])
+
+
+def test_every_baseline_is_listed(tmp_path, monkeypatch):
+    """Whatever can be built here; the examples have tests of their own."""
+    for finder in ("find_examples", "find_kit_examples"):
+        monkeypatch.setattr(scoreboard, finder, lambda _: {})
+    names = [name for name, _, _ in scoreboard.commands(tmp_path)]
+    assert {"fast", "plain", "steps-1000", "solve-ivp-1e-09"} < set(names)

@@ -15,7 +15,7 @@ from contextlib import suppress
 import msgspec
 import pytest
 from support import fuzz
-from support.faulty_servers import faulty
+from support.faulty_steppers import faulty
 from support.schemas import validator
 from test_conformance_session import made_up
 

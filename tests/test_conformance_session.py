@@ -9,7 +9,7 @@ from pathlib import Path
 import msgspec
 import pytest
 from support.depth import deep_among
-from support.saboteurs import HONEST, SABOTEURS, command
+from support.faulty_servers import FAULTS, HONEST, command
 
 from conformance.suite import run as suite
 from conformance.suite.answers import read_answer
@@ -28,7 +28,7 @@ CASES.append("protocol/stop")
 
 
 def made_up(number: int) -> Vector:
-    """A head-on hit of a unit circle, whose answer every citizen knows by heart."""
+    """A head-on hit of a unit circle, whose answer every faulty server knows by heart."""
     numbers = {"dt": "1", "x": "0.6", "y": "0.8", "vx": "-0.6", "vy": "-0.8"}
     ends = {name: (value, value) for name, value in numbers.items()}
     right = Certified(**ends, allowance=(1.0,) * 5, wall="arc")
@@ -55,10 +55,10 @@ def asked_alone(monkeypatch, vectors: list[Vector]) -> None:
 
 @pytest.fixture
 def verdicts(monkeypatch):
-    """Return what runs the suite on a saboteur and gives its results by case; nothing may be left running."""
-    monkeypatch.setenv("SABOTAGE", token := secrets.token_hex(8))
+    """Return what runs the suite on a faulty server and leaves nothing running: its results by case."""
+    monkeypatch.setenv("FAULTY_SERVER", token := secrets.token_hex(8))
     asked_alone(monkeypatch, [made_up(i) for i in range(N)])
-    monkeypatch.setattr(suite, "draw_transform", lambda *_: Transform())  # saboteurs know one answer
+    monkeypatch.setattr(suite, "draw_transform", lambda *_: Transform())  # faulty servers know one answer
 
     def run(name: str, limits: Limits) -> suite.Run:
         found = suite.check(command(name), limits=limits)
@@ -86,7 +86,7 @@ def alive(token: str) -> list[int]:
     return found
 
 
-# Where each departs from an honest citizen, the verdict it gets there, and a word of the reason.
+# Which cases of each do not pass, the verdict it gets there, and a word of the reason.
 STEP = "every step"
 MET = {
     **dict.fromkeys(HONEST, ("", "pass", "")),
@@ -191,8 +191,8 @@ def test_the_total_time_ends_a_check_that_every_answer_keeps_alive(verdicts):
     assert run.seconds < 5.0
 
 
-def test_every_saboteur_is_met():
-    assert {*MET, "slow"} == set(SABOTEURS)
+def test_every_faulty_server_is_met():
+    assert {*MET, "slow"} == set(FAULTS)
 
 
 def test_a_command_that_does_not_exist():

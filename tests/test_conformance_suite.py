@@ -9,8 +9,8 @@ import msgspec
 import pytest
 from msgspec.structs import replace
 from support.faults import FAULTS
-from support.faulty_servers import clock, faulty
-from support.saboteurs import command
+from support.faulty_servers import command
+from support.faulty_steppers import clock, faulty
 from support.schemas import validator
 from test_conformance_session import asked_alone, made_up
 
@@ -18,7 +18,6 @@ from conformance import vectors
 from conformance.mutants.kill_matrix import diagnose
 from conformance.suite import reports, symmetry
 from conformance.suite import run as suite
-from conformance.suite.checks import ensembles
 from conformance.suite.result import VERDICTS, Result, Run
 from conformance.suite.session import Limits, Session, missing
 from scene.protocol.messages import Introduction
@@ -27,12 +26,8 @@ from scene.refusal import BadInput
 INTRODUCTION = Introduction(1, "made-up", "1", "C", ("step", "flow"), ("cap", "mushroom"), ("constant",))
 
 
-CHECKS = ("property", "profile", "promise")
-
-
-def made(
-    *verdicts: str, known: tuple[int, ...] = (), known_names: frozenset[str] = frozenset(), **more
-) -> Run:
+def made(*verdicts: str, listed: tuple[int, ...] = (), **fields) -> Run:
+    """Return a run of so many results: by turns of the protocol and of one group of vectors."""
     results = [
         Result(
             f"made-up/{i}",
@@ -44,88 +39,91 @@ def made(
             ulps=2.0 if verdict == "pass" else None,
             relative=1e-16 if verdict == "pass" else None,
             answer={"x": 1.0},
-            is_known=i in known,
+            is_known=i in listed,
         )
         for i, verdict in enumerate(verdicts)
     ]
-    fields = {
-        "command": ["./made-up"],
-        "level": "core",
-        "seed": 7,
-        "corpus": "1.0",
-        "digest": "0" * 64,
-        "limits": Limits(),
-        "introduction": INTRODUCTION,
-        "results": results,
-        "speed": None,
-        "n_restarts": 0,
-        "stderr": "",
-        "seconds": 1.5,
-        "graded": {"tables": ["cap"], "laws": ["constant"], "profiles": ["step"], "not_graded": ["flow"]},
-        "diagnosis": [],
-        "known": known_names,
-    }
-    return Run(**fields | more)
+    graded = {"tables": ["cap"], "laws": ["constant"], "profiles": ["step"], "not_graded": ["flow"]}
+    asked = ["./made-up"], "core", 7, "1.0", "0" * 64, Limits(), INTRODUCTION
+    return replace(Run(*asked, results, None, 0, "", 1.5, graded, []), **fields)
+
+
+def of_groups(*counts: tuple[int, str, str, str]) -> Run:
+    """Return a run of results by number, group, level and verdict."""
+    results = [
+        Result("a/1", group, verdict, level=level) for n, group, level, verdict in counts for _ in range(n)
+    ]
+    return made(results=results)
+
+
+def of_one_seed(name: str, verdict: str, seed: int) -> Run:
+    """Return a run of a seed with one generated question, where a name is listed as known to fail."""
+    result = Result("fresh/2", "fresh", verdict, level="core")
+    known = replace(result, is_known=suite._is_known(result, frozenset({name}), seed))
+    return made(results=[known, Result("a/1", "a", "pass", level="core")])
+
+
+UNASKED = "not asked: restarted 10 times"
+EASY = 4, "a", "core", "pass"
+PASSES = "passes, though it is listed as a known failure"
 
 
 @pytest.mark.parametrize(
-    ("verdicts", "known", "code"),
+    ("run", "words", "code"),
     [
-        (["pass", "pass"], (), 0),
-        (["pass", "fail"], (), 1),
-        (["pass", "crashed"], (), 1),
-        (["pass", "timed-out"], (), 1),
-        (["pass", "wrong-format"], (), 1),
-        (["pass", "error"], (), 1),
-        (["pass", "unsupported"], (), 0),
-        (["pass", "indeterminate"], (), 2),
-        (["pass", "indeterminate", "fail"], (), 1),
-        (["unsupported", "unsupported"], (), 1),
-        (["declined", "declined"], (), 1),
-        ([*["pass"] * 19, "declined"], (), 0),
-        ([*["pass"] * 18, "declined"], (), 1),
-        (["pass", "fail"], (1,), 0),
-        (["pass", "crashed"], (1,), 0),
-        (["pass", "pass"], (1,), 1),
-        ([], (), 1),
+        (made("pass", "pass"), [], 0),
+        (made("pass", "fail"), ["made-up/1: fail: because & <why>"], 1),
+        *((made("pass", bad), [bad], 1) for bad in ("crashed", "timed-out", "wrong-format", "error")),
+        (made("pass", "unsupported"), [], 0),
+        (made("pass", "indeterminate"), [], 2),
+        (made("pass", "indeterminate", "fail"), ["fail"], 1),
+        (made("unsupported", "unsupported"), ["no vector passed"], 1),
+        (made(), ["no vector passed"], 1),
+        (made("declined", "declined"), ["declined 2 of 2 cases"], 1),
+        (made(*["pass"] * 19, "declined"), [], 0),
+        (made(*["pass"] * 18, "declined"), ["declined 1 of 19"], 1),
+        (made("pass", "fail", listed=(1,)), [], 0),
+        (made("pass", "crashed", listed=(1,)), [], 0),
+        (made("pass", "pass", listed=(1,)), [f"made-up/1: {PASSES}"], 1),
+        # What was never asked has one line.
+        (
+            made(results=[Result(f"a/{i}", "a", "error", UNASKED) for i in range(591)]),
+            [f"a/0 and 590 others: error: {UNASKED}"],
+            1,
+        ),
+        # At level stress a group may be declined, but not all that is asked.
+        (of_groups((60, "a", "core", "pass"), (3, "b", "stress", "declined")), [], 0),
+        (of_groups((60, "a", "core", "pass"), (4, "b", "stress", "declined")), ["declined 4 of 64 cases"], 1),
+        (of_groups(EASY, (3, "a", "core", "declined"), (90, "b", "stress", "pass")), ["in group a"], 1),
+        # What is declined too often can be known.
+        (made("pass", "declined", "declined"), ["declined 2 of 3 cases"], 1),
+        (made("pass", "declined", "declined", known=frozenset({"declined/all"})), [], 0),
+        (
+            made("pass", "declined", "declined", known=frozenset({"declined/all", "declined/protocol"})),
+            ["declined/protocol: less is declined, though it is listed as a known failure"],
+            1,
+        ),
+        # A list made with one seed holds with another: it is strict within a seed.
+        (of_one_seed("fresh/2@1", "fail", 1), [], 0),
+        (of_one_seed("fresh/2@1", "pass", 1), [PASSES], 1),
+        (of_one_seed("fresh/2@1", "pass", 2), [], 0),
+        (of_one_seed("fresh/2@1", "fail", 2), ["fail"], 1),
+        (of_one_seed("fresh/*", "fail", 2), [], 0),
+        (of_one_seed("fresh/*", "pass", 2), [], 0),
+        (of_one_seed("profile/*", "fail", 2), ["fail"], 1),
+        (of_one_seed("fresh/2", "fail", 2), [], 0),
     ],
 )
-def test_exit_codes(verdicts, known, code):
-    assert made(*verdicts, known=known).exit_code() == code
-
-
-def test_objections_say_what_is_wrong():
-    """What was never asked has one line."""
-    run, why = made("pass", "fail", "pass", *["error"] * 591, known=(2,)), "not asked: restarted 10 times"
-    results = [replace(r, why=why) if r.verdict == "error" else r for r in run.results]
-    assert made(results=results).objections() == [
-        "made-up/1: fail: because & <why>",
-        "made-up/2: passes, though it is listed as a known failure",
-        f"made-up/3 and 590 others: error: {why}",
-    ]
-    assert "no vector passed" in made("unsupported").objections()[0]
-    assert "declined 2 of 3" in made("pass", "declined", "declined").objections()[0]
+def test_what_a_run_comes_to(run, words, code):
+    told = run.objections()
+    assert [word in line for word, line in zip(words, told, strict=True)] == [True] * len(words), told
+    assert run.exit_code() == code
 
 
 def test_nothing_is_diagnosed_where_nothing_passed():
-    """Who refuses every question has the same vectors wrong as every mutant that spoils all answers."""
+    """One that refuses every question has the same vectors wrong as every mutant that spoils all answers."""
     failed = [vector for vector in vectors.load("core") if vector.group == "fermi-ulam"]
     assert diagnose(failed, []) == []
-
-
-def test_at_level_stress_a_group_may_be_declined_but_not_all_that_is_asked():
-    """Hits at the horizon within a unit in the last place are no reason to refuse a stepper."""
-    levels = {"a": "core", "b": "stress"}
-
-    def of(*verdicts):
-        run = made(*(verdict for _, verdict in verdicts))
-        told = [replace(r, group=g, level=levels[g]) for r, (g, _) in zip(run.results, verdicts, strict=True)]
-        return made(results=told)
-
-    easy = [("a", "pass")] * 60
-    assert of(*easy, *[("b", "declined")] * 3).objections() == []
-    assert "declined 4 of 64 cases" in of(*easy, *[("b", "declined")] * 4).objections()[0]
-    assert "in group a" in of(*easy[:4], *[("a", "declined")] * 3, *[("b", "pass")] * 90).objections()[0]
 
 
 @pytest.mark.parametrize("groups", [["static-cap"], ["promise"], ["fresh", "static-stem"]])
@@ -155,7 +153,7 @@ def test_levels_and_groups_are_chosen():
 
 
 def test_the_json_report_follows_its_published_schema():
-    run = made("pass", "fail", "declined", "crashed", known=(1,))
+    run = made("pass", "fail", "declined", "crashed", listed=(1,))
     data = json.loads(reports.to_json(run))
     validator("check").validate(data)
     counts = {v: int(v in ("pass", "fail", "declined", "crashed")) for v in VERDICTS}
@@ -165,7 +163,9 @@ def test_the_json_report_follows_its_published_schema():
 
 
 def test_junit_counts_what_happened():
-    run = made("pass", "fail", "declined", "crashed", "fail", "pass", known=(4, 5), stderr="\x1b[31mdown\x00")
+    run = made(
+        "pass", "fail", "declined", "crashed", "fail", "pass", listed=(4, 5), stderr="\x1b[31mdown\x00"
+    )
     root = ElementTree.fromstring(reports.to_junit(run))
     names = ("tests", "failures", "errors", "skipped")
     assert [root.get(name) for name in names] == ["6", "2", "1", "2"]
@@ -187,21 +187,8 @@ def test_the_reference_passes(monkeypatch):
     assert (set(run.counts()), run.exit_code(), run.precision()) == ({"pass"}, 0, "A")
 
 
-def test_the_cases_beside_the_vectors_are_all_listed(monkeypatch):
-    """What a run of an implementation that offers everything contains, and no more."""
-    monkeypatch.setitem(ensembles.SIZES, "core", ensembles.Size(20, 50.0, 0.5))
-    run = suite.check(faulty(lambda request, answer: answer(request)), groups=["static-cap", *CHECKS], seed=1)
-    others = {result.id for result in run.results if not result.level}
-    assert others == set(suite.OTHER_CASES)
-    assert run.exit_code() == 0
-    assert str(run.scope()) == (
-        f"core {run.corpus}; cap; constant; step; trajectory, flow, time, mushroom, stem, fourier, bang-bang"
-        f" not graded; 0.0 % declined; class {run.precision()}; seed 1"
-    )
-
-
 # So long that no wait for an answer, however short the path, bears it out.
-MILLIONFOLD = clock(lambda _, said: [10**6 * n for n in said])
+MILLIONFOLD = clock(lambda said: [10**6 * n for n in said])
 
 
 @pytest.mark.parametrize("fault", [FAULTS["no-time"][2], FAULTS["elsewhere"][2], MILLIONFOLD])
@@ -244,40 +231,6 @@ def test_known_failures_are_read(tmp_path, encoding):
     assert suite.read_known(path) == {"breathing-circle/1", *names.split()}
     with pytest.raises(BadInput, match="cannot be read"):
         suite.read_known(tmp_path / "absent.txt")
-
-
-@pytest.mark.parametrize(
-    ("name", "verdict", "seed", "objection"),
-    [
-        ("fresh/2@1", "fail", 1, ""),
-        ("fresh/2@1", "pass", 1, "passes"),  # strict within a seed
-        ("fresh/2@1", "pass", 2, ""),
-        ("fresh/2@1", "fail", 2, "fail"),
-        ("fresh/*", "fail", 2, ""),
-        ("fresh/*", "pass", 2, ""),
-        ("profile/*", "fail", 2, "fail"),
-        ("fresh/2", "fail", 2, ""),
-    ],
-)
-def test_a_list_made_with_one_seed_holds_with_another(name, verdict, seed, objection):
-    result, other = (
-        Result("fresh/2", "fresh", verdict, level="core"),
-        Result("a/1", "a", "pass", level="core"),
-    )
-    known = replace(result, is_known=suite._is_known(result, frozenset({name}), seed))
-    (told,) = made(results=[known, other]).objections() or [""]
-    assert objection in told
-    assert bool(objection) == bool(told)
-
-
-def test_what_is_declined_too_often_can_be_known():
-    verdicts = ["pass", "declined", "declined"]
-    groups = {name: f"declined/{name}" for name in ("all", "protocol", "made-up")}
-    both = frozenset({groups["all"], groups["protocol"]})
-    assert len(made(*verdicts).objections()) == 1
-    assert made(*verdicts, known_names=frozenset({"declined/all"})).objections() == []
-    told = made(*verdicts, known_names=both).objections()
-    assert told == ["declined/protocol: less is declined, though it is listed as a known failure"]
 
 
 def test_known_failures_are_marked_in_a_run(monkeypatch):

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import operator
 import os
-from collections import Counter
 from collections.abc import Iterator
 from fractions import Fraction
 from random import Random
@@ -21,7 +20,7 @@ from scene.laws import value
 from scene.tables import laws
 
 N_CASES = int(os.environ.get("MUSHROOMS_INTERVALS", 3_000))
-N_FORGERIES = 300
+N_FORGERIES = int(os.environ.get("MUSHROOMS_FORGERIES", 300))
 BITS = (24, 53, 128, 256, 512)
 DECIMALS = 250
 # What these make of a true line, sampling sees.
@@ -142,9 +141,14 @@ def sample() -> Iterator[Line]:
         yield {**line, "expect": [{**answer, "steps": answer.get("steps", [])[: None if IS_DEEP else 3]}]}
 
 
-def test_no_forgery_is_accepted():
-    verdicts = Counter(judge(line) for _, line in draw(N_FORGERIES, 1))
-    assert set(verdicts) <= set(REFUSALS), verdicts
+def test_no_forgery_is_accepted(tally):
+    accepted = []
+    for kind, line in draw(N_FORGERIES, 1):
+        verdict = judge(line)
+        tally[f"{kind}: {verdict}"] += 1
+        if verdict not in REFUSALS:
+            accepted.append((kind, verdict, line))
+    assert accepted == []
     assert len(KINDS) <= N_FORGERIES
 
 

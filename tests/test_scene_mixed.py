@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import os
 import random
-import time
 from fractions import Fraction
 
 import pytest
@@ -134,13 +133,11 @@ def test_a_near_contact_is_decided(gap):
     assert "w <= r fails by" in decide(*dip(-gap))
 
 
-def test_a_contact_is_refused_in_words_and_in_bounded_time():
-    begin = time.perf_counter()
+def test_a_contact_is_refused_in_words():
     message = decide(*dip(0.0))
     assert "w <= r cannot be shown near t = 0.5" in message
     assert "touch" in message
     assert len(message.splitlines()) == 1
-    assert time.perf_counter() - begin < 10
 
 
 def test_a_lost_bend_is_caught(monkeypatch):

@@ -1,8 +1,9 @@
 """The paper's closed forms and quadratures, at any precision.
 
-`volumes` has its formulas. `cycle` says when particles are captured and released, `adiabatic` what they gain,
-and `prediction` the figures that follow; `curves`, `density` and `distribution` are of energies after one
-cycle, `large_deviations` after many. `finite_energy` goes beyond the paper.
+`volumes` has the formulas for volumes of phase space. `cycle` computes when particles are captured and
+released, `adiabatic` how their energy changes, and `prediction` the figures of one cycle. `curves`, `density`
+and `distribution` describe energies after one cycle, `large_deviations` after many cycles. `finite_energy`
+goes beyond the paper.
 """
 
 from theory.adiabatic import NotConverged

@@ -35,7 +35,7 @@ PROMISE = 0.92  # of the digits wanted, in proportion to its degree, are to be s
 
 
 class NotConverged(BadInput):
-    """The digits asked were not reached within the limits on work."""
+    """The digits asked for were not reached within the limit of work."""
 
 
 class Panel(NamedTuple):

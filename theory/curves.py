@@ -35,7 +35,7 @@ class CaptureCurve(NamedTuple):
     t_out: release time [time].
     p_cha: probability of being still in the chaotic zone at t_in (Eq:ps).
     log_g: log of the compression factor (Eq:g).
-    s: log E1 / E0 after the cycle, of a particle captured there and at no other time (Eq:lnE/E0).
+    s: log E1 / E0 after the cycle, for a particle captured then and at no other time (Eq:lnE/E0).
     """
 
     nu: Floats
@@ -54,7 +54,7 @@ def capture_curve(scene: Scene, n: int = 400) -> CaptureCurve:
         n: number of points, 2 to 10 million.
 
     Returns:
-        Arrays of length n; of length 0 when nothing is captured.
+        Arrays of length n. They are empty if nothing is captured.
 
     Raises:
         BadInput: n out of bounds.
@@ -78,7 +78,7 @@ def _curve(branch: Branch, x: Floats) -> CaptureCurve:
 
 
 def largest_gain(scene: Scene) -> tuple[float, float] | None:
-    """Return (t_in, s) of the particles captured once that gain most; None when nothing is captured.
+    """Return (t_in, s) with the largest s of particles captured once, or None if nothing is captured.
 
     Args:
         scene: as for `theory.predict`.
@@ -102,7 +102,8 @@ def energy_density(scene: Scene, edges: ArrayLike) -> Floats:
         edges: bin edges, rising, at least two; a histogram's.
 
     Returns:
-        Masses, one per bin. Over all s they sum to 1 - p_nc; the uncaptured, at log_e_nc, are apart.
+        Probabilities, one per bin. Over all s they add up to 1 - p_nc: particles never captured do
+        not count.
 
     Raises:
         BadInput: edges do not rise.
@@ -117,14 +118,14 @@ def energy_density(scene: Scene, edges: ArrayLike) -> Floats:
 def capture_time_mass(scene: Scene, edges: ArrayLike) -> Floats:
     """Return the mean number of captures per particle within each bin of time.
 
-    In a cycle with one interval of capture it is the probability of being captured then.
+    If nu falls in only one interval of the cycle, this is the probability of a capture in the bin.
 
     Args:
         scene: as for `theory.predict`.
         edges: bin edges [time], rising, in the time of the cycle (from `Cycle.start` on).
 
     Returns:
-        Masses, one per bin.
+        Numbers of captures, one per bin.
 
     Raises:
         BadInput: edges do not rise.
@@ -154,8 +155,8 @@ def chaotic_zone(scene: Scene, times: ArrayLike) -> ChaoticZone:
 
     Args:
         scene: as for `theory.predict`.
-        times: shape (n,) [time]. Beyond the cycle, log_energy goes on by log_e_nc per period, for
-            a particle not captured then either, and p_cha repeats.
+        times: shape (n,) [time]. Beyond the cycle, p_cha repeats. log_energy grows by log_e_nc per period,
+            for a particle that is not captured in the further cycles either.
 
     Returns:
         Arrays of length n.

@@ -41,13 +41,13 @@ class Cycle:
     """One period of a mushroom, from the time at which nu starts to fall.
 
     Attributes:
-        ctx: private number system, GUARD digits wider than asked.
-        digits: the digits asked.
+        ctx: private number system, with GUARD more digits than asked for.
+        digits: the digits asked for.
         start: time at which capture starts, the end of nu's maximum [time].
         period: the cycle's length [time]; None for a static table.
         nu_max: largest mouth.
         nu_min: smallest mouth.
-        valley: its captures, nested; no pieces when nu is constant.
+        valley: the captures in nested wells of nu; no pieces if nu is constant.
     """
 
     ctx: Any
@@ -90,7 +90,7 @@ class Cycle:
 
     @property
     def pieces(self) -> tuple[CapturePiece, ...]:
-        """All pieces of the tree of valleys."""
+        """All pieces of the tree of wells."""
         return tuple(self.valley.all_pieces())
 
     @guarded

@@ -31,7 +31,7 @@ class Caustic(NamedTuple):
 
     t_in: capture time [time].
     s: log E1 / E0 there.
-    strength: the density is strength / sqrt(|s' - s|) near it, on the side where the other energies are.
+    strength: near s, at values s' that particles reach, the density is strength / sqrt(|s' - s|).
     is_largest: s is a local maximum.
     """
 
@@ -130,10 +130,10 @@ def _blur(found: Captures) -> Any:
 
 @guarded
 def density_at(scene: Scene, s: Sequence[Any], digits: int = 15) -> tuple[Any, ...]:
-    """Return the density of log E1 / E0 of the captured particles at each s; atoms have none.
+    """Return the density of log E1 / E0 of the captured particles at each s.
 
-    The uncaptured are an atom. So are those who are captured where s(t_in) is constant, as it is while a loop
-    runs back along itself.
+    Point masses do not count. Particles never captured form a point mass. Particles captured while s(t_in) is
+    constant form another one, for example if a loop retraces itself.
 
     Args:
         scene: a valid mushroom in which a particle is captured at most once per cycle.
@@ -166,7 +166,7 @@ def density_at(scene: Scene, s: Sequence[Any], digits: int = 15) -> tuple[Any, .
 
 @guarded
 def cdf_at(scene: Scene, s: Sequence[Any], digits: int = 15) -> tuple[Any, ...]:
-    """Return the probability of log E1 / E0 <= each s, the uncaptured included.
+    """Return the probability of log E1 / E0 <= each s, with the particles never captured.
 
     Args:
         scene: as for `density_at`.
@@ -230,11 +230,11 @@ def caustics(scene: Scene, digits: int = 15) -> list[Caustic]:
 
 @guarded
 def capture_rate_at(scene: Scene, t: Sequence[Any], digits: int = 15) -> tuple[Any, ...]:
-    """Return the density of capture times at each t [1/time], 0 where nothing is captured; any cycle.
+    """Return the density of capture times at each t [1/time]; 0 where nothing is captured.
 
     Args:
         scene: a valid mushroom.
-        t: times, floats, mpf or decimal strings, taken into the cycle.
+        t: times as floats, mpf or decimal strings. Whole periods are subtracted.
         digits: correct significant digits wanted.
 
     Raises:

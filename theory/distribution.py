@@ -37,8 +37,8 @@ class Energies:
     """The distribution of s over one cycle.
 
     Attributes:
-        p_nc: probability of the atom, the particles never captured (Eq:ps).
-        s_nc: its place (Eq:lnEnc/E0).
+        p_nc: probability of never being captured (Eq:ps).
+        s_nc: s of the particles never captured (Eq:lnEnc/E0).
     """
 
     def __init__(self, root: Node) -> None:
@@ -62,15 +62,15 @@ class Energies:
         return self.captured_below(s) + np.where(s >= self.s_nc - UNRESOLVED, self.p_nc, 0.0)
 
     def lost(self) -> float:
-        """Return the probability of E1 < E0, those apart who keep their energy but for rounding."""
+        """Return the probability of E1 < E0. Particles that keep it within rounding are not counted."""
         return float(self.cdf(np.array([-KEPT]))[0])
 
 
 def energies(found: Energies | Scene) -> Energies:
-    """Solve one cycle for its distribution of energies, once for all that is asked of it.
+    """Compute the distribution of energies of one cycle, to be used in further calls.
 
     Args:
-        found: a valid mushroom, or what was found for it, which is returned.
+        found: a valid mushroom, or an `Energies`, which is returned.
 
     Raises:
         NotCovered, NotConverged: as `theory.predict`.
@@ -79,18 +79,18 @@ def energies(found: Energies | Scene) -> Energies:
 
 
 def energy_cdf(found: Energies | Scene, s: ArrayLike) -> Floats:
-    """Return the probability of log E1 / E0 <= s, the uncaptured included.
+    """Return the probability of log E1 / E0 <= s, with the particles never captured.
 
     Args:
         found: from `energies`, or a scene to solve.
         s: any shape.
 
     Returns:
-        An array of that shape. Error about 1e-14, at a distance d from a caustic 1e-15 / sqrt(d),
-        at most 1e-7; in cycles with several captures of one particle 1e-6, however small the reach of s
-        (but for LEAST_REACH) and unless most of them crowd in a hundredth of it. The uncaptured are a step at
-        log_e_nc: finite energy makes it a peak, so compare whole distributions with
-        `Energies.captured_below`, or away from it.
+        An array of that shape. The error is about 1e-14, and larger near caustics: at most 1e-7. If a
+        particle can be captured several times in a cycle, the error is about 1e-6. It may be larger if the
+        range of s is below LEAST_REACH, or if most captured particles lie in a hundredth of this range.
+        The particles never captured make a step at log_e_nc. At finite energy this step is a peak. So compare
+        simulated energies with `Energies.captured_below`, or away from log_e_nc.
 
     Source: Eq:lnE/E0 with Eq:ps.
     """
@@ -192,11 +192,11 @@ class Sum:
 
     Attributes:
         n_cycles: n.
-        p_nc: probability of never being captured, an atom.
-        s_nc: its place.
+        p_nc: probability of never being captured in n cycles.
+        s_nc: log E_n / E0 of these particles.
         places: shape (m,), equidistant.
-        masses: shape (m,), probabilities of the captured around each place.
-        step: distance of the places.
+        masses: shape (m,), probabilities of all other particles around each place.
+        step: distance between neighbouring places.
     """
 
     def __init__(self, root: Node, n_cycles: int, q: float = 0.0) -> None:
@@ -229,7 +229,7 @@ class Sum:
         return found
 
     def density(self, s: ArrayLike) -> Floats:
-        """Return the density at s of log E_n / E0 of those captured at least once."""
+        """Return the density of log E_n / E0 at s, for particles captured at least once."""
         found: Floats = np.interp(finite_array("s", s), self.places, self.masses / self.step)
         return found
 
@@ -240,14 +240,15 @@ def sum_of_cycles(found: Energies | Scene, n_cycles: int, *, q: float = 0.0) -> 
     Args:
         found: from `energies`, or a scene to solve.
         n_cycles: n, 1 to MAX_CYCLES.
-        q: tilt; 0 gives all probabilities to about 1e-12 of the whole, another q small relative errors
-            around the s with K'(q) = s / n (`theory.cumulants`), and noise elsewhere.
+        q: exp(q s) weights the distribution in the calculation. With q = 0 all probabilities have an error
+            of about 1e-12. With another q relative errors are small around the s with K'(q) = s / n
+            (`theory.cumulants`), and large elsewhere.
 
     Returns:
-        The distribution. Mass is 1 to rounding, the mean n m1 within 1e-7 n R, the variance n sd^2 within
-        n (step^2 / 4 + 1e-7 R^2) and, at q = -1, the mean of exp(-s) 1 within n (step^2 / 4 + 1e-7 R), R the
-        reach of s in one cycle, at least LEAST_REACH. At q = 0 that mean is off by 1e-15 exp(n L) more, L the
-        largest loss in a cycle: of many cycles it is made by tails that are rounding there.
+        The distribution. Let R be the range of s in one cycle, at least LEAST_REACH. The mean n m1 is right
+        to 1e-7 n R, and the variance n sd^2 to n (step^2 / 4 + 1e-7 R^2). Use q = -1 for the mean of exp(-s):
+        it is right to n (step^2 / 4 + 1e-7 R). With q = 0 rounding spoils this mean: its error is larger by
+        1e-15 exp(n L), where L is the largest loss in one cycle.
 
     Raises:
         BadInput: n_cycles out of bounds.

@@ -29,8 +29,8 @@ LEAST = 1e-24  # mean of s, a half of its variance: below, every particle keeps 
 class Rarity(NamedTuple):
     """How P(E_n < E_0) falls with n. The numbers are mpf.
 
-    rate: I, per cycle; 0 when energies do not change.
-    place: the q in (-1, 0) at which Phi is least; -1/2 then.
+    rate: I, per cycle; 0 if energies do not change.
+    place: the q in (-1, 0) at which Phi is least; -1/2 if energies do not change.
     """
 
     rate: Any
@@ -66,14 +66,16 @@ def _least(found: Captures) -> tuple[Any, ...]:
 
 
 def loss_probability(found: Energies | Scene, n_cycles: int) -> float:
-    """Return the probability of E_n < E_0 after n independent cycles; who keeps the energy has not lost.
+    """Return the probability of E_n < E_0 after n independent cycles.
+
+    A particle that keeps its energy does not count as a loss.
 
     Args:
         found: from `theory.energies`, or a scene to solve.
         n_cycles: n, 1 to 10,000.
 
     Returns:
-        It, with a relative error of about 1e-4: sums are tilted to where they cancel. 0 below binary64.
+        The probability, with a relative error of about 1e-4; 0 if it is below the range of binary64.
 
     Raises:
         BadInput: n_cycles out of bounds, or every particle keeps its energy.

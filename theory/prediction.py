@@ -39,9 +39,9 @@ class Prediction(NamedTuple):
 
     p_nc: probability of never being captured (Eq:ps).
     m1: mean of s (Eq:Erate).
-    log_e_nc: s of the uncaptured (Eq:lnEnc/E0).
+    log_e_nc: s of the particles never captured (Eq:lnEnc/E0).
     sd: standard deviation of s.
-    mean_exp_minus: mean of exp(-s), which is 1 for every cycle.
+    mean_exp_minus: mean of exp(-s), which is 1 for every cycle in this theory.
     mean_exp_plus: mean of exp(s), the growth factor of the mean energy.
     """
 
@@ -80,11 +80,11 @@ def predict(
     Args:
         scene: a valid mushroom.
         digits: correct significant digits wanted, 1 to 1000.
-        progress: called with the number of the resolution (two or more are compared), from 1, and how much of
-            it is done, 0 to 1.
+        progress: called with the number of the resolution, from 1, and the part of it that is done, 0 to 1.
+            Two or more resolutions are compared.
 
     Returns:
-        The prediction. What is smaller than 10^-(digits + 30) is given as zero.
+        The prediction. Numbers below 10^-(digits + 30) are returned as zero.
 
     Raises:
         BadInput: no scene, or digits out of bounds.
@@ -104,7 +104,7 @@ def mean_of(scene: Scene, f: Callable[[Any], Any], digits: int = 15) -> Any:
 
     Args:
         scene: as for `predict`.
-        f: takes an mpf, returns one or another finite real number; smooth.
+        f: a smooth function. It takes an mpf and returns a finite real number.
         digits: correct significant digits wanted.
 
     Raises:

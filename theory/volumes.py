@@ -26,7 +26,7 @@ WIDE = 0.75  # nu from which the island's share is summed as a series
 
 
 class NotCovered(BadInput):
-    """A scene the theory says nothing about: one line that tells why."""
+    """The theory does not cover this scene; the message says why."""
 
 
 class Volumes(NamedTuple):
@@ -60,10 +60,8 @@ def _over_stem(ctx: Any, w: Any, h: Any, slope: Any) -> Any:
 def delta(ctx: Any, nu: Any) -> Any:
     """Return the island's share of the cap, (2 / pi) (acos nu - nu sqrt(1 - nu^2)).
 
-    Near nu = 1 the two terms cancel but for the order z^(3/2), z = 1 - nu, which is exact there. It is (4 /
-    pi) times the integral of sqrt(2 u - u^2) over [0, z], too, whose binomial series is summed there: all
-    terms but the first have one sign and add up to less than a twelfth of it, so that it is right to
-    rounding however small the island.
+    Near nu = 1 a series in 1 - nu avoids cancellation. The result is right to rounding, however small the
+    island.
 
     Raises:
         BadInput: nu is outside [0, 1].
@@ -198,20 +196,20 @@ def energy(ctx: Any, vx: Any, vy: Any) -> Any:
 
 
 def sin_phi_hat(ctx: Any, x: Any, y: Any, vx: Any, vy: Any, r: Any) -> Any:
-    """Return sin of the angle phi_hat; its modulus is the cap's adiabatic invariant.
+    """Return sin of the angle phi_hat; its absolute value is the adiabatic invariant of the cap.
 
-    Each hit of the base turns its sign. Between hits, and from arc hit to arc hit, it stays but for O(u / v).
+    Each hit of the base changes its sign. A hit of an arc of speed u changes it only by O(u / v).
 
     Args:
         ctx: number system.
         x: position across [length].
         y: height over the base [length].
-        vx: velocity across; vx and vy must not both be 0.
-        vy: velocity upward.
+        vx: velocity across [length / time]; vx and vy must not both be 0.
+        vy: velocity upward [length / time].
         r: radius of the cap [length].
 
     Returns:
-        -(x vy - y vx) / (|v| r); in the cap the particle is captured when its modulus exceeds nu.
+        -(x vy - y vx) / (|v| r); in the cap a particle is captured if the absolute value exceeds nu.
 
     Raises:
         BadInput: an argument is not finite, r is not > 0, or the particle rests.

@@ -5,12 +5,19 @@ where the new place is outside put it back on the wall and reflect. Both answer 
 and are timed as the lanes are, on flights that go on from a workload's questions. In Python: the plain
 stepper, and scipy's `solve_ivp` with events.
 
+`python -m conformance.bench.baselines NAME` puts one behind protocol 1, to be graded like any other.
+Baselines refuse nothing but what the protocol's decoder refuses: what their own code makes of a state is what
+the suite shall see. Flow is their steps, one after the other.
+
 Every law is a row of LAW_LENGTH numbers: kind, n, mean, omega, then pairs: amplitudes (cos, sin) of
 k = 1, 2, ... n, or n knots (time, value). A state is t, x, y, vx, vy, the wall being left.
 """
 
 import ctypes
+import sys
+import tempfile
 from collections.abc import Callable, Sequence
+from functools import partial
 from itertools import zip_longest
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -26,6 +33,7 @@ from conformance.bench.workloads import FLIGHTS, SINGLE_STEPS, Workload
 from conformance.harness import examples
 from conformance.suite.process import CheckFailure
 from scene import (
+    BadInput,
     BangBang,
     Cap,
     Collision,
@@ -42,6 +50,8 @@ from scene import (
 )
 from scene.geometry import rounded, table_at
 from scene.laws import frequency
+from scene.protocol.wire import serve
+from scene.states import Stepper
 from scene.tables import laws, width_factors
 
 FloatArray = npt.NDArray[np.float64]
@@ -135,6 +145,21 @@ def in_c(library: Path) -> list[Solver]:
         _solver("lean C", "lean", Engine(library)),
         *(_solver(f"steps, flight/{n}", "fixed-step", Engine(library, n), 10 * FLIGHTS / n) for n in PARTS),
     ]
+
+
+def stepper(solver: Solver) -> Stepper:
+    """Return a baseline as a stepper of one state, taken as it is; t_end alone ends a flight."""
+    assert solver.steps is not None
+    steps = solver.steps
+
+    def step(scene: Scene, state: State, t_end: float) -> Outcome:
+        (met,) = steps(scene, [state])
+        if isinstance(met, Collision) and met.t < t_end:
+            return met
+        left = t_end - state.t
+        return Horizon(t_end, state.x + left * state.vx, state.y + left * state.vy, state.vx, state.vy)
+
+    return step
 
 
 def _solver(name: str, family: Family, engine: Engine, flights: float = FLIGHTS) -> Solver:
@@ -239,3 +264,38 @@ def in_python() -> list[Solver]:
         by_call("plain Python", "interpreted", plain.next_collision),
         *(by_call(name, "time-stepping", step) for name, step in integrators.items()),
     ]
+
+
+def _built(name: str) -> Stepper:
+    with tempfile.TemporaryDirectory() as folder:  # the library stays loaded
+        library, _ = build(Path(folder), FLAGS)
+        return stepper(next(one for one in in_c(library) if one.name == name))
+
+
+NAMES: dict[str, Callable[[], Stepper]] = {
+    "lean-c": partial(_built, "lean C"),
+    **{f"steps-{parts}": partial(_built, f"steps, flight/{parts}") for parts in PARTS},
+    **{f"solve-ivp-{rtol:.0e}": partial(next_collision_by, rtol) for rtol in TOLERANCES},
+}
+
+
+def main(arguments: Sequence[str]) -> None:
+    """Speak protocol 1 as the baseline of that name.
+
+    Raises:
+        BadInput: there is no such baseline.
+        CheckFailure: it cannot be built here.
+    """
+    name = arguments[0] if len(arguments) == 1 else ""
+    if name not in NAMES:
+        raise BadInput(f"NAME = {name!r}, must be one of {', '.join(NAMES)}")
+    step = NAMES[name]()
+    follow, carry = partial(plain.trajectory, step=step), partial(plain.flow, step=step)
+    serve(name, step, follow, sys.stdin.buffer, sys.stdout.buffer, flow=carry)
+
+
+if __name__ == "__main__":
+    try:
+        main(sys.argv[1:])
+    except BadInput as error:
+        sys.exit(f"conformance.bench.baselines: {error}")

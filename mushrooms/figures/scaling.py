@@ -21,7 +21,7 @@ from mushrooms.orbits import follow
 from scene import load
 
 N_ORBITS = 40
-N_HITS = 400
+N_HITS = 250
 SEED = 7
 
 

@@ -26,6 +26,7 @@ BLUE, SKY, ORANGE, BLACK, GREY, GREEN = "#0072B2", "#A6CEE9", "#D55E00", "#1A1A1
 LONGEST, MOST_LINES = 40, 3  # letters of a line, and lines, of a name in a title
 STYLE: dict[str, Any] = {
     "font.family": "sans-serif",
+    "font.sans-serif": ["DejaVu Sans", "Verdana"],  # an SVG names them all with each text
     "font.size": 10,
     "axes.titlesize": 10,
     "axes.spines.top": False,
@@ -89,4 +90,8 @@ def svg(figure: Figure) -> bytes:
     file = io.BytesIO()
     with rc_context({"svg.fonttype": "none"}):
         save(figure, file, ".svg", dpi=110)
-    return re.sub(rb"(\.\d\d)\d+", rb"\1", file.getvalue())
+    text = re.sub(rb"\s+", b" ", file.getvalue())
+    text = re.sub(rb"(\.\d\d)\d+(?=[^<>]*>)", rb"\1", text)  # within tags: numbers that are read stay
+    return re.sub(
+        rb'<metadata>.*?</metadata>|<!--.*?-->|(?<=<g) id="[^"]*"| transform="rotate\(-0 [^"]*"', b"", text
+    )

@@ -1,7 +1,5 @@
 """Questions at the edges of protocol 1, and what every honest stepper answers to them by its page."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 
@@ -40,16 +38,16 @@ TOUCHED = {
     "state": {"t": 0.0, "x": 0.25, "y": -1.5, "vx": 0.0, "vy": 0.0, "wall": "floor"},
     "t_end": 2.75,
 }
+REST = {"scene": {"table": "cap", "r": 2.0}, "state": {**START, "vx": 0.0, "vy": 0.0}}
 REFUSED = {"outcome": "rejected"}
 OPEN = {"outcome": "undecided"}
 
 
 def asked(cmd: str, **changes: Any) -> Line:
     """Return a request."""
-    if cmd == "flow":
-        changes = {"states": [START], "state": None, **changes}
-    fields = {"cmd": cmd, "seq": 7, **BASE, **changes}
-    return {name: part for name, part in fields.items() if name != "state" or part is not None}
+    other = {"flow": {"states": [START], "state": None}, "time": {"t_end": None}}.get(cmd, {})
+    fields = {"cmd": cmd, "seq": 7, **BASE, **other, **changes}
+    return {name: part for name, part in fields.items() if part is not None}
 
 
 def _at(x: float, y: float, vx: float, vy: float, wall: str | None = None) -> Line:

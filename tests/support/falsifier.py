@@ -1,26 +1,23 @@
 """A falsifier of claims: it samples a claimed flight and looks for a sign that must not be there.
 
-A claim is a line of the corpus. Walls are written down from docs/protocol.md; they and the laws of `scene`
-are evaluated in mpmath to 60 decimals, at many instants of the flight, more of them near both ends. A golden
-section goes on around the lowest samples. What is found so is confirmed to 300 decimals. A path is followed
-with the falsifier's own numbers: the claim only says where to look for a hit. This shares no theorem with the
-reference or the verifier. A claim that it falsifies is false; one that it does not falsify may be false. Not
-handled: flows, `rejected`, and whether a scene is valid.
+A claim is a line of the corpus. Walls are those of `scene.geometry`, which neither the reference nor the
+verifier uses. They are evaluated in mpmath to 60 decimals, at many instants of the flight, more of them near
+both ends. A golden section goes on around the lowest samples. What is found so is confirmed to 300 decimals.
+A path is followed with the falsifier's own numbers: the claim only says where to look for a hit. This shares
+no theorem with the reference or the verifier. A claim that it falsifies is false; one that it does not
+falsify may be false. Not handled: flows, `rejected`, and whether a scene is valid.
 """
-
-from __future__ import annotations
 
 from collections.abc import Iterator
 from functools import cache
 from itertools import pairwise
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import mpmath
 
 from scene import from_data
-from scene.laws import value
-from scene.tables import laws
+from scene.geometry import table_at
 
 CORPUS = Path(__file__).parents[2] / "conformance" / "corpus"
 DECIMALS, CONFIRMED = 60, 300
@@ -40,16 +37,6 @@ def numbers() -> Any:
     return context
 
 
-class Wall(NamedTuple):
-    """A wall's f, its partial derivatives by t, x and y, and its total one along the flight."""
-
-    f: Number
-    ft: Number
-    fx: Number
-    fy: Number
-    rate: Number
-
-
 class Flight:
     """A straight flight from a state, and the walls along it; s is the time since departure.
 
@@ -67,39 +54,17 @@ class Flight:
         self.t, self.x, self.y, self.vx, self.vy = (mp.mpf(state[name]) for name in ("t", *NUMBERS[1:]))
         self.residual = mp.zero
         if self.left:
-            self.residual = self.walls(mp.zero)[self.left].f
+            self.residual = self.walls(mp.zero)[self.left]
 
     def place(self, s: Number) -> tuple[Number, Number]:
         """Return where the particle is, as long as nothing is met."""
         return self.x + self.vx * s, self.y + self.vy * s
 
-    def laws(self, s: Number) -> dict[str, tuple[Number, Number]]:
-        """Return the laws and their rates; the mouth's half-width as w, however it is given."""
-        t, mp = self.t + s, numbers()
-        found = {name: (value(mp, law, t), value(mp, law, t, 1)) for name, law in laws(self.scene).items()}
-        if "nu" in found:
-            (nu, nu_rate), (r, r_rate) = found["nu"], found["r"]
-            found["w"] = nu * r, nu_rate * r + nu * r_rate
-        return found
-
-    def walls(self, s: Number) -> dict[str, Wall]:
-        """Return all walls of the table, the residual of the one being left taken out."""
-        (x, y), laws = self.place(s), self.laws(s)
-        up = -1 if self.table == "stem" else 1
-        found = {"base": self._wall("base", up * y, 0, 0, up)}
-        if "r" in laws:
-            r, r_rate = laws["r"]
-            found["arc"] = self._wall("arc", r**2 - x**2 - y**2, 2 * r * r_rate, -2 * x, -2 * y)
-        if "h" in laws:
-            (w, w_rate), (h, h_rate), (m, m_rate) = laws["w"], laws["h"], laws.get("slope", (0, 0))
-            for name, side in (("left", 1), ("right", -1)):
-                found[name] = self._wall(name, w + m * y + side * x, w_rate + m_rate * y, side, m)
-            found["floor"] = self._wall("floor", y + h, h_rate, 0, 1)
-        return found
-
-    def _wall(self, name: str, f: Number, ft: Number, fx: Number, fy: Number) -> Wall:
-        residual = self.residual if name == self.left else 0
-        return Wall(f - residual, ft, fx, fy, ft + fx * self.vx + fy * self.vy)
+    def walls(self, s: Number) -> dict[str, Number]:
+        """Return f of all walls of the table, positive inside, without the residual of the one being left."""
+        table = table_at(numbers(), self.scene, self.t + s)
+        found = {wall: table.gap(wall, *self.place(s)) for wall in self.scene.walls}
+        return found | ({self.left: found[self.left] - self.residual} if self.left else {})
 
     def reach(self, s: Number) -> tuple[str, ...]:
         """Return the walls of the part of the table that the particle is in."""
@@ -118,20 +83,24 @@ class Flight:
     def is_mouth_open(self, s: Number) -> bool:
         """Tell whether |x| < w."""
         walls = self.walls(s)
-        return bool(min(walls["left"].f, walls["right"].f) > 0)
+        return bool(min(walls["left"], walls["right"]) > 0)
 
     def root(self, wall: str, low: Number, high: Number) -> Number:
         """Return where f of a wall, positive at low and negative at high, is zero."""
         for _ in range(numbers().prec):
             middle = (low + high) / 2
-            low, high = (middle, high) if self.walls(middle)[wall].f > 0 else (low, middle)
+            low, high = (middle, high) if self.walls(middle)[wall] > 0 else (low, middle)
         return low
 
     def after(self, wall: str, s: Number) -> Line:
         """Return the state after the bounce v - 2 (v.n - u) n."""
-        at = self.walls(s)[wall]
-        push = 2 * at.rate / (at.fx**2 + at.fy**2)
-        return self.free(s) | {"vx": self.vx - push * at.fx, "vy": self.vy - push * at.fy, "wall": wall}
+        table, (x, y) = table_at(numbers(), self.scene, self.t + s), self.place(s)
+        # f is of second degree at most, so that differences are derivatives.
+        fx, fy = (
+            (table.gap(wall, x + i, y + j) - table.gap(wall, x - i, y - j)) / 2 for i, j in ((1, 0), (0, 1))
+        )
+        push = 2 * table.gap_rate(wall, x, y, self.vx, self.vy) / (fx**2 + fy**2)
+        return self.free(s) | {"vx": self.vx - push * fx, "vy": self.vy - push * fy, "wall": wall}
 
     def free(self, s: Number) -> Line:
         """Return the state where nothing is met."""
@@ -182,7 +151,7 @@ def _hit(flight: Flight, step: Line) -> Number | None:
     low, high = (mp.mpf(end) for end in step["dt"])
     spare = high * mp.mpf(10) ** -40
     ends = low - spare, high + spare
-    before, behind = (flight.walls(s)[step["wall"]].f for s in ends)
+    before, behind = (flight.walls(s)[step["wall"]] for s in ends)
     return flight.root(step["wall"], *ends) if before > 0 > behind else None
 
 
@@ -202,16 +171,16 @@ def negative(flight: Flight, end: Number, n: int) -> str | None:
     samples = [(s, flight.walls(s), flight.reach(s)) for s in flight.instants(numbers().zero, end, n)]
     for s, walls, reach in samples:
         for wall in reach:
-            if walls[wall].f < 0:
+            if walls[wall] < 0:
                 return f"{wall} is met before s = {mpmath.nstr(s, 17)}"
     for wall in samples[0][1]:
         dips = []
         for before, at, behind in zip(samples, samples[1:], samples[2:], strict=False):
-            if wall in at[2] and before[1][wall].f > at[1][wall].f <= behind[1][wall].f:
-                dips.append((at[1][wall].f, before[0], behind[0]))
+            if wall in at[2] and before[1][wall] > at[1][wall] <= behind[1][wall]:
+                dips.append((at[1][wall], before[0], behind[0]))
         for _, a, b in sorted(dips)[:N_LOWEST]:
             s = _lowest(flight, wall, a, b)
-            if flight.walls(s)[wall].f < 0 and wall in flight.reach(s):
+            if flight.walls(s)[wall] < 0 and wall in flight.reach(s):
                 return f"{wall} is met between two samples, before s = {mpmath.nstr(s, 17)}"
     return None
 
@@ -221,7 +190,7 @@ def _lowest(flight: Flight, wall: str, a: Number, b: Number) -> Number:
     golden = (numbers().sqrt(5) - 1) / 2
     for _ in range(25):
         left, right = b - golden * (b - a), a + golden * (b - a)
-        is_left = flight.walls(left)[wall].f < flight.walls(right)[wall].f
+        is_left = flight.walls(left)[wall] < flight.walls(right)[wall]
         a, b = (a, right) if is_left else (left, b)
     return (a + b) / 2
 
@@ -241,11 +210,12 @@ def _untied(flight: Flight, line: Line, n: int) -> str | None:
     """Look for an ordinary end of a flight that is claimed to have none."""
     mp = numbers()
     tiny = mp.mpf(10) ** -30
-    on = [wall for wall in flight.walls(mp.zero).values() if abs(wall.f) < tiny]
-    if len(on) > 1 or any(wall.rate < tiny for wall in on):
+    at, start = table_at(mp, flight.scene, flight.t), flight.place(mp.zero)
+    on = [wall for wall, f in flight.walls(mp.zero).items() if abs(f) < tiny]
+    if len(on) > 1 or any(at.gap_rate(wall, *start, flight.vx, flight.vy) < tiny for wall in on):
         return None
     first = next(next_hits(flight, mp.zero, mp.mpf(line["t_end"]) - flight.t, n), None)
-    if first and sum(abs(wall.f) < tiny for wall in flight.walls(first[1]).values()) > 1:
+    if first and sum(abs(f) < tiny for f in flight.walls(first[1]).values()) > 1:
         return None
     return f"nothing is undefined where {first[0] if first else 'nothing'} is met"
 
@@ -264,7 +234,7 @@ def next_hits(
     """
     samples = ((s, flight.walls(s)) for s in flight.instants(begin, end, n))
     for (a, before), (b, behind) in pairwise(samples):
-        met = [wall for wall in only or flight.reach(a) if before[wall].f > 0 >= behind[wall].f]
+        met = [wall for wall in only or flight.reach(a) if before[wall] > 0 >= behind[wall]]
         for root, wall in sorted((flight.root(wall, a, b), wall) for wall in met):
             if only or wall != "base" or flight.table != "mushroom" or not flight.is_mouth_open(root):
                 yield wall, root

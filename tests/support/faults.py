@@ -1,148 +1,103 @@
-"""The one table of faulty servers: the check that refuses each, the verdict, the fault."""
+"""The one table of faulty steppers: the check that refuses each, the verdict, the fault."""
 
 import math
 import operator
+from functools import partial
+from itertools import count
 
-from support.faulty_refusals import (
-    absent_as_zero,
+from support.faulty_readers import (
+    answer_by,
+    as_fortran_reads,
+    at_bad_lines,
+    crash,
     everywhere,
     excused,
+    filled_in,
+    first_parts,
     fleeing,
     in_a,
     in_the_mouth,
+    last_bit_varies,
     leaving_slowly,
     letting,
     loose,
+    minus_is_below,
+    nameless,
     near_by,
     nearly_one_period,
     number_of,
+    offering,
     on_a_longer,
     one_of_two,
     passes_samples,
     refusing,
     refusing_starts,
+    rounded,
+    scene_by,
+    scene_kept,
     scenes_refused_for,
     slower,
     strictly_off,
+    take_hints,
     unchecked,
     unknown_wall,
+    values_alone,
     whole,
     wide_by_ranges,
-)
-from support.faulty_servers import (
-    FLOW,
-    PATH,
-    STEP,
-    Answer,
-    Change,
-    Fault,
-    Line,
-    after_hits,
-    answers_by,
-    as_fortran_reads,
-    asked,
-    at_bad_lines,
-    by,
-    captured_as,
-    clock,
-    crash,
-    each,
-    elsewhere,
-    fewer,
-    first_parts,
-    last_bit_varies,
-    losing_stays,
-    minus_is_below,
-    on,
-    once,
-    one_bad_spoils_all,
-    particles_by,
-    remembered,
-    rounded,
-    same_velocity_for_all,
-    scenes_by,
-    scenes_kept,
-    starts,
-    straight_on,
-    swapping,
-    take_hints,
-    values_alone,
-    wide_edge,
     without,
+    without_depth,
     without_wall,
     wrong_after_bad_lines,
 )
 from support.faulty_steppers import (
+    FLOW,
     OPEN,
+    PATH,
+    STEP,
+    Fault,
+    after_hits,
+    asked,
     beside_its_wall,
+    both,
+    by,
+    captured_as,
+    clock,
     dead_time,
+    each,
     early,
+    elsewhere,
+    fewer,
     horizon_at_once,
     impatient,
     late_speed,
     leaking,
     leaving_out,
+    losing_stays,
+    mend,
     never_moving,
+    on,
+    once,
+    one_bad_spoils_all,
     one_too_few,
+    other_mouth,
+    other_slope,
+    particles_by,
+    remembered,
     repeated,
+    room_for,
+    same_time_for_all,
+    same_velocity_for_all,
     slowed,
+    straight_on,
+    swapping,
     tired,
     to_and_fro,
-    with_mouth,
-    with_slope,
+    turned,
+    wide_edge,
     wrong_order,
 )
 
 PLACE = ("x", "y", "vx", "vy")
-
-
-def first_time_for_all(request: Line) -> None:
-    """Let all particles of a flow begin when the first does."""
-    for state in starts(request):
-        state["t"] = starts(request)[0].get("t")
-
-
-def room_for(n: int) -> Change:
-    """Have room for n particles, and give the last one's arrival to all beyond."""
-    return lambda _, found: {
-        **found,
-        "states": [*found["states"][:n], *found["states"][n - 1 : n] * (len(found["states"]) - n)],
-    }
-
-
-def offering(*profiles: str) -> Fault:
-    """Offer some profiles only."""
-    return lambda request, answer: {
-        **answer(request),
-        **({"profiles": profiles} if request.get("cmd") == "start" else {}),
-    }
-
-
-def both(one: Fault, other: Fault) -> Fault:
-    """Have two faults."""
-    return lambda request, answer: one(request, lambda changed: other(changed, answer))
-
-
-def nameless(request: Line, answer: Answer) -> Line:
-    """Name no walls, and keep no flight times."""
-    found = answer(request)
-    for part in (found, *found.get("steps", ())):
-        part.pop("dt", None)
-        part.pop("wall", None)
-    return found
-
-
-def mend(request: Line, found: Line) -> Line:
-    """Leave paths open after 300 hits, and lose speed before."""
-    leaking(1e-10)(request, found)
-    return {**found, "steps": [*found["steps"][:300], OPEN] if len(found["steps"]) > 300 else found["steps"]}
-
-
-def wall_by_default(wall: str, *cmds: str) -> Fault:
-    """Take a wall that is not named for one."""
-    return asked(lambda request: [state.setdefault("wall", wall) for state in starts(request)], *cmds)
-
-
 EXCUSES = {
     "loose-on-walls": loose(1e-2),
     "loose-by-1e-5": loose(1e-5),
@@ -174,32 +129,39 @@ KEYS = {
 }
 # What refuses each: the check, its verdict, the fault.
 FAULTS: dict[str, tuple[str, str, Fault]] = {
-    "absent-is-arc": ("spelling", "fail", wall_by_default("arc", STEP)),
-    "absent-is-arc-in-paths": ("spelling", "fail", wall_by_default("arc", PATH)),
-    "absent-is-arc-in-flows": ("spelling", "fail", wall_by_default("arc", FLOW)),
+    "absent-is-arc": ("spelling", "fail", asked(filled_in, STEP, name="wall", value="arc")),
+    "absent-is-arc-in-paths": ("spelling", "fail", asked(filled_in, PATH, name="wall", value="arc")),
+    "absent-is-arc-in-flows": ("spelling", "fail", asked(filled_in, FLOW, name="wall", value="arc")),
     "nameless-only": ("spelling", "fail", refusing(lambda request: "name" in request["scene"])),
     "as-fortran-reads": ("spelling", "fail", asked(as_fortran_reads)),
     "crash-at-bad-lines": ("malformed-lines", "crashed", at_bad_lines(crash)),
     "guess-at-bad-lines": ("malformed-lines", "fail", at_bad_lines(lambda: {"seq": None, **OPEN})),
-    "wrong-after-bad-lines": ("malformed-lines", "fail", wrong_after_bad_lines()),
+    "wrong-after-bad-lines": ("malformed-lines", "fail", partial(wrong_after_bad_lines, upset=[])),
     "take-hints": ("extra-fields", "fail", take_hints),
     "minus-is-below": ("minus-zero", "fail", asked(minus_is_below)),
     # Caches.
     **{
-        f"remembering-{n}-digits": ("changed-questions", "fail", answers_by(rounded(n)))
+        f"remembering-{n}-digits": ("changed-questions", "fail", on(STEP, answer_by, key=rounded(n), book={}))
         for n in (6, 9, 12, 15)
     },
-    "answers-without-wall": ("changed-questions", "fail", answers_by(without_wall)),
-    **{f"scenes-{name}": ("changed-questions", "fail", scenes_by(key, STEP)) for name, key in KEYS.items()},
-    "paths-by-first-parts": ("changed-questions", "fail", scenes_by(first_parts, PATH)),
-    "flows-by-first-parts": ("changed-questions", "fail", scenes_by(first_parts, FLOW)),
-    "scenes-by-name": ("changed-questions", "fail", scenes_kept(lambda scene: scene.get("name") or scene)),
-    "scenes-without-depth": (
+    "answers-without-wall": ("changed-questions", "fail", on(STEP, answer_by, key=without_wall, book={})),
+    **{
+        f"scenes-{name}": ("changed-questions", "fail", asked(scene_by, STEP, key=key, book={}))
+        for name, key in KEYS.items()
+    },
+    "paths-by-first-parts": ("changed-questions", "fail", asked(scene_by, PATH, key=first_parts, book={})),
+    "flows-by-first-parts": ("changed-questions", "fail", asked(scene_by, FLOW, key=first_parts, book={})),
+    "scenes-by-name": (
         "changed-questions",
         "fail",
-        scenes_kept(lambda scene: {k: v for k, v in scene.items() if k not in ("h", "slope")}),
+        asked(scene_kept, key=lambda scene: scene.get("name") or scene, book={}),
     ),
-    "scenes-without-names": ("changed-questions", "fail", scenes_by(without(), STEP, are_named=False)),
+    "scenes-without-depth": ("changed-questions", "fail", asked(scene_kept, key=without_depth, book={})),
+    "scenes-without-names": (
+        "changed-questions",
+        "fail",
+        asked(scene_by, STEP, key=without(), book={}, are_named=False),
+    ),
     # Flows.
     "one-bad-spoils-all": ("many-particles", "fail", on(FLOW, one_bad_spoils_all)),
     "bad-ones-last": (
@@ -227,13 +189,13 @@ FAULTS: dict[str, tuple[str, str, Fault]] = {
         on(FLOW, each("rejected", lambda _, part, __: part.update(captured=[0.0, 1.0]))),
     ),
     "first-for-all": ("many-particles", "fail", on(FLOW, same_velocity_for_all)),
-    "first-time-for-all": ("many-particles", "fail", asked(first_time_for_all, FLOW)),
-    **{f"room-for-{n}": ("many-particles", "fail", on(FLOW, room_for(n))) for n in (64, 256, 500, 2000)},
-    "particles-without-time": ("many-particles", "fail", on(FLOW, particles_by(by(*PLACE, "wall")))),
-    "particles-without-wall": ("many-particles", "fail", on(FLOW, particles_by(by("t", *PLACE)))),
-    "particles-by-place": ("many-particles", "fail", on(FLOW, particles_by(by("t", "x", "y", "wall")))),
-    "particles-by-9-digits": ("many-particles", "fail", on(FLOW, particles_by(rounded(9)))),
-    "swapped-now-and-then": ("many-particles", "fail", on(FLOW, swapping(5))),
+    "first-time-for-all": ("many-particles", "fail", asked(same_time_for_all, FLOW)),
+    **{f"room-for-{n}": ("many-particles", "fail", on(FLOW, room_for, n=n)) for n in (64, 256, 500, 2000)},
+    "particles-without-time": ("many-particles", "fail", on(FLOW, particles_by, key=by(*PLACE, "wall"))),
+    "particles-without-wall": ("many-particles", "fail", on(FLOW, particles_by, key=by("t", *PLACE))),
+    "particles-by-place": ("many-particles", "fail", on(FLOW, particles_by, key=by("t", "x", "y", "wall"))),
+    "particles-by-9-digits": ("many-particles", "fail", on(FLOW, particles_by, key=rounded(9))),
+    "swapped-now-and-then": ("many-particles", "fail", on(FLOW, swapping, numbers=count(1))),
     **{
         f"captured-in-blocks-of-{n}": (
             "many-particles",
@@ -254,17 +216,20 @@ FAULTS: dict[str, tuple[str, str, Fault]] = {
         "fail",
         captured_as(lambda request, stay, _: [stay[0], request["t_end"]]),
     ),
-    **{f"edge-wider-by-{part:g}": ("edges", "fail", wide_edge(part)) for part in (1e-4, 1e-6, 2.0**-25)},
-    "without-slope-in-flows": ("hits", "fail", with_slope(lambda _: 0.0, FLOW)),
-    "frozen-after-50": ("long-paths", "fail", after_hits(50, slowed)),
-    **{f"straight-after-{n}": ("long-flow", "fail", after_hits(n, straight_on)) for n in (1000, 2000, 4000)},
+    **{
+        f"edge-wider-by-{part:g}": ("edges", "fail", on(FLOW, wide_edge, by_part=part))
+        for part in (1e-4, 1e-6, 2.0**-25)
+    },
+    "without-slope-in-flows": ("hits", "fail", asked(other_slope, FLOW, change=lambda _: 0.0)),
+    "frozen-after-50": ("long-paths", "fail", on(FLOW, after_hits, n=50, change=slowed)),
+    **{
+        f"straight-after-{n}": ("long-flow", "fail", on(FLOW, after_hits, n=n, change=straight_on))
+        for n in (1000, 2000, 4000)
+    },
     "leaking-in-flows": (
         "long-flow",
         "fail",
-        on(
-            FLOW,
-            each("horizon", lambda _, part, __: part.update(vx=part["vx"] * 1.001, vy=part["vy"] * 1.001)),
-        ),
+        on(FLOW, each("horizon", lambda _, part, __: turned(part, 1.001))),
     ),
     "open-flows": (
         "many-particles",
@@ -278,17 +243,19 @@ FAULTS: dict[str, tuple[str, str, Fault]] = {
     ),
     # Hits and paths.
     "one-too-few": ("long-paths", "fail", on(PATH, one_too_few)),
-    **{f"tired-at-{n}": ("long-paths", "fail", on(PATH, tired(n))) for n in (50, 450, 1000, 2000, 4000)},
-    "without-slope-in-paths": ("hits", "fail", with_slope(lambda _: 0.0, PATH)),
-    "faster-after-1000": ("long-paths", "fail", on(PATH, each("collision", late_speed(1000.0)))),
-    "faster-late-steps": ("late-starts", "fail", on(STEP, each("collision", late_speed(1000.0)))),
-    "leaking": ("long-paths", "fail", on(PATH, leaking(1e-10))),
-    "spiralling": ("long-paths", "fail", on(PATH, leaking(0.0, 1e-10))),
+    **{
+        f"tired-at-{n}": ("long-paths", "fail", on(PATH, tired, after=n)) for n in (50, 450, 1000, 2000, 4000)
+    },
+    "without-slope-in-paths": ("hits", "fail", asked(other_slope, PATH, change=lambda _: 0.0)),
+    "faster-after-1000": ("long-paths", "fail", on(PATH, each("collision", late_speed))),
+    "faster-late-steps": ("late-starts", "fail", on(STEP, each("collision", late_speed))),
+    "leaking": ("long-paths", "fail", on(PATH, each("collision", leaking, part=1e-10))),
+    "spiralling": ("long-paths", "fail", on(PATH, each("collision", leaking, angle=1e-10))),
     "leaking-before-it-is-open": ("long-paths", "fail", on(PATH, mend)),
     "horizon-at-once": ("long-paths", "fail", on(PATH, horizon_at_once)),
     "never-moving": ("long-paths", "fail", on(PATH, each("collision", never_moving))),
-    "standing-at-a-wall": ("long-paths", "fail", on(PATH, repeated({}))),
-    "pressing-at-a-wall": ("long-paths", "fail", on(PATH, repeated({"vx": -1.0, "vy": -1.0}))),
+    "standing-at-a-wall": ("long-paths", "fail", on(PATH, repeated)),
+    "pressing-at-a-wall": ("long-paths", "fail", on(PATH, repeated, factor=-1.0)),
     "at-twice-the-time": (
         "long-paths",
         "fail",
@@ -300,8 +267,8 @@ FAULTS: dict[str, tuple[str, str, Fault]] = {
         "fail",
         asked(lambda request: request.update(collisions=request.get("collisions") or 1), PATH),
     ),
-    "undefined-left-out": ("endings", "fail", on(PATH, leaving_out("undefined"))),
-    "horizon-left-out": ("endings", "fail", on(PATH, leaving_out("horizon"))),
+    "undefined-left-out": ("endings", "fail", on(PATH, leaving_out, outcome="undefined")),
+    "horizon-left-out": ("endings", "fail", on(PATH, leaving_out, outcome="horizon")),
     "corners-for-all-reasons": (
         "endings",
         "fail",
@@ -312,14 +279,14 @@ FAULTS: dict[str, tuple[str, str, Fault]] = {
         ),
     ),
     **{
-        f"ties-within-{near:g}-by-order": ("edges", "fail", on(STEP, wrong_order(near)))
+        f"ties-within-{near:g}-by-order": ("edges", "fail", on(STEP, wrong_order, near=near))
         for near in (1e-4, 1e-8, 2.0**-31)
     },
     **{
         f"mouths-below-{near:g}-shut": (
             "edges",
             "fail",
-            with_mouth(lambda w, near=near: w * 1e-9 if w < near else w),
+            asked(other_mouth, change=lambda w, near=near: w * 1e-9 if w < near else w),
         )
         for near in (1e-3, 1e-5, 2.0**-31)
     },
@@ -327,7 +294,7 @@ FAULTS: dict[str, tuple[str, str, Fault]] = {
         f"mouths-above-{1 - near:g}-whole": (
             "edges",
             "fail",
-            with_mouth(lambda w, near=near: 1.0 if w > 1 - near else w),
+            asked(other_mouth, change=lambda w, near=near: 1.0 if w > 1 - near else w),
         )
         for near in (1e-3, 1e-5, 2.0**-31)
     },
@@ -335,12 +302,12 @@ FAULTS: dict[str, tuple[str, str, Fault]] = {
         f"slopes-from-{-steep:g}-on": (
             "edges",
             "fail",
-            with_slope(lambda slope, steep=steep: max(slope, -steep)),
+            asked(other_slope, change=lambda slope, steep=steep: max(slope, -steep)),
         )
         for steep in (1.0, 16.0, 32.0)
     },
-    "dead-time-of-1e-9": ("edges", "fail", on(STEP, dead_time(1e-9))),
-    **{f"impatient-after-{n}": ("waiting", "fail", on(STEP, impatient(n))) for n in (512, 1000)},
+    "dead-time-of-1e-9": ("edges", "fail", on(STEP, dead_time, part=1e-9)),
+    **{f"impatient-after-{n}": ("waiting", "fail", on(STEP, impatient, periods=n)) for n in (512, 1000)},
     # Bad input, and good.
     **{name: ("bad-states", "fail", excused(excuse, STEP)) for name, excuse in EXCUSES.items()},
     "no-time-no-check": ("bad-states", "fail", unchecked(operator.eq, STEP)),
@@ -360,12 +327,12 @@ FAULTS: dict[str, tuple[str, str, Fault]] = {
         f"scenes-without-{name}": ("bad-scenes", "fail", scenes_refused_for(word))
         for name, word in RULES.items()
     },
-    **{f"scenes-by-{n}-samples": ("bad-scenes", "fail", letting(passes_samples(n))) for n in (1, 64)},
+    **{f"scenes-by-{n}-samples": ("bad-scenes", "fail", letting(passes_samples, n=n)) for n in (1, 64)},
     "periods-to-9-digits": ("bad-scenes", "fail", letting(nearly_one_period)),
     "scenes-by-ranges": ("bad-scenes", "fail", refusing(wide_by_ranges)),
     "unknown-wall-as-null": ("bad-requests", "fail", asked(unknown_wall)),
     **{
-        f"absent-{name}-as-0": ("bad-requests", "fail", absent_as_zero(name))
+        f"absent-{name}-as-0": ("bad-requests", "fail", asked(filled_in, name=name, value=0.0))
         for name in ("t", "x", "y", "vx", "vy")
     },
     "true-as-1": ("bad-requests", "fail", everywhere(lambda value: 1.0 if value is True else value)),
@@ -373,12 +340,12 @@ FAULTS: dict[str, tuple[str, str, Fault]] = {
     "collisions-rounded": ("bad-requests", "fail", asked(whole)),
     "omega-before-period": ("bad-requests", "fail", asked(one_of_two)),
     # Clocks.
-    "fewer": ("time-steps", "fail", fewer(8)),
+    "fewer": ("time-steps", "fail", partial(fewer, most=8)),
     "elsewhere": ("time-steps", "fail", on("time", elsewhere)),
-    "fewer-of-many": ("time-clock", "fail", fewer(100)),
-    "no-time": ("time-clock", "fail", clock(lambda _, said: [0] * len(said))),
-    "a-tenth": ("time-clock", "fail", clock(lambda _, said: [n // 10 for n in said])),
-    "tenfold": ("time-clock", "fail", clock(lambda _, said: [10 * n for n in said])),
+    "fewer-of-many": ("time-clock", "fail", partial(fewer, most=100)),
+    "no-time": ("time-clock", "fail", clock(lambda said: [0] * len(said))),
+    "a-tenth": ("time-clock", "fail", clock(lambda said: [n // 10 for n in said])),
+    "tenfold": ("time-clock", "fail", clock(lambda said: [10 * n for n in said])),
     "constant": ("time-clock", "fail", once(lambda _, __, repeat: [1000] * repeat)),
     "by-the-piece": ("time-clock", "fail", once(lambda n, _, repeat: [500 * n] * repeat)),
     "once-for-all": ("time-clock", "fail", once(lambda n, _, repeat: [10_000_000 + n] * repeat)),
@@ -387,11 +354,11 @@ FAULTS: dict[str, tuple[str, str, Fault]] = {
 # Errors that do not add up, others that vectors let pass, and manners: these are no faults. The checks asked.
 HARMLESS: dict[str, tuple[str | tuple[str, ...], Fault]] = {
     "to and fro": ("promise", on(PATH, each("collision", to_and_fro))),
-    "coarse": ("promise", both(offering(STEP), on(STEP, early(1e-12)))),
-    "coarser": ("promise", both(offering(STEP), on(STEP, early(3e-10)))),
-    "steps alone": ("promise", offering(STEP)),
-    "flows alone": ("promise", offering(FLOW)),
-    "last bit varies": (("property", "promise"), last_bit_varies()),
+    "coarse": ("promise", both(partial(offering, profile=STEP), on(STEP, early, part=1e-12))),
+    "coarser": ("promise", both(partial(offering, profile=STEP), on(STEP, early, part=3e-10))),
+    "steps alone": ("promise", partial(offering, profile=STEP)),
+    "flows alone": ("promise", partial(offering, profile=FLOW)),
+    "last bit varies": (("property", "promise"), on((STEP, PATH, FLOW), last_bit_varies, numbers=count(1))),
     "names no walls and keeps no flight times": (
         ("property/energy", "promise/hits", "promise/spelling", "promise/endings"),
         nameless,

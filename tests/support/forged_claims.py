@@ -5,19 +5,9 @@ false, or None where it cannot be sure of that; its docstring says why the line 
 most: a question has one answer, so what contradicts a true claim is false. The numbers of a forgery agree
 with each other: a later root comes with its own place and velocity. Wrong physics, and questions that must be
 refused, are forged elsewhere: by faulty references under attack, and by weaker verifiers.
-
-    python -m tests.support.forged_claims N [SEED]
-
-draws N forgeries, of each kind in turn, and has them verified. It prints how many of each kind are called
-false, how many not proved; and each one that is proved, or that ends in an error. Then it exits with 1.
 """
 
-from __future__ import annotations
-
 import json
-import sys
-import time
-from collections import Counter
 from collections.abc import Callable, Iterator
 from decimal import Context, Decimal
 from fractions import Fraction
@@ -35,8 +25,7 @@ from conformance.cases.prover import coasted, collided
 from conformance.cases.prover import ends as exact_ends
 from conformance.vectors import Certified, certified
 from scene import State, from_data
-
-from .falsifier import CORPUS, NUMBERS, Flight, Line, next_hits, numbers
+from support.falsifier import CORPUS, NUMBERS, Flight, Line, next_hits, numbers
 
 REFUSALS = ("false", "not proved", "unreadable")
 REASONS = ("corner", "tangency", "sliding", "mouth-edge")
@@ -303,22 +292,3 @@ def judge(line: Line, verifier: ModuleType = verify) -> str:
         return "unreadable"
     except Exception as error:
         return f"{type(error).__name__}: {error}"
-
-
-def main(n: int, seed: int = 1) -> int:
-    """Have n forgeries verified; return 1 if one is accepted, or ends in an error."""
-    counts, began = Counter[tuple[str, str]](), time.monotonic()
-    for kind, line in draw(n, seed):
-        status = judge(line)
-        counts[kind, status] += 1
-        if status not in REFUSALS:
-            print(f"{kind}: {status}\n{json.dumps(line)}", flush=True)
-    for (kind, status), k in sorted(counts.items()):
-        print(f"{kind:35}{k:>6} {status}")
-    n_wrong = sum(k for (_, status), k in counts.items() if status not in REFUSALS)
-    print(f"{n_wrong} of {n} accepted or in error, seed {seed}, {time.monotonic() - began:.0f} s")
-    return bool(n_wrong)
-
-
-if __name__ == "__main__":
-    sys.exit(main(*map(int, sys.argv[1:])))

@@ -8,7 +8,7 @@ from typing import Any
 
 from scene import catalogue
 from scene.load import read_data
-from support.saboteurs import HIT, INTRODUCTION
+from support.faulty_servers import HIT, INTRODUCTION
 
 NUMBERS = (
     0.0,

@@ -14,7 +14,7 @@ from conformance import vectors
 from conformance.grading.agreement import middle
 from conformance.suite.session import AnswerLine
 from conformance.suite.symmetry import Transform, draw_transform
-from support.faulty_servers import Answer, Line, faulty, starts
+from support.faulty_steppers import Answer, Line, faulty, starts
 
 UNDECIDED = {"outcome": "undecided", "reason": "not in the book"}
 

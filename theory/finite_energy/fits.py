@@ -21,10 +21,10 @@ ALIKE = 2.0**-46  # share of a term that the others leave: below it they leave r
 
 
 class PowerFit(NamedTuple):
-    """y = coefficient x^exponent, and next orders where they were asked for, fitted to log y.
+    """A fit of y = coefficient x^exponent, with next orders if asked for, to log y.
 
-    exponent, exponent_error: with the standard errors of the data.
-    coefficient, coefficient_error: value at x = 1 but for next orders; the error of its logarithm, times it.
+    exponent, exponent_error: the exponent and its standard error.
+    coefficient, coefficient_error: value at x = 1 without next orders, and its standard error.
     residuals: (log y - fit) in standard errors, in the order of the data.
     chi_square: their sum of squares, for len(y) - 2 degrees of freedom, less one for each next order.
     """
@@ -38,10 +38,10 @@ class PowerFit(NamedTuple):
 
 
 class Limit(NamedTuple):
-    """y = limit + slope x^exponent.
+    """A fit of y = limit + slope x^exponent.
 
     limit, limit_error: the value as x -> infinity (exponent < 0).
-    slope, slope_error: of the finite-energy term.
+    slope, slope_error: factor of the finite-energy term.
     residuals: (y - fit) in standard errors.
     chi_square: their sum of squares, for len(y) - 2 degrees of freedom.
     """
@@ -55,17 +55,17 @@ class Limit(NamedTuple):
 
 
 def unbiased_mean(scene: Scene, digits: int = 15) -> Any:
-    """Return the mean of exp(-s / 2), which finite energy leaves unbiased to the order E0^(-1/2).
+    """Return the mean of exp(-s / 2), which has no bias of order E0^(-1/2) at a finite energy E0.
 
-    That is so where the sides lean inward at all times; elsewhere (`upright`) it has a bias at any
-    energy that a run reaches.
+    This holds if the sides lean inward at all times. Otherwise (`upright`) it has a bias at every energy that
+    a run reaches.
 
     Args:
         scene: a valid mushroom.
         digits: correct significant digits wanted.
 
     Returns:
-        An mpf below 1, or 1 when energies do not change.
+        An mpf below 1, or 1 if energies do not change.
 
     Raises:
         NotCovered, NotConverged: as `theory.predict`.
@@ -77,10 +77,10 @@ def fit_power(x: ArrayLike, y: ArrayLike, errors: ArrayLike, orders: ArrayLike =
     """Fit a power law; for the width against the energy the theory's exponent is -1/4 (sides lean inward).
 
     Args:
-        x: shape (n,), positive, with two different, and one more for each next order.
+        x: shape (n,), positive, with at least two different values, and one more for each next order.
         y: shape (n,), positive.
         errors: standard errors of y, positive.
-        orders: powers of x, < 0, by which the next orders are smaller: a term in log y is fitted for each.
+        orders: exponents < 0. For each, a term proportional to this power of x is added to log y.
 
     Raises:
         BadInput: the shapes differ or a number is out of bounds.
@@ -106,10 +106,10 @@ def extrapolate(x: ArrayLike, y: ArrayLike, errors: ArrayLike, exponent: float =
     """Extrapolate a measured quantity to infinite energy.
 
     Args:
-        x: energies, shape (n,), positive, n >= 2 with two different.
+        x: energies, shape (n,), positive, with at least two different values.
         y: the quantity (mean of s, share not captured, ...), shape (n,).
         errors: standard errors of y, positive.
-        exponent: of the finite-energy term: -1/2 for everything of order sigma_w^2, if the sides lean inward.
+        exponent: of the finite-energy term; -1/2 for all terms of order sigma_w^2, if the sides lean inward.
 
     Raises:
         BadInput: the shapes differ, a number is out of bounds or exponent is not < 0.

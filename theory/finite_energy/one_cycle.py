@@ -99,10 +99,10 @@ class TheoryError(NamedTuple):
 
 
 class FiniteEnergy:
-    """One cycle's energies at an initial energy.
+    """The energies after one cycle, for one initial energy.
 
     Attributes:
-        scene, energy: as given; refused as by `at_energy`.
+        scene, energy: the arguments; the same ones are refused as by `at_energy`.
         s_nc: log E_nc / E0 of the adiabatic theory.
         p_nc: probability of never being captured.
         atoms: the distribution of s = log E1 / E0.
@@ -146,19 +146,19 @@ class FiniteEnergy:
 
     @property
     def captured_mean(self) -> float:
-        """Mean of log E1 / E0 of the captured; nan of no one."""
+        """Mean of log E1 / E0 of the captured particles; nan if there are none."""
         a = self.atoms.those(~self.atoms.is_free)
         return float(a.weight @ self._centres(a) / a.weight.sum()) if len(a.weight) else float("nan")
 
     @property
     def peak(self) -> tuple[float, float]:
-        """Mean and variance of log E1 / E0 of those never captured."""
+        """Mean and variance of log E1 / E0 of the particles never captured."""
         a = self.atoms.those(self.atoms.is_free)
         return float(self._centres(a)[0]), float(a.variance[0] - a.variance[0] ** 2 / 8)
 
     @property
     def theory_error(self) -> TheoryError:
-        """How far each figure may be off."""
+        """Estimated error of each figure."""
         captured = self.atoms.those(~self.atoms.is_free)
         second = (
             float(captured.weight @ captured.shift**2) / p if (p := float(captured.weight.sum())) else 0.0
@@ -179,11 +179,15 @@ class FiniteEnergy:
         )
 
     def free_cdf(self, s: ArrayLike) -> Floats:
-        """Return the probability, among those never captured, of log E1 / E0 <= s."""
+        """Return the probability of log E1 / E0 <= s for a particle never captured."""
         return self._cdf(s, "free")
 
     def captured_cdf(self, s: ArrayLike) -> Floats:
-        """Return the probability, among the captured, of log E1 / E0 <= s; BadInput of no one."""
+        """Return the probability of log E1 / E0 <= s for a captured particle.
+
+        Raises:
+            BadInput: no particle is captured.
+        """
         return self._cdf(s, "captured")
 
     def cdf(self, s: ArrayLike) -> Floats:
@@ -191,7 +195,11 @@ class FiniteEnergy:
         return self._cdf(s, "all")
 
     def mean_of_exp(self, q: float) -> float:
-        """Return the mean of exp(q s), to the second order in the blurs; BadInput if beyond binary64."""
+        """Return the mean of exp(q s), to second order in the widths.
+
+        Raises:
+            BadInput: the mean is beyond binary64.
+        """
         a, q = self.atoms, check_number("q", q)
         with np.errstate(over="ignore", invalid="ignore"):
             drift = q * (1 + 2 * q) / 4 * a.variance
@@ -201,7 +209,11 @@ class FiniteEnergy:
         return found
 
     def capture_cdf(self, t: ArrayLike) -> Floats:
-        """Return the probability, among the captured, of a first capture by each time; BadInput of no one."""
+        """Return the probability, for a captured particle, of a first capture up to each time.
+
+        Raises:
+            BadInput: no particle is captured.
+        """
         a = self._those_of("captured")
         order = np.argsort(a.t_in)
         below = np.cumsum(a.weight[order]) - a.weight[order] / 2
@@ -209,12 +221,12 @@ class FiniteEnergy:
         return found
 
     def zone(self, times: ArrayLike) -> tuple[Floats, Floats]:
-        """Return mean and variance of log E / E0 at times of the cycle of those not captured so far.
+        """Return mean and variance of log E / E0, at times of the cycle, of particles not captured so far.
 
-        A variance of 0 is one that corrections outweigh: it is below their error, and no more is known.
+        The variance 0 means: it is smaller than its error.
 
         Raises:
-            BadInput: times are no finite numbers in one dimension, or one is outside the cycle.
+            BadInput: times is not a one-dimensional array of finite numbers, or a time is outside the cycle.
         """
         return (found := self._in_zone(times))[0], np.maximum(found[1], 0.0)
 
@@ -228,7 +240,7 @@ class FiniteEnergy:
         return chaotic_zone(self.scene, t).log_energy - begun + drift, variance - variance**2 / 8
 
     def at_capture(self, times: ArrayLike) -> tuple[Floats, Floats]:
-        """Return mean and variance of log E / E0 of those captured first at each time; else as `zone`."""
+        """Return mean and variance of log E / E0 of particles first captured at each time; else as `zone`."""
         (mean, variance), t = self._in_zone(times), self._within(times)
         lag, square = (self._fields.at(name, np.zeros(len(t)), t) for name in ("lag", "square"))
         return mean + lag, np.maximum(variance + square - lag**2, 0.0)
@@ -236,7 +248,7 @@ class FiniteEnergy:
     def draw(self, n_cycles: int, n: int, seed: int) -> Floats:
         """Draw log E / E0 of n particles after each of n_cycles independent cycles; shape (n, n_cycles).
 
-        A cycle that begins at energy E adds shifts and variances in proportion to (E / E0)^(-1/2).
+        In a cycle that begins at energy E, shifts and variances are scaled by (E / E0)^(-1/2).
         """
         n_cycles = check_count("n_cycles", n_cycles, 1, MOST_DRAWN)
         n = check_count("n", n, 1, MOST_DRAWN // n_cycles)
@@ -356,13 +368,13 @@ def at_energy(scene: Scene, energy: float) -> FiniteEnergy:
     """Return the distribution of log E1 / E0 for an initial energy.
 
     Args:
-        scene: a mushroom that `theory.finite_energy.rates` knows, or the reverse of one.
+        scene: a mushroom with measured rates (`theory.finite_energy.rates`), or the reverse of one.
         energy: E = v^2 / 2 of every particle when the cycle begins [length^2 / time^2].
 
     Raises:
         BadInput: energy is not finite, not > 0, or above 2^1000.
-        NotCovered: no frozen rates of the scene are known, none of particles so slow, or corrections of the
-            order v^-1 and v^(-2/3) leave no variance.
+        NotCovered: no rates are known for this scene or for this speed, or the computed variance is not
+            positive.
     """
     return _solved(as_mushroom(scene), check_number("energy", energy))
 

@@ -36,12 +36,14 @@ SAME = 1e-9  # relative difference of parameters below which two cycles are one
 
 
 class Rates(NamedTuple):
-    """A cycle's rates at PHASES, each divided by a power of `pace`, the walls' speed: that makes them smooth.
+    """The rates of a cycle at PHASES.
 
-    diffusion: (N, M) variance of the sum of kicks of each of MEMORIES per path length, over pace^2.
-    lag: (N, S) mean lag of those being captured or released at SPEEDS, over pace; 0 where the mouth rests.
-    square: (N, S) mean square lag, less diffusion's, over pace^2.
-    depletion: (N, S) what the mouth's motion takes off diffusion, over pace^2: negative, or 0.
+    They are divided by powers of `pace`, the speed of the walls. This makes them smooth in the phase.
+
+    diffusion: (N, M) variance of the sum of kicks per path length, for each of MEMORIES, over pace^2.
+    lag: (N, S) mean lag times v, for particles captured or released at SPEEDS v, over pace; 0 if nu rests.
+    square: (N, S) mean square of the same sum of kicks, minus that of diffusion, times v^2, over pace^2.
+    depletion: (N, S) change of diffusion by the motion of the mouth, over pace^2; usually negative.
     diffusion_error, lag_error, square_error, depletion_error: their standard errors.
     """
 
@@ -104,10 +106,10 @@ def kick_rates(scene: Scene, times: Floats) -> Floats:
 
 
 def frozen_rates(scene: Scene) -> tuple[Rates, bool]:
-    """Return the rates of a cycle that was measured, and whether they are those of its reverse.
+    """Return the measured rates of a cycle, and whether they were measured on its reverse.
 
     Raises:
-        NotCovered: neither the scene nor its reverse is in the table.
+        NotCovered: there are no rates for the scene or its reverse.
     """
     found = _found(scene)
     return found.rates, found.turned

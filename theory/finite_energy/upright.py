@@ -40,7 +40,7 @@ TILTED = "sides are tilted: what is computed is of upright ones"
 
 
 def is_upright(scene: Scene) -> bool:
-    """Tell whether a mushroom's sides are upright at all times.
+    """Tell whether the sides of a mushroom are vertical at all times.
 
     Raises:
         NotCovered: not a mushroom.
@@ -52,7 +52,7 @@ def is_upright(scene: Scene) -> bool:
 def kept_by_the_cap(nu: float) -> float:
     """Return the mean of alpha / alpha', where the cap turns a small angle alpha from the base into alpha'.
 
-    That is how much of the next stay in the stem, which lasts as 1 / alpha', is foretold by this one.
+    This is the correlation between consecutive times spent in the stem, which are proportional to 1 / alpha.
 
     Args:
         nu: the mouth w / r, in [NARROWEST, 1].
@@ -76,7 +76,7 @@ def upright_rate(scene: Scene, times: ArrayLike) -> Floats:
     """Return the factor of log(v) / v in the growth of the chaotic zone's variance of log E.
 
     Args:
-        scene: a mushroom with upright sides.
+        scene: a mushroom with vertical sides.
         times: (T,) any times.
 
     Returns:
@@ -84,8 +84,8 @@ def upright_rate(scene: Scene, times: ArrayLike) -> Floats:
 
     Raises:
         NotCovered: not a mushroom, or its sides are tilted.
-        BadInput: times are no finite numbers in one dimension, the mouth is below NARROWEST, or a rate is
-            beyond binary64.
+        BadInput: times is not a one-dimensional array of finite numbers, the mouth is below NARROWEST, or a
+            rate is beyond binary64.
     """
     at = finite_array("times", times, 1)
     if not is_upright(scene):
@@ -113,15 +113,16 @@ def _growth(scene: Scene, at: Floats) -> Floats:
 
 
 def upright_spread(scene: Scene) -> float:
-    """Return B in the variance B log(v) / v + O(1 / v) of log E of the uncaptured after one cycle.
+    """Return B in the variance B log(v) / v + O(1 / v) of log E of particles never captured, in one cycle.
 
-    v is the speed at which the cycle begins, at the widest mouth. What is O(1 / v) is not known, and not
-    small: the narrower the mouth, the oftener the cap hands flights back, and the later log(v) wins.
+    v is the speed at the start of the cycle, when the mouth is widest. The O(1 / v) term is unknown and
+    large, above all for narrow mouths.
 
     Returns:
-        B [length / time], right to 1e-4 if each bang-bang leg lasts 4,096 units in the last place of its
-        times or longer: of 64 its share is off by up to 1 %, of 2 by 10 %, and a leg of one is missed. 0 when
-        no wall moves; no more than rounding, far below 1, where lengths keep their ratios, and all cancels.
+        B [length / time], right to 1e-4 if each bang-bang leg lasts at least 4,096 ulps of its times. The
+        contribution of a leg of 64 ulps is off by up to 1 %, that of a leg of 2 ulps by 10 %. A leg of one
+        ulp is missed. B is 0 if no wall moves. If the table only changes its size, B is a rounding error far
+        below 1.
 
     Raises:
         NotCovered: not a mushroom, or its sides are tilted.

@@ -7,7 +7,7 @@ import pytest
 from support.depth import deep_but
 
 from conformance.mutants import COMMON, MUTANTS, PLAIN, kill_matrix
-from conformance.mutants.kill_matrix import diagnose, kills, verdict
+from conformance.mutants.kill_matrix import diagnose, kills, page, verdict
 from conformance.vectors import load, manifest
 
 DOCS = Path(__file__).parent.parent / "docs"
@@ -35,6 +35,13 @@ def test_without_a_threshold_a_mutant_is_killed_at_level_core(vectors):
     levels = {name: {vectors[v].level for v in e["vectors"]} for name, e in PUBLISHED["mutants"].items()}
     late = {name for name, found in levels.items() if "core" not in found}
     assert all(MUTANTS[name].size is not None for name in late), late
+
+
+def test_the_table_has_a_row_for_each_mutant():
+    text = page(PUBLISHED)
+    rows = [line.replace("\\|", "") for line in text.splitlines() if line.startswith("| ")]
+    assert len(rows) == len(MUTANTS | COMMON) + 2
+    assert {row.count("|") for row in rows} == {6}
 
 
 @pytest.mark.parametrize("name", list(MUTANTS | COMMON))

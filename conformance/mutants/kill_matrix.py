@@ -2,7 +2,8 @@
 
 `python -m conformance.mutants.kill_matrix` answers every vector with every mutant, grades the answers and
 writes kill-matrix.json beside this file, with a few vectors for each mutant: some five minutes on one core.
-Only `fail` kills: a vector that a mutant declines, or at which it crashes, does not count.
+`--table` computes nothing and prints what is kept there as Markdown. Only `fail` kills: a vector that a
+mutant declines, or at which it crashes, does not count.
 
 A diagnosis of a run names the mutants, common mistakes included, that fail most like it. They answer a sample
 of its failures and passes, unless the few vectors by which the matrix tells them from others all passed.
@@ -13,6 +14,7 @@ import math
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Any
 
 import msgspec
 
@@ -25,6 +27,16 @@ from scene import BadInput
 DATA = Path(__file__).parent  # the matrix ships with the package
 MOST_VECTORS = 3  # kept of those that kill a mutant
 LEAST_COMPARED = 5  # vectors: what fewer kill shows too little to call other mutants needless
+HEAD = """# Kill matrix
+
+{n} mutants of the plain stepper, and how many of the {n_vectors} vectors of corpus {corpus} kill each by a
+`fail`. None is subsumed by another: no two are killed by nested sets of vectors. The mistakes named last are
+so common that a diagnosis names them, though the mutant in brackets subsumes each. At most three vectors are
+given, chosen so that few other mutants fail them all. A size is the threshold from which on a mistake shows.
+
+| mutant | what it does wrong | size | kills | some vectors that kill it |
+| --- | --- | ---: | ---: | --- |
+"""
 N_COMPARED = 20  # failures of a run, and as many passes
 # Groups that take the plain stepper long: they are compared only where no other failed.
 SLOW = ("waiting", "hard-case-22", "long-trajectory", "long-flow", "longest-flow")
@@ -128,6 +140,21 @@ def choose(name: str, found: dict[str, list[str]], vectors: dict[str, Vector]) -
     return chosen
 
 
+def page(published: dict[str, Any]) -> str:
+    """Return the readable form: mutants, then common mistakes, the least killed first."""
+    entries = published["mutants"]
+    n = sum(not entry["subsumed_by"] for entry in entries.values())
+    lines = [HEAD.format(n=n, **published).rstrip("\n")]
+    for name in sorted(
+        entries, key=lambda name: (bool(entries[name]["subsumed_by"]), entries[name]["kills"])
+    ):
+        entry = entries[name]
+        label = f"{name} ({entry['subsumed_by']})" if entry["subsumed_by"] else name
+        cells = label, entry["fault"].replace("|", "\\|"), entry["size"] or "", entry["kills"]
+        lines.append(f"| {' | '.join(map(str, cells))} | {', '.join(entry['vectors'])} |")
+    return "\n".join(lines) + "\n"
+
+
 def run(data: Path = DATA, on_progress: Callable[[str], None] = print) -> int:
     """Compute and write the matrix.
 
@@ -168,6 +195,9 @@ def run(data: Path = DATA, on_progress: Callable[[str], None] = print) -> int:
 
 
 if __name__ == "__main__":
+    if sys.argv[1:] == ["--table"]:
+        print(page(json.loads((DATA / "kill-matrix.json").read_text("utf-8"))), end="")
+        sys.exit(0)
     try:
         sys.exit(run())
     except BadInput as error:

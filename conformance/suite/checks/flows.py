@@ -72,9 +72,8 @@ def end_as_due(
     """Hold the outcomes, or the reasons of those that are undefined, to those that are due."""
     parts = side.parts(question(side.profile, scene, state, t_end, n))
     found = [part["reason"] if part["outcome"] == "undefined" else part["outcome"] for part in parts]
-    side.n_asked += 1
     if found[-1:] == ["undecided"] and len(found) <= len(due):
-        side.n_undecided += due[-1] in ("collision", "horizon")  # where mathematics has no answer it may be
+        side.n_undecided -= due[-1] not in ("collision", "horizon")  # it may be where no answer exists
         return False
     where = f"{n} hits from {state} to {t_end} in {scene}"
     assert found == list(due), f"{where} are answered {found}, must be {list(due)}"

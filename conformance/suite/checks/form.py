@@ -18,7 +18,7 @@ from conformance.suite.answers import outcomes_of, read_outcome
 from conformance.suite.process import NOT_NUMBERS, CheckFailure
 from conformance.suite.result import Result
 from conformance.suite.session import MAX_SEQ, Session, missing
-from scene import Collision, Outcome, Scene, State, Undecided, to_data
+from scene import Collision, Outcome, Scene, State, to_data
 from scene.protocol.messages import Introduction
 
 QUESTIONS = ("step", "trajectory", "flow")  # the profiles that answer by outcomes
@@ -68,7 +68,7 @@ class Implementation:
         part, *more = self.parts(question(self.profile, scene, state, t_end))
         if more:
             raise CheckFailure("wrong-format", f"{1 + len(more)} outcomes are answered to one question")
-        return self._counted(read_outcome(part, state.t))
+        return read_outcome(part, state.t)
 
     def by(self, *profiles: str, scene: Scene) -> "Implementation":
         """Return the same implementation, asked by the first of some profiles that it offers.
@@ -83,11 +83,14 @@ class Implementation:
         raise CheckFailure("unsupported", f"profile {' or '.join(profiles)}")
 
     def parts(self, request: Mapping[str, Any]) -> list[dict[str, Any]]:
-        """Ask, and return the outcomes that are answered, as data; a whole refusal is the only one."""
+        """Ask, and return and count the outcomes that are answered; a whole refusal is the only one."""
         answer = self.session.ask(request)
         if "error" in answer:
             raise CheckFailure("error", answer["error"])
-        return outcomes_of(answer)
+        found = outcomes_of(answer)
+        self.n_asked += len(found)
+        self.n_undecided += sum(part["outcome"] == "undecided" for part in found)
+        return found
 
     def said(self, line: str) -> dict[str, Any]:
         """Send a line as it is written, but for the seq in place of "SEQ", and return what it is answered."""
@@ -106,7 +109,7 @@ class Implementation:
             return found
         t = state.t
         for part in self.parts(question("trajectory", scene, state, t_end, n)):
-            found.append(self._counted(read_outcome(part, t)))
+            found.append(read_outcome(part, t))
             t = getattr(found[-1], "t", t)
         hits = [isinstance(outcome, Collision) for outcome in found]
         if len(found) > n or not all(hits[:-1]) or (len(found) < n and hits[-1:] != [False]):
@@ -124,14 +127,7 @@ class Implementation:
         found = self.parts(question("flow", scene, states, t_end)) if states else []
         if len(found) != len(states):
             raise CheckFailure("wrong-format", f"a flow of {len(states)} states is answered {found}"[:200])
-        self.n_asked += len(found)
-        self.n_undecided += sum(part["outcome"] == "undecided" for part in found)
         return found
-
-    def _counted(self, outcome: Outcome) -> Outcome:
-        self.n_asked += 1
-        self.n_undecided += isinstance(outcome, Undecided)
-        return outcome
 
 
 def question(

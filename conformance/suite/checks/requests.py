@@ -18,7 +18,7 @@ from conformance.suite.checks.form import FOREVER, Implementation, Question, oct
 from conformance.suite.checks.paths import distance, drawn, is_same_capture
 from conformance.suite.checks.refusals import RESTING
 from conformance.suite.process import CheckFailure
-from scene import Mushroom, Scene, State, Stem, Undecided
+from scene import Mushroom, Scene, State, Stem
 
 MAX_LINE = 2**20  # bytes of a request
 ROUNDING, CARRIED = 2.0**-44, 2.0**-40  # of sizes: of a step, and of more
@@ -163,7 +163,6 @@ def _agree(
     for one, other in zip(found, own, strict=True):
         stays = one.get("captured"), other.get("captured")
         a, b = read_outcome(one, t), read_outcome(other, t)
-        side.n_asked, side.n_undecided = side.n_asked + 1, side.n_undecided + isinstance(b, Undecided)
         assert type(a) is type(b), f"{one}, must be {other}: {how}"
         gap = distance(scene, a, b) if is_same_capture(*stays, math.inf) else math.inf
         assert gap <= (ROUNDING if side.profile == "step" else CARRIED), f"{one}, must be {other}: {how}"

@@ -24,7 +24,7 @@ from math import hypot
 
 import msgspec
 
-from conformance.grading.called import MeasuredStep, Question, ask, fail, measured, numbers, scales
+from conformance.grading.called import MeasuredStep, Question, ask, fail, measure_step, numbers, scales
 from scene import (
     Collision,
     Horizon,
@@ -147,17 +147,17 @@ def check_split_flight(
 ) -> bool:
     """Check that a flight, or a flow, that is stopped halfway and continued ends like the whole one."""
     question = scene, state, t_end
-    whole = measured(stepper, *question, bound)
+    whole = measure_step(stepper, *question, bound)
     if whole is None:
         return False
     middle = state.t + whole.numbers[0] / 2
-    half = measured(stepper, scene, state, middle, bound)
+    half = measure_step(stepper, scene, state, middle, bound)
     if half is None or middle == state.t:
         return False
     if not isinstance(half.outcome, Horizon):
         fail("split flight", f"{half.outcome} before half of the flight", question, (scene, state, middle))
     asked = question, (scene, state, middle), (scene, half.state(), t_end)
-    rest = measured(stepper, *asked[-1], bound, half.errors[1:])
+    rest = measure_step(stepper, *asked[-1], bound, half.errors[1:])
     if rest is None:
         return False
     if getattr(rest.outcome, "wall", None) != getattr(whole.outcome, "wall", None):
@@ -177,7 +177,7 @@ def check_reversal(
     first. Permitted errors are carried through every step. See `check_mirror`.
     """
     question = scene, state, t_end
-    there = measured(stepper, *question, bound)
+    there = measure_step(stepper, *question, bound)
     if there is None:
         return False
     onward: MeasuredStep | None = there
@@ -193,14 +193,14 @@ def check_reversal(
         begin, hit, end = way
         walls = [hit.wall, None]
         asked.append((scene, there.state(), end))
-        onward = measured(stepper, *asked[-1], bound, there.errors[1:])
+        onward = measure_step(stepper, *asked[-1], bound, there.errors[1:])
     if onward is None or not isinstance(onward.outcome, Horizon) or not onward.outcome.t > begin.t:
         return False
     at, errors, film = onward.state(), onward.errors, transforms.backwards(scene)
     at = State(-at.t, at.x, at.y, -at.vx, -at.vy)
     for wall in walls:  # and last the horizon
         asked.append((film, at, -begin.t))
-        back = measured(stepper, *asked[-1], bound, errors[1:])
+        back = measure_step(stepper, *asked[-1], bound, errors[1:])
         met = None if back is None else getattr(back.outcome, "wall", None)
         if back is not None and wall and met != wall:
             fail("time reversal", f"{wall} there, {back.outcome} on the way back", question, asked[-1])
@@ -219,7 +219,7 @@ def check_angular_momentum(
 
     At the base, which is at rest, it changes sign. Other walls are not compared.
     """
-    step = measured(stepper, scene, state, t_end, bound)
+    step = measure_step(stepper, scene, state, t_end, bound)
     if step is None or not isinstance(step.outcome, Collision) or step.outcome.wall not in ("arc", "base"):
         return False
     _, _, x, y, vx, vy = step.numbers
@@ -362,7 +362,7 @@ def _compare(
     is_same = is_same_kind and getattr(answer, "wall", None) == getattr(expected, "wall", None)
     allowed: Sequence[float] = (0.0,) * 6
     if not is_exact:
-        step = measured(stepper, *question, bound, incoming)
+        step = measure_step(stepper, *question, bound, incoming)
         if step is None:
             return False
         allowed = [2 * error for error in step.errors]

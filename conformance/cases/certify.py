@@ -21,7 +21,7 @@ import numpy as np
 import numpy.typing as npt
 
 import reference
-from conformance.cases.draw import Mark, Proved, Question, Unfit, filed
+from conformance.cases.draw import Mark, Proved, Question, Unfit, file_vector
 from conformance.cases.prover import (
     CONDITIONS,
     NUDGES,
@@ -328,7 +328,7 @@ def certify(question: Question, number: int) -> Vector:
     also = [Expectation(kind) for kind in question.also]
     expect = tuple(dict.fromkeys([*proved.expect, *also]))
     rounded = four_digits(min(proved.condition, INFINITE))
-    vector = filed(question, number, proved._replace(expect=expect, condition=rounded), "stress")
+    vector = file_vector(question, number, proved._replace(expect=expect, condition=rounded), "stress")
     vector = msgspec.structs.replace(vector, level=question.level or _level(scene, vector))
     verdict = judge(vector)
     if verdict.status != "proved":

@@ -70,7 +70,7 @@ def groups() -> dict[str, int]:
     return written | {name: family.n_vectors for name, family in FAMILIES.items() if family.n_vectors}
 
 
-def drawn(family: Family, number: int) -> Vector:
+def draw_vector(family: Family, number: int) -> Vector:
     """Return a family's vector of that number: its first draw that has a certified answer."""
     first = family.first_attempts[number - 1] if family.first_attempts else 0
     for attempt in range(first, first + ATTEMPTS):
@@ -100,10 +100,10 @@ def make(group: str, number: int) -> Vector:
         return next(vector for vector in load("stress", FOLDER) if vector.id == name)
     if group in by_hand():
         return certify(question_of(by_hand()[group][number - 1]), number)
-    return drawn(FAMILIES[group], number)
+    return draw_vector(FAMILIES[group], number)
 
 
-def added(path: Path) -> list[Vector]:
+def certify_added(path: Path) -> list[Vector]:
     """Certify questions that were written by hand, which go to the ends of their groups.
 
     Args:
@@ -202,7 +202,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             return archive(options.archive)
         if options.check:
             return _check(options.out, _made(options.most, options.jobs))
-        known = [*load("stress", FOLDER), *added(options.add)] if options.add else None
+        known = [*load("stress", FOLDER), *certify_added(options.add)] if options.add else None
         vectors = known or _made(options.most, options.jobs)
         written = write(options.out, vectors)
     except (BadInput, OSError) as error:

@@ -208,7 +208,7 @@ class Proved(NamedTuple):
     collisions: int = 1
 
 
-def filed(question: Question, number: int, proved: Proved, level: Level) -> Vector:
+def file_vector(question: Question, number: int, proved: Proved, level: Level) -> Vector:
     """Return a question with its answers as a vector, of this number in its group."""
     return Vector(
         id=f"{question.group}/{number}",

@@ -161,7 +161,7 @@ def run_check(check: SuiteCheck, session: Session, seed: int) -> Result:
 
     for profile in check.profiles:
         side = Implementation(session, profile)
-        fitting, lacking = _drawn(check, session.introduction, profile, seed)
+        fitting, lacking = _draw_asked(check, session.introduction, profile, seed)
         for asked in fitting:
             try:
                 n += 1
@@ -189,7 +189,9 @@ def run_check(check: SuiteCheck, session: Session, seed: int) -> Result:
     return result("pass", why) if n_compared else result("unsupported", lacking or "nothing to compare")
 
 
-def _drawn(check: SuiteCheck, offered: Introduction, profile: str, seed: int) -> tuple[list[Question], str]:
+def _draw_asked(
+    check: SuiteCheck, offered: Introduction, profile: str, seed: int
+) -> tuple[list[Question], str]:
     """Return the questions that may be asked, drawn anew while too few are, and what the others need."""
     fitting: list[Question] = []
     lacking = "" if profile in offered.profiles else f"profile {profile}"

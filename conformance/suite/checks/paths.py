@@ -127,7 +127,7 @@ def is_same_capture(a: Sequence[float] | None, b: Sequence[float] | None, span: 
     return all(abs(one - other) <= CARRIED * span for one, other in zip(a, b, strict=True))
 
 
-def drawn(draw: Draw, kinds: Sequence[str] = USUAL, **at: Any) -> tuple[Scene, State]:
+def draw_start(draw: Draw, kinds: Sequence[str] = USUAL, **at: Any) -> tuple[Scene, State]:
     """Draw a scene with laws of some kinds, and a start in it that meets a wall soon."""
     while True:
         try:
@@ -147,7 +147,7 @@ def crossing(scene: Scene, state: State) -> float:
 def usual(draw: Draw, profile: str) -> Iterator[Question]:
     """Ask about scenes of all kinds."""
     for _ in range(N_USUAL):
-        scene, state = drawn(draw)
+        scene, state = draw_start(draw)
         yield scene, state, draw.pick((1, 2, 3, 4, 6))
 
 
@@ -247,17 +247,17 @@ def nearly_captured(draw: Draw, near: float) -> tuple[Scene, State, int]:
 def changed(draw: Draw, profile: str) -> Iterator[Question]:
     """Ask about a scene or a state, the same with one part changed, and the first again."""
     for change in [*octaves(draw, 2.0**-24, 1.0)] * 2:
-        scene, state = drawn(draw, MIXED)
+        scene, state = draw_start(draw, MIXED)
         other = next(
             filter(None, (_one_number_changed(draw, scene, state, change) for _ in range(64))), scene
         )
         yield from ((replace(one, name="scene"), state, 3) for one in (scene, other, scene))
     for _ in range(N_USUAL):
-        scene, state = drawn(draw)
+        scene, state = draw_start(draw)
         for other in _laws_renamed(scene, state):
             yield from ((replace(one, name="scene"), state, 2) for one in (scene, other, scene))
     for near in [*octaves(draw, 2.0**-44, 2.0**-4)] * 2:
-        scene, state = drawn(draw)
+        scene, state = draw_start(draw)
         name = draw.pick(("t", "x", "x", "y", "y", "vx", "vy"))
         nudged = replace(state, **{name: getattr(state, name) * (1.0 + near)})
         if _meets(scene, nudged):
@@ -319,7 +319,7 @@ def late(draw: Draw, profile: str) -> Iterator[Question]:
     """Begin many periods from t = 0, before or after."""
     for wait in octaves(draw, 1, MAX_LATE):
         t = draw.pick((1.0, -1.0)) * wait * draw.between(1.0, 4.0)
-        yield *drawn(draw, ("fourier", "bang-bang"), t=t, speed=draw.power(0, 4)), 2
+        yield *draw_start(draw, ("fourier", "bang-bang"), t=t, speed=draw.power(0, 4)), 2
 
 
 def waiting(draw: Draw, profile: str) -> Iterator[Question]:

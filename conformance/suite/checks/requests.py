@@ -15,7 +15,7 @@ from msgspec.structs import replace
 from conformance.cases.draw import Draw
 from conformance.suite.answers import outcomes_of, read_outcome, with_walls
 from conformance.suite.checks.form import FOREVER, Implementation, Question, octaves, question
-from conformance.suite.checks.paths import distance, drawn, is_same_capture
+from conformance.suite.checks.paths import distance, draw_start, is_same_capture
 from conformance.suite.checks.refusals import RESTING
 from conformance.suite.process import CheckFailure
 from scene import Mushroom, Scene, State, Stem
@@ -57,7 +57,7 @@ MALFORMED: tuple[tuple[bytes, int | None], ...] = (
 
 
 def _one(draw: Draw, profile: str) -> tuple[Scene, State, dict[str, Any]]:
-    scene, state = drawn(draw, t=float(draw.pick(range(4))))  # a whole number is written without a point, too
+    scene, state = draw_start(draw, t=float(draw.pick(range(4))))  # whole numbers may lack a point
     span = scene.period or 1.0
     t_end = state.t + span * draw.between(0.05, 0.5) if profile == "flow" else FOREVER
     return scene, state, question(profile, scene, state, t_end, N_HITS)

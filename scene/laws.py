@@ -78,10 +78,7 @@ class Fourier(
 
 
 class BangBang(msgspec.Struct, frozen=True, tag_field="kind", tag="bang-bang", forbid_unknown_fields=True):
-    """A law that is at rest at each knot (time, value).
-
-    The acceleration is constant up to the middle between two knots, and the opposite after it.
-    """
+    """At rest at each knot (time, value); constant acceleration to mid-leg, the opposite after."""
 
     knots: tuple[tuple[float, float], ...]
 

@@ -183,11 +183,7 @@ class FiniteEnergy:
         return self._cdf(s, "free")
 
     def captured_cdf(self, s: ArrayLike) -> Floats:
-        """Return the probability of log E1 / E0 <= s for a captured particle.
-
-        Raises:
-            BadInput: no particle is captured.
-        """
+        """Return the probability of log E1 / E0 <= s for a captured particle; BadInput if there is none."""
         return self._cdf(s, "captured")
 
     def cdf(self, s: ArrayLike) -> Floats:
@@ -195,11 +191,7 @@ class FiniteEnergy:
         return self._cdf(s, "all")
 
     def mean_of_exp(self, q: float) -> float:
-        """Return the mean of exp(q s), to second order in the widths.
-
-        Raises:
-            BadInput: the mean is beyond binary64.
-        """
+        """Return the mean of exp(q s), to second order in the widths; BadInput if beyond binary64."""
         a, q = self.atoms, check_number("q", q)
         with np.errstate(over="ignore", invalid="ignore"):
             drift = q * (1 + 2 * q) / 4 * a.variance
@@ -209,11 +201,7 @@ class FiniteEnergy:
         return found
 
     def capture_cdf(self, t: ArrayLike) -> Floats:
-        """Return the probability, for a captured particle, of a first capture up to each time.
-
-        Raises:
-            BadInput: no particle is captured.
-        """
+        """Return the distribution function of the first capture time; BadInput if nothing is captured."""
         a = self._those_of("captured")
         order = np.argsort(a.t_in)
         below = np.cumsum(a.weight[order]) - a.weight[order] / 2

@@ -8,7 +8,6 @@ from __future__ import annotations
 import itertools
 from collections.abc import Sequence
 from fractions import Fraction
-from functools import reduce
 from itertools import pairwise
 from math import comb, gcd, lcm
 
@@ -108,8 +107,13 @@ def derivative(p: Polynomial) -> Polynomial:
 
 
 def at(p: Polynomial, x: Fraction) -> Fraction:
-    """Evaluate p at x, exactly."""
-    return reduce(lambda total, a: total * x + a, reversed(p), Fraction(0))
+    """Evaluate p at x, exactly: in whole numbers, as fractions would be reduced at every step."""
+    common = lcm(*(a.denominator for a in p))
+    total, power = 0, 1
+    for a in reversed(p):
+        total = total * x.numerator + a.numerator * (common // a.denominator) * power
+        power *= x.denominator
+    return Fraction(total * x.denominator, common * power)
 
 
 def _primitive(p: Polynomial) -> Polynomial:
@@ -189,17 +193,13 @@ def negative_point(p: Polynomial, a: Fraction, b: Fraction) -> Fraction | None:
     todo = [(a, b)]
     while todo:
         left, right = todo.pop()
-        ends = at(p, left), at(p, right)
-        if ends[0] < 0:
-            return left
-        if ends[1] < 0:
-            return right
-        n = sturm.n_roots(left, right)
         middle = (left + right) / 2
-        if at(p, middle) < 0:
-            return middle
+        for x in (left, right, middle):
+            if at(p, x) < 0:
+                return x
+        n = sturm.n_roots(left, right)
         # No root inside: one sign. One root between two positive ends: it does not change sign.
-        if n == 0 or (n == 1 and ends[0] > 0 and ends[1] > 0):
+        if n == 0 or (n == 1 and at(p, left) > 0 and at(p, right) > 0):
             continue
         todo += [(middle, right), (left, middle)]
     return None

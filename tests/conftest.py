@@ -37,17 +37,15 @@ LONGEST = [
     "test_mushrooms_bench.py",
     "test_fast_lane_search.py",
     "test_mushrooms_check.py",
-    "test_conformance_disguise.py",
+    "test_conformance_generated.py",
     "test_conformance_agreement.py",
     "test_conformance_suite.py",
-    "test_conformance_promises.py",
     "test_conformance_audit.py",
     "test_conformance_protocol.py",
     "test_scene_validity.py",
     "test_mushrooms_scale.py",
     "test_reference_mutants.py",
     "test_conformance_properties.py",
-    "test_conformance_fresh.py",
     "test_theory_distribution.py",
     "test_conformance_bench.py",
     "test_conformance_session.py",
@@ -99,7 +97,7 @@ def _compiled_once() -> None:
 
 @pytest.fixture(scope="session", autouse=True)
 def _few_fresh_questions() -> Iterator[None]:
-    """Prove few questions in each run of the suite in this process; test_conformance_fresh.py asks all."""
+    """Prove few questions in each run of the suite here; test_conformance_generated.py asks all."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(suite, "N_FRESH", dict.fromkeys(suite.N_FRESH, 3))
         yield

@@ -10,7 +10,7 @@ from types import SimpleNamespace
 
 import msgspec
 import pytest
-from support.depth import deep_but
+from support.depth import deep_among
 from support.schemas import validator
 from support.truth import proved_step
 
@@ -59,15 +59,15 @@ def test_a_seed_draws_the_same_questions(drawn):
 
 
 def test_workloads_are_what_their_names_say(drawn):
-    def speeds(name: str) -> list[float]:
-        return [math.hypot(q.state.vx, q.state.vy) for q in drawn[name].questions]
-
+    speeds = {
+        name: [math.hypot(q.state.vx, q.state.vy) for q in workload.questions]
+        for name, workload in drawn.items()
+    }
     for name, energy in (("moving-cap-1e4", 1e4), ("moving-cap-1e7", 1e7), ("moving-cap-1e12", 1e12)):
         # One collision changes the speed by twice the walls' at most.
-        assert speeds(name) == pytest.approx([math.sqrt(2 * energy)] * 3, abs=10.0)
-    assert max(speeds("slow")) < 10.0
-    for q in drawn["grazing"].questions:
-        s = q.state
+        assert speeds[name] == pytest.approx([math.sqrt(2 * energy)] * 3, abs=10.0)
+    assert max(speeds["slow"]) < 10.0
+    for s in (q.state for q in drawn["grazing"].questions):
         assert s.wall == "arc"
         assert abs(s.x * s.vx + s.y * s.vy) < 0.1 * math.hypot(s.x, s.y) * math.hypot(s.vx, s.vy)
 
@@ -237,17 +237,6 @@ def test_a_file_that_is_no_record_is_refused(tmp_path, content, words):
         record.read(tmp_path / "none.json")
 
 
-def tried(workload, *commands):
-    """Measure commands in runs of several ticks of a clock that counts milliseconds."""
-    brief = solvers.Effort(repeats=3, least_ns=5e6, most_ns=1e9)
-    with ExitStack() as stack:
-        ran = [
-            solvers.by_command(command[-1], "command", [sys.executable, *command], stack)
-            for command in commands
-        ]
-        return solvers.measure(workload, ran, brief, lambda _: None)
-
-
 def test_a_tick_of_a_coarse_clock_is_no_lie():
     """A short repeat may be said to last 1 ms; not so 10 ms where the answer came at once."""
 
@@ -261,12 +250,6 @@ def test_a_tick_of_a_coarse_clock_is_no_lie():
         timed(10**7)
 
 
-def test_a_command_that_offers_no_time_is_left_out(drawn):
-    points, troubles = tried(drawn["breathing-disk"], ["-m", "conformance.plain"])
-    assert not points
-    assert troubles["conformance.plain"].startswith("unsupported")
-
-
 IMPOSTOR = """
 import json, sys
 for line in sys.stdin:
@@ -278,24 +261,6 @@ for line in sys.stdin:
         answer = {"seq": asked["seq"], "ns": NS, "steps": STEPS}
     print(json.dumps(answer), flush=True)
 """
-
-
-@pytest.mark.parametrize(
-    ("ns", "steps", "trouble"),
-    [
-        ("[]", "[]", "fail: 1 repeats are answered"),
-        ("[5]", "[]", "fail: 1 repeats are answered"),
-        ("[5]", "[{'outcome': 'undecided', 'reason': ''}] * 2", "fail: 1 repeats are answered"),
-        ("[10**300]", "[{'outcome': 'undecided', 'reason': ''}]", "fail: 1 repeats are said to last 1000"),
-        ("[0] * asked['repeat']", "[{'outcome': 'undecided', 'reason': ''}]", "declined: undecided"),
-    ],
-)
-def test_a_command_that_times_nothing_is_left_out(drawn, tmp_path, ns, steps, trouble):
-    program = tmp_path / "impostor.py"
-    program.write_text(IMPOSTOR.replace("NS", ns).replace("STEPS", steps))
-    points, troubles = tried(drawn["breathing-disk"], [str(program)])
-    assert not points
-    assert troubles[str(program)].startswith(trouble)
 
 
 SPOILT_CLOCK = """
@@ -319,19 +284,42 @@ for line in sys.stdin:
 """
 
 
-SAYINGS = {
-    "1": "fail: a repeat of",
-    "ns // 20": "fail: a repeat of",
-    "0": "fail: a repeat of",
-    "at_ticks(ns)": "",
+OPEN = "{'outcome': 'undecided', 'reason': ''}"
+PROGRAMS = {  # a program, how it differs, and why it is left out
+    "offers no time": (
+        "import runpy; runpy.run_module('conformance.plain', run_name='__main__')",
+        {},
+        "unsupported",
+    ),
+    "no repeat": (IMPOSTOR, {"NS": "[]", "STEPS": "[]"}, "fail: 1 repeats are answered"),
+    "no step": (IMPOSTOR, {"NS": "[5]", "STEPS": "[]"}, "fail: 1 repeats are answered"),
+    "two steps": (IMPOSTOR, {"NS": "[5]", "STEPS": f"[{OPEN}] * 2"}, "fail: 1 repeats are answered"),
+    "too long": (
+        IMPOSTOR,
+        {"NS": "[10**300]", "STEPS": f"[{OPEN}]"},
+        "fail: 1 repeats are said to last 1000",
+    ),
+    "open": (IMPOSTOR, {"NS": "[0] * asked['repeat']", "STEPS": f"[{OPEN}]"}, "declined: undecided"),
+    "one nanosecond": (SPOILT_CLOCK, {"SAID": "1"}, "fail: a repeat of"),
+    "a twentieth": (SPOILT_CLOCK, {"SAID": "ns // 20"}, "fail: a repeat of"),
+    "no time": (SPOILT_CLOCK, {"SAID": "0"}, "fail: a repeat of"),
+    # One that counts milliseconds is true: most of its steps are said to last 0 ns.
+    "milliseconds": (SPOILT_CLOCK, {"SAID": "at_ticks(ns)"}, ""),
 }
+SPOILT_CLOCKS = "one nanosecond", "no time", "milliseconds"
 
 
-@pytest.mark.parametrize("said", deep_but(SAYINGS, "ns // 20"))
-def test_a_command_is_timed_by_a_clock_that_is_true(drawn, tmp_path, said):
-    """One that counts milliseconds is: most of its steps are said to last 0 ns."""
-    program = tmp_path / "spoilt.py"
-    program.write_text(SPOILT_CLOCK.replace("SAID", said))
-    points, troubles = tried(drawn["breathing-disk"], [str(program)])
-    assert [p.right for p in points] == ([] if SAYINGS[said] else [3])
-    assert troubles.get(str(program), "").startswith(SAYINGS[said])
+@pytest.mark.parametrize("name", deep_among(PROGRAMS, *SPOILT_CLOCKS))
+def test_a_command_is_timed_by_a_clock_that_is_true(drawn, tmp_path, name):
+    """In runs of several ticks of a clock that counts milliseconds."""
+    text, changes, trouble = PROGRAMS[name]
+    for old, new in changes.items():
+        text = text.replace(old, new)
+    program = tmp_path / "program.py"
+    program.write_text(text)
+    brief = solvers.Effort(repeats=3, least_ns=5e6, most_ns=1e9)
+    with ExitStack() as stack:
+        solver = solvers.by_command("it", "command", [sys.executable, str(program)], stack)
+        points, troubles = solvers.measure(drawn["breathing-disk"], [solver], brief, lambda _: None)
+    assert [point.right for point in points] == ([] if trouble else [3])
+    assert troubles.get("it", "").startswith(trouble)

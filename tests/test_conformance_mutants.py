@@ -8,6 +8,7 @@ from support.depth import deep_but
 
 from conformance.mutants import COMMON, MUTANTS, PLAIN, kill_matrix
 from conformance.mutants.kill_matrix import diagnose, kills, page, verdict
+from conformance.mutants.mutant import make_mutant
 from conformance.vectors import load, manifest
 
 DOCS = Path(__file__).parent.parent / "docs"
@@ -23,11 +24,9 @@ def test_the_matrix_is_of_these_mutants_and_this_corpus():
     assert (PUBLISHED["corpus"], PUBLISHED["digest"]) == (manifest().corpus, manifest().digest)
     listed = {name: (entry["fault"], entry["size"]) for name, entry in PUBLISHED["mutants"].items()}
     assert listed == {name: (mutant.fault, mutant.size) for name, mutant in (MUTANTS | COMMON).items()}
-    needless = {name for name, entry in PUBLISHED["mutants"].items() if entry["subsumed_by"]}
-    assert needless == set(COMMON)
-    killed = {name: entry["kills"] for name, entry in PUBLISHED["mutants"].items()}
-    assert {name for name, n in killed.items() if not n} == set()
     for name, entry in PUBLISHED["mutants"].items():
+        assert bool(entry["subsumed_by"]) == (name in COMMON), name
+        assert entry["kills"] > 0, name
         assert 1 <= len(entry["vectors"]) <= kill_matrix.MOST_VECTORS, name
 
 
@@ -53,15 +52,13 @@ def test_mutant_is_killed_by_its_vectors(vectors, name):
 
 def test_plain_fails_no_vector(vectors):
     """A sample here; the published run looked at all. It declines what is degenerate, and nothing else."""
-    verdicts = {(vector.level, verdict(PLAIN, vector)) for vector in list(vectors.values())[::8]}
+    verdicts = {(vector.level, verdict(PLAIN, vector)) for vector in list(vectors.values())[::24]}
     assert {found for _, found in verdicts} <= {"pass", "declined"}
     assert {level for level, found in verdicts if found == "declined"} <= {"stress"}
 
 
 def test_the_page_for_contributors_shows_a_mutant_as_it_is():
-    page = (DOCS.parent / "CONTRIBUTING.md").read_text("utf-8")
-    shown = page.partition("\n```python\n")[2].partition("```")[0]
-    assert shown
+    shown = (DOCS.parent / "CONTRIBUTING.md").read_text("utf-8").split("\n```python\n")[1].split("```")[0]
     assert shown in (kill_matrix.DATA / "walls.py").read_text("utf-8")
 
 
@@ -82,14 +79,14 @@ def test_a_size_is_where_the_mistake_begins(vectors, name):
         assert verdict(MUTANTS[name].of_size(MUTANTS[name].size), vectors[killing]) == "fail"
 
 
-def test_a_crash_is_no_kill(vectors):
-    class Breaks(PLAIN.flight):
-        def outcome(self):
-            raise ZeroDivisionError
+def crash(*_):
+    """Divide by zero in place of an outcome."""
+    raise ZeroDivisionError
 
-    sample = [v for v in list(vectors.values())[:50] if v.kind == "step"]
-    mutant = PLAIN._replace(name="breaks", flight=Breaks)
-    assert {verdict(mutant, vector) for vector in sample} == {"crashed"}
+
+def test_a_crash_is_no_kill(vectors):
+    sample, mutant = list(vectors.values())[:50], make_mutant(PLAIN.flight, "outcome", crash)
+    assert {verdict(mutant, vector) for vector in sample if vector.kind == "step"} == {"crashed"}
     assert kills(sample, mutant) == []
 
 
@@ -112,9 +109,9 @@ def test_the_command_writes_both_files_and_judges(monkeypatch, tmp_path, vectors
 
 
 def judged(mutant, vectors):
-    """Return what fails and what passes in a run of a mutant: every third vector and those of the matrix."""
+    """Return what fails and what passes in a run of a mutant: every 12th vector and those of the matrix."""
     told = {v for entry in PUBLISHED["mutants"].values() for v in entry["vectors"]}
-    asked = [v for i, v in enumerate(vectors.values()) if v.level == "core" and (i % 3 == 0 or v.id in told)]
+    asked = [v for i, v in enumerate(vectors.values()) if v.level == "core" and (i % 12 == 0 or v.id in told)]
     failed = set(kills(asked, mutant))
     return [v for v in asked if v.id in failed], [v for v in asked if v.id not in failed]
 

@@ -44,8 +44,7 @@ def test_every_drawn_step_is_sound(drawn):
 @settings(max_examples=50)
 @given(data=st.data())
 def test_states_of_a_given_scene_are_sound(name, data):
-    scene = load(name)
-    assert_sound(scene, *data.draw(states(scene)))
+    assert_sound(load(name), *data.draw(states(load(name))))
 
 
 @given(st.floats(-4.0, 4.0), st.floats(0.0, 4.0), st.data())
@@ -79,9 +78,9 @@ def lengths(scene):
 
 
 def features_of_laws(scene):
-    table, found = type(scene).__name__, laws_of(scene)
+    found = laws_of(scene)
     moving = [law for law in found.values() if not is_constant(law)]
-    yield table
+    yield type(scene).__name__
     yield f"laws: {type(moving[0]).__name__ if moving else 'static'}"
     if isinstance(scene, Mushroom):
         yield "mouth: w" if scene.nu is None else "mouth: nu"
@@ -89,11 +88,8 @@ def features_of_laws(scene):
         slope = found["slope"]
         yield f"slope: {'moving' if not isinstance(slope, float) else (slope > 0) - (slope < 0)}"
     for law in moving:
-        if isinstance(law, Fourier):
-            yield f"harmonics: {max(k for k, _, _ in law.harmonics())}"
-        else:
-            n_legs = len(law.knots) - 1
-            yield f"legs: {n_legs if n_legs < 5 else 'many'}"
+        n = max(k for k, _, _ in law.harmonics()) if isinstance(law, Fourier) else len(law.knots) - 1
+        yield f"harmonics: {n}" if isinstance(law, Fourier) else f"legs: {n if n < 5 else 'many'}"
     size = max(max(abs(b.lowest), abs(b.highest)) for b in lengths(scene))
     yield f"size: {'small' if size < 2.0**-10 else 'large' if size > 2.0**10 else 'usual'}"
 

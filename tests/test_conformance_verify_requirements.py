@@ -5,8 +5,6 @@ answers a question; that answer, written as a line of a corpus, is the forgery. 
 of a true line.
 """
 
-from __future__ import annotations
-
 import itertools
 from decimal import Decimal
 from fractions import Fraction

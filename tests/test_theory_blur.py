@@ -10,7 +10,7 @@ from scipy.stats import ncx2
 from support.depth import deep_among, deep_but
 
 import theory
-from scene import BadInput, Fourier, Mushroom, load
+from scene import load
 from theory.finite_energy.coefficients import N_TIMES, Fields
 from theory.finite_energy.one_cycle import Atoms, FiniteEnergy, _joined, at_energy, blur_cdf
 from theory.finite_energy.rates import MEMORIES, PHASES, SPEEDS, frozen_rates, kick_rate, rates_at
@@ -146,39 +146,6 @@ def test_joining_keeps_mass_and_mean() -> None:
     assert b.weight[b.is_free].sum() == pytest.approx(a.weight[a.is_free].sum())
 
 
-def test_what_the_theory_of_finite_energy_does_not_know_is_refused() -> None:
-    with pytest.raises(theory.NotCovered, match="no frozen rates of scene 'untilted'"):
-        at_energy(load("untilted"), 1e6)
-    with pytest.raises(theory.NotCovered, match="mushrooms"):
-        at_energy(load("fermi-ulam"), 1e6)
-    with pytest.raises(BadInput, match="energy = 0"):
-        at_energy(load("moving-cap"), 0.0)
-    with pytest.raises(BadInput, match=r"energy = 1e\+308, must be > 0 and at most 2\^1000"):
-        at_energy(load("moving-cap"), 1e308)
-    with pytest.raises(BadInput, match="nobody is captured"):
-        at_energy(load("ergodic"), 1e6).captured_cdf([0.0])
-    moved = Mushroom(r=Fourier(1.0, 1.0, (), (0.5,)), h=Fourier(1.0, 1.0, (), (-0.5,)), nu=0.9, slope=0.1111)
-    with pytest.raises(theory.NotCovered):
-        at_energy(moved, 1e6)
-
-
-def test_of_no_one_and_outside_the_cycle_nothing_is_said() -> None:
-    """These were a page of the array library, a warning with nan, a variance of -1e-5, and a mean of nan."""
-    nobody, found = at_energy(load("ergodic"), 1e6), at_energy(load("moving-cap"), 1e6)
-    with pytest.raises(BadInput, match="nobody is captured"):
-        nobody.capture_cdf([0.1])
-    assert math.isnan(nobody.captured_mean)
-    for times in ([-3.0], [0.0, 13.0], [1e300], [math.nan]):
-        for ask in (found.zone, found.at_capture):
-            with pytest.raises(BadInput, match="times holds"):
-                ask(times)
-    with pytest.raises(BadInput, match="beyond binary64"):
-        found.mean_of_exp(1e6)
-    for energy in (-1.0, 0.0, math.nan, 2.0**1001):
-        with pytest.raises(BadInput, match="energy ="):
-            FiniteEnergy(load("moving-cap"), energy)
-
-
 ALLOWED = [
     ("moving-cap", 1e4),
     ("moving-cap", 1e6),
@@ -201,13 +168,6 @@ def test_no_variance_is_negative_at_any_time_that_is_allowed(asked: tuple[str, f
     uncut = found._in_zone(times)[1] + square - lag**2  # as was told once
     assert uncut.min() < -1e-6
     assert np.array_equal(found.at_capture(times)[1], np.maximum(uncut, 0.0))
-
-
-@pytest.mark.parametrize("make", [FiniteEnergy, at_energy])
-def test_slow_particles_are_refused_however_they_are_asked_for(make) -> None:
-    """The class itself told a peak with a variance of -2.7e9."""
-    with pytest.raises(theory.NotCovered, match="particles so slow, below a speed of 100"):
-        make(load("moving-cap"), 1e-3)
 
 
 def test_the_table_covers_every_phase_with_its_errors() -> None:

@@ -128,12 +128,6 @@ def test_a_trivial_loop_keeps_all_its_mass_at_zero() -> None:
     assert abs(best[1]) < 1e-12
 
 
-@pytest.mark.parametrize("edges", [[0.0], [1.0, 0.0], [0.0, 0.0]])
-def test_edges_must_rise(edges: list[float]) -> None:
-    with pytest.raises(ValueError, match="edges must be at least two rising numbers"):
-        capture_time_mass(load("moving-cap"), edges)
-
-
 @pytest.mark.parametrize(("length", "time"), [(600, 0), (-1000, 0), (0, 900)])
 def test_the_chaotic_zone_is_the_same_in_any_units(length: int, time: int) -> None:
     """Not nan where the square of a length is no float."""

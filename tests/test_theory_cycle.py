@@ -115,13 +115,6 @@ def test_bang_bang_width_and_radius_turn_between_knots() -> None:
     assert min(sampled) - 1e-4 < cycle.nu_min <= min(sampled)
 
 
-def test_bad_arguments_are_named() -> None:
-    with pytest.raises(ValueError, match=r"nu = 0\.1, must be in \[0\.2, 1\]"):
-        Cycle.of(load("moving-cap"), 15).t_in(0.1)
-    with pytest.raises(ValueError, match="nu is constant"):
-        Cycle.of(load("ergodic"), 15).t_out(1.0)
-
-
 def test_chebyshev_grid_integrates_polynomials_exactly() -> None:
     ctx = MPContext()
     ctx.dps = 40

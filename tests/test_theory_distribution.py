@@ -12,7 +12,6 @@ from support.saddle import Saddle
 from scene import BangBang, Fourier, Mushroom, load
 from theory import (
     Energies,
-    NotCovered,
     Prediction,
     capture_curve,
     capture_rate_at,
@@ -150,13 +149,6 @@ def test_capture_rate_is_eq_dps() -> None:
         assert float(rate) == pytest.approx(p_cha * flux, rel=1e-8)
     assert released == 0
     assert float(again) == pytest.approx(float(first), rel=1e-8)
-
-
-def test_densities_that_are_convolutions_or_none_are_refused() -> None:
-    with pytest.raises(NotCovered, match="captured at most once"):
-        density_at(TWICE, [0.0], 4)
-    with pytest.raises(NotCovered, match="in which energies change"):
-        cdf_at(load("moving-cap-trivial"), [0.0], 4)
 
 
 @pytest.mark.parametrize("n_cycles", [10, 30])

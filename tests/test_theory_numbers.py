@@ -70,24 +70,11 @@ def test_times_and_mouths_may_be_of_any_kind(kind: Callable[[Fraction], Any]) ->
     assert theory.cdf_at(SCENE, [half], 4) == theory.cdf_at(SCENE, [0.5], 4)
 
 
-def test_arrays_and_integers_beyond_binary64_are_refused_where_one_number_is_meant() -> None:
-    for call in (CYCLE.t_in, CYCLE.t_out, CYCLE.release_time):
-        assert "must be one number" in one_line(call, np.array([0.5, 0.6]))
-    assert one_line(theory.density_at, SCENE, np.array([[0.1, 0.2]])).startswith("s[0] = ")
-    assert one_line(theory.v_cap, mpmath.fp, 10**400).startswith("r = an integer of")
-    assert theory.v_cap(mpmath.mp, 10**400) > mpmath.mpf(10) ** 800
-    assert one_line(theory.log_energy_rate_island, 10**400, 1.0).startswith("v_cap = an integer of")
-
-
 @pytest.mark.parametrize(
     "value", [None, 1j, "x", mpmath.nan, mpmath.inf, True, np.array([1.0, 2.0]), lambda s: s]
 )
 def test_what_a_mean_is_taken_of_is_a_finite_number(value: Any) -> None:
     assert one_line(theory.mean_of, SCENE, lambda _: value, 4).startswith("f(s) = ")
-
-
-def test_progress_is_a_function() -> None:
-    assert one_line(theory.predict, SCENE, 4, progress=3) == "progress = 3, must be a function"
 
 
 @pytest.mark.parametrize("exponent", [-1000, -400, 300, 1000])
@@ -96,12 +83,6 @@ def test_angles_scale(exponent: int) -> None:
     near = (0.1, 0.2, 1.0, -2.0, 1.5)
     angle = theory.sin_phi_hat(mpmath.fp, *np.ldexp(near, exponent).tolist())
     assert angle == pytest.approx(theory.sin_phi_hat(mpmath.fp, *near), rel=1e-15)
-
-
-@pytest.mark.filterwarnings("error")
-def test_the_slowest_particles_are_refused_without_a_warning() -> None:
-    for energy in (5e-324, 1e-310, 1e-300):
-        assert "so slow" in one_line(theory.at_energy, SCENE, energy)
 
 
 @pytest.mark.parametrize("name", ["moving-cap", "moving-cap-reversed", "retraced-arc"])

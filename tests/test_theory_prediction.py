@@ -13,7 +13,7 @@ import pytest
 from mpmath import MPContext
 from support.depth import deep_among, deep_but
 
-from scene import BangBang, Fourier, Mushroom, Scene, load
+from scene import BangBang, Fourier, Mushroom, Scene, exact, load
 from scene.laws import values
 from theory import (
     Cycle,
@@ -28,6 +28,7 @@ from theory import (
     volumes_at,
 )
 from theory.adiabatic import captures
+from theory.parameters import MovingMushroom
 from theory.volumes import delta_slope
 
 MAIN = ("fixed-cap-anticlockwise", "fixed-cap-clockwise", "moving-cap", "moving-cap-reversed")
@@ -338,3 +339,39 @@ def test_figures_of_several_captures_are_means_over_them(size: float) -> None:
     assert abs(found.sd**2 / square - 1) < 1e-11
     assert abs(found.mean_exp_plus - plus) < 1e-12
     assert abs(found.mean_exp_minus - minus) < 1e-12
+
+
+def _through(values: list[float]) -> BangBang:
+    times = np.linspace(0.0, 1.0, len(values) + 1).tolist()
+    return BangBang(tuple(zip(times, [*values, values[0]], strict=True)))
+
+
+WAVES = Mushroom(
+    r=1.0,
+    h=1.0,
+    nu=Fourier(
+        0.6,
+        1.0,
+        (0.001, -0.006, -0.011, -0.012, 0.008, 0.01, 0.003, 0.006) * 2,
+        (0.009, 0.001, -0.005, 0.009, -0.011, 0.006, -0.006, 0.005) * 2,
+    ),
+)
+LEGS = Mushroom(
+    r=1.0,
+    h=_through([0.72, 0.87, 0.51, 0.84, 0.51, 0.79, 0.57, 0.85]),
+    nu=_through([0.72, 0.62, 0.67, 0.51, 0.55, 0.77, 0.76, 0.65]),
+)
+
+
+@pytest.mark.parametrize(
+    ("moving", "worker", "work", "most"),
+    [
+        (WAVES, exact.Sturm, "n_roots", 300),  # of whole chains: an isolated root is narrowed by sign
+        (LEGS, MovingMushroom, "time", 3500),  # a short piece is resolved by few points
+    ],
+)
+def test_work_is_bounded(moving, worker, work, most, monkeypatch):
+    calls, own = [], getattr(worker, work)
+    monkeypatch.setattr(worker, work, lambda *given: calls.append(None) or own(*given))
+    predict(moving)
+    assert 0 < len(calls) <= most

@@ -121,8 +121,3 @@ def test_a_mouth_given_by_its_width_leads_to_the_same_energies(name):
     assert other.theory_error == pytest.approx(one.theory_error, rel=1e-7)
     for mine, its in zip(one.atoms, other.atoms, strict=True):
         np.testing.assert_allclose(its, mine, rtol=1e-7, atol=1e-9)
-
-
-def test_a_table_at_rest_has_no_rates():
-    with pytest.raises(NotCovered, match="no frozen rates"):
-        frozen_rates(load("frozen-mushroom"))

@@ -30,7 +30,8 @@ from theory.volumes import free_share
 MAX_HALVINGS = 256  # a panel of 2^-256 of its piece
 NARROWEST = 1e-20  # of the widest mouth: `tolerance` of the cycle and rounding stay far below what nu is
 
-FEWEST = 16  # degree of the grid at which a part is first tried; its points are among those of the next
+FEWEST = 8  # least degree of the grid at which a part is first tried; its points are among those of the next
+TELLING = 16  # degree from which coefficients show how they fall
 PROMISE = 0.92  # of the digits wanted, in proportion to its degree, are to be seen on such a grid
 
 
@@ -102,12 +103,19 @@ class Placed(NamedTuple):
 
 @dataclass(frozen=True)
 class Captures:
-    """A cycle's captured particles: panels from nu_max to nu_min within each valley."""
+    """A cycle's captured particles: panels from nu_max to nu_min within each valley.
+
+    grids: on whose points panels may be sampled, by degree.
+    """
 
     cycle: Cycle
-    grid: Grid
+    grids: dict[int, Grid]
     target: int
     root: Window
+
+    def grid(self, panel: Panel) -> Grid:
+        """Return the grid on whose points a panel is sampled."""
+        return self.grids[len(panel.nu) - 1]
 
     @property
     def s_not_captured(self) -> Any:
@@ -145,7 +153,7 @@ class Captures:
         for panel in (placed.panel for placed in self.placed):
             density = [rate * ctx.exp(-a) for rate, a in zip(panel.rate, panel.A, strict=True)]
             gain = [ctx.expm1(log_g) - log_g for log_g in panel.log_g]
-            total += self.grid.integral([y * p for y, p in zip(gain, density, strict=True)])
+            total += self.grid(panel).integral([y * p for y, p in zip(gain, density, strict=True)])
         return total
 
     def taylor(self, q: Any, order: int) -> list[Any]:
@@ -158,7 +166,7 @@ class Captures:
         return [
             (weight * rate * ctx.exp(window.A_top - a), s - gain)
             for panel in window.panels
-            for weight, rate, a, s in zip(self.grid.weights, panel.rate, panel.A, panel.s, strict=True)
+            for weight, rate, a, s in zip(self.grid(panel).weights, panel.rate, panel.A, panel.s, strict=True)
         ]
 
     def _atoms(self, window: Window) -> WeightedPoints:
@@ -231,17 +239,19 @@ def captures(cycle: Cycle, target: int, told: Callable[[float], None] | None = N
     if cycle.nu_min < NARROWEST * cycle.nu_max:
         share = cycle.ctx.nstr(cycle.nu_min / cycle.nu_max, 3)
         raise NotConverged(f"the mouth closes to {share} of its widest, must stay above {NARROWEST:g} of it")
-    grids = [grid_for(cycle.ctx, target)]
-    while (n := grids[0].n // 2) % 2 == 0 and n >= FEWEST:
-        grids.insert(0, Grid(cycle.ctx, n))
+    grids = grids_for(cycle.ctx, target)
     start = cycle.ctx.zero, cycle.ctx.zero
     headway = Headway(len(cycle.pieces), told)
-    return Captures(cycle, grids[-1], target, _window(cycle, grids, cycle.valley, start, target, headway))
+    root = _window(cycle, list(grids.values()), cycle.valley, start, target, headway)
+    return Captures(cycle, grids, target, root)
 
 
-def grid_for(ctx: Any, target: int) -> Grid:
-    """Return the points at which panels are sampled."""
-    return Grid(ctx, even_degree(2 * (12 + target)))
+def grids_for(ctx: Any, target: int) -> dict[int, Grid]:
+    """Return the grids, by degree from low to high, of which each has every other point of the next."""
+    degrees = [even_degree(2 * (12 + target))]
+    while (n := degrees[0] // 2) % 2 == 0 and n >= FEWEST:
+        degrees.insert(0, n)
+    return {n: Grid(ctx, n) for n in degrees}
 
 
 def _window(
@@ -341,9 +351,9 @@ def _panel(
 ) -> Panel | None:
     """Sample a part of a piece and integrate from `start` = (A, B); None when it is not resolved.
 
-    It is sampled on one grid after another, given up where one shows that the next will not do. Coefficients
-    fall geometrically, or more slowly near a singularity: were that wrong, the part would only be halved once
-    more than needed.
+    It is sampled on one grid after another, until one resolves it, or shows that the next will not do.
+    Coefficients fall geometrically, or more slowly near a singularity: were that wrong, the part would only
+    be halved once more than needed.
     """
     ctx, width, n = cycle.ctx, cycle.ctx.ldexp(1, -part[1]), grids[-1].n
     swing = free_share(ctx, cycle.nu_max) - free_share(ctx, cycle.nu_min)
@@ -357,14 +367,20 @@ def _panel(
         nu, t_in, t_out, dA, dB, log_g = (
             list(column) for column in zip(*map(known.get, places), strict=True)
         )
-        share = 1 if grid.n == n else PROMISE * grid.n / n
-        tolerance = ctx.mpf(10) ** (-target * share)
-        c_A, c_B, c_g = (grid.coefficients(values) for values in (dA, dB, log_g))
+        c_A, c_B, c_g, *c_times = map(grid.coefficients, (dA, dB, log_g, t_in, t_out))
         # Of a narrow mouth a and b are large, and A and B in proportion.
-        if any(_tail(c) > tolerance * max(swing, *map(abs, c)) for c in (c_A, c_B)) or _tail(c_g) > tolerance:
-            return None
-    A, B = ([at + rise for rise in grid.running_integral(c)] for at, c in zip(start, (c_A, c_B), strict=True))
-    return Panel(nu, t_in, t_out, dA, log_g, A, B)
+        tail = max(_tail(c_g), *(_tail(c) / max(swing, *map(abs, c)) for c in (c_A, c_B)))
+        # Times are plotted only: no part is halved for them.
+        late = 0 if grid.n == n else max(_tail(c) / cycle.period for c in c_times)
+        if max(tail, late) <= ctx.mpf(10) ** -target:
+            A, B = (
+                [at + rise for rise in grid.running_integral(c)]
+                for at, c in zip(start, (c_A, c_B), strict=True)
+            )
+            return Panel(nu, t_in, t_out, dA, log_g, A, B)
+        if grid.n >= TELLING and tail > ctx.mpf(10) ** (-target * PROMISE * grid.n / n):
+            break
+    return None
 
 
 def _descent(piece: CapturePiece, u: Any) -> tuple[Any, Any]:
@@ -381,4 +397,4 @@ def _descent(piece: CapturePiece, u: Any) -> tuple[Any, Any]:
 
 
 def _tail(coefficients: list[Any]) -> Any:
-    return max(abs(c) for c in coefficients[-(len(coefficients) // 6) :])
+    return max(abs(c) for c in coefficients[-max(len(coefficients) // 6, 3) :])

@@ -189,9 +189,10 @@ def _branch(found: Captures, k: int) -> Branch:
     placed = found.placed[k]
     p = placed.panel
     functions = (p.nu, p.t_in, p.t_out, p.A, p.B, p.log_g)
-    coefficients = [[float(c) for c in found.grid.coefficients(values)] for values in functions]
+    grid = found.grid(p)
+    coefficients = [[float(c) for c in grid.coefficients(values)] for values in functions]
     ends = [[float(values[0]), float(values[-1])] for values in functions]
-    s = _kept([float(c) for c in found.grid.coefficients(placed.s)])
+    s = _kept([float(c) for c in grid.coefficients(placed.s)])
     return Branch(_kept(coefficients), _kept(ends), s, *(float(x) for x in placed[1:]))
 
 

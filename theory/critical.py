@@ -23,8 +23,7 @@ from scene.mouth import mouth_factors
 from scene.tables import Mushroom, laws, period
 from theory.volumes import NotCovered
 
-# An isolating interval this narrow lets Newton's method take over from bisection.
-NARROW = Fraction(1, 2**24)
+NARROW = 1  # an isolating interval from which Newton's method, kept in it, comes to all digits
 MANY_BITS = 512  # beyond which Newton's method begins with fewer
 
 
@@ -146,12 +145,12 @@ def _multiplicity_at(p: exact.Polynomial, x: Fraction) -> int:
 
 def _roots(p: exact.Polynomial, a: Fraction, b: Fraction) -> list[CriticalRoot]:
     """Isolate the distinct roots in the open interval (a, b), in order."""
-    if len(p) < 2:
+    sturms, rest = [], p  # a root of multiplicity m is one of the first m
+    while len(rest) > 1:
+        sturms.append(exact.Sturm(rest))
+        rest = exact.divide(rest, sturms[-1].root_free_of_squares)[0]
+    if not sturms:
         return []
-    layers = [p]  # a root of multiplicity m belongs to the first m of them
-    while len(layers[-1]) > 1:
-        layers.append(exact.divide(layers[-1], exact.squarefree(layers[-1]))[0])
-    sturms = [exact.Sturm(layer) for layer in layers[:-1]]
     simple = sturms[0].root_free_of_squares
     found, todo = [], [(a, b)]
     while todo:
@@ -159,12 +158,11 @@ def _roots(p: exact.Polynomial, a: Fraction, b: Fraction) -> list[CriticalRoot]:
         n = sturms[0].n_roots(left, right)
         if n == 0:
             continue
-        isolated = n == 1 and right - left <= NARROW and exact.at(p, left) != 0 and exact.at(p, right) != 0
-        if isolated:
+        if n == 1 and right - left <= NARROW and exact.at(simple, left) != 0 != exact.at(simple, right):
             found.append(CriticalRoot(left, right, sum(s.n_roots(left, right) for s in sturms), simple))
             continue
         middle = (left + right) / 2
-        if exact.at(p, middle) == 0:
+        if exact.at(simple, middle) == 0:
             found.append(CriticalRoot(middle, middle, _multiplicity_at(p, middle), simple))
         todo += [(left, middle), (middle, right)]
     return sorted(found)

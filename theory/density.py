@@ -68,10 +68,10 @@ class _Panel:
     """One panel's s, A and times as series."""
 
     def __init__(self, found: Captures, placed: Placed) -> None:
-        self.ctx = found.cycle.ctx
+        self.ctx, grid = found.cycle.ctx, found.grid(placed.panel)
 
         def series(values: list[Any]) -> ChebyshevSeries:
-            return ChebyshevSeries(self.ctx, found.grid.coefficients(values))
+            return ChebyshevSeries(self.ctx, grid.coefficients(values))
 
         self.s, self.A, self.t_in = series(placed.s), series(placed.panel.A), series(placed.panel.t_in)
         self.ends = (placed.s[0], placed.s[-1])
@@ -266,6 +266,6 @@ def _spent(found: Captures, time: Any) -> Any:
     """Return A at a time of capture."""
     ctx = found.cycle.ctx
     panel = next(p.panel for p in found.placed if p.panel.t_in[0] <= time <= p.panel.t_in[-1])
-    t_in, A = (ChebyshevSeries(ctx, found.grid.coefficients(v)) for v in (panel.t_in, panel.A))
+    t_in, A = (ChebyshevSeries(ctx, found.grid(panel).coefficients(v)) for v in (panel.t_in, panel.A))
     rate = t_in.rate()
     return A(solve_rising(ctx, lambda x: (t_in(x) - time, rate(x)), ctx.zero, ctx.one))

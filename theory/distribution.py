@@ -152,7 +152,8 @@ class Lattice:
             found += node.passed
             for child in node.children:
                 found *= self._still(child)
-        gains = np.split(node.s, max(len(node.branches), 1))  # from the valley's top, panel after panel
+        # From the valley's top, panel after panel.
+        gains = np.split(node.s, np.cumsum([len(branch.s) for branch in node.branches])[:-1])
         for branch, gain in zip(node.branches, gains, strict=False):
             if np.abs(gain).max() <= KEPT:
                 found += self._captured(branch) / node.p_top

@@ -7,7 +7,7 @@ inverted in closed form where parameters are parabolas, else from a solution in 
 
 from __future__ import annotations
 
-import math
+import cmath
 from collections.abc import Callable
 from fractions import Fraction
 from typing import Any
@@ -21,7 +21,7 @@ from theory.critical import solve_rising
 from theory.precision import Binary
 from theory.volumes import Volumes, volumes_of
 
-# From t and (cos, sin) of omega t to the law's value and rate.
+# From t and exp(i omega t) to the law's value and rate.
 Parameter = Callable[[Any, Any], tuple[Any, Any]]
 # From nu and a bracket to the time in it at which the mouth is nu, about; None where none is found.
 Inverse = Callable[[Any, Any, Any], Any]
@@ -91,7 +91,10 @@ class MovingMushroom:
         return [self._parameters[name](t, turn)[0] for name in names]
 
     def _turn(self, t: Any) -> Any:
-        return None if self._omega is None else gmpy2.sin_cos(self._omega * t)
+        if self._omega is None:
+            return None
+        sin, cos = gmpy2.sin_cos(self._omega * t)
+        return gmpy2.mpc(cos, sin)
 
 
 def _parameter(binary: Binary, piece: Piece) -> Parameter:
@@ -104,25 +107,22 @@ def _parameter(binary: Binary, piece: Piece) -> Parameter:
 
         return parabola
     if isinstance(piece, Fourier):
-        return _wave(binary, piece)
+        return _wave(piece, frequency(binary, piece), gmpy2.mpc)
     constant = binary.mpf(piece), binary.zero
     return lambda t, turn: constant
 
 
-def _wave(binary: Binary, law: Fourier) -> Parameter:
-    omega = frequency(binary, law)
-    amplitudes = {k: (c, s) for k, c, s in law.harmonics()}
-    terms = [amplitudes.get(k, (0.0, 0.0)) for k in range(1, max(amplitudes) + 1)]
+def _wave(law: Fourier, omega: Any, number: Callable[[float, float], Any]) -> Parameter:
+    """Sum a wave by Horner's scheme, in complex numbers that `number` makes of two real ones."""
+    amplitudes = {k: number(c, -s) for k, c, s in law.harmonics()}
+    zero = number(0.0, 0.0)
+    terms = [(amplitudes.get(k, zero), k * amplitudes.get(k, zero)) for k in range(max(amplitudes), 0, -1)]
 
     def wave(_: Any, turn: Any) -> tuple[Any, Any]:
-        sin1, cos1 = sin, cos = turn
-        value, rate = law.mean, binary.zero
-        for k, (c, s) in enumerate(terms, 1):
-            if k > 1:
-                cos, sin = cos * cos1 - sin * sin1, sin * cos1 + cos * sin1
-            value += c * cos + s * sin
-            rate += k * (s * cos - c * sin)
-        return value, omega * rate
+        value = rate = zero
+        for a, k_a in terms:
+            value, rate = value * turn + a, rate * turn + k_a
+        return law.mean + (value * turn).real, -omega * (rate * turn).imag
 
     return wave
 
@@ -174,14 +174,6 @@ def _in_floats(piece: Piece) -> Callable[[float], tuple[float, float]]:
     if not isinstance(piece, Fourier):
         assert isinstance(piece, float)
         return lambda t: (piece, 0.0)
-    omega, terms = float(frequency(fp, piece)), piece.harmonics()
-
-    def wave(t: float) -> tuple[float, float]:
-        value, rate = piece.mean, 0.0
-        for k, c, s in terms:
-            cos, sin = math.cos(k * omega * t), math.sin(k * omega * t)
-            value += c * cos + s * sin
-            rate += k * omega * (s * cos - c * sin)
-        return value, rate
-
-    return wave
+    omega = float(frequency(fp, piece))
+    wave = _wave(piece, omega, complex)
+    return lambda t: wave(t, cmath.exp(1j * omega * t))

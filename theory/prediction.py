@@ -22,7 +22,7 @@ from scene.notebook import rows
 from scene.refusal import BadInput, check_count, check_number, shown
 from scene.tables import Mushroom, Scene, laws
 from scene.transforms import backwards
-from theory.adiabatic import Captures, NotConverged, Panel, Window, captures, grid_for
+from theory.adiabatic import Captures, NotConverged, Panel, Window, captures, grids_for
 from theory.chebyshev import logarithm
 from theory.cycle import GUARD, Cycle
 from theory.precision import guarded
@@ -205,7 +205,8 @@ def converged(
     ctx = cycle.ctx
     noise, agreement = ctx.mpf(10) ** -(digits + GUARD - 10), ctx.mpf(10) ** -(digits + 2)
     previous: tuple[Any, ...] | None = None
-    for number, target in enumerate(range(digits + 4, digits + GUARD - 8, 12), 1):
+    # The first two show enough of nearly every cycle; more is wanted where energies change by very little.
+    for number, target in enumerate((digits + 4, *range(digits + 8, digits + GUARD - 8, 12)), 1):
         told = None if progress is None else partial(progress, number)
         found = solved(scene, cycle, target, told)
         current = tuple(ctx.zero if abs(x) < noise else x for x in figures(found))
@@ -244,7 +245,7 @@ def solved(scene: Scene, cycle: Cycle, target: int, told: Callable[[float], None
         return found
     if told is not None:
         told(1.0)
-    return Captures(cycle, grid_for(cycle.ctx, target), target, _moved(place.window, cycle.ctx.make_mpf))
+    return Captures(cycle, grids_for(cycle.ctx, target), target, _moved(place.window, cycle.ctx.make_mpf))
 
 
 @lru_cache(maxsize=KEPT)

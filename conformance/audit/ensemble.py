@@ -186,7 +186,7 @@ def checks(given: GivenEnsemble, theirs: Expected) -> list[Check]:
 
 
 def reversal(given: GivenEnsemble, other: GivenEnsemble, theirs: Expected) -> Check:
-    """Hold two directions of one cycle to p'(-s) = p(s) exp(-s): to the share below s, where it is worst."""
+    """Hold two directions of one cycle to p_rev(-s) = p(s) exp(-s): to the share below s, at its worst."""
     here, there = _some(given.s), -_some(other.s)
     places = np.quantile(np.concatenate([here, there]), np.linspace(0.01, 0.99, N_LEVELS))
     pairs = [(mean(np.exp(-here) * (here <= x)), mean(there <= x)) for x in places]

@@ -1,7 +1,8 @@
 """Mutants: the plain stepper with one physics error each, of the kind that people make.
 
 MUTANTS prove that the suite can fail. Each is killed by a `fail`, not by a crash, and none is subsumed by
-another: there are no two of which whatever kills the one kills the other too. `kill_matrix` holds both.
+another, that is, killed by all the vectors that kill that other, if these are at least five. `kill_matrix`
+holds both.
 COMMON are mistakes that a diagnosis names too, though mutants subsume them.
 """
 

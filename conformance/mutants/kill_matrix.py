@@ -30,9 +30,10 @@ LEAST_COMPARED = 5  # vectors: what fewer kill shows too little to call other mu
 HEAD = """# Kill matrix
 
 {n} mutants of the plain stepper, and how many of the {n_vectors} vectors of corpus {corpus} kill each by a
-`fail`. None is subsumed by another: no two are killed by nested sets of vectors. The mistakes named last are
-so common that a diagnosis names them, though the mutant in brackets subsumes each. At most three vectors are
-given, chosen so that few other mutants fail them all. A size is the threshold from which on a mistake shows.
+`fail`. None is subsumed by another: none is killed by all the vectors that kill another one, if these are at
+least five. The mistakes named last are so common that a diagnosis names them, though the mutant in brackets
+subsumes each. At most three vectors are given, chosen so that few other mutants fail them all. A size is the
+threshold from which on a mistake shows.
 
 | mutant | what it does wrong | size | kills | some vectors that kill it |
 | --- | --- | ---: | ---: | --- |
@@ -111,7 +112,7 @@ def _correlation(n_failed: int, n_passed: int, of_failed: float, of_passed: floa
 
 
 def subsumed(found: dict[str, list[str]]) -> dict[str, str]:
-    """Return by which mutant each is subsumed: all that kills that one kills it too."""
+    """Return by which mutant each is subsumed: all vectors that kill that one, at least five, kill it too."""
     sets = {name: set(killing) for name, killing in found.items()}
     by: dict[str, str] = {}
     subsumers = [other for other in sets if other in MUTANTS and len(sets[other]) >= LEAST_COMPARED]

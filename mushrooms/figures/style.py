@@ -90,8 +90,5 @@ def svg(figure: Figure) -> bytes:
     file = io.BytesIO()
     with rc_context({"svg.fonttype": "none"}):
         save(figure, file, ".svg", dpi=110)
-    text = re.sub(rb"\s+", b" ", file.getvalue())
-    text = re.sub(rb"(\.\d\d)\d+(?=[^<>]*>)", rb"\1", text)  # within tags: numbers that are read stay
-    return re.sub(
-        rb'<metadata>.*?</metadata>|<!--.*?-->|(?<=<g) id="[^"]*"| transform="rotate\(-0 [^"]*"', b"", text
-    )
+    text = re.sub(rb'<!--.*?-->|(?<=<g) id="[^"]*"| transform="rotate\(-0 [^"]*"', b"", file.getvalue())
+    return re.sub(rb"(\.\d\d)\d+(?=[^<>]*>)", rb"\1", text)  # within tags: numbers that are read stay

@@ -246,7 +246,6 @@ def to_html(data: ReportData, samples: by_claim.Samples) -> str:
         (title, sorted((f for f in data["findings"] if f["id"][0] in letters), key=_place))
         for title, letters in GROUPS.items()
     ]
-    tables = {run["name"].partition("@")[0]: run["scene"] for run in data["runs"]}
     return render(
         "audit.html.jinja",
         report=data,
@@ -254,7 +253,7 @@ def to_html(data: ReportData, samples: by_claim.Samples) -> str:
         first=_first_figure(samples),
         groups=groups,
         images=figures,
-        scenes=tables,
+        scenes={run["name"].partition("@")[0]: run["scene"] for run in data["runs"]},
         figures_text=figures_text,
         expected_text=expected_text,
         power_text=power_text,

@@ -44,7 +44,7 @@ def as_json(value: Any) -> str:
 
 def embed(svg: bytes) -> str:
     """Return a figure as the source of an image within the page."""
-    return "data:image/svg+xml," + quote(svg, safe=" /:;,=()!@+")
+    return "data:image/svg+xml," + quote(b" ".join(svg.split()), safe=" /:;,=()!@+")
 
 
 SIGNS = {"<=": "≤", ">=": "≥", "+-": "±", "!=": "≠", "->": "→"}

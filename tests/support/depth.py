@@ -4,8 +4,6 @@ A case is marked `deep` where it asks of another input what a neighbour asks alr
 takes longest of all. `.ci/run` asks both kinds, one after the other; `pytest` alone asks the first.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from typing import Any
 

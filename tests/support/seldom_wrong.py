@@ -126,6 +126,15 @@ def omega_of_the_first(flight, plain, law):
     return plain(law)
 
 
+@fault("waves from the first knot", "anywhere-mushroom-arc", "law")
+def waves_from_the_first_knot(flight, plain, law):
+    """Counts the time of every law from the first knot of any."""
+    if not isinstance(law, Fourier):
+        return plain(law)
+    knots = [other.knots for other in laws(flight.scene).values() if isinstance(other, BangBang)]
+    return flight.kinds[Fourier](law, flight.state.t - (knots[0][0][0] if knots else 0.0))
+
+
 @fault("late phase in float32", "returning-stem-left", "law")
 def late_phase_in_float32(flight, plain, law):
     """Keeps the time of departure in binary32 from a hundred thousand on."""

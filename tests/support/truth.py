@@ -1,7 +1,5 @@
 """Certified answers, from the one prover, and how delicate a question is."""
 
-from __future__ import annotations
-
 import os
 
 from msgspec import to_builtins

@@ -90,7 +90,7 @@ def pace(scene: Scene, times: Floats) -> Floats:
 
 
 def kick_rate(scene: Scene, t: float) -> float:
-    """Return the chaotic zone's mean d log E / dt at time t, the flux of particles apart. Source: Eq:dE."""
+    """Return the chaotic zone's mean d log E / dt at time t. In Eq:dE the terms in d delta cancel."""
     return float(kick_rates(scene, np.array([t]))[0])
 
 

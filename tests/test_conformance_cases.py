@@ -1,6 +1,8 @@
-"""Attacks find nothing wrong with our steppers, and every family finds the mistake that it hunts."""
+"""Attacks find nothing wrong with our steppers, each family finds its fault; nothing false is certified."""
 
+import dataclasses
 import json
+import math
 import os
 from fractions import Fraction
 
@@ -9,17 +11,29 @@ import pytest
 from support import faulty_references as faults
 from support.depth import deep_but
 from support.refusals import assert_refused
+from support.tables import LIFT
 
 import fast
+import reference
+from conformance import vectors
 from conformance.cases.attacks import UnderAttack, confirmed, flown, line, run
-from conformance.cases.certify import claimed_path
-from conformance.cases.draw import Question
-from conformance.cases.prover import proved_step
+from conformance.cases.certify import (
+    FalseClaim,
+    Links,
+    arrival,
+    capture_intervals,
+    certify,
+    claimed_path,
+    marks,
+)
+from conformance.cases.draw import Question, Unfit
+from conformance.cases.flow_families import any_marks
+from conformance.cases.prover import ask, flight_of, inputs_of, moved, proved_step
 from conformance.cases.table import FAMILIES
-from conformance.vectors import NUMBERS, Expectation, certified
+from conformance.vectors import NUMBERS, Expectation, certified, four_digits
 from conformance.verify import Verdict
 from mushrooms.attack import steppers
-from scene import State, load
+from scene import State, from_data, load
 
 N_ATTACKS = int(os.environ.get("MUSHROOMS_ATTACKS", "6"))
 SEED = 2014
@@ -180,3 +194,122 @@ def test_the_command_prints_wrong_cases(command_line, tmp_path, monkeypatch):
 )
 def test_the_command_refuses_bad_input(command_line, arguments):
     assert_refused(command_line("attack", *arguments), str(arguments[1]))
+
+
+def test_a_false_claim_makes_no_vector(monkeypatch):
+    """The reference made to lie about where a particle is: the verifier refuses."""
+    honest = reference.next_collision
+
+    def lying(*arguments, **options):
+        found = honest(*arguments, **options)
+        x = reference.Enclosure(found.after.x.lo + 1, found.after.x.hi + 1)
+        return dataclasses.replace(found, after=found.after._replace(x=x))
+
+    monkeypatch.setattr(reference, "next_collision", lying)
+    question = Question(load("moving-cap"), State(0.3, 0.1, 0.2, 3.0, 4.0), 9.0, group="lie")
+    with pytest.raises(FalseClaim, match="lie/1 is false: "):
+        certify(question, 1)
+
+
+@pytest.mark.parametrize(("status", "failure"), [("false", FalseClaim), ("not proved", Unfit)])
+def test_what_the_verifier_does_not_prove_makes_no_vector(monkeypatch, status, failure):
+    question = Question(load("moving-cap"), State(0.3, 0.1, 0.2, 3.0, 4.0), 9.0, 2, group="lie")
+    assert certify(question, 1).collisions == 2
+    monkeypatch.setattr("conformance.cases.certify.verify_line", lambda _: Verdict(status, "not so"))
+    with pytest.raises(failure, match=f"lie/1 is {status}: not so"):
+        certify(question, 1)
+
+
+def test_what_has_no_answer_makes_no_vector():
+    touching = State(0.0, 0.0, -1.0, 0.0, 0.0)
+    with pytest.raises(Unfit):
+        certify(Question(LIFT, touching, 0.75, group="touch"), 1)
+
+
+def test_allowances_bound_what_a_nudge_does():
+    """A relative nudge e of every input moves each number by at most e times its allowance, nearly."""
+    paths = [v for v in vectors.load("stress") if v.group == "moving-cap-trajectory"]
+    path = next(v for v in paths if 5 <= len(v.expect[0].steps) <= 24)  # it meets several walls
+    scene, s = from_data(path.scene), path.state
+    e = 2.0**-45
+    nudged = State(s.t * (1 + e), s.x * (1 - e), s.y * (1 + e), s.vx * (1 + e), s.vy * (1 - e), s.wall)
+    n = len([step for step in path.expect[0].steps if step.wall])
+    for step, found in zip(
+        path.expect[0].steps, reference.trajectory(scene, nudged, n, digits=30).steps, strict=False
+    ):
+        got = [float(found.dt), *map(float, found.after[1:])]
+        for name, allowed, number in zip(NUMBERS, step.allowance, got, strict=True):
+            difference = abs(float(Fraction(getattr(step, name)[0]) - Fraction(number)))
+            assert difference <= 1.01 * e * allowed + 2.0**-52 * abs(number)
+
+
+@pytest.mark.parametrize(
+    ("found", "spans"),
+    [
+        ([], []),
+        (["", "free", "out"], []),
+        (["captured"], [(0, 1)]),
+        (["", "captured", "", "captured"], [(1, 4)]),
+        (["captured", "free", "free"], [(0, 1)]),
+        (["captured", "out", "free"], [(0, 1)]),
+        (["free", "captured", "free", "", "out"], [(1, 2)]),
+        (["captured", "free", "captured", "", "free", "out"], [(0, 4)]),
+        (["captured", "free", "captured"], [(0, 3)]),
+        (["captured", "out", "out", "", "captured", "free"], [(0, 1), (4, 5)]),
+    ],
+)
+def test_stays_by_what_hits_mean(found, spans):
+    """Base hits ("") change nothing, free hits between captured ones do not divide a stay."""
+    assert list(capture_intervals(found)) == spans
+
+
+GALLERY = State(3.0, 0.0, 0.5, 2.0, 0.25)
+
+
+ASKED = Question(SCENE, GALLERY, 6.0, 40, any_marks, group="gallery")
+
+
+def test_a_hit_on_the_edge_of_being_captured_makes_no_vector():
+    """The chord x = w keeps exactly as far from the centre as the mouth's edge."""
+    static = load("frozen-mushroom")
+    edge = State(0.0, 0.5, 0.25, 0.0, 1.0)
+    with pytest.raises(Unfit):
+        marks(static, reference.trajectory(static, edge, 1, 9.0).steps)
+    with pytest.raises(Unfit):
+        certify(Question(static, edge, 0.75, 40, any_marks, group="edge"), 1)
+
+
+def test_a_flow_keeps_of_its_path_what_is_asked():
+    path = reference.trajectory(SCENE, GALLERY, 40, 6.0)
+    steps, found = certify(ASKED._replace(flow=None), 1).expect[0].steps, marks(SCENE, path.steps)
+    assert {"captured", ""} <= set(found)
+    kept = arrival(steps, capture_intervals(found))
+    assert certify(ASKED, 1).expect == (kept,)
+    assert certify(ASKED, 1).collisions == len(path.steps) + 1
+    assert len(kept.steps) < len(steps)
+    for place, end in zip(kept.stays[0], capture_intervals(found)[0], strict=True):
+        flown = [sum(step.ends("dt")[side] for step in kept.steps[: place + 1]) for side in (0, 1)]
+        truth = [sum(step.ends("dt")[side] for step in steps[: end + 1]) for side in (0, 1)]
+        assert flown[0] <= truth[0] <= truth[1] <= flown[1]
+        assert kept.steps[place].allowance[1:] == steps[end].allowance[1:]
+    assert kept.steps[-1].x == steps[-1].x
+
+
+def test_chained_allowances_are_those_of_sums_without_rounding():
+    """One entry at a time and by fsum, as the first corpus was made."""
+    path = reference.trajectory(SCENE, GALLERY, 12, 9.0)
+    links, held = Links(SCENE, GALLERY, 9.0), []
+    for found in path.steps:
+        state = links.state
+        allowance = links.add(found)
+        proved = flight_of(ask(SCENE, state, 9.0), state, 9.0)
+        held.append([[[float(i == j) for j in range(5)] for i in range(5)], inputs_of(state)])
+        expected = [0.0] * 5
+        for link in held:
+            rows = [
+                [math.fsum(a * b[j] for a, b in zip(row, link[0], strict=True)) for j in range(5)]
+                for row in proved.jacobian
+            ]
+            expected = [a + moved(row, link[1]) for a, row in zip(expected, rows, strict=True)]
+            link[0] = [[a + b for a, b in zip(rows[0], link[0][0], strict=True)], *rows[1:]]
+        assert [four_digits(part) for part in allowance] == [four_digits(part) for part in expected]

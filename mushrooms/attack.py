@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
-from rich.console import Console
 from rich.table import Table
 
 import fast
@@ -15,9 +14,9 @@ from conformance.cases.attacks import UnderAttack, run
 from conformance.cases.table import FAMILIES
 from conformance.files import write_file
 from mushrooms import output
-from mushrooms.terminal import compilation_told, progress_bar
+from mushrooms.terminal import announce_compilation, new_console, progress_bar
 from scene import BadInput, Horizon, Mushroom, Scene, State, Undefined
-from scene.refusal import check_count, check_seed
+from scene.refusal import MAX_SEED
 
 CHOICES = ("reference", "fast", "both")
 MAX_CASES = 10**7
@@ -26,10 +25,16 @@ SLOWEST = 10.0  # seconds that one question may take the reference: its work is 
 
 def attack(
     family: Annotated[str, typer.Option(help="Name of a family of questions, or all.")] = "all",
-    cases: Annotated[int, typer.Option(help=f"Cases of each family, 1 to {MAX_CASES}.")] = 100,
+    cases: Annotated[
+        int, typer.Option(min=1, max=MAX_CASES, help=f"Cases of each family, 1 to {MAX_CASES}.")
+    ] = 100,
     seed: Annotated[
         int,
-        typer.Option(help="Seed of the questions, 0 to 2^64 - 1. Family, seed and index identify a case."),
+        typer.Option(
+            min=0,
+            max=MAX_SEED,
+            help="Seed of the questions, 0 to 2^64 - 1. Family, seed and index identify a case.",
+        ),
     ] = 0,
     stepper: Annotated[str, typer.Option(help="Stepper to ask: reference, fast or both.")] = "both",
     json_file: Annotated[
@@ -45,14 +50,12 @@ def attack(
     """
     if stepper not in CHOICES:
         raise BadInput(f"--stepper = {stepper!r}, must be one of {', '.join(CHOICES)}")
-    check_count("--cases", cases, 1, MAX_CASES)
-    check_seed(seed, "--seed")
     names = list(FAMILIES) if family == "all" else [family]
     if family != "all" and family not in FAMILIES:
         raise BadInput(f"--family = {family!r}, must be all or one of {', '.join(FAMILIES)}")
     if json_file is not None:
         output.check_file(json_file, (".json",))
-    with compilation_told(), progress_bar() as bar:
+    with announce_compilation(), progress_bar() as bar:
         task = bar.add_task("attack", total=cases * len(names))
         tallies = run(
             [FAMILIES[name] for name in names],
@@ -99,7 +102,7 @@ def _print(tallies: list[Any]) -> None:
         table.add_row(
             tally.family, str(tally.n_cases), *counts, f"{tally.worst_ulps:.3g}", f"{tally.slowest:.2f}"
         )
-    Console(width=140).print(table)
+    new_console().print(table)
     for tally in tallies:
         for kind in ("open", "wrong"):
             for case in tally.cases[kind]:

@@ -6,21 +6,22 @@ import json
 import sys
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 from rich import progress
 
+import fast
+from conformance.audit import session
+from conformance.audit.claim import AuditSteppers, Claim
+from conformance.audit.claims import all_claims, select_claims
+from conformance.audit.runs import Size
+from conformance.audit.session import AuditResult, AuditSettings
 from conformance.files import write_files
-from mushrooms import output
+from mushrooms import audit_runs, output
 from mushrooms.output import locked
-from mushrooms.terminal import check_range, compilation_told, progress_bar, refuse_unheeded
-from scene.refusal import BadInput, check_seed
-
-if TYPE_CHECKING:
-    from conformance.audit.claim import Claim
-    from conformance.audit.runs import Size
-    from conformance.audit.session import AuditResult, AuditSettings
+from mushrooms.terminal import announce_compilation, progress_bar, refuse_unheeded
+from scene.refusal import MAX_SEED, BadInput
 
 
 def audit(
@@ -29,8 +30,10 @@ def audit(
     only: Annotated[
         str | None, typer.Option(metavar="IDS", help="Only these claims, separated by commas: X2,L4.")
     ] = None,
-    seed: Annotated[int, typer.Option(help="Seed of the random starts, 0 to 2^64 - 1.")] = 0,
-    threads: Annotated[int | None, typer.Option(help="Threads; all cores by default.")] = None,
+    seed: Annotated[
+        int, typer.Option(min=0, max=MAX_SEED, help="Seed of the random starts, 0 to 2^64 - 1.")
+    ] = 0,
+    threads: Annotated[int | None, typer.Option(min=1, help="Threads; all cores by default.")] = None,
     resume: Annotated[
         bool, typer.Option("--resume", help="Continue with DIR/runs and DIR/findings.")
     ] = False,
@@ -47,7 +50,8 @@ def audit(
         typer.Option(metavar="FILE", help="An ensemble of the reversed cycle, to compare with --ensemble."),
     ] = None,
     energy: Annotated[
-        float | None, typer.Option(help="Initial energy: chooses rows, or replaces a missing column E0.")
+        float | None,
+        typer.Option(min=0, help="Initial energy: chooses rows, or replaces a missing column E0."),
     ] = None,
     energy_unit: Annotated[str | None, typer.Option(help="Unit of energies: v2/2 (default) or v2.")] = None,
     time_unit: Annotated[
@@ -68,10 +72,10 @@ def audit(
 
     Exit code 0 if every claim has its expected verdict, 1 if one has not, 2 on bad input.
     """
-    told = {"--scene": scene, "--backwards": backwards, "--energy": energy, "--energy-unit": energy_unit}
-    told |= {"--time-unit": time_unit, "--particles": particles}
+    theirs = {"--scene": scene, "--backwards": backwards, "--energy": energy, "--energy-unit": energy_unit}
+    theirs |= {"--time-unit": time_unit, "--particles": particles}
     if ensemble is None:
-        refuse_unheeded(told, "there is no --ensemble")
+        refuse_unheeded(theirs, "there is no --ensemble")
         _audit_paper(out, full, only, seed, threads, resume, commands, as_json)
         return
     from mushrooms.audit_ensemble import Options, audit_ensemble
@@ -93,17 +97,11 @@ def _audit_paper(
     as_json: bool,
 ) -> None:
     """Conduct the audit of the paper's claims."""
-    from conformance.audit.claims import select_claims
-    from conformance.audit.session import AuditSettings
-    from mushrooms import audit_runs
-    from mushrooms.reports import audit_page
+    from mushrooms.reports import audit_page  # drawing takes a second to import
 
     if only is not None and not only.replace(",", " ").split():
         raise BadInput(f"--only = {only!r}, must name a claim such as X2; all are checked without it")
     claims = select_claims(only or "")
-    check_seed(seed, "--seed")
-    if threads is not None:
-        check_range("--threads", threads, 1)
     size: Size = "full" if full else "quick"
     if commands:
         lines = [audit_runs.command(run, size, seed, out) for run in audit_runs.needed(claims, size)]
@@ -111,10 +109,10 @@ def _audit_paper(
         return
     with output.writable_folder(out) as folder, locked(folder):
         settings = AuditSettings(size, seed, threads, folder / "findings", resume)
-        # What an audit that was killed was writing. Nobody else writes under these names: the folder is held.
+        # What a killed audit was writing: no other process writes under these names, as the folder is held.
         for path in (*folder.glob(".report.*.part"), *folder.glob("findings/.*.finding.*.part")):
             path.unlink(missing_ok=True)
-        result = _conducted(folder, settings, claims)
+        result = _conduct(folder, settings, claims)
         data = audit_page.to_data(result)
         texts = {
             "report.json": audit_page.to_json(data),
@@ -130,22 +128,16 @@ def _audit_paper(
     raise typer.Exit(0 if result.is_passed else 1)
 
 
-def _conducted(folder: Path, settings: AuditSettings, claims: tuple[Claim, ...]) -> AuditResult:
+def _conduct(folder: Path, settings: AuditSettings, claims: tuple[Claim, ...]) -> AuditResult:
     """Conduct an audit of the claims, and of those that are taken up, in a folder that is held."""
-    import fast
-    from conformance.audit.claim import AuditSteppers
-    from conformance.audit.claims import all_claims
-    from conformance.audit.session import conduct, kept
-    from mushrooms import audit_runs
-
     if settings.resume:
-        wanted = {claim.id for claim in claims} | kept(settings)
+        wanted = {claim.id for claim in claims} | session.kept(settings)
         claims = tuple(claim for claim in all_claims() if claim.id in wanted)
         _check_report(folder, wanted)
     runs = audit_runs.KeptRuns(folder, settings.resume)
     runs.check(audit_runs.needed(claims, settings.size), settings.seed)
-    with compilation_told(), progress_bar() as bar:
-        return conduct(
+    with announce_compilation(), progress_bar() as bar:
+        return session.conduct(
             AuditSteppers(fast.simulate, fast.trajectory, fast.flow),
             settings,
             claims=claims,

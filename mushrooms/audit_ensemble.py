@@ -1,9 +1,8 @@
-"""`mushrooms audit --ensemble`: an ensemble that somebody else has run, held to the paper; one page of it."""
+"""`mushrooms audit --ensemble`: an ensemble of another program, held to the paper; one page of it."""
 
 from __future__ import annotations
 
 import json
-import math
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -19,10 +18,11 @@ from conformance.audit.ensemble import (
     nu_at,
     reversal,
 )
+from conformance.audit.runs import scene_named
 from conformance.files import write_files
 from mushrooms import output
 from mushrooms.ensemble_table import read_table
-from mushrooms.terminal import check_energy, load_scene
+from mushrooms.reports.page import pull
 from scene.refusal import BadInput
 from scene.tables import Mushroom
 
@@ -61,16 +61,15 @@ def audit_ensemble(
     """Audit an ensemble, write report.json, report.txt and report.html; return the exit code."""
     if scene_name is None:
         raise BadInput("--ensemble needs --scene, the scene that was simulated")
-    found = load_scene(scene_name)
+    found = scene_named(scene_name)
     if not isinstance(found, Mushroom) or not found.period:
         raise BadInput(f"--scene = {scene_name!r}, must be a mushroom that moves: theory has no other")
-    check_energy(options.energy)
     if options.energy_unit not in ENERGIES:
         raise BadInput(f"--energy-unit = {options.energy_unit!r}, must be one of {', '.join(ENERGIES)}")
     if options.time_unit not in (None, *TIMES):
         raise BadInput(f"--time-unit = {options.time_unit!r}, must be one of {', '.join(TIMES)}")
     with output.writable_folder(out) as folder:
-        result = conducted(path, found, reversed_path, options)
+        result = examine(path, found, reversed_path, options)
         data = to_data(result, path, scene_name)
         texts = {
             "report.json": json.dumps(data, indent=1, ensure_ascii=False) + "\n",
@@ -85,7 +84,7 @@ def audit_ensemble(
     return 0 if result.verdict == "confirmed" else 1
 
 
-def conducted(path: Path, scene: Mushroom, reversed_path: Path | None, options: Options) -> EnsembleAudit:
+def examine(path: Path, scene: Mushroom, reversed_path: Path | None, options: Options) -> EnsembleAudit:
     """Read an ensemble and check it."""
     given, notes = read(path, scene, options)
     theirs = expected(scene, given.energy)
@@ -112,11 +111,11 @@ def read(path: Path, scene: Mushroom, options: Options) -> tuple[GivenEnsemble, 
     notes = [f"energies are taken as {form}, lengths in the scene's unit: E0 = {energy:g} as v²/2"]
     if table.n_other:
         notes.append(f"{table.n_other:,} rows of another E0 are left out")
-    t_in, t_out, told = _times(scene, table.columns, options.time_unit)
+    t_in, t_out, more = _times(scene, table.columns, options.time_unit)
     captured = table.columns.get("captured")
     if captured is None and t_in is not None:
         captured = np.isfinite(t_in)
-        told = [*told, "captured are those with a t_in"]
+        more = [*more, "captured are those with a t_in"]
     elif captured is not None:
         _check_flags(path, captured)
     n_lost = table.n_lost
@@ -141,7 +140,7 @@ def read(path: Path, scene: Mushroom, options: Options) -> tuple[GivenEnsemble, 
             table.is_binary32,
             table.sums[:, 1:] if table.sums.shape[1] > 1 else None,
         ),
-        [*notes, *told],
+        [*notes, *more],
     )
 
 
@@ -176,11 +175,11 @@ def _times(scene: Mushroom, columns: dict[str, Any], unit: str | None) -> tuple[
         how = "inferred"
     else:
         how = "as said"
-    told = (
+    note = (
         f"times are taken {'as parts of a cycle' if unit == 'cycles' else 'in the unit of the scene'}, {how}"
     )
     size = span if unit == "cycles" else 1.0
-    return t_in * size, None if t_out is None else t_out * size, [told]
+    return t_in * size, None if t_out is None else t_out * size, [note]
 
 
 def _falls(scene: Mushroom, times: Any, rather_than: Any) -> bool:
@@ -204,13 +203,6 @@ def to_data(result: EnsembleAudit, path: Path, scene_name: str) -> dict[str, Any
         "causes": result.causes,
         "checks": [{**check._asdict(), "pull": pull(check)} for check in result.checks],
     }
-
-
-def pull(check: Check) -> float | None:
-    """Return how many standard errors a value is off; None where nothing is random."""
-    if check.value is None or not check.error or not math.isfinite(check.error):
-        return None
-    return (check.value - float(check.expected)) / check.error
 
 
 def to_text(data: dict[str, Any]) -> str:

@@ -6,9 +6,10 @@ import os
 from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
 
+from conformance.audit.claim import Claim
 from conformance.audit.runs import RUNS, Simulation, Size, run_seed, scene_of
+from fast import Ensemble
 from fast.ensemble import SHARE
 from mushrooms import output
 from mushrooms.output import locked
@@ -16,12 +17,8 @@ from mushrooms.simulate import tell_damaged
 from mushrooms.store import conduct, engines
 from mushrooms.store.run import is_run
 from mushrooms.store.spec import RunSpec
+from scene import Scene
 from scene.refusal import BadInput
-
-if TYPE_CHECKING:
-    from conformance.audit.claim import Claim
-    from fast import Ensemble
-    from scene import Scene
 
 FOLDER = "runs"
 
@@ -58,13 +55,13 @@ class KeptRuns:
 
         Raises:
             BadInput: the folder of one of these runs holds another, or this one and `resume` was not
-                asked for, or somebody else writes in it.
+                asked for, or another process writes in it.
         """
         for run in runs:
             place = self._folder / run.name
             if is_run(place):
                 with locked(place):
-                    conduct.described(place, spec_of(run, seed), {})
+                    conduct.read_description(place, spec_of(run, seed), {})
                 if not self._resume:
                     how = "--resume takes it up, another --out begins anew"
                     raise BadInput(f"output {str(place)!r} holds a run of this audit: {how}")
@@ -90,7 +87,7 @@ class KeptRuns:
         line = spec.command(scene.name, n_particles, place)
         default = block_size(spec, n_particles, threads or os.cpu_count() or 1)
         with output.writable_folder(place), locked(place):
-            run, damaged = conduct.opened(
+            run, damaged = conduct.open_or_create(
                 place, spec, n_particles, None, default, line, self._resume, at_least=True
             )
             tell_damaged(damaged)

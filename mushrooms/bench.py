@@ -7,21 +7,25 @@ import time
 from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
-from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+import fast
+from conformance.bench import baselines, growth, record, solvers, workloads
+from conformance.bench.record import Record, Size, quartiles
+from conformance.bench.solvers import Family, Solver, by_command
+from conformance.cases.prover import proved_step
 from conformance.files import Writer, write_files
+from conformance.harness.examples import find_examples
+from conformance.suite.process import CheckFailure
+from conformance.suite.session import Limits
+from mushrooms import bench_solvers as ours
 from mushrooms import output
-from mushrooms.terminal import compilation_told, progress_bar, refuse_unheeded
-from scene.refusal import BadInput, check_seed
-
-if TYPE_CHECKING:
-    from conformance.bench.record import Record, Size
-    from conformance.bench.solvers import Family, Solver
+from mushrooms.terminal import announce_compilation, new_console, progress_bar, refuse_unheeded
+from scene.refusal import MAX_SEED, BadInput
 
 TIMEOUT, RESTARTS = 30.0, 1  # of a command
 # By size: questions of a workload, steps with walls only, runs, trajectories and their length.
@@ -39,7 +43,7 @@ def bench(
     ] = None,
     out: Annotated[Path, typer.Option(metavar="DIR", help="Folder for the results.")] = Path("bench-report"),
     quick: Annotated[bool, typer.Option("--quick", help="Fewer questions and runs: five minutes.")] = False,
-    seed: Annotated[int, typer.Option(help="Seed of the questions, 0 to 2^64 - 1.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, max=MAX_SEED, help="Seed of the questions, 0 to 2^64 - 1.")] = 0,
     table: Annotated[
         Path | None,
         typer.Option(
@@ -55,49 +59,35 @@ def bench(
 
     Exit code 0, or 2 on bad input.
     """
-    from conformance.bench import record
-    from mushrooms.figures import speed as figures_of_speed
-    from mushrooms.figures import style
+    from mushrooms.figures import speed, style  # drawing takes a second to import
     from mushrooms.reports import bench_page
 
-    _check_table(table, workload, quick, command)
-    if table is not None:
+    if table is None:
+        refuse_unheeded({"--workload": workload}, "it needs --table")
+    else:
+        measuring = {"--quick": quick or None, "COMMAND": command or None}
+        refuse_unheeded(measuring, "--table measures nothing")
         print(bench_page.to_markdown(record.read(table), workload or "moving-cap-1e7"), end="")
         return
-    check_seed(seed, "--seed")
     size: Size = "quick" if quick else "full"
-    with output.writable_folder(out) as folder, compilation_told():
-        found = _measured(size, seed, command or [])
-        picture = style.svg(figures_of_speed.headline(found))
+    with output.writable_folder(out) as folder, announce_compilation():
+        found = _measure(size, seed, command or [])
+        picture = style.svg(speed.headline(found))
         files: dict[str, bytes | str | Writer] = {
             "bench.json": record.encode(found),
             "bench.svg": picture,
             "bench.html": bench_page.to_html(found, picture),
         }
         write_files(folder, files)
-    console = Console(width=140)
+    console = new_console()
     console.print(_table(found))
     for name, why in found.not_run.items():
         console.print(f"not run: {name}: {why}", markup=False)
     print(f"{found.seconds:.0f} s. Report: {folder / 'bench.html'}")
 
 
-def _check_table(table: Path | None, workload: str | None, quick: bool, command: list[str] | None) -> None:
-    """Refuse options that would change nothing: a table measures nothing, a benchmark has all workloads."""
-    if table is None:
-        refuse_unheeded({"--workload": workload}, "it needs --table")
-    else:
-        measuring = {"--quick": quick or None, "COMMAND": command or None}
-        refuse_unheeded(measuring, "--table measures nothing")
-
-
-def _measured(size: Size, seed: int, command: list[str]) -> Record:
+def _measure(size: Size, seed: int, command: list[str]) -> Record:
     """Run everything."""
-    import fast
-    from conformance.bench import growth, record, solvers, workloads
-    from conformance.cases.prover import proved_step
-    from mushrooms import bench_solvers as ours
-
     begin = time.monotonic()
     n_questions, n_further, repeats = QUESTIONS[size], FURTHER[size], REPEATS[size]
     effort = solvers.Effort(repeats, *LASTING[size])
@@ -142,25 +132,18 @@ def _measured(size: Size, seed: int, command: list[str]) -> Record:
 
 def _solvers(stack: ExitStack, command: list[str]) -> tuple[list[Solver], dict[str, str], dict[str, str]]:
     """Return solvers, what was compiled, and what cannot run."""
-    from conformance.bench import baselines
-    from conformance.bench.solvers import by_command
-    from conformance.harness.examples import find_examples
-    from conformance.suite.process import CheckFailure
-    from conformance.suite.session import Limits
-    from mushrooms import bench_solvers as ours
-
     limits = Limits(TIMEOUT, RESTARTS)
-    solvers = [*ours.our_solvers(), *baselines.in_python()]
+    found = [*ours.our_solvers(), *baselines.in_python()]
     built, not_run = dict[str, str](), dict[str, str]()
     folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
     try:
         library, built["lean C"] = baselines.build(folder, baselines.FLAGS)
-        solvers += baselines.in_c(library)
+        found += baselines.in_c(library)
     except CheckFailure as failure:
         not_run["lean C, time steps"] = failure.why
 
     def add(name: str, family: Family, line: Sequence[str]) -> None:
-        solvers.append(by_command(name, family, line, stack, limits))
+        found.append(by_command(name, family, line, stack, limits))
 
     examples = find_examples(folder, baselines.FLAGS)
     for language, example in examples.items():
@@ -180,22 +163,21 @@ def _solvers(stack: ExitStack, command: list[str]) -> tuple[list[Solver], dict[s
             add(f"command {' '.join(command)}", "command", command)
         except CheckFailure as failure:
             raise BadInput(f"command {command[0]!r} {failure.verdict}: {failure.why}") from None
-    return solvers, built, not_run
+    return found, built, not_run
 
 
 def _table(found: Record) -> Table:
-    from conformance.bench.record import quartiles
-    from mushrooms.reports.bench_page import astray, middle_and_worst
+    from mushrooms.reports import bench_page
 
     numbers = ("ns/collision", "quartiles", "median ulps", "worst ulps", "wrong", "undecided", "left")
     table = Table("workload", "stepper", title="Speed against error", title_justify="left")
     for name in (*numbers, "wrong of further"):
         table.add_column(name, justify="right")
     for p in found.points:
-        middle, worst = middle_and_worst(p.ulps, ".2g")
+        middle, worst = bench_page.middle_and_worst(p.ulps, ".2g")
         counts = [str(n) if n else "" for n in (p.wrong, p.undecided, p.left)]
         first, ns, third = quartiles(p.ns)
         spread = f"-{1 - first / ns:.1%} +{third / ns - 1:.1%}"
-        row = [escape(p.solver), f"{ns:,.0f}", spread, middle, worst, *counts, astray(p)]
+        row = [escape(p.solver), f"{ns:,.0f}", spread, middle, worst, *counts, bench_page.astray(p)]
         table.add_row(p.workload, *row)
     return table

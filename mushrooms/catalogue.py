@@ -10,7 +10,7 @@ from rich.table import Table
 
 import scene as scenes
 from conformance.audit.runs import SCENES
-from mushrooms.terminal import AsJson, table_console
+from mushrooms.terminal import AsJson, new_console
 from scene.load import catalogue_text, read_data
 from scene.refusal import BadInput
 
@@ -28,7 +28,11 @@ def list_scenes(
     if as_toml and not name:
         raise BadInput(f"--toml needs NAME, one of {', '.join(scenes.catalogue())}")
     if name:
-        _print_scene(name, as_json)
+        data = scenes.to_data(SCENES[name]) if name in SCENES else None
+        if as_json:
+            print(json.dumps(data or read_data(name), indent=2, ensure_ascii=False))
+        else:
+            print((_toml(data) if data else catalogue_text(name)).rstrip("\n"))
         return
     rows = [_catalogue_row(name) for name in scenes.catalogue()]
     if as_json:
@@ -41,15 +45,7 @@ def list_scenes(
         )
         notes = f"Refused: {row['refused']}" if row["refused"] else row["notes"]
         table.add_row(row["name"], row["table"], length, notes)
-    table_console().print(table)
-
-
-def _print_scene(name: str, as_json: bool) -> None:
-    data = scenes.to_data(SCENES[name]) if name in SCENES else None
-    if as_json:
-        print(json.dumps(data or read_data(name), indent=2, ensure_ascii=False))
-    else:
-        print((_toml(data) if data else catalogue_text(name)).rstrip("\n"))
+    new_console().print(table)
 
 
 def _toml(data: dict[str, Any]) -> str:
@@ -66,9 +62,7 @@ def _toml(data: dict[str, Any]) -> str:
 def _catalogue_row(name: str) -> dict[str, Any]:
     data = read_data(name)
     row = {"name": name, "table": data["table"], "period": None, "notes": data.get("notes", "")}
-    row |= {"refused": None}
     try:
-        length = scenes.load(name).period
+        return row | {"period": scenes.load(name).period or None, "refused": None}
     except scenes.InvalidScene as error:
         return row | {"refused": str(error).partition(": ")[2]}
-    return row | {"period": length or None}

@@ -2,29 +2,30 @@
 
 from __future__ import annotations
 
-import math
 import secrets
 import shlex
 import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 from rich.console import Console
 from rich.markup import escape
+from rich.progress import Progress
 from rich.table import Table
 
+from conformance import suite
 from conformance.files import write_file
+from conformance.suite import reports, sheet_files
+from conformance.suite.result import VERDICTS, Run
+from conformance.suite.run import NEW_SEEDS, choose
+from conformance.suite.session import Limits
+from conformance.suite.sheet import Sheet, grade_answers, signed
 from mushrooms import output
 from mushrooms.terminal import new_console, progress_bar, refuse_unheeded
-from scene.refusal import BadInput, check_seed
-
-if TYPE_CHECKING:
-    from rich.progress import Progress
-
-    from conformance.suite.result import Run
+from scene.refusal import MAX_SEED, BadInput
 
 LONGEST = 7 * 86_400  # seconds
 EVERY = 10.0  # seconds between lines where there is no terminal
@@ -34,18 +35,27 @@ MAX_SENT = 500  # characters of that, and of a line of standard error
 MAX_ERRORS = 6  # lines of that
 COLOURS = {"pass": "green", "declined": "yellow", "unsupported": "yellow"}
 
+Seed = Annotated[
+    int | None, typer.Option(min=0, max=MAX_SEED, help="Seed of the questions; default: a new one.")
+]
+Total = Annotated[
+    float | None, typer.Option(min=0, max=LONGEST, help="Seconds for the whole run; no limit by default.")
+]
+
 
 def check(
     command: Annotated[
         list[str] | None, typer.Argument(metavar="-- COMMAND...", help="The stepper; it speaks protocol 1.")
     ] = None,
     level: Annotated[str, typer.Option(help="core, extended or stress.")] = "core",
-    seed: Annotated[int | None, typer.Option(help="Seed of the questions; default: a new one.")] = None,
-    timeout: Annotated[float, typer.Option(help="Seconds for one answer, compilation included.")] = 120.0,
-    total: Annotated[
-        float | None, typer.Option(help="Seconds for the whole run; no limit by default.")
-    ] = None,
-    restarts: Annotated[int, typer.Option(help="Fresh processes after the first, 0 to 1000.")] = 10,
+    seed: Seed = None,
+    timeout: Annotated[
+        float, typer.Option(min=0, max=LONGEST, help="Seconds for one answer, compilation included.")
+    ] = 120.0,
+    total: Total = None,
+    restarts: Annotated[
+        int, typer.Option(min=0, max=1000, help="Fresh processes after the first, 0 to 1000.")
+    ] = 10,
     groups: Annotated[
         str, typer.Option(help="Only these groups of cases, separated by commas; default: all.")
     ] = "",
@@ -75,59 +85,71 @@ def check(
 
     Exit code 0 if everything passes, 1 if something fails, 2 if the options or the suite are at fault.
     """
-    _check_limits(timeout, restarts, total)
-    files = _report_files(json_file, junit, html, badge, summary)
-    if groups and not groups.replace(",", " ").split():
-        raise BadInput(f"--groups = {groups!r}, must name a group; all are asked without it")
-    names = [name.strip() for name in groups.split(",") if name.strip()]
+    files = _report_files(json=json_file, junit=junit, html=html, badge=badge, summary=summary)
     if questions or answers:
         unheeded = {"COMMAND": command, "--groups": groups or None, "--known-failures": known_failures}
         refuse_unheeded(unheeded, "questions and answers are in files")
-        if answers is None:
-            refuse_unheeded({str(path): True for path, _ in files}, "nothing is graded yet")
-            assert questions is not None
-            write_questions(questions, level, seed)
-            return
+    if answers:
         run = grade_file(answers, questions, level, seed)
+    elif questions:
+        refuse_unheeded({str(path): True for path in files}, "nothing is graded yet")
+        write_questions(questions, level, seed)
+        return
     else:
-        run = _asked(command or [], level, seed, names, (timeout, restarts, total), known_failures)
-    for path, content in files:
+        limits = Limits(timeout, restarts, total)
+        run = _run(command or [], level, seed, _names_of(groups), limits, known_failures)
+    for path, content in files.items():
         write_file(path, content(run))
     show(run)
     raise typer.Exit(run.exit_code())
 
 
-def _check_limits(timeout: float, restarts: int, total: float | None) -> None:
-    for name, seconds in (("--timeout", timeout), ("--total", total)):
-        if seconds is not None and not (math.isfinite(seconds) and 0 < seconds <= LONGEST):
-            raise BadInput(f"{name} = {seconds}, must be > 0 and at most {LONGEST} seconds")
-    if not 0 <= restarts <= 1000:
-        raise BadInput(f"--restarts = {restarts}, must be 0 to 1000")
+def _names_of(groups: str) -> list[str]:
+    names = [name.strip() for name in groups.split(",") if name.strip()]
+    if groups and not names:
+        raise BadInput(f"--groups = {groups!r}, must name a group; all are asked without it")
+    return names
 
 
-def _report_files(*given: Path | None) -> list[tuple[Path, Callable[[Run], bytes | str]]]:
-    """Return the report files that are asked for, each with what makes its content, in the options' order."""
-    asked_for = zip(given, _writers(), strict=True)
-    files = [(path, suffix, content) for path, (suffix, content) in asked_for if path]
-    for i, (path, suffix, _) in enumerate(files):
-        output.check_file(path, (suffix,))
-        if path in [other for other, _, _ in files[:i]]:
-            raise BadInput(f"output {str(path)!r} is asked for twice, must be a file for each report")
-    return [(path, content) for path, _, content in files]
+def to_html(run: Run) -> bytes:
+    """Return the HTML report."""
+    from mushrooms.reports import check_page  # drawing takes a second to import
+
+    return check_page.to_html(run)
 
 
-def _asked(
+# The ending and the content of each report file, by its option.
+WRITERS: dict[str, tuple[str, Callable[[Run], bytes | str]]] = {
+    "json": (".json", reports.to_json),
+    "junit": (".xml", reports.to_junit),
+    "html": (".html", to_html),
+    "badge": (".svg", reports.to_badge),
+    "summary": (".json", reports.to_summary),
+}
+
+
+def _report_files(**given: Path | None) -> dict[Path, Callable[[Run], bytes | str]]:
+    """Return the report files that are asked for, each with what makes its content."""
+    files: dict[Path, Callable[[Run], bytes | str]] = {}
+    for option, path in given.items():
+        if path is not None:
+            suffix, content = WRITERS[option]
+            output.check_file(path, (suffix,))
+            if path in files:
+                raise BadInput(f"output {str(path)!r} is asked for twice, must be a file for each report")
+            files[path] = content
+    return files
+
+
+def _run(
     command: list[str],
     level: str,
     seed: int | None,
     groups: list[str],
-    limits: tuple[float, int, float | None],
+    limits: Limits,
     known_failures: Path | None,
 ) -> Run:
     """Run the suite on a command, with its progress shown."""
-    from conformance import suite
-    from conformance.suite.session import Limits
-
     known = suite.read_known(known_failures) if known_failures else frozenset()
     with progress_bar() as bar:
         return suite.check(
@@ -135,44 +157,28 @@ def _asked(
             level=level,
             seed=seed,
             groups=groups,
-            limits=Limits(*limits),
+            limits=limits,
             known=known,
-            progress=_teller(bar),
+            progress=_new_progress(bar),
         )
 
 
-def _teller(bar: Progress) -> Callable[[int, int], None]:
+def _new_progress(bar: Progress) -> Callable[[int, int], None]:
     """Return what moves a bar on a terminal, and elsewhere writes a line on stderr now and then."""
-    task, told = bar.add_task("cases", total=None), time.monotonic()
+    task, last = bar.add_task("cases", total=None), time.monotonic()
 
-    def tell(n_done: int, n_total: int) -> None:
-        nonlocal told
+    def on_progress(n_done: int, n_total: int) -> None:
+        nonlocal last
         bar.update(task, completed=n_done, total=n_total)
-        if bar.disable and time.monotonic() - told > EVERY:
-            told = time.monotonic()
+        if bar.disable and time.monotonic() - last > EVERY:
+            last = time.monotonic()
             print(f"{n_done} of {n_total} cases", file=sys.stderr, flush=True)
 
-    return tell
-
-
-def _writers() -> tuple[tuple[str, Callable[[Run], bytes | str]], ...]:
-    """Return the ending and the content of each report file, in the order of the options."""
-    from conformance.suite import reports
-
-    def to_html(run: Run) -> bytes:
-        from mushrooms.reports import check_page  # it draws, and drawing takes a second to import
-
-        return check_page.to_html(run)
-
-    kinds = reports.to_json, reports.to_junit, to_html, reports.to_badge, reports.to_summary
-    return tuple(zip((".json", ".xml", ".html", ".svg", ".json"), kinds, strict=True))
+    return on_progress
 
 
 def show(run: Run) -> None:
     """Print verdicts by group, with every denominator, and what stands against success."""
-    from conformance.suite import reports
-    from conformance.suite.result import VERDICTS
-
     groups = [*(reports.summarise(run, group) for group in run.groups()), reports.summarise(run)]
     seen = [verdict for verdict in VERDICTS if verdict == "pass" or groups[-1].counts[verdict]]
     table = Table("group", "cases", *seen, "worst ulps", "A/B/C", "class", title=_title(run))
@@ -187,7 +193,7 @@ def show(run: Run) -> None:
         table.add_row(
             group.group, str(group.cases), *cells, worst if graded else "–", counts, group.precision
         )
-    console = new_console()
+    console = new_console(soft_wrap=True)
     console.print(table)
     if run.speed:
         best = f"{run.speed.best_ns:.4g} ns per collision"
@@ -218,8 +224,8 @@ def _show_objections(console: Console, run: Run) -> None:
     for result in [r for r in run.results if r.expected and not r.is_known and not r.is_right][:MAX_TAUGHT]:
         again = f"mushrooms ask {result.id} --seed {run.seed}"
         console.print(f"{result.id}, asked {escape(result.asked)}; {again} prints it")
-        console.print(f"  given     {escape(in_one_line(result.given))}")
-        console.print(f"  certified {escape(in_one_line(result.expected))}")
+        console.print(f"  given     {escape(format_outcome(result.given))}")
+        console.print(f"  certified {escape(format_outcome(result.expected))}")
     wrong = [r for r in run.results if not r.is_right and not r.is_known]
     for result in [r for r in wrong if r.paste][:MAX_TAUGHT]:
         console.print(
@@ -233,7 +239,7 @@ def _show_objections(console: Console, run: Run) -> None:
         console.print(f"[yellow]{escape(line)}[/]")
 
 
-def in_one_line(outcome: dict[str, Any] | None) -> str:
+def format_outcome(outcome: dict[str, Any] | None) -> str:
     """Return an outcome's fields on a line."""
     if outcome is None:
         return "nothing"
@@ -243,8 +249,8 @@ def in_one_line(outcome: dict[str, Any] | None) -> str:
 
 
 def _title(run: Run) -> str:
-    who = run.introduction
-    name = f"{who.name} {who.version} ({who.language})" if who else shlex.join(run.command)
+    known = run.introduction
+    name = f"{known.name} {known.version} ({known.language})" if known else shlex.join(run.command)
     return escape(f"{name}, level {run.level}, corpus {run.corpus}")
 
 
@@ -255,7 +261,7 @@ def _cell(verdict: str, n: int) -> str:
 def _verdict(run: Run, total: Any) -> str:
     passed = f"{total.counts['pass']} of {total.cases} cases pass"
     restarts = f", {run.n_restarts} restarts" if run.n_restarts else ""
-    doubt = ": the corpus could not tell, which is its own fault" if run.exit_code() == 2 else ""
+    doubt = ": the corpus could not on_progress, which is its own fault" if run.exit_code() == 2 else ""
     return f"{passed}{restarts}, {run.seconds:.1f} s{doubt}."
 
 
@@ -265,12 +271,8 @@ def write_questions(path: Path, level: str, seed: int | None) -> None:
     Raises:
         BadInput: the level, the seed or the path is none; nothing is written then.
     """
-    from conformance.suite import sheet_files
-    from conformance.suite.run import NEW_SEEDS, choose
-    from conformance.suite.sheet import Sheet
-
     choose(level)
-    seed = secrets.randbelow(NEW_SEEDS) if seed is None else check_seed(seed, "--seed")
+    seed = secrets.randbelow(NEW_SEEDS) if seed is None else seed
     if path.suffix == ".jsonl":
         output.check_file(path, (".jsonl",))
         sheet = Sheet(level, seed)
@@ -295,23 +297,20 @@ def grade_file(answers: Path, questions: Path | None, level: str, seed: int | No
         answers: the file, or a folder of CSV files.
         questions: what they answer, where the key is beside it; else the fresh questions are proved anew.
         level: of the questions, where nothing else tells.
-        seed: likewise; None where the answers tell it.
+        seed: likewise; None where the answers on_progress it.
 
     Raises:
         BadInput: in one line.
     """
-    from conformance.suite import sheet_files
-    from conformance.suite.sheet import Sheet, grade_answers, signed
-
     found = sheet_files.read_answers(answers)
     if questions is not None:
         sheet = sheet_files.read_key(questions)
         if seed not in (None, sheet.seed):
             raise BadInput(f"--seed = {seed}, must be {sheet.seed}, that of the questions")
         return grade_answers(sheet, found)
-    told = signed(found.echoes)
-    if told is None and seed is None:
+    written_with = signed(found.echoes)
+    if written_with is None and seed is None:
         raise BadInput("--answers: give --questions, or the --seed and --level that they were written with")
-    level, seed = told if told is not None and seed is None else (level, seed)
+    level, seed = written_with if written_with is not None and seed is None else (level, seed)
     assert seed is not None
-    return grade_answers(Sheet(level, check_seed(seed, "--seed")), found)
+    return grade_answers(Sheet(level, seed), found)

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from mpmath import fp
 
+import theory
 from mushrooms.store.progress import Gain
 from mushrooms.store.spec import RunSpec
 from scene import Mushroom, Scene
@@ -20,7 +21,8 @@ from scene.tables import laws
 
 DIGITS = 10  # of the adiabatic theory: a run knows six at most
 N_TIMES = 1025  # of a cycle, at which the sides are looked at
-SAME = 2.0**-40  # of nu: far above rounding, and nobody starts in so thin a part of the island
+SAME = 2.0**-40  # of nu: far above rounding, and no particle starts in so thin a part of the island
+NO_THEORY = (BadInput, theory.NotCovered, theory.NotConverged)  # raised where theory covers nothing
 
 
 class Theory(NamedTuple):
@@ -28,7 +30,7 @@ class Theory(NamedTuple):
 
     Attributes:
         m1, p_nc: predicted.
-        m1_error, p_nc_error: how far that may be off; None where nobody knows.
+        m1_error, p_nc_error: how far that may be off; None if that is unknown.
     """
 
     m1: float
@@ -46,8 +48,8 @@ def measured(spec: RunSpec, n_captured: int, gain: Gain) -> dict[str, Any]:
         gain: ln(E/E0) of these particles after the last cycle.
 
     The prediction is that at the run's energy where rates of the scene's frozen tables are known. Elsewhere
-    it is the limit of high energies, and without z: what that leaves out is not known. None is what nobody
-    knows: of a cycle that does not begin where the mouth is widest too (see `begins_widest`).
+    it is the limit of high energies, and without z: what that leaves out is not known. None is what is
+    unknown: of a cycle that does not begin where the mouth is widest too (see `begins_widest`).
     """
     n, k = gain.n, spec.n_cycles
     mean, error = (None if x is None else x / k for x in (gain.mean, gain.standard_error))
@@ -55,26 +57,23 @@ def measured(spec: RunSpec, n_captured: int, gain: Gain) -> dict[str, Any]:
     free = 1.0 - n_captured / (n * k) if n and has_island else None
     free_error = None if free is None else _measured_error(spec.scene, free, n * k)
     found = predicted(spec)
-    pulls: tuple[float | None, float | None] = (None, None)
+    m1_z = p_nc_z = None
     if found is not None and n:
-        expected_error = _binomial_error(found.p_nc, n * k)
-        pulls = (
-            _pull(mean, found.m1, error, found.m1_error),
-            _pull(free, found.p_nc, expected_error, found.p_nc_error),
-        )
+        m1_z = _pull(mean, found.m1, error, found.m1_error)
+        p_nc_z = _pull(free, found.p_nc, _binomial_error(found.p_nc, n * k), found.p_nc_error)
     return {
         "m1": mean,
         "m1_se": error,
         "m1_theory": found.m1 if found else None,
-        "m1_z": pulls[0],
+        "m1_z": m1_z,
         "p_nc": free,
         "p_nc_se": free_error,
         "p_nc_theory": found.p_nc if found else None,
-        "p_nc_z": pulls[1],
+        "p_nc_z": p_nc_z,
     }
 
 
-def limit_told(spec: RunSpec, summary: Mapping[str, Any]) -> str | None:
+def explain_limit(spec: RunSpec, summary: Mapping[str, Any]) -> str | None:
     """Return a line that tells that theory beside a run is the limit of high energies, or why there is none.
 
     Args:
@@ -82,26 +81,24 @@ def limit_told(spec: RunSpec, summary: Mapping[str, Any]) -> str | None:
         summary: as `measured` returns it, or more.
     """
     if isinstance(spec.scene, Mushroom) and not begins_widest(spec.scene):
-        return _narrow_told(spec.scene)
+        return _explain_narrow_start(spec.scene)
     # Of one particle m1 has no error, and so no z, at an energy of which theory knows all the same.
     is_of_this_energy = any(summary[z] is not None for z in ("m1_z", "p_nc_z"))
     if summary["m1_theory"] is None or summary["m1"] is None or is_of_this_energy:
         return None
     if not spec.scene.period:  # nothing moves: energies are what they were, at any energy
         return None
-    told = "m1_theory, p_nc_theory: the limit of high energies; what is left at this one is not known"
+    note = "m1_theory, p_nc_theory: the limit of high energies; what is left at this one is not known"
     if not leans_inward(spec.scene):
-        told += (
+        note += (
             ", and falls slowly (of upright sides the variance as log(E) / sqrt(E)):"
             " where the slope is not above 0 some flights stay in the stem"
         )
-    return told
+    return note
 
 
-def _narrow_told(scene: Mushroom) -> str:
+def _explain_narrow_start(scene: Mushroom) -> str:
     """Say why a cycle that begins with a narrow mouth has no theory, and how to shift it."""
-    import theory
-
     begin, length = start_time(scene), scene.period
     now, widest = table_at(fp, scene, begin), theory.Cycle.of(scene, DIGITS)
     wait = (float(widest.start) - begin) % length
@@ -122,7 +119,7 @@ def _measured_error(scene: Scene, share: float, n: int) -> float:
     """Return the standard error of a measured share of n that were free.
 
     Of n that are all alike the binomial one would be 0, as if no more could tell: there it is that of a share
-    of 1 / (n + 1). Where the mouth never narrows nobody can be captured, and the share is known.
+    of 1 / (n + 1). Where the mouth never narrows no particle can be captured, and the share is known.
     """
     if not narrowings(scene):
         return 0.0
@@ -143,15 +140,21 @@ def _pull(found: float | None, wanted: float, error: float | None, left_out: flo
 def begins_widest(scene: Mushroom) -> bool:
     """Tell whether the cycles that are simulated begin where theory's do: where nu is greatest.
 
-    There everybody who takes part is free. At a narrower mouth some of the starts, uniform in all of the
+    There all particles that take part are free. At a narrower mouth some of the starts, uniform in all of the
     table, lie in the part of the island that opens later: they count as captured, with the energy of those
-    who are free, and no energy however high mends that. Later cycles do not know of it.
+    that are free, and no energy however high mends that. Later cycles do not know of it.
     """
-    import theory
-
     now = table_at(fp, scene, start_time(scene))
     widest = theory.Cycle.of(scene, DIGITS).nu_max
     return bool(now.w / now.r >= widest * (1 - SAME))
+
+
+def known(scene: Scene, energy: float) -> theory.FiniteEnergy | None:
+    """Return the theory of a scene at an energy; None if it does not cover the scene."""
+    try:
+        return theory.at_energy(scene, energy) if isinstance(scene, Mushroom) else None
+    except NO_THEORY:
+        return None
 
 
 def predicted(spec: RunSpec) -> Theory | None:
@@ -160,20 +163,17 @@ def predicted(spec: RunSpec) -> Theory | None:
     What finite energy adds to a cycle goes as E^(-1/2) with the energy at which the cycle begins. Cycles are
     independent, so its mean falls by the mean of exp(-s / 2) each.
     """
-    import theory
-
     if not isinstance(spec.scene, Mushroom) or not begins_widest(spec.scene):
         return None
     try:
         limit = theory.predict(spec.scene, DIGITS)
-        m1, p_nc = float(limit.m1), float(limit.p_nc)
-    except (BadInput, theory.NotCovered, theory.NotConverged):
+    except NO_THEORY:
         return None
-    try:
-        there = theory.at_energy(spec.scene, spec.energy)
-        slower, left = there.mean_of_exp(-0.5), there.theory_error
-    except (BadInput, theory.NotCovered, theory.NotConverged):
+    m1, p_nc = float(limit.m1), float(limit.p_nc)
+    there = known(spec.scene, spec.energy)
+    if there is None:
         return Theory(m1, p_nc)
+    slower, left = there.mean_of_exp(-0.5), there.theory_error
     share = math.fsum(slower**k for k in range(spec.n_cycles)) / spec.n_cycles
     return Theory(
         m1 + share * (there.mean_s - m1),

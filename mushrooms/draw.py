@@ -6,21 +6,25 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, Any, BinaryIO, NamedTuple
 
+import numpy as np
 import typer
 
+import fast
+from conformance.audit.runs import scene_named
 from conformance.files import write_file
-from mushrooms import output
+from mushrooms import orbits, output
+from mushrooms.simulate import draw_energies
+from mushrooms.store.run import is_run, open_run
 from mushrooms.terminal import (
     SceneName,
-    check_energy,
-    check_range,
-    compilation_told,
-    load_scene,
+    announce_compilation,
     progress_bar,
     refuse_unheeded,
 )
 from scene import Scene, Stem
-from scene.refusal import BadInput, check_seed
+from scene.laws import bounds
+from scene.refusal import MAX_SEED, BadInput
+from scene.tables import laws
 
 
 class Usual(NamedTuple):
@@ -83,18 +87,24 @@ Export = Annotated[
     typer.Option(metavar="FILE", help="Write the start and every collision to a .csv or .parquet file."),
 ]
 Energy = Annotated[
-    float | None, typer.Option(help="Initial energy v²/2, > 0; default: one that suits the picture.")
+    float | None, typer.Option(min=0, help="Initial energy v²/2, > 0; default: one that suits the picture.")
 ]
-Length = Annotated[int | None, typer.Option(help="Collisions of each particle, 1 to 10^6.")]
-Cycles = Annotated[int | None, typer.Option(help="Cycles to follow, instead of collisions, 1 to 10,000.")]
+Length = Annotated[int | None, typer.Option(min=1, max=10**6, help="Collisions of each particle, 1 to 10^6.")]
+Cycles = Annotated[
+    int | None, typer.Option(min=1, max=10**4, help="Cycles to follow, instead of collisions, 1 to 10,000.")
+]
 Phase = Annotated[
     float | None,
     typer.Option(help="Section at this phase t/T of the walls, 0 to 1. For a stem: y against vy."),
 ]
 Many = Annotated[
-    int | None, typer.Option(help="Particles in a section, map, growth or exponent plot, 1 to 1000.")
+    int | None,
+    typer.Option(min=1, max=1000, help="Particles in a section, map, growth or exponent plot, 1 to 1000."),
 ]
-Seed = Annotated[int | None, typer.Option(help="Seed of the random starts, 0 to 2^64 - 1; default: 0.")]
+Seed = Annotated[
+    int | None,
+    typer.Option(min=0, max=MAX_SEED, help="Seed of the random starts, 0 to 2^64 - 1; default: 0."),
+]
 OF_PARTICLES = ("--energy", "--collisions", "--cycles", "--seed", "--particles", "--phase")
 OF_MANY = ("section", "map", "growth", "lyapunov")
 LEAST_DRAWN = 1e-100  # of lengths and times; its inverse is the greatest
@@ -122,8 +132,6 @@ def draw(
     SCENE is the folder of a run (simulate --out), its histogram of ln(E1/E0) is drawn with the theory. If the
     run has several cycles, the mean after each cycle is drawn too.
     """
-    from mushrooms.store.run import is_run
-
     asked = (trajectory, section, boundary_map, growth, lyapunov)
     kinds = [kind for kind, is_asked in zip(PICTURES, asked, strict=True) if is_asked]
     given = (energy, collisions, cycles, seed, particles, phase)
@@ -133,30 +141,28 @@ def draw(
         refuse_unheeded({**pictures, "--export": export, **options}, f"{scene!r} is a run")
         print(draw_run(Path(scene), out))
         return
-    table = load_scene(scene)
-    follow = _Asked(table, energy, collisions, cycles, particles, seed or 0, phase)
-    follow.check(kinds)
-    if seed is not None:
-        check_seed(seed, "--seed")
+    table = scene_named(scene)
+    arguments = DrawArgs(table, energy, collisions, cycles, particles, seed or 0, phase)
+    arguments.check(kinds)
     if not kinds and export is None:
         refuse_unheeded(options, "the picture of the walls has no particles")
     if export is not None:
         output.check_file(export, (".csv", ".parquet"))
-    is_drawn = bool(kinds) or export is None or out is not None
-    if is_drawn:
+    paths: dict[str, Path] = {}
+    if kinds or export is None or out is not None:
         _check_drawable(table)
-    paths = _paths(out or Path(f"{Path(scene).stem}.svg"), kinds, is_drawn=is_drawn)
-    with compilation_told():
+        paths = _paths(out or Path(f"{Path(scene).stem}.svg"), kinds)
+    with announce_compilation():
         if export is not None:
-            follow("trajectory", 1)[0].write(export)
+            arguments.follow("trajectory", 1)[0].write(export)
             print(export)
         for kind, path in paths.items():
-            write_file(path, _picture(table, kind, path.suffix, follow))
+            write_file(path, _picture(kind, path.suffix, arguments))
             print(path)
 
 
-class _Asked(NamedTuple):
-    """What was asked of the particles of every picture."""
+class DrawArgs(NamedTuple):
+    """What the command line says of the scene and of the particles of every picture."""
 
     table: Scene
     energy: float | None
@@ -167,17 +173,11 @@ class _Asked(NamedTuple):
     phase: float | None
 
     def check(self, kinds: list[str]) -> None:
-        """Refuse what is out of bounds, and what no picture heeds.
+        """Refuse what no picture heeds.
 
         Raises:
             BadInput: naming the option.
         """
-        check_energy(self.energy)
-        bounds = {"--collisions": (self.n_collisions, 10**6), "--cycles": (self.n_cycles, 10**4)}
-        bounds["--particles"] = (self.n_orbits, 1000)
-        for option, (value, most) in bounds.items():
-            if value is not None:
-                check_range(option, value, 1, most)
         if not set(kinds) & set(OF_MANY):
             refuse_unheeded({"--particles": self.n_orbits}, f"it is of --{', --'.join(OF_MANY)}")
         if "section" not in kinds:
@@ -196,14 +196,10 @@ class _Asked(NamedTuple):
 
     def energy_of(self, kind: str) -> float:
         """Return the initial energy of a kind of picture."""
-        from mushrooms import orbits
-
         return self.energy or orbits.usual_energy(self.table, self.usual(kind).crossings)
 
-    def __call__(self, kind: str, n_orbits: int | None = None) -> list[Any]:
+    def follow(self, kind: str, n_orbits: int | None = None) -> list[orbits.FollowedOrbit]:
         """Return the orbits for a kind of picture."""
-        from mushrooms import orbits
-
         usual = self.usual(kind)
         n_cycles = self.n_cycles or (None if self.n_collisions else usual.n_cycles)
         n_collisions = self.n_collisions or (None if n_cycles else usual.n_collisions)
@@ -216,25 +212,9 @@ class _Asked(NamedTuple):
             n_cycles=n_cycles,
         )
 
-    def growth(self) -> Any:
-        """Return the figure of an ensemble's energies from cycle to cycle."""
-        import numpy as np
-
-        import fast
-        from mushrooms.figures import energies
-
-        usual, energy = PICTURES["growth"], self.energy_of("growth")
-        n, n_cycles = self.n_orbits or usual.n_orbits, self.n_cycles or usual.n_cycles or 1
-        found = fast.simulate(self.table, n_particles=n, energy=energy, n_cycles=n_cycles, seed=self.seed)
-        gains = np.log(found.cycle_energies[found.takes_part()] / energy)
-        return energies.growth(self.table, energy, gains, n)
-
 
 def draw_run(folder: Path, out: Path | None) -> Path:
     """Draw the energies of a stored run, with theory; return the file's path."""
-    from mushrooms.simulate import draw_energies
-    from mushrooms.store.run import open_run
-
     path = out or Path(f"{folder.resolve().name}.svg")
     output.check_file(path, (".svg", ".png"))
     run = open_run(folder)
@@ -244,9 +224,6 @@ def draw_run(folder: Path, out: Path | None) -> Path:
 
 def _check_drawable(table: Scene) -> None:
     """Refuse lengths and periods whose squares or sums a figure cannot hold."""
-    from scene.laws import bounds
-    from scene.tables import laws
-
     found = {f"scene.{name}": bounds(law).highest for name, law in laws(table).items() if name != "slope"}
     if table.period:
         found["period"] = table.period
@@ -255,45 +232,60 @@ def _check_drawable(table: Scene) -> None:
             raise BadInput(f"{name} = {size:.3g}, must be 1e-100 to 1e+100 in a picture")
 
 
-def _paths(out: Path, kinds: list[str], *, is_drawn: bool) -> dict[str, Path]:
+def _paths(out: Path, kinds: list[str]) -> dict[str, Path]:
     """Return the file of each picture; several get their names into that of the one given.
 
     Raises:
         BadInput: one of them cannot be written, or does not move and is to be a .gif.
     """
-    from mushrooms.figures import table as pictures
+    from mushrooms.figures.table import SUFFIXES  # drawing takes a second to import
 
-    if not is_drawn:
-        return {}
     paths = dict.fromkeys(kinds or ["walls"], out)
     if len(kinds) > 1:
         paths = {kind: out.with_stem(f"{out.stem}-{kind}") for kind in kinds}
     for kind, path in paths.items():
         moves = kind in ("walls", "trajectory")
-        output.check_file(path, tuple(s for s in pictures.SUFFIXES if moves or s != ".gif"))
+        output.check_file(path, tuple(s for s in SUFFIXES if moves or s != ".gif"))
     return paths
 
 
-def _picture(table: Scene, kind: str, suffix: str, follow: _Asked) -> bytes | Callable[[BinaryIO], object]:
-    from mushrooms.figures import orbits, style
-    from mushrooms.figures import table as pictures
+def _picture(kind: str, suffix: str, arguments: DrawArgs) -> Callable[[BinaryIO], object]:
+    """Return what writes a picture."""
+    from mushrooms.figures import orbits as pictures
+    from mushrooms.figures import style
+    from mushrooms.figures import table as tables
 
     if kind == "walls":
-        return lambda file: pictures.write_picture(table, suffix, file)
-    if kind == "growth" and follow.n_orbits != 1:
-        figure = follow.growth()
+        return lambda file: tables.write_picture(arguments.table, suffix, file)
+    if kind == "growth" and arguments.n_orbits != 1:
+        figure = _growth(arguments)
         return lambda file: style.save(figure, file, suffix)
-    found = follow(kind, 1 if kind in ("trajectory", "growth") else None)
+    found = arguments.follow(kind, 1 if kind in ("trajectory", "growth") else None)
     if kind == "trajectory" and suffix == ".gif":
-        return lambda file: orbits.write_animation(found[0], file)
+        return lambda file: pictures.write_animation(found[0], file)
     if kind == "trajectory":
-        figure = orbits.trajectory(found[0])
+        figure = pictures.trajectory(found[0])
     elif kind == "growth":
-        figure = orbits.energy_in_time(found[0])
+        figure = pictures.energy_in_time(found[0])
     elif kind == "lyapunov":
         with progress_bar() as bar:
             task = bar.add_task("Jacobians", total=sum(len(orbit.walls) for orbit in found))
-            figure = orbits.exponents(found, lambda n: bar.update(task, completed=n))
+            figure = pictures.exponents(found, lambda n: bar.update(task, completed=n))
+    elif kind == "section":
+        figure = pictures.section(found, arguments.phase)
     else:
-        figure = orbits.section(found, follow.phase) if kind == "section" else orbits.collision_map(found)
+        figure = pictures.collision_map(found)
     return lambda file: style.save(figure, file, suffix)
+
+
+def _growth(arguments: DrawArgs) -> Any:
+    """Return the figure of an ensemble's energies from cycle to cycle."""
+    from mushrooms.figures import energies
+
+    usual, energy = PICTURES["growth"], arguments.energy_of("growth")
+    n, n_cycles = arguments.n_orbits or usual.n_orbits, arguments.n_cycles or usual.n_cycles or 1
+    found = fast.simulate(
+        arguments.table, n_particles=n, energy=energy, n_cycles=n_cycles, seed=arguments.seed
+    )
+    gains = np.log(found.cycle_energies[found.takes_part()] / energy)
+    return energies.growth(arguments.table, energy, gains, n)

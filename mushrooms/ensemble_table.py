@@ -1,4 +1,4 @@
-"""Somebody's ensemble read from CSV, Parquet or Zarr, a part at a time: what the audit needs of it.
+"""An ensemble of another program, read a part at a time from CSV, Parquet or Zarr: what the audit needs.
 
 A row is a particle. Columns: E0, E1, E2 ... after each cycle, or s = log E1/E0; where there are any, t_in and
 t_out (of a stay in the cap in the first cycle), captured (0 or 1), and x0, y0, where it started. The names
@@ -16,6 +16,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
+import zarr
 
 from conformance.suite.sheet_files import read_number, read_rows
 from mushrooms.output import import_arrow
@@ -42,7 +43,7 @@ NAMES = {
 }
 
 
-class Given(NamedTuple):
+class EnsembleTable(NamedTuple):
     """What a table holds.
 
     Attributes:
@@ -62,7 +63,7 @@ class Given(NamedTuple):
     is_binary32: bool
 
 
-def read_table(path: Path, energy: float | None, unit: float) -> Given:
+def read_table(path: Path, energy: float | None, unit: float) -> EnsembleTable:
     """Read an ensemble.
 
     Args:
@@ -80,7 +81,7 @@ def read_table(path: Path, energy: float | None, unit: float) -> Given:
         start = np.full(len(next(iter(part.values()))), energy, float)
         if "E0" in part:
             start = part.pop("E0") * unit
-            chosen = _chosen(label, start, energy, energies)
+            chosen = _select(label, start, energy, energies)
             n_other += int(np.sum(~chosen))
             start, part = start[chosen], {name: column[chosen] for name, column in part.items()}
         elif energy is None:
@@ -102,10 +103,12 @@ def read_table(path: Path, energy: float | None, unit: float) -> Given:
         raise BadInput(f"{label}: E0 takes {len(energies)} values, {some}: {ONE_ENERGY}")
     energy = next(iter(energies), energy)
     assert energy is not None
-    return Given(sums, whole, energy, n_lost, n_other, is_binary32 and len(np.unique(sums[:1000])) > 2)
+    return EnsembleTable(
+        sums, whole, energy, n_lost, n_other, is_binary32 and len(np.unique(sums[:1000])) > 2
+    )
 
 
-def _chosen(
+def _select(
     label: str, start: Floats, energy: float | None, energies: dict[float, int]
 ) -> npt.NDArray[np.bool_]:
     """Tell which rows have the E0 that is asked for; where none is, count the rows of each E0."""
@@ -131,7 +134,7 @@ def _parts(path: Path, label: str) -> Iterator[dict[str, Floats]]:
         raise BadInput(f"{label}, must be a .csv or .parquet file, or a .zarr folder")
     try:
         for raw in readers[path.suffix](path, label):
-            named = {what: [raw[name] for name in names] for what, names in _named(label, raw).items()}
+            named = {what: [raw[name] for name in names] for what, names in _find_columns(label, raw).items()}
             stacked = {what: np.column_stack(columns) for what, columns in named.items()}
             yield {
                 what: column if what == ENERGIES else np.asarray(np.fmin.reduce(column, axis=1))
@@ -141,7 +144,7 @@ def _parts(path: Path, label: str) -> Iterator[dict[str, Floats]]:
         raise BadInput(f"{label} cannot be read: {error.strerror or error}") from None
 
 
-def _named(label: str, names: Iterable[str]) -> dict[str, list[str]]:
+def _find_columns(label: str, names: Iterable[str]) -> dict[str, list[str]]:
     """Return the columns of a table that are needed, by what they are; cycles in their order."""
     given = list(names)
     names = sorted(given, key=lambda name: (len(name), name))
@@ -155,15 +158,15 @@ def _named(label: str, names: Iterable[str]) -> dict[str, list[str]]:
     return {what: columns for what, columns in found.items() if columns}
 
 
-def _wanted(label: str, names: Iterable[str]) -> list[str]:
-    return [name for columns in _named(label, names).values() for name in columns]
+def _select_columns(label: str, names: Iterable[str]) -> list[str]:
+    return [name for columns in _find_columns(label, names).values() for name in columns]
 
 
 def _csv(path: Path, label: str) -> Iterator[dict[str, Floats]]:
     """Yield parts of a CSV file: by Arrow where it is installed and numbers are decimal, else by cells."""
     with path.open(encoding="utf-8-sig", newline="") as file:
         header = [name.strip() for name in next(csv.reader(file), [])]
-    wanted, n_done = _wanted(label, header), 0
+    wanted, n_done = _select_columns(label, header), 0
     try:
         from pyarrow import csv as arrow
 
@@ -188,7 +191,7 @@ def _parquet(path: Path, label: str) -> Iterator[dict[str, Floats]]:
     arrow, parquet = import_arrow()
     try:
         with parquet.ParquetFile(path) as file:
-            wanted = _wanted(label, file.schema_arrow.names)
+            wanted = _select_columns(label, file.schema_arrow.names)
             for batch in file.iter_batches(PART, columns=wanted):
                 columns = ((name, batch.column(name).cast("float64")) for name in wanted)
                 yield {name: column.to_numpy(zero_copy_only=False) for name, column in columns}
@@ -198,14 +201,10 @@ def _parquet(path: Path, label: str) -> Iterator[dict[str, Floats]]:
 
 def _zarr(path: Path, label: str) -> Iterator[dict[str, Floats]]:
     try:
-        import zarr
-    except ImportError:
-        raise BadInput("a .zarr folder needs zarr: pip install 'oscillating-mushrooms[scale]'") from None
-    try:
         group: Any = zarr.open_group(path, mode="r")
     except (OSError, ValueError, KeyError) as error:
         raise BadInput(f"{label} is no Zarr group: {error}") from None
-    arrays = {name: group[name] for name in _wanted(label, group.array_keys())}
+    arrays = {name: group[name] for name in _select_columns(label, group.array_keys())}
     lengths = {name: array.shape[0] if array.ndim else 1 for name, array in arrays.items()}
     if len(set(lengths.values())) > 1:
         raise BadInput(f"{label}: arrays of {lengths} particles, must be as many in each")

@@ -18,7 +18,7 @@ CAREFUL_COST = 50  # collisions in lanes that take as long as one careful step, 
 UNITS = ((1.0, "seconds"), (60.0, "minutes"), (3600.0, "hours"), (86400.0, "days"))
 
 
-def in_words(seconds: float) -> str:
+def format_duration(seconds: float) -> str:
     """Return a duration in the unit that suits it."""
     size, unit = next(u for u in reversed(UNITS) if seconds >= 1.5 * u[0] or u is UNITS[0])
     n = seconds / size

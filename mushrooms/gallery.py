@@ -1,16 +1,14 @@
 """The pictures of the documentation: code blocks of a page that name one, run one after the other.
 
 A block whose first line is three backticks and `python NAME.svg` leaves a matplotlib `figure`, or bytes: they
-are written as NAME.svg. The blocks of a page share their names, as a notebook's cells do. `python -m
-mushrooms.gallery PAGE.md FOLDER` makes the pictures of one page; the site makes all of them, and the tests
-run the same blocks.
+are written as NAME.svg. The blocks of a page share their names, as a notebook's cells do. The site makes the
+pictures of all pages, and the tests run the same blocks.
 """
 
 from __future__ import annotations
 
 import io
 import re
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -55,8 +53,3 @@ def draw(page: Path, folder: Path) -> list[Path]:
         write_file(folder / name, picture)
         written.append(folder / name)
     return written
-
-
-if __name__ == "__main__":
-    for path in draw(Path(sys.argv[1]), Path(sys.argv[2])):
-        print(path)

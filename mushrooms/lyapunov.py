@@ -90,7 +90,9 @@ def stretching(orbit: FollowedOrbit, progress: Callable[[int], None] | None = No
     length = float(np.ptp(states[:, 1:3], axis=0).max())
     speeds = np.hypot(states[:, 3], states[:, 4])
     units = np.column_stack([length / speeds, *[np.full(n + 1, length)] * 2, speeds, speeds])
-    deviation, logs = _across(states[0]), np.empty(n)
+    # At first without symmetry: equal parts sideways and in direction.
+    vx, vy = states[0, 3:]
+    deviation, logs = np.array([0.0, -vy, vx, -vy, vx]) / (math.hypot(vx, vy) * math.sqrt(2.0)), np.empty(n)
     for k, matrix in enumerate(jacobians(orbit, progress)):
         deviation = matrix @ (deviation * units[k]) / units[k + 1]
         size = float(np.linalg.norm(deviation))
@@ -100,11 +102,3 @@ def stretching(orbit: FollowedOrbit, progress: Callable[[int], None] | None = No
     error = float(blocks.std(ddof=1) / math.sqrt(N_BLOCKS))
     flight = float(orbit.steps[:, 0].mean())
     return Stretching(logs, exponents, float(exponents[-1]), error, flight)
-
-
-def _across(state: FloatArray) -> FloatArray:
-    """Return a unit deviation without symmetry: equal parts sideways and in direction."""
-    _, _, _, vx, vy = state
-    speed = math.hypot(vx, vy)
-    found: FloatArray = np.array([0.0, -vy, vx, -vy, vx]) / (speed * math.sqrt(2.0))
-    return found

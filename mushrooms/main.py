@@ -7,10 +7,12 @@ from __future__ import annotations
 
 import errno
 import io
+import math
 import os
 import signal
 import sys
 import threading
+from collections.abc import Callable
 from concurrent.futures import BrokenExecutor
 from contextlib import suppress
 from decimal import Decimal, InvalidOperation
@@ -124,20 +126,39 @@ def command(name: str) -> Any:
     module, _, function = entry.function.partition(":")
     alone = typer.Typer(add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None)
     epilog = f"Example: {PROGRAM} {name} {entry.example}"
-    alone.command(name, epilog=epilog)(_with_exponents(getattr(import_module(module), function)))
+    alone.command(name, epilog=epilog)(_with_parsers(getattr(import_module(module), function)))
     return typer.main.get_command(alone)
 
 
-def _with_exponents(function: Any) -> Any:
-    """Let every option that is a whole number be written as 1e6 too, and one that is no number be shown."""
+def _with_parsers(function: Any) -> Any:
+    """Let every option that is a number be read by `_parser`, within the bounds that it declares."""
     function.__annotations__ = get_type_hints(function, include_extras=True)
-    for hint in function.__annotations__.values():
+    for name, hint in function.__annotations__.items():
         kinds = (hint.__origin__, *get_args(hint.__origin__)) if get_origin(hint) is Annotated else ()
-        for told in hint.__metadata__ if int in kinds or float in kinds else ():
-            if isinstance(told, OptionInfo) and told.parser is None:
-                told.parser, letter = (whole, "N") if int in kinds else (number, "X")
-                told.metavar = told.metavar or letter
+        for option in hint.__metadata__ if int in kinds or float in kinds else ():
+            if isinstance(option, OptionInfo) and option.parser is None:
+                names = [*(option.param_decls or ()), f"--{name.replace('_', '-')}"]
+                option.parser = _parser(names[0], int in kinds, option.min, option.max)
+                option.metavar = option.metavar or ("N" if int in kinds else "X")
+                option.min = option.max = None  # its help says them in words
     return function
+
+
+def _parser(option: str, is_whole: bool, low: float | None, high: float | None) -> Callable[[Any], Any]:
+    """Return what reads a number: a whole one from `low` on, or a finite one above `low`; up to `high`."""
+    bounds = f">= {low}" if high is None else f"{low} to {high}"
+    if not is_whole:
+        bounds = f"finite and > {low}" if high is None else f"> {low} and at most {high}"
+
+    def parse(text: Any) -> int | float:
+        value = whole(text) if is_whole else number(text)
+        if low is not None:
+            is_in = value >= low if is_whole else low < value < math.inf
+            if not is_in or (high is not None and value > high):
+                raise UsageError(f"{option} = {value}, must be {bounds}")
+        return value
+
+    return parse
 
 
 def whole(text: str | int) -> int:
@@ -181,12 +202,12 @@ app = typer.Typer(
 )
 
 
-_told = list[str]()  # of an interruption, in this call of `run`
+_notes = list[str]()  # of an interruption, in this call of `run`
 
 
 def tell_interrupted(kept: str) -> None:
     """Say on stderr that the command was interrupted, and what is kept; a command that knows more says it."""
-    _told.append(kept)
+    _notes.append(kept)
     with suppress(OSError):  # the terminal may be what has gone, or be full: the exit code still tells
         print(f"{PROGRAM}: interrupted; {kept}", file=sys.stderr, flush=True)
 
@@ -211,7 +232,7 @@ def _is_of_an_interrupt(error: BaseException | None) -> bool:
 
 def run(arguments: list[str] | None = None) -> NoReturn:
     """Run the command line and exit: 0 done, 1 a claim failed, 2 bad input, 130 interrupted."""
-    _told.clear()
+    _notes.clear()
     _make_printable()
     try:
         _call(sys.argv[1:] if arguments is None else arguments)
@@ -233,25 +254,25 @@ def _call(given: list[str]) -> NoReturn:
     except UsageError as error:
         _refuse(error.format_message())
     except OSError as error:
-        _refuse(_in_words(error))
+        _refuse(_format_error(error))
     except ValueError as error:
         from scene.refusal import BadInput  # not above: the list of commands needs no scene
 
         if not isinstance(error, BadInput):
             raise
-        _refuse(_in_options(str(error), given))
+        _refuse(_name_option(str(error), given))
     except BrokenExecutor as error:
         _refuse(f"a process of this run was ended from outside: {error}")
     except (MemoryError, RecursionError) as error:
         what = "not enough memory" if isinstance(error, MemoryError) else "nested too deeply"
         _refuse(f"{what}: {error}".removesuffix(": "))
-    except Exception as error:
+    except (ImportError, SystemError) as error:
         if not _is_of_an_interrupt(error):
             raise
         code = INTERRUPTED
     if code == INTERRUPTED:
         kept = next((COMMANDS[word].kept for word in given if word in COMMANDS), "")
-        if kept and not _told:
+        if kept and not _notes:
             tell_interrupted(kept)
     sys.exit(code if isinstance(code, int) else 0)
 
@@ -285,7 +306,7 @@ def _let_go(stream: IO[str]) -> None:
             os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
 
 
-def _in_words(error: OSError) -> str:
+def _format_error(error: OSError) -> str:
     """Return what the system refused; of a file it gives the name (`conformance.files` sees to that)."""
     if error.filename is None and error.errno in (errno.ENOSPC, errno.EIO, errno.EBADF, errno.EDQUOT):
         return f"standard output cannot be written: {error.strerror}"
@@ -303,7 +324,7 @@ def _refuse_empty(given: list[str]) -> None:
             _refuse(f"{option.rstrip('=')} is empty, must have a value")
 
 
-def _in_options(message: str, given: list[str]) -> str:
+def _name_option(message: str, given: list[str]) -> str:
     """Return a message that begins with the name of an argument in Python with that of the option given."""
     field, equals, rest = message.partition(" = ")
     option = f"--{field.replace('_', '-')}"

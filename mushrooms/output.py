@@ -50,7 +50,7 @@ def writable_folder(path: Path) -> Iterator[Path]:
 
 @contextmanager
 def locked(folder: Path) -> Iterator[None]:
-    """Hold a folder; anybody else who asks for it meanwhile, here or in another process, is refused.
+    """Hold a folder; meanwhile all others are refused it, here and in another process.
 
     The system lets go of it when the process ends, however it ends. No clock and no process number decides.
 
@@ -79,7 +79,7 @@ def locked(folder: Path) -> Iterator[None]:
                 os.write(file.fileno(), f"process {os.getpid()} on {platform.node()}".encode())
             yield
         finally:
-            with suppress(PermissionError):  # Windows removes no open file; one that nobody holds is harmless
+            with suppress(PermissionError):  # Windows removes no open file; one that is not held is harmless
                 path.unlink(missing_ok=True)
 
 

@@ -8,13 +8,11 @@ from typing import Annotated, Any
 
 import typer
 
+from conformance.audit.runs import scene_named
 from mushrooms.forecast import expected_collisions
 from mushrooms.terminal import (
     AsJson,
     SceneName,
-    check_energy,
-    check_range,
-    load_scene,
     print_pairs,
     progress_bar,
 )
@@ -48,9 +46,11 @@ FIGURES = {
 
 def predict(
     scene: SceneName,
-    digits: Annotated[int, typer.Option(help=f"Correct digits, 1 to {MAX_DIGITS}.")] = 15,
+    digits: Annotated[
+        int, typer.Option(min=1, max=MAX_DIGITS, help=f"Correct digits, 1 to {MAX_DIGITS}.")
+    ] = 15,
     energy: Annotated[
-        float | None, typer.Option(help="Also predict for this initial energy v²/2, > 0.")
+        float | None, typer.Option(min=0, help="Also predict for this initial energy v²/2, > 0.")
     ] = None,
     as_json: AsJson = False,
 ) -> None:
@@ -63,9 +63,7 @@ def predict(
     """
     import theory
 
-    check_range("--digits", digits, 1, MAX_DIGITS)
-    check_energy(energy)
-    found = load_scene(scene)
+    found = scene_named(scene)
     with progress_bar() as bar:
         task = bar.add_task("resolution 1 of two or more", total=100)
 
@@ -82,7 +80,7 @@ def _at_energy(scene: Scene, energy: float) -> dict[str, float | bool | None]:
     import theory
 
     speed, n_collisions = math.sqrt(2 * energy), expected_collisions(scene, energy, 1)
-    begun: dict[str, float | bool | None] = {
+    first: dict[str, float | bool | None] = {
         "energy": energy,
         "v": float(f"{speed:.7g}"),
         "collisions": float(f"{n_collisions:.3g}") if math.isfinite(n_collisions) else None,
@@ -91,7 +89,7 @@ def _at_energy(scene: Scene, energy: float) -> dict[str, float | bool | None]:
         found = theory.at_energy(scene, energy)
     except theory.NotCovered as reason:
         print(f"{reason}. What is printed is the limit of high energies", file=sys.stderr)
-        return begun
+        return first
     (peak, variance), left = found.peak, found.theory_error
     figures = {
         "p_nc_at": found.p_nc,
@@ -106,5 +104,5 @@ def _at_energy(scene: Scene, energy: float) -> dict[str, float | bool | None]:
         "peak_width_error": variance**0.5 * left.variance / 2,
     }
     digits = {name: 2 if name.endswith("_error") else 7 for name in figures}
-    told = {name: x if x is None else float(f"{x:.{digits[name]}g}") for name, x in figures.items()}
-    return {**begun, **told, "is_in_reach": left.variance < 0.5}
+    rounded = {name: x if x is None else float(f"{x:.{digits[name]}g}") for name, x in figures.items()}
+    return {**first, **rounded, "is_in_reach": left.variance < 0.5}

@@ -8,17 +8,13 @@ import os
 import sys
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
+from rich import progress
+from rich.console import Console
 
 from scene.refusal import BadInput
-
-if TYPE_CHECKING:  # loaded where they are used: most commands end before they need a bar or a table
-    from rich.console import Console
-    from rich.progress import Progress
-
-    from scene import Scene
 
 SceneName = Annotated[
     str,
@@ -35,55 +31,40 @@ SLOW_TO_COMPILE = {
 
 
 @contextmanager
-def compilation_told() -> Iterator[None]:
+def announce_compilation() -> Iterator[None]:
     """Say on stderr when the fast stepper is compiled: numba tells when it has found nothing kept.
 
-    What is compiled one after the other and takes a while together is told once.
+    What is compiled one after the other and takes a while together is announced once.
     """
     from numba.core import event
 
-    told_before = set()
+    announced = set()
 
-    class Teller(event.Listener):  # type: ignore[misc]  # numba has no types
-        def on_start(self, told: Any) -> None:
-            compiled = told.data["dispatcher"]
+    class Announcer(event.Listener):  # type: ignore[misc]  # numba has no types
+        def on_start(self, compilation: Any) -> None:
+            compiled = compilation.data["dispatcher"]
             duration = SLOW_TO_COMPILE.get(compiled.py_func.__name__)
-            if duration is not None and compiled.stats.cache_path and duration not in told_before:
-                told_before.add(duration)
+            if duration is not None and compiled.stats.cache_path and duration not in announced:
+                announced.add(duration)
                 what = f"compiling the fast stepper for this machine: {duration}"
                 print(f"{what}; kept for next time", file=sys.stderr, flush=True)
 
-        def on_end(self, told: Any) -> None:
+        def on_end(self, compilation: Any) -> None:
             pass
 
-    with event.install_listener("numba:compile", Teller()):
+    with event.install_listener("numba:compile", Announcer()):
         yield
 
 
-def new_console() -> Console:
-    """Return a console for stdout whose long lines are not broken."""
-    from rich.console import Console
-
-    return Console(width=_width(), soft_wrap=True, highlight=False)
-
-
-def table_console() -> Console:
+def new_console(*, soft_wrap: bool = False) -> Console:
     """Return a console for stdout whose tables fit its width, or COLUMNS where it has none."""
-    from rich.console import Console
-
-    return Console(width=_width())
-
-
-def _width() -> int | None:
     # A pipe has no width: enough for the tables, unless the reader says.
-    return None if sys.stdout.isatty() or os.environ.get("COLUMNS", "").isdigit() else 140
+    has_width = sys.stdout.isatty() or os.environ.get("COLUMNS", "").isdigit()
+    return Console(width=None if has_width else 140, highlight=False, soft_wrap=soft_wrap)
 
 
-def progress_bar() -> Progress:
+def progress_bar() -> progress.Progress:
     """Return a progress bar on stderr, silent where that is no terminal."""
-    from rich import progress
-    from rich.console import Console
-
     console = Console(stderr=True)
     return progress.Progress(
         progress.TextColumn("{task.description}"),
@@ -96,19 +77,8 @@ def progress_bar() -> Progress:
     )
 
 
-def load_scene(name: str) -> Scene:
-    """Return a scene of the catalogue or of the audit, or from a file.
-
-    Raises:
-        InvalidScene: one line naming the file, the field, the value and the bound.
-    """
-    from conformance.audit.runs import scene_named
-
-    return scene_named(name)
-
-
 def refuse_unheeded(options: Mapping[str, object], why: str) -> None:
-    """Refuse options that nothing here would heed: whoever gives one counts on it.
+    """Refuse options that nothing here would heed: their user would count on them.
 
     Args:
         options: by name; None is one that is not given, True one that has no value.
@@ -122,20 +92,6 @@ def refuse_unheeded(options: Mapping[str, object], why: str) -> None:
             shown = repr(value) if isinstance(value, str) else value
             given = name if value is True else f"{name} = {shown}"
             raise BadInput(f"{given} would change nothing here: {why}")
-
-
-def check_range(option: str, value: int, low: int, high: int | None = None) -> None:
-    """Refuse an option's number that is out of bounds."""
-    if value < low or (high is not None and value > high):
-        raise BadInput(
-            f"{option} = {value}, must be " + (f">= {low}" if high is None else f"{low} to {high}")
-        )
-
-
-def check_energy(energy: float | None) -> None:
-    """Refuse an --energy that is none; None where it was not given."""
-    if energy is not None and not (math.isfinite(energy) and energy > 0):
-        raise BadInput(f"--energy = {energy}, must be finite and > 0")
 
 
 def print_pairs(pairs: dict[str, Any], as_json: bool, meanings: Mapping[str, str] | None = None) -> None:

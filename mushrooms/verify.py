@@ -9,9 +9,14 @@ from typing import Annotated, Any
 import msgspec
 import typer
 
+import reference
+from conformance import verify as verifier
+from conformance.audit.runs import scene_named
+from conformance.cases.draw import wire_form
 from conformance.files import write_file
+from conformance.suite.sheet_files import read_number, read_rows
 from mushrooms import output
-from mushrooms.terminal import load_scene
+from scene import State, from_data
 from scene.refusal import BadInput, shown
 
 FIELDS = ("t", "x", "y", "vx", "vy")
@@ -33,14 +38,14 @@ def verify(
     if picture is not None:
         output.check_file(picture, (".svg",))
     text = _read(file, scene)
-    verdicts = _judged(file, text)
+    verdicts = _judge(file, text)
     for place, status, reason in verdicts:
         print(f"{place}: {status}: {reason}")
     n_proved = sum(status == "proved" for _, status, _ in verdicts)
     print(f"{n_proved} of {len(verdicts)} proved")
     wrong = next((i for i, (_, status, _) in enumerate(verdicts) if status == "false"), None)
     if picture is not None and wrong is not None:
-        write_file(picture, _drawn(json.loads(text), wrong))
+        write_file(picture, _draw(json.loads(text), wrong))
         print(f"Picture of step {wrong + 1}: {picture}")
     raise typer.Exit(int(n_proved < len(verdicts)))
 
@@ -62,22 +67,17 @@ def _read(file: Path, scene: str | None) -> str:
 
 
 def _of_rows(file: Path, scene: str) -> dict[str, Any]:
-    from conformance.cases.draw import wire_form
-    from conformance.suite.sheet_files import read_number, read_rows
-
     label, states = f"trajectory {str(file)!r}", []
     for place, row in read_rows(file, label, FIELDS):
         numbers = {name: read_number(place, name, row[name]) for name in FIELDS}
         states.append({**numbers, "wall": row.get("wall") or None})
     if not states:
         raise BadInput(f"{label}: there is no row")
-    return {"scene": wire_form(load_scene(scene)), "state": states[0], "steps": states[1:]}
+    return {"scene": wire_form(scene_named(scene)), "state": states[0], "steps": states[1:]}
 
 
-def _judged(file: Path, text: str) -> list[tuple[str, str, str]]:
+def _judge(file: Path, text: str) -> list[tuple[str, str, str]]:
     """Return place, status and reason of each step."""
-    from conformance import verify as verifier
-
     errors = verifier.Unreadable, verifier.Refused, verifier.Unproved
     try:
         return [(place, v.status, v.reason) for place, v in verifier.verify_answers(text)]
@@ -85,11 +85,9 @@ def _judged(file: Path, text: str) -> list[tuple[str, str, str]]:
         raise BadInput(f"trajectory {str(file)!r}: {error}") from None
 
 
-def _drawn(data: dict[str, Any], at: int) -> bytes:
+def _draw(data: dict[str, Any], at: int) -> bytes:
     """Draw a step as it was given, and as the reference has it."""
-    import reference
-    from mushrooms.figures import case
-    from scene import State, from_data
+    from mushrooms.figures import case  # drawing takes a second to import
 
     begin = data["steps"][at - 1] if at else data["state"]
     state = msgspec.convert({name: begin.get(name) for name in (*FIELDS, "wall")}, State)

@@ -20,8 +20,10 @@ from hypothesis import settings
 from numba.core.dispatcher import Dispatcher
 from support.entries import kept_entries
 
+import fast
 from conformance.suite import run as suite
 from mushrooms.main import run
+from scene import Scene
 
 settings.register_profile("quick", max_examples=50, derandomize=True, deadline=None, print_blob=True)
 settings.register_profile("deep", max_examples=10_000, deadline=None, print_blob=True)
@@ -116,6 +118,21 @@ def tally(request: pytest.FixtureRequest) -> Iterator[Counter[str]]:
 def unsynced(monkeypatch: pytest.MonkeyPatch) -> None:
     """Leave files to the system's buffers: no test can cut the power, and a busy disk would take minutes."""
     monkeypatch.setattr(os, "fsync", lambda _descriptor: None)
+
+
+@pytest.fixture
+def followed(monkeypatch: pytest.MonkeyPatch) -> list[tuple[int, int, int, int]]:
+    """Return the list of what is followed: first particle, how many, after which cycle and up to which."""
+    block_ranges, go_on = list[tuple[int, int, int, int]](), fast.go_on
+
+    def noted(scene: Scene, **options: Any) -> Any:
+        before = options.get("before")
+        n_before = 0 if before is None else before.ensemble.cycle_energies.shape[1]
+        block_ranges.append((options.get("first", 0), options["n_particles"], n_before, options["n_cycles"]))
+        return go_on(scene, **options)
+
+    monkeypatch.setattr(fast, "go_on", noted)
+    return block_ranges
 
 
 class Ended(NamedTuple):

@@ -5,7 +5,7 @@ import math
 
 import msgspec
 import pytest
-from support.replayer import certified_answer
+from support.truth import certified_answer
 
 from conformance.grading.agreement import physics_bound
 from conformance.grading.grade import grade, precision_class

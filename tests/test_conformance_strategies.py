@@ -206,7 +206,7 @@ def failing_line(name):
     return printed(AssertionError, hold, 1000)[0]
 
 
-@pytest.mark.parametrize("name", BLIND)
+@pytest.mark.parametrize("name", deep_but(BLIND, "to a floor that moves"))
 def test_a_faulty_stepper_is_reported_in_few_and_short_numbers(name):
     """At most twelve numbers that are not 0 or 1, all but three of at most six digits."""
     # In a process of its own: Hypothesis also draws constants of all modules that are loaded.

@@ -25,8 +25,7 @@ from fast.kernel.kept import LANE_ROWS
 from mushrooms.orbits import MAX_COLLISIONS, MAX_ORBITS
 from mushrooms.simulate import MOST_IN_MEMORY, MOST_ON_DISK
 from mushrooms.store import conduct
-from mushrooms.store.layout import FIELDS, Shape, shape_of
-from mushrooms.store.spec import RunSpec
+from mushrooms.store.spec import FIELDS, RunSpec, Shape, shape_of
 from reference.arithmetic import MAX_WORK
 from scene import from_data, load
 from scene.given import MAX_HARMONICS, MAX_KNOTS

@@ -55,7 +55,7 @@ def test_a_mistake_is_refuted_and_its_cause_is_named(name, tmp_path, right):
     switches, write_down = practice_engine.ENSEMBLES[name]
     n = 400 if "has_wrong_sign" in switches else N
     columns = write_down(practice_engine.ensemble(n, 41, **switches) if switches else dict(right))
-    result = audit_ensemble.conducted(write(tmp_path / "e.csv", columns), SCENE, None, PLAIN)
+    result = audit_ensemble.examine(write(tmp_path / "e.csv", columns), SCENE, None, PLAIN)
     assert result.verdict == ("refuted" if CAUSES[name] else "confirmed"), result.checks
     assert CAUSES[name] in " ".join(result.causes)
     assert bool(result.causes) == bool(CAUSES[name])
@@ -66,7 +66,7 @@ def test_other_mistakes_of_the_pen_are_named(tmp_path, right):
     said = {"E0 and E1 are exchanged": -gain, "base 10": gain / np.log(10), "speeds are given": gain / 2}
     said |= {"E1/E0 - 1 is given": np.expm1(gain)}
     for words, s in said.items():
-        result = audit_ensemble.conducted(write(tmp_path / "s.csv", {"s": s}), SCENE, None, PLAIN)
+        result = audit_ensemble.examine(write(tmp_path / "s.csv", {"s": s}), SCENE, None, PLAIN)
         assert result.verdict == "refuted"
         assert words in " ".join(result.causes)
 
@@ -74,7 +74,7 @@ def test_other_mistakes_of_the_pen_are_named(tmp_path, right):
 def test_missing_particles_are_told_from_wrong_physics(tmp_path, right):
     kept = {name: column[: N - 200] for name, column in right.items()}
     path = write(tmp_path / "e.csv", kept)
-    result = audit_ensemble.conducted(path, SCENE, None, PLAIN._replace(particles=N))
+    result = audit_ensemble.examine(path, SCENE, None, PLAIN._replace(particles=N))
     assert [check.what for check in result.checks if check.holds is False] == ["every particle has an energy"]
     assert "8.0% of the particles are missing" in result.causes[0]
 
@@ -113,7 +113,7 @@ def test_further_cycles_are_held_to_sums(tmp_path):
     for later, verdict in ((s, "confirmed"), (np.diff(s, axis=1, prepend=0.0), "refuted")):
         energies = {f"E{k + 1}": 1e6 * np.exp(later[:, k]) for k in (2, 0, 1)}
         path = write(tmp_path / "e.csv", {"E0": np.full(len(s), 1e6), **energies})
-        result = audit_ensemble.conducted(path, SCENE, None, PLAIN._replace(energy=None))
+        result = audit_ensemble.examine(path, SCENE, None, PLAIN._replace(energy=None))
         assert result.verdict == verdict, result.checks
         assert {"log E2/E0", "mean of log E3/E0"} <= {check.what for check in result.checks}
 

@@ -66,20 +66,6 @@ def test_a_benchmark_is_written_whole_and_again(call, tmp_path, monkeypatch):
     assert all(errors[0][key] == errors[1][key] for key in errors[1])
 
 
-@pytest.mark.parametrize(
-    ("arguments", "word"),
-    [
-        (["--seed", "-1"], "--seed = -1"),
-        (["--", "./no-such-stepper"], "no-such-stepper"),
-        pytest.param(["--", sys.executable, "-c", "print(1)"], "python", marks=pytest.mark.deep),
-    ],
-)
-def test_bad_options_are_one_line(call, monkeypatch, tmp_path, arguments, word):
-    monkeypatch.chdir(tmp_path)
-    assert_refused(call("--quick", *arguments), word)
-    assert not list(tmp_path.iterdir())
-
-
 def test_the_page_on_speed_shows_what_the_record_holds(call):
     kept = record.read(ROOT / "docs" / "bench" / "bench.json")
     text = (ROOT / "docs" / "speed.md").read_text("utf-8")

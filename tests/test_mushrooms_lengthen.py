@@ -11,7 +11,7 @@ import pytest
 import xarray
 import zarr
 from support.depth import deep_but
-from support.harm import full_disk, held
+from support.harm import held
 from support.refusals import assert_refused
 from zarr.storage import LocalStore
 
@@ -20,9 +20,8 @@ from fast.kernel import kept, pools
 from mushrooms import compared
 from mushrooms.store import conduct, engines
 from mushrooms.store import run as stored
-from mushrooms.store.layout import LANES, paused_of, shape_of
 from mushrooms.store.run import StoredRun
-from mushrooms.store.spec import RunSpec
+from mushrooms.store.spec import LANES, RunSpec, paused_of, shape_of
 from scene import load
 
 pytestmark = pytest.mark.usefixtures("unsynced")
@@ -48,22 +47,7 @@ def summary_of(ended):
 def _whole_sums(monkeypatch):
     """Leave the theory, which takes seconds, out of the summary."""
     monkeypatch.setattr(compared, "measured", lambda _spec, n, gain: {"captured": n, **gain._asdict()})
-    monkeypatch.setattr(compared, "limit_told", lambda _spec, _summary: None)
-
-
-@pytest.fixture
-def followed(monkeypatch):
-    """Return the list of what is followed: first particle, how many, from which cycle on and up to which."""
-    pieces, go_on = [], fast.go_on
-
-    def noted(scene, **options):
-        before = options["before"]
-        n_before = 0 if before is None else before.ensemble.cycle_energies.shape[1]
-        pieces.append((options["first"], options["n_particles"], n_before, options["n_cycles"]))
-        return go_on(scene, **options)
-
-    monkeypatch.setattr(fast, "go_on", noted)
-    return pieces
+    monkeypatch.setattr(compared, "explain_limit", lambda _spec, _summary: None)
 
 
 @pytest.mark.parametrize("name", deep_but(["fermi-ulam", "moving-cap", "breathing-circle"], "moving-cap"))
@@ -99,7 +83,7 @@ def test_a_run_that_is_long_enough_is_not_followed_again(command_line, tmp_path,
     probes, rest = followed[:3], followed[3:]
     assert probes == [(0, 4, 0, 2), (0, 4, 2, 3), (0, 4, 0, 3)]
     whole = [(first, 32, 2, 3) for first in range(0, 128, 32)]
-    assert rest == [*whole, (128, 22, 2, 3), (150, 10, 0, 3), (160, 10, 0, 3)]
+    assert rest == [*whole, (128, 32, 0, 3), (160, 10, 0, 3)]
     saved = json.loads((tmp_path / "summary.json").read_text())
     assert (saved["cycles"], saved["particles"]) == (3, 170)
 
@@ -108,12 +92,12 @@ def test_a_lengthening_that_is_broken_off_goes_on(command_line, tmp_path, follow
     """Also to more cycles than it was broken off at; blocks of three lengths stand side by side."""
     keep, left = StoredRun.keep, 0
 
-    def interrupted(self, piece, block):
+    def interrupted(self, block_range, block):
         nonlocal left
         left -= 1
         if left < 0:
             raise KeyboardInterrupt
-        keep(self, piece, block)
+        keep(self, block_range, block)
 
     monkeypatch.setattr(StoredRun, "keep", interrupted)
     left = 10
@@ -155,9 +139,9 @@ def test_a_block_that_is_half_lengthened_is_followed_from_the_start(
 
     keep = StoredRun.keep
 
-    def dies(self, piece, block):
+    def dies(self, block_range, block):
         monkeypatch.setattr(stored, "write_file", no_marker)
-        keep(self, piece, block)
+        keep(self, block_range, block)
 
     monkeypatch.setattr(StoredRun, "keep", dies)
     if n_written < 100:
@@ -168,15 +152,6 @@ def test_a_block_that_is_half_lengthened_is_followed_from_the_start(
     assert json.loads(ended.out)["sha256"] == at_once(3).sha256()
     # Its first new chunk holds later cycles alone, and those before do not miss it.
     assert ("1 blocks (0)" in ended.err) == (n_written > 2)
-
-
-def test_a_full_disk_leaves_a_lengthening_that_goes_on(command_line, tmp_path, monkeypatch):
-    summary_of(command_line(*arguments(tmp_path, 1)))
-    for n_writes in (0, 3, 12, 14, 40):
-        full_disk(monkeypatch, n_writes)
-        assert_refused(command_line(*arguments(tmp_path, 2)), "No space left on device", str(tmp_path))
-    full_disk(monkeypatch, 10**9)
-    assert summary_of(command_line(*arguments(tmp_path, 2)))["sha256"] == at_once(2).sha256()
 
 
 def test_a_chunk_holds_the_cycles_that_a_run_began_with(command_line, tmp_path):

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from support.refusals import assert_refused, one_line
+from support.refusals import one_line
 
 import fast
 import theory
@@ -17,30 +17,6 @@ from mushrooms.figures import energies, style
 from mushrooms.figures.heating import Loop, fastest, moving_cap, phase_diagram, supremum, switched
 from mushrooms.reports.page import as_json, typeset
 from scene import BangBang, Mushroom, load
-
-RUN = ["simulate", "moving-cap", "--particles", 60, "--energy", 1e4, "--seed", 7, "--threads", 1]
-
-
-def test_the_same_run_writes_the_same_picture(command_line, tmp_path):
-    paths = [tmp_path / name for name in ("a.svg", "b.svg")]
-    for path in paths:
-        assert command_line(*RUN, "--plot", path)[0] == 0
-    first, second = (path.read_bytes() for path in paths)
-    assert first == second
-    assert first.startswith(b"<?xml")
-
-
-@pytest.mark.parametrize(
-    ("arguments", "word"),
-    [
-        (["--plot", "a.pdf"], ".svg, .png"),
-        (["--plot", "a.svg", "--particles", "1"], "--particles = 1, must be >= 2"),
-    ],
-)
-def test_bad_options_are_one_line(command_line, monkeypatch, tmp_path, arguments, word):
-    monkeypatch.chdir(tmp_path)
-    assert_refused(command_line(*RUN, *arguments), word)
-    assert list(tmp_path.iterdir()) == []
 
 
 def test_residuals_tell_another_theory():
@@ -231,29 +207,13 @@ def test_the_page_says_what_the_code_finds():
         ("sigma_w <= 10^-25", "<i>σ</i><sub>w</sub> ≤ 10<sup>−25</sup>"),
         ("x^2 + y^2", "x<sup>2</sup> + y<sup>2</sup>"),
         ("nu(t)", "<i>ν</i>(t)"),
+        ("<script>a_b</script>", "&lt;script&gt;<i>a</i><sub>b</sub>&lt;/script&gt;"),
+        *((prose, prose) for prose in ("M1 and X2, see L7", "theory/equations.md", "sec. 4.1", "numbers")),
+        *((prose, prose) for prose in ("minus 3 sd at n = 30", "moving-cap@1e7")),
     ],
 )
-def test_formulas(text, html):
+def test_formulas_are_typeset_prose_is_left_alone_and_markup_escaped(text, html):
     assert typeset(text) == html
-
-
-@pytest.mark.parametrize(
-    "text",
-    [
-        "M1 and X2, see L7",
-        "theory/equations.md",
-        "sec. 4.1",
-        "minus 3 sd at n = 30",
-        "numbers",
-        "moving-cap@1e7",
-    ],
-)
-def test_prose_is_left_alone(text):
-    assert typeset(text) == text
-
-
-def test_what_could_be_markup_is_escaped():
-    assert typeset("<script>a_b</script>") == "&lt;script&gt;<i>a</i><sub>b</sub>&lt;/script&gt;"
 
 
 def test_scenes_are_written_as_a_reader_sees_them():

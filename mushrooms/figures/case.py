@@ -1,6 +1,6 @@
 """A case of the suite: the given path over the certified one, in the whole table and near the hit.
 
-Colours have one meaning in all of these figures, told once on the page (`LEGEND`).
+Colours have one meaning in all of these figures, explained once on the page (`LEGEND`).
 """
 
 from __future__ import annotations
@@ -11,6 +11,8 @@ from typing import Any
 
 import numpy as np
 from matplotlib import rc_context
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
 from conformance.grading.agreement import middle
 from conformance.suite.answers import outcomes_of
@@ -27,95 +29,76 @@ LEGEND = (
     (plots.BLACK, "walls at the certified hit"),
 )
 CLOSE = 0.06  # half the width of the close-up, of the table's size; more where the two hits lie further apart
-Point = tuple[float, float]
+# The certified path and the given one: colour, width and name.
 STROKES = ((plots.ORANGE, 4.0, "certified"), (plots.BLUE, 1.5, "given"))
+Steps = list[dict[str, Any]]  # the state after each
 
 
-@rc_context(plots.STYLE)
 def paths(result: Result, vector: Vector) -> bytes:
     """Draw a case as SVG: the table at the start and at the hit, both paths, and the hit close up.
 
     Raises:
         BadInput: the vector's scene is one that must be refused, and has no table.
     """
+    is_flow = vector.kind == "flow"  # it says where it ends, not how it came there
     scene = from_data(vector.scene)
     certified = [o for o in middle(vector.expect[0], vector.state) if isinstance(o, Collision | Horizon)]
-    given = _given(result)
-    at = _in_question(result, vector, certified)
+    given = [step for step in outcomes_of(result.answer or {}) if "x" in step and "y" in step]
+    at = max(0, len(certified) - 1)
+    if result.verdict != "pass" and not is_flow:
+        at = min(result.step, at)  # what follows a wrong step follows from it
     t = certified[at].t if certified else vector.state.t
-    start = (vector.state.x, vector.state.y)
-    certified, given = certified[: at + 1], given[: at + 1]  # what follows a wrong step follows from it
-    routes = [start, *((o.x, o.y) for o in certified)], [start, *((step["x"], step["y"]) for step in given)]
-    line = "none" if vector.kind == "flow" else "-"  # a flow says where it ends, not how it came there
-    figure, both = plots.new_figure(7.4, 3.7, 1, 2)
-    for axes in both:
-        _draw_walls(axes, scene, vector.state.t, t)
-        for route, colour, width in zip(routes, (plots.ORANGE, plots.BLUE), (4, 1.5), strict=True):
-            style = {"color": colour, "linewidth": width, "markersize": 3 * width}
-            axes.plot(*np.transpose(route), linestyle=line, alpha=0.75, marker=".", **style)
-        axes.plot(*start, marker="o", color=plots.BLACK, markersize=4, linestyle="none")
-        axes.set(aspect="equal", xlabel="x [length]", ylabel="y [length]")
-    size = float(np.ptp(np.hstack(draw.walls(scene, t)), axis=1).max())
-    ends = [route[at + 1] for route in routes if at + 1 < len(route)]
-    _directions(both, certified[at:], given[at:], 0.1 * size)
-    _close_up(both[1], ends or [start], CLOSE * size)
-    both[1].set_title("close to the end" if vector.kind == "flow" else f"close to step {at + 1}")
+    steps = [_fields(outcome) for outcome in certified[: at + 1]], given[: at + 1]
+    figure = _draw(scene, vector.state, t, steps, at, "none" if is_flow else "-")
+    figure.axes[1].set_title("close to the end" if is_flow else f"close to step {at + 1}")
+    return plots.svg(figure)
+
+
+def step(scene: Scene, state: State, truth: Collision | Horizon, given: Mapping[str, Any]) -> bytes:
+    """Draw one step as SVG: where it leads, and where it was said to; the whole table, and close up."""
+    figure = _draw(scene, state, truth.t, ([_fields(truth)], [dict(given)]), 0, "-")
+    figure.axes[0].legend(loc="best")
     return plots.svg(figure)
 
 
 @rc_context(plots.STYLE)
-def step(scene: Scene, state: State, truth: Collision | Horizon, given: Mapping[str, Any]) -> bytes:
-    """Draw one step as SVG: where it leads, and where it was said to; the whole table, and close up."""
-    figure, both = plots.new_figure(7.4, 3.7, 1, 2)
-    ends = [(truth.x, truth.y), (given["x"], given["y"])]
-    for axes in both:
-        _draw_walls(axes, scene, state.t, truth.t)
-        for (x, y), (colour, width, label) in zip(ends, STROKES, strict=True):
-            style = {"color": colour, "linewidth": width, "markersize": 3 * width, "label": label}
-            axes.plot([state.x, x], [state.y, y], marker=".", alpha=0.75, **style)
+def _draw(scene: Scene, state: State, t: float, both: tuple[Steps, Steps], at: int, line: str) -> Figure:
+    """Draw two paths from a state, in the table of its time and of t; at the right close to step `at`."""
+    figure, panels = plots.new_figure(7.4, 3.7, 1, 2)
+    size = float(np.ptp(np.hstack(draw.walls(scene, t)), axis=1).max())
+    for axes in panels:
+        for wall in draw.walls(scene, state.t):
+            axes.plot(*wall, color=plots.GREY, linewidth=1)
+        for wall in draw.walls(scene, t):
+            axes.plot(*wall, color=plots.BLACK, linewidth=1, linestyle=":")
+        for steps, (colour, width, name) in zip(both, STROKES, strict=True):
+            x, y = ([getattr(state, place), *(step[place] for step in steps)] for place in "xy")
+            style = {"marker": ".", "markersize": 3 * width, "linestyle": line, "alpha": 0.75, "label": name}
+            axes.plot(x, y, color=colour, linewidth=width, **style)
+            for step in steps[at:]:
+                _draw_direction(axes, step, 0.1 * size, color=colour, linewidth=width)
         axes.plot(state.x, state.y, marker="o", color=plots.BLACK, markersize=4, linestyle="none")
         axes.set(aspect="equal", xlabel="x [length]", ylabel="y [length]")
-    size = float(np.ptp(np.hstack(draw.walls(scene, truth.t)), axis=1).max())
-    _directions(both, [truth], [dict(given)], 0.1 * size)
-    _close_up(both[1], ends, CLOSE * size)
-    both[0].legend(loc="best")
-    return plots.svg(figure)
+    ends = [steps[at] for steps in both if at < len(steps)] or [_fields(state)]
+    _close_up(panels[1], ends, CLOSE * size)
+    return figure
 
 
-def _given(result: Result) -> list[dict[str, Any]]:
-    return [step for step in outcomes_of(result.answer or {}) if "x" in step and "y" in step]
+def _fields(state: Outcome | State) -> dict[str, Any]:
+    return {name: getattr(state, name) for name in ("x", "y", "vx", "vy")}
 
 
-def _in_question(result: Result, vector: Vector, certified: Sequence[Outcome]) -> int:
-    """Return the place of the certified step to look at: of a failure the one that differs, else the last."""
-    last = max(0, len(certified) - 1)
-    is_wrong = result.verdict != "pass" and vector.kind != "flow"
-    return min(result.step, last) if is_wrong else last
-
-
-def _draw_walls(axes: Any, scene: Scene, begin: float, end: float) -> None:
-    for line in draw.walls(scene, begin):
-        axes.plot(*line, color=plots.GREY, linewidth=1)
-    for line in draw.walls(scene, end):
-        axes.plot(*line, color=plots.BLACK, linewidth=1, linestyle=":")
-
-
-def _directions(both: Any, certified: Sequence[Any], given: Sequence[Any], length: float) -> None:
+def _draw_direction(axes: Axes, step: Mapping[str, Any], length: float, **style: Any) -> None:
     """Draw where the particle goes on, dashed."""
-    truth = [{name: getattr(o, name) for name in ("x", "y", "vx", "vy")} for o in certified]
-    for steps, colour, width in ((truth, plots.ORANGE, 4), (given, plots.BLUE, 1.5)):
-        for step in steps:
-            speed = math.hypot(step.get("vx", 0.0), step.get("vy", 0.0))
-            if not 0 < speed < math.inf:
-                continue
-            x, y = (step[place] + length * step[v] / speed for place, v in (("x", "vx"), ("y", "vy")))
-            for axes in both:
-                line = [step["x"], x], [step["y"], y]
-                axes.plot(*line, color=colour, linewidth=width, alpha=0.6, linestyle=(0, (1, 0.6)))
+    vx, vy = step.get("vx", 0.0), step.get("vy", 0.0)
+    speed = math.hypot(vx, vy)
+    if 0 < speed < math.inf:
+        x, y = step["x"] + length * vx / speed, step["y"] + length * vy / speed
+        axes.plot([step["x"], x], [step["y"], y], alpha=0.6, linestyle=(0, (1, 0.6)), **style)
 
 
-def _close_up(axes: Any, ends: Sequence[Point], least: float) -> None:
-    xs, ys = zip(*ends, strict=True)
+def _close_up(axes: Axes, ends: Sequence[Mapping[str, Any]], least: float) -> None:
+    xs, ys = ([end[place] for end in ends] for place in "xy")
     half = max(least, 0.75 * (max(xs) - min(xs)), 0.75 * (max(ys) - min(ys)))
     x, y = (max(xs) + min(xs)) / 2, (max(ys) + min(ys)) / 2
     axes.set(xlim=(x - half, x + half), ylim=(y - half, y + half))

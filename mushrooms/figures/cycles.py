@@ -122,8 +122,8 @@ def energies(samples: list[Sample]) -> Figure:
     for (panel, rest), sample in zip(pairs, samples, strict=True):
         _energies(panel, rest, sample)
         # Below: within the panel it would cover the caustic or a peak, wherever a scene has them.
-        told = panel.get_legend_handles_labels()
-        rest.legend(*told, loc="upper center", bbox_to_anchor=(0.5, -0.5))
+        entries = panel.get_legend_handles_labels()
+        rest.legend(*entries, loc="upper center", bbox_to_anchor=(0.5, -0.5))
     return figure
 
 

@@ -19,7 +19,7 @@ from matplotlib.figure import Figure
 
 import theory
 from fast.given import given_energy
-from mushrooms.compared import begins_widest, predicted
+from mushrooms.compared import NO_THEORY, begins_widest, known, predicted
 from mushrooms.figures import style as plots
 from mushrooms.figures.style import BLACK, BLUE, GREY, ORANGE, SKY, STYLE, FloatArray, new_figure
 from mushrooms.store.spec import RunSpec
@@ -162,9 +162,9 @@ def growth(scene: Scene, energy: float, gains: Gains, n_particles: int | None = 
     shown = np.unique(np.linspace(0, cycles[-1], min(N_MARKS, len(cycles))).astype(int))
     error = sd[shown] / np.sqrt(bars.n)
     above.errorbar(cycles[shown], mean[shown], error, fmt="o", color=BLUE, markersize=3.5, label="mean")
-    told = [(k, predicted(RunSpec(scene, energy, int(k), 0))) for k in shown[1:]]
-    if all(one is not None for _, one in told):
-        line = np.array([0.0, *(k * one.m1 for k, one in told if one is not None)])
+    predictions = [(k, predicted(RunSpec(scene, energy, int(k), 0))) for k in shown[1:]]
+    if all(one is not None for _, one in predictions):
+        line = np.array([0.0, *(k * one.m1 for k, one in predictions if one is not None)])
         above.plot(
             cycles[shown], line, color=BLACK, linewidth=1.5, label=f"theory, m1 = {line[1]:.4f} a cycle"
         )
@@ -188,14 +188,6 @@ def _title(scene: Scene, energy: float, bars: Gathered, n_particles: int | None)
     return title if n == bars.n else f"{title}\n({n - bars.n:,} of them never free, or lost: left out)"
 
 
-def known(scene: Scene, energy: float) -> theory.FiniteEnergy | None:
-    """Return the theory of a scene at an energy; None if it does not cover the scene."""
-    try:
-        return theory.at_energy(scene, energy) if isinstance(scene, Mushroom) else None
-    except (BadInput, theory.NotCovered, theory.NotConverged):
-        return None
-
-
 def draw_limit(axes: Axes, scene: Scene, bars: Gathered) -> None:
     """Draw a histogram, with the limit of high energies if theory covers the scene."""
     heights = _bars(axes, bars)
@@ -204,7 +196,7 @@ def draw_limit(axes: Axes, scene: Scene, bars: Gathered) -> None:
     axes.locator_params(axis="x", nbins=6)
     try:
         limit = theory.energies(scene) if isinstance(scene, Mushroom) and begins_widest(scene) else None
-    except (BadInput, theory.NotCovered, theory.NotConverged):
+    except NO_THEORY:
         return
     if limit is None:
         return

@@ -37,7 +37,7 @@ CAPTURED, FREE = plots.BLUE, plots.ORANGE
 HALO = [withStroke(linewidth=2.5, foreground="white")]
 
 
-def _given(orbits: Sequence[FollowedOrbit] | FollowedOrbit) -> list[FollowedOrbit]:
+def _check_orbits(orbits: Sequence[FollowedOrbit] | FollowedOrbit) -> list[FollowedOrbit]:
     found = [orbits] if isinstance(orbits, FollowedOrbit) else list(orbits)
     if not all(isinstance(orbit, FollowedOrbit) for orbit in found):
         raise BadInput(f"orbits = {shown(orbits)}, must be what mushrooms.orbits.follow returns")
@@ -49,7 +49,7 @@ def _given(orbits: Sequence[FollowedOrbit] | FollowedOrbit) -> list[FollowedOrbi
 @rc_context(plots.STYLE)
 def trajectory(orbit: FollowedOrbit) -> Figure:
     """Draw an orbit's path in its table: walls at its start and end, their names, the mouth, the start."""
-    [orbit] = _given(orbit)
+    [orbit] = _check_orbits(orbit)
     figure, axes = plots.new_figure(6.4, 6.0)
     states = orbit.states()
     begin, end = float(states[0, 0]), float(states[-1, 0])
@@ -71,28 +71,22 @@ def trajectory(orbit: FollowedOrbit) -> Figure:
     axes.add_collection(lines)
     _names(axes, orbit.scene, begin)
     axes.plot(*points[0], "o", color=FREE, markeredgecolor="white", markersize=9, label="start", zorder=4)
-    ahead = points[-1] + 0.08 * np.ptp(points, axis=0).max() * _unit(states[-1, 3:])
+    direction = states[-1, 3:] / (np.hypot(*states[-1, 3:]) or 1.0)
+    ahead = points[-1] + 0.08 * np.ptp(points, axis=0).max() * direction
     axes.annotate("", ahead, points[-1], arrowprops={"arrowstyle": "-|>", "color": plots.BLACK})
     bar = figure.colorbar(lines, ax=axes, shrink=0.6, label="collision")
     bar.ax.set_ylim(0, len(points) - 1)
-    axes.set(aspect="equal", xlabel="x [length]", ylabel="y [length]", title=_title(orbit))
+    axes.set(aspect="equal", xlabel="x [length]", ylabel="y [length]", title=_title([orbit]))
     axes.margins(0.08)
     figure.legend(loc="outside lower center", ncols=3)
     return figure
 
 
-def _unit(v: Any) -> Any:
-    return v / (np.hypot(*v) or 1.0)
-
-
-def _title(orbit: FollowedOrbit) -> str:
-    energy = orbit.energies()[0]
-    many = len(orbit.walls)
-    return f"{_scene(orbit)}: {many:,} collisions from E0 = {plots.power(energy)}"
-
-
-def _scene(orbit: FollowedOrbit) -> str:
-    return plots.plain(orbit.scene.name or "a table")
+def _title(orbits: Sequence[FollowedOrbit]) -> str:
+    first, n = orbits[0], len(orbits)
+    what = f"{len(first.walls):,} collisions" if n == 1 else f"{n} particles"
+    name = plots.plain(first.scene.name or "a table")
+    return f"{name}: {what} from E0 = {plots.power(first.energies()[0])}"
 
 
 def _names(axes: Axes, scene: Scene, t: float) -> None:
@@ -100,12 +94,8 @@ def _names(axes: Axes, scene: Scene, t: float) -> None:
     table = table_at(fp, scene, t)
     r, w, h = float(table.r), float(table.w), float(table.h)
     style: dict[str, Any] = {"fontsize": 9, "path_effects": HALO, "ha": "center", "va": "center", "zorder": 5}
-    places: list[tuple[str, float, float]] = []
-    if not isinstance(scene, Stem):
-        places.append(("arc", 0.0, r))
-        places.append(("base", 0.5 * (r + w) if w else 0.0, 0.0))
-    else:
-        places.append(("base", 0.0, 0.0))
+    base = "base", 0.5 * (r + w) if isinstance(scene, Mushroom) else 0.0, 0.0
+    places = [base] if isinstance(scene, Stem) else [("arc", 0.0, r), base]
     if h:
         half = float(table.half_width(-0.5 * h))
         places += [("left", -half, -0.5 * h), ("right", half, -0.5 * h), ("floor", 0.0, -h)]
@@ -134,10 +124,10 @@ def section(orbits: Sequence[FollowedOrbit] | FollowedOrbit, phase: float | None
         BadInput: the walls stand still, and a phase is asked for or the table is a stem.
     """
     figure, axes = plots.new_figure(6.4, 5.2)
-    found = _given(orbits)
+    found = _check_orbits(orbits)
     draw = _draw_stem if isinstance(found[0].scene, Stem) else draw_section
     draw(axes, found, phase)
-    axes.set(title=_of(found) + ("" if phase is None else f", at t/T = {phase:g}"))
+    axes.set(title=_title(found) + ("" if phase is None else f", at t/T = {phase:g}"))
     if axes.get_legend_handles_labels()[0]:
         figure.legend(loc="outside lower center", ncols=2)
     return figure
@@ -200,18 +190,11 @@ def _points(
             axes.plot([], [], "o", color=colour, markersize=5, label=f"{name}{which.sum():,} {what}")
 
 
-def _of(orbits: Sequence[FollowedOrbit]) -> str:
-    n = len(orbits)
-    if n == 1:
-        return _title(orbits[0])
-    return f"{_scene(orbits[0])}: {n} particles from E0 = {plots.power(orbits[0].energies()[0])}"
-
-
 @rc_context(plots.STYLE)
 def collision_map(orbits: Sequence[FollowedOrbit] | FollowedOrbit) -> Figure:
     """Draw the boundary map: place along the whole boundary against the sine after each collision."""
     figure, axes = plots.new_figure(7.6, 5.0)
-    draw_map(axes, _given(orbits))
+    draw_map(axes, _check_orbits(orbits))
     figure.legend(loc="outside lower center", ncols=2)
     return figure
 
@@ -228,7 +211,7 @@ def draw_map(axes: Axes, found: Sequence[FollowedOrbit]) -> None:
             axes.text(*where, slot.wall, ha="center", va="bottom", fontsize=9, transform=axes.transData)
     axes.set(xlim=(0, 1), ylim=(-1, 1), xlabel="place along the boundary, anticlockwise")
     axes.set_ylabel("sine of the angle to the wall's normal, anticlockwise > 0")
-    axes.set_title(_of(found), pad=18)  # above the names of the walls
+    axes.set_title(_title(found), pad=18)  # above the names of the walls
 
 
 @rc_context(plots.STYLE)
@@ -237,7 +220,7 @@ def energy_in_time(orbit: FollowedOrbit) -> Figure:
 
     For many particles use `mushrooms.figures.energies.growth`.
     """
-    [orbit] = _given(orbit)
+    [orbit] = _check_orbits(orbit)
     figure, axes = plots.new_figure(7.2, 4.4)
     span = orbit.scene.period
     states = orbit.states()
@@ -260,7 +243,7 @@ def energy_in_time(orbit: FollowedOrbit) -> Figure:
         for k, (begin, end) in enumerate(edges.reshape(-1, 2)):
             label = "captured" if k == 0 else "_"
             axes.axvspan(time[begin], time[end], color=CAPTURED, alpha=0.15, linewidth=0, label=label)
-    axes.set(xlabel="t / T" if span else "t [time]", ylabel="ln(E/E0)", title=_title(orbit))
+    axes.set(xlabel="t / T" if span else "t [time]", ylabel="ln(E/E0)", title=_title([orbit]))
     figure.legend(loc="outside lower center", ncols=2)
     return figure
 
@@ -274,12 +257,12 @@ def exponents(
     Raises:
         BadInput: as `mushrooms.lyapunov.stretching`.
     """
-    found = _given(orbits)
+    found = _check_orbits(orbits)
     figure, axes = plots.new_figure(7.2, 4.4)
     n_before = 0
     for k, (orbit, colour) in enumerate(zip(found, plots.phase_colours(len(found)), strict=True)):
-        told = None if progress is None else (lambda n, before=n_before: progress(before + n))
-        one = lyapunov.stretching(orbit, told)
+        report = None if progress is None else (lambda n, before=n_before: progress(before + n))
+        one = lyapunov.stretching(orbit, report)
         n_before += len(orbit.walls)
         count = np.arange(1, len(one.logs) + 1)
         label = f"{one.exponent:.3f} ± {one.error:.3f} a collision"
@@ -288,7 +271,7 @@ def exponents(
         axes.plot(count, one.exponents, color=colour, linewidth=1.2, label=label)
         axes.errorbar(count[-1] * (1 + 0.01 * k), one.exponent, one.error, color=colour, capsize=3)
     axes.axhline(0, color=plots.BLACK, linewidth=0.8)
-    axes.set(xscale="log", xlabel="collisions", ylabel="exponent [1/collision]", title=_of(found))
+    axes.set(xscale="log", xlabel="collisions", ylabel="exponent [1/collision]", title=_title(found))
     figure.legend(loc="outside lower center", ncols=1 + (len(found) > 3))
     return figure
 
@@ -301,7 +284,7 @@ def write_animation(orbit: FollowedOrbit, file: BinaryIO, n_frames: int = N_FRAM
         file: open for binary writing.
         n_frames: number of frames.
     """
-    [orbit] = _given(orbit)
+    [orbit] = _check_orbits(orbit)
     states = orbit.states()
     times = np.linspace(states[0, 0], states[-1, 0], n_frames)
     places, last = orbit.at(times), np.searchsorted(states[:, 0], times, side="right") - 1

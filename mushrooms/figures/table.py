@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 from mpmath import fp
 from PIL import Image
 
+import fast
 from mushrooms.figures import style as plots
 from scene import Collision, Scene, State, check_scene
 from scene.geometry import table_at
@@ -44,8 +45,6 @@ def chords(scene: Scene, t: float, n: int = N_CHORDS) -> np.ndarray:
     It is so fast that the walls hardly move meanwhile. The line stops early if a step has no
     answer.
     """
-    import fast  # compiles for seconds: only when a trajectory is wanted
-
     points = np.hstack(walls(scene, t))
     top, bottom = points[1].max(), points[1].min()
     speed = 1e6 * points[0].max()
@@ -97,21 +96,17 @@ def write_picture(scene: Scene, suffix: str, file: BinaryIO) -> None:
         suffix: ".svg", ".png" or ".pdf": the table at each phase, with chords; ".gif": the walls in motion.
         file: open for binary writing.
     """
-    if suffix == ".gif":
-        _write_animation(scene, file)
-    else:
-        figure = new_strip(scene, 7.2, 6.0)
-        figure.suptitle(plots.plain(scene.name))
-        plots.save(figure, file, suffix)
-
-
-def _write_animation(scene: Scene, file: BinaryIO) -> None:
     times, span, name = phases(scene, N_FRAMES), scene.period, plots.plain(scene.name)
 
     def title(k: int) -> str:
         return f"{name}   t/T = {times[k] / span:.2f}" if span else f"{name}   static"
 
-    write_frames(scene, times, lambda _: title, file)
+    if suffix == ".gif":
+        write_frames(scene, times, lambda _: title, file)
+    else:
+        figure = new_strip(scene, 7.2, 6.0)
+        figure.suptitle(name)
+        plots.save(figure, file, suffix)
 
 
 @rc_context(plots.STYLE)

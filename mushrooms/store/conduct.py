@@ -12,15 +12,14 @@ from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import closing
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from mushrooms.forecast import expected_collisions
 from mushrooms.store.engines import Engine, follow
-from mushrooms.store.layout import Arrays, shape_of
 from mushrooms.store.run import Block, BlockRange, StoredRun, attributes_of, is_run
-from mushrooms.store.spec import RunSpec, difference, made_by
+from mushrooms.store.spec import Arrays, RunSpec, difference, made_by, shape_of
 from scene.refusal import BadInput
 
 BLOCK_COLLISIONS = 2e8  # of a block, some seconds: what a fault can cost, and long beside a block's files
@@ -33,21 +32,6 @@ MOST_BLOCKS = 10**6
 PROBED = 4  # particles followed again before a run is gone on with
 MARKER_BYTES = 2**16  # of a block's files beside its chunks, at most
 CLOCK = time.monotonic
-
-
-class RunLimits(NamedTuple):
-    """Where a run stops although it is not at its end; None for no limit.
-
-    Attributes:
-        collisions: of a particle.
-        seconds: on the clock, from the command's begin.
-    """
-
-    collisions: int | None = None
-    seconds: float | None = None
-
-
-NO_LIMITS = RunLimits()
 
 
 class LimitReached(Exception):  # noqa: N818 (nothing is wrong: the run goes on with --resume)
@@ -68,7 +52,7 @@ def block_of_new(spec: RunSpec, n_particles: int, threads: int) -> int:
     return min(block_size(spec, threads), max(ROOM, 1 << (n_particles - 1).bit_length()))
 
 
-def opened(
+def open_or_create(
     folder: Path,
     spec: RunSpec,
     n_particles: int,
@@ -98,7 +82,7 @@ def opened(
     found: dict[str, Any] = {"block": block or default, "cycles_of_a_chunk": None}
     is_there = is_run(folder)
     if is_there:
-        found = described(folder, spec, {} if block is None else {"block": block})
+        found = read_description(folder, spec, {} if block is None else {"block": block})
         if at_least and found["particles"] > n_particles:
             n_particles, command = found["particles"], found["command"]
         _check_growth(folder, "particles", found["particles"], n_particles)
@@ -118,7 +102,7 @@ def opened(
     return run, damaged if is_there else []
 
 
-def described(folder: Path, spec: RunSpec, more: dict[str, object]) -> dict[str, Any]:
+def read_description(folder: Path, spec: RunSpec, more: dict[str, object]) -> dict[str, Any]:
     """Return the description of a stored run, if it is the one asked for, with as many cycles or fewer.
 
     Raises:
@@ -145,7 +129,8 @@ def complete(
     on_block: Callable[[Block], None] = lambda _block: None,
     *,
     n_particles: int | None = None,
-    limits: RunLimits = NO_LIMITS,
+    max_collisions: int | None = None,
+    max_seconds: float | None = None,
 ) -> None:
     """Follow what is missing of the first particles, and keep it block by block.
 
@@ -158,44 +143,37 @@ def complete(
         on_progress: called with the number of finished particles, again and again.
         on_block: called with each block, before it is kept.
         n_particles: how many of the first particles; by default all.
-        limits: at which to stop.
+        max_collisions: of a particle: stop if one makes more.
+        max_seconds: on the clock: stop after them.
 
     Raises:
         LimitReached: a limit; what was kept stays.
         OSError: a block could not be written; the one followed meanwhile is dropped.
     """
     begin, n = CLOCK(), run.shape.n_particles if n_particles is None else n_particles
-    there = n - sum(min(piece.n, n - piece.first) for piece in run.lacking() if piece.first < n)
+    there = n - sum(block_range.n for block_range in run.lacking() if block_range.first < n)
 
     def report(n_done: int) -> None:
-        on_progress(there + n_done)
-        if limits.seconds is not None and CLOCK() - begin > limits.seconds:
-            raise LimitReached(f"--max-seconds = {limits.seconds:g} have passed")
+        on_progress(max(0, there + n_done))  # the last block may have more particles than are asked for
+        if max_seconds is not None and CLOCK() - begin > max_seconds:
+            raise LimitReached(f"--max-seconds = {max_seconds:g} have passed")
 
-    # Particles that continue from earlier cycles do so as a whole block.
-    pieces = (
-        piece if piece.before is not None else piece._replace(n=min(piece.n, n - piece.first))
-        for piece in run.missing()
-        if piece.first < n
-    )
-    with closing(engine(run.spec, pieces, report)) as found, ThreadPoolExecutor(1) as writer:
+    block_ranges = (block_range for block_range in run.missing() if block_range.first < n)
+    with closing(engine(run.spec, block_ranges, report)) as found, ThreadPoolExecutor(1) as writer:
         under_way: Future[None] | None = None
-        for piece, block in found:
-            _check_collisions(piece, block, limits.collisions)
+        for block_range, block in found:
+            most = block.tally.most
+            if max_collisions is not None and most > max_collisions:
+                made = f"a particle of block {block_range.number} makes {most} collisions"
+                raise LimitReached(f"{made}, --max-collisions = {max_collisions}")
             if under_way is not None:
                 under_way.result()
-            under_way = writer.submit(run.keep, piece, block)
-            there += min(piece.n, n - piece.first)
+            under_way = writer.submit(run.keep, block_range, block)
+            there += block_range.n
             on_block(block)
-            on_progress(there)
+            on_progress(max(0, there))
         if under_way is not None:
             under_way.result()
-
-
-def _check_collisions(piece: BlockRange, block: Block, most: int | None) -> None:
-    if most is not None and block.tally.most > most:
-        made = f"a particle of block {piece.number} makes {block.tally.most} collisions"
-        raise LimitReached(f"{made}, --max-collisions = {most}")
 
 
 def _probe(run: StoredRun) -> None:
@@ -209,12 +187,12 @@ def _probe(run: StoredRun) -> None:
         return
     stored = {name: array[:PROBED] for name, array in run.block(there).arrays.items()}
     n, n_cycles = stored["cycle_energies"].shape
-    piece, spec = BlockRange(there, there * run.shape.block, n), run.spec
-    first = follow(spec._replace(n_cycles=n_cycles), piece, None)
+    block_range, spec = BlockRange(there, there * run.shape.block, n), run.spec
+    first = follow(spec._replace(n_cycles=n_cycles), block_range, None)
     _compare(run, stored, first.arrays)
     if n_cycles < spec.n_cycles:
-        longer = follow(spec, piece._replace(before=first._replace(arrays=stored)), None)
-        _compare(run, longer.arrays, follow(spec, piece, None).arrays)
+        longer = follow(spec, block_range._replace(before=first._replace(arrays=stored)), None)
+        _compare(run, longer.arrays, follow(spec, block_range, None).arrays)
 
 
 def _compare(run: StoredRun, ones: Arrays, others: Arrays) -> None:

@@ -1,7 +1,7 @@
 """Engines: what follows the blocks of a run, in this process or on the workers of a Dask cluster.
 
-An engine is handed pieces and yields blocks, in any order. Every particle's bits depend on its number alone,
-so that it does not matter which engine, machine or block followed it, nor how often it was tried.
+An engine is handed ranges of particles and yields blocks, in any order. Every particle's bits depend on its
+number alone: it does not matter which engine, machine or block followed it, nor how often it was tried.
 """
 
 from __future__ import annotations
@@ -10,60 +10,46 @@ import logging
 from collections import Counter
 from collections.abc import Callable, Generator, Iterator
 from concurrent.futures import CancelledError
-from contextlib import contextmanager
 from itertools import islice
 from typing import Any
 
 import fast
 import mushrooms
-from fast import Paused
-from mushrooms.store.layout import columns, paused_of
 from mushrooms.store.run import Block, BlockRange
-from mushrooms.store.spec import RunSpec, spec_of
+from mushrooms.store.spec import RunSpec, columns, paused_of
 from scene.refusal import BadInput
 
-# Told of the particles done in the piece under way, again and again; what it raises ends the engine.
-Tick = Callable[[int], None]
+# Receives the number of finished particles of the block in progress; its exceptions end the engine.
+OnProgress = Callable[[int], None]
 Following = Generator[tuple[BlockRange, Block], None, None]
-Engine = Callable[[RunSpec, Iterator[BlockRange], Tick], Following]
+Engine = Callable[[RunSpec, Iterator[BlockRange], OnProgress], Following]
 RETRIES = 10  # of a block whose workers fail or die
 BLOCKS_AHEAD = 2  # waiting for each thread of the cluster: no worker idles, and few blocks are in memory
 CONNECT_TIMEOUT = 10.0  # seconds in which a scheduler must answer
 POLL_INTERVAL = 0.5  # seconds after which limits are looked at while no block comes
 
 
-def follow(spec: RunSpec, piece: BlockRange, threads: int | None, tick: Tick | None = None) -> Block:
-    """Follow the particles of a piece.
+def follow(
+    spec: RunSpec, block_range: BlockRange, threads: int | None, on_progress: OnProgress | None = None
+) -> Block:
+    """Follow the particles of a block, from their starts or from where they were.
 
     Raises:
         BadInput: as `fast.go_on`.
     """
-    if piece.before is None:
-        return _followed(spec, piece.first, piece.n, threads, tick)
-    arrays, seconds = piece.before
-    before = paused_of(arrays, spec.energy, seconds)
-    n = len(before.lanes)
-    longer = _followed(spec, piece.first, n, threads, tick, before)
-    if n == piece.n:
-        return longer
-    rest = None if tick is None else lambda n_done: tick(n + n_done)
-    return longer.joined(_followed(spec, piece.first + n, piece.n - n, threads, rest))
-
-
-def _followed(
-    spec: RunSpec, first: int, n: int, threads: int | None, tick: Tick | None, before: Paused | None = None
-) -> Block:
-    """Follow particles from their starts, or from where they were."""
+    before = None
+    if block_range.before is not None:
+        before = paused_of(block_range.before.arrays, spec.energy, block_range.before.seconds)
     paused = fast.go_on(
         spec.scene,
-        n_particles=n,
+        n_particles=block_range.n,
         energy=spec.energy,
         n_cycles=spec.n_cycles,
         seed=spec.seed,
-        first=first,
+        first=block_range.first,
         threads=threads,
         phases=spec.phases,
-        progress=tick,
+        progress=on_progress,
         before=before,
     )
     ensemble = paused.ensemble
@@ -73,22 +59,22 @@ def _followed(
 def in_process(threads: int | None) -> Engine:
     """Return the engine that follows one block after another with all threads."""
 
-    def engine(spec: RunSpec, pieces: Iterator[BlockRange], tick: Tick) -> Following:
-        for piece in pieces:
-            yield piece, follow(spec, piece, threads, tick)
+    def engine(spec: RunSpec, block_ranges: Iterator[BlockRange], on_progress: OnProgress) -> Following:
+        for block_range in block_ranges:
+            yield block_range, follow(spec, block_range, threads, on_progress)
 
     return engine
 
 
-def follow_elsewhere(data: dict[str, Any], piece: BlockRange, threads: int) -> Block:
-    """Follow a piece on a worker, which must be of the version that asks.
+def follow_elsewhere(version: str, spec: RunSpec, block_range: BlockRange, threads: int) -> Block:
+    """Follow a block on a worker, which must be of the version that asks.
 
     Raises:
         BadInput: it is of another.
     """
-    if data["version"] != mushrooms.__version__:
-        raise BadInput(f"a worker has version {mushrooms.__version__}, must be {data['version']}")
-    return follow(spec_of(data), piece, threads)
+    if version != mushrooms.__version__:
+        raise BadInput(f"a worker has version {mushrooms.__version__}, must be {version}")
+    return follow(spec, block_range, threads)
 
 
 def by_dask(address: str, threads: int | None) -> Engine:
@@ -104,11 +90,11 @@ def by_dask(address: str, threads: int | None) -> Engine:
     """
     try:
         from distributed import Client
-        from distributed.comm import resolve_address
+        from distributed.comm import CommClosedError, resolve_address
     except ImportError:
         raise BadInput("--dask needs dask.distributed: pip install 'oscillating-mushrooms[scale]'") from None
 
-    def engine(spec: RunSpec, pieces: Iterator[BlockRange], tick: Tick) -> Following:
+    def engine(spec: RunSpec, block_ranges: Iterator[BlockRange], on_progress: OnProgress) -> Following:
         try:
             resolve_address(address)  # of what is no address the client is made, and cannot be closed
             # Not the process's default: what else computes with Dask here would wait for this one, even
@@ -116,76 +102,65 @@ def by_dask(address: str, threads: int | None) -> Engine:
             client = Client(address, timeout=CONNECT_TIMEOUT, set_as_default=False)
         except (OSError, ValueError) as error:
             raise BadInput(f"--dask = {address}: no scheduler answers ({type(error).__name__})") from None
-        with _lost_in_a_line(address), client:
-            yield from _handed_out(client, spec, pieces, tick, threads or 1)
+        # Dask logs pages of its own when a cluster is lost, which are of no use to go on with the run.
+        log = logging.getLogger("distributed.client")
+        level = log.level
+        log.setLevel(logging.CRITICAL + 1)
+        try:
+            with client:
+                yield from _hand_out(client, spec, block_ranges, on_progress, threads or 1)
+        except (CancelledError, CommClosedError) as error:
+            why = type(error).__name__
+            raise ConnectionError(f"--dask = {address}: the scheduler has gone ({why})") from None
+        except RuntimeError as error:
+            if "deserialization" not in str(error):
+                raise
+            raise ConnectionError(f"--dask = {address}: the scheduler must have this project too") from None
+        finally:
+            log.setLevel(level)
 
     return engine
 
 
-@contextmanager
-def _lost_in_a_line(address: str) -> Iterator[None]:
-    """Raise ConnectionError for what Dask raises when its scheduler ends, or cannot read what it is handed.
-
-    Dask logs pages of its own then, which nobody needs who goes on with the run.
-    """
-    from distributed.comm import CommClosedError
-
-    log = logging.getLogger("distributed.client")
-    level = log.level
-    log.setLevel(logging.CRITICAL + 1)
-    try:
-        yield
-    except (CancelledError, CommClosedError) as error:
-        why = type(error).__name__
-        raise ConnectionError(f"--dask = {address}: the scheduler has gone ({why})") from None
-    except RuntimeError as error:
-        if "deserialization" not in str(error):
-            raise
-        raise ConnectionError(f"--dask = {address}: the scheduler must have this project too") from None
-    finally:
-        log.setLevel(level)
-
-
-def _handed_out(
-    client: Any, spec: RunSpec, pieces: Iterator[BlockRange], tick: Tick, threads: int
+def _hand_out(
+    client: Any, spec: RunSpec, block_ranges: Iterator[BlockRange], on_progress: OnProgress, threads: int
 ) -> Following:
     """Keep every worker busy, and yield what comes back; what is still out is dropped at the end."""
     from distributed import KilledWorker, wait
 
-    data, out, n_killed = spec.to_data(), {}, Counter[int]()
+    out, n_killed = dict[Any, BlockRange](), Counter[int]()
 
-    def submit(piece: BlockRange) -> None:
-        future = client.submit(
-            follow_elsewhere, data, piece, threads, pure=False, retries=RETRIES, priority=-piece.number
-        )
-        out[future] = piece
+    def submit(block_range: BlockRange) -> None:
+        asked_for = (mushrooms.__version__, spec, block_range, threads)
+        options = {"pure": False, "retries": RETRIES, "priority": -block_range.number}
+        out[client.submit(follow_elsewhere, *asked_for, **options)] = block_range
 
     try:
         while True:
             n_wanted = max(1, BLOCKS_AHEAD * sum(client.nthreads().values())) - len(out)
-            for piece in islice(pieces, max(0, n_wanted)):
-                submit(piece)
+            for block_range in islice(block_ranges, max(0, n_wanted)):
+                submit(block_range)
             if not out:
                 return
-            tick(0)
+            on_progress(0)
             try:
                 with client.as_current():
                     done = wait(list(out), timeout=POLL_INTERVAL, return_when="FIRST_COMPLETED").done
             except TimeoutError:
                 continue
             for future in done:
-                piece = out.pop(future)
+                block_range = out.pop(future)
                 try:
                     block = future.result()
                 except KilledWorker:
                     # So many workers died with it that the scheduler gave it up; it may not be its fault.
-                    n_killed[piece.number] += 1
-                    if n_killed[piece.number] > RETRIES:
+                    n_killed[block_range.number] += 1
+                    if n_killed[block_range.number] > RETRIES:
                         raise ConnectionError(
-                            f"--dask: workers die of block {piece.number} again and again"
+                            f"--dask: workers die of block {block_range.number} again and again"
                         ) from None
-                    submit(piece)
+                    submit(block_range)
                     continue
-                yield piece, block
+                yield block_range, block
     finally:
         client.cancel(list(out))

@@ -20,8 +20,8 @@ import typer
 from conformance.files import write_file
 from mushrooms import output
 from mushrooms.output import import_arrow
-from mushrooms.store.layout import FIELDS, LANES, WALLS, Arrays
 from mushrooms.store.run import StoredRun, open_run
+from mushrooms.store.spec import FIELDS, LANES, WALLS, Arrays
 from scene.refusal import BadInput
 
 MAX_COLUMNS = 10_000

@@ -5,17 +5,15 @@ from __future__ import annotations
 import math
 import sys
 import time
-from collections.abc import Callable, Iterable
-from itertools import chain
-from types import TracebackType
+from collections.abc import Callable, Iterable, Iterator
 from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
+from rich.progress import Progress
 
 from fast.ensemble import FOLLOWED, UNDECIDED
-from mushrooms.forecast import in_words
-from mushrooms.terminal import progress_bar
+from mushrooms.forecast import format_duration
 
 
 class RunTally(NamedTuple):
@@ -26,7 +24,7 @@ class RunTally(NamedTuple):
         collisions, careful: in all.
         met: collisions of those that were followed to the end.
         most: collisions of the particle that has most.
-        captured: captured cycles of those who take part.
+        captured: captured cycles of the particles that take part.
     """
 
     particles: int = 0
@@ -74,15 +72,17 @@ def gain_of(gains: Callable[[], Iterable[npt.NDArray[np.float64]]]) -> Gain:
     `math.fsum` rounds once, whatever the order: blocks of any size come to the same bits.
 
     Args:
-        gains: returns arrays (n, K) of ln(E/E0) after each cycle, block by block; called three times.
+        gains: returns arrays (n, K) of ln(E/E0) after each cycle, block by block; called twice.
     """
-    n = sum(len(part) for part in gains())
+    lengths = []
 
-    def values(centre: float) -> Iterable[float]:
-        return chain.from_iterable((part[:, -1] - centre).tolist() for part in gains())
+    def values(centre: float) -> Iterator[float]:
+        for part in gains():
+            lengths.append(len(part))
+            yield from (part[:, -1] - centre).tolist()
 
-    total = math.fsum(values(0.0)) if n else math.nan
-    if not math.isfinite(total):
+    total, n = math.fsum(values(0.0)), sum(lengths)
+    if not n or not math.isfinite(total):
         return Gain(n)
     mean = total / n
     squares = math.fsum(x * x for x in values(mean))
@@ -95,32 +95,23 @@ CLOCK = time.monotonic
 
 
 class Watch:
-    """A bar on a terminal; elsewhere a line on stderr after 20 seconds, and then one a minute.
+    """Moves a bar on a terminal; elsewhere prints a line on stderr after 20 seconds, and then one a minute.
 
     Args:
+        bar: begun; see `mushrooms.terminal.progress_bar`.
         name: of the run.
         n_particles: in all.
         before: of the particles that were finished before.
     """
 
-    def __init__(self, name: str, n_particles: int, before: RunTally) -> None:
-        self._name, self._n, self._before, self._all = name, n_particles, before, before
-        self._bar, self._done = progress_bar(), before.particles
-        self._begin: float | None = None
-
-    def __enter__(self) -> Watch:
-        self._bar.__enter__()
-        self._task = self._bar.add_task(self._name, total=self._n, completed=self._done)
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self._bar.__exit__(kind, error, trace)
+    def __init__(self, bar: Progress, name: str, n_particles: int, before: RunTally) -> None:
+        self._bar, self._name, self._n, self._before, self._all = bar, name, n_particles, before, before
+        self._done, self._begin = before.particles, math.nan
+        self._task = bar.add_task(name, total=n_particles, completed=self._done)
 
     def update(self, n_done: int) -> None:
         """Take note of how many particles are finished."""
-        if self._begin is None:  # all is checked and compiled
+        if math.isnan(self._begin):  # all is checked and compiled
             self._begin = CLOCK()
             self._next = self._begin + FIRST
         self._done = n_done
@@ -130,17 +121,16 @@ class Watch:
         )
         if self._bar.disable and CLOCK() > self._next:
             self._next = CLOCK() + EVERY
-            print(f"{self._name}: {self.text()}", file=sys.stderr, flush=True)
+            print(f"{self._name}: {self._text()}", file=sys.stderr, flush=True)
 
     def add(self, tally: RunTally) -> None:
         """Take note of a finished block."""
         self._all = self._all.merged(tally)
 
-    def text(self) -> str:
-        """Return how far the run is."""
+    def _text(self) -> str:
         left, rate = self._n - self._done, self._rate()
-        told = in_words(left / rate) + " left" if rate else "time left unknown"
-        return f"{self._done:,} of {self._n:,} particles, {told}, {self._pace()}"
+        left_in_words = format_duration(left / rate) + " left" if rate else "time left unknown"
+        return f"{self._done:,} of {self._n:,} particles, {left_in_words}, {self._pace()}"
 
     def _pace(self) -> str:
         lost = self._all.particles - self._all.followed
@@ -148,4 +138,4 @@ class Watch:
 
     def _rate(self) -> float:
         """Return how many particles a second have been followed here."""
-        return (self._done - self._before.particles) / max(CLOCK() - (self._begin or 0.0), 1e-9)
+        return (self._done - self._before.particles) / max(CLOCK() - self._begin, 1e-9)

@@ -1,6 +1,6 @@
 """A run in a folder: a Zarr group of results, and a sealed marker for each block of particles.
 
-zarr writes and reads the arrays (`layout`).
+zarr writes and reads the arrays (`spec`).
 
 A block is finished when its marker is there: a small sealed file, written after the block's arrays, that
 holds their SHA-256. A block without a marker, or whose arrays do not have these sums, is followed again. So
@@ -22,9 +22,8 @@ import zarr
 
 from conformance.files import sealed, unsealed, write_file
 from fast import Ensemble
-from mushrooms.store.layout import FIELDS, Array, Arrays, Shape, shape_of
 from mushrooms.store.progress import RunTally, tally_of
-from mushrooms.store.spec import SCHEMA, RunSpec, made_by, spec_of
+from mushrooms.store.spec import FIELDS, SCHEMA, Array, Arrays, RunSpec, Shape, made_by, shape_of, spec_of
 from scene.refusal import BadInput
 
 GROUP, MARKERS = "ensemble.zarr", "blocks"
@@ -37,13 +36,13 @@ DIGESTED = Ensemble._fields[1:-2]  # neither energy0 nor times
 
 
 class BlockRange(NamedTuple):
-    """Particles that are to be followed: a block, or what a block lacks.
+    """The particles of a block that is to be followed.
 
     Attributes:
         number: of the block.
-        first: number of the first particle.
+        first: number of its first particle.
         n: how many.
-        before: results of the first of them after fewer cycles; they go on from there.
+        before: their results after fewer cycles, from which they continue; None: from their starts.
     """
 
     number: int
@@ -53,7 +52,7 @@ class BlockRange(NamedTuple):
 
 
 class Block(NamedTuple):
-    """Results of the particles of a block, or of a part of one.
+    """Results of the particles of a block.
 
     Attributes:
         arrays: as stored.
@@ -67,11 +66,6 @@ class Block(NamedTuple):
     def tally(self) -> RunTally:
         """Count what became of the particles."""
         return tally_of(self.arrays)
-
-    def joined(self, rest: Block) -> Block:
-        """Return this block with more particles behind its own."""
-        arrays = {name: np.concatenate([array, rest.arrays[name]]) for name, array in self.arrays.items()}
-        return Block(arrays, self.seconds + rest.seconds)
 
 
 class Marker(NamedTuple):
@@ -93,51 +87,52 @@ class Marker(NamedTuple):
 
 
 class StoredRun:
-    """A run in a folder, which whoever writes must hold (`mushrooms.output.locked`).
+    """A run in a folder, which a writer must hold (`mushrooms.output.locked`).
 
     Attributes:
         folder: holds GROUP, which xarray reads, and MARKERS.
         spec: all that decides its bits.
         shape: its sizes.
         command: how it is made.
-        tally, seconds: of the blocks that are there, once `check` has looked; without those that hold
-            fewer cycles.
+        tally, seconds: of the finished blocks, once `check` has looked. A block that the run has outgrown,
+            because it holds fewer particles or cycles than it has to, is not finished.
     """
 
     def __init__(self, folder: Path, spec: RunSpec, shape: Shape, command: str) -> None:
         self.folder, self.spec, self.shape, self.command = folder, spec, shape, command
         self.tally, self.seconds = RunTally(), 0.0
-        self._rows: dict[int, int] = {}  # particles that are there, by block
-        self._shorter: dict[int, int] = {}  # blocks that are there with fewer cycles, and how many
+        self._markers: dict[int, Marker] = {}  # of the blocks on disk, those outgrown included
         self._arrays: dict[str, Any] = {}  # of the Zarr group, once it is open
-        # The marker of another run, left here by someone who moved files, does not count.
+        # The marker of another run, moved here with its files, does not count.
         sizes = {"cycles": shape.chunked, "block": shape.block}
         self._identity = _digest(spec.to_data() | sizes)
 
     def missing(self) -> Iterator[BlockRange]:
-        """Yield what is still to be followed, with what is there of it.
+        """Yield the blocks still to be followed, each with what is on disk to continue from.
 
         Raises:
             BadInput: that has been damaged since `check`.
         """
-        for piece in self.lacking():
-            yield piece._replace(before=self.block(piece.number)) if piece.number in self._shorter else piece
+        for block_range in self.lacking():
+            marker = self._markers.get(block_range.number)
+            is_continued = marker is not None and marker.rows == block_range.n
+            yield block_range._replace(before=self.block(block_range.number) if is_continued else None)
 
     def lacking(self) -> Iterator[BlockRange]:
-        """Yield what is still to be followed."""
+        """Yield the blocks still to be followed."""
         for number in range(self.shape.n_blocks):
-            there = self._rows.get(number, 0)
-            if there < self.shape.rows(number):
-                yield BlockRange(number, number * self.shape.block + there, self.shape.rows(number) - there)
+            if not self._is_finished(number):
+                yield BlockRange(number, number * self.shape.block, self.shape.rows(number))
 
-    @property
-    def cycles_there(self) -> int:
-        """Return how many cycles have been followed of all that is missing."""
-        return min((self._shorter.get(piece.number, 0) for piece in self.lacking()), default=0)
+    def _is_finished(self, number: int) -> bool:
+        marker = self._markers.get(number)
+        whole = self.shape.rows(number), self.shape.n_cycles
+        return marker is not None and (marker.rows, marker.cycles) == whole
 
     def first_there(self) -> int | None:
-        """Return the first block that is there, one of fewer cycles before others."""
-        return min(self._shorter or self._rows, default=None)
+        """Return the first block on disk, one with fewer cycles than the run before others."""
+        whole = {number: marker.cycles == self.shape.n_cycles for number, marker in self._markers.items()}
+        return min(whole, key=lambda number: (whole[number], number), default=None)
 
     def block(self, number: int) -> Block:
         """Return a block, with as many cycles as it has.
@@ -146,12 +141,12 @@ class StoredRun:
             BadInput: it is missing or damaged.
         """
         arrays = {name: self.read(number, name) for name in self.shape.names}
-        return Block(arrays, self._found(number).seconds)
+        return Block(arrays, self._markers[number].seconds)
 
     def check(self) -> list[int]:
         """Read every block, count those that are as they were written, and return the damaged ones."""
         damaged = []
-        self._rows, self._shorter, self.tally, self.seconds = {}, {}, RunTally(), 0.0
+        self._markers, self.tally, self.seconds = {}, RunTally(), 0.0
         for pattern in (".*.part", "*.partial"):  # what we, or zarr, were writing when the process ended
             for path in self.folder.rglob(pattern):
                 path.unlink(missing_ok=True)
@@ -160,13 +155,14 @@ class StoredRun:
         for number in range(self.shape.n_blocks):
             if self._path(number).exists():
                 try:
-                    block = self.block(number)
-                    self._count(self._found(number), block.tally)
+                    self._markers[number] = self._marker(number)
+                    self._count(self._markers[number], self.block(number).tally)
                 except BadInput:
+                    self._markers.pop(number, None)
                     damaged.append(number)
         return damaged
 
-    def keep(self, piece: BlockRange, block: Block) -> None:
+    def keep(self, block_range: BlockRange, block: Block) -> None:
         """Write a block: first its arrays, then its marker.
 
         Raises:
@@ -174,26 +170,24 @@ class StoredRun:
         """
         if not self._arrays:
             self.describe()
-        there, whole, first_cycle = self._rows.get(piece.number, 0), block, 0
-        if there:  # the run was widened: the block gets more particles
-            whole = self.block(piece.number).joined(block)
-        marker = self._marker(piece.number)
-        rows = there + piece.n
-        if piece.before is not None and marker is not None and marker.rows == rows:
-            first_cycle = marker.cycles  # these are on the disk, and stay as they are
-        begin = piece.number * self.shape.block
+        first_cycle = 0
+        if block_range.before is not None:
+            first_cycle = self._markers[
+                block_range.number
+            ].cycles  # those before are on disk, and stay as they are
+        rows = slice(block_range.first, block_range.first + block_range.n)
         for name in self.shape.names:
-            array, values = self._arrays[name], whole.arrays[name]
-            if rows < self.shape.rows(piece.number):  # else zarr would read the rest, which may be damaged
-                array[begin : begin + self.shape.block] = array.fill_value
+            values = block.arrays[name]
             if "cycle" in FIELDS[name].dims:
-                array[begin : begin + rows, first_cycle:] = values[:, first_cycle:]
+                self._arrays[name][rows, first_cycle:] = values[:, first_cycle:]
             else:
-                array[begin : begin + rows] = values
-        sums = {name: _sum(whole.arrays[name]) for name in self.shape.names}
-        marker = Marker(self._identity, piece.number, rows, self.shape.n_cycles, sums, whole.seconds)
-        write_file(self._path(piece.number), sealed(json.dumps(marker._asdict()).encode()))
-        self._count(marker._replace(seconds=block.seconds), block.tally)
+                self._arrays[name][rows] = values
+        sums = {name: _sum(block.arrays[name]) for name in self.shape.names}
+        marker = Marker(
+            self._identity, block_range.number, block_range.n, self.shape.n_cycles, sums, block.seconds
+        )
+        write_file(self._path(block_range.number), sealed(json.dumps(marker._asdict()).encode()))
+        self._count(marker, block.tally)
 
     def describe(self) -> None:
         """Write the metadata of the group and of its arrays; chunks that are there stay."""
@@ -229,16 +223,14 @@ class StoredRun:
         Raises:
             BadInput: it is missing or damaged.
         """
-        marker, dims = self._found(number), FIELDS[name].dims
-        begin = number * self.shape.block
-        array = np.empty(0)
-        if self._is_open():
+        marker, begin = self._markers.get(number), number * self.shape.block
+        if marker is not None and self._is_open():
             with suppress(*UNREADABLE):
                 array = np.asarray(self._arrays[name][begin : begin + marker.rows])
-                array = array[:, : marker.cycles] if "cycle" in dims else array
-        if _sum(array) != marker.sums[name]:
-            raise self._damaged(number)
-        return array
+                array = array[:, : marker.cycles] if "cycle" in FIELDS[name].dims else array
+                if _sum(array) == marker.sums[name]:
+                    return array
+        raise self._damaged(number)
 
     def load(self) -> None:
         """Count the blocks by their markers alone: what is read later is checked then.
@@ -247,8 +239,8 @@ class StoredRun:
             BadInput: particles are missing.
         """
         for number in range(self.shape.n_blocks):
-            marker = self._marker(number)
-            if marker is not None:
+            with suppress(BadInput):
+                marker = self._marker(number)
                 self._count(marker, RunTally(particles=marker.rows))
         if any(self.lacking()):
             there, n = self.tally.particles, self.shape.n_particles
@@ -284,7 +276,7 @@ class StoredRun:
         return digest.hexdigest()
 
     def gains(self) -> Iterator[Array]:
-        """Yield (n, K) ln(E/E0) after each cycle of those who take part, block by block."""
+        """Yield (n, K) ln(E/E0) after each cycle of those that take part, block by block."""
         for number in range(self.shape.n_blocks):
             takes_part = self.read(number, "takes_part") == 1
             with np.errstate(divide="ignore"):
@@ -304,12 +296,9 @@ class StoredRun:
         return Ensemble(energy0=self.spec.energy, seconds=seconds, threads=1, **fields)
 
     def _count(self, marker: Marker, tally: RunTally) -> None:
-        if marker.cycles < self.shape.n_cycles:
-            self._shorter[marker.number] = marker.cycles
-            return
-        self._shorter.pop(marker.number, None)
-        self._rows[marker.number] = marker.rows
-        self.tally, self.seconds = self.tally.merged(tally), self.seconds + marker.seconds
+        self._markers[marker.number] = marker
+        if self._is_finished(marker.number):
+            self.tally, self.seconds = self.tally.merged(tally), self.seconds + marker.seconds
 
     def _path(self, number: int) -> Path:
         return self.folder / MARKERS / f"{number}.marker"
@@ -318,22 +307,19 @@ class StoredRun:
         where = f"block {number} of {str(self.folder / GROUP)!r}"
         return BadInput(f"{where} is missing or damaged: mushrooms simulate --resume mends it")
 
-    def _found(self, number: int) -> Marker:
-        """Return the marker of a block, or raise BadInput."""
-        marker = self._marker(number)
-        if marker is None:
-            raise self._damaged(number)
-        return marker
+    def _marker(self, number: int) -> Marker:
+        """Return the marker of a block from the disk.
 
-    def _marker(self, number: int) -> Marker | None:
-        """Return the marker of a block; None where there is none of this run, or none that is whole."""
+        Raises:
+            BadInput: there is none of this run, or none that is whole.
+        """
         content = unsealed(self._path(number))
         data = {} if content is None else json.loads(content)
-        if (data.get("run"), data.get("number")) != (self._identity, number):
-            return None
-        marker = Marker(**data)
-        is_larger = marker.rows > self.shape.rows(number) or marker.cycles > self.shape.n_cycles
-        return None if is_larger else marker
+        if (data.get("run"), data.get("number")) == (self._identity, number):
+            marker = Marker(**data)
+            if marker.rows <= self.shape.rows(number) and marker.cycles <= self.shape.n_cycles:
+                return marker
+        raise self._damaged(number)
 
     def _is_open(self) -> bool:
         """Open the arrays if they are not; tell whether their metadata can be read."""

@@ -1,8 +1,13 @@
-"""The specification of a run: all that decides its bits, and how two specifications differ."""
+"""What a run is: all that decides its bits, the arrays that are stored of it, and their sizes.
+
+A block of particles is one chunk of each array. Along the cycles a chunk holds as many as the run began with,
+and a run that is lengthened gets further chunks. What is not there yet reads as nan, or as -1.
+"""
 
 from __future__ import annotations
 
 import json
+import math
 import platform
 import shlex
 import subprocess
@@ -11,10 +16,14 @@ from typing import Any, NamedTuple
 
 import numba
 import numpy as np
+import numpy.typing as npt
 
 import mushrooms
 import scene as scenes
-from scene import Scene
+from fast import Ensemble, Paused
+from fast.kernel.kept import LANE_ROWS
+from scene import Mushroom, Scene
+from scene.mouth import narrowings
 
 SCHEMA = 4  # of a stored run: raised when its files change, so that older ones are refused
 
@@ -101,3 +110,112 @@ def _revision() -> str | None:
     except (OSError, subprocess.TimeoutExpired):
         return None
     return done.stdout.strip() or None
+
+
+Array = npt.NDArray[Any]
+Arrays = dict[str, Array]
+WALLS = Mushroom.walls
+OUTCOMES = "followed undecided undefined rejected"
+
+
+class Stored(NamedTuple):
+    """An array of the store; it has the name that it has in `fast.Ensemble`, or in `fast.Paused`.
+
+    Attributes:
+        dims: its dimensions.
+        kind: the type of its numbers.
+        meaning: in a line.
+    """
+
+    dims: tuple[str, ...]
+    kind: str
+    meaning: str
+
+
+ONE, CYCLES, SLOTS = ("particle",), ("particle", "cycle"), ("particle", "cycle", "narrowing")
+LOOKS = ("particle", "cycle", "phase")
+FIELDS = {
+    "cycle_energies": Stored(CYCLES, "float64", "energy v^2/2 at the end of each cycle"),
+    "t": Stored(ONE, "float64", "time of the last state"),
+    "x": Stored(ONE, "float64", "place of the last state"),
+    "y": Stored(ONE, "float64", "place of the last state"),
+    "vx": Stored(ONE, "float64", "velocity of the last state"),
+    "vy": Stored(ONE, "float64", "velocity of the last state"),
+    "outcome": Stored(ONE, "int8", f"0 to 3: {OUTCOMES}; -1: not followed yet"),
+    "takes_part": Stored(ONE, "int8", "1: counts in means and shares; -1: not followed yet"),
+    "t_in": Stored(SLOTS, "float64", "begin of the capture interval around each narrowing; nan: none"),
+    "t_out": Stored(SLOTS, "float64", "end of that stay"),
+    "wall_counts": Stored(("particle", "wall"), "int64", f"collisions with {' '.join(WALLS)}"),
+    "n_careful": Stored(ONE, "int64", "collisions left to the careful step"),
+    "phase_energies": Stored(LOOKS, "float64", "energy v^2/2 at the phases of each cycle"),
+    "phase_captured": Stored(LOOKS, "int8", "1: captured there; -1: not followed yet"),
+    "lanes": Stored(("particle", "row"), "float64", "what it takes to go on: see fast.Paused"),
+}
+LANES = "lanes"  # no result: neither digested nor exported
+
+
+class Shape(NamedTuple):
+    """The sizes of a stored run.
+
+    Attributes:
+        n_particles: in all.
+        block: particles of a block; the last one may have fewer.
+        n_cycles, n_narrowings, n_phases: looks at each.
+        chunked: cycles of a chunk.
+    """
+
+    n_particles: int
+    block: int
+    n_cycles: int
+    n_narrowings: int
+    n_phases: int
+    chunked: int
+
+    @property
+    def n_blocks(self) -> int:
+        """Return how many blocks there are."""
+        return -(-self.n_particles // self.block)
+
+    def rows(self, number: int) -> int:
+        """Return how many particles a block has."""
+        return min(self.block, self.n_particles - number * self.block)
+
+    def of(self, name: str, n: int, n_cycles: int) -> tuple[int, ...]:
+        """Return the shape of an array for n particles and so many cycles."""
+        sizes = {"cycle": n_cycles, "narrowing": self.n_narrowings, "phase": self.n_phases}
+        sizes |= {"wall": len(WALLS), "row": int(LANE_ROWS)}
+        return (n, *(sizes[dim] for dim in FIELDS[name].dims[1:]))
+
+    @property
+    def names(self) -> list[str]:
+        """Return the arrays that hold anything: a scene without narrowings has no captured stays."""
+        return [name for name in FIELDS if 0 not in self.of(name, 1, 1)]
+
+    @property
+    def bytes_of_a_particle(self) -> int:
+        """Return how much disk a particle takes."""
+        kinds = {name: np.dtype(FIELDS[name].kind) for name in self.names}
+        return sum(kind.itemsize * math.prod(self.of(name, 1, self.n_cycles)) for name, kind in kinds.items())
+
+
+def shape_of(spec: RunSpec, n_particles: int, block: int, chunked: int | None = None) -> Shape:
+    """Return the sizes of a run; in a chunk it has so many cycles, by default all."""
+    looks = len(narrowings(spec.scene)), len(spec.phases)
+    return Shape(n_particles, block, spec.n_cycles, *looks, chunked or spec.n_cycles)
+
+
+def columns(paused: Paused) -> Arrays:
+    """Return the arrays that are stored of an ensemble."""
+    found = paused.ensemble._asdict()
+    found |= {"lanes": paused.lanes, "takes_part": paused.ensemble.takes_part()}
+    return {name: found[name].astype(field.kind, copy=False) for name, field in FIELDS.items()}
+
+
+def paused_of(arrays: Arrays, energy0: float, seconds: float) -> Paused:
+    """Return the ensemble that arrays were stored of, which has taken so many seconds in one thread."""
+    none = np.zeros((*arrays["cycle_energies"].shape, 0))
+    empty = {"t_in": none, "t_out": none, "phase_energies": none, "phase_captured": none}
+    found: dict[str, Any] = empty | arrays | {"energy0": energy0, "seconds": seconds, "threads": 1}
+    found |= {"energy": found["cycle_energies"][:, -1], "n_collisions": found["wall_counts"].sum(axis=1)}
+    found["phase_captured"] = found["phase_captured"].astype(bool)
+    return Paused(Ensemble(**{name: found[name] for name in Ensemble._fields}), found["lanes"])

@@ -1,18 +1,21 @@
 """Certified answers, from the one prover, and how delicate a question is."""
 
 import os
+from typing import Any
 
 from msgspec import to_builtins
 
 import reference
 import scene as scenes
+from conformance import vectors
 from conformance.cases.prover import proved_step
+from conformance.grading.agreement import middle
 from reference.arithmetic import Enclosure
 from scene import Scene, State
 from scene.laws import bounds
 from scene.tables import laws
 
-__all__ = ["IS_DEEP", "centre", "is_delicate", "proved_step"]
+__all__ = ["IS_DEEP", "centre", "certified_answer", "is_delicate", "proved_step"]
 
 IS_DEEP = os.environ.get("HYPOTHESIS_PROFILE") == "deep"
 NUDGE = 2.0**-46  # what rounding may move a state by, relative to the table and to the speed
@@ -33,3 +36,15 @@ def is_delicate(scene: Scene, state: State, t_end: float) -> bool:
             seen.add((type(outcome).__name__, getattr(outcome, "wall", None)))
             times += [float(outcome.dt)] if isinstance(outcome, reference.Collision) else []
     return len(seen) != 1 or (len(times) > 0 and max(times) - min(times) > 1e-3 * max(times))
+
+
+def certified_answer(vector: vectors.Vector) -> dict[str, Any]:
+    """Return the answer in the middle of the enclosures, rounded, as it comes over the wire."""
+    steps = to_builtins(middle(vector.expect[0], vector.state))
+    if vector.kind == "trajectory":
+        return {"steps": steps}
+    if vector.kind == "step":
+        return dict(steps[-1])
+    times, stays = [vector.state.t, *(step["t"] for step in steps)], vector.expect[0].stays
+    stay = [times[place + 1] for place in stays[0]] if stays else None
+    return {"states": [{**steps[-1], "captured": stay}]}
